@@ -1,0 +1,185 @@
+//! One contact: distance to the cone, natural map and status, from the definitions.
+
+use serde::Serialize;
+
+use crate::linalg::small::tangential_norm;
+
+/// What a contact does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Motion {
+    /// No impulse, separating: `r = 0`.
+    Open,
+    /// Pressed and at rest: `u = 0`, `r` inside K.
+    Stick,
+    /// Pressed and sliding: `u_N = 0`, `r` on the boundary of K against the sliding velocity.
+    Slip,
+}
+
+/// The status of a contact and whether it is certain at the tolerance asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct ContactStatus {
+    /// Open, stick or slip: the region of the cone in which `x − ũ` lies.
+    pub status: Motion,
+    /// The margin to another status is below the tolerance.
+    pub degenerate: bool,
+}
+
+/// `ũ = u + mu‖u_T‖ e_N`, De Saxcé's modified velocity.
+pub(super) fn modified_velocity<const D: usize>(u: &[f64; D], mu: f64) -> [f64; D] {
+    let mut modified = *u;
+    modified[0] += mu * tangential_norm(u);
+    modified
+}
+
+/// The nearest point of `K = {‖x_T‖ ≤ mu x_N}`, in the half-plane of `(x_N, ‖x_T‖)`:
+/// x itself inside, else its projection on the ray `(cos φ, sin φ)`, `tan φ = mu`, or the apex.
+pub(super) fn nearest_in_cone<const D: usize>(x: &[f64; D], mu: f64) -> [f64; D] {
+    let t = tangential_norm(x);
+    if t <= mu * x[0] {
+        return *x;
+    }
+    let secant = (1.0 + mu * mu).sqrt();
+    let along = (x[0] + mu * t) / secant;
+    let mut p = [0.0; D];
+    if along > 0.0 {
+        p[0] = along / secant;
+        for k in 1..D {
+            p[k] = if t > 0.0 { mu * p[0] * (x[k] / t) } else { 0.0 };
+        }
+    }
+    p
+}
+
+/// `dist(x, K)`.
+pub(super) fn distance_to_cone<const D: usize>(x: &[f64; D], mu: f64) -> f64 {
+    let p = nearest_in_cone(x, mu);
+    (0..D)
+        .map(|k| (x[k] - p[k]) * (x[k] - p[k]))
+        .sum::<f64>()
+        .sqrt()
+}
+
+/// `dist(y, K*)` with `K* = {mu‖y_T‖ ≤ y_N}`: by Moreau's decomposition the norm of the projection of −y on K.
+pub(super) fn distance_to_dual<const D: usize>(y: &[f64; D], mu: f64) -> f64 {
+    let p = nearest_in_cone(&y.map(|v| -v), mu);
+    p.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// The natural map `x − P_K(x − ũ)`.
+///
+/// Inside the cone it is ũ and inside the polar cone it is x, returned as such: the difference of two large
+/// numbers would hide a small residual.
+pub(super) fn natural_map<const D: usize>(x: &[f64; D], modified: &[f64; D], mu: f64) -> [f64; D] {
+    let mut y = *x;
+    for k in 0..D {
+        y[k] -= modified[k];
+    }
+    if tangential_norm(&y) <= mu * y[0] {
+        return *modified;
+    }
+    let p = nearest_in_cone(&y, mu);
+    let mut phi = *x;
+    for k in 0..D {
+        phi[k] -= p[k];
+    }
+    phi
+}
+
+/// The status of a contact from `x = w r` and ũ; `margin` is a velocity.
+pub(super) fn status<const D: usize>(
+    x: &[f64; D],
+    modified: &[f64; D],
+    mu: f64,
+    margin: f64,
+) -> ContactStatus {
+    let mut y = *x;
+    for k in 0..D {
+        y[k] -= modified[k];
+    }
+    let t = tangential_norm(&y);
+    let secant = (1.0 + mu * mu).sqrt();
+    // Signed distances of y into K and into its polar cone −K*.
+    let into_cone = (mu * y[0] - t) / secant;
+    let into_polar = (-y[0] - mu * t) / secant;
+    let status = if into_polar >= 0.0 {
+        Motion::Open
+    } else if mu > 0.0 && into_cone >= 0.0 {
+        Motion::Stick
+    } else {
+        Motion::Slip
+    };
+    // A frictionless contact slides or is open: its cone has no interior to be near to.
+    let near_stick = mu > 0.0 && into_cone.abs() <= margin;
+    ContactStatus {
+        status,
+        degenerate: into_polar.abs() <= margin || near_stick,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_three_regions() {
+        let mu = 0.5;
+        let at_rest = ([2.0, 0.1, 0.2], [0.0; 3]);
+        assert_eq!(
+            status(&at_rest.0, &at_rest.1, mu, 1e-9).status,
+            Motion::Stick
+        );
+        let sliding = ([2.0, -1.0, 0.0], modified_velocity(&[0.0, 3.0, 0.0], mu));
+        assert_eq!(
+            status(&sliding.0, &sliding.1, mu, 1e-9).status,
+            Motion::Slip
+        );
+        let flying = ([0.0; 3], modified_velocity(&[1.0, 3.0, 0.0], mu));
+        assert_eq!(status(&flying.0, &flying.1, mu, 1e-9).status, Motion::Open);
+        for (x, u) in [at_rest, sliding, flying] {
+            assert!(natural_map(&x, &u, mu).iter().all(|v| v.abs() < 1e-15));
+            assert!(!status(&x, &u, mu, 1e-9).degenerate);
+        }
+        assert!(status(&[0.0; 3], &[0.0; 3], mu, 1e-9).degenerate);
+        assert!(status(&[2.0, -1.0, 0.0], &[0.0; 3], mu, 1e-9).degenerate);
+    }
+
+    #[test]
+    fn frictionless_contacts_slide_or_are_open() {
+        let pressed = status(&[1.0, 0.0, 0.0], &[0.0, 0.0, 0.0], 0.0, 1e-9);
+        assert_eq!(
+            pressed,
+            ContactStatus {
+                status: Motion::Slip,
+                degenerate: false
+            }
+        );
+        let open = status(&[0.0; 3], &[1.0, 5.0, 0.0], 0.0, 1e-9);
+        assert_eq!(
+            open,
+            ContactStatus {
+                status: Motion::Open,
+                degenerate: false
+            }
+        );
+    }
+
+    #[test]
+    fn the_nearest_point_is_nearer_than_any_other_of_the_cone() {
+        for mu in [0.0, 0.3, 2.0] {
+            for i in 0..60 {
+                let a = f64::from(i) * 0.7;
+                let x = [2.0 * a.sin(), a.cos() * 1.5, (1.3 * a).sin()];
+                let best = distance_to_cone(&x, mu);
+                for j in 0..2000 {
+                    let b = f64::from(j);
+                    let n = (b * 0.377).rem_euclid(4.0);
+                    let t = mu * n * (b * 0.113).sin();
+                    let p = [n, t * b.cos(), t * b.sin()];
+                    let d = (0..3).map(|k| (x[k] - p[k]).powi(2)).sum::<f64>().sqrt();
+                    assert!(d >= best - 1e-12, "mu {mu} x {x:?} p {p:?}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! The full verdict on a point: residuals, the status of each contact, the worst contacts.
+
+use serde::Serialize;
+
+use super::contact::{modified_velocity, natural_map, status};
+use super::local::LawGauge;
+use super::{ContactStatus, Measure, Motion, over};
+use crate::linalg::small;
+use crate::{FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem, ProblemError};
+
+/// Everything that the judge says of a point.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verdict {
+    /// The residuals.
+    pub measure: Measure,
+    /// Whether they pass at the tolerance asked for.
+    pub solved: bool,
+    /// How many contacts do what.
+    pub counts: StatusCounts,
+    /// The status of each contact.
+    #[serde(skip)]
+    pub statuses: Vec<ContactStatus>,
+    /// The relative velocity u recomputed from the impulses, D·nc.
+    #[serde(skip)]
+    pub velocity: Vec<f64>,
+    /// The contacts with the largest residuals over `‖q‖`, worst first, at most ten.
+    pub worst: Vec<(usize, f64)>,
+}
+
+/// How many contacts are open, stick and slip (they add up), and how many of those are degenerate.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct StatusCounts {
+    /// Contacts without impulse.
+    pub open: usize,
+    /// Contacts at rest.
+    pub stick: usize,
+    /// Sliding contacts.
+    pub slip: usize,
+    /// Contacts, counted above as well, whose margin to another status is below the tolerance.
+    pub degenerate: usize,
+}
+
+/// A problem whose judge can say what each contact does.
+pub trait Judged: Problem {
+    /// The full verdict on `point` at `tolerance`. Allocates; the loop uses [`Problem::measure`].
+    ///
+    /// Errors: a point of the wrong shape or with entries that are not finite, a singular M.
+    fn judge(&self, point: &Self::Point, tolerance: f64) -> Result<Verdict, ProblemError>;
+}
+
+impl<const D: usize> Judged for FrictionLocal<D> {
+    fn judge(&self, point: &LocalPoint, tolerance: f64) -> Result<Verdict, ProblemError> {
+        self.validate_point(point)?;
+        let mut gauge = self.gauge()?;
+        let measure = self.measure(point, &mut gauge);
+        Ok(verdict::<D>(
+            measure,
+            &gauge.law,
+            &point.r,
+            gauge.velocity(),
+            &self.mu,
+            tolerance,
+        ))
+    }
+}
+
+impl<const D: usize> Judged for FrictionGlobal<D> {
+    fn judge(&self, point: &GlobalPoint, tolerance: f64) -> Result<Verdict, ProblemError> {
+        self.validate_point(point)?;
+        let mut gauge = self.gauge()?;
+        let measure = self.measure(point, &mut gauge);
+        Ok(verdict::<D>(
+            measure,
+            &gauge.law,
+            &point.r,
+            gauge.velocity(),
+            &self.mu,
+            tolerance,
+        ))
+    }
+}
+
+fn verdict<const D: usize>(
+    measure: Measure,
+    law: &LawGauge,
+    r: &[f64],
+    u: &[f64],
+    mu: &[f64],
+    tolerance: f64,
+) -> Verdict {
+    let margin = if law.norm_q > 0.0 {
+        tolerance * law.norm_q
+    } else {
+        tolerance
+    };
+    let mut counts = StatusCounts::default();
+    let mut statuses = Vec::with_capacity(mu.len());
+    let mut worst = Vec::with_capacity(mu.len());
+    for (c, (&mu, &w)) in mu.iter().zip(&law.w).enumerate() {
+        let x = small::block::<D>(r, c).map(|v| w * v);
+        let modified = modified_velocity::<D>(&small::block(u, c), mu);
+        let s = status(&x, &modified, mu, margin);
+        match s.status {
+            Motion::Open => counts.open += 1,
+            Motion::Stick => counts.stick += 1,
+            Motion::Slip => counts.slip += 1,
+        }
+        counts.degenerate += usize::from(s.degenerate);
+        statuses.push(s);
+        let share = natural_map(&x, &modified, mu)
+            .iter()
+            .map(|v| v * v)
+            .sum::<f64>()
+            .sqrt();
+        worst.push((c, over(share, law.norm_q)));
+    }
+    worst.sort_by(|a, b| b.1.total_cmp(&a.1));
+    worst.truncate(10);
+    Verdict {
+        measure,
+        solved: measure.passes(tolerance),
+        counts,
+        statuses,
+        velocity: u.to_vec(),
+        worst,
+    }
+}

@@ -1,0 +1,103 @@
+//! A caller's mistake in the data of a problem.
+
+/// What is wrong with a problem's data: the place, what was expected there and what was found.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ProblemError {
+    /// A vector or matrix does not have the size that the rest of the problem asks for.
+    #[error("{place}: expected {expected}, found {found}")]
+    Shape {
+        /// The dataset at fault, in FCLIB's letters.
+        place: String,
+        /// What its shape must be.
+        expected: String,
+        /// What its shape is.
+        found: String,
+    },
+    /// A value is not allowed where it stands (NaN, infinite, negative coefficient of friction, ...).
+    #[error("{place}: expected {expected}, found {found}")]
+    Value {
+        /// The entry at fault, for example `mu[3]` or `W[4, 7]`.
+        place: String,
+        /// What may stand there.
+        expected: String,
+        /// What stands there.
+        found: String,
+    },
+    /// The problem has no contacts, so there is nothing to solve.
+    #[error("{place}: expected at least one contact, found none")]
+    Empty {
+        /// The dataset at fault.
+        place: String,
+    },
+    /// A matrix that the statement inverts (M, or M with the bilateral constraints) is singular.
+    #[error("{place}: expected an invertible matrix, found {found}")]
+    Singular {
+        /// The matrix at fault.
+        place: String,
+        /// How the singularity showed.
+        found: String,
+    },
+}
+
+impl ProblemError {
+    pub(crate) fn shape(
+        place: impl Into<String>,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> Self {
+        Self::Shape {
+            place: place.into(),
+            expected: expected.into(),
+            found: found.into(),
+        }
+    }
+
+    pub(crate) fn value(
+        place: impl Into<String>,
+        expected: impl Into<String>,
+        found: impl ToString,
+    ) -> Self {
+        Self::Value {
+            place: place.into(),
+            expected: expected.into(),
+            found: found.to_string(),
+        }
+    }
+}
+
+/// The first entry of `x` that is not finite, as an error that names it.
+pub(crate) fn all_finite(name: &str, x: &[f64]) -> Result<(), ProblemError> {
+    match x.iter().position(|v| !v.is_finite()) {
+        Some(k) => Err(ProblemError::value(
+            format!("{name}[{k}]"),
+            "a finite number",
+            x[k],
+        )),
+        None => Ok(()),
+    }
+}
+
+/// `x` has `len` entries, all finite.
+pub(crate) fn vector(name: &str, x: &[f64], len: usize, meaning: &str) -> Result<(), ProblemError> {
+    if x.len() != len {
+        return Err(ProblemError::shape(
+            name,
+            format!("{len} entries ({meaning})"),
+            format!("{} entries", x.len()),
+        ));
+    }
+    all_finite(name, x)
+}
+
+/// Every coefficient of friction is finite and not negative; zero is allowed (a frictionless contact).
+pub(crate) fn friction_coefficients(mu: &[f64]) -> Result<(), ProblemError> {
+    all_finite("mu", mu)?;
+    match mu.iter().position(|&m| m < 0.0) {
+        Some(c) => Err(ProblemError::value(
+            format!("mu[{c}]"),
+            "a coefficient of friction of at least 0",
+            mu[c],
+        )),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,218 @@
+//! The global (mixed linear) frictional contact problem.
+
+use crate::check::{self, Certificate, Measure};
+use crate::error::{all_finite, friction_coefficients, vector};
+use crate::linalg::{Csc, Inverse};
+use crate::{Kind, Problem, ProblemError};
+
+/// **Find** `v`, `r` (and the multipliers `lambda` of bilateral constraints) such that
+///
+/// ```text
+/// M v = H r + f  (+ G lambda),    u = Hᵀ v + w,    Gᵀ v + b = 0,
+/// K* ∋ u + mu‖u_T‖ e_N  ⟂  r ∈ K    for each contact, K = {‖r_T‖ ≤ mu r_N}.
+/// ```
+///
+/// | field | meaning | shape | unit |
+/// | --- | --- | --- | --- |
+/// | `M` | mass (iteration) matrix, invertible; need not be symmetric | n × n | kg |
+/// | `H` | transposed contact Jacobian, columns by contact | n × D·nc | 1 |
+/// | `f` | right-hand side | n | N·s |
+/// | `w` | given part of the relative velocity, impact terms included | D·nc | m/s |
+/// | `mu` | coefficients of friction, 0 allowed | nc | 1 |
+/// | `bilateral` | `G`, `b` of FCLIB | n × p, p | |
+///
+/// Source: Acary, lecture, problems P_ML and P_ML_b; FCLIB `/fclib_global`.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(non_snake_case)]
+pub struct FrictionGlobal<const D: usize> {
+    /// The mass matrix.
+    pub M: Csc,
+    /// The transposed contact Jacobian.
+    pub H: Csc,
+    /// The right-hand side of the dynamics.
+    pub f: Vec<f64>,
+    /// The given part of the relative velocity.
+    pub w: Vec<f64>,
+    /// The coefficients of friction.
+    pub mu: Vec<f64>,
+    /// Bilateral constraints, if the problem has any.
+    pub bilateral: Option<BilateralGlobal>,
+}
+
+/// The bilateral constraints `Gᵀ v + b = 0` of a [`FrictionGlobal`], with `G lambda` added to the dynamics.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(non_snake_case)]
+pub struct BilateralGlobal {
+    /// n × p: transposed constraint Jacobian.
+    pub G: Csc,
+    /// p: given velocity of the constraints.
+    pub b: Vec<f64>,
+}
+
+/// The unknown of a [`FrictionGlobal`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct GlobalPoint {
+    /// Generalised velocities, n, in m/s.
+    pub v: Vec<f64>,
+    /// Contact impulses, D·nc, in N·s.
+    pub r: Vec<f64>,
+    /// Multipliers of the bilateral constraints, p (empty without any).
+    pub lambda: Vec<f64>,
+}
+
+#[allow(non_snake_case)]
+impl<const D: usize> FrictionGlobal<D> {
+    /// States a problem without bilateral constraints, validated.
+    ///
+    /// Errors: no contacts, a wrong shape, a value that is not finite, a negative `mu`; each names its entry.
+    /// A singular M is found when it is factorised: by the judge ([`Problem::gauge`]) or by a solver.
+    pub fn new(
+        M: Csc,
+        H: Csc,
+        f: Vec<f64>,
+        w: Vec<f64>,
+        mu: Vec<f64>,
+    ) -> Result<Self, ProblemError> {
+        let problem = Self {
+            M,
+            H,
+            f,
+            w,
+            mu,
+            bilateral: None,
+        };
+        problem.validate()?;
+        Ok(problem)
+    }
+
+    /// The number of contacts.
+    pub fn contacts(&self) -> usize {
+        self.mu.len()
+    }
+
+    /// The number of degrees of freedom n.
+    pub fn dofs(&self) -> usize {
+        self.f.len()
+    }
+
+    /// The number of bilateral multipliers.
+    pub fn multipliers(&self) -> usize {
+        self.bilateral.as_ref().map_or(0, |b| b.b.len())
+    }
+
+    /// Checks shapes and values; the fields are public, so call it after changing them.
+    pub fn validate(&self) -> Result<(), ProblemError> {
+        const { assert!(D == 2 || D == 3, "contacts have 2 or 3 components") };
+        let (n, nc) = (self.dofs(), self.contacts());
+        if nc == 0 {
+            return Err(ProblemError::Empty { place: "mu".into() });
+        }
+        if n == 0 {
+            return Err(ProblemError::shape(
+                "f",
+                "at least one degree of freedom",
+                "0 entries",
+            ));
+        }
+        self.M.check_shape("M", n, n, "entries of f")?;
+        self.H
+            .check_shape("H", n, D * nc, "entries of f × contact components of mu")?;
+        self.M.check_finite("M")?;
+        self.H.check_finite("H")?;
+        all_finite("f", &self.f)?;
+        vector("w", &self.w, D * nc, "components of the contacts")?;
+        friction_coefficients(&self.mu)?;
+        if let Some(BilateralGlobal { G, b }) = &self.bilateral {
+            G.check_shape("G", n, b.len(), "entries of f × entries of b")?;
+            G.check_finite("G")?;
+            all_finite("b", b)?;
+        }
+        Ok(())
+    }
+
+    /// The factorised dynamics: `M⁻¹`, or `[M, −G; Gᵀ, 0]⁻¹` where there are bilateral constraints.
+    pub fn dynamics(&self) -> Result<Inverse, ProblemError> {
+        match &self.bilateral {
+            None => Inverse::new(&self.M, "M"),
+            Some(b) => Inverse::saddle(&self.M, &b.G),
+        }
+    }
+
+    /// `H r + f`, followed by `−b` where there are bilateral constraints: what [`dynamics`](Self::dynamics)
+    /// turns into `(v, lambda)`.
+    pub fn load(&self, r: &[f64], out: &mut [f64]) {
+        let n = self.dofs();
+        out[..n].copy_from_slice(&self.f);
+        self.H.mul_add(1.0, r, &mut out[..n]);
+        if let Some(b) = &self.bilateral {
+            for (o, b) in out[n..].iter_mut().zip(&b.b) {
+                *o = -b;
+            }
+        }
+    }
+
+    /// `u = Hᵀ v + w` into `u`.
+    pub fn velocity_into(&self, v: &[f64], u: &mut [f64]) {
+        u.copy_from_slice(&self.w);
+        self.H.mul_transpose_add(1.0, v, u);
+    }
+}
+
+impl<const D: usize> Problem for FrictionGlobal<D> {
+    type Point = GlobalPoint;
+    type Gauge = check::GlobalGauge;
+
+    fn kind(&self) -> Kind {
+        if D == 2 {
+            Kind::FrictionGlobal2d
+        } else {
+            Kind::FrictionGlobal3d
+        }
+    }
+
+    fn unknowns(&self) -> usize {
+        self.dofs() + D * self.contacts() + self.multipliers()
+    }
+
+    fn origin(&self) -> GlobalPoint {
+        GlobalPoint {
+            v: vec![0.0; self.dofs()],
+            r: vec![0.0; D * self.contacts()],
+            lambda: vec![0.0; self.multipliers()],
+        }
+    }
+
+    fn validate_point(&self, point: &GlobalPoint) -> Result<(), ProblemError> {
+        vector("v", &point.v, self.dofs(), "degrees of freedom")?;
+        vector(
+            "r",
+            &point.r,
+            D * self.contacts(),
+            "components of the contacts",
+        )?;
+        vector(
+            "lambda",
+            &point.lambda,
+            self.multipliers(),
+            "bilateral constraints",
+        )
+    }
+
+    fn copy_point(from: &GlobalPoint, to: &mut GlobalPoint) {
+        to.v.clone_from(&from.v);
+        to.r.clone_from(&from.r);
+        to.lambda.clone_from(&from.lambda);
+    }
+
+    fn gauge(&self) -> Result<Self::Gauge, ProblemError> {
+        check::GlobalGauge::new(self)
+    }
+
+    fn measure(&self, point: &GlobalPoint, gauge: &mut Self::Gauge) -> Measure {
+        gauge.measure(self, point)
+    }
+
+    fn verify(&self, certificate: &Certificate) -> bool {
+        check::refutes_global(self, certificate)
+    }
+}

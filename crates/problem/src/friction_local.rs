@@ -1,0 +1,215 @@
+//! The local (Delassus) frictional contact problem.
+
+use crate::check::{self, Certificate, Measure};
+use crate::error::{all_finite, friction_coefficients, vector};
+use crate::linalg::{Bsr, Csc};
+use crate::{Kind, Problem, ProblemError};
+
+/// **Find** `r` (and the multipliers `lambda` of bilateral constraints) such that
+///
+/// ```text
+/// u = W r + q  (+ V lambda),      0 = Vᵀ r + R lambda + s,
+/// K* ∋ u + mu‖u_T‖ e_N  ⟂  r ∈ K    for each contact, K = {‖r_T‖ ≤ mu r_N}.
+/// ```
+///
+/// | field | meaning | shape | unit |
+/// | --- | --- | --- | --- |
+/// | `W` | Delassus operator Hᵀ M⁻¹ H, by D×D blocks; need not be symmetric | D·nc × D·nc | 1/kg |
+/// | `q` | free relative velocity, impact terms included | D·nc | m/s |
+/// | `mu` | coefficients of friction, 0 allowed | nc | 1 |
+/// | `bilateral` | `V`, `R`, `s` of FCLIB | D·nc × p, p × p, p | |
+///
+/// Each contact's entries are `[N, T]` (D = 2) or `[N, T1, T2]` (D = 3).
+/// Source: Acary, lecture (2)–(4); FCLIB `/fclib_local`.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(non_snake_case)]
+pub struct FrictionLocal<const D: usize> {
+    /// The Delassus operator.
+    pub W: Bsr<D>,
+    /// The free relative velocity.
+    pub q: Vec<f64>,
+    /// The coefficients of friction.
+    pub mu: Vec<f64>,
+    /// Bilateral constraints, if the problem has any.
+    pub bilateral: Option<BilateralLocal>,
+}
+
+/// The bilateral part `0 = Vᵀ r + R lambda + s` of a [`FrictionLocal`], with `V lambda` added to u.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(non_snake_case)]
+pub struct BilateralLocal {
+    /// D·nc × p: relative velocity at the contacts for unit multipliers.
+    pub V: Csc,
+    /// p × p: velocity of the constraints for unit multipliers.
+    pub R: Csc,
+    /// p: free velocity of the constraints.
+    pub s: Vec<f64>,
+}
+
+/// The unknown of a [`FrictionLocal`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LocalPoint {
+    /// Contact impulses, D·nc, in N·s.
+    pub r: Vec<f64>,
+    /// Multipliers of the bilateral constraints, p (empty without any).
+    pub lambda: Vec<f64>,
+}
+
+#[allow(non_snake_case)]
+impl<const D: usize> FrictionLocal<D> {
+    /// States a problem without bilateral constraints, validated.
+    ///
+    /// Errors: no contacts, a wrong shape, a value that is not finite, a negative `mu`; each names its entry.
+    pub fn new(W: Bsr<D>, q: Vec<f64>, mu: Vec<f64>) -> Result<Self, ProblemError> {
+        let problem = Self {
+            W,
+            q,
+            mu,
+            bilateral: None,
+        };
+        problem.validate()?;
+        Ok(problem)
+    }
+
+    /// States a problem with bilateral constraints, validated.
+    pub fn with_bilateral(
+        W: Bsr<D>,
+        q: Vec<f64>,
+        mu: Vec<f64>,
+        bilateral: BilateralLocal,
+    ) -> Result<Self, ProblemError> {
+        let problem = Self {
+            W,
+            q,
+            mu,
+            bilateral: Some(bilateral),
+        };
+        problem.validate()?;
+        Ok(problem)
+    }
+
+    /// The number of contacts.
+    pub fn contacts(&self) -> usize {
+        self.mu.len()
+    }
+
+    /// The number of bilateral multipliers.
+    pub fn multipliers(&self) -> usize {
+        self.bilateral.as_ref().map_or(0, |b| b.s.len())
+    }
+
+    /// Checks shapes and values; the fields are public, so call it after changing them.
+    pub fn validate(&self) -> Result<(), ProblemError> {
+        const { assert!(D == 2 || D == 3, "contacts have 2 or 3 components") };
+        let nc = self.contacts();
+        if nc == 0 {
+            return Err(ProblemError::Empty { place: "mu".into() });
+        }
+        if (self.W.nrows(), self.W.ncols()) != (nc, nc) {
+            return Err(ProblemError::shape(
+                "W",
+                format!("{0} × {0} ({D} for each of the {nc} entries of mu)", D * nc),
+                format!("{} × {}", D * self.W.nrows(), D * self.W.ncols()),
+            ));
+        }
+        for i in 0..nc {
+            let (cols, blocks) = self.W.row(i);
+            for (&j, b) in cols.iter().zip(blocks) {
+                if let Some(k) = b.iter().flatten().position(|x| !x.is_finite()) {
+                    let (row, column) = (D * i + k / D, D * j as usize + k % D);
+                    return Err(ProblemError::value(
+                        format!("W[{row}, {column}]"),
+                        "a finite number",
+                        b[k / D][k % D],
+                    ));
+                }
+            }
+        }
+        vector("q", &self.q, D * nc, "components of the contacts")?;
+        friction_coefficients(&self.mu)?;
+        if let Some(BilateralLocal { V, R, s }) = &self.bilateral {
+            V.check_shape("V", D * nc, s.len(), "contact components × entries of s")?;
+            R.check_shape("R", s.len(), s.len(), "entries of s")?;
+            V.check_finite("V")?;
+            R.check_finite("R")?;
+            all_finite("s", s)?;
+        }
+        Ok(())
+    }
+
+    /// `u = W r + V lambda + q`, allocated.
+    pub fn velocity(&self, point: &LocalPoint) -> Vec<f64> {
+        let mut u = self.q.clone();
+        self.velocity_into(point, &mut u);
+        u
+    }
+
+    /// `u = W r + V lambda + q` into `u`.
+    pub fn velocity_into(&self, point: &LocalPoint, u: &mut [f64]) {
+        self.W.mul_plus(&point.r, &self.q, u);
+        if let Some(b) = &self.bilateral {
+            b.V.mul_add(1.0, &point.lambda, u);
+        }
+    }
+}
+
+impl<const D: usize> Problem for FrictionLocal<D> {
+    type Point = LocalPoint;
+    type Gauge = check::LocalGauge;
+
+    fn kind(&self) -> Kind {
+        if D == 2 {
+            Kind::FrictionLocal2d
+        } else {
+            Kind::FrictionLocal3d
+        }
+    }
+
+    fn unknowns(&self) -> usize {
+        D * self.contacts() + self.multipliers()
+    }
+
+    fn origin(&self) -> LocalPoint {
+        LocalPoint {
+            r: vec![0.0; D * self.contacts()],
+            lambda: vec![0.0; self.multipliers()],
+        }
+    }
+
+    fn validate_point(&self, point: &LocalPoint) -> Result<(), ProblemError> {
+        vector(
+            "r",
+            &point.r,
+            D * self.contacts(),
+            "components of the contacts",
+        )?;
+        vector(
+            "lambda",
+            &point.lambda,
+            self.multipliers(),
+            "bilateral constraints",
+        )
+    }
+
+    fn copy_point(from: &LocalPoint, to: &mut LocalPoint) {
+        to.r.clone_from(&from.r);
+        to.lambda.clone_from(&from.lambda);
+    }
+
+    fn gauge(&self) -> Result<Self::Gauge, ProblemError> {
+        Ok(check::LocalGauge::new(self))
+    }
+
+    fn regauge(&self, gauge: &mut Self::Gauge) -> Result<(), ProblemError> {
+        gauge.refill(self);
+        Ok(())
+    }
+
+    fn measure(&self, point: &LocalPoint, gauge: &mut Self::Gauge) -> Measure {
+        gauge.measure(self, point)
+    }
+
+    fn verify(&self, certificate: &Certificate) -> bool {
+        check::refutes_local(self, certificate)
+    }
+}

@@ -1,0 +1,22 @@
+//! The statement and the judge.
+//!
+//! This crate states the problems of nonsmooth mechanics as plain validated data ([`FrictionLocal`],
+//! [`FrictionGlobal`]), says how far a point is from solving them ([`check`]), and makes instances with a
+//! known solution ([`planted`]). It holds no algorithm: nothing here is shared with a solver's kernels.
+//!
+//! Notation follows `docs/notation.md` and FCLIB's letters.
+
+pub mod check;
+mod error;
+mod friction;
+mod friction_global;
+mod friction_local;
+pub mod linalg;
+pub mod planted;
+mod problem;
+
+pub use error::ProblemError;
+pub use friction::Friction;
+pub use friction_global::{BilateralGlobal, FrictionGlobal, GlobalPoint};
+pub use friction_local::{BilateralLocal, FrictionLocal, LocalPoint};
+pub use problem::{Kind, Problem};

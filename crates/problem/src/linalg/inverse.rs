@@ -1,0 +1,420 @@
+//! The inverse of M, or of M under bilateral constraints, behind one face.
+
+use faer::linalg::solvers::Solve;
+use faer::sparse::{SparseColMat, Triplet};
+
+use super::{Csc, norm};
+use crate::ProblemError;
+
+/// Components up to this size are factorised densely; rigid bodies have 1, 3 or 6.
+const DENSE_LIMIT: usize = 48;
+/// The relative size of the regularisation of bilateral rows; refinement removes its bias.
+const BILATERAL_REGULARISATION: f64 = 1e-9;
+
+/// `A⁻¹` for a square sparse A, by one LU factorisation per connected component of A's graph.
+///
+/// A mass matrix of rigid bodies falls into components of 1 to 6 unknowns, each a small dense LU; a finite
+/// element body or a mechanism is one component with a sparse LU (faer). Each solve is followed by iterative
+/// refinement against A itself. With [`Inverse::saddle`] the matrix is `[M, −G; Gᵀ, 0]`, so bilateral
+/// constraints, redundant ones included, are honoured by every product with the inverse.
+#[derive(Debug, Clone)]
+pub struct Inverse {
+    matrix: Csc,
+    components: Vec<Component>,
+    /// For each unknown: its component and its place there.
+    place: Vec<(u32, u32)>,
+    refinements: usize,
+}
+
+#[derive(Debug, Clone)]
+struct Component {
+    index: Vec<usize>,
+    factor: Factor,
+}
+
+#[derive(Debug, Clone)]
+enum Factor {
+    Scalar(f64),
+    Dense(DenseLu),
+    Sparse(faer::sparse::linalg::solvers::Lu<usize, f64>),
+}
+
+impl Inverse {
+    /// Factorises the square matrix `a`, called `name` in messages.
+    ///
+    /// Cost: O(Σ k³) over small components of size k, a sparse LU for each large one.
+    /// Errors: a singular matrix, by the first unknown of the component at fault.
+    pub fn new(a: &Csc, name: &str) -> Result<Self, ProblemError> {
+        Self::with_factor_of(a.clone(), a, name, 1)
+    }
+
+    /// Factorises `[M, −G; Gᵀ, 0]`, the dynamics under the bilateral constraints `Gᵀ v + b = 0`.
+    ///
+    /// The factor is that of `[M, −G; Gᵀ, δD]` with `D = diag(Gᵀ M⁻¹ G)`, δ = 1e-9; each refinement step is one
+    /// step of the proximal method of multipliers, which converges for redundant constraints as well.
+    pub fn saddle(m: &Csc, g: &Csc) -> Result<Self, ProblemError> {
+        let (n, p) = (m.nrows(), g.ncols());
+        let m_inv = Self::new(m, "M")?;
+        let mut d = vec![0.0; p];
+        let mut x = vec![0.0; n];
+        for j in 0..p {
+            let (rows, values) = g.column(j);
+            x.fill(0.0);
+            rows.iter().zip(values).for_each(|(&i, &v)| x[i] = v);
+            m_inv.solve(&mut x);
+            d[j] = g.column_dot(j, &x);
+            if d[j] <= 0.0 || !d[j].is_finite() {
+                // An empty column constrains nothing: 0ᵀ v + b_j = 0.
+                d[j] = 1.0;
+            }
+        }
+        let coupling = g
+            .triplets()
+            .flat_map(|(i, j, x)| [(i, n + j, -x), (n + j, i, x)])
+            .chain(m.triplets())
+            .collect::<Vec<_>>();
+        let delta = d
+            .iter()
+            .enumerate()
+            .map(|(j, d)| (n + j, n + j, BILATERAL_REGULARISATION * d));
+        let regular = coupling.iter().copied().chain(delta);
+        let exact = coupling
+            .iter()
+            .copied()
+            .chain((0..p).map(|j| (n + j, n + j, 0.0)));
+        Self::with_factor_of(
+            Csc::from_triplets(n + p, n + p, exact)?,
+            &Csc::from_triplets(n + p, n + p, regular)?,
+            "M with G",
+            4,
+        )
+    }
+
+    fn with_factor_of(
+        matrix: Csc,
+        regular: &Csc,
+        name: &str,
+        refinements: usize,
+    ) -> Result<Self, ProblemError> {
+        let (index, place) = connected_components(&matrix);
+        let components = index
+            .into_iter()
+            .map(|index| {
+                let factor =
+                    factorise(regular, &index, &place).ok_or_else(|| ProblemError::Singular {
+                        place: format!("{name} (component of row {})", index[0]),
+                        found: "a vanishing pivot".into(),
+                    })?;
+                Ok(Component { index, factor })
+            })
+            .collect::<Result<Vec<_>, ProblemError>>()?;
+        let out = Self {
+            matrix,
+            components,
+            place,
+            refinements,
+        };
+        out.verify(name)?;
+        Ok(out)
+    }
+
+    /// Solves for one pseudo-random right-hand side: a factorisation that cannot is of a singular matrix.
+    fn verify(&self, name: &str) -> Result<(), ProblemError> {
+        let n = self.dim();
+        let y: Vec<f64> = (0..n)
+            .map(|i| 1.0 + (i as f64 * 0.618_033_988_749_895).fract())
+            .collect();
+        let mut b = vec![0.0; n];
+        self.matrix.mul_add(1.0, &y, &mut b);
+        let mut x = b.clone();
+        self.solve(&mut x);
+        let mut residual = b.clone();
+        self.matrix.mul_add(-1.0, &x, &mut residual);
+        for component in &self.components {
+            let part = |v: &[f64]| norm(&component.index.iter().map(|&i| v[i]).collect::<Vec<_>>());
+            let error = part(&residual) / part(&b).max(f64::MIN_POSITIVE);
+            if error.is_nan() || error > 1e-8 {
+                return Err(ProblemError::Singular {
+                    place: format!("{name} (component of row {})", component.index[0]),
+                    found: format!("a solve with relative residual {error:.1e}"),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The number of unknowns.
+    pub fn dim(&self) -> usize {
+        self.place.len()
+    }
+
+    /// The sizes of the connected components, in the order of their first unknown.
+    pub fn component_sizes(&self) -> impl Iterator<Item = usize> + '_ {
+        self.components.iter().map(|c| c.index.len())
+    }
+
+    /// The component of unknown `i`.
+    pub fn component_of(&self, i: usize) -> usize {
+        self.place[i].0 as usize
+    }
+
+    /// The unknowns of component `k`.
+    pub fn component(&self, k: usize) -> &[usize] {
+        &self.components[k].index
+    }
+
+    /// `x ← A⁻¹ x`.
+    pub fn solve(&self, x: &mut [f64]) {
+        let largest = self.component_sizes().max().unwrap_or(0);
+        self.solve_with(x, &mut vec![0.0; 3 * largest]);
+    }
+
+    /// The length of the buffer that [`solve_with`](Inverse::solve_with) asks for.
+    pub fn scratch_len(&self) -> usize {
+        3 * self.component_sizes().max().unwrap_or(0)
+    }
+
+    /// `x ← A⁻¹ x` within a buffer of [`scratch_len`](Inverse::scratch_len) entries.
+    ///
+    /// Allocates nothing unless a component is factorised sparsely.
+    pub fn solve_with(&self, x: &mut [f64], scratch: &mut [f64]) {
+        for (k, component) in self.components.iter().enumerate() {
+            let size = component.index.len();
+            let (local, rest) = scratch.split_at_mut(size);
+            for (l, &i) in local.iter_mut().zip(&component.index) {
+                *l = x[i];
+            }
+            self.solve_component(k, local, rest);
+            for (l, &i) in local.iter().zip(&component.index) {
+                x[i] = *l;
+            }
+        }
+    }
+
+    /// Solves within component `k`: `x` holds its right-hand side, then its solution.
+    /// `scratch` has at least twice the component's size.
+    pub fn solve_component(&self, k: usize, x: &mut [f64], scratch: &mut [f64]) {
+        let Component { index, factor } = &self.components[k];
+        if let Factor::Scalar(inverse) = factor {
+            x[0] *= inverse;
+            return;
+        }
+        let (b, rest) = scratch.split_at_mut(x.len());
+        let residual = &mut rest[..x.len()];
+        b.copy_from_slice(x);
+        factor.solve(x);
+        for _ in 0..self.refinements {
+            // residual = b − A x, within the component.
+            residual.copy_from_slice(b);
+            for (j, &xj) in index.iter().zip(x.iter()) {
+                let (rows, values) = self.matrix.column(*j);
+                for (&i, &v) in rows.iter().zip(values) {
+                    residual[self.place[i].1 as usize] -= v * xj;
+                }
+            }
+            factor.solve(residual);
+            for (xi, ri) in x.iter_mut().zip(residual.iter()) {
+                *xi += ri;
+            }
+        }
+    }
+}
+
+impl Factor {
+    fn solve(&self, x: &mut [f64]) {
+        match self {
+            Factor::Scalar(inverse) => x[0] *= inverse,
+            Factor::Dense(lu) => lu.solve(x),
+            Factor::Sparse(lu) => {
+                let n = x.len();
+                lu.solve_in_place(faer::MatMut::from_column_major_slice_mut(x, n, 1));
+            }
+        }
+    }
+}
+
+/// The factor of the principal submatrix of `a` on `index`, `None` where it is singular.
+fn factorise(a: &Csc, index: &[usize], place: &[(u32, u32)]) -> Option<Factor> {
+    let n = index.len();
+    if n == 1 {
+        let inverse = 1.0 / a.get(index[0], index[0]);
+        return inverse.is_finite().then_some(Factor::Scalar(inverse));
+    }
+    let entries = index.iter().enumerate().flat_map(|(j, &column)| {
+        let (rows, values) = a.column(column);
+        rows.iter()
+            .zip(values)
+            .map(move |(&i, &x)| (place[i].1 as usize, j, x))
+    });
+    if n <= DENSE_LIMIT {
+        let mut dense = vec![0.0; n * n];
+        entries.for_each(|(i, j, x)| dense[i * n + j] = x);
+        return DenseLu::new(dense, n).map(Factor::Dense);
+    }
+    let triplets: Vec<_> = entries.map(|(i, j, x)| Triplet::new(i, j, x)).collect();
+    let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &triplets).ok()?;
+    matrix.sp_lu().ok().map(Factor::Sparse)
+}
+
+/// Connected components of the graph of `a + aᵀ`: the unknowns of each, and each unknown's place.
+fn connected_components(a: &Csc) -> (Vec<Vec<usize>>, Vec<(u32, u32)>) {
+    let n = a.nrows();
+    let mut parent: Vec<usize> = (0..n).collect();
+    fn root(parent: &mut [usize], mut i: usize) -> usize {
+        while parent[i] != i {
+            parent[i] = parent[parent[i]];
+            i = parent[i];
+        }
+        i
+    }
+    for (i, j, x) in a.triplets() {
+        if x != 0.0 {
+            let (ri, rj) = (root(&mut parent, i), root(&mut parent, j));
+            parent[ri.max(rj)] = ri.min(rj);
+        }
+    }
+    let mut of_root = vec![u32::MAX; n];
+    let mut components: Vec<Vec<usize>> = Vec::new();
+    let mut place = Vec::with_capacity(n);
+    for i in 0..n {
+        let r = root(&mut parent, i);
+        if of_root[r] == u32::MAX {
+            of_root[r] = u32::try_from(components.len()).expect("fewer than 2³² components");
+            components.push(Vec::new());
+        }
+        let members = &mut components[of_root[r] as usize];
+        place.push((
+            of_root[r],
+            u32::try_from(members.len()).expect("fewer than 2³² unknowns"),
+        ));
+        members.push(i);
+    }
+    (components, place)
+}
+
+/// Dense LU with partial pivoting, by rows.
+#[derive(Debug, Clone)]
+struct DenseLu {
+    n: usize,
+    lu: Vec<f64>,
+    swaps: Vec<u32>,
+}
+
+impl DenseLu {
+    fn new(mut lu: Vec<f64>, n: usize) -> Option<Self> {
+        let mut swaps = Vec::with_capacity(n);
+        for k in 0..n {
+            let p = (k..n).max_by(|&i, &j| lu[i * n + k].abs().total_cmp(&lu[j * n + k].abs()))?;
+            if lu[p * n + k] == 0.0 || !lu[p * n + k].is_finite() {
+                return None;
+            }
+            swaps.push(p as u32);
+            if p != k {
+                for j in 0..n {
+                    lu.swap(k * n + j, p * n + j);
+                }
+            }
+            for i in k + 1..n {
+                let f = lu[i * n + k] / lu[k * n + k];
+                lu[i * n + k] = f;
+                for j in k + 1..n {
+                    lu[i * n + j] -= f * lu[k * n + j];
+                }
+            }
+        }
+        Some(Self { n, lu, swaps })
+    }
+
+    fn solve(&self, x: &mut [f64]) {
+        let n = self.n;
+        for (k, &p) in self.swaps.iter().enumerate() {
+            x.swap(k, p as usize);
+        }
+        for i in 0..n {
+            let row = &self.lu[i * n..i * n + i];
+            x[i] -= row.iter().zip(x.iter()).map(|(l, y)| l * y).sum::<f64>();
+        }
+        for i in (0..n).rev() {
+            let row = &self.lu[i * n..(i + 1) * n];
+            let tail = row[i + 1..]
+                .iter()
+                .zip(&x[i + 1..n])
+                .map(|(u, y)| u * y)
+                .sum::<f64>();
+            x[i] = (x[i] - tail) / row[i];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A block-diagonal matrix: one scalar, one dense 2×2, one chain long enough for the sparse factor.
+    fn example() -> Csc {
+        let mut e = vec![
+            (0, 0, 4.0),
+            (1, 1, 2.0),
+            (1, 2, -1.0),
+            (2, 1, 0.5),
+            (2, 2, 3.0),
+        ];
+        for k in 3..80 {
+            e.push((k, k, 2.5));
+            if k > 3 {
+                e.push((k, k - 1, -1.0));
+                e.push((k - 1, k, -1.1));
+            }
+        }
+        Csc::from_triplets(80, 80, e.iter().copied()).unwrap()
+    }
+
+    #[test]
+    fn every_kind_of_component_is_inverted() {
+        let a = example();
+        let inverse = Inverse::new(&a, "A").unwrap();
+        assert_eq!(inverse.component_sizes().collect::<Vec<_>>(), [1, 2, 77]);
+        let x: Vec<f64> = (0..80).map(|i| (i as f64).sin()).collect();
+        let mut b = vec![0.0; 80];
+        a.mul_add(1.0, &x, &mut b);
+        inverse.solve(&mut b);
+        assert!(x.iter().zip(&b).all(|(x, y)| (x - y).abs() < 1e-13));
+    }
+
+    #[test]
+    fn a_singular_component_is_named() {
+        let a = Csc::from_triplets(
+            3,
+            3,
+            [
+                (0, 0, 1.0),
+                (1, 1, 1.0),
+                (1, 2, 2.0),
+                (2, 1, 2.0),
+                (2, 2, 4.0),
+            ]
+            .into_iter(),
+        );
+        let e = Inverse::new(&a.unwrap(), "M").unwrap_err().to_string();
+        assert!(e.starts_with("M (component of row 1)"), "{e}");
+    }
+
+    #[test]
+    fn redundant_bilateral_constraints_are_honoured() {
+        // v_0 + v_1 = 1 stated twice on M = I, f = (3, 0): v = (2, −1), the multipliers share the load.
+        let m = Csc::diagonal(&[1.0, 1.0]);
+        let g = Csc::from_triplets(
+            2,
+            2,
+            [(0, 0, 1.0), (1, 0, 1.0), (0, 1, 1.0), (1, 1, 1.0)].into_iter(),
+        );
+        let inverse = Inverse::saddle(&m, &g.unwrap()).unwrap();
+        let mut x = [3.0, 0.0, 1.0, 1.0];
+        inverse.solve(&mut x);
+        assert!(
+            (x[0] - 2.0).abs() < 1e-12 && (x[1] + 1.0).abs() < 1e-12,
+            "{x:?}"
+        );
+        assert!((x[2] + x[3] + 1.0).abs() < 1e-12, "{x:?}");
+    }
+}

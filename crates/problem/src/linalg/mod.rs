@@ -1,0 +1,38 @@
+//! Matrices as the problems state them, and the few operations that the statement and the judge need.
+//!
+//! [`small`]: D×D blocks on arrays. [`Csc`]: general sparse. [`Bsr`]: block-sparse rows, the storage of W.
+//! [`Inverse`]: factorisation of M (or of M with bilateral constraints) behind one face.
+//! [`Delassus`]: W = Hᵀ M⁻¹ H as an operator, never formed, or condensed into a [`Bsr`].
+
+mod bsr;
+mod csc;
+mod delassus;
+mod inverse;
+pub mod small;
+
+pub use bsr::Bsr;
+pub use csc::Csc;
+pub use delassus::Delassus;
+pub use inverse::Inverse;
+
+/// The Euclidean norm, scaled so that neither overflow nor underflow of the squares spoils it.
+pub fn norm(x: &[f64]) -> f64 {
+    let plain = x.iter().map(|v| v * v).sum::<f64>();
+    if plain.is_finite() && plain > f64::MIN_POSITIVE / f64::EPSILON {
+        return plain.sqrt();
+    }
+    // Rare: the plain sum of squares left the range of f64, or every entry is zero or not finite.
+    let largest = x.iter().fold(0.0_f64, |a, v| a.max(v.abs()));
+    if largest == 0.0 || !largest.is_finite() {
+        return if x.iter().any(|v| v.is_nan()) {
+            f64::NAN
+        } else {
+            largest
+        };
+    }
+    largest
+        * x.iter()
+            .map(|v| (v / largest) * (v / largest))
+            .sum::<f64>()
+            .sqrt()
+}

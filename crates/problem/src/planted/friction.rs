@@ -1,0 +1,390 @@
+//! Frictional contact problems with a planted solution.
+//!
+//! Velocities `v*` and, contact by contact, a pair `(u*, r*)` that obeys the law are drawn first; then the data
+//! that makes them a solution: `w = u* − Hᵀ v*`, `f = M v* − H r* − G λ*`, `b = −Gᵀ v*`, and for the local form
+//! `q = u* − W r* − V λ*`, `s = −Vᵀ r* − R λ*`. The structure is that of rigid bodies: blocks of six degrees of freedom, contacts
+//! between two bodies or a body and the ground.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use crate::linalg::{Csc, Delassus, Inverse};
+use crate::{
+    BilateralGlobal, BilateralLocal, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint,
+};
+
+/// What to plant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Planted {
+    /// The number of contacts nc, at least 1.
+    pub contacts: usize,
+    /// The number of degrees of freedom n, at least 1. W has rank `min(n, D·nc)` when every body is touched.
+    pub dofs: usize,
+    /// The number of bilateral constraints; keep it below n.
+    pub bilateral: usize,
+    /// The shares of the contact statuses.
+    pub mix: PlantedMix,
+    /// Coefficients of friction are drawn between these.
+    pub mu: (f64, f64),
+    /// The relative size of a skew-symmetric part in the blocks of M, and so in W.
+    pub skew: f64,
+    /// The seed: the same seed gives the same problem to the bit.
+    pub seed: u64,
+}
+
+/// Weights (they need not add up to 1) with which the status of each planted contact is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlantedMix {
+    /// `r = 0`, `u_N > 0`.
+    pub open: f64,
+    /// `u = 0`, r inside the cone.
+    pub stick: f64,
+    /// `u_N = 0`, sliding, r on the boundary.
+    pub slip: f64,
+    /// `u = 0` with r on the boundary or zero: between two statuses.
+    pub degenerate: f64,
+}
+
+impl Default for Planted {
+    fn default() -> Self {
+        Self {
+            contacts: 20,
+            dofs: 60,
+            bilateral: 0,
+            mix: PlantedMix {
+                open: 1.0,
+                stick: 1.0,
+                slip: 1.0,
+                degenerate: 0.0,
+            },
+            mu: (0.2, 0.9),
+            skew: 0.0,
+            seed: 0,
+        }
+    }
+}
+
+impl Planted {
+    /// A global problem and a solution of it.
+    pub fn global<const D: usize>(&self) -> (FrictionGlobal<D>, GlobalPoint) {
+        let mut rng = Pcg64::seed_from_u64(self.seed);
+        let (n, m, p) = (self.dofs.max(1), D * self.contacts.max(1), self.bilateral);
+        let mut normal = || {
+            // The sum of four uniforms is normal enough to plant with.
+            (0..4).map(|_| rng.random_range(-1.0..1.0)).sum::<f64>() * 0.866
+        };
+
+        let mass = mass_matrix(n, self.skew, &mut normal);
+        let v: Vec<f64> = (0..n).map(|_| normal()).collect();
+        let lambda: Vec<f64> = (0..p).map(|_| normal()).collect();
+        let jacobian_rows = |c: usize, bodies: usize, normal: &mut dyn FnMut() -> f64| {
+            let pick = |x: f64| ((x.abs() * 7919.0) as usize) % bodies;
+            // Contacts visit the bodies in turn, so that each is touched when there are enough contacts.
+            let (a, b) = (c % bodies, pick(normal()));
+            let mut rows: Vec<usize> = (6 * a..(6 * a + 6).min(n)).collect();
+            if b != a && c % 3 != 0 {
+                rows.extend(6 * b..(6 * b + 6).min(n));
+            }
+            rows
+        };
+        let bodies = n.div_ceil(6);
+        let mut h = Vec::new();
+        for c in 0..m / D {
+            for i in jacobian_rows(c, bodies, &mut normal) {
+                for k in 0..D {
+                    h.push((i, D * c + k, normal()));
+                }
+            }
+        }
+        let mut g = Vec::new();
+        for j in 0..p {
+            for i in jacobian_rows(j, bodies, &mut normal) {
+                g.push((i, j, normal()));
+            }
+        }
+        let (mut u, mut r, mut mu) = (vec![0.0; m], vec![0.0; m], Vec::new());
+        for c in 0..m / D {
+            mu.push(rng.random_range(self.mu.0..=self.mu.1));
+            let range = D * c..D * c + D;
+            self.plant(mu[c], &mut rng, &mut u[range.clone()], &mut r[range]);
+        }
+
+        let h = Csc::from_triplets(n, m, h.into_iter()).expect("rows and columns in range");
+        let g = Csc::from_triplets(n, p, g.into_iter()).expect("rows and columns in range");
+        let mut w = u;
+        h.mul_transpose_add(-1.0, &v, &mut w);
+        let mut f = vec![0.0; n];
+        mass.mul_add(1.0, &v, &mut f);
+        h.mul_add(-1.0, &r, &mut f);
+        g.mul_add(-1.0, &lambda, &mut f);
+        let mut b = vec![0.0; p];
+        g.mul_transpose_add(-1.0, &v, &mut b);
+        let bilateral = (p > 0).then_some(BilateralGlobal { G: g, b });
+        let problem = FrictionGlobal {
+            M: mass,
+            H: h,
+            f,
+            w,
+            mu,
+            bilateral,
+        };
+        problem.validate().expect("a planted problem is valid");
+        (problem, GlobalPoint { v, r, lambda })
+    }
+
+    /// A local problem and a solution of it: the condensed form of [`global`](Self::global), with
+    /// `q` and `s` recomputed so that rounding in W does not disturb the solution.
+    pub fn local<const D: usize>(&self) -> (FrictionLocal<D>, LocalPoint) {
+        let (global, GlobalPoint { v, r, lambda }) = self.global::<D>();
+        let inverse = Inverse::new(&global.M, "M").expect("a planted M is invertible");
+        let delassus = Delassus::<D>::new(&global.H, &inverse);
+        let mut q = vec![0.0; r.len()];
+        global.velocity_into(&v, &mut q);
+        let bilateral = global.bilateral.as_ref().map(|BilateralGlobal { G, .. }| {
+            let (n, p) = (G.nrows(), G.ncols());
+            let (mut vv, mut rr) = (Vec::new(), Vec::new());
+            let mut x = vec![0.0; n];
+            for j in 0..p {
+                x.fill(0.0);
+                let (rows, values) = G.column(j);
+                rows.iter().zip(values).for_each(|(&i, &g)| x[i] = g);
+                inverse.solve(&mut x);
+                vv.extend((0..r.len()).map(|i| (i, j, global.H.column_dot(i, &x))));
+                rr.extend((0..p).map(|i| (i, j, G.column_dot(i, &x))));
+            }
+            let stored = |(_, _, x): &(usize, usize, f64)| *x != 0.0;
+            let vv =
+                Csc::from_triplets(r.len(), p, vv.into_iter().filter(stored)).expect("in range");
+            let rr = Csc::from_triplets(p, p, rr.into_iter().filter(stored)).expect("in range");
+            let mut s = vec![0.0; p];
+            vv.mul_transpose_add(-1.0, &r, &mut s);
+            rr.mul_add(-1.0, &lambda, &mut s);
+            vv.mul_add(-1.0, &lambda, &mut q);
+            BilateralLocal { V: vv, R: rr, s }
+        });
+        let w = delassus.condense();
+        for i in 0..w.nrows() {
+            let product = w.row_product(i, &r);
+            for k in 0..D {
+                q[D * i + k] -= product[k];
+            }
+        }
+        let problem = FrictionLocal {
+            W: w,
+            q,
+            mu: global.mu,
+            bilateral,
+        };
+        problem.validate().expect("a planted problem is valid");
+        (problem, LocalPoint { r, lambda })
+    }
+
+    /// Draws `(u, r)` of one contact that obeys the law.
+    fn plant(&self, mu: f64, rng: &mut Pcg64, u: &mut [f64], r: &mut [f64]) {
+        let PlantedMix {
+            open,
+            stick,
+            slip,
+            degenerate,
+        } = self.mix;
+        let mut draw = rng.random_range(0.0..open + stick + slip + degenerate);
+        let direction = direction(u.len() - 1, rng);
+        let size = rng.random_range(0.1..1.0);
+        let sliding = rng.random_range(0.1..1.0);
+        let inside = rng.random_range(0.0..0.9);
+        let apex = rng.random_range(0.0..1.0) < 0.5;
+        let tangential = |x: &mut [f64], a: f64| {
+            x[1..]
+                .iter_mut()
+                .zip(&direction)
+                .for_each(|(x, d)| *x = a * d);
+        };
+        if draw < open {
+            u[0] = size;
+            tangential(u, sliding);
+            return;
+        }
+        draw -= open;
+        if draw < stick {
+            r[0] = size;
+            tangential(r, inside * mu * size);
+        } else if draw - stick < slip {
+            r[0] = size;
+            tangential(r, -mu * size);
+            tangential(u, sliding);
+        } else if !apex {
+            r[0] = size;
+            tangential(r, mu * size);
+        }
+    }
+}
+
+/// A random unit vector of dimension 1 or 2.
+fn direction(dimension: usize, rng: &mut Pcg64) -> Vec<f64> {
+    let angle = rng.random_range(0.0..std::f64::consts::TAU);
+    match dimension {
+        1 => vec![angle.cos().signum()],
+        _ => vec![angle.cos(), angle.sin()],
+    }
+}
+
+/// Blocks of six degrees of freedom: SPD (a random Gram matrix plus the identity) plus `skew` times a skew part.
+fn mass_matrix(n: usize, skew: f64, normal: &mut dyn FnMut() -> f64) -> Csc {
+    let mut entries = Vec::new();
+    for start in (0..n).step_by(6) {
+        let size = 6.min(n - start);
+        let a: Vec<f64> = (0..size * size).map(|_| 0.4 * normal()).collect();
+        for i in 0..size {
+            for j in 0..size {
+                let gram: f64 = (0..size).map(|k| a[i * size + k] * a[j * size + k]).sum();
+                let identity = f64::from(u8::from(i == j));
+                let turn = skew * (a[i * size + j] - a[j * size + i]);
+                entries.push((start + i, start + j, identity + gram + turn));
+            }
+        }
+    }
+    Csc::from_triplets(n, n, entries.into_iter()).expect("rows and columns in range")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::check::{Judged, Motion};
+
+    fn cases() -> impl Iterator<Item = Planted> {
+        (0..12).map(|seed| Planted {
+            contacts: 1 + 9 * seed as usize,
+            dofs: 6 + 20 * (seed as usize % 4),
+            bilateral: (seed as usize % 3) * 2,
+            mix: PlantedMix {
+                open: 1.0,
+                stick: 1.0,
+                slip: 1.0,
+                degenerate: f64::from(seed as u8 % 2),
+            },
+            skew: if seed % 4 == 3 { 0.1 } else { 0.0 },
+            seed,
+            ..Planted::default()
+        })
+    }
+
+    #[test]
+    fn the_judge_accepts_planted_solutions() {
+        for case in cases() {
+            let (problem, point) = case.global::<3>();
+            let verdict = problem.judge(&point, 1e-12).unwrap();
+            assert!(verdict.solved, "{case:?}: {verdict:?}");
+            let (problem, point) = case.local::<3>();
+            assert!(problem.judge(&point, 1e-12).unwrap().solved, "{case:?}");
+            let (problem, point) = case.local::<2>();
+            assert!(problem.judge(&point, 1e-12).unwrap().solved, "{case:?}");
+            let (problem, point) = case.global::<2>();
+            assert!(problem.judge(&point, 1e-12).unwrap().solved, "{case:?}");
+        }
+    }
+
+    #[test]
+    fn the_judge_refuses_every_perturbed_impulse() {
+        let (problem, point) = Planted::default().local::<3>();
+        for i in 0..point.r.len() {
+            let mut wrong = point.clone();
+            wrong.r[i] += 1e-3;
+            assert!(!problem.judge(&wrong, 1e-8).unwrap().solved, "entry {i}");
+        }
+    }
+
+    #[test]
+    fn statuses_are_those_planted() {
+        for (mix, motion) in [
+            (
+                PlantedMix {
+                    open: 1.0,
+                    stick: 0.0,
+                    slip: 0.0,
+                    degenerate: 0.0,
+                },
+                Motion::Open,
+            ),
+            (
+                PlantedMix {
+                    open: 0.0,
+                    stick: 1.0,
+                    slip: 0.0,
+                    degenerate: 0.0,
+                },
+                Motion::Stick,
+            ),
+            (
+                PlantedMix {
+                    open: 0.0,
+                    stick: 0.0,
+                    slip: 1.0,
+                    degenerate: 0.0,
+                },
+                Motion::Slip,
+            ),
+        ] {
+            let (problem, point) = Planted {
+                mix,
+                ..Planted::default()
+            }
+            .local::<3>();
+            let verdict = problem.judge(&point, 1e-10).unwrap();
+            assert!(
+                verdict
+                    .statuses
+                    .iter()
+                    .all(|s| s.status == motion && !s.degenerate)
+            );
+        }
+        let mix = PlantedMix {
+            open: 0.0,
+            stick: 0.0,
+            slip: 0.0,
+            degenerate: 1.0,
+        };
+        let (problem, point) = Planted {
+            mix,
+            ..Planted::default()
+        }
+        .local::<3>();
+        assert_eq!(problem.judge(&point, 1e-10).unwrap().counts.degenerate, 20);
+    }
+
+    #[test]
+    fn a_violated_dynamics_is_refused() {
+        let (problem, mut point) = Planted::default().global::<3>();
+        point.v[0] += 1e-6;
+        assert!(!problem.judge(&point, 1e-3).unwrap().solved);
+    }
+
+    #[test]
+    fn the_residual_does_not_depend_on_units() {
+        // Impulses in other units: W → W/a, r → a r; velocities in other units: q → b q.
+        let (problem, mut point) = Planted::default().local::<3>();
+        point
+            .r
+            .iter_mut()
+            .enumerate()
+            .for_each(|(i, r)| *r += 1e-4 * (i as f64).sin());
+        let reference = problem.judge(&point, 1e-8).unwrap().measure;
+        let (a, b) = (1e6, 1e-3);
+        let scaled = FrictionLocal::<3>::new(
+            crate::linalg::Bsr::from_csc(&{
+                let w = problem.W.to_csc();
+                Csc::from_triplets(60, 60, w.triplets().map(|(i, j, x)| (i, j, x / a))).unwrap()
+            }),
+            problem.q.iter().map(|q| b * q).collect(),
+            problem.mu.clone(),
+        )
+        .unwrap();
+        point.r.iter_mut().for_each(|r| *r *= a * b);
+        let other = scaled.judge(&point, 1e-8).unwrap().measure;
+        assert!((other.relative / reference.relative - 1.0).abs() < 1e-9);
+        assert!((other.absolute / reference.absolute - b).abs() < 1e-9 * b);
+        assert!(
+            (other.paper / reference.paper - 1.0).abs() > 0.5,
+            "the paper's does depend"
+        );
+    }
+}

@@ -1,0 +1,71 @@
+//! What every kind of problem offers to the loop that drives the solvers.
+
+use crate::ProblemError;
+use crate::check::{Certificate, Measure};
+
+/// The kinds of problem, by the name that files, reports and the registry use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// `u = W r + q`, two-dimensional contacts.
+    FrictionLocal2d,
+    /// `u = W r + q`, three-dimensional contacts.
+    FrictionLocal3d,
+    /// `M v = H r + f`, `u = Hᵀ v + w`, two-dimensional contacts.
+    FrictionGlobal2d,
+    /// `M v = H r + f`, `u = Hᵀ v + w`, three-dimensional contacts.
+    FrictionGlobal3d,
+}
+
+impl Kind {
+    /// The name used in files, reports and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::FrictionLocal2d => "friction_local_2d",
+            Kind::FrictionLocal3d => "friction_local_3d",
+            Kind::FrictionGlobal2d => "friction_global_2d",
+            Kind::FrictionGlobal3d => "friction_global_3d",
+        }
+    }
+}
+
+/// A problem, stated: validated data, the shape of its unknown, and its own judge.
+///
+/// The judge is split in two so that a loop may call it without allocating: a [`Gauge`](Problem::Gauge) holds
+/// what depends on the problem alone (norms, diagonal blocks, buffers) and [`measure`](Problem::measure) uses it.
+pub trait Problem {
+    /// The unknown of the problem.
+    type Point: Clone + Send;
+    /// The judge's constants and buffers for one problem.
+    type Gauge: Send;
+
+    /// Which kind of problem this is.
+    fn kind(&self) -> Kind;
+
+    /// The number of scalar unknowns that a solver works on.
+    fn unknowns(&self) -> usize;
+
+    /// The zero point.
+    fn origin(&self) -> Self::Point;
+
+    /// A caller's point, checked: every part has the right length and holds finite numbers.
+    fn validate_point(&self, point: &Self::Point) -> Result<(), ProblemError>;
+
+    /// Overwrites `to` with `from` without allocating when the lengths agree.
+    fn copy_point(from: &Self::Point, to: &mut Self::Point);
+
+    /// Prepares the judge. Cost: one pass over the data, and for global problems one factorisation of M.
+    fn gauge(&self) -> Result<Self::Gauge, ProblemError>;
+
+    /// Prepares the judge for another problem, reusing `gauge`'s memory where the shape allows.
+    fn regauge(&self, gauge: &mut Self::Gauge) -> Result<(), ProblemError> {
+        *gauge = self.gauge()?;
+        Ok(())
+    }
+
+    /// The residuals of `point`, recomputed from the data of the problem alone. Allocates nothing.
+    fn measure(&self, point: &Self::Point, gauge: &mut Self::Gauge) -> Measure;
+
+    /// Whether `certificate` proves that the problem has no solution, decided from the data alone.
+    fn verify(&self, certificate: &Certificate) -> bool;
+}
