@@ -1,0 +1,232 @@
+//! The Alart–Curnier function of one frictional contact and its Jean–Moreau variant.
+//!
+//! With `x_N = r_N − ρ_N u_N`, `x_T = r_T − ρ_T u_T`:
+//!
+//! ```text
+//! Φ_N = r_N − max(0, x_N)                                             (88)
+//! Φ_T = r_T − P_{D(R)}(x_T),  R = mu max(0, x_N)  (Alart–Curnier)      (89)
+//!                             R = mu max(0, r_N)  (Jean–Moreau)
+//! ```
+//!
+//! Vanishes exactly at the solutions of `K* ∋ u + mu‖u_T‖e_N ⟂ r ∈ K`, for any ρ > 0.
+//! Source: AlartCurnier1991; Acary, lecture (88)–(94) with the Jacobian as corrected in docs/notation.md.
+
+/// Which radius the friction disk has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Disk {
+    /// `R = mu max(0, r_N − ρ_N u_N)`.
+    AlartCurnier,
+    /// `R = mu max(0, r_N)`.
+    JeanMoreau,
+}
+
+/// The scaling parameters ρ_N, ρ_T > 0, in units of 1/W.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Radii {
+    /// ρ_N.
+    pub normal: f64,
+    /// ρ_T.
+    pub tangential: f64,
+}
+
+/// Φ and its derivatives `A = ∂Φ/∂u`, `B = ∂Φ/∂r` at `(u, r)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Linearised<const D: usize> {
+    /// Φ.
+    pub phi: [f64; D],
+    /// ∂Φ/∂u.
+    pub a: [[f64; D]; D],
+    /// ∂Φ/∂r.
+    pub b: [[f64; D]; D],
+}
+
+/// The piece of the friction law on which the tangential part is smooth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Piece {
+    /// `‖x_T‖ ≤ R`.
+    Stick,
+    /// `‖x_T‖ > R > 0`.
+    Slip,
+    /// `R = 0`.
+    Open,
+}
+
+/// Evaluates the function and one element of its B-subdifferential.
+pub fn alart_curnier<const D: usize>(
+    disk: Disk,
+    u: &[f64; D],
+    r: &[f64; D],
+    mu: f64,
+    rho: Radii,
+) -> Linearised<D> {
+    let mut out = Linearised {
+        phi: [0.0; D],
+        a: [[0.0; D]; D],
+        b: [[0.0; D]; D],
+    };
+    let x_n = r[0] - rho.normal * u[0];
+    if x_n > 0.0 {
+        out.phi[0] = rho.normal * u[0];
+        out.a[0][0] = rho.normal;
+    } else {
+        out.phi[0] = r[0];
+        out.b[0][0] = 1.0;
+    }
+
+    let mut x = [0.0; D];
+    for k in 1..D {
+        x[k] = r[k] - rho.tangential * u[k];
+    }
+    let size = x[1..].iter().map(|v| v * v).sum::<f64>().sqrt();
+    let pressure = match disk {
+        Disk::AlartCurnier => x_n,
+        Disk::JeanMoreau => r[0],
+    };
+    let radius = mu * pressure.max(0.0);
+    let piece = if radius <= 0.0 {
+        Piece::Open
+    } else if size <= radius {
+        Piece::Stick
+    } else {
+        Piece::Slip
+    };
+    match piece {
+        Piece::Stick => {
+            for k in 1..D {
+                out.phi[k] = rho.tangential * u[k];
+                out.a[k][k] = rho.tangential;
+            }
+        }
+        Piece::Open => {
+            for k in 1..D {
+                out.phi[k] = r[k];
+                out.b[k][k] = 1.0;
+            }
+        }
+        Piece::Slip => {
+            for k in 1..D {
+                let t_k = x[k] / size;
+                out.phi[k] = r[k] - radius * t_k;
+                // ∂R/∂r_N = mu in both variants; ∂R/∂u_N = −mu ρ_N with the Alart–Curnier disk.
+                out.b[k][0] = -mu * t_k;
+                if disk == Disk::AlartCurnier {
+                    out.a[k][0] = mu * rho.normal * t_k;
+                }
+                for l in 1..D {
+                    // R Γ(x_T), Γ = (I − t tᵀ)/‖x_T‖.
+                    let identity = f64::from(u8::from(k == l));
+                    let gamma = radius * (identity - t_k * x[l] / size) / size;
+                    out.a[k][l] = rho.tangential * gamma;
+                    out.b[k][l] = identity - gamma;
+                }
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One point for each combination of pieces, away from kinks.
+    const POINTS: [([f64; 3], [f64; 3], &str); 5] = [
+        ([0.1, 0.01, -0.02], [2.0, 0.2, 0.1], "stick"),
+        ([0.1, 0.5, -0.9], [2.0, 0.2, 0.1], "slip"),
+        ([-0.3, -1.5, 0.4], [0.7, -0.3, 0.6], "slip, penetrating"),
+        ([3.0, 0.5, -0.9], [-0.2, 0.3, 0.1], "open"),
+        (
+            [3.0, 1.5, -0.9],
+            [0.4, 0.3, 0.1],
+            "separating, r_N > 0: the variants differ",
+        ),
+    ];
+
+    #[test]
+    fn the_jacobian_agrees_with_finite_differences_on_every_piece() {
+        let rho = Radii {
+            normal: 0.7,
+            tangential: 1.3,
+        };
+        for disk in [Disk::AlartCurnier, Disk::JeanMoreau] {
+            for (u, r, name) in POINTS {
+                let at = alart_curnier(disk, &u, &r, 0.6, rho);
+                let h = 1e-6;
+                for l in 0..3 {
+                    let mut step = |x: &[f64; 3], s: f64| {
+                        let mut y = *x;
+                        y[l] += s;
+                        y
+                    };
+                    let phi = |u: &[f64; 3], r: &[f64; 3]| alart_curnier(disk, u, r, 0.6, rho).phi;
+                    let (up, um) = (phi(&step(&u, h), &r), phi(&step(&u, -h), &r));
+                    let (rp, rm) = (phi(&u, &step(&r, h)), phi(&u, &step(&r, -h)));
+                    for k in 0..3 {
+                        let (du, dr) = ((up[k] - um[k]) / (2.0 * h), (rp[k] - rm[k]) / (2.0 * h));
+                        assert!(
+                            (du - at.a[k][l]).abs() < 1e-8,
+                            "{disk:?} {name} A[{k}][{l}]"
+                        );
+                        assert!(
+                            (dr - at.b[k][l]).abs() < 1e-8,
+                            "{disk:?} {name} B[{k}][{l}]"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn at_a_kink_the_jacobian_is_that_of_a_neighbouring_piece() {
+        // ‖x_T‖ = R exactly: stick and slip meet.
+        let (rho, mu) = (
+            Radii {
+                normal: 1.0,
+                tangential: 1.0,
+            },
+            0.5,
+        );
+        let (u, r) = ([0.0; 3], [2.0, 0.6, 0.8]);
+        for disk in [Disk::AlartCurnier, Disk::JeanMoreau] {
+            let kink = alart_curnier(disk, &u, &r, mu, rho);
+            let neighbours = [0.999, 1.001].map(|s| {
+                let near = [2.0, 0.6 * s, 0.8 * s];
+                alart_curnier(disk, &u, &near, mu, rho)
+            });
+            let distance = |n: &Linearised<3>| {
+                let pairs = (kink.a.iter().flatten().zip(n.a.iter().flatten()))
+                    .chain(kink.b.iter().flatten().zip(n.b.iter().flatten()));
+                pairs.map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
+            };
+            assert!(neighbours.iter().any(|n| distance(n) < 1e-2), "{disk:?}");
+        }
+    }
+
+    #[test]
+    fn vanishes_at_the_law_and_only_there() {
+        let rho = Radii {
+            normal: 0.7,
+            tangential: 1.3,
+        };
+        let mu = 0.5;
+        let law = [
+            ([0.0; 3], [2.0, 0.3, 0.1]),
+            ([0.0, 3.0, 4.0], [2.0, -0.6, -0.8]),
+            ([1.0, 3.0, 4.0], [0.0; 3]),
+        ];
+        let not_law = [
+            ([0.0, 3.0, 4.0], [2.0, 0.6, 0.8]),
+            ([0.1, 0.0, 0.0], [2.0, 0.0, 0.0]),
+            ([-0.1, 0.0, 0.0], [0.0; 3]),
+        ];
+        for disk in [Disk::AlartCurnier, Disk::JeanMoreau] {
+            let size = |(u, r): &([f64; 3], [f64; 3])| {
+                let phi = alart_curnier(disk, u, r, mu, rho).phi;
+                phi.iter().map(|v| v.abs()).fold(0.0, f64::max)
+            };
+            assert!(law.iter().all(|p| size(p) < 1e-15));
+            assert!(not_law.iter().all(|p| size(p) > 1e-2));
+        }
+    }
+}

@@ -1,0 +1,5 @@
+//! Cones and sets: projection and its Jacobian. Kernels only; nothing here knows of a problem.
+
+mod coulomb;
+
+pub use coulomb::{Region, project, region};

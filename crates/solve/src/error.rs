@@ -1,0 +1,37 @@
+//! A caller's mistake, as opposed to a numerical outcome (which is a [`Status`](crate::Status)).
+
+use nonsmooth_problem::ProblemError;
+
+/// Why a solve could not be started.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// The data of the problem or of the starting point is at fault.
+    #[error(transparent)]
+    Problem(#[from] ProblemError),
+    /// No solver of that name exists for this kind of problem.
+    #[error("unknown solver `{name}` for this kind of problem; there are: {known}")]
+    UnknownSolver {
+        /// The name asked for.
+        name: String,
+        /// The names that exist.
+        known: String,
+    },
+    /// A setting is unknown, of the wrong type or out of range.
+    #[error("solver `{solver}`: {problem}")]
+    Settings {
+        /// The solver's name.
+        solver: String,
+        /// What is wrong, with the key, what is expected and what was found.
+        problem: String,
+    },
+    /// A limit of the solve is impossible.
+    #[error("{name}: expected {expected}, found {found}")]
+    Limits {
+        /// The limit's name.
+        name: &'static str,
+        /// What it may be.
+        expected: &'static str,
+        /// What it is.
+        found: String,
+    },
+}

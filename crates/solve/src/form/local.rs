@@ -1,0 +1,122 @@
+//! The local problem by its contacts: rows of W.
+//!
+//! Bilateral rows `0 = Vᵀ r + R λ + s` are eliminated once: `W ← W − V R⁻¹ Vᵀ`, `q ← q − V R⁻¹ s`. Redundant
+//! constraints (a singular, positive semidefinite R) are honoured.
+
+use nonsmooth_problem::linalg::{Bsr, Delassus, Inverse, norm, small};
+use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint};
+
+use super::{Blockwise, Contacts, Linear};
+use crate::SolveError;
+
+/// What the view keeps: the norm of q, and the problem without its bilateral rows where it has any.
+pub struct LocalState<const D: usize> {
+    scale: f64,
+    eliminated: Option<Eliminated<D>>,
+}
+
+struct Eliminated<const D: usize> {
+    w: Bsr<D>,
+    q: Vec<f64>,
+    r_inverse: Inverse,
+    scratch: Vec<f64>,
+}
+
+impl<const D: usize> Eliminated<D> {
+    fn new(problem: &FrictionLocal<D>, b: &BilateralLocal) -> Result<Self, SolveError> {
+        let r_inverse = Inverse::semidefinite(&b.R, "R")?;
+        // V R⁻¹ Vᵀ is the Delassus operator of "H = Vᵀ, M = R".
+        let w = problem
+            .W
+            .minus(&Delassus::new(&b.V.transpose(), &r_inverse).condense());
+        let mut lambda = b.s.clone();
+        r_inverse.solve(&mut lambda);
+        let mut q = problem.q.clone();
+        b.V.mul_add(-1.0, &lambda, &mut q);
+        Ok(Self {
+            w,
+            q,
+            scratch: vec![0.0; r_inverse.scratch_len()],
+            r_inverse,
+        })
+    }
+}
+
+impl<const D: usize> LocalState<D> {
+    #[inline(always)]
+    fn operator<'a>(&'a self, problem: &'a FrictionLocal<D>) -> (&'a Bsr<D>, &'a [f64]) {
+        match &self.eliminated {
+            None => (&problem.W, &problem.q),
+            Some(e) => (&e.w, &e.q),
+        }
+    }
+}
+
+impl<const D: usize> Contacts<D> for FrictionLocal<D> {
+    type State = LocalState<D>;
+
+    fn state(&self) -> Result<Self::State, SolveError> {
+        let eliminated = self
+            .bilateral
+            .as_ref()
+            .map(|b| Eliminated::new(self, b))
+            .transpose()?;
+        let norm_q = norm(&self.q);
+        Ok(LocalState {
+            scale: if norm_q > 0.0 { norm_q } else { 1.0 },
+            eliminated,
+        })
+    }
+
+    fn mu(&self) -> &[f64] {
+        &self.mu
+    }
+
+    fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D] {
+        state.operator(self).0.diagonal_block(c)
+    }
+
+    fn velocity_scale(&self, state: &Self::State) -> f64 {
+        state.scale
+    }
+
+    fn impulses(point: &mut LocalPoint) -> &mut [f64] {
+        &mut point.r
+    }
+
+    fn enter(&self, _: &mut Self::State, _: &LocalPoint) {}
+
+    fn complete(&self, state: &mut Self::State, point: &mut LocalPoint) {
+        if let (Some(b), Some(e)) = (&self.bilateral, &mut state.eliminated) {
+            // λ = −R⁻¹ (Vᵀ r + s).
+            for (l, s) in point.lambda.iter_mut().zip(&b.s) {
+                *l = -s;
+            }
+            b.V.mul_transpose_add(-1.0, &point.r, &mut point.lambda);
+            e.r_inverse.solve_with(&mut point.lambda, &mut e.scratch);
+        }
+    }
+}
+
+impl<const D: usize> Blockwise<D> for FrictionLocal<D> {
+    #[inline(always)]
+    fn velocity(&self, state: &Self::State, r: &[f64], c: usize) -> [f64; D] {
+        let (w, q) = state.operator(self);
+        let mut u = w.row_product(c, r);
+        let q: [f64; D] = small::block(q, c);
+        for k in 0..D {
+            u[k] += q[k];
+        }
+        u
+    }
+
+    #[inline(always)]
+    fn moved(&self, _: &mut Self::State, _: usize, _: &[f64; D]) {}
+}
+
+impl<const D: usize> Linear<D> for FrictionLocal<D> {
+    fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
+        let (w, q) = state.operator(self);
+        w.mul_plus(r, q, u);
+    }
+}

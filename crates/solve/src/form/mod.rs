@@ -1,0 +1,66 @@
+//! Capabilities that the families of solvers are generic over, and which problem offers which.
+//!
+//! | capability | what a family may ask | offered by |
+//! | --- | --- | --- |
+//! | [`Contacts`] | the law's data, the diagonal blocks of W, ‖q‖, the impulses of a point | local, global |
+//! | [`Blockwise`] | one contact's velocity, and to be told that one contact's impulse moved | local (rows of W), global (velocity space) |
+//! | [`Linear`] | `u = W r + q` for all contacts | local (W), global (product form) |
+
+mod global;
+mod local;
+
+use nonsmooth_problem::Problem;
+
+pub(crate) use global::recover;
+
+use crate::SolveError;
+
+/// A problem with D-dimensional frictional contacts, seen by its contacts.
+///
+/// `State` is what the view keeps beside the problem: velocities, factorisations, buffers.
+pub trait Contacts<const D: usize>: Problem {
+    /// What the view keeps between calls.
+    type State: Send;
+
+    /// Prepares the view.
+    fn state(&self) -> Result<Self::State, SolveError>;
+
+    /// Prepares an existing view for this problem, reusing memory where the shape is the same.
+    fn refill(&self, state: &mut Self::State) -> Result<(), SolveError> {
+        *state = self.state()?;
+        Ok(())
+    }
+
+    /// The coefficients of friction.
+    fn mu(&self) -> &[f64];
+
+    /// The diagonal block `W_cc`.
+    fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D];
+
+    /// `‖q‖`, or 1 where q = 0: what a solver's estimate is relative to.
+    fn velocity_scale(&self, state: &Self::State) -> f64;
+
+    /// The impulses of a point.
+    fn impulses(point: &mut Self::Point) -> &mut [f64];
+
+    /// Takes the impulses of `point` as the current ones.
+    fn enter(&self, state: &mut Self::State, point: &Self::Point);
+
+    /// Completes `point` (velocities, multipliers) from its impulses, exactly.
+    fn complete(&self, state: &mut Self::State, point: &mut Self::Point);
+}
+
+/// Access contact by contact, as block Gauss–Seidel needs it.
+pub trait Blockwise<const D: usize>: Contacts<D> {
+    /// The relative velocity `u_c` for the current impulses `r`.
+    fn velocity(&self, state: &Self::State, r: &[f64], c: usize) -> [f64; D];
+
+    /// The impulse of contact `c` moved by `dr` (and `r` holds it already).
+    fn moved(&self, state: &mut Self::State, c: usize, dr: &[f64; D]);
+}
+
+/// Products with the whole operator.
+pub trait Linear<const D: usize>: Contacts<D> {
+    /// `u = W r + q`.
+    fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]);
+}

@@ -1,0 +1,39 @@
+//! All numerics: contracts, the one loop, and one file per algorithm.
+//!
+//! A *problem* (crate `nonsmooth-problem`) is data with its own judge. A *solver* is a struct that is its
+//! hyperparameters, with `work` and `step` ([`Solver`]). [`Driver`] is the only loop: it counts, times, judges and
+//! keeps the best point. [`registry`] lists what exists, by kind of problem; the command line, its help,
+//! `docs/solvers.md` and the conformance tests come from it.
+//!
+//! ```
+//! use nonsmooth_problem::{FrictionLocal, Problem, planted::Planted};
+//! use nonsmooth_solve::{Limits, Status, registry};
+//!
+//! let (problem, _known) = Planted::default().local::<3>();
+//! let mut session = registry::session::<FrictionLocal<3>>("nsgs", &Default::default())?;
+//! let mut point = problem.origin();
+//! let outcome = session.solve(&problem, &mut point, &Limits::default(), &mut |_| {})?;
+//! assert_eq!(outcome.status, Status::Solved);
+//! assert!(outcome.measure.relative <= 1e-8);
+//! # Ok::<(), nonsmooth_solve::SolveError>(())
+//! ```
+
+pub mod cfun;
+pub mod cone;
+mod drive;
+mod error;
+pub mod form;
+pub mod local;
+pub mod parts;
+pub mod projection;
+pub mod reform;
+pub mod registry;
+mod solver;
+pub mod splitting;
+mod via;
+
+pub use drive::{Driver, Limit, Limits, Outcome, Progress, Sample, Session, Status};
+pub use error::SolveError;
+pub use reform::Reformulation;
+pub use solver::{Solver, Step};
+pub use via::Via;

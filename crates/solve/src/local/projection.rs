@@ -1,0 +1,121 @@
+//! One frictional contact by projection: `r ← P_K(r − ρ (u + mu‖u_T‖ e_N))`, `u = W r + q`.
+//!
+//! [`Projection`] takes one such step a visit with `ρ = 1/‖W‖`; [`ProjectionIterated`] repeats it until the contact is solved,
+//! with ρ adapted by Khobotov's rule (`ρ‖F(r) − F(r̄)‖ ≤ 0.9‖r − r̄‖`).
+//!
+//! Source: DeSaxceFeng1991; Acary, lecture (105)–(109); Khobotov1987. Cost: about 40 flops a step. A single step
+//! per visit converges slowly when the block is badly conditioned, and may not at all for large mu.
+
+use nonsmooth_problem::linalg::small::{mul, tangential_norm};
+
+use super::{LocalSolver, norm_bound};
+use crate::cone;
+
+/// One projection step a visit.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Projection;
+
+/// Projection steps until the contact is solved.
+#[derive(Debug, Clone, Copy)]
+pub struct ProjectionIterated {
+    /// At most this many steps a visit.
+    pub steps: usize,
+}
+
+impl Default for ProjectionIterated {
+    fn default() -> Self {
+        Self { steps: 100 }
+    }
+}
+
+impl<const D: usize> LocalSolver<D> for Projection {
+    type Memo = f64;
+
+    fn prepare(&self, w: &[[f64; D]; D], _mu: f64) -> f64 {
+        step_length(w)
+    }
+
+    #[inline(always)]
+    fn solve(
+        &self,
+        rho: &mut f64,
+        w: &[[f64; D]; D],
+        q: &[f64; D],
+        mu: f64,
+        r: &[f64; D],
+    ) -> [f64; D] {
+        projected(r, &modified_velocity(w, q, mu, r), *rho, mu)
+    }
+}
+
+impl<const D: usize> LocalSolver<D> for ProjectionIterated {
+    type Memo = f64;
+
+    fn prepare(&self, w: &[[f64; D]; D], _mu: f64) -> f64 {
+        step_length(w)
+    }
+
+    fn solve(
+        &self,
+        rho: &mut f64,
+        w: &[[f64; D]; D],
+        q: &[f64; D],
+        mu: f64,
+        r: &[f64; D],
+    ) -> [f64; D] {
+        let distance =
+            |x: &[f64; D], y: &[f64; D]| (0..D).map(|k| (x[k] - y[k]).powi(2)).sum::<f64>().sqrt();
+        let mut r = *r;
+        let mut f = modified_velocity(w, q, mu, &r);
+        for _ in 0..self.steps {
+            let mut next = projected(&r, &f, *rho, mu);
+            let mut f_next = modified_velocity(w, q, mu, &next);
+            let mut ratio = *rho * distance(&f, &f_next) / distance(&r, &next);
+            // A NaN (no movement) ends both loops.
+            while ratio > 0.9 {
+                *rho *= 2.0 / 3.0;
+                next = projected(&r, &f, *rho, mu);
+                f_next = modified_velocity(w, q, mu, &next);
+                ratio = *rho * distance(&f, &f_next) / distance(&r, &next);
+            }
+            let moved = distance(&r, &next);
+            (r, f) = (next, f_next);
+            if moved <= 4.0 * f64::EPSILON * distance(&r, &[0.0; D]) {
+                break;
+            }
+            if ratio < 0.3 {
+                *rho *= 1.5;
+            }
+        }
+        r
+    }
+}
+
+fn step_length<const D: usize>(w: &[[f64; D]; D]) -> f64 {
+    let bound = norm_bound(w);
+    if bound > 0.0 { 1.0 / bound } else { 1.0 }
+}
+
+#[inline(always)]
+fn modified_velocity<const D: usize>(
+    w: &[[f64; D]; D],
+    q: &[f64; D],
+    mu: f64,
+    r: &[f64; D],
+) -> [f64; D] {
+    let mut u = mul(w, r);
+    for k in 0..D {
+        u[k] += q[k];
+    }
+    u[0] += mu * tangential_norm(&u);
+    u
+}
+
+#[inline(always)]
+fn projected<const D: usize>(r: &[f64; D], f: &[f64; D], rho: f64, mu: f64) -> [f64; D] {
+    let mut x = *r;
+    for k in 0..D {
+        x[k] -= rho * f[k];
+    }
+    cone::project(&x, mu)
+}

@@ -1,0 +1,5 @@
+//! What two families share.
+
+mod ordering;
+
+pub use ordering::{Order, Ordering};

@@ -1,0 +1,37 @@
+//! Reformulations: problem → problem, with the way back.
+
+mod condense;
+
+use nonsmooth_problem::Problem;
+
+pub use condense::Condense;
+
+use crate::SolveError;
+
+/// An edge between two kinds of problem that can be walked both ways.
+pub trait Reformulation<P: Problem>: Send {
+    /// The other kind of problem.
+    type To: Problem + Send;
+    /// What the way back needs.
+    type Memo: Send;
+
+    /// The other problem, and the memo of the way back.
+    fn reduce(&self, problem: &P) -> Result<(Self::To, Self::Memo), SolveError>;
+
+    /// A point of the first problem as a starting point of the other.
+    fn lower(
+        &self,
+        problem: &P,
+        point: &P::Point,
+        memo: &Self::Memo,
+    ) -> <Self::To as Problem>::Point;
+
+    /// A point of the other problem as a point of the first.
+    fn lift(
+        &self,
+        problem: &P,
+        reduced: &<Self::To as Problem>::Point,
+        memo: &Self::Memo,
+        point: &mut P::Point,
+    );
+}

@@ -1,0 +1,507 @@
+//! What exists: one slice of entries per kind of problem, and everything that is generated from it.
+//!
+//! A composed name `reformulation/solver` (such as `condense/nsgs`) needs no entry of its own.
+
+use std::marker::PhantomData;
+
+use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+
+use crate::form::{Blockwise, Linear};
+use crate::projection::{DeSaxce, Extragradient, FixedPoint, Method, Projected};
+use crate::reform::Condense;
+use crate::splitting::Nsgs;
+use crate::{Driver, Reformulation, Session, SolveError, Solver, Via};
+
+/// Settings of a solver by key, as they come from a command line or a file.
+pub type SettingsMap = Map<String, Value>;
+
+/// A solver's hyperparameters: typed, documented, defaulted, unknown keys refused.
+pub trait Settings: DeserializeOwned + Serialize + JsonSchema + Default {
+    /// The ranges that types do not express. The message names the key, what is expected and what was found.
+    fn validate(&self) -> Result<(), String>;
+}
+
+/// One solver: what it is, and how it is made and handed to a visitor that knows the kind of problem.
+pub struct Entry<V: Visitor> {
+    /// What it is and needs.
+    pub about: &'static About,
+    build: fn(&SettingsMap, V) -> Result<V::Output, String>,
+}
+
+/// Someone who takes a solver for `Problem` with its type, once a session, and makes something of it.
+pub trait Visitor {
+    /// The problems that the solver must solve.
+    type Problem: Problem;
+    /// What comes of it.
+    type Output;
+    /// Takes the solver.
+    fn visit<S: Solver<Self::Problem> + 'static>(self, solver: S) -> Self::Output;
+}
+
+/// Makes a session on the solver's own kind of problem.
+struct Direct<P>(PhantomData<P>);
+
+impl<P: Problem + 'static> Visitor for Direct<P> {
+    type Problem = P;
+    type Output = Box<dyn Session<P>>;
+    fn visit<S: Solver<P> + 'static>(self, solver: S) -> Self::Output {
+        Box::new(Driver::new(solver))
+    }
+}
+
+/// Makes a session on problems of type `P` that a reformulation leads to the solver's.
+struct Through<P, R>(R, PhantomData<P>);
+
+impl<P: Problem + 'static, R: Reformulation<P> + 'static> Visitor for Through<P, R> {
+    type Problem = R::To;
+    type Output = Box<dyn Session<P>>;
+    fn visit<S: Solver<R::To> + 'static>(self, solver: S) -> Self::Output {
+        Box::new(Driver::new(Via {
+            reformulation: self.0,
+            solver,
+        }))
+    }
+}
+
+/// A solver, described.
+#[derive(Debug, Serialize)]
+pub struct About {
+    /// The name by which it is asked for.
+    pub name: &'static str,
+    /// The family: the folder of its file.
+    pub family: &'static str,
+    /// One line.
+    pub summary: &'static str,
+    /// What it needs of a problem, in words; empty where it takes any.
+    pub needs: &'static [&'static str],
+    /// Keys of `docs/refs.bib`.
+    pub cites: &'static [&'static str],
+    /// Settings (`key=value`) that the conformance tests and benchmarks run besides the defaults.
+    pub variants: &'static [&'static str],
+    /// The documented settings.
+    #[serde(serialize_with = "settings_now")]
+    pub settings: fn() -> Vec<Setting>,
+}
+
+fn settings_now<S: serde::Serializer>(
+    settings: &fn() -> Vec<Setting>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    settings().serialize(serializer)
+}
+
+/// One setting, as help texts show it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Setting {
+    /// The key.
+    pub key: String,
+    /// The default value.
+    pub default: Value,
+    /// The names it may take, where it is a choice.
+    pub choices: Vec<String>,
+    /// What it does.
+    pub help: String,
+}
+
+/// A reformulation that can stand before a solver's name.
+#[derive(Debug, Serialize)]
+pub struct Prefix {
+    /// The name before the slash.
+    pub name: &'static str,
+    /// One line.
+    pub summary: &'static str,
+    /// The kinds of problem that it takes.
+    pub from: &'static [Kind],
+    /// Keys of `docs/refs.bib`.
+    pub cites: &'static [&'static str],
+}
+
+/// A kind of problem that has solvers.
+pub trait Registered: Problem + Sized + 'static {
+    /// The solvers that work on it directly, to be handed to `V`.
+    fn entries<V: Visitor<Problem = Self>>() -> Vec<Entry<V>>;
+
+    /// Hands a solver reached through a reformulation to a session; `None` where there is no such pair.
+    fn composed(_reformulation: &str, _solver: &str, _settings: &SettingsMap) -> Composed<Self> {
+        None
+    }
+
+    /// The composed names `reformulation/solver` that exist.
+    fn composed_names() -> Vec<String> {
+        vec![]
+    }
+}
+
+/// A session through a reformulation, if there is such a pair and its settings are right.
+type Composed<P> = Option<Result<Box<dyn Session<P>>, String>>;
+
+/// The solver that is used when none is named.
+pub const DEFAULT: &str = "nsgs";
+
+/// The reformulations.
+pub const PREFIXES: &[Prefix] = &[Prefix {
+    name: "condense",
+    summary: "global to local: forms W = H' M^-1 H and q, bilateral constraints eliminated",
+    from: &[Kind::FrictionGlobal2d, Kind::FrictionGlobal3d],
+    cites: &["Acary2018"],
+}];
+
+/// NSGS.
+pub const NSGS: About = About {
+    name: "nsgs",
+    family: "splitting",
+    summary: "nonsmooth block Gauss-Seidel over contacts, with a choice of local solvers",
+    needs: &[],
+    cites: &[
+        "JourdanAlartJean1998",
+        "Jean1999",
+        "AcaryBremondHuber2018",
+        "DBB11",
+    ],
+    variants: &[
+        "local=quartic",
+        "local=newton_ac",
+        "local=newton_jm",
+        "local=projection",
+        "local=projection_iterated",
+        "ordering=shuffled",
+        "ordering=fully_shuffled",
+        "omega=0.9",
+        "freeze_after=5",
+    ],
+    settings: described::<Nsgs>,
+};
+
+/// The De Saxcé fixed point.
+pub const DE_SAXCE: About = About {
+    name: "de_saxce",
+    family: "projection",
+    summary: "De Saxce-Feng fixed point (Uzawa) with a fixed step",
+    needs: &[],
+    cites: &["DeSaxceFeng1991", "Acary2018"],
+    variants: &[],
+    settings: described::<DeSaxce>,
+};
+
+/// The fixed-point projection.
+pub const FIXED_POINT: About = About {
+    name: "fixed_point",
+    family: "projection",
+    summary: "fixed-point projection with a self-adaptive step",
+    needs: &[],
+    cites: &["Acary2018", "Khobotov1987", "HanLo2002"],
+    variants: &[],
+    settings: described::<FixedPoint>,
+};
+
+/// The extragradient method.
+pub const EXTRAGRADIENT: About = About {
+    name: "extragradient",
+    family: "projection",
+    summary: "extragradient projection with a self-adaptive step",
+    needs: &[],
+    cites: &["Korpelevich1976", "Khobotov1987", "Acary2018"],
+    variants: &[],
+    settings: described::<Extragradient>,
+};
+
+/// The solvers of frictional contact, for any problem that can be seen by its contacts.
+fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
+where
+    V: Visitor,
+    V::Problem: Blockwise<D> + Linear<D>,
+{
+    fn projected<const D: usize, V, M>(
+        settings: &SettingsMap,
+        visitor: V,
+    ) -> Result<V::Output, String>
+    where
+        V: Visitor,
+        V::Problem: Linear<D>,
+        M: Method + Settings + 'static,
+    {
+        Ok(visitor.visit(Projected::<M, D>(parse(settings)?)))
+    }
+    vec![
+        Entry {
+            about: &NSGS,
+            build: |s, v| Ok(parse::<Nsgs>(s)?.visit::<D, V>(v)),
+        },
+        Entry {
+            about: &DE_SAXCE,
+            build: projected::<D, V, DeSaxce>,
+        },
+        Entry {
+            about: &FIXED_POINT,
+            build: projected::<D, V, FixedPoint>,
+        },
+        Entry {
+            about: &EXTRAGRADIENT,
+            build: projected::<D, V, Extragradient>,
+        },
+    ]
+}
+
+impl<const D: usize> Registered for FrictionLocal<D> {
+    fn entries<V: Visitor<Problem = Self>>() -> Vec<Entry<V>> {
+        contact_solvers::<D, V>()
+    }
+}
+
+impl<const D: usize> Registered for FrictionGlobal<D> {
+    fn entries<V: Visitor<Problem = Self>>() -> Vec<Entry<V>> {
+        contact_solvers::<D, V>()
+    }
+
+    fn composed(reformulation: &str, solver: &str, settings: &SettingsMap) -> Composed<Self> {
+        let through = Through(Condense, PhantomData);
+        (reformulation == "condense")
+            .then(|| find(contact_solvers::<D, _>(), solver))
+            .flatten()
+            .map(|entry| (entry.build)(settings, through))
+    }
+
+    fn composed_names() -> Vec<String> {
+        names(&FrictionLocal::<D>::entries::<Direct<_>>(), "condense/")
+    }
+}
+
+fn find<V: Visitor>(entries: Vec<Entry<V>>, name: &str) -> Option<Entry<V>> {
+    entries.into_iter().find(|e| e.about.name == name)
+}
+
+fn names<V: Visitor>(entries: &[Entry<V>], prefix: &str) -> Vec<String> {
+    entries
+        .iter()
+        .map(|e| format!("{prefix}{}", e.about.name))
+        .collect()
+}
+
+/// The descriptions of the solvers that work on problems of type `P` directly.
+pub fn abouts<P: Registered>() -> Vec<&'static About> {
+    P::entries::<Direct<P>>().iter().map(|e| e.about).collect()
+}
+
+/// Every name that [`session`] takes for problems of type `P`.
+pub fn solver_names<P: Registered>() -> Vec<String> {
+    let mut all = names(&P::entries::<Direct<P>>(), "");
+    all.extend(P::composed_names());
+    all
+}
+
+/// The description behind a name, composed or not.
+pub fn about<P: Registered>(name: &str) -> Option<&'static About> {
+    let last = name.rsplit('/').next().unwrap_or(name);
+    abouts::<P>().into_iter().find(|a| a.name == last)
+}
+
+/// A session of the solver called `name`, with the settings given and defaults for the rest.
+///
+/// Errors: an unknown name, an unknown key, a value of the wrong type or out of range.
+pub fn session<P: Registered>(
+    name: &str,
+    settings: &SettingsMap,
+) -> Result<Box<dyn Session<P>>, SolveError> {
+    let built = match name.split_once('/') {
+        Some((reformulation, solver)) => P::composed(reformulation, solver, settings),
+        None => find(P::entries::<Direct<P>>(), name)
+            .map(|entry| (entry.build)(settings, Direct(PhantomData))),
+    };
+    built
+        .ok_or_else(|| SolveError::UnknownSolver {
+            name: name.into(),
+            known: solver_names::<P>().join(", "),
+        })?
+        .map_err(|problem| SolveError::Settings {
+            solver: name.into(),
+            problem,
+        })
+}
+
+/// Reads `key=value` texts: the value as JSON where it is (numbers, true), as a plain string elsewhere.
+pub fn parse_settings<S: AsRef<str>>(texts: &[S]) -> Result<SettingsMap, String> {
+    let mut map = SettingsMap::new();
+    for text in texts {
+        let text = text.as_ref();
+        let (key, value) = text
+            .split_once('=')
+            .filter(|(key, _)| !key.trim().is_empty())
+            .ok_or_else(|| format!("expected key=value, found `{text}`"))?;
+        let (key, value) = (key.trim(), value.trim());
+        let value = serde_json::from_str(value).unwrap_or_else(|_| Value::String(value.into()));
+        if map.insert(key.into(), value).is_some() {
+            return Err(format!("`{key}` is set twice"));
+        }
+    }
+    Ok(map)
+}
+
+/// The typed settings behind a map.
+fn parse<S: Settings>(map: &SettingsMap) -> Result<S, String> {
+    let known = described::<S>();
+    // One key at a time, so that the message can name the key at fault.
+    for (key, value) in map {
+        let Some(setting) = known.iter().find(|s| s.key == *key) else {
+            let keys: Vec<_> = known.iter().map(|s| s.key.as_str()).collect();
+            return Err(format!(
+                "unknown key `{key}`; there are: {}",
+                keys.join(", ")
+            ));
+        };
+        let alone = SettingsMap::from_iter([(key.clone(), value.clone())]);
+        if serde_json::from_value::<S>(Value::Object(alone)).is_err() {
+            return Err(format!(
+                "{key}: expected {}, found {value}",
+                setting.expected()
+            ));
+        }
+    }
+    let settings: S =
+        serde_json::from_value(Value::Object(map.clone())).map_err(|e| e.to_string())?;
+    settings.validate()?;
+    Ok(settings)
+}
+
+impl Setting {
+    /// What the value may be, in words.
+    fn expected(&self) -> String {
+        match &self.default {
+            _ if !self.choices.is_empty() => format!("one of {}", self.choices.join(", ")),
+            Value::Bool(_) => "true or false".into(),
+            Value::Number(n) if n.is_u64() => "a whole number of at least 0".into(),
+            Value::Number(_) => "a number".into(),
+            _ => "text".into(),
+        }
+    }
+}
+
+/// The settings of `S` as its type documents them.
+fn described<S: Settings>() -> Vec<Setting> {
+    let schema = schemars::schema_for!(S);
+    let defaults = serde_json::to_value(S::default()).unwrap_or_default();
+    let Some(properties) = schema.get("properties").and_then(Value::as_object) else {
+        return vec![];
+    };
+    let text = |v: Option<&Value>| {
+        v.and_then(Value::as_str)
+            .unwrap_or_default()
+            .replace('\n', " ")
+    };
+    properties
+        .iter()
+        .map(|(key, property)| Setting {
+            key: key.clone(),
+            default: defaults.get(key).cloned().unwrap_or_default(),
+            choices: choices(&schema, property),
+            help: text(property.get("description")),
+        })
+        .collect()
+}
+
+/// The names of an enumeration, which a schema states as a reference to a `oneOf` of constants.
+fn choices(schema: &schemars::Schema, property: &Value) -> Vec<String> {
+    let reference = property
+        .get("$ref")
+        .and_then(Value::as_str)
+        .unwrap_or_default();
+    let Some(name) = reference.rsplit('/').next().filter(|n| !n.is_empty()) else {
+        return vec![];
+    };
+    let definition = schema.get("$defs").and_then(|d| d.get(name));
+    let list = |key: &str| {
+        definition
+            .and_then(|d| d.get(key))
+            .and_then(Value::as_array)
+    };
+    let constants = list("oneOf")
+        .into_iter()
+        .flatten()
+        .filter_map(|one| one.get("const"));
+    let plain = list("enum").into_iter().flatten();
+    constants
+        .chain(plain)
+        .filter_map(Value::as_str)
+        .map(str::to_owned)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(texts: &[&str]) -> String {
+        let map = parse_settings(texts).unwrap();
+        session::<FrictionLocal<3>>("nsgs", &map)
+            .err()
+            .expect("refused")
+            .to_string()
+    }
+
+    #[test]
+    fn mistakes_in_settings_name_key_expected_and_found() {
+        assert_eq!(
+            refusal(&["omga=1"]),
+            "solver `nsgs`: unknown key `omga`; there are: local, omega, ordering, seed, freeze_after, \
+             freeze_for, check_every"
+        );
+        assert_eq!(
+            refusal(&["omega=2.5"]),
+            "solver `nsgs`: omega: expected a number in (0, 2), found 2.5"
+        );
+        assert_eq!(
+            refusal(&["omega=fast"]),
+            "solver `nsgs`: omega: expected a number, found \"fast\""
+        );
+        assert!(refusal(&["local=magic"]).contains("local: expected one of exact, quartic,"));
+        assert!(refusal(&["seed=-1"]).contains("seed: expected a whole number"));
+        assert!(refusal(&["check_every=0"]).contains("check_every: expected at least 1, found 0"));
+    }
+
+    #[test]
+    fn unknown_solvers_are_refused_with_those_that_exist() {
+        let e = session::<FrictionLocal<3>>("lemke", &SettingsMap::new())
+            .err()
+            .expect("refused");
+        assert!(e.to_string().contains("unknown solver `lemke`") && e.to_string().contains("nsgs"));
+        for name in ["condense/nsgs", "facet/nsgs", "nsgs/condense"] {
+            assert!(
+                session::<FrictionLocal<3>>(name, &SettingsMap::new()).is_err(),
+                "{name}"
+            );
+        }
+        assert!(session::<FrictionGlobal<3>>("condense/nsgs", &SettingsMap::new()).is_ok());
+    }
+
+    #[test]
+    fn settings_texts() {
+        assert!(parse_settings(&["omega"]).is_err() && parse_settings(&["=1"]).is_err());
+        assert!(
+            parse_settings(&["a=1", "a=2"])
+                .unwrap_err()
+                .contains("twice")
+        );
+        let map = parse_settings(&["a=1.5", "b=word", "c=true"]).unwrap();
+        assert_eq!(map["a"], Value::from(1.5));
+        assert_eq!(
+            (&map["b"], &map["c"]),
+            (&Value::from("word"), &Value::from(true))
+        );
+    }
+
+    #[test]
+    fn every_setting_is_documented() {
+        for about in abouts::<FrictionLocal<3>>() {
+            let settings = (about.settings)();
+            assert!(!settings.is_empty(), "{}", about.name);
+            assert!(
+                settings.iter().all(|s| !s.help.is_empty()),
+                "{}: {settings:?}",
+                about.name
+            );
+        }
+    }
+}

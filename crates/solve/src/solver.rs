@@ -1,0 +1,66 @@
+//! The contract of a solver.
+
+use std::borrow::Cow;
+
+use nonsmooth_problem::Problem;
+use nonsmooth_problem::check::Certificate;
+
+use crate::SolveError;
+
+/// An iterative method for problems of type `P`. The implementing struct *is* the method's hyperparameters.
+///
+/// A solver advances a point; it does not count, time, print, judge or decide to stop. Those belong to
+/// [`Driver`](crate::Driver), the only loop:
+///
+/// ```text
+/// work ── start ──┬─ step ─┬─ publish ─ (the judge) ─┐
+///                 └────────┴────────────────────────┘
+/// ```
+pub trait Solver<P: Problem>: Send {
+    /// Everything that the method keeps between steps; survives between solves.
+    type Work: Send;
+
+    /// Allocates and prepares the workspace for `problem`.
+    ///
+    /// Errors: the problem lacks something that the method needs (an invertible M, for instance).
+    fn work(&self, problem: &P) -> Result<Self::Work, SolveError>;
+
+    /// Prepares an existing workspace for another problem; allocates nothing where the shape is the same.
+    fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
+        *work = self.work(problem)?;
+        Ok(())
+    }
+
+    /// Takes `point` as the starting point. Called once per solve, after `work` or `refill`.
+    fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work);
+
+    /// One iteration.
+    fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step;
+
+    /// Brings `point` up to date with `work`. Called before the point is judged or returned; methods whose
+    /// iterate lives in the workspace (velocities, a reduced problem) write it out here.
+    fn publish(&self, _problem: &P, _point: &mut P::Point, _work: &mut Self::Work) {}
+
+    /// The number of steps between two visits of the judge, unless the estimate calls it earlier.
+    /// A judgement costs about one product with W.
+    fn check_every(&self) -> usize {
+        1
+    }
+}
+
+/// What a step says of itself. All of it is a claim; the judge decides.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Step {
+    /// Go on. `estimate` is the method's own cheap estimate of the relative residual, up to a factor that the
+    /// driver calibrates at each judgement; NaN where it has none.
+    Continue {
+        /// The estimate.
+        estimate: f64,
+    },
+    /// The method has finished and cannot improve the point.
+    Done,
+    /// The method cannot go on, for the reason given.
+    Stuck(Cow<'static, str>),
+    /// The method claims that there is no solution.
+    NoSolution(Certificate),
+}

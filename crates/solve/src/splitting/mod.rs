@@ -1,0 +1,5 @@
+//! Splitting methods: block Gauss–Seidel.
+
+mod nsgs;
+
+pub use nsgs::{LocalChoice, Nsgs, Sweeps};

@@ -1,0 +1,316 @@
+//! **NSGS**, nonsmooth block Gauss–Seidel over contacts.
+//!
+//! Problem: `u = W r + q`, `K* ∋ u + mu‖u_T‖e_N ⟂ r ∈ K` for each contact, W given by its rows or, in velocity
+//! space, by `u_c = H_cᵀ v + w_c` and `v += M⁻¹ H_c Δr_c`.
+//!
+//! Method: visit the contacts in turn; freeze all impulses but the visited contact's; solve that contact's own
+//! problem `u_c = W_cc r_c + (q_c + Σ_{j≠c} W_cj r_j)` with a local solver; go on with the new impulse. With relaxation
+//! `r_c ← (1 − ω) r_c + ω r_c^new`, projected back on K where ω > 1.
+//!
+//! References: JourdanAlartJean1998; Jean1999; Acary, lecture (107); AcaryBremondHuber2018 for orderings, relaxation and freezing.
+//!
+//! Cost of a sweep: one pass over the blocks of W (or over the rows of H and M⁻¹H) plus nc local solves; nothing is
+//! allocated. Storage: the diagonal blocks and the local solver's memo, 100 to 250 bytes a contact.
+//!
+//! Fails: no convergence proof for friction; on hyperstatic problems (3nc > n) it slows down to thousands of sweeps below 1e-4,
+//! and it may circle for large mu with strongly coupled normal and tangential directions.
+
+use nonsmooth_problem::linalg::small;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::cfun::Disk;
+use crate::form::Blockwise;
+use crate::local::{
+    Exact, LocalSolver, Newton, Projection, ProjectionIterated, Quartic, frictionless,
+};
+use crate::parts::{Order, Ordering};
+use crate::registry::{Settings, Visitor};
+use crate::{SolveError, Solver, Step, cone};
+
+/// The hyperparameters of NSGS.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Nsgs {
+    /// The one-contact solver. Contacts without friction and contacts in the plane have a closed form.
+    pub local: LocalChoice,
+    /// Relaxation, in (0, 2); 1 is plain Gauss-Seidel. Below 1 helps flexible bodies, above 1 rarely helps.
+    pub omega: f64,
+    /// The order of the contacts within a sweep.
+    pub ordering: Ordering,
+    /// The seed of the shuffled orders.
+    pub seed: u64,
+    /// Freeze a contact after this many visits in a row that moved it by less than a thousandth of the mean
+    /// move of a contact in the last sweep; 0 never freezes.
+    pub freeze_after: u32,
+    /// The number of sweeps for which a frozen contact is passed over.
+    pub freeze_for: u32,
+    /// Sweeps between two evaluations of the true residual, unless the cheap estimate asks for one earlier.
+    pub check_every: usize,
+}
+
+/// The one-contact solvers by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LocalChoice {
+    /// Cases, and a bracketed one-parameter root for sliding.
+    #[default]
+    Exact,
+    /// Cases, and all roots of the quartic for sliding.
+    Quartic,
+    /// Safeguarded Newton on the Alart-Curnier function.
+    NewtonAc,
+    /// Safeguarded Newton on the Jean-Moreau function.
+    NewtonJm,
+    /// One projection step on the cone a visit.
+    Projection,
+    /// Projection steps until the contact is solved.
+    ProjectionIterated,
+}
+
+impl Default for Nsgs {
+    fn default() -> Self {
+        Self {
+            local: LocalChoice::default(),
+            omega: 1.0,
+            ordering: Ordering::default(),
+            seed: 0,
+            freeze_after: 0,
+            freeze_for: 10,
+            check_every: 20,
+        }
+    }
+}
+
+impl Settings for Nsgs {
+    fn validate(&self) -> Result<(), String> {
+        if !(self.omega > 0.0 && self.omega < 2.0) {
+            return Err(format!(
+                "omega: expected a number in (0, 2), found {}",
+                self.omega
+            ));
+        }
+        if self.check_every == 0 {
+            return Err("check_every: expected at least 1, found 0".into());
+        }
+        if self.freeze_after > 0 && self.freeze_for == 0 {
+            return Err(
+                "freeze_for: expected at least 1 while freeze_after is set, found 0".into(),
+            );
+        }
+        Ok(())
+    }
+}
+
+/// NSGS with its local solver known by type, so that the kernel inlines.
+#[derive(Debug, Clone)]
+pub struct Sweeps<L, const D: usize> {
+    /// The hyperparameters.
+    pub settings: Nsgs,
+    /// The local solver (`settings.local` by type).
+    pub local: L,
+}
+
+impl Nsgs {
+    /// Hands the method with its local solver's type to `visitor`, once a session.
+    pub(crate) fn visit<const D: usize, V>(self, visitor: V) -> V::Output
+    where
+        V: Visitor,
+        V::Problem: Blockwise<D>,
+    {
+        let settings = self;
+        match settings.local {
+            LocalChoice::Exact => visitor.visit(Sweeps {
+                settings,
+                local: Exact,
+            }),
+            LocalChoice::Quartic => visitor.visit(Sweeps {
+                settings,
+                local: Quartic,
+            }),
+            LocalChoice::NewtonAc => visitor.visit(Sweeps {
+                settings,
+                local: Newton {
+                    disk: Disk::AlartCurnier,
+                },
+            }),
+            LocalChoice::NewtonJm => visitor.visit(Sweeps {
+                settings,
+                local: Newton {
+                    disk: Disk::JeanMoreau,
+                },
+            }),
+            LocalChoice::Projection => visitor.visit(Sweeps {
+                settings,
+                local: Projection,
+            }),
+            LocalChoice::ProjectionIterated => visitor.visit(Sweeps {
+                settings,
+                local: ProjectionIterated::default(),
+            }),
+        }
+    }
+}
+
+/// The workspace: the problem's view, and what each contact keeps.
+pub struct SweepsWork<P: Blockwise<D>, L: LocalSolver<D>, const D: usize> {
+    state: P::State,
+    contacts: Vec<Contact<L::Memo, D>>,
+    order: Order,
+    /// `‖q‖`, the unit of the estimate.
+    scale: f64,
+    /// The mean of `w_c²‖Δr_c‖²` in the last sweep, the yardstick of freezing.
+    mean_move: f64,
+}
+
+struct Contact<Memo, const D: usize> {
+    w: [[f64; D]; D],
+    mu: f64,
+    /// `tr(W_cc)/D` turns an impulse into a velocity.
+    unit: f64,
+    /// Visits in a row with hardly a move; beyond `freeze_after` it counts sweeps slept.
+    settled: u32,
+    memo: Memo,
+}
+
+impl<const D: usize, P, L> Solver<P> for Sweeps<L, D>
+where
+    P: Blockwise<D>,
+    L: LocalSolver<D>,
+{
+    type Work = SweepsWork<P, L, D>;
+
+    fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
+        let mut work = SweepsWork {
+            state: problem.state()?,
+            contacts: Vec::with_capacity(problem.mu().len()),
+            order: Order::new(
+                self.settings.ordering,
+                problem.mu().len(),
+                self.settings.seed,
+            ),
+            scale: 1.0,
+            mean_move: 0.0,
+        };
+        self.fill(problem, &mut work);
+        Ok(work)
+    }
+
+    fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
+        problem.refill(&mut work.state)?;
+        self.fill(problem, work);
+        Ok(())
+    }
+
+    fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        problem.enter(&mut work.state, point);
+        work.mean_move = 0.0;
+    }
+
+    fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
+        let r = P::impulses(point);
+        let SweepsWork {
+            state,
+            contacts,
+            order,
+            scale,
+            mean_move,
+        } = work;
+        let Nsgs {
+            omega,
+            freeze_after,
+            freeze_for,
+            ..
+        } = self.settings;
+        let mut moves = 0.0;
+        let settled_below = 1e-6 * *mean_move;
+        for &c in order.next_sweep() {
+            let c = c as usize;
+            let contact = &mut contacts[c];
+            if freeze_after > 0 && contact.settled >= freeze_after {
+                contact.settled += 1;
+                if contact.settled > freeze_after + freeze_for {
+                    contact.settled = 0;
+                }
+                continue;
+            }
+            let old: [f64; D] = small::block(r, c);
+            let u = problem.velocity(state, r, c);
+            let own = small::mul(&contact.w, &old);
+            let mut q = u;
+            for k in 0..D {
+                q[k] -= own[k];
+            }
+            let mut new = if contact.mu > 0.0 {
+                self.local
+                    .solve(&mut contact.memo, &contact.w, &q, contact.mu, &old)
+            } else {
+                frictionless(&contact.w, &q, &old)
+            };
+            if omega != 1.0 {
+                for k in 0..D {
+                    new[k] = (1.0 - omega) * old[k] + omega * new[k];
+                }
+                if omega > 1.0 {
+                    new = cone::project(&new, contact.mu);
+                }
+            }
+            let mut dr = new;
+            for k in 0..D {
+                dr[k] -= old[k];
+            }
+            let size: f64 = dr.iter().map(|x| x * x).sum();
+            if size != 0.0 {
+                r[D * c..D * c + D].copy_from_slice(&new);
+                problem.moved(state, c, &dr);
+            }
+            let moved = contact.unit * contact.unit * size;
+            contact.settled = if moved <= settled_below {
+                contact.settled + 1
+            } else {
+                0
+            };
+            moves += moved;
+        }
+        *mean_move = moves / contacts.len() as f64;
+        if moves == 0.0 && freeze_after == 0 && self.settings.ordering == Ordering::Given {
+            // Every later sweep would repeat this one.
+            return Step::Done;
+        }
+        Step::Continue {
+            estimate: moves.sqrt() / *scale,
+        }
+    }
+
+    fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        problem.complete(&mut work.state, point);
+    }
+
+    fn check_every(&self) -> usize {
+        self.settings.check_every
+    }
+}
+
+impl<L, const D: usize> Sweeps<L, D> {
+    fn fill<P>(&self, problem: &P, work: &mut SweepsWork<P, L, D>)
+    where
+        P: Blockwise<D>,
+        L: LocalSolver<D>,
+    {
+        work.scale = problem.velocity_scale(&work.state);
+        work.order.restart(problem.mu().len(), self.settings.seed);
+        work.contacts.clear();
+        for (c, &mu) in problem.mu().iter().enumerate() {
+            let w = problem.diagonal_block(&work.state, c);
+            let memo = self.local.prepare(&w, mu);
+            let unit = small::mean_diagonal(&w).abs();
+            work.contacts.push(Contact {
+                w,
+                mu,
+                unit,
+                settled: 0,
+                memo,
+            });
+        }
+    }
+}

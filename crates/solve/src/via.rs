@@ -1,0 +1,76 @@
+//! A solver of one problem, made into a solver of another by a reformulation.
+
+use nonsmooth_problem::Problem;
+
+use crate::{Reformulation, SolveError, Solver, Step};
+
+/// `Via { reformulation, solver }` reduces a problem of type `P`, lets `solver` work on the other problem, and
+/// lifts its point back whenever the judge of the *first* problem asks. Itself a solver.
+#[derive(Debug, Clone, Copy)]
+pub struct Via<R, S> {
+    /// The way there and back.
+    pub reformulation: R,
+    /// The solver of the other problem.
+    pub solver: S,
+}
+
+/// The other problem, the way back, and the solver's workspace there.
+pub struct ViaWork<P, R, S>
+where
+    P: Problem,
+    R: Reformulation<P>,
+    S: Solver<R::To>,
+{
+    reduced: R::To,
+    memo: R::Memo,
+    point: <R::To as Problem>::Point,
+    work: S::Work,
+}
+
+impl<P, R, S> Solver<P> for Via<R, S>
+where
+    P: Problem,
+    R: Reformulation<P>,
+    S: Solver<R::To>,
+{
+    type Work = ViaWork<P, R, S>;
+
+    fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
+        let (reduced, memo) = self.reformulation.reduce(problem)?;
+        let work = self.solver.work(&reduced)?;
+        let point = reduced.origin();
+        Ok(ViaWork {
+            reduced,
+            memo,
+            point,
+            work,
+        })
+    }
+
+    fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
+        (work.reduced, work.memo) = self.reformulation.reduce(problem)?;
+        self.solver.refill(&work.reduced, &mut work.work)
+    }
+
+    fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        work.point = self.reformulation.lower(problem, point, &work.memo);
+        self.solver
+            .start(&work.reduced, &mut work.point, &mut work.work);
+    }
+
+    fn step(&self, _problem: &P, _point: &mut P::Point, work: &mut Self::Work) -> Step {
+        self.solver
+            .step(&work.reduced, &mut work.point, &mut work.work)
+    }
+
+    fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        self.solver
+            .publish(&work.reduced, &mut work.point, &mut work.work);
+        self.reformulation
+            .lift(problem, &work.point, &work.memo, point);
+    }
+
+    fn check_every(&self) -> usize {
+        self.solver.check_every()
+    }
+}
