@@ -63,6 +63,24 @@ pub struct Measure {
 }
 
 impl Measure {
+    /// The residuals of a point that nobody has looked at: none of them passes, each is worse than any other.
+    pub fn unknown() -> Self {
+        let never = f64::INFINITY;
+        Self {
+            absolute: never,
+            relative: never,
+            paper: never,
+            peer: never,
+            primal: never,
+            dual: never,
+            complementarity: never,
+            dynamics: None,
+            bilateral: None,
+            worst_contact: 0,
+            worst: never,
+        }
+    }
+
     /// The decision: relative residual and bilateral violation within `tolerance`, dynamics at rounding level.
     pub fn passes(&self, tolerance: f64) -> bool {
         self.relative <= tolerance

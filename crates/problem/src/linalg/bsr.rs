@@ -1,6 +1,6 @@
 //! Block-sparse rows: the hot storage of W.
 
-use super::{Csc, small};
+use super::{Csc, row, small};
 
 /// A block-sparse matrix by compressed block rows with D×D blocks, column indices sorted in each row.
 ///
@@ -123,8 +123,9 @@ impl<const D: usize> Bsr<D> {
     /// `(A x)_i`, the product of block row `i`.
     #[inline(always)]
     pub fn row_product(&self, i: usize, x: &[f64]) -> [f64; D] {
+        assert_eq!(x.len(), D * self.ncols);
         let (cols, blocks) = self.row(i);
-        row_times(cols, blocks, x)
+        row::times(cols, blocks, x)
     }
 
     /// `y = A x + y0`.
@@ -135,6 +136,33 @@ impl<const D: usize> Bsr<D> {
                 y[D * i + k] = p[k] + y0[D * i + k];
             }
         }
+    }
+
+    /// `A − B`, on the union of the two patterns.
+    pub fn minus(&self, other: &Self) -> Self {
+        let rows: Vec<_> = (0..self.nrows())
+            .map(|i| {
+                let (cols, blocks) = self.row(i);
+                let mut row: Vec<_> = cols.iter().copied().zip(blocks.iter().copied()).collect();
+                let (cols, blocks) = other.row(i);
+                for (&j, b) in cols.iter().zip(blocks) {
+                    let at = match row.binary_search_by_key(&j, |e| e.0) {
+                        Ok(at) => at,
+                        Err(at) => {
+                            row.insert(at, (j, [[0.0; D]; D]));
+                            at
+                        }
+                    };
+                    for k in 0..D {
+                        for l in 0..D {
+                            row[at].1[k][l] -= b[k][l];
+                        }
+                    }
+                }
+                row
+            })
+            .collect();
+        Self::from_rows(self.ncols, &rows)
     }
 
     /// The general sparse matrix with the same entries, blocks written in full.
@@ -175,33 +203,6 @@ impl<const D: usize> Bsr<D> {
             .map(|i| small::mean_diagonal(&self.diagonal_block(i)))
             .collect()
     }
-}
-
-/// `Σ_k B_k x_{j_k}`. Two accumulators a row hide the latency of the additions: rows of W hold 5 to 80 blocks.
-#[inline(always)]
-fn row_times<const D: usize>(cols: &[u32], blocks: &[[[f64; D]; D]], x: &[f64]) -> [f64; D] {
-    let mut even = [0.0; D];
-    let mut odd = [0.0; D];
-    let add = |sum: &mut [f64; D], j: u32, b: &[[f64; D]; D]| {
-        let xj: [f64; D] = small::block(x, j as usize);
-        for k in 0..D {
-            for l in 0..D {
-                sum[k] += b[k][l] * xj[l];
-            }
-        }
-    };
-    let pairs = cols.len() / 2;
-    for p in 0..pairs {
-        add(&mut even, cols[2 * p], &blocks[2 * p]);
-        add(&mut odd, cols[2 * p + 1], &blocks[2 * p + 1]);
-    }
-    if cols.len() % 2 == 1 {
-        add(&mut even, cols[2 * pairs], &blocks[2 * pairs]);
-    }
-    for k in 0..D {
-        even[k] += odd[k];
-    }
-    even
 }
 
 #[cfg(test)]

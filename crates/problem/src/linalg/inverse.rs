@@ -90,6 +90,18 @@ impl Inverse {
         )
     }
 
+    /// Factorises a positive semidefinite matrix such as `R = Gᵀ M⁻¹ G`, singular where constraints are
+    /// redundant: `A⁻¹ b` is then a solution of the consistent system. Same regularisation as [`saddle`](Self::saddle).
+    pub fn semidefinite(a: &Csc, name: &str) -> Result<Self, ProblemError> {
+        let delta = (0..a.nrows()).map(|i| {
+            let d = a.get(i, i);
+            // An empty row constrains nothing.
+            (i, i, if d > 0.0 { BILATERAL_REGULARISATION * d } else { 1.0 })
+        });
+        let regular = Csc::from_triplets(a.nrows(), a.ncols(), a.triplets().chain(delta))?;
+        Self::with_factor_of(a.clone(), &regular, name, 4)
+    }
+
     fn with_factor_of(
         matrix: Csc,
         regular: &Csc,

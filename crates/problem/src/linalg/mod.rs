@@ -8,6 +8,7 @@ mod bsr;
 mod csc;
 mod delassus;
 mod inverse;
+mod row;
 pub mod small;
 
 pub use bsr::Bsr;

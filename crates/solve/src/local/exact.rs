@@ -219,7 +219,9 @@ impl Sliding {
             } else {
                 high = x;
             }
-            if value.abs() <= 4.0 * f64::EPSILON * size || high - low <= f64::EPSILON * high {
+            if value.abs() <= 4.0 * f64::EPSILON * size
+                || (high < f64::INFINITY && high - low <= f64::EPSILON * high)
+            {
                 break;
             }
             let newton = x - value / slope;

@@ -14,6 +14,7 @@ use crate::registry::Settings;
 /// The hyperparameters of a projection method with a self-adaptive step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(inline)]
 pub struct StepRule {
     /// Accept a step whose ratio `rho |F(r) - F(r')| / |r - r'|` is at most this, in (0, 1).
     pub accept: f64,

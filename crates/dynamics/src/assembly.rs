@@ -1,0 +1,143 @@
+//! Assembly: a scene into the problem of one Moreau–Jean time step.
+//!
+//! At the velocity level, with `v_k` the velocity at the beginning of the step and positions frozen there,
+//!
+//! ```text
+//! M v = H r + f,                 f = M v_k + h (m g + force, −ω × J ω),
+//! u = Hᵀ v + w,                  w_N = e u_{N,k},  w_T = 0,  u_k = Hᵀ v_k  (Newton's impact law).
+//! ```
+//!
+//! Each body has six degrees of freedom `[linear, angular]`, both in the world frame, and the block
+//! `diag(m I, R J Rᵀ)` of M. A contact at p with frame `[N, T1, T2]` has the columns `(d, (p − x_b) × d)` for b
+//! and minus `(d, (p − x_a) × d)` for a, with d each of N, T1, T2.
+
+use nonsmooth_problem::linalg::{Csc, Delassus, Inverse};
+use nonsmooth_problem::{FrictionGlobal, FrictionLocal};
+
+use crate::vec3::{add, apply, cross, scale, sub};
+use crate::{Contact, RigidBody, Scene, SceneError};
+
+#[allow(non_snake_case)]
+impl Scene {
+    /// The time step as a global problem.
+    ///
+    /// Errors: those of [`Scene::validate`]; no bodies or no contacts.
+    pub fn problem(&self) -> Result<FrictionGlobal<3>, SceneError> {
+        self.validate()?;
+        let (n, nc) = (6 * self.bodies.len(), self.contacts.len());
+        let mass: Vec<_> = self
+            .bodies
+            .iter()
+            .enumerate()
+            .flat_map(|(k, b)| mass_entries(6 * k, b))
+            .collect();
+        let jacobian: Vec<_> = self
+            .contacts
+            .iter()
+            .enumerate()
+            .flat_map(|(c, contact)| jacobian_entries(&self.bodies, c, contact))
+            .collect();
+        let M = Csc::from_triplets(n, n, mass.into_iter())?;
+        let H = Csc::from_triplets(n, 3 * nc, jacobian.into_iter())?;
+        let v = self.velocities();
+        let mut f: Vec<f64> = self.bodies.iter().flat_map(|b| self.drive(b)).collect();
+        M.mul_add(1.0, &v, &mut f);
+        let mut w = vec![0.0; 3 * nc];
+        for (c, contact) in self.contacts.iter().enumerate() {
+            w[3 * c] = contact.e * H.column_dot(3 * c, &v);
+        }
+        let mu = self.contacts.iter().map(|c| c.mu).collect();
+        Ok(FrictionGlobal::new(M, H, f, w, mu)?)
+    }
+
+    /// The time step as a local problem, [`condense`]d.
+    ///
+    /// Errors: those of [`Scene::problem`].
+    pub fn condensed(&self) -> Result<FrictionLocal<3>, SceneError> {
+        condense(&self.problem()?)
+    }
+
+    /// The velocities at the beginning of the step, as the problem stacks them.
+    pub fn velocities(&self) -> Vec<f64> {
+        self.bodies
+            .iter()
+            .flat_map(|b| [b.velocity, b.angular_velocity])
+            .flatten()
+            .collect()
+    }
+
+    /// `h (m g + force, −ω × J ω)`.
+    fn drive(&self, body: &RigidBody) -> [f64; 6] {
+        let weight = add(scale(body.mass, self.gravity), body.force);
+        let omega = body.angular_velocity;
+        let gyroscopic = cross(apply(&body.world_inertia(), omega), omega);
+        let all = [weight, gyroscopic];
+        std::array::from_fn(|k| self.h * all[k / 3][k % 3])
+    }
+}
+
+/// `W = Hᵀ M⁻¹ H`, `q = Hᵀ M⁻¹ f + w` of a global problem without bilateral constraints.
+///
+/// Errors: a singular M; bilateral constraints, which this condensation does not carry.
+pub fn condense(problem: &FrictionGlobal<3>) -> Result<FrictionLocal<3>, SceneError> {
+    if problem.bilateral.is_some() {
+        return Err(SceneError::value(
+            "bilateral",
+            "no bilateral constraints",
+            "some",
+        ));
+    }
+    let inverse = Inverse::new(&problem.M, "M")?;
+    let mut v = problem.f.clone();
+    inverse.solve(&mut v);
+    let mut q = vec![0.0; problem.w.len()];
+    problem.velocity_into(&v, &mut q);
+    let delassus = Delassus::<3>::new(&problem.H, &inverse);
+    Ok(FrictionLocal::new(
+        delassus.condense(),
+        q,
+        problem.mu.clone(),
+    )?)
+}
+
+/// The block `diag(m I, R J Rᵀ)` of a body whose degrees of freedom start at `at`.
+fn mass_entries(at: usize, body: &RigidBody) -> Vec<(usize, usize, f64)> {
+    let inertia = body.world_inertia();
+    let linear = (0..3).map(|k| (at + k, at + k, body.mass));
+    // The product R J Rᵀ is symmetric up to rounding only; its mean with its transpose is so exactly.
+    let angular = (0..9).map(|k| (k / 3, k % 3)).map(|(k, l)| {
+        (
+            at + 3 + k,
+            at + 3 + l,
+            0.5 * (inertia[k][l] + inertia[l][k]),
+        )
+    });
+    linear.chain(angular.filter(|e| e.2 != 0.0)).collect()
+}
+
+/// The columns of H of contact number `c`.
+fn jacobian_entries(
+    bodies: &[RigidBody],
+    c: usize,
+    contact: &Contact,
+) -> impl Iterator<Item = (usize, usize, f64)> {
+    let frame = contact.frame();
+    let sides = [(1.0, Some(contact.b)), (-1.0, contact.a)];
+    sides
+        .into_iter()
+        .filter_map(|(sign, body)| Some((sign, body?)))
+        .flat_map(move |(sign, k)| {
+            let arm = sub(contact.point, bodies[k].position);
+            (0..18).filter_map(move |i| {
+                let (column, row) = (i / 6, i % 6);
+                let d = frame[column];
+                let x = sign
+                    * if row < 3 {
+                        d[row]
+                    } else {
+                        cross(arm, d)[row - 3]
+                    };
+                (x != 0.0).then_some((6 * k + row, 3 * c + column, x))
+            })
+        })
+}

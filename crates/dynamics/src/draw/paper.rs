@@ -1,0 +1,178 @@
+//! The SVG text.
+
+use std::fmt::Write;
+
+/// Red, green, blue.
+pub(super) type Colour = [u8; 3];
+
+type Point = [f64; 2];
+
+/// A colour made darker or lighter.
+pub(super) fn shaded(colour: Colour, factor: f64) -> Colour {
+    colour.map(|c| (factor * f64::from(c)).round().clamp(0.0, 255.0) as u8)
+}
+
+fn hex([r, g, b]: Colour) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+/// An SVG document under construction; coordinates in px, y downwards.
+pub(super) struct Paper {
+    body: String,
+    width: f64,
+    height: f64,
+    title: String,
+    balls: Vec<Colour>,
+}
+
+/// Writing to a string cannot fail.
+macro_rules! put {
+    ($paper:expr, $($arguments:tt)*) => {
+        writeln!($paper.body, $($arguments)*).expect("a string takes everything")
+    };
+}
+
+impl Paper {
+    pub fn new(width: f64, height: f64, title: &str) -> Self {
+        Self {
+            body: String::new(),
+            width,
+            height,
+            title: escape(title),
+            balls: vec![],
+        }
+    }
+
+    /// Opens a group with the given attributes.
+    pub fn open(&mut self, attributes: &str) {
+        put!(self, "<g {attributes}>");
+    }
+
+    pub fn close(&mut self) {
+        put!(self, "</g>");
+    }
+
+    pub fn polygon(&mut self, points: impl Iterator<Item = Point>) {
+        put!(self, r#"<path d="{}"/>"#, path(points));
+    }
+
+    pub fn face(&mut self, points: impl Iterator<Item = Point>, fill: Colour) {
+        put!(self, r#"<path fill="{}" d="{}"/>"#, hex(fill), path(points));
+    }
+
+    pub fn line(&mut self, [x1, y1]: Point, [x2, y2]: Point) {
+        put!(
+            self,
+            r#"<line x1="{x1:.1}" y1="{y1:.1}" x2="{x2:.1}" y2="{y2:.1}"/>"#
+        );
+    }
+
+    /// A sphere, lit from above left.
+    pub fn ball(&mut self, [x, y]: Point, r: f64, colour: Colour) {
+        let k = self
+            .balls
+            .iter()
+            .position(|&c| c == colour)
+            .unwrap_or_else(|| {
+                self.balls.push(colour);
+                self.balls.len() - 1
+            });
+        put!(
+            self,
+            r#"<circle cx="{x:.1}" cy="{y:.1}" r="{r:.2}" fill="url(#ball{k})"/>"#
+        );
+    }
+
+    /// A dot with a light rim, to be seen on dark and light faces.
+    pub fn dot(&mut self, [x, y]: Point, r: f64, fill: &str, opacity: f64) {
+        let rim = 0.3 * r;
+        put!(
+            self,
+            r##"<circle cx="{x:.1}" cy="{y:.1}" r="{r:.2}" fill="{fill}" stroke="#fff" stroke-width="{rim:.2}" opacity="{opacity}"/>"##
+        );
+    }
+
+    /// An arrow with a light rim.
+    pub fn arrow(&mut self, from: Point, to: Point, colour: &str, opacity: f64) {
+        let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+        let length = dx.hypot(dy);
+        // Seen from its tip it is a dot, which the contact or the body already is.
+        if length < 1.0 {
+            return;
+        }
+        let along = [dx / length, dy / length];
+        let head = (0.35 * length).clamp(3.0, 15.0).min(length);
+        let width = 0.24 * head;
+        let at = |back: f64, side: f64| {
+            [
+                to[0] - back * along[0] - side * along[1],
+                to[1] - back * along[1] + side * along[0],
+            ]
+        };
+        let outline = [
+            at(length, 0.5 * width),
+            at(head, 0.5 * width),
+            at(head, 0.38 * head),
+            to,
+            at(head, -0.38 * head),
+            at(head, -0.5 * width),
+            at(length, -0.5 * width),
+        ];
+        put!(
+            self,
+            r##"<path fill="{colour}" opacity="{opacity}" stroke="#fff" stroke-width="0.8" stroke-opacity="0.8" stroke-linejoin="round" paint-order="stroke" d="{}"/>"##,
+            path(outline.into_iter())
+        );
+    }
+
+    /// A line of text at the foot, in a grey for light and dark pages.
+    pub fn caption(&mut self, text: &str) {
+        put!(
+            self,
+            r##"<text x="{:.1}" y="{:.1}" text-anchor="middle" font-family="sans-serif" font-size="14" fill="#7d8792">{}</text>"##,
+            0.5 * self.width,
+            self.height - 12.0,
+            escape(text)
+        );
+    }
+
+    pub fn finish(self) -> String {
+        let (w, h) = (self.width.round(), self.height.round());
+        let mut out = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {w} {h}\" width=\"{w}\" height=\"{h}\">\n\
+             <title>{}</title>\n",
+            self.title
+        );
+        if !self.balls.is_empty() {
+            out += "<defs>\n";
+            for (k, &colour) in self.balls.iter().enumerate() {
+                let stops = [(0, 1.1), (45, 0.95), (100, 0.56)].map(|(offset, factor)| {
+                    let colour = hex(shaded(colour, factor));
+                    format!(r#"<stop offset="{offset}%" stop-color="{colour}"/>"#)
+                });
+                out += &format!(
+                    "<radialGradient id=\"ball{k}\" cx=\"36%\" cy=\"28%\" r=\"76%\">{}</radialGradient>\n",
+                    stops.concat()
+                );
+            }
+            out += "</defs>\n";
+        }
+        out + &self.body + "</svg>\n"
+    }
+}
+
+/// A closed path.
+fn path(points: impl Iterator<Item = Point>) -> String {
+    let mut out = String::new();
+    for (k, [x, y]) in points.enumerate() {
+        let command = if k == 0 { 'M' } else { 'L' };
+        write!(out, "{command}{x:.1} {y:.1}").expect("a string takes everything");
+    }
+    out + "Z"
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+}

@@ -1,0 +1,75 @@
+//! A caller's mistake in a scene or its settings.
+
+use nonsmooth_problem::ProblemError;
+
+/// What is wrong with a scene; every message is a single line that names the place.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SceneError {
+    /// No family of scenes has this name.
+    #[error("unknown scene `{found}`, expected one of {known}")]
+    UnknownScene {
+        /// The name asked for.
+        found: String,
+        /// The names that exist.
+        known: String,
+    },
+    /// The family has no such setting.
+    #[error("unknown setting `{key}` of scene `{scene}`, expected one of {known}")]
+    UnknownSetting {
+        /// The family.
+        scene: &'static str,
+        /// The key asked for.
+        key: String,
+        /// The keys that exist.
+        known: String,
+    },
+    /// A value is of the wrong type or not allowed where it stands.
+    #[error("{key}: expected {expected}, found {found}")]
+    Value {
+        /// The setting or field at fault, for example `mu` or `bodies[3].mass`.
+        key: String,
+        /// What may stand there.
+        expected: String,
+        /// What stands there.
+        found: String,
+    },
+    /// A setting that its type refuses.
+    #[error("{key}: {why}")]
+    Setting {
+        /// The setting at fault.
+        key: String,
+        /// The reason.
+        why: String,
+    },
+    /// The assembled problem is not valid.
+    #[error(transparent)]
+    Problem(#[from] ProblemError),
+}
+
+impl SceneError {
+    pub(crate) fn value(
+        key: impl Into<String>,
+        expected: impl Into<String>,
+        found: impl ToString,
+    ) -> Self {
+        Self::Value {
+            key: key.into(),
+            expected: expected.into(),
+            found: found.to_string(),
+        }
+    }
+}
+
+/// `x` is finite and `ok`, or an error that says what was `expected` of `key`.
+pub(crate) fn require(key: &str, x: f64, ok: bool, expected: &str) -> Result<(), SceneError> {
+    if x.is_finite() && ok {
+        Ok(())
+    } else {
+        Err(SceneError::value(key, expected, x))
+    }
+}
+
+/// `x` is a positive number.
+pub(crate) fn positive(key: &str, x: f64) -> Result<(), SceneError> {
+    require(key, x, x > 0.0, "a positive number")
+}

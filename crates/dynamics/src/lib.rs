@@ -1,0 +1,33 @@
+//! Rigid bodies and given contacts, assembled into the frictional contact problem of one time step.
+//!
+//! A [`Scene`] holds [`RigidBody`]s and [`Contact`]s; [`Scene::problem`] states the Moreau–Jean step as a global
+//! problem and [`Scene::condensed`] as a local one. [`scenes`] has families of scenes by name ([`SCENES`]), and
+//! [`draw::svg`] draws any scene. SI units throughout: m, kg, s, rad.
+//!
+//! ```
+//! use nonsmooth_dynamics::scenes::{Family, Stack};
+//!
+//! let scene = Stack { count: 3, mu: 0.4, ..Stack::default() }.build()?;
+//! let problem = scene.problem()?;
+//! assert_eq!((problem.dofs(), problem.contacts()), (18, 12));
+//! # Ok::<(), nonsmooth_dynamics::SceneError>(())
+//! ```
+
+mod assembly;
+mod body;
+mod contact;
+pub mod draw;
+mod error;
+mod polyhedron;
+mod scene;
+pub mod scenes;
+mod vec3;
+
+pub use assembly::condense;
+pub use body::{RigidBody, Rotation, Shape};
+pub use contact::Contact;
+pub use error::SceneError;
+pub use polyhedron::{MassProperties, Polyhedron};
+pub use scene::{Ground, Scene};
+pub use scenes::{SCENES, SceneEntry};
+pub use vec3::{Mat3, Vec3};

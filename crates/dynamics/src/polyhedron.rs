@@ -1,0 +1,259 @@
+//! Convex polyhedra: faces for drawing, exact mass properties for dynamics.
+
+use crate::SceneError;
+use crate::vec3::{Mat3, Vec3, add, cross, dot, mean, norm, rectangle, scale, sub};
+
+/// A convex polyhedron by its vertices and its faces, each counter-clockwise seen from outside.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polyhedron {
+    vertices: Vec<Vec3>,
+    faces: Vec<Vec<usize>>,
+}
+
+/// Mass, mass centre and inertia of a homogeneous solid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MassProperties {
+    /// Mass, kg.
+    pub mass: f64,
+    /// Mass centre, m.
+    pub centre: Vec3,
+    /// Inertia about the mass centre, in the axes of the vertices, kg·m².
+    pub inertia: Mat3,
+}
+
+impl Polyhedron {
+    /// Checks that the faces bound a convex solid.
+    ///
+    /// Errors: fewer than 4 faces, a face with fewer than 3 vertices or a vertex that does not exist, coordinates
+    /// that are not finite, a vertex in front of a face (not convex, or a face seen from inside), no volume.
+    pub fn new(vertices: Vec<Vec3>, faces: Vec<Vec<usize>>) -> Result<Self, SceneError> {
+        if let Some(k) = vertices
+            .iter()
+            .position(|v| v.iter().any(|x| !x.is_finite()))
+        {
+            let found = format!("{:?}", vertices[k]);
+            return Err(SceneError::value(
+                format!("vertices[{k}]"),
+                "finite coordinates",
+                found,
+            ));
+        }
+        let bad = |f: &Vec<usize>| f.len() < 3 || f.iter().any(|&k| k >= vertices.len());
+        if faces.len() < 4 || faces.iter().any(bad) {
+            let expected = "at least 4 faces, each of at least 3 of the vertices";
+            return Err(SceneError::value("faces", expected, format!("{faces:?}")));
+        }
+        let out = Self { vertices, faces };
+        let size = out.radius_about(mean(&out.vertices));
+        for k in 0..out.faces.len() {
+            let (normal, offset) = out.plane(k);
+            let front = out
+                .vertices
+                .iter()
+                .map(|&v| dot(normal, v) - offset)
+                .fold(0.0, f64::max);
+            // A face without area has no normal.
+            if front > 1e-9 * size || normal.iter().any(|x| x.is_nan()) {
+                let expected = "a face of a convex solid, counter-clockwise from outside";
+                return Err(SceneError::value(
+                    format!("faces[{k}]"),
+                    expected,
+                    "another",
+                ));
+            }
+        }
+        let volume = out.mass_properties(1.0).mass;
+        if volume.is_nan() || volume <= 1e-12 * size.powi(3) {
+            return Err(SceneError::value(
+                "vertices",
+                "a solid with a volume",
+                volume,
+            ));
+        }
+        Ok(out)
+    }
+
+    /// The plane convex polygon `base` (either sense) extruded by `along`, for example a voussoir.
+    ///
+    /// Errors: those of [`Polyhedron::new`].
+    pub fn prism(base: &[Vec3], along: Vec3) -> Result<Self, SceneError> {
+        let n = base.len();
+        let top = base.iter().map(|&p| add(p, along));
+        let vertices: Vec<Vec3> = base.iter().copied().chain(top).collect();
+        let mut faces = vec![(0..n).rev().collect::<Vec<_>>(), (n..2 * n).collect()];
+        faces.extend((0..n).map(|k| vec![k, (k + 1) % n, (k + 1) % n + n, k + n]));
+        // The faces above suit a base that turns counter-clockwise about `along`.
+        let turning = (1..n.max(2) - 1).fold([0.0; 3], |s, k| {
+            add(s, cross(sub(base[k], base[0]), sub(base[k + 1], base[0])))
+        });
+        if dot(turning, along) < 0.0 {
+            faces.iter_mut().for_each(|f| f.reverse());
+        }
+        Self::new(vertices, faces)
+    }
+
+    /// The box of half sides `half` about the origin.
+    ///
+    /// Errors: a half side that is not positive.
+    pub fn cuboid(half: Vec3) -> Result<Self, SceneError> {
+        let [a, b, c] = half;
+        let base = rectangle([0.0, 0.0, -c], [a, 0.0, 0.0], [0.0, b, 0.0]);
+        Self::prism(&base, [0.0, 0.0, 2.0 * c])
+    }
+
+    /// The vertices, m.
+    pub fn vertices(&self) -> &[Vec3] {
+        &self.vertices
+    }
+
+    /// The faces, by indices of vertices, counter-clockwise seen from outside.
+    pub fn faces(&self) -> &[Vec<usize>] {
+        &self.faces
+    }
+
+    /// The same solid with every vertex mapped by `f`, a rigid motion.
+    pub fn mapped(&self, f: impl Fn(Vec3) -> Vec3) -> Self {
+        let vertices = self.vertices.iter().map(|&v| f(v)).collect();
+        Self {
+            vertices,
+            faces: self.faces.clone(),
+        }
+    }
+
+    /// The unit outward normal `n` and offset `d` of the plane `n · x = d` of face `k`.
+    pub fn plane(&self, k: usize) -> (Vec3, f64) {
+        let p = |i: usize| self.vertices[self.faces[k][i]];
+        let sum = (1..self.faces[k].len() - 1).fold([0.0; 3], |s, i| {
+            add(s, cross(sub(p(i), p(0)), sub(p(i + 1), p(0))))
+        });
+        let normal = scale(1.0 / norm(sum), sum);
+        (normal, dot(normal, p(0)))
+    }
+
+    /// The largest distance of a vertex from `point`, m.
+    pub fn radius_about(&self, point: Vec3) -> f64 {
+        self.vertices
+            .iter()
+            .map(|&v| norm(sub(v, point)))
+            .fold(0.0, f64::max)
+    }
+
+    /// Mass, mass centre and inertia for a density in kg/m³, exact.
+    ///
+    /// The solid is the signed union of the tetrahedra between an inner point and triangles of the faces;
+    /// over one with corners 0, a, b, c and volume V, with s = a + b + c:
+    /// `∫x = V s/4` and `∫x xᵀ = V/20 (a aᵀ + b bᵀ + c cᵀ + s sᵀ)`.
+    pub fn mass_properties(&self, density: f64) -> MassProperties {
+        // About an inner point, so that a solid far from the origin loses no digits.
+        let inner = mean(&self.vertices);
+        let (mut volume, mut first, mut second) = (0.0, [0.0; 3], [[0.0; 3]; 3]);
+        for face in &self.faces {
+            let p = |i: usize| sub(self.vertices[face[i]], inner);
+            for i in 1..face.len() - 1 {
+                let (a, b, c) = (p(0), p(i), p(i + 1));
+                let v = dot(a, cross(b, c)) / 6.0;
+                let s = add(a, add(b, c));
+                volume += v;
+                first = add(first, scale(v / 4.0, s));
+                for k in 0..3 {
+                    for l in 0..3 {
+                        second[k][l] +=
+                            v / 20.0 * (a[k] * a[l] + b[k] * b[l] + c[k] * c[l] + s[k] * s[l]);
+                    }
+                }
+            }
+        }
+        let centre = scale(1.0 / volume, first);
+        for k in 0..3 {
+            for l in 0..3 {
+                second[k][l] -= volume * centre[k] * centre[l];
+            }
+        }
+        let trace = second[0][0] + second[1][1] + second[2][2];
+        let mut inertia = second.map(|row| scale(-density, row));
+        for k in 0..3 {
+            inertia[k][k] += density * trace;
+        }
+        MassProperties {
+            mass: density * volume,
+            centre: add(inner, centre),
+            inertia,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inertia_of_a_box_has_its_closed_form_anywhere() {
+        let half = [0.5, 0.2, 1.1];
+        let at = [30.0, -4.0, 7.0];
+        let p = Polyhedron::cuboid(half)
+            .unwrap()
+            .mapped(|v| add(v, at))
+            .mass_properties(700.0);
+        let mass = 700.0 * 8.0 * half[0] * half[1] * half[2];
+        assert!((p.mass - mass).abs() < 1e-11 * mass);
+        assert!(norm(sub(p.centre, at)) < 1e-12);
+        for k in 0..3 {
+            for l in 0..3 {
+                let (a, b) = (half[(k + 1) % 3], half[(k + 2) % 3]);
+                let exact = if k == l {
+                    mass * (a * a + b * b) / 3.0
+                } else {
+                    0.0
+                };
+                assert!((p.inertia[k][l] - exact).abs() < 1e-11 * mass, "{k} {l}");
+            }
+        }
+    }
+
+    #[test]
+    fn inertia_of_a_tetrahedron_has_its_closed_form() {
+        // Corners 0, x, y, z: V = 1/6, centre (1, 1, 1)/4, ∫x² = V/10, ∫xy = V/20.
+        let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let faces = vec![vec![0, 2, 1], vec![0, 1, 3], vec![0, 3, 2], vec![1, 2, 3]];
+        let p = Polyhedron::new(vertices, faces)
+            .unwrap()
+            .mass_properties(6.0);
+        assert!((p.mass - 1.0).abs() < 1e-15 && p.centre.iter().all(|x| (x - 0.25).abs() < 1e-15));
+        let (xx, xy) = (1.0 / 10.0 - 1.0 / 16.0, 1.0 / 20.0 - 1.0 / 16.0);
+        for k in 0..3 {
+            for l in 0..3 {
+                let exact = if k == l { 2.0 * xx } else { -xy };
+                assert!((p.inertia[k][l] - exact).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_convex_solid_is_refused() {
+        let base = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let good = Polyhedron::prism(&base, [0.0, 0.0, 1.0]).unwrap();
+        let turned: Vec<_> = base.iter().rev().copied().collect();
+        assert_eq!(
+            Polyhedron::prism(&turned, [0.0, 0.0, 1.0])
+                .unwrap()
+                .faces()
+                .len(),
+            6
+        );
+        let mut faces = good.faces().to_vec();
+        faces[2].reverse();
+        let e = Polyhedron::new(good.vertices().to_vec(), faces)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            e.starts_with("faces[2]: expected a face of a convex solid"),
+            "{e}"
+        );
+        assert!(Polyhedron::prism(&base, [1.0, 0.0, 0.0]).is_err());
+        let mut faces = good.faces().to_vec();
+        faces[2] = vec![0, 1, 1];
+        assert!(Polyhedron::new(good.vertices().to_vec(), faces).is_err());
+        assert!(Polyhedron::prism(&base[..2], [0.0, 0.0, 1.0]).is_err());
+        assert!(Polyhedron::cuboid([1.0, 0.0, 1.0]).is_err());
+    }
+}

@@ -1,0 +1,107 @@
+//! Bodies and contacts together.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use crate::error::{positive, require};
+use crate::polyhedron::Polyhedron;
+use crate::vec3::{Vec3, X, cross, norm};
+use crate::{Contact, RigidBody, SceneError};
+
+/// Bodies, the contacts between them, and what drives them during one time step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// What the scene is called.
+    pub name: String,
+    /// The bodies, in the order of the degrees of freedom.
+    pub bodies: Vec<RigidBody>,
+    /// The contacts, all of them active.
+    pub contacts: Vec<Contact>,
+    /// Acceleration of gravity, m/s².
+    pub gravity: Vec3,
+    /// Time step, s.
+    pub h: f64,
+    /// The ground as it is drawn; contacts with the ground state their own geometry.
+    pub ground: Option<Ground>,
+    /// Fixed solids, drawn only; contacts with them are contacts with the ground.
+    pub obstacles: Vec<Polyhedron>,
+}
+
+/// A plane ground.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ground {
+    /// A point of the plane, m.
+    pub point: Vec3,
+    /// The unit normal, upwards.
+    pub normal: Vec3,
+    /// A direction along the plane, that of the grid.
+    pub along: Vec3,
+}
+
+impl Ground {
+    /// The plane z = 0.
+    pub const FLAT: Self = Self {
+        point: [0.0; 3],
+        normal: [0.0, 0.0, 1.0],
+        along: X,
+    };
+}
+
+impl Scene {
+    /// Adds a body; returns its index.
+    pub fn push(&mut self, body: RigidBody) -> usize {
+        self.bodies.push(body);
+        self.bodies.len() - 1
+    }
+
+    /// The mass of all bodies, kg.
+    pub fn mass(&self) -> f64 {
+        self.bodies.iter().map(|b| b.mass).sum()
+    }
+
+    /// Adds to each component of velocity a random number within ±`amplitude` (m/s), uniform and reproducible
+    /// by `seed`; angular velocities by as much at the farthest point of the body.
+    pub fn disturb(&mut self, amplitude: f64, seed: u64) {
+        if amplitude == 0.0 {
+            return;
+        }
+        let mut rng = Pcg64::seed_from_u64(seed);
+        let mut draw = || amplitude * rng.random_range(-1.0..=1.0);
+        for body in &mut self.bodies {
+            let radius = body.shape.radius();
+            body.velocity.iter_mut().for_each(|v| *v += draw());
+            body.angular_velocity
+                .iter_mut()
+                .for_each(|w| *w += draw() / radius);
+        }
+    }
+
+    /// Checks every value; the fields are public, so assembly calls it first.
+    ///
+    /// Errors: the first value that is not possible, by its place, for example `bodies[3].mass`.
+    pub fn validate(&self) -> Result<(), SceneError> {
+        positive("h", self.h)?;
+        require(
+            "gravity",
+            self.gravity.iter().sum(),
+            true,
+            "finite components",
+        )?;
+        if let Some(Ground { normal, along, .. }) = self.ground {
+            let across = norm(cross(normal, along));
+            require(
+                "ground",
+                across,
+                across > 0.0,
+                "a normal and a direction across it",
+            )?;
+        }
+        for (k, body) in self.bodies.iter().enumerate() {
+            body.validate(&format!("bodies[{k}]"))?;
+        }
+        for (c, contact) in self.contacts.iter().enumerate() {
+            contact.validate(&format!("contacts[{c}]"), self.bodies.len())?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,67 @@
+//! Vectors and 3×3 matrices of space, as arrays.
+
+/// A vector of space.
+pub type Vec3 = [f64; 3];
+/// A 3×3 matrix by rows.
+pub type Mat3 = [[f64; 3]; 3];
+
+pub(crate) const X: Vec3 = [1.0, 0.0, 0.0];
+pub(crate) const Y: Vec3 = [0.0, 1.0, 0.0];
+pub(crate) const Z: Vec3 = [0.0, 0.0, 1.0];
+
+pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+pub(crate) fn add(a: Vec3, b: Vec3) -> Vec3 {
+    std::array::from_fn(|k| a[k] + b[k])
+}
+
+pub(crate) fn sub(a: Vec3, b: Vec3) -> Vec3 {
+    std::array::from_fn(|k| a[k] - b[k])
+}
+
+pub(crate) fn scale(s: f64, a: Vec3) -> Vec3 {
+    a.map(|x| s * x)
+}
+
+pub(crate) fn norm(a: Vec3) -> f64 {
+    dot(a, a).sqrt()
+}
+
+pub(crate) fn normalise(a: Vec3) -> Vec3 {
+    scale(1.0 / norm(a), a)
+}
+
+/// `A x`.
+pub(crate) fn apply(a: &Mat3, x: Vec3) -> Vec3 {
+    a.map(|row| dot(row, x))
+}
+
+/// `A B Aᵀ`.
+pub(crate) fn congruence(a: &Mat3, b: &Mat3) -> Mat3 {
+    let ab: Mat3 = a.map(|row| std::array::from_fn(|j| (0..3).map(|k| row[k] * b[k][j]).sum()));
+    ab.map(|row| std::array::from_fn(|j| dot(row, a[j])))
+}
+
+/// The mean of some points, which must not be empty.
+pub(crate) fn mean(points: &[Vec3]) -> Vec3 {
+    scale(
+        1.0 / points.len() as f64,
+        points.iter().fold([0.0; 3], |s, &p| add(s, p)),
+    )
+}
+
+/// The four corners `centre ± a ± b`, in order around the rectangle.
+pub(crate) fn rectangle(centre: Vec3, a: Vec3, b: Vec3) -> [Vec3; 4] {
+    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+        .map(|(s, t)| add(centre, add(scale(s, a), scale(t, b))))
+}

@@ -1,0 +1,524 @@
+//! Reading.
+
+use std::collections::HashMap;
+use std::fmt::Display;
+use std::path::Path;
+
+use hdf5_pure::{DType, Dataset, File, Group};
+use nonsmooth_problem::linalg::{Bsr, Csc};
+use nonsmooth_problem::{
+    BilateralGlobal, BilateralLocal, Friction, FrictionGlobal, FrictionLocal, ProblemError,
+};
+
+use super::{FclibFile, Info, Sizes, StoredPoint, check_finite, check_vector, group, guarded};
+use crate::IoError;
+use crate::error::one_line;
+
+/// Reads a file, with its solution and guesses if `points`.
+pub(super) fn read(path: &Path, points: bool) -> Result<FclibFile, IoError> {
+    let expected = "a readable file";
+    if std::fs::metadata(path)
+        .map_err(|e| IoError::os(path, expected, e))?
+        .is_dir()
+    {
+        return Err(IoError::NotHdf5 {
+            file: path.into(),
+            found: "a directory",
+        });
+    }
+    let bytes = std::fs::read(path).map_err(|e| IoError::os(path, expected, e))?;
+    if !hdf5_pure::is_hdf5_bytes(&bytes) {
+        let found = if bytes.is_empty() {
+            "an empty file"
+        } else {
+            "other data"
+        };
+        return Err(IoError::NotHdf5 {
+            file: path.into(),
+            found,
+        });
+    }
+    guarded(path, || parse(path, bytes, points))
+}
+
+fn parse(path: &Path, bytes: Vec<u8>, points: bool) -> Result<FclibFile, IoError> {
+    let size = bytes.len() as u64;
+    let file = File::from_bytes(bytes).map_err(|e| IoError::hdf5(path, "/", e))?;
+    let end = file.superblock().eof_address;
+    if end > size {
+        let found = format!("a truncated file ({size} bytes of {end})");
+        return Err(IoError::hdf5(path, "/", found));
+    }
+    let root = Folder::open(path, size, String::new(), file.root())?;
+    let mut content = FclibFile::new(problem(&root)?);
+    content
+        .problem
+        .validate()
+        .map_err(|problem| IoError::Problem {
+            file: path.into(),
+            group: group(&content.problem),
+            problem,
+        })?;
+    content.info = info(&root.need(&group(&content.problem)[1..])?)?;
+    if points {
+        let sizes = Sizes::of(&content.problem);
+        content.solution = root
+            .folder("solution")?
+            .map(|g| point(&g, sizes))
+            .transpose()?;
+        if let Some(guesses) = root.folder("guesses")? {
+            let number = guesses.int("number_of_guesses")?;
+            if number < 0 {
+                return Err(guesses.error("number_of_guesses", "a number of at least 0", number));
+            }
+            for k in 1..=number {
+                content
+                    .guesses
+                    .push(point(&guesses.need(&k.to_string())?, sizes)?);
+            }
+        }
+    }
+    Ok(content)
+}
+
+/// The one problem of a file, not validated as a whole.
+fn problem(root: &Folder) -> Result<Friction, IoError> {
+    const LOCAL: &str = "fclib_local";
+    const GLOBAL: &str = "fclib_global";
+    for rolling in ["fclib_global_rolling", "fclib_local_rolling"] {
+        if root.groups.iter().any(|g| g == rolling) {
+            return Err(IoError::Unsupported {
+                file: root.file.into(),
+                place: format!("/{rolling}"),
+                what: "rolling friction (spacedim 5)",
+            });
+        }
+    }
+    match (root.folder(LOCAL)?, root.folder(GLOBAL)?) {
+        (Some(g), None) => Ok(match g.spacedim()? {
+            2 => Friction::Local2(local(&g)?),
+            _ => Friction::Local3(local(&g)?),
+        }),
+        (None, Some(g)) => Ok(match g.spacedim()? {
+            2 => Friction::Global2(global(&g)?),
+            _ => Friction::Global3(global(&g)?),
+        }),
+        (both, _) => {
+            let found = match (both, &root.groups[..]) {
+                (Some(_), _) => format!("both /{LOCAL} and /{GLOBAL}"),
+                (None, []) => "no group".into(),
+                (None, others) => format!("only /{}", others.join(", /")),
+            };
+            Err(IoError::Root {
+                file: root.file.into(),
+                found: one_line(found),
+            })
+        }
+    }
+}
+
+#[allow(non_snake_case)]
+fn local<const D: usize>(g: &Folder) -> Result<FrictionLocal<D>, IoError> {
+    let vectors = g.need("vectors")?;
+    let mu = g.mu(&vectors, "/fclib_local")?;
+    let m = D * mu.len();
+    let contacts = format!("{D} for each entry of vectors/mu");
+    let W = g.matrix("W", (m, m), &contacts)?;
+    let q = vectors.vector("q", m, &contacts)?;
+    let bilateral = match (g.folder("V")?, g.folder("R")?, vectors.has("s")) {
+        (None, None, false) => None,
+        (Some(_), Some(_), true) => {
+            let s = vectors.reals("s")?;
+            let p = s.len();
+            let V = g.matrix(
+                "V",
+                (m, p),
+                &format!("{contacts}, by the entries of vectors/s"),
+            )?;
+            Some(BilateralLocal {
+                V,
+                R: g.matrix("R", (p, p), "the entries of vectors/s")?,
+                s,
+            })
+        }
+        (V, R, s) => {
+            let parts = [("V", V.is_some()), ("R", R.is_some()), ("vectors/s", s)];
+            return Err(g.incomplete(&parts));
+        }
+    };
+    Ok(FrictionLocal {
+        W: Bsr::from_csc(&W),
+        q,
+        mu,
+        bilateral,
+    })
+}
+
+#[allow(non_snake_case)]
+fn global<const D: usize>(g: &Folder) -> Result<FrictionGlobal<D>, IoError> {
+    let vectors = g.need("vectors")?;
+    let mu = g.mu(&vectors, "/fclib_global")?;
+    let m = D * mu.len();
+    let f = vectors.reals("f")?;
+    let n = f.len();
+    let contacts = format!("{D} for each entry of vectors/mu");
+    let M = g.matrix("M", (n, n), "the entries of vectors/f")?;
+    let H = g.matrix(
+        "H",
+        (n, m),
+        &format!("the entries of vectors/f, by {contacts}"),
+    )?;
+    let w = vectors.vector("w", m, &contacts)?;
+    let bilateral = match (g.folder("G")?, vectors.has("b")) {
+        (None, false) => None,
+        (Some(_), true) => {
+            let b = vectors.reals("b")?;
+            let why = "the entries of vectors/f, by the entries of vectors/b";
+            Some(BilateralGlobal {
+                G: g.matrix("G", (n, b.len()), why)?,
+                b,
+            })
+        }
+        (G, b) => return Err(g.incomplete(&[("G", G.is_some()), ("vectors/b", b)])),
+    };
+    Ok(FrictionGlobal {
+        M,
+        H,
+        f,
+        w,
+        mu,
+        bilateral,
+    })
+}
+
+fn info(problem: &Folder) -> Result<Info, IoError> {
+    let Some(g) = problem.folder("info")? else {
+        return Ok(Info::default());
+    };
+    let attributes = g
+        .group
+        .attrs()
+        .map_err(|e| IoError::hdf5(g.file, &g.path, e))?;
+    let count = |name: &str| usize::try_from(attributes.get(name)?.as_i64()?).ok();
+    Ok(Info {
+        title: g.text("title")?,
+        description: g.text("description")?,
+        math_info: g.text("math_info")?,
+        dofs: count("numberOfDegreeOfFreedom"),
+        involved_ds: count("numberOfInvolvedDS"),
+    })
+}
+
+fn point(g: &Folder, sizes: Sizes) -> Result<StoredPoint, IoError> {
+    let part = |(name, len, meaning)| match len {
+        0 => Ok(None),
+        _ => g.vector(name, len, meaning).map(Some),
+    };
+    let [v, u, r, l] = sizes.parts();
+    Ok(StoredPoint {
+        v: part(v)?,
+        u: part(u)?.unwrap_or_default(),
+        r: part(r)?.unwrap_or_default(),
+        lambda: part(l)?,
+    })
+}
+
+/// A group of the file with its members, and what messages about them need.
+struct Folder<'a> {
+    file: &'a Path,
+    /// The size of the file, against absurd sizes of datasets.
+    size: u64,
+    /// Empty for the root.
+    path: String,
+    group: Group,
+    datasets: HashMap<String, Dataset>,
+    groups: Vec<String>,
+}
+
+impl<'a> Folder<'a> {
+    fn open(file: &'a Path, size: u64, path: String, group: Group) -> Result<Self, IoError> {
+        let place = if path.is_empty() { "/" } else { &path };
+        let datasets = group
+            .iter_datasets()
+            .map_err(|e| IoError::hdf5(file, place, e))?
+            .collect();
+        let groups = group.groups().map_err(|e| IoError::hdf5(file, place, e))?;
+        Ok(Self {
+            file,
+            size,
+            path,
+            group,
+            datasets,
+            groups,
+        })
+    }
+
+    fn place(&self, name: impl Display) -> String {
+        format!("{}/{name}", self.path)
+    }
+
+    fn error(
+        &self,
+        name: impl Display,
+        expected: impl Into<String>,
+        found: impl Display,
+    ) -> IoError {
+        IoError::data(self.file, self.place(name), expected, found)
+    }
+
+    fn damaged(&self, name: &str) -> impl Fn(hdf5_pure::Error) -> IoError {
+        move |e| IoError::hdf5(self.file, self.place(name), e)
+    }
+
+    fn has(&self, dataset: &str) -> bool {
+        self.datasets.contains_key(dataset)
+    }
+
+    /// The group `name`, if there is one.
+    fn folder(&self, name: &str) -> Result<Option<Folder<'a>>, IoError> {
+        if self.has(name) {
+            return Err(self.error(name, "a group", "a dataset"));
+        }
+        if !self.groups.iter().any(|g| g == name) {
+            return Ok(None);
+        }
+        let group = self.group.group(name).map_err(self.damaged(name))?;
+        Self::open(self.file, self.size, self.place(name), group).map(Some)
+    }
+
+    /// The group `name`.
+    fn need(&self, name: &str) -> Result<Folder<'a>, IoError> {
+        self.folder(name)?
+            .ok_or_else(|| self.error(name, "a group", "nothing of that name"))
+    }
+
+    /// The dataset `name`, whose size the file can account for.
+    fn dataset(&self, name: &str) -> Result<&Dataset, IoError> {
+        let Some(dataset) = self.datasets.get(name) else {
+            let group = self.groups.iter().any(|g| g == name);
+            let found = if group {
+                "a group"
+            } else {
+                "nothing of that name"
+            };
+            return Err(self.error(name, "a dataset", found));
+        };
+        let shape = dataset.shape().map_err(self.damaged(name))?;
+        let width = dataset.element_size().map_err(self.damaged(name))?;
+        let bytes = shape.iter().try_fold(width, |a, &b| a.checked_mul(b));
+        // No filter expands more than deflate, 1032 to 1.
+        let most = self
+            .size
+            .saturating_mul(if dataset.is_chunked() { 1032 } else { 1 });
+        match bytes {
+            Some(bytes) if bytes <= most => Ok(dataset),
+            _ => {
+                let found = format!("shape {shape:?} of {width} bytes each");
+                Err(self.error(
+                    name,
+                    format!("data that fit in the {} bytes of the file", self.size),
+                    found,
+                ))
+            }
+        }
+    }
+
+    fn ints(&self, name: &str) -> Result<Vec<i64>, IoError> {
+        let dataset = self.dataset(name)?;
+        let values = match dataset.dtype().map_err(self.damaged(name))? {
+            DType::I8
+            | DType::I16
+            | DType::I32
+            | DType::I64
+            | DType::U8
+            | DType::U16
+            | DType::U32 => dataset.read_i64(),
+            // What does not fit is too large for any use here; the range checks say so.
+            DType::U64 => dataset.read_u64().map(|values| {
+                values
+                    .into_iter()
+                    .map(|x| i64::try_from(x).unwrap_or(i64::MAX))
+                    .collect()
+            }),
+            other => return Err(self.error(name, "integers", other)),
+        };
+        values.map_err(self.damaged(name))
+    }
+
+    fn int(&self, name: &str) -> Result<i64, IoError> {
+        match self.ints(name)?[..] {
+            [x] => Ok(x),
+            ref x => Err(self.error(name, "one integer", format!("{} entries", x.len()))),
+        }
+    }
+
+    fn reals(&self, name: &str) -> Result<Vec<f64>, IoError> {
+        let dataset = self.dataset(name)?;
+        let values = match dataset.dtype().map_err(self.damaged(name))? {
+            DType::F32 | DType::F64 => dataset.read_f64().map_err(self.damaged(name))?,
+            other => return Err(self.error(name, "reals", other)),
+        };
+        check_finite(self.file, &self.place(name), &values)?;
+        Ok(values)
+    }
+
+    fn vector(&self, name: &str, len: usize, meaning: &str) -> Result<Vec<f64>, IoError> {
+        let x = self.reals(name)?;
+        check_vector(self.file, &self.place(name), &x, len, meaning)?;
+        Ok(x)
+    }
+
+    /// A text that is there or not; bytes that are no UTF-8 are replaced, as it is only for people.
+    fn text(&self, name: &str) -> Result<Option<String>, IoError> {
+        if !self.has(name) {
+            return Ok(None);
+        }
+        let dataset = self.dataset(name)?;
+        match dataset.dtype().map_err(self.damaged(name))? {
+            DType::String => {
+                let bytes = dataset.read_raw().map_err(self.damaged(name))?;
+                let end = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
+                Ok(Some(String::from_utf8_lossy(&bytes[..end]).into_owned()))
+            }
+            DType::VariableLengthString => {
+                let mut texts = dataset.read_string().map_err(self.damaged(name))?;
+                Ok(Some(if texts.is_empty() {
+                    String::new()
+                } else {
+                    texts.swap_remove(0)
+                }))
+            }
+            other => Err(self.error(name, "a text", other)),
+        }
+    }
+
+    fn spacedim(&self) -> Result<i64, IoError> {
+        match self.int("spacedim")? {
+            d @ (2 | 3) => Ok(d),
+            d => Err(self.error("spacedim", "2 or 3", d)),
+        }
+    }
+
+    /// `mu`, checked first: all other sizes follow from its length.
+    fn mu(&self, vectors: &Folder, group: &'static str) -> Result<Vec<f64>, IoError> {
+        let mu = vectors.reals("mu")?;
+        if mu.is_empty() {
+            let problem = ProblemError::Empty { place: "mu".into() };
+            return Err(IoError::Problem {
+                file: self.file.into(),
+                group,
+                problem,
+            });
+        }
+        Ok(mu)
+    }
+
+    /// Some of these parts are there and some are not.
+    fn incomplete(&self, parts: &[(&str, bool)]) -> IoError {
+        let names = |present: bool| {
+            let of = parts
+                .iter()
+                .filter(|p| p.1 == present)
+                .map(|p| self.place(p.0));
+            of.collect::<Vec<_>>().join(" and ")
+        };
+        let expected = format!("it beside {} (bilateral constraints)", names(true));
+        IoError::data(self.file, names(false), expected, "nothing of that name")
+    }
+
+    /// A matrix of the given shape, in any of FCLIB's storages.
+    fn matrix(&self, name: &str, shape: (usize, usize), why: &str) -> Result<Csc, IoError> {
+        let g = self.need(name)?;
+        let (m, n, nz) = (g.int("m")?, g.int("n")?, g.int("nz")?);
+        let (rows, columns) = shape;
+        // Before anything is allocated by them.
+        if (usize::try_from(m), usize::try_from(n)) != (Ok(rows), Ok(columns)) {
+            let expected = format!("{rows} × {columns} ({why})");
+            return Err(self.error(name, expected, format!("{m} × {n}")));
+        }
+        let (p, i, x) = (g.ints("p")?, g.ints("i")?, g.reals("x")?);
+        let (p, i) = match nz {
+            -1 => {
+                let p = g.pointers(&p, columns, &i, &x)?;
+                let i = g.indices("i", "row", &i[..p.len()], rows)?;
+                (p, i)
+            }
+            -2 => {
+                let rows = g.pointers(&p, rows, &i, &x)?;
+                (g.indices("i", "column", &i[..rows.len()], columns)?, rows)
+            }
+            nz if nz >= 0 => {
+                for (name, len) in [("p", p.len()), ("i", i.len()), ("x", x.len())] {
+                    if (len as u64) < nz as u64 {
+                        let expected = format!("{nz} entries (nz)");
+                        return Err(g.error(name, expected, format!("{len} entries")));
+                    }
+                }
+                // nz fits in usize: three arrays are at least as long.
+                let nz = nz as usize;
+                (
+                    g.indices("p", "column", &p[..nz], columns)?,
+                    g.indices("i", "row", &i[..nz], rows)?,
+                )
+            }
+            _ => {
+                let expected = "a number of triplets, -1 (columns) or -2 (rows)";
+                return Err(g.error("nz", expected, nz));
+            }
+        };
+        // x may have room beyond the last entry, which zip leaves out.
+        let entries = i.iter().zip(&p).zip(&x).map(|((&i, &p), &x)| (i, p, x));
+        Csc::from_triplets(rows, columns, entries).map_err(|e| self.error(name, "a matrix", e))
+    }
+
+    /// Indices checked to lie below `bound`.
+    fn indices(
+        &self,
+        name: &str,
+        what: &str,
+        indices: &[i64],
+        bound: usize,
+    ) -> Result<Vec<usize>, IoError> {
+        let check = |(k, &index): (usize, &i64)| {
+            usize::try_from(index)
+                .ok()
+                .filter(|&index| index < bound)
+                .ok_or_else(|| {
+                    let expected = format!("a {what} index of at least 0 and below {bound}");
+                    self.error(format_args!("{name}[{k}]"), expected, index)
+                })
+        };
+        indices.iter().enumerate().map(check).collect()
+    }
+
+    /// Compressed pointers, checked and expanded: the column (or row) of each entry.
+    fn pointers(
+        &self,
+        p: &[i64],
+        count: usize,
+        i: &[i64],
+        x: &[f64],
+    ) -> Result<Vec<usize>, IoError> {
+        if p.len() != count + 1 {
+            let expected = format!("{} pointers (one more than columns or rows)", count + 1);
+            return Err(self.error("p", expected, format!("{} entries", p.len())));
+        }
+        if p[0] != 0 {
+            return Err(self.error("p[0]", "0", p[0]));
+        }
+        if let Some(k) = p.windows(2).position(|w| w[1] < w[0]) {
+            let place = format!("p[{}]", k + 1);
+            return Err(self.error(place, format!("at least {} (p[{k}])", p[k]), p[k + 1]));
+        }
+        for (name, len) in [("i", i.len()), ("x", x.len())] {
+            if p[count] > len as i64 {
+                let expected = format!("{} entries (p[{count}])", p[count]);
+                return Err(self.error(name, expected, format!("{len} entries")));
+            }
+        }
+        let runs = p.windows(2).enumerate();
+        Ok(runs
+            .flat_map(|(k, w)| (w[0]..w[1]).map(move |_| k))
+            .collect())
+    }
+}

@@ -1,0 +1,319 @@
+//! Writing.
+
+use std::ffi::OsString;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use hdf5_pure::{
+    AttrValue, CharacterSet, Datatype, File, FileBuilder, GroupBuilder, LibVer, StringPadding,
+};
+use nonsmooth_problem::linalg::Csc;
+use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal};
+
+use super::{FclibFile, Info, Sizes, StoredPoint, check_vector, group, guarded, read};
+use crate::IoError;
+
+pub(super) fn write(path: &Path, content: &FclibFile) -> Result<(), IoError> {
+    let problem = &content.problem;
+    let root = group(problem);
+    problem.validate().map_err(|problem| IoError::Problem {
+        file: path.into(),
+        group: root,
+        problem,
+    })?;
+    let sizes = Sizes::of(problem);
+
+    let mut file = FileBuilder::new();
+    // The oldest format that the builder knows, for the sake of old readers.
+    file.with_libver_bounds(LibVer::V18, LibVer::V18);
+    let mut top = |name: &str, fill: &dyn Fn(&mut Out) -> Result<(), IoError>| {
+        let group = file.create_group(&name[1..]);
+        let mut g = Out {
+            file: path,
+            path: name.into(),
+            group,
+        };
+        fill(&mut g)?;
+        file.add_group(g.group.finish());
+        Ok::<(), IoError>(())
+    };
+    top(root, &|g| {
+        match problem {
+            Friction::Local2(p) => local(g, p)?,
+            Friction::Local3(p) => local(g, p)?,
+            Friction::Global2(p) => global(g, p)?,
+            Friction::Global3(p) => global(g, p)?,
+        }
+        g.child("info", |g| info(g, &content.info))
+    })?;
+    if let Some(solution) = &content.solution {
+        top("/solution", &|g| point(g, solution, sizes))?;
+    }
+    if !content.guesses.is_empty() {
+        top("/guesses", &|g| {
+            g.int("number_of_guesses", content.guesses.len())?;
+            let mut guesses = content.guesses.iter().enumerate();
+            guesses.try_for_each(|(k, x)| g.child(&(k + 1).to_string(), |g| point(g, x, sizes)))
+        })?;
+    }
+    replace(path, |temporary| {
+        file.write(temporary).map_err(|e| failed(path, e))
+    })
+}
+
+pub(super) fn write_solution(path: &Path, solution: &StoredPoint) -> Result<(), IoError> {
+    let sizes = Sizes::of(&read::read(path, false)?.problem);
+    let parts = stored_parts(path, "/solution", solution, sizes)?;
+    let edit = |temporary: &Path| -> Result<(), hdf5_pure::Error> {
+        let file = File::open_rw(temporary)?;
+        let root = file.root();
+        for old in root
+            .groups()?
+            .iter()
+            .chain(&root.datasets()?)
+            .filter(|name| *name == "solution")
+        {
+            root.delete(old)?;
+        }
+        root.create_group_with("solution", |g| {
+            for (name, x) in &parts {
+                g.create_dataset(name, |d| {
+                    d.with_f64_data(x);
+                });
+            }
+        })?;
+        file.commit()?;
+        drop(root);
+        file.close()
+    };
+    replace(path, |temporary| {
+        std::fs::copy(path, temporary).map_err(|e| IoError::os(path, WRITABLE, e))?;
+        guarded(path, || edit(temporary).map_err(|e| failed(path, e)))
+    })
+}
+
+const WRITABLE: &str = "a file that can be written";
+
+/// A failure of the HDF5 writer: nearly always the system's.
+fn failed(path: &Path, e: hdf5_pure::Error) -> IoError {
+    match e {
+        hdf5_pure::Error::Io(e) => IoError::os(path, WRITABLE, e),
+        e => IoError::hdf5(path, "/", e),
+    }
+}
+
+/// Lets `fill` make a file beside `path`, then gives it that name.
+fn replace(path: &Path, fill: impl FnOnce(&Path) -> Result<(), IoError>) -> Result<(), IoError> {
+    struct Temporary(PathBuf);
+    impl Drop for Temporary {
+        fn drop(&mut self) {
+            // After the renaming there is nothing of that name left to remove.
+            let _ = std::fs::remove_file(&self.0);
+        }
+    }
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+
+    let os = |e| IoError::os(path, WRITABLE, e);
+    // A link stays a link to the new content.
+    let target = path.canonicalize().unwrap_or_else(|_| path.into());
+    let Some(name) = target.file_name().filter(|_| !target.is_dir()) else {
+        return Err(os(std::io::ErrorKind::IsADirectory.into()));
+    };
+    let mut temporary = OsString::from(".");
+    temporary.push(name);
+    temporary.push(format!(
+        ".{}-{}.tmp",
+        std::process::id(),
+        COUNT.fetch_add(1, Ordering::Relaxed)
+    ));
+    let temporary = Temporary(target.with_file_name(temporary));
+    fill(&temporary.0)?;
+    // The content must be on the disk before the name is.
+    std::fs::OpenOptions::new()
+        .write(true)
+        .open(&temporary.0)
+        .and_then(|f| f.sync_all())
+        .map_err(os)?;
+    std::fs::rename(&temporary.0, &target).map_err(os)
+}
+
+fn local<const D: usize>(g: &mut Out, problem: &FrictionLocal<D>) -> Result<(), IoError> {
+    g.int("spacedim", D)?;
+    g.matrix("W", &problem.W.to_csc())?;
+    if let Some(b) = &problem.bilateral {
+        g.matrix("V", &b.V)?;
+        g.matrix("R", &b.R)?;
+    }
+    g.child("vectors", |g| {
+        g.reals("q", &problem.q);
+        g.reals("mu", &problem.mu);
+        if let Some(b) = &problem.bilateral {
+            g.reals("s", &b.s);
+        }
+        Ok(())
+    })
+}
+
+fn global<const D: usize>(g: &mut Out, problem: &FrictionGlobal<D>) -> Result<(), IoError> {
+    g.int("spacedim", D)?;
+    g.matrix("M", &problem.M)?;
+    g.matrix("H", &problem.H)?;
+    if let Some(b) = &problem.bilateral {
+        g.matrix("G", &b.G)?;
+    }
+    g.child("vectors", |g| {
+        g.reals("f", &problem.f);
+        g.reals("w", &problem.w);
+        g.reals("mu", &problem.mu);
+        if let Some(b) = &problem.bilateral {
+            g.reals("b", &b.b);
+        }
+        Ok(())
+    })
+}
+
+fn info(g: &mut Out, info: &Info) -> Result<(), IoError> {
+    let texts = [
+        ("title", &info.title),
+        ("description", &info.description),
+        ("math_info", &info.math_info),
+    ];
+    for (name, text) in texts {
+        if let Some(text) = text {
+            g.text(name, text)?;
+        }
+    }
+    let counts = [
+        ("numberOfDegreeOfFreedom", info.dofs),
+        ("numberOfInvolvedDS", info.involved_ds),
+    ];
+    for (name, count) in counts {
+        if let Some(count) = count {
+            let count = g.as_int(format_args!("@{name}"), count)?;
+            g.group.set_attr(name, AttrValue::I32Array(vec![count]));
+        }
+    }
+    Ok(())
+}
+
+fn point(g: &mut Out, point: &StoredPoint, sizes: Sizes) -> Result<(), IoError> {
+    for (name, x) in stored_parts(g.file, &g.path, point, sizes)? {
+        g.reals(name, x);
+    }
+    Ok(())
+}
+
+/// The parts of a point that FCLIB stores, checked against the problem.
+fn stored_parts<'a>(
+    file: &Path,
+    place: &str,
+    point: &'a StoredPoint,
+    sizes: Sizes,
+) -> Result<Vec<(&'static str, &'a [f64])>, IoError> {
+    let slices = [
+        point.v.as_deref(),
+        Some(&point.u[..]),
+        Some(&point.r[..]),
+        point.lambda.as_deref(),
+    ];
+    let mut stored = vec![];
+    for ((name, len, meaning), x) in sizes.parts().into_iter().zip(slices) {
+        let x = x.unwrap_or_default();
+        check_vector(file, &format!("{place}/{name}"), x, len, meaning)?;
+        if len > 0 {
+            stored.push((name, x));
+        }
+    }
+    Ok(stored)
+}
+
+/// A group under construction, with what messages about its members need.
+struct Out<'a> {
+    file: &'a Path,
+    path: String,
+    group: GroupBuilder,
+}
+
+impl Out<'_> {
+    fn child(
+        &mut self,
+        name: &str,
+        fill: impl FnOnce(&mut Out) -> Result<(), IoError>,
+    ) -> Result<(), IoError> {
+        let group = self.group.create_group(name);
+        let mut child = Out {
+            file: self.file,
+            path: format!("{}/{name}", self.path),
+            group,
+        };
+        fill(&mut child)?;
+        self.group.add_group(child.group.finish());
+        Ok(())
+    }
+
+    /// A C int, which is what FCLIB has for sizes and indices.
+    fn as_int(&self, name: impl Display, x: usize) -> Result<i32, IoError> {
+        let place = || format!("{}/{name}", self.path);
+        let expected = || format!("at most {} (a C int)", i32::MAX);
+        i32::try_from(x).map_err(|_| IoError::data(self.file, place(), expected(), x))
+    }
+
+    fn int(&mut self, name: &str, x: usize) -> Result<(), IoError> {
+        let x = self.as_int(name, x)?;
+        self.group.create_dataset(name).with_i32_data(&[x]);
+        Ok(())
+    }
+
+    fn reals(&mut self, name: &str, x: &[f64]) {
+        self.group.create_dataset(name).with_f64_data(x);
+    }
+
+    /// A scalar string with the terminating NUL that C readers allocate by.
+    fn text(&mut self, name: &str, text: &str) -> Result<(), IoError> {
+        let place = format!("{}/{name}", self.path);
+        if text.contains('\0') {
+            let expected = "a text without NUL characters";
+            return Err(IoError::data(self.file, place, expected, "one with"));
+        }
+        let size = self.as_int(name, text.len() + 1)? as u32;
+        let charset = if text.is_ascii() {
+            CharacterSet::Ascii
+        } else {
+            CharacterSet::Utf8
+        };
+        let datatype = Datatype::String {
+            size,
+            padding: StringPadding::NullTerminate,
+            charset,
+        };
+        let bytes = [text.as_bytes(), b"\0"].concat();
+        self.group
+            .create_dataset(name)
+            .with_raw_data(datatype, bytes, 1)
+            .with_shape(&[]);
+        Ok(())
+    }
+
+    /// Triplets, column by column: row `i`, column `p`.
+    fn matrix(&mut self, name: &str, a: &Csc) -> Result<(), IoError> {
+        self.child(name, |g| {
+            for (name, x) in [
+                ("nzmax", a.nnz()),
+                ("m", a.nrows()),
+                ("n", a.ncols()),
+                ("nz", a.nnz()),
+            ] {
+                g.int(name, x)?;
+            }
+            // Indices lie below m and n, which fit.
+            let column = |j: usize| std::iter::repeat_n(j as i32, a.column(j).0.len());
+            let p: Vec<i32> = (0..a.ncols()).flat_map(column).collect();
+            let i: Vec<i32> = a.row_idx().iter().map(|&i| i as i32).collect();
+            g.group.create_dataset("p").with_i32_data(&p);
+            g.group.create_dataset("i").with_i32_data(&i);
+            g.reals("x", a.values());
+            Ok(())
+        })
+    }
+}

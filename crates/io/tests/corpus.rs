@@ -1,0 +1,49 @@
+//! The files of a corpus, if `NONSMOOTH_CORPUS` names one (with a `manifest.csv`).
+
+mod common;
+
+use std::path::Path;
+
+use nonsmooth_io::fclib;
+use nonsmooth_problem::with_friction;
+
+#[test]
+fn every_file_loads_and_passes_through_unchanged() {
+    let Some(corpus) = std::env::var_os("NONSMOOTH_CORPUS") else {
+        common::skipped("NONSMOOTH_CORPUS is not set");
+        return;
+    };
+    let corpus = Path::new(&corpus);
+    let folder = tempfile::tempdir().unwrap();
+    let copy = folder.path().join("copy.hdf5");
+    let manifest = std::fs::read_to_string(corpus.join("manifest.csv")).unwrap();
+    let (mut loaded, mut refused) = (0, 0);
+    for line in manifest.lines().skip(1) {
+        let fields: Vec<&str> = line.split(',').collect();
+        let (name, kind, nc, m) = (fields[0], fields[1], fields[2], fields[4]);
+        let path = corpus.join(name);
+        if kind.contains("rolling") {
+            let message = fclib::read(&path).unwrap_err().to_string();
+            let expected = "rolling friction (spacedim 5) is not supported yet";
+            assert!(
+                message.ends_with(&format!(": /{kind}: {expected}")),
+                "{message}"
+            );
+            refused += 1;
+        } else if kind.starts_with("fclib") {
+            let content = fclib::read(&path).unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(content.problem.contacts().to_string(), nc, "{name}");
+            assert_eq!(common::sizes(&content.problem).1.to_string(), m, "{name}");
+            with_friction!(&content.problem, p => assert!(p.bilateral.is_none(), "{name}"));
+            assert_eq!(fclib::read_problem(&path).unwrap(), content.problem);
+            fclib::write(&copy, &content).unwrap();
+            common::assert_same(&fclib::read(&copy).unwrap(), &content);
+            loaded += 1;
+        }
+    }
+    eprintln!("{loaded} files loaded, {refused} rolling files refused");
+    assert!(
+        loaded > 200 && refused > 5,
+        "{loaded} loaded, {refused} refused"
+    );
+}

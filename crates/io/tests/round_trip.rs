@@ -1,0 +1,538 @@
+//! What is written is read back bit for bit, here and by other readers of HDF5.
+
+mod common;
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::Command;
+
+use common::{assert_same, sizes};
+use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
+use nonsmooth_problem::linalg::{Bsr, Csc};
+use nonsmooth_problem::{
+    BilateralGlobal, BilateralLocal, Friction, FrictionGlobal, FrictionLocal, GlobalPoint,
+    LocalPoint,
+};
+use proptest::prelude::*;
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(200))]
+
+    #[test]
+    fn files_pass_through_unchanged(content in common::content()) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file.hdf5");
+        fclib::write(&path, &content).unwrap();
+        let back = fclib::read(&path).unwrap();
+        assert_same(&back, &content);
+        prop_assert_eq!(fclib::read_problem(&path).unwrap(), content.problem);
+        prop_assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_solution_is_added_or_replaced(content in common::content()) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file.hdf5");
+        fclib::write(&path, &content).unwrap();
+        let (v, m, p) = sizes(&content.problem);
+        let some = |n: usize| (n > 0).then(|| vec![-0.0; n]);
+        let mut solution = StoredPoint { v: some(v), u: vec![1.5; m], r: vec![5e-324; m], lambda: some(p) };
+        for _ in 0..2 {
+            fclib::write_solution(&path, &solution).unwrap();
+            let expected = FclibFile { solution: Some(solution.clone()), ..content.clone() };
+            assert_same(&fclib::read(&path).unwrap(), &expected);
+            solution.r[0] = 2.0;
+        }
+        prop_assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}
+
+/// Numbers whose bits are easily lost.
+const AWKWARD: [f64; 8] = [
+    -0.0,
+    5e-324,
+    -2.225e-308,
+    0.1,
+    f64::MAX,
+    1.0 / 3.0,
+    0.0,
+    -1e-17,
+];
+
+fn csc(rows: usize, columns: usize) -> Csc {
+    let cells = (0..columns).flat_map(|j| (0..rows).map(move |i| (i, j)));
+    let entries = cells.filter(|(i, j)| (i + 2 * j) % 3 != 1);
+    Csc::from_triplets(
+        rows,
+        columns,
+        entries.map(|(i, j)| (i, j, AWKWARD[(i + j) % 8])),
+    )
+    .unwrap()
+}
+
+fn local() -> FrictionLocal<2> {
+    FrictionLocal {
+        W: Bsr::from_csc(&csc(4, 4)),
+        q: AWKWARD[..4].into(),
+        mu: vec![0.0, 0.7],
+        bilateral: Some(BilateralLocal {
+            V: csc(4, 2),
+            R: csc(2, 2),
+            s: AWKWARD[4..6].into(),
+        }),
+    }
+}
+
+fn global() -> FrictionGlobal<3> {
+    FrictionGlobal {
+        M: csc(5, 5),
+        H: csc(5, 3),
+        f: AWKWARD[..5].into(),
+        w: AWKWARD[5..].into(),
+        mu: vec![0.3],
+        bilateral: Some(BilateralGlobal {
+            G: csc(5, 1),
+            b: vec![-0.0],
+        }),
+    }
+}
+
+fn contents() -> [FclibFile; 2] {
+    let mut local = FclibFile::new(Friction::Local2(local()));
+    let x = AWKWARD[..4].to_vec();
+    local.solution = Some(StoredPoint {
+        v: None,
+        u: x.clone(),
+        r: x,
+        lambda: Some(vec![1.0, -0.0]),
+    });
+    local.info.title = Some("a title".into());
+    local.info.math_info = Some(String::new());
+    local.info.dofs = Some(12);
+    let mut global = FclibFile::new(Friction::Global3(global()));
+    let point = GlobalPoint {
+        v: AWKWARD[..5].into(),
+        r: vec![1.0, 0.0, -0.0],
+        lambda: vec![0.1],
+    };
+    // M is no matter here: u overflows where v meets f64::MAX.
+    let point = StoredPoint {
+        u: vec![0.5; 3],
+        ..StoredPoint {
+            v: Some(point.v),
+            u: vec![],
+            r: point.r,
+            lambda: Some(point.lambda),
+        }
+    };
+    global.guesses = vec![point; 11];
+    global.info.description = Some("friction, größer".into());
+    [local, global]
+}
+
+#[test]
+fn stored_points_carry_the_unknowns_and_the_velocity() {
+    let w = Csc::diagonal(&[2.0, 4.0]);
+    let problem = FrictionLocal::<2>::new(Bsr::from_csc(&w), vec![-1.0, 0.5], vec![0.5]).unwrap();
+    let point = LocalPoint {
+        r: vec![0.5, 0.25],
+        lambda: vec![],
+    };
+    let stored = StoredPoint::from_local(&problem, &point);
+    assert_eq!(
+        stored,
+        StoredPoint {
+            v: None,
+            u: vec![0.0, 1.5],
+            r: point.r.clone(),
+            lambda: None
+        }
+    );
+    assert_eq!(stored.to_local(), point);
+
+    let mut problem = global();
+    problem.H = Csc::from_triplets(5, 3, [(0, 0, 2.0), (4, 2, -1.0)].into_iter()).unwrap();
+    problem.w = vec![1.0, 2.0, 3.0];
+    let point = GlobalPoint {
+        v: vec![1.0, 0.0, 0.0, 0.0, 5.0],
+        r: vec![1.0, 0.0, 0.0],
+        lambda: vec![7.0],
+    };
+    let stored = StoredPoint::from_global(&problem, &point);
+    assert_eq!(stored.u, [3.0, 2.0, -2.0]);
+    assert_eq!(stored.to_global(), point);
+}
+
+#[test]
+fn an_existing_file_is_replaced_and_a_failure_leaves_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file.hdf5");
+    let [local, global] = contents();
+    fclib::write(&path, &local).unwrap();
+    fclib::write(&path, &global).unwrap();
+    assert_same(&fclib::read(&path).unwrap(), &global);
+
+    let mut bad = local;
+    bad.solution.as_mut().unwrap().r[3] = f64::NAN;
+    let message = fclib::write(&path, &bad).unwrap_err().to_string();
+    assert!(
+        message.ends_with(": /solution/r[3]: expected a finite number, found NaN"),
+        "{message}"
+    );
+    let message = fclib::write_solution(&path, &bad.solution.unwrap())
+        .unwrap_err()
+        .to_string();
+    let expected = ": /solution/v: expected 5 entries (degrees of freedom), found 0 entries";
+    assert!(message.ends_with(expected), "{message}");
+    assert_same(&fclib::read(&path).unwrap(), &global);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn what_cannot_be_written_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file.hdf5");
+    let [local, _] = contents();
+    let refused = |path: &Path, content: &FclibFile, expected: &str| {
+        let message = fclib::write(path, content).unwrap_err().to_string();
+        assert_eq!(message, format!("{}: {expected}", path.display()));
+    };
+    let mut bad = local.clone();
+    bad.info.description = Some("a\0b".into());
+    refused(
+        &path,
+        &bad,
+        "/fclib_local/info/description: expected a text without NUL characters, found one with",
+    );
+    let mut bad = local.clone();
+    bad.info.dofs = Some(1 << 31);
+    refused(
+        &path,
+        &bad,
+        "/fclib_local/info/@numberOfDegreeOfFreedom: expected at most 2147483647 (a C int), found 2147483648",
+    );
+    let mut bad = local.clone();
+    let Friction::Local2(p) = &mut bad.problem else {
+        unreachable!()
+    };
+    p.mu[1] = -0.5;
+    refused(
+        &path,
+        &bad,
+        "/fclib_local/vectors/mu[1]: expected a coefficient of friction of at least 0, found -0.5",
+    );
+    let writable = "expected a file that can be written, found: ";
+    let absent = folder.path().join("absent/file.hdf5");
+    refused(
+        &absent,
+        &local,
+        &format!("{writable}No such file or directory (os error 2)"),
+    );
+    refused(folder.path(), &local, &format!("{writable}is a directory"));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+/// Reads every dataset and attribute with h5py: path, type, shape and bytes, one a line.
+const DUMP: &str = r#"
+import sys, h5py
+def bits(v):
+    # numpy drops the trailing NUL of a string, except of an empty one.
+    return bytes(v).rstrip(b'\0').hex() if isinstance(v, bytes) else v.tobytes().hex()
+def show(path, x):
+    for name, v in sorted(x.attrs.items()):
+        print(f'{path}@{name}', v.dtype, v.shape, bits(v))
+    if isinstance(x, h5py.Dataset):
+        t = h5py.check_string_dtype(x.dtype)
+        kind = f'{t.encoding}{t.length}' if t else x.dtype
+        print(path, kind, x.shape, bits(x[()]))
+for path in sys.argv[1:]:
+    with h5py.File(path) as f:
+        f.visititems(lambda name, x: show('/' + name, x))
+"#;
+
+/// The lines that [`DUMP`] prints for the problem parts of a file.
+fn expected_dump(content: &FclibFile) -> String {
+    let mut lines = vec![];
+    fn hex(bytes: impl IntoIterator<Item = u8>) -> String {
+        bytes.into_iter().fold(String::new(), |mut s, b| {
+            write!(s, "{b:02x}").unwrap();
+            s
+        })
+    }
+    let int = |x: &[usize]| hex(x.iter().flat_map(|&x| (x as i32).to_le_bytes()));
+    let real = |x: &[f64]| hex(x.iter().flat_map(|x| x.to_le_bytes()));
+    let mut ints = |path: &str, x: &[usize]| {
+        lines.push(format!("{path} int32 ({},) {}", x.len(), int(x)));
+    };
+    let (root, mut matrices, vectors) = match &content.problem {
+        Friction::Local2(p) => {
+            let b = p.bilateral.as_ref().unwrap();
+            let matrices = vec![("W", p.W.to_csc()), ("V", b.V.clone()), ("R", b.R.clone())];
+            (
+                "/fclib_local",
+                matrices,
+                vec![("q", &p.q), ("mu", &p.mu), ("s", &b.s)],
+            )
+        }
+        Friction::Global3(p) => {
+            let b = p.bilateral.as_ref().unwrap();
+            let matrices = vec![("M", p.M.clone()), ("H", p.H.clone()), ("G", b.G.clone())];
+            (
+                "/fclib_global",
+                matrices,
+                vec![("f", &p.f), ("w", &p.w), ("mu", &p.mu), ("b", &b.b)],
+            )
+        }
+        _ => unreachable!(),
+    };
+    ints(
+        &format!("{root}/spacedim"),
+        &[if root == "/fclib_local" { 2 } else { 3 }],
+    );
+    for (name, a) in &mut matrices {
+        let triplets: Vec<_> = a.triplets().collect();
+        ints(&format!("{root}/{name}/m"), &[a.nrows()]);
+        ints(&format!("{root}/{name}/n"), &[a.ncols()]);
+        ints(&format!("{root}/{name}/nz"), &[a.nnz()]);
+        ints(&format!("{root}/{name}/nzmax"), &[a.nnz()]);
+        ints(
+            &format!("{root}/{name}/i"),
+            &triplets.iter().map(|t| t.0).collect::<Vec<_>>(),
+        );
+        ints(
+            &format!("{root}/{name}/p"),
+            &triplets.iter().map(|t| t.1).collect::<Vec<_>>(),
+        );
+    }
+    if !content.guesses.is_empty() {
+        ints("/guesses/number_of_guesses", &[content.guesses.len()]);
+    }
+    if let Some(dofs) = content.info.dofs {
+        ints(&format!("{root}/info@numberOfDegreeOfFreedom"), &[dofs]);
+    }
+    let mut reals = |path: &str, x: &[f64]| {
+        lines.push(format!("{path} float64 ({},) {}", x.len(), real(x)));
+    };
+    for (name, a) in &matrices {
+        reals(&format!("{root}/{name}/x"), a.values());
+    }
+    for (name, x) in vectors {
+        reals(&format!("{root}/vectors/{name}"), x);
+    }
+    let mut point = |path: &str, point: &StoredPoint| {
+        for (name, x) in [
+            ("u", Some(&point.u)),
+            ("r", Some(&point.r)),
+            ("v", point.v.as_ref()),
+            ("l", point.lambda.as_ref()),
+        ] {
+            if let Some(x) = x {
+                reals(&format!("{path}/{name}"), x);
+            }
+        }
+    };
+    if let Some(solution) = &content.solution {
+        point("/solution", solution);
+    }
+    for (k, guess) in content.guesses.iter().enumerate() {
+        point(&format!("/guesses/{}", k + 1), guess);
+    }
+    let info = &content.info;
+    for (name, text) in [
+        ("title", &info.title),
+        ("description", &info.description),
+        ("math_info", &info.math_info),
+    ] {
+        if let Some(text) = text {
+            let encoding = if text.is_ascii() { "ascii" } else { "utf-8" };
+            let path = format!("{root}/info/{name}");
+            let line = format!(
+                "{path} {encoding}{} () {}",
+                text.len() + 1,
+                hex(text.bytes())
+            );
+            lines.push(line.trim_end().into());
+        }
+    }
+    lines.sort();
+    lines.join("\n")
+}
+
+fn sorted_lines(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let text = String::from_utf8(output.stdout).unwrap();
+    let mut lines: Vec<&str> = text.lines().map(str::trim_end).collect();
+    lines.sort();
+    lines.join("\n")
+}
+
+#[test]
+fn h5py_reads_what_is_written() {
+    let mut python = Command::new("python3");
+    if !python
+        .args(["-c", "import h5py"])
+        .output()
+        .is_ok_and(|o| o.status.success())
+    {
+        common::skipped("python3 with h5py is not here");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file.hdf5");
+    for mut content in contents() {
+        fclib::write(&path, &content).unwrap();
+        let dump = || sorted_lines(Command::new("python3").args(["-c", DUMP]).arg(&path));
+        assert_eq!(dump(), expected_dump(&content));
+        // The same after a solution was added to the file.
+        let mut solution = content
+            .solution
+            .take()
+            .unwrap_or_else(|| content.guesses[0].clone());
+        solution.r[1] = 0.625;
+        fclib::write_solution(&path, &solution).unwrap();
+        content.solution = Some(solution);
+        assert_eq!(dump(), expected_dump(&content));
+    }
+}
+
+#[test]
+fn the_c_library_adds_to_what_is_written() {
+    const APPEND: &str = r#"
+import sys, h5py, numpy as np
+with h5py.File(sys.argv[1], 'r+') as f:
+    for k, n in dict(v=5, u=3, r=3, l=1).items(): f[f'solution/{k}'] = np.full(n, -0.0)
+"#;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file.hdf5");
+    let [_, mut content] = contents();
+    fclib::write(&path, &content).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    assert_eq!(
+        (&bytes[..8], bytes[8]),
+        (&b"\x89HDF\r\n\x1a\n"[..], 2),
+        "superblock of HDF5 1.8"
+    );
+    let appended = Command::new("python3")
+        .args(["-c", APPEND])
+        .arg(&path)
+        .output();
+    if !appended.is_ok_and(|o| o.status.success()) {
+        common::skipped("python3 with h5py is not here");
+        return;
+    }
+    let zeros = |n| vec![-0.0; n];
+    content.solution = Some(StoredPoint {
+        v: Some(zeros(5)),
+        u: zeros(3),
+        r: zeros(3),
+        lambda: Some(zeros(1)),
+    });
+    assert_same(&fclib::read(&path).unwrap(), &content);
+}
+
+#[test]
+fn a_solution_is_added_to_files_of_the_c_library() {
+    // Old superblock, symbol-table groups, and parts that this crate does not know.
+    const MAKE: &str = r#"
+import sys, h5py, numpy as np
+with h5py.File(sys.argv[1], 'w', libver=('earliest', 'v108')) as f:
+    g = f.create_group('fclib_local')
+    g['spacedim'] = np.array([2], 'i4')
+    W = g.create_group('W')
+    for k, v in dict(m=2, n=2, nz=2, nzmax=2).items(): W[k] = np.array([v], 'i4')
+    W['p'] = W['i'] = np.arange(2, dtype='i4')
+    W['x'] = np.array([2.0, 4.0])
+    W['conditioning'] = np.array([2.0])
+    g['vectors/q'] = np.array([-1.0, 0.5])
+    g['vectors/mu'] = np.array([0.5])
+    g.create_group('info').attrs['numberOfInvolvedDS'] = 3
+    f['notes'] = 'kept'
+    if sys.argv[2] == 'with': f['solution/r'] = np.zeros(7)
+"#;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file.hdf5");
+    for old in ["with", "without"] {
+        let made = Command::new("python3")
+            .args(["-c", MAKE])
+            .arg(&path)
+            .arg(old)
+            .output();
+        if !made.is_ok_and(|o| o.status.success()) {
+            common::skipped("python3 with h5py is not here");
+            return;
+        }
+        assert_eq!(std::fs::read(&path).unwrap()[8], 0, "superblock");
+        let dump = || sorted_lines(Command::new("python3").args(["-c", DUMP]).arg(&path));
+        let before = dump();
+        assert!(before.contains("/notes utf-8"), "{before}");
+        let x = vec![0.5, 0.25];
+        let solution = StoredPoint {
+            u: x.clone(),
+            r: x,
+            ..Default::default()
+        };
+        fclib::write_solution(&path, &solution).unwrap();
+        let content = fclib::read(&path).unwrap();
+        assert_eq!(
+            (content.solution, content.info.involved_ds),
+            (Some(solution), Some(3))
+        );
+        let rest = |dump: &str| {
+            let lines = dump.lines().filter(|line| !line.starts_with("/solution"));
+            lines.map(String::from).collect::<Vec<_>>()
+        };
+        assert_eq!(rest(&dump()), rest(&before));
+        assert_eq!(dump().lines().count(), rest(&before).len() + 2);
+    }
+}
+
+#[test]
+fn h5dump_reads_what_is_written() {
+    if Command::new("h5dump").arg("--version").output().is_err() {
+        common::skipped("h5dump is not here");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file.hdf5");
+    for content in contents() {
+        fclib::write(&path, &content).unwrap();
+        let dump = |dataset: &str| {
+            sorted_lines(
+                Command::new("h5dump")
+                    .args(["-m", "%a", "-d", dataset])
+                    .arg(&path),
+            )
+        };
+        let root = if content.problem.kind().name().contains("local") {
+            "local"
+        } else {
+            "global"
+        };
+        let spacedim = dump(&format!("/fclib_{root}/spacedim"));
+        assert!(
+            spacedim.contains("H5T_STD_I32LE") && spacedim.contains("( 1 ) / ( 1 )"),
+            "{spacedim}"
+        );
+        let title = if root == "local" {
+            "title"
+        } else {
+            "description"
+        };
+        let title = dump(&format!("/fclib_{root}/info/{title}"));
+        assert!(
+            title.contains("H5T_STR_NULLTERM") && title.contains("SCALAR"),
+            "{title}"
+        );
+        // Every dataset of the file is readable.
+        let all = sorted_lines(Command::new("h5dump").arg(&path));
+        assert!(
+            all.contains("DATASET \"mu\"") && !all.contains("error"),
+            "{all}"
+        );
+    }
+}

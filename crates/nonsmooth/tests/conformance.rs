@@ -1,0 +1,84 @@
+//! Every registered solver × every planted case of its kind. The verdict comes from the judge alone.
+
+use nonsmooth_problem::check::Judged;
+use nonsmooth_problem::planted::{Planted, PlantedMix};
+
+use nonsmooth_solve::registry::{self, Registered};
+use nonsmooth_solve::{Limits, Outcome, Status};
+
+/// Cases that every solver must solve: enough degrees of freedom for W to be regular, all statuses, `mu = 0`
+/// included, and bilateral constraints.
+fn cases() -> Vec<Planted> {
+    let mixed = PlantedMix { open: 1.0, stick: 1.0, slip: 1.0, degenerate: 0.0 };
+    let base = Planted { mix: mixed, mu: (0.0, 0.6), ..Planted::default() };
+    vec![
+        Planted { contacts: 1, dofs: 6, seed: 1, ..base.clone() },
+        Planted { contacts: 5, dofs: 30, seed: 2, ..base.clone() },
+        Planted { contacts: 20, dofs: 120, seed: 3, ..base.clone() },
+        Planted { contacts: 20, dofs: 120, seed: 4, mu: (0.0, 0.0), ..base.clone() },
+        Planted { contacts: 20, dofs: 120, seed: 5, skew: 0.02, ..base.clone() },
+        Planted { contacts: 10, dofs: 90, bilateral: 4, seed: 6, ..base.clone() },
+        Planted { contacts: 12, dofs: 90, mix: PlantedMix { degenerate: 0.5, ..mixed }, seed: 7, ..base },
+    ]
+}
+
+/// The solvers of `P` by name with every set of settings that the registry asks to be tested.
+fn runs<P: Registered>() -> Vec<(String, Vec<&'static str>)> {
+    registry::solver_names::<P>()
+        .into_iter()
+        .flat_map(|name| {
+            let about = registry::about::<P>(&name).expect("a listed solver is described");
+            let variants = about.variants.iter().map(|v| vec![*v]);
+            std::iter::once(vec![]).chain(variants).map(move |v| (name.clone(), v)).collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+fn solves_everything<P>(make: impl Fn(&Planted) -> P)
+where
+    P: Registered + Judged,
+{
+    let mut failures = Vec::new();
+    for (name, settings) in runs::<P>() {
+        let map = registry::parse_settings(&settings).unwrap();
+        let mut session = registry::session::<P>(&name, &map).unwrap();
+        for case in cases() {
+            let problem = make(&case);
+            let mut point = problem.origin();
+            let limits = Limits { tolerance: 1e-6, max_iterations: 200_000, ..Limits::default() };
+            let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+            let verdict = problem.judge(&point, limits.tolerance).unwrap();
+            assert_eq!(outcome.status == Status::Solved, verdict.solved, "{name} {case:?}");
+            assert_eq!(outcome.measure, verdict.measure, "{name} {settings:?} {case:?}");
+            if !verdict.solved {
+                let Outcome { status, iterations, .. } = outcome;
+                failures.push(format!(
+                    "{name} {settings:?} seed {}: {status} after {iterations}, {:.1e}",
+                    case.seed, verdict.measure.relative
+                ));
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+
+#[test]
+fn local_problems_in_space() {
+    solves_everything(|case| case.local::<3>().0);
+}
+
+#[test]
+fn local_problems_in_the_plane() {
+    solves_everything(|case| case.local::<2>().0);
+}
+
+#[test]
+fn global_problems_in_space() {
+    solves_everything(|case| case.global::<3>().0);
+}
+
+#[test]
+fn global_problems_in_the_plane() {
+    solves_everything(|case| case.global::<2>().0);
+}
