@@ -12,8 +12,8 @@ use std::time::Instant;
 use nonsmooth_io::fclib;
 use nonsmooth_problem::linalg::Bsr;
 use nonsmooth_problem::{Friction, FrictionLocal};
-use nonsmooth_solve::registry::{self, Registered, SettingsMap};
 use nonsmooth_solve::Limits;
+use nonsmooth_solve::registry::{self, Registered, SettingsMap};
 
 const REPETITIONS: usize = 7;
 

@@ -11,8 +11,10 @@
 //! `diag(m I, R J Rᵀ)` of M. A contact at p with frame `[N, T1, T2]` has the columns `(d, (p − x_b) × d)` for b
 //! and minus `(d, (p − x_a) × d)` for a, with d each of N, T1, T2.
 
-use nonsmooth_problem::linalg::{Csc, Delassus, Inverse};
+use nonsmooth_problem::linalg::Csc;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal};
+use nonsmooth_solve::Reformulation;
+use nonsmooth_solve::reform::Condense;
 
 use crate::vec3::{add, apply, cross, scale, sub};
 use crate::{Contact, RigidBody, Scene, SceneError};
@@ -25,12 +27,8 @@ impl Scene {
     pub fn problem(&self) -> Result<FrictionGlobal<3>, SceneError> {
         self.validate()?;
         let (n, nc) = (6 * self.bodies.len(), self.contacts.len());
-        let mass: Vec<_> = self
-            .bodies
-            .iter()
-            .enumerate()
-            .flat_map(|(k, b)| mass_entries(6 * k, b))
-            .collect();
+        let mass: Vec<_> =
+            self.bodies.iter().enumerate().flat_map(|(k, b)| mass_entries(6 * k, b)).collect();
         let jacobian: Vec<_> = self
             .contacts
             .iter()
@@ -50,20 +48,16 @@ impl Scene {
         Ok(FrictionGlobal::new(M, H, f, w, mu)?)
     }
 
-    /// The time step as a local problem, [`condense`]d.
+    /// The time step as a local problem, by [`Condense`].
     ///
     /// Errors: those of [`Scene::problem`].
     pub fn condensed(&self) -> Result<FrictionLocal<3>, SceneError> {
-        condense(&self.problem()?)
+        Ok(Condense.reduce(&self.problem()?)?.0)
     }
 
     /// The velocities at the beginning of the step, as the problem stacks them.
     pub fn velocities(&self) -> Vec<f64> {
-        self.bodies
-            .iter()
-            .flat_map(|b| [b.velocity, b.angular_velocity])
-            .flatten()
-            .collect()
+        self.bodies.iter().flat_map(|b| [b.velocity, b.angular_velocity]).flatten().collect()
     }
 
     /// `h (m g + force, −ω × J ω)`.
@@ -76,42 +70,14 @@ impl Scene {
     }
 }
 
-/// `W = Hᵀ M⁻¹ H`, `q = Hᵀ M⁻¹ f + w` of a global problem without bilateral constraints.
-///
-/// Errors: a singular M; bilateral constraints, which this condensation does not carry.
-pub fn condense(problem: &FrictionGlobal<3>) -> Result<FrictionLocal<3>, SceneError> {
-    if problem.bilateral.is_some() {
-        return Err(SceneError::value(
-            "bilateral",
-            "no bilateral constraints",
-            "some",
-        ));
-    }
-    let inverse = Inverse::new(&problem.M, "M")?;
-    let mut v = problem.f.clone();
-    inverse.solve(&mut v);
-    let mut q = vec![0.0; problem.w.len()];
-    problem.velocity_into(&v, &mut q);
-    let delassus = Delassus::<3>::new(&problem.H, &inverse);
-    Ok(FrictionLocal::new(
-        delassus.condense(),
-        q,
-        problem.mu.clone(),
-    )?)
-}
-
 /// The block `diag(m I, R J Rᵀ)` of a body whose degrees of freedom start at `at`.
 fn mass_entries(at: usize, body: &RigidBody) -> Vec<(usize, usize, f64)> {
     let inertia = body.world_inertia();
     let linear = (0..3).map(|k| (at + k, at + k, body.mass));
     // The product R J Rᵀ is symmetric up to rounding only; its mean with its transpose is so exactly.
-    let angular = (0..9).map(|k| (k / 3, k % 3)).map(|(k, l)| {
-        (
-            at + 3 + k,
-            at + 3 + l,
-            0.5 * (inertia[k][l] + inertia[l][k]),
-        )
-    });
+    let angular = (0..9)
+        .map(|k| (k / 3, k % 3))
+        .map(|(k, l)| (at + 3 + k, at + 3 + l, 0.5 * (inertia[k][l] + inertia[l][k])));
     linear.chain(angular.filter(|e| e.2 != 0.0)).collect()
 }
 
@@ -123,21 +89,13 @@ fn jacobian_entries(
 ) -> impl Iterator<Item = (usize, usize, f64)> {
     let frame = contact.frame();
     let sides = [(1.0, Some(contact.b)), (-1.0, contact.a)];
-    sides
-        .into_iter()
-        .filter_map(|(sign, body)| Some((sign, body?)))
-        .flat_map(move |(sign, k)| {
-            let arm = sub(contact.point, bodies[k].position);
-            (0..18).filter_map(move |i| {
-                let (column, row) = (i / 6, i % 6);
-                let d = frame[column];
-                let x = sign
-                    * if row < 3 {
-                        d[row]
-                    } else {
-                        cross(arm, d)[row - 3]
-                    };
-                (x != 0.0).then_some((6 * k + row, 3 * c + column, x))
-            })
+    sides.into_iter().filter_map(|(sign, body)| Some((sign, body?))).flat_map(move |(sign, k)| {
+        let arm = sub(contact.point, bodies[k].position);
+        (0..18).filter_map(move |i| {
+            let (column, row) = (i / 6, i % 6);
+            let d = frame[column];
+            let x = sign * if row < 3 { d[row] } else { cross(arm, d)[row - 3] };
+            (x != 0.0).then_some((6 * k + row, 3 * c + column, x))
         })
+    })
 }

@@ -38,21 +38,9 @@ impl Rotation {
     pub fn matrix(self) -> Mat3 {
         let [w, x, y, z] = self.0;
         [
-            [
-                1.0 - 2.0 * (y * y + z * z),
-                2.0 * (x * y - w * z),
-                2.0 * (x * z + w * y),
-            ],
-            [
-                2.0 * (x * y + w * z),
-                1.0 - 2.0 * (x * x + z * z),
-                2.0 * (y * z - w * x),
-            ],
-            [
-                2.0 * (x * z - w * y),
-                2.0 * (y * z + w * x),
-                1.0 - 2.0 * (x * x + y * y),
-            ],
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
         ]
     }
 }
@@ -140,11 +128,7 @@ impl RigidBody {
     /// Boxes and spheres are centred at the origin, a polyhedron stays where its vertices are.
     /// Errors: those of [`Shape::mass_properties`].
     pub fn solid(shape: Shape, density: f64) -> Result<Self, SceneError> {
-        let MassProperties {
-            mass,
-            centre,
-            inertia,
-        } = shape.mass_properties(density)?;
+        let MassProperties { mass, centre, inertia } = shape.mass_properties(density)?;
         let shape = match shape {
             Shape::Polyhedron(p) => Shape::Polyhedron(p.mapped(|v| sub(v, centre))),
             other => other,
@@ -188,31 +172,17 @@ impl RigidBody {
         });
         if !(j[0][0] > 0.0 && d2 > 0.0 && d3 > 0.0 && d3.is_finite() && symmetric) {
             let expected = "a symmetric positive definite matrix";
-            return Err(SceneError::value(
-                format!("{key}.inertia"),
-                expected,
-                format!("{j:?}"),
-            ));
+            return Err(SceneError::value(format!("{key}.inertia"), expected, format!("{j:?}")));
         }
         let q = self.rotation.0.iter().map(|x| x * x).sum::<f64>();
-        require(
-            &format!("{key}.rotation"),
-            q,
-            (q - 1.0).abs() < 1e-9,
-            "a unit quaternion",
-        )?;
+        require(&format!("{key}.rotation"), q, (q - 1.0).abs() < 1e-9, "a unit quaternion")?;
         for (name, x) in [
             ("position", self.position),
             ("velocity", self.velocity),
             ("angular_velocity", self.angular_velocity),
             ("force", self.force),
         ] {
-            require(
-                &format!("{key}.{name}"),
-                x.iter().sum(),
-                true,
-                "finite components",
-            )?;
+            require(&format!("{key}.{name}"), x.iter().sum(), true, "finite components")?;
         }
         Ok(())
     }

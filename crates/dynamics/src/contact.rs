@@ -29,20 +29,8 @@ pub struct Contact {
 impl Contact {
     /// A contact with T1 along the world's x axis, or its y axis where the normal is nearly along x.
     pub fn new(a: Option<usize>, b: usize, point: Vec3, normal: Vec3, mu: f64, e: f64) -> Self {
-        let tangent = if normal[0].abs() > 0.9 * norm(normal) {
-            Y
-        } else {
-            X
-        };
-        Self {
-            a,
-            b,
-            point,
-            normal,
-            tangent,
-            mu,
-            e,
-        }
+        let tangent = if normal[0].abs() > 0.9 * norm(normal) { Y } else { X };
+        Self { a, b, point, normal, tangent, mu, e }
     }
 
     /// The local frame `[N, T1, T2]`: orthonormal, with T1 × T2 = N.
@@ -54,39 +42,18 @@ impl Contact {
 
     /// Checks every value against a scene of `bodies` bodies; `key` names the contact in messages.
     pub(crate) fn validate(&self, key: &str, bodies: usize) -> Result<(), SceneError> {
-        let Self {
-            a, b, point, mu, e, ..
-        } = *self;
+        let Self { a, b, point, mu, e, .. } = *self;
         if b >= bodies || a.is_some_and(|a| a >= bodies || a == b) {
             let expected = format!("two different bodies of the {bodies}");
-            return Err(SceneError::value(
-                key,
-                expected,
-                format!("a = {a:?}, b = {b}"),
-            ));
+            return Err(SceneError::value(key, expected, format!("a = {a:?}, b = {b}")));
         }
-        require(
-            &format!("{key}.point"),
-            point.iter().sum(),
-            true,
-            "finite coordinates",
-        )?;
+        require(&format!("{key}.point"), point.iter().sum(), true, "finite coordinates")?;
         if self.frame().iter().flatten().any(|x| !x.is_finite()) {
             let found = format!("{:?} and {:?}", self.normal, self.tangent);
             let expected = "a normal and a tangent that are not parallel";
             return Err(SceneError::value(format!("{key}.normal"), expected, found));
         }
-        require(
-            &format!("{key}.mu"),
-            mu,
-            mu >= 0.0,
-            "a coefficient of at least 0",
-        )?;
-        require(
-            &format!("{key}.e"),
-            e,
-            (0.0..=1.0).contains(&e),
-            "a coefficient from 0 to 1",
-        )
+        require(&format!("{key}.mu"), mu, mu >= 0.0, "a coefficient of at least 0")?;
+        require(&format!("{key}.e"), e, (0.0..=1.0).contains(&e), "a coefficient from 0 to 1")
     }
 }

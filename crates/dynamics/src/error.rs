@@ -1,6 +1,7 @@
 //! A caller's mistake in a scene or its settings.
 
 use nonsmooth_problem::ProblemError;
+use nonsmooth_solve::SolveError;
 
 /// What is wrong with a scene; every message is a single line that names the place.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -44,6 +45,9 @@ pub enum SceneError {
     /// The assembled problem is not valid.
     #[error(transparent)]
     Problem(#[from] ProblemError),
+    /// The problem cannot be reformulated.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
 }
 
 impl SceneError {
@@ -52,21 +56,13 @@ impl SceneError {
         expected: impl Into<String>,
         found: impl ToString,
     ) -> Self {
-        Self::Value {
-            key: key.into(),
-            expected: expected.into(),
-            found: found.to_string(),
-        }
+        Self::Value { key: key.into(), expected: expected.into(), found: found.to_string() }
     }
 }
 
 /// `x` is finite and `ok`, or an error that says what was `expected` of `key`.
 pub(crate) fn require(key: &str, x: f64, ok: bool, expected: &str) -> Result<(), SceneError> {
-    if x.is_finite() && ok {
-        Ok(())
-    } else {
-        Err(SceneError::value(key, expected, x))
-    }
+    if x.is_finite() && ok { Ok(()) } else { Err(SceneError::value(key, expected, x)) }
 }
 
 /// `x` is a positive number.

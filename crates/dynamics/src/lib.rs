@@ -23,7 +23,6 @@ mod scene;
 pub mod scenes;
 mod vec3;
 
-pub use assembly::condense;
 pub use body::{RigidBody, Rotation, Shape};
 pub use contact::Contact;
 pub use error::SceneError;

@@ -27,16 +27,9 @@ impl Polyhedron {
     /// Errors: fewer than 4 faces, a face with fewer than 3 vertices or a vertex that does not exist, coordinates
     /// that are not finite, a vertex in front of a face (not convex, or a face seen from inside), no volume.
     pub fn new(vertices: Vec<Vec3>, faces: Vec<Vec<usize>>) -> Result<Self, SceneError> {
-        if let Some(k) = vertices
-            .iter()
-            .position(|v| v.iter().any(|x| !x.is_finite()))
-        {
+        if let Some(k) = vertices.iter().position(|v| v.iter().any(|x| !x.is_finite())) {
             let found = format!("{:?}", vertices[k]);
-            return Err(SceneError::value(
-                format!("vertices[{k}]"),
-                "finite coordinates",
-                found,
-            ));
+            return Err(SceneError::value(format!("vertices[{k}]"), "finite coordinates", found));
         }
         let bad = |f: &Vec<usize>| f.len() < 3 || f.iter().any(|&k| k >= vertices.len());
         if faces.len() < 4 || faces.iter().any(bad) {
@@ -47,28 +40,16 @@ impl Polyhedron {
         let size = out.radius_about(mean(&out.vertices));
         for k in 0..out.faces.len() {
             let (normal, offset) = out.plane(k);
-            let front = out
-                .vertices
-                .iter()
-                .map(|&v| dot(normal, v) - offset)
-                .fold(0.0, f64::max);
+            let front = out.vertices.iter().map(|&v| dot(normal, v) - offset).fold(0.0, f64::max);
             // A face without area has no normal.
             if front > 1e-9 * size || normal.iter().any(|x| x.is_nan()) {
                 let expected = "a face of a convex solid, counter-clockwise from outside";
-                return Err(SceneError::value(
-                    format!("faces[{k}]"),
-                    expected,
-                    "another",
-                ));
+                return Err(SceneError::value(format!("faces[{k}]"), expected, "another"));
             }
         }
         let volume = out.mass_properties(1.0).mass;
         if volume.is_nan() || volume <= 1e-12 * size.powi(3) {
-            return Err(SceneError::value(
-                "vertices",
-                "a solid with a volume",
-                volume,
-            ));
+            return Err(SceneError::value("vertices", "a solid with a volume", volume));
         }
         Ok(out)
     }
@@ -83,9 +64,8 @@ impl Polyhedron {
         let mut faces = vec![(0..n).rev().collect::<Vec<_>>(), (n..2 * n).collect()];
         faces.extend((0..n).map(|k| vec![k, (k + 1) % n, (k + 1) % n + n, k + n]));
         // The faces above suit a base that turns counter-clockwise about `along`.
-        let turning = (1..n.max(2) - 1).fold([0.0; 3], |s, k| {
-            add(s, cross(sub(base[k], base[0]), sub(base[k + 1], base[0])))
-        });
+        let turning = (1..n.max(2) - 1)
+            .fold([0.0; 3], |s, k| add(s, cross(sub(base[k], base[0]), sub(base[k + 1], base[0]))));
         if dot(turning, along) < 0.0 {
             faces.iter_mut().for_each(|f| f.reverse());
         }
@@ -114,28 +94,21 @@ impl Polyhedron {
     /// The same solid with every vertex mapped by `f`, a rigid motion.
     pub fn mapped(&self, f: impl Fn(Vec3) -> Vec3) -> Self {
         let vertices = self.vertices.iter().map(|&v| f(v)).collect();
-        Self {
-            vertices,
-            faces: self.faces.clone(),
-        }
+        Self { vertices, faces: self.faces.clone() }
     }
 
     /// The unit outward normal `n` and offset `d` of the plane `n · x = d` of face `k`.
     pub fn plane(&self, k: usize) -> (Vec3, f64) {
         let p = |i: usize| self.vertices[self.faces[k][i]];
-        let sum = (1..self.faces[k].len() - 1).fold([0.0; 3], |s, i| {
-            add(s, cross(sub(p(i), p(0)), sub(p(i + 1), p(0))))
-        });
+        let sum = (1..self.faces[k].len() - 1)
+            .fold([0.0; 3], |s, i| add(s, cross(sub(p(i), p(0)), sub(p(i + 1), p(0)))));
         let normal = scale(1.0 / norm(sum), sum);
         (normal, dot(normal, p(0)))
     }
 
     /// The largest distance of a vertex from `point`, m.
     pub fn radius_about(&self, point: Vec3) -> f64 {
-        self.vertices
-            .iter()
-            .map(|&v| norm(sub(v, point)))
-            .fold(0.0, f64::max)
+        self.vertices.iter().map(|&v| norm(sub(v, point))).fold(0.0, f64::max)
     }
 
     /// Mass, mass centre and inertia for a density in kg/m³, exact.
@@ -174,11 +147,7 @@ impl Polyhedron {
         for k in 0..3 {
             inertia[k][k] += density * trace;
         }
-        MassProperties {
-            mass: density * volume,
-            centre: add(inner, centre),
-            inertia,
-        }
+        MassProperties { mass: density * volume, centre: add(inner, centre), inertia }
     }
 }
 
@@ -190,21 +159,14 @@ mod tests {
     fn inertia_of_a_box_has_its_closed_form_anywhere() {
         let half = [0.5, 0.2, 1.1];
         let at = [30.0, -4.0, 7.0];
-        let p = Polyhedron::cuboid(half)
-            .unwrap()
-            .mapped(|v| add(v, at))
-            .mass_properties(700.0);
+        let p = Polyhedron::cuboid(half).unwrap().mapped(|v| add(v, at)).mass_properties(700.0);
         let mass = 700.0 * 8.0 * half[0] * half[1] * half[2];
         assert!((p.mass - mass).abs() < 1e-11 * mass);
         assert!(norm(sub(p.centre, at)) < 1e-12);
         for k in 0..3 {
             for l in 0..3 {
                 let (a, b) = (half[(k + 1) % 3], half[(k + 2) % 3]);
-                let exact = if k == l {
-                    mass * (a * a + b * b) / 3.0
-                } else {
-                    0.0
-                };
+                let exact = if k == l { mass * (a * a + b * b) / 3.0 } else { 0.0 };
                 assert!((p.inertia[k][l] - exact).abs() < 1e-11 * mass, "{k} {l}");
             }
         }
@@ -215,9 +177,7 @@ mod tests {
         // Corners 0, x, y, z: V = 1/6, centre (1, 1, 1)/4, ∫x² = V/10, ∫xy = V/20.
         let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let faces = vec![vec![0, 2, 1], vec![0, 1, 3], vec![0, 3, 2], vec![1, 2, 3]];
-        let p = Polyhedron::new(vertices, faces)
-            .unwrap()
-            .mass_properties(6.0);
+        let p = Polyhedron::new(vertices, faces).unwrap().mass_properties(6.0);
         assert!((p.mass - 1.0).abs() < 1e-15 && p.centre.iter().all(|x| (x - 0.25).abs() < 1e-15));
         let (xx, xy) = (1.0 / 10.0 - 1.0 / 16.0, 1.0 / 20.0 - 1.0 / 16.0);
         for k in 0..3 {
@@ -233,22 +193,11 @@ mod tests {
         let base = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
         let good = Polyhedron::prism(&base, [0.0, 0.0, 1.0]).unwrap();
         let turned: Vec<_> = base.iter().rev().copied().collect();
-        assert_eq!(
-            Polyhedron::prism(&turned, [0.0, 0.0, 1.0])
-                .unwrap()
-                .faces()
-                .len(),
-            6
-        );
+        assert_eq!(Polyhedron::prism(&turned, [0.0, 0.0, 1.0]).unwrap().faces().len(), 6);
         let mut faces = good.faces().to_vec();
         faces[2].reverse();
-        let e = Polyhedron::new(good.vertices().to_vec(), faces)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            e.starts_with("faces[2]: expected a face of a convex solid"),
-            "{e}"
-        );
+        let e = Polyhedron::new(good.vertices().to_vec(), faces).unwrap_err().to_string();
+        assert!(e.starts_with("faces[2]: expected a face of a convex solid"), "{e}");
         assert!(Polyhedron::prism(&base, [1.0, 0.0, 0.0]).is_err());
         let mut faces = good.faces().to_vec();
         faces[2] = vec![0, 1, 1];

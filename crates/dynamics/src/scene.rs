@@ -40,11 +40,7 @@ pub struct Ground {
 
 impl Ground {
     /// The plane z = 0.
-    pub const FLAT: Self = Self {
-        point: [0.0; 3],
-        normal: [0.0, 0.0, 1.0],
-        along: X,
-    };
+    pub const FLAT: Self = Self { point: [0.0; 3], normal: [0.0, 0.0, 1.0], along: X };
 }
 
 impl Scene {
@@ -70,9 +66,7 @@ impl Scene {
         for body in &mut self.bodies {
             let radius = body.shape.radius();
             body.velocity.iter_mut().for_each(|v| *v += draw());
-            body.angular_velocity
-                .iter_mut()
-                .for_each(|w| *w += draw() / radius);
+            body.angular_velocity.iter_mut().for_each(|w| *w += draw() / radius);
         }
     }
 
@@ -81,20 +75,10 @@ impl Scene {
     /// Errors: the first value that is not possible, by its place, for example `bodies[3].mass`.
     pub fn validate(&self) -> Result<(), SceneError> {
         positive("h", self.h)?;
-        require(
-            "gravity",
-            self.gravity.iter().sum(),
-            true,
-            "finite components",
-        )?;
+        require("gravity", self.gravity.iter().sum(), true, "finite components")?;
         if let Some(Ground { normal, along, .. }) = self.ground {
             let across = norm(cross(normal, along));
-            require(
-                "ground",
-                across,
-                across > 0.0,
-                "a normal and a direction across it",
-            )?;
+            require("ground", across, across > 0.0, "a normal and a direction across it")?;
         }
         for (k, body) in self.bodies.iter().enumerate() {
             body.validate(&format!("bodies[{k}]"))?;

@@ -14,11 +14,7 @@ pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
 }
 
 pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 pub(crate) fn add(a: Vec3, b: Vec3) -> Vec3 {
@@ -54,10 +50,7 @@ pub(crate) fn congruence(a: &Mat3, b: &Mat3) -> Mat3 {
 
 /// The mean of some points, which must not be empty.
 pub(crate) fn mean(points: &[Vec3]) -> Vec3 {
-    scale(
-        1.0 / points.len() as f64,
-        points.iter().fold([0.0; 3], |s, &p| add(s, p)),
-    )
+    scale(1.0 / points.len() as f64, points.iter().fold([0.0; 3], |s, &p| add(s, p)))
 }
 
 /// The four corners `centre ± a ± b`, in order around the rectangle.

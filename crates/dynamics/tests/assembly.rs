@@ -10,13 +10,9 @@ fn tumbling() -> Scene {
     let mut rng = Pcg64::seed_from_u64(3);
     let mut vector = |size: f64| -> Vec3 { [(); 3].map(|()| size * rng.random_range(-1.0..=1.0)) };
     let shapes = [
-        Shape::Box {
-            half: [0.3, 0.5, 0.2],
-        },
+        Shape::Box { half: [0.3, 0.5, 0.2] },
         Shape::Sphere { radius: 0.4 },
-        Shape::Box {
-            half: [0.1, 0.7, 0.4],
-        },
+        Shape::Box { half: [0.1, 0.7, 0.4] },
     ];
     let bodies = shapes
         .into_iter()
@@ -29,15 +25,9 @@ fn tumbling() -> Scene {
             ..RigidBody::solid(shape, 800.0).unwrap()
         })
         .collect();
-    let contacts = [
-        (None, 0),
-        (Some(0), 1),
-        (Some(1), 2),
-        (None, 2),
-        (Some(2), 0),
-    ]
-    .map(|(a, b)| Contact::new(a, b, vector(1.0), vector(2.0), 0.3, 0.4))
-    .to_vec();
+    let contacts = [(None, 0), (Some(0), 1), (Some(1), 2), (None, 2), (Some(2), 0)]
+        .map(|(a, b)| Contact::new(a, b, vector(1.0), vector(2.0), 0.3, 0.4))
+        .to_vec();
     Scene {
         name: "tumbling".into(),
         bodies,
@@ -50,9 +40,7 @@ fn tumbling() -> Scene {
 }
 
 fn dense(a: &Csc) -> Vec<Vec<f64>> {
-    (0..a.nrows())
-        .map(|i| (0..a.ncols()).map(|j| a.get(i, j)).collect())
-        .collect()
+    (0..a.nrows()).map(|i| (0..a.ncols()).map(|j| a.get(i, j)).collect()).collect()
 }
 
 /// The smallest pivot of a Cholesky factorisation without pivoting, negative where A is not definite.
@@ -125,9 +113,7 @@ fn relative_velocities_agree_with_finite_differences() {
     let scene = tumbling();
     let problem = scene.problem().unwrap();
     let mut u = vec![0.0; problem.w.len()];
-    problem
-        .H
-        .mul_transpose_add(1.0, &scene.velocities(), &mut u);
+    problem.H.mul_transpose_add(1.0, &scene.velocities(), &mut u);
     // Where the material point of a body that is at `p` now will be at time t.
     let moved = |body: Option<usize>, p: Vec3, t: f64| {
         let Some(b) = body.map(|b| &scene.bodies[b]) else {
@@ -135,39 +121,24 @@ fn relative_velocities_agree_with_finite_differences() {
         };
         let speed = b.angular_velocity.iter().map(|w| w * w).sum::<f64>().sqrt();
         let turned = Rotation::about(b.angular_velocity, speed * t).after(b.rotation);
-        let still = RigidBody {
-            position: [0.0; 3],
-            ..b.clone()
-        };
+        let still = RigidBody { position: [0.0; 3], ..b.clone() };
         let r = b.rotation.matrix();
         let arm: Vec3 = std::array::from_fn(|k| p[k] - b.position[k]);
         let local = std::array::from_fn(|k| (0..3).map(|i| r[i][k] * arm[i]).sum());
-        let rotated = RigidBody {
-            rotation: turned,
-            ..still
-        }
-        .to_world(local);
+        let rotated = RigidBody { rotation: turned, ..still }.to_world(local);
         std::array::from_fn(|k| b.position[k] + t * b.velocity[k] + rotated[k])
     };
     for (c, contact) in scene.contacts.iter().enumerate() {
         let gap = |t: f64| -> Vec3 {
-            let (a, b) = (
-                moved(contact.a, contact.point, t),
-                moved(Some(contact.b), contact.point, t),
-            );
+            let (a, b) =
+                (moved(contact.a, contact.point, t), moved(Some(contact.b), contact.point, t));
             std::array::from_fn(|k| b[k] - a[k])
         };
         let t = 1e-5;
         let (after, before) = (gap(t), gap(-t));
         for (k, axis) in contact.frame().iter().enumerate() {
-            let rate: f64 = (0..3)
-                .map(|i| axis[i] * (after[i] - before[i]) / (2.0 * t))
-                .sum();
-            assert!(
-                (u[3 * c + k] - rate).abs() < 1e-8,
-                "{} {rate}",
-                u[3 * c + k]
-            );
+            let rate: f64 = (0..3).map(|i| axis[i] * (after[i] - before[i]) / (2.0 * t)).sum();
+            assert!((u[3 * c + k] - rate).abs() < 1e-8, "{} {rate}", u[3 * c + k]);
         }
     }
 }
@@ -240,34 +211,13 @@ fn impossible_scenes_name_what_is_wrong() {
         scene.problem().unwrap_err().to_string()
     };
     let cases: [(&str, String); 8] = [
-        (
-            "bodies[1].mass: expected a positive",
-            spoilt(&|s| s.bodies[1].mass = -1.0),
-        ),
-        (
-            "bodies[0].inertia: expected",
-            spoilt(&|s| s.bodies[0].inertia[1][1] = 0.0),
-        ),
-        (
-            "bodies[2].rotation: expected a unit",
-            spoilt(&|s| s.bodies[2].rotation.0 = [0.0; 4]),
-        ),
-        (
-            "bodies[2].velocity: expected",
-            spoilt(&|s| s.bodies[2].velocity[1] = f64::NAN),
-        ),
-        (
-            "contacts[4]: expected two different",
-            spoilt(&|s| s.contacts[4].a = Some(0)),
-        ),
-        (
-            "contacts[1]: expected two different",
-            spoilt(&|s| s.contacts[1].b = 3),
-        ),
-        (
-            "contacts[3].normal: expected",
-            spoilt(&|s| s.contacts[3].normal = [0.0; 3]),
-        ),
+        ("bodies[1].mass: expected a positive", spoilt(&|s| s.bodies[1].mass = -1.0)),
+        ("bodies[0].inertia: expected", spoilt(&|s| s.bodies[0].inertia[1][1] = 0.0)),
+        ("bodies[2].rotation: expected a unit", spoilt(&|s| s.bodies[2].rotation.0 = [0.0; 4])),
+        ("bodies[2].velocity: expected", spoilt(&|s| s.bodies[2].velocity[1] = f64::NAN)),
+        ("contacts[4]: expected two different", spoilt(&|s| s.contacts[4].a = Some(0))),
+        ("contacts[1]: expected two different", spoilt(&|s| s.contacts[1].b = 3)),
+        ("contacts[3].normal: expected", spoilt(&|s| s.contacts[3].normal = [0.0; 3])),
         ("h: expected a positive number", spoilt(&|s| s.h = 0.0)),
     ];
     for (start, message) in cases {

@@ -18,12 +18,7 @@ fn elements(xml: &str) -> Vec<String> {
         let known = |e: &str| ["amp;", "lt;", "gt;"].iter().any(|k| e.starts_with(k));
         assert!(text.split('&').skip(1).all(known), "{text}");
         assert_eq!(tag.matches('"').count() % 2, 0, "{tag}");
-        let name = tag
-            .trim_start_matches('/')
-            .split([' ', '/'])
-            .next()
-            .unwrap()
-            .to_string();
+        let name = tag.trim_start_matches('/').split([' ', '/']).next().unwrap().to_string();
         if tag.starts_with('/') {
             assert_eq!(open.pop(), Some(name));
             continue;
@@ -42,9 +37,8 @@ fn every_scene_is_drawn_well_formed_and_stable() {
     for scene in scenes() {
         let nc = scene.contacts.len();
         let impulses: Vec<f64> = (0..3 * nc).map(|k| (k as f64).cos()).collect();
-        let motions: Vec<Motion> = (0..nc)
-            .map(|c| [Motion::Open, Motion::Stick, Motion::Slip][c % 3])
-            .collect();
+        let motions: Vec<Motion> =
+            (0..nc).map(|c| [Motion::Open, Motion::Stick, Motion::Slip][c % 3]).collect();
         let full = Drawing {
             impulses: Some(&impulses),
             motions: Some(&motions),
@@ -58,10 +52,7 @@ fn every_scene_is_drawn_well_formed_and_stable() {
             assert!(!picture.contains("NaN") && !picture.contains("inf"));
             let names = elements(&picture);
             assert!(names.iter().filter(|n| *n == "circle").count() >= nc);
-            assert_eq!(
-                names.contains(&"text".to_string()),
-                drawing.caption.is_some()
-            );
+            assert_eq!(names.contains(&"text".to_string()), drawing.caption.is_some());
         }
     }
 }
@@ -70,17 +61,10 @@ fn every_scene_is_drawn_well_formed_and_stable() {
 fn contacts_and_arrows_can_be_left_out() {
     let scene = scenes().next().unwrap();
     let count = |drawing: &Drawing, name: &str| {
-        elements(&svg(&scene, drawing).unwrap())
-            .iter()
-            .filter(|n| *n == name)
-            .count()
+        elements(&svg(&scene, drawing).unwrap()).iter().filter(|n| *n == name).count()
     };
     let all = Drawing::default();
-    let bare = Drawing {
-        contacts: false,
-        velocities: false,
-        ..Drawing::default()
-    };
+    let bare = Drawing { contacts: false, velocities: false, ..Drawing::default() };
     assert_eq!(count(&all, "circle"), 4);
     assert_eq!(count(&bare, "circle"), 0);
     assert_eq!(count(&all, "path") - count(&bare, "path"), 1);
@@ -92,19 +76,8 @@ fn any_sensible_view_is_drawn() {
         for (azimuth, elevation, distance) in
             [(0.0, 0.0, 1.5), (200.0, 89.0, 1e4), (90.0, -40.0, 3.0)]
         {
-            let view = View {
-                azimuth,
-                elevation,
-                distance,
-            };
-            let picture = svg(
-                &scene,
-                &Drawing {
-                    view,
-                    ..Drawing::default()
-                },
-            )
-            .unwrap();
+            let view = View { azimuth, elevation, distance };
+            let picture = svg(&scene, &Drawing { view, ..Drawing::default() }).unwrap();
             assert!(!picture.contains("NaN") && !picture.contains("inf"));
         }
     }
@@ -115,36 +88,12 @@ fn what_does_not_fit_the_scene_is_refused() {
     let scene = scenes().next().unwrap();
     let message = |drawing: Drawing| svg(&scene, &drawing).unwrap_err().to_string();
     let impulses = [1.0; 11];
-    let e = message(Drawing {
-        impulses: Some(&impulses),
-        ..Drawing::default()
-    });
-    assert_eq!(
-        e,
-        "impulses: expected 12 entries, 3 for each contact, found 11"
-    );
-    let e = message(Drawing {
-        motions: Some(&[Motion::Open]),
-        ..Drawing::default()
-    });
-    assert_eq!(
-        e,
-        "motions: expected 4 entries, one for each contact, found 1"
-    );
-    let e = message(Drawing {
-        width: 0.0,
-        ..Drawing::default()
-    });
+    let e = message(Drawing { impulses: Some(&impulses), ..Drawing::default() });
+    assert_eq!(e, "impulses: expected 12 entries, 3 for each contact, found 11");
+    let e = message(Drawing { motions: Some(&[Motion::Open]), ..Drawing::default() });
+    assert_eq!(e, "motions: expected 4 entries, one for each contact, found 1");
+    let e = message(Drawing { width: 0.0, ..Drawing::default() });
     assert_eq!(e, "width: expected a positive number, found 0");
-    let view = View {
-        elevation: 90.0,
-        ..View::default()
-    };
-    assert!(
-        message(Drawing {
-            view,
-            ..Drawing::default()
-        })
-        .starts_with("elevation: expected")
-    );
+    let view = View { elevation: 90.0, ..View::default() };
+    assert!(message(Drawing { view, ..Drawing::default() }).starts_with("elevation: expected"));
 }

@@ -34,10 +34,7 @@ fn balance(p: &FrictionGlobal<3>) -> Vec<f64> {
         let gamma = norm(&s).powi(2);
         let alpha = gamma / norm(&hd).powi(2);
         r.iter_mut().zip(&d).for_each(|(r, d)| *r += alpha * d);
-        residual
-            .iter_mut()
-            .zip(&hd)
-            .for_each(|(x, h)| *x -= alpha * h);
+        residual.iter_mut().zip(&hd).for_each(|(x, h)| *x -= alpha * h);
         s = transposed(&residual);
         if norm(&residual) < 1e-12 * norm(&p.f) {
             break;
@@ -64,227 +61,107 @@ fn every_default_builds_and_assembles() {
         ("arch", 90, 64),
         ("spheres", 180, 112),
     ];
-    assert_eq!(
-        sizes,
-        expected.map(|(name, n, nc)| (name.to_string(), n, nc))
-    );
+    assert_eq!(sizes, expected.map(|(name, n, nc)| (name.to_string(), n, nc)));
 }
 
 #[test]
 fn settings_reach_the_scene_and_the_schema_documents_each() {
     for entry in SCENES {
         let defaults = entry.defaults();
-        assert_eq!(
-            entry.make(defaults.clone()).unwrap(),
-            entry.make(Map::new()).unwrap()
-        );
+        assert_eq!(entry.make(defaults.clone()).unwrap(), entry.make(Map::new()).unwrap());
         let schema = entry.schema();
         let properties = schema.get("properties").unwrap().as_object().unwrap();
         assert!(properties.keys().eq(defaults.keys()), "{}", entry.name);
         for (key, property) in properties {
-            assert!(
-                property.get("description").is_some(),
-                "{} {key}",
-                entry.name
-            );
+            assert!(property.get("description").is_some(), "{} {key}", entry.name);
         }
     }
-    let scene = SceneEntry::find("stack")
-        .unwrap()
-        .make(settings(json!({"count": 2, "mu": 1})));
+    let scene = SceneEntry::find("stack").unwrap().make(settings(json!({"count": 2, "mu": 1})));
     let scene = scene.unwrap();
     assert_eq!((scene.bodies.len(), scene.contacts[0].mu), (2, 1.0));
-    let direct = Stack {
-        count: 2,
-        mu: 1.0,
-        ..Stack::default()
-    }
-    .build()
-    .unwrap();
+    let direct = Stack { count: 2, mu: 1.0, ..Stack::default() }.build().unwrap();
     assert_eq!(scene, direct);
 }
 
 #[test]
 fn mistakes_are_named_on_one_line() {
     let cases = [
-        (
-            "stack",
-            json!({"count": 0}),
-            "count: expected a count from 1 to 10000, found 0",
-        ),
+        ("stack", json!({"count": 0}), "count: expected a count from 1 to 10000, found 0"),
         ("stack", json!({"count": -1}), "count: invalid value"),
-        (
-            "stack",
-            json!({"kicked": 6}),
-            "kicked: expected a count from 1 to 5, found 6",
-        ),
-        (
-            "stack",
-            json!({"density": -1.0}),
-            "density: expected a positive number, found -1",
-        ),
-        (
-            "stack",
-            json!({"mass_ratio": 0}),
-            "mass_ratio: expected a positive number, found 0",
-        ),
+        ("stack", json!({"kicked": 6}), "kicked: expected a count from 1 to 5, found 6"),
+        ("stack", json!({"density": -1.0}), "density: expected a positive number, found -1"),
+        ("stack", json!({"mass_ratio": 0}), "mass_ratio: expected a positive number, found 0"),
         (
             "stack",
             json!({"mass_ratio": 1e300, "density": 1e300}),
             "density: expected a positive number, found inf",
         ),
-        (
-            "wall",
-            json!({"rows": "many"}),
-            "rows: invalid type: string \"many\"",
-        ),
-        (
-            "wall",
-            json!({"columns": 100_000_000}),
-            "columns: expected a count from 1 to 1000",
-        ),
+        ("wall", json!({"rows": "many"}), "rows: invalid type: string \"many\""),
+        ("wall", json!({"columns": 100_000_000}), "columns: expected a count from 1 to 1000"),
         (
             "wall",
             json!({"row": 3}),
             "unknown setting `row` of scene `wall`, expected one of `rows`",
         ),
-        (
-            "arch",
-            json!({"blocks": 2}),
-            "blocks: expected a count from 3 to 10000, found 2",
-        ),
-        (
-            "arch",
-            json!({"thickness": 0}),
-            "thickness: expected a positive number",
-        ),
-        (
-            "arch",
-            json!({"mu": -0.1}),
-            "mu: expected a number of at least 0, found -0.1",
-        ),
-        (
-            "spheres",
-            json!({"layout": "cubic"}),
-            "layout: unknown variant `cubic`, expected",
-        ),
-        (
-            "spheres",
-            json!({"radius": null}),
-            "radius: invalid type: null",
-        ),
-        (
-            "spheres",
-            json!({"e": 1.5}),
-            "e: expected a number from 0 to 1, found 1.5",
-        ),
-        (
-            "sliding_box",
-            json!({"slope": 90}),
-            "slope: expected an angle between",
-        ),
-        (
-            "sliding_box",
-            json!({"h": 0}),
-            "h: expected a positive number",
-        ),
+        ("arch", json!({"blocks": 2}), "blocks: expected a count from 3 to 10000, found 2"),
+        ("arch", json!({"thickness": 0}), "thickness: expected a positive number"),
+        ("arch", json!({"mu": -0.1}), "mu: expected a number of at least 0, found -0.1"),
+        ("spheres", json!({"layout": "cubic"}), "layout: unknown variant `cubic`, expected"),
+        ("spheres", json!({"radius": null}), "radius: invalid type: null"),
+        ("spheres", json!({"e": 1.5}), "e: expected a number from 0 to 1, found 1.5"),
+        ("sliding_box", json!({"slope": 90}), "slope: expected an angle between"),
+        ("sliding_box", json!({"h": 0}), "h: expected a positive number"),
         ("sliding_box", json!({"height": 1e-200}), "bodies[0]."),
-        (
-            "sliding_box",
-            json!({"disturbance": -1}),
-            "disturbance: expected a number of at least",
-        ),
-        (
-            "sliding_box",
-            json!({"seed": 0.5}),
-            "seed: invalid type: floating point",
-        ),
+        ("sliding_box", json!({"disturbance": -1}), "disturbance: expected a number of at least"),
+        ("sliding_box", json!({"seed": 0.5}), "seed: invalid type: floating point"),
     ];
     for (name, values, start) in cases {
         let result = SceneEntry::find(name).unwrap().make(settings(values));
         let message = result.unwrap_err().to_string();
-        assert!(
-            message.starts_with(start) && !message.contains('\n'),
-            "{message}"
-        );
+        assert!(message.starts_with(start) && !message.contains('\n'), "{message}");
     }
     let message = SceneEntry::find("tower").err().unwrap().to_string();
     assert!(message.starts_with("unknown scene `tower`, expected one of `sliding_box`, `stack`"));
-    let nan = Wall {
-        length: f64::NAN,
-        ..Wall::default()
-    }
-    .build()
-    .unwrap_err()
-    .to_string();
+    let nan = Wall { length: f64::NAN, ..Wall::default() }.build().unwrap_err().to_string();
     assert_eq!(nan, "length: expected a positive number, found NaN");
 }
 
 #[test]
 fn a_resting_box_falls_freely_in_q() {
-    let settings = SlidingBox {
-        slope: 0.0,
-        speed: 0.0,
-        ..SlidingBox::default()
-    };
+    let settings = SlidingBox { slope: 0.0, speed: 0.0, ..SlidingBox::default() };
     let scene = settings.build().unwrap();
     let q = scene.condensed().unwrap().q;
     for c in 0..4 {
         // The corners fall by h g in a step, and the solver's impulses have to stop them.
         let free = [-0.01 * 9.81, 0.0, 0.0];
-        assert!(
-            (0..3).all(|k| (q[3 * c + k] - free[k]).abs() < 1e-15),
-            "{q:?}"
-        );
+        assert!((0..3).all(|k| (q[3 * c + k] - free[k]).abs() < 1e-15), "{q:?}");
     }
 }
 
 #[test]
 fn a_box_on_a_slope_slides_along_its_first_tangent() {
-    let settings = SlidingBox {
-        e: 0.5,
-        ..SlidingBox::default()
-    };
+    let settings = SlidingBox { e: 0.5, ..SlidingBox::default() };
     let q = settings.build().unwrap().condensed().unwrap().q;
     let (sin, cos) = 10.0_f64.to_radians().sin_cos();
     for c in 0..4 {
         // No normal velocity before the step: restitution adds nothing.
         let free = [-0.0981 * cos, 1.0 + 0.0981 * sin, 0.0];
-        assert!(
-            (0..3).all(|k| (q[3 * c + k] - free[k]).abs() < 1e-14),
-            "{q:?}"
-        );
+        assert!((0..3).all(|k| (q[3 * c + k] - free[k]).abs() < 1e-14), "{q:?}");
     }
 }
 
 #[test]
 fn restitution_enters_through_w() {
-    let mut scene = SlidingBox {
-        slope: 0.0,
-        e: 0.5,
-        ..SlidingBox::default()
-    }
-    .build()
-    .unwrap();
+    let mut scene = SlidingBox { slope: 0.0, e: 0.5, ..SlidingBox::default() }.build().unwrap();
     scene.bodies[0].velocity = [0.0, 0.0, -2.0];
     let p = scene.problem().unwrap();
-    assert!(
-        (0..4).all(|c| p.w[3 * c..3 * c + 3] == [-1.0, 0.0, 0.0]),
-        "{:?}",
-        p.w
-    );
+    assert!((0..4).all(|c| p.w[3 * c..3 * c + 3] == [-1.0, 0.0, 0.0]), "{:?}", p.w);
 }
 
 #[test]
 fn a_resting_stack_is_in_equilibrium_under_its_weight() {
     let (h, g, n) = (0.01, 9.81, 7);
-    let scene = Stack {
-        count: n,
-        mass_ratio: 20.0,
-        ..Stack::default()
-    }
-    .build()
-    .unwrap();
+    let scene = Stack { count: n, mass_ratio: 20.0, ..Stack::default() }.build().unwrap();
     let mass: Vec<f64> = scene.bodies.iter().map(|b| b.mass).collect();
     assert!((mass[n - 1] / mass[0] - 20.0).abs() < 1e-12);
     let p = scene.problem().unwrap();
@@ -306,12 +183,7 @@ fn the_ground_can_carry_every_scene() {
         let r = balance(&p);
         let mut impulse = vec![0.0; p.dofs()];
         p.load(&r, &mut impulse);
-        assert!(
-            norm(&impulse) < 1e-9 * norm(&p.f),
-            "{}: {:e}",
-            scene.name,
-            norm(&impulse)
-        );
+        assert!(norm(&impulse) < 1e-9 * norm(&p.f), "{}: {:e}", scene.name, norm(&impulse));
         // The upward impulse of the ground is the weight during the step.
         let up: f64 = scene
             .contacts
@@ -324,11 +196,7 @@ fn the_ground_can_carry_every_scene() {
             })
             .sum();
         let weight = scene.h * 9.81 * scene.mass();
-        assert!(
-            (up - weight).abs() < 1e-8 * weight,
-            "{}: {up} {weight}",
-            scene.name
-        );
+        assert!((up - weight).abs() < 1e-8 * weight, "{}: {up} {weight}", scene.name);
     }
 }
 
@@ -352,25 +220,14 @@ fn disturbances_repeat_with_their_seed() {
 #[test]
 fn bricks_fill_the_wall_and_bear_on_each_other() {
     for (rows, columns) in [(1, 1), (2, 1), (4, 3)] {
-        let wall = Wall {
-            rows,
-            columns,
-            ..Wall::default()
-        };
+        let wall = Wall { rows, columns, ..Wall::default() };
         let scene = wall.build().unwrap();
         let volume = rows as f64 * columns as f64 * wall.length * wall.depth * wall.height;
         assert!((scene.mass() - wall.density * volume).abs() < 1e-9 * scene.mass());
         // Below each row but the first: two overlaps for each full brick, one for each half.
         let pairs = columns + (rows - 1) * 2 * columns;
         assert_eq!(scene.contacts.len(), 4 * pairs);
-        let joints = Wall {
-            head_joints: true,
-            ..wall
-        }
-        .build()
-        .unwrap()
-        .contacts
-        .len();
+        let joints = Wall { head_joints: true, ..wall }.build().unwrap().contacts.len();
         let in_rows: usize = (0..rows).map(|row| columns + row % 2 - 1).sum();
         assert_eq!(joints, 4 * (pairs + in_rows));
     }
@@ -384,23 +241,12 @@ fn voussoirs_make_up_the_ring() {
     let outer = arch.radius + arch.thickness;
     let area = 0.5 * angle.sin() * (outer * outer - arch.radius * arch.radius);
     let mass = arch.density * area * arch.depth;
-    assert!(
-        scene
-            .bodies
-            .iter()
-            .all(|b| (b.mass - mass).abs() < 1e-10 * mass)
-    );
+    assert!(scene.bodies.iter().all(|b| (b.mass - mass).abs() < 1e-10 * mass));
     assert_eq!(scene.contacts.len(), 4 * (arch.blocks + 1));
     // Each contact is a corner of both its bodies.
     for contact in &scene.contacts {
-        for body in [contact.a, Some(contact.b)]
-            .into_iter()
-            .flatten()
-            .map(|k| &scene.bodies[k])
-        {
-            let Shape::Polyhedron(p) = &body.shape else {
-                panic!("a voussoir")
-            };
+        for body in [contact.a, Some(contact.b)].into_iter().flatten().map(|k| &scene.bodies[k]) {
+            let Shape::Polyhedron(p) = &body.shape else { panic!("a voussoir") };
             let distance = |&v| {
                 let w = body.to_world(v);
                 norm(&[0, 1, 2].map(|k| w[k] - contact.point[k]))
@@ -413,12 +259,7 @@ fn voussoirs_make_up_the_ring() {
 #[test]
 fn spheres_touch_exactly_where_there_are_contacts() {
     for layout in [Layout::Square, Layout::Triangular] {
-        let pile = Spheres {
-            base: 5,
-            layout,
-            radius: 0.3,
-            ..Spheres::default()
-        };
+        let pile = Spheres { base: 5, layout, radius: 0.3, ..Spheres::default() };
         let scene = pile.build().unwrap();
         let distance = |a: usize, b: usize| {
             let (x, y) = (scene.bodies[a].position, scene.bodies[b].position);
@@ -434,11 +275,7 @@ fn spheres_touch_exactly_where_there_are_contacts() {
                 }
             }
         }
-        let mut given: Vec<_> = scene
-            .contacts
-            .iter()
-            .filter_map(|c| Some((c.a?, c.b)))
-            .collect();
+        let mut given: Vec<_> = scene.contacts.iter().filter_map(|c| Some((c.a?, c.b))).collect();
         given.sort_unstable_by_key(|&(a, b)| (b, a));
         assert_eq!(given, touching);
         let grounded = scene.contacts.iter().filter(|c| c.a.is_none()).count();

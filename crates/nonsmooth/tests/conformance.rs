@@ -18,7 +18,13 @@ fn cases() -> Vec<Planted> {
         Planted { contacts: 20, dofs: 120, seed: 4, mu: (0.0, 0.0), ..base.clone() },
         Planted { contacts: 20, dofs: 120, seed: 5, skew: 0.02, ..base.clone() },
         Planted { contacts: 10, dofs: 90, bilateral: 4, seed: 6, ..base.clone() },
-        Planted { contacts: 12, dofs: 90, mix: PlantedMix { degenerate: 0.5, ..mixed }, seed: 7, ..base },
+        Planted {
+            contacts: 12,
+            dofs: 90,
+            mix: PlantedMix { degenerate: 0.5, ..mixed },
+            seed: 7,
+            ..base
+        },
     ]
 }
 
@@ -29,7 +35,10 @@ fn runs<P: Registered>() -> Vec<(String, Vec<&'static str>)> {
         .flat_map(|name| {
             let about = registry::about::<P>(&name).expect("a listed solver is described");
             let variants = about.variants.iter().map(|v| vec![*v]);
-            std::iter::once(vec![]).chain(variants).map(move |v| (name.clone(), v)).collect::<Vec<_>>()
+            std::iter::once(vec![])
+                .chain(variants)
+                .map(move |v| (name.clone(), v))
+                .collect::<Vec<_>>()
         })
         .collect()
 }
@@ -61,7 +70,6 @@ where
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
-
 
 #[test]
 fn local_problems_in_space() {

@@ -45,11 +45,7 @@ impl ProblemError {
         expected: impl Into<String>,
         found: impl Into<String>,
     ) -> Self {
-        Self::Shape {
-            place: place.into(),
-            expected: expected.into(),
-            found: found.into(),
-        }
+        Self::Shape { place: place.into(), expected: expected.into(), found: found.into() }
     }
 
     pub(crate) fn value(
@@ -57,22 +53,14 @@ impl ProblemError {
         expected: impl Into<String>,
         found: impl ToString,
     ) -> Self {
-        Self::Value {
-            place: place.into(),
-            expected: expected.into(),
-            found: found.to_string(),
-        }
+        Self::Value { place: place.into(), expected: expected.into(), found: found.to_string() }
     }
 }
 
 /// The first entry of `x` that is not finite, as an error that names it.
 pub(crate) fn all_finite(name: &str, x: &[f64]) -> Result<(), ProblemError> {
     match x.iter().position(|v| !v.is_finite()) {
-        Some(k) => Err(ProblemError::value(
-            format!("{name}[{k}]"),
-            "a finite number",
-            x[k],
-        )),
+        Some(k) => Err(ProblemError::value(format!("{name}[{k}]"), "a finite number", x[k])),
         None => Ok(()),
     }
 }

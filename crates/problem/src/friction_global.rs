@@ -73,14 +73,7 @@ impl<const D: usize> FrictionGlobal<D> {
         w: Vec<f64>,
         mu: Vec<f64>,
     ) -> Result<Self, ProblemError> {
-        let problem = Self {
-            M,
-            H,
-            f,
-            w,
-            mu,
-            bilateral: None,
-        };
+        let problem = Self { M, H, f, w, mu, bilateral: None };
         problem.validate()?;
         Ok(problem)
     }
@@ -108,15 +101,10 @@ impl<const D: usize> FrictionGlobal<D> {
             return Err(ProblemError::Empty { place: "mu".into() });
         }
         if n == 0 {
-            return Err(ProblemError::shape(
-                "f",
-                "at least one degree of freedom",
-                "0 entries",
-            ));
+            return Err(ProblemError::shape("f", "at least one degree of freedom", "0 entries"));
         }
         self.M.check_shape("M", n, n, "entries of f")?;
-        self.H
-            .check_shape("H", n, D * nc, "entries of f × contact components of mu")?;
+        self.H.check_shape("H", n, D * nc, "entries of f × contact components of mu")?;
         self.M.check_finite("M")?;
         self.H.check_finite("H")?;
         all_finite("f", &self.f)?;
@@ -163,11 +151,7 @@ impl<const D: usize> Problem for FrictionGlobal<D> {
     type Gauge = check::GlobalGauge;
 
     fn kind(&self) -> Kind {
-        if D == 2 {
-            Kind::FrictionGlobal2d
-        } else {
-            Kind::FrictionGlobal3d
-        }
+        if D == 2 { Kind::FrictionGlobal2d } else { Kind::FrictionGlobal3d }
     }
 
     fn unknowns(&self) -> usize {
@@ -184,18 +168,8 @@ impl<const D: usize> Problem for FrictionGlobal<D> {
 
     fn validate_point(&self, point: &GlobalPoint) -> Result<(), ProblemError> {
         vector("v", &point.v, self.dofs(), "degrees of freedom")?;
-        vector(
-            "r",
-            &point.r,
-            D * self.contacts(),
-            "components of the contacts",
-        )?;
-        vector(
-            "lambda",
-            &point.lambda,
-            self.multipliers(),
-            "bilateral constraints",
-        )
+        vector("r", &point.r, D * self.contacts(), "components of the contacts")?;
+        vector("lambda", &point.lambda, self.multipliers(), "bilateral constraints")
     }
 
     fn copy_point(from: &GlobalPoint, to: &mut GlobalPoint) {

@@ -61,12 +61,7 @@ impl<const D: usize> FrictionLocal<D> {
     ///
     /// Errors: no contacts, a wrong shape, a value that is not finite, a negative `mu`; each names its entry.
     pub fn new(W: Bsr<D>, q: Vec<f64>, mu: Vec<f64>) -> Result<Self, ProblemError> {
-        let problem = Self {
-            W,
-            q,
-            mu,
-            bilateral: None,
-        };
+        let problem = Self { W, q, mu, bilateral: None };
         problem.validate()?;
         Ok(problem)
     }
@@ -78,12 +73,7 @@ impl<const D: usize> FrictionLocal<D> {
         mu: Vec<f64>,
         bilateral: BilateralLocal,
     ) -> Result<Self, ProblemError> {
-        let problem = Self {
-            W,
-            q,
-            mu,
-            bilateral: Some(bilateral),
-        };
+        let problem = Self { W, q, mu, bilateral: Some(bilateral) };
         problem.validate()?;
         Ok(problem)
     }
@@ -158,11 +148,7 @@ impl<const D: usize> Problem for FrictionLocal<D> {
     type Gauge = check::LocalGauge;
 
     fn kind(&self) -> Kind {
-        if D == 2 {
-            Kind::FrictionLocal2d
-        } else {
-            Kind::FrictionLocal3d
-        }
+        if D == 2 { Kind::FrictionLocal2d } else { Kind::FrictionLocal3d }
     }
 
     fn unknowns(&self) -> usize {
@@ -170,25 +156,12 @@ impl<const D: usize> Problem for FrictionLocal<D> {
     }
 
     fn origin(&self) -> LocalPoint {
-        LocalPoint {
-            r: vec![0.0; D * self.contacts()],
-            lambda: vec![0.0; self.multipliers()],
-        }
+        LocalPoint { r: vec![0.0; D * self.contacts()], lambda: vec![0.0; self.multipliers()] }
     }
 
     fn validate_point(&self, point: &LocalPoint) -> Result<(), ProblemError> {
-        vector(
-            "r",
-            &point.r,
-            D * self.contacts(),
-            "components of the contacts",
-        )?;
-        vector(
-            "lambda",
-            &point.lambda,
-            self.multipliers(),
-            "bilateral constraints",
-        )
+        vector("r", &point.r, D * self.contacts(), "components of the contacts")?;
+        vector("lambda", &point.lambda, self.multipliers(), "bilateral constraints")
     }
 
     fn copy_point(from: &LocalPoint, to: &mut LocalPoint) {

@@ -26,12 +26,7 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Self {
-            tolerance: 1e-8,
-            max_iterations: 100_000,
-            time_limit: None,
-            cancel: None,
-        }
+        Self { tolerance: 1e-8, max_iterations: 100_000, time_limit: None, cancel: None }
     }
 }
 
@@ -187,11 +182,7 @@ struct Kept<P: Problem, S: Solver<P>> {
 impl<P: Problem, S: Solver<P>> Driver<P, S> {
     /// A driver for `solver`, without a workspace yet.
     pub fn new(solver: S) -> Self {
-        Self {
-            solver,
-            kept: None,
-            history: Vec::with_capacity(HISTORY),
-        }
+        Self { solver, kept: None, history: Vec::with_capacity(HISTORY) }
     }
 
     /// The solver.
@@ -210,11 +201,7 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
     ) -> Result<Outcome, SolveError> {
         limits.validate()?;
         problem.validate_point(point)?;
-        let Self {
-            solver,
-            kept,
-            history,
-        } = self;
+        let Self { solver, kept, history } = self;
         // The judge's own preparation is not part of the solve's time.
         let mut kept_now = match kept.take() {
             Some(mut k) => {
@@ -227,14 +214,7 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
                 let gauge = problem.gauge()?;
                 let start = Instant::now();
                 let work = solver.work(problem)?;
-                (
-                    Kept {
-                        work,
-                        gauge,
-                        best: point.clone(),
-                    },
-                    start,
-                )
+                (Kept { work, gauge, best: point.clone() }, start)
             }
         };
         let outcome = {
@@ -312,12 +292,7 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         };
         let measure = self.judge.best_measure;
         P::copy_point(self.judge.best, point);
-        Outcome {
-            status,
-            measure,
-            iterations,
-            seconds: self.judge.start.elapsed().as_secs_f64(),
-        }
+        Outcome { status, measure, iterations, seconds: self.judge.start.elapsed().as_secs_f64() }
     }
 
     fn judge(&mut self, point: &mut P::Point, iteration: usize) {
@@ -326,12 +301,8 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
     }
 
     fn limit(&self, iterations: usize) -> Option<Limit> {
-        let cancelled = || {
-            self.limits
-                .cancel
-                .as_ref()
-                .is_some_and(|flag| flag.load(Ordering::Relaxed))
-        };
+        let cancelled =
+            || self.limits.cancel.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed));
         let late = |t: f64| self.judge.start.elapsed().as_secs_f64() >= t;
         if iterations >= self.limits.max_iterations {
             Some(Limit::Iterations)
@@ -425,11 +396,7 @@ impl<'a, P: Problem> Judge<'a, P> {
     /// The solver's estimate is proportional to the residual, near enough: learn the factor.
     fn calibrate(&mut self, estimate: f64) {
         let ratio = self.last.relative / estimate;
-        self.ratio = if ratio.is_finite() && ratio > 0.0 {
-            ratio
-        } else {
-            1.0
-        };
+        self.ratio = if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 };
     }
 
     fn progress(&self, iteration: usize) -> Progress {
@@ -439,11 +406,6 @@ impl<'a, P: Problem> Judge<'a, P> {
             seconds,
             relative: f64::NAN,
         });
-        Progress {
-            judged,
-            best: self.best_measure.relative,
-            iteration,
-            seconds,
-        }
+        Progress { judged, best: self.best_measure.relative, iteration, seconds }
     }
 }

@@ -60,10 +60,7 @@ impl<P: Problem + 'static, R: Reformulation<P> + 'static> Visitor for Through<P,
     type Problem = R::To;
     type Output = Box<dyn Session<P>>;
     fn visit<S: Solver<R::To> + 'static>(self, solver: S) -> Self::Output {
-        Box::new(Driver::new(Via {
-            reformulation: self.0,
-            solver,
-        }))
+        Box::new(Driver::new(Via { reformulation: self.0, solver }))
     }
 }
 
@@ -156,12 +153,7 @@ pub const NSGS: About = About {
     family: "splitting",
     summary: "nonsmooth block Gauss-Seidel over contacts, with a choice of local solvers",
     needs: &[],
-    cites: &[
-        "JourdanAlartJean1998",
-        "Jean1999",
-        "AcaryBremondHuber2018",
-        "DBB11",
-    ],
+    cites: &["JourdanAlartJean1998", "Jean1999", "AcaryBremondHuber2018", "DBB11"],
     variants: &[
         "local=quartic",
         "local=newton_ac",
@@ -227,22 +219,10 @@ where
         Ok(visitor.visit(Projected::<M, D>(parse(settings)?)))
     }
     vec![
-        Entry {
-            about: &NSGS,
-            build: |s, v| Ok(parse::<Nsgs>(s)?.visit::<D, V>(v)),
-        },
-        Entry {
-            about: &DE_SAXCE,
-            build: projected::<D, V, DeSaxce>,
-        },
-        Entry {
-            about: &FIXED_POINT,
-            build: projected::<D, V, FixedPoint>,
-        },
-        Entry {
-            about: &EXTRAGRADIENT,
-            build: projected::<D, V, Extragradient>,
-        },
+        Entry { about: &NSGS, build: |s, v| Ok(parse::<Nsgs>(s)?.visit::<D, V>(v)) },
+        Entry { about: &DE_SAXCE, build: projected::<D, V, DeSaxce> },
+        Entry { about: &FIXED_POINT, build: projected::<D, V, FixedPoint> },
+        Entry { about: &EXTRAGRADIENT, build: projected::<D, V, Extragradient> },
     ]
 }
 
@@ -275,10 +255,7 @@ fn find<V: Visitor>(entries: Vec<Entry<V>>, name: &str) -> Option<Entry<V>> {
 }
 
 fn names<V: Visitor>(entries: &[Entry<V>], prefix: &str) -> Vec<String> {
-    entries
-        .iter()
-        .map(|e| format!("{prefix}{}", e.about.name))
-        .collect()
+    entries.iter().map(|e| format!("{prefix}{}", e.about.name)).collect()
 }
 
 /// The descriptions of the solvers that work on problems of type `P` directly.
@@ -316,10 +293,7 @@ pub fn session<P: Registered>(
             name: name.into(),
             known: solver_names::<P>().join(", "),
         })?
-        .map_err(|problem| SolveError::Settings {
-            solver: name.into(),
-            problem,
-        })
+        .map_err(|problem| SolveError::Settings { solver: name.into(), problem })
 }
 
 /// Reads `key=value` texts: the value as JSON where it is (numbers, true), as a plain string elsewhere.
@@ -347,17 +321,11 @@ fn parse<S: Settings>(map: &SettingsMap) -> Result<S, String> {
     for (key, value) in map {
         let Some(setting) = known.iter().find(|s| s.key == *key) else {
             let keys: Vec<_> = known.iter().map(|s| s.key.as_str()).collect();
-            return Err(format!(
-                "unknown key `{key}`; there are: {}",
-                keys.join(", ")
-            ));
+            return Err(format!("unknown key `{key}`; there are: {}", keys.join(", ")));
         };
         let alone = SettingsMap::from_iter([(key.clone(), value.clone())]);
         if serde_json::from_value::<S>(Value::Object(alone)).is_err() {
-            return Err(format!(
-                "{key}: expected {}, found {value}",
-                setting.expected()
-            ));
+            return Err(format!("{key}: expected {}, found {value}", setting.expected()));
         }
     }
     let settings: S =
@@ -386,11 +354,7 @@ fn described<S: Settings>() -> Vec<Setting> {
     let Some(properties) = schema.get("properties").and_then(Value::as_object) else {
         return vec![];
     };
-    let text = |v: Option<&Value>| {
-        v.and_then(Value::as_str)
-            .unwrap_or_default()
-            .replace('\n', " ")
-    };
+    let text = |v: Option<&Value>| v.and_then(Value::as_str).unwrap_or_default().replace('\n', " ");
     properties
         .iter()
         .map(|(key, property)| Setting {
@@ -404,29 +368,15 @@ fn described<S: Settings>() -> Vec<Setting> {
 
 /// The names of an enumeration, which a schema states as a reference to a `oneOf` of constants.
 fn choices(schema: &schemars::Schema, property: &Value) -> Vec<String> {
-    let reference = property
-        .get("$ref")
-        .and_then(Value::as_str)
-        .unwrap_or_default();
+    let reference = property.get("$ref").and_then(Value::as_str).unwrap_or_default();
     let Some(name) = reference.rsplit('/').next().filter(|n| !n.is_empty()) else {
         return vec![];
     };
     let definition = schema.get("$defs").and_then(|d| d.get(name));
-    let list = |key: &str| {
-        definition
-            .and_then(|d| d.get(key))
-            .and_then(Value::as_array)
-    };
-    let constants = list("oneOf")
-        .into_iter()
-        .flatten()
-        .filter_map(|one| one.get("const"));
+    let list = |key: &str| definition.and_then(|d| d.get(key)).and_then(Value::as_array);
+    let constants = list("oneOf").into_iter().flatten().filter_map(|one| one.get("const"));
     let plain = list("enum").into_iter().flatten();
-    constants
-        .chain(plain)
-        .filter_map(Value::as_str)
-        .map(str::to_owned)
-        .collect()
+    constants.chain(plain).filter_map(Value::as_str).map(str::to_owned).collect()
 }
 
 #[cfg(test)]
@@ -435,10 +385,7 @@ mod tests {
 
     fn refusal(texts: &[&str]) -> String {
         let map = parse_settings(texts).unwrap();
-        session::<FrictionLocal<3>>("nsgs", &map)
-            .err()
-            .expect("refused")
-            .to_string()
+        session::<FrictionLocal<3>>("nsgs", &map).err().expect("refused").to_string()
     }
 
     #[test]
@@ -463,15 +410,10 @@ mod tests {
 
     #[test]
     fn unknown_solvers_are_refused_with_those_that_exist() {
-        let e = session::<FrictionLocal<3>>("lemke", &SettingsMap::new())
-            .err()
-            .expect("refused");
+        let e = session::<FrictionLocal<3>>("lemke", &SettingsMap::new()).err().expect("refused");
         assert!(e.to_string().contains("unknown solver `lemke`") && e.to_string().contains("nsgs"));
         for name in ["condense/nsgs", "facet/nsgs", "nsgs/condense"] {
-            assert!(
-                session::<FrictionLocal<3>>(name, &SettingsMap::new()).is_err(),
-                "{name}"
-            );
+            assert!(session::<FrictionLocal<3>>(name, &SettingsMap::new()).is_err(), "{name}");
         }
         assert!(session::<FrictionGlobal<3>>("condense/nsgs", &SettingsMap::new()).is_ok());
     }
@@ -479,17 +421,10 @@ mod tests {
     #[test]
     fn settings_texts() {
         assert!(parse_settings(&["omega"]).is_err() && parse_settings(&["=1"]).is_err());
-        assert!(
-            parse_settings(&["a=1", "a=2"])
-                .unwrap_err()
-                .contains("twice")
-        );
+        assert!(parse_settings(&["a=1", "a=2"]).unwrap_err().contains("twice"));
         let map = parse_settings(&["a=1.5", "b=word", "c=true"]).unwrap();
         assert_eq!(map["a"], Value::from(1.5));
-        assert_eq!(
-            (&map["b"], &map["c"]),
-            (&Value::from("word"), &Value::from(true))
-        );
+        assert_eq!((&map["b"], &map["c"]), (&Value::from("word"), &Value::from(true)));
     }
 
     #[test]
@@ -497,11 +432,7 @@ mod tests {
         for about in abouts::<FrictionLocal<3>>() {
             let settings = (about.settings)();
             assert!(!settings.is_empty(), "{}", about.name);
-            assert!(
-                settings.iter().all(|s| !s.help.is_empty()),
-                "{}: {settings:?}",
-                about.name
-            );
+            assert!(settings.iter().all(|s| !s.help.is_empty()), "{}: {settings:?}", about.name);
         }
     }
 }

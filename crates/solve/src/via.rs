@@ -39,12 +39,7 @@ where
         let (reduced, memo) = self.reformulation.reduce(problem)?;
         let work = self.solver.work(&reduced)?;
         let point = reduced.origin();
-        Ok(ViaWork {
-            reduced,
-            memo,
-            point,
-            work,
-        })
+        Ok(ViaWork { reduced, memo, point, work })
     }
 
     fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
@@ -54,20 +49,16 @@ where
 
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
         work.point = self.reformulation.lower(problem, point, &work.memo);
-        self.solver
-            .start(&work.reduced, &mut work.point, &mut work.work);
+        self.solver.start(&work.reduced, &mut work.point, &mut work.work);
     }
 
     fn step(&self, _problem: &P, _point: &mut P::Point, work: &mut Self::Work) -> Step {
-        self.solver
-            .step(&work.reduced, &mut work.point, &mut work.work)
+        self.solver.step(&work.reduced, &mut work.point, &mut work.work)
     }
 
     fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
-        self.solver
-            .publish(&work.reduced, &mut work.point, &mut work.work);
-        self.reformulation
-            .lift(problem, &work.point, &work.memo, point);
+        self.solver.publish(&work.reduced, &mut work.point, &mut work.work);
+        self.reformulation.lift(problem, &work.point, &work.memo, point);
     }
 
     fn check_every(&self) -> usize {

@@ -17,11 +17,7 @@ pub struct View {
 
 impl Default for View {
     fn default() -> Self {
-        Self {
-            azimuth: -60.0,
-            elevation: 20.0,
-            distance: 5.0,
-        }
+        Self { azimuth: -60.0, elevation: 20.0, distance: 5.0 }
     }
 }
 
@@ -29,19 +25,9 @@ impl View {
     pub(super) fn validate(&self) -> Result<(), SceneError> {
         require("azimuth", self.azimuth, true, "an angle in degrees")?;
         let e = self.elevation;
-        require(
-            "elevation",
-            e,
-            e.abs() <= 89.0,
-            "an angle from -89 to 89 degrees",
-        )?;
+        require("elevation", e, e.abs() <= 89.0, "an angle from -89 to 89 degrees")?;
         let d = self.distance;
-        require(
-            "distance",
-            d,
-            (1.5..=1e4).contains(&d),
-            "a number from 1.5 to 10000",
-        )
+        require("distance", d, (1.5..=1e4).contains(&d), "a number from 1.5 to 10000")
     }
 }
 
@@ -68,15 +54,7 @@ impl Camera {
         let right = normalise(cross(forward, Z));
         let eye = add(centre, scale(distance, out));
         let up = cross(right, forward);
-        Self {
-            eye,
-            right,
-            up,
-            forward,
-            distance,
-            scale: 1.0,
-            origin: [0.0; 2],
-        }
+        Self { eye, right, up, forward, distance, scale: 1.0, origin: [0.0; 2] }
     }
 
     /// The direction to the light: from above, over the left shoulder.
@@ -88,10 +66,7 @@ impl Camera {
     /// The place in the picture, px.
     pub fn project(&self, p: Vec3) -> [f64; 2] {
         let (d, k) = (sub(p, self.eye), self.magnification(p));
-        [
-            self.origin[0] + k * dot(d, self.right),
-            self.origin[1] - k * dot(d, self.up),
-        ]
+        [self.origin[0] + k * dot(d, self.right), self.origin[1] - k * dot(d, self.up)]
     }
 
     /// Pixels for a metre across the line of sight at `p`.

@@ -22,19 +22,10 @@ impl Floor {
         let along = sub(ground.along, scale(dot(ground.along, normal), normal));
         let along = normalise(along);
         let axes = [along, cross(normal, along)];
-        let mut floor = Self {
-            origin: ground.point,
-            normal,
-            axes,
-            lines: [[0; 2]; 2],
-            step: 1.0,
-        };
+        let mut floor = Self { origin: ground.point, normal, axes, lines: [[0; 2]; 2], step: 1.0 };
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for p in solids.iter().flat_map(|s| s.hull()) {
-            for at in [
-                floor.coordinates(p),
-                floor.coordinates(floor.shadow(p, light)),
-            ] {
+            for at in [floor.coordinates(p), floor.coordinates(floor.shadow(p, light))] {
                 for k in 0..2 {
                     low[k] = low[k].min(at[k]);
                     high[k] = high[k].max(at[k]);
@@ -66,26 +57,18 @@ impl Floor {
         let [u, v] = self.lines.map(|l| l.map(|k| k as f64 * self.step));
         for k in self.lines[0][0]..=self.lines[0][1] {
             let x = k as f64 * self.step;
-            paper.line(
-                camera.project(self.at(x, v[0])),
-                camera.project(self.at(x, v[1])),
-            );
+            paper.line(camera.project(self.at(x, v[0])), camera.project(self.at(x, v[1])));
         }
         for k in self.lines[1][0]..=self.lines[1][1] {
             let y = k as f64 * self.step;
-            paper.line(
-                camera.project(self.at(u[0], y)),
-                camera.project(self.at(u[1], y)),
-            );
+            paper.line(camera.project(self.at(u[0], y)), camera.project(self.at(u[1], y)));
         }
         paper.close();
         // The opacity is that of the group, so that shadows do not add up where they overlap.
         paper.open(r##"fill="#20262d" stroke="none" opacity="0.22""##);
         for solid in solids {
             let outline = solid.silhouette(light).into_iter();
-            let shadow = outline
-                .map(|p| self.coordinates(self.shadow(p, light)))
-                .collect();
+            let shadow = outline.map(|p| self.coordinates(self.shadow(p, light))).collect();
             let hull = convex_hull(shadow).into_iter();
             paper.polygon(hull.map(|[x, y]| camera.project(self.at(x, y))));
         }
@@ -93,10 +76,7 @@ impl Floor {
     }
 
     fn at(&self, x: f64, y: f64) -> Vec3 {
-        add(
-            self.origin,
-            add(scale(x, self.axes[0]), scale(y, self.axes[1])),
-        )
+        add(self.origin, add(scale(x, self.axes[0]), scale(y, self.axes[1])))
     }
 
     fn coordinates(&self, p: Vec3) -> [f64; 2] {
@@ -118,11 +98,7 @@ impl Floor {
 /// The largest of 1, 2, 5 × 10ᵏ up to `x`.
 fn round_step(x: f64) -> f64 {
     let decade = 10.0_f64.powf(x.log10().floor());
-    [5.0, 2.0]
-        .into_iter()
-        .find(|s| s * decade <= x)
-        .unwrap_or(1.0)
-        * decade
+    [5.0, 2.0].into_iter().find(|s| s * decade <= x).unwrap_or(1.0) * decade
 }
 
 /// The convex hull of points of the plane, counter-clockwise (monotone chain).
@@ -153,30 +129,14 @@ mod tests {
 
     #[test]
     fn steps_of_the_grid_are_round() {
-        for (x, step) in [
-            (1.0, 1.0),
-            (0.34, 0.2),
-            (7.0, 5.0),
-            (0.0019, 0.001),
-            (23.0, 20.0),
-        ] {
+        for (x, step) in [(1.0, 1.0), (0.34, 0.2), (7.0, 5.0), (0.0019, 0.001), (23.0, 20.0)] {
             assert!((round_step(x) - step).abs() < 1e-12 * step, "{x}");
         }
     }
 
     #[test]
     fn the_hull_drops_inner_points() {
-        let points = vec![
-            [0.0, 0.0],
-            [2.0, 0.0],
-            [1.0, 0.5],
-            [2.0, 2.0],
-            [0.0, 2.0],
-            [1.0, 0.0],
-        ];
-        assert_eq!(
-            convex_hull(points),
-            [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]
-        );
+        let points = vec![[0.0, 0.0], [2.0, 0.0], [1.0, 0.5], [2.0, 2.0], [0.0, 2.0], [1.0, 0.0]];
+        assert_eq!(convex_hull(points), [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]);
     }
 }

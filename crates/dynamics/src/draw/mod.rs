@@ -102,12 +102,7 @@ pub fn svg(scene: &Scene, drawing: &Drawing) -> Result<String, SceneError> {
     for arrow in &arrows {
         let hidden = solids.iter().any(|s| s.hides(arrow.to, camera.eye));
         let opacity = if hidden { 0.35 } else { 1.0 };
-        paper.arrow(
-            camera.project(arrow.from),
-            camera.project(arrow.to),
-            arrow.colour,
-            opacity,
-        );
+        paper.arrow(camera.project(arrow.from), camera.project(arrow.to), arrow.colour, opacity);
     }
     if let Some(text) = drawing.caption {
         paper.caption(text);
@@ -150,39 +145,24 @@ fn solids(scene: &Scene) -> Vec<Solid> {
                 placed(&Polyhedron::cuboid(*half).expect("a validated body has a volume"))
             }
             Shape::Polyhedron(p) => placed(p),
-            Shape::Sphere { radius } => Solid::Ball {
-                centre: body.position,
-                radius: *radius,
-                colour,
-            },
+            Shape::Sphere { radius } => {
+                Solid::Ball { centre: body.position, radius: *radius, colour }
+            }
         }
     });
-    bodies
-        .chain(
-            scene
-                .obstacles
-                .iter()
-                .map(|p| Solid::convex(p.clone(), OBSTACLE)),
-        )
-        .collect()
+    bodies.chain(scene.obstacles.iter().map(|p| Solid::convex(p.clone(), OBSTACLE))).collect()
 }
 
 /// The centre of the bounding box and half its diagonal.
 fn bounds(solids: &[Solid]) -> (Vec3, f64) {
     let axis = |k: usize| {
         let n = std::array::from_fn(|i| f64::from(u8::from(i == k)));
-        solids
-            .iter()
-            .map(|s| s.extent(n))
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |all, one| {
-                (all.0.min(one.0), all.1.max(one.1))
-            })
+        solids.iter().map(|s| s.extent(n)).fold((f64::INFINITY, f64::NEG_INFINITY), |all, one| {
+            (all.0.min(one.0), all.1.max(one.1))
+        })
     };
     let box3: [(f64, f64); 3] = std::array::from_fn(axis);
-    (
-        box3.map(|(a, b)| 0.5 * (a + b)),
-        0.5 * norm(box3.map(|(a, b)| b - a)),
-    )
+    (box3.map(|(a, b)| 0.5 * (a + b)), 0.5 * norm(box3.map(|(a, b)| b - a)))
 }
 
 struct Arrow {
@@ -200,11 +180,7 @@ fn arrows(scene: &Scene, drawing: &Drawing) -> Vec<Arrow> {
         let longest = all.iter().map(|a| norm(a.1)).fold(0.0, f64::max);
         // An arrow shorter than a twentieth of the longest is only a blot.
         out.extend(all.into_iter().filter(|a| norm(a.1) > 0.05 * longest).map(
-            |(from, d, colour)| Arrow {
-                from,
-                to: add(from, scale(length / longest, d)),
-                colour,
-            },
+            |(from, d, colour)| Arrow { from, to: add(from, scale(length / longest, d)), colour },
         ));
     };
     if let Some(r) = drawing.impulses {
@@ -216,20 +192,10 @@ fn arrows(scene: &Scene, drawing: &Drawing) -> Vec<Arrow> {
                 .fold([0.0; 3], |s, (&axis, &x)| add(s, scale(x, axis)));
             (contact.point, d, contact_colour(drawing, c))
         };
-        push(
-            1.3 * size,
-            scene.contacts.iter().enumerate().map(impulse).collect(),
-        );
+        push(1.3 * size, scene.contacts.iter().enumerate().map(impulse).collect());
     }
     if drawing.velocities {
-        push(
-            1.5 * size,
-            scene
-                .bodies
-                .iter()
-                .map(|b| (b.position, b.velocity, VELOCITY))
-                .collect(),
-        );
+        push(1.5 * size, scene.bodies.iter().map(|b| (b.position, b.velocity, VELOCITY)).collect());
     }
     out
 }
@@ -240,27 +206,17 @@ fn contact_colour(drawing: &Drawing, c: usize) -> &'static str {
 
 fn draw_solid(solid: &Solid, camera: &Camera, light: Vec3, paper: &mut Paper) {
     match solid {
-        Solid::Convex {
-            polyhedron,
-            planes,
-            colour,
-        } => {
+        Solid::Convex { polyhedron, planes, colour } => {
             for (face, (normal, offset)) in polyhedron.faces().iter().zip(planes) {
                 if dot(*normal, camera.eye) > *offset {
                     // Half lit from everywhere, so that faces in the shade keep their colour.
                     let shade = 0.74 + 0.3 * dot(*normal, light);
-                    let points = face
-                        .iter()
-                        .map(|&v| camera.project(polyhedron.vertices()[v]));
+                    let points = face.iter().map(|&v| camera.project(polyhedron.vertices()[v]));
                     paper.face(points, paper::shaded(*colour, shade));
                 }
             }
         }
-        Solid::Ball {
-            centre,
-            radius,
-            colour,
-        } => {
+        Solid::Ball { centre, radius, colour } => {
             let r = radius * camera.magnification(*centre);
             paper.ball(camera.project(*centre), r, *colour);
         }
@@ -274,10 +230,7 @@ fn draw_contacts(
     camera: &Camera,
     paper: &mut Paper,
 ) {
-    let sizes = scene
-        .bodies
-        .iter()
-        .map(|b| b.shape.radius() * camera.magnification(b.position));
+    let sizes = scene.bodies.iter().map(|b| b.shape.radius() * camera.magnification(b.position));
     let size = sizes.sum::<f64>() / scene.bodies.len().max(1) as f64;
     let radius = (0.05 * size).clamp(1.2, 4.0);
     for (c, contact) in scene.contacts.iter().enumerate() {

@@ -11,29 +11,15 @@ use crate::vec3::{Vec3, add, cross, dot, mean, norm, normalise, scale, sub};
 /// A convex solid in the world frame.
 pub(super) enum Solid {
     /// A polyhedron with the planes of its faces.
-    Convex {
-        polyhedron: Polyhedron,
-        planes: Vec<(Vec3, f64)>,
-        colour: Colour,
-    },
+    Convex { polyhedron: Polyhedron, planes: Vec<(Vec3, f64)>, colour: Colour },
     /// A ball.
-    Ball {
-        centre: Vec3,
-        radius: f64,
-        colour: Colour,
-    },
+    Ball { centre: Vec3, radius: f64, colour: Colour },
 }
 
 impl Solid {
     pub fn convex(polyhedron: Polyhedron, colour: Colour) -> Self {
-        let planes = (0..polyhedron.faces().len())
-            .map(|k| polyhedron.plane(k))
-            .collect();
-        Self::Convex {
-            polyhedron,
-            planes,
-            colour,
-        }
+        let planes = (0..polyhedron.faces().len()).map(|k| polyhedron.plane(k)).collect();
+        Self::Convex { polyhedron, planes, colour }
     }
 
     pub fn centre(&self) -> Vec3 {
@@ -50,9 +36,7 @@ impl Solid {
                 .vertices()
                 .iter()
                 .map(|&v| dot(n, v))
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
-                    (a.min(x), b.max(x))
-                }),
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x))),
             Solid::Ball { centre, radius, .. } => {
                 let (x, r) = (dot(n, *centre), radius * norm(n));
                 (x - r, x + r)
@@ -77,11 +61,7 @@ impl Solid {
             Solid::Convex { polyhedron, .. } => polyhedron.vertices().to_vec(),
             Solid::Ball { centre, radius, .. } => {
                 // The circle across the light.
-                let axis = if light[0].abs() < 0.9 {
-                    [1.0, 0.0, 0.0]
-                } else {
-                    [0.0, 1.0, 0.0]
-                };
+                let axis = if light[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
                 let a = normalise(cross(light, axis));
                 let b = cross(light, a);
                 (0..32)
@@ -125,10 +105,7 @@ pub(super) fn paint_order(solids: &[Solid], camera: &Camera) -> Vec<usize> {
     let mut waits = vec![0usize; n];
     for (k, &i) in by_left.iter().enumerate() {
         let (low, high) = frames[i];
-        for &j in by_left[k + 1..]
-            .iter()
-            .take_while(|&&j| frames[j].0[0] <= high[0])
-        {
+        for &j in by_left[k + 1..].iter().take_while(|&&j| frames[j].0[0] <= high[0]) {
             if frames[j].0[1] > high[1] || frames[j].1[1] < low[1] {
                 continue;
             }
@@ -141,12 +118,7 @@ pub(super) fn paint_order(solids: &[Solid], camera: &Camera) -> Vec<usize> {
         }
     }
     // Distances are positive, so that their bits are ordered as they are.
-    let far = |i: usize| {
-        (
-            norm(sub(solids[i].centre(), camera.eye)).to_bits(),
-            Reverse(i),
-        )
-    };
+    let far = |i: usize| (norm(sub(solids[i].centre(), camera.eye)).to_bits(), Reverse(i));
     let mut ready: BinaryHeap<_> = (0..n).filter(|&i| waits[i] == 0).map(far).collect();
     let mut done = vec![false; n];
     let mut order = Vec::with_capacity(n);
@@ -154,10 +126,7 @@ pub(super) fn paint_order(solids: &[Solid], camera: &Camera) -> Vec<usize> {
         let next = match ready.pop() {
             Some((_, Reverse(i))) => i,
             // A cycle: its farthest solid goes first.
-            None => (0..n)
-                .filter(|&i| !done[i])
-                .max_by_key(|&i| far(i))
-                .expect("some are left"),
+            None => (0..n).filter(|&i| !done[i]).max_by_key(|&i| far(i)).expect("some are left"),
         };
         if std::mem::replace(&mut done[next], true) {
             continue;

@@ -34,13 +34,7 @@ macro_rules! put {
 
 impl Paper {
     pub fn new(width: f64, height: f64, title: &str) -> Self {
-        Self {
-            body: String::new(),
-            width,
-            height,
-            title: escape(title),
-            balls: vec![],
-        }
+        Self { body: String::new(), width, height, title: escape(title), balls: vec![] }
     }
 
     /// Opens a group with the given attributes.
@@ -61,26 +55,16 @@ impl Paper {
     }
 
     pub fn line(&mut self, [x1, y1]: Point, [x2, y2]: Point) {
-        put!(
-            self,
-            r#"<line x1="{x1:.1}" y1="{y1:.1}" x2="{x2:.1}" y2="{y2:.1}"/>"#
-        );
+        put!(self, r#"<line x1="{x1:.1}" y1="{y1:.1}" x2="{x2:.1}" y2="{y2:.1}"/>"#);
     }
 
     /// A sphere, lit from above left.
     pub fn ball(&mut self, [x, y]: Point, r: f64, colour: Colour) {
-        let k = self
-            .balls
-            .iter()
-            .position(|&c| c == colour)
-            .unwrap_or_else(|| {
-                self.balls.push(colour);
-                self.balls.len() - 1
-            });
-        put!(
-            self,
-            r#"<circle cx="{x:.1}" cy="{y:.1}" r="{r:.2}" fill="url(#ball{k})"/>"#
-        );
+        let k = self.balls.iter().position(|&c| c == colour).unwrap_or_else(|| {
+            self.balls.push(colour);
+            self.balls.len() - 1
+        });
+        put!(self, r#"<circle cx="{x:.1}" cy="{y:.1}" r="{r:.2}" fill="url(#ball{k})"/>"#);
     }
 
     /// A dot with a light rim, to be seen on dark and light faces.
@@ -104,10 +88,7 @@ impl Paper {
         let head = (0.35 * length).clamp(3.0, 15.0).min(length);
         let width = 0.24 * head;
         let at = |back: f64, side: f64| {
-            [
-                to[0] - back * along[0] - side * along[1],
-                to[1] - back * along[1] + side * along[0],
-            ]
+            [to[0] - back * along[0] - side * along[1], to[1] - back * along[1] + side * along[0]]
         };
         let outline = [
             at(length, 0.5 * width),
@@ -172,7 +153,5 @@ fn path(points: impl Iterator<Item = Point>) -> String {
 }
 
 fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -41,11 +41,7 @@ impl Family for Arch {
         let joint = |i: usize| {
             let angle = std::f64::consts::PI * i as f64 / self.blocks as f64;
             // The last joint is the mirror image of the first, without the rounding of π.
-            let (sin, cos) = if i == self.blocks {
-                (0.0, -1.0)
-            } else {
-                angle.sin_cos()
-            };
+            let (sin, cos) = if i == self.blocks { (0.0, -1.0) } else { angle.sin_cos() };
             let at = move |r: f64, y: f64| [r * cos, y, foot + r * sin];
             ([-sin, 0.0, cos], at)
         };
@@ -59,10 +55,7 @@ impl Family for Arch {
                 to(outer, near),
                 to(self.radius, near),
             ];
-            scene.push(RigidBody::solid(
-                Shape::Polyhedron(extruded(&base)?),
-                self.density,
-            )?);
+            scene.push(RigidBody::solid(Shape::Polyhedron(extruded(&base)?), self.density)?);
         }
         for i in 0..=self.blocks {
             let (normal, at) = joint(i);
@@ -72,12 +65,8 @@ impl Family for Arch {
                 i if i == self.blocks => (None, i - 1, normal.map(|x| -x)),
                 i => (Some(i - 1), i, normal),
             };
-            for (r, y) in [
-                (self.radius, near),
-                (outer, near),
-                (outer, -near),
-                (self.radius, -near),
-            ] {
+            for (r, y) in [(self.radius, near), (outer, near), (outer, -near), (self.radius, -near)]
+            {
                 scene.contacts.push(common.contact(a, b, at(r, y), normal));
             }
         }
@@ -86,15 +75,8 @@ impl Family for Arch {
         let near = near - margin;
         for side in [1.0, -1.0] {
             let (x0, x1) = (side * (self.radius - margin), side * (outer + 3.0 * margin));
-            let base = [
-                [x0, near, 0.0],
-                [x1, near, 0.0],
-                [x1, near, foot],
-                [x0, near, foot],
-            ];
-            scene
-                .obstacles
-                .push(Polyhedron::prism(&base, [0.0, -2.0 * near, 0.0])?);
+            let base = [[x0, near, 0.0], [x1, near, 0.0], [x1, near, foot], [x0, near, foot]];
+            scene.obstacles.push(Polyhedron::prism(&base, [0.0, -2.0 * near, 0.0])?);
         }
         common.finish(scene)
     }

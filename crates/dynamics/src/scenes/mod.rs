@@ -117,13 +117,10 @@ impl SceneEntry {
     ///
     /// Errors: no such family; the message lists those that exist.
     pub fn find(name: &str) -> Result<&'static Self, SceneError> {
-        SCENES
-            .iter()
-            .find(|s| s.name == name)
-            .ok_or_else(|| SceneError::UnknownScene {
-                found: name.into(),
-                known: list(SCENES.iter().map(|s| s.name)),
-            })
+        SCENES.iter().find(|s| s.name == name).ok_or_else(|| SceneError::UnknownScene {
+            found: name.into(),
+            known: list(SCENES.iter().map(|s| s.name)),
+        })
     }
 
     /// The default of every setting, in the order of their documentation.
@@ -157,19 +154,11 @@ fn make<F: Family>(settings: Map<String, Value>) -> Result<Scene, SceneError> {
     for (key, value) in &settings {
         if !known.contains_key(key) {
             let known = list(known.keys().map(String::as_str));
-            return Err(SceneError::UnknownSetting {
-                scene: F::NAME,
-                key: key.clone(),
-                known,
-            });
+            return Err(SceneError::UnknownSetting { scene: F::NAME, key: key.clone(), known });
         }
         // Each key is tried alone first: serde's message on a whole struct does not say which key it means.
-        parse::<F>(Map::from_iter([(key.clone(), value.clone())])).map_err(|e| {
-            SceneError::Setting {
-                key: key.clone(),
-                why: e.to_string(),
-            }
-        })?;
+        parse::<F>(Map::from_iter([(key.clone(), value.clone())]))
+            .map_err(|e| SceneError::Setting { key: key.clone(), why: e.to_string() })?;
     }
     let family = parse::<F>(settings).expect("each setting has been parsed alone");
     family.build()
@@ -180,10 +169,7 @@ fn parse<F: Family>(settings: Map<String, Value>) -> serde_json::Result<F> {
 }
 
 fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    names
-        .map(|n| format!("`{n}`"))
-        .collect::<Vec<_>>()
-        .join(", ")
+    names.map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
 }
 
 /// The settings common to all families.
@@ -213,26 +199,11 @@ impl Common {
     fn scene(&self, name: &str) -> Result<Scene, SceneError> {
         positive("density", self.density)?;
         require("mu", self.mu, self.mu >= 0.0, "a number of at least 0")?;
-        require(
-            "e",
-            self.e,
-            (0.0..=1.0).contains(&self.e),
-            "a number from 0 to 1",
-        )?;
+        require("e", self.e, (0.0..=1.0).contains(&self.e), "a number from 0 to 1")?;
         positive("h", self.h)?;
-        require(
-            "gravity",
-            self.gravity,
-            self.gravity >= 0.0,
-            "a number of at least 0",
-        )?;
+        require("gravity", self.gravity, self.gravity >= 0.0, "a number of at least 0")?;
         let amplitude = self.disturbance;
-        require(
-            "disturbance",
-            amplitude,
-            amplitude >= 0.0,
-            "a number of at least 0",
-        )?;
+        require("disturbance", amplitude, amplitude >= 0.0, "a number of at least 0")?;
         Ok(Scene {
             name: name.into(),
             bodies: vec![],

@@ -33,12 +33,7 @@ impl Family for SlidingBox {
         positive("width", self.width)?;
         positive("height", self.height)?;
         let slope = self.slope;
-        require(
-            "slope",
-            slope,
-            slope.abs() < 90.0,
-            "an angle between -90 and 90 degrees",
-        )?;
+        require("slope", slope, slope.abs() < 90.0, "an angle between -90 and 90 degrees")?;
         require("speed", self.speed, true, "a finite number")?;
 
         let rotation = Rotation::about(Y, slope.to_radians());
@@ -48,24 +43,12 @@ impl Family for SlidingBox {
         let body = RigidBody::solid(Shape::Box { half: [a, b, c] }, self.density)?;
         let position = scale(c, normal);
         let velocity = scale(self.speed, down);
-        let body = scene.push(RigidBody {
-            position,
-            rotation,
-            velocity,
-            ..body
-        });
+        let body = scene.push(RigidBody { position, rotation, velocity, ..body });
         for point in rectangle([0.0; 3], scale(a, down), scale(b, Y)) {
             let contact = common.contact(None, body, point, normal);
-            scene.contacts.push(Contact {
-                tangent: down,
-                ..contact
-            });
+            scene.contacts.push(Contact { tangent: down, ..contact });
         }
-        scene.ground = Some(Ground {
-            point: [0.0; 3],
-            normal,
-            along: down,
-        });
+        scene.ground = Some(Ground { point: [0.0; 3], normal, along: down });
         common.finish(scene)
     }
 }

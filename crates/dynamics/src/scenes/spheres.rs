@@ -36,11 +36,7 @@ impl Layout {
             Layout::Square => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.5, 0.5, 0.5_f64.sqrt()]],
             Layout::Triangular => {
                 let row = 0.75_f64.sqrt();
-                [
-                    [1.0, 0.0, 0.0],
-                    [0.5, row, 0.0],
-                    [0.5, row / 3.0, (2.0 / 3.0_f64).sqrt()],
-                ]
+                [[1.0, 0.0, 0.0], [0.5, row, 0.0], [0.5, row / 3.0, (2.0 / 3.0_f64).sqrt()]]
             }
         }
     }
@@ -56,22 +52,10 @@ impl Layout {
     /// Earlier neighbours as steps of `(layer, row, place)`: in the layer, then those below.
     fn neighbours(self) -> &'static [(usize, isize, isize)] {
         match self {
-            Layout::Square => &[
-                (0, 0, -1),
-                (0, -1, 0),
-                (1, 0, 0),
-                (1, 0, 1),
-                (1, 1, 0),
-                (1, 1, 1),
-            ],
-            Layout::Triangular => &[
-                (0, 0, -1),
-                (0, -1, 0),
-                (0, -1, 1),
-                (1, 0, 0),
-                (1, 0, 1),
-                (1, 1, 0),
-            ],
+            Layout::Square => &[(0, 0, -1), (0, -1, 0), (1, 0, 0), (1, 0, 1), (1, 1, 0), (1, 1, 1)],
+            Layout::Triangular => {
+                &[(0, 0, -1), (0, -1, 0), (0, -1, 1), (1, 0, 0), (1, 0, 1), (1, 1, 0)]
+            }
         }
     }
 }
@@ -89,10 +73,7 @@ impl Family for Spheres {
         let [along, across, up] = self.layout.steps().map(|s| scale(2.0 * self.radius, s));
         let at = |layer: usize, j: usize, i: usize| {
             let in_layer = add(scale(i as f64, along), scale(j as f64, across));
-            add(
-                in_layer,
-                add(scale(layer as f64, up), scale(self.radius, Z)),
-            )
+            add(in_layer, add(scale(layer as f64, up), scale(self.radius, Z)))
         };
         // The index of each sphere: by layer, then row, then place.
         let mut index: Vec<Vec<Vec<usize>>> = Vec::new();
@@ -103,9 +84,7 @@ impl Family for Spheres {
                 index[layer].push(Vec::new());
                 for i in 0..self.layout.row(side, j) {
                     let position = at(layer, j, i);
-                    let shape = Shape::Sphere {
-                        radius: self.radius,
-                    };
+                    let shape = Shape::Sphere { radius: self.radius };
                     let b = scene.push(RigidBody::solid(shape, self.density)?.at(position));
                     index[layer][j].push(b);
                     if layer == 0 {
@@ -122,9 +101,7 @@ impl Family for Spheres {
                             let other = scene.bodies[a].position;
                             let middle = scale(0.5, add(position, other));
                             let normal = sub(position, other);
-                            scene
-                                .contacts
-                                .push(common.contact(Some(a), b, middle, normal));
+                            scene.contacts.push(common.contact(Some(a), b, middle, normal));
                         }
                     }
                 }

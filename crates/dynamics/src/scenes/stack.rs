@@ -46,9 +46,7 @@ impl Family for Stack {
             let body = RigidBody::solid(Shape::Box { half: [a, a, c] }, density)?;
             let body = scene.push(body.at([0.0, 0.0, bottom + c]));
             for point in rectangle([0.0, 0.0, bottom], [a, 0.0, 0.0], [0.0, a, 0.0]) {
-                scene
-                    .contacts
-                    .push(common.contact(k.checked_sub(1), body, point, Z));
+                scene.contacts.push(common.contact(k.checked_sub(1), body, point, Z));
             }
         }
         scene.bodies[self.kicked - 1].velocity[0] = self.kick;

@@ -71,9 +71,7 @@ impl Family for Wall {
                 for pair in bricks.windows(2) {
                     let centre = [x(pair[1].1), 0.0, bottom + c];
                     for p in rectangle(centre, [0.0, b, 0.0], [0.0, 0.0, c]) {
-                        scene
-                            .contacts
-                            .push(common.contact(Some(pair[0].0), pair[1].0, p, X));
+                        scene.contacts.push(common.contact(Some(pair[0].0), pair[1].0, p, X));
                     }
                 }
             }

@@ -104,11 +104,7 @@ fn admissible<const D: usize>(r: &[f64], mu: &[f64]) -> bool {
         && scale.is_finite()
         && mu.iter().enumerate().all(|(c, &mu)| {
             let rc: [f64; D] = small::block(r, c);
-            if mu > 0.0 {
-                rc == [0.0; D]
-            } else {
-                distance_to_cone(&rc, 0.0) <= 1e-14 * scale
-            }
+            if mu > 0.0 { rc == [0.0; D] } else { distance_to_cone(&rc, 0.0) <= 1e-14 * scale }
         })
 }
 
@@ -154,10 +150,7 @@ mod tests {
 
     #[test]
     fn squeezing_walls_are_refuted_without_friction_only() {
-        let ray = Certificate {
-            r: vec![1.0, 0.0, 1.0, 0.0],
-            lambda: vec![],
-        };
+        let ray = Certificate { r: vec![1.0, 0.0, 1.0, 0.0], lambda: vec![] };
         let (global, local) = squeezed(0.0);
         assert!(refutes_global(&global, &ray) && refutes_local(&local, &ray));
         let (global, local) = squeezed(0.5);
@@ -167,17 +160,9 @@ mod tests {
     #[test]
     fn a_false_ray_is_refused() {
         let (global, local) = squeezed(0.0);
-        for r in [
-            vec![1.0, 0.0, 0.9, 0.0],
-            vec![-1.0, 0.0, -1.0, 0.0],
-            vec![0.0; 4],
-            vec![1.0],
-        ] {
+        for r in [vec![1.0, 0.0, 0.9, 0.0], vec![-1.0, 0.0, -1.0, 0.0], vec![0.0; 4], vec![1.0]] {
             let ray = Certificate { r, lambda: vec![] };
-            assert!(
-                !refutes_global(&global, &ray) && !refutes_local(&local, &ray),
-                "{ray:?}"
-            );
+            assert!(!refutes_global(&global, &ray) && !refutes_local(&local, &ray), "{ray:?}");
         }
     }
 
@@ -186,15 +171,9 @@ mod tests {
         // v_0 = 1 and v_0 = 2 at once.
         let (mut global, _) = squeezed(0.5);
         let g = Csc::from_triplets(2, 2, [(0, 0, 1.0), (0, 1, 1.0)].into_iter()).unwrap();
-        global.bilateral = Some(crate::BilateralGlobal {
-            G: g,
-            b: vec![-1.0, -2.0],
-        });
+        global.bilateral = Some(crate::BilateralGlobal { G: g, b: vec![-1.0, -2.0] });
         assert!(global.validate().is_ok());
-        let ray = Certificate {
-            r: vec![0.0; 4],
-            lambda: vec![-1.0, 1.0],
-        };
+        let ray = Certificate { r: vec![0.0; 4], lambda: vec![-1.0, 1.0] };
         assert!(refutes_global(&global, &ray));
     }
 }

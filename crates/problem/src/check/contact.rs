@@ -54,10 +54,7 @@ pub(super) fn nearest_in_cone<const D: usize>(x: &[f64; D], mu: f64) -> [f64; D]
 /// `dist(x, K)`.
 pub(super) fn distance_to_cone<const D: usize>(x: &[f64; D], mu: f64) -> f64 {
     let p = nearest_in_cone(x, mu);
-    (0..D)
-        .map(|k| (x[k] - p[k]) * (x[k] - p[k]))
-        .sum::<f64>()
-        .sqrt()
+    (0..D).map(|k| (x[k] - p[k]) * (x[k] - p[k])).sum::<f64>().sqrt()
 }
 
 /// `dist(y, K*)` with `K* = {mu‖y_T‖ ≤ y_N}`: by Moreau's decomposition the norm of the projection of −y on K.
@@ -111,10 +108,7 @@ pub(super) fn status<const D: usize>(
     };
     // A frictionless contact slides or is open: its cone has no interior to be near to.
     let near_stick = mu > 0.0 && into_cone.abs() <= margin;
-    ContactStatus {
-        status,
-        degenerate: into_polar.abs() <= margin || near_stick,
-    }
+    ContactStatus { status, degenerate: into_polar.abs() <= margin || near_stick }
 }
 
 #[cfg(test)]
@@ -125,15 +119,9 @@ mod tests {
     fn the_three_regions() {
         let mu = 0.5;
         let at_rest = ([2.0, 0.1, 0.2], [0.0; 3]);
-        assert_eq!(
-            status(&at_rest.0, &at_rest.1, mu, 1e-9).status,
-            Motion::Stick
-        );
+        assert_eq!(status(&at_rest.0, &at_rest.1, mu, 1e-9).status, Motion::Stick);
         let sliding = ([2.0, -1.0, 0.0], modified_velocity(&[0.0, 3.0, 0.0], mu));
-        assert_eq!(
-            status(&sliding.0, &sliding.1, mu, 1e-9).status,
-            Motion::Slip
-        );
+        assert_eq!(status(&sliding.0, &sliding.1, mu, 1e-9).status, Motion::Slip);
         let flying = ([0.0; 3], modified_velocity(&[1.0, 3.0, 0.0], mu));
         assert_eq!(status(&flying.0, &flying.1, mu, 1e-9).status, Motion::Open);
         for (x, u) in [at_rest, sliding, flying] {
@@ -147,21 +135,9 @@ mod tests {
     #[test]
     fn frictionless_contacts_slide_or_are_open() {
         let pressed = status(&[1.0, 0.0, 0.0], &[0.0, 0.0, 0.0], 0.0, 1e-9);
-        assert_eq!(
-            pressed,
-            ContactStatus {
-                status: Motion::Slip,
-                degenerate: false
-            }
-        );
+        assert_eq!(pressed, ContactStatus { status: Motion::Slip, degenerate: false });
         let open = status(&[0.0; 3], &[1.0, 5.0, 0.0], 0.0, 1e-9);
-        assert_eq!(
-            open,
-            ContactStatus {
-                status: Motion::Open,
-                degenerate: false
-            }
-        );
+        assert_eq!(open, ContactStatus { status: Motion::Open, degenerate: false });
     }
 
     #[test]

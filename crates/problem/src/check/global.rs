@@ -23,11 +23,7 @@ impl GlobalGauge {
         let (n, p, m) = (problem.dofs(), problem.multipliers(), problem.w.len());
         let dynamics = problem.dynamics()?;
         // W = Hᵀ M⁻¹ H and q = Hᵀ M⁻¹ f + w are those of the free dynamics, with bilateral rows apart.
-        let free = if p > 0 {
-            &Inverse::new(&problem.M, "M")?
-        } else {
-            &dynamics
-        };
+        let free = if p > 0 { &Inverse::new(&problem.M, "M")? } else { &dynamics };
         let mut v = problem.f.clone();
         free.solve(&mut v);
         let mut q = vec![0.0; m];
@@ -63,11 +59,7 @@ impl GlobalGauge {
         let given = imbalance(problem, &point.v, &point.r, &point.lambda, &mut self.buffer);
         let (own_v, own_lambda) = self.state.split_at(n);
         let own = imbalance(problem, own_v, &point.r, own_lambda, &mut self.buffer);
-        let dynamics = if given.is_nan() || own.is_nan() {
-            f64::NAN
-        } else {
-            given.max(own)
-        };
+        let dynamics = if given.is_nan() || own.is_nan() { f64::NAN } else { given.max(own) };
         measure.dynamics = Some(dynamics);
 
         if let Some(b) = &problem.bilateral {
@@ -78,11 +70,7 @@ impl GlobalGauge {
             let violation = norm(c);
             for (j, c) in c.iter_mut().enumerate() {
                 let (rows, values) = b.G.column(j);
-                *c = rows
-                    .iter()
-                    .zip(values)
-                    .map(|(&i, g)| (g * point.v[i]).abs())
-                    .sum();
+                *c = rows.iter().zip(values).map(|(&i, g)| (g * point.v[i]).abs()).sum();
             }
             measure.bilateral = Some(over(violation, norm(c).max(norm(&b.b))));
         }

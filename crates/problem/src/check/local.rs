@@ -15,11 +15,7 @@ pub struct LocalGauge {
 
 impl LocalGauge {
     pub(crate) fn new<const D: usize>(problem: &FrictionLocal<D>) -> Self {
-        let mut gauge = Self {
-            law: LawGauge::default(),
-            u: Vec::new(),
-            constraint: Vec::new(),
-        };
+        let mut gauge = Self { law: LawGauge::default(), u: Vec::new(), constraint: Vec::new() };
         gauge.refill(problem);
         gauge
     }
@@ -120,12 +116,7 @@ impl LawGauge {
             plain += square(&natural_map(&rc, &modified, mu));
             primal += distance_to_cone(&x, mu).powi(2);
             dual += distance_to_dual(&modified, mu).powi(2);
-            complementarity += x
-                .iter()
-                .zip(&modified)
-                .map(|(a, b)| a * b)
-                .sum::<f64>()
-                .abs();
+            complementarity += x.iter().zip(&modified).map(|(a, b)| a * b).sum::<f64>().abs();
         }
         let (absolute, plain, q) = (scaled.sqrt(), plain.sqrt(), self.norm_q);
         Measure {

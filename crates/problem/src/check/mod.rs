@@ -95,9 +95,7 @@ impl Measure {
         // f64::max ignores a NaN: ask each part.
         if self.relative.is_nan()
             || self.bilateral.is_some_and(f64::is_nan)
-            || self
-                .dynamics
-                .is_some_and(|d| d.is_nan() || d > DYNAMICS_TOLERANCE)
+            || self.dynamics.is_some_and(|d| d.is_nan() || d > DYNAMICS_TOLERANCE)
         {
             return f64::INFINITY;
         }

@@ -53,14 +53,7 @@ impl<const D: usize> Judged for FrictionLocal<D> {
         self.validate_point(point)?;
         let mut gauge = self.gauge()?;
         let measure = self.measure(point, &mut gauge);
-        Ok(verdict::<D>(
-            measure,
-            &gauge.law,
-            &point.r,
-            gauge.velocity(),
-            &self.mu,
-            tolerance,
-        ))
+        Ok(verdict::<D>(measure, &gauge.law, &point.r, gauge.velocity(), &self.mu, tolerance))
     }
 }
 
@@ -69,14 +62,7 @@ impl<const D: usize> Judged for FrictionGlobal<D> {
         self.validate_point(point)?;
         let mut gauge = self.gauge()?;
         let measure = self.measure(point, &mut gauge);
-        Ok(verdict::<D>(
-            measure,
-            &gauge.law,
-            &point.r,
-            gauge.velocity(),
-            &self.mu,
-            tolerance,
-        ))
+        Ok(verdict::<D>(measure, &gauge.law, &point.r, gauge.velocity(), &self.mu, tolerance))
     }
 }
 
@@ -88,11 +74,7 @@ fn verdict<const D: usize>(
     mu: &[f64],
     tolerance: f64,
 ) -> Verdict {
-    let margin = if law.norm_q > 0.0 {
-        tolerance * law.norm_q
-    } else {
-        tolerance
-    };
+    let margin = if law.norm_q > 0.0 { tolerance * law.norm_q } else { tolerance };
     let mut counts = StatusCounts::default();
     let mut statuses = Vec::with_capacity(mu.len());
     let mut worst = Vec::with_capacity(mu.len());
@@ -107,11 +89,7 @@ fn verdict<const D: usize>(
         }
         counts.degenerate += usize::from(s.degenerate);
         statuses.push(s);
-        let share = natural_map(&x, &modified, mu)
-            .iter()
-            .map(|v| v * v)
-            .sum::<f64>()
-            .sqrt();
+        let share = natural_map(&x, &modified, mu).iter().map(|v| v * v).sum::<f64>().sqrt();
         worst.push((c, over(share, law.norm_q)));
     }
     worst.sort_by(|a, b| b.1.total_cmp(&a.1));

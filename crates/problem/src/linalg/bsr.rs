@@ -2,6 +2,12 @@
 
 use super::{Csc, row, small};
 
+/// A D×D block, by rows.
+pub type Block<const D: usize> = [[f64; D]; D];
+
+/// One block row: `(block column, block)`, sorted by column.
+pub type BlockRow<const D: usize> = Vec<(u32, Block<D>)>;
+
 /// A block-sparse matrix by compressed block rows with D×D blocks, column indices sorted in each row.
 ///
 /// Storage: `8·D²` bytes a block plus 4 of index. One product streams that once.
@@ -10,7 +16,7 @@ pub struct Bsr<const D: usize> {
     ncols: usize,
     row_ptr: Vec<usize>,
     col_idx: Vec<u32>,
-    blocks: Vec<[[f64; D]; D]>,
+    blocks: Vec<Block<D>>,
 }
 
 impl<const D: usize> Bsr<D> {
@@ -55,22 +61,12 @@ impl<const D: usize> Bsr<D> {
                 }
             }
         }
-        Self {
-            ncols: nc,
-            row_ptr,
-            col_idx,
-            blocks,
-        }
+        Self { ncols: nc, row_ptr, col_idx, blocks }
     }
 
-    /// Assembles a matrix from block rows, each a list of `(block column, block)` sorted by column.
-    pub fn from_rows(ncols: usize, rows: &[Vec<(u32, [[f64; D]; D])>]) -> Self {
-        let mut out = Self {
-            ncols,
-            row_ptr: vec![0],
-            col_idx: vec![],
-            blocks: vec![],
-        };
+    /// Assembles a matrix from block rows.
+    pub fn from_rows(ncols: usize, rows: &[BlockRow<D>]) -> Self {
+        let mut out = Self { ncols, row_ptr: vec![0], col_idx: vec![], blocks: vec![] };
         for row in rows {
             debug_assert!(row.windows(2).all(|w| w[0].0 < w[1].0));
             out.col_idx.extend(row.iter().map(|e| e.0));
@@ -97,26 +93,24 @@ impl<const D: usize> Bsr<D> {
 
     /// Block column indices and blocks of block row `i`.
     #[inline(always)]
-    pub fn row(&self, i: usize) -> (&[u32], &[[[f64; D]; D]]) {
+    pub fn row(&self, i: usize) -> (&[u32], &[Block<D>]) {
         let range = self.row_ptr[i]..self.row_ptr[i + 1];
         (&self.col_idx[range.clone()], &self.blocks[range])
     }
 
     /// All blocks, row by row.
-    pub fn blocks(&self) -> &[[[f64; D]; D]] {
+    pub fn blocks(&self) -> &[Block<D>] {
         &self.blocks
     }
 
     /// The block at `(i, j)`, or `None` where nothing is stored.
-    pub fn get(&self, i: usize, j: usize) -> Option<&[[f64; D]; D]> {
+    pub fn get(&self, i: usize, j: usize) -> Option<&Block<D>> {
         let (cols, blocks) = self.row(i);
-        cols.binary_search(&u32::try_from(j).ok()?)
-            .ok()
-            .map(|k| &blocks[k])
+        cols.binary_search(&u32::try_from(j).ok()?).ok().map(|k| &blocks[k])
     }
 
     /// The diagonal block of row `i`, zero where nothing is stored.
-    pub fn diagonal_block(&self, i: usize) -> [[f64; D]; D] {
+    pub fn diagonal_block(&self, i: usize) -> Block<D> {
         self.get(i, i).copied().unwrap_or([[0.0; D]; D])
     }
 
@@ -140,10 +134,10 @@ impl<const D: usize> Bsr<D> {
 
     /// `A − B`, on the union of the two patterns.
     pub fn minus(&self, other: &Self) -> Self {
-        let rows: Vec<_> = (0..self.nrows())
+        let rows: Vec<BlockRow<D>> = (0..self.nrows())
             .map(|i| {
                 let (cols, blocks) = self.row(i);
-                let mut row: Vec<_> = cols.iter().copied().zip(blocks.iter().copied()).collect();
+                let mut row: BlockRow<D> = cols.iter().copied().zip(blocks.iter().copied()).collect();
                 let (cols, blocks) = other.row(i);
                 for (&j, b) in cols.iter().zip(blocks) {
                     let at = match row.binary_search_by_key(&j, |e| e.0) {
@@ -199,9 +193,7 @@ impl<const D: usize> Bsr<D> {
 
     /// The mean diagonal `tr(A_ii)/D` of each diagonal block.
     pub fn mean_diagonals(&self) -> Vec<f64> {
-        (0..self.nrows())
-            .map(|i| small::mean_diagonal(&self.diagonal_block(i)))
-            .collect()
+        (0..self.nrows()).map(|i| small::mean_diagonal(&self.diagonal_block(i))).collect()
     }
 }
 
@@ -210,14 +202,8 @@ mod tests {
     use super::*;
 
     fn example() -> Csc {
-        let entries = [
-            (0, 0, 1.0),
-            (1, 0, 2.0),
-            (3, 0, 3.0),
-            (2, 3, 4.0),
-            (0, 3, -1.0),
-            (3, 3, 5.0),
-        ];
+        let entries =
+            [(0, 0, 1.0), (1, 0, 2.0), (3, 0, 3.0), (2, 3, 4.0), (0, 3, -1.0), (3, 3, 5.0)];
         Csc::from_triplets(4, 4, entries.into_iter()).unwrap()
     }
 

@@ -17,13 +17,7 @@ pub struct Csc {
 impl Csc {
     /// The `nrows × ncols` zero matrix.
     pub fn zeros(nrows: usize, ncols: usize) -> Self {
-        Self {
-            nrows,
-            ncols,
-            col_ptr: vec![0; ncols + 1],
-            row_idx: vec![],
-            values: vec![],
-        }
+        Self { nrows, ncols, col_ptr: vec![0; ncols + 1], row_idx: vec![], values: vec![] }
     }
 
     /// The diagonal matrix with the given diagonal.
@@ -202,11 +196,9 @@ impl Csc {
     /// Every stored value is finite; the error names the entry of the matrix called `name`.
     pub(crate) fn check_finite(&self, name: &str) -> Result<(), ProblemError> {
         match self.triplets().find(|e| !e.2.is_finite()) {
-            Some((i, j, x)) => Err(ProblemError::value(
-                format!("{name}[{i}, {j}]"),
-                "a finite number",
-                x,
-            )),
+            Some((i, j, x)) => {
+                Err(ProblemError::value(format!("{name}[{i}, {j}]"), "a finite number", x))
+            }
             None => Ok(()),
         }
     }
@@ -245,10 +237,7 @@ mod tests {
     #[test]
     fn an_index_outside_is_named() {
         let e = Csc::from_triplets(2, 2, [(0, 0, 1.0), (2, 0, 1.0)].into_iter()).unwrap_err();
-        assert!(
-            e.to_string().contains("entry 1") && e.to_string().contains("row 2"),
-            "{e}"
-        );
+        assert!(e.to_string().contains("entry 1") && e.to_string().contains("row 2"), "{e}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The Delassus operator W = Hᵀ M⁻¹ H of a global problem, never formed, and its condensation.
 
-use super::{Bsr, Csc, Inverse, small};
+use super::{Block, BlockRow, Bsr, Csc, Inverse, small};
 
 /// `W = Hᵀ M⁻¹ H` in product form, contact by contact.
 ///
@@ -29,26 +29,18 @@ struct BlockColumns<const D: usize> {
 
 impl<const D: usize> BlockColumns<D> {
     fn new() -> Self {
-        Self {
-            ptr: vec![0],
-            row: vec![],
-            entries: vec![],
-        }
+        Self { ptr: vec![0], row: vec![], entries: vec![] }
     }
 
     fn push(&mut self, row: usize, entries: [f64; D]) {
-        self.row
-            .push(u32::try_from(row).expect("fewer than 2³² degrees of freedom"));
+        self.row.push(u32::try_from(row).expect("fewer than 2³² degrees of freedom"));
         self.entries.push(entries);
     }
 
     #[inline(always)]
     fn column(&self, c: usize) -> impl Iterator<Item = (usize, &[f64; D])> {
         let range = self.ptr[c]..self.ptr[c + 1];
-        self.row[range.clone()]
-            .iter()
-            .map(|&i| i as usize)
-            .zip(&self.entries[range])
+        self.row[range.clone()].iter().map(|&i| i as usize).zip(&self.entries[range])
     }
 }
 
@@ -58,11 +50,7 @@ impl<const D: usize> Delassus<D> {
     /// Cost: D solves for each contact and component of M that it touches.
     pub fn new(h: &Csc, inverse: &Inverse) -> Self {
         let (n, nc) = (h.nrows(), h.ncols() / D);
-        let mut out = Self {
-            n,
-            h: BlockColumns::new(),
-            z: BlockColumns::new(),
-        };
+        let mut out = Self { n, h: BlockColumns::new(), z: BlockColumns::new() };
         let mut dense = vec![[0.0; D]; inverse.dim()];
         let mut x = vec![0.0; inverse.scratch_len()];
         let mut scratch = vec![0.0; inverse.scratch_len()];
@@ -157,7 +145,7 @@ impl<const D: usize> Delassus<D> {
     }
 
     /// The diagonal block `W_cc = H_cᵀ M⁻¹ H_c`.
-    pub fn diagonal_block(&self, c: usize) -> [[f64; D]; D] {
+    pub fn diagonal_block(&self, c: usize) -> Block<D> {
         let mut w = [[0.0; D]; D];
         let mut z = self.z.column(c).peekable();
         // Both lists hold distinct rows, H sorted; Z is sorted within each component only.
@@ -167,11 +155,7 @@ impl<const D: usize> Delassus<D> {
                     z.next();
                     Some(entries)
                 }
-                _ => self
-                    .z
-                    .column(c)
-                    .find(|&(j, _)| j == i)
-                    .map(|(_, entries)| entries),
+                _ => self.z.column(c).find(|&(j, _)| j == i).map(|(_, entries)| entries),
             };
             if let Some(entries) = matching {
                 for k in 0..D {
@@ -194,9 +178,9 @@ impl<const D: usize> Delassus<D> {
                 by_row[i].push((c as u32, *h));
             }
         }
-        let mut rows: Vec<Vec<(u32, [[f64; D]; D])>> = vec![Vec::new(); nc];
+        let mut rows: Vec<BlockRow<D>> = vec![Vec::new(); nc];
         let mut slot = vec![usize::MAX; nc];
-        let mut met: Vec<(u32, [[f64; D]; D])> = Vec::new();
+        let mut met: BlockRow<D> = Vec::new();
         for j in 0..nc {
             for (row, z) in self.z.column(j) {
                 for &(i, ref h) in &by_row[row] {

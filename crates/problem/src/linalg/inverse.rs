@@ -36,7 +36,7 @@ struct Component {
 enum Factor {
     Scalar(f64),
     Dense(DenseLu),
-    Sparse(faer::sparse::linalg::solvers::Lu<usize, f64>),
+    Sparse(Box<faer::sparse::linalg::solvers::Lu<usize, f64>>),
 }
 
 impl Inverse {
@@ -73,15 +73,9 @@ impl Inverse {
             .flat_map(|(i, j, x)| [(i, n + j, -x), (n + j, i, x)])
             .chain(m.triplets())
             .collect::<Vec<_>>();
-        let delta = d
-            .iter()
-            .enumerate()
-            .map(|(j, d)| (n + j, n + j, BILATERAL_REGULARISATION * d));
+        let delta = d.iter().enumerate().map(|(j, d)| (n + j, n + j, BILATERAL_REGULARISATION * d));
         let regular = coupling.iter().copied().chain(delta);
-        let exact = coupling
-            .iter()
-            .copied()
-            .chain((0..p).map(|j| (n + j, n + j, 0.0)));
+        let exact = coupling.iter().copied().chain((0..p).map(|j| (n + j, n + j, 0.0)));
         Self::with_factor_of(
             Csc::from_triplets(n + p, n + p, exact)?,
             &Csc::from_triplets(n + p, n + p, regular)?,
@@ -120,12 +114,7 @@ impl Inverse {
                 Ok(Component { index, factor })
             })
             .collect::<Result<Vec<_>, ProblemError>>()?;
-        let out = Self {
-            matrix,
-            components,
-            place,
-            refinements,
-        };
+        let out = Self { matrix, components, place, refinements };
         out.verify(name)?;
         Ok(out)
     }
@@ -133,9 +122,8 @@ impl Inverse {
     /// Solves for one pseudo-random right-hand side: a factorisation that cannot is of a singular matrix.
     fn verify(&self, name: &str) -> Result<(), ProblemError> {
         let n = self.dim();
-        let y: Vec<f64> = (0..n)
-            .map(|i| 1.0 + (i as f64 * 0.618_033_988_749_895).fract())
-            .collect();
+        let y: Vec<f64> =
+            (0..n).map(|i| 1.0 + (i as f64 * 0.618_033_988_749_895).fract()).collect();
         let mut b = vec![0.0; n];
         self.matrix.mul_add(1.0, &y, &mut b);
         let mut x = b.clone();
@@ -254,9 +242,7 @@ fn factorise(a: &Csc, index: &[usize], place: &[(u32, u32)]) -> Option<Factor> {
     }
     let entries = index.iter().enumerate().flat_map(|(j, &column)| {
         let (rows, values) = a.column(column);
-        rows.iter()
-            .zip(values)
-            .map(move |(&i, &x)| (place[i].1 as usize, j, x))
+        rows.iter().zip(values).map(move |(&i, &x)| (place[i].1 as usize, j, x))
     });
     if n <= DENSE_LIMIT {
         let mut dense = vec![0.0; n * n];
@@ -265,7 +251,7 @@ fn factorise(a: &Csc, index: &[usize], place: &[(u32, u32)]) -> Option<Factor> {
     }
     let triplets: Vec<_> = entries.map(|(i, j, x)| Triplet::new(i, j, x)).collect();
     let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &triplets).ok()?;
-    matrix.sp_lu().ok().map(Factor::Sparse)
+    matrix.sp_lu().ok().map(|lu| Factor::Sparse(Box::new(lu)))
 }
 
 /// Connected components of the graph of `a + aᵀ`: the unknowns of each, and each unknown's place.
@@ -295,10 +281,7 @@ fn connected_components(a: &Csc) -> (Vec<Vec<usize>>, Vec<(u32, u32)>) {
             components.push(Vec::new());
         }
         let members = &mut components[of_root[r] as usize];
-        place.push((
-            of_root[r],
-            u32::try_from(members.len()).expect("fewer than 2³² unknowns"),
-        ));
+        place.push((of_root[r], u32::try_from(members.len()).expect("fewer than 2³² unknowns")));
         members.push(i);
     }
     (components, place)
@@ -348,11 +331,7 @@ impl DenseLu {
         }
         for i in (0..n).rev() {
             let row = &self.lu[i * n..(i + 1) * n];
-            let tail = row[i + 1..]
-                .iter()
-                .zip(&x[i + 1..n])
-                .map(|(u, y)| u * y)
-                .sum::<f64>();
+            let tail = row[i + 1..].iter().zip(&x[i + 1..n]).map(|(u, y)| u * y).sum::<f64>();
             x[i] = (x[i] - tail) / row[i];
         }
     }
@@ -364,13 +343,7 @@ mod tests {
 
     /// A block-diagonal matrix: one scalar, one dense 2×2, one chain long enough for the sparse factor.
     fn example() -> Csc {
-        let mut e = vec![
-            (0, 0, 4.0),
-            (1, 1, 2.0),
-            (1, 2, -1.0),
-            (2, 1, 0.5),
-            (2, 2, 3.0),
-        ];
+        let mut e = vec![(0, 0, 4.0), (1, 1, 2.0), (1, 2, -1.0), (2, 1, 0.5), (2, 2, 3.0)];
         for k in 3..80 {
             e.push((k, k, 2.5));
             if k > 3 {
@@ -398,14 +371,7 @@ mod tests {
         let a = Csc::from_triplets(
             3,
             3,
-            [
-                (0, 0, 1.0),
-                (1, 1, 1.0),
-                (1, 2, 2.0),
-                (2, 1, 2.0),
-                (2, 2, 4.0),
-            ]
-            .into_iter(),
+            [(0, 0, 1.0), (1, 1, 1.0), (1, 2, 2.0), (2, 1, 2.0), (2, 2, 4.0)].into_iter(),
         );
         let e = Inverse::new(&a.unwrap(), "M").unwrap_err().to_string();
         assert!(e.starts_with("M (component of row 1)"), "{e}");
@@ -423,10 +389,7 @@ mod tests {
         let inverse = Inverse::saddle(&m, &g.unwrap()).unwrap();
         let mut x = [3.0, 0.0, 1.0, 1.0];
         inverse.solve(&mut x);
-        assert!(
-            (x[0] - 2.0).abs() < 1e-12 && (x[1] + 1.0).abs() < 1e-12,
-            "{x:?}"
-        );
+        assert!((x[0] - 2.0).abs() < 1e-12 && (x[1] + 1.0).abs() < 1e-12, "{x:?}");
         assert!((x[2] + x[3] + 1.0).abs() < 1e-12, "{x:?}");
     }
 }

@@ -11,7 +11,7 @@ mod inverse;
 mod row;
 pub mod small;
 
-pub use bsr::Bsr;
+pub use bsr::{Block, BlockRow, Bsr};
 pub use csc::Csc;
 pub use delassus::Delassus;
 pub use inverse::Inverse;
@@ -25,15 +25,7 @@ pub fn norm(x: &[f64]) -> f64 {
     // Rare: the plain sum of squares left the range of f64, or every entry is zero or not finite.
     let largest = x.iter().fold(0.0_f64, |a, v| a.max(v.abs()));
     if largest == 0.0 || !largest.is_finite() {
-        return if x.iter().any(|v| v.is_nan()) {
-            f64::NAN
-        } else {
-            largest
-        };
+        return if x.iter().any(|v| v.is_nan()) { f64::NAN } else { largest };
     }
-    largest
-        * x.iter()
-            .map(|v| (v / largest) * (v / largest))
-            .sum::<f64>()
-            .sqrt()
+    largest * x.iter().map(|v| (v / largest) * (v / largest)).sum::<f64>().sqrt()
 }

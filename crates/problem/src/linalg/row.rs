@@ -109,7 +109,11 @@ mod tests {
             for n in 0..9_usize {
                 let cols: Vec<u32> = (0..n as u32).map(|k| (k * 5) % 7).collect();
                 let blocks: Vec<[[f64; D]; D]> = (0..n)
-                    .map(|b| std::array::from_fn(|k| std::array::from_fn(|l| ((b * 9 + k * 3 + l) as f64).sin())))
+                    .map(|b| {
+                        std::array::from_fn(|k| {
+                            std::array::from_fn(|l| ((b * 9 + k * 3 + l) as f64).sin())
+                        })
+                    })
                     .collect();
                 // Exactly as long as the largest index asks for: a kernel that reads beyond shows under a sanitizer.
                 let x: Vec<f64> = (0..7 * D).map(|i| (i as f64 * 0.7).cos()).collect();

@@ -51,12 +51,7 @@ impl Default for Planted {
             contacts: 20,
             dofs: 60,
             bilateral: 0,
-            mix: PlantedMix {
-                open: 1.0,
-                stick: 1.0,
-                slip: 1.0,
-                degenerate: 0.0,
-            },
+            mix: PlantedMix { open: 1.0, stick: 1.0, slip: 1.0, degenerate: 0.0 },
             mu: (0.2, 0.9),
             skew: 0.0,
             seed: 0,
@@ -82,7 +77,7 @@ impl Planted {
             // Contacts visit the bodies in turn, so that each is touched when there are enough contacts.
             let (a, b) = (c % bodies, pick(normal()));
             let mut rows: Vec<usize> = (6 * a..(6 * a + 6).min(n)).collect();
-            if b != a && c % 3 != 0 {
+            if b != a && !c.is_multiple_of(3) {
                 rows.extend(6 * b..(6 * b + 6).min(n));
             }
             rows
@@ -120,14 +115,7 @@ impl Planted {
         let mut b = vec![0.0; p];
         g.mul_transpose_add(-1.0, &v, &mut b);
         let bilateral = (p > 0).then_some(BilateralGlobal { G: g, b });
-        let problem = FrictionGlobal {
-            M: mass,
-            H: h,
-            f,
-            w,
-            mu,
-            bilateral,
-        };
+        let problem = FrictionGlobal { M: mass, H: h, f, w, mu, bilateral };
         problem.validate().expect("a planted problem is valid");
         (problem, GlobalPoint { v, r, lambda })
     }
@@ -169,24 +157,14 @@ impl Planted {
                 q[D * i + k] -= product[k];
             }
         }
-        let problem = FrictionLocal {
-            W: w,
-            q,
-            mu: global.mu,
-            bilateral,
-        };
+        let problem = FrictionLocal { W: w, q, mu: global.mu, bilateral };
         problem.validate().expect("a planted problem is valid");
         (problem, LocalPoint { r, lambda })
     }
 
     /// Draws `(u, r)` of one contact that obeys the law.
     fn plant(&self, mu: f64, rng: &mut Pcg64, u: &mut [f64], r: &mut [f64]) {
-        let PlantedMix {
-            open,
-            stick,
-            slip,
-            degenerate,
-        } = self.mix;
+        let PlantedMix { open, stick, slip, degenerate } = self.mix;
         let mut draw = rng.random_range(0.0..open + stick + slip + degenerate);
         let direction = direction(u.len() - 1, rng);
         let size = rng.random_range(0.1..1.0);
@@ -194,10 +172,7 @@ impl Planted {
         let inside = rng.random_range(0.0..0.9);
         let apex = rng.random_range(0.0..1.0) < 0.5;
         let tangential = |x: &mut [f64], a: f64| {
-            x[1..]
-                .iter_mut()
-                .zip(&direction)
-                .for_each(|(x, d)| *x = a * d);
+            x[1..].iter_mut().zip(&direction).for_each(|(x, d)| *x = a * d);
         };
         if draw < open {
             u[0] = size;
@@ -296,58 +271,16 @@ mod tests {
     #[test]
     fn statuses_are_those_planted() {
         for (mix, motion) in [
-            (
-                PlantedMix {
-                    open: 1.0,
-                    stick: 0.0,
-                    slip: 0.0,
-                    degenerate: 0.0,
-                },
-                Motion::Open,
-            ),
-            (
-                PlantedMix {
-                    open: 0.0,
-                    stick: 1.0,
-                    slip: 0.0,
-                    degenerate: 0.0,
-                },
-                Motion::Stick,
-            ),
-            (
-                PlantedMix {
-                    open: 0.0,
-                    stick: 0.0,
-                    slip: 1.0,
-                    degenerate: 0.0,
-                },
-                Motion::Slip,
-            ),
+            (PlantedMix { open: 1.0, stick: 0.0, slip: 0.0, degenerate: 0.0 }, Motion::Open),
+            (PlantedMix { open: 0.0, stick: 1.0, slip: 0.0, degenerate: 0.0 }, Motion::Stick),
+            (PlantedMix { open: 0.0, stick: 0.0, slip: 1.0, degenerate: 0.0 }, Motion::Slip),
         ] {
-            let (problem, point) = Planted {
-                mix,
-                ..Planted::default()
-            }
-            .local::<3>();
+            let (problem, point) = Planted { mix, ..Planted::default() }.local::<3>();
             let verdict = problem.judge(&point, 1e-10).unwrap();
-            assert!(
-                verdict
-                    .statuses
-                    .iter()
-                    .all(|s| s.status == motion && !s.degenerate)
-            );
+            assert!(verdict.statuses.iter().all(|s| s.status == motion && !s.degenerate));
         }
-        let mix = PlantedMix {
-            open: 0.0,
-            stick: 0.0,
-            slip: 0.0,
-            degenerate: 1.0,
-        };
-        let (problem, point) = Planted {
-            mix,
-            ..Planted::default()
-        }
-        .local::<3>();
+        let mix = PlantedMix { open: 0.0, stick: 0.0, slip: 0.0, degenerate: 1.0 };
+        let (problem, point) = Planted { mix, ..Planted::default() }.local::<3>();
         assert_eq!(problem.judge(&point, 1e-10).unwrap().counts.degenerate, 20);
     }
 
@@ -362,11 +295,7 @@ mod tests {
     fn the_residual_does_not_depend_on_units() {
         // Impulses in other units: W → W/a, r → a r; velocities in other units: q → b q.
         let (problem, mut point) = Planted::default().local::<3>();
-        point
-            .r
-            .iter_mut()
-            .enumerate()
-            .for_each(|(i, r)| *r += 1e-4 * (i as f64).sin());
+        point.r.iter_mut().enumerate().for_each(|(i, r)| *r += 1e-4 * (i as f64).sin());
         let reference = problem.judge(&point, 1e-8).unwrap().measure;
         let (a, b) = (1e6, 1e-3);
         let scaled = FrictionLocal::<3>::new(
@@ -382,9 +311,6 @@ mod tests {
         let other = scaled.judge(&point, 1e-8).unwrap().measure;
         assert!((other.relative / reference.relative - 1.0).abs() < 1e-9);
         assert!((other.absolute / reference.absolute - b).abs() < 1e-9 * b);
-        assert!(
-            (other.paper / reference.paper - 1.0).abs() > 0.5,
-            "the paper's does depend"
-        );
+        assert!((other.paper / reference.paper - 1.0).abs() > 0.5, "the paper's does depend");
     }
 }

@@ -59,11 +59,7 @@ pub fn alart_curnier<const D: usize>(
     mu: f64,
     rho: Radii,
 ) -> Linearised<D> {
-    let mut out = Linearised {
-        phi: [0.0; D],
-        a: [[0.0; D]; D],
-        b: [[0.0; D]; D],
-    };
+    let mut out = Linearised { phi: [0.0; D], a: [[0.0; D]; D], b: [[0.0; D]; D] };
     let x_n = r[0] - rho.normal * u[0];
     if x_n > 0.0 {
         out.phi[0] = rho.normal * u[0];
@@ -135,25 +131,18 @@ mod tests {
         ([0.1, 0.5, -0.9], [2.0, 0.2, 0.1], "slip"),
         ([-0.3, -1.5, 0.4], [0.7, -0.3, 0.6], "slip, penetrating"),
         ([3.0, 0.5, -0.9], [-0.2, 0.3, 0.1], "open"),
-        (
-            [3.0, 1.5, -0.9],
-            [0.4, 0.3, 0.1],
-            "separating, r_N > 0: the variants differ",
-        ),
+        ([3.0, 1.5, -0.9], [0.4, 0.3, 0.1], "separating, r_N > 0: the variants differ"),
     ];
 
     #[test]
     fn the_jacobian_agrees_with_finite_differences_on_every_piece() {
-        let rho = Radii {
-            normal: 0.7,
-            tangential: 1.3,
-        };
+        let rho = Radii { normal: 0.7, tangential: 1.3 };
         for disk in [Disk::AlartCurnier, Disk::JeanMoreau] {
             for (u, r, name) in POINTS {
                 let at = alart_curnier(disk, &u, &r, 0.6, rho);
                 let h = 1e-6;
                 for l in 0..3 {
-                    let mut step = |x: &[f64; 3], s: f64| {
+                    let step = |x: &[f64; 3], s: f64| {
                         let mut y = *x;
                         y[l] += s;
                         y
@@ -163,14 +152,8 @@ mod tests {
                     let (rp, rm) = (phi(&u, &step(&r, h)), phi(&u, &step(&r, -h)));
                     for k in 0..3 {
                         let (du, dr) = ((up[k] - um[k]) / (2.0 * h), (rp[k] - rm[k]) / (2.0 * h));
-                        assert!(
-                            (du - at.a[k][l]).abs() < 1e-8,
-                            "{disk:?} {name} A[{k}][{l}]"
-                        );
-                        assert!(
-                            (dr - at.b[k][l]).abs() < 1e-8,
-                            "{disk:?} {name} B[{k}][{l}]"
-                        );
+                        assert!((du - at.a[k][l]).abs() < 1e-8, "{disk:?} {name} A[{k}][{l}]");
+                        assert!((dr - at.b[k][l]).abs() < 1e-8, "{disk:?} {name} B[{k}][{l}]");
                     }
                 }
             }
@@ -180,13 +163,7 @@ mod tests {
     #[test]
     fn at_a_kink_the_jacobian_is_that_of_a_neighbouring_piece() {
         // ‖x_T‖ = R exactly: stick and slip meet.
-        let (rho, mu) = (
-            Radii {
-                normal: 1.0,
-                tangential: 1.0,
-            },
-            0.5,
-        );
+        let (rho, mu) = (Radii { normal: 1.0, tangential: 1.0 }, 0.5);
         let (u, r) = ([0.0; 3], [2.0, 0.6, 0.8]);
         for disk in [Disk::AlartCurnier, Disk::JeanMoreau] {
             let kink = alart_curnier(disk, &u, &r, mu, rho);
@@ -205,10 +182,7 @@ mod tests {
 
     #[test]
     fn vanishes_at_the_law_and_only_there() {
-        let rho = Radii {
-            normal: 0.7,
-            tangential: 1.3,
-        };
+        let rho = Radii { normal: 0.7, tangential: 1.3 };
         let mu = 0.5;
         let law = [
             ([0.0; 3], [2.0, 0.3, 0.1]),

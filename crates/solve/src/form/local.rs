@@ -26,19 +26,12 @@ impl<const D: usize> Eliminated<D> {
     fn new(problem: &FrictionLocal<D>, b: &BilateralLocal) -> Result<Self, SolveError> {
         let r_inverse = Inverse::semidefinite(&b.R, "R")?;
         // V R⁻¹ Vᵀ is the Delassus operator of "H = Vᵀ, M = R".
-        let w = problem
-            .W
-            .minus(&Delassus::new(&b.V.transpose(), &r_inverse).condense());
+        let w = problem.W.minus(&Delassus::new(&b.V.transpose(), &r_inverse).condense());
         let mut lambda = b.s.clone();
         r_inverse.solve(&mut lambda);
         let mut q = problem.q.clone();
         b.V.mul_add(-1.0, &lambda, &mut q);
-        Ok(Self {
-            w,
-            q,
-            scratch: vec![0.0; r_inverse.scratch_len()],
-            r_inverse,
-        })
+        Ok(Self { w, q, scratch: vec![0.0; r_inverse.scratch_len()], r_inverse })
     }
 }
 
@@ -56,16 +49,9 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
     type State = LocalState<D>;
 
     fn state(&self) -> Result<Self::State, SolveError> {
-        let eliminated = self
-            .bilateral
-            .as_ref()
-            .map(|b| Eliminated::new(self, b))
-            .transpose()?;
+        let eliminated = self.bilateral.as_ref().map(|b| Eliminated::new(self, b)).transpose()?;
         let norm_q = norm(&self.q);
-        Ok(LocalState {
-            scale: if norm_q > 0.0 { norm_q } else { 1.0 },
-            eliminated,
-        })
+        Ok(LocalState { scale: if norm_q > 0.0 { norm_q } else { 1.0 }, eliminated })
     }
 
     fn mu(&self) -> &[f64] {

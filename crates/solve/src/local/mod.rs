@@ -40,11 +40,7 @@ pub fn frictionless<const D: usize>(w: &[[f64; D]; D], q: &[f64; D], r: &[f64; D
     let mut out = [0.0; D];
     if q[0] < 0.0 {
         // Without W_NN > 0 nothing moves the contact: keep what it has.
-        out[0] = if w[0][0] > 0.0 {
-            -q[0] / w[0][0]
-        } else {
-            r[0].max(0.0)
-        };
+        out[0] = if w[0][0] > 0.0 { -q[0] / w[0][0] } else { r[0].max(0.0) };
     }
     out
 }
@@ -63,9 +59,6 @@ fn inverse_or_regularised<const D: usize>(w: &[[f64; D]; D]) -> Option<[[f64; D]
 
 /// A bound on the spectral radius of a block: the smaller of its row-sum and Frobenius norms.
 fn norm_bound<const D: usize>(w: &[[f64; D]; D]) -> f64 {
-    let rows = w
-        .iter()
-        .map(|r| r.iter().map(|x| x.abs()).sum::<f64>())
-        .fold(0.0, f64::max);
+    let rows = w.iter().map(|r| r.iter().map(|x| x.abs()).sum::<f64>()).fold(0.0, f64::max);
     rows.min(w.iter().flatten().map(|x| x * x).sum::<f64>().sqrt())
 }

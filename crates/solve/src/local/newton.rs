@@ -35,17 +35,9 @@ impl<const D: usize> LocalSolver<D> for Newton {
         let mut tangential = *w;
         tangential[0] = [0.0; D];
         tangential.iter_mut().for_each(|row| row[0] = 0.0);
-        let rho = Radii {
-            normal: 1.0 / w[0][0],
-            tangential: 1.0 / norm_bound(&tangential),
-        };
-        let usable = [rho.normal, rho.tangential]
-            .iter()
-            .all(|r| *r > 0.0 && r.is_finite());
-        NewtonMemo {
-            rho: usable.then_some(rho),
-            exact: Exact.prepare(w, mu),
-        }
+        let rho = Radii { normal: 1.0 / w[0][0], tangential: 1.0 / norm_bound(&tangential) };
+        let usable = [rho.normal, rho.tangential].iter().all(|r| *r > 0.0 && r.is_finite());
+        NewtonMemo { rho: usable.then_some(rho), exact: Exact.prepare(w, mu) }
     }
 
     fn solve(

@@ -6,7 +6,7 @@
 //! Source: DeSaxceFeng1991; Acary, lecture (105)–(109); Khobotov1987. Cost: about 40 flops a step. A single step
 //! per visit converges slowly when the block is badly conditioned, and may not at all for large mu.
 
-use nonsmooth_problem::linalg::small::{mul, tangential_norm};
+use nonsmooth_problem::linalg::small::mul;
 
 use super::{LocalSolver, norm_bound};
 use crate::cone;
@@ -107,7 +107,7 @@ fn modified_velocity<const D: usize>(
     for k in 0..D {
         u[k] += q[k];
     }
-    u[0] += mu * tangential_norm(&u);
+    u[0] += mu * cone::tangential_norm(&u);
     u
 }
 

@@ -5,9 +5,9 @@
 //! residual is smallest is taken. Cost: about 500 flops.
 //! Source: BonnefonDaviet2011; DBB11, appendix B.
 
-use nonsmooth_problem::linalg::small::{mul, tangential_norm};
+use nonsmooth_problem::linalg::small::mul;
 
-use super::exact::{Sliding, embed, stick};
+use super::exact::{Schur, Sliding, embed, stick};
 use super::{Exact, LocalSolver, inverse_or_regularised};
 use crate::cone;
 
@@ -19,6 +19,7 @@ pub struct Quartic;
 #[derive(Debug, Clone)]
 pub struct QuarticMemo<const D: usize> {
     inverse: Option<[[f64; D]; D]>,
+    schur: Option<Schur>,
     exact: <Exact as LocalSolver<D>>::Memo,
 }
 
@@ -26,10 +27,8 @@ impl<const D: usize> LocalSolver<D> for Quartic {
     type Memo = QuarticMemo<D>;
 
     fn prepare(&self, w: &[[f64; D]; D], mu: f64) -> QuarticMemo<D> {
-        QuarticMemo {
-            inverse: inverse_or_regularised(w),
-            exact: Exact.prepare(w, mu),
-        }
+        let schur = if D == 3 { Schur::new(w) } else { None };
+        QuarticMemo { inverse: inverse_or_regularised(w), schur, exact: Exact.prepare(w, mu) }
     }
 
     fn solve(
@@ -46,16 +45,13 @@ impl<const D: usize> LocalSolver<D> for Quartic {
         if q[0] >= 0.0 {
             return [0.0; D];
         }
-        if let Some(stuck) = memo
-            .inverse
-            .as_ref()
-            .and_then(|inverse| stick(inverse, q, mu))
-        {
+        if let Some(stuck) = memo.inverse.as_ref().and_then(|inverse| stick(inverse, q, mu)) {
             return stuck;
         }
-        let Some(sliding) = Sliding::new(w, q, mu) else {
+        let Some(schur) = &memo.schur else {
             return *r;
         };
+        let sliding = Sliding::new(schur, q, mu);
         let (p, scale) = sliding.quartic();
         // In units of `scale` the coefficients are comparable.
         let mut scaled = p;
@@ -81,7 +77,7 @@ fn natural_residual<const D: usize>(w: &[[f64; D]; D], q: &[f64; D], mu: f64, r:
     for k in 0..D {
         u[k] += q[k];
     }
-    u[0] += mu * tangential_norm(&u);
+    u[0] += mu * cone::tangential_norm(&u);
     let mut x = [0.0; D];
     for k in 0..D {
         x[k] = mean * r[k] - u[k];
@@ -99,14 +95,8 @@ fn positive_roots(p: &[f64; 5]) -> impl Iterator<Item = f64> {
     let mut count = 0;
     // Cauchy's bound on the roots, from the highest coefficient that is not negligible.
     let largest = p.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
-    let degree = (0..5)
-        .rev()
-        .find(|&k| p[k].abs() > 1e-14 * largest)
-        .unwrap_or(0);
-    let bound = 1.0
-        + p[..degree]
-            .iter()
-            .fold(0.0_f64, |m, c| m.max((c / p[degree]).abs()));
+    let degree = (0..5).rev().find(|&k| p[k].abs() > 1e-14 * largest).unwrap_or(0);
+    let bound = 1.0 + p[..degree].iter().fold(0.0_f64, |m, c| m.max((c / p[degree]).abs()));
     // From the lowest derivative that is linear up to p itself.
     for order in (0..degree).rev() {
         let derivative = differentiate(p, order);
@@ -163,11 +153,7 @@ fn root_between(p: &[f64; 5], mut low: f64, mut high: f64) -> Option<f64> {
             high = x;
         }
         let newton = x - value / evaluate(&slope, x);
-        let next = if newton > low && newton < high {
-            newton
-        } else {
-            0.5 * (low + high)
-        };
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
         if (next - x).abs() <= 0.5 * f64::EPSILON * x.abs() {
             break;
         }
@@ -185,13 +171,7 @@ mod tests {
         // (x−1)(x−2)(x−3)(x+4) = x⁴ − 2x³ − 13x² + 38x − 24.
         let roots: Vec<f64> = positive_roots(&[-24.0, 38.0, -13.0, -2.0, 1.0]).collect();
         assert_eq!(roots.len(), 3);
-        assert!(
-            roots
-                .iter()
-                .zip([1.0, 2.0, 3.0])
-                .all(|(x, y)| (x - y).abs() < 1e-14),
-            "{roots:?}"
-        );
+        assert!(roots.iter().zip([1.0, 2.0, 3.0]).all(|(x, y)| (x - y).abs() < 1e-14), "{roots:?}");
         assert_eq!(positive_roots(&[1.0, 0.0, 1.0, 0.0, 1.0]).count(), 0);
         let linear: Vec<f64> = positive_roots(&[-3.0, 2.0, 0.0, 0.0, 0.0]).collect();
         assert_eq!(linear, [1.5]);

@@ -30,11 +30,7 @@ pub struct Order {
 impl Order {
     /// An order of `n` contacts.
     pub fn new(ordering: Ordering, n: usize, seed: u64) -> Self {
-        let mut order = Self {
-            ordering,
-            permutation: vec![],
-            rng: Pcg64::seed_from_u64(seed),
-        };
+        let mut order = Self { ordering, permutation: vec![], rng: Pcg64::seed_from_u64(seed) };
         order.restart(n, seed);
         order
     }
@@ -43,8 +39,7 @@ impl Order {
     pub fn restart(&mut self, n: usize, seed: u64) {
         self.rng = Pcg64::seed_from_u64(seed);
         self.permutation.clear();
-        self.permutation
-            .extend(0..u32::try_from(n).expect("fewer than 2³² contacts"));
+        self.permutation.extend(0..u32::try_from(n).expect("fewer than 2³² contacts"));
         if self.ordering == Ordering::Shuffled {
             self.permutation.shuffle(&mut self.rng);
         }

@@ -28,20 +28,14 @@ pub struct DeSaxce {
 
 impl Default for DeSaxce {
     fn default() -> Self {
-        Self {
-            rho: 0.0,
-            check_every: 20,
-        }
+        Self { rho: 0.0, check_every: 20 }
     }
 }
 
 impl Settings for DeSaxce {
     fn validate(&self) -> Result<(), String> {
         if !(self.rho >= 0.0 && self.rho.is_finite()) {
-            return Err(format!(
-                "rho: expected a number of at least 0, found {}",
-                self.rho
-            ));
+            return Err(format!("rho: expected a number of at least 0, found {}", self.rho));
         }
         at_least_one("check_every", self.check_every)
     }
@@ -49,11 +43,7 @@ impl Settings for DeSaxce {
 
 impl Method for DeSaxce {
     fn begin<P: Linear<D>, const D: usize>(&self, problem: &P, _: &[f64], field: &mut Field<P, D>) {
-        field.rho = if self.rho > 0.0 {
-            self.rho
-        } else {
-            1.0 / field.largest_eigenvalue(problem)
-        };
+        field.rho = if self.rho > 0.0 { self.rho } else { 1.0 / field.largest_eigenvalue(problem) };
     }
 
     fn advance<P: Linear<D>, const D: usize>(

@@ -1,6 +1,6 @@
 //! The field F and the projection step that the projection methods share.
 
-use nonsmooth_problem::linalg::small::{self, tangential_norm};
+use nonsmooth_problem::linalg::small;
 
 use crate::form::Linear;
 use crate::{SolveError, cone};
@@ -52,8 +52,7 @@ impl<P: Linear<D>, const D: usize> Field<P, D> {
         self.scale = problem.velocity_scale(&self.state);
         self.unit.clear();
         let (state, n) = (&self.state, problem.mu().len());
-        self.unit
-            .extend((0..n).map(|c| small::mean_diagonal(&problem.diagonal_block(state, c))));
+        self.unit.extend((0..n).map(|c| small::mean_diagonal(&problem.diagonal_block(state, c))));
         let mean = self.unit.iter().sum::<f64>() / n as f64;
         for w in &mut self.unit {
             if *w <= 0.0 {
@@ -68,7 +67,7 @@ impl<P: Linear<D>, const D: usize> Field<P, D> {
         problem.velocities(state, r, f);
         for (c, &mu) in problem.mu().iter().enumerate() {
             let u: [f64; D] = small::block(f, c);
-            f[D * c] += mu * tangential_norm(&u);
+            f[D * c] += mu * cone::tangential_norm(&u);
         }
     }
 

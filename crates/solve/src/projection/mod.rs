@@ -57,9 +57,7 @@ impl<M: Method, P: Linear<D>, const D: usize> Solver<P> for Projected<M, D> {
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, field: &mut Self::Work) -> Step {
-        Step::Continue {
-            estimate: self.0.advance(problem, P::impulses(point), field),
-        }
+        Step::Continue { estimate: self.0.advance(problem, P::impulses(point), field) }
     }
 
     fn publish(&self, problem: &P, point: &mut P::Point, field: &mut Self::Work) {
@@ -72,9 +70,5 @@ impl<M: Method, P: Linear<D>, const D: usize> Solver<P> for Projected<M, D> {
 }
 
 fn at_least_one(name: &str, value: usize) -> Result<(), String> {
-    if value == 0 {
-        Err(format!("{name}: expected at least 1, found 0"))
-    } else {
-        Ok(())
-    }
+    if value == 0 { Err(format!("{name}: expected at least 1, found 0")) } else { Ok(()) }
 }

@@ -28,12 +28,7 @@ pub struct StepRule {
 
 impl Default for StepRule {
     fn default() -> Self {
-        Self {
-            accept: 0.9,
-            grow_below: 0.3,
-            shrink: 2.0 / 3.0,
-            check_every: 20,
-        }
+        Self { accept: 0.9, grow_below: 0.3, shrink: 2.0 / 3.0, check_every: 20 }
     }
 }
 
@@ -43,9 +38,7 @@ impl Settings for StepRule {
             if x > 0.0 && x < high {
                 Ok(())
             } else {
-                Err(format!(
-                    "{name}: expected a number in (0, {high}), found {x}"
-                ))
+                Err(format!("{name}: expected a number in (0, {high}), found {x}"))
             }
         };
         inside("accept", self.accept, 1.0)?;

@@ -41,10 +41,7 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
     }
 
     fn lower(&self, _: &FrictionGlobal<D>, point: &GlobalPoint, _: &CondenseMemo) -> LocalPoint {
-        LocalPoint {
-            r: point.r.clone(),
-            lambda: vec![],
-        }
+        LocalPoint { r: point.r.clone(), lambda: vec![] }
     }
 
     fn lift(

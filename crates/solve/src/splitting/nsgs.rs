@@ -85,18 +85,13 @@ impl Default for Nsgs {
 impl Settings for Nsgs {
     fn validate(&self) -> Result<(), String> {
         if !(self.omega > 0.0 && self.omega < 2.0) {
-            return Err(format!(
-                "omega: expected a number in (0, 2), found {}",
-                self.omega
-            ));
+            return Err(format!("omega: expected a number in (0, 2), found {}", self.omega));
         }
         if self.check_every == 0 {
             return Err("check_every: expected at least 1, found 0".into());
         }
         if self.freeze_after > 0 && self.freeze_for == 0 {
-            return Err(
-                "freeze_for: expected at least 1 while freeze_after is set, found 0".into(),
-            );
+            return Err("freeze_for: expected at least 1 while freeze_after is set, found 0".into());
         }
         Ok(())
     }
@@ -120,34 +115,18 @@ impl Nsgs {
     {
         let settings = self;
         match settings.local {
-            LocalChoice::Exact => visitor.visit(Sweeps {
-                settings,
-                local: Exact,
-            }),
-            LocalChoice::Quartic => visitor.visit(Sweeps {
-                settings,
-                local: Quartic,
-            }),
-            LocalChoice::NewtonAc => visitor.visit(Sweeps {
-                settings,
-                local: Newton {
-                    disk: Disk::AlartCurnier,
-                },
-            }),
-            LocalChoice::NewtonJm => visitor.visit(Sweeps {
-                settings,
-                local: Newton {
-                    disk: Disk::JeanMoreau,
-                },
-            }),
-            LocalChoice::Projection => visitor.visit(Sweeps {
-                settings,
-                local: Projection,
-            }),
-            LocalChoice::ProjectionIterated => visitor.visit(Sweeps {
-                settings,
-                local: ProjectionIterated::default(),
-            }),
+            LocalChoice::Exact => visitor.visit(Sweeps { settings, local: Exact }),
+            LocalChoice::Quartic => visitor.visit(Sweeps { settings, local: Quartic }),
+            LocalChoice::NewtonAc => {
+                visitor.visit(Sweeps { settings, local: Newton { disk: Disk::AlartCurnier } })
+            }
+            LocalChoice::NewtonJm => {
+                visitor.visit(Sweeps { settings, local: Newton { disk: Disk::JeanMoreau } })
+            }
+            LocalChoice::Projection => visitor.visit(Sweeps { settings, local: Projection }),
+            LocalChoice::ProjectionIterated => {
+                visitor.visit(Sweeps { settings, local: ProjectionIterated::default() })
+            }
         }
     }
 }
@@ -184,11 +163,7 @@ where
         let mut work = SweepsWork {
             state: problem.state()?,
             contacts: Vec::with_capacity(problem.mu().len()),
-            order: Order::new(
-                self.settings.ordering,
-                problem.mu().len(),
-                self.settings.seed,
-            ),
+            order: Order::new(self.settings.ordering, problem.mu().len(), self.settings.seed),
             scale: 1.0,
             mean_move: 0.0,
         };
@@ -209,19 +184,8 @@ where
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
         let r = P::impulses(point);
-        let SweepsWork {
-            state,
-            contacts,
-            order,
-            scale,
-            mean_move,
-        } = work;
-        let Nsgs {
-            omega,
-            freeze_after,
-            freeze_for,
-            ..
-        } = self.settings;
+        let SweepsWork { state, contacts, order, scale, mean_move } = work;
+        let Nsgs { omega, freeze_after, freeze_for, .. } = self.settings;
         let mut moves = 0.0;
         let settled_below = 1e-6 * *mean_move;
         for &c in order.next_sweep() {
@@ -242,8 +206,7 @@ where
                 q[k] -= own[k];
             }
             let mut new = if contact.mu > 0.0 {
-                self.local
-                    .solve(&mut contact.memo, &contact.w, &q, contact.mu, &old)
+                self.local.solve(&mut contact.memo, &contact.w, &q, contact.mu, &old)
             } else {
                 frictionless(&contact.w, &q, &old)
             };
@@ -265,11 +228,7 @@ where
                 problem.moved(state, c, &dr);
             }
             let moved = contact.unit * contact.unit * size;
-            contact.settled = if moved <= settled_below {
-                contact.settled + 1
-            } else {
-                0
-            };
+            contact.settled = if moved <= settled_below { contact.settled + 1 } else { 0 };
             moves += moved;
         }
         *mean_move = moves / contacts.len() as f64;
@@ -277,9 +236,7 @@ where
             // Every later sweep would repeat this one.
             return Step::Done;
         }
-        Step::Continue {
-            estimate: moves.sqrt() / *scale,
-        }
+        Step::Continue { estimate: moves.sqrt() / *scale }
     }
 
     fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
@@ -304,13 +261,7 @@ impl<L, const D: usize> Sweeps<L, D> {
             let w = problem.diagonal_block(&work.state, c);
             let memo = self.local.prepare(&w, mu);
             let unit = small::mean_diagonal(&w).abs();
-            work.contacts.push(Contact {
-                w,
-                mu,
-                unit,
-                settled: 0,
-                memo,
-            });
+            work.contacts.push(Contact { w, mu, unit, settled: 0, memo });
         }
     }
 }

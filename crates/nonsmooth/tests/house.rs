@@ -1,0 +1,787 @@
+//! The rules of the house that the compiler does not know: who may import whom, that citations resolve, and
+//! that no file tells on the machine it was written on.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use nonsmooth::solve::registry;
+use nonsmooth::{FrictionGlobal, FrictionLocal};
+
+// ------------------------------------------------------------------------------------------------ floors
+
+/// The crates by the name that sources use, each with those it may depend on: `cli, python → bench →
+/// {dynamics, io} → solve → problem`, but `io → problem` only. `nonsmooth` is the facade.
+const CRATES: &[(&str, &[&str])] = &[
+    ("nonsmooth_problem", &[]),
+    ("nonsmooth_solve", &["nonsmooth_problem"]),
+    ("nonsmooth_io", &["nonsmooth_problem"]),
+    ("nonsmooth_dynamics", &["nonsmooth_problem", "nonsmooth_solve"]),
+    ("nonsmooth_bench", &LIBRARIES),
+    ("nonsmooth_cli", &UP_TO_BENCH),
+    ("nonsmooth_python", &UP_TO_BENCH),
+    ("nonsmooth", &LIBRARIES),
+];
+const LIBRARIES: [&str; 4] =
+    ["nonsmooth_problem", "nonsmooth_solve", "nonsmooth_io", "nonsmooth_dynamics"];
+const UP_TO_BENCH: [&str; 5] = [
+    "nonsmooth_problem",
+    "nonsmooth_solve",
+    "nonsmooth_io",
+    "nonsmooth_dynamics",
+    "nonsmooth_bench",
+];
+
+/// The floors inside a crate, from the bottom up: a module may import from its own floor and from those below.
+struct Floors {
+    floors: &'static [&'static [&'static str]],
+    /// The floor of the modules that `floors` does not name.
+    others: usize,
+    /// Whether modules of the floor `others` may import each other.
+    others_mix: bool,
+    /// What any module may import although it lies above: `(floor of the importer, module)`.
+    contracts: &'static [(usize, &'static str)],
+}
+
+/// `check → kinds → linalg`. A kind names the judge of its own as an associated type, so the two share a floor; what
+/// they must not do is lean on planted instances, and linalg must know neither.
+const PROBLEM: Floors = Floors {
+    floors: &[&["error"], &["linalg"], &["check"], &["planted"]],
+    others: 2,
+    others_mix: true,
+    contracts: &[],
+};
+
+/// `families → {local, parts, solver, reform} → form → cfun → cone`. The loop and the composition stand on the
+/// contract of a solver; the registry stands above all, and a family sees of it what it needs to be registered.
+const SOLVE: Floors = Floors {
+    floors: &[
+        &["error"],
+        &["cone"],
+        &["cfun"],
+        &["form"],
+        &["local", "parts", "solver", "reform"],
+        &["drive", "via", "trace"],
+        &[],
+        &["registry"],
+    ],
+    others: 6,
+    others_mix: false,
+    contracts: &[(6, "registry")],
+};
+
+impl Floors {
+    fn of(&self, module: &str) -> usize {
+        let named = self.floors.iter().position(|f| f.contains(&module));
+        named.unwrap_or(self.others)
+    }
+
+    fn allows(&self, from: &str, to: &str) -> bool {
+        let (a, b) = (self.of(from), self.of(to));
+        from == to
+            || self.contracts.contains(&(a, to))
+            || b < a
+            || (a == b && (a != self.others || self.others_mix))
+    }
+}
+
+/// The floors of a crate's modules, for the crates that have any.
+fn floors_of(krate: &str) -> Option<&'static Floors> {
+    match krate {
+        "nonsmooth_problem" => Some(&PROBLEM),
+        "nonsmooth_solve" => Some(&SOLVE),
+        _ => None,
+    }
+}
+
+/// One source file of a crate, without its comments, its texts and its tests.
+struct Source {
+    /// `crate::a::b` as `[a, b]`; the root is empty.
+    module: Vec<String>,
+    tokens: Vec<String>,
+}
+
+impl Source {
+    /// `place` is the file's path below `src`.
+    fn new(place: &str, text: &str) -> Self {
+        let mut module: Vec<_> =
+            place.trim_end_matches(".rs").split('/').map(str::to_owned).collect();
+        if ["lib", "main", "mod"].contains(&module[module.len() - 1].as_str()) {
+            module.pop();
+        }
+        Self { module, tokens: without_tests(tokens(text)) }
+    }
+
+    /// Every path that starts at a crate of the house or at `crate`, `self` or `super`, made absolute.
+    fn paths(&self) -> Vec<Vec<String>> {
+        let mut found = vec![];
+        let mut module = self.module.clone();
+        // Inline modules that are open, with the depth of braces at which each ends.
+        let (mut open, mut depth) = (vec![], 0_usize);
+        let mut i = 0;
+        while i < self.tokens.len() {
+            let (token, next) = (self.tokens[i].as_str(), self.token(i + 1));
+            let before = i.checked_sub(1).map_or("", |k| self.token(k));
+            match token {
+                "{" => depth += 1,
+                "}" => {
+                    depth = depth.saturating_sub(1);
+                    if open.last() == Some(&depth) {
+                        open.pop();
+                        module.pop();
+                    }
+                }
+                "mod" if self.token(i + 2) == "{" => {
+                    open.push(depth);
+                    module.push(next.to_owned());
+                }
+                _ if before == "::" => {}
+                _ if token == "nonsmooth" || token.starts_with("nonsmooth_") => {
+                    self.tree(i + 1, vec![token.to_owned()], &mut found);
+                }
+                "crate" | "self" | "super" if next == "::" => {
+                    let mut base = module.clone();
+                    match token {
+                        "crate" => base.clear(),
+                        "super" => drop(base.pop()),
+                        _ => {}
+                    }
+                    let mut k = i + 1;
+                    while self.token(k) == "::" && self.token(k + 1) == "super" {
+                        base.pop();
+                        k += 2;
+                    }
+                    base.insert(0, "crate".to_owned());
+                    self.tree(k, base, &mut found);
+                }
+                // In the root a plain `use` starts at a module.
+                "use" if module.is_empty() && !["crate", "self", "::"].contains(&next) => {
+                    let base = vec!["crate".to_owned(), next.to_owned()];
+                    self.tree(i + 2, base, &mut found);
+                }
+                _ => {}
+            }
+            i += 1;
+        }
+        found
+    }
+
+    fn token(&self, i: usize) -> &str {
+        self.tokens.get(i).map_or("", String::as_str)
+    }
+
+    /// Reads the rest of a path or of a tree of `use` from token `i`; the first token after it.
+    fn tree(&self, mut i: usize, mut path: Vec<String>, found: &mut Vec<Vec<String>>) -> usize {
+        while self.token(i) == "::" {
+            match self.token(i + 1) {
+                "{" => {
+                    i += 2;
+                    while !["}", ""].contains(&self.token(i)) {
+                        match self.token(i) {
+                            "," => i += 1,
+                            "self" => {
+                                found.push(path.clone());
+                                i += 1;
+                            }
+                            head => {
+                                let mut longer = path.clone();
+                                longer.push(head.to_owned());
+                                i = self.tree(i + 1, longer, found);
+                            }
+                        }
+                    }
+                    return i + 1;
+                }
+                // Generic arguments end the path; what is in them starts anew.
+                "<" => break,
+                segment => {
+                    path.push(segment.to_owned());
+                    i += 2;
+                }
+            }
+        }
+        found.push(path);
+        if self.token(i) == "as" { i + 2 } else { i }
+    }
+}
+
+/// Identifiers, `::` and single signs. Comments, texts, characters and lifetimes are left out.
+fn tokens(text: &str) -> Vec<String> {
+    let chars: Vec<char> = text.chars().collect();
+    let at = |i: usize| chars.get(i).copied().unwrap_or('\0');
+    let word = |c: char| c.is_alphanumeric() || c == '_';
+    let mut out = vec![];
+    let mut i = 0;
+    while i < chars.len() {
+        match at(i) {
+            '/' if at(i + 1) == '/' => {
+                while i < chars.len() && at(i) != '\n' {
+                    i += 1;
+                }
+            }
+            '/' if at(i + 1) == '*' => {
+                let mut depth = 0;
+                while i < chars.len() {
+                    match (at(i), at(i + 1)) {
+                        ('/', '*') => depth += 1,
+                        ('*', '/') => depth -= 1,
+                        _ => {
+                            i += 1;
+                            continue;
+                        }
+                    }
+                    i += 2;
+                    if depth == 0 {
+                        break;
+                    }
+                }
+            }
+            '"' => i = after_text(&chars, i),
+            '\'' if at(i + 1) == '\\' || at(i + 2) == '\'' => {
+                i += if at(i + 1) == '\\' { 3 } else { 2 };
+                while i < chars.len() && at(i) != '\'' {
+                    i += 1;
+                }
+                i += 1;
+            }
+            '\'' => {
+                i += 1;
+                while word(at(i)) {
+                    i += 1;
+                }
+            }
+            ':' if at(i + 1) == ':' => {
+                out.push("::".to_owned());
+                i += 2;
+            }
+            c if word(c) => {
+                let start = i;
+                while word(at(i)) {
+                    i += 1;
+                }
+                let name: String = chars[start..i].iter().collect();
+                match (name.as_str(), at(i)) {
+                    ("b" | "c", '"') => i = after_text(&chars, i),
+                    ("r" | "br" | "cr", '"' | '#') => {
+                        let mut hashes = 0;
+                        while at(i + hashes) == '#' {
+                            hashes += 1;
+                        }
+                        if at(i + hashes) == '"' {
+                            i += hashes + 1;
+                            while i < chars.len()
+                                && !(at(i) == '"' && (1..=hashes).all(|k| at(i + k) == '#'))
+                            {
+                                i += 1;
+                            }
+                            i += hashes + 1;
+                        } else {
+                            i += hashes; // a raw identifier
+                        }
+                    }
+                    _ => out.push(name),
+                }
+            }
+            c => {
+                if !c.is_whitespace() {
+                    out.push(c.to_string());
+                }
+                i += 1;
+            }
+        }
+    }
+    out
+}
+
+/// The place after the text whose opening quote stands at `i`.
+fn after_text(chars: &[char], mut i: usize) -> usize {
+    i += 1;
+    while i < chars.len() && chars[i] != '"' {
+        i += if chars[i] == '\\' { 2 } else { 1 };
+    }
+    i + 1
+}
+
+/// Drops every item under `#[cfg(test)]`: tests may look anywhere.
+fn without_tests(tokens: Vec<String>) -> Vec<String> {
+    let at = |i: usize| tokens.get(i).map_or("", String::as_str);
+    // The place after the bracket that closes the one at `i`.
+    let closing = |mut i: usize, open: &str, close: &str| {
+        let mut depth = 0_usize;
+        while i < tokens.len() {
+            if at(i) == open {
+                depth += 1;
+            } else if at(i) == close {
+                depth -= 1;
+                if depth == 0 {
+                    break;
+                }
+            }
+            i += 1;
+        }
+        i + 1
+    };
+    let mut out = vec![];
+    let mut i = 0;
+    while i < tokens.len() {
+        let attribute = at(i) == "#" && at(i + 1) == "[";
+        if attribute && at(i + 2) == "cfg" {
+            let end = closing(i + 1, "[", "]");
+            let condition = &tokens[i + 3..end.min(tokens.len())];
+            let holds = |word: &str| condition.iter().any(|t| t == word);
+            if holds("test") && !holds("not") {
+                i = end;
+                while at(i) == "#" {
+                    i = closing(i + 1, "[", "]");
+                }
+                while i < tokens.len() && at(i) != "{" && at(i) != ";" {
+                    i += 1;
+                }
+                i = if at(i) == "{" { closing(i, "{", "}") } else { i + 1 };
+                continue;
+            }
+        }
+        out.push(tokens[i].clone());
+        i += 1;
+    }
+    out
+}
+
+/// What the root of a crate re-exports: the name outside, and the module it comes from.
+fn reexports(root: &Source) -> BTreeMap<String, String> {
+    let inside = |p: &[String]| p[0] == "crate" && p.len() > 2;
+    root.paths()
+        .into_iter()
+        .filter(|p| inside(p))
+        .map(|p| (p[p.len() - 1].clone(), p[1].clone()))
+        .collect()
+}
+
+/// What is wrong with the imports of one file, in words.
+fn violations(krate: &str, source: &Source, reexported: &BTreeMap<String, String>) -> Vec<String> {
+    let Some((_, below)) = CRATES.iter().find(|(name, _)| *name == krate) else {
+        return vec![format!("{krate} stands on no floor: name it in CRATES")];
+    };
+    let mut wrong = BTreeSet::new();
+    for path in source.paths() {
+        let text = path.join("::");
+        if path[0] != "crate" {
+            let known = CRATES.iter().any(|(name, _)| *name == path[0]);
+            if known && path[0] != krate && !below.contains(&path[0].as_str()) {
+                wrong.insert(format!("{krate} must not depend on {text}"));
+            }
+            continue;
+        }
+        let (Some(floors), Some(from), Some(head)) =
+            (floors_of(krate), source.module.first(), path.get(1))
+        else {
+            continue; // the root may import all
+        };
+        if head == "*" {
+            wrong.insert(format!("{from} imports {text}: name what you need"));
+            continue;
+        }
+        let to = reexported.get(head).unwrap_or(head);
+        // What the root itself defines (a macro) is no module.
+        if to.starts_with(|c: char| c.is_lowercase()) && !floors.allows(from, to) {
+            wrong.insert(format!("{krate}: {from} must not import {text}"));
+        }
+    }
+    wrong.into_iter().collect()
+}
+
+/// The crates of the house among the `[dependencies]` of a manifest, development ones apart.
+fn dependencies(manifest: &str) -> BTreeSet<String> {
+    let mut section = "";
+    let mut found = BTreeSet::new();
+    for line in manifest.lines().map(str::trim) {
+        if let Some(header) = line.strip_prefix('[') {
+            section = header.trim_end_matches(']');
+            // `[dependencies.name]`
+            let (table, name) = section.rsplit_once('.').unwrap_or((section, ""));
+            if table.ends_with("dependencies") && !table.ends_with("dev-dependencies") {
+                found.insert(name.replace('-', "_"));
+            }
+        } else if section.ends_with("dependencies") && !section.ends_with("dev-dependencies") {
+            let name = line.split(['.', '=', ' ']).next().unwrap_or_default();
+            found.insert(name.replace('-', "_"));
+        }
+    }
+    found.retain(|name| name == "nonsmooth" || name.starts_with("nonsmooth_"));
+    found
+}
+
+#[test]
+fn every_crate_and_module_keeps_to_its_floor() {
+    let mut wrong = vec![];
+    let mut seen = 0;
+    for folder in crate_folders() {
+        let manifest = read(&folder.join("Cargo.toml"));
+        let name = manifest
+            .lines()
+            .find_map(|l| l.strip_prefix("name = \""))
+            .and_then(|l| l.split('"').next())
+            .expect("a package has a name")
+            .replace('-', "_");
+        let below = CRATES.iter().find(|(n, _)| *n == name).map(|(_, b)| *b);
+        for dependency in dependencies(&manifest) {
+            if !below.is_some_and(|b| b.contains(&dependency.as_str())) {
+                wrong.push(format!("{name}'s Cargo.toml must not name {dependency}"));
+            }
+        }
+        let src = folder.join("src");
+        let root = ["lib.rs", "main.rs"].map(|f| src.join(f));
+        let root = root.iter().find(|p| p.exists()).expect("a crate has a root");
+        let reexported = reexports(&Source::new("lib.rs", &read(root)));
+        for file in files(&src).into_iter().filter(|f| has_extension(f, "rs")) {
+            let place = relative(&file, &src);
+            let source = Source::new(&place, &read(&file));
+            for violation in violations(&name, &source, &reexported) {
+                wrong.push(format!("{}: {violation}", relative(&file, &root_folder())));
+            }
+            seen += 1;
+        }
+    }
+    assert!(seen > 50, "only {seen} sources found");
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
+/// The violations of a planted file.
+fn planted(krate: &str, place: &str, text: &str) -> Vec<String> {
+    let root = Source::new("lib.rs", "mod drive; pub use drive::{Driver, Limit as Bound};");
+    violations(krate, &Source::new(place, text), &reexports(&root))
+}
+
+#[test]
+fn the_checker_finds_planted_violations() {
+    let solve = |place, text| planted("nonsmooth_solve", place, text);
+    let problem = |place, text| planted("nonsmooth_problem", place, text);
+    // Crates.
+    assert_eq!(
+        planted("nonsmooth_io", "lib.rs", "use nonsmooth_solve::Driver;"),
+        ["nonsmooth_io must not depend on nonsmooth_solve::Driver"]
+    );
+    assert_eq!(solve("drive.rs", "fn f() { nonsmooth_dynamics::x() }").len(), 1);
+    assert_eq!(solve("drive.rs", "use nonsmooth_bench as b;").len(), 1);
+    assert_eq!(planted("nonsmooth_new", "lib.rs", "").len(), 1);
+    // A family and another family, by every way of writing it.
+    for text in [
+        "use crate::newton::X;",
+        "use crate::{SolveError, newton::{self, X}};",
+        "use super::super::newton::X;",
+        "use crate::newton;",
+        "fn f() -> crate::newton::X { todo!() }",
+        "fn f(x: Vec<crate::newton::X>) {}",
+        "mod inner { use super::super::super::newton::X; }",
+        "pub use crate::{form::{Linear, Blockwise}, newton::X as Y};",
+    ] {
+        let found = solve("splitting/nsgs.rs", text);
+        assert!(!found.is_empty(), "{text}");
+        for violation in found {
+            let expected = "nonsmooth_solve: splitting must not import crate::newton";
+            assert!(violation.starts_with(expected), "{text}: {violation}");
+        }
+    }
+    // Upwards.
+    assert_eq!(solve("cone/coulomb.rs", "use crate::cfun::Disk;").len(), 1);
+    assert_eq!(solve("cfun/mod.rs", "use crate::form::Linear;").len(), 1);
+    assert_eq!(solve("form/local.rs", "use crate::Driver;").len(), 1, "a re-export");
+    assert_eq!(solve("parts/mod.rs", "use crate::registry::Settings;").len(), 1);
+    assert_eq!(solve("local/mod.rs", "use crate::splitting::Nsgs;").len(), 1);
+    assert_eq!(solve("drive.rs", "use crate::registry::About;").len(), 1);
+    assert_eq!(solve("local/mod.rs", "use crate::*;").len(), 1);
+    assert_eq!(problem("linalg/bsr.rs", "use crate::check::Measure;").len(), 1);
+    assert_eq!(problem("linalg/bsr.rs", "use crate::lcp::Lcp;").len(), 1);
+    assert_eq!(problem("check/local.rs", "use super::super::planted::Planted;").len(), 1);
+    assert_eq!(problem("lcp.rs", "use super::planted::Planted;").len(), 1);
+    // After an item under test the file goes on.
+    let text = "#[cfg(test)] mod tests { fn f() {} } use crate::planted::Planted;";
+    assert_eq!(problem("lcp.rs", text).len(), 1);
+    let text = "#[cfg(not(test))] use crate::planted::Planted;";
+    assert_eq!(problem("lcp.rs", text).len(), 1);
+}
+
+#[test]
+fn the_checker_lets_the_house_live() {
+    let solve = |place, text| planted("nonsmooth_solve", place, text);
+    let problem = |place, text| planted("nonsmooth_problem", place, text);
+    for (place, text) in [
+        ("splitting/nsgs.rs", "use crate::local::Exact; use crate::form::Blockwise;"),
+        ("splitting/nsgs.rs", "use crate::registry::Settings; use super::nsgs2::X;"),
+        ("splitting/mod.rs", "mod nsgs; pub use nsgs::Nsgs; use self::nsgs::X;"),
+        ("registry.rs", "use crate::{splitting::Nsgs, newton::Newton, Driver};"),
+        ("lib.rs", "pub mod splitting; pub use splitting::Nsgs;"),
+        ("via.rs", "use crate::reform::Reformulation; use crate::solver::Solver;"),
+        ("cone/mod.rs", "#[cfg(test)] mod tests { use crate::newton::X; }"),
+        ("cone/mod.rs", "#[cfg(test)] #[path = \"t.rs\"] mod tests; fn f() {}"),
+        (
+            "cone/mod.rs",
+            "/// [x](crate::newton)\n/* crate::newton /* */ crate::newton */ fn f() {}",
+        ),
+        ("cone/mod.rs", "const A: &str = \"crate::newton\\\" crate::newton\";"),
+        ("cone/mod.rs", "const A: &str = r#\"crate::\"newton\"#; fn f<'a>(c: char) { c == '\"'; }"),
+        ("cone/mod.rs", "pub(crate) fn f() {} pub(super) fn g() {}"),
+        ("form/mod.rs", "use nonsmooth_problem::{Problem, linalg::Csc}; use crate::SolveError;"),
+    ] {
+        assert_eq!(solve(place, text), [""; 0], "{text}");
+    }
+    for (place, text) in [
+        ("lcp.rs", "use crate::check::{self, Measure}; use crate::linalg::Csc;"),
+        ("check/lcp.rs", "use crate::lcp::Lcp; use super::Measure;"),
+        ("planted/lcp.rs", "use crate::check::Measure; use crate::lcp::Lcp;"),
+        ("friction.rs", "macro_rules! m { () => { $crate::Friction } }"),
+    ] {
+        assert_eq!(problem(place, text), [""; 0], "{text}");
+    }
+    assert_eq!(
+        dependencies(
+            "[package]\nname = \"nonsmooth-io\"\n[dependencies]\nnonsmooth-problem.workspace = true\n\
+             faer = \"1\"\n[dependencies.nonsmooth-solve]\nversion = \"1\"\n[dev-dependencies]\n\
+             nonsmooth-bench.workspace = true\n"
+        )
+        .into_iter()
+        .collect::<Vec<_>>(),
+        ["nonsmooth_problem", "nonsmooth_solve"]
+    );
+}
+
+// --------------------------------------------------------------------------------------------- citations
+
+/// The keys of `docs/refs.bib`, each with its entry.
+fn bibliography() -> BTreeMap<String, String> {
+    let text = read(&root_folder().join("docs/refs.bib"));
+    let mut entries = BTreeMap::new();
+    for entry in text.split("\n@").skip(1) {
+        let (head, body) = entry.split_once(',').expect("@type{key, fields}");
+        let (_, key) = head.split_once('{').expect("@type{key");
+        let twice = entries.insert(key.trim().to_owned(), body.to_owned());
+        assert!(twice.is_none(), "{key} stands twice in refs.bib");
+    }
+    entries
+}
+
+/// Words that look like citation keys: names and a year (`HanLo2002`).
+fn keys_with_year(text: &str) -> BTreeSet<String> {
+    words(text)
+        .filter(|word| {
+            let (name, year) = word.split_at(word.len().saturating_sub(4));
+            let mut letters = name.chars();
+            name.len() >= 2
+                && letters.next().is_some_and(|c| c.is_ascii_uppercase())
+                && letters.all(|c| c.is_ascii_alphabetic())
+                && ["18", "19", "20"].iter().any(|century| year.starts_with(century))
+                && year.chars().all(|c| c.is_ascii_digit())
+        })
+        .map(str::to_owned)
+        .collect()
+}
+
+/// Words that look like keys of initials and two figures (`DBB11`); only trusted where references stand.
+fn keys_of_initials(text: &str) -> BTreeSet<String> {
+    words(text)
+        .filter(|word| {
+            let (name, year) = word.split_at(word.len().saturating_sub(2));
+            name.len() >= 2
+                && name.chars().all(|c| c.is_ascii_uppercase())
+                && year.chars().all(|c| c.is_ascii_digit())
+        })
+        .map(str::to_owned)
+        .collect()
+}
+
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| !c.is_ascii_alphanumeric())
+}
+
+/// The comment paragraphs of a source from `References:` or `Source:` on.
+fn references(source: &str) -> String {
+    let mut out = String::new();
+    let mut inside = false;
+    for line in source.lines().map(str::trim_start) {
+        let comment = line.strip_prefix("//");
+        let text = comment.unwrap_or_default().trim_start_matches(['/', '!']);
+        let starts = ["References:", "Reference:", "Source:", "Sources:"];
+        let start = starts.iter().filter_map(|s| text.find(s)).min();
+        inside = !text.trim().is_empty() && (inside || start.is_some());
+        if inside {
+            out.push_str(&text[start.unwrap_or(0)..]);
+            out.push('\n');
+        }
+    }
+    out
+}
+
+/// The comments of a source.
+fn comments(source: &str) -> String {
+    let lines = source.lines().filter_map(|l| l.split_once("//"));
+    lines.map(|(_, c)| c).collect::<Vec<_>>().join("\n")
+}
+
+/// The keys that the registry cites, each with who cites it.
+fn registered() -> BTreeMap<String, String> {
+    let kinds = [
+        registry::abouts::<FrictionLocal<2>>(),
+        registry::abouts::<FrictionLocal<3>>(),
+        registry::abouts::<FrictionGlobal<2>>(),
+        registry::abouts::<FrictionGlobal<3>>(),
+    ];
+    let solvers = kinds.into_iter().flatten().map(|a| (a.name, a.cites));
+    let prefixes = registry::PREFIXES.iter().map(|p| (p.name, p.cites));
+    let cited = solvers.chain(prefixes).flat_map(|(name, cites)| {
+        assert!(!cites.is_empty(), "{name} cites nothing");
+        cites.iter().map(move |key| ((*key).to_owned(), format!("the registry's {name}")))
+    });
+    cited.collect()
+}
+
+#[test]
+fn every_citation_is_in_the_bibliography_and_every_entry_is_cited() {
+    let root = root_folder();
+    let known = bibliography();
+    let mut cited = registered();
+    let mut mentioned = BTreeSet::new();
+    for file in project_files() {
+        let place = relative(&file, &root);
+        if place == "docs/refs.bib" || place.starts_with("crates/nonsmooth/tests/") {
+            continue;
+        }
+        let text = read(&file);
+        let keys = match file.extension().and_then(|e| e.to_str()) {
+            Some("rs") => {
+                let mut keys = keys_with_year(&comments(&text));
+                keys.extend(keys_of_initials(&references(&text)));
+                keys
+            }
+            Some("md") => keys_with_year(&text),
+            _ => continue,
+        };
+        mentioned.extend(words(&text).map(str::to_owned));
+        cited.extend(keys.into_iter().map(|key| (key, place.clone())));
+    }
+    let missing: Vec<_> = (cited.iter())
+        .filter(|(key, _)| !known.contains_key(*key))
+        .map(|(key, place)| format!("{key} ({place}) is not in docs/refs.bib"))
+        .collect();
+    let idle: Vec<_> = (known.keys())
+        .filter(|key| !mentioned.contains(*key))
+        .map(|key| format!("{key} is in docs/refs.bib, but nothing cites it"))
+        .collect();
+    assert!(missing.is_empty() && idle.is_empty(), "\n{}\n{}", missing.join("\n"), idle.join("\n"));
+}
+
+#[test]
+fn every_entry_of_the_bibliography_is_complete() {
+    let entries = bibliography();
+    assert!(!entries.is_empty());
+    for (key, body) in entries {
+        for field in ["author", "title", "year"] {
+            let given = body.lines().any(|l| l.trim_start().starts_with(field) && l.contains('='));
+            assert!(given, "{key} has no {field}");
+        }
+        let (open, close) = (body.matches('{').count(), body.matches('}').count());
+        assert_eq!(open + 1, close, "{key}: braces");
+        assert!(
+            words(&key).eq([key.as_str()]),
+            "{key}: letters and figures only, so that it can be found in a text"
+        );
+    }
+}
+
+#[test]
+fn keys_are_recognised() {
+    let header = "//! Method. Source: DBB11, section 4; HanLo2002\n//! and AB12.\n//!\n//! XY99 no.\nlet a = 1; // UTF16\n";
+    assert_eq!(
+        keys_of_initials(&references(header)).into_iter().collect::<Vec<_>>(),
+        ["AB12", "DBB11"]
+    );
+    let keys = keys_with_year(
+        "HanLo2002; (Jean1999), Acary2018. FooBar12345, x2000, X2000, Foo1700, HDF5",
+    );
+    assert_eq!(keys.into_iter().collect::<Vec<_>>(), ["Acary2018", "HanLo2002", "Jean1999"]);
+}
+
+#[test]
+fn the_family_of_a_solver_is_its_folder() {
+    for about in registry::abouts::<FrictionLocal<3>>() {
+        let folder = root_folder().join("crates/solve/src").join(about.family);
+        assert!(folder.is_dir(), "{}: no folder {}", about.name, folder.display());
+    }
+}
+
+// ------------------------------------------------------------------------------------------------- files
+
+#[test]
+fn no_file_names_a_place_on_someones_machine() {
+    // Spelt apart, so that this file passes its own test.
+    let places = [
+        concat!("/", "work/"),
+        concat!("/", "tmp/"),
+        concat!("/", "home/"),
+        concat!("/", "Users/"),
+        concat!("/", "root/"),
+    ];
+    let root = root_folder();
+    let mut wrong = vec![];
+    for file in project_files() {
+        // Binary files are problems, not texts.
+        let Ok(text) = fs::read_to_string(&file) else {
+            continue;
+        };
+        for (number, line) in text.lines().enumerate() {
+            if let Some(place) = places.iter().find(|p| line.contains(**p)) {
+                let file = relative(&file, &root);
+                wrong.push(format!("{file}:{}: {place}", number + 1));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
+fn root_folder() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.ancestors().nth(2).expect("crates/nonsmooth").to_owned()
+}
+
+fn crate_folders() -> Vec<PathBuf> {
+    let crates = root_folder().join("crates");
+    let entries = fs::read_dir(crates).expect("crates").map(|e| e.expect("readable").path());
+    let mut folders: Vec<_> = entries.filter(|p| p.join("Cargo.toml").exists()).collect();
+    folders.sort();
+    folders
+}
+
+/// The files of the project: everything but what is built and what is hidden (`.ci` is not).
+fn project_files() -> Vec<PathBuf> {
+    files(&root_folder())
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = vec![];
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("readable").path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if name == "target" || (name.starts_with('.') && name != ".ci") {
+            continue;
+        }
+        if path.is_dir() {
+            found.extend(files(&path));
+        } else {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+fn has_extension(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|e| e == extension)
+}
+
+fn relative(path: &Path, base: &Path) -> String {
+    let below = path.strip_prefix(base).expect("below the base");
+    below.to_string_lossy().replace('\\', "/")
+}
+
+fn read(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}

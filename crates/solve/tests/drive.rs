@@ -1,0 +1,203 @@
+//! The loop's promises, kept against solvers that lie, diverge, produce NaN or claim certificates.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use nonsmooth_problem::check::Certificate;
+use nonsmooth_problem::linalg::{Bsr, Csc};
+use nonsmooth_problem::planted::Planted;
+use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem};
+use nonsmooth_solve::registry::{self, SettingsMap};
+use nonsmooth_solve::{Driver, Limit, Limits, Outcome, Session, SolveError, Solver, Status, Step};
+
+type P = FrictionLocal<3>;
+
+/// A solver that does whatever a test says.
+struct Scripted<F>(F);
+
+impl<F: Fn(usize, &mut LocalPoint) -> Step + Send> Solver<P> for Scripted<F> {
+    type Work = usize;
+    fn work(&self, _: &P) -> Result<usize, SolveError> {
+        Ok(0)
+    }
+    fn start(&self, _: &P, _: &mut LocalPoint, steps: &mut usize) {
+        *steps = 0;
+    }
+    fn step(&self, _: &P, point: &mut LocalPoint, steps: &mut usize) -> Step {
+        *steps += 1;
+        self.0(*steps, point)
+    }
+}
+
+fn run(
+    problem: &P,
+    limits: &Limits,
+    script: impl Fn(usize, &mut LocalPoint) -> Step + Send,
+) -> (Outcome, LocalPoint) {
+    let mut point = problem.origin();
+    let mut driver = Driver::new(Scripted(script));
+    let outcome = driver.solve(problem, &mut point, limits, &mut |_| {}).unwrap();
+    (outcome, point)
+}
+
+fn planted() -> (P, LocalPoint) {
+    Planted { contacts: 5, dofs: 30, ..Planted::default() }.local::<3>()
+}
+
+const GO_ON: Step = Step::Continue { estimate: f64::NAN };
+
+#[test]
+fn a_solver_that_lies_is_not_believed() {
+    let (problem, _) = planted();
+    let (outcome, _) = run(&problem, &Limits::default(), |_, _| Step::Done);
+    assert!(matches!(outcome.status, Status::Stalled(_)), "{outcome:?}");
+    // An estimate of zero is a claim too.
+    let limits = Limits { max_iterations: 7, ..Limits::default() };
+    let (outcome, _) = run(&problem, &limits, |_, _| Step::Continue { estimate: 0.0 });
+    assert_eq!((outcome.status, outcome.iterations), (Status::Limit(Limit::Iterations), 7));
+}
+
+#[test]
+fn a_modest_solver_is_told_that_it_has_finished() {
+    let (problem, known) = planted();
+    let (outcome, _) = run(&problem, &Limits::default(), |step, point| {
+        if step == 3 {
+            point.clone_from(&known);
+        }
+        Step::Continue { estimate: 1e9 }
+    });
+    assert_eq!((outcome.status, outcome.iterations), (Status::Solved, 3));
+    let (outcome, _) = run(&problem, &Limits::default(), |_, point| {
+        point.clone_from(&known);
+        Step::Stuck("so it says".into())
+    });
+    assert_eq!(outcome.status, Status::Solved);
+}
+
+#[test]
+fn the_best_point_is_returned_whatever_comes_after() {
+    let (problem, known) = planted();
+    let near: Vec<f64> = known.r.iter().map(|r| r * (1.0 + 1e-5)).collect();
+    for ending in 0..3 {
+        let limits = Limits { max_iterations: 20, ..Limits::default() };
+        let (outcome, point) = run(&problem, &limits, |step, point| {
+            match step {
+                4 => point.r.clone_from(&near),
+                5.. => point.r.iter_mut().for_each(|r| *r = 2.0 * *r + 1.0),
+                _ => {}
+            }
+            match (step, ending) {
+                (9, 0) => Step::Stuck("worn out".into()),
+                (9, 1) => {
+                    point.r[0] = f64::NAN;
+                    GO_ON
+                }
+                _ => GO_ON,
+            }
+        });
+        assert_eq!(point.r, near, "ending {ending}");
+        assert!(outcome.measure.relative < 1e-3, "{outcome:?}");
+        let expected = match ending {
+            0 => Status::Stalled("worn out".into()),
+            1 => Status::Stalled("the iterates are no longer finite".into()),
+            _ => Status::Limit(Limit::Iterations),
+        };
+        assert_eq!(outcome.status, expected);
+    }
+}
+
+#[test]
+fn limits_stop_and_are_named() {
+    let (problem, _) = planted();
+    let (outcome, _) =
+        run(&problem, &Limits { time_limit: Some(0.0), ..Limits::default() }, |_, _| GO_ON);
+    assert_eq!((outcome.status, outcome.iterations), (Status::Limit(Limit::Time), 0));
+    let flag = Arc::new(AtomicBool::new(false));
+    let limits = Limits { cancel: Some(flag.clone()), ..Limits::default() };
+    let (outcome, _) = run(&problem, &limits, |step, _| {
+        flag.store(step == 5, Ordering::Relaxed);
+        GO_ON
+    });
+    assert_eq!((outcome.status, outcome.iterations), (Status::Limit(Limit::Cancelled), 5));
+}
+
+#[test]
+fn certificates_are_verified() {
+    // A mass of one, squeezed without friction between walls that approach each other: infeasible.
+    let w = [(0, 0, 1.0), (0, 3, -1.0), (3, 0, -1.0), (3, 3, 1.0)].into_iter();
+    let w = Bsr::from_csc(&Csc::from_triplets(6, 6, w).unwrap());
+    let q = vec![-1.0, 0.0, 0.0, -1.0, 0.0, 0.0];
+    let problem = P::new(w, q, vec![0.0; 2]).unwrap();
+    let ray = |a: f64, b: f64| Certificate { r: vec![a, 0.0, 0.0, b, 0.0, 0.0], lambda: vec![] };
+    let (outcome, _) = run(&problem, &Limits::default(), |_, _| Step::NoSolution(ray(1.0, 1.0)));
+    assert_eq!(outcome.status, Status::Infeasible(ray(1.0, 1.0)));
+    let (outcome, _) = run(&problem, &Limits::default(), |_, _| Step::NoSolution(ray(1.0, 2.0)));
+    assert_eq!(outcome.status, Status::NoConclusion(ray(1.0, 2.0)));
+}
+
+#[test]
+fn mistakes_of_the_caller_are_errors() {
+    let (problem, _) = planted();
+    let mut session = registry::session::<P>("nsgs", &SettingsMap::new()).unwrap();
+    let mut solve = |point: &mut LocalPoint, limits: &Limits| {
+        session.solve(&problem, point, limits, &mut |_| {}).unwrap_err().to_string()
+    };
+    let mut short = problem.origin();
+    short.r.pop();
+    assert!(solve(&mut short, &Limits::default()).starts_with("r: expected 15 entries"));
+    let mut nan = problem.origin();
+    nan.r[4] = f64::NAN;
+    assert!(solve(&mut nan, &Limits::default()).starts_with("r[4]: expected a finite number"));
+    for tolerance in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let limits = Limits { tolerance, ..Limits::default() };
+        assert!(solve(&mut problem.origin(), &limits).starts_with("tolerance: expected"));
+    }
+    let limits = Limits { time_limit: Some(-1.0), ..Limits::default() };
+    assert!(solve(&mut problem.origin(), &limits).starts_with("time limit: expected"));
+}
+
+#[test]
+fn the_same_input_gives_the_same_bits_and_a_warm_start_is_used() {
+    let (problem, _) = Planted { contacts: 60, dofs: 360, ..Planted::default() }.local::<3>();
+    for settings in [vec![], vec!["ordering=fully_shuffled"], vec!["freeze_after=3"]] {
+        let map = registry::parse_settings(&settings).unwrap();
+        let mut session = registry::session::<P>("nsgs", &map).unwrap();
+        let mut solve = |point: &mut LocalPoint| {
+            session.solve(&problem, point, &Limits::default(), &mut |_| {}).unwrap()
+        };
+        let (mut first, mut second) = (problem.origin(), problem.origin());
+        let (a, b) = (solve(&mut first), solve(&mut second));
+        assert_eq!(first, second, "{settings:?}");
+        assert_eq!((a.iterations, a.measure), (b.iterations, b.measure), "{settings:?}");
+        assert_eq!(a.status, Status::Solved);
+        assert_eq!(solve(&mut first).iterations, 0, "a solution needs no step");
+    }
+}
+
+#[test]
+fn it_stops_at_the_tolerance_and_not_far_below() {
+    let (problem, _) = Planted { contacts: 200, dofs: 700, seed: 3, ..Planted::default() }.local::<3>();
+    for tolerance in [1e-3, 1e-6, 1e-9] {
+        let mut session = registry::session::<P>("nsgs", &SettingsMap::new()).unwrap();
+        let limits = Limits { tolerance, ..Limits::default() };
+        let outcome = session.solve(&problem, &mut problem.origin(), &limits, &mut |_| {}).unwrap();
+        assert_eq!(outcome.status, Status::Solved);
+        let history = session.history();
+        let last = history[history.len() - 2..].iter().map(|s| s.iteration).collect::<Vec<_>>();
+        assert!(last[1] - last[0] <= 20);
+        assert!(outcome.measure.relative > 0.2 * tolerance, "{outcome:?}");
+    }
+}
+
+#[test]
+fn the_history_stays_bounded_and_keeps_its_ends() {
+    let (problem, _) = planted();
+    let mut driver = Driver::new(Scripted(|_, _: &mut LocalPoint| GO_ON));
+    let limits = Limits { max_iterations: 100_000, ..Limits::default() };
+    driver.solve(&problem, &mut problem.origin(), &limits, &mut |_| {}).unwrap();
+    let history = driver.history();
+    assert!(history.len() <= 4096 && history.len() > 1000, "{}", history.len());
+    assert_eq!(history[0].iteration, 0);
+    assert!(history.windows(2).all(|w| w[0].iteration < w[1].iteration));
+    assert!(history.last().unwrap().iteration > 90_000);
+}
