@@ -6,7 +6,8 @@ use std::path::PathBuf;
 
 use nonsmooth_io::fclib;
 use nonsmooth_problem::with_friction;
-use nonsmooth_solve::registry::{self, Registered, SettingsMap};
+use nonsmooth_solve::registry::{self, Registered};
+use nonsmooth_solve::settings::{self, SettingsMap};
 use nonsmooth_solve::{Limits, Outcome, SolveError, Status};
 
 fn solve<P: Registered>(
@@ -31,7 +32,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         cancel: None,
     };
     let (settings, folders): (Vec<_>, Vec<_>) = rest.iter().partition(|a| a.contains('='));
-    let settings = registry::parse_settings(&settings)?;
+    let settings = settings::from_texts(&settings)?;
     let folders: Vec<PathBuf> = folders.iter().map(PathBuf::from).collect();
     let (mut solved, mut all) = (0, 0);
     for path in nonsmooth_bench::problem_files(&folders)? {

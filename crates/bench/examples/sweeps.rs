@@ -14,7 +14,8 @@ use std::time::Instant;
 use nonsmooth_io::fclib;
 use nonsmooth_problem::{Friction, FrictionLocal};
 use nonsmooth_solve::Limits;
-use nonsmooth_solve::registry::{self, Registered, SettingsMap};
+use nonsmooth_solve::registry::{self, Registered};
+use nonsmooth_solve::settings::{self, SettingsMap};
 
 const REPETITIONS: usize = 7;
 
@@ -116,7 +117,7 @@ fn report<const D: usize>(
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let (settings, roots): (Vec<_>, Vec<_>) = args.iter().partition(|a| a.contains('='));
-    let mut settings = registry::parse_settings(&settings)?;
+    let mut settings = settings::from_texts(&settings)?;
     let peer = settings.remove("peer").and_then(|path| path.as_str().map(str::to_owned));
     let peer = peer.map(std::fs::read_to_string).transpose()?;
     let roots: Vec<PathBuf> = roots.iter().map(PathBuf::from).collect();

@@ -7,21 +7,11 @@ use nonsmooth_solve::SolveError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SceneError {
     /// No family of scenes has this name.
-    #[error("unknown scene `{found}`, expected one of {known}")]
+    #[error("unknown scene `{found}`; there are: {known}")]
     UnknownScene {
         /// The name asked for.
         found: String,
         /// The names that exist.
-        known: String,
-    },
-    /// The family has no such setting.
-    #[error("unknown setting `{key}` of scene `{scene}`, expected one of {known}")]
-    UnknownSetting {
-        /// The family.
-        scene: &'static str,
-        /// The key asked for.
-        key: String,
-        /// The keys that exist.
         known: String,
     },
     /// A value is of the wrong type or not allowed where it stands.
@@ -34,14 +24,9 @@ pub enum SceneError {
         /// What stands there.
         found: String,
     },
-    /// A setting that its type refuses.
-    #[error("{key}: {why}")]
-    Setting {
-        /// The setting at fault.
-        key: String,
-        /// The reason.
-        why: String,
-    },
+    /// A setting that the family does not have or that its type refuses; the text names it.
+    #[error("{0}")]
+    Setting(String),
     /// The assembled problem is not valid.
     #[error(transparent)]
     Problem(#[from] ProblemError),

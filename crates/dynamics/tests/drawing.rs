@@ -6,7 +6,7 @@ use nonsmooth_problem::check::Motion;
 use serde_json::Map;
 
 fn scenes() -> impl Iterator<Item = Scene> {
-    SCENES.iter().map(|s| s.make(Map::new()).unwrap())
+    SCENES.iter().map(|s| s.make(&Map::new()).unwrap())
 }
 
 /// Tags open and close in order, attributes are quoted, no stray `<` or `&`; returns the names of the elements.

@@ -83,19 +83,11 @@ pub enum IoError {
 
 impl IoError {
     pub(crate) fn os(file: &Path, expected: &'static str, cause: std::io::Error) -> Self {
-        Self::Os {
-            file: file.into(),
-            expected,
-            cause,
-        }
+        Self::Os { file: file.into(), expected, cause }
     }
 
     pub(crate) fn hdf5(file: &Path, place: impl Into<String>, found: impl Display) -> Self {
-        Self::Hdf5 {
-            file: file.into(),
-            place: place.into(),
-            found: one_line(found),
-        }
+        Self::Hdf5 { file: file.into(), place: place.into(), found: one_line(found) }
     }
 
     pub(crate) fn data(
@@ -119,11 +111,7 @@ fn folder(group: &str, problem: &ProblemError) -> String {
     | ProblemError::Value { place, .. }
     | ProblemError::Empty { place }
     | ProblemError::Singular { place, .. }) = problem;
-    let vectors = if place.starts_with(char::is_uppercase) {
-        ""
-    } else {
-        "vectors/"
-    };
+    let vectors = if place.starts_with(char::is_uppercase) { "" } else { "vectors/" };
     format!("{group}/{vectors}")
 }
 

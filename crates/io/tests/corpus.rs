@@ -25,10 +25,7 @@ fn every_file_loads_and_passes_through_unchanged() {
         if kind.contains("rolling") {
             let message = fclib::read(&path).unwrap_err().to_string();
             let expected = "rolling friction (spacedim 5) is not supported yet";
-            assert!(
-                message.ends_with(&format!(": /{kind}: {expected}")),
-                "{message}"
-            );
+            assert!(message.ends_with(&format!(": /{kind}: {expected}")), "{message}");
             refused += 1;
         } else if kind.starts_with("fclib") {
             let content = fclib::read(&path).unwrap_or_else(|e| panic!("{e}"));
@@ -42,8 +39,5 @@ fn every_file_loads_and_passes_through_unchanged() {
         }
     }
     eprintln!("{loaded} files loaded, {refused} rolling files refused");
-    assert!(
-        loaded > 200 && refused > 5,
-        "{loaded} loaded, {refused} refused"
-    );
+    assert!(loaded > 200 && refused > 5, "{loaded} loaded, {refused} refused");
 }

@@ -16,14 +16,8 @@ fn read(path: &Path, bytes: &[u8]) -> Option<String> {
         None => Ok(()),
     });
     let message = result.err()?.to_string();
-    assert!(
-        !message.contains('\n') && message.starts_with(path.to_str().unwrap()),
-        "{message}"
-    );
-    assert!(
-        !message.contains("stopped the HDF5 reader"),
-        "a panic inside: {message}"
-    );
+    assert!(!message.contains('\n') && message.starts_with(path.to_str().unwrap()), "{message}");
+    assert!(!message.contains("stopped the HDF5 reader"), "a panic inside: {message}");
     Some(message)
 }
 
@@ -54,16 +48,9 @@ fn truncated_files_are_refused() {
     let path = folder.path().join("truncated.hdf5");
     for bytes in originals() {
         assert_eq!(read(&path, &bytes), None);
-        for length in (0..bytes.len())
-            .step_by(7)
-            .chain(bytes.len() - 1..bytes.len())
-        {
+        for length in (0..bytes.len()).step_by(7).chain(bytes.len() - 1..bytes.len()) {
             let message = read(&path, &bytes[..length]);
-            assert!(
-                message.is_some(),
-                "{length} bytes of {} were read",
-                bytes.len()
-            );
+            assert!(message.is_some(), "{length} bytes of {} were read", bytes.len());
         }
     }
 }

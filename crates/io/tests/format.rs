@@ -17,10 +17,7 @@ fn read(tree: &Tree) -> FclibFile {
 fn message(path: &Path) -> String {
     let message = fclib::read(path).expect_err("a bad file").to_string();
     assert!(!message.contains('\n'), "{message}");
-    message
-        .strip_prefix(&format!("{}: ", path.display()))
-        .expect(&message)
-        .to_string()
+    message.strip_prefix(&format!("{}: ", path.display())).expect(&message).to_string()
 }
 
 #[track_caller]
@@ -32,9 +29,7 @@ fn refused(tree: &Tree, expected: &str) {
 #[test]
 fn hand_made_files_read_as_stated() {
     let content = read(&local_tree());
-    let Friction::Local2(p) = &content.problem else {
-        panic!("{:?}", content.problem.kind())
-    };
+    let Friction::Local2(p) = &content.problem else { panic!("{:?}", content.problem.kind()) };
     let w = p.W.to_csc();
     for (i, row) in common::W.iter().enumerate() {
         for (j, &x) in row.iter().enumerate() {
@@ -44,21 +39,14 @@ fn hand_made_files_read_as_stated() {
     assert_eq!(content.info.title.as_deref(), Some("hand-made"));
 
     let content = read(&global_tree());
-    let Friction::Global3(p) = &content.problem else {
-        panic!("{:?}", content.problem.kind())
-    };
+    let Friction::Global3(p) = &content.problem else { panic!("{:?}", content.problem.kind()) };
     assert_eq!((p.H.nrows(), p.H.ncols(), p.H.get(0, 2)), (2, 3, 0.5));
     assert_eq!(content.guesses, [content.solution.unwrap()]);
     assert_eq!(content.guesses[0].lambda, Some(vec![3.0]));
 
-    let Friction::Local2(p) = read(&bilateral_tree()).problem else {
-        panic!()
-    };
+    let Friction::Local2(p) = read(&bilateral_tree()).problem else { panic!() };
     let b = p.bilateral.unwrap();
-    assert_eq!(
-        (b.V.get(3, 0), b.V.get(1, 0), b.R.get(0, 0), b.s[0]),
-        (0.5, -0.5, 2.0, 0.125)
-    );
+    assert_eq!((b.V.get(3, 0), b.V.get(1, 0), b.R.get(0, 0), b.s[0]), (0.5, -0.5, 2.0, 0.125));
 }
 
 #[test]
@@ -70,9 +58,7 @@ fn all_storages_of_a_matrix_read_alike() {
     let columns: (&[i32], &[i32], &[f64]) = (
         &[0, 3, 5, 8, 10],
         &[2, 0, 1, 1, 0, 3, 2, 0, 3, 2, -7, 99],
-        &[
-            -1.5, 2.0, 0.25, 3.0, 0.5, 0.75, 4.0, -1.0, 5.0, 0.125, 1.0, 1.0,
-        ],
+        &[-1.5, 2.0, 0.25, 3.0, 0.5, 0.75, 4.0, -1.0, 5.0, 0.125, 1.0, 1.0],
     );
     let rows: (&[i32], &[i32], &[f64]) = (
         &[0, 3, 5, 8, 10],
@@ -83,9 +69,7 @@ fn all_storages_of_a_matrix_read_alike() {
     let triplets: (&[i32], &[i32], &[f64]) = (
         &[3, 0, 0, 2, 0, 0, 1, 1, 2, 0, 2, 3, 2],
         &[3, 0, 1, 3, 0, 2, 0, 1, 2, 1, 0, 2, 1],
-        &[
-            5.0, 1.0, 1.0, 0.75, 1.0, -1.5, 0.5, 3.0, 4.0, -0.75, -1.0, 0.125, 0.0, 7.0,
-        ],
+        &[5.0, 1.0, 1.0, 0.75, 1.0, -1.5, 0.5, 3.0, 4.0, -0.75, -1.0, 0.125, 0.0, 7.0],
     );
     for (nz, storage) in [(-1, columns), (-2, rows), (13, triplets)] {
         let tree = local_tree().matrix(path, shape(nz), storage);
@@ -99,15 +83,8 @@ fn all_storages_of_a_matrix_read_alike() {
 #[test]
 fn a_matrix_that_is_not_square_tells_rows_from_columns() {
     let expected = read(&global_tree());
-    for (nz, p, i) in [
-        (-1, &[0, 1, 2, 3][..], [0, 1, 0]),
-        (-2, &[0, 2, 3][..], [0, 2, 1]),
-    ] {
-        let x = if nz == -1 {
-            [1.0, 1.0, 0.5]
-        } else {
-            [1.0, 0.5, 1.0]
-        };
+    for (nz, p, i) in [(-1, &[0, 1, 2, 3][..], [0, 1, 0]), (-2, &[0, 2, 3][..], [0, 2, 1])] {
+        let x = if nz == -1 { [1.0, 1.0, 0.5] } else { [1.0, 0.5, 1.0] };
         let tree = global_tree().matrix("fclib_global/H", (2, 3, nz), (p, &i, &x));
         assert_eq!(read(&tree), expected, "nz = {nz}");
     }
@@ -119,9 +96,7 @@ fn duplicates_are_added_in_the_order_of_the_file() {
     for (nz, p) in [(3, vec![0; 3]), (-1, vec![0, 3, 3]), (-2, vec![0, 3, 3])] {
         for (x, sum) in [([1e16, 1.0, 1.0], 1e16), ([1.0, 1.0, 1e16], 1e16 + 2.0)] {
             let tree = global_tree().matrix("fclib_global/M", (2, 2, nz), (&p, &[0; 3], &x));
-            let Friction::Global3(problem) = read(&tree).problem else {
-                panic!()
-            };
+            let Friction::Global3(problem) = read(&tree).problem else { panic!() };
             assert_eq!(problem.M.get(0, 0), sum, "nz = {nz}");
         }
     }
@@ -134,10 +109,7 @@ fn other_widths_and_scalars_are_read() {
         .set("fclib_local/spacedim", Data::Scalar(2))
         .set("fclib_local/W/m", Data::I64(vec![4]))
         .set("fclib_local/W/n", Data::U64(vec![4]))
-        .set(
-            "fclib_local/W/p",
-            Data::U64(vec![0, 0, 0, 1, 1, 2, 2, 2, 3, 3]),
-        )
+        .set("fclib_local/W/p", Data::U64(vec![0, 0, 0, 1, 1, 2, 2, 2, 3, 3]))
         .set("fclib_local/vectors/mu", Data::F32(vec![0.5, 0.0]))
         .without("fclib_local/W/nzmax");
     assert_eq!(read(&tree), expected);
@@ -155,24 +127,12 @@ fn what_is_no_fclib_file_is_said() {
         message(&folder.path().join("absent.hdf5")),
         "expected a readable file, found: No such file or directory (os error 2)"
     );
-    assert_eq!(
-        message(folder.path()),
-        "expected an HDF5 file, found a directory"
-    );
-    assert_eq!(
-        file("empty", b""),
-        "expected an HDF5 file, found an empty file"
-    );
-    assert_eq!(
-        file("text", b"vectors 1 2 3\n"),
-        "expected an HDF5 file, found other data"
-    );
+    assert_eq!(message(folder.path()), "expected an HDF5 file, found a directory");
+    assert_eq!(file("empty", b""), "expected an HDF5 file, found an empty file");
+    assert_eq!(file("text", b"vectors 1 2 3\n"), "expected an HDF5 file, found other data");
     let bytes = std::fs::read(local_tree().save(folder.path())).unwrap();
     let cut = file("cut", &bytes[..bytes.len() - 9]);
-    assert!(
-        cut.starts_with("/: expected intact HDF5 data, found: "),
-        "{cut}"
-    );
+    assert!(cut.starts_with("/: expected intact HDF5 data, found: "), "{cut}");
 
     let root = "/: expected one group /fclib_local or /fclib_global, found ";
     let tree = global_tree().without("fclib_global").without("guesses");
@@ -231,9 +191,7 @@ fn missing_parts_are_named() {
         ),
     );
     refused(
-        &bilateral_tree()
-            .without("fclib_local/V")
-            .without("fclib_local/R"),
+        &bilateral_tree().without("fclib_local/V").without("fclib_local/R"),
         &format!(
             "/fclib_local/V and /fclib_local/R: expected it beside /fclib_local/vectors/s \
              (bilateral constraints), {nothing}"
@@ -247,9 +205,7 @@ fn missing_parts_are_named() {
         ),
     );
     refused(
-        &local_tree()
-            .without("fclib_local/W/x")
-            .set("fclib_local/W/x/", Data::Scalar(0)),
+        &local_tree().without("fclib_local/W/x").set("fclib_local/W/x/", Data::Scalar(0)),
         "/fclib_local/W/x: expected a dataset, found a group",
     );
 }
@@ -257,10 +213,7 @@ fn missing_parts_are_named() {
 #[test]
 fn wrong_types_are_named() {
     let with = |path: &str, data| local_tree().set(&format!("fclib_local/{path}"), data);
-    refused(
-        &with("W/i", Data::F(vec![0.0; 10])),
-        "/fclib_local/W/i: expected integers, found f64",
-    );
+    refused(&with("W/i", Data::F(vec![0.0; 10])), "/fclib_local/W/i: expected integers, found f64");
     refused(
         &with("vectors/q", Data::I(vec![0; 4])),
         "/fclib_local/vectors/q: expected reals, found i32",
@@ -355,24 +308,14 @@ fn wrong_indices_are_named() {
     );
     let columns =
         |p: &[i32]| local_tree().matrix("fclib_local/W", (4, 4, -1), (p, &[0; 3], &[1.0; 3]));
-    refused(
-        &columns(&[0, 2, 1, 3, 3]),
-        "/fclib_local/W/p[2]: expected at least 2 (p[1]), found 1",
-    );
-    refused(
-        &columns(&[1, 2, 2, 3, 3]),
-        "/fclib_local/W/p[0]: expected 0, found 1",
-    );
+    refused(&columns(&[0, 2, 1, 3, 3]), "/fclib_local/W/p[2]: expected at least 2 (p[1]), found 1");
+    refused(&columns(&[1, 2, 2, 3, 3]), "/fclib_local/W/p[0]: expected 0, found 1");
     refused(
         &columns(&[0, 2, 2, 3, i32::MAX]),
         "/fclib_local/W/i: expected 2147483647 entries (p[4]), found 3 entries",
     );
     refused(
-        &local_tree().matrix(
-            "fclib_local/W",
-            (4, 4, -2),
-            (&[0, 1, 1, 1, 1], &[4], &[1.0]),
-        ),
+        &local_tree().matrix("fclib_local/W", (4, 4, -2), (&[0, 1, 1, 1, 1], &[4], &[1.0])),
         "/fclib_local/W/i[0]: expected a column index of at least 0 and below 4, found 4",
     );
 }
@@ -382,10 +325,7 @@ fn wrong_values_are_named() {
     let with = |path: &str, data| local_tree().set(&format!("fclib_local/{path}"), data);
     let mut x = vec![1.0; 10];
     x[7] = f64::INFINITY;
-    refused(
-        &with("W/x", Data::F(x)),
-        "/fclib_local/W/x[7]: expected a finite number, found inf",
-    );
+    refused(&with("W/x", Data::F(x)), "/fclib_local/W/x[7]: expected a finite number, found inf");
     refused(
         &with("vectors/q", Data::F(vec![0.0, f64::NAN, 0.0, 0.0])),
         "/fclib_local/vectors/q[1]: expected a finite number, found NaN",
@@ -396,11 +336,7 @@ fn wrong_values_are_named() {
     );
     // Finite entries whose sum is not.
     refused(
-        &local_tree().matrix(
-            "fclib_local/W",
-            (4, 4, 2),
-            (&[3; 2], &[2; 2], &[1.5e308; 2]),
-        ),
+        &local_tree().matrix("fclib_local/W", (4, 4, 2), (&[3; 2], &[2; 2], &[1.5e308; 2])),
         "/fclib_local/W[2, 3]: expected a finite number, found inf",
     );
     let mut r = vec![0.0; 3];

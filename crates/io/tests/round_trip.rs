@@ -48,26 +48,12 @@ proptest! {
 }
 
 /// Numbers whose bits are easily lost.
-const AWKWARD: [f64; 8] = [
-    -0.0,
-    5e-324,
-    -2.225e-308,
-    0.1,
-    f64::MAX,
-    1.0 / 3.0,
-    0.0,
-    -1e-17,
-];
+const AWKWARD: [f64; 8] = [-0.0, 5e-324, -2.225e-308, 0.1, f64::MAX, 1.0 / 3.0, 0.0, -1e-17];
 
 fn csc(rows: usize, columns: usize) -> Csc {
     let cells = (0..columns).flat_map(|j| (0..rows).map(move |i| (i, j)));
     let entries = cells.filter(|(i, j)| (i + 2 * j) % 3 != 1);
-    Csc::from_triplets(
-        rows,
-        columns,
-        entries.map(|(i, j)| (i, j, AWKWARD[(i + j) % 8])),
-    )
-    .unwrap()
+    Csc::from_triplets(rows, columns, entries.map(|(i, j)| (i, j, AWKWARD[(i + j) % 8]))).unwrap()
 }
 
 fn local() -> FrictionLocal<2> {
@@ -75,11 +61,7 @@ fn local() -> FrictionLocal<2> {
         W: Bsr::from_csc(&csc(4, 4)),
         q: AWKWARD[..4].into(),
         mu: vec![0.0, 0.7],
-        bilateral: Some(BilateralLocal {
-            V: csc(4, 2),
-            R: csc(2, 2),
-            s: AWKWARD[4..6].into(),
-        }),
+        bilateral: Some(BilateralLocal { V: csc(4, 2), R: csc(2, 2), s: AWKWARD[4..6].into() }),
     }
 }
 
@@ -90,40 +72,24 @@ fn global() -> FrictionGlobal<3> {
         f: AWKWARD[..5].into(),
         w: AWKWARD[5..].into(),
         mu: vec![0.3],
-        bilateral: Some(BilateralGlobal {
-            G: csc(5, 1),
-            b: vec![-0.0],
-        }),
+        bilateral: Some(BilateralGlobal { G: csc(5, 1), b: vec![-0.0] }),
     }
 }
 
 fn contents() -> [FclibFile; 2] {
     let mut local = FclibFile::new(Friction::Local2(local()));
     let x = AWKWARD[..4].to_vec();
-    local.solution = Some(StoredPoint {
-        v: None,
-        u: x.clone(),
-        r: x,
-        lambda: Some(vec![1.0, -0.0]),
-    });
+    local.solution =
+        Some(StoredPoint { v: None, u: x.clone(), r: x, lambda: Some(vec![1.0, -0.0]) });
     local.info.title = Some("a title".into());
     local.info.math_info = Some(String::new());
     local.info.dofs = Some(12);
     let mut global = FclibFile::new(Friction::Global3(global()));
-    let point = GlobalPoint {
-        v: AWKWARD[..5].into(),
-        r: vec![1.0, 0.0, -0.0],
-        lambda: vec![0.1],
-    };
+    let point = GlobalPoint { v: AWKWARD[..5].into(), r: vec![1.0, 0.0, -0.0], lambda: vec![0.1] };
     // M is no matter here: u overflows where v meets f64::MAX.
     let point = StoredPoint {
         u: vec![0.5; 3],
-        ..StoredPoint {
-            v: Some(point.v),
-            u: vec![],
-            r: point.r,
-            lambda: Some(point.lambda),
-        }
+        ..StoredPoint { v: Some(point.v), u: vec![], r: point.r, lambda: Some(point.lambda) }
     };
     global.guesses = vec![point; 11];
     global.info.description = Some("friction, größer".into());
@@ -134,30 +100,19 @@ fn contents() -> [FclibFile; 2] {
 fn stored_points_carry_the_unknowns_and_the_velocity() {
     let w = Csc::diagonal(&[2.0, 4.0]);
     let problem = FrictionLocal::<2>::new(Bsr::from_csc(&w), vec![-1.0, 0.5], vec![0.5]).unwrap();
-    let point = LocalPoint {
-        r: vec![0.5, 0.25],
-        lambda: vec![],
-    };
+    let point = LocalPoint { r: vec![0.5, 0.25], lambda: vec![] };
     let stored = StoredPoint::from_local(&problem, &point);
     assert_eq!(
         stored,
-        StoredPoint {
-            v: None,
-            u: vec![0.0, 1.5],
-            r: point.r.clone(),
-            lambda: None
-        }
+        StoredPoint { v: None, u: vec![0.0, 1.5], r: point.r.clone(), lambda: None }
     );
     assert_eq!(stored.to_local(), point);
 
     let mut problem = global();
     problem.H = Csc::from_triplets(5, 3, [(0, 0, 2.0), (4, 2, -1.0)].into_iter()).unwrap();
     problem.w = vec![1.0, 2.0, 3.0];
-    let point = GlobalPoint {
-        v: vec![1.0, 0.0, 0.0, 0.0, 5.0],
-        r: vec![1.0, 0.0, 0.0],
-        lambda: vec![7.0],
-    };
+    let point =
+        GlobalPoint { v: vec![1.0, 0.0, 0.0, 0.0, 5.0], r: vec![1.0, 0.0, 0.0], lambda: vec![7.0] };
     let stored = StoredPoint::from_global(&problem, &point);
     assert_eq!(stored.u, [3.0, 2.0, -2.0]);
     assert_eq!(stored.to_global(), point);
@@ -179,9 +134,7 @@ fn an_existing_file_is_replaced_and_a_failure_leaves_it() {
         message.ends_with(": /solution/r[3]: expected a finite number, found NaN"),
         "{message}"
     );
-    let message = fclib::write_solution(&path, &bad.solution.unwrap())
-        .unwrap_err()
-        .to_string();
+    let message = fclib::write_solution(&path, &bad.solution.unwrap()).unwrap_err().to_string();
     let expected = ": /solution/v: expected 5 entries (degrees of freedom), found 0 entries";
     assert!(message.ends_with(expected), "{message}");
     assert_same(&fclib::read(&path).unwrap(), &global);
@@ -212,9 +165,7 @@ fn what_cannot_be_written_is_said() {
         "/fclib_local/info/@numberOfDegreeOfFreedom: expected at most 2147483647 (a C int), found 2147483648",
     );
     let mut bad = local.clone();
-    let Friction::Local2(p) = &mut bad.problem else {
-        unreachable!()
-    };
+    let Friction::Local2(p) = &mut bad.problem else { unreachable!() };
     p.mu[1] = -0.5;
     refused(
         &path,
@@ -223,11 +174,7 @@ fn what_cannot_be_written_is_said() {
     );
     let writable = "expected a file that can be written, found: ";
     let absent = folder.path().join("absent/file.hdf5");
-    refused(
-        &absent,
-        &local,
-        &format!("{writable}No such file or directory (os error 2)"),
-    );
+    refused(&absent, &local, &format!("{writable}No such file or directory (os error 2)"));
     refused(folder.path(), &local, &format!("{writable}is a directory"));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
@@ -268,41 +215,24 @@ fn expected_dump(content: &FclibFile) -> String {
         Friction::Local2(p) => {
             let b = p.bilateral.as_ref().unwrap();
             let matrices = vec![("W", p.W.to_csc()), ("V", b.V.clone()), ("R", b.R.clone())];
-            (
-                "/fclib_local",
-                matrices,
-                vec![("q", &p.q), ("mu", &p.mu), ("s", &b.s)],
-            )
+            ("/fclib_local", matrices, vec![("q", &p.q), ("mu", &p.mu), ("s", &b.s)])
         }
         Friction::Global3(p) => {
             let b = p.bilateral.as_ref().unwrap();
             let matrices = vec![("M", p.M.clone()), ("H", p.H.clone()), ("G", b.G.clone())];
-            (
-                "/fclib_global",
-                matrices,
-                vec![("f", &p.f), ("w", &p.w), ("mu", &p.mu), ("b", &b.b)],
-            )
+            ("/fclib_global", matrices, vec![("f", &p.f), ("w", &p.w), ("mu", &p.mu), ("b", &b.b)])
         }
         _ => unreachable!(),
     };
-    ints(
-        &format!("{root}/spacedim"),
-        &[if root == "/fclib_local" { 2 } else { 3 }],
-    );
+    ints(&format!("{root}/spacedim"), &[if root == "/fclib_local" { 2 } else { 3 }]);
     for (name, a) in &mut matrices {
         let triplets: Vec<_> = a.triplets().collect();
         ints(&format!("{root}/{name}/m"), &[a.nrows()]);
         ints(&format!("{root}/{name}/n"), &[a.ncols()]);
         ints(&format!("{root}/{name}/nz"), &[a.nnz()]);
         ints(&format!("{root}/{name}/nzmax"), &[a.nnz()]);
-        ints(
-            &format!("{root}/{name}/i"),
-            &triplets.iter().map(|t| t.0).collect::<Vec<_>>(),
-        );
-        ints(
-            &format!("{root}/{name}/p"),
-            &triplets.iter().map(|t| t.1).collect::<Vec<_>>(),
-        );
+        ints(&format!("{root}/{name}/i"), &triplets.iter().map(|t| t.0).collect::<Vec<_>>());
+        ints(&format!("{root}/{name}/p"), &triplets.iter().map(|t| t.1).collect::<Vec<_>>());
     }
     if !content.guesses.is_empty() {
         ints("/guesses/number_of_guesses", &[content.guesses.len()]);
@@ -338,19 +268,13 @@ fn expected_dump(content: &FclibFile) -> String {
         point(&format!("/guesses/{}", k + 1), guess);
     }
     let info = &content.info;
-    for (name, text) in [
-        ("title", &info.title),
-        ("description", &info.description),
-        ("math_info", &info.math_info),
-    ] {
+    for (name, text) in
+        [("title", &info.title), ("description", &info.description), ("math_info", &info.math_info)]
+    {
         if let Some(text) = text {
             let encoding = if text.is_ascii() { "ascii" } else { "utf-8" };
             let path = format!("{root}/info/{name}");
-            let line = format!(
-                "{path} {encoding}{} () {}",
-                text.len() + 1,
-                hex(text.bytes())
-            );
+            let line = format!("{path} {encoding}{} () {}", text.len() + 1, hex(text.bytes()));
             lines.push(line.trim_end().into());
         }
     }
@@ -360,11 +284,7 @@ fn expected_dump(content: &FclibFile) -> String {
 
 fn sorted_lines(command: &mut Command) -> String {
     let output = command.output().unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
     let mut lines: Vec<&str> = text.lines().map(str::trim_end).collect();
     lines.sort();
@@ -374,11 +294,7 @@ fn sorted_lines(command: &mut Command) -> String {
 #[test]
 fn h5py_reads_what_is_written() {
     let mut python = Command::new("python3");
-    if !python
-        .args(["-c", "import h5py"])
-        .output()
-        .is_ok_and(|o| o.status.success())
-    {
+    if !python.args(["-c", "import h5py"]).output().is_ok_and(|o| o.status.success()) {
         common::skipped("python3 with h5py is not here");
         return;
     }
@@ -389,10 +305,7 @@ fn h5py_reads_what_is_written() {
         let dump = || sorted_lines(Command::new("python3").args(["-c", DUMP]).arg(&path));
         assert_eq!(dump(), expected_dump(&content));
         // The same after a solution was added to the file.
-        let mut solution = content
-            .solution
-            .take()
-            .unwrap_or_else(|| content.guesses[0].clone());
+        let mut solution = content.solution.take().unwrap_or_else(|| content.guesses[0].clone());
         solution.r[1] = 0.625;
         fclib::write_solution(&path, &solution).unwrap();
         content.solution = Some(solution);
@@ -412,26 +325,15 @@ with h5py.File(sys.argv[1], 'r+') as f:
     let [_, mut content] = contents();
     fclib::write(&path, &content).unwrap();
     let bytes = std::fs::read(&path).unwrap();
-    assert_eq!(
-        (&bytes[..8], bytes[8]),
-        (&b"\x89HDF\r\n\x1a\n"[..], 2),
-        "superblock of HDF5 1.8"
-    );
-    let appended = Command::new("python3")
-        .args(["-c", APPEND])
-        .arg(&path)
-        .output();
+    assert_eq!((&bytes[..8], bytes[8]), (&b"\x89HDF\r\n\x1a\n"[..], 2), "superblock of HDF5 1.8");
+    let appended = Command::new("python3").args(["-c", APPEND]).arg(&path).output();
     if !appended.is_ok_and(|o| o.status.success()) {
         common::skipped("python3 with h5py is not here");
         return;
     }
     let zeros = |n| vec![-0.0; n];
-    content.solution = Some(StoredPoint {
-        v: Some(zeros(5)),
-        u: zeros(3),
-        r: zeros(3),
-        lambda: Some(zeros(1)),
-    });
+    content.solution =
+        Some(StoredPoint { v: Some(zeros(5)), u: zeros(3), r: zeros(3), lambda: Some(zeros(1)) });
     assert_same(&fclib::read(&path).unwrap(), &content);
 }
 
@@ -457,11 +359,7 @@ with h5py.File(sys.argv[1], 'w', libver=('earliest', 'v108')) as f:
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("file.hdf5");
     for old in ["with", "without"] {
-        let made = Command::new("python3")
-            .args(["-c", MAKE])
-            .arg(&path)
-            .arg(old)
-            .output();
+        let made = Command::new("python3").args(["-c", MAKE]).arg(&path).arg(old).output();
         if !made.is_ok_and(|o| o.status.success()) {
             common::skipped("python3 with h5py is not here");
             return;
@@ -471,17 +369,10 @@ with h5py.File(sys.argv[1], 'w', libver=('earliest', 'v108')) as f:
         let before = dump();
         assert!(before.contains("/notes utf-8"), "{before}");
         let x = vec![0.5, 0.25];
-        let solution = StoredPoint {
-            u: x.clone(),
-            r: x,
-            ..Default::default()
-        };
+        let solution = StoredPoint { u: x.clone(), r: x, ..Default::default() };
         fclib::write_solution(&path, &solution).unwrap();
         let content = fclib::read(&path).unwrap();
-        assert_eq!(
-            (content.solution, content.info.involved_ds),
-            (Some(solution), Some(3))
-        );
+        assert_eq!((content.solution, content.info.involved_ds), (Some(solution), Some(3)));
         let rest = |dump: &str| {
             let lines = dump.lines().filter(|line| !line.starts_with("/solution"));
             lines.map(String::from).collect::<Vec<_>>()
@@ -502,37 +393,19 @@ fn h5dump_reads_what_is_written() {
     for content in contents() {
         fclib::write(&path, &content).unwrap();
         let dump = |dataset: &str| {
-            sorted_lines(
-                Command::new("h5dump")
-                    .args(["-m", "%a", "-d", dataset])
-                    .arg(&path),
-            )
+            sorted_lines(Command::new("h5dump").args(["-m", "%a", "-d", dataset]).arg(&path))
         };
-        let root = if content.problem.kind().name().contains("local") {
-            "local"
-        } else {
-            "global"
-        };
+        let root = if content.problem.kind().name().contains("local") { "local" } else { "global" };
         let spacedim = dump(&format!("/fclib_{root}/spacedim"));
         assert!(
             spacedim.contains("H5T_STD_I32LE") && spacedim.contains("( 1 ) / ( 1 )"),
             "{spacedim}"
         );
-        let title = if root == "local" {
-            "title"
-        } else {
-            "description"
-        };
+        let title = if root == "local" { "title" } else { "description" };
         let title = dump(&format!("/fclib_{root}/info/{title}"));
-        assert!(
-            title.contains("H5T_STR_NULLTERM") && title.contains("SCALAR"),
-            "{title}"
-        );
+        assert!(title.contains("H5T_STR_NULLTERM") && title.contains("SCALAR"), "{title}");
         // Every dataset of the file is readable.
         let all = sorted_lines(Command::new("h5dump").arg(&path));
-        assert!(
-            all.contains("DATASET \"mu\"") && !all.contains("error"),
-            "{all}"
-        );
+        assert!(all.contains("DATASET \"mu\"") && !all.contains("error"), "{all}");
     }
 }

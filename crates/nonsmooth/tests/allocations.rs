@@ -100,7 +100,8 @@ fn sessions<P: Registered>() -> Vec<(String, Box<dyn Session<P>>)> {
         let about = registry::about::<P>(&name).expect("listed");
         let variants = about.variants.iter().map(|v| vec![*v]);
         for texts in std::iter::once(vec![]).chain(variants) {
-            let settings = registry::parse_settings(&texts).expect("a variant is key=value");
+            let settings =
+                nonsmooth_solve::settings::from_texts(&texts).expect("a variant is key=value");
             let session = registry::session::<P>(&name, &settings).expect("a variant is valid");
             all.push((format!("{name} {}", texts.join(" ")), session));
         }

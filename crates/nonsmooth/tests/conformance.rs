@@ -49,7 +49,7 @@ where
 {
     let mut failures = Vec::new();
     for (name, settings) in runs::<P>() {
-        let map = registry::parse_settings(&settings).unwrap();
+        let map = nonsmooth_solve::settings::from_texts(&settings).unwrap();
         let mut session = registry::session::<P>(&name, &map).unwrap();
         for case in cases() {
             let problem = make(&case);

@@ -24,7 +24,11 @@ fn solved<P: Registered + Judged>(problem: &P, limits: &Limits, name: &Path) -> 
 }
 
 /// The files of `folders` with a problem that `wanted` takes: how many, and which were solved.
-fn campaign(folders: &[&str], limits: &Limits, wanted: fn(&Friction) -> bool) -> (usize, HashSet<String>) {
+fn campaign(
+    folders: &[&str],
+    limits: &Limits,
+    wanted: fn(&Friction) -> bool,
+) -> (usize, HashSet<String>) {
     let (mut all, mut names) = (0, HashSet::new());
     for path in common::corpus_files(folders) {
         let Ok(file) = fclib::read(&path) else {

@@ -26,7 +26,7 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { tolerance: 1e-8, max_iterations: 100_000, time_limit: None, cancel: None }
+        Self { tolerance: 1e-8, max_iterations: 1_000_000, time_limit: None, cancel: None }
     }
 }
 

@@ -28,6 +28,7 @@ pub mod parts;
 pub mod projection;
 pub mod reform;
 pub mod registry;
+pub mod settings;
 mod solver;
 pub mod splitting;
 mod via;

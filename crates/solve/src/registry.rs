@@ -5,25 +5,14 @@
 use std::marker::PhantomData;
 
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
-use schemars::JsonSchema;
 use serde::Serialize;
-use serde::de::DeserializeOwned;
-use serde_json::{Map, Value};
 
 use crate::form::{Blockwise, Linear};
 use crate::projection::{DeSaxce, Extragradient, FixedPoint, Method, Projected};
 use crate::reform::Condense;
+use crate::settings::{Setting, Settings, SettingsMap, described, parse};
 use crate::splitting::Nsgs;
 use crate::{Driver, Reformulation, Session, SolveError, Solver, Via};
-
-/// Settings of a solver by key, as they come from a command line or a file.
-pub type SettingsMap = Map<String, Value>;
-
-/// A solver's hyperparameters: typed, documented, defaulted, unknown keys refused.
-pub trait Settings: DeserializeOwned + Serialize + JsonSchema + Default {
-    /// The ranges that types do not express. The message names the key, what is expected and what was found.
-    fn validate(&self) -> Result<(), String>;
-}
 
 /// One solver: what it is, and how it is made and handed to a visitor that knows the kind of problem.
 pub struct Entry<V: Visitor> {
@@ -89,19 +78,6 @@ fn settings_now<S: serde::Serializer>(
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
     settings().serialize(serializer)
-}
-
-/// One setting, as help texts show it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Setting {
-    /// The key.
-    pub key: String,
-    /// The default value.
-    pub default: Value,
-    /// The names it may take, where it is a choice.
-    pub choices: Vec<String>,
-    /// What it does.
-    pub help: String,
 }
 
 /// A reformulation that can stand before a solver's name.
@@ -296,95 +272,12 @@ pub fn session<P: Registered>(
         .map_err(|problem| SolveError::Settings { solver: name.into(), problem })
 }
 
-/// Reads `key=value` texts: the value as JSON where it is (numbers, true), as a plain string elsewhere.
-pub fn parse_settings<S: AsRef<str>>(texts: &[S]) -> Result<SettingsMap, String> {
-    let mut map = SettingsMap::new();
-    for text in texts {
-        let text = text.as_ref();
-        let (key, value) = text
-            .split_once('=')
-            .filter(|(key, _)| !key.trim().is_empty())
-            .ok_or_else(|| format!("expected key=value, found `{text}`"))?;
-        let (key, value) = (key.trim(), value.trim());
-        let value = serde_json::from_str(value).unwrap_or_else(|_| Value::String(value.into()));
-        if map.insert(key.into(), value).is_some() {
-            return Err(format!("`{key}` is set twice"));
-        }
-    }
-    Ok(map)
-}
-
-/// The typed settings behind a map.
-fn parse<S: Settings>(map: &SettingsMap) -> Result<S, String> {
-    let known = described::<S>();
-    // One key at a time, so that the message can name the key at fault.
-    for (key, value) in map {
-        let Some(setting) = known.iter().find(|s| s.key == *key) else {
-            let keys: Vec<_> = known.iter().map(|s| s.key.as_str()).collect();
-            return Err(format!("unknown key `{key}`; there are: {}", keys.join(", ")));
-        };
-        let alone = SettingsMap::from_iter([(key.clone(), value.clone())]);
-        if serde_json::from_value::<S>(Value::Object(alone)).is_err() {
-            return Err(format!("{key}: expected {}, found {value}", setting.expected()));
-        }
-    }
-    let settings: S =
-        serde_json::from_value(Value::Object(map.clone())).map_err(|e| e.to_string())?;
-    settings.validate()?;
-    Ok(settings)
-}
-
-impl Setting {
-    /// What the value may be, in words.
-    fn expected(&self) -> String {
-        match &self.default {
-            _ if !self.choices.is_empty() => format!("one of {}", self.choices.join(", ")),
-            Value::Bool(_) => "true or false".into(),
-            Value::Number(n) if n.is_u64() => "a whole number of at least 0".into(),
-            Value::Number(_) => "a number".into(),
-            _ => "text".into(),
-        }
-    }
-}
-
-/// The settings of `S` as its type documents them.
-fn described<S: Settings>() -> Vec<Setting> {
-    let schema = schemars::schema_for!(S);
-    let defaults = serde_json::to_value(S::default()).unwrap_or_default();
-    let Some(properties) = schema.get("properties").and_then(Value::as_object) else {
-        return vec![];
-    };
-    let text = |v: Option<&Value>| v.and_then(Value::as_str).unwrap_or_default().replace('\n', " ");
-    properties
-        .iter()
-        .map(|(key, property)| Setting {
-            key: key.clone(),
-            default: defaults.get(key).cloned().unwrap_or_default(),
-            choices: choices(&schema, property),
-            help: text(property.get("description")),
-        })
-        .collect()
-}
-
-/// The names of an enumeration, which a schema states as a reference to a `oneOf` of constants.
-fn choices(schema: &schemars::Schema, property: &Value) -> Vec<String> {
-    let reference = property.get("$ref").and_then(Value::as_str).unwrap_or_default();
-    let Some(name) = reference.rsplit('/').next().filter(|n| !n.is_empty()) else {
-        return vec![];
-    };
-    let definition = schema.get("$defs").and_then(|d| d.get(name));
-    let list = |key: &str| definition.and_then(|d| d.get(key)).and_then(Value::as_array);
-    let constants = list("oneOf").into_iter().flatten().filter_map(|one| one.get("const"));
-    let plain = list("enum").into_iter().flatten();
-    constants.chain(plain).filter_map(Value::as_str).map(str::to_owned).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn refusal(texts: &[&str]) -> String {
-        let map = parse_settings(texts).unwrap();
+        let map = crate::settings::from_texts(texts).unwrap();
         session::<FrictionLocal<3>>("nsgs", &map).err().expect("refused").to_string()
     }
 
@@ -416,15 +309,6 @@ mod tests {
             assert!(session::<FrictionLocal<3>>(name, &SettingsMap::new()).is_err(), "{name}");
         }
         assert!(session::<FrictionGlobal<3>>("condense/nsgs", &SettingsMap::new()).is_ok());
-    }
-
-    #[test]
-    fn settings_texts() {
-        assert!(parse_settings(&["omega"]).is_err() && parse_settings(&["=1"]).is_err());
-        assert!(parse_settings(&["a=1", "a=2"]).unwrap_err().contains("twice"));
-        let map = parse_settings(&["a=1.5", "b=word", "c=true"]).unwrap();
-        assert_eq!(map["a"], Value::from(1.5));
-        assert_eq!((&map["b"], &map["c"]), (&Value::from("word"), &Value::from(true)));
     }
 
     #[test]

@@ -7,7 +7,8 @@ use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::{Bsr, Csc};
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem};
-use nonsmooth_solve::registry::{self, SettingsMap};
+use nonsmooth_solve::registry;
+use nonsmooth_solve::settings::{self, SettingsMap};
 use nonsmooth_solve::{Driver, Limit, Limits, Outcome, Session, SolveError, Solver, Status, Step};
 
 type P = FrictionLocal<3>;
@@ -160,7 +161,7 @@ fn mistakes_of_the_caller_are_errors() {
 fn the_same_input_gives_the_same_bits_and_a_warm_start_is_used() {
     let (problem, _) = Planted { contacts: 60, dofs: 360, ..Planted::default() }.local::<3>();
     for settings in [vec![], vec!["ordering=fully_shuffled"], vec!["freeze_after=3"]] {
-        let map = registry::parse_settings(&settings).unwrap();
+        let map = settings::from_texts(&settings).unwrap();
         let mut session = registry::session::<P>("nsgs", &map).unwrap();
         let mut solve = |point: &mut LocalPoint| {
             session.solve(&problem, point, &Limits::default(), &mut |_| {}).unwrap()
@@ -176,7 +177,8 @@ fn the_same_input_gives_the_same_bits_and_a_warm_start_is_used() {
 
 #[test]
 fn it_stops_at_the_tolerance_and_not_far_below() {
-    let (problem, _) = Planted { contacts: 200, dofs: 700, seed: 3, ..Planted::default() }.local::<3>();
+    let (problem, _) =
+        Planted { contacts: 200, dofs: 700, seed: 3, ..Planted::default() }.local::<3>();
     for tolerance in [1e-3, 1e-6, 1e-9] {
         let mut session = registry::session::<P>("nsgs", &SettingsMap::new()).unwrap();
         let limits = Limits { tolerance, ..Limits::default() };

@@ -4,10 +4,7 @@
 
 use std::ops::RangeInclusive;
 
-use schemars::{JsonSchema, Schema};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
-use serde_json::{Map, Value};
+use nonsmooth_solve::settings::{self, Setting, Settings, SettingsMap};
 
 use crate::error::{positive, require};
 use crate::{Contact, Scene, SceneError, Vec3};
@@ -48,6 +45,8 @@ macro_rules! settings {
             }
         }
 
+        impl nonsmooth_solve::settings::Settings for $name {}
+
         impl $name {
             fn common(&self) -> $crate::scenes::Common {
                 let Self { density, mu, e, h, gravity, disturbance, seed, .. } = *self;
@@ -79,7 +78,7 @@ pub static SCENES: &[SceneEntry] = &[
 ];
 
 /// A family of scenes: a struct that is its settings.
-pub trait Family: Default + Serialize + DeserializeOwned + JsonSchema {
+pub trait Family: Settings {
     /// The name by which the registry and the command line call it.
     const NAME: &'static str;
     /// One line on what it shows.
@@ -97,9 +96,8 @@ pub struct SceneEntry {
     pub name: &'static str,
     /// One line on what it shows.
     pub summary: &'static str,
-    defaults: fn() -> Map<String, Value>,
-    schema: fn() -> Schema,
-    make: fn(Map<String, Value>) -> Result<Scene, SceneError>,
+    settings: fn() -> Vec<Setting>,
+    make: fn(&SettingsMap) -> Result<Scene, SceneError>,
 }
 
 impl SceneEntry {
@@ -107,9 +105,8 @@ impl SceneEntry {
         Self {
             name: F::NAME,
             summary: F::SUMMARY,
-            defaults: defaults::<F>,
-            schema: || schemars::schema_for!(F),
-            make: make::<F>,
+            settings: settings::described::<F>,
+            make: |settings| settings::parse::<F>(settings).map_err(SceneError::Setting)?.build(),
         }
     }
 
@@ -119,57 +116,22 @@ impl SceneEntry {
     pub fn find(name: &str) -> Result<&'static Self, SceneError> {
         SCENES.iter().find(|s| s.name == name).ok_or_else(|| SceneError::UnknownScene {
             found: name.into(),
-            known: list(SCENES.iter().map(|s| s.name)),
+            known: SCENES.iter().map(|s| s.name).collect::<Vec<_>>().join(", "),
         })
     }
 
-    /// The default of every setting, in the order of their documentation.
-    pub fn defaults(&self) -> Map<String, Value> {
-        (self.defaults)()
-    }
-
-    /// The JSON schema of the settings; its descriptions are the help of each key.
-    pub fn schema(&self) -> Schema {
-        (self.schema)()
+    /// The documented settings with their defaults.
+    pub fn settings(&self) -> Vec<Setting> {
+        (self.settings)()
     }
 
     /// Builds the scene with `settings` in place of the defaults that they name.
     ///
     /// Errors: an unknown key, listing those that exist; a value of the wrong type or one that makes no scene,
     /// by its key.
-    pub fn make(&self, settings: Map<String, Value>) -> Result<Scene, SceneError> {
+    pub fn make(&self, settings: &SettingsMap) -> Result<Scene, SceneError> {
         (self.make)(settings)
     }
-}
-
-fn defaults<F: Family>() -> Map<String, Value> {
-    match serde_json::to_value(F::default()) {
-        Ok(Value::Object(map)) => map,
-        other => unreachable!("settings are a struct of plain values, not {other:?}"),
-    }
-}
-
-fn make<F: Family>(settings: Map<String, Value>) -> Result<Scene, SceneError> {
-    let known = defaults::<F>();
-    for (key, value) in &settings {
-        if !known.contains_key(key) {
-            let known = list(known.keys().map(String::as_str));
-            return Err(SceneError::UnknownSetting { scene: F::NAME, key: key.clone(), known });
-        }
-        // Each key is tried alone first: serde's message on a whole struct does not say which key it means.
-        parse::<F>(Map::from_iter([(key.clone(), value.clone())]))
-            .map_err(|e| SceneError::Setting { key: key.clone(), why: e.to_string() })?;
-    }
-    let family = parse::<F>(settings).expect("each setting has been parsed alone");
-    family.build()
-}
-
-fn parse<F: Family>(settings: Map<String, Value>) -> serde_json::Result<F> {
-    serde_json::from_value(Value::Object(settings))
-}
-
-fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    names.map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
 }
 
 /// The settings common to all families.

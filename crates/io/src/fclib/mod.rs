@@ -49,12 +49,7 @@ pub struct FclibFile {
 impl FclibFile {
     /// A file with the problem alone.
     pub fn new(problem: Friction) -> Self {
-        Self {
-            problem,
-            info: Info::default(),
-            solution: None,
-            guesses: vec![],
-        }
+        Self { problem, info: Info::default(), solution: None, guesses: vec![] }
     }
 }
 
@@ -101,30 +96,18 @@ impl StoredPoint {
     pub fn from_global<const D: usize>(problem: &FrictionGlobal<D>, point: &GlobalPoint) -> Self {
         let mut u = vec![0.0; problem.w.len()];
         problem.velocity_into(&point.v, &mut u);
-        Self {
-            v: some(&point.v),
-            u,
-            r: point.r.clone(),
-            lambda: some(&point.lambda),
-        }
+        Self { v: some(&point.v), u, r: point.r.clone(), lambda: some(&point.lambda) }
     }
 
     /// The unknowns of a local problem.
     pub fn to_local(&self) -> LocalPoint {
-        LocalPoint {
-            r: self.r.clone(),
-            lambda: self.lambda.clone().unwrap_or_default(),
-        }
+        LocalPoint { r: self.r.clone(), lambda: self.lambda.clone().unwrap_or_default() }
     }
 
     /// The unknowns of a global problem.
     pub fn to_global(&self) -> GlobalPoint {
         let LocalPoint { r, lambda } = self.to_local();
-        GlobalPoint {
-            v: self.v.clone().unwrap_or_default(),
-            r,
-            lambda,
-        }
+        GlobalPoint { v: self.v.clone().unwrap_or_default(), r, lambda }
     }
 }
 
@@ -175,18 +158,10 @@ struct Sizes {
 impl Sizes {
     fn of(problem: &Friction) -> Self {
         fn local<const D: usize>(p: &FrictionLocal<D>) -> Sizes {
-            Sizes {
-                v: 0,
-                contacts: D * p.contacts(),
-                lambda: p.multipliers(),
-            }
+            Sizes { v: 0, contacts: D * p.contacts(), lambda: p.multipliers() }
         }
         fn global<const D: usize>(p: &FrictionGlobal<D>) -> Sizes {
-            Sizes {
-                v: p.dofs(),
-                contacts: D * p.contacts(),
-                lambda: p.multipliers(),
-            }
+            Sizes { v: p.dofs(), contacts: D * p.contacts(), lambda: p.multipliers() }
         }
         match problem {
             Friction::Local2(p) => local(p),
@@ -213,13 +188,7 @@ impl Sizes {
 /// panic hook's message: the hook is the program's, not this library's to change).
 fn guarded<T>(file: &Path, run: impl FnOnce() -> Result<T, IoError>) -> Result<T, IoError> {
     let caught = catch_unwind(AssertUnwindSafe(run));
-    caught.unwrap_or_else(|_| {
-        Err(IoError::hdf5(
-            file,
-            "/",
-            "damage that stopped the HDF5 reader",
-        ))
-    })
+    caught.unwrap_or_else(|_| Err(IoError::hdf5(file, "/", "damage that stopped the HDF5 reader")))
 }
 
 /// The root group of a problem.
@@ -240,24 +209,14 @@ fn check_vector(
 ) -> Result<(), IoError> {
     if x.len() != len {
         let expected = format!("{len} entries ({meaning})");
-        return Err(IoError::data(
-            file,
-            place,
-            expected,
-            format!("{} entries", x.len()),
-        ));
+        return Err(IoError::data(file, place, expected, format!("{} entries", x.len())));
     }
     check_finite(file, place, x)
 }
 
 fn check_finite(file: &Path, place: &str, x: &[f64]) -> Result<(), IoError> {
     match x.iter().position(|v| !v.is_finite()) {
-        Some(k) => Err(IoError::data(
-            file,
-            format!("{place}[{k}]"),
-            "a finite number",
-            x[k],
-        )),
+        Some(k) => Err(IoError::data(file, format!("{place}[{k}]"), "a finite number", x[k])),
         None => Ok(()),
     }
 }

@@ -17,26 +17,13 @@ use crate::error::one_line;
 /// Reads a file, with its solution and guesses if `points`.
 pub(super) fn read(path: &Path, points: bool) -> Result<FclibFile, IoError> {
     let expected = "a readable file";
-    if std::fs::metadata(path)
-        .map_err(|e| IoError::os(path, expected, e))?
-        .is_dir()
-    {
-        return Err(IoError::NotHdf5 {
-            file: path.into(),
-            found: "a directory",
-        });
+    if std::fs::metadata(path).map_err(|e| IoError::os(path, expected, e))?.is_dir() {
+        return Err(IoError::NotHdf5 { file: path.into(), found: "a directory" });
     }
     let bytes = std::fs::read(path).map_err(|e| IoError::os(path, expected, e))?;
     if !hdf5_pure::is_hdf5_bytes(&bytes) {
-        let found = if bytes.is_empty() {
-            "an empty file"
-        } else {
-            "other data"
-        };
-        return Err(IoError::NotHdf5 {
-            file: path.into(),
-            found,
-        });
+        let found = if bytes.is_empty() { "an empty file" } else { "other data" };
+        return Err(IoError::NotHdf5 { file: path.into(), found });
     }
     guarded(path, || parse(path, bytes, points))
 }
@@ -51,30 +38,22 @@ fn parse(path: &Path, bytes: Vec<u8>, points: bool) -> Result<FclibFile, IoError
     }
     let root = Folder::open(path, size, String::new(), file.root())?;
     let mut content = FclibFile::new(problem(&root)?);
-    content
-        .problem
-        .validate()
-        .map_err(|problem| IoError::Problem {
-            file: path.into(),
-            group: group(&content.problem),
-            problem,
-        })?;
+    content.problem.validate().map_err(|problem| IoError::Problem {
+        file: path.into(),
+        group: group(&content.problem),
+        problem,
+    })?;
     content.info = info(&root.need(&group(&content.problem)[1..])?)?;
     if points {
         let sizes = Sizes::of(&content.problem);
-        content.solution = root
-            .folder("solution")?
-            .map(|g| point(&g, sizes))
-            .transpose()?;
+        content.solution = root.folder("solution")?.map(|g| point(&g, sizes)).transpose()?;
         if let Some(guesses) = root.folder("guesses")? {
             let number = guesses.int("number_of_guesses")?;
             if number < 0 {
                 return Err(guesses.error("number_of_guesses", "a number of at least 0", number));
             }
             for k in 1..=number {
-                content
-                    .guesses
-                    .push(point(&guesses.need(&k.to_string())?, sizes)?);
+                content.guesses.push(point(&guesses.need(&k.to_string())?, sizes)?);
             }
         }
     }
@@ -109,10 +88,7 @@ fn problem(root: &Folder) -> Result<Friction, IoError> {
                 (None, []) => "no group".into(),
                 (None, others) => format!("only /{}", others.join(", /")),
             };
-            Err(IoError::Root {
-                file: root.file.into(),
-                found: one_line(found),
-            })
+            Err(IoError::Root { file: root.file.into(), found: one_line(found) })
         }
     }
 }
@@ -130,28 +106,15 @@ fn local<const D: usize>(g: &Folder) -> Result<FrictionLocal<D>, IoError> {
         (Some(_), Some(_), true) => {
             let s = vectors.reals("s")?;
             let p = s.len();
-            let V = g.matrix(
-                "V",
-                (m, p),
-                &format!("{contacts}, by the entries of vectors/s"),
-            )?;
-            Some(BilateralLocal {
-                V,
-                R: g.matrix("R", (p, p), "the entries of vectors/s")?,
-                s,
-            })
+            let V = g.matrix("V", (m, p), &format!("{contacts}, by the entries of vectors/s"))?;
+            Some(BilateralLocal { V, R: g.matrix("R", (p, p), "the entries of vectors/s")?, s })
         }
         (V, R, s) => {
             let parts = [("V", V.is_some()), ("R", R.is_some()), ("vectors/s", s)];
             return Err(g.incomplete(&parts));
         }
     };
-    Ok(FrictionLocal {
-        W: Bsr::from_csc(&W),
-        q,
-        mu,
-        bilateral,
-    })
+    Ok(FrictionLocal { W: Bsr::from_csc(&W), q, mu, bilateral })
 }
 
 #[allow(non_snake_case)]
@@ -163,42 +126,25 @@ fn global<const D: usize>(g: &Folder) -> Result<FrictionGlobal<D>, IoError> {
     let n = f.len();
     let contacts = format!("{D} for each entry of vectors/mu");
     let M = g.matrix("M", (n, n), "the entries of vectors/f")?;
-    let H = g.matrix(
-        "H",
-        (n, m),
-        &format!("the entries of vectors/f, by {contacts}"),
-    )?;
+    let H = g.matrix("H", (n, m), &format!("the entries of vectors/f, by {contacts}"))?;
     let w = vectors.vector("w", m, &contacts)?;
     let bilateral = match (g.folder("G")?, vectors.has("b")) {
         (None, false) => None,
         (Some(_), true) => {
             let b = vectors.reals("b")?;
             let why = "the entries of vectors/f, by the entries of vectors/b";
-            Some(BilateralGlobal {
-                G: g.matrix("G", (n, b.len()), why)?,
-                b,
-            })
+            Some(BilateralGlobal { G: g.matrix("G", (n, b.len()), why)?, b })
         }
         (G, b) => return Err(g.incomplete(&[("G", G.is_some()), ("vectors/b", b)])),
     };
-    Ok(FrictionGlobal {
-        M,
-        H,
-        f,
-        w,
-        mu,
-        bilateral,
-    })
+    Ok(FrictionGlobal { M, H, f, w, mu, bilateral })
 }
 
 fn info(problem: &Folder) -> Result<Info, IoError> {
     let Some(g) = problem.folder("info")? else {
         return Ok(Info::default());
     };
-    let attributes = g
-        .group
-        .attrs()
-        .map_err(|e| IoError::hdf5(g.file, &g.path, e))?;
+    let attributes = g.group.attrs().map_err(|e| IoError::hdf5(g.file, &g.path, e))?;
     let count = |name: &str| usize::try_from(attributes.get(name)?.as_i64()?).ok();
     Ok(Info {
         title: g.text("title")?,
@@ -238,19 +184,9 @@ struct Folder<'a> {
 impl<'a> Folder<'a> {
     fn open(file: &'a Path, size: u64, path: String, group: Group) -> Result<Self, IoError> {
         let place = if path.is_empty() { "/" } else { &path };
-        let datasets = group
-            .iter_datasets()
-            .map_err(|e| IoError::hdf5(file, place, e))?
-            .collect();
+        let datasets = group.iter_datasets().map_err(|e| IoError::hdf5(file, place, e))?.collect();
         let groups = group.groups().map_err(|e| IoError::hdf5(file, place, e))?;
-        Ok(Self {
-            file,
-            size,
-            path,
-            group,
-            datasets,
-            groups,
-        })
+        Ok(Self { file, size, path, group, datasets, groups })
     }
 
     fn place(&self, name: impl Display) -> String {
@@ -288,28 +224,21 @@ impl<'a> Folder<'a> {
 
     /// The group `name`.
     fn need(&self, name: &str) -> Result<Folder<'a>, IoError> {
-        self.folder(name)?
-            .ok_or_else(|| self.error(name, "a group", "nothing of that name"))
+        self.folder(name)?.ok_or_else(|| self.error(name, "a group", "nothing of that name"))
     }
 
     /// The dataset `name`, whose size the file can account for.
     fn dataset(&self, name: &str) -> Result<&Dataset, IoError> {
         let Some(dataset) = self.datasets.get(name) else {
             let group = self.groups.iter().any(|g| g == name);
-            let found = if group {
-                "a group"
-            } else {
-                "nothing of that name"
-            };
+            let found = if group { "a group" } else { "nothing of that name" };
             return Err(self.error(name, "a dataset", found));
         };
         let shape = dataset.shape().map_err(self.damaged(name))?;
         let width = dataset.element_size().map_err(self.damaged(name))?;
         let bytes = shape.iter().try_fold(width, |a, &b| a.checked_mul(b));
         // No filter expands more than deflate, 1032 to 1.
-        let most = self
-            .size
-            .saturating_mul(if dataset.is_chunked() { 1032 } else { 1 });
+        let most = self.size.saturating_mul(if dataset.is_chunked() { 1032 } else { 1 });
         match bytes {
             Some(bytes) if bytes <= most => Ok(dataset),
             _ => {
@@ -335,10 +264,7 @@ impl<'a> Folder<'a> {
             | DType::U32 => dataset.read_i64(),
             // What does not fit is too large for any use here; the range checks say so.
             DType::U64 => dataset.read_u64().map(|values| {
-                values
-                    .into_iter()
-                    .map(|x| i64::try_from(x).unwrap_or(i64::MAX))
-                    .collect()
+                values.into_iter().map(|x| i64::try_from(x).unwrap_or(i64::MAX)).collect()
             }),
             other => return Err(self.error(name, "integers", other)),
         };
@@ -382,11 +308,7 @@ impl<'a> Folder<'a> {
             }
             DType::VariableLengthString => {
                 let mut texts = dataset.read_string().map_err(self.damaged(name))?;
-                Ok(Some(if texts.is_empty() {
-                    String::new()
-                } else {
-                    texts.swap_remove(0)
-                }))
+                Ok(Some(if texts.is_empty() { String::new() } else { texts.swap_remove(0) }))
             }
             other => Err(self.error(name, "a text", other)),
         }
@@ -404,11 +326,7 @@ impl<'a> Folder<'a> {
         let mu = vectors.reals("mu")?;
         if mu.is_empty() {
             let problem = ProblemError::Empty { place: "mu".into() };
-            return Err(IoError::Problem {
-                file: self.file.into(),
-                group,
-                problem,
-            });
+            return Err(IoError::Problem { file: self.file.into(), group, problem });
         }
         Ok(mu)
     }
@@ -416,10 +334,7 @@ impl<'a> Folder<'a> {
     /// Some of these parts are there and some are not.
     fn incomplete(&self, parts: &[(&str, bool)]) -> IoError {
         let names = |present: bool| {
-            let of = parts
-                .iter()
-                .filter(|p| p.1 == present)
-                .map(|p| self.place(p.0));
+            let of = parts.iter().filter(|p| p.1 == present).map(|p| self.place(p.0));
             of.collect::<Vec<_>>().join(" and ")
         };
         let expected = format!("it beside {} (bilateral constraints)", names(true));
@@ -480,13 +395,10 @@ impl<'a> Folder<'a> {
         bound: usize,
     ) -> Result<Vec<usize>, IoError> {
         let check = |(k, &index): (usize, &i64)| {
-            usize::try_from(index)
-                .ok()
-                .filter(|&index| index < bound)
-                .ok_or_else(|| {
-                    let expected = format!("a {what} index of at least 0 and below {bound}");
-                    self.error(format_args!("{name}[{k}]"), expected, index)
-                })
+            usize::try_from(index).ok().filter(|&index| index < bound).ok_or_else(|| {
+                let expected = format!("a {what} index of at least 0 and below {bound}");
+                self.error(format_args!("{name}[{k}]"), expected, index)
+            })
         };
         indices.iter().enumerate().map(check).collect()
     }
@@ -517,8 +429,6 @@ impl<'a> Folder<'a> {
             }
         }
         let runs = p.windows(2).enumerate();
-        Ok(runs
-            .flat_map(|(k, w)| (w[0]..w[1]).map(move |_| k))
-            .collect())
+        Ok(runs.flat_map(|(k, w)| (w[0]..w[1]).map(move |_| k)).collect())
     }
 }

@@ -29,11 +29,7 @@ pub(super) fn write(path: &Path, content: &FclibFile) -> Result<(), IoError> {
     file.with_libver_bounds(LibVer::V18, LibVer::V18);
     let mut top = |name: &str, fill: &dyn Fn(&mut Out) -> Result<(), IoError>| {
         let group = file.create_group(&name[1..]);
-        let mut g = Out {
-            file: path,
-            path: name.into(),
-            group,
-        };
+        let mut g = Out { file: path, path: name.into(), group };
         fill(&mut g)?;
         file.add_group(g.group.finish());
         Ok::<(), IoError>(())
@@ -57,9 +53,7 @@ pub(super) fn write(path: &Path, content: &FclibFile) -> Result<(), IoError> {
             guesses.try_for_each(|(k, x)| g.child(&(k + 1).to_string(), |g| point(g, x, sizes)))
         })?;
     }
-    replace(path, |temporary| {
-        file.write(temporary).map_err(|e| failed(path, e))
-    })
+    replace(path, |temporary| file.write(temporary).map_err(|e| failed(path, e)))
 }
 
 pub(super) fn write_solution(path: &Path, solution: &StoredPoint) -> Result<(), IoError> {
@@ -68,11 +62,7 @@ pub(super) fn write_solution(path: &Path, solution: &StoredPoint) -> Result<(), 
     let edit = |temporary: &Path| -> Result<(), hdf5_pure::Error> {
         let file = File::open_rw(temporary)?;
         let root = file.root();
-        for old in root
-            .groups()?
-            .iter()
-            .chain(&root.datasets()?)
-            .filter(|name| *name == "solution")
+        for old in root.groups()?.iter().chain(&root.datasets()?).filter(|name| *name == "solution")
         {
             root.delete(old)?;
         }
@@ -184,10 +174,7 @@ fn info(g: &mut Out, info: &Info) -> Result<(), IoError> {
             g.text(name, text)?;
         }
     }
-    let counts = [
-        ("numberOfDegreeOfFreedom", info.dofs),
-        ("numberOfInvolvedDS", info.involved_ds),
-    ];
+    let counts = [("numberOfDegreeOfFreedom", info.dofs), ("numberOfInvolvedDS", info.involved_ds)];
     for (name, count) in counts {
         if let Some(count) = count {
             let count = g.as_int(format_args!("@{name}"), count)?;
@@ -211,12 +198,8 @@ fn stored_parts<'a>(
     point: &'a StoredPoint,
     sizes: Sizes,
 ) -> Result<Vec<(&'static str, &'a [f64])>, IoError> {
-    let slices = [
-        point.v.as_deref(),
-        Some(&point.u[..]),
-        Some(&point.r[..]),
-        point.lambda.as_deref(),
-    ];
+    let slices =
+        [point.v.as_deref(), Some(&point.u[..]), Some(&point.r[..]), point.lambda.as_deref()];
     let mut stored = vec![];
     for ((name, len, meaning), x) in sizes.parts().into_iter().zip(slices) {
         let x = x.unwrap_or_default();
@@ -242,11 +225,7 @@ impl Out<'_> {
         fill: impl FnOnce(&mut Out) -> Result<(), IoError>,
     ) -> Result<(), IoError> {
         let group = self.group.create_group(name);
-        let mut child = Out {
-            file: self.file,
-            path: format!("{}/{name}", self.path),
-            group,
-        };
+        let mut child = Out { file: self.file, path: format!("{}/{name}", self.path), group };
         fill(&mut child)?;
         self.group.add_group(child.group.finish());
         Ok(())
@@ -277,33 +256,19 @@ impl Out<'_> {
             return Err(IoError::data(self.file, place, expected, "one with"));
         }
         let size = self.as_int(name, text.len() + 1)? as u32;
-        let charset = if text.is_ascii() {
-            CharacterSet::Ascii
-        } else {
-            CharacterSet::Utf8
-        };
-        let datatype = Datatype::String {
-            size,
-            padding: StringPadding::NullTerminate,
-            charset,
-        };
+        let charset = if text.is_ascii() { CharacterSet::Ascii } else { CharacterSet::Utf8 };
+        let datatype = Datatype::String { size, padding: StringPadding::NullTerminate, charset };
         let bytes = [text.as_bytes(), b"\0"].concat();
-        self.group
-            .create_dataset(name)
-            .with_raw_data(datatype, bytes, 1)
-            .with_shape(&[]);
+        self.group.create_dataset(name).with_raw_data(datatype, bytes, 1).with_shape(&[]);
         Ok(())
     }
 
     /// Triplets, column by column: row `i`, column `p`.
     fn matrix(&mut self, name: &str, a: &Csc) -> Result<(), IoError> {
         self.child(name, |g| {
-            for (name, x) in [
-                ("nzmax", a.nnz()),
-                ("m", a.nrows()),
-                ("n", a.ncols()),
-                ("nz", a.nnz()),
-            ] {
+            for (name, x) in
+                [("nzmax", a.nnz()), ("m", a.nrows()), ("n", a.ncols()), ("nz", a.nnz())]
+            {
                 g.int(name, x)?;
             }
             // Indices lie below m and n, which fit.

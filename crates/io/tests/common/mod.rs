@@ -44,12 +44,7 @@ fn local<const D: usize>() -> impl Strategy<Value = FrictionLocal<D>> {
         let bilateral = (csc(m, p), csc(p, p), vec(real(), p));
         (csc(m, m), vec(real(), m), mu(nc), option::of(bilateral)).prop_map(|(w, q, mu, b)| {
             let bilateral = b.map(|(V, R, s)| BilateralLocal { V, R, s });
-            FrictionLocal {
-                W: Bsr::from_csc(&w),
-                q,
-                mu,
-                bilateral,
-            }
+            FrictionLocal { W: Bsr::from_csc(&w), q, mu, bilateral }
         })
     })
 }
@@ -58,25 +53,12 @@ fn global<const D: usize>() -> impl Strategy<Value = FrictionGlobal<D>> {
     (1..5_usize, 1..8_usize, 0..4_usize).prop_flat_map(|(nc, n, p)| {
         let m = D * nc;
         let bilateral = option::of((csc(n, p), vec(real(), p)));
-        (
-            csc(n, n),
-            csc(n, m),
-            vec(real(), n),
-            vec(real(), m),
-            mu(nc),
-            bilateral,
-        )
-            .prop_map(|(M, H, f, w, mu, b)| {
+        (csc(n, n), csc(n, m), vec(real(), n), vec(real(), m), mu(nc), bilateral).prop_map(
+            |(M, H, f, w, mu, b)| {
                 let bilateral = b.map(|(G, b)| BilateralGlobal { G, b });
-                FrictionGlobal {
-                    M,
-                    H,
-                    f,
-                    w,
-                    mu,
-                    bilateral,
-                }
-            })
+                FrictionGlobal { M, H, f, w, mu, bilateral }
+            },
+        )
     })
 }
 
@@ -91,18 +73,8 @@ fn problem() -> impl Strategy<Value = Friction> {
 
 fn point(v: usize, m: usize, p: usize) -> impl Strategy<Value = StoredPoint> {
     let some = |x: Vec<f64>| (!x.is_empty()).then_some(x);
-    (
-        vec(real(), v),
-        vec(real(), m),
-        vec(real(), m),
-        vec(real(), p),
-    )
-        .prop_map(move |(v, u, r, l)| StoredPoint {
-            v: some(v),
-            u,
-            r,
-            lambda: some(l),
-        })
+    (vec(real(), v), vec(real(), m), vec(real(), m), vec(real(), p))
+        .prop_map(move |(v, u, r, l)| StoredPoint { v: some(v), u, r, lambda: some(l) })
 }
 
 fn info() -> impl Strategy<Value = Info> {
@@ -182,20 +154,14 @@ impl Tree {
     /// Without the dataset, or the whole group, of that path.
     pub fn without(mut self, path: &str) -> Self {
         let before = self.0.len();
-        self.0
-            .retain(|key, _| key != path && !key.starts_with(&format!("{path}/")));
+        self.0.retain(|key, _| key != path && !key.starts_with(&format!("{path}/")));
         assert!(self.0.len() < before, "{path} is not there");
         self
     }
 
     /// The same with a group renamed.
     pub fn renamed(self, from: &str, to: &str) -> Self {
-        Self(
-            self.0
-                .into_iter()
-                .map(|(k, v)| (k.replacen(from, to, 1), v))
-                .collect(),
-        )
+        Self(self.0.into_iter().map(|(k, v)| (k.replacen(from, to, 1), v)).collect())
     }
 
     pub fn matrix(
@@ -274,12 +240,8 @@ fn put(dataset: &mut hdf5_pure::DatasetBuilder, data: &Data) {
 }
 
 /// The 4 × 4 W of [`local_tree`] by rows, and its storages: `(p, i, x)`.
-pub const W: [[f64; 4]; 4] = [
-    [2.0, 0.5, -1.0, 0.0],
-    [0.25, 3.0, 0.0, 0.0],
-    [-1.5, 0.0, 4.0, 0.125],
-    [0.0, 0.0, 0.75, 5.0],
-];
+pub const W: [[f64; 4]; 4] =
+    [[2.0, 0.5, -1.0, 0.0], [0.25, 3.0, 0.0, 0.0], [-1.5, 0.0, 4.0, 0.125], [0.0, 0.0, 0.75, 5.0]];
 
 /// Two contacts in the plane, W as sorted triplets.
 pub fn local_tree() -> Tree {
@@ -314,11 +276,7 @@ pub fn global_tree() -> Tree {
     let tree = Tree(BTreeMap::new())
         .set("fclib_global/spacedim", Data::I(vec![3]))
         .matrix("fclib_global/M", (2, 2, 2), (&[0, 1], &[0, 1], &[1.0, 2.0]))
-        .matrix(
-            "fclib_global/H",
-            (2, 3, 3),
-            (&[0, 1, 2], &[0, 1, 0], &[1.0, 1.0, 0.5]),
-        )
+        .matrix("fclib_global/H", (2, 3, 3), (&[0, 1, 2], &[0, 1, 0], &[1.0, 1.0, 0.5]))
         .matrix("fclib_global/G", (2, 1, 1), (&[0], &[1], &[1.0]))
         .set("fclib_global/vectors/f", f(&[-1.0, 1.0]))
         .set("fclib_global/vectors/w", f(&[0.0, 0.0, 0.5]))

@@ -137,7 +137,8 @@ impl<const D: usize> Bsr<D> {
         let rows: Vec<BlockRow<D>> = (0..self.nrows())
             .map(|i| {
                 let (cols, blocks) = self.row(i);
-                let mut row: BlockRow<D> = cols.iter().copied().zip(blocks.iter().copied()).collect();
+                let mut row: BlockRow<D> =
+                    cols.iter().copied().zip(blocks.iter().copied()).collect();
                 let (cols, blocks) = other.row(i);
                 for (&j, b) in cols.iter().zip(blocks) {
                     let at = match row.binary_search_by_key(&j, |e| e.0) {

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Field, Method, at_least_one};
 use crate::form::Linear;
-use crate::registry::Settings;
+use crate::settings::Settings;
 
 /// The hyperparameters of the De Saxcé fixed point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Field, Method, StepRule};
 use crate::form::Linear;
-use crate::registry::Settings;
+use crate::settings::Settings;
 
 /// The hyperparameters: those of the step rule.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::at_least_one;
 use super::field::Field;
 use crate::form::Linear;
-use crate::registry::Settings;
+use crate::settings::Settings;
 
 /// The hyperparameters of a projection method with a self-adaptive step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -28,7 +28,7 @@ pub struct StepRule {
 
 impl Default for StepRule {
     fn default() -> Self {
-        Self { accept: 0.9, grow_below: 0.3, shrink: 2.0 / 3.0, check_every: 20 }
+        Self { accept: 0.9, grow_below: 0.3, shrink: 0.67, check_every: 20 }
     }
 }
 

@@ -25,7 +25,8 @@ use crate::local::{
     Exact, LocalSolver, Newton, Projection, ProjectionIterated, Quartic, frictionless,
 };
 use crate::parts::{Order, Ordering};
-use crate::registry::{Settings, Visitor};
+use crate::registry::Visitor;
+use crate::settings::Settings;
 use crate::{SolveError, Solver, Step, cone};
 
 /// The hyperparameters of NSGS.

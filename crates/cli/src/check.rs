@@ -1,0 +1,83 @@
+//! `nonsmooth check`.
+
+use std::path::{Path, PathBuf};
+
+use nonsmooth_io::fclib;
+use nonsmooth_problem::with_friction;
+use serde_json::json;
+
+use crate::kinds::Form;
+use crate::{Exit, files, output, report};
+
+/// Judge the solutions stored in files.
+///
+/// The residual of /solution is recomputed from the problem's data: from the impulses `r` (and the multipliers
+/// `l`), through the dynamics for a global problem. The stored `u` is not used.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// FCLIB files (HDF5) with a /solution
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// The relative residual that passes
+    #[arg(long, value_name = "TOL", default_value = "1e-8", allow_hyphen_values = true)]
+    tol: f64,
+    /// List the N contacts with the largest residuals (at most 10)
+    #[arg(long, value_name = "N")]
+    worst: Option<usize>,
+    /// Print one line of JSON for each file in place of the report
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  nonsmooth check solved.hdf5
+  nonsmooth check solved.hdf5 --tol 1e-12 --worst 10
+
+Exit codes: 0 all pass; 1 some do not; 2 a file without a solution, or at fault.";
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<Exit, String> {
+    let tol = files::tolerance(args.tol)?;
+    Ok(files::each(&args.files, args.json, |_, file| {
+        let content = fclib::read(file).map_err(|e| e.to_string())?;
+        let stored = content.solution.as_ref().ok_or_else(|| {
+            let file = file.display();
+            format!("{file}: /solution: expected a solution to check, found none")
+        })?;
+        with_friction!(&content.problem, p => one(file, p, p.point(stored), tol, args))
+    }))
+}
+
+fn one<P: Form>(
+    file: &Path,
+    problem: &P,
+    point: P::Point,
+    tol: f64,
+    args: &Args,
+) -> Result<Exit, String> {
+    let verdict = problem.judge(&point, tol).map_err(|e| format!("{}: {e}", file.display()))?;
+    let (name, says) = match verdict.solved {
+        true => ("solved", "solved"),
+        false => ("not_solved", "not solved: the stored solution does not pass"),
+    };
+    if args.json {
+        let mut all = report::problem_json(file, problem);
+        all.extend(report::fields(json!({"tolerance": tol, "status": name, "message": says})));
+        let worst = args.worst.unwrap_or(verdict.worst.len());
+        all.extend(report::verdict_json(&verdict, worst));
+        output::print(&format!("{}\n", json!(all)));
+    } else {
+        let relative = report::number(verdict.measure.relative);
+        let mut text = format!(
+            "{}: {says} (relative residual {relative}, tolerance {tol:e})\n",
+            file.display()
+        );
+        report::row(&mut text, "problem", report::problem_text(problem));
+        let worst = args.worst.unwrap_or(if verdict.solved { 0 } else { 3 });
+        report::verdict_text(&mut text, &verdict, worst);
+        output::print(&text);
+    }
+    Ok(Exit::solved(verdict.solved))
+}

@@ -1,0 +1,129 @@
+//! Input files one by one, and output files that are sure to be writable before any work is done.
+
+use std::collections::HashSet;
+use std::fs::{self, OpenOptions};
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use crate::{Exit, output};
+
+/// Runs a command on each file. A mistake in one is reported and the others still run; the worst exit counts.
+pub fn each(
+    files: &[PathBuf],
+    json: bool,
+    mut one: impl FnMut(usize, &Path) -> Result<Exit, String>,
+) -> Exit {
+    let mut worst = Exit::Solved;
+    for (k, file) in files.iter().enumerate() {
+        let exit = one(k, file).unwrap_or_else(|mistake| {
+            output::error(&mistake);
+            if json {
+                let line = json!({"file": file.to_string_lossy(), "error": mistake});
+                output::print(&format!("{line}\n"));
+            }
+            Exit::Mistake
+        });
+        worst = worst.max(exit);
+    }
+    worst
+}
+
+/// A tolerance on the relative residual.
+pub fn tolerance(tol: f64) -> Result<f64, String> {
+    if tol > 0.0 && tol.is_finite() {
+        Ok(tol)
+    } else {
+        Err(format!("--tol: expected a positive number, found {tol:?}"))
+    }
+}
+
+/// Where the results of `files` go: `to` itself for one file, else a file of the same name in the directory
+/// `to`, with `extension` in place of its own where one is given. Each place is checked to be writable.
+pub fn targets(
+    option: &str,
+    to: &Path,
+    files: &[PathBuf],
+    extension: Option<&str>,
+) -> Result<Vec<PathBuf>, String> {
+    let folder = to.is_dir() || to.to_string_lossy().ends_with(std::path::is_separator);
+    if !folder {
+        if files.len() > 1 {
+            return Err(format!(
+                "{option} {}: expected a directory (existing or ending in `/`) for {} files, found a file name",
+                to.display(),
+                files.len()
+            ));
+        }
+        writable(option, to)?;
+        return Ok(vec![to.into()]);
+    }
+    fs::create_dir_all(to).map_err(|e| refusal(option, to, "a directory", e))?;
+    let mut seen = HashSet::new();
+    files
+        .iter()
+        .map(|file| {
+            let name = file
+                .file_name()
+                .ok_or_else(|| format!("{}: expected a file, found a directory", file.display()))?;
+            let mut path = to.join(name);
+            if let Some(extension) = extension {
+                path.set_extension(extension);
+            }
+            if !seen.insert(path.clone()) {
+                let path = path.display();
+                return Err(format!(
+                    "{option} {path}: expected one input for it, found two of that name"
+                ));
+            }
+            writable(option, &path)?;
+            Ok(path)
+        })
+        .collect()
+}
+
+/// A file can be put at `path`: found out before hours of work, not after.
+pub fn writable(option: &str, path: &Path) -> Result<(), String> {
+    let refused = |e| refusal(option, path, "a file that can be written", e);
+    match fs::metadata(path) {
+        Ok(there) if !there.is_file() => {
+            let path = path.display();
+            let what = if there.is_dir() { "a directory" } else { "a device" };
+            return Err(format!("{option} {path}: expected a file, found {what}"));
+        }
+        Ok(_) => drop(OpenOptions::new().append(true).open(path).map_err(refused)?),
+        Err(_) => {}
+    }
+    // New files are completed beside the old ones, so the directory must let them in.
+    let Some(name) = path.file_name() else {
+        let path = path.display();
+        return Err(format!("{option} {path}: expected a file name, found none"));
+    };
+    let probe = format!(".{}.{}.tmp", name.to_string_lossy(), std::process::id());
+    let probe = path.with_file_name(probe);
+    let made = OpenOptions::new().write(true).create_new(true).open(&probe);
+    made.map_err(refused)?;
+    fs::remove_file(&probe).map_err(refused)
+}
+
+/// Writes a text file.
+pub fn write_text(option: &str, path: &Path, text: &str) -> Result<(), String> {
+    fs::write(path, text).map_err(|e| refusal(option, path, "a file that can be written", e))
+}
+
+fn refusal(option: &str, path: &Path, expected: &str, cause: std::io::Error) -> String {
+    let path = path.display();
+    format!("{option} {path}: expected {expected}, found: {cause}")
+}
+
+/// Whether two paths lead to the same file, which need not exist.
+pub fn same(a: &Path, b: &Path) -> bool {
+    let resolved = |path: &Path| {
+        path.canonicalize().or_else(|_| {
+            let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
+            let parent = parent.unwrap_or(Path::new(".")).canonicalize()?;
+            Ok::<_, std::io::Error>(parent.join(path.file_name().unwrap_or_default()))
+        })
+    };
+    matches!((resolved(a), resolved(b)), (Ok(a), Ok(b)) if a == b)
+}

@@ -1,0 +1,239 @@
+//! `nonsmooth gen`.
+
+use std::path::{Path, PathBuf};
+
+use nonsmooth_dynamics::draw::{self, Drawing};
+use nonsmooth_dynamics::{Scene, SceneEntry, scenes::SCENES};
+use nonsmooth_io::fclib::{self, FclibFile, Info};
+use nonsmooth_problem::Friction;
+use nonsmooth_solve::registry;
+use nonsmooth_solve::settings::{self, Setting, SettingsMap};
+use nonsmooth_solve::{Limits, Status};
+use serde_json::Value;
+
+use crate::solve::{Plan, Solved, seconds, solve_any};
+use crate::{Exit, files, interrupt, output, report};
+
+/// Generate the problem of a scene.
+///
+/// A scene is a set of rigid bodies in contact; its problem is one Moreau-Jean time step from the initial
+/// velocities. Without a scene, or with --list, the scenes and their settings are listed.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// The scene, one of `nonsmooth gen --list`
+    scene: Option<String>,
+    /// A setting of the scene; may be given several times
+    #[arg(long = "set", value_name = "KEY=VALUE", requires = "scene")]
+    settings: Vec<String>,
+    /// Write the problem (FCLIB, HDF5)
+    #[arg(long, value_name = "FILE.hdf5", requires = "scene")]
+    out: Option<PathBuf>,
+    /// State it with the velocities of the bodies (M, H, f, w), or at the contacts alone (W, q)
+    #[arg(long, value_enum, default_value_t = Form::Global)]
+    form: Form,
+    /// Draw the scene (SVG); with --solve also the impulses, coloured by the status of the contact
+    #[arg(long, value_name = "FILE.svg", requires = "scene")]
+    draw: Option<PathBuf>,
+    /// Solve the problem (default solver, relative residual 1e-10) and store its /solution
+    #[arg(long, requires = "scene")]
+    solve: bool,
+    /// List the scenes and their settings (of one scene, if it is named)
+    #[arg(long, conflicts_with_all = ["settings", "out", "draw", "solve"])]
+    list: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  nonsmooth gen --list
+  nonsmooth gen wall --set rows=8 --set mu=0.4 --out wall.hdf5
+  nonsmooth gen arch --out arch.hdf5 --form local --solve --draw arch.svg
+
+Exit codes: 0 done; 1 --solve did not reach 1e-10 (the best point is stored); 2 a mistake in the options.";
+
+/// The relative residual of a stored solution.
+const TOLERANCE: f64 = 1e-10;
+
+/// How the problem is stated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Form {
+    /// M v = H r + f
+    Global,
+    /// u = W r + q
+    Local,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<Exit, String> {
+    let Some(name) = args.scene.as_deref() else {
+        output::print(&list(SCENES.iter()));
+        return Ok(Exit::Solved);
+    };
+    let entry = SceneEntry::find(name).map_err(|e| e.to_string())?;
+    if args.list {
+        output::print(&list(std::iter::once(entry)));
+        return Ok(Exit::Solved);
+    }
+    let settings = settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))?;
+    let Some(label) = args.out.as_deref().or(args.draw.as_deref()) else {
+        return Err(format!(
+            "gen {name}: expected --out FILE.hdf5 or --draw FILE.svg, found neither"
+        ));
+    };
+    for (option, path) in [("--out", &args.out), ("--draw", &args.draw)] {
+        path.as_deref().map_or(Ok(()), |path| files::writable(option, path))?;
+    }
+    if let (Some(out), Some(draw)) = (&args.out, &args.draw)
+        && files::same(out, draw)
+    {
+        return Err(format!(
+            "--draw {}: expected a file of its own, found that of --out",
+            draw.display()
+        ));
+    }
+
+    let mistake = |e| format!("scene {name}: {e}");
+    let scene = entry.make(&settings).map_err(mistake)?;
+    let problem = match args.form {
+        Form::Global => scene.problem().map(Friction::Global3),
+        Form::Local => scene.condensed().map(Friction::Local3),
+    };
+    let mut content = FclibFile::new(problem.map_err(mistake)?);
+    content.info = info(entry, &settings, &scene);
+    let solved = match args.solve {
+        true => Some(solve(label, &content.problem)?),
+        false => None,
+    };
+    content.solution = solved.as_ref().map(|s| s.point.clone());
+    if let Some(path) = &args.out {
+        fclib::write(path, &content).map_err(|e| e.to_string())?;
+    }
+    if let Some(path) = &args.draw {
+        let svg = drawing(&scene, solved.as_ref()).map_err(mistake)?;
+        files::write_text("--draw", path, &svg)?;
+    }
+    output::print(&text(label, &scene, &content.problem, solved.as_ref()));
+    let is_solved = |s: &Solved| s.outcome.status == Status::Solved;
+    Ok(Exit::solved(solved.as_ref().is_none_or(is_solved)))
+}
+
+fn solve(label: &Path, problem: &Friction) -> Result<Solved, String> {
+    let plan = Plan {
+        solver: registry::DEFAULT,
+        settings: &SettingsMap::new(),
+        limits: Limits {
+            tolerance: TOLERANCE,
+            cancel: Some(interrupt::flag()),
+            ..Limits::default()
+        },
+        progress: true,
+    };
+    solve_any(label, problem, &plan)
+}
+
+/// What made the file, so that it can be made again.
+fn info(entry: &SceneEntry, settings: &SettingsMap, scene: &Scene) -> Info {
+    let title = format!("{} {}", entry.name, join(settings));
+    let mut all: SettingsMap = entry.settings().into_iter().map(|s| (s.key, s.default)).collect();
+    all.extend(settings.clone());
+    Info {
+        title: Some(title.trim_end().into()),
+        description: Some(format!(
+            "One Moreau-Jean time step of the scene `{}` ({}), by nonsmooth {}: {}. SI units.",
+            entry.name,
+            entry.summary,
+            env!("CARGO_PKG_VERSION"),
+            join(&all)
+        )),
+        dofs: Some(6 * scene.bodies.len()),
+        ..Info::default()
+    }
+}
+
+fn join(settings: &SettingsMap) -> String {
+    let each = settings.iter().map(|(k, v)| format!("{k}={}", plain(v)));
+    each.collect::<Vec<_>>().join(" ")
+}
+
+/// A value as it would be typed.
+fn plain(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+}
+
+fn drawing(
+    scene: &Scene,
+    solved: Option<&Solved>,
+) -> Result<String, nonsmooth_dynamics::SceneError> {
+    let Some(Solved { verdict, point, .. }) = solved else {
+        return draw::svg(scene, &Drawing::default());
+    };
+    let motions: Vec<_> = verdict.statuses.iter().map(|s| s.status).collect();
+    let counts = &verdict.counts;
+    let caption = format!(
+        "impulses: {} stick (blue), {} slip (red); {} open",
+        counts.stick, counts.slip, counts.open
+    );
+    let drawing = Drawing {
+        impulses: Some(&point.r),
+        motions: Some(&motions),
+        caption: Some(&caption),
+        ..Drawing::default()
+    };
+    draw::svg(scene, &drawing)
+}
+
+fn text(label: &Path, scene: &Scene, problem: &Friction, solved: Option<&Solved>) -> String {
+    let mut text = format!(
+        "{}: {}, {} and {} ({})\n",
+        label.display(),
+        scene.name,
+        match scene.bodies.len() {
+            1 => "1 body".into(),
+            n => format!("{n} bodies"),
+        },
+        report::count(problem.contacts(), "contact"),
+        problem.kind().name(),
+    );
+    if let Some(Solved { outcome, verdict, .. }) = solved {
+        let iterations = report::count(outcome.iterations, "iteration");
+        let time = seconds(outcome.seconds);
+        let status = &outcome.status;
+        report::row(&mut text, "solution", format!("{status}, {iterations}, {time}"));
+        report::verdict_text(&mut text, verdict, 0);
+    }
+    text
+}
+
+fn list<'a>(entries: impl Iterator<Item = &'a SceneEntry>) -> String {
+    let mut text = String::from(
+        "Scenes and their settings, for `nonsmooth gen SCENE --set key=value --out FILE.hdf5`\n",
+    );
+    for entry in entries {
+        text += &format!("\n{}: {}\n", entry.name, entry.summary);
+        for Setting { key, default, choices, help } in entry.settings() {
+            let setting = format!("{key}={}", plain(&default));
+            let choices = match choices.as_slice() {
+                [] => String::new(),
+                names => format!(" One of {}.", names.join(", ")),
+            };
+            text += &format!("  {setting:<18} {help}{choices}\n");
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_scene_and_setting_is_listed_with_its_help() {
+        let text = list(SCENES.iter());
+        for entry in SCENES {
+            assert!(text.contains(&format!("\n{}: ", entry.name)));
+        }
+        assert!(text.contains("layout=square") && text.contains("One of square, triangular."));
+        // A setting without help would end its line with blanks.
+        assert!(text.lines().all(|line| line == line.trim_end()), "{text}");
+    }
+}

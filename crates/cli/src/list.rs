@@ -1,0 +1,279 @@
+//! `nonsmooth list`: all of it comes from the registry.
+
+use std::fmt::Write;
+
+use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
+use nonsmooth_solve::registry::{self, About, PREFIXES, Prefix, Registered};
+use nonsmooth_solve::settings::Setting;
+use serde_json::{Value, json};
+
+use crate::report::{fields, row};
+use crate::{Exit, output};
+
+/// List the solvers and their settings.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Solvers or reformulations to list; all if none is named
+    #[arg(value_name = "NAME")]
+    names: Vec<String>,
+    /// Print one object of JSON
+    #[arg(long, conflicts_with = "markdown")]
+    json: bool,
+    /// Print the page docs/solvers.md
+    #[arg(long)]
+    markdown: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  nonsmooth list
+  nonsmooth list nsgs
+  nonsmooth list --markdown > docs/solvers.md
+
+Settings are given to `nonsmooth solve` as `--set key=value`. A reformulation stands before a solver's name:
+`--solver condense/nsgs`. Citations are keys of docs/refs.bib.";
+
+/// A solver and the kinds of problem that it takes.
+struct Listed {
+    about: &'static About,
+    kinds: Vec<Kind>,
+}
+
+/// Everything that the registry has.
+struct Catalogue {
+    solvers: Vec<Listed>,
+    prefixes: Vec<&'static Prefix>,
+    composed: Vec<String>,
+}
+
+impl Catalogue {
+    fn new() -> Self {
+        let mut all =
+            Self { solvers: vec![], prefixes: PREFIXES.iter().collect(), composed: vec![] };
+        all.add::<FrictionLocal<2>>(Kind::FrictionLocal2d);
+        all.add::<FrictionLocal<3>>(Kind::FrictionLocal3d);
+        all.add::<FrictionGlobal<2>>(Kind::FrictionGlobal2d);
+        all.add::<FrictionGlobal<3>>(Kind::FrictionGlobal3d);
+        all
+    }
+
+    fn add<P: Registered + Problem>(&mut self, kind: Kind) {
+        for about in registry::abouts::<P>() {
+            match self.solvers.iter_mut().find(|s| s.about.name == about.name) {
+                Some(listed) => listed.kinds.push(kind),
+                None => self.solvers.push(Listed { about, kinds: vec![kind] }),
+            }
+        }
+        for name in P::composed_names() {
+            if !self.composed.contains(&name) {
+                self.composed.push(name);
+            }
+        }
+    }
+
+    /// Only what is named.
+    fn only(mut self, names: &[String]) -> Result<Self, String> {
+        let known = |name: &str| {
+            self.solvers.iter().any(|s| s.about.name == name)
+                || self.prefixes.iter().any(|p| p.name == name)
+        };
+        if let Some(unknown) = names.iter().find(|name| !known(name)) {
+            let all = self.solvers.iter().map(|s| s.about.name);
+            let all: Vec<_> = all.chain(self.prefixes.iter().map(|p| p.name)).collect();
+            let all = all.join(", ");
+            return Err(format!("expected a name among {all}, found `{unknown}`"));
+        }
+        if !names.is_empty() {
+            let named = |name: &str| names.iter().any(|n| n == name);
+            self.solvers.retain(|s| named(s.about.name));
+            self.prefixes.retain(|p| named(p.name));
+            self.composed.clear();
+        }
+        Ok(self)
+    }
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<Exit, String> {
+    let catalogue = Catalogue::new().only(&args.names)?;
+    output::print(&if args.json {
+        format!("{}\n", json(&catalogue))
+    } else if args.markdown {
+        markdown(&catalogue)
+    } else {
+        text(&catalogue)
+    });
+    Ok(Exit::Solved)
+}
+
+fn json(catalogue: &Catalogue) -> Value {
+    let solvers = catalogue.solvers.iter().map(|listed| {
+        let mut solver = fields(json!(listed.about));
+        solver.insert("kinds".into(), json!(listed.kinds));
+        solver
+    });
+    json!({
+        "default": registry::DEFAULT,
+        "solvers": solvers.collect::<Vec<_>>(),
+        "reformulations": catalogue.prefixes,
+        "composed": catalogue.composed,
+    })
+}
+
+fn text(catalogue: &Catalogue) -> String {
+    let mut text = String::new();
+    for Listed { about, kinds } in &catalogue.solvers {
+        let default = if about.name == registry::DEFAULT { " (the default)" } else { "" };
+        let _ = writeln!(text, "{}{default}: {}", about.name, about.summary);
+        row(&mut text, "family", about.family);
+        row(&mut text, "kinds", names(kinds));
+        if !about.needs.is_empty() {
+            row(&mut text, "needs", about.needs.join(", "));
+        }
+        row(&mut text, "see", about.cites.join(", "));
+        for setting in (about.settings)() {
+            let default = default_of(&setting);
+            row(&mut text, "--set", format!("{}={default}", setting.key));
+            row(&mut text, "", format!("    {}", setting.help));
+            if !setting.choices.is_empty() {
+                let choices = setting.choices.join(", ");
+                row(&mut text, "", format!("    One of {choices}."));
+            }
+        }
+        text.push('\n');
+    }
+    for prefix in &catalogue.prefixes {
+        let _ = writeln!(text, "{}/SOLVER: {}", prefix.name, prefix.summary);
+        row(&mut text, "kinds", names(prefix.from));
+        row(&mut text, "see", prefix.cites.join(", "));
+        text.push('\n');
+    }
+    if !catalogue.composed.is_empty() {
+        let _ = writeln!(text, "Composed: {}", catalogue.composed.join(", "));
+    }
+    text
+}
+
+fn markdown(catalogue: &Catalogue) -> String {
+    let mut page = String::from(
+        "<!-- Generated by `nonsmooth list --markdown` from the registry; edit the solvers' own documentation. -->\n\n\
+         # Solvers\n\n\
+         `nonsmooth solve FILE --solver NAME --set key=value` takes these names and settings, and so does\n\
+         `registry::session`. Citations are keys of [refs.bib](refs.bib).\n\n\
+         | solver | family | what it is |\n| --- | --- | --- |\n",
+    );
+    for Listed { about, .. } in &catalogue.solvers {
+        let default = if about.name == registry::DEFAULT { "; the default" } else { "" };
+        let (name, family, summary) = (about.name, about.family, cell(about.summary));
+        let _ = writeln!(page, "| [`{name}`](#{name}) | {family} | {summary}{default} |");
+    }
+    for Listed { about, kinds } in &catalogue.solvers {
+        let _ = write!(page, "\n## {}\n\n{}.\n\n", about.name, sentence(about.summary));
+        let _ = writeln!(page, "- Family: {}", about.family);
+        let _ = writeln!(page, "- Kinds of problem: {}", names(kinds));
+        if !about.needs.is_empty() {
+            let _ = writeln!(page, "- Needs: {}", about.needs.join(", "));
+        }
+        let _ = writeln!(page, "- References: {}", about.cites.join(", "));
+        let settings = (about.settings)();
+        if settings.is_empty() {
+            continue;
+        }
+        page.push_str("\n| setting | default | meaning |\n| --- | --- | --- |\n");
+        for setting in settings {
+            let (key, default) = (&setting.key, default_of(&setting));
+            let choices: Vec<_> = setting.choices.iter().map(|c| format!("`{c}`")).collect();
+            let choices = match choices.join(", ") {
+                none if none.is_empty() => none,
+                all => format!(" One of {all}."),
+            };
+            let help = cell(&setting.help);
+            let _ = writeln!(page, "| `{key}` | `{default}` | {help}{choices} |");
+        }
+    }
+    page.push_str(
+        "\n## Reformulations\n\n\
+         A reformulation stands before a solver's name, as in `condense/nsgs`: the problem is reformulated, solved\n\
+         as what it has become, and the point is led back. The settings are the solver's.\n\n\
+         | reformulation | takes | what it does | references |\n| --- | --- | --- | --- |\n",
+    );
+    for prefix in &catalogue.prefixes {
+        let (name, kinds, summary) = (prefix.name, names(prefix.from), cell(prefix.summary));
+        let cites = prefix.cites.join(", ");
+        let _ = writeln!(page, "| `{name}/` | {kinds} | {summary} | {cites} |");
+    }
+    if !catalogue.composed.is_empty() {
+        let names: Vec<_> = catalogue.composed.iter().map(|n| format!("`{n}`")).collect();
+        let _ = write!(page, "\nThe composed names: {}.\n", names.join(", "));
+    }
+    page
+}
+
+fn names(kinds: &[Kind]) -> String {
+    kinds.iter().map(|k| k.name()).collect::<Vec<_>>().join(", ")
+}
+
+/// The default as it would be typed.
+fn default_of(setting: &Setting) -> String {
+    match &setting.default {
+        Value::String(word) => word.clone(),
+        other => other.to_string(),
+    }
+}
+
+/// Text that may stand in a cell of a table.
+fn cell(text: &str) -> String {
+    text.replace('|', "\\|")
+}
+
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_solver_setting_and_composition_is_on_the_page() {
+        let catalogue = Catalogue::new();
+        let page = markdown(&catalogue);
+        assert!(page.starts_with("<!-- Generated by `nonsmooth list --markdown`"));
+        assert!(page.ends_with(".\n") && !page.contains("\n\n\n"));
+        for Listed { about, kinds } in &catalogue.solvers {
+            assert!(!kinds.is_empty());
+            assert!(page.contains(&format!("\n## {}\n", about.name)));
+            for setting in (about.settings)() {
+                assert!(page.contains(&format!("| `{}` | `", setting.key)), "{setting:?}");
+            }
+        }
+        assert!(page.contains("`condense/nsgs`"));
+        assert_eq!(page, markdown(&Catalogue::new()));
+    }
+
+    #[test]
+    fn rows_of_a_table_have_as_many_cells_as_its_head() {
+        let page = markdown(&Catalogue::new());
+        let mut width = 0;
+        for line in page.lines() {
+            let cells = line.replace("\\|", "").matches('|').count();
+            if width > 0 && cells > 0 {
+                assert_eq!(cells, width, "{line}");
+            }
+            width = cells;
+        }
+    }
+
+    #[test]
+    fn the_text_names_defaults_and_choices() {
+        let only = ["nsgs".to_owned()];
+        let text = text(&Catalogue::new().only(&only).unwrap());
+        assert!(text.starts_with("nsgs (the default): "));
+        assert!(text.contains("local=exact") && text.contains("One of exact, quartic"));
+        assert!(!text.contains("extragradient"));
+        assert!(Catalogue::new().only(&["magic".to_owned()]).is_err());
+    }
+}

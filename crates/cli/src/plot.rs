@@ -1,0 +1,279 @@
+//! The history of a solve as a picture.
+
+use nonsmooth_solve::Sample;
+use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+const SIZE: (u32, u32) = (960, 380);
+const INK: RGBColor = RGBColor(52, 64, 76);
+const GRID: RGBColor = RGBColor(226, 230, 234);
+const RESIDUAL: RGBColor = RGBColor(143, 184, 212);
+const BEST: RGBColor = RGBColor(31, 111, 168);
+const TOLERANCE: RGBColor = RGBColor(209, 80, 47);
+/// Points that a curve keeps: about two for each pixel.
+const KEPT: usize = 800;
+/// Decades that a picture shows at most.
+const DEPTH: f64 = 20.0;
+
+/// Draws the relative residual against iterations and against time, two panels side by side, as a standalone SVG.
+pub fn svg(title: &str, history: &[Sample], tolerance: f64) -> Result<String, String> {
+    let mut text = String::new();
+    draw(&mut text, title, history, tolerance).map_err(|e| format!("plot: {e}"))?;
+    Ok(text)
+}
+
+type Drawn = Result<(), Box<dyn std::error::Error>>;
+
+fn draw(text: &mut String, title: &str, history: &[Sample], tolerance: f64) -> Drawn {
+    let root = SVGBackend::with_string(text, SIZE).into_drawing_area();
+    root.fill(&WHITE)?;
+    let (head, body) = root.split_vertically(36);
+    let left = Pos::new(HPos::Left, VPos::Center);
+    head.draw_text(title, &font(15).pos(left), (66, 20))?;
+    let legend = [("residual", RESIDUAL), ("best so far", BEST), ("tolerance", TOLERANCE)];
+    for (k, (what, colour)) in legend.into_iter().enumerate() {
+        let x = SIZE.0 as i32 - 330 + 110 * k as i32;
+        head.draw(&PathElement::new([(x, 20), (x + 20, 20)], colour.stroke_width(2)))?;
+        head.draw_text(what, &font(12).pos(left), (x + 26, 20))?;
+    }
+    let (left, right) = body.split_horizontally(SIZE.0 / 2);
+
+    let curves = Curves::new(history, tolerance);
+    let end = history.last().map_or(0.0, |s| s.seconds);
+    let (unit, scale) = match end {
+        t if t < 1e-3 => ("time (µs)", 1e6),
+        t if t < 1.0 => ("time (ms)", 1e3),
+        _ => ("time (s)", 1.0),
+    };
+    curves.panel(&left, "iterations", true, |s| s.iteration as f64)?;
+    curves.panel(&right, unit, false, |s| scale * s.seconds)?;
+    root.present()?;
+    Ok(())
+}
+
+/// A linear axis with ticks of our choice.
+struct Axis {
+    range: std::ops::Range<f64>,
+    ticks: Vec<f64>,
+}
+
+impl Ranged for Axis {
+    type FormatOption = DefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, x: &f64, (from, to): (i32, i32)) -> i32 {
+        let part = (x - self.range.start) / (self.range.end - self.range.start);
+        from + (part * f64::from(to - from)).round() as i32
+    }
+
+    fn key_points<H: KeyPointHint>(&self, _: H) -> Vec<f64> {
+        self.ticks.clone()
+    }
+
+    fn range(&self) -> std::ops::Range<f64> {
+        self.range.clone()
+    }
+}
+
+/// What both panels show, heights as decimal logarithms.
+struct Curves<'a> {
+    history: &'a [Sample],
+    tolerance: f64,
+    low: f64,
+    high: f64,
+}
+
+impl<'a> Curves<'a> {
+    fn new(history: &'a [Sample], tolerance: f64) -> Self {
+        let tolerance = tolerance.log10();
+        let heights = history.iter().map(|s| s.relative.log10());
+        let finite = || heights.clone().filter(|h| h.is_finite());
+        let high = (finite().fold(tolerance + 1.0, f64::max) + 0.15).ceil();
+        let low = finite().fold(tolerance, f64::min).max(high - DEPTH);
+        // A little room below the lowest curve.
+        let low = (low - 0.3).floor().min(tolerance.floor().max(high - DEPTH));
+        Self { history, tolerance, low, high }
+    }
+
+    /// The height of a residual: at the lower edge if it is zero or far below, none if it is not finite.
+    fn height(&self, residual: f64) -> Option<f64> {
+        let known = residual.is_finite() && residual >= 0.0;
+        known.then(|| residual.log10().max(self.low))
+    }
+
+    fn panel<DB: DrawingBackend>(
+        &self,
+        area: &DrawingArea<DB, plotters::coord::Shift>,
+        x_label: &str,
+        first: bool,
+        x: impl Fn(&Sample) -> f64,
+    ) -> Result<(), Box<dyn std::error::Error>>
+    where
+        DB::ErrorType: 'static,
+    {
+        let points: Vec<_> = self.history.iter().map(|s| (x(s), self.height(s.relative))).collect();
+        let end = points.last().map_or(0.0, |p| p.0);
+        let end = if end > 0.0 { end } else { 1.0 };
+        // Iterations are whole.
+        let least = if first { 1.0 } else { 0.0 };
+        let x_axis = Axis { range: 0.0..1.02 * end, ticks: ticks(end, 8, least) };
+        let y_axis = Axis { range: self.low..self.high, ticks: decades(self.low, self.high) };
+        let mut chart = ChartBuilder::on(area)
+            .margin_right(24)
+            .margin_left(if first { 6 } else { 18 })
+            .margin_bottom(8)
+            .x_label_area_size(42)
+            .y_label_area_size(if first { 58 } else { 40 })
+            .build_cartesian_2d(x_axis, y_axis)?;
+        let mut mesh = chart.configure_mesh();
+        mesh.bold_line_style(GRID)
+            .light_line_style(TRANSPARENT)
+            .axis_style(INK)
+            .label_style(font(12))
+            .axis_desc_style(font(13))
+            .x_label_formatter(&|x| tick(*x))
+            .y_label_formatter(&|y| format!("1e{y:.0}"))
+            .x_desc(x_label);
+        if first {
+            mesh.y_desc("relative residual");
+        }
+        mesh.draw()?;
+
+        let right = 1.02 * end;
+        let line = [(0.0, self.tolerance), (right, self.tolerance)];
+        chart.draw_series(DashedLineSeries::new(line, 6, 4, TOLERANCE.stroke_width(1)))?;
+
+        // The residual, in pieces where it was not finite.
+        for piece in points.split(|p| p.1.is_none()) {
+            let piece: Vec<_> = piece.iter().filter_map(|&(x, h)| Some((x, h?))).collect();
+            chart.draw_series(LineSeries::new(thinned(&piece, end), RESIDUAL.stroke_width(1)))?;
+        }
+        let best = best(&points);
+        chart.draw_series(LineSeries::new(thinned(&best, end), BEST.stroke_width(2)))?;
+        // The point that is returned; the whole history where it is a single point.
+        let last = best.iter().find(|p| Some(p.1) == best.last().map(|b| b.1));
+        chart.draw_series(last.map(|&p| Circle::new(p, 3, BEST.filled())))?;
+        Ok(())
+    }
+}
+
+/// The lowest height so far, from the first that is known.
+fn best(points: &[(f64, Option<f64>)]) -> Vec<(f64, f64)> {
+    let mut lowest = f64::INFINITY;
+    let running = points.iter().map(|&(x, height)| {
+        lowest = lowest.min(height.unwrap_or(lowest));
+        (x, lowest)
+    });
+    running.filter(|p| p.1.is_finite()).collect()
+}
+
+/// The curve with at most four points for each of `KEPT`/4 columns: first, lowest, highest and last.
+fn thinned(points: &[(f64, f64)], end: f64) -> Vec<(f64, f64)> {
+    if points.len() <= KEPT {
+        return points.to_vec();
+    }
+    let column = |x: f64| (x / end * (KEPT / 4) as f64) as usize;
+    points
+        .chunk_by(|a, b| column(a.0) == column(b.0))
+        .flat_map(|chunk| {
+            let by_height = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+            let ends = [chunk.first(), chunk.last()];
+            let extremes = [chunk.iter().min_by(by_height), chunk.iter().max_by(by_height)];
+            let mut kept: Vec<_> = ends.into_iter().chain(extremes).flatten().copied().collect();
+            kept.sort_by(|a, b| a.0.total_cmp(&b.0));
+            kept.dedup();
+            kept
+        })
+        .collect()
+}
+
+/// Multiples of 1, 2 or 5 times a power of ten from 0 to `end`, about `n` of them and `least` apart.
+fn ticks(end: f64, n: usize, least: f64) -> Vec<f64> {
+    let rough = (end / n as f64).max(least);
+    let power = 10f64.powf(rough.log10().floor());
+    let nice = [1.0, 2.0, 5.0, 10.0];
+    let step = power * nice.into_iter().find(|s| s * power >= rough).unwrap_or(10.0);
+    (0..=(end / step * 1.02) as usize).map(|k| k as f64 * step).collect()
+}
+
+/// Whole decades from `low` to `high`, not more than fit.
+fn decades(low: f64, high: f64) -> Vec<f64> {
+    let step = ((high - low) / 10.0).ceil().max(1.0);
+    let first = (low / step).ceil() * step;
+    let mut all = vec![];
+    let mut at = first;
+    while at <= high {
+        all.push(at);
+        at += step;
+    }
+    all
+}
+
+/// A tick's text: no digits that say nothing.
+fn tick(x: f64) -> String {
+    if x >= 1e6 {
+        return format!("{x:.1e}");
+    }
+    let text = format!("{x:.3}");
+    text.trim_end_matches('0').trim_end_matches('.').into()
+}
+
+fn font(size: u32) -> TextStyle<'static> {
+    ("sans-serif", size).into_font().color(&INK)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn history(residuals: impl IntoIterator<Item = f64>) -> Vec<Sample> {
+        let sample =
+            |(k, relative)| Sample { iteration: 10 * k, seconds: 1e-4 * k as f64, relative };
+        residuals.into_iter().enumerate().map(sample).collect()
+    }
+
+    fn picture(residuals: impl IntoIterator<Item = f64>) -> String {
+        let svg = svg("a <b> & c", &history(residuals), 1e-8).unwrap();
+        assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
+        assert!(svg.contains("a &lt;b&gt; &amp; c"), "the title is escaped");
+        assert!(!svg.contains("NaN") && !svg.contains("inf"));
+        assert!(svg.contains("iterations") && svg.contains("tolerance"));
+        svg
+    }
+
+    #[test]
+    fn any_history_can_be_drawn() {
+        picture([]);
+        assert!(picture([1.0]).contains("<circle"));
+        picture([0.0]);
+        picture([f64::NAN]);
+        picture([f64::NAN, f64::INFINITY, -1.0]);
+        picture([1.0, f64::NAN, 1e-3, 0.0, 1e-300, f64::INFINITY, 1e300]);
+        picture([1e-9, 1e-9]);
+        picture((0..100).map(|k| 0.8_f64.powi(k)));
+    }
+
+    #[test]
+    fn huge_histories_make_small_pictures() {
+        let wild = (0..1_000_000).map(|k| (1.0 + f64::from(k % 7)) / (1.0 + f64::from(k)));
+        assert!(picture(wild).len() < 200_000);
+    }
+
+    #[test]
+    fn the_best_residual_never_rises() {
+        let heights = [None, Some(0.0), Some(-2.0), None, Some(-1.0)];
+        let points: Vec<_> = (0..).map(f64::from).zip(heights).collect();
+        assert_eq!(best(&points), [(1.0, 0.0), (2.0, -2.0), (3.0, -2.0), (4.0, -2.0)]);
+    }
+
+    #[test]
+    fn ticks_are_round_numbers() {
+        assert_eq!(ticks(100.0, 5, 1.0), [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]);
+        assert_eq!(ticks(7.0, 6, 0.0), [0.0, 2.0, 4.0, 6.0]);
+        assert_eq!(ticks(2.0, 8, 1.0), [0.0, 1.0, 2.0]);
+        assert_eq!(decades(-9.0, 1.0).len(), 11);
+        assert_eq!(decades(-19.0, 1.0)[0], -18.0);
+        assert_eq!((tick(0.5), tick(40.0), tick(2e7)), ("0.5".into(), "40".into(), "2.0e7".into()));
+    }
+}

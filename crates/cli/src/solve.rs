@@ -1,0 +1,349 @@
+//! `nonsmooth solve`.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
+use nonsmooth_problem::check::Verdict;
+use nonsmooth_problem::{Friction, with_friction};
+use nonsmooth_solve::registry;
+use nonsmooth_solve::settings::{self, SettingsMap};
+use nonsmooth_solve::{Limit, Limits, Outcome, Sample, Status};
+use serde_json::json;
+
+use crate::kinds::Form;
+use crate::progress::Bar;
+use crate::report::{self, number, row};
+use crate::{Exit, files, interrupt, output, plot};
+
+/// Solve problems.
+///
+/// The status printed is the judge's: the residual is recomputed from the problem's data, whatever the solver
+/// believes. Whenever a solve stops, the best point found so far is reported and written.
+/// Ctrl-C stops the solve that way; pressed twice it ends the program.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// FCLIB files (HDF5), each with one problem
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// The solver, one of `nonsmooth list`
+    #[arg(long, value_name = "NAME", default_value = registry::DEFAULT)]
+    solver: String,
+    /// A setting of the solver; may be given several times
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    settings: Vec<String>,
+    /// The relative residual to reach
+    #[arg(long, value_name = "TOL", default_value = "1e-8", allow_hyphen_values = true)]
+    tol: f64,
+    /// At most this many iterations [default: 1000000, or no limit with --time-limit]
+    #[arg(long, value_name = "N")]
+    max_iter: Option<usize>,
+    /// At most this many seconds for each file
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    time_limit: Option<f64>,
+    /// Start from the file's /guesses/1 in place of zero
+    #[arg(long)]
+    warm_start: bool,
+    /// Write the problem with its /solution; a directory (existing or ending in `/`) for several files.
+    /// The input itself may be named: only its /solution changes
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Draw the residual against iterations and time (SVG); a directory for several files
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Print one line of JSON for each file in place of the report
+    #[arg(long)]
+    json: bool,
+    /// No report and no progress bar: only errors and the exit code (and the JSON, with --json)
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  nonsmooth solve wall.hdf5
+  nonsmooth solve wall.hdf5 --tol 1e-12 --time-limit 60 --plot history.svg
+  nonsmooth solve wall.hdf5 --solver nsgs --set omega=0.9 --set ordering=shuffled
+  nonsmooth solve *.hdf5 --out solved/ --json > results.jsonl
+
+Exit codes: 0 all solved; 1 some not solved; 2 some file or option at fault.";
+
+/// How to solve, whatever the problem.
+pub struct Plan<'a> {
+    /// The solver's name.
+    pub solver: &'a str,
+    /// The solver's settings.
+    pub settings: &'a SettingsMap,
+    /// When to stop.
+    pub limits: Limits,
+    /// Whether a progress bar is wanted.
+    pub progress: bool,
+}
+
+/// What came of a solve.
+pub struct Solved {
+    /// The loop's word.
+    pub outcome: Outcome,
+    /// The judge's word.
+    pub verdict: Verdict,
+    /// The best point.
+    pub point: StoredPoint,
+    /// The residuals on the way.
+    history: Vec<Sample>,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<Exit, String> {
+    let settings = settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))?;
+    let time_limit = match args.time_limit {
+        Some(t) if t.is_nan() || t < 0.0 => {
+            return Err(format!(
+                "--time-limit: expected a number of seconds of at least 0, found {t}"
+            ));
+        }
+        t => t,
+    };
+    let tolerance = files::tolerance(args.tol)?;
+    let targets = Targets::new(args)?;
+    let cancel = interrupt::flag();
+    let plan = Plan {
+        solver: &args.solver,
+        settings: &settings,
+        limits: Limits {
+            tolerance,
+            max_iterations: match (args.max_iter, time_limit) {
+                (Some(n), _) => n,
+                (None, Some(_)) => usize::MAX,
+                (None, None) => Limits::default().max_iterations,
+            },
+            time_limit,
+            cancel: Some(cancel.clone()),
+        },
+        progress: !args.quiet,
+    };
+    let one = |k: usize, file: &Path| {
+        if cancelled(&cancel) && k > 0 {
+            if !args.json && !args.quiet {
+                output::print(&format!("{}: skipped after Ctrl-C\n", file.display()));
+            }
+            return Ok(Exit::NotSolved);
+        }
+        let content = fclib::read(file).map_err(|e| e.to_string())?;
+        let guess = match content.guesses.first() {
+            _ if !args.warm_start => None,
+            Some(guess) => Some(guess.clone()),
+            None => {
+                return Err(format!(
+                    "{}: /guesses/1: expected a point for --warm-start, found none",
+                    file.display()
+                ));
+            }
+        };
+        one(file, content, guess.as_ref(), &plan, args, targets.of(k))
+    };
+    Ok(files::each(&args.files, args.json, one))
+}
+
+fn cancelled(flag: &Arc<AtomicBool>) -> bool {
+    flag.load(Ordering::Relaxed)
+}
+
+fn one(
+    file: &Path,
+    content: FclibFile,
+    guess: Option<&StoredPoint>,
+    plan: &Plan,
+    args: &Args,
+    targets: [Option<&Path>; 2],
+) -> Result<Exit, String> {
+    let solved = with_friction!(&content.problem, p => solve(file, p, guess, plan))?;
+    let report = match (args.json, args.quiet) {
+        (true, _) => with_friction!(&content.problem, p => json_line(file, p, plan, &solved)),
+        (false, true) => String::new(),
+        (false, false) => with_friction!(&content.problem, p => text(file, p, plan, &solved)),
+    };
+    // Files first: whoever reads the report may be gone. But a file that fails must not cost the report.
+    let kept = keep(file, content, plan, &solved, targets);
+    output::print(&report);
+    kept.map(|()| Exit::solved(solved.outcome.status == Status::Solved))
+}
+
+/// Writes the files asked for.
+fn keep(
+    file: &Path,
+    content: FclibFile,
+    plan: &Plan,
+    solved: &Solved,
+    [out, picture]: [Option<&Path>; 2],
+) -> Result<(), String> {
+    if let Some(path) = out {
+        // In place, all else that the file holds stays as it is.
+        let written = if files::same(file, path) {
+            fclib::write_solution(path, &solved.point)
+        } else {
+            fclib::write(path, &FclibFile { solution: Some(solved.point.clone()), ..content })
+        };
+        written.map_err(|e| e.to_string())?;
+    }
+    if let Some(path) = picture {
+        let title = format!("{} on {}", plan.solver, name(file));
+        let svg = plot::svg(&title, &solved.history, plan.limits.tolerance)?;
+        files::write_text("--plot", path, &svg)?;
+    }
+    Ok(())
+}
+
+/// Solves a problem from a stored point, or from zero. `file` is its name in messages.
+pub fn solve<P: Form>(
+    file: &Path,
+    problem: &P,
+    start: Option<&StoredPoint>,
+    plan: &Plan,
+) -> Result<Solved, String> {
+    let mistake = |e: &dyn std::fmt::Display| format!("{}: {e}", file.display());
+    let mut session =
+        registry::session::<P>(plan.solver, plan.settings).map_err(|e| mistake(&e))?;
+    let mut point = start.map_or_else(|| problem.origin(), |s| problem.start(s));
+    let mut bar = Bar::new(&name(file), plan.limits.tolerance, plan.progress);
+    let outcome = session
+        .solve(problem, &mut point, &plan.limits, &mut |p| bar.watch(p))
+        .map_err(|e| mistake(&e))?;
+    drop(bar);
+    let verdict = problem.judge(&point, plan.limits.tolerance).map_err(|e| mistake(&e))?;
+    Ok(Solved {
+        outcome,
+        point: problem.store(point, verdict.velocity.clone()),
+        verdict,
+        history: session.history().to_vec(),
+    })
+}
+
+fn name(file: &Path) -> String {
+    file.file_name().unwrap_or_default().to_string_lossy().into()
+}
+
+/// The worst contacts that a report of an unsolved problem lists.
+const WORST: usize = 3;
+
+fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &Solved) -> String {
+    let Solved { outcome, verdict, .. } = solved;
+    let mut all = report::problem_json(file, problem);
+    all.extend(report::fields(json!({
+        "solver": plan.solver,
+        "settings": plan.settings,
+        "tolerance": plan.limits.tolerance,
+        "status": outcome.status.name(),
+        "message": outcome.status.to_string(),
+        "iterations": outcome.iterations,
+        "seconds": outcome.seconds,
+    })));
+    all.extend(report::verdict_json(verdict, verdict.worst.len()));
+    format!("{}\n", json!(all))
+}
+
+fn text<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &Solved) -> String {
+    let Solved { outcome, verdict, .. } = solved;
+    let tolerance = plan.limits.tolerance;
+    let is_solved = outcome.status == Status::Solved;
+    let mut text = format!(
+        "{}: {} (relative residual {}, tolerance {tolerance:e})\n",
+        file.display(),
+        outcome.status,
+        number(verdict.measure.relative),
+    );
+    row(&mut text, "problem", report::problem_text(problem));
+    let settings = plan.settings.iter().map(|(k, v)| match v.as_str() {
+        Some(word) => format!(" {k}={word}"),
+        None => format!(" {k}={v}"),
+    });
+    let iterations = report::count(outcome.iterations, "iteration");
+    row(
+        &mut text,
+        "solver",
+        format!(
+            "{}{}, {iterations}, {}",
+            plan.solver,
+            settings.collect::<String>(),
+            seconds(outcome.seconds)
+        ),
+    );
+    let worst = if is_solved { 0 } else { WORST };
+    report::verdict_text(&mut text, verdict, worst);
+    if let Some(hint) = hint::<P>(&outcome.status, plan) {
+        row(&mut text, "try", hint);
+    }
+    text
+}
+
+/// A duration in the unit that suits it.
+pub fn seconds(t: f64) -> String {
+    match t {
+        t if t < 1e-3 => format!("{:.0} us", 1e6 * t),
+        t if t < 1.0 => format!("{:.3} s", t),
+        t if t < 100.0 => format!("{t:.2} s"),
+        t => format!("{t:.0} s"),
+    }
+}
+
+/// What may help where the problem is not solved.
+fn hint<P: Form>(status: &Status, plan: &Plan) -> Option<String> {
+    let more = match status {
+        Status::Solved | Status::Infeasible(_) | Status::Limit(Limit::Cancelled) => return None,
+        Status::Limit(Limit::Iterations) => {
+            Some(format!("--max-iter {}", plan.limits.max_iterations.max(1).saturating_mul(10)))
+        }
+        Status::Limit(Limit::Time) => {
+            let t = plan.limits.time_limit.unwrap_or_default();
+            Some(format!("--time-limit {}", (10.0 * t).max(1.0)))
+        }
+        Status::NoConclusion(_) | Status::Stalled(_) => None,
+    };
+    // The first solver of each other family.
+    let family = registry::about::<P>(plan.solver).map(|a| a.family);
+    let mut families: Vec<_> = family.into_iter().collect();
+    let others = registry::abouts::<P>().into_iter().filter_map(|about| {
+        let new = !families.contains(&about.family);
+        families.push(about.family);
+        new.then(|| format!("--solver {}", about.name))
+    });
+    let tries: Vec<_> = more.into_iter().chain(others).take(3).collect();
+    Some(format!("{} (see `nonsmooth list`)", tries.join(", or ")))
+}
+
+/// The output files, one of each for each input.
+struct Targets {
+    out: Option<Vec<PathBuf>>,
+    plot: Option<Vec<PathBuf>>,
+}
+
+impl Targets {
+    fn new(args: &Args) -> Result<Self, String> {
+        let place = |option: &str, to: &Option<PathBuf>, extension| {
+            let to = to.as_deref();
+            to.map(|to| files::targets(option, to, &args.files, extension)).transpose()
+        };
+        let out = place("--out", &args.out, None)?;
+        let plot = place("--plot", &args.plot, Some("svg"))?;
+        for picture in plot.iter().flatten() {
+            let mut taken = args.files.iter().chain(out.iter().flatten());
+            if taken.any(|path| files::same(picture, path)) {
+                return Err(format!(
+                    "--plot {}: expected a file of its own, found the file of a problem",
+                    picture.display()
+                ));
+            }
+        }
+        Ok(Self { out, plot })
+    }
+
+    fn of(&self, k: usize) -> [Option<&Path>; 2] {
+        [&self.out, &self.plot].map(|all| Some(all.as_ref()?.get(k)?.as_path()))
+    }
+}
+
+/// A problem known only by its kind, solved as above.
+pub fn solve_any(file: &Path, problem: &Friction, plan: &Plan) -> Result<Solved, String> {
+    with_friction!(problem, p => solve(file, p, None, plan))
+}

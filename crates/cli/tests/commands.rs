@@ -1,0 +1,229 @@
+//! What each command prints, writes and answers when all is well.
+
+mod common;
+
+use common::{Folder, has_keys};
+use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
+use nonsmooth_problem::planted::Planted;
+use nonsmooth_problem::{Friction, with_friction};
+
+const JUDGED: &str = "file kind contacts unknowns status message tolerance residual/absolute residual/relative \
+    residual/paper residual/peer residual/primal residual/dual residual/complementarity contacts_by_status/open \
+    contacts_by_status/stick contacts_by_status/slip degenerate worst_contacts";
+
+#[test]
+fn solve_reports_as_text_and_as_json() {
+    let folder = Folder::with_problems();
+    let text = folder.run("solve wall.hdf5").exits(0).stdout;
+    assert!(text.starts_with("wall.hdf5: solved (relative residual "), "{text}");
+    for part in ["friction_global_3d", "nsgs", "paper", "peer", "dynamics", "stick"] {
+        assert!(text.contains(part), "{part} in {text}");
+    }
+    let run = folder.run("solve wall.hdf5 box.hdf5 --tol 1e-9 --set omega=0.9 --json").exits(0);
+    let lines = run.json();
+    assert_eq!(lines.len(), 2);
+    for line in &lines {
+        has_keys(line, JUDGED);
+        has_keys(line, "solver settings/omega iterations seconds");
+        assert_eq!((&line["status"], &line["solver"]), (&"solved".into(), &"nsgs".into()));
+        assert!(line["residual"]["relative"].as_f64().unwrap() <= 1e-9);
+        let counts = &line["contacts_by_status"];
+        let sum: u64 = ["open", "stick", "slip"].map(|s| counts[s].as_u64().unwrap()).iter().sum();
+        assert_eq!(Some(sum), line["contacts"].as_u64());
+    }
+    assert!(lines[0]["residual"]["dynamics"].as_f64().unwrap() <= 1e-10);
+    assert!(lines[1]["residual"].get("dynamics").is_none());
+    assert_eq!(folder.run("solve wall.hdf5 --quiet").exits(0).stdout, "");
+}
+
+#[test]
+fn an_unsolved_problem_exits_with_1_and_says_what_to_try() {
+    let folder = Folder::with_problems();
+    let text = folder.run("solve wall.hdf5 box.hdf5 --tol 1e-13 --max-iter 2").exits(1).stdout;
+    for part in ["iteration limit", "worst", "--max-iter 20", "--solver "] {
+        assert!(text.contains(part), "{part} in {text}");
+    }
+    let line = folder.run("solve wall.hdf5 --time-limit 0 --json").exits(1).json().remove(0);
+    assert_eq!(line["status"], "time_limit");
+    assert!(!line["worst_contacts"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn check_agrees_with_solve() {
+    let folder = Folder::with_problems();
+    for tol in ["1e-3", "1e-11"] {
+        let solve = format!("solve wall.hdf5 box.hdf5 --out solved/ --json --tol {tol}");
+        let solved = folder.run(&solve).exits(0).json();
+        let check = format!("check solved/wall.hdf5 solved/box.hdf5 --json --tol {tol}");
+        let checked = folder.run(&check).exits(0).json();
+        for (a, b) in solved.iter().zip(&checked) {
+            has_keys(b, JUDGED);
+            for key in ["status", "residual", "contacts_by_status", "degenerate"] {
+                assert_eq!(a[key], b[key], "{key}");
+            }
+        }
+    }
+    folder.run("solve wall.hdf5 --tol 1e-3 --out rough.hdf5").exits(0);
+    let text = folder.run("check rough.hdf5 --worst 2").exits(1).stdout;
+    assert!(text.contains("not solved") && text.contains("worst"), "{text}");
+    let line = folder.run("check rough.hdf5 --json --worst 2").exits(1).json().remove(0);
+    assert_eq!(line["worst_contacts"].as_array().unwrap().len(), 2);
+    assert_eq!(line["status"], "not_solved");
+}
+
+#[test]
+fn a_written_file_keeps_everything_else() {
+    let folder = Folder::with_problems();
+    let before = fclib::read(folder.path("wall.hdf5")).unwrap();
+    folder.run("solve wall.hdf5 --out copy.hdf5 --quiet").exits(0);
+    let copy = fclib::read(folder.path("copy.hdf5")).unwrap();
+    assert_eq!((&copy.problem, &copy.info), (&before.problem, &before.info));
+    assert!(copy.info.title.as_deref().unwrap().starts_with("wall rows=3"));
+
+    // In place, and through another name of the same file.
+    let mut with_guess = before.clone();
+    with_guess.guesses = copy.solution.clone().into_iter().collect();
+    fclib::write(folder.path("wall.hdf5"), &with_guess).unwrap();
+    folder.run("solve wall.hdf5 --out ./wall.hdf5 --quiet").exits(0);
+    let after = fclib::read(folder.path("wall.hdf5")).unwrap();
+    assert_eq!(after, FclibFile { solution: copy.solution, ..with_guess });
+
+    // Nothing else is left in the folder.
+    let mut names: Vec<_> = std::fs::read_dir(&folder)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["box.hdf5", "copy.hdf5", "wall.hdf5"]);
+}
+
+#[test]
+fn two_solves_give_the_same_bytes() {
+    let folder = Folder::with_problems();
+    let solve = "solve wall.hdf5 --set ordering=shuffled --quiet --out";
+    let bytes = ["a.hdf5", "b.hdf5"].map(|name| {
+        folder.run(&format!("{solve} {name}")).exits(0);
+        std::fs::read(folder.path(name)).unwrap()
+    });
+    assert!(bytes[0] == bytes[1]);
+}
+
+#[test]
+fn every_kind_is_solved_warm_started_and_checked() {
+    let folder = Folder::new();
+    let planted = Planted::default();
+    let cases = [
+        Friction::Local2(planted.local::<2>().0),
+        Friction::Local3(planted.local::<3>().0),
+        Friction::Global2(planted.global::<2>().0),
+        Friction::Global3(planted.global::<3>().0),
+    ];
+    for problem in cases {
+        let kind = problem.kind().name();
+        fclib::write(folder.path("a.hdf5"), &FclibFile::new(problem)).unwrap();
+        let cold = folder.run("solve a.hdf5 --out b.hdf5 --json").exits(0).json().remove(0);
+        assert_eq!(cold["kind"], kind);
+        folder.run("check b.hdf5").exits(0);
+        folder.run("info b.hdf5").exits(0);
+
+        // The solution as a guess, with a velocity that must not be believed.
+        let mut file = fclib::read(folder.path("b.hdf5")).unwrap();
+        let guess: StoredPoint = file.solution.take().unwrap();
+        let v = guess.v.as_ref().map(|v| vec![7.0; v.len()]);
+        file.guesses = vec![StoredPoint { v, ..guess }];
+        fclib::write(folder.path("c.hdf5"), &file).unwrap();
+        let warm = folder.run("solve c.hdf5 --warm-start --json").exits(0).json().remove(0);
+        assert_eq!(warm["iterations"], 0, "{kind}");
+        assert!(cold["iterations"].as_u64() > Some(0));
+    }
+}
+
+#[test]
+fn info_describes() {
+    let folder = Folder::with_problems();
+    let text = folder.run("info wall.hdf5 box.hdf5").exits(0).stdout;
+    for part in ["contact density c = ", "hyperstatic", "mu = 0.6", "if condensed", "stored"] {
+        assert!(text.contains(part), "{part} in {text}");
+    }
+    let lines = folder.run("info wall.hdf5 box.hdf5 --json").exits(0).json();
+    for line in &lines {
+        has_keys(
+            line,
+            "file kind contacts unknowns form dimension dofs contact_density mu/min mu/max mu/frictionless \
+             bilateral_rows asymmetry W/blocks W/blocks_per_row/mean W/connected_groups guesses title solution",
+        );
+    }
+    has_keys(&lines[0], "entries/M entries/H components/0/size");
+    has_keys(&lines[1], "solution/residual/relative solution/contacts_by_status/slip");
+    assert_eq!((&lines[1]["dofs"], &lines[1]["contact_density"]), (&6.into(), &2.0.into()));
+    assert_eq!(lines[1]["W"]["blocks"], 16);
+}
+
+#[test]
+fn list_has_every_solver() {
+    let folder = Folder::new();
+    let text = folder.run("list").exits(0).stdout;
+    assert!(text.contains("nsgs (the default)") && text.contains("condense/nsgs"));
+    let list = folder.run("list --json").exits(0).json().remove(0);
+    has_keys(&list, "default reformulations/0/name composed/0");
+    for solver in list["solvers"].as_array().unwrap() {
+        has_keys(solver, "name family summary kinds/0 needs cites settings");
+        for setting in solver["settings"].as_array().unwrap() {
+            has_keys(setting, "key default choices help");
+        }
+    }
+    let page = folder.run("list --markdown").exits(0).stdout;
+    assert!(page.starts_with("<!-- Generated by `nonsmooth list --markdown`"));
+    assert_eq!(page, folder.run("list --markdown").stdout);
+    assert!(folder.run("list nsgs").exits(0).stdout.starts_with("nsgs"));
+}
+
+#[test]
+fn every_scene_is_generated_solved_and_drawn() {
+    let folder = Folder::new();
+    let text = folder.run("gen").exits(0).stdout;
+    assert_eq!(text, folder.run("gen --list").exits(0).stdout);
+    let scenes = text.lines().filter_map(|line| line.split_once(": "));
+    let scenes: Vec<_> = scenes.filter(|(name, _)| !name.contains([' ', '='])).collect();
+    assert!(scenes.len() >= 5);
+    for (scene, _) in scenes {
+        let one = folder.run(&format!("gen {scene} --list")).exits(0).stdout;
+        assert!(one.contains(&format!("\n{scene}: ")) && one.len() < text.len());
+        let plain = format!("gen {scene} --out a.hdf5 --draw a.svg");
+        assert!(folder.run(&plain).exits(0).stdout.contains("friction_global_3d"));
+        assert!(fclib::read(folder.path("a.hdf5")).unwrap().solution.is_none());
+
+        let solved = format!("gen {scene} --form local --solve --out b.hdf5 --draw b.svg");
+        assert!(folder.run(&solved).exits(0).stdout.contains("friction_local_3d"));
+        folder.run("check b.hdf5 --tol 1e-10").exits(0);
+        let file = fclib::read(folder.path("b.hdf5")).unwrap();
+        assert!(file.info.description.unwrap().contains("density=2000.0"));
+        assert_eq!(file.info.dofs.unwrap() % 6, 0);
+        with_friction!(&file.problem, p => assert!(p.mu.iter().all(|&mu| mu == 0.6)));
+        let [plain, impulses] =
+            ["a.svg", "b.svg"].map(|name| std::fs::read_to_string(folder.path(name)).unwrap());
+        assert!(plain.starts_with("<svg") && impulses.contains("impulses: "));
+    }
+}
+
+#[test]
+fn plots_and_several_outputs_go_where_they_are_sent() {
+    let folder = Folder::with_problems();
+    folder.run("solve wall.hdf5 --plot one.svg --quiet").exits(0);
+    folder.run("solve wall.hdf5 box.hdf5 --plot new/plots/ --out new/out/ --quiet").exits(0);
+    for name in ["one.svg", "new/plots/wall.svg", "new/plots/box.svg"] {
+        let svg = std::fs::read_to_string(folder.path(name)).unwrap();
+        assert!(svg.starts_with("<svg") && svg.contains("relative residual"), "{name}");
+    }
+    folder.run("check new/out/wall.hdf5 new/out/box.hdf5").exits(0);
+}
+
+#[test]
+fn help_shows_examples() {
+    let folder = Folder::new();
+    for command in ["", "solve", "check", "info", "list", "gen"] {
+        let help = folder.run(&format!("{command} --help")).exits(0).stdout;
+        assert!(help.contains("Examples:"), "{command}");
+    }
+    assert!(folder.run("--version").exits(0).stdout.starts_with("nonsmooth "));
+}

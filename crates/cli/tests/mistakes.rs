@@ -1,0 +1,113 @@
+//! The caller's mistakes: exit code 2 and one line that names the place, what was expected and what was found.
+
+mod common;
+
+use std::fs;
+
+use common::Folder;
+
+#[test]
+fn bad_files() {
+    let folder = Folder::with_problems();
+    let good = fs::read(folder.path("wall.hdf5")).unwrap();
+    fs::write(folder.path("text.hdf5"), "not a problem").unwrap();
+    fs::write(folder.path("empty.hdf5"), "").unwrap();
+    fs::write(folder.path("short.hdf5"), &good[..good.len() / 2]).unwrap();
+    fs::create_dir(folder.path("folder")).unwrap();
+    for command in ["solve", "check", "info"] {
+        for file in ["missing.hdf5", "text.hdf5", "empty.hdf5", "short.hdf5", "folder"] {
+            folder.run(&format!("{command} {file}")).refused(&[file, "expected", "found"]);
+        }
+    }
+}
+
+#[test]
+fn nan_in_the_data() {
+    let folder = Folder::new();
+    let mu: f64 = 0.123456789;
+    folder.run(&format!("gen sliding_box --set mu={mu} --out nan.hdf5")).exits(0);
+    let mut bytes = fs::read(folder.path("nan.hdf5")).unwrap();
+    let at = bytes.windows(8).position(|b| b == mu.to_le_bytes()).unwrap();
+    bytes[at..at + 8].copy_from_slice(&f64::NAN.to_le_bytes());
+    fs::write(folder.path("nan.hdf5"), bytes).unwrap();
+    folder.run("solve nan.hdf5").refused(&["nan.hdf5", "mu[0]", "expected", "NaN"]);
+}
+
+#[test]
+fn bad_options_of_solve() {
+    let folder = Folder::with_problems();
+    let cases: &[(&str, &[&str])] = &[
+        ("wall.hdf5 --solver magic", &["wall.hdf5", "magic", "nsgs"]),
+        ("box.hdf5 --solver condense/nsgs", &["box.hdf5", "condense/nsgs"]),
+        ("wall.hdf5 --set omga=1", &["omga", "omega"]),
+        ("wall.hdf5 --set omega=3", &["omega", "(0, 2)", "3"]),
+        ("wall.hdf5 --set local=7", &["local", "exact"]),
+        ("wall.hdf5 --set omega", &["--set", "key=value"]),
+        ("wall.hdf5 --set seed=1 --set seed=2", &["seed", "twice"]),
+        ("wall.hdf5 --tol -1e-8", &["--tol", "positive", "-1e-8"]),
+        ("wall.hdf5 --tol 0", &["--tol", "positive"]),
+        ("wall.hdf5 --tol NaN", &["--tol", "NaN"]),
+        ("wall.hdf5 --tol inf", &["--tol", "inf"]),
+        ("wall.hdf5 --time-limit -1", &["--time-limit", "at least 0", "-1"]),
+        ("wall.hdf5 --time-limit nan", &["--time-limit", "NaN"]),
+        ("wall.hdf5 --warm-start", &["wall.hdf5", "/guesses/1", "none"]),
+        ("wall.hdf5 box.hdf5 --out both.hdf5", &["--out", "both.hdf5", "directory"]),
+        ("wall.hdf5 box.hdf5 --plot both.svg", &["--plot", "both.svg", "directory"]),
+        ("wall.hdf5 ./wall.hdf5 --out out/", &["--out", "wall.hdf5", "two"]),
+        ("wall.hdf5 --out nowhere/a.hdf5", &["--out", "nowhere/a.hdf5"]),
+        ("wall.hdf5 --plot nowhere/a.svg", &["--plot", "nowhere/a.svg"]),
+        ("wall.hdf5 --plot wall.hdf5", &["--plot", "wall.hdf5"]),
+        ("wall.hdf5 --out box.hdf5/", &["--out", "box.hdf5"]),
+        #[cfg(unix)]
+        ("wall.hdf5 --out /dev/null", &["--out", "/dev/null", "device"]),
+    ];
+    let before = fs::read(folder.path("wall.hdf5")).unwrap();
+    for (arguments, parts) in cases {
+        let run = folder.run(&format!("solve {arguments}")).refused(parts);
+        assert_eq!(run.stdout, "", "{arguments}");
+    }
+    assert!(before == fs::read(folder.path("wall.hdf5")).unwrap());
+}
+
+#[test]
+fn bad_options_of_the_other_commands() {
+    let folder = Folder::with_problems();
+    let cases: &[(&str, &[&str])] = &[
+        ("check wall.hdf5", &["wall.hdf5", "/solution", "none"]),
+        ("check box.hdf5 --tol -1", &["--tol", "-1"]),
+        ("list magic", &["magic", "nsgs"]),
+        ("gen magic --out a.hdf5", &["magic", "wall"]),
+        ("gen wall", &["--out", "--draw"]),
+        ("gen wall --set bricks=3 --out a.hdf5", &["bricks", "rows"]),
+        ("gen wall --set rows=0 --out a.hdf5", &["rows", "0"]),
+        ("gen wall --set rows=many --out a.hdf5", &["rows", "many"]),
+        ("gen wall --set mu=-1 --out a.hdf5", &["mu", "-1"]),
+        ("gen wall --set rows --out a.hdf5", &["--set", "key=value"]),
+        ("gen wall --out nowhere/a.hdf5", &["--out", "nowhere/a.hdf5"]),
+        ("gen wall --draw nowhere/a.svg", &["--draw", "nowhere/a.svg"]),
+        ("gen wall --out a.x --draw a.x", &["--draw", "a.x"]),
+    ];
+    for (arguments, parts) in cases {
+        folder.run(arguments).refused(parts);
+    }
+    assert!(!folder.path("a.hdf5").exists());
+    for unknown in ["", "sulve", "solve", "solve wall.hdf5 --tol x", "list --json --markdown"] {
+        assert_eq!(folder.run(unknown).code, Some(2), "{unknown}");
+    }
+}
+
+#[test]
+fn one_bad_file_does_not_keep_the_others_from_running() {
+    let folder = Folder::with_problems();
+    let run =
+        folder.run("solve missing.hdf5 wall.hdf5 --max-iter 1 --json").refused(&["missing.hdf5"]);
+    let lines = run.json();
+    assert_eq!(
+        (&lines[0]["file"], &lines[1]["status"]),
+        (&"missing.hdf5".into(), &"iteration_limit".into())
+    );
+    let error = lines[0]["error"].as_str().unwrap();
+    assert!(run.stderr.contains(error) && error.contains("missing.hdf5"));
+    let run = folder.run("info missing.hdf5 wall.hdf5").refused(&["missing.hdf5"]);
+    assert!(run.stdout.starts_with("wall.hdf5: "));
+}
