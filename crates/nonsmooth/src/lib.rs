@@ -51,6 +51,7 @@ pub use nonsmooth_io::{IoError, fclib};
 pub use nonsmooth_problem::check::{Certificate, Judged, Measure, Motion, Verdict};
 pub use nonsmooth_problem::linalg::{Bsr, Csc};
 pub use nonsmooth_problem::planted::Planted;
+pub use nonsmooth_problem::with_friction;
 pub use nonsmooth_problem::{
     BilateralGlobal, BilateralLocal, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, Kind,
     LocalPoint, Problem, ProblemError,
@@ -58,3 +59,8 @@ pub use nonsmooth_problem::{
 pub use nonsmooth_solve::registry::{session, solver_names};
 pub use nonsmooth_solve::settings;
 pub use nonsmooth_solve::{Driver, Limits, Outcome, Session, SolveError, Solver, Status, Step};
+
+/// The README's program compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;
