@@ -118,16 +118,8 @@ impl<const D: usize> FrictionGlobal<D> {
         Ok(())
     }
 
-    /// The factorised dynamics: `M⁻¹`, or `[M, −G; Gᵀ, 0]⁻¹` where there are bilateral constraints.
-    pub fn dynamics(&self) -> Result<Inverse, ProblemError> {
-        match &self.bilateral {
-            None => Inverse::new(&self.M, "M"),
-            Some(b) => Inverse::saddle(&self.M, &b.G),
-        }
-    }
-
-    /// `H r + f`, followed by `−b` where there are bilateral constraints: what [`dynamics`](Self::dynamics)
-    /// turns into `(v, lambda)`.
+    /// `H r + f`, followed by `−b` where there are bilateral constraints: the right-hand side of
+    /// [`Dynamics`].
     pub fn load(&self, r: &[f64], out: &mut [f64]) {
         let n = self.dofs();
         out[..n].copy_from_slice(&self.f);
@@ -143,6 +135,72 @@ impl<const D: usize> FrictionGlobal<D> {
     pub fn velocity_into(&self, v: &[f64], u: &mut [f64]) {
         u.copy_from_slice(&self.w);
         self.H.mul_transpose_add(1.0, v, u);
+    }
+}
+
+/// The factorised dynamics of global problems that share M and G: r to `(v, lambda)`.
+///
+/// `[M, −G; Gᵀ, 0] (v, lambda) = (H r + f, −b)`, or `M v = H r + f` without bilateral constraints.
+#[derive(Debug, Clone)]
+#[allow(non_snake_case)]
+pub struct Dynamics {
+    /// `M⁻¹`, or the inverse of the bordered matrix.
+    pub inverse: Inverse,
+    M: Csc,
+    G: Option<Csc>,
+    state: Vec<f64>,
+    scratch: Vec<f64>,
+}
+
+impl Dynamics {
+    /// Factorises. Errors: a singular M, by the component at fault.
+    pub fn new<const D: usize>(problem: &FrictionGlobal<D>) -> Result<Self, ProblemError> {
+        let inverse = match &problem.bilateral {
+            None => Inverse::new(&problem.M, "M")?,
+            Some(b) => Inverse::saddle(&problem.M, &b.G)?,
+        };
+        Ok(Self {
+            M: problem.M.clone(),
+            G: problem.bilateral.as_ref().map(|b| b.G.clone()),
+            state: vec![0.0; inverse.dim()],
+            scratch: vec![0.0; inverse.scratch_len()],
+            inverse,
+        })
+    }
+
+    /// Whether `problem` has the matrices that were factorised. Cost: one comparison of M and G.
+    pub fn serves<const D: usize>(&self, problem: &FrictionGlobal<D>) -> bool {
+        self.M == problem.M && self.G.as_ref() == problem.bilateral.as_ref().map(|b| &b.G)
+    }
+
+    /// `(v, lambda)` for the impulses `r`, by one solve; allocates nothing unless M has a component that is
+    /// factorised sparsely.
+    pub fn solve<const D: usize>(
+        &mut self,
+        problem: &FrictionGlobal<D>,
+        r: &[f64],
+    ) -> (&[f64], &[f64]) {
+        problem.load(r, &mut self.state);
+        self.inverse.solve_with(&mut self.state, &mut self.scratch);
+        self.state.split_at(problem.dofs())
+    }
+
+    /// Completes `point` from its impulses.
+    pub fn complete<const D: usize>(
+        &mut self,
+        problem: &FrictionGlobal<D>,
+        point: &mut GlobalPoint,
+    ) {
+        let (v, lambda) = self.solve(problem, &point.r);
+        point.v.copy_from_slice(v);
+        point.lambda.copy_from_slice(lambda);
+    }
+
+    /// `q = Hᵀ v_free + w`, the relative velocity without impulses.
+    pub fn free_velocity<const D: usize>(&mut self, problem: &FrictionGlobal<D>, q: &mut [f64]) {
+        q.fill(0.0);
+        let (v, _) = self.solve(problem, q);
+        problem.velocity_into(v, q);
     }
 }
 
@@ -180,6 +238,10 @@ impl<const D: usize> Problem for FrictionGlobal<D> {
 
     fn gauge(&self) -> Result<Self::Gauge, ProblemError> {
         check::GlobalGauge::new(self)
+    }
+
+    fn regauge(&self, gauge: &mut Self::Gauge) -> Result<(), ProblemError> {
+        gauge.refill(self)
     }
 
     fn measure(&self, point: &GlobalPoint, gauge: &mut Self::Gauge) -> Measure {

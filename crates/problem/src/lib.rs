@@ -17,6 +17,6 @@ mod problem;
 
 pub use error::ProblemError;
 pub use friction::Friction;
-pub use friction_global::{BilateralGlobal, FrictionGlobal, GlobalPoint};
+pub use friction_global::{BilateralGlobal, Dynamics, FrictionGlobal, GlobalPoint};
 pub use friction_local::{BilateralLocal, FrictionLocal, LocalPoint};
 pub use problem::{Kind, Problem};

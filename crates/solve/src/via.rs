@@ -43,12 +43,12 @@ where
     }
 
     fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
-        (work.reduced, work.memo) = self.reformulation.reduce(problem)?;
+        self.reformulation.reduce_again(problem, &mut work.reduced, &mut work.memo)?;
         self.solver.refill(&work.reduced, &mut work.work)
     }
 
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
-        work.point = self.reformulation.lower(problem, point, &work.memo);
+        self.reformulation.lower(problem, point, &mut work.point);
         self.solver.start(&work.reduced, &mut work.point, &mut work.work);
     }
 
@@ -58,7 +58,7 @@ where
 
     fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
         self.solver.publish(&work.reduced, &mut work.point, &mut work.work);
-        self.reformulation.lift(problem, &work.point, &work.memo, point);
+        self.reformulation.lift(problem, &work.point, &mut work.memo, point);
     }
 
     fn check_every(&self) -> usize {

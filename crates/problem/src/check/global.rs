@@ -2,17 +2,18 @@
 
 use super::local::LawGauge;
 use super::{Measure, over};
-use crate::linalg::{Delassus, Inverse, norm, small};
-use crate::{FrictionGlobal, GlobalPoint, ProblemError};
+use crate::linalg::{Csc, Delassus, Inverse, norm, small};
+use crate::{Dynamics, FrictionGlobal, GlobalPoint, ProblemError};
 
 /// The judge's constants and buffers for a [`FrictionGlobal`]: among them its own factorisation of the dynamics.
 #[derive(Debug, Clone)]
 pub struct GlobalGauge {
     pub(super) law: LawGauge,
-    dynamics: Inverse,
-    scratch: Vec<f64>,
-    /// `(v, λ)` that follow from r.
-    state: Vec<f64>,
+    dynamics: Dynamics,
+    /// `M⁻¹` alone and its scratch, where bilateral constraints border the dynamics.
+    free: Option<(Inverse, Vec<f64>)>,
+    /// w_c belongs to this H.
+    h: Csc,
     u: Vec<f64>,
     buffer: Vec<f64>,
     constraint: Vec<f64>,
@@ -20,29 +21,56 @@ pub struct GlobalGauge {
 
 impl GlobalGauge {
     pub(crate) fn new<const D: usize>(problem: &FrictionGlobal<D>) -> Result<Self, ProblemError> {
-        let (n, p, m) = (problem.dofs(), problem.multipliers(), problem.w.len());
-        let dynamics = problem.dynamics()?;
+        let dynamics = Dynamics::new(problem)?;
         // W = Hᵀ M⁻¹ H and q = Hᵀ M⁻¹ f + w are those of the free dynamics, with bilateral rows apart.
-        let free = if p > 0 { &Inverse::new(&problem.M, "M")? } else { &dynamics };
-        let mut v = problem.f.clone();
-        free.solve(&mut v);
-        let mut q = vec![0.0; m];
-        problem.velocity_into(&v, &mut q);
-        let delassus = Delassus::<D>::new(&problem.H, free);
-        let mut law = LawGauge::default();
-        law.refill(
-            (0..problem.contacts()).map(|c| small::mean_diagonal(&delassus.diagonal_block(c))),
-            norm(&q),
-        );
-        Ok(Self {
-            law,
-            scratch: vec![0.0; dynamics.scratch_len()],
+        let free = match problem.bilateral {
+            Some(_) => {
+                let free = Inverse::new(&problem.M, "M")?;
+                let scratch = vec![0.0; free.scratch_len()];
+                Some((free, scratch))
+            }
+            None => None,
+        };
+        let delassus =
+            Delassus::<D>::new(&problem.H, free.as_ref().map_or(&dynamics.inverse, |f| &f.0));
+        let diagonal =
+            (0..problem.contacts()).map(|c| small::mean_diagonal(&delassus.diagonal_block(c)));
+        let mut gauge = Self {
+            law: LawGauge::new(diagonal),
             dynamics,
-            state: vec![0.0; n + p],
-            u: vec![0.0; m],
-            buffer: vec![0.0; n],
-            constraint: vec![0.0; p],
-        })
+            free,
+            h: problem.H.clone(),
+            u: vec![0.0; problem.w.len()],
+            buffer: vec![0.0; problem.dofs()],
+            constraint: vec![0.0; problem.multipliers()],
+        };
+        gauge.rescale(problem);
+        Ok(gauge)
+    }
+
+    pub(crate) fn refill<const D: usize>(
+        &mut self,
+        problem: &FrictionGlobal<D>,
+    ) -> Result<(), ProblemError> {
+        if self.dynamics.serves(problem) && self.h == problem.H {
+            self.rescale(problem);
+        } else {
+            *self = Self::new(problem)?;
+        }
+        Ok(())
+    }
+
+    /// `‖q‖` from the present f and w.
+    fn rescale<const D: usize>(&mut self, problem: &FrictionGlobal<D>) {
+        match &mut self.free {
+            None => self.dynamics.free_velocity(problem, &mut self.u),
+            Some((free, scratch)) => {
+                self.buffer.copy_from_slice(&problem.f);
+                free.solve_with(&mut self.buffer, scratch);
+                problem.velocity_into(&self.buffer, &mut self.u);
+            }
+        }
+        self.law.norm_q = norm(&self.u);
     }
 
     pub(crate) fn measure<const D: usize>(
@@ -50,15 +78,11 @@ impl GlobalGauge {
         problem: &FrictionGlobal<D>,
         point: &GlobalPoint,
     ) -> Measure {
-        let n = problem.dofs();
-        problem.load(&point.r, &mut self.state);
-        self.dynamics.solve_with(&mut self.state, &mut self.scratch);
-        problem.velocity_into(&self.state[..n], &mut self.u);
-        let mut measure = self.law.measure::<D>(&point.r, &self.u, &problem.mu);
-
         let given = imbalance(problem, &point.v, &point.r, &point.lambda, &mut self.buffer);
-        let (own_v, own_lambda) = self.state.split_at(n);
-        let own = imbalance(problem, own_v, &point.r, own_lambda, &mut self.buffer);
+        let (v, lambda) = self.dynamics.solve(problem, &point.r);
+        let own = imbalance(problem, v, &point.r, lambda, &mut self.buffer);
+        problem.velocity_into(v, &mut self.u);
+        let mut measure = self.law.measure::<D>(&point.r, &self.u, &problem.mu);
         let dynamics = if given.is_nan() || own.is_nan() { f64::NAN } else { given.max(own) };
         measure.dynamics = Some(dynamics);
 

@@ -86,6 +86,12 @@ pub(super) struct LawGauge {
 }
 
 impl LawGauge {
+    pub(super) fn new(diagonal: impl Iterator<Item = f64>) -> Self {
+        let mut gauge = Self::default();
+        gauge.refill(diagonal, 0.0);
+        gauge
+    }
+
     pub(super) fn refill(&mut self, diagonal: impl Iterator<Item = f64>, norm_q: f64) {
         self.norm_q = norm_q;
         self.w.clear();

@@ -136,28 +136,39 @@ impl<const D: usize> Bsr<D> {
     pub fn minus(&self, other: &Self) -> Self {
         let rows: Vec<BlockRow<D>> = (0..self.nrows())
             .map(|i| {
-                let (cols, blocks) = self.row(i);
-                let mut row: BlockRow<D> =
-                    cols.iter().copied().zip(blocks.iter().copied()).collect();
-                let (cols, blocks) = other.row(i);
-                for (&j, b) in cols.iter().zip(blocks) {
-                    let at = match row.binary_search_by_key(&j, |e| e.0) {
-                        Ok(at) => at,
-                        Err(at) => {
-                            row.insert(at, (j, [[0.0; D]; D]));
-                            at
-                        }
-                    };
-                    for k in 0..D {
-                        for l in 0..D {
-                            row[at].1[k][l] -= b[k][l];
-                        }
-                    }
-                }
-                row
+                let mut cols: Vec<u32> =
+                    self.row(i).0.iter().chain(other.row(i).0).copied().collect();
+                cols.sort_unstable();
+                cols.dedup();
+                cols.into_iter().map(|j| (j, [[0.0; D]; D])).collect()
             })
             .collect();
-        Self::from_rows(self.ncols, &rows)
+        let mut out = Self::from_rows(self.ncols, &rows);
+        let fits = out.set_difference(self, other);
+        debug_assert!(fits);
+        out
+    }
+
+    /// Overwrites this matrix with `a − b` without allocating; false where its pattern does not hold theirs.
+    pub fn set_difference(&mut self, a: &Self, b: &Self) -> bool {
+        if (self.nrows(), self.ncols) != (a.nrows(), a.ncols) || a.nrows() != b.nrows() {
+            return false;
+        }
+        self.blocks.fill([[0.0; D]; D]);
+        for (sign, term) in [(1.0, a), (-1.0, b)] {
+            for i in 0..term.nrows() {
+                let (cols, blocks) = term.row(i);
+                for (j, block) in cols.iter().zip(blocks) {
+                    let range = self.row_ptr[i]..self.row_ptr[i + 1];
+                    let Ok(at) = self.col_idx[range.clone()].binary_search(j) else {
+                        return false;
+                    };
+                    let entries = self.blocks[range.start + at].iter_mut().flatten();
+                    entries.zip(block.iter().flatten()).for_each(|(x, y)| *x += sign * y);
+                }
+            }
+        }
+        true
     }
 
     /// The general sparse matrix with the same entries, blocks written in full.

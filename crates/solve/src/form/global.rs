@@ -4,42 +4,26 @@
 //! (so that an impulse moves v at the same cost). `complete` recomputes v exactly, so the rounding that the
 //! increments gather never reaches a judged point.
 
-use nonsmooth_problem::linalg::{Csc, Delassus, Inverse, norm, small};
-use nonsmooth_problem::{FrictionGlobal, GlobalPoint};
+use nonsmooth_problem::linalg::{Csc, Delassus, norm, small};
+use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
 use super::{Blockwise, Contacts, Linear};
 use crate::SolveError;
 
 /// What the view keeps.
 pub struct GlobalState<const D: usize> {
-    dynamics: Inverse,
+    dynamics: Dynamics,
     delassus: Delassus<D>,
-    /// The operators above belong to these matrices.
-    m: Csc,
+    /// The Delassus operator belongs to this H.
     h: Csc,
-    g: Option<Csc>,
     q: Vec<f64>,
     scale: f64,
     v: Vec<f64>,
-    /// `(v, λ)` while the dynamics are solved.
-    full: Vec<f64>,
-    scratch: Vec<f64>,
 }
 
 impl<const D: usize> GlobalState<D> {
-    fn load(&mut self, problem: &FrictionGlobal<D>, r: &[f64]) {
-        problem.load(r, &mut self.full);
-        self.dynamics.solve_with(&mut self.full, &mut self.scratch);
-    }
-
     fn update_free_velocity(&mut self, problem: &FrictionGlobal<D>) {
-        self.v.fill(0.0);
-        self.q.fill(0.0);
-        // q serves as the zero impulse here.
-        let q = std::mem::take(&mut self.q);
-        self.load(problem, &q);
-        self.q = q;
-        problem.velocity_into(&self.full[..problem.dofs()], &mut self.q);
+        self.dynamics.free_velocity(problem, &mut self.q);
         let norm_q = norm(&self.q);
         self.scale = if norm_q > 0.0 { norm_q } else { 1.0 };
     }
@@ -49,18 +33,13 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     type State = GlobalState<D>;
 
     fn state(&self) -> Result<Self::State, SolveError> {
-        let dynamics = self.dynamics()?;
-        let delassus = Delassus::new(&self.H, &dynamics);
+        let dynamics = Dynamics::new(self)?;
         let mut state = GlobalState {
-            delassus,
-            m: self.M.clone(),
+            delassus: Delassus::new(&self.H, &dynamics.inverse),
             h: self.H.clone(),
-            g: self.bilateral.as_ref().map(|b| b.G.clone()),
             q: vec![0.0; self.w.len()],
             scale: 1.0,
             v: vec![0.0; self.dofs()],
-            full: vec![0.0; self.dofs() + self.multipliers()],
-            scratch: vec![0.0; dynamics.scratch_len()],
             dynamics,
         };
         state.update_free_velocity(self);
@@ -68,10 +47,7 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     }
 
     fn refill(&self, state: &mut Self::State) -> Result<(), SolveError> {
-        let same = state.m == self.M
-            && state.h == self.H
-            && state.g.as_ref() == self.bilateral.as_ref().map(|b| &b.G);
-        if same {
+        if state.dynamics.serves(self) && state.h == self.H {
             state.update_free_velocity(self);
         } else {
             *state = self.state()?;
@@ -96,15 +72,13 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     }
 
     fn enter(&self, state: &mut Self::State, point: &GlobalPoint) {
-        state.load(self, &point.r);
-        state.v.copy_from_slice(&state.full[..self.dofs()]);
+        let (v, _) = state.dynamics.solve(self, &point.r);
+        state.v.copy_from_slice(v);
     }
 
     fn complete(&self, state: &mut Self::State, point: &mut GlobalPoint) {
-        self.enter(state, point);
-        let (v, lambda) = state.full.split_at(self.dofs());
-        point.v.copy_from_slice(v);
-        point.lambda.copy_from_slice(lambda);
+        state.dynamics.complete(self, point);
+        state.v.copy_from_slice(&point.v);
     }
 }
 
@@ -129,18 +103,4 @@ impl<const D: usize> Linear<D> for FrictionGlobal<D> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
         state.delassus.mul_plus(r, &state.q, u, &mut state.v);
     }
-}
-
-/// `(v, λ)` of a point from its impulses, by one solve with the dynamics.
-pub(crate) fn recover<const D: usize>(
-    problem: &FrictionGlobal<D>,
-    dynamics: &Inverse,
-    point: &mut GlobalPoint,
-) {
-    let mut full = vec![0.0; problem.dofs() + problem.multipliers()];
-    problem.load(&point.r, &mut full);
-    dynamics.solve(&mut full);
-    let (v, lambda) = full.split_at(problem.dofs());
-    point.v.copy_from_slice(v);
-    point.lambda.copy_from_slice(lambda);
 }

@@ -3,7 +3,7 @@
 //! Bilateral rows `0 = Vᵀ r + R λ + s` are eliminated once: `W ← W − V R⁻¹ Vᵀ`, `q ← q − V R⁻¹ s`. Redundant
 //! constraints (a singular, positive semidefinite R) are honoured.
 
-use nonsmooth_problem::linalg::{Bsr, Delassus, Inverse, norm, small};
+use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse, norm, small};
 use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint};
 
 use super::{Blockwise, Contacts, Linear};
@@ -19,6 +19,11 @@ struct Eliminated<const D: usize> {
     w: Bsr<D>,
     q: Vec<f64>,
     r_inverse: Inverse,
+    /// V R⁻¹ Vᵀ, and the matrices that it belongs to.
+    schur: Bsr<D>,
+    v: Csc,
+    r: Csc,
+    lambda: Vec<f64>,
     scratch: Vec<f64>,
 }
 
@@ -26,12 +31,35 @@ impl<const D: usize> Eliminated<D> {
     fn new(problem: &FrictionLocal<D>, b: &BilateralLocal) -> Result<Self, SolveError> {
         let r_inverse = Inverse::semidefinite(&b.R, "R")?;
         // V R⁻¹ Vᵀ is the Delassus operator of "H = Vᵀ, M = R".
-        let w = problem.W.minus(&Delassus::new(&b.V.transpose(), &r_inverse).condense());
-        let mut lambda = b.s.clone();
-        r_inverse.solve(&mut lambda);
-        let mut q = problem.q.clone();
-        b.V.mul_add(-1.0, &lambda, &mut q);
-        Ok(Self { w, q, scratch: vec![0.0; r_inverse.scratch_len()], r_inverse })
+        let schur = Delassus::new(&b.V.transpose(), &r_inverse).condense();
+        let mut eliminated = Self {
+            w: problem.W.minus(&schur),
+            q: vec![0.0; problem.q.len()],
+            schur,
+            v: b.V.clone(),
+            r: b.R.clone(),
+            lambda: vec![0.0; b.s.len()],
+            scratch: vec![0.0; r_inverse.scratch_len()],
+            r_inverse,
+        };
+        eliminated.update_free_velocity(problem, b);
+        Ok(eliminated)
+    }
+
+    /// Takes another problem with the same V and R and the same pattern of W; false where it is not so.
+    fn refill(&mut self, problem: &FrictionLocal<D>, b: &BilateralLocal) -> bool {
+        let same = self.v == b.V && self.r == b.R && self.w.set_difference(&problem.W, &self.schur);
+        if same {
+            self.update_free_velocity(problem, b);
+        }
+        same
+    }
+
+    fn update_free_velocity(&mut self, problem: &FrictionLocal<D>, b: &BilateralLocal) {
+        self.lambda.copy_from_slice(&b.s);
+        self.r_inverse.solve_with(&mut self.lambda, &mut self.scratch);
+        self.q.copy_from_slice(&problem.q);
+        b.V.mul_add(-1.0, &self.lambda, &mut self.q);
     }
 }
 
@@ -52,6 +80,20 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
         let eliminated = self.bilateral.as_ref().map(|b| Eliminated::new(self, b)).transpose()?;
         let norm_q = norm(&self.q);
         Ok(LocalState { scale: if norm_q > 0.0 { norm_q } else { 1.0 }, eliminated })
+    }
+
+    fn refill(&self, state: &mut Self::State) -> Result<(), SolveError> {
+        let norm_q = norm(&self.q);
+        state.scale = if norm_q > 0.0 { norm_q } else { 1.0 };
+        let kept = match (&mut state.eliminated, &self.bilateral) {
+            (None, None) => true,
+            (Some(eliminated), Some(b)) => eliminated.refill(self, b),
+            _ => false,
+        };
+        if !kept {
+            *state = self.state()?;
+        }
+        Ok(())
     }
 
     fn mu(&self) -> &[f64] {

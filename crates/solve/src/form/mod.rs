@@ -11,8 +11,6 @@ mod local;
 
 use nonsmooth_problem::Problem;
 
-pub(crate) use global::recover;
-
 use crate::SolveError;
 
 /// A problem with D-dimensional frictional contacts, seen by its contacts.

@@ -6,8 +6,8 @@
 //! Source: Acary, lecture (2)–(9). Cost: D solves per contact, then one product per pair of contacts that share
 //! a component of M. Storage: W. Fails where M is singular.
 
-use nonsmooth_problem::linalg::{Delassus, Inverse};
-use nonsmooth_problem::{FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem};
+use nonsmooth_problem::linalg::{Csc, Delassus};
+use nonsmooth_problem::{Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint};
 
 use super::Reformulation;
 use crate::SolveError;
@@ -16,9 +16,10 @@ use crate::SolveError;
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Condense;
 
-/// The factorised dynamics.
+/// The factorised dynamics, and the H that W was formed with.
 pub struct CondenseMemo {
-    dynamics: Inverse,
+    dynamics: Dynamics,
+    h: Csc,
 }
 
 impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
@@ -29,36 +30,42 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
         &self,
         problem: &FrictionGlobal<D>,
     ) -> Result<(FrictionLocal<D>, CondenseMemo), SolveError> {
-        let dynamics = problem.dynamics()?;
-        let mut origin = problem.origin();
-        let memo = CondenseMemo { dynamics };
-        memo.recover(problem, &mut origin);
-        let mut q = origin.r;
-        problem.velocity_into(&origin.v, &mut q);
-        let delassus = Delassus::<D>::new(&problem.H, &memo.dynamics);
-        let local = FrictionLocal::new(delassus.condense(), q, problem.mu.clone())?;
-        Ok((local, memo))
+        let mut dynamics = Dynamics::new(problem)?;
+        let mut q = vec![0.0; problem.w.len()];
+        dynamics.free_velocity(problem, &mut q); //                                  q = Hᵀ M⁻¹ f + w
+        let w = Delassus::new(&problem.H, &dynamics.inverse).condense(); //          W = Hᵀ M⁻¹ H
+        let local = FrictionLocal::new(w, q, problem.mu.clone())?;
+        Ok((local, CondenseMemo { dynamics, h: problem.H.clone() }))
     }
 
-    fn lower(&self, _: &FrictionGlobal<D>, point: &GlobalPoint, _: &CondenseMemo) -> LocalPoint {
-        LocalPoint { r: point.r.clone(), lambda: vec![] }
+    fn reduce_again(
+        &self,
+        problem: &FrictionGlobal<D>,
+        reduced: &mut FrictionLocal<D>,
+        memo: &mut CondenseMemo,
+    ) -> Result<(), SolveError> {
+        if memo.dynamics.serves(problem) && memo.h == problem.H {
+            memo.dynamics.free_velocity(problem, &mut reduced.q);
+            reduced.mu.clone_from(&problem.mu);
+            reduced.validate()?;
+        } else {
+            (*reduced, *memo) = self.reduce(problem)?;
+        }
+        Ok(())
+    }
+
+    fn lower(&self, _: &FrictionGlobal<D>, point: &GlobalPoint, reduced: &mut LocalPoint) {
+        reduced.r.clone_from(&point.r);
     }
 
     fn lift(
         &self,
         problem: &FrictionGlobal<D>,
         reduced: &LocalPoint,
-        memo: &CondenseMemo,
+        memo: &mut CondenseMemo,
         point: &mut GlobalPoint,
     ) {
         point.r.clone_from(&reduced.r);
-        memo.recover(problem, point);
-    }
-}
-
-impl CondenseMemo {
-    /// `(v, λ)` from r through the dynamics.
-    fn recover<const D: usize>(&self, problem: &FrictionGlobal<D>, point: &mut GlobalPoint) {
-        crate::form::recover(problem, &self.dynamics, point);
+        memo.dynamics.complete(problem, point);
     }
 }

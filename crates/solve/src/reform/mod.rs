@@ -18,20 +18,26 @@ pub trait Reformulation<P: Problem>: Send {
     /// The other problem, and the memo of the way back.
     fn reduce(&self, problem: &P) -> Result<(Self::To, Self::Memo), SolveError>;
 
-    /// A point of the first problem as a starting point of the other.
-    fn lower(
+    /// Reduces another problem into what an earlier one was reduced to, reusing what still serves.
+    fn reduce_again(
         &self,
         problem: &P,
-        point: &P::Point,
-        memo: &Self::Memo,
-    ) -> <Self::To as Problem>::Point;
+        reduced: &mut Self::To,
+        memo: &mut Self::Memo,
+    ) -> Result<(), SolveError> {
+        (*reduced, *memo) = self.reduce(problem)?;
+        Ok(())
+    }
+
+    /// A point of the first problem as a starting point of the other.
+    fn lower(&self, problem: &P, point: &P::Point, reduced: &mut <Self::To as Problem>::Point);
 
     /// A point of the other problem as a point of the first.
     fn lift(
         &self,
         problem: &P,
         reduced: &<Self::To as Problem>::Point,
-        memo: &Self::Memo,
+        memo: &mut Self::Memo,
         point: &mut P::Point,
     );
 }
