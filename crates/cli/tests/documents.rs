@@ -1,0 +1,58 @@
+//! What is checked in beside the code is what the program makes.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use nonsmooth_io::fclib;
+use nonsmooth_problem::check::Judged;
+use nonsmooth_problem::{Problem, with_friction};
+
+use crate::common::Folder;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+#[test]
+fn the_page_of_solvers_is_what_the_registry_prints() {
+    let page = std::fs::read_to_string(root().join("docs/solvers.md")).unwrap();
+    let printed = Folder::new().run("list --markdown");
+    assert!(
+        page == printed.stdout,
+        "docs/solvers.md is stale: nonsmooth list --markdown > docs/solvers.md"
+    );
+}
+
+/// Runs the commands of examples/README.md. On another machine the data may differ in the last bits, so the stored
+/// solution is judged on the problem made anew.
+#[test]
+fn the_examples_are_what_their_commands_make() {
+    let readme = std::fs::read_to_string(root().join("examples/README.md")).unwrap();
+    let folder = Folder::new();
+    let mut made = 0;
+    for line in readme.lines().filter(|l| l.starts_with("nonsmooth gen ") && l.contains("--out")) {
+        folder.run(line.trim_start_matches("nonsmooth ")).exits(0);
+        let after = |option: &str| {
+            let mut words = line.split_whitespace().skip_while(|w| *w != option);
+            words.nth(1).unwrap_or_else(|| panic!("{line}: no {option}"))
+        };
+        let (problem, picture) = (after("--out"), after("--draw"));
+        let anew = fclib::read(folder.path(problem)).unwrap();
+        let kept = fclib::read(root().join("examples").join(problem)).unwrap();
+        assert_eq!(anew.info, kept.info, "{line}");
+        let solution = kept.solution.expect("the examples hold solutions");
+        with_friction!(&anew.problem, p => {
+            let mut point = p.origin();
+            point.r.clone_from(&solution.r);
+            // The velocities of a global problem follow from r; the residual looks at r alone.
+            let verdict = p.judge(&point, 1e-8).unwrap();
+            assert!(verdict.measure.relative <= 1e-9, "{line}: {:?}", verdict.measure);
+        });
+        assert!(root().join("examples").join(picture).exists(), "{line}");
+        made += 1;
+    }
+    let kept = std::fs::read_dir(root().join("examples")).unwrap();
+    let hdf5 = |e: &std::fs::DirEntry| e.path().extension().is_some_and(|e| e == "hdf5");
+    assert_eq!(kept.filter(|e| hdf5(e.as_ref().unwrap())).count(), made);
+}
