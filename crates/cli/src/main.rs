@@ -69,7 +69,16 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let done = match Cli::parse().command {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) if e.to_string().starts_with("error: ") => {
+            output::error(&one_line(&e.to_string()));
+            return ExitCode::from(Exit::Mistake as u8);
+        }
+        // Help and version are answers, not mistakes; without any argument the help is the answer.
+        Err(answer) => answer.exit(),
+    };
+    let done = match cli.command {
         Command::Solve(args) => solve::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Info(args) => info::run(&args),
@@ -81,4 +90,40 @@ fn main() -> ExitCode {
         Exit::Mistake
     });
     ExitCode::from(exit as u8)
+}
+
+/// A usage error as one line: its paragraphs up to the usage text, joined.
+fn one_line(message: &str) -> String {
+    let lines = message.trim_start_matches("error: ").lines().map(str::trim);
+    let said = lines
+        .take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more information"))
+        .filter(|l| !l.is_empty());
+    said.fold(String::new(), |text, line| match line {
+        line if text.is_empty() => line.into(),
+        tip if tip.starts_with("tip:") => format!("{text}; {tip}"),
+        line => format!("{text} {line}"),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn usage_errors_are_one_line() {
+        let message = |arguments: &str| {
+            let all = ["nonsmooth"].into_iter().chain(arguments.split_whitespace());
+            one_line(&Cli::try_parse_from(all).unwrap_err().to_string())
+        };
+        assert_eq!(
+            message("solve"),
+            "the following required arguments were not provided: <FILE>..."
+        );
+        assert_eq!(
+            message("solve x --tool 3"),
+            "unexpected argument '--tool' found; tip: a similar argument exists: '--tol'"
+        );
+        let abc = "invalid value 'abc' for '--tol <TOL>': invalid float literal";
+        assert_eq!(message("solve x --tol abc"), abc);
+    }
 }

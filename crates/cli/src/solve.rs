@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(long, value_name = "TOL", default_value = "1e-8", allow_hyphen_values = true)]
     tol: f64,
     /// At most this many iterations [default: 1000000, or no limit with --time-limit]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
     max_iter: Option<usize>,
     /// At most this many seconds for each file
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
