@@ -31,12 +31,10 @@ impl GlobalGauge {
             }
             None => None,
         };
-        let delassus =
-            Delassus::<D>::new(&problem.H, free.as_ref().map_or(&dynamics.inverse, |f| &f.0));
-        let diagonal =
-            (0..problem.contacts()).map(|c| small::mean_diagonal(&delassus.diagonal_block(c)));
+        let inverse = free.as_ref().map_or(&dynamics.inverse, |f| &f.0);
+        let diagonal = Delassus::<D>::diagonal(&problem.H, inverse);
         let mut gauge = Self {
-            law: LawGauge::new(diagonal),
+            law: LawGauge::new(diagonal.iter().map(small::mean_diagonal)),
             dynamics,
             free,
             h: problem.H.clone(),

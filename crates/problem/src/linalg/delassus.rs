@@ -1,111 +1,81 @@
-//! The Delassus operator W = Hᵀ M⁻¹ H of a global problem, never formed, and its condensation.
+//! The Delassus operator W = Hᵀ M⁻¹ H of a global problem: its diagonal, its condensation, and its factors
+//! contact by contact.
 
-use super::{Block, BlockRow, Bsr, Csc, Inverse, small};
+use super::{Block, BlockRow, Bsr, Csc, Inverse};
 
-/// `W = Hᵀ M⁻¹ H` in product form, contact by contact.
+/// `W = Hᵀ M⁻¹ H` without W: for each contact c the rows of `H_c` (n × D) that are not zero and those of
+/// `Z_c = M⁻¹ H_c`.
 ///
-/// For each contact c it keeps the rows of `H_c` (n × D) that are not zero and those of `Z_c = M⁻¹ H_c`, so that
+/// `u_c = H_cᵀ v + w_c` and `v += Z_c Δr_c` cost O(rows touched): the movements of Gauss–Seidel in velocity space. With
+/// bilateral constraints `M⁻¹` stands for the velocity part of `[M, −G; Gᵀ, 0]⁻¹`.
 ///
-/// - `u_c = H_cᵀ v + w_c` and `v += Z_c Δr_c` cost O(rows touched): the movements of Gauss–Seidel in velocity space;
-/// - `W r = Hᵀ Σ_c Z_c r_c` is a product without W;
-/// - `W_ij = H_iᵀ Z_j` condenses it.
-///
-/// With bilateral constraints `M⁻¹` stands for the velocity part of `[M, −G; Gᵀ, 0]⁻¹`.
-/// Storage: 8(D+½) bytes for each touched row, twice; 12 rows a contact between two rigid bodies.
+/// Storage: `8 D + 4` bytes for each touched row, twice: 12 rows a contact between two rigid bodies, but all
+/// degrees of freedom of a finite element body in Z (condense those instead).
 #[derive(Debug, Clone)]
 pub struct Delassus<const D: usize> {
-    n: usize,
-    h: BlockColumns<D>,
-    z: BlockColumns<D>,
-}
-
-/// A sparse n × (D·nc) matrix by block columns: for each contact, rows and their D entries.
-#[derive(Debug, Clone)]
-struct BlockColumns<const D: usize> {
-    ptr: Vec<usize>,
-    row: Vec<u32>,
-    entries: Vec<[f64; D]>,
-}
-
-impl<const D: usize> BlockColumns<D> {
-    fn new() -> Self {
-        Self { ptr: vec![0], row: vec![], entries: vec![] }
-    }
-
-    fn push(&mut self, row: usize, entries: [f64; D]) {
-        self.row.push(u32::try_from(row).expect("fewer than 2³² degrees of freedom"));
-        self.entries.push(entries);
-    }
-
-    #[inline(always)]
-    fn column(&self, c: usize) -> impl Iterator<Item = (usize, &[f64; D])> {
-        let range = self.ptr[c]..self.ptr[c + 1];
-        self.row[range.clone()].iter().map(|&i| i as usize).zip(&self.entries[range])
-    }
+    h: Columns<D>,
+    z: Columns<D>,
 }
 
 impl<const D: usize> Delassus<D> {
-    /// Prepares the operator from H (n × D·nc) and the inverse of M, which may carry bilateral rows after n.
+    /// Keeps H (n × D·nc) and `Z = M⁻¹ H`. `inverse` may carry bilateral rows after n.
     ///
     /// Cost: D solves for each contact and component of M that it touches.
     pub fn new(h: &Csc, inverse: &Inverse) -> Self {
-        let (n, nc) = (h.nrows(), h.ncols() / D);
-        let mut out = Self { n, h: BlockColumns::new(), z: BlockColumns::new() };
-        let mut dense = vec![[0.0; D]; inverse.dim()];
-        let mut x = vec![0.0; inverse.scratch_len()];
-        let mut scratch = vec![0.0; inverse.scratch_len()];
-        let (mut touched, mut components) = (Vec::new(), Vec::new());
-        for c in 0..nc {
-            touched.clear();
-            components.clear();
-            for k in 0..D {
-                let (rows, values) = h.column(D * c + k);
-                for (&i, &value) in rows.iter().zip(values) {
-                    dense[i][k] = value;
-                    touched.push(i);
-                }
-            }
-            touched.sort_unstable();
-            touched.dedup();
-            for &i in &touched {
-                out.h.push(i, dense[i]);
-                components.push(inverse.component_of(i));
-            }
-            components.sort_unstable();
-            components.dedup();
-            for &component in &components {
-                let index = inverse.component(component);
-                let mut solved = vec![[0.0; D]; index.len()];
-                for k in 0..D {
-                    let x = &mut x[..index.len()];
-                    x.iter_mut().zip(index).for_each(|(x, &i)| *x = dense[i][k]);
-                    if x.iter().any(|&v| v != 0.0) {
-                        inverse.solve_component(component, x, &mut scratch);
-                        solved.iter_mut().zip(x).for_each(|(s, x)| s[k] = *x);
-                    }
-                }
-                for (&i, s) in index.iter().zip(solved) {
-                    // Rows after n are multipliers of bilateral constraints, recovered on demand.
-                    if i < n && s.iter().any(|&v| v != 0.0) {
-                        out.z.push(i, s);
-                    }
-                }
-            }
-            out.h.ptr.push(out.h.row.len());
-            out.z.ptr.push(out.z.row.len());
-            touched.iter().for_each(|&i| dense[i] = [0.0; D]);
-        }
+        let mut out = Self { h: Columns::new(), z: Columns::new() };
+        solve_columns::<D>(h, inverse, |_, h, z| {
+            out.h.push(h);
+            out.z.push(z);
+        });
         out
     }
 
-    /// The number of contacts.
-    pub fn contacts(&self) -> usize {
-        self.h.ptr.len() - 1
+    /// The diagonal blocks `W_cc = H_cᵀ M⁻¹ H_c`. Cost as [`new`](Self::new); keeps nothing else.
+    pub fn diagonal(h: &Csc, inverse: &Inverse) -> Vec<Block<D>> {
+        let mut blocks = Vec::with_capacity(h.ncols() / D);
+        let mut dense = vec![[0.0; D]; h.nrows()];
+        solve_columns::<D>(h, inverse, |_, h, z| {
+            h.iter().for_each(|&(i, row)| dense[i as usize] = row);
+            let mut w = [[0.0; D]; D];
+            z.iter().for_each(|(i, row)| add_outer(&mut w, &dense[*i as usize], row));
+            h.iter().for_each(|&(i, _)| dense[i as usize] = [0.0; D]);
+            blocks.push(w);
+        });
+        blocks
     }
 
-    /// The number of degrees of freedom n.
-    pub fn dofs(&self) -> usize {
-        self.n
+    /// Forms W in block-sparse rows, `W_ij = H_iᵀ Z_j`, one Z_j at a time.
+    ///
+    /// Cost: the solves of [`new`](Self::new), and Σ over degrees of freedom of (contacts in H) × (contacts in Z).
+    pub fn condense(h: &Csc, inverse: &Inverse) -> Bsr<D> {
+        let nc = h.ncols() / D;
+        // Contacts whose H touches a degree of freedom.
+        let mut touching: Vec<Vec<(u32, [f64; D])>> = vec![Vec::new(); h.nrows()];
+        for c in 0..nc {
+            for (i, row) in block_column::<D>(h, c) {
+                touching[i as usize].push((c as u32, row));
+            }
+        }
+        let mut rows: Vec<BlockRow<D>> = vec![Vec::new(); nc];
+        let mut slot = vec![usize::MAX; nc];
+        let mut met: BlockRow<D> = Vec::new();
+        solve_columns::<D>(h, inverse, |j, _, z| {
+            for (dof, row) in z {
+                for &(i, ref h_row) in &touching[*dof as usize] {
+                    let at = &mut slot[i as usize];
+                    if *at == usize::MAX {
+                        *at = met.len();
+                        met.push((i, [[0.0; D]; D]));
+                    }
+                    add_outer(&mut met[*at].1, h_row, row);
+                }
+            }
+            for (i, w) in met.drain(..) {
+                slot[i as usize] = usize::MAX;
+                rows[i as usize].push((j as u32, w));
+            }
+        });
+        Bsr::from_rows(nc, &rows)
     }
 
     /// `H_cᵀ v`.
@@ -114,7 +84,7 @@ impl<const D: usize> Delassus<D> {
         let mut u = [0.0; D];
         for (i, h) in self.h.column(c) {
             for k in 0..D {
-                u[k] += h[k] * v[i];
+                u[k] += h[k] * v[*i as usize];
             }
         }
         u
@@ -125,83 +95,122 @@ impl<const D: usize> Delassus<D> {
     pub fn apply_impulse(&self, c: usize, dr: &[f64; D], v: &mut [f64]) {
         for (i, z) in self.z.column(c) {
             for k in 0..D {
-                v[i] += z[k] * dr[k];
+                v[*i as usize] += z[k] * dr[k];
             }
         }
     }
+}
 
-    /// `u = W r + q` through the velocities; `v` is a buffer of n entries. Allocates nothing.
-    pub fn mul_plus(&self, r: &[f64], q: &[f64], u: &mut [f64], v: &mut [f64]) {
-        v.fill(0.0);
-        for c in 0..self.contacts() {
-            self.apply_impulse(c, &small::block(r, c), v);
+/// A sparse n × (D·nc) matrix by block columns: for each contact, `(row, its D entries)`.
+#[derive(Debug, Clone)]
+struct Columns<const D: usize> {
+    ptr: Vec<usize>,
+    rows: Vec<(u32, [f64; D])>,
+}
+
+impl<const D: usize> Columns<D> {
+    fn new() -> Self {
+        Self { ptr: vec![0], rows: vec![] }
+    }
+
+    fn push(&mut self, rows: &[(u32, [f64; D])]) {
+        self.rows.extend_from_slice(rows);
+        self.ptr.push(self.rows.len());
+    }
+
+    #[inline(always)]
+    fn column(&self, c: usize) -> &[(u32, [f64; D])] {
+        &self.rows[self.ptr[c]..self.ptr[c + 1]]
+    }
+}
+
+/// `w += aᵀ b` for two rows.
+#[inline(always)]
+fn add_outer<const D: usize>(w: &mut Block<D>, a: &[f64; D], b: &[f64; D]) {
+    for k in 0..D {
+        for l in 0..D {
+            w[k][l] += a[k] * b[l];
         }
-        for c in 0..self.contacts() {
-            let uc = self.local_velocity(c, v);
+    }
+}
+
+/// The rows of `H_c` that hold something, in order.
+fn block_column<const D: usize>(h: &Csc, c: usize) -> Vec<(u32, [f64; D])> {
+    let mut rows: Vec<(u32, [f64; D])> = Vec::new();
+    for k in 0..D {
+        let (indices, values) = h.column(D * c + k);
+        for (&i, &value) in indices.iter().zip(values) {
+            let i = u32::try_from(i).expect("fewer than 2³² degrees of freedom");
+            let at = rows.binary_search_by_key(&i, |r| r.0).unwrap_or_else(|at| {
+                rows.insert(at, (i, [0.0; D]));
+                at
+            });
+            rows[at].1[k] = value;
+        }
+    }
+    rows
+}
+
+/// Hands `H_c` and `Z_c = M⁻¹ H_c` of each contact in turn to `visit`, both as rows that hold something.
+fn solve_columns<const D: usize>(
+    h: &Csc,
+    inverse: &Inverse,
+    mut visit: impl FnMut(usize, &[(u32, [f64; D])], &[(u32, [f64; D])]),
+) {
+    let n = h.nrows();
+    let mut x = vec![0.0; inverse.scratch_len()];
+    let mut scratch = vec![0.0; inverse.scratch_len()];
+    let (mut components, mut z) = (Vec::new(), Vec::new());
+    for c in 0..h.ncols() / D {
+        let rows = block_column::<D>(h, c);
+        components.clear();
+        components.extend(rows.iter().map(|r| inverse.component_of(r.0 as usize)));
+        components.sort_unstable();
+        components.dedup();
+        z.clear();
+        for &component in &components {
+            let index = inverse.component(component);
+            let start = z.len();
+            z.extend(index.iter().map(|&i| (i as u32, [0.0; D])));
             for k in 0..D {
-                u[D * c + k] = uc[k] + q[D * c + k];
+                let x = &mut x[..index.len()];
+                x.fill(0.0);
+                for (i, row) in &rows {
+                    if inverse.component_of(*i as usize) == component {
+                        x[inverse.place_in_component(*i as usize)] = row[k];
+                    }
+                }
+                inverse.solve_component(component, x, &mut scratch);
+                z[start..].iter_mut().zip(x).for_each(|(z, x)| z.1[k] = *x);
             }
         }
+        // Rows after n are multipliers of bilateral constraints, recovered on demand.
+        z.retain(|(i, row)| (*i as usize) < n && row.iter().any(|&v| v != 0.0));
+        visit(c, &rows, &z);
     }
+}
 
-    /// The diagonal block `W_cc = H_cᵀ M⁻¹ H_c`.
-    pub fn diagonal_block(&self, c: usize) -> Block<D> {
-        let mut w = [[0.0; D]; D];
-        let mut z = self.z.column(c).peekable();
-        // Both lists hold distinct rows, H sorted; Z is sorted within each component only.
-        for (i, h) in self.h.column(c) {
-            let matching = match z.peek() {
-                Some(&(j, entries)) if j == i => {
-                    z.next();
-                    Some(entries)
-                }
-                _ => self.z.column(c).find(|&(j, _)| j == i).map(|(_, entries)| entries),
-            };
-            if let Some(entries) = matching {
-                for k in 0..D {
-                    for l in 0..D {
-                        w[k][l] += h[k] * entries[l];
-                    }
-                }
-            }
-        }
-        w
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planted::Planted;
 
-    /// Forms W in block-sparse rows. Cost: Σ over degrees of freedom of (contacts in H) × (contacts in Z).
-    pub fn condense(&self) -> Bsr<D> {
-        let nc = self.contacts();
-        // Contacts whose H touches a degree of freedom, by rows of H.
-        let mut by_row: Vec<Vec<(u32, [f64; D])>> = vec![Vec::new(); self.n];
-        for c in 0..nc {
-            for (i, h) in self.h.column(c) {
-                by_row[i].push((c as u32, *h));
-            }
+    #[test]
+    fn diagonal_condensation_and_factors_are_one_operator() {
+        let (problem, _) = Planted { contacts: 9, dofs: 20, ..Planted::default() }.global::<3>();
+        let inverse = Inverse::new(&problem.M, "M").unwrap();
+        let w = Delassus::<3>::condense(&problem.H, &inverse);
+        let diagonal = Delassus::<3>::diagonal(&problem.H, &inverse);
+        let factors = Delassus::<3>::new(&problem.H, &inverse);
+        let r: Vec<f64> = (0..27).map(|i| (i as f64).cos()).collect();
+        let mut v = vec![0.0; 20];
+        for c in 0..9 {
+            assert_eq!(w.get(c, c), Some(&diagonal[c]));
+            factors.apply_impulse(c, &[r[3 * c], r[3 * c + 1], r[3 * c + 2]], &mut v);
         }
-        let mut rows: Vec<BlockRow<D>> = vec![Vec::new(); nc];
-        let mut slot = vec![usize::MAX; nc];
-        let mut met: BlockRow<D> = Vec::new();
-        for j in 0..nc {
-            for (row, z) in self.z.column(j) {
-                for &(i, ref h) in &by_row[row] {
-                    let at = &mut slot[i as usize];
-                    if *at == usize::MAX {
-                        *at = met.len();
-                        met.push((i, [[0.0; D]; D]));
-                    }
-                    let w = &mut met[*at].1;
-                    for k in 0..D {
-                        for l in 0..D {
-                            w[k][l] += h[k] * z[l];
-                        }
-                    }
-                }
-            }
-            for (i, w) in met.drain(..) {
-                slot[i as usize] = usize::MAX;
-                rows[i as usize].push((j as u32, w));
-            }
+        for c in 0..9 {
+            let (product, velocity) = (w.row_product(c, &r), factors.local_velocity(c, &v));
+            assert!((0..3).all(|k| (product[k] - velocity[k]).abs() < 1e-12));
         }
-        Bsr::from_rows(nc, &rows)
     }
 }

@@ -36,13 +36,15 @@ struct Component {
 enum Factor {
     Scalar(f64),
     Dense(DenseLu),
+    Cholesky(Box<faer::sparse::linalg::solvers::Llt<usize, f64>>),
     Sparse(Box<faer::sparse::linalg::solvers::Lu<usize, f64>>),
 }
 
 impl Inverse {
     /// Factorises the square matrix `a`, called `name` in messages.
     ///
-    /// Cost: O(Σ k³) over small components of size k, a sparse LU for each large one.
+    /// Cost: O(Σ k³) over small components of size k, a sparse LU for each large one (Cholesky where
+    /// it is symmetric positive definite).
     /// Errors: a singular matrix, by the first unknown of the component at fault.
     pub fn new(a: &Csc, name: &str) -> Result<Self, ProblemError> {
         Self::with_factor_of(a.clone(), a, name, 1)
@@ -158,6 +160,11 @@ impl Inverse {
         self.place[i].0 as usize
     }
 
+    /// The place of unknown `i` within its component.
+    pub fn place_in_component(&self, i: usize) -> usize {
+        self.place[i].1 as usize
+    }
+
     /// The unknowns of component `k`.
     pub fn component(&self, k: usize) -> &[usize] {
         &self.components[k].index
@@ -225,12 +232,16 @@ impl Factor {
         match self {
             Factor::Scalar(inverse) => x[0] *= inverse,
             Factor::Dense(lu) => lu.solve(x),
-            Factor::Sparse(lu) => {
-                let n = x.len();
-                lu.solve_in_place(faer::MatMut::from_column_major_slice_mut(x, n, 1));
-            }
+            Factor::Cholesky(llt) => llt.solve_in_place(column(x)),
+            Factor::Sparse(lu) => lu.solve_in_place(column(x)),
         }
     }
+}
+
+/// A vector as the n × 1 matrix that faer solves in place.
+fn column(x: &mut [f64]) -> faer::MatMut<'_, f64> {
+    let n = x.len();
+    faer::MatMut::from_column_major_slice_mut(x, n, 1)
 }
 
 /// The factor of the principal submatrix of `a` on `index`, `None` where it is singular.
@@ -251,6 +262,11 @@ fn factorise(a: &Csc, index: &[usize], place: &[(u32, u32)]) -> Option<Factor> {
     }
     let triplets: Vec<_> = entries.map(|(i, j, x)| Triplet::new(i, j, x)).collect();
     let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &triplets).ok()?;
+    // A symmetric positive definite M, as finite elements give it, at half the price.
+    let symmetric = triplets.iter().all(|t| a.get(index[t.col], index[t.row]) == t.val);
+    if symmetric && let Ok(llt) = matrix.sp_cholesky(faer::Side::Lower) {
+        return Some(Factor::Cholesky(Box::new(llt)));
+    }
     matrix.sp_lu().ok().map(|lu| Factor::Sparse(Box::new(lu)))
 }
 

@@ -125,7 +125,6 @@ impl Planted {
     pub fn local<const D: usize>(&self) -> (FrictionLocal<D>, LocalPoint) {
         let (global, GlobalPoint { v, r, lambda }) = self.global::<D>();
         let inverse = Inverse::new(&global.M, "M").expect("a planted M is invertible");
-        let delassus = Delassus::<D>::new(&global.H, &inverse);
         let mut q = vec![0.0; r.len()];
         global.velocity_into(&v, &mut q);
         let bilateral = global.bilateral.as_ref().map(|BilateralGlobal { G, .. }| {
@@ -150,7 +149,7 @@ impl Planted {
             vv.mul_add(-1.0, &lambda, &mut q);
             BilateralLocal { V: vv, R: rr, s }
         });
-        let w = delassus.condense();
+        let w = Delassus::<D>::condense(&global.H, &inverse);
         for i in 0..w.nrows() {
             let product = w.row_product(i, &r);
             for k in 0..D {

@@ -1,10 +1,10 @@
 //! The global problem by its contacts: velocity space, W never formed.
 //!
-//! The state keeps `v` (so that `u_c = H_cᵀ v + w_c` costs the rows that contact c touches) and `Z_c = M⁻¹ H_c`
-//! (so that an impulse moves v at the same cost). `complete` recomputes v exactly, so the rounding that the
+//! Contact by contact, the state keeps `v` (so that `u_c = H_cᵀ v + w_c` costs the rows that contact c touches) and
+//! `Z_c = M⁻¹ H_c` (so that an impulse moves v at the same cost). Products with W are one solve, `Hᵀ M⁻¹ (H r + f) + w`, and need no Z. `complete` recomputes v exactly, so the rounding that the
 //! increments gather never reaches a judged point.
 
-use nonsmooth_problem::linalg::{Csc, Delassus, norm, small};
+use nonsmooth_problem::linalg::{Block, Csc, Delassus, norm, small};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
 use super::{Blockwise, Contacts, Linear};
@@ -13,8 +13,10 @@ use crate::SolveError;
 /// What the view keeps.
 pub struct GlobalState<const D: usize> {
     dynamics: Dynamics,
-    delassus: Delassus<D>,
-    /// The Delassus operator belongs to this H.
+    /// Z, once a method works contact by contact.
+    delassus: Option<Delassus<D>>,
+    diagonal: Vec<Block<D>>,
+    /// The diagonal and Z belong to this H.
     h: Csc,
     q: Vec<f64>,
     scale: f64,
@@ -35,7 +37,8 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     fn state(&self) -> Result<Self::State, SolveError> {
         let dynamics = Dynamics::new(self)?;
         let mut state = GlobalState {
-            delassus: Delassus::new(&self.H, &dynamics.inverse),
+            delassus: None,
+            diagonal: Delassus::diagonal(&self.H, &dynamics.inverse),
             h: self.H.clone(),
             q: vec![0.0; self.w.len()],
             scale: 1.0,
@@ -60,7 +63,7 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     }
 
     fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D] {
-        state.delassus.diagonal_block(c)
+        state.diagonal[c]
     }
 
     fn velocity_scale(&self, state: &Self::State) -> f64 {
@@ -82,10 +85,20 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     }
 }
 
+/// Families call `prepare` before the first visit of a contact.
+const PREPARED: &str = "prepared for visits contact by contact";
+
 impl<const D: usize> Blockwise<D> for FrictionGlobal<D> {
+    fn prepare(&self, state: &mut Self::State) {
+        if state.delassus.is_none() {
+            state.delassus = Some(Delassus::new(&self.H, &state.dynamics.inverse));
+        }
+    }
+
     #[inline(always)]
     fn velocity(&self, state: &Self::State, _: &[f64], c: usize) -> [f64; D] {
-        let mut u = state.delassus.local_velocity(c, &state.v);
+        let delassus = state.delassus.as_ref().expect(PREPARED);
+        let mut u = delassus.local_velocity(c, &state.v);
         let w: [f64; D] = small::block(&self.w, c);
         for k in 0..D {
             u[k] += w[k];
@@ -95,12 +108,13 @@ impl<const D: usize> Blockwise<D> for FrictionGlobal<D> {
 
     #[inline(always)]
     fn moved(&self, state: &mut Self::State, c: usize, dr: &[f64; D]) {
-        state.delassus.apply_impulse(c, dr, &mut state.v);
+        state.delassus.as_ref().expect(PREPARED).apply_impulse(c, dr, &mut state.v);
     }
 }
 
 impl<const D: usize> Linear<D> for FrictionGlobal<D> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
-        state.delassus.mul_plus(r, &state.q, u, &mut state.v);
+        let (v, _) = state.dynamics.solve(self, r);
+        self.velocity_into(v, u);
     }
 }

@@ -31,7 +31,7 @@ impl<const D: usize> Eliminated<D> {
     fn new(problem: &FrictionLocal<D>, b: &BilateralLocal) -> Result<Self, SolveError> {
         let r_inverse = Inverse::semidefinite(&b.R, "R")?;
         // V R⁻¹ Vᵀ is the Delassus operator of "H = Vᵀ, M = R".
-        let schur = Delassus::new(&b.V.transpose(), &r_inverse).condense();
+        let schur = Delassus::condense(&b.V.transpose(), &r_inverse);
         let mut eliminated = Self {
             w: problem.W.minus(&schur),
             q: vec![0.0; problem.q.len()],

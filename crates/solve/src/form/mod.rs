@@ -50,6 +50,9 @@ pub trait Contacts<const D: usize>: Problem {
 
 /// Access contact by contact, as block Gauss–Seidel needs it.
 pub trait Blockwise<const D: usize>: Contacts<D> {
+    /// Prepares the state for visits contact by contact; called after `state` and `refill`, before the first visit.
+    fn prepare(&self, _state: &mut Self::State) {}
+
     /// The relative velocity `u_c` for the current impulses `r`.
     fn velocity(&self, state: &Self::State, r: &[f64], c: usize) -> [f64; D];
 

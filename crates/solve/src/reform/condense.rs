@@ -33,7 +33,7 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
         let mut dynamics = Dynamics::new(problem)?;
         let mut q = vec![0.0; problem.w.len()];
         dynamics.free_velocity(problem, &mut q); //                                  q = Hᵀ M⁻¹ f + w
-        let w = Delassus::new(&problem.H, &dynamics.inverse).condense(); //          W = Hᵀ M⁻¹ H
+        let w = Delassus::condense(&problem.H, &dynamics.inverse); //                W = Hᵀ M⁻¹ H
         let local = FrictionLocal::new(w, q, problem.mu.clone())?;
         Ok((local, CondenseMemo { dynamics, h: problem.H.clone() }))
     }

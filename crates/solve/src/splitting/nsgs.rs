@@ -255,6 +255,7 @@ impl<L, const D: usize> Sweeps<L, D> {
         P: Blockwise<D>,
         L: LocalSolver<D>,
     {
+        problem.prepare(&mut work.state);
         work.scale = problem.velocity_scale(&work.state);
         work.order.restart(problem.mu().len(), self.settings.seed);
         work.contacts.clear();
