@@ -8,7 +8,7 @@ use nonsmooth_problem::check::Judged;
 use nonsmooth_problem::linalg::norm;
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{Friction, FrictionGlobal, Problem};
-use nonsmooth_solve::form::{Contacts, Linear};
+use nonsmooth_solve::form::{Access, Contacts, Linear};
 use nonsmooth_solve::reform::Condense;
 use nonsmooth_solve::{Limits, Reformulation, Status, registry};
 
@@ -40,7 +40,7 @@ fn agree<const D: usize>(problem: &FrictionGlobal<D>, name: &str) -> usize {
         }
     }
     // The three forms of the operator at that point, converged or not; the judge's velocity is a fourth.
-    let mut state = problem.state().unwrap();
+    let mut state = problem.state(Access::Products).unwrap();
     let mut product = vec![0.0; r.len()];
     problem.velocities(&mut state, &r, &mut product);
     let mut explicit = vec![0.0; r.len()];

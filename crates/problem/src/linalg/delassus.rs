@@ -15,6 +15,7 @@ use super::{Block, BlockRow, Bsr, Csc, Inverse};
 pub struct Delassus<const D: usize> {
     h: Columns<D>,
     z: Columns<D>,
+    diagonal: Vec<Block<D>>,
 }
 
 impl<const D: usize> Delassus<D> {
@@ -22,26 +23,22 @@ impl<const D: usize> Delassus<D> {
     ///
     /// Cost: D solves for each contact and component of M that it touches.
     pub fn new(h: &Csc, inverse: &Inverse) -> Self {
-        let mut out = Self { h: Columns::new(), z: Columns::new() };
-        solve_columns::<D>(h, inverse, |_, h, z| {
-            out.h.push(h);
-            out.z.push(z);
+        let (mut h_rows, mut z_rows) = (Columns::new(), Columns::new());
+        let diagonal = with_diagonal::<D>(h, inverse, |h, z| {
+            h_rows.push(h);
+            z_rows.push(z);
         });
-        out
+        Self { h: h_rows, z: z_rows, diagonal }
     }
 
     /// The diagonal blocks `W_cc = H_cᵀ M⁻¹ H_c`. Cost as [`new`](Self::new); keeps nothing else.
     pub fn diagonal(h: &Csc, inverse: &Inverse) -> Vec<Block<D>> {
-        let mut blocks = Vec::with_capacity(h.ncols() / D);
-        let mut dense = vec![[0.0; D]; h.nrows()];
-        solve_columns::<D>(h, inverse, |_, h, z| {
-            h.iter().for_each(|&(i, row)| dense[i as usize] = row);
-            let mut w = [[0.0; D]; D];
-            z.iter().for_each(|(i, row)| add_outer(&mut w, &dense[*i as usize], row));
-            h.iter().for_each(|&(i, _)| dense[i as usize] = [0.0; D]);
-            blocks.push(w);
-        });
-        blocks
+        with_diagonal::<D>(h, inverse, |_, _| {})
+    }
+
+    /// The diagonal block `W_cc`.
+    pub fn diagonal_block(&self, c: usize) -> &Block<D> {
+        &self.diagonal[c]
     }
 
     /// Forms W in block-sparse rows, `W_ij = H_iᵀ Z_j`, one Z_j at a time.
@@ -151,6 +148,25 @@ fn block_column<const D: usize>(h: &Csc, c: usize) -> Vec<(u32, [f64; D])> {
     rows
 }
 
+/// As [`solve_columns`], and returns the diagonal blocks.
+fn with_diagonal<const D: usize>(
+    h: &Csc,
+    inverse: &Inverse,
+    mut visit: impl FnMut(&[(u32, [f64; D])], &[(u32, [f64; D])]),
+) -> Vec<Block<D>> {
+    let mut blocks = Vec::with_capacity(h.ncols() / D);
+    let mut dense = vec![[0.0; D]; h.nrows()];
+    solve_columns::<D>(h, inverse, |_, h, z| {
+        h.iter().for_each(|&(i, row)| dense[i as usize] = row);
+        let mut w = [[0.0; D]; D];
+        z.iter().for_each(|(i, row)| add_outer(&mut w, &dense[*i as usize], row));
+        h.iter().for_each(|&(i, _)| dense[i as usize] = [0.0; D]);
+        blocks.push(w);
+        visit(h, z);
+    });
+    blocks
+}
+
 /// Hands `H_c` and `Z_c = M⁻¹ H_c` of each contact in turn to `visit`, both as rows that hold something.
 fn solve_columns<const D: usize>(
     h: &Csc,
@@ -206,6 +222,7 @@ mod tests {
         let mut v = vec![0.0; 20];
         for c in 0..9 {
             assert_eq!(w.get(c, c), Some(&diagonal[c]));
+            assert_eq!(factors.diagonal_block(c), &diagonal[c]);
             factors.apply_impulse(c, &[r[3 * c], r[3 * c + 1], r[3 * c + 2]], &mut v);
         }
         for c in 0..9 {

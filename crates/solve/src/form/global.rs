@@ -7,20 +7,26 @@
 use nonsmooth_problem::linalg::{Block, Csc, Delassus, norm, small};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
-use super::{Blockwise, Contacts, Linear};
+use super::{Access, Blockwise, Contacts, Linear};
 use crate::SolveError;
 
 /// What the view keeps.
 pub struct GlobalState<const D: usize> {
     dynamics: Dynamics,
-    /// Z, once a method works contact by contact.
-    delassus: Option<Delassus<D>>,
-    diagonal: Vec<Block<D>>,
-    /// The diagonal and Z belong to this H.
+    operator: Operator<D>,
+    /// The operator belongs to this H.
     h: Csc,
     q: Vec<f64>,
     scale: f64,
     v: Vec<f64>,
+}
+
+/// What a family's access to W needs beside the dynamics.
+enum Operator<const D: usize> {
+    /// Visits contact by contact: Z.
+    Visits(Delassus<D>),
+    /// Products with all of W: the diagonal blocks alone.
+    Products(Vec<Block<D>>),
 }
 
 impl<const D: usize> GlobalState<D> {
@@ -34,11 +40,14 @@ impl<const D: usize> GlobalState<D> {
 impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     type State = GlobalState<D>;
 
-    fn state(&self) -> Result<Self::State, SolveError> {
+    fn state(&self, access: Access) -> Result<Self::State, SolveError> {
         let dynamics = Dynamics::new(self)?;
+        let inverse = &dynamics.inverse;
         let mut state = GlobalState {
-            delassus: None,
-            diagonal: Delassus::diagonal(&self.H, &dynamics.inverse),
+            operator: match access {
+                Access::Visits => Operator::Visits(Delassus::new(&self.H, inverse)),
+                Access::Products => Operator::Products(Delassus::diagonal(&self.H, inverse)),
+            },
             h: self.H.clone(),
             q: vec![0.0; self.w.len()],
             scale: 1.0,
@@ -53,7 +62,11 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
         if state.dynamics.serves(self) && state.h == self.H {
             state.update_free_velocity(self);
         } else {
-            *state = self.state()?;
+            let access = match state.operator {
+                Operator::Visits(_) => Access::Visits,
+                Operator::Products(_) => Access::Products,
+            };
+            *state = self.state(access)?;
         }
         Ok(())
     }
@@ -63,7 +76,10 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     }
 
     fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D] {
-        state.diagonal[c]
+        match &state.operator {
+            Operator::Visits(delassus) => *delassus.diagonal_block(c),
+            Operator::Products(diagonal) => diagonal[c],
+        }
     }
 
     fn velocity_scale(&self, state: &Self::State) -> f64 {
@@ -85,20 +101,20 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     }
 }
 
-/// Families call `prepare` before the first visit of a contact.
-const PREPARED: &str = "prepared for visits contact by contact";
-
-impl<const D: usize> Blockwise<D> for FrictionGlobal<D> {
-    fn prepare(&self, state: &mut Self::State) {
-        if state.delassus.is_none() {
-            state.delassus = Some(Delassus::new(&self.H, &state.dynamics.inverse));
+impl<const D: usize> GlobalState<D> {
+    #[inline(always)]
+    fn visits(&self) -> &Delassus<D> {
+        match &self.operator {
+            Operator::Visits(delassus) => delassus,
+            Operator::Products(_) => unreachable!("a state for products is not visited"),
         }
     }
+}
 
+impl<const D: usize> Blockwise<D> for FrictionGlobal<D> {
     #[inline(always)]
     fn velocity(&self, state: &Self::State, _: &[f64], c: usize) -> [f64; D] {
-        let delassus = state.delassus.as_ref().expect(PREPARED);
-        let mut u = delassus.local_velocity(c, &state.v);
+        let mut u = state.visits().local_velocity(c, &state.v);
         let w: [f64; D] = small::block(&self.w, c);
         for k in 0..D {
             u[k] += w[k];
@@ -108,7 +124,9 @@ impl<const D: usize> Blockwise<D> for FrictionGlobal<D> {
 
     #[inline(always)]
     fn moved(&self, state: &mut Self::State, c: usize, dr: &[f64; D]) {
-        state.delassus.as_ref().expect(PREPARED).apply_impulse(c, dr, &mut state.v);
+        let mut v = std::mem::take(&mut state.v);
+        state.visits().apply_impulse(c, dr, &mut v);
+        state.v = v;
     }
 }
 

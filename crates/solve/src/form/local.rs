@@ -6,7 +6,7 @@
 use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse, norm, small};
 use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint};
 
-use super::{Blockwise, Contacts, Linear};
+use super::{Access, Blockwise, Contacts, Linear};
 use crate::SolveError;
 
 /// What the view keeps: the norm of q, and the problem without its bilateral rows where it has any.
@@ -76,7 +76,7 @@ impl<const D: usize> LocalState<D> {
 impl<const D: usize> Contacts<D> for FrictionLocal<D> {
     type State = LocalState<D>;
 
-    fn state(&self) -> Result<Self::State, SolveError> {
+    fn state(&self, _: Access) -> Result<Self::State, SolveError> {
         let eliminated = self.bilateral.as_ref().map(|b| Eliminated::new(self, b)).transpose()?;
         let norm_q = norm(&self.q);
         Ok(LocalState { scale: if norm_q > 0.0 { norm_q } else { 1.0 }, eliminated })
@@ -91,7 +91,7 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
             _ => false,
         };
         if !kept {
-            *state = self.state()?;
+            *state = self.state(Access::Visits)?;
         }
         Ok(())
     }

@@ -13,6 +13,15 @@ use nonsmooth_problem::Problem;
 
 use crate::SolveError;
 
+/// How a family uses W.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Access {
+    /// Contact by contact ([`Blockwise`]).
+    Visits,
+    /// By products with all of it ([`Linear`]).
+    Products,
+}
+
 /// A problem with D-dimensional frictional contacts, seen by its contacts.
 ///
 /// `State` is what the view keeps beside the problem: velocities, factorisations, buffers.
@@ -20,14 +29,11 @@ pub trait Contacts<const D: usize>: Problem {
     /// What the view keeps between calls.
     type State: Send;
 
-    /// Prepares the view.
-    fn state(&self) -> Result<Self::State, SolveError>;
+    /// Prepares the view for one kind of access.
+    fn state(&self, access: Access) -> Result<Self::State, SolveError>;
 
-    /// Prepares an existing view for this problem, reusing memory where the shape is the same.
-    fn refill(&self, state: &mut Self::State) -> Result<(), SolveError> {
-        *state = self.state()?;
-        Ok(())
-    }
+    /// Prepares an existing view for this problem and the same access, reusing memory where the shape is the same.
+    fn refill(&self, state: &mut Self::State) -> Result<(), SolveError>;
 
     /// The coefficients of friction.
     fn mu(&self) -> &[f64];
@@ -50,9 +56,6 @@ pub trait Contacts<const D: usize>: Problem {
 
 /// Access contact by contact, as block Gauss–Seidel needs it.
 pub trait Blockwise<const D: usize>: Contacts<D> {
-    /// Prepares the state for visits contact by contact; called after `state` and `refill`, before the first visit.
-    fn prepare(&self, _state: &mut Self::State) {}
-
     /// The relative velocity `u_c` for the current impulses `r`.
     fn velocity(&self, state: &Self::State, r: &[f64], c: usize) -> [f64; D];
 

@@ -2,7 +2,7 @@
 
 use nonsmooth_problem::linalg::small;
 
-use crate::form::Linear;
+use crate::form::{Access, Linear};
 use crate::{SolveError, cone};
 
 /// Enough for a step length; the power method's estimate is from below by a few percent.
@@ -26,7 +26,7 @@ impl<P: Linear<D>, const D: usize> Field<P, D> {
     pub(super) fn new(problem: &P) -> Result<Self, SolveError> {
         let m = D * problem.mu().len();
         let mut field = Self {
-            state: problem.state()?,
+            state: problem.state(Access::Products)?,
             unit: Vec::with_capacity(m / D),
             scale: 1.0,
             f: vec![0.0; m],

@@ -20,7 +20,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::cfun::Disk;
-use crate::form::Blockwise;
+use crate::form::{Access, Blockwise};
 use crate::local::{
     Exact, LocalSolver, Newton, Projection, ProjectionIterated, Quartic, frictionless,
 };
@@ -162,7 +162,7 @@ where
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
         let mut work = SweepsWork {
-            state: problem.state()?,
+            state: problem.state(Access::Visits)?,
             contacts: Vec::with_capacity(problem.mu().len()),
             order: Order::new(self.settings.ordering, problem.mu().len(), self.settings.seed),
             scale: 1.0,
@@ -255,7 +255,6 @@ impl<L, const D: usize> Sweeps<L, D> {
         P: Blockwise<D>,
         L: LocalSolver<D>,
     {
-        problem.prepare(&mut work.state);
         work.scale = problem.velocity_scale(&work.state);
         work.order.restart(problem.mu().len(), self.settings.seed);
         work.contacts.clear();
