@@ -23,7 +23,7 @@ pub struct Args {
     #[arg(long, value_name = "TOL", default_value = "1e-8", allow_hyphen_values = true)]
     tol: f64,
     /// List the N contacts with the largest residuals (at most 10)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = files::whole)]
     worst: Option<usize>,
     /// Print one line of JSON for each file in place of the report
     #[arg(long)]
@@ -66,17 +66,13 @@ fn one<P: Form>(
         let mut all = report::problem_json(file, problem);
         all.extend(report::fields(json!({"tolerance": tol, "status": name, "message": says})));
         let worst = args.worst.unwrap_or(verdict.worst.len());
-        all.extend(report::verdict_json(&verdict, worst));
+        all.extend(report::verdict_json(&verdict, tol, worst));
         output::print(&format!("{}\n", json!(all)));
     } else {
-        let relative = report::number(verdict.measure.relative);
-        let mut text = format!(
-            "{}: {says} (relative residual {relative}, tolerance {tol:e})\n",
-            file.display()
-        );
+        let mut text = report::headline(file, says, &verdict.measure, tol);
         report::row(&mut text, "problem", report::problem_text(problem));
         let worst = args.worst.unwrap_or(if verdict.solved { 0 } else { 3 });
-        report::verdict_text(&mut text, &verdict, worst);
+        report::verdict_text(&mut text, &verdict, tol, worst);
         output::print(&text);
     }
     Ok(Exit::solved(verdict.solved))

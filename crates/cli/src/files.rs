@@ -29,6 +29,36 @@ pub fn each(
     worst
 }
 
+/// A whole number, written as `1000` or `1e3`.
+pub fn whole(text: &str) -> Result<usize, String> {
+    // Up to 2^53 a float says which whole number it is.
+    let is_whole = |x: &f64| x.fract() == 0.0 && (0.0..=9e15).contains(x);
+    let float = || text.parse().ok().filter(is_whole).map(|x| x as usize);
+    let number = text.parse().ok().or_else(float);
+    number.ok_or_else(|| "expected a whole number such as 1000 or 1e3".into())
+}
+
+/// A limit on the wall clock.
+pub fn time_limit(seconds: Option<f64>) -> Result<Option<f64>, String> {
+    match seconds {
+        Some(t) if t.is_nan() || t < 0.0 => {
+            Err(format!("--time-limit: expected a number of seconds of at least 0, found {t}"))
+        }
+        t => Ok(t),
+    }
+}
+
+/// A picture's name says what the picture is.
+pub fn picture(option: &str, path: &Path) -> Result<(), String> {
+    match path.extension() {
+        Some(e) if e.eq_ignore_ascii_case("svg") => Ok(()),
+        _ => Err(format!(
+            "{option} {}: expected a file name that ends in .svg, the one format there is",
+            path.display()
+        )),
+    }
+}
+
 /// A tolerance on the relative residual.
 pub fn tolerance(tol: f64) -> Result<f64, String> {
     if tol > 0.0 && tol.is_finite() {
@@ -126,4 +156,22 @@ pub fn same(a: &Path, b: &Path) -> bool {
         })
     };
     matches!((resolved(a), resolved(b)), (Ok(a), Ok(b)) if a == b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers_are_integers_or_floats_without_fraction() {
+        for (text, n) in
+            [("0", 0), ("1000", 1000), ("1e3", 1000), ("2.5E1", 25), ("1e15", 1e15 as usize)]
+        {
+            assert_eq!(whole(text), Ok(n));
+        }
+        assert_eq!(whole(&usize::MAX.to_string()), Ok(usize::MAX));
+        for text in ["1.5", "-1", "1e400", "nan", "inf", "", "ten"] {
+            assert!(whole(text).is_err(), "{text}");
+        }
+    }
 }

@@ -11,8 +11,8 @@ use nonsmooth_solve::settings::{self, Setting, SettingsMap};
 use nonsmooth_solve::{Limits, Status};
 use serde_json::Value;
 
-use crate::solve::{Plan, Solved, seconds, solve_any};
-use crate::{Exit, files, interrupt, output, report};
+use crate::solve::{Plan, Solved, limits, seconds, solve_any};
+use crate::{Exit, files, output, report};
 
 /// Generate the problem of a scene.
 ///
@@ -35,9 +35,21 @@ pub struct Args {
     /// Draw the scene (SVG); with --solve also the impulses, coloured by the status of the contact
     #[arg(long, value_name = "FILE.svg", requires = "scene")]
     draw: Option<PathBuf>,
-    /// Solve the problem (default solver, relative residual 1e-10) and store its /solution
+    /// Solve the problem (default solver) and store its /solution
     #[arg(long, requires = "scene")]
     solve: bool,
+    /// The relative residual that --solve is to reach
+    #[arg(
+        long,
+        value_name = "TOL",
+        default_value = "1e-10",
+        requires = "solve",
+        allow_hyphen_values = true
+    )]
+    tol: f64,
+    /// At most this many seconds for --solve
+    #[arg(long, value_name = "S", requires = "solve", allow_hyphen_values = true)]
+    time_limit: Option<f64>,
     /// List the scenes and their settings (of one scene, if it is named)
     #[arg(long, conflicts_with_all = ["settings", "out", "draw", "solve"])]
     list: bool,
@@ -49,10 +61,7 @@ Examples:
   nonsmooth gen wall --set rows=8 --set mu=0.4 --out wall.hdf5
   nonsmooth gen arch --out arch.hdf5 --form local --solve --draw arch.svg
 
-Exit codes: 0 done; 1 --solve did not reach 1e-10 (the best point is stored); 2 a mistake in the options.";
-
-/// The relative residual of a stored solution.
-const TOLERANCE: f64 = 1e-10;
+Exit codes: 0 done; 1 --solve did not reach --tol (the best point is stored); 2 a mistake in the options.";
 
 /// How the problem is stated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -83,6 +92,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     for (option, path) in [("--out", &args.out), ("--draw", &args.draw)] {
         path.as_deref().map_or(Ok(()), |path| files::writable(option, path))?;
     }
+    args.draw.as_deref().map_or(Ok(()), |path| files::picture("--draw", path))?;
     if let (Some(out), Some(draw)) = (&args.out, &args.draw)
         && files::same(out, draw)
     {
@@ -92,6 +102,10 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         ));
     }
 
+    let limits = match args.solve {
+        true => Some(limits(args.tol, None, args.time_limit)?),
+        false => None,
+    };
     let mistake = |e| format!("scene {name}: {e}");
     let scene = entry.make(&settings).map_err(mistake)?;
     let problem = match args.form {
@@ -100,10 +114,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     };
     let mut content = FclibFile::new(problem.map_err(mistake)?);
     content.info = info(entry, &settings, &scene);
-    let solved = match args.solve {
-        true => Some(solve(label, &content.problem)?),
-        false => None,
-    };
+    let solved = limits.map(|limits| solve(label, &content.problem, limits)).transpose()?;
     content.solution = solved.as_ref().map(|s| s.point.clone());
     if let Some(path) = &args.out {
         fclib::write(path, &content).map_err(|e| e.to_string())?;
@@ -112,22 +123,14 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         let svg = drawing(&scene, solved.as_ref()).map_err(mistake)?;
         files::write_text("--draw", path, &svg)?;
     }
-    output::print(&text(label, &scene, &content.problem, solved.as_ref()));
+    output::print(&text(label, &scene, &content.problem, solved.as_ref(), args.tol));
     let is_solved = |s: &Solved| s.outcome.status == Status::Solved;
     Ok(Exit::solved(solved.as_ref().is_none_or(is_solved)))
 }
 
-fn solve(label: &Path, problem: &Friction) -> Result<Solved, String> {
-    let plan = Plan {
-        solver: registry::DEFAULT,
-        settings: &SettingsMap::new(),
-        limits: Limits {
-            tolerance: TOLERANCE,
-            cancel: Some(interrupt::flag()),
-            ..Limits::default()
-        },
-        progress: true,
-    };
+fn solve(label: &Path, problem: &Friction, limits: Limits) -> Result<Solved, String> {
+    let settings = &SettingsMap::new();
+    let plan = Plan { solver: registry::DEFAULT, settings, limits, progress: true };
     solve_any(label, problem, &plan)
 }
 
@@ -169,10 +172,8 @@ fn drawing(
     };
     let motions: Vec<_> = verdict.statuses.iter().map(|s| s.status).collect();
     let counts = &verdict.counts;
-    let caption = format!(
-        "impulses: {} stick (blue), {} slip (red); {} open",
-        counts.stick, counts.slip, counts.open
-    );
+    let caption =
+        format!("impulses: {} stick, {} slip; {} open", counts.stick, counts.slip, counts.open);
     let drawing = Drawing {
         impulses: Some(&point.r),
         motions: Some(&motions),
@@ -182,7 +183,13 @@ fn drawing(
     draw::svg(scene, &drawing)
 }
 
-fn text(label: &Path, scene: &Scene, problem: &Friction, solved: Option<&Solved>) -> String {
+fn text(
+    label: &Path,
+    scene: &Scene,
+    problem: &Friction,
+    solved: Option<&Solved>,
+    tolerance: f64,
+) -> String {
     let mut text = format!(
         "{}: {}, {} and {} ({})\n",
         label.display(),
@@ -199,7 +206,7 @@ fn text(label: &Path, scene: &Scene, problem: &Friction, solved: Option<&Solved>
         let time = seconds(outcome.seconds);
         let status = &outcome.status;
         report::row(&mut text, "solution", format!("{status}, {iterations}, {time}"));
-        report::verdict_text(&mut text, verdict, 0);
+        report::verdict_text(&mut text, verdict, tolerance, 0);
     }
     text
 }

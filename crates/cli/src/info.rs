@@ -3,8 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use nonsmooth_io::fclib::{self, FclibFile};
-use nonsmooth_problem::linalg::{Bsr, Csc};
-use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, with_friction};
+use nonsmooth_problem::linalg::{Bsr, Csc, Inverse};
+use nonsmooth_problem::{
+    Dynamics, Friction, FrictionGlobal, FrictionLocal, ProblemError, with_friction,
+};
 use serde_json::{Value, json};
 
 use crate::kinds::Form;
@@ -68,6 +70,8 @@ enum Operator {
         entries_of_h: usize,
         /// `(size, how many)` of the connected components.
         components: Vec<(usize, usize)>,
+        /// Why it cannot be inverted, so that there is nothing to solve.
+        singular: Option<ProblemError>,
     },
 }
 
@@ -81,12 +85,12 @@ struct Pattern {
 }
 
 fn facts<P: Form>(file: &Path, problem: &P, content: &FclibFile) -> Result<Facts, String> {
-    let solution = content
-        .solution
-        .as_ref()
-        .map(|stored| problem.judge(&problem.point(stored), JUDGED_AT))
-        .transpose()
-        .map_err(|e| format!("{}: {e}", file.display()))?;
+    let judge = |stored| problem.judge(&problem.point(stored), JUDGED_AT);
+    let solution = match content.solution.as_ref().map(judge).transpose() {
+        // Said of M.
+        Err(ProblemError::Singular { .. }) => None,
+        judged => judged.map_err(|e| format!("{}: {e}", file.display()))?,
+    };
     let dofs = content.info.dofs;
     let (dimension, dofs, operator, pattern, multipliers) = match &content.problem {
         Friction::Local2(p) => local(p, dofs),
@@ -129,6 +133,11 @@ fn global<const D: usize>(p: &FrictionGlobal<D>) -> Structure {
         entries: p.M.nnz(),
         entries_of_h: p.H.nnz(),
         components: bodies.sizes(),
+        // Bilateral constraints may make up for a singular M in the dynamics, but M⁻¹ is needed all the same.
+        singular: Inverse::new(&p.M, "M").err().or_else(|| {
+            p.bilateral.as_ref()?;
+            Dynamics::new(p).err()
+        }),
     };
     // Bilateral constraints couple what they touch, in W as well.
     if let Some(bilateral) = &p.bilateral {
@@ -266,10 +275,11 @@ impl Facts {
             "mu": {"min": least, "max": most, "frictionless": frictionless},
             "bilateral_rows": self.multipliers,
         })));
-        if let Operator::Mass { entries, entries_of_h, components, .. } = &self.operator {
+        if let Operator::Mass { entries, entries_of_h, components, singular, .. } = &self.operator {
             let components = components.iter().map(|(size, n)| json!({"size": size, "count": n}));
             all.insert("entries".into(), json!({"M": entries, "H": entries_of_h}));
             all.insert("components".into(), components.collect());
+            all.insert("singular".into(), json!(singular.as_ref().map(|e| e.to_string())));
         }
         let (Operator::Delassus { asymmetry } | Operator::Mass { asymmetry, .. }) = self.operator;
         all.extend(report::fields(json!({
@@ -280,7 +290,7 @@ impl Facts {
                 "connected_groups": pattern.groups,
             },
             "guesses": content.guesses.len(),
-            "solution": self.solution.as_ref().map(|v| report::verdict_json(v, v.worst.len())),
+            "solution": self.solution.as_ref().map(|v| report::verdict_json(v, JUDGED_AT, v.worst.len())),
         })));
         Value::Object(all)
     }
@@ -325,9 +335,12 @@ impl Facts {
             Operator::Delassus { asymmetry } => {
                 row(&mut text, "W", format!("{blocks}, {}", symmetry(*asymmetry)));
             }
-            Operator::Mass { asymmetry, entries, entries_of_h, components } => {
+            Operator::Mass { asymmetry, entries, entries_of_h, components, singular } => {
                 let m = format!("{entries} entries, {}", symmetry(*asymmetry));
                 row(&mut text, "M", format!("{m}, {}", sizes(components)));
+                if let Some(e) = singular {
+                    row(&mut text, "", format!("M is singular: {e}"));
+                }
                 row(&mut text, "H", format!("{entries_of_h} entries"));
                 row(&mut text, "W", format!("if condensed: {blocks}"));
             }
@@ -339,11 +352,14 @@ impl Facts {
             row(&mut text, "guesses", content.guesses.len());
         }
         match &self.solution {
+            None if content.solution.is_some() => {
+                row(&mut text, "solution", "stored, but M is singular: it cannot be judged");
+            }
             None => row(&mut text, "solution", "none stored"),
             Some(verdict) => {
                 let passes = if verdict.solved { "passes" } else { "does not pass" };
                 row(&mut text, "solution", format!("stored, {passes} at {JUDGED_AT:e}"));
-                report::verdict_text(&mut text, verdict, 0);
+                report::verdict_text(&mut text, verdict, JUDGED_AT, 0);
             }
         }
         text

@@ -2,8 +2,8 @@
 
 use nonsmooth_io::fclib::StoredPoint;
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Problem};
-use nonsmooth_solve::registry::Registered;
+use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
+use nonsmooth_solve::registry::{self, About, Registered};
 
 /// A problem that has solvers, a judge and a place in a file.
 pub trait Form: Registered + Judged {
@@ -59,4 +59,61 @@ impl<const D: usize> Form for FrictionGlobal<D> {
 
 fn some(x: Vec<f64>) -> Option<Vec<f64>> {
     Some(x).filter(|x| !x.is_empty())
+}
+
+/// What the registry has for one kind of problem.
+pub struct Offer {
+    /// The kind.
+    pub kind: Kind,
+    /// The solvers.
+    pub solvers: Vec<&'static About>,
+    /// The names of solvers behind a reformulation.
+    pub composed: Vec<String>,
+}
+
+/// What the registry has, kind by kind.
+pub fn offers() -> [Offer; 4] {
+    fn of<P: Registered>(kind: Kind) -> Offer {
+        Offer { kind, solvers: registry::abouts::<P>(), composed: P::composed_names() }
+    }
+    [
+        of::<FrictionLocal<2>>(Kind::FrictionLocal2d),
+        of::<FrictionLocal<3>>(Kind::FrictionLocal3d),
+        of::<FrictionGlobal<2>>(Kind::FrictionGlobal2d),
+        of::<FrictionGlobal<3>>(Kind::FrictionGlobal3d),
+    ]
+}
+
+/// The problems that a solver takes, in words such as `global`; `None` if no kind of problem has it.
+pub fn takes(solver: &str) -> Option<String> {
+    let has = |offer: &Offer| {
+        offer.solvers.iter().any(|a| a.name == solver) || offer.composed.iter().any(|c| c == solver)
+    };
+    let (with, without): (Vec<_>, Vec<_>) = offers().into_iter().partition(has);
+    let words = |offer: &Offer| offer.kind.name().split('_').collect::<Vec<_>>();
+    // The words that tell all these kinds from all the others, else their names.
+    let shared = with.iter().map(words).reduce(|mut all, kind| {
+        all.retain(|word| kind.contains(word));
+        all
+    })?;
+    let tells = |word: &&&str| !without.iter().all(|o| words(o).contains(*word));
+    let telling: Vec<_> = shared.iter().filter(tells).copied().collect();
+    let also = |o: &Offer| telling.iter().all(|word| words(o).contains(word));
+    Some(if without.iter().any(also) {
+        with.iter().map(|o| o.kind.name()).collect::<Vec<_>>().join(", ")
+    } else {
+        telling.join(" ")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_solver_takes_is_said_in_few_words() {
+        assert_eq!(takes("condense/nsgs").as_deref(), Some("global"));
+        assert_eq!(takes("nsgs").as_deref(), Some(""));
+        assert_eq!(takes("magic"), None);
+    }
 }

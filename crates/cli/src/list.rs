@@ -2,11 +2,12 @@
 
 use std::fmt::Write;
 
-use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
-use nonsmooth_solve::registry::{self, About, PREFIXES, Prefix, Registered};
+use nonsmooth_problem::Kind;
+use nonsmooth_solve::registry::{self, About, PREFIXES, Prefix};
 use nonsmooth_solve::settings::Setting;
 use serde_json::{Value, json};
 
+use crate::kinds::{Offer, offers};
 use crate::report::{fields, row};
 use crate::{Exit, output};
 
@@ -51,25 +52,20 @@ impl Catalogue {
     fn new() -> Self {
         let mut all =
             Self { solvers: vec![], prefixes: PREFIXES.iter().collect(), composed: vec![] };
-        all.add::<FrictionLocal<2>>(Kind::FrictionLocal2d);
-        all.add::<FrictionLocal<3>>(Kind::FrictionLocal3d);
-        all.add::<FrictionGlobal<2>>(Kind::FrictionGlobal2d);
-        all.add::<FrictionGlobal<3>>(Kind::FrictionGlobal3d);
+        for Offer { kind, solvers, composed } in offers() {
+            for about in solvers {
+                match all.solvers.iter_mut().find(|s| s.about.name == about.name) {
+                    Some(listed) => listed.kinds.push(kind),
+                    None => all.solvers.push(Listed { about, kinds: vec![kind] }),
+                }
+            }
+            for name in composed {
+                if !all.composed.contains(&name) {
+                    all.composed.push(name);
+                }
+            }
+        }
         all
-    }
-
-    fn add<P: Registered + Problem>(&mut self, kind: Kind) {
-        for about in registry::abouts::<P>() {
-            match self.solvers.iter_mut().find(|s| s.about.name == about.name) {
-                Some(listed) => listed.kinds.push(kind),
-                None => self.solvers.push(Listed { about, kinds: vec![kind] }),
-            }
-        }
-        for name in P::composed_names() {
-            if !self.composed.contains(&name) {
-                self.composed.push(name);
-            }
-        }
     }
 
     /// Only what is named.

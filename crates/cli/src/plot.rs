@@ -2,6 +2,7 @@
 
 use nonsmooth_solve::Sample;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
+use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -11,6 +12,8 @@ const GRID: RGBColor = RGBColor(226, 230, 234);
 const RESIDUAL: RGBColor = RGBColor(143, 184, 212);
 const BEST: RGBColor = RGBColor(31, 111, 168);
 const TOLERANCE: RGBColor = RGBColor(209, 80, 47);
+/// The dashes of the tolerance and the gaps between them, px.
+const DASHES: (i32, i32) = (6, 4);
 /// Points that a curve keeps: about two for each pixel.
 const KEPT: usize = 800;
 /// Decades that a picture shows at most.
@@ -28,18 +31,29 @@ type Drawn = Result<(), Box<dyn std::error::Error>>;
 fn draw(text: &mut String, title: &str, history: &[Sample], tolerance: f64) -> Drawn {
     let root = SVGBackend::with_string(text, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
-    let (head, body) = root.split_vertically(36);
+    let curves = Curves::new(history, tolerance);
+    let notes = curves.notes();
+    let (head, body) = root.split_vertically(36 + 18 * notes.len() as u32);
     let left = Pos::new(HPos::Left, VPos::Center);
     head.draw_text(title, &font(15).pos(left), (66, 20))?;
     let legend = [("residual", RESIDUAL), ("best so far", BEST), ("tolerance", TOLERANCE)];
     for (k, (what, colour)) in legend.into_iter().enumerate() {
         let x = SIZE.0 as i32 - 330 + 110 * k as i32;
-        head.draw(&PathElement::new([(x, 20), (x + 20, 20)], colour.stroke_width(2)))?;
+        let line = [(x, 20), (x + 20, 20)];
+        if colour == TOLERANCE {
+            let (dash, gap) = DASHES;
+            let dashed = DashedPathElement::new(line, dash, gap, colour);
+            head.draw(&dashed)?;
+        } else {
+            head.draw(&PathElement::new(line, colour.stroke_width(2)))?;
+        }
         head.draw_text(what, &font(12).pos(left), (x + 26, 20))?;
+    }
+    for (k, note) in (0..).zip(&notes) {
+        head.draw_text(note, &font(12).pos(left), (66, 40 + 18 * k))?;
     }
     let (left, right) = body.split_horizontally(SIZE.0 / 2);
 
-    let curves = Curves::new(history, tolerance);
     let end = history.last().map_or(0.0, |s| s.seconds);
     let (unit, scale) = match end {
         t if t < 1e-3 => ("time (µs)", 1e6),
@@ -102,6 +116,33 @@ impl<'a> Curves<'a> {
         known.then(|| residual.log10().max(self.low))
     }
 
+    /// What the curves cannot show.
+    fn notes(&self) -> Vec<String> {
+        let count =
+            |is: &dyn Fn(f64) -> bool| self.history.iter().filter(|s| is(s.relative)).count();
+        let zero = count(&|r| r == 0.0);
+        let below = count(&|r| r > 0.0 && r.log10() < self.low);
+        let unknown = count(&|r| !(r.is_finite() && r >= 0.0));
+        let points = |n: usize| crate::report::count(n, "point");
+        let mut notes = vec![];
+        if self.history.is_empty() {
+            notes.push("no residual: nothing was judged".into());
+        }
+        if zero + below > 0 {
+            let what = match (zero, below) {
+                (z, 0) => format!("{} with residual 0", points(z)),
+                (0, b) => format!("{} below the picture", points(b)),
+                (z, b) => format!("{} with residual 0 and {b} below the picture", points(z)),
+            };
+            notes.push(format!("at the lower edge: {what}"));
+        }
+        if unknown > 0 {
+            let all = if unknown == self.history.len() { "no finite residual: " } else { "" };
+            notes.push(format!("{all}{} not shown, NaN or infinite", points(unknown)));
+        }
+        notes
+    }
+
     fn panel<DB: DrawingBackend>(
         &self,
         area: &DrawingArea<DB, plotters::coord::Shift>,
@@ -142,7 +183,8 @@ impl<'a> Curves<'a> {
 
         let right = 1.02 * end;
         let line = [(0.0, self.tolerance), (right, self.tolerance)];
-        chart.draw_series(DashedLineSeries::new(line, 6, 4, TOLERANCE.stroke_width(1)))?;
+        let (dash, gap) = DASHES;
+        chart.draw_series(DashedLineSeries::new(line, dash, gap, TOLERANCE.stroke_width(1)))?;
 
         // The residual, in pieces where it was not finite.
         for piece in points.split(|p| p.1.is_none()) {
@@ -237,19 +279,24 @@ mod tests {
         let svg = svg("a <b> & c", &history(residuals), 1e-8).unwrap();
         assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
         assert!(svg.contains("a &lt;b&gt; &amp; c"), "the title is escaped");
-        assert!(!svg.contains("NaN") && !svg.contains("inf"));
+        assert!(!svg.contains("\"NaN") && !svg.contains("\"inf"));
         assert!(svg.contains("iterations") && svg.contains("tolerance"));
         svg
     }
 
     #[test]
     fn any_history_can_be_drawn() {
-        picture([]);
+        let says = |residuals: &[f64], notes: &[&str]| {
+            let svg = picture(residuals.iter().copied());
+            assert!(notes.iter().all(|note| svg.contains(note)), "{notes:?} in {svg}");
+        };
+        says(&[], &["nothing was judged"]);
         assert!(picture([1.0]).contains("<circle"));
-        picture([0.0]);
-        picture([f64::NAN]);
-        picture([f64::NAN, f64::INFINITY, -1.0]);
-        picture([1.0, f64::NAN, 1e-3, 0.0, 1e-300, f64::INFINITY, 1e300]);
+        says(&[0.0], &["at the lower edge: 1 point with residual 0"]);
+        says(&[f64::NAN], &["no finite residual: 1 point"]);
+        says(&[f64::NAN, f64::INFINITY, -1.0], &["no finite residual: 3 points"]);
+        let wild = [1.0, f64::NAN, 1e-3, 0.0, 1e-300, f64::INFINITY, 1e300];
+        says(&wild, &["1 point with residual 0 and 3 below", "2 points not shown"]);
         picture([1e-9, 1e-9]);
         picture((0..100).map(|k| 0.8_f64.powi(k)));
     }

@@ -12,6 +12,8 @@ use crate::report::number;
 const INTERVAL: f64 = 1.0 / 12.0;
 /// A solve that is done sooner needs no bar.
 const PATIENCE: f64 = 0.25;
+/// Letters that the name of a file may take.
+const NAME: usize = 16;
 /// The bar's full length.
 const FULL: u64 = 1000;
 
@@ -28,9 +30,10 @@ impl Bar {
     pub fn new(name: &str, tolerance: f64, wanted: bool) -> Self {
         let bar = (wanted && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::with_draw_target(Some(FULL), ProgressDrawTarget::hidden());
-            let style = ProgressStyle::with_template("{prefix} [{bar:24.blue}] {msg}");
+            // The wide message is cut to what is left of the line.
+            let style = ProgressStyle::with_template("{prefix} [{bar:8.blue}] {wide_msg}");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-            bar.set_prefix(name.to_owned());
+            bar.set_prefix(shortened(name));
             bar
         });
         Self {
@@ -59,12 +62,11 @@ impl Bar {
         let first = *self.first.get_or_insert(progress.best.max(1.0));
         let won = (first / progress.best).ln() / (first / self.tolerance).ln();
         bar.set_message(format!(
-            "{} iterations, residual {} (best {}, target {:e}), {}",
+            "{}, iteration {}, best {} of {:e}",
+            clock(progress.seconds),
             progress.iteration,
-            number(progress.judged.relative),
             number(progress.best),
             self.tolerance,
-            clock(progress.seconds)
         ));
         bar.set_position((won.clamp(0.0, 1.0) * FULL as f64) as u64);
     }
@@ -78,10 +80,35 @@ impl Drop for Bar {
     }
 }
 
+/// A name with its middle left out where it is long.
+fn shortened(name: &str) -> String {
+    let letters: Vec<char> = name.chars().collect();
+    let Some(excess) = letters.len().checked_sub(NAME).filter(|&n| n > 0) else {
+        return name.into();
+    };
+    let begin = &letters[..(NAME - 1) / 2];
+    let end = &letters[begin.len() + excess + 1..];
+    begin.iter().chain(&['…']).chain(end).collect()
+}
+
 fn clock(seconds: f64) -> String {
     if seconds < 60.0 {
         return format!("{seconds:.1} s");
     }
     let whole = Duration::from_secs_f64(seconds).as_secs();
     format!("{}:{:02} min", whole / 60, whole % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_names_lose_their_middle() {
+        let whole = "of-16-letters.h5";
+        assert_eq!(shortened(whole), whole);
+        assert_eq!(shortened("Capsules-i3062-1800-é.hdf5"), "Capsule…0-é.hdf5");
+        let long = "x".repeat(300);
+        assert_eq!(shortened(&long).chars().count(), NAME);
+    }
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use nonsmooth_problem::check::{Measure, Verdict};
+use nonsmooth_problem::check::{Failing, Measure, Verdict};
 use serde_json::{Map, Value, json};
 
 use crate::kinds::Form;
@@ -47,14 +47,16 @@ pub fn problem_text<P: Form>(problem: &P) -> String {
     )
 }
 
-/// The residuals, the contacts by status and the worst contacts. Numbers that are not finite become null.
-pub fn verdict_json(verdict: &Verdict, worst: usize) -> Object {
+/// The residuals, what of them fails at `tolerance`, the contacts by status and the worst contacts. Numbers that are
+/// not finite become null.
+pub fn verdict_json(verdict: &Verdict, tolerance: f64, worst: usize) -> Object {
     let mut counts = fields(json!(verdict.counts));
     let degenerate = counts.remove("degenerate");
     let worst = worst_of(verdict, worst)
         .map(|(contact, residual)| json!({"contact": contact, "residual": residual}));
     fields(json!({
         "residual": residual_json(&verdict.measure),
+        "failing": verdict.measure.failing(tolerance),
         "contacts_by_status": counts,
         "degenerate": degenerate,
         "worst_contacts": worst.collect::<Vec<_>>(),
@@ -78,9 +80,43 @@ pub fn fields(value: Value) -> Object {
     }
 }
 
-/// The residuals and the contacts by status, a line each, and the `worst` contacts.
-pub fn verdict_text(text: &mut String, verdict: &Verdict, worst: usize) {
+/// The criterion of the contacts that comes first.
+const RELATIVE: &str = "relative residual";
+
+/// What fails at `tolerance`: whether the relative residual does, and what else. Where it does, primal and dual
+/// residuals are only parts of it.
+fn failing(measure: &Measure, tolerance: f64) -> (bool, Vec<Failing>) {
+    let (relative, mut others): (Vec<_>, Vec<_>) =
+        measure.failing(tolerance).into_iter().partition(|f| f.what == RELATIVE);
+    let relative = !relative.is_empty();
+    others.retain(|f| !(relative && ["primal", "dual"].contains(&f.what)));
+    (relative, others)
+}
+
+/// The first line on a point: the file, what came of it, and what the judge's decision rests on.
+pub fn headline(file: &Path, says: &str, measure: &Measure, tolerance: f64) -> String {
+    let others = match listed(&failing(measure, tolerance).1, |_| String::new()) {
+        none if none.is_empty() => none,
+        others => format!("; fails {others}"),
+    };
+    let relative = number(measure.relative);
+    format!("{}: {says} ({RELATIVE} {relative}, tolerance {tolerance:e}{others})\n", file.display())
+}
+
+fn listed(failing: &[Failing], more: impl Fn(&Failing) -> String) -> String {
+    let each = failing.iter().map(|f| format!("{} {}{}", f.what, number(f.value), more(f)));
+    each.collect::<Vec<_>>().join(", ")
+}
+
+/// The residuals, what else than the relative one fails at `tolerance`, the contacts by status, and the `worst`
+/// contacts where it is they that fail.
+pub fn verdict_text(text: &mut String, verdict: &Verdict, tolerance: f64, worst: usize) {
     residual_text(text, &verdict.measure);
+    let (relative, others) = failing(&verdict.measure, tolerance);
+    if !others.is_empty() {
+        let limit = |f: &Failing| format!(" (limit {:.1e})", f.limit).replace(".0e", "e");
+        row(text, "fails", listed(&others, limit));
+    }
     let counts = &verdict.counts;
     let degenerate = match counts.degenerate {
         0 => String::new(),
@@ -89,6 +125,7 @@ pub fn verdict_text(text: &mut String, verdict: &Verdict, worst: usize) {
     let all = [(counts.open, "open"), (counts.stick, "stick"), (counts.slip, "slip")];
     let all = all.map(|(n, what)| format!("{n} {what}")).join(", ");
     row(text, "contacts", all + &degenerate);
+    let worst = if relative || others.is_empty() { worst } else { 0 };
     let worst: Vec<_> = worst_of(verdict, worst)
         .map(|(contact, residual)| format!("{contact} ({})", number(residual)))
         .collect();
@@ -107,6 +144,7 @@ pub fn residual_text(text: &mut String, m: &Measure) {
         ("dual", Some(m.dual)),
         ("complementarity", Some(m.complementarity)),
         ("dynamics", m.dynamics),
+        ("velocities", m.velocity_gap),
         ("bilateral", m.bilateral),
     ];
     row(text, "", named(&parts));

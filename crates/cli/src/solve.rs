@@ -9,12 +9,12 @@ use nonsmooth_problem::check::Verdict;
 use nonsmooth_problem::{Friction, with_friction};
 use nonsmooth_solve::registry;
 use nonsmooth_solve::settings::{self, SettingsMap};
-use nonsmooth_solve::{Limit, Limits, Outcome, Sample, Status};
+use nonsmooth_solve::{Limit, Limits, Outcome, Sample, SolveError, Status};
 use serde_json::json;
 
-use crate::kinds::Form;
+use crate::kinds::{Form, takes};
 use crate::progress::Bar;
-use crate::report::{self, number, row};
+use crate::report::{self, row};
 use crate::{Exit, files, interrupt, output, plot};
 
 /// Solve problems.
@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(long, value_name = "TOL", default_value = "1e-8", allow_hyphen_values = true)]
     tol: f64,
     /// At most this many iterations [default: 1000000, or no limit with --time-limit]
-    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = files::whole)]
     max_iter: Option<usize>,
     /// At most this many seconds for each file
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
@@ -47,7 +47,8 @@ pub struct Args {
     #[arg(long)]
     warm_start: bool,
     /// Write the problem with its /solution; a directory (existing or ending in `/`) for several files.
-    /// The input itself may be named: only its /solution changes
+    /// A new file holds the problem, its info, guesses and solution, and nothing else of the input; of the input
+    /// itself, which may be named, only /solution changes
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Draw the residual against iterations and time (SVG); a directory for several files
@@ -97,32 +98,10 @@ pub struct Solved {
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
     let settings = settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))?;
-    let time_limit = match args.time_limit {
-        Some(t) if t.is_nan() || t < 0.0 => {
-            return Err(format!(
-                "--time-limit: expected a number of seconds of at least 0, found {t}"
-            ));
-        }
-        t => t,
-    };
-    let tolerance = files::tolerance(args.tol)?;
+    let limits = limits(args.tol, args.max_iter, args.time_limit)?;
     let targets = Targets::new(args)?;
-    let cancel = interrupt::flag();
-    let plan = Plan {
-        solver: &args.solver,
-        settings: &settings,
-        limits: Limits {
-            tolerance,
-            max_iterations: match (args.max_iter, time_limit) {
-                (Some(n), _) => n,
-                (None, Some(_)) => usize::MAX,
-                (None, None) => Limits::default().max_iterations,
-            },
-            time_limit,
-            cancel: Some(cancel.clone()),
-        },
-        progress: !args.quiet,
-    };
+    let cancel = limits.cancel.clone().unwrap_or_default();
+    let plan = Plan { solver: &args.solver, settings: &settings, limits, progress: !args.quiet };
     let one = |k: usize, file: &Path| {
         if cancelled(&cancel) && k > 0 {
             if !args.json && !args.quiet {
@@ -144,6 +123,21 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         one(file, content, guess.as_ref(), &plan, args, targets.of(k))
     };
     Ok(files::each(&args.files, args.json, one))
+}
+
+/// Limits from options; Ctrl-C is one of them. To be called once.
+pub fn limits(tol: f64, iterations: Option<usize>, seconds: Option<f64>) -> Result<Limits, String> {
+    let time_limit = files::time_limit(seconds)?;
+    Ok(Limits {
+        tolerance: files::tolerance(tol)?,
+        max_iterations: match (iterations, time_limit) {
+            (Some(n), _) => n,
+            (None, Some(_)) => usize::MAX,
+            (None, None) => Limits::default().max_iterations,
+        },
+        time_limit,
+        cancel: Some(interrupt::flag()),
+    })
 }
 
 fn cancelled(flag: &Arc<AtomicBool>) -> bool {
@@ -203,8 +197,14 @@ pub fn solve<P: Form>(
     plan: &Plan,
 ) -> Result<Solved, String> {
     let mistake = |e: &dyn std::fmt::Display| format!("{}: {e}", file.display());
-    let mut session =
-        registry::session::<P>(plan.solver, plan.settings).map_err(|e| mistake(&e))?;
+    let session = registry::session::<P>(plan.solver, plan.settings);
+    let mut session = session.map_err(|e| match (&e, takes(plan.solver)) {
+        (SolveError::UnknownSolver { name, .. }, Some(problems)) => {
+            let kind = problem.kind().name();
+            mistake(&format!("solver `{name}` takes {problems} problems only (this file: {kind})"))
+        }
+        _ => mistake(&e),
+    })?;
     let mut point = start.map_or_else(|| problem.origin(), |s| problem.start(s));
     let mut bar = Bar::new(&name(file), plan.limits.tolerance, plan.progress);
     let outcome = session
@@ -239,7 +239,7 @@ fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &Solved) ->
         "iterations": outcome.iterations,
         "seconds": outcome.seconds,
     })));
-    all.extend(report::verdict_json(verdict, verdict.worst.len()));
+    all.extend(report::verdict_json(verdict, plan.limits.tolerance, verdict.worst.len()));
     format!("{}\n", json!(all))
 }
 
@@ -247,12 +247,8 @@ fn text<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &Solved) -> Stri
     let Solved { outcome, verdict, .. } = solved;
     let tolerance = plan.limits.tolerance;
     let is_solved = outcome.status == Status::Solved;
-    let mut text = format!(
-        "{}: {} (relative residual {}, tolerance {tolerance:e})\n",
-        file.display(),
-        outcome.status,
-        number(verdict.measure.relative),
-    );
+    let says = outcome.status.to_string();
+    let mut text = report::headline(file, &says, &verdict.measure, tolerance);
     row(&mut text, "problem", report::problem_text(problem));
     let settings = plan.settings.iter().map(|(k, v)| match v.as_str() {
         Some(word) => format!(" {k}={word}"),
@@ -270,8 +266,12 @@ fn text<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &Solved) -> Stri
         ),
     );
     let worst = if is_solved { 0 } else { WORST };
-    report::verdict_text(&mut text, verdict, worst);
-    if let Some(hint) = hint::<P>(&outcome.status, plan) {
+    report::verdict_text(&mut text, verdict, tolerance, worst);
+    let stuck = stuck(&solved.history);
+    if let (Status::Limit(_), Some(since)) = (&outcome.status, stuck) {
+        row(&mut text, "stuck", format!("no progress since iteration {since}"));
+    }
+    if let Some(hint) = hint::<P>(solved, plan, stuck.is_some()) {
         row(&mut text, "try", hint);
     }
     text
@@ -287,22 +287,46 @@ pub fn seconds(t: f64) -> String {
     }
 }
 
+/// The iteration after which the residual fell no more, but for a tenth, if that is half of all iterations ago.
+fn stuck(history: &[Sample]) -> Option<usize> {
+    /// Fewer iterations tell nothing.
+    const ENOUGH: usize = 100;
+    let last = history.last()?.iteration;
+    let best = history.iter().map(|s| s.relative).fold(f64::INFINITY, f64::min);
+    let since = history.iter().find(|s| s.relative <= 1.1 * best)?.iteration;
+    (last >= ENOUGH && since <= last / 2).then_some(since)
+}
+
+/// Settings that make another method of the same solver.
+const OTHER_WAYS: [&str; 2] = ["local=projection", "ordering=shuffled"];
+
 /// What may help where the problem is not solved.
-fn hint<P: Form>(status: &Status, plan: &Plan) -> Option<String> {
-    let more = match status {
+fn hint<P: Form>(solved: &Solved, plan: &Plan, stuck: bool) -> Option<String> {
+    // Iterations are of no help where the contacts are as they should be.
+    let failing = solved.verdict.measure.failing(plan.limits.tolerance);
+    if !failing.iter().any(|f| ["relative residual", "primal", "dual"].contains(&f.what)) {
+        return None;
+    }
+    let about = registry::about::<P>(plan.solver)?;
+    let more = match &solved.outcome.status {
         Status::Solved | Status::Infeasible(_) | Status::Limit(Limit::Cancelled) => return None,
+        Status::Limit(_) if stuck => OTHER_WAYS
+            .iter()
+            .filter(|way| about.variants.contains(way))
+            .filter(|way| way.split_once('=').is_some_and(|w| !plan.settings.contains_key(w.0)))
+            .map(|way| format!("--set {way}"))
+            .collect(),
         Status::Limit(Limit::Iterations) => {
-            Some(format!("--max-iter {}", plan.limits.max_iterations.max(1).saturating_mul(10)))
+            vec![format!("--max-iter {}", plan.limits.max_iterations.max(1).saturating_mul(10))]
         }
         Status::Limit(Limit::Time) => {
             let t = plan.limits.time_limit.unwrap_or_default();
-            Some(format!("--time-limit {}", (10.0 * t).max(1.0)))
+            vec![format!("--time-limit {}", (10.0 * t).max(1.0))]
         }
-        Status::NoConclusion(_) | Status::Stalled(_) => None,
+        Status::NoConclusion(_) | Status::Stalled(_) => vec![],
     };
     // The first solver of each other family.
-    let family = registry::about::<P>(plan.solver).map(|a| a.family);
-    let mut families: Vec<_> = family.into_iter().collect();
+    let mut families = vec![about.family];
     let others = registry::abouts::<P>().into_iter().filter_map(|about| {
         let new = !families.contains(&about.family);
         families.push(about.family);
@@ -327,6 +351,7 @@ impl Targets {
         let out = place("--out", &args.out, None)?;
         let plot = place("--plot", &args.plot, Some("svg"))?;
         for picture in plot.iter().flatten() {
+            files::picture("--plot", picture)?;
             let mut taken = args.files.iter().chain(out.iter().flatten());
             if taken.any(|path| files::same(picture, path)) {
                 return Err(format!(
@@ -346,4 +371,25 @@ impl Targets {
 /// A problem known only by its kind, solved as above.
 pub fn solve_any(file: &Path, problem: &Friction, plan: &Plan) -> Result<Solved, String> {
     with_friction!(problem, p => solve(file, p, None, plan))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_solve_is_stuck_when_half_of_it_brought_nothing() {
+        let since = |residual: fn(usize) -> f64, last: usize| {
+            let sample = |k| Sample { iteration: k, seconds: 0.0, relative: residual(k) };
+            stuck(&(0..=last).map(sample).collect::<Vec<_>>())
+        };
+        let floor = |k: usize| 0.5_f64.powi(k as i32).max(1e-3);
+        assert_eq!(since(floor, 200), Some(10));
+        assert_eq!(since(floor, 20), None);
+        assert_eq!(since(|k| 0.99_f64.powi(k as i32), 200), None);
+        // Up and down all the time, and never a number.
+        assert_eq!(since(|k| 1.0 + (k % 7) as f64, 200), Some(0));
+        assert_eq!(since(|_| f64::NAN, 200), None);
+        assert_eq!(stuck(&[]), None);
+    }
 }

@@ -4,11 +4,12 @@ mod common;
 
 use common::{Folder, has_keys};
 use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
+use nonsmooth_problem::linalg::Csc;
 use nonsmooth_problem::planted::Planted;
-use nonsmooth_problem::{Friction, with_friction};
+use nonsmooth_problem::{BilateralGlobal, Friction, with_friction};
 
 const JUDGED: &str = "file kind contacts unknowns status message tolerance residual/absolute residual/relative \
-    residual/paper residual/peer residual/primal residual/dual residual/complementarity contacts_by_status/open \
+    residual/paper residual/peer residual/primal residual/dual residual/complementarity failing contacts_by_status/open \
     contacts_by_status/stick contacts_by_status/slip degenerate worst_contacts";
 
 #[test]
@@ -33,7 +34,7 @@ fn solve_reports_as_text_and_as_json() {
     }
     assert!(lines[0]["residual"]["dynamics"].as_f64().unwrap() <= 1e-10);
     assert!(lines[1]["residual"].get("dynamics").is_none());
-    assert_eq!(folder.run("solve wall.hdf5 --quiet").exits(0).stdout, "");
+    assert_eq!(folder.run("solve wall.hdf5 --quiet --max-iter 1e6").exits(0).stdout, "");
 }
 
 #[test]
@@ -43,9 +44,75 @@ fn an_unsolved_problem_exits_with_1_and_says_what_to_try() {
     for part in ["iteration limit", "worst", "--max-iter 20", "--solver "] {
         assert!(text.contains(part), "{part} in {text}");
     }
+    // Rounding: more iterations would bring nothing.
+    let stuck = "solve wall.hdf5 --solver de_saxce --tol 1e-17 --max-iter 2e4";
+    let text = folder.run(stuck).exits(1).stdout;
+    assert!(
+        text.contains("no progress since iteration ") && text.contains("--solver nsgs"),
+        "{text}"
+    );
+    assert!(!text.contains("--max-iter"), "{text}");
     let line = folder.run("solve wall.hdf5 --time-limit 0 --json").exits(1).json().remove(0);
     assert_eq!(line["status"], "time_limit");
     assert!(!line["worst_contacts"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn what_fails_besides_the_relative_residual_is_named() {
+    let folder = Folder::with_problems();
+    folder.run("solve wall.hdf5 --out off.hdf5 --quiet").exits(0);
+    let mut file = fclib::read(folder.path("off.hdf5")).unwrap();
+    let v = file.solution.as_mut().and_then(|s| s.v.as_mut()).unwrap();
+    v.iter_mut().for_each(|v| *v += 1.0);
+    fclib::write(folder.path("off.hdf5"), &file).unwrap();
+    let text = folder.run("check off.hdf5").exits(1).stdout;
+    let (headline, rows) = text.split_once('\n').unwrap();
+    assert!(headline.contains("; fails ") && headline.contains("dynamics "), "{text}");
+    assert!(rows.contains("\n  fails      ") && rows.contains(" (limit 1e-10)"), "{text}");
+    assert!(!rows.contains("worst"), "the contacts are as they should be: {text}");
+    let line = folder.run("check off.hdf5 --json").exits(1).json().remove(0);
+    has_keys(&line, "failing/0/what failing/0/value failing/0/limit");
+    let line = folder.run("solve wall.hdf5 --json").exits(0).json().remove(0);
+    assert_eq!(line["failing"].as_array().map(Vec::len), Some(0));
+}
+
+#[test]
+fn contradictory_constraints_are_named_and_no_iterations_proposed() {
+    let folder = Folder::new();
+    let (mut problem, _) = Planted { bilateral: 1, ..Planted::default() }.global::<3>();
+    let old = problem.bilateral.take().unwrap();
+    let twice = old.G.triplets().flat_map(|(i, j, x)| [(i, j, x), (i, j + 1, x)]);
+    problem.bilateral = Some(BilateralGlobal {
+        G: Csc::from_triplets(problem.dofs(), 2, twice).unwrap(),
+        b: vec![old.b[0], old.b[0] + 1.0],
+    });
+    fclib::write(folder.path("a.hdf5"), &FclibFile::new(Friction::Global3(problem))).unwrap();
+    let text = folder.run("solve a.hdf5 --max-iter 1e3").exits(1).stdout;
+    assert!(text.contains("; fails bilateral constraints "), "{text}");
+    assert!(!text.contains("--max-iter"), "{text}");
+}
+
+#[test]
+fn a_singular_mass_matrix_is_described() {
+    let folder = Folder::new();
+    let (mut problem, point) = Planted::default().global::<3>();
+    let (n, a) = (problem.dofs(), problem.M.triplets().filter(|t| t.0 != 0 && t.1 != 0));
+    problem.M = Csc::from_triplets(n, n, a).unwrap();
+    let mut file = FclibFile::new(Friction::Global3(problem));
+    for stored in [false, true] {
+        file.solution = stored.then(|| StoredPoint {
+            v: Some(point.v.clone()),
+            u: vec![0.0; point.r.len()],
+            r: point.r.clone(),
+            lambda: None,
+        });
+        fclib::write(folder.path("a.hdf5"), &file).unwrap();
+        let text = folder.run("info a.hdf5").exits(0).stdout;
+        assert!(text.contains("M is singular: M "), "{text}");
+        let line = folder.run("info a.hdf5 --json").exits(0).json().remove(0);
+        assert!(line["singular"].is_string() && line["solution"].is_null());
+    }
+    folder.run("solve a.hdf5").refused(&["a.hdf5", "M", "invertible"]);
 }
 
 #[test]
@@ -203,6 +270,12 @@ fn every_scene_is_generated_solved_and_drawn() {
         let [plain, impulses] =
             ["a.svg", "b.svg"].map(|name| std::fs::read_to_string(folder.path(name)).unwrap());
         assert!(plain.starts_with("<svg") && impulses.contains("impulses: "));
+        assert!(plain.contains(">contact</text>"));
+    }
+    folder.run("gen wall --solve --time-limit 0 --out c.hdf5").exits(1);
+    folder.run("gen wall --solve --tol 1e-3 --out d.hdf5").exits(0);
+    for file in ["c.hdf5", "d.hdf5"] {
+        assert!(fclib::read(folder.path(file)).unwrap().solution.is_some());
     }
 }
 

@@ -38,7 +38,13 @@ fn bad_options_of_solve() {
     let folder = Folder::with_problems();
     let cases: &[(&str, &[&str])] = &[
         ("wall.hdf5 --solver magic", &["wall.hdf5", "magic", "nsgs"]),
-        ("box.hdf5 --solver condense/nsgs", &["box.hdf5", "condense/nsgs"]),
+        (
+            "box.hdf5 --solver condense/nsgs",
+            &["box.hdf5", "solver `condense/nsgs` takes global problems only", "friction_local_3d"],
+        ),
+        ("wall.hdf5 --max-iter 1.5", &["--max-iter", "1.5", "whole number"]),
+        ("wall.hdf5 --max-iter -1", &["--max-iter", "-1", "whole number"]),
+        ("wall.hdf5 --plot a.png", &["--plot", "a.png", ".svg"]),
         ("wall.hdf5 --set omga=1", &["omga", "omega"]),
         ("wall.hdf5 --set omega=3", &["omega", "(0, 2)", "3"]),
         ("wall.hdf5 --set local=7", &["local", "exact"]),
@@ -85,7 +91,11 @@ fn bad_options_of_the_other_commands() {
         ("gen wall --set rows --out a.hdf5", &["--set", "key=value"]),
         ("gen wall --out nowhere/a.hdf5", &["--out", "nowhere/a.hdf5"]),
         ("gen wall --draw nowhere/a.svg", &["--draw", "nowhere/a.svg"]),
-        ("gen wall --out a.x --draw a.x", &["--draw", "a.x"]),
+        ("gen wall --out a.svg --draw a.svg", &["--draw", "a.svg", "its own"]),
+        ("gen wall --draw a.png", &["--draw", "a.png", ".svg"]),
+        ("gen wall --solve --out a.hdf5 --tol 0", &["--tol", "positive"]),
+        ("gen wall --solve --out a.hdf5 --time-limit -1", &["--time-limit", "at least 0"]),
+        ("gen wall --out a.hdf5 --time-limit 1", &["--solve"]),
     ];
     for (arguments, parts) in cases {
         folder.run(arguments).refused(parts);
@@ -108,6 +118,8 @@ fn one_bad_file_does_not_keep_the_others_from_running() {
     );
     let error = lines[0]["error"].as_str().unwrap();
     assert!(run.stderr.contains(error) && error.contains("missing.hdf5"));
+    let run = folder.run("solve box.hdf5 wall.hdf5 --solver condense/nsgs").refused(&["box.hdf5"]);
+    assert!(run.stdout.starts_with("wall.hdf5: solved"));
     let run = folder.run("info missing.hdf5 wall.hdf5").refused(&["missing.hdf5"]);
     assert!(run.stdout.starts_with("wall.hdf5: "));
 }

@@ -52,7 +52,9 @@ fn every_scene_is_drawn_well_formed_and_stable() {
             assert!(!picture.contains("NaN") && !picture.contains("inf"));
             let names = elements(&picture);
             assert!(names.iter().filter(|n| *n == "circle").count() >= nc);
-            assert_eq!(names.contains(&"text".to_string()), drawing.caption.is_some());
+            // The key, and the caption where there is one.
+            assert!(names.contains(&"text".to_string()));
+            assert!(drawing.caption.is_none() || picture.contains("impulses &lt; weight"));
         }
     }
 }
@@ -63,11 +65,52 @@ fn contacts_and_arrows_can_be_left_out() {
     let count = |drawing: &Drawing, name: &str| {
         elements(&svg(&scene, drawing).unwrap()).iter().filter(|n| *n == name).count()
     };
-    let all = Drawing::default();
-    let bare = Drawing { contacts: false, velocities: false, ..Drawing::default() };
+    let all = Drawing { key: false, ..Drawing::default() };
+    let bare = Drawing { contacts: false, velocities: false, ..all };
     assert_eq!(count(&all, "circle"), 4);
     assert_eq!(count(&bare, "circle"), 0);
     assert_eq!(count(&all, "path") - count(&bare, "path"), 1);
+    assert_eq!(count(&all, "text"), 0);
+}
+
+#[test]
+fn the_key_explains_what_is_shown_and_nothing_else() {
+    let scene = scenes().next().unwrap();
+    let explained = |drawing: &Drawing| {
+        let picture = svg(&scene, drawing).unwrap();
+        let of_key = |piece: &str| Some(piece.split_once("</text>")?.0.to_string());
+        let texts = picture.split("text-anchor=\"start\"").skip(1).filter_map(of_key);
+        texts.map(|t| t.rsplit('>').next().unwrap().to_string()).collect::<Vec<_>>()
+    };
+    let all = Drawing::default();
+    assert_eq!(explained(&all), ["contact", "velocity before the step, up to 1 m/s"]);
+    assert!(explained(&Drawing { contacts: false, velocities: false, ..all }).is_empty());
+    let impulses = [1.0; 12];
+    let motions = [Motion::Slip, Motion::Slip, Motion::Stick, Motion::Slip];
+    let solved = Drawing {
+        impulses: Some(&impulses),
+        motions: Some(&motions),
+        velocities: false,
+        ..Drawing::default()
+    };
+    assert_eq!(explained(&solved), ["stick", "slip", "impulse, up to 1.7 N s"]);
+    let narrow = svg(&scene, &Drawing { width: 150.0, ..solved.clone() }).unwrap();
+    assert_eq!(explained(&solved).len(), elements(&narrow).iter().filter(|n| *n == "text").count());
+}
+
+#[test]
+fn small_marks_have_no_rim() {
+    let scene = |rows| {
+        let rows = serde_json::json!({"rows": rows, "columns": 2 * rows, "disturbance": 0.1});
+        let wall = nonsmooth_dynamics::SceneEntry::find("wall").unwrap();
+        svg(
+            &wall.make(rows.as_object().unwrap()).unwrap(),
+            &Drawing { key: false, ..Drawing::default() },
+        )
+        .unwrap()
+    };
+    assert!(scene(2).contains("#fff"));
+    assert!(!scene(25).contains("#fff"));
 }
 
 #[test]

@@ -47,14 +47,14 @@ pub enum IoError {
         /// The groups that it has.
         found: String,
     },
-    /// The file holds a kind of problem that is not supported.
+    /// The file holds a kind of problem, or a link, that is not supported.
     #[error("{}: {place}: {what} is not supported yet", file.display())]
     Unsupported {
         /// The file.
         file: PathBuf,
-        /// The group of the problem.
+        /// The group of the problem, or the link.
         place: String,
-        /// The kind of problem.
+        /// The kind of problem, or of link.
         what: &'static str,
     },
     /// A dataset or group is absent, or has a wrong type, shape or value.

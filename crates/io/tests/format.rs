@@ -116,6 +116,91 @@ fn other_widths_and_scalars_are_read() {
 }
 
 #[test]
+fn integers_and_whole_reals_stand_for_each_other() {
+    let q = |data| {
+        let tree = local_tree().set("fclib_local/vectors/q", data);
+        let Friction::Local2(p) = read(&tree).problem else { panic!() };
+        p.q
+    };
+    assert_eq!(q(Data::I(vec![-1, 0, 2, i32::MIN])), [-1.0, 0.0, 2.0, -2147483648.0]);
+    assert_eq!(q(Data::U8(vec![255, 0, 1, 2])), [255.0, 0.0, 1.0, 2.0]);
+    // What is beyond the digits of a real rounds as in C.
+    let wide = [i64::MIN, i64::MAX, (1 << 53) + 1, -3];
+    assert_eq!(q(Data::I64(wide.into())), wide.map(|x| x as f64));
+    assert_eq!(q(Data::U64(vec![u64::MAX, 0, 1, 2])), [18446744073709551616.0, 0.0, 1.0, 2.0]);
+
+    let p = [0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 3.0];
+    let with = |path: &str, data| local_tree().set(&format!("fclib_local/{path}"), data);
+    let tree = with("spacedim", Data::F(vec![2.0]))
+        .set("fclib_local/W/nz", Data::F32(vec![10.0]))
+        .set("fclib_local/W/m", Data::U8(vec![4]))
+        .set("fclib_local/W/p", Data::F(p.into()));
+    assert_eq!(read(&tree), read(&local_tree()));
+    for bad in [0.5, f64::NAN, f64::INFINITY, 1e300, 9223372036854775808.0, -9.3e18] {
+        let mut p = p;
+        p[3] = bad;
+        let expected = "expected a whole number of at most 64 bits";
+        let message = format!("/fclib_local/W/p[3]: {expected}, found {bad}");
+        refused(&with("W/p", Data::F(p.into())), &message);
+        let message = format!("/fclib_local/spacedim[0]: {expected}, found {bad}");
+        refused(&with("spacedim", Data::F(vec![bad])), &message);
+    }
+    // The least 64-bit integer is one, and then out of range.
+    refused(
+        &with("spacedim", Data::F(vec![-9223372036854775808.0])),
+        "/fclib_local/spacedim: expected 2 or 3, found -9223372036854775808",
+    );
+}
+
+#[test]
+fn what_follows_the_last_entry_means_nothing() {
+    let expected = read(&local_tree());
+    let path = "fclib_local/W";
+    let tail = [f64::NAN, f64::INFINITY, 0.5];
+    let reals = |x: &[f64]| Data::F([x, &tail].concat());
+    let with = |nz, p: Data, i: &[f64], x: &[f64]| {
+        local_tree()
+            .set(&format!("{path}/nz"), Data::I(vec![nz]))
+            .set(&format!("{path}/p"), p)
+            .set(&format!("{path}/i"), reals(i))
+            .set(&format!("{path}/x"), reals(x))
+    };
+    let i = [0.0, 1.0, 2.0, 0.0, 1.0, 0.0, 2.0, 3.0, 2.0, 3.0];
+    let p = [0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 3.0];
+    let columns = [2.0, 0.25, -1.5, 0.5, 3.0, -1.0, 4.0, 0.75, 0.125, 5.0];
+    let rows = [2.0, 0.5, -1.0, 0.25, 3.0, -1.5, 4.0, 0.125, 0.75, 5.0];
+    let pointers = || Data::I(vec![0, 3, 5, 8, 10]);
+    assert_eq!(read(&with(10, reals(&p), &i, &columns)), expected);
+    assert_eq!(read(&with(-1, pointers(), &i, &columns)), expected);
+    // The pattern is symmetric: the same indices by rows.
+    assert_eq!(read(&with(-2, pointers(), &i, &rows)), expected);
+    // The entries themselves must still be finite.
+    let mut x = columns;
+    x[9] = f64::NAN;
+    refused(
+        &with(10, reals(&p), &i, &x),
+        "/fclib_local/W/x[9]: expected a finite number, found NaN",
+    );
+}
+
+#[test]
+fn multipliers_without_entries_may_be_there_or_not() {
+    let empty = || Data::F(vec![]);
+    let tree = global_tree()
+        .matrix("fclib_global/G", (2, 0, 0), (&[], &[], &[]))
+        .set("fclib_global/vectors/b", empty())
+        .set("solution/l", empty())
+        .without("guesses/1/l");
+    let content = read(&tree);
+    assert_eq!(content.solution.as_ref().unwrap().lambda, None);
+    assert_eq!(content.guesses, [content.solution.unwrap()]);
+    refused(
+        &tree.set("solution/l", Data::F(vec![1.0])),
+        "/solution/l: expected 0 entries (bilateral constraints), found 1 entries",
+    );
+}
+
+#[test]
 fn what_is_no_fclib_file_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let file = |name: &str, bytes: &[u8]| {
@@ -213,10 +298,13 @@ fn missing_parts_are_named() {
 #[test]
 fn wrong_types_are_named() {
     let with = |path: &str, data| local_tree().set(&format!("fclib_local/{path}"), data);
-    refused(&with("W/i", Data::F(vec![0.0; 10])), "/fclib_local/W/i: expected integers, found f64");
     refused(
-        &with("vectors/q", Data::I(vec![0; 4])),
-        "/fclib_local/vectors/q: expected reals, found i32",
+        &with("W/i", Data::Text("0")),
+        "/fclib_local/W/i: expected integers, found vlen_string",
+    );
+    refused(
+        &with("vectors/q", Data::Text("0")),
+        "/fclib_local/vectors/q: expected reals, found vlen_string",
     );
     refused(
         &with("spacedim", Data::Text("2")),

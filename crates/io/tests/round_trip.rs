@@ -177,6 +177,21 @@ fn what_cannot_be_written_is_said() {
     refused(&absent, &local, &format!("{writable}No such file or directory (os error 2)"));
     refused(folder.path(), &local, &format!("{writable}is a directory"));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    #[cfg(unix)]
+    {
+        // With the rights to do so, renaming would replace the device.
+        let socket = folder.path().join("socket");
+        let _listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+        let device = format!("{writable}no regular file (a device, pipe or socket)");
+        refused(&socket, &local, &device);
+        refused(Path::new("/dev/null"), &local, &device);
+        for path in [&socket, Path::new("/dev/null")] {
+            let message =
+                fclib::write_solution(path, &StoredPoint::default()).unwrap_err().to_string();
+            assert_eq!(message, format!("{}: {device}", path.display()));
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
 }
 
 /// Reads every dataset and attribute with h5py: path, type, shape and bytes, one a line.
@@ -291,11 +306,19 @@ fn sorted_lines(command: &mut Command) -> String {
     lines.join("\n")
 }
 
+/// Whether there is h5py; says so if not.
+fn h5py() -> bool {
+    let mut python = Command::new("python3");
+    let here = python.args(["-c", "import h5py"]).output().is_ok_and(|o| o.status.success());
+    if !here {
+        common::skipped("python3 with h5py is not here");
+    }
+    here
+}
+
 #[test]
 fn h5py_reads_what_is_written() {
-    let mut python = Command::new("python3");
-    if !python.args(["-c", "import h5py"]).output().is_ok_and(|o| o.status.success()) {
-        common::skipped("python3 with h5py is not here");
+    if !h5py() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -380,6 +403,88 @@ with h5py.File(sys.argv[1], 'w', libver=('earliest', 'v108')) as f:
         assert_eq!(rest(&dump()), rest(&before));
         assert_eq!(dump().lines().count(), rest(&before).len() + 2);
     }
+}
+
+#[test]
+fn empty_multipliers_are_written_where_fclib_expects_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file.hdf5");
+    let problem =
+        FrictionGlobal { bilateral: Some(BilateralGlobal { G: csc(5, 0), b: vec![] }), ..global() };
+    let point =
+        StoredPoint { v: Some(vec![0.5; 5]), u: vec![0.0; 3], r: vec![1.0; 3], lambda: None };
+    let length = || {
+        let file = hdf5_pure::File::open(&path).unwrap();
+        file.dataset("solution/l").map(|l| l.shape().unwrap()).ok()
+    };
+    let mut content = FclibFile::new(Friction::Global3(problem));
+    content.solution = Some(point.clone());
+    fclib::write(&path, &content).unwrap();
+    assert_eq!(length(), Some(vec![0]));
+    assert_same(&fclib::read(&path).unwrap(), &content);
+    fclib::write_solution(&path, &StoredPoint { lambda: Some(vec![]), ..point.clone() }).unwrap();
+    assert_eq!(length(), Some(vec![0]));
+    assert_same(&fclib::read(&path).unwrap(), &content);
+
+    let Friction::Global3(p) = &mut content.problem else { unreachable!() };
+    p.bilateral = None;
+    fclib::write(&path, &content).unwrap();
+    assert_eq!(length(), None);
+    assert_same(&fclib::read(&path).unwrap(), &content);
+}
+
+#[test]
+fn soft_links_are_named_where_they_matter() {
+    const LINK: &str = r#"
+import sys, h5py
+source, copy, format, name, target = sys.argv[1:]
+def put(x, y):
+    for k, v in x.items():
+        if isinstance(v, h5py.Group): put(v, y.create_group(k))
+        else: y[k] = v[()]
+with h5py.File(source) as f, h5py.File(copy, 'w', libver=(format, 'latest')) as g:
+    put(f, g)
+    if name in g: del g[name]
+    g[name] = h5py.SoftLink(target)
+"#;
+    if !h5py() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let [written, path] = ["written.hdf5", "linked.hdf5"].map(|name| folder.path().join(name));
+    let tree = common::local_tree();
+    std::fs::rename(tree.save(folder.path()), &written).unwrap();
+    let content = fclib::read(&written).unwrap();
+    let solution = StoredPoint { u: vec![0.5; 4], r: vec![0.25; 4], ..Default::default() };
+    let link = |format: &str, name: &str, target: &str| {
+        let mut python = Command::new("python3");
+        let made =
+            python.args(["-c", LINK]).args([&written, &path]).args([format, name, target]).output();
+        let made = made.unwrap();
+        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    };
+    let unsupported =
+        |place: &str| format!("{}: {place}: a soft link is not supported yet", path.display());
+    for place in ["/fclib_local/W/p", "/fclib_local/vectors", "/fclib_global", "/solution"] {
+        link("earliest", place, "/fclib_local");
+        assert_eq!(fclib::read(&path).unwrap_err().to_string(), unsupported(place));
+        let before = std::fs::read(&path).unwrap();
+        let message = fclib::write_solution(&path, &solution).unwrap_err().to_string();
+        assert_eq!(message, unsupported(place));
+        assert_eq!(std::fs::read(&path).unwrap(), before);
+    }
+    // A link that no part of the problem is behind does no harm, until it would be lost.
+    link("earliest", "/notes", "/fclib_local/info");
+    assert_same(&fclib::read(&path).unwrap(), &content);
+    let message = fclib::write_solution(&path, &solution).unwrap_err().to_string();
+    assert_eq!(message, unsupported("/"));
+    link("earliest", "/more/notes", "/fclib_local/info");
+    fclib::write_solution(&path, &solution).unwrap();
+    assert_eq!(fclib::read(&path).unwrap().solution, Some(solution));
+    // In groups of the new format links are not seen.
+    link("latest", "/fclib_local/W/p", "i");
+    let message = fclib::read(&path).unwrap_err().to_string();
+    assert!(message.contains(": /fclib_local/W/p: expected a dataset, "), "{message}");
 }
 
 #[test]

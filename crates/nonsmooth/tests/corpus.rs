@@ -19,6 +19,8 @@ fn solved<P: Registered + Judged>(problem: &P, limits: &Limits, name: &Path) -> 
     let outcome = session.solve(problem, &mut point, limits, &mut |_| {}).unwrap();
     let verdict = problem.judge(&point, limits.tolerance).unwrap();
     let solved = outcome.status == Status::Solved;
+    let stalled = matches!(outcome.status, Status::Stalled(_));
+    assert!(!stalled, "{}: {}", name.display(), outcome.status);
     assert_eq!(solved, verdict.solved, "{}", name.display());
     solved
 }

@@ -2,7 +2,7 @@
 
 use crate::check::{self, Certificate, Measure};
 use crate::error::{all_finite, friction_coefficients, vector};
-use crate::linalg::{Csc, Inverse};
+use crate::linalg::{Csc, Inverse, Refine};
 use crate::{Kind, Problem, ProblemError};
 
 /// **Find** `v`, `r` (and the multipliers `lambda` of bilateral constraints) such that
@@ -173,15 +173,16 @@ impl Dynamics {
         self.M == problem.M && self.G.as_ref() == problem.bilateral.as_ref().map(|b| &b.G)
     }
 
-    /// `(v, lambda)` for the impulses `r`, by one solve; allocates nothing unless M has a component that is
+    /// `(v, lambda)` for the impulses `r`, by one solve as refined as asked for; allocates nothing unless M has a component that is
     /// factorised sparsely.
     pub fn solve<const D: usize>(
         &mut self,
         problem: &FrictionGlobal<D>,
         r: &[f64],
+        refine: Refine,
     ) -> (&[f64], &[f64]) {
         problem.load(r, &mut self.state);
-        self.inverse.solve_with(&mut self.state, &mut self.scratch);
+        self.inverse.solve_with(&mut self.state, &mut self.scratch, refine);
         self.state.split_at(problem.dofs())
     }
 
@@ -191,16 +192,33 @@ impl Dynamics {
         problem: &FrictionGlobal<D>,
         point: &mut GlobalPoint,
     ) {
-        let (v, lambda) = self.solve(problem, &point.r);
+        let (v, lambda) = self.solve(problem, &point.r, Refine::Fully);
         point.v.copy_from_slice(v);
         point.lambda.copy_from_slice(lambda);
     }
 
-    /// `q = Hᵀ v_free + w`, the relative velocity without impulses.
-    pub fn free_velocity<const D: usize>(&mut self, problem: &FrictionGlobal<D>, q: &mut [f64]) {
+    /// `q = Hᵀ v_free + w`, the relative velocity without impulses; and a certificate if the bilateral constraints
+    /// contradict each other, so that no v satisfies `Gᵀ v + b = 0`.
+    pub fn free_velocity<const D: usize>(
+        &mut self,
+        problem: &FrictionGlobal<D>,
+        q: &mut [f64],
+    ) -> Option<Certificate> {
         q.fill(0.0);
-        let (v, _) = self.solve(problem, q);
+        let (v, _) = self.solve(problem, q, Refine::Fully);
         problem.velocity_into(v, q);
+        let b = problem.bilateral.as_ref()?;
+        let left = |j: usize| b.b[j] + b.G.column_dot(j, v);
+        let violated = |j: usize| left(j).abs() > 1e-10 * (b.b[j].abs() + (left(j) - b.b[j]).abs());
+        if !(0..b.b.len()).any(violated) {
+            return None;
+        }
+        let mut residual = vec![0.0; v.len()];
+        residual.extend((0..b.b.len()).map(left));
+        self.inverse.null_direction(&mut residual);
+        let multipliers = residual.split_off(problem.dofs());
+        let r = vec![0.0; problem.w.len()];
+        Certificate::toward(r, multipliers, &[], &b.b, |c| problem.verify(c))
     }
 }
 
@@ -245,7 +263,11 @@ impl<const D: usize> Problem for FrictionGlobal<D> {
     }
 
     fn measure(&self, point: &GlobalPoint, gauge: &mut Self::Gauge) -> Measure {
-        gauge.measure(self, point)
+        gauge.measure(self, point, false)
+    }
+
+    fn certify(&self, point: &GlobalPoint, gauge: &mut Self::Gauge) -> Measure {
+        gauge.measure(self, point, true)
     }
 
     fn verify(&self, certificate: &Certificate) -> bool {

@@ -179,7 +179,11 @@ impl<const D: usize> Problem for FrictionLocal<D> {
     }
 
     fn measure(&self, point: &LocalPoint, gauge: &mut Self::Gauge) -> Measure {
-        gauge.measure(self, point)
+        gauge.measure(self, point, false)
+    }
+
+    fn certify(&self, point: &LocalPoint, gauge: &mut Self::Gauge) -> Measure {
+        gauge.measure(self, point, true)
     }
 
     fn verify(&self, certificate: &Certificate) -> bool {

@@ -63,8 +63,12 @@ pub trait Problem {
         Ok(())
     }
 
-    /// The residuals of `point`, recomputed from the data of the problem alone. Allocates nothing.
+    /// The residuals of `point`, recomputed from the data of the problem alone, in plain arithmetic where that is
+    /// much cheaper: to steer by. Allocates nothing.
     fn measure(&self, point: &Self::Point, gauge: &mut Self::Gauge) -> Measure;
+
+    /// The residuals of `point` with all products in doubled precision: to decide by. Allocates nothing.
+    fn certify(&self, point: &Self::Point, gauge: &mut Self::Gauge) -> Measure;
 
     /// Whether `certificate` proves that the problem has no solution, decided from the data alone.
     fn verify(&self, certificate: &Certificate) -> bool;

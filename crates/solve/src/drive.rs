@@ -129,7 +129,7 @@ pub struct Sample {
     pub iteration: usize,
     /// Seconds since the start of the solve.
     pub seconds: f64,
-    /// The relative residual.
+    /// The relative residual; where another criterion is worse (bilateral constraints, dynamics), that.
     pub relative: f64,
 }
 
@@ -284,20 +284,23 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 self.judge(point, iterations);
                 self.judge.calibrate(estimate);
                 since_judged = 0;
-                if !self.judge.last.relative.is_finite() {
+                if !self.judge.last.merit().is_finite() {
                     claim = Some(Status::Stalled("the iterates are no longer finite".into()));
                 }
             }
             watch(&self.judge.progress(iterations));
         };
-        let measure = self.judge.best_measure;
         P::copy_point(self.judge.best, point);
+        let measure = match self.judge.certified {
+            Some(measure) => measure,
+            None => self.problem.certify(point, self.judge.gauge),
+        };
         Outcome { status, measure, iterations, seconds: self.judge.start.elapsed().as_secs_f64() }
     }
 
     fn judge(&mut self, point: &mut P::Point, iteration: usize) {
         self.solver.publish(self.problem, point, self.work);
-        self.judge.judge(self.problem, point, iteration);
+        self.judge.judge(self.problem, point, iteration, self.limits.tolerance);
     }
 
     fn limit(&self, iterations: usize) -> Option<Limit> {
@@ -338,6 +341,8 @@ struct Judge<'a, P: Problem> {
     start: Instant,
     last: Measure,
     best_measure: Measure,
+    /// The best point's residuals in doubled precision, where they were needed.
+    certified: Option<Measure>,
     /// Judged residual over the solver's estimate, when last compared.
     ratio: f64,
     /// Keep every `stride`-th visit in the history.
@@ -361,16 +366,24 @@ impl<'a, P: Problem> Judge<'a, P> {
             start,
             last: nothing,
             best_measure: nothing,
+            certified: None,
             ratio: 1.0,
             stride: 1,
             visits: 0,
         }
     }
 
-    fn judge(&mut self, problem: &P, point: &P::Point, iteration: usize) {
+    fn judge(&mut self, problem: &P, point: &P::Point, iteration: usize, tolerance: f64) {
         self.last = problem.measure(point, self.gauge);
+        let mut certified = None;
+        if self.last.passes(tolerance) {
+            // What looks solved is looked at again, in doubled precision.
+            self.last = problem.certify(point, self.gauge);
+            certified = Some(self.last);
+        }
         if self.visits == 0 || self.last.merit() < self.best_measure.merit() {
             self.best_measure = self.last;
+            self.certified = certified;
             P::copy_point(point, self.best);
         }
         if self.history.len() == HISTORY {
@@ -381,13 +394,12 @@ impl<'a, P: Problem> Judge<'a, P> {
             });
             self.stride *= 2;
         }
-        if self.visits.is_multiple_of(self.stride)
-            || self.last.relative <= self.best_measure.relative
-        {
+        let merit = self.last.merit();
+        if self.visits.is_multiple_of(self.stride) || merit <= self.best_measure.merit() {
             self.history.push(Sample {
                 iteration,
                 seconds: self.start.elapsed().as_secs_f64(),
-                relative: self.last.relative,
+                relative: merit,
             });
         }
         self.visits += 1;
@@ -395,7 +407,7 @@ impl<'a, P: Problem> Judge<'a, P> {
 
     /// The solver's estimate is proportional to the residual, near enough: learn the factor.
     fn calibrate(&mut self, estimate: f64) {
-        let ratio = self.last.relative / estimate;
+        let ratio = self.last.merit() / estimate;
         self.ratio = if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 };
     }
 
@@ -406,6 +418,6 @@ impl<'a, P: Problem> Judge<'a, P> {
             seconds,
             relative: f64::NAN,
         });
-        Progress { judged, best: self.best_measure.relative, iteration, seconds }
+        Progress { judged, best: self.best_measure.merit(), iteration, seconds }
     }
 }

@@ -285,8 +285,8 @@ mod tests {
     fn mistakes_in_settings_name_key_expected_and_found() {
         assert_eq!(
             refusal(&["omga=1"]),
-            "solver `nsgs`: unknown key `omga`; there are: local, omega, ordering, seed, freeze_after, \
-             freeze_for, check_every"
+            "solver `nsgs`: unknown key `omga`; there are: local, omega, omega_min, ordering, seed, \
+             freeze_after, freeze_for, check_every"
         );
         assert_eq!(
             refusal(&["omega=2.5"]),

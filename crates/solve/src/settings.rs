@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde_json::{Map, Value};
+use serde_json::{Map, Number, Value};
 
 /// Settings by key, as they come from a command line or a file.
 pub type SettingsMap = Map<String, Value>;
@@ -39,7 +39,11 @@ pub fn from_texts<S: AsRef<str>>(texts: &[S]) -> Result<SettingsMap, String> {
             .filter(|(key, _)| !key.trim().is_empty())
             .ok_or_else(|| format!("expected key=value, found `{text}`"))?;
         let (key, value) = (key.trim(), value.trim());
-        let value = serde_json::from_str(value).unwrap_or_else(|_| Value::String(value.into()));
+        let value = serde_json::from_str(value)
+            .ok()
+            // What a person types as a number is one: .5, 1., +3.
+            .or_else(|| Some(Value::Number(Number::from_f64(value.parse().ok()?)?)))
+            .unwrap_or_else(|| Value::String(value.into()));
         if map.insert(key.into(), value).is_some() {
             return Err(format!("`{key}` is set twice"));
         }
@@ -52,19 +56,26 @@ pub fn from_texts<S: AsRef<str>>(texts: &[S]) -> Result<SettingsMap, String> {
 /// Errors: an unknown key, with those that exist; a value of the wrong type or out of range, by its key.
 pub fn parse<S: Settings>(map: &SettingsMap) -> Result<S, String> {
     let known = described::<S>();
+    let mut map = map.clone();
     // One key at a time, so that the message can name the key at fault.
-    for (key, value) in map {
+    for (key, value) in &mut map {
         let Some(setting) = known.iter().find(|s| s.key == *key) else {
             let keys: Vec<_> = known.iter().map(|s| s.key.as_str()).collect();
             return Err(format!("unknown key `{key}`; there are: {}", keys.join(", ")));
         };
+        // 1e3 where a whole number is due is that whole number.
+        if let (true, Some(x)) = (setting.default.is_u64(), value.as_f64())
+            && x.fract() == 0.0
+            && (0.0..9e15).contains(&x)
+        {
+            *value = (x as u64).into();
+        }
         let alone = SettingsMap::from_iter([(key.clone(), value.clone())]);
         if serde_json::from_value::<S>(Value::Object(alone)).is_err() {
             return Err(format!("{key}: expected {}, found {value}", setting.expected()));
         }
     }
-    let settings: S =
-        serde_json::from_value(Value::Object(map.clone())).map_err(|e| e.to_string())?;
+    let settings: S = serde_json::from_value(Value::Object(map)).map_err(|e| e.to_string())?;
     settings.validate()?;
     Ok(settings)
 }
@@ -125,5 +136,8 @@ mod tests {
         let map = from_texts(&["a=1.5", "b=word", "c=true"]).unwrap();
         assert_eq!(map["a"], Value::from(1.5));
         assert_eq!((&map["b"], &map["c"]), (&Value::from("word"), &Value::from(true)));
+        assert_eq!(from_texts(&["a=.5"]).unwrap()["a"], Value::from(0.5));
+        let nsgs: crate::splitting::Nsgs = parse(&from_texts(&["seed=1e3"]).unwrap()).unwrap();
+        assert_eq!(nsgs.seed, 1000);
     }
 }

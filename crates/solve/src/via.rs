@@ -53,6 +53,9 @@ where
     }
 
     fn step(&self, _problem: &P, _point: &mut P::Point, work: &mut Self::Work) -> Step {
+        if let Some(ray) = self.reformulation.contradiction(&work.memo) {
+            return Step::NoSolution(ray.clone());
+        }
         self.solver.step(&work.reduced, &mut work.point, &mut work.work)
     }
 

@@ -186,7 +186,7 @@ fn it_stops_at_the_tolerance_and_not_far_below() {
         assert_eq!(outcome.status, Status::Solved);
         let history = session.history();
         let last = history[history.len() - 2..].iter().map(|s| s.iteration).collect::<Vec<_>>();
-        assert!(last[1] - last[0] <= 20);
+        assert!(last[1] - last[0] <= 50);
         assert!(outcome.measure.relative > 0.2 * tolerance, "{outcome:?}");
     }
 }

@@ -15,7 +15,7 @@ use crate::vec3::{Vec3, add, dot, norm, scale, sub};
 use crate::{Scene, SceneError, Shape};
 use camera::Camera;
 use order::{Solid, paint_order};
-use paper::{Colour, Paper};
+use paper::{Colour, Mark, Paper};
 
 /// What to draw of a scene, besides its bodies.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +32,8 @@ pub struct Drawing<'a> {
     pub impulses: Option<&'a [f64]>,
     /// What each contact does, shown by colour.
     pub motions: Option<&'a [Motion]>,
+    /// What the arrows and dots in the picture mean, below it.
+    pub key: bool,
     /// A short line of text below.
     pub caption: Option<&'a str>,
 }
@@ -45,6 +47,7 @@ impl Default for Drawing<'_> {
             velocities: true,
             impulses: None,
             motions: None,
+            key: true,
             caption: None,
         }
     }
@@ -84,8 +87,13 @@ pub fn svg(scene: &Scene, drawing: &Drawing) -> Result<String, SceneError> {
     let mut reach: Vec<Vec3> = solids.iter().flat_map(Solid::hull).collect();
     reach.extend(floor.iter().flat_map(|f| f.corners()));
     reach.extend(arrows.iter().map(|a| a.to));
-    let caption = if drawing.caption.is_some() { 30.0 } else { 0.0 };
-    let height = camera.fit(&reach, drawing.width, 16.0) + caption;
+    let scene_height = camera.fit(&reach, drawing.width, 16.0);
+    let size = mark_size(scene, &camera);
+    let key = if drawing.key { key(scene, drawing, &arrows) } else { vec![] };
+    let rows = paper::rows(&key, drawing.width);
+    let lines = rows.len() + usize::from(drawing.caption.is_some());
+    // Room for each line of text, and below them.
+    let height = scene_height + if lines > 0 { 22.0 * lines as f64 + 8.0 } else { 0.0 };
 
     let mut paper = Paper::new(drawing.width, height, &scene.name);
     if let Some(floor) = &floor {
@@ -97,15 +105,21 @@ pub fn svg(scene: &Scene, drawing: &Drawing) -> Result<String, SceneError> {
     }
     paper.close();
     if drawing.contacts {
-        draw_contacts(scene, drawing, &solids, &camera, &mut paper);
+        draw_contacts(scene, drawing, &solids, &camera, size, &mut paper);
     }
     for arrow in &arrows {
         let hidden = solids.iter().any(|s| s.hides(arrow.to, camera.eye));
         let opacity = if hidden { 0.35 } else { 1.0 };
-        paper.arrow(camera.project(arrow.from), camera.project(arrow.to), arrow.colour, opacity);
+        let (from, to) = (camera.project(arrow.from), camera.project(arrow.to));
+        paper.arrow(from, to, size, arrow.colour, opacity);
+    }
+    let mut y = scene_height + 10.0;
+    for row in rows {
+        paper.key(row, y);
+        y += 22.0;
     }
     if let Some(text) = drawing.caption {
-        paper.caption(text);
+        paper.caption(text, y);
     }
     Ok(paper.finish())
 }
@@ -165,7 +179,53 @@ fn bounds(solids: &[Solid]) -> (Vec3, f64) {
     (box3.map(|(a, b)| 0.5 * (a + b)), 0.5 * norm(box3.map(|(a, b)| b - a)))
 }
 
+/// The size of a body in the picture on average, px: arrows and dots are small where the bodies are.
+fn mark_size(scene: &Scene, camera: &Camera) -> f64 {
+    let sizes = scene.bodies.iter().map(|b| b.shape.radius() * camera.magnification(b.position));
+    sizes.sum::<f64>() / scene.bodies.len().max(1) as f64
+}
+
+/// What the marks in the picture mean.
+fn key(scene: &Scene, drawing: &Drawing, arrows: &[Arrow]) -> Vec<(Mark, String)> {
+    let longest = |what| arrows.iter().filter(|a| a.what == what).map(|a| a.size).reduce(f64::max);
+    let impulse = longest(What::Impulse);
+    let mut out = vec![];
+    let marked = drawing.contacts && !scene.contacts.is_empty();
+    match drawing.motions {
+        Some(motions) if marked || impulse.is_some() => {
+            for (motion, said) in
+                [(Motion::Stick, "stick"), (Motion::Slip, "slip"), (Motion::Open, "open")]
+            {
+                if motions.contains(&motion) {
+                    out.push((Mark::Dot(motion_colour(motion)), said.into()));
+                }
+            }
+        }
+        None if marked => out.push((Mark::Dot(CONTACT), "contact".into())),
+        _ => {}
+    }
+    // Impulses have the colours of their contacts.
+    let arrows = [
+        (impulse, paper::GREY, "impulse", "N s"),
+        (longest(What::Velocity), VELOCITY, "velocity before the step", "m/s"),
+    ];
+    out.extend(arrows.into_iter().filter_map(|(longest, colour, what, unit)| {
+        let text = format!("{what}, up to {} {unit}", paper::short(longest?));
+        Some((Mark::Arrow(colour), text))
+    }));
+    out
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum What {
+    Impulse,
+    Velocity,
+}
+
 struct Arrow {
+    what: What,
+    /// Of the vector itself.
+    size: f64,
     from: Vec3,
     to: Vec3,
     colour: &'static str,
@@ -176,11 +236,14 @@ fn arrows(scene: &Scene, drawing: &Drawing) -> Vec<Arrow> {
     let radii = scene.bodies.iter().map(|b| b.shape.radius());
     let size = radii.sum::<f64>() / scene.bodies.len().max(1) as f64;
     let mut out = Vec::new();
-    let mut push = |length: f64, all: Vec<(Vec3, Vec3, &'static str)>| {
+    let mut push = |what, length: f64, all: Vec<(Vec3, Vec3, &'static str)>| {
         let longest = all.iter().map(|a| norm(a.1)).fold(0.0, f64::max);
         // An arrow shorter than a twentieth of the longest is only a blot.
         out.extend(all.into_iter().filter(|a| norm(a.1) > 0.05 * longest).map(
-            |(from, d, colour)| Arrow { from, to: add(from, scale(length / longest, d)), colour },
+            |(from, d, colour)| {
+                let to = add(from, scale(length / longest, d));
+                Arrow { what, size: norm(d), from, to, colour }
+            },
         ));
     };
     if let Some(r) = drawing.impulses {
@@ -192,10 +255,11 @@ fn arrows(scene: &Scene, drawing: &Drawing) -> Vec<Arrow> {
                 .fold([0.0; 3], |s, (&axis, &x)| add(s, scale(x, axis)));
             (contact.point, d, contact_colour(drawing, c))
         };
-        push(1.3 * size, scene.contacts.iter().enumerate().map(impulse).collect());
+        push(What::Impulse, 1.3 * size, scene.contacts.iter().enumerate().map(impulse).collect());
     }
     if drawing.velocities {
-        push(1.5 * size, scene.bodies.iter().map(|b| (b.position, b.velocity, VELOCITY)).collect());
+        let each = scene.bodies.iter().map(|b| (b.position, b.velocity, VELOCITY));
+        push(What::Velocity, 1.5 * size, each.collect());
     }
     out
 }
@@ -228,11 +292,10 @@ fn draw_contacts(
     drawing: &Drawing,
     solids: &[Solid],
     camera: &Camera,
+    size: f64,
     paper: &mut Paper,
 ) {
-    let sizes = scene.bodies.iter().map(|b| b.shape.radius() * camera.magnification(b.position));
-    let size = sizes.sum::<f64>() / scene.bodies.len().max(1) as f64;
-    let radius = (0.05 * size).clamp(1.2, 4.0);
+    let radius = (0.05 * size).clamp(0.6, 4.0);
     for (c, contact) in scene.contacts.iter().enumerate() {
         let hidden = solids.iter().any(|s| s.hides(contact.point, camera.eye));
         // What a hidden contact does is worth seeing, that it exists is worth a hint.

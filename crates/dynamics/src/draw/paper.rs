@@ -16,6 +16,59 @@ fn hex([r, g, b]: Colour) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
+/// A sign explained in the key, by its colour.
+pub(super) enum Mark {
+    Dot(&'static str),
+    Arrow(&'static str),
+}
+
+/// A grey for light and dark pages.
+pub(super) const GREY: &str = "#7d8792";
+
+/// The size of the text, px, and the width of its letters on average.
+const TEXT: f64 = 14.0;
+const LETTER: f64 = 0.5 * TEXT;
+/// The gap between two entries of the key.
+const GAP: f64 = 18.0;
+
+type Entry = (Mark, String);
+
+/// The room that a mark takes before its text.
+fn room(mark: &Mark) -> f64 {
+    match mark {
+        Mark::Dot(_) => 12.0,
+        Mark::Arrow(_) => 26.0,
+    }
+}
+
+fn width(entry: &Entry) -> f64 {
+    room(&entry.0) + LETTER * entry.1.chars().count() as f64 + GAP
+}
+
+/// The entries of a key in rows that fit a width, as far as they can.
+pub(super) fn rows(key: &[Entry], fit: f64) -> Vec<&[Entry]> {
+    let mut out = vec![];
+    let mut rest = key;
+    while !rest.is_empty() {
+        let mut used = 0.0;
+        let fits = rest.iter().take_while(|entry| {
+            used += width(entry);
+            used <= fit
+        });
+        let (row, then) = rest.split_at(fits.count().max(1));
+        out.push(row);
+        rest = then;
+    }
+    out
+}
+
+/// A number of two digits, as short as it can be said.
+pub(super) fn short(x: f64) -> String {
+    let digits = (1.0 - x.abs().log10().floor()).clamp(0.0, 9.0);
+    let text = format!("{x:.0$}", digits as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+}
+
 /// An SVG document under construction; coordinates in px, y downwards.
 pub(super) struct Paper {
     body: String,
@@ -67,17 +120,21 @@ impl Paper {
         put!(self, r#"<circle cx="{x:.1}" cy="{y:.1}" r="{r:.2}" fill="url(#ball{k})"/>"#);
     }
 
-    /// A dot with a light rim, to be seen on dark and light faces.
+    /// A dot with a light rim, to be seen on dark and light faces; without one if it is small.
     pub fn dot(&mut self, [x, y]: Point, r: f64, fill: &str, opacity: f64) {
-        let rim = 0.3 * r;
+        let rim = if r < 1.2 {
+            String::new()
+        } else {
+            format!(r##" stroke="#fff" stroke-width="{:.2}""##, 0.3 * r)
+        };
         put!(
             self,
-            r##"<circle cx="{x:.1}" cy="{y:.1}" r="{r:.2}" fill="{fill}" stroke="#fff" stroke-width="{rim:.2}" opacity="{opacity}"/>"##
+            r##"<circle cx="{x:.1}" cy="{y:.1}" r="{r:.2}" fill="{fill}"{rim} opacity="{opacity}"/>"##
         );
     }
 
-    /// An arrow with a light rim.
-    pub fn arrow(&mut self, from: Point, to: Point, colour: &str, opacity: f64) {
+    /// An arrow with a light rim; without one if it is small or the bodies are, of `size` px.
+    pub fn arrow(&mut self, from: Point, to: Point, size: f64, colour: &str, opacity: f64) {
         let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
         let length = dx.hypot(dy);
         // Seen from its tip it is a dot, which the contact or the body already is.
@@ -85,8 +142,13 @@ impl Paper {
             return;
         }
         let along = [dx / length, dy / length];
-        let head = (0.35 * length).clamp(3.0, 15.0).min(length);
+        let head = (0.35 * length).clamp((0.15 * size).clamp(1.2, 3.0), 15.0).min(length);
         let width = 0.24 * head;
+        let rim = if width < 1.2 || size < 30.0 {
+            ""
+        } else {
+            r##" stroke="#fff" stroke-width="0.8" stroke-opacity="0.8" stroke-linejoin="round" paint-order="stroke""##
+        };
         let at = |back: f64, side: f64| {
             [to[0] - back * along[0] - side * along[1], to[1] - back * along[1] + side * along[0]]
         };
@@ -101,19 +163,35 @@ impl Paper {
         ];
         put!(
             self,
-            r##"<path fill="{colour}" opacity="{opacity}" stroke="#fff" stroke-width="0.8" stroke-opacity="0.8" stroke-linejoin="round" paint-order="stroke" d="{}"/>"##,
+            r##"<path fill="{colour}" opacity="{opacity}"{rim} d="{}"/>"##,
             path(outline.into_iter())
         );
     }
 
-    /// A line of text at the foot, in a grey for light and dark pages.
-    pub fn caption(&mut self, text: &str) {
+    /// A row of the key around the height `y`, in the middle.
+    pub fn key(&mut self, row: &[Entry], y: f64) {
+        let mut x = 0.5 * (self.width + GAP - row.iter().map(width).sum::<f64>());
+        for entry in row {
+            match entry.0 {
+                Mark::Dot(colour) => self.dot([x + 4.0, y], 4.0, colour, 1.0),
+                Mark::Arrow(colour) => self.arrow([x, y], [x + 20.0, y], 0.0, colour, 1.0),
+            }
+            self.text([x + room(&entry.0), y], "start", &entry.1);
+            x += width(entry);
+        }
+    }
+
+    /// A line of text around the height `y`, in the middle.
+    pub fn caption(&mut self, text: &str, y: f64) {
+        self.text([0.5 * self.width, y], "middle", text);
+    }
+
+    /// Text in [`GREY`].
+    fn text(&mut self, [x, y]: Point, anchor: &str, text: &str) {
+        let (y, text) = (y + 0.35 * TEXT, escape(text));
         put!(
             self,
-            r##"<text x="{:.1}" y="{:.1}" text-anchor="middle" font-family="sans-serif" font-size="14" fill="#7d8792">{}</text>"##,
-            0.5 * self.width,
-            self.height - 12.0,
-            escape(text)
+            r##"<text x="{x:.1}" y="{y:.1}" text-anchor="{anchor}" font-family="sans-serif" font-size="{TEXT}" fill="{GREY}">{text}</text>"##
         );
     }
 

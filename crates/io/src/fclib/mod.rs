@@ -21,7 +21,8 @@
 //! the order of the file; triplets are written, because other readers of global files know nothing else.
 //!
 //! Written files hold 32-bit integers and 64-bit reals in HDF5 1.8's format. Any width of integer and of real
-//! is read. Values pass bit for bit in both directions.
+//! is read, integers where reals belong, and reals that are whole numbers where integers belong. Otherwise
+//! values pass bit for bit in both directions.
 
 mod read;
 mod write;
@@ -121,6 +122,10 @@ fn some(x: &[f64]) -> Option<Vec<f64>> {
 /// the file; rolling friction, by its group. A `/solution` needs `u` and `r`, `v` if the problem is global,
 /// `l` if it has bilateral constraints; [`read_problem`] does not look at it.
 /// Not read: `nzmax`, matrix info (`conditioning`, ...), guesses beyond `number_of_guesses`, other groups.
+///
+/// Soft and external links are not followed. Where a part of the problem is one, the error says so if the group is
+/// of HDF5's old format (the default of the C library and h5py); in groups of the new format they cannot be
+/// told from nothing, so that an optional part behind one reads as absent.
 pub fn read(path: impl AsRef<Path>) -> Result<FclibFile, IoError> {
     read::read(path.as_ref(), true)
 }
@@ -132,36 +137,46 @@ pub fn read_problem(path: impl AsRef<Path>) -> Result<Friction, IoError> {
 
 /// Writes a file, in place of the one of that name if there is one.
 ///
+/// The file holds what `content` does and nothing else: what [`read`] skips (other groups, `conditioning`, ...)
+/// does not pass from one file to another; [`write_solution`] keeps it.
+///
 /// The new file is completed beside the old one and then renamed, so that nobody sees half of it.
 /// Errors: a problem that is not valid, a point that does not fit it, a text that holds a NUL character,
-/// more than 2³¹ − 1 entries in one matrix, and what the system refuses.
+/// more than 2³¹ − 1 entries in one matrix, a target that is no regular file (a directory, a device, ...), and
+/// what the system refuses.
 pub fn write(path: impl AsRef<Path>, content: &FclibFile) -> Result<(), IoError> {
     write::write(path.as_ref(), content)
 }
 
 /// Sets `/solution` in an existing file and keeps all else in it, known to this crate or not.
 ///
-/// The file is replaced by renaming, as in [`write()`]. Errors: a file whose problem cannot be read, a point that
-/// does not fit it, and what the system refuses.
+/// The file is replaced by renaming, as in [`write()`]: other hard links to it keep the old content. The space of
+/// an old `/solution` is not all used again: each call makes the file some hundred bytes larger.
+/// Soft and external links that stand directly in the root group are the exception to keeping all: a file with
+/// them may be refused or, if HDF5 keeps the group densely or converted it from the old format, lose them.
+/// Errors: a file whose problem cannot be read, a point that does not fit it, a target that is no regular file, and
+/// what the system refuses.
 pub fn write_solution(path: impl AsRef<Path>, solution: &StoredPoint) -> Result<(), IoError> {
     write::write_solution(path.as_ref(), solution)
 }
 
-/// The lengths of `v`, of `u` and `r`, and of `l` that fit a problem.
+/// The lengths of `v`, of `u` and `r`, and of `l` that fit a problem; `None`: the kind of problem has no such part.
 #[derive(Clone, Copy)]
 struct Sizes {
-    v: usize,
+    v: Option<usize>,
     contacts: usize,
-    lambda: usize,
+    lambda: Option<usize>,
 }
 
 impl Sizes {
     fn of(problem: &Friction) -> Self {
         fn local<const D: usize>(p: &FrictionLocal<D>) -> Sizes {
-            Sizes { v: 0, contacts: D * p.contacts(), lambda: p.multipliers() }
+            let lambda = p.bilateral.as_ref().map(|b| b.s.len());
+            Sizes { v: None, contacts: D * p.contacts(), lambda }
         }
         fn global<const D: usize>(p: &FrictionGlobal<D>) -> Sizes {
-            Sizes { v: p.dofs(), contacts: D * p.contacts(), lambda: p.multipliers() }
+            let lambda = p.bilateral.as_ref().map(|b| b.b.len());
+            Sizes { v: Some(p.dofs()), contacts: D * p.contacts(), lambda }
         }
         match problem {
             Friction::Local2(p) => local(p),
@@ -171,12 +186,14 @@ impl Sizes {
         }
     }
 
-    /// The parts of a point: name in FCLIB, length and what the length counts. Empty parts are not stored.
-    fn parts(self) -> [(&'static str, usize, &'static str); 4] {
+    /// The parts of a point: name in FCLIB, length and what the length counts.
+    ///
+    /// A part without entries is stored, as FCLIB does: `l` belongs to a matrix G or R even if that has no column.
+    fn parts(self) -> [(&'static str, Option<usize>, &'static str); 4] {
         [
             ("v", self.v, "degrees of freedom"),
-            ("u", self.contacts, "components of the contacts"),
-            ("r", self.contacts, "components of the contacts"),
+            ("u", Some(self.contacts), "components of the contacts"),
+            ("r", Some(self.contacts), "components of the contacts"),
             ("l", self.lambda, "bilateral constraints"),
         ]
     }

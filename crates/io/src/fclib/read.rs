@@ -1,10 +1,9 @@
 //! Reading.
 
-use std::collections::HashMap;
 use std::fmt::Display;
 use std::path::Path;
 
-use hdf5_pure::{DType, Dataset, File, Group};
+use hdf5_pure::{DType, Dataset, Datatype, Error, File, FormatError, Group};
 use nonsmooth_problem::linalg::{Bsr, Csc};
 use nonsmooth_problem::{
     BilateralGlobal, BilateralLocal, Friction, FrictionGlobal, FrictionLocal, ProblemError,
@@ -36,7 +35,7 @@ fn parse(path: &Path, bytes: Vec<u8>, points: bool) -> Result<FclibFile, IoError
         let found = format!("a truncated file ({size} bytes of {end})");
         return Err(IoError::hdf5(path, "/", found));
     }
-    let root = Folder::open(path, size, String::new(), file.root())?;
+    let root = Folder { file: path, size, path: String::new(), group: file.root() };
     let mut content = FclibFile::new(problem(&root)?);
     content.problem.validate().map_err(|problem| IoError::Problem {
         file: path.into(),
@@ -65,7 +64,7 @@ fn problem(root: &Folder) -> Result<Friction, IoError> {
     const LOCAL: &str = "fclib_local";
     const GLOBAL: &str = "fclib_global";
     for rolling in ["fclib_global_rolling", "fclib_local_rolling"] {
-        if root.groups.iter().any(|g| g == rolling) {
+        if matches!(root.find(rolling)?, Some(Member::Group(_))) {
             return Err(IoError::Unsupported {
                 file: root.file.into(),
                 place: format!("/{rolling}"),
@@ -83,10 +82,12 @@ fn problem(root: &Folder) -> Result<Friction, IoError> {
             _ => Friction::Global3(global(&g)?),
         }),
         (both, _) => {
-            let found = match (both, &root.groups[..]) {
+            let found = match (both, root.group.groups().as_deref()) {
                 (Some(_), _) => format!("both /{LOCAL} and /{GLOBAL}"),
-                (None, []) => "no group".into(),
-                (None, others) => format!("only /{}", others.join(", /")),
+                (None, Ok([])) => "no group".into(),
+                (None, Ok(others)) => format!("only /{}", others.join(", /")),
+                // The names are only for people; a soft link among them keeps the rest from being listed.
+                (None, Err(_)) => "neither".into(),
             };
             Err(IoError::Root { file: root.file.into(), found: one_line(found) })
         }
@@ -101,10 +102,10 @@ fn local<const D: usize>(g: &Folder) -> Result<FrictionLocal<D>, IoError> {
     let contacts = format!("{D} for each entry of vectors/mu");
     let W = g.matrix("W", (m, m), &contacts)?;
     let q = vectors.vector("q", m, &contacts)?;
-    let bilateral = match (g.folder("V")?, g.folder("R")?, vectors.has("s")) {
+    let bilateral = match (g.folder("V")?, g.folder("R")?, vectors.has("s")?) {
         (None, None, false) => None,
         (Some(_), Some(_), true) => {
-            let s = vectors.reals("s")?;
+            let s = vectors.reals("s", None)?;
             let p = s.len();
             let V = g.matrix("V", (m, p), &format!("{contacts}, by the entries of vectors/s"))?;
             Some(BilateralLocal { V, R: g.matrix("R", (p, p), "the entries of vectors/s")?, s })
@@ -122,16 +123,16 @@ fn global<const D: usize>(g: &Folder) -> Result<FrictionGlobal<D>, IoError> {
     let vectors = g.need("vectors")?;
     let mu = g.mu(&vectors, "/fclib_global")?;
     let m = D * mu.len();
-    let f = vectors.reals("f")?;
+    let f = vectors.reals("f", None)?;
     let n = f.len();
     let contacts = format!("{D} for each entry of vectors/mu");
     let M = g.matrix("M", (n, n), "the entries of vectors/f")?;
     let H = g.matrix("H", (n, m), &format!("the entries of vectors/f, by {contacts}"))?;
     let w = vectors.vector("w", m, &contacts)?;
-    let bilateral = match (g.folder("G")?, vectors.has("b")) {
+    let bilateral = match (g.folder("G")?, vectors.has("b")?) {
         (None, false) => None,
         (Some(_), true) => {
-            let b = vectors.reals("b")?;
+            let b = vectors.reals("b", None)?;
             let why = "the entries of vectors/f, by the entries of vectors/b";
             Some(BilateralGlobal { G: g.matrix("G", (n, b.len()), why)?, b })
         }
@@ -157,8 +158,10 @@ fn info(problem: &Folder) -> Result<Info, IoError> {
 
 fn point(g: &Folder, sizes: Sizes) -> Result<StoredPoint, IoError> {
     let part = |(name, len, meaning)| match len {
-        0 => Ok(None),
-        _ => g.vector(name, len, meaning).map(Some),
+        None => Ok(None),
+        // Writers differ on whether a part without entries is there.
+        Some(0) if !g.has(name)? => Ok(None),
+        Some(len) => Ok(Some(g.vector(name, len, meaning)?).filter(|x| !x.is_empty())),
     };
     let [v, u, r, l] = sizes.parts();
     Ok(StoredPoint {
@@ -169,7 +172,45 @@ fn point(g: &Folder, sizes: Sizes) -> Result<StoredPoint, IoError> {
     })
 }
 
-/// A group of the file with its members, and what messages about them need.
+/// The error of looking up the name at `place` in a group.
+pub(super) fn lookup(file: &Path, place: &str, e: Error) -> IoError {
+    match e {
+        // Groups of the old format keep no address for a soft link, and the library takes that for one.
+        Error::Format(FormatError::UnexpectedEof { expected: usize::MAX, .. }) => {
+            IoError::Unsupported { file: file.into(), place: place.into(), what: "a soft link" }
+        }
+        e => IoError::hdf5(file, place, e),
+    }
+}
+
+/// What a name in a group stands for.
+enum Member {
+    Group(Group),
+    Dataset(Dataset),
+    Other,
+}
+
+impl Member {
+    fn kind(&self) -> &'static str {
+        match self {
+            Member::Group(_) => "a group",
+            Member::Dataset(_) => "a dataset",
+            Member::Other => "something else",
+        }
+    }
+}
+
+/// The leading entries of a dataset that count; what follows them may be anything.
+#[derive(Clone, Copy)]
+struct Used<'a> {
+    entries: u64,
+    /// What says so.
+    why: &'a str,
+}
+
+/// A group of the file, with what messages about its members need.
+///
+/// Members are looked up by name, never listed, so that those that do not matter cannot do harm.
 struct Folder<'a> {
     file: &'a Path,
     /// The size of the file, against absurd sizes of datasets.
@@ -177,18 +218,9 @@ struct Folder<'a> {
     /// Empty for the root.
     path: String,
     group: Group,
-    datasets: HashMap<String, Dataset>,
-    groups: Vec<String>,
 }
 
 impl<'a> Folder<'a> {
-    fn open(file: &'a Path, size: u64, path: String, group: Group) -> Result<Self, IoError> {
-        let place = if path.is_empty() { "/" } else { &path };
-        let datasets = group.iter_datasets().map_err(|e| IoError::hdf5(file, place, e))?.collect();
-        let groups = group.groups().map_err(|e| IoError::hdf5(file, place, e))?;
-        Ok(Self { file, size, path, group, datasets, groups })
-    }
-
     fn place(&self, name: impl Display) -> String {
         format!("{}/{name}", self.path)
     }
@@ -202,24 +234,36 @@ impl<'a> Folder<'a> {
         IoError::data(self.file, self.place(name), expected, found)
     }
 
-    fn damaged(&self, name: &str) -> impl Fn(hdf5_pure::Error) -> IoError {
+    fn damaged(&self, name: &str) -> impl Fn(Error) -> IoError {
         move |e| IoError::hdf5(self.file, self.place(name), e)
     }
 
-    fn has(&self, dataset: &str) -> bool {
-        self.datasets.contains_key(dataset)
+    fn find(&self, name: &str) -> Result<Option<Member>, IoError> {
+        match self.group.dataset(name) {
+            Ok(dataset) => Ok(Some(Member::Dataset(dataset))),
+            Err(Error::NotADataset(_)) => match self.group.group(name) {
+                Ok(group) => Ok(Some(Member::Group(group))),
+                Err(Error::NotAGroup(_)) => Ok(Some(Member::Other)),
+                Err(e) => Err(lookup(self.file, &self.place(name), e)),
+            },
+            Err(Error::Format(FormatError::PathNotFound(_))) => Ok(None),
+            Err(e) => Err(lookup(self.file, &self.place(name), e)),
+        }
+    }
+
+    fn has(&self, name: &str) -> Result<bool, IoError> {
+        Ok(self.find(name)?.is_some())
     }
 
     /// The group `name`, if there is one.
     fn folder(&self, name: &str) -> Result<Option<Folder<'a>>, IoError> {
-        if self.has(name) {
-            return Err(self.error(name, "a group", "a dataset"));
+        match self.find(name)? {
+            None => Ok(None),
+            Some(Member::Group(group)) => {
+                Ok(Some(Folder { file: self.file, size: self.size, path: self.place(name), group }))
+            }
+            Some(other) => Err(self.error(name, "a group", other.kind())),
         }
-        if !self.groups.iter().any(|g| g == name) {
-            return Ok(None);
-        }
-        let group = self.group.group(name).map_err(self.damaged(name))?;
-        Self::open(self.file, self.size, self.place(name), group).map(Some)
     }
 
     /// The group `name`.
@@ -228,11 +272,13 @@ impl<'a> Folder<'a> {
     }
 
     /// The dataset `name`, whose size the file can account for.
-    fn dataset(&self, name: &str) -> Result<&Dataset, IoError> {
-        let Some(dataset) = self.datasets.get(name) else {
-            let group = self.groups.iter().any(|g| g == name);
-            let found = if group { "a group" } else { "nothing of that name" };
-            return Err(self.error(name, "a dataset", found));
+    fn dataset(&self, name: &str) -> Result<Dataset, IoError> {
+        let dataset = match self.find(name)? {
+            Some(Member::Dataset(dataset)) => dataset,
+            other => {
+                let found = other.map_or("nothing of that name", |other| other.kind());
+                return Err(self.error(name, "a dataset", found));
+            }
         };
         let shape = dataset.shape().map_err(self.damaged(name))?;
         let width = dataset.element_size().map_err(self.damaged(name))?;
@@ -252,51 +298,92 @@ impl<'a> Folder<'a> {
         }
     }
 
-    fn ints(&self, name: &str) -> Result<Vec<i64>, IoError> {
+    /// Integers: those `used`, or all. Reals that are whole numbers will do.
+    fn ints(&self, name: &str, used: Option<Used>) -> Result<Vec<i64>, IoError> {
         let dataset = self.dataset(name)?;
-        let values = match dataset.dtype().map_err(self.damaged(name))? {
-            DType::I8
-            | DType::I16
-            | DType::I32
-            | DType::I64
-            | DType::U8
-            | DType::U16
-            | DType::U32 => dataset.read_i64(),
+        match dataset.datatype().map_err(self.damaged(name))? {
             // What does not fit is too large for any use here; the range checks say so.
-            DType::U64 => dataset.read_u64().map(|values| {
-                values.into_iter().map(|x| i64::try_from(x).unwrap_or(i64::MAX)).collect()
-            }),
-            other => return Err(self.error(name, "integers", other)),
-        };
-        values.map_err(self.damaged(name))
+            Datatype::FixedPoint { size: 8, layout, .. } if !layout.signed => {
+                let x = self.used(name, dataset.read_u64(), used)?;
+                Ok(x.into_iter().map(|x| i64::try_from(x).unwrap_or(i64::MAX)).collect())
+            }
+            Datatype::FixedPoint { .. } => self.used(name, dataset.read_i64(), used),
+            Datatype::FloatingPoint { .. } => {
+                // The first real beyond i64, exactly.
+                const END: f64 = -(i64::MIN as f64);
+                let whole = |(k, x): (usize, f64)| {
+                    // Not so for NaN and infinities either.
+                    if x.fract() == 0.0 && (-END..END).contains(&x) {
+                        Ok(x as i64)
+                    } else {
+                        let place = format_args!("{name}[{k}]");
+                        Err(self.error(place, "a whole number of at most 64 bits", x))
+                    }
+                };
+                let x = self.used(name, dataset.read_f64(), used)?;
+                x.into_iter().enumerate().map(whole).collect()
+            }
+            _ => Err(self.wrong_type(name, &dataset, "integers")),
+        }
     }
 
     fn int(&self, name: &str) -> Result<i64, IoError> {
-        match self.ints(name)?[..] {
+        match self.ints(name, None)?[..] {
             [x] => Ok(x),
             ref x => Err(self.error(name, "one integer", format!("{} entries", x.len()))),
         }
     }
 
-    fn reals(&self, name: &str) -> Result<Vec<f64>, IoError> {
+    /// Finite reals: those `used`, or all. Integers will do; the widest round as they do in C.
+    fn reals(&self, name: &str, used: Option<Used>) -> Result<Vec<f64>, IoError> {
         let dataset = self.dataset(name)?;
-        let values = match dataset.dtype().map_err(self.damaged(name))? {
-            DType::F32 | DType::F64 => dataset.read_f64().map_err(self.damaged(name))?,
-            other => return Err(self.error(name, "reals", other)),
-        };
-        check_finite(self.file, &self.place(name), &values)?;
+        match dataset.datatype().map_err(self.damaged(name))? {
+            Datatype::FixedPoint { .. } | Datatype::FloatingPoint { .. } => {
+                let x = self.used(name, dataset.read_f64(), used)?;
+                check_finite(self.file, &self.place(name), &x)?;
+                Ok(x)
+            }
+            _ => Err(self.wrong_type(name, &dataset, "reals")),
+        }
+    }
+
+    /// The values that count, out of all.
+    fn used<T>(
+        &self,
+        name: &str,
+        values: Result<Vec<T>, Error>,
+        used: Option<Used>,
+    ) -> Result<Vec<T>, IoError> {
+        let mut values = values.map_err(self.damaged(name))?;
+        if let Some(Used { entries, why }) = used {
+            let found = values.len();
+            match usize::try_from(entries) {
+                Ok(entries) if entries <= found => values.truncate(entries),
+                _ => {
+                    let expected = format!("{entries} entries ({why})");
+                    return Err(self.error(name, expected, format!("{found} entries")));
+                }
+            }
+        }
         Ok(values)
     }
 
+    fn wrong_type(&self, name: &str, dataset: &Dataset, expected: &str) -> IoError {
+        match dataset.dtype() {
+            Ok(found) => self.error(name, expected, found),
+            Err(e) => self.damaged(name)(e),
+        }
+    }
+
     fn vector(&self, name: &str, len: usize, meaning: &str) -> Result<Vec<f64>, IoError> {
-        let x = self.reals(name)?;
+        let x = self.reals(name, None)?;
         check_vector(self.file, &self.place(name), &x, len, meaning)?;
         Ok(x)
     }
 
     /// A text that is there or not; bytes that are no UTF-8 are replaced, as it is only for people.
     fn text(&self, name: &str) -> Result<Option<String>, IoError> {
-        if !self.has(name) {
+        if !self.has(name)? {
             return Ok(None);
         }
         let dataset = self.dataset(name)?;
@@ -323,7 +410,7 @@ impl<'a> Folder<'a> {
 
     /// `mu`, checked first: all other sizes follow from its length.
     fn mu(&self, vectors: &Folder, group: &'static str) -> Result<Vec<f64>, IoError> {
-        let mu = vectors.reals("mu")?;
+        let mu = vectors.reals("mu", None)?;
         if mu.is_empty() {
             let problem = ProblemError::Empty { place: "mu".into() };
             return Err(IoError::Problem { file: self.file.into(), group, problem });
@@ -351,37 +438,31 @@ impl<'a> Folder<'a> {
             let expected = format!("{rows} × {columns} ({why})");
             return Err(self.error(name, expected, format!("{m} × {n}")));
         }
-        let (p, i, x) = (g.ints("p")?, g.ints("i")?, g.reals("x")?);
-        let (p, i) = match nz {
-            -1 => {
-                let p = g.pointers(&p, columns, &i, &x)?;
-                let i = g.indices("i", "row", &i[..p.len()], rows)?;
-                (p, i)
-            }
-            -2 => {
-                let rows = g.pointers(&p, rows, &i, &x)?;
-                (g.indices("i", "column", &i[..rows.len()], columns)?, rows)
+        // Arrays may have room beyond the last entry, whose content means nothing.
+        let (p, i, x) = match nz {
+            -1 | -2 => {
+                let (what, count, bound) =
+                    if nz == -1 { ("row", columns, rows) } else { ("column", rows, columns) };
+                let pointers = g.pointers(count)?;
+                let why = format!("p[{count}]");
+                let used = Some(Used { entries: pointers[count] as u64, why: &why });
+                let (i, x) = (g.ints("i", used)?, g.reals("x", used)?);
+                let minor = g.indices("i", what, &i, bound)?;
+                // Not before i and x are known to be as long.
+                let runs = pointers.windows(2).enumerate();
+                let major = runs.flat_map(|(k, w)| (w[0]..w[1]).map(move |_| k)).collect();
+                if nz == -1 { (major, minor, x) } else { (minor, major, x) }
             }
             nz if nz >= 0 => {
-                for (name, len) in [("p", p.len()), ("i", i.len()), ("x", x.len())] {
-                    if (len as u64) < nz as u64 {
-                        let expected = format!("{nz} entries (nz)");
-                        return Err(g.error(name, expected, format!("{len} entries")));
-                    }
-                }
-                // nz fits in usize: three arrays are at least as long.
-                let nz = nz as usize;
-                (
-                    g.indices("p", "column", &p[..nz], columns)?,
-                    g.indices("i", "row", &i[..nz], rows)?,
-                )
+                let used = Some(Used { entries: nz as u64, why: "nz" });
+                let (p, i, x) = (g.ints("p", used)?, g.ints("i", used)?, g.reals("x", used)?);
+                (g.indices("p", "column", &p, columns)?, g.indices("i", "row", &i, rows)?, x)
             }
             _ => {
                 let expected = "a number of triplets, -1 (columns) or -2 (rows)";
                 return Err(g.error("nz", expected, nz));
             }
         };
-        // x may have room beyond the last entry, which zip leaves out.
         let entries = i.iter().zip(&p).zip(&x).map(|((&i, &p), &x)| (i, p, x));
         Csc::from_triplets(rows, columns, entries).map_err(|e| self.error(name, "a matrix", e))
     }
@@ -403,14 +484,9 @@ impl<'a> Folder<'a> {
         indices.iter().enumerate().map(check).collect()
     }
 
-    /// Compressed pointers, checked and expanded: the column (or row) of each entry.
-    fn pointers(
-        &self,
-        p: &[i64],
-        count: usize,
-        i: &[i64],
-        x: &[f64],
-    ) -> Result<Vec<usize>, IoError> {
+    /// The compressed pointers `p`, checked: they start at 0 and never fall.
+    fn pointers(&self, count: usize) -> Result<Vec<i64>, IoError> {
+        let p = self.ints("p", None)?;
         if p.len() != count + 1 {
             let expected = format!("{} pointers (one more than columns or rows)", count + 1);
             return Err(self.error("p", expected, format!("{} entries", p.len())));
@@ -422,13 +498,6 @@ impl<'a> Folder<'a> {
             let place = format!("p[{}]", k + 1);
             return Err(self.error(place, format!("at least {} (p[{k}])", p[k]), p[k + 1]));
         }
-        for (name, len) in [("i", i.len()), ("x", x.len())] {
-            if p[count] > len as i64 {
-                let expected = format!("{} entries (p[{count}])", p[count]);
-                return Err(self.error(name, expected, format!("{len} entries")));
-            }
-        }
-        let runs = p.windows(2).enumerate();
-        Ok(runs.flat_map(|(k, w)| (w[0]..w[1]).map(move |_| k)).collect())
+        Ok(p)
     }
 }

@@ -2,11 +2,13 @@
 
 use std::ffi::OsString;
 use std::fmt::Display;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use hdf5_pure::{
-    AttrValue, CharacterSet, Datatype, File, FileBuilder, GroupBuilder, LibVer, StringPadding,
+    AttrValue, CharacterSet, Datatype, Error, File, FileBuilder, FormatError, GroupBuilder, LibVer,
+    StringPadding,
 };
 use nonsmooth_problem::linalg::Csc;
 use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal};
@@ -57,39 +59,59 @@ pub(super) fn write(path: &Path, content: &FclibFile) -> Result<(), IoError> {
 }
 
 pub(super) fn write_solution(path: &Path, solution: &StoredPoint) -> Result<(), IoError> {
+    // First of all: to read a pipe may never end.
+    check_target(path)?;
     let sizes = Sizes::of(&read::read(path, false)?.problem);
     let parts = stored_parts(path, "/solution", solution, sizes)?;
-    let edit = |temporary: &Path| -> Result<(), hdf5_pure::Error> {
-        let file = File::open_rw(temporary)?;
+    let fail = |e| failed(path, e);
+    let edit = |temporary: &Path| -> Result<(), IoError> {
+        let file = File::open_rw(temporary).map_err(fail)?;
         let root = file.root();
-        for old in root.groups()?.iter().chain(&root.datasets()?).filter(|name| *name == "solution")
-        {
-            root.delete(old)?;
+        match root.group("solution") {
+            Err(Error::Format(FormatError::PathNotFound(_))) => {}
+            Ok(_) | Err(Error::NotAGroup(_)) => root.delete("solution").map_err(fail)?,
+            Err(e) => return Err(read::lookup(path, "/solution", e)),
         }
+        // An old root group with a soft link, which cannot be listed, would be spoilt by the change.
+        root.groups().map_err(|e| read::lookup(path, "/", e))?;
         root.create_group_with("solution", |g| {
             for (name, x) in &parts {
                 g.create_dataset(name, |d| {
                     d.with_f64_data(x);
                 });
             }
-        })?;
-        file.commit()?;
+        })
+        .map_err(fail)?;
+        file.commit().map_err(fail)?;
         drop(root);
-        file.close()
+        file.close().map_err(fail)
     };
     replace(path, |temporary| {
         std::fs::copy(path, temporary).map_err(|e| IoError::os(path, WRITABLE, e))?;
-        guarded(path, || edit(temporary).map_err(|e| failed(path, e)))
+        guarded(path, || edit(temporary))
     })
 }
 
 const WRITABLE: &str = "a file that can be written";
 
 /// A failure of the HDF5 writer: nearly always the system's.
-fn failed(path: &Path, e: hdf5_pure::Error) -> IoError {
+fn failed(path: &Path, e: Error) -> IoError {
     match e {
-        hdf5_pure::Error::Io(e) => IoError::os(path, WRITABLE, e),
+        Error::Io(e) => IoError::os(path, WRITABLE, e),
         e => IoError::hdf5(path, "/", e),
+    }
+}
+
+/// What stands at `path`, if anything, may be replaced by a file.
+fn check_target(path: &Path) -> Result<(), IoError> {
+    let refuse = |cause| Err(IoError::os(path, WRITABLE, cause));
+    match std::fs::metadata(path) {
+        Ok(target) if target.is_dir() => refuse(ErrorKind::IsADirectory.into()),
+        Ok(target) if !target.is_file() => {
+            refuse(std::io::Error::other("no regular file (a device, pipe or socket)"))
+        }
+        // If there is nothing, or it cannot be asked, then writing shows what the system allows.
+        _ => Ok(()),
     }
 }
 
@@ -104,11 +126,12 @@ fn replace(path: &Path, fill: impl FnOnce(&Path) -> Result<(), IoError>) -> Resu
     }
     static COUNT: AtomicU64 = AtomicU64::new(0);
 
+    check_target(path)?;
     let os = |e| IoError::os(path, WRITABLE, e);
     // A link stays a link to the new content.
     let target = path.canonicalize().unwrap_or_else(|_| path.into());
-    let Some(name) = target.file_name().filter(|_| !target.is_dir()) else {
-        return Err(os(std::io::ErrorKind::IsADirectory.into()));
+    let Some(name) = target.file_name() else {
+        return Err(os(ErrorKind::IsADirectory.into()));
     };
     let mut temporary = OsString::from(".");
     temporary.push(name);
@@ -203,8 +226,8 @@ fn stored_parts<'a>(
     let mut stored = vec![];
     for ((name, len, meaning), x) in sizes.parts().into_iter().zip(slices) {
         let x = x.unwrap_or_default();
-        check_vector(file, &format!("{place}/{name}"), x, len, meaning)?;
-        if len > 0 {
+        check_vector(file, &format!("{place}/{name}"), x, len.unwrap_or(0), meaning)?;
+        if len.is_some() {
             stored.push((name, x));
         }
     }

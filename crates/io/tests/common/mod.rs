@@ -136,6 +136,8 @@ pub enum Data {
     F(Vec<f64>),
     /// 32-bit reals, rank 1.
     F32(Vec<f32>),
+    /// Unsigned 8-bit integers, rank 1.
+    U8(Vec<u8>),
     /// A variable-length string.
     Text(&'static str),
 }
@@ -235,6 +237,7 @@ fn put(dataset: &mut hdf5_pure::DatasetBuilder, data: &Data) {
         Data::Scalar(x) => dataset.with_i16_data(&[*x]).with_shape(&[]),
         Data::F(x) => dataset.with_f64_data(x),
         Data::F32(x) => dataset.with_f32_data(x),
+        Data::U8(x) => dataset.with_u8_data(x),
         Data::Text(x) => dataset.with_vlen_strings(&[x]),
     };
 }

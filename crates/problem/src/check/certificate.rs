@@ -24,6 +24,24 @@ pub struct Certificate {
     pub lambda: Vec<f64>,
 }
 
+impl Certificate {
+    /// The ray or its opposite, whichever makes `qᵀ r + sᵀ lambda` negative, if it passes `verify`.
+    pub fn toward(
+        r: Vec<f64>,
+        lambda: Vec<f64>,
+        q: &[f64],
+        s: &[f64],
+        verify: impl Fn(&Self) -> bool,
+    ) -> Option<Self> {
+        let product = dot(q, &r) + dot(s, &lambda);
+        let mut ray = Self { r, lambda };
+        if product > 0.0 {
+            ray.r.iter_mut().chain(&mut ray.lambda).for_each(|x| *x = -*x);
+        }
+        verify(&ray).then_some(ray)
+    }
+}
+
 /// The relative rounding that "equals zero" forgives.
 const ZERO: f64 = 1e-10;
 /// The relative margin by which the product must be negative.
@@ -52,8 +70,8 @@ pub(crate) fn refutes_local<const D: usize>(
             }
         }
     }
-    let mut load = dot(&problem.q, r);
-    let mut scale = norm(&problem.q) * norm(r);
+    let mut load = Load::default();
+    load.add(&problem.q, r);
     if let Some(b) = &problem.bilateral {
         let m = r.len();
         let entries = (b.V.triplets().map(|(i, j, x)| (i, m + j, x)))
@@ -64,10 +82,9 @@ pub(crate) fn refutes_local<const D: usize>(
             product[j] += term;
             size[j] += term.abs();
         }
-        load += dot(&b.s, lambda);
-        scale += norm(&b.s) * norm(lambda);
+        load.add(&b.s, lambda);
     }
-    norm(&product) <= ZERO * norm(&size) && load < -NEGATIVE * scale
+    norm(&product) <= ZERO * norm(&size) && load.is_negative()
 }
 
 pub(crate) fn refutes_global<const D: usize>(
@@ -80,8 +97,8 @@ pub(crate) fn refutes_global<const D: usize>(
     }
     let mut product = vec![0.0; problem.dofs()];
     let mut size = product.clone();
-    let mut load = dot(&problem.w, r);
-    let mut scale = norm(&problem.w) * norm(r);
+    let mut load = Load::default();
+    load.add(&problem.w, r);
     let mut add = |a: &crate::linalg::Csc, x: &[f64]| {
         for (i, j, value) in a.triplets() {
             product[i] += value * x[j];
@@ -91,10 +108,27 @@ pub(crate) fn refutes_global<const D: usize>(
     add(&problem.H, r);
     if let Some(b) = &problem.bilateral {
         add(&b.G, lambda);
-        load += dot(&b.b, lambda);
-        scale += norm(&b.b) * norm(lambda);
+        load.add(&b.b, lambda);
     }
-    norm(&product) <= ZERO * norm(&size) && load < -NEGATIVE * scale
+    norm(&product) <= ZERO * norm(&size) && load.is_negative()
+}
+
+/// A sum of products and of their sizes.
+#[derive(Default)]
+struct Load {
+    sum: f64,
+    size: f64,
+}
+
+impl Load {
+    fn add(&mut self, a: &[f64], b: &[f64]) {
+        self.sum += dot(a, b);
+        self.size += a.iter().zip(b).map(|(x, y)| (x * y).abs()).sum::<f64>();
+    }
+
+    fn is_negative(&self) -> bool {
+        self.sum < -NEGATIVE * self.size
+    }
 }
 
 /// `r ∈ K`, supported on frictionless contacts, finite and of the right length.

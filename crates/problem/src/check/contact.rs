@@ -65,20 +65,27 @@ pub(super) fn distance_to_dual<const D: usize>(y: &[f64; D], mu: f64) -> f64 {
 
 /// The natural map `x − P_K(x − ũ)`.
 ///
-/// Inside the cone it is ũ and inside the polar cone it is x, returned as such: the difference of two large
-/// numbers would hide a small residual.
+/// With `y = x − ũ` it is ũ where y lies in K, x where y lies in the polar cone, and else `ũ + d n` with the distance d of y
+/// from K and the outward normal n: the difference of x and a projection would round ũ away where x is large.
 pub(super) fn natural_map<const D: usize>(x: &[f64; D], modified: &[f64; D], mu: f64) -> [f64; D] {
     let mut y = *x;
     for k in 0..D {
         y[k] -= modified[k];
     }
-    if tangential_norm(&y) <= mu * y[0] {
+    let t = tangential_norm(&y);
+    let outside = t - mu * y[0];
+    if outside <= 0.0 {
         return *modified;
     }
-    let p = nearest_in_cone(&y, mu);
-    let mut phi = *x;
-    for k in 0..D {
-        phi[k] -= p[k];
+    if y[0] + mu * t <= 0.0 {
+        return *x;
+    }
+    // d n = (outside/secant) (−mu, y_T/t)/secant.
+    let scale = outside / (1.0 + mu * mu);
+    let mut phi = *modified;
+    phi[0] -= mu * scale;
+    for k in 1..D {
+        phi[k] += scale * (y[k] / t);
     }
     phi
 }

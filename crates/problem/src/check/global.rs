@@ -1,8 +1,9 @@
 //! The judge of the global problem.
 
-use super::local::LawGauge;
+use super::local::{LawGauge, ROUNDING, worst};
+use super::rows::Rows;
 use super::{Measure, over};
-use crate::linalg::{Csc, Delassus, Inverse, norm, small};
+use crate::linalg::{Csc, Delassus, Inverse, Refine, norm, small};
 use crate::{Dynamics, FrictionGlobal, GlobalPoint, ProblemError};
 
 /// The judge's constants and buffers for a [`FrictionGlobal`]: among them its own factorisation of the dynamics.
@@ -16,7 +17,7 @@ pub struct GlobalGauge {
     h: Csc,
     u: Vec<f64>,
     buffer: Vec<f64>,
-    constraint: Vec<f64>,
+    rows: Rows,
 }
 
 impl GlobalGauge {
@@ -40,9 +41,12 @@ impl GlobalGauge {
             h: problem.H.clone(),
             u: vec![0.0; problem.w.len()],
             buffer: vec![0.0; problem.dofs()],
-            constraint: vec![0.0; problem.multipliers()],
+            rows: Rows::default(),
         };
         gauge.rescale(problem);
+        // The longest use of the rows, so that a measurement allocates nothing.
+        let longest = problem.dofs().max(problem.w.len()).max(problem.multipliers());
+        gauge.rows.start(&vec![0.0; longest]);
         Ok(gauge)
     }
 
@@ -61,10 +65,12 @@ impl GlobalGauge {
     /// `‖q‖` from the present f and w.
     fn rescale<const D: usize>(&mut self, problem: &FrictionGlobal<D>) {
         match &mut self.free {
-            None => self.dynamics.free_velocity(problem, &mut self.u),
+            None => {
+                let _ = self.dynamics.free_velocity(problem, &mut self.u);
+            }
             Some((free, scratch)) => {
                 self.buffer.copy_from_slice(&problem.f);
-                free.solve_with(&mut self.buffer, scratch);
+                free.solve_with(&mut self.buffer, scratch, Refine::Fully);
                 problem.velocity_into(&self.buffer, &mut self.u);
             }
         }
@@ -75,26 +81,37 @@ impl GlobalGauge {
         &mut self,
         problem: &FrictionGlobal<D>,
         point: &GlobalPoint,
+        precisely: bool,
     ) -> Measure {
-        let given = imbalance(problem, &point.v, &point.r, &point.lambda, &mut self.buffer);
-        let (v, lambda) = self.dynamics.solve(problem, &point.r);
-        let own = imbalance(problem, v, &point.r, lambda, &mut self.buffer);
-        problem.velocity_into(v, &mut self.u);
-        let mut measure = self.law.measure::<D>(&point.r, &self.u, &problem.mu);
-        let dynamics = if given.is_nan() || own.is_nan() { f64::NAN } else { given.max(own) };
-        measure.dynamics = Some(dynamics);
+        let Self { law, dynamics, u, buffer, rows, .. } = self;
+        rows.precisely(precisely);
+        let given = imbalance(problem, &point.v, &point.r, &point.lambda, rows);
+        let (v, lambda) = dynamics.solve(problem, &point.r, Refine::Fully);
+        let own = imbalance(problem, v, &point.r, lambda, rows);
+        rows.start(&problem.w);
+        rows.add_transposed(&problem.H, v);
+        u.iter_mut().zip(rows.values()).for_each(|(u, x)| *u = x);
+        let mut measure = law.measure::<D>(&point.r, u, &problem.mu);
+
+        let worse = |a: f64, b: f64| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) };
+        measure.dynamics = Some(worse(given.residual, own.residual));
+        measure.dynamics_rounding = Some(given.rounding.max(own.rounding));
+        for ((gap, a), b) in buffer.iter_mut().zip(&point.v).zip(v) {
+            *gap = a - b;
+        }
+        u_gap(problem, buffer, rows);
+        measure.velocity_gap = Some(over(rows.norm(), law.norm_q));
 
         if let Some(b) = &problem.bilateral {
-            // Gᵀ v + b against the size of its terms, for the caller's v.
-            let c = &mut self.constraint;
-            c.copy_from_slice(&b.b);
-            b.G.mul_transpose_add(1.0, &point.v, c);
-            let violation = norm(c);
-            for (j, c) in c.iter_mut().enumerate() {
-                let (rows, values) = b.G.column(j);
-                *c = rows.iter().zip(values).map(|(&i, g)| (g * point.v[i]).abs()).sum();
-            }
-            measure.bilateral = Some(over(violation, norm(c).max(norm(&b.b))));
+            // |Gᵀ v + b| against its terms, or against what velocities of a typical size would make of them.
+            let typical = point.v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            rows.start(&b.b);
+            rows.add_transposed(&b.G, &point.v);
+            let shares = rows.values().zip(rows.sizes()).enumerate().map(|(j, (sum, size))| {
+                let weight: f64 = b.G.column(j).1.iter().map(|g| g.abs()).sum();
+                (sum, size + ROUNDING * typical * weight)
+            });
+            measure.bilateral = Some(worst(shares));
         }
         measure
     }
@@ -105,23 +122,37 @@ impl GlobalGauge {
     }
 }
 
+/// `Hᵀ (v − v(r))`.
+fn u_gap<const D: usize>(problem: &FrictionGlobal<D>, gap: &[f64], rows: &mut Rows) {
+    rows.start_at_zero(problem.w.len());
+    rows.add_transposed(&problem.H, gap);
+}
+
+/// The residual of the dynamics and what of it the rounding of v explains.
+struct Imbalance {
+    residual: f64,
+    rounding: f64,
+}
+
 /// `‖M v − H r − f − G λ‖ / max(‖f‖, ‖H r‖)`.
 fn imbalance<const D: usize>(
     problem: &FrictionGlobal<D>,
     v: &[f64],
     r: &[f64],
     lambda: &[f64],
-    buffer: &mut [f64],
-) -> f64 {
-    buffer.fill(0.0);
-    problem.H.mul_add(1.0, r, buffer);
-    let scale = norm(&problem.f).max(norm(buffer));
-    for (b, f) in buffer.iter_mut().zip(&problem.f) {
-        *b += f;
-    }
+    rows: &mut Rows,
+) -> Imbalance {
+    rows.start_at_zero(problem.dofs());
+    rows.add(1.0, &problem.H, r);
+    let scale = norm(&problem.f).max(rows.norm());
+    rows.start(&problem.f);
+    rows.add(1.0, &problem.H, r);
     if let Some(b) = &problem.bilateral {
-        b.G.mul_add(1.0, lambda, buffer);
+        rows.add(1.0, &b.G, lambda);
     }
-    problem.M.mul_add(-1.0, v, buffer);
-    over(norm(buffer), scale)
+    rows.add(-1.0, &problem.M, v);
+    Imbalance {
+        residual: over(rows.norm(), scale),
+        rounding: over(16.0 * f64::EPSILON * norm(rows.sizes()), scale),
+    }
 }

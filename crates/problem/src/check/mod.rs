@@ -8,6 +8,7 @@ mod certificate;
 mod contact;
 mod global;
 mod local;
+mod rows;
 mod verdict;
 
 pub use certificate::Certificate;
@@ -19,7 +20,7 @@ pub use verdict::{Judged, StatusCounts, Verdict};
 
 use serde::Serialize;
 
-/// The dynamics residual that still counts as rounding.
+/// The dynamics residual that always counts as rounding; see [`Measure::dynamics_rounding`].
 pub const DYNAMICS_TOLERANCE: f64 = 1e-10;
 
 /// The residuals of a point. With `x_c = w_c r_c`, `w_c = tr(W_cc)/D`, `ũ_c = u_c + mu‖u_T‖e_N`:
@@ -34,6 +35,9 @@ pub const DYNAMICS_TOLERANCE: f64 = 1e-10;
 /// u is recomputed from r (for global problems through the dynamics, with `q = Hᵀ M⁻¹ f + w`). Where a contact's
 /// `w_c` is not positive, the mean over the contacts stands in (1 if that is not positive either), so that
 /// such a contact is still judged.
+///
+/// `primal` and `dual` are at most `relative` in exact arithmetic and are tested beside it, because rounding can
+/// hide one residual of a point with huge impulses, but not all three.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Measure {
     /// The unscaled residual in velocity units.
@@ -53,13 +57,31 @@ pub struct Measure {
     /// Global problems: `‖M v − H r − f − G λ‖ / max(‖f‖, ‖H r‖)`, the worse of the caller's v and the judge's own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dynamics: Option<f64>,
-    /// Bilateral constraints: their violation over the size of the terms that should cancel.
+    /// Global problems: what of `dynamics` the rounding of v alone explains, `16 ε ‖|M||v| + |H||r| + |f| + |G||λ|‖` over the
+    /// same scale. Large for stiff M, whose v no double holds exactly enough.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dynamics_rounding: Option<f64>,
+    /// Global problems: `‖Hᵀ (v − v(r))‖ / ‖q‖`, the caller's v against the velocities that follow from r.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity_gap: Option<f64>,
+    /// Bilateral constraints: the largest violation of a constraint over the size of the terms that should cancel in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bilateral: Option<f64>,
     /// The contact with the largest share in `absolute`.
     pub worst_contact: usize,
     /// That contact's share, over `‖q‖`.
     pub worst: f64,
+}
+
+/// A criterion that a point does not meet.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Failing {
+    /// The criterion's name.
+    pub what: &'static str,
+    /// Its value; NaN where the point is not finite.
+    pub value: f64,
+    /// What it may be at most.
+    pub limit: f64,
 }
 
 impl Measure {
@@ -75,31 +97,48 @@ impl Measure {
             dual: never,
             complementarity: never,
             dynamics: None,
+            dynamics_rounding: None,
+            velocity_gap: None,
             bilateral: None,
             worst_contact: 0,
             worst: never,
         }
     }
 
-    /// The decision: relative residual and bilateral violation within `tolerance`, dynamics at rounding level.
-    pub fn passes(&self, tolerance: f64) -> bool {
-        self.relative <= tolerance
-            && self.bilateral.is_none_or(|b| b <= tolerance)
-            && self.dynamics.is_none_or(|d| d <= DYNAMICS_TOLERANCE)
+    /// The criteria: what, value, limit at `tolerance`.
+    fn criteria(&self, tolerance: f64) -> impl Iterator<Item = Failing> {
+        let rounding = self.dynamics_rounding.unwrap_or(0.0).max(DYNAMICS_TOLERANCE);
+        [
+            ("relative residual", Some(self.relative), tolerance),
+            ("primal", Some(self.primal), tolerance),
+            ("dual", Some(self.dual), tolerance),
+            ("bilateral constraints", self.bilateral, tolerance),
+            ("velocities", self.velocity_gap, tolerance),
+            ("dynamics", self.dynamics, rounding),
+        ]
+        .into_iter()
+        .filter_map(|(what, value, limit)| Some(Failing { what, value: value?, limit }))
     }
 
-    /// One number to compare two points of the same problem: the largest of what [`passes`](Self::passes)
-    /// compares with the tolerance, infinite where the point is not finite or the dynamics are violated.
+    /// The decision: every criterion within its limit.
+    pub fn passes(&self, tolerance: f64) -> bool {
+        self.criteria(tolerance).all(|c| c.value <= c.limit)
+    }
+
+    /// The criteria that are not met; empty exactly where the point [`passes`](Self::passes).
+    pub fn failing(&self, tolerance: f64) -> Vec<Failing> {
+        // A NaN is not within any limit.
+        self.criteria(tolerance).filter(|c| c.value.is_nan() || c.value > c.limit).collect()
+    }
+
+    /// One number to compare two points of the same problem: the largest of the values that are compared with the
+    /// tolerance, with the dynamics where they exceed rounding; infinite where a value is NaN.
     pub fn merit(&self) -> f64 {
-        let merit = self.relative.max(self.bilateral.unwrap_or(0.0));
-        // f64::max ignores a NaN: ask each part.
-        if self.relative.is_nan()
-            || self.bilateral.is_some_and(f64::is_nan)
-            || self.dynamics.is_some_and(|d| d.is_nan() || d > DYNAMICS_TOLERANCE)
-        {
-            return f64::INFINITY;
-        }
-        merit
+        self.criteria(0.0).fold(0.0, |merit, c| match c.value {
+            v if v.is_nan() => f64::INFINITY,
+            v if c.limit > 0.0 && v <= c.limit => merit,
+            v => merit.max(v),
+        })
     }
 }
 

@@ -52,7 +52,7 @@ impl<const D: usize> Judged for FrictionLocal<D> {
     fn judge(&self, point: &LocalPoint, tolerance: f64) -> Result<Verdict, ProblemError> {
         self.validate_point(point)?;
         let mut gauge = self.gauge()?;
-        let measure = self.measure(point, &mut gauge);
+        let measure = self.certify(point, &mut gauge);
         Ok(verdict::<D>(measure, &gauge.law, &point.r, gauge.velocity(), &self.mu, tolerance))
     }
 }
@@ -61,7 +61,7 @@ impl<const D: usize> Judged for FrictionGlobal<D> {
     fn judge(&self, point: &GlobalPoint, tolerance: f64) -> Result<Verdict, ProblemError> {
         self.validate_point(point)?;
         let mut gauge = self.gauge()?;
-        let measure = self.measure(point, &mut gauge);
+        let measure = self.certify(point, &mut gauge);
         Ok(verdict::<D>(measure, &gauge.law, &point.r, gauge.velocity(), &self.mu, tolerance))
     }
 }

@@ -1,7 +1,7 @@
 //! The Delassus operator W = Hᵀ M⁻¹ H of a global problem: its diagonal, its condensation, and its factors
 //! contact by contact.
 
-use super::{Block, BlockRow, Bsr, Csc, Inverse};
+use super::{Block, BlockRow, Bsr, Csc, Inverse, Refine};
 
 /// `W = Hᵀ M⁻¹ H` without W: for each contact c the rows of `H_c` (n × D) that are not zero and those of
 /// `Z_c = M⁻¹ H_c`.
@@ -196,7 +196,7 @@ fn solve_columns<const D: usize>(
                         x[inverse.place_in_component(*i as usize)] = row[k];
                     }
                 }
-                inverse.solve_component(component, x, &mut scratch);
+                inverse.solve_component(component, x, &mut scratch, Refine::Once);
                 z[start..].iter_mut().zip(x).for_each(|(z, x)| z.1[k] = *x);
             }
         }

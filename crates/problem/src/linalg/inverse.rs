@@ -3,19 +3,21 @@
 use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
 
-use super::{Csc, norm};
+use super::{Compensated, Csc, norm};
 use crate::ProblemError;
 
 /// Components up to this size are factorised densely; rigid bodies have 1, 3 or 6.
 const DENSE_LIMIT: usize = 48;
 /// The relative size of the regularisation of bilateral rows; refinement removes its bias.
-const BILATERAL_REGULARISATION: f64 = 1e-9;
+const BILATERAL_REGULARISATION: f64 = 1e-12;
+/// Refinement converges in a few steps or not at all.
+const MOST_REFINEMENTS: usize = 40;
 
 /// `A⁻¹` for a square sparse A, by one LU factorisation per connected component of A's graph.
 ///
 /// A mass matrix of rigid bodies falls into components of 1 to 6 unknowns, each a small dense LU; a finite
-/// element body or a mechanism is one component with a sparse LU (faer). Each solve is followed by iterative
-/// refinement against A itself. With [`Inverse::saddle`] the matrix is `[M, −G; Gᵀ, 0]`, so bilateral
+/// element body or a mechanism is one component with a sparse LU (faer). Solves are refined
+/// against A itself, with residuals in doubled precision where it matters. With [`Inverse::saddle`] the matrix is `[M, −G; Gᵀ, 0]`, so bilateral
 /// constraints, redundant ones included, are honoured by every product with the inverse.
 #[derive(Debug, Clone)]
 pub struct Inverse {
@@ -23,7 +25,17 @@ pub struct Inverse {
     components: Vec<Component>,
     /// For each unknown: its component and its place there.
     place: Vec<(u32, u32)>,
-    refinements: usize,
+    /// The factor is that of A with a small diagonal added.
+    regularised: bool,
+}
+
+/// How far a solve is refined.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refine {
+    /// One step, if the factor is that of A itself: backward stable.
+    Once,
+    /// Until the correction is rounding, with residuals in doubled precision: as accurate as A's data allow.
+    Fully,
 }
 
 #[derive(Debug, Clone)]
@@ -34,6 +46,7 @@ struct Component {
 
 #[derive(Debug, Clone)]
 enum Factor {
+    /// The entry itself.
     Scalar(f64),
     Dense(DenseLu),
     Cholesky(Box<faer::sparse::linalg::solvers::Llt<usize, f64>>),
@@ -47,12 +60,12 @@ impl Inverse {
     /// it is symmetric positive definite).
     /// Errors: a singular matrix, by the first unknown of the component at fault.
     pub fn new(a: &Csc, name: &str) -> Result<Self, ProblemError> {
-        Self::with_factor_of(a.clone(), a, name, 1)
+        Self::with_factor_of(a.clone(), a, name, false)
     }
 
     /// Factorises `[M, −G; Gᵀ, 0]`, the dynamics under the bilateral constraints `Gᵀ v + b = 0`.
     ///
-    /// The factor is that of `[M, −G; Gᵀ, δD]` with `D = diag(Gᵀ M⁻¹ G)`, δ = 1e-9; each refinement step is one
+    /// The factor is that of `[M, −G; Gᵀ, δD]` with `D = diag(Gᵀ M⁻¹ G)`, δ = 1e-12; each refinement step is one
     /// step of the proximal method of multipliers, which converges for redundant constraints as well.
     pub fn saddle(m: &Csc, g: &Csc) -> Result<Self, ProblemError> {
         let (n, p) = (m.nrows(), g.ncols());
@@ -82,27 +95,33 @@ impl Inverse {
             Csc::from_triplets(n + p, n + p, exact)?,
             &Csc::from_triplets(n + p, n + p, regular)?,
             "M with G",
-            4,
+            true,
         )
     }
 
-    /// Factorises a positive semidefinite matrix such as `R = Gᵀ M⁻¹ G`, singular where constraints are
-    /// redundant: `A⁻¹ b` is then a solution of the consistent system. Same regularisation as [`saddle`](Self::saddle).
-    pub fn semidefinite(a: &Csc, name: &str) -> Result<Self, ProblemError> {
-        let delta = (0..a.nrows()).map(|i| {
-            let d = a.get(i, i);
+    /// Factorises the matrix R of bilateral multipliers: as it is where it is invertible, else, as `R = Gᵀ M⁻¹ G` of
+    /// redundant constraints, with a small diagonal added. `R⁻¹ b` is then a solution of the consistent system.
+    pub fn of_multipliers(r: &Csc, name: &str) -> Result<Self, ProblemError> {
+        if let Ok(inverse) = Self::new(r, name) {
+            return Ok(inverse);
+        }
+        let p = r.nrows();
+        let mean = (0..p).map(|i| r.get(i, i).abs()).sum::<f64>() / p.max(1) as f64;
+        let delta = (0..p).map(|i| {
+            let d = r.get(i, i).abs();
             // An empty row constrains nothing.
+            let d = if d > 0.0 { d } else { mean };
             (i, i, if d > 0.0 { BILATERAL_REGULARISATION * d } else { 1.0 })
         });
-        let regular = Csc::from_triplets(a.nrows(), a.ncols(), a.triplets().chain(delta))?;
-        Self::with_factor_of(a.clone(), &regular, name, 4)
+        let regular = Csc::from_triplets(p, p, r.triplets().chain(delta))?;
+        Self::with_factor_of(r.clone(), &regular, name, true)
     }
 
     fn with_factor_of(
         matrix: Csc,
         regular: &Csc,
         name: &str,
-        refinements: usize,
+        regularised: bool,
     ) -> Result<Self, ProblemError> {
         let (index, place) = connected_components(&matrix);
         let components = index
@@ -116,29 +135,38 @@ impl Inverse {
                 Ok(Component { index, factor })
             })
             .collect::<Result<Vec<_>, ProblemError>>()?;
-        let out = Self { matrix, components, place, refinements };
+        let out = Self { matrix, components, place, regularised };
         out.verify(name)?;
         Ok(out)
     }
 
-    /// Solves for one pseudo-random right-hand side: a factorisation that cannot is of a singular matrix.
+    /// Solves for a known pseudo-random solution: a factorisation that does not find it is of a singular matrix.
+    /// Of a regularised matrix, whose solutions are many, the residual is asked to vanish.
     fn verify(&self, name: &str) -> Result<(), ProblemError> {
         let n = self.dim();
-        let y: Vec<f64> =
+        let known: Vec<f64> =
             (0..n).map(|i| 1.0 + (i as f64 * 0.618_033_988_749_895).fract()).collect();
         let mut b = vec![0.0; n];
-        self.matrix.mul_add(1.0, &y, &mut b);
+        self.matrix.mul_add(1.0, &known, &mut b);
         let mut x = b.clone();
         self.solve(&mut x);
-        let mut residual = b.clone();
-        self.matrix.mul_add(-1.0, &x, &mut residual);
+        let (error, size): (Vec<f64>, Vec<f64>) = if self.regularised {
+            let mut residual = b.clone();
+            self.matrix.mul_add(-1.0, &x, &mut residual);
+            (residual, b)
+        } else {
+            (x.iter().zip(&known).map(|(x, y)| x - y).collect(), known)
+        };
+        let most = if self.regularised { 1e-8 } else { 1e-2 };
         for component in &self.components {
             let part = |v: &[f64]| norm(&component.index.iter().map(|&i| v[i]).collect::<Vec<_>>());
-            let error = part(&residual) / part(&b).max(f64::MIN_POSITIVE);
-            if error.is_nan() || error > 1e-8 {
+            let error = part(&error) / part(&size).max(f64::MIN_POSITIVE);
+            if error.is_nan() || error > most {
                 return Err(ProblemError::Singular {
                     place: format!("{name} (component of row {})", component.index[0]),
-                    found: format!("a solve with relative residual {error:.1e}"),
+                    found: format!(
+                        "one that does not reproduce a known solution ({error:.0e} off)"
+                    ),
                 });
             }
         }
@@ -170,59 +198,101 @@ impl Inverse {
         &self.components[k].index
     }
 
-    /// `x ← A⁻¹ x`.
+    /// `x ← A⁻¹ x`, fully refined.
     pub fn solve(&self, x: &mut [f64]) {
-        let largest = self.component_sizes().max().unwrap_or(0);
-        self.solve_with(x, &mut vec![0.0; 3 * largest]);
+        self.solve_with(x, &mut vec![0.0; self.scratch_len()], Refine::Fully);
     }
 
     /// The length of the buffer that [`solve_with`](Inverse::solve_with) asks for.
     pub fn scratch_len(&self) -> usize {
-        3 * self.component_sizes().max().unwrap_or(0)
+        5 * self.component_sizes().max().unwrap_or(0)
     }
 
     /// `x ← A⁻¹ x` within a buffer of [`scratch_len`](Inverse::scratch_len) entries.
     ///
     /// Allocates nothing unless a component is factorised sparsely.
-    pub fn solve_with(&self, x: &mut [f64], scratch: &mut [f64]) {
+    pub fn solve_with(&self, x: &mut [f64], scratch: &mut [f64], refine: Refine) {
         for (k, component) in self.components.iter().enumerate() {
             let size = component.index.len();
             let (local, rest) = scratch.split_at_mut(size);
             for (l, &i) in local.iter_mut().zip(&component.index) {
                 *l = x[i];
             }
-            self.solve_component(k, local, rest);
+            self.solve_component(k, local, rest, refine);
             for (l, &i) in local.iter().zip(&component.index) {
                 x[i] = *l;
             }
         }
     }
 
+    /// Where `residual` is what a regularised solve leaves of an inconsistent right-hand side: the direction in which its
+    /// solution runs away, a null vector of A up to rounding. Overwrites `residual`.
+    pub fn null_direction(&self, residual: &mut [f64]) {
+        for component in &self.components {
+            let mut local: Vec<f64> = component.index.iter().map(|&i| residual[i]).collect();
+            component.factor.solve(&mut local);
+            component.index.iter().zip(local).for_each(|(&i, x)| residual[i] = x);
+        }
+        let largest = residual.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        if largest > 0.0 {
+            residual.iter_mut().for_each(|x| *x /= largest);
+        }
+    }
+
     /// Solves within component `k`: `x` holds its right-hand side, then its solution.
-    /// `scratch` has at least twice the component's size.
-    pub fn solve_component(&self, k: usize, x: &mut [f64], scratch: &mut [f64]) {
+    /// `scratch` has at least four times the component's size. A regularised factor is always refined fully.
+    pub fn solve_component(&self, k: usize, x: &mut [f64], scratch: &mut [f64], refine: Refine) {
         let Component { index, factor } = &self.components[k];
-        if let Factor::Scalar(inverse) = factor {
-            x[0] *= inverse;
+        if let (Factor::Scalar(entry), false) = (factor, self.regularised) {
+            x[0] /= entry;
             return;
         }
-        let (b, rest) = scratch.split_at_mut(x.len());
-        let residual = &mut rest[..x.len()];
+        let n = x.len();
+        let (b, rest) = scratch.split_at_mut(n);
+        let (step, rest) = rest.split_at_mut(n);
+        let (sum, rest) = rest.split_at_mut(n);
+        let error = &mut rest[..n];
         b.copy_from_slice(x);
         factor.solve(x);
-        for _ in 0..self.refinements {
-            // residual = b − A x, within the component.
-            residual.copy_from_slice(b);
+        let most = match refine {
+            Refine::Once if !self.regularised => 1,
+            _ => MOST_REFINEMENTS,
+        };
+        let mut last = f64::INFINITY;
+        for pass in 0..most {
+            // step = b − A x, within the component, then A⁻¹ of it.
+            sum.copy_from_slice(b);
+            error.fill(0.0);
             for (j, &xj) in index.iter().zip(x.iter()) {
                 let (rows, values) = self.matrix.column(*j);
                 for (&i, &v) in rows.iter().zip(values) {
-                    residual[self.place[i].1 as usize] -= v * xj;
+                    let i = self.place[i].1 as usize;
+                    if most == 1 {
+                        sum[i] -= v * xj;
+                    } else {
+                        let mut term = Compensated::parts(sum[i], error[i]);
+                        term.add_product(-v, xj);
+                        (sum[i], error[i]) = term.into_parts();
+                    }
                 }
             }
-            factor.solve(residual);
-            for (xi, ri) in x.iter_mut().zip(residual.iter()) {
-                *xi += ri;
+            for i in 0..n {
+                step[i] = Compensated::parts(sum[i], error[i]).value();
             }
+            factor.solve(step);
+            let largest = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            let correction = largest(step);
+            // Of an inconsistent system only the multipliers go on moving, at the same pace: stop.
+            if !correction.is_finite() || (pass > 2 && correction > 0.9 * last) {
+                break;
+            }
+            for (xi, si) in x.iter_mut().zip(step.iter()) {
+                *xi += si;
+            }
+            if correction <= f64::EPSILON * largest(x) {
+                break;
+            }
+            last = correction;
         }
     }
 }
@@ -230,7 +300,7 @@ impl Inverse {
 impl Factor {
     fn solve(&self, x: &mut [f64]) {
         match self {
-            Factor::Scalar(inverse) => x[0] *= inverse,
+            Factor::Scalar(entry) => x[0] /= entry,
             Factor::Dense(lu) => lu.solve(x),
             Factor::Cholesky(llt) => llt.solve_in_place(column(x)),
             Factor::Sparse(lu) => lu.solve_in_place(column(x)),
@@ -248,8 +318,8 @@ fn column(x: &mut [f64]) -> faer::MatMut<'_, f64> {
 fn factorise(a: &Csc, index: &[usize], place: &[(u32, u32)]) -> Option<Factor> {
     let n = index.len();
     if n == 1 {
-        let inverse = 1.0 / a.get(index[0], index[0]);
-        return inverse.is_finite().then_some(Factor::Scalar(inverse));
+        let entry = a.get(index[0], index[0]);
+        return (1.0 / entry).is_finite().then_some(Factor::Scalar(entry));
     }
     let entries = index.iter().enumerate().flat_map(|(j, &column)| {
         let (rows, values) = a.column(column);

@@ -5,6 +5,7 @@
 //! [`Delassus`]: W = Hᵀ M⁻¹ H as an operator, never formed, or condensed into a [`Bsr`].
 
 mod bsr;
+mod compensated;
 mod csc;
 mod delassus;
 mod inverse;
@@ -12,9 +13,10 @@ mod row;
 pub mod small;
 
 pub use bsr::{Block, BlockRow, Bsr};
+pub use compensated::Compensated;
 pub use csc::Csc;
 pub use delassus::Delassus;
-pub use inverse::Inverse;
+pub use inverse::{Inverse, Refine};
 
 /// The Euclidean norm, scaled so that neither overflow nor underflow of the squares spoils it.
 pub fn norm(x: &[f64]) -> f64 {

@@ -4,7 +4,8 @@
 //! `Z_c = M⁻¹ H_c` (so that an impulse moves v at the same cost). Products with W are one solve, `Hᵀ M⁻¹ (H r + f) + w`, and need no Z. `complete` recomputes v exactly, so the rounding that the
 //! increments gather never reaches a judged point.
 
-use nonsmooth_problem::linalg::{Block, Csc, Delassus, norm, small};
+use nonsmooth_problem::check::Certificate;
+use nonsmooth_problem::linalg::{Block, Csc, Delassus, Refine, norm, small};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
 use super::{Access, Blockwise, Contacts, Linear};
@@ -19,6 +20,7 @@ pub struct GlobalState<const D: usize> {
     q: Vec<f64>,
     scale: f64,
     v: Vec<f64>,
+    contradiction: Option<Certificate>,
 }
 
 /// What a family's access to W needs beside the dynamics.
@@ -31,7 +33,7 @@ enum Operator<const D: usize> {
 
 impl<const D: usize> GlobalState<D> {
     fn update_free_velocity(&mut self, problem: &FrictionGlobal<D>) {
-        self.dynamics.free_velocity(problem, &mut self.q);
+        self.contradiction = self.dynamics.free_velocity(problem, &mut self.q);
         let norm_q = norm(&self.q);
         self.scale = if norm_q > 0.0 { norm_q } else { 1.0 };
     }
@@ -52,6 +54,7 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
             q: vec![0.0; self.w.len()],
             scale: 1.0,
             v: vec![0.0; self.dofs()],
+            contradiction: None,
             dynamics,
         };
         state.update_free_velocity(self);
@@ -69,6 +72,10 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
             *state = self.state(access)?;
         }
         Ok(())
+    }
+
+    fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Certificate> {
+        state.contradiction.as_ref()
     }
 
     fn mu(&self) -> &[f64] {
@@ -91,7 +98,7 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     }
 
     fn enter(&self, state: &mut Self::State, point: &GlobalPoint) {
-        let (v, _) = state.dynamics.solve(self, &point.r);
+        let (v, _) = state.dynamics.solve(self, &point.r, Refine::Once);
         state.v.copy_from_slice(v);
     }
 
@@ -132,7 +139,7 @@ impl<const D: usize> Blockwise<D> for FrictionGlobal<D> {
 
 impl<const D: usize> Linear<D> for FrictionGlobal<D> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
-        let (v, _) = state.dynamics.solve(self, r);
+        let (v, _) = state.dynamics.solve(self, r, Refine::Once);
         self.velocity_into(v, u);
     }
 }

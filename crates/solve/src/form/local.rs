@@ -3,8 +3,9 @@
 //! Bilateral rows `0 = Vᵀ r + R λ + s` are eliminated once: `W ← W − V R⁻¹ Vᵀ`, `q ← q − V R⁻¹ s`. Redundant
 //! constraints (a singular, positive semidefinite R) are honoured.
 
-use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse, norm, small};
-use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint};
+use nonsmooth_problem::check::Certificate;
+use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse, Refine, norm, small};
+use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint, Problem};
 
 use super::{Access, Blockwise, Contacts, Linear};
 use crate::SolveError;
@@ -25,11 +26,13 @@ struct Eliminated<const D: usize> {
     r: Csc,
     lambda: Vec<f64>,
     scratch: Vec<f64>,
+    residual: Vec<f64>,
+    contradiction: Option<Certificate>,
 }
 
 impl<const D: usize> Eliminated<D> {
     fn new(problem: &FrictionLocal<D>, b: &BilateralLocal) -> Result<Self, SolveError> {
-        let r_inverse = Inverse::semidefinite(&b.R, "R")?;
+        let r_inverse = Inverse::of_multipliers(&b.R, "R")?;
         // V R⁻¹ Vᵀ is the Delassus operator of "H = Vᵀ, M = R".
         let schur = Delassus::condense(&b.V.transpose(), &r_inverse);
         let mut eliminated = Self {
@@ -41,6 +44,8 @@ impl<const D: usize> Eliminated<D> {
             lambda: vec![0.0; b.s.len()],
             scratch: vec![0.0; r_inverse.scratch_len()],
             r_inverse,
+            residual: vec![0.0; b.s.len()],
+            contradiction: None,
         };
         eliminated.update_free_velocity(problem, b);
         Ok(eliminated)
@@ -57,7 +62,19 @@ impl<const D: usize> Eliminated<D> {
 
     fn update_free_velocity(&mut self, problem: &FrictionLocal<D>, b: &BilateralLocal) {
         self.lambda.copy_from_slice(&b.s);
-        self.r_inverse.solve_with(&mut self.lambda, &mut self.scratch);
+        self.r_inverse.solve_with(&mut self.lambda, &mut self.scratch, Refine::Fully);
+        // What R λ = s leaves, where the constraints contradict each other.
+        self.residual.copy_from_slice(&b.s);
+        b.R.mul_add(-1.0, &self.lambda, &mut self.residual);
+        let violated = |(left, s): (&f64, &f64)| left.abs() > 1e-10 * s.abs();
+        self.contradiction = None;
+        if self.residual.iter().zip(&b.s).any(violated) {
+            let mut multipliers = self.residual.clone();
+            self.r_inverse.null_direction(&mut multipliers);
+            let r = vec![0.0; problem.q.len()];
+            self.contradiction =
+                Certificate::toward(r, multipliers, &[], &b.s, |c| problem.verify(c));
+        }
         self.q.copy_from_slice(&problem.q);
         b.V.mul_add(-1.0, &self.lambda, &mut self.q);
     }
@@ -96,6 +113,10 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
         Ok(())
     }
 
+    fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Certificate> {
+        state.eliminated.as_ref()?.contradiction.as_ref()
+    }
+
     fn mu(&self) -> &[f64] {
         &self.mu
     }
@@ -121,7 +142,7 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
                 *l = -s;
             }
             b.V.mul_transpose_add(-1.0, &point.r, &mut point.lambda);
-            e.r_inverse.solve_with(&mut point.lambda, &mut e.scratch);
+            e.r_inverse.solve_with(&mut point.lambda, &mut e.scratch, Refine::Fully);
         }
     }
 }

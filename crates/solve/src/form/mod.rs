@@ -10,6 +10,7 @@ mod global;
 mod local;
 
 use nonsmooth_problem::Problem;
+use nonsmooth_problem::check::Certificate;
 
 use crate::SolveError;
 
@@ -34,6 +35,9 @@ pub trait Contacts<const D: usize>: Problem {
 
     /// Prepares an existing view for this problem and the same access, reusing memory where the shape is the same.
     fn refill(&self, state: &mut Self::State) -> Result<(), SolveError>;
+
+    /// A verified certificate that the bilateral constraints contradict each other, if they do.
+    fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Certificate>;
 
     /// The coefficients of friction.
     fn mu(&self) -> &[f64];

@@ -194,12 +194,13 @@ impl<'a> Sliding<'a> {
         let inv = 1.0 / (det * size);
         let coupling = self.schur.row[0] * t[0] + self.schur.row[1] * t[1];
         let n = coupling * (inv * size) - self.q0;
-        if !(n > 0.0 && n.is_finite()) {
-            // Without a tangential load (size = 0) the contact only presses.
-            return (size == 0.0 && self.q0 < 0.0).then_some([-self.q0, 0.0, 0.0]);
-        }
         let onto = -self.mu * n * (inv * det);
-        Some([n, onto * t[0], onto * t[1]])
+        if n > 0.0 && onto.is_finite() {
+            return Some([n, onto * t[0], onto * t[1]]);
+        }
+        // Without a tangential load (size = 0) the contact only presses. Loads that are all but zero, whose
+        // products underflow, end here too.
+        (size == 0.0 && self.q0 < 0.0).then_some([-self.q0, 0.0, 0.0])
     }
 
     /// The root of `g(α) = ‖A + α q̃‖ − c(α)` by safeguarded Newton from `guess`, and its impulse.
@@ -359,5 +360,15 @@ mod tests {
         for q in [[-1.0, 3.0, 0.5], [-0.1, 30.0, -0.5]] {
             assert!(residual(&Exact, &w, &q, 0.3) < 1e-12);
         }
+        // From kaplaring-12-i000592-1462: a load of subnormal numbers, whose products underflow, gave NaN.
+        let w = [
+            [2.579172796803895, -0.9289108501326886, 1.0260699007046812],
+            [-0.9289108501326886, 7.939394965104379, -0.10318262759041308],
+            [1.0260699007046814, -0.10318262759041308, 11.182318943370722],
+        ];
+        let mut memo = Exact.prepare(&w, 0.5);
+        let q = [-1e-323, 2.17e-322, -1.53e-322];
+        let r = Exact.solve(&mut memo, &w, &q, 0.5, &[5e-324, 0.0, 0.0]);
+        assert!(r.iter().all(|x| x.is_finite()), "{r:?}");
     }
 }

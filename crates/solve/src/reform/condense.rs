@@ -6,6 +6,7 @@
 //! Source: Acary, lecture (2)–(9). Cost: D solves per contact, then one product per pair of contacts that share
 //! a component of M. Storage: W. Fails where M is singular.
 
+use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::{Csc, Delassus};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint};
 
@@ -20,6 +21,7 @@ pub struct Condense;
 pub struct CondenseMemo {
     dynamics: Dynamics,
     h: Csc,
+    contradiction: Option<Certificate>,
 }
 
 impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
@@ -32,10 +34,10 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
     ) -> Result<(FrictionLocal<D>, CondenseMemo), SolveError> {
         let mut dynamics = Dynamics::new(problem)?;
         let mut q = vec![0.0; problem.w.len()];
-        dynamics.free_velocity(problem, &mut q); //                                  q = Hᵀ M⁻¹ f + w
+        let contradiction = dynamics.free_velocity(problem, &mut q); //                                  q = Hᵀ M⁻¹ f + w
         let w = Delassus::condense(&problem.H, &dynamics.inverse); //                W = Hᵀ M⁻¹ H
         let local = FrictionLocal::new(w, q, problem.mu.clone())?;
-        Ok((local, CondenseMemo { dynamics, h: problem.H.clone() }))
+        Ok((local, CondenseMemo { dynamics, h: problem.H.clone(), contradiction }))
     }
 
     fn reduce_again(
@@ -45,13 +47,17 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
         memo: &mut CondenseMemo,
     ) -> Result<(), SolveError> {
         if memo.dynamics.serves(problem) && memo.h == problem.H {
-            memo.dynamics.free_velocity(problem, &mut reduced.q);
+            memo.contradiction = memo.dynamics.free_velocity(problem, &mut reduced.q);
             reduced.mu.clone_from(&problem.mu);
             reduced.validate()?;
         } else {
             (*reduced, *memo) = self.reduce(problem)?;
         }
         Ok(())
+    }
+
+    fn contradiction<'a>(&self, memo: &'a CondenseMemo) -> Option<&'a Certificate> {
+        memo.contradiction.as_ref()
     }
 
     fn lower(&self, _: &FrictionGlobal<D>, point: &GlobalPoint, reduced: &mut LocalPoint) {

@@ -3,6 +3,7 @@
 mod condense;
 
 use nonsmooth_problem::Problem;
+use nonsmooth_problem::check::Certificate;
 
 pub use condense::Condense;
 
@@ -27,6 +28,11 @@ pub trait Reformulation<P: Problem>: Send {
     ) -> Result<(), SolveError> {
         (*reduced, *memo) = self.reduce(problem)?;
         Ok(())
+    }
+
+    /// A verified certificate that the first problem has no solution, where the reduction has come upon one.
+    fn contradiction<'a>(&self, _memo: &'a Self::Memo) -> Option<&'a Certificate> {
+        None
     }
 
     /// A point of the first problem as a starting point of the other.

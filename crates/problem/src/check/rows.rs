@@ -1,0 +1,84 @@
+//! Sums of matrix–vector products, row by row, plainly or in doubled precision.
+
+use crate::linalg::{Compensated, Csc};
+
+/// One compensated sum for each row, and the sum of the sizes of its terms.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Rows {
+    sums: Vec<Compensated>,
+    sizes: Vec<f64>,
+    plainly: bool,
+}
+
+impl Rows {
+    /// Carries doubled precision from now on, or not.
+    pub(super) fn precisely(&mut self, precisely: bool) {
+        self.plainly = !precisely;
+    }
+
+    /// Begins with `x`.
+    pub(super) fn start(&mut self, x: &[f64]) {
+        self.sums.clear();
+        self.sums.extend(x.iter().map(|&x| Compensated::from(x)));
+        self.sizes.clear();
+        self.sizes.extend(x.iter().map(|x| x.abs()));
+    }
+
+    /// Begins with `n` zeros.
+    pub(super) fn start_at_zero(&mut self, n: usize) {
+        self.sums.clear();
+        self.sums.resize(n, Compensated::default());
+        self.sizes.clear();
+        self.sizes.resize(n, 0.0);
+    }
+
+    /// Adds `sign · A x`.
+    pub(super) fn add(&mut self, sign: f64, a: &Csc, x: &[f64]) {
+        for (j, &xj) in x.iter().enumerate() {
+            let (rows, values) = a.column(j);
+            for (&i, &v) in rows.iter().zip(values) {
+                self.add_product(i, sign * v, xj);
+            }
+        }
+    }
+
+    /// Adds `Aᵀ x`.
+    pub(super) fn add_transposed(&mut self, a: &Csc, x: &[f64]) {
+        for j in 0..a.ncols() {
+            let (rows, values) = a.column(j);
+            for (&i, &v) in rows.iter().zip(values) {
+                self.add_product(j, v, x[i]);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn add_product(&mut self, row: usize, a: f64, b: f64) {
+        let product = a * b;
+        if self.plainly {
+            self.sums[row].add_plainly(product);
+        } else {
+            self.sums[row].add_product(a, b);
+        }
+        self.sizes[row] += product.abs();
+    }
+
+    /// The sums, each rounded once.
+    pub(super) fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        self.sums.iter().map(|s| s.value())
+    }
+
+    /// The sizes of the terms of each sum.
+    pub(super) fn sizes(&self) -> &[f64] {
+        &self.sizes
+    }
+
+    /// The Euclidean norm of the sums.
+    pub(super) fn norm(&self) -> f64 {
+        let largest = self.values().fold(0.0_f64, |m, x| m.max(x.abs()));
+        if largest == 0.0 || self.values().any(f64::is_nan) {
+            return self.values().sum::<f64>().abs();
+        }
+        largest * self.values().map(|x| (x / largest).powi(2)).sum::<f64>().sqrt()
+    }
+}
