@@ -144,9 +144,7 @@ pub struct SweepsWork<P: Blockwise<D>, L: LocalSolver<D>, const D: usize> {
     state: P::State,
     contacts: Vec<Contact<L::Memo, D>>,
     order: Order,
-    /// `‖q‖`, the unit of the estimate.
-    scale: f64,
-    /// The mean of `w_c²‖Δr_c‖²` in the last sweep, the yardstick of freezing.
+    /// The mean of `w_c²‖Δr_c‖²/‖q‖²` in the last sweep, the yardstick of freezing.
     mean_move: f64,
     relaxation: Relaxation,
     /// The impulses before the last sweep of a window, where contacts without friction could run away.
@@ -199,12 +197,16 @@ impl Relaxation {
 struct Contact<Memo, const D: usize> {
     w: [[f64; D]; D],
     mu: f64,
-    /// `tr(W_cc)/D` turns an impulse into a velocity.
+    /// `tr(W_cc)/D` over ‖q‖: turns an impulse into a relative velocity.
     unit: f64,
     /// Visits in a row with hardly a move; beyond `freeze_after` it counts sweeps slept.
     settled: u32,
     memo: Memo,
 }
+
+/// The square of a relative move that is far below any rounding: impulses that die away end as zeros instead of
+/// as subnormal numbers, which are slow.
+const NEGLIGIBLE: f64 = 1e-80;
 
 impl<const D: usize, P, L> Solver<P> for Sweeps<L, D>
 where
@@ -218,7 +220,6 @@ where
             state: problem.state(Access::Visits)?,
             contacts: Vec::with_capacity(problem.mu().len()),
             order: Order::new(self.settings.ordering, problem.mu().len(), self.settings.seed),
-            scale: 1.0,
             mean_move: 0.0,
             relaxation: Relaxation::new(self.settings.omega),
             before: Vec::new(),
@@ -244,7 +245,7 @@ where
             return Step::NoSolution(ray.clone());
         }
         let r = P::impulses(point);
-        let SweepsWork { state, contacts, order, scale, mean_move, relaxation, before } = work;
+        let SweepsWork { state, contacts, order, mean_move, relaxation, before } = work;
         if relaxation.last_of_window() && !before.is_empty() {
             before.copy_from_slice(r);
         }
@@ -287,14 +288,12 @@ where
             for k in 0..D {
                 dr[k] -= old[k];
             }
-            let size: f64 = dr.iter().map(|x| x * x).sum();
-            // Not by the size, whose square may be nothing in very small units.
-            if dr != [0.0; D] {
+            let moved: f64 = dr.iter().map(|x| (contact.unit * x).powi(2)).sum();
+            if moved > NEGLIGIBLE {
                 still = false;
                 r[D * c..D * c + D].copy_from_slice(&new);
                 problem.moved(state, c, &dr);
             }
-            let moved = contact.unit * contact.unit * size;
             contact.settled = if moved <= settled_below { contact.settled + 1 } else { 0 };
             moves += moved;
         }
@@ -303,7 +302,7 @@ where
             // Every later sweep would repeat this one.
             return Step::Done;
         }
-        let estimate = moves.sqrt() / *scale;
+        let estimate = moves.sqrt();
         if relaxation.observe(estimate, omega_min)
             && let Some(ray) = runaway::<D>(problem.mu(), before, r)
             && problem.verify(&ray)
@@ -328,7 +327,7 @@ impl<L, const D: usize> Sweeps<L, D> {
         P: Blockwise<D>,
         L: LocalSolver<D>,
     {
-        work.scale = problem.velocity_scale(&work.state);
+        let scale = problem.velocity_scale(&work.state);
         work.order.restart(problem.mu().len(), self.settings.seed);
         let frictionless = problem.mu().contains(&0.0);
         work.before.resize(if frictionless { D * problem.mu().len() } else { 0 }, 0.0);
@@ -336,7 +335,7 @@ impl<L, const D: usize> Sweeps<L, D> {
         for (c, &mu) in problem.mu().iter().enumerate() {
             let w = problem.diagonal_block(&work.state, c);
             let memo = self.local.prepare(&w, mu);
-            let unit = small::mean_diagonal(&w).abs();
+            let unit = small::mean_diagonal(&w).abs() / scale;
             work.contacts.push(Contact { w, mu, unit, settled: 0, memo });
         }
     }
