@@ -38,7 +38,7 @@ pub struct Nsgs {
     pub local: LocalChoice,
     /// Relaxation, in (0, 2); 1 is plain Gauss-Seidel. Below 1 helps flexible bodies, above 1 rarely helps.
     pub omega: f64,
-    /// Where 1000 sweeps bring no progress (a limit cycle), omega is multiplied by 0.8, down to this, in (0, 2).
+    /// Where 1000 sweeps bring no progress and go in circles, omega is multiplied by 0.8, down to this, in (0, 2).
     /// Not below omega: never.
     pub omega_min: f64,
     /// The order of the contacts within a sweep.
@@ -147,26 +147,28 @@ pub struct SweepsWork<P: Blockwise<D>, L: LocalSolver<D>, const D: usize> {
     /// The mean of `w_c²‖Δr_c‖²/‖q‖²` in the last sweep, the yardstick of freezing.
     mean_move: f64,
     relaxation: Relaxation,
-    /// The impulses before the last sweep of a window, where contacts without friction could run away.
-    before: Vec<f64>,
+    /// The impulses before the last two sweeps of a window.
+    marks: [Vec<f64>; 2],
 }
 
 /// The relaxation of the present sweep, lowered where the sweeps go in circles.
 ///
 /// Gauss–Seidel with exact local solves can enter a limit cycle (nonsymmetric W, status changes that chase each other);
-/// a smaller ω breaks it. A cycle shows in that the smallest move of a window of sweeps is no smaller than that of the window before;
-/// convergence at a rate below 0.99998 a sweep is told apart.
+/// a smaller ω breaks it. A cycle shows in two things: the smallest move of a window of sweeps is no smaller than that of
+/// the window before, and one sweep does not move as the one before it did, which slow convergence and impulses that run
+/// away do.
 #[derive(Debug, Clone, Copy)]
 struct Relaxation {
     omega: f64,
-    sweeps: u32,
+    sweeps: usize,
     smallest: f64,
     before: f64,
 }
 
 impl Relaxation {
-    const WINDOW: u32 = 1000;
+    const WINDOW: usize = 1000;
     const NO_PROGRESS: f64 = 0.98;
+    const ALIGNED: f64 = 0.999;
     const FACTOR: f64 = 0.8;
 
     fn new(omega: f64) -> Self {
@@ -174,23 +176,26 @@ impl Relaxation {
     }
 
     /// Counts a sweep; true at the end of a window without progress.
-    fn observe(&mut self, estimate: f64, omega_min: f64) -> bool {
+    fn observe(&mut self, estimate: f64) -> bool {
         self.smallest = self.smallest.min(estimate);
         self.sweeps += 1;
         if self.sweeps < Self::WINDOW {
             return false;
         }
         let stuck = self.smallest > Self::NO_PROGRESS * self.before;
-        if stuck && self.omega > omega_min {
-            self.omega = (Self::FACTOR * self.omega).max(omega_min);
-        }
         (self.sweeps, self.before, self.smallest) = (0, self.smallest, f64::INFINITY);
         stuck
     }
 
-    /// The next sweep is the last of a window.
-    fn last_of_window(&self) -> bool {
-        self.sweeps + 1 == Self::WINDOW
+    /// Which mark the next sweep starts from, if it is one of the last two of a window.
+    fn mark(&self) -> Option<usize> {
+        (self.sweeps + 2).checked_sub(Self::WINDOW)
+    }
+
+    fn lower(&mut self, omega_min: f64) {
+        if self.omega > omega_min {
+            self.omega = (Self::FACTOR * self.omega).max(omega_min);
+        }
     }
 }
 
@@ -222,7 +227,7 @@ where
             order: Order::new(self.settings.ordering, problem.mu().len(), self.settings.seed),
             mean_move: 0.0,
             relaxation: Relaxation::new(self.settings.omega),
-            before: Vec::new(),
+            marks: Default::default(),
         };
         self.fill(problem, &mut work);
         Ok(work)
@@ -245,9 +250,9 @@ where
             return Step::NoSolution(ray.clone());
         }
         let r = P::impulses(point);
-        let SweepsWork { state, contacts, order, mean_move, relaxation, before } = work;
-        if relaxation.last_of_window() && !before.is_empty() {
-            before.copy_from_slice(r);
+        let SweepsWork { state, contacts, order, mean_move, relaxation, marks } = work;
+        if let Some(mark) = relaxation.mark() {
+            marks[mark].copy_from_slice(r);
         }
         let Nsgs { omega_min, freeze_after, freeze_for, .. } = self.settings;
         let omega = relaxation.omega;
@@ -303,11 +308,15 @@ where
             return Step::Done;
         }
         let estimate = moves.sqrt();
-        if relaxation.observe(estimate, omega_min)
-            && let Some(ray) = runaway::<D>(problem.mu(), before, r)
-            && problem.verify(&ray)
-        {
-            return Step::NoSolution(ray);
+        if relaxation.observe(estimate) {
+            let [first, second] = &*marks;
+            if alignment(contacts, first, second, r) < Relaxation::ALIGNED {
+                relaxation.lower(omega_min);
+            } else if let Some(ray) = runaway::<D>(problem.mu(), second, r)
+                && problem.verify(&ray)
+            {
+                return Step::NoSolution(ray);
+            }
         }
         Step::Continue { estimate }
     }
@@ -329,8 +338,9 @@ impl<L, const D: usize> Sweeps<L, D> {
     {
         let scale = problem.velocity_scale(&work.state);
         work.order.restart(problem.mu().len(), self.settings.seed);
-        let frictionless = problem.mu().contains(&0.0);
-        work.before.resize(if frictionless { D * problem.mu().len() } else { 0 }, 0.0);
+        for mark in &mut work.marks {
+            mark.resize(D * problem.mu().len(), 0.0);
+        }
         work.contacts.clear();
         for (c, &mu) in problem.mu().iter().enumerate() {
             let w = problem.diagonal_block(&work.state, c);
@@ -341,10 +351,30 @@ impl<L, const D: usize> Sweeps<L, D> {
     }
 }
 
+/// The cosine of the angle between two successive sweeps' moves, in units of velocity; 0 where nothing moved.
+fn alignment<Memo, const D: usize>(
+    contacts: &[Contact<Memo, D>],
+    first: &[f64],
+    second: &[f64],
+    r: &[f64],
+) -> f64 {
+    let (mut product, mut a, mut b) = (0.0, 0.0, 0.0);
+    for (c, contact) in contacts.iter().enumerate() {
+        for i in D * c..D * c + D {
+            let x = contact.unit * (second[i] - first[i]);
+            let y = contact.unit * (r[i] - second[i]);
+            product += x * y;
+            a += x * x;
+            b += y * y;
+        }
+    }
+    if a > 0.0 && b > 0.0 { product / (a * b).sqrt() } else { 0.0 }
+}
+
 /// The last move of the contacts without friction as a ray: where no motion is admissible, their impulses grow along one
 /// for ever, while all others have settled. A candidate that the judge must verify.
 fn runaway<const D: usize>(mu: &[f64], before: &[f64], r: &[f64]) -> Option<Certificate> {
-    if before.is_empty() {
+    if !mu.contains(&0.0) {
         return None;
     }
     let largest = before.iter().zip(r).fold(0.0_f64, |m, (b, r)| m.max((r - b).abs()));
