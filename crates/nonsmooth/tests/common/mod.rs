@@ -17,19 +17,9 @@ pub fn corpus_files(folders: &[&str]) -> Vec<PathBuf> {
         skipped("NONSMOOTH_CORPUS is not set");
         return vec![];
     };
-    fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                walk(&path, found);
-            } else if path.extension().is_some_and(|e| e == "hdf5") {
-                found.push(path);
-            }
-        }
-    }
-    let mut found = vec![];
-    folders.iter().for_each(|folder| walk(&Path::new(&corpus).join(folder), &mut found));
-    found.sort();
-    assert!(!found.is_empty(), "the corpus at {} holds no files", Path::new(&corpus).display());
+    let corpus = Path::new(&corpus);
+    let roots: Vec<_> = folders.iter().map(|folder| corpus.join(folder)).collect();
+    let found = nonsmooth_bench::problem_files(&roots).unwrap();
+    assert!(!found.is_empty(), "the corpus at {} holds no files", corpus.display());
     found
 }

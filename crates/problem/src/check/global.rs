@@ -85,9 +85,12 @@ impl GlobalGauge {
     ) -> Measure {
         let Self { law, dynamics, u, buffer, rows, .. } = self;
         rows.precisely(precisely);
-        let given = imbalance(problem, &point.v, &point.r, &point.lambda, rows);
+        rows.start_at_zero(problem.dofs());
+        rows.add(1.0, &problem.H, &point.r);
+        let force = norm(&problem.f).max(rows.norm());
+        let given = imbalance(problem, &point.v, &point.r, &point.lambda, force, rows);
         let (v, lambda) = dynamics.solve(problem, &point.r, Refine::Fully);
-        let own = imbalance(problem, v, &point.r, lambda, rows);
+        let own = imbalance(problem, v, &point.r, lambda, force, rows);
         rows.start(&problem.w);
         rows.add_transposed(&problem.H, v);
         u.iter_mut().zip(rows.values()).for_each(|(u, x)| *u = x);
@@ -99,7 +102,8 @@ impl GlobalGauge {
         for ((gap, a), b) in buffer.iter_mut().zip(&point.v).zip(v) {
             *gap = a - b;
         }
-        u_gap(problem, buffer, rows);
+        rows.start_at_zero(problem.w.len());
+        rows.add_transposed(&problem.H, buffer);
         measure.velocity_gap = Some(over(rows.norm(), law.norm_q));
 
         if let Some(b) = &problem.bilateral {
@@ -122,29 +126,21 @@ impl GlobalGauge {
     }
 }
 
-/// `Hᵀ (v − v(r))`.
-fn u_gap<const D: usize>(problem: &FrictionGlobal<D>, gap: &[f64], rows: &mut Rows) {
-    rows.start_at_zero(problem.w.len());
-    rows.add_transposed(&problem.H, gap);
-}
-
 /// The residual of the dynamics and what of it the rounding of v explains.
 struct Imbalance {
     residual: f64,
     rounding: f64,
 }
 
-/// `‖M v − H r − f − G λ‖ / max(‖f‖, ‖H r‖)`.
+/// `‖M v − H r − f − G λ‖` over `force = max(‖f‖, ‖H r‖)`.
 fn imbalance<const D: usize>(
     problem: &FrictionGlobal<D>,
     v: &[f64],
     r: &[f64],
     lambda: &[f64],
+    force: f64,
     rows: &mut Rows,
 ) -> Imbalance {
-    rows.start_at_zero(problem.dofs());
-    rows.add(1.0, &problem.H, r);
-    let scale = norm(&problem.f).max(rows.norm());
     rows.start(&problem.f);
     rows.add(1.0, &problem.H, r);
     if let Some(b) = &problem.bilateral {
@@ -152,7 +148,7 @@ fn imbalance<const D: usize>(
     }
     rows.add(-1.0, &problem.M, v);
     Imbalance {
-        residual: over(rows.norm(), scale),
-        rounding: over(16.0 * f64::EPSILON * norm(rows.sizes()), scale),
+        residual: over(rows.norm(), force),
+        rounding: over(16.0 * f64::EPSILON * norm(rows.sizes()), force),
     }
 }

@@ -1,6 +1,6 @@
 //! Sums of matrix–vector products, row by row, plainly or in doubled precision.
 
-use crate::linalg::{Compensated, Csc};
+use crate::linalg::{Compensated, Csc, norm_of};
 
 /// One compensated sum for each row, and the sum of the sizes of its terms.
 #[derive(Debug, Clone, Default)]
@@ -64,7 +64,7 @@ impl Rows {
     }
 
     /// The sums, each rounded once.
-    pub(super) fn values(&self) -> impl Iterator<Item = f64> + '_ {
+    pub(super) fn values(&self) -> impl Iterator<Item = f64> + Clone + '_ {
         self.sums.iter().map(|s| s.value())
     }
 
@@ -75,10 +75,6 @@ impl Rows {
 
     /// The Euclidean norm of the sums.
     pub(super) fn norm(&self) -> f64 {
-        let largest = self.values().fold(0.0_f64, |m, x| m.max(x.abs()));
-        if largest == 0.0 || self.values().any(f64::is_nan) {
-            return self.values().sum::<f64>().abs();
-        }
-        largest * self.values().map(|x| (x / largest).powi(2)).sum::<f64>().sqrt()
+        norm_of(self.values())
     }
 }

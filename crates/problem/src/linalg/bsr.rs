@@ -1,6 +1,6 @@
 //! Block-sparse rows: the hot storage of W.
 
-use super::{Csc, row, small};
+use super::{Csc, row};
 
 /// A D×D block, by rows.
 pub type Block<const D: usize> = [[f64; D]; D];
@@ -201,11 +201,6 @@ impl<const D: usize> Bsr<D> {
             }
         }
         if all > 0.0 { (skew / all).sqrt() } else { 0.0 }
-    }
-
-    /// The mean diagonal `tr(A_ii)/D` of each diagonal block.
-    pub fn mean_diagonals(&self) -> Vec<f64> {
-        (0..self.nrows()).map(|i| small::mean_diagonal(&self.diagonal_block(i))).collect()
     }
 }
 

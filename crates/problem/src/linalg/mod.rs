@@ -20,14 +20,19 @@ pub use inverse::{Inverse, Refine};
 
 /// The Euclidean norm, scaled so that neither overflow nor underflow of the squares spoils it.
 pub fn norm(x: &[f64]) -> f64 {
-    let plain = x.iter().map(|v| v * v).sum::<f64>();
+    norm_of(x.iter().copied())
+}
+
+/// [`norm`] of values that are computed as they come; they are run through more than once only where the plain sum
+/// of squares leaves the range of f64, or where every value is zero or not finite.
+pub fn norm_of(x: impl Iterator<Item = f64> + Clone) -> f64 {
+    let plain = x.clone().map(|v| v * v).sum::<f64>();
     if plain.is_finite() && plain > f64::MIN_POSITIVE / f64::EPSILON {
         return plain.sqrt();
     }
-    // Rare: the plain sum of squares left the range of f64, or every entry is zero or not finite.
-    let largest = x.iter().fold(0.0_f64, |a, v| a.max(v.abs()));
+    let largest = x.clone().fold(0.0_f64, |a, v| a.max(v.abs()));
     if largest == 0.0 || !largest.is_finite() {
-        return if x.iter().any(|v| v.is_nan()) { f64::NAN } else { largest };
+        return if x.clone().any(f64::is_nan) { f64::NAN } else { largest };
     }
-    largest * x.iter().map(|v| (v / largest) * (v / largest)).sum::<f64>().sqrt()
+    largest * x.map(|v| (v / largest) * (v / largest)).sum::<f64>().sqrt()
 }

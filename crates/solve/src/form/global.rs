@@ -1,14 +1,15 @@
 //! The global problem by its contacts: velocity space, W never formed.
 //!
 //! Contact by contact, the state keeps `v` (so that `u_c = H_cᵀ v + w_c` costs the rows that contact c touches) and
-//! `Z_c = M⁻¹ H_c` (so that an impulse moves v at the same cost). Products with W are one solve, `Hᵀ M⁻¹ (H r + f) + w`, and need no Z. `complete` recomputes v exactly, so the rounding that the
-//! increments gather never reaches a judged point.
+//! `Z_c = M⁻¹ H_c` (so that an impulse moves v at the same cost). Products with W are one solve,
+//! `Hᵀ M⁻¹ (H r + f) + w`, and need no Z. `complete` recomputes v exactly, so the rounding that the increments
+//! gather never reaches a judged point.
 
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Block, Csc, Delassus, Refine, norm, small};
+use nonsmooth_problem::linalg::{Block, Csc, Delassus, Refine, small};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
-use super::{Access, Blockwise, Contacts, Linear};
+use super::{Access, Blockwise, Contacts, Linear, velocity_scale};
 use crate::SolveError;
 
 /// What the view keeps.
@@ -34,8 +35,7 @@ enum Operator<const D: usize> {
 impl<const D: usize> GlobalState<D> {
     fn update_free_velocity(&mut self, problem: &FrictionGlobal<D>) {
         self.contradiction = self.dynamics.free_velocity(problem, &mut self.q);
-        let norm_q = norm(&self.q);
-        self.scale = if norm_q > 0.0 { norm_q } else { 1.0 };
+        self.scale = velocity_scale(&self.q);
     }
 }
 
@@ -108,10 +108,10 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     }
 }
 
-impl<const D: usize> GlobalState<D> {
+impl<const D: usize> Operator<D> {
     #[inline(always)]
     fn visits(&self) -> &Delassus<D> {
-        match &self.operator {
+        match self {
             Operator::Visits(delassus) => delassus,
             Operator::Products(_) => unreachable!("a state for products is not visited"),
         }
@@ -121,7 +121,7 @@ impl<const D: usize> GlobalState<D> {
 impl<const D: usize> Blockwise<D> for FrictionGlobal<D> {
     #[inline(always)]
     fn velocity(&self, state: &Self::State, _: &[f64], c: usize) -> [f64; D] {
-        let mut u = state.visits().local_velocity(c, &state.v);
+        let mut u = state.operator.visits().local_velocity(c, &state.v);
         let w: [f64; D] = small::block(&self.w, c);
         for k in 0..D {
             u[k] += w[k];
@@ -131,9 +131,7 @@ impl<const D: usize> Blockwise<D> for FrictionGlobal<D> {
 
     #[inline(always)]
     fn moved(&self, state: &mut Self::State, c: usize, dr: &[f64; D]) {
-        let mut v = std::mem::take(&mut state.v);
-        state.visits().apply_impulse(c, dr, &mut v);
-        state.v = v;
+        state.operator.visits().apply_impulse(c, dr, &mut state.v);
     }
 }
 

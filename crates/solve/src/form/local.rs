@@ -4,10 +4,10 @@
 //! constraints (a singular, positive semidefinite R) are honoured.
 
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse, Refine, norm, small};
+use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse, Refine, small};
 use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint, Problem};
 
-use super::{Access, Blockwise, Contacts, Linear};
+use super::{Access, Blockwise, Contacts, Linear, velocity_scale};
 use crate::SolveError;
 
 /// What the view keeps: the norm of q, and the problem without its bilateral rows where it has any.
@@ -95,13 +95,11 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
 
     fn state(&self, _: Access) -> Result<Self::State, SolveError> {
         let eliminated = self.bilateral.as_ref().map(|b| Eliminated::new(self, b)).transpose()?;
-        let norm_q = norm(&self.q);
-        Ok(LocalState { scale: if norm_q > 0.0 { norm_q } else { 1.0 }, eliminated })
+        Ok(LocalState { scale: velocity_scale(&self.q), eliminated })
     }
 
     fn refill(&self, state: &mut Self::State) -> Result<(), SolveError> {
-        let norm_q = norm(&self.q);
-        state.scale = if norm_q > 0.0 { norm_q } else { 1.0 };
+        state.scale = velocity_scale(&self.q);
         let kept = match (&mut state.eliminated, &self.bilateral) {
             (None, None) => true,
             (Some(eliminated), Some(b)) => eliminated.refill(self, b),

@@ -72,3 +72,11 @@ pub trait Linear<const D: usize>: Contacts<D> {
     /// `u = W r + q`.
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]);
 }
+
+/// `‖q‖`, or 1 where q = 0.
+fn velocity_scale(q: &[f64]) -> f64 {
+    match nonsmooth_problem::linalg::norm(q) {
+        size if size > 0.0 => size,
+        _ => 1.0,
+    }
+}

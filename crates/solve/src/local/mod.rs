@@ -10,6 +10,8 @@ mod quartic;
 
 use nonsmooth_problem::linalg::small;
 
+use crate::cone;
+
 pub use exact::Exact;
 pub use newton::Newton;
 pub use projection::{Projection, ProjectionIterated};
@@ -43,6 +45,29 @@ pub fn frictionless<const D: usize>(w: &[[f64; D]; D], q: &[f64; D], r: &[f64; D
         out[0] = if w[0][0] > 0.0 { -q[0] / w[0][0] } else { r[0].max(0.0) };
     }
     out
+}
+
+/// `u = W r + q`.
+#[inline(always)]
+fn velocity<const D: usize>(w: &[[f64; D]; D], q: &[f64; D], r: &[f64; D]) -> [f64; D] {
+    let mut u = small::mul(w, r);
+    for k in 0..D {
+        u[k] += q[k];
+    }
+    u
+}
+
+/// `ũ = u + mu‖u_T‖ e_N`.
+#[inline(always)]
+fn modified_velocity<const D: usize>(
+    w: &[[f64; D]; D],
+    q: &[f64; D],
+    mu: f64,
+    r: &[f64; D],
+) -> [f64; D] {
+    let mut u = velocity(w, q, r);
+    u[0] += mu * cone::tangential_norm(&u);
+    u
 }
 
 /// The inverse of a block, or of the block with a small multiple of its mean diagonal added where it is singular

@@ -8,7 +8,7 @@
 
 use nonsmooth_problem::linalg::small::{self, mul};
 
-use super::{Exact, LocalSolver, norm_bound};
+use super::{Exact, LocalSolver, norm_bound, velocity};
 use crate::cfun::{Disk, Radii, alart_curnier};
 
 /// The Newton local solver.
@@ -62,13 +62,7 @@ fn newton<const D: usize>(
     rho: Radii,
     start: &[f64; D],
 ) -> Option<[f64; D]> {
-    let linearise = |r: &[f64; D]| {
-        let mut u = mul(w, r);
-        for k in 0..D {
-            u[k] += q[k];
-        }
-        alart_curnier(disk, &u, r, mu, rho)
-    };
+    let linearise = |r: &[f64; D]| alart_curnier(disk, &velocity(w, q, r), r, mu, rho);
     let size = |x: &[f64; D]| x.iter().map(|v| v * v).sum::<f64>().sqrt();
     // Rounding in Φ is that of ρ q and of r.
     let floor = 4.0 * f64::EPSILON * rho.normal.max(rho.tangential) * size(q);

@@ -6,9 +6,7 @@
 //! Source: DeSaxceFeng1991; Acary, lecture (105)–(109); Khobotov1987. Cost: about 40 flops a step. A single step
 //! per visit converges slowly when the block is badly conditioned, and may not at all for large mu.
 
-use nonsmooth_problem::linalg::small::mul;
-
-use super::{LocalSolver, norm_bound};
+use super::{LocalSolver, modified_velocity, norm_bound};
 use crate::cone;
 
 /// One projection step a visit.
@@ -68,16 +66,16 @@ impl<const D: usize> LocalSolver<D> for ProjectionIterated {
         let mut r = *r;
         let mut f = modified_velocity(w, q, mu, &r);
         for _ in 0..self.steps {
-            let mut next = projected(&r, &f, *rho, mu);
-            let mut f_next = modified_velocity(w, q, mu, &next);
-            let mut ratio = *rho * distance(&f, &f_next) / distance(&r, &next);
-            // A NaN (no movement) ends both loops.
-            while ratio > 0.9 {
+            let (next, f_next, ratio) = loop {
+                let next = projected(&r, &f, *rho, mu);
+                let f_next = modified_velocity(w, q, mu, &next);
+                let ratio = *rho * distance(&f, &f_next) / distance(&r, &next);
+                // A NaN (no movement) is accepted, and ends the outer loop below.
+                if ratio.is_nan() || ratio <= 0.9 {
+                    break (next, f_next, ratio);
+                }
                 *rho *= 2.0 / 3.0;
-                next = projected(&r, &f, *rho, mu);
-                f_next = modified_velocity(w, q, mu, &next);
-                ratio = *rho * distance(&f, &f_next) / distance(&r, &next);
-            }
+            };
             let moved = distance(&r, &next);
             (r, f) = (next, f_next);
             if moved <= 4.0 * f64::EPSILON * distance(&r, &[0.0; D]) {
@@ -94,21 +92,6 @@ impl<const D: usize> LocalSolver<D> for ProjectionIterated {
 fn step_length<const D: usize>(w: &[[f64; D]; D]) -> f64 {
     let bound = norm_bound(w);
     if bound > 0.0 { 1.0 / bound } else { 1.0 }
-}
-
-#[inline(always)]
-fn modified_velocity<const D: usize>(
-    w: &[[f64; D]; D],
-    q: &[f64; D],
-    mu: f64,
-    r: &[f64; D],
-) -> [f64; D] {
-    let mut u = mul(w, r);
-    for k in 0..D {
-        u[k] += q[k];
-    }
-    u[0] += mu * cone::tangential_norm(&u);
-    u
 }
 
 #[inline(always)]

@@ -5,10 +5,10 @@
 //! residual is smallest is taken. Cost: about 500 flops.
 //! Source: BonnefonDaviet2011; DBB11, appendix B.
 
-use nonsmooth_problem::linalg::small::mul;
+use nonsmooth_problem::linalg::small;
 
 use super::exact::{Schur, Sliding, embed, stick};
-use super::{Exact, LocalSolver, inverse_or_regularised};
+use super::{Exact, LocalSolver, inverse_or_regularised, modified_velocity};
 use crate::cone;
 
 /// The local solver that enumerates the roots of the quartic.
@@ -72,12 +72,8 @@ impl<const D: usize> LocalSolver<D> for Quartic {
 
 /// `‖w̄ r − P_K(w̄ r − ũ)‖²`, w̄ the mean diagonal.
 fn natural_residual<const D: usize>(w: &[[f64; D]; D], q: &[f64; D], mu: f64, r: &[f64; D]) -> f64 {
-    let mean = nonsmooth_problem::linalg::small::mean_diagonal(w);
-    let mut u = mul(w, r);
-    for k in 0..D {
-        u[k] += q[k];
-    }
-    u[0] += mu * cone::tangential_norm(&u);
+    let mean = small::mean_diagonal(w);
+    let u = modified_velocity(w, q, mu, r);
     let mut x = [0.0; D];
     for k in 0..D {
         x[k] = mean * r[k] - u[k];

@@ -116,34 +116,20 @@ impl<P: Linear<D>, const D: usize> Field<P, D> {
 
     /// `‖r − trial‖` in units of velocity, over `‖q‖`, for a step of length one: an estimate of the relative residual.
     pub(super) fn estimate(&self, r: &[f64]) -> f64 {
-        self.distance(r, &self.trial) / (self.scale * self.rho.min(1.0))
+        let moved = self.weighted_squares(r, &self.trial, |w| w * w).sqrt();
+        moved / (self.scale * self.rho.min(1.0))
     }
 
     /// `ρ ‖F(r) − F(trial)‖ / ‖r − trial‖` in the dual and the primal metric; NaN where nothing moved.
     pub(super) fn lipschitz_ratio(&self, r: &[f64]) -> f64 {
-        let mut fields = 0.0;
-        for (c, &w) in self.unit.iter().enumerate() {
-            for i in D * c..D * c + D {
-                fields += (self.f[i] - self.trial_f[i]).powi(2) / w;
-            }
-        }
-        let mut points = 0.0;
-        for (c, &w) in self.unit.iter().enumerate() {
-            for i in D * c..D * c + D {
-                points += (r[i] - self.trial[i]).powi(2) * w;
-            }
-        }
+        let fields = self.weighted_squares(&self.f, &self.trial_f, |w| 1.0 / w);
+        let points = self.weighted_squares(r, &self.trial, |w| w);
         self.rho * (fields / points).sqrt()
     }
 
-    /// `‖(w_c (x_c − y_c))_c‖`.
-    fn distance(&self, x: &[f64], y: &[f64]) -> f64 {
-        let mut sum = 0.0;
-        for (c, &w) in self.unit.iter().enumerate() {
-            for i in D * c..D * c + D {
-                sum += (w * (x[i] - y[i])).powi(2);
-            }
-        }
-        sum.sqrt()
+    /// `Σ weight(w_c) ‖x_c − y_c‖²`.
+    fn weighted_squares(&self, x: &[f64], y: &[f64], weight: impl Fn(f64) -> f64) -> f64 {
+        let square = |c: usize| (D * c..D * c + D).map(|i| (x[i] - y[i]).powi(2)).sum::<f64>();
+        self.unit.iter().enumerate().map(|(c, &w)| weight(w) * square(c)).sum()
     }
 }
