@@ -2,6 +2,9 @@
 //!
 //! Timings are ratios against a baseline measured in the same run; see `examples/`.
 
+pub mod record;
+pub mod runs;
+
 use std::path::{Path, PathBuf};
 
 /// All `.hdf5` files under the given files and folders, sorted.

@@ -1,0 +1,176 @@
+//! Files of runs: reading them, joining several, and what is wrong with them.
+
+use std::collections::{BTreeMap, HashSet};
+use std::path::{Path, PathBuf};
+
+use crate::record::{Campaign, FORMAT, Line, Problem, Run, VERSION};
+
+/// Why a file of runs cannot be used. One line each.
+#[derive(Debug, thiserror::Error)]
+pub enum RunsError {
+    /// The system refuses.
+    #[error("{}: {cause}", file.display())]
+    Io {
+        /// The file.
+        file: PathBuf,
+        /// What the system says.
+        cause: std::io::Error,
+    },
+    /// A line that is none of the format's.
+    #[error("{}, line {line}: expected a line of {FORMAT}, found {found}", file.display())]
+    Line {
+        /// The file.
+        file: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// What is wrong with it.
+        found: String,
+    },
+    /// A file of another version.
+    #[error("{}: expected version {VERSION} of {FORMAT}, found version {found}; it was written by {program}", file.display())]
+    Version {
+        /// The file.
+        file: PathBuf,
+        /// Its version.
+        found: u64,
+        /// Who wrote it.
+        program: String,
+    },
+    /// Nothing in it.
+    #[error("{}: expected runs, found none", file.display())]
+    Empty {
+        /// The file.
+        file: PathBuf,
+    },
+}
+
+/// The content of one or more files.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Runs {
+    /// The campaigns.
+    pub campaigns: Vec<Campaign>,
+    /// The problems by name, those that cannot be read included.
+    pub problems: BTreeMap<String, Problem>,
+    /// The runs, each [`Run::key`] once.
+    pub runs: Vec<Run>,
+    /// Whether the last line of the file was torn: written while the power or the program went.
+    pub torn: bool,
+}
+
+impl Runs {
+    /// Reads a file. A last line that is torn is passed over.
+    ///
+    /// Errors: a file that cannot be read, that is of another format or version, that has a line that is neither the
+    /// last nor of the format, or that holds no campaign.
+    pub fn read(file: &Path) -> Result<Self, RunsError> {
+        let text =
+            std::fs::read(file).map_err(|cause| RunsError::Io { file: file.into(), cause })?;
+        Self::parse(file, &String::from_utf8_lossy(&text))
+    }
+
+    /// Reads the text of a file; `file` is its name in messages.
+    pub fn parse(file: &Path, text: &str) -> Result<Self, RunsError> {
+        let mut all = Self::default();
+        let mut seen = HashSet::new();
+        let lines: Vec<&str> = text.split_inclusive('\n').collect();
+        for (k, line) in lines.iter().enumerate().filter(|(_, l)| !l.trim().is_empty()) {
+            let parsed = match serde_json::from_str::<Line>(line) {
+                // Every line is written with its end, so one without is torn even if it reads well.
+                _ if k > 0 && k + 1 == lines.len() && !line.ends_with('\n') => {
+                    all.torn = true;
+                    break;
+                }
+                Ok(parsed) => parsed,
+                Err(e) => return Err(refusal(file, k, line, &e)),
+            };
+            match parsed {
+                Line::Campaign(campaign) => {
+                    check(file, &campaign)?;
+                    all.campaigns.push(campaign);
+                }
+                _ if all.campaigns.is_empty() => {
+                    let found = "a run before any campaign".into();
+                    return Err(RunsError::Line { file: file.into(), line: k + 1, found });
+                }
+                Line::Problem(problem) => {
+                    all.problems.insert(problem.name.clone(), problem);
+                }
+                Line::Run(run) => {
+                    if seen.insert(run.key()) {
+                        all.runs.push(*run);
+                    }
+                }
+            }
+        }
+        if all.campaigns.is_empty() {
+            return Err(RunsError::Empty { file: file.into() });
+        }
+        Ok(all)
+    }
+
+    /// Takes in the content of another file. Of a run that is in both, the first stays; returns how many were.
+    pub fn join(&mut self, other: Runs) -> usize {
+        let mut seen: HashSet<_> = self.runs.iter().map(Run::key).collect();
+        let known: HashSet<_> = self.campaigns.iter().map(|c| c.id.clone()).collect();
+        self.campaigns.extend(other.campaigns.into_iter().filter(|c| !known.contains(&c.id)));
+        for (name, problem) in other.problems {
+            self.problems.entry(name).or_insert(problem);
+        }
+        let before = seen.len() + other.runs.len();
+        self.runs.extend(other.runs.into_iter().filter(|run| seen.insert(run.key())));
+        before - seen.len()
+    }
+
+    /// The labels of the solvers, in the order in which they first appear.
+    pub fn solvers(&self) -> Vec<&str> {
+        let mut seen = HashSet::new();
+        self.runs.iter().map(|r| r.solver.as_str()).filter(|&s| seen.insert(s)).collect()
+    }
+
+    /// The tolerances, the largest first.
+    pub fn tolerances(&self) -> Vec<f64> {
+        let mut all: Vec<f64> = self.runs.iter().map(|r| r.tolerance).collect();
+        all.sort_by(|a, b| b.total_cmp(a));
+        all.dedup();
+        all
+    }
+
+    /// The campaign that a run belongs to.
+    pub fn campaign(&self, run: &Run) -> Option<&Campaign> {
+        self.campaigns.iter().find(|c| c.id == run.campaign)
+    }
+
+    /// The lines that a file of this content has.
+    pub fn lines(self) -> impl Iterator<Item = Line> {
+        let campaigns = self.campaigns.into_iter().map(Line::Campaign);
+        let problems = self.problems.into_values().map(Line::Problem);
+        campaigns.chain(problems).chain(self.runs.into_iter().map(|r| Line::Run(Box::new(r))))
+    }
+}
+
+fn check(file: &Path, campaign: &Campaign) -> Result<(), RunsError> {
+    if campaign.format != FORMAT {
+        let found = format!("the format {:?}", campaign.format);
+        return Err(RunsError::Line { file: file.into(), line: 1, found });
+    }
+    if campaign.version != VERSION {
+        return Err(RunsError::Version {
+            file: file.into(),
+            found: campaign.version.into(),
+            program: campaign.program.clone(),
+        });
+    }
+    Ok(())
+}
+
+/// A line that does not read: of another version, or of nothing that is known.
+fn refusal(file: &Path, k: usize, line: &str, error: &serde_json::Error) -> RunsError {
+    let value: serde_json::Value = serde_json::from_str(line).unwrap_or_default();
+    match value["version"].as_u64() {
+        Some(found) if value["format"] == FORMAT && found != u64::from(VERSION) => {
+            let program = value["program"].as_str().unwrap_or("an unknown program").into();
+            RunsError::Version { file: file.into(), found, program }
+        }
+        _ => RunsError::Line { file: file.into(), line: k + 1, found: error.to_string() },
+    }
+}
