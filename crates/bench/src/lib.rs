@@ -2,6 +2,7 @@
 //!
 //! Timings are ratios against a baseline measured in the same run; see `examples/`.
 
+pub mod campaign;
 pub mod record;
 pub mod runs;
 

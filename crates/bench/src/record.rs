@@ -72,7 +72,7 @@ pub struct Plan {
     pub time_limit: f64,
     /// Bytes of memory that a run may take.
     pub memory_limit: u64,
-    /// Timed solves of a run at most, after one to warm up; the fastest counts.
+    /// Timed solves of a run, after one to warm up; the fastest counts. Very short solves are repeated more often.
     pub repeats: u32,
     /// Seconds from which on a solve is not repeated: then the first one counts.
     pub repeat_below: f64,
@@ -85,6 +85,27 @@ pub struct Plan {
     pub shard: Option<(usize, usize)>,
 }
 
+impl Plan {
+    /// What keeps runs of another plan from being measured in the same way, in words: anything but solvers, tolerances
+    /// and jobs.
+    pub fn difference(&self, other: &Plan) -> Option<String> {
+        let shard = |plan: &Plan| plan.shard.map_or("none".into(), |(i, n)| format!("{i}/{n}"));
+        let of = |plan: &Plan| {
+            [
+                ("a time limit of", plan.time_limit.to_string()),
+                ("a memory limit of", plan.memory_limit.to_string()),
+                ("repeats", plan.repeats.to_string()),
+                ("repeats below seconds of", plan.repeat_below.to_string()),
+                ("traces", plan.trace.to_string()),
+                ("shard", shard(plan)),
+            ]
+        };
+        let mut pairs = of(self).into_iter().zip(of(other));
+        let ((what, expected), (_, found)) = pairs.find(|(a, b)| a != b)?;
+        Some(format!("{what} {expected}, found {found}"))
+    }
+}
+
 /// A problem, described before anything is run on it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
@@ -95,7 +116,7 @@ pub struct Problem {
     pub family: String,
     /// The kind, such as `friction_local_3d`; empty where it is not known.
     pub kind: String,
-    /// BLAKE3 of the file, 16 hexadecimal digits; empty where it is not known.
+    /// The first 16 hexadecimal digits of the file's SHA-256; empty where it is not known.
     pub digest: String,
     /// Contacts nc.
     pub contacts: usize,
@@ -122,7 +143,9 @@ pub struct Problem {
 }
 
 /// How a run ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Ending {
     /// The judge accepts the answer. For foreign runs: the program's own error is at most the tolerance.
@@ -145,7 +168,8 @@ pub enum Ending {
     OutOfMemory,
     /// The process died.
     Crashed,
-    /// A foreign program's failure, not told further.
+    /// A failure of which no more is known, such as a foreign program's.
+    #[default]
     Failed,
 }
 
@@ -221,7 +245,7 @@ pub struct Residuals {
 }
 
 /// A run: one problem, one solver, one tolerance.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Run {
     /// The [`Campaign::id`] that it belongs to.
     pub campaign: String,

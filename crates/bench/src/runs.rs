@@ -1,9 +1,9 @@
 //! Files of runs: reading them, joining several, and what is wrong with them.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 
-use crate::record::{Campaign, FORMAT, Line, Problem, Run, VERSION};
+use crate::record::{Campaign, FORMAT, Line, Plan, Problem, Run, VERSION};
 
 /// Why a file of runs cannot be used. One line each.
 #[derive(Debug, thiserror::Error)]
@@ -44,6 +44,15 @@ pub enum RunsError {
     },
 }
 
+/// What came of joining two files.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Joined {
+    /// Runs that were in both; the first stays.
+    pub twice: usize,
+    /// Problems whose files differ; the runs of the second are left out.
+    pub conflicts: Vec<String>,
+}
+
 /// The content of one or more files.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Runs {
@@ -53,8 +62,6 @@ pub struct Runs {
     pub problems: BTreeMap<String, Problem>,
     /// The runs, each [`Run::key`] once.
     pub runs: Vec<Run>,
-    /// Whether the last line of the file was torn: written while the power or the program went.
-    pub torn: bool,
 }
 
 impl Runs {
@@ -76,10 +83,7 @@ impl Runs {
         for (k, line) in lines.iter().enumerate().filter(|(_, l)| !l.trim().is_empty()) {
             let parsed = match serde_json::from_str::<Line>(line) {
                 // Every line is written with its end, so one without is torn even if it reads well.
-                _ if k > 0 && k + 1 == lines.len() && !line.ends_with('\n') => {
-                    all.torn = true;
-                    break;
-                }
+                _ if k > 0 && !line.ends_with('\n') => break,
                 Ok(parsed) => parsed,
                 Err(e) => return Err(refusal(file, k, line, &e)),
             };
@@ -108,17 +112,58 @@ impl Runs {
         Ok(all)
     }
 
-    /// Takes in the content of another file. Of a run that is in both, the first stays; returns how many were.
-    pub fn join(&mut self, other: Runs) -> usize {
-        let mut seen: HashSet<_> = self.runs.iter().map(Run::key).collect();
+    /// Takes in the content of another file. Of a run that is in both, the first stays; of a problem whose file is not the
+    /// same in both, the runs of the first do.
+    pub fn join(&mut self, other: Runs) -> Joined {
+        let mut joined = Joined::default();
         let known: HashSet<_> = self.campaigns.iter().map(|c| c.id.clone()).collect();
         self.campaigns.extend(other.campaigns.into_iter().filter(|c| !known.contains(&c.id)));
         for (name, problem) in other.problems {
-            self.problems.entry(name).or_insert(problem);
+            let differs = |old: &Problem| {
+                !old.digest.is_empty() && !problem.digest.is_empty() && old.digest != problem.digest
+            };
+            match self.problems.get(&name) {
+                Some(old) if differs(old) => joined.conflicts.push(name),
+                // Where one machine could read it, it is known.
+                Some(old) if old.error.is_none() => {}
+                _ => drop(self.problems.insert(name, problem)),
+            }
         }
-        let before = seen.len() + other.runs.len();
-        self.runs.extend(other.runs.into_iter().filter(|run| seen.insert(run.key())));
-        before - seen.len()
+        let mut seen: HashSet<_> = self.runs.iter().map(Run::key).collect();
+        for run in other.runs {
+            if joined.conflicts.contains(&run.problem) {
+                continue;
+            }
+            match seen.insert(run.key()) {
+                true => self.runs.push(run),
+                false => joined.twice += 1,
+            }
+        }
+        joined
+    }
+
+    /// What keeps these runs from being one whole campaign: parts that are missing, plans that differ.
+    pub fn remarks(&self) -> Vec<String> {
+        let plans: Vec<&Plan> = self.campaigns.iter().filter_map(|c| c.plan.as_ref()).collect();
+        let mut remarks = vec![];
+        let parts: BTreeSet<(usize, usize)> =
+            plans.iter().filter_map(|p| p.shard).map(|(i, n)| (n, i)).collect();
+        let wholes: BTreeSet<usize> = parts.iter().map(|p| p.0).collect();
+        for n in wholes {
+            let missing = (1..=n).filter(|&i| !parts.contains(&(n, i)));
+            let missing: Vec<_> = missing.map(|i| format!("{i}/{n}")).collect();
+            if !missing.is_empty() {
+                remarks.push(format!("missing parts {}", missing.join(", ")));
+            }
+        }
+        for two in plans.windows(2) {
+            let unsharded = |plan: &Plan| Plan { shard: None, ..plan.clone() };
+            if let Some(differs) = unsharded(two[0]).difference(&unsharded(two[1])) {
+                remarks.push(format!("plans differ: {differs}"));
+            }
+        }
+        remarks.dedup();
+        remarks
     }
 
     /// The labels of the solvers, in the order in which they first appear.

@@ -1,5 +1,7 @@
 //! The inverse of M, or of M under bilateral constraints, behind one face.
 
+use std::cell::Cell;
+
 use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
 
@@ -27,6 +29,16 @@ pub struct Inverse {
     place: Vec<(u32, u32)>,
     /// The factor is that of A with a small diagonal added.
     regularised: bool,
+}
+
+thread_local! {
+    static FACTORISATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+/// The matrices that this thread has factorised so far, each counted once however many components it has; the
+/// difference of two readings is what happened between them.
+pub fn factorisations() -> u64 {
+    FACTORISATIONS.get()
 }
 
 /// How far a solve is refined.
@@ -123,6 +135,7 @@ impl Inverse {
         name: &str,
         regularised: bool,
     ) -> Result<Self, ProblemError> {
+        FACTORISATIONS.set(FACTORISATIONS.get() + 1);
         let (index, place) = connected_components(&matrix);
         let components = index
             .into_iter()

@@ -16,7 +16,7 @@ pub use bsr::{Block, BlockRow, Bsr};
 pub use compensated::Compensated;
 pub use csc::Csc;
 pub use delassus::Delassus;
-pub use inverse::{Inverse, Refine};
+pub use inverse::{Inverse, Refine, factorisations};
 
 /// The Euclidean norm, scaled so that neither overflow nor underflow of the squares spoils it.
 pub fn norm(x: &[f64]) -> f64 {
