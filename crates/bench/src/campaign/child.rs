@@ -50,12 +50,13 @@ pub fn work(
     grace: f64,
     cancel: &AtomicBool,
 ) -> std::io::Result<End> {
-    let mut child = Command::new(&command.program)
-        .args(&command.arguments)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()?;
+    let mut process = Command::new(&command.program);
+    process.args(&command.arguments);
+    process.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    // A terminal's Ctrl-C is for the campaign, which then ends its workers; it is no crash of theirs.
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut process, 0);
+    let mut child = process.spawn()?;
     // The worker lives as long as its standard input is open.
     let mut stdin = child.stdin.take();
     if let Some(stdin) = &mut stdin {
