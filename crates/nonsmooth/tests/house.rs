@@ -44,9 +44,9 @@ struct Floors {
 }
 
 /// `check → kinds → linalg`. A kind names the judge of its own as an associated type, so the two share a floor; what
-/// they must not do is lean on planted instances, and linalg must know neither.
+/// they must not do is lean on what describes them (traits) or on planted instances, and linalg must know neither.
 const PROBLEM: Floors = Floors {
-    floors: &[&["error"], &["linalg"], &["check"], &["planted"]],
+    floors: &[&["error"], &["linalg"], &["check"], &["traits"], &["planted"]],
     others: 2,
     others_mix: true,
     contracts: &[],
