@@ -494,6 +494,7 @@ fn the_checker_finds_planted_violations() {
     assert_eq!(problem("linalg/bsr.rs", "use crate::lcp::Lcp;").len(), 1);
     assert_eq!(problem("check/local.rs", "use super::super::planted::Planted;").len(), 1);
     assert_eq!(problem("lcp.rs", "use super::planted::Planted;").len(), 1);
+    assert_eq!(problem("lcp.rs", "use crate::traits::Traits;").len(), 1);
     // After an item under test the file goes on.
     let text = "#[cfg(test)] mod tests { fn f() {} } use crate::planted::Planted;";
     assert_eq!(problem("lcp.rs", text).len(), 1);
