@@ -1,10 +1,12 @@
-//! Measurements of the solvers: what a sweep costs against streaming W once, and what a solver solves.
+//! Measurements of the solvers: what a sweep costs against streaming W once, and what a solver solves; and what the
+//! problems are like ([`traits_table`]).
 //!
 //! Timings are ratios against a baseline measured in the same run; see `examples/`.
 
 pub mod campaign;
 pub mod record;
 pub mod runs;
+pub mod traits_table;
 
 use std::path::{Path, PathBuf};
 

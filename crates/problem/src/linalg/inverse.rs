@@ -5,7 +5,7 @@ use std::cell::Cell;
 use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
 
-use super::{Compensated, Csc, norm};
+use super::{Compensated, Csc, Groups, norm};
 use crate::ProblemError;
 
 /// Components up to this size are factorised densely; rigid bodies have 1, 3 or 6.
@@ -356,25 +356,13 @@ fn factorise(a: &Csc, index: &[usize], place: &[(u32, u32)]) -> Option<Factor> {
 /// Connected components of the graph of `a + aᵀ`: the unknowns of each, and each unknown's place.
 fn connected_components(a: &Csc) -> (Vec<Vec<usize>>, Vec<(u32, u32)>) {
     let n = a.nrows();
-    let mut parent: Vec<usize> = (0..n).collect();
-    fn root(parent: &mut [usize], mut i: usize) -> usize {
-        while parent[i] != i {
-            parent[i] = parent[parent[i]];
-            i = parent[i];
-        }
-        i
-    }
-    for (i, j, x) in a.triplets() {
-        if x != 0.0 {
-            let (ri, rj) = (root(&mut parent, i), root(&mut parent, j));
-            parent[ri.max(rj)] = ri.min(rj);
-        }
-    }
+    let mut groups = Groups::new(n);
+    a.triplets().filter(|e| e.2 != 0.0).for_each(|(i, j, _)| groups.join(i, j));
     let mut of_root = vec![u32::MAX; n];
     let mut components: Vec<Vec<usize>> = Vec::new();
     let mut place = Vec::with_capacity(n);
     for i in 0..n {
-        let r = root(&mut parent, i);
+        let r = groups.root(i);
         if of_root[r] == u32::MAX {
             of_root[r] = u32::try_from(components.len()).expect("fewer than 2³² components");
             components.push(Vec::new());
