@@ -1,31 +1,9 @@
-//! Measurements of the solvers: what a sweep costs against streaming W once, and what a solver solves; and what the
-//! problems are like ([`traits_table`]).
+//! Measurements of the solvers: campaigns, and what is made of their runs.
 //!
-//! Timings are ratios against a baseline measured in the same run; see `examples/`.
+//! A [`campaign`] runs problems × solvers × tolerances and writes [`runs`], lines of [`record`]s.
+//! [`traits_table`] says what the problems are like. `examples/sweeps.rs` measures a sweep against streaming W once.
 
 pub mod campaign;
 pub mod record;
 pub mod runs;
 pub mod traits_table;
-
-use std::path::{Path, PathBuf};
-
-/// All `.hdf5` files under the given files and folders, sorted.
-pub fn problem_files(roots: &[PathBuf]) -> std::io::Result<Vec<PathBuf>> {
-    fn walk(path: &Path, found: &mut Vec<PathBuf>) -> std::io::Result<()> {
-        if path.is_dir() {
-            for entry in std::fs::read_dir(path)? {
-                walk(&entry?.path(), found)?;
-            }
-        } else if path.extension().is_some_and(|e| e == "hdf5") {
-            found.push(path.to_owned());
-        }
-        Ok(())
-    }
-    let mut found = Vec::new();
-    for root in roots {
-        walk(root, &mut found)?;
-    }
-    found.sort();
-    Ok(found)
-}

@@ -6,7 +6,8 @@ use std::time::Instant;
 
 use nonsmooth_io::fclib;
 use nonsmooth_problem::check::Measure;
-use nonsmooth_problem::{Friction, with_friction};
+use nonsmooth_problem::traits::Traits;
+use nonsmooth_problem::with_friction;
 use nonsmooth_solve::registry::Registered;
 use nonsmooth_solve::{Limit, Limits, Outcome, Sample, Status};
 use sha2::{Digest, Sha256};
@@ -65,25 +66,17 @@ fn describe(file: &Path) -> Result<Said, String> {
     let digest = Sha256::digest(&bytes);
     let digest: String = digest.iter().take(8).map(|b| format!("{b:02x}")).collect();
     let content = fclib::read(file).map_err(|e| e.to_string())?;
-    let (dimension, dofs, asymmetry) = match &content.problem {
-        Friction::Local2(p) => (2, content.info.dofs, p.W.asymmetry()),
-        Friction::Local3(p) => (3, content.info.dofs, p.W.asymmetry()),
-        Friction::Global2(p) => (2, Some(p.dofs()), p.M.asymmetry()),
-        Friction::Global3(p) => (3, Some(p.dofs()), p.M.asymmetry()),
-    };
-    let problem = &content.problem;
-    let dofs = dofs.filter(|&n| n > 0);
-    let mu = problem.mu();
+    let traits = Traits::of(&content.problem, content.info.dofs);
     Ok(Said::Described(Problem {
-        kind: problem.kind().name().into(),
+        kind: traits.kind.name().into(),
         digest,
-        contacts: problem.contacts(),
-        unknowns: problem.unknowns(),
-        dofs,
-        density: dofs.map(|n| (dimension * problem.contacts()) as f64 / n as f64),
-        asymmetry: finite(asymmetry),
-        mu_min: mu.iter().copied().reduce(f64::min),
-        mu_max: mu.iter().copied().reduce(f64::max),
+        contacts: traits.contacts,
+        unknowns: traits.unknowns,
+        dofs: traits.dofs,
+        density: traits.density(),
+        asymmetry: finite(traits.asymmetry),
+        mu_min: finite(traits.mu.min),
+        mu_max: finite(traits.mu.max),
         ..Problem::default()
     }))
 }

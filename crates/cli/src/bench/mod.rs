@@ -2,6 +2,7 @@
 
 mod merge;
 mod run;
+mod traits;
 
 use nonsmooth_bench::campaign;
 use nonsmooth_bench::runs::Runs;
@@ -27,6 +28,7 @@ Examples:
 enum Command {
     Run(run::Args),
     Merge(merge::Args),
+    Traits(traits::Args),
     /// Do one run for a campaign, which writes it to the standard input
     #[command(hide = true)]
     Worker,
@@ -40,6 +42,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     match &args.command {
         Command::Run(args) => run::run(args),
         Command::Merge(args) => merge::run(args),
+        Command::Traits(args) => traits::run(args),
         Command::Worker => campaign::serve(&campaign::Registry).map(|()| Exit::Solved),
     }
 }
