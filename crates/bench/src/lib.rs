@@ -2,8 +2,11 @@
 //!
 //! Timings are ratios against a baseline measured in the same run; see `examples/`.
 
+pub mod foreign;
+pub mod profile;
 pub mod record;
 pub mod runs;
+pub mod tables;
 
 use std::path::{Path, PathBuf};
 
