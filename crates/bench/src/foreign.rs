@@ -358,7 +358,8 @@ impl<'a> Reader<'a> {
         let problem = self.problem(name, contacts.unwrap_or(0) as usize, cells);
         let status = cells.get("status");
         let (ending, message) = ending(status, self.has_error.then_some(error), tolerance);
-        self.false_claims += usize::from(self.has_error && !solved_by(ending) && claims(status));
+        self.false_claims +=
+            usize::from(self.has_error && ending != Ending::Solved && claims(status));
         let mut residuals = Residuals { reached: error, ..Residuals::default() };
         match self.source.measure {
             None => {}
@@ -439,10 +440,6 @@ impl<'a> Reader<'a> {
     }
 }
 
-fn solved_by(ending: Ending) -> bool {
-    ending == Ending::Solved
-}
-
 /// Whether a status says that the solver succeeded.
 fn claims(status: Option<&str>) -> bool {
     status.is_some_and(|s| ["0", "solved"].contains(&s))
@@ -462,7 +459,7 @@ fn ending(
         return (Ending::Solved, None);
     }
     let status = status.unwrap_or_default();
-    let named = Ending::ALL.into_iter().find(|e| !solved_by(*e) && e.name() == status);
+    let named = Ending::ALL.into_iter().find(|e| *e != Ending::Solved && e.name() == status);
     let ending = match status {
         s if s.starts_with("timeout") => Ending::TimeLimit,
         s if s.starts_with("signal") || s.starts_with("exit") => Ending::Crashed,
@@ -514,7 +511,7 @@ impl Cells {
     /// A whole number; none where it is negative, as programs write what they do not know.
     fn count(&self, column: &str) -> Result<Option<u64>, String> {
         match self.number(column)? {
-            Some(x) if x < 0.0 => Ok(None),
+            Some(x) if x < 0.0 || x.is_nan() => Ok(None),
             Some(x) if x.fract() != 0.0 || x > 9e15 => {
                 Err(format!("{column}: expected a whole number, found {x}"))
             }

@@ -2,6 +2,9 @@
 //!
 //! Timings are ratios against a baseline measured in the same run; see `examples/`.
 
+pub mod compare;
+pub mod draw;
+pub mod figures;
 pub mod foreign;
 pub mod profile;
 pub mod record;
