@@ -104,6 +104,9 @@ const COLOURS: [RGBColor; 8] = [
     RGBColor(51, 34, 136),
     RGBColor(136, 34, 85),
 ];
+/// The number of looks that colour and dash tell apart.
+pub const LOOKS: usize = COLOURS.len() * DASHES.len();
+
 const DASHES: [Option<(i32, i32)>; 4] = [None, Some((9, 4)), Some((4, 3)), Some((2, 3))];
 const MARKS: [Option<Mark>; 4] = [None, Some(Mark::Dot), Some(Mark::Triangle), Some(Mark::Cross)];
 
@@ -116,5 +119,30 @@ impl Style {
     /// The look of what bounds all solvers.
     pub fn bound() -> Self {
         Self { colour: RGBColor(110, 110, 110), dash: None, mark: None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_numbers() {
+        assert_eq!(ticks(100.0, 5, 1.0), [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]);
+        assert_eq!(ticks(7.0, 6, 0.0), [0.0, 2.0, 4.0, 6.0]);
+        assert_eq!(ticks(2.0, 8, 1.0), [0.0, 1.0, 2.0]);
+        assert_eq!(decades(-9.0, 1.0, 10).len(), 11);
+        assert_eq!(decades(-19.0, 1.0, 10)[0], -18.0);
+        assert_eq!((tick(0.5), tick(40.0), tick(2e7)), ("0.5".into(), "40".into(), "2.0e7".into()));
+    }
+
+    #[test]
+    fn no_two_of_32_solvers_look_alike() {
+        let look = |k: usize| (Style::of(k).colour, Style::of(k).dash);
+        let grey = |k: usize| (Style::of(k).dash, Style::of(k).mark);
+        let all: Vec<_> = (0..LOOKS).map(look).collect();
+        assert!((0..LOOKS).all(|k| all.iter().filter(|l| **l == all[k]).count() == 1));
+        let all: Vec<_> = (0..16).map(grey).collect();
+        assert!((0..16).all(|k| all.iter().filter(|l| **l == all[k]).count() == 1));
     }
 }

@@ -7,7 +7,7 @@ use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::draw::{Axis, GRID, INK, Mark, Style, decades, font, tick, ticks};
+use crate::draw::{Axis, GRID, INK, LOOKS, Mark, Style, decades, font, tick, ticks};
 use crate::profile::{
     Cost, Costs, Curve, DECADES, Progress, Selection, VIRTUAL_BEST, performance,
     performance_of_best, success,
@@ -31,7 +31,8 @@ pub struct Figure {
 /// Every figure that the selected runs have data for: performance profiles by time, iterations and factorisations; data
 /// profiles; success against tolerance; residual against time.
 ///
-/// A solver looks the same in all of them, whatever the selection: its look follows its place among all the runs.
+/// A solver looks the same in all of them, whatever the selection: its look follows its place among all the runs (of
+/// more than 32, if that look is free).
 pub fn figures(runs: &Runs, selection: &Selection) -> Result<Vec<Figure>, String> {
     let scene = Scene::new(runs, selection);
     let mut all = vec![];
@@ -82,16 +83,19 @@ fn ten_to(x: f64) -> String {
 
 impl<'a> Scene<'a> {
     fn new(runs: &'a Runs, selection: &'a Selection) -> Self {
-        let styles = runs.solvers().into_iter().enumerate().map(|(k, s)| (s, Style::of(k)));
+        let mut styles: HashMap<&str, Style> = HashMap::new();
+        for (k, solver) in runs.solvers().into_iter().enumerate() {
+            if selection.solvers.is_empty() || selection.solvers.iter().any(|s| s == solver) {
+                // Beyond 32 solvers looks repeat; then the next that is free in this selection.
+                let mut looks = (k..k + LOOKS).map(Style::of);
+                let free = looks.find(|look| styles.values().all(|used| used != look));
+                styles.insert(solver, free.unwrap_or(Style::of(k)));
+            }
+        }
         let campaigns: HashSet<&str> =
             runs.campaigns.iter().filter(|c| c.foreign).map(|c| c.id.as_str()).collect();
         let foreign = runs.runs.iter().filter(|r| campaigns.contains(r.campaign.as_str()));
-        Self {
-            runs,
-            selection,
-            styles: styles.collect(),
-            foreign: foreign.map(|r| r.solver.as_str()).collect(),
-        }
+        Self { runs, selection, styles, foreign: foreign.map(|r| r.solver.as_str()).collect() }
     }
 
     fn style(&self, solver: &str) -> Style {
@@ -136,12 +140,13 @@ impl<'a> Scene<'a> {
         curves.insert(0, performance_of_best(&costs));
         let far = curves.iter().filter_map(|c| c.steps.last()).fold(2.0, |far, s| s.0.max(far));
         let (log, text, what): (fn(f64) -> f64, fn(f64) -> String, _) = match far <= DOUBLING {
-            true => (f64::log2, |x| tick(x.exp2()), "times the best (logarithmic)"),
-            false => (f64::log10, |x| tick_of_decade(x), "times the best (logarithmic)"),
+            true => (f64::log2, |x| tick(x.exp2()), "τ: times the best"),
+            false => (f64::log10, |x| tick_of_decade(x), "τ: times the best"),
         };
         let end = 1.03 * log(far);
         let x = Axis { range: 0.0..end, ticks: decades(0.0, end, 10) };
-        let title = format!("Performance profile by {}", cost.name());
+        let by = if cost == Cost::Seconds { "time" } else { cost.name() };
+        let title = format!("Performance profile by {by}");
         let n = costs.problems.len();
         let mut notes = vec![format!(
             "share of {n} problems solved to {:e} within τ times the best; failures never count as solved",
@@ -394,8 +399,10 @@ fn stairs(curve: &Curve, x: &Axis, log: fn(f64) -> f64) -> Vec<(f64, f64)> {
 // ------------------------------------------------------------------------------------------------ drawing
 
 const WIDTH: u32 = 960;
-/// A single panel is this high, several are less.
-const HEIGHT: (u32, u32) = (430, 290);
+/// The height of a panel among several.
+const HEIGHT: u32 = 290;
+/// A single panel is as high as its legend, within these bounds.
+const SINGLE: (u32, u32) = (430, 640);
 const LINE: u32 = 18;
 /// The width of a character of 12 px, near enough.
 const CHARACTER: f64 = 6.4;
@@ -417,12 +424,13 @@ fn sheet(
 ) -> Drawn {
     let columns = panels.len().min(2);
     let rows = panels.len().div_ceil(columns.max(1)) as u32;
-    let height = if panels.len() > 1 { HEIGHT.1 } else { HEIGHT.0 };
     let labels: Vec<String> = legend.iter().map(|(label, _)| cut(label)).collect();
     let longest = labels.iter().map(|l| l.chars().count()).max().unwrap_or(0);
     let legend_width = 56 + (CHARACTER * longest as f64) as u32;
     let head_height = 40 + LINE * notes.len() as u32;
-    let body_height = (rows * height).max(LINE * legend.len() as u32 + 30);
+    let legend_height = LINE * legend.len() as u32 + 30;
+    let height = if panels.len() > 1 { HEIGHT } else { legend_height.clamp(SINGLE.0, SINGLE.1) };
+    let body_height = (rows * height).max(legend_height);
     let size = (WIDTH.max(560 + legend_width), head_height + body_height);
     let root = SVGBackend::with_string(text, size).into_drawing_area();
     root.fill(&WHITE)?;
