@@ -16,6 +16,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use serde::Serialize;
 use statrs::distribution::{Binomial, ContinuousCDF, DiscreteCDF, StudentsT};
 
+use crate::plural;
 use crate::record::{Campaign, Ending, Key, Run};
 use crate::runs::Runs;
 use crate::tables::significant;
@@ -298,10 +299,6 @@ fn pace(solver: &str, logs: &[f64]) -> Pace {
         slower,
         sign_test,
     }
-}
-
-fn plural(n: usize, what: &str) -> String {
-    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
 impl Comparison {

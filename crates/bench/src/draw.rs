@@ -80,6 +80,10 @@ pub struct Style {
     pub dash: Option<(i32, i32)>,
     /// The shape of the marks along the curve, if any.
     pub mark: Option<Mark>,
+    /// The width of the line, px.
+    pub width: u32,
+    /// By how many eighths of their distance the marks are shifted, to keep clear of those of others.
+    pub shift: u8,
 }
 
 /// The shape of a mark.
@@ -113,12 +117,16 @@ const MARKS: [Option<Mark>; 4] = [None, Some(Mark::Dot), Some(Mark::Triangle), S
 impl Style {
     /// The look of the k-th solver. Colour and dash tell 32 apart, dash and mark 16 without colour.
     pub fn of(k: usize) -> Self {
-        Self { colour: COLOURS[k % 8], dash: DASHES[(k + k / 8) % 4], mark: MARKS[(k / 4) % 4] }
+        let dash = DASHES[(k + k / 8) % 4];
+        let mark = MARKS[(k / 4) % 4];
+        // A solid line shows below another of the same course only if it is wider.
+        let width = if dash.is_none() && mark.is_none() { 3 } else { 2 };
+        Self { colour: COLOURS[k % 8], dash, mark, width, shift: (k % 8) as u8 }
     }
 
     /// The look of what bounds all solvers.
     pub fn bound() -> Self {
-        Self { colour: RGBColor(110, 110, 110), dash: None, mark: None }
+        Self { colour: RGBColor(150, 150, 150), dash: None, mark: None, width: 2, shift: 0 }
     }
 }
 

@@ -139,10 +139,8 @@ impl<'a> Scene<'a> {
         }
         curves.insert(0, performance_of_best(&costs));
         let far = curves.iter().filter_map(|c| c.steps.last()).fold(2.0, |far, s| s.0.max(far));
-        let (log, text, what): (fn(f64) -> f64, fn(f64) -> String, _) = match far <= DOUBLING {
-            true => (f64::log2, |x| tick(x.exp2()), "τ: times the best"),
-            false => (f64::log10, |x| tick_of_decade(x), "τ: times the best"),
-        };
+        let doubling = far <= DOUBLING;
+        let log: fn(f64) -> f64 = if doubling { f64::log2 } else { f64::log10 };
         let end = 1.03 * log(far);
         let x = Axis { range: 0.0..end, ticks: decades(0.0, end, 10) };
         let by = if cost == Cost::Seconds { "time" } else { cost.name() };
@@ -167,9 +165,9 @@ impl<'a> Scene<'a> {
             series: self.series(&curves, &x, log),
             x,
             y: shares(),
-            x_label: what,
+            x_label: "τ: times the best",
             y_label: "share of problems",
-            x_text: text,
+            x_text: if doubling { |x| tick(x.exp2()) } else { tick_of_decade },
             y_text: tick,
         };
         let mut rows = vec![];
@@ -463,7 +461,7 @@ fn cut(label: &str) -> String {
 
 /// A curve in pixels, with its marks.
 fn line(area: &Area, points: &[(i32, i32)], style: Style) -> Drawn {
-    let stroke = style.colour.stroke_width(2);
+    let stroke = style.colour.stroke_width(style.width);
     match style.dash {
         Some((dash, gap)) => {
             area.draw(&DashedPathElement::new(points.iter().copied(), dash, gap, stroke))?;
@@ -471,7 +469,7 @@ fn line(area: &Area, points: &[(i32, i32)], style: Style) -> Drawn {
         None => area.draw(&PathElement::new(points.to_vec(), stroke))?,
     }
     let Some(mark) = style.mark else { return Ok(()) };
-    for place in places(points) {
+    for place in places(points, style.shift) {
         match mark {
             Mark::Dot => area.draw(&Circle::new(place, 4, style.colour.filled()))?,
             Mark::Triangle => area.draw(&TriangleMarker::new(place, 6, style.colour.filled()))?,
@@ -482,16 +480,19 @@ fn line(area: &Area, points: &[(i32, i32)], style: Style) -> Drawn {
 }
 
 /// Where the marks stand: evenly along the curve, so that they keep apart where it is steep.
-fn places(points: &[(i32, i32)]) -> Vec<(i32, i32)> {
+fn places(points: &[(i32, i32)], shift: u8) -> Vec<(i32, i32)> {
     let length = |a: &(i32, i32), b: &(i32, i32)| f64::from(b.0 - a.0).hypot(f64::from(b.1 - a.1));
     let total: f64 = points.windows(2).map(|w| length(&w[0], &w[1])).sum();
-    // A short line, as in the legend, has one.
-    let n = if total < 100.0 { 1 } else { MARKED };
+    // A short line, as in the legend, has one in the middle.
+    let (n, first) = match total < 100.0 {
+        true => (1, 0.5),
+        false => (MARKED, (f64::from(shift) + 0.5) / 8.0),
+    };
     let (mut found, mut walked) = (vec![], 0.0);
     for w in points.windows(2) {
         let step = length(&w[0], &w[1]);
         while found.len() < n {
-            let ahead = total * (found.len() as f64 + 0.5) / n as f64 - walked;
+            let ahead = total * (found.len() as f64 + first) / n as f64 - walked;
             if ahead > step || step == 0.0 {
                 break;
             }

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use nonsmooth_io::fclib;
 use nonsmooth_problem::{Problem as _, with_friction};
 
+use crate::plural;
 use crate::record::{Campaign, Ending, FORMAT, Line, Machine, Problem, Residuals, Run, VERSION};
 use crate::runs::{Runs, RunsError};
 
@@ -143,7 +144,7 @@ pub fn import(file: &Path, source: &Source, known: &[Problem]) -> Result<Importe
 /// Names and texts; numbers are still texts. `place` is the line, or the entry of an array.
 struct Table {
     columns: Vec<String>,
-    rows: Vec<(String, Result<HashMap<String, String>, String>)>,
+    rows: Vec<(String, Result<Cells, String>)>,
 }
 
 /// The names of columns that stand for another.
@@ -196,7 +197,7 @@ fn csv_table(file: &Path, bytes: &[u8]) -> Result<Table, ForeignError> {
         let cells: Vec<_> =
             record.iter().map(|c| String::from_utf8_lossy(c).into_owned()).collect();
         let row = if cells.len() == columns.len() {
-            Ok(columns.iter().cloned().zip(cells).collect())
+            Ok(Cells(columns.iter().cloned().zip(cells).collect()))
         } else {
             Err(format!("expected {} fields, found {}", columns.len(), cells.len()))
         };
@@ -235,7 +236,7 @@ fn json_table(file: &Path, bytes: &[u8]) -> Result<Table, ForeignError> {
                 columns.extend(
                     row.keys().filter(|k| !columns.contains(k)).cloned().collect::<Vec<_>>(),
                 );
-                Ok(row)
+                Ok(Cells(row))
             }
             Ok(_) => Err("expected an object, found another value".into()),
             Err(e) => Err(format!("expected an object, found {e}")),
@@ -308,7 +309,7 @@ impl<'a> Reader<'a> {
     fn read(mut self, table: Table) -> Imported {
         let total = table.rows.len();
         for (place, row) in table.rows {
-            let done = row.and_then(|row| self.row(&Cells(row)));
+            let done = row.and_then(|cells| self.row(&cells));
             if let Err(mistake) = done {
                 self.mistakes.push(format!("{}, {place}: {mistake}", self.file.display()));
             }
@@ -316,15 +317,16 @@ impl<'a> Reader<'a> {
         let silent = self.drop_idle_counts();
         let mut notes = vec![];
         notes.push(format!(
-            "{} of {total} rows read; {} problems matched, {} not",
+            "{} of {} read; {} matched, {} not",
             self.runs.runs.len(),
-            self.matched.len(),
+            plural(total, "row"),
+            plural(self.matched.len(), "problem"),
             self.unmatched.len()
         ));
         if !self.ambiguous.is_empty() {
             notes.push(format!(
-                "{} of those not matched have several namesakes",
-                self.ambiguous.len()
+                "several known problems have the name of {}: not matched",
+                plural(self.ambiguous.len(), "problem")
             ));
         }
         if !self.has_error {
@@ -332,8 +334,8 @@ impl<'a> Reader<'a> {
         }
         if self.false_claims > 0 {
             notes.push(format!(
-                "{} rows claim success with an error above the tolerance: not solved",
-                self.false_claims
+                "success claimed with an error above the tolerance in {}: not solved",
+                plural(self.false_claims, "row")
             ));
         }
         if !silent.is_empty() {

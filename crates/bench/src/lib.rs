@@ -32,3 +32,8 @@ pub fn problem_files(roots: &[PathBuf]) -> std::io::Result<Vec<PathBuf>> {
     found.sort();
     Ok(found)
 }
+
+/// `1 run`, `2 runs`.
+fn plural(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}

@@ -85,8 +85,8 @@ fn problems_join_by_name_and_size() {
         read.notes,
         [
             "8 of 8 rows read; 2 problems matched, 3 not",
-            "1 of those not matched have several namesakes",
-            "1 rows claim success with an error above the tolerance: not solved",
+            "several known problems have the name of 1 problem: not matched",
+            "success claimed with an error above the tolerance in 1 row: not solved",
             "iterations never above 0, taken as not known: LIAR (Peer 1.2)",
         ]
     );
