@@ -208,7 +208,7 @@ impl Ending {
 }
 
 /// The judge's residuals of the answer (see `nonsmooth_problem::check::Measure` for the formulas). A foreign program's
-/// own error stands under the definition that it uses, if that is one of these.
+/// own error stands as `reached`, and under the definition that it uses if that is one of these.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Residuals {

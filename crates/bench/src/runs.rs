@@ -180,6 +180,16 @@ impl Runs {
         all
     }
 
+    /// The tightest tolerance that every solver was run at, else the one with the most runs.
+    pub fn common_tolerance(&self) -> Option<f64> {
+        let solvers = self.solvers().len();
+        let at = |tolerance: f64| self.runs.iter().filter(move |r| r.tolerance == tolerance);
+        let all = |t: &f64| at(*t).map(|r| &r.solver).collect::<HashSet<_>>().len() == solvers;
+        let tolerances = self.tolerances();
+        let common = tolerances.iter().rev().copied().find(all);
+        common.or_else(|| tolerances.into_iter().max_by_key(|t| at(*t).count()))
+    }
+
     /// The campaign that a run belongs to.
     pub fn campaign(&self, run: &Run) -> Option<&Campaign> {
         self.campaigns.iter().find(|c| c.id == run.campaign)

@@ -3,6 +3,12 @@
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use nonsmooth_io::fclib;
+use nonsmooth_problem::traits::Traits;
+use sha2::{Digest, Sha256};
+
+use crate::record::Problem;
+
 /// A file that holds a problem.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Input {
@@ -69,6 +75,30 @@ pub fn inputs(roots: &[PathBuf]) -> (Vec<Input>, Vec<String>) {
     }
     inputs.sort_by(|a, b| (a.bytes, &a.name).cmp(&(b.bytes, &b.name)));
     (inputs, mistakes)
+}
+
+/// What the problem of a file is; its name and family are left empty.
+///
+/// Errors: a file that cannot be read, by name.
+pub fn describe(file: &Path) -> Result<Problem, String> {
+    let bytes = std::fs::read(file).map_err(|e| format!("{}: {e}", file.display()))?;
+    let digest = Sha256::digest(&bytes);
+    let digest: String = digest.iter().take(8).map(|b| format!("{b:02x}")).collect();
+    let content = fclib::read(file).map_err(|e| e.to_string())?;
+    let traits = Traits::of(&content.problem, content.info.dofs);
+    let finite = |x: f64| Some(x).filter(|x| x.is_finite());
+    Ok(Problem {
+        kind: traits.kind.name().into(),
+        digest,
+        contacts: traits.contacts,
+        unknowns: traits.unknowns,
+        dofs: traits.dofs,
+        density: traits.density(),
+        asymmetry: finite(traits.asymmetry),
+        mu_min: finite(traits.mu.min),
+        mu_max: finite(traits.mu.max),
+        ..Problem::default()
+    })
 }
 
 /// The folders and the name of a file, without extension.

@@ -13,7 +13,7 @@ mod solvers;
 mod system;
 mod worker;
 
-pub use files::{Input, inputs};
+pub use files::{Input, describe, inputs};
 pub use job::{Job, Said, Task};
 pub use journal::Journal;
 pub use pool::{Event, Setup, Summary, WorkerCommand, run};

@@ -1,21 +1,19 @@
 //! The worker: one process, one problem, one solver, one tolerance.
 
 use std::io::{BufRead, Read, Write};
-use std::path::Path;
 use std::time::Instant;
 
 use nonsmooth_io::fclib;
 use nonsmooth_problem::check::Measure;
-use nonsmooth_problem::traits::Traits;
 use nonsmooth_problem::with_friction;
 use nonsmooth_solve::registry::Registered;
 use nonsmooth_solve::{Limit, Limits, Outcome, Sample, Status};
-use sha2::{Digest, Sha256};
 
+use super::files::describe;
 use super::job::{Job, Said, Task};
 use super::solvers::{Label, Solvers};
 use super::system;
-use crate::record::{Ending, Problem, Residuals, Run};
+use crate::record::{Ending, Residuals, Run};
 
 /// Seconds between two signs of life.
 const PULSE: f64 = 1.0;
@@ -42,7 +40,7 @@ pub fn serve(solvers: &impl Solvers) -> Result<(), String> {
     system::stay_on(&job.processors);
     system::limit_memory(job.memory_limit);
     say(&match &job.task {
-        Task::Describe => describe(&job.file).unwrap_or_else(Said::Unreadable),
+        Task::Describe => describe(&job.file).map_or_else(Said::Unreadable, Said::Described),
         Task::Solve { .. } => match fclib::read_problem(&job.file) {
             Err(e) => Said::Unreadable(e.to_string()),
             Ok(problem) => with_friction!(&problem, p => solve(p, &job.task, solvers))
@@ -59,26 +57,6 @@ fn say(said: &Said) {
     if writeln!(out, "{text}").and_then(|()| out.flush()).is_err() {
         std::process::exit(1);
     }
-}
-
-fn describe(file: &Path) -> Result<Said, String> {
-    let bytes = std::fs::read(file).map_err(|e| format!("{}: {e}", file.display()))?;
-    let digest = Sha256::digest(&bytes);
-    let digest: String = digest.iter().take(8).map(|b| format!("{b:02x}")).collect();
-    let content = fclib::read(file).map_err(|e| e.to_string())?;
-    let traits = Traits::of(&content.problem, content.info.dofs);
-    Ok(Said::Described(Problem {
-        kind: traits.kind.name().into(),
-        digest,
-        contacts: traits.contacts,
-        unknowns: traits.unknowns,
-        dofs: traits.dofs,
-        density: traits.density(),
-        asymmetry: finite(traits.asymmetry),
-        mu_min: finite(traits.mu.min),
-        mu_max: finite(traits.mu.max),
-        ..Problem::default()
-    }))
 }
 
 /// Solves a problem: once to warm up, then `repeats` times (more where it is short), unless the first time is long enough or no success.

@@ -1,5 +1,8 @@
 //! `nonsmooth bench`: campaigns and what is made of them.
 
+mod compare;
+mod figures;
+mod import;
 mod merge;
 mod run;
 mod traits;
@@ -28,6 +31,9 @@ Examples:
 enum Command {
     Run(run::Args),
     Merge(merge::Args),
+    Import(import::Args),
+    Figures(figures::Args),
+    Compare(compare::Args),
     Traits(traits::Args),
     /// Do one run for a campaign, which writes it to the standard input
     #[command(hide = true)]
@@ -42,6 +48,9 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     match &args.command {
         Command::Run(args) => run::run(args),
         Command::Merge(args) => merge::run(args),
+        Command::Import(args) => import::run(args),
+        Command::Figures(args) => figures::run(args),
+        Command::Compare(args) => compare::run(args),
         Command::Traits(args) => traits::run(args),
         Command::Worker => campaign::serve(&campaign::Registry).map(|()| Exit::Solved),
     }
