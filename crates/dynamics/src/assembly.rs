@@ -80,7 +80,10 @@ impl Scene {
     /// The velocities at the beginning of the step, as the problem stacks them.
     pub fn velocities(&self) -> Vec<f64> {
         let bodies = self.bodies.iter().flat_map(|b| [b.velocity, b.angular_velocity]);
-        bodies.chain(self.solids.iter().flat_map(|s| s.velocity.iter().copied())).flatten().collect()
+        bodies
+            .chain(self.solids.iter().flat_map(|s| s.velocity.iter().copied()))
+            .flatten()
+            .collect()
     }
 
     /// The first degree of freedom of each solid.

@@ -111,7 +111,8 @@ impl Scene {
             for k in contact.a.into_iter().chain([contact.b]) {
                 let solid = k.checked_sub(self.bodies.len());
                 if solid.is_some_and(|s| self.solids[s].weights(contact.point).is_none()) {
-                    let (key, expected) = (format!("contacts[{c}].point"), format!("a point of {k}"));
+                    let (key, expected) =
+                        (format!("contacts[{c}].point"), format!("a point of {k}"));
                     return Err(SceneError::value(key, expected, format!("{:?}", contact.point)));
                 }
             }

@@ -1,7 +1,7 @@
 //! The trilinear hexahedron of eight nodes (H8) with right angles.
 //!
 //! Local coordinates ξ run from 0 to 1 along each side; node a is the corner whose coordinates are the bits of a. With
-//! `N_a = Π_i (ξ_i or 1 − ξ_i)` the 2×2×2 Gauss points integrate stiffness and mass exactly (Hughes1987, 3.8–3.10).
+//! `N_a = Π_i (ξ_i or 1 − ξ_i)` the 2×2×2 Gauss points integrate stiffness and mass exactly (Hughes1987, chapter 3).
 
 use crate::vec3::{Vec3, dot};
 

@@ -77,11 +77,7 @@ impl ElasticBox {
     /// A box at rest without strain, centred at the origin; θ = 1/2, consistent mass, no node held.
     ///
     /// Errors: a side that is not positive, no elements along an axis, an impossible material.
-    pub fn new(
-        sides: Vec3,
-        elements: [usize; 3],
-        material: Material,
-    ) -> Result<Self, SceneError> {
+    pub fn new(sides: Vec3, elements: [usize; 3], material: Material) -> Result<Self, SceneError> {
         let nodes = elements.iter().map(|n| n + 1).product();
         let solid = Self {
             sides,

@@ -37,7 +37,10 @@ macro_rules! elastic_settings {
                 let Self { density, young, poisson, alpha, beta, theta, lumped, .. } = *self;
                 let material = $crate::Material { density, young, poisson, alpha, beta };
                 let solid = $crate::ElasticBox::new(sides, elements, material)?;
-                Ok($crate::ElasticBox { theta, lumped, position, ..solid })
+                let solid = $crate::ElasticBox { theta, lumped, position, ..solid };
+                // Under the names of the settings.
+                solid.validate("")?;
+                Ok(solid)
             }
         }
     };
