@@ -16,8 +16,8 @@ use crate::{Exit, files, output, report};
 
 /// Generate the problem of a scene.
 ///
-/// A scene is a set of rigid bodies or elastic solids in contact; its problem is one Moreau-Jean time step from the initial
-/// velocities. Without a scene, or with --list, the scenes and their settings are listed.
+/// A scene is a set of rigid bodies or elastic solids in contact; its problem is one Moreau-Jean time step from
+/// the initial velocities. Without a scene, or with --list, the scenes and their settings are listed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {

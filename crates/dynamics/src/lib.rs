@@ -1,7 +1,8 @@
-//! Rigid bodies, elastic solids and given contacts, assembled into the frictional contact problem of one time step.
+//! Rigid bodies, elastic solids and given contacts, assembled into the frictional contact problem of one time
+//! step.
 //!
-//! A [`Scene`] holds [`RigidBody`]s, [`ElasticBox`]es and [`Contact`]s; [`Scene::problem`] states the Moreau–Jean step as a global
-//! problem and [`Scene::condensed`] as a local one. [`scenes`] has families of scenes by name ([`SCENES`]), and
+//! A [`Scene`] holds [`RigidBody`]s, [`ElasticBox`]es and [`Contact`]s; [`Scene::problem`] states the Moreau–Jean
+//! step as a global problem and [`Scene::condensed`] as a local one. [`scenes`] has families of scenes by name ([`SCENES`]), and
 //! [`draw::svg`] draws any scene. SI units throughout: m, kg, s, rad.
 //!
 //! ```

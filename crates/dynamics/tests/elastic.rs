@@ -472,4 +472,6 @@ fn impossible_solids_name_what_is_wrong() {
     for (start, message) in cases {
         assert!(message.starts_with(start) && !message.contains('\n'), "{message}");
     }
+    let endless = ElasticBox::new([1.0; 3], [usize::MAX, 2, 2], STONE).unwrap_err().to_string();
+    assert!(endless.starts_with("elements: expected at least 1 along each axis and at most"));
 }

@@ -70,13 +70,13 @@ fn motion_colour(motion: Motion) -> &'static str {
 
 /// Draws `scene` as a standalone SVG document, the same text for the same input.
 ///
-/// Elastic solids are drawn without strain, with the faces of their elements. Faces are shaded flat and painted from the farthest body to the nearest, in an order that is
-/// exact for convex bodies with a separating face plane. Cost: O(pairs of bodies that overlap in the picture).
+/// Elastic solids are drawn without strain, with the faces of their elements. Faces are shaded flat and painted from
+/// the farthest body to the nearest, in an order that is exact for convex bodies with a separating face plane. Cost: O(pairs of bodies that overlap in the picture).
 ///
 /// Errors: those of [`Scene::validate`]; nothing to draw; impulses or motions that do not fit the contacts.
 pub fn svg(scene: &Scene, drawing: &Drawing) -> Result<String, SceneError> {
     check(scene, drawing)?;
-    let solids = solids(scene);
+    let solids = solids(scene)?;
     let (centre, radius) = bounds(&solids);
     let mut camera = Camera::new(&drawing.view, centre, radius);
     let light = camera.light();
@@ -150,7 +150,7 @@ fn check(scene: &Scene, drawing: &Drawing) -> Result<(), SceneError> {
 }
 
 /// The bodies and obstacles in the world frame.
-fn solids(scene: &Scene) -> Vec<Solid> {
+fn solids(scene: &Scene) -> Result<Vec<Solid>, SceneError> {
     let bodies = scene.bodies.iter().enumerate().map(|(k, body)| {
         let colour = BODY[k % BODY.len()];
         let placed = |p: &Polyhedron| Solid::convex(p.mapped(|v| body.to_world(v)), colour);
@@ -165,11 +165,10 @@ fn solids(scene: &Scene) -> Vec<Solid> {
         }
     });
     let elastic = scene.solids.iter().enumerate().map(|(k, solid)| {
-        let surface = solid.surface().expect("a validated solid has a volume");
-        Solid::convex(surface, BODY[(scene.bodies.len() + k) % BODY.len()])
+        Ok(Solid::convex(solid.surface()?, BODY[(scene.bodies.len() + k) % BODY.len()]))
     });
     let obstacles = scene.obstacles.iter().map(|p| Solid::convex(p.clone(), OBSTACLE));
-    bodies.chain(elastic).chain(obstacles).collect()
+    bodies.map(Ok).chain(elastic).chain(obstacles.map(Ok)).collect()
 }
 
 /// The centre, radius and velocity of each body and each elastic solid.

@@ -15,7 +15,7 @@ pub(super) fn shapes(xi: Vec3) -> [f64; 8] {
 
 /// The gradients of the shape functions at ξ, 1/m.
 fn gradients(xi: Vec3, sides: Vec3) -> [Vec3; 8] {
-    let slope = |a: usize, k: usize| if a >> k & 1 == 1 { 1.0 } else { -1.0 } / sides[k];
+    let slope = |a: usize, k: usize| (if a >> k & 1 == 1 { 1.0 } else { -1.0 }) / sides[k];
     std::array::from_fn(|a| {
         std::array::from_fn(|i| {
             (0..3).map(|k| if k == i { slope(a, k) } else { factor(a, k, xi[k]) }).product()
@@ -31,8 +31,9 @@ fn factor(a: usize, k: usize, xi: f64) -> f64 {
 fn integral(sides: Vec3, term: impl Fn(Vec3, &mut dyn FnMut(usize, usize, f64))) -> Matrix {
     let weight = sides.iter().product::<f64>() / 8.0;
     let mut out = [[0.0; 24]; 24];
+    let points = [0.5 - 0.5 / 3.0_f64.sqrt(), 0.5 + 0.5 / 3.0_f64.sqrt()];
     for g in 0..8 {
-        let xi = [0, 1, 2].map(|k| 0.5 + if g >> k & 1 == 1 { 0.5 } else { -0.5 } / 3.0_f64.sqrt());
+        let xi = [0, 1, 2].map(|k| points[g >> k & 1]);
         term(xi, &mut |row, column, x| out[row][column] += weight * x);
     }
     out

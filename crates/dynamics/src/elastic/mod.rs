@@ -72,12 +72,15 @@ pub struct ElasticBox {
 
 /// Nodes closer to a point than this part of an element are the point.
 const AT_NODE: f64 = 1e-9;
+/// Keeps a slip of the keyboard from filling the memory.
+const MOST_NODES: usize = 10_000_000;
 
 impl ElasticBox {
     /// A box at rest without strain, centred at the origin; θ = 1/2, consistent mass, no node held.
     ///
-    /// Errors: a side that is not positive, no elements along an axis, an impossible material.
+    /// Errors: a side that is not positive, no elements along an axis or too many, an impossible material.
     pub fn new(sides: Vec3, elements: [usize; 3], material: Material) -> Result<Self, SceneError> {
+        check_elements("elements", elements)?;
         let nodes = elements.iter().map(|n| n + 1).product();
         let solid = Self {
             sides,
@@ -254,10 +257,7 @@ impl ElasticBox {
         for side in self.sides {
             positive(&place("sides"), side)?;
         }
-        if self.elements.contains(&0) {
-            let found = format!("{:?}", self.elements);
-            return Err(SceneError::value(place("elements"), "at least 1 along each axis", found));
-        }
+        check_elements(&place("elements"), self.elements)?;
         self.material.validate(&place(""))?;
         positive(&place("mass"), self.mass())?;
         let theta = self.theta;
@@ -347,6 +347,17 @@ impl ElasticBox {
             })
         })
     }
+}
+
+/// At least one element along each axis, and a number of nodes that memory can hold.
+fn check_elements(key: &str, elements: [usize; 3]) -> Result<(), SceneError> {
+    let times = |product: usize, n: &usize| product.checked_mul(n.checked_add(1)?);
+    let nodes = elements.iter().try_fold(1, times);
+    if nodes.is_some_and(|n| n <= MOST_NODES) && !elements.contains(&0) {
+        return Ok(());
+    }
+    let expected = format!("at least 1 along each axis and at most {MOST_NODES} nodes");
+    Err(SceneError::value(key, expected, format!("{elements:?}")))
 }
 
 /// The places of a grid, the last index fastest.

@@ -7,10 +7,10 @@ use crate::vec3::Z;
 use crate::{Scene, SceneError};
 
 elastic_settings! {
-    /// Elastic cubes on each other, in small and full meshes alike: a contact at each node of a cube's bottom that
-    /// stands on the cube below. Every second cube is shifted, so that nodes meet faces and some overhang. W has
-    /// full rank. With `elements` 2, 5 and 20 and `mu` 0.3 the problems have the sizes of Cubes_H8_2, Cubes_H8_5
-    /// and Cubes_H8_20 of the FCLIB collection.
+    /// Elastic cubes on each other: a contact at each node of a cube's bottom that stands on the cube below. Every
+    /// second cube is shifted, so that some nodes overhang and the others meet faces. W has full rank. With
+    /// `elements` 2, 5 and 20 and `mu` 0.3 the problems have the sizes of Cubes_H8_2, Cubes_H8_5 and Cubes_H8_20 of
+    /// the FCLIB collection.
     ElasticCubes {
         /// Number of cubes.
         count: usize = 2,
@@ -18,7 +18,7 @@ elastic_settings! {
         elements: usize = 2,
         /// Side of a cube, m.
         side: f64 = 1.0,
-        /// Shift of every second cube along x and y, in sides, from 0 to 1.
+        /// Shift of every second cube along x and y, in sides, from 0 to below 1.
         offset: f64 = 0.1,
         /// What the lowest cube stands on.
         support: Support = Support::Held,
