@@ -16,8 +16,8 @@ use crate::{Exit, files, output, report};
 
 /// Generate the problem of a scene.
 ///
-/// A scene is a set of rigid bodies in contact; its problem is one Moreau-Jean time step from the initial
-/// velocities. Without a scene, or with --list, the scenes and their settings are listed.
+/// A scene is a set of rigid bodies or elastic solids in contact; its problem is one Moreau-Jean time step from
+/// the initial velocities. Without a scene, or with --list, the scenes and their settings are listed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
@@ -148,7 +148,7 @@ fn info(entry: &SceneEntry, settings: &SettingsMap, scene: &Scene) -> Info {
             env!("CARGO_PKG_VERSION"),
             join(&all)
         )),
-        dofs: Some(6 * scene.bodies.len()),
+        dofs: Some(scene.dofs()),
         ..Info::default()
     }
 }
@@ -194,7 +194,7 @@ fn text(
         "{}: {}, {} and {} ({})\n",
         label.display(),
         scene.name,
-        match scene.bodies.len() {
+        match scene.bodies.len() + scene.solids.len() {
             1 => "1 body".into(),
             n => format!("{n} bodies"),
         },

@@ -10,9 +10,9 @@ use crate::vec3::{Vec3, X, Y, cross, dot, norm, normalise, scale, sub};
 /// `u_N > 0` separates, and the impulse r acts on b (−r on a).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
-    /// The first body, `None` for the ground.
+    /// The first body or, counted after the bodies, elastic solid; `None` for the ground.
     pub a: Option<usize>,
-    /// The second body.
+    /// The second body or elastic solid.
     pub b: usize,
     /// Where they touch, m.
     pub point: Vec3,

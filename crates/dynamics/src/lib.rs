@@ -1,7 +1,8 @@
-//! Rigid bodies and given contacts, assembled into the frictional contact problem of one time step.
+//! Rigid bodies, elastic solids and given contacts, assembled into the frictional contact problem of one time
+//! step.
 //!
-//! A [`Scene`] holds [`RigidBody`]s and [`Contact`]s; [`Scene::problem`] states the Moreau–Jean step as a global
-//! problem and [`Scene::condensed`] as a local one. [`scenes`] has families of scenes by name ([`SCENES`]), and
+//! A [`Scene`] holds [`RigidBody`]s, [`ElasticBox`]es and [`Contact`]s; [`Scene::problem`] states the Moreau–Jean
+//! step as a global problem and [`Scene::condensed`] as a local one. [`scenes`] has families of scenes by name ([`SCENES`]), and
 //! [`draw::svg`] draws any scene. SI units throughout: m, kg, s, rad.
 //!
 //! ```
@@ -17,6 +18,7 @@ mod assembly;
 mod body;
 mod contact;
 pub mod draw;
+mod elastic;
 mod error;
 mod polyhedron;
 mod scene;
@@ -25,6 +27,7 @@ mod vec3;
 
 pub use body::{RigidBody, Rotation, Shape};
 pub use contact::Contact;
+pub use elastic::{ElasticBox, Material};
 pub use error::SceneError;
 pub use polyhedron::{MassProperties, Polyhedron};
 pub use scene::{Ground, Scene};

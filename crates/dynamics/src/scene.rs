@@ -1,4 +1,4 @@
-//! Bodies and contacts together.
+//! Bodies, elastic solids and contacts together.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use crate::error::{positive, require};
 use crate::polyhedron::Polyhedron;
 use crate::vec3::{Vec3, X, cross, norm};
-use crate::{Contact, RigidBody, SceneError};
+use crate::{Contact, ElasticBox, RigidBody, SceneError};
 
 /// Bodies, the contacts between them, and what drives them during one time step.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +15,8 @@ pub struct Scene {
     pub name: String,
     /// The bodies, in the order of the degrees of freedom.
     pub bodies: Vec<RigidBody>,
+    /// Elastic solids; contacts count them after all bodies, as their degrees of freedom come after.
+    pub solids: Vec<ElasticBox>,
     /// The contacts, all of them active.
     pub contacts: Vec<Contact>,
     /// Acceleration of gravity, m/s².
@@ -50,13 +52,26 @@ impl Scene {
         self.bodies.len() - 1
     }
 
-    /// The mass of all bodies, kg.
+    /// Adds an elastic solid; returns its index as contacts count it, so bodies must be added before.
+    pub fn push_solid(&mut self, solid: ElasticBox) -> usize {
+        self.solids.push(solid);
+        self.bodies.len() + self.solids.len() - 1
+    }
+
+    /// The number of degrees of freedom.
+    pub fn dofs(&self) -> usize {
+        6 * self.bodies.len() + self.solids.iter().map(ElasticBox::dofs).sum::<usize>()
+    }
+
+    /// The mass of all bodies and solids, kg.
     pub fn mass(&self) -> f64 {
-        self.bodies.iter().map(|b| b.mass).sum()
+        let solids = self.solids.iter().map(ElasticBox::mass);
+        self.bodies.iter().map(|b| b.mass).chain(solids).sum()
     }
 
     /// Adds to each component of velocity a random number within ±`amplitude` (m/s), uniform and reproducible
-    /// by `seed`; angular velocities by as much at the farthest point of the body.
+    /// by `seed`; angular velocities by as much at the farthest point of the body. An elastic solid gets a rigid
+    /// motion, unless it is held.
     pub fn disturb(&mut self, amplitude: f64, seed: u64) {
         if amplitude == 0.0 {
             return;
@@ -67,6 +82,11 @@ impl Scene {
             let radius = body.shape.radius();
             body.velocity.iter_mut().for_each(|v| *v += draw());
             body.angular_velocity.iter_mut().for_each(|w| *w += draw() / radius);
+        }
+        for solid in self.solids.iter_mut().filter(|s| !s.held.contains(&true)) {
+            let radius = solid.radius();
+            let linear = std::array::from_fn(|_| draw());
+            solid.add_velocity(linear, std::array::from_fn(|_| draw() / radius));
         }
     }
 
@@ -83,8 +103,19 @@ impl Scene {
         for (k, body) in self.bodies.iter().enumerate() {
             body.validate(&format!("bodies[{k}]"))?;
         }
+        for (k, solid) in self.solids.iter().enumerate() {
+            solid.validate(&format!("solids[{k}]"))?;
+        }
         for (c, contact) in self.contacts.iter().enumerate() {
-            contact.validate(&format!("contacts[{c}]"), self.bodies.len())?;
+            contact.validate(&format!("contacts[{c}]"), self.bodies.len() + self.solids.len())?;
+            for k in contact.a.into_iter().chain([contact.b]) {
+                let solid = k.checked_sub(self.bodies.len());
+                if solid.is_some_and(|s| self.solids[s].weights(contact.point).is_none()) {
+                    let (key, expected) =
+                        (format!("contacts[{c}].point"), format!("a point of {k}"));
+                    return Err(SceneError::value(key, expected, format!("{:?}", contact.point)));
+                }
+            }
         }
         Ok(())
     }

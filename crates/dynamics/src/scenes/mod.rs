@@ -57,12 +57,17 @@ macro_rules! settings {
 }
 
 mod arch;
+mod elastic;
+mod elastic_cubes;
+mod elastic_wall;
 mod sliding_box;
 mod spheres;
 mod stack;
 mod wall;
 
 pub use arch::Arch;
+pub use elastic_cubes::{ElasticCubes, Support};
+pub use elastic_wall::ElasticWall;
 pub use sliding_box::SlidingBox;
 pub use spheres::{Layout, Spheres};
 pub use stack::Stack;
@@ -75,6 +80,8 @@ pub static SCENES: &[SceneEntry] = &[
     SceneEntry::of::<Wall>(),
     SceneEntry::of::<Arch>(),
     SceneEntry::of::<Spheres>(),
+    SceneEntry::of::<ElasticCubes>(),
+    SceneEntry::of::<ElasticWall>(),
 ];
 
 /// A family of scenes: a struct that is its settings.
@@ -169,6 +176,7 @@ impl Common {
         Ok(Scene {
             name: name.into(),
             bodies: vec![],
+            solids: vec![],
             contacts: vec![],
             gravity: [0.0, 0.0, -self.gravity],
             h: self.h,
