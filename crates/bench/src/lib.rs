@@ -3,6 +3,7 @@
 //! Timings are ratios against a baseline measured in the same run; see `examples/`.
 
 pub mod record;
+pub mod report;
 pub mod runs;
 
 use std::path::{Path, PathBuf};

@@ -1,0 +1,76 @@
+//! `nonsmooth bench report`.
+
+use std::path::PathBuf;
+
+use nonsmooth_bench::report::{self, Options};
+use nonsmooth_bench::runs::Runs;
+
+use crate::{Exit, files, output};
+
+/// Make the HTML report of measured runs.
+///
+/// One file that works from disk, without a network: profiles, tables and every run, with filters by family, size,
+/// tolerance and solver. Several files of runs are joined; of a run that is in more than one, the first counts.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Files of runs, as a campaign or an import writes them
+    #[arg(required = true, value_name = "RUNS")]
+    files: Vec<PathBuf>,
+    /// The file to write
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// The heading of the page
+    #[arg(long, value_name = "TEXT")]
+    title: Option<String>,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  nonsmooth bench report runs.jsonl --out report.html
+  nonsmooth bench report ours.jsonl siconos.jsonl --out report.html --title \"Ours and Siconos'\"
+
+Exit codes: 0 all files are in the report; 2 a file at fault (the report is of the others), or none left.";
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<Exit, String> {
+    if let Some(file) = args.files.iter().find(|f| same(f, &args.out)) {
+        let file = file.display();
+        return Err(format!(
+            "--out {file}: expected a file to write, found one of the files of runs"
+        ));
+    }
+    files::writable("--out", &args.out)?;
+    let mut all = Runs::default();
+    let mut twice = 0;
+    let exit = files::each(&args.files, false, |_, file| {
+        let runs = Runs::read(file).map_err(|e| e.to_string())?;
+        let torn = all.torn | runs.torn;
+        twice += all.join(runs);
+        all.torn = torn;
+        Ok(Exit::Solved)
+    });
+    if all.campaigns.is_empty() {
+        return Err(format!("--out {}: expected runs to report, found none", args.out.display()));
+    }
+    let options = args.title.clone().map_or_else(Options::default, |title| Options { title });
+    let page = report::html(&all, &options);
+    std::fs::write(&args.out, &page).map_err(|e| format!("--out {}: {e}", args.out.display()))?;
+    let mut text = format!(
+        "{}: {} runs of {} solvers, {:.1} MB",
+        args.out.display(),
+        all.runs.len(),
+        all.solvers().len(),
+        page.len() as f64 / 1e6
+    );
+    if twice > 0 {
+        text += &format!(" ({twice} runs were in several files: the first counts)");
+    }
+    output::print(&format!("{text}\n"));
+    Ok(exit)
+}
+
+/// Whether two paths lead to one file that exists.
+fn same(a: &std::path::Path, b: &std::path::Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
