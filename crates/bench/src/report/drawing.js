@@ -129,10 +129,10 @@ function draw(figure, { width, paper = false }) {
   const line = (name, more = "") => `stroke:${inkOf(name, paper)};${more}`;
   const count = figure.panels.length;
   const columns = Math.max(1, Math.min(count, Math.floor(width / 230)));
-  const margin = { left: 52, right: 12, top: count > 1 ? 24 : 10, bottom: 42 };
+  const margin = { left: 62, right: 20, top: count > 1 ? 24 : 10, bottom: 42 };
   const cell = width / columns;
   const inner = cell - margin.left - margin.right;
-  const tall = count > 1 ? Math.min(230, Math.max(170, inner)) : Math.min(330, Math.max(220, inner * 0.58));
+  const tall = count > 1 ? Math.min(230, Math.max(170, inner)) : Math.min(380, Math.max(220, inner * 0.58));
   const rows = Math.ceil(count / columns);
   const head = paper ? 26 : 0;
   const body = rows * (tall + margin.top + margin.bottom);
@@ -178,7 +178,7 @@ function draw(figure, { width, paper = false }) {
     svg.append(g("text", { x: left + inner / 2, y: top + tall + 36, "text-anchor": "middle", style: ink("faint") }, clean(figure.x.label)));
     if (k % columns === 0) {
       svg.append(g("text", {
-        x: 0, y: 0, transform: `translate(${left - 38} ${top + tall / 2}) rotate(-90)`, "text-anchor": "middle", style: ink("faint"),
+        x: 0, y: 0, transform: `translate(${left - 50} ${top + tall / 2}) rotate(-90)`, "text-anchor": "middle", style: ink("faint"),
       }, clean(figure.y.label)));
     }
     // The virtual best lies under the others.
@@ -245,7 +245,7 @@ function figureCsv(figure) {
   const head = [...(many ? ["panel"] : []), "solver", figure.x.name, figure.y.name];
   const plain = s => (s === BEST ? "virtual best" : data.solvers[s].label);
   return csvText([head, ...figure.panels.flatMap(panel => panel.curves.flatMap(curve => curve.x.map((x, k) => (
-    [...(many ? [panel.title] : []), plain(curve.solver), x, curve.y[k]]))))]);
+    [...(many ? [panel.name] : []), plain(curve.solver), x, curve.y[k]]))))]);
 }
 
 function save(name, blob) {

@@ -10,7 +10,7 @@ const short = (v, digits = 3) => {
   if (v === Infinity) return "∞";
   if (v === 0) return "0";
   const size = Math.abs(v);
-  return size >= 1e-3 && size < 1e6 ? String(Number(v.toPrecision(digits))) : v.toExponential(Math.max(0, digits - 2));
+  return size >= 1e-3 && size < 1e6 ? String(Number(v.toPrecision(digits))) : v.toExponential(digits - 1);
 };
 const residual = v => (Number.isNaN(v) ? "" : v.toExponential(1));
 const whole = v => (Number.isNaN(v) || v === null || v === undefined ? "" : String(v));
@@ -19,6 +19,7 @@ const share = v => `${(100 * v).toFixed(1)} %`;
 const mebi = bytes => (Number.isNaN(bytes) ? "" : short(bytes / 2 ** 20));
 const plural = (n, one, many = `${one}s`) => `${n} ${n === 1 ? one : many}`;
 const toleranceText = v => (v > 0 ? v.toExponential().replace("e", "e").replace("+", "") : String(v));
+const familyOf = p => data.families[data.problems.family[p]];
 const endingText = name => name.replaceAll("_", " ");
 
 // ------------------------------------------------------------------------------------------------ state
@@ -87,7 +88,7 @@ function fromHash() {
 // ------------------------------------------------------------------------------------------------ figures
 
 const shareAxis = (label, name) => ({
-  label, name, min: 0, max: 1, ticks: [0, 0.2, 0.4, 0.6, 0.8, 1].map(v => [v, `${Math.round(100 * v)} %`]),
+  label, name, min: 0, max: 1.02, ticks: [0, 0.2, 0.4, 0.6, 0.8, 1].map(v => [v, `${Math.round(100 * v)} %`]),
 });
 const solversOf = curves => [...new Set(curves.map(c => c.solver))].sort((a, b) => (a === BEST ? 1e9 : a) - (b === BEST ? 1e9 : b));
 const powerBelow = v => 10 ** Math.floor(Math.log10(v) + 1e-9);
@@ -116,7 +117,13 @@ function profileFigure(cost) {
   const max = largest > 100 ? powerAbove(largest) : Math.max(2, largest * 1.1);
   const { name } = COSTS[cost];
   const tolerance = toleranceText(data.tolerances[selection.tolerance]);
+  const note = cost === "seconds"
+    ? `Share of ${plural(problems, "problem")} that a solver solves to ${tolerance} in at most τ times the least time of any selected solver (Dolan `
+      + "and Moré 2002). What fails, and a run that is missing, is not solved at any τ. A profile shows the distance from the best; with more than "
+      + `two solvers it does not rank them (Gould and Scott 2016).${machinesNote(selection)}`
+    : `As by time, with the number of ${name} in place of the time; ${plural(problems, "problem")}, tolerance ${tolerance}.`;
   return {
+    heading: `Performance profile by ${name}`,
     title: `Performance profile by ${name}, tolerance ${tolerance}`,
     x: { label: "ratio τ to the best of the selected solvers", name: "tau", log: true, min: 1, max },
     y: shareAxis("share of problems", "rho"),
@@ -125,10 +132,7 @@ function profileFigure(cost) {
     solvers: solversOf(curves),
     at: x => `τ = ${short(x)}`,
     format: share,
-    note: `Share of ${plural(problems, "problem")} that a solver solves to ${tolerance} at no more than τ times the least ${
-      cost === "seconds" ? "time" : `number of ${name}`} of any selected solver (Dolan and Moré 2002). A failure, and a run that is missing, `
-      + `is never solved at any τ. A profile shows the distance from the best; it does not rank more than two solvers (Gould and Scott 2016).${
-        cost === "seconds" ? machinesNote(selection) : ""}${without(leftOut, `their ${name} are not known`)}`,
+    note: note + without(leftOut, `their ${name} are not known`),
   };
 }
 
@@ -137,6 +141,7 @@ function dataFigure() {
   const { problems, curves, leftOut } = dataProfile(state.selection, epsilon);
   const [min, max] = rangeOf(curves.flatMap(c => [c.x[0], c.x[c.x.length - 1]]));
   return {
+    heading: "Data profile",
     title: `Data profile, residual ${toleranceText(epsilon)}`,
     x: { label: "time limit t, s", name: "seconds", log: true, min: powerBelow(min), max: Math.max(powerAbove(max), 10 * powerBelow(min)) },
     y: shareAxis("share of problems", "share"),
@@ -178,11 +183,11 @@ function successFigure() {
     x: { label: "residual ε", name: "epsilon", log: true, min: 1e-3, max: 1e-14 },
     y: shareAxis("share of problems", "share"),
     stepped: false,
-    panels: classes.map(c => ({ title: `${c.size} contacts, ${plural(c.problems, "problem")}`, curves: c.curves })),
+    panels: classes.map(c => ({ title: `${c.size} contacts (${c.problems})`, name: c.size, curves: c.curves })),
     solvers: solversOf(classes.flatMap(c => c.curves)),
     at: x => `ε = ${toleranceText(EPSILONS.reduce((a, b) => (Math.abs(Math.log(b / x)) < Math.abs(Math.log(a / x)) ? b : a)))}`,
     format: share,
-    note: "Share of problems whose smallest residual, over the runs of a solver at all tolerances, is at most ε. A run stops at its own tolerance, so "
+    note: "In brackets the number of problems. Share of problems whose smallest residual, over the runs of a solver at all tolerances, is at most ε. A run stops at its own tolerance, so "
       + `the shares below the smallest tolerance that was asked for (${toleranceText(Math.min(...data.tolerances))}) are what runs happened to reach.${
         data.solvers.some(s => s.foreign) ? " † by the program's own residual." : ""}${without(leftOut, "their residuals are not known")}`,
   };
@@ -200,6 +205,10 @@ const FIGURES = {
 /** What is shown of each figure: its definition, element, and scales. */
 const shown = {};
 
+/** The width of a column on paper, and whether the figures are drawn for it. */
+const HALF = 345;
+let printing = false;
+
 function figureButtons(name, figure) {
   const one = (text, what, save_) => h("button", { type: "button", click: save_, title: `Save as ${text}`, "aria-label": `Save ${what} as ${text}` }, text);
   return h("span", { class: "exports" },
@@ -210,14 +219,15 @@ function figureButtons(name, figure) {
 
 /** A place for a figure: heading, buttons, drawing, legend (on paper and narrow screens), definition. */
 function place(name, figure, extra = null) {
-  const box = h("figure", { id: `figure-${name}` });
+  const wide = ["profile-time", "success"].includes(name);
+  const box = h("figure", { id: `figure-${name}`, class: wide ? "wide" : null });
   const heading = h("h3");
   const drawing = h("div", { class: "drawing", tabindex: 0, role: "group", "aria-label": "arrow keys read the curves" });
   const key = h("div", { class: "key" });
   const tip = h("div", { class: "tip", role: "status", hidden: true });
   const note = h("figcaption");
   box.append(h("div", { class: "head" }, heading, extra ?? "", figureButtons(name, () => shown[name].figure)), drawing, key, tip, note);
-  shown[name] = { box, heading, drawing, key, tip, note, make: figure };
+  shown[name] = { box, wide, heading, drawing, key, tip, note, make: figure };
   listen(shown[name]);
   return box;
 }
@@ -226,9 +236,9 @@ function render(name) {
   const it = shown[name];
   const figure = it.make();
   it.figure = figure;
-  it.heading.textContent = figure.title;
+  it.heading.textContent = clean(figure.heading ?? figure.title);
   it.note.textContent = figure.note;
-  const { svg, panels } = draw(figure, { width: Math.max(280, it.drawing.clientWidth || 560) });
+  const { svg, panels } = draw(figure, { width: printing ? it.wide ? 2 * HALF : HALF : Math.max(280, it.drawing.clientWidth || 560) });
   it.panels = panels;
   it.svg = svg;
   it.cursor = null;
@@ -433,10 +443,10 @@ function renderSummary() {
 
 function renderHeat() {
   const { families, rows } = byFamily(state.selection);
-  const table = h("table", { id: "heat" },
+  const table = h("table", { id: "heat", class: families.length > 9 ? "many" : null },
     h("thead", {}, h("tr", {}, h("th", {}, "solver"), families.map(f => {
       const n = rows[0]?.cells[families.indexOf(f)].problems ?? 0;
-      return h("th", { class: "n" }, clean(DIMENSIONS.families.labels[f]), h("small", {}, ` ${n}`));
+      return h("th", { class: "n" }, h("span", {}, clean(DIMENSIONS.families.labels[f]), h("small", {}, ` ${n}`)));
     }))),
     h("tbody", {}, rows.map(r => h("tr", {}, h("td", { class: "name" }, swatch(r.solver), labelOf(r.solver)), r.cells.map(c => {
       const part = c[state.heat];
@@ -467,7 +477,7 @@ function renderUnsolved() {
     h("thead", {}, h("tr", {}, h("th", {}, "problem"), h("th", {}, "family"), h("th", { class: "n" }, "contacts"),
       h("th", { class: "n" }, "least residual"), h("th", {}, "by"))),
     h("tbody", {}, found.slice(0, most).map(({ problem: p, best }) => h("tr", {},
-      h("td", {}, problemLink(p)), cell(data.families[data.problems.family[p]]), number(data.problems.contacts[p]),
+      h("td", {}, problemLink(p)), cell(familyOf(p)), number(data.problems.contacts[p]),
       number(best < 0 ? "" : residual(runs.reached[best])), cell(best < 0 ? "" : labelOf(runs.solver[best])))))) : null);
 }
 
@@ -480,24 +490,27 @@ function renderUnreadable() {
 
 // ------------------------------------------------------------------------------------------------ the table of runs
 
-// Each column: heading, the value that sorts, the text that shows.
+// Each column: heading, the value that sorts, the text that shows; its name and value in files where they differ.
 const messageOf = r => (runs.message && runs.message[r] !== null ? data.messages[runs.message[r]] : "");
 const COLUMNS = [
   { name: "problem", sort: r => data.problems.name[runs.problem[r]] },
-  { name: "family", sort: r => data.families[data.problems.family[runs.problem[r]]] },
+  // As a rule the family stands in the problem's name.
+  { name: "family", sort: r => familyOf(runs.problem[r]), hidden: data.problems.name.every((name, p) => name.startsWith(`${familyOf(p)}/`)) },
   { name: "contacts", n: true, sort: r => data.problems.contacts[runs.problem[r]] },
   { name: "solver", sort: r => data.solvers[runs.solver[r]].label, show: r => labelOf(runs.solver[r]) },
   { name: "tolerance", n: true, sort: r => data.tolerances[runs.tolerance[r]], show: r => toleranceText(data.tolerances[runs.tolerance[r]]) },
   { name: "ending", sort: r => runs.ending[r], show: r => endingText(data.endings[runs.ending[r]]), plain: r => data.endings[runs.ending[r]] },
-  { name: "iterations", n: true, sort: r => runs.iterations[r], show: r => whole(runs.iterations[r]) },
-  { name: "factorisations", n: true, sort: r => runs.factorisations[r], show: r => whole(runs.factorisations[r]) },
+  { name: "iterations", column: "iterations", n: true, sort: r => runs.iterations[r], show: r => whole(runs.iterations[r]) },
+  { name: "factorisations", column: "factorisations", n: true, sort: r => runs.factorisations[r], show: r => whole(runs.factorisations[r]) },
   { name: "seconds", n: true, sort: r => runs.seconds[r], show: r => short(runs.seconds[r]) },
   { name: "residual", n: true, sort: r => runs.reached[r], show: r => residual(runs.reached[r]) },
-  { name: "memory, MiB", n: true, sort: r => runs.peak_memory[r], show: r => mebi(runs.peak_memory[r]), plain: r => runs.peak_memory[r], file: "peak_memory" },
+  { name: "memory, MiB", column: "peak_memory", n: true, sort: r => runs.peak_memory[r], show: r => mebi(runs.peak_memory[r]),
+    file: "peak_memory", plain: r => runs.peak_memory[r] },
   { name: "message", sort: messageOf },
-].filter(c => !["iterations", "factorisations", "memory, MiB"].includes(c.name)
-  || (data.runs[c.name === "memory, MiB" ? "peak_memory" : c.name] ?? null) !== null);
+].filter(c => !c.column || data.runs[c.column]);
+const SHOWN = COLUMNS.filter(c => !c.hidden);
 const PAGE = 50;
+const classOf = (c, r) => (c.n ? "n" : c.name === "ending" && runs.ending[r] !== SOLVED ? "failed" : c.name);
 
 /** The runs of the selection, by the filter of texts and in the order of the table. */
 function listedRuns() {
@@ -515,7 +528,7 @@ function listedRuns() {
     found.push(r);
   }
   if (column === null) return found;
-  const value = COLUMNS[column].sort;
+  const value = SHOWN[column].sort;
   const keys = new Map(found.map(r => [r, value(r)]));
   // What is not known stands last in both directions.
   const blank = v => v === "" || Number.isNaN(v);
@@ -532,7 +545,7 @@ function renderRuns() {
   const pages = Math.max(1, Math.ceil(found.length / PAGE));
   const page = state.runs.page = Math.min(Math.max(0, state.runs.page), pages - 1);
   const rows = found.slice(page * PAGE, (page + 1) * PAGE);
-  const heads = COLUMNS.map((c, k) => {
+  const heads = SHOWN.map((c, k) => {
     const mine = state.runs.column === k;
     return h("th", { class: c.n ? "n" : null, "aria-sort": mine ? (state.runs.down ? "descending" : "ascending") : "none" },
       h("button", {
@@ -544,11 +557,11 @@ function renderRuns() {
       }, c.name, h("span", { class: "arrow" }, mine ? (state.runs.down ? " ▼" : " ▲") : "")));
   });
   fill(byId("runs-place"), h("table", { id: "runs" }, h("thead", {}, h("tr", {}, heads)), h("tbody", {}, rows.map(r => h("tr", {},
-    COLUMNS.map((c, k) => {
+    SHOWN.map((c, k) => {
       if (k === 0) return h("td", {}, problemLink(runs.problem[r]));
       const text = (c.show ?? c.sort)(r);
       return cell(text, {
-        class: c.n ? "n" : c.name === "message" ? "message" : c.name === "ending" && runs.ending[r] !== SOLVED ? "failed" : null,
+        class: classOf(c, r),
         title: c.name === "message" ? clean(text) : null,
       });
     }))))));
@@ -582,6 +595,7 @@ function traceFigure(p) {
   const [left, right] = rangeOf(curves.flatMap(c => c.x));
   const [low, high] = rangeOf(curves.flatMap(c => c.y));
   return {
+    heading: "Residual against time",
     title: `Residual against time, ${data.problems.name[p]}, tolerance ${toleranceText(data.tolerances[k])}`,
     x: { label: "time t, s", name: "seconds", log: true, min: powerBelow(left), max: Math.max(powerAbove(right), 10 * powerBelow(left)) },
     y: { label: "residual", name: "residual", log: true, min: powerBelow(low), max: Math.max(powerAbove(high), 10 * powerBelow(low)) },
@@ -608,7 +622,7 @@ function openProblem(p) {
   for (let s = 0; s < nSolvers; s++) for (let k = 0; k < nTolerances; k++) if (runAt(p, s, k) >= 0) mine.push(runAt(p, s, k));
   mine.sort((a, b) => runs.tolerance[a] - runs.tolerance[b] || (runs.ending[a] === SOLVED ? 0 : 1) - (runs.ending[b] === SOLVED ? 0 : 1)
     || runs.seconds[a] - runs.seconds[b]);
-  const columns = COLUMNS.filter(c => !["problem", "family", "contacts"].includes(c.name));
+  const columns = SHOWN.filter(c => !["problem", "family", "contacts"].includes(c.name));
   const traced = traceFigure(p).solvers.length > 0;
   const dialog = byId("problem");
   fill(dialog,
@@ -621,7 +635,7 @@ function openProblem(p) {
     h("div", { class: "scroll" }, h("table", {},
       h("thead", {}, h("tr", {}, columns.map(c => h("th", { class: c.n ? "n" : null }, c.name)))),
       h("tbody", {}, mine.map(r => h("tr", {}, columns.map(c => cell((c.show ?? c.sort)(r), {
-        class: c.n ? "n" : c.name === "ending" && runs.ending[r] !== SOLVED ? "failed" : null,
+        class: classOf(c, r),
       }))))))));
   dialog.showModal();
   if (traced) render("trace");
@@ -651,12 +665,12 @@ function build() {
   const epsilon = h("select", {
     id: "epsilon", "aria-label": "residual of the data profile",
     change: () => { state.epsilon = epsilon.value ? Number(epsilon.value) : null; render("data-profile"); toHash(); },
-  }, h("option", { value: "" }, "at the tolerance"), EPSILONS.map(e => h("option", { value: String(e) }, toleranceText(e))));
+  }, h("option", { value: "" }, "residual: the tolerance"), EPSILONS.map(e => h("option", { value: String(e) }, `residual: ${toleranceText(e)}`)));
   fill(byId("figures"), Object.entries(FIGURES).map(([name, figure]) => place(name, figure, name === "data-profile" ? epsilon : null)));
   byId("summary-buttons").replaceWith(csvButton("summary", () => summaryRows(summary(state.selection))));
   byId("heat-buttons").replaceWith(csvButton("families", heatRows));
   byId("unsolved-buttons").replaceWith(csvButton("unsolved", () => [["problem", "family", "contacts", "residual", "solver"],
-    ...unsolved(state.selection).map(({ problem: p, best }) => [data.problems.name[p], data.families[data.problems.family[p]],
+    ...unsolved(state.selection).map(({ problem: p, best }) => [data.problems.name[p], familyOf(p),
       data.problems.contacts[p], best < 0 ? "" : runs.reached[best], best < 0 ? "" : data.solvers[runs.solver[best]].label])]));
   byId("runs-buttons").replaceWith(csvButton("runs", () => runRows(listedRuns())));
   byId("heat-what").addEventListener("change", () => { state.heat = byId("heat-what").value; renderHeat(); toHash(); });
@@ -675,10 +689,13 @@ function build() {
   let width = 0;
   new ResizeObserver(() => {
     const now = byId("figures").clientWidth;
-    if (now === width || !now) return;
+    if (now === width || !now || printing) return;
     width = now;
     Object.keys(FIGURES).forEach(render);
   }).observe(byId("figures"));
+  const print = on => () => { printing = on; Object.keys(FIGURES).forEach(render); };
+  addEventListener("beforeprint", print(true));
+  addEventListener("afterprint", print(false));
   addEventListener("hashchange", () => { fromHash(); showTheme(); byId("heat-what").value = state.heat; changed(); });
 
   fromHash();

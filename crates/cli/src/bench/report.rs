@@ -34,7 +34,7 @@ Exit codes: 0 all files are in the report; 2 a file at fault (the report is of t
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
-    if let Some(file) = args.files.iter().find(|f| same(f, &args.out)) {
+    if let Some(file) = args.files.iter().find(|f| files::same(f, &args.out)) {
         let file = file.display();
         return Err(format!(
             "--out {file}: expected a file to write, found one of the files of runs"
@@ -55,7 +55,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     }
     let options = args.title.clone().map_or_else(Options::default, |title| Options { title });
     let page = report::html(&all, &options);
-    std::fs::write(&args.out, &page).map_err(|e| format!("--out {}: {e}", args.out.display()))?;
+    files::write_text("--out", &args.out, &page)?;
     let mut text = format!(
         "{}: {} runs of {} solvers, {:.1} MB",
         args.out.display(),
@@ -68,9 +68,4 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     }
     output::print(&format!("{text}\n"));
     Ok(exit)
-}
-
-/// Whether two paths lead to one file that exists.
-fn same(a: &std::path::Path, b: &std::path::Path) -> bool {
-    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
