@@ -4,6 +4,7 @@
 mod browser;
 
 use std::path::Path;
+use std::time::Duration;
 
 use browser::Browser;
 use nonsmooth_bench::record::{
@@ -311,8 +312,6 @@ fn curve<'a>(result: &'a Value, solver: &str) -> &'a Value {
     curves.iter().find(|c| c["solver"] == solver).expect("the solver's curve")
 }
 
-// The numbers of `profile` in this crate are to be confronted with these, on the synthetic campaign, in this function
-// and in `the_numbers_are_those_of_the_crate`.
 #[test]
 fn the_numbers_are_those_computed_by_hand() {
     let Some(mut browser) = Browser::start() else { return };
@@ -355,14 +354,15 @@ fn the_numbers_are_those_computed_by_hand() {
 
     // All problems have 50 contacts; 0.7e-8 where solved.
     let success = browser.value("report.success()");
-    assert_eq!(success[0]["size"], "11-100");
-    assert_eq!(success.as_array().map(Vec::len), Some(1));
+    assert_eq!((&success[0]["size"], &success[1]["size"]), (&json!("all"), &json!("11-100")));
+    assert_eq!(success.as_array().map(Vec::len), Some(2));
+    assert_eq!(success[0]["curves"], success[1]["curves"]);
     let shares = [1.0, 1.0, 1.0, 0.75, 0.75, 0.75, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     assert_eq!(curve(&success[0], "y")["y"], json!(shares.map(|v: f64| json_number(v))));
 
-    // The median over four is infinite until three have an answer, and does not fall with the fourth.
+    // The lower median over four is infinite until two have an answer.
     let median = browser.value("report.medianResidual()");
-    assert_eq!(curve(&median, "y")["x"], json!([4]));
+    assert_eq!(curve(&median, "y")["x"], json!([3]));
 
     let summary = browser.value("report.summary({tolerance: 1e-8})");
     let rows: Vec<Value> = summary
@@ -407,7 +407,7 @@ fn filters_tables_and_the_address_work_together() {
     browser.value("document.querySelector('#filter-families input').click()");
     let fewer = drawn(&mut browser);
     assert_ne!(before, fewer);
-    assert_eq!(browser.value("[...document.querySelectorAll('#heat thead th')].length"), 4);
+    assert_eq!(browser.value("[...document.querySelectorAll('#heat-place thead th')].length"), 4);
     browser.value("document.querySelectorAll('#filter-solvers .only')[1].click()");
     assert_eq!(drawn(&mut browser).as_array().map(Vec::len), Some(1));
     assert_eq!(browser.value("document.querySelectorAll('#summary tbody tr').length"), 2);
@@ -473,8 +473,10 @@ fn filters_tables_and_the_address_work_together() {
 #[test]
 fn figures_and_tables_are_saved_as_valid_files() {
     let Some(mut browser) = Browser::start() else { return };
-    browser.open(&page(&synthetic(30, 4, &[1e-8], true)));
+    browser.open(&page(&synthetic(30, 6, &[1e-8], true)));
     for name in FIGURES {
+        // Chromium drops downloads beyond ten a second.
+        std::thread::sleep(Duration::from_millis(500));
         let buttons = format!("document.querySelectorAll('#figure-{name} .exports button')");
         browser.value(&format!("{buttons}.forEach(b => b.click())"));
         let svg = String::from_utf8(browser.saved(&format!("{name}.svg"))).expect("UTF-8");
@@ -488,7 +490,7 @@ fn figures_and_tables_are_saved_as_valid_files() {
         let csv = String::from_utf8(browser.saved(&format!("{name}.csv"))).expect("UTF-8");
         let mut lines = csv.lines();
         let columns = lines.next().unwrap().split(',').count();
-        assert!(lines.clone().count() > 4);
+        assert!(lines.clone().count() > 2, "{name}");
         assert!(lines.all(|l| l.split(',').count() == columns || l.contains('"')), "{name}");
     }
     let drawn = browser.value("report.csv('profile-time')");
@@ -496,10 +498,11 @@ fn figures_and_tables_are_saved_as_valid_files() {
     let last = drawn.as_str().unwrap().lines().rfind(|l| l.starts_with("solver-00,")).unwrap();
     assert_eq!(last.rsplit(',').next().unwrap().parse::<f64>().ok(), rho.as_f64());
 
+    std::thread::sleep(Duration::from_millis(500));
     browser.value(
         "document.querySelectorAll('section > .head .exports button').forEach(b => b.click())",
     );
-    for (name, lines) in [("summary", 1 + 5), ("families", 1 + 16), ("runs", 1 + 120)] {
+    for (name, lines) in [("summary", 1 + 7), ("families", 1 + 24), ("runs", 1 + 180)] {
         let csv = String::from_utf8(browser.saved(&format!("{name}.csv"))).expect("UTF-8");
         assert_eq!(csv.lines().count(), lines, "{name}");
     }

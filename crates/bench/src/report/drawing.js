@@ -66,6 +66,9 @@ function scale(axis, from, to) {
   return { at, back };
 }
 
+// A curve is { solver, x, y }; of a stepped one, `before` is its value before its first step, if it has one, and `ends`
+// says that it has none after its last.
+
 /** The value of a curve at x: of the last step at or before it, or of the point nearest to it; NaN where there is none. */
 function valueAt(curve, x, stepped) {
   if (!stepped) {
@@ -76,6 +79,7 @@ function valueAt(curve, x, stepped) {
     return curve.y[k];
   }
   let [low, high] = [0, curve.x.length];
+  if (curve.ends && x > curve.x[high - 1]) return NaN;
   while (low < high) {
     const middle = (low + high) >> 1;
     if (curve.x[middle] <= x) low = middle + 1; else high = middle;
@@ -94,7 +98,7 @@ function pathOf(curve, x, y, axis, stepped) {
     text += text ? (px === last ? `V${py}` : `H${px}V${py}`) : `M${px} ${py}`;
     last = px;
   });
-  return text && `${text}H${n(x.at(axis.max))}`;
+  return text && (curve.ends ? text : `${text}H${n(x.at(axis.max))}`);
 }
 
 const sample = (s, x, y, paper) => g("line", {

@@ -140,7 +140,7 @@ function progressOf(p, s) {
     if (trace) trace[1].forEach((t, i) => points.push([t, trace[2][i]]));
     if (!Number.isNaN(runs.seconds[r]) && !Number.isNaN(runs.reached[r])) points.push([runs.seconds[r], runs.reached[r]]);
   }
-  points.sort((a, b) => a[0] - b[0]);
+  points.sort((a, b) => a[0] - b[0] || a[1] - b[1]);
   found = [[], []];
   let best = Infinity;
   for (const [t, residual] of points) {
@@ -173,37 +173,41 @@ function dataProfile(selection, epsilon) {
   return { problems: n, curves, leftOut: selected.filter(s => !solvers.includes(s)) };
 }
 
-/** The median over P of the best residual known at time t; a problem without an answer yet counts as Infinity. */
+/** The first place in sorted numbers whose value is not below v. */
+function lowerBound(sorted, v) {
+  let [low, high] = [0, sorted.length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (sorted[middle] < v) low = middle + 1; else high = middle;
+  }
+  return low;
+}
+
+/** The (lower) median over P of the best residual known at time t; a problem without an answer yet counts as Infinity. */
 function medianResidual(selection) {
   const problems = problemsOfAny(selection);
   const selected = indices(selection.solvers);
   const solvers = selected.filter(s => known.reached[s] && known.seconds[s]);
+  const rank = Math.max(0, Math.ceil(problems.length / 2) - 1);
   const curves = solvers.map(s => {
-    // Events in the order of time; the median of current values changes at events only.
-    const events = [];
-    problems.forEach((p, i) => {
+    const events = problems.flatMap((p, i) => {
       const [times, residuals] = progressOf(p, s);
-      times.forEach((t, k) => events.push([t, i, residuals[k]]));
+      return times.map((t, k) => [t, i, residuals[k]]);
     });
     events.sort((a, b) => a[0] - b[0]);
     const now = new Float64Array(problems.length).fill(Infinity);
-    const x = [];
-    const y = [];
-    let reached = 0;
-    let next = -Infinity;
-    events.forEach(([t, i, residual], k) => {
-      if (now[i] === Infinity) reached++;
+    const sorted = now.slice();
+    const [x, y] = [[], []];
+    for (const [t, i, residual] of events) {
+      // The residual of a problem falls: its place moves down, those between move up.
+      const [to, from] = [lowerBound(sorted, residual), lowerBound(sorted, now[i])];
+      sorted.copyWithin(to + 1, to, from);
+      sorted[to] = residual;
       now[i] = residual;
-      // Half of the problems are needed for a finite median; steps closer than 2 % are not told apart on the axis.
-      const last = k + 1 === events.length;
-      if (2 * reached <= problems.length || (t < next && !last)) return;
-      const value = median(now);
-      next = t * 1.02;
-      if (Number.isFinite(value) && (y.length === 0 || value < y[y.length - 1])) {
-        x.push(t);
-        y.push(Math.max(value, 1e-17));
-      }
-    });
+      const value = sorted[rank];
+      if (x[x.length - 1] === t) { x.pop(); y.pop(); }
+      if (value !== (y[y.length - 1] ?? Infinity)) { x.push(t); y.push(value); }
+    }
     return { solver: s, x, y };
   });
   return { problems: problems.length, curves, leftOut: selected.filter(s => !solvers.includes(s)) };
@@ -211,7 +215,7 @@ function medianResidual(selection) {
 
 const EPSILONS = Array.from({ length: 12 }, (_, k) => Number(`1e-${k + 3}`));
 
-/** Shares of P whose best residual is at most ε, ε = 1e-3 … 1e-14, per class of size. */
+/** Shares of P whose best residual is at most ε, ε = 1e-3 … 1e-14, of all sizes and then per class of size. */
 function success(selection) {
   const problems = problemsOfAny(selection);
   const selected = indices(selection.solvers);
@@ -225,8 +229,8 @@ function success(selection) {
     return least;
   };
   const classes = [];
-  data.sizes.forEach((size, k) => {
-    const inside = problems.filter(p => sizeOf[p] === k);
+  [null, ...data.sizes].forEach((size, k) => {
+    const inside = problems.filter(p => size === null || sizeOf[p] === k - 1);
     if (inside.length === 0) return;
     const residuals = solvers.map(s => inside.map(p => best(p, s)));
     const share = values => EPSILONS.map(e => values.filter(v => v <= e).length / inside.length);
@@ -234,7 +238,7 @@ function success(selection) {
     if (solvers.length > 1) {
       curves.push({ solver: BEST, x: EPSILONS, y: share(inside.map((_, i) => Math.min(...residuals.map(v => v[i])))) });
     }
-    classes.push({ size: size.name, problems: inside.length, curves });
+    classes.push({ size: size === null ? "all" : size.name, problems: inside.length, curves });
   });
   return { classes, leftOut: selected.filter(s => !known.reached[s]) };
 }
@@ -271,18 +275,19 @@ function summary(selection) {
   return rows;
 }
 
-/** Per solver and family the shares of P solved, and solved fastest. */
+/** Per solver and family the numbers of problems of P, of runs, of those solved, and of those solved fastest. */
 function byFamily(selection) {
   const { problems, bySolver } = ratios(selection, "seconds");
   const families = indices(selection.families).filter(f => problems.some(p => data.problems.family[p] === f));
   const rows = indices(selection.solvers).map(s => ({
     solver: s,
     cells: families.map(f => {
-      const cell = { problems: 0, solved: 0, fastest: 0 };
+      const cell = { problems: 0, runs: 0, solved: 0, fastest: 0 };
       problems.forEach((p, i) => {
         if (data.problems.family[p] !== f) return;
         cell.problems++;
         const r = runAt(p, s, selection.tolerance);
+        if (r >= 0) cell.runs++;
         if (r >= 0 && runs.ending[r] === SOLVED) cell.solved++;
         if (bySolver.get(s)?.[i] === 1) cell.fastest++;
       });

@@ -171,23 +171,25 @@ function medianFigure() {
     format: residual,
     lowest: true,
     note: `Median over ${plural(problems, "problem")} of the best residual that a solver has reached within t seconds, over its runs at all `
-      + `tolerances. A problem without an answer yet counts as infinite, so a curve begins where more than half have one.${
+      + `tolerances. A problem without an answer yet counts as infinite, so a curve begins where half of them have one.${
         machinesNote(state.selection)}${without(leftOut, "their residuals or times are not known")}`,
   };
 }
 
 function successFigure() {
-  const { classes, leftOut } = success(state.selection);
+  const { classes: [all, ...sizes], leftOut } = success(state.selection);
+  // One class alone is all there is.
+  const classes = sizes.length > 1 ? [all, ...sizes] : sizes;
   return {
     title: "Success against tolerance, by number of contacts",
     x: { label: "residual ε", name: "epsilon", log: true, min: 1e-3, max: 1e-14 },
     y: shareAxis("share of problems", "share"),
     stepped: false,
-    panels: classes.map(c => ({ title: `${c.size} contacts (${c.problems})`, name: c.size, curves: c.curves })),
+    panels: classes.map(c => ({ title: `${c === all ? "all" : `${c.size} contacts`} (${c.problems})`, name: c.size, curves: c.curves })),
     solvers: solversOf(classes.flatMap(c => c.curves)),
     at: x => `ε = ${toleranceText(EPSILONS.reduce((a, b) => (Math.abs(Math.log(b / x)) < Math.abs(Math.log(a / x)) ? b : a)))}`,
     format: share,
-    note: "In brackets the number of problems. Share of problems whose smallest residual, over the runs of a solver at all tolerances, is at most ε. A run stops at its own tolerance, so "
+    note: "Share of problems whose smallest residual, over the runs of a solver at all tolerances, is at most ε; in brackets their number. A run stops at its own tolerance, so "
       + `the shares below the smallest tolerance that was asked for (${toleranceText(Math.min(...data.tolerances))}) are what runs happened to reach.${
         data.solvers.some(s => s.foreign) ? " † by the program's own residual." : ""}${without(leftOut, "their residuals are not known")}`,
   };
@@ -433,7 +435,7 @@ function renderSummary() {
     h("tbody", {}, sorted.map(r => h("tr", { class: r.solver === BEST ? "best" : null },
       h("td", { class: "name" }, swatch(r.solver), labelOf(r.solver)),
       number(r.solved), number(percent(r.solved, r.problems)), number(percent(r.fastest, r.problems)), number(short(r.medianRatio)),
-      number(short(r.seconds)), failed.map(e => number(r.endings?.[e] || "")), missing ? number(r.missing || "") : null))));
+      number(r.solved ? short(r.seconds) : ""), failed.map(e => number(r.endings?.[e] || "")), missing ? number(r.missing || "") : null))));
   const n = rows[0]?.problems ?? 0;
   byId("summary-note").textContent = `${plural(n, "problem")} at tolerance ${toleranceText(data.tolerances[state.selection.tolerance])}. `
     + "Fastest: the share of problems on which the solver needs the least time, ties for each. Median ratio: of its time to the least, over the "
@@ -443,25 +445,24 @@ function renderSummary() {
 
 function renderHeat() {
   const { families, rows } = byFamily(state.selection);
-  const table = h("table", { id: "heat", class: families.length > 9 ? "many" : null },
-    h("thead", {}, h("tr", {}, h("th", {}, "solver"), families.map(f => {
-      const n = rows[0]?.cells[families.indexOf(f)].problems ?? 0;
-      return h("th", { class: "n" }, h("span", {}, clean(DIMENSIONS.families.labels[f]), h("small", {}, ` ${n}`)));
-    }))),
-    h("tbody", {}, rows.map(r => h("tr", {}, h("td", { class: "name" }, swatch(r.solver), labelOf(r.solver)), r.cells.map(c => {
-      const part = c[state.heat];
-      return h("td", { class: "n heat", style: `--share:${((100 * part) / c.problems).toFixed(0)}%`, title: `${part} of ${c.problems}` },
-        `${Math.round((100 * part) / c.problems)}`);
-    })))));
-  fill(byId("heat-place"), families.length ? table : h("p", {}, "Nothing to show."));
+  // Paper has no room for many columns side by side.
+  const most = printing ? 14 : Math.max(1, families.length);
+  const parts = Array.from({ length: Math.ceil(families.length / most) }, (_, k) => k * most);
+  fill(byId("heat-place"), families.length ? null : h("p", {}, "Nothing to show."), parts.map(from => h("table", { class: families.length > 9 ? "many" : null },
+    h("thead", {}, h("tr", {}, h("th", {}, "solver"), families.slice(from, from + most).map((f, k) => (
+      h("th", { class: "n" }, h("span", {}, clean(DIMENSIONS.families.labels[f]), h("small", {}, ` ${rows[0]?.cells[from + k].problems ?? 0}`))))))),
+    h("tbody", {}, rows.map(r => h("tr", {}, h("td", { class: "name" }, swatch(r.solver), labelOf(r.solver)),
+      r.cells.slice(from, from + most).map(c => (c.runs ? h("td", {
+        class: "n heat", style: `--share:${((100 * c[state.heat]) / c.problems).toFixed(0)}%`, title: `${c[state.heat]} of ${c.problems}`,
+      }, String(Math.round((100 * c[state.heat]) / c.problems))) : h("td")))))))));
   byId("heat-note").textContent = `Share of problems, in per cent, that a solver ${state.heat === "solved" ? "solves" : "solves in the least time of all selected"}, `
-    + "by family. The small numbers are those of the problems.";
+    + "by family. The small numbers are those of the problems; where a solver has no run at all, its place is empty.";
 }
 
 const heatRows = () => {
   const { families, rows } = byFamily(state.selection);
-  return [["solver", "family", "problems", "solved", "fastest"], ...rows.flatMap(r => r.cells.map((c, k) => (
-    [data.solvers[r.solver].label, data.families[families[k]], c.problems, c.solved, c.fastest])))];
+  return [["solver", "family", "problems", "runs", "solved", "fastest"], ...rows.flatMap(r => r.cells.map((c, k) => (
+    [data.solvers[r.solver].label, data.families[families[k]], c.problems, c.runs, c.solved, c.fastest])))];
 };
 
 const problemLink = p => h("button", { type: "button", class: "link", click: () => openProblem(p) }, clean(data.problems.name[p]));
@@ -590,7 +591,7 @@ function traceFigure(p) {
     const trace = data.traces[runAt(p, s, k)];
     if (!trace) return [];
     const points = trace[1].map((t, i) => [t, trace[2][i]]).filter(([t, v]) => t > 0 && v > 0);
-    return points.length ? [{ solver: s, x: points.map(v => v[0]), y: points.map(v => v[1]) }] : [];
+    return points.length ? [{ solver: s, x: points.map(v => v[0]), y: points.map(v => v[1]), ends: true }] : [];
   });
   const [left, right] = rangeOf(curves.flatMap(c => c.x));
   const [low, high] = rangeOf(curves.flatMap(c => c.y));
@@ -629,7 +630,7 @@ function openProblem(p) {
     h("form", { method: "dialog", class: "head" }, h("h2", {}, clean(problems.name[p])),
       h("span", { class: "exports" }, h("button", {
         type: "button", click: () => save("problem.csv", new Blob([csvText(runRows(mine))], { type: "text/csv" })), title: "Save as CSV",
-      }, "CSV"), h("button", {}, "Close"))),
+      }, "CSV"), h("button", { autofocus: true }, "Close"))),
     h("dl", {}, facts.map(([name, v]) => h("div", {}, h("dt", {}, name), h("dd", {}, clean(v))))),
     traced ? place("trace", () => traceFigure(p)) : null,
     h("div", { class: "scroll" }, h("table", {},
@@ -693,7 +694,7 @@ function build() {
     width = now;
     Object.keys(FIGURES).forEach(render);
   }).observe(byId("figures"));
-  const print = on => () => { printing = on; Object.keys(FIGURES).forEach(render); };
+  const print = on => () => { printing = on; Object.keys(FIGURES).forEach(render); renderHeat(); };
   addEventListener("beforeprint", print(true));
   addEventListener("afterprint", print(false));
   addEventListener("hashchange", () => { fromHash(); showTheme(); byId("heat-what").value = state.heat; changed(); });

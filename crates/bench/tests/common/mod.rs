@@ -178,7 +178,7 @@ impl Browser {
         let began = Instant::now();
         // A download has another name until it is whole.
         while !file.exists() {
-            assert!(began.elapsed() < PATIENCE, "never saved: {name}");
+            assert!(began.elapsed() < PATIENCE, "never saved: {name}; {:?}", self.complaints());
             std::thread::sleep(Duration::from_millis(20));
         }
         std::fs::read(file).expect("a saved file")
