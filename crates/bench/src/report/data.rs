@@ -26,9 +26,12 @@ pub struct Data<'a> {
     /// Name and error of each problem that could not be read.
     unreadable: Vec<(&'a str, &'a str)>,
     runs: Columns,
-    /// By index of the run: iterations, seconds, residuals.
-    traces: BTreeMap<usize, (Vec<u64>, Vec<f64>, Vec<f64>)>,
+    /// By index of the run.
+    traces: BTreeMap<usize, Trace>,
 }
+
+/// Seconds, and the residuals at them.
+type Trace = (Vec<f64>, Vec<f64>);
 
 #[derive(Debug, Serialize)]
 struct Solver<'a> {
@@ -183,17 +186,13 @@ impl<'a> Problems<'a> {
     }
 }
 
-fn traces(runs: &[Run]) -> BTreeMap<usize, (Vec<u64>, Vec<f64>, Vec<f64>)> {
+fn traces(runs: &[Run]) -> BTreeMap<usize, Trace> {
     let traced = runs.iter().filter(|r| !r.trace.is_empty()).count().max(1);
     let even = (TRACE_POINTS / traced).clamp(EVEN.0, EVEN.1);
     let columns = |run: &Run| {
         let kept = thinned(&run.trace, even);
         let points = || kept.iter().map(|&k| run.trace[k]);
-        (
-            points().map(|p| p.0).collect(),
-            points().map(|p| rounded(p.1)).collect(),
-            points().map(|p| rounded_up(p.2)).collect(),
-        )
+        (points().map(|p| rounded(p.1)).collect(), points().map(|p| rounded_up(p.2)).collect())
     };
     let traced = runs.iter().enumerate().filter(|(_, r)| !r.trace.is_empty());
     traced.map(|(k, run)| (k, columns(run))).collect()

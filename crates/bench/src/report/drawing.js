@@ -121,7 +121,6 @@ function legend(solvers, width, top, paper) {
 }
 
 /** XML 1.0 knows no control characters. */
-// eslint-disable-next-line no-control-regex
 const clean = text => String(text).replace(/[\u0000-\u0008\u000b-\u001f\u007f-\u009f\ufffe\uffff]/g, "\ufffd");
 
 /**

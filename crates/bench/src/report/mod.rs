@@ -5,7 +5,7 @@
 //! `t_ps` the cost (time, iterations, factorisations) of solver s on problem p, infinite where it is not solved or the
 //! run is missing:
 //!
-//! - performance profile `ρ_s(τ) = |{p ∈ P : t_ps ≤ τ min_s t_ps}| / |P|` \[DolanMore2002\];
+//! - performance profile `ρ_s(τ) = |{p ∈ P : t_ps ≤ τ min_s t_ps}| / |P|` (DolanMore2002);
 //! - virtual best: the solver whose cost is `min_s t_ps`;
 //! - data profile at ε: the share of the problems whose best residual, over all runs of (p, s), is at most ε within t
 //!   seconds;
@@ -15,7 +15,7 @@
 
 mod data;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
 
 use crate::record::{Campaign, Plan};
@@ -89,8 +89,7 @@ fn counted(n: usize, one: &str) -> String {
 
 /// What was measured, by what, where and how.
 fn stamp(page: &mut String, all: &Runs) {
-    let with_runs: std::collections::HashSet<&str> =
-        all.runs.iter().map(|r| r.problem.as_str()).collect();
+    let with_runs: HashSet<&str> = all.runs.iter().map(|r| r.problem.as_str()).collect();
     let tolerances: Vec<String> = all.tolerances().iter().map(|t| format!("{t:e}")).collect();
     let waiting = all
         .problems
@@ -126,8 +125,7 @@ fn stamp(page: &mut String, all: &Runs) {
 
 /// The campaigns that have runs; those that differ in their part and start alone are one, with the number of them.
 fn groups(all: &Runs) -> Vec<(&Campaign, usize)> {
-    let used: std::collections::HashSet<&str> =
-        all.runs.iter().map(|r| r.campaign.as_str()).collect();
+    let used: HashSet<&str> = all.runs.iter().map(|r| r.campaign.as_str()).collect();
     let whole = |plan: &Option<Plan>| plan.clone().map(|p| Plan { shard: None, ..p });
     let mut groups: Vec<(&Campaign, usize)> = Vec::new();
     for campaign in all.campaigns.iter().filter(|c| used.contains(c.id.as_str())) {

@@ -62,22 +62,14 @@ const passes = (selection, p) => selection.families[data.problems.family[p]]
 
 const indices = flags => flags.flatMap((on, k) => (on ? [k] : []));
 
-/** P at the selection's tolerance. */
-function problemsOf(selection) {
-  const solvers = indices(selection.solvers);
-  const found = [];
-  for (let p = 0; p < nProblems; p++) {
-    if (passes(selection, p) && solvers.some(s => runAt(p, s, selection.tolerance) >= 0)) found.push(p);
-  }
-  return found;
-}
+const ALL_TOLERANCES = data.tolerances.map((_, k) => k);
 
-/** P over all tolerances. */
-function problemsOfAny(selection) {
+/** P, by the runs at the selection's tolerance or at others. */
+function problemsOf(selection, tolerances = [selection.tolerance]) {
   const solvers = indices(selection.solvers);
   const found = [];
   for (let p = 0; p < nProblems; p++) {
-    if (passes(selection, p) && solvers.some(s => data.tolerances.some((_, k) => runAt(p, s, k) >= 0))) found.push(p);
+    if (passes(selection, p) && solvers.some(s => tolerances.some(k => runAt(p, s, k) >= 0))) found.push(p);
   }
   return found;
 }
@@ -137,7 +129,7 @@ function progressOf(p, s) {
     const r = runAt(p, s, k);
     if (r < 0) continue;
     const trace = data.traces[r];
-    if (trace) trace[1].forEach((t, i) => points.push([t, trace[2][i]]));
+    if (trace) trace[0].forEach((t, i) => points.push([t, trace[1][i]]));
     if (!Number.isNaN(runs.seconds[r]) && !Number.isNaN(runs.reached[r])) points.push([runs.seconds[r], runs.reached[r]]);
   }
   points.sort((a, b) => a[0] - b[0] || a[1] - b[1]);
@@ -161,7 +153,7 @@ function firstTime(p, s, epsilon) {
 
 /** Data profiles: the share of P whose best residual is at most ε within t seconds. */
 function dataProfile(selection, epsilon) {
-  const problems = problemsOfAny(selection);
+  const problems = problemsOf(selection, ALL_TOLERANCES);
   const selected = indices(selection.solvers);
   const solvers = selected.filter(s => known.reached[s] && known.seconds[s]);
   const times = solvers.map(s => problems.map(p => firstTime(p, s, epsilon)));
@@ -185,7 +177,7 @@ function lowerBound(sorted, v) {
 
 /** The (lower) median over P of the best residual known at time t; a problem without an answer yet counts as Infinity. */
 function medianResidual(selection) {
-  const problems = problemsOfAny(selection);
+  const problems = problemsOf(selection, ALL_TOLERANCES);
   const selected = indices(selection.solvers);
   const solvers = selected.filter(s => known.reached[s] && known.seconds[s]);
   const rank = Math.max(0, Math.ceil(problems.length / 2) - 1);
@@ -217,7 +209,7 @@ const EPSILONS = Array.from({ length: 12 }, (_, k) => Number(`1e-${k + 3}`));
 
 /** Shares of P whose best residual is at most ε, ε = 1e-3 … 1e-14, of all sizes and then per class of size. */
 function success(selection) {
-  const problems = problemsOfAny(selection);
+  const problems = problemsOf(selection, ALL_TOLERANCES);
   const selected = indices(selection.solvers);
   const solvers = selected.filter(s => known.reached[s]);
   const best = (p, s) => {

@@ -18,7 +18,7 @@ const percent = (part, all) => (all ? `${((100 * part) / all).toFixed(part === a
 const share = v => `${(100 * v).toFixed(1)} %`;
 const mebi = bytes => (Number.isNaN(bytes) ? "" : short(bytes / 2 ** 20));
 const plural = (n, one, many = `${one}s`) => `${n} ${n === 1 ? one : many}`;
-const toleranceText = v => (v > 0 ? v.toExponential().replace("e", "e").replace("+", "") : String(v));
+const toleranceText = v => (v > 0 ? v.toExponential().replace("+", "") : String(v));
 const familyOf = p => data.families[data.problems.family[p]];
 const endingText = name => name.replaceAll("_", " ");
 
@@ -95,8 +95,14 @@ const powerBelow = v => 10 ** Math.floor(Math.log10(v) + 1e-9);
 const powerAbove = v => 10 ** Math.ceil(Math.log10(v) - 1e-9);
 const rangeOf = values => {
   const positive = values.filter(v => v > 0 && Number.isFinite(v));
-  return positive.length ? [Math.min(...positive), Math.max(...positive)] : [1, 10];
+  return positive.length ? [positive.reduce((a, b) => Math.min(a, b)), positive.reduce((a, b) => Math.max(a, b))] : [1, 10];
 };
+
+/** A logarithmic axis over whole decades, one at least, that holds the values. */
+function decades(label, name, values) {
+  const [least, most] = rangeOf(values);
+  return { label, name, log: true, min: powerBelow(least), max: Math.max(powerAbove(most), 10 * powerBelow(least)) };
+}
 
 function without(leftOut, why) {
   if (!leftOut.length) return "";
@@ -139,11 +145,10 @@ function profileFigure(cost) {
 function dataFigure() {
   const epsilon = epsilonOf();
   const { problems, curves, leftOut } = dataProfile(state.selection, epsilon);
-  const [min, max] = rangeOf(curves.flatMap(c => [c.x[0], c.x[c.x.length - 1]]));
   return {
     heading: "Data profile",
     title: `Data profile, residual ${toleranceText(epsilon)}`,
-    x: { label: "time limit t, s", name: "seconds", log: true, min: powerBelow(min), max: Math.max(powerAbove(max), 10 * powerBelow(min)) },
+    x: decades("time limit t, s", "seconds", curves.flatMap(c => c.x)),
     y: shareAxis("share of problems", "share"),
     stepped: true,
     panels: [{ title: "", curves: curves.map(c => ({ ...c, before: 0 })) }],
@@ -158,12 +163,10 @@ function dataFigure() {
 
 function medianFigure() {
   const { problems, curves, leftOut } = medianResidual(state.selection);
-  const [left, right] = rangeOf(curves.flatMap(c => [c.x[0], c.x[c.x.length - 1]]));
-  const [low, high] = rangeOf(curves.flatMap(c => [c.y[0], c.y[c.y.length - 1]]));
   return {
     title: "Median residual against time",
-    x: { label: "time t, s", name: "seconds", log: true, min: powerBelow(left), max: Math.max(powerAbove(right), 10 * powerBelow(left)) },
-    y: { label: "median residual", name: "residual", log: true, min: powerBelow(low), max: Math.max(powerAbove(high), 10 * powerBelow(low)) },
+    x: decades("time t, s", "seconds", curves.flatMap(c => c.x)),
+    y: decades("median residual", "residual", curves.flatMap(c => c.y)),
     stepped: true,
     panels: [{ title: "", curves }],
     solvers: solversOf(curves),
@@ -590,16 +593,14 @@ function traceFigure(p) {
   const curves = data.solvers.flatMap((_, s) => {
     const trace = data.traces[runAt(p, s, k)];
     if (!trace) return [];
-    const points = trace[1].map((t, i) => [t, trace[2][i]]).filter(([t, v]) => t > 0 && v > 0);
+    const points = trace[0].map((t, i) => [t, trace[1][i]]).filter(([t, v]) => t > 0 && v > 0);
     return points.length ? [{ solver: s, x: points.map(v => v[0]), y: points.map(v => v[1]), ends: true }] : [];
   });
-  const [left, right] = rangeOf(curves.flatMap(c => c.x));
-  const [low, high] = rangeOf(curves.flatMap(c => c.y));
   return {
     heading: "Residual against time",
     title: `Residual against time, ${data.problems.name[p]}, tolerance ${toleranceText(data.tolerances[k])}`,
-    x: { label: "time t, s", name: "seconds", log: true, min: powerBelow(left), max: Math.max(powerAbove(right), 10 * powerBelow(left)) },
-    y: { label: "residual", name: "residual", log: true, min: powerBelow(low), max: Math.max(powerAbove(high), 10 * powerBelow(low)) },
+    x: decades("time t, s", "seconds", curves.flatMap(c => c.x)),
+    y: decades("residual", "residual", curves.flatMap(c => c.y)),
     stepped: true,
     panels: [{ title: "", curves }],
     solvers: solversOf(curves),
