@@ -1,6 +1,5 @@
 //! The report: what is embedded in the page, and what a real browser makes of it.
 
-#[path = "common/mod.rs"]
 mod browser;
 
 use std::path::Path;

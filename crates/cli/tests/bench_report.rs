@@ -31,7 +31,7 @@ fn files_are_joined_into_a_page() {
         .run("bench report one.jsonl two.jsonl one.jsonl --out page.html --title A<B")
         .exits(0);
     assert!(done.stdout.starts_with("page.html: 4 runs of 2 solvers"), "{}", done.stdout);
-    assert!(done.stdout.contains("2 runs were in several files"), "{}", done.stdout);
+    assert!(done.stdout.contains("2 runs in several files"), "{}", done.stdout);
     let page = fs::read_to_string(folder.path("page.html")).unwrap();
     assert!(page.contains("<h1>A&lt;B</h1>") && page.contains("2 problems, 2 solvers, 4 runs"));
 }
@@ -45,7 +45,7 @@ fn a_file_of_another_version_is_named_and_the_rest_goes_on() {
     let said = ["new.jsonl", "expected version 1", "found version 7", "a program 1.0"];
     assert!(said.iter().all(|s| done.stderr.contains(s)), "{}", done.stderr);
     assert_eq!((done.code, done.stderr.lines().count()), (Some(2), 1));
-    assert!(done.stdout.starts_with("page.html: 2 runs of 1 solvers"), "{}", done.stdout);
+    assert!(done.stdout.starts_with("page.html: 2 runs of 1 solver,"), "{}", done.stdout);
     assert!(folder.path("page.html").exists());
 }
 

@@ -56,15 +56,16 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let options = args.title.clone().map_or_else(Options::default, |title| Options { title });
     let page = report::html(&all, &options);
     files::write_text("--out", &args.out, &page)?;
+    let counted = |n: usize, one: &str| format!("{n} {one}{}", if n == 1 { "" } else { "s" });
     let mut text = format!(
-        "{}: {} runs of {} solvers, {:.1} MB",
+        "{}: {} of {}, {:.1} MB",
         args.out.display(),
-        all.runs.len(),
-        all.solvers().len(),
+        counted(all.runs.len(), "run"),
+        counted(all.solvers().len(), "solver"),
         page.len() as f64 / 1e6
     );
     if twice > 0 {
-        text += &format!(" ({twice} runs were in several files: the first counts)");
+        text += &format!(" ({} in several files: the first counts)", counted(twice, "run"));
     }
     output::print(&format!("{text}\n"));
     Ok(exit)
