@@ -12,6 +12,7 @@ pub mod figures;
 pub mod foreign;
 pub mod profile;
 pub mod record;
+pub mod report;
 pub mod runs;
 pub mod tables;
 pub mod traits_table;

@@ -62,6 +62,8 @@ pub struct Runs {
     pub problems: BTreeMap<String, Problem>,
     /// The runs, each [`Run::key`] once.
     pub runs: Vec<Run>,
+    /// Whether the last line of a file was torn: written while the power or the program went.
+    pub torn: bool,
 }
 
 impl Runs {
@@ -83,7 +85,10 @@ impl Runs {
         for (k, line) in lines.iter().enumerate().filter(|(_, l)| !l.trim().is_empty()) {
             let parsed = match serde_json::from_str::<Line>(line) {
                 // Every line is written with its end, so one without is torn even if it reads well.
-                _ if k > 0 && !line.ends_with('\n') => break,
+                _ if k > 0 && !line.ends_with('\n') => {
+                    all.torn = true;
+                    break;
+                }
                 Ok(parsed) => parsed,
                 Err(e) => return Err(refusal(file, k, line, &e)),
             };
@@ -116,6 +121,7 @@ impl Runs {
     /// same in both, the runs of the first do.
     pub fn join(&mut self, other: Runs) -> Joined {
         let mut joined = Joined::default();
+        self.torn |= other.torn;
         let known: HashSet<_> = self.campaigns.iter().map(|c| c.id.clone()).collect();
         self.campaigns.extend(other.campaigns.into_iter().filter(|c| !known.contains(&c.id)));
         for (name, problem) in other.problems {

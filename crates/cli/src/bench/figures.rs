@@ -9,6 +9,7 @@ use nonsmooth_bench::tables::{
     self, By, summary, summary_page, summary_table, unsolved, unsolved_table,
 };
 
+use super::Joined;
 use crate::{Exit, files, output};
 
 /// Draw the figures of a campaign for papers, and write its tables.
@@ -60,7 +61,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     };
     let sizes = args.size.iter().map(size).collect::<Result<Vec<_>, _>>()?;
     let tol = args.tol.map(files::tolerance).transpose()?;
-    let (runs, exit) = super::read(&args.runs)?;
+    let Joined { runs, exit, .. } = super::read(&args.runs)?;
     let Some(tolerance) = tol.or_else(|| runs.common_tolerance()) else {
         return Err("expected runs, found none in any file".into());
     };

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use nonsmooth_bench::record::Line;
 
+use super::Joined;
 use crate::report::{count, row};
 use crate::{Exit, files, output};
 
@@ -37,7 +38,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         }
     }
     files::writable("--out", &args.out)?;
-    let (runs, mut exit) = super::read(&args.files)?;
+    let Joined { runs, twice, mut exit } = super::read(&args.files)?;
     let mut text = format!(
         "{}: {}, {} of {}\n",
         args.out.display(),
@@ -45,6 +46,9 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         count(runs.runs.len(), "run"),
         count(runs.problems.len(), "problem")
     );
+    if twice > 0 {
+        row(&mut text, "twice", format!("{}: the first counts", count(twice, "run")));
+    }
     for remark in runs.remarks() {
         row(&mut text, "but", remark);
         exit = exit.max(Exit::NotSolved);

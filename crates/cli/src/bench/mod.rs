@@ -4,8 +4,11 @@ mod compare;
 mod figures;
 mod import;
 mod merge;
+mod report;
 mod run;
 mod traits;
+
+use std::path::PathBuf;
 
 use nonsmooth_bench::campaign;
 use nonsmooth_bench::runs::Runs;
@@ -31,6 +34,7 @@ Examples:
 enum Command {
     Run(run::Args),
     Merge(merge::Args),
+    Report(report::Args),
     Import(import::Args),
     Figures(figures::Args),
     Compare(compare::Args),
@@ -48,6 +52,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     match &args.command {
         Command::Run(args) => run::run(args),
         Command::Merge(args) => merge::run(args),
+        Command::Report(args) => report::run(args),
         Command::Import(args) => import::run(args),
         Command::Figures(args) => figures::run(args),
         Command::Compare(args) => compare::run(args),
@@ -56,36 +61,41 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     }
 }
 
-/// The content of files of runs, those that cannot be used left out with a message. Second: what the mistakes come to.
+/// The content of files of runs, joined.
+struct Joined {
+    runs: Runs,
+    /// Runs that are in more than one file; the first counts.
+    twice: usize,
+    /// What the mistakes come to.
+    exit: Exit,
+}
+
+/// Reads files of runs; those that cannot be used are left out with a message.
 ///
 /// Errors: no file can be used.
-fn read(files: &[std::path::PathBuf]) -> Result<(Runs, Exit), String> {
-    let mut all = Runs::default();
-    let mut exit = Exit::Solved;
-    let mut mistake = |message: &str| {
-        output::error(message);
-        exit = Exit::Mistake;
-    };
+fn read(files: &[PathBuf]) -> Result<Joined, String> {
+    let mut all = Joined { runs: Runs::default(), twice: 0, exit: Exit::Solved };
     for file in files {
+        let mut mistake = |message: &str| {
+            output::error(message);
+            all.exit = Exit::Mistake;
+        };
         match Runs::read(file) {
             Err(e) => mistake(&e.to_string()),
             Ok(runs) => {
-                let joined = all.join(runs);
+                let joined = all.runs.join(runs);
+                all.twice += joined.twice;
                 for name in joined.conflicts {
                     let file = file.display();
                     mistake(&format!(
-                        "{file}: {name}: expected the file that the other runs were made on, found another of that name; its runs are left out"
+                        "{file}: {name}: expected the problem of the other runs, found another of that name; its runs are left out"
                     ));
-                }
-                if joined.twice > 0 {
-                    let (file, n) = (file.display(), joined.twice);
-                    mistake(&format!("{file}: {n} of its runs are there already and left out"));
                 }
             }
         }
     }
-    if all.campaigns.is_empty() {
+    if all.runs.campaigns.is_empty() {
         return Err("expected a file of runs that can be used, found none".into());
     }
-    Ok((all, exit))
+    Ok(all)
 }
