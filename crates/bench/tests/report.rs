@@ -6,8 +6,12 @@ use std::path::Path;
 use std::time::Duration;
 
 use browser::Browser;
+use nonsmooth_bench::profile::{
+    Cost, Costs, Curve, Progress, Selection, VIRTUAL_BEST, performance, performance_of_best,
+    success,
+};
 use nonsmooth_bench::record::{
-    Campaign, Ending, FORMAT, Line, Machine, Plan, Problem, Residuals, Run, VERSION,
+    Campaign, Ending, FORMAT, Line, Machine, Plan, Problem, Residuals, Run, SIZES, VERSION,
 };
 use nonsmooth_bench::report::{Options, html};
 use nonsmooth_bench::runs::Runs;
@@ -576,4 +580,101 @@ fn runs_files_lead_to_the_same_page() {
     let lines = all.clone().lines().map(|line: Line| serde_json::to_string(&line).unwrap() + "\n");
     let read = Runs::parse(Path::new("runs.jsonl"), &lines.collect::<String>()).unwrap();
     assert!(page(&read) == page(&all));
+}
+/// The value at x of steps given as two arrays.
+fn step_at(curve: &Value, x: f64) -> f64 {
+    let (xs, ys) = (curve["x"].as_array().unwrap(), curve["y"].as_array().unwrap());
+    let k = xs.partition_point(|v| v.as_f64().unwrap() <= x);
+    if k == 0 { 0.0 } else { ys[k - 1].as_f64().unwrap() }
+}
+
+/// The page's curves are the crate's, step by step.
+fn assert_same(page: &Value, ours: &[Curve], what: &str) {
+    for curve in ours {
+        let curves = page["curves"].as_array().expect("curves");
+        let Some(theirs) = curves.iter().find(|c| c["solver"] == curve.solver) else {
+            // A solver whose costs are not known is not drawn, nor the best of one.
+            let alone = curve.solver == VIRTUAL_BEST && curves.len() == 1;
+            assert!(alone || curve.steps.is_empty(), "{what}: no curve of {}", curve.solver);
+            continue;
+        };
+        let (xs, ys) = (theirs["x"].as_array().unwrap(), theirs["y"].as_array().unwrap());
+        assert_eq!(xs.len(), curve.steps.len(), "{what}: {}", curve.solver);
+        for (&(x, y), (px, py)) in curve.steps.iter().zip(xs.iter().zip(ys)) {
+            let close = |a: f64, b: &Value| (a - b.as_f64().unwrap()).abs() <= 1e-12 * a.abs();
+            assert!(close(x, px) && close(y, py), "{what}: {}: {x} {y}, {px} {py}", curve.solver);
+        }
+    }
+}
+
+#[test]
+fn the_numbers_are_those_of_the_crate() {
+    let Some(mut browser) = Browser::start() else { return };
+    let all = synthetic(120, 7, &[1e-4, 1e-8], false);
+    browser.open(&page(&all));
+    let few = |labels: &[&str]| -> Vec<String> { labels.iter().map(|&l| l.into()).collect() };
+    let selections = [
+        Selection::at(1e-8),
+        Selection {
+            families: few(&["wall", "arch"]),
+            solvers: few(&["solver-01", "solver-03", "solver-06 (another)"]),
+            ..Selection::at(1e-4)
+        },
+        Selection { sizes: vec![SIZES[1], SIZES[3]], ..Selection::at(1e-8) },
+    ];
+    for (k, selection) in selections.iter().enumerate() {
+        let mut asked = json!({"tolerance": selection.tolerance});
+        let sizes: Vec<String> = selection.sizes.iter().map(|s| s.name.into()).collect();
+        let lists =
+            [("families", &selection.families), ("solvers", &selection.solvers), ("sizes", &sizes)];
+        for (name, list) in lists.into_iter().filter(|(_, l)| !l.is_empty()) {
+            asked[name] = json!(list);
+        }
+        for cost in Cost::ALL {
+            let costs = Costs::of(&all, selection, cost);
+            asked["cost"] = json!(cost.name());
+            let found = browser.value(&format!("report.profile({asked})"));
+            assert_eq!(found["problems"], costs.problems.len());
+            let mut ours = performance(&costs);
+            ours.push(performance_of_best(&costs));
+            assert_same(&found, &ours, &format!("selection {k} by {}", cost.name()));
+        }
+        let progress = Progress::of(&all, selection);
+        for epsilon in [1e-3, 1e-6, 1e-8] {
+            asked["epsilon"] = json!(epsilon);
+            let found = browser.value(&format!("report.dataProfile({asked})"));
+            let mut ours = progress.data_profile(epsilon);
+            ours.extend(progress.best().data_profile(epsilon));
+            assert_same(&found, &ours, &format!("selection {k}, data at {epsilon}"));
+        }
+        let found = browser.value(&format!("report.medianResidual({asked})"));
+        assert_same(&found, &progress.quantile(0.5), &format!("selection {k}, median"));
+        let found = browser.value(&format!("report.success({asked})"));
+        let ours = success(&all, selection);
+        assert_eq!(found.as_array().map(Vec::len), Some(ours.len()));
+        for (class, found) in ours.iter().zip(found.as_array().unwrap()) {
+            assert_eq!(found["size"], class.size.map_or("all", |s| s.name));
+            for (solver, shares) in &class.shares {
+                let theirs = curve(found, solver)["y"].as_array().unwrap();
+                let close = |(a, b): (&f64, &Value)| (a - b.as_f64().unwrap()).abs() <= 1e-12;
+                assert_eq!(theirs.len(), shares.len());
+                assert!(shares.iter().zip(theirs).all(close), "selection {k}, {solver}");
+            }
+        }
+    }
+
+    // Traces are thinned and rounded to four digits in the page, yet reach powers of ten when they did.
+    let all = synthetic(60, 5, &[1e-8], true);
+    browser.open(&page(&all));
+    let progress = Progress::of(&all, &Selection::at(1e-8));
+    for epsilon in [1e-1, 1e-4, 1e-8] {
+        let found = browser.value(&format!("report.dataProfile({{epsilon: {epsilon}}})"));
+        for ours in progress.data_profile(epsilon) {
+            let theirs = curve(&found, &ours.solver);
+            for &(t, share) in &ours.steps {
+                assert!(step_at(theirs, 1.001 * t) >= share - 1e-12, "{} at {t}", ours.solver);
+                assert!(step_at(theirs, 0.999 * t) <= share + 1e-12, "{} at {t}", ours.solver);
+            }
+        }
+    }
 }
