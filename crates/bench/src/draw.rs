@@ -105,8 +105,8 @@ const COLOURS: [RGBColor; 8] = [
     RGBColor(204, 121, 167),
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
-    RGBColor(51, 34, 136),
-    RGBColor(136, 34, 85),
+    RGBColor(122, 79, 163),
+    RGBColor(26, 26, 26),
 ];
 /// The number of looks that colour and dash tell apart.
 pub const LOOKS: usize = COLOURS.len() * DASHES.len();

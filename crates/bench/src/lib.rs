@@ -1,8 +1,8 @@
 //! Measurements of the solvers: campaigns, and what is made of their runs.
 //!
 //! A [`campaign`] runs problems × solvers × tolerances and writes [`runs`], lines of [`record`]s; [`foreign`] measurements of
-//! other programs join them. [`profile`]s and [`tables`] are computed from runs, [`figures`] drawn, and two campaigns set
-//! against each other by [`compare`]. [`traits_table`] says what the problems are like. `examples/sweeps.rs` measures a
+//! other programs join them. [`profile`]s and [`tables`] are computed from runs, [`figures`] drawn, a
+//! [`report`] for browsers and a [`page`] of Markdown written, and two campaigns set against each other by [`compare`]. [`traits_table`] says what the problems are like. `examples/sweeps.rs` measures a
 //! sweep against streaming W once.
 
 pub mod campaign;
@@ -10,6 +10,7 @@ pub mod compare;
 pub mod draw;
 pub mod figures;
 pub mod foreign;
+pub mod page;
 pub mod profile;
 pub mod record;
 pub mod report;

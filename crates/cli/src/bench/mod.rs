@@ -4,6 +4,7 @@ mod compare;
 mod figures;
 mod import;
 mod merge;
+mod page;
 mod report;
 mod run;
 mod traits;
@@ -37,6 +38,7 @@ enum Command {
     Report(report::Args),
     Import(import::Args),
     Figures(figures::Args),
+    Page(page::Args),
     Compare(compare::Args),
     Traits(traits::Args),
     /// Do one run for a campaign, which writes it to the standard input
@@ -55,6 +57,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         Command::Report(args) => report::run(args),
         Command::Import(args) => import::run(args),
         Command::Figures(args) => figures::run(args),
+        Command::Page(args) => page::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Traits(args) => traits::run(args),
         Command::Worker => campaign::serve(&campaign::Registry).map(|()| Exit::Solved),

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use nonsmooth_bench::campaign::inputs;
-use nonsmooth_bench::traits_table::{describe, published, table};
+use nonsmooth_bench::traits_table::{Described, describe, published, table};
 
 use crate::{Exit, files, output};
 
@@ -36,23 +36,7 @@ Examples:
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
-    let (inputs, mistakes) = inputs(&args.problems);
-    let mut exit = Exit::Solved;
-    let mut mistake = |message: &str| {
-        output::error(message);
-        exit = Exit::Mistake;
-    };
-    mistakes.iter().for_each(|m| mistake(m));
-    let mut described = vec![];
-    for input in &inputs {
-        match describe(&input.path, args.spectrum_limit) {
-            Ok(problem) => described.push(problem),
-            Err(e) => mistake(&e.to_string()),
-        }
-    }
-    if described.is_empty() {
-        return Err("expected problems that can be read, found none".into());
-    }
+    let (described, exit) = describe_all(&args.problems, args.spectrum_limit)?;
     let table = table(&described, &published());
     output::print(&if args.csv {
         table.csv().map_err(|e| e.to_string())?
@@ -62,4 +46,32 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         table.text()
     });
     Ok(exit)
+}
+
+/// Describes all problems below folders; those that cannot be read are left out with a message. Second: what the mistakes
+/// come to.
+///
+/// Errors: no problem can be read.
+pub fn describe_all(
+    folders: &[PathBuf],
+    spectrum_limit: usize,
+) -> Result<(Vec<Described>, Exit), String> {
+    let (inputs, mistakes) = inputs(folders);
+    let mut exit = Exit::Solved;
+    let mut mistake = |message: &str| {
+        output::error(message);
+        exit = Exit::Mistake;
+    };
+    mistakes.iter().for_each(|m| mistake(m));
+    let mut described = vec![];
+    for input in &inputs {
+        match describe(&input.path, spectrum_limit) {
+            Ok(problem) => described.push(problem),
+            Err(e) => mistake(&e.to_string()),
+        }
+    }
+    if described.is_empty() {
+        return Err("expected problems that can be read, found none".into());
+    }
+    Ok((described, exit))
 }

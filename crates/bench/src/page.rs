@@ -1,0 +1,333 @@
+//! The page of a comparison: what a campaign shows, in sentences, tables and figures made from its runs alone.
+//!
+//! Nothing on the page is written by hand, so that a new campaign makes a new page that is true.
+
+use std::collections::BTreeMap;
+
+use crate::figures::{Figure, figures};
+use crate::plural;
+use crate::profile::{Selection, VIRTUAL_BEST};
+use crate::record::{Campaign, Ending};
+use crate::runs::Runs;
+use crate::tables::{By, Row, Table, summary, summary_page, unsolved};
+use crate::traits_table;
+
+/// The figures that a page shows for each kind of problem, by the names that [`figures`] gives them.
+const SHOWN: [&str; 2] = ["profile-seconds", "success"];
+
+/// A page and its figures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Page {
+    /// The page, in Markdown.
+    pub markdown: String,
+    /// The figures that it shows, each with a name of its own.
+    pub figures: Vec<Figure>,
+}
+
+/// Makes the page. Figures are referred to as `folder/NAME.svg`; `command` is what makes the page again.
+///
+/// Errors: a figure that cannot be drawn.
+pub fn page(
+    runs: &Runs,
+    traits: Option<&traits_table::Table>,
+    folder: &str,
+    command: &str,
+) -> Result<Page, String> {
+    let mut page = Page { markdown: introduction(runs, command), figures: vec![] };
+    let kinds = kinds(runs);
+    for (kind, problems) in &kinds {
+        page.markdown += &format!("\n## {}\n\n{}.\n", heading(kind), plural(*problems, "problem"));
+        for tolerance in runs.tolerances() {
+            let selection = of_kind(runs, kind, tolerance);
+            let rows = summary(runs, &selection, By::All);
+            page.markdown += &format!("\n### To {tolerance:e}\n\n");
+            page.markdown += &findings(&rows);
+            page.markdown += &format!("\n{}", summary_page(&rows).markdown());
+            page.markdown += &show(runs, &selection, kind, folder, SHOWN[0], &mut page.figures)?;
+            page.markdown += &winners(runs, &selection);
+            page.markdown += &nobody(runs, &selection);
+        }
+        if let Some(tightest) = runs.tolerances().last() {
+            page.markdown += "\n### Success against tolerance\n";
+            let selection = of_kind(runs, kind, *tightest);
+            page.markdown += &show(runs, &selection, kind, folder, SHOWN[1], &mut page.figures)?;
+        }
+    }
+    if let Some(traits) = traits {
+        page.markdown += TRAITS;
+        page.markdown += &traits.markdown();
+    }
+    Ok(page)
+}
+
+const TRAITS: &str = "
+## The families
+
+Each family beside those published for FCLIB that it is like (AcaryBremondHuber2018): n degrees of freedom, nc contacts, contact density
+c = 3 nc / n, rows of W over its rank, condition number of W over the singular values that are not rounding. Sizes are those of this
+suite; `nonsmooth gen --list` says what can be set.
+
+";
+
+/// The kinds of problem with the number of problems that were run, the most first.
+fn kinds(runs: &Runs) -> Vec<(String, usize)> {
+    let mut kinds: BTreeMap<&str, std::collections::BTreeSet<&str>> = BTreeMap::new();
+    for run in &runs.runs {
+        kinds.entry(&run.kind).or_default().insert(&run.problem);
+    }
+    let mut kinds: Vec<_> = kinds.into_iter().map(|(k, all)| (k.to_owned(), all.len())).collect();
+    kinds.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
+    kinds
+}
+
+fn heading(kind: &str) -> String {
+    match kind {
+        "friction_local_2d" => "Local problems in the plane, u = W r + q".into(),
+        "friction_local_3d" => "Local problems, u = W r + q".into(),
+        "friction_global_2d" => "Global problems in the plane, M v = H r + f".into(),
+        "friction_global_3d" => "Global problems, M v = H r + f".into(),
+        other => format!("Problems of kind {other}"),
+    }
+}
+
+/// The problems of a kind, and the solvers that take it.
+fn of_kind(runs: &Runs, kind: &str, tolerance: f64) -> Selection {
+    let takes = |solver: &&str| {
+        let mut its = runs.runs.iter().filter(|r| r.kind == kind && r.solver == *solver);
+        its.any(|r| r.ending != Ending::Refused)
+    };
+    let solvers = runs.solvers().into_iter().filter(takes).map(String::from).collect();
+    Selection { kinds: vec![kind.into()], solvers, ..Selection::at(tolerance) }
+}
+
+fn introduction(runs: &Runs, command: &str) -> String {
+    let families: std::collections::BTreeSet<_> = runs.runs.iter().map(|r| &r.family).collect();
+    let problems: usize = kinds(runs).iter().map(|k| k.1).sum();
+    let solvers = runs.solvers();
+    let mut text = format!(
+        "# The solvers compared\n\n<!-- Made by `{command}`; changes by hand are lost. -->\n\n{} of {} families, {}, {}. \
+         Made by `{command}`, from the problems to this page.\n",
+        plural(problems, "problem"),
+        families.len(),
+        plural(solvers.len(), "solver"),
+        plural(runs.runs.len(), "run"),
+    );
+    for campaign in &runs.campaigns {
+        text += &format!("\n- {}", measured(campaign));
+    }
+    text += "\n\nWhat a run is and how it is timed: [benchmarking](benchmarking.md). *Solved* is the judge's word on the relative residual \
+             ([notation](notation.md)). *Fastest* is the share of problems on which the solver needs the least time, and the *ratios* are its \
+             time over that least time where it solves the problem; *seconds* are all its runs, failed ones included. The *virtual best* takes on each problem the \
+             fastest solver. A profile shows the distance from the best; with more than two solvers it does not rank them (GouldScott2016).\n";
+    text
+}
+
+fn measured(campaign: &Campaign) -> String {
+    let machine = &campaign.machine;
+    let mut text = format!("{}, on {}", campaign.program, machine.cpu);
+    if machine.cores > 0 {
+        let gib = machine.memory as f64 / f64::from(1 << 30);
+        text += &format!(" ({}, {gib:.0} GiB, {})", plural(machine.cores, "core"), machine.os);
+    }
+    if campaign.foreign {
+        text += "; a foreign measurement, by its own error";
+    }
+    if let Some(plan) = &campaign.plan {
+        text += &format!(
+            "; at most {} s a solve, {} at a time, {} timed solves of a run after one to warm up",
+            plan.time_limit, plan.jobs, plan.repeats
+        );
+    }
+    text
+}
+
+/// What the rows of all problems say, in sentences.
+fn findings(rows: &[Row]) -> String {
+    let (best, solvers): (Vec<&Row>, Vec<&Row>) =
+        rows.iter().partition(|r| r.solver == VIRTUAL_BEST);
+    let Some(best) = best.first() else { return String::new() };
+    let leaders = |value: fn(&Row) -> usize| {
+        let most = solvers.iter().map(|r| value(r)).max().unwrap_or(0);
+        let names = solvers.iter().filter(|r| value(r) == most).map(|r| format!("`{}`", r.solver));
+        (most, listed(&names.collect::<Vec<_>>()))
+    };
+    let (most, who) = leaders(|r| r.solved);
+    let (fastest, fast) = leaders(|r| r.fastest);
+    if most == 0 {
+        return format!("No solver solves any of the {}.\n", plural(best.problems, "problem"));
+    }
+    let left = match best.problems - best.solved {
+        0 => "every problem is solved by at least one solver".into(),
+        n => format!(
+            "{} by none",
+            if n == 1 { "one is solved".into() } else { format!("{n} are solved") }
+        ),
+    };
+    format!(
+        "Most problems are solved by {who}: {most} of {}; {left}. Most often the fastest is {fast}, on {fastest}.\n",
+        best.problems
+    )
+}
+
+/// `a`, `a and b`, `a, b and c`.
+fn listed(all: &[String]) -> String {
+    match all {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// Draws a figure and says where the page shows it.
+fn show(
+    runs: &Runs,
+    selection: &Selection,
+    kind: &str,
+    folder: &str,
+    name: &str,
+    all: &mut Vec<Figure>,
+) -> Result<String, String> {
+    let Some(figure) = figures(runs, selection)?.into_iter().find(|f| f.name == name) else {
+        return Ok(String::new());
+    };
+    let kind = kind.replace("friction_", "").replace('_', "-");
+    let tolerance = format!("{:e}", selection.tolerance).replace('.', "p");
+    let name = if name == SHOWN[1] {
+        format!("{kind}-{name}")
+    } else {
+        format!("{kind}-{name}-{tolerance}")
+    };
+    let text = format!("\n![{}]({folder}/{name}.svg)\n", figure.title);
+    all.push(Figure { name, ..figure });
+    Ok(text)
+}
+
+/// Who wins where: family by family.
+fn winners(runs: &Runs, selection: &Selection) -> String {
+    let rows = summary(runs, selection, By::Family);
+    let mut table = Table {
+        head: ["family", "problems", "solved by any", "most solved by", "most often the fastest"]
+            .map(String::from)
+            .into(),
+        rows: vec![],
+    };
+    for family in rows.chunk_by(|a, b| a.group == b.group) {
+        let solvers = || family.iter().filter(|r| r.solver != VIRTUAL_BEST);
+        let Some(any) = family.iter().find(|r| r.solver == VIRTUAL_BEST) else { continue };
+        let leaders = |value: fn(&Row) -> usize| {
+            let most = solvers().map(value).max().unwrap_or(0);
+            let names: Vec<_> =
+                solvers().filter(|r| value(r) == most).map(|r| format!("`{}`", r.solver)).collect();
+            match most {
+                0 => "nobody".into(),
+                n if names.len() == solvers().count() && names.len() > 1 => format!("all ({n})"),
+                n => format!("{} ({n})", listed(&names)),
+            }
+        };
+        table.rows.push(vec![
+            any.group.clone(),
+            any.problems.to_string(),
+            any.solved.to_string(),
+            leaders(|r| r.solved),
+            leaders(|r| r.fastest),
+        ]);
+    }
+    format!("\nWho wins where:\n\n{}", table.markdown())
+}
+
+/// What nobody solves.
+fn nobody(runs: &Runs, selection: &Selection) -> String {
+    let all = unsolved(runs, selection);
+    if all.is_empty() {
+        return String::new();
+    }
+    let rows = all.iter().map(|u| {
+        let closest = u.closest.as_ref().map_or_else(String::new, |(solver, reached)| {
+            format!("`{solver}` reaches {reached:.1e}")
+        });
+        vec![u.problem.clone(), u.contacts.to_string(), closest]
+    });
+    let head = ["unsolved", "contacts", "closest"].map(String::from).into();
+    format!("\n{}", Table { head, rows: rows.collect() }.markdown())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{FORMAT, Machine, Residuals, Run, VERSION};
+
+    fn run(problem: &str, kind: &str, solver: &str, ending: Ending, seconds: f64) -> Run {
+        Run {
+            campaign: "c".into(),
+            problem: problem.into(),
+            family: problem.split('/').next().unwrap_or_default().into(),
+            kind: kind.into(),
+            contacts: 20,
+            solver: solver.into(),
+            tolerance: 1e-8,
+            ending,
+            seconds: Some(seconds),
+            iterations: Some(7),
+            residuals: Residuals {
+                reached: Some(if ending == Ending::Solved { 9e-9 } else { 2e-5 }),
+                ..Residuals::default()
+            },
+            ..Run::default()
+        }
+    }
+
+    fn example() -> Runs {
+        let (local, global) = ("friction_local_3d", "friction_global_3d");
+        let campaign = Campaign {
+            format: FORMAT.into(),
+            version: VERSION,
+            id: "c".into(),
+            program: "nonsmooth 9".into(),
+            foreign: false,
+            started: None,
+            machine: Machine { cpu: "a processor".into(), ..Machine::default() },
+            plan: None,
+        };
+        use Ending::{Refused, Solved, TimeLimit};
+        let runs = vec![
+            run("wall/a", local, "quick", Solved, 1.0),
+            run("wall/a", local, "sure", Solved, 2.0),
+            run("arch/b", local, "quick", TimeLimit, 10.0),
+            run("arch/b", local, "sure", Solved, 3.0),
+            run("arch/c", local, "quick", TimeLimit, 10.0),
+            run("arch/c", local, "sure", TimeLimit, 10.0),
+            run("arch/c", local, "condense/quick", Refused, 0.0),
+            run("pile/d", global, "condense/quick", Solved, 0.5),
+            run("pile/d", global, "quick", Solved, 0.6),
+        ];
+        Runs { campaigns: vec![campaign], runs, ..Runs::default() }
+    }
+
+    #[test]
+    fn the_page_says_who_solves_most_who_is_fastest_and_what_nobody_solves() {
+        let page = page(&example(), None, "figures", "make it").unwrap();
+        let has = |text: &str| assert!(page.markdown.contains(text), "{text}\n{}", page.markdown);
+        has("4 problems of 3 families, 3 solvers, 9 runs. Made by `make it`");
+        has("- nonsmooth 9, on a processor");
+        has("## Local problems, u = W r + q\n\n3 problems.");
+        has(
+            "Most problems are solved by `sure`: 2 of 3; one is solved by none. Most often the fastest is `quick` and `sure`, on 1.",
+        );
+        has("| arch | 2 | 1 | `sure` (1) | `sure` (1) |");
+        has("| wall | 1 | 1 | all (1) | `quick` (1) |");
+        has("| arch/c | 20 | `quick` reaches 2.0e-5 |");
+        has("## Global problems, M v = H r + f\n\n1 problem.");
+        has(
+            "1 of 1; every problem is solved by at least one solver. Most often the fastest is `condense/quick`, on 1.",
+        );
+        // A solver that refuses a kind has no row in its table.
+        let local = page.markdown.split("## Global").next().unwrap();
+        assert!(!local.contains("condense"), "{local}");
+        for figure in &page.figures {
+            has(&format!("(figures/{}.svg)", figure.name));
+            assert!(figure.svg.starts_with("<svg"));
+        }
+        let names: std::collections::BTreeSet<_> = page.figures.iter().map(|f| &f.name).collect();
+        assert_eq!((names.len(), page.figures.len()), (4, 4));
+    }
+}

@@ -1,0 +1,67 @@
+//! `nonsmooth bench page`.
+
+use std::path::PathBuf;
+
+use nonsmooth_bench::page::page;
+use nonsmooth_bench::traits_table::{published, table};
+
+use super::{Joined, traits};
+use crate::report::count;
+use crate::{Exit, files, output};
+
+/// Write the page of a comparison: sentences, tables and figures, in Markdown.
+///
+/// Everything on it is made from the runs: who solves most, who is the fastest where, and what nobody solves, for each
+/// kind of problem and each tolerance. docs/benchmarks.md of this project is such a page.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Files of runs
+    #[arg(required = true, value_name = "RUNS.jsonl")]
+    runs: Vec<PathBuf>,
+    /// The page to write; its figures go into a folder of its name beside it
+    #[arg(long, value_name = "PAGE.md")]
+    out: PathBuf,
+    /// The problems: adds a table of their families, beside those published for FCLIB
+    #[arg(long, value_name = "FOLDER")]
+    problems: Vec<PathBuf>,
+    /// No spectrum of problems whose matrix has more rows
+    #[arg(long, value_name = "M", default_value = "1000", value_parser = files::whole)]
+    spectrum_limit: usize,
+    /// The command that makes the page again, to be named on it
+    #[arg(long, value_name = "TEXT", default_value = "nonsmooth bench page")]
+    command: String,
+}
+
+const EXAMPLES: &str = "\
+Example:
+  nonsmooth bench page runs.jsonl --problems problems/ --out comparison.md
+
+Exit codes: 0 written; 2 a mistake in a file or an option.";
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<Exit, String> {
+    files::writable("--out", &args.out)?;
+    let Joined { runs, mut exit, .. } = super::read(&args.runs)?;
+    let described = match args.problems.as_slice() {
+        [] => None,
+        folders => {
+            let (described, worst) = traits::describe_all(folders, args.spectrum_limit)?;
+            exit = exit.max(worst);
+            Some(table(&described, &published()))
+        }
+    };
+    let name = args.out.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let made = page(&runs, described.as_ref(), &name, &args.command)?;
+    let folder = args.out.with_file_name(&name);
+    std::fs::create_dir_all(&folder)
+        .map_err(|e| format!("{}: expected a folder, found: {e}", folder.display()))?;
+    for figure in &made.figures {
+        files::write_text("--out", &folder.join(format!("{}.svg", figure.name)), &figure.svg)?;
+        files::write_text("--out", &folder.join(format!("{}.csv", figure.name)), &figure.csv)?;
+    }
+    files::write_text("--out", &args.out, &made.markdown)?;
+    let figures = count(made.figures.len(), "figure");
+    output::print(&format!("{}: {figures} in {}\n", args.out.display(), folder.display()));
+    Ok(exit)
+}
