@@ -105,10 +105,14 @@ fn introduction(runs: &Runs, command: &str) -> String {
     let problems: usize = kinds(runs).iter().map(|k| k.1).sum();
     let solvers = runs.solvers();
     let mut text = format!(
-        "# The solvers compared\n\n<!-- Made by `{command}`; changes by hand are lost. -->\n\n{} of {} families, {}, {}. \
+        "# The solvers compared\n\n<!-- Made by `{command}`; changes by hand are lost. -->\n\n{} of {}, {}, {}. \
          Made by `{command}`, from the problems to this page.\n",
         plural(problems, "problem"),
-        families.len(),
+        if families.len() == 1 {
+            "1 family".into()
+        } else {
+            format!("{} families", families.len())
+        },
         plural(solvers.len(), "solver"),
         plural(runs.runs.len(), "run"),
     );
@@ -134,8 +138,10 @@ fn measured(campaign: &Campaign) -> String {
     }
     if let Some(plan) = &campaign.plan {
         text += &format!(
-            "; at most {} s a solve, {} at a time, {} timed solves of a run after one to warm up",
-            plan.time_limit, plan.jobs, plan.repeats
+            "; at most {} s a solve, {} at a time, {} of a run after one to warm up",
+            plan.time_limit,
+            plan.jobs,
+            plural(plan.repeats as usize, "timed solve")
         );
     }
     text
