@@ -4,20 +4,28 @@
 //!
 //! ```text
 //! M v = H r + f,                 f = M v_k + h (m g + force, −ω × J ω),
-//! u = Hᵀ v + w,                  w_N = e u_{N,k},  w_T = 0,  u_k = Hᵀ v_k  (Newton's impact law).
+//! u = Hᵀ v + w,                  w = s + (e u_{N,k}, 0, 0),      u_k = Hᵀ v_k + s  (Newton's impact law).
 //! ```
+//!
+//! s is minus the given velocity of images and walls ([`crate::Image`]) in the frame of the contact; elsewhere zero.
 //!
 //! Each body has six degrees of freedom `[linear, angular]`, both in the world frame, and the block
 //! `diag(m I, R J Rᵀ)` of M. A contact at p with frame `[N, T1, T2]` has the columns `(d, (p − x_b) × d)` for b
-//! and minus `(d, (p − x_a) × d)` for a, with d each of N, T1, T2.
+//! and minus `(d, (p − x_a) × d)` for a, with d each of N, T1, T2; where an image of a touches, x_a is the place of the image.
+//!
+//! With [`Gyroscopic::Implicit`] the torque `g(ω) = ω × J ω` is linearised about `ω_k`: the block of M becomes
+//! `J + h G` with `G = ∂g/∂ω = [ω_k]× J − [J ω_k]×`, and f is stated with that M, so that
+//! `J (ω − ω_k) = −h (g(ω_k) + G (ω − ω_k))` without impulses.
+
+use std::array::from_fn;
 
 use nonsmooth_problem::linalg::Csc;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal};
 use nonsmooth_solve::Reformulation;
 use nonsmooth_solve::reform::Condense;
 
-use crate::vec3::{add, apply, cross, scale, sub};
-use crate::{Contact, RigidBody, Scene, SceneError};
+use crate::vec3::{Mat3, Vec3, add, apply, cross, dot, scale, sub};
+use crate::{Contact, Gyroscopic, RigidBody, Scene, SceneError};
 
 #[allow(non_snake_case)]
 impl Scene {
@@ -28,7 +36,7 @@ impl Scene {
         self.validate()?;
         let (n, nc) = (6 * self.bodies.len(), self.contacts.len());
         let mass: Vec<_> =
-            self.bodies.iter().enumerate().flat_map(|(k, b)| mass_entries(6 * k, b)).collect();
+            self.bodies.iter().enumerate().flat_map(|(k, b)| self.mass_entries(6 * k, b)).collect();
         let jacobian: Vec<_> = self
             .contacts
             .iter()
@@ -42,7 +50,11 @@ impl Scene {
         M.mul_add(1.0, &v, &mut f);
         let mut w = vec![0.0; 3 * nc];
         for (c, contact) in self.contacts.iter().enumerate() {
-            w[3 * c] = contact.e * H.column_dot(3 * c, &v);
+            let frame = contact.frame();
+            for k in 0..3 {
+                w[3 * c + k] = -dot(frame[k], contact.image.velocity);
+            }
+            w[3 * c] += contact.e * (H.column_dot(3 * c, &v) + w[3 * c]);
         }
         let mu = self.contacts.iter().map(|c| c.mu).collect();
         Ok(FrictionGlobal::new(M, H, f, w, mu)?)
@@ -66,19 +78,29 @@ impl Scene {
         let omega = body.angular_velocity;
         let gyroscopic = cross(apply(&body.world_inertia(), omega), omega);
         let all = [weight, gyroscopic];
-        std::array::from_fn(|k| self.h * all[k / 3][k % 3])
+        from_fn(|k| self.h * all[k / 3][k % 3])
     }
-}
 
-/// The block `diag(m I, R J Rᵀ)` of a body whose degrees of freedom start at `at`.
-fn mass_entries(at: usize, body: &RigidBody) -> Vec<(usize, usize, f64)> {
-    let inertia = body.world_inertia();
-    let linear = (0..3).map(|k| (at + k, at + k, body.mass));
-    // The product R J Rᵀ is symmetric up to rounding only; its mean with its transpose is so exactly.
-    let angular = (0..9)
-        .map(|k| (k / 3, k % 3))
-        .map(|(k, l)| (at + 3 + k, at + 3 + l, 0.5 * (inertia[k][l] + inertia[l][k])));
-    linear.chain(angular.filter(|e| e.2 != 0.0)).collect()
+    /// The block of M of a body whose degrees of freedom start at `at`.
+    fn mass_entries(&self, at: usize, body: &RigidBody) -> Vec<(usize, usize, f64)> {
+        let J = body.world_inertia();
+        // The product R J Rᵀ is symmetric up to rounding only; its mean with its transpose is so exactly.
+        let mut angular: Mat3 = from_fn(|k| from_fn(|l| 0.5 * (J[k][l] + J[l][k])));
+        if self.gyroscopic == Gyroscopic::Implicit {
+            let omega = body.angular_velocity;
+            let momentum = apply(&J, omega);
+            for l in 0..3 {
+                let unit: Vec3 = from_fn(|k| f64::from(u8::from(k == l)));
+                // Column l of G: ω × (J e_l) − (J ω) × e_l.
+                let column = sub(cross(omega, apply(&J, unit)), cross(momentum, unit));
+                (0..3).for_each(|k| angular[k][l] += self.h * column[k]);
+            }
+        }
+        let linear = (0..3).map(|k| (at + k, at + k, body.mass));
+        let angular =
+            (0..9).map(|i| (i / 3, i % 3)).map(|(k, l)| (at + 3 + k, at + 3 + l, angular[k][l]));
+        linear.chain(angular.filter(|e| e.2 != 0.0)).collect()
+    }
 }
 
 /// The columns of H of contact number `c`.
@@ -88,9 +110,10 @@ fn jacobian_entries(
     contact: &Contact,
 ) -> impl Iterator<Item = (usize, usize, f64)> {
     let frame = contact.frame();
-    let sides = [(1.0, Some(contact.b)), (-1.0, contact.a)];
-    sides.into_iter().filter_map(|(sign, body)| Some((sign, body?))).flat_map(move |(sign, k)| {
-        let arm = sub(contact.point, bodies[k].position);
+    let sides = [(1.0, Some(contact.b), [0.0; 3]), (-1.0, contact.a, contact.image.offset)];
+    let sides = sides.into_iter().filter_map(|(sign, body, offset)| Some((sign, body?, offset)));
+    sides.flat_map(move |(sign, k, offset)| {
+        let arm = sub(contact.point, add(bodies[k].position, offset));
         (0..18).filter_map(move |i| {
             let (column, row) = (i / 6, i % 6);
             let d = frame[column];

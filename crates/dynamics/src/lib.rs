@@ -24,9 +24,9 @@ pub mod scenes;
 mod vec3;
 
 pub use body::{RigidBody, Rotation, Shape};
-pub use contact::Contact;
+pub use contact::{Contact, Image};
 pub use error::SceneError;
 pub use polyhedron::{MassProperties, Polyhedron};
-pub use scene::{Ground, Scene};
+pub use scene::{Ground, Gyroscopic, Obstacle, Scene};
 pub use scenes::{SCENES, SceneEntry};
 pub use vec3::{Mat3, Vec3};

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use crate::error::{positive, require};
 use crate::polyhedron::Polyhedron;
 use crate::vec3::{Vec3, X, cross, norm};
-use crate::{Contact, RigidBody, SceneError};
+use crate::{Contact, RigidBody, SceneError, Shape};
 
 /// Bodies, the contacts between them, and what drives them during one time step.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,10 +21,39 @@ pub struct Scene {
     pub gravity: Vec3,
     /// Time step, s.
     pub h: f64,
+    /// How the gyroscopic torque enters.
+    pub gyroscopic: Gyroscopic,
     /// The ground as it is drawn; contacts with the ground state their own geometry.
     pub ground: Option<Ground>,
     /// Fixed solids, drawn only; contacts with them are contacts with the ground.
-    pub obstacles: Vec<Polyhedron>,
+    pub obstacles: Vec<Obstacle>,
+}
+
+/// How the gyroscopic torque `g(ω) = ω × J ω` enters the step.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Gyroscopic {
+    /// By its value before the step; M is symmetric.
+    Explicit,
+    /// Linearised about the velocity before the step, with its derivative in M, which is then not symmetric.
+    Implicit,
+}
+
+/// A fixed solid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Obstacle {
+    /// Its shape.
+    pub shape: Shape,
+    /// Where the origin of the shape is, m.
+    pub position: Vec3,
+}
+
+impl From<Polyhedron> for Obstacle {
+    fn from(polyhedron: Polyhedron) -> Self {
+        Self { shape: Shape::Polyhedron(polyhedron), position: [0.0; 3] }
+    }
 }
 
 /// A plane ground.
@@ -48,6 +77,11 @@ impl Scene {
     pub fn push(&mut self, body: RigidBody) -> usize {
         self.bodies.push(body);
         self.bodies.len() - 1
+    }
+
+    /// The number of degrees of freedom.
+    pub fn dofs(&self) -> usize {
+        6 * self.bodies.len()
     }
 
     /// The mass of all bodies, kg.

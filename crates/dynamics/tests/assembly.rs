@@ -1,6 +1,6 @@
 //! Assembly against mechanics: Newton's third law, finite differences, definiteness.
 
-use nonsmooth_dynamics::{Contact, RigidBody, Rotation, Scene, Shape, Vec3};
+use nonsmooth_dynamics::{Contact, Gyroscopic, RigidBody, Rotation, Scene, Shape, Vec3};
 use nonsmooth_problem::linalg::Csc;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -34,6 +34,7 @@ fn tumbling() -> Scene {
         contacts,
         gravity: [0.0, 0.0, -9.81],
         h: 0.02,
+        gyroscopic: Gyroscopic::Explicit,
         ground: None,
         obstacles: vec![],
     }

@@ -151,20 +151,32 @@ fn check(scene: &Scene, drawing: &Drawing) -> Result<(), SceneError> {
 
 /// The bodies and obstacles in the world frame.
 fn solids(scene: &Scene) -> Vec<Solid> {
-    let bodies = scene.bodies.iter().enumerate().map(|(k, body)| {
-        let colour = BODY[k % BODY.len()];
-        let placed = |p: &Polyhedron| Solid::convex(p.mapped(|v| body.to_world(v)), colour);
-        match &body.shape {
-            Shape::Box { half } => {
-                placed(&Polyhedron::cuboid(*half).expect("a validated body has a volume"))
-            }
-            Shape::Polyhedron(p) => placed(p),
-            Shape::Sphere { radius } => {
-                Solid::Ball { centre: body.position, radius: *radius, colour }
-            }
-        }
+    let bodies = scene.bodies.iter().enumerate().flat_map(|(k, body)| {
+        placed(&body.shape, body.position, |v| body.to_world(v), BODY[k % BODY.len()])
     });
-    bodies.chain(scene.obstacles.iter().map(|p| Solid::convex(p.clone(), OBSTACLE))).collect()
+    let obstacles = scene
+        .obstacles
+        .iter()
+        .flat_map(|o| placed(&o.shape, o.position, |v| add(o.position, v), OBSTACLE));
+    bodies.chain(obstacles).collect()
+}
+
+/// The convex solids of a shape whose points `to_world` maps and whose origin is at `position`.
+fn placed(
+    shape: &Shape,
+    position: Vec3,
+    to_world: impl Fn(Vec3) -> Vec3,
+    colour: Colour,
+) -> Vec<Solid> {
+    let convex = |p: &Polyhedron| Solid::convex(p.mapped(&to_world), colour);
+    match shape {
+        Shape::Box { half } => {
+            vec![convex(&Polyhedron::cuboid(*half).expect("a validated body has a volume"))]
+        }
+        Shape::Polyhedron(p) => vec![convex(p)],
+        Shape::Compound(parts) => parts.iter().map(convex).collect(),
+        Shape::Sphere { radius } => vec![Solid::Ball { centre: position, radius: *radius, colour }],
+    }
 }
 
 /// The centre of the bounding box and half its diagonal.

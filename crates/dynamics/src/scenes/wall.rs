@@ -1,6 +1,6 @@
 //! A brick wall in running bond.
 
-use super::{Family, count};
+use super::{Family, Spread, count};
 use crate::error::positive;
 use crate::vec3::{X, Z, rectangle};
 use crate::{RigidBody, Scene, SceneError, Shape};
@@ -77,6 +77,6 @@ impl Family for Wall {
             }
             below = bricks;
         }
-        common.finish(scene)
+        common.finish(scene, Spread::Random)
     }
 }
