@@ -16,12 +16,15 @@
 mod assembly;
 mod body;
 mod contact;
+mod domain;
 pub mod draw;
 mod error;
+mod packing;
 mod polyhedron;
 mod scene;
 pub mod scenes;
 mod vec3;
+mod voronoi;
 
 pub use body::{RigidBody, Rotation, Shape};
 pub use contact::{Contact, Image};

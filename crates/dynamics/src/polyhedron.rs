@@ -75,6 +75,11 @@ impl Polyhedron {
         Ok(out)
     }
 
+    /// A solid whose faces are known to bound it; some may be so small that rounding hides their planes.
+    pub(crate) fn trusted(vertices: Vec<Vec3>, faces: Vec<Vec<usize>>) -> Self {
+        Self { vertices, faces }
+    }
+
     /// The plane convex polygon `base` (either sense) extruded by `along`, for example a voussoir.
     ///
     /// Errors: those of [`Polyhedron::new`].

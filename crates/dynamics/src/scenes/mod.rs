@@ -9,7 +9,7 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 
 use crate::error::{positive, require};
-use crate::{Contact, Gyroscopic, Scene, SceneError, Vec3};
+use crate::{Contact, Scene, SceneError, Vec3};
 
 /// Hands the settings that all families share, `[documentation, name: type = default, ...]`, and whatever else it
 /// was given to another macro.
@@ -133,13 +133,27 @@ enum Spread {
 }
 
 mod arch;
+mod bridge;
+mod chain;
+mod chute;
+mod kapla;
+mod periodic_box;
+mod polyhedra;
 mod sliding_box;
+mod sphere_pile;
 mod spheres;
 mod stack;
 mod wall;
 
 pub use arch::Arch;
+pub use bridge::Bridge;
+pub use chain::Chain;
+pub use chute::Chute;
+pub use kapla::Kapla;
+pub use periodic_box::{Grains, Periodic, PeriodicBox};
+pub use polyhedra::Polyhedra;
 pub use sliding_box::SlidingBox;
+pub use sphere_pile::SpherePile;
 pub use spheres::{Layout, Spheres};
 pub use stack::Stack;
 pub use wall::Wall;
@@ -149,8 +163,15 @@ pub static SCENES: &[SceneEntry] = &[
     SceneEntry::of::<SlidingBox>(),
     SceneEntry::of::<Stack>(),
     SceneEntry::of::<Wall>(),
+    SceneEntry::of::<Kapla>(),
     SceneEntry::of::<Arch>(),
+    SceneEntry::of::<Bridge>(),
+    SceneEntry::of::<Chain>(),
     SceneEntry::of::<Spheres>(),
+    SceneEntry::of::<SpherePile>(),
+    SceneEntry::of::<Chute>(),
+    SceneEntry::of::<Polyhedra>(),
+    SceneEntry::of::<PeriodicBox>(),
 ];
 
 /// A family of scenes: a struct that is its settings.
@@ -220,7 +241,7 @@ enum Purpose {
     Contacts,
     Shapes,
     Places,
-    Joints,
+    Faces,
 }
 
 impl Common {
@@ -260,6 +281,18 @@ impl Common {
     /// A contact with the common coefficients.
     fn contact(&self, a: Option<usize>, b: usize, point: Vec3, normal: Vec3) -> Contact {
         Contact::new(a, b, point, normal, self.mu, self.e)
+    }
+
+    /// Random radii within ± the share `spread` of `radius`.
+    ///
+    /// Errors: values that are no radii, by the keys `radius` and `spread`.
+    fn radii(&self, count: usize, radius: f64, spread: f64) -> Result<Vec<f64>, SceneError> {
+        positive("radius", radius)?;
+        let expected = "a number from 0 to below 1";
+        require("spread", spread, (0.0..1.0).contains(&spread), expected)?;
+        let mut rng = self.random(Purpose::Shapes);
+        let mut draw = |_| radius * (1.0 + spread * rng.random_range(-1.0..=1.0));
+        Ok((0..count).map(&mut draw).collect())
     }
 
     /// The finished scene: masses spread, set in motion, contacts thinned, validated.
