@@ -2,7 +2,7 @@
 //!
 //! The energy is `Σ k δ²/2 + Σ w_i z_i`, δ each overlap of two spheres or of a sphere and a wall, and w_i the weight in
 //! proportion to the volume. It is minimised by the inertial relaxation FIRE (Bitzek2006). What overlap is left is taken away
-//! exactly: the packing is blown up until nothing overlaps, the spheres keep their radii.
+//! exactly: the packing is blown up until nothing overlaps, while the spheres keep their radii.
 
 use crate::domain::{Domain, Grid, Wall};
 use crate::vec3::{Vec3, add, dot, norm, scale, sub};
@@ -36,7 +36,11 @@ pub(crate) struct Touch {
 /// The overlap that the weight is to leave at the bottom, in mean radii, from stage to stage.
 const STAGES: [f64; 4] = [0.1, 0.02, 0.004, 0.001];
 /// Steps of the relaxation in a stage, at most.
-const STEPS: usize = 1500;
+const STEPS: usize = 500;
+/// The overlap at which spheres without weight are relaxed, in mean radii.
+const OVERLAP: f64 = 1e-3;
+/// How often a box may grow.
+const GROWTHS: usize = 50;
 /// The room around a sphere in which neighbours are kept on the list, in mean radii.
 const SKIN: f64 = 0.4;
 
@@ -57,9 +61,20 @@ impl Packing {
             // The column above the bottom carries as many spheres as there are diameters in the height.
             let base = self.domain.size[0] * self.domain.size[1];
             let layers = (0.8 * volume(&self.radii) / base).max(1.0);
-            STAGES.iter().for_each(|overlap| self.minimise(overlap / layers));
-        } else {
-            self.minimise(0.0);
+            for overlap in STAGES {
+                self.minimise(overlap / layers);
+            }
+        }
+        // Without weight overlaps vanish where there is room; a box too full grows a little until there is.
+        let mut overlap = self.minimise(0.0);
+        for _ in 0..GROWTHS {
+            if overlap <= OVERLAP {
+                break;
+            }
+            let grown = 1.0 + 0.25 * overlap;
+            self.centres.iter_mut().for_each(|c| *c = scale(grown, *c));
+            self.domain.size = scale(grown, self.domain.size);
+            overlap = self.minimise(0.0);
         }
 
         let domain = self.domain;
@@ -133,14 +148,15 @@ impl Packing {
         pairs
     }
 
-    /// FIRE with unit stiffness, unit masses and the weight `weight` of a sphere of unit radius.
-    fn minimise(&mut self, weight: f64) {
+    /// FIRE with unit stiffness, unit masses and the weight `weight` of a sphere of unit radius; returns the largest
+    /// overlap.
+    fn minimise(&mut self, weight: f64) -> f64 {
         let n = self.centres.len();
         let (mut dt, mut alpha, mut downhill) = (0.1, 0.1, 0);
         let mut velocity = vec![[0.0; 3]; n];
         let mut force = vec![[0.0; 3]; n];
         let mut listed: Vec<Vec3> = vec![];
-        let mut pairs = vec![];
+        let (mut pairs, mut overlap) = (vec![], f64::INFINITY);
         for _ in 0..STEPS {
             let moved = |(a, b): (&Vec3, &Vec3)| norm(sub(*a, *b));
             if listed.is_empty()
@@ -151,12 +167,12 @@ impl Packing {
                 listed.clone_from(&self.centres);
                 pairs = self.near(SKIN);
             }
-            let overlap = self.forces(weight, &pairs, &mut force);
+            overlap = self.forces(weight, &pairs, &mut force);
             let size = |x: &[Vec3]| x.iter().map(|x| dot(*x, *x)).sum::<f64>().sqrt();
             let (f, v) = (size(&force), size(&velocity));
             let rest = 0.01 * weight * (n as f64).sqrt();
-            if f <= rest || (weight == 0.0 && overlap < 1e-4) {
-                return;
+            if f <= rest || (weight == 0.0 && overlap <= OVERLAP) {
+                break;
             }
             let power: f64 = force.iter().zip(&velocity).map(|(f, v)| dot(*f, *v)).sum();
             if power > 0.0 {
@@ -181,6 +197,7 @@ impl Packing {
                 self.centres[i] = add(self.centres[i], step);
             }
         }
+        overlap
     }
 
     /// The forces on the spheres that move; returns the largest overlap.
