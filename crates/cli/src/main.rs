@@ -16,6 +16,7 @@ mod plot;
 mod progress;
 mod report;
 mod solve;
+mod suite;
 
 use std::process::ExitCode;
 

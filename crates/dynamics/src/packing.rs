@@ -231,3 +231,74 @@ impl Packing {
         largest
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    use super::*;
+    use crate::domain::Sides;
+
+    #[test]
+    fn relaxed_packings_do_not_overlap() {
+        let mut rng = Pcg64::seed_from_u64(5);
+        let kinds = [
+            [Sides::Walls, Sides::Walls, Sides::Floor],
+            [Sides::Periodic, Sides::Periodic, Sides::Walls],
+            [Sides::Periodic; 3],
+        ];
+        for case in 0..18 {
+            let sides = kinds[case % 3];
+            let count = [2, 20, 150][case / 3 % 3];
+            // Also boxes far too full.
+            let fill = [0.4, 0.9][case % 2];
+            let radii: Vec<f64> = (0..count).map(|_| rng.random_range(0.6..=1.4)).collect();
+            let domain = Domain { size: [(volume(&radii) / fill).cbrt().max(2.8); 3], sides };
+            let centres = (0..count).map(|_| domain.point(&mut rng)).collect();
+            let mut packing = Packing { domain, centres, radii: radii.clone(), fixed: 0 };
+            packing.relax(sides[2] == Sides::Floor);
+            assert_eq!(packing.radii.len(), radii.len());
+            assert!(packing.radii.iter().zip(&radii).all(|(a, b)| (a - b).abs() < 1e-12));
+            for (i, p) in packing.centres.iter().enumerate() {
+                for wall in packing.domain.walls() {
+                    assert!(wall.distance(*p) > radii[i] * (1.0 - 1e-9));
+                }
+                for (j, q) in packing.centres.iter().enumerate() {
+                    // All images in reach, the sphere's own among them.
+                    for image in 0..27 {
+                        let n = [image % 3, image / 3 % 3, image / 9].map(|x| f64::from(x) - 1.0);
+                        let through = (0..3).all(|k| n[k] == 0.0 || packing.domain.periodic(k));
+                        let itself = i == j && n == [0.0; 3];
+                        if itself || !through {
+                            continue;
+                        }
+                        let shift: Vec3 = std::array::from_fn(|k| n[k] * packing.domain.size[k]);
+                        let d = norm(sub(add(*q, shift), *p));
+                        assert!(d > (radii[i] + radii[j]) * (1.0 - 1e-9), "{case}: {i} {j} {d}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn heavy_spheres_come_to_rest_on_something() {
+        // One sphere in a narrow box: on the floor. Two: one on the other or beside it.
+        let domain =
+            Domain { size: [2.2, 2.2, 9.0], sides: [Sides::Walls, Sides::Walls, Sides::Floor] };
+        let mut packing = Packing {
+            domain,
+            centres: vec![[1.1, 1.1, 5.0], [1.0, 1.1, 8.0]],
+            radii: vec![1.0; 2],
+            fixed: 0,
+        };
+        packing.relax(true);
+        let heights: Vec<f64> = packing.centres.iter().map(|c| c[2]).collect();
+        assert!((heights[0] - 1.0).abs() < 0.05 && (heights[1] - 3.0).abs() < 0.1, "{heights:?}");
+        let touching = packing.touching(0.05);
+        let pair = |t: &&Touch| matches!(t.a, Neighbour::Sphere(0, _)) && t.b == 1;
+        let touch = touching.iter().find(pair).unwrap();
+        assert!(touch.normal[2] > 0.9 && (touch.point[2] - 2.0).abs() < 0.1);
+    }
+}

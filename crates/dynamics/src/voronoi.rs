@@ -207,3 +207,116 @@ pub(crate) fn spread_points(corners: &[Vec3], most: usize) -> Vec<Vec3> {
         _ => (0..most).map(|k| corners[k * n / most]).collect(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64;
+
+    use super::*;
+    use crate::domain::Sides;
+    use crate::vec3::cross;
+
+    const KINDS: [[Sides; 3]; 3] =
+        [[Sides::Walls; 3], [Sides::Periodic, Sides::Periodic, Sides::Walls], [Sides::Periodic; 3]];
+
+    /// Random seeds in random boxes of every kind, few and many, as they come and relaxed.
+    fn cases() -> Vec<(Domain, Vec<Vec3>)> {
+        let mut rng = Pcg64::seed_from_u64(11);
+        let mut all = vec![];
+        for case in 0..60 {
+            let size = [(); 3].map(|()| rng.random_range(0.5..=3.0));
+            let domain = Domain { size, sides: KINDS[case % 3] };
+            let count = [1, 2, 3, 10, 60, 200][case / 3 % 6];
+            let mut seeds: Vec<Vec3> = (0..count).map(|_| domain.point(&mut rng)).collect();
+            relax(&domain, &mut seeds, case % 2);
+            all.push((domain, seeds));
+        }
+        all
+    }
+
+    #[test]
+    fn volumes_add_up_to_the_box() {
+        for (domain, seeds) in cases() {
+            let cells = cells(&domain, &seeds);
+            let volume = |c: &Cell| c.polyhedron().mass_properties(1.0).mass;
+            let sum: f64 = cells.iter().map(volume).sum();
+            let exact: f64 = domain.size.iter().product();
+            assert!((sum - exact).abs() < 1e-11 * exact, "{} {sum} {exact}", seeds.len());
+        }
+    }
+
+    #[test]
+    fn a_point_lies_in_the_cell_of_the_nearest_seed() {
+        let mut rng = Pcg64::seed_from_u64(12);
+        for (domain, seeds) in cases() {
+            let cells = cells(&domain, &seeds);
+            for _ in 0..20 {
+                let p = domain.point(&mut rng);
+                // The image of a seed nearest to p, by all images.
+                let steps = |k: usize| if domain.periodic(k) { -2..=2 } else { 0..=0 };
+                let images = (0..seeds.len()).flat_map(|i| {
+                    let seed = seeds[i];
+                    steps(0)
+                        .flat_map(move |x| {
+                            steps(1).flat_map(move |y| {
+                                let at = move |z| [f64::from(x), f64::from(y), f64::from(z)];
+                                steps(2).map(at)
+                            })
+                        })
+                        .map(move |n| {
+                            (i, add(seed, std::array::from_fn(|k| n[k] * domain.size[k])))
+                        })
+                });
+                let distance = |image: &(usize, Vec3)| norm(sub(p, image.1));
+                let (i, image) = images.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
+                let inside = sub(p, sub(image, seeds[i]));
+                let solid = cells[i].polyhedron();
+                for f in 0..solid.faces().len() {
+                    let (n, d) = solid.plane(f);
+                    assert!(dot(n, inside) - d < 1e-6, "{} {i} {f}", seeds.len());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn cells_are_closed_and_see_each_other() {
+        for (domain, seeds) in cases() {
+            let cells = cells(&domain, &seeds);
+            for (i, cell) in cells.iter().enumerate() {
+                let corners: usize = cell.faces.iter().map(|f| f.0.len()).sum();
+                // Euler: every edge belongs to two faces.
+                assert_eq!(cell.vertices.len() + cell.faces.len(), corners / 2 + 2);
+                for (corners, beyond) in cell.faces() {
+                    let Beyond::Cell(j, offset) = beyond else {
+                        assert!(matches!(beyond, Beyond::Wall(_)));
+                        continue;
+                    };
+                    // A cell that touches another at an edge may see it by rounding.
+                    let turn = |k: usize| {
+                        cross(sub(corners[k], corners[0]), sub(corners[k + 1], corners[0]))
+                    };
+                    if norm((1..corners.len() - 1).map(turn).fold([0.0; 3], add)) < 1e-9 {
+                        continue;
+                    }
+                    let back = Beyond::Cell(i, scale(-1.0, offset));
+                    assert!(cells[j].faces.iter().any(|f| f.1 == back), "{i} {j}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_lattice_gives_cubes() {
+        for sides in KINDS {
+            let domain = Domain { size: [4.0; 3], sides };
+            let place = |k: usize| [k % 4, k / 4 % 4, k / 16].map(|x| x as f64 + 0.5);
+            let seeds: Vec<Vec3> = (0..64).map(place).collect();
+            for (cell, &seed) in cells(&domain, &seeds).iter().zip(&seeds) {
+                let p = cell.polyhedron().mass_properties(1.0);
+                assert!((p.mass - 1.0).abs() < 1e-12 && norm(sub(p.centre, seed)) < 1e-12);
+            }
+        }
+    }
+}
