@@ -75,8 +75,7 @@ Examples:
 Exit codes: 0 done; 1 --solve did not reach --tol (the best point is stored); 2 a mistake in the options.";
 
 /// How the problem is stated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Form {
     /// M v = H r + f
     Global,

@@ -36,16 +36,9 @@ struct Suite {
 struct Entry {
     family: String,
     name: Option<String>,
-    form: Option<OneOrMore<Form>>,
+    form: Option<Value>,
     #[serde(default)]
     settings: SettingsMap,
-}
-
-#[derive(Debug, Clone, Deserialize)]
-#[serde(untagged)]
-enum OneOrMore<T> {
-    One(T),
-    More(Vec<T>),
 }
 
 /// One problem to make.
@@ -123,17 +116,7 @@ fn plan(entry: &Entry) -> Result<Vec<Planned>, String> {
         };
         all = all.iter().flat_map(|one| values.iter().map(move |v| with(one, v))).collect();
     }
-    let forms = match entry.form.clone() {
-        None => vec![(Form::Global, "")],
-        Some(OneOrMore::One(form)) => vec![(form, "")],
-        Some(OneOrMore::More(forms)) => forms
-            .into_iter()
-            .map(|form| (form, if form == Form::Local { "-local" } else { "-global" }))
-            .collect(),
-    };
-    if forms.is_empty() {
-        return Err("form: expected local, global or both, found []".into());
-    }
+    let forms = forms(entry.form.as_ref())?;
     let with = |(name, settings): (String, SettingsMap)| {
         let one = move |&(form, suffix): &(Form, &str)| Planned {
             scene,
@@ -144,6 +127,21 @@ fn plan(entry: &Entry) -> Result<Vec<Planned>, String> {
         forms.iter().map(one).collect::<Vec<_>>()
     };
     Ok(all.into_iter().flat_map(with).collect())
+}
+
+/// The forms of an entry, each with what it adds to the name of the file: nothing if it is the only one.
+fn forms(stated: Option<&Value>) -> Result<Vec<(Form, &'static str)>, String> {
+    let Some(stated) = stated else { return Ok(vec![(Form::Global, "")]) };
+    let form = |value: &Value| match value.as_str() {
+        Some("local") => Some((Form::Local, "-local")),
+        Some("global") => Some((Form::Global, "-global")),
+        _ => None,
+    };
+    let forms: Option<Vec<_>> = match stated {
+        Value::Array(list) if !list.is_empty() => list.iter().map(form).collect(),
+        one => form(one).map(|(form, _)| vec![(form, "")]),
+    };
+    forms.ok_or_else(|| format!("form: expected local, global or a list of them, found {stated}"))
 }
 
 #[cfg(test)]

@@ -119,7 +119,7 @@ fn suites_name_the_entry_at_fault() {
         ("[[problem]]\nfamily = \"tower\"\n", &["problem 1", "tower", "wall"]),
         ("[[problem]]\nname = \"a\"\n", &["line 1", "family"]),
         (&format!("{wall}{wall}colour = 3\n"), &["line 5", "colour", "settings"]),
-        (&format!("{wall}{wall}form = \"both\"\n"), &["line 5", "form"]),
+        (&format!("{wall}{wall}form = \"both\"\n"), &["problem 2", "form", "both"]),
         (&format!("{wall}name = \"a/b\"\n"), &["problem 1", "name", "a/b"]),
         (&format!("{wall}form = []\n"), &["problem 1", "form", "[]"]),
         (&format!("{wall}settings = {{ rows = [] }}\n"), &["problem 1", "rows", "[]"]),

@@ -1,6 +1,6 @@
 //! A hanging chain.
 
-use super::{Family, Spread, count};
+use super::{Family, Spread, count, crosswise};
 use crate::error::{positive, require};
 use crate::polyhedron::Polyhedron;
 use crate::vec3::{Vec3, Z, grid};
@@ -46,14 +46,11 @@ impl Family for Chain {
         let pitch = length - 2.0 * t;
         let top = pitch * self.links as f64 + 2.0 * t + 0.5 * length;
         // Odd links lie in the plane of y and z.
-        let turned = |k: usize, [x, y, z]: Vec3| if k % 2 == 0 { [x, y, z] } else { [y, x, z] };
         let (a, b, c) = (0.5 * length, 0.5 * self.width, 0.5 * t);
         for k in 0..self.links {
             let at = [0.0, 0.0, top - a - pitch * k as f64];
-            let bar = |low: Vec3, high: Vec3| {
-                let (low, high) = (turned(k, low), turned(k, high));
-                Polyhedron::between(low, high)
-            };
+            let bar =
+                |low: Vec3, high: Vec3| Polyhedron::between(crosswise(k, low), crosswise(k, high));
             let parts = vec![
                 bar([-b, -c, a - t], [b, c, a])?,
                 bar([-b, -c, -a], [b, c, t - a])?,

@@ -2,9 +2,9 @@
 
 use rand::RngExt;
 
-use super::{Family, Purpose, Spread, count};
+use super::{Family, Purpose, Spread, count, gap};
 use crate::domain::{Domain, Sides};
-use crate::error::{positive, require};
+use crate::error::require;
 use crate::packing::{Neighbour, Packing, volume};
 use crate::vec3::{Vec3, Y, Z, add, apply, scale, sub};
 use crate::{Ground, Obstacle, RigidBody, Rotation, Scene, SceneError, Shape};
@@ -49,7 +49,7 @@ impl Family for Chute {
         let slope = self.slope;
         require("slope", slope, slope.abs() < 90.0, "an angle between -90 and 90 degrees")?;
         require("speed", self.speed, true, "a finite number")?;
-        positive("gap", self.gap)?;
+        gap(self.gap)?;
         let flowing = common.radii(self.count, self.radius, self.spread)?;
 
         // Packed on the level; the plane is tilted afterwards.

@@ -1,8 +1,8 @@
 //! A tower of planks.
 
-use super::{Family, Spread, count};
+use super::{Family, Spread, count, crosswise};
 use crate::error::{positive, require};
-use crate::vec3::{Vec3, Z, rectangle};
+use crate::vec3::{Z, rectangle};
 use crate::{RigidBody, Scene, SceneError, Shape};
 
 settings! {
@@ -39,9 +39,7 @@ impl Family for Kapla {
         let (length, full) = (self.length, self.width * self.planks as f64);
         require("length", length, length >= full, "a length of at least `planks` widths")?;
 
-        // Vectors are stated for a layer along x and turned by a quarter for one along y.
-        let turned =
-            |layer: usize, [x, y, z]: Vec3| if layer % 2 == 0 { [x, y, z] } else { [y, x, z] };
+        // Vectors are stated for a layer along x.
         let half = [0.5 * length, 0.5 * self.width, 0.5 * self.thickness];
         // A single plank lies in the middle, the outer ones of several flush with the ends of those below.
         let gaps = (self.planks.max(2) - 1) as f64;
@@ -52,11 +50,11 @@ impl Family for Kapla {
         for layer in 0..self.layers {
             let bottom = self.thickness * layer as f64;
             for k in 0..self.planks {
-                let shape = Shape::Box { half: turned(layer, half) };
-                let at = turned(layer, [0.0, across(k), bottom + half[2]]);
+                let shape = Shape::Box { half: crosswise(layer, half) };
+                let at = crosswise(layer, [0.0, across(k), bottom + half[2]]);
                 let body = scene.push(RigidBody::solid(shape, self.density)?.at(at));
                 if layer == 0 {
-                    let foot = turned(layer, [0.0, across(k), 0.0]);
+                    let foot = crosswise(layer, [0.0, across(k), 0.0]);
                     for p in rectangle(foot, [half[0], 0.0, 0.0], [0.0, half[1], 0.0]) {
                         scene.contacts.push(common.contact(None, body, p, Z));
                     }
@@ -64,7 +62,7 @@ impl Family for Kapla {
                 }
                 for below in 0..self.planks {
                     let a = (layer - 1) * self.planks + below;
-                    let crossing = turned(layer, [across(below), across(k), bottom]);
+                    let crossing = crosswise(layer, [across(below), across(k), bottom]);
                     for p in rectangle(crossing, [half[1], 0.0, 0.0], [0.0, half[1], 0.0]) {
                         scene.contacts.push(common.contact(Some(a), body, p, Z));
                     }

@@ -287,7 +287,7 @@ impl Common {
     ///
     /// Errors: values that are no radii, by the keys `radius` and `spread`.
     fn radii(&self, count: usize, radius: f64, spread: f64) -> Result<Vec<f64>, SceneError> {
-        positive("radius", radius)?;
+        length("radius", radius)?;
         let expected = "a number from 0 to below 1";
         require("spread", spread, (0.0..1.0).contains(&spread), expected)?;
         let mut rng = self.random(Purpose::Shapes);
@@ -375,6 +375,21 @@ fn shuffle(items: &mut [usize], first: usize, rng: &mut Pcg64) {
 /// Adds a random number within ± `amplitude` to each component.
 fn symmetric(x: &mut Vec3, amplitude: f64, rng: &mut Pcg64) {
     x.iter_mut().for_each(|x| *x += amplitude * rng.random_range(-1.0..=1.0));
+}
+
+/// A vector of member `k` where every second member lies crosswise: x and y change places for odd `k`.
+fn crosswise(k: usize, [x, y, z]: Vec3) -> Vec3 {
+    if k.is_multiple_of(2) { [x, y, z] } else { [y, x, z] }
+}
+
+/// `x` is a length in m whose cube is a number too.
+fn length(key: &str, x: f64) -> Result<(), SceneError> {
+    require(key, x, (1e-9..=1e9).contains(&x), "a number from 1e-9 to 1e9")
+}
+
+/// `x` is a distance up to which spheres touch, in mean radii.
+fn gap(x: f64) -> Result<(), SceneError> {
+    require("gap", x, x > 0.0 && x <= 1.0, "a positive number up to 1")
 }
 
 /// `n` is an `allowed` count; the upper bound keeps a slip of the keyboard from filling the memory.

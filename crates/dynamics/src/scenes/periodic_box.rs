@@ -1,9 +1,9 @@
 //! Grains in a periodic box that is sheared.
 
 use super::polyhedra::{Faces, tessellation};
-use super::{Common, Family, Purpose, Spread, count};
+use super::{Common, Family, Purpose, Spread, count, gap, length};
 use crate::domain::{Domain, Sides, Wall};
-use crate::error::{positive, require};
+use crate::error::require;
 use crate::packing::{Neighbour, Packing, volume};
 use crate::vec3::{Mat3, Vec3, apply};
 use crate::voronoi::Beyond;
@@ -78,7 +78,7 @@ impl Family for PeriodicBox {
         scene.ground = None;
         count("count", self.count, 2..=1_000_000)?;
         require("fill", self.fill, (0.01..=1.0).contains(&self.fill), "a number from 0.01 to 1")?;
-        positive("gap", self.gap)?;
+        gap(self.gap)?;
         require("shear", self.shear, true, "a finite number")?;
         require("dilation", self.dilation, true, "a finite number")?;
         let last = match self.periodic {
@@ -147,7 +147,7 @@ impl PeriodicBox {
         domain: impl Fn(f64) -> Domain,
         scene: &mut Scene,
     ) -> Result<(), SceneError> {
-        positive("radius", self.radius)?;
+        length("radius", self.radius)?;
         let domain = domain(2.0 * self.radius * (self.count as f64).cbrt());
         let cells = tessellation(common, &domain, self.count, 2);
         for cell in &cells {

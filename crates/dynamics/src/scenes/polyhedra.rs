@@ -3,9 +3,9 @@
 use rand::RngExt;
 use rand_pcg::Pcg64;
 
-use super::{Common, Family, Purpose, Spread, count};
+use super::{Common, Family, Purpose, Spread, count, length};
 use crate::domain::{Domain, Sides};
-use crate::error::{positive, require};
+use crate::error::require;
 use crate::vec3::{Vec3, add, cross, norm, scale, sub};
 use crate::voronoi::{self, Beyond, Cell};
 use crate::{RigidBody, Scene, SceneError, Shape};
@@ -38,7 +38,7 @@ impl Family for Polyhedra {
         let common = self.common();
         let mut scene = common.scene(Self::NAME)?;
         count("count", self.count, 1..=100_000)?;
-        positive("size", self.size)?;
+        length("size", self.size)?;
         let aspect = self.aspect;
         require("aspect", aspect, (1e-3..=1e3).contains(&aspect), "a number from 0.001 to 1000")?;
         count("relaxation", self.relaxation, 0..=1000)?;

@@ -1,8 +1,8 @@
 //! Spheres poured into a box.
 
-use super::{Family, Purpose, Spread, count};
+use super::{Family, Purpose, Spread, count, gap};
 use crate::domain::{Domain, Sides};
-use crate::error::{positive, require};
+use crate::error::require;
 use crate::packing::{Neighbour, Packing, volume};
 use crate::vec3::sub;
 use crate::{RigidBody, Scene, SceneError, Shape};
@@ -34,7 +34,7 @@ impl Family for SpherePile {
         count("count", self.count, 1..=1_000_000)?;
         let aspect = self.aspect;
         require("aspect", aspect, (1e-3..=1e3).contains(&aspect), "a number from 0.001 to 1000")?;
-        positive("gap", self.gap)?;
+        gap(self.gap)?;
         let radii = common.radii(self.count, self.radius, self.spread)?;
 
         // Random packings fill about six tenths of their room.
