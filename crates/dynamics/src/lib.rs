@@ -2,7 +2,8 @@
 //!
 //! A [`Scene`] holds [`RigidBody`]s and [`Contact`]s; [`Scene::problem`] states the Moreau–Jean step as a global
 //! problem and [`Scene::condensed`] as a local one. [`scenes`] has families of scenes by name ([`SCENES`]), and
-//! [`draw::svg`] draws any scene. SI units throughout: m, kg, s, rad.
+//! [`draw::svg`] draws any scene. A contact may be with the periodic image of a body or with a moving wall
+//! ([`Image`]). SI units throughout: m, kg, s, rad.
 //!
 //! ```
 //! use nonsmooth_dynamics::scenes::{Family, Stack};

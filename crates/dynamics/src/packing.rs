@@ -53,9 +53,8 @@ impl Packing {
     /// Relaxes the overlaps; spheres that are heavy sink.
     pub fn relax(&mut self, heavy: bool) {
         let unit = self.mean_radius();
-        self.centres.iter_mut().for_each(|c| *c = scale(1.0 / unit, *c));
         self.radii.iter_mut().for_each(|r| *r /= unit);
-        self.domain.size = scale(1.0 / unit, self.domain.size);
+        self.grow(1.0 / unit);
 
         if heavy {
             // The column above the bottom carries as many spheres as there are diameters in the height.
@@ -71,22 +70,24 @@ impl Packing {
             if overlap <= OVERLAP {
                 break;
             }
-            let grown = 1.0 + 0.25 * overlap;
-            self.centres.iter_mut().for_each(|c| *c = scale(grown, *c));
-            self.domain.size = scale(grown, self.domain.size);
+            self.grow(1.0 + 0.25 * overlap);
             overlap = self.minimise(0.0);
         }
 
         let domain = self.domain;
         self.centres.iter_mut().for_each(|c| *c = domain.wrap(*c));
         let clear = self.clearance();
-        let grown = unit * if clear < 1.0 { (1.0 + 1e-12) / clear } else { 1.0 };
-        self.centres.iter_mut().for_each(|c| *c = scale(grown, *c));
-        self.domain.size = scale(grown, self.domain.size);
+        self.grow(unit * if clear < 1.0 { (1.0 + 1e-12) / clear } else { 1.0 });
         self.radii.iter_mut().for_each(|r| *r *= unit);
     }
 
-    pub fn mean_radius(&self) -> f64 {
+    /// Blows the packing up, but not the spheres.
+    fn grow(&mut self, factor: f64) {
+        self.centres.iter_mut().for_each(|c| *c = scale(factor, *c));
+        self.domain.size = scale(factor, self.domain.size);
+    }
+
+    fn mean_radius(&self) -> f64 {
         self.radii.iter().sum::<f64>() / self.radii.len() as f64
     }
 

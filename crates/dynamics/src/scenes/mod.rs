@@ -1,6 +1,8 @@
 //! Families of scenes by name, each a struct of settings that builds a [`Scene`].
 //!
-//! A new family is one file and one line of [`SCENES`].
+//! A new family is one file and one line of [`SCENES`]. All share the settings of material and time step, the spread of
+//! masses (`mass_ratio`), the motion at the beginning (`state`, `disturbance`, `impact_speed`, `spin`), `gyroscopic` and
+//! `contact_density`; whatever is random repeats with `seed`.
 
 use std::ops::RangeInclusive;
 
