@@ -249,7 +249,7 @@ fn list<'a>(entries: impl Iterator<Item = &'a SceneEntry>) -> String {
                 [] => String::new(),
                 names => format!(" One of {}.", names.join(", ")),
             };
-            text += &format!("  {setting:<18} {help}{choices}\n");
+            text += &format!("  {setting:<20} {help}{choices}\n");
         }
     }
     text
