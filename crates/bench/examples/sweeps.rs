@@ -140,11 +140,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "peer",
         "peer/us",
     );
-    for path in nonsmooth_bench::problem_files(&roots)? {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        match fclib::read(&path).map(|file| file.problem) {
-            Ok(Friction::Local2(problem)) => report(&problem, &settings, &name, &baselines),
-            Ok(Friction::Local3(problem)) => report(&problem, &settings, &name, &baselines),
+    let (inputs, mistakes) = nonsmooth_bench::campaign::inputs(&roots);
+    mistakes.iter().for_each(|mistake| eprintln!("{mistake}"));
+    for input in inputs {
+        let name = input.name.rsplit('/').next().unwrap_or_default();
+        match fclib::read(&input.path).map(|file| file.problem) {
+            Ok(Friction::Local2(problem)) => report(&problem, &settings, name, &baselines),
+            Ok(Friction::Local3(problem)) => report(&problem, &settings, name, &baselines),
             Ok(_) => {}
             Err(e) => eprintln!("{e}"),
         }

@@ -16,10 +16,10 @@ use crate::{Exit, files, output, report, suite};
 
 /// Generate the problem of a scene.
 ///
-/// A scene is a set of rigid bodies in contact; its problem is one Moreau-Jean time step from the initial
-/// velocities. Without a scene, or with --list, the scenes and their settings are listed. A suite is a TOML file
-/// that lists problems: each [[problem]] has a family (a scene), and may have a name, a form and settings; where a
-/// setting or the form is a list, there is a problem for each combination.
+/// A scene is a set of rigid bodies or elastic solids in contact; its problem is one Moreau-Jean time step from
+/// the initial velocities. Without a scene, or with --list, the scenes and their settings are listed. A suite is a
+/// TOML file that lists problems: each [[problem]] has a family (a scene), and may have a name, a form and
+/// settings; where a setting or the form is a list, there is a problem for each combination.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES, group(clap::ArgGroup::new("what").args(["scene", "suite"])))]
 pub struct Args {
@@ -210,7 +210,7 @@ pub fn summary(label: &Path, scene: &Scene, problem: &Friction) -> String {
         "{}: {}, {} and {} ({})\n",
         label.display(),
         scene.name,
-        match scene.bodies.len() {
+        match scene.bodies.len() + scene.solids.len() {
             1 => "1 body".into(),
             n => format!("{n} bodies"),
         },

@@ -4,6 +4,7 @@
 //! [`files`] (input and output files), [`report`] (verdicts as text and JSON), [`output`] (the two streams),
 //! [`progress`], [`interrupt`] and [`plot`].
 
+mod bench;
 mod check;
 mod files;
 mod generate;
@@ -67,6 +68,7 @@ enum Command {
     Info(info::Args),
     List(list::Args),
     Gen(generate::Args),
+    Bench(bench::Args),
 }
 
 fn main() -> ExitCode {
@@ -85,6 +87,7 @@ fn main() -> ExitCode {
         Command::Info(args) => info::run(&args),
         Command::List(args) => list::run(&args),
         Command::Gen(args) => generate::run(&args),
+        Command::Bench(args) => bench::run(&args),
     };
     let exit = done.unwrap_or_else(|mistake| {
         output::error(&mistake);

@@ -1,14 +1,12 @@
 //! The history of a solve as a picture.
 
+use nonsmooth_bench::draw::{Axis, GRID, INK, decades, font, tick, ticks};
 use nonsmooth_solve::Sample;
-use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 const SIZE: (u32, u32) = (960, 380);
-const INK: RGBColor = RGBColor(52, 64, 76);
-const GRID: RGBColor = RGBColor(226, 230, 234);
 const RESIDUAL: RGBColor = RGBColor(143, 184, 212);
 const BEST: RGBColor = RGBColor(31, 111, 168);
 const TOLERANCE: RGBColor = RGBColor(209, 80, 47);
@@ -64,30 +62,6 @@ fn draw(text: &mut String, title: &str, history: &[Sample], tolerance: f64) -> D
     curves.panel(&right, unit, false, |s| scale * s.seconds)?;
     root.present()?;
     Ok(())
-}
-
-/// A linear axis with ticks of our choice.
-struct Axis {
-    range: std::ops::Range<f64>,
-    ticks: Vec<f64>,
-}
-
-impl Ranged for Axis {
-    type FormatOption = DefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, x: &f64, (from, to): (i32, i32)) -> i32 {
-        let part = (x - self.range.start) / (self.range.end - self.range.start);
-        from + (part * f64::from(to - from)).round() as i32
-    }
-
-    fn key_points<H: KeyPointHint>(&self, _: H) -> Vec<f64> {
-        self.ticks.clone()
-    }
-
-    fn range(&self) -> std::ops::Range<f64> {
-        self.range.clone()
-    }
 }
 
 /// What both panels show, heights as decimal logarithms.
@@ -159,7 +133,7 @@ impl<'a> Curves<'a> {
         // Iterations are whole.
         let least = if first { 1.0 } else { 0.0 };
         let x_axis = Axis { range: 0.0..1.02 * end, ticks: ticks(end, 8, least) };
-        let y_axis = Axis { range: self.low..self.high, ticks: decades(self.low, self.high) };
+        let y_axis = Axis { range: self.low..self.high, ticks: decades(self.low, self.high, 10) };
         let mut chart = ChartBuilder::on(area)
             .margin_right(24)
             .margin_left(if first { 6 } else { 18 })
@@ -230,41 +204,6 @@ fn thinned(points: &[(f64, f64)], end: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Multiples of 1, 2 or 5 times a power of ten from 0 to `end`, about `n` of them and `least` apart.
-fn ticks(end: f64, n: usize, least: f64) -> Vec<f64> {
-    let rough = (end / n as f64).max(least);
-    let power = 10f64.powf(rough.log10().floor());
-    let nice = [1.0, 2.0, 5.0, 10.0];
-    let step = power * nice.into_iter().find(|s| s * power >= rough).unwrap_or(10.0);
-    (0..=(end / step * 1.02) as usize).map(|k| k as f64 * step).collect()
-}
-
-/// Whole decades from `low` to `high`, not more than fit.
-fn decades(low: f64, high: f64) -> Vec<f64> {
-    let step = ((high - low) / 10.0).ceil().max(1.0);
-    let first = (low / step).ceil() * step;
-    let mut all = vec![];
-    let mut at = first;
-    while at <= high {
-        all.push(at);
-        at += step;
-    }
-    all
-}
-
-/// A tick's text: no digits that say nothing.
-fn tick(x: f64) -> String {
-    if x >= 1e6 {
-        return format!("{x:.1e}");
-    }
-    let text = format!("{x:.3}");
-    text.trim_end_matches('0').trim_end_matches('.').into()
-}
-
-fn font(size: u32) -> TextStyle<'static> {
-    ("sans-serif", size).into_font().color(&INK)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -312,15 +251,5 @@ mod tests {
         let heights = [None, Some(0.0), Some(-2.0), None, Some(-1.0)];
         let points: Vec<_> = (0..).map(f64::from).zip(heights).collect();
         assert_eq!(best(&points), [(1.0, 0.0), (2.0, -2.0), (3.0, -2.0), (4.0, -2.0)]);
-    }
-
-    #[test]
-    fn ticks_are_round_numbers() {
-        assert_eq!(ticks(100.0, 5, 1.0), [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]);
-        assert_eq!(ticks(7.0, 6, 0.0), [0.0, 2.0, 4.0, 6.0]);
-        assert_eq!(ticks(2.0, 8, 1.0), [0.0, 1.0, 2.0]);
-        assert_eq!(decades(-9.0, 1.0).len(), 11);
-        assert_eq!(decades(-19.0, 1.0)[0], -18.0);
-        assert_eq!((tick(0.5), tick(40.0), tick(2e7)), ("0.5".into(), "40".into(), "2.0e7".into()));
     }
 }

@@ -225,6 +225,29 @@ fn info_describes() {
     has_keys(&lines[1], "solution/residual/relative solution/contacts_by_status/slip");
     assert_eq!((&lines[1]["dofs"], &lines[1]["contact_density"]), (&6.into(), &2.0.into()));
     assert_eq!(lines[1]["W"]["blocks"], 16);
+    assert!(lines[1].get("spectrum").is_none());
+}
+
+#[test]
+fn info_computes_the_spectrum_when_asked() {
+    let folder = Folder::with_problems();
+    // A box on its four corners: 12 rows that six velocities span.
+    let text = folder.run("info box.hdf5 --spectrum").exits(0).stdout;
+    assert!(text.contains("rank 6 of 12, rank ratio 2.000, condition number "), "{text}");
+    let line = folder.run("info box.hdf5 --spectrum --json").exits(0).json().remove(0);
+    has_keys(&line, "spectrum/condition spectrum/least spectrum/largest spectrum/skew solution");
+    assert_eq!(
+        (&line["spectrum"]["rank"], &line["spectrum"]["rank_ratio"]),
+        (&6.into(), &2.0.into())
+    );
+    assert!(line["spectrum_refused"].is_null());
+
+    let large = "info box.hdf5 --spectrum --spectrum-limit 11";
+    let text = folder.run(large).exits(0).stdout;
+    assert!(text.contains("none: W: expected at most 11 rows"), "{text}");
+    let line = folder.run(&format!("{large} --json")).exits(0).json().remove(0);
+    assert!(line["spectrum"].is_null() && line["spectrum_refused"].is_string());
+    folder.run("info box.hdf5 --spectrum-limit 11").refused(&["--spectrum"]);
 }
 
 #[test]

@@ -10,9 +10,9 @@ use crate::vec3::{Vec3, X, Y, cross, dot, norm, normalise, scale, sub};
 /// `u_N > 0` separates, and the impulse r acts on b (−r on a).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
-    /// The first body, `None` for the ground.
+    /// The first body or, counted after the bodies, elastic solid; `None` for the ground.
     pub a: Option<usize>,
-    /// The second body.
+    /// The second body or elastic solid.
     pub b: usize,
     /// Where they touch, m.
     pub point: Vec3,
@@ -28,7 +28,7 @@ pub struct Contact {
     pub image: Image,
 }
 
-/// The image of a body in a periodic domain, or the motion of a wall.
+/// The image of a body or elastic solid in a periodic domain, or the motion of a wall.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Image {
     /// From the body to its image, m; for the ground without meaning.
@@ -50,6 +50,13 @@ impl Contact {
         let n = normalise(self.normal);
         let t1 = normalise(sub(self.tangent, scale(dot(self.tangent, n), n)));
         [n, t1, cross(n, t1)]
+    }
+
+    /// For b and then a, if it is not the ground: the sign with which the contact moves it, its number, and its own point
+    /// that touches, which is `offset` away from [`Contact::point`] where an image of it touches.
+    pub(crate) fn sides(&self) -> impl Iterator<Item = (f64, usize, Vec3)> {
+        let a = self.a.map(|a| (-1.0, a, sub(self.point, self.image.offset)));
+        [Some((1.0, self.b, self.point)), a].into_iter().flatten()
     }
 
     /// Checks every value against a scene of `bodies` bodies; `key` names the contact in messages.

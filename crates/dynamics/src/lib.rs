@@ -1,9 +1,10 @@
-//! Rigid bodies and given contacts, assembled into the frictional contact problem of one time step.
+//! Rigid bodies, elastic solids and given contacts, assembled into the frictional contact problem of one time
+//! step.
 //!
-//! A [`Scene`] holds [`RigidBody`]s and [`Contact`]s; [`Scene::problem`] states the Moreau–Jean step as a global
-//! problem and [`Scene::condensed`] as a local one. [`scenes`] has families of scenes by name ([`SCENES`]), and
-//! [`draw::svg`] draws any scene. A contact may be with the periodic image of a body or with a moving wall
-//! ([`Image`]). SI units throughout: m, kg, s, rad.
+//! A [`Scene`] holds [`RigidBody`]s, [`ElasticBox`]es and [`Contact`]s; [`Scene::problem`] states the Moreau–Jean
+//! step as a global problem and [`Scene::condensed`] as a local one. [`scenes`] has families of scenes by name
+//! ([`SCENES`]), and [`draw::svg`] draws any scene. A contact may be with the periodic image of a body or with a
+//! moving wall ([`Image`]). SI units throughout: m, kg, s, rad.
 //!
 //! ```
 //! use nonsmooth_dynamics::scenes::{Family, Stack};
@@ -19,6 +20,7 @@ mod body;
 mod contact;
 mod domain;
 pub mod draw;
+mod elastic;
 mod error;
 mod packing;
 mod polyhedron;
@@ -29,6 +31,7 @@ mod voronoi;
 
 pub use body::{RigidBody, Rotation, Shape};
 pub use contact::{Contact, Image};
+pub use elastic::{ElasticBox, Material};
 pub use error::SceneError;
 pub use polyhedron::{MassProperties, Polyhedron};
 pub use scene::{Ground, Gyroscopic, Obstacle, Scene};

@@ -1,12 +1,14 @@
-//! Bodies and contacts together.
+//! Bodies, elastic solids and contacts together.
+
+use std::array::from_fn;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use crate::error::{positive, require};
 use crate::polyhedron::Polyhedron;
-use crate::vec3::{Vec3, X, cross, norm};
-use crate::{Contact, RigidBody, SceneError, Shape};
+use crate::vec3::{Vec3, X, add, cross, norm};
+use crate::{Contact, ElasticBox, RigidBody, SceneError, Shape};
 
 /// Bodies, the contacts between them, and what drives them during one time step.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +17,8 @@ pub struct Scene {
     pub name: String,
     /// The bodies, in the order of the degrees of freedom.
     pub bodies: Vec<RigidBody>,
+    /// Elastic solids; contacts count them after all bodies, as their degrees of freedom come after.
+    pub solids: Vec<ElasticBox>,
     /// The contacts, all of them active.
     pub contacts: Vec<Contact>,
     /// Acceleration of gravity, m/s².
@@ -79,28 +83,46 @@ impl Scene {
         self.bodies.len() - 1
     }
 
-    /// The number of degrees of freedom.
-    pub fn dofs(&self) -> usize {
-        6 * self.bodies.len()
+    /// Adds an elastic solid; returns its index as contacts count it, so bodies must be added before.
+    pub fn push_solid(&mut self, solid: ElasticBox) -> usize {
+        self.solids.push(solid);
+        self.bodies.len() + self.solids.len() - 1
     }
 
-    /// The mass of all bodies, kg.
+    /// The number of degrees of freedom.
+    pub fn dofs(&self) -> usize {
+        6 * self.bodies.len() + self.solids.iter().map(ElasticBox::dofs).sum::<usize>()
+    }
+
+    /// The mass of all bodies and solids, kg.
     pub fn mass(&self) -> f64 {
-        self.bodies.iter().map(|b| b.mass).sum()
+        let solids = self.solids.iter().map(ElasticBox::mass);
+        self.bodies.iter().map(|b| b.mass).chain(solids).sum()
     }
 
     /// Adds to each component of velocity a random number within ±`amplitude` (m/s), uniform and reproducible
-    /// by `seed`; angular velocities by as much at the farthest point of the body.
+    /// by `seed`; angular velocities by as much at the farthest point of the body. An elastic solid gets a rigid
+    /// motion, unless it is held.
     pub fn disturb(&mut self, amplitude: f64, seed: u64) {
         if amplitude == 0.0 {
             return;
         }
         let mut rng = Pcg64::seed_from_u64(seed);
         let mut draw = || amplitude * rng.random_range(-1.0..=1.0);
+        self.add_velocities(|radius| (from_fn(|_| draw()), from_fn(|_| draw() / radius)));
+    }
+
+    /// Adds to each body, then to each elastic solid that nothing holds, the velocity `[linear, angular]` about its
+    /// centre that `motion` has for its radius.
+    pub(crate) fn add_velocities(&mut self, mut motion: impl FnMut(f64) -> (Vec3, Vec3)) {
         for body in &mut self.bodies {
-            let radius = body.shape.radius();
-            body.velocity.iter_mut().for_each(|v| *v += draw());
-            body.angular_velocity.iter_mut().for_each(|w| *w += draw() / radius);
+            let (linear, angular) = motion(body.shape.radius());
+            body.velocity = add(body.velocity, linear);
+            body.angular_velocity = add(body.angular_velocity, angular);
+        }
+        for solid in self.solids.iter_mut().filter(|s| !s.is_held()) {
+            let (linear, angular) = motion(solid.radius());
+            solid.add_velocity(linear, angular);
         }
     }
 
@@ -117,8 +139,19 @@ impl Scene {
         for (k, body) in self.bodies.iter().enumerate() {
             body.validate(&format!("bodies[{k}]"))?;
         }
+        for (k, solid) in self.solids.iter().enumerate() {
+            solid.validate(&format!("solids[{k}]"))?;
+        }
         for (c, contact) in self.contacts.iter().enumerate() {
-            contact.validate(&format!("contacts[{c}]"), self.bodies.len())?;
+            contact.validate(&format!("contacts[{c}]"), self.bodies.len() + self.solids.len())?;
+            for (_, k, point) in contact.sides() {
+                let Some(s) = k.checked_sub(self.bodies.len()) else { continue };
+                if self.solids[s].weights(point).is_none() {
+                    let key = format!("contacts[{c}].point");
+                    let expected = format!("a point of solids[{s}]");
+                    return Err(SceneError::value(key, expected, format!("{point:?}")));
+                }
+            }
         }
         Ok(())
     }

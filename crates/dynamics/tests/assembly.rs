@@ -31,6 +31,7 @@ fn tumbling() -> Scene {
     Scene {
         name: "tumbling".into(),
         bodies,
+        solids: vec![],
         contacts,
         gravity: [0.0, 0.0, -9.81],
         h: 0.02,

@@ -36,7 +36,7 @@
 //! | --- | --- |
 //! | [`problem`] | the statement as plain validated data, the judge, instances with a known solution |
 //! | [`solve`] | the contract of a solver, the one loop, the registry, the algorithms |
-//! | [`dynamics`] | rigid bodies, contacts and scenes that become problems |
+//! | [`dynamics`] | rigid bodies, elastic solids, contacts and scenes that become problems |
 //! | [`io`] | FCLIB's HDF5 files, read and written |
 //!
 //! What most programs need is re-exported at the root.

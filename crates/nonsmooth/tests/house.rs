@@ -44,9 +44,9 @@ struct Floors {
 }
 
 /// `check → kinds → linalg`. A kind names the judge of its own as an associated type, so the two share a floor; what
-/// they must not do is lean on planted instances, and linalg must know neither.
+/// they must not do is lean on what describes them (traits) or on planted instances, and linalg must know neither.
 const PROBLEM: Floors = Floors {
-    floors: &[&["error"], &["linalg"], &["check"], &["planted"]],
+    floors: &[&["error"], &["linalg"], &["check"], &["traits"], &["planted"]],
     others: 2,
     others_mix: true,
     contracts: &[],
@@ -494,6 +494,7 @@ fn the_checker_finds_planted_violations() {
     assert_eq!(problem("linalg/bsr.rs", "use crate::lcp::Lcp;").len(), 1);
     assert_eq!(problem("check/local.rs", "use super::super::planted::Planted;").len(), 1);
     assert_eq!(problem("lcp.rs", "use super::planted::Planted;").len(), 1);
+    assert_eq!(problem("lcp.rs", "use crate::traits::Traits;").len(), 1);
     // After an item under test the file goes on.
     let text = "#[cfg(test)] mod tests { fn f() {} } use crate::planted::Planted;";
     assert_eq!(problem("lcp.rs", text).len(), 1);

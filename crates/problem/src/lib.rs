@@ -1,8 +1,8 @@
 //! The statement and the judge.
 //!
 //! This crate states the problems of nonsmooth mechanics as plain validated data ([`FrictionLocal`],
-//! [`FrictionGlobal`]), says how far a point is from solving them ([`check`]), and makes instances with a
-//! known solution ([`planted`]). It holds no algorithm: nothing here is shared with a solver's kernels.
+//! [`FrictionGlobal`]), says how far a point is from solving them ([`check`]) and what they are like ([`traits`]),
+//! and makes instances with a known solution ([`planted`]). It holds no algorithm: nothing here is shared with a solver's kernels.
 //!
 //! Notation follows `docs/notation.md` and FCLIB's letters.
 
@@ -14,6 +14,7 @@ mod friction_local;
 pub mod linalg;
 pub mod planted;
 mod problem;
+pub mod traits;
 
 pub use error::ProblemError;
 pub use friction::Friction;

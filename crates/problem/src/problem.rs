@@ -4,16 +4,21 @@ use crate::ProblemError;
 use crate::check::{Certificate, Measure};
 
 /// The kinds of problem, by the name that files, reports and the registry use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
 pub enum Kind {
     /// `u = W r + q`, two-dimensional contacts.
+    #[serde(rename = "friction_local_2d")]
     FrictionLocal2d,
     /// `u = W r + q`, three-dimensional contacts.
+    #[serde(rename = "friction_local_3d")]
     FrictionLocal3d,
     /// `M v = H r + f`, `u = Hᵀ v + w`, two-dimensional contacts.
+    #[serde(rename = "friction_global_2d")]
     FrictionGlobal2d,
     /// `M v = H r + f`, `u = Hᵀ v + w`, three-dimensional contacts.
+    #[serde(rename = "friction_global_3d")]
     FrictionGlobal3d,
 }
 
@@ -25,6 +30,14 @@ impl Kind {
             Kind::FrictionLocal3d => "friction_local_3d",
             Kind::FrictionGlobal2d => "friction_global_2d",
             Kind::FrictionGlobal3d => "friction_global_3d",
+        }
+    }
+
+    /// The components D of each contact.
+    pub fn dimension(self) -> usize {
+        match self {
+            Kind::FrictionLocal2d | Kind::FrictionGlobal2d => 2,
+            Kind::FrictionLocal3d | Kind::FrictionGlobal3d => 3,
         }
     }
 }

@@ -5,8 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use cpu_time::ProcessTime;
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::{Certificate, Measure};
+use nonsmooth_problem::linalg::factorisations;
 
 use crate::{SolveError, Solver, Step};
 
@@ -118,8 +120,13 @@ pub struct Outcome {
     pub measure: Measure,
     /// Steps done.
     pub iterations: usize,
+    /// Matrices factorised for the solve, as far as they grow with the problem: M, a Newton matrix, but not the
+    /// blocks of single contacts, nor what the judge factorises for itself.
+    pub factorisations: u64,
     /// Wall clock of the solve: set-up of the workspace, steps and judgements, but no file and no final report.
     pub seconds: f64,
+    /// Processor time of the whole process meanwhile, all threads: below `seconds` where the process had to wait.
+    pub cpu_seconds: f64,
 }
 
 /// One visit of the judge.
@@ -131,6 +138,24 @@ pub struct Sample {
     pub seconds: f64,
     /// The relative residual; where another criterion is worse (bilateral constraints, dynamics), that.
     pub relative: f64,
+}
+
+/// What a solve uses up, from the preparation of the workspace on.
+#[derive(Debug, Clone, Copy)]
+struct Meter {
+    wall: Instant,
+    cpu: ProcessTime,
+    factorisations: u64,
+}
+
+impl Meter {
+    fn start() -> Self {
+        Self { wall: Instant::now(), cpu: ProcessTime::now(), factorisations: factorisations() }
+    }
+
+    fn seconds(&self) -> f64 {
+        self.wall.elapsed().as_secs_f64()
+    }
 }
 
 /// What a watcher sees after every step.
@@ -206,25 +231,25 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
         let mut kept_now = match kept.take() {
             Some(mut k) => {
                 problem.regauge(&mut k.gauge)?;
-                let start = Instant::now();
+                let meter = Meter::start();
                 solver.refill(problem, &mut k.work)?;
-                (k, start)
+                (k, meter)
             }
             None => {
                 let gauge = problem.gauge()?;
-                let start = Instant::now();
+                let meter = Meter::start();
                 let work = solver.work(problem)?;
-                (Kept { work, gauge, best: point.clone() }, start)
+                (Kept { work, gauge, best: point.clone() }, meter)
             }
         };
         let outcome = {
-            let (Kept { work, gauge, best }, start) = &mut kept_now;
+            let (Kept { work, gauge, best }, meter) = &mut kept_now;
             P::copy_point(point, best);
             let mut run = Run {
                 problem,
                 solver,
                 work,
-                judge: Judge::new(gauge, best, history, *start),
+                judge: Judge::new(gauge, best, history, *meter),
                 limits,
             };
             run.solve(point, watch)
@@ -295,7 +320,15 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
             Some(measure) => measure,
             None => self.problem.certify(point, self.judge.gauge),
         };
-        Outcome { status, measure, iterations, seconds: self.judge.start.elapsed().as_secs_f64() }
+        let meter = &self.judge.meter;
+        Outcome {
+            status,
+            measure,
+            iterations,
+            factorisations: factorisations() - meter.factorisations,
+            seconds: meter.seconds(),
+            cpu_seconds: meter.cpu.elapsed().as_secs_f64(),
+        }
     }
 
     fn judge(&mut self, point: &mut P::Point, iteration: usize) {
@@ -306,7 +339,7 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
     fn limit(&self, iterations: usize) -> Option<Limit> {
         let cancelled =
             || self.limits.cancel.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed));
-        let late = |t: f64| self.judge.start.elapsed().as_secs_f64() >= t;
+        let late = |t: f64| self.judge.meter.seconds() >= t;
         if iterations >= self.limits.max_iterations {
             Some(Limit::Iterations)
         } else if cancelled() {
@@ -338,7 +371,7 @@ struct Judge<'a, P: Problem> {
     gauge: &'a mut P::Gauge,
     best: &'a mut P::Point,
     history: &'a mut Vec<Sample>,
-    start: Instant,
+    meter: Meter,
     last: Measure,
     best_measure: Measure,
     /// The best point's residuals in doubled precision, where they were needed.
@@ -355,7 +388,7 @@ impl<'a, P: Problem> Judge<'a, P> {
         gauge: &'a mut P::Gauge,
         best: &'a mut P::Point,
         history: &'a mut Vec<Sample>,
-        start: Instant,
+        meter: Meter,
     ) -> Self {
         history.clear();
         let nothing = Measure::unknown();
@@ -363,7 +396,7 @@ impl<'a, P: Problem> Judge<'a, P> {
             gauge,
             best,
             history,
-            start,
+            meter,
             last: nothing,
             best_measure: nothing,
             certified: None,
@@ -396,11 +429,7 @@ impl<'a, P: Problem> Judge<'a, P> {
         }
         let merit = self.last.merit();
         if self.visits.is_multiple_of(self.stride) || merit <= self.best_measure.merit() {
-            self.history.push(Sample {
-                iteration,
-                seconds: self.start.elapsed().as_secs_f64(),
-                relative: merit,
-            });
+            self.history.push(Sample { iteration, seconds: self.meter.seconds(), relative: merit });
         }
         self.visits += 1;
     }
@@ -412,7 +441,7 @@ impl<'a, P: Problem> Judge<'a, P> {
     }
 
     fn progress(&self, iteration: usize) -> Progress {
-        let seconds = self.start.elapsed().as_secs_f64();
+        let seconds = self.meter.seconds();
         let judged = self.history.last().copied().unwrap_or(Sample {
             iteration,
             seconds,

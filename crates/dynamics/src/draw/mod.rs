@@ -70,13 +70,14 @@ fn motion_colour(motion: Motion) -> &'static str {
 
 /// Draws `scene` as a standalone SVG document, the same text for the same input.
 ///
-/// Faces of the bodies are shaded flat and painted from the farthest body to the nearest, in an order that is
-/// exact for convex bodies with a separating face plane. Cost: O(pairs of bodies that overlap in the picture).
+/// Elastic solids are drawn without strain, with the faces of their elements. Faces are shaded flat and painted from
+/// the farthest body to the nearest, in an order that is exact for convex bodies with a separating face plane.
+/// Cost: O(pairs of bodies that overlap in the picture).
 ///
 /// Errors: those of [`Scene::validate`]; nothing to draw; impulses or motions that do not fit the contacts.
 pub fn svg(scene: &Scene, drawing: &Drawing) -> Result<String, SceneError> {
     check(scene, drawing)?;
-    let solids = solids(scene);
+    let solids = solids(scene)?;
     let (centre, radius) = bounds(&solids);
     let mut camera = Camera::new(&drawing.view, centre, radius);
     let light = camera.light();
@@ -126,7 +127,7 @@ pub fn svg(scene: &Scene, drawing: &Drawing) -> Result<String, SceneError> {
 
 fn check(scene: &Scene, drawing: &Drawing) -> Result<(), SceneError> {
     scene.validate()?;
-    if scene.bodies.is_empty() && scene.obstacles.is_empty() {
+    if scene.bodies.is_empty() && scene.solids.is_empty() && scene.obstacles.is_empty() {
         return Err(SceneError::value("bodies", "something to draw", "none"));
     }
     positive("width", drawing.width)?;
@@ -149,16 +150,20 @@ fn check(scene: &Scene, drawing: &Drawing) -> Result<(), SceneError> {
     }
 }
 
-/// The bodies and obstacles in the world frame.
-fn solids(scene: &Scene) -> Vec<Solid> {
-    let bodies = scene.bodies.iter().enumerate().flat_map(|(k, body)| {
-        placed(&body.shape, body.position, |v| body.to_world(v), BODY[k % BODY.len()])
-    });
-    let obstacles = scene
-        .obstacles
-        .iter()
-        .flat_map(|o| placed(&o.shape, o.position, |v| add(o.position, v), OBSTACLE));
-    bodies.chain(obstacles).collect()
+/// The bodies, elastic solids and obstacles in the world frame.
+fn solids(scene: &Scene) -> Result<Vec<Solid>, SceneError> {
+    let colour = |k: usize| BODY[k % BODY.len()];
+    let mut all = vec![];
+    for (k, body) in scene.bodies.iter().enumerate() {
+        all.extend(placed(&body.shape, body.position, |v| body.to_world(v), colour(k)));
+    }
+    for (k, solid) in scene.solids.iter().enumerate() {
+        all.push(Solid::convex(solid.surface()?, colour(scene.bodies.len() + k)));
+    }
+    for o in &scene.obstacles {
+        all.extend(placed(&o.shape, o.position, |v| add(o.position, v), OBSTACLE));
+    }
+    Ok(all)
 }
 
 /// The convex solids of a shape whose points `to_world` maps and whose origin is at `position`.
@@ -179,6 +184,19 @@ fn placed(
     }
 }
 
+/// The centre, radius and velocity of each body and each elastic solid.
+fn moving(scene: &Scene) -> impl Iterator<Item = (Vec3, f64, Vec3)> + '_ {
+    let bodies = scene.bodies.iter().map(|b| (b.position, b.shape.radius(), b.velocity));
+    let solids = scene.solids.iter().map(|s| (s.position, s.radius(), s.mean_velocity()));
+    bodies.chain(solids)
+}
+
+/// The mean of some sizes, zero of none.
+fn average(sizes: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = sizes.fold((0.0, 0), |(sum, n), x| (sum + x, n + 1));
+    sum / f64::from(n.max(1))
+}
+
 /// The centre of the bounding box and half its diagonal.
 fn bounds(solids: &[Solid]) -> (Vec3, f64) {
     let axis = |k: usize| {
@@ -193,8 +211,7 @@ fn bounds(solids: &[Solid]) -> (Vec3, f64) {
 
 /// The size of a body in the picture on average, px: arrows and dots are small where the bodies are.
 fn mark_size(scene: &Scene, camera: &Camera) -> f64 {
-    let sizes = scene.bodies.iter().map(|b| b.shape.radius() * camera.magnification(b.position));
-    sizes.sum::<f64>() / scene.bodies.len().max(1) as f64
+    average(moving(scene).map(|(position, radius, _)| radius * camera.magnification(position)))
 }
 
 /// What the marks in the picture mean.
@@ -245,8 +262,7 @@ struct Arrow {
 
 /// Impulses and velocities, the longest of each kind about as long as a body.
 fn arrows(scene: &Scene, drawing: &Drawing) -> Vec<Arrow> {
-    let radii = scene.bodies.iter().map(|b| b.shape.radius());
-    let size = radii.sum::<f64>() / scene.bodies.len().max(1) as f64;
+    let size = average(moving(scene).map(|(_, radius, _)| radius));
     let mut out = Vec::new();
     let mut push = |what, length: f64, all: Vec<(Vec3, Vec3, &'static str)>| {
         let longest = all.iter().map(|a| norm(a.1)).fold(0.0, f64::max);
@@ -270,7 +286,7 @@ fn arrows(scene: &Scene, drawing: &Drawing) -> Vec<Arrow> {
         push(What::Impulse, 1.3 * size, scene.contacts.iter().enumerate().map(impulse).collect());
     }
     if drawing.velocities {
-        let each = scene.bodies.iter().map(|b| (b.position, b.velocity, VELOCITY));
+        let each = moving(scene).map(|(position, _, velocity)| (position, velocity, VELOCITY));
         push(What::Velocity, 1.5 * size, each.collect());
     }
     out

@@ -2,7 +2,8 @@
 //!
 //! A new family is one file and one line of [`SCENES`]. All share the settings of material and time step, the spread of
 //! masses (`mass_ratio`), the motion at the beginning (`state`, `disturbance`, `impact_speed`, `spin`), `gyroscopic` and
-//! `contact_density`; whatever is random repeats with `seed`.
+//! `contact_density`; whatever is random repeats with `seed`. Bodies are elastic solids too in what these settings say,
+//! but one that a support holds is not set in motion.
 
 use std::ops::RangeInclusive;
 
@@ -11,7 +12,7 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 
 use crate::error::{positive, require};
-use crate::{Contact, Scene, SceneError, Vec3};
+use crate::{Contact, ElasticBox, Scene, SceneError, Vec3};
 
 /// Hands the settings that all families share, `[documentation, name: type = default, ...]`, and whatever else it
 /// was given to another macro.
@@ -40,7 +41,7 @@ macro_rules! with_common {
                 impact_speed: f64 = 1.0,
                 /// Random angular velocities of all bodies within ± this about each axis, rad/s.
                 spin: f64 = 0.0,
-                /// How the gyroscopic torque enters.
+                /// How the gyroscopic torque enters; spheres and elastic solids have none.
                 gyroscopic: $crate::Gyroscopic = $crate::Gyroscopic::Explicit,
                 /// Keeps contacts by lot until 3 contacts / degrees of freedom is this; 0 keeps all.
                 contact_density: f64 = 0.0,
@@ -76,17 +77,21 @@ macro_rules! family {
 
         impl Default for $name {
             fn default() -> Self {
-                let common = $crate::scenes::Common {
+                Self::with($crate::scenes::Common {
                     $($($changed: $value,)*)?
                     ..$crate::scenes::Common::DEFAULT
-                };
-                Self { $($field: $default,)* $($common: common.$common,)* }
+                })
             }
         }
 
         impl nonsmooth_solve::settings::Settings for $name {}
 
         impl $name {
+            /// The defaults of its own settings with these common ones.
+            pub(super) fn with(common: $crate::scenes::Common) -> Self {
+                Self { $($field: $default,)* $($common: common.$common,)* }
+            }
+
             fn common(&self) -> $crate::scenes::Common {
                 $crate::scenes::Common { $($common: self.$common,)* }
             }
@@ -120,8 +125,8 @@ pub enum State {
     Rest,
     /// All bodies, by small random velocities.
     Perturbed,
-    /// All bodies fall with `impact_speed`, so that contacts close at once; without a ground to fall upon they have
-    /// random velocities of that size.
+    /// All bodies fall with `impact_speed`, so that contacts close at once; with neither a ground nor a held solid to fall
+    /// upon they have random velocities of that size.
     Impact,
 }
 
@@ -138,6 +143,9 @@ mod arch;
 mod bridge;
 mod chain;
 mod chute;
+mod elastic;
+mod elastic_cubes;
+mod elastic_wall;
 mod kapla;
 mod periodic_box;
 mod polyhedra;
@@ -151,6 +159,8 @@ pub use arch::Arch;
 pub use bridge::Bridge;
 pub use chain::Chain;
 pub use chute::Chute;
+pub use elastic_cubes::{ElasticCubes, Support};
+pub use elastic_wall::ElasticWall;
 pub use kapla::Kapla;
 pub use periodic_box::{Grains, Periodic, PeriodicBox};
 pub use polyhedra::Polyhedra;
@@ -174,6 +184,8 @@ pub static SCENES: &[SceneEntry] = &[
     SceneEntry::of::<Chute>(),
     SceneEntry::of::<Polyhedra>(),
     SceneEntry::of::<PeriodicBox>(),
+    SceneEntry::of::<ElasticCubes>(),
+    SceneEntry::of::<ElasticWall>(),
 ];
 
 /// A family of scenes: a struct that is its settings.
@@ -271,6 +283,7 @@ impl Common {
         Ok(Scene {
             name: name.into(),
             bodies: vec![],
+            solids: vec![],
             contacts: vec![],
             gravity: [0.0, 0.0, -self.gravity],
             h: self.h,
@@ -307,7 +320,7 @@ impl Common {
     }
 
     fn spread_masses(&self, scene: &mut Scene, spread: Spread) {
-        let n = scene.bodies.len();
+        let n = scene.bodies.len() + scene.solids.len();
         if self.mass_ratio == 1.0 || n < 2 {
             return;
         }
@@ -315,10 +328,14 @@ impl Common {
         if spread == Spread::Random {
             shuffle(&mut ranks, n, &mut self.random(Purpose::Masses));
         }
-        for (body, rank) in scene.bodies.iter_mut().zip(ranks) {
-            let factor = self.mass_ratio.powf(rank as f64 / (n - 1) as f64);
-            body.mass *= factor;
-            body.inertia = body.inertia.map(|row| row.map(|x| factor * x));
+        let factor = |rank| self.mass_ratio.powf(rank as f64 / (n - 1) as f64);
+        let (of_bodies, of_solids) = ranks.split_at(scene.bodies.len());
+        for (body, &rank) in scene.bodies.iter_mut().zip(of_bodies) {
+            body.mass *= factor(rank);
+            body.inertia = body.inertia.map(|row| row.map(|x| factor(rank) * x));
+        }
+        for (solid, &rank) in scene.solids.iter_mut().zip(of_solids) {
+            solid.material.density *= factor(rank);
         }
     }
 
@@ -329,19 +346,16 @@ impl Common {
         };
         scene.disturb(amplitude, self.seed);
         if self.state == State::Impact {
-            let falls = scene.contacts.iter().any(|c| c.a.is_none());
+            let falls = scene.contacts.iter().any(|c| c.a.is_none())
+                || scene.solids.iter().any(ElasticBox::is_held);
             let mut rng = self.random(Purpose::Impact);
-            for body in &mut scene.bodies {
-                match falls {
-                    true => body.velocity[2] -= self.impact_speed,
-                    false => symmetric(&mut body.velocity, self.impact_speed, &mut rng),
-                }
-            }
+            scene.add_velocities(|_| match falls {
+                true => ([0.0, 0.0, -self.impact_speed], [0.0; 3]),
+                false => (symmetric(self.impact_speed, &mut rng), [0.0; 3]),
+            });
         }
         let mut rng = self.random(Purpose::Spin);
-        for body in &mut scene.bodies {
-            symmetric(&mut body.angular_velocity, self.spin, &mut rng);
-        }
+        scene.add_velocities(|_| ([0.0; 3], symmetric(self.spin, &mut rng)));
     }
 
     /// Keeps a random subset of the contacts so that `3 nc / n` comes to `contact_density`.
@@ -374,9 +388,9 @@ fn shuffle(items: &mut [usize], first: usize, rng: &mut Pcg64) {
     }
 }
 
-/// Adds a random number within ± `amplitude` to each component.
-fn symmetric(x: &mut Vec3, amplitude: f64, rng: &mut Pcg64) {
-    x.iter_mut().for_each(|x| *x += amplitude * rng.random_range(-1.0..=1.0));
+/// A vector of random components within ± `amplitude`.
+fn symmetric(amplitude: f64, rng: &mut Pcg64) -> Vec3 {
+    std::array::from_fn(|_| amplitude * rng.random_range(-1.0..=1.0))
 }
 
 /// A vector of member `k` where every second member lies crosswise: x and y change places for odd `k`.

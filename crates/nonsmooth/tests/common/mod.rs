@@ -19,7 +19,9 @@ pub fn corpus_files(folders: &[&str]) -> Vec<PathBuf> {
     };
     let corpus = Path::new(&corpus);
     let roots: Vec<_> = folders.iter().map(|folder| corpus.join(folder)).collect();
-    let found = nonsmooth_bench::problem_files(&roots).unwrap();
-    assert!(!found.is_empty(), "the corpus at {} holds no files", corpus.display());
-    found
+    let (found, mistakes) = nonsmooth_bench::campaign::inputs(&roots);
+    assert!(mistakes.is_empty(), "the corpus at {}: {mistakes:?}", corpus.display());
+    let mut files: Vec<_> = found.into_iter().map(|input| input.path).collect();
+    files.sort();
+    files
 }

@@ -1,7 +1,7 @@
 //! The Delassus operator W = Hᵀ M⁻¹ H of a global problem: its diagonal, its condensation, and its factors
 //! contact by contact.
 
-use super::{Block, BlockRow, Bsr, Csc, Inverse, Refine};
+use super::{Block, BlockRow, Bsr, Csc, Inverse};
 
 /// `W = Hᵀ M⁻¹ H` without W: for each contact c the rows of `H_c` (n × D) that are not zero and those of
 /// `Z_c = M⁻¹ H_c`.
@@ -167,6 +167,10 @@ fn with_diagonal<const D: usize>(
     blocks
 }
 
+/// Contacts whose columns are solved together where a component is large: its factor is read from memory once for
+/// all of them.
+const TOGETHER: usize = 16;
+
 /// Hands `H_c` and `Z_c = M⁻¹ H_c` of each contact in turn to `visit`, both as rows that hold something.
 fn solve_columns<const D: usize>(
     h: &Csc,
@@ -174,35 +178,56 @@ fn solve_columns<const D: usize>(
     mut visit: impl FnMut(usize, &[(u32, [f64; D])], &[(u32, [f64; D])]),
 ) {
     let n = h.nrows();
-    let mut x = vec![0.0; inverse.scratch_len()];
-    let mut scratch = vec![0.0; inverse.scratch_len()];
-    let (mut components, mut z) = (Vec::new(), Vec::new());
-    for c in 0..h.ncols() / D {
-        let rows = block_column::<D>(h, c);
-        components.clear();
-        components.extend(rows.iter().map(|r| inverse.component_of(r.0 as usize)));
-        components.sort_unstable();
-        components.dedup();
-        z.clear();
-        for &component in &components {
-            let index = inverse.component(component);
-            let start = z.len();
-            z.extend(index.iter().map(|&i| (i as u32, [0.0; D])));
-            for k in 0..D {
-                let x = &mut x[..index.len()];
-                x.fill(0.0);
-                for (i, row) in &rows {
-                    if inverse.component_of(*i as usize) == component {
-                        x[inverse.place_in_component(*i as usize)] = row[k];
-                    }
+    let (mut x, mut z, mut scratch) = (Vec::new(), Vec::new(), Vec::new());
+    let mut starts = Vec::new();
+    // Each component that a contact touches: (component, contact of the group).
+    let mut touched: Vec<(usize, usize)> = Vec::new();
+    let together = if inverse.has_sparse_factor() { TOGETHER } else { 1 };
+    let contacts: Vec<usize> = (0..h.ncols() / D).collect();
+    for group in contacts.chunks(together) {
+        let rows: Vec<_> = group.iter().map(|&c| block_column::<D>(h, c)).collect();
+        touched.clear();
+        for (g, rows) in rows.iter().enumerate() {
+            touched.extend(rows.iter().map(|r| (inverse.component_of(r.0 as usize), g)));
+        }
+        touched.sort_unstable();
+        touched.dedup();
+        // The columns of each touched component lie one after the other, those of one component together.
+        let size = |component: usize| inverse.component(component).len();
+        x.clear();
+        starts.clear();
+        for &(component, g) in &touched {
+            let (start, size) = (x.len(), size(component));
+            starts.push(start);
+            x.resize(start + D * size, 0.0);
+            for (i, row) in &rows[g] {
+                if inverse.component_of(*i as usize) == component {
+                    let place = inverse.place_in_component(*i as usize);
+                    (0..D).for_each(|k| x[start + k * size + place] = row[k]);
                 }
-                inverse.solve_component(component, x, &mut scratch, Refine::Once);
-                z[start..].iter_mut().zip(x).for_each(|(z, x)| z.1[k] = *x);
             }
         }
-        // Rows after n are multipliers of bilateral constraints, recovered on demand.
-        z.retain(|(i, row)| (*i as usize) < n && row.iter().any(|&v| v != 0.0));
-        visit(c, &rows, &z);
+        let mut start = 0;
+        for pairs in touched.chunk_by(|a, b| a.0 == b.0) {
+            let component = pairs[0].0;
+            let end = start + pairs.len() * D * size(component);
+            inverse.solve_columns(component, &mut x[start..end], &mut scratch);
+            start = end;
+        }
+        for (g, rows) in rows.iter().enumerate() {
+            z.clear();
+            for (&(component, _), start) in touched.iter().zip(&starts).filter(|t| t.0.1 == g) {
+                let size = size(component);
+                let at = |place: usize| std::array::from_fn(|k| x[start + k * size + place]);
+                let index = inverse.component(component).iter().enumerate();
+                z.extend(index.map(|(place, &i)| (i as u32, at(place))));
+            }
+            // Rows after n are multipliers of bilateral constraints, recovered on demand.
+            z.retain(|(i, row): &(u32, [f64; D])| {
+                (*i as usize) < n && row.iter().any(|&v| v != 0.0)
+            });
+            visit(group[g], rows, &z);
+        }
     }
 }
 

@@ -1,9 +1,11 @@
 //! The inverse of M, or of M under bilateral constraints, behind one face.
 
+use std::cell::Cell;
+
 use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
 
-use super::{Compensated, Csc, norm};
+use super::{Compensated, Csc, Groups, norm};
 use crate::ProblemError;
 
 /// Components up to this size are factorised densely; rigid bodies have 1, 3 or 6.
@@ -27,6 +29,16 @@ pub struct Inverse {
     place: Vec<(u32, u32)>,
     /// The factor is that of A with a small diagonal added.
     regularised: bool,
+}
+
+thread_local! {
+    static FACTORISATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+/// The matrices that this thread has factorised so far, each counted once however many components it has; the
+/// difference of two readings is what happened between them.
+pub fn factorisations() -> u64 {
+    FACTORISATIONS.get()
 }
 
 /// How far a solve is refined.
@@ -123,6 +135,7 @@ impl Inverse {
         name: &str,
         regularised: bool,
     ) -> Result<Self, ProblemError> {
+        FACTORISATIONS.set(FACTORISATIONS.get() + 1);
         let (index, place) = connected_components(&matrix);
         let components = index
             .into_iter()
@@ -183,6 +196,12 @@ impl Inverse {
         self.components.iter().map(|c| c.index.len())
     }
 
+    /// Whether a component is too large for a dense factor.
+    pub fn has_sparse_factor(&self) -> bool {
+        let sparse = |c: &Component| matches!(c.factor, Factor::Cholesky(_) | Factor::Sparse(_));
+        self.components.iter().any(sparse)
+    }
+
     /// The component of unknown `i`.
     pub fn component_of(&self, i: usize) -> usize {
         self.place[i].0 as usize
@@ -230,12 +249,42 @@ impl Inverse {
     pub fn null_direction(&self, residual: &mut [f64]) {
         for component in &self.components {
             let mut local: Vec<f64> = component.index.iter().map(|&i| residual[i]).collect();
-            component.factor.solve(&mut local);
+            component.factor.solve(&mut local, component.index.len());
             component.index.iter().zip(local).for_each(|(&i, x)| residual[i] = x);
         }
         let largest = residual.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         if largest > 0.0 {
             residual.iter_mut().for_each(|x| *x /= largest);
+        }
+    }
+
+    /// Solves within component `k` for several right-hand sides, the columns of `x`, each as [`Refine::Once`] does.
+    ///
+    /// A large factor is read from memory once for all columns.
+    pub fn solve_columns(&self, k: usize, x: &mut [f64], scratch: &mut Vec<f64>) {
+        let Component { index, factor } = &self.components[k];
+        let n = index.len();
+        if self.regularised || !matches!(factor, Factor::Cholesky(_) | Factor::Sparse(_)) {
+            scratch.resize(4 * n, 0.0);
+            x.chunks_mut(n).for_each(|x| self.solve_component(k, x, scratch, Refine::Once));
+            return;
+        }
+        scratch.clear();
+        scratch.extend_from_slice(x);
+        let step = scratch;
+        factor.solve(x, n);
+        for (step, x) in step.chunks_mut(n).zip(x.chunks(n)) {
+            for (j, xj) in index.iter().zip(x) {
+                let (rows, values) = self.matrix.column(*j);
+                for (&i, v) in rows.iter().zip(values) {
+                    step[self.place[i].1 as usize] -= v * xj;
+                }
+            }
+        }
+        factor.solve(step, n);
+        // A correction that is not finite would spoil what there is, as in `solve_component`.
+        if step.iter().all(|s| s.is_finite()) {
+            x.iter_mut().zip(step.iter()).for_each(|(x, s)| *x += s);
         }
     }
 
@@ -253,7 +302,7 @@ impl Inverse {
         let (sum, rest) = rest.split_at_mut(n);
         let error = &mut rest[..n];
         b.copy_from_slice(x);
-        factor.solve(x);
+        factor.solve(x, n);
         let most = match refine {
             Refine::Once if !self.regularised => 1,
             _ => MOST_REFINEMENTS,
@@ -279,7 +328,7 @@ impl Inverse {
             for i in 0..n {
                 step[i] = Compensated::parts(sum[i], error[i]).value();
             }
-            factor.solve(step);
+            factor.solve(step, n);
             let largest = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let correction = largest(step);
             // Of an inconsistent system only the multipliers go on moving, at the same pace: stop.
@@ -298,20 +347,21 @@ impl Inverse {
 }
 
 impl Factor {
-    fn solve(&self, x: &mut [f64]) {
+    /// Solves for each column of the n × k matrix `x`.
+    fn solve(&self, x: &mut [f64], n: usize) {
         match self {
-            Factor::Scalar(entry) => x[0] /= entry,
-            Factor::Dense(lu) => lu.solve(x),
-            Factor::Cholesky(llt) => llt.solve_in_place(column(x)),
-            Factor::Sparse(lu) => lu.solve_in_place(column(x)),
+            Factor::Scalar(entry) => x.iter_mut().for_each(|x| *x /= entry),
+            Factor::Dense(lu) => x.chunks_mut(n).for_each(|x| lu.solve(x)),
+            Factor::Cholesky(llt) => llt.solve_in_place(columns(x, n)),
+            Factor::Sparse(lu) => lu.solve_in_place(columns(x, n)),
         }
     }
 }
 
-/// A vector as the n × 1 matrix that faer solves in place.
-fn column(x: &mut [f64]) -> faer::MatMut<'_, f64> {
-    let n = x.len();
-    faer::MatMut::from_column_major_slice_mut(x, n, 1)
+/// Vectors of n entries as the matrix that faer solves in place.
+fn columns(x: &mut [f64], n: usize) -> faer::MatMut<'_, f64> {
+    let k = x.len() / n;
+    faer::MatMut::from_column_major_slice_mut(x, n, k)
 }
 
 /// The factor of the principal submatrix of `a` on `index`, `None` where it is singular.
@@ -343,25 +393,13 @@ fn factorise(a: &Csc, index: &[usize], place: &[(u32, u32)]) -> Option<Factor> {
 /// Connected components of the graph of `a + aᵀ`: the unknowns of each, and each unknown's place.
 fn connected_components(a: &Csc) -> (Vec<Vec<usize>>, Vec<(u32, u32)>) {
     let n = a.nrows();
-    let mut parent: Vec<usize> = (0..n).collect();
-    fn root(parent: &mut [usize], mut i: usize) -> usize {
-        while parent[i] != i {
-            parent[i] = parent[parent[i]];
-            i = parent[i];
-        }
-        i
-    }
-    for (i, j, x) in a.triplets() {
-        if x != 0.0 {
-            let (ri, rj) = (root(&mut parent, i), root(&mut parent, j));
-            parent[ri.max(rj)] = ri.min(rj);
-        }
-    }
+    let mut groups = Groups::new(n);
+    a.triplets().filter(|e| e.2 != 0.0).for_each(|(i, j, _)| groups.join(i, j));
     let mut of_root = vec![u32::MAX; n];
     let mut components: Vec<Vec<usize>> = Vec::new();
     let mut place = Vec::with_capacity(n);
     for i in 0..n {
-        let r = root(&mut parent, i);
+        let r = groups.root(i);
         if of_root[r] == u32::MAX {
             of_root[r] = u32::try_from(components.len()).expect("fewer than 2³² components");
             components.push(Vec::new());
@@ -450,6 +488,27 @@ mod tests {
         a.mul_add(1.0, &x, &mut b);
         inverse.solve(&mut b);
         assert!(x.iter().zip(&b).all(|(x, y)| (x - y).abs() < 1e-13));
+    }
+
+    #[test]
+    fn columns_are_solved_together_as_one_by_one() {
+        let a = example();
+        let symmetric = a.triplets().chain(a.transpose().triplets()).collect::<Vec<_>>();
+        let symmetric = Csc::from_triplets(80, 80, symmetric.into_iter()).unwrap();
+        for a in [a, symmetric] {
+            let inverse = Inverse::new(&a, "A").unwrap();
+            assert!(inverse.has_sparse_factor());
+            for (k, n) in inverse.component_sizes().enumerate() {
+                let b: Vec<f64> = (0..4 * n).map(|i| (i as f64).cos()).collect();
+                let (mut together, mut scratch) = (b.clone(), vec![]);
+                inverse.solve_columns(k, &mut together, &mut scratch);
+                for (b, x) in b.chunks(n).zip(together.chunks(n)) {
+                    let mut alone = b.to_vec();
+                    inverse.solve_component(k, &mut alone, &mut vec![0.0; 4 * n], Refine::Once);
+                    assert!(alone.iter().zip(x).all(|(a, x)| (a - x).abs() < 1e-14));
+                }
+            }
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod bsr;
 mod compensated;
 mod csc;
 mod delassus;
+mod groups;
 mod inverse;
 mod row;
 pub mod small;
@@ -16,7 +17,8 @@ pub use bsr::{Block, BlockRow, Bsr};
 pub use compensated::Compensated;
 pub use csc::Csc;
 pub use delassus::Delassus;
-pub use inverse::{Inverse, Refine};
+pub(crate) use groups::Groups;
+pub use inverse::{Inverse, Refine, factorisations};
 
 /// The Euclidean norm, scaled so that neither overflow nor underflow of the squares spoils it.
 pub fn norm(x: &[f64]) -> f64 {

@@ -1,0 +1,410 @@
+//! Worker processes side by side, and the campaign from its plan to its last line.
+
+use std::collections::{BTreeMap, HashSet, VecDeque};
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::channel;
+use std::time::{Duration, Instant};
+
+use nonsmooth_problem::Kind;
+
+use super::child::{End, work};
+use super::files::Input;
+use super::job::{Job, Said, Task};
+use super::journal::Journal;
+use super::solvers::{Label, Solvers};
+use super::system;
+use crate::record::{Ending, Key, Line, Plan, Problem, Residuals, Run};
+use crate::runs::Runs;
+
+/// How a worker is started: a program that calls [`serve`](super::serve).
+#[derive(Debug, Clone)]
+pub struct WorkerCommand {
+    /// The program.
+    pub program: PathBuf,
+    /// Its arguments.
+    pub arguments: Vec<OsString>,
+}
+
+/// What to run, and how.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// How a worker is started.
+    pub worker: WorkerCommand,
+    /// The problems, in the order in which they are run.
+    pub inputs: Vec<Input>,
+    /// The rest.
+    pub plan: Plan,
+    /// Seconds beyond its time limit after which a solve that does not stop is ended; the time limit itself, where that
+    /// is longer. A solver looks at the clock after a step only.
+    pub grace: f64,
+}
+
+impl Setup {
+    /// The grace that is enough for a step on a busy machine, s.
+    pub const GRACE: f64 = 10.0;
+}
+
+/// Something that happened in a campaign.
+#[derive(Debug)]
+pub enum Event<'a> {
+    /// A problem was described.
+    Described {
+        /// Problems described.
+        done: usize,
+        /// Problems in all.
+        all: usize,
+        /// The problem; its [`error`](Problem::error) says if it cannot be used.
+        problem: &'a Problem,
+    },
+    /// A run has ended.
+    Ended {
+        /// Runs in the file that belong to the plan.
+        done: usize,
+        /// Runs of the plan.
+        all: usize,
+        /// The run.
+        run: &'a Run,
+        /// An estimate of the time left.
+        left: Option<Duration>,
+    },
+}
+
+/// What a campaign came to.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Summary {
+    /// Runs of the plan.
+    pub all: usize,
+    /// Of them, those in the file now.
+    pub done: usize,
+    /// Of them, those done by this call.
+    pub new: usize,
+    /// Runs by how they ended.
+    pub endings: BTreeMap<&'static str, usize>,
+    /// Solves whose process had to wait for a processor for more than a tenth of the time.
+    pub disturbed: usize,
+    /// Problems that cannot be used.
+    pub unreadable: usize,
+    /// Whether it was cancelled.
+    pub cancelled: bool,
+}
+
+/// Runs what of the plan is not in `there` yet, and appends it to `journal`.
+///
+/// Problems are dealt to shards one by one, so that all solvers of a problem run on the same machine. In each problem
+/// all solvers run one after another. Runs in progress when `cancel` is set are dropped; they will be done on resumption.
+///
+/// Errors: solver labels that nobody takes; a problem whose file has changed since `there` was written, by name; a
+/// worker that cannot be started; a journal that cannot be written.
+pub fn run(
+    setup: &Setup,
+    solvers: &impl Solvers,
+    there: &Runs,
+    journal: &mut Journal,
+    cancel: &AtomicBool,
+    watch: &mut dyn FnMut(Event<'_>),
+) -> Result<Summary, String> {
+    let plan = &setup.plan;
+    let (shard, shards) = plan.shard.unwrap_or((1, 1));
+    let inputs: Vec<&Input> = setup.inputs.iter().skip(shard - 1).step_by(shards).collect();
+    let kinds = plan
+        .solvers
+        .iter()
+        .map(|label| Label::parse(label)?.kinds(solvers))
+        .collect::<Result<Vec<_>, _>>()?;
+    let lanes = lanes(plan.jobs);
+
+    // First what the problems are: it decides which solvers take them.
+    let job = |input: &Input, task| {
+        let (file, memory_limit) = (input.path.clone(), plan.memory_limit);
+        Job { file, task, memory_limit, processors: vec![] }
+    };
+    let jobs = inputs.iter().map(|&input| (input, job(input, Task::Describe))).collect();
+    let mut described = BTreeMap::new();
+    let cancelled = each(setup, &lanes, jobs, cancel, &mut |input: &Input, end, _| {
+        let problem = problem(input, end);
+        let problem = match there.problems.get(&input.name) {
+            Some(old) if old.error.is_none() && old.digest != problem.digest => {
+                let name = &input.name;
+                return Err(match problem.error {
+                    Some(error) => format!("{name}: known from the runs, but now: {error}"),
+                    None => format!("{name}: its file has changed since its runs were written"),
+                });
+            }
+            known => {
+                if known != Some(&problem) {
+                    journal.append(&Line::Problem(problem.clone()))?;
+                }
+                problem
+            }
+        };
+        described.insert(input.name.clone(), problem);
+        let done = described.len();
+        watch(Event::Described { done, all: inputs.len(), problem: &described[&input.name] });
+        Ok(())
+    })?;
+    let unreadable = described.values().filter(|p| p.error.is_some()).count();
+    let mut summary = Summary { unreadable, cancelled, ..Summary::default() };
+    if cancelled {
+        return Ok(summary);
+    }
+
+    let before: HashSet<Key> = there.runs.iter().map(Run::key).collect();
+    let campaign = journal.campaign().to_owned();
+    let mut jobs = VecDeque::new();
+    let mut refused = vec![];
+    for &input in &inputs {
+        let problem = &described[&input.name];
+        if problem.error.is_some() {
+            continue;
+        }
+        for &tolerance in &plan.tolerances {
+            for (solver, kinds) in plan.solvers.iter().zip(&kinds) {
+                summary.all += 1;
+                let run = blank(&campaign, problem, solver, tolerance);
+                if before.contains(&run.key()) {
+                    summary.done += 1;
+                } else if kinds.iter().map(|k: &Kind| k.name()).all(|k| k != problem.kind) {
+                    let message = format!("takes no {} problems", problem.kind);
+                    refused.push(Run { ending: Ending::Refused, message: Some(message), ..run });
+                } else {
+                    let task = Task::Solve {
+                        solver: solver.clone(),
+                        tolerance,
+                        time_limit: plan.time_limit,
+                        repeats: plan.repeats,
+                        repeat_below: plan.repeat_below,
+                        trace: plan.trace,
+                    };
+                    jobs.push_back((run, job(input, task)));
+                }
+            }
+        }
+    }
+    let mut clock = Clock::new(jobs.iter().map(|(run, _)| run), lanes.len());
+    let mut ended = |run: Run, took: Option<Duration>, summary: &mut Summary| {
+        journal.append(&Line::Run(Box::new(run.clone())))?;
+        summary.done += 1;
+        summary.new += 1;
+        *summary.endings.entry(run.ending.name()).or_insert(0) += 1;
+        let waited = |(wall, cpu): (f64, f64)| wall > 0.01 && wall > 1.1 * cpu;
+        summary.disturbed += usize::from(run.seconds.zip(run.cpu_seconds).is_some_and(waited));
+        took.into_iter().for_each(|took| clock.note(&run, took));
+        let left = clock.left();
+        watch(Event::Ended { done: summary.done, all: summary.all, run: &run, left });
+        Ok::<_, String>(())
+    };
+    for run in refused {
+        ended(run, None, &mut summary)?;
+    }
+    summary.cancelled = each(setup, &lanes, jobs, cancel, &mut |blank, end, took| {
+        ended(finished(blank, end, plan), Some(took), &mut summary)
+    })?;
+    Ok(summary)
+}
+
+/// The processors of each worker: the physical cores dealt evenly, or no restriction for one worker alone or where
+/// there are more workers than cores.
+fn lanes(jobs: usize) -> Vec<Vec<usize>> {
+    let cores = system::cores();
+    let jobs = jobs.max(1);
+    if jobs == 1 || jobs > cores.len() {
+        return vec![vec![]; jobs];
+    }
+    let share = cores.len() / jobs;
+    (0..jobs).map(|k| cores[k * share..(k + 1) * share].concat()).collect()
+}
+
+/// Has the workers do all jobs, one lane each; returns whether that was cancelled. `done` is called in this thread.
+fn each<T: Send>(
+    setup: &Setup,
+    lanes: &[Vec<usize>],
+    jobs: VecDeque<(T, Job)>,
+    cancel: &AtomicBool,
+    done: &mut dyn FnMut(T, End, Duration) -> Result<(), String>,
+) -> Result<bool, String> {
+    let queue = Mutex::new(jobs);
+    // A campaign that fails stops its workers as one that is cancelled does.
+    let stop = AtomicBool::new(false);
+    let (send, receive) = channel();
+    let outcome = std::thread::scope(|scope| {
+        for lane in lanes {
+            let (queue, stop, send) = (&queue, &stop, send.clone());
+            scope.spawn(move || {
+                let next = || queue.lock().ok()?.pop_front();
+                while let Some((what, job)) = next() {
+                    let job = Job { processors: lane.clone(), ..job };
+                    let start = Instant::now();
+                    let end = work(&setup.worker, &job, setup.grace, stop);
+                    let over = matches!(end, Ok(End::Cancelled) | Err(_));
+                    if send.send((what, end, start.elapsed())).is_err() || over {
+                        break;
+                    }
+                }
+            });
+        }
+        drop(send);
+        let mut outcome = Ok(());
+        loop {
+            stop.fetch_or(cancel.load(Ordering::Relaxed) || outcome.is_err(), Ordering::Relaxed);
+            match receive.recv_timeout(Duration::from_millis(100)) {
+                Ok((_, Ok(End::Cancelled), _)) => {}
+                Ok((what, Ok(end), took)) if outcome.is_ok() => outcome = done(what, end, took),
+                Ok((_, Err(e), _)) if outcome.is_ok() => {
+                    outcome = Err(format!("{}: {e}", setup.worker.program.display()));
+                }
+                Ok(_) => {}
+                Err(std::sync::mpsc::RecvTimeoutError::Timeout) => {}
+                Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => break outcome,
+            }
+        }
+    });
+    outcome.map(|()| cancel.load(Ordering::Relaxed))
+}
+
+/// What a worker's word on a file comes to.
+fn problem(input: &Input, end: End) -> Problem {
+    let named =
+        Problem { name: input.name.clone(), family: input.family.clone(), ..<_>::default() };
+    let unusable = |error: String| Problem { error: Some(error), ..named.clone() };
+    let file = input.path.display();
+    match end {
+        End::Said(Said::Described(problem)) => {
+            Problem { name: input.name.clone(), family: input.family.clone(), ..problem }
+        }
+        End::Said(Said::Unreadable(message)) => unusable(message),
+        End::Said(other) => unusable(format!("{file}: expected a description, found {other:?}")),
+        End::Hung { .. } => unusable(format!("{file}: reading it does not end")),
+        End::OutOfMemory(why) => {
+            unusable(format!("{file}: reading it takes too much memory: {why}"))
+        }
+        End::Crashed(why) => unusable(format!("{file}: reading it ends the program: {why}")),
+        End::Cancelled => unusable(format!("{file}: cancelled")),
+    }
+}
+
+/// A run of which nothing is known but what it is to be.
+fn blank(campaign: &str, problem: &Problem, solver: &str, tolerance: f64) -> Run {
+    Run {
+        campaign: campaign.into(),
+        problem: problem.name.clone(),
+        digest: problem.digest.clone(),
+        family: problem.family.clone(),
+        kind: problem.kind.clone(),
+        contacts: problem.contacts,
+        solver: solver.into(),
+        tolerance,
+        ..Run::default()
+    }
+}
+
+/// The run with what came of it.
+fn finished(run: Run, end: End, plan: &Plan) -> Run {
+    let ended = |ending, message: String| Run { ending, message: Some(message), ..run.clone() };
+    match end {
+        End::Said(Said::Done(result)) => Run {
+            campaign: run.campaign,
+            problem: run.problem,
+            digest: run.digest,
+            family: run.family,
+            kind: run.kind,
+            contacts: run.contacts,
+            solver: run.solver,
+            tolerance: run.tolerance,
+            ..*result
+        },
+        End::Said(Said::Refused(message) | Said::Unreadable(message)) => {
+            ended(Ending::Refused, message)
+        }
+        End::Said(other) => ended(Ending::Crashed, format!("expected a result, found {other:?}")),
+        End::Hung { iteration, best, seconds, loading } => {
+            let what = if loading { "reading the problem" } else { "the solve" };
+            let message = format!("{what} did not stop at the limit of {} s", plan.time_limit);
+            Run {
+                iterations: iteration,
+                seconds: (!loading).then_some(seconds),
+                residuals: Residuals { reached: best, ..Residuals::default() },
+                ..ended(Ending::Hung, message)
+            }
+        }
+        End::OutOfMemory(message) => ended(Ending::OutOfMemory, message),
+        End::Crashed(message) => ended(Ending::Crashed, message),
+        End::Cancelled => ended(Ending::Crashed, "cancelled".into()),
+    }
+}
+
+/// Estimates the time left: what remains of each solver and tolerance takes as long as what was done of it.
+struct Clock {
+    lanes: usize,
+    groups: BTreeMap<(String, u64), Group>,
+}
+
+#[derive(Default)]
+struct Group {
+    left: usize,
+    done: usize,
+    took: Duration,
+}
+
+impl Clock {
+    fn new<'a>(runs: impl Iterator<Item = &'a Run>, lanes: usize) -> Self {
+        let mut groups: BTreeMap<_, Group> = BTreeMap::new();
+        runs.for_each(|run| groups.entry(Self::group(run)).or_default().left += 1);
+        Self { lanes, groups }
+    }
+
+    fn group(run: &Run) -> (String, u64) {
+        (run.solver.clone(), run.tolerance.to_bits())
+    }
+
+    fn note(&mut self, run: &Run, took: Duration) {
+        let group = self.groups.entry(Self::group(run)).or_default();
+        group.left = group.left.saturating_sub(1);
+        group.done += 1;
+        group.took += took;
+    }
+
+    fn left(&self) -> Option<Duration> {
+        let mean = |group: &Group| group.took.as_secs_f64() / group.done as f64;
+        let known: Vec<f64> = self.groups.values().filter(|g| g.done > 0).map(mean).collect();
+        let other = known.iter().sum::<f64>() / known.len() as f64;
+        let seconds =
+            self.groups.values().map(|g| g.left as f64 * if g.done > 0 { mean(g) } else { other });
+        let total = seconds.sum::<f64>() / self.lanes as f64;
+        (!known.is_empty()).then(|| Duration::try_from_secs_f64(total).ok()).flatten()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_is_that_of_the_runs_that_are_left() {
+        let problem = Problem::default();
+        let fast = blank("c", &problem, "fast", 1e-4);
+        let slow = blank("c", &problem, "slow", 1e-4);
+        let runs = [&fast, &fast, &fast, &slow, &slow];
+        let mut clock = Clock::new(runs.into_iter(), 2);
+        assert_eq!(clock.left(), None);
+        clock.note(&fast, Duration::from_secs(1));
+        // The other solver is taken to be as fast.
+        assert_eq!(clock.left(), Some(Duration::from_secs(2)));
+        clock.note(&slow, Duration::from_secs(10));
+        assert_eq!(clock.left(), Some(Duration::from_secs(6)));
+    }
+
+    #[test]
+    fn lanes_share_the_cores_and_do_not_overlap() {
+        let cores = system::cores().len();
+        assert_eq!(lanes(1), [[0; 0]]);
+        assert_eq!(lanes(cores + 1), vec![Vec::<usize>::new(); cores + 1]);
+        let mut all = lanes(cores).concat();
+        let count = all.len();
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), count);
+    }
+}

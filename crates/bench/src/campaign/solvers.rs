@@ -1,0 +1,136 @@
+//! Solvers by label, and who makes them.
+
+use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind};
+use nonsmooth_solve::registry::{self, Registered};
+use nonsmooth_solve::settings::{self, SettingsMap};
+use nonsmooth_solve::{Session, SolveError};
+
+/// Who makes solvers: the registry, or a test's own.
+pub trait Solvers: Sync {
+    /// A session of the solver called `name`.
+    ///
+    /// Errors: as [`registry::session`].
+    fn session<P: Registered>(
+        &self,
+        name: &str,
+        settings: &SettingsMap,
+    ) -> Result<Box<dyn Session<P>>, SolveError>;
+}
+
+/// The registry of this library.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Registry;
+
+impl Solvers for Registry {
+    fn session<P: Registered>(
+        &self,
+        name: &str,
+        settings: &SettingsMap,
+    ) -> Result<Box<dyn Session<P>>, SolveError> {
+        registry::session(name, settings)
+    }
+}
+
+impl Registry {
+    /// The names of all solvers of all kinds of problem, each once; with `variants` also the settings that the registry
+    /// holds worth comparing.
+    pub fn labels(variants: bool) -> Vec<String> {
+        fn of<P: Registered>(variants: bool, all: &mut Vec<String>) {
+            for name in registry::solver_names::<P>() {
+                let about = registry::about::<P>(&name).filter(|_| variants);
+                let settings = about.map_or(&[][..], |a| a.variants);
+                let labels = settings.iter().map(|s| format!("{name}:{s}"));
+                for label in std::iter::once(name.clone()).chain(labels) {
+                    if !all.contains(&label) {
+                        all.push(label);
+                    }
+                }
+            }
+        }
+        let mut all = vec![];
+        of::<FrictionLocal<3>>(variants, &mut all);
+        of::<FrictionLocal<2>>(variants, &mut all);
+        of::<FrictionGlobal<3>>(variants, &mut all);
+        of::<FrictionGlobal<2>>(variants, &mut all);
+        all
+    }
+}
+
+/// A solver as it is asked for: `name` or `name:key=value,key=value`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Label {
+    /// The name in the registry.
+    pub name: String,
+    /// The settings.
+    pub settings: SettingsMap,
+}
+
+impl Label {
+    /// Reads a label.
+    ///
+    /// Errors: settings that are not `key=value`.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let (name, rest) = text.split_once(':').unwrap_or((text, ""));
+        let each: Vec<&str> = rest.split(',').map(str::trim).filter(|s| !s.is_empty()).collect();
+        let settings = settings::from_texts(&each).map_err(|e| format!("solver `{text}`: {e}"))?;
+        Ok(Self { name: name.trim().into(), settings })
+    }
+
+    /// The kinds of problem that it takes.
+    ///
+    /// Errors: no kind takes it: an unknown name, an unknown key or a bad value.
+    pub fn kinds(&self, solvers: &impl Solvers) -> Result<Vec<Kind>, String> {
+        let tries = [
+            (Kind::FrictionLocal3d, self.refusal::<FrictionLocal<3>>(solvers)),
+            (Kind::FrictionLocal2d, self.refusal::<FrictionLocal<2>>(solvers)),
+            (Kind::FrictionGlobal3d, self.refusal::<FrictionGlobal<3>>(solvers)),
+            (Kind::FrictionGlobal2d, self.refusal::<FrictionGlobal<2>>(solvers)),
+        ];
+        let takes =
+            |(kind, refusal): &(Kind, Option<SolveError>)| refusal.is_none().then_some(*kind);
+        let kinds: Vec<_> = tries.iter().filter_map(takes).collect();
+        if !kinds.is_empty() {
+            return Ok(kinds);
+        }
+        // A kind that knows the name says more than one that does not; global problems know the most names.
+        let refusals: Vec<_> = tries.into_iter().filter_map(|(_, refusal)| refusal).collect();
+        let unknown = |e: &&SolveError| !matches!(e, SolveError::UnknownSolver { .. });
+        let telling = refusals.iter().find(unknown).or(refusals.get(2));
+        Err(telling.map_or_else(String::new, ToString::to_string))
+    }
+
+    fn refusal<P: Registered>(&self, solvers: &impl Solvers) -> Option<SolveError> {
+        solvers.session::<P>(&self.name, &self.settings).err()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kinds(label: &str) -> Result<Vec<Kind>, String> {
+        Label::parse(label)?.kinds(&Registry)
+    }
+
+    #[test]
+    fn labels_carry_settings_and_know_their_problems() {
+        assert_eq!(kinds("nsgs:omega=0.9, local=quartic").unwrap().len(), 4);
+        let global = [Kind::FrictionGlobal3d, Kind::FrictionGlobal2d];
+        assert_eq!(kinds("condense/nsgs").unwrap(), global);
+        assert!(kinds("magic").unwrap_err().contains("unknown solver `magic`"));
+        assert!(kinds("nsgs:omga=1").unwrap_err().contains("unknown key `omga`"));
+        assert!(kinds("condense/nsgs:omga=1").unwrap_err().contains("unknown key `omga`"));
+        assert!(kinds("nsgs:omega").unwrap_err().contains("expected key=value"));
+    }
+
+    #[test]
+    fn the_registry_lists_every_name_once() {
+        let plain = Registry::labels(false);
+        assert!(plain.contains(&"nsgs".into()) && plain.contains(&"condense/extragradient".into()));
+        let all = Registry::labels(true);
+        assert!(all.contains(&"nsgs:local=quartic".into()));
+        let unique: std::collections::HashSet<_> = all.iter().collect();
+        assert_eq!(unique.len(), all.len());
+        assert!(all.iter().all(|l| kinds(l).is_ok()), "{all:?}");
+    }
+}

@@ -1,0 +1,101 @@
+//! `nonsmooth bench figures`.
+
+use std::path::PathBuf;
+
+use nonsmooth_bench::figures::figures;
+use nonsmooth_bench::profile::Selection;
+use nonsmooth_bench::record::SIZES;
+use nonsmooth_bench::tables::{
+    self, By, summary, summary_page, summary_table, unsolved, unsolved_table,
+};
+
+use crate::{Exit, files, output};
+
+/// Draw the figures of a campaign for papers, and write its tables.
+///
+/// Writes into a folder: performance profiles by time, iterations and factorisations, data profiles, success against tolerance and
+/// residual against time, each as SVG and as CSV of its data; tables of what is solved, overall, by family and by
+/// size, and of what nobody solves, each as CSV and as Markdown; and all runs as runs.csv.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Runs files; they are joined
+    #[arg(required = true, value_name = "RUNS")]
+    runs: Vec<PathBuf>,
+    /// The folder to write into
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// The tolerance of the profiles and tables; left out: the tightest that every solver was run at
+    #[arg(long, value_name = "TOL", allow_hyphen_values = true)]
+    tol: Option<f64>,
+    /// Only these families
+    #[arg(long, value_name = "FAMILY", value_delimiter = ',')]
+    family: Vec<String>,
+    /// Only these classes of size: 1-10, 11-100, 101-1000, `over 1000`
+    #[arg(long, value_name = "SIZE", value_delimiter = ',')]
+    size: Vec<String>,
+    /// Only these kinds of problem
+    #[arg(long, value_name = "KIND", value_delimiter = ',')]
+    kind: Vec<String>,
+    /// Only this solver; give it again for each
+    #[arg(long, value_name = "SOLVER")]
+    solver: Vec<String>,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  nonsmooth bench figures runs.jsonl --out figures --tol 1e-8
+  nonsmooth bench figures runs.jsonl siconos.jsonl --out figures --family arch,wall
+
+Exit codes: 0 written; 2 a mistake in a file or an option.";
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<Exit, String> {
+    let size = |name: &String| {
+        let found = SIZES.into_iter().find(|s| s.name == name);
+        found.ok_or_else(|| {
+            let all = SIZES.map(|s| s.name).join(", ");
+            format!("--size: expected one of {all}, found {name}")
+        })
+    };
+    let sizes = args.size.iter().map(size).collect::<Result<Vec<_>, _>>()?;
+    let tol = args.tol.map(files::tolerance).transpose()?;
+    let (runs, exit) = super::read(&args.runs)?;
+    let Some(tolerance) = tol.or_else(|| runs.common_tolerance()) else {
+        return Err("expected runs, found none in any file".into());
+    };
+    let selection = Selection {
+        tolerance,
+        families: args.family.clone(),
+        sizes,
+        kinds: args.kind.clone(),
+        solvers: args.solver.clone(),
+    };
+    if !runs.runs.iter().any(|r| r.tolerance == tolerance && selection.takes(r)) {
+        return Err(format!(
+            "expected runs that are selected at tolerance {tolerance:e}, found none"
+        ));
+    }
+    std::fs::create_dir_all(&args.out)
+        .map_err(|e| format!("--out {}: expected a folder, found: {e}", args.out.display()))?;
+    let write = |name: String, text: &str| {
+        let path = args.out.join(&name);
+        files::write_text("--out", &path, text)?;
+        output::print(&format!("{}\n", path.display()));
+        Ok::<_, String>(())
+    };
+    for figure in figures(&runs, &selection)? {
+        write(format!("{}.svg", figure.name), &figure.svg)?;
+        write(format!("{}.csv", figure.name), &figure.csv)?;
+    }
+    for (name, by) in [("all", By::All), ("family", By::Family), ("size", By::Size)] {
+        let rows = summary(&runs, &selection, by);
+        write(format!("summary-{name}.csv"), &summary_table(&rows).csv())?;
+        write(format!("summary-{name}.md"), &summary_page(&rows).markdown())?;
+    }
+    let nobody = unsolved_table(&unsolved(&runs, &selection));
+    write("unsolved.csv".into(), &nobody.csv())?;
+    write("unsolved.md".into(), &nobody.markdown())?;
+    write("runs.csv".into(), &tables::runs_table(&runs).csv())?;
+    Ok(exit)
+}

@@ -1,0 +1,57 @@
+//! `nonsmooth bench merge`.
+
+use std::path::PathBuf;
+
+use nonsmooth_bench::record::Line;
+
+use crate::report::{count, row};
+use crate::{Exit, files, output};
+
+/// Join the parts of a campaign, or several campaigns, into one file of runs.
+///
+/// Of a run that is in several files the first counts. Files that cannot be used, among them those of another version of
+/// the format, are named and left out.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Files of runs
+    #[arg(required = true, value_name = "RUNS.jsonl")]
+    files: Vec<PathBuf>,
+    /// The file to write
+    #[arg(long, value_name = "ALL.jsonl")]
+    out: PathBuf,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  nonsmooth bench merge part*.jsonl --out runs.jsonl
+
+Exit codes: 0 joined; 1 joined, but parts are missing or plans differ; 2 some file at fault, the others joined.";
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<Exit, String> {
+    for file in &args.files {
+        if files::same(file, &args.out) {
+            let out = args.out.display();
+            return Err(format!("--out {out}: expected a file of its own, found one of the parts"));
+        }
+    }
+    files::writable("--out", &args.out)?;
+    let (runs, mut exit) = super::read(&args.files)?;
+    let mut text = format!(
+        "{}: {}, {} of {}\n",
+        args.out.display(),
+        count(runs.campaigns.len(), "campaign"),
+        count(runs.runs.len(), "run"),
+        count(runs.problems.len(), "problem")
+    );
+    for remark in runs.remarks() {
+        row(&mut text, "but", remark);
+        exit = exit.max(Exit::NotSolved);
+    }
+    let lines: Result<String, serde_json::Error> =
+        runs.lines().map(|line: Line| Ok(serde_json::to_string(&line)? + "\n")).collect();
+    files::write_text("--out", &args.out, &lines.map_err(|e| e.to_string())?)?;
+    output::print(&text);
+    Ok(exit)
+}

@@ -1,0 +1,58 @@
+//! Disjoint sets, for connected components.
+
+/// The numbers `0..n` in groups: each alone at first, then joined. Near constant cost for each call.
+pub(crate) struct Groups {
+    parent: Vec<usize>,
+}
+
+impl Groups {
+    /// `n` groups of one.
+    pub(crate) fn new(n: usize) -> Self {
+        Self { parent: (0..n).collect() }
+    }
+
+    /// The least member of the group of `i`.
+    pub(crate) fn root(&mut self, mut i: usize) -> usize {
+        while self.parent[i] != i {
+            self.parent[i] = self.parent[self.parent[i]];
+            i = self.parent[i];
+        }
+        i
+    }
+
+    /// Makes one group of those of `i` and `j`.
+    pub(crate) fn join(&mut self, i: usize, j: usize) {
+        let (i, j) = (self.root(i), self.root(j));
+        self.parent[i.max(j)] = i.min(j);
+    }
+
+    /// Makes one group of those of all these.
+    pub(crate) fn join_all(&mut self, all: &[usize]) {
+        all.windows(2).for_each(|two| self.join(two[0], two[1]));
+    }
+
+    /// The sizes of the groups, in the order of their least members.
+    pub(crate) fn sizes(&mut self) -> Vec<usize> {
+        let mut sizes = vec![0; self.parent.len()];
+        (0..self.parent.len()).for_each(|i| sizes[self.root(i)] += 1);
+        sizes.retain(|&size| size > 0);
+        sizes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_and_their_sizes() {
+        let mut groups = Groups::new(7);
+        groups.join(3, 0);
+        groups.join(3, 6);
+        groups.join(4, 5);
+        assert_eq!(groups.root(6), 0);
+        assert_eq!(groups.sizes(), [3, 1, 1, 2]);
+        groups.join_all(&[0, 1, 2, 4]);
+        assert_eq!(groups.sizes(), [7]);
+    }
+}
