@@ -76,8 +76,8 @@ pub fn targets(
     files: &[PathBuf],
     extension: Option<&str>,
 ) -> Result<Vec<PathBuf>, String> {
-    let folder = to.is_dir() || to.to_string_lossy().ends_with(std::path::is_separator);
-    if !folder {
+    let is_folder = to.is_dir() || to.to_string_lossy().ends_with(std::path::is_separator);
+    if !is_folder {
         if files.len() > 1 {
             return Err(format!(
                 "{option} {}: expected a directory (existing or ending in `/`) for {} files, found a file name",
@@ -88,7 +88,7 @@ pub fn targets(
         writable(option, to)?;
         return Ok(vec![to.into()]);
     }
-    fs::create_dir_all(to).map_err(|e| refusal(option, to, "a directory", e))?;
+    folder(option, to)?;
     let mut seen = HashSet::new();
     files
         .iter()
@@ -110,6 +110,11 @@ pub fn targets(
             Ok(path)
         })
         .collect()
+}
+
+/// Makes the directory `path` unless it exists.
+pub fn folder(option: &str, path: &Path) -> Result<(), String> {
+    fs::create_dir_all(path).map_err(|e| refusal(option, path, "a directory", e))
 }
 
 /// A file can be put at `path`: found out before hours of work, not after.

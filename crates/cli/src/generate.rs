@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use nonsmooth_dynamics::draw::{self, Drawing};
-use nonsmooth_dynamics::{Scene, SceneEntry, scenes::SCENES};
+use nonsmooth_dynamics::{Scene, SceneEntry, SceneError, scenes::SCENES};
 use nonsmooth_io::fclib::{self, FclibFile, Info};
 use nonsmooth_problem::Friction;
 use nonsmooth_solve::registry;
@@ -12,22 +12,32 @@ use nonsmooth_solve::{Limits, Status};
 use serde_json::Value;
 
 use crate::solve::{Plan, Solved, limits, seconds, solve_any};
-use crate::{Exit, files, output, report};
+use crate::{Exit, files, output, report, suite};
 
 /// Generate the problem of a scene.
 ///
 /// A scene is a set of rigid bodies or elastic solids in contact; its problem is one Moreau-Jean time step from
-/// the initial velocities. Without a scene, or with --list, the scenes and their settings are listed.
+/// the initial velocities. Without a scene, or with --list, the scenes and their settings are listed. A suite is a
+/// TOML file that lists problems: each [[problem]] has a family (a scene), and may have a name, a form and
+/// settings; where a setting or the form is a list, there is a problem for each combination.
 #[derive(Debug, clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, group(clap::ArgGroup::new("what").args(["scene", "suite"])))]
 pub struct Args {
     /// The scene, one of `nonsmooth gen --list`
     scene: Option<String>,
     /// A setting of the scene; may be given several times
     #[arg(long = "set", value_name = "KEY=VALUE", requires = "scene")]
     settings: Vec<String>,
+    /// Generate every problem that a file lists, as DIR/FAMILY/NAME.hdf5 below the directory of --out
+    #[arg(
+        long,
+        value_name = "FILE.toml",
+        requires = "out",
+        conflicts_with_all = ["settings", "form", "draw", "solve", "list"]
+    )]
+    suite: Option<PathBuf>,
     /// Write the problem (FCLIB, HDF5)
-    #[arg(long, value_name = "FILE.hdf5", requires = "scene")]
+    #[arg(long, value_name = "FILE.hdf5", requires = "what")]
     out: Option<PathBuf>,
     /// State it with the velocities of the bodies (M, H, f, w), or at the contacts alone (W, q)
     #[arg(long, value_enum, default_value_t = Form::Global)]
@@ -60,12 +70,13 @@ Examples:
   nonsmooth gen --list
   nonsmooth gen wall --set rows=8 --set mu=0.4 --out wall.hdf5
   nonsmooth gen arch --out arch.hdf5 --form local --solve --draw arch.svg
+  nonsmooth gen --suite docs/benchmarks/suite.toml --out problems/
 
 Exit codes: 0 done; 1 --solve did not reach --tol (the best point is stored); 2 a mistake in the options.";
 
 /// How the problem is stated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Form {
+pub enum Form {
     /// M v = H r + f
     Global,
     /// u = W r + q
@@ -74,6 +85,9 @@ enum Form {
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
+    if let (Some(file), Some(out)) = (&args.suite, &args.out) {
+        return suite::run(file, out);
+    }
     let Some(name) = args.scene.as_deref() else {
         output::print(&list(SCENES.iter()));
         return Ok(Exit::Solved);
@@ -107,13 +121,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         false => None,
     };
     let mistake = |e| format!("scene {name}: {e}");
-    let scene = entry.make(&settings).map_err(mistake)?;
-    let problem = match args.form {
-        Form::Global => scene.problem().map(Friction::Global3),
-        Form::Local => scene.condensed().map(Friction::Local3),
-    };
-    let mut content = FclibFile::new(problem.map_err(mistake)?);
-    content.info = info(entry, &settings, &scene);
+    let (scene, mut content) = make(entry, &settings, args.form).map_err(mistake)?;
     let solved = limits.map(|limits| solve(label, &content.problem, limits)).transpose()?;
     content.solution = solved.as_ref().map(|s| s.point.clone());
     if let Some(path) = &args.out {
@@ -126,6 +134,22 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     output::print(&text(label, &scene, &content.problem, solved.as_ref(), args.tol));
     let is_solved = |s: &Solved| s.outcome.status == Status::Solved;
     Ok(Exit::solved(solved.as_ref().is_none_or(is_solved)))
+}
+
+/// The scene and the file of its problem.
+pub fn make(
+    entry: &SceneEntry,
+    settings: &SettingsMap,
+    form: Form,
+) -> Result<(Scene, FclibFile), SceneError> {
+    let scene = entry.make(settings)?;
+    let problem = match form {
+        Form::Global => Friction::Global3(scene.problem()?),
+        Form::Local => Friction::Local3(scene.condensed()?),
+    };
+    let mut content = FclibFile::new(problem);
+    content.info = info(entry, settings, &scene);
+    Ok((scene, content))
 }
 
 fn solve(label: &Path, problem: &Friction, limits: Limits) -> Result<Solved, String> {
@@ -159,14 +183,11 @@ fn join(settings: &SettingsMap) -> String {
 }
 
 /// A value as it would be typed.
-fn plain(value: &Value) -> String {
+pub fn plain(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
-fn drawing(
-    scene: &Scene,
-    solved: Option<&Solved>,
-) -> Result<String, nonsmooth_dynamics::SceneError> {
+fn drawing(scene: &Scene, solved: Option<&Solved>) -> Result<String, SceneError> {
     let Some(Solved { verdict, point, .. }) = solved else {
         return draw::svg(scene, &Drawing::default());
     };
@@ -183,14 +204,9 @@ fn drawing(
     draw::svg(scene, &drawing)
 }
 
-fn text(
-    label: &Path,
-    scene: &Scene,
-    problem: &Friction,
-    solved: Option<&Solved>,
-    tolerance: f64,
-) -> String {
-    let mut text = format!(
+/// What was made.
+pub fn summary(label: &Path, scene: &Scene, problem: &Friction) -> String {
+    format!(
         "{}: {}, {} and {} ({})\n",
         label.display(),
         scene.name,
@@ -200,7 +216,17 @@ fn text(
         },
         report::count(problem.contacts(), "contact"),
         problem.kind().name(),
-    );
+    )
+}
+
+fn text(
+    label: &Path,
+    scene: &Scene,
+    problem: &Friction,
+    solved: Option<&Solved>,
+    tolerance: f64,
+) -> String {
+    let mut text = summary(label, scene, problem);
     if let Some(Solved { outcome, verdict, .. }) = solved {
         let iterations = report::count(outcome.iterations, "iteration");
         let time = seconds(outcome.seconds);
@@ -223,7 +249,7 @@ fn list<'a>(entries: impl Iterator<Item = &'a SceneEntry>) -> String {
                 [] => String::new(),
                 names => format!(" One of {}.", names.join(", ")),
             };
-            text += &format!("  {setting:<18} {help}{choices}\n");
+            text += &format!("  {setting:<20} {help}{choices}\n");
         }
     }
     text

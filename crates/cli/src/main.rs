@@ -17,6 +17,7 @@ mod plot;
 mod progress;
 mod report;
 mod solve;
+mod suite;
 
 use std::process::ExitCode;
 

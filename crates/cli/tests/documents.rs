@@ -2,13 +2,15 @@
 
 mod common;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use nonsmooth_dynamics::SCENES;
 use nonsmooth_io::fclib;
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::{Problem, with_friction};
+use nonsmooth_problem::{Friction, Problem, with_friction};
 
-use crate::common::Folder;
+use crate::common::{Folder, Run};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -22,6 +24,33 @@ fn the_page_of_solvers_is_what_the_registry_prints() {
         page == printed.stdout,
         "docs/solvers.md is stale: nonsmooth list --markdown > docs/solvers.md"
     );
+}
+
+/// The project's own suite: of every family, small and large, in both forms.
+#[test]
+fn the_suite_can_be_generated() {
+    let suite = root().join("docs/benchmarks/suite.toml");
+    let folder = Folder::new();
+    let out = folder.path("all");
+    let mut command = folder.command();
+    command.args(["gen", "--suite"]).arg(suite).arg("--out").arg(&out);
+    let run = Run::from(command.output().unwrap()).exits(0);
+    assert!((90..=120).contains(&run.stdout.lines().count()), "{}", run.stdout);
+    let (mut least, mut most, mut kinds) = (usize::MAX, 0, BTreeSet::new());
+    for scene in SCENES {
+        for entry in std::fs::read_dir(out.join(scene.name)).expect(scene.name) {
+            let path = entry.unwrap().path();
+            assert!(path.metadata().unwrap().len() < 20_000_000, "{}", path.display());
+            let file = fclib::read(&path).unwrap();
+            if let Friction::Global3(problem) = &file.problem {
+                assert_eq!(file.info.dofs, Some(problem.dofs()), "{}", path.display());
+            }
+            least = least.min(file.problem.contacts());
+            most = most.max(file.problem.contacts());
+            kinds.insert(file.problem.kind().name());
+        }
+    }
+    assert!(least == 3 && (4000..5000).contains(&most) && kinds.len() == 2, "{least} {most}");
 }
 
 /// Runs the commands of examples/README.md. On another machine the data may differ in the last bits, so the stored

@@ -96,6 +96,9 @@ fn bad_options_of_the_other_commands() {
         ("gen wall --solve --out a.hdf5 --tol 0", &["--tol", "positive"]),
         ("gen wall --solve --out a.hdf5 --time-limit -1", &["--time-limit", "at least 0"]),
         ("gen wall --out a.hdf5 --time-limit 1", &["--solve"]),
+        ("gen --suite none.toml --out all", &["--suite none.toml", "expected a TOML file"]),
+        ("gen --suite none.toml", &["--out"]),
+        ("gen wall --suite none.toml --out all", &["--suite"]),
     ];
     for (arguments, parts) in cases {
         folder.run(arguments).refused(parts);
@@ -107,7 +110,37 @@ fn bad_options_of_the_other_commands() {
 }
 
 #[test]
-fn one_bad_file_does_not_keep_the_others_from_running() {
+fn suites_name_the_entry_at_fault() {
+    let folder = Folder::new();
+    let wall = "[[problem]]\nfamily = \"wall\"\n";
+    let cases: &[(&str, &[&str])] = &[
+        ("", &["line 1", "problem"]),
+        ("[[problem]]\nfamily = \"wall\n", &["line 2"]),
+        ("[[problem]]\nfamily = \"tower\"\n", &["problem 1", "tower", "wall"]),
+        ("[[problem]]\nname = \"a\"\n", &["line 1", "family"]),
+        (&format!("{wall}{wall}colour = 3\n"), &["line 5", "colour", "settings"]),
+        (&format!("{wall}{wall}form = \"both\"\n"), &["problem 2", "form", "both"]),
+        (&format!("{wall}name = \"a/b\"\n"), &["problem 1", "name", "a/b"]),
+        (&format!("{wall}form = []\n"), &["problem 1", "form", "[]"]),
+        (&format!("{wall}settings = {{ rows = [] }}\n"), &["problem 1", "rows", "[]"]),
+        (
+            &format!("{wall}settings = {{ rows = [2, 0] }}\n"),
+            &["wall/wall-rows0", "rows", "found 0"],
+        ),
+        (&format!("{wall}settings = {{ row = 2 }}\n"), &["wall/wall-row2", "`row`", "rows"]),
+        (&format!("{wall}{wall}"), &["wall/wall", "twice"]),
+    ];
+    for (text, parts) in cases {
+        fs::write(folder.path("suite.toml"), text).unwrap();
+        let parts = [&["--suite suite.toml"], *parts].concat();
+        folder.run("gen --suite suite.toml --out all").refused(&parts);
+    }
+    fs::write(folder.path("suite.toml"), wall).unwrap();
+    folder.run("gen --suite suite.toml --out suite.toml").refused(&["--out", "suite.toml"]);
+}
+
+#[test]
+fn one_bad_file_does_not_not_keep_the_others_from_running() {
     let folder = Folder::with_problems();
     let run =
         folder.run("solve missing.hdf5 wall.hdf5 --max-iter 1 --json").refused(&["missing.hdf5"]);

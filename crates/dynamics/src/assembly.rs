@@ -4,12 +4,18 @@
 //!
 //! ```text
 //! M v = H r + f,                 f = M v_k + h (m g + force, −ω × J ω),
-//! u = Hᵀ v + w,                  w_N = e u_{N,k},  w_T = 0,  u_k = Hᵀ v_k  (Newton's impact law).
+//! u = Hᵀ v + w,                  w = s + (e u_{N,k}, 0, 0),      u_k = Hᵀ v_k + s  (Newton's impact law).
 //! ```
+//!
+//! s is minus the given velocity of images and walls ([`crate::Image`]) in the frame of the contact; elsewhere zero.
 //!
 //! Each body has six degrees of freedom `[linear, angular]`, both in the world frame, and the block
 //! `diag(m I, R J Rᵀ)` of M. A contact at p with frame `[N, T1, T2]` has the columns `(d, (p − x_b) × d)` for b
-//! and minus `(d, (p − x_a) × d)` for a, with d each of N, T1, T2.
+//! and minus `(d, (p − x_a) × d)` for a, with d each of N, T1, T2; where an image of a touches, x_a is the place of the image.
+//!
+//! With [`Gyroscopic::Implicit`] the torque `g(ω) = ω × J ω` is linearised about `ω_k`: the block of M becomes
+//! `J + h G` with `G = ∂g/∂ω = [ω_k]× J − [J ω_k]×`, and f is stated with that M, so that
+//! `J (ω − ω_k) = −h (g(ω_k) + G (ω − ω_k))` without impulses.
 //!
 //! An elastic solid ([`ElasticBox`]) has three degrees of freedom a node, after those of all bodies. Its forces
 //! `−K x − C v` weigh θ at the end of the step and 1 − θ at its beginning, with `x' = x_k + h (θ v + (1 − θ) v_k)`
@@ -21,16 +27,19 @@
 //! f = M̂ v_k + h (F − C v_k − K x_k − h θ K v_k).
 //! ```
 //!
-//! A contact has the columns `N_a(p) d` at the nodes of the element that it touches, `N_a` their shape functions. A
-//! held node keeps its diagonal of M̂, no part of f and no row of H: its velocity is zero.
+//! A contact has the columns `±N_j(p) d` at the nodes j of the element that it touches, `N_j` their shape functions, at
+//! `p − offset` where an image of a touches. A held node keeps its diagonal of M̂, no part of f and no row of H: its
+//! velocity is zero.
+
+use std::array::from_fn;
 
 use nonsmooth_problem::linalg::Csc;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal};
 use nonsmooth_solve::Reformulation;
 use nonsmooth_solve::reform::Condense;
 
-use crate::vec3::{add, apply, cross, scale, sub};
-use crate::{Contact, ElasticBox, RigidBody, Scene, SceneError};
+use crate::vec3::{Mat3, Vec3, add, apply, cross, dot, scale, sub};
+use crate::{Contact, ElasticBox, Gyroscopic, RigidBody, Scene, SceneError};
 
 #[allow(non_snake_case)]
 impl Scene {
@@ -41,21 +50,18 @@ impl Scene {
         self.validate()?;
         let (n, nc) = (self.dofs(), self.contacts.len());
         let mut mass: Vec<_> =
-            self.bodies.iter().enumerate().flat_map(|(k, b)| mass_entries(6 * k, b)).collect();
+            self.bodies.iter().enumerate().flat_map(|(k, b)| self.mass_entries(6 * k, b)).collect();
         let starts = self.solid_starts();
         for (solid, at) in self.solids.iter().zip(&starts) {
             let matrix = solid.iteration_matrix(self.h)?;
             mass.extend(matrix.triplets().map(|(i, j, x)| (at + i, at + j, x)));
         }
-        let mut jacobian: Vec<_> = self
+        let jacobian: Vec<_> = self
             .contacts
             .iter()
             .enumerate()
-            .flat_map(|(c, contact)| jacobian_entries(&self.bodies, c, contact))
+            .flat_map(|(c, contact)| self.jacobian_entries(&starts, c, contact))
             .collect();
-        for (c, contact) in self.contacts.iter().enumerate() {
-            self.push_solid_entries(&starts, c, contact, &mut jacobian);
-        }
         let M = Csc::from_triplets(n, n, mass.into_iter())?;
         let H = Csc::from_triplets(n, 3 * nc, jacobian.into_iter())?;
         let v = self.velocities();
@@ -64,7 +70,11 @@ impl Scene {
         M.mul_add(1.0, &v, &mut f);
         let mut w = vec![0.0; 3 * nc];
         for (c, contact) in self.contacts.iter().enumerate() {
-            w[3 * c] = contact.e * H.column_dot(3 * c, &v);
+            let frame = contact.frame();
+            for k in 0..3 {
+                w[3 * c + k] = -dot(frame[k], contact.image.velocity);
+            }
+            w[3 * c] += contact.e * (H.column_dot(3 * c, &v) + w[3 * c]);
         }
         let mu = self.contacts.iter().map(|c| c.mu).collect();
         Ok(FrictionGlobal::new(M, H, f, w, mu)?)
@@ -93,27 +103,37 @@ impl Scene {
         self.solids.iter().scan(bodies, next).collect()
     }
 
-    /// The columns of H of contact number `c` at the nodes of solids.
-    fn push_solid_entries(
+    /// The three columns of H of contact number `c`; `starts` are those of the solids.
+    fn jacobian_entries(
         &self,
         starts: &[usize],
         c: usize,
         contact: &Contact,
-        entries: &mut Vec<(usize, usize, f64)>,
-    ) {
+    ) -> Vec<(usize, usize, f64)> {
         let frame = contact.frame();
-        for (sign, k) in [(1.0, Some(contact.b)), (-1.0, contact.a)] {
-            let Some(k) = k.and_then(|k| k.checked_sub(self.bodies.len())) else { continue };
-            let solid = &self.solids[k];
-            let weights = solid.weights(contact.point).expect("validated");
-            for (node, weight) in weights.into_iter().filter(|&(node, _)| !solid.held[node]) {
-                for (column, d) in frame.iter().enumerate() {
-                    let rows = (0..3).filter(|&i| d[i] != 0.0);
-                    let at = starts[k] + 3 * node;
-                    entries.extend(rows.map(|i| (at + i, 3 * c + column, sign * weight * d[i])));
+        let mut entries = vec![];
+        for (sign, k, point) in contact.sides() {
+            // The rows from `first` on, where the column of direction d has `factor` times `part(d)`.
+            let mut push = |first: usize, factor: f64, part: &dyn Fn(Vec3) -> Vec3| {
+                for (column, x) in frame.map(part).iter().enumerate() {
+                    let rows = (0..3).filter(|&i| x[i] != 0.0);
+                    entries.extend(rows.map(|i| (first + i, 3 * c + column, factor * x[i])));
+                }
+            };
+            if let Some(body) = self.bodies.get(k) {
+                let arm = sub(point, body.position);
+                push(6 * k, sign, &|d| d);
+                push(6 * k + 3, sign, &|d| cross(arm, d));
+            } else {
+                let s = k - self.bodies.len();
+                let solid = &self.solids[s];
+                let weights = solid.weights(point).expect("validated");
+                for (node, weight) in weights.into_iter().filter(|w| !solid.held[w.0]) {
+                    push(starts[s] + 3 * node, sign * weight, &|d| d);
                 }
             }
         }
+        entries
     }
 
     /// `h (m g + force, −ω × J ω)`.
@@ -122,38 +142,27 @@ impl Scene {
         let omega = body.angular_velocity;
         let gyroscopic = cross(apply(&body.world_inertia(), omega), omega);
         let all = [weight, gyroscopic];
-        std::array::from_fn(|k| self.h * all[k / 3][k % 3])
+        from_fn(|k| self.h * all[k / 3][k % 3])
     }
-}
 
-/// The block `diag(m I, R J Rᵀ)` of a body whose degrees of freedom start at `at`.
-fn mass_entries(at: usize, body: &RigidBody) -> Vec<(usize, usize, f64)> {
-    let inertia = body.world_inertia();
-    let linear = (0..3).map(|k| (at + k, at + k, body.mass));
-    // The product R J Rᵀ is symmetric up to rounding only; its mean with its transpose is so exactly.
-    let angular = (0..9)
-        .map(|k| (k / 3, k % 3))
-        .map(|(k, l)| (at + 3 + k, at + 3 + l, 0.5 * (inertia[k][l] + inertia[l][k])));
-    linear.chain(angular.filter(|e| e.2 != 0.0)).collect()
-}
-
-/// The columns of H of contact number `c` at rigid bodies.
-fn jacobian_entries(
-    bodies: &[RigidBody],
-    c: usize,
-    contact: &Contact,
-) -> impl Iterator<Item = (usize, usize, f64)> {
-    let frame = contact.frame();
-    let sides = [(1.0, Some(contact.b)), (-1.0, contact.a)];
-    let rigid = |k: &usize| *k < bodies.len();
-    let sides = sides.into_iter().filter_map(move |(sign, body)| Some((sign, body.filter(rigid)?)));
-    sides.flat_map(move |(sign, k)| {
-        let arm = sub(contact.point, bodies[k].position);
-        (0..18).filter_map(move |i| {
-            let (column, row) = (i / 6, i % 6);
-            let d = frame[column];
-            let x = sign * if row < 3 { d[row] } else { cross(arm, d)[row - 3] };
-            (x != 0.0).then_some((6 * k + row, 3 * c + column, x))
-        })
-    })
+    /// The block of M of a body whose degrees of freedom start at `at`.
+    fn mass_entries(&self, at: usize, body: &RigidBody) -> Vec<(usize, usize, f64)> {
+        let J = body.world_inertia();
+        // The product R J Rᵀ is symmetric up to rounding only; its mean with its transpose is so exactly.
+        let mut angular: Mat3 = from_fn(|k| from_fn(|l| 0.5 * (J[k][l] + J[l][k])));
+        if self.gyroscopic == Gyroscopic::Implicit {
+            let omega = body.angular_velocity;
+            let momentum = apply(&J, omega);
+            for l in 0..3 {
+                let unit: Vec3 = from_fn(|k| f64::from(u8::from(k == l)));
+                // Column l of G: ω × (J e_l) − (J ω) × e_l.
+                let column = sub(cross(omega, apply(&J, unit)), cross(momentum, unit));
+                (0..3).for_each(|k| angular[k][l] += self.h * column[k]);
+            }
+        }
+        let linear = (0..3).map(|k| (at + k, at + k, body.mass));
+        let angular =
+            (0..9).map(|i| (i / 3, i % 3)).map(|(k, l)| (at + 3 + k, at + 3 + l, angular[k][l]));
+        linear.chain(angular.filter(|e| e.2 != 0.0)).collect()
+    }
 }

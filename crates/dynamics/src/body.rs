@@ -60,12 +60,14 @@ pub enum Shape {
     },
     /// A convex polyhedron.
     Polyhedron(Polyhedron),
+    /// Convex polyhedra without common volume, rigidly joined: a link of a chain.
+    Compound(Vec<Polyhedron>),
 }
 
 impl Shape {
     /// Mass, mass centre and inertia for a density in kg/m³.
     ///
-    /// Errors: a side, radius or density that is not positive.
+    /// Errors: a side, radius or density that is not positive; a compound of nothing.
     pub fn mass_properties(&self, density: f64) -> Result<MassProperties, SceneError> {
         positive("density", density)?;
         let diagonal = |mass: f64, d: Vec3| MassProperties {
@@ -88,6 +90,13 @@ impl Shape {
                 diagonal(mass, [0.4 * mass * radius * radius; 3])
             }
             Shape::Polyhedron(p) => p.mass_properties(density),
+            Shape::Compound(parts) if parts.is_empty() => {
+                return Err(SceneError::value("parts", "at least one polyhedron", "none"));
+            }
+            Shape::Compound(parts) => {
+                let parts: Vec<_> = parts.iter().map(|p| p.mass_properties(density)).collect();
+                MassProperties::joined(&parts)
+            }
         })
     }
 
@@ -97,6 +106,9 @@ impl Shape {
             Shape::Box { half } => norm(*half),
             Shape::Sphere { radius } => *radius,
             Shape::Polyhedron(p) => p.radius_about([0.0; 3]),
+            Shape::Compound(parts) => {
+                parts.iter().map(|p| p.radius_about([0.0; 3])).fold(0.0, f64::max)
+            }
         }
     }
 }
@@ -125,12 +137,15 @@ pub struct RigidBody {
 impl RigidBody {
     /// A homogeneous solid at rest, its frame that of the world.
     ///
-    /// Boxes and spheres are centred at the origin, a polyhedron stays where its vertices are.
+    /// Boxes and spheres are centred at the origin, polyhedra stay where their vertices are.
     /// Errors: those of [`Shape::mass_properties`].
     pub fn solid(shape: Shape, density: f64) -> Result<Self, SceneError> {
         let MassProperties { mass, centre, inertia } = shape.mass_properties(density)?;
         let shape = match shape {
             Shape::Polyhedron(p) => Shape::Polyhedron(p.mapped(|v| sub(v, centre))),
+            Shape::Compound(parts) => {
+                Shape::Compound(parts.iter().map(|p| p.mapped(|v| sub(v, centre))).collect())
+            }
             other => other,
         };
         Ok(Self {

@@ -24,13 +24,25 @@ pub struct Contact {
     pub mu: f64,
     /// Newton's coefficient of restitution, from 0 to 1.
     pub e: f64,
+    /// What touches b in place of a itself: a periodic image of it, or ground that moves.
+    pub image: Image,
+}
+
+/// The image of a body or elastic solid in a periodic domain, or the motion of a wall.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Image {
+    /// From the body to its image, m; for the ground without meaning.
+    pub offset: Vec3,
+    /// Given velocity of the image relative to the body (`L offset` where the velocity gradient L drives the domain), or
+    /// that of the wall, m/s.
+    pub velocity: Vec3,
 }
 
 impl Contact {
     /// A contact with T1 along the world's x axis, or its y axis where the normal is nearly along x.
     pub fn new(a: Option<usize>, b: usize, point: Vec3, normal: Vec3, mu: f64, e: f64) -> Self {
         let tangent = if normal[0].abs() > 0.9 * norm(normal) { Y } else { X };
-        Self { a, b, point, normal, tangent, mu, e }
+        Self { a, b, point, normal, tangent, mu, e, image: Image::default() }
     }
 
     /// The local frame `[N, T1, T2]`: orthonormal, with T1 × T2 = N.
@@ -40,14 +52,24 @@ impl Contact {
         [n, t1, cross(n, t1)]
     }
 
+    /// For b and then a, if it is not the ground: the sign with which the contact moves it, its number, and its own point
+    /// that touches, which is `offset` away from [`Contact::point`] where an image of it touches.
+    pub(crate) fn sides(&self) -> impl Iterator<Item = (f64, usize, Vec3)> {
+        let a = self.a.map(|a| (-1.0, a, sub(self.point, self.image.offset)));
+        [Some((1.0, self.b, self.point)), a].into_iter().flatten()
+    }
+
     /// Checks every value against a scene of `bodies` bodies; `key` names the contact in messages.
     pub(crate) fn validate(&self, key: &str, bodies: usize) -> Result<(), SceneError> {
-        let Self { a, b, point, mu, e, .. } = *self;
-        if b >= bodies || a.is_some_and(|a| a >= bodies || a == b) {
+        let Self { a, b, point, mu, e, image, .. } = *self;
+        // A body may touch an image of itself.
+        if b >= bodies || a.is_some_and(|a| a >= bodies || (a == b && image.offset == [0.0; 3])) {
             let expected = format!("two different bodies of the {bodies}");
             return Err(SceneError::value(key, expected, format!("a = {a:?}, b = {b}")));
         }
         require(&format!("{key}.point"), point.iter().sum(), true, "finite coordinates")?;
+        let image: f64 = image.offset.iter().chain(&image.velocity).sum();
+        require(&format!("{key}.image"), image, true, "finite components")?;
         if self.frame().iter().flatten().any(|x| !x.is_finite()) {
             let found = format!("{:?} and {:?}", self.normal, self.tangent);
             let expected = "a normal and a tangent that are not parallel";

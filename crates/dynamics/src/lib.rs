@@ -2,8 +2,9 @@
 //! step.
 //!
 //! A [`Scene`] holds [`RigidBody`]s, [`ElasticBox`]es and [`Contact`]s; [`Scene::problem`] states the Moreau–Jean
-//! step as a global problem and [`Scene::condensed`] as a local one. [`scenes`] has families of scenes by name ([`SCENES`]), and
-//! [`draw::svg`] draws any scene. SI units throughout: m, kg, s, rad.
+//! step as a global problem and [`Scene::condensed`] as a local one. [`scenes`] has families of scenes by name
+//! ([`SCENES`]), and [`draw::svg`] draws any scene. A contact may be with the periodic image of a body or with a
+//! moving wall ([`Image`]). SI units throughout: m, kg, s, rad.
 //!
 //! ```
 //! use nonsmooth_dynamics::scenes::{Family, Stack};
@@ -17,19 +18,22 @@
 mod assembly;
 mod body;
 mod contact;
+mod domain;
 pub mod draw;
 mod elastic;
 mod error;
+mod packing;
 mod polyhedron;
 mod scene;
 pub mod scenes;
 mod vec3;
+mod voronoi;
 
 pub use body::{RigidBody, Rotation, Shape};
-pub use contact::Contact;
+pub use contact::{Contact, Image};
 pub use elastic::{ElasticBox, Material};
 pub use error::SceneError;
 pub use polyhedron::{MassProperties, Polyhedron};
-pub use scene::{Ground, Scene};
+pub use scene::{Ground, Gyroscopic, Obstacle, Scene};
 pub use scenes::{SCENES, SceneEntry};
 pub use vec3::{Mat3, Vec3};

@@ -21,6 +21,27 @@ pub struct MassProperties {
     pub inertia: Mat3,
 }
 
+impl MassProperties {
+    /// Those of some solids, at least one, taken as one body.
+    pub(crate) fn joined(parts: &[Self]) -> Self {
+        let mass = parts.iter().map(|p| p.mass).sum();
+        let first = parts.iter().fold([0.0; 3], |s, p| add(s, scale(p.mass, p.centre)));
+        let centre = scale(1.0 / mass, first);
+        let mut inertia = [[0.0; 3]; 3];
+        for part in parts {
+            // Steiner: J + m (|d|² I − d dᵀ).
+            let d = sub(part.centre, centre);
+            for k in 0..3 {
+                inertia[k][k] += part.mass * dot(d, d);
+                for l in 0..3 {
+                    inertia[k][l] += part.inertia[k][l] - part.mass * d[k] * d[l];
+                }
+            }
+        }
+        Self { mass, centre, inertia }
+    }
+}
+
 impl Polyhedron {
     /// Checks that the faces bound a convex solid.
     ///
@@ -54,6 +75,11 @@ impl Polyhedron {
         Ok(out)
     }
 
+    /// A solid whose faces are known to bound it; some may be so small that rounding hides their planes.
+    pub(crate) fn trusted(vertices: Vec<Vec3>, faces: Vec<Vec<usize>>) -> Self {
+        Self { vertices, faces }
+    }
+
     /// The plane convex polygon `base` (either sense) extruded by `along`, for example a voussoir.
     ///
     /// Errors: those of [`Polyhedron::new`].
@@ -79,6 +105,14 @@ impl Polyhedron {
         let [a, b, c] = half;
         let base = rectangle([0.0, 0.0, -c], [a, 0.0, 0.0], [0.0, b, 0.0]);
         Self::prism(&base, [0.0, 0.0, 2.0 * c])
+    }
+
+    /// The box of sides along the axes between two opposite corners.
+    ///
+    /// Errors: a side without length.
+    pub(crate) fn between(low: Vec3, high: Vec3) -> Result<Self, SceneError> {
+        let centre = scale(0.5, add(low, high));
+        Ok(Self::cuboid(scale(0.5, sub(high, low)))?.mapped(|v| add(centre, v)))
     }
 
     /// The vertices, m.

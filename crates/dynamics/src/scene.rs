@@ -1,12 +1,14 @@
 //! Bodies, elastic solids and contacts together.
 
+use std::array::from_fn;
+
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use crate::error::{positive, require};
 use crate::polyhedron::Polyhedron;
-use crate::vec3::{Vec3, X, cross, norm};
-use crate::{Contact, ElasticBox, RigidBody, SceneError};
+use crate::vec3::{Vec3, X, add, cross, norm};
+use crate::{Contact, ElasticBox, RigidBody, SceneError, Shape};
 
 /// Bodies, the contacts between them, and what drives them during one time step.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,10 +25,39 @@ pub struct Scene {
     pub gravity: Vec3,
     /// Time step, s.
     pub h: f64,
+    /// How the gyroscopic torque enters.
+    pub gyroscopic: Gyroscopic,
     /// The ground as it is drawn; contacts with the ground state their own geometry.
     pub ground: Option<Ground>,
     /// Fixed solids, drawn only; contacts with them are contacts with the ground.
-    pub obstacles: Vec<Polyhedron>,
+    pub obstacles: Vec<Obstacle>,
+}
+
+/// How the gyroscopic torque `g(ω) = ω × J ω` enters the step.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Gyroscopic {
+    /// By its value before the step; M is symmetric.
+    Explicit,
+    /// Linearised about the velocity before the step, with its derivative in M, which is then not symmetric.
+    Implicit,
+}
+
+/// A fixed solid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Obstacle {
+    /// Its shape.
+    pub shape: Shape,
+    /// Where the origin of the shape is, m.
+    pub position: Vec3,
+}
+
+impl From<Polyhedron> for Obstacle {
+    fn from(polyhedron: Polyhedron) -> Self {
+        Self { shape: Shape::Polyhedron(polyhedron), position: [0.0; 3] }
+    }
 }
 
 /// A plane ground.
@@ -78,15 +109,20 @@ impl Scene {
         }
         let mut rng = Pcg64::seed_from_u64(seed);
         let mut draw = || amplitude * rng.random_range(-1.0..=1.0);
+        self.add_velocities(|radius| (from_fn(|_| draw()), from_fn(|_| draw() / radius)));
+    }
+
+    /// Adds to each body, then to each elastic solid that nothing holds, the velocity `[linear, angular]` about its
+    /// centre that `motion` has for its radius.
+    pub(crate) fn add_velocities(&mut self, mut motion: impl FnMut(f64) -> (Vec3, Vec3)) {
         for body in &mut self.bodies {
-            let radius = body.shape.radius();
-            body.velocity.iter_mut().for_each(|v| *v += draw());
-            body.angular_velocity.iter_mut().for_each(|w| *w += draw() / radius);
+            let (linear, angular) = motion(body.shape.radius());
+            body.velocity = add(body.velocity, linear);
+            body.angular_velocity = add(body.angular_velocity, angular);
         }
-        for solid in self.solids.iter_mut().filter(|s| !s.held.contains(&true)) {
-            let radius = solid.radius();
-            let linear = std::array::from_fn(|_| draw());
-            solid.add_velocity(linear, std::array::from_fn(|_| draw() / radius));
+        for solid in self.solids.iter_mut().filter(|s| !s.is_held()) {
+            let (linear, angular) = motion(solid.radius());
+            solid.add_velocity(linear, angular);
         }
     }
 
@@ -108,12 +144,12 @@ impl Scene {
         }
         for (c, contact) in self.contacts.iter().enumerate() {
             contact.validate(&format!("contacts[{c}]"), self.bodies.len() + self.solids.len())?;
-            for k in contact.a.into_iter().chain([contact.b]) {
-                let solid = k.checked_sub(self.bodies.len());
-                if solid.is_some_and(|s| self.solids[s].weights(contact.point).is_none()) {
-                    let (key, expected) =
-                        (format!("contacts[{c}].point"), format!("a point of {k}"));
-                    return Err(SceneError::value(key, expected, format!("{:?}", contact.point)));
+            for (_, k, point) in contact.sides() {
+                let Some(s) = k.checked_sub(self.bodies.len()) else { continue };
+                if self.solids[s].weights(point).is_none() {
+                    let key = format!("contacts[{c}].point");
+                    let expected = format!("a point of solids[{s}]");
+                    return Err(SceneError::value(key, expected, format!("{point:?}")));
                 }
             }
         }

@@ -58,3 +58,14 @@ pub(crate) fn rectangle(centre: Vec3, a: Vec3, b: Vec3) -> [Vec3; 4] {
     [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
         .map(|(s, t)| add(centre, add(scale(s, a), scale(t, b))))
 }
+
+/// `points` × `points` points spread evenly over the rectangle `centre ± a ± b`: its corners for 2, its centre for 1.
+pub(crate) fn grid(centre: Vec3, a: Vec3, b: Vec3, points: usize) -> Vec<Vec3> {
+    let at = |k: usize| match points {
+        1 => 0.0,
+        _ => 2.0 * k as f64 / (points - 1) as f64 - 1.0,
+    };
+    (0..points * points)
+        .map(|k| add(centre, add(scale(at(k % points), a), scale(at(k / points), b))))
+        .collect()
+}

@@ -1,6 +1,6 @@
 //! Assembly against mechanics: Newton's third law, finite differences, definiteness.
 
-use nonsmooth_dynamics::{Contact, RigidBody, Rotation, Scene, Shape, Vec3};
+use nonsmooth_dynamics::{Contact, Gyroscopic, Image, RigidBody, Rotation, Scene, Shape, Vec3};
 use nonsmooth_problem::linalg::Csc;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -35,6 +35,7 @@ fn tumbling() -> Scene {
         contacts,
         gravity: [0.0, 0.0, -9.81],
         h: 0.02,
+        gyroscopic: Gyroscopic::Explicit,
         ground: None,
         obstacles: vec![],
     }
@@ -202,6 +203,99 @@ fn free_motion_conserves_and_accelerates_as_it_should() {
         let turning = omega[i] * before[3 + j] - omega[j] * before[3 + i];
         assert!((problem.f[3 + k] - before[3 + k] + h * turning).abs() < 1e-12);
     }
+}
+
+#[test]
+fn implicit_gyroscopic_terms_are_the_derivative_of_the_torque() {
+    let explicit = tumbling();
+    let implicit = Scene { gyroscopic: Gyroscopic::Implicit, ..explicit.clone() };
+    let (e, i) = (explicit.problem().unwrap(), implicit.problem().unwrap());
+    // The torque ω × J ω of a body, by the moment that f holds beside the momentum.
+    let torque = |b: usize, omega: Vec3| -> Vec3 {
+        let mut scene = explicit.clone();
+        scene.bodies[b].angular_velocity = omega;
+        let p = scene.problem().unwrap();
+        let mut momentum = vec![0.0; p.dofs()];
+        p.M.mul_add(1.0, &scene.velocities(), &mut momentum);
+        std::array::from_fn(|k| (momentum[6 * b + 3 + k] - p.f[6 * b + 3 + k]) / scene.h)
+    };
+    let step = 1e-4;
+    for (b, body) in explicit.bodies.iter().enumerate() {
+        for l in 0..3 {
+            let at = |s: f64| {
+                let mut omega = body.angular_velocity;
+                omega[l] += s;
+                torque(b, omega)
+            };
+            let (after, before) = (at(step), at(-step));
+            for k in 0..3 {
+                let (row, column) = (6 * b + 3 + k, 6 * b + 3 + l);
+                let added = (i.M.get(row, column) - e.M.get(row, column)) / explicit.h;
+                // The torque is quadratic in ω: the central difference is exact but for rounding.
+                let derivative = (after[k] - before[k]) / (2.0 * step);
+                assert!((added - derivative).abs() < 1e-6, "{b} {k} {l}: {added} {derivative}");
+            }
+        }
+    }
+    // f is stated with the M in use, so that v_k still enters as M v_k.
+    let forces = |p: &nonsmooth_problem::FrictionGlobal<3>| {
+        let mut rest = p.f.clone();
+        p.M.mul_add(-1.0, &explicit.velocities(), &mut rest);
+        rest
+    };
+    assert!(forces(&e).iter().zip(forces(&i)).all(|(a, b)| (a - b).abs() < 1e-10));
+    assert!(i.M.asymmetry() > 1e-3 && explicit.condensed().unwrap().W.asymmetry() < 1e-14);
+    assert!(implicit.condensed().unwrap().W.asymmetry() > 1e-3);
+}
+
+#[test]
+fn walls_and_images_move_as_given() {
+    let mut scene = tumbling();
+    let u = |scene: &Scene| {
+        let p = scene.problem().unwrap();
+        let mut u = p.w.clone();
+        p.H.mul_transpose_add(1.0, &scene.velocities(), &mut u);
+        u
+    };
+    scene.contacts.iter_mut().for_each(|c| c.e = 0.0);
+    let before = u(&scene);
+    let velocity = [0.3, -0.2, 0.5];
+    scene.contacts.iter_mut().for_each(|c| c.image = Image { offset: [0.0; 3], velocity });
+    let after = u(&scene);
+    for (c, contact) in scene.contacts.iter().enumerate() {
+        for (k, axis) in contact.frame().iter().enumerate() {
+            let less: f64 = (0..3).map(|i| axis[i] * velocity[i]).sum();
+            assert!((before[3 * c + k] - less - after[3 * c + k]).abs() < 1e-14);
+        }
+    }
+    // Newton's law turns the whole approach around: u_N + e u_N,k.
+    scene.contacts.iter_mut().for_each(|c| c.e = 0.5);
+    let bounced = u(&scene);
+    for c in 0..scene.contacts.len() {
+        assert!((bounced[3 * c] - 1.5 * after[3 * c]).abs() < 1e-14);
+        assert_eq!(bounced[3 * c + 1..3 * c + 3], after[3 * c + 1..3 * c + 3]);
+    }
+}
+
+#[test]
+fn a_body_may_touch_its_own_image_only() {
+    let mut scene = tumbling();
+    scene.contacts[4].a = Some(scene.contacts[4].b);
+    let e = scene.problem().unwrap_err().to_string();
+    assert!(e.starts_with("contacts[4]: expected two different bodies"), "{e}");
+    scene.contacts[4].image.offset = [2.0, 0.0, 0.0];
+    // The two impulses cancel and leave the couple offset × d.
+    let h = scene.problem().unwrap().H;
+    let b = scene.contacts[4].b;
+    for (k, d) in scene.contacts[4].frame().iter().enumerate() {
+        let couple = [0.0, -2.0 * d[2], 2.0 * d[1]];
+        for i in 0..3 {
+            assert!(h.get(6 * b + i, 12 + k).abs() < 1e-15);
+            assert!((h.get(6 * b + 3 + i, 12 + k) - couple[i]).abs() < 1e-14);
+        }
+    }
+    scene.contacts[4].image.velocity[2] = f64::NAN;
+    assert!(scene.problem().unwrap_err().to_string().starts_with("contacts[4].image: expected"));
 }
 
 #[test]

@@ -47,23 +47,40 @@ fn balance(p: &FrictionGlobal<3>) -> Vec<f64> {
 
 #[test]
 fn every_default_builds_and_assembles() {
-    let sizes: Vec<_> = defaults()
+    // Where places are random, rounding may decide on a contact.
+    let bounds = [
+        ("sphere_pile", 600, 1.2..2.65),
+        ("chute", 1200, 0.7..3.0),
+        ("polyhedra", 240, 4.0..9.0),
+        ("periodic_box", 600, 0.2..3.0),
+    ];
+    let (random, sizes): (Vec<_>, Vec<_>) = defaults()
         .map(|scene| {
             let (global, local) = (scene.problem().unwrap(), scene.condensed().unwrap());
             assert_eq!(local.contacts(), global.contacts(), "{}", scene.name);
             (scene.name, global.dofs(), global.contacts())
         })
-        .collect();
+        .partition(|size| bounds.iter().any(|b| b.0 == size.0));
     let expected = [
         ("sliding_box", 6, 4),
         ("stack", 30, 20),
         ("wall", 198, 220),
+        ("kapla", 120, 152),
         ("arch", 90, 64),
+        ("bridge", 138, 184),
+        ("chain", 60, 20),
         ("spheres", 180, 112),
         ("elastic_cubes", 162, 4),
         ("elastic_wall", 1350, 112),
     ];
-    assert_eq!(sizes, expected.map(|(name, n, nc)| (name.to_string(), n, nc)));
+    let expected = expected.map(|(name, n, nc)| (name.to_string(), n, nc));
+    assert_eq!(sizes, expected);
+    assert_eq!(random.len(), bounds.len());
+    for ((name, n, nc), (expected, dofs, allowed)) in random.into_iter().zip(bounds) {
+        assert_eq!((name.as_str(), n), (expected, dofs));
+        let density = 3.0 * nc as f64 / n as f64;
+        assert!(allowed.contains(&density), "{name}: {density}");
+    }
 }
 
 #[test]
@@ -91,8 +108,8 @@ fn mistakes_are_named_on_one_line() {
         ("stack", json!({"mass_ratio": 0}), "mass_ratio: expected a positive number, found 0"),
         (
             "stack",
-            json!({"mass_ratio": 1e300, "density": 1e300}),
-            "density: expected a positive number, found inf",
+            json!({"mass_ratio": 1e300}),
+            "bodies[2].inertia: expected a symmetric positive definite matrix",
         ),
         (
             "wall",
@@ -111,6 +128,33 @@ fn mistakes_are_named_on_one_line() {
         ),
         ("spheres", json!({"radius": null}), "radius: expected a number, found null"),
         ("spheres", json!({"e": 1.5}), "e: expected a number from 0 to 1, found 1.5"),
+        ("kapla", json!({"planks": 6}), "length: expected a length of at least `planks` widths"),
+        ("bridge", json!({"opening": 180}), "opening: expected an angle above 0 and below 180"),
+        ("bridge", json!({"pier": 0.8}), "pier: expected more than 0.8660, twice the reach"),
+        ("chain", json!({"bar": 0.02}), "bar: expected a positive number below a third"),
+        ("chain", json!({"points": 5}), "points: expected a count from 1 to 4, found 5"),
+        ("sphere_pile", json!({"spread": 1}), "spread: expected a number from 0 to below 1"),
+        ("sphere_pile", json!({"gap": 0}), "gap: expected a positive number up to 1, found 0"),
+        (
+            "sphere_pile",
+            json!({"gap": 1e300}),
+            "gap: expected a positive number up to 1, found 1000",
+        ),
+        ("chute", json!({"radius": 1e300}), "radius: expected a number from 1e-9 to 1e9"),
+        ("polyhedra", json!({"size": 1e300}), "size: expected a number from 1e-9 to 1e9"),
+        ("chute", json!({"depth": 0.5}), "depth: expected a number from 1 to 1000, found 0.5"),
+        ("polyhedra", json!({"open": 1.5}), "open: expected a number from 0 to 1, found 1.5"),
+        ("polyhedra", json!({"open": 1, "points": 0}), "points: expected a count from 1"),
+        ("periodic_box", json!({"count": 1}), "count: expected a count from 2 to 1000000"),
+        ("periodic_box", json!({"grains": "cubes"}), "grains: expected one of spheres, polyhedra"),
+        ("wall", json!({"state": "moving"}), "state: expected one of rest, perturbed, impact"),
+        ("wall", json!({"gyroscopic": "no"}), "gyroscopic: expected one of explicit, implicit"),
+        ("wall", json!({"spin": -1}), "spin: expected a number of at least 0, found -1"),
+        (
+            "wall",
+            json!({"contact_density": 4}),
+            "contact_density: expected 0 or a number up to 3.3333, ",
+        ),
         ("elastic_cubes", json!({"count": 1}), "count: expected a count of at least 2 where"),
         ("elastic_cubes", json!({"elements": 0}), "elements: expected a count from 1 to 100"),
         ("elastic_cubes", json!({"offset": 1}), "offset: expected a number from 0 to below 1"),
@@ -188,9 +232,10 @@ fn a_resting_stack_is_in_equilibrium_under_its_weight() {
 }
 
 #[test]
-fn the_ground_can_carry_every_scene() {
-    // An elastic solid carries its weight by its strain, not by contacts alone.
-    for mut scene in defaults().filter(|scene| scene.solids.is_empty()) {
+fn the_ground_can_carry_every_structure() {
+    // Grains may lie loose, and an elastic solid carries its weight by its strain, not by contacts alone.
+    let loose = ["sphere_pile", "chute", "periodic_box", "elastic_cubes", "elastic_wall"];
+    for mut scene in defaults().filter(|s| !loose.contains(&s.name.as_str())) {
         scene.bodies.iter_mut().for_each(|b| b.velocity = [0.0; 3]);
         let p = scene.problem().unwrap();
         let r = balance(&p);
@@ -220,10 +265,12 @@ fn disturbances_repeat_with_their_seed() {
             let map = settings(json!({"disturbance": amplitude, "seed": seed}));
             entry.make(&map).unwrap()
         };
-        assert_eq!(make(0.1, 7), make(0.1, 7));
-        assert_ne!(make(0.1, 7), make(0.1, 8));
-        assert_eq!(make(0.0, 7), make(0.0, 8));
-        let (still, moved) = (make(0.0, 0), make(0.1, 7));
+        let moved = make(0.1, 7);
+        assert_eq!(moved, make(0.1, 7));
+        assert_ne!(moved, make(0.1, 8));
+        let still = make(0.0, 7);
+        assert_ne!(still, moved);
+        assert_eq!(still.contacts, moved.contacts);
         for (a, b) in still.bodies.iter().zip(&moved.bodies) {
             assert!((0..3).all(|k| (a.velocity[k] - b.velocity[k]).abs() <= 0.1));
         }

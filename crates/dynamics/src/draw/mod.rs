@@ -71,7 +71,8 @@ fn motion_colour(motion: Motion) -> &'static str {
 /// Draws `scene` as a standalone SVG document, the same text for the same input.
 ///
 /// Elastic solids are drawn without strain, with the faces of their elements. Faces are shaded flat and painted from
-/// the farthest body to the nearest, in an order that is exact for convex bodies with a separating face plane. Cost: O(pairs of bodies that overlap in the picture).
+/// the farthest body to the nearest, in an order that is exact for convex bodies with a separating face plane.
+/// Cost: O(pairs of bodies that overlap in the picture).
 ///
 /// Errors: those of [`Scene::validate`]; nothing to draw; impulses or motions that do not fit the contacts.
 pub fn svg(scene: &Scene, drawing: &Drawing) -> Result<String, SceneError> {
@@ -149,26 +150,38 @@ fn check(scene: &Scene, drawing: &Drawing) -> Result<(), SceneError> {
     }
 }
 
-/// The bodies and obstacles in the world frame.
+/// The bodies, elastic solids and obstacles in the world frame.
 fn solids(scene: &Scene) -> Result<Vec<Solid>, SceneError> {
-    let bodies = scene.bodies.iter().enumerate().map(|(k, body)| {
-        let colour = BODY[k % BODY.len()];
-        let placed = |p: &Polyhedron| Solid::convex(p.mapped(|v| body.to_world(v)), colour);
-        match &body.shape {
-            Shape::Box { half } => {
-                placed(&Polyhedron::cuboid(*half).expect("a validated body has a volume"))
-            }
-            Shape::Polyhedron(p) => placed(p),
-            Shape::Sphere { radius } => {
-                Solid::Ball { centre: body.position, radius: *radius, colour }
-            }
+    let colour = |k: usize| BODY[k % BODY.len()];
+    let mut all = vec![];
+    for (k, body) in scene.bodies.iter().enumerate() {
+        all.extend(placed(&body.shape, body.position, |v| body.to_world(v), colour(k)));
+    }
+    for (k, solid) in scene.solids.iter().enumerate() {
+        all.push(Solid::convex(solid.surface()?, colour(scene.bodies.len() + k)));
+    }
+    for o in &scene.obstacles {
+        all.extend(placed(&o.shape, o.position, |v| add(o.position, v), OBSTACLE));
+    }
+    Ok(all)
+}
+
+/// The convex solids of a shape whose points `to_world` maps and whose origin is at `position`.
+fn placed(
+    shape: &Shape,
+    position: Vec3,
+    to_world: impl Fn(Vec3) -> Vec3,
+    colour: Colour,
+) -> Vec<Solid> {
+    let convex = |p: &Polyhedron| Solid::convex(p.mapped(&to_world), colour);
+    match shape {
+        Shape::Box { half } => {
+            vec![convex(&Polyhedron::cuboid(*half).expect("a validated body has a volume"))]
         }
-    });
-    let elastic = scene.solids.iter().enumerate().map(|(k, solid)| {
-        Ok(Solid::convex(solid.surface()?, BODY[(scene.bodies.len() + k) % BODY.len()]))
-    });
-    let obstacles = scene.obstacles.iter().map(|p| Solid::convex(p.clone(), OBSTACLE));
-    bodies.map(Ok).chain(elastic).chain(obstacles.map(Ok)).collect()
+        Shape::Polyhedron(p) => vec![convex(p)],
+        Shape::Compound(parts) => parts.iter().map(convex).collect(),
+        Shape::Sphere { radius } => vec![Solid::Ball { centre: position, radius: *radius, colour }],
+    }
 }
 
 /// The centre, radius and velocity of each body and each elastic solid.

@@ -139,6 +139,11 @@ impl ElasticBox {
         self.velocity[..layer].fill([0.0; 3]);
     }
 
+    /// Whether any node is held.
+    pub fn is_held(&self) -> bool {
+        self.held.contains(&true)
+    }
+
     /// Adds the velocity of a rigid motion about the centre to every node that is not held.
     pub fn add_velocity(&mut self, linear: Vec3, angular: Vec3) {
         for node in (0..self.nodes()).filter(|&k| !self.held[k]).collect::<Vec<_>>() {

@@ -1,6 +1,6 @@
 //! A semicircular masonry arch.
 
-use super::{Family, count};
+use super::{Family, Spread, count};
 use crate::error::positive;
 use crate::polyhedron::Polyhedron;
 use crate::vec3::Vec3;
@@ -76,8 +76,8 @@ impl Family for Arch {
         for side in [1.0, -1.0] {
             let (x0, x1) = (side * (self.radius - margin), side * (outer + 3.0 * margin));
             let base = [[x0, near, 0.0], [x1, near, 0.0], [x1, near, foot], [x0, near, foot]];
-            scene.obstacles.push(Polyhedron::prism(&base, [0.0, -2.0 * near, 0.0])?);
+            scene.obstacles.push(Polyhedron::prism(&base, [0.0, -2.0 * near, 0.0])?.into());
         }
-        common.finish(scene)
+        common.finish(scene, Spread::Random)
     }
 }

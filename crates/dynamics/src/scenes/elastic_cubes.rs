@@ -1,16 +1,16 @@
 //! Elastic cubes on each other.
 
 use super::elastic::elastic_settings;
-use super::{Family, count};
+use super::{Family, Spread, count};
 use crate::error::{positive, require};
 use crate::vec3::Z;
 use crate::{Scene, SceneError};
 
 elastic_settings! {
     /// Elastic cubes on each other: a contact at each node of a cube's bottom that stands on the cube below. Every
-    /// second cube is shifted, so that some nodes overhang and the others meet faces. W has full rank. With
-    /// `elements` 2, 5 and 20 and `mu` 0.3 the problems have the sizes of Cubes_H8_2, Cubes_H8_5 and Cubes_H8_20 of
-    /// the FCLIB collection.
+    /// second cube is shifted, so that some nodes overhang and the others meet faces. W has full rank.
+    /// `mass_ratio` is that of the top cube to the lowest. With `elements` 2, 5 and 20 and `mu` 0.3 the problems have the
+    /// sizes of Cubes_H8_2, Cubes_H8_5 and Cubes_H8_20 of the FCLIB collection.
     ElasticCubes {
         /// Number of cubes.
         count: usize = 2,
@@ -22,10 +22,6 @@ elastic_settings! {
         offset: f64 = 0.1,
         /// What the lowest cube stands on.
         support: Support = Support::Held,
-        /// Velocity at which the cubes fall, except one that is held, m/s.
-        speed: f64 = 0.5,
-        /// Horizontal velocity of the top cube, m/s.
-        kick: f64 = 0.0,
     }
 }
 
@@ -53,8 +49,6 @@ impl Family for ElasticCubes {
         positive("side", self.side)?;
         let offset = self.offset;
         require("offset", offset, (0.0..1.0).contains(&offset), "a number from 0 to below 1")?;
-        require("speed", self.speed, true, "a finite number")?;
-        require("kick", self.kick, true, "a finite number")?;
         let held = self.support == Support::Held;
         if held && self.count == 1 {
             let expected = "a count of at least 2 where the lowest cube is held";
@@ -67,9 +61,6 @@ impl Family for ElasticCubes {
             let mut solid = self.solid([self.side; 3], [self.elements; 3], position)?;
             if k == 0 && held {
                 solid.hold_bottom();
-            } else {
-                let kick = if k + 1 == self.count { self.kick } else { 0.0 };
-                solid.add_velocity([kick, 0.0, -self.speed], [0.0; 3]);
             }
             let below = k.checked_sub(1).map(|a| &scene.solids[a]);
             let points: Vec<_> = solid
@@ -82,6 +73,6 @@ impl Family for ElasticCubes {
                 scene.contacts.extend(points.into_iter().map(contact));
             }
         }
-        common.finish(scene)
+        common.finish(scene, Spread::ByIndex)
     }
 }

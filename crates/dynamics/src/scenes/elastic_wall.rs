@@ -1,7 +1,7 @@
 //! A brick wall of elastic bricks.
 
 use super::elastic::elastic_settings;
-use super::{Common, Family, Wall, count};
+use super::{Family, Spread, Wall, count};
 use crate::vec3::scale;
 use crate::{Scene, SceneError, Shape};
 
@@ -34,34 +34,18 @@ impl Family for ElasticWall {
     fn build(&self) -> Result<Scene, SceneError> {
         count("elements", self.elements, 1..=100)?;
         let Self { rows, columns, length, depth, height, head_joints, .. } = *self;
-        let Common { density, mu, e, h, gravity, disturbance, seed } = self.common();
-        let rigid = Wall {
-            rows,
-            columns,
-            length,
-            depth,
-            height,
-            head_joints,
-            density,
-            mu,
-            e,
-            h,
-            gravity,
-            disturbance,
-            seed,
-        };
-        // The bricks and their contacts are those of the rigid wall, with its velocities.
-        let mut scene = Scene { name: Self::NAME.into(), ..rigid.build()? };
+        // The bricks and their contacts are those of the rigid wall.
+        let common = self.common();
+        let rigid =
+            Wall { rows, columns, length, depth, height, head_joints, ..Wall::with(common) };
+        let mut scene = Scene { name: Self::NAME.into(), ..rigid.laid()? };
         for body in std::mem::take(&mut scene.bodies) {
             let Shape::Box { half } = body.shape else { unreachable!("a wall is of bricks") };
             let sides = scale(2.0, half);
             let part = (sides[0] / length * self.elements as f64).round().max(1.0);
             let elements = [part as usize, self.elements, self.elements];
-            let mut solid = self.solid(sides, elements, body.position)?;
-            solid.add_velocity(body.velocity, body.angular_velocity);
-            scene.push_solid(solid);
+            scene.push_solid(self.solid(sides, elements, body.position)?);
         }
-        scene.validate()?;
-        Ok(scene)
+        common.finish(scene, Spread::Random)
     }
 }

@@ -1,19 +1,70 @@
 //! Families of scenes by name, each a struct of settings that builds a [`Scene`].
 //!
-//! A new family is one file and one line of [`SCENES`].
+//! A new family is one file and one line of [`SCENES`]. All share the settings of material and time step, the spread of
+//! masses (`mass_ratio`), the motion at the beginning (`state`, `disturbance`, `impact_speed`, `spin`), `gyroscopic` and
+//! `contact_density`; whatever is random repeats with `seed`. Bodies are elastic solids too in what these settings say,
+//! but one that a support holds is not set in motion.
 
 use std::ops::RangeInclusive;
 
 use nonsmooth_solve::settings::{self, Setting, Settings, SettingsMap};
+use rand::RngExt;
+use rand_pcg::Pcg64;
 
 use crate::error::{positive, require};
-use crate::{Contact, Scene, SceneError, Vec3};
+use crate::{Contact, ElasticBox, Scene, SceneError, Vec3};
 
-/// Declares the settings of a family: its own, then those common to all, each with a default.
+/// Hands the settings that all families share, `[documentation, name: type = default, ...]`, and whatever else it
+/// was given to another macro.
+macro_rules! with_common {
+    ($receiver:ident! $($rest:tt)*) => {
+        $receiver! {
+            [
+                /// Density of the bodies, kg/m³; of the lightest with a `mass_ratio` above 1.
+                density: f64 = 2000.0,
+                /// Density of the densest body over that of the lightest; geometric in between, to the bodies by lot
+                /// unless the scene says otherwise.
+                mass_ratio: f64 = 1.0,
+                /// Coefficient of friction of every contact.
+                mu: f64 = 0.6,
+                /// Newton's coefficient of restitution of every contact, from 0 to 1.
+                e: f64 = 0.0,
+                /// Time step, s.
+                h: f64 = 0.01,
+                /// Acceleration of gravity, downwards, m/s².
+                gravity: f64 = 9.81,
+                /// What moves when the step begins, besides what the scene itself sets in motion.
+                state: $crate::scenes::State = $crate::scenes::State::Rest,
+                /// Random velocities of all bodies within ± this, m/s; 0 means 0.1 in the state `perturbed`.
+                disturbance: f64 = 0.0,
+                /// Velocity in the state `impact`, m/s.
+                impact_speed: f64 = 1.0,
+                /// Random angular velocities of all bodies within ± this about each axis, rad/s.
+                spin: f64 = 0.0,
+                /// How the gyroscopic torque enters; spheres and elastic solids have none.
+                gyroscopic: $crate::Gyroscopic = $crate::Gyroscopic::Explicit,
+                /// Keeps contacts by lot until 3 contacts / degrees of freedom is this; 0 keeps all.
+                contact_density: f64 = 0.0,
+                /// Seed of all that is random.
+                seed: u64 = 0,
+            ]
+            $($rest)*
+        }
+    };
+}
+
+/// Declares the settings of a family: its own, then those common to all, each with a default; `with` changes the
+/// defaults of common ones.
 macro_rules! settings {
+    ($($family:tt)*) => { with_common! { family! $($family)* } };
+}
+
+macro_rules! family {
     (
+        [$($(#[$common_doc:meta])* $common:ident: $common_ty:ty = $common_default:expr,)*]
         $(#[$doc:meta])*
         $name:ident { $($(#[$field_doc:meta])* $field:ident: $ty:ty = $default:expr,)* }
+        $(with { $($changed:ident: $value:expr,)* })?
     ) => {
         $(#[$doc])*
         #[derive(Debug, Clone, PartialEq)]
@@ -21,54 +72,100 @@ macro_rules! settings {
         #[serde(default, deny_unknown_fields)]
         pub struct $name {
             $($(#[$field_doc])* pub $field: $ty,)*
-            /// Density of the bodies, kg/m³.
-            pub density: f64,
-            /// Coefficient of friction of every contact.
-            pub mu: f64,
-            /// Newton's coefficient of restitution of every contact, from 0 to 1.
-            pub e: f64,
-            /// Time step, s.
-            pub h: f64,
-            /// Acceleration of gravity, downwards, m/s².
-            pub gravity: f64,
-            /// Random velocities of all bodies within ± this, m/s.
-            pub disturbance: f64,
-            /// Seed of the random velocities.
-            pub seed: u64,
+            $($(#[$common_doc])* pub $common: $common_ty,)*
         }
 
         impl Default for $name {
             fn default() -> Self {
-                let $crate::scenes::Common { density, mu, e, h, gravity, disturbance, seed } =
-                    $crate::scenes::Common::DEFAULT;
-                Self { $($field: $default,)* density, mu, e, h, gravity, disturbance, seed }
+                Self::with($crate::scenes::Common {
+                    $($($changed: $value,)*)?
+                    ..$crate::scenes::Common::DEFAULT
+                })
             }
         }
 
         impl nonsmooth_solve::settings::Settings for $name {}
 
         impl $name {
+            /// The defaults of its own settings with these common ones.
+            pub(super) fn with(common: $crate::scenes::Common) -> Self {
+                Self { $($field: $default,)* $($common: common.$common,)* }
+            }
+
             fn common(&self) -> $crate::scenes::Common {
-                let Self { density, mu, e, h, gravity, disturbance, seed, .. } = *self;
-                $crate::scenes::Common { density, mu, e, h, gravity, disturbance, seed }
+                $crate::scenes::Common { $($common: self.$common,)* }
             }
         }
     };
 }
 
+macro_rules! common {
+    ([$($(#[$doc:meta])* $field:ident: $ty:ty = $default:expr,)*]) => {
+        /// The settings common to all families.
+        #[derive(Debug, Clone, Copy)]
+        struct Common {
+            $($field: $ty,)*
+        }
+
+        impl Common {
+            const DEFAULT: Self = Self { $($field: $default,)* };
+        }
+    };
+}
+
+with_common! { common! }
+
+/// What moves when the step begins.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum State {
+    /// Nothing.
+    Rest,
+    /// All bodies, by small random velocities.
+    Perturbed,
+    /// All bodies fall with `impact_speed`, so that contacts close at once; with neither a ground nor a held solid to fall
+    /// upon they have random velocities of that size.
+    Impact,
+}
+
+/// How the densities of a `mass_ratio` are given to the bodies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Spread {
+    /// By lot.
+    Random,
+    /// The first body is the lightest, the last the densest.
+    ByIndex,
+}
+
 mod arch;
+mod bridge;
+mod chain;
+mod chute;
 mod elastic;
 mod elastic_cubes;
 mod elastic_wall;
+mod kapla;
+mod periodic_box;
+mod polyhedra;
 mod sliding_box;
+mod sphere_pile;
 mod spheres;
 mod stack;
 mod wall;
 
 pub use arch::Arch;
+pub use bridge::Bridge;
+pub use chain::Chain;
+pub use chute::Chute;
 pub use elastic_cubes::{ElasticCubes, Support};
 pub use elastic_wall::ElasticWall;
+pub use kapla::Kapla;
+pub use periodic_box::{Grains, Periodic, PeriodicBox};
+pub use polyhedra::Polyhedra;
 pub use sliding_box::SlidingBox;
+pub use sphere_pile::SpherePile;
 pub use spheres::{Layout, Spheres};
 pub use stack::Stack;
 pub use wall::Wall;
@@ -78,8 +175,15 @@ pub static SCENES: &[SceneEntry] = &[
     SceneEntry::of::<SlidingBox>(),
     SceneEntry::of::<Stack>(),
     SceneEntry::of::<Wall>(),
+    SceneEntry::of::<Kapla>(),
     SceneEntry::of::<Arch>(),
+    SceneEntry::of::<Bridge>(),
+    SceneEntry::of::<Chain>(),
     SceneEntry::of::<Spheres>(),
+    SceneEntry::of::<SpherePile>(),
+    SceneEntry::of::<Chute>(),
+    SceneEntry::of::<Polyhedra>(),
+    SceneEntry::of::<PeriodicBox>(),
     SceneEntry::of::<ElasticCubes>(),
     SceneEntry::of::<ElasticWall>(),
 ];
@@ -141,38 +245,41 @@ impl SceneEntry {
     }
 }
 
-/// The settings common to all families.
+/// What random numbers are for: each purpose has a stream of its own, so that changing one setting leaves the rest
+/// of a scene as it is.
 #[derive(Debug, Clone, Copy)]
-struct Common {
-    density: f64,
-    mu: f64,
-    e: f64,
-    h: f64,
-    gravity: f64,
-    disturbance: f64,
-    seed: u64,
+enum Purpose {
+    Masses,
+    Impact,
+    Spin,
+    Contacts,
+    Shapes,
+    Places,
+    Faces,
 }
 
 impl Common {
-    const DEFAULT: Self = Self {
-        density: 2000.0,
-        mu: 0.6,
-        e: 0.0,
-        h: 0.01,
-        gravity: 9.81,
-        disturbance: 0.0,
-        seed: 0,
-    };
+    /// Random numbers for one purpose, reproducible by `seed`.
+    fn random(&self, purpose: Purpose) -> Pcg64 {
+        Pcg64::new(self.seed.into(), 1 + purpose as u128)
+    }
 
     /// An empty scene of the family, if the common settings are possible.
     fn scene(&self, name: &str) -> Result<Scene, SceneError> {
         positive("density", self.density)?;
+        positive("mass_ratio", self.mass_ratio)?;
         require("mu", self.mu, self.mu >= 0.0, "a number of at least 0")?;
         require("e", self.e, (0.0..=1.0).contains(&self.e), "a number from 0 to 1")?;
         positive("h", self.h)?;
-        require("gravity", self.gravity, self.gravity >= 0.0, "a number of at least 0")?;
-        let amplitude = self.disturbance;
-        require("disturbance", amplitude, amplitude >= 0.0, "a number of at least 0")?;
+        for (key, x) in [
+            ("gravity", self.gravity),
+            ("disturbance", self.disturbance),
+            ("impact_speed", self.impact_speed),
+            ("spin", self.spin),
+            ("contact_density", self.contact_density),
+        ] {
+            require(key, x, x >= 0.0, "a number of at least 0")?;
+        }
         Ok(Scene {
             name: name.into(),
             bodies: vec![],
@@ -180,6 +287,7 @@ impl Common {
             contacts: vec![],
             gravity: [0.0, 0.0, -self.gravity],
             h: self.h,
+            gyroscopic: self.gyroscopic,
             ground: Some(crate::Ground::FLAT),
             obstacles: vec![],
         })
@@ -190,12 +298,114 @@ impl Common {
         Contact::new(a, b, point, normal, self.mu, self.e)
     }
 
-    /// The finished scene, disturbed and validated.
-    fn finish(&self, mut scene: Scene) -> Result<Scene, SceneError> {
-        scene.disturb(self.disturbance, self.seed);
+    /// Random radii within ± the share `spread` of `radius`.
+    ///
+    /// Errors: values that are no radii, by the keys `radius` and `spread`.
+    fn radii(&self, count: usize, radius: f64, spread: f64) -> Result<Vec<f64>, SceneError> {
+        length("radius", radius)?;
+        let expected = "a number from 0 to below 1";
+        require("spread", spread, (0.0..1.0).contains(&spread), expected)?;
+        let mut rng = self.random(Purpose::Shapes);
+        let mut draw = |_| radius * (1.0 + spread * rng.random_range(-1.0..=1.0));
+        Ok((0..count).map(&mut draw).collect())
+    }
+
+    /// The finished scene: masses spread, set in motion, contacts thinned, validated.
+    fn finish(&self, mut scene: Scene, spread: Spread) -> Result<Scene, SceneError> {
+        self.spread_masses(&mut scene, spread);
+        self.set_in_motion(&mut scene);
+        self.thin(&mut scene)?;
         scene.validate()?;
         Ok(scene)
     }
+
+    fn spread_masses(&self, scene: &mut Scene, spread: Spread) {
+        let n = scene.bodies.len() + scene.solids.len();
+        if self.mass_ratio == 1.0 || n < 2 {
+            return;
+        }
+        let mut ranks: Vec<usize> = (0..n).collect();
+        if spread == Spread::Random {
+            shuffle(&mut ranks, n, &mut self.random(Purpose::Masses));
+        }
+        let factor = |rank| self.mass_ratio.powf(rank as f64 / (n - 1) as f64);
+        let (of_bodies, of_solids) = ranks.split_at(scene.bodies.len());
+        for (body, &rank) in scene.bodies.iter_mut().zip(of_bodies) {
+            body.mass *= factor(rank);
+            body.inertia = body.inertia.map(|row| row.map(|x| factor(rank) * x));
+        }
+        for (solid, &rank) in scene.solids.iter_mut().zip(of_solids) {
+            solid.material.density *= factor(rank);
+        }
+    }
+
+    fn set_in_motion(&self, scene: &mut Scene) {
+        let amplitude = match self.state {
+            State::Perturbed if self.disturbance == 0.0 => 0.1,
+            _ => self.disturbance,
+        };
+        scene.disturb(amplitude, self.seed);
+        if self.state == State::Impact {
+            let falls = scene.contacts.iter().any(|c| c.a.is_none())
+                || scene.solids.iter().any(ElasticBox::is_held);
+            let mut rng = self.random(Purpose::Impact);
+            scene.add_velocities(|_| match falls {
+                true => ([0.0, 0.0, -self.impact_speed], [0.0; 3]),
+                false => (symmetric(self.impact_speed, &mut rng), [0.0; 3]),
+            });
+        }
+        let mut rng = self.random(Purpose::Spin);
+        scene.add_velocities(|_| ([0.0; 3], symmetric(self.spin, &mut rng)));
+    }
+
+    /// Keeps a random subset of the contacts so that `3 nc / n` comes to `contact_density`.
+    fn thin(&self, scene: &mut Scene) -> Result<(), SceneError> {
+        if self.contact_density == 0.0 {
+            return Ok(());
+        }
+        let (all, n) = (scene.contacts.len(), scene.dofs());
+        let kept = (self.contact_density * n as f64 / 3.0).round().max(1.0);
+        if kept > all as f64 {
+            let most = 3.0 * all as f64 / n as f64;
+            let expected = format!("0 or a number up to {most:.4}, that of the scene");
+            return Err(SceneError::value("contact_density", expected, self.contact_density));
+        }
+        let kept = kept as usize;
+        let mut chosen: Vec<usize> = (0..all).collect();
+        shuffle(&mut chosen, kept, &mut self.random(Purpose::Contacts));
+        chosen.truncate(kept);
+        chosen.sort_unstable();
+        scene.contacts = chosen.into_iter().map(|c| scene.contacts[c]).collect();
+        Ok(())
+    }
+}
+
+/// Puts a random choice of the entries first, in random order (Fisher and Yates).
+fn shuffle(items: &mut [usize], first: usize, rng: &mut Pcg64) {
+    for k in 0..first.min(items.len()) {
+        let other = rng.random_range(k..items.len());
+        items.swap(k, other);
+    }
+}
+
+/// A vector of random components within ± `amplitude`.
+fn symmetric(amplitude: f64, rng: &mut Pcg64) -> Vec3 {
+    std::array::from_fn(|_| amplitude * rng.random_range(-1.0..=1.0))
+}
+
+/// A vector of member `k` where every second member lies crosswise: x and y change places for odd `k`.
+fn crosswise(k: usize, [x, y, z]: Vec3) -> Vec3 {
+    if k.is_multiple_of(2) { [x, y, z] } else { [y, x, z] }
+}
+
+/// `x` is a length in m whose cube is a number too.
+fn length(key: &str, x: f64) -> Result<(), SceneError> {
+    require(key, x, (1e-9..=1e9).contains(&x), "a number from 1e-9 to 1e9")
+}
+
+/// `x` is a distance up to which spheres touch, in mean radii.
+fn gap(x: f64) -> Result<(), SceneError> {
+    require("gap", x, x > 0.0 && x <= 1.0, "a positive number up to 1")
 }
 
 /// `n` is an `allowed` count; the upper bound keeps a slip of the keyboard from filling the memory.

@@ -1,14 +1,16 @@
 //! One box on a plane.
 
-use super::Family;
+use super::{Family, Spread, count};
 use crate::error::{positive, require};
-use crate::vec3::{Y, Z, apply, rectangle, scale};
+use crate::vec3::{Y, Z, add, apply, rectangle, scale};
 use crate::{Contact, Ground, RigidBody, Rotation, Scene, SceneError, Shape};
 
 settings! {
     /// A box on a plane that slopes down along x, thrown along the slope: four contacts for six degrees of
-    /// freedom, the smallest hyperstatic problem. T1 points down the slope.
+    /// freedom, the smallest hyperstatic problem. T1 points down the slope. Several boxes slide side by side.
     SlidingBox {
+        /// Number of boxes.
+        count: usize = 1,
         /// Side along the slope, m.
         length: f64 = 0.4,
         /// Side across the slope, m.
@@ -24,11 +26,12 @@ settings! {
 
 impl Family for SlidingBox {
     const NAME: &'static str = "sliding_box";
-    const SUMMARY: &'static str = "a box thrown along a sloping plane, four contacts";
+    const SUMMARY: &'static str = "boxes thrown along a sloping plane, four contacts each";
 
     fn build(&self) -> Result<Scene, SceneError> {
         let common = self.common();
         let mut scene = common.scene(Self::NAME)?;
+        count("count", self.count, 1..=100_000)?;
         positive("length", self.length)?;
         positive("width", self.width)?;
         positive("height", self.height)?;
@@ -41,14 +44,17 @@ impl Family for SlidingBox {
         let [down, normal] = [[1.0, 0.0, 0.0], Z].map(|d| apply(&turned, d));
         let [a, b, c] = [self.length, self.width, self.height].map(|side| 0.5 * side);
         let body = RigidBody::solid(Shape::Box { half: [a, b, c] }, self.density)?;
-        let position = scale(c, normal);
         let velocity = scale(self.speed, down);
-        let body = scene.push(RigidBody { position, rotation, velocity, ..body });
-        for point in rectangle([0.0; 3], scale(a, down), scale(b, Y)) {
-            let contact = common.contact(None, body, point, normal);
-            scene.contacts.push(Contact { tangent: down, ..contact });
+        for k in 0..self.count {
+            let foot = scale(1.5 * self.width * k as f64, Y);
+            let position = add(foot, scale(c, normal));
+            let body = scene.push(RigidBody { position, rotation, velocity, ..body.clone() });
+            for point in rectangle(foot, scale(a, down), scale(b, Y)) {
+                let contact = common.contact(None, body, point, normal);
+                scene.contacts.push(Contact { tangent: down, ..contact });
+            }
         }
         scene.ground = Some(Ground { point: [0.0; 3], normal, along: down });
-        common.finish(scene)
+        common.finish(scene, Spread::Random)
     }
 }

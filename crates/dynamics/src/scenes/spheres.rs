@@ -1,6 +1,6 @@
 //! A pile of spheres.
 
-use super::{Family, count};
+use super::{Family, Spread, count};
 use crate::error::positive;
 use crate::vec3::{Vec3, Z, add, scale, sub};
 use crate::{RigidBody, Scene, SceneError, Shape};
@@ -107,6 +107,6 @@ impl Family for Spheres {
                 }
             }
         }
-        common.finish(scene)
+        common.finish(scene, Spread::Random)
     }
 }

@@ -1,13 +1,13 @@
 //! A tower of boxes.
 
-use super::{Family, count};
+use super::{Family, Spread, count};
 use crate::error::{positive, require};
 use crate::vec3::{Z, rectangle};
 use crate::{RigidBody, Scene, SceneError, Shape};
 
 settings! {
-    /// Boxes on each other on the ground, four contacts for each interface. A mass ratio far from 1 makes the
-    /// problem ill conditioned; a kick makes one box slide under its load.
+    /// Boxes on each other on the ground, four contacts for each interface. `mass_ratio` is that of the top box to the
+    /// bottom box; far from 1 it makes the problem ill conditioned. A kick makes one box slide under its load.
     Stack {
         /// Number of boxes.
         count: usize = 5,
@@ -15,8 +15,6 @@ settings! {
         width: f64 = 1.0,
         /// Vertical side of a box, m.
         height: f64 = 0.6,
-        /// Mass of the top box over that of the bottom box; geometric in between. The bottom box has `density`.
-        mass_ratio: f64 = 1.0,
         /// Horizontal velocity of the box that is kicked, m/s.
         kick: f64 = 0.0,
         /// The box that is kicked, 1 at the bottom.
@@ -26,7 +24,7 @@ settings! {
 
 impl Family for Stack {
     const NAME: &'static str = "stack";
-    const SUMMARY: &'static str = "boxes on each other, with a mass ratio and a kick";
+    const SUMMARY: &'static str = "boxes on each other, and a kick";
 
     fn build(&self) -> Result<Scene, SceneError> {
         let common = self.common();
@@ -34,22 +32,19 @@ impl Family for Stack {
         count("count", self.count, 1..=10_000)?;
         positive("width", self.width)?;
         positive("height", self.height)?;
-        positive("mass_ratio", self.mass_ratio)?;
         require("kick", self.kick, true, "a finite number")?;
         count("kicked", self.kicked, 1..=self.count)?;
 
         let (a, c) = (0.5 * self.width, 0.5 * self.height);
         for k in 0..self.count {
-            let rank = k as f64 / (self.count - 1).max(1) as f64;
-            let density = self.density * self.mass_ratio.powf(rank);
             let bottom = self.height * k as f64;
-            let body = RigidBody::solid(Shape::Box { half: [a, a, c] }, density)?;
+            let body = RigidBody::solid(Shape::Box { half: [a, a, c] }, self.density)?;
             let body = scene.push(body.at([0.0, 0.0, bottom + c]));
             for point in rectangle([0.0, 0.0, bottom], [a, 0.0, 0.0], [0.0, a, 0.0]) {
                 scene.contacts.push(common.contact(k.checked_sub(1), body, point, Z));
             }
         }
         scene.bodies[self.kicked - 1].velocity[0] = self.kick;
-        common.finish(scene)
+        common.finish(scene, Spread::ByIndex)
     }
 }

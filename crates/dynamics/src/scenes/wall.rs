@@ -1,6 +1,6 @@
 //! A brick wall in running bond.
 
-use super::{Family, count};
+use super::{Family, Spread, count};
 use crate::error::positive;
 use crate::vec3::{X, Z, rectangle};
 use crate::{RigidBody, Scene, SceneError, Shape};
@@ -29,6 +29,13 @@ impl Family for Wall {
     const SUMMARY: &'static str = "a dry brick wall in running bond";
 
     fn build(&self) -> Result<Scene, SceneError> {
+        self.common().finish(self.laid()?, Spread::Random)
+    }
+}
+
+impl Wall {
+    /// The bricks and their contacts, not yet finished by the common settings.
+    pub(super) fn laid(&self) -> Result<Scene, SceneError> {
         let common = self.common();
         let mut scene = common.scene(Self::NAME)?;
         count("rows", self.rows, 1..=1000)?;
@@ -77,6 +84,6 @@ impl Family for Wall {
             }
             below = bricks;
         }
-        common.finish(scene)
+        Ok(scene)
     }
 }
