@@ -1,6 +1,6 @@
 //! Worker processes side by side, and the campaign from its plan to its last line.
 
-use std::collections::{BTreeMap, HashSet, VecDeque};
+use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -81,11 +81,11 @@ pub struct Summary {
     pub done: usize,
     /// Of them, those done by this call.
     pub new: usize,
-    /// Runs by how they ended.
+    /// Of those, how many ended how.
     pub endings: BTreeMap<&'static str, usize>,
     /// Solves whose process had to wait for a processor for more than a tenth of the time.
     pub disturbed: usize,
-    /// Problems that cannot be used.
+    /// Problems that cannot be used: unreadable, or changed since their runs were made.
     pub unreadable: usize,
     /// Whether it was cancelled.
     pub cancelled: bool,
@@ -95,9 +95,9 @@ pub struct Summary {
 ///
 /// Problems are dealt to shards one by one, so that all solvers of a problem run on the same machine. In each problem
 /// all solvers run one after another. Runs in progress when `cancel` is set are dropped; they will be done on resumption.
+/// A problem that cannot be read, or whose file has changed since `there` was written, is told and left out.
 ///
-/// Errors: solver labels that nobody takes; a problem whose file has changed since `there` was written, by name; a
-/// worker that cannot be started; a journal that cannot be written.
+/// Errors: solver labels that nobody takes; a worker that cannot be started; a journal that cannot be written.
 pub fn run(
     setup: &Setup,
     solvers: &impl Solvers,
@@ -106,91 +106,46 @@ pub fn run(
     cancel: &AtomicBool,
     watch: &mut dyn FnMut(Event<'_>),
 ) -> Result<Summary, String> {
-    let plan = &setup.plan;
-    let (shard, shards) = plan.shard.unwrap_or((1, 1));
+    let kinds = setup.plan.solvers.iter().map(|label| Label::parse(label)?.kinds(solvers));
+    let kinds = kinds.collect::<Result<Vec<_>, _>>()?;
+    let (shard, shards) = setup.plan.shard.unwrap_or((1, 1));
     let inputs: Vec<&Input> = setup.inputs.iter().skip(shard - 1).step_by(shards).collect();
-    let kinds = plan
-        .solvers
-        .iter()
-        .map(|label| Label::parse(label)?.kinds(solvers))
-        .collect::<Result<Vec<_>, _>>()?;
-    let lanes = lanes(plan.jobs);
-
+    let lanes = lanes(setup.plan.jobs);
     // First what the problems are: it decides which solvers take them.
-    let job = |input: &Input, task| {
-        let (file, memory_limit) = (input.path.clone(), plan.memory_limit);
-        Job { file, task, memory_limit, processors: vec![] }
-    };
-    let jobs = inputs.iter().map(|&input| (input, job(input, Task::Describe))).collect();
-    let mut described = BTreeMap::new();
-    let cancelled = each(setup, &lanes, jobs, cancel, &mut |input: &Input, end, _| {
-        let problem = problem(input, end);
-        let problem = match there.problems.get(&input.name) {
-            Some(old) if old.error.is_none() && old.digest != problem.digest => {
-                let name = &input.name;
-                return Err(match problem.error {
-                    Some(error) => format!("{name}: known from the runs, but now: {error}"),
-                    None => format!("{name}: its file has changed since its runs were written"),
-                });
-            }
-            known => {
-                if known != Some(&problem) {
-                    journal.append(&Line::Problem(problem.clone()))?;
-                }
-                problem
-            }
-        };
-        described.insert(input.name.clone(), problem);
-        let done = described.len();
-        watch(Event::Described { done, all: inputs.len(), problem: &described[&input.name] });
-        Ok(())
-    })?;
+    let (described, cancelled) = describe(setup, &inputs, &lanes, there, journal, cancel, watch)?;
     let unreadable = described.values().filter(|p| p.error.is_some()).count();
     let mut summary = Summary { unreadable, cancelled, ..Summary::default() };
     if cancelled {
         return Ok(summary);
     }
 
-    let before: HashSet<Key> = there.runs.iter().map(Run::key).collect();
-    let campaign = journal.campaign().to_owned();
+    let before: HashMap<Key, Ending> = there.runs.iter().map(|r| (r.key(), r.ending)).collect();
     let mut jobs = VecDeque::new();
     let mut refused = vec![];
-    for &input in &inputs {
+    for input in &inputs {
         let problem = &described[&input.name];
         if problem.error.is_some() {
             continue;
         }
-        for &tolerance in &plan.tolerances {
-            for (solver, kinds) in plan.solvers.iter().zip(&kinds) {
-                summary.all += 1;
-                let run = blank(&campaign, problem, solver, tolerance);
-                if before.contains(&run.key()) {
-                    summary.done += 1;
-                } else if kinds.iter().map(|k: &Kind| k.name()).all(|k| k != problem.kind) {
-                    let message = format!("takes no {} problems", problem.kind);
-                    refused.push(Run { ending: Ending::Refused, message: Some(message), ..run });
-                } else {
-                    let task = Task::Solve {
-                        solver: solver.clone(),
-                        tolerance,
-                        time_limit: plan.time_limit,
-                        repeats: plan.repeats,
-                        repeat_below: plan.repeat_below,
-                        trace: plan.trace,
-                    };
-                    jobs.push_back((run, job(input, task)));
-                }
+        for (label, kinds, tolerance) in runs_of(&setup.plan, &kinds) {
+            let run = blank(journal.campaign(), problem, label, tolerance);
+            summary.all += 1;
+            if let Some(ending) = before.get(&run.key()) {
+                summary.count(*ending);
+            } else if kinds.iter().all(|kind| kind.name() != problem.kind) {
+                let message = Some(format!("takes no {} problems", problem.kind));
+                refused.push(Run { ending: Ending::Refused, message, ..run });
+            } else {
+                jobs.push_back((run, setup.job(input, setup.solve(label, tolerance))));
             }
         }
     }
     let mut clock = Clock::new(jobs.iter().map(|(run, _)| run), lanes.len());
     let mut ended = |run: Run, took: Option<Duration>, summary: &mut Summary| {
         journal.append(&Line::Run(Box::new(run.clone())))?;
-        summary.done += 1;
+        summary.count(run.ending);
         summary.new += 1;
-        *summary.endings.entry(run.ending.name()).or_insert(0) += 1;
-        let waited = |(wall, cpu): (f64, f64)| wall > 0.01 && wall > 1.1 * cpu;
-        summary.disturbed += usize::from(run.seconds.zip(run.cpu_seconds).is_some_and(waited));
+        summary.disturbed += usize::from(disturbed(&run));
         took.into_iter().for_each(|took| clock.note(&run, took));
         let left = clock.left();
         watch(Event::Ended { done: summary.done, all: summary.all, run: &run, left });
@@ -200,9 +155,77 @@ pub fn run(
         ended(run, None, &mut summary)?;
     }
     summary.cancelled = each(setup, &lanes, jobs, cancel, &mut |blank, end, took| {
-        ended(finished(blank, end, plan), Some(took), &mut summary)
+        ended(finished(blank, end, &setup.plan), Some(took), &mut summary)
     })?;
     Ok(summary)
+}
+
+/// Every solver with the kinds of problem that it takes, at every tolerance.
+fn runs_of<'a>(
+    plan: &'a Plan,
+    kinds: &'a [Vec<Kind>],
+) -> impl Iterator<Item = (&'a str, &'a [Kind], f64)> {
+    plan.tolerances.iter().flat_map(move |&tolerance| {
+        let solvers = plan.solvers.iter().zip(kinds);
+        solvers.map(move |(label, kinds)| (label.as_str(), kinds.as_slice(), tolerance))
+    })
+}
+
+/// Has every problem described, and writes down those that `there` does not know. Second: whether that was cancelled.
+fn describe(
+    setup: &Setup,
+    inputs: &[&Input],
+    lanes: &[Vec<usize>],
+    there: &Runs,
+    journal: &mut Journal,
+    cancel: &AtomicBool,
+    watch: &mut dyn FnMut(Event<'_>),
+) -> Result<(BTreeMap<String, Problem>, bool), String> {
+    let jobs = inputs.iter().map(|&input| (input, setup.job(input, Task::Describe))).collect();
+    let mut described = BTreeMap::new();
+    let cancelled = each(setup, lanes, jobs, cancel, &mut |input: &Input, end, _| {
+        let mut problem = problem(input, end);
+        match there.problems.get(&input.name) {
+            Some(old) if old.error.is_none() && old.digest != problem.digest => {
+                let file = input.path.display();
+                let why = problem.error.unwrap_or_else(|| {
+                    format!("{file}: expected the file that its runs were made on, found another")
+                });
+                problem = Problem { error: Some(why), ..old.clone() };
+            }
+            Some(old) if *old == problem => {}
+            _ => journal.append(&Line::Problem(problem.clone()))?,
+        }
+        let (done, all) = (described.len() + 1, inputs.len());
+        watch(Event::Described { done, all, problem: &problem });
+        described.insert(input.name.clone(), problem);
+        Ok(())
+    })?;
+    Ok((described, cancelled))
+}
+
+impl Setup {
+    fn job(&self, input: &Input, task: Task) -> Job {
+        let memory_limit = self.plan.memory_limit;
+        Job { file: input.path.clone(), task, memory_limit, processors: vec![] }
+    }
+
+    fn solve(&self, label: &str, tolerance: f64) -> Task {
+        let &Plan { time_limit, repeats, repeat_below, trace, .. } = &self.plan;
+        Task::Solve { solver: label.into(), tolerance, time_limit, repeats, repeat_below, trace }
+    }
+}
+
+impl Summary {
+    fn count(&mut self, ending: Ending) {
+        self.done += 1;
+        *self.endings.entry(ending.name()).or_insert(0) += 1;
+    }
+}
+
+/// Whether a solve had to wait for a processor for more than a tenth of its time.
+fn disturbed(run: &Run) -> bool {
+    run.seconds.zip(run.cpu_seconds).is_some_and(|(wall, cpu)| wall > 0.01 && wall > 1.1 * cpu)
 }
 
 /// The processors of each worker: the physical cores dealt evenly, or no restriction for one worker alone or where
