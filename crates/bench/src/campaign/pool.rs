@@ -1,12 +1,12 @@
 //! Worker processes side by side, and the campaign from its plan to its last line.
 
-use std::collections::{BTreeMap, HashSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use nonsmooth_problem::Kind;
 
@@ -70,6 +70,11 @@ pub enum Event<'a> {
         /// An estimate of the time left.
         left: Option<Duration>,
     },
+    /// A problem whose file can no more be used; its runs from now on are left out. Said once for each problem.
+    Lost {
+        /// What happened to the file, by its name.
+        why: &'a str,
+    },
 }
 
 /// What a campaign came to.
@@ -87,6 +92,8 @@ pub struct Summary {
     pub disturbed: usize,
     /// Problems that cannot be used.
     pub unreadable: usize,
+    /// Runs that are left out, as the file of their problem changed or went during the campaign.
+    pub lost: usize,
     /// Whether it was cancelled.
     pub cancelled: bool,
 }
@@ -95,6 +102,7 @@ pub struct Summary {
 ///
 /// Problems are dealt to shards one by one, so that all solvers of a problem run on the same machine. In each problem
 /// all solvers run one after another. Runs in progress when `cancel` is set are dropped; they will be done on resumption.
+/// So are those of a problem whose file changes or goes during the campaign.
 ///
 /// Errors: solver labels that nobody takes; a problem whose file has changed since `there` was written, by name; a
 /// worker that cannot be started; a journal that cannot be written.
@@ -115,6 +123,7 @@ pub fn run(
         .map(|label| Label::parse(label)?.kinds(solvers))
         .collect::<Result<Vec<_>, _>>()?;
     let lanes = lanes(plan.jobs);
+    let stamps: Vec<Stamp> = inputs.iter().map(|input| stamp(&input.path)).collect();
 
     // First what the problems are: it decides which solvers take them.
     let job = |input: &Input, task| {
@@ -155,7 +164,7 @@ pub fn run(
     let campaign = journal.campaign().to_owned();
     let mut jobs = VecDeque::new();
     let mut refused = vec![];
-    for &input in &inputs {
+    for (&input, &stamp) in inputs.iter().zip(&stamps) {
         let problem = &described[&input.name];
         if problem.error.is_some() {
             continue;
@@ -178,30 +187,41 @@ pub fn run(
                         repeat_below: plan.repeat_below,
                         trace: plan.trace,
                     };
-                    jobs.push_back((run, job(input, task)));
+                    jobs.push_back(((run, input, stamp), job(input, task)));
                 }
             }
         }
     }
-    let mut clock = Clock::new(jobs.iter().map(|(run, _)| run), lanes.len());
-    let mut ended = |run: Run, took: Option<Duration>, summary: &mut Summary| {
-        journal.append(&Line::Run(Box::new(run.clone())))?;
-        summary.done += 1;
-        summary.new += 1;
-        *summary.endings.entry(run.ending.name()).or_insert(0) += 1;
-        let waited = |(wall, cpu): (f64, f64)| wall > 0.01 && wall > 1.1 * cpu;
-        summary.disturbed += usize::from(run.seconds.zip(run.cpu_seconds).is_some_and(waited));
-        took.into_iter().for_each(|took| clock.note(&run, took));
-        let left = clock.left();
-        watch(Event::Ended { done: summary.done, all: summary.all, run: &run, left });
-        Ok::<_, String>(())
-    };
+    let mut clock = Clock::new(jobs.iter().map(|((run, ..), _)| run), lanes.len());
+    let mut told = BTreeSet::new();
+    let mut ended =
+        |run: Run, lost: Option<String>, took: Option<Duration>, summary: &mut Summary| {
+            took.into_iter().for_each(|took| clock.note(&run, took));
+            if let Some(why) = lost {
+                summary.lost += 1;
+                if told.insert(run.problem) {
+                    watch(Event::Lost { why: &why });
+                }
+                return Ok(());
+            }
+            journal.append(&Line::Run(Box::new(run.clone())))?;
+            summary.done += 1;
+            summary.new += 1;
+            *summary.endings.entry(run.ending.name()).or_insert(0) += 1;
+            let waited = |(wall, cpu): (f64, f64)| wall > 0.01 && wall > 1.1 * cpu;
+            summary.disturbed += usize::from(run.seconds.zip(run.cpu_seconds).is_some_and(waited));
+            let left = clock.left();
+            watch(Event::Ended { done: summary.done, all: summary.all, run: &run, left });
+            Ok::<_, String>(())
+        };
     for run in refused {
-        ended(run, None, &mut summary)?;
+        ended(run, None, None, &mut summary)?;
     }
-    summary.cancelled = each(setup, &lanes, jobs, cancel, &mut |blank, end, took| {
-        ended(finished(blank, end, plan), Some(took), &mut summary)
-    })?;
+    summary.cancelled =
+        each(setup, &lanes, jobs, cancel, &mut |(blank, input, before), end, took| {
+            let lost = lost(input, before, &end);
+            ended(finished(blank, end, plan), lost, Some(took), &mut summary)
+        })?;
     Ok(summary)
 }
 
@@ -264,6 +284,26 @@ fn each<T: Send>(
     outcome.map(|()| cancel.load(Ordering::Relaxed))
 }
 
+/// What tells that a file is as it was: its length and the time of its last change. None where there is no file.
+type Stamp = Option<(u64, Option<SystemTime>)>;
+
+fn stamp(file: &Path) -> Stamp {
+    std::fs::metadata(file).ok().map(|m| (m.len(), m.modified().ok()))
+}
+
+/// Why a run is none of the problem that was described, if so.
+fn lost(input: &Input, before: Stamp, end: &End) -> Option<String> {
+    let file = input.path.display();
+    match (stamp(&input.path), end) {
+        (None, _) => Some(format!("{file}: expected the problem, found that its file is gone")),
+        (now, _) if now != before => {
+            Some(format!("{file}: expected the problem as it was, found that its file has changed"))
+        }
+        (_, End::Said(Said::Unreadable(why))) => Some(why.clone()),
+        _ => None,
+    }
+}
+
 /// What a worker's word on a file comes to.
 fn problem(input: &Input, end: End) -> Problem {
     let named =
@@ -315,9 +355,7 @@ fn finished(run: Run, end: End, plan: &Plan) -> Run {
             tolerance: run.tolerance,
             ..*result
         },
-        End::Said(Said::Refused(message) | Said::Unreadable(message)) => {
-            ended(Ending::Refused, message)
-        }
+        End::Said(Said::Refused(message)) => ended(Ending::Refused, message),
         End::Said(other) => ended(Ending::Crashed, format!("expected a result, found {other:?}")),
         End::Hung { iteration, best, seconds, loading } => {
             let what = if loading { "reading the problem" } else { "the solve" };
