@@ -312,7 +312,8 @@ impl Comparison {
         text += &format!("{count} compared, the times of {}", self.timed);
         text += &format!("; {} missing, {} additional\n", self.missing, self.additional);
         fn at(p: &Pair) -> String {
-            format!("{}  {}  {:e}", p.problem, p.solver, p.tolerance)
+            // Names may hold anything; a pair is one line.
+            format!("{}  {}  {:e}", p.problem, p.solver, p.tolerance).replace(char::is_control, " ")
         }
         let mut list = |title: &str, lines: Vec<String>| {
             if !lines.is_empty() {

@@ -131,6 +131,26 @@ struct Table {
 const ALIASES: [(&str, &str); 3] =
     [("tol", "tolerance"), ("iters", "iterations"), ("nc", "contacts")];
 
+/// The columns that are read.
+const USED: [&str; 16] = [
+    "problem",
+    "solver",
+    "tolerance",
+    "seconds",
+    "error",
+    "status",
+    "iterations",
+    "factorisations",
+    "contacts",
+    "family",
+    "kind",
+    "seconds_median",
+    "seconds_max",
+    "repeats",
+    "cpu_seconds",
+    "peak_memory",
+];
+
 fn canonical(column: &str) -> String {
     let column = column.trim().trim_start_matches('\u{feff}').to_lowercase();
     let alias = ALIASES.iter().find(|(alias, _)| *alias == column);
@@ -169,11 +189,21 @@ fn csv_table(file: &Path, bytes: &[u8]) -> Result<Table, ForeignError> {
         found: e.to_string(),
     })?;
     let columns: Vec<String> = header.iter().map(canonical).collect();
+    let twice = |c: &&&str| columns.iter().filter(|column| column == *c).count() > 1;
+    if let Some(column) = USED.iter().find(twice) {
+        return Err(ForeignError::Table {
+            file: file.into(),
+            expected: format!("one column `{column}`"),
+            found: "several".into(),
+        });
+    }
     let mut rows = vec![];
     for record in reader.byte_records() {
         // From memory, byte records cannot fail.
         let Ok(record) = record else { break };
-        let line = record.position().map_or(0, csv::Position::line);
+        // Where lines end with CR LF the reader stands before the LF of the line before.
+        let before = |p: &csv::Position| bytes.get(p.byte() as usize) == Some(&b'\n');
+        let line = record.position().map_or(0, |p| p.line() + u64::from(before(p)));
         let cells: Vec<_> =
             record.iter().map(|c| String::from_utf8_lossy(c).into_owned()).collect();
         let row = if cells.len() == columns.len() {
@@ -189,9 +219,10 @@ fn csv_table(file: &Path, bytes: &[u8]) -> Result<Table, ForeignError> {
 fn json_table(file: &Path, bytes: &[u8]) -> Result<Table, ForeignError> {
     use serde_json::Value;
     let text = String::from_utf8_lossy(bytes);
+    let text = text.trim_start_matches('\u{feff}');
     let values: Vec<(String, Result<Value, serde_json::Error>)> =
         if text.trim_start().starts_with('[') {
-            let all: Vec<Value> = serde_json::from_str(&text).map_err(|e| ForeignError::Table {
+            let all: Vec<Value> = serde_json::from_str(text).map_err(|e| ForeignError::Table {
                 file: file.into(),
                 expected: "an array of objects, or a line for each".into(),
                 found: e.to_string(),
@@ -311,6 +342,9 @@ impl<'a> Reader<'a> {
         }
         if !self.has_error {
             notes.push("no column `error`: what is solved is the program's own word".into());
+            if total > 0 && !self.runs.runs.iter().any(Run::solved) {
+                notes.push("no row has the status `0` or `solved`: none counts as solved".into());
+            }
         }
         if self.false_claims > 0 {
             notes.push(format!(
@@ -365,7 +399,7 @@ impl<'a> Reader<'a> {
             seconds,
             seconds_median: cells.size("seconds_median")?,
             seconds_max: cells.size("seconds_max")?,
-            repeats: cells.whole("repeats")?.unwrap_or(0) as u32,
+            repeats: cells.whole("repeats")?.map_or(0, |n| u32::try_from(n).unwrap_or(u32::MAX)),
             cpu_seconds: cells.size("cpu_seconds")?,
             peak_memory: cells.whole("peak_memory")?,
             loaded_memory: None,
@@ -424,7 +458,7 @@ impl<'a> Reader<'a> {
 
 /// Whether a status says that the solver succeeded.
 fn claims(status: Option<&str>) -> bool {
-    status.is_some_and(|s| ["0", "solved"].contains(&s))
+    status.is_some_and(|s| s == "0" || s.eq_ignore_ascii_case("solved"))
 }
 
 /// How a row ended. `error`: the program's own, where the table has that column.

@@ -9,7 +9,7 @@ use crate::plural;
 use crate::profile::{Selection, VIRTUAL_BEST};
 use crate::record::{Campaign, Ending};
 use crate::runs::Runs;
-use crate::tables::{By, Row, Table, summary, summary_page, unsolved};
+use crate::tables::{By, Row, Table, markdown_text, summary, summary_page, unsolved};
 use crate::traits_table;
 
 /// The figures that a page shows for each kind of problem, by the names that [`figures`] gives them.
@@ -86,7 +86,8 @@ fn heading(kind: &str) -> String {
         "friction_local_3d" => "Local problems, u = W r + q".into(),
         "friction_global_2d" => "Global problems in the plane, M v = H r + f".into(),
         "friction_global_3d" => "Global problems, M v = H r + f".into(),
-        other => format!("Problems of kind {other}"),
+        "" => "Problems of unknown kind".into(),
+        other => format!("Problems of kind {}", markdown_text(other)),
     }
 }
 
@@ -104,8 +105,10 @@ fn introduction(runs: &Runs, command: &str) -> String {
     let families: std::collections::BTreeSet<_> = runs.runs.iter().map(|r| &r.family).collect();
     let problems: usize = kinds(runs).iter().map(|k| k.1).sum();
     let solvers = runs.solvers();
+    let command = markdown_text(command);
+    let comment = command.replace("--", "\u{2010}\u{2010}");
     let mut text = format!(
-        "# The solvers compared\n\n<!-- Made by `{command}`; changes by hand are lost. -->\n\n{} of {}, {}, {}. \
+        "# The solvers compared\n\n<!-- Made by `{comment}`; changes by hand are lost. -->\n\n{} of {}, {}, {}. \
          Made by `{command}`, from the problems to this page.\n",
         plural(problems, "problem"),
         if families.len() == 1 {
@@ -117,7 +120,7 @@ fn introduction(runs: &Runs, command: &str) -> String {
         plural(runs.runs.len(), "run"),
     );
     for campaign in &runs.campaigns {
-        text += &format!("\n- {}", measured(campaign));
+        text += &format!("\n- {}", markdown_text(&measured(campaign)));
     }
     text += "\n\nWhat a run is and how it is timed: [benchmarking](benchmarking.md). *Solved* is the judge's word on the relative residual \
              ([notation](notation.md)). *Fastest* is the share of problems on which the solver needs the least time, and the *ratios* are its \
@@ -138,10 +141,13 @@ fn measured(campaign: &Campaign) -> String {
     }
     if let Some(plan) = &campaign.plan {
         text += &format!(
-            "; at most {} s a solve, {} at a time, {} of a run after one to warm up",
+            "; at most {} s a solve, {} at a time, {}",
             plan.time_limit,
             plan.jobs,
-            plural(plan.repeats as usize, "timed solve")
+            match plan.repeats {
+                0 => "one solve of a run".into(),
+                n => format!("{} of a run after one to warm up", plural(n as usize, "timed solve")),
+            }
         );
     }
     text
@@ -154,7 +160,7 @@ fn findings(rows: &[Row]) -> String {
     let Some(best) = best.first() else { return String::new() };
     let leaders = |value: fn(&Row) -> usize| {
         let most = solvers.iter().map(|r| value(r)).max().unwrap_or(0);
-        let names = solvers.iter().filter(|r| value(r) == most).map(|r| format!("`{}`", r.solver));
+        let names = solvers.iter().filter(|r| value(r) == most).map(|r| code(&r.solver));
         (most, listed(&names.collect::<Vec<_>>()))
     };
     let (most, who) = leaders(|r| r.solved);
@@ -173,6 +179,21 @@ fn findings(rows: &[Row]) -> String {
         "Most problems are solved by {who}: {most} of {}; {left}. Most often the fastest is {fast}, on {fastest}.\n",
         best.problems
     )
+}
+
+/// A label as Markdown's code.
+fn code(label: &str) -> String {
+    format!("`{}`", markdown_text(label).replace('`', "'"))
+}
+
+/// The name of a folder within an address: blanks and brackets would end it.
+fn address(folder: &str) -> String {
+    let safe = |c: char| c.is_alphanumeric() || "-_.~".contains(c);
+    let part = |c: char| match safe(c) {
+        true => c.to_string(),
+        false => c.to_string().bytes().map(|b| format!("%{b:02X}")).collect(),
+    };
+    folder.chars().map(part).collect()
 }
 
 /// `a`, `a and b`, `a, b and c`.
@@ -196,14 +217,23 @@ fn show(
     let Some(figure) = figures(runs, selection)?.into_iter().find(|f| f.name == name) else {
         return Ok(String::new());
     };
-    let kind = kind.replace("friction_", "").replace('_', "-");
+    // Other programs' kinds may hold anything, and names must stay in the folder.
+    let letter = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
+    let kind: String = match kind.strip_prefix("friction_").unwrap_or(kind) {
+        "" => "unknown".into(),
+        kind => kind.chars().map(letter).collect(),
+    };
+    let kind = kind.trim_matches('-');
     let tolerance = format!("{:e}", selection.tolerance).replace('.', "p");
     let name = if name == SHOWN[1] {
         format!("{kind}-{name}")
     } else {
         format!("{kind}-{name}-{tolerance}")
     };
-    let text = format!("\n![{}]({folder}/{name}.svg)\n", figure.title);
+    let free = |name: &String| all.iter().all(|f| f.name != *name);
+    let mut names = std::iter::once(name.clone()).chain((2..).map(|k| format!("{name}-{k}")));
+    let name = names.find(free).unwrap_or(name);
+    let text = format!("\n![{}]({}/{name}.svg)\n", figure.title, address(folder));
     all.push(Figure { name, ..figure });
     Ok(text)
 }
@@ -223,7 +253,7 @@ fn winners(runs: &Runs, selection: &Selection) -> String {
         let leaders = |value: fn(&Row) -> usize| {
             let most = solvers().map(value).max().unwrap_or(0);
             let names: Vec<_> =
-                solvers().filter(|r| value(r) == most).map(|r| format!("`{}`", r.solver)).collect();
+                solvers().filter(|r| value(r) == most).map(|r| code(&r.solver)).collect();
             match most {
                 0 => "nobody".into(),
                 n if names.len() == solvers().count() && names.len() > 1 => format!("all ({n})"),
@@ -249,7 +279,7 @@ fn nobody(runs: &Runs, selection: &Selection) -> String {
     }
     let rows = all.iter().map(|u| {
         let closest = u.closest.as_ref().map_or_else(String::new, |(solver, reached)| {
-            format!("`{solver}` reaches {reached:.1e}")
+            format!("{} reaches {reached:.1e}", code(solver))
         });
         vec![u.problem.clone(), u.contacts.to_string(), closest]
     });
@@ -307,6 +337,30 @@ mod tests {
             run("pile/d", global, "quick", Solved, 0.6),
         ];
         Runs { campaigns: vec![campaign], runs, ..Runs::default() }
+    }
+
+    #[test]
+    fn what_other_programs_write_stays_text_and_in_the_folder() {
+        use Ending::Solved;
+        let kinds = ["../../evil", "friction_local_3d", "local-3d", "a\n# b", ""];
+        let all = (0..).zip(kinds);
+        let runs = all.map(|(k, kind)| run(&format!("f/{k}"), kind, "a`<b>|", Solved, 1.0));
+        let mut all = Runs { runs: runs.collect(), ..example() };
+        all.campaigns[0].program = "<img src=x>\n# P".into();
+        let page = page(&all, None, "my (page)", "make --> <b>").unwrap();
+        let names: std::collections::BTreeSet<_> = page.figures.iter().map(|f| &f.name).collect();
+        assert_eq!((names.len(), page.figures.len()), (10, 10), "{names:?}");
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
+        assert!(names.iter().all(|n| !n.starts_with('-') && n.chars().all(plain)), "{names:?}");
+        for name in names {
+            let shown = format!("](my%20%28page%29/{name}.svg)");
+            assert!(page.markdown.contains(&shown), "{shown}\n{}", page.markdown);
+        }
+        // The one element and the one comment on the page are its own.
+        assert_eq!(page.markdown.matches('<').count(), 1, "{}", page.markdown);
+        assert_eq!(page.markdown.matches("-->").count(), 2, "{}", page.markdown);
+        assert!(!page.markdown.contains("\n# P") && !page.markdown.contains("\n# b"));
+        assert!(page.markdown.contains("Most problems are solved by `a'&lt;b>|`: 1 of 1"));
     }
 
     #[test]

@@ -44,6 +44,9 @@ pub enum RunsError {
     },
 }
 
+/// Parts that are missing are named, up to so many.
+const NAMED: usize = 20;
+
 /// What came of joining two files.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Joined {
@@ -81,6 +84,8 @@ impl Runs {
     pub fn parse(file: &Path, text: &str) -> Result<Self, RunsError> {
         let mut all = Self::default();
         let mut seen = HashSet::new();
+        // Some editors begin a text with a mark of its encoding.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let lines: Vec<&str> = text.split_inclusive('\n').collect();
         for (k, line) in lines.iter().enumerate().filter(|(_, l)| !l.trim().is_empty()) {
             let parsed = match serde_json::from_str::<Line>(line) {
@@ -105,6 +110,9 @@ impl Runs {
                     all.problems.insert(problem.name.clone(), problem);
                 }
                 Line::Run(run) => {
+                    if let Some(found) = out_of_range(&run) {
+                        return Err(RunsError::Line { file: file.into(), line: k + 1, found });
+                    }
                     if seen.insert(run.key()) {
                         all.runs.push(*run);
                     }
@@ -153,13 +161,18 @@ impl Runs {
         let plans: Vec<&Plan> = self.campaigns.iter().filter_map(|c| c.plan.as_ref()).collect();
         let mut remarks = vec![];
         let parts: BTreeSet<(usize, usize)> =
-            plans.iter().filter_map(|p| p.shard).map(|(i, n)| (n, i)).collect();
+            plans.iter().filter_map(|p| p.shard).filter(|s| s.1 > 0).map(|(i, n)| (n, i)).collect();
         let wholes: BTreeSet<usize> = parts.iter().map(|p| p.0).collect();
         for n in wholes {
+            let there = parts.range((n, 1)..=(n, n)).count();
             let missing = (1..=n).filter(|&i| !parts.contains(&(n, i)));
-            let missing: Vec<_> = missing.map(|i| format!("{i}/{n}")).collect();
-            if !missing.is_empty() {
-                remarks.push(format!("missing parts {}", missing.join(", ")));
+            let named: Vec<_> = missing.take(NAMED).map(|i| format!("{i}/{n}")).collect();
+            let more = match n - there - named.len() {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            if !named.is_empty() {
+                remarks.push(format!("missing parts {}{more}", named.join(", ")));
             }
         }
         for two in plans.windows(2) {
@@ -207,6 +220,25 @@ impl Runs {
         let problems = self.problems.into_values().map(Line::Problem);
         campaigns.chain(problems).chain(self.runs.into_iter().map(|r| Line::Run(Box::new(r))))
     }
+}
+
+/// A number of a run that cannot be, in words.
+fn out_of_range(run: &Run) -> Option<String> {
+    let Run { tolerance, seconds, seconds_median, seconds_max, cpu_seconds, residuals, .. } = run;
+    if *tolerance <= 0.0 {
+        return Some(format!("a tolerance of {tolerance:e}"));
+    }
+    let sizes = [
+        ("seconds", seconds),
+        ("seconds_median", seconds_median),
+        ("seconds_max", seconds_max),
+        ("cpu_seconds", cpu_seconds),
+        ("a residual", &residuals.reached),
+    ];
+    let negative = |(what, x): (&str, &Option<f64>)| {
+        x.filter(|x| *x < 0.0).map(|x| format!("{what} of {x:e}"))
+    };
+    sizes.into_iter().find_map(negative)
 }
 
 fn check(file: &Path, campaign: &Campaign) -> Result<(), RunsError> {

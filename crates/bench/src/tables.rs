@@ -180,6 +180,11 @@ pub fn unsolved(runs: &Runs, selection: &Selection) -> Vec<Unsolved> {
     .collect()
 }
 
+/// A text from the runs on a line of Markdown: nothing in it becomes an element of HTML or ends the line.
+pub(crate) fn markdown_text(text: &str) -> String {
+    text.replace(char::is_control, " ").replace('<', "&lt;")
+}
+
 /// A table of texts, for CSV and Markdown alike.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Table {
@@ -203,7 +208,7 @@ impl Table {
     /// As a Markdown table, numbers to the right.
     pub fn markdown(&self) -> String {
         let line = |cells: &[String]| {
-            let safe = |c: &String| c.replace('|', "\\|").replace(['\n', '\r'], " ");
+            let safe = |c: &String| markdown_text(c).replace('|', "\\|");
             format!("| {} |\n", cells.iter().map(safe).collect::<Vec<_>>().join(" | "))
         };
         let number = |k: usize| {

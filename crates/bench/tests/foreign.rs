@@ -251,3 +251,29 @@ fn the_tables_of_the_corpus_are_read_and_matched() {
         assert_eq!(unmatched, expected, "{name}");
     }
 }
+
+#[test]
+fn lines_are_counted_alike_for_all_ends_of_lines_and_marks_of_encodings() {
+    let text = CSV.replace("0.5,1e-5", "fast,1e-5");
+    for text in [text.clone(), text.replace('\n', "\r\n"), format!("\u{feff}{text}")] {
+        let mistakes = read("peer.csv", &text).mistakes;
+        assert_eq!(mistakes, ["peer.csv, line 4: seconds: expected a number, found \"fast\""]);
+    }
+    let json = r#"[{"problem":"a","solver":"S","tol":1e-4,"seconds":1,"error":1e-5}]"#;
+    assert_eq!(read("peer.json", &format!("\u{feff}{json}")).runs.runs.len(), 1);
+}
+
+#[test]
+fn a_column_that_stands_twice_is_refused() {
+    let e = refused("t.csv", "problem,solver,tol,tolerance,seconds,error\na,s,1e-4,1e-8,1,1e-5\n");
+    assert!(e.ends_with("expected one column `tolerance`, found several"), "{e}");
+}
+
+#[test]
+fn words_for_success_that_are_not_known_are_told() {
+    let table = |word: &str| format!("problem,solver,tol,seconds,status\na,s,1e-4,1,{word}\n");
+    assert!(read("t.csv", &table("Solved")).runs.runs[0].solved());
+    let other = read("t.csv", &table("converged"));
+    assert!(!other.runs.runs[0].solved());
+    assert!(other.notes.iter().any(|n| n.contains("none counts as solved")), "{:?}", other.notes);
+}

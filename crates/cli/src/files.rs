@@ -126,24 +126,46 @@ pub fn writable(option: &str, path: &Path) -> Result<(), String> {
             let what = if there.is_dir() { "a directory" } else { "a device" };
             return Err(format!("{option} {path}: expected a file, found {what}"));
         }
-        Ok(_) => drop(OpenOptions::new().append(true).open(path).map_err(refused)?),
+        Ok(_) => {
+            let there = OpenOptions::new().append(true).open(path).map_err(refused)?;
+            if matches!(there.try_lock(), Err(fs::TryLockError::WouldBlock)) {
+                let path = path.display();
+                return Err(format!(
+                    "{option} {path}: expected a file of its own, found one that a campaign writes"
+                ));
+            }
+        }
         Err(_) => {}
     }
     // New files are completed beside the old ones, so the directory must let them in.
-    let Some(name) = path.file_name() else {
+    let Some(probe) = beside(path) else {
         let path = path.display();
         return Err(format!("{option} {path}: expected a file name, found none"));
     };
-    let probe = format!(".{}.{}.tmp", name.to_string_lossy(), std::process::id());
-    let probe = path.with_file_name(probe);
     let made = OpenOptions::new().write(true).create_new(true).open(&probe);
     made.map_err(refused)?;
     fs::remove_file(&probe).map_err(refused)
 }
 
-/// Writes a text file.
+/// Writes a text file. It is completed beside the old one and then renamed: a full disk costs the new text only.
 pub fn write_text(option: &str, path: &Path, text: &str) -> Result<(), String> {
-    fs::write(path, text).map_err(|e| refusal(option, path, "a file that can be written", e))
+    let plain = !path.exists() || path.is_file();
+    // A link stays a link to the new content.
+    let target = path.canonicalize().unwrap_or_else(|_| path.into());
+    let written = match beside(&target).filter(|_| plain) {
+        Some(temporary) => {
+            let done = fs::write(&temporary, text).and_then(|()| fs::rename(&temporary, &target));
+            done.inspect_err(|_| drop(fs::remove_file(&temporary)))
+        }
+        None => fs::write(path, text),
+    };
+    written.map_err(|e| refusal(option, path, "a file that can be written", e))
+}
+
+/// A name of this process's own in the folder of a file; none if the path names no file.
+fn beside(path: &Path) -> Option<PathBuf> {
+    let name = path.file_name()?.to_string_lossy();
+    Some(path.with_file_name(format!(".{name}.{}.tmp", std::process::id())))
 }
 
 fn refusal(option: &str, path: &Path, expected: &str, cause: std::io::Error) -> String {

@@ -14,7 +14,7 @@ pub type Object = Map<String, Value>;
 /// A line of a report: what it is about, and the rest.
 pub fn row(text: &mut String, label: &str, rest: impl std::fmt::Display) {
     // Writing to a String cannot fail.
-    let _ = writeln!(text, "  {label:<11}{rest}");
+    let _ = writeln!(text, "  {label:<10} {rest}");
 }
 
 /// A number of three digits.

@@ -126,3 +126,31 @@ fn mistakes_are_refused() {
     }
     assert!(!folder.path("o.jsonl").exists());
 }
+
+#[test]
+fn a_page_never_replaces_its_runs_and_has_a_folder_of_its_own() {
+    let folder = imported();
+    let before = fs::read(folder.path("t.jsonl")).unwrap();
+    let own = folder.run("bench page t.jsonl --out t.jsonl");
+    own.refused(&["--out t.jsonl", "found one of the files of runs"]);
+    assert_eq!(fs::read(folder.path("t.jsonl")).unwrap(), before);
+    folder.run("bench page t.jsonl --out t").refused(&["--out t: expected a name such as"]);
+    folder.run("bench page t.jsonl --out page.md").exits(0);
+    assert!(folder.path("page/unknown-success.svg").exists());
+}
+
+/// With a limit on the size of files, as with a full disk, writing fails midway.
+#[cfg(unix)]
+#[test]
+fn what_cannot_be_written_leaves_the_old_file() {
+    let folder = imported();
+    folder.run("bench report t.jsonl --out page.html").exits(0);
+    let before = fs::read(folder.path("page.html")).unwrap();
+    assert!(before.len() > 4096);
+    let program = env!("CARGO_BIN_EXE_nonsmooth");
+    let script = format!("ulimit -f 2; {program} bench report t.jsonl --out page.html --title New");
+    let mut shell = std::process::Command::new("sh");
+    let output = shell.args(["-c", &script]).current_dir(&folder).output().unwrap();
+    assert!(!output.status.success());
+    assert!(fs::read(folder.path("page.html")).unwrap() == before, "the old page is gone");
+}

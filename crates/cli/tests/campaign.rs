@@ -158,6 +158,10 @@ fn mistakes_are_named_and_the_rest_goes_on() {
         "bench run problems --time-limit -1 --out e.jsonl",
         "--time-limit: expected a positive",
     );
+    refused("bench run problems --jobs 0 --out e.jsonl", "--jobs: expected from 1 to 1024");
+    refused("bench run problems --jobs 2000 --out e.jsonl", "found 2000");
+    #[cfg(unix)]
+    refused("bench run problems --out /dev/full", "/dev/full: expected a file, found a directory,");
     refused("bench run problems --shard 4/3 --out e.jsonl", "expected I/N with I from 1 to N");
     refused("bench run problems --memory-limit 3X --out e.jsonl", "expected a size such as");
     refused("bench run problems --out nowhere/r.jsonl", "nowhere/r.jsonl: No such file");
@@ -196,4 +200,48 @@ fn ctrl_c_keeps_what_is_done() {
     assert!(runs(&file).len() >= 20);
     let ended = lines(&file).iter().all(|l| l["line"] != "run" || l["ending"] != "crashed");
     assert!(ended, "a run that was dropped is recorded as a crash");
+}
+
+/// A campaign of many runs, from a program that may be another copy.
+#[cfg(target_os = "linux")]
+fn long_campaign(mut program: std::process::Command) -> Child {
+    let all = "bench run problems --solver nsgs --tol 1e-4 --out runs.jsonl --quiet";
+    program.args(all.split_whitespace()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_upgrade_of_the_program_does_not_touch_a_campaign() {
+    let folder = Folder::new();
+    problems(&folder, 100);
+    let copy = folder.path("copy");
+    std::fs::copy(env!("CARGO_BIN_EXE_nonsmooth"), &copy).unwrap();
+    let mut command = std::process::Command::new(&copy);
+    command.current_dir(&folder);
+    let mut campaign = long_campaign(command);
+    let file = folder.path("runs.jsonl");
+    wait_for("a run", 60, || !runs(&file).is_empty());
+    // As package managers do it: a new file under the old name.
+    std::fs::copy("/bin/true", folder.path("new")).unwrap();
+    std::fs::rename(folder.path("new"), &copy).unwrap();
+    assert!(campaign.wait().unwrap().success());
+    assert_eq!(runs(&file).len(), 100);
+    let crashed = lines(&file).iter().filter(|l| l["ending"] == "crashed").count();
+    assert_eq!(crashed, 0);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn nothing_else_writes_into_a_campaign() {
+    let folder = Folder::new();
+    problems(&folder, 100);
+    folder.run("bench run problems --solver nsgs --tol 1e-3 --out old.jsonl").exits(0);
+    let mut campaign = long_campaign(folder.command());
+    let file = folder.path("runs.jsonl");
+    wait_for("a run", 60, || !runs(&file).is_empty());
+    let merged = folder.run("bench merge old.jsonl --out runs.jsonl");
+    assert_eq!(merged.code, Some(2));
+    assert!(merged.stderr.contains("found one that a campaign writes"), "{}", merged.stderr);
+    assert!(campaign.wait().unwrap().success());
+    assert_eq!(runs(&file).len(), 100);
 }

@@ -22,9 +22,11 @@ pub struct Input {
     pub bytes: u64,
 }
 
-/// All `.hdf5` and `.h5` files under the given files and folders, each once, the smallest first.
+/// All `.hdf5` and `.h5` files under the given files and folders, each once, the smallest first. A link to a file has the
+/// name and the folder of the link.
 ///
-/// Second: what is wrong with the roots, one line each: it does not exist, cannot be listed, or holds no problem.
+/// Second: what is wrong with them, one line each: a root that does not exist, cannot be listed, or holds no problem; a
+/// device or a pipe, whose end nobody knows; a name that is not UTF-8.
 pub fn inputs(roots: &[PathBuf]) -> (Vec<Input>, Vec<String>) {
     let mut mistakes = vec![];
     let mut found = BTreeMap::new();
@@ -42,7 +44,19 @@ pub fn inputs(roots: &[PathBuf]) -> (Vec<Input>, Vec<String>) {
             found.entry(real).or_insert(path);
         }
     }
-    let parts: Vec<Vec<String>> = found.keys().map(|real| parts(real)).collect();
+    // `a/b.h5` beside `a/b.hdf5`: no folder tells them apart.
+    let mut seen = HashSet::new();
+    found.retain(|_, path| {
+        let parts = parts(path);
+        let name = tail(&parts, 2);
+        let first = seen.insert(parts);
+        if !first {
+            let path = path.display();
+            mistakes.push(format!("{path}: expected a name of its own, found `{name}` twice"));
+        }
+        first
+    });
+    let parts: Vec<Vec<String>> = found.values().map(|path| parts(path)).collect();
     let mut depth = vec![2; parts.len()];
     // Names that are the same for two files take in one more folder, until all differ.
     loop {
@@ -59,16 +73,9 @@ pub fn inputs(roots: &[PathBuf]) -> (Vec<Input>, Vec<String>) {
             break;
         }
     }
-    let mut seen = HashSet::new();
     let mut inputs = vec![];
     for ((parts, depth), path) in parts.iter().zip(depth).zip(found.into_values()) {
         let name = tail(parts, depth);
-        if !seen.insert(name.clone()) {
-            // `a/b.h5` beside `a/b.hdf5`.
-            let path = path.display();
-            mistakes.push(format!("{path}: expected a name of its own, found `{name}` twice"));
-            continue;
-        }
         let family = parts.iter().rev().nth(1).cloned().unwrap_or_default();
         let bytes = std::fs::metadata(&path).map_or(0, |m| m.len());
         inputs.push(Input { path, name, family, bytes });
@@ -101,9 +108,12 @@ pub fn describe(file: &Path) -> Result<Problem, String> {
     })
 }
 
-/// The folders and the name of a file, without extension.
+/// The folders and the name of a file, without extension. Stores of large files keep them under their checksums and link
+/// to them: what names a file is the link.
 fn parts(path: &Path) -> Vec<String> {
-    let named = path.with_extension("");
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder.canonicalize().unwrap_or_else(|_| folder.into());
+    let named = folder.join(path.file_stem().unwrap_or_default());
     named
         .components()
         .filter_map(|c| match c {
@@ -133,14 +143,20 @@ fn walk(root: &Path, path: &Path, found: &mut Vec<PathBuf>, mistakes: &mut Vec<S
             }
             Err(e) => mistakes.push(refused(e)),
         }
-    } else if path == root {
+    } else if path == root || path.extension().is_some_and(|e| e == "hdf5" || e == "h5") {
         // A file that is named is meant, whatever its extension.
+        let expected = |what: &str| format!("{}: expected {what}", path.display());
         match std::fs::metadata(path) {
+            Ok(there) if !there.is_file() => {
+                mistakes.push(expected("a file, found a device or a pipe"));
+            }
+            // Runs are kept as JSON, and jobs sent as such.
+            Ok(_) if path.to_str().is_none() => {
+                mistakes.push(expected("a path in UTF-8, found other bytes"));
+            }
             Ok(_) => found.push(path.into()),
             Err(e) => mistakes.push(refused(e)),
         }
-    } else if path.extension().is_some_and(|e| e == "hdf5" || e == "h5") {
-        found.push(path.into());
     }
 }
 
@@ -159,12 +175,40 @@ mod tests {
         make("one/wall/a.hdf5", 3);
         make("two/wall/a.hdf5", 2);
         make("two/wall/b.h5", 1);
+        make("two/wall/b.hdf5", 1);
         make("two/wall/notes.txt", 1);
         let all = [dir.path().to_path_buf(), dir.path().join("two/wall/b.h5")];
         let (found, mistakes) = inputs(&all);
         let names: Vec<_> = found.iter().map(|i| (i.name.as_str(), i.family.as_str())).collect();
         assert_eq!(names, [("wall/b", "wall"), ("two/wall/a", "wall"), ("one/wall/a", "wall")]);
-        assert!(mistakes.is_empty());
+        assert_eq!(mistakes.len(), 1, "{mistakes:?}");
+        assert!(mistakes[0].ends_with("expected a name of its own, found `wall/b` twice"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_name_their_files_and_what_is_no_file_is_named() {
+        use std::os::unix::ffi::OsStrExt;
+        use std::os::unix::fs::symlink;
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        std::fs::create_dir_all(at("store")).unwrap();
+        std::fs::create_dir_all(at("wall")).unwrap();
+        std::fs::write(at("store/0f3a"), "content").unwrap();
+        symlink(at("store/0f3a"), at("wall/a.hdf5")).unwrap();
+        symlink(at("store/0f3a"), at("wall/b.hdf5")).unwrap();
+        symlink(at("wall"), at("wall/circle")).unwrap();
+        symlink("/dev/zero", at("wall/endless.hdf5")).unwrap();
+        symlink("nowhere", at("wall/gone.hdf5")).unwrap();
+        std::fs::write(at("wall").join(std::ffi::OsStr::from_bytes(b"\xff.hdf5")), "x").unwrap();
+        let (found, mut mistakes) = inputs(&[at("wall")]);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(["wall/a", "wall/b"].contains(&found[0].name.as_str()), "{found:?}");
+        mistakes.sort();
+        assert_eq!(mistakes.len(), 3, "{mistakes:?}");
+        assert!(mistakes[0].ends_with("endless.hdf5: expected a file, found a device or a pipe"));
+        assert!(mistakes[1].contains("gone.hdf5: No such file"), "{mistakes:?}");
+        assert!(mistakes[2].ends_with("expected a path in UTF-8, found other bytes"));
     }
 
     #[test]

@@ -58,8 +58,9 @@ impl Journal {
         let there = Runs::read(path).map_err(|e| e.to_string())?;
         cut(&journal.file)?;
         journal.file.seek(SeekFrom::End(0)).map_err(|e| refusal(path, &e))?;
-        if let (Some(plan), Some(new)) =
-            (there.campaigns.last().and_then(|c| c.plan.as_ref()), campaign.plan.as_ref())
+        // Campaigns without a plan are foreign, and joined.
+        let plan = there.campaigns.iter().rev().find_map(|c| c.plan.as_ref());
+        if let (Some(plan), Some(new)) = (plan, campaign.plan.as_ref())
             && let Some(differs) = plan.difference(new)
         {
             return Err(format!("{}: to resume, expected {differs}", path.display()));
@@ -76,6 +77,11 @@ impl Journal {
     }
 
     fn open(path: &Path) -> Result<Self, String> {
+        // A device or a pipe keeps nothing, and may never end.
+        if std::fs::metadata(path).is_ok_and(|m| !m.is_file()) {
+            let path = path.display();
+            return Err(format!("{path}: expected a file, found a directory, device or pipe"));
+        }
         let file = OpenOptions::new()
             .read(true)
             .append(true)
@@ -105,10 +111,10 @@ impl Journal {
     pub fn append(&mut self, line: &Line) -> Result<(), String> {
         let mut text = serde_json::to_string(line).map_err(|e| e.to_string())?;
         text.push('\n');
-        let before = self.file.metadata().map_or(0, |m| m.len());
+        let before = self.file.metadata().map(|m| m.len());
         let written = self.file.write_all(text.as_bytes()).and_then(|()| self.file.sync_data());
         written.map_err(|e| {
-            let _ = self.file.set_len(before);
+            let _ = before.and_then(|before| self.file.set_len(before));
             refusal(&self.path, &e)
         })
     }

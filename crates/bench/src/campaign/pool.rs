@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use nonsmooth_problem::Kind;
 
@@ -70,6 +70,11 @@ pub enum Event<'a> {
         /// An estimate of the time left.
         left: Option<Duration>,
     },
+    /// A problem whose file can no more be used; its runs from now on are left out. Said once for each problem.
+    Lost {
+        /// What happened to the file, by its name.
+        why: &'a str,
+    },
 }
 
 /// What a campaign came to.
@@ -87,6 +92,8 @@ pub struct Summary {
     pub disturbed: usize,
     /// Problems that cannot be used: unreadable, or changed since their runs were made.
     pub unreadable: usize,
+    /// Runs that are left out, as the file of their problem changed or went during the campaign.
+    pub lost: usize,
     /// Whether it was cancelled.
     pub cancelled: bool,
 }
@@ -95,7 +102,8 @@ pub struct Summary {
 ///
 /// Problems are dealt to shards one by one, so that all solvers of a problem run on the same machine. In each problem
 /// all solvers run one after another. Runs in progress when `cancel` is set are dropped; they will be done on resumption.
-/// A problem that cannot be read, or whose file has changed since `there` was written, is told and left out.
+/// So are those of a problem whose file changes or goes during the campaign. A problem that cannot be read, or whose file
+/// has changed since `there` was written, is told and left out.
 ///
 /// Errors: solver labels that nobody takes; a worker that cannot be started; a journal that cannot be written.
 pub fn run(
@@ -111,6 +119,7 @@ pub fn run(
     let (shard, shards) = setup.plan.shard.unwrap_or((1, 1));
     let inputs: Vec<&Input> = setup.inputs.iter().skip(shard - 1).step_by(shards).collect();
     let lanes = lanes(setup.plan.jobs);
+    let stamps: Vec<Stamp> = inputs.iter().map(|input| stamp(&input.path)).collect();
     // First what the problems are: it decides which solvers take them.
     let (described, cancelled) = describe(setup, &inputs, &lanes, there, journal, cancel, watch)?;
     let unreadable = described.values().filter(|p| p.error.is_some()).count();
@@ -122,7 +131,7 @@ pub fn run(
     let before: HashMap<Key, Ending> = there.runs.iter().map(|r| (r.key(), r.ending)).collect();
     let mut jobs = VecDeque::new();
     let mut refused = vec![];
-    for input in &inputs {
+    for (&input, &stamp) in inputs.iter().zip(&stamps) {
         let problem = &described[&input.name];
         if problem.error.is_some() {
             continue;
@@ -136,11 +145,12 @@ pub fn run(
                 let message = Some(format!("takes no {} problems", problem.kind));
                 refused.push(Run { ending: Ending::Refused, message, ..run });
             } else {
-                jobs.push_back((run, setup.job(input, setup.solve(label, tolerance))));
+                let job = setup.job(input, setup.solve(label, tolerance));
+                jobs.push_back(((run, input, stamp), job));
             }
         }
     }
-    let mut clock = Clock::new(jobs.iter().map(|(run, _)| run), lanes.len());
+    let mut clock = Clock::new(jobs.iter().map(|((run, ..), _)| run), lanes.len());
     let mut ended = |run: Run, took: Option<Duration>, summary: &mut Summary| {
         journal.append(&Line::Run(Box::new(run.clone())))?;
         summary.count(run.ending);
@@ -154,9 +164,17 @@ pub fn run(
     for run in refused {
         ended(run, None, &mut summary)?;
     }
-    summary.cancelled = each(setup, &lanes, jobs, cancel, &mut |blank, end, took| {
-        ended(finished(blank, end, &setup.plan), Some(took), &mut summary)
-    })?;
+    let mut told = BTreeMap::new();
+    summary.cancelled =
+        each(setup, &lanes, jobs, cancel, &mut |(blank, input, stamp), end, took| {
+            if let Some(why) = lost(input, stamp, &end) {
+                summary.lost += 1;
+                told.entry(&input.name).or_insert(why);
+                return Ok(());
+            }
+            ended(finished(blank, end, &setup.plan), Some(took), &mut summary)
+        })?;
+    told.values().for_each(|why| watch(Event::Lost { why }));
     Ok(summary)
 }
 
@@ -287,6 +305,26 @@ fn each<T: Send>(
     outcome.map(|()| cancel.load(Ordering::Relaxed))
 }
 
+/// What tells that a file is as it was: its length and the time of its last change. None where there is no file.
+type Stamp = Option<(u64, Option<SystemTime>)>;
+
+fn stamp(file: &Path) -> Stamp {
+    std::fs::metadata(file).ok().map(|m| (m.len(), m.modified().ok()))
+}
+
+/// Why a run is none of the problem that was described, if so.
+fn lost(input: &Input, before: Stamp, end: &End) -> Option<String> {
+    let file = input.path.display();
+    match (stamp(&input.path), end) {
+        (None, _) => Some(format!("{file}: expected the problem, found that its file is gone")),
+        (now, _) if now != before => {
+            Some(format!("{file}: expected the problem as it was, found that its file has changed"))
+        }
+        (_, End::Said(Said::Unreadable(why))) => Some(why.clone()),
+        _ => None,
+    }
+}
+
 /// What a worker's word on a file comes to.
 fn problem(input: &Input, end: End) -> Problem {
     let named =
@@ -338,9 +376,7 @@ fn finished(run: Run, end: End, plan: &Plan) -> Run {
             tolerance: run.tolerance,
             ..*result
         },
-        End::Said(Said::Refused(message) | Said::Unreadable(message)) => {
-            ended(Ending::Refused, message)
-        }
+        End::Said(Said::Refused(message)) => ended(Ending::Refused, message),
         End::Said(other) => ended(Ending::Crashed, format!("expected a result, found {other:?}")),
         End::Hung { iteration, best, seconds, loading } => {
             let what = if loading { "reading the problem" } else { "the solve" };

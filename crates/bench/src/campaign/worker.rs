@@ -24,6 +24,9 @@ const MORE: usize = 10;
 /// The most points that a trace keeps.
 const TRACE: usize = 256;
 
+/// As in [`Run::trace`].
+type Trace = Vec<(u64, f64, f64)>;
+
 /// Does the one [`Job`] that stands on the first line of the standard input, and says on the standard output what comes
 /// of it. The process ends when the standard input does: nobody is left to listen.
 ///
@@ -77,7 +80,7 @@ fn solve<P: Registered>(problem: &P, task: &Task, solvers: &impl Solvers) -> Res
         ..Limits::default()
     };
     // Each solve has a workspace of its own: what is timed is a solver that meets the problem for the first time.
-    let attempt = || -> Result<(Outcome, Vec<Sample>), String> {
+    let attempt = || -> Result<(Outcome, Trace), String> {
         let mut session =
             solvers.session::<P>(&label.name, &label.settings).map_err(|e| e.to_string())?;
         let mut point = problem.origin();
@@ -90,7 +93,9 @@ fn solve<P: Registered>(problem: &P, task: &Task, solvers: &impl Solvers) -> Res
                 say(&Said::Progress { iteration, seconds, best: finite(p.best) });
             }
         });
-        Ok((outcome.map_err(|e| e.to_string())?, session.history().to_vec()))
+        // Kept for a trace alone: it would count as memory of the solves to come.
+        let history = if trace { thinned(session.history()) } else { vec![] };
+        Ok((outcome.map_err(|e| e.to_string())?, history))
     };
     let first = attempt()?;
     let mut timed = vec![first];
@@ -108,7 +113,7 @@ fn solve<P: Registered>(problem: &P, task: &Task, solvers: &impl Solvers) -> Res
     let seconds: Vec<f64> = timed.iter().map(|t| t.0.seconds).collect();
     // A success that does not repeat is none.
     let counts = timed.iter().position(|t| t.0.status != Status::Solved).unwrap_or(0);
-    let (outcome, history) = timed.swap_remove(counts);
+    let (outcome, trace) = timed.swap_remove(counts);
     Ok(Said::Done(Box::new(Run {
         ending: ending(&outcome.status),
         message: (outcome.status != Status::Solved).then(|| outcome.status.to_string()),
@@ -122,7 +127,7 @@ fn solve<P: Registered>(problem: &P, task: &Task, solvers: &impl Solvers) -> Res
         peak_memory: system::peak_memory(),
         loaded_memory,
         residuals: residuals(&outcome.measure),
-        trace: if trace { thinned(&history) } else { vec![] },
+        trace,
         ..Run::default()
     })))
 }
@@ -158,7 +163,7 @@ fn finite(x: f64) -> Option<f64> {
 }
 
 /// At most [`TRACE`] points, evenly by their number, the last one included.
-fn thinned(history: &[Sample]) -> Vec<(u64, f64, f64)> {
+fn thinned(history: &[Sample]) -> Trace {
     let stride = history.len().div_ceil(TRACE).max(1);
     let last = history.len().saturating_sub(1);
     history

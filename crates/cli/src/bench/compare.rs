@@ -51,7 +51,8 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let comparison = compare(&old, &new, &options);
     if comparison.pairs == 0 {
         let (old, new) = (args.old.display(), args.new.display());
-        return Err(format!("{new}: expected runs that are also in {old}, found none"));
+        let why = comparison.warnings.iter().map(|w| format!("; {w}")).collect::<String>();
+        return Err(format!("{new}: expected runs that are also in {old}, found none{why}"));
     }
     if args.json {
         output::print(&format!("{}\n", serde_json::json!(comparison)));

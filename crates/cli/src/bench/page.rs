@@ -41,6 +41,17 @@ Exit codes: 0 written; 2 a mistake in a file or an option.";
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
+    let out = args.out.display();
+    if args.out.extension().is_none() {
+        return Err(format!(
+            "--out {out}: expected a name such as comparison.md, whose figures go into `comparison`, found none to part"
+        ));
+    }
+    if args.runs.iter().any(|f| files::same(f, &args.out)) {
+        return Err(format!(
+            "--out {out}: expected a file to write, found one of the files of runs"
+        ));
+    }
     files::writable("--out", &args.out)?;
     let Joined { runs, mut exit, .. } = super::read(&args.runs)?;
     let described = match args.problems.as_slice() {

@@ -1,6 +1,6 @@
 //! `nonsmooth bench run`.
 
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -80,6 +80,10 @@ Exit codes: 0 all runs are done, whatever came of them; 1 ended by Ctrl-C; 2 som
 
 /// The default limit of memory, bytes.
 const MEMORY: u64 = 8 << 30;
+/// The least limit of memory, bytes: a process needs a few dozen megabytes before it has done anything.
+const LEAST_MEMORY: u64 = 64 << 20;
+/// The most runs at a time: each has a process, and a thread that watches it.
+const JOBS: usize = 1024;
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
@@ -111,7 +115,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         (Journal::create(&args.out, &header)?, Runs::default())
     };
     let worker = WorkerCommand {
-        program: std::env::current_exe().map_err(|e| format!("this program: {e}"))?,
+        program: this_program().map_err(|e| format!("this program: {e}"))?,
         arguments: super::WORKER.iter().map(Into::into).collect(),
     };
     let setup = Setup { worker, inputs, plan, grace: Setup::GRACE };
@@ -126,10 +130,19 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     if !args.quiet {
         output::print(&text(&args.out, &summary, args.jobs));
     }
-    if summary.unreadable > 0 {
+    if summary.unreadable + summary.lost > 0 {
         exit = Exit::Mistake;
     }
     Ok(exit.max(Exit::solved(!summary.cancelled)))
+}
+
+/// This program as it runs now. An upgrade during a campaign replaces its file, but not what Linux runs under this name.
+fn this_program() -> std::io::Result<PathBuf> {
+    let running = Path::new("/proc/self/exe");
+    match cfg!(target_os = "linux") && running.exists() {
+        true => Ok(running.into()),
+        false => std::env::current_exe(),
+    }
 }
 
 /// The plan that the options come to. A solver that does not exist is said and left out.
@@ -166,8 +179,8 @@ fn plan(args: &Args) -> Result<(Plan, Exit), String> {
         }
     }
     tolerances.sort_by(|a, b| f64::total_cmp(b, a));
-    if args.jobs == 0 {
-        return Err("--jobs: expected at least 1, found 0".into());
+    if !(1..=JOBS).contains(&args.jobs) {
+        return Err(format!("--jobs: expected from 1 to {JOBS}, found {}", args.jobs));
     }
     let found = args.repeat_below;
     if found.is_nan() || found < 0.0 {
@@ -177,7 +190,7 @@ fn plan(args: &Args) -> Result<(Plan, Exit), String> {
         solvers,
         tolerances,
         time_limit: positive("--time-limit", args.time_limit)?,
-        memory_limit: memory_limit(args),
+        memory_limit: memory_limit(args)?,
         repeats: args.repeats,
         repeat_below: args.repeat_below,
         trace: args.trace,
@@ -188,16 +201,28 @@ fn plan(args: &Args) -> Result<(Plan, Exit), String> {
 }
 
 /// The limit asked for; else, to resume, that of the file; else one that the machine can bear.
-fn memory_limit(args: &Args) -> u64 {
+///
+/// Errors: so many jobs that the machine has not the least memory for each.
+fn memory_limit(args: &Args) -> Result<u64, String> {
     let before = || {
-        let runs = Runs::read(&args.out).ok().filter(|_| args.resume)?;
-        Some(runs.campaigns.last()?.plan.as_ref()?.memory_limit)
+        let there = args.resume && args.out.is_file();
+        let runs = there.then(|| Runs::read(&args.out).ok()).flatten()?;
+        Some(runs.campaigns.iter().rev().find_map(|c| c.plan.as_ref())?.memory_limit)
     };
-    let bearable = || match machine().memory / 5 * 4 / args.jobs.max(1) as u64 {
-        0 => MEMORY,
-        bytes => bytes.min(MEMORY),
-    };
-    args.memory_limit.or_else(before).unwrap_or_else(bearable)
+    if let Some(limit) = args.memory_limit.or_else(before) {
+        return Ok(limit);
+    }
+    match machine().memory / 5 * 4 {
+        0 => Ok(MEMORY),
+        bytes => match bytes / args.jobs as u64 {
+            LEAST_MEMORY.. => Ok(MEMORY.min(bytes / args.jobs as u64)),
+            _ => Err(format!(
+                "--jobs: expected at most {}, as this machine has 64M for so many, found {}; --memory-limit sets the memory of each",
+                bytes / LEAST_MEMORY,
+                args.jobs
+            )),
+        },
+    }
 }
 
 /// A size such as `500M` or `4G`, in bytes.
@@ -213,9 +238,8 @@ fn size(text: &str) -> Result<u64, String> {
         _ => return Err(expected()),
     };
     let bytes = digits.parse::<f64>().map_err(|_| expected())? * unit;
-    // A process needs a few dozen megabytes before it has done anything.
     match bytes {
-        b if (64.0 * 1024.0 * 1024.0..1e18).contains(&b) => Ok(b as u64),
+        b if (LEAST_MEMORY as f64..1e18).contains(&b) => Ok(b as u64),
         _ => Err("expected at least 64M".into()),
     }
 }
@@ -242,7 +266,11 @@ fn text(out: &Path, summary: &Summary, jobs: usize) -> String {
         let fewer = if jobs > 1 { "; --jobs 1 would not" } else { "" };
         row(&mut text, "disturbed", format!("{n} had to wait for a processor{fewer}"));
     }
-    if summary.cancelled {
+    if summary.lost > 0 {
+        let n = count(summary.lost, "run");
+        row(&mut text, "left out", format!("{n}, whose files changed or went"));
+    }
+    if summary.cancelled || summary.lost > 0 {
         row(&mut text, "next", "the same command with --resume does the rest");
     } else {
         row(
@@ -293,7 +321,13 @@ impl Progress {
                 let what = format!("{} on {} at {tolerance:e}: {ending}", run.solver, run.problem);
                 ("runs", done, all, left + &what)
             }
+            Event::Lost { why } => {
+                self.aside(&|| output::error(&format!("{why}; its runs are left out")));
+                return;
+            }
         };
+        // Names of files may hold anything; a message is one line.
+        let message = message.replace(char::is_control, " ");
         if let Some(bar) = &self.bar {
             bar.set_prefix(what);
             bar.set_length(all as u64);
@@ -301,7 +335,8 @@ impl Progress {
             bar.set_message(message);
         } else if self.lines && Instant::now() >= self.next {
             self.next = Instant::now() + INTERVAL;
-            eprintln!("{what} {done}/{all}, {message}");
+            // A campaign does not end because nobody reads of its progress.
+            let _ = writeln!(std::io::stderr(), "{what} {done}/{all}, {message}");
         }
     }
 
