@@ -9,7 +9,7 @@ mkdir -p "$work"
 cargo build --release --quiet
 nonsmooth=${CARGO_TARGET_DIR:-target}/release/nonsmooth
 "$nonsmooth" gen --suite docs/benchmarks/suite.toml --out "$work/problems"
-"$nonsmooth" bench run "$work/problems" --tol 1e-4 --tol 1e-8 --time-limit 5 --out "$work/runs.jsonl" --resume
+"$nonsmooth" bench run "$work/problems" --tol 1e-4 --tol 1e-8 --tol 1e-12 --time-limit 3 --jobs 2 --out "$work/runs.jsonl" --resume
 "$nonsmooth" bench report "$work/runs.jsonl" --out "$work/report.html"
 "$nonsmooth" bench page "$work/runs.jsonl" --problems "$work/problems" --out docs/benchmarks.md \
     --command 'bash docs/benchmarks/make.sh'

@@ -33,31 +33,31 @@ pub fn page(
     folder: &str,
     command: &str,
 ) -> Result<Page, String> {
-    let mut page = Page { markdown: introduction(runs, command), figures: vec![] };
-    let kinds = kinds(runs);
-    for (kind, problems) in &kinds {
-        page.markdown += &format!("\n## {}\n\n{}.\n", heading(kind), plural(*problems, "problem"));
+    let mut short = String::from("\n## In short\n\n");
+    let (mut body, mut shown) = (String::new(), vec![]);
+    for (kind, problems) in &kinds(runs) {
+        let heading = heading(kind);
+        body += &format!("\n## {heading}\n\n{}.\n", plural(*problems, "problem"));
         for tolerance in runs.tolerances() {
             let selection = of_kind(runs, kind, tolerance);
             let rows = summary(runs, &selection, By::All);
-            page.markdown += &format!("\n### To {tolerance:e}\n\n");
-            page.markdown += &findings(&rows);
-            page.markdown += &format!("\n{}", summary_page(&rows).markdown());
-            page.markdown += &show(runs, &selection, kind, folder, SHOWN[0], &mut page.figures)?;
-            page.markdown += &winners(runs, &selection);
-            page.markdown += &nobody(runs, &selection);
+            short += &format!("- {heading}, to {tolerance:e}: {}", findings(&rows));
+            body += &format!("\n### To {tolerance:e}\n\n{}", summary_page(&rows).markdown());
+            body += &show(runs, &selection, kind, folder, SHOWN[0], &mut shown)?;
+            body += &winners(runs, &selection);
+            body += &nobody(runs, &selection);
         }
         if let Some(tightest) = runs.tolerances().last() {
-            page.markdown += "\n### Success against tolerance\n";
+            body += "\n### Success against tolerance\n";
             let selection = of_kind(runs, kind, *tightest);
-            page.markdown += &show(runs, &selection, kind, folder, SHOWN[1], &mut page.figures)?;
+            body += &show(runs, &selection, kind, folder, SHOWN[1], &mut shown)?;
         }
     }
     if let Some(traits) = traits {
-        page.markdown += TRAITS;
-        page.markdown += &traits.markdown();
+        body += TRAITS;
+        body += &traits.markdown();
     }
-    Ok(page)
+    Ok(Page { markdown: introduction(runs, command) + &short + &body, figures: shown })
 }
 
 const TRAITS: &str = "
@@ -166,7 +166,7 @@ fn findings(rows: &[Row]) -> String {
     let (most, who) = leaders(|r| r.solved);
     let (fastest, fast) = leaders(|r| r.fastest);
     if most == 0 {
-        return format!("No solver solves any of the {}.\n", plural(best.problems, "problem"));
+        return format!("no solver solves any of the {}.\n", plural(best.problems, "problem"));
     }
     let left = match best.problems - best.solved {
         0 => "every problem is solved by at least one solver".into(),
@@ -176,7 +176,7 @@ fn findings(rows: &[Row]) -> String {
         ),
     };
     format!(
-        "Most problems are solved by {who}: {most} of {}; {left}. Most often the fastest is {fast}, on {fastest}.\n",
+        "most problems are solved by {who}, {most} of {}; {left}. Most often the fastest is {fast}, on {fastest}.\n",
         best.problems
     )
 }
@@ -360,7 +360,7 @@ mod tests {
         assert_eq!(page.markdown.matches('<').count(), 1, "{}", page.markdown);
         assert_eq!(page.markdown.matches("-->").count(), 2, "{}", page.markdown);
         assert!(!page.markdown.contains("\n# P") && !page.markdown.contains("\n# b"));
-        assert!(page.markdown.contains("Most problems are solved by `a'&lt;b>|`: 1 of 1"));
+        assert!(page.markdown.contains("most problems are solved by `a'&lt;b>|`, 1 of 1"));
     }
 
     #[test]
@@ -371,7 +371,7 @@ mod tests {
         has("- nonsmooth 9, on a processor");
         has("## Local problems, u = W r + q\n\n3 problems.");
         has(
-            "Most problems are solved by `sure`: 2 of 3; one is solved by none. Most often the fastest is `quick` and `sure`, on 1.",
+            "- Local problems, u = W r + q, to 1e-8: most problems are solved by `sure`, 2 of 3; one is solved by none. Most often the fastest is `quick` and `sure`, on 1.",
         );
         has("| arch | 2 | 1 | `sure` (1) | `sure` (1) |");
         has("| wall | 1 | 1 | all (1) | `quick` (1) |");
@@ -381,7 +381,7 @@ mod tests {
             "1 of 1; every problem is solved by at least one solver. Most often the fastest is `condense/quick`, on 1.",
         );
         // A solver that refuses a kind has no row in its table.
-        let local = page.markdown.split("## Global").next().unwrap();
+        let local = page.markdown.split("\n## ").find(|part| part.starts_with("Local")).unwrap();
         assert!(!local.contains("condense"), "{local}");
         for figure in &page.figures {
             has(&format!("(figures/{}.svg)", figure.name));

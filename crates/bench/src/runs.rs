@@ -185,10 +185,13 @@ impl Runs {
         remarks
     }
 
-    /// The labels of the solvers, in the order in which they first appear.
+    /// The labels of the solvers that have runs, in the order of the plans, then of their first runs.
     pub fn solvers(&self) -> Vec<&str> {
-        let mut seen = HashSet::new();
-        self.runs.iter().map(|r| r.solver.as_str()).filter(|&s| seen.insert(s)).collect()
+        let mut left: HashSet<&str> = self.runs.iter().map(|r| r.solver.as_str()).collect();
+        let planned =
+            self.campaigns.iter().filter_map(|c| c.plan.as_ref()).flat_map(|p| &p.solvers);
+        let named = planned.map(String::as_str).chain(self.runs.iter().map(|r| r.solver.as_str()));
+        named.filter(|s| left.remove(s)).collect()
     }
 
     /// The tolerances, the largest first.

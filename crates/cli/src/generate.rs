@@ -89,12 +89,12 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         return suite::run(file, out);
     }
     let Some(name) = args.scene.as_deref() else {
-        output::print(&list(SCENES.iter()));
+        output::print(&list(SCENES));
         return Ok(Exit::Solved);
     };
     let entry = SceneEntry::find(name).map_err(|e| e.to_string())?;
     if args.list {
-        output::print(&list(std::iter::once(entry)));
+        output::print(&list(std::slice::from_ref(entry)));
         return Ok(Exit::Solved);
     }
     let settings = settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))?;
@@ -237,22 +237,40 @@ fn text(
     text
 }
 
-fn list<'a>(entries: impl Iterator<Item = &'a SceneEntry>) -> String {
+/// The scenes and their settings. Of several scenes the settings that all scenes have come once, at the end, and with a
+/// scene only where its default is another.
+fn list(entries: &[SceneEntry]) -> String {
+    let all: Vec<Vec<Setting>> = entries.iter().map(SceneEntry::settings).collect();
+    let everywhere = |s: &Setting| {
+        let same = |other: &Setting| other.key == s.key && other.help == s.help;
+        all.len() > 1 && all.iter().all(|settings| settings.iter().any(same))
+    };
+    let common: Vec<&Setting> = match all.first() {
+        Some(first) => first.iter().filter(|s| everywhere(s)).collect(),
+        None => vec![],
+    };
     let mut text = String::from(
         "Scenes and their settings, for `nonsmooth gen SCENE --set key=value --out FILE.hdf5`\n",
     );
-    for entry in entries {
+    for (entry, settings) in entries.iter().zip(&all) {
         text += &format!("\n{}: {}\n", entry.name, entry.summary);
-        for Setting { key, default, choices, help } in entry.settings() {
-            let setting = format!("{key}={}", plain(&default));
-            let choices = match choices.as_slice() {
-                [] => String::new(),
-                names => format!(" One of {}.", names.join(", ")),
-            };
-            text += &format!("  {setting:<20} {help}{choices}\n");
-        }
+        settings.iter().filter(|s| !common.contains(s)).for_each(|s| text += &line(s));
+    }
+    if !common.is_empty() {
+        text += "\nevery scene:\n";
+        common.iter().for_each(|s| text += &line(s));
     }
     text
+}
+
+/// A setting, as the list shows it.
+fn line(Setting { key, default, choices, help }: &Setting) -> String {
+    let setting = format!("{key}={}", plain(default));
+    let choices = match choices.as_slice() {
+        [] => String::new(),
+        names => format!(" One of {}.", names.join(", ")),
+    };
+    format!("  {setting:<20} {help}{choices}\n")
 }
 
 #[cfg(test)]
@@ -261,11 +279,16 @@ mod tests {
 
     #[test]
     fn every_scene_and_setting_is_listed_with_its_help() {
-        let text = list(SCENES.iter());
+        let text = list(SCENES);
         for entry in SCENES {
             assert!(text.contains(&format!("\n{}: ", entry.name)));
         }
         assert!(text.contains("layout=square") && text.contains("One of square, triangular."));
+        // What all scenes have is said once, and with a scene only where its default is another.
+        let (scenes, common) = text.split_once("\nevery scene:\n").unwrap();
+        assert!(common.contains("contact_density=0.0") && !scenes.contains("contact_density="));
+        assert!(common.contains("mu=0.6") && scenes.contains("mu=0.3"));
+        assert!(list(&SCENES[..1]).contains("contact_density=0.0"));
         // A setting without help would end its line with blanks.
         assert!(text.lines().all(|line| line == line.trim_end()), "{text}");
     }

@@ -56,6 +56,7 @@ Examples:
   nonsmooth solve wall.hdf5 --out solved.hdf5        solve it and keep the solution
   nonsmooth check solved.hdf5                        have the solution judged again
   nonsmooth list                                     the solvers and their settings
+  nonsmooth bench run problems/ --out runs.jsonl     compare solvers on folders of problems
 
 Files are FCLIB's HDF5 files of local (W, q, mu) or global (M, H, f, w, mu) problems, in 2D or 3D.
 

@@ -121,7 +121,11 @@ impl<'a> Data<'a> {
         let (mut families, mut kinds) = (Texts::default(), Texts::default());
         let mut messages = Texts::default();
         let mut problems = Problems::default();
-        let mut solvers: Vec<Solver> = Vec::new();
+        let blank = |label| Solver { label, foreign: false, machines: BTreeSet::new() };
+        let mut solvers: Vec<Solver> = all.solvers().into_iter().map(blank).collect();
+        for solver in &solvers {
+            labels.index(solver.label);
+        }
         let mut runs = Columns::default();
         for run in &all.runs {
             let problem = names.index(&run.problem);
@@ -134,10 +138,6 @@ impl<'a> Data<'a> {
                 problems.push(run, known);
             }
             let solver = labels.index(&run.solver);
-            if solver == solvers.len() {
-                let machines = BTreeSet::new();
-                solvers.push(Solver { label: &run.solver, foreign: false, machines });
-            }
             if let Some(campaign) = campaigns.get(run.campaign.as_str()) {
                 solvers[solver].foreign |= campaign.foreign;
                 solvers[solver].machines.insert(&campaign.machine.cpu);
