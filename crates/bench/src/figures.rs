@@ -10,7 +10,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use crate::draw::{Axis, GRID, INK, LOOKS, Mark, Style, decades, font, tick, ticks};
 use crate::profile::{
     Cost, Costs, Curve, DECADES, Progress, Selection, VIRTUAL_BEST, performance,
-    performance_of_best, success,
+    performance_of_best,
 };
 use crate::runs::Runs;
 use crate::tables::{Table, number};
@@ -44,6 +44,16 @@ pub fn figures(runs: &Runs, selection: &Selection) -> Result<Vec<Figure>, String
     all.extend(scene.success()?);
     all.extend(scene.residual(&progress)?);
     Ok(all)
+}
+
+/// The performance profile of the selected runs alone; none where no run has the cost.
+pub fn profile(runs: &Runs, selection: &Selection, cost: Cost) -> Result<Option<Figure>, String> {
+    Scene::new(runs, selection).profile(cost)
+}
+
+/// The figure of success against tolerance alone; none where there is nothing to show.
+pub fn success(runs: &Runs, selection: &Selection) -> Result<Option<Figure>, String> {
+    Scene::new(runs, selection).success()
 }
 
 /// Data profiles have at most this many panels.
@@ -219,7 +229,7 @@ impl<'a> Scene<'a> {
     }
 
     fn success(&self) -> Result<Option<Figure>, String> {
-        let mut all = success(self.runs, self.selection);
+        let mut all = crate::profile::success(self.runs, self.selection);
         if all.is_empty() {
             return Ok(None);
         }

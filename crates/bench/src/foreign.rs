@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use crate::campaign::{Input, describe, inputs};
 use crate::plural;
-use crate::record::{Campaign, Ending, FORMAT, Line, Machine, Problem, Residuals, Run, VERSION};
+use crate::record::{Campaign, Ending, FORMAT, Machine, Problem, Residuals, Run, VERSION};
 use crate::runs::{Runs, RunsError};
 
 /// The family of problems that are none of those known.
@@ -77,10 +77,7 @@ pub struct Imported {
 impl Imported {
     /// The text of the runs file.
     pub fn text(&self) -> String {
-        let lines = self.runs.clone().lines();
-        lines
-            .map(|line: Line| serde_json::to_string(&line).expect("a line is plain data") + "\n")
-            .collect()
+        self.runs.clone().text()
     }
 }
 

@@ -18,7 +18,12 @@ pub mod runs;
 pub mod tables;
 pub mod traits_table;
 
+/// A number that is one.
+fn finite(x: f64) -> Option<f64> {
+    Some(x).filter(|x| x.is_finite())
+}
+
 /// `1 run`, `2 runs`.
-fn plural(n: usize, what: &str) -> String {
+pub fn plural(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }

@@ -2,18 +2,15 @@
 //!
 //! Nothing on the page is written by hand, so that a new campaign makes a new page that is true.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use crate::figures::{Figure, figures};
+use crate::figures::{self, Figure};
 use crate::plural;
-use crate::profile::{Selection, VIRTUAL_BEST};
+use crate::profile::{Cost, Selection, VIRTUAL_BEST};
 use crate::record::{Campaign, Ending};
 use crate::runs::Runs;
 use crate::tables::{By, Row, Table, markdown_text, summary, summary_page, unsolved};
 use crate::traits_table;
-
-/// The figures that a page shows for each kind of problem, by the names that [`figures`] gives them.
-const SHOWN: [&str; 2] = ["profile-seconds", "success"];
 
 /// A page and its figures.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,31 +30,42 @@ pub fn page(
     folder: &str,
     command: &str,
 ) -> Result<Page, String> {
+    let kinds = kinds(runs);
     let mut short = String::from("\n## In short\n\n");
     let (mut body, mut shown) = (String::new(), vec![]);
-    for (kind, problems) in &kinds(runs) {
+    for (kind, problems) in &kinds {
         let heading = heading(kind);
         body += &format!("\n## {heading}\n\n{}.\n", plural(*problems, "problem"));
+        let solvers = takers(runs, kind);
+        let at = |tolerance| Selection {
+            kinds: vec![kind.clone()],
+            solvers: solvers.clone(),
+            ..Selection::at(tolerance)
+        };
+        let mut show = |figure: Option<Figure>, name: &str| {
+            figure.map_or_else(String::new, |f| show(f, kind, name, folder, &mut shown))
+        };
         for tolerance in runs.tolerances() {
-            let selection = of_kind(runs, kind, tolerance);
+            let selection = at(tolerance);
             let rows = summary(runs, &selection, By::All);
             short += &format!("- {heading}, to {tolerance:e}: {}", findings(&rows));
             body += &format!("\n### To {tolerance:e}\n\n{}", summary_page(&rows).markdown());
-            body += &show(runs, &selection, kind, folder, SHOWN[0], &mut shown)?;
+            let profile = figures::profile(runs, &selection, Cost::Seconds)?;
+            let reached = format!("{tolerance:e}").replace('.', "p");
+            body += &show(profile, &format!("profile-seconds-{reached}"));
             body += &winners(runs, &selection);
             body += &nobody(runs, &selection);
         }
         if let Some(tightest) = runs.tolerances().last() {
             body += "\n### Success against tolerance\n";
-            let selection = of_kind(runs, kind, *tightest);
-            body += &show(runs, &selection, kind, folder, SHOWN[1], &mut shown)?;
+            body += &show(figures::success(runs, &at(*tightest))?, "success");
         }
     }
     if let Some(traits) = traits {
         body += TRAITS;
         body += &traits.markdown();
     }
-    Ok(Page { markdown: introduction(runs, command) + &short + &body, figures: shown })
+    Ok(Page { markdown: introduction(runs, &kinds, command) + &short + &body, figures: shown })
 }
 
 const TRAITS: &str = "
@@ -71,7 +79,7 @@ suite; `nonsmooth gen --list` says what can be set.
 
 /// The kinds of problem with the number of problems that were run, the most first.
 fn kinds(runs: &Runs) -> Vec<(String, usize)> {
-    let mut kinds: BTreeMap<&str, std::collections::BTreeSet<&str>> = BTreeMap::new();
+    let mut kinds: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     for run in &runs.runs {
         kinds.entry(&run.kind).or_default().insert(&run.problem);
     }
@@ -91,19 +99,16 @@ fn heading(kind: &str) -> String {
     }
 }
 
-/// The problems of a kind, and the solvers that take it.
-fn of_kind(runs: &Runs, kind: &str, tolerance: f64) -> Selection {
-    let takes = |solver: &&str| {
-        let mut its = runs.runs.iter().filter(|r| r.kind == kind && r.solver == *solver);
-        its.any(|r| r.ending != Ending::Refused)
-    };
-    let solvers = runs.solvers().into_iter().filter(takes).map(String::from).collect();
-    Selection { kinds: vec![kind.into()], solvers, ..Selection::at(tolerance) }
+/// The solvers that take problems of a kind.
+fn takers(runs: &Runs, kind: &str) -> Vec<String> {
+    let taken = runs.runs.iter().filter(|r| r.kind == kind && r.ending != Ending::Refused);
+    let takes: BTreeSet<&str> = taken.map(|r| r.solver.as_str()).collect();
+    runs.solvers().into_iter().filter(|s| takes.contains(s)).map(String::from).collect()
 }
 
-fn introduction(runs: &Runs, command: &str) -> String {
-    let families: std::collections::BTreeSet<_> = runs.runs.iter().map(|r| &r.family).collect();
-    let problems: usize = kinds(runs).iter().map(|k| k.1).sum();
+fn introduction(runs: &Runs, kinds: &[(String, usize)], command: &str) -> String {
+    let families: BTreeSet<_> = runs.runs.iter().map(|r| &r.family).collect();
+    let problems: usize = kinds.iter().map(|k| k.1).sum();
     let solvers = runs.solvers();
     let command = markdown_text(command);
     let comment = command.replace("--", "\u{2010}\u{2010}");
@@ -155,16 +160,10 @@ fn measured(campaign: &Campaign) -> String {
 
 /// What the rows of all problems say, in sentences.
 fn findings(rows: &[Row]) -> String {
-    let (best, solvers): (Vec<&Row>, Vec<&Row>) =
-        rows.iter().partition(|r| r.solver == VIRTUAL_BEST);
-    let Some(best) = best.first() else { return String::new() };
-    let leaders = |value: fn(&Row) -> usize| {
-        let most = solvers.iter().map(|r| value(r)).max().unwrap_or(0);
-        let names = solvers.iter().filter(|r| value(r) == most).map(|r| code(&r.solver));
-        (most, listed(&names.collect::<Vec<_>>()))
-    };
-    let (most, who) = leaders(|r| r.solved);
-    let (fastest, fast) = leaders(|r| r.fastest);
+    let Some(best) = rows.iter().find(|r| r.solver == VIRTUAL_BEST) else { return String::new() };
+    let (most, who) = leaders(rows, |r| r.solved);
+    let (fastest, fast) = leaders(rows, |r| r.fastest);
+    let (who, fast) = (listed(&who), listed(&fast));
     if most == 0 {
         return format!("no solver solves any of the {}.\n", plural(best.problems, "problem"));
     }
@@ -179,6 +178,13 @@ fn findings(rows: &[Row]) -> String {
         "most problems are solved by {who}, {most} of {}; {left}. Most often the fastest is {fast}, on {fastest}.\n",
         best.problems
     )
+}
+
+/// The most that a solver has of something, and the labels of those that have it.
+fn leaders(rows: &[Row], value: fn(&Row) -> usize) -> (usize, Vec<String>) {
+    let solvers = || rows.iter().filter(|r| r.solver != VIRTUAL_BEST);
+    let most = solvers().map(value).max().unwrap_or(0);
+    (most, solvers().filter(|r| value(r) == most).map(|r| code(&r.solver)).collect())
 }
 
 /// A label as Markdown's code.
@@ -205,18 +211,8 @@ fn listed(all: &[String]) -> String {
     }
 }
 
-/// Draws a figure and says where the page shows it.
-fn show(
-    runs: &Runs,
-    selection: &Selection,
-    kind: &str,
-    folder: &str,
-    name: &str,
-    all: &mut Vec<Figure>,
-) -> Result<String, String> {
-    let Some(figure) = figures(runs, selection)?.into_iter().find(|f| f.name == name) else {
-        return Ok(String::new());
-    };
+/// Keeps a figure, under a name of its own, and says where the page shows it.
+fn show(figure: Figure, kind: &str, name: &str, folder: &str, all: &mut Vec<Figure>) -> String {
     // Other programs' kinds may hold anything, and names must stay in the folder.
     let letter = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
     let kind: String = match kind.strip_prefix("friction_").unwrap_or(kind) {
@@ -224,18 +220,13 @@ fn show(
         kind => kind.chars().map(letter).collect(),
     };
     let kind = kind.trim_matches('-');
-    let tolerance = format!("{:e}", selection.tolerance).replace('.', "p");
-    let name = if name == SHOWN[1] {
-        format!("{kind}-{name}")
-    } else {
-        format!("{kind}-{name}-{tolerance}")
-    };
+    let name = format!("{kind}-{name}");
     let free = |name: &String| all.iter().all(|f| f.name != *name);
     let mut names = std::iter::once(name.clone()).chain((2..).map(|k| format!("{name}-{k}")));
     let name = names.find(free).unwrap_or(name);
     let text = format!("\n![{}]({}/{name}.svg)\n", figure.title, address(folder));
     all.push(Figure { name, ..figure });
-    Ok(text)
+    text
 }
 
 /// Who wins where: family by family.
@@ -248,17 +239,12 @@ fn winners(runs: &Runs, selection: &Selection) -> String {
         rows: vec![],
     };
     for family in rows.chunk_by(|a, b| a.group == b.group) {
-        let solvers = || family.iter().filter(|r| r.solver != VIRTUAL_BEST);
         let Some(any) = family.iter().find(|r| r.solver == VIRTUAL_BEST) else { continue };
-        let leaders = |value: fn(&Row) -> usize| {
-            let most = solvers().map(value).max().unwrap_or(0);
-            let names: Vec<_> =
-                solvers().filter(|r| value(r) == most).map(|r| code(&r.solver)).collect();
-            match most {
-                0 => "nobody".into(),
-                n if names.len() == solvers().count() && names.len() > 1 => format!("all ({n})"),
-                n => format!("{} ({n})", listed(&names)),
-            }
+        let solvers = family.len() - 1;
+        let leaders = |value| match leaders(family, value) {
+            (0, _) => "nobody".into(),
+            (n, names) if names.len() == solvers && solvers > 1 => format!("all ({n})"),
+            (n, names) => format!("{} ({n})", listed(&names)),
         };
         table.rows.push(vec![
             any.group.clone(),
@@ -348,7 +334,7 @@ mod tests {
         let mut all = Runs { runs: runs.collect(), ..example() };
         all.campaigns[0].program = "<img src=x>\n# P".into();
         let page = page(&all, None, "my (page)", "make --> <b>").unwrap();
-        let names: std::collections::BTreeSet<_> = page.figures.iter().map(|f| &f.name).collect();
+        let names: BTreeSet<_> = page.figures.iter().map(|f| &f.name).collect();
         assert_eq!((names.len(), page.figures.len()), (10, 10), "{names:?}");
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
         assert!(names.iter().all(|n| !n.starts_with('-') && n.chars().all(plain)), "{names:?}");
@@ -387,7 +373,7 @@ mod tests {
             has(&format!("(figures/{}.svg)", figure.name));
             assert!(figure.svg.starts_with("<svg"));
         }
-        let names: std::collections::BTreeSet<_> = page.figures.iter().map(|f| &f.name).collect();
+        let names: BTreeSet<_> = page.figures.iter().map(|f| &f.name).collect();
         assert_eq!((names.len(), page.figures.len()), (4, 4));
     }
 }

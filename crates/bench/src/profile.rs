@@ -92,6 +92,12 @@ impl Selection {
             && one(&self.sizes, &Size::of(run.contacts))
     }
 
+    /// The selected runs at its tolerance.
+    pub(crate) fn taken<'a>(&self, runs: &'a Runs) -> Vec<&'a Run> {
+        let at = |r: &&Run| r.tolerance == self.tolerance && self.takes(r);
+        runs.runs.iter().filter(at).collect()
+    }
+
     /// The labels of the selected solvers, in the order in which the runs name them.
     pub fn solvers<'a>(&self, runs: &'a Runs) -> Vec<&'a str> {
         let all = runs.solvers().into_iter();
@@ -117,20 +123,20 @@ pub struct Costs {
 impl Costs {
     /// The costs of the selected runs at the tolerance of the selection.
     pub fn of(runs: &Runs, selection: &Selection, cost: Cost) -> Self {
-        let solvers = selection.solvers(runs);
+        Self::over(&selection.solvers(runs), &selection.taken(runs), cost)
+    }
+
+    /// The costs of runs at one tolerance, all of them of the given solvers.
+    pub(crate) fn over(solvers: &[&str], taken: &[&Run], cost: Cost) -> Self {
         let index: HashMap<&str, usize> =
             solvers.iter().enumerate().map(|(s, &label)| (label, s)).collect();
-        let taken = || {
-            let at = |r: &&Run| r.tolerance == selection.tolerance && selection.takes(r);
-            runs.runs.iter().filter(at)
-        };
-        let problems: BTreeSet<&str> = taken().map(|r| r.problem.as_str()).collect();
+        let problems: BTreeSet<&str> = taken.iter().map(|r| r.problem.as_str()).collect();
         let column: HashMap<&str, usize> =
             problems.iter().enumerate().map(|(p, &n)| (n, p)).collect();
         let mut t = vec![vec![f64::INFINITY; problems.len()]; solvers.len()];
         let mut missing = vec![problems.len(); solvers.len()];
         let mut unknown = vec![0; solvers.len()];
-        for run in taken() {
+        for run in taken {
             let s = index[run.solver.as_str()];
             missing[s] -= 1;
             if run.solved() {
@@ -140,10 +146,9 @@ impl Costs {
                 }
             }
         }
-        let own = |all: Vec<&str>| all.into_iter().map(String::from).collect();
         Self {
-            solvers: own(solvers),
-            problems: own(problems.into_iter().collect()),
+            solvers: solvers.iter().map(|s| s.to_string()).collect(),
+            problems: problems.into_iter().map(String::from).collect(),
             t,
             missing,
             unknown,

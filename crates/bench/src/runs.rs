@@ -217,8 +217,14 @@ impl Runs {
         self.campaigns.iter().find(|c| c.id == run.campaign)
     }
 
+    /// The text of a file of this content.
+    pub fn text(self) -> String {
+        let text = |line| serde_json::to_string(&line).expect("a line is plain data") + "\n";
+        self.lines().map(text).collect()
+    }
+
     /// The lines that a file of this content has.
-    pub fn lines(self) -> impl Iterator<Item = Line> {
+    fn lines(self) -> impl Iterator<Item = Line> {
         let campaigns = self.campaigns.into_iter().map(Line::Campaign);
         let problems = self.problems.into_values().map(Line::Problem);
         campaigns.chain(problems).chain(self.runs.into_iter().map(|r| Line::Run(Box::new(r))))

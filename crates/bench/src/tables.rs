@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use crate::profile::{Cost, Costs, Selection, VIRTUAL_BEST};
-use crate::record::{Ending, Run, SIZES, Size};
+use crate::record::{Ending, Run, Size};
 use crate::runs::Runs;
 
 /// By what the problems of a table are put into groups.
@@ -56,32 +56,28 @@ impl Row {
 
 /// A row for each solver of the selection and one for the virtual best, for each group that has problems.
 pub fn summary(runs: &Runs, selection: &Selection, by: By) -> Vec<Row> {
-    let groups: Vec<(String, Selection)> = match by {
-        By::All => vec![("all".into(), selection.clone())],
-        By::Family => {
-            let taken = runs.runs.iter().filter(|r| selection.takes(r));
-            let families: BTreeSet<&String> = taken.map(|r| &r.family).collect();
-            let only = |f: &String| Selection { families: vec![f.clone()], ..selection.clone() };
-            families.into_iter().map(|f| (f.clone(), only(f))).collect()
-        }
-        By::Size => {
-            let taken = |s: &Size| selection.sizes.is_empty() || selection.sizes.contains(s);
-            let only = |s: Size| Selection { sizes: vec![s], ..selection.clone() };
-            SIZES.into_iter().filter(taken).map(|s| (s.name.into(), only(s))).collect()
-        }
-    };
-    groups.iter().flat_map(|(group, selection)| of_group(runs, group, selection)).collect()
+    let solvers = selection.solvers(runs);
+    let mut groups: BTreeMap<(usize, &str), Vec<&Run>> = BTreeMap::new();
+    for run in selection.taken(runs) {
+        let group = match by {
+            By::All => (0, "all"),
+            By::Family => (0, run.family.as_str()),
+            By::Size => {
+                let size = Size::of(run.contacts);
+                (size.least, size.name)
+            }
+        };
+        groups.entry(group).or_default().push(run);
+    }
+    groups.into_iter().flat_map(|((_, group), runs)| of_group(&solvers, group, &runs)).collect()
 }
 
-fn of_group(runs: &Runs, group: &str, selection: &Selection) -> Vec<Row> {
-    let costs = Costs::of(runs, selection, Cost::Seconds);
-    if costs.problems.is_empty() {
-        return vec![];
-    }
+/// The rows of a group of runs at one tolerance.
+fn of_group(solvers: &[&str], group: &str, runs: &[&Run]) -> Vec<Row> {
+    let costs = Costs::over(solvers, runs, Cost::Seconds);
     let mut ended: HashMap<&str, ([usize; Ending::ALL.len()], f64)> = HashMap::new();
-    let at = |r: &&Run| r.tolerance == selection.tolerance && selection.takes(r);
     let mut solved = BTreeSet::new();
-    for run in runs.runs.iter().filter(at) {
+    for run in runs {
         if run.solved() {
             solved.insert(&run.problem);
         }
@@ -156,8 +152,7 @@ pub struct Unsolved {
 /// The problems on which solvers were run at the tolerance of the selection and that none solved.
 pub fn unsolved(runs: &Runs, selection: &Selection) -> Vec<Unsolved> {
     let mut all: BTreeMap<&str, Vec<&Run>> = BTreeMap::new();
-    let at = |r: &&Run| r.tolerance == selection.tolerance && selection.takes(r);
-    for run in runs.runs.iter().filter(at) {
+    for run in selection.taken(runs) {
         all.entry(&run.problem).or_default().push(run);
     }
     let none = all.into_iter().filter(|(_, runs)| !runs.iter().any(|r| r.solved()));

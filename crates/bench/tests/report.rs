@@ -11,7 +11,7 @@ use nonsmooth_bench::profile::{
     success,
 };
 use nonsmooth_bench::record::{
-    Campaign, Ending, FORMAT, Line, Machine, Plan, Problem, Residuals, Run, SIZES, VERSION,
+    Campaign, Ending, FORMAT, Machine, Plan, Problem, Residuals, Run, SIZES, VERSION,
 };
 use nonsmooth_bench::report::{Options, html};
 use nonsmooth_bench::runs::Runs;
@@ -577,8 +577,7 @@ fn twenty_thousand_runs_open_in_two_seconds() {
 #[test]
 fn runs_files_lead_to_the_same_page() {
     let all = synthetic(5, 3, &[1e-8], true);
-    let lines = all.clone().lines().map(|line: Line| serde_json::to_string(&line).unwrap() + "\n");
-    let read = Runs::parse(Path::new("runs.jsonl"), &lines.collect::<String>()).unwrap();
+    let read = Runs::parse(Path::new("runs.jsonl"), &all.clone().text()).unwrap();
     assert!(page(&read) == page(&all));
 }
 /// The value at x of steps given as two arrays.

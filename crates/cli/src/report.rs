@@ -3,6 +3,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
+/// `1 contact`, `2 contacts`.
+pub use nonsmooth_bench::plural as count;
 use nonsmooth_problem::check::{Failing, Measure, Verdict};
 use serde_json::{Map, Value, json};
 
@@ -20,11 +22,6 @@ pub fn row(text: &mut String, label: &str, rest: impl std::fmt::Display) {
 /// A number of three digits.
 pub fn number(x: f64) -> String {
     format!("{x:.2e}")
-}
-
-/// `1 contact`, `2 contacts`.
-pub fn count(n: usize, what: &str) -> String {
-    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
 /// The file and the size of its problem.

@@ -7,6 +7,7 @@ use nonsmooth_io::fclib;
 use nonsmooth_problem::traits::Traits;
 use sha2::{Digest, Sha256};
 
+use crate::finite;
 use crate::record::Problem;
 
 /// A file that holds a problem.
@@ -93,7 +94,6 @@ pub fn describe(file: &Path) -> Result<Problem, String> {
     let digest: String = digest.iter().take(8).map(|b| format!("{b:02x}")).collect();
     let content = fclib::read(file).map_err(|e| e.to_string())?;
     let traits = Traits::of(&content.problem, content.info.dofs);
-    let finite = |x: f64| Some(x).filter(|x| x.is_finite());
     Ok(Problem {
         kind: traits.kind.name().into(),
         digest,

@@ -55,7 +55,8 @@ impl Journal {
             drop(journal);
             return Ok((Self::create(path, campaign)?, Runs::default()));
         }
-        let there = Runs::read(path).map_err(|e| e.to_string())?;
+        let there =
+            Runs::parse(path, &String::from_utf8_lossy(&text)).map_err(|e| e.to_string())?;
         cut(&journal.file)?;
         journal.file.seek(SeekFrom::End(0)).map_err(|e| refusal(path, &e))?;
         // Campaigns without a plan are foreign, and joined.

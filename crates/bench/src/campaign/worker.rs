@@ -13,6 +13,7 @@ use super::files::describe;
 use super::job::{Job, Said, Task};
 use super::solvers::{Label, Solvers};
 use super::system;
+use crate::finite;
 use crate::record::{Ending, Residuals, Run};
 
 /// Seconds between two signs of life.
@@ -156,10 +157,6 @@ fn residuals(m: &Measure) -> Residuals {
         dynamics: m.dynamics.and_then(finite),
         bilateral: m.bilateral.and_then(finite),
     }
-}
-
-fn finite(x: f64) -> Option<f64> {
-    Some(x).filter(|x| x.is_finite())
 }
 
 /// At most [`TRACE`] points, evenly by their number, the last one included.

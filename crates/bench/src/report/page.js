@@ -161,18 +161,23 @@ function dataFigure() {
   };
 }
 
+/** What figures of residuals against time share. */
+const residualsInTime = (curves, label) => ({
+  x: decades("time t, s", "seconds", curves.flatMap(c => c.x)),
+  y: decades(label, "residual", curves.flatMap(c => c.y)),
+  stepped: true,
+  panels: [{ title: "", curves }],
+  solvers: solversOf(curves),
+  at: x => `t = ${short(x)} s`,
+  format: residual,
+  lowest: true,
+});
+
 function medianFigure() {
   const { problems, curves, leftOut } = medianResidual(state.selection);
   return {
     title: "Median residual against time",
-    x: decades("time t, s", "seconds", curves.flatMap(c => c.x)),
-    y: decades("median residual", "residual", curves.flatMap(c => c.y)),
-    stepped: true,
-    panels: [{ title: "", curves }],
-    solvers: solversOf(curves),
-    at: x => `t = ${short(x)} s`,
-    format: residual,
-    lowest: true,
+    ...residualsInTime(curves, "median residual"),
     note: `Median over ${plural(problems, "problem")} of the best residual that a solver has reached within t seconds, over its runs at all `
       + `tolerances. A problem without an answer yet counts as infinite, so a curve begins where half of them have one.${
         machinesNote(state.selection)}${without(leftOut, "their residuals or times are not known")}`,
@@ -599,14 +604,7 @@ function traceFigure(p) {
   return {
     heading: "Residual against time",
     title: `Residual against time, ${data.problems.name[p]}, tolerance ${toleranceText(data.tolerances[k])}`,
-    x: decades("time t, s", "seconds", curves.flatMap(c => c.x)),
-    y: decades("residual", "residual", curves.flatMap(c => c.y)),
-    stepped: true,
-    panels: [{ title: "", curves }],
-    solvers: solversOf(curves),
-    at: x => `t = ${short(x)} s`,
-    format: residual,
-    lowest: true,
+    ...residualsInTime(curves, "residual"),
     note: "The judge's residual at its visits, thinned to a few dozen of them.",
   };
 }

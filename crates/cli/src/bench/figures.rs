@@ -77,8 +77,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             "expected runs that are selected at tolerance {tolerance:e}, found none"
         ));
     }
-    std::fs::create_dir_all(&args.out)
-        .map_err(|e| format!("--out {}: expected a folder, found: {e}", args.out.display()))?;
+    files::folder("--out", &args.out)?;
     let write = |name: String, text: &str| {
         let path = args.out.join(&name);
         files::write_text("--out", &path, text)?;

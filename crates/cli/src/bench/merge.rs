@@ -2,8 +2,6 @@
 
 use std::path::PathBuf;
 
-use nonsmooth_bench::record::Line;
-
 use super::Joined;
 use crate::report::{count, row};
 use crate::{Exit, files, output};
@@ -53,9 +51,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         row(&mut text, "but", remark);
         exit = exit.max(Exit::NotSolved);
     }
-    let lines: Result<String, serde_json::Error> =
-        runs.lines().map(|line: Line| Ok(serde_json::to_string(&line)? + "\n")).collect();
-    files::write_text("--out", &args.out, &lines.map_err(|e| e.to_string())?)?;
+    files::write_text("--out", &args.out, &runs.text())?;
     output::print(&text);
     Ok(exit)
 }

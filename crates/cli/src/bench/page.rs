@@ -65,8 +65,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let name = args.out.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let made = page(&runs, described.as_ref(), &name, &args.command)?;
     let folder = args.out.with_file_name(&name);
-    std::fs::create_dir_all(&folder)
-        .map_err(|e| format!("{}: expected a folder, found: {e}", folder.display()))?;
+    files::folder("--out", &folder)?;
     for figure in &made.figures {
         files::write_text("--out", &folder.join(format!("{}.svg", figure.name)), &figure.svg)?;
         files::write_text("--out", &folder.join(format!("{}.csv", figure.name)), &figure.csv)?;
