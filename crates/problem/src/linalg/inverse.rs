@@ -196,6 +196,11 @@ impl Inverse {
         self.place.len()
     }
 
+    /// A itself.
+    pub fn matrix(&self) -> &Csc {
+        &self.matrix
+    }
+
     /// The sizes of the connected components, in the order of their first unknown.
     pub fn component_sizes(&self) -> impl Iterator<Item = usize> + '_ {
         self.components.iter().map(|c| c.index.len())

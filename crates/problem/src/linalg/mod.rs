@@ -20,7 +20,7 @@ pub use bsr::{Block, BlockRow, Bsr};
 pub use compensated::Compensated;
 pub use csc::Csc;
 pub use delassus::Delassus;
-pub(crate) use groups::Groups;
+pub use groups::Groups;
 pub use inverse::{Inverse, Refine, factorisations};
 
 /// The Euclidean norm, scaled so that neither overflow nor underflow of the squares spoils it.
