@@ -133,7 +133,7 @@ impl BlockLu {
     #[inline]
     pub fn add_at(&mut self, slot: Slot, block: &[f64]) {
         let place = &self.symbolic.places[slot.0 as usize];
-        let len = (place.rows * place.columns) as usize;
+        let len = place.rows as usize * place.columns as usize;
         assert_eq!(block.len(), len, "the size of a block");
         let values = &mut self.values[place.values..place.values + len];
         values.iter_mut().zip(block).for_each(|(a, b)| *a += b);

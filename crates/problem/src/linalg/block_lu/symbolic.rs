@@ -281,7 +281,7 @@ impl Symbolic {
                         to: front.lower + lj * (front.pivots + front.rest) + li,
                         upper: false,
                     });
-                    self.values_len += (si * sj) as usize;
+                    self.values_len += si as usize * sj as usize;
                     if of > f {
                         self.number[e] = self.places.len() as u32;
                         self.places.push(Place {
@@ -293,7 +293,7 @@ impl Symbolic {
                             to: front.upper + (li - front.pivots) * front.pivots + lj,
                             upper: true,
                         });
-                        self.values_len += (si * sj) as usize;
+                        self.values_len += si as usize * sj as usize;
                     }
                 }
             }
