@@ -2,5 +2,7 @@
 
 pub mod nt;
 mod ordering;
+mod sweep;
 
 pub use ordering::{Order, Ordering};
+pub use sweep::Sweep;
