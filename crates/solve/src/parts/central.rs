@@ -31,11 +31,11 @@
 //! Fails: the exact law is not monotone; its central path can turn back, and then the steps shrink. With a given s the
 //! method fails where the problem has no solution.
 
-use nonsmooth_problem::linalg::{Block, norm, norm_of, small};
+use nonsmooth_problem::linalg::{Block, Singular, norm_of, small};
 
 use super::nt::{Inner, Pair, Scaling, Shape};
 use crate::cone::tangential_norm;
-use crate::form::{Linearised, Singular};
+use crate::form::Linearised;
 
 /// Where s comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -201,6 +201,12 @@ impl<const D: usize> Central<D> {
     /// The impulses of the iterate with the smallest error since the beginning, and that error.
     pub fn best(&self) -> (&[f64], f64) {
         (&self.best, self.best_error)
+    }
+
+    /// Makes r and u those of the best iterate. To go on, begin again.
+    pub fn restore<P: Linearised<D>>(&mut self, problem: &P, state: &mut P::State) {
+        self.r.copy_from_slice(&self.best);
+        problem.velocities(state, &self.r, &mut self.u);
     }
 
     /// The present iterate's numbers.

@@ -1,8 +1,12 @@
 //! What two families share.
 
+mod central;
+mod conic;
 pub mod nt;
 mod ordering;
 mod sweep;
 
+pub use central::{Central, Iterate};
+pub use conic::{ConvexEnd, ConvexIp};
 pub use ordering::{Order, Ordering};
 pub use sweep::Sweep;
