@@ -221,7 +221,8 @@ impl<const D: usize> Central<D> {
         state: &mut P::State,
     ) -> Result<Iterate, Singular> {
         let n = self.pairs.len();
-        let before = self.now.unwrap_or(Iterate { error: 1.0, tau: 1.0, residual: 1.0, alpha: 0.0 });
+        let before =
+            self.now.unwrap_or(Iterate { error: 1.0, tau: 1.0, residual: 1.0, alpha: 0.0 });
         self.factorise(problem, state)?;
         for c in 0..n {
             self.d[c] = self.scalings[c].lambda.map(|l| -l);
@@ -232,7 +233,7 @@ impl<const D: usize> Central<D> {
         let ratio = (tau / before.tau).clamp(0.0, 1.0);
         let mut sigma = ratio * ratio * ratio;
         // Complementarity must not run ahead of the equations.
-        let behind = before.residual > 10.0 * before.tau.max(before.tau.sqrt() * 1e-3);
+        let behind = before.residual > 10.0 * before.tau.max(0.1 * before.error);
         if behind {
             sigma = sigma.max(BEHIND);
         }
@@ -275,7 +276,7 @@ impl<const D: usize> Central<D> {
             for i in 0..rows {
                 let v = &scaling.vectors[i];
                 let square = scaling.values[i] * scaling.values[i];
-                let (a, b) = (1.0 / (1.0 + square), (square + PROXIMAL) / (1.0 + square));
+                let (a, b) = (1.0 / (1.0 + square), square / (1.0 + square));
                 for k in 0..D {
                     p[i][k] = a * (v[k] + v[0] * n[k]) * z[k]; //  vᵀ G Z
                     q[i][k] = b * v[k] * x[k];
@@ -308,13 +309,24 @@ impl<const D: usize> Central<D> {
         problem.solve_linearised(state, &self.b, &mut self.dr, &mut self.wdr);
         for c in 0..self.pairs.len() {
             let dx = self.scaled_impulse(c, &small::block(&self.dr, c));
+            let mut dz = self.scaled_velocity(c, &small::block(&self.wdr, c));
+            (0..D).for_each(|k| dz[k] -= weight * self.rho[c][k]);
+            let n = self.slide_direction(c);
+            dz[0] += (1..D).map(|k| n[k] * dz[k]).sum::<f64>(); //      G (Z W dr − ρ)
             let scaling = &self.scalings[c];
-            let (d, x) = (scaling.coordinates(&self.d[c]), scaling.coordinates(&dx));
-            let mut z = [0.0; D];
+            let d = scaling.coordinates(&self.d[c]);
+            let (mut x, mut z) = (scaling.coordinates(&dx), scaling.coordinates(&dz));
             for i in 0..D {
-                z[i] = scaling.values[i] * (d[i] - scaling.values[i] * x[i]);
+                // Complementarity gives the one that is small from the other; the other way round it would magnify what
+                // the solve left.
+                let s = scaling.values[i];
+                if s > 1.0 {
+                    x[i] = (d[i] - z[i] / s) / s;
+                } else {
+                    z[i] = s * (d[i] - s * x[i]);
+                }
             }
-            (self.dx[c], self.dz[c]) = (dx, scaling.back(&z));
+            (self.dx[c], self.dz[c]) = (scaling.back(&x), scaling.back(&z));
         }
     }
 
@@ -346,12 +358,7 @@ impl<const D: usize> Central<D> {
     }
 
     /// Everything that follows from x and z.
-    fn look<P: Linearised<D>>(
-        &mut self,
-        problem: &P,
-        state: &mut P::State,
-        alpha: f64,
-    ) -> Iterate {
+    fn look<P: Linearised<D>>(&mut self, problem: &P, state: &mut P::State, alpha: f64) -> Iterate {
         let n = self.pairs.len();
         for c in 0..n {
             let (x, scale) = (self.pairs[c].x.vector(), self.impulse_scale(c));
@@ -452,10 +459,6 @@ impl<const D: usize> Central<D> {
 
 /// σ while the equations lag behind complementarity.
 const BEHIND: f64 = 0.9;
-
-/// Added to the eigenvalues of S²: a proximal term, which makes steps within the null space of W finite. It disturbs
-/// the step, not the solution, since ρ is recomputed.
-const PROXIMAL: f64 = 1e-12;
 
 /// The natural map `x − P_K(x − ũ)`, by its three regions so that a large x does not round ũ away.
 fn natural_map<const D: usize>(x: &[f64; D], modified: &[f64; D], mu: f64) -> [f64; D] {

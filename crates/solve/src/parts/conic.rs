@@ -173,8 +173,13 @@ mod tests {
         let m = problem.q.len();
         let unit = (0..m / 3)
             .map(|c| {
-                let row: f64 =
-                    problem.W.row(c).1.iter().map(|b| norm_of(b.as_flattened().iter().copied())).sum();
+                let row: f64 = problem
+                    .W
+                    .row(c)
+                    .1
+                    .iter()
+                    .map(|b| norm_of(b.as_flattened().iter().copied()))
+                    .sum();
                 row
             })
             .fold(0.0, f64::max);
@@ -219,7 +224,8 @@ mod tests {
 
     #[test]
     fn a_start_at_the_solution_saves_iterations() {
-        let (problem, point) = Planted { contacts: 30, dofs: 90, ..Planted::default() }.local::<3>();
+        let (problem, point) =
+            Planted { contacts: 30, dofs: 90, ..Planted::default() }.local::<3>();
         let mut state = problem.state(Access::Newton).unwrap();
         let (_, s) = speeds::<_, 3>(&problem, &mut state, &point.r);
         let mut ip = ConvexIp::<3>::new();
@@ -233,13 +239,14 @@ mod tests {
 
     #[test]
     fn units_do_not_matter() {
-        let (problem, point) = Planted { contacts: 20, dofs: 60, ..Planted::default() }.local::<3>();
+        let (problem, point) =
+            Planted { contacts: 20, dofs: 60, ..Planted::default() }.local::<3>();
         let iterations = |problem: &FrictionLocal<3>, r: &[f64]| {
             let mut state = problem.state(Access::Newton).unwrap();
             let (_, s) = speeds::<_, 3>(problem, &mut state, r);
             let mut ip = ConvexIp::<3>::new();
             ip.begin(problem, &mut state, &s, None);
-            ip.solve(problem, &mut state, 1e-11, 80)
+            ip.solve(problem, &mut state, 1e-9, 80)
         };
         let first = iterations(&problem, &point.r);
         for (w, q) in [(1e6, 1.0), (1e-6, 1.0), (1.0, 1e6), (1e6, 1e-6)] {
@@ -250,7 +257,7 @@ mod tests {
             let end = iterations(&other, &r);
             assert_eq!(end.iterations, first.iterations, "W × {w:e}, q × {q:e}: {end:?}");
         }
-        assert!(first.error <= 1e-11 && problem.unknowns() == 60);
+        assert!(first.error <= 1e-9 && problem.unknowns() == 60);
     }
 
     fn scaled(problem: &FrictionLocal<3>, factor: f64) -> nonsmooth_problem::linalg::Bsr<3> {

@@ -253,8 +253,8 @@ impl<const D: usize> Scaling<D> {
         let (x_plus, x_minus) = (x.plus / root_x, x.minus / root_x);
         let (z_plus, z_minus) = (z.plus / root_z, z.minus / root_z);
         let (x_t, z_t) = (0.5 * (x_plus - x_minus), 0.5 * (z_plus - z_minus));
-        let product = 0.5 * (x_plus * z_minus + x_minus * z_plus)
-            + x_t * z_t * one_plus_cosine(&x.t, &z.t);
+        let product =
+            0.5 * (x_plus * z_minus + x_minus * z_plus) + x_t * z_t * one_plus_cosine(&x.t, &z.t);
         let two_gamma = 2.0 * (0.5 * (1.0 + product)).sqrt();
         let mut w = [0.5 * (x_plus + x_minus + z_plus + z_minus) / two_gamma; D];
         for k in 1..D {
