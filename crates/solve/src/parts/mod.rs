@@ -10,5 +10,5 @@ mod sweep;
 pub use central::{Central, Iterate};
 pub use conic::{ConvexEnd, ConvexIp};
 pub use ordering::{Order, Ordering};
-pub use proximal_newton::{Iterate, ProximalNewton};
+pub use proximal_newton::{Inner, ProximalNewton};
 pub use sweep::Sweep;
