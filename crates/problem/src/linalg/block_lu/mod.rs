@@ -228,11 +228,11 @@ impl BlockLu {
             let height = p.rows as usize;
             let block = &self.values[p.values..p.values + height * p.columns as usize];
             let scale = &mut rows[p.row as usize..p.row as usize + height];
-            for column in block.chunks_exact(height) {
-                for (a, scale) in column.iter().zip(scale.iter_mut()) {
-                    // NaN stays, whichever of the two it is.
-                    *scale = if a.abs() <= *scale { *scale } else { a.abs() + *scale * 0.0 };
-                }
+            match height {
+                3 => row_maxima(block, 3, scale),
+                6 => row_maxima(block, 6, scale),
+                12 => row_maxima(block, 12, scale),
+                _ => row_maxima(block, height, scale),
             }
         }
         if rows.iter().any(|r| !r.is_finite())
@@ -245,13 +245,12 @@ impl BlockLu {
             let height = p.rows as usize;
             let block = &self.values[p.values..p.values + height * p.columns as usize];
             let scale = &rows[p.row as usize..p.row as usize + height];
-            for (column, largest) in
-                block.chunks_exact(height).zip(&mut columns[p.column as usize..])
-            {
-                for (a, scale) in column.iter().zip(scale) {
-                    let a = (a * scale).abs();
-                    *largest = if a > *largest { a } else { *largest };
-                }
+            let columns = &mut columns[p.column as usize..];
+            match height {
+                3 => column_maxima(block, 3, scale, columns),
+                6 => column_maxima(block, 6, scale, columns),
+                12 => column_maxima(block, 12, scale, columns),
+                _ => column_maxima(block, height, scale, columns),
             }
         }
         columns.iter_mut().for_each(|c| *c = inverse_power(*c));
@@ -279,12 +278,11 @@ impl BlockLu {
             } else {
                 (&mut lower[p.to - front.lower..], ld)
             };
-            for ((column, to), scale) in
-                block.chunks_exact(rows).zip(to.chunks_mut(ld)).zip(column_scale)
-            {
-                for ((a, to), row) in column.iter().zip(to).zip(row_scale) {
-                    *to = a * row * scale;
-                }
+            match rows {
+                3 => scatter(block, 3, row_scale, column_scale, to, ld),
+                6 => scatter(block, 6, row_scale, column_scale, to, ld),
+                12 => scatter(block, 12, row_scale, column_scale, to, ld),
+                _ => scatter(block, rows, row_scale, column_scale, to, ld),
             }
         }
         // What the children leave in the pivots' rows and columns.
@@ -370,12 +368,12 @@ impl BlockLu {
             z[k..].fill(0.0);
             for b in (0..k).step_by(WIDTH) {
                 let e = (b + WIDTH).min(k);
-                for j in b..e {
-                    let y = z[j];
-                    for i in j + 1..e {
-                        z[i] -= lower[j * ld + i] * y;
-                    }
-                }
+                let y: [f64; WIDTH] =
+                    std::array::from_fn(|i| if b + i < e { z[b + i] } else { 0.0 });
+                z[b..e].fill(0.0);
+                let triangle = At { at: front.triangles + b * WIDTH, ld: WIDTH };
+                let own = (&self.triangles[..], triangle);
+                kernel::product_vector(simd, own, &y[..e - b], &mut z[b..e]);
                 let (done, open) = z.split_at_mut(e);
                 kernel::product_vector(simd, (lower, At { at: b * ld + e, ld }), &done[b..], open);
             }
@@ -404,19 +402,42 @@ impl BlockLu {
             let mut e = k;
             while e > 0 {
                 let b = (e - 1) / WIDTH * WIDTH;
-                for j in (b..e).rev() {
-                    own[j] *= inverses[j];
-                    let y = own[j];
-                    for i in b..j {
-                        own[i] -= lower[j * ld + i] * y;
-                    }
-                }
+                upper_solve(&lower[b * ld + b..], ld, &inverses[b..e], &mut own[b..e]);
                 let (open, done) = own.split_at_mut(b);
                 kernel::product_vector(simd, (lower, At { at: b * ld, ld }), &done[..e - b], open);
                 e = b;
             }
         }
     }
+}
+
+/// `x ← U⁻¹ x` for a diagonal block of at most [`WIDTH`] rows.
+fn upper_solve(block: &[f64], ld: usize, inverses: &[f64], x: &mut [f64]) {
+    let w = x.len();
+    if w < WIDTH {
+        for j in (0..w).rev() {
+            x[j] *= inverses[j];
+            let y = x[j];
+            for i in 0..j {
+                x[i] -= block[j * ld + i] * y;
+            }
+        }
+        return;
+    }
+    // Whole columns, masked, in a register.
+    let mut z: [f64; WIDTH] = std::array::from_fn(|i| x[i]);
+    for j in (0..WIDTH).rev() {
+        let y = z[j] * inverses[j];
+        let column = &block[j * ld..j * ld + WIDTH];
+        for i in 0..WIDTH {
+            z[i] = match i.cmp(&j) {
+                std::cmp::Ordering::Less => z[i] - column[i] * y,
+                std::cmp::Ordering::Equal => y,
+                std::cmp::Ordering::Greater => z[i],
+            };
+        }
+    }
+    x.copy_from_slice(&z);
 }
 
 /// The power of two by which x comes to lie between one and two; one for zero.
@@ -427,6 +448,50 @@ fn inverse_power(x: f64) -> f64 {
     } else {
         // Subnormal numbers and the largest stay a little outside.
         f64::from_bits((2046 - exponent.clamp(1, 2045)) << 52)
+    }
+}
+
+/// The largest entries of the rows of a block by columns of `height`, which is a constant after inlining. NaN
+/// is passed over: it is met again in a pivot.
+#[inline(always)]
+fn row_maxima(block: &[f64], height: usize, largest: &mut [f64]) {
+    let largest = &mut largest[..height];
+    for column in block.chunks_exact(height) {
+        for i in 0..height {
+            let a = column[i].abs();
+            largest[i] = if a > largest[i] { a } else { largest[i] };
+        }
+    }
+}
+
+/// The largest entries of its columns, rows scaled.
+#[inline(always)]
+fn column_maxima(block: &[f64], height: usize, scale: &[f64], largest: &mut [f64]) {
+    let scale = &scale[..height];
+    for (column, largest) in block.chunks_exact(height).zip(largest) {
+        for i in 0..height {
+            let a = (column[i] * scale[i]).abs();
+            *largest = if a > *largest { a } else { *largest };
+        }
+    }
+}
+
+/// A block, scaled, into columns of a front.
+#[inline(always)]
+fn scatter(
+    block: &[f64],
+    height: usize,
+    row_scale: &[f64],
+    column_scale: &[f64],
+    to: &mut [f64],
+    ld: usize,
+) {
+    let row_scale = &row_scale[..height];
+    for (c, (column, scale)) in block.chunks_exact(height).zip(column_scale).enumerate() {
+        let to = &mut to[c * ld..c * ld + height];
+        for i in 0..height {
+            to[i] = column[i] * row_scale[i] * scale;
+        }
     }
 }
 

@@ -98,7 +98,7 @@ struct Super {
 /// Estimated nanoseconds for a front, its share of assembly included; what merging is decided by.
 fn cost(k: usize, m: usize) -> f64 {
     let (k, m) = (k as f64, m as f64);
-    200.0 + 25.0 * k + flops(k, m) / 30.0 + 0.5 * (k + m) * (k + m)
+    400.0 + 25.0 * k + flops(k, m) / 30.0 + 0.5 * (k + m) * (k + m)
 }
 
 fn flops(k: f64, m: f64) -> f64 {
@@ -537,7 +537,7 @@ fn minimum_degree(start: &[usize], pattern: &[u32]) -> Vec<u32> {
     identity
 }
 
-/// The parent of each step (Liu 1990), NONE for roots.
+/// The parent of each step (Liu1990), NONE for roots.
 fn elimination_tree(start: &[usize], pattern: &[u32], order: &[u32], step: &[u32]) -> Vec<u32> {
     let n = order.len();
     let (mut parent, mut ancestor) = (vec![NONE; n], vec![NONE; n]);
