@@ -6,6 +6,7 @@
 
 mod bench;
 mod check;
+mod exists;
 mod files;
 mod generate;
 mod info;
@@ -53,6 +54,7 @@ const EXAMPLES: &str = "\
 Examples:
   nonsmooth gen wall --set rows=8 --out wall.hdf5    a problem to begin with
   nonsmooth info wall.hdf5                           what it is
+  nonsmooth exists wall.hdf5                         whether a solution exists, with a certificate
   nonsmooth solve wall.hdf5 --out solved.hdf5        solve it and keep the solution
   nonsmooth check solved.hdf5                        have the solution judged again
   nonsmooth list                                     the solvers and their settings
@@ -67,6 +69,7 @@ enum Command {
     Solve(solve::Args),
     Check(check::Args),
     Info(info::Args),
+    Exists(exists::Args),
     List(list::Args),
     Gen(generate::Args),
     Bench(bench::Args),
@@ -86,6 +89,7 @@ fn main() -> ExitCode {
         Command::Solve(args) => solve::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Exists(args) => exists::run(&args),
         Command::List(args) => list::run(&args),
         Command::Gen(args) => generate::run(&args),
         Command::Bench(args) => bench::run(&args),
