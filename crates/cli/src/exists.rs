@@ -78,7 +78,9 @@ pub fn run(args: &Args) -> Result<Exit, String> {
 pub fn fields(existence: &Existence, contacts: usize) -> Object {
     let pressed = |ray: &Certificate| ray.pressed(contacts);
     report::fields(match existence {
-        Existence::Proved { margin, .. } => json!({"verdict": existence.name(), "margin": margin}),
+        Existence::Proved { margin, shift, .. } => {
+            json!({"verdict": existence.name(), "margin": margin, "shift": shift})
+        }
         Existence::Weak { ray } | Existence::CriterionRefuted { ray } => {
             json!({"verdict": existence.name(), "pressed_contacts": pressed(ray)})
         }

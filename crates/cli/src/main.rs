@@ -6,6 +6,7 @@
 
 mod bench;
 mod check;
+mod diagnose;
 mod exists;
 mod files;
 mod generate;
@@ -55,6 +56,7 @@ Examples:
   nonsmooth gen wall --set rows=8 --out wall.hdf5    a problem to begin with
   nonsmooth info wall.hdf5                           what it is
   nonsmooth exists wall.hdf5                         whether a solution exists, with a certificate
+  nonsmooth diagnose wall.hdf5                       what makes it hard, and what to try
   nonsmooth solve wall.hdf5 --out solved.hdf5        solve it and keep the solution
   nonsmooth check solved.hdf5                        have the solution judged again
   nonsmooth list                                     the solvers and their settings
@@ -70,6 +72,7 @@ enum Command {
     Check(check::Args),
     Info(info::Args),
     Exists(exists::Args),
+    Diagnose(diagnose::Args),
     List(list::Args),
     Gen(generate::Args),
     Bench(bench::Args),
@@ -90,6 +93,7 @@ fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Exists(args) => exists::run(&args),
+        Command::Diagnose(args) => diagnose::run(&args),
         Command::List(args) => list::run(&args),
         Command::Gen(args) => generate::run(&args),
         Command::Bench(args) => bench::run(&args),

@@ -192,12 +192,12 @@ impl<P: Seen<D>, const D: usize> Patient<'_, P, D> {
                 format!("W has rank {} of {m} (rank ratio {ratio:.2}){}", s.rank, self.density());
             return Some(if s.rank < m {
                 let slow = "The impulses are not unique. Gauss-Seidel and projections get slow below about 1e-4, and Newton's matrix is singular unless it is made regular.";
-                hard("hyperstatic", says, slow, of_families::<P>(RANK_DEFICIENT))
+                hard("rank", says, slow, of_families::<P>(RANK_DEFICIENT))
             } else {
                 Finding {
                     suits: of_families::<P>(REGULAR),
                     ..easy(
-                        "hyperstatic",
+                        "rank",
                         says,
                         "Not hyperstatic: velocities determine the impulses, so Newton's method converges fast near the solution.",
                     )
@@ -211,9 +211,9 @@ impl<P: Seen<D>, const D: usize> Patient<'_, P, D> {
         );
         Some(if c > 1.0 {
             let slow = "Hyperstatic: the impulses are not unique, and Gauss-Seidel gets slow below about 1e-4.";
-            hard("hyperstatic", says, slow, of_families::<P>(RANK_DEFICIENT))
+            hard("rank", says, slow, of_families::<P>(RANK_DEFICIENT))
         } else {
-            easy("hyperstatic", says, "")
+            easy("rank", says, "")
         })
     }
 
@@ -430,12 +430,12 @@ mod tests {
     fn a_regular_problem_is_sound_and_a_hyperstatic_one_hard() {
         let regular = Planted { contacts: 8, dofs: 48, ..Planted::default() };
         let d = of(Friction::Local3(regular.local().0));
-        assert!(!says(&d, "hyperstatic").unwrap().hard, "{d:?}");
+        assert!(!says(&d, "rank").unwrap().hard, "{d:?}");
         assert!(says(&d, "existence").unwrap().says.starts_with("proved"), "{d:?}");
         assert!(!d.suits.is_empty());
         let hyperstatic = Planted { contacts: 20, dofs: 30, ..Planted::default() };
         let d = of(Friction::Global3(hyperstatic.global().0));
-        let finding = says(&d, "hyperstatic").unwrap();
+        let finding = says(&d, "rank").unwrap();
         assert!(finding.hard && finding.says.contains("rank 30 of 60"), "{finding:?}");
         assert!(finding.says.contains("c = 2.00"), "{finding:?}");
     }

@@ -185,6 +185,8 @@ const NOISE: f64 = 1e-8;
 const ZERO: f64 = 1e-10;
 /// The relative margin by which a power must be negative.
 const NEGATIVE: f64 = 1e-8;
+/// Solutions that move so many times faster than the data say are not excluded by a certificate that holds up to rounding.
+const REACH: f64 = 1e4;
 /// What is forgiven where impulses should be in a cone.
 const INSIDE: f64 = 1e-14;
 /// The uncertainty of each number of the data, and of what is made of them.
@@ -279,51 +281,64 @@ impl<const D: usize> Kinematics<D> {
 
     /// Whether `ray` proves that no motion has `u ∈ K*` at every contact.
     pub fn refutes_criterion(&self, ray: &Certificate) -> bool {
-        self.feels_no_motion(ray, &self.mu) && self.power(ray).is_negative()
+        self.felt(ray, &self.mu).is_some_and(|felt| self.power(ray).is_negative(felt))
     }
 
     /// Whether `ray` proves that no motion has `u ∈ int K*` at every contact.
     pub fn refutes_interior(&self, ray: &Certificate) -> bool {
         let power = self.power(ray);
         let some = ray.r.iter().any(|&r| r != 0.0);
-        some && self.feels_no_motion(ray, &self.mu) && power.sum <= NEGATIVE * power.size
+        some && self.felt(ray, &self.mu).is_some() && power.sum <= NEGATIVE * power.size
     }
 
     /// Whether `certificate` proves that no motion has `u_N ≥ 0` at every contact, and so that there is no solution.
     pub fn refutes(&self, certificate: &Certificate) -> bool {
-        self.feels_no_motion(certificate, &vec![0.0; self.mu.len()])
-            && self.power(certificate).is_negative()
+        let felt = self.felt(certificate, &vec![0.0; self.mu.len()]);
+        felt.is_some_and(|felt| self.power(certificate).is_negative(felt))
     }
 
-    /// `r ∈ K` for the coefficients given, and `(r, λ)ᵀ [A; E] = 0` up to rounding, each column in units of its largest entry.
-    fn feels_no_motion(&self, ray: &Certificate, mu: &[f64]) -> bool {
+    /// Where `r ∈ K` for the coefficients given and `(r, λ)ᵀ [A; E] = 0` up to rounding: the power that the rest of these products
+    /// can still have, with motions that are [`REACH`] times as fast as the largest velocity given.
+    fn felt(&self, ray: &Certificate, mu: &[f64]) -> Option<f64> {
         let (r, lambda) = (&ray.r, &ray.lambda);
         let m = self.contact_rows();
         let scale = norm(r);
         let shaped = r.len() == m && m + lambda.len() == self.constant.len();
         if !shaped || !scale.is_finite() || !norm(lambda).is_finite() {
-            return false;
+            return None;
         }
         let inside = |(c, &mu): (usize, &f64)| {
             distance_to_cone::<D>(&small::block(r, c), mu) <= INSIDE * scale
         };
         if !mu.iter().enumerate().all(inside) {
-            return false;
+            return None;
         }
+        // Contacts are all in m/s; each equation is in units of its own largest entry.
+        let row_unit = |i: usize| {
+            let values = self.rows.column(i).1.iter();
+            let largest = if i < m { 0.0 } else { values.fold(0.0_f64, |l, a| l.max(a.abs())) };
+            if largest > 0.0 { largest } else { 1.0 }
+        };
         let n = self.rows.nrows();
         let (mut sums, mut sizes) = (vec![Compensated::default(); n], vec![0.0; n]);
         let mut units = vec![0.0_f64; n];
-        for (j, i, a) in self.rows.triplets() {
+        let mut fastest = 0.0_f64;
+        for (i, constant) in self.constant.iter().enumerate() {
             let y = if i < m { r[i] } else { lambda[i - m] };
-            sums[j].add_product(a, y);
-            sizes[j] += (a * y).abs();
-            units[j] = units[j].max(a.abs());
+            let unit = row_unit(i);
+            fastest = fastest.max(constant.abs() / unit);
+            let (columns, values) = self.rows.column(i);
+            for (&j, &a) in columns.iter().zip(values) {
+                sums[j].add_product(a, y);
+                sizes[j] += (a * y).abs();
+                units[j] = units[j].max(a.abs() / unit);
+            }
         }
-        let per_unit = |x: f64, unit: f64| if unit > 0.0 { x / unit } else { 0.0 };
-        let left: Vec<_> =
-            sums.iter().zip(&units).map(|(s, &unit)| per_unit(s.value(), unit)).collect();
-        let size: Vec<_> = sizes.iter().zip(&units).map(|(&s, &unit)| per_unit(s, unit)).collect();
-        norm(&left) <= ZERO.max(self.noise) * norm(&size)
+        let in_units = |x: f64, j: usize| if units[j] > 0.0 { x / units[j] } else { 0.0 };
+        let left: Vec<_> = (0..n).map(|j| in_units(sums[j].value(), j)).collect();
+        let size: Vec<_> = (0..n).map(|j| in_units(sizes[j], j)).collect();
+        let vanishes = norm(&left) <= ZERO.max(self.noise) * norm(&size);
+        vanishes.then(|| REACH * fastest * left.iter().map(|x| x.abs()).sum::<f64>())
     }
 
     /// `cᵀ r + eᵀ λ`.
@@ -345,8 +360,9 @@ struct Power {
 }
 
 impl Power {
-    fn is_negative(&self) -> bool {
-        self.sum < -NEGATIVE * self.size
+    /// Negative beyond its own rounding and beyond what is `felt` of the motion.
+    fn is_negative(&self, felt: f64) -> bool {
+        self.sum < -(NEGATIVE * self.size).max(felt)
     }
 }
 

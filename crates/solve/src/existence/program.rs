@@ -142,8 +142,10 @@ fn theirs(a: &Csc) -> CscMatrix<f64> {
 
 /// Impulses below these shares of the largest are taken for zero, one after the other.
 const SUPPORTS: [f64; 4] = [1e-8, 1e-6, 1e-4, 1e-2];
-/// Iterations of a projection.
+/// Iterations of a projection, those without progress that it may do, and the residual that is enough.
 const PROJECTION: usize = 2000;
+const PATIENCE: usize = 100;
+const ROUNDING: f64 = 2e-15;
 
 impl<const D: usize> Widest<'_, D> {
     /// Candidates for impulses that refute: the multipliers without those that are nearly zero, projected onto those that
@@ -174,7 +176,7 @@ impl<const D: usize> Widest<'_, D> {
         let entries = entries.map(|(k, j, a)| (place[k], j, a));
         let restricted = Csc::from_triplets(kept.len(), matrix.ncols(), entries).ok()?;
         let mut y: Vec<f64> = kept.iter().map(|&k| z[k] / largest).collect();
-        for _ in 0..3 {
+        for _ in 0..2 {
             project(&restricted, &mut y, clock);
         }
         let m = kinematics.contact_rows();
@@ -188,25 +190,27 @@ impl<const D: usize> Widest<'_, D> {
     }
 }
 
-/// The nearest y with `Aᵀ y = 0`: the residual of the least-squares problem `min ‖y − A x‖` by conjugate gradients.
-fn project(a: &Csc, y: &mut [f64], clock: &Clock) {
+/// The nearest y with `Aᵀ y = 0` up to rounding: the residual of the least-squares problem `min ‖y − A x‖` by conjugate
+/// gradients. Where A has no full rank they run away once they have reached rounding, so the best y counts.
+fn project(a: &Csc, y: &mut Vec<f64>, clock: &Clock) {
     let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
     let mut s = vec![0.0; a.ncols()];
     a.mul_transpose_add(1.0, y, &mut s);
     let mut p = s.clone();
     let mut left = square(&s);
     // Columns are of size about 1.
-    let enough = (1e-16 * square(y).sqrt()).powi(2);
+    let enough = (ROUNDING * square(y).sqrt()).powi(2);
     let mut product = vec![0.0; y.len()];
+    let (mut best, mut least, mut since) = (y.clone(), left, 0);
     for k in 0..PROJECTION {
-        if left <= enough || (k % 64 == 63 && clock.over()) {
-            return;
+        if least <= enough || since > PATIENCE || (k % 64 == 63 && clock.over()) {
+            break;
         }
         product.fill(0.0);
         a.mul_add(1.0, &p, &mut product);
         let curvature = square(&product);
-        if curvature <= 0.0 {
-            return;
+        if curvature <= 0.0 || !curvature.is_finite() {
+            break;
         }
         let step = left / curvature;
         y.iter_mut().zip(&product).for_each(|(y, d)| *y -= step * d);
@@ -216,5 +220,11 @@ fn project(a: &Csc, y: &mut [f64], clock: &Clock) {
         let turn = next / left;
         p.iter_mut().zip(&s).for_each(|(p, s)| *p = s + turn * *p);
         left = next;
+        since += 1;
+        if left < least {
+            (least, since) = (left, 0);
+            best.clone_from(y);
+        }
     }
+    *y = best;
 }
