@@ -7,7 +7,8 @@ use std::marker::PhantomData;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use serde::Serialize;
 
-use crate::form::{Blockwise, Linear};
+use crate::auto::{Auto, Hybrid};
+use crate::form::{Linear, Linearised};
 use crate::projection::{DeSaxce, Extragradient, FixedPoint, Method, Projected};
 use crate::reform::Condense;
 use crate::settings::{Setting, Settings, SettingsMap, described, parse};
@@ -177,11 +178,22 @@ pub const EXTRAGRADIENT: About = About {
     settings: described::<Extragradient>,
 };
 
+/// The automatic method.
+pub const AUTO: About = About {
+    name: "auto",
+    family: "auto",
+    summary: "hybrid",
+    needs: &[],
+    cites: &["Acary2018"],
+    variants: &[],
+    settings: described::<Auto>,
+};
+
 /// The solvers of frictional contact, for any problem that can be seen by its contacts.
 fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
 where
     V: Visitor,
-    V::Problem: Blockwise<D> + Linear<D>,
+    V::Problem: Linearised<D>,
 {
     fn projected<const D: usize, V, M>(
         settings: &SettingsMap,
@@ -196,6 +208,7 @@ where
     }
     vec![
         Entry { about: &NSGS, build: |s, v| Ok(parse::<Nsgs>(s)?.visit::<D, V>(v)) },
+        Entry { about: &AUTO, build: |s, v| Ok(v.visit(Hybrid::<D>(parse(s)?))) },
         Entry { about: &DE_SAXCE, build: projected::<D, V, DeSaxce> },
         Entry { about: &FIXED_POINT, build: projected::<D, V, FixedPoint> },
         Entry { about: &EXTRAGRADIENT, build: projected::<D, V, Extragradient> },
