@@ -82,7 +82,7 @@ impl std::fmt::Display for Existence {
             Self::Proved { margin, shift, .. } => {
                 let cone = "a motion keeps all contacts in the dual cone";
                 write!(f, "proved: {cone} (relative margin {margin:.1e})")?;
-                if *shift > ROUNDED {
+                if *shift > SHIFTS[1] {
                     write!(f, "; W is positive semidefinite up to {shift:.0e} of its diagonal only")?;
                 }
                 Ok(())
@@ -171,14 +171,12 @@ impl<const D: usize> Kinematic<D> for FrictionLocal<D> {
     fn monotone_up_to(&self) -> Option<f64> {
         let size = self.q.len() + self.multipliers();
         let w = Csc::from_triplets(size, size, self.bordered().into_iter()).expect("in range");
-        [ROUNDED, STORED].into_iter().find(|&shift| is_positive_definite(&w, shift))
+        SHIFTS.into_iter().find(|&shift| is_positive_definite(&w, shift))
     }
 }
 
-/// The shift that rounding of W explains.
-const ROUNDED: f64 = 1e-9;
-/// The shift that the seven digits explain with which some files store W.
-const STORED: f64 = 1e-6;
+/// The shifts that are tried for W: the first is rounding, the last the seven digits with which some files store W.
+const SHIFTS: [f64; 3] = [1e-12, 1e-9, 1e-6];
 /// An asymmetry of W below this is rounding, above it is meant.
 const NOISE: f64 = 1e-8;
 /// The relative rounding that "equals zero" forgives.
@@ -467,7 +465,7 @@ mod tests {
         for (bilateral, skew) in [(0, 0.0), (0, 0.1), (3, 0.0)] {
             let case = Planted { contacts: 4, dofs: 18, bilateral, skew, ..Planted::default() };
             let (local, point) = case.local::<3>();
-            assert_eq!(local.monotone_up_to(), Some(ROUNDED));
+            assert_eq!(local.monotone_up_to(), Some(SHIFTS[0]));
             let k = local.kinematics();
             let x = FrictionLocal::<3>::motion(&point);
             let u = local.velocity(&point);
@@ -478,9 +476,9 @@ mod tests {
         local.W = Bsr::from_csc(&Csc::diagonal(&[1.0, 1.0, -1.0, 1.0]));
         assert_eq!(local.monotone_up_to(), None);
         local.W = Bsr::from_csc(&Csc::diagonal(&[1.0, 0.0, 0.0, 1.0]));
-        assert_eq!(local.monotone_up_to(), Some(ROUNDED), "semidefinite is enough");
+        assert_eq!(local.monotone_up_to(), Some(SHIFTS[0]), "semidefinite is enough");
         local.W = Bsr::from_csc(&Csc::diagonal(&[1.0, -1e-8, 0.0, 1.0]));
-        assert_eq!(local.monotone_up_to(), Some(STORED));
+        assert_eq!(local.monotone_up_to(), Some(SHIFTS[2]));
         let (v, r) = (Csc::zeros(4, 1), Csc::diagonal(&[-1.0]));
         local.bilateral = Some(BilateralLocal { V: v, R: r, s: vec![0.0] });
         assert_eq!(local.monotone_up_to(), None);

@@ -96,9 +96,10 @@ fn proved<P: Kinematic<D>, const D: usize>(problem: &P, found: Found) -> Existen
         Found::Motion(motion, margin) => (motion, margin),
         Found::Contradiction(certificate) => return Existence::NoSolution { certificate },
     };
+    let still = motion.iter().all(|&x| x == 0.0);
     match problem.monotone_up_to() {
-        // A shift of W moves u by as much.
-        Some(shift) if margin >= SHIFTED * shift || shift <= 1e-9 => {
+        // A shift of W moves u by as much, unless nothing moves.
+        Some(shift) if still || margin >= SHIFTED * shift => {
             Existence::Proved { motion, margin, shift }
         }
         Some(_) => unknown("the criterion holds, but by less than W is indefinite"),
