@@ -7,7 +7,7 @@ mod ordering;
 mod proximal_newton;
 mod sweep;
 
-pub use central::{Central, Iterate};
+pub use central::{Central, Iterate as CentralIterate};
 pub use conic::{ConvexEnd, ConvexIp};
 pub use ordering::{Order, Ordering};
 pub use proximal_newton::{Inner, ProximalNewton};
