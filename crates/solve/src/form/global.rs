@@ -9,7 +9,8 @@ use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::{Block, Csc, Delassus, Refine, small};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
-use super::{Access, Blockwise, Contacts, Linear, velocity_scale};
+use super::explicit::symmetric_part;
+use super::{Access, Blockwise, Contacts, Explicit, Linear, Model, velocity_scale};
 use crate::SolveError;
 
 /// What the view keeps.
@@ -139,5 +140,23 @@ impl<const D: usize> Linear<D> for FrictionGlobal<D> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
         let (v, _) = state.dynamics.solve(self, r, Refine::Once);
         self.velocity_into(v, u);
+    }
+}
+
+impl<const D: usize> Explicit<D> for FrictionGlobal<D> {
+    /// `x = (r, v, λ)`, `½ vᵀ M_s v`, `M_s v = H r + G λ`: the multipliers of the equalities are −v, so that
+    /// `W_s r = Hᵀ v` and `Gᵀ v = 0`.
+    fn model(&self, _: &Self::State) -> Model {
+        let (mass, symmetric) = symmetric_part(&self.M);
+        let (n, m) = (self.dofs(), self.w.len());
+        let size = m + n + self.multipliers();
+        let quadratic = mass.triplets().map(|(i, j, x)| (m + i, m + j, x));
+        let quadratic = Csc::from_triplets(size, size, quadratic).expect("indices in range");
+        let dynamics = (mass.triplets().map(|(i, j, x)| (i, m + j, x)))
+            .chain(self.H.triplets().map(|(i, j, x)| (i, j, -x)));
+        let bilateral = self.bilateral.iter().flat_map(|b| b.G.triplets());
+        let linear = dynamics.chain(bilateral.map(|(i, j, x)| (i, m + n + j, -x)));
+        let linear = Csc::from_triplets(n, size, linear).expect("indices in range");
+        Model { quadratic, linear, symmetric }
     }
 }

@@ -7,7 +7,8 @@ use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse, Refine, small};
 use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint, Problem};
 
-use super::{Access, Blockwise, Contacts, Linear, velocity_scale};
+use super::explicit::symmetric_part;
+use super::{Access, Blockwise, Contacts, Explicit, Linear, Model, velocity_scale};
 use crate::SolveError;
 
 /// What the view keeps: the norm of q, and the problem without its bilateral rows where it has any.
@@ -165,5 +166,13 @@ impl<const D: usize> Linear<D> for FrictionLocal<D> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
         let (w, q) = state.operator(self);
         w.mul_plus(r, q, u);
+    }
+}
+
+impl<const D: usize> Explicit<D> for FrictionLocal<D> {
+    fn model(&self, state: &Self::State) -> Model {
+        let (quadratic, symmetric) = symmetric_part(&state.operator(self).0.to_csc());
+        let linear = Csc::zeros(0, quadratic.ncols());
+        Model { quadratic, linear, symmetric }
     }
 }

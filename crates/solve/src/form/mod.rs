@@ -5,12 +5,16 @@
 //! | [`Contacts`] | the law's data, the diagonal blocks of W, ‖q‖, the impulses of a point | local, global |
 //! | [`Blockwise`] | one contact's velocity, and to be told that one contact's impulse moved | local (rows of W), global (velocity space) |
 //! | [`Linear`] | `u = W r + q` for all contacts | local (W), global (product form) |
+//! | [`Explicit`] | entries of matrices that state the symmetric part of W | local (W), global (M, H, G) |
 
+mod explicit;
 mod global;
 mod local;
 
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Certificate;
+
+pub use explicit::{Explicit, Model};
 
 use crate::SolveError;
 
