@@ -4,17 +4,19 @@
 //! constraints (a singular, positive semidefinite R) are honoured.
 
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse, Refine, small};
+use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Inverse, Refine, Singular, small};
 use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint, Problem};
 
-use super::explicit::symmetric_part;
-use super::{Access, Blockwise, Contacts, Explicit, Linear, Model, velocity_scale};
+use super::linearised::{ContactForm, System};
+use super::{Access, Blockwise, Contacts, Linear, Linearised, velocity_scale};
 use crate::SolveError;
 
-/// What the view keeps: the norm of q, and the problem without its bilateral rows where it has any.
+/// What the view keeps: the norm of q, the problem without its bilateral rows where it has any, and the linear system.
 pub struct LocalState<const D: usize> {
     scale: f64,
     eliminated: Option<Eliminated<D>>,
+    /// Made when it is first asked for.
+    system: Option<System<ContactForm<D>, D>>,
 }
 
 struct Eliminated<const D: usize> {
@@ -83,7 +85,7 @@ impl<const D: usize> Eliminated<D> {
 
 impl<const D: usize> LocalState<D> {
     #[inline(always)]
-    fn operator<'a>(&'a self, problem: &'a FrictionLocal<D>) -> (&'a Bsr<D>, &'a [f64]) {
+    pub(super) fn operator<'a>(&'a self, problem: &'a FrictionLocal<D>) -> (&'a Bsr<D>, &'a [f64]) {
         match &self.eliminated {
             None => (&problem.W, &problem.q),
             Some(e) => (&e.w, &e.q),
@@ -96,7 +98,7 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
 
     fn state(&self, _: Access) -> Result<Self::State, SolveError> {
         let eliminated = self.bilateral.as_ref().map(|b| Eliminated::new(self, b)).transpose()?;
-        Ok(LocalState { scale: velocity_scale(&self.q), eliminated })
+        Ok(LocalState { scale: velocity_scale(&self.q), eliminated, system: None })
     }
 
     fn refill(&self, state: &mut Self::State) -> Result<(), SolveError> {
@@ -108,6 +110,11 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
         };
         if !kept {
             *state = self.state(Access::Visits)?;
+        }
+        let LocalState { eliminated, system, .. } = state;
+        let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
+        if system.as_mut().is_some_and(|system| !system.form().refill(w)) {
+            *system = None;
         }
         Ok(())
     }
@@ -169,10 +176,34 @@ impl<const D: usize> Linear<D> for FrictionLocal<D> {
     }
 }
 
-impl<const D: usize> Explicit<D> for FrictionLocal<D> {
-    fn model(&self, state: &Self::State) -> Model {
-        let (quadratic, symmetric) = symmetric_part(&state.operator(self).0.to_csc());
-        let linear = Csc::zeros(0, quadratic.ncols());
-        Model { quadratic, linear, symmetric }
+impl<const D: usize> Linearised<D> for FrictionLocal<D> {
+    fn linearise(
+        &self,
+        state: &mut Self::State,
+        p: &[Block<D>],
+        q: &[Block<D>],
+    ) -> Result<(), Singular> {
+        let LocalState { eliminated, system, .. } = state;
+        let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
+        let unit = (0..w.nrows()).map(|c| small::mean_diagonal(&w.diagonal_block(c)));
+        let system = system.get_or_insert_with(|| System::new(ContactForm::new(w), w.nrows()));
+        system.factorise(unit, p, q)
+    }
+
+    fn solve_linearised(
+        &self,
+        state: &mut Self::State,
+        b: &[f64],
+        x: &mut [f64],
+        wx: &mut [f64],
+    ) -> f64 {
+        let LocalState { eliminated, system, .. } = state;
+        let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
+        let apply = |x: &[f64], wx: &mut [f64]| {
+            for (c, wx) in wx.chunks_mut(D).enumerate() {
+                wx.copy_from_slice(&w.row_product(c, x));
+            }
+        };
+        system.as_mut().map_or(f64::NAN, |system| system.solve(b, x, wx, apply))
     }
 }

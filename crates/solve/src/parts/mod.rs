@@ -2,6 +2,8 @@
 
 mod clarabel;
 mod ordering;
+mod sweep;
 
-pub use clarabel::{Clarabel, ConvexSet, Ended};
+pub use clarabel::{Clarabel, Ended, Shape};
 pub use ordering::{Order, Ordering};
+pub use sweep::Sweep;
