@@ -24,6 +24,7 @@ mod drive;
 mod error;
 pub mod form;
 pub mod local;
+pub mod optimisation;
 pub mod parts;
 pub mod projection;
 pub mod reform;

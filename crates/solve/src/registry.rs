@@ -7,7 +7,8 @@ use std::marker::PhantomData;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use serde::Serialize;
 
-use crate::form::{Blockwise, Linear, Linearised};
+use crate::form::{Blockwise, Explicit, Linear, Linearised};
+use crate::optimisation::{Tresca, TrescaSteps};
 use crate::projection::{DeSaxce, Extragradient, FixedPoint, Method, Projected};
 use crate::reform::Condense;
 use crate::settings::{Setting, Settings, SettingsMap, described, parse};
@@ -177,11 +178,22 @@ pub const EXTRAGRADIENT: About = About {
     settings: described::<Extragradient>,
 };
 
+/// The Tresca fixed point.
+pub const TRESCA: About = About {
+    name: "tresca",
+    family: "optimisation",
+    summary: "Tresca fixed point (Haslinger): convex problems over cylinders of given thresholds",
+    needs: &[],
+    cites: &["HaslingerDostalKucera2002", "Acary2018", "AcaryBremondHuber2018"],
+    variants: &["inner=projected_gradient", "inner=conic"],
+    settings: described::<Tresca>,
+};
+
 /// The solvers of frictional contact, for any problem that can be seen by its contacts.
 fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
 where
     V: Visitor,
-    V::Problem: Blockwise<D> + Linearised<D>,
+    V::Problem: Blockwise<D> + Linearised<D> + Explicit<D>,
 {
     fn projected<const D: usize, V, M>(
         settings: &SettingsMap,
@@ -199,6 +211,7 @@ where
         Entry { about: &DE_SAXCE, build: projected::<D, V, DeSaxce> },
         Entry { about: &FIXED_POINT, build: projected::<D, V, FixedPoint> },
         Entry { about: &EXTRAGRADIENT, build: projected::<D, V, Extragradient> },
+        Entry { about: &TRESCA, build: |s, v| Ok(v.visit(TrescaSteps::<D>(parse(s)?))) },
     ]
 }
 
