@@ -8,7 +8,7 @@ use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use serde::Serialize;
 
 use crate::form::{Blockwise, Explicit, Linear, Linearised};
-use crate::optimisation::{Tresca, TrescaSteps};
+use crate::optimisation::{Alternation, Cadoux, CadouxSteps, Panagiotopoulos, Tresca, TrescaSteps};
 use crate::projection::{DeSaxce, Extragradient, FixedPoint, Method, Projected};
 use crate::reform::Condense;
 use crate::settings::{Setting, Settings, SettingsMap, described, parse};
@@ -189,6 +189,28 @@ pub const TRESCA: About = About {
     settings: described::<Tresca>,
 };
 
+/// Panagiotopoulos' alternation.
+pub const PANAGIOTOPOULOS: About = About {
+    name: "panagiotopoulos",
+    family: "optimisation",
+    summary: "Panagiotopoulos' alternation of a normal and a tangential convex problem",
+    needs: &[],
+    cites: &["Panagiotopoulos1975", "Acary2018", "AcaryBremondHuber2018"],
+    variants: &["inner=projected_gradient", "inner=active_set"],
+    settings: described::<Panagiotopoulos>,
+};
+
+/// Cadoux' approach.
+pub const CADOUX: About = About {
+    name: "cadoux",
+    family: "optimisation",
+    summary: "Cadoux' approach: second-order cone programs of given sliding speeds, Newton on the speeds",
+    needs: &[],
+    cites: &["CadouxThesis2009", "AcaryCadouxLemarechalMalick2011", "Acary2018"],
+    variants: &["update=fixed_point", "inner=newton", "inner=projected_gradient"],
+    settings: described::<Cadoux>,
+};
+
 /// The solvers of frictional contact, for any problem that can be seen by its contacts.
 fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
 where
@@ -212,6 +234,8 @@ where
         Entry { about: &FIXED_POINT, build: projected::<D, V, FixedPoint> },
         Entry { about: &EXTRAGRADIENT, build: projected::<D, V, Extragradient> },
         Entry { about: &TRESCA, build: |s, v| Ok(v.visit(TrescaSteps::<D>(parse(s)?))) },
+        Entry { about: &PANAGIOTOPOULOS, build: |s, v| Ok(v.visit(Alternation::<D>(parse(s)?))) },
+        Entry { about: &CADOUX, build: |s, v| Ok(v.visit(CadouxSteps::<D>(parse(s)?))) },
     ]
 }
 

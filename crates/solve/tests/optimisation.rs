@@ -1,6 +1,5 @@
 //! The methods through convex optimisation: their fixed points are those of Gauss–Seidel, whatever solves the convex problems.
 
-use nonsmooth_problem::Problem;
 use nonsmooth_problem::planted::{Planted, PlantedMix};
 use nonsmooth_solve::form::{Access, Linear};
 use nonsmooth_solve::registry::{self, Registered};
@@ -54,7 +53,7 @@ fn cases() -> Vec<Planted> {
 }
 
 fn agree<P: Registered + Linear<D>, const D: usize>(make: impl Fn(&Planted) -> P) {
-    let limits = Limits { tolerance: 1e-9, max_iterations: 20_000, ..Limits::default() };
+    let limits = Limits { tolerance: 1e-10, max_iterations: 20_000, ..Limits::default() };
     let mut wrong = vec![];
     for case in cases() {
         let problem = make(&case);

@@ -7,12 +7,16 @@
 //! | Panagiotopoulos | in turn r_T, and r_N with `θ = mu r_N` | half lines, disks |
 //! | Cadoux | the sliding speeds `s = ‖u_T‖` | Coulomb cones |
 
+mod cadoux;
 mod convex;
 mod inner;
+mod panagiotopoulos;
 mod sets;
 mod tresca;
 
+pub use cadoux::{Cadoux, CadouxSteps, CadouxWork, ConeSolver, Update};
 pub use inner::CylinderSolver;
+pub use panagiotopoulos::{Alternation, AlternationWork, HalfSolver, Panagiotopoulos};
 pub use tresca::{Tresca, TrescaSteps, TrescaWork};
 
 fn fraction(name: &str, value: f64) -> Result<(), String> {
