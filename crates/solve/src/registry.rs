@@ -7,7 +7,8 @@ use std::marker::PhantomData;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use serde::Serialize;
 
-use crate::form::{Blockwise, Explicit, Linear, Linearised};
+use crate::auto::{Auto, Hybrid};
+use crate::form::{Explicit, Linear, Linearised};
 use crate::optimisation::{Alternation, Cadoux, CadouxSteps, Panagiotopoulos, Tresca, TrescaSteps};
 use crate::projection::{DeSaxce, Extragradient, FixedPoint, Method, Projected};
 use crate::reform::Condense;
@@ -211,11 +212,22 @@ pub const CADOUX: About = About {
     settings: described::<Cadoux>,
 };
 
+/// The automatic method.
+pub const AUTO: About = About {
+    name: "auto",
+    family: "auto",
+    summary: "hybrid",
+    needs: &[],
+    cites: &["Acary2018"],
+    variants: &[],
+    settings: described::<Auto>,
+};
+
 /// The solvers of frictional contact, for any problem that can be seen by its contacts.
 fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
 where
     V: Visitor,
-    V::Problem: Blockwise<D> + Linearised<D> + Explicit<D>,
+    V::Problem: Linearised<D> + Explicit<D>,
 {
     fn projected<const D: usize, V, M>(
         settings: &SettingsMap,
@@ -230,6 +242,7 @@ where
     }
     vec![
         Entry { about: &NSGS, build: |s, v| Ok(parse::<Nsgs>(s)?.visit::<D, V>(v)) },
+        Entry { about: &AUTO, build: |s, v| Ok(v.visit(Hybrid::<D>(parse(s)?))) },
         Entry { about: &DE_SAXCE, build: projected::<D, V, DeSaxce> },
         Entry { about: &FIXED_POINT, build: projected::<D, V, FixedPoint> },
         Entry { about: &EXTRAGRADIENT, build: projected::<D, V, Extragradient> },
