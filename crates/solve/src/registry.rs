@@ -186,7 +186,7 @@ pub const TRESCA: About = About {
     summary: "Tresca fixed point (Haslinger): convex problems over cylinders of given thresholds",
     needs: &[],
     cites: &["HaslingerDostalKucera2002", "Acary2018", "AcaryBremondHuber2018"],
-    variants: &["inner=projected_gradient", "inner=conic"],
+    variants: &["inner=projected_gradient", "inner=conic", "anderson=5"],
     settings: described::<Tresca>,
 };
 
@@ -208,7 +208,13 @@ pub const CADOUX: About = About {
     summary: "Cadoux' approach: second-order cone programs of given sliding speeds, Newton on the speeds",
     needs: &[],
     cites: &["CadouxThesis2009", "AcaryCadouxLemarechalMalick2011", "Acary2018"],
-    variants: &["update=fixed_point", "inner=newton", "inner=projected_gradient"],
+    variants: &[
+        "update=fixed_point",
+        "update=anderson",
+        "inner=clarabel",
+        "inner=newton",
+        "inner=projected_gradient",
+    ],
     settings: described::<Cadoux>,
 };
 

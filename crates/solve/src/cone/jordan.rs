@@ -253,8 +253,7 @@ mod tests {
     fn roots_square_to_their_arguments() {
         for x in points() {
             for y in points() {
-                let w: [f64; 3] =
-                    std::array::from_fn(|k| product(&x, &x)[k] + product(&y, &y)[k]);
+                let w: [f64; 3] = std::array::from_fn(|k| product(&x, &x)[k] + product(&y, &y)[k]);
                 let root = root_of_squares(&x, &y, 0.0);
                 assert!(root.values[0] >= 0.0);
                 let point = root.point();

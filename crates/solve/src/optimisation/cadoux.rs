@@ -28,7 +28,7 @@ use super::inner::{Conic, Effort};
 use super::sets::Set;
 use super::{fraction, positive};
 use crate::form::{Access, Explicit, Linearised};
-use crate::parts::Shape;
+use crate::parts::{Accelerator, ConvexIp, Shape};
 use crate::settings::Settings;
 use crate::{SolveError, Solver, Step, cone};
 
@@ -42,6 +42,8 @@ pub struct Cadoux {
     pub update: Update,
     /// Fixed-point steps go this share of the way to F(s), in (0, 1].
     pub relaxation: f64,
+    /// How many past steps Anderson's update combines, at least 1.
+    pub memory: usize,
     /// The inner residual to reach, as a share of the last outer one, in (0, 1).
     pub inner_share: f64,
     /// At most this many inner iterations a step: factorisations, conic iterations or gradient steps.
@@ -52,8 +54,10 @@ pub struct Cadoux {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ConeSolver {
-    /// Clarabel's interior point, polished by Newton steps.
+    /// Our own interior point with Nesterov-Todd scaling.
     #[default]
+    Interior,
+    /// Clarabel's interior point, polished by Newton steps.
     Clarabel,
     /// Semismooth Newton on the natural map, from the last impulses.
     Newton,
@@ -70,6 +74,8 @@ pub enum Update {
     /// Newton on `F(s) - s`, with fixed-point steps where it does not help.
     #[default]
     Newton,
+    /// The fixed point, accelerated by Anderson's combination of past steps.
+    Anderson,
 }
 
 impl Default for Cadoux {
@@ -78,9 +84,17 @@ impl Default for Cadoux {
             inner: ConeSolver::default(),
             update: Update::default(),
             relaxation: 1.0,
+            memory: 5,
             inner_share: 0.01,
             inner_iterations: 60,
         }
+    }
+}
+
+impl Cadoux {
+    /// The memory of the accelerator.
+    fn depth(&self) -> usize {
+        if self.update == Update::Anderson { self.memory } else { 0 }
     }
 }
 
@@ -90,6 +104,7 @@ impl Settings for Cadoux {
             let found = self.relaxation;
             return Err(format!("relaxation: expected a number in (0, 1], found {found}"));
         }
+        positive("memory", self.memory)?;
         fraction("inner_share", self.inner_share)?;
         positive("inner_iterations", self.inner_iterations)
     }
@@ -103,6 +118,8 @@ pub struct CadouxSteps<const D: usize>(pub Cadoux);
 pub struct CadouxWork<P: Linearised<D> + Explicit<D>, const D: usize> {
     convex: Convex<P, D>,
     conic: Option<Conic<D>>,
+    interior: ConvexIp<D>,
+    accelerator: Accelerator,
     u: Vec<f64>,
     /// s, F(s), F(s) − s and the Newton step.
     s: Vec<f64>,
@@ -138,6 +155,8 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for CadouxSteps<D
         Ok(CadouxWork {
             convex,
             conic,
+            interior: ConvexIp::new(),
+            accelerator: Accelerator::new(self.0.depth(), n),
             u: vec![0.0; D * n],
             s: vec![0.0; n],
             image: vec![0.0; n],
@@ -158,6 +177,7 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for CadouxSteps<D
             x.resize(n, 0.0);
         }
         work.u.resize(D * n, 0.0);
+        work.accelerator.resize(n);
         Ok(())
     }
 
@@ -170,6 +190,7 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for CadouxSteps<D
             *s = if warm { *image } else { 0.0 };
         }
         work.newton = Trial::default();
+        work.accelerator.forget();
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
@@ -206,6 +227,13 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> CadouxWork<P, D> {
         match (settings.inner, &mut self.conic) {
             (ConeSolver::Clarabel, Some(conic)) => {
                 conic.solve(problem, convex, r, &[], effort)?;
+            }
+            (ConeSolver::Interior, _) => {
+                let state = &mut convex.state;
+                self.interior.begin(problem, state, &self.s, None);
+                self.interior.solve(problem, state, effort.tolerance, effort.most);
+                r.copy_from_slice(self.interior.r());
+                convex.evaluate(problem, r);
             }
             (ConeSolver::ProjectedGradient, _) => {
                 convex.gradient(problem, r, effort.tolerance, effort.most);
@@ -254,6 +282,14 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> CadouxWork<P, D> {
             }
         }
         self.newton.wait = self.newton.wait.saturating_sub(1);
+        if self.accelerator.is_on() {
+            self.accelerator.begin(&self.s);
+            self.accelerator.advance(&mut self.image, |c| f64::from(problem.mu()[c] > 0.0));
+            for (s, image) in self.s.iter_mut().zip(&self.image) {
+                *s = image.max(0.0);
+            }
+            return;
+        }
         for (s, gap) in self.s.iter_mut().zip(&self.gap) {
             *s += settings.relaxation * gap; //                               s ← F(s)
         }

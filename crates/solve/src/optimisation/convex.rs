@@ -14,6 +14,7 @@
 use nonsmooth_problem::linalg::{Block, small};
 
 use super::sets::Set;
+use crate::cone::ConvexSet;
 use crate::form::{Access, Linear, Linearised};
 use crate::{SolveError, cone};
 

@@ -21,6 +21,7 @@ use serde::{Deserialize, Serialize};
 use super::convex::Convex;
 use super::sets::Set;
 use super::{fraction, positive};
+use crate::cone::ConvexSet;
 use crate::form::{Access, Blockwise, Linearised};
 use crate::settings::Settings;
 use crate::{SolveError, Solver, Step};

@@ -1,6 +1,6 @@
 //! The convex sets of the subproblems, one factor a contact.
 
-use crate::cone;
+use crate::cone::{ConvexSet, Coulomb, Cylinder};
 
 /// The set that a contact's impulse lies in.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,115 +20,41 @@ pub(super) enum Set<const D: usize> {
     },
 }
 
-/// Where the tangential part lies with respect to its disk.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Disk {
-    Inside,
-    /// Outside, at this distance from the axis.
-    Outside(f64),
-    /// The disk is a point.
-    Point,
-}
-
-impl Disk {
+impl<const D: usize> ConvexSet<D> for Set<D> {
     #[inline(always)]
-    fn piece<const D: usize>(x: &[f64; D], theta: f64) -> Self {
-        let size = cone::tangential_norm(x);
-        if theta <= 0.0 {
-            Disk::Point
-        } else if size <= theta {
-            Disk::Inside
-        } else {
-            Disk::Outside(size)
-        }
-    }
-}
-
-impl<const D: usize> Set<D> {
-    /// The nearest point of the set.
-    #[inline(always)]
-    pub(super) fn project(&self, x: &[f64; D]) -> [f64; D] {
-        let disk = |theta: f64, normal: f64| {
-            let factor = match Disk::piece(x, theta) {
-                Disk::Inside => 1.0,
-                Disk::Outside(size) => theta / size,
-                Disk::Point => 0.0,
-            };
-            let mut p = x.map(|v| factor * v);
-            p[0] = normal;
-            p
-        };
+    fn project(&self, x: &[f64; D]) -> [f64; D] {
         match *self {
-            Set::Cone(mu) => cone::project(x, mu),
-            Set::Cylinder(theta) => disk(theta, x[0].max(0.0)),
+            Set::Cone(mu) => Coulomb { mu }.project(x),
+            Set::Cylinder(threshold) => Cylinder { threshold }.project(x),
             Set::Normal(held) => {
                 let mut p = held;
                 p[0] = x[0].max(0.0);
                 p
             }
-            Set::Tangential { normal, theta } => disk(theta, normal),
+            Set::Tangential { normal, theta } => {
+                let mut p = Cylinder { threshold: theta }.project(x);
+                p[0] = normal;
+                p
+            }
         }
     }
 
-    /// An element of the B-subdifferential of the projection: its derivative where it has one.
-    pub(super) fn jacobian(&self, x: &[f64; D]) -> [[f64; D]; D] {
-        let mut out = [[0.0; D]; D];
-        let pressed = f64::from(u8::from(x[0] > 0.0));
+    fn jacobian(&self, x: &[f64; D]) -> [[f64; D]; D] {
         match *self {
-            Set::Cone(mu) => return cone_jacobian(x, mu),
-            Set::Cylinder(theta) => {
-                disk_jacobian(x, theta, &mut out);
-                out[0][0] = pressed;
+            Set::Cone(mu) => Coulomb { mu }.jacobian(x),
+            Set::Cylinder(threshold) => Cylinder { threshold }.jacobian(x),
+            Set::Normal(_) => {
+                let mut out = [[0.0; D]; D];
+                out[0][0] = f64::from(u8::from(x[0] > 0.0));
+                out
             }
-            Set::Normal(_) => out[0][0] = pressed,
-            Set::Tangential { theta, .. } => disk_jacobian(x, theta, &mut out),
-        }
-        out
-    }
-}
-
-/// The tangential rows: I inside, `R Γ(x_T)` outside, 0 where the disk is a point.
-fn disk_jacobian<const D: usize>(x: &[f64; D], theta: f64, out: &mut [[f64; D]; D]) {
-    match Disk::piece(x, theta) {
-        Disk::Inside => (1..D).for_each(|k| out[k][k] = 1.0),
-        Disk::Outside(size) => {
-            for k in 1..D {
-                for l in 1..D {
-                    let identity = f64::from(u8::from(k == l));
-                    out[k][l] = theta / size * (identity - x[k] * x[l] / (size * size));
-                }
-            }
-        }
-        Disk::Point => {}
-    }
-}
-
-fn cone_jacobian<const D: usize>(x: &[f64; D], mu: f64) -> [[f64; D]; D] {
-    let mut out = [[0.0; D]; D];
-    match cone::region(x, mu) {
-        cone::Region::Inside => (0..D).for_each(|k| out[k][k] = 1.0),
-        cone::Region::Polar => {}
-        cone::Region::Outside => {
-            // p = n (1, mu t), n = (x_N + mu‖x_T‖)/(1 + mu²).
-            let size = cone::tangential_norm(x);
-            let scale = 1.0 / (1.0 + mu * mu);
-            let across = mu * (x[0] + mu * size) * scale / size;
-            let mut edge = [1.0; D];
-            for k in 1..D {
-                edge[k] = mu * x[k] / size;
-            }
-            for k in 0..D {
-                for l in 0..D {
-                    out[k][l] = scale * edge[k] * edge[l];
-                    if k > 0 && l > 0 {
-                        let identity = f64::from(u8::from(k == l));
-                        out[k][l] += across * (identity - x[k] * x[l] / (size * size));
-                    }
-                }
+            Set::Tangential { theta, .. } => {
+                let mut out = Cylinder { threshold: theta }.jacobian(x);
+                out[0][0] = 0.0;
+                out
             }
         }
     }
-    out
 }
 
 #[cfg(test)]

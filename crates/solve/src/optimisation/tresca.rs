@@ -21,6 +21,7 @@ use super::inner::{CylinderSolver, Cylinders, Effort};
 use super::sets::Set;
 use super::{fraction, positive};
 use crate::form::{Explicit, Linearised};
+use crate::parts::Accelerator;
 use crate::settings::Settings;
 use crate::{SolveError, Solver, Step};
 
@@ -32,6 +33,8 @@ pub struct Tresca {
     pub inner: CylinderSolver,
     /// The thresholds move by this share of the way to mu r_N, in (0, 1].
     pub relaxation: f64,
+    /// How many past steps Anderson's acceleration of the thresholds combines; 0 is the plain fixed point.
+    pub anderson: usize,
     /// The inner residual to reach, as a share of the last outer one, in (0, 1).
     pub inner_share: f64,
     /// At most this many inner iterations a step: gradient steps, factorisations or conic iterations.
@@ -43,6 +46,7 @@ impl Default for Tresca {
         Self {
             inner: CylinderSolver::default(),
             relaxation: 1.0,
+            anderson: 0,
             inner_share: 0.1,
             inner_iterations: 100,
         }
@@ -70,6 +74,9 @@ pub struct TrescaSteps<const D: usize>(pub Tresca);
 pub struct TrescaWork<P: Linearised<D> + Explicit<D>, const D: usize> {
     inner: Cylinders<P, D>,
     theta: Vec<f64>,
+    /// The thresholds that follow from the impulses.
+    image: Vec<f64>,
+    accelerator: Accelerator,
     error: f64,
 }
 
@@ -78,12 +85,18 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for TrescaSteps<D
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
         let inner = Cylinders::new(problem, self.0.inner)?;
-        Ok(TrescaWork { inner, theta: vec![0.0; problem.mu().len()], error: 1.0 })
+        let n = problem.mu().len();
+        let accelerator = Accelerator::new(self.0.anderson, n);
+        let (theta, image) = (vec![0.0; n], vec![0.0; n]);
+        Ok(TrescaWork { inner, theta, image, accelerator, error: 1.0 })
     }
 
     fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
         work.inner.refill(problem)?;
-        work.theta.resize(problem.mu().len(), 0.0);
+        let n = problem.mu().len();
+        work.theta.resize(n, 0.0);
+        work.image.resize(n, 0.0);
+        work.accelerator.resize(n);
         Ok(())
     }
 
@@ -92,12 +105,13 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for TrescaSteps<D
         for (c, (theta, mu)) in work.theta.iter_mut().zip(problem.mu()).enumerate() {
             *theta = mu * r[D * c].max(0.0);
         }
+        work.accelerator.forget();
         work.inner.convex.evaluate(problem, r);
         work.error = work.inner.convex.coulomb(problem.mu(), r, &work.inner.convex.y);
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
-        let Self::Work { inner, theta, error } = work;
+        let Self::Work { inner, theta, image, accelerator, error } = work;
         if let Some(ray) = problem.contradiction(&inner.convex.state) {
             return Step::NoSolution(ray.clone());
         }
@@ -114,8 +128,17 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for TrescaSteps<D
             return Step::Stuck(why.into());
         }
         *error = inner.convex.coulomb(problem.mu(), r, &inner.convex.y);
-        for (c, (theta, mu)) in theta.iter_mut().zip(problem.mu()).enumerate() {
-            *theta += self.0.relaxation * (mu * r[D * c].max(0.0) - *theta); //   θ ← mu r_N
+        for (c, (image, mu)) in image.iter_mut().zip(problem.mu()).enumerate() {
+            let target = mu * r[D * c].max(0.0);
+            *image = theta[c] + self.0.relaxation * (target - theta[c]); //       θ ← mu r_N
+        }
+        if accelerator.is_on() {
+            let unit = &inner.convex.unit;
+            accelerator.begin(theta);
+            accelerator.advance(image, |c| unit[c]);
+        }
+        for (theta, image) in theta.iter_mut().zip(&*image) {
+            *theta = image.max(0.0);
         }
         Step::Continue { estimate: *error }
     }

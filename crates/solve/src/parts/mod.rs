@@ -1,15 +1,17 @@
 //! What two families share.
 
-mod clarabel;
+mod anderson;
 mod central;
+mod clarabel;
 mod conic;
 pub mod nt;
 mod ordering;
 mod proximal_newton;
 mod sweep;
 
+pub use anderson::{Accelerator, Anderson};
+pub use central::Central;
 pub use clarabel::{Clarabel, Ended, Shape};
-pub use central::{Central, Iterate};
 pub use conic::{ConvexEnd, ConvexIp};
 pub use ordering::{Order, Ordering};
 pub use proximal_newton::{Iterate, ProximalNewton};
