@@ -167,11 +167,11 @@ impl<P: Linear<D>, const D: usize> Convex<P, D> {
     ) -> f64 {
         self.restrict(r);
         self.evaluate(problem, r);
-        // Objective values relative to the first.
-        let mut values = [0.0; MEMORY];
+        // Objective values relative to the first, and the last step lengths.
+        let (mut values, mut lengths) = ([0.0; MEMORY], [f64::INFINITY; MEMORY]);
         let (mut value, mut alpha) = (0.0, 1.0);
         for step in 1..=most {
-            let (mut slope, mut size) = (0.0, 0.0);
+            let (mut slope, mut size, mut terms) = (0.0_f64, 0.0_f64, 0.0_f64);
             for (c, (set, &w)) in self.sets.iter().zip(&self.unit).enumerate() {
                 let x: [f64; D] =
                     std::array::from_fn(|k| r[D * c + k] - alpha / w * self.y[D * c + k]);
@@ -180,6 +180,7 @@ impl<P: Linear<D>, const D: usize> Convex<P, D> {
                     let d = p[k] - r[D * c + k];
                     self.d[D * c + k] = d;
                     slope += self.y[D * c + k] * d;
+                    terms += (self.y[D * c + k] * r[D * c + k]).abs();
                     size += w * d * d;
                 }
             }
@@ -188,9 +189,11 @@ impl<P: Linear<D>, const D: usize> Convex<P, D> {
                 .sum();
             // ‖d(α)‖ grows with α and ‖d(α)‖/α falls: this bounds the residual from above.
             let bound = moved.sqrt() / (self.scale * alpha.min(1.0));
-            if bound <= tolerance || !bound.is_finite() || slope >= 0.0 {
+            if bound <= tolerance || !bound.is_finite() {
                 break;
             }
+            // The rounding of r on the boundary hides a slope as small as this: then short steps, without the objective.
+            let blind = -slope <= 16.0 * f64::EPSILON * terms;
             problem.velocities(&mut self.state, &self.d, &mut self.wd);
             let curvature: f64 = (self.wd.iter_mut().zip(&self.q).zip(&self.d))
                 .map(|((wd, q), d)| {
@@ -200,7 +203,8 @@ impl<P: Linear<D>, const D: usize> Convex<P, D> {
                 .sum();
             let highest = values.iter().take(step.min(MEMORY)).fold(f64::MIN, |a, v| a.max(*v));
             let whole = slope + 0.5 * curvature;
-            let t = if value + whole <= highest + 1e-4 * slope || curvature <= 0.0 {
+            let agreed = value + whole <= highest + 1e-4 * slope;
+            let t = if blind || agreed || curvature <= 0.0 {
                 1.0
             } else {
                 (-slope / curvature).min(1.0)
@@ -212,6 +216,10 @@ impl<P: Linear<D>, const D: usize> Convex<P, D> {
                 self.y[i] += t * self.wd[i];
             }
             alpha = if curvature > 0.0 { (size / curvature).clamp(1e-8, 1e8) } else { 1e2 };
+            lengths[step % MEMORY] = alpha;
+            if blind {
+                alpha = lengths.iter().fold(alpha, |a, l| a.min(*l));
+            }
             if step % REFRESH == 0 {
                 self.evaluate(problem, r);
             }
