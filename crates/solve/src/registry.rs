@@ -207,7 +207,7 @@ pub const CADOUX: About = About {
     family: "optimisation",
     summary: "Cadoux' approach: second-order cone programs of given sliding speeds, Newton on the speeds",
     needs: &[],
-    cites: &["CadouxThesis2009", "AcaryCadouxLemarechalMalick2011", "Acary2018"],
+    cites: &["Cadoux2009", "AcaryCadouxLemarechalMalick2011", "Acary2018"],
     variants: &[
         "update=fixed_point",
         "update=anderson",

@@ -12,7 +12,7 @@
 //! `[I − J + ρJ (I + mu e_N nᵀ) W] dr = −ρJ mu (F(s) − s) e_N`: one factorisation, no Krylov method.
 //! A step that does not lower ‖F(s) − s‖ is taken back and replaced by fixed-point steps.
 //!
-//! References: CadouxThesis2009; AcaryCadouxLemarechalMalick2011; Acary, lecture (123)(124).
+//! References: Cadoux2009; AcaryCadouxLemarechalMalick2011; Acary, lecture (123)(124).
 //!
 //! Cost of a step: one conic problem (10 to 30 factorisations) and, for Newton, one factorisation more. Storage: 10 vectors and a factor.
 //!

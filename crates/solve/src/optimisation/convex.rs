@@ -9,7 +9,7 @@
 //! *semismooth Newton* on the natural map `φ = r − P_C(r − ρ y)`, `ρ = 10/w_c`: `(I − J + ρ J W) dr = −φ` with J an element of ∂P_C, halved
 //! while ‖φ‖ does not fall, gradient steps where that does not help. On cylinders it is the primal–dual active set method.
 //!
-//! References: BirginMartinezRaydan2000; HueeberStadlerWohlmuth2008.
+//! References: BirginMartinezRaydan2000; HueberStadlerWohlmuth2008.
 
 use nonsmooth_problem::linalg::{Block, small};
 
@@ -373,4 +373,101 @@ fn weighted_map<const D: usize>(
         sum += (w / rho) * (w / rho) * square;
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use nonsmooth_problem::FrictionLocal;
+    use nonsmooth_problem::planted::Planted;
+
+    use super::*;
+    use crate::form::Explicit;
+    use crate::optimisation::inner::{CylinderSolver, Cylinders, Effort};
+
+    fn problem(dofs: usize, seed: u64) -> FrictionLocal<3> {
+        Planted { contacts: 12, dofs, seed, mu: (0.1, 0.6), ..Planted::default() }.local().0
+    }
+
+    #[test]
+    fn the_solvers_agree_on_cylinders() {
+        // 36 unknowns; the last two W have the ranks 30 and 12.
+        for (dofs, seed) in [(60, 1), (60, 2), (30, 3), (12, 4)] {
+            let problem = problem(dofs, seed);
+            let theta: Vec<f64> = (0..12).map(|c| 0.05 * (c % 4) as f64).collect();
+            let mut velocities = vec![];
+            for choice in [
+                CylinderSolver::ActiveSet,
+                CylinderSolver::ProjectedGradient,
+                CylinderSolver::Conic,
+            ] {
+                let mut inner = Cylinders::new(&problem, choice).unwrap();
+                for (set, theta) in inner.convex.sets.iter_mut().zip(&theta) {
+                    *set = Set::Cylinder(*theta);
+                }
+                let mut r = vec![0.0; 36];
+                inner.convex.evaluate(&problem, &r);
+                let most = if choice == CylinderSolver::ProjectedGradient { 100_000 } else { 100 };
+                let effort = Effort { tolerance: 1e-12, most, polish: 20 };
+                let reached = inner.solve(&problem, &mut r, &theta, choice, effort).unwrap();
+                assert!(reached <= 1e-12, "{choice:?} {dofs}: {reached:.1e}");
+                for (set, r) in inner.convex.sets.iter().zip(r.chunks(3)) {
+                    let r: [f64; 3] = r.try_into().unwrap();
+                    let p = set.project(&r);
+                    assert!((0..3).all(|k| (p[k] - r[k]).abs() < 1e-9), "{choice:?} {r:?}");
+                }
+                velocities.push(inner.convex.y);
+            }
+            for other in &velocities[1..] {
+                let gaps = other.iter().zip(&velocities[0]).map(|(a, b)| (a - b).abs());
+                let off = gaps.fold(0.0_f64, f64::max);
+                assert!(off < 1e-9, "dofs {dofs}: {off:.1e}");
+            }
+        }
+    }
+
+    /// The speeds that the convex problem with the speeds `s` answers with, and its solution.
+    fn answer<P: Linearised<3> + Explicit<3>>(
+        problem: &P,
+        convex: &mut Convex<P, 3>,
+        s: &[f64],
+        r: &mut [f64],
+    ) -> (Vec<f64>, Vec<f64>) {
+        for (c, mu) in problem.mu().iter().enumerate() {
+            convex.shift[c] = mu * s[c];
+            convex.sets[c] = Set::Cone(*mu);
+        }
+        convex.evaluate(problem, r);
+        let reached = convex.newton(problem, r, 1e-14, 200);
+        assert!(reached <= 1e-13, "{reached:.1e}");
+        let mut u = convex.y.clone();
+        (0..s.len()).for_each(|c| u[3 * c] -= convex.shift[c]);
+        let image = u.chunks(3).map(|u| cone::tangential_norm::<3>(u.try_into().unwrap()));
+        (image.collect(), u)
+    }
+
+    #[test]
+    fn the_newton_step_solves_the_linearised_fixed_point() {
+        for seed in 1..5 {
+            let problem = problem(60, seed);
+            let mut convex = Convex::<_, 3>::new(&problem, Access::Newton).unwrap();
+            let s: Vec<f64> = (0..12).map(|c| 0.3 + 0.1 * c as f64).collect();
+            let mut r = vec![0.0; 36];
+            let (image, u) = answer(&problem, &mut convex, &s, &mut r);
+            let gap: Vec<f64> = image.iter().zip(&s).map(|(f, s)| f - s).collect();
+            let mut ds = vec![0.0; 12];
+            assert!(convex.speeds(&problem, &r, &u, &gap, &mut ds));
+            // F(s) + F'(s) ds = s + ds.
+            let h = 1e-6;
+            let moved: Vec<f64> = s.iter().zip(&ds).map(|(s, d)| s + h * d).collect();
+            let (there, _) = answer(&problem, &mut convex, &moved, &mut r);
+            for c in 0..12 {
+                // Where nothing slides, F is zero and not differentiable.
+                if image[c] > 1e-9 {
+                    let slope = (there[c] - image[c]) / h;
+                    let expected = ds[c] - gap[c];
+                    assert!((slope - expected).abs() < 1e-4, "{seed} {c}: {slope} {expected}");
+                }
+            }
+        }
+    }
 }

@@ -147,3 +147,32 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for TrescaSteps<D
         problem.complete(&mut work.inner.convex.state, point);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nonsmooth_problem::linalg::{Bsr, Csc};
+    use nonsmooth_problem::{FrictionLocal, Problem};
+
+    use super::*;
+
+    #[test]
+    fn one_sliding_contact_takes_two_steps() {
+        // W = I: r_N = 1, and with θ = mu r_N = 1/2 the tangential impulse is −θ t.
+        let w = Bsr::<3>::from_csc(&Csc::diagonal(&[1.0; 3]));
+        let problem = FrictionLocal::new(w, vec![-1.0, 2.0, 0.0], vec![0.5]).unwrap();
+        for inner in
+            [CylinderSolver::ActiveSet, CylinderSolver::ProjectedGradient, CylinderSolver::Conic]
+        {
+            let solver = TrescaSteps::<3>(Tresca { inner, ..Tresca::default() });
+            let (mut work, mut point) = (solver.work(&problem).unwrap(), problem.origin());
+            solver.start(&problem, &mut point, &mut work);
+            for expected in [[1.0, 0.0, 0.0], [1.0, -0.5, 0.0]] {
+                work.error = 1e-10; // the convex problem is solved this well
+                let step = solver.step(&problem, &mut point, &mut work);
+                assert!(matches!(step, Step::Continue { .. }), "{inner:?}: {step:?}");
+                let off = (0..3).fold(0.0_f64, |a, k| a.max((point.r[k] - expected[k]).abs()));
+                assert!(off < 1e-9, "{inner:?}: {:?}", point.r);
+            }
+        }
+    }
+}
