@@ -18,7 +18,7 @@
 //!
 //! Fails: the fixed point is a contraction for small mu only, and slow on hyperstatic problems with impacts (rates of 0.8 to 0.97, or
 //! above one); Newton meets directions of no descent there. Where the convex problem is unbounded (no v with `Hᵀv + w` in
-//! K*, see docs/notation.md) the method cannot start, though Coulomb's problem may have a solution.
+//! K*) the method cannot start, though Coulomb's problem may have a solution: Clarabel then says so, the others run to a limit.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -126,9 +126,14 @@ pub struct CadouxWork<P: Linearised<D> + Explicit<D>, const D: usize> {
     image: Vec<f64>,
     gap: Vec<f64>,
     ds: Vec<f64>,
+    /// F(s) where the last Newton step began.
+    held: Vec<f64>,
     error: f64,
     newton: Trial,
 }
+
+/// Newton steps after an interior point that did not reach its tolerance.
+const POLISH: usize = 5;
 
 /// Whether the present s came from a Newton step, and what to do if it is no better.
 #[derive(Debug, Clone, Copy, Default)]
@@ -162,6 +167,7 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for CadouxSteps<D
             image: vec![0.0; n],
             gap: vec![0.0; n],
             ds: vec![0.0; n],
+            held: vec![0.0; n],
             error: 1.0,
             newton: Trial::default(),
         })
@@ -173,7 +179,8 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for CadouxSteps<D
             conic.refill(problem, &work.convex);
         }
         let n = problem.mu().len();
-        for x in [&mut work.s, &mut work.image, &mut work.gap, &mut work.ds] {
+        let work_s = [&mut work.s, &mut work.image, &mut work.gap, &mut work.ds, &mut work.held];
+        for x in work_s {
             x.resize(n, 0.0);
         }
         work.u.resize(D * n, 0.0);
@@ -234,6 +241,8 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> CadouxWork<P, D> {
                 self.interior.solve(problem, state, effort.tolerance, effort.most);
                 r.copy_from_slice(self.interior.r());
                 convex.evaluate(problem, r);
+                // Where the interior point ended short of it.
+                convex.newton(problem, r, effort.tolerance, POLISH);
             }
             (ConeSolver::ProjectedGradient, _) => {
                 convex.gradient(problem, r, effort.tolerance, effort.most);
@@ -268,13 +277,17 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> CadouxWork<P, D> {
         let refused =
             self.newton.before.take().is_some_and(|before| merit.is_nan() || merit >= before);
         if refused {
+            // Back to where it began, and on by the fixed point.
             self.newton.refused += 1;
             self.newton.wait = self.newton.refused.min(10);
+            self.s.copy_from_slice(&self.held);
+            return;
         }
         if settings.update == Update::Newton && self.newton.wait == 0 {
             let Self { convex, u, gap, ds, .. } = self;
             if convex.speeds(problem, r, u, gap, ds) {
                 self.newton.before = Some(merit);
+                self.held.copy_from_slice(&self.image);
                 for (s, ds) in self.s.iter_mut().zip(&self.ds) {
                     *s = (*s + ds).max(0.0);
                 }
