@@ -179,8 +179,8 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for CadouxSteps<D
             conic.refill(problem, &work.convex);
         }
         let n = problem.mu().len();
-        let work_s = [&mut work.s, &mut work.image, &mut work.gap, &mut work.ds, &mut work.held];
-        for x in work_s {
+        let speeds = [&mut work.s, &mut work.image, &mut work.gap, &mut work.ds, &mut work.held];
+        for x in speeds {
             x.resize(n, 0.0);
         }
         work.u.resize(D * n, 0.0);

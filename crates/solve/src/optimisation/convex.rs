@@ -1,6 +1,6 @@
 //! The convex subproblems that the methods of this family share, and their solvers.
 //!
-//! Problem: `C ∋ r ⟂-like`: find r in a product C of convex sets with `(W r + b)ᵀ (r' − r) ≥ 0` for all r' in C, which for
+//! Problem: find r in a product C of convex sets with `(W r + b)ᵀ (r' − r) ≥ 0` for all r' in C, which for
 //! symmetric W is `min ½ rᵀWr + bᵀr`. `b = q + shift`.
 //!
 //! Two methods that need no conic solver:
