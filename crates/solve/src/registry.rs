@@ -9,7 +9,8 @@ use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use serde::Serialize;
 
 use crate::auto::{Auto, Hybrid};
-use crate::form::{Linear, Linearised};
+use crate::form::{Explicit, Linear, Linearised};
+use crate::optimisation::{Alternation, Cadoux, CadouxSteps, Panagiotopoulos, Tresca, TrescaSteps};
 use crate::projection::{DeSaxce, Extragradient, FixedPoint, Method, Projected};
 use crate::reform::Condense;
 use crate::settings::{Setting, Settings, SettingsMap, described, parse};
@@ -179,6 +180,45 @@ pub const EXTRAGRADIENT: About = About {
     settings: described::<Extragradient>,
 };
 
+/// The Tresca fixed point.
+pub const TRESCA: About = About {
+    name: "tresca",
+    family: "optimisation",
+    summary: "Tresca fixed point (Haslinger): convex problems over cylinders of given thresholds",
+    needs: &[],
+    cites: &["HaslingerDostalKucera2002", "Acary2018", "AcaryBremondHuber2018"],
+    variants: &["inner=projected_gradient", "inner=conic", "anderson=5"],
+    settings: described::<Tresca>,
+};
+
+/// Panagiotopoulos' alternation.
+pub const PANAGIOTOPOULOS: About = About {
+    name: "panagiotopoulos",
+    family: "optimisation",
+    summary: "Panagiotopoulos' alternation of a normal and a tangential convex problem",
+    needs: &[],
+    cites: &["Panagiotopoulos1975", "Acary2018", "AcaryBremondHuber2018"],
+    variants: &["inner=projected_gradient", "inner=active_set"],
+    settings: described::<Panagiotopoulos>,
+};
+
+/// Cadoux' approach.
+pub const CADOUX: About = About {
+    name: "cadoux",
+    family: "optimisation",
+    summary: "Cadoux' approach: second-order cone programs of given sliding speeds, Newton on the speeds",
+    needs: &[],
+    cites: &["Cadoux2009", "AcaryCadouxLemarechalMalick2011", "Acary2018"],
+    variants: &[
+        "update=fixed_point",
+        "update=anderson",
+        "inner=clarabel",
+        "inner=newton",
+        "inner=projected_gradient",
+    ],
+    settings: described::<Cadoux>,
+};
+
 /// The automatic method.
 pub const AUTO: About = About {
     name: "auto",
@@ -194,7 +234,7 @@ pub const AUTO: About = About {
 fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
 where
     V: Visitor,
-    V::Problem: Linearised<D> + Kinematic<D>,
+    V::Problem: Linearised<D> + Explicit<D> + Kinematic<D>,
 {
     fn projected<const D: usize, V, M>(
         settings: &SettingsMap,
@@ -213,6 +253,9 @@ where
         Entry { about: &DE_SAXCE, build: projected::<D, V, DeSaxce> },
         Entry { about: &FIXED_POINT, build: projected::<D, V, FixedPoint> },
         Entry { about: &EXTRAGRADIENT, build: projected::<D, V, Extragradient> },
+        Entry { about: &TRESCA, build: |s, v| Ok(v.visit(TrescaSteps::<D>(parse(s)?))) },
+        Entry { about: &PANAGIOTOPOULOS, build: |s, v| Ok(v.visit(Alternation::<D>(parse(s)?))) },
+        Entry { about: &CADOUX, build: |s, v| Ok(v.visit(CadouxSteps::<D>(parse(s)?))) },
     ]
 }
 

@@ -5,6 +5,8 @@
 //!
 //! Source: Acary, lecture (112)–(115), in unscaled coordinates.
 
+use super::ConvexSet;
+
 /// `‖x_T‖`. No `hypot`: it costs more than all the rest of a projection, and velocities whose squares leave
 /// the range of f64 are the judge's concern.
 #[inline(always)]
@@ -57,6 +59,85 @@ pub fn project<const D: usize>(x: &[f64; D], mu: f64) -> [f64; D] {
     }
 }
 
+/// An element of the B-subdifferential of [`project`] at `x`; the derivative away from the boundaries of the regions.
+#[inline(always)]
+pub fn projection_jacobian<const D: usize>(x: &[f64; D], mu: f64) -> [[f64; D]; D] {
+    let mut out = [[0.0; D]; D];
+    match region(x, mu) {
+        Region::Inside => (0..D).for_each(|k| out[k][k] = 1.0),
+        Region::Polar => {}
+        Region::Outside => {
+            // p = n (1, mu t), n = (x_N + mu‖x_T‖)/(1 + mu²):  dn = (dx_N + mu t·dx_T)/(1 + mu²),
+            // dp_T = mu t dn + mu n/‖x_T‖ (I − t tᵀ) dx_T.
+            let size = tangential_norm(x);
+            let scale = 1.0 / (1.0 + mu * mu);
+            let across = mu * (x[0] + mu * size) * scale / size;
+            let mut edge = [1.0; D];
+            for k in 1..D {
+                edge[k] = mu * x[k] / size;
+            }
+            for k in 0..D {
+                for l in 0..D {
+                    out[k][l] = scale * edge[k] * edge[l];
+                    if k > 0 && l > 0 {
+                        let identity = f64::from(u8::from(k == l));
+                        out[k][l] += across * (identity - x[k] * x[l] / (size * size));
+                    }
+                }
+            }
+        }
+    }
+    out
+}
+
+/// The Coulomb cone K as a set.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coulomb {
+    /// The coefficient of friction.
+    pub mu: f64,
+}
+
+impl<const D: usize> ConvexSet<D> for Coulomb {
+    fn project(&self, x: &[f64; D]) -> [f64; D] {
+        project(x, self.mu)
+    }
+
+    fn jacobian(&self, x: &[f64; D]) -> [[f64; D]; D] {
+        projection_jacobian(x, self.mu)
+    }
+}
+
+/// The dual cone `K* = {mu‖x_T‖ ≤ x_N}`, a half space for `mu = 0`: by Moreau, `P_K*(x) = x + P_K(−x)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dual {
+    /// The coefficient of friction.
+    pub mu: f64,
+}
+
+impl<const D: usize> ConvexSet<D> for Dual {
+    fn project(&self, x: &[f64; D]) -> [f64; D] {
+        let minus = x.map(|v| -v);
+        let mut p = project(&minus, self.mu);
+        if region(&minus, self.mu) == Region::Inside {
+            return [0.0; D];
+        }
+        for k in 0..D {
+            p[k] += x[k];
+        }
+        p
+    }
+
+    fn jacobian(&self, x: &[f64; D]) -> [[f64; D]; D] {
+        let mut out = projection_jacobian(&x.map(|v| -v), self.mu);
+        for (k, row) in out.iter_mut().enumerate() {
+            for (l, v) in row.iter_mut().enumerate() {
+                *v = f64::from(u8::from(k == l)) - *v;
+            }
+        }
+        out
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -68,5 +149,6 @@ mod tests {
         assert_eq!(project(&[-2.0, 0.0, 0.0], 0.0), [0.0; 3]);
         assert_eq!(project(&[2.0, 0.0], 0.0), [2.0, 0.0]);
         assert_eq!(project(&[0.0; 3], 0.0), [0.0; 3]);
+        assert_eq!(project(&[-2.0, 0.0, 0.0], 0.0), [0.0; 3]);
     }
 }

@@ -85,7 +85,7 @@ impl<const D: usize> Eliminated<D> {
 
 impl<const D: usize> LocalState<D> {
     #[inline(always)]
-    fn operator<'a>(&'a self, problem: &'a FrictionLocal<D>) -> (&'a Bsr<D>, &'a [f64]) {
+    pub(super) fn operator<'a>(&'a self, problem: &'a FrictionLocal<D>) -> (&'a Bsr<D>, &'a [f64]) {
         match &self.eliminated {
             None => (&problem.W, &problem.q),
             Some(e) => (&e.w, &e.q),

@@ -5,8 +5,10 @@
 //! | [`Contacts`] | the law's data, the diagonal blocks of W, ‖q‖, the impulses of a point | local, global |
 //! | [`Blockwise`] | one contact's velocity, and to be told that one contact's impulse moved | local (rows of W), global (velocity space) |
 //! | [`Linear`] | `u = W r + q` for all contacts | local (W), global (product form) |
+//! | [`Explicit`] | entries of matrices that state the symmetric part of W | local (W), global (M, H, G) |
 //! | [`Linearised`] | to solve `(Q + P W) x = b` with block-diagonal P, Q | local (in contact space), global (in velocity space) |
 
+mod explicit;
 mod global;
 mod linearised;
 mod local;
@@ -14,6 +16,8 @@ mod local;
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::{Block, Singular};
+
+pub use explicit::{Explicit, Model};
 
 use crate::SolveError;
 

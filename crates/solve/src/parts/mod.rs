@@ -1,13 +1,17 @@
 //! What two families share.
 
+mod anderson;
 mod central;
+mod clarabel;
 mod conic;
 pub mod nt;
 mod ordering;
 mod proximal_newton;
 mod sweep;
 
+pub use anderson::{Accelerator, Anderson};
 pub use central::{Central, Iterate as CentralIterate};
+pub use clarabel::{Clarabel, Ended, Shape};
 pub use conic::{ConvexEnd, ConvexIp};
 pub use ordering::{Order, Ordering};
 pub use proximal_newton::{Inner, ProximalNewton};
