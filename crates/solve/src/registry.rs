@@ -7,7 +7,7 @@ use std::marker::PhantomData;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use serde::Serialize;
 
-use crate::form::{Blockwise, Linear};
+use crate::form::{Blockwise, Linear, Linearised};
 use crate::projection::{DeSaxce, Extragradient, FixedPoint, Method, Projected};
 use crate::reform::Condense;
 use crate::settings::{Setting, Settings, SettingsMap, described, parse};
@@ -181,7 +181,7 @@ pub const EXTRAGRADIENT: About = About {
 fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
 where
     V: Visitor,
-    V::Problem: Blockwise<D> + Linear<D>,
+    V::Problem: Blockwise<D> + Linearised<D>,
 {
     fn projected<const D: usize, V, M>(
         settings: &SettingsMap,
