@@ -24,6 +24,7 @@ mod drive;
 mod error;
 pub mod form;
 pub mod local;
+pub mod newton;
 pub mod parts;
 pub mod projection;
 pub mod reform;

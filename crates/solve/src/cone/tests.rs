@@ -80,9 +80,7 @@ fn the_coulomb_cone_and_its_dual() {
     for mu in [0.0, 0.3, 1.0, 2.0] {
         let (primal, dual) = (Coulomb { mu }, Dual { mu });
         let tolerance = 1e-14;
-        is_a_projection(&primal, |x| {
-            x[0] >= 0.0 && tangential_norm(x) <= mu * x[0] + tolerance
-        });
+        is_a_projection(&primal, |x| x[0] >= 0.0 && tangential_norm(x) <= mu * x[0] + tolerance);
         is_a_projection(&dual, |x| mu * tangential_norm(x) <= x[0] + tolerance);
         is_differentiated(&primal);
         is_differentiated(&dual);

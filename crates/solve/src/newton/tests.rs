@@ -1,0 +1,1 @@
+//! What every Newton method of the family does.
