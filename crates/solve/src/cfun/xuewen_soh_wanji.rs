@@ -53,12 +53,13 @@ impl<const D: usize> ContactFunction<D> for XuewenSohWanji {
         }
         let rho = law.rho.tangential;
         let (speed, size) = (tangential_norm(u), tangential_norm(r));
-        // At a norm's kink, a direction that keeps the rows independent: r_T against u_T where r_T = 0, u_T along r_T
-        // where u_T = 0. Each is an element of the subdifferential.
+        // At a norm's kink, a direction that keeps the rows independent: u_T and r_T against each other. Each is an element of
+        // the subdifferential.
+        let against = |x: &[f64; D]| direction(x).map(|t| t.map(|v| -v));
         let mut first = [0.0; D];
         first[1] = 1.0;
-        let along_r = direction(r).or_else(|| direction(u).map(|t| t.map(|v| -v))).unwrap_or(first);
-        let along_u = direction(u).unwrap_or(along_r);
+        let along_r = direction(r).or_else(|| against(u)).unwrap_or(first);
+        let along_u = direction(u).unwrap_or(along_r.map(|v| -v));
         match Smaller::of(rho * speed, law.mu * r[0] - size) {
             Smaller::Velocity => {
                 out.phi[1] = rho * speed;

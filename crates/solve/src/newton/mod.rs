@@ -59,6 +59,7 @@ pub use xuewen_soh_wanji::NewtonXsw;
 /// The hyperparameters that all Newton methods have.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[schemars(inline)]
 pub struct Newton {
     /// How the line search accepts a step, on half the square of the function.
     pub line_search: LineSearch,
