@@ -69,7 +69,8 @@ pub struct Newton {
     pub rho: f64,
     /// Gauss-Seidel sweeps before the first Newton step.
     pub warm_up: usize,
-    /// Gauss-Seidel sweeps that take over for one step where Newton's fails; 0 gives up at once.
+    /// Gauss-Seidel sweeps that take over for one step where Newton's fails, doubled up to 64-fold while that does not help;
+    /// 0 gives up at once.
     pub rescue: usize,
     /// Smoothed functions: the smoothing parameter is at most this fraction of the residual, at least 0. The others do not look at it.
     pub smoothing: f64,
@@ -90,6 +91,11 @@ impl Default for Newton {
 
 impl Settings for Newton {
     fn validate(&self) -> Result<(), String> {
+        for (key, sweeps) in [("warm_up", self.warm_up), ("rescue", self.rescue)] {
+            if sweeps > MOST_SWEEPS {
+                return Err(format!("{key}: expected at most {MOST_SWEEPS}, found {sweeps}"));
+            }
+        }
         if !(self.rho > 0.0 && self.rho.is_finite()) {
             return Err(format!("rho: expected a positive number, found {}", self.rho));
         }
@@ -126,8 +132,12 @@ impl<F, const D: usize> Semismooth<F, D> {
     }
 }
 
+/// The most sweeps that may be asked for in one step: time limits act between steps.
+const MOST_SWEEPS: usize = 1000;
 /// Rescues without a new low after which the method is stuck.
 pub const RESCUES: usize = 12;
+/// Each rescue in a row has twice as many sweeps as the one before, this often.
+const DOUBLINGS: usize = 6;
 /// Newton steps without a new low after which sweeps take over.
 pub const PATIENCE: usize = 25;
 
@@ -182,7 +192,10 @@ impl Phase {
     /// Notes a merit; a new low forgives the rescues.
     fn note(&mut self, merit: f64) {
         if merit < 0.98 * self.low {
-            (self.low, self.since_low, self.rescues) = (merit, 0, 0);
+            if self.low.is_finite() {
+                self.rescues = 0;
+            }
+            (self.low, self.since_low) = (merit, 0);
         } else {
             self.since_low += 1;
         }
@@ -364,6 +377,8 @@ impl<F, const D: usize> Semismooth<F, D> {
         if self.settings.rescue == 0 || work.phase.rescues >= RESCUES {
             return Step::Stuck(Cow::Owned(format!("Newton's method is stuck: {why}")));
         }
+        // Longer each time in a row: where W is rank deficient, Newton needs a start that few sweeps do not give.
+        let count = self.settings.rescue << work.phase.rescues.min(DOUBLINGS);
         work.phase.rescues += 1;
         work.phase.since_low = 0;
         work.search.restart();
@@ -372,7 +387,7 @@ impl<F, const D: usize> Semismooth<F, D> {
             work.phase.low = f64::INFINITY;
             self.scale_contacts(problem, work);
         }
-        self.sweeps(problem, point, work, self.settings.rescue)
+        self.sweeps(problem, point, work, count)
     }
 }
 
