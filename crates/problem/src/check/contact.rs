@@ -36,7 +36,8 @@ pub(super) fn modified_velocity<const D: usize>(u: &[f64; D], mu: f64) -> [f64; 
 /// x itself inside, else its projection on the ray `(cos φ, sin φ)`, `tan φ = mu`, or the apex.
 pub(super) fn nearest_in_cone<const D: usize>(x: &[f64; D], mu: f64) -> [f64; D] {
     let t = tangential_norm(x);
-    if t <= mu * x[0] {
+    // x_N ≥ 0 follows from the other except for mu = 0, where K is a half line.
+    if t <= mu * x[0] && x[0] >= 0.0 {
         return *x;
     }
     let secant = (1.0 + mu * mu).sqrt();
@@ -74,7 +75,7 @@ pub(super) fn natural_map<const D: usize>(x: &[f64; D], modified: &[f64; D], mu:
     }
     let t = tangential_norm(&y);
     let outside = t - mu * y[0];
-    if outside <= 0.0 {
+    if outside <= 0.0 && y[0] >= 0.0 {
         return *modified;
     }
     if y[0] + mu * t <= 0.0 {
@@ -145,6 +146,15 @@ mod tests {
         assert_eq!(pressed, ContactStatus { status: Motion::Slip, degenerate: false });
         let open = status(&[0.0; 3], &[1.0, 5.0, 0.0], 0.0, 1e-9);
         assert_eq!(open, ContactStatus { status: Motion::Open, degenerate: false });
+    }
+
+    #[test]
+    fn a_frictionless_contact_cannot_pull() {
+        // No tangential part at all: K is a half line, and −2 is not on it.
+        let pull = [-2.0, 0.0, 0.0];
+        assert_eq!(distance_to_cone(&pull, 0.0), 2.0);
+        assert_eq!(natural_map(&pull, &[0.0; 3], 0.0), pull);
+        assert_eq!(distance_to_dual(&[-1.0, 0.0, 0.0], 0.0), 1.0);
     }
 
     #[test]
