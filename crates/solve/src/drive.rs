@@ -186,6 +186,9 @@ pub trait Session<P: Problem>: Send {
 
     /// The judge's visits during the last solve, thinned evenly where there were very many.
     fn history(&self) -> &[Sample];
+
+    /// What the solver says that it did during the last solve; empty where it has nothing to tell.
+    fn account(&self) -> Vec<String>;
 }
 
 /// The most samples that a history keeps.
@@ -261,6 +264,10 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
     fn history(&self) -> &[Sample] {
         &self.history
     }
+
+    fn account(&self) -> Vec<String> {
+        self.kept.as_ref().map_or(vec![], |kept| self.solver.account(&kept.work))
+    }
 }
 
 struct Run<'a, P: Problem, S: Solver<P>> {
@@ -274,6 +281,7 @@ struct Run<'a, P: Problem, S: Solver<P>> {
 impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
     fn solve(&mut self, point: &mut P::Point, watch: &mut dyn FnMut(&Progress)) -> Outcome {
         let mut iterations = 0;
+        self.solver.aim(self.limits.tolerance, self.work);
         self.solver.start(self.problem, point, self.work);
         self.judge(point, 0);
         let mut estimate = f64::NAN;

@@ -18,10 +18,13 @@
 //! # Ok::<(), nonsmooth_solve::SolveError>(())
 //! ```
 
+pub mod auto;
 pub mod cfun;
 pub mod cone;
+pub mod diagnose;
 mod drive;
 mod error;
+pub mod existence;
 pub mod form;
 pub mod local;
 pub mod newton;

@@ -7,8 +7,9 @@ use std::marker::PhantomData;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use serde::Serialize;
 
+use crate::auto::{Auto, Hybrid};
 use crate::cfun::ContactFunction;
-use crate::form::{Blockwise, Linear, Linearised};
+use crate::form::{Linear, Linearised};
 use crate::newton::{
     Method as NewtonMethod, NewtonAc, NewtonCm, NewtonFb, NewtonFbSmooth, NewtonHsw, NewtonJm,
     NewtonNm, NewtonPk, NewtonXsw, Semismooth,
@@ -289,11 +290,22 @@ pub const NEWTON_HSW: About = About {
     settings: described::<NewtonHsw>,
 };
 
+/// The automatic method.
+pub const AUTO: About = About {
+    name: "auto",
+    family: "auto",
+    summary: "hybrid",
+    needs: &[],
+    cites: &["Acary2018"],
+    variants: &[],
+    settings: described::<Auto>,
+};
+
 /// The solvers of frictional contact, for any problem that can be seen by its contacts.
 fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
 where
     V: Visitor,
-    V::Problem: Blockwise<D> + Linearised<D>,
+    V::Problem: Linearised<D>,
 {
     fn projected<const D: usize, V, M>(
         settings: &SettingsMap,
@@ -309,7 +321,7 @@ where
     fn newton<const D: usize, V, M>(settings: &SettingsMap, visitor: V) -> Result<V::Output, String>
     where
         V: Visitor,
-        V::Problem: Linearised<D> + Blockwise<D>,
+        V::Problem: Linearised<D>,
         M: NewtonMethod + Settings,
         M::Function: ContactFunction<D> + 'static,
     {
@@ -317,6 +329,7 @@ where
     }
     vec![
         Entry { about: &NSGS, build: |s, v| Ok(parse::<Nsgs>(s)?.visit::<D, V>(v)) },
+        Entry { about: &AUTO, build: |s, v| Ok(v.visit(Hybrid::<D>(parse(s)?))) },
         Entry { about: &DE_SAXCE, build: projected::<D, V, DeSaxce> },
         Entry { about: &FIXED_POINT, build: projected::<D, V, FixedPoint> },
         Entry { about: &EXTRAGRADIENT, build: projected::<D, V, Extragradient> },

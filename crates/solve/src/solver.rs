@@ -31,6 +31,9 @@ pub trait Solver<P: Problem>: Send {
         Ok(())
     }
 
+    /// Learns the tolerance that the judge will ask for, before the start: a method may choose its means by it.
+    fn aim(&self, _tolerance: f64, _work: &mut Self::Work) {}
+
     /// Takes `point` as the starting point. Called once per solve, after `work` or `refill`.
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work);
 
@@ -40,6 +43,11 @@ pub trait Solver<P: Problem>: Send {
     /// Brings `point` up to date with `work`. Called before the point is judged or returned; methods whose
     /// iterate lives in the workspace (velocities, a reduced problem) write it out here.
     fn publish(&self, _problem: &P, _point: &mut P::Point, _work: &mut Self::Work) {}
+
+    /// What the last solve did, in a few sentences for its user; nothing where there is nothing to tell.
+    fn account(&self, _work: &Self::Work) -> Vec<String> {
+        vec![]
+    }
 
     /// The number of steps between two visits of the judge, unless the estimate calls it earlier.
     /// A judgement costs about one product with W.

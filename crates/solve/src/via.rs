@@ -47,6 +47,10 @@ where
         self.solver.refill(&work.reduced, &mut work.work)
     }
 
+    fn aim(&self, tolerance: f64, work: &mut Self::Work) {
+        self.solver.aim(tolerance, &mut work.work);
+    }
+
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
         self.reformulation.lower(problem, point, &mut work.point);
         self.solver.start(&work.reduced, &mut work.point, &mut work.work);
@@ -62,6 +66,10 @@ where
     fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
         self.solver.publish(&work.reduced, &mut work.point, &mut work.work);
         self.reformulation.lift(problem, &work.point, &mut work.memo, point);
+    }
+
+    fn account(&self, work: &Self::Work) -> Vec<String> {
+        self.solver.account(&work.work)
     }
 
     fn check_every(&self) -> usize {

@@ -36,7 +36,7 @@ pub(super) fn modified_velocity<const D: usize>(u: &[f64; D], mu: f64) -> [f64; 
 /// x itself inside, else its projection on the ray `(cos φ, sin φ)`, `tan φ = mu`, or the apex.
 pub(super) fn nearest_in_cone<const D: usize>(x: &[f64; D], mu: f64) -> [f64; D] {
     let t = tangential_norm(x);
-    // x_N ≥ 0 follows from the other except for mu = 0, where K is a half line.
+    // Without friction K is a half line: t = 0 alone does not put x on it.
     if t <= mu * x[0] && x[0] >= 0.0 {
         return *x;
     }
@@ -149,12 +149,19 @@ mod tests {
     }
 
     #[test]
-    fn a_frictionless_contact_cannot_pull() {
-        // No tangential part at all: K is a half line, and −2 is not on it.
-        let pull = [-2.0, 0.0, 0.0];
-        assert_eq!(distance_to_cone(&pull, 0.0), 2.0);
-        assert_eq!(natural_map(&pull, &[0.0; 3], 0.0), pull);
-        assert_eq!(distance_to_dual(&[-1.0, 0.0, 0.0], 0.0), 1.0);
+    fn without_friction_and_tangential_parts_the_normal_part_decides() {
+        // A pulling impulse is no solution, an open contact is one.
+        for (x, modified, residual) in [
+            ([-5.0, 0.0], [0.0, 0.0], 5.0),
+            ([0.0, 0.0], [1.0, 0.0], 0.0),
+            ([5.0, 0.0], [0.0, 0.0], 0.0),
+        ] {
+            let phi = natural_map(&x, &modified, 0.0);
+            assert_eq!((phi[0].abs(), phi[1]), (residual, 0.0), "{x:?} {modified:?}");
+        }
+        assert_eq!(distance_to_cone(&[-5.0, 0.0, 0.0], 0.0), 5.0);
+        assert_eq!(distance_to_dual(&[5.0, 0.0, 0.0], 0.0), 0.0);
+        assert_eq!(distance_to_dual(&[-5.0, 0.0, 0.0], 0.0), 5.0);
     }
 
     #[test]

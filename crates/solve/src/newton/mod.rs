@@ -40,7 +40,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::cfun::{ContactFunction, Law, Linearisation};
-use crate::form::{Access, Blockwise, Linearised};
+use crate::form::{Access, Linearised};
 use crate::parts::{LineSearch, Search, Sweep};
 use crate::settings::Settings;
 use crate::{SolveError, Solver, Step};
@@ -204,7 +204,7 @@ impl Phase {
 
 impl<P, F, const D: usize> Solver<P> for Semismooth<F, D>
 where
-    P: Linearised<D> + Blockwise<D>,
+    P: Linearised<D>,
     F: ContactFunction<D>,
 {
     type Work = Work<P, D>;
@@ -351,7 +351,7 @@ impl<F, const D: usize> Semismooth<F, D> {
         count: usize,
     ) -> Step
     where
-        P: Linearised<D> + Blockwise<D>,
+        P: Linearised<D>,
     {
         problem.enter(&mut work.state, point);
         let r = P::impulses(point);
@@ -372,7 +372,7 @@ impl<F, const D: usize> Semismooth<F, D> {
         why: &'static str,
     ) -> Step
     where
-        P: Linearised<D> + Blockwise<D>,
+        P: Linearised<D>,
     {
         if self.settings.rescue == 0 || work.phase.rescues >= RESCUES {
             return Step::Stuck(Cow::Owned(format!("Newton's method is stuck: {why}")));
