@@ -27,6 +27,7 @@ mod error;
 pub mod existence;
 pub mod form;
 pub mod local;
+pub mod newton;
 pub mod optimisation;
 pub mod parts;
 pub mod projection;

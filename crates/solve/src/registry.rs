@@ -9,7 +9,12 @@ use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use serde::Serialize;
 
 use crate::auto::{Auto, Hybrid};
+use crate::cfun::ContactFunction;
 use crate::form::{Explicit, Linear, Linearised};
+use crate::newton::{
+    Method as NewtonMethod, NewtonAc, NewtonCm, NewtonFb, NewtonFbSmooth, NewtonHsw, NewtonJm,
+    NewtonNm, NewtonPk, NewtonXsw, Semismooth,
+};
 use crate::optimisation::{Alternation, Cadoux, CadouxSteps, Panagiotopoulos, Tresca, TrescaSteps};
 use crate::projection::{DeSaxce, Extragradient, FixedPoint, Method, Projected};
 use crate::reform::Condense;
@@ -219,6 +224,113 @@ pub const CADOUX: About = About {
     settings: described::<Cadoux>,
 };
 
+/// Newton on the Alart–Curnier function.
+pub const NEWTON_AC: About = About {
+    name: "newton_ac",
+    family: "newton",
+    summary: "semismooth Newton on the Alart-Curnier function",
+    needs: &[],
+    cites: &["AlartCurnier1991", "Acary2018", "GoldsteinPrice1967", "GrippoLamparielloLucidi1986"],
+    variants: &[
+        "line_search=none",
+        "line_search=goldstein_price",
+        "line_search=nonmonotone",
+        "rho_rule=fixed",
+        "rho_rule=norm",
+        "rho_rule=adaptive",
+        "warm_up=0",
+    ],
+    settings: described::<NewtonAc>,
+};
+
+/// Newton on the Jean–Moreau function.
+pub const NEWTON_JM: About = About {
+    name: "newton_jm",
+    family: "newton",
+    summary: "semismooth Newton on the Jean-Moreau function",
+    needs: &[],
+    cites: &["AlartCurnier1991", "Jean1999", "Acary2018"],
+    variants: &[],
+    settings: described::<NewtonJm>,
+};
+
+/// Newton on the natural map.
+pub const NEWTON_NM: About = About {
+    name: "newton_nm",
+    family: "newton",
+    summary: "semismooth Newton on the natural map of the cone",
+    needs: &[],
+    cites: &["AcaryBremondHuber2018", "Acary2018"],
+    variants: &[],
+    settings: described::<NewtonNm>,
+};
+
+/// Newton on the Fischer–Burmeister function.
+pub const NEWTON_FB: About = About {
+    name: "newton_fb",
+    family: "newton",
+    summary: "semismooth Newton on the Fischer-Burmeister function over the second-order cone",
+    needs: &[],
+    cites: &["FukushimaLuoTseng2001", "Acary2018"],
+    variants: &[],
+    settings: described::<NewtonFb>,
+};
+
+/// Newton on the smoothed Fischer–Burmeister function.
+pub const NEWTON_FB_SMOOTH: About = About {
+    name: "newton_fb_smooth",
+    family: "newton",
+    summary: "smoothing Newton on the Fischer-Burmeister function over the second-order cone",
+    needs: &[],
+    cites: &["FukushimaLuoTseng2001", "Acary2018"],
+    variants: &[],
+    settings: described::<NewtonFbSmooth>,
+};
+
+/// Newton on Chen–Mangasarian smoothings.
+pub const NEWTON_CM: About = About {
+    name: "newton_cm",
+    family: "newton",
+    summary: "smoothing Newton on the Chen-Mangasarian class over the second-order cone",
+    needs: &[],
+    cites: &["ChenMangasarian1996", "FukushimaLuoTseng2001"],
+    variants: &["kernel=neural_network"],
+    settings: described::<NewtonCm>,
+};
+
+/// Newton on the equations of Xuewen, Soh and Wanji.
+pub const NEWTON_XSW: About = About {
+    name: "newton_xsw",
+    family: "newton",
+    summary: "semismooth Newton on the direct equations of Xuewen, Soh and Wanji",
+    needs: &[],
+    cites: &["Acary2018"],
+    variants: &[],
+    settings: described::<NewtonXsw>,
+};
+
+/// Newton on the equations of Park and Kwak.
+pub const NEWTON_PK: About = About {
+    name: "newton_pk",
+    family: "newton",
+    summary: "semismooth Newton on the equations of Park and Kwak, with the sliding angle in space",
+    needs: &[],
+    cites: &["ParkKwak1994", "LeungChenChen1998", "Acary2018"],
+    variants: &[],
+    settings: described::<NewtonPk>,
+};
+
+/// Newton on the function of Hüeber, Stadler and Wohlmuth.
+pub const NEWTON_HSW: About = About {
+    name: "newton_hsw",
+    family: "newton",
+    summary: "semismooth Newton on the function of Hueber, Stadler and Wohlmuth",
+    needs: &[],
+    cites: &["HueberStadlerWohlmuth2008"],
+    variants: &["slip=exact"],
+    settings: described::<NewtonHsw>,
+};
+
 /// The automatic method.
 pub const AUTO: About = About {
     name: "auto",
@@ -247,6 +359,15 @@ where
     {
         Ok(visitor.visit(Projected::<M, D>(parse(settings)?)))
     }
+    fn newton<const D: usize, V, M>(settings: &SettingsMap, visitor: V) -> Result<V::Output, String>
+    where
+        V: Visitor,
+        V::Problem: Linearised<D>,
+        M: NewtonMethod + Settings,
+        M::Function: ContactFunction<D> + 'static,
+    {
+        Ok(visitor.visit(Semismooth::<M::Function, D>::new(&parse::<M>(settings)?)))
+    }
     vec![
         Entry { about: &NSGS, build: |s, v| Ok(parse::<Nsgs>(s)?.visit::<D, V>(v)) },
         Entry { about: &AUTO, build: |s, v| Ok(v.visit(Hybrid::<D>(parse(s)?))) },
@@ -256,6 +377,15 @@ where
         Entry { about: &TRESCA, build: |s, v| Ok(v.visit(TrescaSteps::<D>(parse(s)?))) },
         Entry { about: &PANAGIOTOPOULOS, build: |s, v| Ok(v.visit(Alternation::<D>(parse(s)?))) },
         Entry { about: &CADOUX, build: |s, v| Ok(v.visit(CadouxSteps::<D>(parse(s)?))) },
+        Entry { about: &NEWTON_AC, build: newton::<D, V, NewtonAc> },
+        Entry { about: &NEWTON_JM, build: newton::<D, V, NewtonJm> },
+        Entry { about: &NEWTON_NM, build: newton::<D, V, NewtonNm> },
+        Entry { about: &NEWTON_FB, build: newton::<D, V, NewtonFb> },
+        Entry { about: &NEWTON_FB_SMOOTH, build: newton::<D, V, NewtonFbSmooth> },
+        Entry { about: &NEWTON_CM, build: newton::<D, V, NewtonCm> },
+        Entry { about: &NEWTON_XSW, build: newton::<D, V, NewtonXsw> },
+        Entry { about: &NEWTON_PK, build: newton::<D, V, NewtonPk> },
+        Entry { about: &NEWTON_HSW, build: newton::<D, V, NewtonHsw> },
     ]
 }
 

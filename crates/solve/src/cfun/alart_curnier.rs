@@ -9,7 +9,9 @@
 //! ```
 //!
 //! Vanishes exactly at the solutions of `K* ∋ u + mu‖u_T‖e_N ⟂ r ∈ K`, for any ρ > 0.
-//! Source: AlartCurnier1991; Acary, lecture (88)–(94) with the Jacobian as corrected in docs/notation.md.
+//! Source: AlartCurnier1991; Jean1999; Acary, lecture (88)–(94) with the Jacobian as corrected in docs/notation.md.
+
+use super::{ContactFunction, Law, Linearisation, Radii};
 
 /// Which radius the friction disk has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,24 +22,24 @@ pub enum Disk {
     JeanMoreau,
 }
 
-/// The scaling parameters ρ_N, ρ_T > 0, in units of 1/W.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Radii {
-    /// ρ_N.
-    pub normal: f64,
-    /// ρ_T.
-    pub tangential: f64,
+/// The Alart–Curnier function.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct AlartCurnier;
+
+/// The Jean–Moreau variant.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct JeanMoreau;
+
+impl<const D: usize> ContactFunction<D> for AlartCurnier {
+    fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
+        alart_curnier(Disk::AlartCurnier, u, r, law.mu, law.rho)
+    }
 }
 
-/// Φ and its derivatives `A = ∂Φ/∂u`, `B = ∂Φ/∂r` at `(u, r)`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Linearised<const D: usize> {
-    /// Φ.
-    pub phi: [f64; D],
-    /// ∂Φ/∂u.
-    pub a: [[f64; D]; D],
-    /// ∂Φ/∂r.
-    pub b: [[f64; D]; D],
+impl<const D: usize> ContactFunction<D> for JeanMoreau {
+    fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
+        alart_curnier(Disk::JeanMoreau, u, r, law.mu, law.rho)
+    }
 }
 
 /// The piece of the friction law on which the tangential part is smooth.
@@ -58,8 +60,8 @@ pub fn alart_curnier<const D: usize>(
     r: &[f64; D],
     mu: f64,
     rho: Radii,
-) -> Linearised<D> {
-    let mut out = Linearised { phi: [0.0; D], a: [[0.0; D]; D], b: [[0.0; D]; D] };
+) -> Linearisation<D> {
+    let mut out = Linearisation::zero();
     let x_n = r[0] - rho.normal * u[0];
     if x_n > 0.0 {
         out.phi[0] = rho.normal * u[0];
@@ -171,7 +173,7 @@ mod tests {
                 let near = [2.0, 0.6 * s, 0.8 * s];
                 alart_curnier(disk, &u, &near, mu, rho)
             });
-            let distance = |n: &Linearised<3>| {
+            let distance = |n: &Linearisation<3>| {
                 let pairs = (kink.a.iter().flatten().zip(n.a.iter().flatten()))
                     .chain(kink.b.iter().flatten().zip(n.b.iter().flatten()));
                 pairs.map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)

@@ -149,6 +149,5 @@ mod tests {
         assert_eq!(project(&[-2.0, 0.0, 0.0], 0.0), [0.0; 3]);
         assert_eq!(project(&[2.0, 0.0], 0.0), [2.0, 0.0]);
         assert_eq!(project(&[0.0; 3], 0.0), [0.0; 3]);
-        assert_eq!(project(&[-2.0, 0.0, 0.0], 0.0), [0.0; 3]);
     }
 }

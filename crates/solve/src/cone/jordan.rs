@@ -83,16 +83,19 @@ impl<const D: usize> Spectral<D> {
         out
     }
 
-    /// `L(x)⁻¹ b` for x with these values, λ₁ > 0: in the eigenvectors `(1, ∓t)` and those across t.
+    /// `L(x)⁻¹ b` for x with these values, λ₁ ≥ 0: in the eigenvectors `(1, ∓t)` and those across t. An eigenvalue of zero
+    /// counts as infinite (a pseudo-inverse).
     #[inline(always)]
     pub fn divide(&self, b: &[f64; D]) -> [f64; D] {
         let [low, high] = self.values;
+        let over = |x: f64, eigenvalue: f64| if eigenvalue > 0.0 { x / eigenvalue } else { 0.0 };
         let along: f64 = (1..D).map(|k| self.axis[k] * b[k]).sum();
-        let (minus, plus) = ((b[0] - along) / low, (b[0] + along) / high);
+        let (minus, plus) = (over(b[0] - along, low), over(b[0] + along, high));
         let middle = 0.5 * (low + high);
         let mut x = [0.5 * (plus + minus); D];
         for k in 1..D {
-            x[k] = 0.5 * (plus - minus) * self.axis[k] + (b[k] - along * self.axis[k]) / middle;
+            let across = over(b[k] - along * self.axis[k], middle);
+            x[k] = 0.5 * (plus - minus) * self.axis[k] + across;
         }
         x
     }

@@ -1,0 +1,40 @@
+//! **Newton's method on the smoothed Fischer–Burmeister function.**
+//!
+//! Problem: `x + y = (x² + y² + 2ε²e)^½` with ε → 0, `x = (mu r_N, r_T)`, `y = ρ(ũ_N/mu, ũ_T)`, `u = W r + q`. ε is a fraction of the
+//! residual, and of its square near the solution, so that convergence stays fast.
+//!
+//! Method: the skeleton of this family ([`Semismooth`](super::Semismooth)) with [`SmoothedFischerBurmeister`](crate::cfun::SmoothedFischerBurmeister).
+//!
+//! References: FukushimaLuoTseng2001; Acary, lecture (117).
+//! Cost and storage of a step: the skeleton's.
+//! Fails: as `newton_fb`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Method, Newton};
+use crate::cfun::SmoothedFischerBurmeister;
+use crate::settings::Settings;
+
+/// The hyperparameters: those of the skeleton.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct NewtonFbSmooth(pub Newton);
+
+impl Settings for NewtonFbSmooth {
+    fn validate(&self) -> Result<(), String> {
+        self.0.validate()
+    }
+}
+
+impl Method for NewtonFbSmooth {
+    type Function = SmoothedFischerBurmeister;
+
+    fn newton(&self) -> Newton {
+        self.0
+    }
+
+    fn function(&self) -> SmoothedFischerBurmeister {
+        SmoothedFischerBurmeister
+    }
+}
