@@ -23,6 +23,7 @@ pub mod cone;
 mod drive;
 mod error;
 pub mod form;
+pub mod interior;
 pub mod local;
 pub mod parts;
 pub mod projection;

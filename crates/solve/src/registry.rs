@@ -8,6 +8,7 @@ use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use serde::Serialize;
 
 use crate::form::{Blockwise, Linear, Linearised};
+use crate::interior::{ConvexRelaxation, Interior, Pursued, Relaxed};
 use crate::projection::{DeSaxce, Extragradient, FixedPoint, Method, Projected};
 use crate::reform::Condense;
 use crate::settings::{Setting, Settings, SettingsMap, described, parse};
@@ -177,6 +178,28 @@ pub const EXTRAGRADIENT: About = About {
     settings: described::<Extragradient>,
 };
 
+/// The convex relaxation.
+pub const CONVEX_RELAXATION: About = About {
+    name: "convex_relaxation",
+    family: "interior",
+    summary: "interior point on the convex relaxation (s = 0), which is Coulomb's law only where nothing slides",
+    needs: &[],
+    cites: &["NesterovTodd1998", "Mehrotra1992", "Acary2018"],
+    variants: &[],
+    settings: described::<ConvexRelaxation>,
+};
+
+/// The nonsmooth interior-point method.
+pub const IP: About = About {
+    name: "ip",
+    family: "interior",
+    summary: "nonsmooth interior point: Mehrotra's predictor-corrector with Nesterov-Todd scaling on Coulomb's law itself",
+    needs: &[],
+    cites: &["NesterovTodd1998", "Mehrotra1992", "TutuncuTohTodd2003"],
+    variants: &["smoothing=0.1", "warm_margin=0.1"],
+    settings: described::<Interior>,
+};
+
 /// The solvers of frictional contact, for any problem that can be seen by its contacts.
 fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
 where
@@ -199,6 +222,11 @@ where
         Entry { about: &DE_SAXCE, build: projected::<D, V, DeSaxce> },
         Entry { about: &FIXED_POINT, build: projected::<D, V, FixedPoint> },
         Entry { about: &EXTRAGRADIENT, build: projected::<D, V, Extragradient> },
+        Entry {
+            about: &CONVEX_RELAXATION,
+            build: |s, v| Ok(v.visit(Relaxed::<D>(parse::<ConvexRelaxation>(s)?))),
+        },
+        Entry { about: &IP, build: |s, v| Ok(v.visit(Pursued::<D>(parse::<Interior>(s)?))) },
     ]
 }
 

@@ -25,7 +25,7 @@
 //!
 //! A contact with mu = 0 has the half line in its normal component and `r_T = 0`.
 //!
-//! References: NesterovTodd1998; Mehrotra1992; Tutuncu2003 (formulas for the second-order cone). G and the exact law: the
+//! References: NesterovTodd1998; Mehrotra1992; TutuncuTohTodd2003 (formulas for the second-order cone). G and the exact law: the
 //! derivation above.
 //! Cost of an iteration: one factorisation, two solves, one product. Storage: 20 vectors and five D×D blocks a contact.
 //! Fails: the exact law is not monotone; its central path can turn back, and then the steps shrink. With a given s the
@@ -74,13 +74,13 @@ pub struct Central<const D: usize> {
     mu: Vec<f64>,
     inverse_speed: f64,
     s: Vec<f64>,
-    pairs: Vec<Pair<D>>,
-    scalings: Vec<Scaling<D>>,
-    rho: Vec<[f64; D]>,
+    pub(super) pairs: Vec<Pair<D>>,
+    pub(super) scalings: Vec<Scaling<D>>,
+    pub(super) rho: Vec<[f64; D]>,
     /// d of the Newton step.
-    d: Vec<[f64; D]>,
-    dx: Vec<[f64; D]>,
-    dz: Vec<[f64; D]>,
+    pub(super) d: Vec<[f64; D]>,
+    pub(super) dx: Vec<[f64; D]>,
+    pub(super) dz: Vec<[f64; D]>,
     p: Vec<Block<D>>,
     q: Vec<Block<D>>,
     b: Vec<f64>,
@@ -261,7 +261,7 @@ impl<const D: usize> Central<D> {
     }
 
     /// Factorises the matrix of the Newton step at the present iterate.
-    fn factorise<P: Linearised<D>>(
+    pub(super) fn factorise<P: Linearised<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -291,7 +291,12 @@ impl<const D: usize> Central<D> {
     }
 
     /// `dx` and `dz` for the present d, with ρ weighted.
-    fn newton<P: Linearised<D>>(&mut self, problem: &P, state: &mut P::State, weight: f64) {
+    pub(super) fn newton<P: Linearised<D>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        weight: f64,
+    ) {
         for c in 0..self.pairs.len() {
             let scaling = &self.scalings[c];
             let n = self.slide_direction(c);
@@ -339,7 +344,7 @@ impl<const D: usize> Central<D> {
         (x, z)
     }
 
-    fn reach(&self) -> f64 {
+    pub(super) fn reach(&self) -> f64 {
         let steps = self.dx.iter().zip(&self.dz);
         let reaches = self.pairs.iter().zip(steps).map(|(pair, (dx, dz))| pair.reach(dx, dz));
         reaches.fold(f64::INFINITY, f64::min)
@@ -351,14 +356,19 @@ impl<const D: usize> Central<D> {
         dots.sum::<f64>() / self.pairs.len() as f64
     }
 
-    fn advance(&mut self, alpha: f64) {
+    pub(super) fn advance(&mut self, alpha: f64) {
         for ((pair, dx), dz) in self.pairs.iter_mut().zip(&self.dx).zip(&self.dz) {
             pair.advance(dx, dz, alpha);
         }
     }
 
     /// Everything that follows from x and z.
-    fn look<P: Linearised<D>>(&mut self, problem: &P, state: &mut P::State, alpha: f64) -> Iterate {
+    pub(super) fn look<P: Linearised<D>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        alpha: f64,
+    ) -> Iterate {
         let n = self.pairs.len();
         for c in 0..n {
             let (x, scale) = (self.pairs[c].x.vector(), self.impulse_scale(c));

@@ -4,9 +4,11 @@ mod central;
 mod conic;
 pub mod nt;
 mod ordering;
+mod pursuit;
 mod sweep;
 
 pub use central::{Central, Iterate};
 pub use conic::{ConvexEnd, ConvexIp};
 pub use ordering::{Order, Ordering};
+pub use pursuit::Pursuit;
 pub use sweep::Sweep;
