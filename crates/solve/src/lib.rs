@@ -18,6 +18,7 @@
 //! # Ok::<(), nonsmooth_solve::SolveError>(())
 //! ```
 
+pub mod auto;
 pub mod cfun;
 pub mod cone;
 mod drive;

@@ -7,7 +7,8 @@ use std::marker::PhantomData;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use serde::Serialize;
 
-use crate::form::{Blockwise, Linear, Linearised};
+use crate::auto::{Auto, Hybrid};
+use crate::form::{Linear, Linearised};
 use crate::interior::{ConvexRelaxation, Interior, Pursued, Relaxed};
 use crate::projection::{DeSaxce, Extragradient, FixedPoint, Method, Projected};
 use crate::reform::Condense;
@@ -72,6 +73,26 @@ pub struct About {
     /// The documented settings.
     #[serde(serialize_with = "settings_now")]
     pub settings: fn() -> Vec<Setting>,
+}
+
+/// What a solver's answers are solutions of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Solves {
+    /// The problem that it is given, in this case Coulomb's law.
+    Law,
+    /// A relaxation, whose answers obey the law in special cases only: the judge, who knows the law alone, says in which.
+    Relaxation,
+}
+
+/// The solvers of relaxations.
+const RELAXATIONS: &[&str] = &["convex_relaxation"];
+
+impl About {
+    /// What the solver's answers are solutions of.
+    pub fn solves(&self) -> Solves {
+        if RELAXATIONS.contains(&self.name) { Solves::Relaxation } else { Solves::Law }
+    }
 }
 
 fn settings_now<S: serde::Serializer>(
@@ -195,16 +216,27 @@ pub const IP: About = About {
     family: "interior",
     summary: "nonsmooth interior point: Mehrotra's predictor-corrector with Nesterov-Todd scaling on Coulomb's law itself",
     needs: &[],
-    cites: &["NesterovTodd1998", "Mehrotra1992", "TutuncuTohTodd2003"],
-    variants: &["smoothing=0.1", "warm_margin=0.1"],
+    cites: &["NesterovTodd1998", "Mehrotra1992", "TutuncuTohTodd2003", "Keller1977"],
+    variants: &["smoothing=0.1", "warm_margin=0.1", "path=continuation"],
     settings: described::<Interior>,
+};
+
+/// The automatic method.
+pub const AUTO: About = About {
+    name: "auto",
+    family: "auto",
+    summary: "hybrid",
+    needs: &[],
+    cites: &["Acary2018"],
+    variants: &[],
+    settings: described::<Auto>,
 };
 
 /// The solvers of frictional contact, for any problem that can be seen by its contacts.
 fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
 where
     V: Visitor,
-    V::Problem: Blockwise<D> + Linearised<D>,
+    V::Problem: Linearised<D>,
 {
     fn projected<const D: usize, V, M>(
         settings: &SettingsMap,
@@ -219,6 +251,7 @@ where
     }
     vec![
         Entry { about: &NSGS, build: |s, v| Ok(parse::<Nsgs>(s)?.visit::<D, V>(v)) },
+        Entry { about: &AUTO, build: |s, v| Ok(v.visit(Hybrid::<D>(parse(s)?))) },
         Entry { about: &DE_SAXCE, build: projected::<D, V, DeSaxce> },
         Entry { about: &FIXED_POINT, build: projected::<D, V, FixedPoint> },
         Entry { about: &EXTRAGRADIENT, build: projected::<D, V, Extragradient> },

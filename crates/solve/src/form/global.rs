@@ -9,8 +9,8 @@ use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Refine, Singular, small};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
-use super::linearised::{BodyForm, ContactForm, System};
-use super::{Access, Blockwise, Contacts, Linear, Linearised, velocity_scale};
+use super::linearised::{BodyForm, ContactForm, Form, System};
+use super::{Access, Blockwise, Contacts, Costs, Linear, Linearised, velocity_scale};
 use crate::SolveError;
 
 /// What the view keeps.
@@ -42,6 +42,19 @@ enum Operator<const D: usize> {
     /// W itself: for Newton methods where M is factorised sparsely (finite elements, mechanisms), so that Z would be dense
     /// and the graph of M far larger than that of W.
     Condensed(Bsr<D>),
+}
+
+impl<const D: usize> GlobalSystem<D> {
+    fn new(problem: &FrictionGlobal<D>, operator: &Operator<D>, dynamics: &Dynamics) -> Self {
+        let nc = problem.contacts();
+        match operator {
+            Operator::Condensed(w) => Self::Contacts(System::new(ContactForm::new(w), nc)),
+            _ => {
+                let form = BodyForm::new(dynamics.inverse.matrix(), &problem.H);
+                Self::Bodies(System::new(form, nc))
+            }
+        }
+    }
 }
 
 impl<const D: usize> Operator<D> {
@@ -176,18 +189,8 @@ impl<const D: usize> Linearised<D> for FrictionGlobal<D> {
         q: &[Block<D>],
     ) -> Result<(), Singular> {
         let GlobalState { operator, system, dynamics, .. } = state;
-        let operator = &*operator;
-        let unit = |c| small::mean_diagonal(&operator.diagonal_block(c));
-        let nc = self.contacts();
-        let system = system.get_or_insert_with(|| match operator {
-            Operator::Condensed(w) => GlobalSystem::Contacts(System::new(ContactForm::new(w), nc)),
-            _ => {
-                let form = BodyForm::new(dynamics.inverse.matrix(), &self.H);
-                GlobalSystem::Bodies(System::new(form, nc))
-            }
-        });
-        let unit = (0..nc).map(unit);
-        match system {
+        let unit = (0..self.contacts()).map(|c| small::mean_diagonal(&operator.diagonal_block(c)));
+        match system.get_or_insert_with(|| GlobalSystem::new(self, operator, dynamics)) {
             GlobalSystem::Bodies(system) => system.factorise(unit, p, q),
             GlobalSystem::Contacts(system) => system.factorise(unit, p, q),
         }
@@ -218,5 +221,20 @@ impl<const D: usize> Linearised<D> for FrictionGlobal<D> {
             Some(GlobalSystem::Contacts(system)) => system.solve(b, x, wx, apply),
             None => f64::NAN,
         }
+    }
+
+    fn costs(&self, state: &mut Self::State) -> Costs {
+        let GlobalState { operator, system, dynamics, .. } = state;
+        let contacts = self.contacts() as f64;
+        let visits = match &*operator {
+            Operator::Condensed(w) => 2.0 * w.nblocks() as f64,
+            _ => 1.5 * self.H.nnz() as f64,
+        };
+        let factorisation =
+            match system.get_or_insert_with(|| GlobalSystem::new(self, operator, dynamics)) {
+                GlobalSystem::Bodies(system) => system.form().cost(),
+                GlobalSystem::Contacts(system) => system.form().cost(),
+            };
+        Costs { sweep: 30.0 * contacts + visits, factorisation }
     }
 }

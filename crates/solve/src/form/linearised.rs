@@ -32,6 +32,8 @@ pub(super) trait Form<const D: usize> {
     fn factorise(&mut self, p: &[Block<D>], q: &[Block<D>]) -> Result<(), Singular>;
     /// `b ← (Q + P W)⁻¹ b`.
     fn solve(&mut self, p: &[Block<D>], b: &mut [f64]);
+    /// What `factorise` costs, in nanoseconds or so: assembly and elimination.
+    fn cost(&self) -> f64;
 }
 
 impl<F, const D: usize> System<F, D> {
@@ -186,6 +188,10 @@ impl<const D: usize> Form<D> for ContactForm<D> {
     fn solve(&mut self, _: &[Block<D>], b: &mut [f64]) {
         self.lu.solve(b);
     }
+
+    fn cost(&self) -> f64 {
+        self.lu.flops() / 3.0 + 20.0 * self.blocks.len() as f64
+    }
 }
 
 /// `M + H Q⁻¹P Hᵀ` over the bodies.
@@ -333,6 +339,10 @@ impl<const D: usize> Form<D> for BodyForm<D> {
             let x = small::mul(&q_inverse[c], &small::mul(&p[c], &u));
             (0..D).for_each(|k| b[D * c + k] -= x[k]); //                  Q⁻¹ (b − P Hᵀ y)
         }
+    }
+
+    fn cost(&self) -> f64 {
+        self.lu.flops() / 3.0 + 400.0 * self.contacts.len() as f64
     }
 }
 

@@ -7,8 +7,8 @@ use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Inverse, Refine, Singular, small};
 use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint, Problem};
 
-use super::linearised::{ContactForm, System};
-use super::{Access, Blockwise, Contacts, Linear, Linearised, velocity_scale};
+use super::linearised::{ContactForm, Form, System};
+use super::{Access, Blockwise, Contacts, Costs, Linear, Linearised, velocity_scale};
 use crate::SolveError;
 
 /// What the view keeps: the norm of q, the problem without its bilateral rows where it has any, and the linear system.
@@ -205,5 +205,15 @@ impl<const D: usize> Linearised<D> for FrictionLocal<D> {
             }
         };
         system.as_mut().map_or(f64::NAN, |system| system.solve(b, x, wx, apply))
+    }
+
+    fn costs(&self, state: &mut Self::State) -> Costs {
+        let LocalState { eliminated, system, .. } = state;
+        let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
+        let system = system.get_or_insert_with(|| System::new(ContactForm::new(w), w.nrows()));
+        Costs {
+            sweep: 30.0 * w.nrows() as f64 + 2.0 * w.nblocks() as f64,
+            factorisation: system.form().cost(),
+        }
     }
 }

@@ -78,11 +78,20 @@ pub trait Linear<const D: usize>: Contacts<D> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]);
 }
 
+/// What the means of a method cost, in units of about a nanosecond: to choose between them, the same on every machine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Costs {
+    /// One Gauss–Seidel sweep over all contacts.
+    pub sweep: f64,
+    /// One [`linearise`](Linearised::linearise) and one solve.
+    pub factorisation: f64,
+}
+
 /// Linear systems with a block-diagonal modification of W, as Newton, interior-point and proximal methods have them.
 ///
 /// The state must be made with [`Access::Newton`]. Cost of `linearise`: assembly and one sparse LU, whose symbolic analysis is
 /// done once per pattern; of `solve_linearised`: one to five solves and products with W.
-pub trait Linearised<const D: usize>: Linear<D> {
+pub trait Linearised<const D: usize>: Linear<D> + Blockwise<D> {
     /// Factorises `Q + P W`.
     ///
     /// The factor is that of `Q + δ w_c P + P W`, δ = 1e-10, so Q may be singular and W rank deficient.
@@ -104,6 +113,9 @@ pub trait Linearised<const D: usize>: Linear<D> {
         x: &mut [f64],
         wx: &mut [f64],
     ) -> f64;
+
+    /// What sweeps and factorisations cost on this problem. Makes the symbolic analysis.
+    fn costs(&self, state: &mut Self::State) -> Costs;
 }
 
 /// `‖q‖`, or 1 where q = 0.

@@ -7,7 +7,7 @@
 //! the path from the start, where both the equations' residual and complementarity shrink with one parameter, is
 //! followed by its arc length, so that it may turn back (`path=continuation`).
 //!
-//! References: NesterovTodd1998; Mehrotra1992; for the exact law AcaryArmandNguyen2024.
+//! References: NesterovTodd1998; Mehrotra1992; the exact law: the derivation in `parts::central`; the arc length: Keller1977.
 //! Cost of a step: one factorisation of `Q + P W`, two solves and two products; with continuation up to six of each.
 //! Storage: 20 vectors and five blocks a contact.
 //! Fails: the steps can shrink to nothing away from a solution, mostly near sticking contacts, where the kink of ‖u_T‖ lies on
@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::form::{Access, Linearised};
-use crate::parts::Central;
+use crate::parts::{Central, Iterate, Pursuit};
 use crate::settings::Settings;
 use crate::{SolveError, Solver, Step};
 
@@ -28,6 +28,8 @@ pub enum Path {
     /// Towards smaller complementarity only, by Mehrotra's predictor and corrector.
     #[default]
     Mehrotra,
+    /// By its arc length, so that it may turn back.
+    Continuation,
 }
 
 /// The hyperparameters.
@@ -77,6 +79,7 @@ pub struct Pursued<const D: usize>(pub Interior);
 pub struct PursuedWork<P: Linearised<D>, const D: usize> {
     state: P::State,
     core: Central<D>,
+    pursuit: Pursuit<D>,
     short: usize,
     since_best: usize,
 }
@@ -86,7 +89,8 @@ impl<P: Linearised<D>, const D: usize> Solver<P> for Pursued<D> {
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
         let state = problem.state(Access::Newton)?;
-        Ok(PursuedWork { state, core: Central::default(), short: 0, since_best: 0 })
+        let (core, pursuit) = (Central::default(), Pursuit::default());
+        Ok(PursuedWork { state, core, pursuit, short: 0, since_best: 0 })
     }
 
     fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
@@ -94,9 +98,13 @@ impl<P: Linearised<D>, const D: usize> Solver<P> for Pursued<D> {
     }
 
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        let Interior { path, smoothing, warm_margin, .. } = self.0;
         let r = &*P::impulses(point);
-        let warm = (self.0.warm_margin > 0.0).then_some((r, self.0.warm_margin));
-        work.core.begin(problem, &mut work.state, self.0.smoothing, warm);
+        let warm = (warm_margin > 0.0).then_some((r, warm_margin));
+        match path {
+            Path::Mehrotra => work.core.begin(problem, &mut work.state, smoothing, warm),
+            Path::Continuation => work.pursuit.begin(problem, &mut work.state, smoothing, warm),
+        };
         (work.short, work.since_best) = (0, 0);
     }
 
@@ -104,24 +112,33 @@ impl<P: Linearised<D>, const D: usize> Solver<P> for Pursued<D> {
         if let Some(ray) = problem.contradiction(&work.state) {
             return Step::NoSolution(ray.clone());
         }
-        let best = work.core.best().1;
-        let Ok(now) = work.core.iterate(problem, &mut work.state) else {
+        let PursuedWork { state, core, pursuit, .. } = work;
+        let (best, stepped) = match self.0.path {
+            Path::Mehrotra => (core.best().1, core.iterate(problem, state)),
+            Path::Continuation => (pursuit.core().best().1, pursuit.iterate(problem, state)),
+        };
+        let Ok(Iterate { error, alpha, .. }) = stepped else {
             return Step::Stuck("the matrix of the interior-point step is singular".into());
         };
-        if std::env::var("TRACE").is_ok() {
-            eprintln!("{now:?}");
-        }
-        P::impulses(point).copy_from_slice(work.core.r());
-        work.short = if now.alpha < SHORT { work.short + 1 } else { 0 };
-        work.since_best = if now.error < 0.9 * best { 0 } else { work.since_best + 1 };
-        if work.short >= MANY_SHORT {
+        let core = match self.0.path {
+            Path::Mehrotra => &work.core,
+            Path::Continuation => work.pursuit.core(),
+        };
+        P::impulses(point).copy_from_slice(core.r());
+        work.short = if alpha < SHORT { work.short + 1 } else { 0 };
+        work.since_best = if error < 0.9 * best { 0 } else { work.since_best + 1 };
+        let stuck = match self.0.path {
+            Path::Mehrotra => work.short >= MANY_SHORT,
+            Path::Continuation => work.pursuit.stuck(),
+        };
+        if stuck {
             return Step::Stuck("the step lengths went to zero".into());
         }
         if work.since_best >= self.0.patience {
             let steps = self.0.patience;
             return Step::Stuck(format!("the residual has not decreased for {steps} steps").into());
         }
-        Step::Continue { estimate: now.error }
+        Step::Continue { estimate: error }
     }
 
     fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {

@@ -232,16 +232,36 @@ impl<const D: usize> Central<D> {
         let tau = self.tau_after(affine);
         let ratio = (tau / before.tau).clamp(0.0, 1.0);
         let mut sigma = ratio * ratio * ratio;
-        // Complementarity must not run ahead of the equations.
+        // Complementarity must not run ahead of the equations, and a step that the boundary cut short is followed by
+        // one that leads away from it.
         let behind = before.residual > 10.0 * before.tau.max(0.1 * before.error);
-        if behind {
+        let cut = self.now.is_some() && before.alpha > 0.0 && before.alpha < CUT;
+        if behind || cut {
             sigma = sigma.max(BEHIND);
         }
-        for c in 0..n {
+        self.aim(sigma * before.tau, !(behind || cut));
+        self.newton(problem, state, 1.0);
+        let mut reach = self.reach();
+        if reach < CUT && !cut {
+            // The second-order term can point out of the cone: once more with the same factor, without it.
+            self.aim(sigma.max(BEHIND) * before.tau, false);
+            self.newton(problem, state, 1.0);
+            reach = self.reach();
+        }
+        // Nearer to the boundary as the path ends, so that the tail is fast.
+        let fraction = 1.0 - (0.1 * before.tau).clamp(1e-3, 1e-2);
+        let alpha = (fraction * reach).min(1.0);
+        self.advance(alpha);
+        Ok(self.look(problem, state, alpha))
+    }
+
+    /// d towards `x ∘ z = τ e`, with Mehrotra's term from the present dx and dz or without.
+    fn aim(&mut self, tau: f64, second_order: bool) {
+        for c in 0..self.pairs.len() {
             let scaling = &self.scalings[c];
             let mut g = [0.0; D];
-            g[0] = sigma * before.tau;
-            if !behind {
+            g[0] = tau;
+            if second_order {
                 let (dx, dz) = self.scaled_step(c);
                 let second = scaling.product(&dx, &dz);
                 (0..D).for_each(|k| g[k] -= second[k]);
@@ -251,13 +271,6 @@ impl<const D: usize> Central<D> {
                 self.d[c][k] = correction[k] - scaling.lambda[k];
             }
         }
-        self.newton(problem, state, 1.0);
-        let reach = self.reach();
-        // Nearer to the boundary as the path ends, so that the tail is fast.
-        let fraction = 1.0 - (0.1 * before.tau).clamp(1e-3, 1e-2);
-        let alpha = (fraction * reach).min(1.0);
-        self.advance(alpha);
-        Ok(self.look(problem, state, alpha))
     }
 
     /// Factorises the matrix of the Newton step at the present iterate.
@@ -467,8 +480,11 @@ impl<const D: usize> Central<D> {
     }
 }
 
-/// σ while the equations lag behind complementarity.
+/// σ while the equations lag behind complementarity, and where the boundary cuts steps short.
 const BEHIND: f64 = 0.9;
+
+/// Steps below this are cut short.
+const CUT: f64 = 0.1;
 
 /// The natural map `x − P_K(x − ũ)`, by its three regions so that a large x does not round ũ away.
 fn natural_map<const D: usize>(x: &[f64; D], modified: &[f64; D], mu: f64) -> [f64; D] {

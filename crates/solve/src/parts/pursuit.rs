@@ -12,7 +12,7 @@
 //! equations with the step orthogonal to the tangent. Each corrector needs two solutions with one factor, one for the equations'
 //! residual and one for their derivative by θ. h is doubled after easy steps and quartered after refused ones.
 //!
-//! References: Keller1977 (pseudo-arclength); the path and its tangent: derivation above.
+//! References: Keller1977 (pseudo-arclength).
 //! Cost of a step: at most `1 + CORRECTORS` factorisations. Storage: [`Central`]'s and eight vectors.
 //! Fails: the path may end on the boundary, or run away to infinity.
 
@@ -56,14 +56,15 @@ const NEAR: f64 = 0.3;
 const SHORTEST: f64 = 1e-12;
 
 impl<const D: usize> Pursuit<D> {
-    /// Begins at `x = z = e`, with `smoothing` κ ≥ 0 as in [`Central::begin`].
+    /// Begins at `x = z = e`, with `smoothing` κ ≥ 0 and `start` as in [`Central::begin`].
     pub fn begin<P: Linearised<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
         smoothing: f64,
+        start: Option<(&[f64], f64)>,
     ) -> Iterate {
-        let now = self.core.begin(problem, state, smoothing, None);
+        let now = self.core.begin(problem, state, smoothing, start);
         let n = self.core.pairs.len();
         for direction in [&mut self.tangent, &mut self.slope] {
             for list in [&mut direction.x, &mut direction.z] {
@@ -76,7 +77,9 @@ impl<const D: usize> Pursuit<D> {
         self.first.extend_from_slice(&self.core.rho);
         self.kept.clear();
         self.kept.extend_from_slice(&self.core.pairs);
-        (self.theta, self.length, self.refused, self.turns) = (1.0, f64::INFINITY, 0, 0);
+        (self.theta, self.length, self.refused, self.turns) = (now.tau, f64::INFINITY, 0, 0);
+        // ρ = θ ρ₀ at the start.
+        self.first.iter_mut().flatten().for_each(|rho| *rho /= now.tau);
         now
     }
 
@@ -102,7 +105,6 @@ impl<const D: usize> Pursuit<D> {
         problem: &P,
         state: &mut P::State,
     ) -> Result<Iterate, Singular> {
-        let n = self.core.pairs.len();
         if self.refused == 0 {
             self.core.factorise(problem, state)?;
             self.differentiate(problem, state);
@@ -150,10 +152,7 @@ impl<const D: usize> Pursuit<D> {
         }
         self.refused = 0;
         self.length = if corrections <= 2 { 2.0 * length } else { length };
-        debug_assert_eq!(n, self.first.len());
-        let mut now = *self.core.now().expect("just looked");
-        now.alpha = length;
-        Ok(now)
+        Ok(self.core.look(problem, state, length))
     }
 
     /// The path has come to an end: steps of no length.
