@@ -99,7 +99,7 @@ impl<P: Linearised<D>, const D: usize> Solver<P> for Relaxed<D> {
         work.error = work.error.min(now.error);
         if work.since_best >= self.0.patience {
             return Step::Stuck(
-                format!("the convex relaxation is not solved beyond {:.1e}", work.error).into(),
+                "the convex relaxation could not be solved to its tolerance".into(),
             );
         }
         Step::Continue { estimate: f64::NAN }

@@ -322,6 +322,13 @@ impl<const D: usize> Scaling<D> {
         self.back(&y)
     }
 
+    /// `S⁻¹ z`.
+    pub fn apply_inverse(&self, z: &[f64; D]) -> [f64; D] {
+        let mut y = self.coordinates(z);
+        (0..D).for_each(|k| y[k] /= self.values[k]);
+        self.back(&y)
+    }
+
     /// The d with `λ ∘ d = g`.
     #[inline(always)]
     pub fn divide(&self, g: &[f64; D]) -> [f64; D] {

@@ -10,7 +10,9 @@
 //! method that asks for a smaller θ stops. Here θ is an unknown like x and z. Predictor: along the unit tangent `(ẋ, ż, θ̇)`, by
 //! a length h that ends well inside the cones and at a positive θ. Corrector: Newton on the path's
 //! equations with the step orthogonal to the tangent. Each corrector needs two solutions with one factor, one for the equations'
-//! residual and one for their derivative by θ. h is doubled after easy steps and quartered after refused ones.
+//! residual and one for their derivative by θ. h is doubled after easy steps and quartered after refused ones. Lengths and
+//! angles are measured in the local metric `‖S dx‖² + ‖S⁻¹ dz‖²`, in which a step from θ to θ/2 is as long near the end as at the
+//! start. Near the end Mehrotra's steps take over, which are faster there.
 //!
 //! References: Keller1977 (pseudo-arclength).
 //! Cost of a step: at most `1 + CORRECTORS` factorisations. Storage: [`Central`]'s and eight vectors.
@@ -39,6 +41,18 @@ pub struct Pursuit<const D: usize> {
     /// Steps that were refused in a row.
     refused: usize,
     turns: usize,
+    end: End,
+}
+
+/// Mehrotra's steps at the end of the path.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+enum End {
+    #[default]
+    NotYet,
+    Now {
+        short: usize,
+    },
+    Failed,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -52,6 +66,14 @@ struct Direction<const D: usize> {
 const CORRECTORS: usize = 5;
 /// The largest relative distance from the path, after the correctors.
 const NEAR: f64 = 0.3;
+/// ρ cannot follow θ below this.
+const ROUNDING: f64 = 1e-11;
+/// Below this θ the path is left for Mehrotra's steps, which end superlinearly,
+const END: f64 = 1e-8;
+/// until this many of them in a row
+const MANY_SHORT: usize = 3;
+/// were shorter than this: then the path is taken up again where it was left.
+const SHORT: f64 = 1e-2;
 /// Steps shorter than this are no progress.
 const SHORTEST: f64 = 1e-12;
 
@@ -78,6 +100,7 @@ impl<const D: usize> Pursuit<D> {
         self.kept.clear();
         self.kept.extend_from_slice(&self.core.pairs);
         (self.theta, self.length, self.refused, self.turns) = (now.tau, f64::INFINITY, 0, 0);
+        self.end = End::NotYet;
         // ρ = θ ρ₀ at the start.
         self.first.iter_mut().flatten().for_each(|rho| *rho /= now.tau);
         now
@@ -105,6 +128,21 @@ impl<const D: usize> Pursuit<D> {
         problem: &P,
         state: &mut P::State,
     ) -> Result<Iterate, Singular> {
+        if self.end == End::NotYet && self.theta < END && self.refused == 0 {
+            self.kept.copy_from_slice(&self.core.pairs);
+            self.end = End::Now { short: 0 };
+        }
+        if let End::Now { short } = self.end {
+            let now = self.core.iterate(problem, state)?;
+            let short = if now.alpha < SHORT { short + 1 } else { 0 };
+            self.end = End::Now { short };
+            if short == MANY_SHORT {
+                self.end = End::Failed;
+                self.core.pairs.copy_from_slice(&self.kept);
+                return Ok(self.core.look(problem, state, 1.0));
+            }
+            return Ok(now);
+        }
         if self.refused == 0 {
             self.core.factorise(problem, state)?;
             self.differentiate(problem, state);
@@ -178,18 +216,18 @@ impl<const D: usize> Pursuit<D> {
 
     /// The unit tangent, on from the last one.
     fn turn(&mut self) {
-        let (slope, tangent) = (&self.slope, &mut self.tangent);
-        let size = (1.0 + product(&slope.x, &slope.x) + product(&slope.z, &slope.z)).sqrt();
-        let along = product(&slope.x, &tangent.x) + product(&slope.z, &tangent.z) - tangent.theta;
+        let Self { core, slope, tangent, theta, .. } = self;
+        let size = (core.product(slope, slope, *theta)).sqrt();
+        let along = core.product(slope, tangent, *theta);
         let sign = if along < 0.0 { -1.0 } else { 1.0 };
         for (to, from) in [(&mut tangent.x, &slope.x), (&mut tangent.z, &slope.z)] {
             to.iter_mut().zip(from).for_each(|(t, s)| *t = s.map(|v| sign * v / size));
         }
-        let theta = -sign / size;
-        if theta * tangent.theta < 0.0 {
+        let changed = -sign / size;
+        if changed * tangent.theta < 0.0 {
             self.turns += 1;
         }
-        tangent.theta = theta;
+        tangent.theta = changed;
     }
 
     /// The largest relative distance of the present point from the path.
@@ -209,7 +247,8 @@ impl<const D: usize> Pursuit<D> {
                 size += first[k] * first[k];
             }
         }
-        largest.max((off / size).sqrt() / self.theta)
+        // Below the rounding of the equations there is no path to be near to.
+        largest.max((off / size).sqrt() / self.theta.max(ROUNDING))
     }
 
     /// One Newton step on the path's equations, orthogonal to the tangent.
@@ -232,8 +271,8 @@ impl<const D: usize> Pursuit<D> {
             }
         }
         core.newton(problem, state, 1.0);
-        let missing = product(&tangent.x, &core.dx) + product(&tangent.z, &core.dz);
-        let across = product(&tangent.x, &slope.x) + product(&tangent.z, &slope.z) - tangent.theta;
+        let across = core.product(tangent, slope, *theta);
+        let missing = core.inner((&tangent.x, &tangent.z), (&core.dx, &core.dz)) / *theta;
         let change = missing / across;
         if !change.is_finite() {
             return Err(Singular);
@@ -255,6 +294,23 @@ impl<const D: usize> Pursuit<D> {
     }
 }
 
-fn product<const D: usize>(a: &[[f64; D]], b: &[[f64; D]]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (0..D).map(|k| a[k] * b[k]).sum::<f64>()).sum()
+impl<const D: usize> Central<D> {
+    /// The scalar product of two directions in the local metric, in which the path towards a small θ looks the same as
+    /// towards a large one: `(aₓᵀS²bₓ + a_zᵀS⁻²b_z)/θ + nc a_θ b_θ/θ²`.
+    fn product(&self, a: &Direction<D>, b: &Direction<D>, theta: f64) -> f64 {
+        let along = self.pairs.len() as f64 * (a.theta / theta) * (b.theta / theta);
+        self.inner((&a.x, &a.z), (&b.x, &b.z)) / theta + along
+    }
+
+    /// `aₓᵀS²bₓ + a_zᵀS⁻²b_z`.
+    fn inner(&self, a: (&[[f64; D]], &[[f64; D]]), b: (&[[f64; D]], &[[f64; D]])) -> f64 {
+        let dot = |a: [f64; D], b: [f64; D]| (0..D).map(|k| a[k] * b[k]).sum::<f64>();
+        let contact = |c: usize| {
+            let s = &self.scalings[c];
+            // Of a half line only the normal part counts, and the others are zero.
+            dot(s.apply(&a.0[c]), s.apply(&b.0[c]))
+                + dot(s.apply_inverse(&a.1[c]), s.apply_inverse(&b.1[c]))
+        };
+        (0..self.pairs.len()).map(contact).sum()
+    }
 }
