@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::form::{Access, Linearised};
-use crate::parts::{Central, Iterate, Pursuit};
+use crate::parts::{Central, CentralIterate, Pursuit};
 use crate::settings::Settings;
 use crate::{SolveError, Solver, Step};
 
@@ -117,7 +117,7 @@ impl<P: Linearised<D>, const D: usize> Solver<P> for Pursued<D> {
             Path::Mehrotra => (core.best().1, core.iterate(problem, state)),
             Path::Continuation => (pursuit.core().best().1, pursuit.iterate(problem, state)),
         };
-        let Ok(Iterate { error, alpha, .. }) = stepped else {
+        let Ok(CentralIterate { error, alpha, .. }) = stepped else {
             return Step::Stuck("the matrix of the interior-point step is singular".into());
         };
         let core = match self.0.path {

@@ -8,9 +8,9 @@ mod proximal_newton;
 mod pursuit;
 mod sweep;
 
-pub use central::{Central, Iterate};
+pub use central::{Central, Iterate as CentralIterate};
 pub use conic::{ConvexEnd, ConvexIp};
 pub use ordering::{Order, Ordering};
-pub use proximal_newton::{Iterate as Inner, ProximalNewton};
+pub use proximal_newton::{Inner, ProximalNewton};
 pub use pursuit::Pursuit;
 pub use sweep::Sweep;
