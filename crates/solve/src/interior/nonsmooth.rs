@@ -147,11 +147,10 @@ impl<P: Linearised<D>, const D: usize> Solver<P> for Pursued<D> {
 
 #[cfg(test)]
 mod tests {
+    use nonsmooth_problem::FrictionLocal;
     use nonsmooth_problem::linalg::{Bsr, Csc};
     use nonsmooth_problem::planted::{Planted, PlantedMix};
-    use nonsmooth_problem::{FrictionLocal, Problem};
 
-    use super::*;
     use crate::registry::{self, Registered};
     use crate::{Limits, Outcome};
 
