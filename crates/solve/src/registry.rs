@@ -11,6 +11,7 @@ use serde::Serialize;
 use crate::auto::{Auto, Hybrid};
 use crate::cfun::ContactFunction;
 use crate::form::{Explicit, Linear, Linearised};
+use crate::interior::{ConvexRelaxation, Interior, Pursued, Relaxed};
 use crate::newton::{
     Method as NewtonMethod, NewtonAc, NewtonCm, NewtonFb, NewtonFbSmooth, NewtonHsw, NewtonJm,
     NewtonNm, NewtonPk, NewtonXsw, Semismooth,
@@ -79,6 +80,26 @@ pub struct About {
     /// The documented settings.
     #[serde(serialize_with = "settings_now")]
     pub settings: fn() -> Vec<Setting>,
+}
+
+/// What a solver's answers are solutions of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Solves {
+    /// The problem that it is given, in this case Coulomb's law.
+    Law,
+    /// A relaxation, whose answers obey the law in special cases only: the judge, who knows the law alone, says in which.
+    Relaxation,
+}
+
+/// The solvers of relaxations.
+const RELAXATIONS: &[&str] = &["convex_relaxation"];
+
+impl About {
+    /// What the solver's answers are solutions of.
+    pub fn solves(&self) -> Solves {
+        if RELAXATIONS.contains(&self.name) { Solves::Relaxation } else { Solves::Law }
+    }
 }
 
 fn settings_now<S: serde::Serializer>(
@@ -331,6 +352,28 @@ pub const NEWTON_HSW: About = About {
     settings: described::<NewtonHsw>,
 };
 
+/// The convex relaxation.
+pub const CONVEX_RELAXATION: About = About {
+    name: "convex_relaxation",
+    family: "interior",
+    summary: "interior point on the convex relaxation (s = 0), which is Coulomb's law only where nothing slides",
+    needs: &[],
+    cites: &["NesterovTodd1998", "Mehrotra1992", "Acary2018"],
+    variants: &[],
+    settings: described::<ConvexRelaxation>,
+};
+
+/// The nonsmooth interior-point method.
+pub const IP: About = About {
+    name: "ip",
+    family: "interior",
+    summary: "nonsmooth interior point: Mehrotra's predictor-corrector with Nesterov-Todd scaling on Coulomb's law itself",
+    needs: &[],
+    cites: &["NesterovTodd1998", "Mehrotra1992", "TutuncuTohTodd2003", "Keller1977"],
+    variants: &["smoothing=0.1", "warm_margin=0.1", "path=continuation"],
+    settings: described::<Interior>,
+};
+
 /// The automatic method.
 pub const AUTO: About = About {
     name: "auto",
@@ -386,6 +429,11 @@ where
         Entry { about: &NEWTON_XSW, build: newton::<D, V, NewtonXsw> },
         Entry { about: &NEWTON_PK, build: newton::<D, V, NewtonPk> },
         Entry { about: &NEWTON_HSW, build: newton::<D, V, NewtonHsw> },
+        Entry {
+            about: &CONVEX_RELAXATION,
+            build: |s, v| Ok(v.visit(Relaxed::<D>(parse::<ConvexRelaxation>(s)?))),
+        },
+        Entry { about: &IP, build: |s, v| Ok(v.visit(Pursued::<D>(parse::<Interior>(s)?))) },
     ]
 }
 

@@ -25,7 +25,7 @@
 //!
 //! A contact with mu = 0 has the half line in its normal component and `r_T = 0`.
 //!
-//! References: NesterovTodd1998; Mehrotra1992; Tutuncu2003 (formulas for the second-order cone). G and the exact law: the
+//! References: NesterovTodd1998; Mehrotra1992; TutuncuTohTodd2003 (formulas for the second-order cone). G and the exact law: the
 //! derivation above.
 //! Cost of an iteration: one factorisation, two solves, one product. Storage: 20 vectors and five D×D blocks a contact.
 //! Fails: the exact law is not monotone; its central path can turn back, and then the steps shrink. With a given s the
@@ -74,13 +74,13 @@ pub struct Central<const D: usize> {
     mu: Vec<f64>,
     inverse_speed: f64,
     s: Vec<f64>,
-    pairs: Vec<Pair<D>>,
-    scalings: Vec<Scaling<D>>,
-    rho: Vec<[f64; D]>,
+    pub(super) pairs: Vec<Pair<D>>,
+    pub(super) scalings: Vec<Scaling<D>>,
+    pub(super) rho: Vec<[f64; D]>,
     /// d of the Newton step.
-    d: Vec<[f64; D]>,
-    dx: Vec<[f64; D]>,
-    dz: Vec<[f64; D]>,
+    pub(super) d: Vec<[f64; D]>,
+    pub(super) dx: Vec<[f64; D]>,
+    pub(super) dz: Vec<[f64; D]>,
     p: Vec<Block<D>>,
     q: Vec<Block<D>>,
     b: Vec<f64>,
@@ -232,16 +232,36 @@ impl<const D: usize> Central<D> {
         let tau = self.tau_after(affine);
         let ratio = (tau / before.tau).clamp(0.0, 1.0);
         let mut sigma = ratio * ratio * ratio;
-        // Complementarity must not run ahead of the equations.
+        // Complementarity must not run ahead of the equations, and a step that the boundary cut short is followed by
+        // one that leads away from it.
         let behind = before.residual > 10.0 * before.tau.max(0.1 * before.error);
-        if behind {
+        let cut = self.now.is_some() && before.alpha > 0.0 && before.alpha < CUT;
+        if behind || cut {
             sigma = sigma.max(BEHIND);
         }
-        for c in 0..n {
+        self.aim(sigma * before.tau, !(behind || cut));
+        self.newton(problem, state, 1.0);
+        let mut reach = self.reach();
+        if reach < CUT && !cut {
+            // The second-order term can point out of the cone: once more with the same factor, without it.
+            self.aim(sigma.max(BEHIND) * before.tau, false);
+            self.newton(problem, state, 1.0);
+            reach = self.reach();
+        }
+        // Nearer to the boundary as the path ends, so that the tail is fast.
+        let fraction = 1.0 - (0.1 * before.tau).clamp(1e-3, 1e-2);
+        let alpha = (fraction * reach).min(1.0);
+        self.advance(alpha);
+        Ok(self.look(problem, state, alpha))
+    }
+
+    /// d towards `x ∘ z = τ e`, with Mehrotra's term from the present dx and dz or without.
+    fn aim(&mut self, tau: f64, second_order: bool) {
+        for c in 0..self.pairs.len() {
             let scaling = &self.scalings[c];
             let mut g = [0.0; D];
-            g[0] = sigma * before.tau;
-            if !behind {
+            g[0] = tau;
+            if second_order {
                 let (dx, dz) = self.scaled_step(c);
                 let second = scaling.product(&dx, &dz);
                 (0..D).for_each(|k| g[k] -= second[k]);
@@ -251,17 +271,10 @@ impl<const D: usize> Central<D> {
                 self.d[c][k] = correction[k] - scaling.lambda[k];
             }
         }
-        self.newton(problem, state, 1.0);
-        let reach = self.reach();
-        // Nearer to the boundary as the path ends, so that the tail is fast.
-        let fraction = 1.0 - (0.1 * before.tau).clamp(1e-3, 1e-2);
-        let alpha = (fraction * reach).min(1.0);
-        self.advance(alpha);
-        Ok(self.look(problem, state, alpha))
     }
 
     /// Factorises the matrix of the Newton step at the present iterate.
-    fn factorise<P: Linearised<D>>(
+    pub(super) fn factorise<P: Linearised<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -291,7 +304,12 @@ impl<const D: usize> Central<D> {
     }
 
     /// `dx` and `dz` for the present d, with ρ weighted.
-    fn newton<P: Linearised<D>>(&mut self, problem: &P, state: &mut P::State, weight: f64) {
+    pub(super) fn newton<P: Linearised<D>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        weight: f64,
+    ) {
         for c in 0..self.pairs.len() {
             let scaling = &self.scalings[c];
             let n = self.slide_direction(c);
@@ -339,7 +357,7 @@ impl<const D: usize> Central<D> {
         (x, z)
     }
 
-    fn reach(&self) -> f64 {
+    pub(super) fn reach(&self) -> f64 {
         let steps = self.dx.iter().zip(&self.dz);
         let reaches = self.pairs.iter().zip(steps).map(|(pair, (dx, dz))| pair.reach(dx, dz));
         reaches.fold(f64::INFINITY, f64::min)
@@ -351,14 +369,19 @@ impl<const D: usize> Central<D> {
         dots.sum::<f64>() / self.pairs.len() as f64
     }
 
-    fn advance(&mut self, alpha: f64) {
+    pub(super) fn advance(&mut self, alpha: f64) {
         for ((pair, dx), dz) in self.pairs.iter_mut().zip(&self.dx).zip(&self.dz) {
             pair.advance(dx, dz, alpha);
         }
     }
 
     /// Everything that follows from x and z.
-    fn look<P: Linearised<D>>(&mut self, problem: &P, state: &mut P::State, alpha: f64) -> Iterate {
+    pub(super) fn look<P: Linearised<D>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        alpha: f64,
+    ) -> Iterate {
         let n = self.pairs.len();
         for c in 0..n {
             let (x, scale) = (self.pairs[c].x.vector(), self.impulse_scale(c));
@@ -457,8 +480,11 @@ impl<const D: usize> Central<D> {
     }
 }
 
-/// σ while the equations lag behind complementarity.
+/// σ while the equations lag behind complementarity, and where the boundary cuts steps short.
 const BEHIND: f64 = 0.9;
+
+/// Steps below this are cut short.
+const CUT: f64 = 0.1;
 
 /// The natural map `x − P_K(x − ũ)`, by its three regions so that a large x does not round ũ away.
 fn natural_map<const D: usize>(x: &[f64; D], modified: &[f64; D], mu: f64) -> [f64; D] {

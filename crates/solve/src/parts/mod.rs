@@ -8,6 +8,7 @@ mod line_search;
 pub mod nt;
 mod ordering;
 mod proximal_newton;
+mod pursuit;
 mod sweep;
 
 pub use anderson::{Accelerator, Anderson};
@@ -17,4 +18,5 @@ pub use conic::{ConvexEnd, ConvexIp};
 pub use line_search::{Found, LineSearch, Search};
 pub use ordering::{Order, Ordering};
 pub use proximal_newton::{Inner, ProximalNewton};
+pub use pursuit::Pursuit;
 pub use sweep::Sweep;

@@ -6,7 +6,7 @@
 //!
 //! The scaling of a pair (x, z) is the symmetric positive definite S with `S x = S⁻¹ z = λ` that maps L onto L:
 //! `S² = η (2 w wᵀ − J)`, `η = √(det z/det x)`, `w = (z̄ + J x̄)/(2γ)`, `γ² = (1 + x̄ᵀz̄)/2`, bars for unit determinants
-//! (NesterovTodd1998; the formulas for the second-order cone: Tutuncu2003). It is kept by its eigenvalues `√η ω`, `√η/ω`, `√η` with
+//! (NesterovTodd1998; the formulas for the second-order cone: TutuncuTohTodd2003). It is kept by its eigenvalues `√η ω`, `√η/ω`, `√η` with
 //! `ω = w_N + ‖w_T‖`, and its eigenvectors `(1, ±t)/√2` and `(0, t⊥)`.
 //!
 //! A half line (a contact without friction) is the case where only x_N exists; its eigenvectors are the unit vectors and S moves N alone.
@@ -319,6 +319,13 @@ impl<const D: usize> Scaling<D> {
     pub fn apply(&self, x: &[f64; D]) -> [f64; D] {
         let mut y = self.coordinates(x);
         (0..D).for_each(|k| y[k] *= self.values[k]);
+        self.back(&y)
+    }
+
+    /// `S⁻¹ z`.
+    pub fn apply_inverse(&self, z: &[f64; D]) -> [f64; D] {
+        let mut y = self.coordinates(z);
+        (0..D).for_each(|k| y[k] /= self.values[k]);
         self.back(&y)
     }
 

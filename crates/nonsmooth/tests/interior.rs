@@ -1,0 +1,38 @@
+//! The interior-point methods on real problems.
+
+mod common;
+
+use nonsmooth_io::fclib;
+use nonsmooth_problem::{Friction, Problem};
+use nonsmooth_solve::{Limits, registry};
+
+/// The names of the problems among Siconos' that `ip` solves to 1e-12, and how many there are.
+fn solved(setting: &str) -> (Vec<String>, usize) {
+    let (mut names, mut all) = (vec![], 0);
+    for path in common::corpus_files(&["siconos/fc3d"]) {
+        let Ok(file) = fclib::read(&path) else { continue };
+        let Friction::Local3(problem) = &file.problem else { continue };
+        all += 1;
+        let settings = nonsmooth_solve::settings::from_texts(&[setting, "patience=60"]).unwrap();
+        let mut session = registry::session("ip", &settings).unwrap();
+        let limits = Limits { tolerance: 1e-12, max_iterations: 300, ..Limits::default() };
+        let mut point = problem.origin();
+        let outcome = session.solve(problem, &mut point, &limits, &mut |_| {}).unwrap();
+        if outcome.measure.relative <= 1e-12 {
+            names.push(path.file_stem().unwrap().to_string_lossy().into_owned());
+        }
+    }
+    (names, all)
+}
+
+#[test]
+fn the_arc_length_solves_what_mehrotras_steps_do_not() {
+    let ((monotone, all), (pursued, _)) = (solved("path=mehrotra"), solved("path=continuation"));
+    if all == 0 {
+        return;
+    }
+    assert!(monotone.len() + 3 >= all, "{} of {all}: {monotone:?}", monotone.len());
+    assert!(pursued.len() + 2 >= all, "{} of {all}: {pursued:?}", pursued.len());
+    let rover = |names: &[String]| names.iter().any(|name| name == "Rover11035");
+    assert!(rover(&pursued) && !rover(&monotone));
+}

@@ -1,0 +1,8 @@
+//! Interior-point methods with Nesterov–Todd scaling: on the convex problem, and on Coulomb's law itself.
+//! The iteration is [`parts::Central`](crate::parts::Central).
+
+mod convex;
+mod nonsmooth;
+
+pub use convex::{ConvexRelaxation, Relaxed};
+pub use nonsmooth::{Interior, Path, Pursued};
