@@ -7,11 +7,11 @@ use std::marker::PhantomData;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use serde::Serialize;
 
-use crate::form::{Blockwise, Linear};
-use crate::projection::{DeSaxce, Extragradient, FixedPoint, Method, Projected};
+use crate::form::{Concurrent, Linear};
+use crate::projection::{DeSaxce, Extragradient, FixedPoint, Hyperplane, Method, Projected};
 use crate::reform::Condense;
 use crate::settings::{Setting, Settings, SettingsMap, described, parse};
-use crate::splitting::Nsgs;
+use crate::splitting::{Colored, Nsgs, Psor};
 use crate::{Driver, Reformulation, Session, SolveError, Solver, Via};
 
 /// One solver: what it is, and how it is made and handed to a visitor that knows the kind of problem.
@@ -129,7 +129,7 @@ pub const NSGS: About = About {
     family: "splitting",
     summary: "nonsmooth block Gauss-Seidel over contacts, with a choice of local solvers",
     needs: &[],
-    cites: &["JourdanAlartJean1998", "Jean1999", "AcaryBremondHuber2018", "DBB11"],
+    cites: &["JourdanAlartJean1998", "Jean1999", "AcaryBremondHuber2018", "DBB11", "WalkerNi2011"],
     variants: &[
         "local=quartic",
         "local=newton_ac",
@@ -140,6 +140,8 @@ pub const NSGS: About = About {
         "ordering=fully_shuffled",
         "omega=0.9",
         "freeze_after=5",
+        "local_tolerance=adaptive",
+        "anderson=5",
     ],
     settings: described::<Nsgs>,
 };
@@ -161,8 +163,8 @@ pub const FIXED_POINT: About = About {
     family: "projection",
     summary: "fixed-point projection with a self-adaptive step",
     needs: &[],
-    cites: &["Acary2018", "Khobotov1987", "HanLo2002"],
-    variants: &[],
+    cites: &["Acary2018", "Khobotov1987", "SolodovTseng1996", "HanLo2002"],
+    variants: &["rule=solodov_tseng"],
     settings: described::<FixedPoint>,
 };
 
@@ -172,16 +174,49 @@ pub const EXTRAGRADIENT: About = About {
     family: "projection",
     summary: "extragradient projection with a self-adaptive step",
     needs: &[],
-    cites: &["Korpelevich1976", "Khobotov1987", "Acary2018"],
-    variants: &[],
+    cites: &["Korpelevich1976", "Khobotov1987", "SolodovTseng1996", "Acary2018"],
+    variants: &["rule=solodov_tseng"],
     settings: described::<Extragradient>,
+};
+
+/// The hyperplane projection.
+pub const HYPERPLANE: About = About {
+    name: "hyperplane",
+    family: "projection",
+    summary: "hyperplane projection with a self-adaptive prediction",
+    needs: &[],
+    cites: &["SolodovTseng1996", "SolodovSvaiter1999", "AcaryBremondHuber2018"],
+    variants: &["rule=khobotov"],
+    settings: described::<Hyperplane>,
+};
+
+/// PSOR.
+pub const PSOR: About = About {
+    name: "psor",
+    family: "splitting",
+    summary: "projected successive over-relaxation: Gauss-Seidel sweeps with one projection a contact",
+    needs: &[],
+    cites: &["Cryer1971", "AcaryBremondHuber2018"],
+    variants: &["omega=1"],
+    settings: described::<Psor>,
+};
+
+/// Coloured NSGS.
+pub const NSGS_COLORED: About = About {
+    name: "nsgs_colored",
+    family: "splitting",
+    summary: "nonsmooth block Gauss-Seidel on several threads, contacts by colour; the same bits for any number of threads",
+    needs: &[],
+    cites: &["JourdanAlartJean1998", "JonesPlassmann1993"],
+    variants: &["threads=2", "serial_below=1", "local=newton_ac"],
+    settings: described::<Colored>,
 };
 
 /// The solvers of frictional contact, for any problem that can be seen by its contacts.
 fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
 where
     V: Visitor,
-    V::Problem: Blockwise<D> + Linear<D>,
+    V::Problem: Concurrent<D> + Linear<D>,
 {
     fn projected<const D: usize, V, M>(
         settings: &SettingsMap,
@@ -199,6 +234,9 @@ where
         Entry { about: &DE_SAXCE, build: projected::<D, V, DeSaxce> },
         Entry { about: &FIXED_POINT, build: projected::<D, V, FixedPoint> },
         Entry { about: &EXTRAGRADIENT, build: projected::<D, V, Extragradient> },
+        Entry { about: &HYPERPLANE, build: projected::<D, V, Hyperplane> },
+        Entry { about: &PSOR, build: |s, v| Ok(v.visit(parse::<Psor>(s)?.sweeps::<D>())) },
+        Entry { about: &NSGS_COLORED, build: |s, v| Ok(parse::<Colored>(s)?.visit::<D, V>(v)) },
     ]
 }
 
@@ -285,8 +323,8 @@ mod tests {
     fn mistakes_in_settings_name_key_expected_and_found() {
         assert_eq!(
             refusal(&["omga=1"]),
-            "solver `nsgs`: unknown key `omga`; there are: local, omega, omega_min, ordering, seed, \
-             freeze_after, freeze_for, check_every"
+            "solver `nsgs`: unknown key `omga`; there are: local, local_tolerance, omega, omega_min, \
+             ordering, seed, freeze_after, freeze_for, anderson, anderson_every, check_every"
         );
         assert_eq!(
             refusal(&["omega=2.5"]),

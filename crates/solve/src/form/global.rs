@@ -9,7 +9,7 @@ use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::{Block, Csc, Delassus, Refine, small};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
-use super::{Access, Blockwise, Contacts, Linear, velocity_scale};
+use super::{Access, Blockwise, Concurrent, Contacts, Linear, velocity_scale};
 use crate::SolveError;
 
 /// What the view keeps.
@@ -132,6 +132,22 @@ impl<const D: usize> Blockwise<D> for FrictionGlobal<D> {
     #[inline(always)]
     fn moved(&self, state: &mut Self::State, c: usize, dr: &[f64; D]) {
         state.operator.visits().apply_impulse(c, dr, &mut state.v);
+    }
+}
+
+impl<const D: usize> Concurrent<D> for FrictionGlobal<D> {
+    /// Places are the components of M (with bilateral constraints: of the bordered matrix): `M⁻¹ H_c` reaches all of a component.
+    fn places(&self, state: &Self::State, c: usize, reads: &mut Vec<u32>, writes: &mut Vec<u32>) {
+        let first = reads.len();
+        for k in D * c..D * c + D {
+            for &i in self.H.column(k).0 {
+                let component = state.dynamics.inverse.component_of(i) as u32;
+                if !reads[first..].contains(&component) {
+                    reads.push(component);
+                }
+            }
+        }
+        writes.extend_from_slice(&reads[first..]);
     }
 }
 

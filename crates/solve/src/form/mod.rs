@@ -4,6 +4,7 @@
 //! | --- | --- | --- |
 //! | [`Contacts`] | the law's data, the diagonal blocks of W, ‖q‖, the impulses of a point | local, global |
 //! | [`Blockwise`] | one contact's velocity, and to be told that one contact's impulse moved | local (rows of W), global (velocity space) |
+//! | [`Concurrent`] | in addition, which contacts do not feel each other, and visits from several threads | local, global |
 //! | [`Linear`] | `u = W r + q` for all contacts | local (W), global (product form) |
 
 mod global;
@@ -65,6 +66,13 @@ pub trait Blockwise<const D: usize>: Contacts<D> {
 
     /// The impulse of contact `c` moved by `dr` (and `r` holds it already).
     fn moved(&self, state: &mut Self::State, c: usize, dr: &[f64; D]);
+}
+
+/// Access contact by contact from several threads: velocities may be asked for at the same time.
+pub trait Concurrent<const D: usize>: Blockwise<D> + Contacts<D, State: Sync> + Sync {
+    /// Appends the places that the velocity of contact c depends on, and those that its impulse changes. Places are numbered as the
+    /// view likes; two contacts do not feel each other if neither changes what the other depends on.
+    fn places(&self, state: &Self::State, c: usize, reads: &mut Vec<u32>, writes: &mut Vec<u32>);
 }
 
 /// Products with the whole operator.
