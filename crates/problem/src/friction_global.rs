@@ -186,6 +186,20 @@ impl Dynamics {
         self.state.split_at(problem.dofs())
     }
 
+    /// The change of velocity `M⁻¹ H r` that the impulses alone bring about, the constraints kept.
+    pub fn respond<const D: usize>(
+        &mut self,
+        problem: &FrictionGlobal<D>,
+        r: &[f64],
+        refine: Refine,
+    ) -> &[f64] {
+        let n = problem.dofs();
+        self.state.fill(0.0);
+        problem.H.mul_add(1.0, r, &mut self.state[..n]);
+        self.inverse.solve_with(&mut self.state, &mut self.scratch, refine);
+        &self.state[..n]
+    }
+
     /// Completes `point` from its impulses.
     pub fn complete<const D: usize>(
         &mut self,

@@ -274,6 +274,7 @@ struct Run<'a, P: Problem, S: Solver<P>> {
 impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
     fn solve(&mut self, point: &mut P::Point, watch: &mut dyn FnMut(&Progress)) -> Outcome {
         let mut iterations = 0;
+        self.solver.aim(self.limits.tolerance, self.work);
         self.solver.start(self.problem, point, self.work);
         self.judge(point, 0);
         let mut estimate = f64::NAN;

@@ -18,6 +18,7 @@
 //! # Ok::<(), nonsmooth_solve::SolveError>(())
 //! ```
 
+pub mod auto;
 pub mod cfun;
 pub mod cone;
 mod drive;
@@ -26,6 +27,7 @@ pub mod form;
 pub mod local;
 pub mod parts;
 pub mod projection;
+pub mod proximal;
 pub mod reform;
 pub mod registry;
 pub mod settings;

@@ -7,8 +7,10 @@ use std::marker::PhantomData;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use serde::Serialize;
 
-use crate::form::{Concurrent, Linear};
+use crate::auto::{Auto, Hybrid};
+use crate::form::{Concurrent, Linear, Linearised, Overwrite, Regularised};
 use crate::projection::{DeSaxce, Extragradient, FixedPoint, Hyperplane, Method, Projected};
+use crate::proximal::{Admm, AdmmSteps, Outer, ProximalPoint};
 use crate::reform::Condense;
 use crate::settings::{Setting, Settings, SettingsMap, described, parse};
 use crate::splitting::{Colored, Nsgs, Psor};
@@ -53,6 +55,20 @@ impl<P: Problem + 'static, R: Reformulation<P> + 'static> Visitor for Through<P,
     }
 }
 
+/// Makes a session on problems of type `P` in which the solver works on the inner problems of a proximal point method.
+struct Around<P, const D: usize>(ProximalPoint, PhantomData<P>);
+
+impl<P, const D: usize> Visitor for Around<P, D>
+where
+    P: Linear<D> + Overwrite + Send + 'static,
+{
+    type Problem = Regularised<P>;
+    type Output = Box<dyn Session<P>>;
+    fn visit<S: Solver<Regularised<P>> + 'static>(self, inner: S) -> Self::Output {
+        Box::new(Driver::new(Outer::<S, D> { settings: self.0, inner }))
+    }
+}
+
 /// A solver, described.
 #[derive(Debug, Serialize)]
 pub struct About {
@@ -91,6 +107,9 @@ pub struct Prefix {
     pub from: &'static [Kind],
     /// Keys of `docs/refs.bib`.
     pub cites: &'static [&'static str],
+    /// The documented settings that it adds to those of the solver.
+    #[serde(serialize_with = "settings_now")]
+    pub settings: fn() -> Vec<Setting>,
 }
 
 /// A kind of problem that has solvers.
@@ -116,12 +135,27 @@ type Composed<P> = Option<Result<Box<dyn Session<P>>, String>>;
 pub const DEFAULT: &str = "nsgs";
 
 /// The reformulations.
-pub const PREFIXES: &[Prefix] = &[Prefix {
-    name: "condense",
-    summary: "global to local: forms W = H' M^-1 H and q, bilateral constraints eliminated",
-    from: &[Kind::FrictionGlobal2d, Kind::FrictionGlobal3d],
-    cites: &["Acary2018"],
-}];
+pub const PREFIXES: &[Prefix] = &[
+    Prefix {
+        name: "condense",
+        summary: "global to local: forms W = H' M^-1 H and q, bilateral constraints eliminated",
+        from: &[Kind::FrictionGlobal2d, Kind::FrictionGlobal3d],
+        cites: &["Acary2018"],
+        settings: Vec::new,
+    },
+    Prefix {
+        name: "proximal",
+        summary: "proximal point: the solver works on problems with W + alpha w in place of W",
+        from: &[
+            Kind::FrictionLocal2d,
+            Kind::FrictionLocal3d,
+            Kind::FrictionGlobal2d,
+            Kind::FrictionGlobal3d,
+        ],
+        cites: &["Rockafellar1976", "AcaryBremondHuber2018"],
+        settings: described::<ProximalPoint>,
+    },
+];
 
 /// NSGS.
 pub const NSGS: About = About {
@@ -212,11 +246,35 @@ pub const NSGS_COLORED: About = About {
     settings: described::<Colored>,
 };
 
+/// ADMM.
+pub const ADMM: About = About {
+    name: "admm",
+    family: "proximal",
+    summary: "alternating direction method of multipliers with exact projection on the cones",
+    needs: &[
+        "W (or M) with a positive semidefinite symmetric part; the full W is factorised, so it need not be symmetric",
+    ],
+    cites: &["Carpentier2024", "EcksteinBertsekas1992", "BoydParikhChuPeleatoEckstein2011"],
+    variants: &["rule=fixed", "alpha=1", "anderson=5"],
+    settings: described::<Admm>,
+};
+
+/// The automatic method.
+pub const AUTO: About = About {
+    name: "auto",
+    family: "auto",
+    summary: "hybrid",
+    needs: &[],
+    cites: &["Acary2018"],
+    variants: &[],
+    settings: described::<Auto>,
+};
+
 /// The solvers of frictional contact, for any problem that can be seen by its contacts.
 fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
 where
     V: Visitor,
-    V::Problem: Concurrent<D> + Linear<D>,
+    V::Problem: Concurrent<D> + Linearised<D>,
 {
     fn projected<const D: usize, V, M>(
         settings: &SettingsMap,
@@ -231,18 +289,63 @@ where
     }
     vec![
         Entry { about: &NSGS, build: |s, v| Ok(parse::<Nsgs>(s)?.visit::<D, V>(v)) },
+        Entry { about: &AUTO, build: |s, v| Ok(v.visit(Hybrid::<D>(parse(s)?))) },
         Entry { about: &DE_SAXCE, build: projected::<D, V, DeSaxce> },
         Entry { about: &FIXED_POINT, build: projected::<D, V, FixedPoint> },
         Entry { about: &EXTRAGRADIENT, build: projected::<D, V, Extragradient> },
         Entry { about: &HYPERPLANE, build: projected::<D, V, Hyperplane> },
         Entry { about: &PSOR, build: |s, v| Ok(v.visit(parse::<Psor>(s)?.sweeps::<D>())) },
         Entry { about: &NSGS_COLORED, build: |s, v| Ok(parse::<Colored>(s)?.visit::<D, V>(v)) },
+        Entry { about: &ADMM, build: |s, v| Ok(v.visit(AdmmSteps::<D>(parse(s)?))) },
     ]
+}
+
+/// The solvers that the proximal point method may have inside: those that gain from a regular W. One line each.
+fn inner_solvers<const D: usize, V>() -> Vec<Entry<V>>
+where
+    V: Visitor,
+    V::Problem: Concurrent<D> + Linearised<D>,
+{
+    vec![
+        Entry { about: &NSGS, build: |s, v| Ok(parse::<Nsgs>(s)?.visit::<D, V>(v)) },
+        Entry {
+            about: &EXTRAGRADIENT,
+            build: |s, v| Ok(v.visit(Projected::<Extragradient, D>(parse(s)?))),
+        },
+        Entry { about: &ADMM, build: |s, v| Ok(v.visit(AdmmSteps::<D>(parse(s)?))) },
+    ]
+}
+
+/// The settings of the proximal point method (their keys say so), and those of its inner solver.
+fn around<P, const D: usize>(solver: &str, settings: &SettingsMap) -> Composed<P>
+where
+    P: Concurrent<D> + Linearised<D> + Overwrite + Send + 'static,
+{
+    let entry = find(inner_solvers::<D, Around<P, D>>(), solver)?;
+    let (outer, inner): (SettingsMap, SettingsMap) =
+        settings.clone().into_iter().partition(|(key, _)| key.starts_with("prox_"));
+    let built = parse(&outer).and_then(|outer| (entry.build)(&inner, Around(outer, PhantomData)));
+    Some(built)
+}
+
+fn around_names<P, const D: usize>() -> Vec<String>
+where
+    P: Concurrent<D> + Linearised<D> + Overwrite + Send + 'static,
+{
+    names(&inner_solvers::<D, Around<P, D>>(), "proximal/")
 }
 
 impl<const D: usize> Registered for FrictionLocal<D> {
     fn entries<V: Visitor<Problem = Self>>() -> Vec<Entry<V>> {
         contact_solvers::<D, V>()
+    }
+
+    fn composed(reformulation: &str, solver: &str, settings: &SettingsMap) -> Composed<Self> {
+        (reformulation == "proximal").then(|| around::<Self, D>(solver, settings)).flatten()
+    }
+
+    fn composed_names() -> Vec<String> {
+        around_names::<Self, D>()
     }
 }
 
@@ -252,15 +355,20 @@ impl<const D: usize> Registered for FrictionGlobal<D> {
     }
 
     fn composed(reformulation: &str, solver: &str, settings: &SettingsMap) -> Composed<Self> {
-        let through = Through(Condense, PhantomData);
-        (reformulation == "condense")
-            .then(|| find(contact_solvers::<D, _>(), solver))
-            .flatten()
-            .map(|entry| (entry.build)(settings, through))
+        match reformulation {
+            "condense" => {
+                let entry = find(contact_solvers::<D, _>(), solver)?;
+                Some((entry.build)(settings, Through(Condense, PhantomData)))
+            }
+            "proximal" => around::<Self, D>(solver, settings),
+            _ => None,
+        }
     }
 
     fn composed_names() -> Vec<String> {
-        names(&FrictionLocal::<D>::entries::<Direct<_>>(), "condense/")
+        let mut all = names(&FrictionLocal::<D>::entries::<Direct<_>>(), "condense/");
+        all.extend(around_names::<Self, D>());
+        all
     }
 }
 

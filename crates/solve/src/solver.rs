@@ -31,6 +31,9 @@ pub trait Solver<P: Problem>: Send {
         Ok(())
     }
 
+    /// Learns the tolerance that the judge will ask for, before the start: a method may choose its means by it.
+    fn aim(&self, _tolerance: f64, _work: &mut Self::Work) {}
+
     /// Takes `point` as the starting point. Called once per solve, after `work` or `refill`.
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work);
 

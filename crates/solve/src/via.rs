@@ -47,6 +47,10 @@ where
         self.solver.refill(&work.reduced, &mut work.work)
     }
 
+    fn aim(&self, tolerance: f64, work: &mut Self::Work) {
+        self.solver.aim(tolerance, &mut work.work);
+    }
+
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
         self.reformulation.lower(problem, point, &mut work.point);
         self.solver.start(&work.reduced, &mut work.point, &mut work.work);

@@ -1,18 +1,18 @@
 //! Disjoint sets, for connected components.
 
 /// The numbers `0..n` in groups: each alone at first, then joined. Near constant cost for each call.
-pub(crate) struct Groups {
+pub struct Groups {
     parent: Vec<usize>,
 }
 
 impl Groups {
     /// `n` groups of one.
-    pub(crate) fn new(n: usize) -> Self {
+    pub fn new(n: usize) -> Self {
         Self { parent: (0..n).collect() }
     }
 
     /// The least member of the group of `i`.
-    pub(crate) fn root(&mut self, mut i: usize) -> usize {
+    pub fn root(&mut self, mut i: usize) -> usize {
         while self.parent[i] != i {
             self.parent[i] = self.parent[self.parent[i]];
             i = self.parent[i];
@@ -21,18 +21,18 @@ impl Groups {
     }
 
     /// Makes one group of those of `i` and `j`.
-    pub(crate) fn join(&mut self, i: usize, j: usize) {
+    pub fn join(&mut self, i: usize, j: usize) {
         let (i, j) = (self.root(i), self.root(j));
         self.parent[i.max(j)] = i.min(j);
     }
 
     /// Makes one group of those of all these.
-    pub(crate) fn join_all(&mut self, all: &[usize]) {
+    pub fn join_all(&mut self, all: &[usize]) {
         all.windows(2).for_each(|two| self.join(two[0], two[1]));
     }
 
     /// The sizes of the groups, in the order of their least members.
-    pub(crate) fn sizes(&mut self) -> Vec<usize> {
+    pub fn sizes(&mut self) -> Vec<usize> {
         let mut sizes = vec![0; self.parent.len()];
         (0..self.parent.len()).for_each(|i| sizes[self.root(i)] += 1);
         sizes.retain(|&size| size > 0);

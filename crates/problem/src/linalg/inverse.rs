@@ -41,6 +41,11 @@ pub fn factorisations() -> u64 {
     FACTORISATIONS.get()
 }
 
+/// Counts one factorisation of a matrix that grows with the problem.
+pub(super) fn count_factorisation() {
+    FACTORISATIONS.set(FACTORISATIONS.get() + 1);
+}
+
 /// How far a solve is refined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refine {
@@ -135,7 +140,7 @@ impl Inverse {
         name: &str,
         regularised: bool,
     ) -> Result<Self, ProblemError> {
-        FACTORISATIONS.set(FACTORISATIONS.get() + 1);
+        count_factorisation();
         let (index, place) = connected_components(&matrix);
         let components = index
             .into_iter()
@@ -189,6 +194,11 @@ impl Inverse {
     /// The number of unknowns.
     pub fn dim(&self) -> usize {
         self.place.len()
+    }
+
+    /// A itself.
+    pub fn matrix(&self) -> &Csc {
+        &self.matrix
     }
 
     /// The sizes of the connected components, in the order of their first unknown.

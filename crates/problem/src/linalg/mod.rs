@@ -2,8 +2,10 @@
 //!
 //! [`small`]: D×D blocks on arrays. [`Csc`]: general sparse. [`Bsr`]: block-sparse rows, the storage of W.
 //! [`Inverse`]: factorisation of M (or of M with bilateral constraints) behind one face.
+//! [`BlockLu`]: LU of Newton matrices, analysed once and factorised many times.
 //! [`Delassus`]: W = Hᵀ M⁻¹ H as an operator, never formed, or condensed into a [`Bsr`].
 
+mod block_lu;
 mod bsr;
 mod compensated;
 mod csc;
@@ -13,11 +15,12 @@ mod inverse;
 mod row;
 pub mod small;
 
+pub use block_lu::{BlockLu, Singular, Slot};
 pub use bsr::{Block, BlockRow, Bsr};
 pub use compensated::Compensated;
 pub use csc::Csc;
 pub use delassus::Delassus;
-pub(crate) use groups::Groups;
+pub use groups::Groups;
 pub use inverse::{Inverse, Refine, factorisations};
 
 /// The Euclidean norm, scaled so that neither overflow nor underflow of the squares spoils it.

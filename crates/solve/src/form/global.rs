@@ -6,10 +6,11 @@
 //! gather never reaches a judged point.
 
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Block, Csc, Delassus, Refine, small};
+use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Refine, Singular, small};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
-use super::{Access, Blockwise, Concurrent, Contacts, Linear, velocity_scale};
+use super::linearised::{BodyForm, ContactForm, Form, System};
+use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised, velocity_scale};
 use crate::SolveError;
 
 /// What the view keeps.
@@ -22,6 +23,14 @@ pub struct GlobalState<const D: usize> {
     scale: f64,
     v: Vec<f64>,
     contradiction: Option<Certificate>,
+    /// Made when it is first asked for.
+    system: Option<GlobalSystem<D>>,
+}
+
+/// The linear system of a Newton method, over whichever graph suits M.
+enum GlobalSystem<const D: usize> {
+    Bodies(System<BodyForm<D>, D>),
+    Contacts(System<ContactForm<D>, D>),
 }
 
 /// What a family's access to W needs beside the dynamics.
@@ -30,6 +39,32 @@ enum Operator<const D: usize> {
     Visits(Delassus<D>),
     /// Products with all of W: the diagonal blocks alone.
     Products(Vec<Block<D>>),
+    /// W itself: for Newton methods where M is factorised sparsely (finite elements, mechanisms), so that Z would be dense
+    /// and the graph of M far larger than that of W.
+    Condensed(Bsr<D>),
+}
+
+impl<const D: usize> GlobalSystem<D> {
+    fn new(problem: &FrictionGlobal<D>, operator: &Operator<D>, dynamics: &Dynamics) -> Self {
+        let nc = problem.contacts();
+        match operator {
+            Operator::Condensed(w) => Self::Contacts(System::new(ContactForm::new(w), nc)),
+            _ => {
+                let form = BodyForm::new(dynamics.inverse.matrix(), &problem.H);
+                Self::Bodies(System::new(form, nc))
+            }
+        }
+    }
+}
+
+impl<const D: usize> Operator<D> {
+    fn diagonal_block(&self, c: usize) -> Block<D> {
+        match self {
+            Operator::Visits(delassus) => *delassus.diagonal_block(c),
+            Operator::Products(diagonal) => diagonal[c],
+            Operator::Condensed(w) => w.diagonal_block(c),
+        }
+    }
 }
 
 impl<const D: usize> GlobalState<D> {
@@ -47,7 +82,12 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
         let inverse = &dynamics.inverse;
         let mut state = GlobalState {
             operator: match access {
-                Access::Visits => Operator::Visits(Delassus::new(&self.H, inverse)),
+                Access::Newton if inverse.has_sparse_factor() => {
+                    Operator::Condensed(Delassus::condense(&self.H, inverse))
+                }
+                Access::Visits | Access::Newton => {
+                    Operator::Visits(Delassus::new(&self.H, inverse))
+                }
                 Access::Products => Operator::Products(Delassus::diagonal(&self.H, inverse)),
             },
             h: self.H.clone(),
@@ -55,6 +95,7 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
             scale: 1.0,
             v: vec![0.0; self.dofs()],
             contradiction: None,
+            system: None,
             dynamics,
         };
         state.update_free_velocity(self);
@@ -66,6 +107,8 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
             state.update_free_velocity(self);
         } else {
             let access = match state.operator {
+                Operator::Condensed(_) => Access::Newton,
+                Operator::Visits(_) if state.system.is_some() => Access::Newton,
                 Operator::Visits(_) => Access::Visits,
                 Operator::Products(_) => Access::Products,
             };
@@ -83,10 +126,7 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     }
 
     fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D] {
-        match &state.operator {
-            Operator::Visits(delassus) => *delassus.diagonal_block(c),
-            Operator::Products(diagonal) => diagonal[c],
-        }
+        state.operator.diagonal_block(c)
     }
 
     fn velocity_scale(&self, state: &Self::State) -> f64 {
@@ -108,30 +148,26 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     }
 }
 
-impl<const D: usize> Operator<D> {
-    #[inline(always)]
-    fn visits(&self) -> &Delassus<D> {
-        match self {
-            Operator::Visits(delassus) => delassus,
-            Operator::Products(_) => unreachable!("a state for products is not visited"),
-        }
-    }
-}
-
 impl<const D: usize> Blockwise<D> for FrictionGlobal<D> {
     #[inline(always)]
-    fn velocity(&self, state: &Self::State, _: &[f64], c: usize) -> [f64; D] {
-        let mut u = state.operator.visits().local_velocity(c, &state.v);
-        let w: [f64; D] = small::block(&self.w, c);
+    fn velocity(&self, state: &Self::State, r: &[f64], c: usize) -> [f64; D] {
+        let (mut u, given) = match &state.operator {
+            Operator::Visits(delassus) => (delassus.local_velocity(c, &state.v), &self.w),
+            Operator::Condensed(w) => (w.row_product(c, r), &state.q),
+            Operator::Products(_) => unreachable!("a state for products is not visited"),
+        };
+        let given: [f64; D] = small::block(given, c);
         for k in 0..D {
-            u[k] += w[k];
+            u[k] += given[k];
         }
         u
     }
 
     #[inline(always)]
     fn moved(&self, state: &mut Self::State, c: usize, dr: &[f64; D]) {
-        state.operator.visits().apply_impulse(c, dr, &mut state.v);
+        if let Operator::Visits(delassus) = &state.operator {
+            delassus.apply_impulse(c, dr, &mut state.v);
+        }
     }
 }
 
@@ -153,7 +189,68 @@ impl<const D: usize> Concurrent<D> for FrictionGlobal<D> {
 
 impl<const D: usize> Linear<D> for FrictionGlobal<D> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
+        if let Operator::Condensed(w) = &state.operator {
+            return w.mul_plus(r, &state.q, u);
+        }
         let (v, _) = state.dynamics.solve(self, r, Refine::Once);
         self.velocity_into(v, u);
+    }
+}
+
+impl<const D: usize> Linearised<D> for FrictionGlobal<D> {
+    fn linearise(
+        &self,
+        state: &mut Self::State,
+        p: &[Block<D>],
+        q: &[Block<D>],
+    ) -> Result<(), Singular> {
+        let GlobalState { operator, system, dynamics, .. } = state;
+        let unit = (0..self.contacts()).map(|c| small::mean_diagonal(&operator.diagonal_block(c)));
+        match system.get_or_insert_with(|| GlobalSystem::new(self, operator, dynamics)) {
+            GlobalSystem::Bodies(system) => system.factorise(unit, p, q),
+            GlobalSystem::Contacts(system) => system.factorise(unit, p, q),
+        }
+    }
+
+    fn solve_linearised(
+        &self,
+        state: &mut Self::State,
+        b: &[f64],
+        x: &mut [f64],
+        wx: &mut [f64],
+    ) -> f64 {
+        let GlobalState { operator, system, dynamics, .. } = state;
+        let apply = |x: &[f64], wx: &mut [f64]| match &*operator {
+            Operator::Condensed(w) => {
+                for (c, wx) in wx.chunks_mut(D).enumerate() {
+                    wx.copy_from_slice(&w.row_product(c, x));
+                }
+            }
+            _ => {
+                let v = dynamics.respond(self, x, Refine::Once);
+                wx.fill(0.0);
+                self.H.mul_transpose_add(1.0, v, wx);
+            }
+        };
+        match system {
+            Some(GlobalSystem::Bodies(system)) => system.solve(b, x, wx, apply),
+            Some(GlobalSystem::Contacts(system)) => system.solve(b, x, wx, apply),
+            None => f64::NAN,
+        }
+    }
+
+    fn costs(&self, state: &mut Self::State) -> Costs {
+        let GlobalState { operator, system, dynamics, .. } = state;
+        let contacts = self.contacts() as f64;
+        let visits = match &*operator {
+            Operator::Condensed(w) => 2.0 * w.nblocks() as f64,
+            _ => 1.5 * self.H.nnz() as f64,
+        };
+        let factorisation =
+            match system.get_or_insert_with(|| GlobalSystem::new(self, operator, dynamics)) {
+                GlobalSystem::Bodies(system) => system.form().cost(),
+                GlobalSystem::Contacts(system) => system.form().cost(),
+            };
+        Costs { sweep: 30.0 * contacts + visits, factorisation }
     }
 }

@@ -4,16 +4,19 @@
 //! constraints (a singular, positive semidefinite R) are honoured.
 
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse, Refine, small};
+use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Inverse, Refine, Singular, small};
 use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint, Problem};
 
-use super::{Access, Blockwise, Concurrent, Contacts, Linear, velocity_scale};
+use super::linearised::{ContactForm, Form, System};
+use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised, velocity_scale};
 use crate::SolveError;
 
-/// What the view keeps: the norm of q, and the problem without its bilateral rows where it has any.
+/// What the view keeps: the norm of q, the problem without its bilateral rows where it has any, and the linear system.
 pub struct LocalState<const D: usize> {
     scale: f64,
     eliminated: Option<Eliminated<D>>,
+    /// Made when it is first asked for.
+    system: Option<System<ContactForm<D>, D>>,
 }
 
 struct Eliminated<const D: usize> {
@@ -95,7 +98,7 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
 
     fn state(&self, _: Access) -> Result<Self::State, SolveError> {
         let eliminated = self.bilateral.as_ref().map(|b| Eliminated::new(self, b)).transpose()?;
-        Ok(LocalState { scale: velocity_scale(&self.q), eliminated })
+        Ok(LocalState { scale: velocity_scale(&self.q), eliminated, system: None })
     }
 
     fn refill(&self, state: &mut Self::State) -> Result<(), SolveError> {
@@ -107,6 +110,11 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
         };
         if !kept {
             *state = self.state(Access::Visits)?;
+        }
+        let LocalState { eliminated, system, .. } = state;
+        let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
+        if system.as_mut().is_some_and(|system| !system.form().refill(w)) {
+            *system = None;
         }
         Ok(())
     }
@@ -173,5 +181,47 @@ impl<const D: usize> Linear<D> for FrictionLocal<D> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
         let (w, q) = state.operator(self);
         w.mul_plus(r, q, u);
+    }
+}
+
+impl<const D: usize> Linearised<D> for FrictionLocal<D> {
+    fn linearise(
+        &self,
+        state: &mut Self::State,
+        p: &[Block<D>],
+        q: &[Block<D>],
+    ) -> Result<(), Singular> {
+        let LocalState { eliminated, system, .. } = state;
+        let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
+        let unit = (0..w.nrows()).map(|c| small::mean_diagonal(&w.diagonal_block(c)));
+        let system = system.get_or_insert_with(|| System::new(ContactForm::new(w), w.nrows()));
+        system.factorise(unit, p, q)
+    }
+
+    fn solve_linearised(
+        &self,
+        state: &mut Self::State,
+        b: &[f64],
+        x: &mut [f64],
+        wx: &mut [f64],
+    ) -> f64 {
+        let LocalState { eliminated, system, .. } = state;
+        let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
+        let apply = |x: &[f64], wx: &mut [f64]| {
+            for (c, wx) in wx.chunks_mut(D).enumerate() {
+                wx.copy_from_slice(&w.row_product(c, x));
+            }
+        };
+        system.as_mut().map_or(f64::NAN, |system| system.solve(b, x, wx, apply))
+    }
+
+    fn costs(&self, state: &mut Self::State) -> Costs {
+        let LocalState { eliminated, system, .. } = state;
+        let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
+        let system = system.get_or_insert_with(|| System::new(ContactForm::new(w), w.nrows()));
+        Costs {
+            sweep: 30.0 * w.nrows() as f64 + 2.0 * w.nblocks() as f64,
+            factorisation: system.form().cost(),
+        }
     }
 }

@@ -6,12 +6,20 @@
 //! | [`Blockwise`] | one contact's velocity, and to be told that one contact's impulse moved | local (rows of W), global (velocity space) |
 //! | [`Concurrent`] | in addition, which contacts do not feel each other, and visits from several threads | local, global |
 //! | [`Linear`] | `u = W r + q` for all contacts | local (W), global (product form) |
+//! | [`Linearised`] | to solve `(Q + P W) x = b` with block-diagonal P, Q | local (in contact space), global (in velocity space) |
+//!
+//! [`Regularised`] offers what the problem inside it does.
 
 mod global;
+mod linearised;
 mod local;
+mod regularised;
 
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Certificate;
+use nonsmooth_problem::linalg::{Block, Singular};
+
+pub use regularised::{Overwrite, Regularised, RegularisedState};
 
 use crate::SolveError;
 
@@ -22,6 +30,8 @@ pub enum Access {
     Visits,
     /// By products with all of it ([`Linear`]).
     Products,
+    /// In linear systems ([`Linearised`]), and in both ways above.
+    Newton,
 }
 
 /// A problem with D-dimensional frictional contacts, seen by its contacts.
@@ -79,6 +89,46 @@ pub trait Concurrent<const D: usize>: Blockwise<D> + Contacts<D, State: Sync> + 
 pub trait Linear<const D: usize>: Contacts<D> {
     /// `u = W r + q`.
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]);
+}
+
+/// What the means of a method cost, in units of about a nanosecond: to choose between them, the same on every machine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Costs {
+    /// One Gauss–Seidel sweep over all contacts.
+    pub sweep: f64,
+    /// One [`linearise`](Linearised::linearise) and one solve.
+    pub factorisation: f64,
+}
+
+/// Linear systems with a block-diagonal modification of W, as Newton, interior-point and proximal methods have them.
+///
+/// The state must be made with [`Access::Newton`]. Cost of `linearise`: assembly and one sparse LU, whose symbolic analysis is
+/// done once per pattern; of `solve_linearised`: one to five solves and products with W.
+pub trait Linearised<const D: usize>: Linear<D> + Blockwise<D> {
+    /// Factorises `Q + P W`.
+    ///
+    /// The factor is that of `Q + δ w_c P + P W`, δ = 1e-10, so Q may be singular and W rank deficient.
+    /// Errors: a matrix that cannot be factorised even so (not finite, a zero row).
+    fn linearise(
+        &self,
+        state: &mut Self::State,
+        p: &[Block<D>],
+        q: &[Block<D>],
+    ) -> Result<(), Singular>;
+
+    /// The solution of `(Q + P W) x = b` for the P and Q last given, refined against that matrix, and `wx = W x`.
+    ///
+    /// Returns `‖b − Q x − P W x‖ / ‖b‖`: where `Q + P W` is singular it need not be small.
+    fn solve_linearised(
+        &self,
+        state: &mut Self::State,
+        b: &[f64],
+        x: &mut [f64],
+        wx: &mut [f64],
+    ) -> f64;
+
+    /// What sweeps and factorisations cost on this problem. Makes the symbolic analysis.
+    fn costs(&self, state: &mut Self::State) -> Costs;
 }
 
 /// `‖q‖`, or 1 where q = 0.
