@@ -346,7 +346,7 @@ mod tests {
         let (problem, _) = planted.local::<3>();
         for rule in ["fixed", "residual", "success"] {
             let rule = format!("prox_rule={rule}");
-            let mut solver = session("proximal/nsgs", &[&rule, "prox_alpha=0.1"]);
+            let mut solver = session("proximal/nsgs", &[&rule, "prox_alpha=0.01"]);
             let mut point = problem.origin();
             let limits = Limits { tolerance: 1e-8, max_iterations: 100_000, ..Limits::default() };
             let outcome = solver.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
