@@ -465,4 +465,45 @@ mod tests {
             assert!(settings.iter().all(|s| !s.help.is_empty()), "{}: {settings:?}", about.name);
         }
     }
+
+    /// Methods that share no iteration find the same motion where W is regular.
+    #[test]
+    fn independent_methods_agree() {
+        use nonsmooth_problem::planted::Planted;
+        let planted = Planted { contacts: 20, dofs: 120, seed: 11, ..Planted::default() };
+        let (problem, _) = planted.local::<3>();
+        let motion = |name: &str, texts: &[&str]| {
+            let settings = crate::settings::from_texts(texts).unwrap();
+            let mut session = session::<FrictionLocal<3>>(name, &settings).unwrap();
+            let mut point = problem.origin();
+            let limits = crate::Limits {
+                tolerance: 1e-11,
+                max_iterations: 100_000,
+                ..crate::Limits::default()
+            };
+            let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+            assert_eq!(outcome.status, crate::Status::Solved, "{name} {texts:?}");
+            let mut u = vec![0.0; problem.q.len()];
+            problem.W.mul_plus(&point.r, &problem.q, &mut u);
+            u
+        };
+        let reference = motion("nsgs", &[]);
+        let size = nonsmooth_problem::linalg::norm(&problem.q);
+        for (name, texts) in [
+            ("psor", vec![]),
+            ("nsgs_colored", vec!["threads=2", "serial_below=1"]),
+            ("nsgs", vec!["anderson=5"]),
+            ("nsgs", vec!["local=newton_ac", "local_tolerance=adaptive"]),
+            ("nsgs", vec!["local=projection_iterated", "local_tolerance=adaptive"]),
+            ("extragradient", vec!["rule=solodov_tseng"]),
+            ("admm", vec![]),
+            ("admm", vec!["rule=fixed", "anderson=5"]),
+            ("proximal/nsgs", vec![]),
+            ("proximal/admm", vec!["prox_rule=residual"]),
+        ] {
+            let u = motion(name, &texts);
+            let far = u.iter().zip(&reference).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            assert!(far < 1e-8 * size, "{name} {texts:?}: {far:e}");
+        }
+    }
 }
