@@ -22,11 +22,26 @@ pub struct Auto {
     pub epsilon: f64,
     /// print
     pub verbose: bool,
+    /// idle
+    pub patience: usize,
+    /// floor factor
+    pub floor: f64,
+    /// revert
+    pub revert: f64,
 }
 
 impl Default for Auto {
     fn default() -> Self {
-        Self { kappa: 10.0, sweep_fraction: 0.3, rule: 0, epsilon: 1.0, verbose: false }
+        Self {
+            kappa: 30.0,
+            sweep_fraction: 0.3,
+            rule: 0,
+            epsilon: 1.0,
+            verbose: false,
+            patience: 10,
+            floor: 2.0,
+            revert: 5.0,
+        }
     }
 }
 
@@ -70,6 +85,13 @@ struct Outer {
     failures: usize,
     epsilon: f64,
     error: f64,
+    /// Not below this for now: subproblems there have failed.
+    floor: f64,
+    successes: usize,
+    /// Iterations since the residual last fell markedly.
+    idle: usize,
+    fraction: f64,
+    before_error: f64,
     least: f64,
     factorisations: usize,
 }
@@ -117,7 +139,8 @@ impl<P: Linearised<D>, const D: usize> Solver<P> for Hybrid<D> {
         problem.enter(&mut work.state, point);
         work.phase = Phase::Sweeps;
         work.sweeps = 0;
-        work.outer = Outer { least: f64::INFINITY, ..Outer::default() };
+        work.outer =
+            Outer { least: f64::INFINITY, fraction: self.0.sweep_fraction, ..Outer::default() };
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
@@ -201,10 +224,17 @@ impl<const D: usize> Hybrid<D> {
         let r = P::impulses(point);
         problem.velocities(state, r, &mut newton.u);
         let mut error = newton.error(r);
-        if swept && error > 5.0 * outer.error {
-            r.copy_from_slice(before);
-            problem.velocities(state, r, &mut newton.u);
-            error = newton.error(r);
+        if swept {
+            if error > outer.error {
+                outer.fraction = (0.5 * outer.fraction).max(0.02);
+            } else {
+                outer.fraction = (2.0 * outer.fraction).min(self.0.sweep_fraction);
+            }
+            if error > self.0.revert * outer.error {
+                r.copy_from_slice(before);
+                problem.velocities(state, r, &mut newton.u);
+                error = newton.error(r);
+            }
         }
         if error < outer.least {
             outer.least = error;
@@ -215,6 +245,7 @@ impl<const D: usize> Hybrid<D> {
         outer.target = (1e-3 * error).clamp(1e-15, 1e-4);
         outer.best = outer.initial;
         outer.inner = 0;
+        outer.idle = 0;
         best_r.copy_from_slice(r);
         work.phase = Phase::Inner;
     }
@@ -231,13 +262,21 @@ impl<const D: usize> Hybrid<D> {
         let iterate = newton.iterate(problem, state, r);
         outer.inner += 1;
         outer.factorisations += 1;
+        outer.idle += 1;
         if iterate.residual < outer.best {
+            if iterate.residual < 0.8 * outer.best {
+                outer.idle = 0;
+            }
             outer.best = iterate.residual;
             best_r.copy_from_slice(r);
         }
         let error = newton.error(r);
         let estimate = Step::Continue { estimate: error };
-        if iterate.residual > outer.target && outer.inner < 30 && iterate.step > 0.0 {
+        if iterate.residual > outer.target
+            && outer.inner < 30
+            && outer.idle < self.0.patience
+            && iterate.step > 0.0
+        {
             return estimate;
         }
         let n = outer.inner;
@@ -260,8 +299,15 @@ impl<const D: usize> Hybrid<D> {
                     _ => 1.5,
                 },
             };
-            outer.epsilon *= factor;
+            outer.successes += 1;
+            if outer.successes >= 3 {
+                outer.floor *= 0.3;
+                outer.successes = 0;
+            }
+            outer.epsilon = (factor * eps).max(outer.floor.min(eps));
         } else {
+            outer.floor = self.0.floor * eps;
+            outer.successes = 0;
             outer.failures += 1;
             if outer.best < 0.2 * outer.initial && !outer.failures.is_multiple_of(3) {
                 r.copy_from_slice(best_r);
@@ -288,7 +334,7 @@ impl<const D: usize> Hybrid<D> {
         outer.error = error;
         before.copy_from_slice(r);
         let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
-        let sweeps = self.0.sweep_fraction * n as f64 * costs.factorisation / costs.sweep;
+        let sweeps = outer.fraction * n as f64 * costs.factorisation / costs.sweep;
         problem.enter(&mut work.state, point);
         if error > 1e-9 {
             work.phase = Phase::Between { left: (sweeps as usize).clamp(1, 300) };

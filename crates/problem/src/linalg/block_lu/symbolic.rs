@@ -1,0 +1,631 @@
+//! What the pattern alone decides: the order of elimination, the fronts and where everything lies.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::sparse::SymbolicSparseColMatRef;
+use faer::sparse::linalg::amd;
+
+use super::kernel::WIDTH;
+
+/// `(from, to, length)`: consecutive rows of a front's remainder that are consecutive in its parent too.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Run {
+    pub from: u32,
+    pub to: u32,
+    pub len: u32,
+}
+
+/// A front: `pivots` unknowns eliminated together, coupled to `rest` later ones.
+#[derive(Debug, Clone)]
+pub(super) struct Front {
+    /// Its first unknown in the order of elimination; the other pivots follow.
+    pub start: usize,
+    pub pivots: usize,
+    pub rest: usize,
+    /// Columns of L with the diagonal block, `pivots + rest` rows each, from here on.
+    pub lower: usize,
+    /// Columns of U beside the diagonal block, `pivots` rows each.
+    pub upper: usize,
+    /// The remainder (Schur complement), `rest` rows a column, in the stack.
+    pub remainder: usize,
+    /// The inverses of the unit lower triangles of the diagonal blocks.
+    pub triangles: usize,
+    /// Positions of the `rest` unknowns.
+    pub rows: usize,
+    /// The fronts whose remainders are added to this one: a range of `children`.
+    pub children: std::ops::Range<usize>,
+    /// How this front's remainder lies in the parent: a range of `runs`.
+    pub runs: std::ops::Range<usize>,
+    /// The first of its runs that lies beyond the parent's pivots. Runs do not cross that border.
+    pub beyond: usize,
+    /// Its blocks of A: a range of blocks.
+    pub blocks: std::ops::Range<usize>,
+}
+
+/// Where a block of A lies among the values, and in its front.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    /// Its first value; rows × columns of them, by rows.
+    pub values: usize,
+    /// First row and column in the order of elimination, for the scales.
+    pub row: u32,
+    pub column: u32,
+    pub rows: u32,
+    pub columns: u32,
+    /// The entry of the front's storage (of U's where `upper`) that takes its first value.
+    pub to: usize,
+    pub upper: bool,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Symbolic {
+    pub dim: usize,
+    /// Of node i: its first unknown in the caller's order.
+    pub first: Vec<usize>,
+    pub sizes: Vec<u32>,
+    /// Of unknown k in the order of elimination: its place in the caller's order.
+    pub order: Vec<u32>,
+    /// Blocks of node i: columns `pattern[pattern_start[i]..]`, sorted, and their numbers.
+    pub pattern_start: Vec<usize>,
+    pub pattern: Vec<u32>,
+    pub number: Vec<u32>,
+    pub places: Vec<Place>,
+    pub fronts: Vec<Front>,
+    pub children: Vec<u32>,
+    pub runs: Vec<Run>,
+    /// Positions of the rest of each front.
+    pub rows: Vec<u32>,
+    pub values_len: usize,
+    pub lower_len: usize,
+    pub upper_len: usize,
+    pub stack_len: usize,
+    pub triangles_len: usize,
+    pub widest: usize,
+    pub flops: f64,
+}
+
+const NONE: u32 = u32::MAX;
+
+/// A supernode while fronts are being formed: nodes in steps of elimination.
+#[derive(Default)]
+struct Super {
+    columns: Vec<u32>,
+    /// Later nodes that it is coupled to, sorted at the end only.
+    rest: Vec<u32>,
+    pivots: usize,
+    rest_size: usize,
+    parent: u32,
+    merged: bool,
+}
+
+/// Estimated nanoseconds for a front, its share of assembly included; what merging is decided by.
+fn cost(k: usize, m: usize) -> f64 {
+    let (k, m) = (k as f64, m as f64);
+    200.0 + 25.0 * k + flops(k, m) / 30.0 + 0.5 * (k + m) * (k + m)
+}
+
+fn flops(k: f64, m: f64) -> f64 {
+    k * k * k * (2.0 / 3.0) + 2.0 * k * m * (k + m)
+}
+
+impl Symbolic {
+    pub(super) fn new(sizes: &[usize], edges: impl Iterator<Item = (u32, u32)>) -> Self {
+        let n = sizes.len();
+        let sizes: Vec<u32> =
+            sizes.iter().map(|&s| u32::try_from(s).expect("fewer than 2³² unknowns")).collect();
+        let mut first = vec![0_usize; n + 1];
+        for i in 0..n {
+            first[i + 1] = first[i] + sizes[i] as usize;
+        }
+        let dim = first[n];
+        assert!(n < NONE as usize && dim < NONE as usize, "fewer than 2³² unknowns");
+        let (pattern_start, pattern) = pattern(n, edges);
+        let (order, step) = elimination_order(&pattern_start, &pattern);
+        let fronts = supernodes(&sizes, &pattern_start, &pattern, &order, &step);
+        let mut out = Self {
+            dim,
+            first,
+            sizes,
+            order: vec![],
+            pattern_start,
+            number: vec![0; pattern.len()],
+            pattern,
+            places: vec![],
+            fronts: vec![],
+            children: vec![],
+            runs: vec![],
+            rows: vec![],
+            values_len: 0,
+            lower_len: 0,
+            upper_len: 0,
+            stack_len: 0,
+            triangles_len: 0,
+            widest: 0,
+            flops: 0.0,
+        };
+        out.lay_out(&order, fronts);
+        out
+    }
+
+    /// Numbers the unknowns, and gives everything its place. `order`: node of each step that `supers` speak of.
+    fn lay_out(&mut self, order: &[u32], supers: Vec<Super>) {
+        let n = self.sizes.len();
+        // Postorder of the fronts that are left: parents have larger steps than their children, so lists are filled backwards.
+        let count = supers.len();
+        let (mut child, mut sibling) = (vec![NONE; count + 1], vec![NONE; count]);
+        for s in (0..count).rev().filter(|&s| !supers[s].merged) {
+            let parent = (supers[s].parent as usize).min(count);
+            sibling[s] = child[parent];
+            child[parent] = s as u32;
+        }
+        let mut sequence: Vec<u32> = Vec::new();
+        let mut stack = vec![];
+        let mut at = child[count];
+        // Depth first: down to the first child, out, to the sibling.
+        while at != NONE || !stack.is_empty() {
+            if at != NONE {
+                stack.push(at);
+                at = child[at as usize];
+            } else if let Some(s) = stack.pop() {
+                sequence.push(s);
+                at = sibling[s as usize];
+            }
+        }
+        // Positions of nodes.
+        let mut position = vec![0_u32; n]; // of a node: its first unknown in the order of elimination
+        let mut front_of = vec![0_u32; n];
+        self.order.reserve(self.dim);
+        let mut number_of = vec![NONE; count];
+        for (f, &s) in sequence.iter().enumerate() {
+            number_of[s as usize] = f as u32;
+            for &c in &supers[s as usize].columns {
+                let node = order[c as usize] as usize;
+                position[node] = self.order.len() as u32;
+                front_of[node] = f as u32;
+                self.order.extend((self.first[node]..self.first[node + 1]).map(|i| i as u32));
+            }
+        }
+        // Fronts.
+        let mut children: Vec<Vec<u32>> = vec![vec![]; sequence.len()];
+        let mut rest_nodes: Vec<Vec<u32>> = Vec::with_capacity(sequence.len());
+        let mut start = 0;
+        for (f, &s) in sequence.iter().enumerate() {
+            let s = &supers[s as usize];
+            let mut rest: Vec<u32> = s.rest.iter().map(|&c| order[c as usize]).collect();
+            rest.sort_unstable_by_key(|&i| position[i as usize]);
+            let (pivots, m) = (s.pivots, s.rest_size);
+            self.fronts.push(Front {
+                start,
+                pivots,
+                rest: m,
+                lower: self.lower_len,
+                upper: self.upper_len,
+                remainder: 0,
+                triangles: self.triangles_len,
+                rows: self.rows.len(),
+                children: 0..0,
+                runs: 0..0,
+                beyond: 0,
+                blocks: 0..0,
+            });
+            for &i in &rest {
+                let p = position[i as usize];
+                self.rows.extend(p..p + self.sizes[i as usize]);
+            }
+            if s.parent != NONE {
+                children[number_of[s.parent as usize] as usize].push(f as u32);
+            }
+            rest_nodes.push(rest);
+            start += pivots;
+            self.lower_len += pivots * (pivots + m);
+            self.upper_len += pivots * m;
+            self.triangles_len += pivots.div_ceil(WIDTH) * WIDTH * WIDTH;
+            self.widest = self.widest.max(pivots + m);
+            self.flops += flops(pivots as f64, m as f64);
+        }
+        // Relative places: of the parent's rows in `local`, then runs of each child.
+        let mut local = vec![0_u32; self.dim];
+        for f in 0..self.fronts.len() {
+            let front = self.fronts[f].clone();
+            for k in 0..front.pivots {
+                local[front.start + k] = k as u32;
+            }
+            let rows = &self.rows[front.rows..front.rows + front.rest];
+            for (k, &r) in rows.iter().enumerate() {
+                local[r as usize] = (front.pivots + k) as u32;
+            }
+            let first_child = self.children.len();
+            for &c in &children[f] {
+                self.children.push(c);
+                let child = &self.fronts[c as usize];
+                let begin = self.runs.len();
+                let mut beyond = None;
+                for (k, &r) in self.rows[child.rows..child.rows + child.rest].iter().enumerate() {
+                    let to = local[r as usize];
+                    let crossing = beyond.is_none() && to as usize >= front.pivots;
+                    match self.runs[begin..].last_mut() {
+                        Some(run) if run.to + run.len == to && !crossing => run.len += 1,
+                        _ => self.runs.push(Run { from: k as u32, to, len: 1 }),
+                    }
+                    if crossing {
+                        beyond = Some(self.runs.len() - 1);
+                    }
+                }
+                let end = self.runs.len();
+                let child = &mut self.fronts[c as usize];
+                child.runs = begin..end;
+                child.beyond = beyond.unwrap_or(end);
+            }
+            self.fronts[f].children = first_child..self.children.len();
+            // Blocks of A with their first node of elimination in this front.
+            let begin = self.places.len();
+            for &c in &supers[sequence[f] as usize].columns {
+                let j = order[c as usize] as usize;
+                for e in self.pattern_start[j]..self.pattern_start[j + 1] {
+                    let i = self.pattern[e] as usize;
+                    let of = front_of[i] as usize;
+                    if of < f {
+                        continue;
+                    }
+                    // Block (i, j) in column j; and (j, i) in row j where i is not a pivot of this front.
+                    let (pi, pj) = (position[i], position[j]);
+                    let (si, sj) = (self.sizes[i], self.sizes[j]);
+                    let (li, lj) = (local[pi as usize] as usize, local[pj as usize] as usize);
+                    let mirror = self.find(i, j);
+                    self.number[mirror] = self.places.len() as u32;
+                    self.places.push(Place {
+                        values: self.values_len,
+                        row: pi,
+                        column: pj,
+                        rows: si,
+                        columns: sj,
+                        to: front.lower + lj * (front.pivots + front.rest) + li,
+                        upper: false,
+                    });
+                    self.values_len += si as usize * sj as usize;
+                    if of > f {
+                        self.number[e] = self.places.len() as u32;
+                        self.places.push(Place {
+                            values: self.values_len,
+                            row: pj,
+                            column: pi,
+                            rows: sj,
+                            columns: si,
+                            to: front.upper + (li - front.pivots) * front.pivots + lj,
+                            upper: true,
+                        });
+                        self.values_len += si as usize * sj as usize;
+                    }
+                }
+            }
+            self.fronts[f].blocks = begin..self.places.len();
+        }
+        self.place_remainders();
+    }
+
+    /// The entry of the pattern that holds (i, j).
+    pub(super) fn find(&self, i: usize, j: usize) -> usize {
+        let range = self.pattern_start[i]..self.pattern_start[i + 1];
+        let found = self.pattern[range.clone()].binary_search(&(j as u32));
+        range.start + found.unwrap_or_else(|_| panic!("block ({i}, {j}) is not in the pattern"))
+    }
+
+    /// Gives each remainder room in the stack: the first gap that is large enough among those that live at the same time.
+    fn place_remainders(&mut self) {
+        let mut gaps: Vec<(usize, usize)> = vec![]; // (begin, end), sorted
+        for f in 0..self.fronts.len() {
+            let need = self.fronts[f].rest * self.fronts[f].rest;
+            if need > 0 {
+                let at = match gaps.iter().position(|g| g.1 - g.0 >= need) {
+                    Some(g) => {
+                        let begin = gaps[g].0;
+                        gaps[g].0 += need;
+                        if gaps[g].0 == gaps[g].1 {
+                            gaps.remove(g);
+                        }
+                        begin
+                    }
+                    None => {
+                        // A gap at the very end grows.
+                        let begin = match gaps.last() {
+                            Some(g) if g.1 == self.stack_len => g.0,
+                            _ => self.stack_len,
+                        };
+                        if begin < self.stack_len {
+                            gaps.pop();
+                        }
+                        self.stack_len = begin + need;
+                        begin
+                    }
+                };
+                self.fronts[f].remainder = at;
+            }
+            for c in self.fronts[f].children.clone() {
+                let child = &self.fronts[self.children[c] as usize];
+                let (begin, end) = (child.remainder, child.remainder + child.rest * child.rest);
+                if begin == end {
+                    continue;
+                }
+                let mut g = gaps.partition_point(|g| g.0 < begin);
+                gaps.insert(g, (begin, end));
+                if g + 1 < gaps.len() && gaps[g].1 == gaps[g + 1].0 {
+                    gaps[g].1 = gaps.remove(g + 1).1;
+                }
+                if g > 0 && gaps[g - 1].1 == gaps[g].0 {
+                    gaps[g - 1].1 = gaps.remove(g).1;
+                    g -= 1;
+                }
+                debug_assert!(gaps[g].0 < gaps[g].1);
+            }
+        }
+    }
+}
+
+/// The symmetric pattern by rows, diagonal included, sorted.
+fn pattern(n: usize, edges: impl Iterator<Item = (u32, u32)>) -> (Vec<usize>, Vec<u32>) {
+    let mut pairs: Vec<(u32, u32)> = Vec::with_capacity(2 * edges.size_hint().0 + n);
+    for (i, j) in edges {
+        assert!((i as usize) < n && (j as usize) < n, "an edge joins nodes");
+        if i != j {
+            pairs.push((i, j));
+            pairs.push((j, i));
+        }
+    }
+    pairs.extend((0..n as u32).map(|i| (i, i)));
+    // Two stable buckets: by column, then by row.
+    let mut start = vec![0_usize; n + 1];
+    pairs.iter().for_each(|p| start[p.1 as usize + 1] += 1);
+    (0..n).for_each(|i| start[i + 1] += start[i]);
+    let mut next = start.clone();
+    let mut by_column = vec![(0, 0); pairs.len()];
+    for &p in &pairs {
+        by_column[next[p.1 as usize]] = p;
+        next[p.1 as usize] += 1;
+    }
+    // The counts are the same by rows: the pairs are symmetric.
+    next.copy_from_slice(&start);
+    let mut columns = vec![0_u32; pairs.len()];
+    for (i, j) in by_column {
+        columns[next[i as usize]] = j;
+        next[i as usize] += 1;
+    }
+    // Duplicates out.
+    let mut out_start = vec![0_usize; n + 1];
+    let mut kept = 0;
+    for i in 0..n {
+        let from = kept;
+        for e in start[i]..start[i + 1] {
+            if kept == from || columns[kept - 1] != columns[e] {
+                columns[kept] = columns[e];
+                kept += 1;
+            }
+        }
+        out_start[i + 1] = kept;
+    }
+    columns.truncate(kept);
+    columns.shrink_to_fit();
+    (out_start, columns)
+}
+
+/// The node of each step of elimination and the step of each node: approximate minimum degree, in a postorder of the tree of elimination.
+fn elimination_order(start: &[usize], pattern: &[u32]) -> (Vec<u32>, Vec<u32>) {
+    let n = start.len() - 1;
+    let minimum_degree = minimum_degree(start, pattern);
+    let mut step = vec![0_u32; n];
+    minimum_degree.iter().enumerate().for_each(|(k, &i)| step[i as usize] = k as u32);
+    let parent = elimination_tree(start, pattern, &minimum_degree, &step);
+    // Postorder.
+    let (mut child, mut sibling) = (vec![NONE; n + 1], vec![NONE; n]);
+    for k in (0..n).rev() {
+        let p = (parent[k] as usize).min(n);
+        sibling[k] = child[p];
+        child[p] = k as u32;
+    }
+    let mut order = Vec::with_capacity(n);
+    let mut stack = vec![];
+    let mut at = child[n];
+    while at != NONE || !stack.is_empty() {
+        if at != NONE {
+            stack.push(at);
+            at = child[at as usize];
+        } else if let Some(k) = stack.pop() {
+            order.push(minimum_degree[k as usize]);
+            at = sibling[k as usize];
+        }
+    }
+    order.iter().enumerate().for_each(|(k, &i)| step[i as usize] = k as u32);
+    (order, step)
+}
+
+/// AMD of AmestoyDavisDuff1996, as faer has it.
+fn minimum_degree(start: &[usize], pattern: &[u32]) -> Vec<u32> {
+    let n = start.len() - 1;
+    // Strictly upper part by columns: the earlier entries of each row.
+    let mut column_start = vec![0_u32; n + 1];
+    let mut rows = Vec::with_capacity(pattern.len() / 2);
+    for j in 0..n {
+        rows.extend(pattern[start[j]..start[j + 1]].iter().filter(|&&i| (i as usize) < j));
+        column_start[j + 1] = rows.len() as u32;
+    }
+    let mut identity: Vec<u32> = (0..n as u32).collect();
+    if rows.is_empty() || n < 2 {
+        return identity;
+    }
+    let (mut order, mut inverse) = (vec![0_u32; n], vec![0_u32; n]);
+    let mut memory = MemBuffer::new(amd::order_scratch::<u32>(n, rows.len()));
+    let a = SymbolicSparseColMatRef::new_checked(n, n, &column_start, None, &rows);
+    let control = amd::Control::default();
+    let stack = MemStack::new(&mut memory);
+    if amd::order(&mut order, &mut inverse, a, control, stack).is_ok() {
+        identity = order;
+    }
+    identity
+}
+
+/// The parent of each step (Liu 1990), NONE for roots.
+fn elimination_tree(start: &[usize], pattern: &[u32], order: &[u32], step: &[u32]) -> Vec<u32> {
+    let n = order.len();
+    let (mut parent, mut ancestor) = (vec![NONE; n], vec![NONE; n]);
+    for k in 0..n {
+        let i = order[k] as usize;
+        for &j in &pattern[start[i]..start[i + 1]] {
+            let mut at = step[j as usize];
+            while at < k as u32 {
+                let next = ancestor[at as usize];
+                ancestor[at as usize] = k as u32;
+                if next == NONE {
+                    parent[at as usize] = k as u32;
+                    break;
+                }
+                at = next;
+            }
+        }
+    }
+    parent
+}
+
+/// Supernodes of equal structure, then merged with their parents where the estimated time says so.
+fn supernodes(
+    sizes: &[u32],
+    start: &[usize],
+    pattern: &[u32],
+    order: &[u32],
+    step: &[u32],
+) -> Vec<Super> {
+    let n = order.len();
+    let size = |k: u32| sizes[order[k as usize] as usize] as usize;
+    let mut supers: Vec<Super> = Vec::new();
+    // Supernodes that wait for the step that is the first of their rest; a list for each step.
+    let (mut waiting, mut next): (Vec<u32>, Vec<u32>) = (vec![NONE; n], vec![]);
+    let mut mark = vec![NONE; n];
+    let mut rest: Vec<u32> = vec![];
+    for k in 0..n as u32 {
+        rest.clear();
+        mark[k as usize] = k;
+        let i = order[k as usize] as usize;
+        let mut add = |j: u32, rest: &mut Vec<u32>| {
+            if mark[j as usize] != k {
+                mark[j as usize] = k;
+                rest.push(j);
+            }
+        };
+        for &j in &pattern[start[i]..start[i + 1]] {
+            let j = step[j as usize];
+            if j > k {
+                add(j, &mut rest);
+            }
+        }
+        // Children: those whose parent is k.
+        let mut c = waiting[k as usize];
+        while c != NONE {
+            for e in 0..supers[c as usize].rest.len() {
+                let j = supers[c as usize].rest[e];
+                add(j, &mut rest);
+            }
+            c = next[c as usize];
+        }
+        // The child k − 1 with the same structure goes on as the same supernode.
+        let same = supers.len().checked_sub(1).filter(|&s| {
+            let s = &supers[s];
+            s.parent == k
+                && s.rest.len() == rest.len() + 1
+                && s.columns.last() == k.checked_sub(1).as_ref()
+        });
+        let s = match same {
+            Some(s) => {
+                let last = &mut supers[s];
+                last.columns.push(k);
+                std::mem::swap(&mut last.rest, &mut rest);
+                s
+            }
+            None => {
+                supers.push(Super { columns: vec![k], rest: rest.clone(), ..Super::default() });
+                next.push(NONE);
+                supers.len() - 1
+            }
+        };
+        // The children other than itself now belong to s.
+        let mut c = waiting[k as usize];
+        while c != NONE {
+            let following = next[c as usize];
+            if c as usize != s {
+                supers[c as usize].parent = s as u32 | OWNED;
+            }
+            c = following;
+        }
+        let first = supers[s].rest.iter().copied().min().unwrap_or(NONE);
+        supers[s].parent = first;
+        if first != NONE {
+            next[s] = waiting[first as usize];
+            waiting[first as usize] = s as u32;
+        }
+    }
+    for s in &mut supers {
+        s.parent = if s.parent == NONE { NONE } else { s.parent & !OWNED };
+        s.pivots = s.columns.iter().map(|&k| size(k)).sum();
+        s.rest_size = s.rest.iter().map(|&k| size(k)).sum();
+    }
+    merge(&mut supers);
+    supers
+}
+
+/// Marks a parent that is a supernode already, no longer a step.
+const OWNED: u32 = 1 << 31;
+
+/// Merges fronts into their parents, bottom up, while the estimated time falls.
+fn merge(supers: &mut [Super]) {
+    let count = supers.len();
+    let (mut child, mut sibling) = (vec![NONE; count], vec![NONE; count]);
+    for p in 0..count {
+        // The children of p are complete: they come before it. Best gain first, as long as there is one.
+        loop {
+            let mut best = (0.0, NONE);
+            let (mut c, kp, mp) = (child[p], supers[p].pivots, supers[p].rest_size);
+            while c != NONE {
+                let (k, m) = (supers[c as usize].pivots, supers[c as usize].rest_size);
+                let apart = cost(k, m) + cost(kp, mp);
+                let gain = apart - cost(k + kp, mp);
+                if gain > best.0 {
+                    best = (gain, c);
+                }
+                c = sibling[c as usize];
+            }
+            if best.1 == NONE {
+                break;
+            }
+            // The merged child leaves the list, its children enter it.
+            let c = best.1;
+            let mut grandchild = child[c as usize];
+            let mut list = NONE;
+            let mut at = child[p];
+            while at != NONE {
+                let following = sibling[at as usize];
+                if at != c {
+                    sibling[at as usize] = list;
+                    list = at;
+                }
+                at = following;
+            }
+            while grandchild != NONE {
+                let following = sibling[grandchild as usize];
+                supers[grandchild as usize].parent = p as u32;
+                sibling[grandchild as usize] = list;
+                list = grandchild;
+                grandchild = following;
+            }
+            child[p] = list;
+            let merged = &mut supers[c as usize];
+            merged.merged = true;
+            let mut columns = std::mem::take(&mut merged.columns);
+            merged.rest = vec![];
+            let pivots = merged.pivots;
+            columns.append(&mut supers[p].columns);
+            supers[p].columns = columns;
+            supers[p].pivots += pivots;
+        }
+        let parent = supers[p].parent;
+        if parent != NONE {
+            sibling[p] = child[parent as usize];
+            child[parent as usize] = p as u32;
+        }
+    }
+}
