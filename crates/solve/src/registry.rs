@@ -220,6 +220,7 @@ pub const HYPERPLANE: About = About {
     summary: "hyperplane projection with a self-adaptive prediction",
     needs: &[],
     cites: &["SolodovTseng1996", "SolodovSvaiter1999", "AcaryBremondHuber2018"],
+    // normal=field is too slow for any problem that tests would run.
     variants: &["rule=khobotov"],
     settings: described::<Hyperplane>,
 };
@@ -496,6 +497,8 @@ mod tests {
             ("nsgs", vec!["local=newton_ac", "local_tolerance=adaptive"]),
             ("nsgs", vec!["local=projection_iterated", "local_tolerance=adaptive"]),
             ("extragradient", vec!["rule=solodov_tseng"]),
+            ("hyperplane", vec![]),
+            ("proximal/extragradient", vec![]),
             ("admm", vec![]),
             ("admm", vec!["rule=fixed", "anderson=5"]),
             ("proximal/nsgs", vec![]),

@@ -141,12 +141,30 @@ impl<P: Linear<D>, const D: usize> Field<P, D> {
 
     /// The step along −F(trial) from r to the hyperplane `F(trial)ᵀ(x − trial) = 0`.
     pub(super) fn step_to_hyperplane(&self, r: &[f64]) -> f64 {
+        self.step_along(&self.trial_f, r)
+    }
+
+    fn step_along(&self, normal: &[f64], r: &[f64]) -> f64 {
         let (mut ahead, mut size) = (0.0, 0.0);
-        for (i, f) in self.trial_f.iter().enumerate() {
+        for (i, f) in normal.iter().enumerate() {
             ahead += f * (r[i] - self.trial[i]);
             size += f * f / self.unit[i / D];
         }
         ahead / size
+    }
+
+    /// `F(r) ← w (r − trial) − ρ (F(r) − F(trial))`.
+    pub(super) fn residual_normal(&mut self, r: &[f64]) {
+        for i in 0..r.len() {
+            let w = self.unit[i / D];
+            let difference = self.f[i] - self.trial_f[i];
+            self.f[i] = w * (r[i] - self.trial[i]) - self.rho * difference;
+        }
+    }
+
+    /// The step along −F(r) from r to the hyperplane `F(r)ᵀ(x − trial) = 0`.
+    pub(super) fn step_along_normal(&self, r: &[f64]) -> f64 {
+        self.step_along(&self.f, r)
     }
 
     /// `Σ weight(w_c) ‖x_c − y_c‖²`.

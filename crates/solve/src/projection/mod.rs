@@ -16,7 +16,7 @@ pub use de_saxce::DeSaxce;
 pub use extragradient::Extragradient;
 pub use field::Field;
 pub use fixed_point::FixedPoint;
-pub use hyperplane::Hyperplane;
+pub use hyperplane::{Hyperplane, Normal};
 pub use step_rule::{Ratio, StepRule};
 
 use crate::form::Linear;

@@ -125,6 +125,8 @@ pub struct OuterWork<P: Linear<D>, S: Solver<Regularised<P>>, const D: usize> {
     begun_with: f64,
     /// Inner problems in a row that brought nothing.
     failures: usize,
+    /// Why the inner solver could not be told of its problem.
+    broken: Option<SolveError>,
 }
 
 /// Inner problems in a row that may bring nothing.
@@ -157,6 +159,7 @@ where
             since: 0,
             begun_with: f64::INFINITY,
             failures: 0,
+            broken: None,
         })
     }
 
@@ -175,12 +178,15 @@ where
         P::copy_point(point, &mut work.point);
         work.failures = 0;
         (work.begun_with, _) = work.residuals();
-        self.begin(work);
+        work.broken = self.begin(work).err();
     }
 
     fn step(&self, problem: &P, _: &mut P::Point, work: &mut Self::Work) -> Step {
         if let Some(ray) = problem.contradiction(&work.state) {
             return Step::NoSolution(ray.clone());
+        }
+        if let Some(error) = &work.broken {
+            return Step::Stuck(error.to_string().into());
         }
         let step = self.inner.step(&work.problem, &mut work.point, &mut work.work);
         work.steps += 1;
@@ -216,13 +222,8 @@ where
         if alpha > ALPHA_MOST || work.failures > FAILURES_MOST {
             return Step::Stuck("the inner solver makes no progress, whatever the weight".into());
         }
-        if alpha != work.alpha {
-            work.weigh(alpha);
-            if let Err(error) = self.inner.refill(&work.problem, &mut work.work) {
-                return Step::Stuck(error.to_string().into());
-            }
-        }
-        self.begin(work);
+        work.weigh(alpha);
+        work.broken = self.begin(work).err();
         Step::Continue { estimate: if better { error } else { f64::NAN } }
     }
 
@@ -237,15 +238,17 @@ where
 }
 
 impl<S, const D: usize> Outer<S, D> {
-    /// Begins an inner problem around the present point.
-    fn begin<P>(&self, work: &mut OuterWork<P, S, D>)
+    /// Begins an inner problem around the present point: another problem, which the inner solver must be told of.
+    fn begin<P>(&self, work: &mut OuterWork<P, S, D>) -> Result<(), SolveError>
     where
         P: Linear<D>,
         S: Solver<Regularised<P>>,
     {
         (work.steps, work.since) = (0, 0);
         work.problem.center.copy_from_slice(P::impulses(&mut work.point));
+        self.inner.refill(&work.problem, &mut work.work)?;
         self.inner.start(&work.problem, &mut work.point, &mut work.work);
+        Ok(())
     }
 
     fn next_alpha(&self, alpha: f64, success: bool, error: f64) -> f64 {
