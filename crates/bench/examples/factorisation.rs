@@ -184,8 +184,7 @@ mod peer {
         });
         outcome?;
         let mut memory = MemBuffer::new(symbolic.solve_in_place_scratch::<f64>(1, par));
-        // SAFETY: the numeric factor was just computed with this symbolic one.
-        let lu = unsafe { LuRef::new_unchecked(&symbolic, &numeric) };
+        let lu = LuRef::new_unchecked(&symbolic, &numeric);
         let solve = fastest(|| {
             x.copy_from_slice(b);
             let x = MatMut::from_column_major_slice_mut(x, n, 1);

@@ -3,14 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use nonsmooth_io::fclib::{self, FclibFile};
+use nonsmooth_problem::check::Existence;
 use nonsmooth_problem::linalg::Inverse;
 use nonsmooth_problem::traits::{Components, Mass, MuRange, Spectrum, SpectrumError, Traits};
 use nonsmooth_problem::{Dynamics, Friction, FrictionGlobal, ProblemError, with_friction};
+use nonsmooth_solve::{Limits, existence};
 use serde_json::{Value, json};
 
 use crate::kinds::Form;
 use crate::report::{self, Object, count, number, row};
-use crate::{Exit, files, output};
+use crate::{Exit, exists, files, interrupt, output};
 
 /// Describe the problems in files: sizes, structure, friction, and what is stored besides.
 ///
@@ -29,6 +31,10 @@ pub struct Args {
     /// The most rows for which the spectrum is computed
     #[arg(long, value_name = "ROWS", default_value = "2000", value_parser = files::whole, requires = "spectrum")]
     spectrum_limit: usize,
+    /// Decide whether a solution exists, as `nonsmooth exists` does, in at most 60 seconds. Without this, a short search
+    /// proves it for most problems of up to 2000 contacts
+    #[arg(long)]
+    existence: bool,
     /// Print one line of JSON for each file
     #[arg(long)]
     json: bool,
@@ -37,15 +43,26 @@ pub struct Args {
 const EXAMPLES: &str = "\
 Examples:
   nonsmooth info wall.hdf5
-  nonsmooth info wall.hdf5 --spectrum
+  nonsmooth info wall.hdf5 --spectrum --existence
   nonsmooth info *.hdf5 --json";
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
+    let limits = args.existence.then(|| Limits {
+        time_limit: Some(EXISTENCE_SECONDS),
+        cancel: Some(interrupt::flag()),
+        ..Limits::default()
+    });
     Ok(files::each(&args.files, args.json, |_, file| {
         let content = fclib::read(file).map_err(|e| e.to_string())?;
         let limit = args.spectrum.then_some(args.spectrum_limit);
-        let facts = with_friction!(&content.problem, p => facts(file, p, &content, limit))?;
+        let mut facts = with_friction!(&content.problem, p => facts(file, p, &content, limit))?;
+        if facts.singular.is_none() {
+            facts.existence = match &limits {
+                Some(limits) => Some(existence::of(&content.problem, limits)),
+                None => facts.is_small().then(|| existence::glance(&content.problem)),
+            };
+        }
         output::print(&if args.json {
             format!("{}\n", facts.json(&content))
         } else {
@@ -62,6 +79,8 @@ struct Facts {
     traits: Traits,
     /// Why a global problem's dynamics cannot be inverted, so that there is nothing to solve.
     singular: Option<ProblemError>,
+    /// If asked for, or cheap.
+    existence: Option<Existence>,
     /// If asked for.
     spectrum: Option<Result<Spectrum, SpectrumError>>,
     solution: Option<nonsmooth_problem::check::Verdict>,
@@ -88,10 +107,18 @@ fn facts<P: Form>(
             Friction::Global2(p) => singular(p),
             Friction::Global3(p) => singular(p),
         },
+        existence: None,
         spectrum: spectrum.map(|limit| Spectrum::of(&content.problem, limit)),
         solution,
     })
 }
+
+/// The time for the existence of a solution.
+const EXISTENCE_SECONDS: f64 = 60.0;
+/// A short search for existence takes up to about a second with so many contacts, unless a body has many unknowns.
+const FEW_CONTACTS: usize = 2000;
+/// Unknowns of a rigid body or a small elastic one.
+const SMALL_BODY: usize = 48;
 
 /// The tolerance at which a stored solution is judged.
 const JUDGED_AT: f64 = 1e-8;
@@ -105,6 +132,12 @@ fn singular<const D: usize>(p: &FrictionGlobal<D>) -> Option<ProblemError> {
 }
 
 impl Facts {
+    /// A short search for existence costs next to nothing.
+    fn is_small(&self) -> bool {
+        let bodies = self.traits.mass.iter().flat_map(|m| &m.components);
+        self.traits.contacts <= FEW_CONTACTS && bodies.map(|c| c.size).all(|s| s <= SMALL_BODY)
+    }
+
     fn json(&self, content: &FclibFile) -> Value {
         let mut all = self.sizes.clone();
         let traits = &self.traits;
@@ -137,6 +170,10 @@ impl Facts {
         })));
         if let Some(spectrum) = &self.spectrum {
             all.extend(spectrum_json(spectrum));
+        }
+        if let Some(existence) = &self.existence {
+            let verdict = exists::fields(existence, traits.contacts);
+            all.insert("existence".into(), Value::Object(verdict));
         }
         all.extend(report::fields(json!({
             "guesses": content.guesses.len(),
@@ -194,6 +231,9 @@ impl Facts {
         }
         if let Some(spectrum) = &self.spectrum {
             row(&mut text, "spectrum", spectrum_text(spectrum));
+        }
+        if let Some(existence) = &self.existence {
+            row(&mut text, "existence", existence);
         }
         if traits.bilateral_rows > 0 {
             row(&mut text, "bilateral", count(traits.bilateral_rows, "row"));

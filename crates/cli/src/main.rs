@@ -6,6 +6,8 @@
 
 mod bench;
 mod check;
+mod diagnose;
+mod exists;
 mod files;
 mod generate;
 mod info;
@@ -53,6 +55,8 @@ const EXAMPLES: &str = "\
 Examples:
   nonsmooth gen wall --set rows=8 --out wall.hdf5    a problem to begin with
   nonsmooth info wall.hdf5                           what it is
+  nonsmooth exists wall.hdf5                         whether a solution exists, with a certificate
+  nonsmooth diagnose wall.hdf5                       what makes it hard, and what to try
   nonsmooth solve wall.hdf5 --out solved.hdf5        solve it and keep the solution
   nonsmooth check solved.hdf5                        have the solution judged again
   nonsmooth list                                     the solvers and their settings
@@ -67,6 +71,8 @@ enum Command {
     Solve(solve::Args),
     Check(check::Args),
     Info(info::Args),
+    Exists(exists::Args),
+    Diagnose(diagnose::Args),
     List(list::Args),
     Gen(generate::Args),
     Bench(bench::Args),
@@ -86,6 +92,8 @@ fn main() -> ExitCode {
         Command::Solve(args) => solve::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Info(args) => info::run(&args),
+        Command::Exists(args) => exists::run(&args),
+        Command::Diagnose(args) => diagnose::run(&args),
         Command::List(args) => list::run(&args),
         Command::Gen(args) => generate::run(&args),
         Command::Bench(args) => bench::run(&args),

@@ -7,7 +7,7 @@ use nonsmooth_dynamics::SceneEntry;
 use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
 use nonsmooth_problem::linalg::Csc;
 use nonsmooth_problem::planted::Planted;
-use nonsmooth_problem::{BilateralGlobal, Friction, with_friction};
+use nonsmooth_problem::{BilateralGlobal, Friction, FrictionGlobal, with_friction};
 
 const JUDGED: &str = "file kind contacts unknowns status message tolerance residual/absolute residual/relative \
     residual/paper residual/peer residual/primal residual/dual residual/complementarity failing contacts_by_status/open \
@@ -350,4 +350,74 @@ fn help_shows_examples() {
         assert!(help.contains("Examples:"), "{command}");
     }
     assert!(folder.run("--version").exits(0).stdout.starts_with("nonsmooth "));
+}
+
+/// A mass pressed between two walls that approach each other, in the plane.
+fn squeezed(mu: f64) -> Friction {
+    let h = [(0, 0, 1.0), (1, 1, 1.0), (0, 2, -1.0), (1, 3, -1.0)];
+    let h = Csc::from_triplets(2, 4, h.into_iter()).unwrap();
+    let (m, w) = (Csc::diagonal(&[1.0, 1.0]), vec![-1.0, 0.0, -1.0, 0.0]);
+    Friction::Global2(FrictionGlobal::new(m, h, vec![0.0; 2], w, vec![mu; 2]).unwrap())
+}
+
+#[test]
+fn exists_proves_refutes_and_writes_its_certificate() {
+    let folder = Folder::with_problems();
+    let text = folder.run("exists wall.hdf5").exits(0).stdout;
+    assert!(text.starts_with("wall.hdf5: existence of a solution proved: a motion "), "{text}");
+    let run = folder.run("exists wall.hdf5 box.hdf5 --json --certificate out/").exits(0);
+    for line in run.json() {
+        has_keys(&line, "file kind contacts unknowns verdict margin shift message seconds");
+        assert_eq!(line["verdict"], "proved");
+    }
+    let kept = std::fs::read_to_string(folder.path("out/wall.certificate.json")).unwrap();
+    let kept: serde_json::Value = serde_json::from_str(&kept).unwrap();
+    assert!(kept["motion"].as_array().is_some_and(|v| v.len() > 6), "{kept}");
+
+    for mu in [0.0, 0.8] {
+        fclib::write(folder.path("squeezed.hdf5"), &FclibFile::new(squeezed(mu))).unwrap();
+        let text = folder.run("exists squeezed.hdf5").exits(1).stdout;
+        assert!(text.contains("solution none: ") && text.contains("2 contacts"), "{text}");
+        let line = folder.run("exists squeezed.hdf5 --json").exits(1).json().remove(0);
+        assert_eq!(
+            (&line["verdict"], &line["pressed_contacts"]),
+            (&"no_solution".into(), &vec![0, 1].into())
+        );
+    }
+    folder.run("exists nothing.hdf5").refused(&["nothing.hdf5"]);
+    folder.run("exists wall.hdf5 --time-limit -1").refused(&["--time-limit"]);
+}
+
+#[test]
+fn info_says_whether_a_solution_exists() {
+    let folder = Folder::with_problems();
+    let text = folder.run("info wall.hdf5").exits(0).stdout;
+    assert!(text.contains("  existence  proved: "), "{text}");
+    fclib::write(folder.path("squeezed.hdf5"), &FclibFile::new(squeezed(0.3))).unwrap();
+    let short = folder.run("info squeezed.hdf5 --json").exits(0).json().remove(0);
+    assert_eq!(short["existence"]["verdict"], "unknown");
+    let long = folder.run("info squeezed.hdf5 --existence --json").exits(0).json().remove(0);
+    assert_eq!(long["existence"]["verdict"], "no_solution");
+}
+
+#[test]
+fn diagnose_explains_and_names_solvers_that_exist() {
+    let folder = Folder::with_problems();
+    let text = folder.run("diagnose box.hdf5").exits(0).stdout;
+    for part in
+        ["hard by its ", "W has rank 6 of 12", "  existence  proved", "  try        --solver "]
+    {
+        assert!(text.contains(part), "{part} in {text}");
+    }
+    let list = folder.run("list --json").exits(0).json().remove(0);
+    let known: Vec<_> = list["solvers"].as_array().unwrap().iter().map(|s| &s["name"]).collect();
+    for line in folder.run("diagnose wall.hdf5 box.hdf5 --json").exits(0).json() {
+        has_keys(&line, "file contacts findings/0/about findings/0/says findings/0/hard suits/0");
+        for name in line["suits"].as_array().unwrap() {
+            assert!(known.contains(&name), "{name}");
+        }
+    }
+    fclib::write(folder.path("squeezed.hdf5"), &FclibFile::new(squeezed(1.5))).unwrap();
+    let text = folder.run("diagnose squeezed.hdf5").exits(0).stdout;
+    assert!(text.contains("No solver can succeed") && !text.contains("--solver"), "{text}");
 }

@@ -48,7 +48,7 @@ pub use nonsmooth_solve as solve;
 
 pub use nonsmooth_dynamics::{Scene, SceneError};
 pub use nonsmooth_io::{IoError, fclib};
-pub use nonsmooth_problem::check::{Certificate, Judged, Measure, Motion, Verdict};
+pub use nonsmooth_problem::check::{Certificate, Existence, Judged, Measure, Motion, Verdict};
 pub use nonsmooth_problem::linalg::{Bsr, Csc};
 pub use nonsmooth_problem::planted::Planted;
 pub use nonsmooth_problem::with_friction;

@@ -6,7 +6,7 @@ use std::backtrace::Backtrace;
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 
-use nonsmooth::problem::linalg::{Bsr, Csc};
+use nonsmooth::problem::linalg::{BlockLu, Bsr, Csc};
 use nonsmooth::solve::registry::{self, Registered};
 use nonsmooth::{FrictionGlobal, FrictionLocal, Limits, Planted, Session};
 
@@ -255,4 +255,30 @@ fn iterations_allocate_nothing() {
         growing("global 3D", &planted(0).global::<3>().0),
         growing("global 3D with bilateral constraints", &planted(4).global::<3>().0),
     ]);
+}
+
+#[test]
+fn factorising_and_solving_allocate_nothing() {
+    // A grid of bodies that is large enough for fronts of all sizes.
+    let n = 20_u32;
+    let right = (0..n * n).filter(|k| (k + 1) % n != 0).map(|k| (k, k + 1));
+    let up = (0..n * n - n).map(|k| (k, k + n));
+    let edges: Vec<_> = right.chain(up).collect();
+    let mut lu = BlockLu::new(&vec![6; (n * n) as usize], edges.iter().copied());
+    let block: [f64; 36] = std::array::from_fn(|k| (k as f64).sin());
+    let strong: [f64; 36] = std::array::from_fn(|k| if k % 7 == 0 { 100.0 } else { 0.0 });
+    let slots: Vec<_> = edges.iter().map(|&(i, j)| lu.slot(i as usize, j as usize)).collect();
+    let diagonal: Vec<_> = (0..(n * n) as usize).map(|i| lu.slot(i, i)).collect();
+    let mut x = vec![1.0; lu.dim()];
+    let count = counted(|| {
+        for _ in 0..2 {
+            lu.clear();
+            slots.iter().for_each(|&s| lu.add_at(s, &block));
+            diagonal.iter().for_each(|&s| lu.add_at(s, &strong));
+            lu.factorise().expect("diagonally dominant");
+            lu.solve(&mut x);
+        }
+    });
+    assert_eq!((count.calls, lu.perturbed()), (0, 0));
+    assert!(x.iter().all(|x| x.is_finite()));
 }

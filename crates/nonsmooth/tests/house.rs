@@ -53,7 +53,8 @@ const PROBLEM: Floors = Floors {
 };
 
 /// `families → {local, parts, solver, reform} → form → cfun → cone`. The loop and the composition stand on the
-/// contract of a solver; the registry stands above all, and a family sees of it what it needs to be registered.
+/// contract of a solver, and so does the question of existence, which any family may ask; the registry stands above all, and
+/// a family sees of it what it needs to be registered.
 const SOLVE: Floors = Floors {
     floors: &[
         &["error", "settings"],
@@ -61,9 +62,9 @@ const SOLVE: Floors = Floors {
         &["cfun"],
         &["form"],
         &["local", "parts", "solver", "reform"],
-        &["drive", "via", "trace"],
+        &["drive", "via", "trace", "existence"],
         &[],
-        &["registry"],
+        &["registry", "diagnose"],
     ],
     others: 6,
     others_mix: false,

@@ -186,6 +186,9 @@ pub trait Session<P: Problem>: Send {
 
     /// The judge's visits during the last solve, thinned evenly where there were very many.
     fn history(&self) -> &[Sample];
+
+    /// What the solver says that it did during the last solve; empty where it has nothing to tell.
+    fn account(&self) -> Vec<String>;
 }
 
 /// The most samples that a history keeps.
@@ -260,6 +263,10 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
 
     fn history(&self) -> &[Sample] {
         &self.history
+    }
+
+    fn account(&self) -> Vec<String> {
+        self.kept.as_ref().map_or(vec![], |kept| self.solver.account(&kept.work))
     }
 }
 

@@ -21,8 +21,10 @@
 pub mod auto;
 pub mod cfun;
 pub mod cone;
+pub mod diagnose;
 mod drive;
 mod error;
+pub mod existence;
 pub mod form;
 pub mod local;
 pub mod parts;

@@ -4,6 +4,7 @@
 
 use std::marker::PhantomData;
 
+use nonsmooth_problem::check::Kinematic;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use serde::Serialize;
 
@@ -275,7 +276,7 @@ pub const AUTO: About = About {
 fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
 where
     V: Visitor,
-    V::Problem: Concurrent<D> + Linearised<D>,
+    V::Problem: Concurrent<D> + Linearised<D> + Kinematic<D>,
 {
     fn projected<const D: usize, V, M>(
         settings: &SettingsMap,

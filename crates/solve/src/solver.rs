@@ -44,6 +44,11 @@ pub trait Solver<P: Problem>: Send {
     /// iterate lives in the workspace (velocities, a reduced problem) write it out here.
     fn publish(&self, _problem: &P, _point: &mut P::Point, _work: &mut Self::Work) {}
 
+    /// What the last solve did, in a few sentences for its user; nothing where there is nothing to tell.
+    fn account(&self, _work: &Self::Work) -> Vec<String> {
+        vec![]
+    }
+
     /// The number of steps between two visits of the judge, unless the estimate calls it earlier.
     /// A judgement costs about one product with W.
     fn check_every(&self) -> usize {

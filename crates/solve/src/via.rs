@@ -68,6 +68,10 @@ where
         self.reformulation.lift(problem, &work.point, &mut work.memo, point);
     }
 
+    fn account(&self, work: &Self::Work) -> Vec<String> {
+        self.solver.account(&work.work)
+    }
+
     fn check_every(&self) -> usize {
         self.solver.check_every()
     }

@@ -2,20 +2,20 @@
 
 use serde::Serialize;
 
-use super::contact::distance_to_cone;
-use crate::linalg::{norm, small};
+use super::{Kinematic, Kinematics};
 use crate::{FrictionGlobal, FrictionLocal};
 
 /// Impulses that every admissible motion would have to feed: proof that a problem has no solution.
 ///
-/// Let `r ∈ K` with `r_c = 0` wherever `mu_c > 0`, and multipliers `lambda`.
+/// Let `r_N ≥ 0` and `r_T = 0` at every contact, and multipliers `lambda`.
 ///
 /// - Local: `(r, lambda)ᵀ [W, V; Vᵀ, R] = 0` and `qᵀ r + sᵀ lambda < 0`.
 /// - Global: `H r + G lambda = 0` and `wᵀ r + bᵀ lambda < 0`.
 ///
-/// Any solution has `ũ ∈ K*`, so `rᵀ ũ ≥ 0`; on the support of r friction vanishes and `rᵀ ũ = rᵀ u`, which the
-/// two equations make negative: a contradiction (Farkas' alternative). With friction on the support the
-/// sliding term could still make the product positive, so such an r proves nothing and is refused.
+/// Any solution has `u_N ≥ 0`, so `rᵀ u = Σ r_N u_N ≥ 0`, which the two equations make negative: a contradiction (Farkas'
+/// alternative), whatever mu. With `r_T ≠ 0` there is none: of a solution only `ũ ∈ K*` is known, so `rᵀ u ≥ −Σ mu r_N‖u_T‖`, which may
+/// be negative where contacts slide. Such an r is refused here; it refutes the criterion of existence only
+/// ([`Kinematics::refutes_criterion`]).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Certificate {
     /// Contact impulses of the ray.
@@ -40,106 +40,31 @@ impl Certificate {
         }
         verify(&ray).then_some(ray)
     }
-}
 
-/// The relative rounding that "equals zero" forgives.
-const ZERO: f64 = 1e-10;
-/// The relative margin by which the product must be negative.
-const NEGATIVE: f64 = 1e-8;
+    /// Which of the `contacts` have an impulse.
+    pub fn pressed(&self, contacts: usize) -> Vec<usize> {
+        let width = self.r.len() / contacts.max(1);
+        let any = |c: &usize| self.r[width * c..width * (c + 1)].iter().any(|r| *r != 0.0);
+        (0..contacts).filter(any).collect()
+    }
+}
 
 pub(crate) fn refutes_local<const D: usize>(
     problem: &FrictionLocal<D>,
     certificate: &Certificate,
 ) -> bool {
-    let (r, lambda) = (&certificate.r, &certificate.lambda);
-    if !admissible::<D>(r, &problem.mu) || lambda.len() != problem.multipliers() {
-        return false;
-    }
-    // The rows (r, λ) of [W V; Vᵀ R] vanish; the sizes of the terms say what vanishing means.
-    let mut product = vec![0.0; r.len() + lambda.len()];
-    let mut size = product.clone();
-    for i in 0..problem.contacts() {
-        let (cols, blocks) = problem.W.row(i);
-        for (&j, b) in cols.iter().zip(blocks) {
-            for k in 0..D {
-                for l in 0..D {
-                    let term = b[k][l] * r[D * i + k];
-                    product[D * j as usize + l] += term;
-                    size[D * j as usize + l] += term.abs();
-                }
-            }
-        }
-    }
-    let mut load = Load::default();
-    load.add(&problem.q, r);
-    if let Some(b) = &problem.bilateral {
-        let m = r.len();
-        let entries = (b.V.triplets().map(|(i, j, x)| (i, m + j, x)))
-            .chain(b.V.triplets().map(|(i, j, x)| (m + j, i, x)))
-            .chain(b.R.triplets().map(|(i, j, x)| (m + i, m + j, x)));
-        for (i, j, x) in entries {
-            let term = x * if i < m { r[i] } else { lambda[i - m] };
-            product[j] += term;
-            size[j] += term.abs();
-        }
-        load.add(&b.s, lambda);
-    }
-    norm(&product) <= ZERO * norm(&size) && load.is_negative()
+    refutes(problem.kinematics(), certificate)
 }
 
 pub(crate) fn refutes_global<const D: usize>(
     problem: &FrictionGlobal<D>,
     certificate: &Certificate,
 ) -> bool {
-    let (r, lambda) = (&certificate.r, &certificate.lambda);
-    if !admissible::<D>(r, &problem.mu) || lambda.len() != problem.multipliers() {
-        return false;
-    }
-    let mut product = vec![0.0; problem.dofs()];
-    let mut size = product.clone();
-    let mut load = Load::default();
-    load.add(&problem.w, r);
-    let mut add = |a: &crate::linalg::Csc, x: &[f64]| {
-        for (i, j, value) in a.triplets() {
-            product[i] += value * x[j];
-            size[i] += (value * x[j]).abs();
-        }
-    };
-    add(&problem.H, r);
-    if let Some(b) = &problem.bilateral {
-        add(&b.G, lambda);
-        load.add(&b.b, lambda);
-    }
-    norm(&product) <= ZERO * norm(&size) && load.is_negative()
+    refutes(problem.kinematics(), certificate)
 }
 
-/// A sum of products and of their sizes.
-#[derive(Default)]
-struct Load {
-    sum: f64,
-    size: f64,
-}
-
-impl Load {
-    fn add(&mut self, a: &[f64], b: &[f64]) {
-        self.sum += dot(a, b);
-        self.size += a.iter().zip(b).map(|(x, y)| (x * y).abs()).sum::<f64>();
-    }
-
-    fn is_negative(&self) -> bool {
-        self.sum < -NEGATIVE * self.size
-    }
-}
-
-/// `r ∈ K`, supported on frictionless contacts, finite and of the right length.
-fn admissible<const D: usize>(r: &[f64], mu: &[f64]) -> bool {
-    let scale = norm(r);
-    r.len() == D * mu.len()
-        && scale.is_finite()
-        && mu.iter().enumerate().all(|(c, &mu)| {
-            let rc: [f64; D] = small::block(r, c);
-            if mu > 0.0 { rc == [0.0; D] } else { distance_to_cone(&rc, 0.0) <= 1e-14 * scale }
-        })
+fn refutes<const D: usize>(kinematics: Kinematics<D>, certificate: &Certificate) -> bool {
+    kinematics.refutes(certificate)
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -183,12 +108,15 @@ mod tests {
     }
 
     #[test]
-    fn squeezing_walls_are_refuted_without_friction_only() {
+    fn squeezing_walls_are_refuted_whatever_the_friction() {
         let ray = Certificate { r: vec![1.0, 0.0, 1.0, 0.0], lambda: vec![] };
-        let (global, local) = squeezed(0.0);
-        assert!(refutes_global(&global, &ray) && refutes_local(&local, &ray));
-        let (global, local) = squeezed(0.5);
-        assert!(!refutes_global(&global, &ray) && !refutes_local(&local, &ray));
+        for mu in [0.0, 0.5, 3.0] {
+            let (global, local) = squeezed(mu);
+            assert!(refutes_global(&global, &ray) && refutes_local(&local, &ray), "mu = {mu}");
+            // Tangential impulses that balance as well and lie in K spoil the proof.
+            let tilted = Certificate { r: vec![1.0, 0.1, 1.0, 0.1], lambda: vec![] };
+            assert!(!refutes_global(&global, &tilted) && !refutes_local(&local, &tilted));
+        }
     }
 
     #[test]

@@ -36,7 +36,8 @@ pub(super) fn modified_velocity<const D: usize>(u: &[f64; D], mu: f64) -> [f64; 
 /// x itself inside, else its projection on the ray `(cos φ, sin φ)`, `tan φ = mu`, or the apex.
 pub(super) fn nearest_in_cone<const D: usize>(x: &[f64; D], mu: f64) -> [f64; D] {
     let t = tangential_norm(x);
-    if t <= mu * x[0] {
+    // Without friction K is a half line: t = 0 alone does not put x on it.
+    if t <= mu * x[0] && x[0] >= 0.0 {
         return *x;
     }
     let secant = (1.0 + mu * mu).sqrt();
@@ -74,7 +75,7 @@ pub(super) fn natural_map<const D: usize>(x: &[f64; D], modified: &[f64; D], mu:
     }
     let t = tangential_norm(&y);
     let outside = t - mu * y[0];
-    if outside <= 0.0 {
+    if outside <= 0.0 && y[0] >= 0.0 {
         return *modified;
     }
     if y[0] + mu * t <= 0.0 {
@@ -145,6 +146,22 @@ mod tests {
         assert_eq!(pressed, ContactStatus { status: Motion::Slip, degenerate: false });
         let open = status(&[0.0; 3], &[1.0, 5.0, 0.0], 0.0, 1e-9);
         assert_eq!(open, ContactStatus { status: Motion::Open, degenerate: false });
+    }
+
+    #[test]
+    fn without_friction_and_tangential_parts_the_normal_part_decides() {
+        // A pulling impulse is no solution, an open contact is one.
+        for (x, modified, residual) in [
+            ([-5.0, 0.0], [0.0, 0.0], 5.0),
+            ([0.0, 0.0], [1.0, 0.0], 0.0),
+            ([5.0, 0.0], [0.0, 0.0], 0.0),
+        ] {
+            let phi = natural_map(&x, &modified, 0.0);
+            assert_eq!((phi[0].abs(), phi[1]), (residual, 0.0), "{x:?} {modified:?}");
+        }
+        assert_eq!(distance_to_cone(&[-5.0, 0.0, 0.0], 0.0), 5.0);
+        assert_eq!(distance_to_dual(&[5.0, 0.0, 0.0], 0.0), 0.0);
+        assert_eq!(distance_to_dual(&[-5.0, 0.0, 0.0], 0.0), 5.0);
     }
 
     #[test]

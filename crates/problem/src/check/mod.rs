@@ -6,6 +6,7 @@
 
 mod certificate;
 mod contact;
+mod existence;
 mod global;
 mod local;
 mod rows;
@@ -14,6 +15,7 @@ mod verdict;
 pub use certificate::Certificate;
 pub(crate) use certificate::{refutes_global, refutes_local};
 pub use contact::{ContactStatus, Motion};
+pub use existence::{Existence, Kinematic, Kinematics};
 pub use global::GlobalGauge;
 pub use local::LocalGauge;
 pub use verdict::{Judged, StatusCounts, Verdict};

@@ -400,6 +400,23 @@ fn factorise(a: &Csc, index: &[usize], place: &[(u32, u32)]) -> Option<Factor> {
     matrix.sp_lu().ok().map(|lu| Factor::Sparse(Box::new(lu)))
 }
 
+/// Whether the symmetric part of `a`, with `shift` times its mean diagonal added to its diagonal, is positive definite.
+///
+/// Cost: one sparse Cholesky factorisation, not counted by [`factorisations`].
+pub fn is_positive_definite(a: &Csc, shift: f64) -> bool {
+    let n = a.nrows();
+    let mean = (0..n).map(|i| a.get(i, i)).sum::<f64>() / n.max(1) as f64;
+    let halves = a.triplets().flat_map(|(i, j, x)| [(i, j, 0.5 * x), (j, i, 0.5 * x)]);
+    let shifts = (0..n).map(|i| (i, i, shift * mean));
+    let Ok(symmetric) = Csc::from_triplets(n, n, halves.chain(shifts)) else {
+        return false;
+    };
+    let lower = symmetric.triplets().filter(|(i, j, _)| i >= j);
+    let lower: Vec<_> = lower.map(|(i, j, x)| Triplet::new(i, j, x)).collect();
+    SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &lower)
+        .is_ok_and(|a| a.sp_cholesky(faer::Side::Lower).is_ok())
+}
+
 /// Connected components of the graph of `a + aᵀ`: the unknowns of each, and each unknown's place.
 fn connected_components(a: &Csc) -> (Vec<Vec<usize>>, Vec<(u32, u32)>) {
     let n = a.nrows();

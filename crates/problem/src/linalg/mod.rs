@@ -21,7 +21,7 @@ pub use compensated::Compensated;
 pub use csc::Csc;
 pub use delassus::Delassus;
 pub use groups::Groups;
-pub use inverse::{Inverse, Refine, factorisations};
+pub use inverse::{Inverse, Refine, factorisations, is_positive_definite};
 
 /// The Euclidean norm, scaled so that neither overflow nor underflow of the squares spoils it.
 pub fn norm(x: &[f64]) -> f64 {

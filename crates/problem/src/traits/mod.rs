@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 pub use pattern::Pattern;
-pub use spectrum::{Spectrum, SpectrumError};
+pub use spectrum::{Spectrum, SpectrumError, rank};
 
 use crate::linalg::Groups;
 use crate::{Friction, FrictionGlobal, FrictionLocal, Kind, Problem};

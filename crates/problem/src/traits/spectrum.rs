@@ -3,7 +3,7 @@
 use faer::{Mat, Side};
 use serde::{Deserialize, Serialize};
 
-use crate::linalg::{Bsr, Csc, Delassus, Inverse, norm_of};
+use crate::linalg::{Bsr, Csc, Delassus, Inverse, norm, norm_of};
 use crate::{Friction, FrictionGlobal, FrictionLocal, ProblemError};
 
 /// What the singular values `σ_1 ≥ … ≥ σ_m ≥ 0` of W say, bilateral constraints left aside (W is that of the free
@@ -120,6 +120,25 @@ impl Spectrum {
     }
 }
 
+/// The rank of a sparse matrix whose columns count the same whatever their size: singular values above ε times the larger
+/// dimension times the largest. `None` where the dense matrix would have more than `limit` entries, or an entry is not finite.
+pub fn rank(a: &Csc, limit: usize) -> Option<usize> {
+    if a.nrows().checked_mul(a.ncols())? > limit {
+        return None;
+    }
+    let mut unit = dense(a);
+    for j in 0..a.ncols() {
+        let size = norm(a.column(j).1);
+        if size > 0.0 {
+            (0..a.nrows()).for_each(|i| unit[(i, j)] /= size);
+        }
+    }
+    let values = singular_values(&unit).ok()?;
+    let cut =
+        a.nrows().max(a.ncols()) as f64 * f64::EPSILON * values.first().copied().unwrap_or(0.0);
+    Some(values.iter().filter(|&&s| s > cut).count())
+}
+
 /// A dense matrix of `rows` rows is small enough.
 fn within(rows: usize, limit: usize) -> Result<(), SpectrumError> {
     if rows <= limit { Ok(()) } else { Err(SpectrumError::TooLarge { rows, limit }) }
@@ -204,6 +223,14 @@ mod tests {
             assert!((found.skew - other.skew).abs() < 1e-12 * found.largest);
             assert_eq!(skew > 0.0, found.skew > 0.01);
         }
+    }
+
+    #[test]
+    fn redundant_columns_do_not_count_however_large() {
+        let entries = [(0, 0, 1.0), (1, 1, 1e-9), (0, 2, 2e9), (1, 2, 2e9), (0, 3, 3.0)];
+        let a = Csc::from_triplets(3, 5, entries.into_iter()).unwrap();
+        assert_eq!((rank(&a, 15), rank(&a, 14)), (Some(2), None));
+        assert_eq!(rank(&Csc::zeros(2, 2), 4), Some(0));
     }
 
     #[test]

@@ -1,120 +1,144 @@
-//! `auto`.
+//! **auto**: one method for every frictional contact problem, which needs no setting.
+//!
+//! Problem: `u = W r + q`, `K* ∋ u + mu‖u_T‖e_N ⟂ r ∈ K` for each contact, W of any rank, local or global, in the plane or in space.
+//!
+//! Method, each stage only where the one before it would take longer:
+//!
+//! 1. **Sweeps**: exact Gauss–Seidel for as long as its rate of convergence promises the tolerance sooner than a few
+//!    factorisations would. Many problems end here.
+//! 2. **Interior point** on the exact law ([`Central`]), a starter: some 8 to 20 iterations lead near the solution of a problem
+//!    at rest; where the central path turns back it is left again.
+//! 3. **Proximal point, semismooth Newton inside** ([`ProximalNewton`]): ε falls as fast as the subproblems are solved
+//!    easily, and rises where they are not. It keeps full accuracy on hyperstatic problems.
+//! 4. **Sweeps between the proximal steps**, while they help: they move the impulses within the null space of W, which Newton leaves
+//!    where they are.
+//! 5. **Another strategy** (other ρ, more sweeps, a cold start) where the error has not halved for long; at the first time
+//!    the existence of a solution is investigated, and a problem without one is given up with its certificate.
+//!
+//! References: AcaryBremondHuber2018 for the evidence that proximal Newton methods solve hyperstatic problems; AlartCurnier1991; the
+//! parts' own files.
+//!
+//! Cost: a sweep is one pass over W; an iteration of 2 and 3 one factorisation of a matrix over the bodies (global) or the contacts
+//! (local). The choice goes by counted operations, never by the clock, so a run repeats itself bit by bit.
+//! Fails: impacts on thousands of hyperstatic contacts may need more factorisations than patience allows.
 
+mod controller;
+
+use nonsmooth_problem::check::{Certificate, Existence, Kinematic};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::existence;
 use crate::form::{Access, Costs, Linearised};
-use crate::parts::{ProximalNewton, Sweep};
+use crate::parts::{Central, ProximalNewton, Sweep};
 use crate::settings::Settings;
-use crate::{SolveError, Solver, Step};
+use crate::{Limits, SolveError, Solver, Step};
+use controller::{Controller, Verdict};
 
-/// The hyperparameters.
+/// The hyperparameters of `auto`; none needs to be set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Auto {
-    /// kappa.
-    pub kappa: f64,
-    /// Sweeps between.
-    pub sweep_fraction: f64,
-    /// rule
-    pub rule: usize,
-    /// first epsilon
-    pub epsilon: f64,
-    /// print
-    pub verbose: bool,
-    /// idle
-    pub patience: usize,
-    /// floor factor
-    pub floor: f64,
-    /// revert
-    pub revert: f64,
+    /// Whether an interior point may make the start; false goes from the sweeps to the proximal point method at once.
+    pub interior: bool,
+    /// Give up after this many strategies in a row that have not halved the error; 0 goes on until a limit ends the solve.
+    pub strategies: usize,
 }
 
 impl Default for Auto {
     fn default() -> Self {
-        Self {
-            kappa: 30.0,
-            sweep_fraction: 0.3,
-            rule: 0,
-            epsilon: 1.0,
-            verbose: false,
-            patience: 10,
-            floor: 2.0,
-            revert: 5.0,
-        }
+        Self { interior: true, strategies: 12 }
     }
 }
 
 impl Settings for Auto {}
 
-/// For contacts of dimension D.
+/// `auto` for contacts of dimension D.
 #[derive(Debug, Clone)]
 pub struct Hybrid<const D: usize>(pub Auto);
 
-/// The workspace.
+/// A first stage of sweeps is at least this long, unless it ends at the tolerance.
+const FIRST_SWEEPS: usize = 50;
+/// Sweeps of a step.
+const SWEEPS_A_STEP: usize = 10;
+/// A solve by Newton's method is taken to cost this many factorisations.
+const NEWTON: f64 = 10.0;
+/// Sweeps may cost this many times as much as they were compared with, before their promise is no longer believed.
+const BELIEF: f64 = 3.0;
+/// The interior point ends after this many iterations, or below this error, or after so many iterations that did not halve the
+/// error, or so many short steps in a row.
+const INTERIOR: usize = 60;
+const INTERIOR_ERROR: f64 = 1e-8;
+const INTERIOR_IDLE: usize = 10;
+const INTERIOR_SHORT: (f64, usize) = (1e-6, 6);
+/// Above this error between two proximal steps, sweeps.
+const SWEEP_ABOVE: f64 = 1e-9;
+/// Sweeps that raise the error by more than this factor are taken back.
+const TAKE_BACK: f64 = 5.0;
+/// An investigation of existence may take this long, in seconds.
+const INVESTIGATION: f64 = 10.0;
+
+/// The workspace. The later stages' parts are made when they are first needed.
 pub struct HybridWork<P: Linearised<D>, const D: usize> {
     state: P::State,
     sweep: Sweep<D>,
+    central: Option<Box<Central<D>>>,
     newton: Option<Box<ProximalNewton<D>>>,
+    controller: Controller,
+    costs: Option<Costs>,
     scale: f64,
     tolerance: f64,
-    phase: Phase,
-    costs: Option<Costs>,
-    sweeps: usize,
-    /// log10 estimates of the sweeps
-    last_estimate: f64,
-    outer: Outer,
-    best_r: Vec<f64>,
+    stage: Stage,
+    /// The impulses of the best iterate of the present subproblem; those before the sweeps between; those of the best point.
+    inner_best: Vec<f64>,
     before: Vec<f64>,
+    best: Vec<f64>,
+    existence: Option<Existence>,
+    done: Done,
 }
 
+/// Where the method stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Phase {
-    Sweeps,
-    Inner,
+enum Stage {
+    Sweeps { last: f64, claims: usize },
+    Interior { idle: usize, short: usize, least: f64 },
+    Newton,
     Between { left: usize },
 }
 
+/// What has been done, for the account.
 #[derive(Debug, Clone, Copy, Default)]
-struct Outer {
-    count: usize,
-    inner: usize,
-    initial: f64,
-    target: f64,
-    best: f64,
-    failures: usize,
-    epsilon: f64,
-    error: f64,
-    /// Not below this for now: subproblems there have failed.
-    floor: f64,
-    successes: usize,
-    /// Iterations since the residual last fell markedly.
-    idle: usize,
-    fraction: f64,
-    before_error: f64,
-    least: f64,
-    factorisations: usize,
+struct Done {
+    sweeps: usize,
+    interior: usize,
+    interior_error: f64,
+    subproblems: usize,
+    failed: usize,
+    newton: usize,
+    between: usize,
+    strategies: usize,
 }
 
-impl<P: Linearised<D>, const D: usize> Solver<P> for Hybrid<D> {
+impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
     type Work = HybridWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
         let state = problem.state(Access::Newton)?;
-        let m = D * problem.mu().len();
         Ok(HybridWork {
             sweep: Sweep::new(problem, &state),
+            central: None,
             newton: None,
-            scale: problem.velocity_scale(&state),
-            state,
-            tolerance: 1e-12,
-            phase: Phase::Sweeps,
+            controller: Controller::default(),
             costs: None,
-            sweeps: 0,
-            last_estimate: f64::NAN,
-            outer: Outer::default(),
-            best_r: vec![0.0; m],
-            before: vec![0.0; m],
+            scale: problem.velocity_scale(&state),
+            tolerance: 0.0,
+            stage: FIRST,
+            inner_best: vec![],
+            before: vec![],
+            best: vec![],
+            existence: None,
+            done: Done::default(),
+            state,
         })
     }
 
@@ -122,12 +146,10 @@ impl<P: Linearised<D>, const D: usize> Solver<P> for Hybrid<D> {
         problem.refill(&mut work.state)?;
         work.sweep.fill(problem, &work.state);
         work.scale = problem.velocity_scale(&work.state);
-        if let Some(n) = &mut work.newton {
-            n.fill(problem, &work.state);
+        work.costs = None;
+        if let Some(newton) = &mut work.newton {
+            newton.fill(problem, &work.state);
         }
-        let m = D * problem.mu().len();
-        work.best_r.resize(m, 0.0);
-        work.before.resize(m, 0.0);
         Ok(())
     }
 
@@ -137,210 +159,291 @@ impl<P: Linearised<D>, const D: usize> Solver<P> for Hybrid<D> {
 
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
         problem.enter(&mut work.state, point);
-        work.phase = Phase::Sweeps;
-        work.sweeps = 0;
-        work.outer =
-            Outer { least: f64::INFINITY, fraction: self.0.sweep_fraction, ..Outer::default() };
+        work.stage = FIRST;
+        work.existence = None;
+        work.done = Done::default();
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
         if let Some(ray) = problem.contradiction(&work.state) {
             return Step::NoSolution(ray.clone());
         }
-        match work.phase {
-            Phase::Sweeps => self.sweep_first(problem, point, work),
-            Phase::Inner => self.inner(problem, point, work),
-            Phase::Between { left } => {
-                let n = left.min(20);
-                let mut moves = 0.0;
-                for _ in 0..n {
-                    moves = work.sweep.sweep(problem, &mut work.state, P::impulses(point));
-                }
-                let estimate = moves.sqrt() / work.scale;
-                if left > n {
-                    work.phase = Phase::Between { left: left - n };
-                } else {
-                    self.begin_outer(problem, point, work, true);
-                }
-                Step::Continue { estimate }
-            }
+        match work.stage {
+            Stage::Sweeps { last, claims } => self.sweep(problem, point, work, last, claims),
+            Stage::Interior { .. } => self.interior(problem, point, work),
+            Stage::Newton => self.newton(problem, point, work),
+            Stage::Between { left } => self.between(problem, point, work, left),
         }
     }
 
     fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
         problem.complete(&mut work.state, point);
     }
+
+    fn account(&self, work: &Self::Work) -> Vec<String> {
+        let Done { sweeps, interior, interior_error, subproblems, failed, newton, between, .. } =
+            work.done;
+        let mut lines = vec![format!("{sweeps} Gauss-Seidel sweeps")];
+        if interior > 0 {
+            lines.push(format!(
+                "{interior} interior-point iterations on the exact law, to {interior_error:.1e}"
+            ));
+        }
+        if subproblems > 0 {
+            let epsilon = work.controller.epsilon();
+            lines.push(format!(
+                "{subproblems} proximal subproblems ({failed} not solved, last epsilon \
+                 {epsilon:.0e}) in {newton} Newton iterations, {between} sweeps between them"
+            ));
+        }
+        if work.done.strategies > 0 {
+            lines.push(format!("{} changes of strategy", work.done.strategies));
+        }
+        if let Some(existence) = &work.existence {
+            lines.push(format!("existence of a solution: {}", existence.name()));
+        }
+        lines
+    }
 }
 
+const FIRST: Stage = Stage::Sweeps { last: f64::NAN, claims: 0 };
+
 impl<const D: usize> Hybrid<D> {
-    fn sweep_first<P: Linearised<D>>(
+    /// Stage 1. `last`: the estimate of the step before; `claims`: how often the sweeps thought that they had arrived.
+    fn sweep<P: Linearised<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
+        last: f64,
+        claims: usize,
     ) -> Step {
-        let mut estimate = 0.0;
-        for _ in 0..10 {
+        let mut estimate = f64::NAN;
+        for _ in 0..SWEEPS_A_STEP {
             let moves = work.sweep.sweep(problem, &mut work.state, P::impulses(point));
-            work.sweeps += 1;
+            work.done.sweeps += 1;
             estimate = moves.sqrt() / work.scale;
-            if estimate <= 0.3 * work.tolerance {
+            if estimate <= 0.3 * work.tolerance && claims < SWEEPS_A_STEP {
+                work.stage = Stage::Sweeps { last, claims: claims + 1 };
                 return Step::Continue { estimate };
             }
         }
-        let rate = (estimate / work.last_estimate).powf(0.1);
-        work.last_estimate = estimate;
-        if work.sweeps >= 30 {
-            let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
-            let left = (work.tolerance / estimate).ln() / rate.ln();
-            let newton = 10.0 * costs.factorisation;
-            let go_on = rate < 1.0
-                && left * costs.sweep < newton
-                && (work.sweeps as f64) * costs.sweep < 3.0 * newton;
-            if !go_on && work.sweeps >= 50 {
-                if self.0.verbose {
-                    eprintln!(
-                        "sweeps {} estimate {estimate:.1e} rate {rate:.4} costs {costs:?}",
-                        work.sweeps
-                    );
-                }
-                work.outer.epsilon = self.0.epsilon;
-                self.begin_outer(problem, point, work, false);
-            }
+        work.stage = Stage::Sweeps { last: estimate, claims };
+        if work.done.sweeps < FIRST_SWEEPS && estimate > 0.0 {
+            return Step::Continue { estimate };
+        }
+        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        let rate = (estimate / last).powf(1.0 / SWEEPS_A_STEP as f64);
+        let left = (work.tolerance / estimate).ln() / rate.ln();
+        let newton = NEWTON * costs.factorisation;
+        let promising = rate < 1.0
+            && left * costs.sweep < newton
+            && work.done.sweeps as f64 * costs.sweep < BELIEF * newton;
+        if !promising {
+            self.leave_sweeps(problem, point, work);
         }
         Step::Continue { estimate }
     }
 
-    fn begin_outer<P: Linearised<D>>(
+    /// The parts of the later stages, and whichever comes first.
+    fn leave_sweeps<P: Linearised<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
-        swept: bool,
     ) {
-        let HybridWork { newton, state, outer, best_r, before, .. } = work;
+        let HybridWork { newton, state, controller, .. } = work;
         let newton = newton.get_or_insert_with(|| Box::new(ProximalNewton::new(problem, state)));
-        newton.kappa = self.0.kappa;
         let r = P::impulses(point);
-        problem.velocities(state, r, &mut newton.u);
-        let mut error = newton.error(r);
-        if swept {
-            if error > outer.error {
-                outer.fraction = (0.5 * outer.fraction).max(0.02);
-            } else {
-                outer.fraction = (2.0 * outer.fraction).min(self.0.sweep_fraction);
-            }
-            if error > self.0.revert * outer.error {
-                r.copy_from_slice(before);
-                problem.velocities(state, r, &mut newton.u);
-                error = newton.error(r);
-            }
+        for buffer in [&mut work.inner_best, &mut work.before, &mut work.best] {
+            buffer.resize(r.len(), 0.0);
         }
-        if error < outer.least {
-            outer.least = error;
+        work.best.copy_from_slice(r);
+        problem.velocities(state, r, newton.velocities());
+        controller.begin(newton.error(r));
+        if !self.0.interior {
+            return self.subproblem(problem, point, work);
         }
-        newton.center(r, outer.epsilon);
-        outer.error = error;
-        outer.initial = newton.residual(r);
-        outer.target = (1e-3 * error).clamp(1e-15, 1e-4);
-        outer.best = outer.initial;
-        outer.inner = 0;
-        outer.idle = 0;
-        best_r.copy_from_slice(r);
-        work.phase = Phase::Inner;
+        let now = work.central.get_or_insert_default().begin(problem, state, 0.0, None);
+        work.stage = Stage::Interior { idle: 0, short: 0, least: now.error };
     }
 
-    fn inner<P: Linearised<D>>(
+    /// Stage 2: one iteration of the interior point; at its end the better of its best iterate and the swept point goes on.
+    fn interior<P: Linearised<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) -> Step {
-        let HybridWork { newton, state, outer, best_r, before, .. } = work;
-        let Some(newton) = newton else { return Step::Stuck("no".into()) };
-        let r = P::impulses(point);
-        let iterate = newton.iterate(problem, state, r);
-        outer.inner += 1;
-        outer.factorisations += 1;
-        outer.idle += 1;
-        if iterate.residual < outer.best {
-            if iterate.residual < 0.8 * outer.best {
-                outer.idle = 0;
+        let HybridWork { central, state, stage, done, tolerance, controller, .. } = work;
+        let (Some(central), Stage::Interior { idle, short, least }) = (central, stage) else {
+            return Step::Stuck("auto has lost its place".into());
+        };
+        let ended = match central.iterate(problem, state) {
+            Err(_) => true,
+            Ok(now) => {
+                done.interior += 1;
+                *idle += 1;
+                if now.error < 0.5 * *least {
+                    (*idle, *least) = (0, now.error);
+                }
+                *short = if now.alpha < INTERIOR_SHORT.0 { *short + 1 } else { 0 };
+                now.error <= tolerance.max(INTERIOR_ERROR)
+                    || *idle >= INTERIOR_IDLE
+                    || *short >= INTERIOR_SHORT.1
+                    || done.interior >= INTERIOR
             }
-            outer.best = iterate.residual;
-            best_r.copy_from_slice(r);
-        }
-        let error = newton.error(r);
-        let estimate = Step::Continue { estimate: error };
-        if iterate.residual > outer.target
-            && outer.inner < 30
-            && outer.idle < self.0.patience
-            && iterate.step > 0.0
-        {
-            return estimate;
-        }
-        let n = outer.inner;
-        let converged = iterate.residual <= outer.target;
-        let eps = outer.epsilon;
-        if converged {
-            outer.failures = 0;
-            let factor = match self.0.rule {
-                0 => match n {
-                    0..=4 => 0.1,
-                    5..=8 => 0.25,
-                    9..=15 => 0.5,
-                    _ => 0.8,
-                },
-                _ => match n {
-                    0..=4 => 0.1,
-                    5..=7 => 0.3,
-                    8..=12 => 0.6,
-                    13..=18 => 1.0,
-                    _ => 1.5,
-                },
-            };
-            outer.successes += 1;
-            if outer.successes >= 3 {
-                outer.floor *= 0.3;
-                outer.successes = 0;
+        };
+        let (r, error) = central.best();
+        if ended {
+            done.interior_error = error;
+            if controller.offer(error) {
+                P::impulses(point).copy_from_slice(r);
             }
-            outer.epsilon = (factor * eps).max(outer.floor.min(eps));
-        } else {
-            outer.floor = self.0.floor * eps;
-            outer.successes = 0;
-            outer.failures += 1;
-            if outer.best < 0.2 * outer.initial && !outer.failures.is_multiple_of(3) {
-                r.copy_from_slice(best_r);
-            } else {
-                r.copy_from_slice(newton.centre());
-            }
-            outer.epsilon *= if outer.failures == 1 { 4.0 } else { 10.0 };
-        }
-        outer.epsilon = outer.epsilon.clamp(1e-9, 1e3);
-        problem.velocities(state, r, &mut newton.u);
-        let error = newton.error(r);
-        if self.0.verbose {
-            eprintln!(
-                "outer {} eps {eps:.1e} inner {n} {} prox {:.1e}→{:.1e} error {:.2e}→{error:.2e} nfac {}",
-                outer.count,
-                if converged { "ok " } else { "FAIL" },
-                outer.initial,
-                outer.best,
-                outer.error,
-                outer.factorisations
-            );
-        }
-        outer.count += 1;
-        outer.error = error;
-        before.copy_from_slice(r);
-        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
-        let sweeps = outer.fraction * n as f64 * costs.factorisation / costs.sweep;
-        problem.enter(&mut work.state, point);
-        if error > 1e-9 {
-            work.phase = Phase::Between { left: (sweeps as usize).clamp(1, 300) };
-        } else {
-            self.begin_outer(problem, point, work, false);
+            self.subproblem(problem, point, work);
         }
         Step::Continue { estimate: error }
+    }
+
+    /// Begins a proximal subproblem about the present impulses.
+    fn subproblem<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) {
+        let HybridWork { newton, state, controller, .. } = work;
+        let Some(newton) = newton else { return };
+        let r = P::impulses(point);
+        problem.velocities(state, r, newton.velocities());
+        newton.center(r, controller.epsilon(), controller.kappa());
+        work.inner_best.copy_from_slice(r);
+        let error = newton.error(r);
+        if controller.start(error, newton.residual(r), work.tolerance) {
+            work.best.copy_from_slice(r);
+        }
+        work.stage = Stage::Newton;
+    }
+
+    /// Stage 3: one Newton iteration; at the end of the subproblem what comes next.
+    fn newton<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) -> Step {
+        let HybridWork { newton, state, controller, inner_best, best, done, .. } = work;
+        let Some(newton) = newton else {
+            return Step::Stuck("auto has lost its place".into());
+        };
+        let r = P::impulses(point);
+        let iterate = newton.iterate(problem, state, r);
+        done.newton += 1;
+        if controller.observe(&iterate) {
+            inner_best.copy_from_slice(r);
+        }
+        let Some(verdict) = controller.verdict(&iterate) else {
+            return Step::Continue { estimate: newton.error(r) };
+        };
+        done.subproblems += 1;
+        match verdict {
+            Verdict::Solved => r.copy_from_slice(inner_best),
+            Verdict::Better => {
+                done.failed += 1;
+                r.copy_from_slice(inner_best);
+            }
+            Verdict::Failed => {
+                done.failed += 1;
+                r.copy_from_slice(newton.centre());
+            }
+        }
+        problem.velocities(state, r, newton.velocities());
+        let error = newton.error(r);
+        if controller.end(verdict, error) {
+            best.copy_from_slice(r);
+        }
+        if controller.is_stuck() {
+            return self.other_strategy(problem, point, work);
+        }
+        problem.enter(&mut work.state, point);
+        if error > SWEEP_ABOVE {
+            let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+            let left = work.controller.sweeps(costs.factorisation / costs.sweep);
+            work.before.copy_from_slice(P::impulses(point));
+            work.stage = Stage::Between { left };
+        } else {
+            self.subproblem(problem, point, work);
+        }
+        Step::Continue { estimate: error }
+    }
+
+    /// Stage 4: sweeps on the problem itself; taken back where they spoil more than they mend.
+    fn between<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        left: usize,
+    ) -> Step {
+        let count = left.min(2 * SWEEPS_A_STEP);
+        let mut moves = 0.0;
+        for _ in 0..count {
+            moves = work.sweep.sweep(problem, &mut work.state, P::impulses(point));
+        }
+        work.done.between += count;
+        if left > count {
+            work.stage = Stage::Between { left: left - count };
+            return Step::Continue { estimate: moves.sqrt() / work.scale };
+        }
+        let Some(newton) = &mut work.newton else {
+            return Step::Stuck("auto has lost its place".into());
+        };
+        let r = P::impulses(point);
+        problem.velocities(&mut work.state, r, newton.velocities());
+        let error = newton.error(r);
+        if work.controller.swept(error) > TAKE_BACK {
+            r.copy_from_slice(&work.before);
+        }
+        self.subproblem(problem, point, work);
+        Step::Continue { estimate: error }
+    }
+
+    /// Stage 5. The first time it is asked whether there is a solution at all.
+    fn other_strategy<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) -> Step {
+        let limits = Limits { time_limit: Some(INVESTIGATION), ..Limits::default() };
+        let existence =
+            work.existence.get_or_insert_with(|| existence::decide::<P, D>(problem, &limits));
+        if let Existence::NoSolution { certificate } = existence {
+            return Step::NoSolution(Certificate::clone(certificate));
+        }
+        work.done.strategies += 1;
+        if self.0.strategies > 0 && work.controller.strategies() >= self.0.strategies {
+            let why = format!(
+                "no strategy halves the error any more; existence of a solution: {}",
+                existence.name()
+            );
+            return Step::Stuck(why.into());
+        }
+        let cold = work.controller.change();
+        let r = P::impulses(point);
+        if cold {
+            r.fill(0.0);
+        } else {
+            r.copy_from_slice(&work.best);
+        }
+        problem.enter(&mut work.state, point);
+        if cold {
+            for _ in 0..FIRST_SWEEPS {
+                work.sweep.sweep(problem, &mut work.state, P::impulses(point));
+            }
+            work.done.between += FIRST_SWEEPS;
+        }
+        self.subproblem(problem, point, work);
+        Step::Continue { estimate: f64::NAN }
     }
 }

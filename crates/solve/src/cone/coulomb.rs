@@ -27,7 +27,8 @@ pub enum Region {
 #[inline(always)]
 pub fn region<const D: usize>(x: &[f64; D], mu: f64) -> Region {
     let t = tangential_norm(x);
-    if t <= mu * x[0] {
+    // With mu = 0 the cone is a half line: t = 0 alone does not put x on it.
+    if t <= mu * x[0] && x[0] >= 0.0 {
         Region::Inside
     } else if mu * t <= -x[0] {
         Region::Polar
@@ -64,6 +65,8 @@ mod tests {
     fn mu_zero_projects_on_the_half_line() {
         assert_eq!(project(&[2.0, 3.0, -1.0], 0.0), [2.0, 0.0, -0.0]);
         assert_eq!(project(&[-2.0, 3.0, -1.0], 0.0), [0.0; 3]);
+        assert_eq!(project(&[-2.0, 0.0, 0.0], 0.0), [0.0; 3]);
+        assert_eq!(project(&[2.0, 0.0], 0.0), [2.0, 0.0]);
         assert_eq!(project(&[0.0; 3], 0.0), [0.0; 3]);
     }
 }

@@ -189,9 +189,6 @@ impl<const D: usize> Concurrent<D> for FrictionGlobal<D> {
 
 impl<const D: usize> Linear<D> for FrictionGlobal<D> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
-        if let Operator::Condensed(w) = &state.operator {
-            return w.mul_plus(r, &state.q, u);
-        }
         let (v, _) = state.dynamics.solve(self, r, Refine::Once);
         self.velocity_into(v, u);
     }

@@ -28,16 +28,14 @@ const LEAST_MU: f64 = 1e-6;
 /// The state of the method.
 pub struct ProximalNewton<const D: usize> {
     contacts: Vec<Contact>,
-    /// ‖q‖ and the number of entries.
+    /// `‖q‖`.
     scale: f64,
-    /// ε of the present subproblem.
-    pub epsilon: f64,
-    /// κ.
-    pub kappa: f64,
+    epsilon: f64,
+    kappa: f64,
     /// r_k.
     center: Vec<f64>,
     /// The velocities of the present impulses.
-    pub u: Vec<f64>,
+    u: Vec<f64>,
     phi: Vec<f64>,
     p: Vec<Block<D>>,
     q: Vec<Block<D>>,
@@ -60,7 +58,7 @@ struct Contact {
 
 /// What an iteration came to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Iterate {
+pub struct Inner {
     /// The relative natural residual of the subproblem.
     pub residual: f64,
     /// The step length; 0 where the linear system could not be solved.
@@ -119,10 +117,17 @@ impl<const D: usize> ProximalNewton<D> {
         self.q.resize(nc, [[0.0; D]; D]);
     }
 
-    /// Starts the subproblem about `r`, whose velocities `u` must hold; its relative natural residual is that of the problem.
-    pub fn center(&mut self, r: &[f64], epsilon: f64) {
+    /// Where the velocities of the impulses must be written before [`center`](Self::center), [`error`](Self::error) and
+    /// [`residual`](Self::residual).
+    pub fn velocities(&mut self) -> &mut [f64] {
+        &mut self.u
+    }
+
+    /// Starts the subproblem of `epsilon` about `r`, with ρ = `kappa`/w_c.
+    pub fn center(&mut self, r: &[f64], epsilon: f64, kappa: f64) {
         self.center.copy_from_slice(r);
         self.epsilon = epsilon;
+        self.kappa = kappa;
         self.failures = 0;
     }
 
@@ -131,7 +136,7 @@ impl<const D: usize> ProximalNewton<D> {
         &self.center
     }
 
-    /// The relative natural residual of the problem itself at `(u, r)`.
+    /// The relative natural residual of the problem itself at r.
     pub fn error(&self, r: &[f64]) -> f64 {
         self.natural(&self.u, r, 0.0)
     }
@@ -174,7 +179,7 @@ impl<const D: usize> ProximalNewton<D> {
         Radii { normal: kappa / contact.normal, tangential: kappa / contact.tangential }
     }
 
-    /// `‖Φ/ρ‖² / ‖q‖²` at `(u, r)`; fills `phi` and the blocks where asked to.
+    /// `‖Φ/ρ‖² / ‖q‖²` at `(u, r)`.
     fn merit(&self, u: &[f64], r: &[f64]) -> f64 {
         let mut sum = 0.0;
         for (c, contact) in self.contacts.iter().enumerate() {
@@ -193,7 +198,7 @@ impl<const D: usize> ProximalNewton<D> {
         problem: &P,
         state: &mut P::State,
         r: &mut [f64],
-    ) -> Iterate {
+    ) -> Inner {
         for c in 0..self.contacts.len() {
             let contact = self.contacts[c];
             let ue = self.shifted(&self.u, r, c, self.epsilon);
@@ -211,7 +216,7 @@ impl<const D: usize> ProximalNewton<D> {
             self.p[c] = piece.a;
             self.q[c] = q;
         }
-        let failed = Iterate { residual: f64::INFINITY, step: 0.0 };
+        let failed = Inner { residual: f64::INFINITY, step: 0.0 };
         if problem.linearise(state, &self.p, &self.q).is_err() {
             return failed;
         }
@@ -222,7 +227,7 @@ impl<const D: usize> ProximalNewton<D> {
         let step = self.search(r);
         r.iter_mut().zip(&self.dr).for_each(|(r, d)| *r += step * d);
         problem.velocities(state, r, &mut self.u);
-        Iterate { residual: self.natural(&self.u, r, self.epsilon), step }
+        Inner { residual: self.natural(&self.u, r, self.epsilon), step }
     }
 
     /// The step length: the first that decreases the merit enough, else the best of those tried, but every fifth time the

@@ -219,6 +219,8 @@ macro_rules! kernels {
     ($features:literal) => {
         /// Rows of A packed at a time along K: 24 KiB, so that they stay in the first cache.
         const DEPTH: usize = 128;
+        /// Columns of B and C at a time: 240 KiB of B, which stay in the second cache.
+        const SPAN: usize = 240;
 
         #[repr(align(64))]
         struct Packed([std::mem::MaybeUninit<f64>; DEPTH * ROWS * LANES]);
@@ -238,9 +240,36 @@ macro_rules! kernels {
             set: bool,
         ) {
             let mut buffer = Packed([std::mem::MaybeUninit::uninit(); DEPTH * ROWS * LANES]);
+            let mut j = 0;
+            while j < n {
+                let columns = SPAN.min(n - j);
+                // SAFETY: columns j to j + columns of B and C.
+                unsafe {
+                    let (b, c) = (b.add(j * ldb), c.add(j * ldc));
+                    product_span(m, columns, k, a, lda, b, ldb, c, ldc, set, &mut buffer);
+                }
+                j += columns;
+            }
+        }
+
+        #[allow(clippy::too_many_arguments)]
+        #[target_feature(enable = $features)]
+        unsafe fn product_span(
+            m: usize,
+            n: usize,
+            k: usize,
+            a: *const f64,
+            lda: usize,
+            b: *const f64,
+            ldb: usize,
+            c: *mut f64,
+            ldc: usize,
+            set: bool,
+            buffer: &mut Packed,
+        ) {
+            let mut p = 0;
             // SAFETY: tiles cut the m×n part into pieces; the buffer holds DEPTH columns of ROWS vectors.
             unsafe {
-                let mut p = 0;
                 loop {
                     let depth = DEPTH.min(k - p);
                     let set = set && p == 0;
@@ -254,7 +283,10 @@ macro_rules! kernels {
                         let last = first(rows - (vectors - 1) * LANES);
                         let (mut a, mut lda) = (a.wrapping_add(i), lda);
                         let c = c.add(i);
+                        // Packed rows are filled up with zeros: loads need no mask.
+                        let mut full = rows == vectors * LANES;
                         if n > 3 * COLUMNS && depth > 4 {
+                            full = true;
                             let to = buffer.0.as_mut_ptr().cast::<f64>();
                             for q in 0..depth {
                                 for v in 0..vectors {
@@ -265,10 +297,25 @@ macro_rules! kernels {
                             }
                             (a, lda) = (to, vectors * LANES);
                         }
-                        match vectors {
-                            1 => strip::<1>(n, depth, a, lda, b, ldb, c, ldc, last, set),
-                            2 => strip::<2>(n, depth, a, lda, b, ldb, c, ldc, last, set),
-                            _ => strip::<3>(n, depth, a, lda, b, ldb, c, ldc, last, set),
+                        match (vectors, full) {
+                            (1, false) => {
+                                strip::<1, false>(n, depth, a, lda, b, ldb, c, ldc, last, set)
+                            }
+                            (1, true) => {
+                                strip::<1, true>(n, depth, a, lda, b, ldb, c, ldc, last, set)
+                            }
+                            (2, false) => {
+                                strip::<2, false>(n, depth, a, lda, b, ldb, c, ldc, last, set)
+                            }
+                            (2, true) => {
+                                strip::<2, true>(n, depth, a, lda, b, ldb, c, ldc, last, set)
+                            }
+                            (_, false) => {
+                                strip::<3, false>(n, depth, a, lda, b, ldb, c, ldc, last, set)
+                            }
+                            (_, true) => {
+                                strip::<3, true>(n, depth, a, lda, b, ldb, c, ldc, last, set)
+                            }
                         }
                         i += rows;
                     }
@@ -282,7 +329,7 @@ macro_rules! kernels {
 
         #[allow(clippy::too_many_arguments)]
         #[target_feature(enable = $features)]
-        unsafe fn strip<const V: usize>(
+        unsafe fn strip<const V: usize, const FULL: bool>(
             n: usize,
             k: usize,
             a: *const f64,
@@ -301,14 +348,14 @@ macro_rules! kernels {
                     let columns = COLUMNS.min(n - j);
                     let (b, c) = (b.add(j * ldb), c.add(j * ldc));
                     match columns {
-                        1 => tile::<V, 1>(k, a, lda, b, ldb, c, ldc, last, set),
-                        2 => tile::<V, 2>(k, a, lda, b, ldb, c, ldc, last, set),
-                        3 => tile::<V, 3>(k, a, lda, b, ldb, c, ldc, last, set),
-                        4 => tile::<V, 4>(k, a, lda, b, ldb, c, ldc, last, set),
-                        5 => tile::<V, 5>(k, a, lda, b, ldb, c, ldc, last, set),
-                        6 => tile::<V, 6>(k, a, lda, b, ldb, c, ldc, last, set),
-                        7 => tile::<V, 7>(k, a, lda, b, ldb, c, ldc, last, set),
-                        _ => tile::<V, 8>(k, a, lda, b, ldb, c, ldc, last, set),
+                        1 => tile::<V, 1, FULL>(k, a, lda, b, ldb, c, ldc, last, set),
+                        2 => tile::<V, 2, FULL>(k, a, lda, b, ldb, c, ldc, last, set),
+                        3 => tile::<V, 3, FULL>(k, a, lda, b, ldb, c, ldc, last, set),
+                        4 => tile::<V, 4, FULL>(k, a, lda, b, ldb, c, ldc, last, set),
+                        5 => tile::<V, 5, FULL>(k, a, lda, b, ldb, c, ldc, last, set),
+                        6 => tile::<V, 6, FULL>(k, a, lda, b, ldb, c, ldc, last, set),
+                        7 => tile::<V, 7, FULL>(k, a, lda, b, ldb, c, ldc, last, set),
+                        _ => tile::<V, 8, FULL>(k, a, lda, b, ldb, c, ldc, last, set),
                     }
                     j += columns;
                 }
@@ -317,7 +364,7 @@ macro_rules! kernels {
 
         #[allow(clippy::too_many_arguments)]
         #[target_feature(enable = $features)]
-        unsafe fn tile<const V: usize, const N: usize>(
+        unsafe fn tile<const V: usize, const N: usize, const FULL: bool>(
             k: usize,
             a: *const f64,
             lda: usize,
@@ -335,7 +382,7 @@ macro_rules! kernels {
                     let mut x = [zero(); V];
                     for v in 0..V {
                         let from = a.add(p * lda + v * LANES);
-                        x[v] = if v + 1 == V { load(from, last) } else { load_all(from) };
+                        x[v] = if v + 1 == V && !FULL { load(from, last) } else { load_all(from) };
                     }
                     for j in 0..N {
                         let y = all(*b.add(p + j * ldb));

@@ -24,9 +24,15 @@ use super::inverse::count_factorisation;
 #[error("a singular matrix")]
 pub struct Singular;
 
-/// The handle of a block, for [`BlockLu::add_at`].
+/// The handle of a block, for [`BlockLu::add_at`]; of no use for another pattern.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Slot(u32);
+pub struct Slot {
+    at: usize,
+    /// From one column to the next among the values.
+    stride: u32,
+    rows: u32,
+    columns: u32,
+}
 
 /// LU factors of a square matrix of blocks whose pattern is symmetric, values need not be.
 ///
@@ -119,7 +125,16 @@ impl BlockLu {
     ///
     /// Panics if i and j are not coupled.
     pub fn slot(&self, i: usize, j: usize) -> Slot {
-        Slot(self.symbolic.number[self.symbolic.find(i, j)])
+        let groups = &self.symbolic.groups;
+        let entry = self.symbolic.find(groups.of[i] as usize, groups.of[j] as usize);
+        let place = &self.symbolic.places[self.symbolic.number[entry] as usize];
+        let (row, column) = (groups.within[i] as usize, groups.within[j] as usize);
+        Slot {
+            at: place.values + column * place.rows as usize + row,
+            stride: place.rows,
+            rows: groups.node_sizes[i],
+            columns: groups.node_sizes[j],
+        }
     }
 
     /// `A_ij += block`, by rows, `sizes[i] × sizes[j]`.
@@ -132,11 +147,23 @@ impl BlockLu {
     /// [`add`](BlockLu::add) without the search.
     #[inline]
     pub fn add_at(&mut self, slot: Slot, block: &[f64]) {
-        let place = &self.symbolic.places[slot.0 as usize];
-        let len = place.rows as usize * place.columns as usize;
-        assert_eq!(block.len(), len, "the size of a block");
-        let values = &mut self.values[place.values..place.values + len];
-        values.iter_mut().zip(block).for_each(|(a, b)| *a += b);
+        let (rows, columns, stride) =
+            (slot.rows as usize, slot.columns as usize, slot.stride as usize);
+        assert_eq!(block.len(), rows * columns, "the size of a block");
+        let values = &mut self.values[slot.at..];
+        match (rows, columns) {
+            (3, 3) => add_transposed::<3>(block, values, stride),
+            (6, 6) => add_transposed::<6>(block, values, stride),
+            (1, 1) => values[0] += block[0],
+            _ => {
+                for c in 0..columns {
+                    let column = &mut values[c * stride..c * stride + rows];
+                    for (r, a) in column.iter_mut().enumerate() {
+                        *a += block[r * columns + c];
+                    }
+                }
+            }
+        }
     }
 
     /// `y = A x` with the values last added, nodes concatenated.
@@ -144,13 +171,11 @@ impl BlockLu {
         let order = &self.symbolic.order;
         y.fill(0.0);
         for p in &self.symbolic.places {
-            let (rows, columns) = (p.rows as usize, p.columns as usize);
-            for r in 0..rows {
-                let row = &self.values[p.values + r * columns..p.values + (r + 1) * columns];
-                let first = order[p.column as usize] as usize;
-                let x = &x[first..first + columns];
-                y[order[p.row as usize] as usize + r] +=
-                    row.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
+            let columns = self.values[p.values..].chunks_exact(p.rows as usize);
+            for (column, &c) in columns.zip(&order[p.column as usize..]).take(p.columns as usize) {
+                for (a, &r) in column.iter().zip(&order[p.row as usize..]) {
+                    y[r as usize] += a * x[c as usize];
+                }
             }
         }
     }
@@ -199,32 +224,33 @@ impl BlockLu {
         let (rows, columns) = (&mut self.row_scale, &mut self.column_scale);
         rows.fill(0.0);
         columns.fill(0.0);
-        let mut all = 0.0_f64;
         for p in &self.symbolic.places {
-            let width = p.columns as usize;
-            let block = &self.values[p.values..p.values + width * p.rows as usize];
-            for (row, scale) in block.chunks_exact(width).zip(&mut rows[p.row as usize..]) {
-                for a in row {
-                    let a = a.abs();
-                    *scale = if a > *scale { a } else { *scale };
-                    // NaN and infinity leave NaN.
-                    all += a * 0.0;
-                }
+            let height = p.rows as usize;
+            let block = &self.values[p.values..p.values + height * p.columns as usize];
+            let scale = &mut rows[p.row as usize..p.row as usize + height];
+            match height {
+                3 => row_maxima(block, 3, scale),
+                6 => row_maxima(block, 6, scale),
+                12 => row_maxima(block, 12, scale),
+                _ => row_maxima(block, height, scale),
             }
         }
-        if all.is_nan() || (!rows.is_empty() && rows.iter().all(|&r| r == 0.0)) {
+        if rows.iter().any(|r| !r.is_finite())
+            || (!rows.is_empty() && rows.iter().all(|&r| r == 0.0))
+        {
             return Err(Singular);
         }
         rows.iter_mut().for_each(|r| *r = inverse_power(*r));
         for p in &self.symbolic.places {
-            let width = p.columns as usize;
-            let block = &self.values[p.values..p.values + width * p.rows as usize];
-            let columns = &mut columns[p.column as usize..p.column as usize + width];
-            for (row, scale) in block.chunks_exact(width).zip(&rows[p.row as usize..]) {
-                for (a, column) in row.iter().zip(columns.iter_mut()) {
-                    let a = a.abs() * scale;
-                    *column = if a > *column { a } else { *column };
-                }
+            let height = p.rows as usize;
+            let block = &self.values[p.values..p.values + height * p.columns as usize];
+            let scale = &rows[p.row as usize..p.row as usize + height];
+            let columns = &mut columns[p.column as usize..];
+            match height {
+                3 => column_maxima(block, 3, scale, columns),
+                6 => column_maxima(block, 6, scale, columns),
+                12 => column_maxima(block, 12, scale, columns),
+                _ => column_maxima(block, height, scale, columns),
             }
         }
         columns.iter_mut().for_each(|c| *c = inverse_power(*c));
@@ -252,16 +278,11 @@ impl BlockLu {
             } else {
                 (&mut lower[p.to - front.lower..], ld)
             };
-            match (rows, columns) {
-                (3, 3) => scatter::<3>(block, row_scale, column_scale, to, ld),
-                (6, 6) => scatter::<6>(block, row_scale, column_scale, to, ld),
-                _ => {
-                    for (r, (row, rs)) in block.chunks_exact(columns).zip(row_scale).enumerate() {
-                        for (c, (a, cs)) in row.iter().zip(column_scale).enumerate() {
-                            to[c * ld + r] = a * rs * cs;
-                        }
-                    }
-                }
+            match rows {
+                3 => scatter(block, 3, row_scale, column_scale, to, ld),
+                6 => scatter(block, 6, row_scale, column_scale, to, ld),
+                12 => scatter(block, 12, row_scale, column_scale, to, ld),
+                _ => scatter(block, rows, row_scale, column_scale, to, ld),
             }
         }
         // What the children leave in the pivots' rows and columns.
@@ -347,12 +368,12 @@ impl BlockLu {
             z[k..].fill(0.0);
             for b in (0..k).step_by(WIDTH) {
                 let e = (b + WIDTH).min(k);
-                for j in b..e {
-                    let y = z[j];
-                    for i in j + 1..e {
-                        z[i] -= lower[j * ld + i] * y;
-                    }
-                }
+                let y: [f64; WIDTH] =
+                    std::array::from_fn(|i| if b + i < e { z[b + i] } else { 0.0 });
+                z[b..e].fill(0.0);
+                let triangle = At { at: front.triangles + b * WIDTH, ld: WIDTH };
+                let own = (&self.triangles[..], triangle);
+                kernel::product_vector(simd, own, &y[..e - b], &mut z[b..e]);
                 let (done, open) = z.split_at_mut(e);
                 kernel::product_vector(simd, (lower, At { at: b * ld + e, ld }), &done[b..], open);
             }
@@ -381,19 +402,42 @@ impl BlockLu {
             let mut e = k;
             while e > 0 {
                 let b = (e - 1) / WIDTH * WIDTH;
-                for j in (b..e).rev() {
-                    own[j] *= inverses[j];
-                    let y = own[j];
-                    for i in b..j {
-                        own[i] -= lower[j * ld + i] * y;
-                    }
-                }
+                upper_solve(&lower[b * ld + b..], ld, &inverses[b..e], &mut own[b..e]);
                 let (open, done) = own.split_at_mut(b);
                 kernel::product_vector(simd, (lower, At { at: b * ld, ld }), &done[..e - b], open);
                 e = b;
             }
         }
     }
+}
+
+/// `x ← U⁻¹ x` for a diagonal block of at most [`WIDTH`] rows.
+fn upper_solve(block: &[f64], ld: usize, inverses: &[f64], x: &mut [f64]) {
+    let w = x.len();
+    if w < WIDTH {
+        for j in (0..w).rev() {
+            x[j] *= inverses[j];
+            let y = x[j];
+            for i in 0..j {
+                x[i] -= block[j * ld + i] * y;
+            }
+        }
+        return;
+    }
+    // Whole columns, masked, in a register.
+    let mut z: [f64; WIDTH] = std::array::from_fn(|i| x[i]);
+    for j in (0..WIDTH).rev() {
+        let y = z[j] * inverses[j];
+        let column = &block[j * ld..j * ld + WIDTH];
+        for i in 0..WIDTH {
+            z[i] = match i.cmp(&j) {
+                std::cmp::Ordering::Less => z[i] - column[i] * y,
+                std::cmp::Ordering::Equal => y,
+                std::cmp::Ordering::Greater => z[i],
+            };
+        }
+    }
+    x.copy_from_slice(&z);
 }
 
 /// The power of two by which x comes to lie between one and two; one for zero.
@@ -407,20 +451,58 @@ fn inverse_power(x: f64) -> f64 {
     }
 }
 
-/// A scaled D×D block by rows into columns of a front.
+/// The largest entries of the rows of a block by columns of `height`, which is a constant after inlining. NaN
+/// is passed over: it is met again in a pivot.
 #[inline(always)]
-fn scatter<const D: usize>(
+fn row_maxima(block: &[f64], height: usize, largest: &mut [f64]) {
+    let largest = &mut largest[..height];
+    for column in block.chunks_exact(height) {
+        for i in 0..height {
+            let a = column[i].abs();
+            largest[i] = if a > largest[i] { a } else { largest[i] };
+        }
+    }
+}
+
+/// The largest entries of its columns, rows scaled.
+#[inline(always)]
+fn column_maxima(block: &[f64], height: usize, scale: &[f64], largest: &mut [f64]) {
+    let scale = &scale[..height];
+    for (column, largest) in block.chunks_exact(height).zip(largest) {
+        for i in 0..height {
+            let a = (column[i] * scale[i]).abs();
+            *largest = if a > *largest { a } else { *largest };
+        }
+    }
+}
+
+/// A block, scaled, into columns of a front.
+#[inline(always)]
+fn scatter(
     block: &[f64],
+    height: usize,
     row_scale: &[f64],
     column_scale: &[f64],
     to: &mut [f64],
     ld: usize,
 ) {
-    let (block, rows) = (&block[..D * D], &row_scale[..D]);
+    let row_scale = &row_scale[..height];
+    for (c, (column, scale)) in block.chunks_exact(height).zip(column_scale).enumerate() {
+        let to = &mut to[c * ld..c * ld + height];
+        for i in 0..height {
+            to[i] = column[i] * row_scale[i] * scale;
+        }
+    }
+}
+
+/// Adds a D×D block by rows to columns.
+#[inline(always)]
+fn add_transposed<const D: usize>(block: &[f64], to: &mut [f64], stride: usize) {
+    let block = &block[..D * D];
     for c in 0..D {
-        let column = &mut to[c * ld..c * ld + D];
+        let column = &mut to[c * stride..c * stride + D];
         for r in 0..D {
-            column[r] = block[r * D + c] * rows[r] * column_scale[c];
+            column[r] += block[r * D + c];
         }
     }
 }

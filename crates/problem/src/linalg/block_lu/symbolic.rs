@@ -41,10 +41,10 @@ pub(super) struct Front {
     pub blocks: std::ops::Range<usize>,
 }
 
-/// Where a block of A lies among the values, and in its front.
+/// Where a block of A (of two groups of nodes) lies among the values, and in its front.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
-    /// Its first value; rows × columns of them, by rows.
+    /// Its first value; columns of `rows` values.
     pub values: usize,
     /// First row and column in the order of elimination, for the scales.
     pub row: u32,
@@ -59,12 +59,10 @@ pub(super) struct Place {
 #[derive(Debug, Clone)]
 pub(super) struct Symbolic {
     pub dim: usize,
-    /// Of node i: its first unknown in the caller's order.
-    pub first: Vec<usize>,
-    pub sizes: Vec<u32>,
+    pub groups: Groups,
     /// Of unknown k in the order of elimination: its place in the caller's order.
     pub order: Vec<u32>,
-    /// Blocks of node i: columns `pattern[pattern_start[i]..]`, sorted, and their numbers.
+    /// Blocks of group i: columns `pattern[pattern_start[i]..]`, sorted, and their numbers.
     pub pattern_start: Vec<usize>,
     pub pattern: Vec<u32>,
     pub number: Vec<u32>,
@@ -100,31 +98,36 @@ struct Super {
 /// Estimated nanoseconds for a front, its share of assembly included; what merging is decided by.
 fn cost(k: usize, m: usize) -> f64 {
     let (k, m) = (k as f64, m as f64);
-    200.0 + 25.0 * k + flops(k, m) / 30.0 + 0.5 * (k + m) * (k + m)
+    400.0 + 25.0 * k + flops(k, m) / 30.0 + 0.5 * (k + m) * (k + m)
 }
 
 fn flops(k: f64, m: f64) -> f64 {
     k * k * k * (2.0 / 3.0) + 2.0 * k * m * (k + m)
 }
 
+/// Nodes that are coupled to each other and to the same others, taken together: a fraction of the pattern, and larger blocks.
+#[derive(Debug, Clone)]
+pub(super) struct Groups {
+    /// Of each node: its group, its size, and the rows before it in the group.
+    pub of: Vec<u32>,
+    pub node_sizes: Vec<u32>,
+    pub within: Vec<u32>,
+    /// Of each group: its size, and its unknowns in the caller's order: `members[start[g]..start[g + 1]]`.
+    pub sizes: Vec<u32>,
+    pub start: Vec<usize>,
+    pub members: Vec<u32>,
+}
+
 impl Symbolic {
     pub(super) fn new(sizes: &[usize], edges: impl Iterator<Item = (u32, u32)>) -> Self {
-        let n = sizes.len();
-        let sizes: Vec<u32> =
-            sizes.iter().map(|&s| u32::try_from(s).expect("fewer than 2³² unknowns")).collect();
-        let mut first = vec![0_usize; n + 1];
-        for i in 0..n {
-            first[i + 1] = first[i] + sizes[i] as usize;
-        }
-        let dim = first[n];
-        assert!(n < NONE as usize && dim < NONE as usize, "fewer than 2³² unknowns");
-        let (pattern_start, pattern) = pattern(n, edges);
+        let dim = sizes.iter().sum::<usize>();
+        assert!(sizes.len().max(dim) < OWNED as usize, "fewer than 2³¹ unknowns");
+        let (groups, pattern_start, pattern) = grouped(sizes, edges);
         let (order, step) = elimination_order(&pattern_start, &pattern);
-        let fronts = supernodes(&sizes, &pattern_start, &pattern, &order, &step);
+        let fronts = supernodes(&groups.sizes, &pattern_start, &pattern, &order, &step);
         let mut out = Self {
             dim,
-            first,
-            sizes,
+            groups,
             order: vec![],
             pattern_start,
             number: vec![0; pattern.len()],
@@ -148,7 +151,7 @@ impl Symbolic {
 
     /// Numbers the unknowns, and gives everything its place. `order`: node of each step that `supers` speak of.
     fn lay_out(&mut self, order: &[u32], supers: Vec<Super>) {
-        let n = self.sizes.len();
+        let n = self.groups.sizes.len();
         // Postorder of the fronts that are left: parents have larger steps than their children, so lists are filled backwards.
         let count = supers.len();
         let (mut child, mut sibling) = (vec![NONE; count + 1], vec![NONE; count]);
@@ -170,8 +173,8 @@ impl Symbolic {
                 at = sibling[s as usize];
             }
         }
-        // Positions of nodes.
-        let mut position = vec![0_u32; n]; // of a node: its first unknown in the order of elimination
+        // Positions of groups.
+        let mut position = vec![0_u32; n]; // of a group: its first unknown in the order of elimination
         let mut front_of = vec![0_u32; n];
         self.order.reserve(self.dim);
         let mut number_of = vec![NONE; count];
@@ -181,16 +184,17 @@ impl Symbolic {
                 let node = order[c as usize] as usize;
                 position[node] = self.order.len() as u32;
                 front_of[node] = f as u32;
-                self.order.extend((self.first[node]..self.first[node + 1]).map(|i| i as u32));
+                let members = self.groups.start[node]..self.groups.start[node + 1];
+                self.order.extend_from_slice(&self.groups.members[members]);
             }
         }
         // Fronts.
         let mut children: Vec<Vec<u32>> = vec![vec![]; sequence.len()];
-        let mut rest_nodes: Vec<Vec<u32>> = Vec::with_capacity(sequence.len());
-        let mut start = 0;
+        let (mut start, mut rest) = (0, Vec::new());
         for (f, &s) in sequence.iter().enumerate() {
             let s = &supers[s as usize];
-            let mut rest: Vec<u32> = s.rest.iter().map(|&c| order[c as usize]).collect();
+            rest.clear();
+            rest.extend(s.rest.iter().map(|&c| order[c as usize]));
             rest.sort_unstable_by_key(|&i| position[i as usize]);
             let (pivots, m) = (s.pivots, s.rest_size);
             self.fronts.push(Front {
@@ -209,12 +213,11 @@ impl Symbolic {
             });
             for &i in &rest {
                 let p = position[i as usize];
-                self.rows.extend(p..p + self.sizes[i as usize]);
+                self.rows.extend(p..p + self.groups.sizes[i as usize]);
             }
             if s.parent != NONE {
                 children[number_of[s.parent as usize] as usize].push(f as u32);
             }
-            rest_nodes.push(rest);
             start += pivots;
             self.lower_len += pivots * (pivots + m);
             self.upper_len += pivots * m;
@@ -268,7 +271,7 @@ impl Symbolic {
                     }
                     // Block (i, j) in column j; and (j, i) in row j where i is not a pivot of this front.
                     let (pi, pj) = (position[i], position[j]);
-                    let (si, sj) = (self.sizes[i], self.sizes[j]);
+                    let (si, sj) = (self.groups.sizes[i], self.groups.sizes[j]);
                     let (li, lj) = (local[pi as usize] as usize, local[pj as usize] as usize);
                     let mirror = self.find(i, j);
                     self.number[mirror] = self.places.len() as u32;
@@ -302,7 +305,7 @@ impl Symbolic {
         self.place_remainders();
     }
 
-    /// The entry of the pattern that holds (i, j).
+    /// The entry of the pattern that holds groups (i, j).
     pub(super) fn find(&self, i: usize, j: usize) -> usize {
         let range = self.pattern_start[i]..self.pattern_start[i + 1];
         let found = self.pattern[range.clone()].binary_search(&(j as u32));
@@ -360,50 +363,123 @@ impl Symbolic {
     }
 }
 
-/// The symmetric pattern by rows, diagonal included, sorted.
-fn pattern(n: usize, edges: impl Iterator<Item = (u32, u32)>) -> (Vec<usize>, Vec<u32>) {
-    let mut pairs: Vec<(u32, u32)> = Vec::with_capacity(2 * edges.size_hint().0 + n);
-    for (i, j) in edges {
+/// The groups of nodes, and their symmetric pattern by rows, diagonal included, sorted.
+fn grouped(
+    sizes: &[usize],
+    edges: impl Iterator<Item = (u32, u32)>,
+) -> (Groups, Vec<usize>, Vec<u32>) {
+    let n = sizes.len();
+    let pairs: Vec<(u32, u32)> = edges.filter(|(i, j)| i != j).collect();
+    // Rows of nodes, diagonal first, duplicates out.
+    let mut start = vec![0_usize; n + 1];
+    for &(i, j) in &pairs {
         assert!((i as usize) < n && (j as usize) < n, "an edge joins nodes");
-        if i != j {
-            pairs.push((i, j));
-            pairs.push((j, i));
+        start[i as usize + 1] += 1;
+        start[j as usize + 1] += 1;
+    }
+    (0..n).for_each(|i| start[i + 1] += start[i] + 1);
+    let mut rows = vec![0_u32; start[n]];
+    let mut end: Vec<usize> = start[..n].to_vec();
+    for i in 0..n {
+        rows[end[i]] = i as u32;
+        end[i] += 1;
+    }
+    for &(i, j) in &pairs {
+        for (i, j) in [(i as usize, j), (j as usize, i)] {
+            rows[end[i]] = j;
+            end[i] += 1;
         }
     }
-    pairs.extend((0..n as u32).map(|i| (i, i)));
-    // Two stable buckets: by column, then by row.
-    let mut start = vec![0_usize; n + 1];
-    pairs.iter().for_each(|p| start[p.1 as usize + 1] += 1);
-    (0..n).for_each(|i| start[i + 1] += start[i]);
-    let mut next = start.clone();
-    let mut by_column = vec![(0, 0); pairs.len()];
-    for &p in &pairs {
-        by_column[next[p.1 as usize]] = p;
-        next[p.1 as usize] += 1;
-    }
-    // The counts are the same by rows: the pairs are symmetric.
-    next.copy_from_slice(&start);
-    let mut columns = vec![0_u32; pairs.len()];
-    for (i, j) in by_column {
-        columns[next[i as usize]] = j;
-        next[i as usize] += 1;
-    }
-    // Duplicates out.
-    let mut out_start = vec![0_usize; n + 1];
-    let mut kept = 0;
+    drop(pairs);
+    let mut mark = vec![NONE; n];
+    // A sum of scrambled numbers is the same for equal sets in any order.
+    let scrambled = |j: u32| {
+        let x = (u64::from(j) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        (x ^ (x >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9)
+    };
+    let mut keys: Vec<(u64, u32)> = Vec::with_capacity(n);
     for i in 0..n {
-        let from = kept;
-        for e in start[i]..start[i + 1] {
-            if kept == from || columns[kept - 1] != columns[e] {
-                columns[kept] = columns[e];
+        let (mut kept, mut sum) = (start[i], 0_u64);
+        for e in start[i]..end[i] {
+            let j = rows[e];
+            if mark[j as usize] != i as u32 {
+                mark[j as usize] = i as u32;
+                rows[kept] = j;
                 kept += 1;
+                sum = sum.wrapping_add(scrambled(j));
             }
         }
-        out_start[i + 1] = kept;
+        end[i] = kept;
+        keys.push((sum, i as u32));
     }
-    columns.truncate(kept);
-    columns.shrink_to_fit();
-    (out_start, columns)
+    keys.sort_unstable();
+    // Of each node: the first node with the same row.
+    let mut leader: Vec<u32> = (0..n as u32).collect();
+    mark.fill(NONE);
+    let mut marked = NONE;
+    let mut first = 0;
+    for k in 1..n {
+        if keys[k].0 != keys[first].0 {
+            first = k;
+            continue;
+        }
+        let (i, l) = (keys[k].1 as usize, keys[first].1 as usize);
+        if marked != l as u32 {
+            marked = l as u32;
+            rows[start[l]..end[l]].iter().for_each(|&j| mark[j as usize] = marked);
+        }
+        let same = end[i] - start[i] == end[l] - start[l]
+            && rows[start[i]..end[i]].iter().all(|&j| mark[j as usize] == marked);
+        if same {
+            leader[i] = l as u32;
+        }
+    }
+    // Groups in the order of their first nodes; keys are sorted, so a leader comes before those it leads.
+    let mut groups = Groups {
+        of: vec![0; n],
+        node_sizes: sizes.iter().map(|&s| s as u32).collect(),
+        within: vec![0; n],
+        sizes: vec![],
+        start: vec![0],
+        members: vec![],
+    };
+    let mut leaders = vec![];
+    for i in 0..n {
+        if leader[i] as usize == i {
+            groups.of[i] = leaders.len() as u32;
+            leaders.push(i);
+            groups.sizes.push(0);
+        } else {
+            groups.of[i] = groups.of[leader[i] as usize];
+        }
+        let size = &mut groups.sizes[groups.of[i] as usize];
+        groups.within[i] = *size;
+        *size += sizes[i] as u32;
+    }
+    for g in 0..groups.sizes.len() {
+        groups.start.push(groups.start[g] + groups.sizes[g] as usize);
+    }
+    groups.members = vec![0; groups.start[groups.sizes.len()]];
+    let mut unknown = 0;
+    for i in 0..n {
+        let at = groups.start[groups.of[i] as usize] + groups.within[i] as usize;
+        for k in 0..sizes[i] {
+            groups.members[at + k] = unknown;
+            unknown += 1;
+        }
+    }
+    // Their pattern.
+    let (mut pattern_start, mut pattern) = (vec![0], Vec::new());
+    for (g, &l) in leaders.iter().enumerate() {
+        let from = pattern.len();
+        // Of each group, the leader stands for all.
+        let others = rows[start[l]..end[l]].iter().filter(|&&j| leader[j as usize] == j);
+        pattern.extend(others.map(|&j| groups.of[j as usize]));
+        pattern[from..].sort_unstable();
+        debug_assert!(pattern[from..].contains(&(g as u32)));
+        pattern_start.push(pattern.len());
+    }
+    (groups, pattern_start, pattern)
 }
 
 /// The node of each step of elimination and the step of each node: approximate minimum degree, in a postorder of the tree of elimination.
@@ -461,7 +537,7 @@ fn minimum_degree(start: &[usize], pattern: &[u32]) -> Vec<u32> {
     identity
 }
 
-/// The parent of each step (Liu 1990), NONE for roots.
+/// The parent of each step (Liu1990), NONE for roots.
 fn elimination_tree(start: &[usize], pattern: &[u32], order: &[u32], step: &[u32]) -> Vec<u32> {
     let n = order.len();
     let (mut parent, mut ancestor) = (vec![NONE; n], vec![NONE; n]);

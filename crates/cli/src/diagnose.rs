@@ -1,0 +1,80 @@
+//! `nonsmooth diagnose`.
+
+use std::path::{Path, PathBuf};
+
+use nonsmooth_io::fclib;
+use nonsmooth_problem::with_friction;
+use nonsmooth_solve::Limits;
+use nonsmooth_solve::diagnose::{Diagnosis, Effort, diagnose};
+use serde_json::json;
+
+use crate::report::{self, row};
+use crate::{Exit, files, interrupt, output};
+
+/// Explain what makes problems hard, and what to try.
+///
+/// Size, hyperstaticity, conditioning, asymmetry, mass ratio, impact, friction, duplicate contacts, independent groups,
+/// redundant constraints and the existence of a solution, each with its numbers and what follows from them for solvers.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// FCLIB files (HDF5)
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// The most rows of W for which rank and condition number are computed
+    #[arg(long, value_name = "ROWS", default_value = "1500", value_parser = files::whole)]
+    spectrum_limit: usize,
+    /// At most this many seconds for the existence of a solution
+    #[arg(long, value_name = "SECONDS", default_value = "20", allow_hyphen_values = true)]
+    time_limit: f64,
+    /// Print one line of JSON for each file
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  nonsmooth diagnose wall.hdf5
+  nonsmooth diagnose *.hdf5 --json";
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<Exit, String> {
+    let time_limit = files::time_limit(Some(args.time_limit))?;
+    let effort = Effort {
+        spectrum_limit: args.spectrum_limit,
+        limits: Limits { time_limit, cancel: Some(interrupt::flag()), ..Limits::default() },
+    };
+    Ok(files::each(&args.files, args.json, |_, file| {
+        let content = fclib::read(file).map_err(|e| e.to_string())?;
+        let diagnosis = diagnose(&content.problem, content.info.dofs, &effort);
+        output::print(&if args.json {
+            let mut all = with_friction!(&content.problem, p => report::problem_json(file, p));
+            all.extend(report::fields(json!(diagnosis)));
+            format!("{}\n", json!(all))
+        } else {
+            text(file, &diagnosis)
+        });
+        Ok(Exit::Solved)
+    }))
+}
+
+fn text(file: &Path, diagnosis: &Diagnosis) -> String {
+    let hard: Vec<_> = diagnosis.findings.iter().filter(|f| f.hard).map(|f| f.about).collect();
+    let hard = match hard[..] {
+        [] => "nothing that makes it hard".into(),
+        _ => format!("hard by its {}", hard.join(", ")),
+    };
+    let mut text = format!("{}: {hard}\n", file.display());
+    for finding in &diagnosis.findings {
+        let mark = if finding.hard { "! " } else { "" };
+        row(&mut text, finding.about, format!("{mark}{}.", finding.says));
+        if !finding.means.is_empty() {
+            row(&mut text, "", &finding.means);
+        }
+    }
+    if !diagnosis.suits.is_empty() {
+        let tries: Vec<_> = diagnosis.suits.iter().map(|s| format!("--solver {s}")).collect();
+        row(&mut text, "try", tries.join(", or "));
+    }
+    text
+}

@@ -1,0 +1,129 @@
+//! `nonsmooth exists`.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use nonsmooth_io::fclib;
+use nonsmooth_problem::check::{Certificate, Existence};
+use nonsmooth_problem::with_friction;
+use nonsmooth_solve::{Limits, existence};
+use serde_json::{Value, json};
+
+use crate::report::{self, Object, number, row};
+use crate::{Exit, files, interrupt, output};
+
+/// Decide whether problems have a solution, with a verified certificate.
+///
+/// A solution exists if some motion keeps every contact inside the dual cone K* = {mu |u_T| <= u_N}. If none does, that
+/// is certified by impulses in K that feel no motion; the problem may then still have a solution. Normal impulses that
+/// feel no motion prove that it has none, whatever the friction.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// FCLIB files (HDF5)
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// At most this many seconds for each file
+    #[arg(long, value_name = "SECONDS", default_value = "60", allow_hyphen_values = true)]
+    time_limit: f64,
+    /// Write the certificate as JSON: the motion, or impulses and multipliers
+    #[arg(long, value_name = "OUT")]
+    certificate: Option<PathBuf>,
+    /// Print one line of JSON for each file in place of the report
+    #[arg(long)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  nonsmooth exists wall.hdf5
+  nonsmooth exists problems/*.hdf5 --json
+  nonsmooth exists wall.hdf5 --certificate motion.json
+
+Exit codes: 0 proved for all; 1 not known, or no solution; 2 a mistake in a file or an option.";
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<Exit, String> {
+    let time_limit = files::time_limit(Some(args.time_limit))?;
+    let targets = match &args.certificate {
+        Some(to) => {
+            Some(files::targets("--certificate", to, &args.files, Some("certificate.json"))?)
+        }
+        None => None,
+    };
+    let limits = Limits { time_limit, cancel: Some(interrupt::flag()), ..Limits::default() };
+    Ok(files::each(&args.files, args.json, |k, file| {
+        let content = fclib::read(file).map_err(|e| e.to_string())?;
+        let start = Instant::now();
+        let existence = existence::of(&content.problem, &limits);
+        let seconds = start.elapsed().as_secs_f64();
+        let sizes = with_friction!(&content.problem, p => report::problem_json(file, p));
+        let size_text = with_friction!(&content.problem, p => report::problem_text(p));
+        let contacts = content.problem.contacts();
+        output::print(&if args.json {
+            format!("{}\n", json(sizes.clone(), &existence, contacts, seconds))
+        } else {
+            text(file, &size_text, &existence, contacts, seconds)
+        });
+        if let Some(path) = targets.as_ref().map(|t| &t[k]) {
+            let mut all = sizes;
+            all.extend(report::fields(json!(existence)));
+            files::write_text("--certificate", path, &format!("{}\n", json!(all)))?;
+        }
+        Ok(Exit::solved(matches!(existence, Existence::Proved { .. })))
+    }))
+}
+
+/// The verdict and what it rests on, without the certificate itself.
+pub fn fields(existence: &Existence, contacts: usize) -> Object {
+    let pressed = |ray: &Certificate| ray.pressed(contacts);
+    report::fields(match existence {
+        Existence::Proved { margin, shift, .. } => {
+            json!({"verdict": existence.name(), "margin": margin, "shift": shift})
+        }
+        Existence::Weak { ray } | Existence::CriterionRefuted { ray } => {
+            json!({"verdict": existence.name(), "pressed_contacts": pressed(ray)})
+        }
+        Existence::NoSolution { certificate } => {
+            json!({"verdict": existence.name(), "pressed_contacts": pressed(certificate)})
+        }
+        Existence::Unknown { why } => json!({"verdict": existence.name(), "why": why}),
+    })
+}
+
+fn json(mut all: Object, existence: &Existence, contacts: usize, seconds: f64) -> Value {
+    all.extend(fields(existence, contacts));
+    all.insert("message".into(), json!(existence.to_string()));
+    all.insert("seconds".into(), json!(seconds));
+    Value::Object(all)
+}
+
+fn text(file: &Path, size: &str, existence: &Existence, contacts: usize, seconds: f64) -> String {
+    let mut text = format!("{}: existence of a solution {existence}\n", file.display());
+    row(&mut text, "problem", size);
+    let rests = match existence {
+        Existence::Proved { motion, .. } => {
+            let largest = motion.iter().fold(0.0_f64, |l, x| l.max(x.abs()));
+            Some(format!("a motion of {} unknowns, the largest {}", motion.len(), number(largest)))
+        }
+        Existence::Weak { ray: r }
+        | Existence::CriterionRefuted { ray: r }
+        | Existence::NoSolution { certificate: r } => Some(squeezed(r, contacts)),
+        Existence::Unknown { .. } => None,
+    };
+    if let Some(rests) = rests {
+        row(&mut text, "rests on", rests + ", verified in doubled precision");
+    }
+    row(&mut text, "time", format!("{seconds:.3} s"));
+    text
+}
+
+/// Where a ray has impulses.
+fn squeezed(ray: &Certificate, contacts: usize) -> String {
+    let pressed = report::count(ray.pressed(contacts).len(), "contact");
+    let constraints = match ray.lambda.iter().filter(|l| **l != 0.0).count() {
+        0 => String::new(),
+        n => format!(" and {}", report::count(n, "bilateral row")),
+    };
+    format!("impulses at {pressed}{constraints}")
+}

@@ -1,0 +1,501 @@
+//! Whether a problem has a solution, as far as the motions that it admits tell: the criterion, its certificates, and
+//! their verification from the data alone.
+//!
+//! With `x = v` (global) or `x = (r', λ')` (local) the motions of the contacts are `u = A x + c`, `0 = E x + e`.
+//!
+//! - **Existence.** If some x has `u ∈ int K*` at every contact, `K* = {mu‖u_T‖ ≤ u_N}`, and the dynamics is monotone (M,
+//!   or W with its bilateral rows, has a positive semidefinite symmetric part), a solution exists. For fixed s ≥ 0 let
+//!   v(s) solve the convex problem with `u + mu s e_N ∈ K*`; x is feasible for all of them, so v(s) is bounded
+//!   independently of s, the map `s → ‖u_T(s)‖` takes a ball into itself, and its fixed point (Brouwer) with the
+//!   multipliers (Slater's condition) is a solution. Where K* is a polyhedron (D = 2, or mu = 0) multipliers need no interior: `u ∈ K*` is
+//!   enough there.
+//! - **The criterion fails** exactly where impulses `r ∈ K`, `r ≠ 0` feel no motion, `(r, λ)ᵀ [A; E] = 0`, and have no
+//!   positive power, `cᵀ r + eᵀ λ ≤ 0`. That says nothing of the problem itself: a solution has `ũ ∈ K*`, not `u ∈ K*`, and
+//!   `rᵀ u ≥ −Σ mu r_N ‖u_T‖` may be negative while bodies slide.
+//! - **No solution.** Every solution has `u_N ≥ 0`. Normal impulses (`r_N ≥ 0`, `r_T = 0`) that feel no motion and have negative
+//!   power contradict that, whatever the friction ([`Certificate`]).
+//!
+//! References: AcaryCadouxLemarechalMalick2011; KlarbringPang1998.
+
+use serde::Serialize;
+
+use super::Certificate;
+use super::contact::distance_to_cone;
+use crate::linalg::small::{self, tangential_norm};
+use crate::linalg::{Compensated, Csc, is_positive_definite, norm};
+use crate::{FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem};
+
+/// What is known of the existence of a solution.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "verdict", rename_all = "snake_case")]
+pub enum Existence {
+    /// A solution exists: the criterion holds, with a verified motion.
+    Proved {
+        /// `v` of a global problem; the impulses and multipliers `(r', λ')` of a local one, which need not obey any law.
+        motion: Vec<f64>,
+        /// The least of `(u_N − mu‖u_T‖)` over the size of the terms of u, over all contacts: a pure number. Zero is
+        /// enough at contacts whose K* is a polyhedron.
+        margin: f64,
+        /// What had to be added to the diagonal of M or W, in units of its mean, for the dynamics to be monotone: rounding at most,
+        /// or the digits with which W was stored.
+        shift: f64,
+    },
+    /// The criterion holds at most weakly: motions may touch K*, but verified impulses keep them out of its interior.
+    /// A solution may or may not exist.
+    Weak {
+        /// `r ∈ K` that feels no motion and has no power.
+        ray: Certificate,
+    },
+    /// The criterion does not hold, with verified impulses. A solution may or may not exist.
+    CriterionRefuted {
+        /// `r ∈ K` that feels no motion and has negative power.
+        ray: Certificate,
+    },
+    /// There is no solution, whatever the friction: a verified certificate.
+    NoSolution {
+        /// Normal impulses that feel no motion and have negative power.
+        certificate: Certificate,
+    },
+    /// Nothing could be verified.
+    Unknown {
+        /// Why.
+        why: String,
+    },
+}
+
+impl Existence {
+    /// The verdict's name: `proved`, `weak`, `criterion_refuted`, `no_solution`, `unknown`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Proved { .. } => "proved",
+            Self::Weak { .. } => "weak",
+            Self::CriterionRefuted { .. } => "criterion_refuted",
+            Self::NoSolution { .. } => "no_solution",
+            Self::Unknown { .. } => "unknown",
+        }
+    }
+}
+
+impl std::fmt::Display for Existence {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Proved { margin, shift, .. } => {
+                let cone = "a motion keeps all contacts in the dual cone";
+                write!(f, "proved: {cone} (relative margin {margin:.1e})")?;
+                if *shift > SHIFTS[1] {
+                    write!(f, "; W is positive semidefinite up to {shift:.0e} of its diagonal only")?;
+                }
+                Ok(())
+            }
+            Self::Weak { .. } => f.write_str(
+                "not known: motions reach the dual cone at most at its boundary (verified), which is not enough",
+            ),
+            Self::CriterionRefuted { .. } => f.write_str(
+                "not known: no motion keeps all contacts in the dual cone (verified); sliding may still make a solution",
+            ),
+            Self::NoSolution { .. } => f.write_str(
+                "none: normal impulses that no motion feels prove that bodies are forced into each other, whatever the friction",
+            ),
+            Self::Unknown { why } => write!(f, "not known: {why}"),
+        }
+    }
+}
+
+/// A problem that can say which motions it admits.
+pub trait Kinematic<const D: usize>: Problem {
+    /// The motions `u = A x + c`, `0 = E x + e`. Cost: a copy of H and G, or of W, V and R.
+    fn kinematics(&self) -> Kinematics<D>;
+
+    /// The x of a point: v, or the impulses and multipliers.
+    fn motion(point: &Self::Point) -> Vec<f64>;
+
+    /// The least of a few shifts, in units of the mean diagonal, that make the symmetric part of M, or of `[W, V; Vᵀ, R]`, positive
+    /// definite: M needs none, W is semidefinite at best and rounded. `None`: it is indefinite, and the theorem of existence
+    /// does not apply. Cost: a few sparse Cholesky factorisations.
+    fn monotone_up_to(&self) -> Option<f64>;
+}
+
+impl<const D: usize> Kinematic<D> for FrictionGlobal<D> {
+    fn kinematics(&self) -> Kinematics<D> {
+        let m = self.w.len();
+        let mut rows = vec![];
+        rows.extend(self.H.triplets().map(|(i, j, x)| (j, i, x)));
+        let mut constant = self.w.clone();
+        if let Some(b) = &self.bilateral {
+            rows.extend(b.G.triplets().map(|(i, j, x)| (m + j, i, x)));
+            constant.extend_from_slice(&b.b);
+        }
+        Kinematics::new(&rows, self.dofs(), constant, self.mu.clone(), 0.0)
+    }
+
+    fn motion(point: &GlobalPoint) -> Vec<f64> {
+        point.v.clone()
+    }
+
+    fn monotone_up_to(&self) -> Option<f64> {
+        is_positive_definite(&self.M, 0.0).then_some(0.0)
+    }
+}
+
+impl<const D: usize> FrictionLocal<D> {
+    /// `[W, V; Vᵀ, R]` by entries.
+    fn bordered(&self) -> Vec<(usize, usize, f64)> {
+        let m = self.q.len();
+        let mut entries: Vec<_> = self.W.to_csc().triplets().collect();
+        if let Some(b) = &self.bilateral {
+            entries.extend(b.V.triplets().flat_map(|(i, j, x)| [(i, m + j, x), (m + j, i, x)]));
+            entries.extend(b.R.triplets().map(|(i, j, x)| (m + i, m + j, x)));
+        }
+        entries
+    }
+}
+
+impl<const D: usize> Kinematic<D> for FrictionLocal<D> {
+    fn kinematics(&self) -> Kinematics<D> {
+        let mut constant = self.q.clone();
+        if let Some(b) = &self.bilateral {
+            constant.extend_from_slice(&b.s);
+        }
+        // W is computed: where it should be symmetric, its asymmetry tells its rounding.
+        let noise = match self.W.asymmetry() {
+            a if a < NOISE => a,
+            _ => 0.0,
+        };
+        Kinematics::new(&self.bordered(), constant.len(), constant, self.mu.clone(), noise)
+    }
+
+    fn motion(point: &LocalPoint) -> Vec<f64> {
+        [&point.r[..], &point.lambda].concat()
+    }
+
+    fn monotone_up_to(&self) -> Option<f64> {
+        let size = self.q.len() + self.multipliers();
+        let w = Csc::from_triplets(size, size, self.bordered().into_iter()).expect("in range");
+        SHIFTS.into_iter().find(|&shift| is_positive_definite(&w, shift))
+    }
+}
+
+/// The shifts that are tried for W: the first is rounding, the last the seven digits with which some files store W.
+const SHIFTS: [f64; 3] = [1e-12, 1e-9, 1e-6];
+/// An asymmetry of W below this is rounding, above it is meant.
+const NOISE: f64 = 1e-8;
+/// The relative rounding that "equals zero" forgives.
+const ZERO: f64 = 1e-10;
+/// The relative margin by which a power must be negative.
+const NEGATIVE: f64 = 1e-8;
+/// Solutions that move so many times faster than the data say are not excluded by a certificate that holds up to rounding.
+const REACH: f64 = 1e4;
+/// What is forgiven where impulses should be in a cone.
+const INSIDE: f64 = 1e-14;
+/// The uncertainty of each number of the data, and of what is made of them.
+const UNCERTAINTY: f64 = 64.0 * f64::EPSILON;
+
+/// The motions of the contacts, `u = A x + c`, `0 = E x + e`; see the [module](self::super).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Kinematics<const D: usize> {
+    /// `[A; E]` by rows, stored as its transpose: column i holds row i.
+    pub rows: Csc,
+    /// `[c; e]`.
+    pub constant: Vec<f64>,
+    /// The coefficients of friction.
+    pub mu: Vec<f64>,
+    /// The relative uncertainty of `[A; E]`.
+    pub noise: f64,
+}
+
+impl<const D: usize> Kinematics<D> {
+    fn new(
+        entries: &[(usize, usize, f64)],
+        columns: usize,
+        constant: Vec<f64>,
+        mu: Vec<f64>,
+        noise: f64,
+    ) -> Self {
+        let transposed = entries.iter().map(|&(i, j, x)| (j, i, x));
+        let rows = Csc::from_triplets(columns, constant.len(), transposed).expect("in range");
+        Self { rows, constant, mu, noise: noise.max(UNCERTAINTY) }
+    }
+
+    /// The number of components of u.
+    pub fn contact_rows(&self) -> usize {
+        D * self.mu.len()
+    }
+
+    /// Row i of `[A x + c; E x + e]` in doubled precision, and the size of its terms.
+    fn row(&self, i: usize, x: &[f64]) -> (f64, f64) {
+        let mut sum = Compensated::from(self.constant[i]);
+        let mut size = self.constant[i].abs();
+        let (columns, values) = self.rows.column(i);
+        for (&j, &a) in columns.iter().zip(values) {
+            sum.add_product(a, x[j]);
+            size += (a * x[j]).abs();
+        }
+        (sum.value(), size)
+    }
+
+    /// The relative margin by which the motion x meets the criterion, if it does; see [`Existence::Proved`].
+    ///
+    /// u is computed in doubled precision. The margin of each contact must exceed what relative errors of the data of `64 ε` (or, for a
+    /// local problem, of W's own asymmetry) can change, so that a huge x proves nothing. Scaling all velocities, all
+    /// impulses or any unknown changes nothing.
+    pub fn margin(&self, x: &[f64]) -> Option<f64> {
+        if x.len() != self.rows.nrows() || x.iter().any(|x| !x.is_finite()) {
+            return None;
+        }
+        let m = self.contact_rows();
+        for i in m..self.constant.len() {
+            let (left, size) = self.row(i, x);
+            if left.abs() > ZERO * size {
+                return None;
+            }
+        }
+        let constrained = self.constant.len() > m;
+        let still = x.iter().all(|&x| x == 0.0);
+        let mut least = f64::INFINITY;
+        for (c, &mu) in self.mu.iter().enumerate() {
+            let mut u = [0.0; D];
+            let mut size = 0.0;
+            for k in 0..D {
+                let (value, terms) = self.row(D * c + k, x);
+                u[k] = value;
+                size += if k == 0 { terms } else { mu * terms };
+            }
+            let gap = u[0] - mu * tangential_norm(&u);
+            // Multipliers of a polyhedron need no interior; without motion u is the data themselves.
+            let polyhedral = D == 2 || mu == 0.0;
+            if polyhedral && still && gap >= 0.0 {
+                least = least.min(if size > 0.0 { gap / size } else { 0.0 });
+                continue;
+            }
+            let uncertain = if constrained { self.noise.max(10.0 * ZERO) } else { self.noise };
+            let certain = gap > uncertain * size;
+            if !certain {
+                return None;
+            }
+            least = least.min(gap / size);
+        }
+        Some(least)
+    }
+
+    /// Whether `ray` proves that no motion has `u ∈ K*` at every contact.
+    pub fn refutes_criterion(&self, ray: &Certificate) -> bool {
+        self.felt(ray, &self.mu).is_some_and(|felt| self.power(ray).is_negative(felt))
+    }
+
+    /// Whether `ray` proves that no motion has `u ∈ int K*` at every contact.
+    pub fn refutes_interior(&self, ray: &Certificate) -> bool {
+        let power = self.power(ray);
+        let some = ray.r.iter().any(|&r| r != 0.0);
+        some && self.felt(ray, &self.mu).is_some() && power.sum <= NEGATIVE * power.size
+    }
+
+    /// Whether `certificate` proves that no motion has `u_N ≥ 0` at every contact, and so that there is no solution.
+    pub fn refutes(&self, certificate: &Certificate) -> bool {
+        let felt = self.felt(certificate, &vec![0.0; self.mu.len()]);
+        felt.is_some_and(|felt| self.power(certificate).is_negative(felt))
+    }
+
+    /// Where `r ∈ K` for the coefficients given and `(r, λ)ᵀ [A; E] = 0` up to rounding: the power that the rest of these products
+    /// can still have, with motions that are [`REACH`] times as fast as the largest velocity given.
+    fn felt(&self, ray: &Certificate, mu: &[f64]) -> Option<f64> {
+        let (r, lambda) = (&ray.r, &ray.lambda);
+        let m = self.contact_rows();
+        let scale = norm(r);
+        let shaped = r.len() == m && m + lambda.len() == self.constant.len();
+        if !shaped || !scale.is_finite() || !norm(lambda).is_finite() {
+            return None;
+        }
+        let inside = |(c, &mu): (usize, &f64)| {
+            distance_to_cone::<D>(&small::block(r, c), mu) <= INSIDE * scale
+        };
+        if !mu.iter().enumerate().all(inside) {
+            return None;
+        }
+        // Contacts are all in m/s; each equation is in units of its own largest entry.
+        let row_unit = |i: usize| {
+            let values = self.rows.column(i).1.iter();
+            let largest = if i < m { 0.0 } else { values.fold(0.0_f64, |l, a| l.max(a.abs())) };
+            if largest > 0.0 { largest } else { 1.0 }
+        };
+        let n = self.rows.nrows();
+        let (mut sums, mut sizes) = (vec![Compensated::default(); n], vec![0.0; n]);
+        let mut units = vec![0.0_f64; n];
+        let mut fastest = 0.0_f64;
+        for (i, constant) in self.constant.iter().enumerate() {
+            let y = if i < m { r[i] } else { lambda[i - m] };
+            let unit = row_unit(i);
+            fastest = fastest.max(constant.abs() / unit);
+            let (columns, values) = self.rows.column(i);
+            for (&j, &a) in columns.iter().zip(values) {
+                sums[j].add_product(a, y);
+                sizes[j] += (a * y).abs();
+                units[j] = units[j].max(a.abs() / unit);
+            }
+        }
+        let in_units = |x: f64, j: usize| if units[j] > 0.0 { x / units[j] } else { 0.0 };
+        let left: Vec<_> = (0..n).map(|j| in_units(sums[j].value(), j)).collect();
+        let size: Vec<_> = (0..n).map(|j| in_units(sizes[j], j)).collect();
+        let vanishes = norm(&left) <= ZERO.max(self.noise) * norm(&size);
+        vanishes.then(|| REACH * fastest * left.iter().map(|x| x.abs()).sum::<f64>())
+    }
+
+    /// `cᵀ r + eᵀ λ`.
+    fn power(&self, ray: &Certificate) -> Power {
+        let mut sum = Compensated::default();
+        let mut size = 0.0;
+        for (y, c) in ray.r.iter().chain(&ray.lambda).zip(&self.constant) {
+            sum.add_product(*y, *c);
+            size += (y * c).abs();
+        }
+        Power { sum: sum.value(), size }
+    }
+}
+
+/// A sum of products and of their sizes.
+struct Power {
+    sum: f64,
+    size: f64,
+}
+
+impl Power {
+    /// Negative beyond its own rounding and beyond what is `felt` of the motion.
+    fn is_negative(&self, felt: f64) -> bool {
+        self.sum < -(NEGATIVE * self.size).max(felt)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linalg::Bsr;
+    use crate::planted::Planted;
+    use crate::{BilateralGlobal, BilateralLocal};
+
+    /// One body of unit mass in space that touches planes with the normals given.
+    fn touching(normals: &[[f64; 3]], w: &[f64], mu: f64) -> FrictionGlobal<3> {
+        let mut h = vec![];
+        for (c, n) in normals.iter().enumerate() {
+            // Any two unit vectors orthogonal to n and each other.
+            let helper = if n[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+            let cross = |a: &[f64; 3], b: &[f64; 3]| {
+                [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+            };
+            let t = cross(n, &helper);
+            let size = norm(&t);
+            let t = t.map(|x| x / size);
+            let axes = [*n, t, cross(n, &t)];
+            for (k, axis) in axes.iter().enumerate() {
+                h.extend((0..3).map(|i| (i, 3 * c + k, axis[i])));
+            }
+        }
+        let h = Csc::from_triplets(3, 3 * normals.len(), h.into_iter()).unwrap();
+        let mu = vec![mu; normals.len()];
+        FrictionGlobal::new(Csc::diagonal(&[1.0; 3]), h, vec![0.0; 3], w.to_vec(), mu).unwrap()
+    }
+
+    const UP: [f64; 3] = [0.0, 0.0, 1.0];
+    const DOWN: [f64; 3] = [0.0, 0.0, -1.0];
+
+    #[test]
+    fn a_body_on_a_floor_can_leave_it() {
+        let p = touching(&[UP], &[-1.0, 0.3, 0.0], 0.5);
+        let k = p.kinematics();
+        assert_eq!(p.monotone_up_to(), Some(0.0));
+        assert_eq!(k.margin(&[0.0, 0.0, 0.5]), None);
+        let margin = k.margin(&[0.0, 0.0, 2.0]).unwrap();
+        assert!((0.1..1.0).contains(&margin), "{margin}");
+        // A huge motion whose tangential part cannot be told from rounding proves nothing.
+        assert_eq!(k.margin(&[1e20, 0.0, 2.0]), None);
+        assert_eq!(k.margin(&[0.0; 2]), None);
+        assert_eq!(k.margin(&[0.0, 0.0, f64::NAN]), None);
+    }
+
+    #[test]
+    fn where_the_dual_cone_is_a_polyhedron_its_boundary_is_enough() {
+        let closed = |mu| touching(&[UP, DOWN], &[0.0; 6], mu).kinematics();
+        assert_eq!(closed(0.0).margin(&[0.0; 3]), Some(0.0));
+        assert_eq!(closed(0.5).margin(&[0.0; 3]), None);
+        let ray = Certificate { r: vec![1.0, 0.0, 0.0, 1.0, 0.0, 0.0], lambda: vec![] };
+        assert!(closed(0.5).refutes_interior(&ray) && !closed(0.5).refutes_criterion(&ray));
+    }
+
+    #[test]
+    fn certificates_do_not_depend_on_units() {
+        let p = touching(&[UP, DOWN], &[-1.0, 0.0, 0.0, 0.2, 0.1, 0.0], 0.4);
+        for unit in [1e-6, 1.0, 1e6] {
+            // Velocities in another unit, then one degree of freedom in another unit.
+            let mut scaled = p.clone();
+            scaled.w.iter_mut().for_each(|w| *w *= unit);
+            let h = scaled.H.triplets().map(|(i, j, x)| (i, j, if i == 2 { x * unit } else { x }));
+            scaled.H = Csc::from_triplets(3, 6, h).unwrap();
+            let k = scaled.kinematics();
+            for (size, proves) in [([1.0, 1.0], true), ([1.0, 1.001], false)] {
+                let r = vec![size[0], 0.0, 0.0, size[1], 0.0, 0.0];
+                let ray = Certificate { r, lambda: vec![] };
+                assert_eq!((k.refutes(&ray), k.refutes_criterion(&ray)), (proves, proves));
+            }
+            let floor = touching(&[UP], &[-unit, 0.3 * unit, 0.0], 0.5).kinematics();
+            let margin = floor.margin(&[0.0, 0.0, 2.0 * unit]).unwrap();
+            assert!((margin - 0.85 / 3.15).abs() < 1e-12, "{margin} at {unit:e}");
+        }
+    }
+
+    #[test]
+    fn tangential_impulses_refute_the_criterion_but_not_the_problem() {
+        // A wedge whose walls are closer to upright than the friction cone is wide.
+        let (s, c) = (0.2_f64.sin(), 0.2_f64.cos());
+        let p = touching(&[[c, 0.0, s], [-c, 0.0, s]], &[0.0; 6], 0.5);
+        // Along the line between the contacts the impulses balance: in each frame (N, T).
+        let along = |c: usize, d: [f64; 3]| -> Vec<f64> {
+            (0..3).map(|k| (0..3).map(|i| p.H.get(i, 3 * c + k) * d[i]).sum()).collect()
+        };
+        let r = [along(0, [1.0, 0.0, 0.0]), along(1, [-1.0, 0.0, 0.0])].concat();
+        let ray = Certificate { r: r.clone(), lambda: vec![] };
+        let mut squeezed = p.clone();
+        squeezed.w = r.iter().map(|r| -0.1 * r).collect();
+        let k = squeezed.kinematics();
+        assert!(k.refutes_criterion(&ray) && !k.refutes(&ray));
+        // With less friction the same impulses are outside of K.
+        squeezed.mu = vec![0.1; 2];
+        assert!(!squeezed.kinematics().refutes_criterion(&ray));
+    }
+
+    #[test]
+    fn a_local_problem_admits_the_motions_of_its_global_one() {
+        for (bilateral, skew) in [(0, 0.0), (0, 0.1), (3, 0.0)] {
+            let case = Planted { contacts: 4, dofs: 18, bilateral, skew, ..Planted::default() };
+            let (local, point) = case.local::<3>();
+            assert_eq!(local.monotone_up_to(), Some(SHIFTS[0]));
+            let k = local.kinematics();
+            let x = FrictionLocal::<3>::motion(&point);
+            let u = local.velocity(&point);
+            assert!((0..12).all(|i| (k.row(i, &x).0 - u[i]).abs() < 1e-12));
+            assert!((12..12 + bilateral).all(|i| k.row(i, &x).0.abs() < 1e-12));
+        }
+        let (mut local, _) = Planted { contacts: 2, ..Planted::default() }.local::<2>();
+        local.W = Bsr::from_csc(&Csc::diagonal(&[1.0, 1.0, -1.0, 1.0]));
+        assert_eq!(local.monotone_up_to(), None);
+        local.W = Bsr::from_csc(&Csc::diagonal(&[1.0, 0.0, 0.0, 1.0]));
+        assert_eq!(local.monotone_up_to(), Some(SHIFTS[0]), "semidefinite is enough");
+        local.W = Bsr::from_csc(&Csc::diagonal(&[1.0, -1e-8, 0.0, 1.0]));
+        assert_eq!(local.monotone_up_to(), Some(SHIFTS[2]));
+        let (v, r) = (Csc::zeros(4, 1), Csc::diagonal(&[-1.0]));
+        local.bilateral = Some(BilateralLocal { V: v, R: r, s: vec![0.0] });
+        assert_eq!(local.monotone_up_to(), None);
+    }
+
+    #[test]
+    fn bilateral_constraints_take_part() {
+        // The floor would be left, but the body is held.
+        let mut p = touching(&[UP], &[-1.0, 0.0, 0.0], 0.3);
+        let g = Csc::from_triplets(3, 1, [(2, 0, 1.0)].into_iter()).unwrap();
+        p.bilateral = Some(BilateralGlobal { G: g, b: vec![0.0] });
+        let k = p.kinematics();
+        assert_eq!(k.margin(&[0.0, 0.0, 2.0]), None);
+        let ray = |lambda| Certificate { r: vec![1.0, 0.0, 0.0], lambda: vec![lambda] };
+        assert!(k.refutes(&ray(-1.0)) && !k.refutes(&ray(1.0)) && !k.refutes(&ray(0.0)));
+        p.bilateral.as_mut().unwrap().b[0] = -3.0;
+        assert!(p.kinematics().margin(&[0.0, 0.0, 3.0]).is_some());
+        assert!(!p.kinematics().refutes(&ray(-1.0)));
+    }
+}

@@ -1,0 +1,224 @@
+//! Existence: planted problems, squeezed bodies, wedges that can jam, clamps at rest; in both forms, dimensions and any units.
+
+use nonsmooth_problem::check::{Existence, Judged, Kinematic};
+use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse};
+use nonsmooth_problem::planted::Planted;
+use nonsmooth_problem::{
+    BilateralGlobal, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem,
+};
+use nonsmooth_solve::existence::{decide, glance_at};
+use nonsmooth_solve::form::Blockwise;
+use nonsmooth_solve::registry::{self, Registered};
+use nonsmooth_solve::{Limits, Status};
+
+/// The verdict, its certificate verified once more.
+fn verdict<P: Blockwise<D> + Kinematic<D>, const D: usize>(problem: &P) -> Existence {
+    let existence = decide(problem, &Limits::default());
+    let k = problem.kinematics();
+    match &existence {
+        Existence::Proved { motion, margin, .. } => assert_eq!(k.margin(motion), Some(*margin)),
+        Existence::Weak { ray } => assert!(k.refutes_interior(ray) && !k.refutes_criterion(ray)),
+        Existence::CriterionRefuted { ray } => assert!(k.refutes_criterion(ray)),
+        Existence::NoSolution { certificate } => {
+            assert!(problem.verify(certificate));
+        }
+        Existence::Unknown { .. } => {}
+    }
+    existence
+}
+
+fn name<P: Blockwise<D> + Kinematic<D>, const D: usize>(problem: &P) -> &'static str {
+    verdict(problem).name()
+}
+
+/// The same problem without its bodies.
+fn condensed<const D: usize>(p: &FrictionGlobal<D>) -> FrictionLocal<D> {
+    let inverse = Inverse::new(&p.M, "M").unwrap();
+    let w = Delassus::<D>::condense(&p.H, &inverse);
+    let mut v = p.f.clone();
+    inverse.solve(&mut v);
+    let mut q = vec![0.0; p.w.len()];
+    p.velocity_into(&v, &mut q);
+    FrictionLocal::new(w, q, p.mu.clone()).unwrap()
+}
+
+/// One body without rotation, a contact for each set of axes `[N, T, ...]`.
+fn point_mass<const D: usize>(axes: &[[[f64; D]; D]], w: Vec<f64>, mu: f64) -> FrictionGlobal<D> {
+    let mut h = vec![];
+    for (c, axes) in axes.iter().enumerate() {
+        for (k, axis) in axes.iter().enumerate() {
+            h.extend(axis.iter().enumerate().map(|(i, &x)| (i, D * c + k, x)));
+        }
+    }
+    let h = Csc::from_triplets(D, D * axes.len(), h.into_iter()).unwrap();
+    let m = Csc::diagonal(&[2.0; D]);
+    FrictionGlobal::new(m, h, vec![0.0; D], w, vec![mu; axes.len()]).unwrap()
+}
+
+const X: [f64; 3] = [1.0, 0.0, 0.0];
+const Y: [f64; 3] = [0.0, 1.0, 0.0];
+const Z: [f64; 3] = [0.0, 0.0, 1.0];
+const DOWN: [f64; 3] = [0.0, 0.0, -1.0];
+
+/// Velocities in units of `velocity`, impulses in units of `impulse`.
+fn in_units<const D: usize>(
+    p: &FrictionGlobal<D>,
+    velocity: f64,
+    impulse: f64,
+) -> FrictionGlobal<D> {
+    let mut scaled = p.clone();
+    let m = p.M.triplets().map(|(i, j, x)| (i, j, x * impulse / velocity));
+    scaled.M = Csc::from_triplets(p.dofs(), p.dofs(), m).unwrap();
+    scaled.f.iter_mut().for_each(|f| *f *= impulse);
+    scaled.w.iter_mut().for_each(|w| *w *= velocity);
+    if let Some(b) = &mut scaled.bilateral {
+        b.b.iter_mut().for_each(|b| *b *= velocity);
+    }
+    scaled
+}
+
+#[test]
+fn planted_problems_of_full_rank_have_a_solution() {
+    for (seed, bilateral, skew) in [(0, 0, 0.0), (1, 4, 0.0), (2, 0, 0.2), (3, 2, 0.1)] {
+        let case = Planted { contacts: 15, dofs: 120, bilateral, skew, seed, ..Planted::default() };
+        for velocity in [1e-6, 1.0, 1e6] {
+            assert_eq!(name(&in_units(&case.global::<3>().0, velocity, 1e3)), "proved", "{case:?}");
+        }
+        assert_eq!(name(&case.global::<2>().0), "proved", "{case:?}");
+        assert_eq!(name(&case.local::<3>().0), "proved", "{case:?}");
+        assert_eq!(name(&case.local::<2>().0), "proved", "{case:?}");
+        assert_eq!(glance_at(&case.global::<3>().0).name(), "proved");
+    }
+}
+
+/// Rank-deficient ones may be anything but without a solution: they have one.
+#[test]
+fn no_planted_problem_is_refuted() {
+    let mut seen = vec![];
+    for seed in 0..12 {
+        let contacts = 10 + 3 * seed as usize;
+        let case = Planted { contacts, dofs: 24, mu: (0.3, 1.2), seed, ..Planted::default() };
+        for found in
+            [name(&case.global::<3>().0), name(&case.local::<3>().0), name(&case.global::<2>().0)]
+        {
+            assert_ne!(found, "no_solution", "{case:?} {seen:?}");
+            seen.push(found);
+        }
+    }
+    assert!(seen.contains(&"proved") || seen.contains(&"criterion_refuted"), "{seen:?}");
+    assert!(seen.iter().filter(|s| **s == "unknown").count() <= 2, "{seen:?}");
+}
+
+#[test]
+fn a_squeezed_body_has_no_solution_whatever_the_friction() {
+    let w = vec![-1.0, 0.0, 0.0, -0.5, 0.2, 0.0, 0.3, 0.0, 0.0];
+    for mu in [0.0, 0.4, 2.0] {
+        let p = point_mass(&[[Z, X, Y], [DOWN, X, Y], [X, Y, Z]], w.clone(), mu);
+        for (velocity, impulse) in [(1.0, 1.0), (1e6, 1e-6), (1e-6, 1.0)] {
+            let p = in_units(&p, velocity, impulse);
+            assert_eq!(name(&p), "no_solution", "mu = {mu}, {velocity:e}");
+            assert_eq!(name(&condensed(&p)), "no_solution", "mu = {mu}, {velocity:e}");
+        }
+        let Existence::NoSolution { certificate } = verdict(&p) else { unreachable!() };
+        assert_eq!(certificate.pressed(3), [0, 1]);
+    }
+    let plane = |mu| {
+        point_mass(
+            &[[[0.0, 1.0], [1.0, 0.0]], [[0.0, -1.0], [1.0, 0.0]]],
+            vec![-1.0, 0.0, 0.9, 0.0],
+            mu,
+        )
+    };
+    assert_eq!((name(&plane(0.0)), name(&plane(0.7))), ("no_solution", "no_solution"));
+}
+
+/// A body that slides up between two steep walls: a solution by construction, yet impulses across the wedge balance
+/// inside the friction cones and have negative power.
+fn wedge(mu: f64) -> (FrictionGlobal<3>, GlobalPoint) {
+    let (s, c) = 0.2_f64.sin_cos();
+    let walls = [[[c, 0.0, s], [-s, 0.0, c], Y], [[-c, 0.0, s], [s, 0.0, c], Y]];
+    // u is w at v = 0: sliding up. r against it, on the boundary of K.
+    let w = vec![0.0, 1.0, 0.1, 0.0, 0.8, -0.1];
+    let mut p = point_mass(&walls, w.clone(), mu);
+    let mut r = vec![0.0; 6];
+    for c in 0..2 {
+        let t = w[3 * c + 1].hypot(w[3 * c + 2]);
+        (0..3).for_each(|k| r[3 * c + k] = if k == 0 { 1.0 } else { -mu * w[3 * c + k] / t });
+    }
+    let mut load = vec![0.0; 3];
+    p.H.mul_add(-1.0, &r, &mut load);
+    p.f = load;
+    (p, GlobalPoint { v: vec![0.0; 3], r, lambda: vec![] })
+}
+
+#[test]
+fn in_a_wedge_the_criterion_is_refuted_and_yet_there_is_a_solution() {
+    let (p, solution) = wedge(0.5);
+    assert!(p.judge(&solution, 1e-12).unwrap().solved);
+    for velocity in [1.0, 1e6, 1e-6] {
+        assert_eq!(name(&in_units(&p, velocity, 1.0)), "criterion_refuted", "{velocity:e}");
+    }
+    let local = condensed(&p);
+    let point = LocalPoint { r: solution.r, lambda: vec![] };
+    assert!(local.judge(&point, 1e-12).unwrap().solved);
+    let Existence::CriterionRefuted { ray } = verdict(&local) else {
+        panic!("{:?}", verdict(&local))
+    };
+    assert!(ray.r[1].abs() > 0.1 && !local.verify(&ray), "{ray:?}");
+    // With less friction than the walls are steep nothing jams.
+    assert_eq!(name(&wedge(0.15).0), "proved");
+}
+
+fn solves<P: Registered + Judged>(problem: &P) -> bool {
+    let mut session = registry::session::<P>("nsgs", &Default::default()).unwrap();
+    let mut point = problem.origin();
+    let limits = Limits { max_iterations: 100_000, ..Limits::default() };
+    let outcome = session.solve(problem, &mut point, &limits, &mut |_| {}).unwrap();
+    outcome.status == Status::Solved
+}
+
+#[test]
+fn gauss_seidel_finds_the_solution_that_the_criterion_does_not_promise() {
+    assert!(solves(&wedge(0.5).0) || solves(&condensed(&wedge(0.5).0)));
+}
+
+#[test]
+fn a_clamp_at_rest_meets_the_criterion_weakly() {
+    let clamp = |mu| point_mass(&[[Z, X, Y], [DOWN, X, Y]], vec![0.0; 6], mu);
+    assert_eq!(name(&clamp(0.5)), "weak");
+    // Half spaces are polyhedra: their boundary is enough. So are the cones of the plane.
+    assert_eq!(name(&clamp(0.0)), "proved");
+    let plane =
+        point_mass(&[[[0.0, 1.0], [1.0, 0.0]], [[0.0, -1.0], [1.0, 0.0]]], vec![0.0; 4], 0.5);
+    assert_eq!(name(&plane), "proved");
+}
+
+#[test]
+fn bilateral_constraints_hold_a_body_in_place() {
+    let mut p = point_mass(&[[Z, X, Y]], vec![-1.0, 0.0, 0.0], 0.3);
+    assert_eq!(name(&p), "proved");
+    let g = Csc::from_triplets(3, 1, [(2, 0, 1.0)].into_iter()).unwrap();
+    p.bilateral = Some(BilateralGlobal { G: g, b: vec![0.0] });
+    assert_eq!(name(&p), "no_solution");
+    p.bilateral.as_mut().unwrap().b[0] = -2.0;
+    assert_eq!(name(&p), "proved");
+    // Two constraints that contradict each other.
+    let g = Csc::from_triplets(3, 2, [(2, 0, 1.0), (2, 1, 1.0)].into_iter()).unwrap();
+    p.bilateral = Some(BilateralGlobal { G: g, b: vec![-2.0, -3.0] });
+    assert_eq!(name(&p), "no_solution");
+}
+
+#[test]
+fn the_theorem_is_not_used_where_it_does_not_apply() {
+    let w = Bsr::from_csc(&Csc::diagonal(&[1.0, -1.0, 1.0]));
+    let p = FrictionLocal::<3>::new(w, vec![-1.0, 0.0, 0.0], vec![0.5]).unwrap();
+    let Existence::Unknown { why } = verdict(&p) else { panic!() };
+    assert!(why.contains("semidefinite"), "{why}");
+}
+
+#[test]
+fn a_limit_ends_the_investigation() {
+    let (p, _) = wedge(0.5);
+    let limits = Limits { time_limit: Some(0.0), ..Limits::default() };
+    assert_eq!(decide(&p, &limits), Existence::Unknown { why: "the time limit came first".into() });
+}
