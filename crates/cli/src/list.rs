@@ -129,27 +129,49 @@ fn text(catalogue: &Catalogue) -> String {
             row(&mut text, "needs", about.needs.join(", "));
         }
         row(&mut text, "see", about.cites.join(", "));
-        for setting in (about.settings)() {
-            let default = default_of(&setting);
-            row(&mut text, "--set", format!("{}={default}", setting.key));
-            row(&mut text, "", format!("    {}", setting.help));
-            if !setting.choices.is_empty() {
-                let choices = setting.choices.join(", ");
-                row(&mut text, "", format!("    One of {choices}."));
-            }
-        }
+        settings_text(&mut text, (about.settings)());
         text.push('\n');
     }
     for prefix in &catalogue.prefixes {
         let _ = writeln!(text, "{}/SOLVER: {}", prefix.name, prefix.summary);
         row(&mut text, "kinds", names(prefix.from));
         row(&mut text, "see", prefix.cites.join(", "));
+        settings_text(&mut text, (prefix.settings)());
         text.push('\n');
     }
     if !catalogue.composed.is_empty() {
         let _ = writeln!(text, "Composed: {}", catalogue.composed.join(", "));
     }
     text
+}
+
+fn settings_text(text: &mut String, settings: Vec<Setting>) {
+    for setting in settings {
+        let default = default_of(&setting);
+        row(text, "--set", format!("{}={default}", setting.key));
+        row(text, "", format!("    {}", setting.help));
+        if !setting.choices.is_empty() {
+            let choices = setting.choices.join(", ");
+            row(text, "", format!("    One of {choices}."));
+        }
+    }
+}
+
+fn settings_table(page: &mut String, settings: Vec<Setting>) {
+    if settings.is_empty() {
+        return;
+    }
+    page.push_str("\n| setting | default | meaning |\n| --- | --- | --- |\n");
+    for setting in settings {
+        let (key, default) = (&setting.key, default_of(&setting));
+        let choices: Vec<_> = setting.choices.iter().map(|c| format!("`{c}`")).collect();
+        let choices = match choices.join(", ") {
+            none if none.is_empty() => none,
+            all => format!(" One of {all}."),
+        };
+        let help = cell(&setting.help);
+        let _ = writeln!(page, "| `{key}` | `{default}` | {help}{choices} |");
+    }
 }
 
 fn markdown(catalogue: &Catalogue) -> String {
@@ -173,32 +195,25 @@ fn markdown(catalogue: &Catalogue) -> String {
             let _ = writeln!(page, "- Needs: {}", about.needs.join(", "));
         }
         let _ = writeln!(page, "- References: {}", about.cites.join(", "));
-        let settings = (about.settings)();
-        if settings.is_empty() {
-            continue;
-        }
-        page.push_str("\n| setting | default | meaning |\n| --- | --- | --- |\n");
-        for setting in settings {
-            let (key, default) = (&setting.key, default_of(&setting));
-            let choices: Vec<_> = setting.choices.iter().map(|c| format!("`{c}`")).collect();
-            let choices = match choices.join(", ") {
-                none if none.is_empty() => none,
-                all => format!(" One of {all}."),
-            };
-            let help = cell(&setting.help);
-            let _ = writeln!(page, "| `{key}` | `{default}` | {help}{choices} |");
-        }
+        settings_table(&mut page, (about.settings)());
     }
     page.push_str(
         "\n## Reformulations\n\n\
          A reformulation stands before a solver's name, as in `condense/nsgs`: the problem is reformulated, solved\n\
-         as what it has become, and the point is led back. The settings are the solver's.\n\n\
+         as what it has become, and the point is led back. The settings are the solver's, and those that the reformulation adds.\n\n\
          | reformulation | takes | what it does | references |\n| --- | --- | --- | --- |\n",
     );
     for prefix in &catalogue.prefixes {
         let (name, kinds, summary) = (prefix.name, names(prefix.from), cell(prefix.summary));
         let cites = prefix.cites.join(", ");
         let _ = writeln!(page, "| `{name}/` | {kinds} | {summary} | {cites} |");
+    }
+    for prefix in &catalogue.prefixes {
+        let settings = (prefix.settings)();
+        if !settings.is_empty() {
+            let _ = writeln!(page, "\nSettings that `{}/` adds:", prefix.name);
+            settings_table(&mut page, settings);
+        }
     }
     if !catalogue.composed.is_empty() {
         let names: Vec<_> = catalogue.composed.iter().map(|n| format!("`{n}`")).collect();

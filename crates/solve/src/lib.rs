@@ -32,6 +32,7 @@ pub mod newton;
 pub mod optimisation;
 pub mod parts;
 pub mod projection;
+pub mod proximal;
 pub mod reform;
 pub mod registry;
 pub mod settings;

@@ -10,17 +10,18 @@ use serde::Serialize;
 
 use crate::auto::{Auto, Hybrid};
 use crate::cfun::ContactFunction;
-use crate::form::{Explicit, Linear, Linearised};
+use crate::form::{Concurrent, Explicit, Linear, Linearised, Overwrite, Regularised};
 use crate::interior::{ConvexRelaxation, Interior, Pursued, Relaxed};
 use crate::newton::{
     Method as NewtonMethod, NewtonAc, NewtonCm, NewtonFb, NewtonFbSmooth, NewtonHsw, NewtonJm,
     NewtonNm, NewtonPk, NewtonXsw, Semismooth,
 };
 use crate::optimisation::{Alternation, Cadoux, CadouxSteps, Panagiotopoulos, Tresca, TrescaSteps};
-use crate::projection::{DeSaxce, Extragradient, FixedPoint, Method, Projected};
+use crate::projection::{DeSaxce, Extragradient, FixedPoint, Hyperplane, Method, Projected};
+use crate::proximal::{Admm, AdmmSteps, Outer, ProximalPoint};
 use crate::reform::Condense;
 use crate::settings::{Setting, Settings, SettingsMap, described, parse};
-use crate::splitting::Nsgs;
+use crate::splitting::{Colored, Nsgs, Psor};
 use crate::{Driver, Reformulation, Session, SolveError, Solver, Via};
 
 /// One solver: what it is, and how it is made and handed to a visitor that knows the kind of problem.
@@ -59,6 +60,20 @@ impl<P: Problem + 'static, R: Reformulation<P> + 'static> Visitor for Through<P,
     type Output = Box<dyn Session<P>>;
     fn visit<S: Solver<R::To> + 'static>(self, solver: S) -> Self::Output {
         Box::new(Driver::new(Via { reformulation: self.0, solver }))
+    }
+}
+
+/// Makes a session on problems of type `P` in which the solver works on the inner problems of a proximal point method.
+struct Around<P, const D: usize>(ProximalPoint, PhantomData<P>);
+
+impl<P, const D: usize> Visitor for Around<P, D>
+where
+    P: Linear<D> + Overwrite + Send + 'static,
+{
+    type Problem = Regularised<P>;
+    type Output = Box<dyn Session<P>>;
+    fn visit<S: Solver<Regularised<P>> + 'static>(self, inner: S) -> Self::Output {
+        Box::new(Driver::new(Outer::<S, D> { settings: self.0, inner }))
     }
 }
 
@@ -120,6 +135,9 @@ pub struct Prefix {
     pub from: &'static [Kind],
     /// Keys of `docs/refs.bib`.
     pub cites: &'static [&'static str],
+    /// The documented settings that it adds to those of the solver.
+    #[serde(serialize_with = "settings_now")]
+    pub settings: fn() -> Vec<Setting>,
 }
 
 /// A kind of problem that has solvers.
@@ -145,12 +163,27 @@ type Composed<P> = Option<Result<Box<dyn Session<P>>, String>>;
 pub const DEFAULT: &str = "nsgs";
 
 /// The reformulations.
-pub const PREFIXES: &[Prefix] = &[Prefix {
-    name: "condense",
-    summary: "global to local: forms W = H' M^-1 H and q, bilateral constraints eliminated",
-    from: &[Kind::FrictionGlobal2d, Kind::FrictionGlobal3d],
-    cites: &["Acary2018"],
-}];
+pub const PREFIXES: &[Prefix] = &[
+    Prefix {
+        name: "condense",
+        summary: "global to local: forms W = H' M^-1 H and q, bilateral constraints eliminated",
+        from: &[Kind::FrictionGlobal2d, Kind::FrictionGlobal3d],
+        cites: &["Acary2018"],
+        settings: Vec::new,
+    },
+    Prefix {
+        name: "proximal",
+        summary: "proximal point: the solver works on problems with W + alpha w in place of W",
+        from: &[
+            Kind::FrictionLocal2d,
+            Kind::FrictionLocal3d,
+            Kind::FrictionGlobal2d,
+            Kind::FrictionGlobal3d,
+        ],
+        cites: &["Rockafellar1976", "AcaryBremondHuber2018"],
+        settings: described::<ProximalPoint>,
+    },
+];
 
 /// NSGS.
 pub const NSGS: About = About {
@@ -158,7 +191,7 @@ pub const NSGS: About = About {
     family: "splitting",
     summary: "nonsmooth block Gauss-Seidel over contacts, with a choice of local solvers",
     needs: &[],
-    cites: &["JourdanAlartJean1998", "Jean1999", "AcaryBremondHuber2018", "DBB11"],
+    cites: &["JourdanAlartJean1998", "Jean1999", "AcaryBremondHuber2018", "DBB11", "WalkerNi2011"],
     variants: &[
         "local=quartic",
         "local=newton_ac",
@@ -169,6 +202,8 @@ pub const NSGS: About = About {
         "ordering=fully_shuffled",
         "omega=0.9",
         "freeze_after=5",
+        "local_tolerance=adaptive",
+        "anderson=5",
     ],
     settings: described::<Nsgs>,
 };
@@ -190,8 +225,8 @@ pub const FIXED_POINT: About = About {
     family: "projection",
     summary: "fixed-point projection with a self-adaptive step",
     needs: &[],
-    cites: &["Acary2018", "Khobotov1987", "HanLo2002"],
-    variants: &[],
+    cites: &["Acary2018", "Khobotov1987", "SolodovTseng1996", "HanLo2002"],
+    variants: &["rule=solodov_tseng"],
     settings: described::<FixedPoint>,
 };
 
@@ -201,8 +236,8 @@ pub const EXTRAGRADIENT: About = About {
     family: "projection",
     summary: "extragradient projection with a self-adaptive step",
     needs: &[],
-    cites: &["Korpelevich1976", "Khobotov1987", "Acary2018"],
-    variants: &[],
+    cites: &["Korpelevich1976", "Khobotov1987", "SolodovTseng1996", "Acary2018"],
+    variants: &["rule=solodov_tseng"],
     settings: described::<Extragradient>,
 };
 
@@ -374,6 +409,53 @@ pub const IP: About = About {
     settings: described::<Interior>,
 };
 
+/// The hyperplane projection.
+pub const HYPERPLANE: About = About {
+    name: "hyperplane",
+    family: "projection",
+    summary: "hyperplane projection with a self-adaptive prediction",
+    needs: &[],
+    cites: &["SolodovTseng1996", "SolodovSvaiter1999", "AcaryBremondHuber2018"],
+    // normal=field is too slow for any problem that tests would run.
+    variants: &["rule=khobotov"],
+    settings: described::<Hyperplane>,
+};
+
+/// PSOR.
+pub const PSOR: About = About {
+    name: "psor",
+    family: "splitting",
+    summary: "projected successive over-relaxation: Gauss-Seidel sweeps with one projection a contact",
+    needs: &[],
+    cites: &["Cryer1971", "AcaryBremondHuber2018"],
+    variants: &["omega=1"],
+    settings: described::<Psor>,
+};
+
+/// Coloured NSGS.
+pub const NSGS_COLORED: About = About {
+    name: "nsgs_colored",
+    family: "splitting",
+    summary: "nonsmooth block Gauss-Seidel on several threads, contacts by colour; the same bits for any number of threads",
+    needs: &[],
+    cites: &["JourdanAlartJean1998", "JonesPlassmann1993"],
+    variants: &["threads=2", "serial_below=1", "local=newton_ac"],
+    settings: described::<Colored>,
+};
+
+/// ADMM.
+pub const ADMM: About = About {
+    name: "admm",
+    family: "proximal",
+    summary: "alternating direction method of multipliers with exact projection on the cones",
+    needs: &[
+        "W (or M) with a positive semidefinite symmetric part; the full W is factorised, so it need not be symmetric",
+    ],
+    cites: &["Carpentier2024", "EcksteinBertsekas1992", "BoydParikhChuPeleatoEckstein2011"],
+    variants: &["rule=fixed", "alpha=1", "anderson=5"],
+    settings: described::<Admm>,
+};
+
 /// The automatic method.
 pub const AUTO: About = About {
     name: "auto",
@@ -389,7 +471,7 @@ pub const AUTO: About = About {
 fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
 where
     V: Visitor,
-    V::Problem: Linearised<D> + Explicit<D> + Kinematic<D>,
+    V::Problem: Concurrent<D> + Linearised<D> + Explicit<D> + Kinematic<D>,
 {
     fn projected<const D: usize, V, M>(
         settings: &SettingsMap,
@@ -434,12 +516,59 @@ where
             build: |s, v| Ok(v.visit(Relaxed::<D>(parse::<ConvexRelaxation>(s)?))),
         },
         Entry { about: &IP, build: |s, v| Ok(v.visit(Pursued::<D>(parse::<Interior>(s)?))) },
+        Entry { about: &HYPERPLANE, build: projected::<D, V, Hyperplane> },
+        Entry { about: &PSOR, build: |s, v| Ok(v.visit(parse::<Psor>(s)?.sweeps::<D>())) },
+        Entry { about: &NSGS_COLORED, build: |s, v| Ok(parse::<Colored>(s)?.visit::<D, V>(v)) },
+        Entry { about: &ADMM, build: |s, v| Ok(v.visit(AdmmSteps::<D>(parse(s)?))) },
     ]
+}
+
+/// The solvers that the proximal point method may have inside: those that gain from a regular W. One line each.
+fn inner_solvers<const D: usize, V>() -> Vec<Entry<V>>
+where
+    V: Visitor,
+    V::Problem: Concurrent<D> + Linearised<D>,
+{
+    vec![
+        Entry { about: &NSGS, build: |s, v| Ok(parse::<Nsgs>(s)?.visit::<D, V>(v)) },
+        Entry {
+            about: &EXTRAGRADIENT,
+            build: |s, v| Ok(v.visit(Projected::<Extragradient, D>(parse(s)?))),
+        },
+        Entry { about: &ADMM, build: |s, v| Ok(v.visit(AdmmSteps::<D>(parse(s)?))) },
+    ]
+}
+
+/// The settings of the proximal point method (their keys say so), and those of its inner solver.
+fn around<P, const D: usize>(solver: &str, settings: &SettingsMap) -> Composed<P>
+where
+    P: Concurrent<D> + Linearised<D> + Overwrite + Send + 'static,
+{
+    let entry = find(inner_solvers::<D, Around<P, D>>(), solver)?;
+    let (outer, inner): (SettingsMap, SettingsMap) =
+        settings.clone().into_iter().partition(|(key, _)| key.starts_with("prox_"));
+    let built = parse(&outer).and_then(|outer| (entry.build)(&inner, Around(outer, PhantomData)));
+    Some(built)
+}
+
+fn around_names<P, const D: usize>() -> Vec<String>
+where
+    P: Concurrent<D> + Linearised<D> + Overwrite + Send + 'static,
+{
+    names(&inner_solvers::<D, Around<P, D>>(), "proximal/")
 }
 
 impl<const D: usize> Registered for FrictionLocal<D> {
     fn entries<V: Visitor<Problem = Self>>() -> Vec<Entry<V>> {
         contact_solvers::<D, V>()
+    }
+
+    fn composed(reformulation: &str, solver: &str, settings: &SettingsMap) -> Composed<Self> {
+        (reformulation == "proximal").then(|| around::<Self, D>(solver, settings)).flatten()
+    }
+
+    fn composed_names() -> Vec<String> {
+        around_names::<Self, D>()
     }
 }
 
@@ -449,15 +578,20 @@ impl<const D: usize> Registered for FrictionGlobal<D> {
     }
 
     fn composed(reformulation: &str, solver: &str, settings: &SettingsMap) -> Composed<Self> {
-        let through = Through(Condense, PhantomData);
-        (reformulation == "condense")
-            .then(|| find(contact_solvers::<D, _>(), solver))
-            .flatten()
-            .map(|entry| (entry.build)(settings, through))
+        match reformulation {
+            "condense" => {
+                let entry = find(contact_solvers::<D, _>(), solver)?;
+                Some((entry.build)(settings, Through(Condense, PhantomData)))
+            }
+            "proximal" => around::<Self, D>(solver, settings),
+            _ => None,
+        }
     }
 
     fn composed_names() -> Vec<String> {
-        names(&FrictionLocal::<D>::entries::<Direct<_>>(), "condense/")
+        let mut all = names(&FrictionLocal::<D>::entries::<Direct<_>>(), "condense/");
+        all.extend(around_names::<Self, D>());
+        all
     }
 }
 
@@ -520,8 +654,8 @@ mod tests {
     fn mistakes_in_settings_name_key_expected_and_found() {
         assert_eq!(
             refusal(&["omga=1"]),
-            "solver `nsgs`: unknown key `omga`; there are: local, omega, omega_min, ordering, seed, \
-             freeze_after, freeze_for, check_every"
+            "solver `nsgs`: unknown key `omga`; there are: local, local_tolerance, omega, omega_min, \
+             ordering, seed, freeze_after, freeze_for, anderson, anderson_every, check_every"
         );
         assert_eq!(
             refusal(&["omega=2.5"]),
@@ -552,6 +686,49 @@ mod tests {
             let settings = (about.settings)();
             assert!(!settings.is_empty(), "{}", about.name);
             assert!(settings.iter().all(|s| !s.help.is_empty()), "{}: {settings:?}", about.name);
+        }
+    }
+
+    /// Methods that share no iteration find the same motion where W is regular.
+    #[test]
+    fn independent_methods_agree() {
+        use nonsmooth_problem::planted::Planted;
+        let planted = Planted { contacts: 20, dofs: 120, seed: 11, ..Planted::default() };
+        let (problem, _) = planted.local::<3>();
+        let motion = |name: &str, texts: &[&str]| {
+            let settings = crate::settings::from_texts(texts).unwrap();
+            let mut session = session::<FrictionLocal<3>>(name, &settings).unwrap();
+            let mut point = problem.origin();
+            let limits = crate::Limits {
+                tolerance: 1e-11,
+                max_iterations: 100_000,
+                ..crate::Limits::default()
+            };
+            let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+            assert_eq!(outcome.status, crate::Status::Solved, "{name} {texts:?}");
+            let mut u = vec![0.0; problem.q.len()];
+            problem.W.mul_plus(&point.r, &problem.q, &mut u);
+            u
+        };
+        let reference = motion("nsgs", &[]);
+        let size = nonsmooth_problem::linalg::norm(&problem.q);
+        for (name, texts) in [
+            ("psor", vec![]),
+            ("nsgs_colored", vec!["threads=2", "serial_below=1"]),
+            ("nsgs", vec!["anderson=5"]),
+            ("nsgs", vec!["local=newton_ac", "local_tolerance=adaptive"]),
+            ("nsgs", vec!["local=projection_iterated", "local_tolerance=adaptive"]),
+            ("extragradient", vec!["rule=solodov_tseng"]),
+            ("hyperplane", vec![]),
+            ("proximal/extragradient", vec![]),
+            ("admm", vec![]),
+            ("admm", vec!["rule=fixed", "anderson=5"]),
+            ("proximal/nsgs", vec![]),
+            ("proximal/admm", vec!["prox_rule=residual"]),
+        ] {
+            let u = motion(name, &texts);
+            let far = u.iter().zip(&reference).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            assert!(far < 1e-8 * size, "{name} {texts:?}: {far:e}");
         }
     }
 }

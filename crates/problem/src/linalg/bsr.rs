@@ -11,12 +11,28 @@ pub type BlockRow<const D: usize> = Vec<(u32, Block<D>)>;
 /// A block-sparse matrix by compressed block rows with D×D blocks, column indices sorted in each row.
 ///
 /// Storage: `8·D²` bytes a block plus 4 of index. One product streams that once.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct Bsr<const D: usize> {
     ncols: usize,
     row_ptr: Vec<usize>,
     col_idx: Vec<u32>,
     blocks: Vec<Block<D>>,
+}
+
+impl<const D: usize> Clone for Bsr<D> {
+    fn clone(&self) -> Self {
+        let Self { ncols, row_ptr, col_idx, blocks } = self;
+        let (row_ptr, col_idx, blocks) = (row_ptr.clone(), col_idx.clone(), blocks.clone());
+        Self { ncols: *ncols, row_ptr, col_idx, blocks }
+    }
+
+    /// Into the memory that is there.
+    fn clone_from(&mut self, other: &Self) {
+        self.ncols = other.ncols;
+        self.row_ptr.clone_from(&other.row_ptr);
+        self.col_idx.clone_from(&other.col_idx);
+        self.blocks.clone_from(&other.blocks);
+    }
 }
 
 impl<const D: usize> Bsr<D> {

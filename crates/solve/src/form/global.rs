@@ -10,7 +10,7 @@ use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Refine, Singular, sma
 use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
 use super::linearised::{BodyForm, ContactForm, Form, System};
-use super::{Access, Blockwise, Contacts, Costs, Linear, Linearised, velocity_scale};
+use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised, velocity_scale};
 use crate::SolveError;
 
 /// What the view keeps.
@@ -168,6 +168,22 @@ impl<const D: usize> Blockwise<D> for FrictionGlobal<D> {
         if let Operator::Visits(delassus) = &state.operator {
             delassus.apply_impulse(c, dr, &mut state.v);
         }
+    }
+}
+
+impl<const D: usize> Concurrent<D> for FrictionGlobal<D> {
+    /// Places are the components of M (with bilateral constraints: of the bordered matrix): `M⁻¹ H_c` reaches all of a component.
+    fn places(&self, state: &Self::State, c: usize, reads: &mut Vec<u32>, writes: &mut Vec<u32>) {
+        let first = reads.len();
+        for k in D * c..D * c + D {
+            for &i in self.H.column(k).0 {
+                let component = state.dynamics.inverse.component_of(i) as u32;
+                if !reads[first..].contains(&component) {
+                    reads.push(component);
+                }
+            }
+        }
+        writes.extend_from_slice(&reads[first..]);
     }
 }
 

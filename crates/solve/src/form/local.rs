@@ -8,7 +8,7 @@ use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Inverse, Refine, Sing
 use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint, Problem};
 
 use super::linearised::{ContactForm, Form, System};
-use super::{Access, Blockwise, Contacts, Costs, Linear, Linearised, velocity_scale};
+use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised, velocity_scale};
 use crate::SolveError;
 
 /// What the view keeps: the norm of q, the problem without its bilateral rows where it has any, and the linear system.
@@ -167,6 +167,14 @@ impl<const D: usize> Blockwise<D> for FrictionLocal<D> {
 
     #[inline(always)]
     fn moved(&self, _: &mut Self::State, _: usize, _: &[f64; D]) {}
+}
+
+impl<const D: usize> Concurrent<D> for FrictionLocal<D> {
+    /// Places are impulses.
+    fn places(&self, state: &Self::State, c: usize, reads: &mut Vec<u32>, writes: &mut Vec<u32>) {
+        reads.extend_from_slice(state.operator(self).0.row(c).0);
+        writes.push(c as u32);
+    }
 }
 
 impl<const D: usize> Linear<D> for FrictionLocal<D> {

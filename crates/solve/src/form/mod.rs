@@ -4,20 +4,25 @@
 //! | --- | --- | --- |
 //! | [`Contacts`] | the law's data, the diagonal blocks of W, ‖q‖, the impulses of a point | local, global |
 //! | [`Blockwise`] | one contact's velocity, and to be told that one contact's impulse moved | local (rows of W), global (velocity space) |
+//! | [`Concurrent`] | in addition, which contacts do not feel each other, and visits from several threads | local, global |
 //! | [`Linear`] | `u = W r + q` for all contacts | local (W), global (product form) |
 //! | [`Explicit`] | entries of matrices that state the symmetric part of W | local (W), global (M, H, G) |
 //! | [`Linearised`] | to solve `(Q + P W) x = b` with block-diagonal P, Q | local (in contact space), global (in velocity space) |
+//!
+//! [`Regularised`] offers what the problem inside it does.
 
 mod explicit;
 mod global;
 mod linearised;
 mod local;
+mod regularised;
 
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::{Block, Singular};
 
 pub use explicit::{Explicit, Model};
+pub use regularised::{Overwrite, Regularised, RegularisedState};
 
 use crate::SolveError;
 
@@ -74,6 +79,13 @@ pub trait Blockwise<const D: usize>: Contacts<D> {
 
     /// The impulse of contact `c` moved by `dr` (and `r` holds it already).
     fn moved(&self, state: &mut Self::State, c: usize, dr: &[f64; D]);
+}
+
+/// Access contact by contact from several threads: velocities may be asked for at the same time.
+pub trait Concurrent<const D: usize>: Blockwise<D> + Contacts<D, State: Sync> + Sync {
+    /// Appends the places that the velocity of contact c depends on, and those that its impulse changes. Places are numbered as the
+    /// view likes; two contacts do not feel each other if neither changes what the other depends on.
+    fn places(&self, state: &Self::State, c: usize, reads: &mut Vec<u32>, writes: &mut Vec<u32>);
 }
 
 /// Products with the whole operator.

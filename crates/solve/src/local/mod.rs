@@ -18,9 +18,13 @@ pub use projection::{Projection, ProjectionIterated};
 pub use quartic::Quartic;
 
 /// A solver of one contact.
-pub trait LocalSolver<const D: usize>: Send {
+pub trait LocalSolver<const D: usize>: Send + Sync {
     /// What it keeps for one contact between visits.
     type Memo: Send;
+
+    /// From now on a contact need not be solved more exactly than this, in units of velocity; 0 asks for all that rounding
+    /// allows. Ignored by solvers that have nothing to save.
+    fn tolerate(&mut self, _velocity: f64) {}
 
     /// Prepares for the block `w` of a contact with friction `mu > 0`.
     fn prepare(&self, w: &[[f64; D]; D], mu: f64) -> Self::Memo;

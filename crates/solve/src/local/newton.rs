@@ -16,6 +16,15 @@ use crate::cfun::{Disk, Radii, alart_curnier};
 pub struct Newton {
     /// The radius of the friction disk.
     pub disk: Disk,
+    /// The residual in units of velocity below which it stops; 0: to rounding.
+    pub tolerance: f64,
+}
+
+impl Newton {
+    /// With the disk given, to rounding.
+    pub fn new(disk: Disk) -> Self {
+        Self { disk, tolerance: 0.0 }
+    }
 }
 
 /// The scaling parameters and the exact solver's memo.
@@ -30,6 +39,10 @@ const HALVINGS: usize = 6;
 
 impl<const D: usize> LocalSolver<D> for Newton {
     type Memo = NewtonMemo<D>;
+
+    fn tolerate(&mut self, velocity: f64) {
+        self.tolerance = velocity;
+    }
 
     fn prepare(&self, w: &[[f64; D]; D], mu: f64) -> NewtonMemo<D> {
         let mut tangential = *w;
@@ -49,23 +62,24 @@ impl<const D: usize> LocalSolver<D> for Newton {
         r: &[f64; D],
     ) -> [f64; D] {
         memo.rho
-            .and_then(|rho| newton(self.disk, w, q, mu, rho, r))
+            .and_then(|rho| newton(self, w, q, mu, rho, r))
             .unwrap_or_else(|| Exact.solve(&mut memo.exact, w, q, mu, r))
     }
 }
 
 fn newton<const D: usize>(
-    disk: Disk,
+    solver: &Newton,
     w: &[[f64; D]; D],
     q: &[f64; D],
     mu: f64,
     rho: Radii,
     start: &[f64; D],
 ) -> Option<[f64; D]> {
-    let linearise = |r: &[f64; D]| alart_curnier(disk, &velocity(w, q, r), r, mu, rho);
+    let linearise = |r: &[f64; D]| alart_curnier(solver.disk, &velocity(w, q, r), r, mu, rho);
     let size = |x: &[f64; D]| x.iter().map(|v| v * v).sum::<f64>().sqrt();
     // Rounding in Φ is that of ρ q and of r.
-    let floor = 4.0 * f64::EPSILON * rho.normal.max(rho.tangential) * size(q);
+    let impulse = rho.normal.max(rho.tangential);
+    let floor = impulse * (4.0 * f64::EPSILON * size(q)).max(solver.tolerance);
     let mut r = *start;
     let mut at = linearise(&r);
     for _ in 0..STEPS {

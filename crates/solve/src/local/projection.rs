@@ -10,19 +10,30 @@ use super::{LocalSolver, modified_velocity, norm_bound};
 use crate::cone;
 
 /// One projection step a visit.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Projection;
+#[derive(Debug, Clone, Copy)]
+pub struct Projection {
+    /// The step in units of `1/‖W‖`.
+    pub step: f64,
+}
+
+impl Default for Projection {
+    fn default() -> Self {
+        Self { step: 1.0 }
+    }
+}
 
 /// Projection steps until the contact is solved.
 #[derive(Debug, Clone, Copy)]
 pub struct ProjectionIterated {
     /// At most this many steps a visit.
     pub steps: usize,
+    /// The residual in units of velocity below which it stops; 0: to rounding.
+    pub tolerance: f64,
 }
 
 impl Default for ProjectionIterated {
     fn default() -> Self {
-        Self { steps: 100 }
+        Self { steps: 100, tolerance: 0.0 }
     }
 }
 
@@ -30,7 +41,7 @@ impl<const D: usize> LocalSolver<D> for Projection {
     type Memo = f64;
 
     fn prepare(&self, w: &[[f64; D]; D], _mu: f64) -> f64 {
-        step_length(w)
+        self.step * step_length(w)
     }
 
     #[inline(always)]
@@ -48,6 +59,10 @@ impl<const D: usize> LocalSolver<D> for Projection {
 
 impl<const D: usize> LocalSolver<D> for ProjectionIterated {
     type Memo = f64;
+
+    fn tolerate(&mut self, velocity: f64) {
+        self.tolerance = velocity;
+    }
 
     fn prepare(&self, w: &[[f64; D]; D], _mu: f64) -> f64 {
         step_length(w)
@@ -78,7 +93,7 @@ impl<const D: usize> LocalSolver<D> for ProjectionIterated {
             };
             let moved = distance(&r, &next);
             (r, f) = (next, f_next);
-            if moved <= 4.0 * f64::EPSILON * distance(&r, &[0.0; D]) {
+            if moved <= (4.0 * f64::EPSILON * distance(&r, &[0.0; D])).max(*rho * self.tolerance) {
                 break;
             }
             if ratio < 0.3 {

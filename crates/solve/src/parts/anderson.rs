@@ -239,7 +239,7 @@ impl Accelerator {
             *f = weight(i) * (g[i] - self.start[i]);
         }
         let size = dot(&self.f, &self.f).sqrt();
-        if self.proposed && !(size <= GROWTH * self.size) {
+        if self.proposed && (size.is_nan() || size > GROWTH * self.size) {
             self.anderson.clear();
             self.proposed = false;
             g.copy_from_slice(&self.plain);

@@ -3,6 +3,7 @@
 mod anderson;
 mod central;
 mod clarabel;
+mod coloring;
 mod conic;
 mod line_search;
 pub mod nt;
@@ -10,13 +11,16 @@ mod ordering;
 mod proximal_newton;
 mod pursuit;
 mod sweep;
+mod team;
 
 pub use anderson::{Accelerator, Anderson};
 pub use central::{Central, Iterate as CentralIterate};
 pub use clarabel::{Clarabel, Ended, Shape};
+pub use coloring::Coloring;
 pub use conic::{ConvexEnd, ConvexIp};
 pub use line_search::{Found, LineSearch, Search};
 pub use ordering::{Order, Ordering};
 pub use proximal_newton::{Inner, ProximalNewton};
 pub use pursuit::Pursuit;
 pub use sweep::Sweep;
+pub use team::{Meeting, Team};

@@ -71,13 +71,18 @@ impl<P: Linear<D>, const D: usize> Field<P, D> {
         }
     }
 
-    /// `trial = P_K(r − ρ F)` with the field given.
+    /// `trial = P_K(r − ρ F)` with the field at r or, if `at_trial`, at the trial point.
     pub(super) fn project(&mut self, problem: &P, r: &[f64], at_trial: bool) {
+        self.project_by(self.rho, problem, r, at_trial);
+    }
+
+    /// As [`project`](Self::project), with another step length.
+    pub(super) fn project_by(&mut self, rho: f64, problem: &P, r: &[f64], at_trial: bool) {
         let f = if at_trial { &self.trial_f } else { &self.f };
         for (c, (&mu, &w)) in problem.mu().iter().zip(&self.unit).enumerate() {
             let mut x: [f64; D] = small::block(r, c);
             for k in 0..D {
-                x[k] -= self.rho / w * f[D * c + k];
+                x[k] -= rho / w * f[D * c + k];
             }
             let p = cone::project(&x, mu);
             self.trial[D * c..D * c + D].copy_from_slice(&p);
@@ -125,6 +130,41 @@ impl<P: Linear<D>, const D: usize> Field<P, D> {
         let fields = self.weighted_squares(&self.f, &self.trial_f, |w| 1.0 / w);
         let points = self.weighted_squares(r, &self.trial, |w| w);
         self.rho * (fields / points).sqrt()
+    }
+
+    /// `ρ |(F(r) − F(trial))ᵀ(r − trial)| / ‖r − trial‖²`; NaN where nothing moved.
+    pub(super) fn monotone_ratio(&self, r: &[f64]) -> f64 {
+        let product: f64 =
+            (0..r.len()).map(|i| (self.f[i] - self.trial_f[i]) * (r[i] - self.trial[i])).sum();
+        self.rho * product.abs() / self.weighted_squares(r, &self.trial, |w| w)
+    }
+
+    /// The step along −F(trial) from r to the hyperplane `F(trial)ᵀ(x − trial) = 0`.
+    pub(super) fn step_to_hyperplane(&self, r: &[f64]) -> f64 {
+        self.step_along(&self.trial_f, r)
+    }
+
+    fn step_along(&self, normal: &[f64], r: &[f64]) -> f64 {
+        let (mut ahead, mut size) = (0.0, 0.0);
+        for (i, f) in normal.iter().enumerate() {
+            ahead += f * (r[i] - self.trial[i]);
+            size += f * f / self.unit[i / D];
+        }
+        ahead / size
+    }
+
+    /// `F(r) ← w (r − trial) − ρ (F(r) − F(trial))`.
+    pub(super) fn residual_normal(&mut self, r: &[f64]) {
+        for i in 0..r.len() {
+            let w = self.unit[i / D];
+            let difference = self.f[i] - self.trial_f[i];
+            self.f[i] = w * (r[i] - self.trial[i]) - self.rho * difference;
+        }
+    }
+
+    /// The step along −F(r) from r to the hyperplane `F(r)ᵀ(x − trial) = 0`.
+    pub(super) fn step_along_normal(&self, r: &[f64]) -> f64 {
+        self.step_along(&self.f, r)
     }
 
     /// `Σ weight(w_c) ‖x_c − y_c‖²`.

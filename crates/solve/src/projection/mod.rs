@@ -9,13 +9,15 @@ mod de_saxce;
 mod extragradient;
 mod field;
 mod fixed_point;
+mod hyperplane;
 mod step_rule;
 
 pub use de_saxce::DeSaxce;
 pub use extragradient::Extragradient;
 pub use field::Field;
 pub use fixed_point::FixedPoint;
-pub use step_rule::StepRule;
+pub use hyperplane::{Hyperplane, Normal};
+pub use step_rule::{Ratio, StepRule};
 
 use crate::form::Linear;
 use crate::{SolveError, Solver, Step};

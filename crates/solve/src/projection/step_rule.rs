@@ -1,7 +1,16 @@
 //! The self-adaptive step length of the projection methods.
 //!
-//! Shorten ρ while `ρ‖F(r) − F(r̄)‖ > accept ‖r − r̄‖`, `r̄ = P_K(r − ρF(r))`; lengthen it after a step whose ratio was small.
-//! Source: Khobotov1987; HanLo2002; Acary, lecture, self-adaptive rules.
+//! Shorten ρ while the ratio of a rule is above `accept`, with `r̄ = P_K(r − ρF(r))`; lengthen it after a step whose ratio was
+//! small. In the metric of the methods (`diag(w_c)` for impulses, its inverse for velocities) the ratios are
+//!
+//!     ρ ‖F(r) − F(r̄)‖ / ‖r − r̄‖                  Khobotov
+//!     ρ (F(r) − F(r̄))ᵀ(r − r̄) / ‖r − r̄‖²         Solodov–Tseng
+//!
+//! The second is never larger than the first, so it allows longer steps. It is what makes `F(r̄)ᵀ(x − r̄) = 0` separate r
+//! from the solutions (monotone F): `F(r̄)ᵀ(r − r̄) ≥ (1 − accept)‖r − r̄‖²/ρ`.
+//!
+//! Source: Khobotov1987; SolodovTseng1996; HanLo2002 for steps that grow again; AcaryBremondHuber2018, who call the two
+//! rules UPK and UPTS.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -16,7 +25,9 @@ use crate::settings::Settings;
 #[serde(deny_unknown_fields, default)]
 #[schemars(inline)]
 pub struct StepRule {
-    /// Accept a step whose ratio `rho |F(r) - F(r')| / |r - r'|` is at most this, in (0, 1).
+    /// What a step length is measured by.
+    pub rule: Ratio,
+    /// Accept a step whose ratio is at most this, in (0, 1).
     pub accept: f64,
     /// Lengthen the next step after a ratio below this, in (0, accept).
     pub grow_below: f64,
@@ -26,9 +37,20 @@ pub struct StepRule {
     pub check_every: usize,
 }
 
+/// The ratios that bound a step length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Ratio {
+    /// `rho |F(r) - F(r')| / |r - r'|`, a bound on the Lipschitz constant (Khobotov).
+    #[default]
+    Khobotov,
+    /// `rho (F(r) - F(r'))'(r - r') / |r - r'|^2`, longer steps (Solodov and Tseng).
+    SolodovTseng,
+}
+
 impl Default for StepRule {
     fn default() -> Self {
-        Self { accept: 0.9, grow_below: 0.3, shrink: 0.67, check_every: 20 }
+        Self { rule: Ratio::Khobotov, accept: 0.9, grow_below: 0.3, shrink: 0.67, check_every: 20 }
     }
 }
 
@@ -59,7 +81,10 @@ impl StepRule {
         loop {
             field.project(problem, r, false);
             Field::evaluate(&mut field.state, problem, &field.trial, &mut field.trial_f);
-            let ratio = field.lipschitz_ratio(r);
+            let ratio = match self.rule {
+                Ratio::Khobotov => field.lipschitz_ratio(r),
+                Ratio::SolodovTseng => field.monotone_ratio(r),
+            };
             // NaN: nothing moved, or F is not finite, which the driver notices.
             if ratio.is_nan() || ratio <= self.accept || field.rho < 1e-300 {
                 return ratio;
