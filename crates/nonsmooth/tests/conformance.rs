@@ -35,7 +35,7 @@ fn nothing_slides(case: &Planted) -> bool {
 }
 
 fn solves<P: Registered>(name: &str) -> Solves {
-    registry::about::<P>(name).expect("a listed solver is described").solves()
+    registry::about::<P>(name).expect("a listed solver is described").solves
 }
 
 /// The solvers of `P` by name with every set of settings that the registry asks to be tested.
@@ -109,7 +109,7 @@ fn a_relaxation_does_not_claim_to_solve_what_slides() {
     let (problem, _) = case.local::<3>();
     let mut relaxations = 0;
     for about in registry::abouts::<FrictionLocal<3>>() {
-        if about.solves() == Solves::Law {
+        if about.solves == Solves::Law {
             continue;
         }
         relaxations += 1;

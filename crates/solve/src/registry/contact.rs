@@ -1,0 +1,171 @@
+//! Which solvers there are for frictional contact, and how each is made.
+
+use std::marker::PhantomData;
+
+use nonsmooth_problem::check::Kinematic;
+use nonsmooth_problem::{FrictionGlobal, FrictionLocal};
+
+use super::abouts::*;
+use super::{Composed, Direct, Entry, Registered, Through, Visitor, find, names};
+use crate::auto::Hybrid;
+use crate::cfun::ContactFunction;
+use crate::form::{Concurrent, Explicit, Linear, Linearised, Overwrite, Regularised};
+use crate::interior::{ConvexRelaxation, Interior, Pursued, Relaxed};
+use crate::newton::{
+    Method as NewtonMethod, NewtonAc, NewtonCm, NewtonFb, NewtonFbSmooth, NewtonHsw, NewtonJm,
+    NewtonNm, NewtonPk, NewtonXsw, Semismooth,
+};
+use crate::optimisation::{Alternation, CadouxSteps, TrescaSteps};
+use crate::projection::{DeSaxce, Extragradient, FixedPoint, Hyperplane, Method, Projected};
+use crate::proximal::{AdmmSteps, Outer, ProximalPoint};
+use crate::reform::Condense;
+use crate::settings::{Settings, SettingsMap, parse};
+use crate::splitting::{Colored, Nsgs, Psor};
+use crate::{Driver, Session, Solver};
+
+/// Makes a session on problems of type `P` in which the solver works on the inner problems of a proximal point method.
+struct Around<P, const D: usize>(ProximalPoint, PhantomData<P>);
+
+impl<P, const D: usize> Visitor for Around<P, D>
+where
+    P: Linear<D> + Overwrite + Send + 'static,
+{
+    type Problem = Regularised<P>;
+    type Output = Box<dyn Session<P>>;
+    fn visit<S: Solver<Regularised<P>> + 'static>(self, inner: S) -> Self::Output {
+        Box::new(Driver::new(Outer::<S, D> { settings: self.0, inner }))
+    }
+}
+
+/// A Newton method, by its function.
+fn newton<const D: usize, V, M>(settings: &SettingsMap, visitor: V) -> Result<V::Output, String>
+where
+    V: Visitor,
+    V::Problem: Linearised<D>,
+    M: NewtonMethod + Settings,
+    M::Function: ContactFunction<D> + 'static,
+{
+    Ok(visitor.visit(Semismooth::<M::Function, D>::new(&parse::<M>(settings)?)))
+}
+
+/// The solvers of frictional contact, for any problem that can be seen by its contacts.
+fn contact_solvers<const D: usize, V>() -> Vec<Entry<V>>
+where
+    V: Visitor,
+    V::Problem: Concurrent<D> + Linearised<D> + Explicit<D> + Kinematic<D>,
+{
+    fn projected<const D: usize, V, M>(
+        settings: &SettingsMap,
+        visitor: V,
+    ) -> Result<V::Output, String>
+    where
+        V: Visitor,
+        V::Problem: Linear<D>,
+        M: Method + Settings + 'static,
+    {
+        Ok(visitor.visit(Projected::<M, D>(parse(settings)?)))
+    }
+    vec![
+        Entry { about: &AUTO, build: |s, v| Ok(v.visit(Hybrid::<D>(parse(s)?))) },
+        Entry { about: &NSGS, build: |s, v| Ok(parse::<Nsgs>(s)?.visit::<D, V>(v)) },
+        Entry { about: &NSGS_COLORED, build: |s, v| Ok(parse::<Colored>(s)?.visit::<D, V>(v)) },
+        Entry { about: &PSOR, build: |s, v| Ok(v.visit(parse::<Psor>(s)?.sweeps::<D>())) },
+        Entry { about: &DE_SAXCE, build: projected::<D, V, DeSaxce> },
+        Entry { about: &FIXED_POINT, build: projected::<D, V, FixedPoint> },
+        Entry { about: &EXTRAGRADIENT, build: projected::<D, V, Extragradient> },
+        Entry { about: &HYPERPLANE, build: projected::<D, V, Hyperplane> },
+        Entry { about: &ADMM, build: |s, v| Ok(v.visit(AdmmSteps::<D>(parse(s)?))) },
+        Entry { about: &NEWTON_AC, build: newton::<D, V, NewtonAc> },
+        Entry { about: &NEWTON_JM, build: newton::<D, V, NewtonJm> },
+        Entry { about: &NEWTON_NM, build: newton::<D, V, NewtonNm> },
+        Entry { about: &NEWTON_FB, build: newton::<D, V, NewtonFb> },
+        Entry { about: &NEWTON_FB_SMOOTH, build: newton::<D, V, NewtonFbSmooth> },
+        Entry { about: &NEWTON_CM, build: newton::<D, V, NewtonCm> },
+        Entry { about: &NEWTON_XSW, build: newton::<D, V, NewtonXsw> },
+        Entry { about: &NEWTON_PK, build: newton::<D, V, NewtonPk> },
+        Entry { about: &NEWTON_HSW, build: newton::<D, V, NewtonHsw> },
+        Entry { about: &TRESCA, build: |s, v| Ok(v.visit(TrescaSteps::<D>(parse(s)?))) },
+        Entry { about: &PANAGIOTOPOULOS, build: |s, v| Ok(v.visit(Alternation::<D>(parse(s)?))) },
+        Entry { about: &CADOUX, build: |s, v| Ok(v.visit(CadouxSteps::<D>(parse(s)?))) },
+        Entry { about: &IP, build: |s, v| Ok(v.visit(Pursued::<D>(parse::<Interior>(s)?))) },
+        Entry {
+            about: &CONVEX_RELAXATION,
+            build: |s, v| Ok(v.visit(Relaxed::<D>(parse::<ConvexRelaxation>(s)?))),
+        },
+    ]
+}
+
+/// The solvers that the proximal point method may have inside: those that gain from a regular W. One line each.
+fn inner_solvers<const D: usize, V>() -> Vec<Entry<V>>
+where
+    V: Visitor,
+    V::Problem: Concurrent<D> + Linearised<D>,
+{
+    vec![
+        Entry { about: &NSGS, build: |s, v| Ok(parse::<Nsgs>(s)?.visit::<D, V>(v)) },
+        Entry {
+            about: &EXTRAGRADIENT,
+            build: |s, v| Ok(v.visit(Projected::<Extragradient, D>(parse(s)?))),
+        },
+        Entry { about: &ADMM, build: |s, v| Ok(v.visit(AdmmSteps::<D>(parse(s)?))) },
+        Entry { about: &NEWTON_AC, build: newton::<D, V, NewtonAc> },
+        Entry { about: &NEWTON_NM, build: newton::<D, V, NewtonNm> },
+        Entry { about: &NEWTON_FB, build: newton::<D, V, NewtonFb> },
+    ]
+}
+
+/// The settings of the proximal point method (their keys say so), and those of its inner solver.
+fn around<P, const D: usize>(solver: &str, settings: &SettingsMap) -> Composed<P>
+where
+    P: Concurrent<D> + Linearised<D> + Overwrite + Send + 'static,
+{
+    let entry = find(inner_solvers::<D, Around<P, D>>(), solver)?;
+    let (outer, inner): (SettingsMap, SettingsMap) =
+        settings.clone().into_iter().partition(|(key, _)| key.starts_with("prox_"));
+    let built = parse(&outer).and_then(|outer| (entry.build)(&inner, Around(outer, PhantomData)));
+    Some(built)
+}
+
+fn around_names<P, const D: usize>() -> Vec<String>
+where
+    P: Concurrent<D> + Linearised<D> + Overwrite + Send + 'static,
+{
+    names(&inner_solvers::<D, Around<P, D>>(), "proximal/")
+}
+
+impl<const D: usize> Registered for FrictionLocal<D> {
+    fn entries<V: Visitor<Problem = Self>>() -> Vec<Entry<V>> {
+        contact_solvers::<D, V>()
+    }
+
+    fn composed(reformulation: &str, solver: &str, settings: &SettingsMap) -> Composed<Self> {
+        (reformulation == "proximal").then(|| around::<Self, D>(solver, settings)).flatten()
+    }
+
+    fn composed_names() -> Vec<String> {
+        around_names::<Self, D>()
+    }
+}
+
+impl<const D: usize> Registered for FrictionGlobal<D> {
+    fn entries<V: Visitor<Problem = Self>>() -> Vec<Entry<V>> {
+        contact_solvers::<D, V>()
+    }
+
+    fn composed(reformulation: &str, solver: &str, settings: &SettingsMap) -> Composed<Self> {
+        match reformulation {
+            "condense" => {
+                let entry = find(contact_solvers::<D, _>(), solver)?;
+                Some((entry.build)(settings, Through(Condense, PhantomData)))
+            }
+            "proximal" => around::<Self, D>(solver, settings),
+            _ => None,
+        }
+    }
+
+    fn composed_names() -> Vec<String> {
+        let mut all = names(&FrictionLocal::<D>::entries::<Direct<_>>(), "condense/");
+        all.extend(around_names::<Self, D>());
+        all
+    }
+}
