@@ -17,4 +17,4 @@ pub use conic::{ConvexEnd, ConvexIp};
 pub use ordering::{Order, Ordering};
 pub use proximal_newton::{Inner, ProximalNewton};
 pub use sweep::Sweep;
-pub use team::{Meeting, Team};
+pub use team::Team;
