@@ -23,4 +23,4 @@ pub use ordering::{Order, Ordering};
 pub use proximal_newton::{Inner, ProximalNewton};
 pub use pursuit::Pursuit;
 pub use sweep::Sweep;
-pub use team::{Meeting, Team};
+pub use team::Team;

@@ -1,8 +1,8 @@
 //! A team of threads for work that is done again and again in phases.
 //!
-//! [`Team::run`] forks once and joins once; in between the members meet at a barrier that spins for a moment and then yields, which
-//! costs well under a microsecond where each has a core. The calling thread is member 0, so a team of one is a plain call.
-//! What the members share is the caller's matter (locks): a meeting orders, it does not protect.
+//! [`Team::share`] forks once and joins once; in between whoever is free takes the next part of the present phase from a counter, so a
+//! member that the system has not given a core holds nobody up. The calling thread is a member, so a team of one is a plain loop.
+//! What the members share is the caller's matter (locks): phases order, they do not protect.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
@@ -33,61 +33,79 @@ impl Team {
         self.size
     }
 
-    /// Calls `work(member, meeting)` on every member at the same time, and returns when all have returned.
-    pub fn run(&self, work: impl Fn(usize, &Meeting) + Sync) {
-        let meeting = Meeting::new(self.size);
+    /// Does `work(phase, part)` for all parts of each phase in turn, on whichever thread is free, and `after(phase)` on the calling
+    /// thread between a phase and the next.
+    pub fn share(
+        &self,
+        phases: usize,
+        parts: usize,
+        work: impl Fn(usize, usize) + Sync,
+        mut after: impl FnMut(usize),
+    ) {
+        let board = Board::default();
+        let mut lead = || {
+            let _closing = Closing(&board);
+            for phase in 0..phases {
+                let end = (phase + 1) * parts;
+                board.released.store(end, Ordering::Release);
+                while let Some(k) = board.take() {
+                    work(k / parts, k % parts);
+                    board.done.fetch_add(1, Ordering::AcqRel);
+                }
+                board.wait(|| board.done.load(Ordering::Acquire) >= end);
+                after(phase);
+            }
+        };
         match &self.others {
-            None => work(0, &meeting),
+            None => lead(),
             Some(pool) => pool.in_place_scope(|scope| {
-                let (work, meeting) = (&work, &meeting);
-                scope.spawn_broadcast(move |_, context| {
-                    let _leaving = Leaving(meeting);
-                    work(context.index() + 1, meeting);
+                let (work, board) = (&work, &board);
+                scope.spawn_broadcast(move |_, _| {
+                    let _leaving = Leaving(board);
+                    while !board.closed.load(Ordering::Acquire) {
+                        if let Some(k) = board.take() {
+                            work(k / parts, k % parts);
+                            board.done.fetch_add(1, Ordering::AcqRel);
+                        } else {
+                            board.wait(|| board.any());
+                        }
+                    }
                 });
-                let _leaving = Leaving(meeting);
-                work(0, meeting);
+                lead();
             }),
         }
     }
 }
 
-/// A barrier that serves any number of times.
-pub struct Meeting {
-    size: usize,
-    arrived: AtomicUsize,
-    held: AtomicUsize,
-    /// A member has panicked: nobody waits any longer.
-    broken: AtomicBool,
+/// What is to be done: parts are numbered through all phases.
+#[derive(Default)]
+struct Board {
+    released: AtomicUsize,
+    taken: AtomicUsize,
+    done: AtomicUsize,
+    /// Nothing more will come, or somebody has panicked: nobody waits any longer.
+    closed: AtomicBool,
 }
 
-/// How often a member looks before it lets others have its core.
-const SPINS: usize = 5000;
+/// How often a thread looks before it lets others have its core.
+const LOOKS: usize = 5000;
 
-impl Meeting {
-    fn new(size: usize) -> Self {
-        Self {
-            size,
-            arrived: AtomicUsize::new(0),
-            held: AtomicUsize::new(0),
-            broken: AtomicBool::new(false),
-        }
+impl Board {
+    fn any(&self) -> bool {
+        self.taken.load(Ordering::Acquire) < self.released.load(Ordering::Acquire)
     }
 
-    /// Waits until all members are here.
-    pub fn wait(&self) {
-        if self.size == 1 {
-            return;
-        }
-        let held = self.held.load(Ordering::Acquire);
-        if self.arrived.fetch_add(1, Ordering::AcqRel) + 1 == self.size {
-            self.arrived.store(0, Ordering::Relaxed);
-            self.held.store(held.wrapping_add(1), Ordering::Release);
-            return;
-        }
+    /// A part that nobody has taken.
+    fn take(&self) -> Option<usize> {
+        let free = |k: usize| (k < self.released.load(Ordering::Acquire)).then_some(k + 1);
+        self.taken.fetch_update(Ordering::AcqRel, Ordering::Acquire, free).ok()
+    }
+
+    fn wait(&self, come: impl Fn() -> bool) {
         let mut looks = 0;
-        while self.held.load(Ordering::Acquire) == held && !self.broken.load(Ordering::Relaxed) {
+        while !come() && !self.closed.load(Ordering::Acquire) {
             looks += 1;
-            if looks < SPINS {
+            if looks < LOOKS {
                 std::hint::spin_loop();
             } else {
                 thread::yield_now();
@@ -96,13 +114,22 @@ impl Meeting {
     }
 }
 
-/// Breaks the meeting up if its member panics, so that the others do not wait for ever.
-struct Leaving<'a>(&'a Meeting);
+/// Closes the board when the leader is through, or panics.
+struct Closing<'a>(&'a Board);
+
+impl Drop for Closing<'_> {
+    fn drop(&mut self) {
+        self.0.closed.store(true, Ordering::Release);
+    }
+}
+
+/// Closes the board if its thread panics, so that the leader does not wait for ever.
+struct Leaving<'a>(&'a Board);
 
 impl Drop for Leaving<'_> {
     fn drop(&mut self) {
         if thread::panicking() {
-            self.0.broken.store(true, Ordering::Relaxed);
+            self.0.closed.store(true, Ordering::Release);
         }
     }
 }
@@ -114,36 +141,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_members_do_each_phase_before_any_does_the_next() {
+    fn all_parts_of_a_phase_are_done_once_and_before_the_next() {
         for threads in [1, 2, 3] {
             let team = Team::new(threads);
             assert_eq!(team.size(), threads);
             let log = Mutex::new(vec![]);
-            team.run(|member, meeting| {
-                for phase in 0..50 {
-                    log.lock().unwrap().push((phase, member));
-                    meeting.wait();
-                }
-            });
+            let note = |phase, part| log.lock().unwrap().push((phase, part));
+            team.share(50, 4, note, |phase| note(phase, 4));
             let mut log = log.into_inner().unwrap();
-            assert!(log.is_sorted_by_key(|(phase, _)| *phase));
-            log.sort_unstable();
-            let all = (0..50).flat_map(|p| (0..threads).map(move |m| (p, m)));
-            assert!(log.into_iter().eq(all));
+            for of_phase in log.chunks_mut(5) {
+                assert_eq!(of_phase[4].1, 4, "what comes after came before");
+                of_phase.sort_unstable();
+            }
+            assert!(log.into_iter().eq((0..50).flat_map(|p| (0..5).map(move |k| (p, k)))));
         }
     }
 
     #[test]
     fn a_panic_reaches_the_caller_and_leaves_nobody_waiting() {
         let team = Team::new(2);
-        for culprit in [0, 1] {
-            let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-                team.run(|member, meeting| {
-                    assert!(member != culprit, "meant to be");
-                    meeting.wait();
-                });
-            }));
-            assert!(caught.is_err());
-        }
+        let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            team.share(3, 2, |phase, part| assert!((phase, part) != (1, 1), "meant to be"), |_| ());
+        }));
+        assert!(caught.is_err());
     }
 }

@@ -9,7 +9,7 @@
 //!
 //! References: JourdanAlartJean1998; Acary, lecture (107); JonesPlassmann1993 for colourings.
 //!
-//! Cost of a sweep: as NSGS, plus two meetings of the team a colour (below a microsecond each where every thread has a core).
+//! Cost of a sweep: as NSGS, plus the handing over of a colour to the team (a few atomic operations).
 //! Storage: as NSGS.
 //!
 //! Fails: as NSGS; another order than the contacts' own may need more sweeps. Where contacts share an elastic body, in velocity space,
@@ -117,7 +117,10 @@ impl Colored {
     }
 }
 
-/// The workspace: the problem's view, the colours, and each member's part of the contacts.
+/// Parts of a colour for each member: two, so that a member that is late costs little.
+const PARTS: usize = 2;
+
+/// The workspace: the problem's view, the colours, and the contacts of each colour in parts.
 pub struct ColoredWork<P: Concurrent<D>, L: LocalSolver<D>, const D: usize> {
     state: P::State,
     team: Team,
@@ -132,7 +135,7 @@ pub struct ColoredWork<P: Concurrent<D>, L: LocalSolver<D>, const D: usize> {
     by_color: Vec<Vec<u32>>,
 }
 
-/// What one member does: its contacts, by colour, and its answers to the present colour's visits.
+/// A part of every colour's contacts, and the answers to the present colour's visits.
 struct Part<Memo, const D: usize> {
     contacts: Vec<(usize, Contact<Memo, D>)>,
     /// Where each shared colour's contacts begin; one more at the end.
@@ -179,7 +182,7 @@ where
             state: problem.state(Access::Visits)?,
             coloring: Coloring::default(),
             shared: 0,
-            parts: (0..team.size()).map(|_| Mutex::new(part())).collect(),
+            parts: (0..PARTS * team.size()).map(|_| Mutex::new(part())).collect(),
             rest: vec![],
             units: vec![],
             circles: Circles::default(),
@@ -236,7 +239,7 @@ where
 }
 
 impl<L, const D: usize> ColoredSweeps<L, D> {
-    /// The shared colours, in turn. All members answer from the same impulses; then member 0 enters the answers, in the order of
+    /// The shared colours, in turn. All members answer from the same impulses; then one enters the answers, in the order of
     /// the contacts whatever the number of members.
     fn sweep<P>(
         &self,
@@ -255,36 +258,30 @@ impl<L, const D: usize> ColoredSweeps<L, D> {
         }
         let (parts, shared) = (&*parts, *shared);
         let present = RwLock::new((r, state));
-        let moves = Mutex::new(Moves::default());
-        team.run(|member, meeting| {
-            for color in 0..shared {
-                {
-                    let mut part = locked(&parts[member]);
-                    let present = present.read().unwrap_or_else(PoisonError::into_inner);
-                    let (r, state) = (&*present.0, &*present.1);
-                    let Part { contacts, starts, answers } = &mut *part;
-                    answers.clear();
-                    for (c, contact) in &mut contacts[starts[color]..starts[color + 1]] {
-                        let u = problem.velocity(state, r, *c);
-                        let old = small::block(r, *c);
-                        answers.push((*c, contact.answer(&self.local, &u, &old, omega)));
-                    }
-                }
-                meeting.wait();
-                if member == 0 {
-                    let mut present = present.write().unwrap_or_else(PoisonError::into_inner);
-                    let (r, state) = &mut *present;
-                    let mut moves = locked(&moves);
-                    for part in parts {
-                        for (c, answer) in &locked(part).answers {
-                            moves.take(problem, (&mut **r, &mut **state), *c, answer);
-                        }
-                    }
-                }
-                meeting.wait();
+        let mut moves = Moves::default();
+        let answer = |color: usize, k: usize| {
+            let mut part = locked(&parts[k]);
+            let present = present.read().unwrap_or_else(PoisonError::into_inner);
+            let (r, state) = (&*present.0, &*present.1);
+            let Part { contacts, starts, answers } = &mut *part;
+            answers.clear();
+            for (c, contact) in &mut contacts[starts[color]..starts[color + 1]] {
+                let u = problem.velocity(state, r, *c);
+                let old = small::block(r, *c);
+                answers.push((*c, contact.answer(&self.local, &u, &old, omega)));
             }
-        });
-        moves.into_inner().unwrap_or_else(PoisonError::into_inner)
+        };
+        let enter = |_: usize| {
+            let mut present = present.write().unwrap_or_else(PoisonError::into_inner);
+            let (r, state) = &mut *present;
+            for part in parts {
+                for (c, answer) in &locked(part).answers {
+                    moves.take(problem, (&mut **r, &mut **state), *c, answer);
+                }
+            }
+        };
+        team.share(shared, parts.len(), answer, enter);
+        moves
     }
 
     fn fill<P>(&self, problem: &P, work: &mut ColoredWork<P, L, D>)
@@ -326,11 +323,11 @@ impl<L, const D: usize> ColoredSweeps<L, D> {
                 continue;
             }
             work.shared += 1;
-            let members = parts.len();
-            for (member, part) in parts.iter_mut().enumerate() {
+            let count = parts.len();
+            for (i, part) in parts.iter_mut().enumerate() {
                 let mut part = locked(part);
-                let at = |k: usize| k * contacts.len() / members;
-                part.contacts.extend(contacts[at(member)..at(member + 1)].iter().map(|c| made(*c)));
+                let at = |k: usize| k * contacts.len() / count;
+                part.contacts.extend(contacts[at(i)..at(i + 1)].iter().map(|c| made(*c)));
                 let end = part.contacts.len();
                 part.starts.push(end);
                 let most = part.starts.windows(2).map(|s| s[1] - s[0]).max().unwrap_or(0);
