@@ -20,7 +20,10 @@ pub trait Form: Registered + Judged {
     fn store(&self, point: Self::Point, u: Vec<f64>) -> StoredPoint;
 }
 
-impl<const D: usize> Form for FrictionLocal<D> {
+impl<const D: usize> Form for FrictionLocal<D>
+where
+    Self: Registered,
+{
     fn contacts(&self) -> usize {
         self.contacts()
     }
@@ -38,7 +41,10 @@ impl<const D: usize> Form for FrictionLocal<D> {
     }
 }
 
-impl<const D: usize> Form for FrictionGlobal<D> {
+impl<const D: usize> Form for FrictionGlobal<D>
+where
+    Self: Registered,
+{
     fn contacts(&self) -> usize {
         self.contacts()
     }
