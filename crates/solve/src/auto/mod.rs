@@ -15,7 +15,7 @@
 //! 5. **Another strategy** (other ρ, more sweeps, a cold start) where the error has not halved for long; at the first time
 //!    the existence of a solution is investigated, and a problem without one is given up with its certificate.
 //!
-//! A starting point is taken where its residual is below that of zero impulses.
+//! A starting point is taken where its residual is below that of zero impulses; near a solution it makes stage 2 needless.
 //!
 //! References: AcaryBremondHuber2018 for the evidence that proximal Newton methods solve hyperstatic problems; AlartCurnier1991; the
 //! parts' own files.
@@ -73,6 +73,8 @@ const INTERIOR: usize = 60;
 const INTERIOR_ERROR: f64 = 1e-8;
 const INTERIOR_IDLE: usize = 10;
 const INTERIOR_SHORT: (f64, usize) = (1e-6, 6);
+/// The interior point begins far from any point given; below this error one is better off without it.
+const NEAR: f64 = 1e-3;
 /// Above this error between two proximal steps, sweeps.
 const SWEEP_ABOVE: f64 = 1e-9;
 /// Sweeps that raise the error by more than this factor are taken back.
@@ -96,6 +98,8 @@ pub struct HybridWork<P: Linearised<D>, const D: usize> {
     before: Vec<f64>,
     best: Vec<f64>,
     existence: Option<Existence>,
+    /// The interior point was left out.
+    passed_by: bool,
     done: Done,
 }
 
@@ -152,6 +156,7 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
             before: vec![],
             best: vec![],
             existence: None,
+            passed_by: false,
             done: Done::default(),
             state,
         })
@@ -178,6 +183,7 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
         problem.enter(&mut work.state, point);
         work.stage = FIRST;
         work.existence = None;
+        work.passed_by = false;
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
@@ -203,7 +209,9 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
         match start {
             Start::Zero => {}
             Start::Given => lines.push("started from the point given".into()),
-            Start::Refused => lines.push("started from zero: the point given is farther off".into()),
+            Start::Refused => {
+                lines.push("started from zero: the point given is farther off".into())
+            }
         }
         lines.push(format!("{sweeps} Gauss-Seidel sweeps"));
         if interior > 0 {
@@ -308,12 +316,17 @@ impl<const D: usize> Hybrid<D> {
         }
         work.best.copy_from_slice(r);
         problem.velocities(state, r, newton.velocities());
-        controller.begin(newton.error(r));
-        if !self.0.interior {
-            return self.subproblem(problem, point, work);
+        let error = newton.error(r);
+        controller.begin(error);
+        work.passed_by = self.0.interior && work.done.start == Start::Given && error < NEAR;
+        if work.passed_by {
+            controller.resume();
         }
-        let now = work.central.get_or_insert_default().begin(problem, state, 0.0, None);
-        work.stage = Stage::Interior { idle: 0, short: 0, least: now.error };
+        if work.passed_by || !self.0.interior {
+            self.subproblem(problem, point, work);
+        } else {
+            begin_interior(problem, work);
+        }
     }
 
     /// Stage 2: one iteration of the interior point; at its end the better of its best iterate and the swept point goes on.
@@ -343,8 +356,8 @@ impl<const D: usize> Hybrid<D> {
             }
         };
         let (r, error) = central.best();
+        done.interior_error = error;
         if ended {
-            done.interior_error = error;
             if controller.offer(error) {
                 P::impulses(point).copy_from_slice(r);
             }
@@ -491,9 +504,20 @@ impl<const D: usize> Hybrid<D> {
             }
             work.done.between += FIRST_SWEEPS;
         }
-        self.subproblem(problem, point, work);
+        if std::mem::take(&mut work.passed_by) {
+            begin_interior(problem, work);
+        } else {
+            self.subproblem(problem, point, work);
+        }
         Step::Continue { estimate: f64::NAN }
     }
+}
+
+/// Begins stage 2.
+fn begin_interior<P: Linearised<D>, const D: usize>(problem: &P, work: &mut HybridWork<P, D>) {
+    let HybridWork { central, state, stage, .. } = work;
+    let now = central.get_or_insert_default().begin(problem, state, 0.0, None);
+    *stage = Stage::Interior { idle: 0, short: 0, least: now.error };
 }
 
 #[cfg(test)]
@@ -532,7 +556,10 @@ mod tests {
         // Whatever comes is no worse than nothing: the same steps as from zero.
         for far in [1e3, -1e3, 1e200] {
             let mut point = solution.clone();
-            impulses(&mut point).iter_mut().enumerate().for_each(|(i, r)| *r += far * (i + 1) as f64);
+            impulses(&mut point)
+                .iter_mut()
+                .enumerate()
+                .for_each(|(i, r)| *r += far * (i + 1) as f64);
             let (outcome, account) = solve(problem, &mut point);
             assert_eq!(outcome.iterations, cold.iterations, "{far:e}");
             assert!(account.contains("started from zero"), "{account}");
