@@ -74,7 +74,7 @@ const INTERIOR_ERROR: f64 = 1e-8;
 const INTERIOR_IDLE: usize = 10;
 const INTERIOR_SHORT: (f64, usize) = (1e-6, 6);
 /// The interior point begins far from any point given; below this error one is better off without it.
-const NEAR: f64 = 1e-3;
+const NEAR: f64 = 1e-4;
 /// Above this error between two proximal steps, sweeps.
 const SWEEP_ABOVE: f64 = 1e-9;
 /// Sweeps that raise the error by more than this factor are taken back.
