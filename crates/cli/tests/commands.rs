@@ -253,7 +253,7 @@ fn auto_says_whether_a_solution_exists_where_it_finds_none() {
     let (mut problem, _) = Planted { contacts: 2, dofs: 6, ..Planted::default() }.global::<3>();
     let n = problem.dofs();
     let columns = [(0, 0, 1.0), (1, 1, 1.0), (2, 2, 1.0), (0, 3, -1.0), (1, 4, 1.0), (2, 5, 1.0)];
-    problem.H = Csc::from_triplets(n, 6, columns).unwrap();
+    problem.H = Csc::from_triplets(n, 6, columns.into_iter()).unwrap();
     problem.w = vec![-1.0, 0.0, 0.0, -1.0, 0.0, 0.0];
     fclib::write(folder.path("a.hdf5"), &FclibFile::new(Friction::Global3(problem))).unwrap();
     let text = folder.run("solve a.hdf5").exits(1).stdout;
