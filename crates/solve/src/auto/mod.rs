@@ -523,7 +523,7 @@ fn begin_interior<P: Linearised<D>, const D: usize>(problem: &P, work: &mut Hybr
 #[cfg(test)]
 mod tests {
     use nonsmooth_problem::planted::Planted;
-    use nonsmooth_problem::{FrictionGlobal, FrictionLocal, LocalPoint};
+    use nonsmooth_problem::{FrictionGlobal, FrictionLocal, LocalPoint, Problem};
 
     use super::*;
     use crate::registry::{Registered, session};

@@ -203,6 +203,8 @@ pub fn session<P: Registered>(
 
 #[cfg(test)]
 mod tests {
+    use nonsmooth_problem::{FrictionGlobal, FrictionLocal};
+
     use super::*;
 
     fn refusal(texts: &[&str]) -> String {
