@@ -55,7 +55,7 @@ pub fn diagnose(problem: &Friction, dofs: Option<usize>, effort: &Effort) -> Dia
 }
 
 /// What a diagnosis needs of a kind of problem.
-trait Seen<const D: usize>: Linear<D> + Registered {
+trait Seen<const D: usize>: Linear<D> {
     /// W, where it is stored or cheap to form.
     fn delassus(&self, traits: &Traits) -> Option<Cow<'_, Bsr<D>>>;
 
@@ -130,7 +130,7 @@ const PARALLEL: f64 = 1.0 - 1e-6;
 /// The most entries of a dense matrix of constraints.
 const DENSE: usize = 2_000_000;
 
-impl<P: Seen<D>, const D: usize> Patient<'_, P, D> {
+impl<P: Seen<D> + Registered, const D: usize> Patient<'_, P, D> {
     fn diagnose(self) -> Diagnosis {
         let mut findings = vec![self.size()];
         findings.extend(self.hyperstaticity());

@@ -6,7 +6,7 @@ use nonsmooth_problem::check::Kinematic;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal};
 
 use super::abouts::*;
-use super::{Composed, Direct, Entry, Registered, Through, Visitor, find, names};
+use super::{About, Direct, Entry, Made, Registered, Through, Visitor, find, names};
 use crate::auto::Hybrid;
 use crate::cfun::ContactFunction;
 use crate::form::{Concurrent, Explicit, Linear, Linearised, Overwrite, Regularised};
@@ -115,7 +115,7 @@ where
 }
 
 /// The settings of the proximal point method (their keys say so), and those of its inner solver.
-fn around<P, const D: usize>(solver: &str, settings: &SettingsMap) -> Composed<P>
+fn around<P, const D: usize>(solver: &str, settings: &SettingsMap) -> Made<P>
 where
     P: Concurrent<D> + Linearised<D> + Overwrite + Send + 'static,
 {
@@ -133,39 +133,65 @@ where
     names(&inner_solvers::<D, Around<P, D>>(), "proximal/")
 }
 
-impl<const D: usize> Registered for FrictionLocal<D> {
-    fn entries<V: Visitor<Problem = Self>>() -> Vec<Entry<V>> {
-        contact_solvers::<D, V>()
-    }
-
-    fn composed(reformulation: &str, solver: &str, settings: &SettingsMap) -> Composed<Self> {
-        (reformulation == "proximal").then(|| around::<Self, D>(solver, settings)).flatten()
-    }
-
-    fn composed_names() -> Vec<String> {
-        around_names::<Self, D>()
+/// A session on a problem of contacts, but for the composed names that only some forms have.
+fn contact_session<P, const D: usize>(name: &str, settings: &SettingsMap) -> Made<P>
+where
+    P: Concurrent<D> + Linearised<D> + Explicit<D> + Kinematic<D> + Overwrite + Send + Registered,
+{
+    match name.split_once('/') {
+        None => {
+            let entry = find(contact_solvers::<D, Direct<P>>(), name)?;
+            Some((entry.build)(settings, Direct(PhantomData)))
+        }
+        Some(("proximal", solver)) => around::<P, D>(solver, settings),
+        Some(_) => None,
     }
 }
 
-impl<const D: usize> Registered for FrictionGlobal<D> {
-    fn entries<V: Visitor<Problem = Self>>() -> Vec<Entry<V>> {
-        contact_solvers::<D, V>()
-    }
-
-    fn composed(reformulation: &str, solver: &str, settings: &SettingsMap) -> Composed<Self> {
-        match reformulation {
-            "condense" => {
-                let entry = find(contact_solvers::<D, _>(), solver)?;
-                Some((entry.build)(settings, Through(Condense, PhantomData)))
+macro_rules! register {
+    ($d:literal) => {
+        impl Registered for FrictionLocal<$d> {
+            fn abouts() -> Vec<&'static About> {
+                abouts(&contact_solvers::<$d, Direct<Self>>())
             }
-            "proximal" => around::<Self, D>(solver, settings),
-            _ => None,
-        }
-    }
 
-    fn composed_names() -> Vec<String> {
-        let mut all = names(&FrictionLocal::<D>::entries::<Direct<_>>(), "condense/");
-        all.extend(around_names::<Self, D>());
-        all
-    }
+            fn composed_names() -> Vec<String> {
+                around_names::<Self, $d>()
+            }
+
+            fn make(name: &str, settings: &SettingsMap) -> Made<Self> {
+                contact_session::<Self, $d>(name, settings)
+            }
+        }
+
+        impl Registered for FrictionGlobal<$d> {
+            fn abouts() -> Vec<&'static About> {
+                abouts(&contact_solvers::<$d, Direct<Self>>())
+            }
+
+            fn composed_names() -> Vec<String> {
+                let local = contact_solvers::<$d, Direct<FrictionLocal<$d>>>();
+                let mut all = names(&local, "condense/");
+                all.extend(around_names::<Self, $d>());
+                all
+            }
+
+            fn make(name: &str, settings: &SettingsMap) -> Made<Self> {
+                match name.split_once('/') {
+                    Some(("condense", solver)) => {
+                        let entry = find(contact_solvers::<$d, _>(), solver)?;
+                        Some((entry.build)(settings, Through(Condense, PhantomData)))
+                    }
+                    _ => contact_session::<Self, $d>(name, settings),
+                }
+            }
+        }
+    };
+}
+
+register!(2);
+register!(3);
+
+fn abouts<V: Visitor>(entries: &[Entry<V>]) -> Vec<&'static About> {
+    entries.iter().map(|entry| entry.about).collect()
 }

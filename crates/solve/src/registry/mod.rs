@@ -111,23 +111,22 @@ pub struct Prefix {
 }
 
 /// A kind of problem that has solvers.
+///
+/// Implemented for each kind by itself, not for all dimensions at once: so the solvers are compiled here, and not again by
+/// every crate that asks for one.
 pub trait Registered: Problem + Sized + 'static {
-    /// The solvers that work on it directly, to be handed to `V`.
-    fn entries<V: Visitor<Problem = Self>>() -> Vec<Entry<V>>;
-
-    /// Hands a solver reached through a reformulation to a session; `None` where there is no such pair.
-    fn composed(_reformulation: &str, _solver: &str, _settings: &SettingsMap) -> Composed<Self> {
-        None
-    }
+    /// The descriptions of the solvers that work on it directly.
+    fn abouts() -> Vec<&'static About>;
 
     /// The composed names `reformulation/solver` that exist.
-    fn composed_names() -> Vec<String> {
-        vec![]
-    }
+    fn composed_names() -> Vec<String>;
+
+    /// A session of the solver of this name, composed or not; `None` where there is none.
+    fn make(name: &str, settings: &SettingsMap) -> Made<Self>;
 }
 
-/// A session through a reformulation, if there is such a pair and its settings are right.
-type Composed<P> = Option<Result<Box<dyn Session<P>>, String>>;
+/// A session, if there is such a solver and its settings are right.
+type Made<P> = Option<Result<Box<dyn Session<P>>, String>>;
 
 /// The solver that is used when none is named.
 pub const DEFAULT: &str = "auto";
@@ -165,12 +164,12 @@ fn names<V: Visitor>(entries: &[Entry<V>], prefix: &str) -> Vec<String> {
 
 /// The descriptions of the solvers that work on problems of type `P` directly.
 pub fn abouts<P: Registered>() -> Vec<&'static About> {
-    P::entries::<Direct<P>>().iter().map(|e| e.about).collect()
+    P::abouts()
 }
 
 /// Every name that [`session`] takes for problems of type `P`.
 pub fn solver_names<P: Registered>() -> Vec<String> {
-    let mut all = names(&P::entries::<Direct<P>>(), "");
+    let mut all: Vec<String> = P::abouts().iter().map(|about| about.name.into()).collect();
     all.extend(P::composed_names());
     all
 }
@@ -188,12 +187,7 @@ pub fn session<P: Registered>(
     name: &str,
     settings: &SettingsMap,
 ) -> Result<Box<dyn Session<P>>, SolveError> {
-    let built = match name.split_once('/') {
-        Some((reformulation, solver)) => P::composed(reformulation, solver, settings),
-        None => find(P::entries::<Direct<P>>(), name)
-            .map(|entry| (entry.build)(settings, Direct(PhantomData))),
-    };
-    built
+    P::make(name, settings)
         .ok_or_else(|| SolveError::UnknownSolver {
             name: name.into(),
             known: solver_names::<P>().join(", "),
