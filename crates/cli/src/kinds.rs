@@ -10,6 +10,9 @@ pub trait Form: Registered + Judged {
     /// The number of contacts.
     fn contacts(&self) -> usize;
 
+    /// The components of a contact.
+    fn dimension(&self) -> usize;
+
     /// A stored point as it is, to be judged.
     fn point(&self, stored: &StoredPoint) -> Self::Point;
 
@@ -28,12 +31,17 @@ where
         self.contacts()
     }
 
+    fn dimension(&self) -> usize {
+        D
+    }
+
     fn point(&self, stored: &StoredPoint) -> Self::Point {
         stored.to_local()
     }
 
     fn start(&self, stored: &StoredPoint) -> Self::Point {
-        stored.to_local()
+        let Self::Point { lambda, .. } = self.origin();
+        Self::Point { r: stored.r.clone(), lambda: multipliers(stored, lambda) }
     }
 
     fn store(&self, point: Self::Point, u: Vec<f64>) -> StoredPoint {
@@ -49,18 +57,28 @@ where
         self.contacts()
     }
 
+    fn dimension(&self) -> usize {
+        D
+    }
+
     fn point(&self, stored: &StoredPoint) -> Self::Point {
         stored.to_global()
     }
 
     fn start(&self, stored: &StoredPoint) -> Self::Point {
-        let v = self.origin().v;
-        Self::Point { v, ..stored.to_global() }
+        let Self::Point { v, lambda, .. } = self.origin();
+        Self::Point { v, r: stored.r.clone(), lambda: multipliers(stored, lambda) }
     }
 
     fn store(&self, point: Self::Point, u: Vec<f64>) -> StoredPoint {
         StoredPoint { v: some(point.v), u, r: point.r, lambda: some(point.lambda) }
     }
+}
+
+/// The multipliers of a point, which may be another problem's, else `origin`: they follow from the impulses.
+fn multipliers(stored: &StoredPoint, origin: Vec<f64>) -> Vec<f64> {
+    let fits = stored.lambda.as_ref().filter(|l| l.len() == origin.len());
+    fits.cloned().unwrap_or(origin)
 }
 
 fn some(x: Vec<f64>) -> Option<Vec<f64>> {

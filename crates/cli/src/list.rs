@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use nonsmooth_problem::Kind;
-use nonsmooth_solve::registry::{self, About, PREFIXES, Prefix};
+use nonsmooth_solve::registry::{self, About, PREFIXES, Prefix, Solves};
 use nonsmooth_solve::settings::Setting;
 use serde_json::{Value, json};
 
@@ -29,11 +29,14 @@ pub struct Args {
 const EXAMPLES: &str = "\
 Examples:
   nonsmooth list
-  nonsmooth list nsgs
+  nonsmooth list auto nsgs
   nonsmooth list --markdown > docs/solvers.md
 
 Settings are given to `nonsmooth solve` as `--set key=value`. A reformulation stands before a solver's name:
 `--solver condense/nsgs`. Citations are keys of docs/refs.bib.";
+
+/// What is said of a solver whose answers are those of another problem.
+const RELAXATION: &str = "a relaxation; its answers are judged by Coulomb's law all the same";
 
 /// A solver and the kinds of problem that it takes.
 struct Listed {
@@ -125,6 +128,9 @@ fn text(catalogue: &Catalogue) -> String {
         let _ = writeln!(text, "{}{default}: {}", about.name, about.summary);
         row(&mut text, "family", about.family);
         row(&mut text, "kinds", names(kinds));
+        if about.solves == Solves::Relaxation {
+            row(&mut text, "solves", RELAXATION);
+        }
         if !about.needs.is_empty() {
             row(&mut text, "needs", about.needs.join(", "));
         }
@@ -191,6 +197,9 @@ fn markdown(catalogue: &Catalogue) -> String {
         let _ = write!(page, "\n## {}\n\n{}.\n\n", about.name, sentence(about.summary));
         let _ = writeln!(page, "- Family: {}", about.family);
         let _ = writeln!(page, "- Kinds of problem: {}", names(kinds));
+        if about.solves == Solves::Relaxation {
+            let _ = writeln!(page, "- Solves: {RELAXATION}");
+        }
         if !about.needs.is_empty() {
             let _ = writeln!(page, "- Needs: {}", about.needs.join(", "));
         }
@@ -281,9 +290,9 @@ mod tests {
 
     #[test]
     fn the_text_names_defaults_and_choices() {
-        let only = ["nsgs".to_owned()];
+        let only = [registry::DEFAULT.to_owned(), "nsgs".to_owned()];
         let text = text(&Catalogue::new().only(&only).unwrap());
-        assert!(text.starts_with("nsgs (the default): "));
+        assert!(text.starts_with("auto (the default): ") && text.contains("\nnsgs: "));
         assert!(text.contains("local=exact") && text.contains("One of exact, quartic"));
         assert!(!text.contains("extragradient"));
         assert!(Catalogue::new().only(&["magic".to_owned()]).is_err());

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
 use nonsmooth_problem::check::Verdict;
 use nonsmooth_problem::{Friction, with_friction};
-use nonsmooth_solve::registry;
+use nonsmooth_solve::registry::{self, Solves};
 use nonsmooth_solve::settings::{self, SettingsMap};
 use nonsmooth_solve::{Limit, Limits, Outcome, Sample, SolveError, Status};
 use serde_json::json;
@@ -43,9 +43,10 @@ pub struct Args {
     /// At most this many seconds for each file
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     time_limit: Option<f64>,
-    /// Start from the file's /guesses/1 in place of zero
-    #[arg(long)]
-    warm_start: bool,
+    /// Start from the file's /guesses/1 in place of zero; with =FILE from the /solution of another file (or its
+    /// /guesses/1) with as many contacts, with =DIRECTORY from the file of the same name there
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
+    warm_start: Option<Option<PathBuf>>,
     /// Write the problem with its /solution; a directory (existing or ending in `/`) for several files.
     /// A new file holds the problem, its info, guesses and solution, and nothing else of the input; of the input
     /// itself, which may be named, only /solution changes
@@ -68,6 +69,7 @@ Examples:
   nonsmooth solve wall.hdf5 --tol 1e-12 --time-limit 60 --plot history.svg
   nonsmooth solve wall.hdf5 --solver nsgs --set omega=0.9 --set ordering=shuffled
   nonsmooth solve *.hdf5 --out solved/ --json > results.jsonl
+  nonsmooth solve step2.hdf5 --warm-start=solved/step1.hdf5
 
 Exit codes: 0 all solved; 1 some not solved; 2 some file or option at fault.";
 
@@ -91,6 +93,8 @@ pub struct Solved {
     pub verdict: Verdict,
     /// The best point.
     pub point: StoredPoint,
+    /// What the solver says that it did.
+    account: Vec<String>,
     /// The residuals on the way.
     history: Vec<Sample>,
 }
@@ -110,19 +114,43 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             return Ok(Exit::NotSolved);
         }
         let content = fclib::read(file).map_err(|e| e.to_string())?;
-        let guess = match content.guesses.first() {
-            _ if !args.warm_start => None,
-            Some(guess) => Some(guess.clone()),
-            None => {
-                return Err(format!(
-                    "{}: /guesses/1: expected a point for --warm-start, found none",
-                    file.display()
-                ));
-            }
+        let guess = match &args.warm_start {
+            None => None,
+            Some(None) => Some(own_guess(file, &content)?),
+            Some(Some(from)) => Some(guess_of(from, file, &content.problem)?),
         };
         one(file, content, guess.as_ref(), &plan, args, targets.of(k))
     };
     Ok(files::each(&args.files, args.json, one))
+}
+
+/// The point that a file proposes itself.
+fn own_guess(file: &Path, content: &FclibFile) -> Result<StoredPoint, String> {
+    content.guesses.first().cloned().ok_or_else(|| {
+        format!("{}: /guesses/1: expected a point for --warm-start, found none", file.display())
+    })
+}
+
+/// The point that another file, or the one of the same name in a directory, holds for `problem`.
+fn guess_of(from: &Path, file: &Path, problem: &Friction) -> Result<StoredPoint, String> {
+    let path = match file.file_name() {
+        Some(name) if from.is_dir() => from.join(name),
+        _ => from.into(),
+    };
+    let other = fclib::read(&path).map_err(|e| format!("--warm-start {e}"))?;
+    let refused = |expected: String, found: String| {
+        format!("--warm-start {}: expected {expected}, found {found}", path.display())
+    };
+    let size = |p: &Friction| {
+        let dimension = with_friction!(p, p => p.dimension());
+        format!("{} in {dimension}D", report::count(p.contacts(), "contact"))
+    };
+    let (ours, theirs) = (size(problem), size(&other.problem));
+    if ours != theirs {
+        return Err(refused(format!("{ours} as in {}", file.display()), theirs));
+    }
+    let point = other.solution.or(other.guesses.into_iter().next());
+    point.ok_or_else(|| refused("a /solution or /guesses/1".into(), "neither".into()))
 }
 
 /// Limits from options; Ctrl-C is one of them. To be called once.
@@ -216,6 +244,7 @@ pub fn solve<P: Form>(
         outcome,
         point: problem.store(point, verdict.velocity.clone()),
         verdict,
+        account: session.account(),
         history: session.history().to_vec(),
     })
 }
@@ -228,7 +257,7 @@ fn name(file: &Path) -> String {
 const WORST: usize = 3;
 
 fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &Solved) -> String {
-    let Solved { outcome, verdict, .. } = solved;
+    let Solved { outcome, verdict, account, .. } = solved;
     let mut all = report::problem_json(file, problem);
     all.extend(report::fields(json!({
         "solver": plan.solver,
@@ -238,6 +267,7 @@ fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &Solved) ->
         "message": outcome.status.to_string(),
         "iterations": outcome.iterations,
         "seconds": outcome.seconds,
+        "account": account,
     })));
     all.extend(report::verdict_json(verdict, plan.limits.tolerance, verdict.worst.len()));
     format!("{}\n", json!(all))
@@ -265,6 +295,9 @@ fn text<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &Solved) -> Stri
             seconds(outcome.seconds)
         ),
     );
+    for (k, line) in solved.account.iter().enumerate() {
+        row(&mut text, if k == 0 { "account" } else { "" }, line);
+    }
     let worst = if is_solved { 0 } else { WORST };
     report::verdict_text(&mut text, verdict, tolerance, worst);
     let stuck = stuck(&solved.history);
@@ -325,15 +358,19 @@ fn hint<P: Form>(solved: &Solved, plan: &Plan, stuck: bool) -> Option<String> {
         }
         Status::NoConclusion(_) | Status::Stalled(_) => vec![],
     };
-    // The first solver of each other family.
+    // The default, then the first solver of each other family.
     let mut families = vec![about.family];
-    let others = registry::abouts::<P>().into_iter().filter_map(|about| {
+    let mut abouts = registry::abouts::<P>();
+    abouts.retain(|a| a.solves == Solves::Law);
+    abouts.sort_by_key(|a| a.name != registry::DEFAULT);
+    let others = abouts.into_iter().filter_map(|about| {
         let new = !families.contains(&about.family);
         families.push(about.family);
         new.then(|| format!("--solver {}", about.name))
     });
     let tries: Vec<_> = more.into_iter().chain(others).take(3).collect();
-    Some(format!("{} (see `nonsmooth list`)", tries.join(", or ")))
+    let see = "see `nonsmooth list`; `nonsmooth diagnose` says what makes a problem hard";
+    Some(format!("{} ({see})", tries.join(", or ")))
 }
 
 /// The output files, one of each for each input.

@@ -18,15 +18,22 @@ fn solve_reports_as_text_and_as_json() {
     let folder = Folder::with_problems();
     let text = folder.run("solve wall.hdf5").exits(0).stdout;
     assert!(text.starts_with("wall.hdf5: solved (relative residual "), "{text}");
-    for part in ["friction_global_3d", "nsgs", "paper", "peer", "dynamics", "stick"] {
+    let account = "\n  account    ";
+    for part in ["friction_global_3d", "auto", account, "paper", "peer", "dynamics", "stick"] {
         assert!(text.contains(part), "{part} in {text}");
     }
-    let run = folder.run("solve wall.hdf5 box.hdf5 --tol 1e-9 --set omega=0.9 --json").exits(0);
+    let text = folder.run("solve wall.hdf5 --solver nsgs").exits(0).stdout;
+    assert!(text.contains("nsgs") && !text.contains(account), "{text}");
+    let line = folder.run("solve wall.hdf5 --json").exits(0).json().remove(0);
+    assert!(line["account"].as_array().unwrap().iter().all(|says| says.is_string()));
+    assert!(!line["account"].as_array().unwrap().is_empty());
+    let run = "solve wall.hdf5 box.hdf5 --solver nsgs --tol 1e-9 --set omega=0.9 --json";
+    let run = folder.run(run).exits(0);
     let lines = run.json();
     assert_eq!(lines.len(), 2);
     for line in &lines {
         has_keys(line, JUDGED);
-        has_keys(line, "solver settings/omega iterations seconds");
+        has_keys(line, "solver settings/omega iterations seconds account");
         assert_eq!((&line["status"], &line["solver"]), (&"solved".into(), &"nsgs".into()));
         assert!(line["residual"]["relative"].as_f64().unwrap() <= 1e-9);
         let counts = &line["contacts_by_status"];
@@ -49,7 +56,8 @@ fn an_unsolved_problem_exits_with_1_and_says_what_to_try() {
     let stuck = "solve wall.hdf5 --solver de_saxce --tol 1e-17 --max-iter 2e4";
     let text = folder.run(stuck).exits(1).stdout;
     assert!(
-        text.contains("no progress since iteration ") && text.contains("--solver nsgs"),
+        text.contains("no progress since iteration ")
+            && text.contains("--solver auto, or --solver nsgs"),
         "{text}"
     );
     assert!(!text.contains("--max-iter"), "{text}");
@@ -168,12 +176,14 @@ fn a_written_file_keeps_everything_else() {
 #[test]
 fn two_solves_give_the_same_bytes() {
     let folder = Folder::with_problems();
-    let solve = "solve wall.hdf5 --set ordering=shuffled --quiet --out";
-    let bytes = ["a.hdf5", "b.hdf5"].map(|name| {
-        folder.run(&format!("{solve} {name}")).exits(0);
-        std::fs::read(folder.path(name)).unwrap()
-    });
-    assert!(bytes[0] == bytes[1]);
+    for solver in ["auto", "nsgs --set ordering=shuffled", "nsgs_colored --set threads=2"] {
+        let bytes = ["a.hdf5", "b.hdf5"].map(|name| {
+            let solve = format!("solve wall.hdf5 --solver {solver} --quiet --out {name}");
+            folder.run(&solve).exits(0);
+            std::fs::read(folder.path(name)).unwrap()
+        });
+        assert!(bytes[0] == bytes[1], "{solver}");
+    }
 }
 
 #[test]
@@ -203,7 +213,53 @@ fn every_kind_is_solved_warm_started_and_checked() {
         let warm = folder.run("solve c.hdf5 --warm-start --json").exits(0).json().remove(0);
         assert_eq!(warm["iterations"], 0, "{kind}");
         assert!(cold["iterations"].as_u64() > Some(0));
+
+        // The solution of another file, or of the file of the same name in a directory.
+        std::fs::create_dir_all(folder.path("solved")).unwrap();
+        std::fs::copy(folder.path("b.hdf5"), folder.path("solved/a.hdf5")).unwrap();
+        for from in ["b.hdf5", "c.hdf5", "solved"] {
+            let solve = format!("solve a.hdf5 --warm-start={from} --json");
+            let warm = folder.run(&solve).exits(0).json().remove(0);
+            assert_eq!(warm["iterations"], 0, "{kind} {from}");
+            assert_eq!(warm["account"][0], "started from the point given", "{kind} {from}");
+        }
     }
+    // The impulses of a problem in one form start the other.
+    let wall = "gen wall --set rows=3 --set columns=2 --out";
+    folder.run(&format!("{wall} global.hdf5 --solve --tol 1e-11")).exits(0);
+    folder.run(&format!("{wall} local.hdf5 --form local")).exits(0);
+    let across = "solve local.hdf5 --warm-start=global.hdf5 --tol 1e-9 --json";
+    assert_eq!(folder.run(across).exits(0).json()[0]["iterations"], 0);
+}
+
+#[test]
+fn a_bad_start_costs_nothing() {
+    let folder = Folder::with_problems();
+    folder.run("solve wall.hdf5 --out bad.hdf5 --quiet").exits(0);
+    let mut file = fclib::read(folder.path("bad.hdf5")).unwrap();
+    let solution = file.solution.as_mut().unwrap();
+    solution.r.iter_mut().for_each(|r| *r = -1e4);
+    fclib::write(folder.path("bad.hdf5"), &file).unwrap();
+    let cold = folder.run("solve wall.hdf5 --json").exits(0).json().remove(0);
+    let warm = folder.run("solve wall.hdf5 --warm-start=bad.hdf5 --json").exits(0).json().remove(0);
+    assert_eq!(warm["iterations"], cold["iterations"]);
+    assert!(warm["account"][0].as_str().unwrap().contains("from zero"), "{warm}");
+}
+
+#[test]
+fn auto_says_whether_a_solution_exists_where_it_finds_none() {
+    let folder = Folder::new();
+    // Two immovable walls drive a frictionless body together: normal impulses prove that there is no solution.
+    let (mut problem, _) = Planted { contacts: 2, dofs: 6, ..Planted::default() }.global::<3>();
+    let n = problem.dofs();
+    let columns = [(0, 0, 1.0), (1, 1, 1.0), (2, 2, 1.0), (0, 3, -1.0), (1, 4, 1.0), (2, 5, 1.0)];
+    problem.H = Csc::from_triplets(n, 6, columns.into_iter()).unwrap();
+    problem.w = vec![-1.0, 0.0, 0.0, -1.0, 0.0, 0.0];
+    fclib::write(folder.path("a.hdf5"), &FclibFile::new(Friction::Global3(problem))).unwrap();
+    let text = folder.run("solve a.hdf5").exits(1).stdout;
+    assert!(text.contains("infeasible: no admissible motion exists, with a verified"), "{text}");
+    assert!(text.contains("existence of a solution: "), "{text}");
+    folder.run("exists a.hdf5").exits(1);
 }
 
 #[test]
@@ -254,7 +310,7 @@ fn info_computes_the_spectrum_when_asked() {
 fn list_has_every_solver() {
     let folder = Folder::new();
     let text = folder.run("list").exits(0).stdout;
-    assert!(text.contains("nsgs (the default)") && text.contains("condense/nsgs"));
+    assert!(text.contains("auto (the default)") && text.contains("condense/nsgs"));
     let list = folder.run("list --json").exits(0).json().remove(0);
     has_keys(&list, "default reformulations/0/name composed/0");
     for solver in list["solvers"].as_array().unwrap() {

@@ -18,7 +18,7 @@
 //!     vec![0.5],                                 // mu
 //! )?;
 //!
-//! let mut solver = session::<FrictionLocal<3>>("nsgs", &Default::default())?;
+//! let mut solver = session::<FrictionLocal<3>>("auto", &Default::default())?;
 //! let mut point = problem.origin();
 //! let outcome = solver.solve(&problem, &mut point, &Limits::default(), &mut |_| {})?;
 //! assert_eq!(outcome.status, Status::Solved);

@@ -10,7 +10,7 @@
 //! use nonsmooth_solve::{Limits, Status, registry};
 //!
 //! let (problem, _known) = Planted::default().local::<3>();
-//! let mut session = registry::session::<FrictionLocal<3>>("nsgs", &Default::default())?;
+//! let mut session = registry::session::<FrictionLocal<3>>("auto", &Default::default())?;
 //! let mut point = problem.origin();
 //! let outcome = session.solve(&problem, &mut point, &Limits::default(), &mut |_| {})?;
 //! assert_eq!(outcome.status, Status::Solved);

@@ -87,9 +87,14 @@ impl Controller {
         let better = error < self.error;
         if better {
             self.error = error;
-            self.epsilon = error.clamp(1e-5, 1.0);
+            self.resume();
         }
         better
+    }
+
+    /// The present point is a good start: ε by its error.
+    pub(super) fn resume(&mut self) {
+        self.epsilon = self.error.clamp(1e-5, 1.0);
     }
 
     pub(super) fn epsilon(&self) -> f64 {

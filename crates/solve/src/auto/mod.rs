@@ -15,6 +15,8 @@
 //! 5. **Another strategy** (other ρ, more sweeps, a cold start) where the error has not halved for long; at the first time
 //!    the existence of a solution is investigated, and a problem without one is given up with its certificate.
 //!
+//! A starting point is taken where its residual is below that of zero impulses; near a solution it makes stage 2 needless.
+//!
 //! References: AcaryBremondHuber2018 for the evidence that proximal Newton methods solve hyperstatic problems; AlartCurnier1991; the
 //! parts' own files.
 //!
@@ -71,6 +73,8 @@ const INTERIOR: usize = 60;
 const INTERIOR_ERROR: f64 = 1e-8;
 const INTERIOR_IDLE: usize = 10;
 const INTERIOR_SHORT: (f64, usize) = (1e-6, 6);
+/// The interior point begins far from any point given; below this error one is better off without it.
+const NEAR: f64 = 1e-4;
 /// Above this error between two proximal steps, sweeps.
 const SWEEP_ABOVE: f64 = 1e-9;
 /// Sweeps that raise the error by more than this factor are taken back.
@@ -94,6 +98,8 @@ pub struct HybridWork<P: Linearised<D>, const D: usize> {
     before: Vec<f64>,
     best: Vec<f64>,
     existence: Option<Existence>,
+    /// The interior point was left out.
+    passed_by: bool,
     done: Done,
 }
 
@@ -106,9 +112,22 @@ enum Stage {
     Between { left: usize },
 }
 
+/// Where the solve began.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum Start {
+    /// The caller gave no other point.
+    #[default]
+    Zero,
+    /// The caller's point.
+    Given,
+    /// Zero, though the caller gave a point.
+    Refused,
+}
+
 /// What has been done, for the account.
 #[derive(Debug, Clone, Copy, Default)]
 struct Done {
+    start: Start,
     sweeps: usize,
     interior: usize,
     interior_error: f64,
@@ -137,6 +156,7 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
             before: vec![],
             best: vec![],
             existence: None,
+            passed_by: false,
             done: Done::default(),
             state,
         })
@@ -158,10 +178,12 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
     }
 
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        work.done = Done::default();
+        work.done.start = self.choose_start(problem, P::impulses(point), work);
         problem.enter(&mut work.state, point);
         work.stage = FIRST;
         work.existence = None;
-        work.done = Done::default();
+        work.passed_by = false;
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
@@ -181,9 +203,17 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
     }
 
     fn account(&self, work: &Self::Work) -> Vec<String> {
-        let Done { sweeps, interior, interior_error, subproblems, failed, newton, between, .. } =
-            work.done;
-        let mut lines = vec![format!("{sweeps} Gauss-Seidel sweeps")];
+        let Done { start, sweeps, interior, interior_error, .. } = work.done;
+        let Done { subproblems, failed, newton, between, .. } = work.done;
+        let mut lines = vec![];
+        match start {
+            Start::Zero => {}
+            Start::Given => lines.push("started from the point given".into()),
+            Start::Refused => {
+                lines.push("started from zero: the point given is farther off".into())
+            }
+        }
+        lines.push(format!("{sweeps} Gauss-Seidel sweeps"));
         if interior > 0 {
             lines.push(format!(
                 "{interior} interior-point iterations on the exact law, to {interior_error:.1e}"
@@ -209,6 +239,32 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
 const FIRST: Stage = Stage::Sweeps { last: f64::NAN, claims: 0 };
 
 impl<const D: usize> Hybrid<D> {
+    /// Puts zero in place of impulses that solve the problem no better than zero does: a bad guess must not cost anything.
+    fn choose_start<P: Linearised<D>>(
+        &self,
+        problem: &P,
+        r: &mut [f64],
+        work: &mut HybridWork<P, D>,
+    ) -> Start {
+        if r.iter().all(|x| *x == 0.0) {
+            return Start::Zero;
+        }
+        let HybridWork { state, sweep, before: given, inner_best: u, .. } = work;
+        given.clear();
+        given.extend_from_slice(r);
+        u.resize(r.len(), 0.0);
+        problem.velocities(state, r, u);
+        let theirs = sweep.residual(u, r);
+        r.fill(0.0);
+        problem.velocities(state, r, u);
+        if theirs < sweep.residual(u, r) {
+            r.copy_from_slice(given);
+            Start::Given
+        } else {
+            Start::Refused
+        }
+    }
+
     /// Stage 1. `last`: the estimate of the step before; `claims`: how often the sweeps thought that they had arrived.
     fn sweep<P: Linearised<D> + Kinematic<D>>(
         &self,
@@ -260,12 +316,17 @@ impl<const D: usize> Hybrid<D> {
         }
         work.best.copy_from_slice(r);
         problem.velocities(state, r, newton.velocities());
-        controller.begin(newton.error(r));
-        if !self.0.interior {
-            return self.subproblem(problem, point, work);
+        let error = newton.error(r);
+        controller.begin(error);
+        work.passed_by = self.0.interior && work.done.start == Start::Given && error < NEAR;
+        if work.passed_by {
+            controller.resume();
         }
-        let now = work.central.get_or_insert_default().begin(problem, state, 0.0, None);
-        work.stage = Stage::Interior { idle: 0, short: 0, least: now.error };
+        if work.passed_by || !self.0.interior {
+            self.subproblem(problem, point, work);
+        } else {
+            begin_interior(problem, work);
+        }
     }
 
     /// Stage 2: one iteration of the interior point; at its end the better of its best iterate and the swept point goes on.
@@ -295,8 +356,8 @@ impl<const D: usize> Hybrid<D> {
             }
         };
         let (r, error) = central.best();
+        done.interior_error = error;
         if ended {
-            done.interior_error = error;
             if controller.offer(error) {
                 P::impulses(point).copy_from_slice(r);
             }
@@ -443,7 +504,85 @@ impl<const D: usize> Hybrid<D> {
             }
             work.done.between += FIRST_SWEEPS;
         }
-        self.subproblem(problem, point, work);
+        if std::mem::take(&mut work.passed_by) {
+            begin_interior(problem, work);
+        } else {
+            self.subproblem(problem, point, work);
+        }
         Step::Continue { estimate: f64::NAN }
+    }
+}
+
+/// Begins stage 2.
+fn begin_interior<P: Linearised<D>, const D: usize>(problem: &P, work: &mut HybridWork<P, D>) {
+    let HybridWork { central, state, stage, .. } = work;
+    let now = central.get_or_insert_default().begin(problem, state, 0.0, None);
+    *stage = Stage::Interior { idle: 0, short: 0, least: now.error };
+}
+
+#[cfg(test)]
+mod tests {
+    use nonsmooth_problem::planted::Planted;
+    use nonsmooth_problem::{FrictionGlobal, FrictionLocal, LocalPoint, Problem};
+
+    use super::*;
+    use crate::registry::{Registered, session};
+    use crate::settings::SettingsMap;
+    use crate::{Outcome, Status};
+
+    /// A solve by `auto` from a point, which it overwrites; and its account.
+    fn solve<P: Registered>(problem: &P, point: &mut P::Point) -> (Outcome, String) {
+        let mut auto = session::<P>("auto", &SettingsMap::new()).unwrap();
+        let outcome = auto.solve(problem, point, &Limits::default(), &mut |_| {}).unwrap();
+        assert_eq!(outcome.status, Status::Solved);
+        (outcome, auto.account().join("; "))
+    }
+
+    /// From zero, from the solution, from near it, and from far away. `impulses` gives those of a point.
+    fn starts<P: Registered>(problem: &P, impulses: fn(&mut P::Point) -> &mut Vec<f64>) {
+        let mut solution = problem.origin();
+        let (cold, account) = solve(problem, &mut solution);
+        assert!(cold.iterations > 0 && !account.contains("started"), "{account}");
+
+        let mut point = solution.clone();
+        let (outcome, account) = solve(problem, &mut point);
+        assert!(outcome.iterations <= 1 && account.contains("from the point given"), "{account}");
+
+        let mut near = solution.clone();
+        impulses(&mut near).iter_mut().for_each(|r| *r *= 1.0 + 1e-6);
+        let (outcome, account) = solve(problem, &mut near);
+        assert!(outcome.iterations <= cold.iterations && account.contains("point given"));
+
+        // Whatever comes is no worse than nothing: the same steps as from zero.
+        for far in [1e3, -1e3, 1e200] {
+            let mut point = solution.clone();
+            impulses(&mut point)
+                .iter_mut()
+                .enumerate()
+                .for_each(|(i, r)| *r += far * (i + 1) as f64);
+            let (outcome, account) = solve(problem, &mut point);
+            assert_eq!(outcome.iterations, cold.iterations, "{far:e}");
+            assert!(account.contains("started from zero"), "{account}");
+            assert_eq!(impulses(&mut point), impulses(&mut solution), "{far:e}");
+        }
+    }
+
+    #[test]
+    fn a_start_is_taken_where_it_is_better_than_zero() {
+        let planted = Planted { contacts: 30, dofs: 100, seed: 4, ..Planted::default() };
+        let bilateral = Planted { bilateral: 2, ..planted };
+        starts::<FrictionLocal<3>>(&planted.local().0, |p| &mut p.r);
+        starts::<FrictionLocal<2>>(&bilateral.local().0, |p| &mut p.r);
+        starts::<FrictionGlobal<3>>(&bilateral.global().0, |p| &mut p.r);
+        starts::<FrictionGlobal<2>>(&planted.global().0, |p| &mut p.r);
+    }
+
+    #[test]
+    fn a_problem_at_rest_without_impulses_refuses_every_start() {
+        let (mut problem, _) = Planted::default().local::<3>();
+        problem.q.fill(0.0);
+        let mut point = LocalPoint { r: vec![1.0; problem.q.len()], ..problem.origin() };
+        let (_, account) = solve(&problem, &mut point);
+        assert!(account.contains("started from zero") && point.r.iter().all(|r| *r == 0.0));
     }
 }

@@ -2,7 +2,7 @@
 //! The iteration is [`parts::Central`](crate::parts::Central).
 
 mod convex;
-mod nonsmooth;
+mod exact;
 
 pub use convex::{ConvexRelaxation, Relaxed};
-pub use nonsmooth::{Interior, Path, Pursued};
+pub use exact::{Interior, Path, Pursued};

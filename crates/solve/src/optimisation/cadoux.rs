@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use super::convex::Convex;
 use super::inner::{Conic, Effort};
 use super::sets::Set;
-use super::{fraction, positive};
+use super::{MEMORY, at_most, fraction, positive};
 use crate::form::{Access, Explicit, Linearised};
 use crate::parts::{Accelerator, ConvexIp, Shape};
 use crate::settings::Settings;
@@ -105,6 +105,7 @@ impl Settings for Cadoux {
             return Err(format!("relaxation: expected a number in (0, 1], found {found}"));
         }
         positive("memory", self.memory)?;
+        at_most("memory", self.memory, MEMORY)?;
         fraction("inner_share", self.inner_share)?;
         positive("inner_iterations", self.inner_iterations)
     }

@@ -27,6 +27,17 @@ fn fraction(name: &str, value: f64) -> Result<(), String> {
     }
 }
 
+/// The most steps that an accelerator remembers.
+const MEMORY: usize = 50;
+
+fn at_most(name: &str, value: usize, most: usize) -> Result<(), String> {
+    if value > most {
+        Err(format!("{name}: expected at most {most}, found {value}"))
+    } else {
+        Ok(())
+    }
+}
+
 fn positive(name: &str, value: usize) -> Result<(), String> {
     if value == 0 { Err(format!("{name}: expected at least 1, found 0")) } else { Ok(()) }
 }

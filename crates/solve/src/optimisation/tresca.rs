@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use super::inner::{CylinderSolver, Cylinders, Effort};
 use super::sets::Set;
-use super::{fraction, positive};
+use super::{MEMORY, at_most, fraction, positive};
 use crate::form::{Explicit, Linearised};
 use crate::parts::Accelerator;
 use crate::settings::Settings;
@@ -33,7 +33,7 @@ pub struct Tresca {
     pub inner: CylinderSolver,
     /// The thresholds move by this share of the way to mu r_N, in (0, 1].
     pub relaxation: f64,
-    /// How many past steps Anderson's acceleration of the thresholds combines; 0 is the plain fixed point.
+    /// How many past steps (at most 50) Anderson's acceleration of the thresholds combines; 0 is the plain fixed point.
     pub anderson: usize,
     /// The inner residual to reach, as a share of the last outer one, in (0, 1).
     pub inner_share: f64,
@@ -61,6 +61,7 @@ impl Settings for Tresca {
                 self.relaxation
             ));
         }
+        at_most("anderson", self.anderson, MEMORY)?;
         fraction("inner_share", self.inner_share)?;
         positive("inner_iterations", self.inner_iterations)
     }
