@@ -5,8 +5,8 @@ use nonsmooth_problem::check::Judged;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use nonsmooth_solve::registry::{self, About, Registered};
 
-/// A problem that has solvers, a judge and a place in a file.
-pub trait Form: Registered + Judged {
+/// A problem that has a judge and a place in a file.
+pub trait Form: Judged {
     /// The number of contacts.
     fn contacts(&self) -> usize;
 
@@ -23,10 +23,7 @@ pub trait Form: Registered + Judged {
     fn store(&self, point: Self::Point, u: Vec<f64>) -> StoredPoint;
 }
 
-impl<const D: usize> Form for FrictionLocal<D>
-where
-    Self: Registered,
-{
+impl<const D: usize> Form for FrictionLocal<D> {
     fn contacts(&self) -> usize {
         self.contacts()
     }
@@ -49,10 +46,7 @@ where
     }
 }
 
-impl<const D: usize> Form for FrictionGlobal<D>
-where
-    Self: Registered,
-{
+impl<const D: usize> Form for FrictionGlobal<D> {
     fn contacts(&self) -> usize {
         self.contacts()
     }

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
 use nonsmooth_problem::check::Verdict;
 use nonsmooth_problem::{Friction, with_friction};
-use nonsmooth_solve::registry::{self, Solves};
+use nonsmooth_solve::registry::{self, Registered, Solves};
 use nonsmooth_solve::settings::{self, SettingsMap};
 use nonsmooth_solve::{Limit, Limits, Outcome, Sample, SolveError, Status};
 use serde_json::json;
@@ -218,7 +218,7 @@ fn keep(
 }
 
 /// Solves a problem from a stored point, or from zero. `file` is its name in messages.
-pub fn solve<P: Form>(
+pub fn solve<P: Form + Registered>(
     file: &Path,
     problem: &P,
     start: Option<&StoredPoint>,
@@ -334,7 +334,7 @@ fn stuck(history: &[Sample]) -> Option<usize> {
 const OTHER_WAYS: [&str; 2] = ["local=projection", "ordering=shuffled"];
 
 /// What may help where the problem is not solved.
-fn hint<P: Form>(solved: &Solved, plan: &Plan, stuck: bool) -> Option<String> {
+fn hint<P: Form + Registered>(solved: &Solved, plan: &Plan, stuck: bool) -> Option<String> {
     // Iterations are of no help where the contacts are as they should be.
     let failing = solved.verdict.measure.failing(plan.limits.tolerance);
     if !failing.iter().any(|f| ["relative residual", "primal", "dual"].contains(&f.what)) {
