@@ -273,7 +273,7 @@ fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &Solved) ->
     format!("{}\n", json!(all))
 }
 
-fn text<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &Solved) -> String {
+fn text<P: Form + Registered>(file: &Path, problem: &P, plan: &Plan, solved: &Solved) -> String {
     let Solved { outcome, verdict, .. } = solved;
     let tolerance = plan.limits.tolerance;
     let is_solved = outcome.status == Status::Solved;
