@@ -20,7 +20,7 @@ use nonsmooth_solve::{Limit, Limits, Outcome, Reformulation, Status, existence};
 
 const TIGHT: f64 = 1e-12;
 /// Far more than any of these needs.
-const SECONDS: f64 = 20.0;
+const SECONDS: f64 = 10.0;
 
 /// Solves, or names what is not solved.
 fn solved<P: Registered + Judged>(problem: &P, solver: &str, what: &str) -> Vec<String> {
@@ -30,7 +30,10 @@ fn solved<P: Registered + Judged>(problem: &P, solver: &str, what: &str) -> Vec<
         Status::Solved => vec![],
         other => {
             let relative = measure.relative;
-            vec![format!("{what}, {solver}: {other} at {relative:.1e} after {iterations} steps")]
+            let failed =
+                format!("{what}, {solver}: {other} at {relative:.1e} after {iterations} steps");
+            eprintln!("{failed}");
+            vec![failed]
         }
     }
 }
@@ -236,7 +239,7 @@ fn one_status_for_all() {
 #[test]
 fn nothing_moves() {
     let (local, _) = Planted::default().local::<3>();
-    for size in [0.0, 1e-300, 1e-30] {
+    for size in [0.0, 1e-100, 1e-30] {
         let mut still = local.clone();
         still.q.iter_mut().enumerate().for_each(|(i, q)| *q = size * (i as f64).sin());
         none(solved(&still, "auto", &format!("q of size {size:e}")));
@@ -406,9 +409,11 @@ fn units_change_nothing() {
                 for (form, (status, work, r), (other_status, other_work, other_r)) in runs {
                     let what = format!("{name}, {form}, unit {unit} by {a:e}");
                     assert_eq!((status, work), (&other_status, &other_work), "{what}");
-                    // Powers of two are exact: then every bit is the same.
+                    // Powers of two are exact: then every bit is the same. But a unit of length makes velocities larger and
+                    // angular ones not, so that M is factorised in another order.
                     let apart = r.iter().zip(&other_r).map(|(a, b)| a - b).collect::<Vec<_>>();
-                    let allowed = if a == big || a == 1.0 / big { 0.0 } else { 1e-6 };
+                    let exact = (a == big || a == 1.0 / big) && unit != 1;
+                    let allowed = if exact { 0.0 } else { 1e-6 };
                     assert!(norm(&apart) <= allowed * norm(r), "{what}: {:e}", norm(&apart));
                 }
             }
