@@ -24,8 +24,17 @@ const SECONDS: f64 = 10.0;
 
 /// Solves, or names what is not solved.
 fn solved<P: Registered + Judged>(problem: &P, solver: &str, what: &str) -> Vec<String> {
+    solved_to(TIGHT, problem, solver, what)
+}
+
+fn solved_to<P: Registered + Judged>(
+    tolerance: f64,
+    problem: &P,
+    solver: &str,
+    what: &str,
+) -> Vec<String> {
     let Outcome { status, measure, iterations, .. } =
-        run(problem, solver, &[], &within(TIGHT, SECONDS)).outcome;
+        run(problem, solver, &[], &within(tolerance, SECONDS)).outcome;
     match status {
         Status::Solved => vec![],
         other => {
@@ -44,11 +53,23 @@ where
     FrictionGlobal<D>: Registered + Judged,
     FrictionLocal<D>: Registered + Judged,
 {
-    let mut failed = solved(problem, "auto", &format!("{what}, global"));
-    failed.extend(solved(problem, "condense/auto", &format!("{what}, global")));
+    all_forms_to(TIGHT, problem, what)
+}
+
+fn all_forms_to<const D: usize>(
+    tolerance: f64,
+    problem: &FrictionGlobal<D>,
+    what: &str,
+) -> Vec<String>
+where
+    FrictionGlobal<D>: Registered + Judged,
+    FrictionLocal<D>: Registered + Judged,
+{
+    let mut failed = solved_to(tolerance, problem, "auto", &format!("{what}, global"));
+    failed.extend(solved_to(tolerance, problem, "condense/auto", &format!("{what}, global")));
     if problem.bilateral.is_none() {
         let (local, _) = Condense.reduce(problem).unwrap();
-        failed.extend(solved(&local, "auto", &format!("{what}, local")));
+        failed.extend(solved_to(tolerance, &local, "auto", &format!("{what}, local")));
     }
     failed
 }
@@ -94,19 +115,23 @@ fn friction_from_none_to_two() {
     none(failed);
 }
 
+/// Impulses a million times those that the lightest body needs, rounded, leave velocities of 1e6 ε and more: 1e-12 is out of reach.
 #[test]
 fn masses_that_differ_by_a_million() {
     let mut failed = vec![];
+    let rounded = |family: &dyn Fn() -> Scene, what: &str| {
+        all_forms_to(1e-9, &family().problem().unwrap(), what)
+    };
     for seed in 0..2 {
         for state in [State::Rest, State::Perturbed, State::Impact] {
             let mass_ratio = 1e6;
             let what = |name: &str| format!("{name}, seed {seed}, {state:?}");
             let tower = Stack { count: 10, mass_ratio, state, seed, ..Stack::default() };
-            failed.extend(scene(&tower, &what("stack")));
+            failed.extend(rounded(&|| tower.build().unwrap(), &what("stack")));
             let chain = Chain { links: 8, mass_ratio, state, seed, ..Chain::default() };
-            failed.extend(scene(&chain, &what("chain")));
+            failed.extend(rounded(&|| chain.build().unwrap(), &what("chain")));
             let wall = Wall { rows: 4, columns: 3, mass_ratio, state, seed, ..Wall::default() };
-            failed.extend(scene(&wall, &what("wall")));
+            failed.extend(rounded(&|| wall.build().unwrap(), &what("wall")));
         }
     }
     none(failed);
