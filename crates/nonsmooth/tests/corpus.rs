@@ -1,6 +1,8 @@
-//! Real problems: what NSGS with its default local solver solves, and that the judge never disagrees with `solved`.
+//! Real problems: what NSGS with its default local solver solves, what `auto` solves, and that the judge never disagrees with
+//! `solved`.
 //!
-//! Limits are numbers of sweeps, so that the outcome does not depend on the machine.
+//! Limits of NSGS are numbers of sweeps, so that the outcome does not depend on the machine; those of `auto` are the seconds
+//! that it is allowed, several times what it needs.
 
 mod common;
 
@@ -13,20 +15,29 @@ use nonsmooth_problem::{Friction, with_friction};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limits, Status};
 
-fn solved<P: Registered + Judged>(problem: &P, limits: &Limits, name: &Path) -> bool {
+fn solved<P: Registered + Judged>(problem: &P, solver: &str, limits: &Limits, name: &Path) -> bool {
     let mut point = problem.origin();
-    let mut session = registry::session::<P>(registry::DEFAULT, &Default::default()).unwrap();
+    let mut session = registry::session::<P>(solver, &Default::default()).unwrap();
     let outcome = session.solve(problem, &mut point, limits, &mut |_| {}).unwrap();
     let verdict = problem.judge(&point, limits.tolerance).unwrap();
     let solved = outcome.status == Status::Solved;
-    let stalled = matches!(outcome.status, Status::Stalled(_));
+    let stalled = matches!(outcome.status, Status::Stalled(_)) && solver == "nsgs";
     assert!(!stalled, "{}: {}", name.display(), outcome.status);
     assert_eq!(solved, verdict.solved, "{}", name.display());
+    if !solved {
+        let Limits { tolerance, .. } = limits;
+        let (relative, name) = (outcome.measure.relative, name.display());
+        eprintln!(
+            "{solver}, not solved at {tolerance:e}: {name}, {}, {relative:.1e}",
+            outcome.status
+        );
+    }
     solved
 }
 
 /// The files of `folders` with a problem that `wanted` takes: how many, and which were solved.
 fn campaign(
+    solver: &str,
     folders: &[&str],
     limits: &Limits,
     wanted: fn(&Friction) -> bool,
@@ -40,10 +51,8 @@ fn campaign(
             continue;
         }
         all += 1;
-        if with_friction!(&file.problem, p => solved(p, limits, &path)) {
+        if with_friction!(&file.problem, p => solved(p, solver, limits, &path)) {
             names.insert(path.file_stem().unwrap().to_string_lossy().replace(".hdf5", ""));
-        } else {
-            eprintln!("not solved at {:e}: {}", limits.tolerance, path.display());
         }
     }
     (all, names)
@@ -53,7 +62,8 @@ fn campaign(
 fn local_problems_at_a_loose_tolerance() {
     let limits = Limits { tolerance: 1e-4, max_iterations: 30_000, ..Limits::default() };
     let local = |p: &Friction| matches!(p, Friction::Local2(_) | Friction::Local3(_));
-    let (all, solved) = campaign(&["siconos/fc3d", "siconos/fc2d", "generated"], &limits, local);
+    let (all, solved) =
+        campaign("nsgs", &["siconos/fc3d", "siconos/fc2d", "generated"], &limits, local);
     assert!(solved.len() as f64 >= 0.95 * all as f64, "{} of {all} solved", solved.len());
 }
 
@@ -61,7 +71,8 @@ fn local_problems_at_a_loose_tolerance() {
 fn global_problems_at_a_loose_tolerance() {
     let limits = Limits { tolerance: 1e-4, max_iterations: 30_000, ..Limits::default() };
     let global = |p: &Friction| matches!(p, Friction::Global2(_) | Friction::Global3(_));
-    let (all, solved) = campaign(&["siconos/gfc3d", "siconos/gfc2d", "generated"], &limits, global);
+    let (all, solved) =
+        campaign("nsgs", &["siconos/gfc3d", "siconos/gfc2d", "generated"], &limits, global);
     assert_eq!(solved.len(), all);
 }
 
@@ -69,7 +80,7 @@ fn global_problems_at_a_loose_tolerance() {
 #[test]
 fn at_a_tight_tolerance_no_fewer_than_the_peer() {
     let limits = Limits { tolerance: 1e-8, max_iterations: 300_000, ..Limits::default() };
-    let (all, solved) = campaign(&["siconos/fc3d"], &limits, |_| true);
+    let (all, solved) = campaign("nsgs", &["siconos/fc3d"], &limits, |_| true);
     if all == 0 {
         return;
     }
@@ -87,4 +98,21 @@ fn at_a_tight_tolerance_no_fewer_than_the_peer() {
         .collect::<HashSet<_>>();
     assert!(peer_solved.len() > 30, "{peer_solved:?}");
     assert!(solved.len() >= peer_solved.len(), "{} against {}", solved.len(), peer_solved.len());
+}
+
+const EVERYWHERE: [&str; 5] =
+    ["siconos/fc2d", "siconos/fc3d", "siconos/gfc2d", "siconos/gfc3d", "generated"];
+
+#[test]
+fn auto_solves_all_but_three_to_the_last_digit() {
+    let limits = Limits { tolerance: 1e-12, time_limit: Some(60.0), ..Limits::default() };
+    let (all, solved) = campaign("auto", &EVERYWHERE, &limits, |_| true);
+    assert!(solved.len() + 3 >= all, "{} of {all}", solved.len());
+}
+
+#[test]
+fn auto_solves_nearly_all_at_the_default_tolerance_in_a_third_of_the_time() {
+    let limits = Limits { time_limit: Some(20.0), ..Limits::default() };
+    let (all, solved) = campaign("auto", &EVERYWHERE, &limits, |_| true);
+    assert!(solved.len() as f64 >= 0.98 * all as f64, "{} of {all}", solved.len());
 }

@@ -33,8 +33,6 @@ mod scaling;
 mod tests;
 mod xuewen_soh_wanji;
 
-use std::borrow::Cow;
-
 use nonsmooth_problem::linalg::{Block, small};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -265,16 +263,31 @@ where
             work.phase.note(merit);
         }
         if work.phase.since_low > PATIENCE {
-            return self.rescue(problem, point, work, "its merit no longer decreases");
+            return self.rescue(
+                problem,
+                point,
+                work,
+                "Newton's method is stuck: its merit no longer decreases",
+            );
         }
         if problem.linearise(&mut work.state, &work.p, &work.q).is_err() {
-            return self.rescue(problem, point, work, "its matrix is singular");
+            return self.rescue(
+                problem,
+                point,
+                work,
+                "Newton's method is stuck: its matrix is singular",
+            );
         }
         let Work { state, u, trial, trial_u, step, step_u, b, search, laws, unit, scale, .. } =
             work;
         problem.solve_linearised(state, b, step, step_u); //             (Q + P W) Δr = −Φ
         if step.iter().any(|x| !x.is_finite()) {
-            return self.rescue(problem, point, work, "its step is not finite");
+            return self.rescue(
+                problem,
+                point,
+                work,
+                "Newton's method is stuck: its step is not finite",
+            );
         }
         let found = search.search(merit, |t| {
             for i in 0..r.len() {
@@ -289,7 +302,7 @@ where
                 problem,
                 point,
                 work,
-                "no step along its direction decreases the merit",
+                "Newton's method is stuck: no step along its direction decreases the merit",
             );
         }
         r.copy_from_slice(trial); //                                     r ← r + t Δr
@@ -375,7 +388,7 @@ impl<F, const D: usize> Semismooth<F, D> {
         P: Linearised<D>,
     {
         if self.settings.rescue == 0 || work.phase.rescues >= RESCUES {
-            return Step::Stuck(Cow::Owned(format!("Newton's method is stuck: {why}")));
+            return Step::Stuck(why.into());
         }
         // Longer each time in a row: where W is rank deficient, Newton needs a start that few sweeps do not give.
         let count = self.settings.rescue << work.phase.rescues.min(DOUBLINGS);
