@@ -83,7 +83,9 @@ fn report<const D: usize>(
     settings: &SettingsMap,
     name: &str,
     baselines: &Baselines,
-) {
+) where
+    FrictionLocal<D>: Registered,
+{
     let entries = problem.W.blocks().as_flattened().as_flattened();
     let bytes = 8 * entries.len();
     let sweeps = (50_000_000 / bytes).clamp(20, 20_000);

@@ -7,13 +7,17 @@ use nonsmooth_io::fclib;
 use nonsmooth_problem::check::Judged;
 use nonsmooth_problem::linalg::norm;
 use nonsmooth_problem::planted::Planted;
-use nonsmooth_problem::{Friction, FrictionGlobal, Problem};
+use nonsmooth_problem::{Friction, FrictionGlobal, GlobalPoint, Problem};
 use nonsmooth_solve::form::{Access, Contacts, Linear};
 use nonsmooth_solve::reform::Condense;
-use nonsmooth_solve::{Limits, Reformulation, Status, registry};
+use nonsmooth_solve::registry::{self, Registered};
+use nonsmooth_solve::{Limits, Reformulation, Status};
 
 /// The velocity u at the end of a run and whether the run reached 1e-12; and that run's impulses.
-fn run<const D: usize>(problem: &FrictionGlobal<D>, path: &str) -> (Vec<f64>, bool, Vec<f64>) {
+fn run<const D: usize>(problem: &FrictionGlobal<D>, path: &str) -> (Vec<f64>, bool, Vec<f64>)
+where
+    FrictionGlobal<D>: Problem<Point = GlobalPoint> + Registered,
+{
     let limits = Limits { tolerance: 1e-12, max_iterations: 5_000, ..Limits::default() };
     let mut session = registry::session::<FrictionGlobal<D>>(path, &Default::default()).unwrap();
     let mut point = problem.origin();
@@ -23,7 +27,10 @@ fn run<const D: usize>(problem: &FrictionGlobal<D>, path: &str) -> (Vec<f64>, bo
 }
 
 /// Returns how many paths beside the condensed one reached the solution.
-fn agree<const D: usize>(problem: &FrictionGlobal<D>, name: &str) -> usize {
+fn agree<const D: usize>(problem: &FrictionGlobal<D>, name: &str) -> usize
+where
+    FrictionGlobal<D>: Problem<Point = GlobalPoint> + Registered,
+{
     let (condensed, _) = Condense.reduce(problem).unwrap();
     let scale = norm(&condensed.q).max(f64::MIN_POSITIVE);
     let difference = |a: &[f64], b: &[f64]| {

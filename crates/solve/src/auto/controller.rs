@@ -20,6 +20,8 @@ const FLOOR: f64 = 2.0;
 const SINK: (f64, usize) = (0.3, 3);
 /// Sweeps between two subproblems.
 const MOST_SWEEPS: usize = 300;
+/// Sweeps of a cold start.
+const LONG: (usize, usize) = (50, 30_000);
 /// The least share of the time that sweeps have.
 const LEAST_SHARE: f64 = 0.02;
 /// A strategy is left after this many factorisations that did not halve the error, and each later one half as late again.
@@ -206,6 +208,11 @@ impl Controller {
         ((self.share * iterations * ratio) as usize).clamp(1, MOST_SWEEPS)
     }
 
+    /// How many sweeps a cold start has, if a factorisation costs `ratio` of them.
+    pub(super) fn long_sweeps(&self, ratio: f64) -> usize {
+        ((self.budget * ratio) as usize).clamp(LONG.0, LONG.1)
+    }
+
     /// The sweeps have ended with this error; returns by which factor it grew, and gives sweeps that help more time.
     pub(super) fn swept(&mut self, error: f64) -> f64 {
         let growth = error / self.error;
@@ -229,6 +236,10 @@ impl Controller {
         self.failures = 0;
         let (_, share, cold) = STRATEGIES[self.strategy];
         self.share = share;
+        if cold {
+            // What sweeps from zero come to is not compared with what there was.
+            self.error = f64::INFINITY;
+        }
         self.epsilon = if cold { 1.0 } else { self.least.clamp(1e-4, 1.0) };
         cold
     }

@@ -80,7 +80,7 @@ const SWEEP_ABOVE: f64 = 1e-9;
 /// Sweeps that raise the error by more than this factor are taken back.
 const TAKE_BACK: f64 = 5.0;
 /// An investigation of existence may take this long, in seconds.
-const INVESTIGATION: f64 = 10.0;
+const INVESTIGATION: f64 = 2.0;
 
 /// The workspace. The later stages' parts are made when they are first needed.
 pub struct HybridWork<P: Linearised<D>, const D: usize> {
@@ -497,15 +497,15 @@ impl<const D: usize> Hybrid<D> {
         } else {
             r.copy_from_slice(&work.best);
         }
-        problem.enter(&mut work.state, point);
-        if cold {
-            for _ in 0..FIRST_SWEEPS {
-                work.sweep.sweep(problem, &mut work.state, P::impulses(point));
-            }
-            work.done.between += FIRST_SWEEPS;
-        }
         if std::mem::take(&mut work.passed_by) {
             begin_interior(problem, work);
+        } else if cold {
+            // Some problems want nothing but sweeps, tens of thousands: as many as the strategy before took time for.
+            problem.enter(&mut work.state, point);
+            let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+            let left = work.controller.long_sweeps(costs.factorisation / costs.sweep);
+            work.before.copy_from_slice(P::impulses(point));
+            work.stage = Stage::Between { left };
         } else {
             self.subproblem(problem, point, work);
         }
