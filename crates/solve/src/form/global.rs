@@ -17,6 +17,7 @@ use crate::SolveError;
 pub struct GlobalState<const D: usize> {
     dynamics: Dynamics,
     operator: Operator<D>,
+    access: Access,
     /// The operator belongs to this H.
     h: Csc,
     q: Vec<f64>,
@@ -90,6 +91,7 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
                 }
                 Access::Products => Operator::Products(Delassus::diagonal(&self.H, inverse)),
             },
+            access,
             h: self.H.clone(),
             q: vec![0.0; self.w.len()],
             scale: 1.0,
@@ -106,13 +108,16 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
         if state.dynamics.serves(self) && state.h == self.H {
             state.update_free_velocity(self);
         } else {
-            let access = match state.operator {
-                Operator::Condensed(_) => Access::Newton,
-                Operator::Visits(_) if state.system.is_some() => Access::Newton,
-                Operator::Visits(_) => Access::Visits,
-                Operator::Products(_) => Access::Products,
-            };
-            *state = self.state(access)?;
+            let earlier = state.system.take();
+            *state = self.state(state.access)?;
+            // A contact set that changed a little can keep the analysis of its Newton matrix.
+            if let (Some(GlobalSystem::Bodies(earlier)), Operator::Visits(_)) =
+                (earlier, &state.operator)
+            {
+                let matrix = state.dynamics.inverse.matrix();
+                let form = BodyForm::after(Some(earlier.into_form()), matrix, &self.H);
+                state.system = Some(GlobalSystem::Bodies(System::new(form, self.contacts())));
+            }
         }
         Ok(())
     }

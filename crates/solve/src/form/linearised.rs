@@ -48,6 +48,11 @@ impl<F, const D: usize> System<F, D> {
         }
     }
 
+    /// The form alone.
+    pub(super) fn into_form(self) -> F {
+        self.form
+    }
+
     /// The way in which it is factorised.
     pub(super) fn form(&mut self) -> &mut F {
         &mut self.form
@@ -218,6 +223,12 @@ impl<const D: usize> BodyForm<D> {
     /// `matrix` is M, or M bordered by bilateral constraints (its rows after those of H). Nodes are the connected components of
     /// M; a multiplier belongs to the first component that it acts on.
     pub(super) fn new(matrix: &Csc, h: &Csc) -> Self {
+        Self::after(None, matrix, h)
+    }
+
+    /// As [`new`](Self::new), with the analysis of an earlier form where that serves: the bodies are the same, and no two of them touch that
+    /// did not touch before.
+    pub(super) fn after(earlier: Option<Self>, matrix: &Csc, h: &Csc) -> Self {
         let n = h.nrows();
         let node_of = nodes(matrix, n);
         let count = node_of.iter().max().map_or(0, |m| m + 1);
@@ -259,7 +270,11 @@ impl<const D: usize> BodyForm<D> {
         let by_contact = touched.iter().flat_map(|list| {
             list.iter().flat_map(move |&a| list.iter().map(move |&b| (a as u32, b as u32)))
         });
-        let lu = BlockLu::new(&sizes, couplings.chain(by_contact).filter(|(i, j)| i != j));
+        let edges = couplings.chain(by_contact).filter(|(i, j)| i != j);
+        let lu = match earlier {
+            Some(Self { lu, .. }) if lu.serves(&sizes, edges.clone()) => lu,
+            _ => BlockLu::new(&sizes, edges),
+        };
         for (touch, list) in contacts.iter_mut().zip(&touched) {
             let pairs = list.iter().flat_map(|&a| list.iter().map(move |&b| (a, b)));
             touch.slots = pairs.map(|(a, b)| lu.slot(a, b)).collect();
@@ -448,6 +463,36 @@ mod tests {
                 assert!((wx[i] - wy[i]).abs() < 1e-8 * (1.0 + wx[i].abs()), "{bilateral} {i}");
             }
         }
+    }
+
+    #[test]
+    fn fewer_contacts_between_the_same_bodies_need_no_new_analysis() {
+        let (problem, _) = Planted { contacts: 12, dofs: 60, ..Planted::default() }.global::<3>();
+        let fewer = Csc::from_triplets(60, 27, problem.H.triplets().filter(|e| e.1 < 27)).unwrap();
+        let mut first = BodyForm::<3>::new(&problem.M, &problem.H);
+        let (p, q) = blocks((0..9).map(|_| 1.0));
+        let regular = p.iter().zip(q).map(|(p, mut q)| {
+            (0..3).for_each(|k| (0..3).for_each(|l| q[k][l] += 0.5 * p[k][l]));
+            q
+        });
+        let regular: Vec<Block<3>> = regular.collect();
+        let flops = first.lu.flops();
+        let solve = |form: &mut BodyForm<3>| {
+            form.factorise(&p, &regular).unwrap();
+            let mut b: Vec<f64> = (0..27).map(|i| (i as f64).sin()).collect();
+            form.solve(&p, &mut b);
+            b
+        };
+        // The earlier analysis has more couplings than the new one would.
+        let mut fresh = BodyForm::new(&problem.M, &fewer);
+        assert!(fresh.lu.flops() < flops);
+        first = BodyForm::after(Some(first), &problem.M, &fewer);
+        assert_eq!(first.lu.flops(), flops);
+        let (a, b) = (solve(&mut first), solve(&mut fresh));
+        assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-9 * (1.0 + b.abs())));
+        // More contacts than were analysed: anew.
+        let more = BodyForm::after(Some(fresh), &problem.M, &problem.H);
+        assert_eq!(more.lu.flops(), flops);
     }
 
     #[test]

@@ -6,8 +6,10 @@
 //! and, for monotone F, all solutions on the other; γ times the way from r to it, `τ = dᵀ(r − r̄)/‖d‖²`, then back to K. Each step
 //! brings r closer to every solution, without a Lipschitz constant. The normal is
 //!
-//!     d = r − r̄ − ρ(F(r) − F(r̄))    residual: vanishes at the solution, so τ stays of order one
-//!     d = F(r̄)                      field: the classical one, which does not
+//! ```text
+//! d = r − r̄ − ρ(F(r) − F(r̄))    residual: vanishes at the solution, so τ stays of order one
+//! d = F(r̄)                      field: the classical one, which does not
+//! ```
 //!
 //! (in the metric of the methods: fields are divided by w_c).
 //!

@@ -3,8 +3,10 @@
 //! Shorten ρ while the ratio of a rule is above `accept`, with `r̄ = P_K(r − ρF(r))`; lengthen it after a step whose ratio was
 //! small. In the metric of the methods (`diag(w_c)` for impulses, its inverse for velocities) the ratios are
 //!
-//!     ρ ‖F(r) − F(r̄)‖ / ‖r − r̄‖                  Khobotov
-//!     ρ (F(r) − F(r̄))ᵀ(r − r̄) / ‖r − r̄‖²         Solodov–Tseng
+//! ```text
+//! ρ ‖F(r) − F(r̄)‖ / ‖r − r̄‖                  Khobotov
+//! ρ (F(r) − F(r̄))ᵀ(r − r̄) / ‖r − r̄‖²         Solodov–Tseng
+//! ```
 //!
 //! The second is never larger than the first, so it allows longer steps. It is what makes `F(r̄)ᵀ(x − r̄) = 0` separate r
 //! from the solutions (monotone F): `F(r̄)ᵀ(r − r̄) ≥ (1 − accept)‖r − r̄‖²/ρ`.

@@ -4,8 +4,10 @@
 //!
 //! Method: r is split into r (for W) and z (for K), tied by scaled multipliers y in the metric `w_c = tr(W_cc)/D`:
 //!
-//!     (W + (η + ρ) w) r⁺ = η w r + ρ w (z − y) − q − s,    s = mu‖u_T‖ e_N with the dual velocity u = −ρ w y,
-//!     t = α r⁺ + (1 − α) z + y,    z⁺ = P_K(t),    y⁺ = t − z⁺.
+//! ```text
+//! (W + (η + ρ) w) r⁺ = η w r + ρ w (z − y) − q − s,    s = mu‖u_T‖ e_N with the dual velocity u = −ρ w y,
+//! t = α r⁺ + (1 − α) z + y,    z⁺ = P_K(t),    y⁺ = t − z⁺.
+//! ```
 //!
 //! s moves with every iteration instead of in an outer loop, so the fixed points obey the exact law. The matrix is factorised once
 //! for each ρ; ρ is fixed, or `√(λ_min λ_max)` of W in that metric, or from there balanced between the two residuals.

@@ -127,6 +127,7 @@ impl BlockLu {
     pub fn slot(&self, i: usize, j: usize) -> Slot {
         let groups = &self.symbolic.groups;
         let entry = self.symbolic.find(groups.of[i] as usize, groups.of[j] as usize);
+        let entry = entry.unwrap_or_else(|| panic!("block ({i}, {j}) is not in the pattern"));
         let place = &self.symbolic.places[self.symbolic.number[entry] as usize];
         let (row, column) = (groups.within[i] as usize, groups.within[j] as usize);
         Slot {
@@ -135,6 +136,19 @@ impl BlockLu {
             rows: groups.node_sizes[i],
             columns: groups.node_sizes[j],
         }
+    }
+
+    /// Whether matrices of this pattern, or of a part of it, can be factorised with this analysis.
+    pub fn serves(&self, sizes: &[usize], mut edges: impl Iterator<Item = (u32, u32)>) -> bool {
+        let groups = &self.symbolic.groups;
+        let mut pairs = groups.node_sizes.iter().zip(sizes);
+        let coupled = |(i, j): (u32, u32)| {
+            let (i, j) = (groups.of[i as usize] as usize, groups.of[j as usize] as usize);
+            self.symbolic.find(i, j).is_some()
+        };
+        groups.node_sizes.len() == sizes.len()
+            && pairs.all(|(a, b)| *a as usize == *b)
+            && edges.all(coupled)
     }
 
     /// `A_ij += block`, by rows, `sizes[i] × sizes[j]`.

@@ -273,7 +273,7 @@ impl Symbolic {
                     let (pi, pj) = (position[i], position[j]);
                     let (si, sj) = (self.groups.sizes[i], self.groups.sizes[j]);
                     let (li, lj) = (local[pi as usize] as usize, local[pj as usize] as usize);
-                    let mirror = self.find(i, j);
+                    let mirror = self.find(i, j).expect("the pattern is symmetric");
                     self.number[mirror] = self.places.len() as u32;
                     self.places.push(Place {
                         values: self.values_len,
@@ -305,11 +305,11 @@ impl Symbolic {
         self.place_remainders();
     }
 
-    /// The entry of the pattern that holds groups (i, j).
-    pub(super) fn find(&self, i: usize, j: usize) -> usize {
+    /// The entry of the pattern that holds groups (i, j), if they are coupled.
+    pub(super) fn find(&self, i: usize, j: usize) -> Option<usize> {
         let range = self.pattern_start[i]..self.pattern_start[i + 1];
         let found = self.pattern[range.clone()].binary_search(&(j as u32));
-        range.start + found.unwrap_or_else(|_| panic!("block ({i}, {j}) is not in the pattern"))
+        found.ok().map(|at| range.start + at)
     }
 
     /// Gives each remainder room in the stack: the first gap that is large enough among those that live at the same time.
