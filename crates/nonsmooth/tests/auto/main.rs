@@ -286,7 +286,8 @@ fn nothing_moves() {
         none(solved(&still, "auto", &format!("q of size {size:e}")));
     }
     let (mut global, _) = Planted::default().global::<3>();
-    (global.f.fill(0.0), global.w.fill(0.0));
+    global.f.fill(0.0);
+    global.w.fill(0.0);
     none(all_forms(&global, "q = 0"));
     let end = run(&global, "auto", &[], &within(TIGHT, SECONDS));
     assert!(norm(&end.point.v) == 0.0 && norm(&end.point.r) == 0.0);

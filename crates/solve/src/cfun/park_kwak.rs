@@ -91,9 +91,7 @@ impl<const D: usize> ContactFunction<D> for ParkKwak {
             }
             Piece::Slip | Piece::Open => {
                 out.phi[1] = along_r - radius;
-                for k in 1..D {
-                    out.b[1][k] = t[k];
-                }
+                out.b[1][1..D].copy_from_slice(&t[1..D]);
                 if radius > 0.0 {
                     out.b[1][0] = -mu;
                     out.a[1][0] = mu * rho.normal;
@@ -106,9 +104,7 @@ impl<const D: usize> ContactFunction<D> for ParkKwak {
                 Piece::Stick => rho.tangential * dot(u, &s),
                 Piece::Slip | Piece::Open => dot(r, &s),
             };
-            for k in 1..D {
-                out.b[D - 1][k] = s[k];
-            }
+            out.b[D - 1][1..D].copy_from_slice(&s[1..D]);
             if size > 0.0 {
                 // The frame turns by dθ = s·dx/‖x_T‖: dt = s dθ, ds = −t dθ.
                 let turn_t = match piece {

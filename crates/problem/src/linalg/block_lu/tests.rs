@@ -100,8 +100,10 @@ fn random_edges(rng: &mut Pcg64, n: usize, per_node: f64) -> Vec<(u32, u32)> {
         .collect()
 }
 
-/// Patterns by name: `(sizes, edges)`.
-fn patterns(rng: &mut Pcg64) -> Vec<(&'static str, Vec<usize>, Vec<(u32, u32)>)> {
+/// A name, the sizes of the nodes, and the edges.
+type Pattern = (&'static str, Vec<usize>, Vec<(u32, u32)>);
+
+fn patterns(rng: &mut Pcg64) -> Vec<Pattern> {
     let mut mixed = |n: usize| (0..n).map(|_| rng.random_range(1..7)).collect::<Vec<usize>>();
     let all = |n: u32| (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).collect::<Vec<_>>();
     let grid = |n: u32| {
