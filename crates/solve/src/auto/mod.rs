@@ -60,7 +60,7 @@ impl Settings for Auto {}
 pub struct Hybrid<const D: usize>(pub Auto);
 
 /// A first stage of sweeps is at least this long, unless it ends at the tolerance.
-const FIRST_SWEEPS: usize = 50;
+const FIRST_SWEEPS: usize = 30;
 /// Sweeps of a step.
 const SWEEPS_A_STEP: usize = 10;
 /// A solve by Newton's method is taken to cost this many factorisations.

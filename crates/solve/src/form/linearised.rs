@@ -15,7 +15,7 @@ const DELTA: f64 = 1e-10;
 /// Refinement ends here at the latest; what it does not reach, the residual tells.
 const MOST_REFINEMENTS: usize = 4;
 /// Rounding level of a refined solve.
-const ENOUGH: f64 = 1e-15;
+const ENOUGH: f64 = 1e-12;
 
 /// A factorised system, with the blocks that it belongs to.
 pub(super) struct System<F, const D: usize> {
