@@ -315,15 +315,14 @@ impl<const D: usize> Hybrid<D> {
             buffer.resize(r.len(), 0.0);
         }
         work.best.copy_from_slice(r);
-        problem.velocities(state, r, newton.velocities());
-        let error = newton.error(r);
+        let error = newton.look(problem, state, r);
         controller.begin(error);
         work.passed_by = self.0.interior && work.done.start == Start::Given && error < NEAR;
         if work.passed_by {
             controller.resume();
         }
         if work.passed_by || !self.0.interior {
-            self.subproblem(problem, point, work);
+            self.subproblem(point, work, error);
         } else {
             begin_interior(problem, work);
         }
@@ -361,25 +360,36 @@ impl<const D: usize> Hybrid<D> {
             if controller.offer(error) {
                 P::impulses(point).copy_from_slice(r);
             }
-            self.subproblem(problem, point, work);
+            self.subproblem_here(problem, point, work);
         }
         Step::Continue { estimate: error }
     }
 
-    /// Begins a proximal subproblem about the present impulses.
-    fn subproblem<P: Linearised<D> + Kinematic<D>>(
+    /// Begins a proximal subproblem about the present impulses, from which their velocities have yet to be computed.
+    fn subproblem_here<P: Linearised<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) {
-        let HybridWork { newton, state, controller, .. } = work;
+        let HybridWork { newton, state, .. } = work;
+        let Some(newton) = newton else { return };
+        let error = newton.look(problem, state, P::impulses(point));
+        self.subproblem(point, work, error);
+    }
+
+    /// Begins a proximal subproblem about the present impulses, whose velocities and error are known.
+    fn subproblem<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        error: f64,
+    ) {
+        let HybridWork { newton, controller, .. } = work;
         let Some(newton) = newton else { return };
         let r = P::impulses(point);
-        problem.velocities(state, r, newton.velocities());
         newton.center(r, controller.epsilon(), controller.kappa());
         work.inner_best.copy_from_slice(r);
-        let error = newton.error(r);
         if controller.start(error, newton.residual(r), work.tolerance) {
             work.best.copy_from_slice(r);
         }
@@ -418,8 +428,7 @@ impl<const D: usize> Hybrid<D> {
                 r.copy_from_slice(newton.centre());
             }
         }
-        problem.velocities(state, r, newton.velocities());
-        let error = newton.error(r);
+        let error = newton.look(problem, state, r);
         if controller.end(verdict, error) {
             best.copy_from_slice(r);
         }
@@ -433,7 +442,7 @@ impl<const D: usize> Hybrid<D> {
             work.before.copy_from_slice(P::impulses(point));
             work.stage = Stage::Between { left };
         } else {
-            self.subproblem(problem, point, work);
+            self.subproblem(point, work, error);
         }
         Step::Continue { estimate: error }
     }
@@ -460,12 +469,13 @@ impl<const D: usize> Hybrid<D> {
             return Step::Stuck("auto has lost its place".into());
         };
         let r = P::impulses(point);
-        problem.velocities(&mut work.state, r, newton.velocities());
-        let error = newton.error(r);
+        let error = newton.look(problem, &mut work.state, r);
         if work.controller.swept(error) > TAKE_BACK {
             r.copy_from_slice(&work.before);
+            self.subproblem_here(problem, point, work);
+        } else {
+            self.subproblem(point, work, error);
         }
-        self.subproblem(problem, point, work);
         Step::Continue { estimate: error }
     }
 
@@ -507,7 +517,7 @@ impl<const D: usize> Hybrid<D> {
             work.before.copy_from_slice(P::impulses(point));
             work.stage = Stage::Between { left };
         } else {
-            self.subproblem(problem, point, work);
+            self.subproblem_here(problem, point, work);
         }
         Step::Continue { estimate: f64::NAN }
     }

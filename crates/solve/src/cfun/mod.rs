@@ -15,7 +15,7 @@ pub use alart_curnier::{AlartCurnier, Disk, JeanMoreau, alart_curnier};
 pub use chen_mangasarian::{ChenMangasarian, Kernel};
 pub use fischer_burmeister::{FischerBurmeister, SmoothedFischerBurmeister};
 pub use hueber_stadler_wohlmuth::{HueberStadlerWohlmuth, SlipBlock};
-pub use natural_map::NaturalMap;
+pub use natural_map::{NaturalMap, natural_map, natural_residual};
 pub use park_kwak::ParkKwak;
 pub use xuewen_soh_wanji::XuewenSohWanji;
 

@@ -12,6 +12,38 @@
 use super::{ContactFunction, Law, Linearisation, modified_velocity};
 use crate::cone::{self, Region};
 
+/// `x − P_K(x − ũ)` by the three regions of the cone, so that a large x does not round ũ away.
+#[inline(always)]
+pub fn natural_map<const D: usize>(x: &[f64; D], modified: &[f64; D], mu: f64) -> [f64; D] {
+    let mut y = *x;
+    for k in 0..D {
+        y[k] -= modified[k];
+    }
+    match cone::region(&y, mu) {
+        Region::Inside => *modified,
+        Region::Polar => *x,
+        Region::Outside => {
+            // ũ + d n, with the distance d of y from K and the outward normal n.
+            let size = cone::tangential_norm(&y);
+            let scale = (size - mu * y[0]) / (1.0 + mu * mu);
+            let mut phi = *modified;
+            phi[0] -= mu * scale;
+            for k in 1..D {
+                phi[k] += scale * (y[k] / size);
+            }
+            phi
+        }
+    }
+}
+
+/// One contact's part of the natural residual, `‖w r − P_K(w r − ũ)‖²`, `ũ = u + mu‖u_T‖ e_N`.
+#[inline(always)]
+pub fn natural_residual<const D: usize>(w: f64, r: &[f64; D], u: &[f64; D], mu: f64) -> f64 {
+    let mut modified = *u;
+    modified[0] += mu * cone::tangential_norm(u);
+    natural_map(&r.map(|r| w * r), &modified, mu).iter().map(|v| v * v).sum()
+}
+
 /// The natural map.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NaturalMap;
@@ -20,24 +52,12 @@ impl<const D: usize> ContactFunction<D> for NaturalMap {
     fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
         let (mu, rho) = (law.mu, law.rho_cone);
         let (modified, t) = modified_velocity(u, mu, 0.0);
+        let scaled = modified.map(|v| rho * v);
+        let mut out = Linearisation::zero();
+        out.phi = natural_map(r, &scaled, mu);
         let mut x = *r;
         for k in 0..D {
-            x[k] -= rho * modified[k];
-        }
-        let mut out = Linearisation::zero();
-        // The differences of r and its projection are written without cancellation.
-        match cone::region(&x, mu) {
-            Region::Inside => out.phi = modified.map(|v| rho * v),
-            Region::Polar => out.phi = *r,
-            Region::Outside => {
-                // ρ ũ + d n, with the distance d of x from K and the outward normal n.
-                let size = cone::tangential_norm(&x);
-                let scale = (size - mu * x[0]) / (1.0 + mu * mu);
-                out.phi[0] = rho * modified[0] - mu * scale;
-                for k in 1..D {
-                    out.phi[k] = rho * modified[k] + scale * (x[k] / size);
-                }
-            }
+            x[k] -= scaled[k];
         }
         // ∂Φ/∂r = I − P', ∂Φ/∂u = ρ P' ∂ũ/∂u, ∂ũ/∂u = I + mu e_N tᵀ.
         let slope = cone::projection_jacobian(&x, mu);

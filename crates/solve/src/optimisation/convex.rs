@@ -14,6 +14,7 @@
 use nonsmooth_problem::linalg::{Block, small};
 
 use super::sets::Set;
+use crate::cfun::natural_residual;
 use crate::cone::ConvexSet;
 use crate::form::{Access, Linear, Linearised};
 use crate::{SolveError, cone};
@@ -147,11 +148,7 @@ impl<P: Linear<D>, const D: usize> Convex<P, D> {
     pub(super) fn coulomb(&self, mu: &[f64], r: &[f64], u: &[f64]) -> f64 {
         let mut sum = 0.0;
         for (c, (&mu, &w)) in mu.iter().zip(&self.unit).enumerate() {
-            let mut y: [f64; D] = small::block(u, c);
-            y[0] += mu * cone::tangential_norm(&y);
-            let x: [f64; D] = std::array::from_fn(|k| w * r[D * c + k]);
-            let p: [f64; D] = cone::project(&std::array::from_fn(|k| x[k] - y[k]), mu);
-            sum += (0..D).map(|k| (x[k] - p[k]).powi(2)).sum::<f64>();
+            sum += natural_residual(w, &small::block::<D>(r, c), &small::block(u, c), mu);
         }
         sum.sqrt() / self.scale
     }

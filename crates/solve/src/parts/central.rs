@@ -34,6 +34,7 @@
 use nonsmooth_problem::linalg::{Block, Singular, norm_of, small};
 
 use super::nt::{Inner, Pair, Scaling, Shape};
+use crate::cfun::natural_map;
 use crate::cone::tangential_norm;
 use crate::form::Linearised;
 
@@ -485,21 +486,3 @@ const BEHIND: f64 = 0.9;
 
 /// Steps below this are cut short.
 const CUT: f64 = 0.1;
-
-/// The natural map `x − P_K(x − ũ)`, by its three regions so that a large x does not round ũ away.
-fn natural_map<const D: usize>(x: &[f64; D], modified: &[f64; D], mu: f64) -> [f64; D] {
-    let mut y = *x;
-    (0..D).for_each(|k| y[k] -= modified[k]);
-    let t = tangential_norm(&y);
-    if t <= mu * y[0] {
-        return *modified;
-    }
-    if y[0] + mu * t <= 0.0 {
-        return *x;
-    }
-    let along = (t - mu * y[0]) / (1.0 + mu * mu);
-    let mut phi = *modified;
-    phi[0] -= mu * along;
-    (1..D).for_each(|k| phi[k] += along * (y[k] / t));
-    phi
-}

@@ -14,8 +14,7 @@
 
 use nonsmooth_problem::linalg::{Block, small};
 
-use crate::cfun::{Disk, Radii, alart_curnier};
-use crate::cone;
+use crate::cfun::{Disk, Radii, alart_curnier, natural_residual};
 use crate::form::Linearised;
 
 /// Trials of the line search.
@@ -117,10 +116,11 @@ impl<const D: usize> ProximalNewton<D> {
         self.q.resize(nc, [[0.0; D]; D]);
     }
 
-    /// Where the velocities of the impulses must be written before [`center`](Self::center), [`error`](Self::error) and
-    /// [`residual`](Self::residual).
-    pub fn velocities(&mut self) -> &mut [f64] {
-        &mut self.u
+    /// Takes `r` as the present impulses: computes their velocities, on which [`error`](Self::error) and [`residual`](Self::residual)
+    /// rest, and returns the error.
+    pub fn look<P: Linearised<D>>(&mut self, problem: &P, state: &mut P::State, r: &[f64]) -> f64 {
+        problem.velocities(state, r, &mut self.u);
+        self.error(r)
     }
 
     /// Starts the subproblem of `epsilon` about `r`, with ρ = `kappa`/w_c.
@@ -147,13 +147,7 @@ impl<const D: usize> ProximalNewton<D> {
         for (c, contact) in self.contacts.iter().enumerate() {
             let (ue, rc) = (self.shifted(u, r, c, epsilon), small::block::<D>(r, c));
             let w = contact.unit + epsilon * contact.tangential;
-            let mut y = rc;
-            for k in 0..D {
-                y[k] = w * rc[k] - ue[k];
-            }
-            y[0] -= contact.mu * small::tangential_norm(&ue);
-            let p = cone::project(&y, contact.mu);
-            sum += (0..D).map(|k| (w * rc[k] - p[k]).powi(2)).sum::<f64>();
+            sum += natural_residual(w, &rc, &ue, contact.mu);
         }
         sum.sqrt() / self.scale
     }

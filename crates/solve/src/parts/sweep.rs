@@ -8,7 +8,7 @@
 
 use nonsmooth_problem::linalg::small;
 
-use crate::cone;
+use crate::cfun::natural_residual;
 use crate::form::{Blockwise, Contacts};
 use crate::local::{Exact, LocalSolver, frictionless};
 
@@ -82,15 +82,8 @@ impl<const D: usize> Sweep<D> {
     pub fn residual(&self, u: &[f64], r: &[f64]) -> f64 {
         let mut sum = 0.0;
         for (c, contact) in self.contacts.iter().enumerate() {
-            let (uc, mut x): ([f64; D], [f64; D]) = (small::block(u, c), small::block(r, c));
-            x = x.map(|x| contact.unit * x);
-            let mut y = x;
-            for k in 0..D {
-                y[k] -= uc[k];
-            }
-            y[0] -= contact.mu * small::tangential_norm(&uc);
-            let p = cone::project(&y, contact.mu);
-            sum += (0..D).map(|k| (x[k] - p[k]).powi(2)).sum::<f64>();
+            let (u, r) = (small::block::<D>(u, c), small::block(r, c));
+            sum += natural_residual(contact.unit, &r, &u, contact.mu);
         }
         sum.sqrt()
     }

@@ -16,9 +16,10 @@ use nonsmooth_problem::linalg::small;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::cfun::natural_residual;
 use crate::form::{Access, Linear, Overwrite, Regularised};
 use crate::settings::Settings;
-use crate::{SolveError, Solver, Step, cone};
+use crate::{SolveError, Solver, Step};
 
 /// The hyperparameters of the outer loop.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -280,25 +281,16 @@ impl<P: Linear<D>, S: Solver<Regularised<P>>, const D: usize> OuterWork<P, S, D>
         for (c, (&mu, &w)) in problem.base.mu().iter().zip(&*unit).enumerate() {
             let r_c: [f64; D] = small::block(r, c);
             let mut u_c: [f64; D] = small::block(u, c);
-            own += natural(&r_c, &u_c, mu, w);
+            own += natural_residual(w, &r_c, &u_c, mu);
             let weight = problem.weight[c];
             for k in 0..D {
                 u_c[k] += weight * (r_c[k] - problem.center[D * c + k]);
             }
-            inner += natural(&r_c, &u_c, mu, w + weight);
+            inner += natural_residual(w + weight, &r_c, &u_c, mu);
         }
         let scale = problem.base.velocity_scale(state);
         (own.sqrt() / scale, inner.sqrt() / scale)
     }
-}
-
-/// `‖x − P_K(x − ũ)‖²`, `x = w r`.
-fn natural<const D: usize>(r: &[f64; D], u: &[f64; D], mu: f64, w: f64) -> f64 {
-    let x = r.map(|r| w * r);
-    let mut y: [f64; D] = std::array::from_fn(|k| x[k] - u[k]);
-    y[0] -= mu * cone::tangential_norm(u);
-    let p = cone::project(&y, mu);
-    (0..D).map(|k| (x[k] - p[k]).powi(2)).sum()
 }
 
 /// `w_c`, positive.
