@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use nonsmooth_io::fclib;
-use nonsmooth_problem::check::{Certificate, Existence};
+use nonsmooth_problem::check::{Existence, Impulses};
 use nonsmooth_problem::with_friction;
 use nonsmooth_solve::{Limits, existence};
 use serde_json::{Value, json};
@@ -76,7 +76,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
 
 /// The verdict and what it rests on, without the certificate itself.
 pub fn fields(existence: &Existence, contacts: usize) -> Object {
-    let pressed = |ray: &Certificate| ray.pressed(contacts);
+    let pressed = |ray: &Impulses| ray.pressed(contacts);
     report::fields(match existence {
         Existence::Proved { margin, shift, .. } => {
             json!({"verdict": existence.name(), "margin": margin, "shift": shift})
@@ -119,7 +119,7 @@ fn text(file: &Path, size: &str, existence: &Existence, contacts: usize, seconds
 }
 
 /// Where a ray has impulses.
-fn squeezed(ray: &Certificate, contacts: usize) -> String {
+fn squeezed(ray: &Impulses, contacts: usize) -> String {
     let pressed = report::count(ray.pressed(contacts).len(), "contact");
     let constraints = match ray.lambda.iter().filter(|l| **l != 0.0).count() {
         0 => String::new(),

@@ -1,12 +1,12 @@
 //! What the commands need of a kind of problem.
 
 use nonsmooth_io::fclib::StoredPoint;
-use nonsmooth_problem::check::Judged;
+use nonsmooth_problem::check::{ContactStatus, Judged, StatusCounts};
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
 use nonsmooth_solve::registry::{self, About, Registered};
 
 /// A problem that has a judge and a place in a file.
-pub trait Form: Judged {
+pub trait Form: Judged<Status = ContactStatus, Counts = StatusCounts> {
     /// The number of contacts.
     fn contacts(&self) -> usize;
 

@@ -165,6 +165,7 @@ pub fn limits(tol: f64, iterations: Option<usize>, seconds: Option<f64>) -> Resu
         },
         time_limit,
         cancel: Some(interrupt::flag()),
+        trace: false,
     })
 }
 

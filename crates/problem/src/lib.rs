@@ -1,12 +1,13 @@
 //! The statement and the judge.
 //!
 //! This crate states the problems of nonsmooth mechanics as plain validated data ([`FrictionLocal`],
-//! [`FrictionGlobal`]), says how far a point is from solving them ([`check`]) and what they are like ([`traits`]),
+//! [`FrictionGlobal`], [`Lcp`], [`Mlcp`], …), says how far a point is from solving them ([`check`]) and what they are like ([`traits`]),
 //! and makes instances with a known solution ([`planted`]). It holds no algorithm: nothing here is shared with a solver's kernels.
 //!
 //! Notation follows `docs/notation.md` and FCLIB's letters.
 
 pub mod check;
+mod complementarity;
 mod error;
 mod friction;
 mod friction_global;
@@ -16,6 +17,7 @@ pub mod planted;
 mod problem;
 pub mod traits;
 
+pub use complementarity::{BoxLcp, Complementarity, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp};
 pub use error::ProblemError;
 pub use friction::Friction;
 pub use friction_global::{BilateralGlobal, Dynamics, FrictionGlobal, GlobalPoint};

@@ -10,6 +10,7 @@ use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::{Certificate, Measure};
 use nonsmooth_problem::linalg::factorisations;
 
+use crate::trace::Trace;
 use crate::{SolveError, Solver, Step};
 
 /// When to stop.
@@ -24,11 +25,19 @@ pub struct Limits {
     pub time_limit: Option<f64>,
     /// Set to true from anywhere to stop after the current step.
     pub cancel: Option<Arc<AtomicBool>>,
+    /// Whether to keep the method's own record of its iterations ([`Session::trace`]); it grows with their number.
+    pub trace: bool,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { tolerance: 1e-8, max_iterations: 1_000_000, time_limit: None, cancel: None }
+        Self {
+            tolerance: 1e-8,
+            max_iterations: 1_000_000,
+            time_limit: None,
+            cancel: None,
+            trace: false,
+        }
     }
 }
 
@@ -97,8 +106,8 @@ impl std::fmt::Display for Status {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Status::Solved => f.write_str("solved"),
-            Status::Infeasible(_) => {
-                f.write_str("infeasible: no admissible motion exists, with a verified certificate")
+            Status::Infeasible(certificate) => {
+                write!(f, "infeasible: {certificate}, with a verified certificate")
             }
             Status::NoConclusion(_) => {
                 f.write_str("no conclusion: the solver ended on a ray that proves nothing")
@@ -187,6 +196,9 @@ pub trait Session<P: Problem>: Send {
     /// The judge's visits during the last solve, thinned evenly where there were very many.
     fn history(&self) -> &[Sample];
 
+    /// The method's own record of the last solve, if [`Limits::trace`] asked for it and the method keeps one.
+    fn trace(&self) -> Trace;
+
     /// What the solver says that it did during the last solve; empty where it has nothing to tell.
     fn account(&self) -> Vec<String>;
 }
@@ -265,6 +277,10 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
         &self.history
     }
 
+    fn trace(&self) -> Trace {
+        self.kept.as_ref().map_or(Trace::None, |kept| self.solver.trace(&kept.work))
+    }
+
     fn account(&self) -> Vec<String> {
         self.kept.as_ref().map_or(vec![], |kept| self.solver.account(&kept.work))
     }
@@ -282,6 +298,7 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
     fn solve(&mut self, point: &mut P::Point, watch: &mut dyn FnMut(&Progress)) -> Outcome {
         let mut iterations = 0;
         self.solver.aim(self.limits.tolerance, self.work);
+        self.solver.record(self.limits.trace, self.work);
         self.solver.start(self.problem, point, self.work);
         self.judge(point, 0);
         let mut estimate = f64::NAN;

@@ -24,6 +24,14 @@ pub enum SolveError {
         /// What is wrong, with the key, what is expected and what was found.
         problem: String,
     },
+    /// The method does not apply: the problem lacks something that it needs.
+    #[error("the solver needs {expected}, found {found}")]
+    Needs {
+        /// What the method needs.
+        expected: &'static str,
+        /// What the problem has.
+        found: String,
+    },
     /// A limit of the solve is impossible.
     #[error("{name}: expected {expected}, found {found}")]
     Limits {
@@ -34,4 +42,16 @@ pub enum SolveError {
         /// What it is.
         found: String,
     },
+}
+
+impl SolveError {
+    /// The method needs something that the problem does not have.
+    pub fn needs(expected: &'static str, found: impl Into<String>) -> Self {
+        Self::Needs { expected, found: found.into() }
+    }
+
+    /// Whether it says that the method does not apply to the problem, as opposed to a mistake of the caller.
+    pub fn is_inapplicable(&self) -> bool {
+        matches!(self, Self::Needs { .. } | Self::Problem(ProblemError::Singular { .. }))
+    }
 }

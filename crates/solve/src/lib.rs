@@ -38,6 +38,7 @@ pub mod registry;
 pub mod settings;
 mod solver;
 pub mod splitting;
+pub mod trace;
 mod via;
 
 pub use drive::{Driver, Limit, Limits, Outcome, Progress, Sample, Session, Status};

@@ -6,6 +6,7 @@ use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Certificate;
 
 use crate::SolveError;
+use crate::trace::Trace;
 
 /// An iterative method for problems of type `P`. The implementing struct *is* the method's hyperparameters.
 ///
@@ -43,6 +44,14 @@ pub trait Solver<P: Problem>: Send {
     /// Brings `point` up to date with `work`. Called before the point is judged or returned; methods whose
     /// iterate lives in the workspace (velocities, a reduced problem) write it out here.
     fn publish(&self, _problem: &P, _point: &mut P::Point, _work: &mut Self::Work) {}
+
+    /// Begins a record of iterations, if `on`: see [`trace`](Self::trace). Called once per solve, before the start.
+    fn record(&self, _on: bool, _work: &mut Self::Work) {}
+
+    /// The record of the last solve, of methods that keep one.
+    fn trace(&self, _work: &Self::Work) -> Trace {
+        Trace::None
+    }
 
     /// What the last solve did, in a few sentences for its user; nothing where there is nothing to tell.
     fn account(&self, _work: &Self::Work) -> Vec<String> {

@@ -2,6 +2,7 @@
 
 use nonsmooth_problem::Problem;
 
+use crate::trace::Trace;
 use crate::{Reformulation, SolveError, Solver, Step};
 
 /// `Via { reformulation, solver }` reduces a problem of type `P`, lets `solver` work on the other problem, and
@@ -58,14 +59,27 @@ where
 
     fn step(&self, _problem: &P, _point: &mut P::Point, work: &mut Self::Work) -> Step {
         if let Some(ray) = self.reformulation.contradiction(&work.memo) {
-            return Step::NoSolution(ray.clone());
+            return Step::NoSolution(ray);
         }
-        self.solver.step(&work.reduced, &mut work.point, &mut work.work)
+        match self.solver.step(&work.reduced, &mut work.point, &mut work.work) {
+            Step::NoSolution(certificate) => {
+                Step::NoSolution(self.reformulation.lift_certificate(certificate, &work.memo))
+            }
+            other => other,
+        }
     }
 
     fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
         self.solver.publish(&work.reduced, &mut work.point, &mut work.work);
         self.reformulation.lift(problem, &work.point, &mut work.memo, point);
+    }
+
+    fn record(&self, on: bool, work: &mut Self::Work) {
+        self.solver.record(on, &mut work.work);
+    }
+
+    fn trace(&self, work: &Self::Work) -> Trace {
+        self.solver.trace(&work.work)
     }
 
     fn account(&self, work: &Self::Work) -> Vec<String> {

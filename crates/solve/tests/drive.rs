@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use nonsmooth_problem::check::Certificate;
+use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::linalg::{Bsr, Csc};
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem};
@@ -129,11 +129,13 @@ fn certificates_are_verified() {
     let w = Bsr::from_csc(&Csc::from_triplets(6, 6, w).unwrap());
     let q = vec![-1.0, 0.0, 0.0, -1.0, 0.0, 0.0];
     let problem = P::new(w, q, vec![0.0; 2]).unwrap();
-    let ray = |a: f64, b: f64| Certificate { r: vec![a, 0.0, 0.0, b, 0.0, 0.0], lambda: vec![] };
-    let (outcome, _) = run(&problem, &Limits::default(), |_, _| Step::NoSolution(ray(1.0, 1.0)));
-    assert_eq!(outcome.status, Status::Infeasible(ray(1.0, 1.0)));
-    let (outcome, _) = run(&problem, &Limits::default(), |_, _| Step::NoSolution(ray(1.0, 2.0)));
-    assert_eq!(outcome.status, Status::NoConclusion(ray(1.0, 2.0)));
+    let ray = |a: f64, b: f64| Impulses { r: vec![a, 0.0, 0.0, b, 0.0, 0.0], lambda: vec![] };
+    let (outcome, _) =
+        run(&problem, &Limits::default(), |_, _| Step::NoSolution(ray(1.0, 1.0).into()));
+    assert_eq!(outcome.status, Status::Infeasible(ray(1.0, 1.0).into()));
+    let (outcome, _) =
+        run(&problem, &Limits::default(), |_, _| Step::NoSolution(ray(1.0, 2.0).into()));
+    assert_eq!(outcome.status, Status::NoConclusion(ray(1.0, 2.0).into()));
 }
 
 #[test]

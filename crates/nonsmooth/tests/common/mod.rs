@@ -4,8 +4,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use nonsmooth_problem::Problem;
-use nonsmooth_problem::check::{Judged, Verdict};
+use nonsmooth_problem::check::{Judged, VerdictOf};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limits, Outcome, Status};
 
@@ -32,10 +31,10 @@ pub fn corpus_files(folders: &[&str]) -> Vec<PathBuf> {
 }
 
 /// A run of one solver, confronted with the judge: `solved` is the judge's word.
-pub struct Run<P: Problem> {
+pub struct Run<P: Judged> {
     pub point: P::Point,
     pub outcome: Outcome,
-    pub verdict: Verdict,
+    pub verdict: VerdictOf<P>,
 }
 
 /// Runs a solver; it must end near its time limit, and say `solved` exactly where the judge does.

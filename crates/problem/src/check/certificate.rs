@@ -1,141 +1,85 @@
-//! Certificates that a problem has no solution, and their verification.
+//! Certificates that a problem has no solution.
 
 use serde::Serialize;
 
-use super::{Kinematic, Kinematics};
-use crate::{FrictionGlobal, FrictionLocal};
+use super::Impulses;
 
-/// Impulses that every admissible motion would have to feed: proof that a problem has no solution.
-///
-/// Let `r_N ≥ 0` and `r_T = 0` at every contact, and multipliers `lambda`.
-///
-/// - Local: `(r, lambda)ᵀ [W, V; Vᵀ, R] = 0` and `qᵀ r + sᵀ lambda < 0`.
-/// - Global: `H r + G lambda = 0` and `wᵀ r + bᵀ lambda < 0`.
-///
-/// Any solution has `u_N ≥ 0`, so `rᵀ u = Σ r_N u_N ≥ 0`, which the two equations make negative: a contradiction (Farkas'
-/// alternative), whatever mu. With `r_T ≠ 0` there is none: of a solution only `ũ ∈ K*` is known, so `rᵀ u ≥ −Σ mu r_N‖u_T‖`, which may
-/// be negative where contacts slide. Such an r is refused here; it refutes the criterion of existence only
-/// ([`Kinematics::refutes_criterion`]).
+/// Proof that a problem has no solution, verified by the problem's own judge from its data alone ([`crate::Problem::verify`]).
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Certificate {
-    /// Contact impulses of the ray.
-    pub r: Vec<f64>,
-    /// Multipliers of the ray (empty without bilateral constraints).
-    pub lambda: Vec<f64>,
+#[serde(tag = "proof", rename_all = "snake_case")]
+pub enum Certificate {
+    /// Frictional contact: normal impulses that no motion feels.
+    Impulses(Impulses),
+    /// LCP: a row that no `z ≥ 0` makes nonnegative, `q_r < 0` and `M_rj ≤ 0` for all j (lecture (19)).
+    Row {
+        /// r.
+        row: usize,
+    },
+    /// LCP: `y ≥ 0`, `Mᵀ y ≤ 0`, `qᵀ y < 0`. No `z ≥ 0` has `M z + q ≥ 0`, since `0 ≤ yᵀ(M z + q) = (Mᵀ y)ᵀ z + qᵀ y < 0`.
+    ///
+    /// MLCP: `y` of any sign on equalities, `(Mᵀ y)_j = 0` for free variables. hLCP: `Qᵀ y ≥ 0`, `Rᵀ y ≥ 0`, `qᵀ y < 0`. Box: the least upper bound
+    /// of `yᵀ(M z + q)` over the box is negative, with `y_i = 0` where both bounds are finite.
+    Farkas {
+        /// y, one entry a row.
+        y: Vec<f64>,
+    },
+    /// The secondary ray `(z̃, z̃₀)` on which Lemke's method ended. Where M is copositive-plus (on this ray at least), `z̃₀ = 0` and z̃ is a Farkas
+    /// vector: a proof. Otherwise it proves nothing.
+    Ray {
+        /// z̃, one entry a variable.
+        z: Vec<f64>,
+        /// z̃₀, the part of the artificial variable.
+        z0: f64,
+    },
+    /// Every one of the complementary cones is separated from q by one of these vectors: `yᵀ e_j ≥ 0` for the `w_j` and `−yᵀ M_j ≥ 0` for the `z_j`
+    /// of the cone (`= 0` for free variables), `qᵀ y < 0`. Proves that a problem has no solution even where `M z + q ≥ 0, z ≥ 0` is possible.
+    Cones {
+        /// The vectors y.
+        separating: Vec<Vec<f64>>,
+    },
+}
+
+impl From<Impulses> for Certificate {
+    fn from(impulses: Impulses) -> Self {
+        Self::Impulses(impulses)
+    }
 }
 
 impl Certificate {
-    /// The ray or its opposite, whichever makes `qᵀ r + sᵀ lambda` negative, if it passes `verify`.
-    pub fn toward(
-        r: Vec<f64>,
-        lambda: Vec<f64>,
-        q: &[f64],
-        s: &[f64],
-        verify: impl Fn(&Self) -> bool,
-    ) -> Option<Self> {
-        let product = dot(q, &r) + dot(s, &lambda);
-        let mut ray = Self { r, lambda };
-        if product > 0.0 {
-            ray.r.iter_mut().chain(&mut ray.lambda).for_each(|x| *x = -*x);
-        }
-        verify(&ray).then_some(ray)
-    }
-
-    /// Which of the `contacts` have an impulse.
-    pub fn pressed(&self, contacts: usize) -> Vec<usize> {
-        let width = self.r.len() / contacts.max(1);
-        let any = |c: &usize| self.r[width * c..width * (c + 1)].iter().any(|r| *r != 0.0);
-        (0..contacts).filter(any).collect()
-    }
-}
-
-pub(crate) fn refutes_local<const D: usize>(
-    problem: &FrictionLocal<D>,
-    certificate: &Certificate,
-) -> bool {
-    refutes(problem.kinematics(), certificate)
-}
-
-pub(crate) fn refutes_global<const D: usize>(
-    problem: &FrictionGlobal<D>,
-    certificate: &Certificate,
-) -> bool {
-    refutes(problem.kinematics(), certificate)
-}
-
-fn refutes<const D: usize>(kinematics: Kinematics<D>, certificate: &Certificate) -> bool {
-    kinematics.refutes(certificate)
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::linalg::{Bsr, Csc};
-
-    /// A mass of 1 pressed between two opposite walls that approach each other: no motion is admissible.
-    fn squeezed(mu: f64) -> (FrictionGlobal<2>, FrictionLocal<2>) {
-        let h = [(0, 0, 1.0), (1, 1, 1.0), (0, 2, -1.0), (1, 3, -1.0)];
-        let h = Csc::from_triplets(2, 4, h.into_iter()).unwrap();
-        let w = vec![-1.0, 0.0, -1.0, 0.0];
-        let product = Csc::from_triplets(
-            4,
-            4,
-            [
-                (0, 0, 1.0),
-                (0, 2, -1.0),
-                (2, 0, -1.0),
-                (2, 2, 1.0),
-                (1, 1, 1.0),
-                (1, 3, -1.0),
-                (3, 1, -1.0),
-                (3, 3, 1.0),
-            ]
-            .into_iter(),
-        );
-        let global = FrictionGlobal::new(
-            Csc::diagonal(&[1.0, 1.0]),
-            h,
-            vec![0.0; 2],
-            w.clone(),
-            vec![mu; 2],
-        );
-        let local = FrictionLocal::new(Bsr::from_csc(&product.unwrap()), w, vec![mu; 2]).unwrap();
-        (global.unwrap(), local)
-    }
-
-    #[test]
-    fn squeezing_walls_are_refuted_whatever_the_friction() {
-        let ray = Certificate { r: vec![1.0, 0.0, 1.0, 0.0], lambda: vec![] };
-        for mu in [0.0, 0.5, 3.0] {
-            let (global, local) = squeezed(mu);
-            assert!(refutes_global(&global, &ray) && refutes_local(&local, &ray), "mu = {mu}");
-            // Tangential impulses that balance as well and lie in K spoil the proof.
-            let tilted = Certificate { r: vec![1.0, 0.1, 1.0, 0.1], lambda: vec![] };
-            assert!(!refutes_global(&global, &tilted) && !refutes_local(&local, &tilted));
+    /// The impulses, if that is what it is.
+    pub fn impulses(&self) -> Option<&Impulses> {
+        match self {
+            Self::Impulses(impulses) => Some(impulses),
+            _ => None,
         }
     }
+}
 
-    #[test]
-    fn a_false_ray_is_refused() {
-        let (global, local) = squeezed(0.0);
-        for r in [vec![1.0, 0.0, 0.9, 0.0], vec![-1.0, 0.0, -1.0, 0.0], vec![0.0; 4], vec![1.0]] {
-            let ray = Certificate { r, lambda: vec![] };
-            assert!(!refutes_global(&global, &ray) && !refutes_local(&local, &ray), "{ray:?}");
+impl std::fmt::Display for Certificate {
+    /// A sentence for a user: what a verified certificate proves.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Impulses(_) => f.write_str("no admissible motion exists"),
+            Self::Row { row } => {
+                write!(
+                    f,
+                    "row {row} is negative for every z >= 0: its q is, and no entry of M there is positive"
+                )
+            }
+            Self::Farkas { y } => {
+                let rows = y.iter().filter(|y| **y != 0.0).count();
+                write!(
+                    f,
+                    "a combination of {rows} rows is negative for every z >= 0 (Farkas vector)"
+                )
+            }
+            Self::Ray { .. } => f.write_str(
+                "Lemke's secondary ray is a combination of rows that is negative for every z >= 0",
+            ),
+            Self::Cones { separating } => {
+                let n = separating.len();
+                write!(f, "no complementary cone contains q, as {n} separating vectors show")
+            }
         }
-    }
-
-    #[test]
-    fn contradicting_bilateral_constraints_are_refuted() {
-        // v_0 = 1 and v_0 = 2 at once.
-        let (mut global, _) = squeezed(0.5);
-        let g = Csc::from_triplets(2, 2, [(0, 0, 1.0), (0, 1, 1.0)].into_iter()).unwrap();
-        global.bilateral = Some(crate::BilateralGlobal { G: g, b: vec![-1.0, -2.0] });
-        assert!(global.validate().is_ok());
-        let ray = Certificate { r: vec![0.0; 4], lambda: vec![-1.0, 1.0] };
-        assert!(refutes_global(&global, &ray));
     }
 }

@@ -13,13 +13,13 @@
 //!   positive power, `cᵀ r + eᵀ λ ≤ 0`. That says nothing of the problem itself: a solution has `ũ ∈ K*`, not `u ∈ K*`, and
 //!   `rᵀ u ≥ −Σ mu r_N ‖u_T‖` may be negative while bodies slide.
 //! - **No solution.** Every solution has `u_N ≥ 0`. Normal impulses (`r_N ≥ 0`, `r_T = 0`) that feel no motion and have negative
-//!   power contradict that, whatever the friction ([`Certificate`]).
+//!   power contradict that, whatever the friction ([`Impulses`]).
 //!
 //! References: AcaryCadouxLemarechalMalick2011; KlarbringPang1998.
 
 use serde::Serialize;
 
-use super::Certificate;
+use super::Impulses;
 use super::contact::distance_to_cone;
 use crate::linalg::small::{self, tangential_norm};
 use crate::linalg::{Compensated, Csc, is_positive_definite, norm};
@@ -44,17 +44,17 @@ pub enum Existence {
     /// A solution may or may not exist.
     Weak {
         /// `r ∈ K` that feels no motion and has no power.
-        ray: Certificate,
+        ray: Impulses,
     },
     /// The criterion does not hold, with verified impulses. A solution may or may not exist.
     CriterionRefuted {
         /// `r ∈ K` that feels no motion and has negative power.
-        ray: Certificate,
+        ray: Impulses,
     },
     /// There is no solution, whatever the friction: a verified certificate.
     NoSolution {
         /// Normal impulses that feel no motion and have negative power.
-        certificate: Certificate,
+        certificate: Impulses,
     },
     /// Nothing could be verified.
     Unknown {
@@ -278,26 +278,26 @@ impl<const D: usize> Kinematics<D> {
     }
 
     /// Whether `ray` proves that no motion has `u ∈ K*` at every contact.
-    pub fn refutes_criterion(&self, ray: &Certificate) -> bool {
+    pub fn refutes_criterion(&self, ray: &Impulses) -> bool {
         self.felt(ray, &self.mu).is_some_and(|felt| self.power(ray).is_negative(felt))
     }
 
     /// Whether `ray` proves that no motion has `u ∈ int K*` at every contact.
-    pub fn refutes_interior(&self, ray: &Certificate) -> bool {
+    pub fn refutes_interior(&self, ray: &Impulses) -> bool {
         let power = self.power(ray);
         let some = ray.r.iter().any(|&r| r != 0.0);
         some && self.felt(ray, &self.mu).is_some() && power.sum <= NEGATIVE * power.size
     }
 
     /// Whether `certificate` proves that no motion has `u_N ≥ 0` at every contact, and so that there is no solution.
-    pub fn refutes(&self, certificate: &Certificate) -> bool {
+    pub fn refutes(&self, certificate: &Impulses) -> bool {
         let felt = self.felt(certificate, &vec![0.0; self.mu.len()]);
         felt.is_some_and(|felt| self.power(certificate).is_negative(felt))
     }
 
     /// Where `r ∈ K` for the coefficients given and `(r, λ)ᵀ [A; E] = 0` up to rounding: the power that the rest of these products
     /// can still have, with motions that are [`REACH`] times as fast as the largest velocity given.
-    fn felt(&self, ray: &Certificate, mu: &[f64]) -> Option<f64> {
+    fn felt(&self, ray: &Impulses, mu: &[f64]) -> Option<f64> {
         let (r, lambda) = (&ray.r, &ray.lambda);
         let m = self.contact_rows();
         let scale = norm(r);
@@ -340,7 +340,7 @@ impl<const D: usize> Kinematics<D> {
     }
 
     /// `cᵀ r + eᵀ λ`.
-    fn power(&self, ray: &Certificate) -> Power {
+    fn power(&self, ray: &Impulses) -> Power {
         let mut sum = Compensated::default();
         let mut size = 0.0;
         for (y, c) in ray.r.iter().chain(&ray.lambda).zip(&self.constant) {
@@ -415,7 +415,7 @@ mod tests {
         let closed = |mu| touching(&[UP, DOWN], &[0.0; 6], mu).kinematics();
         assert_eq!(closed(0.0).margin(&[0.0; 3]), Some(0.0));
         assert_eq!(closed(0.5).margin(&[0.0; 3]), None);
-        let ray = Certificate { r: vec![1.0, 0.0, 0.0, 1.0, 0.0, 0.0], lambda: vec![] };
+        let ray = Impulses { r: vec![1.0, 0.0, 0.0, 1.0, 0.0, 0.0], lambda: vec![] };
         assert!(closed(0.5).refutes_interior(&ray) && !closed(0.5).refutes_criterion(&ray));
     }
 
@@ -431,7 +431,7 @@ mod tests {
             let k = scaled.kinematics();
             for (size, proves) in [([1.0, 1.0], true), ([1.0, 1.001], false)] {
                 let r = vec![size[0], 0.0, 0.0, size[1], 0.0, 0.0];
-                let ray = Certificate { r, lambda: vec![] };
+                let ray = Impulses { r, lambda: vec![] };
                 assert_eq!((k.refutes(&ray), k.refutes_criterion(&ray)), (proves, proves));
             }
             let floor = touching(&[UP], &[-unit, 0.3 * unit, 0.0], 0.5).kinematics();
@@ -450,7 +450,7 @@ mod tests {
             (0..3).map(|k| (0..3).map(|i| p.H.get(i, 3 * c + k) * d[i]).sum()).collect()
         };
         let r = [along(0, [1.0, 0.0, 0.0]), along(1, [-1.0, 0.0, 0.0])].concat();
-        let ray = Certificate { r: r.clone(), lambda: vec![] };
+        let ray = Impulses { r: r.clone(), lambda: vec![] };
         let mut squeezed = p.clone();
         squeezed.w = r.iter().map(|r| -0.1 * r).collect();
         let k = squeezed.kinematics();
@@ -492,7 +492,7 @@ mod tests {
         p.bilateral = Some(BilateralGlobal { G: g, b: vec![0.0] });
         let k = p.kinematics();
         assert_eq!(k.margin(&[0.0, 0.0, 2.0]), None);
-        let ray = |lambda| Certificate { r: vec![1.0, 0.0, 0.0], lambda: vec![lambda] };
+        let ray = |lambda| Impulses { r: vec![1.0, 0.0, 0.0], lambda: vec![lambda] };
         assert!(k.refutes(&ray(-1.0)) && !k.refutes(&ray(1.0)) && !k.refutes(&ray(0.0)));
         p.bilateral.as_mut().unwrap().b[0] = -3.0;
         assert!(p.kinematics().margin(&[0.0, 0.0, 3.0]).is_some());

@@ -8,17 +8,21 @@ mod certificate;
 mod contact;
 mod existence;
 mod global;
+mod impulses;
+pub(crate) mod linear;
 mod local;
 mod rows;
 mod verdict;
 
 pub use certificate::Certificate;
-pub(crate) use certificate::{refutes_global, refutes_local};
 pub use contact::{ContactStatus, Motion};
 pub use existence::{Existence, Kinematic, Kinematics};
 pub use global::GlobalGauge;
+pub use impulses::Impulses;
+pub(crate) use impulses::{refutes_global, refutes_local};
+pub use linear::{HlcpGauge, LinearGauge, RowCounts, RowStatus};
 pub use local::LocalGauge;
-pub use verdict::{Judged, StatusCounts, Verdict};
+pub use verdict::{Judged, StatusCounts, Verdict, VerdictOf};
 
 use serde::Serialize;
 
@@ -36,7 +40,7 @@ pub const DYNAMICS_TOLERANCE: f64 = 1e-10;
 ///
 /// u is recomputed from r (for global problems through the dynamics, with `q = Hᵀ M⁻¹ f + w`). Where a contact's
 /// `w_c` is not positive, the mean over the contacts stands in (1 if that is not positive either), so that
-/// such a contact is still judged.
+/// such a contact is still judged. Linear complementarity problems have the same residuals of `min(s_i z_i, w_i)`; see [`LinearGauge`].
 ///
 /// `primal` and `dual` are at most `relative` in exact arithmetic and are tested beside it, because rounding can
 /// hide one residual of a point with huge impulses, but not all three.
@@ -69,7 +73,10 @@ pub struct Measure {
     /// Bilateral constraints: the largest violation of a constraint over the size of the terms that should cancel in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bilateral: Option<f64>,
-    /// The contact with the largest share in `absolute`.
+    /// Linear complementarity: the largest residual of a row in units of its own terms, so that a scaling of rows hides nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rows: Option<f64>,
+    /// The contact (or row) with the largest share in `absolute`.
     pub worst_contact: usize,
     /// That contact's share, over `‖q‖`.
     pub worst: f64,
@@ -102,6 +109,7 @@ impl Measure {
             dynamics_rounding: None,
             velocity_gap: None,
             bilateral: None,
+            rows: None,
             worst_contact: 0,
             worst: never,
         }
@@ -115,6 +123,7 @@ impl Measure {
             ("primal", Some(self.primal), tolerance),
             ("dual", Some(self.dual), tolerance),
             ("bilateral constraints", self.bilateral, tolerance),
+            ("rows", self.rows, tolerance),
             ("velocities", self.velocity_gap, tolerance),
             ("dynamics", self.dynamics, rounding),
         ]

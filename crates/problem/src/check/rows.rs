@@ -1,6 +1,6 @@
 //! Sums of matrix–vector products, row by row, plainly or in doubled precision.
 
-use crate::linalg::{Compensated, Csc, norm_of};
+use crate::linalg::{Compensated, Csc, Matrix, norm_of};
 
 /// One compensated sum for each row, and the sum of the sizes of its terms.
 #[derive(Debug, Clone, Default)]
@@ -39,6 +39,29 @@ impl Rows {
             for (&i, &v) in rows.iter().zip(values) {
                 self.add_product(i, sign * v, xj);
             }
+        }
+    }
+
+    /// Adds `sign · A x`; false, and nothing added, where A is known by its products only.
+    pub(super) fn add_matrix(&mut self, sign: f64, a: &Matrix, x: &[f64]) -> bool {
+        match a {
+            Matrix::Sparse(a) => self.add(sign, a, x),
+            Matrix::Dense(a) => {
+                for i in 0..a.nrows() {
+                    for (&a, &x) in a.row(i).iter().zip(x) {
+                        self.add_product(i, sign * a, x);
+                    }
+                }
+            }
+            Matrix::Operator(_) => return false,
+        }
+        true
+    }
+
+    /// Adds `x`.
+    pub(super) fn add_vector(&mut self, x: &[f64]) {
+        for (row, &x) in x.iter().enumerate() {
+            self.add_product(row, 1.0, x);
         }
     }
 

@@ -10,20 +10,20 @@ use crate::{FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem, Pro
 
 /// Everything that the judge says of a point.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Verdict {
+pub struct Verdict<Status = ContactStatus, Counts = StatusCounts> {
     /// The residuals.
     pub measure: Measure,
     /// Whether they pass at the tolerance asked for.
     pub solved: bool,
-    /// How many contacts do what.
-    pub counts: StatusCounts,
-    /// The status of each contact.
+    /// How many contacts, or rows, do what.
+    pub counts: Counts,
+    /// The status of each contact, or row.
     #[serde(skip)]
-    pub statuses: Vec<ContactStatus>,
-    /// The relative velocity u recomputed from the impulses, D·nc.
+    pub statuses: Vec<Status>,
+    /// The relative velocity u recomputed from the impulses, D·nc; of a linear complementarity problem `w = M z + q`.
     #[serde(skip)]
     pub velocity: Vec<f64>,
-    /// The contacts with the largest residuals over `‖q‖`, worst first, at most ten.
+    /// The contacts, or rows, with the largest residuals over `‖q‖`, worst first, at most ten.
     pub worst: Vec<(usize, f64)>,
 }
 
@@ -40,15 +40,26 @@ pub struct StatusCounts {
     pub degenerate: usize,
 }
 
-/// A problem whose judge can say what each contact does.
+/// The verdict on a point of a problem P.
+pub type VerdictOf<P> = Verdict<<P as Judged>::Status, <P as Judged>::Counts>;
+
+/// A problem whose judge can say what each contact, or row, does.
 pub trait Judged: Problem {
+    /// What a contact, or a row, may do.
+    type Status;
+    /// How many do what.
+    type Counts;
+
     /// The full verdict on `point` at `tolerance`. Allocates; the loop uses [`Problem::measure`].
     ///
     /// Errors: a point of the wrong shape or with entries that are not finite, a singular M.
-    fn judge(&self, point: &Self::Point, tolerance: f64) -> Result<Verdict, ProblemError>;
+    fn judge(&self, point: &Self::Point, tolerance: f64) -> Result<VerdictOf<Self>, ProblemError>;
 }
 
 impl<const D: usize> Judged for FrictionLocal<D> {
+    type Status = ContactStatus;
+    type Counts = StatusCounts;
+
     fn judge(&self, point: &LocalPoint, tolerance: f64) -> Result<Verdict, ProblemError> {
         self.validate_point(point)?;
         let mut gauge = self.gauge()?;
@@ -58,6 +69,9 @@ impl<const D: usize> Judged for FrictionLocal<D> {
 }
 
 impl<const D: usize> Judged for FrictionGlobal<D> {
+    type Status = ContactStatus;
+    type Counts = StatusCounts;
+
     fn judge(&self, point: &GlobalPoint, tolerance: f64) -> Result<Verdict, ProblemError> {
         self.validate_point(point)?;
         let mut gauge = self.gauge()?;

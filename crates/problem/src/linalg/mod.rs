@@ -1,6 +1,7 @@
 //! Matrices as the problems state them, and the few operations that the statement and the judge need.
 //!
 //! [`small`]: D×D blocks on arrays. [`Csc`]: general sparse. [`Bsr`]: block-sparse rows, the storage of W.
+//! [`Dense`], [`Matrix`]: the matrices of complementarity problems, dense, sparse or known by products.
 //! [`Inverse`]: factorisation of M (or of M with bilateral constraints) behind one face.
 //! [`BlockLu`]: LU of Newton matrices, analysed once and factorised many times.
 //! [`Delassus`]: W = Hᵀ M⁻¹ H as an operator, never formed, or condensed into a [`Bsr`].
@@ -10,8 +11,10 @@ mod bsr;
 mod compensated;
 mod csc;
 mod delassus;
+mod dense;
 mod groups;
 mod inverse;
+mod matrix;
 mod row;
 pub mod small;
 
@@ -20,8 +23,10 @@ pub use bsr::{Block, BlockRow, Bsr};
 pub use compensated::Compensated;
 pub use csc::Csc;
 pub use delassus::Delassus;
+pub use dense::Dense;
 pub use groups::Groups;
 pub use inverse::{Inverse, Refine, factorisations, is_positive_definite};
+pub use matrix::{Matrix, Operator};
 
 /// The Euclidean norm, scaled so that neither overflow nor underflow of the squares spoils it.
 pub fn norm(x: &[f64]) -> f64 {

@@ -26,7 +26,7 @@
 
 mod controller;
 
-use nonsmooth_problem::check::{Certificate, Existence, Kinematic};
+use nonsmooth_problem::check::{Existence, Kinematic};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -188,7 +188,7 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
         if let Some(ray) = problem.contradiction(&work.state) {
-            return Step::NoSolution(ray.clone());
+            return Step::NoSolution(ray.clone().into());
         }
         match work.stage {
             Stage::Sweeps { last, claims } => self.sweep(problem, point, work, last, claims),
@@ -490,7 +490,7 @@ impl<const D: usize> Hybrid<D> {
         let existence =
             work.existence.get_or_insert_with(|| existence::decide::<P, D>(problem, &limits));
         if let Existence::NoSolution { certificate } = existence {
-            return Step::NoSolution(Certificate::clone(certificate));
+            return Step::NoSolution(certificate.clone().into());
         }
         work.done.strategies += 1;
         if self.0.strategies > 0 && work.controller.strategies() >= self.0.strategies {

@@ -21,7 +21,7 @@ mod program;
 use std::time::Instant;
 
 use nonsmooth_problem::Friction;
-use nonsmooth_problem::check::{Certificate, Existence, Kinematic, Kinematics};
+use nonsmooth_problem::check::{Existence, Impulses, Kinematic, Kinematics};
 use nonsmooth_problem::with_friction;
 
 use crate::Limits;
@@ -114,7 +114,7 @@ enum Found {
     /// A verified motion into the dual cone and its margin.
     Motion(Vec<f64>, f64),
     /// A verified certificate that bilateral constraints contradict each other.
-    Contradiction(Certificate),
+    Contradiction(Impulses),
 }
 
 /// The margin must exceed the shift that makes W semidefinite by this factor.

@@ -3,7 +3,7 @@
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
-use nonsmooth_problem::check::{Certificate, Kinematics};
+use nonsmooth_problem::check::{Impulses, Kinematics};
 use nonsmooth_problem::linalg::Csc;
 
 use super::Clock;
@@ -150,11 +150,11 @@ const ROUNDING: f64 = 2e-15;
 impl<const D: usize> Widest<'_, D> {
     /// Candidates for impulses that refute: the multipliers without those that are nearly zero, projected onto those that
     /// feel no motion.
-    pub(super) fn rays<'b>(&'b self, clock: &'b Clock) -> impl Iterator<Item = Certificate> + 'b {
+    pub(super) fn rays<'b>(&'b self, clock: &'b Clock) -> impl Iterator<Item = Impulses> + 'b {
         SUPPORTS.iter().filter_map(|share| self.ray(*share, clock))
     }
 
-    fn ray(&self, share: f64, clock: &Clock) -> Option<Certificate> {
+    fn ray(&self, share: f64, clock: &Clock) -> Option<Impulses> {
         let Program { kinematics, rows, nonnegative, matrix, .. } = &self.program;
         let equations = nonnegative + D * self.program.cones;
         // The normal row of each row.
@@ -181,7 +181,7 @@ impl<const D: usize> Widest<'_, D> {
         }
         let m = kinematics.contact_rows();
         let mut ray =
-            Certificate { r: vec![0.0; m], lambda: vec![0.0; kinematics.constant.len() - m] };
+            Impulses { r: vec![0.0; m], lambda: vec![0.0; kinematics.constant.len() - m] };
         for (&k, y) in kept.iter().zip(&y) {
             let (i, factor) = rows[k];
             *if i < m { &mut ray.r[i] } else { &mut ray.lambda[i - m] } = factor * y;

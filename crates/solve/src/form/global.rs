@@ -5,7 +5,7 @@
 //! `Hᵀ M⁻¹ (H r + f) + w`, and need no Z. `complete` recomputes v exactly, so the rounding that the increments
 //! gather never reaches a judged point.
 
-use nonsmooth_problem::check::Certificate;
+use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Refine, Singular, small};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
@@ -23,7 +23,7 @@ pub struct GlobalState<const D: usize> {
     q: Vec<f64>,
     scale: f64,
     v: Vec<f64>,
-    contradiction: Option<Certificate>,
+    contradiction: Option<Impulses>,
     /// Made when it is first asked for.
     system: Option<GlobalSystem<D>>,
 }
@@ -122,7 +122,7 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
         Ok(())
     }
 
-    fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Certificate> {
+    fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Impulses> {
         state.contradiction.as_ref()
     }
 

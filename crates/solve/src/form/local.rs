@@ -3,9 +3,9 @@
 //! Bilateral rows `0 = Vᵀ r + R λ + s` are eliminated once: `W ← W − V R⁻¹ Vᵀ`, `q ← q − V R⁻¹ s`. Redundant
 //! constraints (a singular, positive semidefinite R) are honoured.
 
-use nonsmooth_problem::check::Certificate;
+use nonsmooth_problem::check::{Impulses, Kinematic};
 use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Inverse, Refine, Singular, small};
-use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint, Problem};
+use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint};
 
 use super::linearised::{ContactForm, Form, System};
 use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised, velocity_scale};
@@ -30,7 +30,7 @@ struct Eliminated<const D: usize> {
     lambda: Vec<f64>,
     scratch: Vec<f64>,
     residual: Vec<f64>,
-    contradiction: Option<Certificate>,
+    contradiction: Option<Impulses>,
 }
 
 impl<const D: usize> Eliminated<D> {
@@ -76,7 +76,7 @@ impl<const D: usize> Eliminated<D> {
             self.r_inverse.null_direction(&mut multipliers);
             let r = vec![0.0; problem.q.len()];
             self.contradiction =
-                Certificate::toward(r, multipliers, &[], &b.s, |c| problem.verify(c));
+                Impulses::toward(r, multipliers, &[], &b.s, |c| problem.kinematics().refutes(c));
         }
         self.q.copy_from_slice(&problem.q);
         b.V.mul_add(-1.0, &self.lambda, &mut self.q);
@@ -119,7 +119,7 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
         Ok(())
     }
 
-    fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Certificate> {
+    fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Impulses> {
         state.eliminated.as_ref()?.contradiction.as_ref()
     }
 

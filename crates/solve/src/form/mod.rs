@@ -7,10 +7,13 @@
 //! | [`Concurrent`] | in addition, which contacts do not feel each other, and visits from several threads | local, global |
 //! | [`Linear`] | `u = W r + q` for all contacts | local (W), global (product form) |
 //! | [`Explicit`] | entries of matrices that state the symmetric part of W | local (W), global (M, H, G) |
+//! | [`Bounded`] | M, q and the bounds of a linear complementarity problem with one variable a row | LCP, square MLCP, box LCP |
+//! | [`Complementary`] | in addition, that variables are free or nonnegative | LCP, square MLCP |
 //! | [`Linearised`] | to solve `(Q + P W) x = b` with block-diagonal P, Q | local (in contact space), global (in velocity space) |
 //!
 //! [`Regularised`] offers what the problem inside it does.
 
+mod complementarity;
 mod explicit;
 mod global;
 mod linearised;
@@ -18,9 +21,10 @@ mod local;
 mod regularised;
 
 use nonsmooth_problem::Problem;
-use nonsmooth_problem::check::Certificate;
+use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::linalg::{Block, Singular};
 
+pub use complementarity::{Bounded, Bounds, Complementary, System, system};
 pub use explicit::{Explicit, Model};
 pub use regularised::{Overwrite, Regularised, RegularisedState};
 
@@ -51,7 +55,7 @@ pub trait Contacts<const D: usize>: Problem {
     fn refill(&self, state: &mut Self::State) -> Result<(), SolveError>;
 
     /// A verified certificate that the bilateral constraints contradict each other, if they do.
-    fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Certificate>;
+    fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Impulses>;
 
     /// The coefficients of friction.
     fn mu(&self) -> &[f64];

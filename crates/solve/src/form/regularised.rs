@@ -3,7 +3,7 @@
 //! Everything is the base problem's, but for multiples of the identity on the diagonal blocks and what follows from them. The judge is
 //! the base problem's too: it tells how well a point solves *that*, which is what a proximal method is after.
 
-use nonsmooth_problem::check::{Certificate, Measure};
+use nonsmooth_problem::check::{Certificate, Impulses, Measure};
 use nonsmooth_problem::linalg::{Block, Singular};
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem, ProblemError};
 
@@ -115,7 +115,7 @@ impl<P: Contacts<D>, const D: usize> Contacts<D> for Regularised<P> {
         self.base.refill(&mut state.base)
     }
 
-    fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Certificate> {
+    fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Impulses> {
         self.base.contradiction(&state.base)
     }
 

@@ -83,7 +83,7 @@ impl<P: Linearised<D>, const D: usize> Solver<P> for Relaxed<D> {
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
         if let Some(ray) = problem.contradiction(&work.state) {
-            return Step::NoSolution(ray.clone());
+            return Step::NoSolution(ray.clone().into());
         }
         let Ok(now) = work.ip.iterate(problem, &mut work.state) else {
             return Step::Stuck("the matrix of the interior-point step is singular".into());

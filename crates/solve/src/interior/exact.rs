@@ -110,7 +110,7 @@ impl<P: Linearised<D>, const D: usize> Solver<P> for Pursued<D> {
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
         if let Some(ray) = problem.contradiction(&work.state) {
-            return Step::NoSolution(ray.clone());
+            return Step::NoSolution(ray.clone().into());
         }
         let PursuedWork { state, core, pursuit, .. } = work;
         let (best, stepped) = match self.0.path {

@@ -249,7 +249,7 @@ where
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
         if let Some(ray) = problem.contradiction(&work.state) {
-            return Step::NoSolution(ray.clone());
+            return Step::NoSolution(ray.clone().into());
         }
         if std::mem::take(&mut work.phase.fresh) && self.settings.warm_up > 0 {
             return self.sweeps(problem, point, work, self.settings.warm_up);

@@ -203,7 +203,7 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for CadouxSteps<D
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
         if let Some(ray) = problem.contradiction(&work.convex.state) {
-            return Step::NoSolution(ray.clone());
+            return Step::NoSolution(ray.clone().into());
         }
         let r = P::impulses(point);
         if let Err(why) = work.solve(problem, r, &self.0) {

@@ -112,7 +112,7 @@ impl<P: Blockwise<D> + Linearised<D>, const D: usize> Solver<P> for Alternation<
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
         if let Some(ray) = problem.contradiction(&work.convex.state) {
-            return Step::NoSolution(ray.clone());
+            return Step::NoSolution(ray.clone().into());
         }
         if self.0.inner == HalfSolver::Sweeps {
             problem.enter(&mut work.convex.state, point);

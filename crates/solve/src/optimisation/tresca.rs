@@ -114,7 +114,7 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for TrescaSteps<D
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
         let Self::Work { inner, theta, image, accelerator, error } = work;
         if let Some(ray) = problem.contradiction(&inner.convex.state) {
-            return Step::NoSolution(ray.clone());
+            return Step::NoSolution(ray.clone().into());
         }
         let r = P::impulses(point);
         for (set, theta) in inner.convex.sets.iter_mut().zip(&*theta) {

@@ -60,7 +60,7 @@ impl<M: Method, P: Linear<D>, const D: usize> Solver<P> for Projected<M, D> {
 
     fn step(&self, problem: &P, point: &mut P::Point, field: &mut Self::Work) -> Step {
         if let Some(ray) = problem.contradiction(&field.state) {
-            return Step::NoSolution(ray.clone());
+            return Step::NoSolution(ray.clone().into());
         }
         Step::Continue { estimate: self.0.advance(problem, P::impulses(point), field) }
     }

@@ -198,7 +198,7 @@ impl<P: Linearised<D>, const D: usize> Solver<P> for Steps<D> {
 
     fn step(&self, problem: &P, _: &mut P::Point, work: &mut Self::Work) -> Step {
         if let Some(ray) = problem.contradiction(&work.state) {
-            return Step::NoSolution(ray.clone());
+            return Step::NoSolution(ray.clone().into());
         }
         if work.failed {
             return Step::Stuck("W + rho w cannot be factorised".into());

@@ -184,7 +184,7 @@ where
 
     fn step(&self, problem: &P, _: &mut P::Point, work: &mut Self::Work) -> Step {
         if let Some(ray) = problem.contradiction(&work.state) {
-            return Step::NoSolution(ray.clone());
+            return Step::NoSolution(ray.clone().into());
         }
         if let Some(error) = &work.broken {
             return Step::Stuck(error.to_string().into());

@@ -6,7 +6,7 @@
 //! Source: Acary, lecture (2)–(9). Cost: D solves per contact, then one product per pair of contacts that share
 //! a component of M. Storage: W. Fails where M is singular.
 
-use nonsmooth_problem::check::Certificate;
+use nonsmooth_problem::check::{Certificate, Impulses};
 use nonsmooth_problem::linalg::{Csc, Delassus};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint};
 
@@ -21,7 +21,7 @@ pub struct Condense;
 pub struct CondenseMemo {
     dynamics: Dynamics,
     h: Csc,
-    contradiction: Option<Certificate>,
+    contradiction: Option<Impulses>,
 }
 
 impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
@@ -56,8 +56,8 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
         Ok(())
     }
 
-    fn contradiction<'a>(&self, memo: &'a CondenseMemo) -> Option<&'a Certificate> {
-        memo.contradiction.as_ref()
+    fn contradiction(&self, memo: &CondenseMemo) -> Option<Certificate> {
+        memo.contradiction.clone().map(Certificate::from)
     }
 
     fn lower(&self, _: &FrictionGlobal<D>, point: &GlobalPoint, reduced: &mut LocalPoint) {

@@ -31,8 +31,14 @@ pub trait Reformulation<P: Problem>: Send {
     }
 
     /// A verified certificate that the first problem has no solution, where the reduction has come upon one.
-    fn contradiction<'a>(&self, _memo: &'a Self::Memo) -> Option<&'a Certificate> {
+    fn contradiction(&self, _memo: &Self::Memo) -> Option<Certificate> {
         None
+    }
+
+    /// What a certificate that the other problem has no solution says of the first. As it is, unless the reformulation knows better: the
+    /// first problem's judge decides what it proves.
+    fn lift_certificate(&self, certificate: Certificate, _memo: &Self::Memo) -> Certificate {
+        certificate
     }
 
     /// A point of the first problem as a starting point of the other.

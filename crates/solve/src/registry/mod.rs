@@ -4,6 +4,8 @@
 
 mod abouts;
 mod contact;
+mod linear;
+pub mod linear_abouts;
 
 use std::marker::PhantomData;
 

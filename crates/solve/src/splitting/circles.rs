@@ -1,7 +1,7 @@
 //! Sweeps that go in circles, and impulses that run away.
 
 use nonsmooth_problem::Problem;
-use nonsmooth_problem::check::Certificate;
+use nonsmooth_problem::check::{Certificate, Impulses};
 
 /// The relaxation of the present sweep, lowered where the sweeps go in circles.
 ///
@@ -69,7 +69,9 @@ impl Circles {
         }
         let [first, second] = &self.marks;
         if alignment::<D>(unit, first, second, r) >= ALIGNED {
-            return runaway::<D>(mu, second, r).filter(|ray| problem.verify(ray));
+            return runaway::<D>(mu, second, r)
+                .map(Certificate::from)
+                .filter(|ray| problem.verify(ray));
         }
         if self.omega > self.omega_min {
             self.omega = (FACTOR * self.omega).max(self.omega_min);
@@ -101,7 +103,7 @@ fn alignment<const D: usize>(
 
 /// The last move of the contacts without friction as a ray: where no motion is admissible, their impulses grow along one
 /// for ever, while all others have settled. A candidate that the judge must verify.
-fn runaway<const D: usize>(mu: &[f64], before: &[f64], r: &[f64]) -> Option<Certificate> {
+fn runaway<const D: usize>(mu: &[f64], before: &[f64], r: &[f64]) -> Option<Impulses> {
     if !mu.contains(&0.0) {
         return None;
     }
@@ -115,5 +117,5 @@ fn runaway<const D: usize>(mu: &[f64], before: &[f64], r: &[f64]) -> Option<Cert
             return None;
         }
     }
-    Some(Certificate { r: ray, lambda: vec![] })
+    Some(Impulses { r: ray, lambda: vec![] })
 }

@@ -1,8 +1,9 @@
-//! Splitting methods: block Gauss–Seidel.
+//! Splitting methods: block Gauss–Seidel over contacts, and those of linear complementarity problems.
 
 mod circles;
 mod colored;
 mod contact;
+pub mod linear;
 mod nsgs;
 mod psor;
 

@@ -1,0 +1,608 @@
+//! The judge of linear complementarity problems, and the verification of their certificates.
+
+use serde::Serialize;
+
+use super::rows::Rows;
+use super::{Certificate, Judged, Measure, Verdict, over};
+use crate::linalg::{Compensated, Matrix, norm};
+use crate::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem, ProblemError};
+
+/// The data of a problem in z with `w = M z + q`: row i belongs to an equality, or to the variable `free + i − equalities`.
+pub(crate) struct Data<'a> {
+    matrix: &'a Matrix,
+    q: &'a [f64],
+    equalities: usize,
+    free: usize,
+    bounds: Option<(&'a [f64], &'a [f64])>,
+}
+
+pub(crate) trait Stated {
+    fn data(&self) -> Data<'_>;
+}
+
+impl Stated for Lcp {
+    fn data(&self) -> Data<'_> {
+        Data { matrix: &self.M, q: &self.q, equalities: 0, free: 0, bounds: None }
+    }
+}
+
+impl Stated for Mlcp {
+    fn data(&self) -> Data<'_> {
+        let Self { M, q, equalities, free } = self;
+        Data { matrix: M, q, equalities: *equalities, free: *free, bounds: None }
+    }
+}
+
+impl Stated for BoxLcp {
+    fn data(&self) -> Data<'_> {
+        let bounds = Some((&self.lower[..], &self.upper[..]));
+        Data { matrix: &self.M, q: &self.q, equalities: 0, free: 0, bounds }
+    }
+}
+
+impl Data<'_> {
+    /// The variable of row i; `None` of an equality.
+    fn variable(&self, i: usize) -> Option<usize> {
+        i.checked_sub(self.equalities).map(|k| self.free + k)
+    }
+
+    /// The bounds of the variable of row i.
+    fn bounds(&self, i: usize) -> (f64, f64) {
+        match self.bounds {
+            Some((lower, upper)) => (lower[i], upper[i]),
+            None if i < self.equalities => (f64::NEG_INFINITY, f64::INFINITY),
+            None => (0.0, f64::INFINITY),
+        }
+    }
+
+    /// The bounds of column j.
+    fn column_bounds(&self, j: usize) -> (f64, f64) {
+        match self.bounds {
+            Some((lower, upper)) => (lower[j], upper[j]),
+            None if j < self.free => (f64::NEG_INFINITY, f64::INFINITY),
+            None => (0.0, f64::INFINITY),
+        }
+    }
+}
+
+/// The judge's constants and buffers for an LCP, an MLCP or a box LCP.
+///
+/// With `s_i` the largest modulus in row i of M (1 of an empty row or an operator without diagonal), `x_i = s_i z_i`, and P the projection on the bounds of
+/// `x_i`, here for an LCP:
+///
+/// | field of [`Measure`] | formula |
+/// | --- | --- |
+/// | `absolute` | `‖(x_i − P(x_i − w_i))_i‖₂ = ‖(min(x_i, w_i))_i‖₂`, in the unit of q |
+/// | `relative` | `absolute / ‖q‖₂`, with q = 0 `absolute` itself |
+/// | `rows` | `max_i |min(σ_i z_i, w_i)| / (|q_i| + σ_i ‖z‖_∞)`, `σ_i = Σ_j |M_ij|`: the same whatever the scale of row i |
+/// | `paper` | `‖min(z, w)‖₂ / ‖q‖₂` |
+/// | `peer` | `Σ_i (−z_i)₊ + (−w_i)₊ + (z_i)₊ (w_i)₊` over `‖q‖₂ + 1`, with `|w_i|` of an equality, as Siconos has it |
+///
+/// `relative` and `rows` decide. An equality counts with `w_i`. Both bounds finite: `min` becomes the distance to the projection.
+#[derive(Debug, Clone, Default)]
+pub struct LinearGauge {
+    norm_q: f64,
+    /// s
+    largest: Vec<f64>,
+    /// σ
+    sums: Vec<f64>,
+    w: Vec<f64>,
+    rows: Rows,
+}
+
+/// What the judge adds up, row by row.
+struct Sum {
+    unit: f64,
+    scaled: f64,
+    plain: f64,
+    primal: f64,
+    dual: f64,
+    complementarity: f64,
+    peer: f64,
+    rows: f64,
+    worst: (usize, f64),
+}
+
+/// `x − P(x − w)`, P the projection on `[l, u]`. Zero where x and w obey the law.
+fn natural(x: f64, w: f64, l: f64, u: f64) -> f64 {
+    // The smaller of the two differences is computed without the larger.
+    if x - w <= l {
+        x - l
+    } else if x - w >= u {
+        x - u
+    } else {
+        w
+    }
+}
+
+/// The part of w that its law does not allow, for a variable with these bounds.
+fn dual_violation(w: f64, l: f64, u: f64) -> f64 {
+    match (l.is_finite(), u.is_finite()) {
+        (true, true) => 0.0,
+        (true, false) => (-w).max(0.0),
+        (false, true) => w.max(0.0),
+        (false, false) => w.abs(),
+    }
+}
+
+impl Sum {
+    fn new(norm_q: f64) -> Self {
+        Self {
+            unit: if norm_q > 0.0 { norm_q } else { 1.0 },
+            scaled: 0.0,
+            plain: 0.0,
+            primal: 0.0,
+            dual: 0.0,
+            complementarity: 0.0,
+            peer: 0.0,
+            rows: 0.0,
+            worst: (0, -1.0),
+        }
+    }
+
+    /// A pair of z with bounds and w. `s` makes z comparable to w in the sums; `sigma` in its row, whose terms have the size `terms`.
+    #[allow(clippy::too_many_arguments)]
+    fn pair(
+        &mut self,
+        i: usize,
+        z: f64,
+        w: f64,
+        (l, u): (f64, f64),
+        s: f64,
+        sigma: f64,
+        terms: f64,
+    ) {
+        let (x, sl, su) = (s * z, s * l, s * u);
+        self.add(i, natural(x, w, sl, su));
+        self.plain += (natural(z, w, l, u) / self.unit).powi(2);
+        self.primal += ((sl - x).max(x - su).max(0.0) / self.unit).powi(2);
+        self.dual += (dual_violation(w, l, u) / self.unit).powi(2);
+        let gap = if w > 0.0 { x - sl } else { su - x };
+        if gap.is_finite() {
+            self.complementarity += (gap / self.unit * (w / self.unit)).abs();
+        }
+        self.peer += (l - z).max(z - u).max(0.0) + dual_violation(w, l, u);
+        let inside = if w > 0.0 { z - l } else { u - z };
+        if inside.is_finite() && inside > 0.0 {
+            self.peer += inside * w.abs();
+        }
+        let row = over(natural(sigma * z, w, sigma * l, sigma * u).abs(), terms);
+        // A NaN is the worst there is.
+        self.rows = if row.is_nan() { row } else { self.rows.max(row) };
+    }
+
+    fn equality(&mut self, i: usize, w: f64, terms: f64) {
+        self.add(i, w);
+        self.plain += (w / self.unit).powi(2);
+        self.dual += (w / self.unit).powi(2);
+        self.peer += w.abs();
+        let row = over(w.abs(), terms);
+        self.rows = if row.is_nan() { row } else { self.rows.max(row) };
+    }
+
+    fn add(&mut self, i: usize, residual: f64) {
+        let share = (residual / self.unit).powi(2);
+        if share > self.worst.1 || share.is_nan() {
+            self.worst = (i, share);
+        }
+        self.scaled += share;
+    }
+
+    fn measure(self, norm_q: f64) -> Measure {
+        Measure {
+            absolute: self.scaled.sqrt() * self.unit,
+            relative: self.scaled.sqrt(),
+            paper: self.plain.sqrt(),
+            peer: self.peer / (norm_q + 1.0),
+            primal: self.primal.sqrt(),
+            dual: self.dual.sqrt(),
+            complementarity: self.complementarity,
+            rows: Some(self.rows),
+            worst_contact: self.worst.0,
+            worst: self.worst.1.max(0.0).sqrt(),
+            ..Measure::unknown()
+        }
+    }
+}
+
+/// The largest modulus and the sum of moduli of each row; of an operator its diagonal, else 1.
+fn sizes(m: &Matrix, largest: &mut Vec<f64>, sums: &mut Vec<f64>) {
+    largest.clear();
+    largest.resize(m.nrows(), 0.0);
+    sums.clear();
+    sums.resize(m.nrows(), 0.0);
+    let known = m.for_each(|i, _, x| {
+        largest[i] = largest[i].max(x.abs());
+        sums[i] += x.abs();
+    });
+    if !known {
+        for (i, d) in m.diagonal().into_iter().flatten().enumerate().take(m.nrows()) {
+            (largest[i], sums[i]) = (d.abs(), d.abs());
+        }
+    }
+    for x in largest.iter_mut().chain(sums) {
+        if *x == 0.0 {
+            *x = 1.0;
+        }
+    }
+}
+
+fn largest_of(x: &[f64]) -> f64 {
+    x.iter().fold(0.0, |l, x| if x.is_nan() { f64::NAN } else { l.max(x.abs()) })
+}
+
+impl LinearGauge {
+    pub(crate) fn new(problem: &impl Stated) -> Self {
+        let mut gauge = Self::default();
+        gauge.refill(problem);
+        gauge
+    }
+
+    pub(crate) fn refill(&mut self, problem: &impl Stated) {
+        let data = problem.data();
+        self.norm_q = norm(data.q);
+        sizes(data.matrix, &mut self.largest, &mut self.sums);
+        self.w.resize(data.q.len(), 0.0);
+        self.rows.start(data.q);
+    }
+
+    pub(crate) fn measure(
+        &mut self,
+        problem: &impl Stated,
+        point: &LcpPoint,
+        precisely: bool,
+    ) -> Measure {
+        let data = problem.data();
+        self.rows.precisely(precisely);
+        self.rows.start(data.q);
+        if !self.rows.add_matrix(1.0, data.matrix, &point.z) {
+            data.matrix.mul(&point.z, &mut self.w);
+            self.rows.add_vector(&self.w);
+        }
+        self.w.iter_mut().zip(self.rows.values()).for_each(|(w, sum)| *w = sum);
+        let mut sum = Sum::new(self.norm_q);
+        let reach = largest_of(&point.z);
+        for (i, (&w, &q)) in self.w.iter().zip(data.q).enumerate() {
+            let (s, sigma) = (self.largest[i], self.sums[i]);
+            let terms = q.abs() + sigma * reach;
+            match data.variable(i) {
+                None => sum.equality(i, w, terms),
+                Some(j) => sum.pair(i, point.z[j], w, data.bounds(i), s, sigma, terms),
+            }
+        }
+        sum.measure(self.norm_q)
+    }
+
+    fn judge(
+        problem: &(impl Stated + Problem<Point = LcpPoint, Gauge = Self>),
+        point: &LcpPoint,
+        tolerance: f64,
+    ) -> Result<Verdict<RowStatus, RowCounts>, ProblemError> {
+        problem.validate_point(point)?;
+        let mut gauge = problem.gauge()?;
+        let measure = problem.certify(point, &mut gauge);
+        let data = problem.data();
+        let rows = gauge.w.iter().enumerate().map(|(i, &w)| {
+            let pair = data.variable(i).map(|j| (gauge.largest[i] * point.z[j], data.bounds(i)));
+            (pair.map(|(x, (l, u))| (x, gauge.largest[i] * l, gauge.largest[i] * u)), w)
+        });
+        let rows: Vec<_> = rows.collect();
+        Ok(verdict(measure, &rows, gauge.norm_q, gauge.w.clone(), tolerance))
+    }
+}
+
+/// The judge's constants and buffers for a horizontal LCP.
+///
+/// With `c_i`, `d_i` the largest moduli in column i of Q and R, the residual is that of the equalities `Q x + R s − q` and of the pairs `min(c_i x_i, d_i s_i)`; what
+/// is made of it is as for [`LinearGauge`]. The rows of pairs follow those of the equalities.
+#[derive(Debug, Clone, Default)]
+pub struct HlcpGauge {
+    norm_q: f64,
+    c: Vec<f64>,
+    d: Vec<f64>,
+    /// `Σ_j |Q_ij|`, `Σ_j |R_ij|`.
+    sums: [Vec<f64>; 2],
+    w: Vec<f64>,
+    rows: Rows,
+}
+
+impl HlcpGauge {
+    pub(crate) fn new(problem: &Hlcp) -> Self {
+        let mut gauge = Self::default();
+        gauge.refill(problem);
+        gauge
+    }
+
+    pub(crate) fn refill(&mut self, problem: &Hlcp) {
+        self.norm_q = norm(&problem.q);
+        let mut unused = vec![];
+        let [of_q, of_r] = &mut self.sums;
+        for (m, size, sums) in [(&problem.Q, &mut self.c, of_q), (&problem.R, &mut self.d, of_r)] {
+            sizes(m, &mut unused, sums);
+            size.clear();
+            size.resize(m.ncols(), 0.0);
+            m.for_each(|_, j, x| size[j] = size[j].max(x.abs()));
+            size.iter_mut().filter(|x| **x == 0.0).for_each(|x| *x = 1.0);
+        }
+        self.w.resize(problem.q.len(), 0.0);
+        self.rows.start(&problem.q);
+    }
+
+    pub(crate) fn measure(
+        &mut self,
+        problem: &Hlcp,
+        point: &HlcpPoint,
+        precisely: bool,
+    ) -> Measure {
+        self.rows.precisely(precisely);
+        self.rows.start_at_zero(problem.q.len());
+        self.w.iter_mut().zip(&problem.q).for_each(|(w, q)| *w = -q);
+        self.rows.add_vector(&self.w);
+        for (m, x) in [(&problem.Q, &point.x), (&problem.R, &point.s)] {
+            if !self.rows.add_matrix(1.0, m, x) {
+                m.mul(x, &mut self.w);
+                self.rows.add_vector(&self.w);
+            }
+        }
+        self.w.iter_mut().zip(self.rows.values()).for_each(|(w, sum)| *w = sum);
+        let mut sum = Sum::new(self.norm_q);
+        let (x_reach, s_reach) = (largest_of(&point.x), largest_of(&point.s));
+        for (i, (&w, &q)) in self.w.iter().zip(&problem.q).enumerate() {
+            let terms = q.abs() + self.sums[0][i] * x_reach + self.sums[1][i] * s_reach;
+            sum.equality(i, w, terms);
+        }
+        let n = self.w.len();
+        let reach = self.reach(point);
+        for (i, (&x, &s)) in point.x.iter().zip(&point.s).enumerate() {
+            let (c, ds) = (self.c[i], self.d[i] * s);
+            sum.pair(n + i, x, ds, (0.0, f64::INFINITY), c, c, reach);
+        }
+        sum.measure(self.norm_q)
+    }
+
+    /// The size of the terms that pairs are compared with.
+    fn reach(&self, point: &HlcpPoint) -> f64 {
+        let largest =
+            |x: &[f64], c: &[f64]| x.iter().zip(c).fold(0.0_f64, |l, (x, c)| l.max((c * x).abs()));
+        self.norm_q + largest(&point.x, &self.c) + largest(&point.s, &self.d)
+    }
+}
+
+/// Where a variable is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RowStatus {
+    /// Strictly between its bounds; `w_i = 0`.
+    Inside,
+    /// At its lower bound, `w_i > 0`.
+    Lower,
+    /// At its upper bound, `w_i < 0`.
+    Upper,
+    /// The row is an equality.
+    Equality,
+}
+
+/// How many rows do what (they add up), and how many of those are degenerate.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct RowCounts {
+    /// Variables strictly between their bounds: `z_i > 0` of an LCP.
+    pub inside: usize,
+    /// Variables at their lower bound: `z_i = 0` of an LCP.
+    pub lower: usize,
+    /// Variables at their upper bound.
+    pub upper: usize,
+    /// Equalities.
+    pub equalities: usize,
+    /// Pairs, counted above as well, that are zero on both sides within the tolerance.
+    pub degenerate: usize,
+}
+
+/// From `(x, l, u)` (none of an equality) and w of each row, all in the unit of q.
+fn verdict(
+    measure: Measure,
+    rows: &[(Option<(f64, f64, f64)>, f64)],
+    norm_q: f64,
+    w: Vec<f64>,
+    tolerance: f64,
+) -> Verdict<RowStatus, RowCounts> {
+    let margin = tolerance * if norm_q > 0.0 { norm_q } else { 1.0 };
+    let mut counts = RowCounts::default();
+    let (mut statuses, mut worst) = (vec![], vec![]);
+    for (i, &(pair, w)) in rows.iter().enumerate() {
+        let (status, residual) = match pair {
+            None => (RowStatus::Equality, w),
+            Some((x, l, u)) => {
+                let at = if x - w <= l {
+                    RowStatus::Lower
+                } else if x - w >= u {
+                    RowStatus::Upper
+                } else {
+                    RowStatus::Inside
+                };
+                let bound = (x - l).abs().min((u - x).abs()) <= margin;
+                counts.degenerate += usize::from(bound && w.abs() <= margin && l < u);
+                (at, natural(x, w, l, u))
+            }
+        };
+        match status {
+            RowStatus::Inside => counts.inside += 1,
+            RowStatus::Lower => counts.lower += 1,
+            RowStatus::Upper => counts.upper += 1,
+            RowStatus::Equality => counts.equalities += 1,
+        }
+        statuses.push(status);
+        worst.push((i, over(residual.abs(), norm_q)));
+    }
+    worst.sort_by(|a, b| b.1.total_cmp(&a.1));
+    worst.truncate(10);
+    Verdict { measure, solved: measure.passes(tolerance), counts, statuses, velocity: w, worst }
+}
+
+macro_rules! judged {
+    ($kind:ty) => {
+        impl Judged for $kind {
+            type Status = RowStatus;
+            type Counts = RowCounts;
+
+            fn judge(
+                &self,
+                point: &LcpPoint,
+                tolerance: f64,
+            ) -> Result<Verdict<RowStatus, RowCounts>, ProblemError> {
+                LinearGauge::judge(self, point, tolerance)
+            }
+        }
+    };
+}
+
+judged!(Lcp);
+judged!(Mlcp);
+judged!(BoxLcp);
+
+impl Judged for Hlcp {
+    type Status = RowStatus;
+    type Counts = RowCounts;
+
+    /// The counts are those of the pairs; what is called w here is `Q x + R s − q`.
+    fn judge(
+        &self,
+        point: &HlcpPoint,
+        tolerance: f64,
+    ) -> Result<Verdict<RowStatus, RowCounts>, ProblemError> {
+        self.validate_point(point)?;
+        let mut gauge = self.gauge()?;
+        let measure = self.certify(point, &mut gauge);
+        let equalities = gauge.w.iter().map(|&w| (None, w));
+        let pairs = (0..self.dim()).map(|i| {
+            let (x, s) = (gauge.c[i] * point.x[i], gauge.d[i] * point.s[i]);
+            (Some((x, 0.0, f64::INFINITY)), s)
+        });
+        let rows: Vec<_> = equalities.chain(pairs).collect();
+        Ok(verdict(measure, &rows, gauge.norm_q, gauge.w.clone(), tolerance))
+    }
+}
+
+/// What of a product `Σ a_i y_i` is rounding, in units of the size of its terms: such a sum counts as zero.
+const ZERO: f64 = 1e-13;
+/// How negative the sum that must be negative is at least, in units of the size of its terms.
+const NEGATIVE: f64 = -1e-9;
+
+/// `Aᵀ y` by columns in doubled precision, with what is rounding set to zero. `None` of an operator.
+fn combination(a: &Matrix, y: &[f64]) -> Option<Vec<f64>> {
+    let n = a.ncols();
+    let (mut sums, mut sizes) = (vec![Compensated::default(); n], vec![0.0; n]);
+    let known = a.for_each(|i, j, x| {
+        sums[j].add_product(x, y[i]);
+        sizes[j] += (x * y[i]).abs();
+    });
+    let cleaned = sums.iter().zip(&sizes).map(|(sum, size)| match sum.value() {
+        value if value.abs() <= ZERO * size => 0.0,
+        value => value,
+    });
+    known.then(|| cleaned.collect())
+}
+
+/// `qᵀ y` is negative beyond rounding, together with other `terms` of the same sum.
+fn negative(q: &[f64], y: &[f64], terms: impl Iterator<Item = f64>) -> bool {
+    let mut sum = Compensated::default();
+    let mut size = 0.0;
+    for (q, y) in q.iter().zip(y) {
+        sum.add_product(*q, *y);
+        size += (q * y).abs();
+    }
+    for term in terms {
+        sum.add(term);
+        size += term.abs();
+    }
+    size > 0.0 && sum.value() <= NEGATIVE * size
+}
+
+/// Whether the certificate proves from M and q alone that there is no solution.
+pub(crate) fn refutes(problem: &impl Stated, certificate: &Certificate) -> bool {
+    let data = problem.data();
+    match certificate {
+        Certificate::Impulses(_) => false,
+        &Certificate::Row { row } => {
+            let mut y = vec![0.0; data.q.len()];
+            match y.get_mut(row) {
+                Some(entry) => *entry = 1.0,
+                None => return false,
+            }
+            row >= data.equalities && farkas(&data, &y)
+        }
+        Certificate::Farkas { y } => farkas(&data, y),
+        // Only a square problem has a Lemke ray; its rows then are numbered as its variables.
+        Certificate::Ray { z, z0 } => {
+            *z0 == 0.0 && data.equalities == data.free && farkas(&data, z)
+        }
+        Certificate::Cones { separating } => data.bounds.is_none() && cones(&data, separating),
+    }
+}
+
+fn shaped(y: &[f64], len: usize) -> bool {
+    y.len() == len && norm(y).is_finite()
+}
+
+fn farkas(data: &Data, y: &[f64]) -> bool {
+    if !shaped(y, data.q.len()) {
+        return false;
+    }
+    let signs = y.iter().enumerate().all(|(i, &y)| match data.bounds(i) {
+        _ if i < data.equalities => true,
+        (l, u) if l.is_finite() && u.is_finite() => y == 0.0,
+        (l, _) if l.is_finite() => y >= 0.0,
+        (_, u) if u.is_finite() => y <= 0.0,
+        _ => true,
+    });
+    let Some(slope) = combination(data.matrix, y).filter(|_| signs) else {
+        return false;
+    };
+    // The least upper bound of yᵀ M z over the box, column by column.
+    let terms = slope.iter().enumerate().map(|(j, &g)| match data.column_bounds(j) {
+        _ if g == 0.0 => 0.0,
+        (_, u) if g > 0.0 => g * u,
+        (l, _) => g * l,
+    });
+    terms.clone().all(f64::is_finite) && negative(data.q, y, terms)
+}
+
+/// Whether the vectors separate all complementary cones from q.
+fn cones(data: &Data, separating: &[Vec<f64>]) -> bool {
+    let pairs = data.q.len() - data.equalities;
+    // Which cones a vector separates: those with w_j where it allows w_j, and z_j where it allows z_j.
+    let allowed: Option<Vec<[Vec<bool>; 2]>> = separating
+        .iter()
+        .map(|y| {
+            let slope = combination(data.matrix, y).filter(|_| shaped(y, data.q.len()))?;
+            let free = slope[..data.free].iter().all(|g| *g == 0.0);
+            let proper = free && negative(data.q, y, std::iter::empty());
+            let w = y[data.equalities..].iter().map(|y| *y >= 0.0).collect();
+            let z = slope[data.free..].iter().map(|g| *g <= 0.0).collect();
+            proper.then_some([w, z])
+        })
+        .collect();
+    let Some(allowed) = allowed else { return false };
+    covered(&allowed, &(0..allowed.len()).collect::<Vec<_>>(), 0, pairs)
+}
+
+/// Whether the vectors left separate all cones whose first `depth` pairs are chosen.
+fn covered(allowed: &[[Vec<bool>; 2]], left: &[usize], depth: usize, pairs: usize) -> bool {
+    let all = |k: &usize| (depth..pairs).all(|j| allowed[*k][0][j] && allowed[*k][1][j]);
+    if left.iter().any(all) {
+        return true;
+    }
+    depth < pairs
+        && [0, 1].into_iter().all(|side| {
+            let still: Vec<_> = left.iter().copied().filter(|&k| allowed[k][side][depth]).collect();
+            !still.is_empty() && covered(allowed, &still, depth + 1, pairs)
+        })
+}
+
+/// As [`refutes`], for the horizontal problem.
+pub(crate) fn refutes_horizontal(problem: &Hlcp, certificate: &Certificate) -> bool {
+    let Certificate::Farkas { y } = certificate else { return false };
+    let fine = |m: &Matrix| combination(m, y).is_some_and(|g| g.iter().all(|g| *g >= 0.0));
+    shaped(y, problem.q.len())
+        && fine(&problem.Q)
+        && fine(&problem.R)
+        && negative(&problem.q, y, std::iter::empty())
+}

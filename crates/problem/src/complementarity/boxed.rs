@@ -1,0 +1,117 @@
+//! The linear complementarity problem with two bounds.
+
+use super::{LcpPoint, square};
+use crate::check::{Certificate, LinearGauge, Measure, linear};
+use crate::error::vector;
+use crate::linalg::Matrix;
+use crate::{Kind, Problem, ProblemError};
+
+/// `−(M z + q) ∈ N_[l, u](z)`: with `w = M z + q`, `w_i ≥ 0` where `z_i = l_i`, `w_i ≤ 0` where `z_i = u_i`, and `w_i = 0` between.
+///
+/// Bounds may be infinite: `l = 0, u = ∞` is an LCP, `l = −∞, u = ∞` an equation.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(non_snake_case)]
+pub struct BoxLcp {
+    /// n × n.
+    pub M: Matrix,
+    /// n.
+    pub q: Vec<f64>,
+    /// l, n; −∞ allowed.
+    pub lower: Vec<f64>,
+    /// u, n; ∞ allowed.
+    pub upper: Vec<f64>,
+}
+
+#[allow(non_snake_case)]
+impl BoxLcp {
+    /// States a problem, validated.
+    ///
+    /// Errors: a matrix that is not square, a wrong length, an entry of M or q that is not finite, bounds that are NaN or cross.
+    pub fn new(
+        M: impl Into<Matrix>,
+        q: Vec<f64>,
+        lower: Vec<f64>,
+        upper: Vec<f64>,
+    ) -> Result<Self, ProblemError> {
+        let problem = Self { M: M.into(), q, lower, upper };
+        problem.validate()?;
+        Ok(problem)
+    }
+
+    /// Checks shapes and values; the fields are public, so call it after changing them.
+    pub fn validate(&self) -> Result<(), ProblemError> {
+        square("M", &self.M)?;
+        let n = self.M.nrows();
+        vector("q", &self.q, n, "rows of M")?;
+        for (name, bound) in [("l", &self.lower), ("u", &self.upper)] {
+            if bound.len() != n {
+                let found = format!("{} entries", bound.len());
+                return Err(ProblemError::shape(name, format!("{n} entries (rows of M)"), found));
+            }
+        }
+        for (i, (&l, &u)) in self.lower.iter().zip(&self.upper).enumerate() {
+            if !(l <= u && l < f64::INFINITY && u > f64::NEG_INFINITY) {
+                let found = format!("[{l}, {u}]");
+                return Err(ProblemError::value(
+                    format!("[l, u][{i}]"),
+                    "l ≤ u, l < ∞, u > −∞",
+                    found,
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The number of variables n.
+    pub fn dim(&self) -> usize {
+        self.q.len()
+    }
+}
+
+impl Problem for BoxLcp {
+    type Point = LcpPoint;
+    type Gauge = LinearGauge;
+
+    fn kind(&self) -> Kind {
+        Kind::BoxLcp
+    }
+
+    fn unknowns(&self) -> usize {
+        self.dim()
+    }
+
+    /// The point of the box that is nearest to zero.
+    fn origin(&self) -> LcpPoint {
+        let bounds = self.lower.iter().zip(&self.upper);
+        LcpPoint { z: bounds.map(|(&l, &u)| 0.0_f64.clamp(l, u)).collect() }
+    }
+
+    fn validate_point(&self, point: &LcpPoint) -> Result<(), ProblemError> {
+        vector("z", &point.z, self.dim(), "variables")
+    }
+
+    fn copy_point(from: &LcpPoint, to: &mut LcpPoint) {
+        to.z.clone_from(&from.z);
+    }
+
+    fn gauge(&self) -> Result<LinearGauge, ProblemError> {
+        Ok(LinearGauge::new(self))
+    }
+
+    fn regauge(&self, gauge: &mut LinearGauge) -> Result<(), ProblemError> {
+        gauge.refill(self);
+        Ok(())
+    }
+
+    fn measure(&self, point: &LcpPoint, gauge: &mut LinearGauge) -> Measure {
+        gauge.measure(self, point, false)
+    }
+
+    fn certify(&self, point: &LcpPoint, gauge: &mut LinearGauge) -> Measure {
+        gauge.measure(self, point, true)
+    }
+
+    fn verify(&self, certificate: &Certificate) -> bool {
+        linear::refutes(self, certificate)
+    }
+}

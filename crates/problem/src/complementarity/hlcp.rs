@@ -1,0 +1,105 @@
+//! The horizontal linear complementarity problem.
+
+use super::square;
+use crate::check::{Certificate, HlcpGauge, Measure, linear};
+use crate::error::vector;
+use crate::linalg::Matrix;
+use crate::{Kind, Problem, ProblemError};
+
+/// `Q x + R s = q`, `0 ≤ x ⟂ s ≥ 0`: lecture (33). An LCP is `Q = M, R = −I`, with −q on the right.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(non_snake_case)]
+pub struct Hlcp {
+    /// n × n.
+    pub Q: Matrix,
+    /// n × n.
+    pub R: Matrix,
+    /// n.
+    pub q: Vec<f64>,
+}
+
+/// A point of a horizontal problem.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct HlcpPoint {
+    /// n.
+    pub x: Vec<f64>,
+    /// n.
+    pub s: Vec<f64>,
+}
+
+#[allow(non_snake_case)]
+impl Hlcp {
+    /// States a problem, validated.
+    ///
+    /// Errors: matrices that are not square or of different order, a wrong length, a value that is not finite.
+    pub fn new(
+        Q: impl Into<Matrix>,
+        R: impl Into<Matrix>,
+        q: Vec<f64>,
+    ) -> Result<Self, ProblemError> {
+        let problem = Self { Q: Q.into(), R: R.into(), q };
+        problem.validate()?;
+        Ok(problem)
+    }
+
+    /// Checks shapes and values; the fields are public, so call it after changing them.
+    pub fn validate(&self) -> Result<(), ProblemError> {
+        square("Q", &self.Q)?;
+        square("R", &self.R)?;
+        self.R.check_shape("R", self.Q.nrows(), self.Q.nrows(), "as Q")?;
+        vector("q", &self.q, self.Q.nrows(), "rows of Q")
+    }
+
+    /// The number of pairs n.
+    pub fn dim(&self) -> usize {
+        self.q.len()
+    }
+}
+
+impl Problem for Hlcp {
+    type Point = HlcpPoint;
+    type Gauge = HlcpGauge;
+
+    fn kind(&self) -> Kind {
+        Kind::Hlcp
+    }
+
+    fn unknowns(&self) -> usize {
+        2 * self.dim()
+    }
+
+    fn origin(&self) -> HlcpPoint {
+        HlcpPoint { x: vec![0.0; self.dim()], s: vec![0.0; self.dim()] }
+    }
+
+    fn validate_point(&self, point: &HlcpPoint) -> Result<(), ProblemError> {
+        vector("x", &point.x, self.dim(), "pairs")?;
+        vector("s", &point.s, self.dim(), "pairs")
+    }
+
+    fn copy_point(from: &HlcpPoint, to: &mut HlcpPoint) {
+        to.x.clone_from(&from.x);
+        to.s.clone_from(&from.s);
+    }
+
+    fn gauge(&self) -> Result<HlcpGauge, ProblemError> {
+        Ok(HlcpGauge::new(self))
+    }
+
+    fn regauge(&self, gauge: &mut HlcpGauge) -> Result<(), ProblemError> {
+        gauge.refill(self);
+        Ok(())
+    }
+
+    fn measure(&self, point: &HlcpPoint, gauge: &mut HlcpGauge) -> Measure {
+        gauge.measure(self, point, false)
+    }
+
+    fn certify(&self, point: &HlcpPoint, gauge: &mut HlcpGauge) -> Measure {
+        gauge.measure(self, point, true)
+    }
+
+    fn verify(&self, certificate: &Certificate) -> bool {
+        linear::refutes_horizontal(self, certificate)
+    }
+}

@@ -1,0 +1,93 @@
+//! The linear complementarity problem.
+
+use super::square;
+use crate::check::{Certificate, LinearGauge, Measure, linear};
+use crate::error::vector;
+use crate::linalg::Matrix;
+use crate::{Kind, Problem, ProblemError};
+
+/// `0 ≤ z ⟂ w = M z + q ≥ 0`: LCP(M, q), lecture (6).
+#[derive(Debug, Clone, PartialEq)]
+#[allow(non_snake_case)]
+pub struct Lcp {
+    /// n × n, of any kind.
+    pub M: Matrix,
+    /// n.
+    pub q: Vec<f64>,
+}
+
+/// A point of a linear complementarity problem. `w = M z + q` follows from it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LcpPoint {
+    /// The variables: z, or `(u, v)` of a mixed problem.
+    pub z: Vec<f64>,
+}
+
+#[allow(non_snake_case)]
+impl Lcp {
+    /// States a problem, validated.
+    ///
+    /// Errors: no rows, a matrix that is not square, a wrong length, a value that is not finite; each names its entry.
+    pub fn new(M: impl Into<Matrix>, q: Vec<f64>) -> Result<Self, ProblemError> {
+        let problem = Self { M: M.into(), q };
+        problem.validate()?;
+        Ok(problem)
+    }
+
+    /// Checks shapes and values; the fields are public, so call it after changing them.
+    pub fn validate(&self) -> Result<(), ProblemError> {
+        square("M", &self.M)?;
+        vector("q", &self.q, self.M.nrows(), "rows of M")
+    }
+
+    /// The number of variables n.
+    pub fn dim(&self) -> usize {
+        self.q.len()
+    }
+}
+
+impl Problem for Lcp {
+    type Point = LcpPoint;
+    type Gauge = LinearGauge;
+
+    fn kind(&self) -> Kind {
+        Kind::Lcp
+    }
+
+    fn unknowns(&self) -> usize {
+        self.dim()
+    }
+
+    fn origin(&self) -> LcpPoint {
+        LcpPoint { z: vec![0.0; self.dim()] }
+    }
+
+    fn validate_point(&self, point: &LcpPoint) -> Result<(), ProblemError> {
+        vector("z", &point.z, self.dim(), "variables")
+    }
+
+    fn copy_point(from: &LcpPoint, to: &mut LcpPoint) {
+        to.z.clone_from(&from.z);
+    }
+
+    fn gauge(&self) -> Result<LinearGauge, ProblemError> {
+        Ok(LinearGauge::new(self))
+    }
+
+    fn regauge(&self, gauge: &mut LinearGauge) -> Result<(), ProblemError> {
+        gauge.refill(self);
+        Ok(())
+    }
+
+    fn measure(&self, point: &LcpPoint, gauge: &mut LinearGauge) -> Measure {
+        gauge.measure(self, point, false)
+    }
+
+    fn certify(&self, point: &LcpPoint, gauge: &mut LinearGauge) -> Measure {
+        gauge.measure(self, point, true)
+    }
+
+    fn verify(&self, certificate: &Certificate) -> bool {
+        linear::refutes(self, certificate)
+    }
+}

@@ -1,0 +1,56 @@
+//! Linear complementarity problems as plain validated data.
+//!
+//! | kind | statement |
+//! | --- | --- |
+//! | [`Lcp`] | `0 ≤ z ⟂ w = M z + q ≥ 0` |
+//! | [`Mlcp`] | `A u + C v + a = 0`, `0 ≤ v ⟂ D u + B v + b ≥ 0` |
+//! | [`Hlcp`] | `Q x + R s = q`, `0 ≤ x ⟂ s ≥ 0` |
+//! | [`BoxLcp`] | `−(M z + q) ∈ N_[l, u](z)` |
+
+mod boxed;
+mod hlcp;
+mod lcp;
+mod mlcp;
+
+pub use boxed::BoxLcp;
+pub use hlcp::{Hlcp, HlcpPoint};
+pub use lcp::{Lcp, LcpPoint};
+pub use mlcp::Mlcp;
+
+use crate::ProblemError;
+use crate::linalg::Matrix;
+
+/// Any of the linear complementarity problems.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Complementarity {
+    /// `0 ≤ z ⟂ M z + q ≥ 0`.
+    Lcp(Lcp),
+    /// With equalities and free variables.
+    Mlcp(Mlcp),
+    /// `Q x + R s = q`, `0 ≤ x ⟂ s ≥ 0`.
+    Hlcp(Hlcp),
+    /// With two bounds.
+    Box(BoxLcp),
+}
+
+/// Evaluates an expression for whichever problem a [`Complementarity`] holds.
+#[macro_export]
+macro_rules! with_complementarity {
+    ($any:expr, $problem:ident => $body:expr) => {
+        match $any {
+            $crate::Complementarity::Lcp($problem) => $body,
+            $crate::Complementarity::Mlcp($problem) => $body,
+            $crate::Complementarity::Hlcp($problem) => $body,
+            $crate::Complementarity::Box($problem) => $body,
+        }
+    };
+}
+
+/// A square matrix with finite entries, and at least one.
+fn square(name: &str, m: &Matrix) -> Result<(), ProblemError> {
+    if m.nrows() == 0 {
+        return Err(ProblemError::shape(name, "at least one row", "none"));
+    }
+    m.check_shape(name, m.nrows(), m.nrows(), "square")?;
+    m.check_finite(name)
+}

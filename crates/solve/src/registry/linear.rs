@@ -1,0 +1,50 @@
+//! Which solvers there are for linear complementarity problems, and how each is made.
+
+use std::marker::PhantomData;
+
+use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
+
+use super::linear_abouts::*;
+use super::{About, Direct, Entry, Made, Registered, Visitor, find};
+use crate::form::{Bounded, Complementary};
+use crate::settings::{SettingsMap, parse};
+use crate::splitting::linear::Jacobi;
+
+/// The solvers that take bounds of any kind.
+fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
+    vec![Entry { about: &PROJECTED_JACOBI, build: |s, v| Ok(v.visit(Jacobi(parse(s)?))) }]
+}
+
+/// The solvers of problems whose variables are free or nonnegative.
+fn complementary_solvers<V: Visitor<Problem: Complementary>>() -> Vec<Entry<V>> {
+    bounded_solvers()
+}
+
+/// The solvers of horizontal problems.
+fn horizontal_solvers<V: Visitor<Problem = Hlcp>>() -> Vec<Entry<V>> {
+    vec![]
+}
+
+macro_rules! register {
+    ($kind:ty, $solvers:ident) => {
+        impl Registered for $kind {
+            fn abouts() -> Vec<&'static About> {
+                $solvers::<Direct<Self>>().iter().map(|entry| entry.about).collect()
+            }
+
+            fn composed_names() -> Vec<String> {
+                vec![]
+            }
+
+            fn make(name: &str, settings: &SettingsMap) -> Made<Self> {
+                let entry = find($solvers::<Direct<Self>>(), name)?;
+                Some((entry.build)(settings, Direct(PhantomData)))
+            }
+        }
+    };
+}
+
+register!(Lcp, complementary_solvers);
+register!(Mlcp, complementary_solvers);
+register!(BoxLcp, bounded_solvers);
+register!(Hlcp, horizontal_solvers);

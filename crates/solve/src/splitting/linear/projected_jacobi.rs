@@ -1,0 +1,97 @@
+//! **Projected Jacobi**: every variable takes one step, all from the same w.
+//!
+//! Problem: `−w_i ∈ N_[l_i, u_i](z_i)`, `w = M z + q`; an LCP is `l = 0, u = ∞`.
+//!
+//! Method: `z ← P(z − ω D⁻¹ (q + M z))`, D the diagonal of M, P the projection on `[l, u]`.
+//!
+//! References: Acary2018 (11); CottlePangStone2009, chapter 5.
+//!
+//! Cost of a step: one product with M. Storage: w and D.
+//! Fails: needs a positive diagonal; converges for ω = 1 where M is an H-matrix with positive diagonal, else only for ω small enough where M is symmetric
+//! positive definite.
+
+use nonsmooth_problem::LcpPoint;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::form::{Bounded, system};
+use crate::settings::Settings;
+use crate::{SolveError, Solver, Step};
+
+/// The hyperparameters of projected Jacobi.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ProjectedJacobi {
+    /// Relaxation: the step in units of 1/M_ii, in (0, 2).
+    pub omega: f64,
+    /// Steps between two evaluations of the true residual, unless the estimate asks for one earlier.
+    pub check_every: usize,
+}
+
+impl Default for ProjectedJacobi {
+    fn default() -> Self {
+        Self { omega: 1.0, check_every: 50 }
+    }
+}
+
+impl Settings for ProjectedJacobi {
+    fn validate(&self) -> Result<(), String> {
+        if !(self.omega > 0.0 && self.omega < 2.0) {
+            return Err(format!("omega: expected a number in (0, 2), found {}", self.omega));
+        }
+        if self.check_every == 0 {
+            return Err("check_every: expected at least 1, found 0".into());
+        }
+        Ok(())
+    }
+}
+
+/// The solver.
+#[derive(Debug, Clone, Copy)]
+pub struct Jacobi(pub ProjectedJacobi);
+
+/// The workspace: w and the diagonal.
+pub struct JacobiWork {
+    w: Vec<f64>,
+    diagonal: Vec<f64>,
+    scale: f64,
+}
+
+impl<P: Bounded> Solver<P> for Jacobi {
+    type Work = JacobiWork;
+
+    fn work(&self, problem: &P) -> Result<JacobiWork, SolveError> {
+        let system = problem.system()?;
+        let diagonal = system
+            .matrix
+            .diagonal()
+            .ok_or_else(|| SolveError::needs("the diagonal of M", "an operator without one"))?;
+        if let Some(i) = diagonal.iter().position(|d| d.is_nan() || *d <= 0.0) {
+            let found = format!("M[{i}, {i}] = {}", diagonal[i]);
+            return Err(SolveError::needs("a positive diagonal of M", found));
+        }
+        Ok(JacobiWork { w: vec![0.0; system.dim()], diagonal, scale: system.scale() })
+    }
+
+    fn start(&self, problem: &P, point: &mut LcpPoint, _: &mut JacobiWork) {
+        let bounds = system(problem).bounds;
+        point.z.iter_mut().enumerate().for_each(|(i, z)| *z = bounds.project(i, *z));
+    }
+
+    fn step(&self, problem: &P, point: &mut LcpPoint, work: &mut JacobiWork) -> Step {
+        let system = system(problem);
+        system.matrix.mul(&point.z, &mut work.w);
+        let mut moved = 0.0;
+        for (i, z) in point.z.iter_mut().enumerate() {
+            let w = work.w[i] + system.q[i];
+            let new = system.bounds.project(i, *z - self.0.omega / work.diagonal[i] * w);
+            moved += (work.diagonal[i] * (new - *z)).powi(2);
+            *z = new;
+        }
+        Step::Continue { estimate: moved.sqrt() / (work.scale * self.0.omega) }
+    }
+
+    fn check_every(&self) -> usize {
+        self.0.check_every
+    }
+}
