@@ -9,10 +9,9 @@ use super::{About, Direct, Entry, Made, Registered, Visitor, find};
 use crate::Session;
 use crate::auto::linear::{LinearAuto, Planned};
 use crate::form::{Bounded, Complementary};
+use crate::optimisation::linear::Proportioning;
 use crate::settings::{SettingsMap, parse};
-use crate::splitting::linear::{
-    Jacobi, Pgs, Proximal, Psor, Relaxation, Rpgs, Rpsor, Searched,
-};
+use crate::splitting::linear::{Jacobi, Pgs, Proximal, Psor, Relaxation, Rpgs, Rpsor, Searched};
 
 /// The solvers that take bounds of any kind.
 fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
@@ -22,6 +21,7 @@ fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
         Entry { about: &PSOR, build: |s, v| Ok(v.visit(Relaxation(parse(s)?))) },
         Entry { about: &RPGS, build: |s, v| Ok(v.visit(Proximal(Rpsor::from(parse::<Rpgs>(s)?)))) },
         Entry { about: &RPSOR, build: |s, v| Ok(v.visit(Proximal(parse(s)?))) },
+        Entry { about: &MPRGP, build: |s, v| Ok(v.visit(Proportioning(parse(s)?))) },
         Entry { about: &SPLITTING_LS, build: |s, v| Ok(v.visit(Searched(parse(s)?))) },
     ]
 }

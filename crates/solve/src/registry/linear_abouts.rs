@@ -2,6 +2,7 @@
 
 use super::{About, Solves};
 use crate::auto::linear::LinearAuto;
+use crate::optimisation::linear::Mprgp;
 use crate::settings::described;
 use crate::splitting::linear::{Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs};
 
@@ -87,4 +88,16 @@ pub const SPLITTING_LS: About = About {
     cites: &["Acary2018", "CottlePangStone2009"],
     variants: &["sweep=jacobi"],
     settings: described::<SplittingLs>,
+};
+
+/// Modified proportioning with reduced gradient projections.
+pub const MPRGP: About = About {
+    name: "mprgp",
+    family: "optimisation",
+    solves: Solves::Law,
+    summary: "conjugate gradients on the face, gradient projections between faces; by products only",
+    needs: &["a symmetric positive semidefinite M"],
+    cites: &["DostalSchoberl2005", "Dostal2009"],
+    variants: &["gamma=0.1"],
+    settings: described::<Mprgp>,
 };

@@ -8,10 +8,10 @@ mod rpgs;
 mod rpsor;
 mod splitting_ls;
 
-pub use splitting_ls::{Searched, SplittingLs, Sweep};
 pub use pgs::Pgs;
 pub use projected_jacobi::{Jacobi, ProjectedJacobi};
 pub use psor::{Psor, Relaxation};
 pub use rows::Direction;
 pub use rpgs::Rpgs;
 pub use rpsor::{Proximal, Rpsor};
+pub use splitting_ls::{Searched, SplittingLs, Sweep};

@@ -146,9 +146,7 @@ impl Rows {
                 Matrix::Sparse(a) => {
                     let range = self.sparse.start[i]..self.sparse.start[i + 1];
                     range
-                        .map(|k| {
-                            self.sparse.value[k] * a.get(self.sparse.column[k] as usize, i)
-                        })
+                        .map(|k| self.sparse.value[k] * a.get(self.sparse.column[k] as usize, i))
                         .sum::<f64>()
                         > 0.0
                 }
