@@ -7,6 +7,7 @@ use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 use super::linear_abouts::*;
 use super::{About, Direct, Entry, Made, Registered, Visitor, find};
 use crate::form::{Bounded, Complementary};
+use crate::pivoting::LemkePath;
 use crate::settings::{SettingsMap, parse};
 use crate::splitting::linear::Jacobi;
 
@@ -17,7 +18,12 @@ fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
 
 /// The solvers of problems whose variables are free or nonnegative.
 fn complementary_solvers<V: Visitor<Problem: Complementary>>() -> Vec<Entry<V>> {
-    bounded_solvers()
+    let mut entries = bounded_solvers();
+    entries.extend([Entry {
+        about: &LEMKE,
+        build: |s, v: V| Ok(v.visit(LemkePath::new(parse(s)?))),
+    }]);
+    entries
 }
 
 /// The solvers of horizontal problems.

@@ -1,6 +1,7 @@
 //! The solvers of linear complementarity problems, described.
 
 use super::{About, Solves};
+use crate::pivoting::Lemke;
 use crate::settings::described;
 use crate::splitting::linear::ProjectedJacobi;
 
@@ -14,4 +15,16 @@ pub const PROJECTED_JACOBI: About = About {
     cites: &["Acary2018", "CottlePangStone2009"],
     variants: &["omega=0.7"],
     settings: described::<ProjectedJacobi>,
+};
+
+/// Lemke's method.
+pub const LEMKE: About = About {
+    name: "lemke",
+    family: "pivoting",
+    solves: Solves::Law,
+    summary: "Lemke: complementary pivoting on a factorised basis; decides solvability for copositive-plus M",
+    needs: &["the entries of M"],
+    cites: &["Acary2018", "CottlePangStone2009", "Lemke1965"],
+    variants: &["basis=tableau", "basis=dense", "basis=sparse", "ties=perturbed", "covering=row_norms", "covering=random"],
+    settings: described::<Lemke>,
 };
