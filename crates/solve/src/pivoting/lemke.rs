@@ -36,8 +36,12 @@ use crate::{SolveError, Solver, Step};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Covering {
+    /// `ones`, or `scaled` where the sizes of the rows differ by more than 1000.
+    Auto,
     /// `d_i = 1`.
     Ones,
+    /// `d_i = 1` in the units in which M is equilibrated.
+    Scaled,
     /// `d_i = |q_i| + Σ_j |M_ij|`: does not depend on the scale of a row.
     RowNorms,
     /// `d_i` random in [1/2, 2] (its logarithm even), by `seed`.
@@ -99,7 +103,7 @@ pub struct Lemke {
 impl Default for Lemke {
     fn default() -> Self {
         Self {
-            covering: Covering::Ones,
+            covering: Covering::Auto,
             seed: 1,
             ties: Ties::Auto,
             basis: BasisKind::Auto,
@@ -132,6 +136,8 @@ const TABLEAU_LIMIT: usize = 40;
 const DENSITY: f64 = 0.2;
 /// The elimination of a singular A is dense.
 const ELIMINATION_LIMIT: usize = 3000;
+/// Rows whose sizes differ by less are covered by ones.
+const EVEN: f64 = 1e3;
 /// A basis that reproduces a known vector less well is not one to start from.
 const REGULAR: f64 = 1e-6;
 /// A last basis that misses the problem by more is mended: it becomes the first basis of another path.
@@ -165,6 +171,8 @@ impl LemkePath {
 enum Phase {
     /// The first basis is to be made: from the caller's point.
     Warm,
+    /// As before, from the rows in which q is negative.
+    Negative,
     /// As before, from nothing.
     Cold,
     /// As before, from the basis where it stands.
@@ -263,7 +271,7 @@ impl<P: Complementary> Solver<P> for LemkePath {
         let event = match work.phase {
             Phase::Running => work.path.pivot(),
             Phase::Finished => return Step::Done,
-            Phase::Cold | Phase::Warm | Phase::Here => {
+            Phase::Cold | Phase::Warm | Phase::Negative | Phase::Here => {
                 match self.begin(&system(problem), point, work) {
                     Ok(event) => event,
                     Err(step) => return step,
@@ -288,7 +296,7 @@ impl<P: Complementary> Solver<P> for LemkePath {
         match work.phase {
             Phase::Finished => point.z.copy_from_slice(&work.z),
             Phase::Running => work.values(&mut point.z),
-            Phase::Cold | Phase::Warm | Phase::Here => {}
+            Phase::Cold | Phase::Warm | Phase::Negative | Phase::Here => {}
         }
     }
 
@@ -362,6 +370,12 @@ impl LemkePath {
                 work.active(system, point);
                 work.place()
             }
+            Phase::Negative => {
+                let free = system.free();
+                work.alpha.clear();
+                work.alpha.extend(system.q.iter().enumerate().map(|(i, q)| i < free || *q < 0.0));
+                work.place()
+            }
             _ => {
                 if let Some(row) = blocked_row(system, &mut work.alpha) {
                     work.phase = Phase::Finished;
@@ -397,11 +411,18 @@ impl LemkePath {
         // By rows first.
         g.clear();
         g.resize(n, 0.0);
+        let rows = &path.data.row;
         let kinds = [self.settings.covering, Covering::RowNorms, Covering::Random];
-        let kind = kinds[(*rays).min(2)];
+        let mut kind = kinds[(*rays).min(2)];
+        if kind == Covering::Auto {
+            let range = |of: fn(f64, f64) -> f64| rows.iter().copied().reduce(of).unwrap_or(1.0);
+            let even = range(f64::max) <= EVEN * range(f64::min);
+            kind = if even { Covering::Ones } else { Covering::Scaled };
+        }
         match (&self.covering, kind) {
             (Some(d), _) if *rays == 0 => g.copy_from_slice(d),
-            (_, Covering::Ones) => g.fill(1.0),
+            (_, Covering::Auto | Covering::Ones) => g.fill(1.0),
+            (_, Covering::Scaled) => g.iter_mut().zip(rows).for_each(|(g, r)| *g = 1.0 / r),
             (_, Covering::RowNorms) => {
                 g.iter_mut().zip(system.q).for_each(|(g, q)| *g = q.abs());
                 system.matrix.for_each(|i, _, x| g[i] += x.abs());
@@ -411,7 +432,6 @@ impl LemkePath {
                 g.iter_mut().for_each(|g| *g = rng.random_range(-1.0_f64..1.0).exp2());
             }
         }
-        let rows = &path.data.row;
         g.iter_mut().zip(rows).for_each(|(g, r)| *g *= r);
         let largest = g.iter().fold(0.0_f64, |l, g| l.max(*g));
         // A power of two, so that the ratios stay as they are.
@@ -436,11 +456,15 @@ impl LemkePath {
             return Step::NoSolution(ray);
         }
         work.phase = Phase::Cold;
-        if !work.warm {
+        if !work.warm || work.rays > 0 {
             work.rays += 1;
             if work.rays > self.settings.restarts {
                 work.phase = Phase::Running;
                 return Step::NoSolution(work.first_ray.take().unwrap_or(ray));
+            }
+            // Every third time from where the negative rows are equations.
+            if work.rays.is_multiple_of(3) {
+                work.phase = Phase::Negative;
             }
             work.first_ray.get_or_insert(ray);
         }

@@ -18,6 +18,8 @@ pub(in super::super) struct Tableau {
     /// The row of the pivot.
     pivot: Vec<f64>,
     rows: Vec<usize>,
+    /// Rows from which w has gone.
+    taken: Vec<bool>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,8 +28,8 @@ enum Place {
     Row(usize),
 }
 
-/// A pivot of a fresh basis below this, in units of its column, is zero.
-const SINGULAR: f64 = 1e-13;
+/// A pivot of a fresh basis below this, in units of its column in the rows that are to be taken, is zero.
+const SINGULAR: f64 = 1e-14;
 
 impl Tableau {
     fn index(&self, v: Variable) -> usize {
@@ -83,6 +85,8 @@ impl Basis for Tableau {
         // Rows whose w has to leave.
         self.rows.clear();
         self.rows.extend(0..n);
+        self.taken.clear();
+        self.taken.resize(n, false);
         for v in basic {
             if let Variable::W(i) = v {
                 self.rows[*i] = usize::MAX;
@@ -91,7 +95,12 @@ impl Basis for Tableau {
         for &v in basic {
             let index = self.index(v);
             let Place::Column(s) = self.place[index] else { continue };
-            let size = (0..n).fold(0.0_f64, |l, i| l.max(self.at(i, s).abs()));
+            let mut size = 0.0_f64;
+            let taken = |i: usize| self.rows[i] == i || self.taken[i];
+            match v {
+                Variable::Z(j) => data.each(j, |i, x| if taken(i) { size = size.max(x.abs()) }),
+                _ => (0..n).filter(|&i| taken(i)).for_each(|i| size = size.max(data.d[i].abs())),
+            }
             let free = (0..n).filter(|&i| self.rows[i] == i);
             let best = free.max_by(|&a, &b| self.at(a, s).abs().total_cmp(&self.at(b, s).abs()));
             let Some(r) = best.filter(|&r| self.at(r, s).abs() > SINGULAR * size) else {
@@ -99,6 +108,7 @@ impl Basis for Tableau {
             };
             self.pivot(r, s);
             self.rows[r] = usize::MAX;
+            self.taken[r] = true;
             self.place[index] = Place::Row(r);
             self.place[n + r] = Place::Column(s);
         }
