@@ -10,6 +10,7 @@ use crate::Session;
 use crate::auto::linear::{LinearAuto, Planned};
 use crate::form::{Bounded, Complementary};
 use crate::optimisation::linear::Proportioning;
+use crate::pivoting::LemkePath;
 use crate::settings::{SettingsMap, parse};
 use crate::splitting::linear::{Jacobi, Pgs, Proximal, Psor, Relaxation, Rpgs, Rpsor, Searched};
 
@@ -28,7 +29,12 @@ fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
 
 /// The solvers of problems whose variables are free or nonnegative.
 fn complementary_solvers<V: Visitor<Problem: Complementary>>() -> Vec<Entry<V>> {
-    bounded_solvers()
+    let mut entries = bounded_solvers();
+    entries.extend([Entry {
+        about: &LEMKE,
+        build: |s, v: V| Ok(v.visit(LemkePath::new(parse(s)?))),
+    }]);
+    entries
 }
 
 /// The solvers of horizontal problems.

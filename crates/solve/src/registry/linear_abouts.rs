@@ -3,6 +3,7 @@
 use super::{About, Solves};
 use crate::auto::linear::LinearAuto;
 use crate::optimisation::linear::Mprgp;
+use crate::pivoting::Lemke;
 use crate::settings::described;
 use crate::splitting::linear::{Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs};
 
@@ -100,4 +101,13 @@ pub const MPRGP: About = About {
     cites: &["DostalSchoberl2005", "Dostal2009"],
     variants: &["gamma=0.1"],
     settings: described::<Mprgp>,
+/// Lemke's method.
+pub const LEMKE: About = About {
+    name: "lemke",
+    family: "pivoting",
+    summary: "Lemke: complementary pivoting on a factorised basis; decides solvability for copositive-plus M",
+    needs: &["the entries of M"],
+    cites: &["Acary2018", "CottlePangStone2009", "Lemke1965"],
+    variants: &["basis=tableau", "basis=dense", "basis=sparse", "ties=perturbed", "covering=row_norms", "covering=random"],
+    settings: described::<Lemke>,
 };
