@@ -6,7 +6,8 @@ use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 
 use super::linear_abouts::*;
 use super::{About, Direct, Entry, Made, Registered, Visitor, find};
-use crate::form::{Bounded, Complementary};
+use crate::form::{Bounded, Complementary, Paired};
+use crate::interior::linear::{Mehrotra, Mty};
 use crate::settings::{SettingsMap, parse};
 use crate::splitting::linear::Jacobi;
 
@@ -16,13 +17,23 @@ fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
 }
 
 /// The solvers of problems whose variables are free or nonnegative.
-fn complementary_solvers<V: Visitor<Problem: Complementary>>() -> Vec<Entry<V>> {
-    bounded_solvers()
+fn complementary_solvers<V: Visitor<Problem: Complementary + Paired>>() -> Vec<Entry<V>> {
+    let mut all = bounded_solvers();
+    all.extend(paired_solvers());
+    all
+}
+
+/// The solvers that follow pairs of variables.
+fn paired_solvers<V: Visitor<Problem: Paired>>() -> Vec<Entry<V>> {
+    vec![
+        Entry { about: &IP_MTY, build: |s, v| Ok(v.visit(Mty(parse(s)?))) },
+        Entry { about: &IP_MEHROTRA, build: |s, v| Ok(v.visit(Mehrotra(parse(s)?))) },
+    ]
 }
 
 /// The solvers of horizontal problems.
 fn horizontal_solvers<V: Visitor<Problem = Hlcp>>() -> Vec<Entry<V>> {
-    vec![]
+    paired_solvers()
 }
 
 macro_rules! register {

@@ -1,6 +1,7 @@
 //! The solvers of linear complementarity problems, described.
 
 use super::{About, Solves};
+use crate::interior::linear::{MehrotraType, MizunoToddYe};
 use crate::settings::described;
 use crate::splitting::linear::ProjectedJacobi;
 
@@ -14,4 +15,28 @@ pub const PROJECTED_JACOBI: About = About {
     cites: &["Acary2018", "CottlePangStone2009"],
     variants: &["omega=0.7"],
     settings: described::<ProjectedJacobi>,
+};
+
+/// Mizuno, Todd and Ye's interior points.
+pub const IP_MTY: About = About {
+    name: "ip_mty",
+    family: "interior",
+    solves: Solves::Law,
+    summary: "interior points in the narrow neighbourhood: predictor and corrector of Mizuno, Todd and Ye",
+    needs: &["a monotone problem (of an LCP: M positive semidefinite) to be sure of its end"],
+    cites: &["MizunoToddYe1993", "Potra1996", "Acary2018"],
+    variants: &["theta=0.1"],
+    settings: described::<MizunoToddYe>,
+};
+
+/// Mehrotra's interior points.
+pub const IP_MEHROTRA: About = About {
+    name: "ip_mehrotra",
+    family: "interior",
+    solves: Solves::Law,
+    summary: "interior points in the wide neighbourhood: Mehrotra's predictor and corrector, infeasible start",
+    needs: &["a monotone problem (of an LCP: M positive semidefinite) to be sure of its end"],
+    cites: &["Mehrotra1992", "Wright1997", "Acary2018", "KojimaMegiddoNomaYoshise1991"],
+    variants: &["epsilon=0.01"],
+    settings: described::<MehrotraType>,
 };
