@@ -11,6 +11,8 @@ use crate::auto::linear::{LinearAuto, Planned};
 use crate::form::{Bounded, Complementary};
 use crate::optimisation::linear::Proportioning;
 use crate::pivoting::LemkePath;
+use crate::form::{Bounded, Complementary, Paired};
+use crate::interior::linear::{Mehrotra, Mty};
 use crate::settings::{SettingsMap, parse};
 use crate::splitting::linear::{Jacobi, Pgs, Proximal, Psor, Relaxation, Rpgs, Rpsor, Searched};
 
@@ -35,11 +37,23 @@ fn complementary_solvers<V: Visitor<Problem: Complementary>>() -> Vec<Entry<V>> 
         build: |s, v: V| Ok(v.visit(LemkePath::new(parse(s)?))),
     }]);
     entries
+fn complementary_solvers<V: Visitor<Problem: Complementary + Paired>>() -> Vec<Entry<V>> {
+    let mut all = bounded_solvers();
+    all.extend(paired_solvers());
+    all
+}
+
+/// The solvers that follow pairs of variables.
+fn paired_solvers<V: Visitor<Problem: Paired>>() -> Vec<Entry<V>> {
+    vec![
+        Entry { about: &IP_MTY, build: |s, v| Ok(v.visit(Mty(parse(s)?))) },
+        Entry { about: &IP_MEHROTRA, build: |s, v| Ok(v.visit(Mehrotra(parse(s)?))) },
+    ]
 }
 
 /// The solvers of horizontal problems.
 fn horizontal_solvers<V: Visitor<Problem = Hlcp>>() -> Vec<Entry<V>> {
-    vec![]
+    paired_solvers()
 }
 
 /// `auto` runs whole sessions of the others, so it is one itself.

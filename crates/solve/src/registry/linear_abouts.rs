@@ -4,6 +4,7 @@ use super::{About, Solves};
 use crate::auto::linear::LinearAuto;
 use crate::optimisation::linear::Mprgp;
 use crate::pivoting::Lemke;
+use crate::interior::linear::{MehrotraType, MizunoToddYe};
 use crate::settings::described;
 use crate::splitting::linear::{Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs};
 
@@ -110,4 +111,24 @@ pub const LEMKE: About = About {
     cites: &["Acary2018", "CottlePangStone2009", "Lemke1965"],
     variants: &["basis=tableau", "basis=dense", "basis=sparse", "ties=perturbed", "covering=row_norms", "covering=random"],
     settings: described::<Lemke>,
+/// Mizuno, Todd and Ye's interior points.
+pub const IP_MTY: About = About {
+    name: "ip_mty",
+    family: "interior",
+    summary: "interior points in the narrow neighbourhood: predictor and corrector of Mizuno, Todd and Ye",
+    needs: &["a monotone problem (of an LCP: M positive semidefinite) to be sure of its end"],
+    cites: &["MizunoToddYe1993", "Potra1996", "Acary2018"],
+    variants: &["theta=0.1"],
+    settings: described::<MizunoToddYe>,
+};
+
+/// Mehrotra's interior points.
+pub const IP_MEHROTRA: About = About {
+    name: "ip_mehrotra",
+    family: "interior",
+    summary: "interior points in the wide neighbourhood: Mehrotra's predictor and corrector, infeasible start",
+    needs: &["a monotone problem (of an LCP: M positive semidefinite) to be sure of its end"],
+    cites: &["Mehrotra1992", "Wright1997", "Acary2018", "KojimaMegiddoNomaYoshise1991"],
+    variants: &["epsilon=0.01"],
+    settings: described::<MehrotraType>,
 };

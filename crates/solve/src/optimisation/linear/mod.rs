@@ -3,3 +3,4 @@
 mod mprgp;
 
 pub use mprgp::{Mprgp, Proportioning};
+//! placeholder

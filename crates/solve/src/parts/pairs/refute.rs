@@ -1,0 +1,160 @@
+//! Vectors that refute a problem, from iterates that run away.
+//!
+//! Where `M z + q ≥ 0, z ≥ 0` is impossible and M is monotone, the iterates grow, and their directions x̂, ŝ tend to `M x̂ = ŝ`, `x̂ᵀŝ = 0`; then
+//! `x̂ᵀM x̂ = 0`, hence `Mᵀx̂ = −M x̂ ≤ 0`, and `qᵀx̂ < 0`: a Farkas vector, but for rounding and the path still to go. It is made exact by a projection: entries
+//! that should be zero, of y and of `Mᵀy`, are guessed, and the nearest vector with these zeros is taken. With R in general `Rᵀy = x̂`, `Qᵀy = ŝ`.
+
+use nonsmooth_problem::linalg::{Csc, Inverse, Matrix};
+
+use super::newton::Newton;
+use super::scale::Scaled;
+use crate::form::Equations;
+
+/// The projection's cost is that of a sparse factorisation of this order, at most.
+const LARGEST: usize = 20_000;
+/// A guess counts what is below these fractions of the largest as zero, in turn.
+const FRACTIONS: [f64; 3] = [1e-3, 1e-6, 1e-9];
+/// How far from a Farkas vector the first guess may be.
+const NEAR: f64 = 0.1;
+
+/// A row that no z ≥ 0 makes nonnegative: `q_r < 0`, `M_rj ≤ 0` for all j, and zero for free variables (lecture (19)).
+pub fn hopeless_row(problem: &Equations) -> Option<usize> {
+    let Equations { matrix, slack, q, free } = *problem;
+    if slack.is_some() {
+        return None;
+    }
+    let mut hopeless: Vec<bool> = q.iter().enumerate().map(|(i, q)| i >= free && *q < 0.0).collect();
+    matrix.for_each(|i, j, x| {
+        if x > 0.0 || (j < free && x != 0.0) {
+            hopeless[i] = false;
+        }
+    });
+    hopeless.iter().position(|h| *h)
+}
+
+/// A Farkas vector from an iterate, in the caller's units. α and β are those of the last factorisation.
+#[allow(clippy::too_many_arguments)]
+pub(super) fn farkas(
+    scaled: &Scaled,
+    newton: &mut Newton,
+    z: &[f64],
+    s: &[f64],
+    alpha: &[f64],
+    beta: &[f64],
+    t: &mut [f64],
+) -> Option<Vec<f64>> {
+    let free = scaled.free;
+    let size = s.iter().chain(&z[free..]).fold(0.0_f64, |l, x| l.max(x.abs()));
+    if size.is_nan() || size <= 0.0 {
+        return None;
+    }
+    let y: Vec<f64> = match &scaled.slack {
+        None => z.iter().map(|z| z / size).collect(),
+        Some(_) => {
+            // K_jᵀ y = α_j ŝ_j − β_j x̂_j is what Qᵀ y = ŝ, Rᵀ y = x̂ imply.
+            for (j, t) in t.iter_mut().enumerate() {
+                *t = (alpha[j] * s[j] - beta[j] * z[j]) / size;
+            }
+            newton.solve_transpose(t);
+            // The problem has c = −q on the left.
+            t.to_vec()
+        }
+    };
+    let sign = if scaled.slack.is_some() { -1.0 } else { 1.0 };
+    let cost: f64 = scaled.c.iter().zip(&y).map(|(c, y)| sign * c * y).sum();
+    if cost.is_nan() || cost >= 0.0 {
+        return None;
+    }
+    // The matrix whose transpose must not be positive (nonnegative with R) on the combination.
+    let (columns, direction) = match &scaled.slack {
+        None => (vec![scaled.matrix()], 1.0),
+        Some(r) => (vec![scaled.matrix(), r], -1.0),
+    };
+    let mut cleaned = cleaned(&columns, direction, free, &y)?;
+    scaled.rows_leave(&mut cleaned);
+    Some(cleaned)
+}
+
+/// The vector nearest to y with the zeros that it seems to have: for `y_i ≥ 0` beyond the first `free` entries, `Mᵀy ≤ 0` (zero for those of free variables), of
+/// a problem with R = −I. In the units of `matrix`.
+pub fn clean(matrix: &Matrix, free: usize, y: &[f64]) -> Option<Vec<f64>> {
+    cleaned(&[matrix], 1.0, free, y)
+}
+
+/// With one matrix y is nonnegative beyond the free entries; with two it has any sign.
+fn cleaned(matrices: &[&Matrix], direction: f64, free: usize, y: &[f64]) -> Option<Vec<f64>> {
+    let n = y.len();
+    if n > LARGEST {
+        return None;
+    }
+    let largest = |v: &[f64]| v.iter().fold(0.0_f64, |l, x| l.max(x.abs()));
+    let signed = matrices.len() > 1;
+    let sums: Vec<Vec<f64>> = matrices
+        .iter()
+        .map(|m| {
+            let mut g = vec![0.0; n];
+            m.mul_transpose(y, &mut g);
+            g.iter_mut().for_each(|g| *g *= direction);
+            g
+        })
+        .collect();
+    let reach = largest(y);
+    let wrong = sums.iter().flatten().fold(0.0_f64, |l, g| l.max(*g));
+    if wrong.is_nan() || wrong > NEAR * reach {
+        return None;
+    }
+    for fraction in FRACTIONS {
+        let floor = fraction * reach;
+        let support: Vec<usize> =
+            (0..n).filter(|&i| signed || i < free || y[i] > floor).collect();
+        let mut place = vec![usize::MAX; n];
+        support.iter().enumerate().for_each(|(k, &i)| place[i] = k);
+        let mut entries = vec![];
+        let mut count = 0;
+        for (m, g) in matrices.iter().zip(&sums) {
+            let mut number = vec![usize::MAX; n];
+            for j in 0..n {
+                if (!signed && j < free) || g[j] > -floor {
+                    number[j] = count;
+                    count += 1;
+                }
+            }
+            m.for_each(|i, j, x| {
+                if place[i] != usize::MAX && number[j] != usize::MAX {
+                    entries.push((place[i], number[j], x));
+                }
+            });
+        }
+        let p = support.len();
+        let Ok(g) = Csc::from_triplets(p, count, entries.iter().copied()) else { continue };
+        let Ok(projection) = Inverse::saddle(&Csc::diagonal(&vec![1.0; p]), &g) else { continue };
+        let mut both: Vec<f64> = support.iter().map(|&i| y[i]).collect();
+        both.resize(p + count, 0.0);
+        projection.solve(&mut both);
+        let mut out = vec![0.0; n];
+        support.iter().zip(&both).for_each(|(&i, &b)| out[i] = b);
+        let positive = signed || out[free..].iter().all(|y| *y >= 0.0);
+        let moved = out.iter().zip(y).fold(0.0_f64, |l, (a, b)| l.max((a - b).abs()));
+        if positive && moved <= 0.5 * reach && holds(matrices, direction, free, signed, &out) {
+            return Some(out);
+        }
+    }
+    None
+}
+
+/// The signs of the combination, with what is rounding taken for zero.
+fn holds(matrices: &[&Matrix], direction: f64, free: usize, signed: bool, y: &[f64]) -> bool {
+    let n = y.len();
+    matrices.iter().all(|m| {
+        let (mut sums, mut sizes) = (vec![0.0; n], vec![0.0; n]);
+        m.for_each(|i, j, x| {
+            sums[j] += direction * x * y[i];
+            sizes[j] += (x * y[i]).abs();
+        });
+        let fine = |(j, (g, size)): (usize, (&f64, &f64))| {
+            let zero = 5e-14 * size;
+            *g <= zero && (signed || j >= free || g.abs() <= zero)
+        };
+        sums.iter().zip(&sizes).enumerate().all(fine)
+    })
+}
