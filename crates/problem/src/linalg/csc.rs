@@ -111,6 +111,11 @@ impl Csc {
         &self.values
     }
 
+    /// Values, to be changed.
+    pub fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
     /// Row indices and values of column `j`.
     #[inline]
     pub fn column(&self, j: usize) -> (&[usize], &[f64]) {

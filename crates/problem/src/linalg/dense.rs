@@ -57,6 +57,11 @@ impl Dense {
         &self.values
     }
 
+    /// All entries, row by row, to be changed.
+    pub fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
     /// The entries that are not zero, as a sparse matrix.
     pub fn to_csc(&self) -> Csc {
         let there = (0..self.nrows).flat_map(|i| {

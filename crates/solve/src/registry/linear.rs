@@ -9,12 +9,27 @@ use super::{About, Direct, Entry, Made, Registered, Visitor, find};
 use crate::Session;
 use crate::auto::linear::{LinearAuto, Planned};
 use crate::form::{Bounded, Complementary};
+use crate::newton::linear::{Method, NewtonFb, NewtonMin, NewtonPfb, Semismooth};
 use crate::settings::{SettingsMap, parse};
 use crate::splitting::linear::Jacobi;
 
+/// A Newton method, by its function.
+fn newton<V, M>(settings: &SettingsMap, visitor: V) -> Result<V::Output, String>
+where
+    V: Visitor<Problem: Bounded>,
+    M: Method<Function: 'static>,
+{
+    Ok(visitor.visit(Semismooth::new(&parse::<M>(settings)?)))
+}
+
 /// The solvers that take bounds of any kind.
 fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
-    vec![Entry { about: &PROJECTED_JACOBI, build: |s, v| Ok(v.visit(Jacobi(parse(s)?))) }]
+    vec![
+        Entry { about: &PROJECTED_JACOBI, build: |s, v| Ok(v.visit(Jacobi(parse(s)?))) },
+        Entry { about: &NEWTON_MIN, build: |s, v| newton::<V, NewtonMin>(s, v) },
+        Entry { about: &NEWTON_FB, build: |s, v| newton::<V, NewtonFb>(s, v) },
+        Entry { about: &NEWTON_PFB, build: |s, v| newton::<V, NewtonPfb>(s, v) },
+    ]
 }
 
 /// The solvers of problems whose variables are free or nonnegative.
