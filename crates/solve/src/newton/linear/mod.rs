@@ -113,17 +113,20 @@ pub const PATIENCE: usize = 40;
 /// A full step on the minimum must bring Ψ below this part of the reference.
 const GOOD: f64 = 0.9;
 /// A step that is to finish must bring Ψ below this part.
-const FINISHED: f64 = 0.01;
+const FINISHED: f64 = 0.1;
 /// The methods on smooth merits try to finish below this ‖Φ‖∞.
 const FINISH_BELOW: f64 = 1e-3;
-/// After an attempt that failed the next one waits until ‖Φ‖∞ has fallen to this part.
+/// After an attempt that failed the next one waits until ‖Φ‖∞ has fallen to this part, or until a step leaves Ψ above the part `SLOW`.
 const NEXT_FINISH: f64 = 0.03;
+const SLOW: f64 = 0.5;
 /// Below this ‖Φ‖∞ w is computed in doubled precision.
 const PRECISE_BELOW: f64 = 1e-6;
 /// A direction descends if `∇Ψᵀd ≤ −ρ‖d‖^p` (DeLucaFacchineiKanzow1996).
 const DESCENT: (f64, f64) = (1e-8, 2.1);
 /// A linear system is solved if its residual is below this part of the right-hand side.
 const SOLVED: f64 = 1e-3;
+/// A direction is long if it is this many times as long as what it is to remove.
+const LONG: f64 = 30.0;
 /// λ of the minimum's singular matrices; refinement removes its bias.
 const SMALL: f64 = 1e-9;
 /// Up to this order Levenberg–Marquardt's dense matrices are factorised.
@@ -168,6 +171,7 @@ pub struct Work {
     correction: Vec<f64>,
     stacked: Vec<f64>,
     phase: Phase,
+    last_t: f64,
 }
 
 /// How the solve is going.
@@ -182,16 +186,13 @@ struct Phase {
     proximal_tries: usize,
     low: f64,
     since_low: usize,
+    /// Ψ where the last step began.
+    last: f64,
     /// ‖Φ‖∞ below which the next attempt to finish is made.
     finish_below: f64,
     restarts: usize,
-    counts: Counts,
-}
-
-#[derive(Debug, Clone, Copy, Default)]
-struct Counts {
+    /// The steps that each rung made.
     moves: [usize; 5],
-    finished: bool,
 }
 
 impl Phase {
@@ -204,16 +205,17 @@ impl Phase {
             proximal_tries: 0,
             low: f64::INFINITY,
             since_low: 0,
+            last: f64::INFINITY,
             finish_below: FINISH_BELOW,
             restarts: 0,
-            counts: Counts::default(),
+            moves: [0; 5],
         }
     }
 
     /// The same solve from another start.
     fn anew(&mut self) {
-        let Self { restarts, counts, .. } = *self;
-        *self = Self { restarts: restarts + 1, counts, ..Self::new() };
+        let Self { restarts, moves, .. } = *self;
+        *self = Self { restarts: restarts + 1, moves, ..Self::new() };
     }
 }
 
@@ -251,7 +253,7 @@ impl<P: Paired, F: ScalarFunction> Solver<P> for Semismooth<F> {
             residual: vec![0.0; m],
             correction: vec![0.0; n],
             stacked: Vec::with_capacity(m + n),
-            phase: Phase::new(),
+            phase: Phase::new(), last_t: 0.0,
         })
     }
 
@@ -305,6 +307,7 @@ impl<P: Paired, F: ScalarFunction> Solver<P> for Semismooth<F> {
             Rung::Marquardt => self.marquardt(work, merit),
             Rung::Gradient => self.steepest(work, merit),
         };
+        if std::env::var_os("NEWTON_DEBUG").is_some() { eprintln!("{rung:?} {moved} merit {:.2e} largest {:.2e} prox {:.1e} |x| {:.1e} |d| {:.1e} low {:.1e} t {:.1e}", merit.value, merit.largest, work.phase.proximal, norm(&work.x), norm(&work.d), work.phase.low, work.last_t); }
         let phase = &mut work.phase;
         match (rung, moved) {
             (Rung::Proximal, true) => phase.proximal = (phase.proximal / 4.0).max(1e-3),
@@ -314,7 +317,7 @@ impl<P: Paired, F: ScalarFunction> Solver<P> for Semismooth<F> {
             _ => {}
         }
         if moved {
-            phase.counts.moves[rung as usize] += 1;
+            phase.moves[rung as usize] += 1;
             (phase.rung, phase.proximal_tries) = (None, 0);
             return Step::Continue { estimate: norm(&work.phi) };
         }
@@ -345,8 +348,8 @@ impl<P: Paired, F: ScalarFunction> Solver<P> for Semismooth<F> {
     }
 
     fn account(&self, work: &Work) -> Vec<String> {
-        let Phase { counts, restarts, .. } = work.phase;
-        let [minimum, newton, proximal, marquardt, gradient] = counts.moves;
+        let Phase { moves, restarts, .. } = work.phase;
+        let [minimum, newton, proximal, marquardt, gradient] = moves;
         let mut said = vec![format!(
             "steps on the minimum {minimum}, Newton {newton}, proximal {proximal}, Levenberg-Marquardt {marquardt}, gradient {gradient}"
         )];
@@ -384,7 +387,8 @@ impl<F: ScalarFunction> Semismooth<F> {
         if self.minimum_first {
             return Rung::Minimum;
         }
-        if merit.largest <= phase.finish_below {
+        let slow = merit.value > SLOW * std::mem::replace(&mut phase.last, merit.value);
+        if merit.largest <= phase.finish_below || (slow && merit.largest <= FINISH_BELOW) {
             phase.finish_below = NEXT_FINISH * merit.largest;
             return Rung::Minimum;
         }
@@ -486,6 +490,7 @@ impl<F: ScalarFunction> Semismooth<F> {
             }
             merit_at(&self.function, problem, trial, trial_w)
         });
+        work.last_t = found.step;
         if found.accepted {
             Self::take(work, merit);
         }
@@ -509,14 +514,32 @@ impl<F: ScalarFunction> Semismooth<F> {
                 (phi[i], of_z[i], of_w[i]) = (at.value, at.z, at.w);
             }
         }
-        if !(Self::solve(work, 0.0, true) || Self::solve(work, SMALL, true)) {
+        let solved = Self::solve(work, 0.0, true);
+        if solved && self.full(work, merit) {
+            return true;
+        }
+        // Where the matrix is (nearly) singular the short solution is wanted: it leaves the other pairs alone.
+        let long = norm(&work.d) > LONG * norm(&work.phi);
+        if (!solved || long) && Self::solve(work, SMALL, true) {
+            if self.full(work, merit) {
+                return true;
+            }
+        } else if !solved {
             return false;
         }
+        if !self.minimum_first {
+            return false;
+        }
+        let slope = Self::slope(work);
+        Self::descends(work, slope) && self.along(work, merit, slope)
+    }
+
+    /// The full step d of the minimum, what goes to a bound going there exactly, if it is good.
+    fn full(&self, work: &mut Work, merit: Merit) -> bool {
         let Work { problem, x, phi, of_z, of_w, d, trial, trial_w, .. } = work;
         for (to, (x, d)) in trial.iter_mut().zip(x.iter().zip(&*d)) {
             *to = x + d;
         }
-        // What goes to a bound goes there exactly.
         for i in 0..phi.len() {
             if let Some(j) = problem.variable(i).filter(|_| of_w[i] == 0.0 && of_z[i] != 0.0) {
                 let (l, u) = (problem.lower[j], problem.upper[j]);
@@ -531,16 +554,12 @@ impl<F: ScalarFunction> Semismooth<F> {
             full <= FINISHED * merit.value
         };
         let blind = self.settings.line_search == LineSearch::None && self.minimum_first;
-        if (good || blind) && full.is_finite() {
+        let accepted = (good || blind) && full.is_finite();
+        if accepted {
             work.search.remember(merit.value);
             Self::take(work, merit);
-            return true;
         }
-        if !self.minimum_first {
-            return false;
-        }
-        let slope = Self::slope(work);
-        Self::descends(work, slope) && self.along(work, merit, slope)
+        accepted
     }
 
     /// A step on the method's own function, with a proximal term.
