@@ -13,8 +13,18 @@ use crate::optimisation::linear::Proportioning;
 use crate::pivoting::LemkePath;
 use crate::form::{Bounded, Complementary, Paired};
 use crate::interior::linear::{Mehrotra, Mty};
+use crate::newton::linear::{Method, NewtonFb, NewtonMin, NewtonPfb, Semismooth};
 use crate::settings::{SettingsMap, parse};
 use crate::splitting::linear::{Jacobi, Pgs, Proximal, Psor, Relaxation, Rpgs, Rpsor, Searched};
+
+/// A Newton method, by its function.
+fn newton<V, M>(settings: &SettingsMap, visitor: V) -> Result<V::Output, String>
+where
+    V: Visitor<Problem: Bounded>,
+    M: Method<Function: 'static>,
+{
+    Ok(visitor.visit(Semismooth::new(&parse::<M>(settings)?)))
+}
 
 /// The solvers that take bounds of any kind.
 fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
@@ -26,6 +36,9 @@ fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
         Entry { about: &RPSOR, build: |s, v| Ok(v.visit(Proximal(parse(s)?))) },
         Entry { about: &MPRGP, build: |s, v| Ok(v.visit(Proportioning(parse(s)?))) },
         Entry { about: &SPLITTING_LS, build: |s, v| Ok(v.visit(Searched(parse(s)?))) },
+        Entry { about: &NEWTON_MIN, build: |s, v| newton::<V, NewtonMin>(s, v) },
+        Entry { about: &NEWTON_FB, build: |s, v| newton::<V, NewtonFb>(s, v) },
+        Entry { about: &NEWTON_PFB, build: |s, v| newton::<V, NewtonPfb>(s, v) },
     ]
 }
 

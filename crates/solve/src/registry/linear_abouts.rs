@@ -5,6 +5,7 @@ use crate::auto::linear::LinearAuto;
 use crate::optimisation::linear::Mprgp;
 use crate::pivoting::Lemke;
 use crate::interior::linear::{MehrotraType, MizunoToddYe};
+use crate::newton::linear::{NewtonFb, NewtonMin, NewtonPfb};
 use crate::settings::described;
 use crate::splitting::linear::{Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs};
 
@@ -131,4 +132,32 @@ pub const IP_MEHROTRA: About = About {
     cites: &["Mehrotra1992", "Wright1997", "Acary2018", "KojimaMegiddoNomaYoshise1991"],
     variants: &["epsilon=0.01"],
     settings: described::<MehrotraType>,
+/// Newton's method on the minimum.
+pub const NEWTON_MIN: About = About {
+    name: "newton_min",
+    family: "newton",
+    summary: "semismooth Newton on min(z, w), globalised by the Fischer-Burmeister merit",
+    cites: &["Acary2018", "BenGharbiaGilbert2012", "DeLucaFacchineiKanzow1996"],
+    variants: &["line_search=armijo"],
+    settings: described::<NewtonMin>,
+};
+
+/// Newton's method on the Fischer–Burmeister function.
+pub const NEWTON_FB: About = About {
+    name: "newton_fb",
+    family: "newton",
+    summary: "semismooth Newton on the Fischer-Burmeister function; equalities in any number",
+    cites: &["Acary2018", "Fischer1992", "DeLucaFacchineiKanzow1996"],
+    variants: &["line_search=armijo"],
+    settings: described::<NewtonFb>,
+};
+
+/// Newton's method on the penalised Fischer–Burmeister function.
+pub const NEWTON_PFB: About = About {
+    name: "newton_pfb",
+    family: "newton",
+    summary: "semismooth Newton on the penalised Fischer-Burmeister function",
+    cites: &["Acary2018", "ChenChenKanzow2000"],
+    variants: &["lambda=0.95"],
+    settings: described::<NewtonPfb>,
 };
