@@ -32,9 +32,7 @@ impl Numbers {
 }
 
 fn times(a: &Dense, b: &Dense) -> Dense {
-    Dense::from_fn(a.nrows(), b.ncols(), |i, j| {
-        (0..a.ncols()).map(|k| a[(i, k)] * b[(k, j)]).sum()
-    })
+    Dense::from_fn(a.nrows(), b.ncols(), |i, j| (0..a.ncols()).map(|k| a[(i, k)] * b[(k, j)]).sum())
 }
 
 fn transposed(a: &Dense) -> Dense {
@@ -129,14 +127,26 @@ fn planted_monotone_problems_are_solved_to_rounding() {
                     let matrices = [Matrix::from(m.clone()), m.to_csc().into()];
                     let (z, w, q) = planted(&matrices[0], share, numbers);
                     for m in matrices {
-                        let storage = if matches!(m, Matrix::Dense(_)) { "dense" } else { "sparse" };
+                        let storage =
+                            if matches!(m, Matrix::Dense(_)) { "dense" } else { "sparse" };
                         let problem = Lcp::new(m, q.clone()).unwrap();
                         for name in BOTH {
-                            let at = format!("{name}, {class}, {storage}, n = {n}, seed {seed}, share {share}");
+                            let at = format!(
+                                "{name}, {class}, {storage}, n = {n}, seed {seed}, share {share}"
+                            );
                             let run = run(&problem, name, 1e-12);
-                            assert_eq!(run.outcome.status, Status::Solved, "{at}: {:?}", run.outcome.measure);
+                            assert_eq!(
+                                run.outcome.status,
+                                Status::Solved,
+                                "{at}: {:?}",
+                                run.outcome.measure
+                            );
                             let most = if name == "ip_mty" { 120 } else { 60 };
-                            assert!(run.outcome.iterations <= most, "{at}: {}", run.outcome.iterations);
+                            assert!(
+                                run.outcome.iterations <= most,
+                                "{at}: {}",
+                                run.outcome.iterations
+                            );
                             let wrong = off(&w_of(&problem, &run.point.z), &w);
                             if class == "SPD" || class == "PSD" {
                                 assert!(wrong < 1e-6, "{at}: w off by {wrong:.1e}");

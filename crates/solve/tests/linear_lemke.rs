@@ -60,7 +60,13 @@ fn assert_close(z: &[f64], expected: &[f64], what: &str) {
 
 /// 1 on the diagonal, 2 above.
 fn upper(i: usize, j: usize) -> f64 {
-    if i == j { 1.0 } else if i < j { 2.0 } else { 0.0 }
+    if i == j {
+        1.0
+    } else if i < j {
+        2.0
+    } else {
+        0.0
+    }
 }
 
 /// Name, problem, solution, pivots of the textbook's tableau with d = e and lexicographic ties.
@@ -157,17 +163,18 @@ fn classics() -> Vec<(String, Lcp, Vec<f64>, Option<usize>)> {
             Some(2 * n),
         ));
         let csizmadia = |i: usize, j: usize| {
-            if i == j { 1.0 } else if j < i { -1.0 } else { 0.0 }
+            if i == j {
+                1.0
+            } else if j < i {
+                -1.0
+            } else {
+                0.0
+            }
         };
         let z: Vec<f64> = (0..n).map(|i| power(i)).collect();
         all.push((format!("Csizmadia {n}"), from_fn(n, csizmadia, |_| -1.0), z, Some(n + 1)));
     }
-    all.push((
-        "exp_murty".into(),
-        from_fn(6, upper, |_| -1.0),
-        unit(6, 5, 1.0),
-        Some(4),
-    ));
+    all.push(("exp_murty".into(), from_fn(6, upper, |_| -1.0), unit(6, 5, 1.0), Some(4)));
     all
 }
 
@@ -209,8 +216,7 @@ fn same_pivots(problem: &Lcp, settings: Lemke, what: &str) -> Run {
     let mut runs: Vec<Run> =
         BASES.iter().map(|&basis| run(problem, Lemke { basis, ..settings })).collect();
     let first = runs.remove(0);
-    let exchanges =
-        |r: &Run| r.pivots.iter().map(|p| (p.entering, p.leaving)).collect::<Vec<_>>();
+    let exchanges = |r: &Run| r.pivots.iter().map(|p| (p.entering, p.leaving)).collect::<Vec<_>>();
     for other in &runs {
         assert_eq!(exchanges(&first), exchanges(other), "{what}");
         assert_eq!(first.outcome.status.name(), other.outcome.status.name(), "{what}");
@@ -252,7 +258,13 @@ fn planted(n: usize, class: Class, share: f64, seed: u64) -> (Lcp, Vec<f64>) {
         Class::CopositivePlus => product(i, j) + skew[(i, j)].abs() + f64::from(u8::from(i == j)),
         Class::Triangular => {
             let (a, b) = ((7 * i + 3) % n, (7 * j + 3) % n);
-            if i == j { 1.0 } else if a < b { skew[(i, j)] } else { 0.0 }
+            if i == j {
+                1.0
+            } else if a < b {
+                skew[(i, j)]
+            } else {
+                0.0
+            }
         }
     });
     let (mut z, mut w) = (vec![0.0; n], vec![0.0; n]);
@@ -295,9 +307,7 @@ fn many_ties_are_broken() {
     for n in [20, 60, 150] {
         let mut rng = rng(n as u64);
         let signs = Dense::from_fn(n, n, |_, _| f64::from(rng.random_range(-1..2_i32)));
-        let m = |i: usize, j: usize| {
-            signs[(i, j)] - signs[(j, i)] + if i == j { 1.0 } else { 0.0 }
-        };
+        let m = |i: usize, j: usize| signs[(i, j)] - signs[(j, i)] + if i == j { 1.0 } else { 0.0 };
         let problem = from_fn(n, m, |_| -1.0);
         for ties in [Ties::Lexicographic, Ties::Perturbed] {
             let found = same_pivots(&problem, Lemke { ties, ..plain() }, "ties");
@@ -351,7 +361,15 @@ fn infeasible_programs_have_a_ray() {
             (false, false) => 0.0,
         };
         let q: Vec<f64> = (0..n)
-            .map(|i| if i < k { i as f64 - 6.0 } else if i < k + m { 0.0 } else { -1.0 })
+            .map(|i| {
+                if i < k {
+                    i as f64 - 6.0
+                } else if i < k + m {
+                    0.0
+                } else {
+                    -1.0
+                }
+            })
             .collect();
         let problem = from_fn(n, entry, |i| q[i]);
         let found = same_pivots(&problem, plain(), "infeasible");
@@ -401,11 +419,8 @@ fn scales_of_rows_and_columns_do_not_matter() {
             let mut scale = || 10.0_f64.powf(rng.random_range(-8.0..8.0));
             let rows: Vec<f64> = (0..n).map(|_| scale()).collect();
             let columns: Vec<f64> = (0..n).map(|_| scale()).collect();
-            let scaled = from_fn(
-                n,
-                |i, j| rows[i] * m[(i, j)] * columns[j],
-                |i| rows[i] * problem.q[i],
-            );
+            let scaled =
+                from_fn(n, |i, j| rows[i] * m[(i, j)] * columns[j], |i| rows[i] * problem.q[i]);
             for covering in [Covering::Auto, Covering::RowNorms, Covering::Ones] {
                 let found = same_pivots(&scaled, Lemke { covering, ..plain() }, "scaled");
                 assert_eq!(found.outcome.status, Status::Solved, "{class:?}, {n}, {covering:?}");
@@ -418,7 +433,12 @@ fn scales_of_rows_and_columns_do_not_matter() {
 fn a_solution_is_a_first_basis() {
     let (problem, z) = planted(60, Class::Definite, 0.0, 5);
     let cold = run(&problem, Lemke::default());
-    let warm = run_with(&problem, LemkePath::new(Lemke::default()), &z.iter().map(|z| 1.01 * z).collect::<Vec<_>>(), 1e-11);
+    let warm = run_with(
+        &problem,
+        LemkePath::new(Lemke::default()),
+        &z.iter().map(|z| 1.01 * z).collect::<Vec<_>>(),
+        1e-11,
+    );
     assert_eq!(warm.outcome.status, Status::Solved);
     assert!(warm.pivots.is_empty() && cold.pivots.len() > 10);
     // A few of the signs are wrong: a few pivots.
@@ -430,7 +450,12 @@ fn a_solution_is_a_first_basis() {
         let settings = Lemke { basis, ..Lemke::default() };
         let warm = run_with(&problem, LemkePath::new(settings), &off, 1e-11);
         assert_eq!(warm.outcome.status, Status::Solved);
-        assert!(warm.pivots.len() < cold.pivots.len(), "{} pivots, {} before", warm.pivots.len(), cold.pivots.len());
+        assert!(
+            warm.pivots.len() < cold.pivots.len(),
+            "{} pivots, {} before",
+            warm.pivots.len(),
+            cold.pivots.len()
+        );
         assert_close(&warm.z, &cold.z, "warm");
     }
 }

@@ -112,7 +112,6 @@ impl Csc {
     }
 
     /// Values, to be changed; the pattern stays.
-    /// Values, to be changed.
     pub fn values_mut(&mut self) -> &mut [f64] {
         &mut self.values
     }

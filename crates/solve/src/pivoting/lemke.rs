@@ -338,11 +338,13 @@ impl LemkePath {
     fn applies<'a, P: Complementary>(&self, problem: &'a P) -> Result<System<'a>, SolveError> {
         let system = problem.system()?;
         system.needs_entries()?;
-        let fits = |d: &[f64]| d.len() == system.dim() && d.iter().all(|d| *d > 0.0 && d.is_finite());
+        let fits =
+            |d: &[f64]| d.len() == system.dim() && d.iter().all(|d| *d > 0.0 && d.is_finite());
         match &self.covering {
-            Some(d) if !fits(d) => {
-                Err(SolveError::needs("a covering vector with a positive entry for each row", "another"))
-            }
+            Some(d) if !fits(d) => Err(SolveError::needs(
+                "a covering vector with a positive entry for each row",
+                "another",
+            )),
             _ => Ok(system),
         }
     }
@@ -361,7 +363,12 @@ impl LemkePath {
     }
 
     /// The first basis, and z0 into it; or the end, where there is nothing to do.
-    fn begin(&self, system: &System, point: &LcpPoint, work: &mut LemkeWork) -> Result<Event, Step> {
+    fn begin(
+        &self,
+        system: &System,
+        point: &LcpPoint,
+        work: &mut LemkeWork,
+    ) -> Result<Event, Step> {
         let phase = work.phase;
         work.warm = phase == Phase::Warm;
         let placed = match phase {
@@ -553,7 +560,10 @@ impl LemkeWork {
         if violation <= SOLVED {
             Step::Done
         } else if self.dropped > 0 {
-            Step::Stuck("an equality has no free variable of its own, and the path does not satisfy it".into())
+            Step::Stuck(
+                "an equality has no free variable of its own, and the path does not satisfy it"
+                    .into(),
+            )
         } else {
             Step::Stuck("the last basis is not feasible to working accuracy".into())
         }

@@ -340,7 +340,9 @@ impl Path {
         let largest = slots.map(|s| self.x[s] / self.y[s]).fold(0.0_f64, f64::max);
         self.tied.clear();
         for s in 0..self.x.len() {
-            if self.y[s] < 0.0 && self.x[s] - largest * self.y[s] <= TIE * self.size[s].max(self.x[s].abs()) {
+            if self.y[s] < 0.0
+                && self.x[s] - largest * self.y[s] <= TIE * self.size[s].max(self.x[s].abs())
+            {
                 self.tied.push(s);
             }
         }
@@ -390,7 +392,8 @@ impl Path {
         loop {
             let Self { data, basis, y, driving, .. } = self;
             basis.column(data, *driving, y);
-            let largest = y.iter().fold(0.0_f64, |l, y| if y.is_nan() { f64::NAN } else { l.max(y.abs()) });
+            let largest =
+                y.iter().fold(0.0_f64, |l, y| if y.is_nan() { f64::NAN } else { l.max(y.abs()) });
             if !largest.is_finite() {
                 return Event::Trouble("the basis has become singular to working accuracy");
             }

@@ -8,12 +8,11 @@ use super::linear_abouts::*;
 use super::{About, Direct, Entry, Made, Registered, Visitor, find};
 use crate::Session;
 use crate::auto::linear::{LinearAuto, Planned};
-use crate::form::{Bounded, Complementary};
-use crate::optimisation::linear::Proportioning;
-use crate::pivoting::LemkePath;
 use crate::form::{Bounded, Complementary, Paired};
 use crate::interior::linear::{Mehrotra, Mty};
 use crate::newton::linear::{Method, NewtonFb, NewtonMin, NewtonPfb, Semismooth};
+use crate::optimisation::linear::Proportioning;
+use crate::pivoting::LemkePath;
 use crate::settings::{SettingsMap, parse};
 use crate::splitting::linear::{Jacobi, Pgs, Proximal, Psor, Relaxation, Rpgs, Rpsor, Searched};
 
@@ -43,17 +42,16 @@ fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
 }
 
 /// The solvers of problems whose variables are free or nonnegative.
-fn complementary_solvers<V: Visitor<Problem: Complementary>>() -> Vec<Entry<V>> {
-    let mut entries = bounded_solvers();
-    entries.extend([Entry {
-        about: &LEMKE,
-        build: |s, v: V| Ok(v.visit(LemkePath::new(parse(s)?))),
-    }]);
-    entries
 fn complementary_solvers<V: Visitor<Problem: Complementary + Paired>>() -> Vec<Entry<V>> {
     let mut all = bounded_solvers();
+    all.extend(pivoting_solvers());
     all.extend(paired_solvers());
     all
+}
+
+/// The pivoting methods.
+fn pivoting_solvers<V: Visitor<Problem: Complementary>>() -> Vec<Entry<V>> {
+    vec![Entry { about: &LEMKE, build: |s, v| Ok(v.visit(LemkePath::new(parse(s)?))) }]
 }
 
 /// The solvers that follow pairs of variables.

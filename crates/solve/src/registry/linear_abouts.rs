@@ -2,10 +2,10 @@
 
 use super::{About, Solves};
 use crate::auto::linear::LinearAuto;
-use crate::optimisation::linear::Mprgp;
-use crate::pivoting::Lemke;
 use crate::interior::linear::{MehrotraType, MizunoToddYe};
 use crate::newton::linear::{NewtonFb, NewtonMin, NewtonPfb};
+use crate::optimisation::linear::Mprgp;
+use crate::pivoting::Lemke;
 use crate::settings::described;
 use crate::splitting::linear::{Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs};
 
@@ -103,19 +103,32 @@ pub const MPRGP: About = About {
     cites: &["DostalSchoberl2005", "Dostal2009"],
     variants: &["gamma=0.1"],
     settings: described::<Mprgp>,
+};
+
 /// Lemke's method.
 pub const LEMKE: About = About {
     name: "lemke",
     family: "pivoting",
+    solves: Solves::Law,
     summary: "Lemke: complementary pivoting on a factorised basis; decides solvability for copositive-plus M",
     needs: &["the entries of M"],
     cites: &["Acary2018", "CottlePangStone2009", "Lemke1965"],
-    variants: &["basis=tableau", "basis=dense", "basis=sparse", "ties=perturbed", "covering=row_norms", "covering=random"],
+    variants: &[
+        "basis=tableau",
+        "basis=dense",
+        "basis=sparse",
+        "ties=perturbed",
+        "covering=row_norms",
+        "covering=random",
+    ],
     settings: described::<Lemke>,
+};
+
 /// Mizuno, Todd and Ye's interior points.
 pub const IP_MTY: About = About {
     name: "ip_mty",
     family: "interior",
+    solves: Solves::Law,
     summary: "interior points in the narrow neighbourhood: predictor and corrector of Mizuno, Todd and Ye",
     needs: &["a monotone problem (of an LCP: M positive semidefinite) to be sure of its end"],
     cites: &["MizunoToddYe1993", "Potra1996", "Acary2018"],
@@ -127,16 +140,21 @@ pub const IP_MTY: About = About {
 pub const IP_MEHROTRA: About = About {
     name: "ip_mehrotra",
     family: "interior",
+    solves: Solves::Law,
     summary: "interior points in the wide neighbourhood: Mehrotra's predictor and corrector, infeasible start",
     needs: &["a monotone problem (of an LCP: M positive semidefinite) to be sure of its end"],
     cites: &["Mehrotra1992", "Wright1997", "Acary2018", "KojimaMegiddoNomaYoshise1991"],
     variants: &["epsilon=0.01"],
     settings: described::<MehrotraType>,
+};
+
 /// Newton's method on the minimum.
 pub const NEWTON_MIN: About = About {
     name: "newton_min",
     family: "newton",
+    solves: Solves::Law,
     summary: "semismooth Newton on min(z, w), globalised by the Fischer-Burmeister merit",
+    needs: &["the entries of M"],
     cites: &["Acary2018", "BenGharbiaGilbert2012", "DeLucaFacchineiKanzow1996"],
     variants: &["line_search=armijo"],
     settings: described::<NewtonMin>,
@@ -146,7 +164,9 @@ pub const NEWTON_MIN: About = About {
 pub const NEWTON_FB: About = About {
     name: "newton_fb",
     family: "newton",
+    solves: Solves::Law,
     summary: "semismooth Newton on the Fischer-Burmeister function; equalities in any number",
+    needs: &["the entries of M"],
     cites: &["Acary2018", "Fischer1992", "DeLucaFacchineiKanzow1996"],
     variants: &["line_search=armijo"],
     settings: described::<NewtonFb>,
@@ -156,7 +176,9 @@ pub const NEWTON_FB: About = About {
 pub const NEWTON_PFB: About = About {
     name: "newton_pfb",
     family: "newton",
+    solves: Solves::Law,
     summary: "semismooth Newton on the penalised Fischer-Burmeister function",
+    needs: &["the entries of M"],
     cites: &["Acary2018", "ChenChenKanzow2000"],
     variants: &["lambda=0.95"],
     settings: described::<NewtonPfb>,

@@ -41,7 +41,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::cfun::scalar::{self, Min, ScalarFunction, Slope};
-use crate::form::Paired;
+use crate::form::Rowwise;
 use crate::parts::{LineSearch, Search};
 use crate::settings::Settings;
 use crate::{SolveError, Solver, Step};
@@ -228,11 +228,11 @@ struct Merit {
     largest: f64,
 }
 
-impl<P: Paired, F: ScalarFunction> Solver<P> for Semismooth<F> {
+impl<P: Rowwise, F: ScalarFunction> Solver<P> for Semismooth<F> {
     type Work = Work;
 
     fn work(&self, problem: &P) -> Result<Work, SolveError> {
-        let problem = Scaled::new(&problem.paired())?;
+        let problem = Scaled::new(&problem.rowwise())?;
         let (m, n) = (problem.nrows(), problem.dim());
         Ok(Work {
             jacobian: Jacobian::new(&problem),
@@ -253,12 +253,13 @@ impl<P: Paired, F: ScalarFunction> Solver<P> for Semismooth<F> {
             residual: vec![0.0; m],
             correction: vec![0.0; n],
             stacked: Vec::with_capacity(m + n),
-            phase: Phase::new(), last_t: 0.0,
+            phase: Phase::new(),
+            last_t: 0.0,
         })
     }
 
     fn refill(&self, problem: &P, work: &mut Work) -> Result<(), SolveError> {
-        let rows = problem.paired();
+        let rows = problem.rowwise();
         rows.needs_entries()?;
         if !work.problem.refill(&rows) {
             *work = self.work(problem)?;
@@ -307,7 +308,18 @@ impl<P: Paired, F: ScalarFunction> Solver<P> for Semismooth<F> {
             Rung::Marquardt => self.marquardt(work, merit),
             Rung::Gradient => self.steepest(work, merit),
         };
-        if std::env::var_os("NEWTON_DEBUG").is_some() { eprintln!("{rung:?} {moved} merit {:.2e} largest {:.2e} prox {:.1e} |x| {:.1e} |d| {:.1e} low {:.1e} t {:.1e}", merit.value, merit.largest, work.phase.proximal, norm(&work.x), norm(&work.d), work.phase.low, work.last_t); }
+        if std::env::var_os("NEWTON_DEBUG").is_some() {
+            eprintln!(
+                "{rung:?} {moved} merit {:.2e} largest {:.2e} prox {:.1e} |x| {:.1e} |d| {:.1e} low {:.1e} t {:.1e}",
+                merit.value,
+                merit.largest,
+                work.phase.proximal,
+                norm(&work.x),
+                norm(&work.d),
+                work.phase.low,
+                work.last_t
+            );
+        }
         let phase = &mut work.phase;
         match (rung, moved) {
             (Rung::Proximal, true) => phase.proximal = (phase.proximal / 4.0).max(1e-3),
@@ -616,7 +628,7 @@ impl<F: ScalarFunction> Semismooth<F> {
     }
 
     /// No direction descends, or none descends enough.
-    fn give_up<P: Paired>(&self, problem: &P, work: &mut Work, merit: Merit) -> Step {
+    fn give_up<P: Rowwise>(&self, problem: &P, work: &mut Work, merit: Merit) -> Step {
         let reach = work.x.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
         if merit.largest <= ROUNDING * reach {
             return Step::Done;
@@ -625,7 +637,7 @@ impl<F: ScalarFunction> Semismooth<F> {
     }
 
     /// Starts again elsewhere, if that is still allowed.
-    fn restart<P: Paired>(&self, problem: &P, work: &mut Work) -> Step {
+    fn restart<P: Rowwise>(&self, problem: &P, work: &mut Work) -> Step {
         if work.phase.restarts >= self.settings.restarts {
             return stuck(problem);
         }
@@ -651,8 +663,8 @@ impl<F: ScalarFunction> Semismooth<F> {
 }
 
 /// The last word: a row that proves that there is no solution, if there is one.
-fn stuck<P: Paired>(problem: &P) -> Step {
-    let rows = problem.paired();
+fn stuck<P: Rowwise>(problem: &P) -> Step {
+    let rows = problem.rowwise();
     for row in 0..rows.q.len() {
         let proof = Certificate::Row { row };
         if rows.q[row] < 0.0 && problem.verify(&proof) {

@@ -3,4 +3,3 @@
 mod mprgp;
 
 pub use mprgp::{Mprgp, Proportioning};
-//! placeholder

@@ -23,7 +23,8 @@ pub fn hopeless_row(problem: &Equations) -> Option<usize> {
     if slack.is_some() {
         return None;
     }
-    let mut hopeless: Vec<bool> = q.iter().enumerate().map(|(i, q)| i >= free && *q < 0.0).collect();
+    let mut hopeless: Vec<bool> =
+        q.iter().enumerate().map(|(i, q)| i >= free && *q < 0.0).collect();
     matrix.for_each(|i, j, x| {
         if x > 0.0 || (j < free && x != 0.0) {
             hopeless[i] = false;
@@ -105,8 +106,7 @@ fn cleaned(matrices: &[&Matrix], direction: f64, free: usize, y: &[f64]) -> Opti
     }
     for fraction in FRACTIONS {
         let floor = fraction * reach;
-        let support: Vec<usize> =
-            (0..n).filter(|&i| signed || i < free || y[i] > floor).collect();
+        let support: Vec<usize> = (0..n).filter(|&i| signed || i < free || y[i] > floor).collect();
         let mut place = vec![usize::MAX; n];
         support.iter().enumerate().for_each(|(k, &i)| place[i] = k);
         let mut entries = vec![];

@@ -81,8 +81,7 @@ impl Scaled {
         self.norm_q = norm(q);
         self.abs_q.clear();
         self.abs_q.extend(q.iter().map(|q| q.abs()));
-        for v in
-            [&mut self.largest, &mut self.sums, &mut self.slack_largest, &mut self.slack_sums]
+        for v in [&mut self.largest, &mut self.sums, &mut self.slack_largest, &mut self.slack_sums]
         {
             v.clear();
             v.resize(n, 0.0);
@@ -277,7 +276,8 @@ impl Scaled {
                 let s_reach = largest(s, &self.ds);
                 for i in 0..z.len() {
                     let w = self.theta / self.e[i] * r[i];
-                    let terms = self.abs_q[i] + self.sums[i] * z_reach + self.slack_sums[i] * s_reach;
+                    let terms =
+                        self.abs_q[i] + self.sums[i] * z_reach + self.slack_sums[i] * s_reach;
                     add(w, w, terms);
                     let x = self.largest[i] * self.theta * self.dz[i] * z[i];
                     let y = self.slack_largest[i] * self.theta * self.ds[i] * s[i];

@@ -194,7 +194,14 @@ impl Data {
     }
 
     /// `b − B x`, summed up in doubled precision.
-    pub fn residual(&self, basic: &[Variable], b: &[f64], x: &[f64], sums: &mut [Compensated], out: &mut [f64]) {
+    pub fn residual(
+        &self,
+        basic: &[Variable],
+        b: &[f64],
+        x: &[f64],
+        sums: &mut [Compensated],
+        out: &mut [f64],
+    ) {
         for (sum, &b) in sums.iter_mut().zip(b) {
             *sum = Compensated::default();
             sum.add(b);

@@ -98,7 +98,11 @@ impl Basis for Tableau {
             let mut size = 0.0_f64;
             let taken = |i: usize| self.rows[i] == i || self.taken[i];
             match v {
-                Variable::Z(j) => data.each(j, |i, x| if taken(i) { size = size.max(x.abs()) }),
+                Variable::Z(j) => data.each(j, |i, x| {
+                    if taken(i) {
+                        size = size.max(x.abs())
+                    }
+                }),
                 _ => (0..n).filter(|&i| taken(i)).for_each(|i| size = size.max(data.d[i].abs())),
             }
             let free = (0..n).filter(|&i| self.rows[i] == i);
