@@ -37,7 +37,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<LinearFile, IoError> {
     let kinds: [(&str, Reader); 3] =
         [("an MLCP", mixed), ("an MLCP of the old format", mixed_old), ("an LCP", lcp)];
     let mut found: Vec<(&str, Complementarity)> = vec![];
-    // The mistake that was made last in the file: of the kind that fits best.
+    // The mistake that was made last in the file: of the kind that fits best, the most frequent one among equals.
     let mut nearest: Option<(usize, IoError)> = None;
     for (name, reader) in kinds {
         let mut tokens = Tokens::new(path, &text);
@@ -45,7 +45,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<LinearFile, IoError> {
             Ok(problem) => found.push((name, problem)),
             Err(e) => {
                 let left = tokens.left();
-                if nearest.as_ref().is_none_or(|n| left < n.0) {
+                if nearest.as_ref().is_none_or(|n| left <= n.0) {
                     nearest = Some((left, e));
                 }
             }
@@ -215,7 +215,9 @@ fn stored_parts(
 /// An MLCP of the old format, which may have more equalities than free variables.
 fn mixed_old(t: &mut Tokens, path: &Path) -> Result<Complementarity, IoError> {
     let n = t.count("the number n of free variables")?;
-    let m = t.count("the number m of pairs")?;
+    // Without pairs it would be an equation, and many a damaged LCP would look like one.
+    let most = t.left() / 2 + 1;
+    let m = t.one_of("the number m of pairs", "at least 1", |m| (1..=most).contains(&m))?;
     let expected = format!("a number of rows of at least n + m = {}", n + m);
     let most = t.left() / 2 + 1;
     let rows = t.one_of("the number of rows", &expected, |r| n + m <= r && r <= most)?;
