@@ -2,6 +2,7 @@
 
 use nonsmooth_bench::draw::{Axis, GRID, INK, decades, font, tick, ticks};
 use nonsmooth_solve::Sample;
+use nonsmooth_solve::trace::Trace;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -18,7 +19,13 @@ const KEPT: usize = 800;
 const DEPTH: f64 = 20.0;
 
 /// Draws the relative residual against iterations and against time, two panels side by side, as a standalone SVG.
-pub fn svg(title: &str, history: &[Sample], tolerance: f64) -> Result<String, String> {
+pub fn svg(
+    title: &str,
+    history: &[Sample],
+    trace: &Trace,
+    tolerance: f64,
+) -> Result<String, String> {
+    let _ = trace;
     let mut text = String::new();
     draw(&mut text, title, history, tolerance).map_err(|e| format!("plot: {e}"))?;
     Ok(text)
@@ -215,7 +222,7 @@ mod tests {
     }
 
     fn picture(residuals: impl IntoIterator<Item = f64>) -> String {
-        let svg = svg("a <b> & c", &history(residuals), 1e-8).unwrap();
+        let svg = svg("a <b> & c", &history(residuals), &Trace::None, 1e-8).unwrap();
         assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
         assert!(svg.contains("a &lt;b&gt; &amp; c"), "the title is escaped");
         assert!(!svg.contains("\"NaN") && !svg.contains("\"inf"));
