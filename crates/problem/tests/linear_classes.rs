@@ -412,7 +412,7 @@ proptest! {
             .map(|i| (0..n).map(|j| if i == j { m[i][j] } else { -m[i][j].abs() }).collect())
             .collect();
         let h = minors(&compared).iter().all(|d| *d > 0);
-        prop_assert!(if h { c.is(HPlus) } else { !c.is(HPlus) }, "{}", c);
+        says(HPlus, h)?;
         // A vector of small integers that shows something must not meet a proof to the contrary.
         let value = |x: &[i64]| times(&twice, x).iter().zip(x).map(|(a, b)| a * b).sum::<i64>();
         for x in grid(n, 0, 3).iter().filter(|x| x.iter().any(|v| *v > 0)) {

@@ -105,6 +105,11 @@ pub enum Witness {
         /// The two rows.
         pair: [usize; 2],
     },
+    /// A principal minor of the comparison matrix that is not positive.
+    ComparisonMinor {
+        /// Its rows.
+        rows: Vec<usize>,
+    },
     /// A vector `x ≥ 0`, not zero, whose product with the comparison matrix has no positive entry.
     Comparison {
         /// The entries of x that are not zero, by index.
@@ -239,6 +244,9 @@ impl fmt::Display for Witness {
             Self::Transform { pivots, pair: [i, j] } => {
                 write!(f, "the pair {{{i}, {j}}} after pivots on {}", indices(pivots))
             }
+            Self::ComparisonMinor { rows } => {
+                write!(f, "the principal minor of {} of the comparison matrix", indices(rows))
+            }
             Self::Comparison { x } => write!(f, "the comparison matrix and x = {}", vector(x)),
             Self::Combination { y } => write!(f, "y^T M <= 0 for y = {}", vector(y)),
         }
@@ -252,6 +260,12 @@ pub(super) fn entry(m: &Matrix, i: usize, j: usize) -> f64 {
         Matrix::Sparse(a) => a.get(i, j),
         Matrix::Operator(_) => f64::NAN,
     }
+}
+
+/// The entry of the comparison matrix.
+pub(super) fn compared(m: &Matrix, i: usize, j: usize) -> Interval {
+    let x = entry(m, i, j).abs();
+    Interval::from(if i == j { x } else { -x })
 }
 
 /// `M_ij + M_ji`.
@@ -402,6 +416,9 @@ impl Witness {
                 let Some(t) = tableau.transformed(&set) else { return false };
                 let [column, row] = insufficient(&t, place(i), place(j));
                 if class == Class::ColumnSufficient { column } else { row }
+            }
+            (Self::ComparisonMinor { rows }, Class::HPlus) if proper(rows, n) => {
+                negative(determinant_sign(rows.len(), |i, j| compared(m, rows[i], rows[j])), true)
             }
             (Self::Comparison { x }, Class::HPlus) if proper_vector(x, n) => {
                 let mut dense = vec![0.0; n];

@@ -62,6 +62,7 @@ impl Default for Effort {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Classes {
+    order: usize,
     findings: Vec<Finding>,
 }
 
@@ -71,7 +72,7 @@ impl Classes {
     /// Of an operator, and of a matrix that is not square or has entries that are not finite, nothing is known.
     pub fn of(m: &Matrix, effort: Effort) -> Self {
         let unknown = Finding::Unknown { why: Why::Undecided };
-        let mut out = Self { findings: vec![unknown; Class::ALL.len()] };
+        let mut out = Self { order: m.nrows(), findings: vec![unknown; Class::ALL.len()] };
         let mut finite = true;
         let known = m.for_each(|_, _, x| finite &= x.is_finite());
         if !known {
@@ -91,6 +92,11 @@ impl Classes {
     /// What O(nnz) operations and at most two Cholesky factorisations show.
     pub fn quick(m: &Matrix) -> Self {
         Self::of(m, Effort { operations: 0, thorough: false })
+    }
+
+    /// The number of rows of the matrix.
+    pub fn order(&self) -> usize {
+        self.order
     }
 
     /// What is known of a class.
@@ -356,8 +362,12 @@ impl Classes {
                 self.unsure(Class::IrreduciblyDominant, Why::Rounding);
             }
         }
-        if row_sums_positive(m) {
+        let [row, column] = sums(m);
+        if row.iter().all(|s| s.is_positive()) {
             self.prove(Class::S, How::Entries);
+        } else if column.iter().all(|s| s.is_nonpositive()) {
+            let y = (0..m.nrows()).map(|i| (i, 1.0)).collect();
+            self.refute(m, Class::S, Witness::Combination { y });
         }
     }
 
@@ -426,11 +436,18 @@ impl Classes {
             };
             match found {
                 Ok(Ok(_)) => {}
-                Ok(Err(Witness::Comparison { x })) => {
-                    let x = x.into_iter().map(|(i, a)| (rows[i], a)).collect();
-                    return self.refute(m, Class::HPlus, Witness::Comparison { x });
+                Ok(Err(witness)) => {
+                    let witness = match witness {
+                        Witness::Comparison { x } => Witness::Comparison {
+                            x: x.into_iter().map(|(i, a)| (rows[i], a)).collect(),
+                        },
+                        Witness::ComparisonMinor { rows: at } => Witness::ComparisonMinor {
+                            rows: at.into_iter().map(|i| rows[i]).collect(),
+                        },
+                        other => other,
+                    };
+                    return self.refute(m, Class::HPlus, witness);
                 }
-                Ok(Err(_)) => all = Err(Why::Undecided),
                 Err(why) => all = all.and(Err(why)),
             }
         }
@@ -674,11 +691,14 @@ fn transforms(n: usize) -> u64 {
     ((n * n) as u64) << n.min(40)
 }
 
-/// `M e > 0`.
-fn row_sums_positive(m: &Matrix) -> bool {
-    let mut sums = vec![Interval::ZERO; m.nrows()];
-    m.for_each(|i, _, x| sums[i] += x.into());
-    sums.iter().all(|s| s.is_positive())
+/// `M e` and `Mᵀ e`.
+fn sums(m: &Matrix) -> [Vec<Interval>; 2] {
+    let mut sums = [vec![Interval::ZERO; m.nrows()], vec![Interval::ZERO; m.nrows()]];
+    m.for_each(|i, j, x| {
+        sums[0][i] += x.into();
+        sums[1][j] += x.into();
+    });
+    sums
 }
 
 impl std::fmt::Display for Classes {
