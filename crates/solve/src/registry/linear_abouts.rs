@@ -53,7 +53,7 @@ pub const PSOR: About = About {
     summary: "projected Gauss-Seidel with over-relaxation, whose factor may follow the observed rate",
     needs: &["the entries of M", "a positive diagonal of M"],
     cites: &["Acary2018", "Cryer1971", "CottlePangStone2009", "HagemanYoung1981"],
-    variants: &["adapt=true", "direction=symmetric"],
+    variants: &["adapt=false", "direction=symmetric"],
     settings: described::<Psor>,
 };
 
