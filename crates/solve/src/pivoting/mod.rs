@@ -1,0 +1,18 @@
+//! Pivoting methods for linear complementarity problems: finite, on complementary (or almost complementary) bases.
+
+mod bard;
+mod block;
+mod criss_cross;
+mod enumeration;
+mod keller;
+mod murty;
+
+pub use bard::{Bard, BardPivoting};
+pub use block::{BlockPivoting, BlockPrincipal};
+pub use criss_cross::{CrissCross, CrissCrossPivoting};
+pub use enumeration::{Enumeration, Enumerate, Face, Solutions, all_solutions};
+pub use keller::{Keller, KellerPivoting};
+pub use murty::{Murty, MurtyPivoting};
+
+/// Pivots between two visits of the judge: the bases on the way are rarely worth a visit, but the best of them survives a limit.
+const CHECK_EVERY: usize = 100;
