@@ -24,7 +24,7 @@ use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::linalg::{Block, Singular};
 
-pub use complementarity::{Bounded, Bounds, Complementary, System, system};
+pub use complementarity::{Bounded, Bounds, Complementary, Mixed, System, system};
 pub use explicit::{Explicit, Model};
 pub use regularised::{Overwrite, Regularised, RegularisedState};
 

@@ -139,6 +139,8 @@ pub struct Tableau {
     refuting: Option<usize>,
     since_rebuilt: usize,
     polishes: usize,
+    /// How often a singular basis threw the solve back to the initial one.
+    restarts: usize,
     /// Numbers the pivots of a solve.
     count: usize,
     /// The initial basis: the free variables, and what they needed.
@@ -195,7 +197,7 @@ impl Tableau {
         }
         self.set.clear();
         self.set.reserve(n);
-        (self.impossible, self.count, self.polishes) = (None, 0, 0);
+        (self.impossible, self.count, self.polishes, self.restarts) = (None, 0, 0, 0);
         self.refuting = refuting_row(system);
         self.fill(system);
         self.reset();
@@ -287,7 +289,10 @@ impl Tableau {
     fn solve_with_pair(&mut self) -> Result<(), SolveError> {
         let n = self.n;
         let mut best = (0.0, 0, 0);
-        for i in (0..self.free).filter(|i| !self.basic[*i] && !self.dropped[*i]) {
+        for i in 0..self.free {
+            if self.basic[i] || self.dropped[i] {
+                continue;
+            }
             self.sizes_of_row(i);
             for j in (self.free..n).filter(|j| !self.basic[*j]) {
                 let (there, back) = (self.t[i * n + j].abs(), self.t[j * n + i].abs());
@@ -400,6 +405,16 @@ impl Tableau {
             }
         }
         worst.map(|(i, _)| i)
+    }
+
+    /// How often a singular basis threw the solve back to the initial one.
+    pub fn restarts(&self) -> usize {
+        self.restarts
+    }
+
+    /// Whether the bases on the way are numerically singular, and it is of no use to go on.
+    pub fn is_lost(&self) -> bool {
+        self.restarts > 3
     }
 
     /// A sentence for the user.
@@ -634,6 +649,7 @@ impl Tableau {
 
     /// Back to the initial basis.
     fn restart(&mut self) {
+        self.restarts += 1;
         let first = std::mem::take(&mut self.first);
         self.reset();
         self.adopt(&first);
@@ -680,9 +696,11 @@ impl Tableau {
     pub fn warm(&mut self, system: &System, z: &[f64]) {
         let n = self.n;
         (self.count, self.polishes) = (0, 0);
+        self.restarts = 0;
         if z.iter().any(|z| !z.is_finite()) || z[self.free..].iter().all(|z| *z <= 0.0) {
             if self.basic != self.first {
                 self.restart();
+                self.restarts = 0;
             }
             return;
         }
@@ -700,6 +718,7 @@ impl Tableau {
         if (0..n).any(|i| self.first[i] && !self.basic[i]) {
             self.restart();
         }
+        self.restarts = 0;
         self.wanted = wanted;
     }
 

@@ -71,6 +71,9 @@ impl<P: Complementary> Solver<P> for BardPivoting {
         if let Some(proof) = tableau.refuted() {
             return Step::NoSolution(proof);
         }
+        if tableau.is_lost() {
+            return Step::Stuck("numerically singular bases on the way".into());
+        }
         let chosen =
             if *least { tableau.first_negative(false) } else { tableau.most_negative() };
         let Some(r) = chosen else {

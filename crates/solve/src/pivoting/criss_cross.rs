@@ -64,6 +64,9 @@ impl<P: Complementary> Solver<P> for CrissCrossPivoting {
         if let Some(proof) = tableau.refuted() {
             return Step::NoSolution(proof);
         }
+        if tableau.is_lost() {
+            return Step::Stuck("numerically singular bases on the way".into());
+        }
         let Some(r) = tableau.first_negative(self.0.descending) else {
             return match tableau.polish() {
                 Polished::Negative => {

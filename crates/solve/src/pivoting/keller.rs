@@ -48,6 +48,7 @@ pub struct KellerWork {
     is_z: Vec<bool>,
     lambda: f64,
     distinguished: Option<usize>,
+    restarts: usize,
 }
 
 const NOT_SUFFICIENT: &str = "signs in the tableau show that M is not a sufficient matrix";
@@ -68,6 +69,7 @@ impl KellerWork {
             self.lambda = self.lambda.min(if negative { 2.0 * self.x[i] } else { 0.0 });
         }
         self.distinguished = None;
+        self.restarts = self.tableau.restarts();
         self.cycle.begin(self.tableau.basis());
     }
 
@@ -198,6 +200,7 @@ impl<P: Complementary> Solver<P> for KellerPivoting {
             is_z: vec![false; n],
             lambda: 0.0,
             distinguished: None,
+            restarts: 0,
         })
     }
 
@@ -221,6 +224,12 @@ impl<P: Complementary> Solver<P> for KellerPivoting {
     fn step(&self, _: &P, _: &mut LcpPoint, work: &mut KellerWork) -> Step {
         if let Some(proof) = work.tableau.refuted() {
             return Step::NoSolution(proof);
+        }
+        if work.tableau.is_lost() {
+            return Step::Stuck("numerically singular bases on the way".into());
+        }
+        if work.restarts != work.tableau.restarts() {
+            work.begin();
         }
         let chosen = work.distinguished.or_else(|| work.choose(self.0.least_index));
         if let Some(r) = chosen {

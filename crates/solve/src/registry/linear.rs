@@ -9,6 +9,9 @@ use super::{About, Direct, Entry, Made, Registered, Visitor, find};
 use crate::Session;
 use crate::auto::linear::{LinearAuto, Planned};
 use crate::form::{Bounded, Complementary};
+use crate::pivoting::{
+    BardPivoting, BlockPrincipal, CrissCrossPivoting, Enumerate, KellerPivoting, MurtyPivoting,
+};
 use crate::settings::{SettingsMap, parse};
 use crate::splitting::linear::Jacobi;
 
@@ -19,7 +22,21 @@ fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
 
 /// The solvers of problems whose variables are free or nonnegative.
 fn complementary_solvers<V: Visitor<Problem: Complementary>>() -> Vec<Entry<V>> {
-    bounded_solvers()
+    let mut all = bounded_solvers();
+    all.extend(pivoting_solvers());
+    all
+}
+
+/// The principal pivoting methods, and enumeration.
+fn pivoting_solvers<V: Visitor<Problem: Complementary>>() -> Vec<Entry<V>> {
+    vec![
+        Entry { about: &MURTY, build: |s, v| Ok(v.visit(MurtyPivoting(parse(s)?))) },
+        Entry { about: &BARD, build: |s, v| Ok(v.visit(BardPivoting(parse(s)?))) },
+        Entry { about: &CRISS_CROSS, build: |s, v| Ok(v.visit(CrissCrossPivoting(parse(s)?))) },
+        Entry { about: &KELLER, build: |s, v| Ok(v.visit(KellerPivoting(parse(s)?))) },
+        Entry { about: &BLOCK_PIVOTING, build: |s, v| Ok(v.visit(BlockPrincipal(parse(s)?))) },
+        Entry { about: &ENUMERATION, build: |s, v| Ok(v.visit(Enumerate(parse(s)?))) },
+    ]
 }
 
 /// The solvers of horizontal problems.
