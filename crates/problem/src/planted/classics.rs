@@ -411,10 +411,11 @@ pub fn pang_perturbed() -> Classic {
     Classic::small("pang_perturbed", PANG, [-1e-4, -1.0, 1.0], &[])
 }
 
-/// [`pang_perturbed`] with `M_12 = −1`, `M_13 = 1`: solvable again.
+/// [`pang_perturbed`] with `M_12 = −1`, `M_13 = 1`: solvable again, by `(1, t, 10⁻⁴ + t)`, t ≥ 0.
 pub fn pang_other_perturbed() -> Classic {
-    let m = [[0.0, -1.0, 1.0], PANG[1], PANG[2]];
-    Classic::small("pang_other_perturbed", m, [-1e-4, -1.0, 1.0], &[[1.0, 0.0, 1e-4]])
+    let m = Dense::from_fn(3, 3, |i, j| if (i, j) == (0, 2) { 1.0 } else { PANG[i][j] });
+    let known = Known::HalfLine([vec![1.0, 0.0, 1e-4], vec![0.0, 1.0, 1.0]]);
+    Classic::new("pang_other_perturbed", m, vec![-1e-4, -1.0, 1.0], known)
 }
 
 /// Two variables, positive definite, both positive.

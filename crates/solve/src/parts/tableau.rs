@@ -25,9 +25,11 @@ use crate::trace::{Pivot, Recorder, Variable};
 /// The largest order: beyond, two dense matrices are no longer a sensible thing to allocate.
 const MOST: usize = 20_000;
 /// What of q̄ is zero, in units of its terms.
-const NEGLIGIBLE: f64 = 1e-12;
+const NEGLIGIBLE: f64 = 1e-11;
 /// What of an entry of t is zero, in units of its terms.
 const ZERO: f64 = 1e-11;
+/// What rounding makes of refined values, in units of their terms.
+const REFINED: f64 = 64.0 * f64::EPSILON;
 /// How often the answer is polished and found not to be one, before the method gives up.
 const POLISHES: usize = 20;
 
@@ -438,12 +440,20 @@ impl Tableau {
     /// t_ii, zero where it is no more than rounding.
     pub fn diagonal(&self, i: usize) -> f64 {
         let (n, row) = (self.n, self.row(i));
-        let size = if self.basic[i] {
-            (0..n).filter(|k| self.basic[*k]).fold(0.0_f64, |s, k| s.max(row[k].abs()))
-        } else {
-            let basic = (0..n).filter(|k| self.basic[*k]);
-            basic.fold(self.m[i * n + i].abs(), |s, k| s + (row[k] * self.m[k * n + i]).abs())
+        let basic = || (0..n).filter(|k| self.basic[*k]);
+        // t_ik M_ki of w_i; t_ik M_kl t_li of z_i.
+        let column = |k: usize| -> f64 {
+            let from = &self.m[k * n..(k + 1) * n];
+            if !self.basic[i] {
+                return from[i].abs();
+            }
+            basic().map(|l| (from[l] * self.t[l * n + i]).abs()).sum()
         };
+        let first = if self.basic[i] { 0.0 } else { self.m[i * n + i].abs() };
+        if row[i].abs() > 1e-3 * row.iter().fold(first, |l, x| l.max(x.abs())) {
+            return row[i];
+        }
+        let size = basic().fold(first, |s, k| s + row[k].abs() * column(k));
         if row[i].abs() <= ZERO * size { 0.0 } else { row[i] }
     }
 
@@ -577,7 +587,8 @@ impl Tableau {
         pivot_row.copy_from_slice(row);
         q[a] /= -p;
         size[a] /= p.abs();
-        let (value, terms) = (q[a], size[a]);
+        // Of what cancelled in row a, its rounding goes on to the others, not its size.
+        let (value, terms) = (q[a], q[a].abs().max(1e-3 * size[a]));
         for i in (0..n).filter(|i| *i != a) {
             let row = &mut t[i * n..(i + 1) * n];
             let factor = row[b];
@@ -585,7 +596,7 @@ impl Tableau {
                 row[b] = 0.0;
                 row.iter_mut().zip(&*pivot_row).for_each(|(x, p)| *x += factor * p);
                 q[i] += factor * value;
-                size[i] = size[i].max(factor.abs() * terms.max(value.abs()));
+                size[i] = size[i].max(factor.abs() * terms);
             }
         }
     }
@@ -745,6 +756,19 @@ impl Tableau {
         if self.polishes > POLISHES { Polished::Exhausted } else { Polished::Negative }
     }
 
+    /// Before a tableau says something unpleasant: the same basis anew from the data, where it has seen pivots since the last time. False where that has been
+    /// done already, or too often.
+    pub fn freshen(&mut self) -> bool {
+        if self.since_rebuilt == 0 || self.polishes > POLISHES {
+            return false;
+        }
+        self.polishes += 1;
+        if self.rebuild() {
+            self.refine();
+        }
+        true
+    }
+
     /// Iterative refinement of the basic z, then w of the others; q̄ and its sizes become those of accurate values. False where it does not converge.
     fn refine(&mut self) -> bool {
         let n = self.n;
@@ -770,10 +794,10 @@ impl Tableau {
                 let row = &t[i * n..(i + 1) * n];
                 let correction: f64 = set.iter().map(|&k| row[k] * scratch[k]).sum();
                 q[i] -= correction;
-                size[i] = 4.0 * f64::EPSILON / NEGLIGIBLE
-                    * set.iter().map(|&k| (row[k] * sizes[k]).abs()).sum::<f64>();
+                let terms = set.iter().map(|&k| (row[k] * sizes[k]).abs()).sum::<f64>();
+                size[i] = REFINED / NEGLIGIBLE * terms;
                 // In units of the component's own rounding: small components converge too.
-                let unit = size[i] * NEGLIGIBLE;
+                let unit = 4.0 * f64::EPSILON * terms;
                 finite &= correction.is_finite() && unit.is_finite();
                 largest = largest.max(if unit > 0.0 { correction.abs() / unit } else { 0.0 });
             }
@@ -797,8 +821,11 @@ impl Tableau {
                 sum.add_product(row[j], q[j]);
                 terms += (row[j] * q[j]).abs();
             }
+            // What the rounding of z_α does to w_i: t_iα times that of the residuals.
+            let row = &t[i * n..(i + 1) * n];
+            terms += set.iter().map(|&k| (row[k] * sizes[k]).abs()).sum::<f64>();
             q[i] = sum.value();
-            size[i] = 4.0 * f64::EPSILON / NEGLIGIBLE * terms;
+            size[i] = REFINED / NEGLIGIBLE * terms;
         }
         converged
     }
@@ -814,7 +841,15 @@ impl Tableau {
     /// A proof that was seen before the first pivot: a row that is always negative, an equation that cannot hold.
     pub fn refuted(&mut self) -> Option<Certificate> {
         let row = self.refuting.map(|row| Certificate::Row { row });
-        row.or_else(|| self.impossible.map(|i| self.farkas(i)))
+        row.or_else(|| {
+            let i = self.impossible?;
+            let mut proof = self.farkas(i);
+            // An equation may be taken with either sign.
+            if let (Certificate::Farkas { y }, true) = (&mut proof, self.q[i] > 0.0) {
+                y.iter_mut().for_each(|y| *y = -*y);
+            }
+            Some(proof)
+        })
     }
 
     /// The combination of rows that row i of the tableau is. Where `q̄_i < 0` and no entry of the row is positive, it proves that there is no solution.
@@ -845,10 +880,9 @@ impl Tableau {
                 y[k] += set.iter().map(|&j| t[j * n + k] * scratch[j]).sum::<f64>();
             }
         }
-        let largest = y.iter().fold(0.0_f64, |l, y| l.max(y.abs()));
         let mut out = vec![0.0; n];
         for k in 0..n {
-            let keep = k < self.free || y[k] > ZERO * largest;
+            let keep = k < self.free || y[k] > 0.0;
             let e = self.equation[k];
             out[e] = if keep { y[k] * self.rows[e] } else { 0.0 };
         }

@@ -86,6 +86,9 @@ impl<P: Complementary> Solver<P> for BardPivoting {
             };
         };
         if tableau.diagonal(r) == 0.0 {
+            if tableau.freshen() {
+                return Step::Continue { estimate: f64::NAN };
+            }
             return Step::Stuck("a zero on the diagonal of the tableau: M is not a P-matrix".into());
         }
         tableau.pivot(r);

@@ -78,7 +78,7 @@ impl<P: Complementary> Solver<P> for CrissCrossPivoting {
         };
         match tableau.diagonal(r) {
             d if d > 0.0 => tableau.pivot(r),
-            d if d < 0.0 => return Step::Stuck(NOT_SUFFICIENT.into()),
+            d if d < 0.0 => return unpleasant(tableau, Step::Stuck(NOT_SUFFICIENT.into())),
             _ => {
                 tableau.sizes_of_row(r);
                 let eligible = |j: &usize| {
@@ -91,10 +91,13 @@ impl<P: Complementary> Solver<P> for CrissCrossPivoting {
                     pairs.find(eligible)
                 };
                 match partner {
-                    None => return Step::NoSolution(tableau.farkas(r)),
+                    None => {
+                        let proof = tableau.farkas(r);
+                        return unpleasant(tableau, Step::NoSolution(proof));
+                    }
                     // Of a sufficient matrix t_jr is negative.
                     Some(j) if !tableau.pivot_pair(r, j) => {
-                        return Step::Stuck(NOT_SUFFICIENT.into());
+                        return unpleasant(tableau, Step::Stuck(NOT_SUFFICIENT.into()));
                     }
                     Some(_) => {}
                 }
@@ -125,4 +128,9 @@ impl<P: Complementary> Solver<P> for CrissCrossPivoting {
     fn check_every(&self) -> usize {
         super::CHECK_EVERY
     }
+}
+
+/// The step's word, once it has been heard from a tableau that is fresh from the data.
+fn unpleasant(tableau: &mut Tableau, word: Step) -> Step {
+    if tableau.freshen() { Step::Continue { estimate: f64::NAN } } else { word }
 }

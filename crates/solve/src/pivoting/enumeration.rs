@@ -392,7 +392,8 @@ impl Case {
         row[j] = 1.0;
         self.b[i] /= p;
         self.size[i] /= p.abs();
-        let (value, terms) = (self.b[i], self.size[i]);
+        // Of what cancelled in row i, its rounding goes on to the others, not its size.
+        let (value, terms) = (self.b[i], self.b[i].abs().max(1e-3 * self.size[i]));
         let others = head.chunks_exact_mut(width).chain(tail.chunks_exact_mut(width));
         let kept = self.b.iter_mut().zip(&mut self.size).enumerate().filter(|(k, _)| *k != i);
         for (other, (_, (b, size))) in others.zip(kept) {
@@ -401,7 +402,7 @@ impl Case {
                 other.iter_mut().zip(&*row).for_each(|(x, r)| *x -= factor * r);
                 other[j] = 0.0;
                 *b -= factor * value;
-                *size = size.max(factor.abs() * terms.max(value.abs()));
+                *size = size.max(factor.abs() * terms);
             }
         }
         self.basis[i] = Basic::Column(j);

@@ -233,7 +233,13 @@ impl<P: Complementary> Solver<P> for KellerPivoting {
         }
         let chosen = work.distinguished.or_else(|| work.choose(self.0.least_index));
         if let Some(r) = chosen {
-            return work.drive(r);
+            let word = work.drive(r);
+            // What is unpleasant is heard twice, the second time from a tableau fresh from the data.
+            if !matches!(word, Step::Continue { .. }) && work.tableau.freshen() {
+                work.begin();
+                return Step::Continue { estimate: f64::NAN };
+            }
+            return word;
         }
         match work.tableau.polish() {
             Polished::Negative => {
