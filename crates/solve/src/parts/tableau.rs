@@ -26,8 +26,8 @@ use crate::trace::{Pivot, Recorder, Variable};
 const MOST: usize = 20_000;
 /// What of q̄ is zero, in units of its terms.
 const NEGLIGIBLE: f64 = 1e-11;
-/// What of an entry of t is zero, in units of its terms.
-const ZERO: f64 = 1e-11;
+/// What of an entry of t is zero, as a perturbation of M.
+const ZERO: f64 = 1e-13;
 /// What rounding makes of refined values, in units of their terms.
 const REFINED: f64 = 64.0 * f64::EPSILON;
 /// How often the answer is polished and found not to be one, before the method gives up.
@@ -254,7 +254,7 @@ impl Tableau {
         let first = largest(&self.t, &used, &of_column).0;
         for _ in 0..f {
             let (x, a, b) = largest(&self.t, &used, &of_column);
-            if x <= ZERO * first || x == 0.0 {
+            if x <= 1e-12 * first || x == 0.0 {
                 break;
             }
             (used[a], of_column[b]) = (true, a);
@@ -298,7 +298,7 @@ impl Tableau {
             self.sizes_of_row(i);
             for j in (self.free..n).filter(|j| !self.basic[*j]) {
                 let (there, back) = (self.t[i * n + j].abs(), self.t[j * n + i].abs());
-                if there > ZERO * self.sizes[j] && there.min(back) > best.0 {
+                if there > self.threshold(j) && there.min(back) > best.0 {
                     best = (there.min(back), i, j);
                 }
             }
@@ -437,86 +437,48 @@ impl Tableau {
         self.t[i * self.n + j]
     }
 
-    /// t_ii, zero where it is no more than rounding.
-    pub fn diagonal(&self, i: usize) -> f64 {
-        let (n, row) = (self.n, self.row(i));
-        let basic = || (0..n).filter(|k| self.basic[*k]);
-        // t_ik M_ki of w_i; t_ik M_kl t_li of z_i.
-        let column = |k: usize| -> f64 {
-            let from = &self.m[k * n..(k + 1) * n];
-            if !self.basic[i] {
-                return from[i].abs();
-            }
-            basic().map(|l| (from[l] * self.t[l * n + i]).abs()).sum()
-        };
-        let first = if self.basic[i] { 0.0 } else { self.m[i * n + i].abs() };
-        if row[i].abs() > 1e-3 * row.iter().fold(first, |l, x| l.max(x.abs())) {
-            return row[i];
-        }
-        let size = basic().fold(first, |s, k| s + row[k].abs() * column(k));
-        if row[i].abs() <= ZERO * size { 0.0 } else { row[i] }
+    /// How row i of t feels a perturbation of M: `‖t_iα‖₁`, and 1 for its own row where w_i is basic. M is scaled to entries of at most about 1.
+    fn row_reach(&self, i: usize) -> f64 {
+        let row = self.row(i).iter().zip(&self.basic);
+        let own = if self.basic[i] { 0.0 } else { 1.0 };
+        own + row.filter(|(_, b)| **b).map(|(t, _)| t.abs()).sum::<f64>()
     }
 
-    /// The size of the terms of the entries of row i, into [`sizes`](Self::sizes).
+    /// As [`row_reach`](Self::row_reach), of column j.
+    fn column_reach(&self, j: usize) -> f64 {
+        let own = if self.basic[j] { 0.0 } else { 1.0 };
+        let column = (0..self.n).filter(|k| self.basic[*k]).map(|k| self.t[k * self.n + j].abs());
+        own + column.sum::<f64>()
+    }
+
+    /// t_ii, zero where it is no more than rounding: a perturbation E of M changes t_ij by `(t_iα, 1) E (t_αj, 1)ᵀ`.
+    pub fn diagonal(&self, i: usize) -> f64 {
+        let value = self.entry(i, i);
+        let size = self.row_reach(i) * self.column_reach(i);
+        if value.abs() <= ZERO * size { 0.0 } else { value }
+    }
+
+    /// How the entries of row i feel a perturbation of M, for [`threshold`](Self::threshold).
     pub fn sizes_of_row(&mut self, i: usize) {
         let n = self.n;
-        let Self { sizes, scratch, m, t, basic, .. } = self;
-        let row = &t[i * n..(i + 1) * n];
-        // x_i through the basic z: weights g_k on the rows k of α, the row of M itself where w_i is basic.
-        scratch.fill(0.0);
-        if !basic[i] {
-            scratch.iter_mut().zip(&m[i * n..(i + 1) * n]).for_each(|(s, m)| *s = m.abs());
-        }
+        let reach = self.row_reach(i);
+        let Self { sizes, t, basic, .. } = self;
+        sizes.iter_mut().zip(&*basic).for_each(|(s, b)| *s = if *b { 0.0 } else { 1.0 });
         for k in (0..n).filter(|k| basic[*k]) {
-            let weight = row[k].abs();
-            if weight > 0.0 {
-                let from = &m[k * n..(k + 1) * n];
-                scratch.iter_mut().zip(from).for_each(|(s, m)| *s += weight * m.abs());
-            }
+            sizes.iter_mut().zip(&t[k * n..(k + 1) * n]).for_each(|(s, t)| *s += t.abs());
         }
-        sizes.fill(0.0);
-        for k in (0..n).filter(|k| basic[*k]) {
-            let weight = scratch[k];
-            if weight > 0.0 {
-                let from = &t[k * n..(k + 1) * n];
-                sizes.iter_mut().zip(from).for_each(|(s, t)| *s += weight * t.abs());
-            }
-        }
-        for j in (0..n).filter(|j| !basic[*j]) {
-            sizes[j] = scratch[j];
-        }
+        sizes.iter_mut().for_each(|s| *s *= reach);
     }
 
-    /// The size of the terms of the entries of column j, into [`sizes`](Self::sizes).
+    /// As [`sizes_of_row`](Self::sizes_of_row), of column j.
     pub fn sizes_of_column(&mut self, j: usize) {
-        let n = self.n;
-        let Self { sizes, scratch, m, t, basic, .. } = self;
-        scratch.fill(0.0);
-        if basic[j] {
-            for k in 0..n {
-                let row = &m[k * n..(k + 1) * n];
-                scratch[k] =
-                    (0..n).filter(|l| basic[*l]).map(|l| (row[l] * t[l * n + j]).abs()).sum();
-            }
-        } else {
-            for k in 0..n {
-                let row = &m[k * n..(k + 1) * n];
-                let inner: f64 =
-                    (0..n).filter(|l| basic[*l]).map(|l| (row[l] * t[l * n + j]).abs()).sum();
-                scratch[k] = row[j].abs() + inner;
-            }
-        }
-        for i in 0..n {
-            sizes[i] = if basic[i] {
-                let row = &t[i * n..(i + 1) * n];
-                (0..n).filter(|k| basic[*k]).map(|k| row[k].abs() * scratch[k]).sum()
-            } else {
-                scratch[i]
-            };
+        let reach = self.column_reach(j);
+        for i in 0..self.n {
+            self.sizes[i] = self.row_reach(i) * reach;
         }
     }
 
-    /// What [`sizes_of_row`](Self::sizes_of_row) or [`sizes_of_column`](Self::sizes_of_column) found, times the tolerance: entries below are zero.
+    /// Entries of the row or column last sized that are no larger are rounding.
     pub fn threshold(&self, k: usize) -> f64 {
         ZERO * self.sizes[k]
     }
