@@ -1,12 +1,12 @@
 //! The solvers of linear complementarity problems, described.
 
 use super::{About, Solves};
-use crate::auto::linear::LinearAuto;
+use crate::auto::linear::{LinearAuto};
 use crate::interior::linear::{MehrotraType, MizunoToddYe};
 use crate::newton::linear::{NewtonFb, NewtonMin, NewtonPfb};
-use crate::optimisation::linear::Mprgp;
-use crate::pivoting::Lemke;
-use crate::settings::described;
+use crate::optimisation::linear::{Mprgp, QuadraticProgram};
+use crate::pivoting::{Bard, BlockPivoting, CrissCross, Enumeration, Keller, Lemke, Murty};
+use crate::settings::{described};
 use crate::splitting::linear::{Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs};
 
 /// The automatic method.
@@ -105,6 +105,78 @@ pub const MPRGP: About = About {
     settings: described::<Mprgp>,
 };
 
+/// Murty's method.
+pub const MURTY: About = About {
+    name: "murty",
+    family: "pivoting",
+    solves: Solves::Law,
+    summary: "Murty's principal pivoting: the least index with a negative value changes sides",
+    needs: &["the entries of M", "no zero on the tableau's diagonal (M a P-matrix: guaranteed)"],
+    cites: &["Acary2018", "Murty1974", "Murty1988", "CottlePangStone2009"],
+    variants: &["descending=true"],
+    settings: described::<Murty>,
+};
+
+/// Bard's method.
+pub const BARD: About = About {
+    name: "bard",
+    family: "pivoting",
+    solves: Solves::Law,
+    summary: "Bard's principal pivoting: the most negative variable changes sides; least index where that cycles",
+    needs: &["the entries of M", "no zero on the tableau's diagonal (M a P-matrix: guaranteed)"],
+    cites: &["Acary2018", "Murty1988", "CottlePangStone2009"],
+    variants: &["protect=false"],
+    settings: described::<Bard>,
+};
+
+/// The least-index criss-cross method.
+pub const CRISS_CROSS: About = About {
+    name: "criss_cross",
+    family: "pivoting",
+    solves: Solves::Law,
+    summary: "least-index criss-cross: single and double principal pivots, for sufficient M; proves infeasibility",
+    needs: &["the entries of M", "a sufficient M (PSD or P, for instance): guaranteed"],
+    cites: &["DenHertogRoosTerlaky1993", "CsizmadiaIlles2006", "CottlePangStone2009"],
+    variants: &["descending=true"],
+    settings: described::<CrissCross>,
+};
+
+/// The principal pivoting method.
+pub const KELLER: About = About {
+    name: "keller",
+    family: "pivoting",
+    solves: Solves::Law,
+    summary: "principal pivoting of Keller, Cottle and Dantzig: one negative variable at a time is driven to zero; proves infeasibility",
+    needs: &["the entries of M", "a sufficient M (PSD or P, for instance): guaranteed"],
+    cites: &["Keller1973", "CottleDantzig1968", "CottlePangStone2009"],
+    variants: &["least_index=true"],
+    settings: described::<Keller>,
+};
+
+/// Block principal pivoting.
+pub const BLOCK_PIVOTING: About = About {
+    name: "block_pivoting",
+    family: "pivoting",
+    solves: Solves::Law,
+    summary: "block principal pivoting: every variable of the wrong sign changes sides, Murty's rule where that does not help; dense or sparse LU",
+    needs: &["the entries of M", "regular principal submatrices (M a P-matrix: guaranteed)"],
+    cites: &["JudicePires1994", "Kostreva1978", "Murty1974", "BenGharbiaGilbert2012"],
+    variants: &["patience=1"],
+    settings: described::<BlockPivoting>,
+};
+
+/// Enumeration.
+pub const ENUMERATION: About = About {
+    name: "enumeration",
+    family: "pivoting",
+    solves: Solves::Law,
+    summary: "enumeration of complementary cones by branch and bound: any M of few variables, a solution or a proof that there is none",
+    needs: &["the entries of M", "few complementary pairs (max_pairs)"],
+    cites: &["CottlePangStone2009", "Bland1977", "Acary2018"],
+    variants: &["batch=1"],
+    settings: described::<Enumeration>,
+};
+
 /// Lemke's method.
 pub const LEMKE: About = About {
     name: "lemke",
@@ -112,7 +184,7 @@ pub const LEMKE: About = About {
     solves: Solves::Law,
     summary: "Lemke: complementary pivoting on a factorised basis; decides solvability for copositive-plus M",
     needs: &["the entries of M"],
-    cites: &["Acary2018", "CottlePangStone2009", "Lemke1965"],
+    cites: &["Acary2018", "CottlePangStone2009", "Lemke1965", "Kostreva1979"],
     variants: &[
         "basis=tableau",
         "basis=dense",
@@ -146,6 +218,18 @@ pub const IP_MEHROTRA: About = About {
     cites: &["Mehrotra1992", "Wright1997", "Acary2018", "KojimaMegiddoNomaYoshise1991"],
     variants: &["epsilon=0.01"],
     settings: described::<MehrotraType>,
+};
+
+/// The convex quadratic program.
+pub const QP: About = About {
+    name: "qp",
+    family: "optimisation",
+    solves: Solves::Law,
+    summary: "the convex quadratic program behind the problem, through Clarabel, polished",
+    needs: &["M positive semidefinite; symmetric where variables have two bounds"],
+    cites: &["GoulartChen2024", "CottlePangStone2009", "Acary2018"],
+    variants: &["form=gap"],
+    settings: described::<QuadraticProgram>,
 };
 
 /// Newton's method on the minimum.
