@@ -60,7 +60,13 @@ fn assert_close(z: &[f64], expected: &[f64], what: &str) {
 
 /// 1 on the diagonal, 2 above.
 fn upper(i: usize, j: usize) -> f64 {
-    if i == j { 1.0 } else if i < j { 2.0 } else { 0.0 }
+    if i == j {
+        1.0
+    } else if i < j {
+        2.0
+    } else {
+        0.0
+    }
 }
 
 /// Name, problem, solution, pivots of the textbook's tableau with d = e and lexicographic ties.
@@ -157,17 +163,18 @@ fn classics() -> Vec<(String, Lcp, Vec<f64>, Option<usize>)> {
             Some(2 * n),
         ));
         let csizmadia = |i: usize, j: usize| {
-            if i == j { 1.0 } else if j < i { -1.0 } else { 0.0 }
+            if i == j {
+                1.0
+            } else if j < i {
+                -1.0
+            } else {
+                0.0
+            }
         };
         let z: Vec<f64> = (0..n).map(|i| power(i)).collect();
         all.push((format!("Csizmadia {n}"), from_fn(n, csizmadia, |_| -1.0), z, Some(n + 1)));
     }
-    all.push((
-        "exp_murty".into(),
-        from_fn(6, upper, |_| -1.0),
-        unit(6, 5, 1.0),
-        Some(4),
-    ));
+    all.push(("exp_murty".into(), from_fn(6, upper, |_| -1.0), unit(6, 5, 1.0), Some(4)));
     all
 }
 
@@ -209,10 +216,11 @@ fn same_pivots(problem: &Lcp, settings: Lemke, what: &str) -> Run {
     let mut runs: Vec<Run> =
         BASES.iter().map(|&basis| run(problem, Lemke { basis, ..settings })).collect();
     let first = runs.remove(0);
-    let exchanges =
-        |r: &Run| r.pivots.iter().map(|p| (p.entering, p.leaving)).collect::<Vec<_>>();
+    let exchanges = |r: &Run| r.pivots.iter().map(|p| (p.entering, p.leaving)).collect::<Vec<_>>();
     for other in &runs {
-        assert_eq!(exchanges(&first), exchanges(other), "{what}");
+        let (a, b) = (exchanges(&first), exchanges(other));
+        let differ = a.iter().zip(&b).position(|(a, b)| a != b);
+        assert!(differ.is_none() && a.len() == b.len(), "{what}: at pivot {differ:?}");
         assert_eq!(first.outcome.status.name(), other.outcome.status.name(), "{what}");
     }
     first
@@ -252,7 +260,13 @@ fn planted(n: usize, class: Class, share: f64, seed: u64) -> (Lcp, Vec<f64>) {
         Class::CopositivePlus => product(i, j) + skew[(i, j)].abs() + f64::from(u8::from(i == j)),
         Class::Triangular => {
             let (a, b) = ((7 * i + 3) % n, (7 * j + 3) % n);
-            if i == j { 1.0 } else if a < b { skew[(i, j)] } else { 0.0 }
+            if i == j {
+                1.0
+            } else if a < b {
+                skew[(i, j)]
+            } else {
+                0.0
+            }
         }
     });
     let (mut z, mut w) = (vec![0.0; n], vec![0.0; n]);
@@ -295,13 +309,16 @@ fn many_ties_are_broken() {
     for n in [20, 60, 150] {
         let mut rng = rng(n as u64);
         let signs = Dense::from_fn(n, n, |_, _| f64::from(rng.random_range(-1..2_i32)));
-        let m = |i: usize, j: usize| {
-            signs[(i, j)] - signs[(j, i)] + if i == j { 1.0 } else { 0.0 }
-        };
+        let m = |i: usize, j: usize| signs[(i, j)] - signs[(j, i)] + if i == j { 1.0 } else { 0.0 };
         let problem = from_fn(n, m, |_| -1.0);
         for ties in [Ties::Lexicographic, Ties::Perturbed] {
-            let found = same_pivots(&problem, Lemke { ties, ..plain() }, "ties");
-            assert_eq!(found.outcome.status, Status::Solved, "n = {n}, {ties:?}");
+            if n <= 60 {
+                same_pivots(&problem, Lemke { ties, ..plain() }, "ties");
+            }
+            for basis in BASES {
+                let found = run(&problem, Lemke { ties, basis, ..plain() });
+                assert_eq!(found.outcome.status, Status::Solved, "n = {n}, {ties:?}, {basis:?}");
+            }
         }
     }
 }
@@ -351,7 +368,15 @@ fn infeasible_programs_have_a_ray() {
             (false, false) => 0.0,
         };
         let q: Vec<f64> = (0..n)
-            .map(|i| if i < k { i as f64 - 6.0 } else if i < k + m { 0.0 } else { -1.0 })
+            .map(|i| {
+                if i < k {
+                    i as f64 - 6.0
+                } else if i < k + m {
+                    0.0
+                } else {
+                    -1.0
+                }
+            })
             .collect();
         let problem = from_fn(n, entry, |i| q[i]);
         let found = same_pivots(&problem, plain(), "infeasible");
@@ -401,11 +426,8 @@ fn scales_of_rows_and_columns_do_not_matter() {
             let mut scale = || 10.0_f64.powf(rng.random_range(-8.0..8.0));
             let rows: Vec<f64> = (0..n).map(|_| scale()).collect();
             let columns: Vec<f64> = (0..n).map(|_| scale()).collect();
-            let scaled = from_fn(
-                n,
-                |i, j| rows[i] * m[(i, j)] * columns[j],
-                |i| rows[i] * problem.q[i],
-            );
+            let scaled =
+                from_fn(n, |i, j| rows[i] * m[(i, j)] * columns[j], |i| rows[i] * problem.q[i]);
             for covering in [Covering::Auto, Covering::RowNorms, Covering::Ones] {
                 let found = same_pivots(&scaled, Lemke { covering, ..plain() }, "scaled");
                 assert_eq!(found.outcome.status, Status::Solved, "{class:?}, {n}, {covering:?}");
@@ -418,7 +440,12 @@ fn scales_of_rows_and_columns_do_not_matter() {
 fn a_solution_is_a_first_basis() {
     let (problem, z) = planted(60, Class::Definite, 0.0, 5);
     let cold = run(&problem, Lemke::default());
-    let warm = run_with(&problem, LemkePath::new(Lemke::default()), &z.iter().map(|z| 1.01 * z).collect::<Vec<_>>(), 1e-11);
+    let warm = run_with(
+        &problem,
+        LemkePath::new(Lemke::default()),
+        &z.iter().map(|z| 1.01 * z).collect::<Vec<_>>(),
+        1e-11,
+    );
     assert_eq!(warm.outcome.status, Status::Solved);
     assert!(warm.pivots.is_empty() && cold.pivots.len() > 10);
     // A few of the signs are wrong: a few pivots.
@@ -430,7 +457,12 @@ fn a_solution_is_a_first_basis() {
         let settings = Lemke { basis, ..Lemke::default() };
         let warm = run_with(&problem, LemkePath::new(settings), &off, 1e-11);
         assert_eq!(warm.outcome.status, Status::Solved);
-        assert!(warm.pivots.len() < cold.pivots.len(), "{} pivots, {} before", warm.pivots.len(), cold.pivots.len());
+        assert!(
+            warm.pivots.len() < cold.pivots.len(),
+            "{} pivots, {} before",
+            warm.pivots.len(),
+            cold.pivots.len()
+        );
         assert_close(&warm.z, &cold.z, "warm");
     }
 }
@@ -492,4 +524,138 @@ fn sparse_problems_of_some_size() {
     assert_eq!(found.outcome.status, Status::Solved);
     assert!(found.outcome.measure.rows.unwrap() <= 1e-13);
     println!("{} pivots, {} factorisations", found.pivots.len(), found.outcome.factorisations);
+}
+
+#[test]
+fn games_have_their_equilibria() {
+    use nonsmooth_solve::pivoting::{game, lemke_howson};
+    let dense = |rows: &[[f64; 2]]| Dense::from_rows(rows).unwrap();
+    // Two pure equilibria, and a mixed one that no label reaches from the artificial one.
+    let (a, b) = (dense(&[[2.0, 0.0], [0.0, 1.0]]), dense(&[[1.0, 0.0], [0.0, 2.0]]));
+    let mut pure = [false; 2];
+    for label in 0..4 {
+        let e = lemke_howson(&a, &b, label).unwrap().unwrap();
+        let which = usize::from(e.x == [0.0, 1.0]);
+        assert_eq!(e.x, e.y);
+        assert_eq!(e.x[which], 1.0);
+        pure[which] = true;
+    }
+    assert_eq!(pure, [true; 2]);
+    // Matching pennies, and a 3 × 2 game (von Stengel) with a mixed equilibrium (0, 1/3, 2/3), (1/3, 2/3).
+    let (a, b) = (dense(&[[1.0, -1.0], [-1.0, 1.0]]), dense(&[[-1.0, 1.0], [1.0, -1.0]]));
+    for label in 0..4 {
+        let e = lemke_howson(&a, &b, label).unwrap().unwrap();
+        assert_close(&e.x, &[0.5, 0.5], "pennies");
+        assert_close(&e.y, &[0.5, 0.5], "pennies");
+    }
+    let (a, b) = (
+        dense(&[[3.0, 3.0], [2.0, 5.0], [0.0, 6.0]]),
+        dense(&[[3.0, 2.0], [2.0, 6.0], [3.0, 1.0]]),
+    );
+    let known = [
+        (vec![1.0, 0.0, 0.0], vec![1.0, 0.0]),
+        (vec![0.8, 0.2, 0.0], vec![2.0 / 3.0, 1.0 / 3.0]),
+        (vec![0.0, 1.0 / 3.0, 2.0 / 3.0], vec![1.0 / 3.0, 2.0 / 3.0]),
+    ];
+    for label in 0..5 {
+        let e = lemke_howson(&a, &b, label).unwrap().unwrap();
+        let near = |x: &[f64], y: &[f64]| x.iter().zip(y).all(|(x, y)| (x - y).abs() < 1e-12);
+        assert!(known.iter().any(|(x, y)| near(x, &e.x) && near(y, &e.y)), "{label}: {e:?}");
+    }
+    assert!(lemke_howson(&a, &b, 5).is_err());
+    // Larger ones, by what an equilibrium is; the last with a factorised basis.
+    for n in [10, 45] {
+        let mut rng = rng(n as u64);
+        let a = Dense::from_fn(n, n, |_, _| rng.random_range(-3.0..5.0));
+        let b = Dense::from_fn(n, n, |_, _| rng.random_range(0.0..1.0));
+        let e = lemke_howson(&a, &b, 3).unwrap().unwrap();
+        let (mut rows, mut columns) = (vec![0.0; n], vec![0.0; n]);
+        a.mul_add(1.0, &e.y, &mut rows);
+        b.mul_transpose_add(1.0, &e.x, &mut columns);
+        for (payoff, s) in [(rows, &e.x), (columns, &e.y)] {
+            let now: f64 = payoff.iter().zip(s).map(|(p, s)| p * s).sum();
+            assert!(payoff.iter().all(|p| *p <= now + 1e-12), "{n}");
+        }
+        assert_eq!(game(&a, &b).unwrap().dim(), 2 * n);
+    }
+}
+
+/// `A u + C v + a = 0`, `0 ≤ v ⟂ D u + B v + b ≥ 0` with a planted solution.
+fn planted_mixed(
+    free: usize,
+    m: usize,
+    mut entry: impl FnMut(usize, usize) -> f64,
+    seed: u64,
+) -> (Mlcp, Vec<f64>) {
+    let n = free + m;
+    let mut rng = rng(seed);
+    let matrix = Matrix::from(Dense::from_fn(n, n, &mut entry));
+    let mut z: Vec<f64> = (0..n).map(|_| rng.random_range(-1.0..1.0)).collect();
+    let mut w = vec![0.0; n];
+    for i in free..n {
+        (z[i], w[i]) = (z[i].max(0.0), (-z[i]).max(0.0));
+    }
+    let mut q = vec![0.0; n];
+    matrix.mul(&z, &mut q);
+    q.iter_mut().zip(&w).for_each(|(q, w)| *q = w - *q);
+    (Mlcp::new(matrix, q, free).unwrap(), z)
+}
+
+#[test]
+fn free_variables_are_basic_whether_a_is_singular_or_not() {
+    for (free, m) in [(1, 1), (3, 5), (20, 30), (30, 40)] {
+        let n = free + m;
+        let mut rng = rng(n as u64);
+        let r = Dense::from_fn(n, n, |_, _| rng.random_range(-1.0..1.0_f64));
+        let gram = |i: usize, j: usize| -> f64 {
+            r.row(i).iter().zip(r.row(j)).map(|(x, y)| x * y).sum::<f64>() / n as f64
+        };
+        let skew = |i: usize, j: usize| r[(i, j)] - r[(j, i)];
+        // A definite; A = 0, a saddle point; A of half the rank.
+        let kinds: [Box<dyn Fn(usize, usize) -> f64>; 3] = [
+            Box::new(|i, j| gram(i, j) + skew(i, j) + f64::from(u8::from(i == j))),
+            Box::new(|i, j| match (i < free, j < free) {
+                (true, true) => 0.0,
+                (false, false) => gram(i, j) + f64::from(u8::from(i == j)),
+                _ => skew(i, j),
+            }),
+            Box::new(|i, j| match (i < free, j < free) {
+                (true, true) => f64::from(u8::from(i == j && i >= free.div_ceil(2))),
+                (false, false) => gram(i, j) + f64::from(u8::from(i == j)),
+                _ => skew(i, j),
+            }),
+        ];
+        for (kind, entry) in kinds.iter().enumerate() {
+            if kind > 0 && m < free {
+                continue;
+            }
+            let (problem, z) = planted_mixed(free, m, entry, n as u64);
+            for basis in BASES {
+                let found = run(&problem, Lemke { basis, ..plain() });
+                let what = format!("{free} + {m}, kind {kind}, {basis:?}");
+                assert_eq!(found.outcome.status, Status::Solved, "{what}");
+                // Elsewhere u need not be unique.
+                let off: Vec<f64> = z.iter().zip(&found.z).map(|(a, b)| a - b).collect();
+                assert!(kind > 0 || norm(&off) <= 1e-9 * norm(&z), "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn equalities_that_cannot_be_met_are_refuted_or_named() {
+    // u + v = 1 twice; then the second one says 2.
+    let rows = [[1.0, 1.0, 1.0], [1.0, 1.0, 1.0], [0.0, 0.0, 1.0]];
+    let matrix = || Dense::from_rows(&rows).unwrap();
+    for basis in BASES {
+        let settings = Lemke { basis, ..plain() };
+        let redundant = Mlcp::new(matrix(), vec![-1.0, -1.0, 0.5], 2).unwrap();
+        assert_eq!(run(&redundant, settings).outcome.status, Status::Solved, "{basis:?}");
+        let contradictory = Mlcp::new(matrix(), vec![-1.0, -2.0, 0.5], 2).unwrap();
+        let found = run(&contradictory, settings).outcome.status;
+        assert!(
+            matches!(found, Status::Infeasible(Certificate::Farkas { .. })),
+            "{basis:?}: {found:?}"
+        );
+    }
 }

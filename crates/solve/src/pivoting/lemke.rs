@@ -12,7 +12,7 @@
 //!
 //! References: Acary2018 (25)–(32), with the argmax in (27)(28); Lemke1965; CottlePangStone2009, section 4.4.
 //!
-//! Cost of a step (a pivot), k basic z: `2 n²` (tableau), `2 k² + 2 k (n − k)` (dense), in proportion to the entries (sparse); for each tied row, one solve more with the transpose. Storage: M again, and the tableau or
+//! Cost of a step (a pivot), k basic z: `4 n²` (tableau), `2 k² + 2 k (n − k)` (dense), in proportion to the entries (sparse); for each tied row, one solve more with the transpose. Storage: M again, and the tableau or
 //! the LU with at most `renew_every` columns.
 //! Fails: 2ⁿ pivots at worst. A ray proves that there is no solution where M is copositive-plus, and nothing elsewhere. Needs the entries of M.
 
@@ -272,7 +272,7 @@ impl<P: Complementary> Solver<P> for LemkePath {
             Phase::Running => work.path.pivot(),
             Phase::Finished => return Step::Done,
             Phase::Cold | Phase::Warm | Phase::Negative | Phase::Here => {
-                match self.begin(&system(problem), point, work) {
+                match self.begin(problem, point, work) {
                     Ok(event) => event,
                     Err(step) => return step,
                 }
@@ -338,11 +338,13 @@ impl LemkePath {
     fn applies<'a, P: Complementary>(&self, problem: &'a P) -> Result<System<'a>, SolveError> {
         let system = problem.system()?;
         system.needs_entries()?;
-        let fits = |d: &[f64]| d.len() == system.dim() && d.iter().all(|d| *d > 0.0 && d.is_finite());
+        let fits =
+            |d: &[f64]| d.len() == system.dim() && d.iter().all(|d| *d > 0.0 && d.is_finite());
         match &self.covering {
-            Some(d) if !fits(d) => {
-                Err(SolveError::needs("a covering vector with a positive entry for each row", "another"))
-            }
+            Some(d) if !fits(d) => Err(SolveError::needs(
+                "a covering vector with a positive entry for each row",
+                "another",
+            )),
             _ => Ok(system),
         }
     }
@@ -361,7 +363,13 @@ impl LemkePath {
     }
 
     /// The first basis, and z0 into it; or the end, where there is nothing to do.
-    fn begin(&self, system: &System, point: &LcpPoint, work: &mut LemkeWork) -> Result<Event, Step> {
+    fn begin<P: Complementary>(
+        &self,
+        problem: &P,
+        point: &LcpPoint,
+        work: &mut LemkeWork,
+    ) -> Result<Event, Step> {
+        let system = &system(problem);
         let phase = work.phase;
         work.warm = phase == Phase::Warm;
         let placed = match phase {
@@ -394,6 +402,14 @@ impl LemkePath {
             }
             work.phase = Phase::Cold;
             return Err(Step::Continue { estimate: f64::NAN });
+        }
+        if let Some(certificate) = work.contradiction()
+            && problem.verify(&certificate)
+        {
+            work.phase = Phase::Finished;
+            work.z.clear();
+            work.z.extend_from_slice(&point.z);
+            return Err(Step::NoSolution(certificate));
         }
         work.phase = Phase::Running;
         if work.path.feasible() {
@@ -522,6 +538,31 @@ impl LemkeWork {
         self.path.prepare().is_ok()
     }
 
+    /// An equality without a free variable that no variable can satisfy: its row of B⁻¹.
+    fn contradiction(&mut self) -> Option<Certificate> {
+        if self.dropped == 0 {
+            return None;
+        }
+        let Self { path, .. } = self;
+        let free = path.data.free;
+        let open = |s: &usize| matches!(path.basic[*s], Variable::W(i) if i < free);
+        let worst = (0..path.basic.len())
+            .filter(open)
+            .max_by(|&a, &b| path.x[a].abs().total_cmp(&path.x[b].abs()))?;
+        let x = path.x[worst];
+        let mut y = vec![0.0; path.data.n];
+        path.row(worst, &mut y);
+        let largest = y.iter().fold(0.0_f64, |l, y| l.max(y.abs()));
+        for (i, (y, r)) in y.iter_mut().zip(&path.data.row).enumerate() {
+            let rounding = y.abs() <= 1e-12 * largest;
+            *y = if rounding { 0.0 } else { -x.signum() * *y * r };
+            if i >= free {
+                *y = y.max(0.0);
+            }
+        }
+        (x != 0.0).then_some(Certificate::Farkas { y })
+    }
+
     /// z of the basis where it stands, in the problem's units.
     fn values(&self, z: &mut [f64]) {
         z.fill(0.0);
@@ -553,7 +594,10 @@ impl LemkeWork {
         if violation <= SOLVED {
             Step::Done
         } else if self.dropped > 0 {
-            Step::Stuck("an equality has no free variable of its own, and the path does not satisfy it".into())
+            Step::Stuck(
+                "an equality has no free variable of its own, and the path does not satisfy it"
+                    .into(),
+            )
         } else {
             Step::Stuck("the last basis is not feasible to working accuracy".into())
         }

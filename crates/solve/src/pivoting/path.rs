@@ -220,9 +220,12 @@ impl Path {
     pub fn renew(&mut self) -> Result<(), &'static str> {
         const SINGULAR: &str = "the basis has become singular to working accuracy";
         self.basis.renew(&self.data, &self.basic).map_err(|_| SINGULAR)?;
-        let Self { data, basis, basic, x, p, size, buffer, correction, sums, .. } = self;
+        let Self { data, basis, basic, x, p, size, buffer, correction, .. } = self;
         basis.solve(data, &data.q, x);
-        data.residual(basic, &data.q, x, sums, buffer);
+        buffer.copy_from_slice(&data.q);
+        for (&v, &x) in basic.iter().zip(x.iter()).filter(|e| *e.1 != 0.0) {
+            data.add_column(v, -x, buffer);
+        }
         basis.solve(data, buffer, correction);
         for ((x, dx), size) in x.iter_mut().zip(correction.iter()).zip(size.iter_mut()) {
             *x += dx;
@@ -251,6 +254,9 @@ impl Path {
                     break;
                 }
                 x.iter_mut().zip(correction.iter()).for_each(|(x, dx)| *x += dx);
+                if last <= f64::EPSILON * largest(x) {
+                    break;
+                }
             }
             x.iter().zip(size.iter_mut()).for_each(|(x, s)| *s = x.abs());
             if last <= CONVERGED * largest(x) {
@@ -340,7 +346,9 @@ impl Path {
         let largest = slots.map(|s| self.x[s] / self.y[s]).fold(0.0_f64, f64::max);
         self.tied.clear();
         for s in 0..self.x.len() {
-            if self.y[s] < 0.0 && self.x[s] - largest * self.y[s] <= TIE * self.size[s].max(self.x[s].abs()) {
+            if self.y[s] < 0.0
+                && self.x[s] - largest * self.y[s] <= TIE * self.size[s].max(self.x[s].abs())
+            {
                 self.tied.push(s);
             }
         }
@@ -375,6 +383,11 @@ impl Path {
         self.basic.iter().position(|&b| b == v)
     }
 
+    /// Row `slot` of B⁻¹.
+    pub fn row(&mut self, slot: usize, out: &mut [f64]) {
+        self.basis.row(&self.data, slot, out);
+    }
+
     /// The column of the last pivot or ray.
     pub fn last_column(&self) -> &[f64] {
         &self.y
@@ -390,7 +403,8 @@ impl Path {
         loop {
             let Self { data, basis, y, driving, .. } = self;
             basis.column(data, *driving, y);
-            let largest = y.iter().fold(0.0_f64, |l, y| if y.is_nan() { f64::NAN } else { l.max(y.abs()) });
+            let largest =
+                y.iter().fold(0.0_f64, |l, y| if y.is_nan() { f64::NAN } else { l.max(y.abs()) });
             if !largest.is_finite() {
                 return Event::Trouble("the basis has become singular to working accuracy");
             }
@@ -503,7 +517,7 @@ impl Path {
             }
             self.p[r] = phi;
         }
-        self.basis.exchange(r, leaving, entering, &self.y);
+        self.basis.exchange(r, entering, &self.y);
         self.basic[r] = entering;
         self.driving = complement(leaving);
         let exchange = Exchange { entering, leaving, ratio: theta * self.unit(entering) };

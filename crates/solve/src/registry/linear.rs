@@ -19,10 +19,8 @@ fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
 /// The solvers of problems whose variables are free or nonnegative.
 fn complementary_solvers<V: Visitor<Problem: Complementary>>() -> Vec<Entry<V>> {
     let mut entries = bounded_solvers();
-    entries.extend([Entry {
-        about: &LEMKE,
-        build: |s, v: V| Ok(v.visit(LemkePath::new(parse(s)?))),
-    }]);
+    entries
+        .extend([Entry { about: &LEMKE, build: |s, v: V| Ok(v.visit(LemkePath::new(parse(s)?))) }]);
     entries
 }
 

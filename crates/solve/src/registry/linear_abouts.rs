@@ -25,6 +25,13 @@ pub const LEMKE: About = About {
     summary: "Lemke: complementary pivoting on a factorised basis; decides solvability for copositive-plus M",
     needs: &["the entries of M"],
     cites: &["Acary2018", "CottlePangStone2009", "Lemke1965"],
-    variants: &["basis=tableau", "basis=dense", "basis=sparse", "ties=perturbed", "covering=row_norms", "covering=random"],
+    variants: &[
+        "basis=tableau",
+        "basis=dense",
+        "basis=sparse",
+        "ties=perturbed",
+        "covering=row_norms",
+        "covering=random",
+    ],
     settings: described::<Lemke>,
 };
