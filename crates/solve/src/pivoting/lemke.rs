@@ -10,7 +10,7 @@
 //! with complementary ones that make the block regular; a caller's point gives the first basis in the same way, with the covering vector `d = B g`.
 //! The data are equilibrated by powers of two, which does not change the path; the last basis is refined against them in doubled precision.
 //!
-//! References: Acary2018 (25)–(32), with the argmax in (27)(28); Lemke1965; CottlePangStone2009, section 4.4.
+//! References: Acary2018 (25)–(32), with the argmax in (27)(28); Lemke1965; CottlePangStone2009, section 4.4; Kostreva1979 (cycling).
 //!
 //! Cost of a step (a pivot), k basic z: `4 n²` (tableau), `2 k² + 2 k (n − k)` (dense), in proportion to the entries (sparse); for each tied row, one solve more with the transpose. Storage: M again, and the tableau or
 //! the LU with at most `renew_every` columns.

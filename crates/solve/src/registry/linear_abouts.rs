@@ -1,9 +1,22 @@
 //! The solvers of linear complementarity problems, described.
 
 use super::{About, Solves};
+use crate::auto::linear::LinearAuto;
 use crate::pivoting::Lemke;
 use crate::settings::described;
 use crate::splitting::linear::ProjectedJacobi;
+
+/// The automatic method.
+pub const AUTO: About = About {
+    name: "auto",
+    family: "auto",
+    solves: Solves::Law,
+    summary: "needs no setting: a plan of solvers by size, class and structure of M, until one solves the problem or proves that there is no solution",
+    needs: &[],
+    cites: &["CottlePangStone2009", "FacchineiPang2003", "Acary2018"],
+    variants: &[],
+    settings: described::<LinearAuto>,
+};
 
 /// Projected Jacobi.
 pub const PROJECTED_JACOBI: About = About {
@@ -24,7 +37,7 @@ pub const LEMKE: About = About {
     solves: Solves::Law,
     summary: "Lemke: complementary pivoting on a factorised basis; decides solvability for copositive-plus M",
     needs: &["the entries of M"],
-    cites: &["Acary2018", "CottlePangStone2009", "Lemke1965"],
+    cites: &["Acary2018", "CottlePangStone2009", "Lemke1965", "Kostreva1979"],
     variants: &[
         "basis=tableau",
         "basis=dense",
