@@ -200,6 +200,7 @@ pub struct LemkeWork {
     z: Vec<f64>,
     /// g, by slots.
     g: Vec<f64>,
+    by_slot: Vec<f64>,
     alpha: Vec<bool>,
     rng: Pcg64Mcg,
     record: Recorder<Pivot>,
@@ -229,6 +230,7 @@ impl<P: Complementary> Solver<P> for LemkePath {
             dropped: 0,
             z: vec![],
             g: vec![],
+            by_slot: vec![],
             alpha: vec![],
             rng: Pcg64Mcg::seed_from_u64(self.settings.seed),
             record: Recorder::default(),
@@ -422,7 +424,7 @@ impl LemkePath {
 
     /// g, in the order of the slots: `R d` for basic w, 1 for basic z.
     fn choose_covering(&self, system: &System, work: &mut LemkeWork) {
-        let LemkeWork { path, g, rng, rays, .. } = work;
+        let LemkeWork { path, g, by_slot, rng, rays, .. } = work;
         let n = path.data.n;
         // By rows first.
         g.clear();
@@ -454,15 +456,13 @@ impl LemkePath {
         let unit = (-largest.log2().round()).exp2();
         g.iter_mut().for_each(|g| *g *= unit);
         path.artificial_unit = unit;
-        let by_row = std::mem::take(g);
-        work.g = path
-            .basic
-            .iter()
-            .map(|v| match v {
-                Variable::W(i) => by_row[*i],
-                _ => 1.0,
-            })
-            .collect();
+        let in_slots = by_slot;
+        in_slots.clear();
+        in_slots.extend(path.basic.iter().map(|v| match v {
+            Variable::W(i) => g[*i],
+            _ => 1.0,
+        }));
+        std::mem::swap(g, in_slots);
     }
 
     /// At the end of a ray: a proof, another covering vector, or nothing.
