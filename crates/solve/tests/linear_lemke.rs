@@ -218,7 +218,9 @@ fn same_pivots(problem: &Lcp, settings: Lemke, what: &str) -> Run {
     let first = runs.remove(0);
     let exchanges = |r: &Run| r.pivots.iter().map(|p| (p.entering, p.leaving)).collect::<Vec<_>>();
     for other in &runs {
-        assert_eq!(exchanges(&first), exchanges(other), "{what}");
+        let (a, b) = (exchanges(&first), exchanges(other));
+        let differ = a.iter().zip(&b).position(|(a, b)| a != b);
+        assert!(differ.is_none() && a.len() == b.len(), "{what}: at pivot {differ:?}");
         assert_eq!(first.outcome.status.name(), other.outcome.status.name(), "{what}");
     }
     first
@@ -310,8 +312,13 @@ fn many_ties_are_broken() {
         let m = |i: usize, j: usize| signs[(i, j)] - signs[(j, i)] + if i == j { 1.0 } else { 0.0 };
         let problem = from_fn(n, m, |_| -1.0);
         for ties in [Ties::Lexicographic, Ties::Perturbed] {
-            let found = same_pivots(&problem, Lemke { ties, ..plain() }, "ties");
-            assert_eq!(found.outcome.status, Status::Solved, "n = {n}, {ties:?}");
+            if n <= 60 {
+                same_pivots(&problem, Lemke { ties, ..plain() }, "ties");
+            }
+            for basis in BASES {
+                let found = run(&problem, Lemke { ties, basis, ..plain() });
+                assert_eq!(found.outcome.status, Status::Solved, "n = {n}, {ties:?}, {basis:?}");
+            }
         }
     }
 }
@@ -517,4 +524,252 @@ fn sparse_problems_of_some_size() {
     assert_eq!(found.outcome.status, Status::Solved);
     assert!(found.outcome.measure.rows.unwrap() <= 1e-13);
     println!("{} pivots, {} factorisations", found.pivots.len(), found.outcome.factorisations);
+}
+
+#[test]
+fn games_have_their_equilibria() {
+    use nonsmooth_solve::pivoting::{game, lemke_howson};
+    let dense = |rows: &[[f64; 2]]| Dense::from_rows(rows).unwrap();
+    // Two pure equilibria, and a mixed one that no label reaches from the artificial one.
+    let (a, b) = (dense(&[[2.0, 0.0], [0.0, 1.0]]), dense(&[[1.0, 0.0], [0.0, 2.0]]));
+    let mut pure = [false; 2];
+    for label in 0..4 {
+        let e = lemke_howson(&a, &b, label).unwrap().unwrap();
+        let which = usize::from(e.x == [0.0, 1.0]);
+        assert_eq!(e.x, e.y);
+        assert_eq!(e.x[which], 1.0);
+        pure[which] = true;
+    }
+    assert_eq!(pure, [true; 2]);
+    // Matching pennies, and a 3 × 2 game (von Stengel) with a mixed equilibrium (0, 1/3, 2/3), (1/3, 2/3).
+    let (a, b) = (dense(&[[1.0, -1.0], [-1.0, 1.0]]), dense(&[[-1.0, 1.0], [1.0, -1.0]]));
+    for label in 0..4 {
+        let e = lemke_howson(&a, &b, label).unwrap().unwrap();
+        assert_close(&e.x, &[0.5, 0.5], "pennies");
+        assert_close(&e.y, &[0.5, 0.5], "pennies");
+    }
+    let (a, b) = (
+        dense(&[[3.0, 3.0], [2.0, 5.0], [0.0, 6.0]]),
+        dense(&[[3.0, 2.0], [2.0, 6.0], [3.0, 1.0]]),
+    );
+    let known = [
+        (vec![1.0, 0.0, 0.0], vec![1.0, 0.0]),
+        (vec![0.8, 0.2, 0.0], vec![2.0 / 3.0, 1.0 / 3.0]),
+        (vec![0.0, 1.0 / 3.0, 2.0 / 3.0], vec![1.0 / 3.0, 2.0 / 3.0]),
+    ];
+    for label in 0..5 {
+        let e = lemke_howson(&a, &b, label).unwrap().unwrap();
+        let near = |x: &[f64], y: &[f64]| x.iter().zip(y).all(|(x, y)| (x - y).abs() < 1e-12);
+        assert!(known.iter().any(|(x, y)| near(x, &e.x) && near(y, &e.y)), "{label}: {e:?}");
+    }
+    assert!(lemke_howson(&a, &b, 5).is_err());
+    // Larger ones, by what an equilibrium is; the last with a factorised basis.
+    for n in [10, 45] {
+        let mut rng = rng(n as u64);
+        let a = Dense::from_fn(n, n, |_, _| rng.random_range(-3.0..5.0));
+        let b = Dense::from_fn(n, n, |_, _| rng.random_range(0.0..1.0));
+        let e = lemke_howson(&a, &b, 3).unwrap().unwrap();
+        let (mut rows, mut columns) = (vec![0.0; n], vec![0.0; n]);
+        a.mul_add(1.0, &e.y, &mut rows);
+        b.mul_transpose_add(1.0, &e.x, &mut columns);
+        for (payoff, s) in [(rows, &e.x), (columns, &e.y)] {
+            let now: f64 = payoff.iter().zip(s).map(|(p, s)| p * s).sum();
+            assert!(payoff.iter().all(|p| *p <= now + 1e-12), "{n}");
+        }
+        assert_eq!(game(&a, &b).unwrap().dim(), 2 * n);
+    }
+}
+
+/// `A u + C v + a = 0`, `0 ≤ v ⟂ D u + B v + b ≥ 0` with a planted solution.
+fn planted_mixed(
+    free: usize,
+    m: usize,
+    mut entry: impl FnMut(usize, usize) -> f64,
+    seed: u64,
+) -> (Mlcp, Vec<f64>) {
+    let n = free + m;
+    let mut rng = rng(seed);
+    let matrix = Matrix::from(Dense::from_fn(n, n, &mut entry));
+    let mut z: Vec<f64> = (0..n).map(|_| rng.random_range(-1.0..1.0)).collect();
+    let mut w = vec![0.0; n];
+    for i in free..n {
+        (z[i], w[i]) = (z[i].max(0.0), (-z[i]).max(0.0));
+    }
+    let mut q = vec![0.0; n];
+    matrix.mul(&z, &mut q);
+    q.iter_mut().zip(&w).for_each(|(q, w)| *q = w - *q);
+    (Mlcp::new(matrix, q, free).unwrap(), z)
+}
+
+#[test]
+fn free_variables_are_basic_whether_a_is_singular_or_not() {
+    for (free, m) in [(1, 1), (3, 5), (20, 30), (30, 40)] {
+        let n = free + m;
+        let mut rng = rng(n as u64);
+        let r = Dense::from_fn(n, n, |_, _| rng.random_range(-1.0..1.0_f64));
+        let gram = |i: usize, j: usize| -> f64 {
+            r.row(i).iter().zip(r.row(j)).map(|(x, y)| x * y).sum::<f64>() / n as f64
+        };
+        let skew = |i: usize, j: usize| r[(i, j)] - r[(j, i)];
+        // A definite; A = 0, a saddle point; A of half the rank.
+        let kinds: [Box<dyn Fn(usize, usize) -> f64>; 3] = [
+            Box::new(|i, j| gram(i, j) + skew(i, j) + f64::from(u8::from(i == j))),
+            Box::new(|i, j| match (i < free, j < free) {
+                (true, true) => 0.0,
+                (false, false) => gram(i, j) + f64::from(u8::from(i == j)),
+                _ => skew(i, j),
+            }),
+            Box::new(|i, j| match (i < free, j < free) {
+                (true, true) => f64::from(u8::from(i == j && i >= free.div_ceil(2))),
+                (false, false) => gram(i, j) + f64::from(u8::from(i == j)),
+                _ => skew(i, j),
+            }),
+        ];
+        for (kind, entry) in kinds.iter().enumerate() {
+            if kind > 0 && m < free {
+                continue;
+            }
+            let (problem, z) = planted_mixed(free, m, entry, n as u64);
+            for basis in BASES {
+                let found = run(&problem, Lemke { basis, ..plain() });
+                let what = format!("{free} + {m}, kind {kind}, {basis:?}");
+                assert_eq!(found.outcome.status, Status::Solved, "{what}");
+                // Elsewhere u need not be unique.
+                let off: Vec<f64> = z.iter().zip(&found.z).map(|(a, b)| a - b).collect();
+                assert!(kind > 0 || norm(&off) <= 1e-9 * norm(&z), "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn equalities_that_cannot_be_met_are_refuted_or_named() {
+    // u + v = 1 twice; then the second one says 2.
+    let rows = [[1.0, 1.0, 1.0], [1.0, 1.0, 1.0], [0.0, 0.0, 1.0]];
+    let matrix = || Dense::from_rows(&rows).unwrap();
+    for basis in BASES {
+        let settings = Lemke { basis, ..plain() };
+        let redundant = Mlcp::new(matrix(), vec![-1.0, -1.0, 0.5], 2).unwrap();
+        assert_eq!(run(&redundant, settings).outcome.status, Status::Solved, "{basis:?}");
+        let contradictory = Mlcp::new(matrix(), vec![-1.0, -2.0, 0.5], 2).unwrap();
+        let found = run(&contradictory, settings).outcome.status;
+        assert!(
+            matches!(found, Status::Infeasible(Certificate::Farkas { .. })),
+            "{basis:?}: {found:?}"
+        );
+    }
+}
+
+/// All solutions of a small LCP whose complementary bases are regular: `None` where one is singular.
+fn enumerated(problem: &Lcp) -> Option<Vec<Vec<f64>>> {
+    let n = problem.dim();
+    let m = problem.M.to_dense().unwrap();
+    let mut found = vec![];
+    for set in 0..1_u32 << n {
+        let basic = |i: usize| set >> i & 1 == 1;
+        // [I or −M] x = q.
+        let mut t = Dense::from_fn(n, n + 1, |i, j| match j {
+            _ if j == n => problem.q[i],
+            _ if basic(j) => -m[(i, j)],
+            _ => f64::from(u8::from(i == j)),
+        });
+        for c in 0..n {
+            let r = (c..n).max_by(|&a, &b| t[(a, c)].abs().total_cmp(&t[(b, c)].abs())).unwrap();
+            if t[(r, c)].abs() < 1e-9 {
+                return None;
+            }
+            for j in 0..=n {
+                (t[(r, j)], t[(c, j)]) = (t[(c, j)], t[(r, j)]);
+            }
+            let pivot = t[(c, c)];
+            (0..=n).for_each(|j| t[(c, j)] /= pivot);
+            for i in (0..n).filter(|&i| i != c) {
+                let y = t[(i, c)];
+                (0..=n).for_each(|j| t[(i, j)] -= y * t[(c, j)]);
+            }
+        }
+        if (0..n).all(|i| t[(i, n)] >= -1e-9) {
+            found.push((0..n).map(|i| if basic(i) { t[(i, n)].max(0.0) } else { 0.0 }).collect());
+        }
+    }
+    Some(found)
+}
+
+#[test]
+fn small_problems_of_any_class_agree_with_enumeration() {
+    let (mut solved, mut refuted, mut open) = (0, 0, 0);
+    for seed in 0..600 {
+        let mut rng = rng(seed);
+        let n = rng.random_range(2..6_usize);
+        let m = Dense::from_fn(n, n, |_, _| f64::from(rng.random_range(-4..6_i32)));
+        let q = (0..n).map(|_| f64::from(rng.random_range(-5..4_i32))).collect();
+        let problem = Lcp::new(m, q).unwrap();
+        let Some(all) = enumerated(&problem) else { continue };
+        for basis in BASES {
+            let found = run(&problem, Lemke { basis, ..Lemke::default() });
+            match found.outcome.status {
+                Status::Solved => {
+                    solved += 1;
+                    let near = |z: &Vec<f64>| {
+                        z.iter().zip(&found.z).all(|(a, b)| (a - b).abs() < 1e-7 * (1.0 + a.abs()))
+                    };
+                    assert!(all.iter().any(near), "{seed}: {:?} is none of {all:?}", found.z);
+                }
+                Status::Infeasible(_) => {
+                    refuted += 1;
+                    assert!(all.is_empty(), "{seed}: {all:?}");
+                }
+                Status::NoConclusion(_) => open += 1,
+                other => panic!("{seed}: {other:?}"),
+            }
+        }
+    }
+    println!("{solved} solved, {refuted} refuted, {open} open");
+    assert!(solved > 500 && refuted > 50);
+}
+
+#[test]
+fn almost_singular_problems_end() {
+    for seed in 0..30 {
+        let n = 40;
+        let mut rng = rng(seed);
+        let (problem, _) = planted(n, Class::Semidefinite, 0.3, seed);
+        let m = problem.M.to_dense().unwrap();
+        // Rows and columns twice, up to rounding, in scales that differ by 1e16.
+        let mut noise = || 1.0 + 1e-14 * rng.random_range(-1.0..1.0_f64);
+        let size = |i: usize| if i % 3 == 0 { 1e-8 } else if i % 5 == 0 { 1e8 } else { 1.0 };
+        let twice = Dense::from_fn(2 * n, 2 * n, |i, j| {
+            size(i) * size(j) * m[(i % n, j % n)] * noise()
+        });
+        let q = (0..2 * n).map(|i| size(i) * problem.q[i % n]).collect();
+        let problem = Lcp::new(twice, q).unwrap();
+        for basis in BASES {
+            let found = run_with(&problem, LemkePath::new(Lemke { basis, ..plain() }), &[], 1e-8);
+            let named = match &found.outcome.status {
+                Status::Stalled(why) => !why.is_empty(),
+                Status::Solved | Status::NoConclusion(_) => true,
+                // It has a solution.
+                _ => false,
+            };
+            assert!(named && found.outcome.iterations < 5000, "{:?}", found.outcome.status);
+            if seed == 0 {
+                println!("{basis:?}: {}", found.outcome.status);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_session_solves_one_problem_after_another() {
+    let mut driver = Driver::new(LemkePath::new(Lemke::default()));
+    for (n, seed) in [(20, 1), (20, 2), (60, 3), (20, 4), (60, 5)] {
+        let (problem, z) = planted(n, Class::Definite, 0.0, seed);
+        let mut point = problem.origin();
+        let limits = Limits { tolerance: 1e-10, ..Limits::default() };
+        let outcome = driver.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+        assert_eq!(outcome.status, Status::Solved);
+        let off: Vec<f64> = z.iter().zip(&point.z).map(|(a, b)| a - b).collect();
+        assert!(norm(&off) <= 1e-8 * norm(&z));
+        assert_eq!(driver.account().len(), 1, "{:?}", driver.account());
+    }
 }

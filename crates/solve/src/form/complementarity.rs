@@ -75,36 +75,10 @@ pub trait Bounded: Rowwise {
 }
 
 /// A [`Bounded`] problem whose variables are free (the first ones, if any) or nonnegative. Offered by [`Lcp`] and [`Mlcp`].
-pub trait Complementary: Bounded {
-    /// The problem's data, with as many equalities as there may be.
-    fn mixed(&self) -> Mixed<'_>;
-}
+pub trait Complementary: Bounded {}
 
-impl Complementary for Lcp {
-    fn mixed(&self) -> Mixed<'_> {
-        Mixed { matrix: &self.M, q: &self.q, equalities: 0, free: 0 }
-    }
-}
-
-impl Complementary for Mlcp {
-    fn mixed(&self) -> Mixed<'_> {
-        let Self { M, q, equalities, free } = self;
-        Mixed { matrix: M, q, equalities: *equalities, free: *free }
-    }
-}
-
-/// The data of a [`Complementary`] problem, whose equalities may be more or fewer than the free variables.
-#[derive(Debug, Clone, Copy)]
-pub struct Mixed<'a> {
-    /// `[A C; D B]`.
-    pub matrix: &'a Matrix,
-    /// `(a, b)`.
-    pub q: &'a [f64],
-    /// The first rows: `A u + C v + a = 0`.
-    pub equalities: usize,
-    /// The first columns: u.
-    pub free: usize,
-}
+impl Complementary for Lcp {}
+impl Complementary for Mlcp {}
 
 /// The data of a [`Bounded`] problem.
 #[derive(Debug, Clone, Copy)]

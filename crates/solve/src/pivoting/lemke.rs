@@ -10,9 +10,9 @@
 //! with complementary ones that make the block regular; a caller's point gives the first basis in the same way, with the covering vector `d = B g`.
 //! The data are equilibrated by powers of two, which does not change the path; the last basis is refined against them in doubled precision.
 //!
-//! References: Acary2018 (25)–(32), with the argmax in (27)(28); Lemke1965; CottlePangStone2009, section 4.4.
+//! References: Acary2018 (25)–(32), with the argmax in (27)(28); Lemke1965; CottlePangStone2009, section 4.4; Kostreva1979 (cycling).
 //!
-//! Cost of a step (a pivot), k basic z: `2 n²` (tableau), `2 k² + 2 k (n − k)` (dense), in proportion to the entries (sparse); for each tied row, one solve more with the transpose. Storage: M again, and the tableau or
+//! Cost of a step (a pivot), k basic z: `4 n²` (tableau), `2 k² + 2 k (n − k)` (dense), in proportion to the entries (sparse); for each tied row, one solve more with the transpose. Storage: M again, and the tableau or
 //! the LU with at most `renew_every` columns.
 //! Fails: 2ⁿ pivots at worst. A ray proves that there is no solution where M is copositive-plus, and nothing elsewhere. Needs the entries of M.
 
@@ -200,6 +200,7 @@ pub struct LemkeWork {
     z: Vec<f64>,
     /// g, by slots.
     g: Vec<f64>,
+    by_slot: Vec<f64>,
     alpha: Vec<bool>,
     rng: Pcg64Mcg,
     record: Recorder<Pivot>,
@@ -229,6 +230,7 @@ impl<P: Complementary> Solver<P> for LemkePath {
             dropped: 0,
             z: vec![],
             g: vec![],
+            by_slot: vec![],
             alpha: vec![],
             rng: Pcg64Mcg::seed_from_u64(self.settings.seed),
             record: Recorder::default(),
@@ -272,7 +274,7 @@ impl<P: Complementary> Solver<P> for LemkePath {
             Phase::Running => work.path.pivot(),
             Phase::Finished => return Step::Done,
             Phase::Cold | Phase::Warm | Phase::Negative | Phase::Here => {
-                match self.begin(&system(problem), point, work) {
+                match self.begin(problem, point, work) {
                     Ok(event) => event,
                     Err(step) => return step,
                 }
@@ -363,12 +365,13 @@ impl LemkePath {
     }
 
     /// The first basis, and z0 into it; or the end, where there is nothing to do.
-    fn begin(
+    fn begin<P: Complementary>(
         &self,
-        system: &System,
+        problem: &P,
         point: &LcpPoint,
         work: &mut LemkeWork,
     ) -> Result<Event, Step> {
+        let system = &system(problem);
         let phase = work.phase;
         work.warm = phase == Phase::Warm;
         let placed = match phase {
@@ -402,6 +405,14 @@ impl LemkePath {
             work.phase = Phase::Cold;
             return Err(Step::Continue { estimate: f64::NAN });
         }
+        if let Some(certificate) = work.contradiction()
+            && problem.verify(&certificate)
+        {
+            work.phase = Phase::Finished;
+            work.z.clear();
+            work.z.extend_from_slice(&point.z);
+            return Err(Step::NoSolution(certificate));
+        }
         work.phase = Phase::Running;
         if work.path.feasible() {
             return Err(work.finish());
@@ -413,7 +424,7 @@ impl LemkePath {
 
     /// g, in the order of the slots: `R d` for basic w, 1 for basic z.
     fn choose_covering(&self, system: &System, work: &mut LemkeWork) {
-        let LemkeWork { path, g, rng, rays, .. } = work;
+        let LemkeWork { path, g, by_slot, rng, rays, .. } = work;
         let n = path.data.n;
         // By rows first.
         g.clear();
@@ -445,15 +456,13 @@ impl LemkePath {
         let unit = (-largest.log2().round()).exp2();
         g.iter_mut().for_each(|g| *g *= unit);
         path.artificial_unit = unit;
-        let by_row = std::mem::take(g);
-        work.g = path
-            .basic
-            .iter()
-            .map(|v| match v {
-                Variable::W(i) => by_row[*i],
-                _ => 1.0,
-            })
-            .collect();
+        let in_slots = by_slot;
+        in_slots.clear();
+        in_slots.extend(path.basic.iter().map(|v| match v {
+            Variable::W(i) => g[*i],
+            _ => 1.0,
+        }));
+        std::mem::swap(g, in_slots);
     }
 
     /// At the end of a ray: a proof, another covering vector, or nothing.
@@ -527,6 +536,31 @@ impl LemkeWork {
         let open = |v: &&Variable| matches!(v, Variable::W(i) if *i < free);
         self.dropped = self.path.basic.iter().filter(open).count();
         self.path.prepare().is_ok()
+    }
+
+    /// An equality without a free variable that no variable can satisfy: its row of B⁻¹.
+    fn contradiction(&mut self) -> Option<Certificate> {
+        if self.dropped == 0 {
+            return None;
+        }
+        let Self { path, .. } = self;
+        let free = path.data.free;
+        let open = |s: &usize| matches!(path.basic[*s], Variable::W(i) if i < free);
+        let worst = (0..path.basic.len())
+            .filter(open)
+            .max_by(|&a, &b| path.x[a].abs().total_cmp(&path.x[b].abs()))?;
+        let x = path.x[worst];
+        let mut y = vec![0.0; path.data.n];
+        path.row(worst, &mut y);
+        let largest = y.iter().fold(0.0_f64, |l, y| l.max(y.abs()));
+        for (i, (y, r)) in y.iter_mut().zip(&path.data.row).enumerate() {
+            let rounding = y.abs() <= 1e-12 * largest;
+            *y = if rounding { 0.0 } else { -x.signum() * *y * r };
+            if i >= free {
+                *y = y.max(0.0);
+            }
+        }
+        (x != 0.0).then_some(Certificate::Farkas { y })
     }
 
     /// z of the basis where it stands, in the problem's units.

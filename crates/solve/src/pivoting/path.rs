@@ -213,16 +213,21 @@ impl Path {
         self.start.clear();
         self.start.extend_from_slice(&self.basic);
         self.cycles.begin();
-        self.renew()
+        self.renew()?;
+        // Signs decide here whether there is a path at all: they are those of the data.
+        self.refine()
     }
 
     /// Makes the basis anew, and the values from it.
     pub fn renew(&mut self) -> Result<(), &'static str> {
         const SINGULAR: &str = "the basis has become singular to working accuracy";
         self.basis.renew(&self.data, &self.basic).map_err(|_| SINGULAR)?;
-        let Self { data, basis, basic, x, p, size, buffer, correction, sums, .. } = self;
+        let Self { data, basis, basic, x, p, size, buffer, correction, .. } = self;
         basis.solve(data, &data.q, x);
-        data.residual(basic, &data.q, x, sums, buffer);
+        buffer.copy_from_slice(&data.q);
+        for (&v, &x) in basic.iter().zip(x.iter()).filter(|e| *e.1 != 0.0) {
+            data.add_column(v, -x, buffer);
+        }
         basis.solve(data, buffer, correction);
         for ((x, dx), size) in x.iter_mut().zip(correction.iter()).zip(size.iter_mut()) {
             *x += dx;
@@ -251,6 +256,9 @@ impl Path {
                     break;
                 }
                 x.iter_mut().zip(correction.iter()).for_each(|(x, dx)| *x += dx);
+                if last <= f64::EPSILON * largest(x) {
+                    break;
+                }
             }
             x.iter().zip(size.iter_mut()).for_each(|(x, s)| *s = x.abs());
             if last <= CONVERGED * largest(x) {
@@ -375,6 +383,11 @@ impl Path {
     /// The slot of a variable, if it is basic.
     pub fn slot(&self, v: Variable) -> Option<usize> {
         self.basic.iter().position(|&b| b == v)
+    }
+
+    /// Row `slot` of B⁻¹.
+    pub fn row(&mut self, slot: usize, out: &mut [f64]) {
+        self.basis.row(&self.data, slot, out);
     }
 
     /// The column of the last pivot or ray.
@@ -506,7 +519,7 @@ impl Path {
             }
             self.p[r] = phi;
         }
-        self.basis.exchange(r, leaving, entering, &self.y);
+        self.basis.exchange(r, entering, &self.y);
         self.basic[r] = entering;
         self.driving = complement(leaving);
         let exchange = Exchange { entering, leaving, ratio: theta * self.unit(entering) };

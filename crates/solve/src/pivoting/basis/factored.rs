@@ -2,7 +2,7 @@
 
 use nonsmooth_problem::linalg::{Csc, Dense, Matrix, Singular, SquareLu};
 
-use super::{Basis, Columns, Data, dot};
+use super::{Basis, Columns, Data};
 use crate::trace::Variable;
 
 /// B at its last renewal, in the order of its slots, with α the basic z (and z0) and β the rows whose w is nonbasic:
@@ -25,7 +25,9 @@ pub(in super::super) struct Factored {
     /// The rows of the basic w, and their slots.
     others: Vec<(usize, usize)>,
     /// `[M, d]` in those rows, by rows; dense only.
-    below: Vec<f64>,
+    below: Dense,
+    /// Entries by basic w.
+    lower: Vec<f64>,
     updates: Updates,
     /// Entries by rows of M, and by columns of K.
     rows: Vec<f64>,
@@ -33,6 +35,9 @@ pub(in super::super) struct Factored {
     /// The place of a row in β.
     place: Vec<usize>,
 }
+
+/// Entries of a line of the cache.
+const LINE: usize = 8;
 
 /// The elementary matrices: column `y` in slot r.
 #[derive(Debug, Clone, Default)]
@@ -94,7 +99,7 @@ impl Updates {
 impl Factored {
     /// `x = B⁻¹ b` of the basis at its renewal; `self.rows` is b, and is overwritten.
     fn solve_base(&mut self, data: &Data, x: &mut [f64]) {
-        let Self { lu, core, beta, others, below, rows, solution, .. } = self;
+        let Self { lu, core, beta, others, below, lower, rows, solution, .. } = self;
         solution.clear();
         solution.extend(beta.iter().map(|&i| rows[i]));
         if !core.is_empty() && solution.iter().any(|x| *x != 0.0) {
@@ -106,10 +111,12 @@ impl Factored {
         }
         match &data.columns {
             Columns::Dense(_) => {
-                let k = core.len();
-                for (m, &(i, slot)) in others.iter().enumerate() {
-                    x[slot] = rows[i] + dot(&below[m * k..(m + 1) * k], solution);
+                lower.clear();
+                lower.extend(others.iter().map(|&(i, _)| rows[i]));
+                if !core.is_empty() && !others.is_empty() {
+                    below.mul_add(1.0, solution, lower);
                 }
+                others.iter().zip(lower.iter()).for_each(|(&(_, slot), y)| x[slot] = *y);
             }
             Columns::Sparse { .. } => {
                 for (&t, &(v, _)) in solution.iter().zip(core.iter()) {
@@ -188,18 +195,17 @@ impl Basis for Factored {
             let matrix = self.core_matrix(data);
             self.lu.factorise(&matrix)?;
         }
-        self.below.clear();
         if let Columns::Dense(values) = &data.columns {
-            let k = self.core.len();
-            self.below.resize(k * self.others.len(), 0.0);
-            // Column by column of M: each is read once, in order.
-            for (c, &(v, _)) in self.core.iter().enumerate() {
-                let column = match v {
-                    Variable::Z(j) => &values[j * n..(j + 1) * n],
-                    _ => &data.d,
-                };
+            self.below.reset(self.others.len(), self.core.len());
+            let column = |v: Variable| match v {
+                Variable::Z(j) => &values[j * n..(j + 1) * n],
+                _ => &data.d,
+            };
+            // Some columns at a time: they are read in order, and rows written in lines.
+            for (c, chunk) in self.core.chunks(LINE).enumerate() {
                 for (m, &(i, _)) in self.others.iter().enumerate() {
-                    self.below[m * k + c] = column[i];
+                    let row = &mut self.below.row_mut(m)[c * LINE..];
+                    row.iter_mut().zip(chunk).for_each(|(x, &(v, _))| *x = column(v)[i]);
                 }
             }
         }
@@ -229,7 +235,7 @@ impl Basis for Factored {
         s.fill(0.0);
         s[slot] = 1.0;
         self.updates.backward(&mut s);
-        let Self { lu, core, beta, others, below, solution, .. } = self;
+        let Self { lu, core, beta, others, below, lower, solution, .. } = self;
         out.fill(0.0);
         others.iter().for_each(|&(i, slot)| out[i] = s[slot]);
         // Kᵀ ρ_β = −(s_α + [M, d]ᵀ ρ_w).
@@ -237,10 +243,10 @@ impl Basis for Factored {
         match &data.columns {
             Columns::Dense(_) => {
                 solution.extend(core.iter().map(|&(_, slot)| -s[slot]));
-                let k = core.len();
-                for (m, &(i, _)) in others.iter().enumerate().filter(|e| out[e.1.0] != 0.0) {
-                    let row = &below[m * k..(m + 1) * k];
-                    solution.iter_mut().zip(row).for_each(|(t, x)| *t -= x * out[i]);
+                lower.clear();
+                lower.extend(others.iter().map(|&(i, _)| out[i]));
+                if !core.is_empty() && lower.iter().any(|x| *x != 0.0) {
+                    below.mul_transpose_add(-1.0, lower, solution);
                 }
             }
             // The column in B is −[M, d]; rows in β are still zero.
@@ -255,7 +261,7 @@ impl Basis for Factored {
         self.rows = s;
     }
 
-    fn exchange(&mut self, slot: usize, _: Variable, _: Variable, y: &[f64]) {
+    fn exchange(&mut self, slot: usize, _: Variable, y: &[f64]) {
         self.updates.push(slot, y);
     }
 }

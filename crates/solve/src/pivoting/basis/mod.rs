@@ -2,7 +2,7 @@
 //!
 //! | basis | kept | a pivot costs |
 //! | --- | --- | --- |
-//! | [`Tableau`] | `B⁻¹` times all nonbasic columns | `2 n²`, all of it written |
+//! | [`Tableau`] | `B⁻¹` times all columns | `4 n²`, all of it written |
 //! | [`Factored`] | LU of the z-block, product-form updates | one solve with it and one product, dense or sparse |
 
 mod factored;
@@ -143,12 +143,18 @@ impl Data {
                 rows[i] = rows[i].max(x);
                 cols[j] = cols[j].max(x);
             });
+            let mut changed = false;
             for (scale, largest) in [(&mut self.row, &*rows), (&mut self.col, &*cols)] {
                 for (s, &l) in scale.iter_mut().zip(largest) {
                     if l > 0.0 && l.is_finite() {
-                        *s *= power_of_two(1.0 / l.sqrt());
+                        let by = power_of_two(1.0 / l.sqrt());
+                        changed |= by != 1.0;
+                        *s *= by;
                     }
                 }
+            }
+            if !changed {
+                break;
             }
         }
         rows.fill(0.0);
@@ -236,8 +242,8 @@ pub(super) trait Basis: Send {
     /// Row `slot` of B⁻¹.
     fn row(&mut self, data: &Data, slot: usize, out: &mut [f64]);
 
-    /// `v` takes `slot`, whose variable leaves; `y` is its column.
-    fn exchange(&mut self, slot: usize, leaving: Variable, v: Variable, y: &[f64]);
+    /// `v` takes `slot`; `y` is its column.
+    fn exchange(&mut self, slot: usize, v: Variable, y: &[f64]);
 }
 
 /// `xᵀ y` with enough partial sums to be vectorised.
