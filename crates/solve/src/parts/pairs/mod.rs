@@ -29,6 +29,8 @@ use crate::trace::{PathPoint, Recorder};
 const WARM: f64 = 0.1;
 /// A residual that is worth the name of a solution.
 const ACCURATE: f64 = 1e-11;
+/// Iterations without progress after which it is asked whether there is a solution.
+const STANDSTILL: usize = 4;
 /// μ that is nothing.
 const VANISHED: f64 = 1e-32;
 /// For messages.
@@ -166,7 +168,7 @@ impl PairPath {
         if self.polish(mu <= VANISHED) || mu <= VANISHED {
             return Step::Done;
         }
-        if let Some(y) = self.refute(false) {
+        if let Some(y) = self.refute(self.idle == STANDSTILL) {
             return Step::NoSolution(Certificate::Farkas { y });
         }
         let (r0, mu0) = self.begin;
@@ -449,8 +451,7 @@ impl PairPath {
         }
         // Tried again once the iterates are ten times as large.
         self.refute_above = 10.0 * reach.max(1.0);
-        let newton = &mut self.newton;
-        refute::farkas(&self.scaled, newton, &self.z, &self.s, &self.alpha, &self.beta, &mut self.t)
+        refute::farkas(&self.scaled, &self.z, &self.s)
     }
 
     /// The point to publish, in the caller's units: the better one of the iterate and the polished guess.

@@ -6,14 +6,15 @@
 
 use nonsmooth_problem::linalg::{Csc, Inverse, Matrix};
 
-use super::newton::Newton;
 use super::scale::Scaled;
 use crate::form::Equations;
 
 /// The projection's cost is that of a sparse factorisation of this order, at most.
 const LARGEST: usize = 20_000;
 /// A guess counts what is below these fractions of the largest as zero, in turn.
-const FRACTIONS: [f64; 3] = [1e-3, 1e-6, 1e-9];
+const FRACTIONS: [f64; 4] = [1e-1, 1e-2, 1e-4, 1e-8];
+/// Projections for each.
+const ROUNDS: usize = 5;
 /// How far from a Farkas vector the first guess may be.
 const NEAR: f64 = 0.1;
 
@@ -32,17 +33,24 @@ pub fn hopeless_row(problem: &Equations) -> Option<usize> {
     hopeless.iter().position(|h| *h)
 }
 
-/// A Farkas vector from an iterate, in the caller's units. α and β are those of the last factorisation.
-#[allow(clippy::too_many_arguments)]
-pub(super) fn farkas(
-    scaled: &Scaled,
-    newton: &mut Newton,
-    z: &[f64],
-    s: &[f64],
-    alpha: &[f64],
-    beta: &[f64],
-    t: &mut [f64],
-) -> Option<Vec<f64>> {
+/// y with `Qᵀ y = s`, `Rᵀ y = x` in the sense of least squares: the multipliers of `min ‖v − (s, x)‖`, `[Q R] v = 0`.
+fn combination(q: &Matrix, r: &Matrix, x: &[f64], s: &[f64]) -> Option<Vec<f64>> {
+    let n = x.len();
+    if n > LARGEST {
+        return None;
+    }
+    let mut entries = vec![];
+    q.for_each(|i, j, x| entries.push((j, i, x)));
+    r.for_each(|i, j, x| entries.push((n + j, i, x)));
+    let g = Csc::from_triplets(2 * n, n, entries.into_iter()).ok()?;
+    let saddle = Inverse::saddle(&Csc::diagonal(&vec![1.0; 2 * n]), &g).ok()?;
+    let mut both = [s, x, &vec![0.0; n]].concat();
+    saddle.solve(&mut both);
+    Some(both[2 * n..].iter().map(|y| -y).collect())
+}
+
+/// A Farkas vector from an iterate, in the caller's units.
+pub(super) fn farkas(scaled: &Scaled, z: &[f64], s: &[f64]) -> Option<Vec<f64>> {
     let free = scaled.free;
     let size = s.iter().chain(&z[free..]).fold(0.0_f64, |l, x| l.max(x.abs()));
     if size.is_nan() || size <= 0.0 {
@@ -50,15 +58,7 @@ pub(super) fn farkas(
     }
     let y: Vec<f64> = match &scaled.slack {
         None => z.iter().map(|z| z / size).collect(),
-        Some(_) => {
-            // K_jᵀ y = α_j ŝ_j − β_j x̂_j is what Qᵀ y = ŝ, Rᵀ y = x̂ imply.
-            for (j, t) in t.iter_mut().enumerate() {
-                *t = (alpha[j] * s[j] - beta[j] * z[j]) / size;
-            }
-            newton.solve_transpose(t);
-            // The problem has c = −q on the left.
-            t.to_vec()
-        }
+        Some(slack) => combination(scaled.matrix(), slack, z, s)?.iter().map(|y| y / size).collect(),
     };
     let sign = if scaled.slack.is_some() { -1.0 } else { 1.0 };
     let cost: f64 = scaled.c.iter().zip(&y).map(|(c, y)| sign * c * y).sum();
@@ -105,41 +105,66 @@ fn cleaned(matrices: &[&Matrix], direction: f64, free: usize, y: &[f64]) -> Opti
     }
     for fraction in FRACTIONS {
         let floor = fraction * reach;
-        let support: Vec<usize> =
+        let mut support: Vec<usize> =
             (0..n).filter(|&i| signed || i < free || y[i] > floor).collect();
-        let mut place = vec![usize::MAX; n];
-        support.iter().enumerate().for_each(|(k, &i)| place[i] = k);
-        let mut entries = vec![];
-        let mut count = 0;
-        for (m, g) in matrices.iter().zip(&sums) {
-            let mut number = vec![usize::MAX; n];
-            for j in 0..n {
-                if (!signed && j < free) || g[j] > -floor {
-                    number[j] = count;
-                    count += 1;
-                }
+        let zero = |k: usize, j: usize| (!signed && j < free) || sums[k][j] > -floor;
+        // Entries that a projection makes negative are zero in the next.
+        for _ in 0..ROUNDS {
+            let Some(mut out) = project(matrices, &support, zero, y) else { break };
+            let size = largest(&out);
+            let rounding = |y: &f64| y.abs() <= 1e-14 * size;
+            out.iter_mut().filter(|y| rounding(y)).for_each(|y| *y = 0.0);
+            if size < 0.5 * reach {
+                break;
             }
-            m.for_each(|i, j, x| {
-                if place[i] != usize::MAX && number[j] != usize::MAX {
-                    entries.push((place[i], number[j], x));
-                }
-            });
-        }
-        let p = support.len();
-        let Ok(g) = Csc::from_triplets(p, count, entries.iter().copied()) else { continue };
-        let Ok(projection) = Inverse::saddle(&Csc::diagonal(&vec![1.0; p]), &g) else { continue };
-        let mut both: Vec<f64> = support.iter().map(|&i| y[i]).collect();
-        both.resize(p + count, 0.0);
-        projection.solve(&mut both);
-        let mut out = vec![0.0; n];
-        support.iter().zip(&both).for_each(|(&i, &b)| out[i] = b);
-        let positive = signed || out[free..].iter().all(|y| *y >= 0.0);
-        let moved = out.iter().zip(y).fold(0.0_f64, |l, (a, b)| l.max((a - b).abs()));
-        if positive && moved <= 0.5 * reach && holds(matrices, direction, free, signed, &out) {
-            return Some(out);
+            let wrong = |i: &usize| !signed && *i >= free && out[*i] < 0.0;
+            if support.iter().any(wrong) {
+                support.retain(|i| !wrong(i));
+            } else if holds(matrices, direction, free, signed, &out) {
+                return Some(out);
+            } else {
+                break;
+            }
         }
     }
     None
+}
+
+/// The vector with this support that is nearest to y among those whose combination vanishes where `zero(matrix, column)` says.
+fn project(
+    matrices: &[&Matrix],
+    support: &[usize],
+    zero: impl Fn(usize, usize) -> bool,
+    y: &[f64],
+) -> Option<Vec<f64>> {
+    let n = y.len();
+    let mut place = vec![usize::MAX; n];
+    support.iter().enumerate().for_each(|(k, &i)| place[i] = k);
+    let mut entries = vec![];
+    let mut count = 0;
+    for (k, m) in matrices.iter().enumerate() {
+        let mut number = vec![usize::MAX; n];
+        for (j, number) in number.iter_mut().enumerate() {
+            if zero(k, j) {
+                *number = count;
+                count += 1;
+            }
+        }
+        m.for_each(|i, j, x| {
+            if place[i] != usize::MAX && number[j] != usize::MAX {
+                entries.push((place[i], number[j], x));
+            }
+        });
+    }
+    let p = support.len();
+    let g = Csc::from_triplets(p, count, entries.into_iter()).ok()?;
+    let projection = Inverse::saddle(&Csc::diagonal(&vec![1.0; p]), &g).ok()?;
+    let mut both: Vec<f64> = support.iter().map(|&i| y[i]).collect();
+    both.resize(p + count, 0.0);
+    projection.solve(&mut both);
+    let mut out = vec![0.0; n];
+    support.iter().zip(&both).for_each(|(&i, &b)| out[i] = b);
+    Some(out)
 }
 
 /// The signs of the combination, with what is rounding taken for zero.
