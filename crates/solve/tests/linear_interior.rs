@@ -2,13 +2,14 @@
 
 use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::{Csc, Dense, Matrix, norm};
-use nonsmooth_problem::{Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem};
+use nonsmooth_problem::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::settings::from_texts;
 use nonsmooth_solve::trace::{PathPoint, Trace};
 use nonsmooth_solve::{Limits, Outcome, Status};
 
 const BOTH: [&str; 2] = ["ip_mty", "ip_mehrotra"];
+const ALL: [&str; 3] = ["ip_mty", "ip_mehrotra", "qp"];
 
 /// Numbers that look random and are the same everywhere.
 struct Numbers(u64);
@@ -32,9 +33,7 @@ impl Numbers {
 }
 
 fn times(a: &Dense, b: &Dense) -> Dense {
-    Dense::from_fn(a.nrows(), b.ncols(), |i, j| {
-        (0..a.ncols()).map(|k| a[(i, k)] * b[(k, j)]).sum()
-    })
+    Dense::from_fn(a.nrows(), b.ncols(), |i, j| (0..a.ncols()).map(|k| a[(i, k)] * b[(k, j)]).sum())
 }
 
 fn transposed(a: &Dense) -> Dense {
@@ -129,14 +128,26 @@ fn planted_monotone_problems_are_solved_to_rounding() {
                     let matrices = [Matrix::from(m.clone()), m.to_csc().into()];
                     let (z, w, q) = planted(&matrices[0], share, numbers);
                     for m in matrices {
-                        let storage = if matches!(m, Matrix::Dense(_)) { "dense" } else { "sparse" };
+                        let storage =
+                            if matches!(m, Matrix::Dense(_)) { "dense" } else { "sparse" };
                         let problem = Lcp::new(m, q.clone()).unwrap();
-                        for name in BOTH {
-                            let at = format!("{name}, {class}, {storage}, n = {n}, seed {seed}, share {share}");
+                        for name in ALL {
+                            let at = format!(
+                                "{name}, {class}, {storage}, n = {n}, seed {seed}, share {share}"
+                            );
                             let run = run(&problem, name, 1e-12);
-                            assert_eq!(run.outcome.status, Status::Solved, "{at}: {:?}", run.outcome.measure);
+                            assert_eq!(
+                                run.outcome.status,
+                                Status::Solved,
+                                "{at}: {:?}",
+                                run.outcome.measure
+                            );
                             let most = if name == "ip_mty" { 120 } else { 60 };
-                            assert!(run.outcome.iterations <= most, "{at}: {}", run.outcome.iterations);
+                            assert!(
+                                run.outcome.iterations <= most,
+                                "{at}: {}",
+                                run.outcome.iterations
+                            );
                             let wrong = off(&w_of(&problem, &run.point.z), &w);
                             if class == "SPD" || class == "PSD" {
                                 assert!(wrong < 1e-6, "{at}: w off by {wrong:.1e}");
@@ -168,8 +179,15 @@ fn csizmadias_problem_costs_what_its_handicap_says_and_is_solved_or_named() {
         let problem = csizmadia(n);
         for name in BOTH {
             let run = run(&problem, name, 1e-10);
-            println!("Csizmadia n = {n}, {name}: {} in {}", run.outcome.status, run.outcome.iterations);
-            assert!(matches!(run.outcome.status, Status::Solved | Status::Stalled(_)), "{:?}", run.outcome.status);
+            println!(
+                "Csizmadia n = {n}, {name}: {} in {}",
+                run.outcome.status, run.outcome.iterations
+            );
+            assert!(
+                matches!(run.outcome.status, Status::Solved | Status::Stalled(_)),
+                "{:?}",
+                run.outcome.status
+            );
             if n <= 10 {
                 assert_eq!(run.outcome.status, Status::Solved, "{name}, n = {n}");
                 // z = 2^i: the whole is an M-matrix, all rows are equalities.
@@ -189,14 +207,18 @@ fn infeasible_problems_come_back_with_a_verified_certificate() {
         ("1 x 1".into(), Dense::from_rows(&[[-1.0]]).unwrap(), vec![-1.0]),
         ("zero".into(), Dense::zeros(2, 2), vec![1.0, -1.0]),
         ("rank 1".into(), Dense::from_rows(&[[1.0, -1.0], [-1.0, 1.0]]).unwrap(), vec![-1.0, 0.5]),
-        ("LP without a feasible point".into(),
-         // x ≤ 1 and x ≥ 2.
-         Dense::from_rows(&[[0.0, 1.0, -1.0], [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]).unwrap(), vec![1.0, 1.0, -2.0]),
+        (
+            "LP without a feasible point".into(),
+            // x ≤ 1 and x ≥ 2.
+            Dense::from_rows(&[[0.0, 1.0, -1.0], [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]).unwrap(),
+            vec![1.0, 1.0, -2.0],
+        ),
     ];
     for n in [4, 12, 40] {
         // y ≥ 0 with M y = 0 and qᵀy < 0.
         let half = n / 2;
-        let y: Vec<f64> = (0..n).map(|i| if i < half { numbers.within(0.5, 2.0) } else { 0.0 }).collect();
+        let y: Vec<f64> =
+            (0..n).map(|i| if i < half { numbers.within(0.5, 2.0) } else { 0.0 }).collect();
         let size = norm(&y);
         let mut a = numbers.dense(n, n);
         for j in 0..n {
@@ -231,10 +253,17 @@ fn infeasible_problems_come_back_with_a_verified_certificate() {
     for (at, m, q) in cases {
         for m in [Matrix::from(m.clone()), m.to_csc().into()] {
             let problem = Lcp::new(m, q.clone()).unwrap();
-            for name in BOTH {
+            for name in ALL {
+                if name == "qp" && at == "1 x 1" {
+                    continue; // not convex
+                }
                 let run = run(&problem, name, 1e-9);
                 println!("{at}, {name}: {} in {}", run.outcome.status, run.outcome.iterations);
-                assert!(matches!(run.outcome.status, Status::Infeasible(_)), "{at}, {name}: {:?}", run.outcome.status);
+                assert!(
+                    matches!(run.outcome.status, Status::Infeasible(_)),
+                    "{at}, {name}: {:?}",
+                    run.outcome.status
+                );
             }
         }
     }
@@ -246,7 +275,11 @@ fn horizontal_problems_are_solved_natively() {
         for seed in 0..4 {
             let numbers = &mut Numbers(seed + 77 * n as u64);
             // Monotone: Q = B M, R = −B with M positive semidefinite, and half of the columns exchanged.
-            let m = if seed % 2 == 0 { gram(n, n.div_ceil(2), 0.0, numbers) } else { skew(n, 0.5, numbers) };
+            let m = if seed % 2 == 0 {
+                gram(n, n.div_ceil(2), 0.0, numbers)
+            } else {
+                skew(n, 0.5, numbers)
+            };
             let b = numbers.dense(n, n);
             let (mut q, mut r) = (times(&b, &m), Dense::from_fn(n, n, |i, j| -b[(i, j)]));
             for j in (0..n).step_by(2) {
@@ -276,7 +309,12 @@ fn horizontal_problems_are_solved_natively() {
                         let run = run(&problem, name, 1e-11);
                         let at = format!("{name}, n = {n}, seed {seed}, share {share}");
                         println!("hLCP {at}: {} in {}", run.outcome.status, run.outcome.iterations);
-                        assert_eq!(run.outcome.status, Status::Solved, "{at}: {:?}", run.outcome.measure);
+                        assert_eq!(
+                            run.outcome.status,
+                            Status::Solved,
+                            "{at}: {:?}",
+                            run.outcome.measure
+                        );
                     }
                 }
             }
@@ -311,8 +349,16 @@ fn an_infeasible_horizontal_problem_is_refuted() {
         let problem = Hlcp::new(q, r, rhs).unwrap();
         for name in BOTH {
             let run = run(&problem, name, 1e-9);
-            println!("hLCP n = {n}, {name}: {:?} in {}", run.outcome.status.name(), run.outcome.iterations);
-            assert!(matches!(run.outcome.status, Status::Infeasible(Certificate::Farkas { .. })), "{name}: {:?}", run.outcome.status);
+            println!(
+                "hLCP n = {n}, {name}: {:?} in {}",
+                run.outcome.status.name(),
+                run.outcome.iterations
+            );
+            assert!(
+                matches!(run.outcome.status, Status::Infeasible(Certificate::Farkas { .. })),
+                "{name}: {:?}",
+                run.outcome.status
+            );
         }
     }
 }
@@ -350,11 +396,16 @@ fn mixed_problems_are_solved_with_their_free_variables() {
             q.iter_mut().zip(&w).for_each(|(q, w)| *q = w - *q);
             for m in [m.clone(), m.to_csc().unwrap().into()] {
                 let problem = Mlcp::new(m, q.clone(), free).unwrap();
-                for name in BOTH {
+                for name in ALL {
                     let run = run(&problem, name, 1e-11);
                     let at = format!("{name}, n = {n}, {free} free, seed {seed}");
                     println!("MLCP {at}: {} in {}", run.outcome.status, run.outcome.iterations);
-                    assert_eq!(run.outcome.status, Status::Solved, "{at}: {:?}", run.outcome.measure);
+                    assert_eq!(
+                        run.outcome.status,
+                        Status::Solved,
+                        "{at}: {:?}",
+                        run.outcome.measure
+                    );
                 }
             }
         }
@@ -370,8 +421,14 @@ fn the_path_stays_in_its_neighbourhood() {
         let problem = Lcp::new(m, q).unwrap();
         let narrow = run(&problem, "ip_mty", 1e-12);
         let wide = run(&problem, "ip_mehrotra", 1e-12);
-        assert_eq!((&narrow.outcome.status, &wide.outcome.status), (&Status::Solved, &Status::Solved));
-        println!("n = {n}: {} and {} iterations", narrow.outcome.iterations, wide.outcome.iterations);
+        assert_eq!(
+            (&narrow.outcome.status, &wide.outcome.status),
+            (&Status::Solved, &Status::Solved)
+        );
+        println!(
+            "n = {n}: {} and {} iterations",
+            narrow.outcome.iterations, wide.outcome.iterations
+        );
         let mut last = 0;
         for row in &narrow.path {
             // The first row of an iteration is the predictor's, the last one the corrector's.
@@ -430,8 +487,15 @@ fn an_obstacle_problem_of_ninety_thousand_is_solved() {
     let problem = obstacle(300);
     let clock = std::time::Instant::now();
     let run = run(&problem, "ip_mehrotra", 1e-10);
-    println!("300 x 300: {} in {} iterations, {} factorisations, {:.1} s ({:?}); {:?}", run.outcome.status, run.outcome.iterations,
-        run.outcome.factorisations, clock.elapsed().as_secs_f64(), run.account, run.outcome.measure);
+    println!(
+        "300 x 300: {} in {} iterations, {} factorisations, {:.1} s ({:?}); {:?}",
+        run.outcome.status,
+        run.outcome.iterations,
+        run.outcome.factorisations,
+        clock.elapsed().as_secs_f64(),
+        run.account,
+        run.outcome.measure
+    );
     assert_eq!(run.outcome.status, Status::Solved);
     assert!(run.outcome.iterations <= 40);
     let touching = run.point.z.iter().filter(|z| **z <= 1e-12).count();
@@ -443,8 +507,14 @@ fn an_obstacle_problem_of_ninety_thousand_is_solved() {
 fn an_obstacle_problem_of_a_million_is_solved() {
     let problem = obstacle(1000);
     let run = run(&problem, "ip_mehrotra", 1e-8);
-    println!("1000 x 1000: {} in {} iterations, {} factorisations, {:.1} s; {:?}", run.outcome.status, run.outcome.iterations,
-        run.outcome.factorisations, run.outcome.seconds, run.outcome.measure);
+    println!(
+        "1000 x 1000: {} in {} iterations, {} factorisations, {:.1} s; {:?}",
+        run.outcome.status,
+        run.outcome.iterations,
+        run.outcome.factorisations,
+        run.outcome.seconds,
+        run.outcome.measure
+    );
     assert_eq!(run.outcome.status, Status::Solved);
 }
 
@@ -455,13 +525,17 @@ fn scaling_by_different_hands_is_undone() {
             let numbers = &mut Numbers(seed + 31 * n as u64);
             let m = if seed % 2 == 0 { gram(n, n, 0.5, numbers) } else { skew(n, 1.0, numbers) };
             let (_, _, q) = planted(&Matrix::from(m.clone()), 0.1, numbers);
-            let d: Vec<[f64; 2]> = (0..n).map(|_| [0; 2].map(|_| 10f64.powf(numbers.within(-6.0, 6.0)))).collect();
+            let d: Vec<[f64; 2]> =
+                (0..n).map(|_| [0; 2].map(|_| 10f64.powf(numbers.within(-6.0, 6.0)))).collect();
             let scaled = Dense::from_fn(n, n, |i, j| d[i][0] * m[(i, j)] * d[j][1]);
             let q: Vec<f64> = q.iter().zip(&d).map(|(q, d)| q * d[0]).collect();
             let problem = Lcp::new(scaled, q).unwrap();
             for name in BOTH {
                 let run = run(&problem, name, 1e-10);
-                println!("n = {n}, seed {seed}, {name}: {} in {}", run.outcome.status, run.outcome.iterations);
+                println!(
+                    "n = {n}, seed {seed}, {name}: {} in {}",
+                    run.outcome.status, run.outcome.iterations
+                );
                 assert_eq!(run.outcome.status, Status::Solved, "{name}: {:?}", run.outcome.measure);
             }
         }
@@ -480,9 +554,118 @@ fn a_good_start_is_used_and_a_bad_one_does_no_harm() {
         let warm = run_from(&problem, name, &[], 1e-10, LcpPoint { z: near });
         let wild: Vec<f64> = z.iter().map(|_| numbers.within(-1e6, 1e6)).collect();
         let bad = run_from(&problem, name, &[], 1e-10, LcpPoint { z: wild });
-        println!("{name}: {cold} cold, {} warm, {} from afar", warm.outcome.iterations, bad.outcome.iterations);
+        println!(
+            "{name}: {cold} cold, {} warm, {} from afar",
+            warm.outcome.iterations, bad.outcome.iterations
+        );
         assert_eq!((warm.outcome.status, bad.outcome.status), (Status::Solved, Status::Solved));
         assert!(warm.outcome.iterations <= cold && bad.outcome.iterations <= cold + 1);
     }
 }
 
+#[test]
+fn programs_take_boxes_and_both_forms() {
+    for n in [1, 4, 30, 100] {
+        for seed in 0..4 {
+            let numbers = &mut Numbers(seed + 5 * n as u64);
+            let m = gram(n, if seed % 2 == 0 { n } else { n.div_ceil(2) }, 0.0, numbers);
+            let (mut z, mut w) = (vec![0.0; n], vec![0.0; n]);
+            let (mut lower, mut upper) = (vec![0.0; n], vec![0.0; n]);
+            for i in 0..n {
+                (lower[i], upper[i]) = match numbers.bits() % 5 {
+                    0 => (-1.0, 2.0),
+                    1 => (f64::NEG_INFINITY, 1.0),
+                    2 => (0.5, f64::INFINITY),
+                    3 => (f64::NEG_INFINITY, f64::INFINITY),
+                    _ => (0.25, 0.25),
+                };
+                let side = numbers.within(-1.0, 1.0);
+                let size = numbers.within(0.5, 1.0);
+                if side < -0.3 && lower[i].is_finite() {
+                    (z[i], w[i]) = (lower[i], size);
+                } else if (side > 0.3 && upper[i].is_finite()) || lower[i] == upper[i] {
+                    (z[i], w[i]) = (upper[i], -size);
+                } else {
+                    z[i] = lower[i].max(-2.0) + 0.5 * (upper[i].min(2.0) - lower[i].max(-2.0));
+                }
+            }
+            let mut q = vec![0.0; n];
+            Matrix::from(m.clone()).mul(&z, &mut q);
+            q.iter_mut().zip(&w).for_each(|(q, w)| *q = w - *q);
+            for m in [Matrix::from(m.clone()), m.to_csc().into()] {
+                let problem = BoxLcp::new(m, q.clone(), lower.clone(), upper.clone()).unwrap();
+                let run = run(&problem, "qp", 1e-11);
+                assert_eq!(
+                    run.outcome.status,
+                    Status::Solved,
+                    "n = {n}, seed {seed}: {:?}, {:?}",
+                    run.outcome.measure,
+                    run.account
+                );
+            }
+            let (_, w, q) = planted(&Matrix::from(m.clone()), 0.3, numbers);
+            let problem = Lcp::new(m, q).unwrap();
+            for form in ["form=energy", "form=gap"] {
+                let run = run_from(&problem, "qp", &[form], 1e-11, problem.origin());
+                assert_eq!(
+                    run.outcome.status,
+                    Status::Solved,
+                    "{form}, n = {n}, seed {seed}: {:?}, {:?}",
+                    run.outcome.measure,
+                    run.account
+                );
+                assert!(off(&w_of(&problem, &run.point.z), &w) < 1e-8);
+            }
+        }
+    }
+}
+
+#[test]
+fn programs_say_what_they_need() {
+    let refusal = |problem: &dyn Fn() -> String| problem();
+    let lcp = |rows: &[[f64; 2]], settings: &[&str]| {
+        let problem = Lcp::new(Dense::from_rows(rows).unwrap(), vec![-1.0, 1.0]).unwrap();
+        let mut session = registry::session::<Lcp>("qp", &from_texts(settings).unwrap()).unwrap();
+        session
+            .solve(&problem, &mut problem.origin(), &Limits::default(), &mut |_| {})
+            .unwrap_err()
+            .to_string()
+    };
+    let indefinite = refusal(&|| lcp(&[[1.0, 2.0], [2.0, 1.0]], &[]));
+    assert!(indefinite.contains("a positive semidefinite M"), "{indefinite}");
+    let skew = refusal(&|| lcp(&[[1.0, 2.0], [-2.0, 1.0]], &["form=energy"]));
+    assert!(skew.contains("a symmetric M"), "{skew}");
+    let boxed =
+        BoxLcp::new(Dense::from_rows(&[[1.0]]).unwrap(), vec![1.0], vec![0.0], vec![1.0]).unwrap();
+    let mut session =
+        registry::session::<BoxLcp>("qp", &from_texts(&["form=gap"]).unwrap()).unwrap();
+    let error =
+        session.solve(&boxed, &mut boxed.origin(), &Limits::default(), &mut |_| {}).unwrap_err();
+    assert!(error.to_string().contains("free or nonnegative"), "{error}");
+    let rectangular = Mlcp::rectangular(Dense::zeros(3, 2), vec![0.0; 3], 2, 1).unwrap();
+    for name in ALL {
+        let mut session =
+            registry::session::<Mlcp>(name, &from_texts::<&str>(&[]).unwrap()).unwrap();
+        let error = session
+            .solve(&rectangular, &mut rectangular.origin(), &Limits::default(), &mut |_| {})
+            .unwrap_err();
+        assert!(error.is_inapplicable(), "{name}: {error}");
+    }
+}
+
+#[test]
+fn an_unbounded_box_is_refuted() {
+    // min −z_1 + …, z_1 unbounded above with a zero row; the third variable only below.
+    let m = Dense::from_rows(&[[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]).unwrap();
+    let (lower, upper) =
+        (vec![f64::NEG_INFINITY, f64::NEG_INFINITY, 0.0], vec![0.0, f64::INFINITY, 1.0]);
+    // y = (−1, 1, 0): M y = 0, qᵀy = −2.
+    let problem = BoxLcp::new(m, vec![1.0, -1.0, 0.5], lower, upper).unwrap();
+    let run = run(&problem, "qp", 1e-9);
+    assert!(
+        matches!(run.outcome.status, Status::Infeasible(Certificate::Farkas { .. })),
+        "{:?} {:?}",
+        run.outcome.status,
+        run.account
+    );
+}

@@ -179,7 +179,8 @@ mod tests {
         for shift in [0.0, 0.3] {
             let a = example(60, shift);
             let x: Vec<f64> = (0..60).map(|i| (i as f64).cos()).collect();
-            for (factor, a) in [(&mut dense, Matrix::from(a.clone())), (&mut sparse, a.to_csc().into())]
+            for (factor, a) in
+                [(&mut dense, Matrix::from(a.clone())), (&mut sparse, a.to_csc().into())]
             {
                 factor.factorise(&a).unwrap();
                 let mut b = vec![0.0; 60];

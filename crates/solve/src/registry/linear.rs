@@ -8,12 +8,16 @@ use super::linear_abouts::*;
 use super::{About, Direct, Entry, Made, Registered, Visitor, find};
 use crate::form::{Bounded, Complementary, Paired};
 use crate::interior::linear::{Mehrotra, Mty};
+use crate::optimisation::linear::Programmed;
 use crate::settings::{SettingsMap, parse};
 use crate::splitting::linear::Jacobi;
 
 /// The solvers that take bounds of any kind.
 fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
-    vec![Entry { about: &PROJECTED_JACOBI, build: |s, v| Ok(v.visit(Jacobi(parse(s)?))) }]
+    vec![
+        Entry { about: &PROJECTED_JACOBI, build: |s, v| Ok(v.visit(Jacobi(parse(s)?))) },
+        Entry { about: &QP, build: |s, v| Ok(v.visit(Programmed(parse(s)?))) },
+    ]
 }
 
 /// The solvers of problems whose variables are free or nonnegative.

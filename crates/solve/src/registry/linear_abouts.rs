@@ -2,6 +2,7 @@
 
 use super::{About, Solves};
 use crate::interior::linear::{MehrotraType, MizunoToddYe};
+use crate::optimisation::linear::QuadraticProgram;
 use crate::settings::described;
 use crate::splitting::linear::ProjectedJacobi;
 
@@ -39,4 +40,16 @@ pub const IP_MEHROTRA: About = About {
     cites: &["Mehrotra1992", "Wright1997", "Acary2018", "KojimaMegiddoNomaYoshise1991"],
     variants: &["epsilon=0.01"],
     settings: described::<MehrotraType>,
+};
+
+/// The convex quadratic program.
+pub const QP: About = About {
+    name: "qp",
+    family: "optimisation",
+    solves: Solves::Law,
+    summary: "the convex quadratic program behind the problem, through Clarabel, polished",
+    needs: &["M positive semidefinite; symmetric where variables have two bounds"],
+    cites: &["GoulartChen2024", "CottlePangStone2009", "Acary2018"],
+    variants: &["form=gap"],
+    settings: described::<QuadraticProgram>,
 };

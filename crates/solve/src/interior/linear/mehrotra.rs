@@ -135,7 +135,8 @@ impl Mehrotra {
     fn length(&self, path: &PairPath, mu: f64) -> f64 {
         let boundary = path.boundary();
         // All but the whole way as μ vanishes, as superlinear convergence asks for.
-        let mut step = boundary * if boundary < 1.0 { (1.0 - mu).clamp(0.99, 1.0 - 1e-9) } else { 1.0 };
+        let mut step =
+            boundary * if boundary < 1.0 { (1.0 - mu).clamp(0.99, 1.0 - 1e-9) } else { 1.0 };
         for _ in 0..60 {
             let ahead = path.ahead(step);
             if ahead.mu > 0.0

@@ -1,1 +1,5 @@
-//! placeholder
+//! Linear complementarity problems as convex quadratic programs.
+
+mod qp;
+
+pub use qp::{Form, Programmed, QpWork, QuadraticProgram};

@@ -15,7 +15,7 @@ mod scale;
 
 pub use newton::Newton;
 pub use polish::{Polish, Polished};
-pub use refute::{clean, hopeless_row};
+pub use refute::{Side, clean, hopeless_row};
 pub use scale::Scaled;
 
 use nonsmooth_problem::check::Certificate;
@@ -179,7 +179,8 @@ impl PairPath {
             self.idle += 1;
         }
         if self.idle > patience {
-            return self.given_up("no progress: M may not be monotone, or there is no solution", xi);
+            return self
+                .given_up("no progress: M may not be monotone, or there is no solution", xi);
         }
         Step::Continue { estimate: self.estimate() }
     }
@@ -253,7 +254,8 @@ impl PairPath {
         if merit.is_nan() || merit > worst {
             return false;
         }
-        let size = z[free..].iter().zip(s.iter()).fold(0.0_f64, |l, (x, s)| l.max(x.abs()).max(s.abs()));
+        let size =
+            z[free..].iter().zip(s.iter()).fold(0.0_f64, |l, (x, s)| l.max(x.abs()).max(s.abs()));
         let mu = (merit * size).max(1e-8 * size).max(1e-12) * size.max(1e-12);
         for (x, s) in z[free..].iter_mut().zip(s.iter_mut()) {
             let gap = *x - *s;
@@ -293,9 +295,11 @@ impl PairPath {
         let pairs = || {
             let x = self.z[free..].iter().zip(&self.dz[free..]);
             let s = self.s.iter().zip(&self.ds);
-            x.zip(s).map(|((x, dx), (s, ds))| {
-                if step == 0.0 { x * s } else { (x + step * dx) * (s + step * ds) }
-            })
+            x.zip(s).map(
+                |((x, dx), (s, ds))| {
+                    if step == 0.0 { x * s } else { (x + step * dx) * (s + step * ds) }
+                },
+            )
         };
         let m = self.s.len() as f64;
         let mu = pairs().sum::<f64>() / m;
@@ -381,7 +385,10 @@ impl PairPath {
             }
             // ρ − Q dx⁰ − R ds⁰ = −(η r + (Q dx⁰ + R ds⁰ + c) − c)
             scaled.residual(dz, ds, t);
-            t.iter_mut().zip(r.iter()).zip(&scaled.c).for_each(|((t, r), c)| *t = -(eta * r + (*t - c)));
+            t.iter_mut()
+                .zip(r.iter())
+                .zip(&scaled.c)
+                .for_each(|((t, r), c)| *t = -(eta * r + (*t - c)));
             newton.solve(t);
             for k in 0..s.len() {
                 dz[k] += alpha[k] * t[k];
@@ -421,7 +428,14 @@ impl PairPath {
         let Ahead { mu, delta, least } = self.now();
         let unit = norm(&self.scaled.c);
         let residual = norm(&self.r) / if unit > 0.0 { unit } else { 1.0 };
-        self.recorder.push(PathPoint { iteration: self.iterations, mu, delta, least, step, residual });
+        self.recorder.push(PathPoint {
+            iteration: self.iterations,
+            mu,
+            delta,
+            least,
+            step,
+            residual,
+        });
     }
 
     /// Tries the guess which variables are positive, if it looks ripe (or anyway). Says whether its point is a solution to rounding.

@@ -24,7 +24,8 @@ pub fn hopeless_row(problem: &Equations) -> Option<usize> {
     if slack.is_some() {
         return None;
     }
-    let mut hopeless: Vec<bool> = q.iter().enumerate().map(|(i, q)| i >= free && *q < 0.0).collect();
+    let mut hopeless: Vec<bool> =
+        q.iter().enumerate().map(|(i, q)| i >= free && *q < 0.0).collect();
     matrix.for_each(|i, j, x| {
         if x > 0.0 || (j < free && x != 0.0) {
             hopeless[i] = false;
@@ -58,7 +59,9 @@ pub(super) fn farkas(scaled: &Scaled, z: &[f64], s: &[f64]) -> Option<Vec<f64>> 
     }
     let y: Vec<f64> = match &scaled.slack {
         None => z.iter().map(|z| z / size).collect(),
-        Some(slack) => combination(scaled.matrix(), slack, z, s)?.iter().map(|y| y / size).collect(),
+        Some(slack) => {
+            combination(scaled.matrix(), slack, z, s)?.iter().map(|y| y / size).collect()
+        }
     };
     let sign = if scaled.slack.is_some() { -1.0 } else { 1.0 };
     let cost: f64 = scaled.c.iter().zip(&y).map(|(c, y)| sign * c * y).sum();
@@ -70,25 +73,56 @@ pub(super) fn farkas(scaled: &Scaled, z: &[f64], s: &[f64]) -> Option<Vec<f64>> 
         None => (vec![scaled.matrix()], 1.0),
         Some(r) => (vec![scaled.matrix(), r], -1.0),
     };
-    let mut cleaned = cleaned(&columns, direction, free, &y)?;
+    let side = |i: usize| if i < free { Side::Free } else { Side::Lower };
+    let sides: Vec<Side> = match &scaled.slack {
+        None => (0..y.len()).map(side).collect(),
+        Some(_) => vec![],
+    };
+    let mut cleaned = cleaned(&columns, direction, &sides, &y)?;
     scaled.rows_leave(&mut cleaned);
     Some(cleaned)
 }
 
-/// The vector nearest to y with the zeros that it seems to have: for `y_i ≥ 0` beyond the first `free` entries, `Mᵀy ≤ 0` (zero for those of free variables), of
-/// a problem with R = −I. In the units of `matrix`.
-pub fn clean(matrix: &Matrix, free: usize, y: &[f64]) -> Option<Vec<f64>> {
-    cleaned(&[matrix], 1.0, free, y)
+/// Which bounds a variable has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// None.
+    Free,
+    /// A lower one.
+    Lower,
+    /// An upper one.
+    Upper,
+    /// Two.
+    Both,
 }
 
-/// With one matrix y is nonnegative beyond the free entries; with two it has any sign.
-fn cleaned(matrices: &[&Matrix], direction: f64, free: usize, y: &[f64]) -> Option<Vec<f64>> {
+impl Side {
+    /// Whether y_i, or −y_i, is nonnegative, if that is asked for.
+    fn sign(self) -> Option<f64> {
+        match self {
+            Self::Lower => Some(1.0),
+            Self::Upper => Some(-1.0),
+            Self::Free | Self::Both => None,
+        }
+    }
+}
+
+/// The vector nearest to y with the zeros that it seems to have: for a problem `w = M z + q` with these bounds, `y_i ≥ 0` and `(Mᵀy)_i ≤ 0` for a lower bound, the other way
+/// round for an upper one, `(Mᵀy)_i = 0` without bounds, `y_i = 0` with two. In the units of `matrix`.
+pub fn clean(matrix: &Matrix, sides: &[Side], y: &[f64]) -> Option<Vec<f64>> {
+    cleaned(&[matrix], 1.0, sides, y)
+}
+
+/// With one matrix y has signs; with two (and no sides) it has any.
+fn cleaned(matrices: &[&Matrix], direction: f64, sides: &[Side], y: &[f64]) -> Option<Vec<f64>> {
     let n = y.len();
     if n > LARGEST {
         return None;
     }
     let largest = |v: &[f64]| v.iter().fold(0.0_f64, |l, x| l.max(x.abs()));
-    let signed = matrices.len() > 1;
+    // Of problems without sides all combinations have the same sign, and y has any.
+    let side = |j: usize| sides.get(j).copied();
+    let sign = |j: usize| side(j).map_or(Some(1.0), Side::sign);
     let sums: Vec<Vec<f64>> = matrices
         .iter()
         .map(|m| {
@@ -99,15 +133,28 @@ fn cleaned(matrices: &[&Matrix], direction: f64, free: usize, y: &[f64]) -> Opti
         })
         .collect();
     let reach = largest(y);
-    let wrong = sums.iter().flatten().fold(0.0_f64, |l, g| l.max(*g));
+    let excess = |(j, g): (usize, &f64)| match sign(j) {
+        Some(sign) => sign * g,
+        None if side(j) == Some(Side::Free) => g.abs(),
+        None => 0.0,
+    };
+    let worst = |g: &Vec<f64>| g.iter().enumerate().map(excess).fold(0.0_f64, f64::max);
+    let wrong = sums.iter().map(worst).fold(0.0_f64, f64::max);
     if wrong.is_nan() || wrong > NEAR * reach {
         return None;
     }
     for fraction in FRACTIONS {
         let floor = fraction * reach;
-        let mut support: Vec<usize> =
-            (0..n).filter(|&i| signed || i < free || y[i] > floor).collect();
-        let zero = |k: usize, j: usize| (!signed && j < free) || sums[k][j] > -floor;
+        let supports = |i: &usize| match side(*i) {
+            None | Some(Side::Free) => true,
+            Some(Side::Both) => false,
+            Some(side) => side.sign().is_some_and(|sign| sign * y[*i] > floor),
+        };
+        let mut support: Vec<usize> = (0..n).filter(supports).collect();
+        let zero = |k: usize, j: usize| match sign(j) {
+            Some(sign) => sign * sums[k][j] > -floor,
+            None => side(j) == Some(Side::Free) || sums[k][j].abs() < floor,
+        };
         // Entries that a projection makes negative are zero in the next.
         for _ in 0..ROUNDS {
             let Some(mut out) = project(matrices, &support, zero, y) else { break };
@@ -117,10 +164,11 @@ fn cleaned(matrices: &[&Matrix], direction: f64, free: usize, y: &[f64]) -> Opti
             if size < 0.5 * reach {
                 break;
             }
-            let wrong = |i: &usize| !signed && *i >= free && out[*i] < 0.0;
+            let wrong =
+                |i: &usize| side(*i).and_then(Side::sign).is_some_and(|sign| sign * out[*i] < 0.0);
             if support.iter().any(wrong) {
                 support.retain(|i| !wrong(i));
-            } else if holds(matrices, direction, free, signed, &out) {
+            } else if holds(matrices, direction, sides, &out) {
                 return Some(out);
             } else {
                 break;
@@ -168,7 +216,7 @@ fn project(
 }
 
 /// The signs of the combination, with what is rounding taken for zero.
-fn holds(matrices: &[&Matrix], direction: f64, free: usize, signed: bool, y: &[f64]) -> bool {
+fn holds(matrices: &[&Matrix], direction: f64, sides: &[Side], y: &[f64]) -> bool {
     let n = y.len();
     matrices.iter().all(|m| {
         let (mut sums, mut sizes) = (vec![0.0; n], vec![0.0; n]);
@@ -178,7 +226,12 @@ fn holds(matrices: &[&Matrix], direction: f64, free: usize, signed: bool, y: &[f
         });
         let fine = |(j, (g, size)): (usize, (&f64, &f64))| {
             let zero = 5e-14 * size;
-            *g <= zero && (signed || j >= free || g.abs() <= zero)
+            match sides.get(j) {
+                None | Some(Side::Lower) => *g <= zero,
+                Some(Side::Upper) => *g >= -zero,
+                Some(Side::Free) => g.abs() <= zero,
+                Some(Side::Both) => true,
+            }
         };
         sums.iter().zip(&sizes).enumerate().all(fine)
     })

@@ -20,6 +20,7 @@ const SPREAD: f64 = 1e3;
 /// The scaled problem, and the weights with which the judge sees its residuals.
 #[derive(Debug, Clone, Default)]
 pub struct Scaled {
+    congruent: bool,
     /// E Q Z.
     pub matrix: Option<Matrix>,
     /// E R S; none where it is −I.
@@ -44,6 +45,11 @@ pub struct Scaled {
 }
 
 impl Scaled {
+    /// With E = Z whatever the matrix, for methods that need `Z M Z` to be monotone where M is. Empty, to be filled.
+    pub fn congruent() -> Self {
+        Self { congruent: true, ..Self::default() }
+    }
+
     /// Takes another problem; memory is kept.
     pub fn refill(&mut self, problem: &Equations) {
         let Equations { matrix, slack, q, free } = *problem;
@@ -81,8 +87,7 @@ impl Scaled {
         self.norm_q = norm(q);
         self.abs_q.clear();
         self.abs_q.extend(q.iter().map(|q| q.abs()));
-        for v in
-            [&mut self.largest, &mut self.sums, &mut self.slack_largest, &mut self.slack_sums]
+        for v in [&mut self.largest, &mut self.sums, &mut self.slack_largest, &mut self.slack_sums]
         {
             v.clear();
             v.resize(n, 0.0);
@@ -143,8 +148,9 @@ impl Scaled {
         let pairs = || self.e[self.free..].iter().zip(&self.dz[self.free..]).map(ratio);
         let most = pairs().fold(0.0_f64, f64::max);
         let least = pairs().fold(f64::INFINITY, f64::min);
-        if most <= SPREAD * least {
-            for (e, d) in self.e.iter_mut().zip(&mut self.dz).skip(self.free) {
+        if self.congruent || most <= SPREAD * least {
+            let from = if self.congruent { 0 } else { self.free };
+            for (e, d) in self.e.iter_mut().zip(&mut self.dz).skip(from) {
                 let mean = (*e * *d).sqrt();
                 (*e, *d) = (mean, mean);
             }
@@ -246,6 +252,37 @@ impl Scaled {
         r.iter_mut().zip(sums.iter()).for_each(|(r, sum)| *r = sum.value());
     }
 
+    /// `w = M z + c` of a problem without R, in doubled precision.
+    pub fn product_precisely(&self, z: &[f64], w: &mut [f64], sums: &mut Vec<Compensated>) {
+        sums.clear();
+        sums.extend(self.c.iter().map(|&c| Compensated::from(c)));
+        self.matrix().for_each(|i, j, x| sums[i].add_product(x, z[j]));
+        w.iter_mut().zip(sums.iter()).for_each(|(w, sum)| *w = sum.value());
+    }
+
+    /// The residual as the judge measures it, of a problem without R and with bounds in scaled units, from z between them and `w = M z + c`.
+    pub fn merit_between(&self, z: &[f64], w: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
+        let unit = if self.norm_q > 0.0 { self.norm_q } else { 1.0 };
+        let reach =
+            z.iter().zip(&self.dz).fold(0.0_f64, |l, (z, d)| l.max((z * d).abs())) * self.theta;
+        let (mut sum, mut worst) = (0.0, 0.0_f64);
+        for i in 0..z.len() {
+            let to_z = self.theta * self.dz[i];
+            let w = self.theta / self.e[i] * w[i];
+            // w, or less where a bound is nearer.
+            let natural = |s: f64| match w > 0.0 {
+                true => w.min(s * to_z * (z[i] - lower[i])),
+                false => w.max(s * to_z * (z[i] - upper[i])),
+            };
+            sum += (natural(self.largest[i]) / unit).powi(2);
+            let terms = self.abs_q[i] + self.sums[i] * reach;
+            let row = natural(self.sums[i]).abs();
+            worst = worst.max(if terms > 0.0 { row / terms } else { row });
+        }
+        let merit = sum.sqrt().max(worst);
+        if merit.is_nan() { f64::INFINITY } else { merit }
+    }
+
     /// The residual as the judge measures it, from z, s and `r = Q z + R s + c`: the larger of the relative one and the worst row.
     pub fn merit(&self, z: &[f64], s: &[f64], r: &[f64]) -> f64 {
         let unit = if self.norm_q > 0.0 { self.norm_q } else { 1.0 };
@@ -277,7 +314,8 @@ impl Scaled {
                 let s_reach = largest(s, &self.ds);
                 for i in 0..z.len() {
                     let w = self.theta / self.e[i] * r[i];
-                    let terms = self.abs_q[i] + self.sums[i] * z_reach + self.slack_sums[i] * s_reach;
+                    let terms =
+                        self.abs_q[i] + self.sums[i] * z_reach + self.slack_sums[i] * s_reach;
                     add(w, w, terms);
                     let x = self.largest[i] * self.theta * self.dz[i] * z[i];
                     let y = self.slack_largest[i] * self.theta * self.ds[i] * s[i];
