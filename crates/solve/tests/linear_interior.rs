@@ -669,3 +669,51 @@ fn an_unbounded_box_is_refuted() {
         run.account
     );
 }
+
+#[test]
+fn what_is_not_monotone_is_solved_or_named() {
+    let murty = Dense::from_rows(&[[-2.0, 1.0], [1.0, -2.0]]).unwrap();
+    let pang = Dense::from_rows(&[[0.0, -1.0, -1.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]).unwrap();
+    let ray =
+        Dense::from_rows(&[[-1.0, 0.0, -3.0], [1.0, -2.0, -5.0], [-2.0, -1.0, -2.0]]).unwrap();
+    let kostreva = Dense::from_rows(&[[1.0, 2.0, 0.0], [0.0, 1.0, 2.0], [2.0, 0.0, 1.0]]).unwrap();
+    for (m, q, solvable) in [
+        (murty, vec![-1.0, -1.0], false),
+        (pang, vec![0.0, -1.0, 1.0], true),
+        (ray, vec![-3.0, -2.0, -1.0], false),
+        (kostreva, vec![-1.0; 3], true),
+    ] {
+        let problem = Lcp::new(m, q).unwrap();
+        for name in BOTH {
+            let status = run(&problem, name, 1e-9).outcome.status;
+            println!("{name}: {status}");
+            match status {
+                Status::Solved => assert!(solvable),
+                Status::Infeasible(_) => assert!(!solvable),
+                Status::Stalled(_) => {}
+                other => panic!("{name}: {other}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn a_session_is_used_again() {
+    let numbers = &mut Numbers(21);
+    let m = gram(40, 25, 0.0, numbers);
+    for m in [Matrix::from(m.clone()), m.to_csc().into()] {
+        for name in ALL {
+            let mut session =
+                registry::session::<Lcp>(name, &from_texts::<&str>(&[]).unwrap()).unwrap();
+            for share in [0.0, 0.4, 0.0] {
+                let (_, w, q) = planted(&m, share, numbers);
+                let problem = Lcp::new(m.clone(), q).unwrap();
+                let mut point = problem.origin();
+                let limits = Limits { tolerance: 1e-11, ..Limits::default() };
+                let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+                assert_eq!(outcome.status, Status::Solved, "{name}: {:?}", outcome.measure);
+                assert!(off(&w_of(&problem, &point.z), &w) < 1e-8);
+            }
+        }
+    }
+}

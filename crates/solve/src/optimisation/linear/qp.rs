@@ -239,7 +239,7 @@ impl Programmed {
             return Err(SolveError::needs("a positive semidefinite M", "one that is not"));
         }
         work.newton.refill(&work.scaled);
-        work.hopeless = if boxed { None } else { hopeless_row(&equations) };
+        work.hopeless = if boxed { None } else { hopeless_row(&equations, &mut work.inside) };
         for (to, upper) in [(&mut work.lower, false), (&mut work.upper, true)] {
             to.clear();
             let bound = |i| if upper { system.bounds.upper(i) } else { system.bounds.lower(i) };
@@ -256,6 +256,7 @@ impl Programmed {
         ] {
             v.resize(n, 0.0);
         }
+        work.inside.clear();
         work.inside.resize(n, false);
         Ok(())
     }

@@ -10,28 +10,28 @@ use super::scale::Scaled;
 use crate::form::Equations;
 
 /// The projection's cost is that of a sparse factorisation of this order, at most.
-const LARGEST: usize = 20_000;
+const LARGEST: usize = 5_000;
 /// A guess counts what is below these fractions of the largest as zero, in turn.
 const FRACTIONS: [f64; 4] = [1e-1, 1e-2, 1e-4, 1e-8];
 /// Projections for each.
 const ROUNDS: usize = 5;
 /// How far from a Farkas vector the first guess may be.
-const NEAR: f64 = 0.1;
+const NEAR: f64 = 0.05;
 
-/// A row that no z ≥ 0 makes nonnegative: `q_r < 0`, `M_rj ≤ 0` for all j, and zero for free variables (lecture (19)).
-pub fn hopeless_row(problem: &Equations) -> Option<usize> {
+/// A row that no z ≥ 0 makes nonnegative: `q_r < 0`, `M_rj ≤ 0` for all j, and zero for free variables (lecture (19)). `marks` is room for a mark a row.
+pub fn hopeless_row(problem: &Equations, marks: &mut Vec<bool>) -> Option<usize> {
     let Equations { matrix, slack, q, free } = *problem;
     if slack.is_some() {
         return None;
     }
-    let mut hopeless: Vec<bool> =
-        q.iter().enumerate().map(|(i, q)| i >= free && *q < 0.0).collect();
+    marks.clear();
+    marks.extend(q.iter().enumerate().map(|(i, q)| i >= free && *q < 0.0));
     matrix.for_each(|i, j, x| {
         if x > 0.0 || (j < free && x != 0.0) {
-            hopeless[i] = false;
+            marks[i] = false;
         }
     });
-    hopeless.iter().position(|h| *h)
+    marks.iter().position(|hopeless| *hopeless)
 }
 
 /// y with `Qᵀ y = s`, `Rᵀ y = x` in the sense of least squares: the multipliers of `min ‖v − (s, x)‖`, `[Q R] v = 0`.
@@ -50,8 +50,8 @@ fn combination(q: &Matrix, r: &Matrix, x: &[f64], s: &[f64]) -> Option<Vec<f64>>
     Some(both[2 * n..].iter().map(|y| -y).collect())
 }
 
-/// A Farkas vector from an iterate, in the caller's units.
-pub(super) fn farkas(scaled: &Scaled, z: &[f64], s: &[f64]) -> Option<Vec<f64>> {
+/// A Farkas vector from an iterate, in the caller's units. `None` where the iterate does not look like one; `Some(None)` where it does, but is none.
+pub(super) fn farkas(scaled: &Scaled, z: &[f64], s: &[f64]) -> Option<Option<Vec<f64>>> {
     let free = scaled.free;
     let size = s.iter().chain(&z[free..]).fold(0.0_f64, |l, x| l.max(x.abs()));
     if size.is_nan() || size <= 0.0 {
@@ -64,8 +64,7 @@ pub(super) fn farkas(scaled: &Scaled, z: &[f64], s: &[f64]) -> Option<Vec<f64>> 
         }
     };
     let sign = if scaled.slack.is_some() { -1.0 } else { 1.0 };
-    let cost: f64 = scaled.c.iter().zip(&y).map(|(c, y)| sign * c * y).sum();
-    if cost.is_nan() || cost >= 0.0 {
+    if !negative(&scaled.c, sign, &y) {
         return None;
     }
     // The matrix whose transpose must not be positive (nonnegative with R) on the combination.
@@ -78,9 +77,22 @@ pub(super) fn farkas(scaled: &Scaled, z: &[f64], s: &[f64]) -> Option<Vec<f64>> 
         None => (0..y.len()).map(side).collect(),
         Some(_) => vec![],
     };
-    let mut cleaned = cleaned(&columns, direction, &sides, &y)?;
-    scaled.rows_leave(&mut cleaned);
-    Some(cleaned)
+    let cleaned = cleaned(&columns, direction, &sides, &y);
+    let proof = cleaned.filter(|y| negative(&scaled.c, sign, y));
+    Some(proof.map(|mut y| {
+        scaled.rows_leave(&mut y);
+        y
+    }))
+}
+
+/// Whether `sign cᵀ y` is negative beyond rounding.
+fn negative(c: &[f64], sign: f64, y: &[f64]) -> bool {
+    let (mut sum, mut size) = (0.0, 0.0);
+    for (c, y) in c.iter().zip(y) {
+        sum += sign * c * y;
+        size += (c * y).abs();
+    }
+    sum < -1e-8 * size
 }
 
 /// Which bounds a variable has.

@@ -42,6 +42,8 @@ pub struct Scaled {
     sums: Vec<f64>,
     slack_largest: Vec<f64>,
     slack_sums: Vec<f64>,
+    /// Sizes of rows and columns while the scaling is sought.
+    sizes: [Vec<f64>; 3],
 }
 
 impl Scaled {
@@ -55,7 +57,10 @@ impl Scaled {
         let Equations { matrix, slack, q, free } = *problem;
         let n = q.len();
         self.free = free;
-        self.symmetric = slack.is_none() && matrix.asymmetry().is_some_and(|a| a <= 1e-15);
+        self.symmetric = slack.is_none() && symmetric(matrix);
+        for v in &mut self.sizes {
+            v.resize(n, 0.0);
+        }
         for v in [&mut self.e, &mut self.dz] {
             v.clear();
             v.resize(n, 1.0);
@@ -114,32 +119,29 @@ impl Scaled {
 
     /// E = Z with entries of at most about one.
     fn symmetric_scaling(&mut self, m: &Matrix) {
-        let mut largest = vec![0.0_f64; self.e.len()];
+        let Self { e, sizes: [largest, ..], .. } = self;
         for _ in 0..3 {
             largest.fill(0.0);
-            let d = &self.e;
-            m.for_each(|i, j, x| largest[i] = largest[i].max((d[i] * x * d[j]).abs()));
-            self.e.iter_mut().zip(&largest).for_each(|(d, l)| *d /= root(*l));
+            m.for_each(|i, j, x| largest[i] = largest[i].max((e[i] * x * e[j]).abs()));
+            e.iter_mut().zip(largest.iter()).for_each(|(d, l)| *d /= root(*l));
         }
         self.dz.copy_from_slice(&self.e);
     }
 
     /// Equal sums of rows and columns, near enough; then one E = Z for all, unless the problem was made to differ.
     fn general_scaling(&mut self, m: &Matrix) {
-        let n = self.e.len();
-        let (mut rows, mut columns) = (vec![0.0_f64; n], vec![0.0_f64; n]);
+        let Self { e, dz: d, sizes: [rows, columns, _], .. } = &mut *self;
         for _ in 0..SWEEPS {
             rows.fill(0.0);
             columns.fill(0.0);
-            let (e, d) = (&self.e, &self.dz);
             m.for_each(|i, j, x| {
                 let size = (e[i] * x * d[j]).abs();
                 rows[i] += size;
                 columns[j] += size;
             });
-            self.e.iter_mut().zip(&rows).for_each(|(e, r)| *e /= root(*r));
-            self.dz.iter_mut().zip(&columns).for_each(|(d, c)| *d /= root(*c));
-            let off = rows.iter().chain(&columns).filter(|x| **x > 0.0);
+            e.iter_mut().zip(rows.iter()).for_each(|(e, r)| *e /= root(*r));
+            d.iter_mut().zip(columns.iter()).for_each(|(d, c)| *d /= root(*c));
+            let off = rows.iter().chain(columns.iter()).filter(|x| **x > 0.0);
             if off.fold(1.0_f64, |l, x| l.max(x.max(1.0 / x))) < 1.2 {
                 break;
             }
@@ -159,19 +161,20 @@ impl Scaled {
 
     /// Columns of Q and R of equal size, then rows of about one.
     fn horizontal_scaling(&mut self, q: &Matrix, r: &Matrix) {
-        let n = self.e.len();
-        let (mut of_q, mut of_r, mut rows) = (vec![0.0_f64; n], vec![0.0_f64; n], vec![0.0_f64; n]);
+        let Self { e, dz: d, sizes: [of_q, of_r, rows], .. } = self;
+        for v in [&mut *of_q, &mut *of_r, &mut *rows] {
+            v.fill(0.0);
+        }
         q.for_each(|_, j, x| of_q[j] = of_q[j].max(x.abs()));
         r.for_each(|_, j, x| of_r[j] = of_r[j].max(x.abs()));
-        for j in 0..n {
-            if of_q[j] > 0.0 && of_r[j] > 0.0 {
-                self.dz[j] = root(of_r[j] / of_q[j]);
+        for (d, (q, r)) in d.iter_mut().zip(of_q.iter().zip(of_r.iter())) {
+            if *q > 0.0 && *r > 0.0 {
+                *d = root(r / q);
             }
         }
-        let d = &self.dz;
         q.for_each(|i, j, x| rows[i] = rows[i].max((x * d[j]).abs()));
         r.for_each(|i, j, x| rows[i] = rows[i].max((x / d[j]).abs()));
-        for (e, row) in self.e.iter_mut().zip(&rows) {
+        for (e, row) in e.iter_mut().zip(rows.iter()) {
             if *row > 0.0 {
                 *e = 1.0 / row;
             }
@@ -325,6 +328,18 @@ impl Scaled {
         }
         let merit = sum.sqrt().max(worst);
         if merit.is_nan() { f64::INFINITY } else { merit }
+    }
+}
+
+/// Whether `a_ij = a_ji` to the last bits of the largest entry.
+fn symmetric(m: &Matrix) -> bool {
+    let mut largest = 0.0_f64;
+    m.for_each(|_, _, x| largest = largest.max(x.abs()));
+    let near = |a: f64, b: f64| (a - b).abs() <= 1e-15 * largest;
+    match m {
+        Matrix::Dense(m) => (0..m.nrows()).all(|i| (0..i).all(|j| near(m[(i, j)], m[(j, i)]))),
+        Matrix::Sparse(m) => m.triplets().all(|(i, j, x)| i == j || near(x, m.get(j, i))),
+        Matrix::Operator(_) => false,
     }
 }
 
