@@ -11,7 +11,7 @@ use crate::auto::linear::{LinearAuto, Planned};
 use crate::form::{Bounded, Complementary, Paired};
 use crate::interior::linear::{Mehrotra, Mty};
 use crate::newton::linear::{Method, NewtonFb, NewtonMin, NewtonPfb, Semismooth};
-use crate::optimisation::linear::Proportioning;
+use crate::optimisation::linear::{Programmed, Proportioning};
 use crate::pivoting::{
     BardPivoting, BlockPrincipal, CrissCrossPivoting, Enumerate, KellerPivoting, LemkePath,
     MurtyPivoting,
@@ -39,6 +39,7 @@ fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
         Entry { about: &RPSOR, build: |s, v| Ok(v.visit(Proximal(parse(s)?))) },
         Entry { about: &SPLITTING_LS, build: |s, v| Ok(v.visit(Searched(parse(s)?))) },
         Entry { about: &MPRGP, build: |s, v| Ok(v.visit(Proportioning(parse(s)?))) },
+        Entry { about: &QP, build: |s, v| Ok(v.visit(Programmed(parse(s)?))) },
         Entry { about: &NEWTON_MIN, build: |s, v| newton::<V, NewtonMin>(s, v) },
         Entry { about: &NEWTON_FB, build: |s, v| newton::<V, NewtonFb>(s, v) },
         Entry { about: &NEWTON_PFB, build: |s, v| newton::<V, NewtonPfb>(s, v) },

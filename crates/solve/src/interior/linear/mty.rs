@@ -7,8 +7,8 @@
 //!
 //! The theory presumes a feasible start in `N₂(θ)`, which nobody has. Here the start `x = s = ξ e` is in the centre but does not obey the equations;
 //! a predictor of length α shortens their residual by `1 − α`, a corrector leaves it, so it vanishes in proportion to μ. The bound `O(√n L)` on the number of
-//! iterations is the one for feasible starts; for this start the literature's bound is `O(n L)`, with ξ above all entries of a solution. Where the
-//! equations are stubborn ξ is enlarged.
+//! iterations is the one for feasible starts; for this start the literature's bound is `O(n L)`, with ξ above all entries of a solution. Without
+//! progress it begins again once, with a larger ξ.
 //!
 //! References: MizunoToddYe1993; Potra1996 (infeasible start); Acary2018 (33)-(45).
 //! Cost of a step: two factorisations of `M + X⁻¹S` (Cholesky where M is symmetric positive semidefinite, else LU; analysed once), two solves, two products.
@@ -108,7 +108,7 @@ impl<P: Paired> Solver<P> for Mty {
             if path.factorise().is_err() || !path.direct(0.0, |product, _| mu - product) {
                 return path.given_up(SINGULAR, self.0.start);
             }
-            let mut step = 0.99_f64.max(path.boundary()).min(path.boundary());
+            let mut step = path.boundary();
             while path.ahead(step).delta > 2.0 * self.0.theta && step > 1e-3 {
                 step *= 0.5;
             }

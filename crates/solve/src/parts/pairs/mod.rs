@@ -15,7 +15,7 @@ mod scale;
 
 pub use newton::Newton;
 pub use polish::{Polish, Polished};
-pub use refute::{clean, hopeless_row};
+pub use refute::{Side, clean, hopeless_row};
 pub use scale::Scaled;
 
 use nonsmooth_problem::check::Certificate;
@@ -29,6 +29,12 @@ use crate::trace::{PathPoint, Recorder};
 const WARM: f64 = 0.1;
 /// A residual that is worth the name of a solution.
 const ACCURATE: f64 = 1e-11;
+/// The factor of ξ at the second start.
+const ENLARGED: f64 = 1e3;
+/// Refutations that are tried, at most.
+const ATTEMPTS: usize = 8;
+/// Iterations without progress after which it is asked whether there is a solution.
+const STANDSTILL: usize = 4;
 /// μ that is nothing.
 const VANISHED: f64 = 1e-32;
 /// For messages.
@@ -87,6 +93,10 @@ pub struct PairPath {
     trivial: bool,
     /// Began near the caller's point.
     warm: bool,
+    /// Began again with a larger ξ.
+    enlarged: bool,
+    /// Refutations tried.
+    attempts: usize,
     /// Iterations of the solve, those since the last progress, and the least `μ + ‖r‖` at the time.
     iterations: usize,
     idle: usize,
@@ -115,14 +125,17 @@ impl PairPath {
         for v in [&mut self.s, &mut self.ds, &mut self.gamma, &mut self.best.s] {
             v.resize(m, 0.0);
         }
+        self.hopeless = hopeless_row(problem, &mut self.partition);
+        self.partition.clear();
         self.partition.resize(m, false);
-        self.hopeless = hopeless_row(problem);
     }
 
     /// Begins near the z and s in place if they are worth it, else at `x = s = ξ e`.
     pub fn begin(&mut self, xi: f64) {
         self.iterations = 0;
         self.best.merit = f64::INFINITY;
+        self.enlarged = false;
+        self.attempts = 0;
         self.trivial = self.zero_solves();
         self.warm = self.begin_near(WARM);
         if !self.warm {
@@ -166,7 +179,7 @@ impl PairPath {
         if self.polish(mu <= VANISHED) || mu <= VANISHED {
             return Step::Done;
         }
-        if let Some(y) = self.refute(false) {
+        if let Some(y) = self.refute(self.idle == STANDSTILL) {
             return Step::NoSolution(Certificate::Farkas { y });
         }
         let (r0, mu0) = self.begin;
@@ -198,6 +211,12 @@ impl PairPath {
             self.begin_cold(xi);
             return Step::Continue { estimate: self.estimate() };
         }
+        if !self.enlarged {
+            // Solutions much larger than ξ are beyond the reach of short steps.
+            self.enlarged = true;
+            self.begin_cold(ENLARGED * xi);
+            return Step::Continue { estimate: self.estimate() };
+        }
         Step::Stuck(why.into())
     }
 
@@ -212,6 +231,9 @@ impl PairPath {
         let mut said = vec![format!("matrices factorised by {kind}")];
         if self.warm {
             said.push("began near the given point".into());
+        }
+        if self.enlarged {
+            said.push("began again with a larger start, without progress from the first".into());
         }
         if self.best.merit < self.merit {
             said.push("the answer comes from the positive variables, once they were known".into());
@@ -458,13 +480,14 @@ impl PairPath {
         let free = self.scaled.free;
         let size = |v: &[f64]| v.iter().fold(0.0_f64, |l, x| l.max(x.abs()));
         let reach = size(&self.z[free..]).max(size(&self.s));
-        if !anyway && reach < self.refute_above {
+        if (!anyway && reach < self.refute_above) || self.attempts == ATTEMPTS {
             return None;
         }
         // Tried again once the iterates are ten times as large.
         self.refute_above = 10.0 * reach.max(1.0);
-        let newton = &mut self.newton;
-        refute::farkas(&self.scaled, newton, &self.z, &self.s, &self.alpha, &self.beta, &mut self.t)
+        let found = refute::farkas(&self.scaled, &self.z, &self.s)?;
+        self.attempts += usize::from(found.is_none());
+        found
     }
 
     /// The point to publish, in the caller's units: the better one of the iterate and the polished guess.

@@ -204,11 +204,6 @@ impl Newton {
         (self.b, self.product) = (b, product);
     }
 
-    /// `y ← K⁻ᵀ y`, by LU.
-    pub fn solve_transpose(&mut self, y: &mut [f64]) {
-        if self.positive { self.cholesky.solve(y) } else { self.lu.solve_transpose(y) }
-    }
-
     /// Whether the last factor was Cholesky's.
     pub fn is_positive(&self) -> bool {
         self.positive

@@ -20,6 +20,7 @@ const SPREAD: f64 = 1e3;
 /// The scaled problem, and the weights with which the judge sees its residuals.
 #[derive(Debug, Clone, Default)]
 pub struct Scaled {
+    congruent: bool,
     /// E Q Z.
     pub matrix: Option<Matrix>,
     /// E R S; none where it is −I.
@@ -41,15 +42,25 @@ pub struct Scaled {
     sums: Vec<f64>,
     slack_largest: Vec<f64>,
     slack_sums: Vec<f64>,
+    /// Sizes of rows and columns while the scaling is sought.
+    sizes: [Vec<f64>; 3],
 }
 
 impl Scaled {
+    /// With E = Z whatever the matrix, for methods that need `Z M Z` to be monotone where M is. Empty, to be filled.
+    pub fn congruent() -> Self {
+        Self { congruent: true, ..Self::default() }
+    }
+
     /// Takes another problem; memory is kept.
     pub fn refill(&mut self, problem: &Equations) {
         let Equations { matrix, slack, q, free } = *problem;
         let n = q.len();
         self.free = free;
-        self.symmetric = slack.is_none() && matrix.asymmetry().is_some_and(|a| a <= 1e-15);
+        self.symmetric = slack.is_none() && symmetric(matrix);
+        for v in &mut self.sizes {
+            v.resize(n, 0.0);
+        }
         for v in [&mut self.e, &mut self.dz] {
             v.clear();
             v.resize(n, 1.0);
@@ -108,32 +119,29 @@ impl Scaled {
 
     /// E = Z with entries of at most about one.
     fn symmetric_scaling(&mut self, m: &Matrix) {
-        let mut largest = vec![0.0_f64; self.e.len()];
+        let Self { e, sizes: [largest, ..], .. } = self;
         for _ in 0..3 {
             largest.fill(0.0);
-            let d = &self.e;
-            m.for_each(|i, j, x| largest[i] = largest[i].max((d[i] * x * d[j]).abs()));
-            self.e.iter_mut().zip(&largest).for_each(|(d, l)| *d /= root(*l));
+            m.for_each(|i, j, x| largest[i] = largest[i].max((e[i] * x * e[j]).abs()));
+            e.iter_mut().zip(largest.iter()).for_each(|(d, l)| *d /= root(*l));
         }
         self.dz.copy_from_slice(&self.e);
     }
 
     /// Equal sums of rows and columns, near enough; then one E = Z for all, unless the problem was made to differ.
     fn general_scaling(&mut self, m: &Matrix) {
-        let n = self.e.len();
-        let (mut rows, mut columns) = (vec![0.0_f64; n], vec![0.0_f64; n]);
+        let Self { e, dz: d, sizes: [rows, columns, _], .. } = &mut *self;
         for _ in 0..SWEEPS {
             rows.fill(0.0);
             columns.fill(0.0);
-            let (e, d) = (&self.e, &self.dz);
             m.for_each(|i, j, x| {
                 let size = (e[i] * x * d[j]).abs();
                 rows[i] += size;
                 columns[j] += size;
             });
-            self.e.iter_mut().zip(&rows).for_each(|(e, r)| *e /= root(*r));
-            self.dz.iter_mut().zip(&columns).for_each(|(d, c)| *d /= root(*c));
-            let off = rows.iter().chain(&columns).filter(|x| **x > 0.0);
+            e.iter_mut().zip(rows.iter()).for_each(|(e, r)| *e /= root(*r));
+            d.iter_mut().zip(columns.iter()).for_each(|(d, c)| *d /= root(*c));
+            let off = rows.iter().chain(columns.iter()).filter(|x| **x > 0.0);
             if off.fold(1.0_f64, |l, x| l.max(x.max(1.0 / x))) < 1.2 {
                 break;
             }
@@ -142,8 +150,9 @@ impl Scaled {
         let pairs = || self.e[self.free..].iter().zip(&self.dz[self.free..]).map(ratio);
         let most = pairs().fold(0.0_f64, f64::max);
         let least = pairs().fold(f64::INFINITY, f64::min);
-        if most <= SPREAD * least {
-            for (e, d) in self.e.iter_mut().zip(&mut self.dz).skip(self.free) {
+        if self.congruent || most <= SPREAD * least {
+            let from = if self.congruent { 0 } else { self.free };
+            for (e, d) in self.e.iter_mut().zip(&mut self.dz).skip(from) {
                 let mean = (*e * *d).sqrt();
                 (*e, *d) = (mean, mean);
             }
@@ -152,19 +161,20 @@ impl Scaled {
 
     /// Columns of Q and R of equal size, then rows of about one.
     fn horizontal_scaling(&mut self, q: &Matrix, r: &Matrix) {
-        let n = self.e.len();
-        let (mut of_q, mut of_r, mut rows) = (vec![0.0_f64; n], vec![0.0_f64; n], vec![0.0_f64; n]);
+        let Self { e, dz: d, sizes: [of_q, of_r, rows], .. } = self;
+        for v in [&mut *of_q, &mut *of_r, &mut *rows] {
+            v.fill(0.0);
+        }
         q.for_each(|_, j, x| of_q[j] = of_q[j].max(x.abs()));
         r.for_each(|_, j, x| of_r[j] = of_r[j].max(x.abs()));
-        for j in 0..n {
-            if of_q[j] > 0.0 && of_r[j] > 0.0 {
-                self.dz[j] = root(of_r[j] / of_q[j]);
+        for (d, (q, r)) in d.iter_mut().zip(of_q.iter().zip(of_r.iter())) {
+            if *q > 0.0 && *r > 0.0 {
+                *d = root(r / q);
             }
         }
-        let d = &self.dz;
         q.for_each(|i, j, x| rows[i] = rows[i].max((x * d[j]).abs()));
         r.for_each(|i, j, x| rows[i] = rows[i].max((x / d[j]).abs()));
-        for (e, row) in self.e.iter_mut().zip(&rows) {
+        for (e, row) in e.iter_mut().zip(rows.iter()) {
             if *row > 0.0 {
                 *e = 1.0 / row;
             }
@@ -245,6 +255,37 @@ impl Scaled {
         r.iter_mut().zip(sums.iter()).for_each(|(r, sum)| *r = sum.value());
     }
 
+    /// `w = M z + c` of a problem without R, in doubled precision.
+    pub fn product_precisely(&self, z: &[f64], w: &mut [f64], sums: &mut Vec<Compensated>) {
+        sums.clear();
+        sums.extend(self.c.iter().map(|&c| Compensated::from(c)));
+        self.matrix().for_each(|i, j, x| sums[i].add_product(x, z[j]));
+        w.iter_mut().zip(sums.iter()).for_each(|(w, sum)| *w = sum.value());
+    }
+
+    /// The residual as the judge measures it, of a problem without R and with bounds in scaled units, from z between them and `w = M z + c`.
+    pub fn merit_between(&self, z: &[f64], w: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
+        let unit = if self.norm_q > 0.0 { self.norm_q } else { 1.0 };
+        let reach =
+            z.iter().zip(&self.dz).fold(0.0_f64, |l, (z, d)| l.max((z * d).abs())) * self.theta;
+        let (mut sum, mut worst) = (0.0, 0.0_f64);
+        for i in 0..z.len() {
+            let to_z = self.theta * self.dz[i];
+            let w = self.theta / self.e[i] * w[i];
+            // w, or less where a bound is nearer.
+            let natural = |s: f64| match w > 0.0 {
+                true => w.min(s * to_z * (z[i] - lower[i])),
+                false => w.max(s * to_z * (z[i] - upper[i])),
+            };
+            sum += (natural(self.largest[i]) / unit).powi(2);
+            let terms = self.abs_q[i] + self.sums[i] * reach;
+            let row = natural(self.sums[i]).abs();
+            worst = worst.max(if terms > 0.0 { row / terms } else { row });
+        }
+        let merit = sum.sqrt().max(worst);
+        if merit.is_nan() { f64::INFINITY } else { merit }
+    }
+
     /// The residual as the judge measures it, from z, s and `r = Q z + R s + c`: the larger of the relative one and the worst row.
     pub fn merit(&self, z: &[f64], s: &[f64], r: &[f64]) -> f64 {
         let unit = if self.norm_q > 0.0 { self.norm_q } else { 1.0 };
@@ -287,6 +328,18 @@ impl Scaled {
         }
         let merit = sum.sqrt().max(worst);
         if merit.is_nan() { f64::INFINITY } else { merit }
+    }
+}
+
+/// Whether `a_ij = a_ji` to the last bits of the largest entry.
+fn symmetric(m: &Matrix) -> bool {
+    let mut largest = 0.0_f64;
+    m.for_each(|_, _, x| largest = largest.max(x.abs()));
+    let near = |a: f64, b: f64| (a - b).abs() <= 1e-15 * largest;
+    match m {
+        Matrix::Dense(m) => (0..m.nrows()).all(|i| (0..i).all(|j| near(m[(i, j)], m[(j, i)]))),
+        Matrix::Sparse(m) => m.triplets().all(|(i, j, x)| i == j || near(x, m.get(j, i))),
+        Matrix::Operator(_) => false,
     }
 }
 
