@@ -716,31 +716,56 @@ fn siconos_lcp(path: &std::path::Path) -> Option<Lcp> {
     Lcp::new(m, x[6 + n * n..6 + n * n + n].to_vec()).ok()
 }
 
-#[test]
-fn corpus() {
-    let Some(folder) = std::env::var_os("NONSMOOTH_CORPUS") else {
+/// The same for mixed problems: `1 1 n m`, the blocks of rows, then the matrix as above.
+fn siconos_mlcp(path: &std::path::Path) -> Option<Mlcp> {
+    let x = numbers(path);
+    let (free, pairs) = (x[2] as usize, x[3] as usize);
+    let n = free + pairs;
+    if [x[0], x[9], x[10], x[11]] != [1.0, 0.0, n as f64, n as f64] {
+        return None;
+    }
+    let m = Dense::from_fn(n, n, |i, j| x[14 + j * n + i]);
+    Mlcp::new(m, x[14 + n * n..14 + n * n + n].to_vec(), free).ok()
+}
+
+/// Every method on every file of a folder of the corpus; what it did not solve.
+fn corpus<P: Registered + Problem<Point = LcpPoint>>(
+    folder: &str,
+    read: impl Fn(&std::path::Path) -> Option<P>,
+) -> Option<(usize, Vec<String>)> {
+    let Some(root) = std::env::var_os("NONSMOOTH_CORPUS") else {
         println!("skipped: NONSMOOTH_CORPUS is not set");
-        return;
+        return None;
     };
-    let folder = std::path::Path::new(&folder).join("lcp");
-    let mut unsolved = vec![];
-    let mut count = 0;
+    let folder = std::path::Path::new(&root).join(folder);
+    let (mut count, mut unsolved) = (0, vec![]);
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let file = path.file_name().unwrap().to_string_lossy().into_owned();
-        let Some(problem) = siconos_lcp(&path) else { continue };
+        let Some(problem) = read(&path) else { continue };
         count += 1;
         for name in METHODS {
             let (outcome, _, account) = solve_with(name, &[], &problem, &problem.origin().z, 1e-10);
-            println!("{name:10} {file:40} {:4} {} {account:?}", outcome.iterations, outcome.status);
+            println!("{name:10} {file:36} {:4} {} {account:?}", outcome.iterations, outcome.status);
             if outcome.status != Status::Solved {
                 unsolved.push(format!("{name} {file}: {}", outcome.status));
             }
         }
     }
-    assert!(
-        unsolved.iter().all(|u| u.contains("Pang_isolated_sol_perturbed.dat: infeasible")),
-        "{unsolved:#?}"
-    );
+    Some((count, unsolved))
+}
+
+#[test]
+fn corpus_lcp() {
+    let Some((count, unsolved)) = corpus("lcp", siconos_lcp) else { return };
     assert!(count >= 14, "{count} problems");
+    let impossible = |u: &String| u.contains("Pang_isolated_sol_perturbed.dat: infeasible");
+    assert!(unsolved.iter().all(impossible), "{unsolved:#?}");
+}
+
+#[test]
+fn corpus_mlcp() {
+    let Some((count, unsolved)) = corpus("mlcp", siconos_mlcp) else { return };
+    assert!(count >= 17, "{count} problems");
+    assert!(unsolved.is_empty(), "{unsolved:#?}");
 }

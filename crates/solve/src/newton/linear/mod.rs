@@ -111,8 +111,10 @@ impl<F> Semismooth<F> {
 }
 
 /// Steps without a new low after which the method starts again elsewhere.
-pub const PATIENCE: usize = 25;
-/// Steps without a new low after which the minimum no longer leads.
+pub const PATIENCE: usize = 30;
+/// A new low is below this part of the last one.
+const LOWER: f64 = 0.5;
+/// Steps on the minimum without a new low after which they are no longer taken blindly, and then no longer first.
 const CREDIT: usize = 8;
 /// A full step on the minimum must bring Ψ below this part of the reference.
 const GOOD: f64 = 0.9;
@@ -159,6 +161,8 @@ pub struct Work {
     /// ẑ and ŵ.
     x: Vec<f64>,
     w: Vec<f64>,
+    /// ẑ at the last new low.
+    best: Vec<f64>,
     /// Φ of the merit with its slopes, and of the direction where that has another function.
     phi: Vec<f64>,
     of_z: Vec<f64>,
@@ -182,6 +186,8 @@ pub struct Work {
 struct Phase {
     /// No step was made yet.
     fresh: bool,
+    /// Full steps on the minimum are taken whatever the merit says, as long as there is a new low every now and then.
+    blind: bool,
     rung: Option<Rung>,
     /// Newton's matrix was singular once.
     singular: bool,
@@ -204,6 +210,7 @@ impl Phase {
     fn new() -> Self {
         Self {
             fresh: true,
+            blind: true,
             rung: None,
             singular: false,
             proximal: 0.1,
@@ -248,6 +255,7 @@ impl<P: Paired, F: ScalarFunction> Solver<P> for Semismooth<F> {
             search: Search::new(self.settings.line_search),
             x: vec![0.0; n],
             w: vec![0.0; m],
+            best: vec![0.0; n],
             phi: vec![0.0; m],
             of_z: vec![0.0; m],
             of_w: vec![0.0; m],
@@ -273,7 +281,7 @@ impl<P: Paired, F: ScalarFunction> Solver<P> for Semismooth<F> {
     }
 
     fn start(&self, _: &P, point: &mut LcpPoint, work: &mut Work) {
-        work.search.restart();
+        work.search = Search::new(self.settings.line_search);
         work.phase = Phase::new();
         let Work { problem, x, w, .. } = work;
         problem.enter(&point.z, x);
@@ -293,14 +301,26 @@ impl<P: Paired, F: ScalarFunction> Solver<P> for Semismooth<F> {
         {
             return Step::NoSolution(proof);
         }
+        work.phase.since_low += 1;
         let rung = match work.phase.rung {
             Some(rung) => rung,
             None => {
                 let phase = &mut work.phase;
-                if merit.value < 0.98 * phase.low {
+                if merit.value < LOWER * phase.low {
                     (phase.low, phase.since_low) = (merit.value, 0);
-                } else {
-                    phase.since_low += 1;
+                    work.best.copy_from_slice(&work.x);
+                }
+                if self.by_minimum(phase)
+                    && phase.blind
+                    && phase.since_low > CREDIT
+                    && self.settings.line_search != LineSearch::None
+                {
+                    // The full steps lead nowhere: back, and downhill from now on.
+                    (phase.blind, phase.since_low) = (false, 0);
+                    let Work { problem, x, w, best, .. } = work;
+                    x.copy_from_slice(best);
+                    problem.multiply(x, w, false);
+                    return Step::Continue { estimate: f64::NAN };
                 }
                 if phase.since_low > PATIENCE {
                     return self.give_up(problem, work, merit);
@@ -405,11 +425,15 @@ impl<F: ScalarFunction> Semismooth<F> {
         if phase.singular { Rung::Proximal } else { Rung::Newton }
     }
 
-    /// Whether steps on the minimum come first: not where they have not helped for a while, nor from every start.
+    /// Whether this start is the minimum's: every other one.
+    fn by_minimum(&self, phase: &Phase) -> bool {
+        self.minimum_first == phase.restarts.is_multiple_of(2)
+    }
+
+    /// Whether steps on the minimum come first: not where they have not helped for a while.
     fn leads(&self, phase: &Phase) -> bool {
-        let blind = self.settings.line_search == LineSearch::None;
-        let turn = phase.restarts % 2 == 0 && phase.since_low <= CREDIT;
-        self.minimum_first && (blind || turn)
+        let plain = self.settings.line_search == LineSearch::None;
+        self.by_minimum(phase) && (plain || phase.since_low <= CREDIT)
     }
 
     /// Φ and its slopes at the present point; Ψ. Remembers nothing.
@@ -587,7 +611,8 @@ impl<F: ScalarFunction> Semismooth<F> {
         } else {
             full <= FINISHED * merit.value
         };
-        let blind = self.settings.line_search == LineSearch::None && self.minimum_first;
+        let plain = self.settings.line_search == LineSearch::None;
+        let blind = self.leads(&work.phase) && (plain || work.phase.blind);
         let accepted = (good || blind) && full.is_finite();
         if accepted {
             work.search.remember(merit.value);
@@ -670,7 +695,13 @@ impl<F: ScalarFunction> Semismooth<F> {
             return Step::Stuck(why.into());
         }
         work.phase.anew();
-        work.search.restart();
+        // What the one rule does not reach the other may.
+        let other = match (self.settings.line_search, work.phase.restarts / 2 % 2) {
+            (LineSearch::Nonmonotone, 1) => LineSearch::Armijo,
+            (LineSearch::Armijo, 1) => LineSearch::Nonmonotone,
+            (rule, _) => rule,
+        };
+        work.search = Search::new(other);
         let Work { problem, x, w, phase, .. } = work;
         let k = phase.restarts;
         for (j, x) in x.iter_mut().enumerate() {
@@ -679,7 +710,8 @@ impl<F: ScalarFunction> Semismooth<F> {
             let free = !problem.lower[j].is_finite() && !problem.upper[j].is_finite();
             let far = match k {
                 1 => 0.0,
-                2 => 1.0,
+                2 => 10.0,
+                3 => 1.0,
                 k => [1.0, 10.0, 0.1, 100.0][k % 4] * noise,
             };
             let from = if problem.lower[j].is_finite() { problem.lower[j] } else { 0.0 };
