@@ -5,11 +5,12 @@ use std::marker::PhantomData;
 use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 
 use super::linear_abouts::*;
-use super::{About, Direct, Entry, Made, Registered, Visitor, find};
+use super::{About, Direct, Entry, Made, Registered, Through, Visitor, find, names};
 use crate::Session;
 use crate::auto::linear::{LinearAuto, Planned};
 use crate::form::{Bounded, Complementary};
 use crate::newton::linear::{Method, NewtonFb, NewtonMin, NewtonPfb, Semismooth};
+use crate::reform::{Mixed, Reduce, Split};
 use crate::settings::{SettingsMap, parse};
 use crate::splitting::linear::Jacobi;
 
@@ -47,8 +48,9 @@ fn automatic<P: Planned>(settings: &SettingsMap) -> Result<Box<dyn Session<P>>, 
     Ok(Box::new(parse::<LinearAuto>(settings)?.session::<P>()))
 }
 
+/// `$prefix/solver` leads to another kind of problem by a reformulation.
 macro_rules! register {
-    ($kind:ty, $solvers:ident) => {
+    ($kind:ty, $solvers:ident $(, $prefix:literal, $reformulation:ident, $others:ident)?) => {
         impl Registered for $kind {
             fn abouts() -> Vec<&'static About> {
                 let entries = $solvers::<Direct<Self>>();
@@ -56,13 +58,21 @@ macro_rules! register {
             }
 
             fn composed_names() -> Vec<String> {
-                vec![]
+                let all: Vec<Vec<String>> = vec![$(names(
+                    &$others::<Through<Self, $reformulation>>(),
+                    concat!($prefix, "/"),
+                ))?];
+                all.concat()
             }
 
             fn make(name: &str, settings: &SettingsMap) -> Made<Self> {
                 if name == AUTO.name {
                     return Some(automatic(settings));
                 }
+                $(if let Some(($prefix, solver)) = name.split_once('/') {
+                    let entry = find($others::<Through<Self, _>>(), solver)?;
+                    return Some((entry.build)(settings, Through($reformulation, PhantomData)));
+                })?
                 let entry = find($solvers::<Direct<Self>>(), name)?;
                 Some((entry.build)(settings, Direct(PhantomData)))
             }
@@ -71,6 +81,6 @@ macro_rules! register {
 }
 
 register!(Lcp, complementary_solvers);
-register!(Mlcp, complementary_solvers);
-register!(BoxLcp, bounded_solvers);
-register!(Hlcp, horizontal_solvers);
+register!(Mlcp, complementary_solvers, "reduce", Reduce, complementary_solvers);
+register!(BoxLcp, bounded_solvers, "split", Split, complementary_solvers);
+register!(Hlcp, horizontal_solvers, "mixed", Mixed, complementary_solvers);

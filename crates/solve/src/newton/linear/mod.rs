@@ -291,7 +291,7 @@ impl<P: Paired, F: ScalarFunction> Solver<P> for Semismooth<F> {
     fn step(&self, problem: &P, _: &mut LcpPoint, work: &mut Work) -> Step {
         let merit = self.linearise(work);
         if !merit.value.is_finite() {
-            return self.restart(problem, work);
+            return self.restart(work);
         }
         if merit.largest == 0.0 {
             return Step::Done;
@@ -683,12 +683,12 @@ impl<F: ScalarFunction> Semismooth<F> {
         self.linearise(work);
         match proof(problem, work) {
             Some(proof) => Step::NoSolution(proof),
-            None => self.restart(problem, work),
+            None => self.restart(work),
         }
     }
 
     /// Starts again elsewhere, if that is still allowed.
-    fn restart<P: Paired>(&self, problem: &P, work: &mut Work) -> Step {
+    fn restart(&self, work: &mut Work) -> Step {
         if work.phase.restarts >= self.settings.restarts {
             let why =
                 "Newton's method is stuck: its merit has stationary points that solve nothing";
