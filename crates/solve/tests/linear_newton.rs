@@ -416,13 +416,356 @@ fn units_change_no_step() {
     }
 }
 
+// ------------------------------------------------------------------------------- two bounds, mixed, rectangular
+
 #[test]
-#[ignore]
-fn debug() {
+fn two_bounds() {
+    for class in [Class::Spd, Class::Definite, Class::Semidefinite, Class::Triangular] {
+        for (n, seed) in [(1, 0), (6, 1), (40, 2), (40, 3), (120, 4)] {
+            let mut rng = Pcg64::seed_from_u64(seed);
+            let m = matrix(class, n, &mut rng);
+            let (mut lower, mut upper, mut z, mut w) = (vec![], vec![], vec![], vec![]);
+            for i in 0..n {
+                let (l, gap) = (3.0 * random(&mut rng), rng.random_range(0.5..2.0));
+                let size = rng.random_range(0.5..1.0);
+                // Every kind of bounds, and every place between them, degenerate ones included.
+                let (l, u) = match i % 5 {
+                    0 => (l, l + gap),
+                    1 => (l, f64::INFINITY),
+                    2 => (f64::NEG_INFINITY, l),
+                    3 => (f64::NEG_INFINITY, f64::INFINITY),
+                    _ => (l, if i % 2 == 0 { l } else { l + gap }),
+                };
+                let (at, force) = match rng.random_range(0..4) {
+                    0 if l.is_finite() => (l, size),
+                    1 if u.is_finite() => (u, -size),
+                    2 if l.is_finite() => (l, 0.0),
+                    _ if l == u => (l, -size),
+                    _ if l.is_finite() && u.is_finite() => (0.5 * (l + u), 0.0),
+                    _ if l.is_finite() => (l + size, 0.0),
+                    _ if u.is_finite() => (u - size, 0.0),
+                    _ => (size, 0.0),
+                };
+                (lower.push(l), upper.push(u), z.push(at), w.push(force));
+            }
+            let q: Vec<f64> = w.iter().zip(product(&m, &z)).map(|(w, x)| w - x).collect();
+            let problem = BoxLcp::new(m, q, lower, upper).unwrap();
+            for name in METHODS {
+                let what = format!("box {class:?} n = {n} seed {seed}");
+                let found = solve(name, &problem, &what).0;
+                if class != Class::Semidefinite {
+                    close(&found, &z, 1e-8, &format!("{name} {what}"));
+                }
+            }
+        }
+    }
+}
+
+/// The three functions on `[A C; D B]`; sparse and dense; A regular, and A = 0 (a saddle point).
+#[test]
+fn mixed_problems() {
+    for saddle in [false, true] {
+        for (free, pairs, seed) in [(1, 1, 0), (3, 8, 1), (10, 30, 2), (30, 90, 3)] {
+            let mut rng = Pcg64::seed_from_u64(seed);
+            let n = free + pairs;
+            let mut m = matrix(Class::Definite, n, &mut rng);
+            if saddle {
+                // [0 C; −Cᵀ B], B definite.
+                for i in 0..free {
+                    for j in 0..n {
+                        let x = if j < free { 0.0 } else { random(&mut rng) };
+                        (m[(i, j)], m[(j, i)]) = (x, -x);
+                    }
+                }
+            }
+            let (mut z, mut w) = plant(n, 0.1, &mut rng);
+            for i in 0..free {
+                (z[i], w[i]) = (random(&mut rng), 0.0);
+            }
+            let q: Vec<f64> = w.iter().zip(product(&m, &z)).map(|(w, x)| w - x).collect();
+            for m in [Matrix::from(m.clone()), m.to_csc().into()] {
+                let problem = Mlcp::new(m, q.clone(), free).unwrap();
+                for name in METHODS {
+                    let what = format!("mixed {free} + {pairs} saddle {saddle}");
+                    let found = solve(name, &problem, &what).0;
+                    close(&found[free..], &z[free..], 1e-7, &format!("{name} {what}"));
+                }
+            }
+        }
+    }
+}
+
+/// More equalities than free variables (consistent ones), and fewer.
+#[test]
+fn rectangular_problems() {
+    for (equalities, free, pairs) in [(6, 3, 10), (3, 6, 10), (0, 2, 5), (4, 0, 8)] {
+        for seed in 0..3 {
+            let mut rng = Pcg64::seed_from_u64(seed);
+            let b = matrix(Class::Definite, pairs, &mut rng);
+            let m = Dense::from_fn(equalities + pairs, free + pairs, |i, j| {
+                if i >= equalities && j >= free {
+                    b[(i - equalities, j - free)]
+                } else {
+                    random(&mut rng)
+                }
+            });
+            let (v, f) = plant(pairs, 0.0, &mut rng);
+            let z: Vec<f64> = (0..free).map(|_| random(&mut rng)).chain(v).collect();
+            let w: Vec<f64> = vec![0.0; equalities].into_iter().chain(f).collect();
+            let q: Vec<f64> = w.iter().zip(product(&m, &z)).map(|(w, x)| w - x).collect();
+            for m in [Matrix::from(m.clone()), m.to_csc().into()] {
+                let problem = Mlcp::rectangular(m, q.clone(), equalities, free).unwrap();
+                for name in METHODS {
+                    solve(name, &problem, &format!("{equalities} × {free} + {pairs} seed {seed}"));
+                }
+            }
+        }
+    }
+}
+
+// ------------------------------------------------------------------------------------------------- large
+
+/// The five-point Laplacian on k × k inner points of the unit square.
+fn laplacian(k: usize) -> Csc {
+    let at = |i: usize, j: usize| i * k + j;
+    let entries = (0..k * k).flat_map(|p| {
+        let (i, j) = (p / k, p % k);
+        let mut near = vec![(p, p, 4.0)];
+        if i > 0 {
+            near.push((p, at(i - 1, j), -1.0));
+        }
+        if i + 1 < k {
+            near.push((p, at(i + 1, j), -1.0));
+        }
+        if j > 0 {
+            near.push((p, at(i, j - 1), -1.0));
+        }
+        if j + 1 < k {
+            near.push((p, at(i, j + 1), -1.0));
+        }
+        near
+    });
+    Csc::from_triplets(k * k, k * k, entries).unwrap()
+}
+
+/// A membrane over a bump, `u ≥ ψ`, `−Δu ≥ 0`: z = u − ψ.
+fn obstacle(k: usize) -> Lcp {
+    let m = laplacian(k);
+    let psi: Vec<f64> = (0..k * k)
+        .map(|p| {
+            let x = |i: usize| (i + 1) as f64 / (k + 1) as f64 - 0.5;
+            0.5 - 5.0 * (x(p / k).powi(2) + 2.0 * x(p % k).powi(2)) + 0.1 * (20.0 * x(p / k)).sin()
+        })
+        .collect();
+    let mut q = vec![0.0; k * k];
+    m.mul_add(1.0, &psi, &mut q);
+    Lcp::new(m, q).unwrap()
+}
+
+#[test]
+fn obstacle_problems() {
+    let problem = obstacle(40);
+    let found = METHODS.map(|name| solve(name, &problem, "obstacle 40").0);
+    close(&found[1], &found[0], 1e-10, "fb");
+    close(&found[2], &found[0], 1e-10, "pfb");
+}
+
+#[test]
+#[ignore = "seconds to minutes"]
+fn large_problems() {
+    let k = std::env::var("GRID").map_or(300, |k| k.parse().unwrap());
+    let problem = obstacle(k);
+    for name in METHODS {
+        let clock = std::time::Instant::now();
+        let (_, steps) = solve(name, &problem, "obstacle");
+        println!("{name} {k} × {k}: {steps} steps, {:.2} s", clock.elapsed().as_secs_f64());
+    }
     let mut rng = Pcg64::seed_from_u64(1);
-    let m = matrix(Class::Semidefinite, 60, &mut rng);
-    let (z, w) = plant(60, 0.0, &mut rng);
+    let n = 5000;
+    let entries: Vec<_> = (0..n)
+        .flat_map(|i| {
+            let others: Vec<_> =
+                (0..3).map(|_| (i, rng.random_range(0..n), random(&mut rng))).collect();
+            others.into_iter().chain([(i, i, 3.5)])
+        })
+        .collect();
+    let m = Csc::from_triplets(n, n, entries.iter().copied()).unwrap();
+    let (z, w) = plant(n, 0.1, &mut rng);
+    let mut q = w.clone();
+    m.mul_add(-1.0, &z, &mut q);
+    let problem = Lcp::new(m, q).unwrap();
+    for name in METHODS {
+        let clock = std::time::Instant::now();
+        let (found, steps) = solve(name, &problem, "sparse 5000");
+        println!("{name} sparse 5000: {steps} steps, {:.2} s", clock.elapsed().as_secs_f64());
+        close(&found, &z, 1e-9, name);
+    }
+}
+
+// ------------------------------------------------------------------------------------------ what they say
+
+#[derive(Debug)]
+struct Twice;
+
+impl Operator for Twice {
+    fn nrows(&self) -> usize {
+        2
+    }
+    fn ncols(&self) -> usize {
+        2
+    }
+    fn mul(&self, x: &[f64], y: &mut [f64]) {
+        (y[0], y[1]) = (2.0 * x[0], 2.0 * x[1]);
+    }
+    fn mul_transpose(&self, x: &[f64], y: &mut [f64]) {
+        self.mul(x, y);
+    }
+}
+
+#[test]
+fn refusals() {
+    let m = Matrix::Operator(std::sync::Arc::new(Twice));
+    let problem = Lcp::new(m, vec![-1.0, 1.0]).unwrap();
+    for name in METHODS {
+        let mut session = registry::session::<Lcp>(name, &Default::default()).unwrap();
+        let refused =
+            session.solve(&problem, &mut problem.origin(), &Limits::default(), &mut |_| {});
+        let said = refused.unwrap_err().to_string();
+        assert!(said.contains("the entries of M") && said.contains("operator"), "{said}");
+    }
+    let error = registry::session::<Lcp>("newton_pfb", &from_texts(&["lambda=0"]).unwrap());
+    let said = error.err().unwrap().to_string();
+    assert!(said.contains("lambda") && said.contains("(0, 1]"), "{said}");
+}
+
+#[test]
+fn problems_without_a_solution_end_and_are_never_called_solved() {
+    let cases = [
+        ("murty 2.2", rows(&[&[-2.0, 1.0], &[1.0, -2.0]]), vec![-1.0, -1.0]),
+        (
+            "murty 2.9",
+            rows(&[&[-1.0, 0.0, -3.0], &[1.0, -2.0, -5.0], &[-2.0, -1.0, -2.0]]),
+            vec![-3.0, -2.0, -1.0],
+        ),
+        ("1 × 1", rows(&[&[-1.0]]), vec![-1.0]),
+        (
+            "pang perturbed",
+            rows(&[&[0.0, -1.0, -1.0], &[1.0, 0.0, 0.0], &[-1.0, 0.0, 0.0]]),
+            vec![-1e-4, -1.0, 1.0],
+        ),
+        ("semidefinite", rows(&[&[1.0, -1.0], &[-1.0, 1.0]]), vec![-1.0, -1.0]),
+    ];
+    for (what, m, q) in cases {
+        let problem = Lcp::new(m, q).unwrap();
+        for name in METHODS {
+            let (outcome, ..) = solve_with(name, &[], &problem, &problem.origin().z, 1e-10);
+            assert!(
+                matches!(outcome.status, Status::Infeasible(_)),
+                "{name} {what}: {}",
+                outcome.status
+            );
+        }
+    }
+}
+
+#[test]
+fn a_session_solves_again_from_where_it_is() {
+    let mut rng = Pcg64::seed_from_u64(8);
+    let m = matrix(Class::Definite, 50, &mut rng);
+    let (z, w) = plant(50, 0.0, &mut rng);
     let q: Vec<f64> = w.iter().zip(product(&m, &z)).map(|(w, x)| w - x).collect();
-    let problem = Lcp::new(m.clone(), q).unwrap();
-    solve("newton_fb", &problem, "debug");
+    for name in METHODS {
+        for m in [Matrix::from(m.clone()), m.to_csc().into()] {
+            let mut session = registry::session::<Lcp>(name, &Default::default()).unwrap();
+            let mut problem = Lcp::new(m, q.clone()).unwrap();
+            let mut point = problem.origin();
+            let limits = Limits { tolerance: 1e-12, ..Limits::default() };
+            let cold = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+            close(&point.z, &z, 1e-10, name);
+            problem.q.iter_mut().for_each(|q| *q *= 1.001);
+            let warm = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+            assert_eq!(warm.status, Status::Solved);
+            assert!(warm.iterations <= cold.iterations, "{name}");
+            let scaled: Vec<f64> = z.iter().map(|z| 1.001 * z).collect();
+            close(&point.z, &scaled, 1e-10, name);
+            // Another shape into the same session.
+            let small = Lcp::new(rows(&[&[2.0]]), vec![-4.0]).unwrap();
+            let mut point = small.origin();
+            session.solve(&small, &mut point, &limits, &mut |_| {}).unwrap();
+            close(&point.z, &[2.0], 1e-12, name);
+        }
+    }
+}
+
+// ------------------------------------------------------------------------------------------------ corpus
+
+/// All numbers of a file, from the first line of the format on.
+fn numbers(path: &std::path::Path) -> Vec<f64> {
+    let text = std::fs::read_to_string(path).unwrap();
+    text.split_whitespace().map_while(|t| t.parse().ok()).collect()
+}
+
+/// Siconos' dense text format: numbers column by column.
+fn siconos_lcp(path: &std::path::Path) -> Option<Lcp> {
+    let x = numbers(path);
+    let n = x[0] as usize;
+    if x[1] != 0.0 || x.len() < 6 + n * n + n {
+        return None;
+    }
+    let m = Dense::from_fn(n, n, |i, j| x[6 + j * n + i]);
+    Lcp::new(m, x[6 + n * n..6 + n * n + n].to_vec()).ok()
+}
+
+/// The same for mixed problems: `1 1 n m`, the blocks of rows, then the matrix as above.
+fn siconos_mlcp(path: &std::path::Path) -> Option<Mlcp> {
+    let x = numbers(path);
+    let (free, pairs) = (x[2] as usize, x[3] as usize);
+    let n = free + pairs;
+    if [x[0], x[9], x[10], x[11]] != [1.0, 0.0, n as f64, n as f64] {
+        return None;
+    }
+    let m = Dense::from_fn(n, n, |i, j| x[14 + j * n + i]);
+    Mlcp::new(m, x[14 + n * n..14 + n * n + n].to_vec(), free).ok()
+}
+
+/// Every method on every file of a folder of the corpus; what it did not solve.
+fn corpus<P: Registered + Problem<Point = LcpPoint>>(
+    folder: &str,
+    read: impl Fn(&std::path::Path) -> Option<P>,
+) -> Option<(usize, Vec<String>)> {
+    let Some(root) = std::env::var_os("NONSMOOTH_CORPUS") else {
+        println!("skipped: NONSMOOTH_CORPUS is not set");
+        return None;
+    };
+    let folder = std::path::Path::new(&root).join(folder);
+    let (mut count, mut unsolved) = (0, vec![]);
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let file = path.file_name().unwrap().to_string_lossy().into_owned();
+        let Some(problem) = read(&path) else { continue };
+        count += 1;
+        for name in METHODS {
+            let (outcome, _, account) = solve_with(name, &[], &problem, &problem.origin().z, 1e-10);
+            println!("{name:10} {file:36} {:4} {} {account:?}", outcome.iterations, outcome.status);
+            if outcome.status != Status::Solved {
+                unsolved.push(format!("{name} {file}: {}", outcome.status));
+            }
+        }
+    }
+    Some((count, unsolved))
+}
+
+#[test]
+fn corpus_lcp() {
+    let Some((count, unsolved)) = corpus("lcp", siconos_lcp) else { return };
+    assert!(count >= 14, "{count} problems");
+    let impossible = |u: &String| u.contains("Pang_isolated_sol_perturbed.dat: infeasible");
+    assert!(unsolved.iter().all(impossible), "{unsolved:#?}");
+}
+
+#[test]
+fn corpus_mlcp() {
+    let Some((count, unsolved)) = corpus("mlcp", siconos_mlcp) else { return };
+    assert!(count >= 17, "{count} problems");
+    assert!(unsolved.is_empty(), "{unsolved:#?}");
 }

@@ -18,7 +18,7 @@
 //! Each comes with an element of its B-subdifferential: the derivative where there is one, at a kink the derivative of a piece that meets
 //! there. All of them but Evtushenko's and Purtov's increase in z and in w: their derivatives are not negative.
 //!
-//! References: Acary2018 (74); Fischer1992; ChenChenKanzow2000; EvtushenkoPurtov1984; Munson2002 (evaluation, two bounds).
+//! References: Acary2018 (74); Fischer1992; ChenChenKanzow2000; EvtushenkoPurtov1984; Billups1995 (two bounds).
 
 /// The value of a function of (z, w) and its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]

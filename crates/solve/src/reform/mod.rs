@@ -1,11 +1,17 @@
 //! Reformulations: problem → problem, with the way back.
 
 mod condense;
+mod mixed;
+mod reduce;
+mod split;
 
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Certificate;
 
 pub use condense::Condense;
+pub use mixed::Mixed;
+pub use reduce::Reduce;
+pub use split::Split;
 
 use crate::SolveError;
 

@@ -154,6 +154,27 @@ pub const PREFIXES: &[Prefix] = &[
         cites: &["Rockafellar1976", "AcaryBremondHuber2018"],
         settings: described::<ProximalPoint>,
     },
+    Prefix {
+        name: "reduce",
+        summary: "MLCP to LCP: the free variables eliminated, M = B - D A^-1 C, where A is invertible",
+        from: &[Kind::Mlcp],
+        cites: &["Acary2018"],
+        settings: Vec::new,
+    },
+    Prefix {
+        name: "split",
+        summary: "box LCP to MLCP: bounds by shifts, second bounds by multipliers",
+        from: &[Kind::BoxLcp],
+        cites: &["Acary2018"],
+        settings: Vec::new,
+    },
+    Prefix {
+        name: "mixed",
+        summary: "horizontal LCP to MLCP: s is a free variable",
+        from: &[Kind::Hlcp],
+        cites: &["Acary2018"],
+        settings: Vec::new,
+    },
 ];
 
 fn find<V: Visitor>(entries: Vec<Entry<V>>, name: &str) -> Option<Entry<V>> {
@@ -179,7 +200,12 @@ pub fn solver_names<P: Registered>() -> Vec<String> {
 /// The description behind a name, composed or not.
 pub fn about<P: Registered>(name: &str) -> Option<&'static About> {
     let last = name.rsplit('/').next().unwrap_or(name);
-    abouts::<P>().into_iter().find(|a| a.name == last)
+    let known = |all: Vec<&'static About>| all.into_iter().find(|a| a.name == last);
+    // Behind a reformulation there may be solvers that the problem's own kind does not have.
+    known(abouts::<P>()).or_else(|| {
+        let composed = P::composed_names().iter().any(|n| n == name);
+        known(nonsmooth_problem::Mlcp::abouts()).filter(|_| composed)
+    })
 }
 
 /// A session of the solver called `name`, with the settings given and defaults for the rest.

@@ -29,6 +29,7 @@
 //!
 //! Cost of a step: one LU of the size of M (Levenberg–Marquardt: twice the size), a few products. Storage: M twice, the factor, ten vectors.
 
+mod factor;
 mod fischer_burmeister;
 mod min;
 mod penalised;
@@ -50,6 +51,7 @@ pub use fischer_burmeister::NewtonFb;
 pub use min::NewtonMin;
 pub use penalised::NewtonPfb;
 
+use factor::Factor;
 use scaled::{Jacobian, Scaled};
 
 /// The hyperparameters that all of them have.
@@ -65,7 +67,7 @@ pub struct Newton {
 
 impl Default for Newton {
     fn default() -> Self {
-        Self { line_search: LineSearch::Nonmonotone, restarts: 6 }
+        Self { line_search: LineSearch::Nonmonotone, restarts: 4 }
     }
 }
 
@@ -109,7 +111,11 @@ impl<F> Semismooth<F> {
 }
 
 /// Steps without a new low after which the method starts again elsewhere.
-pub const PATIENCE: usize = 40;
+pub const PATIENCE: usize = 30;
+/// A new low is below this part of the last one.
+const LOWER: f64 = 0.5;
+/// Steps on the minimum without a new low after which they are no longer taken blindly, and then no longer first.
+const CREDIT: usize = 8;
 /// A full step on the minimum must bring Ψ below this part of the reference.
 const GOOD: f64 = 0.9;
 /// A step that is to finish must bring Ψ below this part.
@@ -148,13 +154,15 @@ enum Rung {
 pub struct Work {
     problem: Scaled,
     jacobian: Jacobian,
-    lu: SquareLu,
+    factor: Factor,
     /// Of Levenberg–Marquardt's matrices, which have another pattern.
     augmented_lu: SquareLu,
     search: Search,
     /// ẑ and ŵ.
     x: Vec<f64>,
     w: Vec<f64>,
+    /// ẑ at the last new low.
+    best: Vec<f64>,
     /// Φ of the merit with its slopes, and of the direction where that has another function.
     phi: Vec<f64>,
     of_z: Vec<f64>,
@@ -171,12 +179,15 @@ pub struct Work {
     correction: Vec<f64>,
     stacked: Vec<f64>,
     phase: Phase,
-    last_t: f64,
 }
 
 /// How the solve is going.
 #[derive(Debug, Clone, Copy)]
 struct Phase {
+    /// No step was made yet.
+    fresh: bool,
+    /// Full steps on the minimum are taken whatever the merit says, as long as there is a new low every now and then.
+    blind: bool,
     rung: Option<Rung>,
     /// Newton's matrix was singular once.
     singular: bool,
@@ -198,6 +209,8 @@ struct Phase {
 impl Phase {
     fn new() -> Self {
         Self {
+            fresh: true,
+            blind: true,
             rung: None,
             singular: false,
             proximal: 0.1,
@@ -215,7 +228,7 @@ impl Phase {
     /// The same solve from another start.
     fn anew(&mut self) {
         let Self { restarts, moves, .. } = *self;
-        *self = Self { restarts: restarts + 1, moves, ..Self::new() };
+        *self = Self { fresh: false, restarts: restarts + 1, moves, ..Self::new() };
     }
 }
 
@@ -235,13 +248,14 @@ impl<P: Rowwise, F: ScalarFunction> Solver<P> for Semismooth<F> {
         let problem = Scaled::new(&problem.rowwise())?;
         let (m, n) = (problem.nrows(), problem.dim());
         Ok(Work {
+            factor: Factor::new(&problem.matrix),
             jacobian: Jacobian::new(&problem),
             problem,
-            lu: SquareLu::default(),
             augmented_lu: SquareLu::default(),
             search: Search::new(self.settings.line_search),
             x: vec![0.0; n],
             w: vec![0.0; m],
+            best: vec![0.0; n],
             phi: vec![0.0; m],
             of_z: vec![0.0; m],
             of_w: vec![0.0; m],
@@ -254,7 +268,6 @@ impl<P: Rowwise, F: ScalarFunction> Solver<P> for Semismooth<F> {
             correction: vec![0.0; n],
             stacked: Vec::with_capacity(m + n),
             phase: Phase::new(),
-            last_t: 0.0,
         })
     }
 
@@ -268,7 +281,7 @@ impl<P: Rowwise, F: ScalarFunction> Solver<P> for Semismooth<F> {
     }
 
     fn start(&self, _: &P, point: &mut LcpPoint, work: &mut Work) {
-        work.search.restart();
+        work.search = Search::new(self.settings.line_search);
         work.phase = Phase::new();
         let Work { problem, x, w, .. } = work;
         problem.enter(&point.z, x);
@@ -278,19 +291,36 @@ impl<P: Rowwise, F: ScalarFunction> Solver<P> for Semismooth<F> {
     fn step(&self, problem: &P, _: &mut LcpPoint, work: &mut Work) -> Step {
         let merit = self.linearise(work);
         if !merit.value.is_finite() {
-            return self.restart(problem, work);
+            return self.restart(work);
         }
         if merit.largest == 0.0 {
             return Step::Done;
         }
+        if std::mem::take(&mut work.phase.fresh)
+            && let Some(proof) = impossible_row(problem, work)
+        {
+            return Step::NoSolution(proof);
+        }
+        work.phase.since_low += 1;
         let rung = match work.phase.rung {
             Some(rung) => rung,
             None => {
                 let phase = &mut work.phase;
-                if merit.value < 0.98 * phase.low {
+                if merit.value < LOWER * phase.low {
                     (phase.low, phase.since_low) = (merit.value, 0);
-                } else {
-                    phase.since_low += 1;
+                    work.best.copy_from_slice(&work.x);
+                }
+                if self.by_minimum(phase)
+                    && phase.blind
+                    && phase.since_low > CREDIT
+                    && self.settings.line_search != LineSearch::None
+                {
+                    // The full steps lead nowhere: back, and downhill from now on.
+                    (phase.blind, phase.since_low) = (false, 0);
+                    let Work { problem, x, w, best, .. } = work;
+                    x.copy_from_slice(best);
+                    problem.multiply(x, w, false);
+                    return Step::Continue { estimate: f64::NAN };
                 }
                 if phase.since_low > PATIENCE {
                     return self.give_up(problem, work, merit);
@@ -308,18 +338,6 @@ impl<P: Rowwise, F: ScalarFunction> Solver<P> for Semismooth<F> {
             Rung::Marquardt => self.marquardt(work, merit),
             Rung::Gradient => self.steepest(work, merit),
         };
-        if std::env::var_os("NEWTON_DEBUG").is_some() {
-            eprintln!(
-                "{rung:?} {moved} merit {:.2e} largest {:.2e} prox {:.1e} |x| {:.1e} |d| {:.1e} low {:.1e} t {:.1e}",
-                merit.value,
-                merit.largest,
-                work.phase.proximal,
-                norm(&work.x),
-                norm(&work.d),
-                work.phase.low,
-                work.last_t
-            );
-        }
         let phase = &mut work.phase;
         match (rung, moved) {
             (Rung::Proximal, true) => phase.proximal = (phase.proximal / 4.0).max(1e-3),
@@ -396,7 +414,7 @@ impl<F: ScalarFunction> Semismooth<F> {
         if work.x.len() != work.w.len() {
             return Rung::Marquardt;
         }
-        if self.minimum_first {
+        if self.leads(phase) {
             return Rung::Minimum;
         }
         let slow = merit.value > SLOW * std::mem::replace(&mut phase.last, merit.value);
@@ -405,6 +423,17 @@ impl<F: ScalarFunction> Semismooth<F> {
             return Rung::Minimum;
         }
         if phase.singular { Rung::Proximal } else { Rung::Newton }
+    }
+
+    /// Whether this start is the minimum's: every other one.
+    fn by_minimum(&self, phase: &Phase) -> bool {
+        self.minimum_first == phase.restarts.is_multiple_of(2)
+    }
+
+    /// Whether steps on the minimum come first: not where they have not helped for a while.
+    fn leads(&self, phase: &Phase) -> bool {
+        let plain = self.settings.line_search == LineSearch::None;
+        self.by_minimum(phase) && (plain || phase.since_low <= CREDIT)
     }
 
     /// Φ and its slopes at the present point; Ψ. Remembers nothing.
@@ -434,45 +463,63 @@ impl<F: ScalarFunction> Semismooth<F> {
         }
     }
 
-    /// d with `J d = −Φ` for the slopes and Φ that the workspace holds, `J` with `∂Φ/∂z + λ ∂Φ/∂w`; refined `sweeps` times against λ = 0 where `to_zero`.
+    /// d with `J d = −Φ` for the slopes and Φ that the workspace holds, `J` with `∂Φ/∂z + λ ∂Φ/∂w`; refined towards λ = 0 where `to_zero`.
     /// False where the matrix is singular.
     fn solve(work: &mut Work, lambda: f64, to_zero: bool) -> bool {
-        let Work { problem, jacobian, lu, phi, of_z, of_w, d, residual, correction, .. } = work;
+        let Work { problem, jacobian, factor, of_z, of_w, .. } = work;
         if lambda > 0.0 {
             of_z.iter_mut().zip(&*of_w).for_each(|(e, f)| *e += lambda * f);
         }
         jacobian.assemble(problem, of_z, of_w);
-        let factorised = lu.factorise(&jacobian.matrix).is_ok();
+        let mut factorised = factor.factorise(&jacobian.matrix);
         if lambda > 0.0 {
             of_z.iter_mut().zip(&*of_w).for_each(|(e, f)| *e -= lambda * f);
-            if to_zero {
+        }
+        let shifted = lambda > 0.0 && to_zero;
+        if shifted {
+            jacobian.assemble(problem, of_z, of_w);
+        }
+        loop {
+            if factorised && Self::refine(work, if to_zero { 6 } else { 2 }) {
+                return true;
+            }
+            let Work { problem, jacobian, factor, of_z, of_w, .. } = work;
+            if !factor.distrust() {
+                return false;
+            }
+            if shifted {
+                of_z.iter_mut().zip(&*of_w).for_each(|(e, f)| *e += lambda * f);
+                jacobian.assemble(problem, of_z, of_w);
+                of_z.iter_mut().zip(&*of_w).for_each(|(e, f)| *e -= lambda * f);
+            }
+            factorised = factor.factorise(&jacobian.matrix);
+            if shifted {
                 jacobian.assemble(problem, of_z, of_w);
             }
         }
-        if !factorised {
-            return false;
-        }
+    }
+
+    /// d from the factors, by so many corrections at most; whether `J d = −Φ` holds well enough.
+    fn refine(work: &mut Work, sweeps: usize) -> bool {
+        let Work { jacobian, factor, phi, d, residual, correction, .. } = work;
         d.fill(0.0);
         let wanted = norm(phi);
-        let (mut last, sweeps) = (wanted, if to_zero { 6 } else { 2 });
+        let mut last = wanted;
         residual.copy_from_slice(phi);
         for _ in 0..sweeps {
             correction.iter_mut().zip(&*residual).for_each(|(c, r)| *c = -r);
-            lu.solve(correction);
+            factor.solve(correction);
             d.iter_mut().zip(&*correction).for_each(|(d, c)| *d += c);
             jacobian.matrix.mul(d, residual);
             residual.iter_mut().zip(&*phi).for_each(|(r, phi)| *r += phi);
             let now = norm(residual);
-            if now.is_nan() || now >= 0.5 * last {
-                if now.is_nan() || now > last {
-                    d.iter_mut().zip(&*correction).for_each(|(d, c)| *d -= c);
-                } else {
-                    last = now;
-                }
+            if now.is_nan() || now > last {
+                d.iter_mut().zip(&*correction).for_each(|(d, c)| *d -= c);
                 break;
             }
+            let slow = now > 0.5 * last;
             last = now;
-            if last <= 1e-15 * wanted {
+            if slow || last <= 1e-15 * wanted {
                 break;
             }
         }
@@ -502,7 +549,6 @@ impl<F: ScalarFunction> Semismooth<F> {
             }
             merit_at(&self.function, problem, trial, trial_w)
         });
-        work.last_t = found.step;
         if found.accepted {
             Self::take(work, merit);
         }
@@ -539,7 +585,7 @@ impl<F: ScalarFunction> Semismooth<F> {
         } else if !solved {
             return false;
         }
-        if !self.minimum_first {
+        if !self.leads(&work.phase) {
             return false;
         }
         let slope = Self::slope(work);
@@ -560,12 +606,13 @@ impl<F: ScalarFunction> Semismooth<F> {
         }
         problem.multiply(trial, trial_w, merit.largest < PRECISE_BELOW);
         let full = merit_at(&self.function, problem, trial, trial_w);
-        let good = if self.minimum_first {
+        let good = if self.leads(&work.phase) {
             full <= GOOD * work.search.reference(merit.value)
         } else {
             full <= FINISHED * merit.value
         };
-        let blind = self.settings.line_search == LineSearch::None && self.minimum_first;
+        let plain = self.settings.line_search == LineSearch::None;
+        let blind = self.leads(&work.phase) && (plain || work.phase.blind);
         let accepted = (good || blind) && full.is_finite();
         if accepted {
             work.search.remember(merit.value);
@@ -633,16 +680,28 @@ impl<F: ScalarFunction> Semismooth<F> {
         if merit.largest <= ROUNDING * reach {
             return Step::Done;
         }
-        self.restart(problem, work)
+        self.linearise(work);
+        match proof(problem, work) {
+            Some(proof) => Step::NoSolution(proof),
+            None => self.restart(work),
+        }
     }
 
     /// Starts again elsewhere, if that is still allowed.
-    fn restart<P: Rowwise>(&self, problem: &P, work: &mut Work) -> Step {
+    fn restart(&self, work: &mut Work) -> Step {
         if work.phase.restarts >= self.settings.restarts {
-            return stuck(problem);
+            let why =
+                "Newton's method is stuck: its merit has stationary points that solve nothing";
+            return Step::Stuck(why.into());
         }
         work.phase.anew();
-        work.search.restart();
+        // What the one rule does not reach the other may.
+        let other = match (self.settings.line_search, work.phase.restarts / 2 % 2) {
+            (LineSearch::Nonmonotone, 1) => LineSearch::Armijo,
+            (LineSearch::Armijo, 1) => LineSearch::Nonmonotone,
+            (rule, _) => rule,
+        };
+        work.search = Search::new(other);
         let Work { problem, x, w, phase, .. } = work;
         let k = phase.restarts;
         for (j, x) in x.iter_mut().enumerate() {
@@ -651,7 +710,8 @@ impl<F: ScalarFunction> Semismooth<F> {
             let free = !problem.lower[j].is_finite() && !problem.upper[j].is_finite();
             let far = match k {
                 1 => 0.0,
-                2 => 1.0,
+                2 => 10.0,
+                3 => 1.0,
                 k => [1.0, 10.0, 0.1, 100.0][k % 4] * noise,
             };
             let from = if problem.lower[j].is_finite() { problem.lower[j] } else { 0.0 };
@@ -662,16 +722,34 @@ impl<F: ScalarFunction> Semismooth<F> {
     }
 }
 
-/// The last word: a row that proves that there is no solution, if there is one.
-fn stuck<P: Rowwise>(problem: &P) -> Step {
+/// A row that no point satisfies, lecture (19), if there is one. Cost: one pass over M.
+fn impossible_row<P: Rowwise>(problem: &P, work: &mut Work) -> Option<Certificate> {
     let rows = problem.rowwise();
-    for row in 0..rows.q.len() {
-        let proof = Certificate::Row { row };
-        if rows.q[row] < 0.0 && problem.verify(&proof) {
-            return Step::NoSolution(proof);
-        }
-    }
-    Step::Stuck(
-        "Newton's method is stuck: its merit has stationary points that solve nothing".into(),
-    )
+    let largest = &mut work.residual;
+    largest.fill(f64::NEG_INFINITY);
+    rows.matrix.for_each(|i, _, x| largest[i] = largest[i].max(x));
+    let row = (0..largest.len()).find(|&i| rows.q[i] < 0.0 && largest[i] <= 0.0)?;
+    Some(Certificate::Row { row }).filter(|proof| problem.verify(proof))
+}
+
+/// A proof that there is no solution, where the stationary point is one.
+///
+/// With `y = −∂Φ/∂w ∘ Φ`, `∇Ψ = 0` says `Mᵀ y = ∂Φ/∂z ∘ Φ`: a Farkas vector, if Φ ≤ 0.
+fn proof<P: Rowwise>(problem: &P, work: &Work) -> Option<Certificate> {
+    let Work { problem: scaled, phi, of_w, .. } = work;
+    let mut y: Vec<f64> = (0..phi.len())
+        .map(|i| {
+            let y = -scaled.row(i) * of_w[i] * phi[i];
+            match scaled.variable(i).map(|j| (scaled.lower[j], scaled.upper[j])) {
+                Some((l, u)) if l.is_finite() && u.is_finite() => 0.0,
+                Some((l, _)) if l.is_finite() => y.max(0.0),
+                Some((_, u)) if u.is_finite() => y.min(0.0),
+                _ => y,
+            }
+        })
+        .collect();
+    let largest = y.iter().fold(0.0_f64, |m, y| m.max(y.abs()));
+    y.iter_mut().filter(|y| y.abs() <= 1e-9 * largest).for_each(|y| *y = 0.0);
+    let farkas = Certificate::Farkas { y };
+    problem.verify(&farkas).then_some(farkas)
 }

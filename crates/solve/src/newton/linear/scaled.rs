@@ -169,6 +169,11 @@ impl Scaled {
         i.checked_sub(self.equalities).map(|k| self.free + k)
     }
 
+    /// `ŵ_i` over `w_i`, up to a factor that all rows have in common.
+    pub fn row(&self, i: usize) -> f64 {
+        self.row[i]
+    }
+
     /// ẑ of z.
     pub fn enter(&self, z: &[f64], x: &mut [f64]) {
         for ((x, z), c) in x.iter_mut().zip(z).zip(&self.unit) {
