@@ -9,12 +9,21 @@ use super::{About, Direct, Entry, Made, Registered, Visitor, find};
 use crate::Session;
 use crate::auto::linear::{LinearAuto, Planned};
 use crate::form::{Bounded, Complementary};
+use crate::optimisation::linear::Proportioning;
 use crate::settings::{SettingsMap, parse};
-use crate::splitting::linear::Jacobi;
+use crate::splitting::linear::{Jacobi, Pgs, Proximal, Psor, Relaxation, Rpgs, Rpsor, Searched};
 
 /// The solvers that take bounds of any kind.
 fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
-    vec![Entry { about: &PROJECTED_JACOBI, build: |s, v| Ok(v.visit(Jacobi(parse(s)?))) }]
+    vec![
+        Entry { about: &PROJECTED_JACOBI, build: |s, v| Ok(v.visit(Jacobi(parse(s)?))) },
+        Entry { about: &PGS, build: |s, v| Ok(v.visit(Relaxation(Psor::from(parse::<Pgs>(s)?)))) },
+        Entry { about: &PSOR, build: |s, v| Ok(v.visit(Relaxation(parse(s)?))) },
+        Entry { about: &RPGS, build: |s, v| Ok(v.visit(Proximal(Rpsor::from(parse::<Rpgs>(s)?)))) },
+        Entry { about: &RPSOR, build: |s, v| Ok(v.visit(Proximal(parse(s)?))) },
+        Entry { about: &MPRGP, build: |s, v| Ok(v.visit(Proportioning(parse(s)?))) },
+        Entry { about: &SPLITTING_LS, build: |s, v| Ok(v.visit(Searched(parse(s)?))) },
+    ]
 }
 
 /// The solvers of problems whose variables are free or nonnegative.
