@@ -165,7 +165,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
 }
 
 /// The name of a file for a linear complementarity problem.
-fn linear_name(path: &Path) -> Result<(), String> {
+pub fn linear_name(path: &Path) -> Result<(), String> {
     match path.extension().and_then(|e| e.to_str()) {
         Some("toml" | "mtx") => Ok(()),
         _ => Err(format!(

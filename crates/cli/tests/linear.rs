@@ -110,6 +110,49 @@ fn problems_are_solved_from_every_format() {
 }
 
 #[test]
+fn problems_are_generated_with_the_solution_planted() {
+    let folder = Folder::new();
+    let list = folder.run("gen --list").exits(0).stdout;
+    assert!(
+        list.contains("\nlcp: ") && list.contains("class=spd") && list.contains("copositive_plus")
+    );
+    assert!(folder.run("gen bearing --list").exits(0).stdout.contains("eccentricity=0.1"));
+    for (name, settings) in [
+        ("lcp", "--set n=12 --set class=p --set degenerate=0.25"),
+        ("lcp", "--set n=30 --set class=m_matrix --set density=0.2 --set decades=4"),
+        ("box_lcp", "--set n=9 --set seed=3"),
+        ("hlcp", ""),
+        ("mlcp", "--set blocks=singular_a --set redundant=2"),
+    ] {
+        folder.run(&format!("gen {name} {settings} --out a.toml")).exits(0);
+        folder.run("check a.toml --tol 1e-12").exits(0);
+        assert!(folder.run("info a.toml").exits(0).stdout.contains("title      "), "{name}");
+    }
+    folder.run("gen lcp --out a.mtx").exits(0);
+    folder.run("check a.mtx").exits(0);
+    for (name, kind) in
+        [("obstacle", "lcp"), ("torsion", "box_lcp"), ("bearing", "lcp"), ("infeasible", "lcp")]
+    {
+        let more = if name == "infeasible" { " --set class=psd" } else { "" };
+        let text = folder.run(&format!("gen {name}{more} --out {name}.toml")).exits(0).stdout;
+        assert!(text.contains(kind), "{text}");
+        folder.run(&format!("check {name}.toml")).refused(&["[solution]"]);
+    }
+    for (arguments, parts) in [
+        ("gen lcp", ["--out FILE.toml", "found none"]),
+        ("gen lcp --out a.hdf5", ["--out a.hdf5", ".toml or .mtx"]),
+        ("gen lcp --draw a.svg --out a.toml", ["--draw", "lcp"]),
+        ("gen lcp --form local --out a.toml", ["--form", "lcp"]),
+        ("gen lcp --set n=1 --out a.toml", ["n: expected from 2", "found 1"]),
+        ("gen lcp --set class=q --out a.toml", ["class", "spd"]),
+        ("gen infeasible --out a.toml", ["class", "psd, kkt or copositive_plus"]),
+        ("gen magic --out a.toml", ["magic", "linear complementarity: lcp"]),
+    ] {
+        folder.run(arguments).refused(&parts);
+    }
+}
+
+#[test]
 fn a_solution_is_a_start() {
     let folder = folder();
     let iterations = |arguments: &str| {
