@@ -392,6 +392,9 @@ fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &SolvedOf<P
         "seconds": outcome.seconds,
         "account": account,
     })));
+    if let Status::Infeasible(proof) | Status::NoConclusion(proof) = &outcome.status {
+        all.insert("certificate".into(), json!(proof));
+    }
     all.extend(report::verdict_json(verdict, plan.limits.tolerance, verdict.worst.len()));
     format!("{}\n", json!(all))
 }
