@@ -165,7 +165,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
 }
 
 /// The name of a file for a linear complementarity problem.
-fn linear_name(path: &Path) -> Result<(), String> {
+pub fn linear_name(path: &Path) -> Result<(), String> {
     match path.extension().and_then(|e| e.to_str()) {
         Some("toml" | "mtx") => Ok(()),
         _ => Err(format!(
@@ -392,6 +392,9 @@ fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &SolvedOf<P
         "seconds": outcome.seconds,
         "account": account,
     })));
+    if let Status::Infeasible(proof) | Status::NoConclusion(proof) = &outcome.status {
+        all.insert("certificate".into(), json!(proof));
+    }
     all.extend(report::verdict_json(verdict, plan.limits.tolerance, verdict.worst.len()));
     format!("{}\n", json!(all))
 }

@@ -25,8 +25,6 @@ enum Format {
     Siconos,
 }
 
-/// The first bytes of every HDF5 file, but for a user block before them.
-const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// The first bytes of every Matrix Market file.
 const MARKET: &[u8] = b"%%MatrixMarket";
 /// Bytes that a glance takes in.
@@ -88,7 +86,7 @@ fn format(path: &Path) -> Result<Option<Format>, IoError> {
         return Ok(Some(format));
     }
     let bytes = glance(path)?;
-    if bytes.starts_with(HDF5) {
+    if hdf5_pure::is_hdf5_bytes(&bytes) {
         return Ok(Some(Format::Fclib));
     }
     if bytes.starts_with(MARKET) {
