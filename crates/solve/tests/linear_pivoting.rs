@@ -54,8 +54,7 @@ fn solve<P: Registered + Problem<Point = LcpPoint>>(
 }
 
 /// The methods with the classes of matrices they are made for.
-const ALL: [&str; 6] =
-    ["murty", "bard", "criss_cross", "keller", "block_pivoting", "enumeration"];
+const ALL: [&str; 6] = ["murty", "bard", "criss_cross", "keller", "block_pivoting", "enumeration"];
 
 /// `M z + q`.
 fn w_of(problem: &Lcp, z: &[f64]) -> Vec<f64> {
@@ -245,13 +244,21 @@ fn rows_refute_before_the_first_pivot() {
     let example = classics::minus_one_infeasible();
     for name in ALL {
         let solved = solve(name, &[], &example.problem);
-        assert_eq!(solved.outcome.status, Status::Infeasible(Certificate::Row { row: 0 }), "{name}");
+        assert_eq!(
+            solved.outcome.status,
+            Status::Infeasible(Certificate::Row { row: 0 }),
+            "{name}"
+        );
     }
     let m = Dense::from_rows(&[[1.0, 0.5, 0.0], [0.0, 2.0, 1.0], [-1.0, 0.0, -3.0]]).unwrap();
     let problem = Lcp::new(m, vec![-1.0, -1.0, -1e-7]).unwrap();
     for name in ALL {
         let solved = solve(name, &[], &problem);
-        assert_eq!(solved.outcome.status, Status::Infeasible(Certificate::Row { row: 2 }), "{name}");
+        assert_eq!(
+            solved.outcome.status,
+            Status::Infeasible(Certificate::Row { row: 2 }),
+            "{name}"
+        );
     }
 }
 
@@ -276,13 +283,16 @@ fn contradicting_rows_are_proved() {
         let mut rng = Pcg64::seed_from_u64(seed);
         let n = [4, 10, 30, 60][seed as usize % 4];
         let problem = contradiction(n, &mut rng);
-        for (name, settings) in [
-            ("criss_cross", vec![]),
-            ("keller", vec![]),
-            ("keller", vec!["least_index=true"]),
-        ] {
+        for (name, settings) in
+            [("criss_cross", vec![]), ("keller", vec![]), ("keller", vec!["least_index=true"])]
+        {
             let solved = solve(name, &settings, &problem);
-            assert_eq!(solved.status(), "infeasible", "{name} seed {seed}: {}", solved.outcome.status);
+            assert_eq!(
+                solved.status(),
+                "infeasible",
+                "{name} seed {seed}: {}",
+                solved.outcome.status
+            );
         }
         if n <= 10 {
             assert_eq!(solve("enumeration", &[], &problem).status(), "infeasible");
@@ -319,8 +329,9 @@ fn every_solution_of_every_example_is_listed() {
                     assert!(example.has(&face.z, 1e-11 * largest(&face.z).max(1e-3)));
                 }
                 for z in all {
-                    assert!(found.faces.iter().any(|f| close(&f.z, z, 1e-10)
-                        || largest(z) == 0.0 && largest(&f.z) == 0.0));
+                    assert!(found.faces.iter().any(
+                        |f| close(&f.z, z, 1e-10) || largest(z) == 0.0 && largest(&f.z) == 0.0
+                    ));
                 }
             }
             Known::Segment(ends) => {
@@ -378,10 +389,8 @@ fn all_solutions_against_all_bases() {
 /// `M_αα x = −q_α`.
 fn eliminate(m: &Dense, q: &[f64], alpha: &[usize]) -> Option<Vec<f64>> {
     let k = alpha.len();
-    let mut a: Vec<Vec<f64>> = alpha
-        .iter()
-        .map(|&i| alpha.iter().map(|&j| m[(i, j)]).chain([-q[i]]).collect())
-        .collect();
+    let mut a: Vec<Vec<f64>> =
+        alpha.iter().map(|&i| alpha.iter().map(|&j| m[(i, j)]).chain([-q[i]]).collect()).collect();
     for c in 0..k {
         let p = (c..k).max_by(|x, y| a[*x][c].abs().total_cmp(&a[*y][c].abs()))?;
         a.swap(c, p);
@@ -410,7 +419,8 @@ fn planted(m: Dense, degenerate: f64, rng: &mut Pcg64) -> (Lcp, Vec<f64>) {
             if rng.random_range(0.0..1.0) < 0.5 { z[i] = value } else { w[i] = value }
         }
     }
-    let q = (0..n).map(|i| w[i] - m.row(i).iter().zip(&z).map(|(m, z)| m * z).sum::<f64>()).collect();
+    let q =
+        (0..n).map(|i| w[i] - m.row(i).iter().zip(&z).map(|(m, z)| m * z).sum::<f64>()).collect();
     (Lcp::new(m, q).unwrap(), z)
 }
 
@@ -734,7 +744,11 @@ fn matrices_of_no_class_end_with_a_name() {
         let q: Vec<f64> = (0..n).map(|_| entry()).collect();
         let problem = Lcp::new(m, q).unwrap();
         let exact = solve("enumeration", &[], &problem);
-        assert!(["solved", "infeasible"].contains(&exact.status()), "{problem:?} {}", exact.status());
+        assert!(
+            ["solved", "infeasible"].contains(&exact.status()),
+            "{problem:?} {}",
+            exact.status()
+        );
         for name in ALL {
             let solved = solve(name, &[], &problem);
             match solved.status() {
@@ -792,7 +806,10 @@ fn a_thousand_variables() {
     for name in ["keller", "block_pivoting"] {
         let solved = solve(name, &[], &problem);
         let Outcome { seconds, factorisations, .. } = solved.outcome;
-        println!("{name}: {} pivots, {factorisations} factorisations, {seconds:.2} s", solved.pivots);
+        println!(
+            "{name}: {} pivots, {factorisations} factorisations, {seconds:.2} s",
+            solved.pivots
+        );
         assert_eq!(solved.status(), "solved");
         assert!(close(&solved.z, &z, 1e-7), "{name}");
     }

@@ -237,7 +237,8 @@ impl Tableau {
     fn pair_equations(&mut self, system: &System) {
         let (n, f) = (self.n, self.free);
         // Elimination on a copy of A, in t.
-        let (mut of_column, mut used) = (std::mem::take(&mut self.from), std::mem::take(&mut self.wanted));
+        let (mut of_column, mut used) =
+            (std::mem::take(&mut self.from), std::mem::take(&mut self.wanted));
         of_column[..f].fill(usize::MAX);
         used[..f].fill(false);
         let largest = |t: &[f64], used: &[bool], of: &[usize]| {
@@ -506,7 +507,8 @@ impl Tableau {
 
     /// Exchanges z_i with w_j and z_j with w_i: a 2 × 2 pivot where `t_ii` is zero. False where the block is singular, and nothing done.
     pub fn pivot_pair(&mut self, i: usize, j: usize) -> bool {
-        let variables = [(j, self.entering(j), self.leaving(i)), (i, self.entering(i), self.leaving(j))];
+        let variables =
+            [(j, self.entering(j), self.leaving(i)), (i, self.entering(i), self.leaving(j))];
         self.set.clear();
         self.set.extend([i, j]);
         if !self.exchange_set() {

@@ -286,8 +286,7 @@ impl<P: Complementary> Solver<P> for BlockPrincipal {
         w.fill(&system, z);
         for i in 0..system.dim() {
             let scaled = z[i] / columns[i];
-            basis[i] =
-                i < work.free || (scaled > 0.0 && scaled > w.sums[i].value() * rows[i]);
+            basis[i] = i < work.free || (scaled > 0.0 && scaled > w.sums[i].value() * rows[i]);
         }
         work.before.copy_from_slice(&work.basis);
         (work.least, work.left) = (usize::MAX, self.0.patience);

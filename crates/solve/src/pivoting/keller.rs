@@ -94,12 +94,10 @@ impl KellerWork {
             }
         }
         let negative = self.tableau.pairs().filter(|i| self.below[*i]);
-        let by_value = |a: &usize, b: &usize| {
-            self.negative_value(*a).total_cmp(&self.negative_value(*b))
-        };
+        let by_value =
+            |a: &usize, b: &usize| self.negative_value(*a).total_cmp(&self.negative_value(*b));
         let mut negative = negative;
-        self.distinguished =
-            if least_index { negative.next() } else { negative.min_by(by_value) };
+        self.distinguished = if least_index { negative.next() } else { negative.min_by(by_value) };
         self.cycle.begin(self.tableau.basis());
         self.distinguished
     }

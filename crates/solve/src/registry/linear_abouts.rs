@@ -1,12 +1,12 @@
 //! The solvers of linear complementarity problems, described.
 
 use super::{About, Solves};
-use crate::auto::linear::{LinearAuto};
+use crate::auto::linear::LinearAuto;
 use crate::interior::linear::{MehrotraType, MizunoToddYe};
 use crate::newton::linear::{NewtonFb, NewtonMin, NewtonPfb};
 use crate::optimisation::linear::{Mprgp, QuadraticProgram};
 use crate::pivoting::{Bard, BlockPivoting, CrissCross, Enumeration, Keller, Lemke, Murty};
-use crate::settings::{described};
+use crate::settings::described;
 use crate::splitting::linear::{Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs};
 
 /// The automatic method.
