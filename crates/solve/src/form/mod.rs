@@ -26,6 +26,7 @@ use nonsmooth_problem::linalg::{Block, Singular};
 
 pub use complementarity::{Bounded, Bounds, Complementary, System, system};
 pub use explicit::{Explicit, Model};
+pub use local::LocalState;
 pub use regularised::{Overwrite, Regularised, RegularisedState};
 
 use crate::SolveError;

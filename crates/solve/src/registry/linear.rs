@@ -16,7 +16,7 @@ fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
 }
 
 /// The solvers of problems whose variables are free or nonnegative.
-fn complementary_solvers<V: Visitor<Problem: Complementary>>() -> Vec<Entry<V>> {
+pub(super) fn complementary_solvers<V: Visitor<Problem: Complementary>>() -> Vec<Entry<V>> {
     bounded_solvers()
 }
 
