@@ -58,10 +58,9 @@ impl<R, S> Via<R, S> {
             _ => f64::NAN,
         };
         let going = matches!(step, Step::Continue { .. });
-        if going
-            && work.unjudged < self.solver.check_every()
-            && !(work.ratio * estimate <= work.tolerance)
-        {
+        let due = work.unjudged >= self.solver.check_every()
+            || work.ratio * estimate <= work.tolerance;
+        if going && !due {
             return step;
         }
         self.solver.publish(&work.reduced, &mut work.point, &mut work.work);

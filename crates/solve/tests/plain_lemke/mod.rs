@@ -1,5 +1,7 @@
 //! Lemke's method on a dense tableau with lexicographic ratios, plain enough to be read at a glance; free variables are eliminated first.
 
+use std::cmp::Ordering;
+
 use nonsmooth_problem::LcpPoint;
 use nonsmooth_problem::check::Certificate;
 use nonsmooth_solve::form::Complementary;
@@ -96,18 +98,19 @@ fn leaving(
         };
         let b = tableau[k][entering];
         let (x, y) = (tableau[i][2 * n + 1] / a, tableau[k][2 * n + 1] / b);
-        let order = if (x - y).abs() <= 1e-13 * x.abs().max(y.abs()).max(1e-3) {
-            if basis[k] == 2 * n {
-                continue;
+        // What differs by rounding only is equal.
+        let compare = |x: f64, y: f64| {
+            let equal = (x - y).abs() <= 1e-11 * x.abs().max(y.abs()).max(1.0);
+            if equal { Ordering::Equal } else { x.total_cmp(&y) }
+        };
+        let order = match compare(x, y) {
+            Ordering::Equal if basis[k] == 2 * n => continue,
+            Ordering::Equal if basis[i] == 2 * n => Ordering::Less,
+            Ordering::Equal => {
+                let rows = (0..n).map(|j| compare(tableau[i][j] / a, tableau[k][j] / b));
+                rows.fold(Ordering::Equal, Ordering::then)
             }
-            let rows = (0..n).map(|j| (tableau[i][j] / a).total_cmp(&(tableau[k][j] / b)));
-            if basis[i] == 2 * n {
-                std::cmp::Ordering::Less
-            } else {
-                rows.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
-            }
-        } else {
-            x.total_cmp(&y)
+            order => order,
         };
         if order.is_lt() {
             best = Some(i);

@@ -1,0 +1,186 @@
+//! Panels of curves side by side, as SVG and PNG.
+
+use std::ops::Range;
+use std::path::Path;
+
+use nonsmooth_bench::draw::{Axis, GRID, INK, font};
+use plotters::coord::Shift;
+use plotters::element::DashedPathElement;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// A curve.
+pub struct Curve {
+    /// The entry of the legend; curves with the same label share it.
+    pub label: String,
+    pub colour: RGBColor,
+    pub width: u32,
+    pub dashed: bool,
+    /// Whether a dot marks the last point.
+    pub end: bool,
+    pub points: Vec<(f64, f64)>,
+}
+
+/// A square panel.
+pub struct Panel {
+    pub title: String,
+    pub labels: [&'static str; 2],
+    pub x: Axis,
+    pub y: Axis,
+    pub text: fn(f64) -> String,
+    pub curves: Vec<Curve>,
+}
+
+/// The side of a panel with its labels, px.
+const SIDE: u32 = 400;
+const TOP: u32 = 56;
+const BOTTOM: u32 = 34;
+
+/// The picture as SVG.
+pub fn svg(title: &str, panels: &[Panel]) -> Result<String, String> {
+    let mut text = String::new();
+    let size = (SIDE * panels.len() as u32, TOP + SIDE + BOTTOM);
+    {
+        let area = SVGBackend::with_string(&mut text, size).into_drawing_area();
+        sheet(&area, title, panels).map_err(|e| e.to_string())?;
+    }
+    Ok(text)
+}
+
+fn sheet(
+    area: &DrawingArea<SVGBackend, Shift>,
+    title: &str,
+    panels: &[Panel],
+) -> Result<(), Box<dyn std::error::Error>> {
+    area.fill(&WHITE)?;
+    let centre = Pos::new(HPos::Center, VPos::Center);
+    let wide = SIDE as i32 * panels.len() as i32;
+    area.draw_text(title, &font(17).pos(centre), (wide / 2, 20))?;
+    for (k, panel) in panels.iter().enumerate() {
+        let left = SIDE * k as u32;
+        let part = area.clone().shrink((left, TOP), (SIDE, SIDE));
+        let middle = (left + SIDE / 2) as i32 + 22;
+        area.draw_text(&panel.title, &font(14).pos(centre), (middle, TOP as i32 - 8))?;
+        draw(&part, panel)?;
+    }
+    // One line of legend, its entries evenly spaced.
+    let mut entries: Vec<&Curve> = vec![];
+    for curve in panels.iter().flat_map(|p| &p.curves) {
+        if entries.iter().all(|e| e.label != curve.label) {
+            entries.push(curve);
+        }
+    }
+    let y = (TOP + SIDE) as i32 + 14;
+    let step = wide / entries.len().max(1) as i32;
+    for (k, curve) in entries.iter().enumerate() {
+        let x = step * k as i32 + 14;
+        let line = vec![(x, y), (x + 26, y)];
+        stroke(curve, line, |e| area.draw(&e), |e| area.draw(&e))?;
+        let left = Pos::new(HPos::Left, VPos::Center);
+        area.draw_text(&curve.label, &font(13).pos(left), (x + 32, y))?;
+    }
+    area.present()?;
+    Ok(())
+}
+
+fn draw(
+    area: &DrawingArea<SVGBackend, Shift>,
+    panel: &Panel,
+) -> Result<(), Box<dyn std::error::Error>> {
+    let mut chart = ChartBuilder::on(area)
+        .margin_top(8)
+        .margin_right(14)
+        .x_label_area_size(42)
+        .y_label_area_size(54)
+        .build_cartesian_2d(panel.x.clone(), panel.y.clone())?;
+    let text = |x: &f64| (panel.text)(*x);
+    chart
+        .configure_mesh()
+        .axis_style(INK)
+        .bold_line_style(GRID)
+        .light_line_style(TRANSPARENT)
+        .label_style(font(12))
+        .x_desc(panel.labels[0])
+        .y_desc(panel.labels[1])
+        .x_label_formatter(&text)
+        .y_label_formatter(&text)
+        .draw()?;
+    for curve in &panel.curves {
+        let inside: Vec<_> = thinned(curve.points.iter().copied());
+        // The parts of the curve inside the panel; plotters does not clip.
+        let shows =
+            |p: &(f64, f64)| panel.x.range.contains(&p.0) && panel.y.range.contains(&p.1);
+        for part in inside.split(|p| !shows(p)).filter(|part| part.len() > 1) {
+            let (solid, dashed) = (style(curve), style(curve));
+            if curve.dashed {
+                chart.draw_series(std::iter::once(DashedPathElement::new(
+                    part.to_vec(),
+                    5,
+                    4,
+                    dashed,
+                )))?;
+            } else {
+                chart.draw_series(LineSeries::new(part.to_vec(), solid))?;
+            }
+        }
+        if let Some(last) = curve.points.last().filter(|p| curve.end && shows(p)) {
+            chart.draw_series([Circle::new(*last, curve.width + 2, curve.colour.filled())])?;
+        }
+    }
+    Ok(())
+}
+
+fn style(curve: &Curve) -> ShapeStyle {
+    curve.colour.stroke_width(curve.width)
+}
+
+type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
+
+fn stroke(
+    curve: &Curve,
+    line: Vec<(i32, i32)>,
+    solid: impl Fn(PathElement<(i32, i32)>) -> Drawn,
+    dashed: impl Fn(DashedPathElement<std::vec::IntoIter<(i32, i32)>, i32>) -> Drawn,
+) -> Drawn {
+    if curve.dashed {
+        dashed(DashedPathElement::new(line, 5, 4, style(curve)))
+    } else {
+        solid(PathElement::new(line, style(curve)))
+    }
+}
+
+/// At most about 2000 points.
+fn thinned(points: impl ExactSizeIterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+    let (last, step) = (points.len().saturating_sub(1), points.len().div_ceil(2000).max(1));
+    points.enumerate().filter(|(k, _)| k % step == 0 || *k == last).map(|(_, p)| p).collect()
+}
+
+/// A linear axis of this range with about five round ticks.
+pub fn linear(range: Range<f64>) -> Axis {
+    let rough = (range.end - range.start) / 5.0;
+    let power = 10f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].map(|s| s * power).into_iter().find(|s| *s >= rough);
+    let step = step.unwrap_or(rough);
+    let (first, last) = ((range.start / step).ceil() as i64, (range.end / step).floor() as i64);
+    Axis { ticks: (first..=last).map(|k| k as f64 * step).collect(), range }
+}
+
+/// The SVG as pixels, two to a unit, written to `path` as PNG.
+pub fn png(svg: &str, path: &Path) -> Result<(), String> {
+    use resvg::{tiny_skia, usvg};
+    let mut options = usvg::Options::default();
+    options.fontdb_mut().load_system_fonts();
+    options.fontdb_mut().set_sans_serif_family("DejaVu Sans");
+    let tree = usvg::Tree::from_str(svg, &options).map_err(|e| e.to_string())?;
+    let size = tree.size().to_int_size().scale_by(2.0).ok_or("an empty picture")?;
+    let mut pixels =
+        tiny_skia::Pixmap::new(size.width(), size.height()).ok_or("an empty picture")?;
+    resvg::render(&tree, tiny_skia::Transform::from_scale(2.0, 2.0), &mut pixels.as_mut());
+    let bytes = pixels.encode_png().map_err(|e| e.to_string())?;
+    write(path, &bytes)
+}
+
+/// Writes a file.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
+    std::fs::write(path, bytes).map_err(|e| format!("{}: {e}", path.display()))
+}
