@@ -61,7 +61,7 @@ impl Start {
         })
     }
 
-    fn panel(&self, title: &str, square: Option<f64>) -> Panel {
+    fn panel(&self, title: &str, square: Option<[f64; 2]>) -> Panel {
         let place = |s: &BallState| (s.position[0], s.position[1]);
         let inner = self.paths.iter().filter(|p| p.0 == "facet_inner");
         let mut curves: Vec<Curve> = inner
@@ -83,8 +83,8 @@ impl Start {
             end: true,
             points: self.exact.iter().map(place).collect(),
         });
-        let (x, y) = square.map_or_else(|| frame(&curves), |a| (linear(-a..a), linear(-a..a)));
-        Panel { title: title.into(), labels: ["x (m)", "y (m)"], x, y, text, curves }
+        let (x, y) = square.map_or_else(|| frame(&curves), |[a, b]| (linear(a..b), linear(a..b)));
+        Panel { title: title.into(), labels: ["x (m)", "y (m)"], x, y, texts: [text; 2], curves }
     }
 }
 
@@ -118,7 +118,7 @@ fn main() -> Result<(), String> {
     let panels = [
         launched.panel("launched with 4 m/s along x", None),
         rest.panel("from rest: it should not move", None),
-        rest.panel("from rest, nearer", Some(0.25)),
+        rest.panel("from rest, nearer", Some([-0.08, 0.24])),
     ];
     let title = "A ball on a plane under a force of the size of the friction limit that turns in 15 s: inner facets";
     let svg = drawing::svg(title, &panels)?;

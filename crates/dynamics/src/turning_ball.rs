@@ -63,7 +63,8 @@ impl TurningBall {
         let mut path = vec![at];
         let long = self.period / 3.0;
         for k in 0..phases {
-            let phase = |j: usize| self.during(&at, self.direction(k), long * j as f64 / count as f64);
+            let phase =
+                |j: usize| self.during(&at, self.direction(k), long * j as f64 / count as f64);
             path.extend((1..=count).map(phase));
             at = path[path.len() - 1];
         }

@@ -39,7 +39,8 @@ where
 }
 
 /// What is said when the solver says that it has finished, and the other problem's judge does not agree.
-const FAILED: &str = "the solver of the reformulated problem has finished, but its answer fails the check";
+const FAILED: &str =
+    "the solver of the reformulated problem has finished, but its answer fails the check";
 
 impl<R, S> Via<R, S> {
     /// Asks the judge of the other problem, if the reformulation approximates: what the step comes to.
@@ -58,8 +59,8 @@ impl<R, S> Via<R, S> {
             _ => f64::NAN,
         };
         let going = matches!(step, Step::Continue { .. });
-        let due = work.unjudged >= self.solver.check_every()
-            || work.ratio * estimate <= work.tolerance;
+        let due =
+            work.unjudged >= self.solver.check_every() || work.ratio * estimate <= work.tolerance;
         if going && !due {
             return step;
         }
@@ -90,7 +91,17 @@ where
         let point = reduced.origin();
         let gauge = self.reformulation.approximates().map(|_| reduced.gauge()).transpose()?;
         let (measure, tolerance) = (Measure::unknown(), 0.0);
-        Ok(ViaWork { reduced, memo, point, work, gauge, measure, tolerance, ratio: 1.0, unjudged: 0 })
+        Ok(ViaWork {
+            reduced,
+            memo,
+            point,
+            work,
+            gauge,
+            measure,
+            tolerance,
+            ratio: 1.0,
+            unjudged: 0,
+        })
     }
 
     fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {

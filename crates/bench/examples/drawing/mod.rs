@@ -27,14 +27,17 @@ pub struct Panel {
     pub labels: [&'static str; 2],
     pub x: Axis,
     pub y: Axis,
-    pub text: fn(f64) -> String,
+    /// The texts of the ticks.
+    pub texts: [fn(f64) -> String; 2],
     pub curves: Vec<Curve>,
 }
 
-/// The side of a panel with its labels, px.
-const SIDE: u32 = 400;
-const TOP: u32 = 56;
-const BOTTOM: u32 = 34;
+/// Pixels of the picture a unit of its design: coordinates are whole pixels, and curves should look smooth.
+const FINE: u32 = 2;
+/// The side of a panel with its labels.
+const SIDE: u32 = 400 * FINE;
+const TOP: u32 = 56 * FINE;
+const BOTTOM: u32 = 34 * FINE;
 
 /// The picture as SVG.
 pub fn svg(title: &str, panels: &[Panel]) -> Result<String, String> {
@@ -55,12 +58,16 @@ fn sheet(
     area.fill(&WHITE)?;
     let centre = Pos::new(HPos::Center, VPos::Center);
     let wide = SIDE as i32 * panels.len() as i32;
-    area.draw_text(title, &font(17).pos(centre), (wide / 2, 20))?;
+    area.draw_text(title, &font(17 * FINE).pos(centre), (wide / 2, 20 * FINE as i32))?;
     for (k, panel) in panels.iter().enumerate() {
         let left = SIDE * k as u32;
         let part = area.clone().shrink((left, TOP), (SIDE, SIDE));
-        let middle = (left + SIDE / 2) as i32 + 22;
-        area.draw_text(&panel.title, &font(14).pos(centre), (middle, TOP as i32 - 8))?;
+        let middle = (left + SIDE / 2) as i32 + 22 * FINE as i32;
+        area.draw_text(
+            &panel.title,
+            &font(14 * FINE).pos(centre),
+            (middle, TOP as i32 - 8 * FINE as i32),
+        )?;
         draw(&part, panel)?;
     }
     // One line of legend, its entries evenly spaced.
@@ -70,14 +77,14 @@ fn sheet(
             entries.push(curve);
         }
     }
-    let y = (TOP + SIDE) as i32 + 14;
+    let y = (TOP + SIDE) as i32 + 14 * FINE as i32;
     let step = wide / entries.len().max(1) as i32;
     for (k, curve) in entries.iter().enumerate() {
-        let x = step * k as i32 + 14;
-        let line = vec![(x, y), (x + 26, y)];
+        let x = step * k as i32 + 14 * FINE as i32;
+        let line = vec![(x, y), (x + 26 * FINE as i32, y)];
         stroke(curve, line, |e| area.draw(&e), |e| area.draw(&e))?;
         let left = Pos::new(HPos::Left, VPos::Center);
-        area.draw_text(&curve.label, &font(13).pos(left), (x + 32, y))?;
+        area.draw_text(&curve.label, &font(13 * FINE).pos(left), (x + 32 * FINE as i32, y))?;
     }
     area.present()?;
     Ok(())
@@ -88,35 +95,36 @@ fn draw(
     panel: &Panel,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let mut chart = ChartBuilder::on(area)
-        .margin_top(8)
-        .margin_right(14)
-        .x_label_area_size(42)
-        .y_label_area_size(54)
+        .margin_top(8 * FINE)
+        .margin_right(14 * FINE)
+        .margin_left(10 * FINE)
+        .x_label_area_size(42 * FINE)
+        .y_label_area_size(54 * FINE)
         .build_cartesian_2d(panel.x.clone(), panel.y.clone())?;
-    let text = |x: &f64| (panel.text)(*x);
+    let [x_text, y_text] = panel.texts;
     chart
         .configure_mesh()
         .axis_style(INK)
         .bold_line_style(GRID)
         .light_line_style(TRANSPARENT)
-        .label_style(font(12))
+        .label_style(font(12 * FINE))
+        .axis_desc_style(font(13 * FINE))
         .x_desc(panel.labels[0])
         .y_desc(panel.labels[1])
-        .x_label_formatter(&text)
-        .y_label_formatter(&text)
+        .x_label_formatter(&|x| x_text(*x))
+        .y_label_formatter(&|y| y_text(*y))
         .draw()?;
     for curve in &panel.curves {
         let inside: Vec<_> = thinned(curve.points.iter().copied());
         // The parts of the curve inside the panel; plotters does not clip.
-        let shows =
-            |p: &(f64, f64)| panel.x.range.contains(&p.0) && panel.y.range.contains(&p.1);
+        let shows = |p: &(f64, f64)| panel.x.range.contains(&p.0) && panel.y.range.contains(&p.1);
         for part in inside.split(|p| !shows(p)).filter(|part| part.len() > 1) {
             let (solid, dashed) = (style(curve), style(curve));
             if curve.dashed {
                 chart.draw_series(std::iter::once(DashedPathElement::new(
                     part.to_vec(),
-                    5,
-                    4,
+                    5 * FINE,
+                    4 * FINE,
                     dashed,
                 )))?;
             } else {
@@ -124,14 +132,18 @@ fn draw(
             }
         }
         if let Some(last) = curve.points.last().filter(|p| curve.end && shows(p)) {
-            chart.draw_series([Circle::new(*last, curve.width + 2, curve.colour.filled())])?;
+            chart.draw_series([Circle::new(
+                *last,
+                (curve.width + 2) * FINE,
+                curve.colour.filled(),
+            )])?;
         }
     }
     Ok(())
 }
 
 fn style(curve: &Curve) -> ShapeStyle {
-    curve.colour.stroke_width(curve.width)
+    curve.colour.stroke_width(curve.width * FINE)
 }
 
 type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
@@ -140,18 +152,18 @@ fn stroke(
     curve: &Curve,
     line: Vec<(i32, i32)>,
     solid: impl Fn(PathElement<(i32, i32)>) -> Drawn,
-    dashed: impl Fn(DashedPathElement<std::vec::IntoIter<(i32, i32)>, i32>) -> Drawn,
+    dashed: impl Fn(DashedPathElement<std::vec::IntoIter<(i32, i32)>, u32>) -> Drawn,
 ) -> Drawn {
     if curve.dashed {
-        dashed(DashedPathElement::new(line, 5, 4, style(curve)))
+        dashed(DashedPathElement::new(line, 5 * FINE, 4 * FINE, style(curve)))
     } else {
         solid(PathElement::new(line, style(curve)))
     }
 }
 
-/// At most about 2000 points.
+/// At most about 800 points.
 fn thinned(points: impl ExactSizeIterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
-    let (last, step) = (points.len().saturating_sub(1), points.len().div_ceil(2000).max(1));
+    let (last, step) = (points.len().saturating_sub(1), points.len().div_ceil(800).max(1));
     points.enumerate().filter(|(k, _)| k % step == 0 || *k == last).map(|(_, p)| p).collect()
 }
 
@@ -165,17 +177,17 @@ pub fn linear(range: Range<f64>) -> Axis {
     Axis { ticks: (first..=last).map(|k| k as f64 * step).collect(), range }
 }
 
-/// The SVG as pixels, two to a unit, written to `path` as PNG.
+/// The SVG as pixels, written to `path` as PNG.
 pub fn png(svg: &str, path: &Path) -> Result<(), String> {
     use resvg::{tiny_skia, usvg};
     let mut options = usvg::Options::default();
     options.fontdb_mut().load_system_fonts();
     options.fontdb_mut().set_sans_serif_family("DejaVu Sans");
     let tree = usvg::Tree::from_str(svg, &options).map_err(|e| e.to_string())?;
-    let size = tree.size().to_int_size().scale_by(2.0).ok_or("an empty picture")?;
+    let size = tree.size().to_int_size();
     let mut pixels =
         tiny_skia::Pixmap::new(size.width(), size.height()).ok_or("an empty picture")?;
-    resvg::render(&tree, tiny_skia::Transform::from_scale(2.0, 2.0), &mut pixels.as_mut());
+    resvg::render(&tree, tiny_skia::Transform::identity(), &mut pixels.as_mut());
     let bytes = pixels.encode_png().map_err(|e| e.to_string())?;
     write(path, &bytes)
 }

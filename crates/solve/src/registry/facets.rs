@@ -70,9 +70,8 @@ where
     let entry = find(entries, solver)?;
     let (own, inner): (SettingsMap, SettingsMap) =
         settings.clone().into_iter().partition(|(key, _)| key.starts_with("facet"));
-    let built = parse(&own).and_then(|facets| {
-        (entry.build)(&inner, Before { reformulation: edge(facets), visitor })
-    });
+    let built = parse(&own)
+        .and_then(|facets| (entry.build)(&inner, Before { reformulation: edge(facets), visitor }));
     Some(built)
 }
 

@@ -21,7 +21,9 @@ use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::{Block, small};
 use nonsmooth_problem::{FrictionLocal, Lcp, LcpPoint, LocalPoint};
 
-use super::{Entries, Facets, Kept, approximates, decompose, dot, normal_impulses, tangential, velocity};
+use super::{
+    Entries, Facets, Kept, approximates, decompose, dot, normal_impulses, tangential, velocity,
+};
 use crate::SolveError;
 use crate::form::Contacts;
 use crate::reform::Reformulation;
@@ -185,7 +187,7 @@ impl<const D: usize> Reformulation<FrictionLocal<D>> for FacetInner<D> {
         for (c, &mu) in problem.mu.iter().enumerate() {
             let (o, r) = (memo.starts[c], small::block::<D>(&point.r, c));
             z[o] = r[0].max(0.0);
-            if memo.starts[c + 1] - o == 1 || z[o] == 0.0 {
+            if memo.starts[c + 1] - o == 1 {
                 continue;
             }
             let (directions, end) = (&memo.kept.directions, memo.starts[c + 1] - 1);

@@ -251,8 +251,7 @@ mod tests {
     #[test]
     fn a_vector_is_the_sum_of_its_neighbours() {
         for count in [3, 4, 5, 16] {
-            let directions =
-                Facets { facets: count, facet_angle: 0.3 }.directions::<3>();
+            let directions = Facets { facets: count, facet_angle: 0.3 }.directions::<3>();
             for k in 0..50 {
                 let x = [(0.7 * f64::from(k)).cos(), 1.3 * (1.9 * f64::from(k)).sin()];
                 let mut sum = [0.0; 2];

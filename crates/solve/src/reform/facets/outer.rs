@@ -21,7 +21,9 @@ use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::small;
 use nonsmooth_problem::{FrictionLocal, LcpPoint, LocalPoint, Mlcp};
 
-use super::{Entries, Facets, Kept, approximates, decompose, normal_impulses, tangential, velocity};
+use super::{
+    Entries, Facets, Kept, approximates, decompose, normal_impulses, tangential, velocity,
+};
 use crate::SolveError;
 use crate::form::Contacts;
 use crate::reform::Reformulation;
