@@ -31,6 +31,7 @@ pub mod local;
 pub mod newton;
 pub mod optimisation;
 pub mod parts;
+pub mod pivoting;
 pub mod projection;
 pub mod proximal;
 pub mod reform;

@@ -3,6 +3,7 @@
 //! [`small`]: D×D blocks on arrays. [`Csc`]: general sparse. [`Bsr`]: block-sparse rows, the storage of W.
 //! [`Dense`], [`Matrix`]: the matrices of complementarity problems, dense, sparse or known by products.
 //! [`Inverse`]: factorisation of M (or of M with bilateral constraints) behind one face.
+//! [`SquareLu`]: LU of a dense or sparse square matrix, made again and again.
 //! [`BlockLu`]: LU of Newton matrices, analysed once and factorised many times.
 //! [`Delassus`]: W = Hᵀ M⁻¹ H as an operator, never formed, or condensed into a [`Bsr`].
 
@@ -17,6 +18,7 @@ mod inverse;
 mod matrix;
 mod row;
 pub mod small;
+mod square_lu;
 
 pub use block_lu::{BlockLu, Singular, Slot};
 pub use bsr::{Block, BlockRow, Bsr};
@@ -27,6 +29,7 @@ pub use dense::Dense;
 pub use groups::Groups;
 pub use inverse::{Inverse, Refine, factorisations, is_positive_definite};
 pub use matrix::{Matrix, Operator};
+pub use square_lu::SquareLu;
 
 /// The Euclidean norm, scaled so that neither overflow nor underflow of the squares spoils it.
 pub fn norm(x: &[f64]) -> f64 {

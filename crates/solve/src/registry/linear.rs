@@ -6,7 +6,10 @@ use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 
 use super::linear_abouts::*;
 use super::{About, Direct, Entry, Made, Registered, Visitor, find};
+use crate::Session;
+use crate::auto::linear::{LinearAuto, Planned};
 use crate::form::{Bounded, Complementary};
+use crate::pivoting::LemkePath;
 use crate::settings::{SettingsMap, parse};
 use crate::splitting::linear::Jacobi;
 
@@ -17,7 +20,10 @@ fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
 
 /// The solvers of problems whose variables are free or nonnegative.
 pub(super) fn complementary_solvers<V: Visitor<Problem: Complementary>>() -> Vec<Entry<V>> {
-    bounded_solvers()
+    let mut entries = bounded_solvers();
+    entries
+        .extend([Entry { about: &LEMKE, build: |s, v: V| Ok(v.visit(LemkePath::new(parse(s)?))) }]);
+    entries
 }
 
 /// The solvers of horizontal problems.
@@ -25,11 +31,17 @@ fn horizontal_solvers<V: Visitor<Problem = Hlcp>>() -> Vec<Entry<V>> {
     vec![]
 }
 
+/// `auto` runs whole sessions of the others, so it is one itself.
+fn automatic<P: Planned>(settings: &SettingsMap) -> Result<Box<dyn Session<P>>, String> {
+    Ok(Box::new(parse::<LinearAuto>(settings)?.session::<P>()))
+}
+
 macro_rules! register {
     ($kind:ty, $solvers:ident) => {
         impl Registered for $kind {
             fn abouts() -> Vec<&'static About> {
-                $solvers::<Direct<Self>>().iter().map(|entry| entry.about).collect()
+                let entries = $solvers::<Direct<Self>>();
+                std::iter::once(&AUTO).chain(entries.iter().map(|entry| entry.about)).collect()
             }
 
             fn composed_names() -> Vec<String> {
@@ -37,6 +49,9 @@ macro_rules! register {
             }
 
             fn make(name: &str, settings: &SettingsMap) -> Made<Self> {
+                if name == AUTO.name {
+                    return Some(automatic(settings));
+                }
                 let entry = find($solvers::<Direct<Self>>(), name)?;
                 Some((entry.build)(settings, Direct(PhantomData)))
             }
