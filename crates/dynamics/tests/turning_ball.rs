@@ -1,35 +1,27 @@
 //! The ball on a plane: time stepping with the exact cone against the closed form, and what facets do to it.
 
-#[path = "../../solve/tests/plain_lemke/mod.rs"]
-mod plain_lemke;
-
 use nonsmooth_dynamics::{BallState, TurningBall};
 use nonsmooth_problem::FrictionLocal;
-use nonsmooth_solve::reform::{FacetInner, FacetOuter, Facets};
-use nonsmooth_solve::{Driver, Limits, Session, Via, registry};
-use plain_lemke::PlainLemke;
+use nonsmooth_solve::{Limits, registry, settings};
 
-fn limits() -> Limits {
-    Limits { tolerance: 1e-12, max_iterations: 10_000, ..Limits::default() }
-}
-
-fn end(ball: &TurningBall, session: &mut dyn Session<FrictionLocal<3>>, steps: usize) -> BallState {
-    *ball.path(session, &limits(), 3, steps).unwrap().last().unwrap()
+/// The end of the path with the contact problems solved by the solver of this name.
+fn end(ball: &TurningBall, solver: &str, texts: &[&str], steps: usize) -> BallState {
+    let settings = settings::from_texts(texts).unwrap();
+    let mut session = registry::session::<FrictionLocal<3>>(solver, &settings).unwrap();
+    let limits = Limits { tolerance: 1e-12, max_iterations: 10_000, ..Limits::default() };
+    *ball.path(&mut *session, &limits, 3, steps).unwrap().last().unwrap()
 }
 
 fn cone(ball: &TurningBall, steps: usize) -> BallState {
-    let mut session = registry::session("nsgs", &Default::default()).unwrap();
-    end(ball, &mut *session, steps)
+    end(ball, "nsgs", &[], steps)
 }
 
 fn inner(ball: &TurningBall, facets: usize) -> BallState {
-    let reformulation = FacetInner::<3>(Facets { facets, ..Facets::default() });
-    end(ball, &mut Driver::new(Via { reformulation, solver: PlainLemke }), 1000)
+    end(ball, "facet_inner/lemke", &[&format!("facets={facets}")], 1000)
 }
 
 fn outer(ball: &TurningBall, facets: usize) -> BallState {
-    let reformulation = FacetOuter::<3>(Facets { facets, ..Facets::default() });
-    end(ball, &mut Driver::new(Via { reformulation, solver: PlainLemke }), 1000)
+    end(ball, "facet_outer/lemke", &[&format!("facets={facets}")], 1000)
 }
 
 fn distance(a: &BallState, b: &BallState) -> f64 {

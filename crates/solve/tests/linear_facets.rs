@@ -323,3 +323,68 @@ fn the_account_tells_of_the_reduced_problem() {
     let account = session.account().join(" ");
     assert!(account.contains("36 unknowns") && account.contains("relative residual"), "{account}");
 }
+
+/// Through the registry: names, settings, and another Lemke than this file's.
+#[test]
+fn the_registry_composes() {
+    use nonsmooth_problem::FrictionGlobal;
+    use registry::Solves;
+    let names = registry::solver_names::<FrictionLocal<3>>();
+    let global = registry::solver_names::<FrictionGlobal<2>>();
+    for edge in ["facet_inner", "facet_outer"] {
+        let name = format!("{edge}/lemke");
+        assert!(names.contains(&name), "{names:?}");
+        assert!(global.contains(&format!("condense/{name}")), "{global:?}");
+        assert_eq!(registry::solves::<FrictionLocal<3>>(&name), Some(Solves::Relaxation));
+        assert_eq!(registry::solves::<FrictionLocal<2>>(&name), Some(Solves::Law));
+        assert_eq!(registry::about::<FrictionLocal<3>>(&name).unwrap().family, "pivoting");
+
+        let (problem, known) = planted(5, MIXED).global::<2>();
+        let mut session = registry::session::<FrictionGlobal<2>>(
+            &format!("condense/{name}"),
+            &Default::default(),
+        )
+        .unwrap();
+        let (outcome, point) = run(&mut *session, &problem);
+        assert_eq!(outcome.status, Status::Solved, "{name}");
+        assert!(farthest(&point.v, &known.v) < 1e-9);
+
+        let settings =
+            nonsmooth_solve::settings::from_texts(&["facets=12", "facet_angle=.2"]).unwrap();
+        let (problem, _) = planted(5, MIXED).local::<3>();
+        let mut session = registry::session::<FrictionLocal<3>>(&name, &settings).unwrap();
+        let (outcome, point) = run(&mut *session, &problem);
+        let chosen = Facets { facets: 12, facet_angle: 0.2 };
+        let (plain, same) =
+            if edge == "facet_inner" { inner(chosen, &problem) } else { outer(chosen, &problem) };
+        assert_eq!(outcome.status, plain.status, "{name}");
+        assert!(farthest(&point.r, &same.r) < 1e-9, "{name}");
+
+        let refused = |text: &str| {
+            let settings = nonsmooth_solve::settings::from_texts(&[text]).unwrap();
+            registry::session::<FrictionLocal<3>>(&name, &settings).err().unwrap().to_string()
+        };
+        assert!(refused("facets=2").contains("from 3 to"));
+        assert!(refused("facet_width=2").contains("there are: facets, facet_angle"));
+        assert!(refused("omga=2").contains("unknown key `omga`"));
+    }
+    assert!(
+        registry::session::<FrictionLocal<3>>("facet_inner/magic", &Default::default()).is_err()
+    );
+}
+
+/// More contacts than degrees of freedom: W and its tangential part are singular, the motion is unique all the same.
+#[test]
+fn hyperstatic_contacts_in_the_plane() {
+    for seed in SEEDS {
+        let case = Planted { contacts: 12, dofs: 12, ..planted(seed, MIXED) };
+        let (problem, _) = case.local::<2>();
+        for name in ["facet_inner/lemke", "facet_outer/lemke"] {
+            let mut session =
+                registry::session::<FrictionLocal<2>>(name, &Default::default()).unwrap();
+            let (outcome, point) = run(&mut *session, &problem);
+            assert_eq!(outcome.status, Status::Solved, "{name} {seed}");
+            assert!(problem.judge(&point, 1e-10).unwrap().solved);
+        }
+    }
+}

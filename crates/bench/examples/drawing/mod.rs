@@ -177,12 +177,21 @@ pub fn linear(range: Range<f64>) -> Axis {
     Axis { ticks: (first..=last).map(|k| k as f64 * step).collect(), range }
 }
 
+/// What stands for "sans-serif" where the machine has it.
+const FONTS: [&str; 6] =
+    ["DejaVu Sans", "Liberation Sans", "Noto Sans", "Arial", "Helvetica", "Helvetica Neue"];
+
 /// The SVG as pixels, written to `path` as PNG.
 pub fn png(svg: &str, path: &Path) -> Result<(), String> {
     use resvg::{tiny_skia, usvg};
     let mut options = usvg::Options::default();
-    options.fontdb_mut().load_system_fonts();
-    options.fontdb_mut().set_sans_serif_family("DejaVu Sans");
+    let fonts = options.fontdb_mut();
+    fonts.load_system_fonts();
+    let has = |family: &&&str| {
+        fonts.faces().any(|face| face.families.iter().any(|(name, _)| name == **family))
+    };
+    let family = FONTS.iter().find(has).ok_or("the texts of the PNG need a font without serifs")?;
+    fonts.set_sans_serif_family(*family);
     let tree = usvg::Tree::from_str(svg, &options).map_err(|e| e.to_string())?;
     let size = tree.size().to_int_size();
     let mut pixels =
