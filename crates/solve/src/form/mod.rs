@@ -29,6 +29,7 @@ use nonsmooth_problem::linalg::{Block, Singular};
 
 pub use complementarity::{Bounded, Bounds, Complementary, Rows, Rowwise, System, system};
 pub use explicit::{Explicit, Model};
+pub use local::LocalState;
 pub use pairs::{Equations, Paired};
 pub use regularised::{Overwrite, Regularised, RegularisedState};
 

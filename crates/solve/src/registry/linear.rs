@@ -68,7 +68,8 @@ fn paired_solvers<V: Visitor<Problem: Paired>>() -> Vec<Entry<V>> {
 }
 
 /// The solvers of problems whose variables are free or nonnegative: all.
-fn complementary_solvers<V: Visitor<Problem: Complementary + Paired>>() -> Vec<Entry<V>> {
+pub(super) fn complementary_solvers<V: Visitor<Problem: Complementary + Paired>>() -> Vec<Entry<V>>
+{
     let mut all = bounded_solvers();
     all.extend(pivoting_solvers());
     all.extend(paired_solvers());
