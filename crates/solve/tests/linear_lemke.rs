@@ -737,10 +737,17 @@ fn almost_singular_problems_end() {
         let m = problem.M.to_dense().unwrap();
         // Rows and columns twice, up to rounding, in scales that differ by 1e16.
         let mut noise = || 1.0 + 1e-14 * rng.random_range(-1.0..1.0_f64);
-        let size = |i: usize| if i % 3 == 0 { 1e-8 } else if i % 5 == 0 { 1e8 } else { 1.0 };
-        let twice = Dense::from_fn(2 * n, 2 * n, |i, j| {
-            size(i) * size(j) * m[(i % n, j % n)] * noise()
-        });
+        let size = |i: usize| {
+            if i % 3 == 0 {
+                1e-8
+            } else if i % 5 == 0 {
+                1e8
+            } else {
+                1.0
+            }
+        };
+        let twice =
+            Dense::from_fn(2 * n, 2 * n, |i, j| size(i) * size(j) * m[(i % n, j % n)] * noise());
         let q = (0..2 * n).map(|i| size(i) * problem.q[i % n]).collect();
         let problem = Lcp::new(twice, q).unwrap();
         for basis in BASES {
