@@ -12,8 +12,8 @@
 //!
 //! References: Acary2018 (25)–(32), with the argmax in (27)(28); Lemke1965; CottlePangStone2009, section 4.4; Kostreva1979 (cycling).
 //!
-//! Cost of a step (a pivot), k basic z: `4 n²` (tableau), `2 k² + 2 k (n − k)` (dense), in proportion to the entries (sparse); for each tied row, one solve more with the transpose. Storage: M again, and the tableau or
-//! the LU with at most `renew_every` columns.
+//! Cost of a step (a pivot), k basic z: `4 n²` (tableau), `2 k² + 2 k (n − k)` (dense), in proportion to the entries (sparse); for each tied row, one
+//! solve more with the transpose. Storage: M again, and the tableau or the LU with at most `renew_every` columns.
 //! Fails: 2ⁿ pivots at worst. A ray proves that there is no solution where M is copositive-plus, and nothing elsewhere. Needs the entries of M.
 
 use nonsmooth_problem::LcpPoint;
@@ -603,11 +603,14 @@ impl LemkeWork {
         }
     }
 
-    /// From the beginning, with larger pivots and more factorisations.
+    /// From the beginning, with larger pivots, more factorisations and ties that depend less on rounding.
     fn try_again(&mut self, why: &'static str) -> Step {
         self.again += 1;
         if self.again >= TRIES || self.path.breaking == Breaking::First {
             return Step::Stuck(why.into());
+        }
+        if self.path.breaking == Breaking::Lexicographic {
+            self.path.breaking = Breaking::Perturbed;
         }
         self.path.pivot_tolerance = (self.path.pivot_tolerance * 30.0).min(1e-7);
         self.path.renew_every = (self.path.renew_every / 4).max(4);
