@@ -56,6 +56,75 @@ pub fn success(runs: &Runs, selection: &Selection) -> Result<Option<Figure>, Str
     Scene::new(runs, selection).success()
 }
 
+/// One panel of [`scaling`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scaling {
+    /// What is solved.
+    pub title: String,
+    /// The solvers by label, each with its `(n, seconds)`.
+    pub curves: Vec<(String, Vec<(f64, f64)>)>,
+}
+
+/// Times against the number of unknowns, both logarithmic: a power of n is a straight line. A label looks the same in all panels.
+///
+/// Errors: the drawing fails, or no point is positive.
+pub fn scaling(
+    name: &str,
+    title: &str,
+    notes: &[String],
+    all: &[Scaling],
+) -> Result<Figure, String> {
+    let mut labels: Vec<&String> = vec![];
+    for (label, _) in all.iter().flat_map(|panel| &panel.curves) {
+        if !labels.contains(&label) {
+            labels.push(label);
+        }
+    }
+    let style = |label: &String| {
+        labels.iter().position(|l| *l == label).map_or_else(Style::bound, Style::of)
+    };
+    let axis = |of: fn(&(f64, f64)) -> f64| {
+        let points = all.iter().flat_map(|panel| &panel.curves).flat_map(|(_, points)| points);
+        let logs = points.map(of).filter(|x| *x > 0.0).map(f64::log10);
+        let (low, high) =
+            logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        let range = (low - 0.05).floor()..(high + 0.05).ceil();
+        let ticks = decades(range.start, range.end, 9);
+        (low <= high).then_some(Axis { range, ticks }).ok_or(format!("{name}: nothing to draw"))
+    };
+    let (x, y) = (axis(|p| p.0)?, axis(|p| p.1)?);
+    let panel = |panel: &Scaling| Panel {
+        title: panel.title.clone(),
+        x: x.clone(),
+        y: y.clone(),
+        x_label: "unknowns n",
+        y_label: "time (s)",
+        x_text: ten_to,
+        y_text: ten_to,
+        series: panel
+            .curves
+            .iter()
+            .map(|(label, points)| Series {
+                style: style(label),
+                points: points.iter().map(|p| (p.0.log10(), p.1.log10())).collect(),
+            })
+            .collect(),
+    };
+    let panels: Vec<Panel> = all.iter().map(panel).collect();
+    let legend: Vec<_> = labels.iter().map(|l| ((*l).clone(), style(l))).collect();
+    let mut svg = String::new();
+    sheet(&mut svg, title, notes, &panels, &legend).map_err(|e| format!("{name}: {e}"))?;
+    let rows = all.iter().flat_map(|panel| {
+        panel.curves.iter().flat_map(move |(label, points)| {
+            points.iter().map(move |(n, t)| {
+                vec![panel.title.clone(), label.clone(), number(Some(*n)), number(Some(*t))]
+            })
+        })
+    });
+    let csv = table(["problem", "solver", "n", "seconds"], rows.collect());
+    Ok(Figure { name: name.into(), title: title.into(), svg, csv })
+}
+
 /// Data profiles have at most this many panels.
 const PANELS: usize = 4;
 /// Parts of the problems for which the residual is shown.

@@ -1,4 +1,4 @@
-//! Numerical methods for nonsmooth mechanical systems: state, solve and judge frictional contact problems.
+//! Numerical methods for nonsmooth mechanical systems: state, solve and judge frictional contact and linear complementarity problems.
 //!
 //! Unilateral contact with exact Coulomb friction, contact by contact:
 //!
@@ -32,6 +32,21 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! Linear complementarity problems, `0 ≤ z ⟂ M z + q ≥ 0`, are stated and solved the same way. This one has no solution, which is proved:
+//!
+//! ```
+//! use nonsmooth::{Dense, Lcp, Limits, Problem, Status, session};
+//!
+//! let m = Dense::from_rows(&[[-2.0, 1.0], [1.0, -2.0]]).expect("two rows of two");
+//! let problem = Lcp::new(m, vec![-1.0, -1.0])?;
+//! let mut point = problem.origin();
+//! let outcome = session::<Lcp>("auto", &Default::default())?
+//!     .solve(&problem, &mut point, &Limits::default(), &mut |_| {})?;
+//! let Status::Infeasible(certificate) = outcome.status else { panic!("{}", outcome.status) };
+//! assert!(problem.verify(&certificate)); // by the problem's own judge, from M and q alone
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! | module | what |
 //! | --- | --- |
 //! | [`problem`] | the statement as plain validated data, the judge, instances with a known solution |
@@ -49,13 +64,14 @@ pub use nonsmooth_solve as solve;
 pub use nonsmooth_dynamics::{Scene, SceneError};
 pub use nonsmooth_io::{IoError, fclib};
 pub use nonsmooth_problem::check::{Certificate, Existence, Judged, Measure, Motion, Verdict};
-pub use nonsmooth_problem::linalg::{Bsr, Csc};
+pub use nonsmooth_problem::linalg::{Bsr, Csc, Dense, Matrix, Operator};
 pub use nonsmooth_problem::planted::Planted;
-pub use nonsmooth_problem::with_friction;
 pub use nonsmooth_problem::{
-    BilateralGlobal, BilateralLocal, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, Kind,
-    LocalPoint, Problem, ProblemError,
+    BilateralGlobal, BilateralLocal, BoxLcp, Complementarity, Friction, FrictionGlobal,
+    FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Kind, Lcp, LcpPoint, LocalPoint, Mlcp, Problem,
+    ProblemError,
 };
+pub use nonsmooth_problem::{with_complementarity, with_friction};
 pub use nonsmooth_solve::registry::{session, solver_names};
 pub use nonsmooth_solve::settings;
 pub use nonsmooth_solve::{Driver, Limits, Outcome, Session, SolveError, Solver, Status, Step};

@@ -57,12 +57,12 @@ const PROBLEM: Floors = Floors {
 /// a family sees of it what it needs to be registered.
 const SOLVE: Floors = Floors {
     floors: &[
-        &["error", "settings"],
+        &["error", "settings", "trace"],
         &["cone"],
         &["cfun"],
         &["form"],
         &["local", "parts", "solver", "reform"],
-        &["drive", "via", "trace", "existence"],
+        &["drive", "via", "existence"],
         &[],
         &["registry", "diagnose"],
     ],

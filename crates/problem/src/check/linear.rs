@@ -75,8 +75,7 @@ impl Data<'_> {
 /// | `absolute` | `‖(x_i − P(x_i − w_i))_i‖₂ = ‖(min(x_i, w_i))_i‖₂`, in the unit of q |
 /// | `relative` | `absolute / ‖q‖₂`, with q = 0 `absolute` itself |
 /// | `rows` | `max_i |min(σ_i z_i, w_i)| / (|q_i| + σ_i ‖z‖_∞)`, `σ_i = Σ_j |M_ij|`: the same whatever the scale of row i |
-/// | `paper` | `‖min(z, w)‖₂ / ‖q‖₂` |
-/// | `peer` | `Σ_i (−z_i)₊ + (−w_i)₊ + (z_i)₊ (w_i)₊` over `‖q‖₂ + 1`, with `|w_i|` of an equality, as Siconos has it |
+/// | `paper`, `peer` | `‖min(z, w)‖₂ / ‖q‖₂`, as Siconos has it for an LCP |
 ///
 /// `relative` and `rows` decide. An equality counts with `w_i`. Both bounds finite: `min` becomes the distance to the projection.
 #[derive(Debug, Clone, Default)]
@@ -98,7 +97,6 @@ struct Sum {
     primal: f64,
     dual: f64,
     complementarity: f64,
-    peer: f64,
     rows: f64,
     worst: (usize, f64),
 }
@@ -134,7 +132,6 @@ impl Sum {
             primal: 0.0,
             dual: 0.0,
             complementarity: 0.0,
-            peer: 0.0,
             rows: 0.0,
             worst: (0, -1.0),
         }
@@ -161,11 +158,6 @@ impl Sum {
         if gap.is_finite() {
             self.complementarity += (gap / self.unit * (w / self.unit)).abs();
         }
-        self.peer += (l - z).max(z - u).max(0.0) + dual_violation(w, l, u);
-        let inside = if w > 0.0 { z - l } else { u - z };
-        if inside.is_finite() && inside > 0.0 {
-            self.peer += inside * w.abs();
-        }
         let row = over(natural(sigma * z, w, sigma * l, sigma * u).abs(), terms);
         // A NaN is the worst there is.
         self.rows = if row.is_nan() { row } else { self.rows.max(row) };
@@ -175,7 +167,6 @@ impl Sum {
         self.add(i, w);
         self.plain += (w / self.unit).powi(2);
         self.dual += (w / self.unit).powi(2);
-        self.peer += w.abs();
         let row = over(w.abs(), terms);
         self.rows = if row.is_nan() { row } else { self.rows.max(row) };
     }
@@ -188,12 +179,12 @@ impl Sum {
         self.scaled += share;
     }
 
-    fn measure(self, norm_q: f64) -> Measure {
+    fn measure(self) -> Measure {
         Measure {
             absolute: self.scaled.sqrt() * self.unit,
             relative: self.scaled.sqrt(),
             paper: self.plain.sqrt(),
-            peer: self.peer / (norm_q + 1.0),
+            peer: self.plain.sqrt(),
             primal: self.primal.sqrt(),
             dual: self.dual.sqrt(),
             complementarity: self.complementarity,
@@ -270,7 +261,7 @@ impl LinearGauge {
                 Some(j) => sum.pair(i, point.z[j], w, data.bounds(i), s, sigma, terms),
             }
         }
-        sum.measure(self.norm_q)
+        sum.measure()
     }
 
     fn judge(
@@ -357,7 +348,7 @@ impl HlcpGauge {
             let (c, ds) = (self.c[i], self.d[i] * s);
             sum.pair(n + i, x, ds, (0.0, f64::INFINITY), c, c, reach);
         }
-        sum.measure(self.norm_q)
+        sum.measure()
     }
 
     /// The size of the terms that pairs are compared with.

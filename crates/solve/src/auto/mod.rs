@@ -25,6 +25,7 @@
 //! Fails: impacts on thousands of hyperstatic contacts may need more factorisations than patience allows.
 
 mod controller;
+pub mod linear;
 
 use nonsmooth_problem::check::{Existence, Kinematic};
 use schemars::JsonSchema;

@@ -6,6 +6,8 @@ use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 
 use super::linear_abouts::*;
 use super::{About, Direct, Entry, Made, Registered, Visitor, find};
+use crate::Session;
+use crate::auto::linear::{LinearAuto, Planned};
 use crate::form::{Bounded, Complementary, Paired};
 use crate::interior::linear::{Mehrotra, Mty};
 use crate::optimisation::linear::Programmed;
@@ -40,11 +42,17 @@ fn horizontal_solvers<V: Visitor<Problem = Hlcp>>() -> Vec<Entry<V>> {
     paired_solvers()
 }
 
+/// `auto` runs whole sessions of the others, so it is one itself.
+fn automatic<P: Planned>(settings: &SettingsMap) -> Result<Box<dyn Session<P>>, String> {
+    Ok(Box::new(parse::<LinearAuto>(settings)?.session::<P>()))
+}
+
 macro_rules! register {
     ($kind:ty, $solvers:ident) => {
         impl Registered for $kind {
             fn abouts() -> Vec<&'static About> {
-                $solvers::<Direct<Self>>().iter().map(|entry| entry.about).collect()
+                let entries = $solvers::<Direct<Self>>();
+                std::iter::once(&AUTO).chain(entries.iter().map(|entry| entry.about)).collect()
             }
 
             fn composed_names() -> Vec<String> {
@@ -52,6 +60,9 @@ macro_rules! register {
             }
 
             fn make(name: &str, settings: &SettingsMap) -> Made<Self> {
+                if name == AUTO.name {
+                    return Some(automatic(settings));
+                }
                 let entry = find($solvers::<Direct<Self>>(), name)?;
                 Some((entry.build)(settings, Direct(PhantomData)))
             }

@@ -1,10 +1,23 @@
 //! The solvers of linear complementarity problems, described.
 
 use super::{About, Solves};
+use crate::auto::linear::LinearAuto;
 use crate::interior::linear::{MehrotraType, MizunoToddYe};
 use crate::optimisation::linear::QuadraticProgram;
 use crate::settings::described;
 use crate::splitting::linear::ProjectedJacobi;
+
+/// The automatic method.
+pub const AUTO: About = About {
+    name: "auto",
+    family: "auto",
+    solves: Solves::Law,
+    summary: "needs no setting: a plan of solvers by size, class and structure of M, until one solves the problem or proves that there is no solution",
+    needs: &[],
+    cites: &["CottlePangStone2009", "FacchineiPang2003", "Acary2018"],
+    variants: &[],
+    settings: described::<LinearAuto>,
+};
 
 /// Projected Jacobi.
 pub const PROJECTED_JACOBI: About = About {

@@ -1,0 +1,230 @@
+//! Several solvers, one after the other, as one session.
+
+use std::time::Instant;
+
+use cpu_time::ProcessTime;
+use nonsmooth_problem::Problem;
+use nonsmooth_problem::check::Measure;
+
+use crate::registry::{self, Registered};
+use crate::settings::SettingsMap;
+use crate::trace::Trace;
+use crate::{Limit, Limits, Outcome, Progress, Sample, Session, SolveError, Status};
+
+/// A solver of a plan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// The name in the registry.
+    pub name: &'static str,
+    /// Its settings.
+    pub settings: SettingsMap,
+    /// At most this many iterations, before the next one has its turn.
+    pub iterations: usize,
+    /// Why it is tried, in words that follow its name.
+    pub because: String,
+}
+
+/// A session that runs the solvers of a plan until one solves the problem or proves that it has no solution. Each starts from the best point that the ones before
+/// it have found.
+pub struct Portfolio<P: Registered> {
+    plan: Box<dyn Fn(&P) -> Vec<Candidate> + Send>,
+    /// What was made for earlier problems, by name and settings.
+    sessions: Vec<(&'static str, SettingsMap, Box<dyn Session<P>>)>,
+    history: Vec<Sample>,
+    account: Vec<String>,
+    trace: Trace,
+}
+
+/// The most samples that a history keeps.
+const HISTORY: usize = 4096;
+
+impl<P: Registered> Portfolio<P> {
+    /// A session that follows `plan`.
+    pub fn new(plan: impl Fn(&P) -> Vec<Candidate> + Send + 'static) -> Self {
+        Self {
+            plan: Box::new(plan),
+            sessions: vec![],
+            history: vec![],
+            account: vec![],
+            trace: Trace::None,
+        }
+    }
+
+    /// The place of the candidate's session.
+    fn session(&mut self, candidate: &Candidate) -> Result<usize, SolveError> {
+        let same = |(name, settings, _): &(&str, SettingsMap, _)| {
+            *name == candidate.name && *settings == candidate.settings
+        };
+        if let Some(k) = self.sessions.iter().position(same) {
+            return Ok(k);
+        }
+        let session = registry::session::<P>(candidate.name, &candidate.settings)?;
+        self.sessions.push((candidate.name, candidate.settings.clone(), session));
+        Ok(self.sessions.len() - 1)
+    }
+}
+
+/// What has been done, and found, so far.
+struct Tally<P: Problem> {
+    wall: Instant,
+    cpu: ProcessTime,
+    iterations: usize,
+    factorisations: u64,
+    best: Option<(P::Point, Measure)>,
+}
+
+impl<P: Problem> Tally<P> {
+    fn take(&mut self, point: P::Point, outcome: &Outcome) {
+        self.iterations += outcome.iterations;
+        self.factorisations += outcome.factorisations;
+        let better = |(_, best): &(P::Point, Measure)| outcome.measure.merit() < best.merit();
+        if self.best.as_ref().is_none_or(better) {
+            self.best = Some((point, outcome.measure));
+        }
+    }
+
+    /// What is left of the limits for a candidate.
+    fn left(&self, limits: &Limits, iterations: usize) -> Limits {
+        let seconds = self.wall.elapsed().as_secs_f64();
+        Limits {
+            max_iterations: limits.max_iterations.saturating_sub(self.iterations).min(iterations),
+            time_limit: limits.time_limit.map(|t| (t - seconds).max(0.0)),
+            ..limits.clone()
+        }
+    }
+
+    /// The caller's own limit ended the solve, not the candidate's.
+    fn is_over(&self, limits: &Limits, status: &Status) -> bool {
+        match status {
+            Status::Limit(Limit::Iterations) => self.iterations >= limits.max_iterations,
+            Status::Limit(Limit::Time | Limit::Cancelled) => true,
+            _ => false,
+        }
+    }
+}
+
+impl<P: Registered> Session<P> for Portfolio<P> {
+    fn solve(
+        &mut self,
+        problem: &P,
+        point: &mut P::Point,
+        limits: &Limits,
+        watch: &mut dyn FnMut(&Progress),
+    ) -> Result<Outcome, SolveError> {
+        problem.validate_point(point)?;
+        self.history.clear();
+        self.account.clear();
+        self.trace = Trace::None;
+        let mut tally = Tally::<P> {
+            wall: Instant::now(),
+            cpu: ProcessTime::now(),
+            iterations: 0,
+            factorisations: 0,
+            best: None,
+        };
+        let mut status = Status::Stalled("no method applies to this problem".into());
+        for candidate in (self.plan)(problem) {
+            let k = self.session(&candidate)?;
+            let mut trial = tally.best.as_ref().map_or_else(|| point.clone(), |b| b.0.clone());
+            let (before, begun) = (tally.iterations, tally.wall.elapsed().as_secs_f64());
+            let left = tally.left(limits, candidate.iterations);
+            let session = &mut self.sessions[k].2;
+            let tried =
+                session.solve(problem, &mut trial, &left, &mut |p| watch(&later(p, before, begun)));
+            let outcome = match tried {
+                Ok(outcome) => outcome,
+                Err(e) if e.is_inapplicable() => {
+                    self.account.push(format!("{} does not apply: {e}", candidate.name));
+                    continue;
+                }
+                Err(e) => return Err(e),
+            };
+            let shifted = session.history().iter().map(|s| Sample {
+                iteration: before + s.iteration,
+                seconds: begun + s.seconds,
+                relative: s.relative,
+            });
+            self.history.extend(shifted.take(HISTORY.saturating_sub(self.history.len())));
+            self.trace = session.trace();
+            self.account.push(sentence(&candidate, &outcome));
+            self.account.extend(session.account().into_iter().map(|line| format!("  {line}")));
+            tally.take(trial, &outcome);
+            let (decided, over) = (
+                matches!(outcome.status, Status::Solved | Status::Infeasible(_)),
+                tally.is_over(limits, &outcome.status),
+            );
+            status = outcome.status;
+            if decided || over {
+                break;
+            }
+        }
+        if let Status::Stalled(_) | Status::Limit(Limit::Iterations) | Status::NoConclusion(_) =
+            &status
+            && !tally.is_over(limits, &status)
+            && tally.best.is_some()
+        {
+            status = match status {
+                ray @ Status::NoConclusion(_) => ray,
+                _ => Status::Stalled("none of the methods tried solves it; see the account".into()),
+            };
+        }
+        let measure = match tally.best {
+            Some((best, measure)) => {
+                P::copy_point(&best, point);
+                measure
+            }
+            None => problem.certify(point, &mut problem.gauge()?),
+        };
+        Ok(Outcome {
+            status,
+            measure,
+            iterations: tally.iterations,
+            factorisations: tally.factorisations,
+            seconds: tally.wall.elapsed().as_secs_f64(),
+            cpu_seconds: tally.cpu.elapsed().as_secs_f64(),
+        })
+    }
+
+    fn history(&self) -> &[Sample] {
+        &self.history
+    }
+
+    fn trace(&self) -> Trace {
+        self.trace.clone()
+    }
+
+    fn account(&self) -> Vec<String> {
+        self.account.clone()
+    }
+}
+
+/// What a watcher sees, with what was done before added.
+fn later(p: &Progress, iterations: usize, seconds: f64) -> Progress {
+    let judged = Sample {
+        iteration: p.judged.iteration + iterations,
+        seconds: p.judged.seconds + seconds,
+        relative: p.judged.relative,
+    };
+    Progress {
+        judged,
+        best: p.best,
+        iteration: p.iteration + iterations,
+        seconds: p.seconds + seconds,
+    }
+}
+
+/// What a candidate did, for the account.
+fn sentence(candidate: &Candidate, outcome: &Outcome) -> String {
+    let Candidate { name, settings, because, .. } = candidate;
+    let settings: String = settings
+        .iter()
+        .map(|(key, value)| {
+            format!(" {key}={}", value.as_str().map_or_else(|| value.to_string(), str::to_owned))
+        })
+        .collect();
+    let ended = match &outcome.status {
+        Status::Stalled(why) => why.to_string(),
+        other => other.to_string(),
+    };
+    format!("{name}{settings} ({because}): {ended} after {} iterations", outcome.iterations)
+}
