@@ -116,6 +116,11 @@ impl Csc {
         &mut self.values
     }
 
+    /// Column pointers, row indices, and the values to be changed: the structure stays.
+    pub fn parts_mut(&mut self) -> (&[usize], &[usize], &mut [f64]) {
+        (&self.col_ptr, &self.row_idx, &mut self.values)
+    }
+
     /// Row indices and values of column `j`.
     #[inline]
     pub fn column(&self, j: usize) -> (&[usize], &[f64]) {

@@ -12,6 +12,7 @@ pub mod pairs;
 mod proximal_newton;
 mod pursuit;
 mod sweep;
+mod tableau;
 mod team;
 
 pub use anderson::{Accelerator, Anderson};
@@ -24,4 +25,5 @@ pub use ordering::{Order, Ordering};
 pub use proximal_newton::{Inner, ProximalNewton};
 pub use pursuit::Pursuit;
 pub use sweep::Sweep;
+pub use tableau::{Cycle, Polished, Tableau, equilibrate, refuting_row};
 pub use team::Team;
