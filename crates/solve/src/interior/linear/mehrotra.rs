@@ -11,7 +11,7 @@
 //! Cost of a step: one factorisation of `M + X⁻¹S` (Cholesky where M is symmetric positive semidefinite, else LU; analysed once), two solves, three products.
 //! Storage: a scaled copy of the matrices, that matrix, its factors, 20 vectors.
 //! Fails: M that is not monotone may stop it (it often does not). Where there is no solution the iterates grow, and of a monotone problem their
-//! direction is a certificate. The record has μ in the units of the scaled problem.
+//! direction is a certificate (sought up to 5000 variables). The record has μ in the units of the scaled problem.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

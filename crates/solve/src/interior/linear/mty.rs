@@ -14,7 +14,7 @@
 //! Cost of a step: two factorisations of `M + X⁻¹S` (Cholesky where M is symmetric positive semidefinite, else LU; analysed once), two solves, two products.
 //! Storage: a scaled copy of the matrices, that matrix, its factors, 20 vectors.
 //! Fails: M that is not monotone; it says so when a corrector does not come back to the neighbourhood. Where there is no solution the iterates grow, and
-//! of a monotone problem their direction is a certificate. The record has two rows an iteration, and μ in the units of the scaled problem.
+//! of a monotone problem their direction is a certificate (sought up to 5000 variables). The record has two rows an iteration, and μ in the units of the scaled problem.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
