@@ -5,7 +5,7 @@
 //! (diag(∂Φ/∂z) + diag(∂Φ/∂w) M) d = −Φ,   z ← z + t d
 //! ```
 //!
-//! One skeleton ([`Semismooth`]), one file for each function. All is done in pure numbers ([`scaled`]): rows and columns of M scaled to entries of about one, so
+//! One skeleton ([`Semismooth`]), one file for each function. All is done in pure numbers: rows and columns of M scaled to entries of about one, so
 //! units change neither steps nor decisions.
 //!
 //! *Globalisation.* The merit is `Ψ = ½‖Φ‖²` of a function whose square is differentiable (Fischer–Burmeister or penalised). A step goes down a ladder until one
