@@ -7,12 +7,12 @@ use crate::SolveError;
 
 /// A problem with a matrix of any shape, `w = M z + q`: each row is an equality `w_i = 0`, or belongs to one variable. Offered by [`Lcp`], [`Mlcp`]
 /// and [`BoxLcp`].
-pub trait Paired: Problem<Point = LcpPoint> {
+pub trait Rowwise: Problem<Point = LcpPoint> {
     /// The problem's data.
-    fn paired(&self) -> Rows<'_>;
+    fn rowwise(&self) -> Rows<'_>;
 }
 
-/// The data of a [`Paired`] problem: the first `equalities` rows are equalities, row `equalities + k` belongs to variable `free + k`.
+/// The data of a [`Rowwise`] problem: the first `equalities` rows are equalities, row `equalities + k` belongs to variable `free + k`.
 #[derive(Debug, Clone, Copy)]
 pub struct Rows<'a> {
     /// M, rows × variables.
@@ -34,23 +34,23 @@ impl Rows<'_> {
     }
 }
 
-impl Paired for Lcp {
-    fn paired(&self) -> Rows<'_> {
+impl Rowwise for Lcp {
+    fn rowwise(&self) -> Rows<'_> {
         let bounds = Bounds::Orthant { free: 0 };
         Rows { matrix: &self.M, q: &self.q, equalities: 0, free: 0, bounds }
     }
 }
 
-impl Paired for Mlcp {
-    fn paired(&self) -> Rows<'_> {
+impl Rowwise for Mlcp {
+    fn rowwise(&self) -> Rows<'_> {
         let Self { M, q, equalities, free } = self;
         let bounds = Bounds::Orthant { free: *free };
         Rows { matrix: M, q, equalities: *equalities, free: *free, bounds }
     }
 }
 
-impl Paired for BoxLcp {
-    fn paired(&self) -> Rows<'_> {
+impl Rowwise for BoxLcp {
+    fn rowwise(&self) -> Rows<'_> {
         let bounds = Bounds::Box { lower: &self.lower, upper: &self.upper };
         Rows { matrix: &self.M, q: &self.q, equalities: 0, free: 0, bounds }
     }
@@ -67,7 +67,7 @@ fn needs_entries(matrix: &Matrix) -> Result<(), SolveError> {
 
 /// A problem with one variable a row: `−w_i ∈ N_[l_i, u_i](z_i)`, `w = M z + q`. Offered by [`Lcp`], [`Mlcp`] (with as many equalities as
 /// free variables) and [`BoxLcp`].
-pub trait Bounded: Paired {
+pub trait Bounded: Rowwise {
     /// The problem's data.
     ///
     /// Errors: a mixed problem whose equalities are not as many as its free variables.

@@ -54,7 +54,7 @@ impl Reformulation<Hlcp> for Mixed {
         }
     }
 
-    fn lower(&self, _: &Hlcp, point: &HlcpPoint, reduced: &mut LcpPoint) {
+    fn lower(&self, _: &Hlcp, point: &HlcpPoint, (): &(), reduced: &mut LcpPoint) {
         reduced.z.clear();
         reduced.z.extend_from_slice(&point.s);
         reduced.z.extend_from_slice(&point.x);

@@ -216,7 +216,7 @@ impl Reformulation<Mlcp> for Reduce {
         }
     }
 
-    fn lower(&self, problem: &Mlcp, point: &LcpPoint, reduced: &mut LcpPoint) {
+    fn lower(&self, problem: &Mlcp, point: &LcpPoint, _: &ReduceMemo, reduced: &mut LcpPoint) {
         reduced.z.clear();
         reduced.z.extend_from_slice(&point.z[problem.free..]);
     }

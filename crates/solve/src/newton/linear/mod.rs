@@ -46,7 +46,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::cfun::scalar::{self, Min, ScalarFunction, Slope};
-use crate::form::Paired;
+use crate::form::Rowwise;
 use crate::parts::{LineSearch, Search};
 use crate::settings::Settings;
 use crate::{SolveError, Solver, Step};
@@ -245,11 +245,11 @@ struct Merit {
     largest: f64,
 }
 
-impl<P: Paired, F: ScalarFunction> Solver<P> for Semismooth<F> {
+impl<P: Rowwise, F: ScalarFunction> Solver<P> for Semismooth<F> {
     type Work = Work;
 
     fn work(&self, problem: &P) -> Result<Work, SolveError> {
-        let problem = Scaled::new(&problem.paired())?;
+        let problem = Scaled::new(&problem.rowwise())?;
         let (m, n) = (problem.nrows(), problem.dim());
         Ok(Work {
             factor: Factor::new(&problem.matrix),
@@ -276,7 +276,7 @@ impl<P: Paired, F: ScalarFunction> Solver<P> for Semismooth<F> {
     }
 
     fn refill(&self, problem: &P, work: &mut Work) -> Result<(), SolveError> {
-        let rows = problem.paired();
+        let rows = problem.rowwise();
         rows.needs_entries()?;
         if !work.problem.refill(&rows) {
             *work = self.work(problem)?;
@@ -665,7 +665,7 @@ impl<F: ScalarFunction> Semismooth<F> {
     }
 
     /// No direction descends, or none descends enough.
-    fn give_up<P: Paired>(&self, problem: &P, work: &mut Work, merit: Merit) -> Step {
+    fn give_up<P: Rowwise>(&self, problem: &P, work: &mut Work, merit: Merit) -> Step {
         let reach = work.x.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
         if merit.largest <= ROUNDING * reach {
             return Step::Done;
@@ -713,8 +713,8 @@ impl<F: ScalarFunction> Semismooth<F> {
 }
 
 /// A row that no point satisfies, lecture (19), if there is one. Cost: one pass over M.
-fn impossible_row<P: Paired>(problem: &P, work: &mut Work) -> Option<Certificate> {
-    let rows = problem.paired();
+fn impossible_row<P: Rowwise>(problem: &P, work: &mut Work) -> Option<Certificate> {
+    let rows = problem.rowwise();
     let largest = &mut work.residual;
     largest.fill(f64::NEG_INFINITY);
     rows.matrix.for_each(|i, _, x| largest[i] = largest[i].max(x));
@@ -725,7 +725,7 @@ fn impossible_row<P: Paired>(problem: &P, work: &mut Work) -> Option<Certificate
 /// A proof that there is no solution, where the stationary point is one.
 ///
 /// With `y = −∂Φ/∂w ∘ Φ`, `∇Ψ = 0` says `Mᵀ y = ∂Φ/∂z ∘ Φ`: a Farkas vector, if Φ ≤ 0.
-fn proof<P: Paired>(problem: &P, work: &Work) -> Option<Certificate> {
+fn proof<P: Rowwise>(problem: &P, work: &Work) -> Option<Certificate> {
     let Work { problem: scaled, phi, of_w, .. } = work;
     let mut y: Vec<f64> = (0..phi.len())
         .map(|i| {
