@@ -58,6 +58,11 @@ impl Factor {
     pub fn distrust(&mut self) -> bool {
         std::mem::take(&mut self.trusted)
     }
+
+    /// Back to the fixed order.
+    pub fn trust(&mut self) {
+        self.trusted = self.fixed.is_some();
+    }
 }
 
 fn symmetric(a: &Csc) -> bool {

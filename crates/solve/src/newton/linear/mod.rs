@@ -5,7 +5,7 @@
 //! (diag(∂Φ/∂z) + diag(∂Φ/∂w) M) d = −Φ,   z ← z + t d
 //! ```
 //!
-//! One skeleton ([`Semismooth`]), one file for each function. All is done in pure numbers ([`scaled`]): rows and columns of M scaled to entries of about one, so
+//! One skeleton ([`Semismooth`]), one file for each function. All is done in pure numbers: rows and columns of M scaled to entries of about one, so
 //! units change neither steps nor decisions.
 //!
 //! *Globalisation.* The merit is `Ψ = ½‖Φ‖²` of a function whose square is differentiable (Fischer–Burmeister or penalised). A step goes down a ladder until one
@@ -19,7 +19,11 @@
 //! | Levenberg–Marquardt | `min ‖Φ + J d‖² + λ‖d‖²`: a descent direction always; the first rung where equalities are not as many as free variables |
 //! | gradient | `−∇Ψ` with the step that is best for the linearisation |
 //!
-//! Where no rung descends, or Ψ has no new low for [`PATIENCE`] steps, the method starts again elsewhere, a few times, and then is stuck.
+//! `newton_min` takes full steps whatever Ψ says as long as there is a new low every few steps, and then goes back to the last low and downhill: the plain method often
+//! is the fastest. Where no rung descends, or Ψ has no new low for [`PATIENCE`] steps, the method starts again elsewhere, every other time with the minimum first
+//! where its own function was first before, and the other way round; after a few of these it is stuck.
+//!
+//! *Proofs.* A row that no z satisfies is found before the first step. Where Ψ is stationary and `Φ ≤ 0`, `−∂Φ/∂w ∘ Φ` is a Farkas vector.
 //!
 //! *Finish.* A full step on the minimum solves for the variables inside their bounds alone, refined against the problem's data with residuals in doubled
 //! precision: exact but for the rounding of z.
@@ -463,39 +467,28 @@ impl<F: ScalarFunction> Semismooth<F> {
         }
     }
 
-    /// d with `J d = −Φ` for the slopes and Φ that the workspace holds, `J` with `∂Φ/∂z + λ ∂Φ/∂w`; refined towards λ = 0 where `to_zero`.
+    /// d with `J d = −Φ` for the slopes and Φ that the workspace holds, M̂ with λE added; refined towards λ = 0 where `to_zero`.
     /// False where the matrix is singular.
     fn solve(work: &mut Work, lambda: f64, to_zero: bool) -> bool {
-        let Work { problem, jacobian, factor, of_z, of_w, .. } = work;
-        if lambda > 0.0 {
-            of_z.iter_mut().zip(&*of_w).for_each(|(e, f)| *e += lambda * f);
-        }
-        jacobian.assemble(problem, of_z, of_w);
-        let mut factorised = factor.factorise(&jacobian.matrix);
-        if lambda > 0.0 {
-            of_z.iter_mut().zip(&*of_w).for_each(|(e, f)| *e -= lambda * f);
-        }
-        let shifted = lambda > 0.0 && to_zero;
-        if shifted {
-            jacobian.assemble(problem, of_z, of_w);
-        }
+        let mut again = false;
         loop {
+            let Work { problem, jacobian, factor, of_z, of_w, .. } = work;
+            jacobian.assemble(problem, of_z, of_w, lambda);
+            let factorised = factor.factorise(&jacobian.matrix);
+            if lambda > 0.0 && to_zero {
+                jacobian.assemble(problem, of_z, of_w, 0.0);
+            }
             if factorised && Self::refine(work, if to_zero { 6 } else { 2 }) {
                 return true;
             }
-            let Work { problem, jacobian, factor, of_z, of_w, .. } = work;
-            if !factor.distrust() {
+            if !work.factor.distrust() {
+                if again {
+                    // It was the matrix, not the order of elimination.
+                    work.factor.trust();
+                }
                 return false;
             }
-            if shifted {
-                of_z.iter_mut().zip(&*of_w).for_each(|(e, f)| *e += lambda * f);
-                jacobian.assemble(problem, of_z, of_w);
-                of_z.iter_mut().zip(&*of_w).for_each(|(e, f)| *e -= lambda * f);
-            }
-            factorised = factor.factorise(&jacobian.matrix);
-            if shifted {
-                jacobian.assemble(problem, of_z, of_w);
-            }
+            again = true;
         }
     }
 
@@ -624,11 +617,8 @@ impl<F: ScalarFunction> Semismooth<F> {
     /// A step on the method's own function, with a proximal term.
     fn newton(&self, work: &mut Work, merit: Merit, lambda: f64) -> bool {
         Self::differentiate(work);
-        if !Self::solve(work, lambda, false) && lambda == 0.0 {
-            work.phase.singular = true;
-            return false;
-        }
-        if work.d.iter().any(|d| !d.is_finite()) {
+        if !Self::solve(work, lambda, false) {
+            work.phase.singular |= lambda == 0.0;
             return false;
         }
         let slope = Self::slope(work);
@@ -642,7 +632,7 @@ impl<F: ScalarFunction> Semismooth<F> {
         Self::differentiate(work);
         let lambda = (work.phase.marquardt * merit.largest).clamp(1e-14, 1e2);
         let Work { problem, jacobian, augmented_lu, phi, of_z, of_w, d, stacked, .. } = work;
-        jacobian.assemble(problem, of_z, of_w);
+        jacobian.assemble(problem, of_z, of_w, 0.0);
         if augmented_lu.factorise(&jacobian.augmented(lambda)).is_err() {
             return false;
         }

@@ -257,23 +257,23 @@ impl Jacobian {
         Self { matrix: scaled.matrix.clone(), pairs }
     }
 
-    /// Assembles `diag(e) E + diag(f) M̂`.
-    pub fn assemble(&mut self, scaled: &Scaled, e: &[f64], f: &[f64]) {
+    /// Assembles `diag(e) E + diag(f) (M̂ + λE)`.
+    pub fn assemble(&mut self, scaled: &Scaled, e: &[f64], f: &[f64], lambda: f64) {
         let p = scaled.equalities;
         match (&mut self.matrix, &scaled.matrix) {
             (Matrix::Dense(to), Matrix::Dense(a)) => {
                 for (i, &f) in f.iter().enumerate() {
                     to.row_mut(i).iter_mut().zip(a.row(i)).for_each(|(to, a)| *to = f * a);
                     if let Some(j) = scaled.variable(i) {
-                        to[(i, j)] += e[i];
+                        to[(i, j)] += e[i] + lambda * f;
                     }
                 }
             }
             (Matrix::Sparse(to), Matrix::Sparse(a)) => {
                 let entries = to.values_mut().iter_mut().zip(a.row_idx()).zip(a.values());
                 entries.for_each(|((to, &i), a)| *to = f[i] * a);
-                for (&k, e) in self.pairs.iter().zip(&e[p..]) {
-                    to.values_mut()[k] += e;
+                for ((&k, e), f) in self.pairs.iter().zip(&e[p..]).zip(&f[p..]) {
+                    to.values_mut()[k] += e + lambda * f;
                 }
             }
             _ => {}
