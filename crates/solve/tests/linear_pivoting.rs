@@ -54,8 +54,7 @@ fn solve<P: Registered + Problem<Point = LcpPoint>>(
 }
 
 /// The methods with the classes of matrices they are made for.
-const ALL: [&str; 6] =
-    ["murty", "bard", "criss_cross", "keller", "block_pivoting", "enumeration"];
+const ALL: [&str; 6] = ["murty", "bard", "criss_cross", "keller", "block_pivoting", "enumeration"];
 
 /// `M z + q`.
 fn w_of(problem: &Lcp, z: &[f64]) -> Vec<f64> {
@@ -253,13 +252,21 @@ fn rows_refute_before_the_first_pivot() {
     let example = classics::minus_one_infeasible();
     for name in ALL {
         let solved = solve(name, &[], &example.problem);
-        assert_eq!(solved.outcome.status, Status::Infeasible(Certificate::Row { row: 0 }), "{name}");
+        assert_eq!(
+            solved.outcome.status,
+            Status::Infeasible(Certificate::Row { row: 0 }),
+            "{name}"
+        );
     }
     let m = Dense::from_rows(&[[1.0, 0.5, 0.0], [0.0, 2.0, 1.0], [-1.0, 0.0, -3.0]]).unwrap();
     let problem = Lcp::new(m, vec![-1.0, -1.0, -1e-7]).unwrap();
     for name in ALL {
         let solved = solve(name, &[], &problem);
-        assert_eq!(solved.outcome.status, Status::Infeasible(Certificate::Row { row: 2 }), "{name}");
+        assert_eq!(
+            solved.outcome.status,
+            Status::Infeasible(Certificate::Row { row: 2 }),
+            "{name}"
+        );
     }
 }
 
@@ -284,17 +291,20 @@ fn contradicting_rows_are_proved() {
         let mut rng = Pcg64::seed_from_u64(seed);
         let n = [4, 10, 30, 60][seed as usize % 4];
         let problem = contradiction(n, &mut rng);
-        for (name, settings) in [
-            ("criss_cross", vec![]),
-            ("keller", vec![]),
-            ("keller", vec!["least_index=true"]),
-        ] {
+        for (name, settings) in
+            [("criss_cross", vec![]), ("keller", vec![]), ("keller", vec!["least_index=true"])]
+        {
             // The bases of criss-cross are any, and soon as badly conditioned as M itself.
             if name == "criss_cross" && n > 30 {
                 continue;
             }
             let solved = solve(name, &settings, &problem);
-            assert_eq!(solved.status(), "infeasible", "{name} seed {seed}: {}", solved.outcome.status);
+            assert_eq!(
+                solved.status(),
+                "infeasible",
+                "{name} seed {seed}: {}",
+                solved.outcome.status
+            );
         }
         if n <= 10 {
             assert_eq!(solve("enumeration", &[], &problem).status(), "infeasible");
@@ -331,8 +341,9 @@ fn every_solution_of_every_example_is_listed() {
                     assert!(example.has(&face.z, 1e-11 * largest(&face.z).max(1e-3)));
                 }
                 for z in all {
-                    assert!(found.faces.iter().any(|f| close(&f.z, z, 1e-10)
-                        || largest(z) == 0.0 && largest(&f.z) == 0.0));
+                    assert!(found.faces.iter().any(
+                        |f| close(&f.z, z, 1e-10) || largest(z) == 0.0 && largest(&f.z) == 0.0
+                    ));
                 }
             }
             Known::Segment(ends) => {
@@ -390,10 +401,8 @@ fn all_solutions_against_all_bases() {
 /// `M_αα x = −q_α`.
 fn eliminate(m: &Dense, q: &[f64], alpha: &[usize]) -> Option<Vec<f64>> {
     let k = alpha.len();
-    let mut a: Vec<Vec<f64>> = alpha
-        .iter()
-        .map(|&i| alpha.iter().map(|&j| m[(i, j)]).chain([-q[i]]).collect())
-        .collect();
+    let mut a: Vec<Vec<f64>> =
+        alpha.iter().map(|&i| alpha.iter().map(|&j| m[(i, j)]).chain([-q[i]]).collect()).collect();
     for c in 0..k {
         let p = (c..k).max_by(|x, y| a[*x][c].abs().total_cmp(&a[*y][c].abs()))?;
         a.swap(c, p);
@@ -422,7 +431,8 @@ fn planted(m: Dense, degenerate: f64, rng: &mut Pcg64) -> (Lcp, Vec<f64>) {
             if rng.random_range(0.0..1.0) < 0.5 { z[i] = value } else { w[i] = value }
         }
     }
-    let q = (0..n).map(|i| w[i] - m.row(i).iter().zip(&z).map(|(m, z)| m * z).sum::<f64>()).collect();
+    let q =
+        (0..n).map(|i| w[i] - m.row(i).iter().zip(&z).map(|(m, z)| m * z).sum::<f64>()).collect();
     (Lcp::new(m, q).unwrap(), z)
 }
 
@@ -544,7 +554,7 @@ fn degenerate_programs_with_many_ties() {
                 let solved = solve(name, &settings, &problem);
                 assert_eq!(solved.status(), "solved", "{name} n = {n} {}", solved.outcome.status);
                 // H is definite: x is unique.
-                    let off = solved.z[..n / 2].iter().zip(&z).map(|(a, b)| (a - b).abs());
+                let off = solved.z[..n / 2].iter().zip(&z).map(|(a, b)| (a - b).abs());
                 assert!(off.fold(0.0, f64::max) < 1e-9, "{name} n = {n}");
             }
         }
@@ -747,7 +757,11 @@ fn matrices_of_no_class_end_with_a_name() {
         let q: Vec<f64> = (0..n).map(|_| entry()).collect();
         let problem = Lcp::new(m, q).unwrap();
         let exact = solve("enumeration", &[], &problem);
-        assert!(["solved", "infeasible"].contains(&exact.status()), "{problem:?} {}", exact.status());
+        assert!(
+            ["solved", "infeasible"].contains(&exact.status()),
+            "{problem:?} {}",
+            exact.status()
+        );
         for name in ALL {
             let solved = solve(name, &[], &problem);
             match solved.status() {
@@ -805,7 +819,10 @@ fn a_thousand_variables() {
     for name in ["keller", "block_pivoting"] {
         let solved = solve(name, &[], &problem);
         let Outcome { seconds, factorisations, .. } = solved.outcome;
-        println!("{name}: {} pivots, {factorisations} factorisations, {seconds:.2} s", solved.pivots);
+        println!(
+            "{name}: {} pivots, {factorisations} factorisations, {seconds:.2} s",
+            solved.pivots
+        );
         assert_eq!(solved.status(), "solved");
         assert!(close(&solved.z, &z, 1e-7), "{name}");
     }
@@ -817,4 +834,128 @@ fn a_thousand_variables() {
     let solved = solve("block_pivoting", &[], &obstacle(300));
     println!("obstacle: {:?}", solved.outcome);
     assert_eq!(solved.status(), "solved");
+}
+
+// ------------------------------------------------------------------------------------------------ the corpus
+
+/// Numbers of a file of Siconos, in order.
+struct Tokens(std::vec::IntoIter<f64>);
+
+impl Tokens {
+    fn new(text: &str) -> Self {
+        let numbers: Vec<f64> = text.split_whitespace().map_while(|t| t.parse().ok()).collect();
+        Self(numbers.into_iter())
+    }
+
+    fn number(&mut self) -> f64 {
+        self.0.next().expect("a number")
+    }
+
+    fn index(&mut self) -> usize {
+        self.number() as usize
+    }
+
+    fn vector(&mut self, n: usize) -> Vec<f64> {
+        (0..n).map(|_| self.number()).collect()
+    }
+
+    /// The dense matrix of a file: by columns. `None` of another storage.
+    fn dense(&mut self) -> Option<Dense> {
+        if self.index() != 0 {
+            return None;
+        }
+        let _ = self.vector(2);
+        let (rows, columns) = (self.index(), self.index());
+        let values = self.vector(rows * columns);
+        Some(Dense::from_fn(rows, columns, |i, j| values[j * rows + i]))
+    }
+}
+
+fn corpus(folder: &str) -> Option<Vec<(String, String)>> {
+    let Some(root) = std::env::var_os("NONSMOOTH_CORPUS") else {
+        eprintln!("skipped: NONSMOOTH_CORPUS is not set");
+        return None;
+    };
+    let folder = std::path::Path::new(&root).join(folder);
+    let mut files: Vec<_> = std::fs::read_dir(folder)
+        .expect("a folder")
+        .filter_map(|entry| {
+            let path = entry.ok()?.path();
+            let name = path.file_name()?.to_string_lossy().into_owned();
+            Some((name, std::fs::read_to_string(path).ok()?))
+        })
+        .collect();
+    files.sort();
+    Some(files)
+}
+
+/// The residual that the files' precision allows is reached, or the end has a name.
+fn try_all<P: Registered + Problem<Point = LcpPoint>>(
+    file: &str,
+    problem: &P,
+) -> Vec<&'static str> {
+    let mut solved_by = vec![];
+    for name in ALL {
+        match from(name, &[], problem, problem.origin().z) {
+            Err(refused) => {
+                assert!(refused.is_inapplicable(), "{file} {name}: {refused}");
+                println!("{file:36} {name:15} {refused}");
+            }
+            Ok(solved) => {
+                println!("{file:36} {name:15} {:5} {}", solved.pivots, solved.outcome.status);
+                match solved.outcome.status {
+                    Status::Solved => solved_by.push(name),
+                    Status::Infeasible(proof) => assert!(problem.verify(&proof)),
+                    Status::Stalled(_) | Status::NoConclusion(_) => {}
+                    Status::Limit(limit) => panic!("{file} {name}: {limit:?}"),
+                }
+            }
+        }
+    }
+    solved_by
+}
+
+#[test]
+fn lcp_files() {
+    let Some(files) = corpus("lcp") else { return };
+    for (file, text) in files {
+        let mut tokens = Tokens::new(&text);
+        let n = tokens.index();
+        let Some(m) = tokens.dense() else { continue };
+        let problem = Lcp::new(m, tokens.vector(n)).unwrap();
+        let solved_by = try_all(&file, &problem);
+        if file.contains("isolated_sol_perturbed") {
+            assert!(solved_by.is_empty());
+        } else if file.contains("tobenna") {
+            // Neither P nor sufficient, and too many pairs unless they are asked for.
+            let mut session =
+                registry::session::<Lcp>("enumeration", &from_texts(&["max_pairs=40"]).unwrap());
+            let mut point = problem.origin();
+            let limits = Limits { max_iterations: 500, tolerance: 1e-10, ..Limits::default() };
+            let session = session.as_mut().unwrap();
+            let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+            assert_eq!(outcome.status, Status::Solved);
+        } else {
+            assert!(!solved_by.is_empty(), "{file}");
+            assert!(n > 20 || solved_by.contains(&"enumeration"), "{file}");
+        }
+    }
+}
+
+#[test]
+fn mlcp_files() {
+    let Some(files) = corpus("mlcp") else { return };
+    for (file, text) in files {
+        let mut tokens = Tokens::new(&text);
+        let _ = tokens.vector(2);
+        let (n, m) = (tokens.index(), tokens.index());
+        let _ = tokens.vector(5);
+        let Some(matrix) = tokens.dense() else { continue };
+        if matrix.nrows() != matrix.ncols() {
+            continue;
+        }
+        let problem = Mlcp::new(matrix, tokens.vector(n + m), n).unwrap();
+        let solved_by = try_all(&file, &problem);
+        assert!(m > 20 || solved_by.contains(&"enumeration"), "{file}");
+    }
 }

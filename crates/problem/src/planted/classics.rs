@@ -426,12 +426,8 @@ pub fn two_by_two() -> Classic {
 
 /// Four variables, not symmetric, of P type.
 pub fn ortiz() -> Classic {
-    let m = [
-        [3.0, 1.0, 0.0, -1.0],
-        [-1.0, 2.0, 1.0, 1.0],
-        [0.0, 1.0, 3.0, -1.0],
-        [0.0, 0.0, 1.0, 2.0],
-    ];
+    let m =
+        [[3.0, 1.0, 0.0, -1.0], [-1.0, 2.0, 1.0, 1.0], [0.0, 1.0, 3.0, -1.0], [0.0, 0.0, 1.0, 2.0]];
     let z = [2.0 / 3.0, 0.0, 1.0 / 3.0, 0.0];
     Classic::small("ortiz", m, [-2.0, 1.0, -1.0, 1.0], &[z])
 }
@@ -518,9 +514,8 @@ mod tests {
 
     #[test]
     fn printed_solutions() {
-        let near = |z: &[f64], printed: &[f64]| {
-            z.iter().zip(printed).all(|(z, p)| (z - p).abs() < 6e-7)
-        };
+        let near =
+            |z: &[f64], printed: &[f64]| z.iter().zip(printed).all(|(z, p)| (z - p).abs() < 6e-7);
         let ahn = ahn(8);
         let z = [0.407637, 0.315273, 0.334365, 0.326367, 0.319917, 0.303019, 0.265996, 0.183501];
         assert!(near(ahn.solution().unwrap(), &z));

@@ -33,10 +33,11 @@ const REFINED: f64 = 64.0 * f64::EPSILON;
 /// How often the answer is polished and found not to be one, before the method gives up.
 const POLISHES: usize = 20;
 
-/// Whether M has a row that refutes the problem: `q_r < 0`, `m_rj ≤ 0` for all j (and `= 0` for free variables). Lecture (19).
-pub fn refuting_row(system: &System) -> Option<usize> {
+/// A row of M that refutes the problem: `q_r < 0`, `m_rj ≤ 0` for all j (and `= 0` for free variables). Lecture (19). `candidate`: a buffer.
+pub fn refuting_row(system: &System, candidate: &mut Vec<bool>) -> Option<usize> {
     let free = system.free();
-    let mut candidate: Vec<bool> = system.q.iter().map(|q| *q < 0.0).collect();
+    candidate.clear();
+    candidate.extend(system.q.iter().map(|q| *q < 0.0));
     candidate[..free].fill(false);
     let known = system.matrix.for_each(|i, j, x| {
         if x > 0.0 || (j < free && x != 0.0) {
@@ -200,7 +201,7 @@ impl Tableau {
         self.set.clear();
         self.set.reserve(n);
         (self.impossible, self.count, self.polishes, self.restarts) = (None, 0, 0, 0);
-        self.refuting = refuting_row(system);
+        self.refuting = refuting_row(system, &mut self.wanted);
         self.fill(system);
         self.reset();
         if self.free > 0 {
@@ -237,7 +238,8 @@ impl Tableau {
     fn pair_equations(&mut self, system: &System) {
         let (n, f) = (self.n, self.free);
         // Elimination on a copy of A, in t.
-        let (mut of_column, mut used) = (std::mem::take(&mut self.from), std::mem::take(&mut self.wanted));
+        let (mut of_column, mut used) =
+            (std::mem::take(&mut self.from), std::mem::take(&mut self.wanted));
         of_column[..f].fill(usize::MAX);
         used[..f].fill(false);
         let largest = |t: &[f64], used: &[bool], of: &[usize]| {
@@ -506,7 +508,8 @@ impl Tableau {
 
     /// Exchanges z_i with w_j and z_j with w_i: a 2 × 2 pivot where `t_ii` is zero. False where the block is singular, and nothing done.
     pub fn pivot_pair(&mut self, i: usize, j: usize) -> bool {
-        let variables = [(j, self.entering(j), self.leaving(i)), (i, self.entering(i), self.leaving(j))];
+        let variables =
+            [(j, self.entering(j), self.leaving(i)), (i, self.entering(i), self.leaving(j))];
         self.set.clear();
         self.set.extend([i, j]);
         if !self.exchange_set() {

@@ -74,8 +74,7 @@ impl<P: Complementary> Solver<P> for BardPivoting {
         if tableau.is_lost() {
             return Step::Stuck("numerically singular bases on the way".into());
         }
-        let chosen =
-            if *least { tableau.first_negative(false) } else { tableau.most_negative() };
+        let chosen = if *least { tableau.first_negative(false) } else { tableau.most_negative() };
         let Some(r) = chosen else {
             return match tableau.polish() {
                 Polished::Negative => {
@@ -89,7 +88,9 @@ impl<P: Complementary> Solver<P> for BardPivoting {
             if tableau.freshen() {
                 return Step::Continue { estimate: f64::NAN };
             }
-            return Step::Stuck("a zero on the diagonal of the tableau: M is not a P-matrix".into());
+            return Step::Stuck(
+                "a zero on the diagonal of the tableau: M is not a P-matrix".into(),
+            );
         }
         tableau.pivot(r);
         if cycle.returns(tableau.basis()) {

@@ -81,15 +81,10 @@ impl<P: Complementary> Solver<P> for CrissCrossPivoting {
             d if d < 0.0 => return unpleasant(tableau, Step::Stuck(NOT_SUFFICIENT.into())),
             _ => {
                 tableau.sizes_of_row(r);
-                let eligible = |j: &usize| {
-                    *j != r && tableau.entry(r, *j) > tableau.threshold(*j)
-                };
+                let eligible = |j: &usize| *j != r && tableau.entry(r, *j) > tableau.threshold(*j);
                 let mut pairs = tableau.pairs();
-                let partner = if self.0.descending {
-                    pairs.rfind(eligible)
-                } else {
-                    pairs.find(eligible)
-                };
+                let partner =
+                    if self.0.descending { pairs.rfind(eligible) } else { pairs.find(eligible) };
                 match partner {
                     None => {
                         let proof = tableau.farkas(r);

@@ -72,7 +72,7 @@ impl<P: Complementary> Solver<P> for Enumerate {
     fn work(&self, problem: &P) -> Result<EnumerateWork, SolveError> {
         Ok(EnumerateWork {
             data: Data::new(&problem.mixed(), self.0.max_pairs)?,
-            refuting: problem.system().ok().and_then(|system| refuting_row(&system)),
+            refuting: problem.system().ok().and_then(|system| refuting_row(&system, &mut vec![])),
             open: vec![],
             separating: vec![],
             started: false,
@@ -217,9 +217,7 @@ fn maximal(faces: Vec<Face>) -> Vec<Face> {
     let keep: Vec<bool> = (0..faces.len())
         .map(|i| {
             !(0..faces.len()).any(|k| {
-                k != i
-                    && inside(&faces[i], &faces[k])
-                    && (k < i || !inside(&faces[k], &faces[i]))
+                k != i && inside(&faces[i], &faces[k]) && (k < i || !inside(&faces[k], &faces[i]))
             })
         })
         .collect();
@@ -290,7 +288,8 @@ impl Data {
     /// `Σ columns · x` for values of all columns, as a point of the problem.
     fn unscaled(&self, x: &[f64]) -> Vec<f64> {
         let value = |j: usize| {
-            let at = if j < self.free { self.rows + self.pairs + j } else { self.rows + j - self.free };
+            let at =
+                if j < self.free { self.rows + self.pairs + j } else { self.rows + j - self.free };
             x[at] * self.column_scale[j]
         };
         (0..self.free + self.pairs).map(value).collect()
@@ -605,7 +604,8 @@ impl Case {
             }
             ends.push(case.values(data));
         }
-        let scale = ends.iter().flatten().fold(0.0_f64, |l, x| l.max(x.abs())).max(f64::MIN_POSITIVE);
+        let scale =
+            ends.iter().flatten().fold(0.0_f64, |l, x| l.max(x.abs())).max(f64::MIN_POSITIVE);
         let mean = |j: usize| {
             let points: f64 = ends.iter().map(|x| x[j]).sum::<f64>() / ends.len() as f64;
             points + rays.iter().map(|x: &Vec<f64>| x[j] * scale).sum::<f64>()

@@ -10,7 +10,7 @@ mod murty;
 pub use bard::{Bard, BardPivoting};
 pub use block::{BlockPivoting, BlockPrincipal};
 pub use criss_cross::{CrissCross, CrissCrossPivoting};
-pub use enumeration::{Enumeration, Enumerate, Face, Solutions, all_solutions};
+pub use enumeration::{Enumerate, Enumeration, Face, Solutions, all_solutions};
 pub use keller::{Keller, KellerPivoting};
 pub use murty::{Murty, MurtyPivoting};
 

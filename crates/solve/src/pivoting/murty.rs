@@ -78,7 +78,9 @@ impl<P: Complementary> Solver<P> for MurtyPivoting {
             if tableau.freshen() {
                 return Step::Continue { estimate: f64::NAN };
             }
-            return Step::Stuck("a zero on the diagonal of the tableau: M is not a P-matrix".into());
+            return Step::Stuck(
+                "a zero on the diagonal of the tableau: M is not a P-matrix".into(),
+            );
         }
         tableau.pivot(r);
         if cycle.returns(tableau.basis()) {
