@@ -8,6 +8,7 @@ mod conic;
 mod line_search;
 pub mod nt;
 mod ordering;
+pub mod pairs;
 mod proximal_newton;
 mod pursuit;
 mod sweep;

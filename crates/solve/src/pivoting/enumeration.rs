@@ -17,7 +17,7 @@ use nonsmooth_problem::linalg::{Compensated, Matrix};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::form::{Complementary, Mixed};
+use crate::form::{Complementary, Rows};
 use crate::parts::{equilibrate, refuting_row};
 use crate::settings::Settings;
 use crate::{SolveError, Solver, Step};
@@ -71,7 +71,7 @@ impl<P: Complementary> Solver<P> for Enumerate {
 
     fn work(&self, problem: &P) -> Result<EnumerateWork, SolveError> {
         Ok(EnumerateWork {
-            data: Data::new(&problem.mixed(), self.0.max_pairs)?,
+            data: Data::new(&problem.rowwise(), self.0.max_pairs)?,
             refuting: problem.system().ok().and_then(|system| refuting_row(&system, &mut vec![])),
             open: vec![],
             separating: vec![],
@@ -190,7 +190,7 @@ impl Solutions {
 ///
 /// Errors: an operator, more than 40 pairs.
 pub fn all_solutions(problem: &impl Complementary, limit: usize) -> Result<Solutions, SolveError> {
-    let data = Data::new(&problem.mixed(), 40)?;
+    let data = Data::new(&problem.rowwise(), 40)?;
     let mut faces: Vec<Face> = vec![];
     let mut open: Vec<Case> = Case::root(&data).into_iter().collect();
     while let Some(case) = open.pop() {
@@ -246,8 +246,8 @@ struct Data {
 }
 
 impl Data {
-    fn new(mixed: &Mixed, most: usize) -> Result<Self, SolveError> {
-        let Mixed { matrix, q, equalities, free } = *mixed;
+    fn new(mixed: &Rows, most: usize) -> Result<Self, SolveError> {
+        let Rows { matrix, q, equalities, free, .. } = *mixed;
         if let Matrix::Operator(_) = matrix {
             return Err(SolveError::needs("the entries of M (dense or sparse)", "an operator"));
         }
