@@ -33,10 +33,11 @@ const REFINED: f64 = 64.0 * f64::EPSILON;
 /// How often the answer is polished and found not to be one, before the method gives up.
 const POLISHES: usize = 20;
 
-/// Whether M has a row that refutes the problem: `q_r < 0`, `m_rj ≤ 0` for all j (and `= 0` for free variables). Lecture (19).
-pub fn refuting_row(system: &System) -> Option<usize> {
+/// A row of M that refutes the problem: `q_r < 0`, `m_rj ≤ 0` for all j (and `= 0` for free variables). Lecture (19). `candidate`: a buffer.
+pub fn refuting_row(system: &System, candidate: &mut Vec<bool>) -> Option<usize> {
     let free = system.free();
-    let mut candidate: Vec<bool> = system.q.iter().map(|q| *q < 0.0).collect();
+    candidate.clear();
+    candidate.extend(system.q.iter().map(|q| *q < 0.0));
     candidate[..free].fill(false);
     let known = system.matrix.for_each(|i, j, x| {
         if x > 0.0 || (j < free && x != 0.0) {
@@ -200,7 +201,7 @@ impl Tableau {
         self.set.clear();
         self.set.reserve(n);
         (self.impossible, self.count, self.polishes, self.restarts) = (None, 0, 0, 0);
-        self.refuting = refuting_row(system);
+        self.refuting = refuting_row(system, &mut self.wanted);
         self.fill(system);
         self.reset();
         if self.free > 0 {

@@ -19,7 +19,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::form::{Complementary, System, system};
-use crate::parts::{Cycle, equilibrate, refuting_row};
+use crate::parts::{Cycle, Tableau, equilibrate, refuting_row};
 use crate::settings::Settings;
 use crate::trace::{Pivot, Recorder, Trace, Variable};
 use crate::{SolveError, Solver, Step};
@@ -41,6 +41,9 @@ impl Default for BlockPivoting {
 }
 
 impl Settings for BlockPivoting {}
+
+/// Up to this many variables a dense tableau says which pairs a singular A needs in the first basis.
+const MOST_PAIRED: usize = 2000;
 
 /// The solver.
 #[derive(Debug, Clone, Copy)]
@@ -122,7 +125,7 @@ impl BlockWork {
         let n = system.dim();
         self.free = system.free();
         equilibrate(system.matrix, &mut self.rows, &mut self.columns, &mut self.scratch);
-        self.refuting = refuting_row(system);
+        self.refuting = refuting_row(system, &mut self.basis);
         for x in [&mut self.basis, &mut self.before] {
             x.clear();
             x.resize(n, false);
@@ -306,7 +309,15 @@ impl<P: Complementary> Solver<P> for BlockPrincipal {
             if first && !all() {
                 // The point's basis is no good, or free variables need complementary ones.
                 let plain = work.basis[work.free..].iter().all(|b| !*b);
-                work.basis[work.free..].fill(plain);
+                if plain {
+                    let small = system.dim() <= MOST_PAIRED;
+                    match small.then(|| Tableau::new(&system)) {
+                        Some(Ok(tableau)) => work.basis.copy_from_slice(tableau.basis()),
+                        _ => work.basis.fill(true),
+                    }
+                } else {
+                    work.basis[work.free..].fill(false);
+                }
                 work.steps = usize::from(plain);
                 work.before.copy_from_slice(&work.basis);
                 return Step::Continue { estimate: f64::NAN };

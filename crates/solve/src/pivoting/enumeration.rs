@@ -72,7 +72,7 @@ impl<P: Complementary> Solver<P> for Enumerate {
     fn work(&self, problem: &P) -> Result<EnumerateWork, SolveError> {
         Ok(EnumerateWork {
             data: Data::new(&problem.rowwise(), self.0.max_pairs)?,
-            refuting: problem.system().ok().and_then(|system| refuting_row(&system)),
+            refuting: problem.system().ok().and_then(|system| refuting_row(&system, &mut vec![])),
             open: vec![],
             separating: vec![],
             started: false,

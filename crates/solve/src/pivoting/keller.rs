@@ -52,6 +52,8 @@ pub struct KellerWork {
 }
 
 const NOT_SUFFICIENT: &str = "signs in the tableau show that M is not a sufficient matrix";
+/// λ in units of the most negative value: so far that it rarely blocks, and near enough for rounding.
+const FAR: f64 = 1e3;
 /// Ratios that differ by less, relatively, tie.
 const TIE: f64 = 1e-12;
 
@@ -66,7 +68,7 @@ impl KellerWork {
             self.xi[i] = 0.0;
             self.below[i] = negative;
             self.is_z[i] = self.tableau.basis()[i];
-            self.lambda = self.lambda.min(if negative { 2.0 * self.x[i] } else { 0.0 });
+            self.lambda = self.lambda.min(if negative { FAR * self.x[i] } else { 0.0 });
         }
         self.distinguished = None;
         self.restarts = self.tableau.restarts();
