@@ -314,7 +314,7 @@ fn list_has_every_solver() {
     let list = folder.run("list --json").exits(0).json().remove(0);
     has_keys(&list, "default reformulations/0/name composed/0");
     for solver in list["solvers"].as_array().unwrap() {
-        has_keys(solver, "name family summary kinds/0 needs cites settings");
+        has_keys(solver, "name class family summary kinds/0 needs cites settings");
         for setting in solver["settings"].as_array().unwrap() {
             has_keys(setting, "key default choices help");
         }

@@ -32,6 +32,7 @@ pub mod local;
 pub mod newton;
 pub mod optimisation;
 pub mod parts;
+pub mod pivoting;
 pub mod projection;
 pub mod proximal;
 pub mod reform;
