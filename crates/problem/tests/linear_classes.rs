@@ -388,7 +388,7 @@ fn square(largest: i64) -> impl Strategy<Value = Vec<Vec<i64>>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(1500))]
+    #![proptest_config(ProptestConfig::with_cases(600))]
 
     #[test]
     fn small_integers_are_decided_and_rightly(m in square(2)) {
@@ -545,6 +545,21 @@ fn large_matrices_take_the_time_of_a_factorisation() {
     let m = Matrix::from(Csc::from_triplets(n, n, broken).unwrap());
     let c = of(&m);
     assert!(c.is_not(PositiveSemidefinite) && c.is_not(P) && c.is_not(HPlus), "{c}");
+}
+
+#[test]
+fn a_pattern_that_fills_up_is_left_alone() {
+    // A random graph: factors would be dense.
+    for class in [PlantedClass::CopositivePlus, PlantedClass::Lcprand] {
+        let case = PlantedLcp { n: 60_000, density: 8e-5, class, ..PlantedLcp::default() };
+        let (problem, _) = case.lcp();
+        let c = of(&problem.M);
+        assert!(!c.is_not(Copositive), "{c}");
+        if class == PlantedClass::Lcprand {
+            let unknown = Finding::Unknown { why: Why::Operations };
+            assert_eq!(c.get(PositiveDefinite), &unknown, "{c}");
+        }
+    }
 }
 
 #[test]

@@ -58,6 +58,9 @@ fn by_vector(m: &Matrix) -> Result<Result<How, Witness>, Why> {
         }
         Matrix::Operator(_) => return Err(Why::Operator),
     };
+    if !super::definite::fits(&c) {
+        return Err(Why::Operations);
+    }
     let mut lu = SquareLu::default();
     let mut x = m.diagonal().ok_or(Why::Operator)?;
     if lu.factorise(&c).is_err() {

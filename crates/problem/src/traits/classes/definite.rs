@@ -6,7 +6,8 @@
 
 use std::cmp::Ordering;
 
-use faer::sparse::{SparseColMat, Triplet};
+use faer::sparse::linalg::cholesky::{SymmetricOrdering, factorize_symbolic_cholesky};
+use faer::sparse::{SparseColMat, SymbolicSparseColMatRef, Triplet};
 use faer::{Mat, Side};
 
 use super::finding::{doubled, quadratic, slacks};
@@ -34,6 +35,24 @@ const ELIMINATED: usize = 40;
 const EIGENVALUES: usize = 200;
 /// Steps of Lanczos' method.
 const STEPS: usize = 60;
+
+/// The most entries of a factor: a few hundred megabytes.
+const MOST_ENTRIES: usize = 50_000_000;
+
+/// Whether a sparse factorisation of a matrix with the pattern of `m + mᵀ` stays within bounds; a random graph fills up completely.
+pub(super) fn fits(m: &Matrix) -> bool {
+    let (n, Matrix::Sparse(a)) = (m.nrows(), m) else { return true };
+    if n * n <= MOST_ENTRIES {
+        return true;
+    }
+    let entries = a.triplets().flat_map(|(i, j, _)| [(i, j, 0.0), (j, i, 0.0)]);
+    let Ok(both) = Csc::from_triplets(n, n, entries.filter(|(i, j, _)| i >= j)) else {
+        return false;
+    };
+    let pattern = SymbolicSparseColMatRef::new_checked(n, n, both.col_ptr(), None, both.row_idx());
+    factorize_symbolic_cholesky(pattern, Side::Lower, SymmetricOrdering::Amd, Default::default())
+        .is_ok_and(|symbolic| symbolic.len_val() <= MOST_ENTRIES)
+}
 
 /// Decides at the cost of two Cholesky factorisations.
 pub(super) fn decide(m: &Matrix) -> Definite {
@@ -132,6 +151,9 @@ impl<'a> Part<'a> {
         let k = self.rows.len();
         if k == 0 {
             return Definite::AtLeastSemi(How::Entries, Why::Undecided);
+        }
+        if !fits(self.m) {
+            return Definite::Unknown(Why::Operations);
         }
         let shift = 2.0 * (k + 4) as f64 * f64::EPSILON * self.trace;
         if self.has_cholesky(-shift) {

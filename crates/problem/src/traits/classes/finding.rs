@@ -132,7 +132,7 @@ pub enum Why {
     UpToRounding,
     /// Rounding hides the signs that decide.
     Rounding,
-    /// The exact test takes more operations than were allowed.
+    /// The test takes more operations, or memory, than were allowed.
     Operations,
     /// The tests that apply did not decide.
     Undecided,
@@ -203,7 +203,7 @@ impl fmt::Display for Why {
             Self::Operator => "M is known by its products only",
             Self::UpToRounding => "true up to rounding",
             Self::Rounding => "rounding decides",
-            Self::Operations => "the exact test takes too many operations",
+            Self::Operations => "the test takes too many operations",
             Self::Undecided => "no test decides",
         })
     }

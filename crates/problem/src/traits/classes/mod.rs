@@ -43,9 +43,9 @@ pub struct Effort {
 }
 
 impl Default for Effort {
-    /// Exact up to n = 20 for P, to n = 15 for the others; a second or so.
+    /// Exact up to n = 19 for P, to n = 14 for the others; a second or two at most.
     fn default() -> Self {
-        Self { operations: 8_000_000, thorough: true }
+        Self { operations: 4_000_000, thorough: true }
     }
 }
 
@@ -271,7 +271,7 @@ impl Classes {
                 };
                 let mut x = vec![(i, weights[0]), (j, weights[1])];
                 x.sort_by_key(|e| e.0);
-                if (a.sqrt() * b.sqrt()) * 2.0 < -s * 1.01
+                if a.sqrt() * b.sqrt() * 2.0 * (1.0 + ROUNDING) < -s
                     && (Witness::Direction { x: x.clone() }).refutes(m, Class::Copositive)
                 {
                     down = Some(x);
