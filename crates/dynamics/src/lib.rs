@@ -26,6 +26,7 @@ mod packing;
 mod polyhedron;
 mod scene;
 pub mod scenes;
+mod turning_ball;
 mod vec3;
 mod voronoi;
 
@@ -36,4 +37,5 @@ pub use error::SceneError;
 pub use polyhedron::{MassProperties, Polyhedron};
 pub use scene::{Ground, Gyroscopic, Obstacle, Scene};
 pub use scenes::{SCENES, SceneEntry};
+pub use turning_ball::{BallState, TurningBall};
 pub use vec3::{Mat3, Vec3};

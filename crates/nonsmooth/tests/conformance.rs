@@ -35,7 +35,7 @@ fn nothing_slides(case: &Planted) -> bool {
 }
 
 fn solves<P: Registered>(name: &str) -> Solves {
-    registry::about::<P>(name).expect("a listed solver is described").solves
+    registry::solves::<P>(name).expect("a listed solver is described")
 }
 
 /// The solvers of `P` by name with every set of settings that the registry asks to be tested.

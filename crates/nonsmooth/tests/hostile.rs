@@ -20,7 +20,7 @@ fn statuses<P: Registered + Judged>(problem: &P) -> Vec<(String, Status)> {
         assert_eq!(outcome.status == Status::Solved, verdict.solved, "{name}");
         (name, outcome.status)
     };
-    let of_the_law = |name: &String| registry::about::<P>(name).unwrap().solves == Solves::Law;
+    let of_the_law = |name: &String| registry::solves::<P>(name) == Some(Solves::Law);
     registry::solver_names::<P>().into_iter().filter(of_the_law).map(solve).collect()
 }
 

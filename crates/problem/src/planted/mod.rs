@@ -1,5 +1,6 @@
 //! Instances with a known solution, of any size, and models whose optima are published.
 
+pub mod classics;
 mod friction;
 mod linear;
 mod obstacle;

@@ -7,7 +7,7 @@
 //! | --- | --- | --- |
 //! | [`Membrane`] | a membrane between obstacles | MoreToraldo1991 |
 //! | [`torsion`] | elastic-plastic torsion of a square bar | MoreToraldo1991 |
-//! | [`JournalBearing`] | pressure in a journal bearing | Cryer1971; MoreToraldo1991 |
+//! | [`JournalBearing`] | pressure in a journal bearing | MoreToraldo1991 |
 
 use std::f64::consts::TAU;
 use std::sync::Arc;

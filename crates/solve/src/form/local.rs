@@ -84,12 +84,23 @@ impl<const D: usize> Eliminated<D> {
 }
 
 impl<const D: usize> LocalState<D> {
+    /// W and q, without the bilateral constraints where the problem has any.
     #[inline(always)]
-    pub(super) fn operator<'a>(&'a self, problem: &'a FrictionLocal<D>) -> (&'a Bsr<D>, &'a [f64]) {
+    pub fn operator<'a>(&'a self, problem: &'a FrictionLocal<D>) -> (&'a Bsr<D>, &'a [f64]) {
         match &self.eliminated {
             None => (&problem.W, &problem.q),
             Some(e) => (&e.w, &e.q),
         }
+    }
+
+    /// The multipliers with which the bilateral constraints feel no motion from the impulses r: `Vᵀ r + R λ = 0`. Allocates.
+    pub fn multipliers(&self, r: &[f64]) -> Vec<f64> {
+        let Some(e) = &self.eliminated else { return vec![] };
+        let mut lambda = vec![0.0; e.lambda.len()];
+        e.v.mul_transpose_add(-1.0, r, &mut lambda);
+        let mut scratch = vec![0.0; e.scratch.len()];
+        e.r_inverse.solve_with(&mut lambda, &mut scratch, Refine::Fully);
+        lambda
     }
 }
 

@@ -60,7 +60,13 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
         memo.contradiction.clone().map(Certificate::from)
     }
 
-    fn lower(&self, _: &FrictionGlobal<D>, point: &GlobalPoint, reduced: &mut LocalPoint) {
+    fn lower(
+        &self,
+        _: &FrictionGlobal<D>,
+        point: &GlobalPoint,
+        _: &CondenseMemo,
+        reduced: &mut LocalPoint,
+    ) {
         reduced.r.clone_from(&point.r);
     }
 

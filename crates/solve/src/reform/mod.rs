@@ -1,11 +1,19 @@
 //! Reformulations: problem → problem, with the way back.
 
 mod condense;
+pub mod facets;
+mod mixed;
+mod reduce;
+mod split;
 
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Certificate;
 
 pub use condense::Condense;
+pub use facets::{FacetInner, FacetOuter, Facets};
+pub use mixed::Mixed;
+pub use reduce::Reduce;
+pub use split::Split;
 
 use crate::SolveError;
 
@@ -41,8 +49,20 @@ pub trait Reformulation<P: Problem>: Send {
         certificate
     }
 
+    /// What is to be said when the other problem is solved and the first is not, of a reformulation whose solutions are those of the first problem only
+    /// nearly: then the other problem's own judge is asked as well, since the first one's may never be content.
+    fn approximates(&self) -> Option<&'static str> {
+        None
+    }
+
     /// A point of the first problem as a starting point of the other.
-    fn lower(&self, problem: &P, point: &P::Point, reduced: &mut <Self::To as Problem>::Point);
+    fn lower(
+        &self,
+        problem: &P,
+        point: &P::Point,
+        memo: &Self::Memo,
+        reduced: &mut <Self::To as Problem>::Point,
+    );
 
     /// A point of the other problem as a point of the first.
     fn lift(

@@ -6,6 +6,7 @@ use nonsmooth_problem::check::Kinematic;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal};
 
 use super::abouts::*;
+use super::facets::{facet_names, faceted, nearly};
 use super::{About, Direct, Entry, Made, Registered, Through, Visitor, find, names};
 use crate::auto::Hybrid;
 use crate::cfun::ContactFunction;
@@ -156,11 +157,18 @@ macro_rules! register {
             }
 
             fn composed_names() -> Vec<String> {
-                around_names::<Self, $d>()
+                let mut all = around_names::<Self, $d>();
+                all.extend(facet_names(""));
+                all
             }
 
             fn make(name: &str, settings: &SettingsMap) -> Made<Self> {
-                contact_session::<Self, $d>(name, settings)
+                faceted::<$d, _>(name, settings, Direct(PhantomData))
+                    .or_else(|| contact_session::<Self, $d>(name, settings))
+            }
+
+            fn nearly(name: &str) -> bool {
+                nearly::<$d>(name)
             }
         }
 
@@ -173,17 +181,25 @@ macro_rules! register {
                 let local = contact_solvers::<$d, Direct<FrictionLocal<$d>>>();
                 let mut all = names(&local, "condense/");
                 all.extend(around_names::<Self, $d>());
+                all.extend(facet_names("condense/"));
                 all
             }
 
             fn make(name: &str, settings: &SettingsMap) -> Made<Self> {
                 match name.split_once('/') {
+                    Some(("condense", solver)) if solver.contains('/') => {
+                        faceted::<$d, _>(solver, settings, Through(Condense, PhantomData))
+                    }
                     Some(("condense", solver)) => {
                         let entry = find(contact_solvers::<$d, _>(), solver)?;
                         Some((entry.build)(settings, Through(Condense, PhantomData)))
                     }
                     _ => contact_session::<Self, $d>(name, settings),
                 }
+            }
+
+            fn nearly(name: &str) -> bool {
+                nearly::<$d>(name)
             }
         }
     };

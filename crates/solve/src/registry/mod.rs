@@ -4,17 +4,20 @@
 
 mod abouts;
 mod contact;
+mod facets;
 mod linear;
 pub mod linear_abouts;
 
 use std::marker::PhantomData;
 
-use nonsmooth_problem::{Kind, Problem};
+use nonsmooth_problem::{Kind, Lcp, Mlcp, Problem};
 use serde::Serialize;
 
 pub use abouts::*;
+pub use facets::{FACET_INNER, FACET_OUTER};
 
 use crate::proximal::ProximalPoint;
+use crate::reform::Facets;
 use crate::settings::{Setting, SettingsMap, described};
 use crate::{Driver, Reformulation, Session, SolveError, Solver, Via};
 
@@ -125,6 +128,11 @@ pub trait Registered: Problem + Sized + 'static {
 
     /// A session of the solver of this name, composed or not; `None` where there is none.
     fn make(name: &str, settings: &SettingsMap) -> Made<Self>;
+
+    /// Whether a composed name contains a reformulation whose answers obey the problem's law only nearly.
+    fn nearly(_name: &str) -> bool {
+        false
+    }
 }
 
 /// A session, if there is such a solver and its settings are right.
@@ -154,6 +162,41 @@ pub const PREFIXES: &[Prefix] = &[
         cites: &["Rockafellar1976", "AcaryBremondHuber2018"],
         settings: described::<ProximalPoint>,
     },
+    Prefix {
+        name: "reduce",
+        summary: "MLCP to LCP: the free variables eliminated, M = B - D A^-1 C, where A is invertible",
+        from: &[Kind::Mlcp],
+        cites: &["Acary2018"],
+        settings: Vec::new,
+    },
+    Prefix {
+        name: "split",
+        summary: "box LCP to MLCP: bounds by shifts, second bounds by multipliers",
+        from: &[Kind::BoxLcp],
+        cites: &["Acary2018"],
+        settings: Vec::new,
+    },
+    Prefix {
+        name: "mixed",
+        summary: "horizontal LCP to MLCP: s is a free variable",
+        from: &[Kind::Hlcp],
+        cites: &["Acary2018"],
+        settings: Vec::new,
+    },
+    Prefix {
+        name: FACET_INNER,
+        summary: "contact to LCP: the disk of friction becomes an inscribed polygon; exact in the plane, an approximation in space",
+        from: &[Kind::FrictionLocal2d, Kind::FrictionLocal3d],
+        cites: &["StewartTrinkle1996", "AnitescuPotra1997", "Acary2018"],
+        settings: described::<Facets>,
+    },
+    Prefix {
+        name: FACET_OUTER,
+        summary: "contact to MLCP: the disk of friction becomes a circumscribed polygon; exact in the plane, an approximation in space",
+        from: &[Kind::FrictionLocal2d, Kind::FrictionLocal3d],
+        cites: &["Klarbring1986", "Acary2018"],
+        settings: described::<Facets>,
+    },
 ];
 
 fn find<V: Visitor>(entries: Vec<Entry<V>>, name: &str) -> Option<Entry<V>> {
@@ -178,8 +221,24 @@ pub fn solver_names<P: Registered>() -> Vec<String> {
 
 /// The description behind a name, composed or not.
 pub fn about<P: Registered>(name: &str) -> Option<&'static About> {
-    let last = name.rsplit('/').next().unwrap_or(name);
-    abouts::<P>().into_iter().find(|a| a.name == last)
+    let (path, last) = name.rsplit_once('/').unwrap_or(("", name));
+    let before = path.rsplit('/').next().unwrap_or(path);
+    behind(before).unwrap_or_else(P::abouts).into_iter().find(|a| a.name == last)
+}
+
+/// The solvers behind a prefix that leads to problems of another kind, with solvers of their own.
+fn behind(prefix: &str) -> Option<Vec<&'static About>> {
+    match prefix {
+        FACET_INNER | "reduce" => Some(Lcp::abouts()),
+        FACET_OUTER | "split" | "mixed" => Some(Mlcp::abouts()),
+        _ => None,
+    }
+}
+
+/// What the answers of the solver behind a name, composed or not, are solutions of.
+pub fn solves<P: Registered>(name: &str) -> Option<Solves> {
+    let solves = about::<P>(name)?.solves;
+    Some(if P::nearly(name) { Solves::Relaxation } else { solves })
 }
 
 /// A session of the solver called `name`, with the settings given and defaults for the rest.

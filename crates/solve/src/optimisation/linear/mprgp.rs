@@ -37,7 +37,7 @@ pub struct Mprgp {
 
 impl Default for Mprgp {
     fn default() -> Self {
-        Self { gamma: 1.0, expansion: 1.9, check_every: 50 }
+        Self { gamma: 2.0, expansion: 1.9, check_every: 50 }
     }
 }
 
@@ -93,8 +93,8 @@ struct Gradients {
     residual: f64,
 }
 
-/// Steps after which w is computed anew.
-const DRIFT: usize = 100;
+/// Steps after which w is computed anew; the direction stays, for a new start would cost more than what it corrects.
+const DRIFT: usize = 50;
 
 /// The largest `|M_ij − M_ji|`, in units of the largest entry, of a matrix that counts as symmetric.
 const SYMMETRIC: f64 = 1e-12;
@@ -131,7 +131,7 @@ impl<P: Bounded> Solver<P> for Proportioning {
         let z = &mut point.z;
         work.steps += 1;
         if work.steps.is_multiple_of(DRIFT) {
-            work.renew(&system, z);
+            work.gradient(&system, z);
         }
         let proportional = work.at.chopped <= self.0.gamma.powi(2) * work.at.reduced;
         if !proportional {
@@ -238,10 +238,15 @@ impl ProportioningWork {
         if norm > 0.0 && norm.is_finite() { 1.1 * norm } else { 1.0 }
     }
 
-    /// `w = M z + q`, and the direction from there.
-    fn renew(&mut self, system: &System, z: &[f64]) {
+    /// `w = M z + q`.
+    fn gradient(&mut self, system: &System, z: &[f64]) {
         product(system.matrix, z, &mut self.g);
         self.g.iter_mut().zip(system.q).for_each(|(g, q)| *g += q);
+    }
+
+    /// w, and the direction from there.
+    fn renew(&mut self, system: &System, z: &[f64]) {
+        self.gradient(system, z);
         self.free_direction(&system.bounds, z);
     }
 

@@ -4,7 +4,8 @@
 //!
 //! Method: `z_i ← P(z_i − ω/M_ii (q_i + Σ_{j<i} M_ij z_j^new + Σ_{j≥i} M_ij z_j^old))`, ω in (0, 2). With `adapt`, ω follows the rate λ at which the moves
 //! shrink: Young's relation `(λ + ω − 1)² = λ ω² μ²` gives the spectral radius μ of the Jacobi iteration on the present face, and that the
-//! best `ω = 2/(1 + √(1 − μ²))`; on grids this takes O(n) sweeps for n points a side where ω = 1 takes O(n²).
+//! best `ω = 2/(1 + √(1 − μ²))`; on grids this takes O(n) sweeps for n points a side where ω = 1 takes O(n²). Where the relation does not hold, the new ω is measured
+//! against the old one, and the better stays.
 //!
 //! References: Acary2018 (12)(13), the latter with the second sum over j ≥ i; Cryer1971; CottlePangStone2009, chapter 5; HagemanYoung1981, chapter 9, for ω.
 //!
@@ -27,7 +28,7 @@ use crate::{SolveError, Solver, Step};
 pub struct Psor {
     /// Relaxation: the step in units of the one that solves the row, in (0, 2). With adapt, the first one.
     pub omega: f64,
-    /// Whether omega follows the observed rate of convergence. For symmetric M and for matrices like those of grids.
+    /// Whether omega follows the observed rate of convergence, with direction=forward; pays for matrices like those of grids.
     pub adapt: bool,
     /// The order of the visits.
     pub direction: Direction,
@@ -37,16 +38,13 @@ pub struct Psor {
 
 impl Default for Psor {
     fn default() -> Self {
-        Self { omega: 1.3, adapt: false, direction: Direction::Forward, check_every: 50 }
+        Self { omega: 1.3, adapt: true, direction: Direction::Forward, check_every: 50 }
     }
 }
 
 impl Settings for Psor {
     fn validate(&self) -> Result<(), String> {
         validate_omega(self.omega)?;
-        if self.adapt && self.direction != Direction::Forward {
-            return Err("adapt: expected false with direction=symmetric, found true".into());
-        }
         validate_check(self.check_every)
     }
 }
@@ -66,19 +64,31 @@ pub struct RelaxationWork {
     rate: Rate,
 }
 
-/// The present ω, and the moves of the last sweeps: what adapting ω goes by.
+/// The present ω and what has been seen of its rate: what adapting ω goes by.
 #[derive(Debug, Clone, Copy, Default)]
 struct Rate {
     omega: f64,
+    /// Sweeps since ω changed.
+    age: usize,
+    /// The moves of the last sweep.
     moves: f64,
     /// The last ratio of two moves.
     ratio: f64,
-    /// Sweeps since ω changed.
-    age: usize,
+    /// The moves at the beginning of the second window.
+    mark: f64,
+    /// The ω before this one, and its rate.
+    other: Option<(f64, f64)>,
+    /// The rate of `other` was measured as the present one is, and was the worse.
+    returned: bool,
+    /// ω stays.
+    settled: bool,
 }
 
-/// Sweeps that a new ω is given before the rate is read, and after which it is read even if it has not settled.
+/// Sweeps that a new ω is given before its rate is read.
 const YOUNG: usize = 10;
+
+/// The largest ω that is tried: what Young's relation overstates costs more than what it understates.
+const LARGEST: f64 = 1.995;
 
 impl<P: Bounded> Solver<P> for Relaxation {
     type Work = RelaxationWork;
@@ -97,6 +107,7 @@ impl<P: Bounded> Solver<P> for Relaxation {
         let bounds = system(problem).bounds;
         point.z.iter_mut().enumerate().for_each(|(i, z)| *z = bounds.project(i, *z));
         work.backward = false;
+        work.rate = Rate::default();
         work.relax(&system(problem), self.0.omega);
     }
 
@@ -111,6 +122,7 @@ impl<P: Bounded> Solver<P> for Relaxation {
         let moves = sum.sqrt();
         let estimate = moves / (*scale * rate.omega);
         if self.0.adapt
+            && self.0.direction == Direction::Forward
             && let Some(omega) = rate.next(moves)
         {
             work.relax(&system, omega);
@@ -135,7 +147,7 @@ impl Relaxation {
 impl RelaxationWork {
     /// Takes another ω.
     fn relax(&mut self, system: &System, omega: f64) {
-        self.rate = Rate { omega, ..Rate::default() };
+        self.rate = Rate { omega, age: 0, ..self.rate };
         self.step.clear();
         self.step.extend(self.rows.diagonal.iter().enumerate().map(|(i, &d)| {
             // A fixed variable goes to its place whatever its row says.
@@ -145,21 +157,51 @@ impl RelaxationWork {
 }
 
 impl Rate {
-    /// Takes the moves of a sweep; the ω that they suggest, where it is time for another one.
+    /// Takes the moves of a sweep; another ω, where it is time for one.
     fn next(&mut self, moves: f64) -> Option<f64> {
         let ratio = moves / self.moves;
-        let settled = (ratio - self.ratio).abs() <= 0.1 * (1.0 - ratio).abs();
+        let steady = (ratio - self.ratio).abs() <= 0.1 * (1.0 - ratio).abs();
         (self.moves, self.ratio, self.age) = (moves, ratio, self.age + 1);
+        if self.settled {
+            return None;
+        }
+        // The slowest mode shows after some 1/(2 − ω) sweeps.
+        let window = YOUNG + (3.0 / (2.0 - self.omega)) as usize;
+        if self.age == window {
+            self.mark = moves;
+        } else if self.age == 2 * window {
+            return self.compare((moves / self.mark).powf(1.0 / window as f64));
+        }
+        if self.returned || self.age < YOUNG || !steady {
+            return None;
+        }
         // With ω above the best one the moves oscillate, and their rate ω − 1 says no more of μ.
-        let legible = ratio < 1.0 && ratio > (self.omega - 1.0) * 1.02;
-        if self.age < YOUNG || !settled || !legible {
+        if !(ratio < 1.0 && ratio > (self.omega - 1.0) * 1.02) {
             return None;
         }
         let omega = self.omega;
         let mu = (ratio + omega - 1.0) / (omega * ratio.sqrt()); //  (λ + ω − 1)² = λ ω² μ²
         let best = 2.0 / (1.0 + (1.0 - mu * mu).max(1e-10).sqrt());
-        // What the relation overstates costs more than what it understates: stop short of 2.
-        let next = best.min(1.995);
-        ((2.0 - next) < 0.9 * (2.0 - omega)).then_some(next)
+        let next = best.min(LARGEST);
+        ((2.0 - next) < 0.9 * (2.0 - omega)).then(|| {
+            self.other = Some((omega, ratio));
+            next
+        })
+    }
+
+    /// The rate of the present ω has been measured: back to the other one, if that was better. The rate of the other may have been read
+    /// too early; so it is measured as well before it is believed.
+    fn compare(&mut self, rate: f64) -> Option<f64> {
+        match self.other.take() {
+            Some((omega, better)) if better < rate || rate.is_nan() => {
+                self.other = (!self.returned).then_some((self.omega, rate));
+                self.returned = !self.returned;
+                Some(omega)
+            }
+            other => {
+                self.settled = other.is_some() && self.returned;
+                None
+            }
+        }
     }
 }

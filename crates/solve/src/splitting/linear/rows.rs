@@ -23,14 +23,12 @@ pub enum Direction {
     Symmetric,
 }
 
-/// The entries of M by rows, its diagonal and the sizes of its rows.
+/// The entries of M by rows, and its diagonal.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rows {
     sparse: SparseRows,
     /// `M_ii`.
     pub diagonal: Vec<f64>,
-    /// `Σ_j |M_ij|`.
-    pub sums: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -90,10 +88,6 @@ impl Rows {
             }
             Matrix::Operator(_) => {}
         }
-        self.sums.clear();
-        self.sums.resize(n, 0.0);
-        let sums = &mut self.sums;
-        system.matrix.for_each(|i, _, x| sums[i] += x.abs());
         Ok(())
     }
 

@@ -21,7 +21,7 @@ use crate::settings::Settings;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rpgs {
-    /// The regularisation ρ_i in units of `Σ_j |M_ij|`, positive. With adapt, the first one.
+    /// The regularisation in units of the balanced row sums of |M|, positive. With adapt, the first one.
     pub rho: f64,
     /// Whether rho follows the number of sweeps that the inner problems take.
     pub adapt: bool,

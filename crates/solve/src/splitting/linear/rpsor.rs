@@ -3,8 +3,8 @@
 //! Problem: `−w_i ∈ N_[l_i, u_i](z_i)`, `w = M z + q`; an LCP is `l = 0, u = ∞`.
 //!
 //! Method: the proximal point method solves `−(w + R (z − z̃)) ∈ N(z)`, R = diag(ρ_i), and moves the centre z̃ to the solution; here by sweeps
-//! `z_i ← P(z_i − ω/(M_ii + ρ_i) (w_i + ρ_i (z_i − z̃_i)))` until their moves are a fraction of the proximal move `R (z − z̃)`. `ρ_i = rho Σ_j |M_ij|` makes
-//! `M + R` diagonally dominant for rho ≥ 1; rho falls while the sweeps need few steps, and rises, for good, where they do not converge. Equalities are taken with the sign
+//! `z_i ← P(z_i − ω/(M_ii + ρ_i) (w_i + ρ_i (z_i − z̃_i)))` until their moves are a fraction of the proximal move `R (z − z̃)`. `ρ_i = rho/s_i²`, where
+//! the scales s make all rows of `s_i |M_ij| s_j` sum to about 1: that does not depend on units, and `M + R` is about diagonally dominant for rho = 1. rho falls while the sweeps need few steps, and rises, for good, where they do not converge. Equalities are taken with the sign
 //! that suits a monotone problem.
 //!
 //! References: Acary2018 (14)(15), the latter with `+ρ(z_i − z̃_i)`; Rockafellar1976.
@@ -27,7 +27,7 @@ use crate::{SolveError, Solver, Step};
 pub struct Rpsor {
     /// Relaxation of the sweeps, in (0, 2).
     pub omega: f64,
-    /// The regularisation ρ_i in units of `Σ_j |M_ij|`, positive. With adapt, the first one.
+    /// The regularisation in units of the balanced row sums of |M|, positive. With adapt, the first one.
     pub rho: f64,
     /// Whether rho follows the number of sweeps that the inner problems take.
     pub adapt: bool,
@@ -77,6 +77,8 @@ pub struct ProximalWork {
     signs: Vec<f64>,
     /// z̃.
     center: Vec<f64>,
+    /// ρ_i for rho = 1.
+    unit: Vec<f64>,
     /// ρ_i, with the sign of the row.
     rho: Vec<f64>,
     /// `ω / (M_ii + ρ_i)`, with the sign of the row.
@@ -102,6 +104,9 @@ struct Inner {
 /// Inner sweeps after which rho may fall, and after which it rises.
 const FEW: usize = 6;
 const MANY: usize = 60;
+
+/// Sweeps that balance |M|.
+const BALANCES: usize = 8;
 
 impl<P: Bounded> Solver<P> for Proximal {
     type Work = ProximalWork;
@@ -179,19 +184,43 @@ impl ProximalWork {
         }
         self.rows.signs(system, &mut self.signs);
         self.scale = system.scale();
-        // A row of zeros is regularised like the others are on average.
-        let sums = &mut self.rows.sums;
-        let mean = sums.iter().sum::<f64>() / sums.len() as f64;
-        let mean = if mean > 0.0 { mean } else { 1.0 };
-        sums.iter_mut().filter(|s| **s == 0.0).for_each(|s| *s = mean);
+        self.equilibrate(system);
         Ok(())
+    }
+
+    /// `unit_i = 1/s_i²` such that the rows of `s_i |M_ij| s_j`, M taken symmetrically, have the sum 1, as far as some sweeps get.
+    fn equilibrate(&mut self, system: &System) {
+        let Self { unit, rho: sums, step: s, .. } = self;
+        let n = system.dim();
+        s.clear();
+        s.resize(n, 1.0);
+        for _ in 0..BALANCES {
+            sums.clear();
+            sums.resize(n, 0.0);
+            system.matrix.for_each(|i, j, x| {
+                let half = 0.5 * x.abs() * s[i] * s[j];
+                sums[i] += half;
+                sums[j] += half;
+            });
+            let balanced =
+                |(s, sum): (&mut f64, &f64)| *s /= if *sum > 0.0 { sum.sqrt() } else { 1.0 };
+            s.iter_mut().zip(&*sums).for_each(balanced);
+        }
+        unit.clear();
+        unit.extend(s.iter().map(|s| 1.0 / (s * s)));
+        // A variable that nothing depends on is regularised like the others are on average.
+        let known = || sums.iter().zip(&*unit).filter(|(sum, _)| **sum > 0.0);
+        let mean = known().map(|(_, unit)| unit).sum::<f64>() / known().count().max(1) as f64;
+        let mean = if mean > 0.0 { mean } else { 1.0 };
+        let unknown = unit.iter_mut().zip(&*sums).filter(|(_, sum)| **sum == 0.0);
+        unknown.for_each(|(unit, _)| *unit = mean);
     }
 
     /// Takes another rho.
     fn regularise(&mut self, system: &System, omega: f64) {
-        let Self { rows, signs, rho, step, inner, .. } = self;
+        let Self { rows, signs, unit, rho, step, inner, .. } = self;
         rho.clear();
-        rho.extend(rows.sums.iter().zip(&*signs).map(|(sum, sign)| sign * inner.rho * sum));
+        rho.extend(unit.iter().zip(&*signs).map(|(unit, sign)| sign * inner.rho * unit));
         step.clear();
         step.extend(rows.diagonal.iter().zip(&*rho).enumerate().map(|(i, (&d, &rho))| {
             if is_fixed(&system.bounds, i) { 0.0 } else { omega / (d + rho) }
