@@ -153,6 +153,22 @@ fn problems_are_generated_with_the_solution_planted() {
 }
 
 #[test]
+fn auto_solves_the_examples_or_proves_that_there_is_no_solution() {
+    let folder = folder();
+    folder
+        .run("solve string.toml rectifier.toml blocks.toml horizontal.toml --tol 1e-10 --quiet")
+        .exits(0);
+    let text = folder.run("solve impossible.toml").exits(1).stdout;
+    assert!(
+        text.starts_with("impossible.toml: infeasible: ") && text.contains("verified certificate"),
+        "{text}"
+    );
+    let line = first(folder.run("solve impossible.toml --json").exits(1));
+    assert_eq!(line["status"], "infeasible");
+    has_keys(&line, "certificate/proof");
+}
+
+#[test]
 fn a_solution_is_a_start() {
     let folder = folder();
     let iterations = |arguments: &str| {
@@ -179,6 +195,20 @@ fn the_trace_and_the_plot_are_written() {
     assert_eq!(trace["method"], "none");
     let svg = std::fs::read_to_string(folder.path("a.svg")).unwrap();
     assert!(svg.contains("projected_jacobi on lcp_two.dat"));
+    let run = "solve string.toml --solver lemke --trace b.json --plot b.svg --quiet";
+    folder.run(run).exits(0);
+    let trace: Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path("b.json")).unwrap()).unwrap();
+    assert_eq!(trace["method"], "pivots");
+    has_keys(&trace, "rows/0/iteration rows/0/entering rows/0/leaving rows/0/ratio rows/0/z0");
+    assert!(std::fs::read_to_string(folder.path("b.svg")).unwrap().contains("z0"));
+    let run = "solve string.toml --solver ip_mehrotra --trace c.json --plot c.svg --quiet";
+    folder.run(run).exits(0);
+    let trace: Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path("c.json")).unwrap()).unwrap();
+    assert_eq!(trace["method"], "path");
+    has_keys(&trace, "rows/0/mu rows/0/delta rows/0/step rows/0/residual");
+    assert!(std::fs::read_to_string(folder.path("c.svg")).unwrap().contains("centrality delta"));
     let several = "solve lcp_two.dat string.toml --solver projected_jacobi --trace all/ --quiet";
     folder.run(several).exits(0);
     assert!(
@@ -201,6 +231,8 @@ fn info_describes_the_matrix() {
         "blocks.toml: box_lcp, 3 variables, 3 lower bounds and 3 upper",
         "horizontal.toml: hlcp, 2 pairs",
         "solution   stored, passes at 1e-8",
+        "M is       symmetric, Z, ",
+        "murty: M is ",
     ] {
         assert!(text.contains(part), "{part} in {text}");
     }

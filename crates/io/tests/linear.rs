@@ -490,7 +490,7 @@ fn damaged_files_never_panic() {
     ];
     for (name, text) in texts {
         let path = folder.path(name);
-        let mut read = |bytes: &[u8]| {
+        let read = |bytes: &[u8]| {
             std::fs::write(&path, bytes).unwrap();
             if let Err(e) = read_any(&path) {
                 assert!(!e.to_string().contains('\n'), "{e}");

@@ -5,7 +5,9 @@ use std::path::Path;
 use nonsmooth_io::linear::LinearFile;
 use nonsmooth_problem::check::{Judged, RowCounts, RowStatus, Verdict};
 use nonsmooth_problem::linalg::Matrix;
+use nonsmooth_problem::traits::{Classes, Effort, Finding};
 use nonsmooth_problem::{Complementarity, Mlcp, with_complementarity};
+use nonsmooth_solve::guarantees::{Guarantee, guaranteed};
 use serde_json::{Value, json};
 
 use super::{JUDGED_AT, symmetry, texts};
@@ -18,6 +20,10 @@ pub(super) struct Facts {
     size_text: String,
     matrices: Vec<(&'static str, Entries)>,
     q: Right,
+    /// What is known of M; of problems that have no other.
+    classes: Option<Classes>,
+    /// The solvers that are sure to work; of an LCP.
+    guaranteed: Vec<Guarantee>,
     solution: Option<Verdict<RowStatus, RowCounts>>,
 }
 
@@ -61,7 +67,18 @@ pub(super) fn facts(file: &Path, content: &LinearFile) -> Result<Facts, String> 
         let judge = |stored| p.judge(&p.point(stored), JUDGED_AT);
         content.solution.as_ref().map(judge).transpose()
     });
+    let classes = match &content.problem {
+        Complementarity::Lcp(p) => Some(classes(&p.M)),
+        Complementarity::Box(p) => Some(classes(&p.M)),
+        Complementarity::Mlcp(_) | Complementarity::Hlcp(_) => None,
+    };
+    let guaranteed = match (&content.problem, &classes) {
+        (Complementarity::Lcp(_), Some(classes)) => guaranteed(classes),
+        _ => vec![],
+    };
     Ok(Facts {
+        classes,
+        guaranteed,
         sizes: with_complementarity!(&content.problem, p => report::problem_json(file, p)),
         size_text: with_complementarity!(&content.problem, p => report::problem_text(p)),
         matrices,
@@ -72,6 +89,33 @@ pub(super) fn facts(file: &Path, content: &LinearFile) -> Result<Facts, String> 
         },
         solution: solution.map_err(|e| format!("{}: {e}", file.display()))?,
     })
+}
+
+/// What the entries, a few factorisations, and of small matrices exact tests say of M.
+fn classes(m: &Matrix) -> Classes {
+    /// Rows above which more than a factorisation or two takes long.
+    const MANY: usize = 2000;
+    match m.nrows() {
+        0..=MANY => Classes::of(m, Effort::default()),
+        _ => Classes::quick(m),
+    }
+}
+
+/// Classes in three lines: those that M is in, is not in, and those of which nothing is known.
+fn classes_text(text: &mut String, classes: &Classes) {
+    let (mut is, mut is_not, mut unknown) = (vec![], vec![], vec![]);
+    for (class, finding) in classes.iter() {
+        match finding {
+            Finding::Proven { .. } => is.push(class.to_string()),
+            Finding::Refuted { witness, .. } => is_not.push(format!("{class} ({witness})")),
+            Finding::Unknown { why } => unknown.push(format!("{class} ({why})")),
+        }
+    }
+    for (label, all) in [("M is", is), ("M is not", is_not), ("unknown", unknown)] {
+        if !all.is_empty() {
+            row(text, label, all.join(", "));
+        }
+    }
 }
 
 /// The blocks of a mixed problem.
@@ -201,6 +245,8 @@ impl Facts {
             "description": content.description,
             "matrices": matrices,
             "q": {"negative": self.q.negative, "zero": self.q.zero, "norm": self.q.norm},
+            "classes": self.classes,
+            "guaranteed": self.guaranteed,
             "solution": self.solution.as_ref().map(|v| report::verdict_json(v, JUDGED_AT, v.worst.len())),
         })));
         Value::Object(all)
@@ -212,6 +258,12 @@ impl Facts {
         texts(&mut text, &content.title, &content.description);
         for (name, m) in &self.matrices {
             row(&mut text, name, m.text());
+        }
+        if let Some(classes) = &self.classes {
+            classes_text(&mut text, classes);
+        }
+        for (k, guarantee) in self.guaranteed.iter().enumerate() {
+            row(&mut text, if k == 0 { "sure" } else { "" }, guarantee);
         }
         let Right { negative, zero, norm } = self.q;
         let trivial = match (&content.problem, negative) {

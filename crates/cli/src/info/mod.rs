@@ -16,6 +16,9 @@ use crate::{Exit, files, interrupt, output};
 ///
 /// The contact density is c = D nc / n, the components of the contact impulses over the degrees of freedom:
 /// above 1 the impulses need not be unique (hyperstatic), and iterative solvers slow down.
+///
+/// Of the matrix of a linear complementarity problem: in which classes it surely is or is not, with a witness, and which
+/// solvers are therefore sure to end in a solution.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {

@@ -57,7 +57,8 @@ fn pivots(rows: &[Pivot]) -> [Panel; 2] {
             Variable::Artificial => Some(0.0),
         }),
     };
-    let ratio = curve("|ratio|", TOLERANCE, true, &|p| Some(p.ratio.abs()));
+    let ratio =
+        curve("|ratio|, zeros at the lower edge", TOLERANCE, true, &|p| Some(p.ratio.abs()));
     [
         Panel { x: "pivots", logarithmic: false, curves: vec![left] },
         Panel { x: "pivots", logarithmic: true, curves: vec![ratio] },
@@ -103,7 +104,8 @@ impl Panel {
         }
         let high = (high + 0.1).ceil();
         let low = heights().fold(f64::INFINITY, f64::min).max(high - DEPTH);
-        (low.floor().min(high - 1.0), high)
+        // A zero lies at the lower edge, so nothing else does.
+        ((low - 0.3).floor().min(high - 1.0), high)
     }
 
     /// The height of a value; none where it is not a number.
