@@ -167,7 +167,7 @@ impl Solutions {
     }
 }
 
-/// Lists every solution of an LCP or MLCP: isolated ones as points, others as families. Stops, and says so, after `limit` patterns with solutions.
+/// Lists every solution of an LCP or MLCP: isolated ones as points, in lexicographic order, then families. Stops, and says so, after `limit` patterns with solutions.
 ///
 /// ```
 /// use nonsmooth_problem::Lcp;
@@ -205,13 +205,10 @@ pub fn all_solutions(problem: &impl Complementary, limit: usize) -> Result<Solut
             }
         }
     }
-    faces.reverse();
-    let mut faces = maximal(faces);
-    faces.sort_by_key(|face| face.dimension);
-    Ok(Solutions { faces, complete: true })
+    Ok(Solutions { faces: maximal(faces), complete: true })
 }
 
-/// Without those that are contained in another.
+/// Without those that are contained in another; isolated ones first, in the order of z.
 fn maximal(faces: Vec<Face>) -> Vec<Face> {
     let inside = |a: &Face, b: &Face| a.support.iter().zip(&b.allowed).all(|(s, a)| !s || *a);
     let keep: Vec<bool> = (0..faces.len())
@@ -221,7 +218,14 @@ fn maximal(faces: Vec<Face>) -> Vec<Face> {
             })
         })
         .collect();
-    faces.into_iter().zip(keep).filter(|(_, keep)| *keep).map(|(face, _)| face).collect()
+    let kept = faces.into_iter().zip(keep).filter(|(_, keep)| *keep);
+    let mut faces: Vec<Face> = kept.map(|(face, _)| face).collect();
+    let earlier = |a: &Face, b: &Face| {
+        let first = a.z.iter().zip(&b.z).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne());
+        a.dimension.cmp(&b.dimension).then(first.unwrap_or(std::cmp::Ordering::Equal))
+    };
+    faces.sort_by(earlier);
+    faces
 }
 
 /// What of an entry is zero, in units of the largest of its row.
