@@ -91,7 +91,7 @@ fn the_reduced_problem_is_the_lectures() {
     Reduce.lift(&problem, &LcpPoint { z: vec![1.0, 5.0] }, &mut memo, &mut point);
     assert_eq!(point.z, [0.0, 1.0, 5.0]);
     let mut back = LcpPoint::default();
-    Reduce.lower(&problem, &point, &mut back);
+    Reduce.lower(&problem, &point, &memo, &mut back);
     assert_eq!(back.z, [1.0, 5.0]);
 }
 
@@ -274,7 +274,7 @@ fn split_problems_lead_back_to_the_planted_solution() {
             let (mixed, mut memo) = Split.reduce(&problem).unwrap();
             // A solution goes there and back unchanged, and solves the mixed problem.
             let mut there = mixed.origin();
-            Split.lower(&problem, &LcpPoint { z: z.clone() }, &mut there);
+            Split.lower(&problem, &LcpPoint { z: z.clone() }, &memo, &mut there);
             assert!(mixed.judge(&there, 1e-12).unwrap().solved, "n = {n}");
             let mut back = problem.origin();
             Split.lift(&problem, &there, &mut memo, &mut back);
@@ -356,7 +356,7 @@ fn horizontal_problems_through_mixed_ones() {
             let (mixed, mut memo) = Mixed.reduce(&problem).unwrap();
             let known = HlcpPoint { x: x.clone(), s: s.clone() };
             let mut there = LcpPoint::default();
-            Mixed.lower(&problem, &known, &mut there);
+            Mixed.lower(&problem, &known, &memo, &mut there);
             assert!(mixed.judge(&there, 1e-12).unwrap().solved);
             let mut back = problem.origin();
             Mixed.lift(&problem, &there, &mut memo, &mut back);

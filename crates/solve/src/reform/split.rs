@@ -157,8 +157,7 @@ impl Reformulation<BoxLcp> for Split {
         }
     }
 
-    fn lower(&self, problem: &BoxLcp, point: &LcpPoint, _: &SplitMemo, reduced: &mut LcpPoint) {
-        let memo = places(problem);
+    fn lower(&self, problem: &BoxLcp, point: &LcpPoint, memo: &SplitMemo, reduced: &mut LcpPoint) {
         let mut w = vec![0.0; problem.q.len()];
         problem.M.mul(&point.z, &mut w);
         reduced.z.clear();
