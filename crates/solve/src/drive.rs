@@ -264,7 +264,7 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
                 problem,
                 solver,
                 work,
-                judge: Judge::new(gauge, best, history, *meter),
+                judge: Judge::new(gauge, best, history, *meter, solver.latest()),
                 limits,
             };
             run.solve(point, watch)
@@ -404,6 +404,8 @@ struct Judge<'a, P: Problem> {
     best: &'a mut P::Point,
     history: &'a mut Vec<Sample>,
     meter: Meter,
+    /// Whether the latest point counts as the best.
+    latest: bool,
     last: Measure,
     best_measure: Measure,
     /// The best point's residuals in doubled precision, where they were needed.
@@ -421,6 +423,7 @@ impl<'a, P: Problem> Judge<'a, P> {
         best: &'a mut P::Point,
         history: &'a mut Vec<Sample>,
         meter: Meter,
+        latest: bool,
     ) -> Self {
         history.clear();
         let nothing = Measure::unknown();
@@ -429,6 +432,7 @@ impl<'a, P: Problem> Judge<'a, P> {
             best,
             history,
             meter,
+            latest,
             last: nothing,
             best_measure: nothing,
             certified: None,
@@ -446,7 +450,7 @@ impl<'a, P: Problem> Judge<'a, P> {
             self.last = problem.certify(point, self.gauge);
             certified = Some(self.last);
         }
-        if self.visits == 0 || self.last.merit() < self.best_measure.merit() {
+        if self.visits == 0 || self.latest || self.last.merit() < self.best_measure.merit() {
             self.best_measure = self.last;
             self.certified = certified;
             P::copy_point(point, self.best);

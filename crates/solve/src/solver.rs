@@ -58,6 +58,12 @@ pub trait Solver<P: Problem>: Send {
         vec![]
     }
 
+    /// Whether the latest point is the answer even where an earlier one has the smaller residual: of methods that solve another problem than the judge's,
+    /// whose answer must not be mixed with the start.
+    fn latest(&self) -> bool {
+        false
+    }
+
     /// The number of steps between two visits of the judge, unless the estimate calls it earlier.
     /// A judgement costs about one product with W.
     fn check_every(&self) -> usize {

@@ -159,6 +159,10 @@ where
         account
     }
 
+    fn latest(&self) -> bool {
+        self.reformulation.approximates().is_some() || self.solver.latest()
+    }
+
     fn check_every(&self) -> usize {
         self.solver.check_every()
     }

@@ -388,3 +388,21 @@ fn hyperstatic_contacts_in_the_plane() {
         }
     }
 }
+
+/// The answer is the faceted problem's, even where the start obeys Coulomb's law better.
+#[test]
+fn a_better_start_does_not_replace_the_answer() {
+    for seed in SEEDS {
+        let (problem, known) = planted(seed, SLIDING).local::<3>();
+        let start = LocalPoint { r: known.r.iter().map(|r| r * (1.0 + 1e-6)).collect(), ..known };
+        for name in ["facet_inner/lemke", "facet_outer/lemke"] {
+            let settings = nonsmooth_solve::settings::from_texts(&["facets=4"]).unwrap();
+            let mut session = registry::session::<FrictionLocal<3>>(name, &settings).unwrap();
+            let (_, cold) = run(&mut *session, &problem);
+            let mut warm = start.clone();
+            let outcome = session.solve(&problem, &mut warm, &limits(), &mut |_| {}).unwrap();
+            assert!(outcome.measure.relative > 1e-4, "{name} {seed}");
+            assert!(farthest(&warm.r, &cold.r) < 1e-9, "{name} {seed}");
+        }
+    }
+}

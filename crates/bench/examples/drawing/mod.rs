@@ -1,5 +1,8 @@
 //! Panels of curves side by side, as SVG and PNG.
 
+// Each example uses its part.
+#![allow(dead_code)]
+
 use std::ops::Range;
 use std::path::Path;
 
