@@ -270,6 +270,8 @@ fn one<P: Form + Registered>(
     };
     let record = args.trace.as_ref().map(|_| {
         let mut all = report::problem_json(file, problem);
+        // The rows of a trace are pivots or iterations.
+        all.remove("rows");
         all.extend(report::fields(json!({
             "solver": plan.solver,
             "settings": plan.settings,
@@ -429,7 +431,9 @@ fn text<P: Form + Registered>(
     for (k, line) in solved.account.iter().enumerate() {
         row(&mut text, if k == 0 { "account" } else { "" }, line);
     }
-    let worst = if is_solved { 0 } else { WORST };
+    // Where there is no solution, no row is to blame.
+    let settled = is_solved || matches!(outcome.status, Status::Infeasible(_));
+    let worst = if settled { 0 } else { WORST };
     report::verdict_text(&mut text, verdict, tolerance, worst);
     let stuck = stuck(&solved.history);
     if let (Status::Limit(_), Some(since)) = (&outcome.status, stuck) {

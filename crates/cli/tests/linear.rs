@@ -193,6 +193,7 @@ fn the_trace_and_the_plot_are_written() {
         serde_json::from_str(&std::fs::read_to_string(folder.path("a.json")).unwrap()).unwrap();
     has_keys(&trace, "file kind solver settings status iterations method");
     assert_eq!(trace["method"], "none");
+    assert!(trace.get("rows").is_none());
     let svg = std::fs::read_to_string(folder.path("a.svg")).unwrap();
     assert!(svg.contains("projected_jacobi on lcp_two.dat"));
     let run = "solve string.toml --solver lemke --trace b.json --plot b.svg --quiet";
