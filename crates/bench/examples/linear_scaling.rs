@@ -135,7 +135,7 @@ fn main() -> Result<(), String> {
         "newton_min",
         "newton_fb",
         "pgs",
-        "psor:omega=1.8",
+        "psor",
         "mprgp",
     ];
     let panels = [

@@ -81,7 +81,7 @@ impl Imported {
     }
 }
 
-/// The problems of a runs file, or of the FCLIB files below a folder; of a file that cannot be read, the name alone.
+/// The problems of a runs file, or of the files below a folder; of a file that cannot be read, the name alone.
 pub fn problems(place: &Path) -> Result<Vec<Problem>, ForeignError> {
     if !place.is_dir() {
         return Ok(Runs::read(place)?.problems.into_values().collect());
@@ -258,7 +258,9 @@ fn json_table(file: &Path, bytes: &[u8]) -> Result<Table, ForeignError> {
 /// A name without folders and without the extensions of problem files: `a/b.hdf5.dat` is `b`.
 fn stem(name: &str) -> &str {
     let mut name = name.rsplit(['/', '\\']).next().unwrap_or(name);
-    while let Some(shorter) = [".dat", ".hdf5", ".h5"].iter().find_map(|e| name.strip_suffix(e)) {
+    while let Some(shorter) =
+        [".dat", ".hdf5", ".h5", ".toml", ".mtx"].iter().find_map(|e| name.strip_suffix(e))
+    {
         name = shorter;
     }
     name

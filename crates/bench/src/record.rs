@@ -118,7 +118,7 @@ pub struct Problem {
     pub kind: String,
     /// The first 16 hexadecimal digits of the file's SHA-256; empty where it is not known.
     pub digest: String,
-    /// Contacts nc.
+    /// Contacts nc; of a linear complementarity problem its pairs.
     pub contacts: usize,
     /// Unknowns.
     pub unknowns: usize,
@@ -242,6 +242,9 @@ pub struct Residuals {
     /// Bilateral constraints.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bilateral: Option<f64>,
+    /// The worst row in units of its own terms, of linear complementarity problems.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rows: Option<f64>,
 }
 
 /// A run: one problem, one solver, one tolerance.

@@ -240,14 +240,10 @@ fn the_tables_of_the_corpus_are_read_and_matched() {
             cells[error].parse::<f64>().unwrap() <= cells[tolerance].parse::<f64>().unwrap()
         });
         assert_eq!(read.runs.runs.iter().filter(|r| r.solved()).count(), solved.count());
-        // Friction problems are all in the corpus, but for one in the plane.
+        // The problems are all in the corpus, but for one in the plane.
         let name = table.file_name().unwrap().to_string_lossy().into_owned();
         let unmatched = read.runs.problems.values().filter(|p| p.family == UNMATCHED).count();
-        let expected = match name.as_str() {
-            "siconos_lcp.csv" | "siconos_mlcp.csv" => read.runs.problems.len(),
-            "siconos_fc2d.csv" => 1,
-            _ => 0,
-        };
+        let expected = usize::from(name == "siconos_fc2d.csv");
         assert_eq!(unmatched, expected, "{name}");
     }
 }

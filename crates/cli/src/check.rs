@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use nonsmooth_io::fclib;
-use nonsmooth_problem::with_friction;
+use nonsmooth_io::{Content, read_any};
+use nonsmooth_problem::{with_complementarity, with_friction};
 use serde_json::json;
 
 use crate::kinds::Form;
@@ -11,18 +11,19 @@ use crate::{Exit, files, output, report};
 
 /// Judge the solutions stored in files.
 ///
-/// The residual of /solution is recomputed from the problem's data: from the impulses `r` (and the multipliers
-/// `l`), through the dynamics for a global problem. The stored `u` is not used.
+/// The residual of the solution is recomputed from the problem's data: from the impulses `r` (and the multipliers
+/// `l`), through the dynamics for a global contact problem, or from z of a linear complementarity problem. The stored
+/// `u` or `w` is not used.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// FCLIB files (HDF5) with a /solution
+    /// Files with a solution: FCLIB's (HDF5), or linear complementarity problems (TOML, Matrix Market)
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// The relative residual that passes
     #[arg(long, value_name = "TOL", default_value = "1e-8", allow_hyphen_values = true)]
     tol: f64,
-    /// List the N contacts with the largest residuals (at most 10)
+    /// List the N contacts, or rows, with the largest residuals (at most 10)
     #[arg(long, value_name = "N", value_parser = files::whole)]
     worst: Option<usize>,
     /// Print one line of JSON for each file in place of the report
@@ -33,6 +34,7 @@ pub struct Args {
 const EXAMPLES: &str = "\
 Examples:
   nonsmooth check solved.hdf5
+  nonsmooth check solved.toml
   nonsmooth check solved.hdf5 --tol 1e-12 --worst 10
 
 Exit codes: 0 all pass; 1 some do not; 2 a file without a solution, or at fault.";
@@ -41,12 +43,20 @@ Exit codes: 0 all pass; 1 some do not; 2 a file without a solution, or at fault.
 pub fn run(args: &Args) -> Result<Exit, String> {
     let tol = files::tolerance(args.tol)?;
     Ok(files::each(&args.files, args.json, |_, file| {
-        let content = fclib::read(file).map_err(|e| e.to_string())?;
-        let stored = content.solution.as_ref().ok_or_else(|| {
+        let none = |place: &str| {
             let file = file.display();
-            format!("{file}: /solution: expected a solution to check, found none")
-        })?;
-        with_friction!(&content.problem, p => one(file, p, p.point(stored), tol, args))
+            format!("{file}: {place}: expected a solution to check, found none")
+        };
+        match read_any(file).map_err(|e| e.to_string())? {
+            Content::Friction(content) => {
+                let stored = content.solution.as_ref().ok_or_else(|| none("/solution"))?;
+                with_friction!(&content.problem, p => one(file, p, p.point(stored), tol, args))
+            }
+            Content::Linear(content) => {
+                let stored = content.solution.as_ref().ok_or_else(|| none("[solution]"))?;
+                with_complementarity!(&content.problem, p => one(file, p, p.point(stored), tol, args))
+            }
+        }
     }))
 }
 

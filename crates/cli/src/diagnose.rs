@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use nonsmooth_io::fclib;
 use nonsmooth_problem::with_friction;
 use nonsmooth_solve::Limits;
 use nonsmooth_solve::diagnose::{Diagnosis, Effort, diagnose};
@@ -45,7 +44,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         limits: Limits { time_limit, cancel: Some(interrupt::flag()), ..Limits::default() },
     };
     Ok(files::each(&args.files, args.json, |_, file| {
-        let content = fclib::read(file).map_err(|e| e.to_string())?;
+        let content = files::contact_problem(file)?;
         let diagnosis = diagnose(&content.problem, content.info.dofs, &effort);
         output::print(&if args.json {
             let mut all = with_friction!(&content.problem, p => report::problem_json(file, p));

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use nonsmooth_io::fclib;
 use nonsmooth_problem::check::{Existence, Impulses};
 use nonsmooth_problem::with_friction;
 use nonsmooth_solve::{Limits, existence};
@@ -53,7 +52,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     };
     let limits = Limits { time_limit, cancel: Some(interrupt::flag()), ..Limits::default() };
     Ok(files::each(&args.files, args.json, |k, file| {
-        let content = fclib::read(file).map_err(|e| e.to_string())?;
+        let content = files::contact_problem(file)?;
         let start = Instant::now();
         let existence = existence::of(&content.problem, &limits);
         let seconds = start.elapsed().as_secs_f64();

@@ -4,6 +4,8 @@ use std::collections::HashSet;
 use std::fs::{self, OpenOptions};
 use std::path::{Path, PathBuf};
 
+use nonsmooth_io::fclib::FclibFile;
+use nonsmooth_io::{Content, read_any};
 use serde_json::json;
 
 use crate::{Exit, output};
@@ -27,6 +29,17 @@ pub fn each(
         worst = worst.max(exit);
     }
     worst
+}
+
+/// A file that must hold a frictional contact problem.
+pub fn contact_problem(file: &Path) -> Result<FclibFile, String> {
+    match read_any(file).map_err(|e| e.to_string())? {
+        Content::Friction(content) => Ok(content),
+        Content::Linear(_) => Err(format!(
+            "{}: expected a frictional contact problem, found a linear complementarity problem",
+            file.display()
+        )),
+    }
 }
 
 /// A whole number, written as `1000` or `1e3`.

@@ -1,35 +1,90 @@
 //! What the commands need of a kind of problem.
 
 use nonsmooth_io::fclib::StoredPoint;
-use nonsmooth_problem::check::{ContactStatus, Judged, StatusCounts};
-use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem};
+use nonsmooth_io::linear::LinearPoint;
+use nonsmooth_problem::check::{Judged, RowCounts, StatusCounts};
+use nonsmooth_problem::{
+    BoxLcp, FrictionGlobal, FrictionLocal, Hlcp, HlcpPoint, Kind, Lcp, LcpPoint, Mlcp, Problem,
+};
 use nonsmooth_solve::registry::{self, About, Registered};
+use serde::Serialize;
+use serde_json::json;
+
+use crate::report::{Object, count, fields};
 
 /// A problem that has a judge and a place in a file.
-pub trait Form: Judged<Status = ContactStatus, Counts = StatusCounts> {
-    /// The number of contacts.
-    fn contacts(&self) -> usize;
+pub trait Form: Judged<Counts: Counts> {
+    /// How files store its points.
+    type Stored;
 
-    /// The components of a contact.
-    fn dimension(&self) -> usize;
+    /// Its size, in words.
+    fn size(&self) -> String;
+
+    /// Its size by name, for JSON.
+    fn sizes(&self) -> Object;
 
     /// A stored point as it is, to be judged.
-    fn point(&self, stored: &StoredPoint) -> Self::Point;
+    fn point(&self, stored: &Self::Stored) -> Self::Point;
 
-    /// The impulses and multipliers of a stored point, to start from; the rest is the solver's to recompute.
-    fn start(&self, stored: &StoredPoint) -> Self::Point;
+    /// A stored point to start from; the rest is the solver's to recompute.
+    fn start(&self, stored: &Self::Stored) -> Self::Point;
 
-    /// A point to store, with the relative velocity `u` that the judge computed.
-    fn store(&self, point: Self::Point, u: Vec<f64>) -> StoredPoint;
+    /// A point to store, with the relative velocity u, or w, that the judge computed.
+    fn store(&self, point: Self::Point, w: Vec<f64>) -> Self::Stored;
+}
+
+/// How many contacts, or rows, do what.
+pub trait Counts: Serialize {
+    /// What is counted.
+    const WHAT: &'static str;
+    /// The unit of the absolute residual, after a blank.
+    const UNIT: &'static str;
+
+    /// The numbers with their names; all that is counted is in one of them.
+    fn all(&self) -> Vec<(usize, &'static str)>;
+
+    /// Those near another status.
+    fn degenerate(&self) -> usize;
+}
+
+impl Counts for StatusCounts {
+    const WHAT: &'static str = "contact";
+    const UNIT: &'static str = " m/s";
+
+    fn all(&self) -> Vec<(usize, &'static str)> {
+        vec![(self.open, "open"), (self.stick, "stick"), (self.slip, "slip")]
+    }
+
+    fn degenerate(&self) -> usize {
+        self.degenerate
+    }
+}
+
+impl Counts for RowCounts {
+    const WHAT: &'static str = "row";
+    const UNIT: &'static str = "";
+
+    fn all(&self) -> Vec<(usize, &'static str)> {
+        let mut all = vec![(self.inside, "inside"), (self.lower, "at the lower bound")];
+        let others = [(self.upper, "at the upper bound"), (self.equalities, "equalities")];
+        all.extend(others.into_iter().filter(|c| c.0 > 0));
+        all
+    }
+
+    fn degenerate(&self) -> usize {
+        self.degenerate
+    }
 }
 
 impl<const D: usize> Form for FrictionLocal<D> {
-    fn contacts(&self) -> usize {
-        self.contacts()
+    type Stored = StoredPoint;
+
+    fn size(&self) -> String {
+        contact_size(self.contacts(), self)
     }
 
-    fn dimension(&self) -> usize {
-        D
+    fn sizes(&self) -> Object {
+        contact_sizes(self.contacts(), self)
     }
 
     fn point(&self, stored: &StoredPoint) -> Self::Point {
@@ -47,12 +102,14 @@ impl<const D: usize> Form for FrictionLocal<D> {
 }
 
 impl<const D: usize> Form for FrictionGlobal<D> {
-    fn contacts(&self) -> usize {
-        self.contacts()
+    type Stored = StoredPoint;
+
+    fn size(&self) -> String {
+        contact_size(self.contacts(), self)
     }
 
-    fn dimension(&self) -> usize {
-        D
+    fn sizes(&self) -> Object {
+        contact_sizes(self.contacts(), self)
     }
 
     fn point(&self, stored: &StoredPoint) -> Self::Point {
@@ -69,6 +126,14 @@ impl<const D: usize> Form for FrictionGlobal<D> {
     }
 }
 
+fn contact_size(contacts: usize, problem: &impl Problem) -> String {
+    format!("{}, {}", count(contacts, "contact"), count(problem.unknowns(), "unknown"))
+}
+
+fn contact_sizes(contacts: usize, problem: &impl Problem) -> Object {
+    fields(json!({"contacts": contacts, "unknowns": problem.unknowns()}))
+}
+
 /// The multipliers of a point, which may be another problem's, else `origin`: they follow from the impulses.
 fn multipliers(stored: &StoredPoint, origin: Vec<f64>) -> Vec<f64> {
     let fits = stored.lambda.as_ref().filter(|l| l.len() == origin.len());
@@ -77,6 +142,146 @@ fn multipliers(stored: &StoredPoint, origin: Vec<f64>) -> Vec<f64> {
 
 fn some(x: Vec<f64>) -> Option<Vec<f64>> {
     Some(x).filter(|x| !x.is_empty())
+}
+
+/// The parts of [`Form`] that LCP, MLCP and box LCP share: their point is z, and w follows from it.
+macro_rules! points_of_z {
+    () => {
+        type Stored = LinearPoint;
+
+        fn point(&self, stored: &LinearPoint) -> LcpPoint {
+            stored.to_lcp()
+        }
+
+        fn start(&self, stored: &LinearPoint) -> LcpPoint {
+            stored.to_lcp()
+        }
+    };
+}
+
+impl Form for Lcp {
+    points_of_z!();
+
+    fn size(&self) -> String {
+        count(self.dim(), "variable")
+    }
+
+    fn sizes(&self) -> Object {
+        fields(json!({"rows": self.dim(), "unknowns": self.unknowns()}))
+    }
+
+    fn store(&self, point: LcpPoint, w: Vec<f64>) -> LinearPoint {
+        LinearPoint { z: point.z, w: Some(w) }
+    }
+}
+
+impl Form for BoxLcp {
+    points_of_z!();
+
+    fn size(&self) -> String {
+        let bounded = |all: &[f64]| all.iter().filter(|x| x.is_finite()).count();
+        let variables = count(self.dim(), "variable");
+        let (lower, upper) = (bounded(&self.lower), bounded(&self.upper));
+        format!("{variables}, {} and {upper} upper", count(lower, "lower bound"))
+    }
+
+    fn sizes(&self) -> Object {
+        fields(json!({"rows": self.dim(), "unknowns": self.unknowns()}))
+    }
+
+    fn store(&self, point: LcpPoint, w: Vec<f64>) -> LinearPoint {
+        LinearPoint { z: point.z, w: Some(w) }
+    }
+}
+
+impl Form for Mlcp {
+    points_of_z!();
+
+    fn size(&self) -> String {
+        format!(
+            "{}, {}, {}",
+            match self.equalities {
+                1 => "1 equality".into(),
+                n => format!("{n} equalities"),
+            },
+            count(self.free, "free variable"),
+            count(self.pairs(), "pair")
+        )
+    }
+
+    fn sizes(&self) -> Object {
+        fields(json!({
+            "rows": self.q.len(),
+            "unknowns": self.unknowns(),
+            "equalities": self.equalities,
+            "free": self.free,
+            "pairs": self.pairs(),
+        }))
+    }
+
+    fn store(&self, point: LcpPoint, mut w: Vec<f64>) -> LinearPoint {
+        w.drain(..self.equalities.min(w.len()));
+        LinearPoint { z: point.z, w: Some(w) }
+    }
+}
+
+impl Form for Hlcp {
+    type Stored = LinearPoint;
+
+    fn size(&self) -> String {
+        count(self.dim(), "pair")
+    }
+
+    fn sizes(&self) -> Object {
+        fields(json!({"rows": self.dim(), "unknowns": self.unknowns(), "pairs": self.dim()}))
+    }
+
+    fn point(&self, stored: &LinearPoint) -> HlcpPoint {
+        stored.to_hlcp()
+    }
+
+    fn start(&self, stored: &LinearPoint) -> HlcpPoint {
+        stored.to_hlcp()
+    }
+
+    fn store(&self, point: HlcpPoint, _: Vec<f64>) -> LinearPoint {
+        LinearPoint { z: point.x, w: Some(point.s) }
+    }
+}
+
+/// Classes of problems: their solvers are listed apart, and may have the same names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Class {
+    /// Frictional contact.
+    Contact,
+    /// Linear complementarity.
+    Linear,
+}
+
+impl Class {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Contact, Self::Linear];
+
+    /// The class of a kind.
+    pub fn of(kind: Kind) -> Self {
+        if kind.is_linear() { Self::Linear } else { Self::Contact }
+    }
+
+    /// In JSON and in anchors.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Contact => "contact",
+            Self::Linear => "linear",
+        }
+    }
+
+    /// As a title.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Contact => "Frictional contact",
+            Self::Linear => "Linear complementarity",
+        }
+    }
 }
 
 /// What the registry has for one kind of problem.
@@ -90,7 +295,7 @@ pub struct Offer {
 }
 
 /// What the registry has, kind by kind.
-pub fn offers() -> [Offer; 4] {
+pub fn offers() -> [Offer; 8] {
     fn of<P: Registered>(kind: Kind) -> Offer {
         Offer { kind, solvers: registry::abouts::<P>(), composed: P::composed_names() }
     }
@@ -99,6 +304,10 @@ pub fn offers() -> [Offer; 4] {
         of::<FrictionLocal<3>>(Kind::FrictionLocal3d),
         of::<FrictionGlobal<2>>(Kind::FrictionGlobal2d),
         of::<FrictionGlobal<3>>(Kind::FrictionGlobal3d),
+        of::<Lcp>(Kind::Lcp),
+        of::<Mlcp>(Kind::Mlcp),
+        of::<Hlcp>(Kind::Hlcp),
+        of::<BoxLcp>(Kind::BoxLcp),
     ]
 }
 
@@ -109,18 +318,20 @@ pub fn takes(solver: &str) -> Option<String> {
     };
     let (with, without): (Vec<_>, Vec<_>) = offers().into_iter().partition(has);
     let words = |offer: &Offer| offer.kind.name().split('_').collect::<Vec<_>>();
-    // The words that tell all these kinds from all the others, else their names.
     let shared = with.iter().map(words).reduce(|mut all, kind| {
         all.retain(|word| kind.contains(word));
         all
     })?;
-    let tells = |word: &&&str| !without.iter().all(|o| words(o).contains(*word));
-    let telling: Vec<_> = shared.iter().filter(tells).copied().collect();
-    let also = |o: &Offer| telling.iter().all(|word| words(o).contains(word));
-    Some(if without.iter().any(also) {
-        with.iter().map(|o| o.kind.name()).collect::<Vec<_>>().join(", ")
-    } else {
-        telling.join(" ")
+    // One word that tells these kinds from all the others, else several, else their names.
+    let tells = |all: &[&str]| {
+        let has_all = |o: &Offer| all.iter().all(|word| words(o).contains(word));
+        !all.is_empty() && !without.iter().any(has_all)
+    };
+    let alone = shared.iter().find(|word| tells(&[word]));
+    Some(match alone {
+        Some(word) => (*word).into(),
+        None if tells(&shared) => shared.join(" "),
+        None => with.iter().map(|o| o.kind.name()).collect::<Vec<_>>().join(", "),
     })
 }
 
@@ -131,7 +342,8 @@ mod tests {
     #[test]
     fn what_a_solver_takes_is_said_in_few_words() {
         assert_eq!(takes("condense/nsgs").as_deref(), Some("global"));
-        assert_eq!(takes("nsgs").as_deref(), Some(""));
+        assert_eq!(takes("nsgs").as_deref(), Some("friction"));
+        assert_eq!(takes("projected_jacobi").as_deref(), Some("lcp, mlcp, box_lcp"));
         assert_eq!(takes("magic"), None);
     }
 }

@@ -1,5 +1,6 @@
 //! `nonsmooth list`: all of it comes from the registry.
 
+use std::collections::HashSet;
 use std::fmt::Write;
 
 use nonsmooth_problem::Kind;
@@ -7,7 +8,7 @@ use nonsmooth_solve::registry::{self, About, PREFIXES, Prefix, Solves};
 use nonsmooth_solve::settings::Setting;
 use serde_json::{Value, json};
 
-use crate::kinds::{Offer, offers};
+use crate::kinds::{Class, Offer, offers};
 use crate::report::{fields, row};
 use crate::{Exit, output};
 
@@ -38,10 +39,32 @@ Settings are given to `nonsmooth solve` as `--set key=value`. A reformulation st
 /// What is said of a solver whose answers are those of another problem.
 const RELAXATION: &str = "a relaxation; its answers are judged by Coulomb's law all the same";
 
-/// A solver and the kinds of problem that it takes.
+/// A solver and the kinds of problem that it takes, all of one class.
 struct Listed {
     about: &'static About,
     kinds: Vec<Kind>,
+}
+
+impl Listed {
+    fn class(&self) -> Class {
+        Class::of(self.kinds[0])
+    }
+
+    /// The name, unlike that of any other solver: of contact problems the plain one.
+    fn heading(&self) -> String {
+        match self.class() {
+            Class::Contact => self.about.name.into(),
+            class => format!("{} ({})", self.about.name, class.name()),
+        }
+    }
+
+    /// The anchor that a heading has in rendered Markdown.
+    fn anchor(&self) -> String {
+        match self.class() {
+            Class::Contact => self.about.name.into(),
+            class => format!("{}-{}", self.about.name, class.name()),
+        }
+    }
 }
 
 /// Everything that the registry has.
@@ -57,7 +80,9 @@ impl Catalogue {
             Self { solvers: vec![], prefixes: PREFIXES.iter().collect(), composed: vec![] };
         for Offer { kind, solvers, composed } in offers() {
             for about in solvers {
-                match all.solvers.iter_mut().find(|s| s.about.name == about.name) {
+                let same =
+                    |s: &&mut Listed| s.about.name == about.name && s.class() == Class::of(kind);
+                match all.solvers.iter_mut().find(same) {
                     Some(listed) => listed.kinds.push(kind),
                     None => all.solvers.push(Listed { about, kinds: vec![kind] }),
                 }
@@ -71,6 +96,13 @@ impl Catalogue {
         all
     }
 
+    /// The classes that have solvers here, each with them.
+    fn by_class(&self) -> impl Iterator<Item = (Class, Vec<&Listed>)> {
+        let of = |class| self.solvers.iter().filter(|s| s.class() == class).collect::<Vec<_>>();
+        let all = Class::ALL.into_iter().map(move |class| (class, of(class)));
+        all.filter(|(_, solvers)| !solvers.is_empty())
+    }
+
     /// Only what is named.
     fn only(mut self, names: &[String]) -> Result<Self, String> {
         let known = |name: &str| {
@@ -79,7 +111,9 @@ impl Catalogue {
         };
         if let Some(unknown) = names.iter().find(|name| !known(name)) {
             let all = self.solvers.iter().map(|s| s.about.name);
-            let all: Vec<_> = all.chain(self.prefixes.iter().map(|p| p.name)).collect();
+            let mut all: Vec<_> = all.chain(self.prefixes.iter().map(|p| p.name)).collect();
+            let mut seen = HashSet::new();
+            all.retain(|name| seen.insert(*name));
             let all = all.join(", ");
             return Err(format!("expected a name among {all}, found `{unknown}`"));
         }
@@ -109,6 +143,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
 fn json(catalogue: &Catalogue) -> Value {
     let solvers = catalogue.solvers.iter().map(|listed| {
         let mut solver = fields(json!(listed.about));
+        solver.insert("class".into(), json!(listed.class().name()));
         solver.insert("kinds".into(), json!(listed.kinds));
         solver.insert("solves".into(), json!(listed.about.solves));
         solver
@@ -123,20 +158,29 @@ fn json(catalogue: &Catalogue) -> Value {
 
 fn text(catalogue: &Catalogue) -> String {
     let mut text = String::new();
-    for Listed { about, kinds } in &catalogue.solvers {
-        let default = if about.name == registry::DEFAULT { " (the default)" } else { "" };
-        let _ = writeln!(text, "{}{default}: {}", about.name, about.summary);
-        row(&mut text, "family", about.family);
-        row(&mut text, "kinds", names(kinds));
-        if about.solves == Solves::Relaxation {
-            row(&mut text, "solves", RELAXATION);
+    let both = catalogue.by_class().count() > 1;
+    for (class, solvers) in catalogue.by_class() {
+        if both {
+            let _ = writeln!(text, "# {}\n", class.title());
         }
-        if !about.needs.is_empty() {
-            row(&mut text, "needs", about.needs.join(", "));
+        for Listed { about, kinds } in solvers {
+            let default = if about.name == registry::DEFAULT { " (the default)" } else { "" };
+            let _ = writeln!(text, "{}{default}: {}", about.name, about.summary);
+            row(&mut text, "family", about.family);
+            row(&mut text, "kinds", names(kinds));
+            if about.solves == Solves::Relaxation {
+                row(&mut text, "solves", RELAXATION);
+            }
+            if !about.needs.is_empty() {
+                row(&mut text, "needs", about.needs.join(", "));
+            }
+            row(&mut text, "see", about.cites.join(", "));
+            settings_text(&mut text, (about.settings)());
+            text.push('\n');
         }
-        row(&mut text, "see", about.cites.join(", "));
-        settings_text(&mut text, (about.settings)());
-        text.push('\n');
+    }
+    if both && !catalogue.prefixes.is_empty() {
+        text.push_str("# Reformulations\n\n");
     }
     for prefix in &catalogue.prefixes {
         let _ = writeln!(text, "{}/SOLVER: {}", prefix.name, prefix.summary);
@@ -185,26 +229,34 @@ fn markdown(catalogue: &Catalogue) -> String {
         "<!-- Generated by `nonsmooth list --markdown` from the registry; edit the solvers' own documentation. -->\n\n\
          # Solvers\n\n\
          `nonsmooth solve FILE --solver NAME --set key=value` takes these names and settings, and so does\n\
-         `registry::session`. Citations are keys of [refs.bib](refs.bib).\n\n\
-         | solver | family | what it is |\n| --- | --- | --- |\n",
+         `registry::session`. Citations are keys of [refs.bib](refs.bib).\n",
     );
-    for Listed { about, .. } in &catalogue.solvers {
-        let default = if about.name == registry::DEFAULT { "; the default" } else { "" };
-        let (name, family, summary) = (about.name, about.family, cell(about.summary));
-        let _ = writeln!(page, "| [`{name}`](#{name}) | {family} | {summary}{default} |");
-    }
-    for Listed { about, kinds } in &catalogue.solvers {
-        let _ = write!(page, "\n## {}\n\n{}.\n\n", about.name, sentence(about.summary));
-        let _ = writeln!(page, "- Family: {}", about.family);
-        let _ = writeln!(page, "- Kinds of problem: {}", names(kinds));
-        if about.solves == Solves::Relaxation {
-            let _ = writeln!(page, "- Solves: {RELAXATION}");
+    for (class, solvers) in catalogue.by_class() {
+        let title = class.title();
+        let _ =
+            write!(page, "\n## {title}\n\n| solver | family | what it is |\n| --- | --- | --- |\n");
+        for listed in &solvers {
+            let about = listed.about;
+            let default = if about.name == registry::DEFAULT { "; the default" } else { "" };
+            let (name, family, summary) = (about.name, about.family, cell(about.summary));
+            let anchor = listed.anchor();
+            let _ = writeln!(page, "| [`{name}`](#{anchor}) | {family} | {summary}{default} |");
         }
-        if !about.needs.is_empty() {
-            let _ = writeln!(page, "- Needs: {}", about.needs.join(", "));
+        for listed in solvers {
+            let Listed { about, kinds } = listed;
+            let (heading, summary) = (listed.heading(), sentence(about.summary));
+            let _ = write!(page, "\n### {heading}\n\n{summary}.\n\n");
+            let _ = writeln!(page, "- Family: {}", about.family);
+            let _ = writeln!(page, "- Kinds of problem: {}", names(kinds));
+            if about.solves == Solves::Relaxation {
+                let _ = writeln!(page, "- Solves: {RELAXATION}");
+            }
+            if !about.needs.is_empty() {
+                let _ = writeln!(page, "- Needs: {}", about.needs.join(", "));
+            }
+            let _ = writeln!(page, "- References: {}", about.cites.join(", "));
+            settings_table(&mut page, (about.settings)());
         }
-        let _ = writeln!(page, "- References: {}", about.cites.join(", "));
-        settings_table(&mut page, (about.settings)());
     }
     page.push_str(
         "\n## Reformulations\n\n\
@@ -264,10 +316,15 @@ mod tests {
         let page = markdown(&catalogue);
         assert!(page.starts_with("<!-- Generated by `nonsmooth list --markdown`"));
         assert!(page.ends_with(".\n") && !page.contains("\n\n\n"));
-        for Listed { about, kinds } in &catalogue.solvers {
-            assert!(!kinds.is_empty());
-            assert!(page.contains(&format!("\n## {}\n", about.name)));
-            for setting in (about.settings)() {
+        let mut headings = HashSet::new();
+        for listed in &catalogue.solvers {
+            let heading = format!("\n### {}\n", listed.heading());
+            assert_eq!(page.matches(&heading).count(), 1, "{heading}");
+            assert!(
+                page.contains(&format!("](#{})", listed.anchor()))
+                    && headings.insert(listed.anchor())
+            );
+            for setting in (listed.about.settings)() {
                 assert!(page.contains(&format!("| `{}` | `", setting.key)), "{setting:?}");
             }
         }
@@ -292,7 +349,8 @@ mod tests {
     fn the_text_names_defaults_and_choices() {
         let only = [registry::DEFAULT.to_owned(), "nsgs".to_owned()];
         let text = text(&Catalogue::new().only(&only).unwrap());
-        assert!(text.starts_with("auto (the default): ") && text.contains("\nnsgs: "));
+        assert!(text.starts_with("# Frictional contact\n\nauto (the default): "), "{text}");
+        assert!(text.contains("\nnsgs: ") && text.contains("# Linear complementarity\n\nauto "));
         assert!(text.contains("local=exact") && text.contains("One of exact, quartic"));
         assert!(!text.contains("extragradient"));
         assert!(Catalogue::new().only(&["magic".to_owned()]).is_err());

@@ -43,7 +43,7 @@ impl Exit {
     }
 }
 
-/// Solve, check, describe and generate frictional contact problems.
+/// Solve, check, describe and generate frictional contact problems, and solve linear complementarity problems.
 #[derive(Debug, Parser)]
 #[command(name = "nonsmooth", version, after_help = EXAMPLES)]
 struct Cli {
@@ -59,10 +59,12 @@ Examples:
   nonsmooth diagnose wall.hdf5                       what makes it hard, and what to try
   nonsmooth solve wall.hdf5 --out solved.hdf5        solve it and keep the solution
   nonsmooth check solved.hdf5                        have the solution judged again
+  nonsmooth solve rectifier.toml --trace pivots.json a linear complementarity problem, and what the method did
   nonsmooth list                                     the solvers and their settings
   nonsmooth bench run problems/ --out runs.jsonl     compare solvers on folders of problems
 
-Files are FCLIB's HDF5 files of local (W, q, mu) or global (M, H, f, w, mu) problems, in 2D or 3D.
+Files of contact problems are FCLIB's HDF5 files, local (W, q, mu) or global (M, H, f, w, mu), in 2D or 3D. Linear
+complementarity problems (LCP, mixed, horizontal, with bounds) are TOML, Matrix Market or Siconos' text.
 
 Exit codes: 0 solved; 1 not solved; 2 a mistake in a file or an option; 130 Ctrl-C pressed twice.";
 

@@ -8,7 +8,7 @@ pub use nonsmooth_bench::plural as count;
 use nonsmooth_problem::check::{Failing, Measure, Verdict};
 use serde_json::{Map, Value, json};
 
-use crate::kinds::Form;
+use crate::kinds::{Counts, Form};
 
 /// An object of JSON, in the order in which it is filled.
 pub type Object = Map<String, Value>;
@@ -26,37 +26,29 @@ pub fn number(x: f64) -> String {
 
 /// The file and the size of its problem.
 pub fn problem_json<P: Form>(file: &Path, problem: &P) -> Object {
-    fields(json!({
-        "file": file.to_string_lossy(),
-        "kind": problem.kind().name(),
-        "contacts": problem.contacts(),
-        "unknowns": problem.unknowns(),
-    }))
+    let mut all = fields(json!({"file": file.to_string_lossy(), "kind": problem.kind().name()}));
+    all.extend(problem.sizes());
+    all
 }
 
 /// The size of a problem.
 pub fn problem_text<P: Form>(problem: &P) -> String {
-    format!(
-        "{}, {}, {}",
-        problem.kind().name(),
-        count(problem.contacts(), "contact"),
-        count(problem.unknowns(), "unknown")
-    )
+    format!("{}, {}", problem.kind().name(), problem.size())
 }
 
-/// The residuals, what of them fails at `tolerance`, the contacts by status and the worst contacts. Numbers that are
-/// not finite become null.
-pub fn verdict_json(verdict: &Verdict, tolerance: f64, worst: usize) -> Object {
+/// The residuals, what of them fails at `tolerance`, the contacts (or rows) by status and the worst of them. Numbers that
+/// are not finite become null.
+pub fn verdict_json<S, C: Counts>(verdict: &Verdict<S, C>, tolerance: f64, worst: usize) -> Object {
     let mut counts = fields(json!(verdict.counts));
     let degenerate = counts.remove("degenerate");
     let worst = worst_of(verdict, worst)
-        .map(|(contact, residual)| json!({"contact": contact, "residual": residual}));
+        .map(|(which, residual)| json!({(C::WHAT): which, "residual": residual}));
     fields(json!({
         "residual": residual_json(&verdict.measure),
         "failing": verdict.measure.failing(tolerance),
-        "contacts_by_status": counts,
+        (format!("{}s_by_status", C::WHAT)): counts,
         "degenerate": degenerate,
-        "worst_contacts": worst.collect::<Vec<_>>(),
+        (format!("worst_{}s", C::WHAT)): worst.collect::<Vec<_>>(),
     }))
 }
 
@@ -105,41 +97,47 @@ fn listed(failing: &[Failing], more: impl Fn(&Failing) -> String) -> String {
     each.collect::<Vec<_>>().join(", ")
 }
 
-/// The residuals, what else than the relative one fails at `tolerance`, the contacts by status, and the `worst`
-/// contacts where it is they that fail.
-pub fn verdict_text(text: &mut String, verdict: &Verdict, tolerance: f64, worst: usize) {
-    residual_text(text, &verdict.measure);
+/// The residuals, what else than the relative one fails at `tolerance`, the contacts (or rows) by status, and the
+/// `worst` of them where it is they that fail.
+pub fn verdict_text<S, C: Counts>(
+    text: &mut String,
+    verdict: &Verdict<S, C>,
+    tolerance: f64,
+    worst: usize,
+) {
+    residual_text(text, &verdict.measure, C::UNIT);
     let (relative, others) = failing(&verdict.measure, tolerance);
     if !others.is_empty() {
         let limit = |f: &Failing| format!(" (limit {:.1e})", f.limit).replace(".0e", "e");
         row(text, "fails", listed(&others, limit));
     }
     let counts = &verdict.counts;
-    let degenerate = match counts.degenerate {
+    let degenerate = match counts.degenerate() {
         0 => String::new(),
         n => format!(" ({n} degenerate: near another status)"),
     };
-    let all = [(counts.open, "open"), (counts.stick, "stick"), (counts.slip, "slip")];
-    let all = all.map(|(n, what)| format!("{n} {what}")).join(", ");
-    row(text, "contacts", all + &degenerate);
+    let all: Vec<_> = counts.all().iter().map(|(n, what)| format!("{n} {what}")).collect();
+    let what = format!("{}s", C::WHAT);
+    row(text, &what, all.join(", ") + &degenerate);
     let worst = if relative || others.is_empty() { worst } else { 0 };
     let worst: Vec<_> = worst_of(verdict, worst)
-        .map(|(contact, residual)| format!("{contact} ({})", number(residual)))
+        .map(|(which, residual)| format!("{which} ({})", number(residual)))
         .collect();
     if !worst.is_empty() {
-        row(text, "worst", format!("contacts {}", worst.join(", ")));
+        row(text, "worst", format!("{what} {}", worst.join(", ")));
     }
 }
 
 /// The residuals, in two lines.
-pub fn residual_text(text: &mut String, m: &Measure) {
+fn residual_text(text: &mut String, m: &Measure, unit: &str) {
     let rest = [("relative", Some(m.relative)), ("paper", Some(m.paper)), ("peer", Some(m.peer))];
-    let absolute = format!(", absolute {} m/s", number(m.absolute));
+    let absolute = format!(", absolute {}{unit}", number(m.absolute));
     row(text, "residual", named(&rest) + &absolute);
     let parts = [
         ("primal", Some(m.primal)),
         ("dual", Some(m.dual)),
         ("complementarity", Some(m.complementarity)),
+        ("rows", m.rows),
         ("dynamics", m.dynamics),
         ("velocities", m.velocity_gap),
         ("bilateral", m.bilateral),
@@ -153,8 +151,11 @@ fn named(parts: &[(&str, Option<f64>)]) -> String {
     texts.join(", ")
 }
 
-/// The contacts with the largest residuals; those without any are not listed.
-fn worst_of(verdict: &Verdict, worst: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+/// The contacts, or rows, with the largest residuals; those without any are not listed.
+fn worst_of<S, C>(
+    verdict: &Verdict<S, C>,
+    worst: usize,
+) -> impl Iterator<Item = (usize, f64)> + '_ {
     // A NaN is as bad as it gets: keep it.
     let bad = verdict.worst.iter().copied().filter(|&(_, x)| x != 0.0);
     bad.take(worst)

@@ -5,14 +5,17 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
-use nonsmooth_problem::check::Verdict;
-use nonsmooth_problem::{Friction, with_friction};
+use nonsmooth_io::linear::{self, LinearFile, LinearPoint};
+use nonsmooth_io::{Content, read_any};
+use nonsmooth_problem::check::{ContactStatus, Judged, StatusCounts, Verdict};
+use nonsmooth_problem::{Complementarity, Friction, Problem, with_complementarity, with_friction};
 use nonsmooth_solve::registry::{self, Registered, Solves};
 use nonsmooth_solve::settings::{self, SettingsMap};
+use nonsmooth_solve::trace::Trace;
 use nonsmooth_solve::{Limit, Limits, Outcome, Sample, SolveError, Status};
 use serde_json::json;
 
-use crate::kinds::{Form, takes};
+use crate::kinds::{Class, Form, takes};
 use crate::progress::Bar;
 use crate::report::{self, row};
 use crate::{Exit, files, interrupt, output, plot};
@@ -25,7 +28,7 @@ use crate::{Exit, files, interrupt, output, plot};
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// FCLIB files (HDF5), each with one problem
+    /// Files with one problem each: FCLIB's (HDF5), or linear complementarity problems (TOML, Matrix Market, Siconos' text)
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// The solver, one of `nonsmooth list`
@@ -43,18 +46,24 @@ pub struct Args {
     /// At most this many seconds for each file
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     time_limit: Option<f64>,
-    /// Start from the file's /guesses/1 in place of zero; with =FILE from the /solution of another file (or its
-    /// /guesses/1) with as many contacts, with =DIRECTORY from the file of the same name there
+    /// Start from the file's /guesses/1 (linear complementarity: its [solution]) in place of zero; with =FILE from the
+    /// solution of another file (or its /guesses/1) of the same size, with =DIRECTORY from the file of the same name there
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
     warm_start: Option<Option<PathBuf>>,
     /// Write the problem with its /solution; a directory (existing or ending in `/`) for several files.
     /// A new file holds the problem, its info, guesses and solution, and nothing else of the input; of the input
-    /// itself, which may be named, only /solution changes
+    /// itself, which may be named, only /solution changes. Linear complementarity problems are written as TOML (.toml), or
+    /// as Matrix Market (.mtx) with vectors beside
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Draw the residual against iterations and time (SVG); a directory for several files
+    /// Draw the residual against iterations and time (SVG), and the pivots or the central path of methods that record
+    /// them; a directory for several files
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
+    /// Write what the method did, pivot by pivot or iteration by iteration (JSON), of methods that record it; a directory
+    /// for several files
+    #[arg(long, value_name = "FILE.json")]
+    trace: Option<PathBuf>,
     /// Print one line of JSON for each file in place of the report
     #[arg(long)]
     json: bool,
@@ -70,6 +79,7 @@ Examples:
   nonsmooth solve wall.hdf5 --solver nsgs --set omega=0.9 --set ordering=shuffled
   nonsmooth solve *.hdf5 --out solved/ --json > results.jsonl
   nonsmooth solve step2.hdf5 --warm-start=solved/step1.hdf5
+  nonsmooth solve contact.toml --out solved.toml --trace pivots.json --plot pivots.svg
 
 Exit codes: 0 all solved; 1 some not solved; 2 some file or option at fault.";
 
@@ -85,43 +95,118 @@ pub struct Plan<'a> {
     pub progress: bool,
 }
 
-/// What came of a solve.
-pub struct Solved {
+/// What came of a solve; of a contact problem, where nothing else is said.
+pub struct Solved<S = ContactStatus, C = StatusCounts, T = StoredPoint> {
     /// The loop's word.
     pub outcome: Outcome,
     /// The judge's word.
-    pub verdict: Verdict,
+    pub verdict: Verdict<S, C>,
     /// The best point.
-    pub point: StoredPoint,
+    pub point: T,
     /// What the solver says that it did.
     account: Vec<String>,
     /// The residuals on the way.
     history: Vec<Sample>,
+    /// The method's own record.
+    trace: Trace,
 }
+
+/// What came of a solve of a problem P.
+type SolvedOf<P> = Solved<<P as Judged>::Status, <P as Judged>::Counts, <P as Form>::Stored>;
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
     let settings = settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))?;
-    let limits = limits(args.tol, args.max_iter, args.time_limit)?;
+    let mut limits = limits(args.tol, args.max_iter, args.time_limit)?;
+    limits.trace = args.trace.is_some() || args.plot.is_some();
     let targets = Targets::new(args)?;
     let cancel = limits.cancel.clone().unwrap_or_default();
     let plan = Plan { solver: &args.solver, settings: &settings, limits, progress: !args.quiet };
-    let one = |k: usize, file: &Path| {
+    let one_file = |k: usize, file: &Path| {
         if cancelled(&cancel) && k > 0 {
             if !args.json && !args.quiet {
                 output::print(&format!("{}: skipped after Ctrl-C\n", file.display()));
             }
             return Ok(Exit::NotSolved);
         }
-        let content = fclib::read(file).map_err(|e| e.to_string())?;
-        let guess = match &args.warm_start {
-            None => None,
-            Some(None) => Some(own_guess(file, &content)?),
-            Some(Some(from)) => Some(guess_of(from, file, &content.problem)?),
-        };
-        one(file, content, guess.as_ref(), &plan, args, targets.of(k))
+        let targets = targets.of(k);
+        let warm = args.warm_start.as_ref().map(Option::as_deref);
+        match read_any(file).map_err(|e| e.to_string())? {
+            Content::Friction(content) => {
+                let guess = match warm {
+                    None => None,
+                    Some(None) => Some(own_guess(file, &content)?),
+                    Some(Some(from)) => Some(guess_of(from, file, &content.problem)?),
+                };
+                let guess = guess.as_ref();
+                let done = with_friction!(&content.problem, p => one(file, p, guess, &plan, args))?;
+                done.keep(file, &plan, targets, |path, solution| {
+                    keep_contact(file, path, content, solution)
+                })
+            }
+            Content::Linear(content) => {
+                targets.out.map_or(Ok(()), linear_name)?;
+                let guess = match warm {
+                    None => None,
+                    Some(None) => Some(own_linear_guess(file, &content)?),
+                    Some(Some(from)) => Some(linear_guess_of(from, file, &content.problem)?),
+                };
+                let guess = guess.as_ref();
+                let problem = &content.problem;
+                let done = with_complementarity!(problem, p => one(file, p, guess, &plan, args))?;
+                done.keep(file, &plan, targets, |path, solution| {
+                    let content = LinearFile { solution: Some(solution), ..content };
+                    linear::write(path, &content).map_err(|e| e.to_string())
+                })
+            }
+        }
     };
-    Ok(files::each(&args.files, args.json, one))
+    Ok(files::each(&args.files, args.json, one_file))
+}
+
+/// The name of a file for a linear complementarity problem.
+pub fn linear_name(path: &Path) -> Result<(), String> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("toml" | "mtx") => Ok(()),
+        _ => Err(format!(
+            "--out {}: expected a file name that ends in .toml or .mtx for a linear complementarity problem",
+            path.display()
+        )),
+    }
+}
+
+/// The point of a linear file itself.
+fn own_linear_guess(file: &Path, content: &LinearFile) -> Result<LinearPoint, String> {
+    content.solution.clone().ok_or_else(|| {
+        format!("{}: [solution]: expected a point for --warm-start, found none", file.display())
+    })
+}
+
+/// The point that another linear file, or the one of the same name in a directory, holds for `problem`.
+fn linear_guess_of(
+    from: &Path,
+    file: &Path,
+    problem: &Complementarity,
+) -> Result<LinearPoint, String> {
+    let path = other_file(from, file);
+    let other = linear::read(&path).map_err(|e| format!("--warm-start {e}"))?;
+    let size = |p: &Complementarity| with_complementarity!(p, p => report::problem_text(p));
+    let (ours, theirs) = (size(problem), size(&other.problem));
+    let refused = |expected: String, found: &str| {
+        format!("--warm-start {}: expected {expected}, found {found}", path.display())
+    };
+    if ours != theirs {
+        return Err(refused(format!("{ours} as in {}", file.display()), &theirs));
+    }
+    other.solution.ok_or_else(|| refused("a [solution]".into(), "none"))
+}
+
+/// A file, or that of the same name in a directory.
+fn other_file(from: &Path, file: &Path) -> PathBuf {
+    match file.file_name() {
+        Some(name) if from.is_dir() => from.join(name),
+        _ => from.into(),
+    }
 }
 
 /// The point that a file proposes itself.
@@ -133,16 +218,13 @@ fn own_guess(file: &Path, content: &FclibFile) -> Result<StoredPoint, String> {
 
 /// The point that another file, or the one of the same name in a directory, holds for `problem`.
 fn guess_of(from: &Path, file: &Path, problem: &Friction) -> Result<StoredPoint, String> {
-    let path = match file.file_name() {
-        Some(name) if from.is_dir() => from.join(name),
-        _ => from.into(),
-    };
+    let path = other_file(from, file);
     let other = fclib::read(&path).map_err(|e| format!("--warm-start {e}"))?;
     let refused = |expected: String, found: String| {
         format!("--warm-start {}: expected {expected}, found {found}", path.display())
     };
     let size = |p: &Friction| {
-        let dimension = with_friction!(p, p => p.dimension());
+        let dimension = with_friction!(p, p => p.kind().dimension());
         format!("{} in {dimension}D", report::count(p.contacts(), "contact"))
     };
     let (ours, theirs) = (size(problem), size(&other.problem));
@@ -173,58 +255,97 @@ fn cancelled(flag: &Arc<AtomicBool>) -> bool {
     flag.load(Ordering::Relaxed)
 }
 
-fn one(
+fn one<P: Form + Registered>(
     file: &Path,
-    content: FclibFile,
-    guess: Option<&StoredPoint>,
+    problem: &P,
+    guess: Option<&P::Stored>,
     plan: &Plan,
     args: &Args,
-    targets: [Option<&Path>; 2],
-) -> Result<Exit, String> {
-    let solved = with_friction!(&content.problem, p => solve(file, p, guess, plan))?;
+) -> Result<Done<P::Stored>, String> {
+    let solved = solve(file, problem, guess, plan)?;
     let report = match (args.json, args.quiet) {
-        (true, _) => with_friction!(&content.problem, p => json_line(file, p, plan, &solved)),
+        (true, _) => json_line(file, problem, plan, &solved),
         (false, true) => String::new(),
-        (false, false) => with_friction!(&content.problem, p => text(file, p, plan, &solved)),
+        (false, false) => text(file, problem, plan, &solved),
     };
-    // Files first: whoever reads the report may be gone. But a file that fails must not cost the report.
-    let kept = keep(file, content, plan, &solved, targets);
-    output::print(&report);
-    kept.map(|()| Exit::solved(solved.outcome.status == Status::Solved))
+    let record = args.trace.as_ref().map(|_| {
+        let mut all = report::problem_json(file, problem);
+        all.extend(report::fields(json!({
+            "solver": plan.solver,
+            "settings": plan.settings,
+            "status": solved.outcome.status.name(),
+            "iterations": solved.outcome.iterations,
+        })));
+        all.extend(report::fields(json!(solved.trace)));
+        format!("{}\n", json!(all))
+    });
+    let Solved { outcome, point, history, trace, .. } = solved;
+    let is_solved = outcome.status == Status::Solved;
+    Ok(Done { report, point, history, trace, record, is_solved })
 }
 
-/// Writes the files asked for.
-fn keep(
-    file: &Path,
-    content: FclibFile,
-    plan: &Plan,
-    solved: &Solved,
-    [out, picture]: [Option<&Path>; 2],
-) -> Result<(), String> {
-    if let Some(path) = out {
-        // In place, all else that the file holds stays as it is.
-        let written = if files::same(file, path) {
-            fclib::write_solution(path, &solved.point)
-        } else {
-            fclib::write(path, &FclibFile { solution: Some(solved.point.clone()), ..content })
+/// What is left to print and to write of a solve.
+struct Done<T> {
+    report: String,
+    point: T,
+    history: Vec<Sample>,
+    trace: Trace,
+    /// The trace as JSON, if asked for.
+    record: Option<String>,
+    is_solved: bool,
+}
+
+impl<T> Done<T> {
+    /// Writes the files asked for, the solution by `write`, and prints the report.
+    fn keep(
+        self,
+        file: &Path,
+        plan: &Plan,
+        targets: Target,
+        write: impl FnOnce(&Path, T) -> Result<(), String>,
+    ) -> Result<Exit, String> {
+        let Self { report, point, history, trace, record, is_solved } = self;
+        let pictures = || {
+            if let Some(path) = targets.plot {
+                let title = format!("{} on {}", plan.solver, name(file));
+                let svg = plot::svg(&title, &history, &trace, plan.limits.tolerance)?;
+                files::write_text("--plot", path, &svg)?;
+            }
+            match (targets.trace, record) {
+                (Some(path), Some(record)) => files::write_text("--trace", path, &record),
+                _ => Ok(()),
+            }
         };
-        written.map_err(|e| e.to_string())?;
+        // Files first: whoever reads the report may be gone. But a file that fails must not cost the report.
+        let kept = targets.out.map_or(Ok(()), |path| write(path, point)).and_then(|()| pictures());
+        output::print(&report);
+        kept.map(|()| Exit::solved(is_solved))
     }
-    if let Some(path) = picture {
-        let title = format!("{} on {}", plan.solver, name(file));
-        let svg = plot::svg(&title, &solved.history, plan.limits.tolerance)?;
-        files::write_text("--plot", path, &svg)?;
-    }
-    Ok(())
+}
+
+/// Writes a contact problem with its solution.
+fn keep_contact(
+    file: &Path,
+    path: &Path,
+    content: FclibFile,
+    solution: StoredPoint,
+) -> Result<(), String> {
+    // In place, all else that the file holds stays as it is.
+    let written = if files::same(file, path) {
+        fclib::write_solution(path, &solution)
+    } else {
+        fclib::write(path, &FclibFile { solution: Some(solution), ..content })
+    };
+    written.map_err(|e| e.to_string())
 }
 
 /// Solves a problem from a stored point, or from zero. `file` is its name in messages.
 pub fn solve<P: Form + Registered>(
     file: &Path,
     problem: &P,
-    start: Option<&StoredPoint>,
+    start: Option<&P::Stored>,
     plan: &Plan,
-) -> Result<Solved, String> {
+) -> Result<SolvedOf<P>, String> {
     let mistake = |e: &dyn std::fmt::Display| format!("{}: {e}", file.display());
     let session = registry::session::<P>(plan.solver, plan.settings);
     let mut session = session.map_err(|e| match (&e, takes(plan.solver)) {
@@ -247,6 +368,7 @@ pub fn solve<P: Form + Registered>(
         verdict,
         account: session.account(),
         history: session.history().to_vec(),
+        trace: session.trace(),
     })
 }
 
@@ -257,7 +379,7 @@ fn name(file: &Path) -> String {
 /// The worst contacts that a report of an unsolved problem lists.
 const WORST: usize = 3;
 
-fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &Solved) -> String {
+fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &SolvedOf<P>) -> String {
     let Solved { outcome, verdict, account, .. } = solved;
     let mut all = report::problem_json(file, problem);
     all.extend(report::fields(json!({
@@ -270,11 +392,19 @@ fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &Solved) ->
         "seconds": outcome.seconds,
         "account": account,
     })));
+    if let Status::Infeasible(proof) | Status::NoConclusion(proof) = &outcome.status {
+        all.insert("certificate".into(), json!(proof));
+    }
     all.extend(report::verdict_json(verdict, plan.limits.tolerance, verdict.worst.len()));
     format!("{}\n", json!(all))
 }
 
-fn text<P: Form + Registered>(file: &Path, problem: &P, plan: &Plan, solved: &Solved) -> String {
+fn text<P: Form + Registered>(
+    file: &Path,
+    problem: &P,
+    plan: &Plan,
+    solved: &SolvedOf<P>,
+) -> String {
     let Solved { outcome, verdict, .. } = solved;
     let tolerance = plan.limits.tolerance;
     let is_solved = outcome.status == Status::Solved;
@@ -305,7 +435,7 @@ fn text<P: Form + Registered>(file: &Path, problem: &P, plan: &Plan, solved: &So
     if let (Status::Limit(_), Some(since)) = (&outcome.status, stuck) {
         row(&mut text, "stuck", format!("no progress since iteration {since}"));
     }
-    if let Some(hint) = hint::<P>(solved, plan, stuck.is_some()) {
+    if let Some(hint) = hint(problem, solved, plan, stuck.is_some()) {
         row(&mut text, "try", hint);
     }
     text
@@ -335,10 +465,15 @@ fn stuck(history: &[Sample]) -> Option<usize> {
 const OTHER_WAYS: [&str; 2] = ["local=projection", "ordering=shuffled"];
 
 /// What may help where the problem is not solved.
-fn hint<P: Form + Registered>(solved: &Solved, plan: &Plan, stuck: bool) -> Option<String> {
+fn hint<P: Form + Registered>(
+    problem: &P,
+    solved: &SolvedOf<P>,
+    plan: &Plan,
+    stuck: bool,
+) -> Option<String> {
     // Iterations are of no help where the contacts are as they should be.
     let failing = solved.verdict.measure.failing(plan.limits.tolerance);
-    if !failing.iter().any(|f| ["relative residual", "primal", "dual"].contains(&f.what)) {
+    if !failing.iter().any(|f| ["relative residual", "primal", "dual", "rows"].contains(&f.what)) {
         return None;
     }
     let about = registry::about::<P>(plan.solver)?;
@@ -370,7 +505,12 @@ fn hint<P: Form + Registered>(solved: &Solved, plan: &Plan, stuck: bool) -> Opti
         new.then(|| format!("--solver {}", about.name))
     });
     let tries: Vec<_> = more.into_iter().chain(others).take(3).collect();
-    let see = "see `nonsmooth list`; `nonsmooth diagnose` says what makes a problem hard";
+    let see = match Class::of(problem.kind()) {
+        Class::Contact => {
+            "see `nonsmooth list`; `nonsmooth diagnose` says what makes a problem hard"
+        }
+        Class::Linear => "see `nonsmooth list`; `nonsmooth info` says what is known of the matrix",
+    };
     Some(format!("{} ({see})", tries.join(", or ")))
 }
 
@@ -378,32 +518,63 @@ fn hint<P: Form + Registered>(solved: &Solved, plan: &Plan, stuck: bool) -> Opti
 struct Targets {
     out: Option<Vec<PathBuf>>,
     plot: Option<Vec<PathBuf>>,
+    trace: Option<Vec<PathBuf>>,
+}
+
+/// The output files for one input.
+#[derive(Clone, Copy)]
+struct Target<'a> {
+    out: Option<&'a Path>,
+    plot: Option<&'a Path>,
+    trace: Option<&'a Path>,
 }
 
 impl Targets {
     fn new(args: &Args) -> Result<Self, String> {
         let place = |option: &str, to: &Option<PathBuf>, extension| {
             let to = to.as_deref();
-            to.map(|to| files::targets(option, to, &args.files, extension)).transpose()
+            to.map(|to| files::targets(option, to, &named(&args.files), extension)).transpose()
         };
         let out = place("--out", &args.out, None)?;
         let plot = place("--plot", &args.plot, Some("svg"))?;
-        for picture in plot.iter().flatten() {
-            files::picture("--plot", picture)?;
-            let mut taken = args.files.iter().chain(out.iter().flatten());
-            if taken.any(|path| files::same(picture, path)) {
-                return Err(format!(
-                    "--plot {}: expected a file of its own, found the file of a problem",
-                    picture.display()
-                ));
+        let trace = place("--trace", &args.trace, Some("trace.json"))?;
+        for (option, all) in [("--plot", &plot), ("--trace", &trace)] {
+            for path in all.iter().flatten() {
+                if option == "--plot" {
+                    files::picture(option, path)?;
+                }
+                let mut taken = args.files.iter().chain(out.iter().flatten());
+                if taken.any(|other| files::same(path, other)) {
+                    return Err(format!(
+                        "{option} {}: expected a file of its own, found the file of a problem",
+                        path.display()
+                    ));
+                }
             }
         }
-        Ok(Self { out, plot })
+        let both = plot.iter().flatten().zip(trace.iter().flatten());
+        if let Some((path, _)) = both.into_iter().find(|(a, b)| files::same(a, b)) {
+            let path = path.display();
+            return Err(format!(
+                "--trace {path}: expected a file of its own, found that of --plot"
+            ));
+        }
+        Ok(Self { out, plot, trace })
     }
 
-    fn of(&self, k: usize) -> [Option<&Path>; 2] {
-        [&self.out, &self.plot].map(|all| Some(all.as_ref()?.get(k)?.as_path()))
+    fn of(&self, k: usize) -> Target<'_> {
+        fn path(all: &Option<Vec<PathBuf>>, k: usize) -> Option<&Path> {
+            Some(all.as_ref()?.get(k)?.as_path())
+        }
+        Target { out: path(&self.out, k), plot: path(&self.plot, k), trace: path(&self.trace, k) }
     }
+}
+
+/// The names of results in a directory: formats that hold no solution give way to ours.
+fn named(inputs: &[PathBuf]) -> Vec<PathBuf> {
+    let foreign = |p: &Path| p.extension().is_some_and(|e| e == "dat" || e == "mtx");
+    let each = inputs.iter().map(|p| if foreign(p) { p.with_extension("toml") } else { p.clone() });
+    each.collect()
 }
 
 /// A problem known only by its kind, solved as above.

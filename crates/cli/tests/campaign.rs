@@ -139,7 +139,10 @@ fn mistakes_are_named_and_the_rest_goes_on() {
     assert_eq!(errors.len(), 5, "{}", run.stderr);
     assert!(errors[0].starts_with("error: --solver magic: unknown solver `magic`"));
     assert!(errors[1].contains("nsgs:omega=7: solver `nsgs`: omega: expected a number in (0, 2)"));
-    assert_eq!(errors[2], "error: empty: expected problems (*.hdf5), found none");
+    assert_eq!(
+        errors[2],
+        "error: empty: expected problems (*.hdf5, *.toml, *.mtx, *.dat), found none"
+    );
     assert!(errors[3].starts_with("error: nowhere: "));
     assert!(errors[4].contains("broken.hdf5"));
     assert!(run.stdout.starts_with("r.jsonl: 2 of 2 runs done (2 new)"), "{}", run.stdout);

@@ -69,6 +69,25 @@ pub enum IoError {
         /// What stands there.
         found: String,
     },
+    /// The file holds no problem in a format that is known.
+    #[error(
+        "{}: expected an FCLIB file (HDF5), or a linear complementarity problem in TOML, Matrix Market or Siconos' text, found {found}",
+        file.display()
+    )]
+    Unknown {
+        /// The file.
+        file: PathBuf,
+        /// What it is instead.
+        found: String,
+    },
+    /// The parts of a linear complementarity problem are readable but do not make a valid problem together.
+    #[error("{}: {problem}", file.display())]
+    Linear {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong with the problem.
+        problem: ProblemError,
+    },
     /// The parts of the problem are readable but do not make a valid problem together.
     #[error("{}: {}{problem}", file.display(), folder(group, problem))]
     Problem {

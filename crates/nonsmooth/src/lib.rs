@@ -52,7 +52,7 @@
 //! | [`problem`] | the statement as plain validated data, the judge, instances with a known solution |
 //! | [`solve`] | the contract of a solver, the one loop, the registry, the algorithms |
 //! | [`dynamics`] | rigid bodies, elastic solids, contacts and scenes that become problems |
-//! | [`io`] | FCLIB's HDF5 files, read and written |
+//! | [`io`] | FCLIB's HDF5 files, and linear complementarity problems as text, read and written |
 //!
 //! What most programs need is re-exported at the root.
 
@@ -62,7 +62,7 @@ pub use nonsmooth_problem as problem;
 pub use nonsmooth_solve as solve;
 
 pub use nonsmooth_dynamics::{Scene, SceneError};
-pub use nonsmooth_io::{IoError, fclib};
+pub use nonsmooth_io::{Content, IoError, fclib, read_any};
 pub use nonsmooth_problem::check::{Certificate, Existence, Judged, Measure, Motion, Verdict};
 pub use nonsmooth_problem::linalg::{Bsr, Csc, Dense, Matrix, Operator};
 pub use nonsmooth_problem::planted::Planted;

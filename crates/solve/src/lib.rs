@@ -26,6 +26,7 @@ mod drive;
 mod error;
 pub mod existence;
 pub mod form;
+pub mod guarantees;
 pub mod interior;
 pub mod local;
 pub mod newton;

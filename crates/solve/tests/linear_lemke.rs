@@ -659,3 +659,124 @@ fn equalities_that_cannot_be_met_are_refuted_or_named() {
         );
     }
 }
+
+/// All solutions of a small LCP whose complementary bases are regular: `None` where one is singular.
+fn enumerated(problem: &Lcp) -> Option<Vec<Vec<f64>>> {
+    let n = problem.dim();
+    let m = problem.M.to_dense().unwrap();
+    let mut found = vec![];
+    for set in 0..1_u32 << n {
+        let basic = |i: usize| set >> i & 1 == 1;
+        // [I or −M] x = q.
+        let mut t = Dense::from_fn(n, n + 1, |i, j| match j {
+            _ if j == n => problem.q[i],
+            _ if basic(j) => -m[(i, j)],
+            _ => f64::from(u8::from(i == j)),
+        });
+        for c in 0..n {
+            let r = (c..n).max_by(|&a, &b| t[(a, c)].abs().total_cmp(&t[(b, c)].abs())).unwrap();
+            if t[(r, c)].abs() < 1e-9 {
+                return None;
+            }
+            for j in 0..=n {
+                (t[(r, j)], t[(c, j)]) = (t[(c, j)], t[(r, j)]);
+            }
+            let pivot = t[(c, c)];
+            (0..=n).for_each(|j| t[(c, j)] /= pivot);
+            for i in (0..n).filter(|&i| i != c) {
+                let y = t[(i, c)];
+                (0..=n).for_each(|j| t[(i, j)] -= y * t[(c, j)]);
+            }
+        }
+        if (0..n).all(|i| t[(i, n)] >= -1e-9) {
+            found.push((0..n).map(|i| if basic(i) { t[(i, n)].max(0.0) } else { 0.0 }).collect());
+        }
+    }
+    Some(found)
+}
+
+#[test]
+fn small_problems_of_any_class_agree_with_enumeration() {
+    let (mut solved, mut refuted, mut open) = (0, 0, 0);
+    for seed in 0..600 {
+        let mut rng = rng(seed);
+        let n = rng.random_range(2..6_usize);
+        let m = Dense::from_fn(n, n, |_, _| f64::from(rng.random_range(-4..6_i32)));
+        let q = (0..n).map(|_| f64::from(rng.random_range(-5..4_i32))).collect();
+        let problem = Lcp::new(m, q).unwrap();
+        let Some(all) = enumerated(&problem) else { continue };
+        for basis in BASES {
+            let found = run(&problem, Lemke { basis, ..Lemke::default() });
+            match found.outcome.status {
+                Status::Solved => {
+                    solved += 1;
+                    let near = |z: &Vec<f64>| {
+                        z.iter().zip(&found.z).all(|(a, b)| (a - b).abs() < 1e-7 * (1.0 + a.abs()))
+                    };
+                    assert!(all.iter().any(near), "{seed}: {:?} is none of {all:?}", found.z);
+                }
+                Status::Infeasible(_) => {
+                    refuted += 1;
+                    assert!(all.is_empty(), "{seed}: {all:?}");
+                }
+                Status::NoConclusion(_) => open += 1,
+                other => panic!("{seed}: {other:?}"),
+            }
+        }
+    }
+    println!("{solved} solved, {refuted} refuted, {open} open");
+    assert!(solved > 500 && refuted > 50);
+}
+
+#[test]
+fn almost_singular_problems_end() {
+    for seed in 0..30 {
+        let n = 40;
+        let mut rng = rng(seed);
+        let (problem, _) = planted(n, Class::Semidefinite, 0.3, seed);
+        let m = problem.M.to_dense().unwrap();
+        // Rows and columns twice, up to rounding, in scales that differ by 1e16.
+        let mut noise = || 1.0 + 1e-14 * rng.random_range(-1.0..1.0_f64);
+        let size = |i: usize| {
+            if i % 3 == 0 {
+                1e-8
+            } else if i % 5 == 0 {
+                1e8
+            } else {
+                1.0
+            }
+        };
+        let twice =
+            Dense::from_fn(2 * n, 2 * n, |i, j| size(i) * size(j) * m[(i % n, j % n)] * noise());
+        let q = (0..2 * n).map(|i| size(i) * problem.q[i % n]).collect();
+        let problem = Lcp::new(twice, q).unwrap();
+        for basis in BASES {
+            let found = run_with(&problem, LemkePath::new(Lemke { basis, ..plain() }), &[], 1e-8);
+            let named = match &found.outcome.status {
+                Status::Stalled(why) => !why.is_empty(),
+                Status::Solved | Status::NoConclusion(_) => true,
+                // It has a solution.
+                _ => false,
+            };
+            assert!(named && found.outcome.iterations < 5000, "{:?}", found.outcome.status);
+            if seed == 0 {
+                println!("{basis:?}: {}", found.outcome.status);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_session_solves_one_problem_after_another() {
+    let mut driver = Driver::new(LemkePath::new(Lemke::default()));
+    for (n, seed) in [(20, 1), (20, 2), (60, 3), (20, 4), (60, 5)] {
+        let (problem, z) = planted(n, Class::Definite, 0.0, seed);
+        let mut point = problem.origin();
+        let limits = Limits { tolerance: 1e-10, ..Limits::default() };
+        let outcome = driver.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+        assert_eq!(outcome.status, Status::Solved);
+        let off: Vec<f64> = z.iter().zip(&point.z).map(|(a, b)| a - b).collect();
+        assert!(norm(&off) <= 1e-8 * norm(&z));
+        assert_eq!(driver.account().len(), 1, "{:?}", driver.account());
+    }
+}

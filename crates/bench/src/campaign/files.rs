@@ -3,8 +3,10 @@
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
-use nonsmooth_io::fclib;
+use nonsmooth_io::linear::LinearFile;
+use nonsmooth_io::{Content, holds_problem, parts as files_of, read_any};
 use nonsmooth_problem::traits::Traits;
+use nonsmooth_problem::{Complementarity, Problem as _, with_complementarity};
 use sha2::{Digest, Sha256};
 
 use crate::finite;
@@ -23,8 +25,8 @@ pub struct Input {
     pub bytes: u64,
 }
 
-/// All `.hdf5` and `.h5` files under the given files and folders, each once, the smallest first. A link to a file has the
-/// name and the folder of the link.
+/// All files that look like problems (`.hdf5` and `.h5`; of `.toml`, `.mtx` and `.dat` those that begin like one) under the given
+/// files and folders, each once, the smallest first. A link to a file has the name and the folder of the link.
 ///
 /// Second: what is wrong with them, one line each: a root that does not exist, cannot be listed, or holds no problem; a
 /// device or a pipe, whose end nobody knows; a name that is not UTF-8.
@@ -37,7 +39,9 @@ pub fn inputs(roots: &[PathBuf]) -> (Vec<Input>, Vec<String>) {
         walk(root, root, &mut here, &mut mistakes);
         if here.is_empty() && mistakes.len() == before {
             let root = root.display();
-            mistakes.push(format!("{root}: expected problems (*.hdf5), found none"));
+            mistakes.push(format!(
+                "{root}: expected problems (*.hdf5, *.toml, *.mtx, *.dat), found none"
+            ));
         }
         for path in here {
             // The same file may be reached from two roots.
@@ -89,21 +93,47 @@ pub fn inputs(roots: &[PathBuf]) -> (Vec<Input>, Vec<String>) {
 ///
 /// Errors: a file that cannot be read, by name.
 pub fn describe(file: &Path) -> Result<Problem, String> {
-    let bytes = std::fs::read(file).map_err(|e| format!("{}: {e}", file.display()))?;
-    let digest = Sha256::digest(&bytes);
-    let digest: String = digest.iter().take(8).map(|b| format!("{b:02x}")).collect();
-    let content = fclib::read(file).map_err(|e| e.to_string())?;
-    let traits = Traits::of(&content.problem, content.info.dofs);
-    Ok(Problem {
-        kind: traits.kind.name().into(),
-        digest,
-        contacts: traits.contacts,
-        unknowns: traits.unknowns,
-        dofs: traits.dofs,
-        density: traits.density(),
-        asymmetry: finite(traits.asymmetry),
-        mu_min: finite(traits.mu.min),
-        mu_max: finite(traits.mu.max),
+    let mut digest = Sha256::new();
+    for part in files_of(file) {
+        let bytes = std::fs::read(&part).map_err(|e| format!("{}: {e}", part.display()))?;
+        digest.update(&bytes);
+    }
+    let digest: String = digest.finalize().iter().take(8).map(|b| format!("{b:02x}")).collect();
+    let described = match read_any(file).map_err(|e| e.to_string())? {
+        Content::Friction(content) => {
+            let traits = Traits::of(&content.problem, content.info.dofs);
+            Problem {
+                kind: traits.kind.name().into(),
+                contacts: traits.contacts,
+                unknowns: traits.unknowns,
+                dofs: traits.dofs,
+                density: traits.density(),
+                asymmetry: finite(traits.asymmetry),
+                mu_min: finite(traits.mu.min),
+                mu_max: finite(traits.mu.max),
+                ..Problem::default()
+            }
+        }
+        Content::Linear(content) => linear(&content),
+    };
+    Ok(Problem { digest, ..described })
+}
+
+/// A linear complementarity problem: its pairs stand where contacts do.
+fn linear(content: &LinearFile) -> Problem {
+    let (pairs, matrix) = match &content.problem {
+        Complementarity::Lcp(p) => (p.dim(), &p.M),
+        Complementarity::Mlcp(p) => (p.pairs(), &p.M),
+        Complementarity::Hlcp(p) => (p.dim(), &p.Q),
+        Complementarity::Box(p) => (p.dim(), &p.M),
+    };
+    let square = matrix.nrows() == matrix.ncols();
+    let asymmetry = if square { matrix.asymmetry() } else { None };
+    with_complementarity!(&content.problem, p => Problem {
+        kind: p.kind().name().into(),
+        contacts: pairs,
+        unknowns: p.unknowns(),
+        asymmetry: asymmetry.and_then(finite),
         ..Problem::default()
     })
 }
@@ -143,7 +173,7 @@ fn walk(root: &Path, path: &Path, found: &mut Vec<PathBuf>, mistakes: &mut Vec<S
             }
             Err(e) => mistakes.push(refused(e)),
         }
-    } else if path == root || path.extension().is_some_and(|e| e == "hdf5" || e == "h5") {
+    } else if path == root || holds_problem(path) {
         // A file that is named is meant, whatever its extension.
         let expected = |what: &str| format!("{}: expected {what}", path.display());
         match std::fs::metadata(path) {
@@ -185,6 +215,32 @@ mod tests {
         assert!(mistakes[0].ends_with("expected a name of its own, found `wall/b` twice"));
     }
 
+    #[test]
+    fn linear_problems_are_found_among_other_texts() {
+        let dir = tempfile::tempdir().unwrap();
+        let make = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+        let matrix = "%%MatrixMarket matrix array real general\n1 1\n";
+        make("a.toml", "# x >= 0\nkind = \"lcp\"\nq = [-1]\nM = [[2]]\n");
+        make("suite.toml", "[[problem]]\nfamily = \"wall\"\n");
+        make("b.mtx", &format!("{matrix}2\n"));
+        make("b_q.mtx", &format!("{matrix}-1\n"));
+        make("c.dat", "1\n0\n1\n1\n1 1\n2\n-1\n");
+        make("d.dat", "time force\n0 1\n");
+        let (found, mistakes) = inputs(&[dir.path().into()]);
+        assert!(mistakes.is_empty(), "{mistakes:?}");
+        let mut names: Vec<_> = found.iter().map(|i| i.path.file_name().unwrap()).collect();
+        names.sort();
+        assert_eq!(names, ["a.toml", "b.mtx", "c.dat"]);
+        let described: Vec<_> = found.iter().map(|i| describe(&i.path).unwrap()).collect();
+        assert!(
+            described.iter().all(|d| (d.kind.as_str(), d.contacts, d.unknowns) == ("lcp", 1, 1))
+        );
+        // The vectors belong to the problem.
+        let before = describe(&dir.path().join("b.mtx")).unwrap().digest;
+        make("b_q.mtx", &format!("{matrix}-3\n"));
+        assert_ne!(before, describe(&dir.path().join("b.mtx")).unwrap().digest);
+    }
+
     #[cfg(unix)]
     #[test]
     fn links_name_their_files_and_what_is_no_file_is_named() {
@@ -216,7 +272,10 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let (found, mistakes) = inputs(&[dir.path().into(), dir.path().join("nowhere")]);
         assert!(found.is_empty());
-        assert!(mistakes[0].ends_with("expected problems (*.hdf5), found none"), "{mistakes:?}");
+        assert!(
+            mistakes[0].ends_with("expected problems (*.hdf5, *.toml, *.mtx, *.dat), found none"),
+            "{mistakes:?}"
+        );
         assert!(mistakes[1].contains("nowhere: No such file"), "{mistakes:?}");
     }
 }

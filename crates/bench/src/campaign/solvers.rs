@@ -1,6 +1,6 @@
 //! Solvers by label, and who makes them.
 
-use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind};
+use nonsmooth_problem::{BoxLcp, FrictionGlobal, FrictionLocal, Hlcp, Kind, Lcp, Mlcp};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::settings::{self, SettingsMap};
 use nonsmooth_solve::{Session, SolveError};
@@ -52,6 +52,10 @@ impl Registry {
         of::<FrictionLocal<2>>(variants, &mut all);
         of::<FrictionGlobal<3>>(variants, &mut all);
         of::<FrictionGlobal<2>>(variants, &mut all);
+        of::<Lcp>(variants, &mut all);
+        of::<Mlcp>(variants, &mut all);
+        of::<BoxLcp>(variants, &mut all);
+        of::<Hlcp>(variants, &mut all);
         all
     }
 }
@@ -85,6 +89,10 @@ impl Label {
             (Kind::FrictionLocal2d, self.refusal::<FrictionLocal<2>>(solvers)),
             (Kind::FrictionGlobal3d, self.refusal::<FrictionGlobal<3>>(solvers)),
             (Kind::FrictionGlobal2d, self.refusal::<FrictionGlobal<2>>(solvers)),
+            (Kind::Lcp, self.refusal::<Lcp>(solvers)),
+            (Kind::Mlcp, self.refusal::<Mlcp>(solvers)),
+            (Kind::BoxLcp, self.refusal::<BoxLcp>(solvers)),
+            (Kind::Hlcp, self.refusal::<Hlcp>(solvers)),
         ];
         let takes =
             |(kind, refusal): &(Kind, Option<SolveError>)| refusal.is_none().then_some(*kind);

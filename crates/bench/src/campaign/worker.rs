@@ -3,9 +3,9 @@
 use std::io::{BufRead, Read, Write};
 use std::time::Instant;
 
-use nonsmooth_io::fclib;
+use nonsmooth_io::{Content, read_any};
 use nonsmooth_problem::check::Measure;
-use nonsmooth_problem::with_friction;
+use nonsmooth_problem::{with_complementarity, with_friction};
 use nonsmooth_solve::registry::Registered;
 use nonsmooth_solve::{Limit, Limits, Outcome, Sample, Status};
 
@@ -45,10 +45,18 @@ pub fn serve(solvers: &impl Solvers) -> Result<(), String> {
     system::limit_memory(job.memory_limit);
     say(&match &job.task {
         Task::Describe => describe(&job.file).map_or_else(Said::Unreadable, Said::Described),
-        Task::Solve { .. } => match fclib::read_problem(&job.file) {
+        Task::Solve { .. } => match read_any(&job.file) {
             Err(e) => Said::Unreadable(e.to_string()),
-            Ok(problem) => with_friction!(&problem, p => solve(p, &job.task, solvers))
-                .unwrap_or_else(Said::Refused),
+            Ok(Content::Friction(file)) => {
+                let problem = file.problem;
+                with_friction!(&problem, p => solve(p, &job.task, solvers))
+                    .unwrap_or_else(Said::Refused)
+            }
+            Ok(Content::Linear(file)) => {
+                let problem = file.problem;
+                with_complementarity!(&problem, p => solve(p, &job.task, solvers))
+                    .unwrap_or_else(Said::Refused)
+            }
         },
     });
     Ok(())
@@ -156,6 +164,7 @@ fn residuals(m: &Measure) -> Residuals {
         complementarity: finite(m.complementarity),
         dynamics: m.dynamics.and_then(finite),
         bilateral: m.bilateral.and_then(finite),
+        rows: m.rows.and_then(finite),
     }
 }
 

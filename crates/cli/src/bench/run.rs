@@ -24,7 +24,7 @@ use crate::{Exit, files, interrupt, output};
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Folders with FCLIB files (*.hdf5, *.h5), or files. A problem's family is the folder that holds it
+    /// Folders with problems (*.hdf5, *.h5, *.toml, *.mtx, *.dat), or files. A problem's family is the folder that holds it
     #[arg(required = true, value_name = "FOLDER")]
     problems: Vec<PathBuf>,
     /// A solver of `nonsmooth list`, perhaps with settings, as auto or nsgs:omega=0.9,local=quartic; may be given
@@ -74,6 +74,7 @@ const EXAMPLES: &str = "\
 Examples:
   nonsmooth bench run problems/ --out runs.jsonl
   nonsmooth bench run problems/ --solver auto --solver nsgs:omega=0.9 --tol 1e-6 --time-limit 60 --out runs.jsonl
+  nonsmooth bench run lcp/ --solver lemke --solver psor:omega=1.2 --out lcp.jsonl
   nonsmooth bench run problems/ --shard 3/8 --out part3.jsonl
 
 Exit codes: 0 all runs are done, whatever came of them; 1 ended by Ctrl-C; 2 some problem, solver or option at fault.";

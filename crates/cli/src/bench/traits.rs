@@ -1,6 +1,6 @@
 //! `nonsmooth bench traits`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use nonsmooth_bench::campaign::inputs;
 use nonsmooth_bench::traits_table::{Described, describe, published, table};
@@ -64,7 +64,11 @@ pub fn describe_all(
     };
     mistakes.iter().for_each(|m| mistake(m));
     let mut described = vec![];
-    for input in &inputs {
+    // Linear complementarity problems have other traits: `nonsmooth info` says which.
+    let linear = |path: &Path| {
+        path.extension().is_some_and(|e| ["toml", "mtx", "dat"].iter().any(|l| e == *l))
+    };
+    for input in inputs.iter().filter(|i| !linear(&i.path)) {
         match describe(&input.path, spectrum_limit) {
             Ok(problem) => described.push(problem),
             Err(e) => mistake(&e.to_string()),

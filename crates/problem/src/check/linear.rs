@@ -218,8 +218,9 @@ fn sizes(m: &Matrix, largest: &mut Vec<f64>, sums: &mut Vec<f64>) {
     }
 }
 
+/// The largest modulus; infinite where an entry is not finite.
 fn largest_of(x: &[f64]) -> f64 {
-    x.iter().fold(0.0, |l, x| if x.is_nan() { f64::NAN } else { l.max(x.abs()) })
+    x.iter().fold(0.0, |l, x| if x.is_finite() { l.max(x.abs()) } else { f64::INFINITY })
 }
 
 impl LinearGauge {
@@ -244,6 +245,11 @@ impl LinearGauge {
         precisely: bool,
     ) -> Measure {
         let data = problem.data();
+        let reach = largest_of(&point.z);
+        if !reach.is_finite() {
+            // An empty column would hide it.
+            return Measure::unknown();
+        }
         self.rows.precisely(precisely);
         self.rows.start(data.q);
         if !self.rows.add_matrix(1.0, data.matrix, &point.z) {
@@ -252,7 +258,6 @@ impl LinearGauge {
         }
         self.w.iter_mut().zip(self.rows.values()).for_each(|(w, sum)| *w = sum);
         let mut sum = Sum::new(self.norm_q);
-        let reach = largest_of(&point.z);
         for (i, (&w, &q)) in self.w.iter().zip(data.q).enumerate() {
             let (s, sigma) = (self.largest[i], self.sums[i]);
             let terms = q.abs() + sigma * reach;
@@ -325,6 +330,10 @@ impl HlcpGauge {
         point: &HlcpPoint,
         precisely: bool,
     ) -> Measure {
+        let (x_reach, s_reach) = (largest_of(&point.x), largest_of(&point.s));
+        if !(x_reach.is_finite() && s_reach.is_finite()) {
+            return Measure::unknown();
+        }
         self.rows.precisely(precisely);
         self.rows.start_at_zero(problem.q.len());
         self.w.iter_mut().zip(&problem.q).for_each(|(w, q)| *w = -q);
@@ -337,7 +346,6 @@ impl HlcpGauge {
         }
         self.w.iter_mut().zip(self.rows.values()).for_each(|(w, sum)| *w = sum);
         let mut sum = Sum::new(self.norm_q);
-        let (x_reach, s_reach) = (largest_of(&point.x), largest_of(&point.s));
         for (i, (&w, &q)) in self.w.iter().zip(&problem.q).enumerate() {
             let terms = q.abs() + self.sums[0][i] * x_reach + self.sums[1][i] * s_reach;
             sum.equality(i, w, terms);

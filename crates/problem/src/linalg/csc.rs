@@ -111,6 +111,11 @@ impl Csc {
         &self.values
     }
 
+    /// Values, to be changed; the pattern stays.
+    pub fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
     /// Column pointers, row indices, and the values to be changed: the structure stays.
     pub fn parts_mut(&mut self) -> (&[usize], &[usize], &mut [f64]) {
         (&self.col_ptr, &self.row_idx, &mut self.values)

@@ -60,6 +60,11 @@ impl Dense {
         &self.values
     }
 
+    /// All entries, row by row, to be changed.
+    pub fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
     /// Becomes the `nrows × ncols` zero matrix, in the memory it has.
     pub fn reset(&mut self, nrows: usize, ncols: usize) {
         (self.nrows, self.ncols) = (nrows, ncols);

@@ -18,6 +18,7 @@ mod inverse;
 mod matrix;
 mod row;
 pub mod small;
+mod square_cholesky;
 mod square_lu;
 
 pub use block_lu::{BlockLu, Singular, Slot};
@@ -29,6 +30,7 @@ pub use dense::Dense;
 pub use groups::Groups;
 pub use inverse::{Inverse, Refine, factorisations, is_positive_definite};
 pub use matrix::{Matrix, Operator};
+pub use square_cholesky::SquareCholesky;
 pub use square_lu::SquareLu;
 
 /// The Euclidean norm, scaled so that neither overflow nor underflow of the squares spoils it.

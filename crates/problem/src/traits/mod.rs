@@ -1,5 +1,6 @@
 //! What a problem is like before anybody solves it: [`Traits`] are cheap, a [`Spectrum`] is dense.
 
+mod classes;
 mod pattern;
 mod spectrum;
 
@@ -8,6 +9,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+pub use classes::{Class, Classes, Effort, Finding, How, Why, Witness};
 pub use pattern::Pattern;
 pub use spectrum::{Spectrum, SpectrumError, rank};
 

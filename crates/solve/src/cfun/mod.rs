@@ -7,6 +7,7 @@ mod fischer_burmeister;
 mod hueber_stadler_wohlmuth;
 mod natural_map;
 mod park_kwak;
+pub mod scalar;
 mod xuewen_soh_wanji;
 
 use crate::cone;

@@ -5,9 +5,69 @@ use nonsmooth_problem::{BoxLcp, Lcp, LcpPoint, Mlcp, Problem};
 
 use crate::SolveError;
 
+/// A problem with a matrix of any shape, `w = M z + q`: each row is an equality `w_i = 0`, or belongs to one variable. Offered by [`Lcp`], [`Mlcp`]
+/// and [`BoxLcp`].
+pub trait Rowwise: Problem<Point = LcpPoint> {
+    /// The problem's data.
+    fn rowwise(&self) -> Rows<'_>;
+}
+
+/// The data of a [`Rowwise`] problem: the first `equalities` rows are equalities, row `equalities + k` belongs to variable `free + k`.
+#[derive(Debug, Clone, Copy)]
+pub struct Rows<'a> {
+    /// M, rows × variables.
+    pub matrix: &'a Matrix,
+    /// q, one entry a row.
+    pub q: &'a [f64],
+    /// The number of equalities.
+    pub equalities: usize,
+    /// The number of variables that belong to no row; they come first, and are free.
+    pub free: usize,
+    /// The bounds of the variables.
+    pub bounds: Bounds<'a>,
+}
+
+impl Rows<'_> {
+    /// Refuses a matrix that is known by its products only.
+    pub fn needs_entries(&self) -> Result<(), SolveError> {
+        needs_entries(self.matrix)
+    }
+}
+
+impl Rowwise for Lcp {
+    fn rowwise(&self) -> Rows<'_> {
+        let bounds = Bounds::Orthant { free: 0 };
+        Rows { matrix: &self.M, q: &self.q, equalities: 0, free: 0, bounds }
+    }
+}
+
+impl Rowwise for Mlcp {
+    fn rowwise(&self) -> Rows<'_> {
+        let Self { M, q, equalities, free } = self;
+        let bounds = Bounds::Orthant { free: *free };
+        Rows { matrix: M, q, equalities: *equalities, free: *free, bounds }
+    }
+}
+
+impl Rowwise for BoxLcp {
+    fn rowwise(&self) -> Rows<'_> {
+        let bounds = Bounds::Box { lower: &self.lower, upper: &self.upper };
+        Rows { matrix: &self.M, q: &self.q, equalities: 0, free: 0, bounds }
+    }
+}
+
+fn needs_entries(matrix: &Matrix) -> Result<(), SolveError> {
+    match matrix {
+        Matrix::Operator(_) => {
+            Err(SolveError::needs("the entries of M (dense or sparse)", "an operator"))
+        }
+        Matrix::Dense(_) | Matrix::Sparse(_) => Ok(()),
+    }
+}
+
 /// A problem with one variable a row: `−w_i ∈ N_[l_i, u_i](z_i)`, `w = M z + q`. Offered by [`Lcp`], [`Mlcp`] (with as many equalities as
 /// free variables) and [`BoxLcp`].
-pub trait Bounded: Problem<Point = LcpPoint> {
+pub trait Bounded: Rowwise {
     /// The problem's data.
     ///
     /// Errors: a mixed problem whose equalities are not as many as its free variables.
@@ -100,12 +160,7 @@ impl<'a> System<'a> {
 
     /// Refuses a matrix that is known by its products only.
     pub fn needs_entries(&self) -> Result<(), SolveError> {
-        match self.matrix {
-            Matrix::Operator(_) => {
-                Err(SolveError::needs("the entries of M (dense or sparse)", "an operator"))
-            }
-            Matrix::Dense(_) | Matrix::Sparse(_) => Ok(()),
-        }
+        needs_entries(self.matrix)
     }
 }
 

@@ -8,7 +8,9 @@
 //! | [`Linear`] | `u = W r + q` for all contacts | local (W), global (product form) |
 //! | [`Explicit`] | entries of matrices that state the symmetric part of W | local (W), global (M, H, G) |
 //! | [`Bounded`] | M, q and the bounds of a linear complementarity problem with one variable a row | LCP, square MLCP, box LCP |
+//! | [`Rowwise`] | the same of any shape: equalities need not be as many as free variables | LCP, MLCP, box LCP |
 //! | [`Complementary`] | in addition, that variables are free or nonnegative | LCP, square MLCP |
+//! | [`Paired`] | Q, R, q of equations between complementary pairs | LCP, square MLCP, hLCP |
 //! | [`Linearised`] | to solve `(Q + P W) x = b` with block-diagonal P, Q | local (in contact space), global (in velocity space) |
 //!
 //! [`Regularised`] offers what the problem inside it does.
@@ -18,15 +20,17 @@ mod explicit;
 mod global;
 mod linearised;
 mod local;
+mod pairs;
 mod regularised;
 
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::linalg::{Block, Singular};
 
-pub use complementarity::{Bounded, Bounds, Complementary, System, system};
+pub use complementarity::{Bounded, Bounds, Complementary, Rows, Rowwise, System, system};
 pub use explicit::{Explicit, Model};
 pub use local::LocalState;
+pub use pairs::{Equations, Paired};
 pub use regularised::{Overwrite, Regularised, RegularisedState};
 
 use crate::SolveError;

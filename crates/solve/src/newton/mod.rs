@@ -26,6 +26,7 @@ mod fischer_burmeister;
 mod fischer_burmeister_smoothed;
 mod hueber_stadler_wohlmuth;
 mod jean_moreau;
+pub mod linear;
 mod natural_map;
 mod park_kwak;
 mod scaling;

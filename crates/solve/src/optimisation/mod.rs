@@ -10,6 +10,7 @@
 mod cadoux;
 mod convex;
 mod inner;
+pub mod linear;
 mod panagiotopoulos;
 mod sets;
 mod tresca;

@@ -64,16 +64,36 @@ impl Search {
         self.filled = 0;
     }
 
-    /// Searches from `merit = Ψ(0)` with `trial(t) = Ψ(t)`. The last call of `trial` is with the step returned.
-    pub fn search(&mut self, merit: f64, mut trial: impl FnMut(f64) -> f64) -> Found {
-        self.memory[self.filled % MEMORY] = merit;
-        self.filled += 1;
-        let reference = match self.rule {
+    /// What the rule compares a merit with: the largest of those remembered and Ψ(0), or Ψ(0) itself.
+    pub fn reference(&self, merit: f64) -> f64 {
+        match self.rule {
             LineSearch::Nonmonotone => {
                 self.memory[..self.filled.min(MEMORY)].iter().fold(merit, |m, v| m.max(*v))
             }
             _ => merit,
-        };
+        }
+    }
+
+    /// Notes the merit at which a step begins that is taken without a search.
+    pub fn remember(&mut self, merit: f64) {
+        self.memory[self.filled % MEMORY] = merit;
+        self.filled += 1;
+    }
+
+    /// Searches from `merit = Ψ(0)` with `trial(t) = Ψ(t)` along a Newton direction. The last call of `trial` is with the step returned.
+    pub fn search(&mut self, merit: f64, trial: impl FnMut(f64) -> f64) -> Found {
+        self.search_along(merit, -2.0 * merit, trial)
+    }
+
+    /// [`search`](Self::search) along any direction of descent: `slope = Ψ'(0)`.
+    pub fn search_along(
+        &mut self,
+        merit: f64,
+        slope: f64,
+        mut trial: impl FnMut(f64) -> f64,
+    ) -> Found {
+        self.remember(merit);
+        let reference = self.reference(merit);
         let sigma = match self.rule {
             LineSearch::GoldsteinPrice => SIGMA_GOLDSTEIN,
             _ => SIGMA,
@@ -90,10 +110,10 @@ impl Search {
             if self.rule == LineSearch::None {
                 return Found { step, merit: value, accepted: value.is_finite() };
             }
-            let enough = value <= reference - 2.0 * sigma * step * merit;
+            let enough = value <= reference + sigma * step * slope;
             let timid = self.rule == LineSearch::GoldsteinPrice
                 && step < 1.0
-                && value < (1.0 - 2.0 * (1.0 - sigma) * step) * merit;
+                && value < merit + (1.0 - sigma) * step * slope;
             if enough && !timid {
                 return Found { step, merit: value, accepted: true };
             }

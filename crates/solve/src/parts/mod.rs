@@ -8,9 +8,11 @@ mod conic;
 mod line_search;
 pub mod nt;
 mod ordering;
+pub mod pairs;
 mod proximal_newton;
 mod pursuit;
 mod sweep;
+mod tableau;
 mod team;
 
 pub use anderson::{Accelerator, Anderson};
@@ -23,4 +25,5 @@ pub use ordering::{Order, Ordering};
 pub use proximal_newton::{Inner, ProximalNewton};
 pub use pursuit::Pursuit;
 pub use sweep::Sweep;
+pub use tableau::{Cycle, Polished, Tableau, equilibrate, refuting_row};
 pub use team::Team;

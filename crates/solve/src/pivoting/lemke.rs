@@ -12,8 +12,8 @@
 //!
 //! References: Acary2018 (25)–(32), with the argmax in (27)(28); Lemke1965; CottlePangStone2009, section 4.4; Kostreva1979 (cycling).
 //!
-//! Cost of a step (a pivot), k basic z: `4 n²` (tableau), `2 k² + 2 k (n − k)` (dense), in proportion to the entries (sparse); for each tied row, one solve more with the transpose. Storage: M again, and the tableau or
-//! the LU with at most `renew_every` columns.
+//! Cost of a step (a pivot), k basic z: `4 n²` (tableau), `2 k² + 2 k (n − k)` (dense), in proportion to the entries (sparse); for each tied row, one
+//! solve more with the transpose. Storage: M again, and the tableau or the LU with at most `renew_every` columns.
 //! Fails: 2ⁿ pivots at worst. A ray proves that there is no solution where M is copositive-plus, and nothing elsewhere. Needs the entries of M.
 
 use nonsmooth_problem::LcpPoint;
@@ -200,6 +200,7 @@ pub struct LemkeWork {
     z: Vec<f64>,
     /// g, by slots.
     g: Vec<f64>,
+    by_slot: Vec<f64>,
     alpha: Vec<bool>,
     rng: Pcg64Mcg,
     record: Recorder<Pivot>,
@@ -229,6 +230,7 @@ impl<P: Complementary> Solver<P> for LemkePath {
             dropped: 0,
             z: vec![],
             g: vec![],
+            by_slot: vec![],
             alpha: vec![],
             rng: Pcg64Mcg::seed_from_u64(self.settings.seed),
             record: Recorder::default(),
@@ -422,7 +424,7 @@ impl LemkePath {
 
     /// g, in the order of the slots: `R d` for basic w, 1 for basic z.
     fn choose_covering(&self, system: &System, work: &mut LemkeWork) {
-        let LemkeWork { path, g, rng, rays, .. } = work;
+        let LemkeWork { path, g, by_slot, rng, rays, .. } = work;
         let n = path.data.n;
         // By rows first.
         g.clear();
@@ -454,15 +456,13 @@ impl LemkePath {
         let unit = (-largest.log2().round()).exp2();
         g.iter_mut().for_each(|g| *g *= unit);
         path.artificial_unit = unit;
-        let by_row = std::mem::take(g);
-        work.g = path
-            .basic
-            .iter()
-            .map(|v| match v {
-                Variable::W(i) => by_row[*i],
-                _ => 1.0,
-            })
-            .collect();
+        let in_slots = by_slot;
+        in_slots.clear();
+        in_slots.extend(path.basic.iter().map(|v| match v {
+            Variable::W(i) => g[*i],
+            _ => 1.0,
+        }));
+        std::mem::swap(g, in_slots);
     }
 
     /// At the end of a ray: a proof, another covering vector, or nothing.
@@ -603,11 +603,14 @@ impl LemkeWork {
         }
     }
 
-    /// From the beginning, with larger pivots and more factorisations.
+    /// From the beginning, with larger pivots, more factorisations and ties that depend less on rounding.
     fn try_again(&mut self, why: &'static str) -> Step {
         self.again += 1;
         if self.again >= TRIES || self.path.breaking == Breaking::First {
             return Step::Stuck(why.into());
+        }
+        if self.path.breaking == Breaking::Lexicographic {
+            self.path.breaking = Breaking::Perturbed;
         }
         self.path.pivot_tolerance = (self.path.pivot_tolerance * 30.0).min(1e-7);
         self.path.renew_every = (self.path.renew_every / 4).max(4);

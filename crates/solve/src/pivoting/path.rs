@@ -213,7 +213,9 @@ impl Path {
         self.start.clear();
         self.start.extend_from_slice(&self.basic);
         self.cycles.begin();
-        self.renew()
+        self.renew()?;
+        // Signs decide here whether there is a path at all: they are those of the data.
+        self.refine()
     }
 
     /// Makes the basis anew, and the values from it.

@@ -2,12 +2,18 @@
 
 mod condense;
 pub mod facets;
+mod mixed;
+mod reduce;
+mod split;
 
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Certificate;
 
 pub use condense::Condense;
 pub use facets::{FacetInner, FacetOuter, Facets};
+pub use mixed::Mixed;
+pub use reduce::Reduce;
+pub use split::Split;
 
 use crate::SolveError;
 

@@ -85,15 +85,6 @@ pub(super) fn facet_names(path: &str) -> Vec<String> {
     [listed(FACET_INNER, Lcp::abouts()), listed(FACET_OUTER, Mlcp::abouts())].concat()
 }
 
-/// The descriptions among which the last part of a composed name is found, if the part before it leads to linear complementarity problems.
-pub(super) fn behind(prefix: &str) -> Option<Vec<&'static About>> {
-    match prefix {
-        FACET_INNER => Some(Lcp::abouts()),
-        FACET_OUTER => Some(Mlcp::abouts()),
-        _ => None,
-    }
-}
-
 /// Whether the answers of a solver of this name obey the law only nearly: facets in space.
 pub(super) fn nearly<const D: usize>(name: &str) -> bool {
     D > 2 && name.split('/').any(|part| [FACET_INNER, FACET_OUTER].contains(&part))

@@ -10,7 +10,7 @@ pub mod linear_abouts;
 
 use std::marker::PhantomData;
 
-use nonsmooth_problem::{Kind, Problem};
+use nonsmooth_problem::{Kind, Lcp, Mlcp, Problem};
 use serde::Serialize;
 
 pub use abouts::*;
@@ -163,6 +163,27 @@ pub const PREFIXES: &[Prefix] = &[
         settings: described::<ProximalPoint>,
     },
     Prefix {
+        name: "reduce",
+        summary: "MLCP to LCP: the free variables eliminated, M = B - D A^-1 C, where A is invertible",
+        from: &[Kind::Mlcp],
+        cites: &["Acary2018"],
+        settings: Vec::new,
+    },
+    Prefix {
+        name: "split",
+        summary: "box LCP to MLCP: bounds by shifts, second bounds by multipliers",
+        from: &[Kind::BoxLcp],
+        cites: &["Acary2018"],
+        settings: Vec::new,
+    },
+    Prefix {
+        name: "mixed",
+        summary: "horizontal LCP to MLCP: s is a free variable",
+        from: &[Kind::Hlcp],
+        cites: &["Acary2018"],
+        settings: Vec::new,
+    },
+    Prefix {
         name: FACET_INNER,
         summary: "contact to LCP: the disk of friction becomes an inscribed polygon; exact in the plane, an approximation in space",
         from: &[Kind::FrictionLocal2d, Kind::FrictionLocal3d],
@@ -201,9 +222,17 @@ pub fn solver_names<P: Registered>() -> Vec<String> {
 /// The description behind a name, composed or not.
 pub fn about<P: Registered>(name: &str) -> Option<&'static About> {
     let (path, last) = name.rsplit_once('/').unwrap_or(("", name));
-    // A prefix may lead to problems of another kind, which have solvers of their own.
     let before = path.rsplit('/').next().unwrap_or(path);
-    facets::behind(before).unwrap_or_else(P::abouts).into_iter().find(|a| a.name == last)
+    behind(before).unwrap_or_else(P::abouts).into_iter().find(|a| a.name == last)
+}
+
+/// The solvers behind a prefix that leads to problems of another kind, with solvers of their own.
+fn behind(prefix: &str) -> Option<Vec<&'static About>> {
+    match prefix {
+        FACET_INNER | "reduce" => Some(Lcp::abouts()),
+        FACET_OUTER | "split" | "mixed" => Some(Mlcp::abouts()),
+        _ => None,
+    }
 }
 
 /// What the answers of the solver behind a name, composed or not, are solutions of.

@@ -209,7 +209,7 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &LinearAuto) -> Vec<Candidate> 
     let n = facts.n;
     Plan::new()
         .when(facts.symmetric && facts.positive_diagonal && n > HUGE, |p| {
-            p.then("mprgp", 20_000, format!("{}, and large", facts.class()))
+            p.then("psor", 5_000, format!("{}, and large", facts.class()))
         })
         .then("newton_min", 300, facts.class())
         .then("newton_fb", 500, "globalised")

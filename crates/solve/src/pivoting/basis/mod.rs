@@ -62,16 +62,15 @@ impl Data {
         } else {
             Columns::Sparse { ptr: vec![], idx: vec![], val: vec![] }
         };
-        let none = Vec::new;
         let mut data = Self {
             n: 0,
             free: 0,
             columns,
-            q: none(),
-            d: none(),
-            p: none(),
-            row: none(),
-            col: none(),
+            q: vec![],
+            d: vec![],
+            p: vec![],
+            row: vec![],
+            col: vec![],
         };
         data.fill(system);
         data
@@ -98,30 +97,22 @@ impl Data {
             Columns::Sparse { ptr, idx, val } => {
                 ptr.clear();
                 ptr.resize(n + 1, 0);
-                let place = |ptr: &mut [usize], j: usize, by: usize| {
-                    let at = ptr[j];
-                    ptr[j] += by;
-                    at
-                };
                 system.matrix.for_each(|_, j, x| ptr[j + 1] += usize::from(x != 0.0));
                 (0..n).for_each(|j| ptr[j + 1] += ptr[j]);
-                for v in [&mut *idx] {
-                    v.clear();
-                    v.resize(ptr[n], 0);
-                }
+                idx.clear();
+                idx.resize(ptr[n], 0);
                 val.clear();
                 val.resize(ptr[n], 0.0);
                 system.matrix.for_each(|i, j, x| {
                     if x != 0.0 {
-                        let at = place(ptr, j, 1);
+                        let at = ptr[j];
+                        ptr[j] += 1;
                         (idx[at], val[at]) = (i, x * row[i] * col[j]);
                     }
                 });
-                // The pointers have moved by one column.
+                // Each pointer has moved to the end of its column.
                 ptr.rotate_right(1);
                 ptr[0] = 0;
-                let last = ptr.len() - 1;
-                ptr[last] = idx.len();
             }
         }
     }

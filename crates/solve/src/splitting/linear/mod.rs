@@ -1,5 +1,17 @@
 //! Splitting methods for linear complementarity problems.
 
+mod pgs;
 mod projected_jacobi;
+mod psor;
+mod rows;
+mod rpgs;
+mod rpsor;
+mod splitting_ls;
 
+pub use pgs::Pgs;
 pub use projected_jacobi::{Jacobi, ProjectedJacobi};
+pub use psor::{Psor, Relaxation};
+pub use rows::Direction;
+pub use rpgs::Rpgs;
+pub use rpsor::{Proximal, Rpsor};
+pub use splitting_ls::{Searched, SplittingLs, Sweep};

@@ -11,6 +11,7 @@
 //! positive definite.
 
 use nonsmooth_problem::LcpPoint;
+use nonsmooth_problem::linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -51,6 +52,7 @@ impl Settings for ProjectedJacobi {
 pub struct Jacobi(pub ProjectedJacobi);
 
 /// The workspace: w and the diagonal.
+#[derive(Debug, Clone, Default)]
 pub struct JacobiWork {
     w: Vec<f64>,
     diagonal: Vec<f64>,
@@ -61,16 +63,29 @@ impl<P: Bounded> Solver<P> for Jacobi {
     type Work = JacobiWork;
 
     fn work(&self, problem: &P) -> Result<JacobiWork, SolveError> {
+        let mut work = JacobiWork::default();
+        self.refill(problem, &mut work)?;
+        Ok(work)
+    }
+
+    fn refill(&self, problem: &P, work: &mut JacobiWork) -> Result<(), SolveError> {
         let system = problem.system()?;
-        let diagonal = system
-            .matrix
-            .diagonal()
-            .ok_or_else(|| SolveError::needs("the diagonal of M", "an operator without one"))?;
+        let JacobiWork { w, diagonal, scale } = work;
+        diagonal.clear();
+        match system.matrix {
+            Matrix::Dense(a) => diagonal.extend((0..system.dim()).map(|i| a[(i, i)])),
+            Matrix::Sparse(a) => diagonal.extend((0..system.dim()).map(|i| a.get(i, i))),
+            Matrix::Operator(a) => diagonal.extend(a.diagonal().ok_or_else(|| {
+                SolveError::needs("the diagonal of M", "an operator without one")
+            })?),
+        }
         if let Some(i) = diagonal.iter().position(|d| d.is_nan() || *d <= 0.0) {
             let found = format!("M[{i}, {i}] = {}", diagonal[i]);
             return Err(SolveError::needs("a positive diagonal of M", found));
         }
-        Ok(JacobiWork { w: vec![0.0; system.dim()], diagonal, scale: system.scale() })
+        w.resize(system.dim(), 0.0);
+        *scale = system.scale();
+        Ok(())
     }
 
     fn start(&self, problem: &P, point: &mut LcpPoint, _: &mut JacobiWork) {

@@ -1,31 +1,36 @@
 //! `nonsmooth gen`.
 
+mod linear;
+
 use std::path::{Path, PathBuf};
 
 use nonsmooth_dynamics::draw::{self, Drawing};
 use nonsmooth_dynamics::{Scene, SceneEntry, SceneError, scenes::SCENES};
 use nonsmooth_io::fclib::{self, FclibFile, Info};
-use nonsmooth_problem::Friction;
+use nonsmooth_problem::{Friction, with_complementarity};
 use nonsmooth_solve::registry;
 use nonsmooth_solve::settings::{self, Setting, SettingsMap};
 use nonsmooth_solve::{Limits, Status};
 use serde_json::Value;
 
-use crate::solve::{Plan, Solved, limits, seconds, solve_any};
+use self::linear::Maker;
+use crate::kinds::Counts;
+use crate::solve::{Plan, Solved, limits, linear_name, seconds, solve as solve_one, solve_any};
 use crate::{Exit, files, output, report, suite};
 
-/// Generate the problem of a scene.
+/// Generate the problem of a scene, or a linear complementarity problem.
 ///
 /// A scene is a set of rigid bodies or elastic solids in contact; its problem is one Moreau-Jean time step from
 /// the initial velocities. Without a scene, or with --list, the scenes and their settings are listed. A suite is a
 /// TOML file that lists problems: each [[problem]] has a family (a scene), and may have a name, a form and
-/// settings; where a setting or the form is a list, there is a problem for each combination.
+/// settings; where a setting or the form is a list, there is a problem for each combination. A linear complementarity problem
+/// (lcp, mlcp, obstacle, ...) is written with the solution that was planted in it, if one was.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES, group(clap::ArgGroup::new("what").args(["scene", "suite"])))]
 pub struct Args {
-    /// The scene, one of `nonsmooth gen --list`
+    /// The scene or linear complementarity problem, one of `nonsmooth gen --list`
     scene: Option<String>,
-    /// A setting of the scene; may be given several times
+    /// A setting of it; may be given several times
     #[arg(long = "set", value_name = "KEY=VALUE", requires = "scene")]
     settings: Vec<String>,
     /// Generate every problem that a file lists, as DIR/FAMILY/NAME.hdf5 below the directory of --out
@@ -36,8 +41,8 @@ pub struct Args {
         conflicts_with_all = ["settings", "form", "draw", "solve", "list"]
     )]
     suite: Option<PathBuf>,
-    /// Write the problem (FCLIB, HDF5)
-    #[arg(long, value_name = "FILE.hdf5", requires = "what")]
+    /// Write the problem: FCLIB (HDF5); a linear complementarity problem as .toml or .mtx
+    #[arg(long, value_name = "FILE", requires = "what")]
     out: Option<PathBuf>,
     /// State it with the velocities of the bodies (M, H, f, w), or at the contacts alone (W, q)
     #[arg(long, value_enum, default_value_t = Form::Global)]
@@ -70,6 +75,7 @@ Examples:
   nonsmooth gen --list
   nonsmooth gen wall --set rows=8 --set mu=0.4 --out wall.hdf5
   nonsmooth gen arch --out arch.hdf5 --form local --solve --draw arch.svg
+  nonsmooth gen lcp --set n=100 --set class=p --set degenerate=0.1 --out hard.toml
   nonsmooth gen --suite docs/benchmarks/suite.toml --out problems/
 
 Exit codes: 0 done; 1 --solve did not reach --tol (the best point is stored); 2 a mistake in the options.";
@@ -89,10 +95,16 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         return suite::run(file, out);
     }
     let Some(name) = args.scene.as_deref() else {
-        output::print(&list(SCENES));
+        output::print(&format!("{}\n{}", list(SCENES), makers(linear::MAKERS)));
         return Ok(Exit::Solved);
     };
-    let entry = SceneEntry::find(name).map_err(|e| e.to_string())?;
+    if let Some(maker) = Maker::find(name) {
+        return linear_problem(maker, args);
+    }
+    let entry = SceneEntry::find(name).map_err(|e| {
+        let others: Vec<_> = linear::MAKERS.iter().map(|m| m.name).collect();
+        format!("{e}; linear complementarity: {}", others.join(", "))
+    })?;
     if args.list {
         output::print(&list(std::slice::from_ref(entry)));
         return Ok(Exit::Solved);
@@ -134,6 +146,57 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     output::print(&text(label, &scene, &content.problem, solved.as_ref(), args.tol));
     let is_solved = |s: &Solved| s.outcome.status == Status::Solved;
     Ok(Exit::solved(solved.as_ref().is_none_or(is_solved)))
+}
+
+/// Writes a linear complementarity problem.
+fn linear_problem(maker: &Maker, args: &Args) -> Result<Exit, String> {
+    let name = maker.name;
+    if args.list {
+        output::print(&makers(std::slice::from_ref(maker)));
+        return Ok(Exit::Solved);
+    }
+    if args.draw.is_some() || args.form != Form::Global {
+        let option = if args.draw.is_some() { "--draw" } else { "--form" };
+        return Err(format!(
+            "{option}: expected a scene, found {name}, a linear complementarity problem"
+        ));
+    }
+    let settings = settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))?;
+    let Some(path) = args.out.as_deref() else {
+        return Err(format!("gen {name}: expected --out FILE.toml, found none"));
+    };
+    linear_name(path)?;
+    files::writable("--out", path)?;
+    let limits = match args.solve {
+        true => Some(limits(args.tol, None, args.time_limit)?),
+        false => None,
+    };
+    let mut content = maker.make(&settings)?;
+    let all = (maker.settings)().into_iter().map(|s| (s.key, s.default));
+    let mut all: SettingsMap = all.collect();
+    all.extend(settings.clone());
+    content.title = Some(format!("{name} {}", join(&settings)).trim_end().into());
+    content.description = Some(format!(
+        "{}, by nonsmooth {}: {}.",
+        maker.summary,
+        env!("CARGO_PKG_VERSION"),
+        join(&all)
+    ));
+    let sizes = with_complementarity!(&content.problem, p => report::problem_text(p));
+    let mut text = format!("{}: {sizes}\n", path.display());
+    let mut exit = Exit::Solved;
+    if let Some(limits) = limits {
+        let tolerance = limits.tolerance;
+        let settings = &SettingsMap::new();
+        let plan = Plan { solver: registry::DEFAULT, settings, limits, progress: true };
+        let solved = with_complementarity!(&content.problem, p => solve_one(path, p, None, &plan))?;
+        solution(&mut text, &solved, tolerance);
+        exit = Exit::solved(solved.outcome.status == Status::Solved);
+        content.solution = Some(solved.point);
+    }
+    nonsmooth_io::linear::write(path, &content).map_err(|e| e.to_string())?;
+    output::print(&text);
+    Ok(exit)
 }
 
 /// The scene and the file of its problem.
@@ -227,12 +290,38 @@ fn text(
     tolerance: f64,
 ) -> String {
     let mut text = summary(label, scene, problem);
-    if let Some(Solved { outcome, verdict, .. }) = solved {
-        let iterations = report::count(outcome.iterations, "iteration");
-        let time = seconds(outcome.seconds);
-        let status = &outcome.status;
-        report::row(&mut text, "solution", format!("{status}, {iterations}, {time}"));
-        report::verdict_text(&mut text, verdict, tolerance, 0);
+    if let Some(solved) = solved {
+        solution(&mut text, solved, tolerance);
+    }
+    text
+}
+
+/// What came of --solve.
+fn solution<S, C: Counts, T>(text: &mut String, solved: &Solved<S, C, T>, tolerance: f64) {
+    let Solved { outcome, verdict, .. } = solved;
+    let iterations = report::count(outcome.iterations, "iteration");
+    let time = seconds(outcome.seconds);
+    let status = &outcome.status;
+    report::row(text, "solution", format!("{status}, {iterations}, {time}"));
+    report::verdict_text(text, verdict, tolerance, 0);
+}
+
+/// The makers of linear complementarity problems and their settings.
+fn makers(all: &[Maker]) -> String {
+    let mut text = String::from(
+        "Linear complementarity problems and their settings, for `nonsmooth gen NAME --set key=value --out FILE.toml`\n",
+    );
+    // Those with the same settings, one after the other, have them once.
+    let mut before: Option<Vec<Setting>> = None;
+    for maker in all {
+        let settings = (maker.settings)();
+        text += &format!("\n{}: {}\n", maker.name, maker.summary);
+        if before.as_ref() == Some(&settings) {
+            text += "  the same settings\n";
+        } else {
+            settings.iter().for_each(|s| text += &line(s));
+        }
+        before = Some(settings);
     }
     text
 }

@@ -1,97 +1,43 @@
-//! `nonsmooth info`.
+//! What `nonsmooth info` says of frictional contact problems.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use nonsmooth_io::fclib::{self, FclibFile};
-use nonsmooth_problem::check::Existence;
+use nonsmooth_io::fclib::{FclibFile, StoredPoint};
+use nonsmooth_problem::check::{ContactStatus, Existence, StatusCounts};
 use nonsmooth_problem::linalg::Inverse;
 use nonsmooth_problem::traits::{Components, Mass, MuRange, Spectrum, SpectrumError, Traits};
-use nonsmooth_problem::{Dynamics, Friction, FrictionGlobal, ProblemError, with_friction};
-use nonsmooth_solve::{Limits, existence};
+use nonsmooth_problem::{Dynamics, Friction, FrictionGlobal, ProblemError};
 use serde_json::{Value, json};
 
+use super::{JUDGED_AT, symmetry};
+use crate::exists;
 use crate::kinds::Form;
 use crate::report::{self, Object, count, number, row};
-use crate::{Exit, exists, files, interrupt, output};
-
-/// Describe the problems in files: sizes, structure, friction, and what is stored besides.
-///
-/// The contact density is c = D nc / n, the components of the contact impulses over the degrees of freedom:
-/// above 1 the impulses need not be unique (hyperstatic), and iterative solvers slow down.
-#[derive(Debug, clap::Args)]
-#[command(after_help = EXAMPLES)]
-pub struct Args {
-    /// FCLIB files (HDF5)
-    #[arg(required = true, value_name = "FILE")]
-    files: Vec<PathBuf>,
-    /// Compute the singular values of W: its rank, rank ratio and condition number. Time grows with the third
-    /// power of the rows of W: a second or so for 1000
-    #[arg(long)]
-    spectrum: bool,
-    /// The most rows for which the spectrum is computed
-    #[arg(long, value_name = "ROWS", default_value = "2000", value_parser = files::whole, requires = "spectrum")]
-    spectrum_limit: usize,
-    /// Decide whether a solution exists, as `nonsmooth exists` does, in at most 60 seconds. Without this, a short search
-    /// proves it for most problems of up to 2000 contacts
-    #[arg(long)]
-    existence: bool,
-    /// Print one line of JSON for each file
-    #[arg(long)]
-    json: bool,
-}
-
-const EXAMPLES: &str = "\
-Examples:
-  nonsmooth info wall.hdf5
-  nonsmooth info wall.hdf5 --spectrum --existence
-  nonsmooth info *.hdf5 --json";
-
-/// Runs the command.
-pub fn run(args: &Args) -> Result<Exit, String> {
-    let limits = args.existence.then(|| Limits {
-        time_limit: Some(EXISTENCE_SECONDS),
-        cancel: Some(interrupt::flag()),
-        ..Limits::default()
-    });
-    Ok(files::each(&args.files, args.json, |_, file| {
-        let content = fclib::read(file).map_err(|e| e.to_string())?;
-        let limit = args.spectrum.then_some(args.spectrum_limit);
-        let mut facts = with_friction!(&content.problem, p => facts(file, p, &content, limit))?;
-        if facts.singular.is_none() {
-            facts.existence = match &limits {
-                Some(limits) => Some(existence::of(&content.problem, limits)),
-                None => facts.is_small().then(|| existence::glance(&content.problem)),
-            };
-        }
-        output::print(&if args.json {
-            format!("{}\n", facts.json(&content))
-        } else {
-            facts.text(file, &content)
-        });
-        Ok(Exit::Solved)
-    }))
-}
 
 /// What there is to say of a problem.
-struct Facts {
+pub(super) struct Facts {
     sizes: Object,
     size_text: String,
     traits: Traits,
     /// Why a global problem's dynamics cannot be inverted, so that there is nothing to solve.
-    singular: Option<ProblemError>,
+    pub(super) singular: Option<ProblemError>,
     /// If asked for, or cheap.
-    existence: Option<Existence>,
+    pub(super) existence: Option<Existence>,
     /// If asked for.
     spectrum: Option<Result<Spectrum, SpectrumError>>,
     solution: Option<nonsmooth_problem::check::Verdict>,
 }
 
-fn facts<P: Form>(
+/// Everything about a problem but the existence of a solution.
+pub(super) fn facts<P>(
     file: &Path,
     problem: &P,
     content: &FclibFile,
     spectrum: Option<usize>,
-) -> Result<Facts, String> {
+) -> Result<Facts, String>
+where
+    P: Form<Stored = StoredPoint, Status = ContactStatus, Counts = StatusCounts>,
+{
     let judge = |stored| problem.judge(&problem.point(stored), JUDGED_AT);
     let solution = match content.solution.as_ref().map(judge).transpose() {
         // Said of M.
@@ -113,15 +59,10 @@ fn facts<P: Form>(
     })
 }
 
-/// The time for the existence of a solution.
-const EXISTENCE_SECONDS: f64 = 60.0;
 /// A short search for existence takes up to about a second with so many contacts, unless a body has many unknowns.
 const FEW_CONTACTS: usize = 2000;
 /// Unknowns of a rigid body or a small elastic one.
 const SMALL_BODY: usize = 48;
-
-/// The tolerance at which a stored solution is judged.
-const JUDGED_AT: f64 = 1e-8;
 
 fn singular<const D: usize>(p: &FrictionGlobal<D>) -> Option<ProblemError> {
     // Bilateral constraints may make up for a singular M in the dynamics, but M⁻¹ is needed all the same.
@@ -133,12 +74,13 @@ fn singular<const D: usize>(p: &FrictionGlobal<D>) -> Option<ProblemError> {
 
 impl Facts {
     /// A short search for existence costs next to nothing.
-    fn is_small(&self) -> bool {
+    pub(super) fn is_small(&self) -> bool {
         let bodies = self.traits.mass.iter().flat_map(|m| &m.components);
         self.traits.contacts <= FEW_CONTACTS && bodies.map(|c| c.size).all(|s| s <= SMALL_BODY)
     }
 
-    fn json(&self, content: &FclibFile) -> Value {
+    /// As JSON.
+    pub(super) fn json(&self, content: &FclibFile) -> Value {
         let mut all = self.sizes.clone();
         let traits = &self.traits;
         all.extend(report::fields(json!({
@@ -182,14 +124,10 @@ impl Facts {
         Value::Object(all)
     }
 
-    fn text(&self, file: &Path, content: &FclibFile) -> String {
+    /// As text.
+    pub(super) fn text(&self, file: &Path, content: &FclibFile) -> String {
         let mut text = format!("{}: {}\n", file.display(), self.size_text);
-        let info = &content.info;
-        for (label, said) in [("title", &info.title), ("about", &info.description)] {
-            if let Some(said) = said.as_deref().map(str::trim).filter(|s| !s.is_empty()) {
-                row(&mut text, label, said.replace('\n', "\n             "));
-            }
-        }
+        super::texts(&mut text, &content.info.title, &content.info.description);
         let traits = &self.traits;
         let dofs = match (traits.dofs, traits.density()) {
             (Some(n), Some(c)) => {
@@ -253,13 +191,6 @@ impl Facts {
             }
         }
         text
-    }
-}
-
-fn symmetry(asymmetry: f64) -> String {
-    match asymmetry {
-        0.0 => "symmetric".into(),
-        a => format!("asymmetry {}", number(a)),
     }
 }
 

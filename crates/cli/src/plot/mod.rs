@@ -1,7 +1,10 @@
-//! The history of a solve as a picture.
+//! The history of a solve as a picture, and below it what the method recorded.
+
+mod trace;
 
 use nonsmooth_bench::draw::{Axis, GRID, INK, decades, font, tick, ticks};
 use nonsmooth_solve::Sample;
+use nonsmooth_solve::trace::Trace;
 use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -17,18 +20,34 @@ const KEPT: usize = 800;
 /// Decades that a picture shows at most.
 const DEPTH: f64 = 20.0;
 
-/// Draws the relative residual against iterations and against time, two panels side by side, as a standalone SVG.
-pub fn svg(title: &str, history: &[Sample], tolerance: f64) -> Result<String, String> {
+/// Draws the relative residual against iterations and against time, two panels side by side, as a standalone SVG; below them
+/// two panels of the method's record, if there is one.
+pub fn svg(
+    title: &str,
+    history: &[Sample],
+    trace: &Trace,
+    tolerance: f64,
+) -> Result<String, String> {
     let mut text = String::new();
-    draw(&mut text, title, history, tolerance).map_err(|e| format!("plot: {e}"))?;
+    draw(&mut text, title, history, trace, tolerance).map_err(|e| format!("plot: {e}"))?;
     Ok(text)
 }
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
-fn draw(text: &mut String, title: &str, history: &[Sample], tolerance: f64) -> Drawn {
-    let root = SVGBackend::with_string(text, SIZE).into_drawing_area();
-    root.fill(&WHITE)?;
+fn draw(
+    text: &mut String,
+    title: &str,
+    history: &[Sample],
+    trace: &Trace,
+    tolerance: f64,
+) -> Drawn {
+    let recorded = trace::panels(trace);
+    let (width, height) = SIZE;
+    let below = if recorded.is_some() { trace::HEIGHT } else { 0 };
+    let whole = SVGBackend::with_string(text, (width, height + below)).into_drawing_area();
+    whole.fill(&WHITE)?;
+    let (root, record) = whole.split_vertically(height);
     let curves = Curves::new(history, tolerance);
     let notes = curves.notes();
     let (head, body) = root.split_vertically(36 + 18 * notes.len() as u32);
@@ -60,7 +79,12 @@ fn draw(text: &mut String, title: &str, history: &[Sample], tolerance: f64) -> D
     };
     curves.panel(&left, "iterations", true, |s| s.iteration as f64)?;
     curves.panel(&right, unit, false, |s| scale * s.seconds)?;
-    root.present()?;
+    if let Some([left_panel, right_panel]) = recorded {
+        let (left, right) = record.split_horizontally(width / 2);
+        left_panel.draw(&left)?;
+        right_panel.draw(&right)?;
+    }
+    whole.present()?;
     Ok(())
 }
 
@@ -215,7 +239,7 @@ mod tests {
     }
 
     fn picture(residuals: impl IntoIterator<Item = f64>) -> String {
-        let svg = svg("a <b> & c", &history(residuals), 1e-8).unwrap();
+        let svg = svg("a <b> & c", &history(residuals), &Trace::None, 1e-8).unwrap();
         assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
         assert!(svg.contains("a &lt;b&gt; &amp; c"), "the title is escaped");
         assert!(!svg.contains("\"NaN") && !svg.contains("\"inf"));

@@ -1,0 +1,285 @@
+//! What `nonsmooth info` says of linear complementarity problems.
+
+use std::path::Path;
+
+use nonsmooth_io::linear::LinearFile;
+use nonsmooth_problem::check::{Judged, RowCounts, RowStatus, Verdict};
+use nonsmooth_problem::linalg::Matrix;
+use nonsmooth_problem::traits::{Classes, Effort, Finding};
+use nonsmooth_problem::{Complementarity, Mlcp, with_complementarity};
+use nonsmooth_solve::guarantees::{Guarantee, guaranteed};
+use serde_json::{Value, json};
+
+use super::{JUDGED_AT, symmetry, texts};
+use crate::kinds::Form;
+use crate::report::{self, Object, count, number, row};
+
+/// What there is to say of a problem.
+pub(super) struct Facts {
+    sizes: Object,
+    size_text: String,
+    matrices: Vec<(&'static str, Entries)>,
+    q: Right,
+    /// What is known of M; of problems that have no other.
+    classes: Option<Classes>,
+    /// The solvers that are sure to work; of an LCP.
+    guaranteed: Vec<Guarantee>,
+    solution: Option<Verdict<RowStatus, RowCounts>>,
+}
+
+/// What the entries of a matrix say at a glance.
+struct Entries {
+    rows: usize,
+    columns: usize,
+    dense: bool,
+    /// Entries that are not zero.
+    nonzeros: usize,
+    /// `max |a_ij − a_ji| / max |a_ij|`; of square matrices.
+    asymmetry: Option<f64>,
+    /// Entries on the diagonal: positive, zero, negative.
+    diagonal: [usize; 3],
+    /// Entries off the diagonal: positive, negative.
+    off: [usize; 2],
+    /// The largest moduli of the rows, from the least to the largest; zero rows left out.
+    scale: Option<(f64, f64)>,
+    zero_rows: usize,
+}
+
+/// What q says at a glance.
+struct Right {
+    negative: usize,
+    zero: usize,
+    norm: f64,
+}
+
+pub(super) fn facts(file: &Path, content: &LinearFile) -> Result<Facts, String> {
+    let (matrices, q): (Vec<(&'static str, &Matrix)>, &[f64]) = match &content.problem {
+        Complementarity::Lcp(p) => (vec![("M", &p.M)], &p.q),
+        Complementarity::Box(p) => (vec![("M", &p.M)], &p.q),
+        Complementarity::Mlcp(p) => (vec![("M", &p.M)], &p.q),
+        Complementarity::Hlcp(p) => (vec![("Q", &p.Q), ("R", &p.R)], &p.q),
+    };
+    let mut matrices: Vec<_> = matrices.into_iter().map(|(n, m)| (n, Entries::of(m))).collect();
+    if let Complementarity::Mlcp(p) = &content.problem {
+        matrices.extend(blocks(p));
+    }
+    let solution = with_complementarity!(&content.problem, p => {
+        let judge = |stored| p.judge(&p.point(stored), JUDGED_AT);
+        content.solution.as_ref().map(judge).transpose()
+    });
+    let classes = match &content.problem {
+        Complementarity::Lcp(p) => Some(classes(&p.M)),
+        Complementarity::Box(p) => Some(classes(&p.M)),
+        Complementarity::Mlcp(_) | Complementarity::Hlcp(_) => None,
+    };
+    let guaranteed = match (&content.problem, &classes) {
+        (Complementarity::Lcp(_), Some(classes)) => guaranteed(classes),
+        _ => vec![],
+    };
+    Ok(Facts {
+        classes,
+        guaranteed,
+        sizes: with_complementarity!(&content.problem, p => report::problem_json(file, p)),
+        size_text: with_complementarity!(&content.problem, p => report::problem_text(p)),
+        matrices,
+        q: Right {
+            negative: q.iter().filter(|q| **q < 0.0).count(),
+            zero: q.iter().filter(|q| **q == 0.0).count(),
+            norm: nonsmooth_problem::linalg::norm(q),
+        },
+        solution: solution.map_err(|e| format!("{}: {e}", file.display()))?,
+    })
+}
+
+/// What the entries, a few factorisations, and of small matrices exact tests say of M.
+fn classes(m: &Matrix) -> Classes {
+    /// Rows above which more than a factorisation or two takes long.
+    const MANY: usize = 2000;
+    match m.nrows() {
+        0..=MANY => Classes::of(m, Effort::default()),
+        _ => Classes::quick(m),
+    }
+}
+
+/// Classes in three lines: those that M is in, is not in, and those of which nothing is known.
+fn classes_text(text: &mut String, classes: &Classes) {
+    let (mut is, mut is_not, mut unknown) = (vec![], vec![], vec![]);
+    for (class, finding) in classes.iter() {
+        match finding {
+            Finding::Proven { .. } => is.push(class.to_string()),
+            Finding::Refuted { witness, .. } => is_not.push(format!("{class} ({witness})")),
+            Finding::Unknown { why } => unknown.push(format!("{class} ({why})")),
+        }
+    }
+    for (label, all) in [("M is", is), ("M is not", is_not), ("unknown", unknown)] {
+        if !all.is_empty() {
+            row(text, label, all.join(", "));
+        }
+    }
+}
+
+/// The blocks of a mixed problem.
+fn blocks(p: &Mlcp) -> Vec<(&'static str, Entries)> {
+    let (rows, columns) = (p.M.nrows(), p.M.ncols());
+    let (r, c) = (p.equalities, p.free);
+    let all = [
+        ("A", 0..r, 0..c),
+        ("B", r..rows, c..columns),
+        ("C", 0..r, c..columns),
+        ("D", r..rows, 0..c),
+    ];
+    let block = |(name, rows, columns)| Some((name, Entries::of(&p.block(rows, columns)?.into())));
+    all.into_iter().filter_map(block).collect()
+}
+
+impl Entries {
+    fn of(m: &Matrix) -> Self {
+        let (rows, columns) = (m.nrows(), m.ncols());
+        let mut diagonal = [0, rows.min(columns), 0];
+        let mut off = [0; 2];
+        let (mut nonzeros, mut largest) = (0, vec![0.0_f64; rows]);
+        m.for_each(|i, j, x| {
+            largest[i] = largest[i].max(x.abs());
+            nonzeros += usize::from(x != 0.0);
+            match (i == j, x > 0.0) {
+                _ if x == 0.0 => {}
+                (true, positive) => {
+                    diagonal[1] -= 1;
+                    diagonal[if positive { 0 } else { 2 }] += 1;
+                }
+                (false, positive) => off[usize::from(!positive)] += 1,
+            }
+        });
+        let there = || largest.iter().copied().filter(|x| *x > 0.0);
+        Self {
+            rows,
+            columns,
+            dense: matches!(m, Matrix::Dense(_)),
+            nonzeros,
+            asymmetry: (rows == columns && rows > 0).then(|| m.asymmetry()).flatten(),
+            diagonal,
+            off,
+            scale: (nonzeros > 0)
+                .then(|| (there().fold(f64::INFINITY, f64::min), there().fold(0.0, f64::max))),
+            zero_rows: rows - there().count(),
+        }
+    }
+
+    fn density(&self) -> f64 {
+        self.nonzeros as f64 / (self.rows * self.columns).max(1) as f64
+    }
+
+    /// The signs in a few words; a Z-matrix has no positive entry off its diagonal.
+    fn signs(&self) -> String {
+        let [positive, zero, negative] = self.diagonal;
+        let diagonal = match self.diagonal {
+            [_, 0, 0] => "positive diagonal".into(),
+            [0, _, 0] => "zero diagonal".into(),
+            _ => {
+                let each = [(positive, "positive"), (zero, "zero"), (negative, "negative")];
+                let some: Vec<_> = each.iter().filter(|e| e.0 > 0).collect();
+                let some: Vec<_> = some.iter().map(|(n, what)| format!("{n} {what}")).collect();
+                format!("diagonal {}", some.join(", "))
+            }
+        };
+        let off = match self.off {
+            [0, 0] => "nothing off it",
+            [0, _] => "no positive entry off it (Z)",
+            [_, 0] => "no negative entry off it",
+            _ => "both signs off it",
+        };
+        format!("{diagonal}, {off}")
+    }
+
+    fn json(&self) -> Value {
+        let [positive, zero, negative] = self.diagonal;
+        json!({
+            "rows": self.rows,
+            "columns": self.columns,
+            "storage": if self.dense { "dense" } else { "sparse" },
+            "nonzeros": self.nonzeros,
+            "density": self.density(),
+            "asymmetry": self.asymmetry,
+            "diagonal": {"positive": positive, "zero": zero, "negative": negative},
+            "off_diagonal": {"positive": self.off[0], "negative": self.off[1]},
+            "row_scale": self.scale.map(|(min, max)| json!({"min": min, "max": max})),
+            "zero_rows": self.zero_rows,
+        })
+    }
+
+    fn text(&self) -> String {
+        let Self { rows, columns, .. } = self;
+        let stored = if self.dense { "dense" } else { "sparse" };
+        if rows * columns == 0 || self.nonzeros == 0 {
+            return format!("{rows} x {columns}, zero");
+        }
+        let density = match 100.0 * self.density() {
+            d if d >= 10.0 => format!("{d:.0} %"),
+            d => format!("{d:.2} %"),
+        };
+        let mut text = format!(
+            "{rows} x {columns}, {stored}, {} ({density})",
+            count(self.nonzeros, "nonzero")
+        );
+        if let Some(asymmetry) = self.asymmetry {
+            text += &format!(", {}, {}", symmetry(asymmetry), self.signs());
+        }
+        if let Some((min, max)) = self.scale.filter(|(min, max)| max > min) {
+            text += &format!(", rows from {} to {}", number(min), number(max));
+        }
+        if self.zero_rows > 0 {
+            text += &format!(", {}", count(self.zero_rows, "zero row"));
+        }
+        text
+    }
+}
+
+impl Facts {
+    /// As JSON.
+    pub(super) fn json(&self, content: &LinearFile) -> Value {
+        let mut all = self.sizes.clone();
+        let matrices: Object =
+            self.matrices.iter().map(|(name, m)| ((*name).to_owned(), m.json())).collect();
+        all.extend(report::fields(json!({
+            "title": content.title,
+            "description": content.description,
+            "matrices": matrices,
+            "q": {"negative": self.q.negative, "zero": self.q.zero, "norm": self.q.norm},
+            "classes": self.classes,
+            "guaranteed": self.guaranteed,
+            "solution": self.solution.as_ref().map(|v| report::verdict_json(v, JUDGED_AT, v.worst.len())),
+        })));
+        Value::Object(all)
+    }
+
+    /// As text.
+    pub(super) fn text(&self, file: &Path, content: &LinearFile) -> String {
+        let mut text = format!("{}: {}\n", file.display(), self.size_text);
+        texts(&mut text, &content.title, &content.description);
+        for (name, m) in &self.matrices {
+            row(&mut text, name, m.text());
+        }
+        if let Some(classes) = &self.classes {
+            classes_text(&mut text, classes);
+        }
+        for (k, guarantee) in self.guaranteed.iter().enumerate() {
+            row(&mut text, if k == 0 { "sure" } else { "" }, guarantee);
+        }
+        let Right { negative, zero, norm } = self.q;
+        let trivial = match (&content.problem, negative) {
+            (Complementarity::Lcp(_), 0) => "; z = 0 solves it",
+            _ => "",
+        };
+        let q = format!("{negative} negative, {zero} zero, norm {}{trivial}", number(norm));
+        row(&mut text, "q", q);
+        match &self.solution {
+            None => row(&mut text, "solution", "none stored"),
+            Some(verdict) => {
+                let passes = if verdict.solved { "passes" } else { "does not pass" };
+                row(&mut text, "solution", format!("stored, {passes} at {JUDGED_AT:e}"));
+                report::verdict_text(&mut text, verdict, JUDGED_AT, 0);
+            }
+        }
+        text
+    }
+}

@@ -1,0 +1,309 @@
+//! Matrix Market: `NAME.mtx` is M, `NAME_q.mtx` beside it q. `NAME_l.mtx` and `NAME_u.mtx`, where they are, make it a box LCP;
+//! `NAME_z.mtx` is a solution.
+//!
+//! Matrices are `coordinate` or `array`, `real` or `integer`, `general`, `symmetric` or `skew-symmetric`. Vectors are matrices of one column, or plain
+//! lists of numbers. Values pass bit for bit; a matrix of `coordinate` is sparse, one of `array` dense.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
+use nonsmooth_problem::{BoxLcp, Complementarity, Lcp};
+
+use super::tokens::Tokens;
+use super::{Digits, LinearFile, LinearPoint, check, text, toml};
+use crate::IoError;
+use crate::replace::{WRITABLE, replace};
+
+/// What stands between the name of the matrix and the extension of its vectors' files: q, lower and upper bounds, a solution.
+const PARTS: [&str; 4] = ["_q", "_l", "_u", "_z"];
+
+/// The files of q, l, u and z that belong to the matrix in `path`.
+pub(crate) fn vectors(path: &Path) -> [PathBuf; 4] {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    PARTS.map(|part| path.with_file_name(format!("{stem}{part}.mtx")))
+}
+
+/// Whether a file is the vector of a matrix beside it.
+pub(crate) fn is_part(path: &Path) -> bool {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let matrix = PARTS.iter().find_map(|part| stem.strip_suffix(part));
+    matrix.is_some_and(|matrix| path.with_file_name(format!("{matrix}.mtx")).is_file())
+}
+
+/// Reads M and the vectors beside it.
+///
+/// Errors: no file of q; a file that is damaged, by its line; one bound without the other; parts that do not fit.
+pub fn read(path: impl AsRef<Path>) -> Result<LinearFile, IoError> {
+    let path = path.as_ref();
+    let m = matrix(path, &text(path)?)?;
+    let [q, l, u, z] = vectors(path);
+    let vector = |file: &Path| vector(file, &text(file)?);
+    if !q.is_file() {
+        let name = q.file_name().unwrap_or_default().to_string_lossy();
+        return Err(IoError::data(path, "q", format!("a file {name} beside the matrix"), "none"));
+    }
+    let q = vector(&q)?;
+    let bounds = match (l.is_file(), u.is_file()) {
+        (false, false) => None,
+        (true, true) => Some((vector(&l)?, vector(&u)?)),
+        (there, _) => {
+            let (missing, there) = if there { (&u, &l) } else { (&l, &u) };
+            let name = |p: &Path| p.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let expected = format!("a file {} beside {}", name(missing), name(there));
+            return Err(IoError::data(path, "bounds", expected, "none"));
+        }
+    };
+    let problem = match bounds {
+        None => Lcp::new(m, q).map(Complementarity::Lcp),
+        Some((l, u)) => BoxLcp::new(m, q, l, u).map(Complementarity::Box),
+    };
+    let problem = problem.map_err(|problem| IoError::Linear { file: path.into(), problem })?;
+    let solution = match z.is_file() {
+        true => Some(LinearPoint { z: vector(&z)?, w: None }),
+        false => None,
+    };
+    let content = LinearFile { solution, ..LinearFile::new(problem) };
+    check(path, &content)?;
+    Ok(content)
+}
+
+/// What the first line says.
+struct Banner {
+    coordinate: bool,
+    symmetry: Symmetry,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Symmetry {
+    General,
+    Symmetric,
+    Skew,
+}
+
+/// The words after the first line and the comments below it.
+fn banner<'a>(path: &'a Path, text: &'a str) -> Result<(Banner, Tokens<'a>), IoError> {
+    let mut tokens = Tokens::new(path, text);
+    let first = tokens.line().trim().to_lowercase();
+    let words: Vec<_> = first.split_whitespace().collect();
+    let wrong = |expected: &str, found: &str| {
+        Err(IoError::data(path, "line 1", expected, format!("`{found}`")))
+    };
+    let [_, "matrix", layout, field, symmetry] = words[..] else {
+        return wrong("`%%MatrixMarket matrix LAYOUT FIELD SYMMETRY`", &first);
+    };
+    if words[0] != "%%matrixmarket" {
+        return wrong("`%%MatrixMarket`", words[0]);
+    }
+    if !["coordinate", "array"].contains(&layout) {
+        return wrong("coordinate or array", layout);
+    }
+    if !["real", "integer", "double"].contains(&field) {
+        return wrong("real or integer", field);
+    }
+    let symmetry = match symmetry {
+        "general" => Symmetry::General,
+        "symmetric" => Symmetry::Symmetric,
+        "skew-symmetric" => Symmetry::Skew,
+        other => return wrong("general, symmetric or skew-symmetric", other),
+    };
+    loop {
+        let mut ahead = tokens.clone();
+        match ahead.word() {
+            Some(word) if word.starts_with('%') => {
+                ahead.line();
+                tokens = ahead;
+            }
+            _ => break,
+        }
+    }
+    Ok((Banner { coordinate: layout == "coordinate", symmetry }, tokens))
+}
+
+fn matrix(path: &Path, text: &str) -> Result<Matrix, IoError> {
+    let (Banner { coordinate, symmetry }, mut t) = banner(path, text)?;
+    let made = match coordinate {
+        true => sparse(&mut t, symmetry)?.into(),
+        false => dense(&mut t, symmetry)?.into(),
+    };
+    match t.word() {
+        None => Ok(made),
+        Some(word) => Err(t.wrong("after the last entry", "the end of the file", Some(word))),
+    }
+}
+
+fn mirrored(t: &Tokens, symmetry: Symmetry, rows: usize, columns: usize) -> Result<(), IoError> {
+    if symmetry != Symmetry::General && rows != columns {
+        let found = format!("{rows} × {columns}");
+        return Err(t.wrong("the shape", "a square matrix, as it is symmetric", Some(&found)));
+    }
+    Ok(())
+}
+
+fn sparse(t: &mut Tokens, symmetry: Symmetry) -> Result<Csc, IoError> {
+    // A column without entries leaves no trace in the file, but a vector beside it must have its row.
+    const MOST: usize = 1 << 40;
+    let below = |n: usize| n <= MOST;
+    let rows = t.one_of("the number of rows", "a whole number", below)?;
+    let columns = t.one_of("the number of columns", "a whole number", below)?;
+    mirrored(t, symmetry, rows, columns)?;
+    let count = t.count("the number of entries")?;
+    // Each row and column of a matrix without zero columns has an entry; more than the file has room for cannot be meant.
+    if rows.max(columns) > t.left().max(1 << 20) {
+        let found = format!("{rows} × {columns}");
+        return Err(t.wrong("the shape", "a matrix that the entries can fill", Some(&found)));
+    }
+    let mut entries = Vec::with_capacity(2 * count);
+    for k in 0..count {
+        let what = format!("entry {k}");
+        let index = |t: &mut Tokens, size: usize| {
+            let expected = format!("an index from 1 to {size}");
+            t.one_of(&what, &expected, |i| (1..=size).contains(&i)).map(|i| i - 1)
+        };
+        let (i, j) = (index(t, rows)?, index(t, columns)?);
+        let x = t.real(|| format!("entry {k}"))?;
+        entries.push((i, j, x));
+        match symmetry {
+            Symmetry::Symmetric if i != j => entries.push((j, i, x)),
+            Symmetry::Skew if i != j => entries.push((j, i, -x)),
+            _ => {}
+        }
+    }
+    let made = Csc::from_triplets(rows, columns, entries.iter().copied());
+    made.map_err(|e| t.wrong("the entries", "indices inside the matrix", Some(&e.to_string())))
+}
+
+/// By columns; of a symmetric matrix the lower triangle, of a skew one without the diagonal.
+fn dense(t: &mut Tokens, symmetry: Symmetry) -> Result<Dense, IoError> {
+    let rows = t.count("the number of rows")?;
+    let columns = t.count("the number of columns")?;
+    mirrored(t, symmetry, rows, columns)?;
+    let stated = match symmetry {
+        Symmetry::General => rows.checked_mul(columns),
+        Symmetry::Symmetric => rows.checked_mul(rows + 1).map(|n| n / 2),
+        Symmetry::Skew => rows.checked_mul(rows.max(1) - 1).map(|n| n / 2),
+    };
+    if stated.is_none_or(|n| n > t.left() / 2 + 1) {
+        let expected = format!("a file with {rows} × {columns} entries");
+        return Err(t.wrong("the entries", &expected, None));
+    }
+    let mut m = Dense::zeros(rows, columns);
+    for j in 0..columns {
+        let first = match symmetry {
+            Symmetry::General => 0,
+            Symmetry::Symmetric => j,
+            Symmetry::Skew => j + 1,
+        };
+        for i in first..rows {
+            let x = t.real(|| format!("entry ({}, {})", i + 1, j + 1))?;
+            m[(i, j)] = x;
+            match symmetry {
+                Symmetry::General => {}
+                Symmetry::Symmetric => m[(j, i)] = x,
+                Symmetry::Skew => m[(j, i)] = -x,
+            }
+        }
+    }
+    Ok(m)
+}
+
+/// A matrix of one column, or a list of numbers.
+fn vector(path: &Path, text: &str) -> Result<Vec<f64>, IoError> {
+    if !text.trim_start().starts_with("%%") {
+        let mut t = Tokens::new(path, text);
+        let mut all = vec![];
+        let mut ahead = t.clone();
+        while ahead.word().is_some() {
+            all.push(t.real(|| format!("entry {}", all.len()))?);
+            ahead = t.clone();
+        }
+        return Ok(all);
+    }
+    let m = matrix(path, text)?;
+    if m.ncols() != 1 {
+        return Err(IoError::data(
+            path,
+            "the shape",
+            "one column",
+            format!("{} columns", m.ncols()),
+        ));
+    }
+    // Not by `for_each`, which passes over zeros and their signs.
+    if let Matrix::Dense(m) = &m {
+        return Ok(m.values().to_vec());
+    }
+    let mut all = vec![0.0; m.nrows()];
+    m.for_each(|i, _, x| all[i] = x);
+    Ok(all)
+}
+
+/// Writes M to `path` and the vectors beside it: an LCP or a box LCP, with the solution if there is one.
+///
+/// Errors: another kind; a problem that is not valid or is known by its products only; a file in the place of a vector that the content lacks; what
+/// the system refuses.
+pub fn write(path: impl AsRef<Path>, content: &LinearFile) -> Result<(), IoError> {
+    let path = path.as_ref();
+    check(path, content)?;
+    let (m, q, bounds) = match &content.problem {
+        Complementarity::Lcp(p) => (&p.M, &p.q, None),
+        Complementarity::Box(p) => (&p.M, &p.q, Some((&p.lower, &p.upper))),
+        Complementarity::Mlcp(_) | Complementarity::Hlcp(_) => {
+            let expected =
+                "a problem with one matrix and one vector (LCP or box LCP); TOML holds the others";
+            return Err(IoError::data(path, "the problem", expected, "another kind"));
+        }
+    };
+    let matrix = match m {
+        Matrix::Dense(m) => {
+            let mut out =
+                format!("%%MatrixMarket matrix array real general\n{} {}\n", m.nrows(), m.ncols());
+            for j in 0..m.ncols() {
+                (0..m.nrows()).for_each(|i| line(&mut out, m[(i, j)]));
+            }
+            out
+        }
+        Matrix::Sparse(m) => {
+            let (rows, columns, nnz) = (m.nrows(), m.ncols(), m.nnz());
+            let mut out =
+                format!("%%MatrixMarket matrix coordinate real general\n{rows} {columns} {nnz}\n");
+            for (i, j, x) in m.triplets() {
+                let _ = write!(out, "{} {} ", i + 1, j + 1);
+                line(&mut out, x);
+            }
+            out
+        }
+        Matrix::Operator(_) => return Err(toml::operator(path)),
+    };
+    let parts = [
+        Some(q),
+        bounds.map(|b| b.0),
+        bounds.map(|b| b.1),
+        content.solution.as_ref().map(|s| &s.z),
+    ];
+    let files = vectors(path);
+    let each = || files.iter().zip(parts);
+    if let Some((file, _)) = each().find(|(file, x)| x.is_none() && file.exists()) {
+        let expected = "no such file, as it would become a part of the problem";
+        return Err(IoError::data(file, "the file", expected, "one"));
+    }
+    put(path, &matrix)?;
+    for (file, x) in each() {
+        if let Some(x) = x {
+            let mut out = format!("%%MatrixMarket matrix array real general\n{} 1\n", x.len());
+            x.iter().for_each(|&x| line(&mut out, x));
+            put(file, &out)?;
+        }
+    }
+    Ok(())
+}
+
+fn line(out: &mut String, x: f64) {
+    // Writing to a String cannot fail.
+    let _ = writeln!(out, "{}", Digits(x));
+}
+
+fn put(path: &Path, text: &str) -> Result<(), IoError> {
+    replace(path, |temporary| {
+        std::fs::write(temporary, text).map_err(|e| IoError::os(path, WRITABLE, e))
+    })
+}

@@ -1,0 +1,599 @@
+//! Files of linear complementarity problems: round trips, formats, the mistakes, and damage.
+#![allow(non_snake_case)]
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use common::real;
+use nonsmooth_io::linear::{self, LinearFile, LinearPoint, market, toml};
+use nonsmooth_io::{Content, holds_problem, parts, read_any};
+use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
+use nonsmooth_problem::{BoxLcp, Complementarity, Hlcp, Lcp, Mlcp};
+use proptest::collection::{btree_map, vec};
+use proptest::option;
+use proptest::prelude::*;
+use tempfile::TempDir;
+
+struct Folder(TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn put(&self, name: &str, text: &str) -> PathBuf {
+        std::fs::write(self.path(name), text).unwrap();
+        self.path(name)
+    }
+
+    /// What a file of this content is.
+    fn read(&self, name: &str, text: &str) -> Complementarity {
+        linear::read(self.put(name, text)).unwrap_or_else(|e| panic!("{e}")).problem
+    }
+
+    /// The message that refuses this content: one line that names the file and `all`.
+    fn refused(&self, name: &str, text: &str, all: &[&str]) {
+        let path = self.put(name, text);
+        let message = read_any(&path).expect_err(text).to_string();
+        assert!(
+            message.starts_with(path.to_str().unwrap()) && !message.contains('\n'),
+            "{message}"
+        );
+        for part in all {
+            assert!(message.contains(part), "{part} in {message}");
+        }
+    }
+}
+
+/// The dense matrix with these rows.
+fn rows<const N: usize>(rows: &[[f64; N]]) -> Dense {
+    Dense::from_rows(rows).unwrap()
+}
+
+fn dense(p: &Complementarity) -> Dense {
+    match p {
+        Complementarity::Lcp(p) => p.M.to_dense(),
+        Complementarity::Mlcp(p) => p.M.to_dense(),
+        Complementarity::Box(p) => p.M.to_dense(),
+        Complementarity::Hlcp(p) => p.Q.to_dense(),
+    }
+    .unwrap()
+}
+
+// ------------------------------------------------------------------------------------------------ round trips
+
+fn matrix(rows: usize, columns: usize) -> BoxedStrategy<Matrix> {
+    let most = if rows * columns == 0 { 0 } else { 12 };
+    let entries = btree_map((0..rows.max(1), 0..columns.max(1)), real(), 0..=most);
+    let sparse = entries.prop_map(move |all| {
+        let all = all.iter().map(|(&(i, j), &x)| (i, j, x));
+        Csc::from_triplets(rows, columns, all).unwrap().into()
+    });
+    let dense = vec(real(), rows * columns)
+        .prop_map(move |x| Dense::from_fn(rows, columns, |i, j| x[i * columns + j]).into());
+    prop_oneof![sparse, dense].boxed()
+}
+
+fn problem() -> impl Strategy<Value = Complementarity> {
+    let reals = |n: usize| vec(real(), n);
+    let lcp = (1..5usize).prop_flat_map(move |n| (matrix(n, n), reals(n)));
+    let lcp = lcp.prop_map(|(m, q)| Complementarity::Lcp(Lcp::new(m, q).unwrap()));
+    let mixed = (0..3usize, 0..4usize, 1..4usize)
+        .prop_flat_map(move |(p, n, m)| (matrix(p + m, n + m), reals(p + m), Just((p, n))));
+    let mixed = mixed
+        .prop_map(|(m, q, (p, n))| Complementarity::Mlcp(Mlcp::rectangular(m, q, p, n).unwrap()));
+    let horizontal = (1..4usize).prop_flat_map(move |n| (matrix(n, n), matrix(n, n), reals(n)));
+    let horizontal =
+        horizontal.prop_map(|(a, b, q)| Complementarity::Hlcp(Hlcp::new(a, b, q).unwrap()));
+    let bound = || {
+        (option::of(real()), option::of(real())).prop_map(|(a, b)| {
+            let (a, b) = (a.unwrap_or(f64::NEG_INFINITY), b.unwrap_or(f64::INFINITY));
+            (a.min(b), a.max(b))
+        })
+    };
+    let boxed = (1..4usize).prop_flat_map(move |n| (matrix(n, n), reals(n), vec(bound(), n)));
+    let boxed = boxed.prop_map(|(m, q, bounds)| {
+        let (l, u) = bounds.into_iter().unzip();
+        Complementarity::Box(BoxLcp::new(m, q, l, u).unwrap())
+    });
+    prop_oneof![lcp, mixed, horizontal, boxed]
+}
+
+/// The lengths of z and w.
+fn sizes(p: &Complementarity) -> (usize, usize) {
+    match p {
+        Complementarity::Lcp(p) => (p.dim(), p.dim()),
+        Complementarity::Mlcp(p) => (p.M.ncols(), p.pairs()),
+        Complementarity::Hlcp(p) => (p.dim(), p.dim()),
+        Complementarity::Box(p) => (p.dim(), p.dim()),
+    }
+}
+
+fn content() -> impl Strategy<Value = LinearFile> {
+    let point = |problem: Complementarity| {
+        let (n, m) = sizes(&problem);
+        let always = matches!(problem, Complementarity::Hlcp(_));
+        let w = (any::<bool>(), vec(real(), m))
+            .prop_map(move |(there, w)| (there || always).then_some(w));
+        let solution = (vec(real(), n), w).prop_map(|(z, w)| LinearPoint { z, w });
+        (Just(problem), option::of(solution))
+    };
+    let texts = (option::of(any::<String>()), option::of(any::<String>()));
+    (problem().prop_flat_map(point), texts).prop_map(
+        |((problem, solution), (title, description))| LinearFile {
+            problem,
+            title,
+            description,
+            solution,
+        },
+    )
+}
+
+/// Equal bit for bit: `0 == -0`, but they are two numbers.
+fn same(a: &LinearFile, b: &LinearFile) {
+    assert_eq!(a, b);
+    assert_eq!(format!("{a:?}"), format!("{b:?}"));
+}
+
+proptest! {
+    #[test]
+    fn our_format_keeps_every_bit(content in content()) {
+        let folder = Folder::new();
+        let path = folder.path("a.toml");
+        linear::write(&path, &content).unwrap();
+        same(&linear::read(&path).unwrap(), &content);
+        prop_assert!(holds_problem(&path));
+    }
+
+    #[test]
+    fn matrix_market_keeps_every_bit(content in content()) {
+        let folder = Folder::new();
+        let path = folder.path("a.mtx");
+        let content = LinearFile { title: None, description: None, ..content };
+        let fits = matches!(content.problem, Complementarity::Lcp(_) | Complementarity::Box(_));
+        let written = linear::write(&path, &content);
+        prop_assert_eq!(written.is_ok(), fits, "{:?}", written);
+        if fits {
+            let solution = content.solution.clone().map(|s| LinearPoint { w: None, ..s });
+            same(&market::read(&path).unwrap(), &LinearFile { solution, ..content });
+            prop_assert!(holds_problem(&path) && !holds_problem(&folder.path("a_q.mtx")));
+            prop_assert!(parts(&path).len() >= 2);
+        }
+    }
+
+    /// Whatever a file holds, it is read or refused.
+    #[test]
+    fn garbage_is_refused_without_a_panic(bytes in vec(any::<u8>(), 0..200), words in "([ 0-9.e\\-:\n]|col|triplet){0,60}") {
+        let folder = Folder::new();
+        for name in ["a.toml", "a.mtx", "a.dat", "a", "a.hdf5"] {
+            let path = folder.path(name);
+            for content in [&bytes[..], words.as_bytes()] {
+                std::fs::write(&path, content).unwrap();
+                holds_problem(&path);
+                if let Err(e) = read_any(&path) {
+                    let message = e.to_string();
+                    assert!(!message.contains('\n') && message.starts_with(path.to_str().unwrap()), "{message}");
+                }
+            }
+        }
+    }
+}
+
+// ------------------------------------------------------------------------------------------------ our format
+
+#[test]
+fn our_format_as_people_write_it() {
+    let folder = Folder::new();
+    let text = "\
+kind = 'lcp'
+title = \"two rows\"
+q = [-5, -6.0]
+M = [[2, 1], [1, 2]]
+[solution]
+z = [1.25, 2]
+";
+    let file = linear::read(folder.put("a.toml", text)).unwrap();
+    let lcp = Lcp::new(rows(&[[2.0, 1.0], [1.0, 2.0]]), vec![-5.0, -6.0]).unwrap();
+    assert_eq!(file.problem, Complementarity::Lcp(lcp.clone()));
+    assert_eq!(file.title.as_deref(), Some("two rows"));
+    assert_eq!(file.solution, Some(LinearPoint { z: vec![1.25, 2.0], w: None }));
+
+    let sparse = "kind = 'lcp'\nq = [-5, -6]\n[M]\nshape = [2, 2]\nentries = [[0, 0, 2], [0, 1, 1.0], [1, 0, 1], [1, 1, 2]]\n";
+    let Complementarity::Lcp(read) = folder.read("b.toml", sparse) else { panic!() };
+    assert!(matches!(read.M, Matrix::Sparse(_)));
+    assert_eq!(read.M.to_dense(), lcp.M.to_dense());
+
+    // By blocks, what is not stated being zero; and as one matrix.
+    let blocks = "kind = 'mlcp'\nA = [[1, 2]]\nD = [[3, 4]]\na = [5]\nb = [6]\n";
+    let Complementarity::Mlcp(by_blocks) = folder.read("c.toml", blocks) else { panic!() };
+    assert_eq!(by_blocks.M, rows(&[[1.0, 2.0, 0.0], [3.0, 4.0, 0.0]]).into());
+    assert_eq!((by_blocks.equalities, by_blocks.free, by_blocks.q.len()), (1, 2, 2));
+    let whole = "kind = 'mlcp'\nM = [[1, 2, 0], [3, 4, 0]]\nq = [5, 6]\nfree = 2\nequalities = 1\n";
+    assert_eq!(folder.read("d.toml", whole), Complementarity::Mlcp(by_blocks));
+
+    let boxed = "kind = 'box_lcp'\nM = [[1]]\nq = [2]\nlower = [-inf]\nupper = [3]\n";
+    let Complementarity::Box(boxed) = folder.read("e.toml", boxed) else { panic!() };
+    assert_eq!((boxed.lower[0], boxed.upper[0]), (f64::NEG_INFINITY, 3.0));
+}
+
+#[test]
+fn mistakes_in_our_format_are_named() {
+    let folder = Folder::new();
+    let lcp = "kind = 'lcp'\nq = [1, 2]\nM = [[1, 0], [0, 1]]\n";
+    folder.read("a.toml", lcp);
+    let cases: [(&str, &[&str]); 14] = [
+        ("", &["line 1", "kind"]),
+        ("kind = 'lcp'\nq = [1\n", &["line 2"]),
+        ("kind = 'lcq'\n", &["kind: expected one of \"lcp\"", "found \"lcq\""]),
+        ("kind = 'lcp'\nq = [1]\n", &["M: expected this key", "found none"]),
+        ("kind = 'lcp'\nq = [1, 'x']\nM = [[1, 0], [0, 1]]\n", &["line 2", "f64"]),
+        (
+            "kind = 'lcp'\nq = [1, nan]\nM = [[1, 0], [0, 1]]\n",
+            &["q[1]: expected a finite number, found NaN"],
+        ),
+        ("kind = 'lcp'\nq = [1]\nM = [[1, 0], [0, 1]]\n", &["q: expected 2 entries", "found 1"]),
+        (
+            "kind = 'lcp'\nq = [1, 2]\nM = [[1, 0], [0]]\n",
+            &["M[1]: expected 2 entries, as in M[0], found 1"],
+        ),
+        ("kind = 'lcp'\nq = [1, 2]\nM = 3\n", &["line 3", "array of rows"]),
+        (
+            "kind = 'lcp'\nq = [1]\n[M]\nshape = [1, 1]\nentries = [[0, 1, 2]]\n",
+            &["M.entries[0]", "counted from 0", "0 and 1"],
+        ),
+        (
+            "kind = 'lcp'\nq = [1]\n[M]\nshape = [1, 99999999999]\nentries = []\n",
+            &["M.shape", "99999999999"],
+        ),
+        ("kind = 'lcp'\nq = [1]\nM = [[1]]\nfree = 1\n", &["free", "kind \"lcp\"", "M, q"]),
+        ("kind = 'mlcp'\nA = [[1]]\na = [1]\nb = []\nfree = 1\n", &["A: expected either", "free"]),
+        ("kind = 'lcp'\nq = [1]\nM = [[1]]\ncolour = 3\n", &["line 4", "colour"]),
+    ];
+    for (text, all) in cases {
+        folder.refused("a.toml", text, all);
+    }
+    for (text, all) in [
+        ("[solution]\nz = [1]\n", ["z: expected 2 entries", "found 1"]),
+        ("[solution]\nz = [1, 2]\nw = [1]\n", ["solution.w", "2 entries"]),
+        ("[solution]\nu = [1, 2]\n", ["solution.u", "z, w"]),
+        ("[solution]\nw = [1, 2]\n", ["solution.z", "none"]),
+    ] {
+        folder.refused("a.toml", &format!("{lcp}{text}"), &all);
+    }
+    let operator = LinearFile::new(Complementarity::Lcp(
+        Lcp::new(Matrix::Operator(std::sync::Arc::new(Identity)), vec![0.0]).unwrap(),
+    ));
+    for name in ["o.toml", "o.mtx"] {
+        let message = linear::write(folder.path(name), &operator).unwrap_err().to_string();
+        assert!(message.contains("found an operator"), "{message}");
+        assert!(!folder.path(name).exists());
+    }
+    assert!(linear::write(folder.path("o.txt"), &operator).is_err());
+}
+
+#[derive(Debug)]
+struct Identity;
+
+impl nonsmooth_problem::linalg::Operator for Identity {
+    fn nrows(&self) -> usize {
+        1
+    }
+    fn ncols(&self) -> usize {
+        1
+    }
+    fn mul(&self, x: &[f64], y: &mut [f64]) {
+        y.copy_from_slice(x);
+    }
+    fn mul_transpose(&self, x: &[f64], y: &mut [f64]) {
+        y.copy_from_slice(x);
+    }
+}
+
+// ------------------------------------------------------------------------------------------------ Matrix Market
+
+#[test]
+fn layouts_and_symmetries_of_matrix_market() {
+    let folder = Folder::new();
+    folder.put("a_q.mtx", "1 2\n3\n");
+    let read = |text: &str| match folder.read("a.mtx", text) {
+        Complementarity::Lcp(p) => p.M,
+        other => panic!("{other:?}"),
+    };
+    let head = "%%MatrixMarket matrix";
+    let symmetric = rows(&[[1.0, 2.0, 0.0], [2.0, 0.0, 5.0], [0.0, 5.0, 0.0]]);
+    let sparse = read(&format!(
+        "{head} coordinate real symmetric\n% remark\n%\n3 3 3\n1 1 1\n2 1 2e0\n3 2 5\n"
+    ));
+    assert!(matches!(sparse, Matrix::Sparse(_)));
+    assert_eq!(sparse.to_dense().unwrap(), symmetric);
+    assert_eq!(
+        read(&format!("{head} array integer symmetric\n3 3\n1\n2\n0\n0\n5\n0\n")),
+        symmetric.into()
+    );
+    let skew = rows(&[[0.0, -2.0, 0.0], [2.0, 0.0, -5.0], [0.0, 5.0, 0.0]]);
+    let from = read(&format!("{head} coordinate real skew-symmetric\n3 3 2\n2 1 2\n3 2 5\n"));
+    assert_eq!(from.to_dense().unwrap(), skew);
+    assert_eq!(
+        read(&format!("{head} array real skew-symmetric\n3 3\n2\n-0\n5\n")).to_dense(),
+        Some(skew)
+    );
+    // By columns.
+    let general = read(&format!("{head} array real general\n3 3\n1\n2\n3\n4\n5\n6\n7\n8\n9\n"));
+    assert_eq!(general, rows(&[[1.0, 4.0, 7.0], [2.0, 5.0, 8.0], [3.0, 6.0, 9.0]]).into());
+
+    for (text, all) in [
+        ("%%MatrixMarket vector array real general\n3 3\n", ["line 1", "matrix LAYOUT"]),
+        ("%%MatrixMarket matrix array complex general\n3 3\n", ["line 1", "`complex`"]),
+        (
+            "%%MatrixMarket matrix array real general\n3 3\n1\n2\n",
+            ["expected", "the end of the file"],
+        ),
+        (
+            "%%MatrixMarket matrix array real general\n99999999999 99999999999\n",
+            ["line 2", "number of rows"],
+        ),
+        (
+            "%%MatrixMarket matrix coordinate real general\n3 3 1\n4 1 1\n",
+            ["line 3", "from 1 to 3"],
+        ),
+        ("%%MatrixMarket matrix coordinate real general\n3 3 1\n0 1 1\n", ["line 3", "`0`"]),
+        ("%%MatrixMarket matrix coordinate real general\n3 3 1\n1 1 x\n", ["line 3", "`x`"]),
+        (
+            "%%MatrixMarket matrix coordinate real general\n3 3 1\n1 1 1\n2 2 2\n",
+            ["line 4", "end of the file"],
+        ),
+        ("%%MatrixMarket matrix coordinate real symmetric\n3 2 0\n", ["square", "3 × 2"]),
+        ("%%MatrixMarket matrix coordinate real general\n2 2 0\n", ["q", "2 entries"]),
+    ] {
+        folder.refused("a.mtx", text, &all);
+    }
+    let alone = format!("{head} array real general\n1 1\n1\n");
+    folder.refused("b.mtx", &alone, &["b_q.mtx beside"]);
+    folder.put("b_q.mtx", "%%MatrixMarket matrix array real general\n1 1\n-3\n");
+    folder.read("b.mtx", &alone);
+    folder.put("b_l.mtx", "-1");
+    folder.refused("b.mtx", &alone, &["b_u.mtx beside b_l.mtx"]);
+    folder.put("b_u.mtx", "inf");
+    assert!(matches!(folder.read("b.mtx", &alone), Complementarity::Box(_)));
+    // What is there would become a part of an LCP.
+    let lcp = LinearFile::new(Complementarity::Lcp(Lcp::new(rows(&[[1.0]]), vec![1.0]).unwrap()));
+    let message = linear::write(folder.path("b.mtx"), &lcp).unwrap_err().to_string();
+    assert!(message.contains("b_l.mtx"), "{message}");
+}
+
+// ------------------------------------------------------------------------------------------------ Siconos
+
+const BLOCKS: &str = "3\n1\n3\n3\n3\n2 2\n1 3\n2 3\n3 3\n0 1 3\n1 0 1\n\
+    0\n1\n2\n1\n3\n4\n2\n5\n6\n7\n8\n-1 -2 -3\n";
+
+#[test]
+fn siconos_matrices_of_all_storages() {
+    let folder = Folder::new();
+    // A line of the file is a column of M.
+    let text = "2\n0\n2\n2\n2\t2\n 1.0 2.0\n 3.0 4.0\n -5 -6\n\nRemark 7 in CPS\n";
+    let Complementarity::Lcp(p) = folder.read("a.dat", text) else { panic!() };
+    assert_eq!(p.M, rows(&[[1.0, 3.0], [2.0, 4.0]]).into());
+    assert_eq!(p.q, [-5.0, -6.0]);
+
+    // Two rows of blocks, of 2 and 1 rows; two columns of blocks, of 1 and 2 columns.
+    let blocks = "3\n1\n3\n3\n3\n2 2\n2 3\n1 3\n3 3\n0 1 3\n1 0 1\n\
+        0\n1\n2\n3\n4\n1\n5\n2\n6\n7\n-1 -2 -3\n";
+    let Complementarity::Lcp(p) = folder.read("a.dat", blocks) else { panic!() };
+    let expected = rows(&[[0.0, 1.0, 3.0], [0.0, 2.0, 4.0], [5.0, 6.0, 7.0]]);
+    assert_eq!(p.M.to_dense().unwrap(), expected);
+    folder.refused("a.dat", BLOCKS, &["line "]);
+
+    let triplets = "2\n2\n2\n2\n1\nCSparse Version 3.2.0, Sept 12, 2017.  Copyright\n\
+        triplet: 2-by-2, nzmax: 4 nnz: 3\n    0 1 : 3\n    1 0 : 2\n    1 1 : 4e-1\n-5 -6\n";
+    let Complementarity::Lcp(p) = folder.read("a.dat", triplets) else { panic!() };
+    assert_eq!(p.M.to_dense().unwrap(), rows(&[[0.0, 3.0], [2.0, 0.4]]));
+    let columns = "2\n2\n2\n2\n3\nCSparse Version 3.2.0\n2-by-2, nzmax: 4 nnz: 2, 1-norm: 7\n\
+        col 0 : locations 0 to -1\ncol 1 : locations 0 to 1\n 0 : 3\n 1 : 4\n-5 -6\n";
+    let Complementarity::Lcp(p) = folder.read("a.dat", columns) else { panic!() };
+    assert_eq!(p.M.to_dense().unwrap(), rows(&[[0.0, 3.0], [0.0, 4.0]]));
+    assert_eq!(p.q, [-5.0, -6.0]);
+}
+
+#[test]
+fn siconos_mixed_problems_and_relays() {
+    let folder = Folder::new();
+    // A = [1 2; 0 5], C = (3; 6), D = (7 8), B = 9.
+    let parts = "0 1 2 1\n 1 2\n0 5\n 9\n 3\n6\n 7 8\n -1 -2\n -3\n";
+    let Complementarity::Mlcp(p) = folder.read("a.dat", parts) else { panic!() };
+    let expected = rows(&[[1.0, 2.0, 3.0], [0.0, 5.0, 6.0], [7.0, 8.0, 9.0]]);
+    assert_eq!((p.M.clone(), p.free, p.equalities), (expected.clone().into(), 2, 2));
+    assert_eq!(p.q, [-1.0, -2.0, -3.0]);
+    let whole = "1\n0\n2\n1\n0 2 3\n0 1\n0\n3\n3\n3 3\n1 0 7\n2 5 8\n3 6 9\n-1 -2 -3\n";
+    assert_eq!(folder.read("b.dat", whole), Complementarity::Mlcp(p.clone()));
+    // The pair first.
+    let turned = "1\n0\n2\n1\n0 1 3\n1 0\n0\n3\n3\n3 3\n9 3 6\n7 1 0\n8 2 5\n-3 -1 -2\n";
+    assert_eq!(folder.read("c.dat", turned), Complementarity::Mlcp(p));
+    // The old format, with more equalities than free variables.
+    let old = "1 1 3\n 1\n2\n 3\n 4\n5\n 6\n -1 -2\n -3\n";
+    let Complementarity::Mlcp(p) = folder.read("d.dat", old) else { panic!() };
+    assert_eq!(p.M, rows(&[[1.0, 4.0], [2.0, 5.0], [6.0, 3.0]]).into());
+    assert_eq!((p.equalities, p.free), (2, 1));
+
+    let relay = "2\n0\n2\n2\n2 2\n 1 2\n 3 4\n -5 -6\n -1 -1\n 1 1\n";
+    let Complementarity::Box(p) = folder.read("a.dat", relay) else { panic!() };
+    assert_eq!((p.lower, p.upper), (vec![-1.0, -1.0], vec![1.0, 1.0]));
+    // Bounds or a solution? The name may say.
+    let either = "2\n0\n2\n2\n2 2\n 1 2\n 3 4\n -5 -6\n 0 0\n 1 1\n";
+    folder.refused("a.dat", either, &["after q", "`lcp` or `relay`"]);
+    assert!(matches!(folder.read("relay_a.dat", either), Complementarity::Box(_)));
+    assert!(matches!(folder.read("lcp_a.dat", either), Complementarity::Lcp(_)));
+}
+
+#[test]
+fn mistakes_in_siconos_files_are_named() {
+    let folder = Folder::new();
+    let cases: [(&str, &[&str]); 9] = [
+        (
+            "2\n0\n2\n2\n2 2\n1 2\n3 4\n-5\n",
+            &["line 9, q[1]: expected a number, found the end of the file"],
+        ),
+        ("2\n0\n2\n2\n2 2\n1 2\n3 x\n-5 -6\n", &["line 7, M[1, 1]: expected a number, found `x`"]),
+        ("2\n0\n3\n2\n2 2\n1 2\n3 4\n-5 -6\n", &["line 3, the rows of M: expected 2, found `3`"]),
+        ("2\n7\n2\n2\n", &["line 2", "0 (dense), 1 (blocks) or 2 (sparse)", "`7`"]),
+        ("99999999999\n0\n2\n2\n", &["line 1", "has room", "`99999999999`"]),
+        ("1 0 1 1\n0 1 2\n0 0\n", &["blocks with 1 equalities", "2 equalities"]),
+        (
+            "1 1 1 1\n0 1 2\n0 1\n0\n2\n2\n2 2\n1 2 3 4\n5 6\n1\n4\n3\n2\n5\n7\n",
+            &["row 1", "the same data"],
+        ),
+        ("2\n0\n2\n2\n2 2\n1 2\n3 nan\n-5 -6\n", &["M[1, 1]", "NaN"]),
+        ("1 1 3\n1\n2\n3\n4\n5\n6\n-1 -2\n-3\nmore\n", &["line 10", "`more`"]),
+    ];
+    for (text, all) in cases {
+        folder.refused("a.dat", text, all);
+    }
+    folder.refused("a.dat", "some text", &["HDF5", "another text"]);
+    folder.refused("a.dat", "", &["an empty file"]);
+    folder.refused("a.dat", "\u{0}\u{1}", &["another text"]);
+    std::fs::write(folder.path("b.dat"), [0xff, 0xfe, 0x00]).unwrap();
+    assert!(read_any(folder.path("b.dat")).unwrap_err().to_string().contains("other data"));
+    assert!(read_any(folder.path("")).unwrap_err().to_string().contains("a directory"));
+    assert!(read_any(folder.path("none.dat")).unwrap_err().to_string().contains("none.dat"));
+}
+
+// ------------------------------------------------------------------------------------------------ damage
+
+/// Every beginning of a file, and every file with one letter changed, is read or refused.
+#[test]
+fn damaged_files_never_panic() {
+    let folder = Folder::new();
+    let file = LinearFile {
+        title: Some("a \"title\"".into()),
+        solution: Some(LinearPoint { z: vec![1.0, 2.0, 3.0], w: Some(vec![4.0]) }),
+        ..LinearFile::new(Complementarity::Mlcp(
+            Mlcp::new(rows(&[[1.0, 2.0, 3.0], [0.0, 5.0, 6.0], [7.0, 8.0, 9.0]]), vec![-1.0; 3], 2)
+                .unwrap(),
+        ))
+    };
+    toml::write(folder.path("m.toml"), &file).unwrap();
+    folder.put("s_q.mtx", "1\n2\n");
+    let mixed = std::fs::read_to_string(folder.path("m.toml")).unwrap();
+    let texts = [
+        ("a.toml", mixed.as_str()),
+        ("s.mtx", "%%MatrixMarket matrix coordinate real symmetric\n% x\n2 2 2\n1 1 1.5\n2 1 2\n"),
+        ("a.dat", BLOCKS),
+        ("a.dat", "1\n1\n1\n1\n0 1 2\n0 1\n0\n2\n2\n2 2\n1 2\n3 4\n5 6\n1\n4\n3\n2\n5\n6\n"),
+        (
+            "a.dat",
+            "2\n2\n2\n2\n1\nCSparse V\ntriplet: 2-by-2, nzmax: 4 nnz: 3\n0 1 : 3\n1 0 : 2\n1 1 : 4\n-5 -6\n",
+        ),
+    ];
+    for (name, text) in texts {
+        let path = folder.path(name);
+        let read = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            if let Err(e) = read_any(&path) {
+                assert!(!e.to_string().contains('\n'), "{e}");
+            }
+        };
+        for end in 0..text.len() {
+            read(&text.as_bytes()[..end]);
+        }
+        for at in 0..text.len() {
+            for letter in *b"09-x \n[\xff" {
+                let mut bytes = text.as_bytes().to_vec();
+                bytes[at] = letter;
+                read(&bytes);
+            }
+        }
+    }
+}
+
+// ------------------------------------------------------------------------------------------------ the corpus
+
+fn corpus(folder: &str) -> Option<Vec<PathBuf>> {
+    let Some(corpus) = std::env::var_os("NONSMOOTH_CORPUS") else {
+        common::skipped("NONSMOOTH_CORPUS is not set");
+        return None;
+    };
+    let all = std::fs::read_dir(Path::new(&corpus).join(folder)).unwrap();
+    let mut all: Vec<_> = all.map(|e| e.unwrap().path()).collect();
+    all.sort();
+    Some(all)
+}
+
+#[test]
+fn every_lcp_of_the_corpus_is_read() {
+    let Some(files) = corpus("lcp") else { return };
+    let mut read = std::collections::BTreeMap::new();
+    for path in &files {
+        assert!(holds_problem(path), "{}", path.display());
+        let Content::Linear(file) = read_any(path).unwrap_or_else(|e| panic!("{e}")) else {
+            panic!()
+        };
+        let Complementarity::Lcp(lcp) = file.problem else { panic!("{}", path.display()) };
+        let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
+        read.insert(name, lcp);
+    }
+    assert_eq!(read.len(), 20);
+    let mut blocks = 0;
+    for (name, lcp) in &read {
+        if let Some(plain) = name.strip_suffix("_block") {
+            assert!(matches!(lcp.M, Matrix::Sparse(_)));
+            assert_eq!(lcp.M.to_dense(), read[plain].M.to_dense(), "{name}");
+            assert_eq!(lcp.q, read[plain].q, "{name}");
+            blocks += 1;
+        }
+    }
+    assert_eq!(blocks, 3);
+    // Murty's U_6, not its transpose.
+    let murty = read["lcp_exp_murty"].M.to_dense().unwrap();
+    assert_eq!((murty[(0, 1)], murty[(1, 0)]), (2.0, 0.0));
+    assert_eq!(
+        read["lcp_Pang_isolated_sol"].M,
+        rows(&[[0.0, -1.0, -1.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]).into()
+    );
+}
+
+#[test]
+fn every_mlcp_of_the_corpus_is_read() {
+    let Some(files) = corpus("mlcp") else { return };
+    let sizes = [
+        ("deudeu", 1, 1),
+        ("RCD", 2, 1),
+        ("RLCD", 6, 2),
+        ("m2n1", 1, 2),
+        ("m3n2", 2, 3),
+        ("PD", 3, 4),
+        ("PDSym", 3, 4),
+        ("diodeBridge", 3, 4),
+        ("relay2", 4, 2),
+        ("relay3", 4, 2),
+        ("diodeBridge20", 11, 20),
+        ("diodeBridge40", 21, 40),
+        ("Buck2", 20, 12),
+        ("BuckConverter", 20, 12),
+        ("BuckFirstStep", 20, 12),
+        ("deltasigma", 65, 156),
+        ("deltasigma2", 65, 156),
+    ];
+    assert_eq!(files.len(), sizes.len() + 1);
+    for path in &files {
+        let name = path.file_stem().unwrap().to_str().unwrap().trim_end_matches("_mlcp").to_owned();
+        let content = read_any(path);
+        if name == "Rectangular" {
+            let message = content.unwrap_err().to_string();
+            assert!(message.ends_with("the rows of M: expected 2, found `3`"), "{message}");
+            continue;
+        }
+        let Content::Linear(file) = content.unwrap_or_else(|e| panic!("{e}")) else { panic!() };
+        let Complementarity::Mlcp(p) = &file.problem else { panic!("{name}") };
+        let (_, n, m) = sizes.iter().find(|s| s.0 == name).expect(&name);
+        assert_eq!((p.free, p.equalities, p.pairs()), (*n, *n, *m), "{name}");
+        // What is read can be kept in our format.
+        let folder = Folder::new();
+        toml::write(folder.path("a.toml"), &file).unwrap();
+        same(&toml::read(folder.path("a.toml")).unwrap(), &file);
+        assert_eq!(dense(&file.problem).nrows(), n + m);
+    }
+}

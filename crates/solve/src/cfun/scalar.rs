@@ -1,0 +1,162 @@
+//! Scalar complementarity functions (74a–f): `ψ(z, w) = 0` exactly where `0 ≤ z ⟂ w ≥ 0`.
+//!
+//! | lecture | here, positive where z and w are | type |
+//! | --- | --- | --- |
+//! | (74a) `min(w, z)` | the same | [`Min`] |
+//! | (74b) `max(0, w − ρz) − w` | `min(w, ρz)` | [`MinRho`] with `Side::Z` |
+//! | (74c) `max(0, z − ρw) − z` | `min(z, ρw)` | [`MinRho`] with `Side::W` |
+//! | (74d) `√(w² + z²) − z − w` | `z + w − √(z² + w²)` | [`FischerBurmeister`] |
+//! | (74e) `λ(√(w² + z²) − z − w) − (1 − λ) w₊ z₊` | its negative | [`Penalised`] |
+//! | (74f) `−wz + ½ min(0, w + z)²` | its negative | [`EvtushenkoPurtov`] |
+//!
+//! The sign is that of the minimum throughout, so that a function nests in itself. Two bounds (Billups): `l ≤ z ≤ u` with `w ≥ 0` at l, `w ≤ 0` at u is
+//!
+//! ```text
+//! Φ(z, w) = ψ(z − l, −ψ(u − z, −w)),   one bound: ψ(z − l, w), −ψ(u − z, −w),   none: w
+//! ```
+//!
+//! Each comes with an element of its B-subdifferential: the derivative where there is one, at a kink the derivative of a piece that meets
+//! there. All of them but Evtushenko's and Purtov's increase in z and in w: their derivatives are not negative.
+//!
+//! References: Acary2018 (74); Fischer1992; ChenChenKanzow2000; EvtushenkoPurtov1984; Billups1995 (two bounds).
+
+/// The value of a function of (z, w) and its derivatives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slope {
+    /// ψ.
+    pub value: f64,
+    /// ∂ψ/∂z.
+    pub z: f64,
+    /// ∂ψ/∂w.
+    pub w: f64,
+}
+
+/// A complementarity function of two numbers.
+pub trait ScalarFunction: Copy + Send {
+    /// ψ(z, w) and an element of its B-subdifferential.
+    fn at(&self, z: f64, w: f64) -> Slope;
+
+    /// ψ(z, w).
+    #[inline]
+    fn value(&self, z: f64, w: f64) -> f64 {
+        self.at(z, w).value
+    }
+}
+
+/// `min(z, w)`: on the tie z counts as the smaller.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Min;
+
+impl ScalarFunction for Min {
+    #[inline]
+    fn at(&self, z: f64, w: f64) -> Slope {
+        if z <= w { Slope { value: z, z: 1.0, w: 0.0 } } else { Slope { value: w, z: 0.0, w: 1.0 } }
+    }
+}
+
+/// Which of the two is multiplied by ρ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// `min(w, ρz)`.
+    Z,
+    /// `min(z, ρw)`.
+    W,
+}
+
+/// The minimum with one side multiplied by `ρ > 0`.
+#[derive(Debug, Clone, Copy)]
+pub struct MinRho {
+    /// ρ.
+    pub rho: f64,
+    /// Where it stands.
+    pub side: Side,
+}
+
+impl ScalarFunction for MinRho {
+    #[inline]
+    fn at(&self, z: f64, w: f64) -> Slope {
+        let (of_z, of_w) = match self.side {
+            Side::Z => (self.rho, 1.0),
+            Side::W => (1.0, self.rho),
+        };
+        let at = Min.at(of_z * z, of_w * w);
+        Slope { z: of_z * at.z, w: of_w * at.w, ..at }
+    }
+}
+
+/// `z + w − √(z² + w²)`.
+///
+/// No digits are lost where the sum cancels with the root: for `z + w > 0` the value is `2zw / (z + w + √(z² + w²))`, and `1 − z/r` with `z > 0` is
+/// `(w/r) (w/(r + z))`. At the origin the derivative along (1, 1) is taken.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct FischerBurmeister;
+
+impl ScalarFunction for FischerBurmeister {
+    #[inline]
+    fn at(&self, z: f64, w: f64) -> Slope {
+        let r = z.hypot(w);
+        if r == 0.0 {
+            let slope = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
+            return Slope { value: 0.0, z: slope, w: slope };
+        }
+        let sum = z + w;
+        let value = if sum > 0.0 { 2.0 * (z / (sum + r)) * w } else { sum - r };
+        let one_minus = |x: f64, y: f64| {
+            if x > 0.0 { (y / r) * (y / (r + x)) } else { 1.0 - x / r }
+        };
+        Slope { value, z: one_minus(z, w), w: one_minus(w, z) }
+    }
+}
+
+/// `λ(z + w − √(z² + w²)) + (1 − λ) z₊ w₊`: grows in the positive quadrant, where Fischer's and Burmeister's function is flat.
+#[derive(Debug, Clone, Copy)]
+pub struct Penalised {
+    /// λ in (0, 1].
+    pub lambda: f64,
+}
+
+impl ScalarFunction for Penalised {
+    #[inline]
+    fn at(&self, z: f64, w: f64) -> Slope {
+        let fb = FischerBurmeister.at(z, w);
+        let (lambda, rest) = (self.lambda, 1.0 - self.lambda);
+        // On the axes the derivative is taken from within the quadrant.
+        let (z_plus, w_plus) = if z >= 0.0 && w >= 0.0 { (z, w) } else { (0.0, 0.0) };
+        Slope {
+            value: lambda * fb.value + rest * z_plus * w_plus,
+            z: lambda * fb.z + rest * w_plus,
+            w: lambda * fb.w + rest * z_plus,
+        }
+    }
+}
+
+/// `zw − ½ min(0, z + w)²`: differentiable everywhere, but its derivative vanishes at (0, 0), so Newton's method is slow at degenerate solutions.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct EvtushenkoPurtov;
+
+impl ScalarFunction for EvtushenkoPurtov {
+    #[inline]
+    fn at(&self, z: f64, w: f64) -> Slope {
+        let below = (z + w).min(0.0);
+        Slope { value: z * w - 0.5 * below * below, z: w - below, w: z - below }
+    }
+}
+
+/// Φ for a variable z in `[l, u]` with its w: nested where both bounds are finite.
+#[inline]
+pub fn boxed<F: ScalarFunction>(f: &F, z: f64, w: f64, l: f64, u: f64) -> Slope {
+    match (l.is_finite(), u.is_finite()) {
+        (false, false) => Slope { value: w, z: 0.0, w: 1.0 },
+        (true, false) => f.at(z - l, w),
+        (false, true) => {
+            let at = f.at(u - z, -w);
+            Slope { value: -at.value, ..at }
+        }
+        (true, true) if l == u => Slope { value: z - l, z: 1.0, w: 0.0 },
+        (true, true) => {
+            let upper = f.at(u - z, -w);
+            let at = f.at(z - l, -upper.value);
+            Slope { value: at.value, z: at.z + at.w * upper.z, w: at.w * upper.w }
+        }
+    }
+}

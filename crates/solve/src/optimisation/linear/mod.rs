@@ -1,0 +1,7 @@
+//! Optimisation methods for linear complementarity problems: M as the Hessian of a convex quadratic program.
+
+mod mprgp;
+mod qp;
+
+pub use mprgp::{Mprgp, Proportioning};
+pub use qp::{Form, Programmed, QpWork, QuadraticProgram};
