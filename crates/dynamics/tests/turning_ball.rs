@@ -73,3 +73,17 @@ fn from_rest_only_the_inner_facets_let_the_ball_go() {
     assert!(far[0] > 3.0 && far[1] > 0.05 && far[2] < 0.1 && far[3] < 0.02, "{far:?}");
     assert!(distance(&inner(&ball, 6), &rest) < 1e-9);
 }
+
+/// With four facets everything can be followed by hand. At 60° the friction sits on the edge between two vertices: the ball slides along the diagonal with
+/// `(√3 − 1)/4 a` along each axis. At 180° it stops there with −a along each axis, and rests, because the force points at a vertex. At 300° it slides along
+/// the other diagonal as in the beginning.
+#[test]
+fn four_facets_by_hand() {
+    let ball = TurningBall::default();
+    let a = ball.mu * ball.gravity;
+    let slow = (3.0_f64.sqrt() - 1.0) / 4.0 * a;
+    let (slide, stop) = (0.5 * slow * 25.0, (5.0 * slow).powi(2) / (2.0 * a));
+    let expected = [2.0 * slide + stop, stop];
+    let found = inner(&ball, 4).position;
+    assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 1e-2), "{found:?} {expected:?}");
+}
