@@ -75,14 +75,18 @@ impl Mlcp {
         }
         vector("q", q, M.nrows(), "rows of M")?;
         let most = |name: &str, what: &str, value: usize, most: usize| {
-            let expected = format!("at most {most}, the {what} of M");
-            (value <= most).then_some(()).ok_or_else(|| ProblemError::value(name, expected, value))
+            let expected = || format!("at most {most}, the {what} of M");
+            (value <= most)
+                .then_some(())
+                .ok_or_else(|| ProblemError::value(name, expected(), value))
         };
         most("equalities", "rows", *equalities, M.nrows())?;
         most("free", "columns", *free, M.ncols())?;
         let pairs = M.nrows() - equalities;
-        let meaning = format!("{equalities} equalities, {free} free variables, {pairs} pairs");
-        M.check_shape("M", equalities + pairs, free + pairs, &meaning)?;
+        if (M.nrows(), M.ncols()) != (equalities + pairs, free + pairs) {
+            let meaning = format!("{equalities} equalities, {free} free variables, {pairs} pairs");
+            M.check_shape("M", equalities + pairs, free + pairs, &meaning)?;
+        }
         M.check_finite("M")
     }
 
