@@ -1,85 +1,48 @@
 //! Which solvers `auto` tries on a linear complementarity problem, in which order, and why.
 
-use nonsmooth_problem::linalg::{Matrix, is_positive_definite};
+use nonsmooth_problem::linalg::Matrix;
+use nonsmooth_problem::traits::{Class, Classes};
 use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 
 use super::{Candidate, LinearAuto};
 use crate::settings::SettingsMap;
 
-/// A symmetric part is taken as positive semidefinite if this much of its mean diagonal makes it definite.
-const SEMIDEFINITE: f64 = 1e-11;
 /// Up to this many variables a dense pivoting method is affordable.
 const DENSE: usize = 2000;
 /// Up to this many variables a pivot on a sparse basis is.
 const SPARSE: usize = 10_000;
-/// Beyond this many variables a factorisation of a sparse matrix is worth many sweeps.
+/// Beyond this many variables a factorisation of a sparse matrix is worth many sweeps, and the class is not asked for.
 const HUGE: usize = 200_000;
 
 /// What a plan goes by.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Facts {
     n: usize,
+    sparse: bool,
     symmetric: bool,
     positive_diagonal: bool,
-    /// No positive entry off the diagonal.
-    is_z: bool,
-    /// Strictly diagonally dominant by rows.
-    dominant: bool,
-    definite: Definite,
-    sparse: bool,
-}
-
-/// What a Cholesky factorisation of the symmetric part says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Definite {
-    Yes,
-    Semi,
-    No,
-    /// Not asked.
-    Unknown,
+    /// What O(nnz) operations and at most two Cholesky factorisations show; none of huge matrices.
+    classes: Option<Classes>,
 }
 
 impl Facts {
-    /// Cost: O(nnz) and at most two Cholesky factorisations. `None` of an operator.
+    /// `None` of an operator.
     fn of(m: &Matrix) -> Option<Self> {
         let n = m.nrows();
-        let (mut diagonal, mut others) = (vec![0.0; n], vec![0.0; n]);
-        let mut is_z = true;
-        let known = m.for_each(|i, j, x| {
-            if i == j {
-                diagonal[i] = x;
-            } else {
-                others[i] += x.abs();
-                is_z &= x <= 0.0;
-            }
-        });
-        let csc = m.to_csc().filter(|_| known)?;
-        let positive_diagonal = diagonal.iter().all(|d| *d > 0.0);
-        let dominant = diagonal.iter().zip(&others).all(|(d, o)| d > o);
-        let definite = if n > HUGE {
-            Definite::Unknown
-        } else if diagonal.iter().any(|d| *d < 0.0) {
-            Definite::No
-        } else if positive_diagonal && is_positive_definite(&csc, 0.0) {
-            Definite::Yes
-        } else if is_positive_definite(&csc, SEMIDEFINITE) {
-            Definite::Semi
-        } else {
-            Definite::No
-        };
-        Some(Self {
-            n,
-            symmetric: m.asymmetry() == Some(0.0),
-            positive_diagonal,
-            is_z,
-            dominant,
-            definite,
-            sparse: matches!(m, Matrix::Sparse(a) if a.nnz() < n * n / 4),
-        })
+        let sparse = matches!(m, Matrix::Sparse(a) if a.nnz() < n * n / 4);
+        let symmetric = m.asymmetry()? == 0.0;
+        let positive_diagonal = m.diagonal()?.iter().all(|d| *d > 0.0);
+        let classes = (n <= HUGE).then(|| Classes::quick(m));
+        Some(Self { n, sparse, symmetric, positive_diagonal, classes })
     }
 
+    fn is(&self, class: Class) -> bool {
+        self.classes.as_ref().is_some_and(|c| c.is(class))
+    }
+
+    /// Positive semidefinite, at least up to rounding.
     fn monotone(&self) -> bool {
-        matches!(self.definite, Definite::Yes | Definite::Semi)
+        self.classes.as_ref().is_some_and(|c| c.is_likely(Class::PositiveSemidefinite))
     }
 
     /// Whether Lemke's method is affordable.
@@ -87,16 +50,24 @@ impl Facts {
         self.n <= if self.sparse { SPARSE } else { DENSE }
     }
 
-    /// The class that the choice went by, in words.
+    /// The class that the choice goes by, in words.
     fn class(&self) -> &'static str {
-        match self.definite {
-            _ if self.dominant && self.positive_diagonal => "M is diagonally dominant",
-            Definite::Yes if self.symmetric => "M is symmetric positive definite",
-            Definite::Yes => "M is positive definite",
-            Definite::Semi => "M is positive semidefinite",
-            Definite::No => "M is not monotone",
-            Definite::Unknown if self.symmetric => "M is symmetric",
-            Definite::Unknown => "M is of unknown class",
+        if self.symmetric && self.is(Class::PositiveDefinite) {
+            "M is symmetric positive definite"
+        } else if self.is(Class::PositiveDefinite) {
+            "M is positive definite"
+        } else if self.is(Class::HPlus) {
+            "M is in H+"
+        } else if self.is(Class::P) {
+            "M is a P-matrix"
+        } else if self.monotone() {
+            "M is positive semidefinite"
+        } else if self.is(Class::CopositivePlus) {
+            "M is copositive-plus"
+        } else if self.classes.is_none() && self.symmetric {
+            "M is symmetric"
+        } else {
+            "M is of unknown class"
         }
     }
 }
@@ -141,7 +112,6 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto) -> Vec<Candidate> {
         return of_operator();
     };
     let n = facts.n;
-    let sure = facts.definite == Definite::Yes || (facts.dominant && facts.positive_diagonal);
     let mut plan = Plan::new();
     if facts.symmetric && facts.positive_diagonal && n > HUGE {
         plan = plan.then("mprgp", 20_000, format!("{}, and large", facts.class())).then(
@@ -150,7 +120,8 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto) -> Vec<Candidate> {
             "few factorisations, whatever the condition",
         );
     }
-    if sure || (facts.is_z && facts.positive_diagonal) {
+    // Finite for P; and a Z-matrix with a positive diagonal may well be one.
+    if facts.is(Class::P) || (facts.is(Class::Z) && facts.positive_diagonal) {
         plan = plan.then("block_pivoting", 300, facts.class());
     }
     plan = plan
