@@ -48,6 +48,8 @@ pub struct BallState {
     pub position: [f64; 2],
     /// m/s.
     pub velocity: [f64; 2],
+    /// The judge's relative residual of the step that ended here: how nearly it obeys Coulomb's law. Zero at the start, and of exact motions.
+    pub residual: f64,
 }
 
 impl TurningBall {
@@ -80,12 +82,13 @@ impl TurningBall {
         let out = |y: [f64; 2]| [y[0] * e[0] - y[1] * e[1], y[0] * e[1] + y[1] * e[0]];
         let [dx, dy] = out(x);
         let position = [start.position[0] + dx, start.position[1] + dy];
-        BallState { time: start.time + t, position, velocity: out(v) }
+        BallState { time: start.time + t, position, velocity: out(v), residual: 0.0 }
     }
 
     /// The motion by Moreau–Jean's scheme with θ = 1/2 and `steps` steps a phase, the contact problem of each step solved by `session`; one state a step.
     ///
-    /// A step whose problem is not solved is taken all the same, by the best impulses found: facets obey Coulomb's law only nearly.
+    /// A step whose problem is not solved is taken all the same, by the impulses found: facets obey Coulomb's law only nearly. How nearly,
+    /// each state says.
     ///
     /// Errors: those of the session.
     pub fn path(
@@ -110,7 +113,7 @@ impl TurningBall {
             let [vx, vy] = at.velocity;
             let push = h * mu * gravity;
             problem.q.copy_from_slice(&[-h * gravity, vx + push * e[0], vy + push * e[1]]);
-            session.solve(&problem, &mut point, limits, &mut |_| {})?;
+            let outcome = session.solve(&problem, &mut point, limits, &mut |_| {})?;
             let [qx, qy] = [problem.q[1], problem.q[2]];
             let v = [qx + point.r[1] / mass, qy + point.r[2] / mass];
             for k in 0..2 {
@@ -118,6 +121,7 @@ impl TurningBall {
             }
             at.velocity = v;
             at.time = h * (step + 1) as f64;
+            at.residual = outcome.measure.relative;
             path.push(at);
         }
         Ok(path)

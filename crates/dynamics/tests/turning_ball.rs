@@ -48,6 +48,15 @@ fn the_cone_follows_the_exact_path() {
     assert!((x - 15.0036).abs() < 1e-3 && (y - 9.2526).abs() < 1e-3, "{x} {y}");
 }
 
+/// The last step says how nearly it obeys Coulomb's law.
+#[test]
+fn residuals_tell_the_cone_from_its_facets() {
+    let ball = launched();
+    assert!(cone(&ball, 1000).residual < 1e-12);
+    let at = |facets| inner(&ball, facets).residual;
+    assert!(at(4) > 1e-3 && at(32) > 1e-6, "{:e} {:e}", at(4), at(32));
+}
+
 #[test]
 fn fewer_facets_lead_the_ball_farther_away() {
     let ball = launched();
