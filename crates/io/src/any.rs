@@ -8,6 +8,8 @@ use crate::fclib::{self, FclibFile};
 use crate::linear::{self, LinearFile, market};
 
 /// What a file holds.
+// One a file: its size does not matter.
+#[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Content {
     /// A frictional contact problem.

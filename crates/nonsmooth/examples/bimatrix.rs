@@ -23,7 +23,9 @@ fn regret(a: &Dense, b: &Dense, e: &Equilibrium) -> f64 {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let games: [(&str, Vec<Vec<f64>>, Vec<Vec<f64>>); 3] = [
+    /// Its name, and the payoffs of the row and of the column player.
+    type Game = (&'static str, Vec<Vec<f64>>, Vec<Vec<f64>>);
+    let games: [Game; 3] = [
         (
             "battle of the sexes",
             vec![vec![2.0, 0.0], vec![0.0, 1.0]],

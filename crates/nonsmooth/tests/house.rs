@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nonsmooth::solve::registry;
-use nonsmooth::{FrictionGlobal, FrictionLocal};
+use nonsmooth::{BoxLcp, FrictionGlobal, FrictionLocal, Hlcp, Lcp, Mlcp};
 
 // ------------------------------------------------------------------------------------------------ floors
 
@@ -644,6 +644,10 @@ fn registered() -> BTreeMap<String, String> {
         registry::abouts::<FrictionLocal<3>>(),
         registry::abouts::<FrictionGlobal<2>>(),
         registry::abouts::<FrictionGlobal<3>>(),
+        registry::abouts::<Lcp>(),
+        registry::abouts::<Mlcp>(),
+        registry::abouts::<BoxLcp>(),
+        registry::abouts::<Hlcp>(),
     ];
     let solvers = kinds.into_iter().flatten().map(|a| (a.name, a.cites));
     let prefixes = registry::PREFIXES.iter().map(|p| (p.name, p.cites));

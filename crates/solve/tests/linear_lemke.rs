@@ -171,7 +171,7 @@ fn classics() -> Vec<(String, Lcp, Vec<f64>, Option<usize>)> {
                 0.0
             }
         };
-        let z: Vec<f64> = (0..n).map(|i| power(i)).collect();
+        let z: Vec<f64> = (0..n).map(power).collect();
         all.push((format!("Csizmadia {n}"), from_fn(n, csizmadia, |_| -1.0), z, Some(n + 1)));
     }
     all.push(("exp_murty".into(), from_fn(6, upper, |_| -1.0), unit(6, 5, 1.0), Some(4)));
@@ -738,9 +738,9 @@ fn almost_singular_problems_end() {
         // Rows and columns twice, up to rounding, in scales that differ by 1e16.
         let mut noise = || 1.0 + 1e-14 * rng.random_range(-1.0..1.0_f64);
         let size = |i: usize| {
-            if i % 3 == 0 {
+            if i.is_multiple_of(3) {
                 1e-8
-            } else if i % 5 == 0 {
+            } else if i.is_multiple_of(5) {
                 1e8
             } else {
                 1.0

@@ -100,7 +100,9 @@ fn known_solutions() {
         &[10.0, 10.0, 21.0, -1.0],
         &[1.0, 1.0, 1.0, 0.0],
     ]);
-    let cases: Vec<(&str, Dense, Vec<f64>, Vec<f64>, f64)> = vec![
+    // Name, M, q, z, and the digits that M's condition leaves.
+    type Case = (&'static str, Dense, Vec<f64>, Vec<f64>, f64);
+    let cases: Vec<Case> = vec![
         ("murty", u.clone(), ones(16), unit(16, 15, 1.0), 1e-12),
         ("murty transposed", transposed(&u), ones(16), unit(16, 0, 1.0), 1e-12),
         ("fathi", times(&transposed(&u), &u), ones(16), unit(16, 0, 1.0), 1e-9),
@@ -446,7 +448,10 @@ fn two_bounds() {
                     _ if u.is_finite() => (u - size, 0.0),
                     _ => (size, 0.0),
                 };
-                (lower.push(l), upper.push(u), z.push(at), w.push(force));
+                lower.push(l);
+                upper.push(u);
+                z.push(at);
+                w.push(force);
             }
             let q: Vec<f64> = w.iter().zip(product(&m, &z)).map(|(w, x)| w - x).collect();
             let problem = BoxLcp::new(m, q, lower, upper).unwrap();

@@ -259,7 +259,10 @@ fn boxed(n: usize, seed: u64) -> (Dense, Vec<f64>, [Vec<f64>; 2], Vec<f64>) {
             (_, false, true) => (u - gap, 0.0),
             (_, false, false) => (at, 0.0),
         };
-        (z.push(zi), w.push(wi), lower.push(l), upper.push(u));
+        z.push(zi);
+        w.push(wi);
+        lower.push(l);
+        upper.push(u);
     }
     let q = w.iter().zip(product(&m.clone().into(), &z)).map(|(w, x)| w - x).collect();
     (m, q, [lower, upper], z)

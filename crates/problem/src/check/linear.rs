@@ -395,10 +395,13 @@ pub struct RowCounts {
     pub degenerate: usize,
 }
 
-/// From `(x, l, u)` (none of an equality) and w of each row, all in the unit of q.
+/// `(x, l, u)`: a variable and its bounds in the unit of q.
+type Scaled = (f64, f64, f64);
+
+/// From each row's variable (none of an equality) and w.
 fn verdict(
     measure: Measure,
-    rows: &[(Option<(f64, f64, f64)>, f64)],
+    rows: &[(Option<Scaled>, f64)],
     norm_q: f64,
     w: Vec<f64>,
     tolerance: f64,

@@ -712,7 +712,7 @@ impl Tableau {
     /// q̄ from the problem's data as accurately as they allow, and whether anything is negative then.
     pub fn polish(&mut self) -> Polished {
         self.polishes += 1;
-        if !self.refine() && !(self.rebuild() && self.refine()) {
+        if !(self.refine() || self.rebuild() && self.refine()) {
             return Polished::Exhausted;
         }
         if !(self.free..self.n).any(|i| self.is_negative(i)) {

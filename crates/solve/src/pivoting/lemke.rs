@@ -202,6 +202,9 @@ pub struct LemkeWork {
     g: Vec<f64>,
     by_slot: Vec<f64>,
     alpha: Vec<bool>,
+    /// w of the caller's point, and the largest modulus of each row.
+    w: Vec<f64>,
+    sizes: Vec<f64>,
     rng: Pcg64Mcg,
     record: Recorder<Pivot>,
 }
@@ -232,6 +235,8 @@ impl<P: Complementary> Solver<P> for LemkePath {
             g: vec![],
             by_slot: vec![],
             alpha: vec![],
+            w: vec![],
+            sizes: vec![],
             rng: Pcg64Mcg::seed_from_u64(self.settings.seed),
             record: Recorder::default(),
         })
@@ -503,15 +508,19 @@ impl LemkeWork {
 
     /// α of a caller's point: the z that weigh more than their w.
     fn active(&mut self, system: &System, point: &LcpPoint) {
-        let free = self.path.data.free;
-        let mut largest = vec![0.0_f64; system.dim()];
-        system.matrix.for_each(|i, _, x| largest[i] = largest[i].max(x.abs()));
-        let mut w = vec![0.0; system.dim()];
-        system.matrix.mul(&point.z, &mut w);
-        self.alpha.clear();
-        self.alpha.extend((0..system.dim()).map(|i| {
-            i < free || (point.z[i] > 0.0 && largest[i] * point.z[i] > w[i] + system.q[i])
-        }));
+        let Self { path, alpha, w, sizes, .. } = self;
+        let (n, free) = (system.dim(), path.data.free);
+        sizes.clear();
+        sizes.resize(n, 0.0_f64);
+        system.matrix.for_each(|i, _, x| sizes[i] = sizes[i].max(x.abs()));
+        w.resize(n, 0.0);
+        system.matrix.mul(&point.z, w);
+        alpha.clear();
+        alpha.extend(
+            (0..n).map(|i| {
+                i < free || (point.z[i] > 0.0 && sizes[i] * point.z[i] > w[i] + system.q[i])
+            }),
+        );
     }
 
     /// The basis of α; false where it is not regular.

@@ -24,10 +24,13 @@ pub struct Candidate {
     pub because: String,
 }
 
+/// Who makes the plan for a problem.
+type Planner<P> = Box<dyn Fn(&P) -> Vec<Candidate> + Send>;
+
 /// A session that runs the solvers of a plan until one solves the problem or proves that it has no solution. Each starts from the best point that the ones before
 /// it have found.
 pub struct Portfolio<P: Registered> {
-    plan: Box<dyn Fn(&P) -> Vec<Candidate> + Send>,
+    plan: Planner<P>,
     /// What was made for earlier problems, by name and settings.
     sessions: Vec<(&'static str, SettingsMap, Box<dyn Session<P>>)>,
     history: Vec<Sample>,
