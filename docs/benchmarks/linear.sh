@@ -40,7 +40,7 @@ solvers=()
 for name in auto lemke keller criss_cross block_pivoting ip_mehrotra ip_mty qp newton_min newton_fb newton_pfb psor rpsor mprgp; do
     solvers+=(--solver "$name")
 done
-"$nonsmooth" bench run "$work/problems" "${solvers[@]}" --tol 1e-4 --tol 1e-10 \
+"$nonsmooth" bench run "$work/problems" "${solvers[@]}" --tol 1e-10 \
     --time-limit 1 --repeat-below 0.05 --jobs 2 --out "$work/runs.jsonl" --resume
 "$nonsmooth" bench report "$work/runs.jsonl" --out "$work/report.html"
 "$nonsmooth" bench page "$work/runs.jsonl" --out docs/benchmarks-linear.md \

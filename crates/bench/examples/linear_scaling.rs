@@ -18,7 +18,7 @@ use nonsmooth_solve::{Limits, Status};
 /// A solver leaves after a solve that took longer, s.
 const ENOUGH: f64 = 2.0;
 /// The longest solve, s.
-const LONGEST: f64 = 60.0;
+const LONGEST: f64 = 15.0;
 
 /// Pseudo-random in (−1, 1), the same for the same index.
 fn noise(k: usize) -> f64 {
