@@ -11,8 +11,12 @@ use crate::settings::SettingsMap;
 const DENSE: usize = 2000;
 /// Up to this many variables a pivot on a sparse basis is.
 const SPARSE: usize = 10_000;
-/// Beyond this many variables a factorisation of a sparse matrix is worth many sweeps, and the class is not asked for.
-const HUGE: usize = 200_000;
+/// Beyond this many variables sweeps over a sparse symmetric matrix come before its factorisation.
+const LARGE: usize = 2000;
+/// Sweeps that cost no more than a few factorisations.
+const SWEEPS: usize = 2000;
+/// Beyond this many variables the class is not asked for.
+const HUGE: usize = 50_000;
 
 /// What a plan goes by.
 #[derive(Debug, Clone)]
@@ -43,6 +47,11 @@ impl Facts {
     /// Positive semidefinite, at least up to rounding.
     fn monotone(&self) -> bool {
         self.classes.as_ref().is_some_and(|c| c.is_likely(Class::PositiveSemidefinite))
+    }
+
+    /// Whether sweeps may well be the fastest.
+    fn sweepable(&self) -> bool {
+        self.symmetric && self.positive_diagonal && self.sparse && self.n > LARGE
     }
 
     /// Whether Lemke's method is affordable.
@@ -113,12 +122,8 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto) -> Vec<Candidate> {
     };
     let n = facts.n;
     let mut plan = Plan::new();
-    if facts.symmetric && facts.positive_diagonal && n > HUGE {
-        plan = plan.then("mprgp", 20_000, format!("{}, and large", facts.class())).then(
-            "ip_mehrotra",
-            200,
-            "few factorisations, whatever the condition",
-        );
+    if facts.sweepable() {
+        plan = plan.then("psor", SWEEPS, format!("{}, sparse and large", facts.class()));
     }
     // Finite for P; and a Z-matrix with a positive diagonal may well be one.
     if facts.is(Class::P) || (facts.is(Class::Z) && facts.positive_diagonal) {
@@ -179,8 +184,8 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &LinearAuto) -> Vec<Candidate> 
     let finite = bounds.filter(|b| b.is_finite()).count();
     let n = facts.n;
     Plan::new()
-        .when(facts.symmetric && facts.positive_diagonal && n > HUGE, |p| {
-            p.then("psor", 5_000, format!("{}, and large", facts.class()))
+        .when(facts.sweepable(), |p| {
+            p.then("psor", SWEEPS, format!("{}, sparse and large", facts.class()))
         })
         .then("newton_min", 300, facts.class())
         .then("newton_fb", 500, "globalised")
