@@ -2,7 +2,7 @@
 //!
 //! Problem: LCP, MLCP, horizontal and box LCP.
 //!
-//! Method: a plan of solvers in the order of their promise on the problem at hand ([`plan`]); each starts from the best point before it and has a budget of
+//! Method: a plan of solvers in the order of their promise on the problem at hand (`plan.rs`); each starts from the best point before it and has a budget of
 //! iterations, never of seconds, so that a run repeats itself. The first that solves the problem, or proves that there is no solution, ends the solve.
 //!
 //! References: CottlePangStone2009; FacchineiPang2003; Acary2018 (how to choose); the solvers' own files.
