@@ -1,10 +1,9 @@
 //! The linear complementarity problem with two bounds.
 
-use super::{LcpPoint, square};
-use crate::check::{Certificate, LinearGauge, Measure, linear};
+use super::square;
+use crate::ProblemError;
 use crate::error::vector;
 use crate::linalg::Matrix;
-use crate::{Kind, Problem, ProblemError};
 
 /// `−(M z + q) ∈ N_[l, u](z)`: with `w = M z + q`, `w_i ≥ 0` where `z_i = l_i`, `w_i ≤ 0` where `z_i = u_i`, and `w_i = 0` between.
 ///
@@ -68,50 +67,8 @@ impl BoxLcp {
     }
 }
 
-impl Problem for BoxLcp {
-    type Point = LcpPoint;
-    type Gauge = LinearGauge;
-
-    fn kind(&self) -> Kind {
-        Kind::BoxLcp
-    }
-
-    fn unknowns(&self) -> usize {
-        self.dim()
-    }
-
-    /// The point of the box that is nearest to zero.
-    fn origin(&self) -> LcpPoint {
-        let bounds = self.lower.iter().zip(&self.upper);
-        LcpPoint { z: bounds.map(|(&l, &u)| 0.0_f64.clamp(l, u)).collect() }
-    }
-
-    fn validate_point(&self, point: &LcpPoint) -> Result<(), ProblemError> {
-        vector("z", &point.z, self.dim(), "variables")
-    }
-
-    fn copy_point(from: &LcpPoint, to: &mut LcpPoint) {
-        to.z.clone_from(&from.z);
-    }
-
-    fn gauge(&self) -> Result<LinearGauge, ProblemError> {
-        Ok(LinearGauge::new(self))
-    }
-
-    fn regauge(&self, gauge: &mut LinearGauge) -> Result<(), ProblemError> {
-        gauge.refill(self);
-        Ok(())
-    }
-
-    fn measure(&self, point: &LcpPoint, gauge: &mut LinearGauge) -> Measure {
-        gauge.measure(self, point, false)
-    }
-
-    fn certify(&self, point: &LcpPoint, gauge: &mut LinearGauge) -> Measure {
-        gauge.measure(self, point, true)
-    }
-
-    fn verify(&self, certificate: &Certificate) -> bool {
-        linear::refutes(self, certificate)
-    }
-}
+// The point of the box that is nearest to zero.
+problem_in_z!(BoxLcp, problem => problem.dim(), {
+    let bounds = problem.lower.iter().zip(&problem.upper);
+    bounds.map(|(&l, &u)| 0.0_f64.clamp(l, u)).collect()
+});

@@ -1,10 +1,9 @@
 //! The linear complementarity problem.
 
 use super::square;
-use crate::check::{Certificate, LinearGauge, Measure, linear};
+use crate::ProblemError;
 use crate::error::vector;
 use crate::linalg::Matrix;
-use crate::{Kind, Problem, ProblemError};
 
 /// `0 ≤ z ⟂ w = M z + q ≥ 0`: LCP(M, q), lecture (6).
 #[derive(Debug, Clone, PartialEq)]
@@ -46,48 +45,4 @@ impl Lcp {
     }
 }
 
-impl Problem for Lcp {
-    type Point = LcpPoint;
-    type Gauge = LinearGauge;
-
-    fn kind(&self) -> Kind {
-        Kind::Lcp
-    }
-
-    fn unknowns(&self) -> usize {
-        self.dim()
-    }
-
-    fn origin(&self) -> LcpPoint {
-        LcpPoint { z: vec![0.0; self.dim()] }
-    }
-
-    fn validate_point(&self, point: &LcpPoint) -> Result<(), ProblemError> {
-        vector("z", &point.z, self.dim(), "variables")
-    }
-
-    fn copy_point(from: &LcpPoint, to: &mut LcpPoint) {
-        to.z.clone_from(&from.z);
-    }
-
-    fn gauge(&self) -> Result<LinearGauge, ProblemError> {
-        Ok(LinearGauge::new(self))
-    }
-
-    fn regauge(&self, gauge: &mut LinearGauge) -> Result<(), ProblemError> {
-        gauge.refill(self);
-        Ok(())
-    }
-
-    fn measure(&self, point: &LcpPoint, gauge: &mut LinearGauge) -> Measure {
-        gauge.measure(self, point, false)
-    }
-
-    fn certify(&self, point: &LcpPoint, gauge: &mut LinearGauge) -> Measure {
-        gauge.measure(self, point, true)
-    }
-
-    fn verify(&self, certificate: &Certificate) -> bool {
-        linear::refutes(self, certificate)
-    }
-}
+problem_in_z!(Lcp, problem => problem.dim(), vec![0.0; problem.dim()]);

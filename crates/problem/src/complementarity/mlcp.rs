@@ -1,10 +1,8 @@
 //! The mixed linear complementarity problem.
 
-use super::LcpPoint;
-use crate::check::{Certificate, LinearGauge, Measure, linear};
+use crate::ProblemError;
 use crate::error::vector;
 use crate::linalg::{Csc, Dense, Matrix};
-use crate::{Kind, Problem, ProblemError};
 
 /// `A u + C v + a = 0`, `0 ≤ v ⟂ D u + B v + b ≥ 0`: MLCP, lecture (8).
 ///
@@ -111,48 +109,4 @@ impl Mlcp {
     }
 }
 
-impl Problem for Mlcp {
-    type Point = LcpPoint;
-    type Gauge = LinearGauge;
-
-    fn kind(&self) -> Kind {
-        Kind::Mlcp
-    }
-
-    fn unknowns(&self) -> usize {
-        self.M.ncols()
-    }
-
-    fn origin(&self) -> LcpPoint {
-        LcpPoint { z: vec![0.0; self.unknowns()] }
-    }
-
-    fn validate_point(&self, point: &LcpPoint) -> Result<(), ProblemError> {
-        vector("z", &point.z, self.unknowns(), "variables")
-    }
-
-    fn copy_point(from: &LcpPoint, to: &mut LcpPoint) {
-        to.z.clone_from(&from.z);
-    }
-
-    fn gauge(&self) -> Result<LinearGauge, ProblemError> {
-        Ok(LinearGauge::new(self))
-    }
-
-    fn regauge(&self, gauge: &mut LinearGauge) -> Result<(), ProblemError> {
-        gauge.refill(self);
-        Ok(())
-    }
-
-    fn measure(&self, point: &LcpPoint, gauge: &mut LinearGauge) -> Measure {
-        gauge.measure(self, point, false)
-    }
-
-    fn certify(&self, point: &LcpPoint, gauge: &mut LinearGauge) -> Measure {
-        gauge.measure(self, point, true)
-    }
-
-    fn verify(&self, certificate: &Certificate) -> bool {
-        linear::refutes(self, certificate)
-    }
-}
+problem_in_z!(Mlcp, problem => problem.M.ncols(), vec![0.0; problem.M.ncols()]);

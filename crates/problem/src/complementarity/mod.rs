@@ -7,6 +7,67 @@
 //! | [`Hlcp`] | `Q x + R s = q`, `0 ≤ x ⟂ s ≥ 0` |
 //! | [`BoxLcp`] | `−(M z + q) ∈ N_[l, u](z)` |
 
+/// The [`Problem`](crate::Problem) of a kind whose point is z: what differs is the number of variables and the point to begin from.
+macro_rules! problem_in_z {
+    ($kind:ident, $problem:ident => $unknowns:expr, $origin:expr) => {
+        impl crate::Problem for $kind {
+            type Point = $crate::LcpPoint;
+            type Gauge = $crate::check::LinearGauge;
+
+            fn kind(&self) -> $crate::Kind {
+                $crate::Kind::$kind
+            }
+
+            fn unknowns(&self) -> usize {
+                let $problem = self;
+                $unknowns
+            }
+
+            fn origin(&self) -> Self::Point {
+                let $problem = self;
+                $crate::LcpPoint { z: $origin }
+            }
+
+            fn validate_point(&self, point: &Self::Point) -> Result<(), $crate::ProblemError> {
+                $crate::error::vector("z", &point.z, self.unknowns(), "variables")
+            }
+
+            fn copy_point(from: &Self::Point, to: &mut Self::Point) {
+                to.z.clone_from(&from.z);
+            }
+
+            fn gauge(&self) -> Result<Self::Gauge, $crate::ProblemError> {
+                Ok($crate::check::LinearGauge::new(self))
+            }
+
+            fn regauge(&self, gauge: &mut Self::Gauge) -> Result<(), $crate::ProblemError> {
+                gauge.refill(self);
+                Ok(())
+            }
+
+            fn measure(
+                &self,
+                point: &Self::Point,
+                gauge: &mut Self::Gauge,
+            ) -> $crate::check::Measure {
+                gauge.measure(self, point, false)
+            }
+
+            fn certify(
+                &self,
+                point: &Self::Point,
+                gauge: &mut Self::Gauge,
+            ) -> $crate::check::Measure {
+                gauge.measure(self, point, true)
+            }
+
+            fn verify(&self, certificate: &$crate::check::Certificate) -> bool {
+                $crate::check::linear::refutes(self, certificate)
+            }
+        }
+    };
+}
+
 mod boxed;
 mod hlcp;
 mod lcp;
