@@ -15,8 +15,9 @@ use nonsmooth_problem::LcpPoint;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::{NOT_SUFFICIENT, ended, polished, unpleasant};
 use crate::form::{Complementary, system};
-use crate::parts::{Cycle, Polished, Tableau};
+use crate::parts::{Cycle, Tableau};
 use crate::settings::Settings;
 use crate::trace::Trace;
 use crate::{SolveError, Solver, Step};
@@ -30,8 +31,6 @@ pub struct CrissCross {
 }
 
 impl Settings for CrissCross {}
-
-const NOT_SUFFICIENT: &str = "signs in the tableau show that M is not a sufficient matrix";
 
 /// The solver.
 #[derive(Debug, Clone, Copy)]
@@ -61,20 +60,11 @@ impl<P: Complementary> Solver<P> for CrissCrossPivoting {
 
     fn step(&self, _: &P, _: &mut LcpPoint, work: &mut CrissCrossWork) -> Step {
         let CrissCrossWork { tableau, cycle } = work;
-        if let Some(proof) = tableau.refuted() {
-            return Step::NoSolution(proof);
-        }
-        if tableau.is_lost() {
-            return Step::Stuck("numerically singular bases on the way".into());
+        if let Some(end) = ended(tableau) {
+            return end;
         }
         let Some(r) = tableau.first_negative(self.0.descending) else {
-            return match tableau.polish() {
-                Polished::Negative => {
-                    cycle.begin(tableau.basis());
-                    Step::Continue { estimate: f64::NAN }
-                }
-                Polished::Feasible | Polished::Exhausted => Step::Done,
-            };
+            return polished(tableau, cycle);
         };
         match tableau.diagonal(r) {
             d if d > 0.0 => tableau.pivot(r),
@@ -123,9 +113,4 @@ impl<P: Complementary> Solver<P> for CrissCrossPivoting {
     fn check_every(&self) -> usize {
         super::CHECK_EVERY
     }
-}
-
-/// The step's word, once it has been heard from a tableau that is fresh from the data.
-fn unpleasant(tableau: &mut Tableau, word: Step) -> Step {
-    if tableau.freshen() { Step::Continue { estimate: f64::NAN } } else { word }
 }

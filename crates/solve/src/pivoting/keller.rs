@@ -16,6 +16,7 @@ use nonsmooth_problem::LcpPoint;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::{NOT_SUFFICIENT, ended};
 use crate::form::{Complementary, system};
 use crate::parts::{Cycle, Polished, Tableau};
 use crate::settings::Settings;
@@ -51,7 +52,6 @@ pub struct KellerWork {
     restarts: usize,
 }
 
-const NOT_SUFFICIENT: &str = "signs in the tableau show that M is not a sufficient matrix";
 /// λ in units of the most negative value: so far that it rarely blocks, and near enough for rounding.
 const FAR: f64 = 1e3;
 /// Ratios that differ by less, relatively, tie.
@@ -222,11 +222,8 @@ impl<P: Complementary> Solver<P> for KellerPivoting {
     }
 
     fn step(&self, _: &P, _: &mut LcpPoint, work: &mut KellerWork) -> Step {
-        if let Some(proof) = work.tableau.refuted() {
-            return Step::NoSolution(proof);
-        }
-        if work.tableau.is_lost() {
-            return Step::Stuck("numerically singular bases on the way".into());
+        if let Some(end) = ended(&mut work.tableau) {
+            return end;
         }
         if work.restarts != work.tableau.restarts() {
             work.begin();

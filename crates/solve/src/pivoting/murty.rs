@@ -15,8 +15,9 @@ use nonsmooth_problem::LcpPoint;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::{NOT_P, ended, polished, unpleasant};
 use crate::form::{Complementary, system};
-use crate::parts::{Cycle, Polished, Tableau};
+use crate::parts::{Cycle, Tableau};
 use crate::settings::Settings;
 use crate::trace::Trace;
 use crate::{SolveError, Solver, Step};
@@ -59,28 +60,14 @@ impl<P: Complementary> Solver<P> for MurtyPivoting {
 
     fn step(&self, _: &P, _: &mut LcpPoint, work: &mut MurtyWork) -> Step {
         let MurtyWork { tableau, cycle } = work;
-        if let Some(proof) = tableau.refuted() {
-            return Step::NoSolution(proof);
-        }
-        if tableau.is_lost() {
-            return Step::Stuck("numerically singular bases on the way".into());
+        if let Some(end) = ended(tableau) {
+            return end;
         }
         let Some(r) = tableau.first_negative(self.0.descending) else {
-            return match tableau.polish() {
-                Polished::Negative => {
-                    cycle.begin(tableau.basis());
-                    Step::Continue { estimate: f64::NAN }
-                }
-                Polished::Feasible | Polished::Exhausted => Step::Done,
-            };
+            return polished(tableau, cycle);
         };
         if tableau.diagonal(r) == 0.0 {
-            if tableau.freshen() {
-                return Step::Continue { estimate: f64::NAN };
-            }
-            return Step::Stuck(
-                "a zero on the diagonal of the tableau: M is not a P-matrix".into(),
-            );
+            return unpleasant(tableau, Step::Stuck(NOT_P.into()));
         }
         tableau.pivot(r);
         if cycle.returns(tableau.basis()) {

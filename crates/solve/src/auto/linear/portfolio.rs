@@ -152,21 +152,12 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             self.account.push(sentence(&candidate, &outcome));
             self.account.extend(session.account().into_iter().map(|line| format!("  {line}")));
             tally.take(trial, &outcome);
-            let (decided, over) = (
-                matches!(outcome.status, Status::Solved | Status::Infeasible(_)),
-                tally.is_over(limits, &outcome.status),
-            );
-            status = outcome.status;
-            if decided || over {
+            let decided = matches!(outcome.status, Status::Solved | Status::Infeasible(_));
+            if decided || tally.is_over(limits, &outcome.status) {
+                status = outcome.status;
                 break;
             }
-        }
-        if let Status::Stalled(_) | Status::Limit(Limit::Iterations) | Status::NoConclusion(_) =
-            &status
-            && !tally.is_over(limits, &status)
-            && tally.best.is_some()
-        {
-            status = match status {
+            status = match outcome.status {
                 ray @ Status::NoConclusion(_) => ray,
                 _ => Status::Stalled("none of the methods tried solves it; see the account".into()),
             };
