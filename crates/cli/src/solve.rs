@@ -13,7 +13,7 @@ use nonsmooth_solve::registry::{self, Registered, Solves};
 use nonsmooth_solve::settings::{self, SettingsMap};
 use nonsmooth_solve::trace::Trace;
 use nonsmooth_solve::{Limit, Limits, Outcome, Sample, SolveError, Status};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::kinds::{Class, Form, takes};
 use crate::progress::Bar;
@@ -64,6 +64,10 @@ pub struct Args {
     /// for several files
     #[arg(long, value_name = "FILE.json")]
     trace: Option<PathBuf>,
+    /// Where there is no solution: write the certificate (JSON), which `nonsmooth check FILE --certificate` verifies; a directory for
+    /// several files. A proof is written with the exact fractions that were verified
+    #[arg(long, value_name = "FILE.json")]
+    certificate: Option<PathBuf>,
     /// Print one line of JSON for each file in place of the report
     #[arg(long)]
     json: bool,
@@ -80,6 +84,7 @@ Examples:
   nonsmooth solve *.hdf5 --out solved/ --json > results.jsonl
   nonsmooth solve step2.hdf5 --warm-start=solved/step1.hdf5
   nonsmooth solve contact.toml --out solved.toml --trace pivots.json --plot pivots.svg
+  nonsmooth solve impossible.toml --certificate proof.json   # then: check impossible.toml --certificate proof.json
 
 Exit codes: 0 all solved; 1 some not solved; 2 some file or option at fault.";
 
@@ -283,7 +288,13 @@ fn one<P: Form + Registered>(
     });
     let Solved { outcome, point, history, trace, .. } = solved;
     let is_solved = outcome.status == Status::Solved;
-    Ok(Done { report, point, history, trace, record, is_solved })
+    let proof = certificate(&outcome.status).map(|certificate| {
+        let mut all = report::problem_json(file, problem);
+        all.insert("status".into(), json!(outcome.status.name()));
+        all.insert("certificate".into(), certificate);
+        format!("{}\n", json!(all))
+    });
+    Ok(Done { report, point, history, trace, record, proof, is_solved })
 }
 
 /// What is left to print and to write of a solve.
@@ -294,6 +305,8 @@ struct Done<T> {
     trace: Trace,
     /// The trace as JSON, if asked for.
     record: Option<String>,
+    /// The certificate as JSON, where there is one.
+    proof: Option<String>,
     is_solved: bool,
 }
 
@@ -306,17 +319,21 @@ impl<T> Done<T> {
         targets: Target,
         write: impl FnOnce(&Path, T) -> Result<(), String>,
     ) -> Result<Exit, String> {
-        let Self { report, point, history, trace, record, is_solved } = self;
+        let Self { report, point, history, trace, record, proof, is_solved } = self;
         let pictures = || {
             if let Some(path) = targets.plot {
                 let title = format!("{} on {}", plan.solver, name(file));
                 let svg = plot::svg(&title, &history, &trace, plan.limits.tolerance)?;
                 files::write_text("--plot", path, &svg)?;
             }
-            match (targets.trace, record) {
-                (Some(path), Some(record)) => files::write_text("--trace", path, &record),
-                _ => Ok(()),
+            for (option, path, text) in
+                [("--trace", targets.trace, record), ("--certificate", targets.certificate, proof)]
+            {
+                if let (Some(path), Some(text)) = (path, text) {
+                    files::write_text(option, path, &text)?;
+                }
             }
+            Ok(())
         };
         // Files first: whoever reads the report may be gone. But a file that fails must not cost the report.
         let kept = targets.out.map_or(Ok(()), |path| write(path, point)).and_then(|()| pictures());
@@ -378,6 +395,20 @@ fn name(file: &Path) -> String {
     file.file_name().unwrap_or_default().to_string_lossy().into()
 }
 
+/// What the status rests on, if it says that there is no solution.
+fn certificate(status: &Status) -> Option<Value> {
+    match status {
+        Status::Infeasible(proof) => Some(json!(proof)),
+        Status::NoConclusion(certificate) => Some(json!(certificate)),
+        Status::NearlyInfeasible { certificate, change } => {
+            let mut all = report::fields(json!(certificate));
+            all.insert("change".into(), json!(change));
+            Some(Value::Object(all))
+        }
+        _ => None,
+    }
+}
+
 /// The worst contacts that a report of an unsolved problem lists.
 const WORST: usize = 3;
 
@@ -394,8 +425,8 @@ fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &SolvedOf<P
         "seconds": outcome.seconds,
         "account": account,
     })));
-    if let Status::Infeasible(proof) | Status::NoConclusion(proof) = &outcome.status {
-        all.insert("certificate".into(), json!(proof));
+    if let Some(certificate) = certificate(&outcome.status) {
+        all.insert("certificate".into(), certificate);
     }
     all.extend(report::verdict_json(verdict, plan.limits.tolerance, verdict.worst.len()));
     format!("{}\n", json!(all))
@@ -496,7 +527,7 @@ fn hint<P: Form + Registered>(
             let t = plan.limits.time_limit.unwrap_or_default();
             vec![format!("--time-limit {}", (10.0 * t).max(1.0))]
         }
-        Status::NoConclusion(_) | Status::Stalled(_) => vec![],
+        Status::NearlyInfeasible { .. } | Status::NoConclusion(_) | Status::Stalled(_) => vec![],
     };
     // The default, then the first solver of each other family.
     let mut families = vec![about.family];
@@ -523,6 +554,7 @@ struct Targets {
     out: Option<Vec<PathBuf>>,
     plot: Option<Vec<PathBuf>>,
     trace: Option<Vec<PathBuf>>,
+    certificate: Option<Vec<PathBuf>>,
 }
 
 /// The output files for one input.
@@ -531,6 +563,7 @@ struct Target<'a> {
     out: Option<&'a Path>,
     plot: Option<&'a Path>,
     trace: Option<&'a Path>,
+    certificate: Option<&'a Path>,
 }
 
 impl Targets {
@@ -542,7 +575,10 @@ impl Targets {
         let out = place("--out", &args.out, None)?;
         let plot = place("--plot", &args.plot, Some("svg"))?;
         let trace = place("--trace", &args.trace, Some("trace.json"))?;
-        for (option, all) in [("--plot", &plot), ("--trace", &trace)] {
+        let certificate = place("--certificate", &args.certificate, Some("certificate.json"))?;
+        for (option, all) in
+            [("--plot", &plot), ("--trace", &trace), ("--certificate", &certificate)]
+        {
             for path in all.iter().flatten() {
                 if option == "--plot" {
                     files::picture(option, path)?;
@@ -563,14 +599,19 @@ impl Targets {
                 "--trace {path}: expected a file of its own, found that of --plot"
             ));
         }
-        Ok(Self { out, plot, trace })
+        Ok(Self { out, plot, trace, certificate })
     }
 
     fn of(&self, k: usize) -> Target<'_> {
         fn path(all: &Option<Vec<PathBuf>>, k: usize) -> Option<&Path> {
             Some(all.as_ref()?.get(k)?.as_path())
         }
-        Target { out: path(&self.out, k), plot: path(&self.plot, k), trace: path(&self.trace, k) }
+        Target {
+            out: path(&self.out, k),
+            plot: path(&self.plot, k),
+            trace: path(&self.trace, k),
+            certificate: path(&self.certificate, k),
+        }
     }
 }
 

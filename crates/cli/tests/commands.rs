@@ -438,7 +438,7 @@ fn exists_proves_refutes_and_writes_its_certificate() {
     for mu in [0.0, 0.8] {
         fclib::write(folder.path("squeezed.hdf5"), &FclibFile::new(squeezed(mu))).unwrap();
         let text = folder.run("exists squeezed.hdf5").exits(1).stdout;
-        assert!(text.contains("solution none: ") && text.contains("2 contacts"), "{text}");
+        assert!(text.contains("solution none, proved: ") && text.contains("2 contacts"), "{text}");
         let line = folder.run("exists squeezed.hdf5 --json").exits(1).json().remove(0);
         assert_eq!(
             (&line["verdict"], &line["pressed_contacts"]),

@@ -1,6 +1,6 @@
 //! The global (mixed linear) frictional contact problem.
 
-use crate::check::{self, Certificate, Impulses, Measure};
+use crate::check::{self, Certificate, ConeSystem, Evidence, Impulses, Measure};
 use crate::error::{all_finite, friction_coefficients, vector};
 use crate::linalg::{Csc, Inverse, Refine};
 use crate::{Kind, Problem, ProblemError};
@@ -232,7 +232,7 @@ impl Dynamics {
         self.inverse.null_direction(&mut residual);
         let multipliers = residual.split_off(problem.dofs());
         let r = vec![0.0; problem.w.len()];
-        Impulses::toward(r, multipliers, &[], &b.b, |c| check::refutes_global(problem, c))
+        Impulses::toward(r, multipliers, &[], &b.b, |c| check::holds(problem, c))
     }
 }
 
@@ -284,7 +284,17 @@ impl<const D: usize> Problem for FrictionGlobal<D> {
         gauge.measure(self, point, true)
     }
 
-    fn verify(&self, certificate: &Certificate) -> bool {
-        certificate.impulses().is_some_and(|i| check::refutes_global(self, i))
+    fn evidence(&self, certificate: &Certificate) -> Evidence {
+        check::weigh(self, certificate)
+    }
+
+    fn cones(&self) -> Option<ConeSystem> {
+        check::Exactly::system(self, None)
+    }
+
+    fn assembled(&self, unknowns: &[f64]) -> Self::Point {
+        let (v, rest) = unknowns.split_at(self.dofs());
+        let (r, lambda) = rest.split_at(self.w.len());
+        GlobalPoint { v: v.to_vec(), r: r.to_vec(), lambda: lambda.to_vec() }
     }
 }

@@ -417,25 +417,25 @@ proptest! {
         let class = [PlantedClass::Psd, PlantedClass::Kkt, PlantedClass::CopositivePlus][class];
         let case = PlantedLcp { n, class, seed, ..PlantedLcp::default() };
         let (problem, proof) = case.infeasible().unwrap();
-        prop_assert!(problem.verify(&proof));
+        prop_assert!(problem.evidence(&proof).holds());
         let Certificate::Farkas { y } = proof else { unreachable!() };
         let there: Vec<_> = (0..n).filter(|&i| y[i] > 0.0).collect();
         let i = there[pick.index(there.len())];
         let changed = |factor: f64| {
             let mut other = y.clone();
             other[i] *= factor;
-            problem.verify(&farkas(&other))
+            problem.evidence(&farkas(&other)).holds()
         };
         // Not by chance: where more of a row is no longer balanced downwards, less of it is.
         prop_assert!(!changed(-1.0), "{}", i);
         prop_assert!(!(changed(1.0 + 1e-6) && changed(1.0 - 1e-6)), "{}", i);
         // The same as a ray, a mixed problem and a box.
-        prop_assert!(problem.verify(&ray(&y, 0.0)));
+        prop_assert!(problem.evidence(&ray(&y, 0.0)).holds());
         prop_assert!(!problem.verify(&ray(&y, 0.1)));
         let mixed = Mlcp::new(problem.M.clone(), problem.q.clone(), 0).unwrap();
-        prop_assert!(mixed.verify(&farkas(&y)));
+        prop_assert!(mixed.evidence(&farkas(&y)).holds());
         let boxed = BoxLcp::new(problem.M.clone(), problem.q.clone(), vec![0.0; n], vec![INF; n]).unwrap();
-        prop_assert!(boxed.verify(&farkas(&y)));
+        prop_assert!(boxed.evidence(&farkas(&y)).holds());
         // Scaled rows: the vector goes with them.
         let m = problem.M.to_dense().unwrap();
         let d = |i: usize| f64::from((i as i32 * 7) % 53 - 26).exp2();
@@ -443,10 +443,10 @@ proptest! {
         let q = (0..n).map(|i| d(i) * problem.q[i]).collect();
         let scaled = Lcp::new(scaled, q).unwrap();
         let fitting: Vec<_> = (0..n).map(|i| y[i] / d(i)).collect();
-        prop_assert!(scaled.verify(&farkas(&fitting)));
+        prop_assert!(scaled.evidence(&farkas(&fitting)).holds());
         // A feasible problem has no proof: raise q until the planted point is a solution again.
         let (feasible, _) = case.lcp();
-        prop_assert!(!feasible.verify(&farkas(&y)));
+        prop_assert!(!feasible.evidence(&farkas(&y)).holds());
     }
 }
 
@@ -529,13 +529,12 @@ fn certificates_of_mixed_boxed_and_horizontal_problems() {
     let m = rows([[1e-6, 1.0], [0.0, 1.0]]);
     assert!(!Mlcp::new(m, vec![1.0, 1.0], 1).unwrap().verify(&farkas(&[-1.0, 0.0])));
     assert!(!problem.verify(&Certificate::Row { row: 0 }), "an equality");
-    // Rectangular: two equalities that contradict each other; a ray has no meaning there.
+    // Rectangular: two equalities that contradict each other.
     let m = Dense::from_rows(&[[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]]).unwrap();
     let problem = Mlcp::rectangular(m, vec![-1.0, -2.0, 1.0], 2, 1).unwrap();
     assert!(
         problem.verify(&farkas(&[-1.0, 1.0, 0.0])) && !problem.verify(&farkas(&[1.0, -1.0, 0.0]))
     );
-    assert!(!problem.verify(&Certificate::Ray { z: vec![-1.0, 1.0, 0.0], z0: 0.0 }));
     // A box always has a solution where it is bounded; with one bound it may have none.
     let half =
         |q: f64, l: f64, u: f64| BoxLcp::new(rows([[-1.0]]), vec![q], vec![l], vec![u]).unwrap();

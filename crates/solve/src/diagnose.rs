@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use nonsmooth_problem::check::Existence;
+use nonsmooth_problem::check::{Existence, Impulses};
 use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse, norm, small};
 use nonsmooth_problem::traits::{Spectrum, Traits, rank};
 use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, with_friction};
@@ -378,21 +378,40 @@ impl<P: Seen<D> + Registered, const D: usize> Patient<'_, P, D> {
         })
     }
 
+    /// Where bodies are forced into each other.
+    fn squeezed(&self, impulses: Option<&Impulses>) -> String {
+        let Some(impulses) = impulses else {
+            return "Look at the matrix and the given velocities: no choice of open, sticking and sliding contacts satisfies them.".into();
+        };
+        let pressed = impulses.pressed(self.traits.contacts);
+        let shown: Vec<_> = pressed.iter().take(6).map(usize::to_string).collect();
+        let more = if pressed.len() > shown.len() { ", ..." } else { "" };
+        format!(
+            "Look at the given velocities w at contacts {}{more}: they press rigid bodies into each other.",
+            shown.join(", ")
+        )
+    }
+
     fn existence(&self) -> Finding {
         let says = self.existence.to_string();
         match &self.existence {
-            Existence::Proved { .. } => {
+            Existence::Proved { .. } | Existence::Solved { .. } => {
                 easy("existence", says, "A solver that fails has failed; the problem is sound.")
             }
-            Existence::NoSolution { certificate } => {
-                let pressed = certificate.pressed(self.traits.contacts);
-                let shown: Vec<_> = pressed.iter().take(6).map(usize::to_string).collect();
-                let more = if pressed.len() > shown.len() { ", ..." } else { "" };
-                let mean = format!(
-                    "No solver can succeed. Look at the given velocities w at contacts {}{more}: they press rigid bodies into each other.",
-                    shown.join(", ")
-                );
-                hard("existence", says, &mean, vec![])
+            Existence::NearlyProved { .. } => easy(
+                "existence",
+                says,
+                "A solver that fails has most likely failed; the problem is sound but for rounding.",
+            ),
+            Existence::NearlyNoSolution { certificate, .. } => hard(
+                "existence",
+                says,
+                &self.squeezed(certificate.impulses()),
+                of_families::<P>(ANY),
+            ),
+            Existence::NoSolution { proof } => {
+                let mean = self.squeezed(proof.certificate().impulses());
+                hard("existence", says, &format!("No solver can succeed. {mean}"), vec![])
             }
             Existence::Weak { .. } | Existence::CriterionRefuted { .. } => hard(
                 "existence",

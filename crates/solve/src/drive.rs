@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use nonsmooth_problem::Problem;
-use nonsmooth_problem::check::{Certificate, Measure};
+use nonsmooth_problem::check::{Certificate, Evidence, Measure, Proof};
 use nonsmooth_problem::linalg::factorisations;
 
 use crate::trace::Trace;
@@ -66,8 +66,15 @@ impl Limits {
 pub enum Status {
     /// The judge accepts the point at the tolerance asked for.
     Solved,
-    /// There is no solution; the judge has verified the certificate.
-    Infeasible(Certificate),
+    /// There is no solution: proved, in exact arithmetic on the stored data.
+    Infeasible(Proof),
+    /// There is no solution for data that differ from those stored by rounding; nothing is known of the problem as stored.
+    NearlyInfeasible {
+        /// What holds nearly.
+        certificate: Certificate,
+        /// The relative change of the data that makes it true.
+        change: f64,
+    },
     /// The solver ended on a ray that the judge does not accept as a proof.
     NoConclusion(Certificate),
     /// A limit came first.
@@ -88,11 +95,29 @@ pub enum Limit {
 }
 
 impl Status {
-    /// A short name: `solved`, `infeasible`, `no_conclusion`, `iteration_limit`, `time_limit`, `cancelled`, `stalled`.
+    /// What the status rests on, where it is about there being no solution.
+    pub fn certificate(&self) -> Option<&Certificate> {
+        match self {
+            Status::Infeasible(proof) => Some(proof.certificate()),
+            Status::NearlyInfeasible { certificate, .. } | Status::NoConclusion(certificate) => {
+                Some(certificate)
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether it says that there is no solution, proved or up to rounding.
+    pub fn refutes(&self) -> bool {
+        matches!(self, Status::Infeasible(_) | Status::NearlyInfeasible { .. })
+    }
+
+    /// A short name: `solved`, `infeasible`, `nearly_infeasible`, `no_conclusion`, `iteration_limit`,
+    /// `time_limit`, `cancelled`, `stalled`.
     pub fn name(&self) -> &'static str {
         match self {
             Status::Solved => "solved",
             Status::Infeasible(_) => "infeasible",
+            Status::NearlyInfeasible { .. } => "nearly_infeasible",
             Status::NoConclusion(_) => "no_conclusion",
             Status::Limit(Limit::Iterations) => "iteration_limit",
             Status::Limit(Limit::Time) => "time_limit",
@@ -106,9 +131,13 @@ impl std::fmt::Display for Status {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Status::Solved => f.write_str("solved"),
-            Status::Infeasible(certificate) => {
-                write!(f, "infeasible: {certificate}, with a verified certificate")
+            Status::Infeasible(proof) => {
+                write!(f, "infeasible: {proof}; proved in exact arithmetic")
             }
+            Status::NearlyInfeasible { certificate, change } => write!(
+                f,
+                "not solved, nearly infeasible: {certificate}, up to rounding: a relative change of the data by {change:.0e} would make it so"
+            ),
             Status::NoConclusion(_) => {
                 f.write_str("no conclusion: the solver ended on a ray that proves nothing")
             }
@@ -387,10 +416,11 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
     fn conclusion(&self, step: Step) -> Status {
         match step {
             Step::Stuck(why) => Status::Stalled(why),
-            Step::NoSolution(certificate) if self.problem.verify(&certificate) => {
-                Status::Infeasible(certificate)
-            }
-            Step::NoSolution(certificate) => Status::NoConclusion(certificate),
+            Step::NoSolution(certificate) => match self.problem.evidence(&certificate) {
+                Evidence::Proved(proof) => Status::Infeasible(proof),
+                Evidence::Nearly { change } => Status::NearlyInfeasible { certificate, change },
+                Evidence::Nothing => Status::NoConclusion(certificate),
+            },
             Step::Done | Step::Continue { .. } => {
                 Status::Stalled("the solver has finished, but its answer fails the check".into())
             }

@@ -145,6 +145,7 @@ fn ending(status: &Status) -> Ending {
     match status {
         Status::Solved => Ending::Solved,
         Status::Infeasible(_) => Ending::Infeasible,
+        Status::NearlyInfeasible { .. } => Ending::NearlyInfeasible,
         Status::NoConclusion(_) => Ending::NoConclusion,
         Status::Limit(Limit::Time | Limit::Cancelled) => Ending::TimeLimit,
         Status::Limit(Limit::Iterations) => Ending::IterationLimit,

@@ -11,6 +11,7 @@ mod global;
 mod impulses;
 pub(crate) mod linear;
 mod local;
+mod proof;
 mod rows;
 mod verdict;
 
@@ -19,9 +20,11 @@ pub use contact::{ContactStatus, Motion};
 pub use existence::{Existence, Kinematic, Kinematics};
 pub use global::GlobalGauge;
 pub use impulses::Impulses;
-pub(crate) use impulses::{refutes_global, refutes_local};
+pub(crate) use impulses::holds;
 pub use linear::{HlcpGauge, LinearGauge, RowCounts, RowStatus};
 pub use local::LocalGauge;
+pub use proof::{Column, ConeSystem, Evidence, Exact, ExactVector, Monotone, NEAR, Proof, rounded};
+pub(crate) use proof::{Exactly, weigh};
 pub use verdict::{Judged, StatusCounts, Verdict, VerdictOf};
 
 use serde::Serialize;

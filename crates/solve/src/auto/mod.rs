@@ -490,11 +490,30 @@ impl<const D: usize> Hybrid<D> {
         let limits = Limits { time_limit: Some(INVESTIGATION), ..Limits::default() };
         let existence =
             work.existence.get_or_insert_with(|| existence::decide::<P, D>(problem, &limits));
-        if let Existence::NoSolution { certificate } = existence {
-            return Step::NoSolution(certificate.clone().into());
+        match existence {
+            Existence::NoSolution { proof } => {
+                return Step::NoSolution(proof.certificate().clone());
+            }
+            // An exact solution, found on the way: the judge has the last word on its rounding.
+            Existence::Solved { coefficients } if work.done.strategies == 0 => {
+                let Some(system) = problem.cones() else {
+                    return Step::Stuck("auto has lost its place".into());
+                };
+                let x = system.unknowns_at(&coefficients.0);
+                P::copy_point(&problem.assembled(&x), point);
+                problem.enter(&mut work.state, point);
+                work.best.copy_from_slice(P::impulses(point));
+                work.done.strategies += 1;
+                self.subproblem_here(problem, point, work);
+                return Step::Continue { estimate: 0.0 };
+            }
+            _ => {}
         }
         work.done.strategies += 1;
         if self.0.strategies > 0 && work.controller.strategies() >= self.0.strategies {
+            if let Existence::NearlyNoSolution { certificate, .. } = existence {
+                return Step::NoSolution(certificate.clone());
+            }
             let why = format!(
                 "no strategy halves the error any more; existence of a solution: {}",
                 existence.name()

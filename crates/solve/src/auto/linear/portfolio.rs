@@ -1,5 +1,6 @@
 //! Several solvers, one after the other, as one session.
 
+use std::borrow::Cow;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
@@ -40,6 +41,10 @@ pub struct Portfolio<P: Registered> {
 
 /// The most samples that a history keeps.
 const HISTORY: usize = 4096;
+
+/// What is said at the end of a plan.
+const NONE: Status =
+    Status::Stalled(Cow::Borrowed("none of the methods tried solves it; see the account"));
 
 impl<P: Registered> Portfolio<P> {
     /// A session that follows `plan`.
@@ -126,6 +131,7 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             best: None,
         };
         let mut status = Status::Stalled("no method applies to this problem".into());
+        let mut nearly = None;
         for candidate in (self.plan)(problem) {
             let k = self.session(&candidate)?;
             let mut trial = tally.best.as_ref().map_or_else(|| point.clone(), |b| b.0.clone());
@@ -159,8 +165,15 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             }
             status = match outcome.status {
                 ray @ Status::NoConclusion(_) => ray,
-                _ => Status::Stalled("none of the methods tried solves it; see the account".into()),
+                near @ Status::NearlyInfeasible { .. } => {
+                    nearly = Some(near);
+                    NONE
+                }
+                _ => NONE,
             };
+        }
+        if let (Some(near), Status::Stalled(_) | Status::NoConclusion(_)) = (nearly, &status) {
+            status = near;
         }
         let measure = match tally.best {
             Some((best, measure)) => {
