@@ -11,6 +11,7 @@ mod global;
 mod impulses;
 pub(crate) mod linear;
 mod local;
+pub(crate) mod refute;
 mod rows;
 mod verdict;
 

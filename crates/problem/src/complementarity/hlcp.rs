@@ -1,7 +1,7 @@
 //! The horizontal linear complementarity problem.
 
 use super::square;
-use crate::check::{Certificate, HlcpGauge, Measure, linear};
+use crate::check::{Certificate, HlcpGauge, Measure, refute};
 use crate::error::vector;
 use crate::linalg::Matrix;
 use crate::{Kind, Problem, ProblemError};
@@ -100,6 +100,6 @@ impl Problem for Hlcp {
     }
 
     fn verify(&self, certificate: &Certificate) -> bool {
-        linear::refutes_horizontal(self, certificate)
+        refute::refutes_horizontal(self, certificate)
     }
 }

@@ -62,7 +62,7 @@ macro_rules! problem_in_z {
             }
 
             fn verify(&self, certificate: &$crate::check::Certificate) -> bool {
-                $crate::check::linear::refutes(self, certificate)
+                $crate::check::refute::refutes(self, certificate)
             }
         }
     };
