@@ -246,9 +246,6 @@ pub struct Residuals {
     /// Bilateral constraints.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bilateral: Option<f64>,
-    /// The worst row in units of its own terms, of linear complementarity problems.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rows: Option<f64>,
 }
 
 /// A run: one problem, one solver, one tolerance.

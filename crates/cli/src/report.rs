@@ -137,7 +137,6 @@ fn residual_text(text: &mut String, m: &Measure, unit: &str) {
         ("primal", Some(m.primal)),
         ("dual", Some(m.dual)),
         ("complementarity", Some(m.complementarity)),
-        ("rows", m.rows),
         ("dynamics", m.dynamics),
         ("velocities", m.velocity_gap),
         ("bilateral", m.bilateral),

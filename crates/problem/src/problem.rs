@@ -105,6 +105,13 @@ pub trait Problem {
     /// The residuals of `point` with all products in doubled precision: to decide by. Allocates nothing.
     fn certify(&self, point: &Self::Point, gauge: &mut Self::Gauge) -> Measure;
 
+    /// Puts `point`, the one last measured with `gauge`, exactly where it is but for rounding: variables on the bounds that they are nearer to, in the judge's
+    /// units, than their partners are to zero; `boldly`, also what is below rounding in units of the whole problem. Says whether that changed it; by default nothing
+    /// does. The result is a candidate, to be measured in its turn. Allocates nothing.
+    fn tidy(&self, _point: &mut Self::Point, _gauge: &mut Self::Gauge, _boldly: bool) -> bool {
+        false
+    }
+
     /// What `certificate`, which claims that the problem has no solution, is worth: decided from the data alone, in exact arithmetic.
     fn evidence(&self, certificate: &Certificate) -> Evidence;
 

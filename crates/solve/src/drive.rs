@@ -246,6 +246,7 @@ struct Kept<P: Problem, S: Solver<P>> {
     work: S::Work,
     gauge: P::Gauge,
     best: P::Point,
+    tidied: P::Point,
 }
 
 impl<P: Problem, S: Solver<P>> Driver<P, S> {
@@ -283,17 +284,17 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
                 let gauge = problem.gauge()?;
                 let meter = Meter::start();
                 let work = solver.work(problem)?;
-                (Kept { work, gauge, best: point.clone() }, meter)
+                (Kept { work, gauge, best: point.clone(), tidied: point.clone() }, meter)
             }
         };
         let outcome = {
-            let (Kept { work, gauge, best }, meter) = &mut kept_now;
+            let (Kept { work, gauge, best, tidied }, meter) = &mut kept_now;
             P::copy_point(point, best);
             let mut run = Run {
                 problem,
                 solver,
                 work,
-                judge: Judge::new(gauge, best, history, *meter, solver.latest()),
+                judge: Judge::new(gauge, best, tidied, history, *meter, solver.latest()),
                 limits,
             };
             run.solve(point, watch)
@@ -372,7 +373,16 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         P::copy_point(self.judge.best, point);
         let measure = match self.judge.certified {
             Some(measure) => measure,
-            None => self.problem.certify(point, self.judge.gauge),
+            None => {
+                // The gauge may have been at another point since.
+                let _ = self.problem.measure(point, self.judge.gauge);
+                let (measure, tidied) =
+                    self.judge.certify(self.problem, point, self.limits.tolerance);
+                if tidied {
+                    P::copy_point(self.judge.tidied, point);
+                }
+                measure
+            }
         };
         // Plain arithmetic may have refused, at rounding level, what doubled precision accepts.
         let status = match status {
@@ -432,6 +442,8 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
 struct Judge<'a, P: Problem> {
     gauge: &'a mut P::Gauge,
     best: &'a mut P::Point,
+    /// The point last certified with its variables exactly on their bounds.
+    tidied: &'a mut P::Point,
     history: &'a mut Vec<Sample>,
     meter: Meter,
     /// Whether the latest point counts as the best.
@@ -451,6 +463,7 @@ impl<'a, P: Problem> Judge<'a, P> {
     fn new(
         gauge: &'a mut P::Gauge,
         best: &'a mut P::Point,
+        tidied: &'a mut P::Point,
         history: &'a mut Vec<Sample>,
         meter: Meter,
         latest: bool,
@@ -460,6 +473,7 @@ impl<'a, P: Problem> Judge<'a, P> {
         Self {
             gauge,
             best,
+            tidied,
             history,
             meter,
             latest,
@@ -474,16 +488,16 @@ impl<'a, P: Problem> Judge<'a, P> {
 
     fn judge(&mut self, problem: &P, point: &P::Point, iteration: usize, tolerance: f64) {
         self.last = problem.measure(point, self.gauge);
-        let mut certified = None;
+        let (mut certified, mut tidied) = (None, false);
         if self.last.passes(tolerance) {
             // What looks solved is looked at again, in doubled precision.
-            self.last = problem.certify(point, self.gauge);
+            (self.last, tidied) = self.certify(problem, point, tolerance);
             certified = Some(self.last);
         }
-        if self.visits == 0 || self.latest || self.last.merit() < self.best_measure.merit() {
+        if self.visits == 0 || self.latest || self.last.is_better_than(&self.best_measure) {
             self.best_measure = self.last;
             self.certified = certified;
-            P::copy_point(point, self.best);
+            P::copy_point(if tidied { self.tidied } else { point }, self.best);
         }
         if self.history.len() == HISTORY {
             let mut k = 0;
@@ -498,6 +512,23 @@ impl<'a, P: Problem> Judge<'a, P> {
             self.history.push(Sample { iteration, seconds: self.meter.seconds(), relative: merit });
         }
         self.visits += 1;
+    }
+
+    /// The certified residuals of the point last measured, or of the same with its variables exactly on their bounds if those are better; which.
+    fn certify(&mut self, problem: &P, point: &P::Point, tolerance: f64) -> (Measure, bool) {
+        let mut plain = None;
+        for boldly in [true, false] {
+            P::copy_point(point, self.tidied);
+            if !problem.tidy(self.tidied, self.gauge, boldly) {
+                continue;
+            }
+            let tidied = problem.certify(self.tidied, self.gauge);
+            let plain = plain.insert(problem.certify(point, self.gauge));
+            if tidied.passes(tolerance) || tidied.is_better_than(plain) {
+                return (tidied, true);
+            }
+        }
+        (plain.unwrap_or_else(|| problem.certify(point, self.gauge)), false)
     }
 
     /// The solver's estimate is proportional to the residual, near enough: learn the factor.

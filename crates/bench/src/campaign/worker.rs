@@ -165,7 +165,6 @@ fn residuals(m: &Measure) -> Residuals {
         complementarity: finite(m.complementarity),
         dynamics: m.dynamics.and_then(finite),
         bilateral: m.bilateral.and_then(finite),
-        rows: m.rows.and_then(finite),
     }
 }
 

@@ -43,7 +43,7 @@ pub const DYNAMICS_TOLERANCE: f64 = 1e-10;
 ///
 /// u is recomputed from r (for global problems through the dynamics, with `q = Hᵀ M⁻¹ f + w`). Where a contact's
 /// `w_c` is not positive, the mean over the contacts stands in (1 if that is not positive either), so that
-/// such a contact is still judged. Linear complementarity problems have the same residuals of `min(s_i z_i, w_i)`; see [`LinearGauge`].
+/// such a contact is still judged. Of linear complementarity problems `relative`, `primal`, `dual` and `complementarity` are componentwise errors; see [`LinearGauge`].
 ///
 /// `primal` and `dual` are at most `relative` in exact arithmetic and are tested beside it, because rounding can
 /// hide one residual of a point with huge impulses, but not all three.
@@ -76,9 +76,6 @@ pub struct Measure {
     /// Bilateral constraints: the largest violation of a constraint over the size of the terms that should cancel in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bilateral: Option<f64>,
-    /// Linear complementarity: the largest residual of a row in units of its own terms, so that a scaling of rows hides nothing.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rows: Option<f64>,
     /// The contact (or row) with the largest share in `absolute`.
     pub worst_contact: usize,
     /// That contact's share, over `‖q‖`.
@@ -112,7 +109,6 @@ impl Measure {
             dynamics_rounding: None,
             velocity_gap: None,
             bilateral: None,
-            rows: None,
             worst_contact: 0,
             worst: never,
         }
@@ -126,7 +122,6 @@ impl Measure {
             ("primal", Some(self.primal), tolerance),
             ("dual", Some(self.dual), tolerance),
             ("bilateral constraints", self.bilateral, tolerance),
-            ("rows", self.rows, tolerance),
             ("velocities", self.velocity_gap, tolerance),
             ("dynamics", self.dynamics, rounding),
         ]
@@ -153,6 +148,12 @@ impl Measure {
             v if c.limit > 0.0 && v <= c.limit => merit,
             v => merit.max(v),
         })
+    }
+
+    /// Whether this point is the better one of two of the same problem, by [`merit`](Self::merit); among equals by `absolute`.
+    pub fn is_better_than(&self, other: &Self) -> bool {
+        let (here, there) = (self.merit(), other.merit());
+        here < there || (here == there && self.absolute < other.absolute)
     }
 }
 

@@ -99,6 +99,10 @@ impl Problem for Hlcp {
         gauge.measure(self, point, true)
     }
 
+    fn tidy(&self, point: &mut HlcpPoint, gauge: &mut HlcpGauge, boldly: bool) -> bool {
+        gauge.tidy(point, boldly)
+    }
+
     fn evidence(&self, certificate: &Certificate) -> Evidence {
         check::weigh(self, certificate)
     }

@@ -61,6 +61,10 @@ macro_rules! problem_in_z {
                 gauge.measure(self, point, true)
             }
 
+            fn tidy(&self, point: &mut Self::Point, gauge: &mut Self::Gauge, boldly: bool) -> bool {
+                gauge.tidy(self, point, boldly)
+            }
+
             fn evidence(
                 &self,
                 certificate: &$crate::check::Certificate,

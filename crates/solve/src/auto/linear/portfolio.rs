@@ -85,7 +85,7 @@ impl<P: Problem> Tally<P> {
     fn take(&mut self, point: P::Point, outcome: &Outcome) {
         self.iterations += outcome.iterations;
         self.factorisations += outcome.factorisations;
-        let better = |(_, best): &(P::Point, Measure)| outcome.measure.merit() < best.merit();
+        let better = |(_, best): &(P::Point, Measure)| outcome.measure.is_better_than(best);
         if self.best.as_ref().is_none_or(better) {
             self.best = Some((point, outcome.measure));
         }

@@ -245,6 +245,7 @@ impl Programmed {
             let bound = |i| if upper { system.bounds.upper(i) } else { system.bounds.lower(i) };
             to.extend((0..n).map(|i| work.scaled.bound(i, bound(i))));
         }
+        work.scaled.bounded(&work.lower, &work.upper);
         for v in [
             &mut work.z,
             &mut work.w,
