@@ -17,7 +17,7 @@ fn read(path: &Path, bytes: &[u8]) -> Option<String> {
     });
     let message = result.err()?.to_string();
     assert!(!message.contains('\n') && message.starts_with(path.to_str().unwrap()), "{message}");
-    assert!(!message.contains("stopped the HDF5 reader"), "a panic inside: {message}");
+    assert!(!message.contains("stopped the HDF5 editor"), "a panic inside: {message}");
     Some(message)
 }
 
