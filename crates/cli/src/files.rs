@@ -78,7 +78,7 @@ pub fn tolerance(tol: f64) -> Result<f64, String> {
     if tol > 0.0 && tol <= 1.0 {
         Ok(tol)
     } else {
-        Err(format!("--tol: expected a number above 0 and at most 1, found {tol:?}"))
+        Err(format!("--tol: expected a positive number of at most 1, found {tol:?}"))
     }
 }
 

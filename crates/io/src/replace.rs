@@ -158,7 +158,10 @@ mod tests {
         assert!(kept.iter().all(exists) && at(&format!(".b.{dead}-0-{here}{MARK}")).exists());
         // Elsewhere nothing is known of processes.
         assert_eq!(exists(&left), machine() == 0);
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), kept.len() + 1 + usize::from(machine() == 0));
+        assert_eq!(
+            std::fs::read_dir(folder.path()).unwrap().count(),
+            kept.len() + 1 + usize::from(machine() == 0)
+        );
 
         // Of another machine only what is old goes.
         let old = SystemTime::now() - 2 * ABANDONED;

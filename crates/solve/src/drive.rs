@@ -47,7 +47,7 @@ impl Limits {
         if !(self.tolerance > 0.0 && self.tolerance <= 1.0) {
             return Err(SolveError::Limits {
                 name: "tolerance",
-                expected: "a number above 0 and at most 1",
+                expected: "a positive number of at most 1",
                 found: self.tolerance.to_string(),
             });
         }

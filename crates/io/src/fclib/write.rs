@@ -140,7 +140,9 @@ fn places<'x>(
     for &(name, x) in parts {
         let Ok(Some(Object::Dataset(d))) = file.find(&group, name) else { return Ok(None) };
         match place(&d, x) {
-            Some(range) if places.iter().all(|(p, _)| p.end <= range.start || range.end <= p.start) => {
+            Some(range)
+                if places.iter().all(|(p, _)| p.end <= range.start || range.end <= p.start) =>
+            {
                 places.push((range, x));
             }
             _ => return Ok(None),

@@ -141,7 +141,7 @@ impl<'a> File<'a> {
             return Ok(());
         }
         loop {
-            self.spend(8)?;
+            self.spend(1)?;
             if let Some((address, size, mask)) = entry(grid.place(&at))? {
                 each(Chunk { at: &at, address, size, mask })?;
             }
@@ -375,21 +375,31 @@ impl ExtensibleArray {
         }
         // Its head has a checksum of its own, and so has each page.
         file.block(block, 4 + head + 4, b"EADB")?;
-        let full = usize::try_from(self.page).ok().and_then(|n| n.checked_mul(self.size)?.checked_add(4));
+        let full =
+            usize::try_from(self.page).ok().and_then(|n| n.checked_mul(self.size)?.checked_add(4));
         let at = full.and_then(|full| {
             let at = (page as usize).checked_mul(full)?.checked_add(8 + head)?;
             Some((block.checked_add(at as u64)?, full))
         });
-        let Some((at, full)) = at else { return damaged("an extensible array of impossible sizes") };
+        let Some((at, full)) = at else {
+            return damaged("an extensible array of impossible sizes");
+        };
         let bytes = file.sealed(at, full)?;
         let from = (k % self.page) as usize * self.size;
         file.entry(&bytes[from..from + self.size], self.filtered)
     }
 
     /// An entry of a data block without pages.
-    fn in_block<'a>(&self, file: &File<'a>, block: u64, entries: u64, k: u64) -> Result<Option<Entry>> {
+    fn in_block<'a>(
+        &self,
+        file: &File<'a>,
+        block: u64,
+        entries: u64,
+        k: u64,
+    ) -> Result<Option<Entry>> {
         let head = 2 + file.widths.0 + self.place;
-        let Some(bytes) = usize::try_from(entries).ok().and_then(|n| n.checked_mul(self.size)) else {
+        let Some(bytes) = usize::try_from(entries).ok().and_then(|n| n.checked_mul(self.size))
+        else {
             return damaged("an extensible array of impossible sizes");
         };
         let total = bytes.saturating_add(8 + head);

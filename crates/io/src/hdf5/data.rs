@@ -9,8 +9,19 @@ use super::{EXPANSION, FUZZING, Fault, File, Result, damaged};
 /// The type of an element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Type {
-    Int { big: bool, signed: bool, shift: u32, bits: u32 },
-    Real { big: bool, sign: u32, exponent: (u32, u32), mantissa: (u32, u32), bias: u32 },
+    Int {
+        big: bool,
+        signed: bool,
+        shift: u32,
+        bits: u32,
+    },
+    Real {
+        big: bool,
+        sign: u32,
+        exponent: (u32, u32),
+        mantissa: (u32, u32),
+        bias: u32,
+    },
     /// Of fixed length.
     Text,
     /// Of any length.
@@ -125,7 +136,8 @@ impl<'a> File<'a> {
             }
             1 => {
                 c.skip(4)?;
-                let [e_at, e_bits, m_at, m_bits] = [c.u8()?, c.u8()?, c.u8()?, c.u8()?].map(u32::from);
+                let [e_at, e_bits, m_at, m_bits] =
+                    [c.u8()?, c.u8()?, c.u8()?, c.u8()?].map(u32::from);
                 let bias = c.u32()?;
                 let sign = bits >> 8 & 0xff;
                 let (exponent, mantissa) = ((e_at, e_bits), (m_at, m_bits));
@@ -134,7 +146,10 @@ impl<'a> File<'a> {
                     return damaged("a real type of impossible sizes");
                 }
                 // With the leading digit implied, at most as wide as a double in each part, and not VAX' order of bytes.
-                let known = bits >> 4 & 3 == 2 && bits & 0x40 == 0 && (2..=11).contains(&e_bits) && m_bits <= 52;
+                let known = bits >> 4 & 3 == 2
+                    && bits & 0x40 == 0
+                    && (2..=11).contains(&e_bits)
+                    && m_bits <= 52;
                 if !known || bias != (1 << (e_bits - 1)) - 1 {
                     Type::Other("reals of another kind than IEEE 754")
                 } else {
@@ -361,7 +376,8 @@ impl<'a> File<'a> {
             let part = |k: usize| chunk.at[k] * chunked.shape[k];
             let cut = (0..d.shape.len()).any(|k| d.shape[k] - part(k) < chunked.shape[k]);
             let plain = d.filters.is_empty() || chunked.raw_edges && cut;
-            let stored = self.slice(chunk.address, if plain { whole } else { chunk.size.unwrap_or(whole) })?;
+            let stored =
+                self.slice(chunk.address, if plain { whole } else { chunk.size.unwrap_or(whole) })?;
             self.claim(whole)?;
             let data = match plain {
                 true => Cow::Borrowed(stored),
@@ -586,7 +602,13 @@ fn word(bytes: &[u8], big: bool) -> u64 {
 }
 
 /// A real of IEEE's making with at most the digits and the range of a double.
-fn real(x: u64, sign: u32, (e_at, e_bits): (u32, u32), (m_at, m_bits): (u32, u32), bias: u32) -> f64 {
+fn real(
+    x: u64,
+    sign: u32,
+    (e_at, e_bits): (u32, u32),
+    (m_at, m_bits): (u32, u32),
+    bias: u32,
+) -> f64 {
     let field = |at: u32, bits: u32| x >> at & ((1 << bits) - 1);
     let (e, m) = (field(e_at, e_bits), field(m_at, m_bits));
     let negative = field(sign, 1) << 63;
@@ -721,10 +743,10 @@ mod tests {
 
     #[test]
     fn texts_that_were_packed_are_unpacked() {
-        assert_eq!(lzf(b"\x02abc\x80\x02", 100).unwrap(), b"abcabcabc"[..9].to_vec());
+        assert_eq!(lzf(b"\x02abc\x80\x02", 100).unwrap(), b"abcabcabc");
         assert!(lzf(b"\x20\x05", 100).is_err());
         assert!(lzf(b"\x05ab", 100).is_err());
-        assert_eq!(fletcher32(b"abcde"), 0xf04f_c729_u32.swap_bytes().swap_bytes());
+        assert_eq!(fletcher32(b"abcde"), 0x4ff0_29c7);
         assert_eq!(unshuffled(b"acebdfg", 2), b"abcdefg");
     }
 }

@@ -80,15 +80,17 @@ impl<'a> File<'a> {
                 match left.checked_sub(1) {
                     Some(fewer) => *left = fewer,
                     None => {
-                        let found = format!("more than {MOST_LINKS} soft links in a row, the last to `{said}`");
+                        let found = format!(
+                            "more than {MOST_LINKS} soft links in a row, the last to `{said}`"
+                        );
                         return Err(Fault::Dangling(found));
                     }
                 }
                 match self.walk(group, path, left)? {
                     Some(address) => Ok(Some(address)),
-                    None => {
-                        Err(Fault::Dangling(format!("a soft link to `{said}`, where nothing stands")))
-                    }
+                    None => Err(Fault::Dangling(format!(
+                        "a soft link to `{said}`, where nothing stands"
+                    ))),
                 }
             }
         }

@@ -39,7 +39,8 @@ impl<'f, 'a> Heap<'f, 'a> {
         c.skip(2)?;
         let root = c.address()?;
         let rows = c.u16()?.into();
-        let powers = start.is_power_of_two() && most_direct.is_power_of_two() && start <= most_direct;
+        let powers =
+            start.is_power_of_two() && most_direct.is_power_of_two() && start <= most_direct;
         if !powers || width == 0 || !(1..=64).contains(&bits) {
             return damaged("a fractal heap of impossible sizes");
         }
@@ -109,7 +110,10 @@ impl<'f, 'a> Heap<'f, 'a> {
             if row >= rows || rows > 64 {
                 return damaged("an object beyond the end of its heap");
             }
-            let doubled = |x: u64| x.checked_shl(row.saturating_sub(1) as u32).filter(|y| y >> row.saturating_sub(1) == x);
+            let doubled = |x: u64| {
+                x.checked_shl(row.saturating_sub(1) as u32)
+                    .filter(|y| y >> row.saturating_sub(1) == x)
+            };
             let size = doubled(self.start).ok_or_else(overflow)?;
             let before = if row == 0 { 0 } else { doubled(first_row).ok_or_else(overflow)? };
             let column = (at - before) / size;
@@ -123,7 +127,8 @@ impl<'f, 'a> Heap<'f, 'a> {
             if row < direct_rows {
                 return Ok((block, size, at));
             }
-            let below = u64::from(size.ilog2()).checked_sub(u64::from(first_row.ilog2())).map(|k| k + 1);
+            let below =
+                u64::from(size.ilog2()).checked_sub(u64::from(first_row.ilog2())).map(|k| k + 1);
             match below {
                 Some(below) if below < rows => rows = below,
                 _ => return damaged("a fractal heap whose blocks do not shrink"),

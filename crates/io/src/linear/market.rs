@@ -57,9 +57,7 @@ pub fn parse(
     let path = path.as_ref();
     let m = matrix(path, text)?;
     let files = vectors(path);
-    let name = |k: usize| {
-        files[k].file_name().unwrap_or_default().to_string_lossy().into_owned()
-    };
+    let name = |k: usize| files[k].file_name().unwrap_or_default().to_string_lossy().into_owned();
     let part = |k: usize| parts[k].map(|text| vector(&files[k], text)).transpose();
     let Some(q) = part(0)? else {
         let expected = format!("a file {} beside the matrix", name(0));
