@@ -38,6 +38,9 @@ pub(crate) enum Object<'a> {
     Other,
 }
 
+/// A child of a node of a B-tree of version 1, with the key before it.
+type Child<'a> = (&'a [u8], u64);
+
 /// Soft links in a row, as many as the C library follows.
 const MOST_LINKS: usize = 16;
 
@@ -233,7 +236,7 @@ impl<'a> File<'a> {
         kind: u8,
         level: Option<u8>,
         key: usize,
-    ) -> Result<(u8, Vec<(&'a [u8], u64)>)> {
+    ) -> Result<(u8, Vec<Child<'a>>)> {
         let mut c = self.cursor(address)?;
         if c.take(4)? != b"TREE" {
             return damaged("no TREE where one must be");
