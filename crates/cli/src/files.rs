@@ -5,7 +5,7 @@ use std::fs::{self, OpenOptions};
 use std::path::{Path, PathBuf};
 
 use nonsmooth_io::fclib::FclibFile;
-use nonsmooth_io::{Content, read_any};
+use nonsmooth_io::{Content, beside, read_any};
 use serde_json::json;
 
 use crate::{Exit, output};
@@ -74,10 +74,11 @@ pub fn picture(option: &str, path: &Path) -> Result<(), String> {
 
 /// A tolerance on the relative residual.
 pub fn tolerance(tol: f64) -> Result<f64, String> {
-    if tol > 0.0 && tol.is_finite() {
+    // The residual of doing nothing is about 1: beyond, everything would pass.
+    if tol > 0.0 && tol <= 1.0 {
         Ok(tol)
     } else {
-        Err(format!("--tol: expected a positive number, found {tol:?}"))
+        Err(format!("--tol: expected a positive number of at most 1, found {tol:?}"))
     }
 }
 
@@ -173,12 +174,6 @@ pub fn write_text(option: &str, path: &Path, text: &str) -> Result<(), String> {
         None => fs::write(path, text),
     };
     written.map_err(|e| refusal(option, path, "a file that can be written", e))
-}
-
-/// A name of this process's own in the folder of a file; none if the path names no file.
-fn beside(path: &Path) -> Option<PathBuf> {
-    let name = path.file_name()?.to_string_lossy();
-    Some(path.with_file_name(format!(".{name}.{}.tmp", std::process::id())))
 }
 
 fn refusal(option: &str, path: &Path, expected: &str, cause: std::io::Error) -> String {

@@ -43,10 +43,11 @@ impl Default for Limits {
 
 impl Limits {
     fn validate(&self) -> Result<(), SolveError> {
-        if !(self.tolerance > 0.0 && self.tolerance.is_finite()) {
+        // The residual of doing nothing is about 1: beyond, everything would pass.
+        if !(self.tolerance > 0.0 && self.tolerance <= 1.0) {
             return Err(SolveError::Limits {
                 name: "tolerance",
-                expected: "a positive finite number",
+                expected: "a positive number of at most 1",
                 found: self.tolerance.to_string(),
             });
         }
