@@ -6,9 +6,11 @@
 //! [`SquareLu`]: LU of a dense or sparse square matrix, made again and again.
 //! [`BlockLu`]: LU of Newton matrices, analysed once and factorised many times.
 //! [`Delassus`]: W = Hᵀ M⁻¹ H as an operator, never formed, or condensed into a [`Bsr`].
+//! [`budget`]: the time and memory that all of these may use.
 
 mod block_lu;
 mod bsr;
+pub mod budget;
 mod compensated;
 mod csc;
 mod delassus;

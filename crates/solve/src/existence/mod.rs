@@ -22,10 +22,11 @@ use std::time::Instant;
 
 use nonsmooth_problem::Friction;
 use nonsmooth_problem::check::{Existence, Impulses, Kinematic, Kinematics};
+use nonsmooth_problem::linalg::budget;
 use nonsmooth_problem::with_friction;
 
-use crate::Limits;
 use crate::form::Blockwise;
+use crate::{Limit, Limits, guard};
 use program::{Program, Widest};
 
 /// How long an investigation may take.
@@ -36,9 +37,15 @@ struct Clock<'a> {
 
 impl Clock<'_> {
     fn over(&self) -> bool {
-        let cancelled = (self.limits.cancel.as_ref())
-            .is_some_and(|c| c.load(std::sync::atomic::Ordering::Relaxed));
-        cancelled || self.left().is_some_and(|left| left <= 0.0)
+        self.limits.reached(self.start).is_some() || budget::over()
+    }
+
+    /// What is said where a limit came first.
+    fn late(&self) -> Existence {
+        late(match self.limits.reached(self.start) {
+            Some(limit) => limit,
+            None => Limit::Time,
+        })
     }
 
     /// Seconds.
@@ -48,9 +55,26 @@ impl Clock<'_> {
 }
 
 /// What is known of the existence of a solution, within the time limit of `limits`; its other entries, but for the flag of
-/// cancellation, are not used.
+/// cancellation and the limit on memory, are not used. A large problem is investigated on a thread of its own, see [`guard`].
 pub fn of(problem: &Friction, limits: &Limits) -> Existence {
-    with_friction!(problem, p => decide(p, limits))
+    if problem.unknowns() <= guard::SMALL {
+        return with_friction!(problem, p => decide(p, limits));
+    }
+    let copy = problem.clone();
+    let decided = guard::run(
+        limits,
+        || {},
+        move |limits| with_friction!(&copy, p => decide(p, limits)),
+    );
+    decided.unwrap_or_else(late)
+}
+
+/// What is said where a limit came first.
+fn late(limit: Limit) -> Existence {
+    match limit {
+        Limit::Cancelled => unknown("it was cancelled"),
+        Limit::Time | Limit::Iterations => unknown("the time limit came first"),
+    }
 }
 
 /// As [`of`], with the cheap attempts only: the free motion and a few hundred sweeps. What they cannot prove is unknown.
@@ -64,6 +88,7 @@ pub fn decide<P: Blockwise<D> + Kinematic<D>, const D: usize>(
     limits: &Limits,
 ) -> Existence {
     let clock = Clock { start: Instant::now(), limits };
+    let _scope = limits.budget(clock.start).enter();
     let kinematics = problem.kinematics();
     match approach::approach(problem, &kinematics, THOROUGH, &clock) {
         Some(found) => proved(problem, found),
@@ -125,9 +150,8 @@ fn by_program<P: Kinematic<D>, const D: usize>(
     kinematics: &Kinematics<D>,
     clock: &Clock,
 ) -> Existence {
-    let late = || unknown("the time limit came first");
     if clock.over() {
-        return late();
+        return clock.late();
     }
     let Some(widest) = Program::new(kinematics, &kinematics.mu).solve(clock) else {
         return unknown("the cone program could not be stated");
@@ -136,7 +160,7 @@ fn by_program<P: Kinematic<D>, const D: usize>(
         return proved(problem, Found::Motion(widest.motion, margin));
     }
     if clock.over() {
-        return late();
+        return clock.late();
     }
     // Can the normal velocities alone be made nonnegative?
     let without = vec![0.0; kinematics.mu.len()];
@@ -163,7 +187,7 @@ fn by_program<P: Kinematic<D>, const D: usize>(
     }
     match weak {
         Some(ray) => Existence::Weak { ray },
-        None if clock.over() => late(),
+        None if clock.over() => clock.late(),
         None => {
             unknown("neither a motion nor impulses could be verified: the margin is near rounding")
         }

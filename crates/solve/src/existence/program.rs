@@ -4,7 +4,7 @@
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 use nonsmooth_problem::check::{Impulses, Kinematics};
-use nonsmooth_problem::linalg::Csc;
+use nonsmooth_problem::linalg::{Csc, budget};
 
 use super::Clock;
 
@@ -115,11 +115,8 @@ impl<'a, const D: usize> Program<'a, D> {
         };
         let mut solver =
             DefaultSolver::new(&theirs(&p), &q, &theirs(&a), &b, &cones, settings).ok()?;
-        if let Some(cancel) = clock.limits.cancel.clone() {
-            solver.set_termination_callback(move |_: &_| {
-                cancel.load(std::sync::atomic::Ordering::Relaxed)
-            });
-        }
+        let budget = budget::current();
+        solver.set_termination_callback(move |_: &_| budget.is_over());
         solver.solve();
         let solution = &solver.solution;
         if matches!(solution.status, SolverStatus::Unsolved) {
