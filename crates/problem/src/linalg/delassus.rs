@@ -1,6 +1,7 @@
 //! The Delassus operator W = Hᵀ M⁻¹ H of a global problem: its diagonal, its condensation, and its factors
 //! contact by contact.
 
+use super::budget::Pace;
 use super::{Block, BlockRow, Bsr, Csc, Inverse};
 
 /// `W = Hᵀ M⁻¹ H` without W: for each contact c the rows of `H_c` (n × D) that are not zero and those of
@@ -171,7 +172,8 @@ fn with_diagonal<const D: usize>(
 /// all of them.
 const TOGETHER: usize = 16;
 
-/// Hands `H_c` and `Z_c = M⁻¹ H_c` of each contact in turn to `visit`, both as rows that hold something.
+/// Hands `H_c` and `Z_c = M⁻¹ H_c` of each contact in turn to `visit`, both as rows that hold something. Once the time is over (see
+/// [`budget`](super::budget)) the rest of Z is empty.
 fn solve_columns<const D: usize>(
     h: &Csc,
     inverse: &Inverse,
@@ -184,7 +186,14 @@ fn solve_columns<const D: usize>(
     let mut touched: Vec<(usize, usize)> = Vec::new();
     let together = if inverse.has_sparse_factor() { TOGETHER } else { 1 };
     let contacts: Vec<usize> = (0..h.ncols() / D).collect();
+    let mut pace = Pace::default();
+    let mut late = false;
     for group in contacts.chunks(together) {
+        if late {
+            // Nobody will use it: the shape alone.
+            group.iter().for_each(|&c| visit(c, &block_column::<D>(h, c), &[]));
+            continue;
+        }
         let rows: Vec<_> = group.iter().map(|&c| block_column::<D>(h, c)).collect();
         touched.clear();
         for (g, rows) in rows.iter().enumerate() {
@@ -207,6 +216,7 @@ fn solve_columns<const D: usize>(
                 }
             }
         }
+        late = pace.over(100.0 * x.len() as f64);
         let mut start = 0;
         for pairs in touched.chunk_by(|a, b| a.0 == b.0) {
             let component = pairs[0].0;

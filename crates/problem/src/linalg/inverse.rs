@@ -5,6 +5,7 @@ use std::cell::Cell;
 use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
 
+use super::budget::Pace;
 use super::{Compensated, Csc, Groups, norm};
 use crate::ProblemError;
 
@@ -40,6 +41,9 @@ thread_local! {
 pub fn factorisations() -> u64 {
     FACTORISATIONS.get()
 }
+
+/// Matrices up to this order are factorised without a look at the clock.
+pub(super) const QUICK: usize = 100;
 
 /// Counts one factorisation of a matrix that grows with the problem.
 pub(super) fn count_factorisation() {
@@ -143,9 +147,17 @@ impl Inverse {
         count_factorisation();
         let matrix = without_zeros(matrix);
         let (index, place) = connected_components(&matrix);
+        let mut pace = Pace::default();
         let components = index
             .into_iter()
             .map(|index| {
+                // A lower bound of what a sparse factor costs, an upper one of what a dense one does.
+                if pace.over((index.len() * index.len().min(DENSE_LIMIT).pow(2)) as f64) {
+                    return Err(ProblemError::Singular {
+                        place: name.into(),
+                        found: "no time to factorise it".into(),
+                    });
+                }
                 let factor =
                     factorise(regular, &index, &place).ok_or_else(|| ProblemError::Singular {
                         place: format!("{name} (component of row {})", index[0]),

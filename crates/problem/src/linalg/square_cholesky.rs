@@ -10,8 +10,8 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, MatRef, Par, Side};
 
 use super::block_lu::Singular;
-use super::inverse::count_factorisation;
-use super::{Csc, Dense, Matrix};
+use super::inverse::{QUICK, count_factorisation};
+use super::{Csc, Dense, Matrix, budget};
 
 /// `A = L Lᵀ` of a symmetric positive definite [`Matrix`]: faer's blocked factorisation of a dense one, its supernodal or simplicial one of a sparse one in
 /// an order of approximate minimum degree, whose analysis is kept while the pattern stays.
@@ -50,6 +50,9 @@ impl SquareCholesky {
     pub fn factorise(&mut self, a: &Matrix) -> Result<(), Singular> {
         assert_eq!(a.nrows(), a.ncols(), "a square matrix");
         count_factorisation();
+        if a.nrows() > QUICK && budget::over() {
+            return Err(Singular);
+        }
         self.factorised = false;
         match a {
             Matrix::Dense(a) => self.dense(a)?,

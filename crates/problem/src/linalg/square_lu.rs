@@ -6,8 +6,8 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, Mat, MatMut};
 
 use super::block_lu::Singular;
-use super::inverse::count_factorisation;
-use super::{Csc, Matrix};
+use super::inverse::{QUICK, count_factorisation};
+use super::{Csc, Matrix, budget};
 
 /// LU with row pivoting of a square [`Matrix`]: faer's blocked LU of a dense one, its supernodal or simplicial LU of a sparse one, whose symbolic
 /// analysis is kept while the pattern stays.
@@ -40,6 +40,9 @@ impl SquareLu {
     pub fn factorise(&mut self, a: &Matrix) -> Result<(), Singular> {
         assert_eq!(a.nrows(), a.ncols(), "a square matrix");
         count_factorisation();
+        if a.nrows() > QUICK && budget::over() {
+            return Err(Singular);
+        }
         self.factor = None;
         let factor = match a {
             Matrix::Dense(a) => {

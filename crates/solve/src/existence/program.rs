@@ -115,8 +115,7 @@ impl<'a, const D: usize> Program<'a, D> {
         };
         let mut solver =
             DefaultSolver::new(&theirs(&p), &q, &theirs(&a), &b, &cones, settings).ok()?;
-        let budget = budget::current();
-        solver.set_termination_callback(move |_: &_| budget.is_over());
+        solver.set_termination_callback(|_: &_| budget::over());
         solver.solve();
         let solution = &solver.solution;
         if matches!(solution.status, SolverStatus::Unsolved) {

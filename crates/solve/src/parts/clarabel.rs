@@ -14,7 +14,7 @@
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
-use nonsmooth_problem::linalg::Csc;
+use nonsmooth_problem::linalg::{Csc, budget};
 
 use crate::form::Model;
 
@@ -86,7 +86,7 @@ impl<const D: usize> Clarabel<D> {
         let (quadratic, constraints) = layout.matrices::<D>(model, mu, w);
         let (n, rows) = (model.quadratic.ncols(), constraints.m);
         let (cost, bound) = (vec![0.0; n], vec![0.0; rows]);
-        let solver = DefaultSolver::new(
+        let mut solver = DefaultSolver::new(
             &quadratic,
             &cost,
             &constraints,
@@ -95,6 +95,7 @@ impl<const D: usize> Clarabel<D> {
             settings(1e-8, 60),
         )
         .expect("the matrices fit each other");
+        solver.set_termination_callback(|_: &_| budget::over());
         Self { solver, layout, quadratic, constraints, cost, bound, w, speed: 1.0 }
     }
 
