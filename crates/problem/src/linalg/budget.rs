@@ -183,20 +183,30 @@ pub fn bytes_in_words(bytes: f64) -> String {
 /// Below this, nobody asks what the machine has free.
 const HARMLESS: f64 = 64e6;
 
+/// What may be taken, and whether that is what the machine has free; `None` where `needed` bytes need no question.
+fn allowed(needed: f64) -> Option<(f64, bool)> {
+    match CURRENT.with_borrow(|budget| budget.memory) {
+        Some(limit) => Some((limit as f64, false)),
+        None if needed < HARMLESS => None,
+        None => Some((free_memory().unwrap_or(f64::INFINITY), true)),
+    }
+}
+
+/// Whether `needed` bytes may be taken, with no word about it: a first look with an upper bound.
+pub fn fits(needed: f64) -> bool {
+    allowed(needed).is_none_or(|(allowed, _)| needed <= allowed)
+}
+
 /// Whether about `needed` bytes may be taken for `what`: within the memory of the budget in force or, where that has none, within what the machine has free.
 pub fn admit(what: &'static str, needed: f64) -> Result<(), TooLarge> {
-    let set = CURRENT.with_borrow(|budget| budget.memory);
-    let (allowed, free) = match set {
-        Some(limit) => (limit as f64, false),
-        None if needed < HARMLESS => return Ok(()),
-        None => (free_memory().unwrap_or(f64::INFINITY), true),
-    };
-    if needed <= allowed {
-        return Ok(());
+    match allowed(needed) {
+        Some((allowed, free)) if needed > allowed => {
+            let refused = TooLarge { what, needed, allowed, free };
+            REFUSED.set(Some(refused));
+            Err(refused)
+        }
+        _ => Ok(()),
     }
-    let refused = TooLarge { what, needed, allowed, free };
-    REFUSED.set(Some(refused));
-    Err(refused)
 }
 
 /// What this machine has free, in bytes; `None` where it does not say. A control group's limit counts.

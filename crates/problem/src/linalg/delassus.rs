@@ -76,6 +76,19 @@ impl<const D: usize> Delassus<D> {
         Bsr::from_rows(nc, &rows)
     }
 
+    /// The bytes that [`condense`](Self::condense) takes, from above: every pair of contacts that touch the same component of M.
+    pub fn condensed_bytes(h: &Csc, inverse: &Inverse) -> f64 {
+        let pairs = |count: usize, _: usize| (count * count) as f64;
+        // The rows as they are filled, and the matrix that is made of them.
+        2.0 * (8 * D * D + 8) as f64 * sum_over_components::<D>(h, inverse, pairs)
+    }
+
+    /// The bytes that [`new`](Self::new) keeps of Z, from above.
+    pub fn kept_bytes(h: &Csc, inverse: &Inverse) -> f64 {
+        let rows = |count: usize, size: usize| (count * size) as f64;
+        (8 * D + 8) as f64 * sum_over_components::<D>(h, inverse, rows)
+    }
+
     /// `H_cᵀ v`.
     #[inline(always)]
     pub fn local_velocity(&self, c: usize, v: &[f64]) -> [f64; D] {
@@ -120,6 +133,26 @@ impl<const D: usize> Columns<D> {
     fn column(&self, c: usize) -> &[(u32, [f64; D])] {
         &self.rows[self.ptr[c]..self.ptr[c + 1]]
     }
+}
+
+/// `Σ f(contacts that touch it, size)` over the components of M.
+fn sum_over_components<const D: usize>(
+    h: &Csc,
+    inverse: &Inverse,
+    f: impl Fn(usize, usize) -> f64,
+) -> f64 {
+    let sizes: Vec<usize> = inverse.component_sizes().collect();
+    let (mut counts, mut last) = (vec![0_usize; sizes.len()], vec![usize::MAX; sizes.len()]);
+    for c in 0..h.ncols() / D {
+        for &i in (D * c..D * c + D).flat_map(|j| h.column(j).0) {
+            let k = inverse.component_of(i);
+            if last[k] != c {
+                last[k] = c;
+                counts[k] += 1;
+            }
+        }
+    }
+    counts.iter().zip(sizes).map(|(&count, size)| f(count, size)).sum()
 }
 
 /// `w += aᵀ b` for two rows.

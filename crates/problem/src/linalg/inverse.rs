@@ -6,7 +6,7 @@ use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
 
 use super::budget::Pace;
-use super::{Compensated, Csc, Groups, norm};
+use super::{Compensated, Csc, Groups, admit_sparse, norm};
 use crate::ProblemError;
 
 /// Components up to this size are factorised densely; rigid bodies have 1, 3 or 6.
@@ -407,6 +407,8 @@ fn factorise(a: &Csc, index: &[usize], place: &[(u32, u32)]) -> Option<Factor> {
     }
     let triplets: Vec<_> = entries.map(|(i, j, x)| Triplet::new(i, j, x)).collect();
     let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &triplets).ok()?;
+    let pattern = triplets.iter().map(|t| (t.row, t.col));
+    admit_sparse("the factorisation of the dynamics", n, pattern, 1.0).ok()?;
     // A symmetric positive definite M, as finite elements give it, at half the price.
     let symmetric = triplets.iter().all(|t| a.get(index[t.col], index[t.row]) == t.val);
     if symmetric && let Ok(llt) = matrix.sp_cholesky(faer::Side::Lower) {

@@ -7,6 +7,7 @@ use nonsmooth_problem::check::{Impulses, Kinematics};
 use nonsmooth_problem::linalg::{Csc, budget};
 
 use super::Clock;
+use crate::parts::admit_program;
 
 /// The program `min −t + ½ δ‖x‖²`, `s = S (A x + c) − t e ∈ L`, `E x + e = 0`, `t ≤ 1`, with S = diag(1, mu, mu): a contact with
 /// friction has D rows, one without its normal row.
@@ -113,6 +114,7 @@ impl<'a, const D: usize> Program<'a, D> {
             tol_infeas_rel: TOLERANCE,
             ..DefaultSettings::default()
         };
+        admit_program(&theirs(&p), &theirs(&a)).ok()?;
         let mut solver =
             DefaultSolver::new(&theirs(&p), &q, &theirs(&a), &b, &cones, settings).ok()?;
         solver.set_termination_callback(|_: &_| budget::over());

@@ -6,7 +6,7 @@
 //! gather never reaches a judged point.
 
 use nonsmooth_problem::check::Impulses;
-use nonsmooth_problem::linalg::budget::TooLarge;
+use nonsmooth_problem::linalg::budget::{self, TooLarge};
 use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Refine, Singular, small};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
@@ -86,6 +86,17 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     fn state(&self, access: Access) -> Result<Self::State, SolveError> {
         let dynamics = Dynamics::new(self)?;
         let inverse = &dynamics.inverse;
+        match access {
+            Access::Newton if inverse.has_sparse_factor() => {
+                let bytes = Delassus::<D>::condensed_bytes(&self.H, inverse);
+                budget::admit("the condensed W", bytes)?;
+            }
+            Access::Visits | Access::Newton => {
+                let bytes = Delassus::<D>::kept_bytes(&self.H, inverse);
+                budget::admit("the velocities that impulses give", bytes)?;
+            }
+            Access::Products => {}
+        }
         let mut state = GlobalState {
             operator: match access {
                 Access::Newton if inverse.has_sparse_factor() => {

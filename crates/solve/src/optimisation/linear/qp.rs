@@ -21,6 +21,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::form::{Bounded, Bounds, Equations, System, system};
+use crate::parts::admit_program;
 use crate::parts::pairs::{Newton, Scaled, Side, clean, hopeless_row};
 use crate::settings::Settings;
 use crate::{SolveError, Solver, Step};
@@ -275,6 +276,7 @@ impl Programmed {
             ..DefaultSettings::default()
         };
         let Program { quadratic, linear, constraints, bound, cones } = &program;
+        admit_program(quadratic, constraints).map_err(|_| "there is not memory enough")?;
         let Ok(mut solver) =
             DefaultSolver::new(quadratic, linear, constraints, bound, cones, settings)
         else {
