@@ -60,7 +60,12 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         let diagnosis = match diagnose(&content.problem, content.info.dofs, &effort) {
             Ok(diagnosis) => diagnosis,
             Err(limit) => {
-                return Ok(files::late(file, args.json, limit, "before the problem was understood"));
+                return Ok(files::late(
+                    file,
+                    args.json,
+                    limit,
+                    "before the problem was understood",
+                ));
             }
         };
         output::print(&if args.json {

@@ -85,15 +85,19 @@ fn part(limits: &Limits, begun: Instant, share: f64) -> Limits {
 /// Errors: why there are none, in words.
 pub fn spectrum(problem: &Friction, rows: usize, limits: &Limits) -> Result<Spectrum, String> {
     let copy = problem.clone();
-    let found = guard::run(limits, || {}, move |limits| {
-        let begun = Instant::now();
-        let scope = limits.budget(begun).enter();
-        let found = Spectrum::of(&copy, rows);
-        match limits.reached(begun) {
-            Some(limit) if scope.raised() => Err(limit),
-            _ => Ok(found),
-        }
-    });
+    let found = guard::run(
+        limits,
+        || {},
+        move |limits| {
+            let begun = Instant::now();
+            let scope = limits.budget(begun).enter();
+            let found = Spectrum::of(&copy, rows);
+            match limits.reached(begun) {
+                Some(limit) if scope.raised() => Err(limit),
+                _ => Ok(found),
+            }
+        },
+    );
     match found.and_then(|found| found) {
         Ok(found) => found.map_err(|e| e.to_string()),
         Err(Limit::Cancelled) => Err("it was cancelled".into()),
@@ -466,7 +470,8 @@ mod tests {
     use nonsmooth_problem::planted::Planted;
 
     fn of(problem: Friction) -> Diagnosis {
-        diagnose(&problem, None, &Effort { spectrum_limit: 500, limits: Limits::default() }).unwrap()
+        diagnose(&problem, None, &Effort { spectrum_limit: 500, limits: Limits::default() })
+            .unwrap()
     }
 
     fn says<'a>(diagnosis: &'a Diagnosis, about: &str) -> Option<&'a Finding> {

@@ -12,7 +12,7 @@ use nonsmooth_problem::linalg::budget::{Budget, Scope};
 use nonsmooth_problem::linalg::factorisations;
 
 use crate::trace::Trace;
-use crate::{SolveError, Solver, Step};
+use crate::{SolveError, Solver, Step, guard};
 
 /// When to stop.
 #[derive(Debug, Clone)]
@@ -427,7 +427,8 @@ struct Run<'a, P: Problem, S: Solver<P>> {
     observer: &'a mut dyn Observer<P>,
 }
 
-/// A residual above this many tolerances is not doubted at a limit of time: another judgement, in doubled precision, could not make it pass.
+/// A residual of a large problem above this many tolerances is not doubted at a limit of time: another judgement, in doubled precision, takes long and
+/// could not make it pass.
 const DOUBTFUL: f64 = 1e3;
 
 impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
@@ -480,7 +481,8 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         };
         P::copy_point(self.judge.best, point);
         let late = matches!(status, Status::Limit(Limit::Time | Limit::Cancelled));
-        let hopeless = self.judge.best_measure.merit() > DOUBTFUL * self.limits.tolerance;
+        let hopeless = self.problem.unknowns() > guard::SMALL
+            && self.judge.best_measure.merit() > DOUBTFUL * self.limits.tolerance;
         let measure = match self.judge.certified {
             Some(measure) => measure,
             None if late && hopeless => self.judge.best_measure,

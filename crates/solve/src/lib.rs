@@ -44,9 +44,7 @@ pub mod splitting;
 pub mod trace;
 mod via;
 
-pub use drive::{
-    Driver, Limit, Limits, Observer, Outcome, Progress, Sample, Session, Status,
-};
+pub use drive::{Driver, Limit, Limits, Observer, Outcome, Progress, Sample, Session, Status};
 pub use error::SolveError;
 pub use reform::Reformulation;
 pub use solver::{Solver, Step};

@@ -29,11 +29,7 @@ pub(super) struct Facts {
 }
 
 /// Everything about a problem but its spectrum and the existence of a solution.
-pub(super) fn facts<P>(
-    file: &Path,
-    problem: &P,
-    content: &FclibFile,
-) -> Result<Facts, String>
+pub(super) fn facts<P>(file: &Path, problem: &P, content: &FclibFile) -> Result<Facts, String>
 where
     P: Form<Stored = StoredPoint, Status = ContactStatus, Counts = StatusCounts>,
 {

@@ -61,7 +61,8 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let limits = Limits { time_limit, cancel, ..Limits::default() };
     Ok(files::each(&args.files, args.json, |_, file| {
         let begun = Instant::now();
-        let late = |limit| Ok(files::late(file, args.json, limit, "before the problem was described"));
+        let late =
+            |limit| Ok(files::late(file, args.json, limit, "before the problem was described"));
         let content = match files::read_within(file, &limits)? {
             Ok(Content::Friction(content)) => content,
             Ok(Content::Linear(content)) => {
@@ -82,9 +83,11 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         };
         let (path, copy) = (file.to_path_buf(), content.clone());
         let left = files::left(&limits, begun);
-        let facts = guard::run(&left, || {}, move |_| {
-            with_friction!(&copy.problem, p => contact::facts(&path, p, &copy))
-        });
+        let facts = guard::run(
+            &left,
+            || {},
+            move |_| with_friction!(&copy.problem, p => contact::facts(&path, p, &copy)),
+        );
         let mut facts = match facts {
             Ok(facts) => facts?,
             Err(limit) => return late(limit),

@@ -61,11 +61,8 @@ pub fn of(problem: &Friction, limits: &Limits) -> Existence {
         return with_friction!(problem, p => decide(p, limits));
     }
     let copy = problem.clone();
-    let decided = guard::run(
-        limits,
-        || {},
-        move |limits| with_friction!(&copy, p => decide(p, limits)),
-    );
+    let decided =
+        guard::run(limits, || {}, move |limits| with_friction!(&copy, p => decide(p, limits)));
     decided.unwrap_or_else(late)
 }
 

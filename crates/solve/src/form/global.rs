@@ -266,12 +266,11 @@ impl<const D: usize> Linearised<D> for FrictionGlobal<D> {
             Operator::Condensed(w) => 2.0 * w.nblocks() as f64,
             _ => 1.5 * self.H.nnz() as f64,
         };
-        let factorisation =
-            match made(system, || GlobalSystem::new(self, operator, dynamics)) {
-                Some(GlobalSystem::Bodies(system)) => system.form().cost(),
-                Some(GlobalSystem::Contacts(system)) => system.form().cost(),
-                None => NEVER,
-            };
+        let factorisation = match made(system, || GlobalSystem::new(self, operator, dynamics)) {
+            Some(GlobalSystem::Bodies(system)) => system.form().cost(),
+            Some(GlobalSystem::Contacts(system)) => system.form().cost(),
+            None => NEVER,
+        };
         Costs { sweep: 30.0 * contacts + visits, factorisation }
     }
 }

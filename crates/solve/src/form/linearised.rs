@@ -22,7 +22,10 @@ const ENOUGH: f64 = 1e-12;
 pub(super) type Once<T> = Option<Result<T, TooLarge>>;
 
 /// What is there, made now if it was not yet; `None` where there is not the memory.
-pub(super) fn made<T>(slot: &mut Once<T>, make: impl FnOnce() -> Result<T, TooLarge>) -> Option<&mut T> {
+pub(super) fn made<T>(
+    slot: &mut Once<T>,
+    make: impl FnOnce() -> Result<T, TooLarge>,
+) -> Option<&mut T> {
     slot.get_or_insert_with(make).as_mut().ok()
 }
 
@@ -245,11 +248,7 @@ impl<const D: usize> BodyForm<D> {
 
     /// As [`new`](Self::new), with the analysis of an earlier form where that serves: the bodies are the same, and no two of them touch that
     /// did not touch before.
-    pub(super) fn after(
-        earlier: Option<Self>,
-        matrix: &Csc,
-        h: &Csc,
-    ) -> Result<Self, TooLarge> {
+    pub(super) fn after(earlier: Option<Self>, matrix: &Csc, h: &Csc) -> Result<Self, TooLarge> {
         let n = h.nrows();
         let node_of = nodes(matrix, n);
         let count = node_of.iter().max().map_or(0, |m| m + 1);

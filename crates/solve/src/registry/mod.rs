@@ -5,6 +5,7 @@
 mod abouts;
 mod contact;
 mod facets;
+mod guarded;
 mod linear;
 pub mod linear_abouts;
 
@@ -15,8 +16,8 @@ use serde::Serialize;
 
 pub use abouts::*;
 pub use facets::{FACET_INNER, FACET_OUTER};
+use guarded::Guarded;
 
-use crate::guard::Guarded;
 use crate::proximal::ProximalPoint;
 use crate::reform::Facets;
 use crate::settings::{Setting, SettingsMap, described};

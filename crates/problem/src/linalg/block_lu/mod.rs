@@ -78,10 +78,7 @@ impl BlockLu {
     ///
     /// Allocates all that the other functions need. Cost: near linear in the blocks of L.
     /// Errors: factors that take more memory than there is (see [`budget::admit`]).
-    pub fn new(
-        sizes: &[usize],
-        edges: impl Iterator<Item = (u32, u32)>,
-    ) -> Result<Self, TooLarge> {
+    pub fn new(sizes: &[usize], edges: impl Iterator<Item = (u32, u32)>) -> Result<Self, TooLarge> {
         let symbolic = Symbolic::new(sizes, edges);
         let s = &symbolic;
         let entries = [s.values_len, s.lower_len, s.upper_len, s.stack_len, s.triangles_len];
@@ -636,12 +633,7 @@ impl Elimination<'_> {
             let part = At { at: j * ld, ld };
             left_solve(simd, (a, mid), (left, ld), self.triangles, (right, part), n);
             let (done, open) = (At { at: j * ld + a, ld }, At { at: j * ld + mid, ld });
-            kernel::product_below(
-                simd,
-                (ld - mid, n, mid - a),
-                (left, below),
-                (right, done, open),
-            );
+            kernel::product_below(simd, (ld - mid, n, mid - a), (left, below), (right, done, open));
             if self.pace.over(each * n as f64) {
                 return None;
             }

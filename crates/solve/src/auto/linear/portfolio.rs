@@ -159,6 +159,10 @@ impl<P: Registered> Session<P> for Portfolio<P> {
         }
         let mut status = Status::Stalled("no method applies to this problem".into());
         for candidate in (self.plan)(problem) {
+            if let Some(limit) = limits.reached(tally.wall) {
+                status = Status::Limit(limit);
+                break;
+            }
             let k = self.session(&candidate)?;
             let mut trial = tally.best.as_ref().map_or_else(|| point.clone(), |b| b.0.clone());
             let (before, begun) = (tally.iterations, tally.wall.elapsed().as_secs_f64());
