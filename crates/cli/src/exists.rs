@@ -28,6 +28,9 @@ pub struct Args {
     /// At most this many seconds for each file
     #[arg(long, value_name = "SECONDS", default_value = "60", allow_hyphen_values = true)]
     time_limit: f64,
+    /// Memory that one factorisation may take, as 500M or 4G [default: what the machine has free]
+    #[arg(long, value_name = "SIZE", value_parser = files::size)]
+    memory_limit: Option<u64>,
     /// Write the certificate as JSON: the motion, or impulses and multipliers
     #[arg(long, value_name = "OUT")]
     certificate: Option<PathBuf>,
@@ -53,11 +56,19 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         }
         None => None,
     };
-    let limits = Limits { time_limit, cancel: Some(interrupt::flag()), ..Limits::default() };
+    let limits = Limits {
+        time_limit,
+        cancel: Some(interrupt::flag()),
+        memory_limit: args.memory_limit,
+        ..Limits::default()
+    };
     Ok(files::each(&args.files, args.json, |k, file| {
-        let content = files::contact_problem(file)?;
         let start = Instant::now();
-        let existence = existence::of(&content.problem, &limits);
+        let content = match files::contact_within(file, &limits)? {
+            Ok(content) => content,
+            Err(limit) => return Ok(files::late(file, args.json, limit, files::WHILE_READ)),
+        };
+        let existence = existence::of(&content.problem, &files::left(&limits, start));
         let seconds = start.elapsed().as_secs_f64();
         let sizes = with_friction!(&content.problem, p => report::problem_json(file, p));
         let size_text = with_friction!(&content.problem, p => report::problem_text(p));

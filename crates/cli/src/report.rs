@@ -39,8 +39,11 @@ pub fn problem_text<P: Form>(problem: &P) -> String {
 /// The residuals, what of them fails at `tolerance`, the contacts (or rows) by status and the worst of them. Numbers that
 /// are not finite become null.
 pub fn verdict_json<S, C: Counts>(verdict: &Verdict<S, C>, tolerance: f64, worst: usize) -> Object {
-    let mut counts = fields(json!(verdict.counts));
-    let degenerate = counts.remove("degenerate");
+    let mut counts = json!(verdict.counts);
+    let mut degenerate = counts.as_object_mut().and_then(|counts| counts.remove("degenerate"));
+    if uncounted(verdict) {
+        (counts, degenerate) = (Value::Null, None);
+    }
     let worst = worst_of(verdict, worst)
         .map(|(which, residual)| json!({(C::WHAT): which, "residual": residual}));
     fields(json!({
@@ -50,6 +53,26 @@ pub fn verdict_json<S, C: Counts>(verdict: &Verdict<S, C>, tolerance: f64, worst
         "degenerate": degenerate,
         (format!("worst_{}s", C::WHAT)): worst.collect::<Vec<_>>(),
     }))
+}
+
+/// A verdict without the status of each contact: the judge had no time to say it.
+pub fn unjudged<S, C: Counts>(
+    measure: Measure,
+    tolerance: f64,
+    velocity: Vec<f64>,
+) -> Verdict<S, C> {
+    Verdict {
+        measure,
+        solved: measure.passes(tolerance),
+        counts: C::default(),
+        statuses: vec![],
+        velocity,
+        worst: vec![],
+    }
+}
+
+fn uncounted<S, C: Counts>(verdict: &Verdict<S, C>) -> bool {
+    verdict.statuses.is_empty() && !verdict.velocity.is_empty()
 }
 
 /// The residuals by name.
@@ -110,6 +133,10 @@ pub fn verdict_text<S, C: Counts>(
     if !others.is_empty() {
         let limit = |f: &Failing| format!(" (limit {:.1e})", f.limit).replace(".0e", "e");
         row(text, "fails", listed(&others, limit));
+    }
+    if uncounted(verdict) {
+        let what = format!("{}s", C::WHAT);
+        return row(text, &what, "not counted: the limit had passed");
     }
     let counts = &verdict.counts;
     let degenerate = match counts.degenerate() {

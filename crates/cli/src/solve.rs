@@ -3,16 +3,19 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
+use nonsmooth_io::Content;
 use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
 use nonsmooth_io::linear::{self, LinearFile, LinearPoint};
-use nonsmooth_io::{Content, read_any};
-use nonsmooth_problem::check::{ContactStatus, Judged, StatusCounts, Verdict};
-use nonsmooth_problem::{Complementarity, Friction, Problem, with_complementarity, with_friction};
+use nonsmooth_problem::check::{ContactStatus, Judged, StatusCounts, Verdict, VerdictOf};
+use nonsmooth_problem::{
+    Complementarity, Friction, Problem, ProblemError, with_complementarity, with_friction,
+};
 use nonsmooth_solve::registry::{self, Registered, Solves};
 use nonsmooth_solve::settings::{self, SettingsMap};
 use nonsmooth_solve::trace::Trace;
-use nonsmooth_solve::{Limit, Limits, Outcome, Sample, SolveError, Status};
+use nonsmooth_solve::{Limit, Limits, Outcome, Sample, SolveError, Status, guard};
 use serde_json::{Value, json};
 
 use crate::kinds::{Class, Form, takes};
@@ -43,9 +46,13 @@ pub struct Args {
     /// At most this many iterations [default: 1000000, or no limit with --time-limit]
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = files::whole)]
     max_iter: Option<usize>,
-    /// At most this many seconds for each file
+    /// At most this many seconds for each file, reading it included
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     time_limit: Option<f64>,
+    /// Memory that one factorisation may take, as 500M or 4G: a larger one is refused before it begins [default: what the
+    /// machine has free]
+    #[arg(long, value_name = "SIZE", value_parser = files::size)]
+    memory_limit: Option<u64>,
     /// Start from the file's /guesses/1 (linear complementarity: its [solution]) in place of zero; with =FILE from the
     /// solution of another file (or its /guesses/1) of the same size, with =DIRECTORY from the file of the same name there
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
@@ -89,6 +96,7 @@ Examples:
 Exit codes: 0 all solved; 1 some not solved; 2 some file or option at fault.";
 
 /// How to solve, whatever the problem.
+#[derive(Clone)]
 pub struct Plan<'a> {
     /// The solver's name.
     pub solver: &'a str,
@@ -123,6 +131,7 @@ type SolvedOf<P> = Solved<<P as Judged>::Status, <P as Judged>::Counts, <P as Fo
 pub fn run(args: &Args) -> Result<Exit, String> {
     let settings = settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))?;
     let mut limits = limits(args.tol, args.max_iter, args.time_limit)?;
+    limits.memory_limit = args.memory_limit;
     limits.trace = args.trace.is_some() || args.plot.is_some();
     let targets = Targets::new(args)?;
     let cancel = limits.cancel.clone().unwrap_or_default();
@@ -136,7 +145,13 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         }
         let targets = targets.of(k);
         let warm = args.warm_start.as_ref().map(Option::as_deref);
-        match read_any(file).map_err(|e| e.to_string())? {
+        let begun = Instant::now();
+        let content = match files::read_within(file, &plan.limits)? {
+            Ok(content) => content,
+            Err(limit) => return Ok(files::late(file, args.json, limit, files::WHILE_READ)),
+        };
+        let plan = Plan { limits: files::left(&plan.limits, begun), ..plan.clone() };
+        match content {
             Content::Friction(content) => {
                 let guess = match warm {
                     None => None,
@@ -252,6 +267,7 @@ pub fn limits(tol: f64, iterations: Option<usize>, seconds: Option<f64>) -> Resu
         },
         time_limit,
         cancel: Some(interrupt::flag()),
+        memory_limit: None,
         trace: false,
     })
 }
@@ -365,6 +381,7 @@ pub fn solve<P: Form + Registered>(
     start: Option<&P::Stored>,
     plan: &Plan,
 ) -> Result<SolvedOf<P>, String> {
+    let begun = Instant::now();
     let mistake = |e: &dyn std::fmt::Display| format!("{}: {e}", file.display());
     let session = registry::session::<P>(plan.solver, plan.settings);
     let mut session = session.map_err(|e| match (&e, takes(plan.solver)) {
@@ -380,7 +397,8 @@ pub fn solve<P: Form + Registered>(
         .solve(problem, &mut point, &plan.limits, &mut |p| bar.watch(p))
         .map_err(|e| mistake(&e))?;
     drop(bar);
-    let verdict = problem.judge(&point, plan.limits.tolerance).map_err(|e| mistake(&e))?;
+    let left = files::left(&plan.limits, begun);
+    let verdict = judged(problem, &point, &outcome, &left).map_err(|e| mistake(&e))?;
     Ok(Solved {
         outcome,
         point: problem.store(point, verdict.velocity.clone()),
@@ -389,6 +407,25 @@ pub fn solve<P: Form + Registered>(
         history: session.history().to_vec(),
         trace: session.trace(),
     })
+}
+
+/// The judge's word on each contact, or on the point alone where the limits leave no time for more.
+fn judged<P: Form + Registered>(
+    problem: &P,
+    point: &P::Point,
+    outcome: &Outcome,
+    limits: &Limits,
+) -> Result<VerdictOf<P>, ProblemError> {
+    let tolerance = limits.tolerance;
+    let unlimited = limits.time_limit.is_none() && !limits.cancel.as_ref().is_some_and(cancelled);
+    if unlimited || problem.unknowns() <= guard::SMALL {
+        return problem.judge(point, tolerance);
+    }
+    let copy = (problem.clone(), point.clone());
+    match guard::run(limits, || {}, move |_| copy.0.judge(&copy.1, tolerance)) {
+        Ok(verdict) => verdict,
+        Err(_) => Ok(report::unjudged(outcome.measure, tolerance, problem.velocity(point))),
+    }
 }
 
 fn name(file: &Path) -> String {

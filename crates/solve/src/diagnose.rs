@@ -2,6 +2,7 @@
 //! named by the registry.
 
 use std::borrow::Cow;
+use std::time::Instant;
 
 use nonsmooth_problem::check::{Existence, Impulses};
 use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse, norm, small};
@@ -11,7 +12,7 @@ use serde::Serialize;
 
 use crate::form::{Access, Linear};
 use crate::registry::{self, Registered};
-use crate::{Limits, existence};
+use crate::{Limit, Limits, existence, guard};
 
 /// One thing worth knowing of a problem.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -42,16 +43,66 @@ pub struct Diagnosis {
 pub struct Effort {
     /// The most rows for which the singular values of W are computed.
     pub spectrum_limit: usize,
-    /// Limits of the question of existence.
+    /// Limits of it all: half of the time for singular values, most of the rest for the question of existence.
     pub limits: Limits,
 }
 
 /// Explains a problem. `dofs` are the degrees of freedom that a local problem was condensed from, if known.
-pub fn diagnose(problem: &Friction, dofs: Option<usize>, effort: &Effort) -> Diagnosis {
-    let traits = Traits::of(problem, dofs);
-    let spectrum = Spectrum::of(problem, effort.spectrum_limit).ok();
-    let existence = existence::of(problem, &effort.limits);
-    with_friction!(problem, p => Patient { problem: p, traits, spectrum, existence }.diagnose())
+///
+/// Errors: the limit that came before there was anything to say.
+pub fn diagnose(
+    problem: &Friction,
+    dofs: Option<usize>,
+    effort: &Effort,
+) -> Result<Diagnosis, Limit> {
+    let copy = (problem.clone(), effort.spectrum_limit);
+    guard::run(&effort.limits, || {}, move |limits| {
+        let (problem, rows) = copy;
+        let begun = Instant::now();
+        let scope = limits.budget(begun).enter();
+        let traits = Traits::of(&problem, dofs);
+        let spectrum = spectrum(&problem, rows, &part(limits, begun, 0.5)).ok();
+        let existence = existence::of(&problem, &part(limits, begun, 0.8));
+        let found =
+            with_friction!(&problem, p => Patient { problem: p, traits, spectrum, existence }.diagnose());
+        match limits.reached(begun) {
+            Some(limit) if scope.raised() => Err(limit),
+            _ => Ok(found),
+        }
+    })
+    .and_then(|found| found)
+}
+
+/// A share of what is left of the time.
+fn part(limits: &Limits, begun: Instant, share: f64) -> Limits {
+    let spent = begun.elapsed().as_secs_f64();
+    let time_limit = limits.time_limit.map(|t| share * (t - spent).max(0.0));
+    Limits { time_limit, ..limits.clone() }
+}
+
+/// The singular values of W within the limits of time and memory, up to so many rows.
+///
+/// Errors: why there are none, in words.
+pub fn spectrum(problem: &Friction, rows: usize, limits: &Limits) -> Result<Spectrum, String> {
+    let copy = problem.clone();
+    let found = guard::run(
+        limits,
+        || {},
+        move |limits| {
+            let begun = Instant::now();
+            let scope = limits.budget(begun).enter();
+            let found = Spectrum::of(&copy, rows);
+            match limits.reached(begun) {
+                Some(limit) if scope.raised() => Err(limit),
+                _ => Ok(found),
+            }
+        },
+    );
+    match found.and_then(|found| found) {
+        Ok(found) => found.map_err(|e| e.to_string()),
+        Err(Limit::Cancelled) => Err("it was cancelled".into()),
+        Err(_) => Err("the time limit came first".into()),
+    }
 }
 
 /// What a diagnosis needs of a kind of problem.
@@ -439,6 +490,7 @@ mod tests {
 
     fn of(problem: Friction) -> Diagnosis {
         diagnose(&problem, None, &Effort { spectrum_limit: 500, limits: Limits::default() })
+            .unwrap()
     }
 
     fn says<'a>(diagnosis: &'a Diagnosis, about: &str) -> Option<&'a Finding> {

@@ -3,15 +3,16 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use cpu_time::ProcessTime;
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::{Certificate, Evidence, Measure, Proof};
+use nonsmooth_problem::linalg::budget::{Budget, Scope};
 use nonsmooth_problem::linalg::factorisations;
 
 use crate::trace::Trace;
-use crate::{SolveError, Solver, Step};
+use crate::{SolveError, Solver, Step, guard};
 
 /// When to stop.
 #[derive(Debug, Clone)]
@@ -21,10 +22,13 @@ pub struct Limits {
     pub tolerance: f64,
     /// At most this many steps.
     pub max_iterations: usize,
-    /// At most this many seconds of wall clock, set-up of the workspace included. Tested after every step.
+    /// At most this many seconds of wall clock, the preparation of judge and workspace included. Looked at after every step and inside long ones; what
+    /// cannot be interrupted is given up (see [`guard`](crate::guard)).
     pub time_limit: Option<f64>,
-    /// Set to true from anywhere to stop after the current step.
+    /// Set to true from anywhere to stop, as promptly as at the time limit.
     pub cancel: Option<Arc<AtomicBool>>,
+    /// The bytes of memory that one factorisation may take: a larger one is refused before it begins. Without a number, what the machine has free.
+    pub memory_limit: Option<u64>,
     /// Whether to keep the method's own record of its iterations ([`Session::trace`]); it grows with their number.
     pub trace: bool,
 }
@@ -36,13 +40,37 @@ impl Default for Limits {
             max_iterations: 1_000_000,
             time_limit: None,
             cancel: None,
+            memory_limit: None,
             trace: false,
         }
     }
 }
 
 impl Limits {
-    fn validate(&self) -> Result<(), SolveError> {
+    /// What kernels look at, if the clock runs from `begun`.
+    pub(crate) fn budget(&self, begun: Instant) -> Budget {
+        // A limit beyond the reach of the clock is none.
+        let deadline = |t: f64| begun.checked_add(Duration::try_from_secs_f64(t).ok()?);
+        Budget {
+            deadline: self.time_limit.and_then(deadline),
+            cancel: self.cancel.clone(),
+            memory: self.memory_limit,
+        }
+    }
+
+    /// Which of the limits that come from outside is reached, if the clock runs from `begun`.
+    pub(crate) fn reached(&self, begun: Instant) -> Option<Limit> {
+        let late = |t: f64| begun.elapsed().as_secs_f64() >= t;
+        if self.cancel.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+            Some(Limit::Cancelled)
+        } else if self.time_limit.is_some_and(late) {
+            Some(Limit::Time)
+        } else {
+            None
+        }
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), SolveError> {
         // The residual of doing nothing is about 1: beyond, everything would pass.
         if !(self.tolerance > 0.0 && self.tolerance <= 1.0) {
             return Err(SolveError::Limits {
@@ -182,18 +210,51 @@ pub struct Sample {
 /// What a solve uses up, from the preparation of the workspace on.
 #[derive(Debug, Clone, Copy)]
 struct Meter {
+    /// When the solve was asked for: limits count from here, with the judge's preparation.
+    begun: Instant,
     wall: Instant,
     cpu: ProcessTime,
     factorisations: u64,
 }
 
 impl Meter {
-    fn start() -> Self {
-        Self { wall: Instant::now(), cpu: ProcessTime::now(), factorisations: factorisations() }
+    fn start(begun: Instant) -> Self {
+        let (wall, cpu) = (Instant::now(), ProcessTime::now());
+        Self { begun, wall, cpu, factorisations: factorisations() }
     }
 
     fn seconds(&self) -> f64 {
         self.wall.elapsed().as_secs_f64()
+    }
+
+    /// What a failure of the preparation comes to: where a limit was reached, a preparation that was cut short proves nothing of the problem.
+    fn ended(
+        &self,
+        measure: Measure,
+        limits: &Limits,
+        scope: &Scope,
+        error: SolveError,
+    ) -> Result<Outcome, SolveError> {
+        let inapplicable = error.is_inapplicable();
+        match (raised(scope), scope.refused()) {
+            (Some(limit), _) if inapplicable => {
+                let limit = limits.reached(self.begun).unwrap_or(limit);
+                Ok(self.outcome(Status::Limit(limit), measure, 0))
+            }
+            (_, Some(refused)) if inapplicable => Err(refused.into()),
+            _ => Err(error),
+        }
+    }
+
+    fn outcome(&self, status: Status, measure: Measure, iterations: usize) -> Outcome {
+        Outcome {
+            status,
+            measure,
+            iterations,
+            factorisations: factorisations() - self.factorisations,
+            seconds: self.seconds(),
+            cpu_seconds: self.cpu.elapsed().as_secs_f64(),
+        }
     }
 }
 
@@ -210,17 +271,52 @@ pub struct Progress {
     pub seconds: f64,
 }
 
+/// Who follows a solve from outside.
+pub trait Observer<P: Problem> {
+    /// Called after every step.
+    fn step(&mut self, progress: &Progress);
+
+    /// Whether [`best`](Self::best) is to be called, which costs a judgement of the start.
+    fn keeps_best(&self) -> bool {
+        false
+    }
+
+    /// Called with each point that would be returned if the solve stopped now.
+    fn best(&mut self, _point: &P::Point, _measure: &Measure) {}
+}
+
+/// An observer of steps alone.
+struct Steps<'a>(&'a mut dyn FnMut(&Progress));
+
+impl<P: Problem> Observer<P> for Steps<'_> {
+    fn step(&mut self, progress: &Progress) {
+        (self.0)(progress);
+    }
+}
+
 /// A solver whose type is forgotten: what the registry hands out. One virtual call per solve, none per step.
 pub trait Session<P: Problem>: Send {
     /// Solves `problem` from `point`, which is overwritten with the best point found whatever stops the solve.
     ///
-    /// `watch` is called after every step. Errors are the caller's mistakes only.
+    /// `watch` is called after every step, but for a large problem with a limit on time or a flag to cancel: then now and then. Errors are the
+    /// caller's mistakes only.
     fn solve(
         &mut self,
         problem: &P,
         point: &mut P::Point,
         limits: &Limits,
         watch: &mut dyn FnMut(&Progress),
+    ) -> Result<Outcome, SolveError> {
+        self.observe(problem, point, limits, &mut Steps(watch))
+    }
+
+    /// As [`solve`](Self::solve), with an observer who may also see the best point so far.
+    fn observe(
+        &mut self,
+        problem: &P,
+        point: &mut P::Point,
+        limits: &Limits,
+        observer: &mut dyn Observer<P>,
     ) -> Result<Outcome, SolveError>;
 
     /// The judge's visits during the last solve, thinned evenly where there were very many.
@@ -248,6 +344,8 @@ struct Kept<P: Problem, S: Solver<P>> {
     gauge: P::Gauge,
     best: P::Point,
     tidied: P::Point,
+    /// A limit was reached inside a kernel, which left something unfinished.
+    torn: bool,
 }
 
 impl<P: Problem, S: Solver<P>> Driver<P, S> {
@@ -263,44 +361,73 @@ impl<P: Problem, S: Solver<P>> Driver<P, S> {
 }
 
 impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
-    fn solve(
+    fn observe(
         &mut self,
         problem: &P,
         point: &mut P::Point,
         limits: &Limits,
-        watch: &mut dyn FnMut(&Progress),
+        observer: &mut dyn Observer<P>,
     ) -> Result<Outcome, SolveError> {
+        let begun = Instant::now();
         limits.validate()?;
         problem.validate_point(point)?;
+        let scope = limits.budget(begun).enter();
         let Self { solver, kept, history } = self;
+        history.clear();
+        // What was cut short in a kernel is begun anew.
+        let earlier = kept.take().filter(|k| !k.torn);
         // The judge's own preparation is not part of the solve's time.
-        let mut kept_now = match kept.take() {
-            Some(mut k) => {
-                problem.regauge(&mut k.gauge)?;
-                let meter = Meter::start();
-                solver.refill(problem, &mut k.work)?;
-                (k, meter)
+        let (gauge, earlier) = match earlier {
+            Some(Kept { work, mut gauge, best, tidied, .. }) => {
+                (problem.regauge(&mut gauge).map(|()| gauge), Some((work, best, tidied)))
             }
-            None => {
-                let gauge = problem.gauge()?;
-                let meter = Meter::start();
-                let work = solver.work(problem)?;
-                (Kept { work, gauge, best: point.clone(), tidied: point.clone() }, meter)
+            None => (problem.gauge(), None),
+        };
+        let meter = Meter::start(begun);
+        let mut gauge = match gauge {
+            Ok(gauge) => gauge,
+            Err(e) => return meter.ended(Measure::unknown(), limits, &scope, e.into()),
+        };
+        // Whatever happens in the preparation, there is a judged point.
+        let start = observer.keeps_best().then(|| {
+            let measure = problem.measure(point, &mut gauge);
+            observer.best(point, &measure);
+            measure
+        });
+        let (work, best, tidied) = match earlier {
+            Some((mut work, best, tidied)) => {
+                (solver.refill(problem, &mut work).map(|()| work), best, tidied)
+            }
+            None => (solver.work(problem), point.clone(), point.clone()),
+        };
+        let work = match work {
+            Ok(work) => work,
+            Err(e) => {
+                let measure = match start {
+                    Some(measure) => measure,
+                    None if scope.raised() => problem.measure(point, &mut gauge),
+                    None => Measure::unknown(),
+                };
+                return meter.ended(measure, limits, &scope, e);
             }
         };
+        let mut now = Kept { work, gauge, best, tidied, torn: false };
         let outcome = {
-            let (Kept { work, gauge, best, tidied }, meter) = &mut kept_now;
+            let Kept { work, gauge, best, tidied, .. } = &mut now;
             P::copy_point(point, best);
             let mut run = Run {
                 problem,
                 solver,
                 work,
-                judge: Judge::new(gauge, best, tidied, history, *meter, solver.latest()),
+                judge: Judge::new(gauge, best, tidied, history, meter, solver.latest()),
                 limits,
+                scope: &scope,
+                observer,
             };
-            run.solve(point, watch)
+            run.solve(point)
         };
-        *kept = Some(kept_now.0);
+        now.torn = scope.raised();
+        *kept = Some(now);
         Ok(outcome)
     }
 
@@ -317,16 +444,28 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
     }
 }
 
+/// The limit at which a kernel was cut short, if one was.
+fn raised(scope: &Scope) -> Option<Limit> {
+    let limit = || if scope.cancelled() { Limit::Cancelled } else { Limit::Time };
+    scope.raised().then(limit)
+}
+
 struct Run<'a, P: Problem, S: Solver<P>> {
     problem: &'a P,
     solver: &'a S,
     work: &'a mut S::Work,
     judge: Judge<'a, P>,
     limits: &'a Limits,
+    scope: &'a Scope,
+    observer: &'a mut dyn Observer<P>,
 }
 
+/// A residual of a large problem above this many tolerances is not doubted at a limit of time: another judgement, in doubled precision, takes long and
+/// could not make it pass.
+const DOUBTFUL: f64 = 1e3;
+
 impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
-    fn solve(&mut self, point: &mut P::Point, watch: &mut dyn FnMut(&Progress)) -> Outcome {
+    fn solve(&mut self, point: &mut P::Point) -> Outcome {
         let mut iterations = 0;
         self.solver.aim(self.limits.tolerance, self.work);
         self.solver.record(self.limits.trace, self.work);
@@ -357,6 +496,8 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
             since_judged += 1;
             match step {
                 Step::Continue { estimate: e } => estimate = e,
+                // What ends because a kernel was cut short has not failed.
+                Step::Stuck(_) | Step::Done if self.scope.raised() => {}
                 ended => claim = Some(self.conclusion(ended)),
             }
             let due = since_judged >= self.solver.check_every()
@@ -369,11 +510,15 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                     claim = Some(Status::Stalled("the iterates are no longer finite".into()));
                 }
             }
-            watch(&self.judge.progress(iterations));
+            self.observer.step(&self.judge.progress(iterations));
         };
         P::copy_point(self.judge.best, point);
+        let late = matches!(status, Status::Limit(Limit::Time | Limit::Cancelled));
+        let hopeless = self.problem.unknowns() > guard::SMALL
+            && self.judge.best_measure.merit() > DOUBTFUL * self.limits.tolerance;
         let measure = match self.judge.certified {
             Some(measure) => measure,
+            None if late && hopeless => self.judge.best_measure,
             None => {
                 // The gauge may have been at another point since.
                 let _ = self.problem.measure(point, self.judge.gauge);
@@ -392,41 +537,31 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
             }
             other => other,
         };
-        let meter = &self.judge.meter;
-        Outcome {
-            status,
-            measure,
-            iterations,
-            factorisations: factorisations() - meter.factorisations,
-            seconds: meter.seconds(),
-            cpu_seconds: meter.cpu.elapsed().as_secs_f64(),
-        }
+        self.judge.meter.outcome(status, measure, iterations)
     }
 
     fn judge(&mut self, point: &mut P::Point, iteration: usize) {
         self.solver.publish(self.problem, point, self.work);
-        self.judge.judge(self.problem, point, iteration, self.limits.tolerance);
+        let better = self.judge.judge(self.problem, point, iteration, self.limits.tolerance);
+        if better && self.observer.keeps_best() {
+            self.observer.best(self.judge.best, &self.judge.best_measure);
+        }
     }
 
     fn limit(&self, iterations: usize) -> Option<Limit> {
-        let cancelled =
-            || self.limits.cancel.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed));
-        let late = |t: f64| self.judge.meter.seconds() >= t;
         if iterations >= self.limits.max_iterations {
-            Some(Limit::Iterations)
-        } else if cancelled() {
-            Some(Limit::Cancelled)
-        } else if self.limits.time_limit.is_some_and(late) {
-            Some(Limit::Time)
-        } else {
-            None
+            return Some(Limit::Iterations);
         }
+        self.limits.reached(self.judge.meter.begun).or_else(|| raised(self.scope))
     }
 
     /// What a solver's last word comes to if the judge does not accept its point.
     fn conclusion(&self, step: Step) -> Status {
         match step {
-            Step::Stuck(why) => Status::Stalled(why),
+            Step::Stuck(why) => match self.scope.refused() {
+                Some(refused) => Status::Stalled(format!("{why}: {refused}").into()),
+                None => Status::Stalled(why),
+            },
             Step::NoSolution(certificate) => match self.problem.evidence(&certificate) {
                 Evidence::Proved(proof) => Status::Infeasible(proof),
                 Evidence::Nearly { change } => Status::NearlyInfeasible { certificate, change },
@@ -469,7 +604,6 @@ impl<'a, P: Problem> Judge<'a, P> {
         meter: Meter,
         latest: bool,
     ) -> Self {
-        history.clear();
         let nothing = Measure::unknown();
         Self {
             gauge,
@@ -487,7 +621,8 @@ impl<'a, P: Problem> Judge<'a, P> {
         }
     }
 
-    fn judge(&mut self, problem: &P, point: &P::Point, iteration: usize, tolerance: f64) {
+    /// Whether the point is now the best.
+    fn judge(&mut self, problem: &P, point: &P::Point, iteration: usize, tolerance: f64) -> bool {
         self.last = problem.measure(point, self.gauge);
         let (mut certified, mut tidied) = (None, false);
         if self.last.passes(tolerance) {
@@ -495,7 +630,9 @@ impl<'a, P: Problem> Judge<'a, P> {
             (self.last, tidied) = self.certify(problem, point, tolerance);
             certified = Some(self.last);
         }
-        if self.visits == 0 || self.latest || self.last.is_better_than(&self.best_measure) {
+        let better =
+            self.visits == 0 || self.latest || self.last.is_better_than(&self.best_measure);
+        if better {
             self.best_measure = self.last;
             self.certified = certified;
             P::copy_point(if tidied { self.tidied } else { point }, self.best);
@@ -513,6 +650,7 @@ impl<'a, P: Problem> Judge<'a, P> {
             self.history.push(Sample { iteration, seconds: self.meter.seconds(), relative: merit });
         }
         self.visits += 1;
+        better
     }
 
     /// The certified residuals of the point last measured, or of the same with its variables exactly on their bounds if those are better; which.

@@ -54,6 +54,15 @@ impl Data<'_> {
             None => (0.0, f64::INFINITY),
         }
     }
+
+    /// The bounds of column j.
+    fn column_bounds(&self, j: usize) -> (f64, f64) {
+        match self.bounds {
+            Some((lower, upper)) => (lower[j], upper[j]),
+            None if j < self.free => (f64::NEG_INFINITY, f64::INFINITY),
+            None => (0.0, f64::INFINITY),
+        }
+    }
 }
 
 /// What an error is that nothing can be compared with: never accepted, and still finite.

@@ -5,7 +5,8 @@ use std::cell::Cell;
 use faer::linalg::solvers::Solve;
 use faer::sparse::{SparseColMat, Triplet};
 
-use super::{Compensated, Csc, Groups, norm};
+use super::budget::Pace;
+use super::{Compensated, Csc, Groups, admit_sparse, norm};
 use crate::ProblemError;
 
 /// Components up to this size are factorised densely; rigid bodies have 1, 3 or 6.
@@ -40,6 +41,9 @@ thread_local! {
 pub fn factorisations() -> u64 {
     FACTORISATIONS.get()
 }
+
+/// Matrices up to this order are factorised without a look at the clock.
+pub(super) const QUICK: usize = 100;
 
 /// Counts one factorisation of a matrix that grows with the problem.
 pub(super) fn count_factorisation() {
@@ -143,9 +147,17 @@ impl Inverse {
         count_factorisation();
         let matrix = without_zeros(matrix);
         let (index, place) = connected_components(&matrix);
+        let mut pace = Pace::default();
         let components = index
             .into_iter()
             .map(|index| {
+                // A lower bound of what a sparse factor costs, an upper one of what a dense one does.
+                if pace.over((index.len() * index.len().min(DENSE_LIMIT).pow(2)) as f64) {
+                    return Err(ProblemError::Singular {
+                        place: name.into(),
+                        found: "no time to factorise it".into(),
+                    });
+                }
                 let factor =
                     factorise(regular, &index, &place).ok_or_else(|| ProblemError::Singular {
                         place: format!("{name} (component of row {})", index[0]),
@@ -395,6 +407,8 @@ fn factorise(a: &Csc, index: &[usize], place: &[(u32, u32)]) -> Option<Factor> {
     }
     let triplets: Vec<_> = entries.map(|(i, j, x)| Triplet::new(i, j, x)).collect();
     let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &triplets).ok()?;
+    let pattern = triplets.iter().map(|t| (t.row, t.col));
+    admit_sparse("the factorisation of the dynamics", n, pattern, 1.0).ok()?;
     // A symmetric positive definite M, as finite elements give it, at half the price.
     let symmetric = triplets.iter().all(|t| a.get(index[t.col], index[t.row]) == t.val);
     if symmetric && let Ok(llt) = matrix.sp_cholesky(faer::Side::Lower) {

@@ -6,13 +6,16 @@
 //! [`SquareLu`]: LU of a dense or sparse square matrix, made again and again.
 //! [`BlockLu`]: LU of Newton matrices, analysed once and factorised many times.
 //! [`Delassus`]: W = Hᵀ M⁻¹ H as an operator, never formed, or condensed into a [`Bsr`].
+//! [`budget`]: the time and memory that all of these may use.
 
 mod block_lu;
 mod bsr;
+pub mod budget;
 mod compensated;
 mod csc;
 mod delassus;
 mod dense;
+mod fill;
 mod groups;
 mod inverse;
 mod matrix;
@@ -27,6 +30,7 @@ pub use compensated::Compensated;
 pub use csc::Csc;
 pub use delassus::Delassus;
 pub use dense::Dense;
+pub use fill::admit_sparse;
 pub use groups::Groups;
 pub use inverse::{Inverse, Refine, factorisations, is_positive_definite};
 pub use matrix::{Matrix, Operator};

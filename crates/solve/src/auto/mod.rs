@@ -28,6 +28,7 @@ mod controller;
 pub mod linear;
 
 use nonsmooth_problem::check::{Existence, Kinematic};
+use nonsmooth_problem::linalg::budget;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -279,6 +280,9 @@ impl<const D: usize> Hybrid<D> {
         for _ in 0..SWEEPS_A_STEP {
             let moves = work.sweep.sweep(problem, &mut work.state, P::impulses(point));
             work.done.sweeps += 1;
+            if budget::over() {
+                break;
+            }
             estimate = moves.sqrt() / work.scale;
             if estimate <= 0.3 * work.tolerance && claims < SWEEPS_A_STEP {
                 work.stage = Stage::Sweeps { last, claims: claims + 1 };
@@ -460,6 +464,9 @@ impl<const D: usize> Hybrid<D> {
         let mut moves = 0.0;
         for _ in 0..count {
             moves = work.sweep.sweep(problem, &mut work.state, P::impulses(point));
+            if budget::over() {
+                break;
+            }
         }
         work.done.between += count;
         if left > count {

@@ -25,11 +25,12 @@ use nonsmooth_problem::Friction;
 use nonsmooth_problem::check::{
     Certificate, Evidence, ExactVector, Existence, Impulses, Kinematic, Kinematics, rounded,
 };
+use nonsmooth_problem::linalg::budget;
 use nonsmooth_problem::with_friction;
 
-use crate::Limits;
 use crate::form::Blockwise;
 use crate::parts::{ExactCones, ExactlyFound};
+use crate::{Limit, Limits, guard};
 use program::{Program, Widest};
 
 /// How long an investigation may take.
@@ -40,18 +41,15 @@ struct Clock<'a> {
 
 impl Clock<'_> {
     fn over(&self) -> bool {
-        let cancelled = (self.limits.cancel.as_ref())
-            .is_some_and(|c| c.load(std::sync::atomic::Ordering::Relaxed));
-        cancelled || self.left().is_some_and(|left| left <= 0.0)
+        self.limits.reached(self.start).is_some() || budget::over()
     }
 
-    /// Why an investigation ended before its time.
-    fn why(&self) -> &'static str {
-        let flag = self.limits.cancel.as_ref();
-        match flag.is_some_and(|c| c.load(std::sync::atomic::Ordering::Relaxed)) {
-            true => "cancelled",
-            false => "the time limit came first",
-        }
+    /// What is said where a limit came first.
+    fn late(&self) -> Existence {
+        late(match self.limits.reached(self.start) {
+            Some(limit) => limit,
+            None => Limit::Time,
+        })
     }
 
     /// Seconds.
@@ -61,9 +59,23 @@ impl Clock<'_> {
 }
 
 /// What is known of the existence of a solution, within the time limit of `limits`; its other entries, but for the flag of
-/// cancellation, are not used.
+/// cancellation and the limit on memory, are not used. A large problem is investigated on a thread of its own, see [`guard`].
 pub fn of(problem: &Friction, limits: &Limits) -> Existence {
-    with_friction!(problem, p => decide(p, limits))
+    if problem.unknowns() <= guard::SMALL {
+        return with_friction!(problem, p => decide(p, limits));
+    }
+    let copy = problem.clone();
+    let decided =
+        guard::run(limits, || {}, move |limits| with_friction!(&copy, p => decide(p, limits)));
+    decided.unwrap_or_else(late)
+}
+
+/// What is said where a limit came first.
+fn late(limit: Limit) -> Existence {
+    match limit {
+        Limit::Cancelled => unknown("it was cancelled"),
+        Limit::Time | Limit::Iterations => unknown("the time limit came first"),
+    }
 }
 
 /// As [`of`], with the cheap attempts only: the free motion and a few hundred sweeps. What they cannot prove is unknown.
@@ -77,6 +89,7 @@ pub fn decide<P: Blockwise<D> + Kinematic<D>, const D: usize>(
     limits: &Limits,
 ) -> Existence {
     let clock = Clock { start: Instant::now(), limits };
+    let _scope = limits.budget(clock.start).enter();
     let kinematics = problem.kinematics();
     let found = approach::approach(problem, &kinematics, THOROUGH, &clock);
     let first = found.map(|found| proved(problem, &kinematics, found));
@@ -207,9 +220,8 @@ fn by_program<P: Kinematic<D>, const D: usize>(
     kinematics: &Kinematics<D>,
     clock: &Clock,
 ) -> Existence {
-    let late = || unknown(clock.why());
     if clock.over() {
-        return late();
+        return clock.late();
     }
     let Some(widest) = Program::new(kinematics, &kinematics.mu).solve(clock) else {
         return unknown("the cone program could not be stated");
@@ -218,7 +230,7 @@ fn by_program<P: Kinematic<D>, const D: usize>(
         return Existence::by_motion(problem, kinematics, widest.motion, margin);
     }
     if clock.over() {
-        return late();
+        return clock.late();
     }
     // Can the normal velocities alone be made nonnegative?
     let without = vec![0.0; kinematics.mu.len()];
@@ -252,7 +264,7 @@ fn by_program<P: Kinematic<D>, const D: usize>(
     }
     match weak {
         Some(ray) => Existence::Weak { ray },
-        None if clock.over() => late(),
+        None if clock.over() => clock.late(),
         None => {
             unknown("neither a motion nor impulses could be verified: the margin is near rounding")
         }

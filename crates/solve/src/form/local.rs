@@ -7,7 +7,7 @@ use nonsmooth_problem::check::{Impulses, Kinematic};
 use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Inverse, Refine, Singular, small};
 use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint};
 
-use super::linearised::{ContactForm, Form, System};
+use super::linearised::{ContactForm, Form, NEVER, Once, System, made, there};
 use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised, velocity_scale};
 use crate::SolveError;
 
@@ -16,7 +16,7 @@ pub struct LocalState<const D: usize> {
     scale: f64,
     eliminated: Option<Eliminated<D>>,
     /// Made when it is first asked for.
-    system: Option<System<ContactForm<D>, D>>,
+    system: Once<System<ContactForm<D>, D>>,
 }
 
 struct Eliminated<const D: usize> {
@@ -124,7 +124,7 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
         }
         let LocalState { eliminated, system, .. } = state;
         let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
-        if system.as_mut().is_some_and(|system| !system.form().refill(w)) {
+        if there(system).is_none_or(|system| !system.form().refill(w)) {
             *system = None;
         }
         Ok(())
@@ -205,8 +205,8 @@ impl<const D: usize> Linearised<D> for FrictionLocal<D> {
         let LocalState { eliminated, system, .. } = state;
         let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
         let unit = (0..w.nrows()).map(|c| small::mean_diagonal(&w.diagonal_block(c)));
-        let system = system.get_or_insert_with(|| System::new(ContactForm::new(w), w.nrows()));
-        system.factorise(unit, p, q)
+        let make = || Ok(System::new(ContactForm::new(w)?, w.nrows()));
+        made(system, make).ok_or(Singular)?.factorise(unit, p, q)
     }
 
     fn solve_linearised(
@@ -223,16 +223,16 @@ impl<const D: usize> Linearised<D> for FrictionLocal<D> {
                 wx.copy_from_slice(&w.row_product(c, x));
             }
         };
-        system.as_mut().map_or(f64::NAN, |system| system.solve(b, x, wx, apply))
+        there(system).map_or(f64::NAN, |system| system.solve(b, x, wx, apply))
     }
 
     fn costs(&self, state: &mut Self::State) -> Costs {
         let LocalState { eliminated, system, .. } = state;
         let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
-        let system = system.get_or_insert_with(|| System::new(ContactForm::new(w), w.nrows()));
+        let system = made(system, || Ok(System::new(ContactForm::new(w)?, w.nrows())));
         Costs {
             sweep: 30.0 * w.nrows() as f64 + 2.0 * w.nblocks() as f64,
-            factorisation: system.form().cost(),
+            factorisation: system.map_or(NEVER, |system| system.form().cost()),
         }
     }
 }

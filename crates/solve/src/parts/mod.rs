@@ -18,7 +18,7 @@ mod team;
 
 pub use anderson::{Accelerator, Anderson};
 pub use central::{Central, Iterate as CentralIterate};
-pub use clarabel::{Clarabel, Ended, Shape};
+pub use clarabel::{Clarabel, Ended, Shape, admit_program};
 pub use coloring::Coloring;
 pub use conic::{ConvexEnd, ConvexIp};
 pub use exact_cones::{ExactCones, Found as ExactlyFound};
