@@ -2,7 +2,7 @@
 
 use crate::check::{self, Certificate, ConeSystem, Evidence, Impulses, Measure};
 use crate::error::{all_finite, friction_coefficients, vector};
-use crate::linalg::{Csc, Inverse, Refine};
+use crate::linalg::{Compensated, Csc, Inverse, Refine};
 use crate::{Kind, Problem, ProblemError};
 
 /// **Find** `v`, `r` (and the multipliers `lambda` of bilateral constraints) such that
@@ -184,6 +184,31 @@ impl Dynamics {
         problem.load(r, &mut self.state);
         self.inverse.solve_with(&mut self.state, &mut self.scratch, refine);
         self.state.split_at(problem.dofs())
+    }
+
+    /// The velocities and multipliers for the impulses `r` in doubled precision: `high + low`, each n + p, and in `last` what is
+    /// not known of them ([`Inverse::solve_doubled`]).
+    pub fn solve_doubled<const D: usize>(
+        &mut self,
+        problem: &FrictionGlobal<D>,
+        r: &[f64],
+        [high, low, last]: [&mut [f64]; 3],
+    ) {
+        // H r + f and −b, each one sum in doubled precision.
+        let n = problem.dofs();
+        high[..n].copy_from_slice(&problem.f);
+        let b = problem.bilateral.iter().flat_map(|b| &b.b);
+        high[n..].iter_mut().zip(b).for_each(|(high, b)| *high = -b);
+        low.fill(0.0);
+        for (j, &rj) in r.iter().enumerate() {
+            let (rows, values) = problem.H.column(j);
+            for (&i, &v) in rows.iter().zip(values) {
+                let mut sum = Compensated::parts(high[i], low[i]);
+                sum.add_product(v, rj);
+                (high[i], low[i]) = sum.into_parts();
+            }
+        }
+        self.inverse.solve_doubled(high, low, last, &mut self.scratch);
     }
 
     /// The change of velocity `M⁻¹ H r` that the impulses alone bring about, the constraints kept.

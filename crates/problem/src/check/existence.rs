@@ -447,7 +447,7 @@ impl<const D: usize> Kinematics<D> {
             return None;
         }
         let inside = |(c, &mu): (usize, &f64)| {
-            distance_to_cone::<D>(&small::block(r, c), mu) <= INSIDE * scale
+            distance_to_cone(&small::block::<D>(r, c), mu) <= INSIDE * scale
         };
         if !mu.iter().enumerate().all(inside) {
             return None;

@@ -76,6 +76,18 @@ pub struct Measure {
     /// Bilateral constraints: the largest violation of a constraint over the size of the terms that should cancel in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bilateral: Option<f64>,
+    /// Contacts: the largest residual of one contact in units of its own terms, `‖φ_c‖ / ‖(|q| + |W||r| + |V||λ|)_c‖` with its part φ_c of
+    /// the natural map, so that no contact hides behind larger ones. For global problems the terms are `|w| + |H|ᵀ|M⁻¹|(|f| + |H||r| + |G||λ|)`; in a large
+    /// component of M (finite elements), whose inverse nobody knows, `|w| + |H|ᵀ|v|` and the bound by Cauchy and Schwarz on `|W||r|`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub own: Option<f64>,
+    /// The contact that `own` is of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub own_contact: Option<usize>,
+    /// Contacts, certified measurements only: what the rounding of r (and λ, v) to doubles makes of the residual in the root mean
+    /// square, over `‖q‖`. No solver can be expected to get below it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub floor: Option<f64>,
     /// The contact (or row) with the largest share in `absolute`.
     pub worst_contact: usize,
     /// That contact's share, over `‖q‖`.
@@ -109,6 +121,9 @@ impl Measure {
             dynamics_rounding: None,
             velocity_gap: None,
             bilateral: None,
+            own: None,
+            own_contact: None,
+            floor: None,
             worst_contact: 0,
             worst: never,
         }
@@ -122,6 +137,7 @@ impl Measure {
             ("primal", Some(self.primal), tolerance),
             ("dual", Some(self.dual), tolerance),
             ("bilateral constraints", self.bilateral, tolerance),
+            ("own", self.own, tolerance),
             ("velocities", self.velocity_gap, tolerance),
             ("dynamics", self.dynamics, rounding),
         ]
