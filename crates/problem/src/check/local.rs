@@ -304,7 +304,9 @@ impl LawGauge {
                 T::DOUBT * (value(length(&x)) + value(length(&modified))) + (1.0 + mu) * of_u;
             doubts += left * left;
             let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] / unit));
-            let of_own = over(value(length(&residual)) + left, terms);
+            // With much friction K* is nearly the whole space, and far from it is near: every solution has u_N ≥ 0.
+            let sinking = (-value(uc[0] * per)).max(0.0);
+            let of_own = over(value(length(&residual)).max(sinking) + left, terms);
             if of_own > own || of_own.is_nan() {
                 (own_contact, own) = (c, of_own);
             }

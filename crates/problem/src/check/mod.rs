@@ -77,7 +77,7 @@ pub struct Measure {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bilateral: Option<f64>,
     /// Contacts: the largest residual of one contact in units of its own terms, `‖φ_c‖ / ‖(|q| + |W||r| + |V||λ|)_c‖` with its part φ_c of
-    /// the natural map, so that no contact hides behind larger ones. For global problems the terms are `|w| + |H|ᵀ|M⁻¹|(|f| + |H||r| + |G||λ|)`; in a large
+    /// the natural map (or `max(0, −u_N)`, if larger: under much friction a velocity into the obstacle is near K*), so that no contact hides behind larger ones. For global problems the terms are `|w| + |H|ᵀ|M⁻¹|(|f| + |H||r| + |G||λ|)`; in a large
     /// component of M (finite elements), whose inverse nobody knows, `|w| + |H|ᵀ|v|` and the bound by Cauchy and Schwarz on `|W||r|`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub own: Option<f64>,
