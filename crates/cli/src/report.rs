@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// `1 contact`, `2 contacts`.
 pub use nonsmooth_bench::plural as count;
-use nonsmooth_problem::check::{Failing, Measure, Verdict};
+use nonsmooth_problem::check::{self, Failing, Measure, Verdict};
 use serde_json::{Map, Value, json};
 
 use crate::kinds::{Counts, Form};
@@ -131,7 +131,13 @@ pub fn verdict_text<S, C: Counts>(
     residual_text(text, &verdict.measure, C::UNIT);
     let (relative, others) = failing(&verdict.measure, tolerance);
     if !others.is_empty() {
-        let limit = |f: &Failing| format!(" (limit {:.1e})", f.limit).replace(".0e", "e");
+        let limit = |f: &Failing| {
+            let limit = format!("limit {:.1e}", f.limit).replace(".0e", "e");
+            match verdict.measure.own_contact.filter(|_| f.what == check::OWN) {
+                Some(c) => format!(" (contact {c}, {limit})"),
+                None => format!(" ({limit})"),
+            }
+        };
         row(text, "fails", listed(&others, limit));
     }
     if uncounted(verdict) {
@@ -164,6 +170,7 @@ fn residual_text(text: &mut String, m: &Measure, unit: &str) {
         ("primal", Some(m.primal)),
         ("dual", Some(m.dual)),
         ("complementarity", Some(m.complementarity)),
+        ("own", m.own),
         ("dynamics", m.dynamics),
         ("velocities", m.velocity_gap),
         ("bilateral", m.bilateral),

@@ -508,6 +508,8 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 since_judged = 0;
                 if !self.judge.last.merit().is_finite() {
                     claim = Some(Status::Stalled("the iterates are no longer finite".into()));
+                } else if claim.is_none() {
+                    claim = self.floor(iterations);
                 }
             }
             self.observer.step(&self.judge.progress(iterations));
@@ -555,6 +557,22 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         self.limits.reached(self.judge.meter.begun).or_else(|| raised(self.scope))
     }
 
+    /// The end of a solve that the rounding of its impulses keeps from the tolerance: nothing has come of it for long, and the best point is at
+    /// the floor that the judge finds for it.
+    fn floor(&mut self, iterations: usize) -> Option<Status> {
+        let work = self.judge.idle(iterations)?;
+        let measure = self.judge.certify_best(self.problem);
+        let (floor, tolerance) = (measure.floor?, self.limits.tolerance);
+        // A point near the floor may still meet a tolerance little below it by chance.
+        let (near, below) = if work < LATE * IDLE { (AT_FLOOR, 4.0) } else { (NEAR_FLOOR, 1.0) };
+        (floor > below * tolerance && measure.merit() <= near * floor).then(|| {
+            let why = format!(
+                "the rounding of the impulses to double precision alone makes a residual of {floor:.0e}"
+            );
+            Status::Stalled(why.into())
+        })
+    }
+
     /// What a solver's last word comes to if the judge does not accept its point.
     fn conclusion(&self, step: Step) -> Status {
         match step {
@@ -574,6 +592,30 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
     }
 }
 
+/// A solve that has not halved its merit in so many steps is asked whether it is at the floor; a factorisation counts as three steps more.
+const IDLE: u64 = 1200;
+/// How much later it may be asked the second question, and each later time than the one before.
+const LATE: u64 = 4;
+/// What counts as at the floor, and as near it.
+const AT_FLOOR: f64 = 10.0;
+const NEAR_FLOOR: f64 = 1000.0;
+
+/// Since when a solve gets no further.
+#[derive(Debug, Clone, Copy)]
+struct Halved {
+    merit: f64,
+    iteration: usize,
+    factorisations: u64,
+    /// The work without a halving after which the floor is looked at.
+    patience: u64,
+}
+
+impl Halved {
+    fn now(merit: f64, iteration: usize) -> Self {
+        Self { merit, iteration, factorisations: factorisations(), patience: IDLE }
+    }
+}
+
 /// The judge's visits, the best point among them, and the history.
 struct Judge<'a, P: Problem> {
     gauge: &'a mut P::Gauge,
@@ -588,6 +630,8 @@ struct Judge<'a, P: Problem> {
     best_measure: Measure,
     /// The best point's residuals in doubled precision, where they were needed.
     certified: Option<Measure>,
+    /// When the best merit was last halved.
+    halved: Halved,
     /// Judged residual over the solver's estimate, when last compared.
     ratio: f64,
     /// Keep every `stride`-th visit in the history.
@@ -615,6 +659,7 @@ impl<'a, P: Problem> Judge<'a, P> {
             last: nothing,
             best_measure: nothing,
             certified: None,
+            halved: Halved::now(f64::INFINITY, 0),
             ratio: 1.0,
             stride: 1,
             visits: 0,
@@ -630,8 +675,11 @@ impl<'a, P: Problem> Judge<'a, P> {
             (self.last, tidied) = self.certify(problem, point, tolerance);
             certified = Some(self.last);
         }
-        let better =
-            self.visits == 0 || self.latest || self.last.is_better_than(&self.best_measure);
+        // What passes counts as the best, though its merit may be that of a point with a contact that is not done.
+        let better = self.visits == 0
+            || self.latest
+            || self.last.is_better_than(&self.best_measure)
+            || self.last.passes(tolerance);
         if better {
             self.best_measure = self.last;
             self.certified = certified;
@@ -668,6 +716,29 @@ impl<'a, P: Problem> Judge<'a, P> {
             }
         }
         (plain.unwrap_or_else(|| problem.certify(point, self.gauge)), false)
+    }
+
+    /// The work since the best merit was last halved, where it is time to look at the floor.
+    fn idle(&mut self, iteration: usize) -> Option<u64> {
+        let merit = self.best_measure.merit();
+        if merit <= 0.5 * self.halved.merit {
+            self.halved = Halved::now(merit, iteration);
+            return None;
+        }
+        let Halved { iteration: since, factorisations: before, patience, .. } = self.halved;
+        let work = (iteration - since) as u64 + 3 * (factorisations() - before);
+        if work < patience {
+            return None;
+        }
+        self.halved.patience *= 2;
+        Some(work)
+    }
+
+    /// The best point's residuals in doubled precision.
+    fn certify_best(&mut self, problem: &P) -> Measure {
+        let measure = *self.certified.get_or_insert_with(|| problem.certify(self.best, self.gauge));
+        self.best_measure = measure;
+        measure
     }
 
     /// The solver's estimate is proportional to the residual, near enough: learn the factor.

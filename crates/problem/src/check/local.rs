@@ -37,6 +37,7 @@ impl LocalGauge {
         let contacts = problem.contacts();
         let diagonal = (0..contacts).map(|c| small::mean_diagonal(&problem.W.diagonal_block(c)));
         self.law.refill(diagonal, norm(&problem.q));
+        self.mark_loaded(problem);
         let blocks = (0..contacts).map(|c| problem.W.row(c).0.len()).max().unwrap_or(0);
         self.terms = 1 + D * blocks + problem.multipliers();
         let m = problem.q.len();
@@ -47,6 +48,30 @@ impl LocalGauge {
         self.sizes.resize(m, 0.0);
         // The longest use of the rows, so that a measurement allocates nothing.
         self.rows.start_at_zero(m.max(problem.multipliers()));
+    }
+
+    /// Which contacts have a load or are coupled, however far, to one that has; those that bilateral constraints touch count.
+    fn mark_loaded<const D: usize>(&mut self, problem: &FrictionLocal<D>) {
+        let loaded = &mut self.law.loaded;
+        loaded.clear();
+        loaded.extend(problem.q.chunks(D).map(|q| q.iter().any(|q| *q != 0.0)));
+        if let Some(b) = &problem.bilateral {
+            let touched = (0..b.s.len()).flat_map(|j| b.V.column(j).0);
+            touched.for_each(|&i| loaded[i / D] = true);
+        }
+        let mut spreads = loaded.contains(&false);
+        while spreads {
+            spreads = false;
+            for i in 0..loaded.len() {
+                let (cols, blocks) = problem.W.row(i);
+                for (&j, block) in cols.iter().zip(blocks) {
+                    let j = j as usize;
+                    if loaded[i] != loaded[j] && *block != [[0.0; D]; D] {
+                        (loaded[i], loaded[j], spreads) = (true, true, true);
+                    }
+                }
+            }
+        }
     }
 
     /// The residuals; `precisely` in doubled precision from the data to the last comparison.
@@ -197,6 +222,9 @@ impl LocalGauge {
 /// The rounding of a stored double, over its size, in the root mean square.
 pub(super) const HALF_ULP: f64 = 0.3 * f64::EPSILON;
 
+/// Terms below this share of ‖q‖ have lost digits to underflow.
+const LEAST: f64 = 1e-280;
+
 /// Calls `term(i, A_ij, x_j)` for the entries of A.
 fn each_term(a: Option<&Csc>, x: &[f64], mut term: impl FnMut(usize, f64, f64)) {
     let Some(a) = a else { return };
@@ -228,10 +256,11 @@ pub(super) fn worst(shares: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
     })
 }
 
-/// What the contact law's residual needs of a problem: `w_c` and `‖q‖`.
+/// What the contact law's residual needs of a problem: `w_c` and `‖q‖`, and which contacts are not loaded at all (empty: none).
 #[derive(Debug, Clone, Default)]
 pub(super) struct LawGauge {
     pub(super) w: Vec<f64>,
+    loaded: Vec<bool>,
     pub(super) norm_q: f64,
 }
 
@@ -304,10 +333,13 @@ impl LawGauge {
                 T::DOUBT * (value(length(&x)) + value(length(&modified))) + (1.0 + mu) * of_u;
             doubts += left * left;
             let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] / unit));
-            // With much friction K* is nearly the whole space, and far from it is near: every solution has u_N ≥ 0.
+            // Below the range of double precision there are no digits to be right. With much friction K* is nearly the whole space, and far from
+            // it is near: every solution has u_N ≥ 0.
             let sinking = (-value(uc[0] * per)).max(0.0);
-            let of_own = over(value(length(&residual)).max(sinking) + left, terms);
-            if of_own > own || of_own.is_nan() {
+            let error = value(length(&residual)).max(sinking) + left;
+            let of_own = over(error, terms.max(LEAST));
+            let idle = self.loaded.get(c) == Some(&false);
+            if !idle && (of_own > own || of_own.is_nan()) {
                 (own_contact, own) = (c, of_own);
             }
             let rc = rc.map(|r| T::from(r) * plain_per);

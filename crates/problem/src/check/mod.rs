@@ -77,8 +77,11 @@ pub struct Measure {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bilateral: Option<f64>,
     /// Contacts: the largest residual of one contact in units of its own terms, `‖φ_c‖ / ‖(|q| + |W||r| + |V||λ|)_c‖` with its part φ_c of
-    /// the natural map (or `max(0, −u_N)`, if larger: under much friction a velocity into the obstacle is near K*), so that no contact hides behind larger ones. For global problems the terms are `|w| + |H|ᵀ|M⁻¹|(|f| + |H||r| + |G||λ|)`; in a large
-    /// component of M (finite elements), whose inverse nobody knows, `|w| + |H|ᵀ|v|` and the bound by Cauchy and Schwarz on `|W||r|`.
+    /// the natural map (or `max(0, −u_N)`, if larger: under much friction a velocity into the obstacle is near K*): a contact that nothing solves does not hide behind larger ones, whatever its scale. The limit is the root of the tolerance:
+    /// half of the digits, because a contact with a small load gets no more than its share of the work. Islands of contacts without load (q = 0)
+    /// are left out: r = 0 solves them, and what is there is noise. For global problems the terms are
+    /// `|w| + |H|ᵀ|M⁻¹|(|f| + |H||r| + |G||λ|)`; in a large component of M (finite elements), whose inverse nobody knows, `|w| + |H|ᵀ|v|` and
+    /// the bound by Cauchy and Schwarz on `|W||r|`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub own: Option<f64>,
     /// The contact that `own` is of.
@@ -93,6 +96,9 @@ pub struct Measure {
     /// That contact's share, over `‖q‖`.
     pub worst: f64,
 }
+
+/// The name of the criterion of each contact by its own terms.
+pub const OWN: &str = "own residual of a contact";
 
 /// A criterion that a point does not meet.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -137,7 +143,7 @@ impl Measure {
             ("primal", Some(self.primal), tolerance),
             ("dual", Some(self.dual), tolerance),
             ("bilateral constraints", self.bilateral, tolerance),
-            ("own", self.own, tolerance),
+            (OWN, self.own, tolerance.sqrt()),
             ("velocities", self.velocity_gap, tolerance),
             ("dynamics", self.dynamics, rounding),
         ]
@@ -157,9 +163,10 @@ impl Measure {
     }
 
     /// One number to compare two points of the same problem: the largest of the values that are compared with the
-    /// tolerance, with the dynamics where they exceed rounding; infinite where a value is NaN.
+    /// tolerance, with the dynamics where they exceed rounding; infinite where a value is NaN. `own` is not among them: it says
+    /// whether the smallest contact is done, not how far the problem is.
     pub fn merit(&self) -> f64 {
-        self.criteria(0.0).fold(0.0, |merit, c| match c.value {
+        self.criteria(0.0).filter(|c| c.what != OWN).fold(0.0, |merit, c| match c.value {
             v if v.is_nan() => f64::INFINITY,
             v if c.limit > 0.0 && v <= c.limit => merit,
             v => merit.max(v),

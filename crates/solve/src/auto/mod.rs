@@ -393,6 +393,7 @@ impl<const D: usize> Hybrid<D> {
         let HybridWork { newton, controller, .. } = work;
         let Some(newton) = newton else { return };
         let r = P::impulses(point);
+        newton.focus(r, error, work.tolerance);
         newton.center(r, controller.epsilon(), controller.kappa());
         work.inner_best.copy_from_slice(r);
         if controller.start(error, newton.residual(r), work.tolerance) {

@@ -7,7 +7,7 @@
 
 use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::linalg::budget::{self, TooLarge};
-use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Refine, Singular, small};
+use nonsmooth_problem::linalg::{Block, Bsr, Compensated, Csc, Delassus, Refine, Singular, small};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
 use super::linearised::{BodyForm, ContactForm, Form, NEVER, Once, System, made, there};
@@ -24,6 +24,8 @@ pub struct GlobalState<const D: usize> {
     q: Vec<f64>,
     scale: f64,
     v: Vec<f64>,
+    /// v in doubled precision, where it was asked for: high, low, the last correction.
+    precise: [Vec<f64>; 3],
     contradiction: Option<Impulses>,
     /// Made when it is first asked for.
     system: Once<GlobalSystem<D>>,
@@ -112,6 +114,7 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
             q: vec![0.0; self.w.len()],
             scale: 1.0,
             v: vec![0.0; self.dofs()],
+            precise: Default::default(),
             contradiction: None,
             system: None,
             dynamics,
@@ -213,6 +216,24 @@ impl<const D: usize> Linear<D> for FrictionGlobal<D> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
         let (v, _) = state.dynamics.solve(self, r, Refine::Once);
         self.velocity_into(v, u);
+    }
+
+    fn velocities_precisely(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
+        let [high, low, last] = &mut state.precise;
+        let n = state.dynamics.inverse.dim();
+        for part in [&mut *high, &mut *low, &mut *last] {
+            part.resize(n, 0.0);
+        }
+        state.dynamics.solve_doubled(self, r, [high, low, last]);
+        for (i, u) in u.iter_mut().enumerate() {
+            let mut sum = Compensated::from(self.w[i]);
+            let (rows, values) = self.H.column(i);
+            for (&j, &h) in rows.iter().zip(values) {
+                sum.add_product(h, high[j]);
+                sum.add_product(h, low[j]);
+            }
+            *u = sum.value();
+        }
     }
 }
 

@@ -4,7 +4,9 @@
 //! constraints (a singular, positive semidefinite R) are honoured.
 
 use nonsmooth_problem::check::{Impulses, Kinematic};
-use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Inverse, Refine, Singular, small};
+use nonsmooth_problem::linalg::{
+    Block, Bsr, Compensated, Csc, Delassus, Inverse, Refine, Singular, small,
+};
 use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint};
 
 use super::linearised::{ContactForm, Form, NEVER, Once, System, made, there};
@@ -17,6 +19,8 @@ pub struct LocalState<const D: usize> {
     eliminated: Option<Eliminated<D>>,
     /// Made when it is first asked for.
     system: Once<System<ContactForm<D>, D>>,
+    /// Room for velocities in doubled precision.
+    sums: Vec<Compensated>,
 }
 
 struct Eliminated<const D: usize> {
@@ -30,6 +34,8 @@ struct Eliminated<const D: usize> {
     lambda: Vec<f64>,
     scratch: Vec<f64>,
     residual: Vec<f64>,
+    /// λ in doubled precision: high, low, the last correction.
+    precise: [Vec<f64>; 3],
     contradiction: Option<Impulses>,
 }
 
@@ -48,6 +54,7 @@ impl<const D: usize> Eliminated<D> {
             scratch: vec![0.0; r_inverse.scratch_len()],
             r_inverse,
             residual: vec![0.0; b.s.len()],
+            precise: [0; 3].map(|_| vec![0.0; b.s.len()]),
             contradiction: None,
         };
         eliminated.update_free_velocity(problem, b);
@@ -109,7 +116,7 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
 
     fn state(&self, _: Access) -> Result<Self::State, SolveError> {
         let eliminated = self.bilateral.as_ref().map(|b| Eliminated::new(self, b)).transpose()?;
-        Ok(LocalState { scale: velocity_scale(&self.q), eliminated, system: None })
+        Ok(LocalState { scale: velocity_scale(&self.q), eliminated, system: None, sums: vec![] })
     }
 
     fn refill(&self, state: &mut Self::State) -> Result<(), SolveError> {
@@ -192,6 +199,44 @@ impl<const D: usize> Linear<D> for FrictionLocal<D> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
         let (w, q) = state.operator(self);
         w.mul_plus(r, q, u);
+    }
+
+    /// With bilateral rows by way of the multipliers, `u = W r + V λ + q`: the eliminated W carries the rounding of its elimination.
+    fn velocities_precisely(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
+        let sums = &mut state.sums;
+        sums.clear();
+        sums.extend(self.q.iter().map(|&q| Compensated::from(q)));
+        for (i, sum) in sums.chunks_mut(D).enumerate() {
+            let (columns, blocks) = self.W.row(i);
+            for (&j, block) in columns.iter().zip(blocks) {
+                for (sum, row) in sum.iter_mut().zip(block) {
+                    row.iter()
+                        .enumerate()
+                        .for_each(|(l, &w)| sum.add_product(w, r[D * j as usize + l]));
+                }
+            }
+        }
+        if let (Some(BilateralLocal { V, s, .. }), Some(e)) =
+            (&self.bilateral, &mut state.eliminated)
+        {
+            // λ = −R⁻¹ (Vᵀ r + s), high and low.
+            let [high, low, last] = &mut e.precise;
+            for j in 0..s.len() {
+                let mut sum = Compensated::from(-s[j]);
+                let (rows, values) = V.column(j);
+                rows.iter().zip(values).for_each(|(&i, &v)| sum.add_product(-v, r[i]));
+                (high[j], low[j]) = sum.into_parts();
+            }
+            e.r_inverse.solve_doubled(high, low, last, &mut e.scratch);
+            for j in 0..s.len() {
+                let (rows, values) = V.column(j);
+                for (&i, &v) in rows.iter().zip(values) {
+                    sums[i].add_product(v, high[j]);
+                    sums[i].add_product(v, low[j]);
+                }
+            }
+        }
+        u.iter_mut().zip(&*sums).for_each(|(u, sum)| *u = sum.value());
     }
 }
 

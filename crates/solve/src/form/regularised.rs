@@ -187,6 +187,13 @@ impl<P: Linear<D>, const D: usize> Linear<D> for Regularised<P> {
             *u += self.weight[i / D] * (r[i] - self.center[i]);
         }
     }
+
+    fn velocities_precisely(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
+        self.base.velocities_precisely(&mut state.base, r, u);
+        for (i, u) in u.iter_mut().enumerate() {
+            *u += self.weight[i / D] * (r[i] - self.center[i]);
+        }
+    }
 }
 
 impl<P: Linearised<D>, const D: usize> Linearised<D> for Regularised<P> {
