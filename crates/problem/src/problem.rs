@@ -112,6 +112,11 @@ pub trait Problem {
         false
     }
 
+    /// The residual that the rounding of a point to doubles explains alone, at the point last measured with `gauge`; zero where that is not known. Allocates nothing.
+    fn floor(&self, _gauge: &Self::Gauge) -> f64 {
+        0.0
+    }
+
     /// Whether `certificate` proves that the problem has no solution, decided from the data alone.
     fn verify(&self, certificate: &Certificate) -> bool;
 }

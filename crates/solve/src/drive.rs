@@ -203,6 +203,11 @@ pub trait Session<P: Problem>: Send {
     fn account(&self) -> Vec<String>;
 }
 
+/// So many visits of the judge at points whose residual is rounding, and still above the tolerance, are enough.
+const PATIENCE: usize = 20;
+/// What is rounding, in units of what half a bit of each unknown makes.
+const NOISE: f64 = 16.0;
+
 /// The most samples that a history keeps.
 const HISTORY: usize = 4096;
 
@@ -338,6 +343,15 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 if !self.judge.last.merit().is_finite() {
                     claim = Some(Status::Stalled("the iterates are no longer finite".into()));
                 }
+                if claim.is_none() && self.judge.at_floor >= PATIENCE {
+                    claim = Some(Status::Stalled(
+                        format!(
+                            "rounding the unknowns to doubles makes a residual of {:.0e} here, more than the tolerance",
+                            self.judge.floor
+                        )
+                        .into(),
+                    ));
+                }
             }
             watch(&self.judge.progress(iterations));
         };
@@ -424,6 +438,9 @@ struct Judge<'a, P: Problem> {
     certified: Option<Measure>,
     /// Judged residual over the solver's estimate, when last compared.
     ratio: f64,
+    /// Visits at points whose residual is rounding, and what that makes.
+    at_floor: usize,
+    floor: f64,
     /// Keep every `stride`-th visit in the history.
     stride: usize,
     visits: usize,
@@ -451,6 +468,8 @@ impl<'a, P: Problem> Judge<'a, P> {
             best_measure: nothing,
             certified: None,
             ratio: 1.0,
+            at_floor: 0,
+            floor: 0.0,
             stride: 1,
             visits: 0,
         }
@@ -458,6 +477,10 @@ impl<'a, P: Problem> Judge<'a, P> {
 
     fn judge(&mut self, problem: &P, point: &P::Point, iteration: usize, tolerance: f64) {
         self.last = problem.measure(point, self.gauge);
+        let floor = problem.floor(self.gauge);
+        if floor > tolerance && self.last.merit() <= NOISE * floor {
+            (self.at_floor, self.floor) = (self.at_floor + 1, floor);
+        }
         let (mut certified, mut tidied) = (None, false);
         if self.last.passes(tolerance) {
             // What looks solved is looked at again, in doubled precision.

@@ -103,6 +103,10 @@ impl Problem for Hlcp {
         gauge.tidy(point, boldly)
     }
 
+    fn floor(&self, gauge: &HlcpGauge) -> f64 {
+        gauge.floor()
+    }
+
     fn verify(&self, certificate: &Certificate) -> bool {
         refute::refutes_horizontal(self, certificate)
     }

@@ -65,6 +65,10 @@ macro_rules! problem_in_z {
                 gauge.tidy(self, point, boldly)
             }
 
+            fn floor(&self, gauge: &Self::Gauge) -> f64 {
+                gauge.floor()
+            }
+
             fn verify(&self, certificate: &$crate::check::Certificate) -> bool {
                 $crate::check::refute::refutes(self, certificate)
             }
