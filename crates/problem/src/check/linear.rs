@@ -91,7 +91,8 @@ const SMALLER: f64 = 1e-3;
 /// | `paper`, `peer` | `‖min(z, w)‖₂ / ‖q‖₂`, as Siconos has it for an LCP |
 ///
 /// The unit `ω_i` is what q and the bounds make of row i: `ω_i = max(|q_i|, max_j |M_ij| ζ_j)`, where `ζ_j = max_k |q_k| / |M_kj|`, at least the smaller
-/// modulus of two finite bounds, is the unit of column j; what has no unit looks for one a few times further on, then only the first term counts. Without it a z that
+/// modulus of two finite bounds, is the unit of column j; what q does not reach gets its unit from its
+/// neighbours, and where they have none the terms alone count. Without it a z that
 /// runs to infinity in the kernel of M would solve every problem. The relative error is thus one of q as well as one of the whole row.
 ///
 /// A variable with an empty column is wrong unless it is exactly where it should be. Of an operator only products are known: `D_i = |q_i| + |(M z)_i| + s_i |z_i|`, and
@@ -497,7 +498,8 @@ impl LinearGauge {
                 Some(pair) => sum.pair(i, &pair, self.largest[i]),
             }
         }
-        if visible { sum.measure() } else { Measure { relative: NEVER, ..sum.measure() } }
+        let measure = Measure { floor: precisely.then(|| self.floor()), ..sum.measure() };
+        if visible { measure } else { Measure { relative: NEVER, ..measure } }
     }
 
     /// The pair of row i at the point last measured, if it is no equality.
@@ -529,6 +531,10 @@ impl LinearGauge {
         changed
     }
 
+    fn floor(&self) -> f64 {
+        floor(self.rows.sizes(), &self.scales)
+    }
+
     fn judge(
         problem: &(impl Stated + Problem<Point = LcpPoint, Gauge = Self>),
         point: &LcpPoint,
@@ -542,6 +548,12 @@ impl LinearGauge {
             .map(|i| gauge.pair(&data, point, i).ok_or_else(|| share(gauge.w[i], gauge.scales[i])));
         Ok(verdict(measure, rows, gauge.w.clone(), tolerance))
     }
+}
+
+/// The largest error that a change of all variables by half their last bit makes.
+fn floor(terms: &[f64], scales: &[f64]) -> f64 {
+    let rows = terms.iter().zip(scales).filter(|(_, d)| **d > 0.0);
+    0.5 * f64::EPSILON * rows.fold(0.0_f64, |most, (terms, d)| most.max(terms / d))
 }
 
 /// Overwrites `to`; whether that changed it.
@@ -625,7 +637,12 @@ impl HlcpGauge {
             let (pair, d) = (self.pair(point, i), self.d[i]);
             sum.pair(n + i, &Pair { w: d * pair.w, ..pair }, self.c[i]);
         }
-        if visible { sum.measure() } else { Measure { relative: NEVER, ..sum.measure() } }
+        let measure = Measure { floor: precisely.then(|| self.floor()), ..sum.measure() };
+        if visible { measure } else { Measure { relative: NEVER, ..measure } }
+    }
+
+    fn floor(&self) -> f64 {
+        floor(self.rows.sizes(), &self.scales)
     }
 
     fn pair(&self, point: &HlcpPoint, i: usize) -> Pair {

