@@ -19,8 +19,7 @@ pub trait Hostile: Registered + Judged + Sync {
     /// The problem as a union of polyhedra; none where its cones are round.
     fn union(&self) -> Option<Union>;
 
-    /// The criterion by which a point is called solved, computed exactly: at most the tolerance. Infinite where no velocity follows from
-    /// the impulses.
+    /// The criterion by which a point is called solved, computed exactly: at most the tolerance.
     fn error(&self, point: &Self::Point) -> f64;
 
     /// The same for a point whose velocities are taken as they are given, not as they follow from the impulses: where constraints nearly repeat each other,
@@ -541,7 +540,10 @@ impl<const D: usize> Judge for FrictionGlobal<D> {
             let dynamics = violation(&load, |_| 0.0, 0.0);
             return law::<D>(&w, &point.r, &given, &self.mu, &q).max(bilateral).max(dynamics);
         }
-        let Some(u) = eliminated(equations, forms, n + p) else { return f64::INFINITY };
+        // Where r does not determine the velocities, those given count.
+        let Some(u) = eliminated(equations, forms, n + p) else {
+            return self.exactly(point, true);
+        };
         let u: Vec<_> = u.into_iter().flatten().collect();
         let square = |s: Dyadic, x: &Dyadic| &s + &(x * x);
         let size = q.iter().fold(Dyadic::zero(), square).sqrt();
