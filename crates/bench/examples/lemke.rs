@@ -171,7 +171,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 outcome.iterations,
                 outcome.factorisations,
                 outcome.cpu_seconds,
-                outcome.measure.rows.unwrap_or(f64::NAN),
+                outcome.measure.relative,
                 outcome.status
             );
         }

@@ -150,8 +150,10 @@ pub struct Problem {
 pub enum Ending {
     /// The judge accepts the answer. For foreign runs: the program's own error is at most the tolerance.
     Solved,
-    /// There is no solution, with a verified certificate.
+    /// There is no solution: proved.
     Infeasible,
+    /// There is no solution up to rounding: not proved.
+    NearlyInfeasible,
     /// The solver ended on a ray that proves nothing.
     NoConclusion,
     /// Iterations ran out.
@@ -175,9 +177,10 @@ pub enum Ending {
 
 impl Ending {
     /// Every ending, in the order of the tables.
-    pub const ALL: [Ending; 11] = [
+    pub const ALL: [Ending; 12] = [
         Ending::Solved,
         Ending::Infeasible,
+        Ending::NearlyInfeasible,
         Ending::NoConclusion,
         Ending::IterationLimit,
         Ending::TimeLimit,
@@ -194,6 +197,7 @@ impl Ending {
         match self {
             Ending::Solved => "solved",
             Ending::Infeasible => "infeasible",
+            Ending::NearlyInfeasible => "nearly_infeasible",
             Ending::NoConclusion => "no_conclusion",
             Ending::IterationLimit => "iteration_limit",
             Ending::TimeLimit => "time_limit",
@@ -242,9 +246,6 @@ pub struct Residuals {
     /// Bilateral constraints.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bilateral: Option<f64>,
-    /// The worst row in units of its own terms, of linear complementarity problems.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rows: Option<f64>,
 }
 
 /// A run: one problem, one solver, one tolerance.

@@ -7,9 +7,9 @@ use nonsmooth_problem::{with_complementarity, with_friction};
 use serde_json::json;
 
 use crate::kinds::Form;
-use crate::{Exit, files, output, report};
+use crate::{Exit, certificate, files, output, report};
 
-/// Judge the solutions stored in files.
+/// Judge the solutions stored in files, or a certificate.
 ///
 /// The residual of the solution is recomputed from the problem's data: from the impulses `r` (and the multipliers
 /// `l`), through the dynamics for a global contact problem, or from z of a linear complementarity problem. The stored
@@ -26,6 +26,10 @@ pub struct Args {
     /// List the N contacts, or rows, with the largest residuals (at most 10)
     #[arg(long, value_name = "N", value_parser = files::whole)]
     worst: Option<usize>,
+    /// Verify this certificate (JSON, from `solve` or `exists` with --certificate) for the problem in FILE, in exact arithmetic, in
+    /// place of a solution
+    #[arg(long, value_name = "FILE.json", conflicts_with_all = ["tol", "worst"])]
+    certificate: Option<PathBuf>,
     /// Print one line of JSON for each file in place of the report
     #[arg(long)]
     json: bool,
@@ -36,11 +40,15 @@ Examples:
   nonsmooth check solved.hdf5
   nonsmooth check solved.toml
   nonsmooth check solved.hdf5 --tol 1e-12 --worst 10
+  nonsmooth check impossible.toml --certificate proof.json
 
-Exit codes: 0 all pass; 1 some do not; 2 a file without a solution, or at fault.";
+Exit codes: 0 all pass, or the certificate is a proof; 1 some do not, or it is none; 2 a file without a solution, or at fault.";
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
+    if let Some(path) = &args.certificate {
+        return certificate::check(&args.files, path, args.json);
+    }
     let tol = files::tolerance(args.tol)?;
     Ok(files::each(&args.files, args.json, |_, file| {
         let none = |place: &str| {

@@ -1,6 +1,7 @@
 //! `nonsmooth diagnose`.
 
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use nonsmooth_problem::with_friction;
 use nonsmooth_solve::Limits;
@@ -23,9 +24,12 @@ pub struct Args {
     /// The most rows of W for which rank and condition number are computed
     #[arg(long, value_name = "ROWS", default_value = "1500", value_parser = files::whole)]
     spectrum_limit: usize,
-    /// At most this many seconds for the existence of a solution
+    /// At most this many seconds for each file, half of them for rank and condition number
     #[arg(long, value_name = "SECONDS", default_value = "20", allow_hyphen_values = true)]
     time_limit: f64,
+    /// Memory that one factorisation may take, as 500M or 4G [default: what the machine has free]
+    #[arg(long, value_name = "SIZE", value_parser = files::size)]
+    memory_limit: Option<u64>,
     /// Print one line of JSON for each file
     #[arg(long)]
     json: bool,
@@ -39,13 +43,31 @@ Examples:
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
     let time_limit = files::time_limit(Some(args.time_limit))?;
-    let effort = Effort {
-        spectrum_limit: args.spectrum_limit,
-        limits: Limits { time_limit, cancel: Some(interrupt::flag()), ..Limits::default() },
+    let limits = Limits {
+        time_limit,
+        cancel: Some(interrupt::flag()),
+        memory_limit: args.memory_limit,
+        ..Limits::default()
     };
     Ok(files::each(&args.files, args.json, |_, file| {
-        let content = files::contact_problem(file)?;
-        let diagnosis = diagnose(&content.problem, content.info.dofs, &effort);
+        let begun = Instant::now();
+        let content = match files::contact_within(file, &limits)? {
+            Ok(content) => content,
+            Err(limit) => return Ok(files::late(file, args.json, limit, files::WHILE_READ)),
+        };
+        let left = files::left(&limits, begun);
+        let effort = Effort { spectrum_limit: args.spectrum_limit, limits: left };
+        let diagnosis = match diagnose(&content.problem, content.info.dofs, &effort) {
+            Ok(diagnosis) => diagnosis,
+            Err(limit) => {
+                return Ok(files::late(
+                    file,
+                    args.json,
+                    limit,
+                    "before the problem was understood",
+                ));
+            }
+        };
         output::print(&if args.json {
             let mut all = with_friction!(&content.problem, p => report::problem_json(file, p));
             all.extend(report::fields(json!(diagnosis)));

@@ -8,14 +8,17 @@ use nonsmooth_problem::with_friction;
 use nonsmooth_solve::{Limits, existence};
 use serde_json::{Value, json};
 
-use crate::report::{self, Object, number, row};
+use crate::report::{self, Object, row};
 use crate::{Exit, files, interrupt, output};
 
 /// Decide whether problems have a solution, with a verified certificate.
 ///
+/// What is called proved holds in exact arithmetic on the stored data; what holds up to rounding only is called nearly proved, and
+/// ends like what is not known.
 /// A solution exists if some motion keeps every contact inside the dual cone K* = {mu |u_T| <= u_N}. If none does, that
 /// is certified by impulses in K that feel no motion; the problem may then still have a solution. Normal impulses that
-/// feel no motion prove that it has none, whatever the friction.
+/// feel no motion prove that it has none, whatever the friction. Problems of a few contacts in the plane, or without friction, are
+/// decided completely.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
@@ -25,6 +28,9 @@ pub struct Args {
     /// At most this many seconds for each file
     #[arg(long, value_name = "SECONDS", default_value = "60", allow_hyphen_values = true)]
     time_limit: f64,
+    /// Memory that one factorisation may take, as 500M or 4G [default: what the machine has free]
+    #[arg(long, value_name = "SIZE", value_parser = files::size)]
+    memory_limit: Option<u64>,
     /// Write the certificate as JSON: the motion, or impulses and multipliers
     #[arg(long, value_name = "OUT")]
     certificate: Option<PathBuf>,
@@ -39,7 +45,7 @@ Examples:
   nonsmooth exists problems/*.hdf5 --json
   nonsmooth exists wall.hdf5 --certificate motion.json
 
-Exit codes: 0 proved for all; 1 not known, or no solution; 2 a mistake in a file or an option.";
+Exit codes: 0 proved for all; 1 not known, nearly proved, or no solution; 2 a mistake in a file or an option.";
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
@@ -50,11 +56,19 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         }
         None => None,
     };
-    let limits = Limits { time_limit, cancel: Some(interrupt::flag()), ..Limits::default() };
+    let limits = Limits {
+        time_limit,
+        cancel: Some(interrupt::flag()),
+        memory_limit: args.memory_limit,
+        ..Limits::default()
+    };
     Ok(files::each(&args.files, args.json, |k, file| {
-        let content = files::contact_problem(file)?;
         let start = Instant::now();
-        let existence = existence::of(&content.problem, &limits);
+        let content = match files::contact_within(file, &limits)? {
+            Ok(content) => content,
+            Err(limit) => return Ok(files::late(file, args.json, limit, files::WHILE_READ)),
+        };
+        let existence = existence::of(&content.problem, &files::left(&limits, start));
         let seconds = start.elapsed().as_secs_f64();
         let sizes = with_friction!(&content.problem, p => report::problem_json(file, p));
         let size_text = with_friction!(&content.problem, p => report::problem_text(p));
@@ -69,7 +83,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             all.extend(report::fields(json!(existence)));
             files::write_text("--certificate", path, &format!("{}\n", json!(all)))?;
         }
-        Ok(Exit::solved(matches!(existence, Existence::Proved { .. })))
+        Ok(Exit::solved(existence.is_proved()))
     }))
 }
 
@@ -77,14 +91,23 @@ pub fn run(args: &Args) -> Result<Exit, String> {
 pub fn fields(existence: &Existence, contacts: usize) -> Object {
     let pressed = |ray: &Impulses| ray.pressed(contacts);
     report::fields(match existence {
-        Existence::Proved { margin, shift, .. } => {
+        Existence::Proved { margin, .. } => {
+            json!({"verdict": existence.name(), "margin": margin})
+        }
+        Existence::Solved { .. } => json!({"verdict": existence.name()}),
+        Existence::NearlyProved { margin, shift, .. } => {
             json!({"verdict": existence.name(), "margin": margin, "shift": shift})
         }
         Existence::Weak { ray } | Existence::CriterionRefuted { ray } => {
             json!({"verdict": existence.name(), "pressed_contacts": pressed(ray)})
         }
-        Existence::NoSolution { certificate } => {
-            json!({"verdict": existence.name(), "pressed_contacts": pressed(certificate)})
+        Existence::NoSolution { proof } => {
+            let pressed = proof.certificate().impulses().map(pressed);
+            json!({"verdict": existence.name(), "pressed_contacts": pressed})
+        }
+        Existence::NearlyNoSolution { certificate, change } => {
+            let pressed = certificate.impulses().map(pressed);
+            json!({"verdict": existence.name(), "pressed_contacts": pressed, "change": change})
         }
         Existence::Unknown { why } => json!({"verdict": existence.name(), "why": why}),
     })
@@ -100,18 +123,30 @@ fn json(mut all: Object, existence: &Existence, contacts: usize, seconds: f64) -
 fn text(file: &Path, size: &str, existence: &Existence, contacts: usize, seconds: f64) -> String {
     let mut text = format!("{}: existence of a solution {existence}\n", file.display());
     row(&mut text, "problem", size);
+    let exactly = "in exact arithmetic";
+    let nearly = "up to rounding";
+    let of_motion = |unknowns: usize| format!("a motion of {unknowns} unknowns");
     let rests = match existence {
-        Existence::Proved { motion, .. } => {
-            let largest = motion.iter().fold(0.0_f64, |l, x| l.max(x.abs()));
-            Some(format!("a motion of {} unknowns, the largest {}", motion.len(), number(largest)))
+        Existence::Proved { motion, .. } => Some((of_motion(motion.0.len()), exactly)),
+        Existence::Solved { .. } => Some(("a solution in fractions".into(), exactly)),
+        Existence::NearlyProved { motion, .. } => Some((of_motion(motion.len()), nearly)),
+        Existence::Weak { ray } | Existence::CriterionRefuted { ray } => {
+            Some((squeezed(ray, contacts), nearly))
         }
-        Existence::Weak { ray: r }
-        | Existence::CriterionRefuted { ray: r }
-        | Existence::NoSolution { certificate: r } => Some(squeezed(r, contacts)),
+        Existence::NoSolution { proof } => Some((
+            match proof.certificate().impulses() {
+                Some(impulses) => squeezed(impulses, contacts),
+                None => report::count(proof.vectors(), "separating vector"),
+            },
+            exactly,
+        )),
+        Existence::NearlyNoSolution { certificate, .. } => {
+            certificate.impulses().map(|impulses| (squeezed(impulses, contacts), nearly))
+        }
         Existence::Unknown { .. } => None,
     };
-    if let Some(rests) = rests {
-        row(&mut text, "rests on", rests + ", verified in doubled precision");
+    if let Some((rests, how)) = rests {
+        row(&mut text, "rests on", format!("{rests}, verified {how}"));
     }
     row(&mut text, "time", format!("{seconds:.3} s"));
     text

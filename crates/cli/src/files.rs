@@ -3,9 +3,11 @@
 use std::collections::HashSet;
 use std::fs::{self, OpenOptions};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use nonsmooth_io::fclib::FclibFile;
-use nonsmooth_io::{Content, read_any};
+use nonsmooth_io::{Content, beside, read_any};
+use nonsmooth_solve::{Limit, Limits, Status, guard};
 use serde_json::json;
 
 use crate::{Exit, output};
@@ -31,9 +33,8 @@ pub fn each(
     worst
 }
 
-/// A file that must hold a frictional contact problem.
-pub fn contact_problem(file: &Path) -> Result<FclibFile, String> {
-    match read_any(file).map_err(|e| e.to_string())? {
+fn contact(file: &Path, content: Content) -> Result<FclibFile, String> {
+    match content {
         Content::Friction(content) => Ok(content),
         Content::Linear(_) => Err(format!(
             "{}: expected a frictional contact problem, found a linear complementarity problem",
@@ -61,6 +62,71 @@ pub fn time_limit(seconds: Option<f64>) -> Result<Option<f64>, String> {
     }
 }
 
+/// A size such as `500M` or `4G`, in bytes.
+pub fn size(text: &str) -> Result<u64, String> {
+    let expected = || "expected a size such as 500M or 4G".to_owned();
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit = match text[digits.len()..].trim_end_matches(['i', 'B']) {
+        "" => 1.0,
+        "k" | "K" => 1024.0,
+        "M" => 1024.0 * 1024.0,
+        "G" => 1024.0 * 1024.0 * 1024.0,
+        "T" => 1024.0 * 1024.0 * 1024.0 * 1024.0,
+        _ => return Err(expected()),
+    };
+    match digits.parse::<f64>().map_err(|_| expected())? * unit {
+        bytes if (1.0..1e18).contains(&bytes) => Ok(bytes as u64),
+        _ => Err(expected()),
+    }
+}
+
+/// Bytes of a file that are read in no time.
+const SHORT: u64 = 1 << 20;
+
+/// Reads a file of any kind within the limits; the limit if it came first.
+pub fn read_within(file: &Path, limits: &Limits) -> Result<Result<Content, Limit>, String> {
+    let length = fs::metadata(file).map_or(0, |m| m.len());
+    if length <= SHORT {
+        return read_any(file).map(Ok).map_err(|e| e.to_string());
+    }
+    let path = file.to_path_buf();
+    match guard::run(limits, || {}, move |_| read_any(path)) {
+        Ok(content) => content.map(Ok).map_err(|e| e.to_string()),
+        Err(limit) => Ok(Err(limit)),
+    }
+}
+
+/// As [`read_within`], of a file that must hold a frictional contact problem.
+pub fn contact_within(file: &Path, limits: &Limits) -> Result<Result<FclibFile, Limit>, String> {
+    Ok(match read_within(file, limits)? {
+        Ok(content) => Ok(contact(file, content)?),
+        Err(limit) => Err(limit),
+    })
+}
+
+/// When a limit came that came early.
+pub const WHILE_READ: &str = "while the file was read";
+
+/// Says that a limit came before there was anything else to say of a file.
+pub fn late(file: &Path, json: bool, limit: Limit, meanwhile: &str) -> Exit {
+    let status = Status::Limit(limit);
+    let message = format!("{status} {meanwhile}");
+    let name = file.to_string_lossy();
+    output::print(&if json {
+        let line = json!({"file": name, "status": status.name(), "message": message});
+        format!("{line}\n")
+    } else {
+        format!("{name}: {message}\n")
+    });
+    Exit::NotSolved
+}
+
+/// What is left of the limits of a file that was begun at `begun`.
+pub fn left(limits: &Limits, begun: Instant) -> Limits {
+    let spent = begun.elapsed().as_secs_f64();
+    Limits { time_limit: limits.time_limit.map(|t| (t - spent).max(0.0)), ..limits.clone() }
+}
+
 /// A picture's name says what the picture is.
 pub fn picture(option: &str, path: &Path) -> Result<(), String> {
     match path.extension() {
@@ -74,10 +140,11 @@ pub fn picture(option: &str, path: &Path) -> Result<(), String> {
 
 /// A tolerance on the relative residual.
 pub fn tolerance(tol: f64) -> Result<f64, String> {
-    if tol > 0.0 && tol.is_finite() {
+    // The residual of doing nothing is about 1: beyond, everything would pass.
+    if tol > 0.0 && tol <= 1.0 {
         Ok(tol)
     } else {
-        Err(format!("--tol: expected a positive number, found {tol:?}"))
+        Err(format!("--tol: expected a positive number of at most 1, found {tol:?}"))
     }
 }
 
@@ -175,12 +242,6 @@ pub fn write_text(option: &str, path: &Path, text: &str) -> Result<(), String> {
     written.map_err(|e| refusal(option, path, "a file that can be written", e))
 }
 
-/// A name of this process's own in the folder of a file; none if the path names no file.
-fn beside(path: &Path) -> Option<PathBuf> {
-    let name = path.file_name()?.to_string_lossy();
-    Some(path.with_file_name(format!(".{name}.{}.tmp", std::process::id())))
-}
-
 fn refusal(option: &str, path: &Path, expected: &str, cause: std::io::Error) -> String {
     let path = path.display();
     format!("{option} {path}: expected {expected}, found: {cause}")
@@ -201,6 +262,16 @@ pub fn same(a: &Path, b: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_have_units() {
+        assert_eq!(size("500M"), Ok(500 << 20));
+        assert_eq!(size("1.5GiB"), Ok(3 << 29));
+        assert_eq!((size("64k"), size("1000")), (Ok(64 << 10), Ok(1000)));
+        for text in ["", "G", "4X", "-4G", "0", "nan", "inf", "1e30"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+    }
 
     #[test]
     fn whole_numbers_are_integers_or_floats_without_fraction() {

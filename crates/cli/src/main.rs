@@ -5,6 +5,7 @@
 //! [`progress`], [`interrupt`] and [`plot`].
 
 mod bench;
+mod certificate;
 mod check;
 mod diagnose;
 mod exists;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// `1 contact`, `2 contacts`.
 pub use nonsmooth_bench::plural as count;
-use nonsmooth_problem::check::{Failing, Measure, Verdict};
+use nonsmooth_problem::check::{self, Failing, Measure, Verdict};
 use serde_json::{Map, Value, json};
 
 use crate::kinds::{Counts, Form};
@@ -39,8 +39,11 @@ pub fn problem_text<P: Form>(problem: &P) -> String {
 /// The residuals, what of them fails at `tolerance`, the contacts (or rows) by status and the worst of them. Numbers that
 /// are not finite become null.
 pub fn verdict_json<S, C: Counts>(verdict: &Verdict<S, C>, tolerance: f64, worst: usize) -> Object {
-    let mut counts = fields(json!(verdict.counts));
-    let degenerate = counts.remove("degenerate");
+    let mut counts = json!(verdict.counts);
+    let mut degenerate = counts.as_object_mut().and_then(|counts| counts.remove("degenerate"));
+    if uncounted(verdict) {
+        (counts, degenerate) = (Value::Null, None);
+    }
     let worst = worst_of(verdict, worst)
         .map(|(which, residual)| json!({(C::WHAT): which, "residual": residual}));
     fields(json!({
@@ -50,6 +53,26 @@ pub fn verdict_json<S, C: Counts>(verdict: &Verdict<S, C>, tolerance: f64, worst
         "degenerate": degenerate,
         (format!("worst_{}s", C::WHAT)): worst.collect::<Vec<_>>(),
     }))
+}
+
+/// A verdict without the status of each contact: the judge had no time to say it.
+pub fn unjudged<S, C: Counts>(
+    measure: Measure,
+    tolerance: f64,
+    velocity: Vec<f64>,
+) -> Verdict<S, C> {
+    Verdict {
+        measure,
+        solved: measure.passes(tolerance),
+        counts: C::default(),
+        statuses: vec![],
+        velocity,
+        worst: vec![],
+    }
+}
+
+fn uncounted<S, C: Counts>(verdict: &Verdict<S, C>) -> bool {
+    verdict.statuses.is_empty() && !verdict.velocity.is_empty()
 }
 
 /// The residuals by name.
@@ -108,8 +131,18 @@ pub fn verdict_text<S, C: Counts>(
     residual_text(text, &verdict.measure, C::UNIT);
     let (relative, others) = failing(&verdict.measure, tolerance);
     if !others.is_empty() {
-        let limit = |f: &Failing| format!(" (limit {:.1e})", f.limit).replace(".0e", "e");
+        let limit = |f: &Failing| {
+            let limit = format!("limit {:.1e}", f.limit).replace(".0e", "e");
+            match verdict.measure.own_contact.filter(|_| f.what == check::OWN) {
+                Some(c) => format!(" (contact {c}, {limit})"),
+                None => format!(" ({limit})"),
+            }
+        };
         row(text, "fails", listed(&others, limit));
+    }
+    if uncounted(verdict) {
+        let what = format!("{}s", C::WHAT);
+        return row(text, &what, "not counted: the limit had passed");
     }
     let counts = &verdict.counts;
     let degenerate = match counts.degenerate() {
@@ -137,7 +170,7 @@ fn residual_text(text: &mut String, m: &Measure, unit: &str) {
         ("primal", Some(m.primal)),
         ("dual", Some(m.dual)),
         ("complementarity", Some(m.complementarity)),
-        ("rows", m.rows),
+        ("own", m.own),
         ("dynamics", m.dynamics),
         ("velocities", m.velocity_gap),
         ("bilateral", m.bilateral),

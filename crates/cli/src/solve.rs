@@ -3,17 +3,20 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
+use nonsmooth_io::Content;
 use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
 use nonsmooth_io::linear::{self, LinearFile, LinearPoint};
-use nonsmooth_io::{Content, read_any};
-use nonsmooth_problem::check::{ContactStatus, Judged, StatusCounts, Verdict};
-use nonsmooth_problem::{Complementarity, Friction, Problem, with_complementarity, with_friction};
+use nonsmooth_problem::check::{ContactStatus, Judged, StatusCounts, Verdict, VerdictOf};
+use nonsmooth_problem::{
+    Complementarity, Friction, Problem, ProblemError, with_complementarity, with_friction,
+};
 use nonsmooth_solve::registry::{self, Registered, Solves};
 use nonsmooth_solve::settings::{self, SettingsMap};
 use nonsmooth_solve::trace::Trace;
-use nonsmooth_solve::{Limit, Limits, Outcome, Sample, SolveError, Status};
-use serde_json::json;
+use nonsmooth_solve::{Limit, Limits, Outcome, Sample, SolveError, Status, guard};
+use serde_json::{Value, json};
 
 use crate::kinds::{Class, Form, takes};
 use crate::progress::Bar;
@@ -43,9 +46,13 @@ pub struct Args {
     /// At most this many iterations [default: 1000000, or no limit with --time-limit]
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = files::whole)]
     max_iter: Option<usize>,
-    /// At most this many seconds for each file
+    /// At most this many seconds for each file, reading it included
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     time_limit: Option<f64>,
+    /// Memory that one factorisation may take, as 500M or 4G: a larger one is refused before it begins [default: what the
+    /// machine has free]
+    #[arg(long, value_name = "SIZE", value_parser = files::size)]
+    memory_limit: Option<u64>,
     /// Start from the file's /guesses/1 (linear complementarity: its [solution]) in place of zero; with =FILE from the
     /// solution of another file (or its /guesses/1) of the same size, with =DIRECTORY from the file of the same name there
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
@@ -64,6 +71,10 @@ pub struct Args {
     /// for several files
     #[arg(long, value_name = "FILE.json")]
     trace: Option<PathBuf>,
+    /// Where there is no solution: write the certificate (JSON), which `nonsmooth check FILE --certificate` verifies; a directory for
+    /// several files. A proof is written with the exact fractions that were verified
+    #[arg(long, value_name = "FILE.json")]
+    certificate: Option<PathBuf>,
     /// Print one line of JSON for each file in place of the report
     #[arg(long)]
     json: bool,
@@ -80,10 +91,12 @@ Examples:
   nonsmooth solve *.hdf5 --out solved/ --json > results.jsonl
   nonsmooth solve step2.hdf5 --warm-start=solved/step1.hdf5
   nonsmooth solve contact.toml --out solved.toml --trace pivots.json --plot pivots.svg
+  nonsmooth solve impossible.toml --certificate proof.json   # then: check impossible.toml --certificate proof.json
 
 Exit codes: 0 all solved; 1 some not solved; 2 some file or option at fault.";
 
 /// How to solve, whatever the problem.
+#[derive(Clone)]
 pub struct Plan<'a> {
     /// The solver's name.
     pub solver: &'a str,
@@ -118,6 +131,7 @@ type SolvedOf<P> = Solved<<P as Judged>::Status, <P as Judged>::Counts, <P as Fo
 pub fn run(args: &Args) -> Result<Exit, String> {
     let settings = settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))?;
     let mut limits = limits(args.tol, args.max_iter, args.time_limit)?;
+    limits.memory_limit = args.memory_limit;
     limits.trace = args.trace.is_some() || args.plot.is_some();
     let targets = Targets::new(args)?;
     let cancel = limits.cancel.clone().unwrap_or_default();
@@ -131,7 +145,13 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         }
         let targets = targets.of(k);
         let warm = args.warm_start.as_ref().map(Option::as_deref);
-        match read_any(file).map_err(|e| e.to_string())? {
+        let begun = Instant::now();
+        let content = match files::read_within(file, &plan.limits)? {
+            Ok(content) => content,
+            Err(limit) => return Ok(files::late(file, args.json, limit, files::WHILE_READ)),
+        };
+        let plan = Plan { limits: files::left(&plan.limits, begun), ..plan.clone() };
+        match content {
             Content::Friction(content) => {
                 let guess = match warm {
                     None => None,
@@ -247,6 +267,7 @@ pub fn limits(tol: f64, iterations: Option<usize>, seconds: Option<f64>) -> Resu
         },
         time_limit,
         cancel: Some(interrupt::flag()),
+        memory_limit: None,
         trace: false,
     })
 }
@@ -283,7 +304,13 @@ fn one<P: Form + Registered>(
     });
     let Solved { outcome, point, history, trace, .. } = solved;
     let is_solved = outcome.status == Status::Solved;
-    Ok(Done { report, point, history, trace, record, is_solved })
+    let proof = certificate(&outcome.status).map(|certificate| {
+        let mut all = report::problem_json(file, problem);
+        all.insert("status".into(), json!(outcome.status.name()));
+        all.insert("certificate".into(), certificate);
+        format!("{}\n", json!(all))
+    });
+    Ok(Done { report, point, history, trace, record, proof, is_solved })
 }
 
 /// What is left to print and to write of a solve.
@@ -294,6 +321,8 @@ struct Done<T> {
     trace: Trace,
     /// The trace as JSON, if asked for.
     record: Option<String>,
+    /// The certificate as JSON, where there is one.
+    proof: Option<String>,
     is_solved: bool,
 }
 
@@ -306,17 +335,21 @@ impl<T> Done<T> {
         targets: Target,
         write: impl FnOnce(&Path, T) -> Result<(), String>,
     ) -> Result<Exit, String> {
-        let Self { report, point, history, trace, record, is_solved } = self;
+        let Self { report, point, history, trace, record, proof, is_solved } = self;
         let pictures = || {
             if let Some(path) = targets.plot {
                 let title = format!("{} on {}", plan.solver, name(file));
                 let svg = plot::svg(&title, &history, &trace, plan.limits.tolerance)?;
                 files::write_text("--plot", path, &svg)?;
             }
-            match (targets.trace, record) {
-                (Some(path), Some(record)) => files::write_text("--trace", path, &record),
-                _ => Ok(()),
+            for (option, path, text) in
+                [("--trace", targets.trace, record), ("--certificate", targets.certificate, proof)]
+            {
+                if let (Some(path), Some(text)) = (path, text) {
+                    files::write_text(option, path, &text)?;
+                }
             }
+            Ok(())
         };
         // Files first: whoever reads the report may be gone. But a file that fails must not cost the report.
         let kept = targets.out.map_or(Ok(()), |path| write(path, point)).and_then(|()| pictures());
@@ -348,6 +381,7 @@ pub fn solve<P: Form + Registered>(
     start: Option<&P::Stored>,
     plan: &Plan,
 ) -> Result<SolvedOf<P>, String> {
+    let begun = Instant::now();
     let mistake = |e: &dyn std::fmt::Display| format!("{}: {e}", file.display());
     let session = registry::session::<P>(plan.solver, plan.settings);
     let mut session = session.map_err(|e| match (&e, takes(plan.solver)) {
@@ -363,7 +397,8 @@ pub fn solve<P: Form + Registered>(
         .solve(problem, &mut point, &plan.limits, &mut |p| bar.watch(p))
         .map_err(|e| mistake(&e))?;
     drop(bar);
-    let verdict = problem.judge(&point, plan.limits.tolerance).map_err(|e| mistake(&e))?;
+    let left = files::left(&plan.limits, begun);
+    let verdict = judged(problem, &point, &outcome, &left).map_err(|e| mistake(&e))?;
     Ok(Solved {
         outcome,
         point: problem.store(point, verdict.velocity.clone()),
@@ -374,8 +409,41 @@ pub fn solve<P: Form + Registered>(
     })
 }
 
+/// The judge's word on each contact, or on the point alone where the limits leave no time for more.
+fn judged<P: Form + Registered>(
+    problem: &P,
+    point: &P::Point,
+    outcome: &Outcome,
+    limits: &Limits,
+) -> Result<VerdictOf<P>, ProblemError> {
+    let tolerance = limits.tolerance;
+    let unlimited = limits.time_limit.is_none() && !limits.cancel.as_ref().is_some_and(cancelled);
+    if unlimited || problem.unknowns() <= guard::SMALL {
+        return problem.judge(point, tolerance);
+    }
+    let copy = (problem.clone(), point.clone());
+    match guard::run(limits, || {}, move |_| copy.0.judge(&copy.1, tolerance)) {
+        Ok(verdict) => verdict,
+        Err(_) => Ok(report::unjudged(outcome.measure, tolerance, problem.velocity(point))),
+    }
+}
+
 fn name(file: &Path) -> String {
     file.file_name().unwrap_or_default().to_string_lossy().into()
+}
+
+/// What the status rests on, if it says that there is no solution.
+fn certificate(status: &Status) -> Option<Value> {
+    match status {
+        Status::Infeasible(proof) => Some(json!(proof)),
+        Status::NoConclusion(certificate) => Some(json!(certificate)),
+        Status::NearlyInfeasible { certificate, change } => {
+            let mut all = report::fields(json!(certificate));
+            all.insert("change".into(), json!(change));
+            Some(Value::Object(all))
+        }
+        _ => None,
+    }
 }
 
 /// The worst contacts that a report of an unsolved problem lists.
@@ -394,8 +462,8 @@ fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &SolvedOf<P
         "seconds": outcome.seconds,
         "account": account,
     })));
-    if let Status::Infeasible(proof) | Status::NoConclusion(proof) = &outcome.status {
-        all.insert("certificate".into(), json!(proof));
+    if let Some(certificate) = certificate(&outcome.status) {
+        all.insert("certificate".into(), certificate);
     }
     all.extend(report::verdict_json(verdict, plan.limits.tolerance, verdict.worst.len()));
     format!("{}\n", json!(all))
@@ -496,7 +564,7 @@ fn hint<P: Form + Registered>(
             let t = plan.limits.time_limit.unwrap_or_default();
             vec![format!("--time-limit {}", (10.0 * t).max(1.0))]
         }
-        Status::NoConclusion(_) | Status::Stalled(_) => vec![],
+        Status::NearlyInfeasible { .. } | Status::NoConclusion(_) | Status::Stalled(_) => vec![],
     };
     // The default, then the first solver of each other family.
     let mut families = vec![about.family];
@@ -523,6 +591,7 @@ struct Targets {
     out: Option<Vec<PathBuf>>,
     plot: Option<Vec<PathBuf>>,
     trace: Option<Vec<PathBuf>>,
+    certificate: Option<Vec<PathBuf>>,
 }
 
 /// The output files for one input.
@@ -531,6 +600,7 @@ struct Target<'a> {
     out: Option<&'a Path>,
     plot: Option<&'a Path>,
     trace: Option<&'a Path>,
+    certificate: Option<&'a Path>,
 }
 
 impl Targets {
@@ -542,7 +612,10 @@ impl Targets {
         let out = place("--out", &args.out, None)?;
         let plot = place("--plot", &args.plot, Some("svg"))?;
         let trace = place("--trace", &args.trace, Some("trace.json"))?;
-        for (option, all) in [("--plot", &plot), ("--trace", &trace)] {
+        let certificate = place("--certificate", &args.certificate, Some("certificate.json"))?;
+        for (option, all) in
+            [("--plot", &plot), ("--trace", &trace), ("--certificate", &certificate)]
+        {
             for path in all.iter().flatten() {
                 if option == "--plot" {
                     files::picture(option, path)?;
@@ -563,14 +636,19 @@ impl Targets {
                 "--trace {path}: expected a file of its own, found that of --plot"
             ));
         }
-        Ok(Self { out, plot, trace })
+        Ok(Self { out, plot, trace, certificate })
     }
 
     fn of(&self, k: usize) -> Target<'_> {
         fn path(all: &Option<Vec<PathBuf>>, k: usize) -> Option<&Path> {
             Some(all.as_ref()?.get(k)?.as_path())
         }
-        Target { out: path(&self.out, k), plot: path(&self.plot, k), trace: path(&self.trace, k) }
+        Target {
+            out: path(&self.out, k),
+            plot: path(&self.plot, k),
+            trace: path(&self.trace, k),
+            certificate: path(&self.certificate, k),
+        }
     }
 }
 

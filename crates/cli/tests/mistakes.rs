@@ -55,6 +55,7 @@ fn bad_options_of_solve() {
         ("wall.hdf5 --tol 0", &["--tol", "positive"]),
         ("wall.hdf5 --tol NaN", &["--tol", "NaN"]),
         ("wall.hdf5 --tol inf", &["--tol", "inf"]),
+        ("wall.hdf5 --tol 1.5", &["--tol", "at most 1", "1.5"]),
         ("wall.hdf5 --time-limit -1", &["--time-limit", "at least 0", "-1"]),
         ("wall.hdf5 --time-limit nan", &["--time-limit", "NaN"]),
         ("wall.hdf5 --solver tresca --set anderson=99999999999", &["anderson", "at most 50"]),

@@ -88,7 +88,7 @@ fn format(path: &Path) -> Result<Option<Format>, IoError> {
         return Ok(Some(format));
     }
     let bytes = glance(path)?;
-    if hdf5_pure::is_hdf5_bytes(&bytes) {
+    if crate::hdf5::is_hdf5(&bytes) {
         return Ok(Some(Format::Fclib));
     }
     if bytes.starts_with(MARKET) {

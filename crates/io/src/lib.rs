@@ -9,8 +9,10 @@
 mod any;
 mod error;
 pub mod fclib;
+mod hdf5;
 pub mod linear;
 mod replace;
 
 pub use any::{Content, holds_problem, parts, read_any};
 pub use error::IoError;
+pub use replace::beside;

@@ -17,7 +17,7 @@ fn read(path: &Path, bytes: &[u8]) -> Option<String> {
     });
     let message = result.err()?.to_string();
     assert!(!message.contains('\n') && message.starts_with(path.to_str().unwrap()), "{message}");
-    assert!(!message.contains("stopped the HDF5 reader"), "a panic inside: {message}");
+    assert!(!message.contains("stopped the HDF5 editor"), "a panic inside: {message}");
     Some(message)
 }
 
@@ -71,6 +71,49 @@ fn flipped_bytes_never_panic() {
                 damaged[any(bytes.len())] = byte;
             }
             read(&path, &damaged);
+        }
+    }
+}
+
+/// Says in place of a number that it is another, wherever it stands in 64 bits.
+fn claim(bytes: &[u8], is: u64, claimed: u64) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    for k in 0..bytes.len() - 8 {
+        if bytes[k..k + 8] == is.to_le_bytes() {
+            bytes[k..k + 8].copy_from_slice(&claimed.to_le_bytes());
+        }
+    }
+    bytes
+}
+
+#[test]
+fn sizes_that_a_file_cannot_hold_are_refused() {
+    // Old headers, which have no checksums: one dataset of 77 entries, then told that it has more.
+    const MAKE: &str = r#"
+import sys, h5py, numpy as np
+with h5py.File(sys.argv[1], 'w', libver=('earliest', 'v108')) as f:
+    g = f.create_group('fclib_local')
+    g['spacedim'] = np.array([2], 'i4')
+    options = dict(chunks=(77,), compression='gzip', maxshape=(None,)) if sys.argv[2] == 'chunks' else {}
+    g.create_dataset('vectors/mu', data=np.zeros(77), **options)
+"#;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("claims.hdf5");
+    for kind in ["plain", "chunks"] {
+        let made =
+            std::process::Command::new("python3").args(["-c", MAKE]).arg(&path).arg(kind).output();
+        if !made.is_ok_and(|o| o.status.success()) {
+            common::skipped("python3 with h5py is not here");
+            return;
+        }
+        let bytes = std::fs::read(&path).unwrap();
+        for claimed in [1 << 60, 1 << 40, 1 << 33, u64::MAX - 1] {
+            let bytes = claim(&bytes, 77, claimed);
+            let message = fclib::read_bytes("x", &bytes).unwrap_err().to_string();
+            let expected = format!("data that fit in the {} bytes of the file", bytes.len());
+            let found = format!("shape [{claimed}] of 8 bytes each");
+            let place = "x: /fclib_local/vectors/mu";
+            assert_eq!(message, format!("{place}: expected {expected}, found {found}"), "{kind}");
         }
     }
 }

@@ -298,17 +298,14 @@ fn missing_parts_are_named() {
 #[test]
 fn wrong_types_are_named() {
     let with = |path: &str, data| local_tree().set(&format!("fclib_local/{path}"), data);
-    refused(
-        &with("W/i", Data::Text("0")),
-        "/fclib_local/W/i: expected integers, found vlen_string",
-    );
+    refused(&with("W/i", Data::Text("0")), "/fclib_local/W/i: expected integers, found a text");
     refused(
         &with("vectors/q", Data::Text("0")),
-        "/fclib_local/vectors/q: expected reals, found vlen_string",
+        "/fclib_local/vectors/q: expected reals, found a text",
     );
     refused(
         &with("spacedim", Data::Text("2")),
-        "/fclib_local/spacedim: expected integers, found vlen_string",
+        "/fclib_local/spacedim: expected integers, found a text",
     );
     refused(
         &with("spacedim", Data::I(vec![2, 2])),
@@ -316,7 +313,7 @@ fn wrong_types_are_named() {
     );
     refused(
         &with("info/title", Data::F(vec![0.0])),
-        "/fclib_local/info/title: expected a text, found f64",
+        "/fclib_local/info/title: expected a text, found reals",
     );
 }
 

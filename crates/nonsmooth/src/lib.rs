@@ -42,8 +42,8 @@
 //! let mut point = problem.origin();
 //! let outcome = session::<Lcp>("auto", &Default::default())?
 //!     .solve(&problem, &mut point, &Limits::default(), &mut |_| {})?;
-//! let Status::Infeasible(certificate) = outcome.status else { panic!("{}", outcome.status) };
-//! assert!(problem.verify(&certificate)); // by the problem's own judge, from M and q alone
+//! let Status::Infeasible(proof) = outcome.status else { panic!("{}", outcome.status) };
+//! assert!(problem.verify(proof.certificate())); // by the problem's own judge, from M and q alone, in exact arithmetic
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

@@ -62,7 +62,7 @@ const SOLVE: Floors = Floors {
         &["cfun"],
         &["form"],
         &["local", "parts", "solver", "reform"],
-        &["drive", "via", "existence"],
+        &["drive", "via", "existence", "guard"],
         &[],
         &["registry", "diagnose"],
     ],

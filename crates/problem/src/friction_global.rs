@@ -1,8 +1,8 @@
 //! The global (mixed linear) frictional contact problem.
 
-use crate::check::{self, Certificate, Impulses, Measure};
+use crate::check::{self, Certificate, ConeSystem, Evidence, Impulses, Measure};
 use crate::error::{all_finite, friction_coefficients, vector};
-use crate::linalg::{Csc, Inverse, Refine};
+use crate::linalg::{Compensated, Csc, Inverse, Refine};
 use crate::{Kind, Problem, ProblemError};
 
 /// **Find** `v`, `r` (and the multipliers `lambda` of bilateral constraints) such that
@@ -186,6 +186,31 @@ impl Dynamics {
         self.state.split_at(problem.dofs())
     }
 
+    /// The velocities and multipliers for the impulses `r` in doubled precision: `high + low`, each n + p, and in `last` what is
+    /// not known of them ([`Inverse::solve_doubled`]).
+    pub fn solve_doubled<const D: usize>(
+        &mut self,
+        problem: &FrictionGlobal<D>,
+        r: &[f64],
+        [high, low, last]: [&mut [f64]; 3],
+    ) {
+        // H r + f and −b, each one sum in doubled precision.
+        let n = problem.dofs();
+        high[..n].copy_from_slice(&problem.f);
+        let b = problem.bilateral.iter().flat_map(|b| &b.b);
+        high[n..].iter_mut().zip(b).for_each(|(high, b)| *high = -b);
+        low.fill(0.0);
+        for (j, &rj) in r.iter().enumerate() {
+            let (rows, values) = problem.H.column(j);
+            for (&i, &v) in rows.iter().zip(values) {
+                let mut sum = Compensated::parts(high[i], low[i]);
+                sum.add_product(v, rj);
+                (high[i], low[i]) = sum.into_parts();
+            }
+        }
+        self.inverse.solve_doubled(high, low, last, &mut self.scratch);
+    }
+
     /// The change of velocity `M⁻¹ H r` that the impulses alone bring about, the constraints kept.
     pub fn respond<const D: usize>(
         &mut self,
@@ -232,7 +257,7 @@ impl Dynamics {
         self.inverse.null_direction(&mut residual);
         let multipliers = residual.split_off(problem.dofs());
         let r = vec![0.0; problem.w.len()];
-        Impulses::toward(r, multipliers, &[], &b.b, |c| check::refutes_global(problem, c))
+        Impulses::toward(r, multipliers, &[], &b.b, |c| check::holds(problem, c))
     }
 }
 
@@ -284,7 +309,17 @@ impl<const D: usize> Problem for FrictionGlobal<D> {
         gauge.measure(self, point, true)
     }
 
-    fn verify(&self, certificate: &Certificate) -> bool {
-        certificate.impulses().is_some_and(|i| check::refutes_global(self, i))
+    fn evidence(&self, certificate: &Certificate) -> Evidence {
+        check::weigh(self, certificate)
+    }
+
+    fn cones(&self) -> Option<ConeSystem> {
+        check::Exactly::system(self, None)
+    }
+
+    fn assembled(&self, unknowns: &[f64]) -> Self::Point {
+        let (v, rest) = unknowns.split_at(self.dofs());
+        let (r, lambda) = rest.split_at(self.w.len());
+        GlobalPoint { v: v.to_vec(), r: r.to_vec(), lambda: lambda.to_vec() }
     }
 }

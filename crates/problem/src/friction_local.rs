@@ -1,6 +1,6 @@
 //! The local (Delassus) frictional contact problem.
 
-use crate::check::{self, Certificate, Measure};
+use crate::check::{self, Certificate, ConeSystem, Evidence, Measure};
 use crate::error::{all_finite, friction_coefficients, vector};
 use crate::linalg::{Bsr, Csc};
 use crate::{Kind, Problem, ProblemError};
@@ -186,7 +186,16 @@ impl<const D: usize> Problem for FrictionLocal<D> {
         gauge.measure(self, point, true)
     }
 
-    fn verify(&self, certificate: &Certificate) -> bool {
-        certificate.impulses().is_some_and(|i| check::refutes_local(self, i))
+    fn evidence(&self, certificate: &Certificate) -> Evidence {
+        check::weigh(self, certificate)
+    }
+
+    fn cones(&self) -> Option<ConeSystem> {
+        check::Exactly::system(self, None)
+    }
+
+    fn assembled(&self, unknowns: &[f64]) -> Self::Point {
+        let (r, lambda) = unknowns.split_at(self.q.len());
+        LocalPoint { r: r.to_vec(), lambda: lambda.to_vec() }
     }
 }

@@ -1,7 +1,7 @@
 //! What every kind of problem offers to the loop that drives the solvers.
 
 use crate::ProblemError;
-use crate::check::{Certificate, Measure};
+use crate::check::{Certificate, ConeSystem, Evidence, Measure};
 
 /// The kinds of problem, by the name that files, reports and the registry use.
 #[derive(
@@ -105,6 +105,24 @@ pub trait Problem {
     /// The residuals of `point` with all products in doubled precision: to decide by. Allocates nothing.
     fn certify(&self, point: &Self::Point, gauge: &mut Self::Gauge) -> Measure;
 
-    /// Whether `certificate` proves that the problem has no solution, decided from the data alone.
-    fn verify(&self, certificate: &Certificate) -> bool;
+    /// Puts `point`, the one last measured with `gauge`, exactly where it is but for rounding: variables on the bounds that they are nearer to, in the judge's
+    /// units, than their partners are to zero; `boldly`, also what is below rounding in units of the whole problem. Says whether that changed it; by default nothing
+    /// does. The result is a candidate, to be measured in its turn. Allocates nothing.
+    fn tidy(&self, _point: &mut Self::Point, _gauge: &mut Self::Gauge, _boldly: bool) -> bool {
+        false
+    }
+
+    /// What `certificate`, which claims that the problem has no solution, is worth: decided from the data alone, in exact arithmetic.
+    fn evidence(&self, certificate: &Certificate) -> Evidence;
+
+    /// Whether `certificate` proves that the problem has no solution.
+    fn verify(&self, certificate: &Certificate) -> bool {
+        matches!(self.evidence(certificate), Evidence::Proved(_))
+    }
+
+    /// The problem in exact numbers; `None` where its matrix is known by its products only.
+    fn cones(&self) -> Option<ConeSystem>;
+
+    /// The point with these unknowns, in the order of [`ConeSystem::unknowns`].
+    fn assembled(&self, unknowns: &[f64]) -> Self::Point;
 }

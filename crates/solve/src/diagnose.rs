@@ -2,8 +2,9 @@
 //! named by the registry.
 
 use std::borrow::Cow;
+use std::time::Instant;
 
-use nonsmooth_problem::check::Existence;
+use nonsmooth_problem::check::{Existence, Impulses};
 use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse, norm, small};
 use nonsmooth_problem::traits::{Spectrum, Traits, rank};
 use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, with_friction};
@@ -11,7 +12,7 @@ use serde::Serialize;
 
 use crate::form::{Access, Linear};
 use crate::registry::{self, Registered};
-use crate::{Limits, existence};
+use crate::{Limit, Limits, existence, guard};
 
 /// One thing worth knowing of a problem.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -42,16 +43,66 @@ pub struct Diagnosis {
 pub struct Effort {
     /// The most rows for which the singular values of W are computed.
     pub spectrum_limit: usize,
-    /// Limits of the question of existence.
+    /// Limits of it all: half of the time for singular values, most of the rest for the question of existence.
     pub limits: Limits,
 }
 
 /// Explains a problem. `dofs` are the degrees of freedom that a local problem was condensed from, if known.
-pub fn diagnose(problem: &Friction, dofs: Option<usize>, effort: &Effort) -> Diagnosis {
-    let traits = Traits::of(problem, dofs);
-    let spectrum = Spectrum::of(problem, effort.spectrum_limit).ok();
-    let existence = existence::of(problem, &effort.limits);
-    with_friction!(problem, p => Patient { problem: p, traits, spectrum, existence }.diagnose())
+///
+/// Errors: the limit that came before there was anything to say.
+pub fn diagnose(
+    problem: &Friction,
+    dofs: Option<usize>,
+    effort: &Effort,
+) -> Result<Diagnosis, Limit> {
+    let copy = (problem.clone(), effort.spectrum_limit);
+    guard::run(&effort.limits, || {}, move |limits| {
+        let (problem, rows) = copy;
+        let begun = Instant::now();
+        let scope = limits.budget(begun).enter();
+        let traits = Traits::of(&problem, dofs);
+        let spectrum = spectrum(&problem, rows, &part(limits, begun, 0.5)).ok();
+        let existence = existence::of(&problem, &part(limits, begun, 0.8));
+        let found =
+            with_friction!(&problem, p => Patient { problem: p, traits, spectrum, existence }.diagnose());
+        match limits.reached(begun) {
+            Some(limit) if scope.raised() => Err(limit),
+            _ => Ok(found),
+        }
+    })
+    .and_then(|found| found)
+}
+
+/// A share of what is left of the time.
+fn part(limits: &Limits, begun: Instant, share: f64) -> Limits {
+    let spent = begun.elapsed().as_secs_f64();
+    let time_limit = limits.time_limit.map(|t| share * (t - spent).max(0.0));
+    Limits { time_limit, ..limits.clone() }
+}
+
+/// The singular values of W within the limits of time and memory, up to so many rows.
+///
+/// Errors: why there are none, in words.
+pub fn spectrum(problem: &Friction, rows: usize, limits: &Limits) -> Result<Spectrum, String> {
+    let copy = problem.clone();
+    let found = guard::run(
+        limits,
+        || {},
+        move |limits| {
+            let begun = Instant::now();
+            let scope = limits.budget(begun).enter();
+            let found = Spectrum::of(&copy, rows);
+            match limits.reached(begun) {
+                Some(limit) if scope.raised() => Err(limit),
+                _ => Ok(found),
+            }
+        },
+    );
+    match found.and_then(|found| found) {
+        Ok(found) => found.map_err(|e| e.to_string()),
+        Err(Limit::Cancelled) => Err("it was cancelled".into()),
+        Err(_) => Err("the time limit came first".into()),
+    }
 }
 
 /// What a diagnosis needs of a kind of problem.
@@ -378,21 +429,40 @@ impl<P: Seen<D> + Registered, const D: usize> Patient<'_, P, D> {
         })
     }
 
+    /// Where bodies are forced into each other.
+    fn squeezed(&self, impulses: Option<&Impulses>) -> String {
+        let Some(impulses) = impulses else {
+            return "Look at the matrix and the given velocities: no choice of open, sticking and sliding contacts satisfies them.".into();
+        };
+        let pressed = impulses.pressed(self.traits.contacts);
+        let shown: Vec<_> = pressed.iter().take(6).map(usize::to_string).collect();
+        let more = if pressed.len() > shown.len() { ", ..." } else { "" };
+        format!(
+            "Look at the given velocities w at contacts {}{more}: they press rigid bodies into each other.",
+            shown.join(", ")
+        )
+    }
+
     fn existence(&self) -> Finding {
         let says = self.existence.to_string();
         match &self.existence {
-            Existence::Proved { .. } => {
+            Existence::Proved { .. } | Existence::Solved { .. } => {
                 easy("existence", says, "A solver that fails has failed; the problem is sound.")
             }
-            Existence::NoSolution { certificate } => {
-                let pressed = certificate.pressed(self.traits.contacts);
-                let shown: Vec<_> = pressed.iter().take(6).map(usize::to_string).collect();
-                let more = if pressed.len() > shown.len() { ", ..." } else { "" };
-                let mean = format!(
-                    "No solver can succeed. Look at the given velocities w at contacts {}{more}: they press rigid bodies into each other.",
-                    shown.join(", ")
-                );
-                hard("existence", says, &mean, vec![])
+            Existence::NearlyProved { .. } => easy(
+                "existence",
+                says,
+                "A solver that fails has most likely failed; the problem is sound but for rounding.",
+            ),
+            Existence::NearlyNoSolution { certificate, .. } => hard(
+                "existence",
+                says,
+                &self.squeezed(certificate.impulses()),
+                of_families::<P>(ANY),
+            ),
+            Existence::NoSolution { proof } => {
+                let mean = self.squeezed(proof.certificate().impulses());
+                hard("existence", says, &format!("No solver can succeed. {mean}"), vec![])
             }
             Existence::Weak { .. } | Existence::CriterionRefuted { .. } => hard(
                 "existence",
@@ -420,6 +490,7 @@ mod tests {
 
     fn of(problem: Friction) -> Diagnosis {
         diagnose(&problem, None, &Effort { spectrum_limit: 500, limits: Limits::default() })
+            .unwrap()
     }
 
     fn says<'a>(diagnosis: &'a Diagnosis, about: &str) -> Option<&'a Finding> {

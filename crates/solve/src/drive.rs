@@ -3,15 +3,16 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use cpu_time::ProcessTime;
 use nonsmooth_problem::Problem;
-use nonsmooth_problem::check::{Certificate, Measure};
+use nonsmooth_problem::check::{Certificate, Evidence, Measure, Proof};
+use nonsmooth_problem::linalg::budget::{Budget, Scope};
 use nonsmooth_problem::linalg::factorisations;
 
 use crate::trace::Trace;
-use crate::{SolveError, Solver, Step};
+use crate::{SolveError, Solver, Step, guard};
 
 /// When to stop.
 #[derive(Debug, Clone)]
@@ -21,10 +22,13 @@ pub struct Limits {
     pub tolerance: f64,
     /// At most this many steps.
     pub max_iterations: usize,
-    /// At most this many seconds of wall clock, set-up of the workspace included. Tested after every step.
+    /// At most this many seconds of wall clock, the preparation of judge and workspace included. Looked at after every step and inside long ones; what
+    /// cannot be interrupted is given up (see [`guard`](crate::guard)).
     pub time_limit: Option<f64>,
-    /// Set to true from anywhere to stop after the current step.
+    /// Set to true from anywhere to stop, as promptly as at the time limit.
     pub cancel: Option<Arc<AtomicBool>>,
+    /// The bytes of memory that one factorisation may take: a larger one is refused before it begins. Without a number, what the machine has free.
+    pub memory_limit: Option<u64>,
     /// Whether to keep the method's own record of its iterations ([`Session::trace`]); it grows with their number.
     pub trace: bool,
 }
@@ -36,17 +40,42 @@ impl Default for Limits {
             max_iterations: 1_000_000,
             time_limit: None,
             cancel: None,
+            memory_limit: None,
             trace: false,
         }
     }
 }
 
 impl Limits {
-    fn validate(&self) -> Result<(), SolveError> {
-        if !(self.tolerance > 0.0 && self.tolerance.is_finite()) {
+    /// What kernels look at, if the clock runs from `begun`.
+    pub(crate) fn budget(&self, begun: Instant) -> Budget {
+        // A limit beyond the reach of the clock is none.
+        let deadline = |t: f64| begun.checked_add(Duration::try_from_secs_f64(t).ok()?);
+        Budget {
+            deadline: self.time_limit.and_then(deadline),
+            cancel: self.cancel.clone(),
+            memory: self.memory_limit,
+        }
+    }
+
+    /// Which of the limits that come from outside is reached, if the clock runs from `begun`.
+    pub(crate) fn reached(&self, begun: Instant) -> Option<Limit> {
+        let late = |t: f64| begun.elapsed().as_secs_f64() >= t;
+        if self.cancel.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+            Some(Limit::Cancelled)
+        } else if self.time_limit.is_some_and(late) {
+            Some(Limit::Time)
+        } else {
+            None
+        }
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), SolveError> {
+        // The residual of doing nothing is about 1: beyond, everything would pass.
+        if !(self.tolerance > 0.0 && self.tolerance <= 1.0) {
             return Err(SolveError::Limits {
                 name: "tolerance",
-                expected: "a positive finite number",
+                expected: "a positive number of at most 1",
                 found: self.tolerance.to_string(),
             });
         }
@@ -66,8 +95,15 @@ impl Limits {
 pub enum Status {
     /// The judge accepts the point at the tolerance asked for.
     Solved,
-    /// There is no solution; the judge has verified the certificate.
-    Infeasible(Certificate),
+    /// There is no solution: proved, in exact arithmetic on the stored data.
+    Infeasible(Proof),
+    /// There is no solution for data that differ from those stored by rounding; nothing is known of the problem as stored.
+    NearlyInfeasible {
+        /// What holds nearly.
+        certificate: Certificate,
+        /// The relative change of the data that makes it true.
+        change: f64,
+    },
     /// The solver ended on a ray that the judge does not accept as a proof.
     NoConclusion(Certificate),
     /// A limit came first.
@@ -88,11 +124,29 @@ pub enum Limit {
 }
 
 impl Status {
-    /// A short name: `solved`, `infeasible`, `no_conclusion`, `iteration_limit`, `time_limit`, `cancelled`, `stalled`.
+    /// What the status rests on, where it is about there being no solution.
+    pub fn certificate(&self) -> Option<&Certificate> {
+        match self {
+            Status::Infeasible(proof) => Some(proof.certificate()),
+            Status::NearlyInfeasible { certificate, .. } | Status::NoConclusion(certificate) => {
+                Some(certificate)
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether it says that there is no solution, proved or up to rounding.
+    pub fn refutes(&self) -> bool {
+        matches!(self, Status::Infeasible(_) | Status::NearlyInfeasible { .. })
+    }
+
+    /// A short name: `solved`, `infeasible`, `nearly_infeasible`, `no_conclusion`, `iteration_limit`,
+    /// `time_limit`, `cancelled`, `stalled`.
     pub fn name(&self) -> &'static str {
         match self {
             Status::Solved => "solved",
             Status::Infeasible(_) => "infeasible",
+            Status::NearlyInfeasible { .. } => "nearly_infeasible",
             Status::NoConclusion(_) => "no_conclusion",
             Status::Limit(Limit::Iterations) => "iteration_limit",
             Status::Limit(Limit::Time) => "time_limit",
@@ -106,9 +160,13 @@ impl std::fmt::Display for Status {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Status::Solved => f.write_str("solved"),
-            Status::Infeasible(certificate) => {
-                write!(f, "infeasible: {certificate}, with a verified certificate")
+            Status::Infeasible(proof) => {
+                write!(f, "infeasible: {proof}; proved in exact arithmetic")
             }
+            Status::NearlyInfeasible { certificate, change } => write!(
+                f,
+                "not solved, nearly infeasible: {certificate}, up to rounding: a relative change of the data by {change:.0e} would make it so"
+            ),
             Status::NoConclusion(_) => {
                 f.write_str("no conclusion: the solver ended on a ray that proves nothing")
             }
@@ -152,18 +210,51 @@ pub struct Sample {
 /// What a solve uses up, from the preparation of the workspace on.
 #[derive(Debug, Clone, Copy)]
 struct Meter {
+    /// When the solve was asked for: limits count from here, with the judge's preparation.
+    begun: Instant,
     wall: Instant,
     cpu: ProcessTime,
     factorisations: u64,
 }
 
 impl Meter {
-    fn start() -> Self {
-        Self { wall: Instant::now(), cpu: ProcessTime::now(), factorisations: factorisations() }
+    fn start(begun: Instant) -> Self {
+        let (wall, cpu) = (Instant::now(), ProcessTime::now());
+        Self { begun, wall, cpu, factorisations: factorisations() }
     }
 
     fn seconds(&self) -> f64 {
         self.wall.elapsed().as_secs_f64()
+    }
+
+    /// What a failure of the preparation comes to: where a limit was reached, a preparation that was cut short proves nothing of the problem.
+    fn ended(
+        &self,
+        measure: Measure,
+        limits: &Limits,
+        scope: &Scope,
+        error: SolveError,
+    ) -> Result<Outcome, SolveError> {
+        let inapplicable = error.is_inapplicable();
+        match (raised(scope), scope.refused()) {
+            (Some(limit), _) if inapplicable => {
+                let limit = limits.reached(self.begun).unwrap_or(limit);
+                Ok(self.outcome(Status::Limit(limit), measure, 0))
+            }
+            (_, Some(refused)) if inapplicable => Err(refused.into()),
+            _ => Err(error),
+        }
+    }
+
+    fn outcome(&self, status: Status, measure: Measure, iterations: usize) -> Outcome {
+        Outcome {
+            status,
+            measure,
+            iterations,
+            factorisations: factorisations() - self.factorisations,
+            seconds: self.seconds(),
+            cpu_seconds: self.cpu.elapsed().as_secs_f64(),
+        }
     }
 }
 
@@ -180,17 +271,52 @@ pub struct Progress {
     pub seconds: f64,
 }
 
+/// Who follows a solve from outside.
+pub trait Observer<P: Problem> {
+    /// Called after every step.
+    fn step(&mut self, progress: &Progress);
+
+    /// Whether [`best`](Self::best) is to be called, which costs a judgement of the start.
+    fn keeps_best(&self) -> bool {
+        false
+    }
+
+    /// Called with each point that would be returned if the solve stopped now.
+    fn best(&mut self, _point: &P::Point, _measure: &Measure) {}
+}
+
+/// An observer of steps alone.
+struct Steps<'a>(&'a mut dyn FnMut(&Progress));
+
+impl<P: Problem> Observer<P> for Steps<'_> {
+    fn step(&mut self, progress: &Progress) {
+        (self.0)(progress);
+    }
+}
+
 /// A solver whose type is forgotten: what the registry hands out. One virtual call per solve, none per step.
 pub trait Session<P: Problem>: Send {
     /// Solves `problem` from `point`, which is overwritten with the best point found whatever stops the solve.
     ///
-    /// `watch` is called after every step. Errors are the caller's mistakes only.
+    /// `watch` is called after every step, but for a large problem with a limit on time or a flag to cancel: then now and then. Errors are the
+    /// caller's mistakes only.
     fn solve(
         &mut self,
         problem: &P,
         point: &mut P::Point,
         limits: &Limits,
         watch: &mut dyn FnMut(&Progress),
+    ) -> Result<Outcome, SolveError> {
+        self.observe(problem, point, limits, &mut Steps(watch))
+    }
+
+    /// As [`solve`](Self::solve), with an observer who may also see the best point so far.
+    fn observe(
+        &mut self,
+        problem: &P,
+        point: &mut P::Point,
+        limits: &Limits,
+        observer: &mut dyn Observer<P>,
     ) -> Result<Outcome, SolveError>;
 
     /// The judge's visits during the last solve, thinned evenly where there were very many.
@@ -217,6 +343,9 @@ struct Kept<P: Problem, S: Solver<P>> {
     work: S::Work,
     gauge: P::Gauge,
     best: P::Point,
+    tidied: P::Point,
+    /// A limit was reached inside a kernel, which left something unfinished.
+    torn: bool,
 }
 
 impl<P: Problem, S: Solver<P>> Driver<P, S> {
@@ -232,44 +361,73 @@ impl<P: Problem, S: Solver<P>> Driver<P, S> {
 }
 
 impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
-    fn solve(
+    fn observe(
         &mut self,
         problem: &P,
         point: &mut P::Point,
         limits: &Limits,
-        watch: &mut dyn FnMut(&Progress),
+        observer: &mut dyn Observer<P>,
     ) -> Result<Outcome, SolveError> {
+        let begun = Instant::now();
         limits.validate()?;
         problem.validate_point(point)?;
+        let scope = limits.budget(begun).enter();
         let Self { solver, kept, history } = self;
+        history.clear();
+        // What was cut short in a kernel is begun anew.
+        let earlier = kept.take().filter(|k| !k.torn);
         // The judge's own preparation is not part of the solve's time.
-        let mut kept_now = match kept.take() {
-            Some(mut k) => {
-                problem.regauge(&mut k.gauge)?;
-                let meter = Meter::start();
-                solver.refill(problem, &mut k.work)?;
-                (k, meter)
+        let (gauge, earlier) = match earlier {
+            Some(Kept { work, mut gauge, best, tidied, .. }) => {
+                (problem.regauge(&mut gauge).map(|()| gauge), Some((work, best, tidied)))
             }
-            None => {
-                let gauge = problem.gauge()?;
-                let meter = Meter::start();
-                let work = solver.work(problem)?;
-                (Kept { work, gauge, best: point.clone() }, meter)
+            None => (problem.gauge(), None),
+        };
+        let meter = Meter::start(begun);
+        let mut gauge = match gauge {
+            Ok(gauge) => gauge,
+            Err(e) => return meter.ended(Measure::unknown(), limits, &scope, e.into()),
+        };
+        // Whatever happens in the preparation, there is a judged point.
+        let start = observer.keeps_best().then(|| {
+            let measure = problem.measure(point, &mut gauge);
+            observer.best(point, &measure);
+            measure
+        });
+        let (work, best, tidied) = match earlier {
+            Some((mut work, best, tidied)) => {
+                (solver.refill(problem, &mut work).map(|()| work), best, tidied)
+            }
+            None => (solver.work(problem), point.clone(), point.clone()),
+        };
+        let work = match work {
+            Ok(work) => work,
+            Err(e) => {
+                let measure = match start {
+                    Some(measure) => measure,
+                    None if scope.raised() => problem.measure(point, &mut gauge),
+                    None => Measure::unknown(),
+                };
+                return meter.ended(measure, limits, &scope, e);
             }
         };
+        let mut now = Kept { work, gauge, best, tidied, torn: false };
         let outcome = {
-            let (Kept { work, gauge, best }, meter) = &mut kept_now;
+            let Kept { work, gauge, best, tidied, .. } = &mut now;
             P::copy_point(point, best);
             let mut run = Run {
                 problem,
                 solver,
                 work,
-                judge: Judge::new(gauge, best, history, *meter, solver.latest()),
+                judge: Judge::new(gauge, best, tidied, history, meter, solver.latest()),
                 limits,
+                scope: &scope,
+                observer,
             };
-            run.solve(point, watch)
+            run.solve(point)
         };
-        *kept = Some(kept_now.0);
+        now.torn = scope.raised();
+        *kept = Some(now);
         Ok(outcome)
     }
 
@@ -286,16 +444,28 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
     }
 }
 
+/// The limit at which a kernel was cut short, if one was.
+fn raised(scope: &Scope) -> Option<Limit> {
+    let limit = || if scope.cancelled() { Limit::Cancelled } else { Limit::Time };
+    scope.raised().then(limit)
+}
+
 struct Run<'a, P: Problem, S: Solver<P>> {
     problem: &'a P,
     solver: &'a S,
     work: &'a mut S::Work,
     judge: Judge<'a, P>,
     limits: &'a Limits,
+    scope: &'a Scope,
+    observer: &'a mut dyn Observer<P>,
 }
 
+/// A residual of a large problem above this many tolerances is not doubted at a limit of time: another judgement, in doubled precision, takes long and
+/// could not make it pass.
+const DOUBTFUL: f64 = 1e3;
+
 impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
-    fn solve(&mut self, point: &mut P::Point, watch: &mut dyn FnMut(&Progress)) -> Outcome {
+    fn solve(&mut self, point: &mut P::Point) -> Outcome {
         let mut iterations = 0;
         self.solver.aim(self.limits.tolerance, self.work);
         self.solver.record(self.limits.trace, self.work);
@@ -326,6 +496,8 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
             since_judged += 1;
             match step {
                 Step::Continue { estimate: e } => estimate = e,
+                // What ends because a kernel was cut short has not failed.
+                Step::Stuck(_) | Step::Done if self.scope.raised() => {}
                 ended => claim = Some(self.conclusion(ended)),
             }
             let due = since_judged >= self.solver.check_every()
@@ -336,14 +508,29 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 since_judged = 0;
                 if !self.judge.last.merit().is_finite() {
                     claim = Some(Status::Stalled("the iterates are no longer finite".into()));
+                } else if claim.is_none() {
+                    claim = self.floor(iterations);
                 }
             }
-            watch(&self.judge.progress(iterations));
+            self.observer.step(&self.judge.progress(iterations));
         };
         P::copy_point(self.judge.best, point);
+        let late = matches!(status, Status::Limit(Limit::Time | Limit::Cancelled));
+        let hopeless = self.problem.unknowns() > guard::SMALL
+            && self.judge.best_measure.merit() > DOUBTFUL * self.limits.tolerance;
         let measure = match self.judge.certified {
             Some(measure) => measure,
-            None => self.problem.certify(point, self.judge.gauge),
+            None if late && hopeless => self.judge.best_measure,
+            None => {
+                // The gauge may have been at another point since.
+                let _ = self.problem.measure(point, self.judge.gauge);
+                let (measure, tidied) =
+                    self.judge.certify(self.problem, point, self.limits.tolerance);
+                if tidied {
+                    P::copy_point(self.judge.tidied, point);
+                }
+                measure
+            }
         };
         // Plain arithmetic may have refused, at rounding level, what doubled precision accepts.
         let status = match status {
@@ -352,45 +539,52 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
             }
             other => other,
         };
-        let meter = &self.judge.meter;
-        Outcome {
-            status,
-            measure,
-            iterations,
-            factorisations: factorisations() - meter.factorisations,
-            seconds: meter.seconds(),
-            cpu_seconds: meter.cpu.elapsed().as_secs_f64(),
-        }
+        self.judge.meter.outcome(status, measure, iterations)
     }
 
     fn judge(&mut self, point: &mut P::Point, iteration: usize) {
         self.solver.publish(self.problem, point, self.work);
-        self.judge.judge(self.problem, point, iteration, self.limits.tolerance);
+        let better = self.judge.judge(self.problem, point, iteration, self.limits.tolerance);
+        if better && self.observer.keeps_best() {
+            self.observer.best(self.judge.best, &self.judge.best_measure);
+        }
     }
 
     fn limit(&self, iterations: usize) -> Option<Limit> {
-        let cancelled =
-            || self.limits.cancel.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed));
-        let late = |t: f64| self.judge.meter.seconds() >= t;
         if iterations >= self.limits.max_iterations {
-            Some(Limit::Iterations)
-        } else if cancelled() {
-            Some(Limit::Cancelled)
-        } else if self.limits.time_limit.is_some_and(late) {
-            Some(Limit::Time)
-        } else {
-            None
+            return Some(Limit::Iterations);
         }
+        self.limits.reached(self.judge.meter.begun).or_else(|| raised(self.scope))
+    }
+
+    /// The end of a solve that the rounding of its impulses keeps from the tolerance: nothing has come of it for long, and the best point is at
+    /// the floor that the judge finds for it.
+    fn floor(&mut self, iterations: usize) -> Option<Status> {
+        let work = self.judge.idle(iterations)?;
+        let measure = self.judge.certify_best(self.problem);
+        let (floor, tolerance) = (measure.floor?, self.limits.tolerance);
+        // A point near the floor may still meet a tolerance little below it by chance.
+        let (near, below) = if work < LATE * IDLE { (AT_FLOOR, 4.0) } else { (NEAR_FLOOR, 1.0) };
+        (floor > below * tolerance && measure.merit() <= near * floor).then(|| {
+            let why = format!(
+                "the rounding of the impulses to double precision alone makes a residual of {floor:.0e}"
+            );
+            Status::Stalled(why.into())
+        })
     }
 
     /// What a solver's last word comes to if the judge does not accept its point.
     fn conclusion(&self, step: Step) -> Status {
         match step {
-            Step::Stuck(why) => Status::Stalled(why),
-            Step::NoSolution(certificate) if self.problem.verify(&certificate) => {
-                Status::Infeasible(certificate)
-            }
-            Step::NoSolution(certificate) => Status::NoConclusion(certificate),
+            Step::Stuck(why) => match self.scope.refused() {
+                Some(refused) => Status::Stalled(format!("{why}: {refused}").into()),
+                None => Status::Stalled(why),
+            },
+            Step::NoSolution(certificate) => match self.problem.evidence(&certificate) {
+                Evidence::Proved(proof) => Status::Infeasible(proof),
+                Evidence::Nearly { change } => Status::NearlyInfeasible { certificate, change },
+                Evidence::Nothing => Status::NoConclusion(certificate),
+            },
             Step::Done | Step::Continue { .. } => {
                 Status::Stalled("the solver has finished, but its answer fails the check".into())
             }
@@ -398,10 +592,36 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
     }
 }
 
+/// A solve that has not halved its merit in so many steps is asked whether it is at the floor; a factorisation counts as three steps more.
+const IDLE: u64 = 1200;
+/// How much later it may be asked the second question, and each later time than the one before.
+const LATE: u64 = 4;
+/// What counts as at the floor, and as near it.
+const AT_FLOOR: f64 = 10.0;
+const NEAR_FLOOR: f64 = 1000.0;
+
+/// Since when a solve gets no further.
+#[derive(Debug, Clone, Copy)]
+struct Halved {
+    merit: f64,
+    iteration: usize,
+    factorisations: u64,
+    /// The work without a halving after which the floor is looked at.
+    patience: u64,
+}
+
+impl Halved {
+    fn now(merit: f64, iteration: usize) -> Self {
+        Self { merit, iteration, factorisations: factorisations(), patience: IDLE }
+    }
+}
+
 /// The judge's visits, the best point among them, and the history.
 struct Judge<'a, P: Problem> {
     gauge: &'a mut P::Gauge,
     best: &'a mut P::Point,
+    /// The point last certified with its variables exactly on their bounds.
+    tidied: &'a mut P::Point,
     history: &'a mut Vec<Sample>,
     meter: Meter,
     /// Whether the latest point counts as the best.
@@ -410,6 +630,8 @@ struct Judge<'a, P: Problem> {
     best_measure: Measure,
     /// The best point's residuals in doubled precision, where they were needed.
     certified: Option<Measure>,
+    /// When the best merit was last halved.
+    halved: Halved,
     /// Judged residual over the solver's estimate, when last compared.
     ratio: f64,
     /// Keep every `stride`-th visit in the history.
@@ -421,39 +643,47 @@ impl<'a, P: Problem> Judge<'a, P> {
     fn new(
         gauge: &'a mut P::Gauge,
         best: &'a mut P::Point,
+        tidied: &'a mut P::Point,
         history: &'a mut Vec<Sample>,
         meter: Meter,
         latest: bool,
     ) -> Self {
-        history.clear();
         let nothing = Measure::unknown();
         Self {
             gauge,
             best,
+            tidied,
             history,
             meter,
             latest,
             last: nothing,
             best_measure: nothing,
             certified: None,
+            halved: Halved::now(f64::INFINITY, 0),
             ratio: 1.0,
             stride: 1,
             visits: 0,
         }
     }
 
-    fn judge(&mut self, problem: &P, point: &P::Point, iteration: usize, tolerance: f64) {
+    /// Whether the point is now the best.
+    fn judge(&mut self, problem: &P, point: &P::Point, iteration: usize, tolerance: f64) -> bool {
         self.last = problem.measure(point, self.gauge);
-        let mut certified = None;
+        let (mut certified, mut tidied) = (None, false);
         if self.last.passes(tolerance) {
             // What looks solved is looked at again, in doubled precision.
-            self.last = problem.certify(point, self.gauge);
+            (self.last, tidied) = self.certify(problem, point, tolerance);
             certified = Some(self.last);
         }
-        if self.visits == 0 || self.latest || self.last.merit() < self.best_measure.merit() {
+        // What passes counts as the best, though its merit may be that of a point with a contact that is not done.
+        let better = self.visits == 0
+            || self.latest
+            || self.last.is_better_than(&self.best_measure)
+            || self.last.passes(tolerance);
+        if better {
             self.best_measure = self.last;
             self.certified = certified;
-            P::copy_point(point, self.best);
+            P::copy_point(if tidied { self.tidied } else { point }, self.best);
         }
         if self.history.len() == HISTORY {
             let mut k = 0;
@@ -468,6 +698,47 @@ impl<'a, P: Problem> Judge<'a, P> {
             self.history.push(Sample { iteration, seconds: self.meter.seconds(), relative: merit });
         }
         self.visits += 1;
+        better
+    }
+
+    /// The certified residuals of the point last measured, or of the same with its variables exactly on their bounds if those are better; which.
+    fn certify(&mut self, problem: &P, point: &P::Point, tolerance: f64) -> (Measure, bool) {
+        let mut plain = None;
+        for boldly in [true, false] {
+            P::copy_point(point, self.tidied);
+            if !problem.tidy(self.tidied, self.gauge, boldly) {
+                continue;
+            }
+            let tidied = problem.certify(self.tidied, self.gauge);
+            let plain = plain.insert(problem.certify(point, self.gauge));
+            if tidied.passes(tolerance) || tidied.is_better_than(plain) {
+                return (tidied, true);
+            }
+        }
+        (plain.unwrap_or_else(|| problem.certify(point, self.gauge)), false)
+    }
+
+    /// The work since the best merit was last halved, where it is time to look at the floor.
+    fn idle(&mut self, iteration: usize) -> Option<u64> {
+        let merit = self.best_measure.merit();
+        if merit <= 0.5 * self.halved.merit {
+            self.halved = Halved::now(merit, iteration);
+            return None;
+        }
+        let Halved { iteration: since, factorisations: before, patience, .. } = self.halved;
+        let work = (iteration - since) as u64 + 3 * (factorisations() - before);
+        if work < patience {
+            return None;
+        }
+        self.halved.patience *= 2;
+        Some(work)
+    }
+
+    /// The best point's residuals in doubled precision.
+    fn certify_best(&mut self, problem: &P) -> Measure {
+        let measure = *self.certified.get_or_insert_with(|| problem.certify(self.best, self.gauge));
+        self.best_measure = measure;
+        measure
     }
 
     /// The solver's estimate is proportional to the residual, near enough: learn the factor.

@@ -1,6 +1,7 @@
 //! A caller's mistake, as opposed to a numerical outcome (which is a [`Status`](crate::Status)).
 
 use nonsmooth_problem::ProblemError;
+use nonsmooth_problem::linalg::budget::TooLarge;
 
 /// Why a solve could not be started.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -32,6 +33,9 @@ pub enum SolveError {
         /// What the problem has.
         found: String,
     },
+    /// The method does not apply: a factorisation that it begins with needs more memory than it may take.
+    #[error("not enough memory: {0}")]
+    TooLarge(#[from] TooLarge),
     /// A limit of the solve is impossible.
     #[error("{name}: expected {expected}, found {found}")]
     Limits {
@@ -52,6 +56,9 @@ impl SolveError {
 
     /// Whether it says that the method does not apply to the problem, as opposed to a mistake of the caller.
     pub fn is_inapplicable(&self) -> bool {
-        matches!(self, Self::Needs { .. } | Self::Problem(ProblemError::Singular { .. }))
+        matches!(
+            self,
+            Self::Needs { .. } | Self::TooLarge(_) | Self::Problem(ProblemError::Singular { .. })
+        )
     }
 }

@@ -27,6 +27,7 @@ mod error;
 pub mod existence;
 pub mod form;
 pub mod guarantees;
+pub mod guard;
 pub mod interior;
 pub mod local;
 pub mod newton;
@@ -43,7 +44,7 @@ pub mod splitting;
 pub mod trace;
 mod via;
 
-pub use drive::{Driver, Limit, Limits, Outcome, Progress, Sample, Session, Status};
+pub use drive::{Driver, Limit, Limits, Observer, Outcome, Progress, Sample, Session, Status};
 pub use error::SolveError;
 pub use reform::Reformulation;
 pub use solver::{Solver, Step};

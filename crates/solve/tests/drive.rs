@@ -151,7 +151,7 @@ fn mistakes_of_the_caller_are_errors() {
     let mut nan = problem.origin();
     nan.r[4] = f64::NAN;
     assert!(solve(&mut nan, &Limits::default()).starts_with("r[4]: expected a finite number"));
-    for tolerance in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+    for tolerance in [0.0, -1.0, 1.0 + f64::EPSILON, f64::NAN, f64::INFINITY] {
         let limits = Limits { tolerance, ..Limits::default() };
         assert!(solve(&mut problem.origin(), &limits).starts_with("tolerance: expected"));
     }

@@ -145,6 +145,7 @@ fn ending(status: &Status) -> Ending {
     match status {
         Status::Solved => Ending::Solved,
         Status::Infeasible(_) => Ending::Infeasible,
+        Status::NearlyInfeasible { .. } => Ending::NearlyInfeasible,
         Status::NoConclusion(_) => Ending::NoConclusion,
         Status::Limit(Limit::Time | Limit::Cancelled) => Ending::TimeLimit,
         Status::Limit(Limit::Iterations) => Ending::IterationLimit,
@@ -164,7 +165,6 @@ fn residuals(m: &Measure) -> Residuals {
         complementarity: finite(m.complementarity),
         dynamics: m.dynamics.and_then(finite),
         bilateral: m.bilateral.and_then(finite),
-        rows: m.rows.and_then(finite),
     }
 }
 

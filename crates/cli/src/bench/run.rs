@@ -226,21 +226,10 @@ fn memory_limit(args: &Args) -> Result<u64, String> {
     }
 }
 
-/// A size such as `500M` or `4G`, in bytes.
+/// The memory of a run: a size such as `500M` or `4G`.
 fn size(text: &str) -> Result<u64, String> {
-    let expected = || "expected a size such as 500M or 4G".to_owned();
-    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
-    let unit = match text[digits.len()..].trim_end_matches(['i', 'B']) {
-        "" => 1.0,
-        "k" | "K" => 1024.0,
-        "M" => 1024.0 * 1024.0,
-        "G" => 1024.0 * 1024.0 * 1024.0,
-        "T" => 1024.0 * 1024.0 * 1024.0 * 1024.0,
-        _ => return Err(expected()),
-    };
-    let bytes = digits.parse::<f64>().map_err(|_| expected())? * unit;
-    match bytes {
-        b if (LEAST_MEMORY as f64..1e18).contains(&b) => Ok(b as u64),
+    match files::size(text)? {
+        LEAST_MEMORY.. => files::size(text),
         _ => Err("expected at least 64M".into()),
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use nonsmooth_io::fclib::{FclibFile, StoredPoint};
 use nonsmooth_problem::check::{ContactStatus, Existence, StatusCounts};
 use nonsmooth_problem::linalg::Inverse;
-use nonsmooth_problem::traits::{Components, Mass, MuRange, Spectrum, SpectrumError, Traits};
+use nonsmooth_problem::traits::{Components, Mass, MuRange, Spectrum, Traits};
 use nonsmooth_problem::{Dynamics, Friction, FrictionGlobal, ProblemError};
 use serde_json::{Value, json};
 
@@ -24,17 +24,12 @@ pub(super) struct Facts {
     /// If asked for, or cheap.
     pub(super) existence: Option<Existence>,
     /// If asked for.
-    spectrum: Option<Result<Spectrum, SpectrumError>>,
+    pub(super) spectrum: Option<Result<Spectrum, String>>,
     solution: Option<nonsmooth_problem::check::Verdict>,
 }
 
-/// Everything about a problem but the existence of a solution.
-pub(super) fn facts<P>(
-    file: &Path,
-    problem: &P,
-    content: &FclibFile,
-    spectrum: Option<usize>,
-) -> Result<Facts, String>
+/// Everything about a problem but its spectrum and the existence of a solution.
+pub(super) fn facts<P>(file: &Path, problem: &P, content: &FclibFile) -> Result<Facts, String>
 where
     P: Form<Stored = StoredPoint, Status = ContactStatus, Counts = StatusCounts>,
 {
@@ -54,7 +49,7 @@ where
             Friction::Global3(p) => singular(p),
         },
         existence: None,
-        spectrum: spectrum.map(|limit| Spectrum::of(&content.problem, limit)),
+        spectrum: None,
         solution,
     })
 }
@@ -211,8 +206,8 @@ fn sizes(components: &[Components]) -> String {
 }
 
 /// What the singular values of W say, or why there are none; null where W is zero.
-fn spectrum_json(spectrum: &Result<Spectrum, SpectrumError>) -> Object {
-    let refused = spectrum.as_ref().err().map(SpectrumError::to_string);
+fn spectrum_json(spectrum: &Result<Spectrum, String>) -> Object {
+    let refused = spectrum.as_ref().err();
     let said = spectrum.as_ref().ok().map(|s| {
         json!({
             "rank": s.rank,
@@ -227,7 +222,7 @@ fn spectrum_json(spectrum: &Result<Spectrum, SpectrumError>) -> Object {
     report::fields(json!({"spectrum": said, "spectrum_refused": refused}))
 }
 
-fn spectrum_text(spectrum: &Result<Spectrum, SpectrumError>) -> String {
+fn spectrum_text(spectrum: &Result<Spectrum, String>) -> String {
     let s = match spectrum {
         Ok(spectrum) => spectrum,
         Err(refused) => return format!("none: {refused}"),

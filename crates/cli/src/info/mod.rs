@@ -4,10 +4,12 @@ mod contact;
 mod linear;
 
 use std::path::PathBuf;
+use std::time::Instant;
 
-use nonsmooth_io::{Content, read_any};
+use nonsmooth_io::Content;
 use nonsmooth_problem::with_friction;
-use nonsmooth_solve::{Limits, existence};
+use nonsmooth_solve::diagnose::spectrum;
+use nonsmooth_solve::{Limits, existence, guard};
 
 use crate::report::{number, row};
 use crate::{Exit, files, interrupt, output};
@@ -32,10 +34,13 @@ pub struct Args {
     /// The most rows for which the spectrum is computed
     #[arg(long, value_name = "ROWS", default_value = "2000", value_parser = files::whole, requires = "spectrum")]
     spectrum_limit: usize,
-    /// Contact: decide whether a solution exists, as `nonsmooth exists` does, in at most 60 seconds. Without this, a short search
+    /// Contact: decide whether a solution exists, as `nonsmooth exists` does. Without this, a short search
     /// proves it for most problems of up to 2000 contacts
     #[arg(long)]
     existence: bool,
+    /// At most this many seconds for each file [default: 60 for the existence of a solution, none for the rest]
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    time_limit: Option<f64>,
     /// Print one line of JSON for each file
     #[arg(long)]
     json: bool,
@@ -49,16 +54,24 @@ Examples:
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
-    let limits = args.existence.then(|| Limits {
-        time_limit: Some(EXISTENCE_SECONDS),
-        cancel: Some(interrupt::flag()),
-        ..Limits::default()
-    });
+    let time_limit = files::time_limit(args.time_limit)?;
+    let long = args.existence || args.spectrum || time_limit.is_some();
+    // Where all is quick, Ctrl-C simply ends the program.
+    let cancel = long.then(interrupt::flag);
+    let limits = Limits { time_limit, cancel, ..Limits::default() };
     Ok(files::each(&args.files, args.json, |_, file| {
-        let content = match read_any(file).map_err(|e| e.to_string())? {
-            Content::Friction(content) => content,
-            Content::Linear(content) => {
-                let facts = linear::facts(file, &content)?;
+        let begun = Instant::now();
+        let late =
+            |limit| Ok(files::late(file, args.json, limit, "before the problem was described"));
+        let content = match files::read_within(file, &limits)? {
+            Ok(Content::Friction(content)) => content,
+            Ok(Content::Linear(content)) => {
+                let (path, copy) = (file.to_path_buf(), content.clone());
+                let left = files::left(&limits, begun);
+                let facts = match guard::run(&left, || {}, move |_| linear::facts(&path, &copy)) {
+                    Ok(facts) => facts?,
+                    Err(limit) => return late(limit),
+                };
                 output::print(&if args.json {
                     format!("{}\n", facts.json(&content))
                 } else {
@@ -66,14 +79,30 @@ pub fn run(args: &Args) -> Result<Exit, String> {
                 });
                 return Ok(Exit::Solved);
             }
+            Err(limit) => return late(limit),
         };
-        let limit = args.spectrum.then_some(args.spectrum_limit);
-        let mut facts =
-            with_friction!(&content.problem, p => contact::facts(file, p, &content, limit))?;
+        let (path, copy) = (file.to_path_buf(), content.clone());
+        let left = files::left(&limits, begun);
+        let facts = guard::run(
+            &left,
+            || {},
+            move |_| with_friction!(&copy.problem, p => contact::facts(&path, p, &copy)),
+        );
+        let mut facts = match facts {
+            Ok(facts) => facts?,
+            Err(limit) => return late(limit),
+        };
+        if args.spectrum {
+            let left = files::left(&limits, begun);
+            facts.spectrum = Some(spectrum(&content.problem, args.spectrum_limit, &left));
+        }
         if facts.singular.is_none() {
-            facts.existence = match &limits {
-                Some(limits) => Some(existence::of(&content.problem, limits)),
-                None => facts.is_small().then(|| existence::glance(&content.problem)),
+            facts.existence = if args.existence {
+                let left = files::left(&limits, begun);
+                let time_limit = Some(left.time_limit.unwrap_or(EXISTENCE_SECONDS));
+                Some(existence::of(&content.problem, &Limits { time_limit, ..left }))
+            } else {
+                facts.is_small().then(|| existence::glance(&content.problem))
             };
         }
         output::print(&if args.json {

@@ -21,8 +21,8 @@
 //! the order of the file; triplets are written, because other readers of global files know nothing else.
 //!
 //! Written files hold 32-bit integers and 64-bit reals in HDF5 1.8's format. Any width of integer and of real
-//! is read, integers where reals belong, and reals that are whole numbers where integers belong. Otherwise
-//! values pass bit for bit in both directions.
+//! is read, reals of half precision too, integers where reals belong, and reals that are whole numbers where integers belong. Otherwise
+//! values pass bit for bit in both directions. All layouts of HDF5 up to 2.0 are read (groups, soft links, chunks, deflate, shuffle, checksums, LZF).
 
 mod read;
 mod write;
@@ -123,16 +123,24 @@ fn some(x: &[f64]) -> Option<Vec<f64>> {
 /// `l` if it has bilateral constraints; [`read_problem`] does not look at it.
 /// Not read: `nzmax`, matrix info (`conditioning`, ...), guesses beyond `number_of_guesses`, other groups.
 ///
-/// Soft and external links are not followed. Where a part of the problem is one, the error says so if the group is
-/// of HDF5's old format (the default of the C library and h5py); in groups of the new format they cannot be
-/// told from nothing, so that an optional part behind one reads as absent.
+/// Soft links are followed, up to 16 in a row; one that leads nowhere is an error that says where to. External links are refused.
+///
+/// Cost: proportional to the size of the file in time and memory, whatever the file says of itself; a dataset that the file has no room for is
+/// refused before anything is allocated by its size.
 pub fn read(path: impl AsRef<Path>) -> Result<FclibFile, IoError> {
-    read::read(path.as_ref(), true)
+    let path = path.as_ref();
+    read::parse(path, &read::bytes(path)?, true)
+}
+
+/// Reads a file that is in memory already; `name` stands for it in messages. Errors and cost: as [`read`].
+pub fn read_bytes(name: impl AsRef<Path>, bytes: &[u8]) -> Result<FclibFile, IoError> {
+    read::parse(name.as_ref(), bytes, true)
 }
 
 /// Reads the problem of a file, whatever its `/solution` and `/guesses` hold. Errors: as [`read`].
 pub fn read_problem(path: impl AsRef<Path>) -> Result<Friction, IoError> {
-    Ok(read::read(path.as_ref(), false)?.problem)
+    let path = path.as_ref();
+    Ok(read::parse(path, &read::bytes(path)?, false)?.problem)
 }
 
 /// Writes a file, in place of the one of that name if there is one.
@@ -148,14 +156,17 @@ pub fn write(path: impl AsRef<Path>, content: &FclibFile) -> Result<(), IoError>
     write::write(path.as_ref(), content)
 }
 
+/// The bytes of the file that [`write()`] makes; `name` stands for it in messages. Errors: as [`write()`], but for the system's.
+pub fn to_bytes(name: impl AsRef<Path>, content: &FclibFile) -> Result<Vec<u8>, IoError> {
+    write::to_bytes(name.as_ref(), content)
+}
+
 /// Sets `/solution` in an existing file and keeps all else in it, known to this crate or not.
 ///
-/// The file is replaced by renaming, as in [`write()`]: other hard links to it keep the old content. The space of
-/// an old `/solution` is not all used again: each call makes the file some hundred bytes larger.
-/// Soft and external links that stand directly in the root group are the exception to keeping all: a file with
-/// them may be refused or, if HDF5 keeps the group densely or converted it from the old format, lose them.
-/// Errors: a file whose problem cannot be read, a point that does not fit it, a target that is no regular file, and
-/// what the system refuses.
+/// The file is replaced by renaming, as in [`write()`]: other hard links to it keep the old content. Where an old `/solution` holds the same parts as
+/// plain 64-bit reals, their values are replaced where they stand and the file keeps its size; else the space of the old one is not used again.
+/// Errors: a file whose problem cannot be read, a point that does not fit it, a target that is no regular file, a `/solution` that is a soft link,
+/// soft links in the root group that would be lost, and what the system refuses.
 pub fn write_solution(path: impl AsRef<Path>, solution: &StoredPoint) -> Result<(), IoError> {
     write::write_solution(path.as_ref(), solution)
 }
@@ -199,13 +210,13 @@ impl Sizes {
     }
 }
 
-/// Runs what handles a file's bytes by the HDF5 library.
+/// Runs what edits a file's bytes by the HDF5 library.
 ///
 /// No damage is known that makes that library panic. If one does, the caller still gets an error (after the
 /// panic hook's message: the hook is the program's, not this library's to change).
 fn guarded<T>(file: &Path, run: impl FnOnce() -> Result<T, IoError>) -> Result<T, IoError> {
     let caught = catch_unwind(AssertUnwindSafe(run));
-    caught.unwrap_or_else(|_| Err(IoError::hdf5(file, "/", "damage that stopped the HDF5 reader")))
+    caught.unwrap_or_else(|_| Err(IoError::hdf5(file, "/", "damage that stopped the HDF5 editor")))
 }
 
 /// The root group of a problem.

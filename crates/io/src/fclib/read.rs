@@ -3,39 +3,39 @@
 use std::fmt::Display;
 use std::path::Path;
 
-use hdf5_pure::{DType, Dataset, Datatype, Error, File, FormatError, Group};
 use nonsmooth_problem::linalg::{Bsr, Csc};
 use nonsmooth_problem::{
     BilateralGlobal, BilateralLocal, Friction, FrictionGlobal, FrictionLocal, ProblemError,
 };
 
-use super::{FclibFile, Info, Sizes, StoredPoint, check_finite, check_vector, group, guarded};
+use super::{FclibFile, Info, Sizes, StoredPoint, check_finite, check_vector, group};
 use crate::IoError;
 use crate::error::one_line;
+use crate::hdf5::{self, Dataset, Fault, File, Group, Link, Object, Type};
 
-/// Reads a file, with its solution and guesses if `points`.
-pub(super) fn read(path: &Path, points: bool) -> Result<FclibFile, IoError> {
+/// The bytes of a file.
+pub(super) fn bytes(path: &Path) -> Result<Vec<u8>, IoError> {
     let expected = "a readable file";
     if std::fs::metadata(path).map_err(|e| IoError::os(path, expected, e))?.is_dir() {
         return Err(IoError::NotHdf5 { file: path.into(), found: "a directory" });
     }
-    let bytes = std::fs::read(path).map_err(|e| IoError::os(path, expected, e))?;
-    if !hdf5_pure::is_hdf5_bytes(&bytes) {
+    std::fs::read(path).map_err(|e| IoError::os(path, expected, e))
+}
+
+/// The HDF5 file in those bytes.
+pub(super) fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<File<'a>, IoError> {
+    if !hdf5::is_hdf5(bytes) {
         let found = if bytes.is_empty() { "an empty file" } else { "other data" };
         return Err(IoError::NotHdf5 { file: path.into(), found });
     }
-    guarded(path, || parse(path, bytes, points))
+    File::new(bytes).map_err(|e| fault(path, "/", e))
 }
 
-fn parse(path: &Path, bytes: Vec<u8>, points: bool) -> Result<FclibFile, IoError> {
-    let size = bytes.len() as u64;
-    let file = File::from_bytes(bytes).map_err(|e| IoError::hdf5(path, "/", e))?;
-    let end = file.superblock().eof_address;
-    if end > size {
-        let found = format!("a truncated file ({size} bytes of {end})");
-        return Err(IoError::hdf5(path, "/", found));
-    }
-    let root = Folder { file: path, size, path: String::new(), group: file.root() };
+/// Reads a file, with its solution and guesses if `points`.
+pub(super) fn parse(path: &Path, bytes: &[u8], points: bool) -> Result<FclibFile, IoError> {
+    let file = open(path, bytes)?;
+    let root = file.root().map_err(|e| fault(path, "/", e))?;
+    let root = Folder { file: path, data: &file, path: String::new(), group: root };
     let mut content = FclibFile::new(problem(&root)?);
     content.problem.validate().map_err(|problem| IoError::Problem {
         file: path.into(),
@@ -59,12 +59,29 @@ fn parse(path: &Path, bytes: Vec<u8>, points: bool) -> Result<FclibFile, IoError
     Ok(content)
 }
 
+/// What keeps a part of a file from being read, as an error that names the part.
+pub(super) fn fault(file: &Path, place: &str, fault: Fault) -> IoError {
+    match fault {
+        Fault::Damaged(found) => IoError::hdf5(file, place, found),
+        Fault::Unsupported(what) => {
+            IoError::Unsupported { file: file.into(), place: place.into(), what }
+        }
+        Fault::Dangling(found) => {
+            IoError::data(file, place, "a soft link that leads somewhere", found)
+        }
+        Fault::Size(size, found) => {
+            let expected = format!("data that fit in the {size} bytes of the file");
+            IoError::data(file, place, expected, found)
+        }
+    }
+}
+
 /// The one problem of a file, not validated as a whole.
 fn problem(root: &Folder) -> Result<Friction, IoError> {
     const LOCAL: &str = "fclib_local";
     const GLOBAL: &str = "fclib_global";
     for rolling in ["fclib_global_rolling", "fclib_local_rolling"] {
-        if matches!(root.find(rolling)?, Some(Member::Group(_))) {
+        if matches!(root.find(rolling)?, Some(Object::Group(_))) {
             return Err(IoError::Unsupported {
                 file: root.file.into(),
                 place: format!("/{rolling}"),
@@ -82,12 +99,10 @@ fn problem(root: &Folder) -> Result<Friction, IoError> {
             _ => Friction::Global3(global(&g)?),
         }),
         (both, _) => {
-            let found = match (both, root.group.groups().as_deref()) {
+            let found = match (both, root.groups()) {
                 (Some(_), _) => format!("both /{LOCAL} and /{GLOBAL}"),
-                (None, Ok([])) => "no group".into(),
-                (None, Ok(others)) => format!("only /{}", others.join(", /")),
-                // The names are only for people; a soft link among them keeps the rest from being listed.
-                (None, Err(_)) => "neither".into(),
+                (None, others) if others.is_empty() => "no group".into(),
+                (None, others) => format!("only /{}", others.join(", /")),
             };
             Err(IoError::Root { file: root.file.into(), found: one_line(found) })
         }
@@ -145,14 +160,17 @@ fn info(problem: &Folder) -> Result<Info, IoError> {
     let Some(g) = problem.folder("info")? else {
         return Ok(Info::default());
     };
-    let attributes = g.group.attrs().map_err(|e| IoError::hdf5(g.file, &g.path, e))?;
-    let count = |name: &str| usize::try_from(attributes.get(name)?.as_i64()?).ok();
+    let count = |name: &str| -> Result<Option<usize>, IoError> {
+        let found = g.data.attribute(g.group.address, name);
+        let found = found.map_err(|e| fault(g.file, &g.path, e))?;
+        Ok(found.and_then(|n| usize::try_from(n).ok()))
+    };
     Ok(Info {
         title: g.text("title")?,
         description: g.text("description")?,
         math_info: g.text("math_info")?,
-        dofs: count("numberOfDegreeOfFreedom"),
-        involved_ds: count("numberOfInvolvedDS"),
+        dofs: count("numberOfDegreeOfFreedom")?,
+        involved_ds: count("numberOfInvolvedDS")?,
     })
 }
 
@@ -172,31 +190,11 @@ fn point(g: &Folder, sizes: Sizes) -> Result<StoredPoint, IoError> {
     })
 }
 
-/// The error of looking up the name at `place` in a group.
-pub(super) fn lookup(file: &Path, place: &str, e: Error) -> IoError {
-    match e {
-        // Groups of the old format keep no address for a soft link, and the library takes that for one.
-        Error::Format(FormatError::UnexpectedEof { expected: usize::MAX, .. }) => {
-            IoError::Unsupported { file: file.into(), place: place.into(), what: "a soft link" }
-        }
-        e => IoError::hdf5(file, place, e),
-    }
-}
-
-/// What a name in a group stands for.
-enum Member {
-    Group(Group),
-    Dataset(Dataset),
-    Other,
-}
-
-impl Member {
-    fn kind(&self) -> &'static str {
-        match self {
-            Member::Group(_) => "a group",
-            Member::Dataset(_) => "a dataset",
-            Member::Other => "something else",
-        }
+fn name_of(object: &Object) -> &'static str {
+    match object {
+        Object::Group(_) => "a group",
+        Object::Dataset(_) => "a dataset",
+        Object::Other => "something else",
     }
 }
 
@@ -210,17 +208,16 @@ struct Used<'a> {
 
 /// A group of the file, with what messages about its members need.
 ///
-/// Members are looked up by name, never listed, so that those that do not matter cannot do harm.
-struct Folder<'a> {
-    file: &'a Path,
-    /// The size of the file, against absurd sizes of datasets.
-    size: u64,
+/// Members are opened by name, so that those that do not matter cannot do harm.
+struct Folder<'f, 'a> {
+    file: &'f Path,
+    data: &'f File<'a>,
     /// Empty for the root.
     path: String,
-    group: Group,
+    group: Group<'a>,
 }
 
-impl<'a> Folder<'a> {
+impl<'f, 'a> Folder<'f, 'a> {
     fn place(&self, name: impl Display) -> String {
         format!("{}/{name}", self.path)
     }
@@ -234,21 +231,22 @@ impl<'a> Folder<'a> {
         IoError::data(self.file, self.place(name), expected, found)
     }
 
-    fn damaged(&self, name: &str) -> impl Fn(Error) -> IoError {
-        move |e| IoError::hdf5(self.file, self.place(name), e)
+    fn fault(&self, name: &str) -> impl Fn(Fault) -> IoError {
+        move |e| fault(self.file, &self.place(name), e)
     }
 
-    fn find(&self, name: &str) -> Result<Option<Member>, IoError> {
-        match self.group.dataset(name) {
-            Ok(dataset) => Ok(Some(Member::Dataset(dataset))),
-            Err(Error::NotADataset(_)) => match self.group.group(name) {
-                Ok(group) => Ok(Some(Member::Group(group))),
-                Err(Error::NotAGroup(_)) => Ok(Some(Member::Other)),
-                Err(e) => Err(lookup(self.file, &self.place(name), e)),
-            },
-            Err(Error::Format(FormatError::PathNotFound(_))) => Ok(None),
-            Err(e) => Err(lookup(self.file, &self.place(name), e)),
-        }
+    fn find(&self, name: &str) -> Result<Option<Object<'a>>, IoError> {
+        self.data.find(&self.group, name).map_err(self.fault(name))
+    }
+
+    /// The names of the groups in it, for people.
+    fn groups(&self) -> Vec<String> {
+        let is_group = |link: &Link| match link {
+            Link::Hard(address) => matches!(self.data.object(*address), Ok(Object::Group(_))),
+            Link::Soft(_) | Link::External => false,
+        };
+        let groups = self.group.links.iter().filter(|(_, link)| is_group(link));
+        groups.map(|(name, _)| String::from_utf8_lossy(name).into_owned()).collect()
     }
 
     fn has(&self, name: &str) -> Result<bool, IoError> {
@@ -256,44 +254,28 @@ impl<'a> Folder<'a> {
     }
 
     /// The group `name`, if there is one.
-    fn folder(&self, name: &str) -> Result<Option<Folder<'a>>, IoError> {
+    fn folder(&self, name: &str) -> Result<Option<Folder<'f, 'a>>, IoError> {
         match self.find(name)? {
             None => Ok(None),
-            Some(Member::Group(group)) => {
-                Ok(Some(Folder { file: self.file, size: self.size, path: self.place(name), group }))
+            Some(Object::Group(group)) => {
+                let path = self.place(name);
+                Ok(Some(Folder { file: self.file, data: self.data, path, group }))
             }
-            Some(other) => Err(self.error(name, "a group", other.kind())),
+            Some(other) => Err(self.error(name, "a group", name_of(&other))),
         }
     }
 
     /// The group `name`.
-    fn need(&self, name: &str) -> Result<Folder<'a>, IoError> {
+    fn need(&self, name: &str) -> Result<Folder<'f, 'a>, IoError> {
         self.folder(name)?.ok_or_else(|| self.error(name, "a group", "nothing of that name"))
     }
 
-    /// The dataset `name`, whose size the file can account for.
-    fn dataset(&self, name: &str) -> Result<Dataset, IoError> {
-        let dataset = match self.find(name)? {
-            Some(Member::Dataset(dataset)) => dataset,
+    fn dataset(&self, name: &str) -> Result<Dataset<'a>, IoError> {
+        match self.find(name)? {
+            Some(Object::Dataset(dataset)) => Ok(dataset),
             other => {
-                let found = other.map_or("nothing of that name", |other| other.kind());
-                return Err(self.error(name, "a dataset", found));
-            }
-        };
-        let shape = dataset.shape().map_err(self.damaged(name))?;
-        let width = dataset.element_size().map_err(self.damaged(name))?;
-        let bytes = shape.iter().try_fold(width, |a, &b| a.checked_mul(b));
-        // No filter expands more than deflate, 1032 to 1.
-        let most = self.size.saturating_mul(if dataset.is_chunked() { 1032 } else { 1 });
-        match bytes {
-            Some(bytes) if bytes <= most => Ok(dataset),
-            _ => {
-                let found = format!("shape {shape:?} of {width} bytes each");
-                Err(self.error(
-                    name,
-                    format!("data that fit in the {} bytes of the file", self.size),
-                    found,
-                ))
+                let found = other.as_ref().map_or("nothing of that name", name_of);
+                Err(self.error(name, "a dataset", found))
             }
         }
     }
@@ -301,14 +283,10 @@ impl<'a> Folder<'a> {
     /// Integers: those `used`, or all. Reals that are whole numbers will do.
     fn ints(&self, name: &str, used: Option<Used>) -> Result<Vec<i64>, IoError> {
         let dataset = self.dataset(name)?;
-        match dataset.datatype().map_err(self.damaged(name))? {
+        match dataset.kind {
             // What does not fit is too large for any use here; the range checks say so.
-            Datatype::FixedPoint { size: 8, layout, .. } if !layout.signed => {
-                let x = self.used(name, dataset.read_u64(), used)?;
-                Ok(x.into_iter().map(|x| i64::try_from(x).unwrap_or(i64::MAX)).collect())
-            }
-            Datatype::FixedPoint { .. } => self.used(name, dataset.read_i64(), used),
-            Datatype::FloatingPoint { .. } => {
+            Type::Int { .. } => self.used(name, self.data.ints(&dataset), used),
+            Type::Real { .. } => {
                 // The first real beyond i64, exactly.
                 const END: f64 = -(i64::MIN as f64);
                 let whole = |(k, x): (usize, f64)| {
@@ -320,10 +298,10 @@ impl<'a> Folder<'a> {
                         Err(self.error(place, "a whole number of at most 64 bits", x))
                     }
                 };
-                let x = self.used(name, dataset.read_f64(), used)?;
+                let x = self.used(name, self.data.reals(&dataset), used)?;
                 x.into_iter().enumerate().map(whole).collect()
             }
-            _ => Err(self.wrong_type(name, &dataset, "integers")),
+            other => Err(self.error(name, "integers", other.name())),
         }
     }
 
@@ -337,13 +315,13 @@ impl<'a> Folder<'a> {
     /// Finite reals: those `used`, or all. Integers will do; the widest round as they do in C.
     fn reals(&self, name: &str, used: Option<Used>) -> Result<Vec<f64>, IoError> {
         let dataset = self.dataset(name)?;
-        match dataset.datatype().map_err(self.damaged(name))? {
-            Datatype::FixedPoint { .. } | Datatype::FloatingPoint { .. } => {
-                let x = self.used(name, dataset.read_f64(), used)?;
+        match dataset.kind {
+            Type::Int { .. } | Type::Real { .. } => {
+                let x = self.used(name, self.data.reals(&dataset), used)?;
                 check_finite(self.file, &self.place(name), &x)?;
                 Ok(x)
             }
-            _ => Err(self.wrong_type(name, &dataset, "reals")),
+            other => Err(self.error(name, "reals", other.name())),
         }
     }
 
@@ -351,10 +329,10 @@ impl<'a> Folder<'a> {
     fn used<T>(
         &self,
         name: &str,
-        values: Result<Vec<T>, Error>,
+        values: Result<Vec<T>, Fault>,
         used: Option<Used>,
     ) -> Result<Vec<T>, IoError> {
-        let mut values = values.map_err(self.damaged(name))?;
+        let mut values = values.map_err(self.fault(name))?;
         if let Some(Used { entries, why }) = used {
             let found = values.len();
             match usize::try_from(entries) {
@@ -366,13 +344,6 @@ impl<'a> Folder<'a> {
             }
         }
         Ok(values)
-    }
-
-    fn wrong_type(&self, name: &str, dataset: &Dataset, expected: &str) -> IoError {
-        match dataset.dtype() {
-            Ok(found) => self.error(name, expected, found),
-            Err(e) => self.damaged(name)(e),
-        }
     }
 
     fn vector(&self, name: &str, len: usize, meaning: &str) -> Result<Vec<f64>, IoError> {
@@ -387,17 +358,12 @@ impl<'a> Folder<'a> {
             return Ok(None);
         }
         let dataset = self.dataset(name)?;
-        match dataset.dtype().map_err(self.damaged(name))? {
-            DType::String => {
-                let bytes = dataset.read_raw().map_err(self.damaged(name))?;
-                let end = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
-                Ok(Some(String::from_utf8_lossy(&bytes[..end]).into_owned()))
+        match dataset.kind {
+            Type::Text | Type::VariableText => {
+                let bytes = self.data.text(&dataset).map_err(self.fault(name))?;
+                Ok(Some(String::from_utf8_lossy(&bytes).into_owned()))
             }
-            DType::VariableLengthString => {
-                let mut texts = dataset.read_string().map_err(self.damaged(name))?;
-                Ok(Some(if texts.is_empty() { String::new() } else { texts.swap_remove(0) }))
-            }
-            other => Err(self.error(name, "a text", other)),
+            other => Err(self.error(name, "a text", other.name())),
         }
     }
 

@@ -1,6 +1,8 @@
 //! Writing.
 
 use std::fmt::Display;
+use std::io::{Seek, SeekFrom, Write};
+use std::ops::Range;
 use std::path::Path;
 
 use hdf5_pure::{
@@ -12,9 +14,19 @@ use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal};
 
 use super::{FclibFile, Info, Sizes, StoredPoint, check_vector, group, guarded, read};
 use crate::IoError;
+use crate::hdf5::{Dataset, Group, Link, Object, Type};
 use crate::replace::{WRITABLE, check_target, replace};
 
 pub(super) fn write(path: &Path, content: &FclibFile) -> Result<(), IoError> {
+    let file = build(path, content)?;
+    replace(path, |temporary| file.write(temporary).map_err(|e| failed(path, e)))
+}
+
+pub(super) fn to_bytes(path: &Path, content: &FclibFile) -> Result<Vec<u8>, IoError> {
+    build(path, content)?.finish().map_err(|e| failed(path, e))
+}
+
+fn build(path: &Path, content: &FclibFile) -> Result<FileBuilder, IoError> {
     let problem = &content.problem;
     let root = group(problem);
     problem.validate().map_err(|problem| IoError::Problem {
@@ -53,41 +65,136 @@ pub(super) fn write(path: &Path, content: &FclibFile) -> Result<(), IoError> {
             guesses.try_for_each(|(k, x)| g.child(&(k + 1).to_string(), |g| point(g, x, sizes)))
         })?;
     }
-    replace(path, |temporary| file.write(temporary).map_err(|e| failed(path, e)))
+    Ok(file)
 }
 
 pub(super) fn write_solution(path: &Path, solution: &StoredPoint) -> Result<(), IoError> {
     // First of all: to read a pipe may never end.
     check_target(path)?;
-    let sizes = Sizes::of(&read::read(path, false)?.problem);
+    let bytes = read::bytes(path)?;
+    let sizes = Sizes::of(&read::parse(path, &bytes, false)?.problem);
     let parts = stored_parts(path, "/solution", solution, sizes)?;
-    let fail = |e| failed(path, e);
-    let edit = |temporary: &Path| -> Result<(), IoError> {
-        let file = File::open_rw(temporary).map_err(fail)?;
-        let root = file.root();
-        match root.group("solution") {
-            Err(Error::Format(FormatError::PathNotFound(_))) => {}
-            Ok(_) | Err(Error::NotAGroup(_)) => root.delete("solution").map_err(fail)?,
-            Err(e) => return Err(read::lookup(path, "/solution", e)),
-        }
-        // An old root group with a soft link, which cannot be listed, would be spoilt by the change.
-        root.groups().map_err(|e| read::lookup(path, "/", e))?;
-        root.create_group_with("solution", |g| {
-            for (name, x) in &parts {
-                g.create_dataset(name, |d| {
-                    d.with_f64_data(x);
-                });
-            }
-        })
-        .map_err(fail)?;
-        file.commit().map_err(fail)?;
-        drop(root);
-        file.close().map_err(fail)
-    };
+    let places = places(path, &bytes, &parts)?;
+    let links = root_links(path, &bytes)?;
+    drop(bytes);
     replace(path, |temporary| {
         std::fs::copy(path, temporary).map_err(|e| IoError::os(path, WRITABLE, e))?;
-        guarded(path, || edit(temporary))
+        if let Some(places) = places {
+            return overwrite(temporary, &places).map_err(|e| IoError::os(path, WRITABLE, e));
+        }
+        guarded(path, || edit(path, temporary, &parts))?;
+        // The library that edits knows no soft links, and must not lose them.
+        let links_now = root_links(path, &read::bytes(temporary)?)?;
+        match links == links_now {
+            true => Ok(()),
+            false => Err(soft_links(path, "/")),
+        }
     })
+}
+
+fn soft_links(path: &Path, place: &str) -> IoError {
+    let what = "writing a solution into a group with soft links";
+    IoError::Unsupported { file: path.into(), place: place.into(), what }
+}
+
+/// The names in the root group but for the solution, with whether each is an object of this file.
+fn root_links(path: &Path, bytes: &[u8]) -> Result<Vec<(Vec<u8>, bool)>, IoError> {
+    let root = read::open(path, bytes)?.root().map_err(|e| read::fault(path, "/", e))?;
+    let others = root.links.iter().filter(|(name, _)| **name != b"solution");
+    Ok(others.map(|(name, link)| (name.to_vec(), matches!(link, Link::Hard(_)))).collect())
+}
+
+/// New values and where in the file they belong.
+type Places<'x> = Vec<(Range<usize>, &'x [f64])>;
+
+/// Where the values of a `/solution` that is there can be replaced where they stand, so that the file does not grow; `None`: nowhere.
+fn places<'x>(
+    path: &Path,
+    bytes: &[u8],
+    parts: &[(&'static str, &'x [f64])],
+) -> Result<Option<Places<'x>>, IoError> {
+    let file = read::open(path, bytes)?;
+    let root = file.root().map_err(|e| read::fault(path, "/", e))?;
+    if matches!(root.links.get(&b"solution"[..]), Some(Link::Soft(_) | Link::External)) {
+        return Err(soft_links(path, "/solution"));
+    }
+    // What is damaged is replaced as a whole.
+    let Ok(Some(Object::Group(group))) = file.find(&root, "solution") else { return Ok(None) };
+    let plain = |group: &Group| {
+        group.references == 1
+            && group.links.len() == parts.len()
+            && group.links.values().all(|link| matches!(link, Link::Hard(_)))
+    };
+    if !plain(&group) {
+        return Ok(None);
+    }
+    let place = |d: &Dataset, x: &[f64]| -> Option<Range<usize>> {
+        let double = matches!(
+            d.kind,
+            Type::Real { big: false, sign: 63, exponent: (52, 11), mantissa: (0, 52), .. }
+        );
+        let fits = d.references == 1 && double && d.shape[..] == [x.len() as u64];
+        fits.then(|| if x.is_empty() { Some(0..0) } else { file.place(d) }).flatten()
+    };
+    let mut places: Places = vec![];
+    for &(name, x) in parts {
+        let Ok(Some(Object::Dataset(d))) = file.find(&group, name) else { return Ok(None) };
+        match place(&d, x) {
+            Some(range)
+                if places.iter().all(|(p, _)| p.end <= range.start || range.end <= p.start) =>
+            {
+                places.push((range, x));
+            }
+            _ => return Ok(None),
+        }
+    }
+    Ok(Some(places))
+}
+
+fn overwrite(file: &Path, places: &Places) -> std::io::Result<()> {
+    let mut file = std::fs::OpenOptions::new().write(true).open(file)?;
+    for (range, x) in places {
+        file.seek(SeekFrom::Start(range.start as u64))?;
+        let bytes: Vec<u8> = x.iter().flat_map(|x| x.to_le_bytes()).collect();
+        file.write_all(&bytes)?;
+    }
+    Ok(())
+}
+
+/// Replaces `/solution` in the file `temporary`, which is to become `path`.
+fn edit(path: &Path, temporary: &Path, parts: &[(&'static str, &[f64])]) -> Result<(), IoError> {
+    let fail = |e| failed(path, e);
+    let file = File::open_rw(temporary).map_err(fail)?;
+    let root = file.root();
+    match root.group("solution") {
+        Err(Error::Format(FormatError::PathNotFound(_))) => {}
+        Ok(_) | Err(Error::NotAGroup(_)) => root.delete("solution").map_err(fail)?,
+        Err(e) => return Err(lookup(path, "/solution", e)),
+    }
+    // An old root group with a soft link, which cannot be listed, would be spoilt by the change.
+    root.groups().map_err(|e| lookup(path, "/", e))?;
+    root.create_group_with("solution", |g| {
+        for (name, x) in parts {
+            g.create_dataset(name, |d| {
+                d.with_f64_data(x);
+            });
+        }
+    })
+    .map_err(fail)?;
+    file.commit().map_err(fail)?;
+    drop(root);
+    file.close().map_err(fail)
+}
+
+/// The error of looking up the name at `place` in a group.
+fn lookup(file: &Path, place: &str, e: Error) -> IoError {
+    match e {
+        // Groups of the old format keep no address for a soft link, and the library takes that for one.
+        Error::Format(FormatError::UnexpectedEof { expected: usize::MAX, .. }) => {
+            soft_links(file, place)
+        }
+        e => IoError::hdf5(file, place, e),
+    }
 }
 
 /// A failure of the HDF5 writer: nearly always the system's.

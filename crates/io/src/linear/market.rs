@@ -36,33 +36,44 @@ pub(crate) fn is_part(path: &Path) -> bool {
 /// Errors: no file of q; a file that is damaged, by its line; one bound without the other; parts that do not fit.
 pub fn read(path: impl AsRef<Path>) -> Result<LinearFile, IoError> {
     let path = path.as_ref();
-    let m = matrix(path, &text(path)?)?;
-    let [q, l, u, z] = vectors(path);
-    let vector = |file: &Path| vector(file, &text(file)?);
-    if !q.is_file() {
-        let name = q.file_name().unwrap_or_default().to_string_lossy();
-        return Err(IoError::data(path, "q", format!("a file {name} beside the matrix"), "none"));
+    let there = |file: &PathBuf| match file.is_file() {
+        true => text(file).map(Some),
+        false => Ok(None),
+    };
+    let matrix = text(path)?;
+    let mut parts = [None, None, None, None];
+    for (part, file) in parts.iter_mut().zip(&vectors(path)) {
+        *part = there(file)?;
     }
-    let q = vector(&q)?;
-    let bounds = match (l.is_file(), u.is_file()) {
-        (false, false) => None,
-        (true, true) => Some((vector(&l)?, vector(&u)?)),
-        (there, _) => {
-            let (missing, there) = if there { (&u, &l) } else { (&l, &u) };
-            let name = |p: &Path| p.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    parse(path, &matrix, parts.each_ref().map(Option::as_deref))
+}
+
+/// Reads the texts of the matrix and of q, l, u and z, where they are; `path` is the name of the matrix in messages. Errors: as [`read`].
+pub fn parse(
+    path: impl AsRef<Path>,
+    text: &str,
+    parts: [Option<&str>; 4],
+) -> Result<LinearFile, IoError> {
+    let path = path.as_ref();
+    let m = matrix(path, text)?;
+    let files = vectors(path);
+    let name = |k: usize| files[k].file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let part = |k: usize| parts[k].map(|text| vector(&files[k], text)).transpose();
+    let Some(q) = part(0)? else {
+        let expected = format!("a file {} beside the matrix", name(0));
+        return Err(IoError::data(path, "q", expected, "none"));
+    };
+    let problem = match (part(1)?, part(2)?) {
+        (None, None) => Lcp::new(m, q).map(Complementarity::Lcp),
+        (Some(l), Some(u)) => BoxLcp::new(m, q, l, u).map(Complementarity::Box),
+        (l, _) => {
+            let (missing, there) = if l.is_some() { (2, 1) } else { (1, 2) };
             let expected = format!("a file {} beside {}", name(missing), name(there));
             return Err(IoError::data(path, "bounds", expected, "none"));
         }
     };
-    let problem = match bounds {
-        None => Lcp::new(m, q).map(Complementarity::Lcp),
-        Some((l, u)) => BoxLcp::new(m, q, l, u).map(Complementarity::Box),
-    };
     let problem = problem.map_err(|problem| IoError::Linear { file: path.into(), problem })?;
-    let solution = match z.is_file() {
-        true => Some(LinearPoint { z: vector(&z)?, w: None }),
-        false => None,
-    };
+    let solution = part(3)?.map(|z| LinearPoint { z, w: None });
     let content = LinearFile { solution, ..LinearFile::new(problem) };
     check(path, &content)?;
     Ok(content)

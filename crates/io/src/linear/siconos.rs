@@ -32,7 +32,13 @@ use crate::IoError;
 /// Errors: a file that is none of them, by the line at which it ceases to be the most likely; one that may be two of them.
 pub fn read(path: impl AsRef<Path>) -> Result<LinearFile, IoError> {
     let path = path.as_ref();
-    let text = text(path)?;
+    parse(path, &text(path)?)
+}
+
+/// Reads the text of a file; `path` is its name in messages, and where it names `lcp` or `relay` it says which of these the file is.
+/// Errors: as [`read`].
+pub fn parse(path: impl AsRef<Path>, text: &str) -> Result<LinearFile, IoError> {
+    let path = path.as_ref();
     type Reader = fn(&mut Tokens, &Path) -> Result<Complementarity, IoError>;
     let kinds: [(&str, Reader); 3] =
         [("an MLCP", mixed), ("an MLCP of the old format", mixed_old), ("an LCP", lcp)];
@@ -40,7 +46,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<LinearFile, IoError> {
     // The mistake that was made last in the file: of the kind that fits best, the most frequent one among equals.
     let mut nearest: Option<(usize, IoError)> = None;
     for (name, reader) in kinds {
-        let mut tokens = Tokens::new(path, &text);
+        let mut tokens = Tokens::new(path, text);
         match reader(&mut tokens, path) {
             Ok(problem) => found.push((name, problem)),
             Err(e) => {

@@ -105,7 +105,9 @@ pub fn read(path: impl AsRef<Path>) -> Result<LinearFile, IoError> {
     parse(path, &text(path)?)
 }
 
-fn parse(path: &Path, text: &str) -> Result<LinearFile, IoError> {
+/// Reads the text of a file; `path` is its name in messages. Errors: as [`read`].
+pub fn parse(path: impl AsRef<Path>, text: &str) -> Result<LinearFile, IoError> {
+    let path = path.as_ref();
     let keys: Keys = toml::from_str(text).map_err(|e| {
         let line = e.span().map_or(1, |s| 1 + text[..s.start].matches('\n').count());
         IoError::data(
@@ -334,11 +336,17 @@ impl Keyed<'_> {
 /// Errors: a problem that is not valid or is known by its products only, a point that does not fit, what the system refuses.
 pub fn write(path: impl AsRef<Path>, content: &LinearFile) -> Result<(), IoError> {
     let path = path.as_ref();
-    check(path, content)?;
-    let text = format(content).ok_or_else(|| operator(path))?;
+    let text = to_text(path, content)?;
     replace(path, |temporary| {
         std::fs::write(temporary, &text).map_err(|e| IoError::os(path, WRITABLE, e))
     })
+}
+
+/// The text of the file that [`write`] makes; `path` is its name in messages. Errors: as [`write`], but for the system's.
+pub fn to_text(path: impl AsRef<Path>, content: &LinearFile) -> Result<String, IoError> {
+    let path = path.as_ref();
+    check(path, content)?;
+    format(content).ok_or_else(|| operator(path))
 }
 
 /// The refusal of a matrix without entries.

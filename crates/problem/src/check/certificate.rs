@@ -1,11 +1,12 @@
 //! Certificates that a problem has no solution.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::Impulses;
+use super::proof::ExactVector;
 
-/// Proof that a problem has no solution, verified by the problem's own judge from its data alone ([`crate::Problem::verify`]).
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// The claim that a problem has no solution, and why. What it is worth the problem's own judge says, from the data alone ([`crate::Problem::evidence`]).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "proof", rename_all = "snake_case")]
 pub enum Certificate {
     /// Frictional contact: normal impulses that no motion feels.
@@ -36,6 +37,11 @@ pub enum Certificate {
     Cones {
         /// The vectors y.
         separating: Vec<Vec<f64>>,
+    },
+    /// The same in exact numbers, for any kind of problem: vectors over the rows of its [`ConeSystem`](super::ConeSystem).
+    Separating {
+        /// The vectors.
+        vectors: Vec<ExactVector>,
     },
 }
 
@@ -76,10 +82,20 @@ impl std::fmt::Display for Certificate {
             Self::Ray { .. } => f.write_str(
                 "Lemke's secondary ray is a combination of rows that is negative for every z >= 0",
             ),
-            Self::Cones { separating } => {
-                let n = separating.len();
-                write!(f, "no complementary cone contains q, as {n} separating vectors show")
-            }
+            Self::Cones { separating } => no_cone(f, separating.len()),
+            Self::Separating { vectors } => no_cone(f, vectors.len()),
         }
+    }
+}
+
+fn no_cone(f: &mut std::fmt::Formatter<'_>, vectors: usize) -> std::fmt::Result {
+    match vectors {
+        1 => {
+            f.write_str("a combination of rows contradicts every solution (one separating vector)")
+        }
+        n => write!(
+            f,
+            "every choice of zeros contradicts the equations, as {n} separating vectors show"
+        ),
     }
 }

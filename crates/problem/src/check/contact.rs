@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::linalg::small::tangential_norm;
+use crate::linalg::Real;
 
 /// What a contact does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
@@ -25,68 +25,98 @@ pub struct ContactStatus {
     pub degenerate: bool,
 }
 
+/// `‖x_T‖` of `[x_N, x_T…]`.
+fn tangential<T: Real, const D: usize>(x: &[T; D]) -> T {
+    match D {
+        2 => x[1].modulus(),
+        3 => x[1].hypot(x[2]),
+        _ => x[1..].iter().fold(T::from(0.0), |length, &t| length.hypot(t)),
+    }
+}
+
+/// `‖x‖`.
+pub(super) fn length<T: Real, const D: usize>(x: &[T; D]) -> T {
+    x[0].hypot(tangential(x))
+}
+
 /// `ũ = u + mu‖u_T‖ e_N`, De Saxcé's modified velocity.
-pub(super) fn modified_velocity<const D: usize>(u: &[f64; D], mu: f64) -> [f64; D] {
+pub(super) fn modified_velocity<T: Real, const D: usize>(u: &[T; D], mu: f64) -> [T; D] {
     let mut modified = *u;
-    modified[0] += mu * tangential_norm(u);
+    modified[0] = modified[0] + T::from(mu) * tangential(u);
     modified
+}
+
+/// `1 + mu²` and its root.
+fn secant<T: Real>(mu: f64) -> (T, T) {
+    let square = T::from(1.0) + T::of_product(mu, mu);
+    (square, square.sqrt())
 }
 
 /// The nearest point of `K = {‖x_T‖ ≤ mu x_N}`, in the half-plane of `(x_N, ‖x_T‖)`:
 /// x itself inside, else its projection on the ray `(cos φ, sin φ)`, `tan φ = mu`, or the apex.
-pub(super) fn nearest_in_cone<const D: usize>(x: &[f64; D], mu: f64) -> [f64; D] {
-    let t = tangential_norm(x);
+pub(super) fn nearest_in_cone<T: Real, const D: usize>(x: &[T; D], mu: f64) -> [T; D] {
+    let (t, zero, friction) = (tangential(x), T::from(0.0), T::from(mu));
     // Without friction K is a half line: t = 0 alone does not put x on it.
-    if t <= mu * x[0] && x[0] >= 0.0 {
+    if t <= friction * x[0] && x[0] >= zero {
         return *x;
     }
-    let secant = (1.0 + mu * mu).sqrt();
-    let along = (x[0] + mu * t) / secant;
-    let mut p = [0.0; D];
-    if along > 0.0 {
-        p[0] = along / secant;
+    let (square, _) = secant::<T>(mu);
+    let along = x[0] + friction * t;
+    let mut p = [zero; D];
+    if along > zero {
+        p[0] = along / square;
         for k in 1..D {
-            p[k] = if t > 0.0 { mu * p[0] * (x[k] / t) } else { 0.0 };
+            p[k] = if t > zero { friction * p[0] * (x[k] / t) } else { zero };
         }
     }
     p
 }
 
 /// `dist(x, K)`.
-pub(super) fn distance_to_cone<const D: usize>(x: &[f64; D], mu: f64) -> f64 {
-    let p = nearest_in_cone(x, mu);
-    (0..D).map(|k| (x[k] - p[k]) * (x[k] - p[k])).sum::<f64>().sqrt()
+pub(super) fn distance_to_cone<T: Real, const D: usize>(x: &[T; D], mu: f64) -> T {
+    let t = tangential(x);
+    let outside = t - T::from(mu) * x[0];
+    if outside <= T::from(0.0) && x[0] >= T::from(0.0) {
+        T::from(0.0)
+    } else if x[0] + T::from(mu) * t <= T::from(0.0) {
+        length(x)
+    } else {
+        outside / secant::<T>(mu).1
+    }
 }
 
 /// `dist(y, K*)` with `K* = {mu‖y_T‖ ≤ y_N}`: by Moreau's decomposition the norm of the projection of −y on K.
-pub(super) fn distance_to_dual<const D: usize>(y: &[f64; D], mu: f64) -> f64 {
-    let p = nearest_in_cone(&y.map(|v| -v), mu);
-    p.iter().map(|v| v * v).sum::<f64>().sqrt()
+pub(super) fn distance_to_dual<T: Real, const D: usize>(y: &[T; D], mu: f64) -> T {
+    length(&nearest_in_cone(&y.map(|v| -v), mu))
 }
 
 /// The natural map `x − P_K(x − ũ)`.
 ///
 /// With `y = x − ũ` it is ũ where y lies in K, x where y lies in the polar cone, and else `ũ + d n` with the distance d of y
 /// from K and the outward normal n: the difference of x and a projection would round ũ away where x is large.
-pub(super) fn natural_map<const D: usize>(x: &[f64; D], modified: &[f64; D], mu: f64) -> [f64; D] {
+pub(super) fn natural_map<T: Real, const D: usize>(
+    x: &[T; D],
+    modified: &[T; D],
+    mu: f64,
+) -> [T; D] {
     let mut y = *x;
     for k in 0..D {
-        y[k] -= modified[k];
+        y[k] = y[k] - modified[k];
     }
-    let t = tangential_norm(&y);
-    let outside = t - mu * y[0];
-    if outside <= 0.0 && y[0] >= 0.0 {
+    let (t, zero, friction) = (tangential(&y), T::from(0.0), T::from(mu));
+    let outside = t - friction * y[0];
+    if outside <= zero && y[0] >= zero {
         return *modified;
     }
-    if y[0] + mu * t <= 0.0 {
+    if y[0] + friction * t <= zero {
         return *x;
     }
     // d n = (outside/secant) (−mu, y_T/t)/secant.
-    let scale = outside / (1.0 + mu * mu);
+    let scale = outside / secant::<T>(mu).0;
     let mut phi = *modified;
-    phi[0] -= mu * scale;
+    phi[0] = phi[0] - friction * scale;
     for k in 1..D {
-        phi[k] += scale * (y[k] / t);
+        phi[k] = phi[k] + scale * (y[k] / t);
     }
     phi
 }
@@ -102,7 +132,7 @@ pub(super) fn status<const D: usize>(
     for k in 0..D {
         y[k] -= modified[k];
     }
-    let t = tangential_norm(&y);
+    let t = tangential(&y);
     let secant = (1.0 + mu * mu).sqrt();
     // Signed distances of y into K and into its polar cone −K*.
     let into_cone = (mu * y[0] - t) / secant;

@@ -19,42 +19,63 @@
 
 use serde::Serialize;
 
-use super::Impulses;
 use super::contact::distance_to_cone;
+use super::proof::{Equation, exact, monotone, negative, satisfying};
+use super::{Certificate, Exact, ExactVector, Impulses, Monotone, Proof, rounded};
 use crate::linalg::small::{self, tangential_norm};
-use crate::linalg::{Compensated, Csc, is_positive_definite, norm};
+use crate::linalg::{Compensated, Csc, norm};
 use crate::{FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem};
 
-/// What is known of the existence of a solution.
+/// What is known of the existence of a solution. *Proved* is what holds in exact arithmetic on the stored doubles; what holds up to rounding is *nearly* so.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "verdict", rename_all = "snake_case")]
 pub enum Existence {
-    /// A solution exists: the criterion holds, with a verified motion.
+    /// A solution exists: the criterion holds, with a motion and a monotony that are proved.
     Proved {
         /// `v` of a global problem; the impulses and multipliers `(r', λ')` of a local one, which need not obey any law.
-        motion: Vec<f64>,
+        motion: ExactVector,
         /// The least of `(u_N − mu‖u_T‖)` over the size of the terms of u, over all contacts: a pure number. Zero is
         /// enough at contacts whose K* is a polyhedron.
         margin: f64,
-        /// What had to be added to the diagonal of M or W, in units of its mean, for the dynamics to be monotone: rounding at most,
-        /// or the digits with which W was stored.
+    },
+    /// A solution exists: here it is, exactly.
+    #[serde(rename = "proved")]
+    Solved {
+        /// The coefficients of the columns of the problem's [`crate::check::ConeSystem`].
+        coefficients: ExactVector,
+    },
+    /// The criterion holds up to rounding.
+    NearlyProved {
+        /// As above, in doubles.
+        motion: Vec<f64>,
+        /// As above.
+        margin: f64,
+        /// What has to be added to the diagonal of M or W, in units of each entry, for the dynamics to be monotone: rounding at most,
+        /// or the digits with which W was stored. Zero where only the motion is not exact.
         shift: f64,
     },
-    /// The criterion holds at most weakly: motions may touch K*, but verified impulses keep them out of its interior.
+    /// The criterion holds at most weakly: motions may touch K*, but impulses keep them out of its interior, up to rounding.
     /// A solution may or may not exist.
     Weak {
         /// `r ∈ K` that feels no motion and has no power.
         ray: Impulses,
     },
-    /// The criterion does not hold, with verified impulses. A solution may or may not exist.
+    /// The criterion does not hold, by impulses, up to rounding. A solution may or may not exist.
     CriterionRefuted {
         /// `r ∈ K` that feels no motion and has negative power.
         ray: Impulses,
     },
-    /// There is no solution, whatever the friction: a verified certificate.
+    /// There is no solution: proved.
     NoSolution {
-        /// Normal impulses that feel no motion and have negative power.
-        certificate: Impulses,
+        /// Normal impulses that feel no motion and have negative power (then there is none whatever the friction), or vectors that separate all cases.
+        proof: Proof,
+    },
+    /// There is no solution, up to rounding.
+    NearlyNoSolution {
+        /// Normal impulses that nearly feel no motion and have negative power.
+        certificate: Certificate,
+        /// The relative change of the data that would make it true.
+        change: f64,
     },
     /// Nothing could be verified.
     Unknown {
@@ -64,37 +85,86 @@ pub enum Existence {
 }
 
 impl Existence {
-    /// The verdict's name: `proved`, `weak`, `criterion_refuted`, `no_solution`, `unknown`.
+    /// The verdict's name: `proved`, `nearly_proved`, `weak`, `criterion_refuted`, `no_solution`, `nearly_no_solution`, `unknown`.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Proved { .. } => "proved",
+            Self::Proved { .. } | Self::Solved { .. } => "proved",
+            Self::NearlyProved { .. } => "nearly_proved",
             Self::Weak { .. } => "weak",
             Self::CriterionRefuted { .. } => "criterion_refuted",
             Self::NoSolution { .. } => "no_solution",
+            Self::NearlyNoSolution { .. } => "nearly_no_solution",
             Self::Unknown { .. } => "unknown",
+        }
+    }
+
+    /// Whether a solution is proved to exist.
+    pub fn is_proved(&self) -> bool {
+        matches!(self, Self::Proved { .. } | Self::Solved { .. })
+    }
+
+    /// What a motion that meets the criterion, by this margin, proves of the problem.
+    pub fn by_motion<P: Kinematic<D>, const D: usize>(
+        problem: &P,
+        kinematics: &Kinematics<D>,
+        motion: Vec<f64>,
+        margin: f64,
+    ) -> Self {
+        let exact = kinematics.exact_motion(&motion);
+        match (problem.monotone(), exact) {
+            (Monotone::Proved { .. }, Some((motion, margin))) => Self::Proved { motion, margin },
+            (Monotone::Proved { .. }, None) => Self::NearlyProved { motion, margin, shift: 0.0 },
+            (Monotone::Nearly { shift }, _) => {
+                // A shift of W moves u by as much, unless nothing moves.
+                if margin >= SHIFTED * shift || motion.iter().all(|&x| x == 0.0) {
+                    return Self::NearlyProved { motion, margin, shift };
+                }
+                Self::Unknown { why: "the criterion holds, but by less than W is indefinite".into() }
+            }
+            (Monotone::Unknown, _) => Self::Unknown {
+                why: "the criterion holds, but its theorem asks for more: M, or W on its range, is not positive definite".into(),
+            },
         }
     }
 }
 
+/// The margin must exceed the shift that makes W semidefinite by this factor.
+const SHIFTED: f64 = 10.0;
+
 impl std::fmt::Display for Existence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let cone = "a motion keeps all contacts in the dual cone";
         match self {
-            Self::Proved { margin, shift, .. } => {
-                let cone = "a motion keeps all contacts in the dual cone";
-                write!(f, "proved: {cone} (relative margin {margin:.1e})")?;
-                if *shift > SHIFTS[1] {
-                    write!(f, "; W is positive semidefinite up to {shift:.0e} of its diagonal only")?;
+            Self::Proved { margin, .. } => {
+                write!(f, "proved: {cone} (relative margin {margin:.1e})")
+            }
+            Self::Solved { .. } => f.write_str("proved: an exact solution is known"),
+            Self::NearlyProved { margin, shift, .. } => {
+                write!(f, "nearly proved: {cone} (relative margin {margin:.1e}), up to rounding only")?;
+                match shift {
+                    0.0 => f.write_str(": the motion meets the bilateral constraints nearly"),
+                    _ => write!(
+                        f,
+                        ": W is positive semidefinite for data that differ by {shift:.0e} of its diagonal"
+                    ),
                 }
-                Ok(())
             }
             Self::Weak { .. } => f.write_str(
-                "not known: motions reach the dual cone at most at its boundary (verified), which is not enough",
+                "not known: motions reach the dual cone at most at its boundary (up to rounding), which is not enough",
             ),
             Self::CriterionRefuted { .. } => f.write_str(
-                "not known: no motion keeps all contacts in the dual cone (verified); sliding may still make a solution",
+                "not known: no motion keeps all contacts in the dual cone (up to rounding); sliding may still make a solution",
             ),
-            Self::NoSolution { .. } => f.write_str(
-                "none: normal impulses that no motion feels prove that bodies are forced into each other, whatever the friction",
+            Self::NoSolution { proof } => match proof.certificate().impulses() {
+                Some(_) => f.write_str(
+                    "none, proved: normal impulses that no motion feels show that bodies are forced into each other, whatever the friction",
+                ),
+                None => write!(f, "none, proved: {proof}"),
+            },
+            Self::NearlyNoSolution { change, .. } => write!(
+                f,
+                "not known, nearly none: normal impulses that hardly feel any motion force bodies into each other; \
+                 a relative change of the data by {change:.0e} would prove it"
             ),
             Self::Unknown { why } => write!(f, "not known: {why}"),
         }
@@ -109,10 +179,9 @@ pub trait Kinematic<const D: usize>: Problem {
     /// The x of a point: v, or the impulses and multipliers.
     fn motion(point: &Self::Point) -> Vec<f64>;
 
-    /// The least of a few shifts, in units of the mean diagonal, that make the symmetric part of M, or of `[W, V; Vᵀ, R]`, positive
-    /// definite: M needs none, W is semidefinite at best and rounded. `None`: it is indefinite, and the theorem of existence
-    /// does not apply. Cost: a few sparse Cholesky factorisations.
-    fn monotone_up_to(&self) -> Option<f64>;
+    /// Whether the dynamics are monotone as the theorem asks: the symmetric part of M positive definite, or that of `[W, V; Vᵀ, R]`
+    /// semidefinite with its kernel in that of the matrix. Cost: a few sparse Cholesky factorisations.
+    fn monotone(&self) -> Monotone;
 }
 
 impl<const D: usize> Kinematic<D> for FrictionGlobal<D> {
@@ -132,8 +201,12 @@ impl<const D: usize> Kinematic<D> for FrictionGlobal<D> {
         point.v.clone()
     }
 
-    fn monotone_up_to(&self) -> Option<f64> {
-        is_positive_definite(&self.M, 0.0).then_some(0.0)
+    fn monotone(&self) -> Monotone {
+        match monotone(&self.M) {
+            // The motions of a semidefinite M need not be bounded; that of an invertible M cannot be nearly definite.
+            Monotone::Proved { definite: false } | Monotone::Nearly { .. } => Monotone::Unknown,
+            known => known,
+        }
     }
 }
 
@@ -168,15 +241,12 @@ impl<const D: usize> Kinematic<D> for FrictionLocal<D> {
         [&point.r[..], &point.lambda].concat()
     }
 
-    fn monotone_up_to(&self) -> Option<f64> {
+    fn monotone(&self) -> Monotone {
         let size = self.q.len() + self.multipliers();
-        let w = Csc::from_triplets(size, size, self.bordered().into_iter()).expect("in range");
-        SHIFTS.into_iter().find(|&shift| is_positive_definite(&w, shift))
+        monotone(&Csc::from_triplets(size, size, self.bordered().into_iter()).expect("in range"))
     }
 }
 
-/// The shifts that are tried for W: the first is rounding, the last the seven digits with which some files store W.
-const SHIFTS: [f64; 3] = [1e-12, 1e-9, 1e-6];
 /// An asymmetry of W below this is rounding, above it is meant.
 const NOISE: f64 = 1e-8;
 /// The relative rounding that "equals zero" forgives.
@@ -187,6 +257,10 @@ const NEGATIVE: f64 = 1e-8;
 const REACH: f64 = 1e4;
 /// What is forgiven where impulses should be in a cone.
 const INSIDE: f64 = 1e-14;
+/// The relative margin that no sum of fewer than 10⁷ terms in doubled precision, rounded a few times, can be mistaken about.
+const SURE: f64 = 1e-13;
+/// Rational operations that making a motion exact may cost.
+const REPAIR: usize = 200_000;
 /// The uncertainty of each number of the data, and of what is made of them.
 const UNCERTAINTY: f64 = 64.0 * f64::EPSILON;
 
@@ -277,19 +351,86 @@ impl<const D: usize> Kinematics<D> {
         Some(least)
     }
 
-    /// Whether `ray` proves that no motion has `u ∈ K*` at every contact.
+    /// The motion with its constraints satisfied exactly, and the relative margin by which it then meets the criterion, if it does, in exact
+    /// arithmetic: `u ∈ int K*`, or `u ∈ K*` at contacts whose K* is a polyhedron.
+    pub fn exact_motion(&self, x: &[f64]) -> Option<(ExactVector, f64)> {
+        if x.len() != self.rows.nrows() || x.iter().any(|x| !x.is_finite()) {
+            return None;
+        }
+        let m = self.contact_rows();
+        let terms = |i: usize| {
+            let (columns, values) = self.rows.column(i);
+            columns.iter().zip(values).map(|(&j, &a)| (j, exact(a))).collect()
+        };
+        let equations = (m..self.constant.len())
+            .map(|i| Equation { terms: terms(i), constant: exact(self.constant[i]) });
+        let given: Vec<Exact> = x.iter().map(|&x| exact(x)).collect();
+        let largest = x.iter().fold(0.0_f64, |l, x| l.max(x.abs())).max(1.0);
+        // Unknowns that are not used are the last to be moved.
+        let weights: Vec<f64> = x.iter().map(|x| x.abs().max(1e-3 * largest)).collect();
+        let x = ExactVector(satisfying(equations.collect(), &given, &weights, REPAIR)?);
+        let margin = self.exact_margin(&x)?;
+        Some((x, margin))
+    }
+
+    /// The relative margin by which a motion meets the criterion, if it does, in exact arithmetic.
+    pub fn exact_margin(&self, ExactVector(x): &ExactVector) -> Option<f64> {
+        let m = self.contact_rows();
+        if x.len() != self.rows.nrows() {
+            return None;
+        }
+        let row = |i: usize| {
+            let (columns, values) = self.rows.column(i);
+            let terms = columns.iter().zip(values).map(|(&j, &a)| exact(a) * &x[j]);
+            terms.fold(exact(self.constant[i]), |sum, term| sum + term)
+        };
+        if !(m..self.constant.len()).all(|i| row(i).is_zero()) {
+            return None;
+        }
+        let mut least = f64::INFINITY;
+        let near: Vec<f64> = x.iter().map(rounded).collect();
+        let doubles = near.iter().zip(x).all(|(near, x)| exact(*near) == *x);
+        for (c, &mu) in self.mu.iter().enumerate() {
+            // A margin beyond all rounding of doubled precision needs no closer look where x is made of doubles.
+            if doubles {
+                let rows: [(f64, f64); D] = std::array::from_fn(|k| self.row(D * c + k, &near));
+                let size = rows[0].1 + mu * rows[1..].iter().map(|r| r.1).sum::<f64>();
+                let gap = rows[0].0 - mu * tangential_norm(&rows.map(|r| r.0));
+                if gap > SURE * size && size.is_finite() {
+                    least = least.min(gap / size);
+                    continue;
+                }
+            }
+            let u: [Exact; D] = std::array::from_fn(|k| row(D * c + k));
+            let tangential = u[1..].iter().fold(Exact::ZERO, |sum, t| sum + t * t);
+            let mu_exact = exact(mu);
+            let gap = &u[0] * &u[0] - &mu_exact * &mu_exact * &tangential;
+            let polyhedral = D == 2 || mu == 0.0;
+            let inside = !negative(&u[0]) && !negative(&gap);
+            if !inside || (!polyhedral && (u[0].is_zero() || gap.is_zero())) {
+                return None;
+            }
+            let normal = rounded(&u[0]);
+            let gap = normal - mu * rounded(&tangential).sqrt();
+            let size = self.row(D * c, &near).1 + mu * rounded(&tangential).sqrt();
+            least = least.min(if size > 0.0 { (gap / size).max(0.0) } else { 0.0 });
+        }
+        Some(least)
+    }
+
+    /// Whether `ray` proves, up to rounding, that no motion has `u ∈ K*` at every contact.
     pub fn refutes_criterion(&self, ray: &Impulses) -> bool {
         self.felt(ray, &self.mu).is_some_and(|felt| self.power(ray).is_negative(felt))
     }
 
-    /// Whether `ray` proves that no motion has `u ∈ int K*` at every contact.
+    /// Whether `ray` proves, up to rounding, that no motion has `u ∈ int K*` at every contact.
     pub fn refutes_interior(&self, ray: &Impulses) -> bool {
         let power = self.power(ray);
         let some = ray.r.iter().any(|&r| r != 0.0);
         some && self.felt(ray, &self.mu).is_some() && power.sum <= NEGATIVE * power.size
     }
 
-    /// Whether `certificate` proves that no motion has `u_N ≥ 0` at every contact, and so that there is no solution.
+    /// Whether `certificate` proves, up to rounding, that no motion has `u_N ≥ 0` at every contact, and so that there is no solution.
     pub fn refutes(&self, certificate: &Impulses) -> bool {
         let felt = self.felt(certificate, &vec![0.0; self.mu.len()]);
         felt.is_some_and(|felt| self.power(certificate).is_negative(felt))
@@ -306,7 +447,7 @@ impl<const D: usize> Kinematics<D> {
             return None;
         }
         let inside = |(c, &mu): (usize, &f64)| {
-            distance_to_cone::<D>(&small::block(r, c), mu) <= INSIDE * scale
+            distance_to_cone(&small::block::<D>(r, c), mu) <= INSIDE * scale
         };
         if !mu.iter().enumerate().all(inside) {
             return None;
@@ -400,7 +541,7 @@ mod tests {
     fn a_body_on_a_floor_can_leave_it() {
         let p = touching(&[UP], &[-1.0, 0.3, 0.0], 0.5);
         let k = p.kinematics();
-        assert_eq!(p.monotone_up_to(), Some(0.0));
+        assert_eq!(p.monotone(), Monotone::Proved { definite: true });
         assert_eq!(k.margin(&[0.0, 0.0, 0.5]), None);
         let margin = k.margin(&[0.0, 0.0, 2.0]).unwrap();
         assert!((0.1..1.0).contains(&margin), "{margin}");
@@ -465,7 +606,7 @@ mod tests {
         for (bilateral, skew) in [(0, 0.0), (0, 0.1), (3, 0.0)] {
             let case = Planted { contacts: 4, dofs: 18, bilateral, skew, ..Planted::default() };
             let (local, point) = case.local::<3>();
-            assert_eq!(local.monotone_up_to(), Some(SHIFTS[0]));
+            assert_ne!(local.monotone(), Monotone::Unknown);
             let k = local.kinematics();
             let x = FrictionLocal::<3>::motion(&point);
             let u = local.velocity(&point);
@@ -473,15 +614,17 @@ mod tests {
             assert!((12..12 + bilateral).all(|i| k.row(i, &x).0.abs() < 1e-12));
         }
         let (mut local, _) = Planted { contacts: 2, ..Planted::default() }.local::<2>();
-        local.W = Bsr::from_csc(&Csc::diagonal(&[1.0, 1.0, -1.0, 1.0]));
-        assert_eq!(local.monotone_up_to(), None);
-        local.W = Bsr::from_csc(&Csc::diagonal(&[1.0, 0.0, 0.0, 1.0]));
-        assert_eq!(local.monotone_up_to(), Some(SHIFTS[0]), "semidefinite is enough");
-        local.W = Bsr::from_csc(&Csc::diagonal(&[1.0, -1e-8, 0.0, 1.0]));
-        assert_eq!(local.monotone_up_to(), Some(SHIFTS[2]));
+        let mut with = |d: [f64; 4]| {
+            local.W = Bsr::from_csc(&Csc::diagonal(&d));
+            local.monotone()
+        };
+        assert_eq!(with([1.0, 1.0, -1.0, 1.0]), Monotone::Unknown);
+        assert_eq!(with([1.0, 0.0, 0.0, 1.0]), Monotone::Proved { definite: false });
+        assert_eq!(with([1e9, -1e-8, 0.0, 1.0]), Monotone::Unknown, "no mean hides it");
+        with([1.0; 4]);
         let (v, r) = (Csc::zeros(4, 1), Csc::diagonal(&[-1.0]));
         local.bilateral = Some(BilateralLocal { V: v, R: r, s: vec![0.0] });
-        assert_eq!(local.monotone_up_to(), None);
+        assert_eq!(local.monotone(), Monotone::Unknown);
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! The judge of the global problem.
 
-use super::local::{LawGauge, ROUNDING, worst};
-use super::rows::Rows;
+use super::local::{HALF_ULP, LawGauge, ROUNDING, unit, worst};
+use super::rows::{Rows, doubt};
 use super::{Measure, over};
-use crate::linalg::{Csc, Delassus, Inverse, Refine, norm, small};
+use crate::linalg::{Csc, Delassus, Doubled, Inverse, Refine, norm, norm_of, small};
 use crate::{Dynamics, FrictionGlobal, GlobalPoint, ProblemError};
 
 /// The judge's constants and buffers for a [`FrictionGlobal`]: among them its own factorisation of the dynamics.
@@ -15,9 +15,114 @@ pub struct GlobalGauge {
     free: Option<(Inverse, Vec<f64>)>,
     /// w_c belongs to this H.
     h: Csc,
+    reach: Reach,
+    q: Vec<f64>,
     u: Vec<f64>,
+    /// u with all its digits.
+    exact: Vec<Doubled>,
+    own: State,
     buffer: Vec<f64>,
     rows: Rows,
+}
+
+/// The judge's own v and λ: high and low parts, what is not known of them, and room for more.
+#[derive(Debug, Clone)]
+struct State {
+    high: Vec<f64>,
+    low: Vec<f64>,
+    last: Vec<f64>,
+    spare: Vec<f64>,
+}
+
+/// What it takes to know the size of the terms of each velocity: `|w| + |H|ᵀ|M⁻¹|(|f| + |H||r| + |G||λ|)`.
+#[derive(Debug, Clone, Default)]
+struct Reach {
+    /// Small components of M: their unknowns and `|M⁻¹|` there.
+    small: Vec<(Vec<usize>, Vec<f64>)>,
+    /// Contacts of large components, whose inverse is not known by entries, by component.
+    large: Vec<Vec<usize>>,
+    sizes: Vec<f64>,
+    load: Vec<f64>,
+}
+
+/// Components of M whose inverse is formed.
+const SMALL: usize = 48;
+
+impl Reach {
+    fn new<const D: usize>(h: &Csc, inverse: &Inverse) -> Self {
+        let mut reach = Self { load: vec![0.0; h.nrows()], ..Self::default() };
+        reach.sizes.resize(h.ncols(), 0.0);
+        let (mut column, mut scratch) = (vec![], vec![0.0; inverse.scratch_len()]);
+        let mut place = vec![usize::MAX; inverse.component_sizes().len()];
+        for (k, n) in inverse.component_sizes().enumerate() {
+            if n > SMALL {
+                place[k] = reach.large.len();
+                reach.large.push(vec![]);
+                continue;
+            }
+            let mut entries = vec![0.0; n * n];
+            for j in 0..n {
+                column.clear();
+                column.resize(n, 0.0);
+                column[j] = 1.0;
+                inverse.solve_component(k, &mut column, &mut scratch, Refine::Once);
+                column.iter().enumerate().for_each(|(i, x)| entries[i * n + j] = x.abs());
+            }
+            reach.small.push((inverse.component(k).to_vec(), entries));
+        }
+        for i in 0..h.ncols() {
+            for &row in h.column(i).0 {
+                let component = place[inverse.component_of(row)];
+                if component != usize::MAX && reach.large[component].last() != Some(&(i / D)) {
+                    reach.large[component].push(i / D);
+                }
+            }
+        }
+        reach.large.iter_mut().for_each(Vec::dedup);
+        reach
+    }
+
+    /// The sizes of the terms of each velocity for the impulses r and the multipliers.
+    fn update<const D: usize>(
+        &mut self,
+        problem: &FrictionGlobal<D>,
+        w: &[f64],
+        r: &[f64],
+        (v, lambda): (&[f64], &[f64]),
+        spare: &mut [f64],
+    ) {
+        let Self { small, large, sizes, load } = self;
+        load.iter_mut().zip(&problem.f).for_each(|(load, f)| *load = f.abs());
+        let mut add = |a: &Csc, x: &[f64]| {
+            for (j, xj) in x.iter().enumerate() {
+                let (rows, values) = a.column(j);
+                rows.iter().zip(values).for_each(|(&i, v)| load[i] += (v * xj).abs());
+            }
+        };
+        add(&problem.H, r);
+        if let Some(b) = &problem.bilateral {
+            add(&b.G, lambda);
+        }
+        // Of a large component at least what comes of it.
+        spare.copy_from_slice(v);
+        for (index, entries) in &*small {
+            let n = index.len();
+            for (row, &i) in entries.chunks(n).zip(index) {
+                spare[i] = row.iter().zip(index).map(|(m, &j)| m * load[j]).sum();
+            }
+        }
+        for (i, size) in sizes.iter_mut().enumerate() {
+            let (rows, values) = problem.H.column(i);
+            let terms = rows.iter().zip(values).map(|(&j, h)| (h * spare[j]).abs());
+            *size = problem.w[i].abs() + terms.sum::<f64>();
+        }
+        // |W_cj| ≤ √(w_c w_j).
+        for contacts in &*large {
+            let of = |c: usize| w[c].sqrt() * norm(&r[D * c..D * c + D]);
+            let sum: f64 = contacts.iter().map(|&c| of(c)).sum();
+            contacts.iter().for_each(|&c| sizes[D * c] += w[c].sqrt() * sum);
+        }
+    }
 }
 
 impl GlobalGauge {
@@ -34,12 +139,23 @@ impl GlobalGauge {
         };
         let inverse = free.as_ref().map_or(&dynamics.inverse, |f| &f.0);
         let diagonal = Delassus::<D>::diagonal(&problem.H, inverse);
+        let (m, n) = (problem.w.len(), problem.dofs() + problem.multipliers());
+        let zeros = vec![0.0; n];
         let mut gauge = Self {
             law: LawGauge::new(diagonal.iter().map(small::mean_diagonal)),
+            reach: Reach::new::<D>(&problem.H, inverse),
             dynamics,
             free,
             h: problem.H.clone(),
-            u: vec![0.0; problem.w.len()],
+            q: vec![0.0; m],
+            u: vec![0.0; m],
+            exact: vec![Doubled::default(); m],
+            own: State {
+                high: zeros.clone(),
+                low: zeros.clone(),
+                last: zeros,
+                spare: vec![0.0; n.max(m)],
+            },
             buffer: vec![0.0; problem.dofs()],
             rows: Rows::default(),
         };
@@ -62,19 +178,30 @@ impl GlobalGauge {
         Ok(())
     }
 
-    /// `‖q‖` from the present f and w.
+    /// q from the present f and w, in doubled precision before it is rounded: of a body nearly at rest its terms cancel.
     fn rescale<const D: usize>(&mut self, problem: &FrictionGlobal<D>) {
-        match &mut self.free {
+        let Self { dynamics, free, own, rows, q, law, .. } = self;
+        let n = problem.dofs();
+        let State { high, low, last, .. } = own;
+        match free {
             None => {
-                let _ = self.dynamics.free_velocity(problem, &mut self.u);
+                q.fill(0.0);
+                dynamics.solve_doubled(problem, q, [high, low, last]);
             }
             Some((free, scratch)) => {
-                self.buffer.copy_from_slice(&problem.f);
-                free.solve_with(&mut self.buffer, scratch, Refine::Fully);
-                problem.velocity_into(&self.buffer, &mut self.u);
+                high[..n].copy_from_slice(&problem.f);
+                low.fill(0.0);
+                let parts = [&mut high[..n], &mut low[..n], &mut last[..n]];
+                let [high, low, last] = parts;
+                free.solve_doubled(high, low, last, scratch);
             }
         }
-        self.law.norm_q = norm(&self.u);
+        rows.precisely(true);
+        rows.start(&problem.w);
+        rows.add_transposed(&problem.H, &high[..n]);
+        rows.add_transposed(&problem.H, &low[..n]);
+        q.iter_mut().zip(rows.values()).for_each(|(q, x)| *q = x);
+        law.norm_q = norm(q);
     }
 
     pub(crate) fn measure<const D: usize>(
@@ -83,39 +210,81 @@ impl GlobalGauge {
         point: &GlobalPoint,
         precisely: bool,
     ) -> Measure {
-        let Self { law, dynamics, u, buffer, rows, .. } = self;
+        let Self { law, dynamics, reach, u, exact, own: state, buffer, rows, .. } = self;
+        let (n, mu) = (problem.dofs(), &problem.mu[..]);
         rows.precisely(precisely);
-        rows.start_at_zero(problem.dofs());
+        rows.start_at_zero(n);
         rows.add(1.0, &problem.H, &point.r);
         let force = norm(&problem.f).max(rows.norm());
-        let given = imbalance(problem, &point.v, &point.r, &point.lambda, force, rows);
-        let (v, lambda) = dynamics.solve(problem, &point.r, Refine::Fully);
-        let own = imbalance(problem, v, &point.r, lambda, force, rows);
+        let given = imbalance(problem, (&point.v, &[]), &point.r, &point.lambda, force, rows);
+        let State { high, low, last, spare } = state;
+        if precisely {
+            dynamics.solve_doubled(problem, &point.r, [high, low, last]);
+        } else {
+            let (v, lambda) = dynamics.solve(problem, &point.r, Refine::Fully);
+            high[..n].copy_from_slice(v);
+            high[n..].copy_from_slice(lambda);
+            low.fill(0.0);
+        }
+        let ((v, lambda), (v_low, _)) = (high.split_at(n), low.split_at(n));
+        let own = imbalance(problem, (v, v_low), &point.r, lambda, force, rows);
+        reach.update(problem, &law.w, &point.r, (v, lambda), &mut spare[..n]);
         rows.start(&problem.w);
         rows.add_transposed(&problem.H, v);
-        u.iter_mut().zip(rows.values()).for_each(|(u, x)| *u = x);
-        let mut measure = law.measure::<D>(&point.r, u, &problem.mu);
+        let mut measure = if precisely {
+            rows.add_transposed(&problem.H, v_low);
+            exact.iter_mut().zip(rows.doubled()).for_each(|(u, x)| *u = x);
+            u.iter_mut().zip(rows.values()).for_each(|(u, x)| *u = x);
+            let all = doubt(n + u.len());
+            let (h, sums, sizes) = (&problem.H, rows.sizes(), &reach.sizes);
+            let doubt = |i: usize| {
+                let (at, values) = h.column(i);
+                let of_v: f64 = at.iter().zip(values).map(|(&j, h)| (h * last[j]).abs()).sum();
+                of_v + all * (sums[i] + sizes[i])
+            };
+            law.measure::<_, D>(&point.r, exact, sizes, doubt, mu)
+        } else {
+            u.iter_mut().zip(rows.values()).for_each(|(u, x)| *u = x);
+            law.measure::<f64, D>(&point.r, u, &reach.sizes, |_| 0.0, mu)
+        };
 
         let worse = |a: f64, b: f64| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) };
         measure.dynamics = Some(worse(given.residual, own.residual));
         measure.dynamics_rounding = Some(given.rounding.max(own.rounding));
-        for ((gap, a), b) in buffer.iter_mut().zip(&point.v).zip(v) {
-            *gap = a - b;
+        for (i, gap) in buffer.iter_mut().enumerate() {
+            *gap = (point.v[i] - v[i]) - v_low[i];
+        }
+        // What a solve in plain arithmetic leaves of a component of M is no gap.
+        let inverse = &dynamics.inverse;
+        for k in 0..inverse.component_sizes().len() {
+            let index = || inverse.component(k).iter().filter(|&&i| i < n);
+            let largest = index().fold(0.0_f64, |l, &i| l.max(v[i].abs()));
+            for &i in index() {
+                if buffer[i].abs() <= 2.0 * f64::EPSILON * largest {
+                    buffer[i] = 0.0;
+                }
+            }
         }
         rows.start_at_zero(problem.w.len());
         rows.add_transposed(&problem.H, buffer);
         measure.velocity_gap = Some(over(rows.norm(), law.norm_q));
 
         if let Some(b) = &problem.bilateral {
-            // |Gᵀ v + b| against its terms, or against what velocities of a typical size would make of them.
-            let typical = point.v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            // |Gᵀ v + b| against its terms, beyond what the rounding of velocities of a typical size makes of them.
+            let unit = |i: usize| unit(problem.M.get(i, i));
+            let typical = (0..n).fold(0.0_f64, |t, i| t.max(point.v[i].abs() * unit(i)));
             rows.start(&b.b);
             rows.add_transposed(&b.G, &point.v);
-            let shares = rows.values().zip(rows.sizes()).enumerate().map(|(j, (sum, size))| {
-                let weight: f64 = b.G.column(j).1.iter().map(|g| g.abs()).sum();
-                (sum, size + ROUNDING * typical * weight)
+            let shares = rows.values().zip(rows.sizes()).enumerate().map(|(j, (sum, &size))| {
+                let (at, values) = b.G.column(j);
+                let weight: f64 = at.iter().zip(values).map(|(&i, g)| g.abs() / unit(i)).sum();
+                (sum, size, ROUNDING * typical * weight)
             });
             measure.bilateral = Some(worst(shares));
+        }
+        if precisely {
+            let signed = &mut spare[..problem.w.len()];
+            measure.floor = Some(floor(problem, &point.r, law, dynamics, signed));
         }
         measure
     }
@@ -126,16 +295,35 @@ impl GlobalGauge {
     }
 }
 
+/// What the rounding of r to doubles alone makes of the residual, in the root mean square: by one response to
+/// impulses of the size of that rounding with signs in no order, since W itself is not known.
+fn floor<const D: usize>(
+    problem: &FrictionGlobal<D>,
+    r: &[f64],
+    law: &LawGauge,
+    dynamics: &mut Dynamics,
+    signed: &mut [f64],
+) -> f64 {
+    for (i, (signed, r)) in signed.iter_mut().zip(r).enumerate() {
+        // The sign of a fixed hash of the place.
+        let hash = (i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_mul(i as u64 | 1);
+        *signed = if hash >> 63 == 0 { *r } else { -r };
+    }
+    let response = dynamics.respond(problem, signed, Refine::Once);
+    let of_column = |i: usize| problem.H.column_dot(i, response);
+    HALF_ULP * norm_of((0..problem.w.len()).map(of_column)) / law.unit()
+}
+
 /// The residual of the dynamics and what of it the rounding of v explains.
 struct Imbalance {
     residual: f64,
     rounding: f64,
 }
 
-/// `‖M v − H r − f − G λ‖` over `force = max(‖f‖, ‖H r‖)`.
+/// `‖M v − H r − f − G λ‖` over `force = max(‖f‖, ‖H r‖)`; v may have a low part.
 fn imbalance<const D: usize>(
     problem: &FrictionGlobal<D>,
-    v: &[f64],
+    (v, v_low): (&[f64], &[f64]),
     r: &[f64],
     lambda: &[f64],
     force: f64,
@@ -147,6 +335,7 @@ fn imbalance<const D: usize>(
         rows.add(1.0, &b.G, lambda);
     }
     rows.add(-1.0, &problem.M, v);
+    rows.add(-1.0, &problem.M, v_low);
     Imbalance {
         residual: over(rows.norm(), force),
         rounding: over(16.0 * f64::EPSILON * norm(rows.sizes()), force),

@@ -1,19 +1,19 @@
-//! The judge of linear complementarity problems, and the verification of their certificates.
+//! The judge of linear complementarity problems.
 
 use serde::Serialize;
 
 use super::rows::Rows;
-use super::{Certificate, Judged, Measure, Verdict, over};
-use crate::linalg::{Compensated, Matrix, norm};
+use super::{Judged, Measure, Verdict};
+use crate::linalg::{Matrix, norm};
 use crate::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem, ProblemError};
 
 /// The data of a problem in z with `w = M z + q`: row i belongs to an equality, or to the variable `free + i − equalities`.
 pub(crate) struct Data<'a> {
-    matrix: &'a Matrix,
-    q: &'a [f64],
-    equalities: usize,
-    free: usize,
-    bounds: Option<(&'a [f64], &'a [f64])>,
+    pub(super) matrix: &'a Matrix,
+    pub(super) q: &'a [f64],
+    pub(super) equalities: usize,
+    pub(super) free: usize,
+    pub(super) bounds: Option<(&'a [f64], &'a [f64])>,
 }
 
 pub(crate) trait Stated {
@@ -42,12 +42,12 @@ impl Stated for BoxLcp {
 
 impl Data<'_> {
     /// The variable of row i; `None` of an equality.
-    fn variable(&self, i: usize) -> Option<usize> {
+    pub(super) fn variable(&self, i: usize) -> Option<usize> {
         i.checked_sub(self.equalities).map(|k| self.free + k)
     }
 
     /// The bounds of the variable of row i.
-    fn bounds(&self, i: usize) -> (f64, f64) {
+    pub(super) fn bounds(&self, i: usize) -> (f64, f64) {
         match self.bounds {
             Some((lower, upper)) => (lower[i], upper[i]),
             None if i < self.equalities => (f64::NEG_INFINITY, f64::INFINITY),
@@ -65,40 +65,73 @@ impl Data<'_> {
     }
 }
 
+/// What an error is that nothing can be compared with: never accepted, and still finite.
+const NEVER: f64 = f64::MAX;
+/// Below this, products have rounding errors that no double holds.
+const TINY: f64 = 1e-270;
+/// So many times a row without a unit of its own looks for one in the columns that have one, and conversely.
+const GENERATIONS: usize = 50;
+/// In the units of the problem, not of the point: a distance of this size may be rounding,
+const ROUNDING: f64 = 1e-12;
+/// and one so much smaller than the partner's.
+const SMALLER: f64 = 1e-3;
+
 /// The judge's constants and buffers for an LCP, an MLCP or a box LCP.
 ///
-/// With `s_i` the largest modulus in row i of M (1 of an empty row or an operator without diagonal), `x_i = s_i z_i`, and P the projection on the bounds of
-/// `x_i`, here for an LCP:
+/// The error of row i is `|w_i| / D_i` (0/0 = 0), `D_i = min(Σ_j |M_ij||z_j| + |q_i|, ω_i)`. That a variable is d away from a bound counts as much as what it does
+/// to the rows: `max_k |M_kj| d / D_k`. Therefore neither changes when rows or columns of the problem are multiplied by numbers.
 ///
 /// | field of [`Measure`] | formula |
 /// | --- | --- |
-/// | `absolute` | `‖(x_i − P(x_i − w_i))_i‖₂ = ‖(min(x_i, w_i))_i‖₂`, in the unit of q |
-/// | `relative` | `absolute / ‖q‖₂`, with q = 0 `absolute` itself |
-/// | `rows` | `max_i |min(σ_i z_i, w_i)| / (|q_i| + σ_i ‖z‖_∞)`, `σ_i = Σ_j |M_ij|`: the same whatever the scale of row i |
+/// | `primal` | the largest `d_j` of a variable beyond a bound |
+/// | `dual` | the largest error of an equality, and of a w whose sign no bound allows |
+/// | `complementarity` | the largest error of a pair: the smaller of that of w and that of the distance from the bound that the sign of w asks for |
+/// | `relative` | the largest of the three; **decides** |
+/// | `absolute` | `‖(min(s_i z_i, w_i))_i‖₂`, `s_i` the largest modulus in row i, in the unit of q |
 /// | `paper`, `peer` | `‖min(z, w)‖₂ / ‖q‖₂`, as Siconos has it for an LCP |
 ///
-/// `relative` and `rows` decide. An equality counts with `w_i`. Both bounds finite: `min` becomes the distance to the projection.
+/// The unit `ω_i` is what q and the bounds make of row i: `ω_i = max(|q_i|, max_j |M_ij| ζ_j)`, where `ζ_j = max_k |q_k| / |M_kj|`, at least the smaller
+/// modulus of two finite bounds, is the unit of column j; what has no unit looks for one a few times further on, then only the first term counts. Without it a z that
+/// runs to infinity in the kernel of M would solve every problem. The relative error is thus one of q as well as one of the whole row.
+///
+/// A variable with an empty column is wrong unless it is exactly where it should be. Of an operator only products are known: `D_i = |q_i| + |(M z)_i| + s_i |z_i|`, and
+/// a distance counts with `s_i / D_i`, `s_i` the modulus of the diagonal entry (1 where unknown).
 #[derive(Debug, Clone, Default)]
 pub struct LinearGauge {
     norm_q: f64,
     /// s
     largest: Vec<f64>,
-    /// σ
-    sums: Vec<f64>,
+    /// ω
+    units: Vec<f64>,
+    /// `max_k |M_kj| / ω_k`
+    columns: Vec<f64>,
+    /// Whether what has no unit has no connection with q either.
+    closed: bool,
+    /// D at the point last measured.
+    scales: Vec<f64>,
+    /// `max_k |M_kj| / D_k` at the point last measured.
+    effects: Vec<f64>,
     w: Vec<f64>,
     rows: Rows,
 }
 
-/// What the judge adds up, row by row.
-struct Sum {
-    unit: f64,
-    scaled: f64,
-    plain: f64,
-    primal: f64,
-    dual: f64,
-    complementarity: f64,
-    rows: f64,
-    worst: (usize, f64),
+/// The judge's constants and buffers for a horizontal LCP.
+///
+/// As for [`LinearGauge`]: the rows `Q x + R s − q` are equalities with `D_i = min(Σ_j |Q_ij||x_j| + Σ_j |R_ij||s_j| + |q_i|, ω_i)`, and a pair is as good as the
+/// better one of x and s is zero: `min(max_k |Q_kj| x_j / D_k, max_k |R_kj| s_j / D_k)`. `absolute` is that of the equalities and of `min(c_j x_j, d_j s_j)`, with
+/// `c_j`, `d_j` the largest moduli in column j of Q and R. The rows of pairs follow those of the equalities.
+#[derive(Debug, Clone, Default)]
+pub struct HlcpGauge {
+    norm_q: f64,
+    c: Vec<f64>,
+    d: Vec<f64>,
+    units: Vec<f64>,
+    columns: [Vec<f64>; 2],
+    closed: bool,
+    scales: Vec<f64>,
+    effects: [Vec<f64>; 2],
+    w: Vec<f64>,
+    rows: Rows,
 }
 
 /// `x − P(x − w)`, P the projection on `[l, u]`. Zero where x and w obey the law.
@@ -113,14 +146,142 @@ fn natural(x: f64, w: f64, l: f64, u: f64) -> f64 {
     }
 }
 
-/// The part of w that its law does not allow, for a variable with these bounds.
-fn dual_violation(w: f64, l: f64, u: f64) -> f64 {
-    match (l.is_finite(), u.is_finite()) {
-        (true, true) => 0.0,
-        (true, false) => (-w).max(0.0),
-        (false, true) => w.max(0.0),
-        (false, false) => w.abs(),
+/// The error of a sum in units of D.
+fn share(w: f64, scale: f64) -> f64 {
+    if w == 0.0 {
+        0.0
+    } else if scale > 0.0 && scale.is_finite() || scale.is_nan() {
+        capped(w.abs() / scale)
+    } else {
+        NEVER
     }
+}
+
+/// The error of a distance that matters so much.
+fn distance(d: f64, effect: f64) -> f64 {
+    if d == 0.0 {
+        0.0
+    } else if effect == 0.0 {
+        // Nothing feels it, so that nothing hinders it from being exact.
+        NEVER
+    } else {
+        capped(d * effect)
+    }
+}
+
+/// As [`distance`], of one that may be undone: what nothing feels does not matter.
+fn matters(d: f64, effect: f64) -> f64 {
+    if d == 0.0 { 0.0 } else { d * effect }
+}
+
+/// Finite unless not a number.
+fn capped(x: f64) -> f64 {
+    if x > NEVER { NEVER } else { x }
+}
+
+/// The larger one; a NaN is the worst there is.
+fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
+/// A variable, its bounds and its partner.
+struct Pair {
+    z: f64,
+    l: f64,
+    u: f64,
+    /// Of w only the sign counts,
+    w: f64,
+    /// and its error as a sum that should be zero.
+    error: f64,
+    /// What a distance of z counts.
+    effect: f64,
+}
+
+impl Pair {
+    /// The bound that the sign of w asks for.
+    fn towards(&self) -> f64 {
+        if self.w > 0.0 { self.l } else { self.u }
+    }
+
+    fn primal(&self) -> f64 {
+        distance((self.l - self.z).max(self.z - self.u).max(0.0), self.effect)
+    }
+
+    fn dual(&self) -> f64 {
+        if self.w == 0.0 || self.towards().is_finite() { 0.0 } else { self.error }
+    }
+
+    fn complementarity(&self) -> f64 {
+        let bound = self.towards();
+        if self.w.is_nan() {
+            f64::NAN
+        } else if self.w == 0.0 || !bound.is_finite() {
+            0.0
+        } else {
+            self.error.min(distance((self.z - bound).abs(), self.effect))
+        }
+    }
+
+    fn worst(&self) -> f64 {
+        worse(worse(self.primal(), self.dual()), self.complementarity())
+    }
+
+    fn status(&self) -> RowStatus {
+        let Self { z, l, u, w, error, effect } = *self;
+        if w >= 0.0 && distance((z - l).max(0.0), effect) <= error {
+            RowStatus::Lower
+        } else if w <= 0.0 && distance((u - z).max(0.0), effect) <= error {
+            RowStatus::Upper
+        } else {
+            RowStatus::Inside
+        }
+    }
+
+    fn degenerate(&self, tolerance: f64) -> bool {
+        let nearest = (self.z - self.l).abs().min((self.u - self.z).abs());
+        self.l < self.u && self.error <= tolerance && distance(nearest, self.effect) <= tolerance
+    }
+
+    /// z between its bounds, and on the one that w asks for where that is no worse than to let z be.
+    fn tidied(&self) -> f64 {
+        let z = self.z.max(self.l).min(self.u);
+        let bound = self.towards();
+        let better = self.w != 0.0
+            && bound.is_finite()
+            && matters((z - bound).abs(), self.effect) <= self.error;
+        if better { bound } else { z }
+    }
+
+    /// As [`tidied`](Self::tidied) in the units of the problem, in which rows of nothing but rounding hide nothing: z and w count `distance` and `size` a unit.
+    /// A z that no unit reaches is as well on its bound.
+    fn boldly_tidied(&self, distance: f64, size: f64) -> f64 {
+        let z = self.z.max(self.l).min(self.u);
+        let w = (self.w * size).abs();
+        let near = |bound: f64| {
+            let d = matters((z - bound).abs(), distance);
+            bound.is_finite() && (d <= SMALLER * w || d.max(w) <= ROUNDING)
+        };
+        let bound = self.towards();
+        let other = if self.w > 0.0 { self.u } else { self.l };
+        if near(bound) {
+            bound
+        } else if w <= ROUNDING && near(other) {
+            other
+        } else {
+            z
+        }
+    }
+}
+
+/// What the judge adds up, row by row.
+struct Sum {
+    unit: f64,
+    scaled: f64,
+    plain: f64,
+    primal: f64,
+    dual: f64,
+    complementarity: f64,
+    worst: (usize, f64),
 }
 
 impl Sum {
@@ -132,95 +293,138 @@ impl Sum {
             primal: 0.0,
             dual: 0.0,
             complementarity: 0.0,
-            rows: 0.0,
             worst: (0, -1.0),
         }
     }
 
-    /// A pair of z with bounds and w. `s` makes z comparable to w in the sums; `sigma` in its row, whose terms have the size `terms`.
-    #[allow(clippy::too_many_arguments)]
-    fn pair(
-        &mut self,
-        i: usize,
-        z: f64,
-        w: f64,
-        (l, u): (f64, f64),
-        s: f64,
-        sigma: f64,
-        terms: f64,
-    ) {
-        let (x, sl, su) = (s * z, s * l, s * u);
-        self.add(i, natural(x, w, sl, su));
+    /// A pair with its partner in the unit of w; `s` makes z comparable to it.
+    fn pair(&mut self, i: usize, pair: &Pair, s: f64) {
+        let Pair { z, l, u, w, .. } = *pair;
+        self.scaled += (natural(s * z, w, s * l, s * u) / self.unit).powi(2);
         self.plain += (natural(z, w, l, u) / self.unit).powi(2);
-        self.primal += ((sl - x).max(x - su).max(0.0) / self.unit).powi(2);
-        self.dual += (dual_violation(w, l, u) / self.unit).powi(2);
-        let gap = if w > 0.0 { x - sl } else { su - x };
-        if gap.is_finite() {
-            self.complementarity += (gap / self.unit * (w / self.unit)).abs();
-        }
-        let row = over(natural(sigma * z, w, sigma * l, sigma * u).abs(), terms);
-        // A NaN is the worst there is.
-        self.rows = if row.is_nan() { row } else { self.rows.max(row) };
+        self.primal = worse(self.primal, pair.primal());
+        self.dual = worse(self.dual, pair.dual());
+        self.complementarity = worse(self.complementarity, pair.complementarity());
+        self.note(i, pair.worst());
     }
 
-    fn equality(&mut self, i: usize, w: f64, terms: f64) {
-        self.add(i, w);
+    fn equality(&mut self, i: usize, w: f64, error: f64) {
+        self.scaled += (w / self.unit).powi(2);
         self.plain += (w / self.unit).powi(2);
-        self.dual += (w / self.unit).powi(2);
-        let row = over(w.abs(), terms);
-        self.rows = if row.is_nan() { row } else { self.rows.max(row) };
+        self.dual = worse(self.dual, error);
+        self.note(i, error);
     }
 
-    fn add(&mut self, i: usize, residual: f64) {
-        let share = (residual / self.unit).powi(2);
-        if share > self.worst.1 || share.is_nan() {
-            self.worst = (i, share);
+    fn note(&mut self, i: usize, error: f64) {
+        if error > self.worst.1 || error.is_nan() {
+            self.worst = (i, error);
         }
-        self.scaled += share;
     }
 
     fn measure(self) -> Measure {
+        let Self { primal, dual, complementarity, .. } = self;
         Measure {
             absolute: self.scaled.sqrt() * self.unit,
-            relative: self.scaled.sqrt(),
+            relative: worse(worse(primal, dual), complementarity),
             paper: self.plain.sqrt(),
             peer: self.plain.sqrt(),
-            primal: self.primal.sqrt(),
-            dual: self.dual.sqrt(),
-            complementarity: self.complementarity,
-            rows: Some(self.rows),
+            primal,
+            dual,
+            complementarity,
             worst_contact: self.worst.0,
-            worst: self.worst.1.max(0.0).sqrt(),
+            worst: worse(self.worst.1, 0.0),
             ..Measure::unknown()
         }
     }
 }
 
-/// The largest modulus and the sum of moduli of each row; of an operator its diagonal, else 1.
-fn sizes(m: &Matrix, largest: &mut Vec<f64>, sums: &mut Vec<f64>) {
+/// The largest modulus of each row; of an operator its diagonal, else 1.
+fn sizes(m: &Matrix, largest: &mut Vec<f64>) {
     largest.clear();
     largest.resize(m.nrows(), 0.0);
-    sums.clear();
-    sums.resize(m.nrows(), 0.0);
-    let known = m.for_each(|i, _, x| {
-        largest[i] = largest[i].max(x.abs());
-        sums[i] += x.abs();
-    });
-    if !known {
-        for (i, d) in m.diagonal().into_iter().flatten().enumerate().take(m.nrows()) {
-            (largest[i], sums[i]) = (d.abs(), d.abs());
+    if !m.for_each(|i, _, x| largest[i] = largest[i].max(x.abs())) {
+        for (l, d) in largest.iter_mut().zip(m.diagonal().into_iter().flatten()) {
+            *l = d.abs();
         }
     }
-    for x in largest.iter_mut().chain(sums) {
-        if *x == 0.0 {
-            *x = 1.0;
-        }
-    }
+    largest.iter_mut().filter(|x| **x == 0.0).for_each(|x| *x = 1.0);
 }
 
-/// The largest modulus; infinite where an entry is not finite.
-fn largest_of(x: &[f64]) -> f64 {
-    x.iter().fold(0.0, |l, x| if x.is_finite() { l.max(x.abs()) } else { f64::INFINITY })
+/// ω from the moduli of q in `units`, infinite where nothing is known; from those of bounds in `columns`, one for each matrix, what a distance counts in them.
+/// Whether the rest is known to have no connection. `next` is room.
+///
+/// Products, quotients and maxima only: whatever powers of two the rows and columns are multiplied by, the units go with them to the last bit.
+fn find_units(
+    matrices: &[&Matrix],
+    units: &mut [f64],
+    columns: &mut [&mut Vec<f64>],
+    next: &mut Vec<f64>,
+) -> bool {
+    let mut closed = false;
+    for generation in 0..GENERATIONS {
+        // The first time everybody listens, later who has no unit yet.
+        let open = |x: f64| generation == 0 || x == 0.0;
+        let mut grown = false;
+        for (m, columns) in matrices.iter().zip(columns.iter_mut()) {
+            next.clear();
+            next.resize(columns.len(), 0.0);
+            m.for_each(|i, j, x| {
+                if x != 0.0 && open(columns[j]) {
+                    next[j] = next[j].max(units[i] / x.abs());
+                }
+            });
+            for (to, &from) in columns.iter_mut().zip(next.iter()) {
+                grown |= from > *to;
+                *to = to.max(from);
+            }
+        }
+        next.clear();
+        next.resize(units.len(), 0.0);
+        for (m, columns) in matrices.iter().zip(columns.iter()) {
+            m.for_each(|i, j, x| {
+                if open(units[i]) {
+                    next[i] = next[i].max(x.abs() * columns[j]);
+                }
+            });
+        }
+        for (to, &from) in units.iter_mut().zip(next.iter()) {
+            grown |= from > *to;
+            *to = to.max(from);
+        }
+        closed = !grown || units.iter().all(|x| *x > 0.0);
+        if closed {
+            break;
+        }
+    }
+    units.iter_mut().filter(|x| **x == 0.0).for_each(|x| *x = f64::INFINITY);
+    for (m, columns) in matrices.iter().zip(columns.iter_mut()) {
+        columns.fill(0.0);
+        m.for_each(|i, j, x| columns[j] = columns[j].max(x.abs() / units[i]));
+    }
+    closed
+}
+
+/// `max_k |A_kj| / D_k` into `effects`. False where a row's terms are so small that its rounding cannot be told.
+fn find_effects(a: &Matrix, x: &[f64], scales: &[f64], effects: &mut [f64]) -> bool {
+    effects.fill(0.0);
+    let mut visible = true;
+    a.for_each(|i, j, v| {
+        if v != 0.0 {
+            effects[j] = effects[j].max(v.abs() / scales[i]);
+            visible &= x[j] == 0.0 || scales[i] >= TINY;
+        }
+    });
+    visible
+}
+
+/// The smaller modulus of two bounds, 0 where there is none that is finite.
+fn reach(l: f64, u: f64) -> f64 {
+    let least = l.abs().min(u.abs());
+    if least.is_finite() { least } else { 0.0 }
+}
+
+fn finite(x: &[f64]) -> bool {
+    x.iter().all(|x| x.is_finite())
 }
 
 impl LinearGauge {
@@ -232,9 +436,23 @@ impl LinearGauge {
 
     pub(crate) fn refill(&mut self, problem: &impl Stated) {
         let data = problem.data();
+        let (m, n) = (data.q.len(), data.matrix.ncols());
         self.norm_q = norm(data.q);
-        sizes(data.matrix, &mut self.largest, &mut self.sums);
-        self.w.resize(data.q.len(), 0.0);
+        sizes(data.matrix, &mut self.largest);
+        self.w.resize(m, 0.0);
+        self.scales.resize(m, 0.0);
+        self.effects.resize(n, 0.0);
+        self.units.clear();
+        self.units.extend(data.q.iter().map(|q| q.abs()));
+        self.columns.clear();
+        self.columns.extend((0..n).map(|j| match data.column_bounds(j) {
+            (l, u) if data.bounds.is_some() => reach(l, u),
+            _ => 0.0,
+        }));
+        let Self { units, columns, w, .. } = self;
+        self.closed = find_units(&[data.matrix], units, &mut [columns], w);
+        // Room that served for columns.
+        self.w.resize(m, 0.0);
         self.rows.start(data.q);
     }
 
@@ -245,28 +463,70 @@ impl LinearGauge {
         precisely: bool,
     ) -> Measure {
         let data = problem.data();
-        let reach = largest_of(&point.z);
-        if !reach.is_finite() {
+        if !finite(&point.z) {
             // An empty column would hide it.
             return Measure::unknown();
         }
         self.rows.precisely(precisely);
         self.rows.start(data.q);
-        if !self.rows.add_matrix(1.0, data.matrix, &point.z) {
+        let known = self.rows.add_matrix(1.0, data.matrix, &point.z);
+        if !known {
             data.matrix.mul(&point.z, &mut self.w);
             self.rows.add_vector(&self.w);
         }
         self.w.iter_mut().zip(self.rows.values()).for_each(|(w, sum)| *w = sum);
-        let mut sum = Sum::new(self.norm_q);
-        for (i, (&w, &q)) in self.w.iter().zip(data.q).enumerate() {
-            let (s, sigma) = (self.largest[i], self.sums[i]);
-            let terms = q.abs() + sigma * reach;
-            match data.variable(i) {
-                None => sum.equality(i, w, terms),
-                Some(j) => sum.pair(i, point.z[j], w, data.bounds(i), s, sigma, terms),
+        let mut visible = true;
+        if known {
+            let terms = self.rows.sizes().iter().zip(&self.units);
+            self.scales.iter_mut().zip(terms).for_each(|(d, (terms, unit))| *d = terms.min(*unit));
+            visible = find_effects(data.matrix, &point.z, &self.scales, &mut self.effects);
+        } else {
+            for (i, terms) in self.rows.sizes().iter().enumerate() {
+                let j = data.variable(i).unwrap_or(i);
+                let own = self.largest[i];
+                self.scales[i] = terms + own * point.z.get(j).map_or(0.0, |z| z.abs());
+                if let Some(j) = data.variable(i) {
+                    self.effects[j] = own / self.scales[i];
+                }
             }
         }
-        sum.measure()
+        let mut sum = Sum::new(self.norm_q);
+        for i in 0..self.w.len() {
+            match self.pair(&data, point, i) {
+                None => sum.equality(i, self.w[i], share(self.w[i], self.scales[i])),
+                Some(pair) => sum.pair(i, &pair, self.largest[i]),
+            }
+        }
+        if visible { sum.measure() } else { Measure { relative: NEVER, ..sum.measure() } }
+    }
+
+    /// The pair of row i at the point last measured, if it is no equality.
+    fn pair(&self, data: &Data, point: &LcpPoint, i: usize) -> Option<Pair> {
+        let j = data.variable(i)?;
+        let (l, u) = data.bounds(i);
+        let (w, error) = (self.w[i], share(self.w[i], self.scales[i]));
+        Some(Pair { z: point.z[j], l, u, w, error, effect: self.effects[j] })
+    }
+
+    /// Puts variables on their bounds that are there but for rounding: `point` is the one last measured. Says whether anything changed.
+    pub(crate) fn tidy(&self, problem: &impl Stated, point: &mut LcpPoint, boldly: bool) -> bool {
+        let data = problem.data();
+        let mut changed = false;
+        for i in data.equalities..self.w.len() {
+            let (Some(pair), Some(j)) = (self.pair(&data, point, i), data.variable(i)) else {
+                continue;
+            };
+            let unit = self.units[i];
+            let z = if !boldly {
+                pair.tidied()
+            } else if unit.is_finite() || self.closed {
+                pair.boldly_tidied(self.columns[j], 1.0 / unit)
+            } else {
+                pair.z
+            };
+            changed |= put(z, &mut point.z[j]);
+        }
+        changed
     }
 
     fn judge(
@@ -278,28 +538,17 @@ impl LinearGauge {
         let mut gauge = problem.gauge()?;
         let measure = problem.certify(point, &mut gauge);
         let data = problem.data();
-        let rows = gauge.w.iter().enumerate().map(|(i, &w)| {
-            let pair = data.variable(i).map(|j| (gauge.largest[i] * point.z[j], data.bounds(i)));
-            (pair.map(|(x, (l, u))| (x, gauge.largest[i] * l, gauge.largest[i] * u)), w)
-        });
-        let rows: Vec<_> = rows.collect();
-        Ok(verdict(measure, &rows, gauge.norm_q, gauge.w.clone(), tolerance))
+        let rows = (0..gauge.w.len())
+            .map(|i| gauge.pair(&data, point, i).ok_or_else(|| share(gauge.w[i], gauge.scales[i])));
+        Ok(verdict(measure, rows, gauge.w.clone(), tolerance))
     }
 }
 
-/// The judge's constants and buffers for a horizontal LCP.
-///
-/// With `c_i`, `d_i` the largest moduli in column i of Q and R, the residual is that of the equalities `Q x + R s − q` and of the pairs `min(c_i x_i, d_i s_i)`; what
-/// is made of it is as for [`LinearGauge`]. The rows of pairs follow those of the equalities.
-#[derive(Debug, Clone, Default)]
-pub struct HlcpGauge {
-    norm_q: f64,
-    c: Vec<f64>,
-    d: Vec<f64>,
-    /// `Σ_j |Q_ij|`, `Σ_j |R_ij|`.
-    sums: [Vec<f64>; 2],
-    w: Vec<f64>,
-    rows: Rows,
+/// Overwrites `to`; whether that changed it.
+fn put(x: f64, to: &mut f64) -> bool {
+    let changed = x != *to;
+    *to = x;
+    changed
 }
 
 impl HlcpGauge {
@@ -310,17 +559,26 @@ impl HlcpGauge {
     }
 
     pub(crate) fn refill(&mut self, problem: &Hlcp) {
+        let n = problem.q.len();
         self.norm_q = norm(&problem.q);
-        let mut unused = vec![];
-        let [of_q, of_r] = &mut self.sums;
-        for (m, size, sums) in [(&problem.Q, &mut self.c, of_q), (&problem.R, &mut self.d, of_r)] {
-            sizes(m, &mut unused, sums);
+        for (m, size) in [(&problem.Q, &mut self.c), (&problem.R, &mut self.d)] {
             size.clear();
             size.resize(m.ncols(), 0.0);
             m.for_each(|_, j, x| size[j] = size[j].max(x.abs()));
             size.iter_mut().filter(|x| **x == 0.0).for_each(|x| *x = 1.0);
         }
-        self.w.resize(problem.q.len(), 0.0);
+        for v in self.effects.iter_mut().chain([&mut self.w, &mut self.scales]) {
+            v.resize(n, 0.0);
+        }
+        for v in &mut self.columns {
+            v.clear();
+            v.resize(n, 0.0);
+        }
+        self.units.clear();
+        self.units.extend(problem.q.iter().map(|q| q.abs()));
+        let [of_q, of_r] = &mut self.columns;
+        let parts = [&problem.Q, &problem.R];
+        self.closed = find_units(&parts, &mut self.units, &mut [of_q, of_r], &mut self.w);
         self.rows.start(&problem.q);
     }
 
@@ -330,40 +588,70 @@ impl HlcpGauge {
         point: &HlcpPoint,
         precisely: bool,
     ) -> Measure {
-        let (x_reach, s_reach) = (largest_of(&point.x), largest_of(&point.s));
-        if !(x_reach.is_finite() && s_reach.is_finite()) {
+        if !(finite(&point.x) && finite(&point.s)) {
             return Measure::unknown();
         }
+        let parts = [(&problem.Q, &point.x), (&problem.R, &point.s)];
         self.rows.precisely(precisely);
         self.rows.start_at_zero(problem.q.len());
         self.w.iter_mut().zip(&problem.q).for_each(|(w, q)| *w = -q);
         self.rows.add_vector(&self.w);
-        for (m, x) in [(&problem.Q, &point.x), (&problem.R, &point.s)] {
+        for (m, x) in parts {
             if !self.rows.add_matrix(1.0, m, x) {
                 m.mul(x, &mut self.w);
                 self.rows.add_vector(&self.w);
             }
         }
         self.w.iter_mut().zip(self.rows.values()).for_each(|(w, sum)| *w = sum);
+        let operators = parts.iter().any(|(m, _)| matches!(m, Matrix::Operator(_)));
+        let terms = self.rows.sizes().iter().zip(&self.units);
+        for (d, (terms, unit)) in self.scales.iter_mut().zip(terms) {
+            *d = if operators { *terms } else { terms.min(*unit) };
+        }
+        let mut visible = true;
+        for ((m, x), effects) in parts.into_iter().zip(&mut self.effects) {
+            if let Matrix::Operator(_) = m {
+                effects.iter_mut().zip(&self.scales).for_each(|(e, d)| *e = 1.0 / d);
+            } else {
+                visible &= find_effects(m, x, &self.scales, effects);
+            }
+        }
         let mut sum = Sum::new(self.norm_q);
-        for (i, (&w, &q)) in self.w.iter().zip(&problem.q).enumerate() {
-            let terms = q.abs() + self.sums[0][i] * x_reach + self.sums[1][i] * s_reach;
-            sum.equality(i, w, terms);
+        for (i, (&w, &scale)) in self.w.iter().zip(&self.scales).enumerate() {
+            sum.equality(i, w, share(w, scale));
         }
         let n = self.w.len();
-        let reach = self.reach(point);
-        for (i, (&x, &s)) in point.x.iter().zip(&point.s).enumerate() {
-            let (c, ds) = (self.c[i], self.d[i] * s);
-            sum.pair(n + i, x, ds, (0.0, f64::INFINITY), c, c, reach);
+        for i in 0..n {
+            let (pair, d) = (self.pair(point, i), self.d[i]);
+            sum.pair(n + i, &Pair { w: d * pair.w, ..pair }, self.c[i]);
         }
-        sum.measure()
+        if visible { sum.measure() } else { Measure { relative: NEVER, ..sum.measure() } }
     }
 
-    /// The size of the terms that pairs are compared with.
-    fn reach(&self, point: &HlcpPoint) -> f64 {
-        let largest =
-            |x: &[f64], c: &[f64]| x.iter().zip(c).fold(0.0_f64, |l, (x, c)| l.max((c * x).abs()));
-        self.norm_q + largest(&point.x, &self.c) + largest(&point.s, &self.d)
+    fn pair(&self, point: &HlcpPoint, i: usize) -> Pair {
+        let (x, s) = (point.x[i], point.s[i]);
+        let [effect, of_s] = [self.effects[0][i], self.effects[1][i]];
+        Pair { z: x, l: 0.0, u: f64::INFINITY, w: s, error: distance(s.abs(), of_s), effect }
+    }
+
+    /// As [`LinearGauge::tidy`]: of each pair the side is put to zero whose size matters less, and what is negative.
+    pub(crate) fn tidy(&self, point: &mut HlcpPoint, boldly: bool) -> bool {
+        let mut changed = false;
+        let [of_x, of_s] = if boldly { &self.columns } else { &self.effects };
+        for i in 0..self.w.len() {
+            let (x, s) = (point.x[i].max(0.0), point.s[i].max(0.0));
+            let (by_x, by_s) = (matters(x, of_x[i]), matters(s, of_s[i]));
+            let (x, s) = if boldly && by_x.max(by_s) <= ROUNDING && self.closed {
+                (0.0, 0.0)
+            } else if by_x <= by_s {
+                (0.0, s)
+            } else {
+                (x, 0.0)
+            };
+            changed |= put(x, &mut point.x[i]);
+            changed |= put(s, &mut point.s[i]);
+        }
+        changed
     }
 }
 
@@ -395,34 +683,21 @@ pub struct RowCounts {
     pub degenerate: usize,
 }
 
-/// `(x, l, u)`: a variable and its bounds in the unit of q.
-type Scaled = (f64, f64, f64);
-
-/// From each row's variable (none of an equality) and w.
+/// From each row's pair, or the error of an equality.
 fn verdict(
     measure: Measure,
-    rows: &[(Option<Scaled>, f64)],
-    norm_q: f64,
+    rows: impl Iterator<Item = Result<Pair, f64>>,
     w: Vec<f64>,
     tolerance: f64,
 ) -> Verdict<RowStatus, RowCounts> {
-    let margin = tolerance * if norm_q > 0.0 { norm_q } else { 1.0 };
     let mut counts = RowCounts::default();
     let (mut statuses, mut worst) = (vec![], vec![]);
-    for (i, &(pair, w)) in rows.iter().enumerate() {
-        let (status, residual) = match pair {
-            None => (RowStatus::Equality, w),
-            Some((x, l, u)) => {
-                let at = if x - w <= l {
-                    RowStatus::Lower
-                } else if x - w >= u {
-                    RowStatus::Upper
-                } else {
-                    RowStatus::Inside
-                };
-                let bound = (x - l).abs().min((u - x).abs()) <= margin;
-                counts.degenerate += usize::from(bound && w.abs() <= margin && l < u);
-                (at, natural(x, w, l, u))
+    for (i, row) in rows.enumerate() {
+        let (status, error) = match row {
+            Err(error) => (RowStatus::Equality, error),
+            Ok(pair) => {
+                counts.degenerate += usize::from(pair.degenerate(tolerance));
+                (pair.status(), pair.worst())
             }
         };
         match status {
@@ -432,7 +707,7 @@ fn verdict(
             RowStatus::Equality => counts.equalities += 1,
         }
         statuses.push(status);
-        worst.push((i, over(residual.abs(), norm_q)));
+        worst.push((i, error));
     }
     worst.sort_by(|a, b| b.1.total_cmp(&a.1));
     worst.truncate(10);
@@ -473,138 +748,8 @@ impl Judged for Hlcp {
         self.validate_point(point)?;
         let mut gauge = self.gauge()?;
         let measure = self.certify(point, &mut gauge);
-        let equalities = gauge.w.iter().map(|&w| (None, w));
-        let pairs = (0..self.dim()).map(|i| {
-            let (x, s) = (gauge.c[i] * point.x[i], gauge.d[i] * point.s[i]);
-            (Some((x, 0.0, f64::INFINITY)), s)
-        });
-        let rows: Vec<_> = equalities.chain(pairs).collect();
-        Ok(verdict(measure, &rows, gauge.norm_q, gauge.w.clone(), tolerance))
+        let equalities = gauge.w.iter().zip(&gauge.scales).map(|(w, d)| Err(share(*w, *d)));
+        let pairs = (0..self.dim()).map(|i| Ok(gauge.pair(point, i)));
+        Ok(verdict(measure, equalities.chain(pairs), gauge.w.clone(), tolerance))
     }
-}
-
-/// What of a product `Σ a_i y_i` is rounding, in units of the size of its terms: such a sum counts as zero.
-const ZERO: f64 = 1e-13;
-/// How negative the sum that must be negative is at least, in units of the size of its terms.
-const NEGATIVE: f64 = -1e-9;
-
-/// `Aᵀ y` by columns in doubled precision, with what is rounding set to zero. `None` of an operator.
-fn combination(a: &Matrix, y: &[f64]) -> Option<Vec<f64>> {
-    let n = a.ncols();
-    let (mut sums, mut sizes) = (vec![Compensated::default(); n], vec![0.0; n]);
-    let known = a.for_each(|i, j, x| {
-        sums[j].add_product(x, y[i]);
-        sizes[j] += (x * y[i]).abs();
-    });
-    let cleaned = sums.iter().zip(&sizes).map(|(sum, size)| match sum.value() {
-        value if value.abs() <= ZERO * size => 0.0,
-        value => value,
-    });
-    known.then(|| cleaned.collect())
-}
-
-/// `qᵀ y` is negative beyond rounding, together with other `terms` of the same sum.
-fn negative(q: &[f64], y: &[f64], terms: impl Iterator<Item = f64>) -> bool {
-    let mut sum = Compensated::default();
-    let mut size = 0.0;
-    for (q, y) in q.iter().zip(y) {
-        sum.add_product(*q, *y);
-        size += (q * y).abs();
-    }
-    for term in terms {
-        sum.add(term);
-        size += term.abs();
-    }
-    size > 0.0 && sum.value() <= NEGATIVE * size
-}
-
-/// Whether the certificate proves from M and q alone that there is no solution.
-pub(crate) fn refutes(problem: &impl Stated, certificate: &Certificate) -> bool {
-    let data = problem.data();
-    match certificate {
-        Certificate::Impulses(_) => false,
-        &Certificate::Row { row } => {
-            let mut y = vec![0.0; data.q.len()];
-            match y.get_mut(row) {
-                Some(entry) => *entry = 1.0,
-                None => return false,
-            }
-            row >= data.equalities && farkas(&data, &y)
-        }
-        Certificate::Farkas { y } => farkas(&data, y),
-        // Only a square problem has a Lemke ray; its rows then are numbered as its variables.
-        Certificate::Ray { z, z0 } => {
-            *z0 == 0.0 && data.equalities == data.free && farkas(&data, z)
-        }
-        Certificate::Cones { separating } => data.bounds.is_none() && cones(&data, separating),
-    }
-}
-
-fn shaped(y: &[f64], len: usize) -> bool {
-    y.len() == len && norm(y).is_finite()
-}
-
-fn farkas(data: &Data, y: &[f64]) -> bool {
-    if !shaped(y, data.q.len()) {
-        return false;
-    }
-    let signs = y.iter().enumerate().all(|(i, &y)| match data.bounds(i) {
-        _ if i < data.equalities => true,
-        (l, u) if l.is_finite() && u.is_finite() => y == 0.0,
-        (l, _) if l.is_finite() => y >= 0.0,
-        (_, u) if u.is_finite() => y <= 0.0,
-        _ => true,
-    });
-    let Some(slope) = combination(data.matrix, y).filter(|_| signs) else {
-        return false;
-    };
-    // The least upper bound of yᵀ M z over the box, column by column.
-    let terms = slope.iter().enumerate().map(|(j, &g)| match data.column_bounds(j) {
-        _ if g == 0.0 => 0.0,
-        (_, u) if g > 0.0 => g * u,
-        (l, _) => g * l,
-    });
-    terms.clone().all(f64::is_finite) && negative(data.q, y, terms)
-}
-
-/// Whether the vectors separate all complementary cones from q.
-fn cones(data: &Data, separating: &[Vec<f64>]) -> bool {
-    let pairs = data.q.len() - data.equalities;
-    // Which cones a vector separates: those with w_j where it allows w_j, and z_j where it allows z_j.
-    let allowed: Option<Vec<[Vec<bool>; 2]>> = separating
-        .iter()
-        .map(|y| {
-            let slope = combination(data.matrix, y).filter(|_| shaped(y, data.q.len()))?;
-            let free = slope[..data.free].iter().all(|g| *g == 0.0);
-            let proper = free && negative(data.q, y, std::iter::empty());
-            let w = y[data.equalities..].iter().map(|y| *y >= 0.0).collect();
-            let z = slope[data.free..].iter().map(|g| *g <= 0.0).collect();
-            proper.then_some([w, z])
-        })
-        .collect();
-    let Some(allowed) = allowed else { return false };
-    covered(&allowed, &(0..allowed.len()).collect::<Vec<_>>(), 0, pairs)
-}
-
-/// Whether the vectors left separate all cones whose first `depth` pairs are chosen.
-fn covered(allowed: &[[Vec<bool>; 2]], left: &[usize], depth: usize, pairs: usize) -> bool {
-    let all = |k: &usize| (depth..pairs).all(|j| allowed[*k][0][j] && allowed[*k][1][j]);
-    if left.iter().any(all) {
-        return true;
-    }
-    depth < pairs
-        && [0, 1].into_iter().all(|side| {
-            let still: Vec<_> = left.iter().copied().filter(|&k| allowed[k][side][depth]).collect();
-            !still.is_empty() && covered(allowed, &still, depth + 1, pairs)
-        })
-}
-
-/// As [`refutes`], for the horizontal problem.
-pub(crate) fn refutes_horizontal(problem: &Hlcp, certificate: &Certificate) -> bool {
-    let Certificate::Farkas { y } = certificate else { return false };
-    let fine = |m: &Matrix| combination(m, y).is_some_and(|g| g.iter().all(|g| *g >= 0.0));
-    shaped(y, problem.q.len())
-        && fine(&problem.Q)
-        && fine(&problem.R)
-        && negative(&problem.q, y, std::iter::empty())
 }

@@ -1,84 +1,140 @@
 //! The judge of the local problem.
 
-use super::contact::{distance_to_cone, distance_to_dual, modified_velocity, natural_map};
-use super::rows::Rows;
+use super::contact::{distance_to_cone, distance_to_dual, length, modified_velocity, natural_map};
+use super::rows::{Rows, doubt};
 use super::{Measure, over};
-use crate::linalg::{Compensated, norm, small};
-use crate::{FrictionLocal, LocalPoint};
+use crate::linalg::{Csc, Doubled, Real, norm, norm_of, power_of_two, small};
+use crate::{BilateralLocal, FrictionLocal, LocalPoint};
 
 /// The judge's constants and buffers for a [`FrictionLocal`].
 #[derive(Debug, Clone)]
 pub struct LocalGauge {
     pub(super) law: LawGauge,
     u: Vec<f64>,
+    /// u with all its digits, and the size of its terms.
+    exact: Vec<Doubled>,
+    sizes: Vec<f64>,
     rows: Rows,
+    /// The most terms of an entry of u.
+    terms: usize,
 }
 
 impl LocalGauge {
     pub(crate) fn new<const D: usize>(problem: &FrictionLocal<D>) -> Self {
-        let mut gauge = Self { law: LawGauge::default(), u: Vec::new(), rows: Rows::default() };
+        let mut gauge = Self {
+            law: LawGauge::default(),
+            u: Vec::new(),
+            exact: Vec::new(),
+            sizes: Vec::new(),
+            rows: Rows::default(),
+            terms: 0,
+        };
         gauge.refill(problem);
         gauge
     }
 
     pub(crate) fn refill<const D: usize>(&mut self, problem: &FrictionLocal<D>) {
-        let diagonal =
-            (0..problem.contacts()).map(|c| small::mean_diagonal(&problem.W.diagonal_block(c)));
+        let contacts = problem.contacts();
+        let diagonal = (0..contacts).map(|c| small::mean_diagonal(&problem.W.diagonal_block(c)));
         self.law.refill(diagonal, norm(&problem.q));
-        self.u.resize(problem.q.len(), 0.0);
-        // Both uses of the rows, so that a measurement allocates nothing.
-        self.rows.start(&self.u);
+        self.mark_loaded(problem);
+        let blocks = (0..contacts).map(|c| problem.W.row(c).0.len()).max().unwrap_or(0);
+        self.terms = 1 + D * blocks + problem.multipliers();
+        let m = problem.q.len();
+        self.u.resize(m, 0.0);
+        self.exact.resize(m, Doubled::default());
+        self.sizes.clear();
+        self.sizes.reserve(m.max(problem.multipliers()));
+        self.sizes.resize(m, 0.0);
+        // The longest use of the rows, so that a measurement allocates nothing.
+        self.rows.start_at_zero(m.max(problem.multipliers()));
     }
 
-    /// The residuals; `precisely` with the products in doubled precision.
+    /// Which contacts have a load or are coupled, however far, to one that has; those that bilateral constraints touch count.
+    fn mark_loaded<const D: usize>(&mut self, problem: &FrictionLocal<D>) {
+        let loaded = &mut self.law.loaded;
+        loaded.clear();
+        loaded.extend(problem.q.chunks(D).map(|q| q.iter().any(|q| *q != 0.0)));
+        if let Some(b) = &problem.bilateral {
+            let touched = (0..b.s.len()).flat_map(|j| b.V.column(j).0);
+            touched.for_each(|&i| loaded[i / D] = true);
+        }
+        let mut spreads = loaded.contains(&false);
+        while spreads {
+            spreads = false;
+            for i in 0..loaded.len() {
+                let (cols, blocks) = problem.W.row(i);
+                for (&j, block) in cols.iter().zip(blocks) {
+                    let j = j as usize;
+                    if loaded[i] != loaded[j] && *block != [[0.0; D]; D] {
+                        (loaded[i], loaded[j], spreads) = (true, true, true);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The residuals; `precisely` in doubled precision from the data to the last comparison.
     pub(crate) fn measure<const D: usize>(
         &mut self,
         problem: &FrictionLocal<D>,
         point: &LocalPoint,
         precisely: bool,
     ) -> Measure {
-        if precisely {
-            self.update_velocity(
-                problem,
-                point,
-                Compensated::from,
-                |sum, a, b| {
-                    sum.add_product(a, b);
-                },
-                Compensated::value,
-            );
+        self.rows.precisely(precisely);
+        let mut measure = if precisely {
+            self.update_velocity_precisely(problem, point);
+            let Self { law, exact, sizes, terms, .. } = self;
+            let doubt = doubt(*terms);
+            let of = |i: usize| doubt * sizes[i];
+            let mut measure = law.measure::<_, D>(&point.r, exact, sizes, of, &problem.mu);
+            measure.floor = Some(self.floor(problem, point));
+            measure
         } else {
-            self.update_velocity(problem, point, |x| x, |sum, a, b| *sum += a * b, |sum| sum);
-        }
-        if let Some(b) = &problem.bilateral {
-            self.rows.start(&self.u);
-            self.rows.add(1.0, &b.V, &point.lambda);
-            self.u.iter_mut().zip(self.rows.values()).for_each(|(u, v)| *u = v);
-        }
-        let mut measure = self.law.measure::<D>(&point.r, &self.u, &problem.mu);
+            self.update_velocity(problem, point);
+            let Self { law, u, sizes, .. } = self;
+            law.measure::<f64, D>(&point.r, u, sizes, |_| 0.0, &problem.mu)
+        };
         measure.bilateral = self.violation(problem, point);
         measure
     }
 
-    /// The largest `|(Vᵀ r + R λ + s)_j|` over the size of its terms. A constraint whose terms are all rounding is compared
-    /// with the others, in units of `√R_jj`, instead of with itself.
+    /// The largest `|(Vᵀ r + R λ + s)_j|` over the size of its terms, beyond what the rounding of impulses and multipliers of a typical
+    /// size makes in row j: of a constraint without load all terms are rounding. A row without coefficients has no such excuse.
     fn violation<const D: usize>(
         &mut self,
         problem: &FrictionLocal<D>,
         point: &LocalPoint,
     ) -> Option<f64> {
-        let b = problem.bilateral.as_ref()?;
-        self.rows.start(&b.s);
-        self.rows.add_transposed(&b.V, &point.r);
-        self.rows.add(1.0, &b.R, &point.lambda);
-        let unit = |j: usize| match b.R.get(j, j).abs().sqrt() {
-            d if d > 0.0 => d,
-            _ => 1.0,
+        let BilateralLocal { V, R, s } = problem.bilateral.as_ref()?;
+        self.rows.start(s);
+        self.rows.add_transposed(V, &point.r);
+        self.rows.add(1.0, R, &point.lambda);
+        // λ_j √|R_jj| and r_c √w_c are comparable, whatever the scale of a row or a contact.
+        let unit = |j: usize| unit(R.get(j, j));
+        let typical = |x: &[f64], unit: &dyn Fn(usize) -> f64| {
+            (0..x.len()).fold(0.0_f64, |m, j| m.max(x[j].abs() * unit(j)))
         };
-        let sizes = self.rows.sizes();
-        let typical = (0..sizes.len()).fold(0.0_f64, |m, j| m.max(sizes[j] / unit(j)));
-        let shares = self.rows.values().zip(sizes).enumerate();
-        Some(worst(shares.map(|(j, (sum, size))| (sum, size + ROUNDING * typical * unit(j)))))
+        let of_contact = |i: usize| self.law.w[i / D].sqrt();
+        let typical_r = typical(&point.r, &of_contact);
+        let typical_lambda = typical(&point.lambda, &unit);
+        // R by rows through its columns: it need not be symmetric.
+        let excuse = &mut self.sizes;
+        excuse.clear();
+        excuse.resize(s.len().max(point.r.len()), 0.0);
+        for j in 0..s.len() {
+            let (rows, values) = V.column(j);
+            let v: f64 = rows.iter().zip(values).map(|(&i, v)| v.abs() / of_contact(i)).sum();
+            excuse[j] += v * typical_r;
+            let (rows, values) = R.column(j);
+            for (&i, v) in rows.iter().zip(values) {
+                excuse[i] += v.abs() / unit(j) * typical_lambda;
+            }
+        }
+        let shares = self.rows.values().zip(self.rows.sizes()).zip(&*excuse);
+        let share = worst(shares.map(|((sum, &size), excuse)| (sum, size, ROUNDING * excuse)));
+        self.sizes.truncate(point.r.len());
+        Some(share)
     }
 
     /// The velocity of the last point measured.
@@ -86,45 +142,125 @@ impl LocalGauge {
         &self.u
     }
 
-    /// `u = W r + q`, entry by entry, without the solvers' kernels.
-    fn update_velocity<const D: usize, S: Copy>(
-        &mut self,
-        problem: &FrictionLocal<D>,
-        point: &LocalPoint,
-        start: impl Fn(f64) -> S,
-        add: impl Fn(&mut S, f64, f64),
-        end: impl Fn(S) -> f64,
-    ) {
+    /// `u = W r + q + V λ` and the sizes of its terms, entry by entry, without the solvers' kernels.
+    fn update_velocity<const D: usize>(&mut self, problem: &FrictionLocal<D>, point: &LocalPoint) {
+        let Self { u, sizes, .. } = self;
         for i in 0..problem.contacts() {
             let (cols, blocks) = problem.W.row(i);
-            let mut sum = small::block::<D>(&problem.q, i).map(&start);
+            let mut sum: [f64; D] = small::block(&problem.q, i);
+            let mut size = sum.map(f64::abs);
             for (&j, b) in cols.iter().zip(blocks) {
                 for k in 0..D {
                     for l in 0..D {
-                        add(&mut sum[k], b[k][l], point.r[D * j as usize + l]);
+                        let product = b[k][l] * point.r[D * j as usize + l];
+                        sum[k] += product;
+                        size[k] += product.abs();
                     }
                 }
             }
-            self.u[D * i..D * i + D].copy_from_slice(&sum.map(&end));
+            u[D * i..D * i + D].copy_from_slice(&sum);
+            sizes[D * i..D * i + D].copy_from_slice(&size);
         }
+        each_term(problem.bilateral.as_ref().map(|b| &b.V), &point.lambda, |i, a, x| {
+            u[i] += a * x;
+            sizes[i] += (a * x).abs();
+        });
+    }
+
+    /// The same, each entry as one sum in doubled precision.
+    fn update_velocity_precisely<const D: usize>(
+        &mut self,
+        problem: &FrictionLocal<D>,
+        point: &LocalPoint,
+    ) {
+        let Self { u, exact, sizes, rows, .. } = self;
+        rows.start(&problem.q);
+        for i in 0..problem.contacts() {
+            let (cols, blocks) = problem.W.row(i);
+            for (&j, b) in cols.iter().zip(blocks) {
+                for k in 0..D {
+                    for l in 0..D {
+                        rows.add_product(D * i + k, b[k][l], point.r[D * j as usize + l]);
+                    }
+                }
+            }
+        }
+        if let Some(b) = &problem.bilateral {
+            rows.add(1.0, &b.V, &point.lambda);
+        }
+        sizes.copy_from_slice(rows.sizes());
+        for ((u, exact), sum) in u.iter_mut().zip(exact).zip(rows.doubled()) {
+            (*u, *exact) = (sum.value(), sum);
+        }
+    }
+
+    /// What the rounding of r and λ to doubles alone makes of the residual, in the root mean square.
+    fn floor<const D: usize>(&mut self, problem: &FrictionLocal<D>, point: &LocalPoint) -> f64 {
+        let unit = power_of_two(self.law.unit());
+        let squares = &mut self.u;
+        squares.fill(0.0);
+        for i in 0..problem.contacts() {
+            let (cols, blocks) = problem.W.row(i);
+            for (&j, b) in cols.iter().zip(blocks) {
+                for k in 0..D {
+                    for l in 0..D {
+                        let product = b[k][l] * point.r[D * j as usize + l] / unit;
+                        squares[D * i + k] += product * product;
+                    }
+                }
+            }
+        }
+        each_term(problem.bilateral.as_ref().map(|b| &b.V), &point.lambda, |i, a, x| {
+            squares[i] += (a * x / unit).powi(2);
+        });
+        let spread = squares.iter().sum::<f64>().sqrt() * (unit / self.law.unit());
+        squares.iter_mut().zip(&self.exact).for_each(|(u, x)| *u = x.value());
+        HALF_ULP * spread
     }
 }
 
-/// A term smaller than this share of its like may be rounding.
-pub(super) const ROUNDING: f64 = 1e-3;
+/// The rounding of a stored double, over its size, in the root mean square.
+pub(super) const HALF_ULP: f64 = 0.3 * f64::EPSILON;
 
-/// The largest ratio of violation to size, infinite if any is NaN.
-pub(super) fn worst(shares: impl Iterator<Item = (f64, f64)>) -> f64 {
-    shares.fold(0.0, |worst: f64, (violation, size)| match over(violation.abs(), size) {
-        share if share.is_nan() => f64::INFINITY,
-        share => worst.max(share),
+/// Terms below this share of ‖q‖ have lost digits to underflow.
+const LEAST: f64 = 1e-280;
+
+/// Calls `term(i, A_ij, x_j)` for the entries of A.
+fn each_term(a: Option<&Csc>, x: &[f64], mut term: impl FnMut(usize, f64, f64)) {
+    let Some(a) = a else { return };
+    for (j, &xj) in x.iter().enumerate() {
+        let (rows, values) = a.column(j);
+        rows.iter().zip(values).for_each(|(&i, &v)| term(i, v, xj));
+    }
+}
+
+/// What rounding a few operations on terms of a typical size leaves, over that size.
+pub(super) const ROUNDING: f64 = 16.0 * f64::EPSILON;
+
+/// `√|d|` of a diagonal entry, the unit of what belongs to it; 1 where it vanishes.
+pub(super) fn unit(d: f64) -> f64 {
+    match d.abs().sqrt() {
+        unit if unit > 0.0 => unit,
+        _ => 1.0,
+    }
+}
+
+/// The largest ratio of violation to size, beyond what each is excused for; infinite if any is NaN.
+pub(super) fn worst(shares: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
+    shares.fold(0.0, |worst: f64, (violation, size, excuse)| {
+        match over((violation.abs() - excuse).max(0.0), size) {
+            _ if violation.is_nan() => f64::INFINITY,
+            share if share.is_nan() => f64::INFINITY,
+            share => worst.max(share),
+        }
     })
 }
 
-/// What the contact law's residual needs of a problem: `w_c` and `‖q‖`.
+/// What the contact law's residual needs of a problem: `w_c` and `‖q‖`, and which contacts are not loaded at all (empty: none).
 #[derive(Debug, Clone, Default)]
 pub(super) struct LawGauge {
     pub(super) w: Vec<f64>,
+    loaded: Vec<bool>,
     pub(super) norm_q: f64,
 }
 
@@ -148,45 +284,87 @@ impl LawGauge {
         }
     }
 
-    /// All sums of squares are taken in units of their scale, so that none leaves the range of double precision
+    /// What the residual is relative to.
+    pub(super) fn unit(&self) -> f64 {
+        if self.norm_q > 0.0 { self.norm_q } else { 1.0 }
+    }
+
+    /// The residuals of the impulses `r` with the velocities `u`, whose terms have the `sizes` and whose entries may be wrong by
+    /// `doubt(i)`. What the arithmetic T leaves in doubt is added to the residuals that decide, so that they never
+    /// promise too much.
+    ///
+    /// All is done in units of a power of two near its scale, so that no square leaves the range of double precision
     /// before the data do.
-    pub(super) fn measure<const D: usize>(&self, r: &[f64], u: &[f64], mu: &[f64]) -> Measure {
-        let q = self.norm_q;
-        let unit = if q > 0.0 { q } else { 1.0 };
-        let plain_unit = match q.max(norm(r)).max(norm(u)) {
+    pub(super) fn measure<T: Real, const D: usize>(
+        &self,
+        r: &[f64],
+        u: &[T],
+        sizes: &[f64],
+        doubt: impl Fn(usize) -> f64,
+        mu: &[f64],
+    ) -> Measure {
+        let unit = power_of_two(self.unit());
+        let largest = u.iter().map(|u| u.value() / unit);
+        let plain = match self.norm_q.max(norm(r)).max(unit * norm_of(largest)) {
             largest if largest > 0.0 => largest,
             _ => 1.0,
         };
-        let square = |x: &[f64; D], unit: f64| x.iter().map(|v| (v / unit).powi(2)).sum::<f64>();
-        let (mut scaled, mut plain) = (0.0, 0.0);
+        let plain_unit = power_of_two(plain);
+        let (per, plain_per) = (T::from(1.0 / unit), T::from(1.0 / plain_unit));
+        let value = |x: T| x.value();
+        let square = |x: &[T; D]| x.iter().map(|v| value(*v).powi(2)).sum::<f64>();
+        let (mut scaled, mut peer, mut doubts) = (0.0, 0.0, 0.0);
         let (mut primal, mut dual, mut complementarity) = (0.0, 0.0, 0.0);
         let (mut worst_contact, mut worst) = (0, -1.0);
+        let (mut own_contact, mut own) = (0, -1.0);
         for (c, (&mu, &w)) in mu.iter().zip(&self.w).enumerate() {
             let rc: [f64; D] = small::block(r, c);
-            let x = rc.map(|v| w * v);
-            let modified = modified_velocity::<D>(&small::block(u, c), mu);
-            let share = square(&natural_map(&x, &modified, mu), unit);
+            let uc: [T; D] = std::array::from_fn(|k| u[D * c + k]);
+            let x = rc.map(|r| T::of_product(w, r) * per);
+            let modified = modified_velocity::<T, D>(&uc.map(|u| u * per), mu);
+            let residual = natural_map(&x, &modified, mu);
+            let share = square(&residual);
             if share > worst || share.is_nan() {
                 (worst_contact, worst) = (c, share);
             }
             scaled += share;
-            plain += square(&natural_map(&rc, &modified, mu), plain_unit);
-            primal += (distance_to_cone(&x, mu) / unit).powi(2);
-            dual += (distance_to_dual(&modified, mu) / unit).powi(2);
-            let product = |(a, b): (&f64, &f64)| (a / unit) * (b / unit);
-            complementarity += x.iter().zip(&modified).map(product).sum::<f64>().abs();
+            let of_u = norm_of((D * c..D * c + D).map(|i| doubt(i) / unit));
+            let left =
+                T::DOUBT * (value(length(&x)) + value(length(&modified))) + (1.0 + mu) * of_u;
+            doubts += left * left;
+            let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] / unit));
+            // Below the range of double precision there are no digits to be right. With much friction K* is nearly the whole space, and far from
+            // it is near: every solution has u_N ≥ 0.
+            let sinking = (-value(uc[0] * per)).max(0.0);
+            let error = value(length(&residual)).max(sinking) + left;
+            let of_own = over(error, terms.max(LEAST));
+            let idle = self.loaded.get(c) == Some(&false);
+            if !idle && (of_own > own || of_own.is_nan()) {
+                (own_contact, own) = (c, of_own);
+            }
+            let rc = rc.map(|r| T::from(r) * plain_per);
+            let modified_plainly = modified_velocity::<T, D>(&uc.map(|u| u * plain_per), mu);
+            peer += square(&natural_map(&rc, &modified_plainly, mu));
+            primal += value(distance_to_cone(&x, mu)).powi(2);
+            dual += value(distance_to_dual(&modified, mu)).powi(2);
+            let products = x.iter().zip(&modified).map(|(&a, &b)| a * b);
+            complementarity += value(products.fold(T::from(0.0), |sum, p| sum + p)).abs();
         }
-        let plain = plain.sqrt();
+        // From units of a power of two to those of q.
+        let q = unit / self.unit();
+        let relative = (scaled.sqrt() + doubts.sqrt()) * q;
         Measure {
-            absolute: scaled.sqrt() * unit,
-            relative: scaled.sqrt(),
-            paper: plain * plain_unit / unit,
-            peer: plain,
-            primal: primal.sqrt(),
-            dual: dual.sqrt(),
-            complementarity,
+            absolute: relative * self.unit(),
+            relative,
+            paper: peer.sqrt() * (plain_unit / self.unit()),
+            peer: peer.sqrt() * (plain_unit / plain),
+            primal: primal.sqrt() * q,
+            dual: dual.sqrt() * q,
+            complementarity: complementarity * q * q,
+            own: Some(own.max(0.0)),
+            own_contact: Some(own_contact),
             worst_contact,
-            worst: worst.sqrt(),
+            worst: worst.sqrt() * q,
             ..Measure::unknown()
         }
     }

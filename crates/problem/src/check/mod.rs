@@ -11,6 +11,7 @@ mod global;
 mod impulses;
 pub(crate) mod linear;
 mod local;
+mod proof;
 mod rows;
 mod verdict;
 
@@ -19,9 +20,11 @@ pub use contact::{ContactStatus, Motion};
 pub use existence::{Existence, Kinematic, Kinematics};
 pub use global::GlobalGauge;
 pub use impulses::Impulses;
-pub(crate) use impulses::{refutes_global, refutes_local};
+pub(crate) use impulses::holds;
 pub use linear::{HlcpGauge, LinearGauge, RowCounts, RowStatus};
 pub use local::LocalGauge;
+pub use proof::{Column, ConeSystem, Evidence, Exact, ExactVector, Monotone, NEAR, Proof, rounded};
+pub(crate) use proof::{Exactly, weigh};
 pub use verdict::{Judged, StatusCounts, Verdict, VerdictOf};
 
 use serde::Serialize;
@@ -40,7 +43,7 @@ pub const DYNAMICS_TOLERANCE: f64 = 1e-10;
 ///
 /// u is recomputed from r (for global problems through the dynamics, with `q = Hᵀ M⁻¹ f + w`). Where a contact's
 /// `w_c` is not positive, the mean over the contacts stands in (1 if that is not positive either), so that
-/// such a contact is still judged. Linear complementarity problems have the same residuals of `min(s_i z_i, w_i)`; see [`LinearGauge`].
+/// such a contact is still judged. Of linear complementarity problems `relative`, `primal`, `dual` and `complementarity` are componentwise errors; see [`LinearGauge`].
 ///
 /// `primal` and `dual` are at most `relative` in exact arithmetic and are tested beside it, because rounding can
 /// hide one residual of a point with huge impulses, but not all three.
@@ -73,14 +76,29 @@ pub struct Measure {
     /// Bilateral constraints: the largest violation of a constraint over the size of the terms that should cancel in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bilateral: Option<f64>,
-    /// Linear complementarity: the largest residual of a row in units of its own terms, so that a scaling of rows hides nothing.
+    /// Contacts: the largest residual of one contact in units of its own terms, `‖φ_c‖ / ‖(|q| + |W||r| + |V||λ|)_c‖` with its part φ_c of
+    /// the natural map (or `max(0, −u_N)`, if larger: under much friction a velocity into the obstacle is near K*): a contact that nothing solves does not hide behind larger ones, whatever its scale. The limit is the root of the tolerance:
+    /// half of the digits, because a contact with a small load gets no more than its share of the work. Islands of contacts without load (q = 0)
+    /// are left out: r = 0 solves them, and what is there is noise. For global problems the terms are
+    /// `|w| + |H|ᵀ|M⁻¹|(|f| + |H||r| + |G||λ|)`; in a large component of M (finite elements), whose inverse nobody knows, `|w| + |H|ᵀ|v|` and
+    /// the bound by Cauchy and Schwarz on `|W||r|`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub rows: Option<f64>,
+    pub own: Option<f64>,
+    /// The contact that `own` is of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub own_contact: Option<usize>,
+    /// Contacts, certified measurements only: what the rounding of r (and λ, v) to doubles makes of the residual in the root mean
+    /// square, over `‖q‖`. No solver can be expected to get below it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub floor: Option<f64>,
     /// The contact (or row) with the largest share in `absolute`.
     pub worst_contact: usize,
     /// That contact's share, over `‖q‖`.
     pub worst: f64,
 }
+
+/// The name of the criterion of each contact by its own terms.
+pub const OWN: &str = "own residual of a contact";
 
 /// A criterion that a point does not meet.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -109,7 +127,9 @@ impl Measure {
             dynamics_rounding: None,
             velocity_gap: None,
             bilateral: None,
-            rows: None,
+            own: None,
+            own_contact: None,
+            floor: None,
             worst_contact: 0,
             worst: never,
         }
@@ -123,7 +143,7 @@ impl Measure {
             ("primal", Some(self.primal), tolerance),
             ("dual", Some(self.dual), tolerance),
             ("bilateral constraints", self.bilateral, tolerance),
-            ("rows", self.rows, tolerance),
+            (OWN, self.own, tolerance.sqrt()),
             ("velocities", self.velocity_gap, tolerance),
             ("dynamics", self.dynamics, rounding),
         ]
@@ -143,13 +163,20 @@ impl Measure {
     }
 
     /// One number to compare two points of the same problem: the largest of the values that are compared with the
-    /// tolerance, with the dynamics where they exceed rounding; infinite where a value is NaN.
+    /// tolerance, with the dynamics where they exceed rounding; infinite where a value is NaN. `own` is not among them: it says
+    /// whether the smallest contact is done, not how far the problem is.
     pub fn merit(&self) -> f64 {
-        self.criteria(0.0).fold(0.0, |merit, c| match c.value {
+        self.criteria(0.0).filter(|c| c.what != OWN).fold(0.0, |merit, c| match c.value {
             v if v.is_nan() => f64::INFINITY,
             v if c.limit > 0.0 && v <= c.limit => merit,
             v => merit.max(v),
         })
+    }
+
+    /// Whether this point is the better one of two of the same problem, by [`merit`](Self::merit); among equals by `absolute`.
+    pub fn is_better_than(&self, other: &Self) -> bool {
+        let (here, there) = (self.merit(), other.merit());
+        here < there || (here == there && self.absolute < other.absolute)
     }
 }
 

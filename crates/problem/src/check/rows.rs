@@ -1,6 +1,6 @@
 //! Sums of matrix–vector products, row by row, plainly or in doubled precision.
 
-use crate::linalg::{Compensated, Csc, Matrix, norm_of};
+use crate::linalg::{Compensated, Csc, Doubled, Matrix, norm_of};
 
 /// One compensated sum for each row, and the sum of the sizes of its terms.
 #[derive(Debug, Clone, Default)]
@@ -75,8 +75,9 @@ impl Rows {
         }
     }
 
+    /// Adds `a b` to a row.
     #[inline(always)]
-    fn add_product(&mut self, row: usize, a: f64, b: f64) {
+    pub(super) fn add_product(&mut self, row: usize, a: f64, b: f64) {
         let product = a * b;
         if self.plainly {
             self.sums[row].add_plainly(product);
@@ -91,6 +92,11 @@ impl Rows {
         self.sums.iter().map(|s| s.value())
     }
 
+    /// The sums with all their digits. Each is wrong by at most [`doubt`]`(n)` times the size of its n terms.
+    pub(super) fn doubled(&self) -> impl Iterator<Item = Doubled> + Clone + '_ {
+        self.sums.iter().map(|s| s.doubled())
+    }
+
     /// The sizes of the terms of each sum.
     pub(super) fn sizes(&self) -> &[f64] {
         &self.sizes
@@ -100,4 +106,11 @@ impl Rows {
     pub(super) fn norm(&self) -> f64 {
         norm_of(self.values())
     }
+}
+
+/// What a compensated sum of `n` terms may be wrong by, over the size of its terms (OgitaRumpOishi2005, theorem 5.6 before its last
+/// rounding).
+pub(super) fn doubt(n: usize) -> f64 {
+    let gamma = 0.5 * f64::EPSILON * (n + 2) as f64;
+    gamma * gamma
 }

@@ -94,7 +94,7 @@ fn verdict<const D: usize>(
     let mut worst = Vec::with_capacity(mu.len());
     for (c, (&mu, &w)) in mu.iter().zip(&law.w).enumerate() {
         let x = small::block::<D>(r, c).map(|v| w * v);
-        let modified = modified_velocity::<D>(&small::block(u, c), mu);
+        let modified = modified_velocity::<f64, D>(&small::block(u, c), mu);
         let s = status(&x, &modified, mu, margin);
         match s.status {
             Motion::Open => counts.open += 1,

@@ -1,7 +1,7 @@
 //! The horizontal linear complementarity problem.
 
 use super::square;
-use crate::check::{Certificate, HlcpGauge, Measure, linear};
+use crate::check::{self, Certificate, ConeSystem, Evidence, HlcpGauge, Measure};
 use crate::error::vector;
 use crate::linalg::Matrix;
 use crate::{Kind, Problem, ProblemError};
@@ -99,7 +99,20 @@ impl Problem for Hlcp {
         gauge.measure(self, point, true)
     }
 
-    fn verify(&self, certificate: &Certificate) -> bool {
-        linear::refutes_horizontal(self, certificate)
+    fn tidy(&self, point: &mut HlcpPoint, gauge: &mut HlcpGauge, boldly: bool) -> bool {
+        gauge.tidy(point, boldly)
+    }
+
+    fn evidence(&self, certificate: &Certificate) -> Evidence {
+        check::weigh(self, certificate)
+    }
+
+    fn cones(&self) -> Option<ConeSystem> {
+        check::Exactly::system(self, None)
+    }
+
+    fn assembled(&self, unknowns: &[f64]) -> Self::Point {
+        let (x, s) = unknowns.split_at(self.dim());
+        HlcpPoint { x: x.to_vec(), s: s.to_vec() }
     }
 }

@@ -61,8 +61,23 @@ macro_rules! problem_in_z {
                 gauge.measure(self, point, true)
             }
 
-            fn verify(&self, certificate: &$crate::check::Certificate) -> bool {
-                $crate::check::linear::refutes(self, certificate)
+            fn tidy(&self, point: &mut Self::Point, gauge: &mut Self::Gauge, boldly: bool) -> bool {
+                gauge.tidy(self, point, boldly)
+            }
+
+            fn evidence(
+                &self,
+                certificate: &$crate::check::Certificate,
+            ) -> $crate::check::Evidence {
+                $crate::check::weigh(self, certificate)
+            }
+
+            fn cones(&self) -> Option<$crate::check::ConeSystem> {
+                $crate::check::Exactly::system(self, None)
+            }
+
+            fn assembled(&self, unknowns: &[f64]) -> Self::Point {
+                $crate::LcpPoint { z: unknowns.to_vec() }
             }
         }
     };

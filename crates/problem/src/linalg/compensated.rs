@@ -3,6 +3,8 @@
 //! A residual is the difference of numbers much larger than itself: computed plainly, it is rounding that looks like an
 //! answer. Source: OgitaRumpOishi2005, algorithms TwoSum, TwoProduct and Dot2.
 
+use super::Doubled;
+
 /// A running sum with the rounding errors of all its additions.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Compensated {
@@ -52,7 +54,14 @@ impl Compensated {
         let (b_high, b_low) = split(b);
         let error = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low;
         self.add(product);
-        self.error += error;
+        // The parts of a factor beyond 2⁹⁹⁶ leave the range, though the product need not.
+        self.error += if error.is_finite() { error } else { a.mul_add(b, -product) };
+    }
+
+    /// The sum with all that is known of it; NaN where a part left the range of double precision.
+    #[inline]
+    pub fn doubled(self) -> Doubled {
+        Doubled::new(self.sum, self.error)
     }
 
     /// The sum, rounded once. Where a part left the range of double precision, the plain sum.

@@ -1,6 +1,7 @@
 //! The Delassus operator W = Hᵀ M⁻¹ H of a global problem: its diagonal, its condensation, and its factors
 //! contact by contact.
 
+use super::budget::Pace;
 use super::{Block, BlockRow, Bsr, Csc, Inverse};
 
 /// `W = Hᵀ M⁻¹ H` without W: for each contact c the rows of `H_c` (n × D) that are not zero and those of
@@ -75,6 +76,19 @@ impl<const D: usize> Delassus<D> {
         Bsr::from_rows(nc, &rows)
     }
 
+    /// The bytes that [`condense`](Self::condense) takes, from above: every pair of contacts that touch the same component of M.
+    pub fn condensed_bytes(h: &Csc, inverse: &Inverse) -> f64 {
+        let pairs = |count: usize, _: usize| (count * count) as f64;
+        // The rows as they are filled, and the matrix that is made of them.
+        2.0 * (8 * D * D + 8) as f64 * sum_over_components::<D>(h, inverse, pairs)
+    }
+
+    /// The bytes that [`new`](Self::new) keeps of Z, from above.
+    pub fn kept_bytes(h: &Csc, inverse: &Inverse) -> f64 {
+        let rows = |count: usize, size: usize| (count * size) as f64;
+        (8 * D + 8) as f64 * sum_over_components::<D>(h, inverse, rows)
+    }
+
     /// `H_cᵀ v`.
     #[inline(always)]
     pub fn local_velocity(&self, c: usize, v: &[f64]) -> [f64; D] {
@@ -119,6 +133,26 @@ impl<const D: usize> Columns<D> {
     fn column(&self, c: usize) -> &[(u32, [f64; D])] {
         &self.rows[self.ptr[c]..self.ptr[c + 1]]
     }
+}
+
+/// `Σ f(contacts that touch it, size)` over the components of M.
+fn sum_over_components<const D: usize>(
+    h: &Csc,
+    inverse: &Inverse,
+    f: impl Fn(usize, usize) -> f64,
+) -> f64 {
+    let sizes: Vec<usize> = inverse.component_sizes().collect();
+    let (mut counts, mut last) = (vec![0_usize; sizes.len()], vec![usize::MAX; sizes.len()]);
+    for c in 0..h.ncols() / D {
+        for &i in (D * c..D * c + D).flat_map(|j| h.column(j).0) {
+            let k = inverse.component_of(i);
+            if last[k] != c {
+                last[k] = c;
+                counts[k] += 1;
+            }
+        }
+    }
+    counts.iter().zip(sizes).map(|(&count, size)| f(count, size)).sum()
 }
 
 /// `w += aᵀ b` for two rows.
@@ -171,7 +205,8 @@ fn with_diagonal<const D: usize>(
 /// all of them.
 const TOGETHER: usize = 16;
 
-/// Hands `H_c` and `Z_c = M⁻¹ H_c` of each contact in turn to `visit`, both as rows that hold something.
+/// Hands `H_c` and `Z_c = M⁻¹ H_c` of each contact in turn to `visit`, both as rows that hold something. Once the time is over (see
+/// [`budget`](super::budget)) the rest of Z is empty.
 fn solve_columns<const D: usize>(
     h: &Csc,
     inverse: &Inverse,
@@ -184,7 +219,14 @@ fn solve_columns<const D: usize>(
     let mut touched: Vec<(usize, usize)> = Vec::new();
     let together = if inverse.has_sparse_factor() { TOGETHER } else { 1 };
     let contacts: Vec<usize> = (0..h.ncols() / D).collect();
+    let mut pace = Pace::default();
+    let mut late = false;
     for group in contacts.chunks(together) {
+        if late {
+            // Nobody will use it: the shape alone.
+            group.iter().for_each(|&c| visit(c, &block_column::<D>(h, c), &[]));
+            continue;
+        }
         let rows: Vec<_> = group.iter().map(|&c| block_column::<D>(h, c)).collect();
         touched.clear();
         for (g, rows) in rows.iter().enumerate() {
@@ -207,6 +249,7 @@ fn solve_columns<const D: usize>(
                 }
             }
         }
+        late = pace.over(100.0 * x.len() as f64);
         let mut start = 0;
         for pairs in touched.chunk_by(|a, b| a.0 == b.0) {
             let component = pairs[0].0;

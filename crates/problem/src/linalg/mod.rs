@@ -5,14 +5,19 @@
 //! [`Inverse`]: factorisation of M (or of M with bilateral constraints) behind one face.
 //! [`SquareLu`]: LU of a dense or sparse square matrix, made again and again.
 //! [`BlockLu`]: LU of Newton matrices, analysed once and factorised many times.
+//! [`Compensated`], [`Doubled`]: sums and numbers in doubled precision.
 //! [`Delassus`]: W = Hᵀ M⁻¹ H as an operator, never formed, or condensed into a [`Bsr`].
+//! [`budget`]: the time and memory that all of these may use.
 
 mod block_lu;
 mod bsr;
+pub mod budget;
 mod compensated;
 mod csc;
 mod delassus;
 mod dense;
+mod doubled;
+mod fill;
 mod groups;
 mod inverse;
 mod matrix;
@@ -27,6 +32,8 @@ pub use compensated::Compensated;
 pub use csc::Csc;
 pub use delassus::Delassus;
 pub use dense::Dense;
+pub use doubled::{Doubled, Real, power_of_two};
+pub use fill::admit_sparse;
 pub use groups::Groups;
 pub use inverse::{Inverse, Refine, factorisations, is_positive_definite};
 pub use matrix::{Matrix, Operator};

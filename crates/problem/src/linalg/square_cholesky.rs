@@ -10,8 +10,8 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, MatRef, Par, Side};
 
 use super::block_lu::Singular;
-use super::inverse::count_factorisation;
-use super::{Csc, Dense, Matrix};
+use super::inverse::{QUICK, count_factorisation};
+use super::{Csc, Dense, Matrix, admit_sparse, budget};
 
 /// `A = L Lᵀ` of a symmetric positive definite [`Matrix`]: faer's blocked factorisation of a dense one, its supernodal or simplicial one of a sparse one in
 /// an order of approximate minimum degree, whose analysis is kept while the pattern stays.
@@ -50,6 +50,9 @@ impl SquareCholesky {
     pub fn factorise(&mut self, a: &Matrix) -> Result<(), Singular> {
         assert_eq!(a.nrows(), a.ncols(), "a square matrix");
         count_factorisation();
+        if a.nrows() > QUICK && budget::over() {
+            return Err(Singular);
+        }
         self.factorised = false;
         match a {
             Matrix::Dense(a) => self.dense(a)?,
@@ -63,6 +66,8 @@ impl SquareCholesky {
     fn dense(&mut self, a: &Dense) -> Result<(), Singular> {
         let n = a.nrows();
         if self.symbolic.is_some() || self.n != n || self.buffer.is_none() {
+            let needed = 8.0 * (n as f64) * (n as f64);
+            budget::admit("a dense Cholesky factorisation", needed).map_err(|_| Singular)?;
             let scratch = llt::factor::cholesky_in_place_scratch::<f64>(
                 n,
                 Par::Seq,
@@ -99,6 +104,9 @@ impl SquareCholesky {
         let pattern = SymbolicSparseColMatRef::new_checked(n, n, a.col_ptr(), None, a.row_idx());
         let same = self.pattern.0 == a.col_ptr() && self.pattern.1 == a.row_idx();
         if !same || self.symbolic.is_none() {
+            let entries = a.triplets().map(|(i, j, _)| (i, j));
+            let admitted = admit_sparse("a sparse Cholesky factorisation", n, entries, 1.0);
+            admitted.map_err(|_| Singular)?;
             let symbolic = factorize_symbolic_cholesky(
                 pattern,
                 Side::Lower,

@@ -6,8 +6,8 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, Mat, MatMut};
 
 use super::block_lu::Singular;
-use super::inverse::count_factorisation;
-use super::{Csc, Matrix};
+use super::inverse::{QUICK, count_factorisation};
+use super::{Csc, Matrix, admit_sparse, budget};
 
 /// LU with row pivoting of a square [`Matrix`]: faer's blocked LU of a dense one, its supernodal or simplicial LU of a sparse one, whose symbolic
 /// analysis is kept while the pattern stays.
@@ -40,10 +40,14 @@ impl SquareLu {
     pub fn factorise(&mut self, a: &Matrix) -> Result<(), Singular> {
         assert_eq!(a.nrows(), a.ncols(), "a square matrix");
         count_factorisation();
+        if a.nrows() > QUICK && budget::over() {
+            return Err(Singular);
+        }
         self.factor = None;
         let factor = match a {
             Matrix::Dense(a) => {
                 let n = a.nrows();
+                admit_dense(n)?;
                 let a = Mat::from_fn(n, n, |i, j| a[(i, j)]);
                 let lu = a.partial_piv_lu();
                 let regular = |i: usize| lu.U()[(i, i)] != 0.0 && lu.U()[(i, i)].is_finite();
@@ -64,6 +68,8 @@ impl SquareLu {
         let pattern = SymbolicSparseColMatRef::new_checked(n, n, a.col_ptr(), None, a.row_idx());
         let same = self.pattern.0 == a.col_ptr() && self.pattern.1 == a.row_idx();
         if !same || self.symbolic.is_none() {
+            let entries = a.triplets().map(|(i, j, _)| (i, j));
+            admit_sparse("a sparse LU factorisation", n, entries, 2.0).map_err(|_| Singular)?;
             self.symbolic = Some(SymbolicLu::try_new(pattern).map_err(|_| Singular)?);
             self.pattern.0.clear();
             self.pattern.0.extend_from_slice(a.col_ptr());
@@ -114,6 +120,11 @@ impl SquareLu {
             Factor::Sparse(lu) => lu.solve_transpose_in_place_with_conj(Conj::No, b),
         }
     }
+}
+
+fn admit_dense(n: usize) -> Result<(), Singular> {
+    let needed = 8.0 * (n as f64) * (n as f64);
+    budget::admit("a dense LU factorisation", needed).map_err(|_| Singular)
 }
 
 #[cfg(test)]

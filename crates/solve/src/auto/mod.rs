@@ -28,6 +28,7 @@ mod controller;
 pub mod linear;
 
 use nonsmooth_problem::check::{Existence, Kinematic};
+use nonsmooth_problem::linalg::budget;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -279,6 +280,9 @@ impl<const D: usize> Hybrid<D> {
         for _ in 0..SWEEPS_A_STEP {
             let moves = work.sweep.sweep(problem, &mut work.state, P::impulses(point));
             work.done.sweeps += 1;
+            if budget::over() {
+                break;
+            }
             estimate = moves.sqrt() / work.scale;
             if estimate <= 0.3 * work.tolerance && claims < SWEEPS_A_STEP {
                 work.stage = Stage::Sweeps { last, claims: claims + 1 };
@@ -389,6 +393,7 @@ impl<const D: usize> Hybrid<D> {
         let HybridWork { newton, controller, .. } = work;
         let Some(newton) = newton else { return };
         let r = P::impulses(point);
+        newton.focus(r, error, work.tolerance);
         newton.center(r, controller.epsilon(), controller.kappa());
         work.inner_best.copy_from_slice(r);
         if controller.start(error, newton.residual(r), work.tolerance) {
@@ -460,6 +465,9 @@ impl<const D: usize> Hybrid<D> {
         let mut moves = 0.0;
         for _ in 0..count {
             moves = work.sweep.sweep(problem, &mut work.state, P::impulses(point));
+            if budget::over() {
+                break;
+            }
         }
         work.done.between += count;
         if left > count {
@@ -490,11 +498,30 @@ impl<const D: usize> Hybrid<D> {
         let limits = Limits { time_limit: Some(INVESTIGATION), ..Limits::default() };
         let existence =
             work.existence.get_or_insert_with(|| existence::decide::<P, D>(problem, &limits));
-        if let Existence::NoSolution { certificate } = existence {
-            return Step::NoSolution(certificate.clone().into());
+        match existence {
+            Existence::NoSolution { proof } => {
+                return Step::NoSolution(proof.certificate().clone());
+            }
+            // An exact solution, found on the way: the judge has the last word on its rounding.
+            Existence::Solved { coefficients } if work.done.strategies == 0 => {
+                let Some(system) = problem.cones() else {
+                    return Step::Stuck("auto has lost its place".into());
+                };
+                let x = system.unknowns_at(&coefficients.0);
+                P::copy_point(&problem.assembled(&x), point);
+                problem.enter(&mut work.state, point);
+                work.best.copy_from_slice(P::impulses(point));
+                work.done.strategies += 1;
+                self.subproblem_here(problem, point, work);
+                return Step::Continue { estimate: 0.0 };
+            }
+            _ => {}
         }
         work.done.strategies += 1;
         if self.0.strategies > 0 && work.controller.strategies() >= self.0.strategies {
+            if let Existence::NearlyNoSolution { certificate, .. } = existence {
+                return Step::NoSolution(certificate.clone());
+            }
             let why = format!(
                 "no strategy halves the error any more; existence of a solution: {}",
                 existence.name()

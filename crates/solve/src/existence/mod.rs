@@ -7,8 +7,9 @@
 //! Method: the free motion first; then Gauss–Seidel sweeps on the convex relaxation `K* ∋ u − τ e_N ⟂ r ∈ K`, whose velocities enter
 //! int K* long before they converge (`approach`); then one second-order cone program, `max t` with `u − t e_N ∈ K*`,
 //! whose solution is a motion and whose multipliers are the impulses that refute (`program`); for problems without a
-//! solution the same program without friction, a linear one. What is found is polished and verified by the judge's
-//! crate: a verdict never rests on a tolerance of the program.
+//! solution the same program without friction, a linear one. What is found is polished, made exact and verified by the judge's
+//! crate: a verdict never rests on a tolerance of the program. Problems of few contacts that these means leave open are decided by
+//! enumeration of their cases in exact arithmetic ([`ExactCones`]).
 //!
 //! References: AcaryCadouxLemarechalMalick2011; KlarbringPang1998; GoulartChen2024.
 //!
@@ -21,11 +22,15 @@ mod program;
 use std::time::Instant;
 
 use nonsmooth_problem::Friction;
-use nonsmooth_problem::check::{Existence, Impulses, Kinematic, Kinematics};
+use nonsmooth_problem::check::{
+    Certificate, Evidence, ExactVector, Existence, Impulses, Kinematic, Kinematics, rounded,
+};
+use nonsmooth_problem::linalg::budget;
 use nonsmooth_problem::with_friction;
 
-use crate::Limits;
 use crate::form::Blockwise;
+use crate::parts::{ExactCones, ExactlyFound};
+use crate::{Limit, Limits, guard};
 use program::{Program, Widest};
 
 /// How long an investigation may take.
@@ -36,9 +41,15 @@ struct Clock<'a> {
 
 impl Clock<'_> {
     fn over(&self) -> bool {
-        let cancelled = (self.limits.cancel.as_ref())
-            .is_some_and(|c| c.load(std::sync::atomic::Ordering::Relaxed));
-        cancelled || self.left().is_some_and(|left| left <= 0.0)
+        self.limits.reached(self.start).is_some() || budget::over()
+    }
+
+    /// What is said where a limit came first.
+    fn late(&self) -> Existence {
+        late(match self.limits.reached(self.start) {
+            Some(limit) => limit,
+            None => Limit::Time,
+        })
     }
 
     /// Seconds.
@@ -48,9 +59,23 @@ impl Clock<'_> {
 }
 
 /// What is known of the existence of a solution, within the time limit of `limits`; its other entries, but for the flag of
-/// cancellation, are not used.
+/// cancellation and the limit on memory, are not used. A large problem is investigated on a thread of its own, see [`guard`].
 pub fn of(problem: &Friction, limits: &Limits) -> Existence {
-    with_friction!(problem, p => decide(p, limits))
+    if problem.unknowns() <= guard::SMALL {
+        return with_friction!(problem, p => decide(p, limits));
+    }
+    let copy = problem.clone();
+    let decided =
+        guard::run(limits, || {}, move |limits| with_friction!(&copy, p => decide(p, limits)));
+    decided.unwrap_or_else(late)
+}
+
+/// What is said where a limit came first.
+fn late(limit: Limit) -> Existence {
+    match limit {
+        Limit::Cancelled => unknown("it was cancelled"),
+        Limit::Time | Limit::Iterations => unknown("the time limit came first"),
+    }
 }
 
 /// As [`of`], with the cheap attempts only: the free motion and a few hundred sweeps. What they cannot prove is unknown.
@@ -64,19 +89,88 @@ pub fn decide<P: Blockwise<D> + Kinematic<D>, const D: usize>(
     limits: &Limits,
 ) -> Existence {
     let clock = Clock { start: Instant::now(), limits };
+    let _scope = limits.budget(clock.start).enter();
     let kinematics = problem.kinematics();
-    match approach::approach(problem, &kinematics, THOROUGH, &clock) {
-        Some(found) => proved(problem, found),
-        None => by_program(problem, &kinematics, &clock),
+    let found = approach::approach(problem, &kinematics, THOROUGH, &clock);
+    let first = found.map(|found| proved(problem, &kinematics, found));
+    if first.as_ref().is_some_and(is_decided) {
+        return first.unwrap_or_else(|| unknown("nothing was found"));
     }
+    // What holds up to rounding, or not by the theorem, exact enumeration may decide.
+    match (by_cases(problem, &kinematics, &clock), first) {
+        (Some(decided), _) => decided,
+        (None, Some(found)) => found,
+        (None, None) => by_program(problem, &kinematics, &clock),
+    }
+}
+
+fn is_decided(existence: &Existence) -> bool {
+    existence.is_proved() || matches!(existence, Existence::NoSolution { .. })
+}
+
+/// Problems of so few contacts are decided by exact enumeration of their cases, if they are polyhedral; in space the enumeration may still refute.
+const FEW: usize = 8;
+/// The most cases of an enumeration.
+const CASES: usize = 20_000;
+
+/// Decides small problems by [`ExactCones`]: those in the plane or without friction altogether, in space those that even a relaxation of the law refutes.
+fn by_cases<P: Kinematic<D>, const D: usize>(
+    problem: &P,
+    kinematics: &Kinematics<D>,
+    clock: &Clock,
+) -> Option<Existence> {
+    if problem.unknowns() > 12 * FEW {
+        return None;
+    }
+    let system = problem.cones().filter(|s| s.pairs.len() <= FEW * (2 * D - 1))?;
+    let complete = system.complete;
+    let mut search = ExactCones::new(system);
+    for _ in 0..CASES {
+        if clock.over() {
+            return None;
+        }
+        match search.advance() {
+            None => {}
+            Some(ExactlyFound::Solution(t)) => {
+                let verified = complete && search.system().solved_by(&t);
+                return verified.then_some(Existence::Solved { coefficients: ExactVector(t) });
+            }
+            Some(ExactlyFound::Nothing(vectors)) => {
+                // Normal impulses say more to a reader.
+                if let [vector] = &vectors[..]
+                    && let Some(impulses) = normal(kinematics, vector)
+                    && let Evidence::Proved(proof) = problem.evidence(&impulses.into())
+                {
+                    return Some(Existence::NoSolution { proof });
+                }
+                return match problem.evidence(&Certificate::Separating { vectors }) {
+                    Evidence::Proved(proof) => Some(Existence::NoSolution { proof }),
+                    _ => None,
+                };
+            }
+        }
+    }
+    None
+}
+
+/// The normal impulses and multipliers of a separating vector, whose rows of contacts and constraints come before those that define bounds.
+fn normal<const D: usize>(kinematics: &Kinematics<D>, vector: &ExactVector) -> Option<Impulses> {
+    let m = kinematics.contact_rows();
+    let bounds = (D - 1) * kinematics.mu.iter().filter(|mu| **mu > 0.0).count();
+    let first = vector.0.len().checked_sub(bounds + kinematics.constant.len())?;
+    let mut r: Vec<f64> = vector.0[first..first + m].iter().map(rounded).collect();
+    r.iter_mut().enumerate().filter(|(i, _)| i % D != 0).for_each(|(_, r)| *r = 0.0);
+    let lambda = vector.0[first + m..first + kinematics.constant.len()].iter().map(rounded);
+    Some(Impulses { r, lambda: lambda.collect() })
 }
 
 /// As [`glance`], for a problem of a known kind.
 pub fn glance_at<P: Blockwise<D> + Kinematic<D>, const D: usize>(problem: &P) -> Existence {
     let limits = Limits::default();
     let clock = Clock { start: Instant::now(), limits: &limits };
-    match approach::approach(problem, &problem.kinematics(), SHORT, &clock) {
-        Some(found) => proved(problem, found),
+    let kinematics = problem.kinematics();
+    match approach::approach(problem, &kinematics, SHORT, &clock) {
+        Some(found) => proved(problem, &kinematics, found),
         None => unknown("a short search found no motion into the dual cone"),
     }
 }
@@ -90,22 +184,26 @@ fn unknown(why: &str) -> Existence {
     Existence::Unknown { why: why.into() }
 }
 
-/// What was found, if the theorem applies where it is used.
-fn proved<P: Kinematic<D>, const D: usize>(problem: &P, found: Found) -> Existence {
-    let (motion, margin) = match found {
-        Found::Motion(motion, margin) => (motion, margin),
-        Found::Contradiction(certificate) => return Existence::NoSolution { certificate },
-    };
-    let still = motion.iter().all(|&x| x == 0.0);
-    match problem.monotone_up_to() {
-        // A shift of W moves u by as much, unless nothing moves.
-        Some(shift) if still || margin >= SHIFTED * shift => {
-            Existence::Proved { motion, margin, shift }
+/// What was found is worth.
+fn proved<P: Kinematic<D>, const D: usize>(
+    problem: &P,
+    kinematics: &Kinematics<D>,
+    found: Found,
+) -> Existence {
+    match found {
+        Found::Motion(motion, margin) => Existence::by_motion(problem, kinematics, motion, margin),
+        Found::Contradiction(certificate) => refuted(problem, certificate),
+    }
+}
+
+/// What impulses prove that refute the problem up to rounding.
+fn refuted<P: Kinematic<D>, const D: usize>(problem: &P, certificate: Impulses) -> Existence {
+    match problem.evidence(&certificate.clone().into()) {
+        Evidence::Proved(proof) => Existence::NoSolution { proof },
+        Evidence::Nearly { change } => {
+            Existence::NearlyNoSolution { certificate: certificate.into(), change }
         }
-        Some(_) => unknown("the criterion holds, but by less than W is indefinite"),
-        None => unknown(
-            "the criterion holds, but M (or W) is not positive semidefinite, which its theorem asks for",
-        ),
+        Evidence::Nothing => unknown("impulses that seem to refute the problem do not"),
     }
 }
 
@@ -117,33 +215,36 @@ enum Found {
     Contradiction(Impulses),
 }
 
-/// The margin must exceed the shift that makes W semidefinite by this factor.
-const SHIFTED: f64 = 10.0;
-
 fn by_program<P: Kinematic<D>, const D: usize>(
     problem: &P,
     kinematics: &Kinematics<D>,
     clock: &Clock,
 ) -> Existence {
-    let late = || unknown("the time limit came first");
     if clock.over() {
-        return late();
+        return clock.late();
     }
     let Some(widest) = Program::new(kinematics, &kinematics.mu).solve(clock) else {
         return unknown("the cone program could not be stated");
     };
     if let Some(margin) = kinematics.margin(&widest.motion) {
-        return proved(problem, Found::Motion(widest.motion, margin));
+        return Existence::by_motion(problem, kinematics, widest.motion, margin);
     }
     if clock.over() {
-        return late();
+        return clock.late();
     }
     // Can the normal velocities alone be made nonnegative?
     let without = vec![0.0; kinematics.mu.len()];
     if let Some(w) = Program::new(kinematics, &without).solve(clock) {
-        let mut rays = w.rays(clock);
-        if let Some(certificate) = rays.find(|ray| kinematics.refutes(ray)) {
-            return Existence::NoSolution { certificate };
+        let mut nearly = None;
+        for ray in w.rays(clock).filter(|ray| kinematics.refutes(ray)) {
+            match refuted(problem, ray) {
+                proved @ Existence::NoSolution { .. } => return proved,
+                near @ Existence::NearlyNoSolution { .. } => nearly = nearly.or(Some(near)),
+                _ => {}
+            }
+        }
+        if let Some(near) = nearly {
+            return near;
         }
     }
     // The multipliers lie on the boundary of K, where polishing would push some of them out: those of a slightly
@@ -163,7 +264,7 @@ fn by_program<P: Kinematic<D>, const D: usize>(
     }
     match weak {
         Some(ray) => Existence::Weak { ray },
-        None if clock.over() => late(),
+        None if clock.over() => clock.late(),
         None => {
             unknown("neither a motion nor impulses could be verified: the margin is near rounding")
         }

@@ -4,9 +4,10 @@
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 use nonsmooth_problem::check::{Impulses, Kinematics};
-use nonsmooth_problem::linalg::Csc;
+use nonsmooth_problem::linalg::{Csc, budget};
 
 use super::Clock;
+use crate::parts::admit_program;
 
 /// The program `min −t + ½ δ‖x‖²`, `s = S (A x + c) − t e ∈ L`, `E x + e = 0`, `t ≤ 1`, with S = diag(1, mu, mu): a contact with
 /// friction has D rows, one without its normal row.
@@ -113,13 +114,10 @@ impl<'a, const D: usize> Program<'a, D> {
             tol_infeas_rel: TOLERANCE,
             ..DefaultSettings::default()
         };
+        admit_program(&theirs(&p), &theirs(&a)).ok()?;
         let mut solver =
             DefaultSolver::new(&theirs(&p), &q, &theirs(&a), &b, &cones, settings).ok()?;
-        if let Some(cancel) = clock.limits.cancel.clone() {
-            solver.set_termination_callback(move |_: &_| {
-                cancel.load(std::sync::atomic::Ordering::Relaxed)
-            });
-        }
+        solver.set_termination_callback(|_: &_| budget::over());
         solver.solve();
         let solution = &solver.solution;
         if matches!(solution.status, SolverStatus::Unsolved) {

@@ -6,10 +6,11 @@
 //! gather never reaches a judged point.
 
 use nonsmooth_problem::check::Impulses;
-use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Refine, Singular, small};
+use nonsmooth_problem::linalg::budget::{self, TooLarge};
+use nonsmooth_problem::linalg::{Block, Bsr, Compensated, Csc, Delassus, Refine, Singular, small};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
-use super::linearised::{BodyForm, ContactForm, Form, System};
+use super::linearised::{BodyForm, ContactForm, Form, NEVER, Once, System, made, there};
 use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised, velocity_scale};
 use crate::SolveError;
 
@@ -23,9 +24,11 @@ pub struct GlobalState<const D: usize> {
     q: Vec<f64>,
     scale: f64,
     v: Vec<f64>,
+    /// v in doubled precision, where it was asked for: high, low, the last correction.
+    precise: [Vec<f64>; 3],
     contradiction: Option<Impulses>,
     /// Made when it is first asked for.
-    system: Option<GlobalSystem<D>>,
+    system: Once<GlobalSystem<D>>,
 }
 
 /// The linear system of a Newton method, over whichever graph suits M.
@@ -46,15 +49,19 @@ enum Operator<const D: usize> {
 }
 
 impl<const D: usize> GlobalSystem<D> {
-    fn new(problem: &FrictionGlobal<D>, operator: &Operator<D>, dynamics: &Dynamics) -> Self {
+    fn new(
+        problem: &FrictionGlobal<D>,
+        operator: &Operator<D>,
+        dynamics: &Dynamics,
+    ) -> Result<Self, TooLarge> {
         let nc = problem.contacts();
-        match operator {
-            Operator::Condensed(w) => Self::Contacts(System::new(ContactForm::new(w), nc)),
+        Ok(match operator {
+            Operator::Condensed(w) => Self::Contacts(System::new(ContactForm::new(w)?, nc)),
             _ => {
-                let form = BodyForm::new(dynamics.inverse.matrix(), &problem.H);
+                let form = BodyForm::new(dynamics.inverse.matrix(), &problem.H)?;
                 Self::Bodies(System::new(form, nc))
             }
-        }
+        })
     }
 }
 
@@ -81,6 +88,17 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     fn state(&self, access: Access) -> Result<Self::State, SolveError> {
         let dynamics = Dynamics::new(self)?;
         let inverse = &dynamics.inverse;
+        match access {
+            Access::Newton if inverse.has_sparse_factor() => {
+                let bytes = Delassus::<D>::condensed_bytes(&self.H, inverse);
+                budget::admit("the condensed W", bytes)?;
+            }
+            Access::Visits | Access::Newton => {
+                let bytes = Delassus::<D>::kept_bytes(&self.H, inverse);
+                budget::admit("the velocities that impulses give", bytes)?;
+            }
+            Access::Products => {}
+        }
         let mut state = GlobalState {
             operator: match access {
                 Access::Newton if inverse.has_sparse_factor() => {
@@ -96,6 +114,7 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
             q: vec![0.0; self.w.len()],
             scale: 1.0,
             v: vec![0.0; self.dofs()],
+            precise: Default::default(),
             contradiction: None,
             system: None,
             dynamics,
@@ -111,12 +130,13 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
             let earlier = state.system.take();
             *state = self.state(state.access)?;
             // A contact set that changed a little can keep the analysis of its Newton matrix.
-            if let (Some(GlobalSystem::Bodies(earlier)), Operator::Visits(_)) =
+            if let (Some(Ok(GlobalSystem::Bodies(earlier))), Operator::Visits(_)) =
                 (earlier, &state.operator)
             {
                 let matrix = state.dynamics.inverse.matrix();
                 let form = BodyForm::after(Some(earlier.into_form()), matrix, &self.H);
-                state.system = Some(GlobalSystem::Bodies(System::new(form, self.contacts())));
+                let system = |form| GlobalSystem::Bodies(System::new(form, self.contacts()));
+                state.system = Some(form.map(system));
             }
         }
         Ok(())
@@ -197,6 +217,24 @@ impl<const D: usize> Linear<D> for FrictionGlobal<D> {
         let (v, _) = state.dynamics.solve(self, r, Refine::Once);
         self.velocity_into(v, u);
     }
+
+    fn velocities_precisely(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
+        let [high, low, last] = &mut state.precise;
+        let n = state.dynamics.inverse.dim();
+        for part in [&mut *high, &mut *low, &mut *last] {
+            part.resize(n, 0.0);
+        }
+        state.dynamics.solve_doubled(self, r, [high, low, last]);
+        for (i, u) in u.iter_mut().enumerate() {
+            let mut sum = Compensated::from(self.w[i]);
+            let (rows, values) = self.H.column(i);
+            for (&j, &h) in rows.iter().zip(values) {
+                sum.add_product(h, high[j]);
+                sum.add_product(h, low[j]);
+            }
+            *u = sum.value();
+        }
+    }
 }
 
 impl<const D: usize> Linearised<D> for FrictionGlobal<D> {
@@ -208,7 +246,8 @@ impl<const D: usize> Linearised<D> for FrictionGlobal<D> {
     ) -> Result<(), Singular> {
         let GlobalState { operator, system, dynamics, .. } = state;
         let unit = (0..self.contacts()).map(|c| small::mean_diagonal(&operator.diagonal_block(c)));
-        match system.get_or_insert_with(|| GlobalSystem::new(self, operator, dynamics)) {
+        let system = made(system, || GlobalSystem::new(self, operator, dynamics));
+        match system.ok_or(Singular)? {
             GlobalSystem::Bodies(system) => system.factorise(unit, p, q),
             GlobalSystem::Contacts(system) => system.factorise(unit, p, q),
         }
@@ -234,7 +273,7 @@ impl<const D: usize> Linearised<D> for FrictionGlobal<D> {
                 self.H.mul_transpose_add(1.0, v, wx);
             }
         };
-        match system {
+        match there(system) {
             Some(GlobalSystem::Bodies(system)) => system.solve(b, x, wx, apply),
             Some(GlobalSystem::Contacts(system)) => system.solve(b, x, wx, apply),
             None => f64::NAN,
@@ -248,11 +287,11 @@ impl<const D: usize> Linearised<D> for FrictionGlobal<D> {
             Operator::Condensed(w) => 2.0 * w.nblocks() as f64,
             _ => 1.5 * self.H.nnz() as f64,
         };
-        let factorisation =
-            match system.get_or_insert_with(|| GlobalSystem::new(self, operator, dynamics)) {
-                GlobalSystem::Bodies(system) => system.form().cost(),
-                GlobalSystem::Contacts(system) => system.form().cost(),
-            };
+        let factorisation = match made(system, || GlobalSystem::new(self, operator, dynamics)) {
+            Some(GlobalSystem::Bodies(system)) => system.form().cost(),
+            Some(GlobalSystem::Contacts(system)) => system.form().cost(),
+            None => NEVER,
+        };
         Costs { sweep: 30.0 * contacts + visits, factorisation }
     }
 }

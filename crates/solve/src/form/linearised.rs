@@ -8,6 +8,7 @@
 //! What is factorised has `Q + δ w_c P` in place of Q, δ = 1e-10, so that Q may be singular (sticking contacts of a
 //! Newton matrix) and W rank deficient; refinement against `Q + P W` itself removes the bias wherever that matrix is regular.
 
+use nonsmooth_problem::linalg::budget::TooLarge;
 use nonsmooth_problem::linalg::{Block, BlockLu, Bsr, Csc, Groups, Singular, Slot, norm, small};
 
 /// The relative size of the regularisation.
@@ -16,6 +17,25 @@ const DELTA: f64 = 1e-10;
 const MOST_REFINEMENTS: usize = 4;
 /// Rounding level of a refined solve.
 const ENOUGH: f64 = 1e-12;
+
+/// What is made at its first use; or the memory that it would take, found out once.
+pub(super) type Once<T> = Option<Result<T, TooLarge>>;
+
+/// What is there, made now if it was not yet; `None` where there is not the memory.
+pub(super) fn made<T>(
+    slot: &mut Once<T>,
+    make: impl FnOnce() -> Result<T, TooLarge>,
+) -> Option<&mut T> {
+    slot.get_or_insert_with(make).as_mut().ok()
+}
+
+/// What is there.
+pub(super) fn there<T>(slot: &mut Once<T>) -> Option<&mut T> {
+    slot.as_mut().and_then(|made| made.as_mut().ok())
+}
+
+/// The cost of a factorisation that there is not the memory for.
+pub(super) const NEVER: f64 = 1e18;
 
 /// A factorised system, with the blocks that it belongs to.
 pub(super) struct System<F, const D: usize> {
@@ -146,10 +166,10 @@ pub(super) struct ContactForm<const D: usize> {
 }
 
 impl<const D: usize> ContactForm<D> {
-    pub(super) fn new(w: &Bsr<D>) -> Self {
+    pub(super) fn new(w: &Bsr<D>) -> Result<Self, TooLarge> {
         let nc = w.nrows();
         let pairs = || (0..nc).flat_map(|i| w.row(i).0.iter().map(move |&j| (i as u32, j)));
-        let lu = BlockLu::new(&vec![D; nc], pairs().filter(|(i, j)| i != j));
+        let lu = BlockLu::new(&vec![D; nc], pairs().filter(|(i, j)| i != j))?;
         let slots = pairs().map(|(i, j)| lu.slot(i as usize, j as usize)).collect();
         let diagonal = (0..nc).map(|i| lu.slot(i, i)).collect();
         let mut ptr = vec![0];
@@ -158,7 +178,7 @@ impl<const D: usize> ContactForm<D> {
             Some(*end)
         }));
         let columns = pairs().map(|(_, j)| j).collect();
-        Self { lu, ptr, columns, slots, diagonal, blocks: w.blocks().to_vec() }
+        Ok(Self { lu, ptr, columns, slots, diagonal, blocks: w.blocks().to_vec() })
     }
 
     /// Takes another W; false where its pattern is not the one that was analysed.
@@ -222,13 +242,13 @@ struct Touch<const D: usize> {
 impl<const D: usize> BodyForm<D> {
     /// `matrix` is M, or M bordered by bilateral constraints (its rows after those of H). Nodes are the connected components of
     /// M; a multiplier belongs to the first component that it acts on.
-    pub(super) fn new(matrix: &Csc, h: &Csc) -> Self {
+    pub(super) fn new(matrix: &Csc, h: &Csc) -> Result<Self, TooLarge> {
         Self::after(None, matrix, h)
     }
 
     /// As [`new`](Self::new), with the analysis of an earlier form where that serves: the bodies are the same, and no two of them touch that
     /// did not touch before.
-    pub(super) fn after(earlier: Option<Self>, matrix: &Csc, h: &Csc) -> Self {
+    pub(super) fn after(earlier: Option<Self>, matrix: &Csc, h: &Csc) -> Result<Self, TooLarge> {
         let n = h.nrows();
         let node_of = nodes(matrix, n);
         let count = node_of.iter().max().map_or(0, |m| m + 1);
@@ -273,7 +293,7 @@ impl<const D: usize> BodyForm<D> {
         let edges = couplings.chain(by_contact).filter(|(i, j)| i != j);
         let lu = match earlier {
             Some(Self { lu, .. }) if lu.serves(&sizes, edges.clone()) => lu,
-            _ => BlockLu::new(&sizes, edges),
+            _ => BlockLu::new(&sizes, edges)?,
         };
         for (touch, list) in contacts.iter_mut().zip(&touched) {
             let pairs = list.iter().flat_map(|&a| list.iter().map(move |&b| (a, b)));
@@ -288,14 +308,14 @@ impl<const D: usize> BodyForm<D> {
         }
         let mass = blocks.into_iter().map(|((a, b), v)| (lu.slot(a, b), v)).collect();
         let largest = sizes.iter().max().copied().unwrap_or(0);
-        Self {
+        Ok(Self {
             mass,
             q_inverse: vec![[[0.0; D]; D]; contacts.len()],
             contacts,
             y: vec![0.0; lu.dim()],
             scratch: vec![0.0; largest * largest],
             lu,
-        }
+        })
     }
 }
 
@@ -469,7 +489,7 @@ mod tests {
     fn fewer_contacts_between_the_same_bodies_need_no_new_analysis() {
         let (problem, _) = Planted { contacts: 12, dofs: 60, ..Planted::default() }.global::<3>();
         let fewer = Csc::from_triplets(60, 27, problem.H.triplets().filter(|e| e.1 < 27)).unwrap();
-        let mut first = BodyForm::<3>::new(&problem.M, &problem.H);
+        let mut first = BodyForm::<3>::new(&problem.M, &problem.H).unwrap();
         let (p, q) = blocks((0..9).map(|_| 1.0));
         let regular = p.iter().zip(q).map(|(p, mut q)| {
             (0..3).for_each(|k| (0..3).for_each(|l| q[k][l] += 0.5 * p[k][l]));
@@ -484,14 +504,14 @@ mod tests {
             b
         };
         // The earlier analysis has more couplings than the new one would.
-        let mut fresh = BodyForm::new(&problem.M, &fewer);
+        let mut fresh = BodyForm::new(&problem.M, &fewer).unwrap();
         assert!(fresh.lu.flops() < flops);
-        first = BodyForm::after(Some(first), &problem.M, &fewer);
+        first = BodyForm::after(Some(first), &problem.M, &fewer).unwrap();
         assert_eq!(first.lu.flops(), flops);
         let (a, b) = (solve(&mut first), solve(&mut fresh));
         assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-9 * (1.0 + b.abs())));
         // More contacts than were analysed: anew.
-        let more = BodyForm::after(Some(fresh), &problem.M, &problem.H);
+        let more = BodyForm::after(Some(fresh), &problem.M, &problem.H).unwrap();
         assert_eq!(more.lu.flops(), flops);
     }
 

@@ -4,10 +4,12 @@
 //! constraints (a singular, positive semidefinite R) are honoured.
 
 use nonsmooth_problem::check::{Impulses, Kinematic};
-use nonsmooth_problem::linalg::{Block, Bsr, Csc, Delassus, Inverse, Refine, Singular, small};
+use nonsmooth_problem::linalg::{
+    Block, Bsr, Compensated, Csc, Delassus, Inverse, Refine, Singular, small,
+};
 use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint};
 
-use super::linearised::{ContactForm, Form, System};
+use super::linearised::{ContactForm, Form, NEVER, Once, System, made, there};
 use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised, velocity_scale};
 use crate::SolveError;
 
@@ -16,7 +18,9 @@ pub struct LocalState<const D: usize> {
     scale: f64,
     eliminated: Option<Eliminated<D>>,
     /// Made when it is first asked for.
-    system: Option<System<ContactForm<D>, D>>,
+    system: Once<System<ContactForm<D>, D>>,
+    /// Room for velocities in doubled precision.
+    sums: Vec<Compensated>,
 }
 
 struct Eliminated<const D: usize> {
@@ -30,6 +34,8 @@ struct Eliminated<const D: usize> {
     lambda: Vec<f64>,
     scratch: Vec<f64>,
     residual: Vec<f64>,
+    /// λ in doubled precision: high, low, the last correction.
+    precise: [Vec<f64>; 3],
     contradiction: Option<Impulses>,
 }
 
@@ -48,6 +54,7 @@ impl<const D: usize> Eliminated<D> {
             scratch: vec![0.0; r_inverse.scratch_len()],
             r_inverse,
             residual: vec![0.0; b.s.len()],
+            precise: [0; 3].map(|_| vec![0.0; b.s.len()]),
             contradiction: None,
         };
         eliminated.update_free_velocity(problem, b);
@@ -109,7 +116,7 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
 
     fn state(&self, _: Access) -> Result<Self::State, SolveError> {
         let eliminated = self.bilateral.as_ref().map(|b| Eliminated::new(self, b)).transpose()?;
-        Ok(LocalState { scale: velocity_scale(&self.q), eliminated, system: None })
+        Ok(LocalState { scale: velocity_scale(&self.q), eliminated, system: None, sums: vec![] })
     }
 
     fn refill(&self, state: &mut Self::State) -> Result<(), SolveError> {
@@ -124,7 +131,7 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
         }
         let LocalState { eliminated, system, .. } = state;
         let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
-        if system.as_mut().is_some_and(|system| !system.form().refill(w)) {
+        if there(system).is_none_or(|system| !system.form().refill(w)) {
             *system = None;
         }
         Ok(())
@@ -193,6 +200,44 @@ impl<const D: usize> Linear<D> for FrictionLocal<D> {
         let (w, q) = state.operator(self);
         w.mul_plus(r, q, u);
     }
+
+    /// With bilateral rows by way of the multipliers, `u = W r + V λ + q`: the eliminated W carries the rounding of its elimination.
+    fn velocities_precisely(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
+        let sums = &mut state.sums;
+        sums.clear();
+        sums.extend(self.q.iter().map(|&q| Compensated::from(q)));
+        for (i, sum) in sums.chunks_mut(D).enumerate() {
+            let (columns, blocks) = self.W.row(i);
+            for (&j, block) in columns.iter().zip(blocks) {
+                for (sum, row) in sum.iter_mut().zip(block) {
+                    row.iter()
+                        .enumerate()
+                        .for_each(|(l, &w)| sum.add_product(w, r[D * j as usize + l]));
+                }
+            }
+        }
+        if let (Some(BilateralLocal { V, s, .. }), Some(e)) =
+            (&self.bilateral, &mut state.eliminated)
+        {
+            // λ = −R⁻¹ (Vᵀ r + s), high and low.
+            let [high, low, last] = &mut e.precise;
+            for j in 0..s.len() {
+                let mut sum = Compensated::from(-s[j]);
+                let (rows, values) = V.column(j);
+                rows.iter().zip(values).for_each(|(&i, &v)| sum.add_product(-v, r[i]));
+                (high[j], low[j]) = sum.into_parts();
+            }
+            e.r_inverse.solve_doubled(high, low, last, &mut e.scratch);
+            for j in 0..s.len() {
+                let (rows, values) = V.column(j);
+                for (&i, &v) in rows.iter().zip(values) {
+                    sums[i].add_product(v, high[j]);
+                    sums[i].add_product(v, low[j]);
+                }
+            }
+        }
+        u.iter_mut().zip(&*sums).for_each(|(u, sum)| *u = sum.value());
+    }
 }
 
 impl<const D: usize> Linearised<D> for FrictionLocal<D> {
@@ -205,8 +250,8 @@ impl<const D: usize> Linearised<D> for FrictionLocal<D> {
         let LocalState { eliminated, system, .. } = state;
         let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
         let unit = (0..w.nrows()).map(|c| small::mean_diagonal(&w.diagonal_block(c)));
-        let system = system.get_or_insert_with(|| System::new(ContactForm::new(w), w.nrows()));
-        system.factorise(unit, p, q)
+        let make = || Ok(System::new(ContactForm::new(w)?, w.nrows()));
+        made(system, make).ok_or(Singular)?.factorise(unit, p, q)
     }
 
     fn solve_linearised(
@@ -223,16 +268,16 @@ impl<const D: usize> Linearised<D> for FrictionLocal<D> {
                 wx.copy_from_slice(&w.row_product(c, x));
             }
         };
-        system.as_mut().map_or(f64::NAN, |system| system.solve(b, x, wx, apply))
+        there(system).map_or(f64::NAN, |system| system.solve(b, x, wx, apply))
     }
 
     fn costs(&self, state: &mut Self::State) -> Costs {
         let LocalState { eliminated, system, .. } = state;
         let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
-        let system = system.get_or_insert_with(|| System::new(ContactForm::new(w), w.nrows()));
+        let system = made(system, || Ok(System::new(ContactForm::new(w)?, w.nrows())));
         Costs {
             sweep: 30.0 * w.nrows() as f64 + 2.0 * w.nblocks() as f64,
-            factorisation: system.form().cost(),
+            factorisation: system.map_or(NEVER, |system| system.form().cost()),
         }
     }
 }

@@ -3,7 +3,7 @@
 //! Everything is the base problem's, but for multiples of the identity on the diagonal blocks and what follows from them. The judge is
 //! the base problem's too: it tells how well a point solves *that*, which is what a proximal method is after.
 
-use nonsmooth_problem::check::{Certificate, Impulses, Measure};
+use nonsmooth_problem::check::{Certificate, ConeSystem, Evidence, Impulses, Measure};
 use nonsmooth_problem::linalg::{Block, Singular};
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem, ProblemError};
 
@@ -93,8 +93,17 @@ impl<P: Problem> Problem for Regularised<P> {
         self.base.certify(point, gauge)
     }
 
-    fn verify(&self, certificate: &Certificate) -> bool {
-        self.base.verify(certificate)
+    fn evidence(&self, certificate: &Certificate) -> Evidence {
+        self.base.evidence(certificate)
+    }
+
+    /// Of the problem without the regularisation.
+    fn cones(&self) -> Option<ConeSystem> {
+        self.base.cones()
+    }
+
+    fn assembled(&self, unknowns: &[f64]) -> Self::Point {
+        self.base.assembled(unknowns)
     }
 }
 
@@ -174,6 +183,13 @@ impl<P: Concurrent<D>, const D: usize> Concurrent<D> for Regularised<P> {
 impl<P: Linear<D>, const D: usize> Linear<D> for Regularised<P> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
         self.base.velocities(&mut state.base, r, u);
+        for (i, u) in u.iter_mut().enumerate() {
+            *u += self.weight[i / D] * (r[i] - self.center[i]);
+        }
+    }
+
+    fn velocities_precisely(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
+        self.base.velocities_precisely(&mut state.base, r, u);
         for (i, u) in u.iter_mut().enumerate() {
             *u += self.weight[i / D] * (r[i] - self.center[i]);
         }

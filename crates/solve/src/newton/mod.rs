@@ -34,7 +34,7 @@ mod scaling;
 mod tests;
 mod xuewen_soh_wanji;
 
-use nonsmooth_problem::linalg::{Block, small};
+use nonsmooth_problem::linalg::{Block, budget, small};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -372,6 +372,9 @@ impl<F, const D: usize> Semismooth<F, D> {
         let mut moves = 0.0;
         for _ in 0..count {
             moves = work.sweep.sweep(problem, &mut work.state, r);
+            if budget::over() {
+                break;
+            }
         }
         problem.velocities(&mut work.state, r, &mut work.u);
         Step::Continue { estimate: moves.sqrt() / (work.scale * (work.laws.len() as f64).sqrt()) }

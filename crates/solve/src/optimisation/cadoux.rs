@@ -156,7 +156,8 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for CadouxSteps<D
         let access = if products { Access::Products } else { Access::Newton };
         let convex = Convex::new(problem, access)?;
         let conic = (self.0.inner == ConeSolver::Clarabel)
-            .then(|| Conic::new(problem, &convex, Shape::Coulomb));
+            .then(|| Conic::new(problem, &convex, Shape::Coulomb))
+            .transpose()?;
         let n = problem.mu().len();
         Ok(CadouxWork {
             convex,
@@ -177,7 +178,7 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for CadouxSteps<D
     fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
         work.convex.refill(problem)?;
         if let Some(conic) = &mut work.conic {
-            conic.refill(problem, &work.convex);
+            conic.refill(problem, &work.convex)?;
         }
         let n = problem.mu().len();
         let speeds = [&mut work.s, &mut work.image, &mut work.gap, &mut work.ds, &mut work.held];

@@ -11,7 +11,7 @@
 //!
 //! References: BirginMartinezRaydan2000; HueberStadlerWohlmuth2008.
 
-use nonsmooth_problem::linalg::{Block, small};
+use nonsmooth_problem::linalg::{Block, budget, small};
 
 use super::sets::Set;
 use crate::cfun::natural_residual;
@@ -186,7 +186,7 @@ impl<P: Linear<D>, const D: usize> Convex<P, D> {
                 .sum();
             // ‖d(α)‖ grows with α and ‖d(α)‖/α falls: this bounds the residual from above.
             let bound = moved.sqrt() / (self.scale * alpha.min(1.0));
-            if bound <= tolerance || !bound.is_finite() {
+            if bound <= tolerance || !bound.is_finite() || budget::over() {
                 break;
             }
             // The rounding of r on the boundary hides a slope as small as this: then short steps, without the objective.
@@ -238,7 +238,7 @@ impl<P: Linearised<D>, const D: usize> Convex<P, D> {
     ) -> f64 {
         let mut residual = self.residual(r);
         for _ in 0..most {
-            if residual <= tolerance || !residual.is_finite() {
+            if residual <= tolerance || !residual.is_finite() || budget::over() {
                 break;
             }
             if !self.newton_step(problem, r) {

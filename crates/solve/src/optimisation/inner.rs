@@ -48,25 +48,34 @@ pub(super) struct Conic<const D: usize> {
 }
 
 impl<const D: usize> Conic<D> {
-    pub(super) fn new<P: Explicit<D>>(problem: &P, convex: &Convex<P, D>, shape: Shape) -> Self {
+    pub(super) fn new<P: Explicit<D>>(
+        problem: &P,
+        convex: &Convex<P, D>,
+        shape: Shape,
+    ) -> Result<Self, SolveError> {
         let model = problem.model(&convex.state);
         let m = convex.q.len();
-        Self {
-            solver: Clarabel::new(&model, problem.mu(), convex.mean_unit(), shape),
+        Ok(Self {
+            solver: Clarabel::new(&model, problem.mu(), convex.mean_unit(), shape)?,
             symmetric: model.symmetric,
             skew: vec![0.0; m],
             b: vec![0.0; m],
-        }
+        })
     }
 
-    pub(super) fn refill<P: Explicit<D>>(&mut self, problem: &P, convex: &Convex<P, D>) {
+    pub(super) fn refill<P: Explicit<D>>(
+        &mut self,
+        problem: &P,
+        convex: &Convex<P, D>,
+    ) -> Result<(), SolveError> {
         let model = problem.model(&convex.state);
-        self.solver.refill(&model, problem.mu(), convex.mean_unit());
+        self.solver.refill(&model, problem.mu(), convex.mean_unit())?;
         self.symmetric = model.symmetric;
         for x in [&mut self.skew, &mut self.b] {
             x.clear();
             x.resize(convex.q.len(), 0.0);
         }
+        Ok(())
     }
 
     /// Solves, polishes, and leaves `convex.y` at the new `r`; the residual reached.
@@ -122,14 +131,15 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Cylinders<P, D> {
         };
         let convex = Convex::new(problem, access)?;
         let conic = (choice == CylinderSolver::Conic)
-            .then(|| Conic::new(problem, &convex, Shape::Cylinder));
+            .then(|| Conic::new(problem, &convex, Shape::Cylinder))
+            .transpose()?;
         Ok(Self { convex, conic })
     }
 
     pub(super) fn refill(&mut self, problem: &P) -> Result<(), SolveError> {
         self.convex.refill(problem)?;
         if let Some(conic) = &mut self.conic {
-            conic.refill(problem, &self.convex);
+            conic.refill(problem, &self.convex)?;
         }
         Ok(())
     }

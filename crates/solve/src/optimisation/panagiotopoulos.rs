@@ -14,7 +14,7 @@
 //! Fails: as Tresca's fixed point, and it is slow where normal and tangential directions are strongly coupled (bodies that
 //! roll or tip), since each half knows nothing of the other.
 
-use nonsmooth_problem::linalg::{Block, small};
+use nonsmooth_problem::linalg::{Block, budget, small};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -183,7 +183,7 @@ impl<P: Blockwise<D> + Linearised<D>, const D: usize> AlternationWork<P, D> {
                 problem.moved(&mut convex.state, c, &dr);
                 moves += dr.iter().map(|v| (convex.unit[c] * v).powi(2)).sum::<f64>();
             }
-            if moves.sqrt() <= tolerance * convex.scale {
+            if moves.sqrt() <= tolerance * convex.scale || budget::over() {
                 break;
             }
         }

@@ -14,7 +14,8 @@
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
-use nonsmooth_problem::linalg::Csc;
+use nonsmooth_problem::linalg::budget::{self, TooLarge};
+use nonsmooth_problem::linalg::{Csc, admit_sparse};
 
 use crate::form::Model;
 
@@ -75,18 +76,36 @@ enum Rows {
     SecondOrder(usize),
 }
 
+/// Whether there is the memory for the factor of Clarabel's matrix `[P, Aᵀ; A, ·]`.
+pub fn admit_program(p: &CscMatrix<f64>, a: &CscMatrix<f64>) -> Result<(), TooLarge> {
+    let entries = |m: &CscMatrix<f64>, below: usize| {
+        let all = (0..m.n).flat_map(|j| (m.colptr[j]..m.colptr[j + 1]).map(move |k| (k, j)));
+        all.map(|(k, j)| (below + m.rowval[k], j)).collect::<Vec<_>>()
+    };
+    let order = p.n + a.m;
+    let needed = 6.0 * (order as f64) * (order as f64);
+    if budget::fits(needed) {
+        return Ok(());
+    }
+    let pattern = [entries(p, 0), entries(a, p.n)].concat();
+    admit_sparse("the factorisation of a cone program", order, pattern.into_iter(), 1.0)
+}
+
 impl<const D: usize> Clarabel<D> {
     /// Prepares Clarabel for the problem that `model` states, with `w > 0` a typical diagonal entry of W.
+    ///
+    /// Errors: a factor that takes more memory than there is.
     ///
     /// # Panics
     ///
     /// Never on a model whose matrices fit each other and the number of contacts.
-    pub fn new(model: &Model, mu: &[f64], w: f64, set: Shape) -> Self {
+    pub fn new(model: &Model, mu: &[f64], w: f64, set: Shape) -> Result<Self, TooLarge> {
         let layout = Layout::new::<D>(model, mu, set);
         let (quadratic, constraints) = layout.matrices::<D>(model, mu, w);
         let (n, rows) = (model.quadratic.ncols(), constraints.m);
         let (cost, bound) = (vec![0.0; n], vec![0.0; rows]);
-        let solver = DefaultSolver::new(
+        admit_program(&quadratic, &constraints)?;
+        let mut solver = DefaultSolver::new(
             &quadratic,
             &cost,
             &constraints,
@@ -95,11 +114,14 @@ impl<const D: usize> Clarabel<D> {
             settings(1e-8, 60),
         )
         .expect("the matrices fit each other");
-        Self { solver, layout, quadratic, constraints, cost, bound, w, speed: 1.0 }
+        solver.set_termination_callback(|_: &_| budget::over());
+        Ok(Self { solver, layout, quadratic, constraints, cost, bound, w, speed: 1.0 })
     }
 
     /// Takes another problem's data; in place where its pattern is the same.
-    pub fn refill(&mut self, model: &Model, mu: &[f64], w: f64) {
+    ///
+    /// Errors: as [`new`](Self::new).
+    pub fn refill(&mut self, model: &Model, mu: &[f64], w: f64) -> Result<(), TooLarge> {
         let layout = Layout::new::<D>(model, mu, self.layout.set);
         let same = |a: &CscMatrix<f64>, b: &CscMatrix<f64>| {
             (a.m, a.n) == (b.m, b.n) && a.colptr == b.colptr && a.rowval == b.rowval
@@ -114,8 +136,9 @@ impl<const D: usize> Clarabel<D> {
         if updated {
             (self.quadratic, self.constraints, self.w) = (quadratic, constraints, w);
         } else {
-            *self = Self::new(model, mu, w, self.layout.set);
+            *self = Self::new(model, mu, w, self.layout.set)?;
         }
+        Ok(())
     }
 
     /// Minimises `½ rᵀ W_s r + bᵀ r` to a relative tolerance, with `speed > 0` a typical size of b and `theta` the radii of the
@@ -353,7 +376,7 @@ mod tests {
         let model = problem.model(&state);
         assert!(model.symmetric, "{at}");
         let other = Model { quadratic: model.quadratic.clone(), ..model.clone() };
-        let mut conic = Clarabel::<D>::new(&model, problem.mu(), 1.0, Shape::Coulomb);
+        let mut conic = Clarabel::<D>::new(&model, problem.mu(), 1.0, Shape::Coulomb).unwrap();
         for speed in [1.0, 7.0] {
             let ended = conic.solve(&b, &[], speed, 1e-11, 60, &mut r);
             assert!(matches!(ended, Ended::Accurate | Ended::Roughly), "{at}: {ended:?}");
@@ -365,12 +388,12 @@ mod tests {
             conic.product(&mut product);
             let off = (0..m).fold(0.0_f64, |a, i| a.max((product[i] + q[i] - found[i]).abs()));
             assert!(off < 1e-5, "{at}: W r off by {off:.1e}");
-            conic.refill(&other, problem.mu(), 2.0);
+            conic.refill(&other, problem.mu(), 2.0).unwrap();
         }
         // Cylinders through the planted normal impulses: Tresca's problem has the Coulomb solution.
         let theta: Vec<f64> =
             (problem.mu().iter().enumerate()).map(|(c, mu)| mu * planted[D * c]).collect();
-        let mut conic = Clarabel::<D>::new(&model, problem.mu(), 1.0, Shape::Cylinder);
+        let mut conic = Clarabel::<D>::new(&model, problem.mu(), 1.0, Shape::Cylinder).unwrap();
         let ended = conic.solve(&q, &theta, 1.0, 1e-11, 60, &mut r);
         assert!(matches!(ended, Ended::Accurate | Ended::Roughly), "{at}: {ended:?}");
         let mut found = vec![0.0; m];
@@ -408,7 +431,7 @@ mod tests {
         assert!(problem.validate_point(&problem.origin()).is_ok());
         let state = problem.state(Access::Products).unwrap();
         let model = problem.model(&state);
-        let mut conic = Clarabel::<3>::new(&model, problem.mu(), 1.0, Shape::Coulomb);
+        let mut conic = Clarabel::<3>::new(&model, problem.mu(), 1.0, Shape::Coulomb).unwrap();
         let ended = conic.solve(&problem.q, &[], 1.0, 1e-8, 60, &mut [0.0; 3]);
         assert_eq!(ended, Ended::Unbounded);
     }

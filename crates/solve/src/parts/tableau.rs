@@ -16,7 +16,7 @@
 //! Cost: 2n² operations a pivot. Storage: two n × n matrices.
 
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Compensated, Matrix};
+use nonsmooth_problem::linalg::{Compensated, Matrix, budget};
 
 use crate::SolveError;
 use crate::form::System;
@@ -177,6 +177,7 @@ impl Tableau {
             let found = format!("{n} variables");
             return Err(SolveError::needs("at most 20000 variables: its tableau is dense", found));
         }
+        budget::admit("the dense tableau", 16.0 * (n as f64) * (n as f64))?;
         (self.n, self.free) = (n, system.free());
         equilibrate(system.matrix, &mut self.rows, &mut self.columns, &mut self.scratch);
         self.equation.clear();

@@ -411,7 +411,7 @@ impl LemkePath {
             return Err(Step::Continue { estimate: f64::NAN });
         }
         if let Some(certificate) = work.contradiction()
-            && problem.verify(&certificate)
+            && problem.evidence(&certificate).holds()
         {
             work.phase = Phase::Finished;
             work.z.clear();

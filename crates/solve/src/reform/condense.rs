@@ -7,7 +7,7 @@
 //! a component of M. Storage: W. Fails where M is singular.
 
 use nonsmooth_problem::check::{Certificate, Impulses};
-use nonsmooth_problem::linalg::{Csc, Delassus};
+use nonsmooth_problem::linalg::{Csc, Delassus, budget};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint};
 
 use super::Reformulation;
@@ -35,6 +35,8 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
         let mut dynamics = Dynamics::new(problem)?;
         let mut q = vec![0.0; problem.w.len()];
         let contradiction = dynamics.free_velocity(problem, &mut q); //                                  q = Hᵀ M⁻¹ f + w
+        let bytes = Delassus::<D>::condensed_bytes(&problem.H, &dynamics.inverse);
+        budget::admit("the condensed W", bytes)?;
         let w = Delassus::condense(&problem.H, &dynamics.inverse); //                W = Hᵀ M⁻¹ H
         let local = FrictionLocal::new(w, q, problem.mu.clone())?;
         Ok((local, CondenseMemo { dynamics, h: problem.H.clone(), contradiction }))

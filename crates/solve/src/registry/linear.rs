@@ -13,8 +13,8 @@ use crate::interior::linear::{Mehrotra, Mty};
 use crate::newton::linear::{Method, NewtonFb, NewtonMin, NewtonPfb, Semismooth};
 use crate::optimisation::linear::{Programmed, Proportioning};
 use crate::pivoting::{
-    BardPivoting, BlockPrincipal, CrissCrossPivoting, Enumerate, KellerPivoting, LemkePath,
-    MurtyPivoting,
+    BardPivoting, BlockPrincipal, CrissCrossPivoting, Enumerate, EnumerateExactly, KellerPivoting,
+    LemkePath, MurtyPivoting,
 };
 use crate::reform::{Mixed, Reduce, Split};
 use crate::settings::{SettingsMap, parse};
@@ -43,6 +43,7 @@ fn bounded_solvers<V: Visitor<Problem: Bounded>>() -> Vec<Entry<V>> {
         Entry { about: &NEWTON_MIN, build: |s, v| newton::<V, NewtonMin>(s, v) },
         Entry { about: &NEWTON_FB, build: |s, v| newton::<V, NewtonFb>(s, v) },
         Entry { about: &NEWTON_PFB, build: |s, v| newton::<V, NewtonPfb>(s, v) },
+        Entry { about: &ENUMERATION_EXACT, build: |s, v| Ok(v.visit(EnumerateExactly(parse(s)?))) },
     ]
 }
 
@@ -59,12 +60,22 @@ fn pivoting_solvers<V: Visitor<Problem: Complementary>>() -> Vec<Entry<V>> {
     ]
 }
 
-/// The solvers that follow pairs of variables: those of horizontal problems.
+/// The solvers that follow pairs of variables.
 fn paired_solvers<V: Visitor<Problem: Paired>>() -> Vec<Entry<V>> {
     vec![
         Entry { about: &IP_MTY, build: |s, v| Ok(v.visit(Mty(parse(s)?))) },
         Entry { about: &IP_MEHROTRA, build: |s, v| Ok(v.visit(Mehrotra(parse(s)?))) },
     ]
+}
+
+/// Those of horizontal problems.
+fn horizontal_solvers<V: Visitor<Problem: Paired>>() -> Vec<Entry<V>> {
+    let mut all = paired_solvers::<V>();
+    all.push(Entry {
+        about: &ENUMERATION_EXACT,
+        build: |s, v: V| Ok(v.visit(EnumerateExactly(parse(s)?))),
+    });
+    all
 }
 
 /// The solvers of problems whose variables are free or nonnegative: all.
@@ -116,4 +127,4 @@ macro_rules! register {
 register!(Lcp, complementary_solvers);
 register!(Mlcp, complementary_solvers, "reduce", Reduce, complementary_solvers);
 register!(BoxLcp, bounded_solvers, "split", Split, complementary_solvers);
-register!(Hlcp, paired_solvers, "mixed", Mixed, complementary_solvers);
+register!(Hlcp, horizontal_solvers, "mixed", Mixed, complementary_solvers);

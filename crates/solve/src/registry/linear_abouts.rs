@@ -5,7 +5,9 @@ use crate::auto::linear::LinearAuto;
 use crate::interior::linear::{MehrotraType, MizunoToddYe};
 use crate::newton::linear::{NewtonFb, NewtonMin, NewtonPfb};
 use crate::optimisation::linear::{Mprgp, QuadraticProgram};
-use crate::pivoting::{Bard, BlockPivoting, CrissCross, Enumeration, Keller, Lemke, Murty};
+use crate::pivoting::{
+    Bard, BlockPivoting, CrissCross, Enumeration, EnumerationExact, Keller, Lemke, Murty,
+};
 use crate::settings::described;
 use crate::splitting::linear::{Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs};
 
@@ -175,6 +177,18 @@ pub const ENUMERATION: About = About {
     cites: &["CottlePangStone2009", "Bland1977", "Acary2018"],
     variants: &["batch=1"],
     settings: described::<Enumeration>,
+};
+
+/// Enumeration of complementary cones in exact arithmetic.
+pub const ENUMERATION_EXACT: About = About {
+    name: "enumeration_exact",
+    family: "pivoting",
+    solves: Solves::Law,
+    summary: "enumeration of complementary cones in rational arithmetic: decides any problem of few variables, whatever its scaling and condition",
+    needs: &["the entries of M", "few complementary pairs (max_pairs)"],
+    cites: &["CottlePangStone2009", "Bareiss1968", "Bland1977"],
+    variants: &[],
+    settings: described::<EnumerationExact>,
 };
 
 /// Lemke's method.

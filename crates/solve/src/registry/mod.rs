@@ -5,6 +5,7 @@
 mod abouts;
 mod contact;
 mod facets;
+mod guarded;
 mod linear;
 pub mod linear_abouts;
 
@@ -15,6 +16,7 @@ use serde::Serialize;
 
 pub use abouts::*;
 pub use facets::{FACET_INNER, FACET_OUTER};
+use guarded::Guarded;
 
 use crate::proximal::ProximalPoint;
 use crate::reform::Facets;
@@ -119,7 +121,7 @@ pub struct Prefix {
 ///
 /// Implemented for each kind by itself, not for all dimensions at once: so the solvers are compiled here, and not again by
 /// every crate that asks for one.
-pub trait Registered: Problem + Sized + 'static {
+pub trait Registered: Problem<Point: 'static> + Clone + Send + Sync + Sized + 'static {
     /// The descriptions of the solvers that work on it directly.
     fn abouts() -> Vec<&'static About>;
 
@@ -243,8 +245,18 @@ pub fn solves<P: Registered>(name: &str) -> Option<Solves> {
 
 /// A session of the solver called `name`, with the settings given and defaults for the rest.
 ///
+/// It keeps its limits whatever the solver does, see [`guard`](crate::guard).
 /// Errors: an unknown name, an unknown key, a value of the wrong type or out of range.
 pub fn session<P: Registered>(
+    name: &str,
+    settings: &SettingsMap,
+) -> Result<Box<dyn Session<P>>, SolveError> {
+    let bare = bare::<P>(name, settings)?;
+    Ok(Box::new(Guarded::new(bare, name, settings)))
+}
+
+/// As [`session`], for callers who are guarded themselves.
+pub(crate) fn bare<P: Registered>(
     name: &str,
     settings: &SettingsMap,
 ) -> Result<Box<dyn Session<P>>, SolveError> {

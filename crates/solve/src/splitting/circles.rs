@@ -71,7 +71,7 @@ impl Circles {
         if alignment::<D>(unit, first, second, r) >= ALIGNED {
             return runaway::<D>(mu, second, r)
                 .map(Certificate::from)
-                .filter(|ray| problem.verify(ray));
+                .filter(|ray| problem.evidence(ray).holds());
         }
         if self.omega > self.omega_min {
             self.omega = (FACTOR * self.omega).max(self.omega_min);

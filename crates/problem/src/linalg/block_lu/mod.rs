@@ -17,9 +17,11 @@ mod symbolic;
 use kernel::{At, Pivots, Simd, WIDTH};
 use symbolic::{Front, Run, Symbolic};
 
+use super::budget::{self, Pace, TooLarge};
 use super::inverse::count_factorisation;
 
-/// A matrix that cannot be factorised: without a non-zero entry, with one that is not finite, or with factors that overflow.
+/// A matrix that cannot be factorised: without a non-zero entry, with one that is not finite, or with factors that overflow; or one for which there is
+/// not time or memory enough (see [`budget`]).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("a singular matrix")]
 pub struct Singular;
@@ -38,7 +40,7 @@ pub struct Slot {
 ///
 /// ```
 /// use nonsmooth_problem::linalg::BlockLu;
-/// let mut a = BlockLu::new(&[1, 2], [(0, 1)].into_iter());
+/// let mut a = BlockLu::new(&[1, 2], [(0, 1)].into_iter()).unwrap();
 /// a.add(0, 0, &[2.0]);
 /// a.add(0, 1, &[1.0, 0.0]);
 /// a.add(1, 0, &[0.0, 1.0]);
@@ -75,10 +77,14 @@ impl BlockLu {
     /// Analyses the pattern: node i has `sizes[i]` unknowns; `edges` are the coupled nodes, in one or both orientations.
     ///
     /// Allocates all that the other functions need. Cost: near linear in the blocks of L.
-    pub fn new(sizes: &[usize], edges: impl Iterator<Item = (u32, u32)>) -> Self {
+    /// Errors: factors that take more memory than there is (see [`budget::admit`]).
+    pub fn new(sizes: &[usize], edges: impl Iterator<Item = (u32, u32)>) -> Result<Self, TooLarge> {
         let symbolic = Symbolic::new(sizes, edges);
+        let s = &symbolic;
+        let entries = [s.values_len, s.lower_len, s.upper_len, s.stack_len, s.triangles_len];
+        budget::admit("the factorisation", 8.0 * entries.iter().map(|&n| n as f64).sum::<f64>())?;
         let n = symbolic.dim;
-        Self {
+        Ok(Self {
             simd: Simd::best(),
             values: vec![0.0; symbolic.values_len],
             row_scale: vec![1.0; n],
@@ -93,7 +99,7 @@ impl BlockLu {
             z: vec![0.0; symbolic.widest],
             perturbed: 0,
             symbolic,
-        }
+        })
     }
 
     /// The number of unknowns.
@@ -208,8 +214,9 @@ impl BlockLu {
         count_factorisation();
         self.scale()?;
         let mut outcome = Pivots::default();
+        let mut pace = Pace::default();
         for f in 0..self.symbolic.fronts.len() {
-            let found = self.front(f);
+            let found = self.front(f, &mut pace).ok_or(Singular)?;
             outcome.perturbed += found.perturbed;
             outcome.broken |= found.broken;
         }
@@ -271,12 +278,15 @@ impl BlockLu {
         Ok(())
     }
 
-    /// Assembles and eliminates front f.
-    fn front(&mut self, f: usize) -> Pivots {
+    /// Assembles and eliminates front f; `None` where the time is over.
+    fn front(&mut self, f: usize, pace: &mut Pace) -> Option<Pivots> {
         let s = &self.symbolic;
         let front = &s.fronts[f];
         let (k, m, simd) = (front.pivots, front.rest, self.simd);
         let ld = k + m;
+        if pace.over((ld * ld) as f64) {
+            return None;
+        }
         let lower = &mut self.lower[front.lower..front.lower + k * ld];
         let upper = &mut self.upper[front.upper..front.upper + k * m];
         lower.fill(0.0);
@@ -328,21 +338,29 @@ impl BlockLu {
             inverses: &mut self.inverses[front.start..front.start + k],
             swaps: &mut self.swaps[front.start..front.start + k],
             outcome: Pivots::default(),
+            pace,
         };
-        elimination.columns(0, k);
+        elimination.columns(0, k)?;
         let outcome = elimination.outcome;
         if m == 0 {
-            return outcome;
+            return Some(outcome);
         }
         let whole = At { at: 0, ld: k };
         exchange(upper, whole, m, &self.swaps[front.start..front.start + k], 0);
         let triangles = &self.triangles[front.triangles..];
-        left_solve(simd, (0, k), (lower, ld), triangles, (upper, whole), m);
         // The remainder; children's follow on top of it.
         let (begin, end) = (front.remainder, front.remainder + m * m);
-        let remainder = (&mut self.remainders[begin..end], At { at: 0, ld: m });
         let below = At { at: k, ld };
-        kernel::product(simd, (m, m, k), (lower, below), (upper, whole), remainder, true);
+        let each = (k * (k + 2 * m)) as f64;
+        for (j, n) in strips(m, each) {
+            let part = At { at: j * k, ld: k };
+            left_solve(simd, (0, k), (lower, ld), triangles, (upper, part), n);
+            let remainder = (&mut self.remainders[begin..end], At { at: j * m, ld: m });
+            kernel::product(simd, (m, n, k), (lower, below), (upper, part), remainder, true);
+            if pace.over(each * n as f64) {
+                return None;
+            }
+        }
         for &c in &s.children[front.children.clone()] {
             let child = &s.fronts[c as usize];
             let from = child.remainder..child.remainder + child.rest * child.rest;
@@ -363,7 +381,7 @@ impl BlockLu {
                 }
             }
         }
-        outcome
+        Some(outcome)
     }
 
     /// `x ← L⁻¹ P x`, front by front.
@@ -566,6 +584,18 @@ fn left_solve(
     left_solve(simd, (mid, b), (lower, ld), triangles, (x, part), n);
 }
 
+/// Operations of a product that is made in one go: some 20 ms.
+const STRIP: f64 = 2e8;
+/// The least columns of a strip, so that the rest of the product's operands are not read too often.
+const NARROW: usize = 48;
+
+/// Cuts `columns` columns of `each` operations into strips (first column, number) of some milliseconds; all but the largest fronts are one strip.
+fn strips(columns: usize, each: f64) -> impl Iterator<Item = (usize, usize)> {
+    let whole = each * columns as f64 <= 2.0 * STRIP;
+    let width = if whole { columns.max(1) } else { ((STRIP / each) as usize).max(NARROW) };
+    (0..columns).step_by(width).map(move |j| (j, width.min(columns - j)))
+}
+
 /// Where a range of pivots is halved: at a multiple of the panel width from its start.
 fn middle(a: usize, b: usize) -> usize {
     a + ((b - a) / 2).next_multiple_of(WIDTH)
@@ -581,33 +611,38 @@ struct Elimination<'a> {
     inverses: &'a mut [f64],
     swaps: &'a mut [u32],
     outcome: Pivots,
+    pace: &'a mut Pace,
 }
 
 impl Elimination<'_> {
-    fn columns(&mut self, a: usize, b: usize) {
+    /// `None` where the time is over.
+    fn columns(&mut self, a: usize, b: usize) -> Option<()> {
         let (simd, k, ld) = (self.simd, self.k, self.ld);
         if b - a <= WIDTH {
             self.panel(a, b);
-            return;
+            return Some(());
         }
         let mid = middle(a, b);
-        self.columns(a, mid);
+        self.columns(a, mid)?;
         let (left, right) = self.lower.split_at_mut(mid * ld);
         let columns = At { at: 0, ld };
         exchange(right, columns, b - mid, &self.swaps[a..mid], a);
-        left_solve(simd, (a, mid), (left, ld), self.triangles, (right, columns), b - mid);
         let below = At { at: a * ld + mid, ld };
-        let (done, open) = (At { at: a, ld }, At { at: mid, ld });
-        kernel::product_below(
-            simd,
-            (ld - mid, b - mid, mid - a),
-            (left, below),
-            (right, done, open),
-        );
-        self.columns(mid, b);
+        let each = ((mid - a) * (mid - a + 2 * (ld - mid))) as f64;
+        for (j, n) in strips(b - mid, each) {
+            let part = At { at: j * ld, ld };
+            left_solve(simd, (a, mid), (left, ld), self.triangles, (right, part), n);
+            let (done, open) = (At { at: j * ld + a, ld }, At { at: j * ld + mid, ld });
+            kernel::product_below(simd, (ld - mid, n, mid - a), (left, below), (right, done, open));
+            if self.pace.over(each * n as f64) {
+                return None;
+            }
+        }
+        self.columns(mid, b)?;
         let columns = At { at: a * self.ld, ld: self.ld };
         exchange(self.lower, columns, mid - a, &self.swaps[mid..b], mid);
         debug_assert!(b <= k);
+        Some(())
     }
 
     /// Eliminates pivots `a..b`, at most [`WIDTH`], in their own columns.

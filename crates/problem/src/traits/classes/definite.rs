@@ -14,7 +14,7 @@ use super::finding::{doubled, quadratic, slacks};
 use super::graph::components;
 use super::interval::Interval;
 use super::{How, Why, Witness};
-use crate::linalg::{Csc, Matrix, norm};
+use crate::linalg::{Csc, Matrix, budget, norm};
 
 /// What is known of the sign of `xᵀ M x`.
 #[derive(Debug, Clone)]
@@ -176,6 +176,9 @@ impl<'a> Part<'a> {
     fn has_cholesky(&self, shift: f64) -> bool {
         let k = self.rows.len();
         let scale = &self.scale;
+        if budget::over() {
+            return false;
+        }
         match self.m {
             Matrix::Dense(_) => self.dense(shift).llt(Side::Lower).is_ok(),
             _ => {
@@ -235,7 +238,7 @@ impl<'a> Part<'a> {
             (0..k).map(|i| (i as f64 * 0.618_033_988_749_895).fract() - 0.5).collect();
         for _ in 0..STEPS.min(k) {
             let size = norm(&v);
-            if size.is_nan() || size <= 1e-12 {
+            if size.is_nan() || size <= 1e-12 || budget::over() {
                 break;
             }
             if !basis.is_empty() {
@@ -259,6 +262,9 @@ impl<'a> Part<'a> {
             v = w;
         }
         let steps = alpha.len();
+        if steps == 0 {
+            return None;
+        }
         let t = Mat::from_fn(steps, steps, |i, j| match i.abs_diff(j) {
             0 => alpha[i],
             1 => beta[i.min(j)],
@@ -314,6 +320,9 @@ impl<'a> Part<'a> {
                 let rows = minor(&done, &left[..1]);
                 return Some(Definite::Semi(How::Elimination, Witness::SymmetricMinor { rows }));
             };
+            if budget::over() {
+                return None;
+            }
             let p = left.swap_remove(at);
             let pivot = t[p * k + p];
             for &i in &left {

@@ -96,7 +96,7 @@ impl Plan {
     }
 
     /// The same with a setting for the last candidate.
-    fn with(mut self, key: &str, value: &str) -> Self {
+    fn with(mut self, key: &str, value: impl Into<serde_json::Value>) -> Self {
         if let Some(last) = self.0.last_mut() {
             last.settings.insert(key.into(), value.into());
         }
@@ -116,6 +116,14 @@ fn pivots(n: usize) -> usize {
 /// Bases to enumerate: all of them.
 const ALL: usize = usize::MAX;
 
+/// Up to so many pairs exact arithmetic decides in milliseconds.
+const EXACT: usize = 12;
+
+fn exactly(plan: Plan) -> Plan {
+    plan.then("enumeration_exact", ALL, "decides, whatever the class and the scaling")
+        .with("max_pairs", 40)
+}
+
 pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto) -> Vec<Candidate> {
     let Some(facts) = Facts::of(&problem.M) else {
         return of_operator();
@@ -132,6 +140,7 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto) -> Vec<Candidate> {
     plan = plan
         .when(facts.pivotal(), |p| p.then("lemke", pivots(n), facts.class()))
         .when(facts.monotone() || n > DENSE, |p| p.then("ip_mehrotra", 200, facts.class()))
+        .when(n <= EXACT, exactly)
         .then("newton_min", 300, "superlinear where it converges")
         .then("newton_fb", 500, "globalised")
         .when(facts.pivotal(), |p| {
@@ -149,9 +158,11 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto) -> Vec<Candidate> {
 pub(super) fn of_mlcp(problem: &Mlcp, settings: &LinearAuto) -> Vec<Candidate> {
     let pairs = problem.pairs();
     let enumeration = |p: Plan| p.then("enumeration", ALL, "decides, whatever the class");
+    let few = pairs <= EXACT && problem.q.len() + problem.free <= 4 * EXACT;
     if problem.equalities != problem.free {
         let why = "more or fewer equalities than free variables";
         return Plan::new()
+            .when(few, exactly)
             .then("newton_fb", 500, why)
             .when(pairs <= settings.enumerate_below, enumeration)
             .0;
@@ -163,6 +174,7 @@ pub(super) fn of_mlcp(problem: &Mlcp, settings: &LinearAuto) -> Vec<Candidate> {
     Plan::new()
         .when(facts.pivotal(), |p| p.then("lemke", pivots(n), facts.class()))
         .when(facts.monotone(), |p| p.then("ip_mehrotra", 200, facts.class()))
+        .when(few, exactly)
         .then("newton_min", 300, "superlinear where it converges")
         .then("newton_fb", 500, "globalised")
         .when(pairs <= settings.enumerate_below, enumeration)
@@ -188,6 +200,7 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &LinearAuto) -> Vec<Candidate> 
             p.then("psor", SWEEPS, format!("{}, sparse and large", facts.class()))
         })
         .then("newton_min", 300, facts.class())
+        .when(finite <= 2 * EXACT && n <= EXACT, exactly)
         .then("newton_fb", 500, "globalised")
         .when(facts.pivotal(), |p| {
             p.then("split/lemke", pivots(n + finite), "decides more classes")
@@ -204,6 +217,7 @@ pub(super) fn of_hlcp(problem: &Hlcp, settings: &LinearAuto) -> Vec<Candidate> {
     let n = problem.dim();
     Plan::new()
         .then("ip_mehrotra", 200, "the method of horizontal problems")
+        .when(n <= EXACT, exactly)
         .when(n <= DENSE, |p| p.then("mixed/lemke", pivots(2 * n), "pivots where monotony fails"))
         .then("mixed/newton_fb", 500, "globalised")
         .when(n <= settings.enumerate_below, |p| {

@@ -1,5 +1,6 @@
 //! Several solvers, one after the other, as one session.
 
+use std::borrow::Cow;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
@@ -9,7 +10,7 @@ use nonsmooth_problem::check::Measure;
 use crate::registry::{self, Registered};
 use crate::settings::SettingsMap;
 use crate::trace::Trace;
-use crate::{Limit, Limits, Outcome, Progress, Sample, Session, SolveError, Status};
+use crate::{Limit, Limits, Observer, Outcome, Progress, Sample, Session, SolveError, Status};
 
 /// A solver of a plan.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +42,10 @@ pub struct Portfolio<P: Registered> {
 /// The most samples that a history keeps.
 const HISTORY: usize = 4096;
 
+/// What is said at the end of a plan.
+const NONE: Status =
+    Status::Stalled(Cow::Borrowed("none of the methods tried solves it; see the account"));
+
 impl<P: Registered> Portfolio<P> {
     /// A session that follows `plan`.
     pub fn new(plan: impl Fn(&P) -> Vec<Candidate> + Send + 'static) -> Self {
@@ -61,7 +66,7 @@ impl<P: Registered> Portfolio<P> {
         if let Some(k) = self.sessions.iter().position(same) {
             return Ok(k);
         }
-        let session = registry::session::<P>(candidate.name, &candidate.settings)?;
+        let session = registry::bare::<P>(candidate.name, &candidate.settings)?;
         self.sessions.push((candidate.name, candidate.settings.clone(), session));
         Ok(self.sessions.len() - 1)
     }
@@ -80,7 +85,7 @@ impl<P: Problem> Tally<P> {
     fn take(&mut self, point: P::Point, outcome: &Outcome) {
         self.iterations += outcome.iterations;
         self.factorisations += outcome.factorisations;
-        let better = |(_, best): &(P::Point, Measure)| outcome.measure.merit() < best.merit();
+        let better = |(_, best): &(P::Point, Measure)| outcome.measure.is_better_than(best);
         if self.best.as_ref().is_none_or(better) {
             self.best = Some((point, outcome.measure));
         }
@@ -106,14 +111,41 @@ impl<P: Problem> Tally<P> {
     }
 }
 
+/// Sees a candidate's solve as a part of the whole.
+struct Part<'a, P: Problem> {
+    observer: &'a mut dyn Observer<P>,
+    iterations: usize,
+    seconds: f64,
+    /// The merit of the best point so far.
+    merit: f64,
+}
+
+impl<P: Problem> Observer<P> for Part<'_, P> {
+    fn step(&mut self, progress: &Progress) {
+        self.observer.step(&later(progress, self.iterations, self.seconds));
+    }
+
+    fn keeps_best(&self) -> bool {
+        self.observer.keeps_best()
+    }
+
+    fn best(&mut self, point: &P::Point, measure: &Measure) {
+        if measure.merit() < self.merit {
+            self.merit = measure.merit();
+            self.observer.best(point, measure);
+        }
+    }
+}
+
 impl<P: Registered> Session<P> for Portfolio<P> {
-    fn solve(
+    fn observe(
         &mut self,
         problem: &P,
         point: &mut P::Point,
         limits: &Limits,
-        watch: &mut dyn FnMut(&Progress),
+        observer: &mut dyn Observer<P>,
     ) -> Result<Outcome, SolveError> {
+        limits.validate()?;
         problem.validate_point(point)?;
         self.history.clear();
         self.account.clear();
@@ -125,15 +157,26 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             factorisations: 0,
             best: None,
         };
+        let scope = limits.budget(tally.wall).enter();
+        if observer.keeps_best() {
+            // The plan asks for the classes of the matrix, which may take all the time there is.
+            observer.best(point, &problem.measure(point, &mut problem.gauge()?));
+        }
         let mut status = Status::Stalled("no method applies to this problem".into());
+        let mut nearly = None;
         for candidate in (self.plan)(problem) {
+            if let Some(limit) = limits.reached(tally.wall) {
+                status = Status::Limit(limit);
+                break;
+            }
             let k = self.session(&candidate)?;
             let mut trial = tally.best.as_ref().map_or_else(|| point.clone(), |b| b.0.clone());
             let (before, begun) = (tally.iterations, tally.wall.elapsed().as_secs_f64());
             let left = tally.left(limits, candidate.iterations);
             let session = &mut self.sessions[k].2;
-            let tried =
-                session.solve(problem, &mut trial, &left, &mut |p| watch(&later(p, before, begun)));
+            let merit = tally.best.as_ref().map_or(f64::INFINITY, |b| b.1.merit());
+            let mut part = Part { observer, iterations: before, seconds: begun, merit };
+            let tried = session.observe(problem, &mut trial, &left, &mut part);
             let outcome = match tried {
                 Ok(outcome) => outcome,
                 Err(e) if e.is_inapplicable() => {
@@ -159,8 +202,16 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             }
             status = match outcome.status {
                 ray @ Status::NoConclusion(_) => ray,
-                _ => Status::Stalled("none of the methods tried solves it; see the account".into()),
+                near @ Status::NearlyInfeasible { .. } => {
+                    nearly = Some(near);
+                    NONE
+                }
+                _ => NONE,
             };
+        }
+        drop(scope);
+        if let (Some(near), Status::Stalled(_) | Status::NoConclusion(_)) = (nearly, &status) {
+            status = near;
         }
         let measure = match tally.best {
             Some((best, measure)) => {

@@ -3,6 +3,7 @@
 //! Matrices of a nearly symmetric sparse pattern go to the multifrontal LU with a fixed order of elimination ([`BlockLu`]), which is much the faster; its pivots are
 //! static, so the caller looks at residuals and, where they are bad, asks for row pivoting ([`SquareLu`]) from then on.
 
+use nonsmooth_problem::linalg::budget::TooLarge;
 use nonsmooth_problem::linalg::{BlockLu, Csc, Matrix, Slot, SquareLu};
 
 /// The multifrontal LU is used where at least this part of the entries has its mirror image in the pattern.
@@ -26,7 +27,8 @@ impl Factor {
     /// For matrices with the pattern of `a`.
     pub fn new(a: &Matrix) -> Self {
         let fixed = match a {
-            Matrix::Sparse(a) if symmetric(a) => Some(Fixed::new(a)),
+            // Where the memory is short, row pivoting is refused in its turn.
+            Matrix::Sparse(a) if symmetric(a) => Fixed::new(a).ok(),
             _ => None,
         };
         Self { pivoting: SquareLu::default(), trusted: fixed.is_some(), fixed }
@@ -75,10 +77,10 @@ fn symmetric(a: &Csc) -> bool {
 }
 
 impl Fixed {
-    fn new(a: &Csc) -> Self {
+    fn new(a: &Csc) -> Result<Self, TooLarge> {
         let edges = a.triplets().filter(|(i, j, _)| i != j).map(|(i, j, _)| (i as u32, j as u32));
-        let lu = BlockLu::new(&vec![1; a.nrows()], edges);
+        let lu = BlockLu::new(&vec![1; a.nrows()], edges)?;
         let slots = a.triplets().map(|(i, j, _)| lu.slot(i, j)).collect();
-        Self { lu, slots }
+        Ok(Self { lu, slots })
     }
 }

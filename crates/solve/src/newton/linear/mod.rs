@@ -741,5 +741,5 @@ fn proof<P: Rowwise>(problem: &P, work: &Work) -> Option<Certificate> {
     let largest = y.iter().fold(0.0_f64, |m, y| m.max(y.abs()));
     y.iter_mut().filter(|y| y.abs() <= 1e-9 * largest).for_each(|y| *y = 0.0);
     let farkas = Certificate::Farkas { y };
-    problem.verify(&farkas).then_some(farkas)
+    problem.evidence(&farkas).holds().then_some(farkas)
 }

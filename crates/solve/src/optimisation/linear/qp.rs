@@ -8,7 +8,7 @@
 //! method, each step by Newton's method on the natural map, so redundant rows do not matter). A program that is unbounded (`energy`) or infeasible (`gap`) gives a Farkas vector.
 //!
 //! References: GoulartChen2024; CottlePangStone2009, section 1.4; Acary2018 (18).
-//! Cost: one step is a whole solve of Clarabel (10 to 30 sparse LDLᵀ factorisations; limits and Ctrl-C act after it), the second polishes with a few
+//! Cost: one step is a whole solve of Clarabel (10 to 30 sparse LDLᵀ factorisations), the second polishes with a few
 //! factorisations of the size of M. Storage: Clarabel's factors, a scaled copy of M. A given point is used where its own polish solves the problem.
 //! Fails: M that is not positive semidefinite is refused. Where Clarabel cannot get near a solution, neither can the polish.
 
@@ -16,11 +16,12 @@ use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 use nonsmooth_problem::LcpPoint;
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Compensated, Csc, Dense, Matrix, SquareCholesky};
+use nonsmooth_problem::linalg::{Compensated, Csc, Dense, Matrix, SquareCholesky, budget};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::form::{Bounded, Bounds, Equations, System, system};
+use crate::parts::admit_program;
 use crate::parts::pairs::{Newton, Scaled, Side, clean, hopeless_row};
 use crate::settings::Settings;
 use crate::{SolveError, Solver, Step};
@@ -245,6 +246,7 @@ impl Programmed {
             let bound = |i| if upper { system.bounds.upper(i) } else { system.bounds.lower(i) };
             to.extend((0..n).map(|i| work.scaled.bound(i, bound(i))));
         }
+        work.scaled.bounded(&work.lower, &work.upper);
         for v in [
             &mut work.z,
             &mut work.w,
@@ -275,11 +277,13 @@ impl Programmed {
             ..DefaultSettings::default()
         };
         let Program { quadratic, linear, constraints, bound, cones } = &program;
+        admit_program(quadratic, constraints).map_err(|_| "there is not memory enough")?;
         let Ok(mut solver) =
             DefaultSolver::new(quadratic, linear, constraints, bound, cones, settings)
         else {
             return Err("Clarabel does not accept the program");
         };
+        solver.set_termination_callback(|_: &_| budget::over());
         solver.solve();
         let solution = &solver.solution;
         work.iterations = solution.iterations;

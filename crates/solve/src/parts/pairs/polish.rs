@@ -45,7 +45,7 @@ impl Polish {
     #[allow(clippy::too_many_arguments)]
     pub fn run(
         &mut self,
-        scaled: &Scaled,
+        scaled: &mut Scaled,
         newton: &mut Newton,
         z: &[f64],
         s: &[f64],
@@ -151,7 +151,7 @@ impl Polish {
     }
 
     /// The merit of the point with its wrong signs cut off.
-    fn clipped_merit(&mut self, scaled: &Scaled, free: usize) -> f64 {
+    fn clipped_merit(&mut self, scaled: &mut Scaled, free: usize) -> f64 {
         let Self { now: (z, s), r, sums, .. } = self;
         z[free..].iter_mut().chain(s.iter_mut()).for_each(|x| *x = x.max(0.0));
         scaled.residual_precisely(z, s, r, sums);

@@ -8,7 +8,7 @@
 //! where E and Z then differ by more than a factor of a thousand between pairs, the rows and columns were evidently scaled by different hands,
 //! and this undoes it; else both are replaced by their mean.
 
-use nonsmooth_problem::linalg::{Compensated, Csc, Dense, Matrix, norm};
+use nonsmooth_problem::linalg::{Compensated, Csc, Dense, Matrix};
 
 use crate::form::Equations;
 
@@ -17,7 +17,7 @@ const SWEEPS: usize = 30;
 /// E/Z may differ by this factor between pairs before it counts as intended.
 const SPREAD: f64 = 1e3;
 
-/// The scaled problem, and the weights with which the judge sees its residuals.
+/// The scaled problem, and the units in which the judge sees its residuals.
 #[derive(Debug, Clone, Default)]
 pub struct Scaled {
     congruent: bool,
@@ -35,14 +35,9 @@ pub struct Scaled {
     dz: Vec<f64>,
     ds: Vec<f64>,
     theta: f64,
-    norm_q: f64,
-    abs_q: Vec<f64>,
-    /// Largest modulus and sum of moduli: of rows of M; with R of columns of Q, R and rows of both.
-    largest: Vec<f64>,
-    sums: Vec<f64>,
-    slack_largest: Vec<f64>,
-    slack_sums: Vec<f64>,
-    /// Sizes of rows and columns while the scaling is sought.
+    /// The unit of each row that q makes, see [`LinearGauge`](nonsmooth_problem::check::LinearGauge).
+    units: Vec<f64>,
+    /// Sizes of rows and columns: while the scaling is sought, and of errors at the point judged.
     sizes: [Vec<f64>; 3],
 }
 
@@ -89,32 +84,7 @@ impl Scaled {
         self.theta = if largest > 0.0 { power_of_two(largest) } else { 1.0 };
         self.c.clear();
         self.c.extend(q.iter().zip(&self.e).map(|(q, e)| sign * q * e / self.theta));
-        self.norm_q = norm(q);
-        self.abs_q.clear();
-        self.abs_q.extend(q.iter().map(|q| q.abs()));
-        for v in [&mut self.largest, &mut self.sums, &mut self.slack_largest, &mut self.slack_sums]
-        {
-            v.clear();
-            v.resize(n, 0.0);
-        }
-        let by_column = slack.is_some();
-        matrix.for_each(|i, j, x| {
-            let k = if by_column { j } else { i };
-            self.largest[k] = self.largest[k].max(x.abs());
-            self.sums[i] += x.abs();
-        });
-        if let Some(slack) = slack {
-            slack.for_each(|i, j, x| {
-                self.slack_largest[j] = self.slack_largest[j].max(x.abs());
-                self.slack_sums[i] += x.abs();
-            });
-        }
-        let all = self.largest.iter_mut().chain(&mut self.sums);
-        for x in all.chain(&mut self.slack_largest).chain(&mut self.slack_sums) {
-            if *x == 0.0 {
-                *x = 1.0;
-            }
-        }
+        self.find_units(|_| 0.0);
     }
 
     /// E = Z with entries of at most about one.
@@ -263,72 +233,137 @@ impl Scaled {
         w.iter_mut().zip(sums.iter()).for_each(|(w, sum)| *w = sum.value());
     }
 
-    /// The residual as the judge measures it, of a problem without R and with bounds in scaled units, from z between them and `w = M z + c`.
-    pub fn merit_between(&self, z: &[f64], w: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
-        let unit = if self.norm_q > 0.0 { self.norm_q } else { 1.0 };
-        let reach =
-            z.iter().zip(&self.dz).fold(0.0_f64, |l, (z, d)| l.max((z * d).abs())) * self.theta;
-        let (mut sum, mut worst) = (0.0, 0.0_f64);
-        for i in 0..z.len() {
-            let to_z = self.theta * self.dz[i];
-            let w = self.theta / self.e[i] * w[i];
-            // w, or less where a bound is nearer.
-            let natural = |s: f64| match w > 0.0 {
-                true => w.min(s * to_z * (z[i] - lower[i])),
-                false => w.max(s * to_z * (z[i] - upper[i])),
-            };
-            sum += (natural(self.largest[i]) / unit).powi(2);
-            let terms = self.abs_q[i] + self.sums[i] * reach;
-            let row = natural(self.sums[i]).abs();
-            worst = worst.max(if terms > 0.0 { row / terms } else { row });
-        }
-        let merit = sum.sqrt().max(worst);
-        if merit.is_nan() { f64::INFINITY } else { merit }
+    /// Tells the units of rows about bounds of z, in scaled units.
+    pub fn bounded(&mut self, lower: &[f64], upper: &[f64]) {
+        self.find_units(|j| {
+            let least = lower[j].abs().min(upper[j].abs());
+            if least.is_finite() { least } else { 0.0 }
+        });
     }
 
-    /// The residual as the judge measures it, from z, s and `r = Q z + R s + c`: the larger of the relative one and the worst row.
-    pub fn merit(&self, z: &[f64], s: &[f64], r: &[f64]) -> f64 {
-        let unit = if self.norm_q > 0.0 { self.norm_q } else { 1.0 };
-        let largest = |v: &[f64], d: &[f64]| {
-            v.iter().zip(d).fold(0.0_f64, |l, (v, d)| l.max((v * d).abs())) * self.theta
-        };
-        let z_reach = largest(z, &self.dz);
-        let (mut sum, mut worst) = (0.0, 0.0_f64);
-        let mut add = |residual: f64, row: f64, terms: f64| {
-            sum += (residual / unit).powi(2);
-            // A row without terms is compared with itself.
-            worst = worst.max(if terms > 0.0 { row.abs() / terms } else { row.abs() });
-        };
-        match &self.slack {
-            None => {
-                for i in 0..z.len() {
-                    let unit = self.theta / self.e[i];
-                    let terms = self.abs_q[i] + self.sums[i] * z_reach;
-                    if i < self.free {
-                        add(unit * r[i], unit * r[i], terms);
-                    } else {
-                        let w = unit * (s[i - self.free] + r[i]);
-                        let z = self.theta * self.dz[i] * z[i];
-                        add((self.largest[i] * z).min(w), (self.sums[i] * z).min(w), terms);
-                    }
+    /// What q, and bounds of this size, make of each row: once from q to the columns and back, then on to rows that have nothing yet.
+    fn find_units(&mut self, bound: impl Fn(usize) -> f64) {
+        let n = self.c.len();
+        let Self { matrix, slack, c, units, sizes: [next, of_z, of_s], .. } = self;
+        let matrix = matrix.as_ref().expect("filled");
+        units.clear();
+        units.extend(c.iter().map(|c| c.abs()));
+        for v in [&mut *next, &mut *of_z, &mut *of_s] {
+            v.clear();
+            v.resize(n, 0.0);
+        }
+        of_z.iter_mut().enumerate().for_each(|(j, x)| *x = bound(j));
+        let parts = [Some(matrix), slack.as_ref()];
+        for generation in 0..4 {
+            for (a, of) in parts.iter().zip([&mut *of_z, &mut *of_s]) {
+                next.fill(0.0);
+                if let Some(a) = a {
+                    a.for_each(|i, j, x| {
+                        if x != 0.0 && (generation == 0 || of[j] == 0.0) {
+                            next[j] = next[j].max(units[i] / x.abs());
+                        }
+                    });
+                }
+                of.iter_mut().zip(next.iter()).for_each(|(to, x)| *to = to.max(*x));
+            }
+            next.fill(0.0);
+            for (a, of) in parts.iter().zip([&*of_z, &*of_s]) {
+                if let Some(a) = a {
+                    a.for_each(|i, j, x| {
+                        if generation == 0 || units[i] == 0.0 {
+                            next[i] = next[i].max(x.abs() * of[j]);
+                        }
+                    });
                 }
             }
-            Some(_) => {
-                let s_reach = largest(s, &self.ds);
-                for i in 0..z.len() {
-                    let w = self.theta / self.e[i] * r[i];
-                    let terms =
-                        self.abs_q[i] + self.sums[i] * z_reach + self.slack_sums[i] * s_reach;
-                    add(w, w, terms);
-                    let x = self.largest[i] * self.theta * self.dz[i] * z[i];
-                    let y = self.slack_largest[i] * self.theta * self.ds[i] * s[i];
-                    add(x.min(y), 0.0, 0.0);
+            units.iter_mut().zip(next.iter()).for_each(|(to, x)| *to = to.max(*x));
+            if units.iter().all(|x| *x > 0.0) {
+                break;
+            }
+        }
+        units.iter_mut().filter(|x| **x == 0.0).for_each(|x| *x = f64::INFINITY);
+    }
+
+    /// What an error of a row, and a distance of z or s from a bound, count at (z, s): as the judge has it, whose units are the same in every scaling.
+    fn find_effects(&mut self, z: &[f64], s: &[f64]) {
+        let Self { matrix, slack, c, units, sizes: [scale, of_z, of_s], .. } = self;
+        let matrix = matrix.as_ref().expect("filled");
+        scale.iter_mut().zip(c.iter()).for_each(|(d, c)| *d = c.abs());
+        matrix.for_each(|i, j, x| scale[i] += (x * z[j]).abs());
+        if let Some(slack) = slack {
+            slack.for_each(|i, j, x| scale[i] += (x * s[j]).abs());
+        }
+        scale.iter_mut().zip(units.iter()).for_each(|(d, unit)| *d = d.min(*unit));
+        of_z.fill(0.0);
+        matrix.for_each(|i, j, x| of_z[j] = of_z[j].max(error(x, scale[i])));
+        if let Some(slack) = slack {
+            of_s.fill(0.0);
+            slack.for_each(|i, j, x| of_s[j] = of_s[j].max(error(x, scale[i])));
+        }
+    }
+
+    /// The residual as the judge measures it, of a problem without R and with bounds in scaled units, from z between them and `w = M z + c`.
+    pub fn merit_between(&mut self, z: &[f64], w: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
+        self.find_effects(z, &[]);
+        let [scale, of_z, _] = &self.sizes;
+        let mut worst = Worst::default();
+        for i in 0..z.len() {
+            let part = error(w[i], scale[i]);
+            let bound = if w[i] > 0.0 { lower[i] } else { upper[i] };
+            worst.add(if bound.is_finite() {
+                part.min((z[i] - bound).abs() * of_z[i])
+            } else {
+                part
+            });
+        }
+        worst.value()
+    }
+
+    /// The residual as the judge measures it, from z, s and `r = Q z + R s + c`.
+    pub fn merit(&mut self, z: &[f64], s: &[f64], r: &[f64]) -> f64 {
+        self.find_effects(z, s);
+        let free = self.free;
+        let [scale, of_z, of_s] = &self.sizes;
+        let mut worst = Worst::default();
+        for i in 0..z.len() {
+            match &self.slack {
+                None if i < free => worst.add(error(r[i], scale[i])),
+                None => {
+                    let w = s[i - free] + r[i];
+                    let (x, part) = (z[i].abs() * of_z[i], error(w, scale[i]));
+                    worst.add(if w > 0.0 { part.min(x) } else { part });
+                    worst.add(if z[i] < 0.0 { x } else { 0.0 });
+                }
+                Some(_) => {
+                    let (x, y) = (z[i].abs() * of_z[i], s[i].abs() * of_s[i]);
+                    worst.add(error(r[i], scale[i]));
+                    worst.add(x.min(y));
+                    worst.add(if z[i] < 0.0 { x } else { 0.0 });
+                    worst.add(if s[i] < 0.0 { y } else { 0.0 });
                 }
             }
         }
-        let merit = sum.sqrt().max(worst);
-        if merit.is_nan() { f64::INFINITY } else { merit }
+        worst.value()
     }
+}
+
+/// The largest number met, infinite after one that is none.
+#[derive(Default)]
+struct Worst(f64);
+
+impl Worst {
+    fn add(&mut self, x: f64) {
+        self.0 = if x.is_nan() { f64::INFINITY } else { self.0.max(x) };
+    }
+
+    fn value(self) -> f64 {
+        self.0
+    }
+}
+
+/// `|x|/d`, 0/0 = 0.
+fn error(x: f64, d: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x.abs() / d }
 }
 
 /// Whether `a_ij = a_ji` to the last bits of the largest entry.

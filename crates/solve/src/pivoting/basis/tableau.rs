@@ -1,6 +1,6 @@
 //! The textbook's dense tableau.
 
-use nonsmooth_problem::linalg::Singular;
+use nonsmooth_problem::linalg::{Singular, budget};
 
 use super::{Basis, Data};
 use crate::trace::Variable;
@@ -67,6 +67,8 @@ impl Basis for Tableau {
         self.n = n;
         self.age = 0;
         let width = self.width();
+        let needed = 8.0 * n as f64 * width as f64;
+        budget::admit("the dense tableau", needed).map_err(|_| Singular)?;
         self.entries.clear();
         self.entries.resize(n * width, 0.0);
         for j in 0..n {

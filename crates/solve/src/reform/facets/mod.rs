@@ -187,7 +187,9 @@ fn normal_impulses<const D: usize>(
         Certificate::Farkas { y } | Certificate::Ray { z: y, .. } => {
             (0..contacts).for_each(|c| r[D * c] = y.get(row(c)).map_or(0.0, |y| y.max(0.0)));
         }
-        Certificate::Impulses(_) | Certificate::Cones { .. } => return certificate,
+        Certificate::Impulses(_) | Certificate::Cones { .. } | Certificate::Separating { .. } => {
+            return certificate;
+        }
     }
     let lambda = memo.state.multipliers(&r);
     Impulses { r, lambda }.into()

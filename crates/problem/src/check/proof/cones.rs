@@ -1,0 +1,287 @@
+//! A problem as a union of polyhedral cones, in exact numbers, and the vectors that separate its right-hand side from them.
+
+use super::exact::{Equation, Exact, exact, negative, rounded, satisfying};
+
+/// A column of a [`ConeSystem`]: its entries by row.
+pub type Column = Vec<(usize, Exact)>;
+
+/// `Σ_j t_j A_j = b`, where t_j is free, or nonnegative, or nonnegative and one of a pair of which one is zero.
+///
+/// Every linear complementarity problem, and every contact problem in the plane or without friction, is of this form exactly; of contact with friction in
+/// space it is a relaxation ([`complete`](Self::complete) is false). It is stated from the stored doubles without rounding
+/// ([`crate::Problem::cones`]): products of coefficients, and differences of bounds, are rational numbers.
+#[derive(Debug, Clone, Default)]
+pub struct ConeSystem {
+    /// b.
+    pub rhs: Vec<Exact>,
+    /// A, by columns; of rows that were not asked for nothing is kept.
+    pub columns: Vec<Column>,
+    /// Columns with a free coefficient.
+    pub free: Vec<usize>,
+    /// Columns with a nonnegative coefficient.
+    pub rays: Vec<usize>,
+    /// Pairs of columns with nonnegative coefficients, at most one of them positive.
+    pub pairs: Vec<[usize; 2]>,
+    /// What the coefficients say of the problem's unknowns: `x = constant + Σ factor · t_j`, in the order of the problem's point.
+    pub unknowns: Vec<(Exact, Vec<(usize, Exact)>)>,
+    /// Whether the system says all that the problem says.
+    pub complete: bool,
+    /// Rows that define bounds, and the two columns (with the entry ±1 there) that are their slacks.
+    pub(crate) slack_rows: Vec<(usize, [usize; 2])>,
+    /// Entries of other rows are left out.
+    pub(crate) wanted: Option<Vec<bool>>,
+}
+
+impl ConeSystem {
+    /// A system with the right-hand side b; with `wanted`, entries in rows where it is false are left out.
+    pub(crate) fn new(rhs: Vec<Exact>, wanted: Option<&[bool]>) -> Self {
+        let wanted = wanted.map(|w| {
+            let mut w = w.to_vec();
+            // Rows beyond those of the problem define slacks, and are few.
+            w.resize(rhs.len().max(w.len()), true);
+            w
+        });
+        Self { rhs, complete: true, wanted, ..Self::default() }
+    }
+
+    pub(crate) fn wants(&self, row: usize) -> bool {
+        self.wanted.as_ref().is_none_or(|w| w.get(row).copied().unwrap_or(true))
+    }
+
+    /// A new row with this right-hand side.
+    pub(crate) fn row(&mut self, rhs: Exact) -> usize {
+        self.rhs.push(rhs);
+        self.rhs.len() - 1
+    }
+
+    /// A new column.
+    pub(crate) fn column(&mut self, mut entries: Column) -> usize {
+        entries.retain(|(i, x)| self.wants(*i) && !x.is_zero());
+        entries.sort_by_key(|e| e.0);
+        entries.dedup_by(|b, a| {
+            let same = a.0 == b.0;
+            if same {
+                a.1 += &b.1;
+            }
+            same
+        });
+        self.columns.push(entries);
+        self.columns.len() - 1
+    }
+
+    /// A new column with one entry.
+    pub(crate) fn unit(&mut self, row: usize, x: i8) -> usize {
+        self.column(vec![(row, Exact::from(x))])
+    }
+
+    /// `yᵀ A_j`.
+    fn slope(&self, y: &[Exact], j: usize) -> Exact {
+        let terms = self.columns[j].iter().filter(|(i, _)| !y[*i].is_zero());
+        terms.fold(Exact::ZERO, |sum, (i, x)| sum + x * &y[*i])
+    }
+
+    /// `Σ |y_i A_ij|`, nearly.
+    fn size(&self, y: &[Exact], j: usize) -> f64 {
+        self.columns[j].iter().map(|(i, x)| (rounded(x) * rounded(&y[*i])).abs()).sum()
+    }
+
+    /// Completes y in the rows that define bounds, where the best value follows from the other rows.
+    pub(crate) fn complete(&self, y: &mut Vec<Exact>) {
+        y.resize(self.rhs.len(), Exact::ZERO);
+        for &(row, columns) in &self.slack_rows {
+            y[row] = Exact::ZERO;
+            let sign = self.columns[columns[0]].iter().find(|(i, _)| *i == row);
+            let Some((_, sign)) = sign else { continue };
+            let least = columns.map(|j| -self.slope(y, j)).into_iter().max().unwrap_or_default();
+            y[row] = sign * least;
+        }
+    }
+
+    /// What y separates from b exactly: for each pair whether it does so with the first and with the second column. `None` where it separates
+    /// nothing: `yᵀ b ≥ 0`, or a free column or a ray on the wrong side.
+    fn separates(&self, y: &[Exact]) -> Option<Vec<[bool; 2]>> {
+        let power = y.iter().zip(&self.rhs).fold(Exact::ZERO, |sum, (y, b)| sum + y * b);
+        let fine = negative(&power)
+            && self.free.iter().all(|&j| self.slope(y, j).is_zero())
+            && self.rays.iter().all(|&j| !negative(&self.slope(y, j)));
+        let side = |j: usize| !negative(&self.slope(y, j));
+        fine.then(|| self.pairs.iter().map(|p| p.map(side)).collect())
+    }
+
+    /// Whether the vectors together separate b from every choice of one column a pair, **in exact arithmetic**: the system then has no solution.
+    pub fn refuted_by(&self, vectors: &[Vec<Exact>]) -> bool {
+        if self.wanted.is_some() && !vectors.iter().all(|y| self.is_supported(y)) {
+            return false;
+        }
+        let shaped = vectors.iter().all(|y| y.len() == self.rhs.len());
+        let sides = || vectors.iter().map(|y| self.separates(y)).collect::<Option<Vec<_>>>();
+        shaped && sides().is_some_and(|sides| all_closed(&sides, self.pairs.len()))
+    }
+
+    /// Whether the coefficients solve the system, **in exact arithmetic**.
+    pub fn solved_by(&self, t: &[Exact]) -> bool {
+        let signs = |j: &usize| !negative(&t[*j]);
+        let fine = t.len() == self.columns.len()
+            && self.wanted.is_none()
+            && self.rays.iter().all(signs)
+            && self.pairs.iter().all(|p| p.iter().all(signs) && p.iter().any(|&j| t[j].is_zero()));
+        let mut left = self.rhs.clone();
+        for (t, column) in t.iter().zip(&self.columns).filter(|(t, _)| !t.is_zero()) {
+            column.iter().for_each(|(i, x)| left[*i] -= x * t);
+        }
+        fine && left.iter().all(Exact::is_zero)
+    }
+
+    /// The problem's unknowns where the coefficients are t, each rounded once.
+    pub fn unknowns_at(&self, t: &[Exact]) -> Vec<f64> {
+        let sum = |(constant, terms): &(Exact, Vec<(usize, Exact)>)| {
+            rounded(&terms.iter().fold(constant.clone(), |sum, (j, factor)| sum + factor * &t[*j]))
+        };
+        self.unknowns.iter().map(sum).collect()
+    }
+
+    /// Whether y is zero in the rows that were left out.
+    fn is_supported(&self, y: &[Exact]) -> bool {
+        y.iter().enumerate().all(|(i, y)| y.is_zero() || self.wants(i))
+    }
+
+    /// The vectors, exact, changed by no more than rounding so that they separate what they nearly separate; each as it is where that fails.
+    ///
+    /// What is nearly zero is made zero by elimination within the vector's support.
+    pub(crate) fn mended(&self, vectors: &[Vec<Exact>]) -> Vec<Vec<Exact>> {
+        vectors.iter().map(|y| self.mend(y)).collect()
+    }
+
+    fn mend(&self, y: &[Exact]) -> Vec<Exact> {
+        let bounding: Vec<usize> = self.slack_rows.iter().map(|s| s.0).collect();
+        let unbounded = |y: &[Exact]| {
+            let mut y = y.to_vec();
+            bounding.iter().for_each(|&i| y[i] = Exact::ZERO);
+            y
+        };
+        for near in [1e-13, 1e-10] {
+            let start = unbounded(y);
+            let mut equations = vec![];
+            for j in 0..self.columns.len() {
+                let slope = self.slope(y, j);
+                let tight = !slope.is_zero() && rounded(&slope).abs() <= near * self.size(y, j);
+                let zero = slope.is_zero() && self.columns[j].len() > 1;
+                if tight || zero {
+                    let terms = self.columns[j].iter().filter(|(i, _)| !bounding.contains(i));
+                    let terms: Vec<_> = terms.filter(|(i, _)| !y[*i].is_zero()).cloned().collect();
+                    // A column that meets a bound's row is closed by that row.
+                    let closed = self.columns[j].iter().any(|(i, _)| bounding.contains(i));
+                    if !closed && !terms.is_empty() {
+                        equations.push(Equation { terms, constant: Exact::ZERO });
+                    }
+                }
+            }
+            if equations.is_empty() {
+                continue;
+            }
+            // What is zero stays zero: the support does not grow.
+            let weights: Vec<f64> = start.iter().map(|y| rounded(y).abs()).collect();
+            let Some(mut found) = satisfying(equations, &start, &weights, BUDGET) else {
+                continue;
+            };
+            self.complete(&mut found);
+            if self.separates(&found).is_some() {
+                return found;
+            }
+        }
+        y.to_vec()
+    }
+
+    /// The smallest relative change of the entries of A and b (those that are no units) for which the vectors would refute the system, up to a
+    /// factor of two; `None` where that is more than [`NEAR`].
+    pub(crate) fn nearness(&self, vectors: &[Vec<Exact>]) -> Option<f64> {
+        if vectors.iter().any(|y| y.len() != self.rhs.len()) {
+            return None;
+        }
+        // Of each vector: its own violation, and that of each side of each pair.
+        let violations: Vec<(f64, Vec<[f64; 2]>)> =
+            vectors.iter().map(|y| self.violations(y)).collect();
+        let closed = |change: f64| {
+            let sides = violations.iter().filter(|(own, _)| *own <= change).map(|(_, sides)| {
+                sides.iter().map(|s| s.map(|v| v <= change)).collect::<Vec<[bool; 2]>>()
+            });
+            all_closed(&sides.collect::<Vec<_>>(), self.pairs.len())
+        };
+        let mut change = f64::EPSILON / 16.0;
+        while change <= NEAR {
+            if closed(change) {
+                return Some(change);
+            }
+            change *= 2.0;
+        }
+        None
+    }
+
+    fn violations(&self, y: &[Exact]) -> (f64, Vec<[f64; 2]>) {
+        let power = y.iter().zip(&self.rhs).fold(Exact::ZERO, |sum, (y, b)| sum + y * b);
+        let size: f64 = y.iter().zip(&self.rhs).map(|(y, b)| (rounded(y) * rounded(b)).abs()).sum();
+        let share = |x: f64, size: f64| if x == 0.0 { 0.0 } else { x.abs() / size };
+        let mut own = match rounded(&power) {
+            power if power < 0.0 => 0.0,
+            power if size > 0.0 => (power / size).max(f64::EPSILON / 16.0),
+            _ => f64::INFINITY,
+        };
+        let below = |j: usize| share(rounded(&self.slope(y, j)).min(0.0), self.size(y, j));
+        for &j in &self.free {
+            own = own.max(share(rounded(&self.slope(y, j)), self.size(y, j)));
+        }
+        for &j in &self.rays {
+            own = own.max(below(j));
+        }
+        (own, self.pairs.iter().map(|p| p.map(below)).collect())
+    }
+
+    /// The vectors of doubles as exact ones over the rows of the system, with the rows that define bounds completed.
+    pub(crate) fn vector(&self, y: &[f64]) -> Vec<Exact> {
+        let mut y: Vec<Exact> = y.iter().map(|&y| exact(y)).collect();
+        self.complete(&mut y);
+        y
+    }
+}
+
+/// The largest relative change of the data that still counts as rounding.
+pub const NEAR: f64 = 1e-9;
+/// Rational operations that mending a vector may cost.
+const BUDGET: usize = 200_000;
+
+/// Whether every choice of a side for each pair is closed by some vector, given which sides each vector closes.
+fn all_closed(sides: &[Vec<[bool; 2]>], pairs: usize) -> bool {
+    fn closed(sides: &[Vec<[bool; 2]>], left: &[usize], depth: usize, pairs: usize) -> bool {
+        // Pairs that no vector cares about are no choice.
+        let matters = |d: &usize| left.iter().any(|&k| sides[k][*d] != [true, true]);
+        let Some(depth) = (depth..pairs).find(matters) else { return !left.is_empty() };
+        [0, 1].into_iter().all(|side| {
+            let still: Vec<_> = left.iter().copied().filter(|&k| sides[k][depth][side]).collect();
+            // One that closes all that is left decides at once.
+            let all = |&k: &usize| sides[k][depth + 1..].iter().all(|s| s[0] && s[1]);
+            still.iter().any(all) || closed(sides, &still, depth + 1, pairs)
+        })
+    }
+    closed(sides, &(0..sides.len()).collect::<Vec<_>>(), 0, pairs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vectors_close_all_choices_together_or_not() {
+        let all = vec![vec![[true, true]; 60]];
+        assert!(all_closed(&all, 60));
+        let mut one = all.clone();
+        one[0][59] = [true, false];
+        assert!(!all_closed(&one, 60));
+        let mut two = one.clone();
+        two.push(vec![[true, true]; 60]);
+        two[1][59] = [false, true];
+        assert!(all_closed(&two, 60));
+        two[1][3] = [false, true];
+        assert!(!all_closed(&two, 60));
+        assert!(!all_closed(&[], 3) && !all_closed(&[], 0));
+    }
+}

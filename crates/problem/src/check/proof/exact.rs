@@ -1,0 +1,164 @@
+//! Exact rational arithmetic on stored doubles.
+
+use dashu_ratio::RBig;
+
+/// A rational number of any size.
+pub type Exact = RBig;
+
+/// A finite double as the rational number that it is; zero in place of an infinity or a NaN, which no problem holds.
+pub(crate) fn exact(x: f64) -> Exact {
+    Exact::try_from(x).unwrap_or(Exact::ZERO)
+}
+
+/// The nearest double.
+pub fn rounded(x: &Exact) -> f64 {
+    x.to_f64().value()
+}
+
+/// `x < 0`.
+pub(crate) fn negative(x: &Exact) -> bool {
+    *x < Exact::ZERO
+}
+
+/// A linear equation in some unknowns: `Σ coefficient · unknown + constant = 0`.
+pub(crate) struct Equation {
+    pub(crate) terms: Vec<(usize, Exact)>,
+    pub(crate) constant: Exact,
+}
+
+/// Values that satisfy all equations exactly and differ from those given only in one unknown for each independent equation,
+/// the one whose coefficient times weight is largest: with the unknown's own size as its weight, the one which that moves least relative to itself.
+/// Unknowns without weight stay as they are. `None` where the equations contradict each other, or would cost more than `budget`
+/// rational operations.
+///
+/// Cost: one elimination, rows · unknowns · rank operations at most.
+pub(crate) fn satisfying(
+    equations: Vec<Equation>,
+    values: &[Exact],
+    weights: &[f64],
+    budget: usize,
+) -> Option<Vec<Exact>> {
+    let mut spent = 0;
+    // Reduced rows: (pivot, terms without the pivot, constant), the pivot's coefficient being 1.
+    let mut reduced: Vec<(usize, Row, Exact)> = vec![];
+    let mut place = vec![usize::MAX; values.len()];
+    for Equation { terms, mut constant } in equations {
+        let mut row: Row = Row::new();
+        for (j, a) in terms {
+            if weights[j] > 0.0 {
+                row.add(j, a);
+            } else {
+                constant += a * &values[j];
+            }
+        }
+        // Pivots of earlier rows are replaced, in the order of these rows.
+        while let Some((k, a)) = row.first_with(|j| place[j]) {
+            row.remove(reduced[k].0);
+            for (j, b) in &reduced[k].1.0 {
+                spent += 1;
+                row.add(*j, -(&a * b));
+            }
+            constant -= &a * &reduced[k].2;
+        }
+        if spent > budget {
+            return None;
+        }
+        let weight = |(j, a): &(usize, Exact)| rounded(a).abs() * weights[*j];
+        let Some((pivot, a)) = row.0.iter().max_by(|x, y| weight(x).total_cmp(&weight(y))).cloned()
+        else {
+            if constant.is_zero() {
+                continue;
+            }
+            return None;
+        };
+        row.remove(pivot);
+        row.0.iter_mut().for_each(|(_, b)| *b = &*b / &a);
+        place[pivot] = reduced.len();
+        reduced.push((pivot, row, constant / a));
+    }
+    let mut out = values.to_vec();
+    // A row refers to pivots of later rows only.
+    for (pivot, row, constant) in reduced.iter().rev() {
+        let mut sum = -constant;
+        for (j, b) in &row.0 {
+            sum -= b * &out[*j];
+        }
+        out[*pivot] = sum;
+    }
+    Some(out)
+}
+
+/// A sparse row, sorted by unknown.
+struct Row(Vec<(usize, Exact)>);
+
+impl Row {
+    fn new() -> Self {
+        Self(vec![])
+    }
+
+    fn add(&mut self, j: usize, a: Exact) {
+        match self.0.binary_search_by_key(&j, |e| e.0) {
+            Ok(k) => {
+                self.0[k].1 += a;
+                if self.0[k].1.is_zero() {
+                    self.0.remove(k);
+                }
+            }
+            Err(k) if !a.is_zero() => self.0.insert(k, (j, a)),
+            Err(_) => {}
+        }
+    }
+
+    fn remove(&mut self, j: usize) {
+        if let Ok(k) = self.0.binary_search_by_key(&j, |e| e.0) {
+            self.0.remove(k);
+        }
+    }
+
+    /// The least `place` of an unknown that has one, and its coefficient.
+    fn first_with(&self, place: impl Fn(usize) -> usize) -> Option<(usize, Exact)> {
+        let placed = self.0.iter().filter(|e| place(e.0) != usize::MAX);
+        placed.min_by_key(|e| place(e.0)).map(|e| (place(e.0), e.1.clone()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn equation(terms: &[(usize, f64)], constant: f64) -> Equation {
+        Equation {
+            terms: terms.iter().map(|&(j, a)| (j, exact(a))).collect(),
+            constant: exact(constant),
+        }
+    }
+
+    #[test]
+    fn doubles_are_what_they_are() {
+        assert_eq!(exact(0.1) * Exact::from(10u8) - Exact::ONE, exact(2f64.powi(-54)));
+        assert_eq!(rounded(&exact(-1e-300)), -1e-300);
+        assert_eq!(exact(f64::INFINITY), Exact::ZERO);
+    }
+
+    #[test]
+    fn equations_hold_exactly_and_little_changes() {
+        let values: Vec<_> = [1.0 / 3.0, 2.0 / 3.0, 0.0, 1e-17].map(exact).into();
+        let rows = [(vec![(0, 2.0), (1, -1.0)], 0.0), (vec![(0, 1.0), (1, 1.0), (3, 1.0)], -1.0)];
+        let state = || rows.iter().map(|(t, c)| equation(t, *c)).collect::<Vec<_>>();
+        let weights: Vec<f64> = values.iter().map(|x| rounded(x).abs()).collect();
+        let satisfying = |equations| satisfying(equations, &values, &weights, 1000);
+        let found = satisfying(state()).unwrap();
+        for Equation { terms, constant } in state() {
+            let sum = terms.iter().fold(constant, |s, (j, a)| s + a * &found[*j]);
+            assert!(sum.is_zero());
+        }
+        assert!(found.iter().zip(&values).all(|(a, b)| rounded(&(a - b)).abs() < 1e-15));
+        // The same equation twice is one; two that contradict each other have no solution.
+        let twice =
+            |c| vec![equation(&[(0, 1.0), (1, 1.0)], -1.0), equation(&[(0, 2.0), (1, 2.0)], c)];
+        assert!(satisfying(twice(-2.0)).is_some());
+        assert!(satisfying(twice(-2.1)).is_none());
+        // Nothing can be changed in an unknown without weight.
+        assert!(satisfying(vec![equation(&[(2, 1.0)], -1.0)]).is_none());
+    }
+}

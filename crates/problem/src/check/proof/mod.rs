@@ -1,0 +1,21 @@
+//! Proofs in exact arithmetic on the stored doubles.
+//!
+//! A solver's certificate is a handful of doubles, and what it says of the problem usually holds up to rounding only. Here it is first made strictly
+//! valid (what is nearly zero is made zero by exact elimination) and then verified in rational numbers: [`Evidence::Proved`]. What cannot be made valid holds for
+//! data nearby, and that is all that is said: [`Evidence::Nearly`].
+
+mod cones;
+mod evidence;
+mod exact;
+mod monotone;
+mod statement;
+
+pub use cones::{Column, ConeSystem, NEAR};
+pub use evidence::{Evidence, ExactVector, Proof};
+pub use exact::{Exact, rounded};
+pub use monotone::Monotone;
+
+pub(crate) use evidence::weigh;
+pub(crate) use exact::{Equation, exact, negative, satisfying};
+pub(crate) use monotone::monotone;
+pub(crate) use statement::Exactly;

@@ -1,0 +1,369 @@
+//! Branch and bound over the cones of a [`ConeSystem`], in exact arithmetic.
+//!
+//! Problem: `Σ t_j A_j = b` with t_j free, nonnegative, or nonnegative and one of a pair of which one is zero.
+//!
+//! Method: without the pairs' condition it is a linear program, which the simplex method decides: a point, or a vector y with `yᵀ A_j ≥ 0` for all columns
+//! and `yᵀ b < 0`. Where both columns of a pair are positive at the point there are two cases, one without each; a case goes on from the tableau of the case before,
+//! in which the column that it excludes is one of those to be driven out. A case without a point is closed by its y.
+//!
+//! The tableau holds integers with one common denominator, so a pivot divides without remainder (Edmonds' and Bareiss' elimination): no greatest
+//! common divisors. Rows and columns are first divided by what they have in common, so exact scalings cost nothing.
+//!
+//! Cost: at most 2ᵐ cases for m pairs; a pivot is rows · columns products of integers of rows · 53 bits at most. Storage: a tableau for each open case.
+
+use dashu_int::ops::{Gcd, UnsignedAbs};
+use dashu_int::{IBig, UBig};
+use nonsmooth_problem::check::{ConeSystem, Exact, ExactVector};
+
+/// How the enumeration ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Found {
+    /// The coefficients t of a solution.
+    Solution(Vec<Exact>),
+    /// No case has a point: the vectors that close them.
+    Nothing(Vec<ExactVector>),
+}
+
+/// The search.
+#[derive(Debug, Clone)]
+pub struct ExactCones {
+    system: ConeSystem,
+    /// `A'_ij = ρ_i A_ij κ_j`, `b'_i = ρ_i b_i β`.
+    rho: Vec<Exact>,
+    kappa: Vec<Exact>,
+    beta: Exact,
+    open: Vec<Case>,
+    vectors: Vec<ExactVector>,
+    /// Cases looked at.
+    pub cases: usize,
+}
+
+/// A case: which columns are excluded, and the tableau on which it goes on. Columns: those of A, the rows' units, b.
+#[derive(Debug, Clone)]
+struct Case {
+    rows: Vec<Vec<IBig>>,
+    denominator: IBig,
+    basis: Vec<usize>,
+    excluded: Vec<bool>,
+}
+
+impl ExactCones {
+    /// Begins.
+    pub fn new(system: ConeSystem) -> Self {
+        let (m, n) = (system.rhs.len(), system.columns.len());
+        let mut a = vec![vec![Exact::ZERO; n + 1]; m];
+        for (j, column) in system.columns.iter().enumerate() {
+            for (i, x) in column {
+                a[*i][j] += x;
+            }
+        }
+        for (i, b) in system.rhs.iter().enumerate() {
+            a[i][n] = b.clone();
+        }
+        let mut rho = vec![Exact::ONE; m];
+        let mut kappa = vec![Exact::ONE; n + 1];
+        // Twice: a row's factor changes what the columns have in common.
+        for _ in 0..2 {
+            for (row, rho) in a.iter_mut().zip(&mut rho) {
+                let factor = common(row.iter());
+                row.iter_mut().for_each(|x| *x = &*x / &factor);
+                *rho = &*rho / &factor;
+            }
+            for (j, kappa) in kappa.iter_mut().enumerate() {
+                let factor = common(a.iter().map(|row| &row[j]));
+                a.iter_mut().for_each(|row| row[j] = &row[j] / &factor);
+                *kappa = &*kappa / &factor;
+            }
+        }
+        // Columns may have become fractions again.
+        for (row, rho) in a.iter_mut().zip(&mut rho) {
+            let factor = common(row.iter());
+            row.iter_mut().for_each(|x| *x = &*x / &factor);
+            *rho = &*rho / &factor;
+        }
+        let beta = kappa.pop().unwrap_or(Exact::ONE);
+        let mut case = Case {
+            rows: a
+                .into_iter()
+                .enumerate()
+                .map(|(i, mut row)| {
+                    let b = row.pop().unwrap_or(Exact::ZERO);
+                    let units = (0..m).map(|k| if k == i { IBig::ONE } else { IBig::ZERO });
+                    let whole = |x: Exact| x.into_parts().0;
+                    row.into_iter().map(whole).chain(units).chain([whole(b)]).collect()
+                })
+                .collect(),
+            denominator: IBig::ONE,
+            basis: (n..n + m).collect(),
+            excluded: (0..n + m).map(|j| j >= n).collect(),
+        };
+        case.enter_free(&system.free, n);
+        let mut search = Self { system, rho, kappa, beta, open: vec![], vectors: vec![], cases: 0 };
+        search.close_or_open(case);
+        search
+    }
+
+    /// Looks at one more case; `None` while there are others.
+    pub fn advance(&mut self) -> Option<Found> {
+        let Some(case) = self.open.pop() else {
+            return Some(Found::Nothing(std::mem::take(&mut self.vectors)));
+        };
+        self.cases += 1;
+        let positive = |j: usize| case.row_of(j).is_some_and(|i| *case.value(i) > IBig::ZERO);
+        let conflict = self.system.pairs.iter().find(|p| p.iter().all(|&j| positive(j)));
+        let Some(&pair) = conflict else {
+            return Some(Found::Solution(self.coefficients(&case)));
+        };
+        for j in pair {
+            let mut without = case.clone();
+            without.excluded[j] = true;
+            self.close_or_open(without);
+        }
+        None
+    }
+
+    /// Whether a point is left to be looked at.
+    fn close_or_open(&mut self, mut case: Case) {
+        let free = &self.system.free;
+        case.drive_out(self.system.columns.len(), free);
+        match case.closing(self.system.columns.len()) {
+            None => self.open.push(case),
+            Some(y) => {
+                let scaled = y.into_iter().zip(&self.rho).map(|(y, rho)| Exact::from(y) * rho);
+                self.vectors.push(ExactVector(scaled.collect()));
+            }
+        }
+    }
+
+    /// The problem that is searched.
+    pub fn system(&self) -> &ConeSystem {
+        &self.system
+    }
+
+    fn coefficients(&self, case: &Case) -> Vec<Exact> {
+        let denominator = Exact::from(case.denominator.clone());
+        let n = self.system.columns.len();
+        let mut t = vec![Exact::ZERO; n];
+        for (i, &j) in case.basis.iter().enumerate().filter(|(_, j)| **j < n) {
+            let value = Exact::from(case.value(i).clone());
+            t[j] = value / &denominator * &self.kappa[j] / &self.beta;
+        }
+        t
+    }
+}
+
+/// A positive number such that all x over it are whole and have nothing in common: the greatest common divisor of the numerators over the least common
+/// multiple of the denominators.
+fn common<'a>(x: impl Iterator<Item = &'a Exact>) -> Exact {
+    let mut divisor = UBig::ZERO;
+    let mut multiple = UBig::ONE;
+    for x in x.filter(|x| !x.is_zero()) {
+        let (numerator, denominator) = x.clone().into_parts();
+        let size = numerator.unsigned_abs();
+        divisor = if divisor.is_zero() { size } else { divisor.gcd(size) };
+        multiple = &multiple / (&multiple).gcd(&denominator) * denominator;
+    }
+    if divisor.is_zero() { Exact::ONE } else { Exact::from_parts(divisor.into(), multiple) }
+}
+
+/// Pivots by the largest coefficient before Bland's rule, which cannot cycle.
+const DANTZIG: usize = 50;
+
+impl Case {
+    fn value(&self, row: usize) -> &IBig {
+        &self.rows[row][self.excluded.len()]
+    }
+
+    fn row_of(&self, column: usize) -> Option<usize> {
+        self.basis.iter().position(|&j| j == column)
+    }
+
+    /// Free columns into the basis, as far as they are independent, then every other row with a nonnegative right-hand side.
+    fn enter_free(&mut self, free: &[usize], n: usize) {
+        for &j in free {
+            let candidate =
+                (0..self.rows.len()).find(|&i| self.basis[i] >= n && !self.rows[i][j].is_zero());
+            if let Some(i) = candidate {
+                self.pivot(i, j);
+            }
+        }
+        for i in 0..self.rows.len() {
+            // The row's unit stands for an artificial column with the sign that makes its value nonnegative.
+            if self.basis[i] >= n && *self.value(i) < IBig::ZERO {
+                self.rows[i].iter_mut().for_each(|x| *x = -std::mem::take(x));
+            }
+        }
+    }
+
+    fn pivot(&mut self, row: usize, column: usize) {
+        let pivot = self.rows[row][column].clone();
+        let chosen = std::mem::take(&mut self.rows[row]);
+        for other in self.rows.iter_mut().filter(|r| !r.is_empty()) {
+            let factor = other[column].clone();
+            for (x, y) in other.iter_mut().zip(&chosen) {
+                let mut product = &*x * &pivot;
+                if !factor.is_zero() && !y.is_zero() {
+                    product -= &factor * y;
+                }
+                *x = if product.is_zero() { product } else { product / &self.denominator };
+            }
+        }
+        self.rows[row] = chosen;
+        self.basis[row] = column;
+        self.denominator = pivot;
+        if self.denominator < IBig::ZERO {
+            self.denominator = -std::mem::take(&mut self.denominator);
+            self.rows.iter_mut().flatten().for_each(|x| *x = -std::mem::take(x));
+        }
+    }
+
+    /// Which rows hold a column that is to be driven out.
+    fn excluded_rows(&self) -> Vec<usize> {
+        (0..self.rows.len()).filter(|&i| self.excluded[self.basis[i]]).collect()
+    }
+
+    /// Lowers the sum of the excluded columns' values as far as it goes.
+    fn drive_out(&mut self, n: usize, free: &[usize]) {
+        let mut is_free = vec![false; self.excluded.len()];
+        free.iter().for_each(|&j| is_free[j] = true);
+        let mut pivots = 0;
+        loop {
+            let rows = self.excluded_rows();
+            if rows.iter().all(|&i| self.value(i).is_zero()) {
+                return;
+            }
+            let gain = |j: usize| rows.iter().fold(IBig::ZERO, |sum, &i| sum + &self.rows[i][j]);
+            let mut entering: Option<(usize, IBig)> = None;
+            for j in (0..n).filter(|&j| !self.excluded[j] && !is_free[j]) {
+                let gain = gain(j);
+                if gain <= IBig::ZERO {
+                    continue;
+                }
+                if entering.as_ref().is_none_or(|(_, best)| gain > *best) {
+                    entering = Some((j, gain));
+                }
+                if pivots >= DANTZIG {
+                    break;
+                }
+            }
+            let Some((j, _)) = entering else { return };
+            // The least ratio; among equals excluded columns leave first, then Bland's rule.
+            let mut leaving: Option<usize> = None;
+            for i in 0..self.rows.len() {
+                if is_free[self.basis[i]] || self.rows[i][j] <= IBig::ZERO {
+                    continue;
+                }
+                let better = leaving.is_none_or(|k| {
+                    let ours = self.value(i) * &self.rows[k][j];
+                    let theirs = self.value(k) * &self.rows[i][j];
+                    let rank = |i: usize| (!self.excluded[self.basis[i]], self.basis[i]);
+                    ours < theirs || (ours == theirs && rank(i) < rank(k))
+                });
+                if better {
+                    leaving = Some(i);
+                }
+            }
+            let Some(i) = leaving else { return };
+            self.pivot(i, j);
+            pivots += 1;
+        }
+    }
+
+    /// Where excluded columns could not be driven out: the vector that closes the case, over the scaled rows.
+    fn closing(&self, n: usize) -> Option<Vec<IBig>> {
+        let rows = self.excluded_rows();
+        if rows.iter().all(|&i| self.value(i).is_zero()) {
+            return None;
+        }
+        let y = |k: usize| -rows.iter().fold(IBig::ZERO, |sum, &i| sum + &self.rows[i][n + k]);
+        Some((0..self.rows.len()).map(y).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nonsmooth_problem::check::{Certificate, Evidence};
+    use nonsmooth_problem::linalg::{Bsr, Csc, Dense};
+    use nonsmooth_problem::{BoxLcp, FrictionLocal, Hlcp, Lcp, Mlcp, Problem};
+
+    use super::*;
+
+    /// The unknowns of a solution, or that a proof of their absence has been verified.
+    fn decide(problem: &impl Problem) -> Option<Vec<f64>> {
+        let mut search = ExactCones::new(problem.cones().unwrap());
+        let found = loop {
+            if let Some(found) = search.advance() {
+                break found;
+            }
+        };
+        match found {
+            Found::Solution(t) => {
+                assert!(search.system().solved_by(&t));
+                Some(search.system().unknowns_at(&t))
+            }
+            Found::Nothing(vectors) => {
+                let evidence = problem.evidence(&Certificate::Separating { vectors });
+                assert!(matches!(evidence, Evidence::Proved(_)), "{evidence:?}");
+                None
+            }
+        }
+    }
+
+    fn dense<const N: usize>(m: [[f64; N]; N]) -> Dense {
+        let mut out = Dense::zeros(N, N);
+        for i in 0..N {
+            for j in 0..N {
+                out[(i, j)] = m[i][j];
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn problems_at_the_edge_of_rounding_are_decided() {
+        // Positive definite by seven units of the last place, and singular.
+        let d = 1.0 + 7e-15;
+        let near = |d: f64| Lcp::new(dense([[d, -1.0], [-1.0, d]]), vec![-1.0, -1.0]).unwrap();
+        let z = decide(&near(d)).unwrap();
+        assert!((z[0] * (d - 1.0) - 1.0).abs() < 1e-12 && z[0] == z[1], "{z:?}");
+        assert_eq!(decide(&near(1.0)), None);
+        // No solution though the constraints can be met: z2 > 0 needs w2 = 0, and z1 wants w1 = 0.
+        let m = [[0.0, 17179869184.0], [4.57763671875e-5, 3.0]];
+        let scaled = Lcp::new(dense(m), vec![-131072.0, -7.62939453125e-6]).unwrap();
+        assert_eq!(decide(&scaled), None);
+        assert_eq!(decide(&Lcp::new(dense([[0.0]]), vec![0.0]).unwrap()), Some(vec![0.0]));
+    }
+
+    #[test]
+    fn every_kind_is_decided() {
+        let mixed = |a: f64| Mlcp::new(dense([[0.0, 1.0], [1.0, 0.0]]), vec![a, -1.0], 1).unwrap();
+        assert_eq!(decide(&mixed(-2.0)), Some(vec![1.0, 2.0]));
+        assert_eq!(decide(&mixed(1.0)), None);
+        let bounded =
+            |u: f64| BoxLcp::new(dense([[0.0]]), vec![-1.0], vec![-2.0], vec![u]).unwrap();
+        assert_eq!(decide(&bounded(3.0)), Some(vec![3.0]));
+        assert_eq!(decide(&bounded(-2.0)), Some(vec![-2.0]));
+        assert_eq!(decide(&bounded(f64::INFINITY)), None);
+        let pair = |q: f64| Hlcp::new(dense([[1.0]]), dense([[1.0]]), vec![q]).unwrap();
+        assert!(decide(&pair(2.0)).is_some());
+        assert_eq!(decide(&pair(-2.0)), None);
+    }
+
+    #[test]
+    fn friction_in_the_plane_is_decided() {
+        // u = W r + q: pressed with u_N = r_N - 1 and sliding or sticking.
+        let contact = |w: [f64; 4], q: [f64; 2], mu: f64| {
+            let entries = w.into_iter().enumerate().map(|(k, x)| (k / 2, k % 2, x));
+            let w = Bsr::from_csc(&Csc::from_triplets(2, 2, entries).unwrap());
+            FrictionLocal::<2>::new(w, q.to_vec(), vec![mu]).unwrap()
+        };
+        let unit = [1.0, 0.0, 0.0, 1.0];
+        assert_eq!(decide(&contact(unit, [-1.0, 0.25], 0.5)), Some(vec![1.0, -0.25]));
+        assert_eq!(decide(&contact(unit, [-1.0, 2.0], 0.5)), Some(vec![1.0, -0.5]));
+        assert_eq!(decide(&contact(unit, [1.0, 2.0], 0.5)), Some(vec![0.0, 0.0]));
+        // Skew: without friction u_N = -1 whatever r_N is.
+        let skew = [0.0, -2.0, 2.0, 1.0];
+        assert_eq!(decide(&contact(skew, [-1.0, 0.0], 0.0)), None);
+        assert!(decide(&contact(skew, [-1.0, 0.0], 1.0)).is_some());
+    }
+}
