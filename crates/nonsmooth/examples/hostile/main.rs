@@ -253,16 +253,17 @@ fn report(options: &Options, tally: &Tally, taken: Duration) {
         classes.entry((lie.claim, lie.kind)).or_default().push(lie);
     }
     println!("\nfalse claims: {}", tally.lies.len());
-    for ((claim, kind), mut lies) in classes.clone() {
-        lies.sort_by_key(|lie| lie.size);
-        println!("\n{claim}, {kind}: {}", lies.len());
-        let mut by_solver: BTreeMap<&str, (u64, &Lie)> = BTreeMap::new();
-        for lie in lies {
-            by_solver.entry(&lie.solver).or_insert((0, lie)).0 += 1;
-        }
-        for (count, lie) in by_solver.values() {
-            println!("  {count:6} {}", line(lie));
-        }
+    for ((claim, kind), mut lies) in classes {
+        lies.sort_by_key(|lie| (lie.size, lie.recipe.len()));
+        let mut by_solver: BTreeMap<&str, u64> = BTreeMap::new();
+        lies.iter().for_each(|lie| *by_solver.entry(&lie.solver).or_default() += 1);
+        let mut by_solver: Vec<_> = by_solver.into_iter().collect();
+        by_solver.sort_by_key(|s| std::cmp::Reverse(s.1));
+        let names: Vec<_> = by_solver.iter().map(|(name, n)| format!("{name} {n}")).collect();
+        println!("\n{claim}, {kind}: {} ({})", lies.len(), names.join(", "));
+        // The smallest, each problem once.
+        lies.dedup_by_key(|lie| lie.index);
+        lies.iter().take(5).for_each(|lie| println!("  {}", line(lie)));
     }
     let seconds = taken.as_secs_f64();
     println!(

@@ -2,9 +2,9 @@
 //! believes, nothing is called solved that is not, and what can be solved is.
 
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::linalg::{Bsr, Csc};
+use nonsmooth_problem::linalg::{Bsr, Csc, Dense};
 use nonsmooth_problem::{
-    BilateralGlobal, BilateralLocal, FrictionGlobal, FrictionLocal, LocalPoint, Problem,
+    BilateralGlobal, BilateralLocal, FrictionGlobal, FrictionLocal, LocalPoint, Mlcp, Problem,
 };
 use nonsmooth_solve::registry::{self, Registered, Solves};
 use nonsmooth_solve::{Limits, Status};
@@ -192,4 +192,26 @@ fn a_contact_that_nothing_can_move() {
     all_solve(&FrictionLocal::new(zero(), vec![1.0, 2.0, 0.0], vec![0.5]).unwrap());
     none_solves(&FrictionLocal::new(zero(), vec![-1.0, 2.0, 0.0], vec![0.5]).unwrap());
     all_solve(&FrictionLocal::new(zero(), vec![0.0; 3], vec![0.5]).unwrap());
+}
+
+/// The equation has no entry for its free variable, and the pair that it is solved with is singular up to rounding: the tableau begins anew before it was
+/// ever complete.
+#[test]
+fn a_pair_that_turns_out_singular_is_no_panic() {
+    let m =
+        [[0.0, 1e-8, 1.0, 0.0], [1e-8, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 1.0]];
+    let problem = Mlcp::new(Dense::from_rows(&m).unwrap(), vec![1.0, -1.0, 1.0, 1.0], 1).unwrap();
+    // Before it, in the same session, a problem of another size.
+    let other = Dense::from_rows(&[[2.0, 1.0], [-1.0, 1.0]]).unwrap();
+    let other = Mlcp::new(other, vec![-1.0, 1.0], 1).unwrap();
+    for name in ["bard", "murty", "keller", "criss_cross"] {
+        let mut session = registry::session::<Mlcp>(name, &Default::default()).unwrap();
+        for problem in [&problem, &other, &problem] {
+            let mut point = problem.origin();
+            match session.solve(problem, &mut point, &Limits::default(), &mut |_| {}) {
+                Ok(_) => assert!(point.z.iter().all(|z| z.is_finite()), "{name}"),
+                Err(e) => assert!(e.is_inapplicable(), "{name}: {e}"),
+            }
+        }
+    }
 }

@@ -190,7 +190,8 @@ impl Tableau {
             x.clear();
             x.resize(n * n, 0.0);
         }
-        for x in [&mut self.basic, &mut self.dropped, &mut self.wanted] {
+        // Nothing is basic at first, not even what was of an earlier problem: a restart may come before the free variables are solved for.
+        for x in [&mut self.basic, &mut self.dropped, &mut self.wanted, &mut self.first] {
             x.clear();
             x.resize(n, false);
         }

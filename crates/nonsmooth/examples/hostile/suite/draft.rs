@@ -233,7 +233,12 @@ impl Draft {
     /// A coefficient of friction.
     pub fn mu(&mut self) -> f64 {
         let tiny = 2.0_f64.powi(-20);
-        self.rng.pick(&[0.0, 0.0, 0.25, 0.5, 0.5, 0.625, 1.0, 2.0, 3.0, 1e3, 1e6, tiny])
+        let mu = self.rng.pick(&[0.0, 0.0, 0.25, 0.5, 0.5, 0.625, 1.0, 2.0, 3.0, 1e3, 1e6, tiny]);
+        if mu == tiny {
+            // A coarse tolerance does not tell it from none.
+            self.fine = self.fine.min(tiny);
+        }
+        mu
     }
 
     /// Coefficients for contacts; often all the same.

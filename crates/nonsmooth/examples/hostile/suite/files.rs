@@ -43,6 +43,10 @@ pub fn run(folder: &Path, seed: u64, index: u64, rounds: usize) -> Tally {
     let mut rng = Rng::of(seed, 50, index);
     for format in FORMATS {
         let path = folder.join(format!("damaged.{format}"));
+        // The vectors beside a matrix would become parts of the next problem.
+        for part in ["q", "l", "u"] {
+            let _ = std::fs::remove_file(folder.join(format!("damaged_{part}.mtx")));
+        }
         write(&path, format, seed, index, &mut rng);
         let original = std::fs::read(&path).expect("what was written");
         for _ in 0..rounds {

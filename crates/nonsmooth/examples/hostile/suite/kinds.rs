@@ -19,9 +19,14 @@ pub trait Hostile: Registered + Judged + Sync {
     /// The problem as a union of polyhedra; none where its cones are round.
     fn union(&self) -> Option<Union>;
 
-    /// The criterion by which a point is called solved, computed exactly: at most the tolerance. Infinite where no velocity follows from
-    /// the impulses.
+    /// The criterion by which a point is called solved, computed exactly: at most the tolerance.
     fn error(&self, point: &Self::Point) -> f64;
+
+    /// The same for a point whose velocities are taken as they are given, not as they follow from the impulses: where constraints nearly repeat each other,
+    /// these are velocities of a neighbouring problem.
+    fn error_as_given(&self, point: &Self::Point) -> f64 {
+        self.error(point)
+    }
 
     /// All numbers of a point.
     fn numbers(point: &Self::Point) -> Vec<f64>;
@@ -434,7 +439,7 @@ fn violation(sums: &[Sum], unit: impl Fn(usize) -> f64, typical: f64) -> f64 {
 }
 
 impl<const D: usize> Judge for FrictionLocal<D> {
-    fn exactly(&self, point: &LocalPoint) -> f64 {
+    fn exactly(&self, point: &LocalPoint, _as_given: bool) -> f64 {
         let (m, nc) = (self.q.len(), self.contacts());
         let mut sums: Vec<Sum> = self.q.iter().map(|&q| Sum::of(q)).collect();
         self.W.to_csc().triplets().for_each(|(i, j, a)| sums[i].add(a, point.r[j]));
@@ -465,7 +470,7 @@ impl<const D: usize> Judge for FrictionLocal<D> {
 }
 
 impl<const D: usize> Judge for FrictionGlobal<D> {
-    fn exactly(&self, point: &GlobalPoint) -> f64 {
+    fn exactly(&self, point: &GlobalPoint, as_given: bool) -> f64 {
         let (n, m, p) = (self.dofs(), self.w.len(), self.multipliers());
         let entry = |rows: &mut [Vec<Dyadic>], i: usize, j: usize, x: f64| {
             rows[i][j] = &rows[i][j] + &Dyadic::from(x);
@@ -523,11 +528,26 @@ impl<const D: usize> Judge for FrictionGlobal<D> {
             let typical = point.v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
             bilateral = violation(&rows, |j| weights[j], typical);
         }
-        let Some(u) = eliminated(equations, forms, n + p) else { return f64::INFINITY };
+        let given: Vec<_> = given.into_iter().map(|s| s.value).collect();
+        if as_given {
+            for (j, &v) in point.v.iter().enumerate() {
+                let (at, values) = self.M.column(j);
+                at.iter().zip(values).for_each(|(&i, &x)| load[i].add(-x, v));
+            }
+            if let Some(b) = &self.bilateral {
+                b.G.triplets().for_each(|(i, j, x)| load[i].add(x, point.lambda[j]));
+            }
+            let dynamics = violation(&load, |_| 0.0, 0.0);
+            return law::<D>(&w, &point.r, &given, &self.mu, &q).max(bilateral).max(dynamics);
+        }
+        // Where r does not determine the velocities, those given count.
+        let Some(u) = eliminated(equations, forms, n + p) else {
+            return self.exactly(point, true);
+        };
         let u: Vec<_> = u.into_iter().flatten().collect();
         let square = |s: Dyadic, x: &Dyadic| &s + &(x * x);
         let size = q.iter().fold(Dyadic::zero(), square).sqrt();
-        let gaps = u.iter().zip(&given).map(|(u, g)| u - &g.value);
+        let gaps = u.iter().zip(&given).map(|(u, g)| u - g);
         let gap = gaps.fold(Dyadic::zero(), |s, x| square(s, &x)).sqrt();
         let gap = if size.is_zero() { gap.to_f64() } else { ratio(&gap, &size) };
         law::<D>(&w, &point.r, &u, &self.mu, &q).max(bilateral).max(gap)
@@ -536,7 +556,7 @@ impl<const D: usize> Judge for FrictionGlobal<D> {
 
 /// The residual of a contact problem, exactly.
 trait Judge: nonsmooth::Problem {
-    fn exactly(&self, point: &Self::Point) -> f64;
+    fn exactly(&self, point: &Self::Point, as_given: bool) -> f64;
 }
 
 macro_rules! hostile_contact {
@@ -546,7 +566,10 @@ macro_rules! hostile_contact {
                 self.union_of()
             }
             fn error(&self, point: &$point) -> f64 {
-                self.exactly(point)
+                self.exactly(point, false)
+            }
+            fn error_as_given(&self, point: &$point) -> f64 {
+                self.exactly(point, true)
             }
             fn numbers(point: &$point) -> Vec<f64> {
                 [$(&point.$part[..]),*].concat()
