@@ -1,6 +1,8 @@
-//! Writes valid files of every format to fuzz/seeds: what the fuzzers start from.
+//! Writes valid files of every format to fuzz/seeds: what the fuzzers start from. `cargo run --release -p nonsmooth-io --example seeds`
 //!
 //! HDF5 files of many layouts come from Python's h5py, where it is; see seeds.py.
+
+#![allow(non_snake_case)]
 
 use std::path::Path;
 use std::process::Command;
@@ -102,7 +104,7 @@ const SICONOS: [&str; 8] = [
 ];
 
 fn main() {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz");
     let put = |target: &str, name: usize, bytes: &[u8]| {
         for folder in ["seeds", "corpus"] {
             std::fs::create_dir_all(here.join(folder).join(target)).expect("a folder can be made");
