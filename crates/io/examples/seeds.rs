@@ -21,11 +21,8 @@ fn diagonal(rows: usize, columns: usize) -> Csc {
 }
 
 fn local<const D: usize>(bilateral: bool) -> FrictionLocal<D> {
-    let bilateral = bilateral.then(|| BilateralLocal {
-        V: diagonal(D, 1),
-        R: diagonal(1, 1),
-        s: vec![0.5],
-    });
+    let bilateral =
+        bilateral.then(|| BilateralLocal { V: diagonal(D, 1), R: diagonal(1, 1), s: vec![0.5] });
     FrictionLocal { W: Bsr::from_csc(&diagonal(D, D)), q: vec![-1.0; D], mu: vec![0.5], bilateral }
 }
 
@@ -126,13 +123,19 @@ fn main() {
     let lines: Vec<&str> = runs.lines().collect();
     let of = |kind: &str, n: usize| {
         let mark = format!("{{\"line\":\"{kind}\"");
-        lines.iter().filter(move |l| l.starts_with(&mark)).take(n).map(|l| format!("{l}\n")).collect::<String>()
+        lines
+            .iter()
+            .filter(move |l| l.starts_with(&mark))
+            .take(n)
+            .map(|l| format!("{l}\n"))
+            .collect::<String>()
     };
     put("runs", 0, of("campaign", 1).as_bytes());
     put("runs", 1, (of("campaign", 1) + &of("problem", 1) + &of("run", 1)).as_bytes());
     put("runs", 2, (of("campaign", 1) + &of("problem", 2) + &of("run", 3)).as_bytes());
 
-    let made = Command::new("python3").arg(here.join("seeds.py")).arg(here.join("seeds/fclib")).status();
+    let made =
+        Command::new("python3").arg(here.join("seeds.py")).arg(here.join("seeds/fclib")).status();
     if !made.is_ok_and(|status| status.success()) {
         eprintln!("SKIPPED: python3 with h5py is not here: no seeds of other HDF5 layouts");
     }
