@@ -9,7 +9,8 @@ fuzz_target!(|data: &[u8]| {
     for name in ["lcp.dat", "relay.dat", "fuzz.dat"] {
         match siconos::parse(name, &text) {
             Ok(content) => {
-                let text = toml::to_text("fuzz.toml", &content).expect("what is read can be written");
+                let text =
+                    toml::to_text("fuzz.toml", &content).expect("what is read can be written");
                 let again = toml::parse("fuzz.toml", &text).expect("what is written can be read");
                 assert!(content == again, "{content:?}\n{again:?}");
             }

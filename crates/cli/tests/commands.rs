@@ -165,6 +165,17 @@ fn a_written_file_keeps_everything_else() {
     let after = fclib::read(folder.path("wall.hdf5")).unwrap();
     assert_eq!(after, FclibFile { solution: copy.solution, ..with_guess });
 
+    // Again and again, without a larger file; what a killed writer left goes.
+    let size = || std::fs::metadata(folder.path("wall.hdf5")).unwrap().len();
+    let first = size();
+    let left = folder.path(".wall.hdf5.1-0-0000000000000001.nonsmooth-tmp");
+    let long_ago = std::time::SystemTime::now() - std::time::Duration::from_secs(100_000);
+    std::fs::File::create(&left).unwrap().set_modified(long_ago).unwrap();
+    for _ in 0..20 {
+        folder.run("solve wall.hdf5 --out wall.hdf5 --quiet").exits(0);
+        assert_eq!(size(), first);
+    }
+
     // Nothing else is left in the folder.
     let mut names: Vec<_> = std::fs::read_dir(&folder)
         .unwrap()

@@ -3,9 +3,9 @@
 use std::ffi::{OsStr, OsString};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::{Duration, SystemTime};
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::{Duration, Instant, SystemTime};
 
 use crate::IoError;
 
@@ -16,6 +16,9 @@ pub(crate) const WRITABLE: &str = "a file that can be written";
 const MARK: &str = ".nonsmooth-tmp";
 /// No file takes as long to write: what is older was left by a writer of which nothing else is known.
 const ABANDONED: Duration = Duration::from_secs(24 * 3600);
+
+/// A folder is looked through once in this time.
+const AGAIN: Duration = Duration::from_secs(1);
 
 /// What stands at `path`, if anything, may be replaced by a file.
 pub(crate) fn check_target(path: &Path) -> Result<(), IoError> {
@@ -72,7 +75,14 @@ pub fn beside(path: &Path) -> Option<PathBuf> {
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
     name.push(format!(".{}-{count}-{:016x}{MARK}", std::process::id(), machine()));
     let path = path.with_file_name(name);
-    clean(path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")));
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // Who writes thousands of files there need not look at all of them each time.
+    static LAST: Mutex<Option<(PathBuf, Instant)>> = Mutex::new(None);
+    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    if !last.as_ref().is_some_and(|(at, when)| at == folder && when.elapsed() < AGAIN) {
+        clean(folder);
+        *last = Some((folder.into(), Instant::now()));
+    }
     Some(path)
 }
 
@@ -167,7 +177,7 @@ mod tests {
         let old = SystemTime::now() - 2 * ABANDONED;
         let foreign = at(&kept[1]);
         std::fs::File::options().write(true).open(&foreign).unwrap().set_modified(old).unwrap();
-        assert!(beside(&at("b")).is_some_and(|path| !path.exists()));
+        clean(folder.path());
         assert!(!foreign.exists() && exists(&kept[0]));
     }
 }

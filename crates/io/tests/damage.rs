@@ -4,16 +4,18 @@ mod common;
 
 use std::path::Path;
 
-use nonsmooth_io::fclib;
+use nonsmooth_io::fclib::{self, StoredPoint};
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::TestRunner;
 
-/// Reads bytes as a file, and writes the solution that it holds, if any; the message of the error, if any.
+/// Reads bytes as a file, and writes the solution that it holds, or zeros; the message of the error, if any.
 fn read(path: &Path, bytes: &[u8]) -> Option<String> {
     std::fs::write(path, bytes).unwrap();
-    let result = fclib::read(path).and_then(|content| match content.solution {
-        Some(solution) => fclib::write_solution(path, &solution),
-        None => Ok(()),
+    let result = fclib::read(path).and_then(|content| {
+        let (v, m, p) = common::sizes(&content.problem);
+        let zeros = |n: usize| Some(vec![0.0; n]);
+        let point = StoredPoint { v: zeros(v), u: vec![0.0; m], r: vec![0.0; m], lambda: zeros(p) };
+        fclib::write_solution(path, &content.solution.unwrap_or(point))
     });
     let message = result.err()?.to_string();
     assert!(!message.contains('\n') && message.starts_with(path.to_str().unwrap()), "{message}");
@@ -31,6 +33,8 @@ fn originals() -> Vec<Vec<u8>> {
     let mut files = vec![
         std::fs::read(path).unwrap(),
         std::fs::read(common::global_tree().save(folder.path())).unwrap(),
+        // Into these the solution is not written where an old one stands.
+        std::fs::read(common::bilateral_tree().save(folder.path())).unwrap(),
     ];
     match std::env::var_os("NONSMOOTH_CORPUS") {
         Some(corpus) => {

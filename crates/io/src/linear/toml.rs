@@ -342,7 +342,7 @@ pub fn write(path: impl AsRef<Path>, content: &LinearFile) -> Result<(), IoError
     })
 }
 
-/// The text of the file that [`write`] makes; `path` is its name in messages. Errors: as [`write`], but for the system's.
+/// The text of the file that [`write()`] makes; `path` is its name in messages. Errors: as [`write()`], but for the system's.
 pub fn to_text(path: impl AsRef<Path>, content: &LinearFile) -> Result<String, IoError> {
     let path = path.as_ref();
     check(path, content)?;

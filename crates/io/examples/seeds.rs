@@ -1,6 +1,8 @@
-//! Writes valid files of every format to fuzz/seeds: what the fuzzers start from.
+//! Writes valid files of every format to fuzz/seeds: what the fuzzers start from. `cargo run --release -p nonsmooth-io --example seeds`
 //!
 //! HDF5 files of many layouts come from Python's h5py, where it is; see seeds.py.
+
+#![allow(non_snake_case)]
 
 use std::path::Path;
 use std::process::Command;
@@ -19,11 +21,8 @@ fn diagonal(rows: usize, columns: usize) -> Csc {
 }
 
 fn local<const D: usize>(bilateral: bool) -> FrictionLocal<D> {
-    let bilateral = bilateral.then(|| BilateralLocal {
-        V: diagonal(D, 1),
-        R: diagonal(1, 1),
-        s: vec![0.5],
-    });
+    let bilateral =
+        bilateral.then(|| BilateralLocal { V: diagonal(D, 1), R: diagonal(1, 1), s: vec![0.5] });
     FrictionLocal { W: Bsr::from_csc(&diagonal(D, D)), q: vec![-1.0; D], mu: vec![0.5], bilateral }
 }
 
@@ -102,7 +101,7 @@ const SICONOS: [&str; 8] = [
 ];
 
 fn main() {
-    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let here = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz");
     let put = |target: &str, name: usize, bytes: &[u8]| {
         for folder in ["seeds", "corpus"] {
             std::fs::create_dir_all(here.join(folder).join(target)).expect("a folder can be made");
@@ -124,13 +123,19 @@ fn main() {
     let lines: Vec<&str> = runs.lines().collect();
     let of = |kind: &str, n: usize| {
         let mark = format!("{{\"line\":\"{kind}\"");
-        lines.iter().filter(move |l| l.starts_with(&mark)).take(n).map(|l| format!("{l}\n")).collect::<String>()
+        lines
+            .iter()
+            .filter(move |l| l.starts_with(&mark))
+            .take(n)
+            .map(|l| format!("{l}\n"))
+            .collect::<String>()
     };
     put("runs", 0, of("campaign", 1).as_bytes());
     put("runs", 1, (of("campaign", 1) + &of("problem", 1) + &of("run", 1)).as_bytes());
     put("runs", 2, (of("campaign", 1) + &of("problem", 2) + &of("run", 3)).as_bytes());
 
-    let made = Command::new("python3").arg(here.join("seeds.py")).arg(here.join("seeds/fclib")).status();
+    let made =
+        Command::new("python3").arg(here.join("seeds.py")).arg(here.join("seeds/fclib")).status();
     if !made.is_ok_and(|status| status.success()) {
         eprintln!("SKIPPED: python3 with h5py is not here: no seeds of other HDF5 layouts");
     }
