@@ -539,6 +539,7 @@ for format in ['earliest', 'v108', 'v110', 'latest']:
             g.create_dataset('vectors/mu', data=(k[:nc] % 8) * 0.125, dtype='f2', **options)
             g['info/title'] = 'layout'
             for j in range(20): g['info'].attrs[f'more{j}'] = j
+            if format != 'earliest': g['info'].attrs['long'] = np.zeros(20000)
             g['info'].attrs['numberOfDegreeOfFreedom'] = np.array([7], 'i4')
             for j in range(40): W[f'more{j}'] = j
 "#;

@@ -532,10 +532,17 @@ impl<'a> File<'a> {
                 c.skip(2)?;
             }
             if let (Some(heap), Some(names)) = (c.address()?, c.address()?) {
-                let heap = super::heap::Heap::open(self, heap)?;
+                // What is not read here is no integer.
+                let heap = match super::heap::Heap::open(self, heap) {
+                    Err(Fault::Unsupported(_)) => return Ok(None),
+                    heap => heap?,
+                };
                 self.records(names, 8, |record| {
                     if record.len() >= 9 && found.is_none() && record[8] & 2 == 0 {
-                        found = self.named(heap.object(&record[..8])?, name);
+                        match heap.object(&record[..8]) {
+                            Err(Fault::Unsupported(_)) => {}
+                            object => found = self.named(object?, name),
+                        }
                     }
                     Ok(())
                 })?;
