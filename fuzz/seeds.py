@@ -100,3 +100,11 @@ for version in ["earliest", "v108", "v110", "v200"]:
     make(version, nothing, chunks=(2,), maxshape=(None,), compression="lzf")
     make(version, nothing, chunks=(2,), maxshape=(None,))
     make(version, nothing, chunks=(1,), maxshape=(9,))
+
+    def scaled(f, g, W):
+        for name in "px":
+            values = W[name][()]
+            del W[name]
+            W.create_dataset(name, data=values, chunks=(2,), scaleoffset=0 if name == "p" else 1)
+
+    make(version, scaled)

@@ -259,7 +259,7 @@ fn check(file: &Path, campaign: &Campaign) -> Result<(), RunsError> {
         return Err(RunsError::Version {
             file: file.into(),
             found: campaign.version.into(),
-            program: campaign.program.clone(),
+            program: one_line(&campaign.program),
         });
     }
     Ok(())
@@ -270,9 +270,16 @@ fn refusal(file: &Path, k: usize, line: &str, error: &serde_json::Error) -> Runs
     let value: serde_json::Value = serde_json::from_str(line).unwrap_or_default();
     match value["version"].as_u64() {
         Some(found) if value["format"] == FORMAT && found != u64::from(VERSION) => {
-            let program = value["program"].as_str().unwrap_or("an unknown program").into();
+            let program = one_line(value["program"].as_str().unwrap_or("an unknown program"));
             RunsError::Version { file: file.into(), found, program }
         }
-        _ => RunsError::Line { file: file.into(), line: k + 1, found: error.to_string() },
+        _ => {
+            RunsError::Line { file: file.into(), line: k + 1, found: one_line(&error.to_string()) }
+        }
     }
+}
+
+/// Texts from a file may hold anything; a message is one line.
+fn one_line(text: &str) -> String {
+    text.replace(char::is_control, " ")
 }

@@ -57,3 +57,15 @@ fn mutated_runs_are_read_or_refused() {
         }
     }
 }
+
+#[test]
+fn what_a_file_says_does_not_break_a_message_into_lines() {
+    let kind = r#"{"line":"cam\npaign"}"#;
+    let program = r#"{"line":"campaign","format":"nonsmooth-runs","version":99,"program":"a\nb"}"#;
+    let known = seed().replacen("\"version\":1", "\"version\":99", 1);
+    let known = known.replacen("\"program\":\"", "\"program\":\"a\\n", 1);
+    for text in [kind, program, &known] {
+        let message = Runs::parse(Path::new("x.jsonl"), text).unwrap_err().to_string();
+        assert!(!message.contains('\n'), "{message}");
+    }
+}

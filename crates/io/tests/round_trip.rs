@@ -534,11 +534,15 @@ for format in ['earliest', 'v108', 'v110', 'latest']:
             W = g.create_group('W')
             for name, value in dict(m=m, n=m, nz=m).items(): W[name] = np.array([value], 'i4')
             for name, x in dict(p=k.astype('i4'), i=k.astype('>i8')[::-1], x=(k * 0.5 + 1)).items():
+                # For integers it is a number of bits, 0 for as many as they need.
+                if 'scaleoffset' in options: options['scaleoffset'] = 2 if name == 'x' else 0
                 W.create_dataset(name, data=x, **options)
             g.create_dataset('vectors/q', data=-(k % 7.0), **options)
+            if 'scaleoffset' in options: options = {}
             g.create_dataset('vectors/mu', data=(k[:nc] % 8) * 0.125, dtype='f2', **options)
             g['info/title'] = 'layout'
             for j in range(20): g['info'].attrs[f'more{j}'] = j
+            if format != 'earliest': g['info'].attrs['long'] = np.zeros(20000)
             g['info'].attrs['numberOfDegreeOfFreedom'] = np.array([7], 'i4')
             for j in range(40): W[f'more{j}'] = j
 "#;
@@ -558,6 +562,7 @@ fn every_layout_of_hdf5_is_read() {
         "dict(chunks=(7,), compression='gzip')",
         "dict(chunks=(2000,), maxshape=(2000,), compression='gzip', shuffle=True)",
         "dict(chunks=(50,), compression='lzf', fletcher32=True)",
+        "dict(chunks=(64,), scaleoffset=2)",
     ];
     let folder = tempfile::tempdir().unwrap();
     let mut python = Command::new("python3");

@@ -22,7 +22,7 @@
 //!
 //! Written files hold 32-bit integers and 64-bit reals in HDF5 1.8's format. Any width of integer and of real
 //! is read, reals of half precision too, integers where reals belong, and reals that are whole numbers where integers belong. Otherwise
-//! values pass bit for bit in both directions. All layouts of HDF5 up to 2.0 are read (groups, soft links, chunks, deflate, shuffle, checksums, LZF).
+//! values pass bit for bit in both directions. All layouts of HDF5 up to 2.0 are read (groups, soft links, chunks, deflate, shuffle, checksums, scaleoffset, LZF).
 
 mod read;
 mod write;

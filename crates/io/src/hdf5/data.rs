@@ -58,6 +58,7 @@ struct Filter {
 const DEFLATE: u16 = 1;
 const SHUFFLE: u16 = 2;
 const FLETCHER32: u16 = 3;
+const SCALEOFFSET: u16 = 6;
 const LZF: u16 = 32000;
 
 /// A dataset, its values not yet read.
@@ -436,9 +437,9 @@ impl<'a> File<'a> {
                     }
                 }
                 LZF => Cow::Owned(lzf(&data, most)?),
+                SCALEOFFSET => Cow::Owned(scaleoffset(&data, &filter.values, most)?),
                 4 => return Err(Fault::Unsupported("the filter szip")),
                 5 => return Err(Fault::Unsupported("the filter nbit")),
-                6 => return Err(Fault::Unsupported("the filter scaleoffset")),
                 32015 => return Err(Fault::Unsupported("the filter zstd")),
                 32001 => return Err(Fault::Unsupported("the filter blosc")),
                 _ => return Err(Fault::Unsupported("a filter that is not part of HDF5")),
@@ -532,10 +533,17 @@ impl<'a> File<'a> {
                 c.skip(2)?;
             }
             if let (Some(heap), Some(names)) = (c.address()?, c.address()?) {
-                let heap = super::heap::Heap::open(self, heap)?;
+                // What is not read here is no integer.
+                let heap = match super::heap::Heap::open(self, heap) {
+                    Err(Fault::Unsupported(_)) => return Ok(None),
+                    heap => heap?,
+                };
                 self.records(names, 8, |record| {
                     if record.len() >= 9 && found.is_none() && record[8] & 2 == 0 {
-                        found = self.named(heap.object(&record[..8])?, name);
+                        match heap.object(&record[..8]) {
+                            Err(Fault::Unsupported(_)) => {}
+                            object => found = self.named(object?, name),
+                        }
                     }
                     Ok(())
                 })?;
@@ -703,6 +711,53 @@ fn lzf(data: &[u8], most: usize) -> Result<Vec<u8>> {
         }
         if out.len() > most {
             return Err(fault());
+        }
+    }
+    Ok(out)
+}
+
+/// Numbers as bits above the least: integers, or reals times a power of ten.
+fn scaleoffset(data: &[u8], values: &[u32], most: usize) -> Result<Vec<u8>> {
+    let fault = || Fault::Damaged("a chunk that scaleoffset did not make".into());
+    let &[scale, factor, count, class, size, _, order, has_fill, ref fill @ ..] = values else {
+        return Err(fault());
+    };
+    let (count, size) = (count as usize, size as usize);
+    let bytes = count.checked_mul(size).filter(|&n| n <= most && (1..=8).contains(&size));
+    let (bytes, head) = (bytes.ok_or_else(fault)?, data.get(..21).ok_or_else(fault)?);
+    let (bits, packed) = (word(&head[..4], false), &data[21..]);
+    let least = word(&head[5..5 + usize::from(head[4]).min(8)], false);
+    let full = 8 * size as u64;
+    if bits == full {
+        return packed.get(..bytes).map(<[u8]>::to_vec).ok_or_else(fault);
+    }
+    if bits > full || (packed.len() as u64 * 8) / bits.max(1) < count as u64 && bits > 0 {
+        return Err(fault());
+    }
+    // All bits set stand for the fill value, if there is one.
+    let fill = (has_fill == 1).then(|| {
+        let parts = fill.iter().take(2).enumerate();
+        parts.fold(0, |sum, (k, &part)| sum | u64::from(part) << (32 * k))
+    });
+    let power = 10_f64.powi(factor as i32);
+    let mut out = Vec::with_capacity(bytes);
+    for k in 0..count as u64 {
+        // The highest bit first.
+        let bit = |at: u64| u64::from(packed[(at / 8) as usize] >> (7 - at % 8) & 1);
+        let x = (k * bits..(k + 1) * bits).fold(0, |x, at| x << 1 | bit(at));
+        let x = match (fill, class, scale, size) {
+            (Some(fill), ..) if x == (1 << bits) - 1 => fill,
+            (_, 0, 2, _) => x.wrapping_add(least),
+            (_, 1, 0, 8) => (x as i64 as f64 / power + f64::from_bits(least)).to_bits(),
+            (_, 1, 0, 4) => {
+                let (x, least) = (x as u32 as i32 as f32, f32::from_bits(least as u32));
+                u64::from((x / power as f32 + least).to_bits())
+            }
+            _ => return Err(Fault::Unsupported("this kind of the filter scaleoffset")),
+        };
+        match order {
+            0 => out.extend_from_slice(&x.to_le_bytes()[..size]),
+            _ => out.extend_from_slice(&x.to_be_bytes()[8 - size..]),
         }
     }
     Ok(out)

@@ -2,7 +2,7 @@
 //!
 //! All superblocks (0 to 3); groups as symbol tables, as link messages and as dense storage, with hard and soft links; contiguous, compact and
 //! chunked data with every index of chunks (B-trees of both versions, single, implicit, fixed and extensible arrays), of every version of the layout
-//! up to that of HDF5 2.0; deflate, shuffle, Fletcher's checksum and LZF; integers and reals of up to 64 bits in either byte order, texts.
+//! up to that of HDF5 2.0; deflate, shuffle, Fletcher's checksum, scaleoffset and LZF; integers and reals of up to 64 bits in either byte order, texts.
 //! Refused by name: external links and files, virtual datasets, other filters, wider numbers, messages in shared heaps.
 //!
 //! The bytes are never believed. Every address and length is checked against the file, every checksum that the format has is compared, and two
