@@ -104,6 +104,8 @@ pub struct Plan<'a> {
     pub settings: &'a SettingsMap,
     /// When to stop.
     pub limits: Limits,
+    /// When the file was begun: the time limit counts from here.
+    pub begun: Instant,
     /// Whether a progress bar is wanted.
     pub progress: bool,
 }
@@ -135,7 +137,13 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     limits.trace = args.trace.is_some() || args.plot.is_some();
     let targets = Targets::new(args)?;
     let cancel = limits.cancel.clone().unwrap_or_default();
-    let plan = Plan { solver: &args.solver, settings: &settings, limits, progress: !args.quiet };
+    let plan = Plan {
+        solver: &args.solver,
+        settings: &settings,
+        limits,
+        begun: Instant::now(),
+        progress: !args.quiet,
+    };
     let one_file = |k: usize, file: &Path| {
         if cancelled(&cancel) && k > 0 {
             if !args.json && !args.quiet {
@@ -150,7 +158,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             Ok(content) => content,
             Err(limit) => return Ok(files::late(file, args.json, limit, files::WHILE_READ)),
         };
-        let plan = Plan { limits: files::left(&plan.limits, begun), ..plan.clone() };
+        let plan = Plan { begun, ..plan.clone() };
         match content {
             Content::Friction(content) => {
                 let guess = match warm {
@@ -381,7 +389,6 @@ pub fn solve<P: Form + Registered>(
     start: Option<&P::Stored>,
     plan: &Plan,
 ) -> Result<SolvedOf<P>, String> {
-    let begun = Instant::now();
     let mistake = |e: &dyn std::fmt::Display| format!("{}: {e}", file.display());
     let session = registry::session::<P>(plan.solver, plan.settings);
     let mut session = session.map_err(|e| match (&e, takes(plan.solver)) {
@@ -394,10 +401,10 @@ pub fn solve<P: Form + Registered>(
     let mut point = start.map_or_else(|| problem.origin(), |s| problem.start(s));
     let mut bar = Bar::new(&name(file), plan.limits.tolerance, plan.progress);
     let outcome = session
-        .solve(problem, &mut point, &plan.limits, &mut |p| bar.watch(p))
+        .solve(problem, &mut point, &files::left(&plan.limits, plan.begun), &mut |p| bar.watch(p))
         .map_err(|e| mistake(&e))?;
     drop(bar);
-    let left = files::left(&plan.limits, begun);
+    let left = files::left(&plan.limits, plan.begun);
     let verdict = judged(problem, &point, &outcome, &left).map_err(|e| mistake(&e))?;
     Ok(Solved {
         outcome,

@@ -314,7 +314,7 @@ fn factorising_and_solving_allocate_nothing() {
     let right = (0..n * n).filter(|k| (k + 1) % n != 0).map(|k| (k, k + 1));
     let up = (0..n * n - n).map(|k| (k, k + n));
     let edges: Vec<_> = right.chain(up).collect();
-    let mut lu = BlockLu::new(&vec![6; (n * n) as usize], edges.iter().copied());
+    let mut lu = BlockLu::new(&vec![6; (n * n) as usize], edges.iter().copied()).unwrap();
     let block: [f64; 36] = std::array::from_fn(|k| (k as f64).sin());
     let strong: [f64; 36] = std::array::from_fn(|k| if k % 7 == 0 { 100.0 } else { 0.0 });
     let slots: Vec<_> = edges.iter().map(|&(i, j)| lu.slot(i as usize, j as usize)).collect();

@@ -18,17 +18,19 @@ use crate::{Limit, Limits};
 /// Up to this many unknowns, no single operation takes more than some milliseconds.
 pub const SMALL: usize = 300;
 /// How often the flag to cancel is looked at, and progress relayed.
-const TICK: Duration = Duration::from_millis(10);
+const TICK: Duration = Duration::from_millis(5);
 /// Seconds that a task has after a limit to come back by itself, and the share of the time limit that it has in addition.
-const GRACE: f64 = 0.05;
-const SHARE: f64 = 0.05;
+const GRACE: f64 = 0.04;
+const SHARE: f64 = 0.04;
+/// The same where there is no time from the start: what can be had at once.
+const AT_ONCE: f64 = 0.02;
 /// Of the thread: as much as a main thread has.
 const STACK: usize = 8 << 20;
 
 /// Runs `task`, which observes the limits that it is given as well as it can, and gives it up where it is late.
 ///
 /// `limits.time_limit` counts from now. The task gets limits of its own: the same time, and a flag that is set when it is given up or when the caller's flag
-/// is. `tick` is called about a hundred times a second meanwhile. Without a limit on time and a flag to cancel the task runs on the caller's thread.
+/// is. `tick` is called some hundred times a second meanwhile. Without a limit on time and a flag to cancel the task runs on the caller's thread.
 ///
 /// Errors: the limit at which the task was given up.
 ///
@@ -65,8 +67,10 @@ pub fn run<T: Send + 'static>(
             return Ok(task(limits));
         }
     };
-    let grace = GRACE + SHARE * limits.time_limit.unwrap_or(0.0).min(20.0);
-    let grace = Duration::from_secs_f64(grace);
+    let grace = Duration::from_secs_f64(match (limits.reached(begun), limits.time_limit) {
+        (Some(_), _) => AT_ONCE,
+        (None, t) => GRACE + SHARE * t.unwrap_or(0.0).min(20.0),
+    });
     // The limit that is reached, and when it was noticed.
     let mut late: Option<(Limit, Instant)> = None;
     loop {

@@ -3,6 +3,7 @@
 mod linear;
 
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use nonsmooth_dynamics::draw::{self, Drawing};
 use nonsmooth_dynamics::{Scene, SceneEntry, SceneError, scenes::SCENES};
@@ -188,7 +189,8 @@ fn linear_problem(maker: &Maker, args: &Args) -> Result<Exit, String> {
     if let Some(limits) = limits {
         let tolerance = limits.tolerance;
         let settings = &SettingsMap::new();
-        let plan = Plan { solver: registry::DEFAULT, settings, limits, progress: true };
+        let begun = Instant::now();
+        let plan = Plan { solver: registry::DEFAULT, settings, limits, begun, progress: true };
         let solved = with_complementarity!(&content.problem, p => solve_one(path, p, None, &plan))?;
         solution(&mut text, &solved, tolerance);
         exit = Exit::solved(solved.outcome.status == Status::Solved);
@@ -217,7 +219,8 @@ pub fn make(
 
 fn solve(label: &Path, problem: &Friction, limits: Limits) -> Result<Solved, String> {
     let settings = &SettingsMap::new();
-    let plan = Plan { solver: registry::DEFAULT, settings, limits, progress: true };
+    let begun = Instant::now();
+    let plan = Plan { solver: registry::DEFAULT, settings, limits, begun, progress: true };
     solve_any(label, problem, &plan)
 }
 
