@@ -74,9 +74,9 @@ pub struct Measure {
     /// Bilateral constraints: the largest violation of a constraint over the size of the terms that should cancel in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bilateral: Option<f64>,
-    /// The contact (or row) with the largest share in `absolute`.
+    /// The contact with the largest share in `absolute`; the row with the largest error.
     pub worst_contact: usize,
-    /// That contact's share, over `‖q‖`.
+    /// That contact's share, over `‖q‖`; that row's error.
     pub worst: f64,
 }
 
