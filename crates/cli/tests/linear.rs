@@ -9,7 +9,7 @@ use nonsmooth_io::linear;
 use serde_json::Value;
 
 const JUDGED: &str = "file kind rows unknowns status message tolerance residual/absolute residual/relative \
-    residual/rows residual/peer failing rows_by_status/inside rows_by_status/lower rows_by_status/upper \
+    residual/primal residual/peer failing rows_by_status/inside rows_by_status/lower rows_by_status/upper \
     rows_by_status/equalities degenerate worst_rows";
 
 fn examples() -> PathBuf {
@@ -313,7 +313,7 @@ fn campaigns_run_on_linear_problems() {
     };
     for name in ["/string", "/lcp_two", "/two", "/blocks"] {
         assert_eq!(of(name)["ending"], "solved", "{name}");
-        assert!(of(name)["residuals"]["rows"].is_number());
+        assert!(of(name)["residuals"]["primal"].is_number());
     }
     assert_eq!(of("/rectifier")["ending"], "refused");
     assert_eq!((&of("/string")["kind"], &of("/string")["contacts"]), (&"lcp".into(), &9.into()));

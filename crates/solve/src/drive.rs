@@ -670,6 +670,20 @@ impl<'a, P: Problem> Judge<'a, P> {
     fn judge(&mut self, problem: &P, point: &P::Point, iteration: usize, tolerance: f64) -> bool {
         self.last = problem.measure(point, self.gauge);
         let (mut certified, mut tidied) = (None, false);
+        if !self.last.passes(tolerance) {
+            // What is zero but for rounding may hide how good the rest is.
+            P::copy_point(point, self.tidied);
+            if problem.tidy(self.tidied, self.gauge, true) {
+                let measure = problem.measure(self.tidied, self.gauge);
+                if measure.is_better_than(&self.last) {
+                    (self.last, tidied) = (measure, true);
+                }
+                if measure.passes(tolerance) {
+                    // Back to the point that is to be tidied for good.
+                    let _ = problem.measure(point, self.gauge);
+                }
+            }
+        }
         if self.last.passes(tolerance) {
             // What looks solved is looked at again, in doubled precision.
             (self.last, tidied) = self.certify(problem, point, tolerance);

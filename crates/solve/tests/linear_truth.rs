@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use nonsmooth_problem::linalg::Dense;
-use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
+use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp, Problem};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::settings::SettingsMap;
 use nonsmooth_solve::{Limits, Status};
@@ -244,5 +244,43 @@ fn solved_and_infeasible_are_true_in_all_units() {
         for ((solver, exists, status), count) in &counts[k] {
             println!("  {solver:18} solvable {exists:5} {status:16} {count}");
         }
+    }
+}
+
+#[test]
+fn a_tolerance_beyond_doubles_is_named_and_not_chased() {
+    // Thirds and sevenths are no doubles: whatever z is, some rows keep a last bit.
+    let n = 40;
+    let m = Dense::from_fn(n, n, |i, j| match i.abs_diff(j) {
+        0 => 7.0 / 3.0,
+        1 => -1.0 / 3.0,
+        k => 0.1 / (7 * k * k) as f64,
+    });
+    let q = (0..n).map(|i| -1.0 / (i + 3) as f64).collect();
+    let problem = Lcp::new(m, q).unwrap();
+    let limits = Limits { tolerance: 1e-19, max_iterations: 1_000_000, ..Limits::default() };
+    for solver in ["psor", "pgs", "projected_jacobi"] {
+        let mut session = registry::session::<Lcp>(solver, &SettingsMap::new()).unwrap();
+        let mut point = problem.origin();
+        let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+        let said = outcome.status.to_string();
+        assert!(said.contains("rounding the unknowns"), "{solver}: {said}");
+        assert!(outcome.iterations < 10_000 && outcome.measure.relative < 1e-14, "{outcome:?}");
+    }
+}
+
+#[test]
+fn units_do_not_make_a_solution() {
+    // Integers without a solution, in units that made the residual of the whole problem small.
+    let p = f64::exp2;
+    let two = Dense::from_rows(&[[0.0, p(34.0)], [3.0 * p(-16.0), 3.0]]).unwrap();
+    let three = [[0.0, p(37.0), p(36.0)], [0.0, p(25.0), 3.0 * p(25.0)], [0.0, 0.0, 0.0]];
+    let problems = [
+        Lcp::new(two, vec![-p(17.0), -p(-17.0)]).unwrap(),
+        Lcp::new(Dense::from_rows(&three).unwrap(), vec![-3.0 * p(14.0), 24.0, p(-21.0)]).unwrap(),
+    ];
+    for problem in problems {
+        let said = ask(&problem, &LCP, false, "in units", &mut Counts::new());
+        assert_eq!(said[0], "infeasible");
     }
 }

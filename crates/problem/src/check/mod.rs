@@ -91,9 +91,9 @@ pub struct Measure {
     /// square, over `‖q‖`. No solver can be expected to get below it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub floor: Option<f64>,
-    /// The contact (or row) with the largest share in `absolute`.
+    /// The contact with the largest share in `absolute`; the row with the largest error.
     pub worst_contact: usize,
-    /// That contact's share, over `‖q‖`.
+    /// That contact's share, over `‖q‖`; that row's error.
     pub worst: f64,
 }
 

@@ -23,7 +23,7 @@ pub struct Verdict<Status = ContactStatus, Counts = StatusCounts> {
     /// The relative velocity u recomputed from the impulses, D·nc; of a linear complementarity problem `w = M z + q`.
     #[serde(skip)]
     pub velocity: Vec<f64>,
-    /// The contacts, or rows, with the largest residuals over `‖q‖`, worst first, at most ten.
+    /// The contacts with the largest residuals over `‖q‖`, or the rows with the largest errors, worst first, at most ten.
     pub worst: Vec<(usize, f64)>,
 }
 
