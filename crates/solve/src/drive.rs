@@ -562,7 +562,8 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
     fn floor(&mut self, iterations: usize) -> Option<Status> {
         let work = self.judge.idle(iterations)?;
         let measure = self.judge.certify_best(self.problem);
-        let (floor, tolerance) = (measure.floor?, self.limits.tolerance);
+        let floor = measure.floor.filter(|floor| floor.is_finite())?;
+        let tolerance = self.limits.tolerance;
         // A point near the floor may still meet a tolerance little below it by chance.
         let (near, below) = if work < LATE * IDLE { (AT_FLOOR, 4.0) } else { (NEAR_FLOOR, 1.0) };
         (floor > below * tolerance && measure.merit() <= near * floor).then(|| {
@@ -600,6 +601,9 @@ const LATE: u64 = 4;
 const AT_FLOOR: f64 = 10.0;
 const NEAR_FLOOR: f64 = 1000.0;
 
+/// The most steps between two looks at a point of which a single contact is not done: a look costs several steps.
+const MOST_WAIT: usize = 16;
+
 /// Since when a solve gets no further.
 #[derive(Debug, Clone, Copy)]
 struct Halved {
@@ -632,6 +636,10 @@ struct Judge<'a, P: Problem> {
     certified: Option<Measure>,
     /// When the best merit was last halved.
     halved: Halved,
+    /// The own residual of the contact for which a point was last refused, the step from which it is asked again, and the last wait.
+    own: Option<f64>,
+    own_again: usize,
+    own_wait: usize,
     /// Judged residual over the solver's estimate, when last compared.
     ratio: f64,
     /// Keep every `stride`-th visit in the history.
@@ -660,6 +668,9 @@ impl<'a, P: Problem> Judge<'a, P> {
             best_measure: nothing,
             certified: None,
             halved: Halved::now(f64::INFINITY, 0),
+            own: None,
+            own_again: 0,
+            own_wait: 0,
             ratio: 1.0,
             stride: 1,
             visits: 0,
@@ -684,10 +695,18 @@ impl<'a, P: Problem> Judge<'a, P> {
                 }
             }
         }
-        if self.last.passes(tolerance) {
+        if let (Some(own), true) = (self.own, iteration < self.own_again) {
+            // Refused a moment ago for a single contact: as yet as good as then.
+            self.last.own = Some(own);
+        } else if self.last.passes(tolerance) {
             // What looks solved is looked at again, in doubled precision.
             (self.last, tidied) = self.certify(problem, point, tolerance);
             certified = Some(self.last);
+            if self.last.fails_own_only(tolerance) {
+                self.own = self.last.own;
+                self.own_wait = (2 * self.own_wait).clamp(1, MOST_WAIT);
+                self.own_again = iteration + self.own_wait;
+            }
         }
         // What passes counts as the best, though its merit may be that of a point with a contact that is not done.
         let better = self.visits == 0

@@ -52,7 +52,7 @@ fn secant<T: Real>(mu: f64) -> (T, T) {
     (square, square.sqrt())
 }
 
-/// The nearest point of `K = {‖x_T‖ ≤ mu x_N}`, in the half-plane of `(x_N, ‖x_T‖)`:
+/// The nearest point of `K = {‖x_T‖ ≤ mu x_N}`; of −y its size is `dist(y, K*)` with `K* = {mu‖y_T‖ ≤ y_N}`, by Moreau's decomposition. In the half-plane of `(x_N, ‖x_T‖)`:
 /// x itself inside, else its projection on the ray `(cos φ, sin φ)`, `tan φ = mu`, or the apex.
 pub(super) fn nearest_in_cone<T: Real, const D: usize>(x: &[T; D], mu: f64) -> [T; D] {
     let (t, zero, friction) = (tangential(x), T::from(0.0), T::from(mu));
@@ -83,11 +83,6 @@ pub(super) fn distance_to_cone<T: Real, const D: usize>(x: &[T; D], mu: f64) -> 
     } else {
         outside / secant::<T>(mu).1
     }
-}
-
-/// `dist(y, K*)` with `K* = {mu‖y_T‖ ≤ y_N}`: by Moreau's decomposition the norm of the projection of −y on K.
-pub(super) fn distance_to_dual<T: Real, const D: usize>(y: &[T; D], mu: f64) -> T {
-    length(&nearest_in_cone(&y.map(|v| -v), mu))
 }
 
 /// The natural map `x − P_K(x − ũ)`.
@@ -152,6 +147,10 @@ pub(super) fn status<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn distance_to_dual<const D: usize>(y: &[f64; D], mu: f64) -> f64 {
+        length(&nearest_in_cone(&y.map(|v| -v), mu))
+    }
 
     #[test]
     fn the_three_regions() {

@@ -228,10 +228,10 @@ impl GlobalGauge {
         }
         let ((v, lambda), (v_low, _)) = (high.split_at(n), low.split_at(n));
         let own = imbalance(problem, (v, v_low), &point.r, lambda, force, rows);
-        reach.update(problem, &law.w, &point.r, (v, lambda), &mut spare[..n]);
         rows.start(&problem.w);
         rows.add_transposed(&problem.H, v);
         let mut measure = if precisely {
+            reach.update(problem, &law.w, &point.r, (v, lambda), &mut spare[..n]);
             rows.add_transposed(&problem.H, v_low);
             exact.iter_mut().zip(rows.doubled()).for_each(|(u, x)| *u = x);
             u.iter_mut().zip(rows.values()).for_each(|(u, x)| *u = x);
@@ -245,7 +245,7 @@ impl GlobalGauge {
             law.measure::<_, D>(&point.r, exact, sizes, doubt, mu)
         } else {
             u.iter_mut().zip(rows.values()).for_each(|(u, x)| *u = x);
-            law.measure::<f64, D>(&point.r, u, &reach.sizes, |_| 0.0, mu)
+            law.measure::<f64, D>(&point.r, u, &[], |_| 0.0, mu)
         };
 
         let worse = |a: f64, b: f64| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) };

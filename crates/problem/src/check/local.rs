@@ -1,6 +1,6 @@
 //! The judge of the local problem.
 
-use super::contact::{distance_to_cone, distance_to_dual, length, modified_velocity, natural_map};
+use super::contact::{distance_to_cone, length, modified_velocity, natural_map, nearest_in_cone};
 use super::rows::{Rows, doubt};
 use super::{Measure, over};
 use crate::linalg::{Csc, Doubled, Real, norm, norm_of, power_of_two, small};
@@ -11,7 +11,7 @@ use crate::{BilateralLocal, FrictionLocal, LocalPoint};
 pub struct LocalGauge {
     pub(super) law: LawGauge,
     u: Vec<f64>,
-    /// u with all its digits, and the size of its terms.
+    /// u with all its digits and the size of its terms, when it was last certified.
     exact: Vec<Doubled>,
     sizes: Vec<f64>,
     rows: Rows,
@@ -92,8 +92,7 @@ impl LocalGauge {
             measure
         } else {
             self.update_velocity(problem, point);
-            let Self { law, u, sizes, .. } = self;
-            law.measure::<f64, D>(&point.r, u, sizes, |_| 0.0, &problem.mu)
+            self.law.measure::<f64, D>(&point.r, &self.u, &[], |_| 0.0, &problem.mu)
         };
         measure.bilateral = self.violation(problem, point);
         measure
@@ -142,29 +141,22 @@ impl LocalGauge {
         &self.u
     }
 
-    /// `u = W r + q + V λ` and the sizes of its terms, entry by entry, without the solvers' kernels.
+    /// `u = W r + q + V λ`, entry by entry, without the solvers' kernels.
     fn update_velocity<const D: usize>(&mut self, problem: &FrictionLocal<D>, point: &LocalPoint) {
-        let Self { u, sizes, .. } = self;
+        let u = &mut self.u;
         for i in 0..problem.contacts() {
             let (cols, blocks) = problem.W.row(i);
             let mut sum: [f64; D] = small::block(&problem.q, i);
-            let mut size = sum.map(f64::abs);
             for (&j, b) in cols.iter().zip(blocks) {
                 for k in 0..D {
                     for l in 0..D {
-                        let product = b[k][l] * point.r[D * j as usize + l];
-                        sum[k] += product;
-                        size[k] += product.abs();
+                        sum[k] += b[k][l] * point.r[D * j as usize + l];
                     }
                 }
             }
             u[D * i..D * i + D].copy_from_slice(&sum);
-            sizes[D * i..D * i + D].copy_from_slice(&size);
         }
-        each_term(problem.bilateral.as_ref().map(|b| &b.V), &point.lambda, |i, a, x| {
-            u[i] += a * x;
-            sizes[i] += (a * x).abs();
-        });
+        each_term(problem.bilateral.as_ref().map(|b| &b.V), &point.lambda, |i, a, x| u[i] += a * x);
     }
 
     /// The same, each entry as one sum in doubled precision.
@@ -316,37 +308,40 @@ impl LawGauge {
         let (mut scaled, mut peer, mut doubts) = (0.0, 0.0, 0.0);
         let (mut primal, mut dual, mut complementarity) = (0.0, 0.0, 0.0);
         let (mut worst_contact, mut worst) = (0, -1.0);
-        let (mut own_contact, mut own) = (0, -1.0);
+        let (mut own_contact, mut own) = (0, 0.0);
         for (c, (&mu, &w)) in mu.iter().zip(&self.w).enumerate() {
             let rc: [f64; D] = small::block(r, c);
             let uc: [T; D] = std::array::from_fn(|k| u[D * c + k]);
             let x = rc.map(|r| T::of_product(w, r) * per);
-            let modified = modified_velocity::<T, D>(&uc.map(|u| u * per), mu);
+            let modified = modified_velocity::<T, D>(&uc, mu);
+            let modified_plainly = modified.map(|u| u * plain_per);
+            let modified = modified.map(|u| u * per);
             let residual = natural_map(&x, &modified, mu);
             let share = square(&residual);
             if share > worst || share.is_nan() {
                 (worst_contact, worst) = (c, share);
             }
             scaled += share;
-            let of_u = norm_of((D * c..D * c + D).map(|i| doubt(i) / unit));
-            let left =
-                T::DOUBT * (value(length(&x)) + value(length(&modified))) + (1.0 + mu) * of_u;
-            doubts += left * left;
-            let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] / unit));
-            // Below the range of double precision there are no digits to be right. With much friction K* is nearly the whole space, and far from
-            // it is near: every solution has u_N ≥ 0.
-            let sinking = (-value(uc[0] * per)).max(0.0);
-            let error = value(length(&residual)).max(sinking) + left;
-            let of_own = over(error, terms.max(LEAST));
-            let idle = self.loaded.get(c) == Some(&false);
-            if !idle && (of_own > own || of_own.is_nan()) {
-                (own_contact, own) = (c, of_own);
+            // Plain arithmetic decides nothing: it leaves out what only decides.
+            if T::DOUBT > 0.0 {
+                let of_u = norm_of((D * c..D * c + D).map(|i| doubt(i) / unit));
+                let left = T::DOUBT * value(length(&x) + length(&modified)) + (1.0 + mu) * of_u;
+                doubts += left * left;
+                let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] / unit));
+                // With much friction K* is nearly the whole space, and far from it is near: every solution has u_N ≥ 0.
+                let sinking = (-value(uc[0] * per)).max(0.0);
+                // Below the range of double precision there are no digits to be right.
+                let error = value(length(&residual)).max(sinking) + left;
+                let of_own = over(error, terms.max(LEAST));
+                let idle = self.loaded.get(c) == Some(&false);
+                if !idle && (of_own > own || of_own.is_nan()) {
+                    (own_contact, own) = (c, of_own);
+                }
             }
             let rc = rc.map(|r| T::from(r) * plain_per);
-            let modified_plainly = modified_velocity::<T, D>(&uc.map(|u| u * plain_per), mu);
             peer += square(&natural_map(&rc, &modified_plainly, mu));
             primal += value(distance_to_cone(&x, mu)).powi(2);
-            dual += value(distance_to_dual(&modified, mu)).powi(2);
+            dual += square(&nearest_in_cone(&modified.map(|v| -v), mu));
             let products = x.iter().zip(&modified).map(|(&a, &b)| a * b);
             complementarity += value(products.fold(T::from(0.0), |sum, p| sum + p)).abs();
         }
@@ -361,8 +356,8 @@ impl LawGauge {
             primal: primal.sqrt() * q,
             dual: dual.sqrt() * q,
             complementarity: complementarity * q * q,
-            own: Some(own.max(0.0)),
-            own_contact: Some(own_contact),
+            own: (T::DOUBT > 0.0).then_some(own),
+            own_contact: (T::DOUBT > 0.0).then_some(own_contact),
             worst_contact,
             worst: worst.sqrt() * q,
             ..Measure::unknown()

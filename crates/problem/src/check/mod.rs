@@ -76,7 +76,7 @@ pub struct Measure {
     /// Bilateral constraints: the largest violation of a constraint over the size of the terms that should cancel in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bilateral: Option<f64>,
-    /// Contacts: the largest residual of one contact in units of its own terms, `‖φ_c‖ / ‖(|q| + |W||r| + |V||λ|)_c‖` with its part φ_c of
+    /// Contacts, certified measurements only: the largest residual of one contact in units of its own terms, `‖φ_c‖ / ‖(|q| + |W||r| + |V||λ|)_c‖` with its part φ_c of
     /// the natural map (or `max(0, −u_N)`, if larger: under much friction a velocity into the obstacle is near K*): a contact that nothing solves does not hide behind larger ones, whatever its scale. The limit is the root of the tolerance:
     /// half of the digits, because a contact with a small load gets no more than its share of the work. Islands of contacts without load (q = 0)
     /// are left out: r = 0 solves them, and what is there is noise. For global problems the terms are
@@ -149,6 +149,13 @@ impl Measure {
         ]
         .into_iter()
         .filter_map(|(what, value, limit)| Some(Failing { what, value: value?, limit }))
+    }
+
+    /// Whether a contact's own residual is all that fails.
+    pub fn fails_own_only(&self, tolerance: f64) -> bool {
+        let mut failing =
+            self.criteria(tolerance).filter(|c| !matches!(c.value, v if v <= c.limit));
+        failing.next().is_some_and(|c| c.what == OWN) && failing.next().is_none()
     }
 
     /// The decision: every criterion within its limit.
