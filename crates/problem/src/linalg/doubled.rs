@@ -4,7 +4,7 @@
 //! adds up in doubled precision it must also subtract, square and compare so. [`Real`] lets the law be written once for both
 //! precisions.
 //!
-//! Source: Dekker1971, HidaLiBailey2001 (the accurate sum); square root by one Newton step on the reciprocal's.
+//! The sum and the product of parts are those of OgitaRumpOishi2005; quotients by three digits of long division, roots by one Newton step.
 
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
