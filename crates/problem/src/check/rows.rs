@@ -108,7 +108,7 @@ impl Rows {
     }
 }
 
-/// What a compensated sum of `n` terms may be wrong by, over the size of its terms (OgitaRumpOishi2005, theorem 5.6 before its last
+/// What a compensated sum of `n` terms may be wrong by, over the size of its terms (OgitaRumpOishi2005, the bound of Dot2 before its last
 /// rounding).
 pub(super) fn doubt(n: usize) -> f64 {
     let gamma = 0.5 * f64::EPSILON * (n + 2) as f64;

@@ -74,7 +74,7 @@ impl Compensated {
 
 /// `x` as two numbers of 26 bits each.
 #[inline]
-fn split(x: f64) -> (f64, f64) {
+pub(super) fn split(x: f64) -> (f64, f64) {
     const FACTOR: f64 = 134_217_729.0; // 2²⁷ + 1
     let scaled = FACTOR * x;
     let high = scaled - (scaled - x);

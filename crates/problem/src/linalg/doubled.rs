@@ -4,10 +4,12 @@
 //! adds up in doubled precision it must also subtract, square and compare so. [`Real`] lets the law be written once for both
 //! precisions.
 //!
-//! Source: Dekker1971, HidaLiBailey2001 (the accurate sum); square root by one Newton step on the reciprocal's.
+//! The sum and the product of parts are those of OgitaRumpOishi2005; quotients by three digits of long division, roots by one Newton step.
 
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use super::compensated::split;
 
 /// `high + low` with `|low| ≤ ulp(high)/2`. Each operation is right to a few units of 2⁻¹⁰⁴, as long as the parts stay within the
 /// range of double precision; what leaves it is infinite or NaN.
@@ -44,7 +46,10 @@ impl Doubled {
     #[inline]
     pub fn product(a: f64, b: f64) -> Self {
         let high = a * b;
-        Self { high, low: a.mul_add(b, -high) }
+        let ((a_high, a_low), (b_high, b_low)) = (split(a), split(b));
+        let low = ((a_high * b_high - high) + a_high * b_low + a_low * b_high) + a_low * b_low;
+        // A fused product is a function call where the machine is not known; it is needed beyond 2⁹⁹⁶ only.
+        Self { high, low: if low.is_finite() { low } else { a.mul_add(b, -high) } }
     }
 
     /// The nearest double and the rest.
