@@ -1,6 +1,6 @@
 //! The judge of the global problem.
 
-use super::local::{HALF_ULP, LawGauge, ROUNDING, unit, worst};
+use super::local::{HALF_ULP, LawGauge, ROUNDING, largest, reachable, unit, worst};
 use super::rows::{Rows, doubt};
 use super::{Measure, over};
 use crate::linalg::{Csc, Delassus, Doubled, Inverse, Refine, norm, norm_of, small};
@@ -159,6 +159,7 @@ impl GlobalGauge {
             buffer: vec![0.0; problem.dofs()],
             rows: Rows::default(),
         };
+        gauge.law.strength = diagonal.iter().map(largest).collect();
         gauge.rescale(problem);
         // The longest use of the rows, so that a measurement allocates nothing.
         let longest = problem.dofs().max(problem.w.len()).max(problem.multipliers());
@@ -202,6 +203,23 @@ impl GlobalGauge {
         rows.add_transposed(&problem.H, &low[..n]);
         q.iter_mut().zip(rows.values()).for_each(|(q, x)| *q = x);
         law.norm_q = norm(q);
+        // Velocities of bodies carry the loads from contact to contact.
+        let LawGauge { reachable: most, scratch: [loads, units], impulses, .. } = law;
+        loads.clear();
+        loads.extend(q.chunks(D).map(norm));
+        loads.extend(problem.bilateral.iter().flat_map(|b| b.b.iter().map(|b| b.abs())));
+        let nc = problem.contacts();
+        let entries = |call: &mut dyn FnMut(usize, usize, f64)| {
+            problem.H.triplets().for_each(|(i, j, x)| call(j / D, i, x.abs()));
+            let constraints = problem.bilateral.iter().flat_map(|b| b.G.triplets());
+            constraints.for_each(|(i, j, x)| call(nc + j, i, x.abs()));
+        };
+        reachable(loads, n, entries, units, most);
+        impulses.clear();
+        impulses.resize(nc, 0.0);
+        for (i, j, x) in problem.H.triplets().filter(|e| e.2 != 0.0) {
+            impulses[j / D] = impulses[j / D].max((problem.f[i] / x).abs());
+        }
     }
 
     pub(crate) fn measure<const D: usize>(
@@ -258,9 +276,11 @@ impl GlobalGauge {
         let inverse = &dynamics.inverse;
         for k in 0..inverse.component_sizes().len() {
             let index = || inverse.component(k).iter().filter(|&&i| i < n);
-            let largest = index().fold(0.0_f64, |l, &i| l.max(v[i].abs()));
+            // In units in which unknowns of one component are comparable.
+            let unit = |i: usize| unit(problem.M.get(i, i));
+            let largest = index().fold(0.0_f64, |l, &i| l.max(v[i].abs() * unit(i)));
             for &i in index() {
-                if buffer[i].abs() <= 2.0 * f64::EPSILON * largest {
+                if buffer[i].abs() * unit(i) <= 2.0 * f64::EPSILON * largest {
                     buffer[i] = 0.0;
                 }
             }

@@ -38,6 +38,7 @@ impl LocalGauge {
         let diagonal = (0..contacts).map(|c| small::mean_diagonal(&problem.W.diagonal_block(c)));
         self.law.refill(diagonal, norm(&problem.q));
         self.mark_loaded(problem);
+        self.mark_reachable(problem);
         let blocks = (0..contacts).map(|c| problem.W.row(c).0.len()).max().unwrap_or(0);
         self.terms = 1 + D * blocks + problem.multipliers();
         let m = problem.q.len();
@@ -48,6 +49,36 @@ impl LocalGauge {
         self.sizes.resize(m, 0.0);
         // The longest use of the rows, so that a measurement allocates nothing.
         self.rows.start_at_zero(m.max(problem.multipliers()));
+    }
+
+    /// What q and s make of each contact and constraint, through `[W, V; Vᵀ, R]` by contacts.
+    fn mark_reachable<const D: usize>(&mut self, problem: &FrictionLocal<D>) {
+        let nc = problem.contacts();
+        let LawGauge { reachable: most, scratch: [loads, units], impulses, .. } = &mut self.law;
+        loads.clear();
+        loads.extend(problem.q.chunks(D).map(norm));
+        loads.extend(problem.bilateral.iter().flat_map(|b| b.s.iter().map(|s| s.abs())));
+        let entries = |call: &mut dyn FnMut(usize, usize, f64)| {
+            for i in 0..nc {
+                let (cols, blocks) = problem.W.row(i);
+                for (&j, block) in cols.iter().zip(blocks) {
+                    call(i, j as usize, largest(block));
+                }
+            }
+            if let Some(b) = &problem.bilateral {
+                for (i, j, x) in b.V.triplets() {
+                    call(i / D, nc + j, x.abs());
+                    call(nc + j, i / D, x.abs());
+                }
+                b.R.triplets().for_each(|(i, j, x)| call(nc + i, nc + j, x.abs()));
+            }
+        };
+        reachable(loads, loads.len(), entries, units, most);
+        impulses.clear();
+        impulses.extend_from_slice(&units[..nc]);
+        let strength = &mut self.law.strength;
+        strength.clear();
+        strength.extend((0..nc).map(|c| largest(&problem.W.diagonal_block(c))));
     }
 
     /// Which contacts have a load or are coupled, however far, to one that has; those that bilateral constraints touch count.
@@ -114,7 +145,7 @@ impl LocalGauge {
         let typical = |x: &[f64], unit: &dyn Fn(usize) -> f64| {
             (0..x.len()).fold(0.0_f64, |m, j| m.max(x[j].abs() * unit(j)))
         };
-        let of_contact = |i: usize| self.law.w[i / D].sqrt();
+        let of_contact = |i: usize| self.law.own_w(i / D).sqrt();
         let typical_r = typical(&point.r, &of_contact);
         let typical_lambda = typical(&point.lambda, &unit);
         // R by rows through its columns: it need not be symmetric.
@@ -248,11 +279,62 @@ pub(super) fn worst(shares: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
     })
 }
 
-/// What the contact law's residual needs of a problem: `w_c` and `‖q‖`, and which contacts are not loaded at all (empty: none).
+/// How far a contact with `x = w r` is from each part of the law by itself: `u_N ≥ 0`, `r ∈ K`, `u_N > 0` only where r = 0, and `x_T = −mu x_N u_T/‖u_T‖` where
+/// `u_T ≠ 0`. All of that is the same as `K* ∋ ũ ⟂ r ∈ K`, but with much friction K* is nearly the whole space and K nearly a half space, where far from the law is near in the
+/// distance to cones.
+fn apart<const D: usize>(x: &[f64; D], u: &[f64; D], mu: f64) -> f64 {
+    let sinking = (-u[0]).max(0.0);
+    let pressed = u[0].max(0.0).min(norm(x));
+    let sliding = small::tangential_norm(u);
+    let across = if sliding > 0.0 {
+        norm_of((1..D).map(|k| x[k] + mu * x[0] * (u[k] / sliding)))
+    } else {
+        0.0
+    };
+    let pulling = (-x[0]).max(small::tangential_norm(x) - mu * x[0].max(0.0)).max(0.0);
+    sinking.max(pressed).max(sliding.min(across)).max(pulling)
+}
+
+/// The largest modulus in a block.
+pub(super) fn largest<const D: usize>(block: &[[f64; D]; D]) -> f64 {
+    block.iter().flatten().fold(0.0, |l, x| l.max(x.abs()))
+}
+
+/// What the loads make of each row of a matrix: with `ζ_j = max_i |q_i|/|A_ij|`, the unit of column j, `ω_i = max(|q_i|, max_j |A_ij| ζ_j)`; zero where no load
+/// is near. The same in all units of rows and columns. `entries` calls for each entry with its row, its column and its modulus.
+pub(super) fn reachable(
+    loads: &[f64],
+    columns: usize,
+    entries: impl Fn(&mut dyn FnMut(usize, usize, f64)),
+    units: &mut Vec<f64>,
+    most: &mut Vec<f64>,
+) {
+    units.clear();
+    units.resize(columns, 0.0);
+    entries(&mut |i, j, a| {
+        if a > 0.0 {
+            units[j] = units[j].max(loads[i] / a);
+        }
+    });
+    most.clear();
+    most.extend_from_slice(loads);
+    entries(&mut |i, j, a| most[i] = most[i].max(a * units[j]));
+}
+
+/// What the contact law's residual needs of a problem: `w_c` and `‖q‖`, which contacts are not loaded at all (empty: none), and
+/// what the loads make of each contact's velocity.
 #[derive(Debug, Clone, Default)]
 pub(super) struct LawGauge {
     pub(super) w: Vec<f64>,
     loaded: Vec<bool>,
+    /// The largest modulus of W_cc, which is there where the trace is not.
+    pub(super) strength: Vec<f64>,
+    /// ω, see [`reachable`]; those of bilateral constraints follow.
+    pub(super) reachable: Vec<f64>,
+    /// The loads, and the units of columns, for that. Of contacts those are impulses.
+    pub(super) scratch: [Vec<f64>; 2],
+    /// Of each contact an impulse that the loads make, by its column.
+    pub(super) impulses: Vec<f64>,
     pub(super) norm_q: f64,
 }
 
@@ -274,6 +356,14 @@ impl LawGauge {
                 *w = stand_in;
             }
         }
+    }
+
+    /// What stands for w_c where contact c is measured by itself: the largest modulus of W_cc; of an empty block the velocity that loads
+    /// make of the contact over the impulse that would.
+    fn own_w(&self, c: usize) -> f64 {
+        let at = |all: &[f64]| all.get(c).copied().filter(|x| *x > 0.0);
+        let unit = || Some(at(&self.reachable)? / at(&self.impulses)?);
+        at(&self.strength).or_else(unit).unwrap_or(self.w[c])
     }
 
     /// What the residual is relative to.
@@ -328,10 +418,15 @@ impl LawGauge {
                 let left = T::DOUBT * value(length(&x) + length(&modified)) + (1.0 + mu) * of_u;
                 doubts += left * left;
                 let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] / unit));
-                // With much friction K* is nearly the whole space, and far from it is near: every solution has u_N ≥ 0.
-                let sinking = (-value(uc[0] * per)).max(0.0);
+                // Terms far beyond what q makes of them are impulses that run away along the kernel of W.
+                let terms = match self.reachable.get(c) {
+                    Some(&most) if most > 0.0 => terms.min(most / unit),
+                    _ => terms,
+                };
+                let strength = self.own_w(c);
+                let apart = apart(&rc.map(|r| strength * r / unit), &uc.map(|u| value(u * per)), mu);
                 // Below the range of double precision there are no digits to be right.
-                let error = value(length(&residual)).max(sinking) + left;
+                let error = value(length(&residual)).max(apart) + left;
                 let of_own = over(error, terms.max(LEAST));
                 let idle = self.loaded.get(c) == Some(&false);
                 if !idle && (of_own > own || of_own.is_nan()) {
