@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::proof::{Exact, FEW, exact, exactly_near};
 use super::rows::Rows;
 use super::{Judged, Measure, Verdict};
 use crate::linalg::{Matrix, norm};
@@ -499,7 +500,8 @@ impl LinearGauge {
             }
         }
         let measure = Measure { floor: precisely.then(|| self.floor()), ..sum.measure() };
-        if visible { measure } else { Measure { relative: NEVER, ..measure } }
+        let measure = if visible { measure } else { Measure { relative: NEVER, ..measure } };
+        rounding(measure, || is_rounded(&data, &point.z))
     }
 
     /// The pair of row i at the point last measured, if it is no equality.
@@ -548,6 +550,76 @@ impl LinearGauge {
             .map(|i| gauge.pair(&data, point, i).ok_or_else(|| share(gauge.w[i], gauge.scales[i])));
         Ok(verdict(measure, rows, gauge.w.clone(), tolerance))
     }
+}
+
+/// The measure of a point whose errors may be those of its rounding alone: where that is so, they count as one bit.
+fn rounding(measure: Measure, is_rounded: impl FnOnce() -> bool) -> Measure {
+    /// Beyond so many floors nothing is explained by rounding.
+    const REACH: f64 = 100.0;
+    let bit = f64::EPSILON;
+    match measure.floor {
+        Some(floor) if measure.relative > 1e-14 && measure.relative <= REACH * floor => {}
+        _ => return measure,
+    }
+    if !is_rounded() {
+        return measure;
+    }
+    let least = |x: f64| x.min(bit);
+    Measure {
+        relative: bit,
+        primal: least(measure.primal),
+        dual: least(measure.dual),
+        worst: least(measure.worst),
+        ..measure
+    }
+}
+
+/// Whether z is an exact solution, rounded: with what is on a bound there, the equations of the others have a solution within its last bits, and all
+/// signs are right there, in exact arithmetic. Of few variables only.
+fn is_rounded(data: &Data, z: &[f64]) -> bool {
+    if z.len() > FEW || data.q.len() > FEW {
+        return false;
+    }
+    let mut rows = vec![vec![]; data.q.len()];
+    if !data.matrix.for_each(|i, j, x| rows[i].push((j, x))) {
+        return false;
+    }
+    let mut movable = vec![true; z.len()];
+    for (j, movable) in movable.iter_mut().enumerate() {
+        let (l, u) = data.column_bounds(j);
+        *movable = l < z[j] && z[j] < u;
+        if z[j] < l || z[j] > u {
+            return false;
+        }
+    }
+    let is_zero = |i: usize| data.variable(i).is_none_or(|j| movable[j]);
+    let equations = (0..rows.len()).filter(|&i| is_zero(i)).map(|i| (rows[i].clone(), data.q[i]));
+    let Some(x) = exactly_near(equations.collect(), z, &movable) else { return false };
+    rows.iter().enumerate().filter(|(i, _)| !is_zero(*i)).all(|(i, row)| {
+        let terms = row.iter().map(|&(j, a)| exact(a) * &x[j]);
+        let w = terms.fold(exact(data.q[i]), |sum, term| sum + term);
+        let (l, u) = data.bounds(i);
+        let at = data.variable(i).map_or(0.0, |j| z[j]);
+        (at == l || w <= Exact::ZERO) && (at == u || w >= Exact::ZERO)
+    })
+}
+
+/// The same of a horizontal problem.
+fn is_rounded_pair(problem: &Hlcp, HlcpPoint { x, s }: &HlcpPoint) -> bool {
+    let n = x.len();
+    let mut rows = vec![vec![]; n];
+    let known = 2 * n <= FEW
+        && problem.Q.for_each(|i, j, a| rows[i].push((j, a)))
+        && problem.R.for_each(|i, j, a| rows[i].push((n + j, a)));
+    let complementary = x.iter().zip(s).all(|(x, s)| x.min(*s) == 0.0);
+    if !(known && complementary) {
+        return false;
+    }
+    let values = [&x[..], s].concat();
+    let movable: Vec<bool> = values.iter().map(|x| *x > 0.0).collect();
+    let equations = rows.into_iter().zip(&problem.q).map(|(row, q)| (row, -q));
+    // Within the last bit of a positive number all are positive.
+    exactly_near(equations.collect(), &values, &movable).is_some()
 }
 
 /// The largest error that a change of all variables by half their last bit makes.
@@ -638,7 +710,8 @@ impl HlcpGauge {
             sum.pair(n + i, &Pair { w: d * pair.w, ..pair }, self.c[i]);
         }
         let measure = Measure { floor: precisely.then(|| self.floor()), ..sum.measure() };
-        if visible { measure } else { Measure { relative: NEVER, ..measure } }
+        let measure = if visible { measure } else { Measure { relative: NEVER, ..measure } };
+        rounding(measure, || is_rounded_pair(problem, point))
     }
 
     fn floor(&self) -> f64 {

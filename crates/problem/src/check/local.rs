@@ -424,7 +424,8 @@ impl LawGauge {
                     _ => terms,
                 };
                 let strength = self.own_w(c);
-                let apart = apart(&rc.map(|r| strength * r / unit), &uc.map(|u| value(u * per)), mu);
+                let apart =
+                    apart(&rc.map(|r| strength * r / unit), &uc.map(|u| value(u * per)), mu);
                 // Below the range of double precision there are no digits to be right.
                 let error = value(length(&residual)).max(apart) + left;
                 let of_own = over(error, terms.max(LEAST));

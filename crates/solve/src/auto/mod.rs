@@ -81,6 +81,9 @@ const NEAR: f64 = 1e-4;
 const SWEEP_ABOVE: f64 = 1e-9;
 /// Sweeps that raise the error by more than this factor are taken back.
 const TAKE_BACK: f64 = 5.0;
+/// Problems of so few unknowns are enumerated after so many Newton iterations: milliseconds, and a last word.
+const TINY: usize = 24;
+const EARLY: usize = 20;
 /// An investigation of existence may take this long, in seconds.
 const INVESTIGATION: f64 = 2.0;
 
@@ -100,6 +103,8 @@ pub struct HybridWork<P: Linearised<D>, const D: usize> {
     before: Vec<f64>,
     best: Vec<f64>,
     existence: Option<Existence>,
+    /// Enumeration was tried.
+    asked: bool,
     /// The interior point was left out.
     passed_by: bool,
     done: Done,
@@ -158,6 +163,7 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
             before: vec![],
             best: vec![],
             existence: None,
+            asked: false,
             passed_by: false,
             done: Done::default(),
             state,
@@ -184,7 +190,7 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
         work.done.start = self.choose_start(problem, P::impulses(point), work);
         problem.enter(&mut work.state, point);
         work.stage = FIRST;
-        work.existence = None;
+        (work.existence, work.asked) = (None, false);
         work.passed_by = false;
     }
 
@@ -441,6 +447,15 @@ impl<const D: usize> Hybrid<D> {
         if controller.is_stuck() {
             return self.other_strategy(problem, point, work);
         }
+        if !work.asked && work.done.newton >= EARLY && problem.unknowns() <= TINY {
+            work.asked = true;
+            if let Some(existence) = existence::enumerated(problem)
+                && let Some(step) = self.decided(problem, point, work, &existence)
+            {
+                work.existence = Some(existence);
+                return step;
+            }
+        }
         problem.enter(&mut work.state, point);
         if error > SWEEP_ABOVE {
             let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
@@ -488,6 +503,29 @@ impl<const D: usize> Hybrid<D> {
         Step::Continue { estimate: error }
     }
 
+    /// What follows from what is known of the existence of a solution, if something does.
+    fn decided<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        existence: &Existence,
+    ) -> Option<Step> {
+        match existence {
+            Existence::NoSolution { proof } => Some(Step::NoSolution(proof.certificate().clone())),
+            // An exact solution, found on the way: the judge has the last word on its rounding.
+            Existence::Solved { coefficients } => {
+                let x = problem.cones()?.unknowns_at(&coefficients.0);
+                P::copy_point(&problem.assembled(&x), point);
+                problem.enter(&mut work.state, point);
+                work.best.copy_from_slice(P::impulses(point));
+                self.subproblem_here(problem, point, work);
+                Some(Step::Continue { estimate: 0.0 })
+            }
+            _ => None,
+        }
+    }
+
     /// Stage 5. The first time it is asked whether there is a solution at all.
     fn other_strategy<P: Linearised<D> + Kinematic<D>>(
         &self,
@@ -496,30 +534,21 @@ impl<const D: usize> Hybrid<D> {
         work: &mut HybridWork<P, D>,
     ) -> Step {
         let limits = Limits { time_limit: Some(INVESTIGATION), ..Limits::default() };
-        let existence =
-            work.existence.get_or_insert_with(|| existence::decide::<P, D>(problem, &limits));
-        match existence {
-            Existence::NoSolution { proof } => {
-                return Step::NoSolution(proof.certificate().clone());
-            }
-            // An exact solution, found on the way: the judge has the last word on its rounding.
-            Existence::Solved { coefficients } if work.done.strategies == 0 => {
-                let Some(system) = problem.cones() else {
-                    return Step::Stuck("auto has lost its place".into());
-                };
-                let x = system.unknowns_at(&coefficients.0);
-                P::copy_point(&problem.assembled(&x), point);
-                problem.enter(&mut work.state, point);
-                work.best.copy_from_slice(P::impulses(point));
+        let existence = work
+            .existence
+            .get_or_insert_with(|| existence::decide::<P, D>(problem, &limits))
+            .clone();
+        if work.done.strategies == 0 && !work.asked {
+            if let Some(step) = self.decided(problem, point, work, &existence) {
                 work.done.strategies += 1;
-                self.subproblem_here(problem, point, work);
-                return Step::Continue { estimate: 0.0 };
+                return step;
             }
-            _ => {}
+        } else if let Existence::NoSolution { proof } = existence {
+            return Step::NoSolution(proof.certificate().clone());
         }
         work.done.strategies += 1;
         if self.0.strategies > 0 && work.controller.strategies() >= self.0.strategies {
-            if let Existence::NearlyNoSolution { certificate, .. } = existence {
+            if let Some(Existence::NearlyNoSolution { certificate, .. }) = &work.existence {
                 return Step::NoSolution(certificate.clone());
             }
             let why = format!(

@@ -104,6 +104,13 @@ pub fn decide<P: Blockwise<D> + Kinematic<D>, const D: usize>(
     }
 }
 
+/// What exact enumeration of the cases says of a small problem, if anything.
+pub(crate) fn enumerated<P: Kinematic<D>, const D: usize>(problem: &P) -> Option<Existence> {
+    let limits = Limits::default();
+    let clock = Clock { start: Instant::now(), limits: &limits };
+    by_cases(problem, &problem.kinematics(), &clock)
+}
+
 fn is_decided(existence: &Existence) -> bool {
     existence.is_proved() || matches!(existence, Existence::NoSolution { .. })
 }

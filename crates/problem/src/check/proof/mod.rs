@@ -8,6 +8,7 @@ mod cones;
 mod evidence;
 mod exact;
 mod monotone;
+mod rounding;
 mod statement;
 
 pub use cones::{Column, ConeSystem, NEAR};
@@ -18,4 +19,5 @@ pub use monotone::Monotone;
 pub(crate) use evidence::weigh;
 pub(crate) use exact::{Equation, exact, negative, satisfying};
 pub(crate) use monotone::monotone;
+pub(crate) use rounding::{FEW, exactly_near};
 pub(crate) use statement::Exactly;
