@@ -279,11 +279,10 @@ pub(super) fn worst(shares: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
     })
 }
 
-/// How far a contact with `x = w r` is from each part of the law by itself: `u_N ≥ 0`, `r ∈ K`, `u_N > 0` only where r = 0, and `x_T = −mu x_N u_T/‖u_T‖` where
-/// `u_T ≠ 0`. All of that is the same as `K* ∋ ũ ⟂ r ∈ K`, but with much friction K* is nearly the whole space and K nearly a half space, where far from the law is near in the
+/// How far a contact with `x = w r` is from each part of the law by itself: `r ∈ K`, `u_N > 0` only where r = 0, and `x_T = −mu x_N u_T/‖u_T‖` where
+/// `u_T ≠ 0`. With `u_N ≥ 0` all of that is the same as `K* ∋ ũ ⟂ r ∈ K`, but with much friction K* is nearly the whole space and K nearly a half space, where far from the law is near in the
 /// distance to cones.
 fn apart<const D: usize>(x: &[f64; D], u: &[f64; D], mu: f64) -> f64 {
-    let sinking = (-u[0]).max(0.0);
     let pressed = u[0].max(0.0).min(norm(x));
     let sliding = small::tangential_norm(u);
     let across = if sliding > 0.0 {
@@ -292,7 +291,7 @@ fn apart<const D: usize>(x: &[f64; D], u: &[f64; D], mu: f64) -> f64 {
         0.0
     };
     let pulling = (-x[0]).max(small::tangential_norm(x) - mu * x[0].max(0.0)).max(0.0);
-    sinking.max(pressed).max(sliding.min(across)).max(pulling)
+    pressed.max(sliding.min(across)).max(pulling)
 }
 
 /// The largest modulus in a block.
@@ -419,16 +418,19 @@ impl LawGauge {
                 doubts += left * left;
                 let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] / unit));
                 // Terms far beyond what q makes of them are impulses that run away along the kernel of W.
-                let terms = match self.reachable.get(c) {
+                let reached = |terms: f64| match self.reachable.get(c) {
                     Some(&most) if most > 0.0 => terms.min(most / unit),
                     _ => terms,
                 };
+                let (terms, normal) = (reached(terms), reached(sizes[D * c] / unit));
                 let strength = self.own_w(c);
                 let apart =
                     apart(&rc.map(|r| strength * r / unit), &uc.map(|u| value(u * per)), mu);
                 // Below the range of double precision there are no digits to be right.
                 let error = value(length(&residual)).max(apart) + left;
-                let of_own = over(error, terms.max(LEAST));
+                // No sliding, however fast, excuses a velocity into the obstacle.
+                let sinking = over((-value(uc[0] * per)).max(0.0), normal.max(LEAST));
+                let of_own = over(error, terms.max(LEAST)).max(sinking);
                 let idle = self.loaded.get(c) == Some(&false);
                 if !idle && (of_own > own || of_own.is_nan()) {
                     (own_contact, own) = (c, of_own);

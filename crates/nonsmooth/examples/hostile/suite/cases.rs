@@ -645,6 +645,8 @@ fn global_data<const D: usize>(draft: &mut Draft, nc: usize) -> (Global, Truth) 
         let tiny = 2.0_f64.powi(draft.rng.int(10, 40));
         let i = draft.rng.below(n);
         m[i][i] *= tiny;
+        // The velocities of the heavy one are numbers of that size.
+        draft.fine = draft.fine.min(1.0 / tiny);
         draft.exact = false;
     }
     let mut truth = Truth::Unknown;

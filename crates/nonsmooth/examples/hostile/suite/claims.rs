@@ -306,7 +306,11 @@ fn refuted<P: Made>(
     // A residual is relative to the whole problem, whose numbers are up to a hundred times those that were changed.
     let fine = case.fine < 100.0 * tolerance;
     match case.truth {
-        Truth::Unsolvable if fine && !residual => Some(("near", why())),
+        Truth::Unsolvable
+            if fine && (!residual || case.problem.error_as_given(point) <= tolerance) =>
+        {
+            Some(("near", why()))
+        }
         Truth::Unsolvable => Some(("solved none", why())),
         _ if residual && fine && case.problem.error_as_given(point) <= tolerance => {
             Some(("near", why()))
