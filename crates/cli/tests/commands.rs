@@ -57,7 +57,7 @@ fn an_unsolved_problem_exits_with_1_and_says_what_to_try() {
     let text = folder.run(stuck).exits(1).stdout;
     assert!(
         (text.contains("no progress since iteration ")
-            || text.contains("the rounding of the impulses"))
+            || text.contains("the rounding of the unknowns"))
             && text.contains("--solver auto, or --solver nsgs"),
         "{text}"
     );

@@ -114,7 +114,7 @@ fn heavy_on_light_is_solved_or_ends_at_the_floor_soon() {
         match outcome.status {
             Status::Solved => {}
             Status::Stalled(why) => {
-                assert!(why.contains("the rounding of the impulses"), "{levels} {ratio}: {why}");
+                assert!(why.contains("the rounding of the unknowns"), "{levels} {ratio}: {why}");
                 assert!(floor > 1e-12, "{levels} {ratio}: {floor:e}");
             }
             other => panic!("{levels} {ratio}: {other}"),

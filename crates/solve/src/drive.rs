@@ -566,12 +566,8 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         let tolerance = self.limits.tolerance;
         // A point near the floor may still meet a tolerance little below it by chance.
         let (near, below) = if work < LATE * IDLE { (AT_FLOOR, 4.0) } else { (NEAR_FLOOR, 1.0) };
-        (floor > below * tolerance && measure.merit() <= near * floor).then(|| {
-            let why = format!(
-                "the rounding of the impulses to double precision alone makes a residual of {floor:.0e}"
-            );
-            Status::Stalled(why.into())
-        })
+        (floor > below * tolerance && measure.merit() <= near * floor)
+            .then(|| Status::Stalled(floor_of(floor).into()))
     }
 
     /// What a solver's last word comes to if the judge does not accept its point.
@@ -591,6 +587,20 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
             }
         }
     }
+}
+
+/// What is said of a floor, by its decade: without allocation, so that a solve that ends there costs none.
+fn floor_of(floor: f64) -> &'static str {
+    macro_rules! texts {
+        ($($decade:literal)*) => {
+            [$(concat!(
+                "the rounding of the unknowns to double precision alone makes a residual of about 1e-",
+                $decade
+            )),*]
+        };
+    }
+    const TEXTS: [&str; 18] = texts!(0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17);
+    TEXTS[(-floor.log10()).round().clamp(0.0, 17.0) as usize]
 }
 
 /// A solve that has not halved its merit in so many steps is asked whether it is at the floor; a factorisation counts as three steps more.

@@ -132,7 +132,8 @@ fn certificates_are_verified() {
     let ray = |a: f64, b: f64| Impulses { r: vec![a, 0.0, 0.0, b, 0.0, 0.0], lambda: vec![] };
     let (outcome, _) =
         run(&problem, &Limits::default(), |_, _| Step::NoSolution(ray(1.0, 1.0).into()));
-    assert_eq!(outcome.status, Status::Infeasible(ray(1.0, 1.0).into()));
+    assert!(matches!(outcome.status, Status::Infeasible(_)), "{}", outcome.status);
+    assert_eq!(outcome.status.certificate(), Some(&ray(1.0, 1.0).into()));
     let (outcome, _) =
         run(&problem, &Limits::default(), |_, _| Step::NoSolution(ray(1.0, 2.0).into()));
     assert_eq!(outcome.status, Status::NoConclusion(ray(1.0, 2.0).into()));

@@ -93,7 +93,7 @@ fn no_method_is_wrong_on_any_example() {
                 }
                 Status::Infeasible(certificate) => {
                     assert_eq!(example.known, Known::Nothing, "{name} {}", example.name);
-                    assert!(example.problem.verify(certificate));
+                    assert!(example.problem.verify(certificate.certificate()));
                 }
                 Status::Stalled(_) => assert!(solved.account.len() < 3),
                 other => panic!("{name} {}: {other}", example.name),
@@ -279,10 +279,10 @@ fn enumeration_proves_that_there_is_no_solution() {
         let Status::Infeasible(certificate) = &solved.outcome.status else {
             panic!("{}: {}", example.name, solved.outcome.status);
         };
-        assert!(example.problem.verify(certificate));
+        assert!(example.problem.verify(certificate.certificate()));
         // The same vectors say nothing of the problem with another right-hand side.
         let other = Lcp::new(example.problem.M.clone(), vec![1.0; example.problem.dim()]).unwrap();
-        assert!(!other.verify(certificate));
+        assert!(!other.verify(certificate.certificate()));
     }
 }
 
@@ -908,7 +908,10 @@ fn try_all<P: Registered + Problem<Point = LcpPoint>>(
                 println!("{file:36} {name:15} {:5} {}", solved.pivots, solved.outcome.status);
                 match solved.outcome.status {
                     Status::Solved => solved_by.push(name),
-                    Status::Infeasible(proof) => assert!(problem.verify(&proof)),
+                    Status::Infeasible(proof) => assert!(problem.verify(proof.certificate())),
+                    Status::NearlyInfeasible { certificate, .. } => {
+                        assert!(problem.evidence(&certificate).holds());
+                    }
                     Status::Stalled(_) | Status::NoConclusion(_) => {}
                     Status::Limit(limit) => panic!("{file} {name}: {limit:?}"),
                 }

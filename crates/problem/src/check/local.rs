@@ -417,12 +417,7 @@ impl LawGauge {
                 let left = T::DOUBT * value(length(&x) + length(&modified)) + (1.0 + mu) * of_u;
                 doubts += left * left;
                 let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] / unit));
-                // Terms far beyond what q makes of them are impulses that run away along the kernel of W.
-                let reached = |terms: f64| match self.reachable.get(c) {
-                    Some(&most) if most > 0.0 => terms.min(most / unit),
-                    _ => terms,
-                };
-                let (terms, normal) = (reached(terms), reached(sizes[D * c] / unit));
+                let normal = sizes[D * c] / unit;
                 let strength = self.own_w(c);
                 let apart =
                     apart(&rc.map(|r| strength * r / unit), &uc.map(|u| value(u * per)), mu);

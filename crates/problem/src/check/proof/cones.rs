@@ -145,6 +145,28 @@ impl ConeSystem {
         y.iter().enumerate().all(|(i, y)| y.is_zero() || self.wants(i))
     }
 
+    /// The vectors without the entries whose terms are at most `noise` of the largest of theirs.
+    pub(crate) fn without(&self, vectors: &[Vec<Exact>], noise: f64) -> Vec<Vec<Exact>> {
+        if noise == 0.0 {
+            return vectors.to_vec();
+        }
+        let mut rows = vec![0.0_f64; self.rhs.len()];
+        for (i, x) in self.columns.iter().filter(|c| c.len() > 1).flatten() {
+            rows[*i] = rows[*i].max(rounded(x).abs());
+        }
+        let row = |i: usize| if rows[i] > 0.0 { rows[i] } else { 1.0 };
+        let pruned = |y: &Vec<Exact>| {
+            let size = |i: usize| rounded(&y[i]).abs() * row(i);
+            let largest = (0..y.len()).fold(0.0_f64, |l, i| l.max(size(i)));
+            let kept = |i: usize| size(i) > noise * largest;
+            let mut out: Vec<Exact> =
+                (0..y.len()).map(|i| if kept(i) { y[i].clone() } else { Exact::ZERO }).collect();
+            self.complete(&mut out);
+            out
+        };
+        vectors.iter().map(pruned).collect()
+    }
+
     /// The vectors, exact, changed by no more than rounding so that they separate what they nearly separate; each as it is where that fails.
     ///
     /// What is nearly zero is made zero by elimination within the vector's support.
