@@ -203,6 +203,9 @@ impl GlobalGauge {
         rows.add_transposed(&problem.H, &low[..n]);
         q.iter_mut().zip(rows.values()).for_each(|(q, x)| *q = x);
         law.norm_q = norm(q);
+        if law.strength.iter().all(|s| *s > 0.0) {
+            return;
+        }
         // Velocities of bodies carry the loads from contact to contact.
         let LawGauge { reachable: most, scratch: [loads, units], impulses, .. } = law;
         loads.clear();

@@ -51,10 +51,16 @@ impl LocalGauge {
         self.rows.start_at_zero(m.max(problem.multipliers()));
     }
 
-    /// What q and s make of each contact and constraint, through `[W, V; Vᵀ, R]` by contacts.
+    /// The largest moduli of the diagonal blocks; where one is empty, what q and s make of each contact and constraint, through `[W, V; Vᵀ, R]` by contacts.
     fn mark_reachable<const D: usize>(&mut self, problem: &FrictionLocal<D>) {
         let nc = problem.contacts();
-        let LawGauge { reachable: most, scratch: [loads, units], impulses, .. } = &mut self.law;
+        let LawGauge { reachable: most, scratch: [loads, units], impulses, strength, .. } =
+            &mut self.law;
+        strength.clear();
+        strength.extend((0..nc).map(|c| largest(&problem.W.diagonal_block(c))));
+        if strength.iter().all(|s| *s > 0.0) {
+            return;
+        }
         loads.clear();
         loads.extend(problem.q.chunks(D).map(norm));
         loads.extend(problem.bilateral.iter().flat_map(|b| b.s.iter().map(|s| s.abs())));
@@ -76,9 +82,6 @@ impl LocalGauge {
         reachable(loads, loads.len(), entries, units, most);
         impulses.clear();
         impulses.extend_from_slice(&units[..nc]);
-        let strength = &mut self.law.strength;
-        strength.clear();
-        strength.extend((0..nc).map(|c| largest(&problem.W.diagonal_block(c))));
     }
 
     /// Which contacts have a load or are coupled, however far, to one that has; those that bilateral constraints touch count.
