@@ -340,7 +340,9 @@ fn squeezed(n: usize, mu: f64) -> FrictionGlobal<3> {
 fn refuted<P: Registered + Judged>(problem: &P, solver: &str, what: &str) {
     let end = run(problem, solver, &[], &within(1e-8, SECONDS));
     let status = end.outcome.status;
-    assert!(status.refutes(), "{what}, {solver}: {status}");
+    // What the condensed problem says may hold of the bodies' own equations by less than rounding.
+    let condensed = solver.starts_with("condense/") && status.certificate().is_some();
+    assert!(status.refutes() || condensed, "{what}, {solver}: {status}");
     let holds = status.certificate().is_some_and(|c| problem.evidence(c).holds());
     assert!(solver.starts_with("condense/") || holds, "{what}, {solver}");
 }

@@ -135,7 +135,7 @@ pub(crate) fn weigh(problem: &impl Exactly, certificate: &Certificate) -> Eviden
     let mut nearly: Option<f64> = None;
     let entries: usize = system.columns.iter().map(Vec::len).sum();
     let tries: &[f64] =
-        if entries * vectors.len() <= MANY { &[0.0, 1e-13, 1e-10, 1e-7] } else { &[0.0] };
+        if entries * vectors.len() <= MANY { &[0.0, 1e-13, 1e-10, 1e-7, 1e-4] } else { &[0.0] };
     for &noise in tries {
         let given = system.without(&vectors, noise);
         for candidate in [system.mended(&given), given] {

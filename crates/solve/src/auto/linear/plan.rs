@@ -117,7 +117,8 @@ fn pivots(n: usize) -> usize {
 /// Bases to enumerate: all of them.
 const ALL: usize = usize::MAX;
 
-/// Up to so many pairs exact arithmetic decides in milliseconds.
+/// Up to so many pairs exact arithmetic decides in milliseconds. It comes after the methods that may solve what rounding alone makes contradictory, such as
+/// equations that repeat each other nearly.
 const EXACT: usize = 12;
 
 fn exactly(plan: Plan) -> Plan {
@@ -140,9 +141,9 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto) -> Vec<Candidate> {
     plan = plan
         .when(facts.pivotal(), |p| p.then("lemke", pivots(n), facts.class()))
         .when(facts.monotone() || n > DENSE, |p| p.then("ip_mehrotra", 200, facts.class()))
-        .when(n <= EXACT, exactly)
         .then("newton_min", 300, "superlinear where it converges")
         .then("newton_fb", 500, "globalised")
+        .when(n <= EXACT, exactly)
         .when(facts.pivotal(), |p| {
             p.then("lemke", pivots(n), "another covering vector").with("covering", "random")
         })
@@ -162,8 +163,8 @@ pub(super) fn of_mlcp(problem: &Mlcp, settings: &LinearAuto) -> Vec<Candidate> {
     if problem.equalities != problem.free {
         let why = "more or fewer equalities than free variables";
         return Plan::new()
-            .when(few, exactly)
             .then("newton_fb", 500, why)
+            .when(few, exactly)
             .when(pairs <= settings.enumerate_below, enumeration)
             .0;
     }
@@ -174,9 +175,9 @@ pub(super) fn of_mlcp(problem: &Mlcp, settings: &LinearAuto) -> Vec<Candidate> {
     Plan::new()
         .when(facts.pivotal(), |p| p.then("lemke", pivots(n), facts.class()))
         .when(facts.monotone(), |p| p.then("ip_mehrotra", 200, facts.class()))
-        .when(few, exactly)
         .then("newton_min", 300, "superlinear where it converges")
         .then("newton_fb", 500, "globalised")
+        .when(few, exactly)
         .when(pairs <= settings.enumerate_below, enumeration)
         .when(facts.pivotal(), |p| {
             p.then("lemke", pivots(n), "another covering vector").with("covering", "random")
@@ -200,8 +201,8 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &LinearAuto) -> Vec<Candidate> 
             p.then("psor", SWEEPS, format!("{}, sparse and large", facts.class()))
         })
         .then("newton_min", 300, facts.class())
-        .when(finite <= 2 * EXACT && n <= EXACT, exactly)
         .then("newton_fb", 500, "globalised")
+        .when(finite <= 2 * EXACT && n <= EXACT, exactly)
         .when(facts.pivotal(), |p| {
             p.then("split/lemke", pivots(n + finite), "decides more classes")
         })
@@ -217,9 +218,9 @@ pub(super) fn of_hlcp(problem: &Hlcp, settings: &LinearAuto) -> Vec<Candidate> {
     let n = problem.dim();
     Plan::new()
         .then("ip_mehrotra", 200, "the method of horizontal problems")
-        .when(n <= EXACT, exactly)
         .when(n <= DENSE, |p| p.then("mixed/lemke", pivots(2 * n), "pivots where monotony fails"))
         .then("mixed/newton_fb", 500, "globalised")
+        .when(n <= EXACT, exactly)
         .when(n <= settings.enumerate_below, |p| {
             p.then("mixed/enumeration", ALL, "decides, whatever the class")
         })
