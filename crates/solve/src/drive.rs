@@ -564,6 +564,10 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         let measure = self.judge.certify_best(self.problem);
         let floor = measure.floor.filter(|floor| floor.is_finite())?;
         let tolerance = self.limits.tolerance;
+        // Impulses that are that large may be those of a problem without a solution: a solver that asks has its time.
+        if floor > RUNAWAY && work < LATE * IDLE {
+            return None;
+        }
         // A point near the floor may still meet a tolerance little below it by chance.
         let (near, below) = if work < LATE * IDLE { (AT_FLOOR, 4.0) } else { (NEAR_FLOOR, 1.0) };
         (floor > below * tolerance && measure.merit() <= near * floor)
@@ -605,6 +609,8 @@ fn floor_of(floor: f64) -> &'static str {
 
 /// A solve that has not halved its merit in so many steps is asked whether it is at the floor; a factorisation counts as three steps more.
 const IDLE: u64 = 1200;
+/// A floor above this is one of impulses that run away.
+const RUNAWAY: f64 = 1e-6;
 /// How much later it may be asked the second question, and each later time than the one before.
 const LATE: u64 = 4;
 /// What counts as at the floor, and as near it.
