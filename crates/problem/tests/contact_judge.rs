@@ -117,7 +117,7 @@ fn impulse(random: &mut Pcg64, d: usize, mu: f64, size: i32) -> Vec<f64> {
         0 => vec![0.0; d],
         kind => {
             let t = if kind == 1 { 0.3 * mu * n } else { mu * n };
-            let angle: f64 = random.random_range(0.0..6.28);
+            let angle: f64 = random.random_range(0.0..std::f64::consts::TAU);
             let mut r = vec![n, t * angle.cos(), t * angle.sin()];
             r.truncate(d);
             if d == 2 {
