@@ -8,7 +8,7 @@ pub type Column = Vec<(usize, Exact)>;
 /// `Σ_j t_j A_j = b`, where t_j is free, or nonnegative, or nonnegative and one of a pair of which one is zero.
 ///
 /// Every linear complementarity problem, and every contact problem in the plane or without friction, is of this form exactly; of contact with friction in
-/// space it is a relaxation ([`complete`](Self::complete) is false). It is stated from the stored doubles without rounding
+/// space it is a relaxation (`complete` is false). It is stated from the stored doubles without rounding
 /// ([`crate::Problem::cones`]): products of coefficients, and differences of bounds, are rational numbers.
 #[derive(Debug, Clone, Default)]
 pub struct ConeSystem {
