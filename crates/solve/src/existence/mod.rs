@@ -93,15 +93,13 @@ pub fn decide<P: Blockwise<D> + Kinematic<D>, const D: usize>(
     let kinematics = problem.kinematics();
     let found = approach::approach(problem, &kinematics, THOROUGH, &clock);
     let first = found.map(|found| proved(problem, &kinematics, found));
-    if first.as_ref().is_some_and(is_decided) {
-        return first.unwrap_or_else(|| unknown("nothing was found"));
+    if let Some(decided) = first.as_ref().filter(|found| is_decided(found)) {
+        return decided.clone();
     }
     // What holds up to rounding, or not by the theorem, exact enumeration may decide.
-    match (by_cases(problem, &kinematics, &clock), first) {
-        (Some(decided), _) => decided,
-        (None, Some(found)) => found,
-        (None, None) => by_program(problem, &kinematics, &clock),
-    }
+    by_cases(problem, &kinematics, &clock)
+        .or(first)
+        .unwrap_or_else(|| by_program(problem, &kinematics, &clock))
 }
 
 /// What exact enumeration of the cases says of a small problem, if anything.
