@@ -160,7 +160,8 @@ fn auto_solves_the_examples_or_proves_that_there_is_no_solution() {
         .exits(0);
     let text = folder.run("solve impossible.toml").exits(1).stdout;
     assert!(
-        text.starts_with("impossible.toml: infeasible: ") && text.contains("verified certificate"),
+        text.starts_with("impossible.toml: infeasible: ")
+            && text.contains("proved in exact arithmetic"),
         "{text}"
     );
     let line = first(folder.run("solve impossible.toml --json").exits(1));

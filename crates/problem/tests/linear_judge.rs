@@ -537,5 +537,6 @@ fn certificates_of_mixed_boxed_and_horizontal_problems() {
     let horizontal = |r: f64| Hlcp::new(rows([[1.0]]), rows([[r]]), vec![-1.0]).unwrap();
     assert!(horizontal(1.0).verify(&farkas(&[1.0])) && !horizontal(1.0).verify(&farkas(&[-1.0])));
     assert!(!horizontal(-1.0).verify(&farkas(&[1.0])));
-    assert!(!horizontal(1.0).verify(&Certificate::Row { row: 0 }));
+    let row = Certificate::Row { row: 0 };
+    assert!(horizontal(1.0).verify(&row) && !horizontal(-1.0).verify(&row));
 }

@@ -537,6 +537,13 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
             Status::Limit(_) | Status::Stalled(_) if measure.passes(self.limits.tolerance) => {
                 Status::Solved
             }
+            // A solver that goes on without what memory refused it says what it lacked.
+            Status::Limit(Limit::Iterations) => match self.scope.refused() {
+                Some(refused) => {
+                    Status::Stalled(format!("iteration limit reached; {refused}").into())
+                }
+                None => status,
+            },
             other => other,
         };
         self.judge.meter.outcome(status, measure, iterations)

@@ -246,5 +246,5 @@ fn a_limit_ends_the_investigation() {
     assert_eq!(decide(&p, &limits), Existence::Unknown { why: "the time limit came first".into() });
     let cancel = Some(std::sync::Arc::new(std::sync::atomic::AtomicBool::new(true)));
     let limits = Limits { cancel, ..Limits::default() };
-    assert_eq!(decide(&p, &limits), Existence::Unknown { why: "cancelled".into() });
+    assert_eq!(decide(&p, &limits), Existence::Unknown { why: "it was cancelled".into() });
 }

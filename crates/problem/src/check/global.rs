@@ -1,6 +1,6 @@
 //! The judge of the global problem.
 
-use super::local::{HALF_ULP, LawGauge, ROUNDING, largest, reachable, unit, worst};
+use super::local::{HALF_ULP, LawGauge, ROUNDING, largest, unit, worst};
 use super::rows::{Rows, doubt};
 use super::{Measure, over};
 use crate::linalg::{Csc, Delassus, Doubled, Inverse, Refine, norm, norm_of, small};
@@ -203,26 +203,28 @@ impl GlobalGauge {
         rows.add_transposed(&problem.H, &low[..n]);
         q.iter_mut().zip(rows.values()).for_each(|(q, x)| *q = x);
         law.norm_q = norm(q);
-        if law.strength.iter().all(|s| *s > 0.0) {
-            return;
+        // Velocities of bodies carry the loads from contact to contact. The unit of a velocity is 1/√M_ii, that of a row of Hᵀ or Gᵀ what it makes of
+        // such velocities.
+        let (nc, p) = (problem.contacts(), problem.multipliers());
+        let LawGauge { loads, strength, .. } = law;
+        let of_motion = |i: usize| 1.0 / unit(problem.M.get(i, i));
+        loads.start(nc + p + n);
+        let motion = |i: usize| nc + p + i;
+        for (i, j, _) in problem.H.triplets().filter(|e| e.2 != 0.0) {
+            let c = j / D;
+            loads.couple(c, motion(i), || strength[c].sqrt() / of_motion(i));
         }
-        // Velocities of bodies carry the loads from contact to contact.
-        let LawGauge { reachable: most, scratch: [loads, units], impulses, .. } = law;
-        loads.clear();
-        loads.extend(q.chunks(D).map(norm));
-        loads.extend(problem.bilateral.iter().flat_map(|b| b.b.iter().map(|b| b.abs())));
-        let nc = problem.contacts();
-        let entries = |call: &mut dyn FnMut(usize, usize, f64)| {
-            problem.H.triplets().for_each(|(i, j, x)| call(j / D, i, x.abs()));
-            let constraints = problem.bilateral.iter().flat_map(|b| b.G.triplets());
-            constraints.for_each(|(i, j, x)| call(nc + j, i, x.abs()));
-        };
-        reachable(loads, n, entries, units, most);
-        impulses.clear();
-        impulses.resize(nc, 0.0);
-        for (i, j, x) in problem.H.triplets().filter(|e| e.2 != 0.0) {
-            impulses[j / D] = impulses[j / D].max((problem.f[i] / x).abs());
+        for (i, j, x) in problem.bilateral.iter().flat_map(|b| b.G.triplets()) {
+            if x != 0.0 {
+                loads.couple(nc + j, motion(i), || x.abs());
+            }
         }
+        for (i, j, _) in problem.M.triplets().filter(|e| e.2 != 0.0) {
+            loads.couple(motion(i), motion(j), || of_motion(i) / of_motion(j));
+        }
+        let constraints = problem.bilateral.iter().flat_map(|b| b.b.iter().map(|b| b.abs()));
+        let forces = problem.f.iter().enumerate().map(|(i, f)| f.abs() * of_motion(i).powi(2));
+        loads.spread(q.chunks(D).map(norm).chain(constraints).chain(forces));
     }
 
     pub(crate) fn measure<const D: usize>(

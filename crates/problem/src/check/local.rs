@@ -1,6 +1,7 @@
 //! The judge of the local problem.
 
 use super::contact::{distance_to_cone, length, modified_velocity, natural_map, nearest_in_cone};
+use super::loads::Loads;
 use super::rows::{Rows, doubt};
 use super::{Measure, over};
 use crate::linalg::{Csc, Doubled, Real, norm, norm_of, power_of_two, small};
@@ -37,8 +38,7 @@ impl LocalGauge {
         let contacts = problem.contacts();
         let diagonal = (0..contacts).map(|c| small::mean_diagonal(&problem.W.diagonal_block(c)));
         self.law.refill(diagonal, norm(&problem.q));
-        self.mark_loaded(problem);
-        self.mark_reachable(problem);
+        self.mark_loads(problem);
         let blocks = (0..contacts).map(|c| problem.W.row(c).0.len()).max().unwrap_or(0);
         self.terms = 1 + D * blocks + problem.multipliers();
         let m = problem.q.len();
@@ -51,61 +51,56 @@ impl LocalGauge {
         self.rows.start_at_zero(m.max(problem.multipliers()));
     }
 
-    /// The largest moduli of the diagonal blocks; where one is empty, what q and s make of each contact and constraint, through `[W, V; Vᵀ, R]` by contacts.
-    fn mark_reachable<const D: usize>(&mut self, problem: &FrictionLocal<D>) {
+    /// What stands for `w_c` of each contact by itself, and the loads that reach it through `[W, V; Vᵀ, R]`.
+    fn mark_loads<const D: usize>(&mut self, problem: &FrictionLocal<D>) {
         let nc = problem.contacts();
-        let LawGauge { reachable: most, scratch: [loads, units], impulses, strength, .. } =
-            &mut self.law;
+        let LawGauge { strength, loads, .. } = &mut self.law;
+        let entry = |i: usize, j: usize| problem.W.get(i, j).map_or(0.0, largest);
         strength.clear();
-        strength.extend((0..nc).map(|c| largest(&problem.W.diagonal_block(c))));
-        if strength.iter().all(|s| *s > 0.0) {
-            return;
+        strength.extend((0..nc).map(|c| entry(c, c)));
+        if let Some(b) = &problem.bilateral {
+            strength.extend((0..b.s.len()).map(|j| b.R.get(j, j).abs()));
         }
-        loads.clear();
-        loads.extend(problem.q.chunks(D).map(norm));
-        loads.extend(problem.bilateral.iter().flat_map(|b| b.s.iter().map(|s| s.abs())));
-        let entries = |call: &mut dyn FnMut(usize, usize, f64)| {
-            for i in 0..nc {
-                let (cols, blocks) = problem.W.row(i);
-                for (&j, block) in cols.iter().zip(blocks) {
-                    call(i, j as usize, largest(block));
-                }
-            }
-            if let Some(b) = &problem.bilateral {
-                for (i, j, x) in b.V.triplets() {
-                    call(i / D, nc + j, x.abs());
-                    call(nc + j, i / D, x.abs());
-                }
-                b.R.triplets().for_each(|(i, j, x)| call(nc + i, nc + j, x.abs()));
+        // Of an empty block what an impulse does through a neighbour; of a free multiplier likewise.
+        let through = |i: usize, j: usize, product: f64, strength: &mut [f64]| {
+            if strength[i] == 0.0 && strength[j] > 0.0 {
+                strength[i] = product / strength[j];
             }
         };
-        reachable(loads, loads.len(), entries, units, most);
-        impulses.clear();
-        impulses.extend_from_slice(&units[..nc]);
-    }
-
-    /// Which contacts have a load or are coupled, however far, to one that has; those that bilateral constraints touch count.
-    fn mark_loaded<const D: usize>(&mut self, problem: &FrictionLocal<D>) {
-        let loaded = &mut self.law.loaded;
-        loaded.clear();
-        loaded.extend(problem.q.chunks(D).map(|q| q.iter().any(|q| *q != 0.0)));
-        if let Some(b) = &problem.bilateral {
-            let touched = (0..b.s.len()).flat_map(|j| b.V.column(j).0);
-            touched.for_each(|&i| loaded[i / D] = true);
-        }
-        let mut spreads = loaded.contains(&false);
-        while spreads {
-            spreads = false;
-            for i in 0..loaded.len() {
-                let (cols, blocks) = problem.W.row(i);
-                for (&j, block) in cols.iter().zip(blocks) {
-                    let j = j as usize;
-                    if loaded[i] != loaded[j] && *block != [[0.0; D]; D] {
-                        (loaded[i], loaded[j], spreads) = (true, true, true);
-                    }
-                }
+        for i in (0..nc).filter(|&i| entry(i, i) == 0.0) {
+            let (cols, blocks) = problem.W.row(i);
+            for (&j, block) in cols.iter().zip(blocks) {
+                through(i, j as usize, largest(block) * entry(j as usize, i), strength);
             }
         }
+        loads.start(strength.len());
+        let ratio = |i: usize, j: usize, strength: &[f64]| (strength[i] / strength[j]).sqrt();
+        if let Some(b) = &problem.bilateral {
+            for (i, j, v) in b.V.triplets() {
+                through(nc + j, i / D, v * v, strength);
+                through(i / D, nc + j, v * v, strength);
+            }
+            for (i, j, _) in b.V.triplets().filter(|e| e.2 != 0.0) {
+                loads.couple(i / D, nc + j, || ratio(i / D, nc + j, strength));
+            }
+            for (i, j, _) in b.R.triplets().filter(|e| e.2 != 0.0) {
+                loads.couple(nc + i, nc + j, || ratio(nc + i, nc + j, strength));
+            }
+        }
+        for i in 0..nc {
+            let (cols, blocks) = problem.W.row(i);
+            for (j, block) in cols.iter().map(|&j| j as usize).zip(blocks) {
+                if i == j || *block == [[0.0; D]; D] {
+                    continue;
+                }
+                loads.couple(i, j, || match entry(j, i) {
+                    0.0 => largest(block) / strength[j],
+                    back => ratio(i, j, strength) * (largest(block) / back).sqrt(),
+                });
+            }
+        }
+        let constraints = problem.bilateral.iter().flat_map(|b| b.s.iter().map(|s| s.abs()));
+        loads.spread(problem.q.chunks(D).map(norm).chain(constraints));
     }
 
     /// The residuals; `precisely` in doubled precision from the data to the last comparison.
@@ -302,41 +297,13 @@ pub(super) fn largest<const D: usize>(block: &[[f64; D]; D]) -> f64 {
     block.iter().flatten().fold(0.0, |l, x| l.max(x.abs()))
 }
 
-/// What the loads make of each row of a matrix: with `ζ_j = max_i |q_i|/|A_ij|`, the unit of column j, `ω_i = max(|q_i|, max_j |A_ij| ζ_j)`; zero where no load
-/// is near. The same in all units of rows and columns. `entries` calls for each entry with its row, its column and its modulus.
-pub(super) fn reachable(
-    loads: &[f64],
-    columns: usize,
-    entries: impl Fn(&mut dyn FnMut(usize, usize, f64)),
-    units: &mut Vec<f64>,
-    most: &mut Vec<f64>,
-) {
-    units.clear();
-    units.resize(columns, 0.0);
-    entries(&mut |i, j, a| {
-        if a > 0.0 {
-            units[j] = units[j].max(loads[i] / a);
-        }
-    });
-    most.clear();
-    most.extend_from_slice(loads);
-    entries(&mut |i, j, a| most[i] = most[i].max(a * units[j]));
-}
-
-/// What the contact law's residual needs of a problem: `w_c` and `‖q‖`, which contacts are not loaded at all (empty: none), and
-/// what the loads make of each contact's velocity.
+/// What the contact law's residual needs of a problem: `w_c` and `‖q‖`, and what stands for both where a contact is measured by itself.
 #[derive(Debug, Clone, Default)]
 pub(super) struct LawGauge {
     pub(super) w: Vec<f64>,
-    loaded: Vec<bool>,
-    /// The largest modulus of W_cc, which is there where the trace is not.
+    /// The largest modulus of W_cc, which is there where the trace is not; zero where nothing is. Others may follow.
     pub(super) strength: Vec<f64>,
-    /// ω, see [`reachable`]; those of bilateral constraints follow.
-    pub(super) reachable: Vec<f64>,
-    /// The loads, and the units of columns, for that. Of contacts those are impulses.
-    pub(super) scratch: [Vec<f64>; 2],
-    /// Of each contact an impulse that the loads make, by its column.
-    pub(super) impulses: Vec<f64>,
+    pub(super) loads: Loads,
     pub(super) norm_q: f64,
 }
 
@@ -360,12 +327,12 @@ impl LawGauge {
         }
     }
 
-    /// What stands for w_c where contact c is measured by itself: the largest modulus of W_cc; of an empty block the velocity that loads
-    /// make of the contact over the impulse that would.
+    /// What stands for w_c where contact c is measured by itself.
     fn own_w(&self, c: usize) -> f64 {
-        let at = |all: &[f64]| all.get(c).copied().filter(|x| *x > 0.0);
-        let unit = || Some(at(&self.reachable)? / at(&self.impulses)?);
-        at(&self.strength).or_else(unit).unwrap_or(self.w[c])
+        match self.strength.get(c) {
+            Some(&strength) if strength > 0.0 => strength,
+            _ => self.w[c],
+        }
     }
 
     /// What the residual is relative to.
@@ -419,8 +386,10 @@ impl LawGauge {
                 let of_u = norm_of((D * c..D * c + D).map(|i| doubt(i) / unit));
                 let left = T::DOUBT * value(length(&x) + length(&modified)) + (1.0 + mu) * of_u;
                 doubts += left * left;
-                let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] / unit));
-                let normal = sizes[D * c] / unit;
+                // Impulses that run away along the kernel of W make terms of any size: no more than the loads excuse.
+                let load = self.loads.reaching(c) / unit;
+                let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] / unit)).min(load);
+                let normal = (sizes[D * c] / unit).min(load);
                 let strength = self.own_w(c);
                 let apart =
                     apart(&rc.map(|r| strength * r / unit), &uc.map(|u| value(u * per)), mu);
@@ -429,8 +398,7 @@ impl LawGauge {
                 // No sliding, however fast, excuses a velocity into the obstacle.
                 let sinking = over((-value(uc[0] * per)).max(0.0), normal.max(LEAST));
                 let of_own = over(error, terms.max(LEAST)).max(sinking);
-                let idle = self.loaded.get(c) == Some(&false);
-                if !idle && (of_own > own || of_own.is_nan()) {
+                if load > 0.0 && (of_own > own || of_own.is_nan()) {
                     (own_contact, own) = (c, of_own);
                 }
             }

@@ -10,6 +10,7 @@ mod existence;
 mod global;
 mod impulses;
 pub(crate) mod linear;
+mod loads;
 mod local;
 mod proof;
 mod rows;

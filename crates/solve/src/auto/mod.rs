@@ -84,6 +84,8 @@ const TAKE_BACK: f64 = 5.0;
 /// Problems of so few unknowns are enumerated after so many Newton iterations: milliseconds, and a last word.
 const TINY: usize = 24;
 const EARLY: usize = 20;
+/// Impulses that make velocities so many times those of the loads run away: it is time to ask for existence.
+const RUNAWAY: f64 = 1e7;
 /// An investigation of existence may take this long, in seconds.
 const INVESTIGATION: f64 = 2.0;
 
@@ -455,6 +457,10 @@ impl<const D: usize> Hybrid<D> {
                 work.existence = Some(existence);
                 return step;
             }
+        }
+        if work.existence.is_none() && work.sweep.largest(P::impulses(point)) > RUNAWAY * work.scale
+        {
+            return self.other_strategy(problem, point, work);
         }
         problem.enter(&mut work.state, point);
         if error > SWEEP_ABOVE {

@@ -115,8 +115,8 @@ fn is_decided(existence: &Existence) -> bool {
 
 /// Problems of so few contacts are decided by exact enumeration of their cases, if they are polyhedral; in space the enumeration may still refute.
 const FEW: usize = 8;
-/// The most cases of an enumeration.
-const CASES: usize = 20_000;
+/// What an enumeration may cost, see [`ExactCones::within`]: about half a second.
+const WORK: u64 = 50_000_000;
 
 /// Decides small problems by [`ExactCones`]: those in the plane or without friction altogether, in space those that even a relaxation of the law refutes.
 fn by_cases<P: Kinematic<D>, const D: usize>(
@@ -124,16 +124,13 @@ fn by_cases<P: Kinematic<D>, const D: usize>(
     kinematics: &Kinematics<D>,
     clock: &Clock,
 ) -> Option<Existence> {
-    if problem.unknowns() > 12 * FEW {
+    if kinematics.mu.len() > FEW || problem.unknowns() > 12 * FEW {
         return None;
     }
-    let system = problem.cones().filter(|s| s.pairs.len() <= FEW * (2 * D - 1))?;
+    let system = problem.cones()?;
     let complete = system.complete;
-    let mut search = ExactCones::new(system);
-    for _ in 0..CASES {
-        if clock.over() {
-            return None;
-        }
+    let mut search = ExactCones::within(WORK, system);
+    while !search.is_cut_short() && !clock.over() {
         match search.advance() {
             None => {}
             Some(ExactlyFound::Solution(t)) => {

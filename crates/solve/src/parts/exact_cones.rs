@@ -11,9 +11,11 @@
 //!
 //! Cost: at most 2ᵐ cases for m pairs; a pivot is rows · columns products of integers of rows · 53 bits at most. Storage: a tableau for each open case.
 
-use dashu_int::ops::{Gcd, UnsignedAbs};
+use dashu_int::ops::{BitTest, Gcd, UnsignedAbs};
+
 use dashu_int::{IBig, UBig};
 use nonsmooth_problem::check::{ConeSystem, Exact, ExactVector};
+use nonsmooth_problem::linalg::budget;
 
 /// How the enumeration ended.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,6 +38,10 @@ pub struct ExactCones {
     vectors: Vec<ExactVector>,
     /// Cases looked at.
     pub cases: usize,
+    /// Products of machine words, about, and how many are allowed.
+    work: u64,
+    allowed: u64,
+    cut: bool,
 }
 
 /// A case: which columns are excluded, and the tableau on which it goes on. Columns: those of A, the rows' units, b.
@@ -45,11 +51,17 @@ struct Case {
     denominator: IBig,
     basis: Vec<usize>,
     excluded: Vec<bool>,
+    work: u64,
 }
 
 impl ExactCones {
-    /// Begins.
+    /// Begins a search of any length.
     pub fn new(system: ConeSystem) -> Self {
+        Self::within(u64::MAX, system)
+    }
+
+    /// Begins a search that ends, see [`is_cut_short`](Self::is_cut_short), when it has cost about so many products of machine words: some 10⁸ of them a second.
+    pub fn within(allowed: u64, system: ConeSystem) -> Self {
         let (m, n) = (system.rhs.len(), system.columns.len());
         let mut a = vec![vec![Exact::ZERO; n + 1]; m];
         for (j, column) in system.columns.iter().enumerate() {
@@ -96,15 +108,35 @@ impl ExactCones {
             denominator: IBig::ONE,
             basis: (n..n + m).collect(),
             excluded: (0..n + m).map(|j| j >= n).collect(),
+            work: 0,
         };
         case.enter_free(&system.free, n);
-        let mut search = Self { system, rho, kappa, beta, open: vec![], vectors: vec![], cases: 0 };
+        let mut search = Self {
+            system,
+            rho,
+            kappa,
+            beta,
+            open: vec![],
+            vectors: vec![],
+            cases: 0,
+            work: 0,
+            allowed,
+            cut: false,
+        };
         search.close_or_open(case);
         search
     }
 
+    /// Whether a limit ended the search, which then finds nothing any more.
+    pub fn is_cut_short(&self) -> bool {
+        self.cut
+    }
+
     /// Looks at one more case; `None` while there are others.
     pub fn advance(&mut self) -> Option<Found> {
+        if self.cut {
+            return None;
+        }
         let Some(case) = self.open.pop() else {
             return Some(Found::Nothing(std::mem::take(&mut self.vectors)));
         };
@@ -125,7 +157,12 @@ impl ExactCones {
     /// Whether a point is left to be looked at.
     fn close_or_open(&mut self, mut case: Case) {
         let free = &self.system.free;
-        case.drive_out(self.system.columns.len(), free);
+        let left = self.allowed.saturating_sub(self.work);
+        self.cut |= !case.drive_out(self.system.columns.len(), free, left);
+        self.work += std::mem::take(&mut case.work);
+        if self.cut {
+            return;
+        }
         match case.closing(self.system.columns.len()) {
             None => self.open.push(case),
             Some(y) => {
@@ -208,6 +245,8 @@ impl Case {
                 *x = if product.is_zero() { product } else { product / &self.denominator };
             }
         }
+        let words = 1 + self.denominator.bit_len().max(pivot.bit_len()) as u64 / 64;
+        self.work += (self.rows.len() * chosen.len()) as u64 * words;
         self.rows[row] = chosen;
         self.basis[row] = column;
         self.denominator = pivot;
@@ -222,15 +261,18 @@ impl Case {
         (0..self.rows.len()).filter(|&i| self.excluded[self.basis[i]]).collect()
     }
 
-    /// Lowers the sum of the excluded columns' values as far as it goes.
-    fn drive_out(&mut self, n: usize, free: &[usize]) {
+    /// Lowers the sum of the excluded columns' values as far as it goes; false where a limit ended that, or it cost more than `allowed`.
+    fn drive_out(&mut self, n: usize, free: &[usize], allowed: u64) -> bool {
         let mut is_free = vec![false; self.excluded.len()];
         free.iter().for_each(|&j| is_free[j] = true);
         let mut pivots = 0;
         loop {
             let rows = self.excluded_rows();
             if rows.iter().all(|&i| self.value(i).is_zero()) {
-                return;
+                return true;
+            }
+            if self.work > allowed || budget::over() {
+                return false;
             }
             let gain = |j: usize| rows.iter().fold(IBig::ZERO, |sum, &i| sum + &self.rows[i][j]);
             let mut entering: Option<(usize, IBig)> = None;
@@ -246,7 +288,7 @@ impl Case {
                     break;
                 }
             }
-            let Some((j, _)) = entering else { return };
+            let Some((j, _)) = entering else { return true };
             // The least ratio; among equals excluded columns leave first, then Bland's rule.
             let mut leaving: Option<usize> = None;
             for i in 0..self.rows.len() {
@@ -263,7 +305,7 @@ impl Case {
                     leaving = Some(i);
                 }
             }
-            let Some(i) = leaving else { return };
+            let Some(i) = leaving else { return true };
             self.pivot(i, j);
             pivots += 1;
         }

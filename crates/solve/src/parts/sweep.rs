@@ -6,7 +6,7 @@
 //! Cost of a sweep: one pass over the blocks of W (or over the rows of H and M⁻¹H) plus nc local solves. Storage: the
 //! diagonal block and the local solver's memo of each contact.
 
-use nonsmooth_problem::linalg::small;
+use nonsmooth_problem::linalg::{norm, small};
 
 use crate::cfun::natural_residual;
 use crate::form::{Blockwise, Contacts};
@@ -76,6 +76,12 @@ impl<const D: usize> Sweep<D> {
             }
         }
         moves
+    }
+
+    /// `max_c w_c‖r_c‖`, a velocity.
+    pub fn largest(&self, r: &[f64]) -> f64 {
+        let of = |(c, contact): (usize, &Visited<D>)| contact.unit * norm(&small::block::<D>(r, c));
+        self.contacts.iter().enumerate().map(of).fold(0.0, f64::max)
     }
 
     /// The natural residual `‖( w_c r_c − P_K(w_c r_c − ũ_c) )_c‖` at r, whose velocities are u.
