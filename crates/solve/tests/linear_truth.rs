@@ -264,7 +264,7 @@ fn a_tolerance_beyond_doubles_is_named_and_not_chased() {
         let mut point = problem.origin();
         let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
         let said = outcome.status.to_string();
-        assert!(said.contains("rounding the unknowns"), "{solver}: {said}");
+        assert!(said.contains("rounding of the unknowns"), "{solver}: {said}");
         assert!(outcome.iterations < 10_000 && outcome.measure.relative < 1e-14, "{outcome:?}");
     }
 }
