@@ -470,7 +470,7 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         self.solver.aim(self.limits.tolerance, self.work);
         self.solver.record(self.limits.trace, self.work);
         self.solver.start(self.problem, point, self.work);
-        self.judge(point, 0);
+        self.judge(point, 0, false);
         let mut estimate = f64::NAN;
         let mut since_judged = 0;
         let mut claim = None;
@@ -484,7 +484,7 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
             if let Some(limit) = self.limit(iterations) {
                 if since_judged > 0 {
                     // A last look: the steps since the last one may have been enough.
-                    self.judge(point, iterations);
+                    self.judge(point, iterations, false);
                     if self.judge.last.passes(self.limits.tolerance) {
                         break Status::Solved;
                     }
@@ -503,7 +503,7 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
             let due = since_judged >= self.solver.check_every()
                 || self.judge.ratio * estimate <= self.limits.tolerance;
             if due || claim.is_some() {
-                self.judge(point, iterations);
+                self.judge(point, iterations, claim.is_some());
                 self.judge.calibrate(estimate);
                 since_judged = 0;
                 if !self.judge.last.merit().is_finite() {
@@ -549,9 +549,11 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         self.judge.meter.outcome(status, measure, iterations)
     }
 
-    fn judge(&mut self, point: &mut P::Point, iteration: usize) {
+    /// `closely`: a solver's last word is looked at in doubled precision, even if it seems no solution.
+    fn judge(&mut self, point: &mut P::Point, iteration: usize, closely: bool) {
         self.solver.publish(self.problem, point, self.work);
-        let better = self.judge.judge(self.problem, point, iteration, self.limits.tolerance);
+        let tolerance = self.limits.tolerance;
+        let better = self.judge.judge(self.problem, point, iteration, tolerance, closely);
         if better && self.observer.keeps_best() {
             self.observer.best(self.judge.best, &self.judge.best_measure);
         }
@@ -701,7 +703,14 @@ impl<'a, P: Problem> Judge<'a, P> {
     }
 
     /// Whether the point is now the best.
-    fn judge(&mut self, problem: &P, point: &P::Point, iteration: usize, tolerance: f64) -> bool {
+    fn judge(
+        &mut self,
+        problem: &P,
+        point: &P::Point,
+        iteration: usize,
+        tolerance: f64,
+        closely: bool,
+    ) -> bool {
         self.last = problem.measure(point, self.gauge);
         let (mut certified, mut tidied) = (None, false);
         if !self.last.passes(tolerance) {
@@ -721,7 +730,7 @@ impl<'a, P: Problem> Judge<'a, P> {
         if let (Some(own), true) = (self.own, iteration < self.own_again) {
             // Refused a moment ago for a single contact: as yet as good as then.
             self.last.own = Some(own);
-        } else if self.last.passes(tolerance) {
+        } else if closely || self.last.passes(tolerance) {
             // What looks solved is looked at again, in doubled precision.
             (self.last, tidied) = self.certify(problem, point, tolerance);
             certified = Some(self.last);

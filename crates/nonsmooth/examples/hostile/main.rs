@@ -27,6 +27,8 @@ use std::time::{Duration, Instant};
 use suite::claims::{Effort, Lie, Tally};
 use suite::{All, KINDS};
 
+/// Undecided problems that are listed, of each kind and truth.
+const OPEN_SHOWN: usize = 20;
 /// Seconds after which a solver is given up, and the run with it.
 const HANGS: f64 = 60.0;
 
@@ -247,6 +249,8 @@ fn report(options: &Options, tally: &Tally, taken: Duration) {
     for ((kind, truth), (asked, left)) in &tally.undecided {
         let share = 100.0 * *left as f64 / (*asked).max(1) as f64;
         println!("{kind:24} {truth:12} {left:8} of {asked:8}  {share:6.2} %");
+        let open = tally.open.iter().filter(|o| o.0 == *kind && o.2.starts_with(truth));
+        open.take(OPEN_SHOWN).for_each(|(_, index, recipe)| println!("  {index:6}  {recipe}"));
     }
     let mut classes: BTreeMap<_, Vec<&Lie>> = BTreeMap::new();
     for lie in &tally.lies {

@@ -22,6 +22,8 @@ pub struct GlobalGauge {
     exact: Vec<Doubled>,
     own: State,
     buffer: Vec<f64>,
+    /// The units of the velocities of contacts, constraints and motions.
+    units: Vec<f64>,
     rows: Rows,
 }
 
@@ -157,6 +159,7 @@ impl GlobalGauge {
                 spare: vec![0.0; n.max(m)],
             },
             buffer: vec![0.0; problem.dofs()],
+            units: vec![],
             rows: Rows::default(),
         };
         gauge.law.strength = diagonal.iter().map(largest).collect();
@@ -181,7 +184,7 @@ impl GlobalGauge {
 
     /// q from the present f and w, in doubled precision before it is rounded: of a body nearly at rest its terms cancel.
     fn rescale<const D: usize>(&mut self, problem: &FrictionGlobal<D>) {
-        let Self { dynamics, free, own, rows, q, law, .. } = self;
+        let Self { dynamics, free, own, rows, q, law, units, .. } = self;
         let n = problem.dofs();
         let State { high, low, last, .. } = own;
         match free {
@@ -203,28 +206,31 @@ impl GlobalGauge {
         rows.add_transposed(&problem.H, &low[..n]);
         q.iter_mut().zip(rows.values()).for_each(|(q, x)| *q = x);
         law.norm_q = norm(q);
-        // Velocities of bodies carry the loads from contact to contact. The unit of a velocity is 1/√M_ii, that of a row of Hᵀ or Gᵀ what it makes of
-        // such velocities.
+        // Velocities of bodies carry the loads from contact to contact. The unit of a velocity is 1/√M_ii, that of a row of Hᵀ or Gᵀ the most that it
+        // makes of such velocities: w_c would be too small where its terms cancel.
         let (nc, p) = (problem.contacts(), problem.multipliers());
-        let LawGauge { loads, strength, .. } = law;
-        let of_motion = |i: usize| 1.0 / unit(problem.M.get(i, i));
-        loads.start(nc + p + n);
-        let motion = |i: usize| nc + p + i;
-        for (i, j, _) in problem.H.triplets().filter(|e| e.2 != 0.0) {
-            let c = j / D;
-            loads.couple(c, motion(i), || strength[c].sqrt() / of_motion(i));
+        let motion = nc + p;
+        let of_contacts = problem.H.triplets().map(|(i, j, x)| (j / D, motion + i, x));
+        let constraints = problem.bilateral.iter().flat_map(|b| b.G.triplets());
+        let rows = of_contacts.chain(constraints.map(|(i, j, x)| (nc + j, motion + i, x)));
+        let rows = || rows.clone().filter(|(_, _, x)| *x != 0.0);
+        units.clear();
+        units.resize(motion, 0.0);
+        units.extend((0..n).map(|i| 1.0 / unit(problem.M.get(i, i))));
+        for (row, i, x) in rows() {
+            units[row] = units[row].max(x.abs() * units[i]);
         }
-        for (i, j, x) in problem.bilateral.iter().flat_map(|b| b.G.triplets()) {
-            if x != 0.0 {
-                loads.couple(nc + j, motion(i), || x.abs());
-            }
+        let loads = &mut law.loads;
+        loads.start(units.len());
+        for (row, i, _) in rows() {
+            loads.couple(row, i, || units[row] / units[i]);
         }
         for (i, j, _) in problem.M.triplets().filter(|e| e.2 != 0.0) {
-            loads.couple(motion(i), motion(j), || of_motion(i) / of_motion(j));
+            loads.couple(motion + i, motion + j, || units[motion + i] / units[motion + j]);
         }
-        let constraints = problem.bilateral.iter().flat_map(|b| b.b.iter().map(|b| b.abs()));
-        let forces = problem.f.iter().enumerate().map(|(i, f)| f.abs() * of_motion(i).powi(2));
-        loads.spread(q.chunks(D).map(norm).chain(constraints).chain(forces));
+        let violations = problem.bilateral.iter().flat_map(|b| b.b.iter().map(|b| b.abs()));
+        let forces = problem.f.iter().zip(&units[motion..]).map(|(f, unit)| f.abs() * unit * unit);
+        loads.spread(q.chunks(D).map(norm).chain(violations).chain(forces));
     }
 
     pub(crate) fn measure<const D: usize>(

@@ -388,11 +388,13 @@ impl LawGauge {
                 doubts += left * left;
                 // Impulses that run away along the kernel of W make terms of any size: no more than the loads excuse.
                 let load = self.loads.reaching(c) / unit;
-                let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] / unit)).min(load);
-                let normal = (sizes[D * c] / unit).min(load);
                 let strength = self.own_w(c);
-                let apart =
-                    apart(&rc.map(|r| strength * r / unit), &uc.map(|u| value(u * per)), mu);
+                let own_x = rc.map(|r| strength * r / unit);
+                let apart = apart(&own_x, &uc.map(|u| value(u * per)), mu);
+                // Of an empty block the impulse is no term, but may be all there is.
+                let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] / unit));
+                let terms = terms.max(norm(&own_x)).min(load);
+                let normal = (sizes[D * c] / unit).min(load);
                 // Below the range of double precision there are no digits to be right.
                 let error = value(length(&residual)).max(apart) + left;
                 // No sliding, however fast, excuses a velocity into the obstacle.

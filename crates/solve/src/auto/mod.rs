@@ -105,6 +105,8 @@ pub struct HybridWork<P: Linearised<D>, const D: usize> {
     before: Vec<f64>,
     best: Vec<f64>,
     existence: Option<Existence>,
+    /// An exact solution, rounded, that the judge has yet to see.
+    exact: Option<P::Point>,
     /// Enumeration was tried.
     asked: bool,
     /// The interior point was left out.
@@ -165,6 +167,7 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
             before: vec![],
             best: vec![],
             existence: None,
+            exact: None,
             asked: false,
             passed_by: false,
             done: Done::default(),
@@ -192,7 +195,7 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
         work.done.start = self.choose_start(problem, P::impulses(point), work);
         problem.enter(&mut work.state, point);
         work.stage = FIRST;
-        (work.existence, work.asked) = (None, false);
+        (work.existence, work.exact, work.asked) = (None, None, false);
         work.passed_by = false;
     }
 
@@ -200,6 +203,8 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
         if let Some(ray) = problem.contradiction(&work.state) {
             return Step::NoSolution(ray.clone().into());
         }
+        // The judge has seen it, and goes on asking.
+        work.exact = None;
         match work.stage {
             Stage::Sweeps { last, claims } => self.sweep(problem, point, work, last, claims),
             Stage::Interior { .. } => self.interior(problem, point, work),
@@ -209,7 +214,11 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
     }
 
     fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
-        problem.complete(&mut work.state, point);
+        match &work.exact {
+            // Its velocities and multipliers are exact too.
+            Some(exact) => P::copy_point(exact, point),
+            None => problem.complete(&mut work.state, point),
+        }
     }
 
     fn account(&self, work: &Self::Work) -> Vec<String> {
@@ -298,6 +307,13 @@ impl<const D: usize> Hybrid<D> {
             }
         }
         work.stage = Stage::Sweeps { last: estimate, claims };
+        if !estimate.is_finite() && !budget::over() {
+            // Where W is not positive semidefinite a sweep may send the impulses to infinity.
+            P::impulses(point).fill(0.0);
+            problem.enter(&mut work.state, point);
+            self.leave_sweeps(problem, point, work);
+            return Step::Continue { estimate: f64::NAN };
+        }
         if work.done.sweeps < FIRST_SWEEPS && estimate > 0.0 {
             return Step::Continue { estimate };
         }
@@ -500,7 +516,8 @@ impl<const D: usize> Hybrid<D> {
         };
         let r = P::impulses(point);
         let error = newton.look(problem, &mut work.state, r);
-        if work.controller.swept(error) > TAKE_BACK {
+        let factor = work.controller.swept(error);
+        if factor > TAKE_BACK || factor.is_nan() {
             r.copy_from_slice(&work.before);
             self.subproblem_here(problem, point, work);
         } else {
@@ -522,10 +539,12 @@ impl<const D: usize> Hybrid<D> {
             // An exact solution, found on the way: the judge has the last word on its rounding.
             Existence::Solved { coefficients } => {
                 let x = problem.cones()?.unknowns_at(&coefficients.0);
-                P::copy_point(&problem.assembled(&x), point);
+                let exact = problem.assembled(&x);
+                P::copy_point(&exact, point);
                 problem.enter(&mut work.state, point);
                 work.best.copy_from_slice(P::impulses(point));
                 self.subproblem_here(problem, point, work);
+                work.exact = Some(exact);
                 Some(Step::Continue { estimate: 0.0 })
             }
             _ => None,

@@ -1,5 +1,6 @@
 //! Hostile problems of every kind, each a function of a seed and an index.
 
+use nonsmooth::solve::reform::{Condense, Reformulation};
 use nonsmooth::{
     BilateralGlobal, BilateralLocal, BoxLcp, Bsr, Csc, Dense, FrictionGlobal, FrictionLocal, Hlcp,
     Lcp, Matrix, Mlcp,
@@ -453,6 +454,7 @@ fn local_data<const D: usize>(draft: &mut Draft, nc: usize) -> (Local, Truth) {
 fn in_units(data: &mut Local, d: usize, draft: &mut Draft) {
     let nc = data.mu.len();
     let u = draft.exponents(nc, "u");
+    draft.beside(largest(&data.q), u.iter().any(|&e| e != 0));
     // V is both a column of u and a row of r: only equal units keep it one matrix.
     let same = data.bilateral.is_some() || draft.rng.chance(60);
     let r = if same { u.clone() } else { draft.exponents(nc, "r") };
@@ -682,8 +684,13 @@ fn global_data<const D: usize>(draft: &mut Draft, nc: usize) -> (Global, Truth) 
         }
         _ => {}
     }
+    let plain = Global { m, h, f, w, mu, bilateral };
+    let velocity =
+        Condense.reduce(&global::<D>(&plain)).map_or(1.0, |(local, _)| largest(&local.q));
+    let Global { m, h, f, w, mu, bilateral } = plain;
     // Units of contacts and of motions.
     let e = draft.exponents(nc, "u");
+    draft.beside(velocity, e.iter().any(|&e| e != 0));
     let e: Vec<_> = e.iter().flat_map(|&e| vec![e; D]).collect();
     let s = draft.exponents(n, "v");
     let m = scaled(&m, &s, &s);
@@ -694,6 +701,11 @@ fn global_data<const D: usize>(draft: &mut Draft, nc: usize) -> (Global, Truth) 
         (scaled(&g, &s, &l), scaled_vector(&b, &l))
     });
     (Global { m, h, f, w, mu, bilateral }, truth)
+}
+
+/// The largest modulus.
+fn largest(x: &[f64]) -> f64 {
+    x.iter().fold(0.0, |size, x| size.max(x.abs()))
 }
 
 impl Made for FrictionGlobal<2> {
@@ -730,9 +742,17 @@ impl Made for FrictionGlobal<3> {
             (false, false) if i == j => 1.0,
             _ => 0.0,
         });
+        // In the unit of the contact.
+        let width = |c: usize| {
+            let entries = flat.h.iter().flat_map(|row| [row[2 * c].abs(), row[2 * c + 1].abs()]);
+            match entries.fold(0.0, f64::max) {
+                0.0 => 1.0,
+                width => width,
+            }
+        };
         let straight = matrix(heavy, columns, |i, j| match at(j) {
             Some(k) if i < n => flat.h[i][k],
-            None if i == n + j / 3 => 1.0,
+            None if i == n + j / 3 => width(j / 3),
             _ => 0.0,
         });
         // u = S Hᵀ v + S w.

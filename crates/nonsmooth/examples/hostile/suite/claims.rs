@@ -48,6 +48,8 @@ pub struct Tally {
     pub problems: u64,
     /// Problems decided by enumeration, by kind and truth: asked of the default solver, left undecided.
     pub undecided: BTreeMap<(&'static str, &'static str), (u64, u64)>,
+    /// Which these are.
+    pub open: Vec<(&'static str, u64, String)>,
     /// Seconds in each solver.
     pub seconds: BTreeMap<(&'static str, String), f64>,
 }
@@ -65,6 +67,7 @@ impl Tally {
         for (key, seconds) in other.seconds {
             *self.seconds.entry(key).or_default() += seconds;
         }
+        self.open.extend(other.open);
         self.lies.extend(other.lies);
         self.solves += other.solves;
         self.problems += other.problems;
@@ -178,6 +181,10 @@ where
                 let (asked, left) = tally.undecided.entry((kind, truth)).or_default();
                 *asked += 1;
                 *left += u64::from(!decided);
+                if !decided {
+                    let recipe = format!("{truth}  {}  {}", case.recipe, outcome.status);
+                    tally.open.push((kind, index, recipe));
+                }
             }
             let numbers = P::numbers(&point);
             let finite = numbers.iter().all(|x| x.is_finite());
@@ -241,7 +248,8 @@ where
                         match claim {
                             "near" => tally.count(kind, "(judge)", "near"),
                             _ => {
-                                let why = format!("{why} at {numbers:?}");
+                                let said = verdict.measure.merit();
+                                let why = format!("{why}, judged {said:.2e} at {numbers:?}");
                                 tally.lies.push(lie("(judge)", claim, why));
                             }
                         }

@@ -100,6 +100,13 @@ impl Draft {
         tiny
     }
 
+    /// Contacts whose free velocities are up to `velocity` where the numbers that decide are of size one; `apart`: in units of their own, where each is held
+    /// to the root of the tolerance.
+    pub fn beside(&mut self, velocity: f64, apart: bool) {
+        let share = 1.0 / velocity.max(1.0);
+        self.fine = self.fine.min(if apart { share * share / 100.0 } else { share });
+    }
+
     /// Whole numbers, many of them small.
     pub fn ints(&mut self, rows: usize, columns: usize) -> Rows {
         let most = self.rng.pick(&[1, 2, 3, 5, 9]);

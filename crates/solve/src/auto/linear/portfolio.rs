@@ -218,7 +218,9 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             };
         }
         drop(scope);
-        if let (Some(near), true) = (nearly, status == NONE || status.certificate().is_some()) {
+        // What is nearly so is more than a ray without a conclusion; what is decided stays.
+        let open = status == NONE || matches!(status, Status::NoConclusion(_));
+        if let (Some(near), true) = (nearly, open) {
             status = near;
         }
         let measure = match tally.best {
