@@ -342,7 +342,7 @@ fn refuted<P: Registered + Judged>(problem: &P, solver: &str, what: &str) {
     let status = end.outcome.status;
     // What the condensed problem says may hold of the bodies' own equations by less than rounding.
     let condensed = solver.starts_with("condense/") && status.certificate().is_some();
-    assert!(status.refutes() || condensed, "{what}, {solver}: {status}");
+    assert!(status.refutes() || condensed, "{what}, {solver}: {status} {:?}", end.account);
     let holds = status.certificate().is_some_and(|c| problem.evidence(c).holds());
     assert!(solver.starts_with("condense/") || holds, "{what}, {solver}");
 }

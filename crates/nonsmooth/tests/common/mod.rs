@@ -35,6 +35,7 @@ pub struct Run<P: Judged> {
     pub point: P::Point,
     pub outcome: Outcome,
     pub verdict: VerdictOf<P>,
+    pub account: Vec<String>,
 }
 
 /// Runs a solver; it must end near its time limit, and say `solved` exactly where the judge does.
@@ -55,7 +56,7 @@ pub fn run<P: Registered + Judged>(
         let late = 2.0 * limit + 10.0;
         assert!(outcome.seconds < late, "{solver}: {} s, allowed {limit}", outcome.seconds);
     }
-    Run { point, outcome, verdict }
+    Run { point, outcome, verdict, account: session.account() }
 }
 
 /// To this relative residual, within so many seconds.

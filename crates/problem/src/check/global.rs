@@ -281,20 +281,9 @@ impl GlobalGauge {
         measure.dynamics = Some(worse(given.residual, own.residual));
         measure.dynamics_rounding = Some(given.rounding.max(own.rounding));
         for (i, gap) in buffer.iter_mut().enumerate() {
-            *gap = (point.v[i] - v[i]) - v_low[i];
-        }
-        // What a solve in plain arithmetic leaves of a component of M is no gap.
-        let inverse = &dynamics.inverse;
-        for k in 0..inverse.component_sizes().len() {
-            let index = || inverse.component(k).iter().filter(|&&i| i < n);
-            // In units in which unknowns of one component are comparable.
-            let unit = |i: usize| unit(problem.M.get(i, i));
-            let largest = index().fold(0.0_f64, |l, &i| l.max(v[i].abs() * unit(i)));
-            for &i in index() {
-                if buffer[i].abs() * unit(i) <= 2.0 * f64::EPSILON * largest {
-                    buffer[i] = 0.0;
-                }
-            }
+            let missing = (point.v[i] - v[i]) - v_low[i];
+            // The last bits of v are no gap.
+            *gap = if missing.abs() <= ROUNDING * v[i].abs() { 0.0 } else { missing };
         }
         rows.start_at_zero(problem.w.len());
         rows.add_transposed(&problem.H, buffer);

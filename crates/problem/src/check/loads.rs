@@ -7,7 +7,7 @@
 /// reaches row i is then `ω_i = max_j |q_j| s_i/s_j` over all rows j coupled to i, however far. In a wall at rest every contact but those
 /// of the ground has rounding for its q; they share the load of the ground.
 ///
-/// Source: the units of a saddle matrix that make its diagonal one (van der Sluis 1969), carried along a spanning forest.
+/// Cost: a union-find over the couplings, once a problem.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Loads {
     parent: Vec<usize>,

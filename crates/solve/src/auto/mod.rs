@@ -474,9 +474,15 @@ impl<const D: usize> Hybrid<D> {
                 return step;
             }
         }
-        if work.existence.is_none() && work.sweep.largest(P::impulses(point)) > RUNAWAY * work.scale
-        {
-            return self.other_strategy(problem, point, work);
+        if work.sweep.largest(P::impulses(point)) > RUNAWAY * work.scale {
+            match &work.existence {
+                None => return self.other_strategy(problem, point, work),
+                // They run where the certificate points.
+                Some(Existence::NearlyNoSolution { certificate, .. }) => {
+                    return Step::NoSolution(certificate.clone());
+                }
+                _ => {}
+            }
         }
         problem.enter(&mut work.state, point);
         if error > SWEEP_ABOVE {
