@@ -1,6 +1,7 @@
 //! The judge of the global problem.
 
-use super::local::{HALF_ULP, LawGauge, ROUNDING, largest, unit, worst};
+use super::loads::ROUNDING;
+use super::local::{HALF_ULP, LawGauge, largest, unit, worst};
 use super::rows::{Rows, doubt};
 use super::{Measure, over};
 use crate::linalg::{Csc, Delassus, Doubled, Inverse, Refine, norm, norm_of, small};
@@ -46,6 +47,9 @@ struct Reach {
     sizes: Vec<f64>,
     load: Vec<f64>,
 }
+
+/// The mean diagonal of a block W_cc that is rounding, over its largest entry.
+const NOISE: f64 = 1e-12;
 
 /// Components of M whose inverse is formed.
 const SMALL: usize = 48;
@@ -144,7 +148,11 @@ impl GlobalGauge {
         let (m, n) = (problem.w.len(), problem.dofs() + problem.multipliers());
         let zeros = vec![0.0; n];
         let mut gauge = Self {
-            law: LawGauge::new(diagonal.iter().map(small::mean_diagonal)),
+            law: LawGauge::new(diagonal.iter().map(|block| {
+                // A trace of rounding is none: of skew M the diagonal of W is zero.
+                let mean = small::mean_diagonal(block);
+                if mean > NOISE * largest(block) { mean } else { 0.0 }
+            })),
             reach: Reach::new::<D>(&problem.H, inverse),
             dynamics,
             free,
@@ -298,7 +306,7 @@ impl GlobalGauge {
             let shares = rows.values().zip(rows.sizes()).enumerate().map(|(j, (sum, &size))| {
                 let (at, values) = b.G.column(j);
                 let weight: f64 = at.iter().zip(values).map(|(&i, g)| g.abs() / unit(i)).sum();
-                (sum, size, ROUNDING * typical * weight)
+                law.loads.excused(problem.contacts() + j, sum, size, typical * weight)
             });
             measure.bilateral = Some(worst(shares));
         }

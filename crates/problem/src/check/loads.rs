@@ -80,6 +80,23 @@ impl Loads {
     }
 }
 
+/// What rounding a few operations on terms of a typical size leaves, over that size.
+pub(super) const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// Impulses are not so many times larger than what the loads ask for, if they are not to be those of a problem without a solution.
+const REACH: f64 = 1e5;
+
+impl Loads {
+    /// The violation, the size it is compared with and the violation that is excused of an equation of row i: its terms are no larger than the loads
+    /// make them, nor is the rounding of `typical` terms.
+    pub(super) fn excused(&self, i: usize, sum: f64, size: f64, typical: f64) -> (f64, f64, f64) {
+        match self.reaching(i) {
+            load if load > 0.0 => (sum, size.min(load), ROUNDING * typical.min(REACH * load)),
+            // Zero solves what no load reaches.
+            _ => (0.0, size, 0.0),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

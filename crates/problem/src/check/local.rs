@@ -53,54 +53,41 @@ impl LocalGauge {
 
     /// What stands for `w_c` of each contact by itself, and the loads that reach it through `[W, V; Vᵀ, R]`.
     fn mark_loads<const D: usize>(&mut self, problem: &FrictionLocal<D>) {
-        let nc = problem.contacts();
-        let LawGauge { strength, loads, .. } = &mut self.law;
-        let entry = |i: usize, j: usize| problem.W.get(i, j).map_or(0.0, largest);
+        let all = Saddle(problem);
+        let LawGauge { strength, loads, amounts, impulses, .. } = &mut self.law;
+        amounts.clear();
+        amounts.extend(problem.q.chunks(D).map(norm));
+        amounts.extend(problem.bilateral.iter().flat_map(|b| b.s.iter().map(|s| s.abs())));
+        let n = amounts.len();
         strength.clear();
-        strength.extend((0..nc).map(|c| entry(c, c)));
-        if let Some(b) = &problem.bilateral {
-            strength.extend((0..b.s.len()).map(|j| b.R.get(j, j).abs()));
-        }
-        // Of an empty block what an impulse does through a neighbour; of a free multiplier likewise.
-        let through = |i: usize, j: usize, product: f64, strength: &mut [f64]| {
-            if strength[i] == 0.0 && strength[j] > 0.0 {
-                strength[i] = product / strength[j];
-            }
-        };
-        for i in (0..nc).filter(|&i| entry(i, i) == 0.0) {
-            let (cols, blocks) = problem.W.row(i);
-            for (&j, block) in cols.iter().zip(blocks) {
-                through(i, j as usize, largest(block) * entry(j as usize, i), strength);
-            }
-        }
-        loads.start(strength.len());
-        let ratio = |i: usize, j: usize, strength: &[f64]| (strength[i] / strength[j]).sqrt();
-        if let Some(b) = &problem.bilateral {
-            for (i, j, v) in b.V.triplets() {
-                through(nc + j, i / D, v * v, strength);
-                through(i / D, nc + j, v * v, strength);
-            }
-            for (i, j, _) in b.V.triplets().filter(|e| e.2 != 0.0) {
-                loads.couple(i / D, nc + j, || ratio(i / D, nc + j, strength));
-            }
-            for (i, j, _) in b.R.triplets().filter(|e| e.2 != 0.0) {
-                loads.couple(nc + i, nc + j, || ratio(nc + i, nc + j, strength));
-            }
-        }
-        for i in 0..nc {
-            let (cols, blocks) = problem.W.row(i);
-            for (j, block) in cols.iter().map(|&j| j as usize).zip(blocks) {
-                if i == j || *block == [[0.0; D]; D] {
-                    continue;
+        strength.extend((0..n).map(|i| all.entry(i, i)));
+        if strength.contains(&0.0) {
+            // Of an empty block what an impulse does through a neighbour, or the velocity that loads make over the impulse that answers them.
+            let (known, missing) = (impulses, |x: f64| x == 0.0);
+            known.clear();
+            known.extend_from_slice(strength);
+            all.each(|i, j, a| {
+                if missing(known[i]) && known[j] > 0.0 {
+                    strength[i] = strength[i].max(a * all.entry(j, i) / known[j]);
                 }
-                loads.couple(i, j, || match entry(j, i) {
-                    0.0 => largest(block) / strength[j],
-                    back => ratio(i, j, strength) * (largest(block) / back).sqrt(),
-                });
+            });
+            known.fill(0.0);
+            all.each(|i, j, a| known[j] = known[j].max(amounts[i] / a));
+            for i in 0..n {
+                if missing(strength[i]) && known[i] > 0.0 {
+                    strength[i] = amounts[i] / known[i];
+                }
             }
         }
-        let constraints = problem.bilateral.iter().flat_map(|b| b.s.iter().map(|s| s.abs()));
-        loads.spread(problem.q.chunks(D).map(norm).chain(constraints));
+        loads.start(n);
+        all.each(|i, j, a| {
+            loads.couple(i, j, || match (strength[i], strength[j], all.entry(j, i)) {
+                (_, s, 0.0) if s > 0.0 => a / s,
+                (r, s, back) if r > 0.0 && s > 0.0 => (r / s * (a / back)).sqrt(),
+                _ => amounts[i] / amounts[j],
+            });
+        });
+        loads.spread(amounts.iter().copied());
     }
 
     /// The residuals; `precisely` in doubled precision from the data to the last comparison.
@@ -159,8 +146,12 @@ impl LocalGauge {
                 excuse[i] += v.abs() / unit(j) * typical_lambda;
             }
         }
-        let shares = self.rows.values().zip(self.rows.sizes()).zip(&*excuse);
-        let share = worst(shares.map(|((sum, &size), excuse)| (sum, size, ROUNDING * excuse)));
+        let nc = problem.contacts();
+        let shares = self.rows.values().zip(self.rows.sizes()).zip(&*excuse).enumerate();
+        let share =
+            worst(shares.map(|(j, ((sum, &size), excuse))| {
+                self.law.loads.excused(nc + j, sum, size, *excuse)
+            }));
         self.sizes.truncate(point.r.len());
         Some(share)
     }
@@ -255,9 +246,6 @@ fn each_term(a: Option<&Csc>, x: &[f64], mut term: impl FnMut(usize, f64, f64)) 
     }
 }
 
-/// What rounding a few operations on terms of a typical size leaves, over that size.
-pub(super) const ROUNDING: f64 = 16.0 * f64::EPSILON;
-
 /// `√|d|` of a diagonal entry, the unit of what belongs to it; 1 where it vanishes.
 pub(super) fn unit(d: f64) -> f64 {
     match d.abs().sqrt() {
@@ -292,6 +280,48 @@ fn apart<const D: usize>(x: &[f64; D], u: &[f64; D], mu: f64) -> f64 {
     pressed.max(sliding.min(across)).max(pulling)
 }
 
+/// The matrix `[W, V; Vᵀ, R]` by contacts and constraints.
+struct Saddle<'a, const D: usize>(&'a FrictionLocal<D>);
+
+impl<const D: usize> Saddle<'_, D> {
+    /// The largest modulus in row i and column j.
+    fn entry(&self, i: usize, j: usize) -> f64 {
+        let nc = self.0.contacts();
+        let Some(b) = self.0.bilateral.as_ref().filter(|_| i.max(j) >= nc) else {
+            return self.0.W.get(i, j).map_or(0.0, largest);
+        };
+        match (i.checked_sub(nc), j.checked_sub(nc)) {
+            (Some(i), Some(j)) => b.R.get(i, j).abs(),
+            (c, k) => {
+                let (c, k) = (c.map_or(i, |_| j), c.or(k).unwrap_or(0));
+                (0..D).fold(0.0, |most, l| most.max(b.V.get(D * c + l, k).abs()))
+            }
+        }
+    }
+
+    /// Calls with row, column and modulus for all that is not zero beside the diagonal; entries of a block of V one by one.
+    fn each(&self, mut call: impl FnMut(usize, usize, f64)) {
+        let nc = self.0.contacts();
+        for i in 0..nc {
+            let (cols, blocks) = self.0.W.row(i);
+            for (&j, block) in cols.iter().zip(blocks).filter(|(j, _)| **j as usize != i) {
+                let a = largest(block);
+                if a > 0.0 {
+                    call(i, j as usize, a);
+                }
+            }
+        }
+        let Some(b) = &self.0.bilateral else { return };
+        for (i, j, v) in b.V.triplets().filter(|e| e.2 != 0.0) {
+            call(i / D, nc + j, v.abs());
+            call(nc + j, i / D, v.abs());
+        }
+        for (i, j, x) in b.R.triplets().filter(|e| e.2 != 0.0 && e.0 != e.1) {
+            call(nc + i, nc + j, x.abs());
+        }
+    }
+}
+
 /// The largest modulus in a block.
 pub(super) fn largest<const D: usize>(block: &[[f64; D]; D]) -> f64 {
     block.iter().flatten().fold(0.0, |l, x| l.max(x.abs()))
@@ -304,6 +334,9 @@ pub(super) struct LawGauge {
     /// The largest modulus of W_cc, which is there where the trace is not; zero where nothing is. Others may follow.
     pub(super) strength: Vec<f64>,
     pub(super) loads: Loads,
+    /// Moduli of loads, and room for as many.
+    amounts: Vec<f64>,
+    impulses: Vec<f64>,
     pub(super) norm_q: f64,
 }
 

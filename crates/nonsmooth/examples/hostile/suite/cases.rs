@@ -19,6 +19,8 @@ pub struct Case<P> {
     /// The smallest relative change that was made to whole numbers on purpose: what is true of the problem may be false of
     /// its neighbours from there on.
     pub fine: f64,
+    /// Contacts are in units of their own.
+    pub apart: bool,
     /// How it was made.
     pub recipe: String,
     /// Whether it is small enough that everybody may be expected to decide it.
@@ -58,7 +60,8 @@ pub trait Made: Hostile {
         if truth == Truth::Unsolvable && draft.recipe.contains("planted") {
             draft.fine = draft.fine.min(f64::EPSILON);
         }
-        Case { problem, truth, fine: draft.fine, recipe: draft.recipe, small }
+        let Draft { fine, apart, recipe, .. } = draft;
+        Case { problem, truth, fine, apart, recipe, small }
     }
 }
 

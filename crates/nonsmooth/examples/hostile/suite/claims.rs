@@ -312,7 +312,7 @@ fn refuted<P: Made>(
         format!("exact {error:.2e}, asked {tolerance:e}, largest number {largest:.1e}")
     };
     // A residual is relative to the whole problem, whose numbers are up to a hundred times those that were changed.
-    let fine = case.fine < 100.0 * tolerance;
+    let fine = case.fine < 100.0 * if case.apart { tolerance.sqrt() } else { tolerance };
     match case.truth {
         Truth::Unsolvable
             if fine && (!residual || case.problem.error_as_given(point) <= tolerance) =>

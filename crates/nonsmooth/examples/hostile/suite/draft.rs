@@ -67,6 +67,8 @@ pub struct Draft {
     pub rng: Rng,
     /// The smallest relative change that was made to whole numbers on purpose; 1 where none was.
     pub fine: f64,
+    /// Contacts are in units of their own, where each is held to the root of the tolerance.
+    pub apart: bool,
     /// Only whole numbers so far, small enough that sums of products of them are exact.
     pub exact: bool,
     /// How it was made.
@@ -75,7 +77,7 @@ pub struct Draft {
 
 impl Draft {
     pub fn new(rng: Rng) -> Self {
-        Self { rng, fine: 1.0, exact: true, recipe: String::new() }
+        Self { rng, fine: 1.0, apart: false, exact: true, recipe: String::new() }
     }
 
     pub fn say(&mut self, what: &str) {
@@ -100,11 +102,10 @@ impl Draft {
         tiny
     }
 
-    /// Contacts whose free velocities are up to `velocity` where the numbers that decide are of size one; `apart`: in units of their own, where each is held
-    /// to the root of the tolerance.
+    /// Contacts whose free velocities are up to `velocity` where the numbers that decide are of size one; `apart`: in units of their own.
     pub fn beside(&mut self, velocity: f64, apart: bool) {
-        let share = 1.0 / velocity.max(1.0);
-        self.fine = self.fine.min(if apart { share * share / 100.0 } else { share });
+        self.fine = self.fine.min(1.0 / velocity.max(1.0));
+        self.apart |= apart;
     }
 
     /// Whole numbers, many of them small.

@@ -324,8 +324,8 @@ fn law<const D: usize>(w: &[Dyadic], r: &[f64], u: &[Dyadic], mu: &[f64], q: &[D
     norm(&map).over(&q).to_f64()
 }
 
-/// What the judge forgives of a constraint whose terms are rounding themselves.
-const ROUNDING: f64 = 1e-3;
+/// What the judge forgives of a constraint whose terms are rounding themselves, over those of typical unknowns.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 impl<const D: usize> FrictionParts for FrictionLocal<D> {
     fn union_of(&self) -> Option<Union> {
@@ -429,13 +429,22 @@ fn eliminated(
     Some(forms.iter().map(|f| f[width..].iter().map(value).collect()).collect())
 }
 
-/// The largest violation of an equation in units of its terms; an equation whose terms are all rounding counts with the others.
-fn violation(sums: &[Sum], unit: impl Fn(usize) -> f64, typical: f64) -> f64 {
+/// The largest violation of an equation in units of its terms; an equation whose terms are all the rounding of `typical` ones counts with the others.
+fn violation(sums: &[Sum], typical: impl Fn(usize) -> f64) -> f64 {
     let share = |(j, s): (usize, &Sum)| {
-        let floor = Dyadic::from(ROUNDING * typical * unit(j));
-        ratio(&s.value, &(&s.size + &floor))
+        let floor = Dyadic::from(ROUNDING * typical(j));
+        let beyond = &s.value.abs() - &floor;
+        ratio(&beyond.max(Dyadic::zero()), &s.size)
     };
     sums.iter().enumerate().map(share).fold(0.0, f64::max)
+}
+
+/// The root of a diagonal entry, the unit of its row; 1 where it vanishes.
+fn unit(diagonal: f64) -> f64 {
+    match diagonal.abs().sqrt() {
+        unit if unit > 0.0 => unit,
+        _ => 1.0,
+    }
 }
 
 impl<const D: usize> Judge for FrictionLocal<D> {
@@ -449,12 +458,21 @@ impl<const D: usize> Judge for FrictionLocal<D> {
             let mut rows: Vec<Sum> = b.s.iter().map(|&s| Sum::of(s)).collect();
             b.V.triplets().for_each(|(i, j, a)| rows[j].add(a, point.r[i]));
             b.R.triplets().for_each(|(i, j, a)| rows[i].add(a, point.lambda[j]));
-            let unit = |j: usize| match b.R.get(j, j).abs().sqrt() {
-                d if d > 0.0 => d,
-                _ => 1.0,
+            // Rounding of a typical impulse or multiplier: r_c √w_c and λ_j √|R_jj| are comparable.
+            let of_contact = |i: usize| {
+                let block = self.W.diagonal_block(i / D);
+                unit(block.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs())))
             };
-            let sizes = rows.iter().enumerate().map(|(j, s)| s.size.to_f64() / unit(j));
-            bilateral = violation(&rows, unit, sizes.fold(0.0, f64::max));
+            let of_row = |j: usize| unit(b.R.get(j, j));
+            let largest = |x: &[f64], unit: &dyn Fn(usize) -> f64| {
+                (0..x.len()).fold(0.0_f64, |m, i| m.max(x[i].abs() * unit(i)))
+            };
+            let typical = [largest(&point.r, &of_contact), largest(&point.lambda, &of_row)];
+            let mut weights = vec![0.0; b.s.len()];
+            let mut add = |j: usize, share: f64| weights[j] += share;
+            b.V.triplets().for_each(|(i, j, a)| add(j, typical[0] * a.abs() / of_contact(i)));
+            b.R.triplets().for_each(|(i, j, a)| add(i, typical[1] * a.abs() / of_row(j)));
+            bilateral = violation(&rows, |j| weights[j]);
         }
         let w: Vec<_> = (0..nc)
             .map(|c| {
@@ -520,13 +538,14 @@ impl<const D: usize> Judge for FrictionGlobal<D> {
                 entry(&mut equations, i, n + j, -x);
                 entry(&mut equations, n + j, i, x);
                 rows[j].add(x, point.v[i]);
-                weights[j] += x.abs();
+                weights[j] += x.abs() / unit(self.M.get(i, i));
             });
             for j in 0..p {
                 entry(&mut equations, n + j, n + p, b.b[j]);
             }
-            let typical = point.v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-            bilateral = violation(&rows, |j| weights[j], typical);
+            let kinetic = |(i, v): (usize, &f64)| v.abs() * unit(self.M.get(i, i));
+            let typical = point.v.iter().enumerate().map(kinetic).fold(0.0, f64::max);
+            bilateral = violation(&rows, |j| weights[j] * typical);
         }
         let given: Vec<_> = given.into_iter().map(|s| s.value).collect();
         if as_given {
@@ -537,7 +556,7 @@ impl<const D: usize> Judge for FrictionGlobal<D> {
             if let Some(b) = &self.bilateral {
                 b.G.triplets().for_each(|(i, j, x)| load[i].add(x, point.lambda[j]));
             }
-            let dynamics = violation(&load, |_| 0.0, 0.0);
+            let dynamics = violation(&load, |_| 0.0);
             return law::<D>(&w, &point.r, &given, &self.mu, &q).max(bilateral).max(dynamics);
         }
         // Where r does not determine the velocities, those given count.
