@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::proof::{Exact, FEW, exact, exactly_near};
-use super::rows::Rows;
+use super::rows::{Rows, doubt};
 use super::{Judged, Measure, Verdict};
 use crate::linalg::{Matrix, norm};
 use crate::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem, ProblemError};
@@ -501,7 +501,7 @@ impl LinearGauge {
         }
         let measure = Measure { floor: precisely.then(|| self.floor()), ..sum.measure() };
         let measure = if visible { measure } else { Measure { relative: NEVER, ..measure } };
-        rounding(measure, || is_rounded(&data, &point.z))
+        rounding(measure, point.z.len() + 1, || is_rounded(&data, &point.z))
     }
 
     /// The pair of row i at the point last measured, if it is no equality.
@@ -552,11 +552,14 @@ impl LinearGauge {
     }
 }
 
-/// The measure of a point whose errors may be those of its rounding alone: where that is so, they count as one bit.
-fn rounding(measure: Measure, is_rounded: impl FnOnce() -> bool) -> Measure {
+/// The measure of a point whose errors may be those of its rounding alone: where that is so, they count as one bit. What doubled precision leaves in
+/// doubt of sums of `terms` terms is added: of terms 1e30 times larger than the row's unit nobody can tell that they vanish.
+fn rounding(measure: Measure, terms: usize, is_rounded: impl FnOnce() -> bool) -> Measure {
     /// Beyond so many floors nothing is explained by rounding.
     const REACH: f64 = 100.0;
     let bit = f64::EPSILON;
+    let in_doubt = measure.floor.map_or(0.0, |floor| floor * doubt(terms) / (0.5 * bit));
+    let measure = Measure { relative: measure.relative + in_doubt, ..measure };
     match measure.floor {
         Some(floor) if measure.relative > 1e-14 && measure.relative <= REACH * floor => {}
         _ => return measure,
@@ -711,7 +714,7 @@ impl HlcpGauge {
         }
         let measure = Measure { floor: precisely.then(|| self.floor()), ..sum.measure() };
         let measure = if visible { measure } else { Measure { relative: NEVER, ..measure } };
-        rounding(measure, || is_rounded_pair(problem, point))
+        rounding(measure, 2 * n + 1, || is_rounded_pair(problem, point))
     }
 
     fn floor(&self) -> f64 {

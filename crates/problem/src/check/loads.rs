@@ -91,8 +91,7 @@ impl Loads {
     pub(super) fn excused(&self, i: usize, sum: f64, size: f64, typical: f64) -> (f64, f64, f64) {
         match self.reaching(i) {
             load if load > 0.0 => (sum, size.min(load), ROUNDING * typical.min(REACH * load)),
-            // Zero solves what no load reaches.
-            _ => (0.0, size, 0.0),
+            _ => (sum, size, ROUNDING * typical),
         }
     }
 }

@@ -440,7 +440,9 @@ impl LawGauge {
             let rc = rc.map(|r| T::from(r) * plain_per);
             peer += square(&natural_map(&rc, &modified_plainly, mu));
             primal += value(distance_to_cone(&x, mu)).powi(2);
-            dual += square(&nearest_in_cone(&modified.map(|v| -v), mu));
+            // Much friction opens K* to nearly the whole space, and a velocity into the obstacle is near it: as far as with mu = 1.
+            let opening = ((1.0 + mu * mu) / (1.0 + mu.min(1.0).powi(2))).min(f64::MAX);
+            dual += opening * square(&nearest_in_cone(&modified.map(|v| -v), mu));
             let products = x.iter().zip(&modified).map(|(&a, &b)| a * b);
             complementarity += value(products.fold(T::from(0.0), |sum, p| sum + p)).abs();
         }

@@ -46,7 +46,7 @@ pub const DYNAMICS_TOLERANCE: f64 = 1e-10;
 /// `w_c` is not positive, the mean over the contacts stands in (1 if that is not positive either), so that
 /// such a contact is still judged. Of linear complementarity problems `relative`, `primal`, `dual` and `complementarity` are componentwise errors; see [`LinearGauge`].
 ///
-/// `primal` and `dual` are at most `relative` in exact arithmetic and are tested beside it, because rounding can
+/// `primal` and, where mu ≤ 1, `dual` are at most `relative` in exact arithmetic and are tested beside it, because rounding can
 /// hide one residual of a point with huge impulses, but not all three.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Measure {
@@ -60,7 +60,8 @@ pub struct Measure {
     pub peer: f64,
     /// Infeasibility of the impulses: `‖(dist(x_c, K))_c‖ / ‖q‖`.
     pub primal: f64,
-    /// Infeasibility of the velocities: `‖(dist(ũ_c, K*))_c‖ / ‖q‖`.
+    /// Infeasibility of the velocities: `‖(dist(ũ_c, K*))_c‖ / ‖q‖`; a distance with mu > 1 counts as if the same velocity were into an obstacle with mu = 1,
+    /// `√((1 + mu²)/2)` times more, because K* is then nearly the whole space.
     pub dual: f64,
     /// Complementarity: `Σ |x_c · ũ_c| / ‖q‖²`.
     pub complementarity: f64,

@@ -566,7 +566,14 @@ impl<const D: usize> Judge for FrictionGlobal<D> {
         let u: Vec<_> = u.into_iter().flatten().collect();
         let square = |s: Dyadic, x: &Dyadic| &s + &(x * x);
         let size = q.iter().fold(Dyadic::zero(), square).sqrt();
-        let gaps = u.iter().zip(&given).map(|(u, g)| u - g);
+        // The last bits of v are no gap.
+        let mut bits = vec![0.0; m];
+        self.H.triplets().for_each(|(i, j, x)| bits[j] += ROUNDING * (x * point.v[i]).abs());
+        let gaps = u
+            .iter()
+            .zip(&given)
+            .zip(&bits)
+            .map(|((u, g), bits)| (&(u - g).abs() - &Dyadic::from(*bits)).max(Dyadic::zero()));
         let gap = gaps.fold(Dyadic::zero(), |s, x| square(s, &x)).sqrt();
         let gap = if size.is_zero() { gap.to_f64() } else { ratio(&gap, &size) };
         law::<D>(&w, &point.r, &u, &self.mu, &q).max(bilateral).max(gap)
