@@ -157,7 +157,7 @@ fn a_point_that_runs_away_in_the_kernel_is_no_solution() {
     let problem = Lcp::new(m, vec![-1.0, -1.0]).unwrap();
     for t in [1e3, 1e9, 1e12, 1e15] {
         let found = problem.judge(&LcpPoint { z: vec![t, t] }, 1e-3).unwrap();
-        assert!(!found.solved && found.measure.relative == 1.0, "{found:?}");
+        assert!(!found.solved && found.measure.relative >= 1.0, "{found:?}");
     }
     // Nor is one whose variables are far apart: the third is neither zero nor its w.
     let m = [[1.0, -1.0, 1.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 0.0]];

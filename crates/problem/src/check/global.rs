@@ -151,7 +151,7 @@ impl GlobalGauge {
             law: LawGauge::new(diagonal.iter().map(|block| {
                 // A trace of rounding is none: of skew M the diagonal of W is zero.
                 let mean = small::mean_diagonal(block);
-                if mean > NOISE * largest(block) { mean } else { 0.0 }
+                if mean.abs() > NOISE * largest(block) { mean } else { 0.0 }
             })),
             reach: Reach::new::<D>(&problem.H, inverse),
             dynamics,

@@ -559,6 +559,7 @@ fn rounding(measure: Measure, terms: usize, is_rounded: impl FnOnce() -> bool) -
     const REACH: f64 = 100.0;
     let bit = f64::EPSILON;
     let in_doubt = measure.floor.map_or(0.0, |floor| floor * doubt(terms) / (0.5 * bit));
+    let in_doubt = if in_doubt > bit { in_doubt } else { 0.0 };
     let measure = Measure { relative: measure.relative + in_doubt, ..measure };
     match measure.floor {
         Some(floor) if measure.relative > 1e-14 && measure.relative <= REACH * floor => {}

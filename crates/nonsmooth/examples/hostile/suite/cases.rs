@@ -745,12 +745,15 @@ impl Made for FrictionGlobal<3> {
             (false, false) if i == j => 1.0,
             _ => 0.0,
         });
-        // In the unit of the contact.
+        // In the unit of the contact: the most that it makes of motions in theirs, to a power of two.
         let width = |c: usize| {
-            let entries = flat.h.iter().flat_map(|row| [row[2 * c].abs(), row[2 * c + 1].abs()]);
-            match entries.fold(0.0, f64::max) {
+            let of = |(i, row): (usize, &Vec<f64>)| {
+                let mass = if flat.m[i][i] == 0.0 { 1.0 } else { flat.m[i][i].abs() };
+                row[2 * c].abs().max(row[2 * c + 1].abs()) / mass.sqrt()
+            };
+            match flat.h.iter().enumerate().map(of).fold(0.0, f64::max) {
                 0.0 => 1.0,
-                width => width,
+                width => width.log2().round().exp2(),
             }
         };
         let straight = matrix(heavy, columns, |i, j| match at(j) {
