@@ -116,6 +116,47 @@ pub(super) fn natural_map<T: Real, const D: usize>(
     phi
 }
 
+/// What one contact adds to the residuals, from x and ũ.
+pub(super) struct Share {
+    /// `‖x − P_K(x − ũ)‖²`.
+    pub residual: f64,
+    /// `dist(x, K)²`.
+    pub primal: f64,
+    /// `dist(ũ, K*)²`, with mu > 1 as far as with mu = 1: much friction opens K* to nearly the whole space, and a velocity into the obstacle is near it.
+    pub dual: f64,
+    /// `|x · ũ|`.
+    pub complementarity: f64,
+}
+
+impl Share {
+    pub(super) fn new<T: Real, const D: usize>(x: &[T; D], modified: &[T; D], mu: f64) -> Self {
+        let square = |x: &[T; D]| x.iter().map(|v| v.value().powi(2)).sum::<f64>();
+        let opening = ((1.0 + mu * mu) / (1.0 + mu.min(1.0).powi(2))).min(f64::MAX);
+        let products = x.iter().zip(modified).map(|(&a, &b)| a * b);
+        Self {
+            residual: square(&natural_map(x, modified, mu)),
+            primal: distance_to_cone(x, mu).value().powi(2),
+            dual: opening * square(&nearest_in_cone(&modified.map(|v| -v), mu)),
+            complementarity: products.fold(T::from(0.0), |sum, p| sum + p).value().abs(),
+        }
+    }
+}
+
+/// Whether `x − ũ`, which plain arithmetic knows up to `error`, surely lies in K or in its polar cone, so that the natural map is ũ or x itself and no difference.
+pub(super) fn is_at_rest_or_open<const D: usize>(
+    x: &[f64; D],
+    modified: &[f64; D],
+    mu: f64,
+    error: f64,
+) -> bool {
+    let mut y = *x;
+    for k in 0..D {
+        y[k] -= modified[k];
+    }
+    let (t, margin) = (tangential(&y), (1.0 + mu) * error);
+    t - mu * y[0] < -margin || y[0] + mu * t < -margin
+}
+
 /// The status of a contact from `x = w r` and ũ; `margin` is a velocity.
 pub(super) fn status<const D: usize>(
     x: &[f64; D],

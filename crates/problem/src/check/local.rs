@@ -1,6 +1,6 @@
 //! The judge of the local problem.
 
-use super::contact::{distance_to_cone, length, modified_velocity, natural_map, nearest_in_cone};
+use super::contact::{Share, is_at_rest_or_open, length, modified_velocity, natural_map};
 use super::loads::Loads;
 use super::rows::{Rows, doubt};
 use super::{Measure, over};
@@ -189,13 +189,8 @@ impl LocalGauge {
         rows.start(&problem.q);
         for i in 0..problem.contacts() {
             let (cols, blocks) = problem.W.row(i);
-            for (&j, b) in cols.iter().zip(blocks) {
-                for k in 0..D {
-                    for l in 0..D {
-                        rows.add_product(D * i + k, b[k][l], point.r[D * j as usize + l]);
-                    }
-                }
-            }
+            let blocks = cols.iter().zip(blocks);
+            rows.add_blocks(D * i, blocks.map(|(&j, b)| (b, small::block(&point.r, j as usize))));
         }
         if let Some(b) = &problem.bilateral {
             rows.add(1.0, &b.V, &point.lambda);
@@ -209,6 +204,7 @@ impl LocalGauge {
     /// What the rounding of r and λ to doubles alone makes of the residual, in the root mean square.
     fn floor<const D: usize>(&mut self, problem: &FrictionLocal<D>, point: &LocalPoint) -> f64 {
         let unit = power_of_two(self.law.unit());
+        let per = 1.0 / unit;
         let squares = &mut self.u;
         squares.fill(0.0);
         for i in 0..problem.contacts() {
@@ -216,14 +212,14 @@ impl LocalGauge {
             for (&j, b) in cols.iter().zip(blocks) {
                 for k in 0..D {
                     for l in 0..D {
-                        let product = b[k][l] * point.r[D * j as usize + l] / unit;
+                        let product = b[k][l] * point.r[D * j as usize + l] * per;
                         squares[D * i + k] += product * product;
                     }
                 }
             }
         }
         each_term(problem.bilateral.as_ref().map(|b| &b.V), &point.lambda, |i, a, x| {
-            squares[i] += (a * x / unit).powi(2);
+            squares[i] += (a * x * per).powi(2);
         });
         let spread = squares.iter().sum::<f64>().sqrt() * (unit / self.law.unit());
         squares.iter_mut().zip(&self.exact).for_each(|(u, x)| *u = x.value());
@@ -234,6 +230,8 @@ impl LocalGauge {
 /// The rounding of a stored double, over its size, in the root mean square.
 pub(super) const HALF_ULP: f64 = 0.3 * f64::EPSILON;
 
+/// What plain arithmetic makes of x and ũ is wrong by less than this, over `‖x‖ + ‖ũ‖`.
+const PLAIN: f64 = 16.0 * f64::EPSILON;
 /// Terms below this share of ‖q‖ have lost digits to underflow.
 const LEAST: f64 = 1e-280;
 
@@ -394,9 +392,7 @@ impl LawGauge {
             _ => 1.0,
         };
         let plain_unit = power_of_two(plain);
-        let (per, plain_per) = (T::from(1.0 / unit), T::from(1.0 / plain_unit));
-        let value = |x: T| x.value();
-        let square = |x: &[T; D]| x.iter().map(|v| value(*v).powi(2)).sum::<f64>();
+        let (per, plain_per) = (1.0 / unit, 1.0 / plain_unit);
         let (mut scaled, mut peer, mut doubts) = (0.0, 0.0, 0.0);
         let (mut primal, mut dual, mut complementarity) = (0.0, 0.0, 0.0);
         let (mut worst_contact, mut worst) = (0, -1.0);
@@ -404,47 +400,54 @@ impl LawGauge {
         for (c, (&mu, &w)) in mu.iter().zip(&self.w).enumerate() {
             let rc: [f64; D] = small::block(r, c);
             let uc: [T; D] = std::array::from_fn(|k| u[D * c + k]);
-            let x = rc.map(|r| T::of_product(w, r) * per);
-            let modified = modified_velocity::<T, D>(&uc, mu);
-            let modified_plainly = modified.map(|u| u * plain_per);
-            let modified = modified.map(|u| u * per);
-            let residual = natural_map(&x, &modified, mu);
-            let share = square(&residual);
-            if share > worst || share.is_nan() {
-                (worst_contact, worst) = (c, share);
+            let plain_u = uc.map(|u| u.value());
+            let plain_modified = modified_velocity::<f64, D>(&plain_u, mu);
+            let near = (rc.map(|r| w * r * per), plain_modified.map(|u| u * per));
+            let size = length(&near.0) + length(&near.1);
+            // Of most contacts the natural map is ũ or x: once these are known, plain arithmetic is right to the last bits.
+            let plainly = T::DOUBT > 0.0 && is_at_rest_or_open(&near.0, &near.1, mu, PLAIN * size);
+            let (share, left) = if plainly {
+                let share = Share::new(&near.0, &near.1, mu);
+                let left = PLAIN * share.residual.sqrt();
+                (share, left)
+            } else {
+                let x = rc.map(|r| T::of_product(w, r) * T::from(per));
+                let modified = modified_velocity::<T, D>(&uc, mu).map(|u| u * T::from(per));
+                (Share::new(&x, &modified, mu), T::DOUBT * size)
+            };
+            if share.residual > worst || share.residual.is_nan() {
+                (worst_contact, worst) = (c, share.residual);
             }
-            scaled += share;
+            scaled += share.residual;
             // Plain arithmetic decides nothing: it leaves out what only decides.
             if T::DOUBT > 0.0 {
-                let of_u = norm_of((D * c..D * c + D).map(|i| doubt(i) / unit));
-                let left = T::DOUBT * value(length(&x) + length(&modified)) + (1.0 + mu) * of_u;
+                let of_u = norm_of((D * c..D * c + D).map(|i| doubt(i) * per));
+                let left = left + (1.0 + mu) * of_u;
                 doubts += left * left;
                 // Impulses that run away along the kernel of W make terms of any size: no more than the loads excuse.
-                let load = self.loads.reaching(c) / unit;
+                let load = self.loads.reaching(c) * per;
                 let strength = self.own_w(c);
-                let own_x = rc.map(|r| strength * r / unit);
-                let apart = apart(&own_x, &uc.map(|u| value(u * per)), mu);
+                let own_x = rc.map(|r| strength * r * per);
+                let apart = apart(&own_x, &plain_u.map(|u| u * per), mu);
                 // Of an empty block the impulse is no term, but may be all there is.
-                let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] / unit));
+                let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] * per));
                 let terms = terms.max(norm(&own_x)).min(load);
-                let normal = (sizes[D * c] / unit).min(load);
+                let normal = (sizes[D * c] * per).min(load);
                 // Below the range of double precision there are no digits to be right.
-                let error = value(length(&residual)).max(apart) + left;
+                let error = share.residual.sqrt().max(apart) + left;
                 // No sliding, however fast, excuses a velocity into the obstacle.
-                let sinking = over((-value(uc[0] * per)).max(0.0), normal.max(LEAST));
+                let sinking = over((-plain_u[0] * per).max(0.0), normal.max(LEAST));
                 let of_own = over(error, terms.max(LEAST)).max(sinking);
                 if load > 0.0 && (of_own > own || of_own.is_nan()) {
                     (own_contact, own) = (c, of_own);
                 }
             }
-            let rc = rc.map(|r| T::from(r) * plain_per);
-            peer += square(&natural_map(&rc, &modified_plainly, mu));
-            primal += value(distance_to_cone(&x, mu)).powi(2);
-            // Much friction opens K* to nearly the whole space, and a velocity into the obstacle is near it: as far as with mu = 1.
-            let opening = ((1.0 + mu * mu) / (1.0 + mu.min(1.0).powi(2))).min(f64::MAX);
-            dual += opening * square(&nearest_in_cone(&modified.map(|v| -v), mu));
-            let products = x.iter().zip(&modified).map(|(&a, &b)| a * b);
-            complementarity += value(products.fold(T::from(0.0), |sum, p| sum + p)).abs();
+            let plain_r = rc.map(|r| r * plain_per);
+            let map = natural_map(&plain_r, &plain_modified.map(|u| u * plain_per), mu);
+            peer += map.iter().map(|v| v * v).sum::<f64>();
+            primal += share.primal;
+            dual += share.dual;
+            complementarity += share.complementarity;
         }
         // From units of a power of two to those of q.
         let q = unit / self.unit();

@@ -87,6 +87,27 @@ impl Rows {
         self.sizes[row] += product.abs();
     }
 
+    /// Adds `Σ B x` to D rows from `first` on, for blocks B, in doubled precision.
+    pub(super) fn add_blocks<'a, const D: usize>(
+        &mut self,
+        first: usize,
+        blocks: impl Iterator<Item = (&'a [[f64; D]; D], [f64; D])>,
+    ) {
+        // In registers, not in memory.
+        let mut sums: [Compensated; D] = std::array::from_fn(|k| self.sums[first + k]);
+        let mut sizes: [f64; D] = std::array::from_fn(|k| self.sizes[first + k]);
+        for (block, x) in blocks {
+            for k in 0..D {
+                for l in 0..D {
+                    sums[k].add_product(block[k][l], x[l]);
+                    sizes[k] += (block[k][l] * x[l]).abs();
+                }
+            }
+        }
+        self.sums[first..first + D].copy_from_slice(&sums);
+        self.sizes[first..first + D].copy_from_slice(&sizes);
+    }
+
     /// The sums, each rounded once.
     pub(super) fn values(&self) -> impl Iterator<Item = f64> + Clone + '_ {
         self.sums.iter().map(|s| s.value())
