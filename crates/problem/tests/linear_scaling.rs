@@ -157,7 +157,9 @@ fn a_point_that_runs_away_in_the_kernel_is_no_solution() {
     let problem = Lcp::new(m, vec![-1.0, -1.0]).unwrap();
     for t in [1e3, 1e9, 1e12, 1e15] {
         let found = problem.judge(&LcpPoint { z: vec![t, t] }, 1e-3).unwrap();
-        assert!(!found.solved && found.measure.relative >= 1.0, "{found:?}");
+        // At least one, and more by what doubled precision leaves in doubt only.
+        let relative = found.measure.relative;
+        assert!(!found.solved && (1.0..1.0 + 1e-12).contains(&relative), "{found:?}");
     }
     // Nor is one whose variables are far apart: the third is neither zero nor its w.
     let m = [[1.0, -1.0, 1.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 0.0]];

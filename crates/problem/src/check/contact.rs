@@ -39,6 +39,11 @@ pub(super) fn length<T: Real, const D: usize>(x: &[T; D]) -> T {
     x[0].hypot(tangential(x))
 }
 
+/// `x − y`.
+fn difference<T: Real, const D: usize>(x: &[T; D], y: &[T; D]) -> [T; D] {
+    std::array::from_fn(|k| x[k] - y[k])
+}
+
 /// `ũ = u + mu‖u_T‖ e_N`, De Saxcé's modified velocity.
 pub(super) fn modified_velocity<T: Real, const D: usize>(u: &[T; D], mu: f64) -> [T; D] {
     let mut modified = *u;
@@ -94,10 +99,7 @@ pub(super) fn natural_map<T: Real, const D: usize>(
     modified: &[T; D],
     mu: f64,
 ) -> [T; D] {
-    let mut y = *x;
-    for k in 0..D {
-        y[k] = y[k] - modified[k];
-    }
+    let y = difference(x, modified);
     let (t, zero, friction) = (tangential(&y), T::from(0.0), T::from(mu));
     let outside = t - friction * y[0];
     if outside <= zero && y[0] >= zero {
@@ -149,10 +151,7 @@ pub(super) fn is_at_rest_or_open<const D: usize>(
     mu: f64,
     error: f64,
 ) -> bool {
-    let mut y = *x;
-    for k in 0..D {
-        y[k] -= modified[k];
-    }
+    let y = difference(x, modified);
     let (t, margin) = (tangential(&y), (1.0 + mu) * error);
     t - mu * y[0] < -margin || y[0] + mu * t < -margin
 }
@@ -164,10 +163,7 @@ pub(super) fn status<const D: usize>(
     mu: f64,
     margin: f64,
 ) -> ContactStatus {
-    let mut y = *x;
-    for k in 0..D {
-        y[k] -= modified[k];
-    }
+    let y = difference(x, modified);
     let t = tangential(&y);
     let secant = (1.0 + mu * mu).sqrt();
     // Signed distances of y into K and into its polar cone −K*.

@@ -403,17 +403,20 @@ impl LawGauge {
             let plain_u = uc.map(|u| u.value());
             let plain_modified = modified_velocity::<f64, D>(&plain_u, mu);
             let near = (rc.map(|r| w * r * per), plain_modified.map(|u| u * per));
-            let size = length(&near.0) + length(&near.1);
-            // Of most contacts the natural map is ũ or x: once these are known, plain arithmetic is right to the last bits.
-            let plainly = T::DOUBT > 0.0 && is_at_rest_or_open(&near.0, &near.1, mu, PLAIN * size);
-            let (share, left) = if plainly {
-                let share = Share::new(&near.0, &near.1, mu);
-                let left = PLAIN * share.residual.sqrt();
-                (share, left)
+            let (share, left) = if T::DOUBT == 0.0 {
+                (Share::new(&near.0, &near.1, mu), 0.0)
             } else {
-                let x = rc.map(|r| T::of_product(w, r) * T::from(per));
-                let modified = modified_velocity::<T, D>(&uc, mu).map(|u| u * T::from(per));
-                (Share::new(&x, &modified, mu), T::DOUBT * size)
+                let size = length(&near.0) + length(&near.1);
+                // Of most contacts the natural map is ũ or x: once these are known, plain arithmetic is right to the last bits.
+                if is_at_rest_or_open(&near.0, &near.1, mu, PLAIN * size) {
+                    let share = Share::new(&near.0, &near.1, mu);
+                    let left = PLAIN * share.residual.sqrt();
+                    (share, left)
+                } else {
+                    let x = rc.map(|r| T::of_product(w, r) * T::from(per));
+                    let modified = modified_velocity::<T, D>(&uc, mu).map(|u| u * T::from(per));
+                    (Share::new(&x, &modified, mu), T::DOUBT * size)
+                }
             };
             if share.residual > worst || share.residual.is_nan() {
                 (worst_contact, worst) = (c, share.residual);

@@ -12,7 +12,6 @@
 //! Cost: at most 2ᵐ cases for m pairs; a pivot is rows · columns products of integers of rows · 53 bits at most. Storage: a tableau for each open case.
 
 use dashu_int::ops::{BitTest, Gcd, UnsignedAbs};
-
 use dashu_int::{IBig, UBig};
 use nonsmooth_problem::check::{ConeSystem, Exact, ExactVector};
 use nonsmooth_problem::linalg::budget;
