@@ -277,6 +277,7 @@ pub fn limits(tol: f64, iterations: Option<usize>, seconds: Option<f64>) -> Resu
         cancel: Some(interrupt::flag()),
         memory_limit: None,
         trace: false,
+        cpu_time: false,
     })
 }
 

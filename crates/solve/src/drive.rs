@@ -31,6 +31,8 @@ pub struct Limits {
     pub memory_limit: Option<u64>,
     /// Whether to keep the method's own record of its iterations ([`Session::trace`]); it grows with their number.
     pub trace: bool,
+    /// Whether to read the processor's clock too ([`Outcome::cpu_seconds`]), which costs two system calls: as much as a small contact problem.
+    pub cpu_time: bool,
 }
 
 impl Default for Limits {
@@ -42,6 +44,7 @@ impl Default for Limits {
             cancel: None,
             memory_limit: None,
             trace: false,
+            cpu_time: false,
         }
     }
 }
@@ -192,8 +195,8 @@ pub struct Outcome {
     pub factorisations: u64,
     /// Wall clock of the solve: set-up of the workspace, steps and judgements, but no file and no final report.
     pub seconds: f64,
-    /// Processor time of the whole process meanwhile, all threads: below `seconds` where the process had to wait.
-    pub cpu_seconds: f64,
+    /// Processor time of the whole process meanwhile, all threads, if [`Limits::cpu_time`] asked for it: below `seconds` where the process had to wait.
+    pub cpu_seconds: Option<f64>,
 }
 
 /// One visit of the judge.
@@ -209,21 +212,21 @@ pub struct Sample {
 
 /// What a solve uses up, from the preparation of the workspace on.
 #[derive(Debug, Clone, Copy)]
-struct Meter {
+pub(crate) struct Meter {
     /// When the solve was asked for: limits count from here, with the judge's preparation.
-    begun: Instant,
+    pub(crate) begun: Instant,
     wall: Instant,
-    cpu: ProcessTime,
+    cpu: Option<ProcessTime>,
     factorisations: u64,
 }
 
 impl Meter {
-    fn start(begun: Instant) -> Self {
-        let (wall, cpu) = (Instant::now(), ProcessTime::now());
-        Self { begun, wall, cpu, factorisations: factorisations() }
+    pub(crate) fn start(begun: Instant, limits: &Limits) -> Self {
+        let cpu = limits.cpu_time.then(ProcessTime::now);
+        Self { begun, wall: Instant::now(), cpu, factorisations: factorisations() }
     }
 
-    fn seconds(&self) -> f64 {
+    pub(crate) fn seconds(&self) -> f64 {
         self.wall.elapsed().as_secs_f64()
     }
 
@@ -246,14 +249,14 @@ impl Meter {
         }
     }
 
-    fn outcome(&self, status: Status, measure: Measure, iterations: usize) -> Outcome {
+    pub(crate) fn outcome(&self, status: Status, measure: Measure, iterations: usize) -> Outcome {
         Outcome {
             status,
             measure,
             iterations,
             factorisations: factorisations() - self.factorisations,
             seconds: self.seconds(),
-            cpu_seconds: self.cpu.elapsed().as_secs_f64(),
+            cpu_seconds: self.cpu.map(|cpu| cpu.elapsed().as_secs_f64()),
         }
     }
 }
@@ -335,13 +338,14 @@ const HISTORY: usize = 4096;
 /// Drives a solver. Keeps its workspace, so that a second solve of the same shape allocates nothing.
 pub struct Driver<P: Problem, S: Solver<P>> {
     solver: S,
-    kept: Option<Kept<P, S>>,
+    // Boxed: workspaces are large to move.
+    gauge: Option<Box<P::Gauge>>,
+    kept: Option<Box<Kept<P, S>>>,
     history: Vec<Sample>,
 }
 
 struct Kept<P: Problem, S: Solver<P>> {
     work: S::Work,
-    gauge: P::Gauge,
     best: P::Point,
     tidied: P::Point,
     /// A limit was reached inside a kernel, which left something unfinished.
@@ -351,7 +355,7 @@ struct Kept<P: Problem, S: Solver<P>> {
 impl<P: Problem, S: Solver<P>> Driver<P, S> {
     /// A driver for `solver`, without a workspace yet.
     pub fn new(solver: S) -> Self {
-        Self { solver, kept: None, history: Vec::with_capacity(HISTORY) }
+        Self { solver, gauge: None, kept: None, history: Vec::with_capacity(HISTORY) }
     }
 
     /// The solver.
@@ -372,54 +376,51 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
         limits.validate()?;
         problem.validate_point(point)?;
         let scope = limits.budget(begun).enter();
-        let Self { solver, kept, history } = self;
+        let Self { solver, gauge, kept, history } = self;
         history.clear();
         // What was cut short in a kernel is begun anew.
-        let earlier = kept.take().filter(|k| !k.torn);
+        let (earlier, gauge_before) = (kept.take().filter(|k| !k.torn), gauge.take());
         // The judge's own preparation is not part of the solve's time.
-        let (gauge, earlier) = match earlier {
-            Some(Kept { work, mut gauge, best, tidied, .. }) => {
-                (problem.regauge(&mut gauge).map(|()| gauge), Some((work, best, tidied)))
-            }
-            None => (problem.gauge(), None),
+        let judge = match gauge_before.filter(|_| earlier.is_some()) {
+            Some(mut gauge) => problem.regauge(&mut gauge).map(|()| gauge),
+            None => problem.gauge().map(Box::new),
         };
-        let meter = Meter::start(begun);
-        let mut gauge = match gauge {
-            Ok(gauge) => gauge,
+        let meter = Meter::start(begun, limits);
+        let judge: &mut P::Gauge = match judge {
+            Ok(judge) => gauge.insert(judge),
             Err(e) => return meter.ended(Measure::unknown(), limits, &scope, e.into()),
         };
         // Whatever happens in the preparation, there is a judged point.
         let start = observer.keeps_best().then(|| {
-            let measure = problem.measure(point, &mut gauge);
+            let measure = problem.measure(point, judge);
             observer.best(point, &measure);
             measure
         });
-        let (work, best, tidied) = match earlier {
-            Some((mut work, best, tidied)) => {
-                (solver.refill(problem, &mut work).map(|()| work), best, tidied)
-            }
-            None => (solver.work(problem), point.clone(), point.clone()),
+        let ready = match earlier {
+            Some(mut k) => solver.refill(problem, &mut k.work).map(|()| k),
+            None => solver.work(problem).map(|work| {
+                Box::new(Kept { work, best: point.clone(), tidied: point.clone(), torn: false })
+            }),
         };
-        let work = match work {
-            Ok(work) => work,
+        let mut now = match ready {
+            Ok(now) => now,
             Err(e) => {
                 let measure = match start {
                     Some(measure) => measure,
-                    None if scope.raised() => problem.measure(point, &mut gauge),
+                    None if scope.raised() => problem.measure(point, judge),
                     None => Measure::unknown(),
                 };
                 return meter.ended(measure, limits, &scope, e);
             }
         };
-        let mut now = Kept { work, gauge, best, tidied, torn: false };
         let outcome = {
-            let Kept { work, gauge, best, tidied, .. } = &mut now;
+            let Kept { work, best, tidied, .. } = &mut *now;
             P::copy_point(point, best);
             let mut run = Run {
                 problem,
                 solver,
                 work,
-                judge: Judge::new(gauge, best, tidied, history, meter, solver.latest()),
+                judge: Judge::new(judge, best, tidied, history, meter, solver.latest()),
                 limits,
                 scope: &scope,
                 observer,

@@ -86,6 +86,7 @@ fn solve<P: Registered>(problem: &P, task: &Task, solvers: &impl Solvers) -> Res
         tolerance,
         max_iterations: usize::MAX,
         time_limit: Some(time_limit),
+        cpu_time: true,
         ..Limits::default()
     };
     // Each solve has a workspace of its own: what is timed is a solver that meets the problem for the first time.
@@ -132,7 +133,7 @@ fn solve<P: Registered>(problem: &P, task: &Task, solvers: &impl Solvers) -> Res
         seconds_median: Some(seconds[seconds.len() / 2]),
         seconds_max: Some(seconds[seconds.len() - 1]),
         repeats: seconds.len() as u32,
-        cpu_seconds: Some(outcome.cpu_seconds),
+        cpu_seconds: outcome.cpu_seconds,
         peak_memory: system::peak_memory(),
         loaded_memory,
         residuals: residuals(&outcome.measure),

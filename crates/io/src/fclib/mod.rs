@@ -63,7 +63,7 @@ pub struct Info {
     pub description: Option<String>,
     /// The dataset `math_info`.
     pub math_info: Option<String>,
-    /// The attribute `numberOfDegreeOfFreedom`; anything but one non-negative integer reads as `None`.
+    /// The attribute `numberOfDegreeOfFreedom`; anything but one non-negative C int reads as `None`.
     pub dofs: Option<usize>,
     /// The attribute `numberOfInvolvedDS` of older files: the number of bodies, read like `dofs`.
     pub involved_ds: Option<usize>,

@@ -163,7 +163,8 @@ fn info(problem: &Folder) -> Result<Info, IoError> {
     let count = |name: &str| -> Result<Option<usize>, IoError> {
         let found = g.data.attribute(g.group.address, name);
         let found = found.map_err(|e| fault(g.file, &g.path, e))?;
-        Ok(found.and_then(|n| usize::try_from(n).ok()))
+        // FCLIB has a C int here.
+        Ok(found.and_then(|n| u32::try_from(i32::try_from(n).ok()?).ok()).map(|n| n as usize))
     };
     Ok(Info {
         title: g.text("title")?,

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::linalg::Real;
+use crate::linalg::{Real, power_of_two};
 
 /// What a contact does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
@@ -51,42 +51,31 @@ pub(super) fn modified_velocity<T: Real, const D: usize>(u: &[T; D], mu: f64) ->
     modified
 }
 
-/// `1 + mu²` and its root.
-fn secant<T: Real>(mu: f64) -> (T, T) {
-    let square = T::from(1.0) + T::of_product(mu, mu);
-    (square, square.sqrt())
-}
-
-/// The nearest point of `K = {‖x_T‖ ≤ mu x_N}`; of −y its size is `dist(y, K*)` with `K* = {mu‖y_T‖ ≤ y_N}`, by Moreau's decomposition. In the half-plane of `(x_N, ‖x_T‖)`:
-/// x itself inside, else its projection on the ray `(cos φ, sin φ)`, `tan φ = mu`, or the apex.
-pub(super) fn nearest_in_cone<T: Real, const D: usize>(x: &[T; D], mu: f64) -> [T; D] {
-    let (t, zero, friction) = (tangential(x), T::from(0.0), T::from(mu));
-    // Without friction K is a half line: t = 0 alone does not put x on it.
-    if t <= friction * x[0] && x[0] >= zero {
-        return *x;
-    }
-    let (square, _) = secant::<T>(mu);
-    let along = x[0] + friction * t;
-    let mut p = [zero; D];
-    if along > zero {
-        p[0] = along / square;
-        for k in 1..D {
-            p[k] = if t > zero { friction * p[0] * (x[k] / t) } else { zero };
-        }
-    }
-    p
-}
-
-/// `dist(x, K)`.
-pub(super) fn distance_to_cone<T: Real, const D: usize>(x: &[T; D], mu: f64) -> T {
+/// `dist(x, K)`, `K = {‖x_T‖ ≤ mu x_N}`. In the half-plane of `(x_N, ‖x_T‖)`: to the ray `(cos φ, sin φ)`, `tan φ = mu`, or to the apex.
+///
+/// What nearly cancels is done in T, the rest plainly: so are all distances here.
+pub(super) fn distance_to_cone<T: Real, const D: usize>(x: &[T; D], mu: f64) -> f64 {
     let t = tangential(x);
     let outside = t - T::from(mu) * x[0];
     if outside <= T::from(0.0) && x[0] >= T::from(0.0) {
-        T::from(0.0)
+        0.0
     } else if x[0] + T::from(mu) * t <= T::from(0.0) {
-        length(x)
+        length(&x.map(|v| v.value()))
     } else {
-        outside / secant::<T>(mu).1
+        outside.value() / 1.0.hypot(mu)
+    }
+}
+
+/// `dist(ũ, K*)`, `K* = {mu‖y_T‖ ≤ y_N}`, from u: with Moreau's decomposition the size of the nearest point of K to −ũ, of which `−u_N` is
+/// the part along K's side.
+fn distance_to_dual<const D: usize>(u: &[f64; D], mu: f64) -> f64 {
+    let modified = modified_velocity(u, mu);
+    if u[0] >= 0.0 {
+        0.0
+    } else if tangential(u) + mu * modified[0] <= 0.0 {
+        length(&modified)
+    } else {
+        -u[0] / 1.0.hypot(mu)
     }
 }
 
@@ -98,24 +87,27 @@ pub(super) fn natural_map<T: Real, const D: usize>(
     x: &[T; D],
     modified: &[T; D],
     mu: f64,
-) -> [T; D] {
+) -> [f64; D] {
     let y = difference(x, modified);
     let (t, zero, friction) = (tangential(&y), T::from(0.0), T::from(mu));
     let outside = t - friction * y[0];
     if outside <= zero && y[0] >= zero {
-        return *modified;
+        return modified.map(|v| v.value());
     }
     if y[0] + friction * t <= zero {
-        return *x;
+        return x.map(|v| v.value());
     }
-    // d n = (outside/secant) (−mu, y_T/t)/secant.
-    let scale = outside / secant::<T>(mu).0;
-    let mut phi = *modified;
-    phi[0] = phi[0] - friction * scale;
-    for k in 1..D {
-        phi[k] = phi[k] + scale * (y[k] / t);
-    }
-    phi
+    // d n = outside/square (−mu, y_T/t), square = 1 + mu²; times the divisors, that T need not divide. A power of two keeps t from underflow.
+    let square = T::from(1.0) + T::of_product(mu, mu);
+    let per = 1.0 / power_of_two(t.value());
+    let divisor = square * t.times_power(per);
+    std::array::from_fn(|k| match k {
+        0 => (square * modified[0] - friction * outside).value() / square.value(),
+        _ if t > zero => {
+            (divisor * modified[k] + outside * y[k].times_power(per)).value() / divisor.value()
+        }
+        _ => modified[k].value(),
+    })
 }
 
 /// What one contact adds to the residuals, from x and ũ.
@@ -131,14 +123,20 @@ pub(super) struct Share {
 }
 
 impl Share {
-    pub(super) fn new<T: Real, const D: usize>(x: &[T; D], modified: &[T; D], mu: f64) -> Self {
-        let square = |x: &[T; D]| x.iter().map(|v| v.value().powi(2)).sum::<f64>();
+    /// From x, u and ũ.
+    pub(super) fn new<T: Real, const D: usize>(
+        x: &[T; D],
+        u: &[T; D],
+        modified: &[T; D],
+        mu: f64,
+    ) -> Self {
+        let square = |x: [f64; D]| x.iter().map(|v| v * v).sum::<f64>();
         let opening = ((1.0 + mu * mu) / (1.0 + mu.min(1.0).powi(2))).min(f64::MAX);
         let products = x.iter().zip(modified).map(|(&a, &b)| a * b);
         Self {
-            residual: square(&natural_map(x, modified, mu)),
-            primal: distance_to_cone(x, mu).value().powi(2),
-            dual: opening * square(&nearest_in_cone(&modified.map(|v| -v), mu)),
+            residual: square(natural_map(x, modified, mu)),
+            primal: distance_to_cone(x, mu).powi(2),
+            dual: opening * distance_to_dual(&u.map(|v| v.value()), mu).powi(2),
             complementarity: products.fold(T::from(0.0), |sum, p| sum + p).value().abs(),
         }
     }
@@ -184,10 +182,6 @@ pub(super) fn status<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn distance_to_dual<const D: usize>(y: &[f64; D], mu: f64) -> f64 {
-        length(&nearest_in_cone(&y.map(|v| -v), mu))
-    }
 
     #[test]
     fn the_three_regions() {

@@ -17,6 +17,8 @@ pub(super) struct Loads {
     most: Vec<f64>,
     /// ω.
     reaching: Vec<f64>,
+    /// How many groups of rows are not coupled with each other.
+    groups: usize,
 }
 
 impl Loads {
@@ -26,6 +28,12 @@ impl Loads {
         self.parent.extend(0..n);
         self.level.clear();
         self.level.resize(n, 0.0);
+        self.groups = n;
+    }
+
+    /// Whether all rows are coupled: more couplings change nothing.
+    pub(super) fn are_joined(&self) -> bool {
+        self.groups <= 1
     }
 
     /// The root of i, and `log₂` of the unit of i over that of the root; the path to it is shortened.
@@ -53,6 +61,7 @@ impl Loads {
             let ratio = ratio();
             let ratio = if ratio > 0.0 && ratio.is_finite() { ratio.log2() } else { 0.0 };
             // log s_i − log s_j = ratio, with log s_i = of_i + level(a).
+            self.groups -= 1;
             self.parent[a] = b;
             self.level[a] = ratio + of_j - of_i;
         }

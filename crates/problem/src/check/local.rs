@@ -70,9 +70,13 @@ impl LocalGauge {
                 if missing(known[i]) && known[j] > 0.0 {
                     strength[i] = strength[i].max(a * all.entry(j, i) / known[j]);
                 }
+                true
             });
             known.fill(0.0);
-            all.each(|i, j, a| known[j] = known[j].max(amounts[i] / a));
+            all.each(|i, j, a| {
+                known[j] = known[j].max(amounts[i] / a);
+                true
+            });
             for i in 0..n {
                 if missing(strength[i]) && known[i] > 0.0 {
                     strength[i] = amounts[i] / known[i];
@@ -86,6 +90,7 @@ impl LocalGauge {
                 (r, s, back) if r > 0.0 && s > 0.0 => (r / s * (a / back)).sqrt(),
                 _ => amounts[i] / amounts[j],
             });
+            !loads.are_joined()
         });
         loads.spread(amounts.iter().copied());
     }
@@ -187,11 +192,7 @@ impl LocalGauge {
     ) {
         let Self { u, exact, sizes, rows, .. } = self;
         rows.start(&problem.q);
-        for i in 0..problem.contacts() {
-            let (cols, blocks) = problem.W.row(i);
-            let blocks = cols.iter().zip(blocks);
-            rows.add_blocks(D * i, blocks.map(|(&j, b)| (b, small::block(&point.r, j as usize))));
-        }
+        rows.add_blocks(&problem.W, &point.r);
         if let Some(b) = &problem.bilateral {
             rows.add(1.0, &b.V, &point.lambda);
         }
@@ -297,25 +298,28 @@ impl<const D: usize> Saddle<'_, D> {
         }
     }
 
-    /// Calls with row, column and modulus for all that is not zero beside the diagonal; entries of a block of V one by one.
-    fn each(&self, mut call: impl FnMut(usize, usize, f64)) {
+    /// Calls with row, column and modulus for all that is not zero beside the diagonal, as long as the call wants more; entries of a block of V one by one.
+    fn each(&self, mut call: impl FnMut(usize, usize, f64) -> bool) {
         let nc = self.0.contacts();
         for i in 0..nc {
             let (cols, blocks) = self.0.W.row(i);
             for (&j, block) in cols.iter().zip(blocks).filter(|(j, _)| **j as usize != i) {
                 let a = largest(block);
-                if a > 0.0 {
-                    call(i, j as usize, a);
+                if a > 0.0 && !call(i, j as usize, a) {
+                    return;
                 }
             }
         }
         let Some(b) = &self.0.bilateral else { return };
         for (i, j, v) in b.V.triplets().filter(|e| e.2 != 0.0) {
-            call(i / D, nc + j, v.abs());
-            call(nc + j, i / D, v.abs());
+            if !(call(i / D, nc + j, v.abs()) && call(nc + j, i / D, v.abs())) {
+                return;
+            }
         }
         for (i, j, x) in b.R.triplets().filter(|e| e.2 != 0.0 && e.0 != e.1) {
-            call(nc + i, nc + j, x.abs());
+            if !call(nc + i, nc + j, x.abs()) {
+                return;
+            }
         }
     }
 }
@@ -403,19 +407,21 @@ impl LawGauge {
             let plain_u = uc.map(|u| u.value());
             let plain_modified = modified_velocity::<f64, D>(&plain_u, mu);
             let near = (rc.map(|r| w * r * per), plain_modified.map(|u| u * per));
+            let plainly = || Share::new(&near.0, &plain_u.map(|u| u * per), &near.1, mu);
             let (share, left) = if T::DOUBT == 0.0 {
-                (Share::new(&near.0, &near.1, mu), 0.0)
+                (plainly(), 0.0)
             } else {
                 let size = length(&near.0) + length(&near.1);
                 // Of most contacts the natural map is ũ or x: once these are known, plain arithmetic is right to the last bits.
                 if is_at_rest_or_open(&near.0, &near.1, mu, PLAIN * size) {
-                    let share = Share::new(&near.0, &near.1, mu);
+                    let share = plainly();
                     let left = PLAIN * share.residual.sqrt();
                     (share, left)
                 } else {
-                    let x = rc.map(|r| T::of_product(w, r) * T::from(per));
-                    let modified = modified_velocity::<T, D>(&uc, mu).map(|u| u * T::from(per));
-                    (Share::new(&x, &modified, mu), T::DOUBT * size)
+                    let x = rc.map(|r| T::of_product(w, r).times_power(per));
+                    let u = uc.map(|u| u.times_power(per));
+                    let modified = modified_velocity(&u, mu);
+                    (Share::new(&x, &u, &modified, mu), T::DOUBT * size)
                 }
             };
             if share.residual > worst || share.residual.is_nan() {

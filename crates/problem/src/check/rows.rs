@@ -1,6 +1,6 @@
 //! Sums of matrix–vector products, row by row, plainly or in doubled precision.
 
-use crate::linalg::{Compensated, Csc, Doubled, Matrix, norm_of};
+use crate::linalg::{Bsr, Compensated, Csc, Doubled, Matrix, norm_of};
 
 /// One compensated sum for each row, and the sum of the sizes of its terms.
 #[derive(Debug, Clone, Default)]
@@ -34,11 +34,17 @@ impl Rows {
 
     /// Adds `sign · A x`.
     pub(super) fn add(&mut self, sign: f64, a: &Csc, x: &[f64]) {
-        for (j, &xj) in x.iter().enumerate() {
-            let (rows, values) = a.column(j);
-            for (&i, &v) in rows.iter().zip(values) {
-                self.add_product(i, sign * v, xj);
+        if self.plainly {
+            for (j, &xj) in x.iter().enumerate() {
+                let (rows, values) = a.column(j);
+                for (&i, &v) in rows.iter().zip(values) {
+                    let product = sign * v * xj;
+                    self.sums[i].add_plainly(product);
+                    self.sizes[i] += product.abs();
+                }
             }
+        } else {
+            fused::add(&mut self.sums, &mut self.sizes, (sign, a, x));
         }
     }
 
@@ -67,11 +73,19 @@ impl Rows {
 
     /// Adds `Aᵀ x`.
     pub(super) fn add_transposed(&mut self, a: &Csc, x: &[f64]) {
-        for j in 0..a.ncols() {
-            let (rows, values) = a.column(j);
-            for (&i, &v) in rows.iter().zip(values) {
-                self.add_product(j, v, x[i]);
+        if self.plainly {
+            for j in 0..a.ncols() {
+                let (rows, values) = a.column(j);
+                let (mut sum, mut size) = (self.sums[j], self.sizes[j]);
+                for (&i, &v) in rows.iter().zip(values) {
+                    let product = v * x[i];
+                    sum.add_plainly(product);
+                    size += product.abs();
+                }
+                (self.sums[j], self.sizes[j]) = (sum, size);
             }
+        } else {
+            fused::add_transposed(&mut self.sums, &mut self.sizes, (a, x));
         }
     }
 
@@ -87,25 +101,9 @@ impl Rows {
         self.sizes[row] += product.abs();
     }
 
-    /// Adds `Σ B x` to D rows from `first` on, for blocks B, in doubled precision.
-    pub(super) fn add_blocks<'a, const D: usize>(
-        &mut self,
-        first: usize,
-        blocks: impl Iterator<Item = (&'a [[f64; D]; D], [f64; D])>,
-    ) {
-        // In registers, not in memory.
-        let mut sums: [Compensated; D] = std::array::from_fn(|k| self.sums[first + k]);
-        let mut sizes: [f64; D] = std::array::from_fn(|k| self.sizes[first + k]);
-        for (block, x) in blocks {
-            for k in 0..D {
-                for l in 0..D {
-                    sums[k].add_product(block[k][l], x[l]);
-                    sizes[k] += (block[k][l] * x[l]).abs();
-                }
-            }
-        }
-        self.sums[first..first + D].copy_from_slice(&sums);
-        self.sizes[first..first + D].copy_from_slice(&sizes);
+    /// Adds `W x` in doubled precision.
+    pub(super) fn add_blocks<const D: usize>(&mut self, w: &Bsr<D>, x: &[f64]) {
+        fused::add_blocks(&mut self.sums, &mut self.sizes, (w, x));
     }
 
     /// The sums, each rounded once.
@@ -134,4 +132,97 @@ impl Rows {
 pub(super) fn doubt(n: usize) -> f64 {
     let gamma = 0.5 * f64::EPSILON * (n + 2) as f64;
     gamma * gamma
+}
+
+/// The kernels in doubled precision, each compiled twice: the error of a product costs one operation on a machine with fused
+/// multiplication and addition (found at run time), else seventeen. Both make the same bits.
+mod fused {
+    use crate::linalg::{Bsr, Compensated, Csc, small};
+
+    /// Defines a kernel that calls the faster of the two bodies.
+    macro_rules! kernel {
+        ($name:ident $([const $D:ident])?, $body:ident, $data:ty) => {
+            pub(super) fn $name$(<const $D: usize>)?(
+                sums: &mut [Compensated],
+                sizes: &mut [f64],
+                data: $data,
+            ) {
+                #[cfg(target_arch = "x86_64")]
+                {
+                    #[target_feature(enable = "avx2,fma")]
+                    fn with_fma$(<const $D: usize>)?(
+                        sums: &mut [Compensated],
+                        sizes: &mut [f64],
+                        data: $data,
+                    ) {
+                        $body::<true $(, $D)?>(sums, sizes, data);
+                    }
+                    if std::arch::is_x86_feature_detected!("avx2")
+                        && std::arch::is_x86_feature_detected!("fma")
+                    {
+                        // SAFETY: the features were just found.
+                        return unsafe { with_fma(sums, sizes, data) };
+                    }
+                }
+                $body::<false $(, $D)?>(sums, sizes, data);
+            }
+        };
+    }
+    kernel!(add, add_by, (f64, &Csc, &[f64]));
+    kernel!(add_transposed, add_transposed_by, (&Csc, &[f64]));
+    kernel!(add_blocks[const D], add_blocks_by, (&Bsr<D>, &[f64]));
+
+    #[inline(always)]
+    fn add_by<const FUSED: bool>(
+        sums: &mut [Compensated],
+        sizes: &mut [f64],
+        (sign, a, x): (f64, &Csc, &[f64]),
+    ) {
+        for (j, &xj) in x.iter().enumerate() {
+            let (rows, values) = a.column(j);
+            for (&i, &v) in rows.iter().zip(values) {
+                sums[i].add_product_by::<FUSED>(sign * v, xj);
+                sizes[i] += (v * xj).abs();
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn add_transposed_by<const FUSED: bool>(
+        sums: &mut [Compensated],
+        sizes: &mut [f64],
+        (a, x): (&Csc, &[f64]),
+    ) {
+        for (j, (sum, size)) in sums.iter_mut().zip(sizes).take(a.ncols()).enumerate() {
+            let (rows, values) = a.column(j);
+            for (&i, &v) in rows.iter().zip(values) {
+                sum.add_product_by::<FUSED>(v, x[i]);
+                *size += (v * x[i]).abs();
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn add_blocks_by<const FUSED: bool, const D: usize>(
+        sums: &mut [Compensated],
+        sizes: &mut [f64],
+        (w, x): (&Bsr<D>, &[f64]),
+    ) {
+        let (sums, sizes) = (sums.as_chunks_mut::<D>().0, sizes.as_chunks_mut::<D>().0);
+        for (i, (of_sums, of_sizes)) in sums.iter_mut().zip(sizes).enumerate() {
+            // In registers, not in memory.
+            let (mut sum, mut size) = (*of_sums, *of_sizes);
+            let (cols, blocks) = w.row(i);
+            for (&j, block) in cols.iter().zip(blocks) {
+                let x: [f64; D] = small::block(x, j as usize);
+                for k in 0..D {
+                    for l in 0..D {
+                        sum[k].add_product_by::<FUSED>(block[k][l], x[l]);
+                        size[k] += (block[k][l] * x[l]).abs();
+                    }
+                }
+            }
+            (*of_sums, *of_sizes) = (sum, size);
+        }
+    }
 }

@@ -49,7 +49,18 @@ impl Compensated {
     /// Adds `a b`, its rounding error included.
     #[inline]
     pub fn add_product(&mut self, a: f64, b: f64) {
+        self.add_product_by::<false>(a, b);
+    }
+
+    /// The same, `FUSED` with one fused multiplication and addition for the error: for functions that are compiled for machines that have it.
+    #[inline(always)]
+    pub(crate) fn add_product_by<const FUSED: bool>(&mut self, a: f64, b: f64) {
         let product = a * b;
+        if FUSED {
+            self.add(product);
+            self.error += a.mul_add(b, -product);
+            return;
+        }
         let (a_high, a_low) = split(a);
         let (b_high, b_low) = split(b);
         let error = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low;

@@ -57,12 +57,6 @@ impl Doubled {
     pub fn parts(self) -> (f64, f64) {
         (self.high, self.low)
     }
-
-    /// Times a power of two: exact where nothing underflows.
-    #[inline]
-    pub fn times_power(self, power: f64) -> Self {
-        Self { high: power * self.high, low: power * self.low }
-    }
 }
 
 impl From<f64> for Doubled {
@@ -130,6 +124,17 @@ impl Div for Doubled {
     }
 }
 
+impl Div<f64> for Doubled {
+    type Output = Self;
+    #[inline]
+    fn div(self, other: f64) -> Self {
+        let first = self.high / other;
+        let product = Self::product(first, other);
+        let rest = (self.high - product.high) - product.low + self.low;
+        Self::new(first, rest / other)
+    }
+}
+
 /// The arithmetic in which the law at a contact is judged: plain or doubled.
 pub trait Real:
     Copy
@@ -151,6 +156,8 @@ pub trait Real:
     fn value(self) -> f64;
     /// `a b` with all its digits.
     fn of_product(a: f64, b: f64) -> Self;
+    /// Times a power of two: exact where nothing underflows.
+    fn times_power(self, power: f64) -> Self;
     /// `|x|`.
     #[inline]
     fn modulus(self) -> Self {
@@ -178,6 +185,10 @@ impl Real for f64 {
     fn of_product(a: f64, b: f64) -> Self {
         a * b
     }
+    #[inline]
+    fn times_power(self, power: f64) -> Self {
+        self * power
+    }
 }
 
 impl Real for Doubled {
@@ -193,6 +204,11 @@ impl Real for Doubled {
         Self::new(guess, rest.high / (2.0 * guess))
     }
     fn hypot(self, other: Self) -> Self {
+        let sum = self * self + other * other;
+        // Where no part of a square leaves the range.
+        if (1e-200..1e280).contains(&sum.high) {
+            return sum.sqrt();
+        }
         let largest = self.high.abs().max(other.high.abs());
         if largest == 0.0 || !largest.is_finite() {
             return Self::from(largest);
@@ -211,6 +227,10 @@ impl Real for Doubled {
     #[inline]
     fn of_product(a: f64, b: f64) -> Self {
         Self::product(a, b)
+    }
+    #[inline]
+    fn times_power(self, power: f64) -> Self {
+        Self { high: power * self.high, low: power * self.low }
     }
 }
 
@@ -255,6 +275,7 @@ mod tests {
                 (a - b, &x - &y),
                 (a * b, &x * &y),
                 (a / b, &x / &y),
+                (a / b.high, &x / &RBig::try_from(b.high).unwrap()),
                 // What is left of a difference is exact to the digits of its terms.
                 ((a + b) - a, y.clone()),
             ] {

@@ -399,7 +399,7 @@ impl Component {
         let Component { index, factor } = self;
         if let (Factor::Scalar(entry), false) = (factor, inverse.regularised) {
             let i = index[0];
-            let quotient = Doubled::new(high[i], low[i]) / Doubled::from(*entry);
+            let quotient = Doubled::new(high[i], low[i]) / *entry;
             (high[i], low[i]) = quotient.parts();
             last[i] = 0.0;
             return;
@@ -487,7 +487,7 @@ fn factorise(a: &Csc, index: &[usize], place: &[(u32, u32)]) -> Option<Factor> {
     });
     if n <= DENSE_LIMIT {
         let mut dense = vec![0.0; n * n];
-        entries.for_each(|(i, j, x)| dense[i * n + j] = x);
+        entries.for_each(|(i, j, x)| dense[j * n + i] = x);
         return DenseLu::new(dense, n).map(Factor::Dense);
     }
     let triplets: Vec<_> = entries.map(|(i, j, x)| Triplet::new(i, j, x)).collect();
@@ -549,7 +549,7 @@ fn connected_components(a: &Csc) -> (Vec<Vec<usize>>, Vec<(u32, u32)>) {
     (components, place)
 }
 
-/// Dense LU with partial pivoting, by rows.
+/// Dense LU with partial pivoting, by columns: no sum waits for its last term.
 #[derive(Debug, Clone)]
 struct DenseLu {
     n: usize,
@@ -561,23 +561,21 @@ impl DenseLu {
     fn new(mut lu: Vec<f64>, n: usize) -> Option<Self> {
         let mut swaps = Vec::with_capacity(n);
         for k in 0..n {
-            let p = (k..n).max_by(|&i, &j| lu[i * n + k].abs().total_cmp(&lu[j * n + k].abs()))?;
-            if lu[p * n + k] == 0.0 || !lu[p * n + k].is_finite() {
+            let (done, rest) = lu.split_at_mut((k + 1) * n);
+            let pivots = &mut done[k * n..];
+            let p = (k..n).max_by(|&i, &j| pivots[i].abs().total_cmp(&pivots[j].abs()))?;
+            let pivot = pivots[p];
+            if pivot == 0.0 || !pivot.is_finite() {
                 return None;
             }
             swaps.push(p as u32);
-            if p != k {
-                for j in 0..n {
-                    lu.swap(k * n + j, p * n + j);
-                }
+            pivots.swap(k, p);
+            pivots[k + 1..].iter_mut().for_each(|l| *l /= pivot);
+            for column in rest.chunks_exact_mut(n) {
+                column.swap(k, p);
+                subtract(column[k], &pivots[k + 1..], &mut column[k + 1..]);
             }
-            for i in k + 1..n {
-                let f = lu[i * n + k] / lu[k * n + k];
-                lu[i * n + k] = f;
-                for j in k + 1..n {
-                    lu[i * n + j] -= f * lu[k * n + j];
-                }
-            }
+            done[..k * n].chunks_exact_mut(n).for_each(|column| column.swap(k, p));
         }
         Some(Self { n, lu, swaps })
     }
@@ -587,16 +585,20 @@ impl DenseLu {
         for (k, &p) in self.swaps.iter().enumerate() {
             x.swap(k, p as usize);
         }
-        for i in 0..n {
-            let row = &self.lu[i * n..i * n + i];
-            x[i] -= row.iter().zip(x.iter()).map(|(l, y)| l * y).sum::<f64>();
+        for (k, column) in self.lu.chunks_exact(n).enumerate() {
+            subtract(x[k], &column[k + 1..], &mut x[k + 1..]);
         }
-        for i in (0..n).rev() {
-            let row = &self.lu[i * n..(i + 1) * n];
-            let tail = row[i + 1..].iter().zip(&x[i + 1..n]).map(|(u, y)| u * y).sum::<f64>();
-            x[i] = (x[i] - tail) / row[i];
+        for (k, column) in self.lu.chunks_exact(n).enumerate().rev() {
+            x[k] /= column[k];
+            subtract(x[k], &column[..k], &mut x[..k]);
         }
     }
+}
+
+/// `y ← y − a x`.
+#[inline(always)]
+fn subtract(a: f64, x: &[f64], y: &mut [f64]) {
+    y.iter_mut().zip(x).for_each(|(y, x)| *y -= a * x);
 }
 
 #[cfg(test)]

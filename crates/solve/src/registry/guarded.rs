@@ -4,11 +4,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use cpu_time::ProcessTime;
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Measure;
 
 use super::{Registered, bare};
+use crate::drive::Meter;
 use crate::guard::{self, locked};
 use crate::settings::SettingsMap;
 use crate::trace::Trace;
@@ -95,13 +95,13 @@ impl<P: Registered> Session<P> for Guarded<P> {
             self.session = Some(session);
             return outcome;
         }
-        let (wall, cpu) = (Instant::now(), ProcessTime::now());
+        let meter = Meter::start(Instant::now(), limits);
         self.history.clear();
         self.account.clear();
         let told = Mutex::new(Told { progress: None, best: None });
         let seen = Arc::new(Seen { asked: AtomicBool::new(true), told });
         let copy = (problem.clone(), point.clone(), seen.clone());
-        let left = limits.time_limit.map(|t| t - wall.elapsed().as_secs_f64());
+        let left = limits.time_limit.map(|t| t - meter.seconds());
         let left = Limits { time_limit: left.map(|t| t.max(0.0)), ..limits.clone() };
         let history = &mut self.history;
         let mut last = None;
@@ -141,15 +141,9 @@ impl<P: Registered> Session<P> for Guarded<P> {
                     self.name
                 ));
                 let solved = measure.passes(limits.tolerance);
-                Ok(Outcome {
-                    status: if solved { Status::Solved } else { Status::Limit(limit) },
-                    measure,
-                    iterations: last.map_or(0, |p| p.iteration),
-                    // Those of the other thread are not known here.
-                    factorisations: 0,
-                    seconds: wall.elapsed().as_secs_f64(),
-                    cpu_seconds: cpu.elapsed().as_secs_f64(),
-                })
+                let status = if solved { Status::Solved } else { Status::Limit(limit) };
+                // The factorisations of the other thread are not known here.
+                Ok(meter.outcome(status, measure, last.map_or(0, |p| p.iteration)))
             }
         }
     }

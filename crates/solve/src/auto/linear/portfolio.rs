@@ -3,10 +3,10 @@
 use std::borrow::Cow;
 use std::time::Instant;
 
-use cpu_time::ProcessTime;
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Measure;
 
+use crate::drive::Meter;
 use crate::registry::{self, Registered};
 use crate::settings::SettingsMap;
 use crate::trace::Trace;
@@ -77,8 +77,7 @@ impl<P: Registered> Portfolio<P> {
 
 /// What has been done, and found, so far.
 struct Tally<P: Problem> {
-    wall: Instant,
-    cpu: ProcessTime,
+    meter: Meter,
     iterations: usize,
     factorisations: u64,
     best: Option<(P::Point, Measure)>,
@@ -96,7 +95,7 @@ impl<P: Problem> Tally<P> {
 
     /// What is left of the limits for a candidate.
     fn left(&self, limits: &Limits, iterations: usize) -> Limits {
-        let seconds = self.wall.elapsed().as_secs_f64();
+        let seconds = self.meter.seconds();
         Limits {
             max_iterations: limits.max_iterations.saturating_sub(self.iterations).min(iterations),
             time_limit: limits.time_limit.map(|t| (t - seconds).max(0.0)),
@@ -154,13 +153,12 @@ impl<P: Registered> Session<P> for Portfolio<P> {
         self.account.clear();
         self.trace = Trace::None;
         let mut tally = Tally::<P> {
-            wall: Instant::now(),
-            cpu: ProcessTime::now(),
+            meter: Meter::start(Instant::now(), limits),
             iterations: 0,
             factorisations: 0,
             best: None,
         };
-        let scope = limits.budget(tally.wall).enter();
+        let scope = limits.budget(tally.meter.begun).enter();
         if observer.keeps_best() {
             // The plan asks for the classes of the matrix, which may take all the time there is.
             observer.best(point, &problem.measure(point, &mut problem.gauge()?));
@@ -168,13 +166,13 @@ impl<P: Registered> Session<P> for Portfolio<P> {
         let mut status = Status::Stalled("no method applies to this problem".into());
         let mut nearly = None;
         for candidate in (self.plan)(problem) {
-            if let Some(limit) = limits.reached(tally.wall) {
+            if let Some(limit) = limits.reached(tally.meter.begun) {
                 status = Status::Limit(limit);
                 break;
             }
             let k = self.session(&candidate)?;
             let mut trial = tally.best.as_ref().map_or_else(|| point.clone(), |b| b.0.clone());
-            let (before, begun) = (tally.iterations, tally.wall.elapsed().as_secs_f64());
+            let (before, begun) = (tally.iterations, tally.meter.seconds());
             let left = tally.left(limits, candidate.iterations);
             let session = &mut self.sessions[k].2;
             let merit = tally.best.as_ref().map_or(f64::INFINITY, |b| b.1.merit());
@@ -230,14 +228,8 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             }
             None => problem.certify(point, &mut problem.gauge()?),
         };
-        Ok(Outcome {
-            status,
-            measure,
-            iterations: tally.iterations,
-            factorisations: tally.factorisations,
-            seconds: tally.wall.elapsed().as_secs_f64(),
-            cpu_seconds: tally.cpu.elapsed().as_secs_f64(),
-        })
+        let outcome = tally.meter.outcome(status, measure, tally.iterations);
+        Ok(Outcome { factorisations: tally.factorisations, ..outcome })
     }
 
     fn history(&self) -> &[Sample] {
