@@ -76,7 +76,8 @@ pub struct BlockLu {
 impl BlockLu {
     /// Analyses the pattern: node i has `sizes[i]` unknowns; `edges` are the coupled nodes, in one or both orientations.
     ///
-    /// Allocates all that the other functions need. Cost: near linear in the blocks of L.
+    /// The entries of the factors are allocated by the first factorisation: who only wants to know what one costs pays for the analysis alone. Cost: near
+    /// linear in the blocks of L.
     /// Errors: factors that take more memory than there is (see [`budget::admit`]).
     pub fn new(sizes: &[usize], edges: impl Iterator<Item = (u32, u32)>) -> Result<Self, TooLarge> {
         let symbolic = Symbolic::new(sizes, edges);
@@ -86,13 +87,13 @@ impl BlockLu {
         let n = symbolic.dim;
         Ok(Self {
             simd: Simd::best(),
-            values: vec![0.0; symbolic.values_len],
+            values: vec![],
             row_scale: vec![1.0; n],
             column_scale: vec![1.0; n],
-            lower: vec![0.0; symbolic.lower_len],
-            upper: vec![0.0; symbolic.upper_len],
-            remainders: vec![0.0; symbolic.stack_len],
-            triangles: vec![0.0; symbolic.triangles_len],
+            lower: vec![],
+            upper: vec![],
+            remainders: vec![],
+            triangles: vec![],
             inverses: vec![1.0; n],
             swaps: vec![0; n],
             x: vec![0.0; n],
@@ -114,7 +115,7 @@ impl BlockLu {
 
     /// Entries of L and U together.
     pub fn factor_len(&self) -> usize {
-        self.lower.len() + self.upper.len()
+        self.symbolic.lower_len + self.symbolic.upper_len
     }
 
     /// The number of dense fronts.
@@ -125,6 +126,7 @@ impl BlockLu {
     /// Sets all values to zero; the pattern stays.
     pub fn clear(&mut self) {
         self.values.fill(0.0);
+        self.values.resize(self.symbolic.values_len, 0.0);
     }
 
     /// The handle of block (i, j), so that repeated assembly needs no search.
@@ -170,6 +172,9 @@ impl BlockLu {
         let (rows, columns, stride) =
             (slot.rows as usize, slot.columns as usize, slot.stride as usize);
         assert_eq!(block.len(), rows * columns, "the size of a block");
+        if self.values.is_empty() {
+            self.clear();
+        }
         let values = &mut self.values[slot.at..];
         match (rows, columns) {
             (3, 3) => add_transposed::<3>(block, values, stride),
@@ -190,7 +195,9 @@ impl BlockLu {
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
         let order = &self.symbolic.order;
         y.fill(0.0);
-        for p in &self.symbolic.places {
+        // Without values, none were added: A = 0.
+        let places = if self.values.is_empty() { &[][..] } else { &self.symbolic.places };
+        for p in places {
             let columns = self.values[p.values..].chunks_exact(p.rows as usize);
             for (column, &c) in columns.zip(&order[p.column as usize..]).take(p.columns as usize) {
                 for (a, &r) in column.iter().zip(&order[p.row as usize..]) {
@@ -212,6 +219,7 @@ impl BlockLu {
     /// ε^(1/2). Errors: see [`Singular`]; the factors are then of no use.
     pub fn factorise(&mut self) -> Result<(), Singular> {
         count_factorisation();
+        self.make_room();
         self.scale()?;
         let mut outcome = Pivots::default();
         let mut pace = Pace::default();
@@ -222,6 +230,22 @@ impl BlockLu {
         }
         self.perturbed = outcome.perturbed;
         if outcome.broken { Err(Singular) } else { Ok(()) }
+    }
+
+    /// Allocates the values and the entries of the factors, where that has not been done.
+    fn make_room(&mut self) {
+        let Self { symbolic: s, values, lower, upper, remainders, triangles, .. } = self;
+        for (entries, count) in [
+            (values, s.values_len),
+            (lower, s.lower_len),
+            (upper, s.upper_len),
+            (remainders, s.stack_len),
+            (triangles, s.triangles_len),
+        ] {
+            if entries.is_empty() {
+                *entries = vec![0.0; count];
+            }
+        }
     }
 
     /// `x ← A⁻¹ x` with the last factors, nodes concatenated in the caller's order. One pass, not refined.
