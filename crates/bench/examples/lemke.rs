@@ -8,7 +8,7 @@
 
 use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::{Lcp, Problem};
-use nonsmooth_solve::pivoting::{BasisKind, Lemke, LemkePath, Ties};
+use nonsmooth_solve::complementarity::pivoting::{BasisKind, Lemke, LemkePath, Ties};
 use nonsmooth_solve::{Driver, Limits, Outcome, Session};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;

@@ -6,7 +6,7 @@ use nonsmooth_problem::check::{Judged, RowCounts, StatusCounts};
 use nonsmooth_problem::{
     BoxLcp, FrictionGlobal, FrictionLocal, Hlcp, HlcpPoint, Kind, Lcp, LcpPoint, Mlcp, Problem,
 };
-use nonsmooth_solve::registry::{self, About, Registered};
+use nonsmooth_solve::registry::{self, About, Prefix, Registered};
 use serde::Serialize;
 use serde_json::json;
 
@@ -319,6 +319,8 @@ pub struct Offer {
     pub kind: Kind,
     /// The solvers.
     pub solvers: Vec<&'static About>,
+    /// What may stand before a solver's name.
+    pub prefixes: Vec<&'static Prefix>,
     /// The names of solvers behind a reformulation.
     pub composed: Vec<String>,
 }
@@ -326,7 +328,12 @@ pub struct Offer {
 /// What the registry has, kind by kind.
 pub fn offers() -> [Offer; 8] {
     fn of<P: Registered>(kind: Kind) -> Offer {
-        Offer { kind, solvers: registry::abouts::<P>(), composed: P::composed_names() }
+        Offer {
+            kind,
+            solvers: registry::abouts::<P>(),
+            prefixes: registry::prefixes::<P>(),
+            composed: registry::composed_names::<P>(),
+        }
     }
     [
         of::<FrictionLocal<2>>(Kind::FrictionLocal2d),

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::fmt::Write;
 
 use nonsmooth_problem::Kind;
-use nonsmooth_solve::registry::{self, About, PREFIXES, Prefix, Solves};
+use nonsmooth_solve::registry::{self, About, Prefix, Solves};
 use nonsmooth_solve::settings::Setting;
 use serde_json::{Value, json};
 
@@ -76,15 +76,19 @@ struct Catalogue {
 
 impl Catalogue {
     fn new() -> Self {
-        let mut all =
-            Self { solvers: vec![], prefixes: PREFIXES.iter().collect(), composed: vec![] };
-        for Offer { kind, solvers, composed } in offers() {
+        let mut all = Self { solvers: vec![], prefixes: vec![], composed: vec![] };
+        for Offer { kind, solvers, prefixes, composed } in offers() {
             for about in solvers {
                 let same =
                     |s: &&mut Listed| s.about.name == about.name && s.class() == Class::of(kind);
                 match all.solvers.iter_mut().find(same) {
                     Some(listed) => listed.kinds.push(kind),
                     None => all.solvers.push(Listed { about, kinds: vec![kind] }),
+                }
+            }
+            for prefix in prefixes {
+                if all.prefixes.iter().all(|known| known.name != prefix.name) {
+                    all.prefixes.push(prefix);
                 }
             }
             for name in composed {

@@ -36,7 +36,7 @@ use std::array::from_fn;
 use nonsmooth_problem::linalg::Csc;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal};
 use nonsmooth_solve::Reformulation;
-use nonsmooth_solve::reform::Condense;
+use nonsmooth_solve::contact::Condense;
 
 use crate::vec3::{Mat3, Vec3, add, apply, cross, dot, scale, sub};
 use crate::{Contact, ElasticBox, Gyroscopic, RigidBody, Scene, SceneError};

@@ -7,7 +7,7 @@
 //! better against the other player's. The game is an LCP, too: its solutions are the equilibria, scaled.
 
 use nonsmooth::problem::linalg::Dense;
-use nonsmooth::solve::pivoting::{Equilibrium, lemke_howson};
+use nonsmooth::solve::complementarity::pivoting::{Equilibrium, lemke_howson};
 
 /// The most that a player gains by leaving the equilibrium alone.
 fn regret(a: &Dense, b: &Dense, e: &Equilibrium) -> f64 {

@@ -32,57 +32,76 @@ const UP_TO_BENCH: [&str; 5] = [
     "nonsmooth_bench",
 ];
 
-/// The floors inside a crate, from the bottom up: a module may import from its own floor and from those below.
+/// The rooms of a crate on their floors, from the bottom up: a room may import from itself and from those below.
+///
+/// A room is a module, `check`, or one inside a wing, `contact/form`. `wing/*` stands for the rooms of a wing that are not named, `*` for all others.
 struct Floors {
     floors: &'static [&'static [&'static str]],
-    /// The floor of the modules that `floors` does not name.
-    others: usize,
-    /// Whether modules of the floor `others` may import each other.
+    /// Whether the rooms that are not named may import each other.
     others_mix: bool,
-    /// What any module may import although it lies above: `(floor of the importer, module)`.
-    contracts: &'static [(usize, &'static str)],
+    /// Wings never import each other; only rooms outside them see both.
+    wings: &'static [&'static str],
 }
 
 /// `check → kinds → linalg`. A kind names the judge of its own as an associated type, so the two share a floor; what
 /// they must not do is lean on what describes them (traits) or on planted instances, and linalg must know neither.
 const PROBLEM: Floors = Floors {
-    floors: &[&["error"], &["linalg"], &["check"], &["traits"], &["planted"]],
-    others: 2,
+    floors: &[&["error"], &["linalg"], &["check", "*"], &["traits"], &["planted"]],
     others_mix: true,
-    contracts: &[],
+    wings: &[],
 };
 
-/// `families → {local, parts, solver, reform} → form → cfun → cone`. The loop and the composition stand on the
-/// contract of a solver, and so does the question of existence, which any family may ask; the registry stands above all, and
-/// a family sees of it what it needs to be registered.
+/// `diagnose → registry → bridges → {contact, complementarity} → core`; inside a wing `solvers → families → what they share → form → law`.
+/// The question of existence and the elimination of velocities are no families: any may ask them.
 const SOLVE: Floors = Floors {
     floors: &[
-        &["error", "settings", "trace"],
-        &["cone"],
-        &["cfun"],
-        &["form"],
-        &["local", "parts", "solver", "reform"],
-        &["drive", "via", "existence", "guard"],
-        &[],
-        &["registry", "diagnose"],
+        &["core"],
+        &["contact/law", "complementarity/functions"],
+        &["contact/form", "complementarity/form"],
+        &[
+            "contact/parts",
+            "contact/condense",
+            "contact/existence",
+            "complementarity/parts",
+            "complementarity/guarantees",
+            "complementarity/reform",
+        ],
+        &["contact/*", "complementarity/*"],
+        &["contact/solvers", "complementarity/solvers"],
+        &["bridges"],
+        &["registry"],
+        &["diagnose"],
     ],
-    others: 6,
     others_mix: false,
-    contracts: &[(6, "registry")],
+    wings: &["contact", "complementarity"],
 };
 
 impl Floors {
-    fn of(&self, module: &str) -> usize {
-        let named = self.floors.iter().position(|f| f.contains(&module));
-        named.unwrap_or(self.others)
+    /// The room that a module is in, and its floor; none for the root of a crate or of a wing, which may import all that is in it.
+    fn room(&self, module: &[String]) -> Option<(String, usize)> {
+        let first = module.first()?;
+        let floor = |name: &str| self.floors.iter().position(|floor| floor.contains(&name));
+        if let Some(second) = module.get(1) {
+            let room = format!("{first}/{second}");
+            if let Some(at) = floor(&room).or_else(|| floor(&format!("{first}/*"))) {
+                return Some((room, at));
+            }
+        } else if self.wings.contains(&first.as_str()) {
+            return None;
+        }
+        Some((first.clone(), floor(first).or_else(|| floor("*")).unwrap_or(self.floors.len())))
     }
 
-    fn allows(&self, from: &str, to: &str) -> bool {
-        let (a, b) = (self.of(from), self.of(to));
-        from == to
-            || self.contracts.contains(&(a, to))
-            || b < a
-            || (a == b && (a != self.others || self.others_mix))
+    /// What is wrong if a module imports from another, if anything is.
+    fn forbids(&self, from: &[String], to: &[String]) -> bool {
+        let Some((from_room, a)) = self.room(from) else { return false };
+        let Some((to_room, b)) = self.room(to) else {
+            return true; // a wing as a whole
+        };
+        let wing = |module: &[String]| self.wings.iter().find(|wing| **wing == module[0]);
+        let across = wing(from).is_some() && wing(to).is_some() && wing(from) != wing(to);
+        let mix = self.others_mix && self.floors[a].contains(&"*");
+        across || (from_room != to_room && !(b < a || (a == b && mix)))
     }
 }
 
@@ -136,7 +155,8 @@ impl Source {
                     open.push(depth);
                     module.push(next.to_owned());
                 }
-                _ if before == "::" => {}
+                // A path that goes on, and who may see: `pub(in crate::wing)`.
+                _ if before == "::" || before == "in" && token == "crate" => {}
                 _ if token == "nonsmooth" || token.starts_with("nonsmooth_") => {
                     self.tree(i + 1, vec![token.to_owned()], &mut found);
                 }
@@ -348,18 +368,22 @@ fn without_tests(tokens: Vec<String>) -> Vec<String> {
     out
 }
 
-/// What the root of a crate re-exports: the name outside, and the module it comes from.
-fn reexports(root: &Source) -> BTreeMap<String, String> {
+/// What the root of a crate re-exports: the name outside, and where it comes from.
+fn reexports(root: &Source) -> BTreeMap<String, Vec<String>> {
     let inside = |p: &[String]| p[0] == "crate" && p.len() > 2;
     root.paths()
         .into_iter()
         .filter(|p| inside(p))
-        .map(|p| (p[p.len() - 1].clone(), p[1].clone()))
+        .map(|p| (p[p.len() - 1].clone(), p[1..].to_vec()))
         .collect()
 }
 
 /// What is wrong with the imports of one file, in words.
-fn violations(krate: &str, source: &Source, reexported: &BTreeMap<String, String>) -> Vec<String> {
+fn violations(
+    krate: &str,
+    source: &Source,
+    reexported: &BTreeMap<String, Vec<String>>,
+) -> Vec<String> {
     let Some((_, below)) = CRATES.iter().find(|(name, _)| *name == krate) else {
         return vec![format!("{krate} stands on no floor: name it in CRATES")];
     };
@@ -373,18 +397,24 @@ fn violations(krate: &str, source: &Source, reexported: &BTreeMap<String, String
             }
             continue;
         }
-        let (Some(floors), Some(from), Some(head)) =
-            (floors_of(krate), source.module.first(), path.get(1))
-        else {
-            continue; // the root may import all
+        let (Some(floors), Some(head)) = (floors_of(krate), path.get(1)) else {
+            continue;
         };
+        let from = source.module.join("/");
         if head == "*" {
-            wrong.insert(format!("{from} imports {text}: name what you need"));
+            if !from.is_empty() {
+                wrong.insert(format!("{from} imports {text}: name what you need"));
+            }
             continue;
         }
-        let to = reexported.get(head).unwrap_or(head);
-        // What the root itself defines (a macro) is no module.
-        if to.starts_with(|c: char| c.is_lowercase()) && !floors.allows(from, to) {
+        let to: Vec<String> = match reexported.get(head) {
+            Some(place) => [place, &path[2..]].concat(),
+            None => path[1..].to_vec(),
+        };
+        // Names of things are no modules; what the root itself defines (a macro) is in no room.
+        let modules = to.iter().take_while(|name| name.starts_with(|c: char| c.is_lowercase()));
+        let to: Vec<String> = modules.cloned().collect();
+        if !to.is_empty() && floors.forbids(&source.module, &to) {
             wrong.insert(format!("{krate}: {from} must not import {text}"));
         }
     }
@@ -436,6 +466,9 @@ fn every_crate_and_module_keeps_to_its_floor() {
         let reexported = reexports(&Source::new("lib.rs", &read(root)));
         for file in files(&src).into_iter().filter(|f| has_extension(f, "rs")) {
             let place = relative(&file, &src);
+            if place.ends_with("/tests.rs") {
+                continue;
+            }
             let source = Source::new(&place, &read(&file));
             for violation in violations(&name, &source, &reexported) {
                 wrong.push(format!("{}: {violation}", relative(&file, &root_folder())));
@@ -449,7 +482,8 @@ fn every_crate_and_module_keeps_to_its_floor() {
 
 /// The violations of a planted file.
 fn planted(krate: &str, place: &str, text: &str) -> Vec<String> {
-    let root = Source::new("lib.rs", "mod drive; pub use drive::{Driver, Limit as Bound};");
+    let root = "mod core; pub use self::core::drive::{Driver, Limit as Bound}; pub use self::core::settings;";
+    let root = Source::new("lib.rs", root);
     violations(krate, &Source::new(place, text), &reexports(&root))
 }
 
@@ -462,35 +496,51 @@ fn the_checker_finds_planted_violations() {
         planted("nonsmooth_io", "lib.rs", "use nonsmooth_solve::Driver;"),
         ["nonsmooth_io must not depend on nonsmooth_solve::Driver"]
     );
-    assert_eq!(solve("drive.rs", "fn f() { nonsmooth_dynamics::x() }").len(), 1);
-    assert_eq!(solve("drive.rs", "use nonsmooth_bench as b;").len(), 1);
+    assert_eq!(solve("core/drive.rs", "fn f() { nonsmooth_dynamics::x() }").len(), 1);
+    assert_eq!(solve("core/drive.rs", "use nonsmooth_bench as b;").len(), 1);
     assert_eq!(planted("nonsmooth_new", "lib.rs", "").len(), 1);
     // A family and another family, by every way of writing it.
     for text in [
-        "use crate::newton::X;",
-        "use crate::{SolveError, newton::{self, X}};",
+        "use crate::contact::newton::X;",
+        "use crate::{SolveError, contact::newton::{self, X}};",
         "use super::super::newton::X;",
-        "use crate::newton;",
-        "fn f() -> crate::newton::X { todo!() }",
-        "fn f(x: Vec<crate::newton::X>) {}",
+        "use super::super::{newton::X};",
+        "use crate::contact::newton;",
+        "fn f() -> crate::contact::newton::X { todo!() }",
+        "fn f(x: Vec<crate::contact::newton::X>) {}",
         "mod inner { use super::super::super::newton::X; }",
-        "pub use crate::{form::{Linear, Blockwise}, newton::X as Y};",
+        "pub use crate::{contact::{form::{Linear, Blockwise}, newton::X as Y}};",
     ] {
-        let found = solve("splitting/nsgs.rs", text);
+        let found = solve("contact/splitting/nsgs.rs", text);
         assert!(!found.is_empty(), "{text}");
         for violation in found {
-            let expected = "nonsmooth_solve: splitting must not import crate::newton";
+            let expected =
+                "nonsmooth_solve: contact/splitting/nsgs must not import crate::contact::newton";
             assert!(violation.starts_with(expected), "{text}: {violation}");
         }
     }
+    // One wing and the other, on whatever floor.
+    for (place, text) in [
+        ("contact/splitting/nsgs.rs", "use crate::complementarity::form::Bounded;"),
+        ("contact/solvers.rs", "use crate::complementarity::functions::Min;"),
+        ("complementarity/newton/min.rs", "use crate::contact::law::cone;"),
+        ("complementarity/mod.rs", "use crate::contact;"),
+    ] {
+        let found = solve(place, text).len();
+        assert_eq!(found, usize::from(place != "complementarity/mod.rs"), "{place} {text}");
+    }
     // Upwards.
-    assert_eq!(solve("cone/coulomb.rs", "use crate::cfun::Disk;").len(), 1);
-    assert_eq!(solve("cfun/mod.rs", "use crate::form::Linear;").len(), 1);
-    assert_eq!(solve("form/local.rs", "use crate::Driver;").len(), 1, "a re-export");
-    assert_eq!(solve("parts/mod.rs", "use crate::registry::Visitor;").len(), 1);
-    assert_eq!(solve("local/mod.rs", "use crate::splitting::Nsgs;").len(), 1);
-    assert_eq!(solve("drive.rs", "use crate::registry::About;").len(), 1);
-    assert_eq!(solve("local/mod.rs", "use crate::*;").len(), 1);
+    assert_eq!(solve("contact/law/cone/coulomb.rs", "use crate::contact::form::Linear;").len(), 1);
+    assert_eq!(solve("contact/form/local.rs", "use crate::contact::parts::Sweep;").len(), 1);
+    assert_eq!(solve("contact/parts/mod.rs", "use crate::contact::solvers::x;").len(), 1);
+    assert_eq!(solve("contact/parts/mod.rs", "use crate::contact::existence::x;").len(), 1);
+    assert_eq!(solve("contact/law/local.rs", "use crate::contact::splitting::Nsgs;").len(), 1);
+    assert_eq!(solve("contact/newton/mod.rs", "use crate::registry::About;").len(), 1);
+    assert_eq!(solve("contact/solvers.rs", "use crate::bridges::FacetInner;").len(), 1);
+    assert_eq!(solve("core/drive.rs", "use crate::registry::About;").len(), 1);
+    assert_eq!(solve("core/drive.rs", "use crate::contact::form::Linear;").len(), 1);
+    assert_eq!(solve("core/drive.rs", "use crate::contact::Condense;").len(), 1, "a whole wing");
+    assert_eq!(solve("contact/law/local.rs", "use crate::*;").len(), 1);
     assert_eq!(problem("linalg/bsr.rs", "use crate::check::Measure;").len(), 1);
     assert_eq!(problem("linalg/bsr.rs", "use crate::lcp::Lcp;").len(), 1);
     assert_eq!(problem("check/local.rs", "use super::super::planted::Planted;").len(), 1);
@@ -508,24 +558,42 @@ fn the_checker_lets_the_house_live() {
     let solve = |place, text| planted("nonsmooth_solve", place, text);
     let problem = |place, text| planted("nonsmooth_problem", place, text);
     for (place, text) in [
-        ("splitting/nsgs.rs", "use crate::local::Exact; use crate::form::Blockwise;"),
-        ("splitting/nsgs.rs", "use crate::{registry::Visitor, settings::Settings};"),
-        ("splitting/nsgs.rs", "use super::nsgs2::X; use crate::parts::Order;"),
-        ("parts/mod.rs", "use crate::settings::Settings;"),
-        ("splitting/mod.rs", "mod nsgs; pub use nsgs::Nsgs; use self::nsgs::X;"),
-        ("registry.rs", "use crate::{splitting::Nsgs, newton::Newton, Driver};"),
-        ("lib.rs", "pub mod splitting; pub use splitting::Nsgs;"),
-        ("via.rs", "use crate::reform::Reformulation; use crate::solver::Solver;"),
-        ("cone/mod.rs", "#[cfg(test)] mod tests { use crate::newton::X; }"),
-        ("cone/mod.rs", "#[cfg(test)] #[path = \"t.rs\"] mod tests; fn f() {}"),
+        ("contact/splitting/nsgs.rs", "use crate::contact::{law::local::Exact, form::Blockwise};"),
+        ("contact/splitting/nsgs.rs", "use crate::core::{register::About, settings::Settings};"),
+        ("contact/splitting/nsgs.rs", "use super::nsgs2::X; use crate::contact::parts::Order;"),
+        ("contact/form/local.rs", "use crate::Driver; use crate::settings::Settings;"),
+        ("contact/splitting/mod.rs", "mod nsgs; pub use nsgs::Nsgs; use self::nsgs::X;"),
+        ("contact/mod.rs", "pub mod newton; pub use newton::Newton; use self::splitting::X;"),
         (
-            "cone/mod.rs",
-            "/// [x](crate::newton)\n/* crate::newton /* */ crate::newton */ fn f() {}",
+            "contact/solvers.rs",
+            "use crate::contact::{splitting::Nsgs, newton::Newton}; use crate::Driver;",
         ),
-        ("cone/mod.rs", "const A: &str = \"crate::newton\\\" crate::newton\";"),
-        ("cone/mod.rs", "const A: &str = r#\"crate::\"newton\"#; fn f<'a>(c: char) { c == '\"'; }"),
-        ("cone/mod.rs", "pub(crate) fn f() {} pub(super) fn g() {}"),
-        ("form/mod.rs", "use nonsmooth_problem::{Problem, linalg::Csc}; use crate::SolveError;"),
+        (
+            "bridges/facets.rs",
+            "use crate::contact::form::Contacts; use crate::complementarity::solvers::x;",
+        ),
+        ("registry.rs", "use crate::{bridges::X, contact::solvers::x};"),
+        ("lib.rs", "pub mod contact; pub use contact::existence;"),
+        (
+            "core/via.rs",
+            "use crate::core::reformulation::Reformulation; use crate::core::solver::Solver;",
+        ),
+        ("contact/law/mod.rs", "#[cfg(test)] mod tests { use crate::contact::newton::X; }"),
+        ("contact/law/mod.rs", "#[cfg(test)] #[path = \"t.rs\"] mod tests; fn f() {}"),
+        (
+            "contact/law/mod.rs",
+            "/// [x](crate::contact::newton)\n/* crate::newton /* */ crate::newton */ fn f() {}",
+        ),
+        ("contact/law/mod.rs", "const A: &str = \"crate::newton\\\" crate::newton\";"),
+        (
+            "contact/law/mod.rs",
+            "const A: &str = r#\"crate::\"newton\"#; fn f<'a>(c: char) { c == '\"'; }",
+        ),
+        ("contact/law/mod.rs", "pub(crate) fn f() {} pub(super) fn g() {}"),
+        (
+            "contact/form/mod.rs",
+            "use nonsmooth_problem::{Problem, linalg::Csc}; use crate::SolveError;",
+        ),
     ] {
         assert_eq!(solve(place, text), [""; 0], "{text}");
     }
@@ -650,7 +718,14 @@ fn registered() -> BTreeMap<String, String> {
         registry::abouts::<Hlcp>(),
     ];
     let solvers = kinds.into_iter().flatten().map(|a| (a.name, a.cites));
-    let prefixes = registry::PREFIXES.iter().map(|p| (p.name, p.cites));
+    let prefixes = [
+        registry::prefixes::<FrictionLocal<3>>(),
+        registry::prefixes::<FrictionGlobal<3>>(),
+        registry::prefixes::<Mlcp>(),
+        registry::prefixes::<BoxLcp>(),
+        registry::prefixes::<Hlcp>(),
+    ];
+    let prefixes = prefixes.into_iter().flatten().map(|p| (p.name, p.cites));
     let cited = solvers.chain(prefixes).flat_map(|(name, cites)| {
         assert!(!cites.is_empty(), "{name} cites nothing");
         cites.iter().map(move |key| ((*key).to_owned(), format!("the registry's {name}")))
@@ -723,9 +798,15 @@ fn keys_are_recognised() {
 
 #[test]
 fn the_family_of_a_solver_is_its_folder() {
-    for about in registry::abouts::<FrictionLocal<3>>() {
-        let folder = root_folder().join("crates/solve/src").join(about.family);
-        assert!(folder.is_dir(), "{}: no folder {}", about.name, folder.display());
+    for (wing, abouts) in [
+        ("contact", registry::abouts::<FrictionLocal<3>>()),
+        ("complementarity", registry::abouts::<Lcp>()),
+        ("complementarity", registry::abouts::<Hlcp>()),
+    ] {
+        for about in abouts {
+            let folder = root_folder().join("crates/solve/src").join(wing).join(about.family);
+            assert!(folder.is_dir(), "{}: no folder {}", about.name, folder.display());
+        }
     }
 }
 

@@ -8,8 +8,8 @@ use nonsmooth_problem::check::Judged;
 use nonsmooth_problem::linalg::norm;
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{Friction, FrictionGlobal, GlobalPoint, Problem};
-use nonsmooth_solve::form::{Access, Contacts, Linear};
-use nonsmooth_solve::reform::Condense;
+use nonsmooth_solve::contact::Condense;
+use nonsmooth_solve::contact::form::{Access, Contacts, Linear};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limits, Reformulation, Status};
 

@@ -10,9 +10,12 @@ use nonsmooth_problem::traits::{Spectrum, Traits, rank};
 use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, with_friction};
 use serde::Serialize;
 
-use crate::form::{Access, Linear};
-use crate::registry::{self, Registered};
-use crate::{Limit, Limits, existence, guard};
+use crate::contact::existence;
+use crate::contact::form::{Access, Linear};
+use crate::core::guard;
+use crate::core::register::Registered;
+use crate::registry;
+use crate::{Limit, Limits};
 
 /// One thing worth knowing of a problem.
 #[derive(Debug, Clone, PartialEq, Serialize)]

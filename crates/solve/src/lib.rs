@@ -1,9 +1,16 @@
-//! All numerics: contracts, the one loop, and one file per algorithm.
+//! All numerics: contracts, the one loop, and one file per algorithm, in two wings that never open each other's files.
 //!
 //! A *problem* (crate `nonsmooth-problem`) is data with its own judge. A *solver* is a struct that is its
 //! hyperparameters, with `work` and `step` ([`Solver`]). [`Driver`] is the only loop: it counts, times, judges and
 //! keeps the best point. [`registry`] lists what exists, by kind of problem; the command line, its help,
 //! `docs/solvers.md` and the conformance tests come from it.
+//!
+//! | room | what |
+//! | --- | --- |
+//! | [`contact`] | frictional contact: the law, forms of the problem, families of methods |
+//! | [`complementarity`] | linear complementarity problems: functions, forms, families of methods, reformulations |
+//! | [`bridges`] | from contact to complementarity: facets |
+//! | `core` | what both wings stand on: the contract of a solver, the loop, settings, the shape of the registry |
 //!
 //! ```
 //! use nonsmooth_problem::{FrictionLocal, Problem, planted::Planted};
@@ -18,34 +25,21 @@
 //! # Ok::<(), nonsmooth_solve::SolveError>(())
 //! ```
 
-pub mod auto;
-pub mod cfun;
-pub mod cone;
+pub mod bridges;
+pub mod complementarity;
+pub mod contact;
+mod core;
 pub mod diagnose;
-mod drive;
-mod error;
-pub mod existence;
-pub mod form;
-pub mod guarantees;
-pub mod guard;
-pub mod interior;
-pub mod local;
-pub mod newton;
-pub mod optimisation;
-pub mod parts;
-pub mod pivoting;
-pub mod projection;
-pub mod proximal;
-pub mod reform;
 pub mod registry;
-pub mod settings;
-mod solver;
-pub mod splitting;
-pub mod trace;
-mod via;
 
-pub use drive::{Driver, Limit, Limits, Observer, Outcome, Progress, Sample, Session, Status};
-pub use error::SolveError;
-pub use reform::Reformulation;
-pub use solver::{Solver, Step};
-pub use via::Via;
+pub use self::complementarity::guarantees;
+pub use self::contact::existence;
+pub use self::core::boxed::Boxed;
+pub use self::core::drive::{
+    Driver, Limit, Limits, Observer, Outcome, Progress, Sample, Session, Status,
+};
+pub use self::core::error::SolveError;
+pub use self::core::reformulation::Reformulation;
+pub use self::core::solver::{Solver, Step};
+pub use self::core::via::Via;
+pub use self::core::{guard, line_search, settings, trace};

@@ -6,8 +6,8 @@ use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{
     BilateralGlobal, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem,
 };
+use nonsmooth_solve::contact::form::Blockwise;
 use nonsmooth_solve::existence::{decide, glance_at};
-use nonsmooth_solve::form::Blockwise;
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limits, Status};
 

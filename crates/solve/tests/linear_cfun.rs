@@ -1,6 +1,6 @@
 //! Scalar complementarity functions: derivatives against differences, neighbouring pieces at kinks, roots, digits.
 
-use nonsmooth_solve::cfun::scalar::{
+use nonsmooth_solve::complementarity::functions::{
     EvtushenkoPurtov, FischerBurmeister, Min, MinRho, Penalised, ScalarFunction, Side, Slope, boxed,
 };
 

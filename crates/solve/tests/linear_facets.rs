@@ -6,7 +6,8 @@ use nonsmooth_problem::check::Judged;
 use nonsmooth_problem::linalg::{Bsr, Csc};
 use nonsmooth_problem::planted::{Planted, PlantedMix};
 use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem};
-use nonsmooth_solve::reform::{Condense, FacetInner, FacetOuter, Facets};
+use nonsmooth_solve::bridges::{FacetInner, FacetOuter, Facets};
+use nonsmooth_solve::contact::Condense;
 use nonsmooth_solve::{
     Driver, Limits, Outcome, Reformulation, Session, SolveError, Solver, Status, Via, registry,
 };

@@ -3,7 +3,7 @@
 use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::{Csc, Dense, Matrix, norm};
 use nonsmooth_problem::{Lcp, LcpPoint, Mlcp, Problem};
-use nonsmooth_solve::pivoting::{BasisKind, Covering, Lemke, LemkePath, Ties};
+use nonsmooth_solve::complementarity::pivoting::{BasisKind, Covering, Lemke, LemkePath, Ties};
 use nonsmooth_solve::trace::{Pivot, Trace, Variable};
 use nonsmooth_solve::{Driver, Limits, Outcome, Session, Status};
 use rand::{RngExt, SeedableRng};
@@ -24,7 +24,7 @@ struct Run {
 
 fn run_with<P>(problem: &P, solver: LemkePath, start: &[f64], tolerance: f64) -> Run
 where
-    P: Problem<Point = LcpPoint> + nonsmooth_solve::form::Complementary,
+    P: Problem<Point = LcpPoint> + nonsmooth_solve::complementarity::form::Complementary,
 {
     let mut driver = Driver::new(solver);
     let mut point = problem.origin();
@@ -39,7 +39,7 @@ where
 
 fn run<P>(problem: &P, settings: Lemke) -> Run
 where
-    P: Problem<Point = LcpPoint> + nonsmooth_solve::form::Complementary,
+    P: Problem<Point = LcpPoint> + nonsmooth_solve::complementarity::form::Complementary,
 {
     run_with(problem, LemkePath::new(settings), &[], 1e-11)
 }
@@ -530,7 +530,7 @@ fn sparse_problems_of_some_size() {
 
 #[test]
 fn games_have_their_equilibria() {
-    use nonsmooth_solve::pivoting::{game, lemke_howson};
+    use nonsmooth_solve::complementarity::pivoting::{game, lemke_howson};
     let dense = |rows: &[[f64; 2]]| Dense::from_rows(rows).unwrap();
     // Two pure equilibria, and a mixed one that no label reaches from the artificial one.
     let (a, b) = (dense(&[[2.0, 0.0], [0.0, 1.0]]), dense(&[[1.0, 0.0], [0.0, 2.0]]));

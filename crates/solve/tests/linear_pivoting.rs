@@ -4,7 +4,7 @@ use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::planted::classics::{self, Classic, Costs, Known};
 use nonsmooth_problem::{Lcp, LcpPoint, Mlcp, Problem};
-use nonsmooth_solve::pivoting::all_solutions;
+use nonsmooth_solve::complementarity::pivoting::all_solutions;
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::settings::from_texts;
 use nonsmooth_solve::trace::Trace;

@@ -3,7 +3,8 @@
 use nonsmooth_problem::check::{Certificate, Evidence, Judged};
 use nonsmooth_problem::linalg::{Dense, Matrix};
 use nonsmooth_problem::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem};
-use nonsmooth_solve::reform::{Mixed, Reduce, Reformulation, Split};
+use nonsmooth_solve::Reformulation;
+use nonsmooth_solve::complementarity::reform::{Mixed, Reduce, Split};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limits, SolveError, Status};
 use rand::{RngExt, SeedableRng};
@@ -393,17 +394,17 @@ fn certificates_of_the_mixed_problem_are_lifted() {
 #[test]
 fn composed_names_exist_and_are_described() {
     fn each<P: Registered>(prefix: &str) {
-        let composed = P::composed_names();
+        let composed = registry::composed_names::<P>();
         assert!(composed.iter().any(|n| *n == format!("{prefix}/newton_fb")), "{composed:?}");
         for name in &composed {
             assert!(registry::session::<P>(name, &Default::default()).is_ok(), "{name}");
             assert!(registry::about::<P>(name).is_some(), "{name}");
         }
-        assert!(registry::PREFIXES.iter().any(|p| p.name == prefix));
+        assert!(registry::prefixes::<P>().iter().any(|p| p.name == prefix));
         assert!(registry::session::<P>(&format!("{prefix}/nothing"), &Default::default()).is_err());
     }
     each::<Mlcp>("reduce");
     each::<BoxLcp>("split");
     each::<Hlcp>("mixed");
-    assert!(Lcp::composed_names().is_empty());
+    assert!(registry::composed_names::<Lcp>().is_empty());
 }

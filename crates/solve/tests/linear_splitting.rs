@@ -6,12 +6,12 @@ use std::cell::Cell;
 use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::planted::{JournalBearing, Membrane, energy, torsion};
 use nonsmooth_problem::{BoxLcp, Lcp, LcpPoint, Mlcp, Problem};
-use nonsmooth_solve::optimisation::linear::{Mprgp, Proportioning};
-use nonsmooth_solve::registry::{self, Registered};
-use nonsmooth_solve::settings;
-use nonsmooth_solve::splitting::linear::{
+use nonsmooth_solve::complementarity::quadratic::{Mprgp, Proportioning};
+use nonsmooth_solve::complementarity::splitting::{
     Direction, Proximal, Psor, Relaxation, Rpsor, Searched, SplittingLs, Sweep,
 };
+use nonsmooth_solve::registry::{self, Registered};
+use nonsmooth_solve::settings;
 use nonsmooth_solve::{Limits, Outcome, Session, SolveError, Solver, Status};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;

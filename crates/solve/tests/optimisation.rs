@@ -1,7 +1,7 @@
 //! The methods through convex optimisation: their fixed points are those of Gauss–Seidel, whatever solves the convex problems.
 
 use nonsmooth_problem::planted::{Planted, PlantedMix};
-use nonsmooth_solve::form::{Access, Linear};
+use nonsmooth_solve::contact::form::{Access, Linear};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limits, Outcome, Status, settings};
 

@@ -8,8 +8,9 @@ use nonsmooth_problem::linalg::norm;
 use nonsmooth_problem::planted::{Planted, PlantedMix};
 use nonsmooth_problem::traits::Spectrum;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, with_friction};
+use nonsmooth_solve::contact::Condense;
 use nonsmooth_solve::registry::Registered;
-use nonsmooth_solve::{Limits, Reformulation, Status, reform::Condense};
+use nonsmooth_solve::{Limits, Reformulation, Status};
 
 const MIXED: PlantedMix = PlantedMix { open: 1.0, stick: 1.0, slip: 1.0, degenerate: 0.0 };
 

@@ -14,7 +14,7 @@ use nonsmooth_problem::check::{Existence, Judged};
 use nonsmooth_problem::linalg::{Bsr, Csc, norm};
 use nonsmooth_problem::planted::{Planted, PlantedMix};
 use nonsmooth_problem::{BilateralGlobal, FrictionGlobal, FrictionLocal, GlobalPoint};
-use nonsmooth_solve::reform::Condense;
+use nonsmooth_solve::contact::Condense;
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limit, Limits, Outcome, Reformulation, Status, existence};
 

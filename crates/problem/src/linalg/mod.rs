@@ -45,6 +45,14 @@ pub fn norm(x: &[f64]) -> f64 {
     norm_of(x.iter().copied())
 }
 
+/// `‖x‖`, or 1 where x = 0: what errors are relative to.
+pub fn norm_or_one(x: &[f64]) -> f64 {
+    match norm(x) {
+        size if size > 0.0 => size,
+        _ => 1.0,
+    }
+}
+
 /// [`norm`] of values that are computed as they come; they are run through more than once only where the plain sum
 /// of squares leaves the range of f64, or where every value is zero or not finite.
 pub fn norm_of(x: impl Iterator<Item = f64> + Clone) -> f64 {

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use nonsmooth_problem::LcpPoint;
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_solve::form::Complementary;
+use nonsmooth_solve::complementarity::form::Complementary;
 use nonsmooth_solve::{SolveError, Solver, Step};
 
 #[derive(Debug, Clone, Copy)]

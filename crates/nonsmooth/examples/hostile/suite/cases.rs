@@ -1,6 +1,7 @@
 //! Hostile problems of every kind, each a function of a seed and an index.
 
-use nonsmooth::solve::reform::{Condense, Reformulation};
+use nonsmooth::solve::Reformulation;
+use nonsmooth::solve::contact::Condense;
 use nonsmooth::{
     BilateralGlobal, BilateralLocal, BoxLcp, Bsr, Csc, Dense, FrictionGlobal, FrictionLocal, Hlcp,
     Lcp, Matrix, Mlcp,

@@ -1,0 +1,89 @@
+//! **auto** for linear complementarity problems: chooses by size, class and structure, falls back, and says what it tried and why.
+//!
+//! Problem: LCP, MLCP, horizontal and box LCP.
+//!
+//! Method: a plan of solvers in the order of their promise on the problem at hand (`plan.rs`); each starts from the best point before it and has a budget of
+//! iterations, never of seconds, so that a run repeats itself. The first that solves the problem, or proves that there is no solution, ends the solve.
+//!
+//! References: CottlePangStone2009; FacchineiPang2003; Acary2018 (how to choose); the solvers' own files.
+//!
+//! Cost: that of the solvers tried. Fails: where all of them do.
+
+mod plan;
+mod portfolio;
+
+use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::core::register::Registered;
+use crate::core::register::{About, Described, Solves};
+use crate::core::settings::{Settings, described};
+
+pub use portfolio::{Candidate, Portfolio};
+
+/// The hyperparameters of `auto` for linear complementarity problems; none needs to be set.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct LinearAuto {
+    /// Enumerate all complementary bases, as the last resort, up to this many complementary pairs.
+    pub enumerate_below: usize,
+}
+
+impl Default for LinearAuto {
+    fn default() -> Self {
+        Self { enumerate_below: 20 }
+    }
+}
+
+impl Settings for LinearAuto {}
+
+impl Described for LinearAuto {
+    const ABOUT: &'static About = &About {
+        name: "auto",
+        family: "auto",
+        solves: Solves::Law,
+        summary: "needs no setting: a plan of solvers by size, class and structure of M, until one solves the problem or proves that there is no solution",
+        needs: &[],
+        cites: &["CottlePangStone2009", "FacchineiPang2003", "Acary2018"],
+        variants: &[],
+        settings: described::<Self>,
+    };
+}
+
+/// A kind of problem that `auto` has a plan for.
+pub trait Planned: Registered {
+    /// The solvers to try, in this order.
+    fn plan(&self, settings: &LinearAuto) -> Vec<Candidate>;
+}
+
+impl LinearAuto {
+    /// The session.
+    pub fn session<P: Planned>(self) -> Portfolio<P> {
+        Portfolio::new(move |problem: &P| problem.plan(&self))
+    }
+}
+
+impl Planned for Lcp {
+    fn plan(&self, settings: &LinearAuto) -> Vec<Candidate> {
+        plan::of_lcp(self, settings)
+    }
+}
+
+impl Planned for Mlcp {
+    fn plan(&self, settings: &LinearAuto) -> Vec<Candidate> {
+        plan::of_mlcp(self, settings)
+    }
+}
+
+impl Planned for BoxLcp {
+    fn plan(&self, settings: &LinearAuto) -> Vec<Candidate> {
+        plan::of_box(self, settings)
+    }
+}
+
+impl Planned for Hlcp {
+    fn plan(&self, settings: &LinearAuto) -> Vec<Candidate> {
+        plan::of_hlcp(self, settings)
+    }
+}

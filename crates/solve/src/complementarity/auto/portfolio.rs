@@ -1,0 +1,277 @@
+//! Several solvers, one after the other, as one session.
+
+use std::borrow::Cow;
+use std::time::Instant;
+
+use nonsmooth_problem::Problem;
+use nonsmooth_problem::check::Measure;
+
+use crate::core::drive::Meter;
+use crate::core::register::{self, Registered};
+use crate::core::settings::SettingsMap;
+use crate::core::trace::Trace;
+use crate::{Limit, Limits, Observer, Outcome, Progress, Sample, Session, SolveError, Status};
+
+/// A solver of a plan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// The name in the registry.
+    pub name: &'static str,
+    /// Its settings.
+    pub settings: SettingsMap,
+    /// At most this many iterations, before the next one has its turn.
+    pub iterations: usize,
+    /// Why it is tried, in words that follow its name.
+    pub because: String,
+}
+
+/// Who makes the plan for a problem.
+type Planner<P> = Box<dyn Fn(&P) -> Vec<Candidate> + Send>;
+
+/// A session that runs the solvers of a plan until one solves the problem or proves that it has no solution. Each starts from the best point that the ones before
+/// it have found.
+pub struct Portfolio<P: Registered> {
+    plan: Planner<P>,
+    /// What was made for earlier problems, by name and settings.
+    sessions: Vec<(&'static str, SettingsMap, Box<dyn Session<P>>)>,
+    history: Vec<Sample>,
+    account: Vec<String>,
+    trace: Trace,
+}
+
+/// The most samples that a history keeps.
+const HISTORY: usize = 4096;
+
+/// The method whose word is final where it has one.
+pub(super) const DECIDES: &str = "enumeration_exact";
+
+/// What is said at the end of a plan.
+const NONE: Status =
+    Status::Stalled(Cow::Borrowed("none of the methods tried solves it; see the account"));
+
+impl<P: Registered> Portfolio<P> {
+    /// A session that follows `plan`.
+    pub fn new(plan: impl Fn(&P) -> Vec<Candidate> + Send + 'static) -> Self {
+        Self {
+            plan: Box::new(plan),
+            sessions: vec![],
+            history: vec![],
+            account: vec![],
+            trace: Trace::None,
+        }
+    }
+
+    /// The place of the candidate's session.
+    fn session(&mut self, candidate: &Candidate) -> Result<usize, SolveError> {
+        let same = |(name, settings, _): &(&str, SettingsMap, _)| {
+            *name == candidate.name && *settings == candidate.settings
+        };
+        if let Some(k) = self.sessions.iter().position(same) {
+            return Ok(k);
+        }
+        let session = register::bare::<P>(candidate.name, &candidate.settings)?;
+        self.sessions.push((candidate.name, candidate.settings.clone(), session));
+        Ok(self.sessions.len() - 1)
+    }
+}
+
+/// What has been done, and found, so far.
+struct Tally<P: Problem> {
+    meter: Meter,
+    iterations: usize,
+    factorisations: u64,
+    best: Option<(P::Point, Measure)>,
+}
+
+impl<P: Problem> Tally<P> {
+    fn take(&mut self, point: P::Point, outcome: &Outcome) {
+        self.iterations += outcome.iterations;
+        self.factorisations += outcome.factorisations;
+        let better = |(_, best): &(P::Point, Measure)| outcome.measure.is_better_than(best);
+        if self.best.as_ref().is_none_or(better) {
+            self.best = Some((point, outcome.measure));
+        }
+    }
+
+    /// What is left of the limits for a candidate.
+    fn left(&self, limits: &Limits, iterations: usize) -> Limits {
+        let seconds = self.meter.seconds();
+        Limits {
+            max_iterations: limits.max_iterations.saturating_sub(self.iterations).min(iterations),
+            time_limit: limits.time_limit.map(|t| (t - seconds).max(0.0)),
+            ..limits.clone()
+        }
+    }
+
+    /// The caller's own limit ended the solve, not the candidate's.
+    fn is_over(&self, limits: &Limits, status: &Status) -> bool {
+        match status {
+            Status::Limit(Limit::Iterations) => self.iterations >= limits.max_iterations,
+            Status::Limit(Limit::Time | Limit::Cancelled) => true,
+            _ => false,
+        }
+    }
+}
+
+/// Sees a candidate's solve as a part of the whole.
+struct Part<'a, P: Problem> {
+    observer: &'a mut dyn Observer<P>,
+    iterations: usize,
+    seconds: f64,
+    /// The merit of the best point so far.
+    merit: f64,
+}
+
+impl<P: Problem> Observer<P> for Part<'_, P> {
+    fn step(&mut self, progress: &Progress) {
+        self.observer.step(&later(progress, self.iterations, self.seconds));
+    }
+
+    fn keeps_best(&self) -> bool {
+        self.observer.keeps_best()
+    }
+
+    fn best(&mut self, point: &P::Point, measure: &Measure) {
+        if measure.merit() < self.merit {
+            self.merit = measure.merit();
+            self.observer.best(point, measure);
+        }
+    }
+}
+
+impl<P: Registered> Session<P> for Portfolio<P> {
+    fn observe(
+        &mut self,
+        problem: &P,
+        point: &mut P::Point,
+        limits: &Limits,
+        observer: &mut dyn Observer<P>,
+    ) -> Result<Outcome, SolveError> {
+        limits.validate()?;
+        problem.validate_point(point)?;
+        self.history.clear();
+        self.account.clear();
+        self.trace = Trace::None;
+        let mut tally = Tally::<P> {
+            meter: Meter::start(Instant::now(), limits),
+            iterations: 0,
+            factorisations: 0,
+            best: None,
+        };
+        let scope = limits.budget(tally.meter.begun).enter();
+        if observer.keeps_best() {
+            // The plan asks for the classes of the matrix, which may take all the time there is.
+            observer.best(point, &problem.measure(point, &mut problem.gauge()?));
+        }
+        let mut status = Status::Stalled("no method applies to this problem".into());
+        let mut nearly = None;
+        for candidate in (self.plan)(problem) {
+            if let Some(limit) = limits.reached(tally.meter.begun) {
+                status = Status::Limit(limit);
+                break;
+            }
+            let k = self.session(&candidate)?;
+            let mut trial = tally.best.as_ref().map_or_else(|| point.clone(), |b| b.0.clone());
+            let (before, begun) = (tally.iterations, tally.meter.seconds());
+            let left = tally.left(limits, candidate.iterations);
+            let session = &mut self.sessions[k].2;
+            let merit = tally.best.as_ref().map_or(f64::INFINITY, |b| b.1.merit());
+            let mut part = Part { observer, iterations: before, seconds: begun, merit };
+            let tried = session.observe(problem, &mut trial, &left, &mut part);
+            let outcome = match tried {
+                Ok(outcome) => outcome,
+                Err(e) if e.is_inapplicable() => {
+                    self.account.push(format!("{} does not apply: {e}", candidate.name));
+                    continue;
+                }
+                Err(e) => return Err(e),
+            };
+            let shifted = session.history().iter().map(|s| Sample {
+                iteration: before + s.iteration,
+                seconds: begun + s.seconds,
+                relative: s.relative,
+            });
+            self.history.extend(shifted.take(HISTORY.saturating_sub(self.history.len())));
+            self.trace = session.trace();
+            self.account.push(sentence(&candidate, &outcome));
+            self.account.extend(session.account().into_iter().map(|line| format!("  {line}")));
+            tally.take(trial, &outcome);
+            let decided = matches!(outcome.status, Status::Solved | Status::Infeasible(_));
+            if decided || tally.is_over(limits, &outcome.status) {
+                status = outcome.status;
+                break;
+            }
+            if candidate.name == DECIDES && matches!(outcome.status, Status::Stalled(_)) {
+                // There is a solution, and doubles do not hold it.
+                status = outcome.status;
+                break;
+            }
+            status = match outcome.status {
+                ray @ Status::NoConclusion(_) => ray,
+                near @ Status::NearlyInfeasible { .. } => {
+                    nearly = Some(near);
+                    NONE
+                }
+                _ => NONE,
+            };
+        }
+        drop(scope);
+        // What is nearly so is more than a ray without a conclusion; what is decided stays.
+        let open = status == NONE || matches!(status, Status::NoConclusion(_));
+        if let (Some(near), true) = (nearly, open) {
+            status = near;
+        }
+        let measure = match tally.best {
+            Some((best, measure)) => {
+                P::copy_point(&best, point);
+                measure
+            }
+            None => problem.certify(point, &mut problem.gauge()?),
+        };
+        let outcome = tally.meter.outcome(status, measure, tally.iterations);
+        Ok(Outcome { factorisations: tally.factorisations, ..outcome })
+    }
+
+    fn history(&self) -> &[Sample] {
+        &self.history
+    }
+
+    fn trace(&self) -> Trace {
+        self.trace.clone()
+    }
+
+    fn account(&self) -> Vec<String> {
+        self.account.clone()
+    }
+}
+
+/// What a watcher sees, with what was done before added.
+fn later(p: &Progress, iterations: usize, seconds: f64) -> Progress {
+    let judged = Sample {
+        iteration: p.judged.iteration + iterations,
+        seconds: p.judged.seconds + seconds,
+        relative: p.judged.relative,
+    };
+    Progress {
+        judged,
+        best: p.best,
+        iteration: p.iteration + iterations,
+        seconds: p.seconds + seconds,
+    }
+}
+
+/// What a candidate did, for the account.
+fn sentence(candidate: &Candidate, outcome: &Outcome) -> String {
+    let Candidate { name, settings, because, .. } = candidate;
+    let settings: String = settings
+        .iter()
+        .map(|(key, value)| {
+            format!(" {key}={}", value.as_str().map_or_else(|| value.to_string(), str::to_owned))
+        })
+        .collect();
+    let ended = match &outcome.status {
+        Status::Stalled(why) => why.to_string(),
+        other => other.to_string(),
+    };
+    format!("{name}{settings} ({because}): {ended} after {} iterations", outcome.iterations)
+}

@@ -1,0 +1,25 @@
+//! Interior points for linear complementarity problems: LCP, MLCP and horizontal LCP alike. The linear algebra, the start, and the ways to end are
+//! [`parts::pairs`](crate::complementarity::parts::pairs).
+//!
+//! | method | neighbourhood | factorisations an iteration | guarantee |
+//! | --- | --- | --- | --- |
+//! | [`MizunoToddYe`] | `N₂(θ)`, narrow | two | `O(√n L)` iterations from a feasible start |
+//! | [`MehrotraType`] | `N₋∞(ε)`, wide | one | none as good, and far fewer iterations |
+
+mod mehrotra;
+mod mty;
+
+pub use mehrotra::{Mehrotra, MehrotraType, MehrotraWork};
+pub use mty::{MizunoToddYe, Mty, MtyWork};
+
+fn above_zero(name: &str, value: f64) -> Result<(), String> {
+    if value > 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        Err(format!("{name}: expected a positive number, found {value}"))
+    }
+}
+
+fn at_least_one(name: &str, value: usize) -> Result<(), String> {
+    if value == 0 { Err(format!("{name}: expected at least 1, found 0")) } else { Ok(()) }
+}

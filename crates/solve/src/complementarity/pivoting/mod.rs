@@ -1,0 +1,56 @@
+//! Pivoting methods for linear complementarity problems: finite, on complementary (or almost complementary) bases.
+
+mod bard;
+mod basis;
+mod block;
+mod criss_cross;
+mod enumeration;
+mod exact;
+mod keller;
+mod lemke;
+mod lemke_howson;
+mod murty;
+mod path;
+mod start;
+
+pub use bard::{Bard, BardPivoting};
+pub use block::{BlockPivoting, BlockPrincipal};
+pub use criss_cross::{CrissCross, CrissCrossPivoting};
+pub use enumeration::{Enumerate, Enumeration, Face, Solutions, all_solutions};
+pub use exact::{EnumerateExactly, EnumerationExact};
+pub use keller::{Keller, KellerPivoting};
+pub use lemke::{BasisKind, Covering, Lemke, LemkePath, LemkeWork, Ties};
+pub use lemke_howson::{Equilibrium, game, lemke_howson};
+pub use murty::{Murty, MurtyPivoting};
+
+use crate::Step;
+use crate::complementarity::parts::{Cycle, Polished, Tableau};
+
+/// Pivots between two visits of the judge: the bases on the way are rarely worth a visit, but the best of them survives a limit.
+const CHECK_EVERY: usize = 100;
+const NOT_P: &str = "a zero on the diagonal of the tableau: M is not a P-matrix";
+const NOT_SUFFICIENT: &str = "signs in the tableau show that M is not a sufficient matrix";
+
+/// What ends a method before it chooses a pivot: there is no solution, or the tableau is of no use.
+fn ended(tableau: &mut Tableau) -> Option<Step> {
+    if let Some(proof) = tableau.refuted() {
+        return Some(Step::NoSolution(proof));
+    }
+    tableau.is_lost().then(|| Step::Stuck("numerically singular bases on the way".into()))
+}
+
+/// Nothing is negative: the answer is polished, which may show that something is after all.
+fn polished(tableau: &mut Tableau, cycle: &mut Cycle) -> Step {
+    match tableau.polish() {
+        Polished::Negative => {
+            cycle.begin(tableau.basis());
+            Step::Continue { estimate: f64::NAN }
+        }
+        Polished::Feasible | Polished::Exhausted => Step::Done,
+    }
+}
+
+/// The step's word, once it has been heard from a tableau that is fresh from the data.
+fn unpleasant(tableau: &mut Tableau, word: Step) -> Step {
+    if tableau.freshen() { Step::Continue { estimate: f64::NAN } } else { word }
+}

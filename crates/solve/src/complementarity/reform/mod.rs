@@ -1,0 +1,9 @@
+//! Reformulations within the wing: each a problem of one kind made of one of another, with the way back.
+
+mod mixed;
+mod reduce;
+mod split;
+
+pub use mixed::Mixed;
+pub use reduce::Reduce;
+pub use split::Split;

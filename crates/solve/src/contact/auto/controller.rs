@@ -1,0 +1,246 @@
+//! When a proximal subproblem is solved, what ε the next one has, how many sweeps come between, and when to try something else.
+//!
+//! The numbers were chosen on a part of the problems of Siconos' numerics, of simulated rigid bodies and of this project's own
+//! scenes, by counts of factorisations; docs/choosing.md has the evidence.
+
+use crate::contact::auto::proximal_newton::Inner;
+
+/// ε never leaves this range.
+const EPSILON: (f64, f64) = (1e-9, 1e3);
+/// Newton iterations on one subproblem.
+const ITERATIONS: usize = 30;
+/// A subproblem has failed after this many iterations that did not lower its residual by a fifth.
+const PATIENCE: usize = 10;
+/// What counts as lower.
+const LOWER: f64 = 0.8;
+/// A subproblem solved by this factor is solved if no more comes in a few iterations.
+const ENOUGH: (f64, usize) = (0.05, 3);
+/// ε stays above this multiple of one at which a subproblem has failed, and that floor sinks after a few successes.
+const FLOOR: f64 = 2.0;
+const SINK: (f64, usize) = (0.3, 3);
+/// Sweeps between two subproblems.
+const MOST_SWEEPS: usize = 300;
+/// Sweeps of a cold start.
+const LONG: (usize, usize) = (50, 30_000);
+/// The least share of the time that sweeps have.
+const LEAST_SHARE: f64 = 0.02;
+/// A strategy is left after this many factorisations that did not halve the error, and each later one half as late again.
+const PATIENT: f64 = 200.0;
+const MORE_PATIENT: f64 = 1.5;
+
+/// κ of ρ = κ/w_c, the share of the time for sweeps, and whether it starts cold.
+const STRATEGIES: [(f64, f64, bool); 4] =
+    [(30.0, 0.3, false), (100.0, 1.0, false), (10.0, 1.0, true), (30.0, 3.0, false)];
+
+/// How a subproblem ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Verdict {
+    /// Its best iterate solves it.
+    Solved,
+    /// Its best iterate is not good, but better than the start.
+    Better,
+    /// Back to the start.
+    Failed,
+}
+
+/// The state of the control.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Controller {
+    epsilon: f64,
+    floor: f64,
+    successes: usize,
+    failures: usize,
+    /// The relative residual of the problem at the present impulses, and the smallest so far.
+    error: f64,
+    least: f64,
+    /// Of the present subproblem.
+    inner: Subproblem,
+    /// The share of the time for sweeps, now.
+    share: f64,
+    strategy: usize,
+    /// Strategies in a row without success.
+    idle: usize,
+    /// The error to reach and the factorisations since it was set.
+    halved: f64,
+    spent: f64,
+    budget: f64,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Subproblem {
+    iterations: usize,
+    /// Iterations since the residual last fell markedly.
+    idle: usize,
+    initial: f64,
+    target: f64,
+    best: f64,
+}
+
+impl Controller {
+    /// Begins with the first strategy at a point with this error.
+    pub(super) fn begin(&mut self, error: f64) {
+        *self = Self { error, least: error, epsilon: 1.0, budget: PATIENT, ..Self::default() };
+        self.halved = 0.5 * error;
+        self.share = STRATEGIES[0].1;
+    }
+
+    /// A starter offers a point with this error: whether to take it.
+    pub(super) fn offer(&mut self, error: f64) -> bool {
+        let better = error < self.error;
+        if better {
+            self.error = error;
+            self.resume();
+        }
+        better
+    }
+
+    /// The present point is a good start: ε by its error.
+    pub(super) fn resume(&mut self) {
+        self.epsilon = self.error.clamp(1e-5, 1.0);
+    }
+
+    pub(super) fn epsilon(&self) -> f64 {
+        self.epsilon
+    }
+
+    pub(super) fn kappa(&self) -> f64 {
+        STRATEGIES[self.strategy].0
+    }
+
+    /// Strategies in a row that have not halved the error.
+    pub(super) fn strategies(&self) -> usize {
+        self.idle
+    }
+
+    /// A subproblem begins: the error of the problem and its own residual there. True: the best point so far.
+    pub(super) fn start(&mut self, error: f64, residual: f64, tolerance: f64) -> bool {
+        self.inner = Subproblem {
+            initial: residual,
+            best: residual,
+            target: (1e-3 * error).clamp(0.1 * tolerance, 1e-4),
+            ..Subproblem::default()
+        };
+        self.error = error;
+        self.record(error)
+    }
+
+    fn record(&mut self, error: f64) -> bool {
+        let best = error < self.least;
+        if best {
+            self.least = error;
+        }
+        if error <= self.halved {
+            (self.halved, self.spent, self.idle) = (0.5 * error, 0.0, 0);
+            self.budget = PATIENT;
+        }
+        best
+    }
+
+    /// Notes an iteration; true: the best of this subproblem.
+    pub(super) fn observe(&mut self, iterate: &Inner) -> bool {
+        self.spent += 1.0;
+        let inner = &mut self.inner;
+        inner.iterations += 1;
+        inner.idle += 1;
+        let better = iterate.residual < inner.best;
+        if better {
+            if iterate.residual < LOWER * inner.best {
+                inner.idle = 0;
+            }
+            inner.best = iterate.residual;
+        }
+        better
+    }
+
+    /// Whether the subproblem is over, and how it ended.
+    pub(super) fn verdict(&self, iterate: &Inner) -> Option<Verdict> {
+        let inner = &self.inner;
+        let enough = inner.best <= ENOUGH.0 * inner.initial;
+        let patience = if enough { ENOUGH.1 } else { PATIENCE };
+        let goes_on = iterate.residual > inner.target
+            && inner.iterations < ITERATIONS
+            && inner.idle < patience
+            && iterate.step > 0.0;
+        if goes_on {
+            return None;
+        }
+        let kept = inner.best < 0.2 * inner.initial && !(self.failures + 1).is_multiple_of(3);
+        Some(if inner.best <= inner.target || enough {
+            Verdict::Solved
+        } else if kept {
+            Verdict::Better
+        } else {
+            Verdict::Failed
+        })
+    }
+
+    /// The subproblem has ended at a point with this error: the next ε. True: the best point so far.
+    pub(super) fn end(&mut self, verdict: Verdict, error: f64) -> bool {
+        let epsilon = self.epsilon;
+        if verdict == Verdict::Solved {
+            self.failures = 0;
+            self.successes += 1;
+            if self.successes >= SINK.1 {
+                self.floor *= SINK.0;
+                self.successes = 0;
+            }
+            let factor = match self.inner.iterations - self.inner.idle {
+                0..=4 => 0.1,
+                5..=8 => 0.25,
+                9..=15 => 0.5,
+                _ => 0.8,
+            };
+            self.epsilon = (factor * epsilon).max(self.floor.min(epsilon));
+        } else {
+            self.failures += 1;
+            self.successes = 0;
+            self.floor = FLOOR * epsilon;
+            self.epsilon = epsilon * if self.failures == 1 { 4.0 } else { 10.0 };
+        }
+        self.epsilon = self.epsilon.clamp(EPSILON.0, EPSILON.1);
+        self.error = error;
+        self.record(error)
+    }
+
+    /// How many sweeps come next, if a factorisation costs `ratio` of them.
+    pub(super) fn sweeps(&self, ratio: f64) -> usize {
+        let iterations = (self.inner.iterations - self.inner.idle).max(1) as f64;
+        ((self.share * iterations * ratio) as usize).clamp(1, MOST_SWEEPS)
+    }
+
+    /// How many sweeps a cold start has, if a factorisation costs `ratio` of them.
+    pub(super) fn long_sweeps(&self, ratio: f64) -> usize {
+        ((self.budget * ratio) as usize).clamp(LONG.0, LONG.1)
+    }
+
+    /// The sweeps have ended with this error; returns by which factor it grew, and gives sweeps that help more time.
+    pub(super) fn swept(&mut self, error: f64) -> f64 {
+        let growth = error / self.error;
+        let share = if growth > 1.0 { 0.5 } else { 2.0 } * self.share;
+        self.share = share.clamp(LEAST_SHARE, STRATEGIES[self.strategy].1);
+        growth
+    }
+
+    /// Whether the error has not halved for long.
+    pub(super) fn is_stuck(&self) -> bool {
+        self.spent > self.budget
+    }
+
+    /// Goes over to another strategy; true: from a cold start.
+    pub(super) fn change(&mut self) -> bool {
+        self.strategy = (self.strategy + 1) % STRATEGIES.len();
+        self.idle += 1;
+        self.spent = 0.0;
+        self.budget *= MORE_PATIENT;
+        self.floor = 0.0;
+        self.failures = 0;
+        let (_, share, cold) = STRATEGIES[self.strategy];
+        self.share = share;
+        if cold {
+            // What sweeps from zero come to is not compared with what there was.
+            self.error = f64::INFINITY;
+        }
+        self.epsilon = if cold { 1.0 } else { self.least.clamp(1e-4, 1.0) };
+        cold
+    }
+}

@@ -1,0 +1,702 @@
+//! **auto**: one method for every frictional contact problem, which needs no setting.
+//!
+//! Problem: `u = W r + q`, `K* ∋ u + mu‖u_T‖e_N ⟂ r ∈ K` for each contact, W of any rank, local or global, in the plane or in space.
+//!
+//! Method, each stage only where the one before it would take longer:
+//!
+//! 1. **Sweeps**: exact Gauss–Seidel for as long as its rate of convergence promises the tolerance sooner than a few
+//!    factorisations would. Many problems end here.
+//! 2. **Interior point** on the exact law ([`Central`]), a starter: some 8 to 20 iterations lead near the solution of a problem
+//!    at rest; where the central path turns back it is left again.
+//! 3. **Proximal point, semismooth Newton inside** ([`ProximalNewton`]): ε falls as fast as the subproblems are solved
+//!    easily, and rises where they are not. It keeps full accuracy on hyperstatic problems.
+//! 4. **Sweeps between the proximal steps**, while they help: they move the impulses within the null space of W, which Newton leaves
+//!    where they are.
+//! 5. **Another strategy** (other ρ, more sweeps, a cold start) where the error has not halved for long; at the first time
+//!    the existence of a solution is investigated, and a problem without one is given up with its certificate.
+//!
+//! A starting point is taken where its residual is below that of zero impulses; near a solution it makes stage 2 needless.
+//!
+//! References: AcaryBremondHuber2018 for the evidence that proximal Newton methods solve hyperstatic problems; AlartCurnier1991; the
+//! parts' own files.
+//!
+//! Cost: a sweep is one pass over W; an iteration of 2 and 3 one factorisation of a matrix over the bodies (global) or the contacts
+//! (local). The choice goes by counted operations, never by the clock, so a run repeats itself bit by bit.
+//! Fails: impacts on thousands of hyperstatic contacts may need more factorisations than patience allows.
+
+mod controller;
+mod proximal_newton;
+
+use nonsmooth_problem::check::{Existence, Kinematic};
+use nonsmooth_problem::linalg::budget;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::contact::auto::proximal_newton::ProximalNewton;
+use crate::contact::existence;
+use crate::contact::form::{Access, Costs, Linearised};
+use crate::contact::parts::{Central, Sweep};
+use crate::core::register::{About, Described, Solves};
+use crate::core::settings::{Settings, described};
+use crate::{Limits, SolveError, Solver, Step};
+use controller::{Controller, Verdict};
+
+/// The hyperparameters of `auto`; none needs to be set.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Auto {
+    /// Whether an interior point may make the start; false goes from the sweeps to the proximal point method at once.
+    pub interior: bool,
+    /// Give up after this many strategies in a row that have not halved the error; 0 goes on until a limit ends the solve.
+    pub strategies: usize,
+}
+
+impl Default for Auto {
+    fn default() -> Self {
+        Self { interior: true, strategies: 12 }
+    }
+}
+
+impl Settings for Auto {}
+
+impl Described for Auto {
+    const ABOUT: &'static About = &About {
+        name: "auto",
+        family: "auto",
+        solves: Solves::Law,
+        summary: "needs no setting: sweeps, interior point, proximal semismooth Newton, each where it is the fastest",
+        needs: &[],
+        cites: &["AcaryBremondHuber2018", "AlartCurnier1991", "Acary2018"],
+        variants: &["interior=false"],
+        settings: described::<Self>,
+    };
+}
+
+/// `auto` for contacts of dimension D.
+#[derive(Debug, Clone)]
+pub struct Hybrid<const D: usize>(pub Auto);
+
+/// A first stage of sweeps is at least this long, unless it ends at the tolerance.
+const FIRST_SWEEPS: usize = 30;
+/// Sweeps of a step.
+const SWEEPS_A_STEP: usize = 10;
+/// A solve by Newton's method is taken to cost this many factorisations.
+const NEWTON: f64 = 10.0;
+/// Sweeps may cost this many times as much as they were compared with, before their promise is no longer believed.
+const BELIEF: f64 = 3.0;
+/// The interior point ends after this many iterations, or below this error, or after so many iterations that did not halve the
+/// error, or so many short steps in a row.
+const INTERIOR: usize = 60;
+const INTERIOR_ERROR: f64 = 1e-8;
+const INTERIOR_IDLE: usize = 10;
+const INTERIOR_SHORT: (f64, usize) = (1e-6, 6);
+/// The interior point begins far from any point given; below this error one is better off without it.
+const NEAR: f64 = 1e-4;
+/// Above this error between two proximal steps, sweeps.
+const SWEEP_ABOVE: f64 = 1e-9;
+/// Sweeps that raise the error by more than this factor are taken back.
+const TAKE_BACK: f64 = 5.0;
+/// Problems of so few unknowns are enumerated after so many Newton iterations: milliseconds, and a last word.
+const TINY: usize = 24;
+const EARLY: usize = 20;
+/// Impulses that make velocities so many times those of the loads run away: it is time to ask for existence.
+const RUNAWAY: f64 = 1e7;
+/// An investigation of existence may take this long, in seconds.
+const INVESTIGATION: f64 = 2.0;
+
+/// The workspace. The later stages' parts are made when they are first needed.
+pub struct HybridWork<P: Linearised<D>, const D: usize> {
+    state: P::State,
+    sweep: Sweep<D>,
+    central: Option<Box<Central<D>>>,
+    newton: Option<Box<ProximalNewton<D>>>,
+    controller: Controller,
+    costs: Option<Costs>,
+    scale: f64,
+    tolerance: f64,
+    stage: Stage,
+    /// The impulses of the best iterate of the present subproblem; those before the sweeps between; those of the best point.
+    inner_best: Vec<f64>,
+    before: Vec<f64>,
+    best: Vec<f64>,
+    existence: Option<Existence>,
+    /// An exact solution, rounded, that the judge has yet to see.
+    exact: Option<P::Point>,
+    /// Enumeration was tried.
+    asked: bool,
+    /// The interior point was left out.
+    passed_by: bool,
+    done: Done,
+}
+
+/// Where the method stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Stage {
+    Sweeps { last: f64, claims: usize },
+    Interior { idle: usize, short: usize, least: f64 },
+    Newton,
+    Between { left: usize },
+}
+
+/// Where the solve began.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum Start {
+    /// The caller gave no other point.
+    #[default]
+    Zero,
+    /// The caller's point.
+    Given,
+    /// Zero, though the caller gave a point.
+    Refused,
+}
+
+/// What has been done, for the account.
+#[derive(Debug, Clone, Copy, Default)]
+struct Done {
+    start: Start,
+    sweeps: usize,
+    interior: usize,
+    interior_error: f64,
+    subproblems: usize,
+    failed: usize,
+    newton: usize,
+    between: usize,
+    strategies: usize,
+}
+
+impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
+    type Work = HybridWork<P, D>;
+
+    fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
+        let state = problem.state(Access::Newton)?;
+        Ok(HybridWork {
+            sweep: Sweep::new(problem, &state),
+            central: None,
+            newton: None,
+            controller: Controller::default(),
+            costs: None,
+            scale: problem.velocity_scale(&state),
+            tolerance: 0.0,
+            stage: FIRST,
+            inner_best: vec![],
+            before: vec![],
+            best: vec![],
+            existence: None,
+            exact: None,
+            asked: false,
+            passed_by: false,
+            done: Done::default(),
+            state,
+        })
+    }
+
+    fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
+        problem.refill(&mut work.state)?;
+        work.sweep.fill(problem, &work.state);
+        work.scale = problem.velocity_scale(&work.state);
+        work.costs = None;
+        if let Some(newton) = &mut work.newton {
+            newton.fill(problem, &work.state);
+        }
+        Ok(())
+    }
+
+    fn aim(&self, tolerance: f64, work: &mut Self::Work) {
+        work.tolerance = tolerance;
+    }
+
+    fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        work.done = Done::default();
+        work.done.start = self.choose_start(problem, P::impulses(point), work);
+        problem.enter(&mut work.state, point);
+        work.stage = FIRST;
+        (work.existence, work.exact, work.asked) = (None, None, false);
+        work.passed_by = false;
+    }
+
+    fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
+        if let Some(ray) = problem.contradiction(&work.state) {
+            return Step::NoSolution(ray.clone().into());
+        }
+        // The judge has seen it, and goes on asking.
+        work.exact = None;
+        match work.stage {
+            Stage::Sweeps { last, claims } => self.sweep(problem, point, work, last, claims),
+            Stage::Interior { .. } => self.interior(problem, point, work),
+            Stage::Newton => self.newton(problem, point, work),
+            Stage::Between { left } => self.between(problem, point, work, left),
+        }
+    }
+
+    fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        match &work.exact {
+            // Its velocities and multipliers are exact too.
+            Some(exact) => P::copy_point(exact, point),
+            None => problem.complete(&mut work.state, point),
+        }
+    }
+
+    fn account(&self, work: &Self::Work) -> Vec<String> {
+        let Done { start, sweeps, interior, interior_error, .. } = work.done;
+        let Done { subproblems, failed, newton, between, .. } = work.done;
+        let mut lines = vec![];
+        match start {
+            Start::Zero => {}
+            Start::Given => lines.push("started from the point given".into()),
+            Start::Refused => {
+                lines.push("started from zero: the point given is farther off".into())
+            }
+        }
+        lines.push(format!("{sweeps} Gauss-Seidel sweeps"));
+        if interior > 0 {
+            lines.push(format!(
+                "{interior} interior-point iterations on the exact law, to {interior_error:.1e}"
+            ));
+        }
+        if subproblems > 0 {
+            let epsilon = work.controller.epsilon();
+            lines.push(format!(
+                "{subproblems} proximal subproblems ({failed} not solved, last epsilon \
+                 {epsilon:.0e}) in {newton} Newton iterations, {between} sweeps between them"
+            ));
+        }
+        if work.done.strategies > 0 {
+            lines.push(format!("{} changes of strategy", work.done.strategies));
+        }
+        if let Some(existence) = &work.existence {
+            lines.push(format!("existence of a solution: {}", existence.name()));
+        }
+        lines
+    }
+}
+
+const FIRST: Stage = Stage::Sweeps { last: f64::NAN, claims: 0 };
+
+impl<const D: usize> Hybrid<D> {
+    /// Puts zero in place of impulses that solve the problem no better than zero does: a bad guess must not cost anything.
+    fn choose_start<P: Linearised<D>>(
+        &self,
+        problem: &P,
+        r: &mut [f64],
+        work: &mut HybridWork<P, D>,
+    ) -> Start {
+        if r.iter().all(|x| *x == 0.0) {
+            return Start::Zero;
+        }
+        let HybridWork { state, sweep, before: given, inner_best: u, .. } = work;
+        given.clear();
+        given.extend_from_slice(r);
+        u.resize(r.len(), 0.0);
+        problem.velocities(state, r, u);
+        let theirs = sweep.residual(u, r);
+        r.fill(0.0);
+        problem.velocities(state, r, u);
+        if theirs < sweep.residual(u, r) {
+            r.copy_from_slice(given);
+            Start::Given
+        } else {
+            Start::Refused
+        }
+    }
+
+    /// Stage 1. `last`: the estimate of the step before; `claims`: how often the sweeps thought that they had arrived.
+    fn sweep<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        last: f64,
+        claims: usize,
+    ) -> Step {
+        let mut estimate = f64::NAN;
+        for _ in 0..SWEEPS_A_STEP {
+            let moves = work.sweep.sweep(problem, &mut work.state, P::impulses(point));
+            work.done.sweeps += 1;
+            if budget::over() {
+                break;
+            }
+            estimate = moves.sqrt() / work.scale;
+            if estimate <= 0.3 * work.tolerance && claims < SWEEPS_A_STEP {
+                work.stage = Stage::Sweeps { last, claims: claims + 1 };
+                return Step::Continue { estimate };
+            }
+        }
+        work.stage = Stage::Sweeps { last: estimate, claims };
+        if !estimate.is_finite() && !budget::over() {
+            // Where W is not positive semidefinite a sweep may send the impulses to infinity.
+            P::impulses(point).fill(0.0);
+            problem.enter(&mut work.state, point);
+            self.leave_sweeps(problem, point, work);
+            return Step::Continue { estimate: f64::NAN };
+        }
+        if work.done.sweeps < FIRST_SWEEPS && estimate > 0.0 {
+            return Step::Continue { estimate };
+        }
+        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        let rate = (estimate / last).powf(1.0 / SWEEPS_A_STEP as f64);
+        let left = (work.tolerance / estimate).ln() / rate.ln();
+        let newton = NEWTON * costs.factorisation;
+        let promising = rate < 1.0
+            && left * costs.sweep < newton
+            && work.done.sweeps as f64 * costs.sweep < BELIEF * newton;
+        if !promising {
+            self.leave_sweeps(problem, point, work);
+        }
+        Step::Continue { estimate }
+    }
+
+    /// The parts of the later stages, and whichever comes first.
+    fn leave_sweeps<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) {
+        let HybridWork { newton, state, controller, .. } = work;
+        let newton = newton.get_or_insert_with(|| Box::new(ProximalNewton::new(problem, state)));
+        let r = P::impulses(point);
+        for buffer in [&mut work.inner_best, &mut work.before, &mut work.best] {
+            buffer.resize(r.len(), 0.0);
+        }
+        work.best.copy_from_slice(r);
+        let error = newton.look(problem, state, r);
+        controller.begin(error);
+        work.passed_by = self.0.interior && work.done.start == Start::Given && error < NEAR;
+        if work.passed_by {
+            controller.resume();
+        }
+        if work.passed_by || !self.0.interior {
+            self.subproblem(point, work, error);
+        } else {
+            begin_interior(problem, work);
+        }
+    }
+
+    /// Stage 2: one iteration of the interior point; at its end the better of its best iterate and the swept point goes on.
+    fn interior<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) -> Step {
+        let HybridWork { central, state, stage, done, tolerance, controller, .. } = work;
+        let (Some(central), Stage::Interior { idle, short, least }) = (central, stage) else {
+            return Step::Stuck("auto has lost its place".into());
+        };
+        let ended = match central.iterate(problem, state) {
+            Err(_) => true,
+            Ok(now) => {
+                done.interior += 1;
+                *idle += 1;
+                if now.error < 0.5 * *least {
+                    (*idle, *least) = (0, now.error);
+                }
+                *short = if now.alpha < INTERIOR_SHORT.0 { *short + 1 } else { 0 };
+                now.error <= tolerance.max(INTERIOR_ERROR)
+                    || *idle >= INTERIOR_IDLE
+                    || *short >= INTERIOR_SHORT.1
+                    || done.interior >= INTERIOR
+            }
+        };
+        let (r, error) = central.best();
+        done.interior_error = error;
+        if ended {
+            if controller.offer(error) {
+                P::impulses(point).copy_from_slice(r);
+            }
+            self.subproblem_here(problem, point, work);
+        }
+        Step::Continue { estimate: error }
+    }
+
+    /// Begins a proximal subproblem about the present impulses, from which their velocities have yet to be computed.
+    fn subproblem_here<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) {
+        let HybridWork { newton, state, .. } = work;
+        let Some(newton) = newton else { return };
+        let error = newton.look(problem, state, P::impulses(point));
+        self.subproblem(point, work, error);
+    }
+
+    /// Begins a proximal subproblem about the present impulses, whose velocities and error are known.
+    fn subproblem<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        error: f64,
+    ) {
+        let HybridWork { newton, controller, .. } = work;
+        let Some(newton) = newton else { return };
+        let r = P::impulses(point);
+        newton.focus(r, error, work.tolerance);
+        newton.center(r, controller.epsilon(), controller.kappa());
+        work.inner_best.copy_from_slice(r);
+        if controller.start(error, newton.residual(r), work.tolerance) {
+            work.best.copy_from_slice(r);
+        }
+        work.stage = Stage::Newton;
+    }
+
+    /// Stage 3: one Newton iteration; at the end of the subproblem what comes next.
+    fn newton<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) -> Step {
+        let HybridWork { newton, state, controller, inner_best, best, done, .. } = work;
+        let Some(newton) = newton else {
+            return Step::Stuck("auto has lost its place".into());
+        };
+        let r = P::impulses(point);
+        let iterate = newton.iterate(problem, state, r);
+        done.newton += 1;
+        if controller.observe(&iterate) {
+            inner_best.copy_from_slice(r);
+        }
+        let Some(verdict) = controller.verdict(&iterate) else {
+            return Step::Continue { estimate: newton.error(r) };
+        };
+        done.subproblems += 1;
+        match verdict {
+            Verdict::Solved => r.copy_from_slice(inner_best),
+            Verdict::Better => {
+                done.failed += 1;
+                r.copy_from_slice(inner_best);
+            }
+            Verdict::Failed => {
+                done.failed += 1;
+                r.copy_from_slice(newton.centre());
+            }
+        }
+        let error = newton.look(problem, state, r);
+        if controller.end(verdict, error) {
+            best.copy_from_slice(r);
+        }
+        if controller.is_stuck() {
+            return self.other_strategy(problem, point, work);
+        }
+        if !work.asked && work.done.newton >= EARLY && problem.unknowns() <= TINY {
+            work.asked = true;
+            if let Some(existence) = existence::enumerated(problem)
+                && let Some(step) = self.decided(problem, point, work, &existence)
+            {
+                work.existence = Some(existence);
+                return step;
+            }
+        }
+        if work.sweep.largest(P::impulses(point)) > RUNAWAY * work.scale {
+            match &work.existence {
+                None => return self.other_strategy(problem, point, work),
+                // They run where the certificate points.
+                Some(Existence::NearlyNoSolution { certificate, .. }) => {
+                    return Step::NoSolution(certificate.clone());
+                }
+                _ => {}
+            }
+        }
+        problem.enter(&mut work.state, point);
+        if error > SWEEP_ABOVE {
+            let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+            let left = work.controller.sweeps(costs.factorisation / costs.sweep);
+            work.before.copy_from_slice(P::impulses(point));
+            work.stage = Stage::Between { left };
+        } else {
+            self.subproblem(point, work, error);
+        }
+        Step::Continue { estimate: error }
+    }
+
+    /// Stage 4: sweeps on the problem itself; taken back where they spoil more than they mend.
+    fn between<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        left: usize,
+    ) -> Step {
+        let count = left.min(2 * SWEEPS_A_STEP);
+        let mut moves = 0.0;
+        for _ in 0..count {
+            moves = work.sweep.sweep(problem, &mut work.state, P::impulses(point));
+            if budget::over() {
+                break;
+            }
+        }
+        work.done.between += count;
+        if left > count {
+            work.stage = Stage::Between { left: left - count };
+            return Step::Continue { estimate: moves.sqrt() / work.scale };
+        }
+        let Some(newton) = &mut work.newton else {
+            return Step::Stuck("auto has lost its place".into());
+        };
+        let r = P::impulses(point);
+        let error = newton.look(problem, &mut work.state, r);
+        let factor = work.controller.swept(error);
+        if factor > TAKE_BACK || factor.is_nan() {
+            r.copy_from_slice(&work.before);
+            self.subproblem_here(problem, point, work);
+        } else {
+            self.subproblem(point, work, error);
+        }
+        Step::Continue { estimate: error }
+    }
+
+    /// What follows from what is known of the existence of a solution, if something does.
+    fn decided<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        existence: &Existence,
+    ) -> Option<Step> {
+        match existence {
+            Existence::NoSolution { proof } => Some(Step::NoSolution(proof.certificate().clone())),
+            // An exact solution, found on the way: the judge has the last word on its rounding.
+            Existence::Solved { coefficients } => {
+                let x = problem.cones()?.unknowns_at(&coefficients.0);
+                let exact = problem.assembled(&x);
+                P::copy_point(&exact, point);
+                problem.enter(&mut work.state, point);
+                work.best.copy_from_slice(P::impulses(point));
+                self.subproblem_here(problem, point, work);
+                work.exact = Some(exact);
+                Some(Step::Continue { estimate: 0.0 })
+            }
+            _ => None,
+        }
+    }
+
+    /// Stage 5. The first time it is asked whether there is a solution at all.
+    fn other_strategy<P: Linearised<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) -> Step {
+        let limits = Limits { time_limit: Some(INVESTIGATION), ..Limits::default() };
+        let existence = work
+            .existence
+            .get_or_insert_with(|| existence::decide::<P, D>(problem, &limits))
+            .clone();
+        if work.done.strategies == 0 && !work.asked {
+            if let Some(step) = self.decided(problem, point, work, &existence) {
+                work.done.strategies += 1;
+                return step;
+            }
+        } else if let Existence::NoSolution { proof } = existence {
+            return Step::NoSolution(proof.certificate().clone());
+        }
+        work.done.strategies += 1;
+        if self.0.strategies > 0 && work.controller.strategies() >= self.0.strategies {
+            if let Some(Existence::NearlyNoSolution { certificate, .. }) = &work.existence {
+                return Step::NoSolution(certificate.clone());
+            }
+            let why = format!(
+                "no strategy halves the error any more; existence of a solution: {}",
+                existence.name()
+            );
+            return Step::Stuck(why.into());
+        }
+        let cold = work.controller.change();
+        let r = P::impulses(point);
+        if cold {
+            r.fill(0.0);
+        } else {
+            r.copy_from_slice(&work.best);
+        }
+        if std::mem::take(&mut work.passed_by) {
+            begin_interior(problem, work);
+        } else if cold {
+            // Some problems want nothing but sweeps, tens of thousands: as many as the strategy before took time for.
+            problem.enter(&mut work.state, point);
+            let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+            let left = work.controller.long_sweeps(costs.factorisation / costs.sweep);
+            work.before.copy_from_slice(P::impulses(point));
+            work.stage = Stage::Between { left };
+        } else {
+            self.subproblem_here(problem, point, work);
+        }
+        Step::Continue { estimate: f64::NAN }
+    }
+}
+
+/// Begins stage 2.
+fn begin_interior<P: Linearised<D>, const D: usize>(problem: &P, work: &mut HybridWork<P, D>) {
+    let HybridWork { central, state, stage, .. } = work;
+    let now = central.get_or_insert_default().begin(problem, state, 0.0, None);
+    *stage = Stage::Interior { idle: 0, short: 0, least: now.error };
+}
+
+#[cfg(test)]
+mod tests {
+    use nonsmooth_problem::planted::Planted;
+    use nonsmooth_problem::{FrictionGlobal, FrictionLocal, LocalPoint, Problem};
+
+    use super::*;
+    use crate::core::register::Registered;
+    use crate::core::settings::SettingsMap;
+    use crate::registry::session;
+    use crate::{Outcome, Status};
+
+    /// A solve by `auto` from a point, which it overwrites; and its account.
+    fn solve<P: Registered>(problem: &P, point: &mut P::Point) -> (Outcome, String) {
+        let mut auto = session::<P>("auto", &SettingsMap::new()).unwrap();
+        let outcome = auto.solve(problem, point, &Limits::default(), &mut |_| {}).unwrap();
+        assert_eq!(outcome.status, Status::Solved);
+        (outcome, auto.account().join("; "))
+    }
+
+    /// From zero, from the solution, from near it, and from far away. `impulses` gives those of a point.
+    fn starts<P: Registered>(problem: &P, impulses: fn(&mut P::Point) -> &mut Vec<f64>) {
+        let mut solution = problem.origin();
+        let (cold, account) = solve(problem, &mut solution);
+        assert!(cold.iterations > 0 && !account.contains("started"), "{account}");
+
+        let mut point = solution.clone();
+        let (outcome, account) = solve(problem, &mut point);
+        assert!(outcome.iterations <= 1 && account.contains("from the point given"), "{account}");
+
+        let mut near = solution.clone();
+        impulses(&mut near).iter_mut().for_each(|r| *r *= 1.0 + 1e-6);
+        let (outcome, account) = solve(problem, &mut near);
+        assert!(outcome.iterations <= cold.iterations && account.contains("point given"));
+
+        // Whatever comes is no worse than nothing: the same steps as from zero.
+        for far in [1e3, -1e3, 1e200] {
+            let mut point = solution.clone();
+            impulses(&mut point)
+                .iter_mut()
+                .enumerate()
+                .for_each(|(i, r)| *r += far * (i + 1) as f64);
+            let (outcome, account) = solve(problem, &mut point);
+            assert_eq!(outcome.iterations, cold.iterations, "{far:e}");
+            assert!(account.contains("started from zero"), "{account}");
+            assert_eq!(impulses(&mut point), impulses(&mut solution), "{far:e}");
+        }
+    }
+
+    #[test]
+    fn a_start_is_taken_where_it_is_better_than_zero() {
+        let planted = Planted { contacts: 30, dofs: 100, seed: 4, ..Planted::default() };
+        let bilateral = Planted { bilateral: 2, ..planted };
+        starts::<FrictionLocal<3>>(&planted.local().0, |p| &mut p.r);
+        starts::<FrictionLocal<2>>(&bilateral.local().0, |p| &mut p.r);
+        starts::<FrictionGlobal<3>>(&bilateral.global().0, |p| &mut p.r);
+        starts::<FrictionGlobal<2>>(&planted.global().0, |p| &mut p.r);
+    }
+
+    #[test]
+    fn a_problem_at_rest_without_impulses_refuses_every_start() {
+        let (mut problem, _) = Planted::default().local::<3>();
+        problem.q.fill(0.0);
+        let mut point = LocalPoint { r: vec![1.0; problem.q.len()], ..problem.origin() };
+        let (_, account) = solve(&problem, &mut point);
+        assert!(account.contains("started from zero") && point.r.iter().all(|r| *r == 0.0));
+    }
+}

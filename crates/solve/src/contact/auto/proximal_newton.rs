@@ -1,0 +1,313 @@
+//! Proximal point steps whose subproblems a semismooth Newton method on the Alart–Curnier function solves.
+//!
+//! Problem: `u = W r + q`, `K* ∋ u + mu‖u_T‖e_N ⟂ r ∈ K` for each contact, W possibly rank deficient.
+//!
+//! Outer k: the law for `u_ε = u + ε E (r − r_k)` in place of u, E diagonal in units of W. Its W + εE is regular, the bias
+//! vanishes where `r = r_k`, so hyperstatic problems lose no accuracy.
+//! Inner: Newton on Φ(u_ε, r) = 0, `(∂Φ/∂r + ε ∂Φ/∂u E + ∂Φ/∂u W) Δr = −Φ`, with a line search on ‖Φ/ρ‖.
+//!
+//! The metric: with K made self-dual (`D = diag(mu, 1, 1)`, `x = D r`, `W' = D⁻¹ W D⁻¹`) one number a contact,
+//! `w_c = tr(W'_cc)/D`, measures normal and tangential directions alike: ρ = κ/((1 + ε) w_c), E = w_c, both carried back by D.
+//!
+//! References: AlartCurnier1991; AcaryBremondHuber2018 (proximal point); Rockafellar1976.
+//! Near the end of a solve to a tolerance that the rounding of `W r + q` would hide, velocities come in doubled precision, so that Newton
+//! sees the residual of the impulses as they are stored.
+//!
+//! Cost of an iteration: one factorisation of `Q + P W`, one to five products with W, O(nc) a trial of the line search.
+
+use nonsmooth_problem::linalg::{Block, small};
+
+use crate::contact::form::Linearised;
+use crate::contact::law::cfun::{Disk, Radii, alart_curnier, natural_residual};
+
+/// Trials of the line search.
+const TRIALS: usize = 8;
+/// Sufficient decrease.
+const ARMIJO: f64 = 1e-3;
+/// mu below this is treated as this in the metric; contacts without friction have none.
+const LEAST_MU: f64 = 1e-6;
+
+/// The state of the method.
+pub struct ProximalNewton<const D: usize> {
+    contacts: Vec<Contact>,
+    /// `‖q‖`.
+    scale: f64,
+    epsilon: f64,
+    kappa: f64,
+    /// r_k.
+    center: Vec<f64>,
+    /// The velocities of the present impulses.
+    u: Vec<f64>,
+    phi: Vec<f64>,
+    p: Vec<Block<D>>,
+    q: Vec<Block<D>>,
+    dr: Vec<f64>,
+    du: Vec<f64>,
+    trial_r: Vec<f64>,
+    trial_u: Vec<f64>,
+    failures: usize,
+    /// Velocities are computed in doubled precision.
+    precise: bool,
+}
+
+/// Plain sums of W r are wrong by about this share of their terms.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+/// Doubled precision begins where the error is below this multiple of that rounding.
+const NEAR: f64 = 1e4;
+
+#[derive(Debug, Clone, Copy)]
+struct Contact {
+    mu: f64,
+    /// `tr(W_cc)/D`.
+    unit: f64,
+    /// `w_c` of the self-dual metric along the normal and the tangents: `w mu²` and `w`.
+    normal: f64,
+    tangential: f64,
+}
+
+/// What an iteration came to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inner {
+    /// The relative natural residual of the subproblem.
+    pub residual: f64,
+    /// The step length; 0 where the linear system could not be solved.
+    pub step: f64,
+}
+
+impl<const D: usize> ProximalNewton<D> {
+    /// For `problem`.
+    pub fn new<P: Linearised<D>>(problem: &P, state: &P::State) -> Self {
+        let mut out = Self {
+            contacts: vec![],
+            scale: 1.0,
+            epsilon: 1.0,
+            kappa: 10.0,
+            center: vec![],
+            u: vec![],
+            phi: vec![],
+            p: vec![],
+            q: vec![],
+            dr: vec![],
+            du: vec![],
+            trial_r: vec![],
+            trial_u: vec![],
+            failures: 0,
+            precise: false,
+        };
+        out.fill(problem, state);
+        out
+    }
+
+    /// Takes another problem; allocates nothing where the number of contacts is the same.
+    pub fn fill<P: Linearised<D>>(&mut self, problem: &P, state: &P::State) {
+        let nc = problem.mu().len();
+        self.scale = problem.velocity_scale(state);
+        self.precise = false;
+        self.contacts.clear();
+        for (c, &mu) in problem.mu().iter().enumerate() {
+            let w = problem.diagonal_block(state, c);
+            let unit = small::mean_diagonal(&w).abs();
+            let m = if mu > 0.0 { mu.max(LEAST_MU) } else { 1.0 };
+            let trace: f64 = (1..D).map(|k| w[k][k]).sum();
+            let self_dual = (w[0][0] / (m * m) + trace) / D as f64;
+            let w = if self_dual > 0.0 { self_dual } else { 1.0 };
+            self.contacts.push(Contact { mu, unit, normal: w * m * m, tangential: w });
+        }
+        for x in [
+            &mut self.center,
+            &mut self.u,
+            &mut self.phi,
+            &mut self.dr,
+            &mut self.du,
+            &mut self.trial_r,
+            &mut self.trial_u,
+        ] {
+            x.resize(D * nc, 0.0);
+        }
+        self.p.resize(nc, [[0.0; D]; D]);
+        self.q.resize(nc, [[0.0; D]; D]);
+    }
+
+    /// Takes `r` as the present impulses: computes their velocities, on which [`error`](Self::error) and [`residual`](Self::residual)
+    /// rest, and returns the error.
+    pub fn look<P: Linearised<D>>(&mut self, problem: &P, state: &mut P::State, r: &[f64]) -> f64 {
+        self.update(problem, state, r);
+        self.error(r)
+    }
+
+    fn update<P: Linearised<D>>(&mut self, problem: &P, state: &mut P::State, r: &[f64]) {
+        if self.precise {
+            problem.velocities_precisely(state, r, &mut self.u);
+        } else {
+            problem.velocities(state, r, &mut self.u);
+        }
+    }
+
+    /// Chooses the precision of velocities near `r`, whose relative error is known, for a solve to `tolerance`.
+    pub fn focus(&mut self, r: &[f64], error: f64, tolerance: f64) {
+        let squares = r
+            .chunks(D)
+            .zip(&self.contacts)
+            .map(|(r, c)| r.iter().map(|r| (c.unit * r / self.scale).powi(2)).sum::<f64>());
+        let rounding = ROUNDING * squares.sum::<f64>().sqrt();
+        self.precise = rounding > 0.1 * tolerance && error < NEAR * rounding;
+    }
+
+    /// Starts the subproblem of `epsilon` about `r`, with ρ = `kappa`/w_c.
+    pub fn center(&mut self, r: &[f64], epsilon: f64, kappa: f64) {
+        self.center.copy_from_slice(r);
+        self.epsilon = epsilon;
+        self.kappa = kappa;
+        self.failures = 0;
+    }
+
+    /// `r_k`.
+    pub fn centre(&self) -> &[f64] {
+        &self.center
+    }
+
+    /// The relative natural residual of the problem itself at r.
+    pub fn error(&self, r: &[f64]) -> f64 {
+        self.natural(&self.u, r, 0.0)
+    }
+
+    /// The relative natural residual with ε: `‖( w r − P_K(w r − ũ_ε) )_c‖ / ‖q‖`, `w = w_c + ε E`.
+    fn natural(&self, u: &[f64], r: &[f64], epsilon: f64) -> f64 {
+        let mut sum = 0.0;
+        for (c, contact) in self.contacts.iter().enumerate() {
+            let (ue, rc) = (self.shifted(u, r, c, epsilon), small::block::<D>(r, c));
+            let w = contact.unit + epsilon * contact.tangential;
+            sum += natural_residual(w, &rc, &ue, contact.mu);
+        }
+        sum.sqrt() / self.scale
+    }
+
+    /// `u_ε` of contact c.
+    #[inline(always)]
+    fn shifted(&self, u: &[f64], r: &[f64], c: usize, epsilon: f64) -> [f64; D] {
+        let contact = &self.contacts[c];
+        let mut ue: [f64; D] = small::block(u, c);
+        if epsilon > 0.0 {
+            ue[0] += epsilon * contact.normal * (r[D * c] - self.center[D * c]);
+            for k in 1..D {
+                let i = D * c + k;
+                ue[k] += epsilon * contact.tangential * (r[i] - self.center[i]);
+            }
+        }
+        ue
+    }
+
+    #[inline(always)]
+    fn radii(&self, contact: &Contact) -> Radii {
+        let kappa = self.kappa / (1.0 + self.epsilon);
+        Radii { normal: kappa / contact.normal, tangential: kappa / contact.tangential }
+    }
+
+    /// `‖Φ/ρ‖² / ‖q‖²` at `(u, r)`.
+    fn merit(&self, u: &[f64], r: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        for (c, contact) in self.contacts.iter().enumerate() {
+            let ue = self.shifted(u, r, c, self.epsilon);
+            let rho = self.radii(contact);
+            let phi = value(&ue, &small::block(r, c), contact.mu, rho);
+            sum += (phi[0] / rho.normal).powi(2);
+            sum += phi[1..].iter().map(|x| (x / rho.tangential).powi(2)).sum::<f64>();
+        }
+        sum / (self.scale * self.scale)
+    }
+
+    /// One Newton iteration on `r` and `u`.
+    pub fn iterate<P: Linearised<D>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        r: &mut [f64],
+    ) -> Inner {
+        for c in 0..self.contacts.len() {
+            let contact = self.contacts[c];
+            let ue = self.shifted(&self.u, r, c, self.epsilon);
+            let rho = self.radii(&contact);
+            let piece =
+                alart_curnier(Disk::AlartCurnier, &ue, &small::block(r, c), contact.mu, rho);
+            let (mut q, epsilon) = (piece.b, self.epsilon);
+            for row in 0..D {
+                self.phi[D * c + row] = -piece.phi[row];
+                for k in 0..D {
+                    let e = if k == 0 { contact.normal } else { contact.tangential };
+                    q[row][k] += epsilon * e * piece.a[row][k];
+                }
+            }
+            self.p[c] = piece.a;
+            self.q[c] = q;
+        }
+        let failed = Inner { residual: f64::INFINITY, step: 0.0 };
+        if problem.linearise(state, &self.p, &self.q).is_err() {
+            return failed;
+        }
+        problem.solve_linearised(state, &self.phi, &mut self.dr, &mut self.du);
+        if !self.dr.iter().all(|x| x.is_finite()) {
+            return failed;
+        }
+        let step = self.search(r);
+        r.iter_mut().zip(&self.dr).for_each(|(r, d)| *r += step * d);
+        self.update(problem, state, r);
+        Inner { residual: self.natural(&self.u, r, self.epsilon), step }
+    }
+
+    /// The step length: the first that decreases the merit enough, else the best of those tried, but every fifth time the
+    /// smallest, which leads out of cycles.
+    fn search(&mut self, r: &[f64]) -> f64 {
+        let start = self.merit(&self.u, r).sqrt();
+        let (mut step, mut best) = (1.0, (f64::INFINITY, 1.0));
+        for _ in 0..=TRIALS {
+            for i in 0..r.len() {
+                self.trial_r[i] = r[i] + step * self.dr[i];
+                self.trial_u[i] = self.u[i] + step * self.du[i];
+            }
+            let merit = self.merit(&self.trial_u, &self.trial_r).sqrt();
+            if merit <= (1.0 - ARMIJO * step) * start {
+                return step;
+            }
+            if merit < best.0 {
+                best = (merit, step);
+            }
+            step *= 0.5;
+        }
+        self.failures += 1;
+        if self.failures.is_multiple_of(5) { 2.0 * step } else { best.1 }
+    }
+
+    /// The relative natural residual of the present subproblem.
+    pub fn residual(&self, r: &[f64]) -> f64 {
+        self.natural(&self.u, r, self.epsilon)
+    }
+}
+
+/// The value of the Alart–Curnier function alone.
+#[inline(always)]
+fn value<const D: usize>(u: &[f64; D], r: &[f64; D], mu: f64, rho: Radii) -> [f64; D] {
+    let x_n = r[0] - rho.normal * u[0];
+    let mut phi = *r;
+    if x_n <= 0.0 {
+        return phi;
+    }
+    phi[0] = rho.normal * u[0];
+    let radius = mu * x_n;
+    let mut x = [0.0; D];
+    let mut square = 0.0;
+    for k in 1..D {
+        x[k] = r[k] - rho.tangential * u[k];
+        square += x[k] * x[k];
+    }
+    if square <= radius * radius {
+        for k in 1..D {
+            phi[k] = rho.tangential * u[k];
+        }
+    } else {
+        let factor = radius / square.sqrt();
+        for k in 1..D {
+            phi[k] = r[k] - factor * x[k];
+        }
+    }
+    phi
+}

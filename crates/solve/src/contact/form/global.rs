@@ -1,0 +1,299 @@
+//! The global problem by its contacts: velocity space, W never formed.
+//!
+//! Contact by contact, the state keeps `v` (so that `u_c = H_cᵀ v + w_c` costs the rows that contact c touches) and
+//! `Z_c = M⁻¹ H_c` (so that an impulse moves v at the same cost). Products with W are one solve,
+//! `Hᵀ M⁻¹ (H r + f) + w`, and need no Z. `complete` recomputes v exactly, so the rounding that the increments
+//! gather never reaches a judged point.
+
+use nonsmooth_problem::check::Impulses;
+use nonsmooth_problem::linalg::budget::{self, TooLarge};
+use nonsmooth_problem::linalg::{
+    Block, Bsr, Compensated, Csc, Delassus, Refine, Singular, norm_or_one, small,
+};
+use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
+
+use super::linearised::{BodyForm, ContactForm, Form, NEVER, Once, System, made, there};
+use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised};
+use crate::SolveError;
+
+/// What the view keeps.
+pub struct GlobalState<const D: usize> {
+    dynamics: Dynamics,
+    operator: Operator<D>,
+    access: Access,
+    /// The operator belongs to this H.
+    h: Csc,
+    q: Vec<f64>,
+    scale: f64,
+    v: Vec<f64>,
+    /// v in doubled precision, where it was asked for: high, low, the last correction.
+    precise: [Vec<f64>; 3],
+    contradiction: Option<Impulses>,
+    /// Made when it is first asked for.
+    system: Once<GlobalSystem<D>>,
+}
+
+/// The linear system of a Newton method, over whichever graph suits M.
+enum GlobalSystem<const D: usize> {
+    Bodies(System<BodyForm<D>, D>),
+    Contacts(System<ContactForm<D>, D>),
+}
+
+/// What a family's access to W needs beside the dynamics.
+enum Operator<const D: usize> {
+    /// Visits contact by contact: Z.
+    Visits(Delassus<D>),
+    /// Products with all of W: the diagonal blocks alone.
+    Products(Vec<Block<D>>),
+    /// W itself: for Newton methods where M is factorised sparsely (finite elements, mechanisms), so that Z would be dense
+    /// and the graph of M far larger than that of W.
+    Condensed(Bsr<D>),
+}
+
+impl<const D: usize> GlobalSystem<D> {
+    fn new(
+        problem: &FrictionGlobal<D>,
+        operator: &Operator<D>,
+        dynamics: &Dynamics,
+    ) -> Result<Self, TooLarge> {
+        let nc = problem.contacts();
+        Ok(match operator {
+            Operator::Condensed(w) => Self::Contacts(System::new(ContactForm::new(w)?, nc)),
+            _ => {
+                let form = BodyForm::new(dynamics.inverse.matrix(), &problem.H)?;
+                Self::Bodies(System::new(form, nc))
+            }
+        })
+    }
+}
+
+impl<const D: usize> Operator<D> {
+    fn diagonal_block(&self, c: usize) -> Block<D> {
+        match self {
+            Operator::Visits(delassus) => *delassus.diagonal_block(c),
+            Operator::Products(diagonal) => diagonal[c],
+            Operator::Condensed(w) => w.diagonal_block(c),
+        }
+    }
+}
+
+impl<const D: usize> GlobalState<D> {
+    fn update_free_velocity(&mut self, problem: &FrictionGlobal<D>) {
+        self.contradiction = self.dynamics.free_velocity(problem, &mut self.q);
+        self.scale = norm_or_one(&self.q);
+    }
+}
+
+impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
+    type State = GlobalState<D>;
+
+    fn state(&self, access: Access) -> Result<Self::State, SolveError> {
+        let dynamics = Dynamics::new(self)?;
+        let inverse = &dynamics.inverse;
+        match access {
+            Access::Newton if inverse.has_sparse_factor() => {
+                let bytes = Delassus::<D>::condensed_bytes(&self.H, inverse);
+                budget::admit("the condensed W", bytes)?;
+            }
+            Access::Visits | Access::Newton => {
+                let bytes = Delassus::<D>::kept_bytes(&self.H, inverse);
+                budget::admit("the velocities that impulses give", bytes)?;
+            }
+            Access::Products => {}
+        }
+        let mut state = GlobalState {
+            operator: match access {
+                Access::Newton if inverse.has_sparse_factor() => {
+                    Operator::Condensed(Delassus::condense(&self.H, inverse))
+                }
+                Access::Visits | Access::Newton => {
+                    Operator::Visits(Delassus::new(&self.H, inverse))
+                }
+                Access::Products => Operator::Products(Delassus::diagonal(&self.H, inverse)),
+            },
+            access,
+            h: self.H.clone(),
+            q: vec![0.0; self.w.len()],
+            scale: 1.0,
+            v: vec![0.0; self.dofs()],
+            precise: Default::default(),
+            contradiction: None,
+            system: None,
+            dynamics,
+        };
+        state.update_free_velocity(self);
+        Ok(state)
+    }
+
+    fn refill(&self, state: &mut Self::State) -> Result<(), SolveError> {
+        if state.dynamics.serves(self) && state.h == self.H {
+            state.update_free_velocity(self);
+        } else {
+            let earlier = state.system.take();
+            *state = self.state(state.access)?;
+            // A contact set that changed a little can keep the analysis of its Newton matrix.
+            if let (Some(Ok(GlobalSystem::Bodies(earlier))), Operator::Visits(_)) =
+                (earlier, &state.operator)
+            {
+                let matrix = state.dynamics.inverse.matrix();
+                let form = BodyForm::after(Some(earlier.into_form()), matrix, &self.H);
+                let system = |form| GlobalSystem::Bodies(System::new(form, self.contacts()));
+                state.system = Some(form.map(system));
+            }
+        }
+        Ok(())
+    }
+
+    fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Impulses> {
+        state.contradiction.as_ref()
+    }
+
+    fn mu(&self) -> &[f64] {
+        &self.mu
+    }
+
+    fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D] {
+        state.operator.diagonal_block(c)
+    }
+
+    fn velocity_scale(&self, state: &Self::State) -> f64 {
+        state.scale
+    }
+
+    fn impulses(point: &mut GlobalPoint) -> &mut [f64] {
+        &mut point.r
+    }
+
+    fn enter(&self, state: &mut Self::State, point: &GlobalPoint) {
+        let (v, _) = state.dynamics.solve(self, &point.r, Refine::Once);
+        state.v.copy_from_slice(v);
+    }
+
+    fn complete(&self, state: &mut Self::State, point: &mut GlobalPoint) {
+        state.dynamics.complete(self, point);
+        state.v.copy_from_slice(&point.v);
+    }
+}
+
+impl<const D: usize> Blockwise<D> for FrictionGlobal<D> {
+    #[inline(always)]
+    fn velocity(&self, state: &Self::State, r: &[f64], c: usize) -> [f64; D] {
+        let (mut u, given) = match &state.operator {
+            Operator::Visits(delassus) => (delassus.local_velocity(c, &state.v), &self.w),
+            Operator::Condensed(w) => (w.row_product(c, r), &state.q),
+            Operator::Products(_) => unreachable!("a state for products is not visited"),
+        };
+        let given: [f64; D] = small::block(given, c);
+        for k in 0..D {
+            u[k] += given[k];
+        }
+        u
+    }
+
+    #[inline(always)]
+    fn moved(&self, state: &mut Self::State, c: usize, dr: &[f64; D]) {
+        if let Operator::Visits(delassus) = &state.operator {
+            delassus.apply_impulse(c, dr, &mut state.v);
+        }
+    }
+}
+
+impl<const D: usize> Concurrent<D> for FrictionGlobal<D> {
+    /// Places are the components of M (with bilateral constraints: of the bordered matrix): `M⁻¹ H_c` reaches all of a component.
+    fn places(&self, state: &Self::State, c: usize, reads: &mut Vec<u32>, writes: &mut Vec<u32>) {
+        let first = reads.len();
+        for k in D * c..D * c + D {
+            for &i in self.H.column(k).0 {
+                let component = state.dynamics.inverse.component_of(i) as u32;
+                if !reads[first..].contains(&component) {
+                    reads.push(component);
+                }
+            }
+        }
+        writes.extend_from_slice(&reads[first..]);
+    }
+}
+
+impl<const D: usize> Linear<D> for FrictionGlobal<D> {
+    fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
+        let (v, _) = state.dynamics.solve(self, r, Refine::Once);
+        self.velocity_into(v, u);
+    }
+
+    fn velocities_precisely(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
+        let [high, low, last] = &mut state.precise;
+        let n = state.dynamics.inverse.dim();
+        for part in [&mut *high, &mut *low, &mut *last] {
+            part.resize(n, 0.0);
+        }
+        state.dynamics.solve_doubled(self, r, [high, low, last]);
+        for (i, u) in u.iter_mut().enumerate() {
+            let mut sum = Compensated::from(self.w[i]);
+            let (rows, values) = self.H.column(i);
+            for (&j, &h) in rows.iter().zip(values) {
+                sum.add_product(h, high[j]);
+                sum.add_product(h, low[j]);
+            }
+            *u = sum.value();
+        }
+    }
+}
+
+impl<const D: usize> Linearised<D> for FrictionGlobal<D> {
+    fn linearise(
+        &self,
+        state: &mut Self::State,
+        p: &[Block<D>],
+        q: &[Block<D>],
+    ) -> Result<(), Singular> {
+        let GlobalState { operator, system, dynamics, .. } = state;
+        let unit = (0..self.contacts()).map(|c| small::mean_diagonal(&operator.diagonal_block(c)));
+        let system = made(system, || GlobalSystem::new(self, operator, dynamics));
+        match system.ok_or(Singular)? {
+            GlobalSystem::Bodies(system) => system.factorise(unit, p, q),
+            GlobalSystem::Contacts(system) => system.factorise(unit, p, q),
+        }
+    }
+
+    fn solve_linearised(
+        &self,
+        state: &mut Self::State,
+        b: &[f64],
+        x: &mut [f64],
+        wx: &mut [f64],
+    ) -> f64 {
+        let GlobalState { operator, system, dynamics, .. } = state;
+        let apply = |x: &[f64], wx: &mut [f64]| match &*operator {
+            Operator::Condensed(w) => {
+                for (c, wx) in wx.chunks_mut(D).enumerate() {
+                    wx.copy_from_slice(&w.row_product(c, x));
+                }
+            }
+            _ => {
+                let v = dynamics.respond(self, x, Refine::Once);
+                wx.fill(0.0);
+                self.H.mul_transpose_add(1.0, v, wx);
+            }
+        };
+        match there(system) {
+            Some(GlobalSystem::Bodies(system)) => system.solve(b, x, wx, apply),
+            Some(GlobalSystem::Contacts(system)) => system.solve(b, x, wx, apply),
+            None => f64::NAN,
+        }
+    }
+
+    fn costs(&self, state: &mut Self::State) -> Costs {
+        let GlobalState { operator, system, dynamics, .. } = state;
+        let contacts = self.contacts() as f64;
+        let visits = match &*operator {
+            Operator::Condensed(w) => 2.0 * w.nblocks() as f64,
+            _ => 1.5 * self.H.nnz() as f64,
+        };
+        let factorisation = match made(system, || GlobalSystem::new(self, operator, dynamics)) {
+            Some(GlobalSystem::Bodies(system)) => system.form().cost(),
+            Some(GlobalSystem::Contacts(system)) => system.form().cost(),
+            None => NEVER,
+        };
+        Costs { sweep: 30.0 * contacts + visits, factorisation }
+    }
+}

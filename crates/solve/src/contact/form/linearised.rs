@@ -1,0 +1,539 @@
+//! Linear systems `(Q + P W) x = b` with block-diagonal P and Q, in contact space or in velocity space.
+//!
+//! *Contact form*, where only W is known: the D·nc × D·nc matrix itself.
+//! *Body form*, where M and H are: with `y = M⁻¹ H x`, `x = Q⁻¹ (b − P Hᵀ y)` and
+//! `(M + H Q⁻¹P Hᵀ) y = H Q⁻¹ b`, whose graph is that of the bodies: smaller than W wherever bodies have more than one or two
+//! contacts.
+//!
+//! What is factorised has `Q + δ w_c P` in place of Q, δ = 1e-10, so that Q may be singular (sticking contacts of a
+//! Newton matrix) and W rank deficient; refinement against `Q + P W` itself removes the bias wherever that matrix is regular.
+
+use nonsmooth_problem::linalg::budget::TooLarge;
+use nonsmooth_problem::linalg::{Block, BlockLu, Bsr, Csc, Groups, Singular, Slot, norm, small};
+
+/// The relative size of the regularisation.
+const DELTA: f64 = 1e-10;
+/// Refinement ends here at the latest; what it does not reach, the residual tells.
+const MOST_REFINEMENTS: usize = 4;
+/// Rounding level of a refined solve.
+const ENOUGH: f64 = 1e-12;
+
+/// What is made at its first use; or the memory that it would take, found out once.
+pub(super) type Once<T> = Option<Result<T, TooLarge>>;
+
+/// What is there, made now if it was not yet; `None` where there is not the memory.
+pub(super) fn made<T>(
+    slot: &mut Once<T>,
+    make: impl FnOnce() -> Result<T, TooLarge>,
+) -> Option<&mut T> {
+    slot.get_or_insert_with(make).as_mut().ok()
+}
+
+/// What is there.
+pub(super) fn there<T>(slot: &mut Once<T>) -> Option<&mut T> {
+    slot.as_mut().and_then(|made| made.as_mut().ok())
+}
+
+/// The cost of a factorisation that there is not the memory for.
+pub(super) const NEVER: f64 = 1e18;
+
+/// A factorised system, with the blocks that it belongs to.
+pub(super) struct System<F, const D: usize> {
+    form: F,
+    p: Vec<Block<D>>,
+    q: Vec<Block<D>>,
+    residual: Vec<f64>,
+    best: Vec<f64>,
+}
+
+/// One way to factorise and solve, up to the regularisation.
+pub(super) trait Form<const D: usize> {
+    /// Factorises `Q + P W`.
+    fn factorise(&mut self, p: &[Block<D>], q: &[Block<D>]) -> Result<(), Singular>;
+    /// `b ← (Q + P W)⁻¹ b`.
+    fn solve(&mut self, p: &[Block<D>], b: &mut [f64]);
+    /// What `factorise` costs, in nanoseconds or so: assembly and elimination.
+    fn cost(&self) -> f64;
+}
+
+impl<F, const D: usize> System<F, D> {
+    pub(super) fn new(form: F, contacts: usize) -> Self {
+        let m = D * contacts;
+        Self {
+            form,
+            p: Vec::with_capacity(contacts),
+            q: Vec::with_capacity(contacts),
+            residual: vec![0.0; m],
+            best: vec![0.0; m],
+        }
+    }
+
+    /// The form alone.
+    pub(super) fn into_form(self) -> F {
+        self.form
+    }
+
+    /// The way in which it is factorised.
+    pub(super) fn form(&mut self) -> &mut F {
+        &mut self.form
+    }
+}
+
+impl<F: Form<D>, const D: usize> System<F, D> {
+    /// Factorises; `unit` holds `w_c`.
+    pub(super) fn factorise(
+        &mut self,
+        unit: impl Iterator<Item = f64>,
+        p: &[Block<D>],
+        q: &[Block<D>],
+    ) -> Result<(), Singular> {
+        self.p.clear();
+        self.p.extend_from_slice(p);
+        self.q.clear();
+        // The regularised Q is what the form sees; the true one comes back for the refinement.
+        self.q.extend(unit.zip(p).zip(q).map(|((w, p), q)| {
+            let mut regular = *q;
+            for k in 0..D {
+                for l in 0..D {
+                    regular[k][l] += DELTA * w.abs() * p[k][l];
+                }
+            }
+            regular
+        }));
+        let factorised = self.form.factorise(p, &self.q);
+        self.q.copy_from_slice(q);
+        factorised
+    }
+
+    /// Solves, with `apply(x, wx)` giving `wx = W x`. Returns the relative residual.
+    pub(super) fn solve(
+        &mut self,
+        b: &[f64],
+        x: &mut [f64],
+        wx: &mut [f64],
+        mut apply: impl FnMut(&[f64], &mut [f64]),
+    ) -> f64 {
+        let Self { form, p, q, residual, best } = self;
+        let size = norm(b);
+        if size == 0.0 {
+            x.fill(0.0);
+            wx.fill(0.0);
+            return 0.0;
+        }
+        x.copy_from_slice(b);
+        form.solve(p, x);
+        let mut least = f64::INFINITY;
+        for pass in 0..=MOST_REFINEMENTS {
+            apply(x, wx);
+            for (c, (p, q)) in p.iter().zip(&*q).enumerate() {
+                let qx = small::mul(q, &small::block(x, c));
+                let pwx = small::mul(p, &small::block(wx, c));
+                for k in 0..D {
+                    residual[D * c + k] = b[D * c + k] - qx[k] - pwx[k];
+                }
+            }
+            let left = norm(residual) / size;
+            if left.is_nan() || left >= least {
+                // The step made it worse: back to the one before.
+                if least.is_finite() {
+                    x.copy_from_slice(best);
+                    apply(x, wx);
+                    return least;
+                }
+                return left;
+            }
+            if left <= ENOUGH || left > 0.5 * least || pass == MOST_REFINEMENTS {
+                return left;
+            }
+            least = left;
+            best.copy_from_slice(x);
+            form.solve(p, residual);
+            x.iter_mut().zip(&*residual).for_each(|(x, d)| *x += d);
+        }
+        least
+    }
+}
+
+/// The D·nc × D·nc matrix `Q + P W`.
+pub(super) struct ContactForm<const D: usize> {
+    lu: BlockLu,
+    /// W by rows: where row i begins, and for each block its column, its place in the factor and its value.
+    ptr: Vec<usize>,
+    columns: Vec<u32>,
+    slots: Vec<Slot>,
+    diagonal: Vec<Slot>,
+    blocks: Vec<Block<D>>,
+}
+
+impl<const D: usize> ContactForm<D> {
+    pub(super) fn new(w: &Bsr<D>) -> Result<Self, TooLarge> {
+        let nc = w.nrows();
+        let pairs = || (0..nc).flat_map(|i| w.row(i).0.iter().map(move |&j| (i as u32, j)));
+        let lu = BlockLu::new(&vec![D; nc], pairs().filter(|(i, j)| i != j))?;
+        let slots = pairs().map(|(i, j)| lu.slot(i as usize, j as usize)).collect();
+        let diagonal = (0..nc).map(|i| lu.slot(i, i)).collect();
+        let mut ptr = vec![0];
+        ptr.extend((0..nc).scan(0, |end, i| {
+            *end += w.row(i).0.len();
+            Some(*end)
+        }));
+        let columns = pairs().map(|(_, j)| j).collect();
+        Ok(Self { lu, ptr, columns, slots, diagonal, blocks: w.blocks().to_vec() })
+    }
+
+    /// Takes another W; false where its pattern is not the one that was analysed.
+    pub(super) fn refill(&mut self, w: &Bsr<D>) -> bool {
+        let rows = self.ptr.len() - 1;
+        let same = w.nrows() == rows
+            && w.nblocks() == self.columns.len()
+            && (0..rows).all(|i| *w.row(i).0 == self.columns[self.ptr[i]..self.ptr[i + 1]]);
+        if same {
+            self.blocks.copy_from_slice(w.blocks());
+        }
+        same
+    }
+}
+
+impl<const D: usize> Form<D> for ContactForm<D> {
+    fn factorise(&mut self, p: &[Block<D>], q: &[Block<D>]) -> Result<(), Singular> {
+        self.lu.clear();
+        for (i, (p, q)) in p.iter().zip(q).enumerate() {
+            self.lu.add_at(self.diagonal[i], q.as_flattened());
+            if *p == [[0.0; D]; D] {
+                continue;
+            }
+            for k in self.ptr[i]..self.ptr[i + 1] {
+                let product = multiply(p, &self.blocks[k]);
+                self.lu.add_at(self.slots[k], product.as_flattened());
+            }
+        }
+        self.lu.factorise()
+    }
+
+    fn solve(&mut self, _: &[Block<D>], b: &mut [f64]) {
+        self.lu.solve(b);
+    }
+
+    fn cost(&self) -> f64 {
+        self.lu.flops() / 3.0 + 20.0 * self.blocks.len() as f64
+    }
+}
+
+/// `M + H Q⁻¹P Hᵀ` over the bodies.
+pub(super) struct BodyForm<const D: usize> {
+    lu: BlockLu,
+    /// M by blocks.
+    mass: Vec<(Slot, Vec<f64>)>,
+    contacts: Vec<Touch<D>>,
+    /// `Q⁻¹` of the contacts.
+    q_inverse: Vec<Block<D>>,
+    y: Vec<f64>,
+    scratch: Vec<f64>,
+}
+
+/// The bodies that a contact touches, with its rows of H there.
+struct Touch<const D: usize> {
+    /// Node, first position, rows of H.
+    parts: Vec<(usize, Vec<[f64; D]>)>,
+    /// Places of the products of each pair of parts, row by row.
+    slots: Vec<Slot>,
+}
+
+impl<const D: usize> BodyForm<D> {
+    /// `matrix` is M, or M bordered by bilateral constraints (its rows after those of H). Nodes are the connected components of
+    /// M; a multiplier belongs to the first component that it acts on.
+    pub(super) fn new(matrix: &Csc, h: &Csc) -> Result<Self, TooLarge> {
+        Self::after(None, matrix, h)
+    }
+
+    /// As [`new`](Self::new), with the analysis of an earlier form where that serves: the bodies are the same, and no two of them touch that
+    /// did not touch before.
+    pub(super) fn after(earlier: Option<Self>, matrix: &Csc, h: &Csc) -> Result<Self, TooLarge> {
+        let n = h.nrows();
+        let node_of = nodes(matrix, n);
+        let count = node_of.iter().max().map_or(0, |m| m + 1);
+        let mut members = vec![Vec::new(); count];
+        node_of.iter().enumerate().for_each(|(i, &k)| members[k].push(i));
+        let sizes: Vec<usize> = members.iter().map(Vec::len).collect();
+        // Each unknown's place in its node, each node's first place among all.
+        let (mut within, mut start) = (vec![0; node_of.len()], vec![0; count]);
+        let mut next = 0;
+        for (k, members) in members.iter().enumerate() {
+            start[k] = next;
+            members.iter().enumerate().for_each(|(l, &i)| within[i] = l);
+            next += members.len();
+        }
+        // The rows of H by contact and node.
+        let mut contacts: Vec<Touch<D>> = Vec::with_capacity(h.ncols() / D);
+        let mut touched: Vec<Vec<usize>> = Vec::with_capacity(h.ncols() / D);
+        for c in 0..h.ncols() / D {
+            let entries = |k: usize| {
+                let (rows, values) = h.column(D * c + k);
+                rows.iter().zip(values).filter(|e| *e.1 != 0.0)
+            };
+            let mut list: Vec<usize> =
+                (0..D).flat_map(|k| entries(k).map(|(&i, _)| node_of[i])).collect();
+            list.sort_unstable();
+            list.dedup();
+            let mut parts: Vec<_> =
+                list.iter().map(|&k| (start[k], vec![[0.0; D]; sizes[k]])).collect();
+            for k in 0..D {
+                for (&i, &value) in entries(k) {
+                    let part = list.binary_search(&node_of[i]).expect("listed");
+                    parts[part].1[within[i]][k] = value;
+                }
+            }
+            contacts.push(Touch { parts, slots: vec![] });
+            touched.push(list);
+        }
+        let couplings = matrix.triplets().map(|(i, j, _)| (node_of[i] as u32, node_of[j] as u32));
+        let by_contact = touched.iter().flat_map(|list| {
+            list.iter().flat_map(move |&a| list.iter().map(move |&b| (a as u32, b as u32)))
+        });
+        let edges = couplings.chain(by_contact).filter(|(i, j)| i != j);
+        let lu = match earlier {
+            Some(Self { lu, .. }) if lu.serves(&sizes, edges.clone()) => lu,
+            _ => BlockLu::new(&sizes, edges)?,
+        };
+        for (touch, list) in contacts.iter_mut().zip(&touched) {
+            let pairs = list.iter().flat_map(|&a| list.iter().map(move |&b| (a, b)));
+            touch.slots = pairs.map(|(a, b)| lu.slot(a, b)).collect();
+        }
+        // M by blocks.
+        let mut blocks = std::collections::BTreeMap::new();
+        for (i, j, value) in matrix.triplets() {
+            let (a, b) = (node_of[i], node_of[j]);
+            let block = blocks.entry((a, b)).or_insert_with(|| vec![0.0; sizes[a] * sizes[b]]);
+            block[within[i] * sizes[b] + within[j]] += value;
+        }
+        let mass = blocks.into_iter().map(|((a, b), v)| (lu.slot(a, b), v)).collect();
+        let largest = sizes.iter().max().copied().unwrap_or(0);
+        Ok(Self {
+            mass,
+            q_inverse: vec![[[0.0; D]; D]; contacts.len()],
+            contacts,
+            y: vec![0.0; lu.dim()],
+            scratch: vec![0.0; largest * largest],
+            lu,
+        })
+    }
+}
+
+impl<const D: usize> Form<D> for BodyForm<D> {
+    fn factorise(&mut self, p: &[Block<D>], q: &[Block<D>]) -> Result<(), Singular> {
+        let Self { lu, mass, contacts, q_inverse, scratch, .. } = self;
+        lu.clear();
+        for (slot, block) in mass {
+            lu.add_at(*slot, block);
+        }
+        for (c, touch) in contacts.iter().enumerate() {
+            q_inverse[c] = small::inverse(&q[c]).ok_or(Singular)?;
+            if p[c] == [[0.0; D]; D] {
+                continue;
+            }
+            let weight = multiply(&q_inverse[c], &p[c]); //                Q⁻¹P
+            let mut slots = touch.slots.iter();
+            for (_, a) in &touch.parts {
+                for ((_, b), slot) in touch.parts.iter().zip(&mut slots) {
+                    let block = &mut scratch[..a.len() * b.len()];
+                    for (row, a) in block.chunks_mut(b.len()).zip(a) {
+                        let left: [f64; D] = std::array::from_fn(|l| {
+                            (0..D).map(|k| a[k] * weight[k][l]).sum::<f64>()
+                        });
+                        for (out, b) in row.iter_mut().zip(b) {
+                            *out = (0..D).map(|l| left[l] * b[l]).sum();
+                        }
+                    }
+                    lu.add_at(*slot, block); //                            H Q⁻¹P Hᵀ
+                }
+            }
+        }
+        lu.factorise()
+    }
+
+    fn solve(&mut self, p: &[Block<D>], b: &mut [f64]) {
+        let Self { lu, contacts, q_inverse, y, .. } = self;
+        y.fill(0.0);
+        for (c, touch) in contacts.iter().enumerate() {
+            let x = small::mul(&q_inverse[c], &small::block(b, c)); //     Q⁻¹ b
+            b[D * c..D * c + D].copy_from_slice(&x);
+            for (start, rows) in &touch.parts {
+                for (y, h) in y[*start..].iter_mut().zip(rows) {
+                    *y += (0..D).map(|k| h[k] * x[k]).sum::<f64>(); //     H Q⁻¹ b
+                }
+            }
+        }
+        lu.solve(y);
+        for (c, touch) in contacts.iter().enumerate() {
+            let mut u = [0.0; D];
+            for (start, rows) in &touch.parts {
+                for (y, h) in y[*start..].iter().zip(rows) {
+                    (0..D).for_each(|k| u[k] += h[k] * y); //              Hᵀ y
+                }
+            }
+            let x = small::mul(&q_inverse[c], &small::mul(&p[c], &u));
+            (0..D).for_each(|k| b[D * c + k] -= x[k]); //                  Q⁻¹ (b − P Hᵀ y)
+        }
+    }
+
+    fn cost(&self) -> f64 {
+        self.lu.flops() / 3.0 + 400.0 * self.contacts.len() as f64
+    }
+}
+
+/// The node of each unknown of `matrix`: components of its leading n × n part; rows beyond join the first they act on.
+fn nodes(matrix: &Csc, n: usize) -> Vec<usize> {
+    let mut groups = Groups::new(n);
+    let coupled = |e: &(usize, usize, f64)| e.0 < n && e.1 < n && e.2 != 0.0;
+    matrix.triplets().filter(coupled).for_each(|(i, j, _)| groups.join(i, j));
+    let mut number = vec![usize::MAX; n];
+    let mut next = 0;
+    let mut node = Vec::with_capacity(matrix.nrows());
+    for i in 0..n {
+        let root = groups.root(i);
+        if number[root] == usize::MAX {
+            number[root] = next;
+            next += 1;
+        }
+        node.push(number[root]);
+    }
+    for j in n..matrix.ncols() {
+        let (rows, values) = matrix.column(j);
+        let first = rows.iter().zip(values).find(|(i, v)| **i < n && **v != 0.0);
+        node.push(first.map_or(0, |(&i, _)| node[i]));
+    }
+    node
+}
+
+/// `A B`.
+fn multiply<const D: usize>(a: &Block<D>, b: &Block<D>) -> Block<D> {
+    let mut out = [[0.0; D]; D];
+    for i in 0..D {
+        for k in 0..D {
+            for j in 0..D {
+                out[i][j] += a[i][k] * b[k][j];
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use nonsmooth_problem::Problem;
+    use nonsmooth_problem::planted::Planted;
+
+    use super::*;
+    use crate::Reformulation;
+    use crate::contact::Condense;
+    use crate::contact::form::{Access, Linearised};
+
+    /// Blocks of an Alart–Curnier Jacobian: open, sticking (Q = 0) and sliding contacts in turn.
+    fn blocks(unit: impl Iterator<Item = f64>) -> (Vec<Block<3>>, Vec<Block<3>>) {
+        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let scaled = |a: f64| identity.map(|row| row.map(|x| a * x));
+        unit.enumerate()
+            .map(|(c, w)| match c % 3 {
+                0 => (scaled(0.0), identity),
+                1 => (scaled(1.0 / w), scaled(0.0)),
+                _ => (
+                    [[1.0 / w, 0.0, 0.0], [0.6 / w, 0.4 / w, 0.0], [0.8 / w, 0.0, 0.4 / w]],
+                    [[0.0, 0.0, 0.0], [-0.6, 0.7, 0.1], [-0.8, 0.1, 0.6]],
+                ),
+            })
+            .unzip()
+    }
+
+    fn solved<P: Linearised<3>>(problem: &P) -> (Vec<f64>, Vec<f64>) {
+        let mut state = problem.state(Access::Newton).unwrap();
+        let nc = problem.mu().len();
+        let unit: Vec<f64> =
+            (0..nc).map(|c| small::mean_diagonal(&problem.diagonal_block(&state, c))).collect();
+        let (p, q) = blocks(unit.into_iter());
+        let b: Vec<f64> = (0..3 * nc).map(|i| (i as f64).sin()).collect();
+        let (mut x, mut wx) = (vec![0.0; 3 * nc], vec![0.0; 3 * nc]);
+        problem.linearise(&mut state, &p, &q).unwrap();
+        let left = problem.solve_linearised(&mut state, &b, &mut x, &mut wx);
+        assert!(left < 1e-12, "{left:e}");
+        // The system holds, with W from its definition as a difference of velocities.
+        let (mut u, mut u0) = (vec![0.0; 3 * nc], vec![0.0; 3 * nc]);
+        problem.velocities(&mut state, &x, &mut u);
+        problem.velocities(&mut state, &vec![0.0; 3 * nc], &mut u0);
+        for c in 0..nc {
+            let w: [f64; 3] = std::array::from_fn(|k| u[3 * c + k] - u0[3 * c + k]);
+            let (pw, qx) = (small::mul(&p[c], &w), small::mul(&q[c], &small::block(&x, c)));
+            for k in 0..3 {
+                assert!((pw[k] + qx[k] - b[3 * c + k]).abs() < 1e-8, "contact {c}");
+                assert!((w[k] - wx[3 * c + k]).abs() < 1e-9);
+            }
+        }
+        (x, wx)
+    }
+
+    #[test]
+    fn body_and_contact_forms_solve_the_same_system() {
+        for (bilateral, skew) in [(0, 0.0), (0, 0.02), (4, 0.0)] {
+            let planted = Planted { contacts: 12, dofs: 60, bilateral, skew, ..Planted::default() };
+            let (global, _) = planted.global::<3>();
+            let (local, _) = Condense.reduce(&global).unwrap();
+            assert_eq!(local.unknowns(), 36);
+            let ((x, wx), (y, wy)) = (solved(&global), solved(&local));
+            for i in 0..36 {
+                assert!((x[i] - y[i]).abs() < 1e-7 * (1.0 + x[i].abs()), "{bilateral} {i}");
+                assert!((wx[i] - wy[i]).abs() < 1e-8 * (1.0 + wx[i].abs()), "{bilateral} {i}");
+            }
+        }
+    }
+
+    #[test]
+    fn fewer_contacts_between_the_same_bodies_need_no_new_analysis() {
+        let (problem, _) = Planted { contacts: 12, dofs: 60, ..Planted::default() }.global::<3>();
+        let fewer = Csc::from_triplets(60, 27, problem.H.triplets().filter(|e| e.1 < 27)).unwrap();
+        let mut first = BodyForm::<3>::new(&problem.M, &problem.H).unwrap();
+        let (p, q) = blocks((0..9).map(|_| 1.0));
+        let regular = p.iter().zip(q).map(|(p, mut q)| {
+            (0..3).for_each(|k| (0..3).for_each(|l| q[k][l] += 0.5 * p[k][l]));
+            q
+        });
+        let regular: Vec<Block<3>> = regular.collect();
+        let flops = first.lu.flops();
+        let solve = |form: &mut BodyForm<3>| {
+            form.factorise(&p, &regular).unwrap();
+            let mut b: Vec<f64> = (0..27).map(|i| (i as f64).sin()).collect();
+            form.solve(&p, &mut b);
+            b
+        };
+        // The earlier analysis has more couplings than the new one would.
+        let mut fresh = BodyForm::new(&problem.M, &fewer).unwrap();
+        assert!(fresh.lu.flops() < flops);
+        first = BodyForm::after(Some(first), &problem.M, &fewer).unwrap();
+        assert_eq!(first.lu.flops(), flops);
+        let (a, b) = (solve(&mut first), solve(&mut fresh));
+        assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-9 * (1.0 + b.abs())));
+        // More contacts than were analysed: anew.
+        let more = BodyForm::after(Some(fresh), &problem.M, &problem.H).unwrap();
+        assert_eq!(more.lu.flops(), flops);
+    }
+
+    #[test]
+    fn hyperstatic_systems_are_solved_by_a_proximal_term() {
+        // 3nc = 60 unknowns, rank 12: Q = ε w_c P.
+        let planted = Planted { contacts: 20, dofs: 12, ..Planted::default() };
+        let (global, _) = planted.global::<3>();
+        let (local, _) = Condense.reduce(&global).unwrap();
+        fn residual<P: Linearised<3>>(problem: &P) -> f64 {
+            let mut state = problem.state(Access::Newton).unwrap();
+            let nc = problem.mu().len();
+            let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+            let unit = |c| small::mean_diagonal(&problem.diagonal_block(&state, c));
+            let q: Vec<_> =
+                (0..nc).map(|c| identity.map(|row| row.map(|x| 1e-6 * unit(c) * x))).collect();
+            problem.linearise(&mut state, &vec![identity; nc], &q).unwrap();
+            let b: Vec<f64> = (0..3 * nc).map(|i| (i as f64).cos()).collect();
+            let (mut x, mut wx) = (vec![0.0; 3 * nc], vec![0.0; 3 * nc]);
+            problem.solve_linearised(&mut state, &b, &mut x, &mut wx)
+        }
+        assert!(residual(&global) < 1e-9, "{:e}", residual(&global));
+        assert!(residual(&local) < 1e-9, "{:e}", residual(&local));
+    }
+}

@@ -1,0 +1,283 @@
+//! The local problem by its contacts: rows of W.
+//!
+//! Bilateral rows `0 = Vᵀ r + R λ + s` are eliminated once: `W ← W − V R⁻¹ Vᵀ`, `q ← q − V R⁻¹ s`. Redundant
+//! constraints (a singular, positive semidefinite R) are honoured.
+
+use nonsmooth_problem::check::{Impulses, Kinematic};
+use nonsmooth_problem::linalg::{
+    Block, Bsr, Compensated, Csc, Delassus, Inverse, Refine, Singular, norm_or_one, small,
+};
+use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint};
+
+use super::linearised::{ContactForm, Form, NEVER, Once, System, made, there};
+use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised};
+use crate::SolveError;
+
+/// What the view keeps: the norm of q, the problem without its bilateral rows where it has any, and the linear system.
+pub struct LocalState<const D: usize> {
+    scale: f64,
+    eliminated: Option<Eliminated<D>>,
+    /// Made when it is first asked for.
+    system: Once<System<ContactForm<D>, D>>,
+    /// Room for velocities in doubled precision.
+    sums: Vec<Compensated>,
+}
+
+struct Eliminated<const D: usize> {
+    w: Bsr<D>,
+    q: Vec<f64>,
+    r_inverse: Inverse,
+    /// V R⁻¹ Vᵀ, and the matrices that it belongs to.
+    schur: Bsr<D>,
+    v: Csc,
+    r: Csc,
+    lambda: Vec<f64>,
+    scratch: Vec<f64>,
+    residual: Vec<f64>,
+    /// λ in doubled precision: high, low, the last correction.
+    precise: [Vec<f64>; 3],
+    contradiction: Option<Impulses>,
+}
+
+impl<const D: usize> Eliminated<D> {
+    fn new(problem: &FrictionLocal<D>, b: &BilateralLocal) -> Result<Self, SolveError> {
+        let r_inverse = Inverse::of_multipliers(&b.R, "R")?;
+        // V R⁻¹ Vᵀ is the Delassus operator of "H = Vᵀ, M = R".
+        let schur = Delassus::condense(&b.V.transpose(), &r_inverse);
+        let mut eliminated = Self {
+            w: problem.W.minus(&schur),
+            q: vec![0.0; problem.q.len()],
+            schur,
+            v: b.V.clone(),
+            r: b.R.clone(),
+            lambda: vec![0.0; b.s.len()],
+            scratch: vec![0.0; r_inverse.scratch_len()],
+            r_inverse,
+            residual: vec![0.0; b.s.len()],
+            precise: [0; 3].map(|_| vec![0.0; b.s.len()]),
+            contradiction: None,
+        };
+        eliminated.update_free_velocity(problem, b);
+        Ok(eliminated)
+    }
+
+    /// Takes another problem with the same V and R and the same pattern of W; false where it is not so.
+    fn refill(&mut self, problem: &FrictionLocal<D>, b: &BilateralLocal) -> bool {
+        let same = self.v == b.V && self.r == b.R && self.w.set_difference(&problem.W, &self.schur);
+        if same {
+            self.update_free_velocity(problem, b);
+        }
+        same
+    }
+
+    fn update_free_velocity(&mut self, problem: &FrictionLocal<D>, b: &BilateralLocal) {
+        self.lambda.copy_from_slice(&b.s);
+        self.r_inverse.solve_with(&mut self.lambda, &mut self.scratch, Refine::Fully);
+        // What R λ = s leaves, where the constraints contradict each other.
+        self.residual.copy_from_slice(&b.s);
+        b.R.mul_add(-1.0, &self.lambda, &mut self.residual);
+        let violated = |(left, s): (&f64, &f64)| left.abs() > 1e-10 * s.abs();
+        self.contradiction = None;
+        if self.residual.iter().zip(&b.s).any(violated) {
+            let mut multipliers = self.residual.clone();
+            self.r_inverse.null_direction(&mut multipliers);
+            let r = vec![0.0; problem.q.len()];
+            self.contradiction =
+                Impulses::toward(r, multipliers, &[], &b.s, |c| problem.kinematics().refutes(c));
+        }
+        self.q.copy_from_slice(&problem.q);
+        b.V.mul_add(-1.0, &self.lambda, &mut self.q);
+    }
+}
+
+impl<const D: usize> LocalState<D> {
+    /// W and q, without the bilateral constraints where the problem has any.
+    #[inline(always)]
+    pub fn operator<'a>(&'a self, problem: &'a FrictionLocal<D>) -> (&'a Bsr<D>, &'a [f64]) {
+        match &self.eliminated {
+            None => (&problem.W, &problem.q),
+            Some(e) => (&e.w, &e.q),
+        }
+    }
+
+    /// The multipliers with which the bilateral constraints feel no motion from the impulses r: `Vᵀ r + R λ = 0`. Allocates.
+    pub fn multipliers(&self, r: &[f64]) -> Vec<f64> {
+        let Some(e) = &self.eliminated else { return vec![] };
+        let mut lambda = vec![0.0; e.lambda.len()];
+        e.v.mul_transpose_add(-1.0, r, &mut lambda);
+        let mut scratch = vec![0.0; e.scratch.len()];
+        e.r_inverse.solve_with(&mut lambda, &mut scratch, Refine::Fully);
+        lambda
+    }
+}
+
+impl<const D: usize> Contacts<D> for FrictionLocal<D> {
+    type State = LocalState<D>;
+
+    fn state(&self, _: Access) -> Result<Self::State, SolveError> {
+        let eliminated = self.bilateral.as_ref().map(|b| Eliminated::new(self, b)).transpose()?;
+        Ok(LocalState { scale: norm_or_one(&self.q), eliminated, system: None, sums: vec![] })
+    }
+
+    fn refill(&self, state: &mut Self::State) -> Result<(), SolveError> {
+        state.scale = norm_or_one(&self.q);
+        let kept = match (&mut state.eliminated, &self.bilateral) {
+            (None, None) => true,
+            (Some(eliminated), Some(b)) => eliminated.refill(self, b),
+            _ => false,
+        };
+        if !kept {
+            *state = self.state(Access::Visits)?;
+        }
+        let LocalState { eliminated, system, .. } = state;
+        let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
+        if there(system).is_none_or(|system| !system.form().refill(w)) {
+            *system = None;
+        }
+        Ok(())
+    }
+
+    fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Impulses> {
+        state.eliminated.as_ref()?.contradiction.as_ref()
+    }
+
+    fn mu(&self) -> &[f64] {
+        &self.mu
+    }
+
+    fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D] {
+        state.operator(self).0.diagonal_block(c)
+    }
+
+    fn velocity_scale(&self, state: &Self::State) -> f64 {
+        state.scale
+    }
+
+    fn impulses(point: &mut LocalPoint) -> &mut [f64] {
+        &mut point.r
+    }
+
+    fn enter(&self, _: &mut Self::State, _: &LocalPoint) {}
+
+    fn complete(&self, state: &mut Self::State, point: &mut LocalPoint) {
+        if let (Some(b), Some(e)) = (&self.bilateral, &mut state.eliminated) {
+            // λ = −R⁻¹ (Vᵀ r + s).
+            for (l, s) in point.lambda.iter_mut().zip(&b.s) {
+                *l = -s;
+            }
+            b.V.mul_transpose_add(-1.0, &point.r, &mut point.lambda);
+            e.r_inverse.solve_with(&mut point.lambda, &mut e.scratch, Refine::Fully);
+        }
+    }
+}
+
+impl<const D: usize> Blockwise<D> for FrictionLocal<D> {
+    #[inline(always)]
+    fn velocity(&self, state: &Self::State, r: &[f64], c: usize) -> [f64; D] {
+        let (w, q) = state.operator(self);
+        let mut u = w.row_product(c, r);
+        let q: [f64; D] = small::block(q, c);
+        for k in 0..D {
+            u[k] += q[k];
+        }
+        u
+    }
+
+    #[inline(always)]
+    fn moved(&self, _: &mut Self::State, _: usize, _: &[f64; D]) {}
+}
+
+impl<const D: usize> Concurrent<D> for FrictionLocal<D> {
+    /// Places are impulses.
+    fn places(&self, state: &Self::State, c: usize, reads: &mut Vec<u32>, writes: &mut Vec<u32>) {
+        reads.extend_from_slice(state.operator(self).0.row(c).0);
+        writes.push(c as u32);
+    }
+}
+
+impl<const D: usize> Linear<D> for FrictionLocal<D> {
+    fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
+        let (w, q) = state.operator(self);
+        w.mul_plus(r, q, u);
+    }
+
+    /// With bilateral rows by way of the multipliers, `u = W r + V λ + q`: the eliminated W carries the rounding of its elimination.
+    fn velocities_precisely(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
+        let sums = &mut state.sums;
+        sums.clear();
+        sums.extend(self.q.iter().map(|&q| Compensated::from(q)));
+        for (i, sum) in sums.chunks_mut(D).enumerate() {
+            let (columns, blocks) = self.W.row(i);
+            for (&j, block) in columns.iter().zip(blocks) {
+                for (sum, row) in sum.iter_mut().zip(block) {
+                    row.iter()
+                        .enumerate()
+                        .for_each(|(l, &w)| sum.add_product(w, r[D * j as usize + l]));
+                }
+            }
+        }
+        if let (Some(BilateralLocal { V, s, .. }), Some(e)) =
+            (&self.bilateral, &mut state.eliminated)
+        {
+            // λ = −R⁻¹ (Vᵀ r + s), high and low.
+            let [high, low, last] = &mut e.precise;
+            for j in 0..s.len() {
+                let mut sum = Compensated::from(-s[j]);
+                let (rows, values) = V.column(j);
+                rows.iter().zip(values).for_each(|(&i, &v)| sum.add_product(-v, r[i]));
+                (high[j], low[j]) = sum.into_parts();
+            }
+            e.r_inverse.solve_doubled(high, low, last, &mut e.scratch);
+            for j in 0..s.len() {
+                let (rows, values) = V.column(j);
+                for (&i, &v) in rows.iter().zip(values) {
+                    sums[i].add_product(v, high[j]);
+                    sums[i].add_product(v, low[j]);
+                }
+            }
+        }
+        u.iter_mut().zip(&*sums).for_each(|(u, sum)| *u = sum.value());
+    }
+}
+
+impl<const D: usize> Linearised<D> for FrictionLocal<D> {
+    fn linearise(
+        &self,
+        state: &mut Self::State,
+        p: &[Block<D>],
+        q: &[Block<D>],
+    ) -> Result<(), Singular> {
+        let LocalState { eliminated, system, .. } = state;
+        let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
+        let unit = (0..w.nrows()).map(|c| small::mean_diagonal(&w.diagonal_block(c)));
+        let make = || Ok(System::new(ContactForm::new(w)?, w.nrows()));
+        made(system, make).ok_or(Singular)?.factorise(unit, p, q)
+    }
+
+    fn solve_linearised(
+        &self,
+        state: &mut Self::State,
+        b: &[f64],
+        x: &mut [f64],
+        wx: &mut [f64],
+    ) -> f64 {
+        let LocalState { eliminated, system, .. } = state;
+        let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
+        let apply = |x: &[f64], wx: &mut [f64]| {
+            for (c, wx) in wx.chunks_mut(D).enumerate() {
+                wx.copy_from_slice(&w.row_product(c, x));
+            }
+        };
+        there(system).map_or(f64::NAN, |system| system.solve(b, x, wx, apply))
+    }
+
+    fn costs(&self, state: &mut Self::State) -> Costs {
+        let LocalState { eliminated, system, .. } = state;
+        let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
+        let system = made(system, || Ok(System::new(ContactForm::new(w)?, w.nrows())));
+        Costs {
+            sweep: 30.0 * w.nrows() as f64 + 2.0 * w.nblocks() as f64,
+            factorisation: system.map_or(NEVER, |system| system.form().cost()),
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Capabilities that the families of solvers are generic over, and which problem offers which.
+//!
+//! | capability | what a family may ask | offered by |
+//! | --- | --- | --- |
+//! | [`Contacts`] | the law's data, the diagonal blocks of W, ‖q‖, the impulses of a point | local, global |
+//! | [`Blockwise`] | one contact's velocity, and to be told that one contact's impulse moved | local (rows of W), global (velocity space) |
+//! | [`Concurrent`] | in addition, which contacts do not feel each other, and visits from several threads | local, global |
+//! | [`Linear`] | `u = W r + q` for all contacts | local (W), global (product form) |
+//! | [`Explicit`] | entries of matrices that state the symmetric part of W | local (W), global (M, H, G) |
+//! | [`Linearised`] | to solve `(Q + P W) x = b` with block-diagonal P, Q | local (in contact space), global (in velocity space) |
+//!
+//! [`Regularised`] offers what the problem inside it does.
+
+mod explicit;
+mod global;
+mod linearised;
+mod local;
+mod regularised;
+
+use nonsmooth_problem::Problem;
+use nonsmooth_problem::check::Impulses;
+use nonsmooth_problem::linalg::{Block, Singular};
+
+pub use explicit::{Explicit, Model};
+pub use local::LocalState;
+pub use regularised::{Overwrite, Regularised, RegularisedState};
+
+use crate::SolveError;
+
+/// How a family uses W.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Access {
+    /// Contact by contact ([`Blockwise`]).
+    Visits,
+    /// By products with all of it ([`Linear`]).
+    Products,
+    /// In linear systems ([`Linearised`]), and in both ways above.
+    Newton,
+}
+
+/// A problem with D-dimensional frictional contacts, seen by its contacts.
+///
+/// `State` is what the view keeps beside the problem: velocities, factorisations, buffers.
+pub trait Contacts<const D: usize>: Problem {
+    /// What the view keeps between calls.
+    type State: Send;
+
+    /// Prepares the view for one kind of access.
+    fn state(&self, access: Access) -> Result<Self::State, SolveError>;
+
+    /// Prepares an existing view for this problem and the same access, reusing memory where the shape is the same.
+    fn refill(&self, state: &mut Self::State) -> Result<(), SolveError>;
+
+    /// A verified certificate that the bilateral constraints contradict each other, if they do.
+    fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Impulses>;
+
+    /// The coefficients of friction.
+    fn mu(&self) -> &[f64];
+
+    /// The diagonal block `W_cc`.
+    fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D];
+
+    /// `‖q‖`, or 1 where q = 0: what a solver's estimate is relative to.
+    fn velocity_scale(&self, state: &Self::State) -> f64;
+
+    /// The impulses of a point.
+    fn impulses(point: &mut Self::Point) -> &mut [f64];
+
+    /// Takes the impulses of `point` as the current ones.
+    fn enter(&self, state: &mut Self::State, point: &Self::Point);
+
+    /// Completes `point` (velocities, multipliers) from its impulses, exactly.
+    fn complete(&self, state: &mut Self::State, point: &mut Self::Point);
+}
+
+/// Access contact by contact, as block Gauss–Seidel needs it.
+pub trait Blockwise<const D: usize>: Contacts<D> {
+    /// The relative velocity `u_c` for the current impulses `r`.
+    fn velocity(&self, state: &Self::State, r: &[f64], c: usize) -> [f64; D];
+
+    /// The impulse of contact `c` moved by `dr` (and `r` holds it already).
+    fn moved(&self, state: &mut Self::State, c: usize, dr: &[f64; D]);
+}
+
+/// Access contact by contact from several threads: velocities may be asked for at the same time.
+pub trait Concurrent<const D: usize>: Blockwise<D> + Contacts<D, State: Sync> + Sync {
+    /// Appends the places that the velocity of contact c depends on, and those that its impulse changes. Places are numbered as the
+    /// view likes; two contacts do not feel each other if neither changes what the other depends on.
+    fn places(&self, state: &Self::State, c: usize, reads: &mut Vec<u32>, writes: &mut Vec<u32>);
+}
+
+/// Products with the whole operator.
+pub trait Linear<const D: usize>: Contacts<D> {
+    /// `u = W r + q`.
+    fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]);
+
+    /// The same with all sums in doubled precision, rounded once: for the last digits, where the terms of u are so much larger
+    /// than u that their rounding hides the residual. Costs several times a plain product.
+    fn velocities_precisely(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]);
+}
+
+/// What the means of a method cost, in units of about a nanosecond: to choose between them, the same on every machine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Costs {
+    /// One Gauss–Seidel sweep over all contacts.
+    pub sweep: f64,
+    /// One [`linearise`](Linearised::linearise) and one solve.
+    pub factorisation: f64,
+}
+
+/// Linear systems with a block-diagonal modification of W, as Newton, interior-point and proximal methods have them.
+///
+/// The state must be made with [`Access::Newton`]. Cost of `linearise`: assembly and one sparse LU, whose symbolic analysis is
+/// done once per pattern; of `solve_linearised`: one to five solves and products with W.
+pub trait Linearised<const D: usize>: Linear<D> + Blockwise<D> {
+    /// Factorises `Q + P W`.
+    ///
+    /// The factor is that of `Q + δ w_c P + P W`, δ = 1e-10, so Q may be singular and W rank deficient.
+    /// Errors: a matrix that cannot be factorised even so (not finite, a zero row).
+    fn linearise(
+        &self,
+        state: &mut Self::State,
+        p: &[Block<D>],
+        q: &[Block<D>],
+    ) -> Result<(), Singular>;
+
+    /// The solution of `(Q + P W) x = b` for the P and Q last given, refined against that matrix, and `wx = W x`.
+    ///
+    /// Returns `‖b − Q x − P W x‖ / ‖b‖`: where `Q + P W` is singular it need not be small.
+    fn solve_linearised(
+        &self,
+        state: &mut Self::State,
+        b: &[f64],
+        x: &mut [f64],
+        wx: &mut [f64],
+    ) -> f64;
+
+    /// What sweeps and factorisations cost on this problem. Makes the symbolic analysis.
+    fn costs(&self, state: &mut Self::State) -> Costs;
+}

@@ -1,0 +1,125 @@
+//! **The convex relaxation** by a primal–dual interior-point method. It does *not* solve Coulomb's law.
+//!
+//! Problem: `min ½ rᵀW r + qᵀr` over `r ∈ K`, or `K* ∋ W r + q ⟂ r ∈ K`: Coulomb's law without De Saxcé's term `mu‖u_T‖`, as if
+//! a contact that slides with u_T had to open with `u_N = mu‖u_T‖`. Where nothing slides its solutions are Coulomb's.
+//!
+//! Method: Mehrotra's predictor–corrector with Nesterov–Todd scaling and an infeasible start, see `parts::central`. It ends
+//! when the convex problem is solved to rounding; the judge measures the residual of Coulomb's law, so that a problem whose
+//! contacts slide ends as not solved.
+//!
+//! References: Acary, lecture (123)(124) with s = 0; NesterovTodd1998; Mehrotra1992.
+//! Cost of a step: one factorisation of `Q + P W`, two solves, two products. Storage: 20 vectors and five blocks a contact.
+//! Fails: where the relaxation has no solution (r grows without bound).
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::contact::form::{Access, Linearised};
+use crate::contact::parts::ConvexIp;
+use crate::core::register::{About, Described, Solves};
+use crate::core::settings::{Settings, described};
+use crate::{SolveError, Solver, Step};
+
+/// The hyperparameters.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ConvexRelaxation {
+    /// The relative residual of the convex problem at which it has finished, positive.
+    pub convex_tolerance: f64,
+    /// Steps without a smaller residual of the convex problem after which it gives up.
+    pub patience: usize,
+}
+
+impl Default for ConvexRelaxation {
+    fn default() -> Self {
+        Self { convex_tolerance: 1e-13, patience: 12 }
+    }
+}
+
+impl Settings for ConvexRelaxation {
+    fn validate(&self) -> Result<(), String> {
+        if !(self.convex_tolerance > 0.0 && self.convex_tolerance.is_finite()) {
+            let found = self.convex_tolerance;
+            return Err(format!("convex_tolerance: expected a positive number, found {found}"));
+        }
+        if self.patience == 0 {
+            return Err("patience: expected at least 1, found 0".into());
+        }
+        Ok(())
+    }
+}
+
+impl Described for ConvexRelaxation {
+    const ABOUT: &'static About = &About {
+        name: "convex_relaxation",
+        family: "interior",
+        solves: Solves::Relaxation,
+        summary: "interior point on the convex relaxation (s = 0), which is Coulomb's law only where nothing slides",
+        needs: &[],
+        cites: &["NesterovTodd1998", "Mehrotra1992", "Acary2018"],
+        variants: &[],
+        settings: described::<Self>,
+    };
+}
+
+/// The convex relaxation for contacts of dimension D.
+#[derive(Debug, Clone, Copy)]
+pub struct Relaxed<const D: usize>(pub ConvexRelaxation);
+
+/// The workspace.
+pub struct RelaxedWork<P: Linearised<D>, const D: usize> {
+    state: P::State,
+    ip: ConvexIp<D>,
+    /// s = 0.
+    s: Vec<f64>,
+    error: f64,
+    since_best: usize,
+}
+
+impl<P: Linearised<D>, const D: usize> Solver<P> for Relaxed<D> {
+    type Work = RelaxedWork<P, D>;
+
+    fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
+        let state = problem.state(Access::Newton)?;
+        let s = vec![0.0; problem.mu().len()];
+        Ok(RelaxedWork { state, ip: ConvexIp::new(), s, error: f64::INFINITY, since_best: 0 })
+    }
+
+    fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
+        work.s.resize(problem.mu().len(), 0.0);
+        problem.refill(&mut work.state)
+    }
+
+    fn start(&self, problem: &P, _: &mut P::Point, work: &mut Self::Work) {
+        work.error = work.ip.begin(problem, &mut work.state, &work.s, None).error;
+        work.since_best = 0;
+    }
+
+    fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
+        if let Some(ray) = problem.contradiction(&work.state) {
+            return Step::NoSolution(ray.clone().into());
+        }
+        let Ok(now) = work.ip.iterate(problem, &mut work.state) else {
+            return Step::Stuck("the matrix of the interior-point step is singular".into());
+        };
+        P::impulses(point).copy_from_slice(work.ip.r());
+        if now.error <= self.0.convex_tolerance {
+            return Step::Stuck(
+                "the convex relaxation is solved, and its solution does not obey Coulomb's law"
+                    .into(),
+            );
+        }
+        work.since_best = if now.error < 0.9 * work.error { 0 } else { work.since_best + 1 };
+        work.error = work.error.min(now.error);
+        if work.since_best >= self.0.patience {
+            return Step::Stuck(
+                "the convex relaxation could not be solved to its tolerance".into(),
+            );
+        }
+        Step::Continue { estimate: f64::NAN }
+    }
+
+    fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        problem.complete(&mut work.state, point);
+    }
+}

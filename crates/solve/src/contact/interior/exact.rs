@@ -1,0 +1,233 @@
+//! **Nonsmooth interior point**: a primal–dual interior-point method on Coulomb's law itself.
+//!
+//! Problem: `K* ∋ W r + q + mu‖u_T‖ e_N ⟂ r ∈ K`; in scaled coordinates `L ∋ z ⟂ x ∈ L`, `z = Z (W r + q) + ‖z_T‖ e_N`.
+//!
+//! Method: Mehrotra's predictor–corrector with Nesterov–Todd scaling. ‖z_T‖ is differentiated like any other term
+//! (`G = I + e nᵀ`), which costs the symmetry of the matrix and the monotonicity of the problem, see `parts::central`. Optionally
+//! the path from the start, where both the equations' residual and complementarity shrink with one parameter, is
+//! followed by its arc length, so that it may turn back (`path=continuation`).
+//!
+//! References: NesterovTodd1998; Mehrotra1992; the exact law: the derivation in `parts::central`; the arc length: Keller1977.
+//! Cost of a step: one factorisation of `Q + P W`, two solves and two products; with continuation up to six of each.
+//! Storage: 20 vectors and five blocks a contact.
+//! Fails: the steps can shrink to nothing away from a solution, mostly near sticking contacts, where the kink of ‖u_T‖ lies on
+//! the cone's boundary; it then ends as stuck. A starter more than a solver where impacts are large.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::contact::form::{Access, Linearised};
+use crate::contact::interior::pursuit::Pursuit;
+use crate::contact::parts::{Central, CentralIterate};
+use crate::core::register::{About, Described, Solves};
+use crate::core::settings::{Settings, described};
+use crate::{SolveError, Solver, Step};
+
+/// How the central path is followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Path {
+    /// Towards smaller complementarity only, by Mehrotra's predictor and corrector.
+    #[default]
+    Mehrotra,
+    /// By its arc length, so that it may turn back.
+    Continuation,
+}
+
+/// The hyperparameters.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Interior {
+    /// How the central path is followed.
+    pub path: Path,
+    /// Smooths ‖u_T‖ to √(‖u_T‖² + δ²), δ this many times the complementarity; 0 for the exact law throughout.
+    pub smoothing: f64,
+    /// Begin near the starting point, this far inside the cones in units of the free velocity; 0 for a cold start.
+    pub warm_margin: f64,
+    /// Steps without a smaller residual after which it gives up.
+    pub patience: usize,
+}
+
+impl Default for Interior {
+    fn default() -> Self {
+        Self { path: Path::Mehrotra, smoothing: 0.0, warm_margin: 0.0, patience: 30 }
+    }
+}
+
+impl Settings for Interior {
+    fn validate(&self) -> Result<(), String> {
+        for (name, value) in [("smoothing", self.smoothing), ("warm_margin", self.warm_margin)] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(format!("{name}: expected a number of at least 0, found {value}"));
+            }
+        }
+        if self.patience == 0 {
+            return Err("patience: expected at least 1, found 0".into());
+        }
+        Ok(())
+    }
+}
+
+impl Described for Interior {
+    const ABOUT: &'static About = &About {
+        name: "ip",
+        family: "interior",
+        solves: Solves::Law,
+        summary: "nonsmooth interior point: Mehrotra's predictor-corrector with Nesterov-Todd scaling on Coulomb's law itself",
+        needs: &[],
+        cites: &["NesterovTodd1998", "Mehrotra1992", "TutuncuTohTodd2003", "Keller1977"],
+        variants: &["smoothing=0.1", "warm_margin=0.1", "path=continuation"],
+        settings: described::<Self>,
+    };
+}
+
+/// Steps this short are no progress,
+const SHORT: f64 = 1e-6;
+/// and after this many of them in a row there will be none.
+const MANY_SHORT: usize = 6;
+
+/// The nonsmooth interior-point method for contacts of dimension D.
+#[derive(Debug, Clone, Copy)]
+pub struct Pursued<const D: usize>(pub Interior);
+
+/// The workspace.
+pub struct PursuedWork<P: Linearised<D>, const D: usize> {
+    state: P::State,
+    core: Central<D>,
+    pursuit: Pursuit<D>,
+    short: usize,
+    since_best: usize,
+}
+
+impl<P: Linearised<D>, const D: usize> Solver<P> for Pursued<D> {
+    type Work = PursuedWork<P, D>;
+
+    fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
+        let state = problem.state(Access::Newton)?;
+        let (core, pursuit) = (Central::default(), Pursuit::default());
+        Ok(PursuedWork { state, core, pursuit, short: 0, since_best: 0 })
+    }
+
+    fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
+        problem.refill(&mut work.state)
+    }
+
+    fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        let Interior { path, smoothing, warm_margin, .. } = self.0;
+        let r = &*P::impulses(point);
+        let warm = (warm_margin > 0.0).then_some((r, warm_margin));
+        match path {
+            Path::Mehrotra => work.core.begin(problem, &mut work.state, smoothing, warm),
+            Path::Continuation => work.pursuit.begin(problem, &mut work.state, smoothing, warm),
+        };
+        (work.short, work.since_best) = (0, 0);
+    }
+
+    fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
+        if let Some(ray) = problem.contradiction(&work.state) {
+            return Step::NoSolution(ray.clone().into());
+        }
+        let PursuedWork { state, core, pursuit, .. } = work;
+        let (best, stepped) = match self.0.path {
+            Path::Mehrotra => (core.best().1, core.iterate(problem, state)),
+            Path::Continuation => (pursuit.core().best().1, pursuit.iterate(problem, state)),
+        };
+        let Ok(CentralIterate { error, alpha, .. }) = stepped else {
+            return Step::Stuck("the matrix of the interior-point step is singular".into());
+        };
+        let core = match self.0.path {
+            Path::Mehrotra => &work.core,
+            Path::Continuation => work.pursuit.core(),
+        };
+        P::impulses(point).copy_from_slice(core.r());
+        work.short = if alpha < SHORT { work.short + 1 } else { 0 };
+        work.since_best = if error < 0.9 * best { 0 } else { work.since_best + 1 };
+        let stuck = match self.0.path {
+            Path::Mehrotra => work.short >= MANY_SHORT,
+            Path::Continuation => work.pursuit.stuck(),
+        };
+        if stuck {
+            return Step::Stuck("the step lengths went to zero".into());
+        }
+        if work.since_best >= self.0.patience {
+            return Step::Stuck("the residual has not decreased for too many steps".into());
+        }
+        Step::Continue { estimate: error }
+    }
+
+    fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        problem.complete(&mut work.state, point);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nonsmooth_problem::FrictionLocal;
+    use nonsmooth_problem::linalg::{Bsr, Csc};
+    use nonsmooth_problem::planted::{Planted, PlantedMix};
+
+    use crate::core::register::Registered;
+    use crate::registry;
+    use crate::{Limits, Outcome};
+
+    fn solved<P: Registered>(problem: &P, settings: &[&str], tolerance: f64) -> Outcome {
+        let settings = crate::core::settings::from_texts(settings).unwrap();
+        let mut session = registry::session::<P>("ip", &settings).unwrap();
+        let limits = Limits { tolerance, max_iterations: 500, ..Limits::default() };
+        session.solve(problem, &mut problem.origin(), &limits, &mut |_| {}).unwrap()
+    }
+
+    #[test]
+    fn planted_problems_of_all_kinds_are_solved_to_1e_12() {
+        let all = PlantedMix { open: 1.0, stick: 1.0, slip: 1.0, degenerate: 0.0 };
+        let base = Planted { mix: all, dofs: 120, ..Planted::default() };
+        for case in [
+            base.clone(),
+            Planted { seed: 1, mu: (0.0, 0.6), ..base.clone() },
+            Planted { seed: 2, mu: (0.0, 0.0), ..base.clone() },
+            Planted { seed: 3, skew: 0.02, ..base.clone() },
+            Planted { seed: 4, bilateral: 6, ..base.clone() },
+            // Hyperstatic.
+            Planted { seed: 5, contacts: 30, dofs: 48, ..base },
+        ] {
+            let outcomes = [
+                solved(&case.local::<3>().0, &[], 1e-12),
+                solved(&case.local::<2>().0, &[], 1e-12),
+                solved(&case.global::<3>().0, &[], 1e-12),
+                solved(&case.global::<2>().0, &[], 1e-12),
+            ];
+            for outcome in outcomes {
+                assert!(outcome.measure.relative <= 1e-12, "{case:?}: {outcome:?}");
+                assert!(outcome.iterations <= 60, "{case:?}: {outcome:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn units_do_not_matter() {
+        let (problem, _) = Planted { dofs: 120, ..Planted::default() }.local::<3>();
+        let first = solved(&problem, &[], 1e-9);
+        let w = problem.W.to_csc();
+        for (mass, speed) in [(1e6, 1.0), (1e-6, 1.0), (1.0, 1e6), (1e-6, 1e-6)] {
+            let entries = w.triplets().map(|(i, j, x)| (i, j, x / mass));
+            let w = Csc::from_triplets(w.nrows(), w.ncols(), entries).unwrap();
+            let q = problem.q.iter().map(|q| speed * q).collect();
+            let other = FrictionLocal::<3>::new(Bsr::from_csc(&w), q, problem.mu.clone()).unwrap();
+            let outcome = solved(&other, &[], 1e-9);
+            assert_eq!(outcome.iterations, first.iterations, "mass × {mass:e}, q × {speed:e}");
+            assert!(outcome.measure.relative <= 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_problem_without_a_solution_ends_as_stuck() {
+        // A wedge that cannot give way: two walls press on a body without mass, W = 0.
+        let w = Bsr::from_csc(&Csc::from_triplets(6, 6, std::iter::empty()).unwrap());
+        let q = vec![-1.0, 0.0, 0.0, -1.0, 0.0, 0.0];
+        let problem = FrictionLocal::<3>::new(w, q, vec![0.3, 0.3]).unwrap();
+        for settings in [&[][..], &["path=continuation"]] {
+            let outcome = solved(&problem, settings, 1e-8);
+            assert!(matches!(outcome.status, crate::Status::Stalled(_)), "{outcome:?}");
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! Interior-point methods with Nesterov–Todd scaling: on the convex problem, and on Coulomb's law itself.
+//! The iteration is [`parts::Central`](crate::contact::parts::Central). Those of linear complementarity problems are in [`linear`].
+
+mod convex;
+mod exact;
+mod pursuit;
+
+pub use convex::{ConvexRelaxation, Relaxed};
+pub use exact::{Interior, Path, Pursued};

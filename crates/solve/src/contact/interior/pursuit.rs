@@ -1,0 +1,301 @@
+//! The central path followed by its arc length, so that it may turn back.
+//!
+//! From the start `x = z = e` of [`Central`], where the equations leave `ρ = ρ₀`, the path is
+//!
+//! ```text
+//! ρ(x, z) = θ ρ₀,     x ∘ z = θ e,     θ from 1 to 0.
+//! ```
+//!
+//! With Coulomb's law θ need not decrease along it: at a turning point the matrix of the Newton step is singular, and a
+//! method that asks for a smaller θ stops. Here θ is an unknown like x and z. Predictor: along the unit tangent `(ẋ, ż, θ̇)`, by
+//! a length h that ends well inside the cones and at a positive θ. Corrector: Newton on the path's
+//! equations with the step orthogonal to the tangent. Each corrector needs two solutions with one factor, one for the equations'
+//! residual and one for their derivative by θ. h is doubled after easy steps and quartered after refused ones. Lengths and
+//! angles are measured in the local metric `‖S dx‖² + ‖S⁻¹ dz‖²`, in which a step from θ to θ/2 is as long near the end as at the
+//! start. Near the end Mehrotra's steps take over, which are faster there.
+//!
+//! References: Keller1977 (pseudo-arclength).
+//! Cost of a step: at most `1 + CORRECTORS` factorisations. Storage: [`Central`]'s and eight vectors.
+//! Fails: the path may end on the boundary, or run away to infinity.
+
+use nonsmooth_problem::linalg::Singular;
+
+use crate::contact::form::Linearised;
+use crate::contact::parts::nt::Pair;
+use crate::contact::parts::{Central, CentralIterate};
+
+/// The path's present point and the workspace.
+#[derive(Debug, Clone, Default)]
+pub struct Pursuit<const D: usize> {
+    core: Central<D>,
+    theta: f64,
+    /// The unit tangent of the last point, with the sign of travel.
+    tangent: Direction<D>,
+    /// The derivative by −θ at the present point, as it is last known.
+    slope: Direction<D>,
+    /// ρ₀.
+    first: Vec<[f64; D]>,
+    /// The point to go back to.
+    kept: Vec<Pair<D>>,
+    length: f64,
+    /// Steps that were refused in a row.
+    refused: usize,
+    end: End,
+}
+
+/// Mehrotra's steps at the end of the path.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+enum End {
+    #[default]
+    NotYet,
+    Now {
+        short: usize,
+    },
+    Failed,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Direction<const D: usize> {
+    x: Vec<[f64; D]>,
+    z: Vec<[f64; D]>,
+    theta: f64,
+}
+
+/// Newton corrections of one step.
+const CORRECTORS: usize = 5;
+/// The largest relative distance from the path, after the correctors.
+const NEAR: f64 = 0.3;
+/// ρ cannot follow θ below this.
+const ROUNDING: f64 = 1e-11;
+/// Below this θ the path is left for Mehrotra's steps, which end superlinearly,
+const END: f64 = 1e-8;
+/// until this many of them in a row
+const MANY_SHORT: usize = 3;
+/// were shorter than this: then the path is taken up again where it was left.
+const SHORT: f64 = 1e-2;
+/// Steps shorter than this are no progress.
+const SHORTEST: f64 = 1e-12;
+
+impl<const D: usize> Pursuit<D> {
+    /// Begins at `x = z = e`, with `smoothing` κ ≥ 0 and `start` as in [`Central::begin`].
+    pub fn begin<P: Linearised<D>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        smoothing: f64,
+        start: Option<(&[f64], f64)>,
+    ) -> CentralIterate {
+        let now = self.core.begin(problem, state, smoothing, start);
+        let n = self.core.pairs.len();
+        for direction in [&mut self.tangent, &mut self.slope] {
+            for list in [&mut direction.x, &mut direction.z] {
+                list.clear();
+                list.resize(n, [0.0; D]);
+            }
+            direction.theta = -1.0;
+        }
+        self.first.clear();
+        self.first.extend_from_slice(&self.core.rho);
+        self.kept.clear();
+        self.kept.extend_from_slice(&self.core.pairs);
+        (self.theta, self.length, self.refused) = (now.tau, f64::INFINITY, 0);
+        self.end = End::NotYet;
+        // ρ = θ ρ₀ at the start.
+        self.first.iter_mut().flatten().for_each(|rho| *rho /= now.tau);
+        now
+    }
+
+    /// The iterate.
+    pub fn core(&self) -> &Central<D> {
+        &self.core
+    }
+
+    /// One step along the path: a predictor and its correctors. `alpha` of the answer is the step's length, zero
+    /// where the step was refused.
+    pub fn iterate<P: Linearised<D>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+    ) -> Result<CentralIterate, Singular> {
+        if self.end == End::NotYet && self.theta < END && self.refused == 0 {
+            self.kept.copy_from_slice(&self.core.pairs);
+            self.end = End::Now { short: 0 };
+        }
+        if let End::Now { short } = self.end {
+            let now = self.core.iterate(problem, state)?;
+            let short = if now.alpha < SHORT { short + 1 } else { 0 };
+            self.end = End::Now { short };
+            if short == MANY_SHORT {
+                self.end = End::Failed;
+                self.core.pairs.copy_from_slice(&self.kept);
+                return Ok(self.core.look(problem, state, 1.0));
+            }
+            return Ok(now);
+        }
+        if self.refused == 0 {
+            self.core.factorise(problem, state)?;
+            self.differentiate(problem, state);
+            self.turn();
+        }
+        self.kept.copy_from_slice(&self.core.pairs);
+        let theta = self.theta;
+        // The predictor.
+        self.core.dx.copy_from_slice(&self.tangent.x);
+        self.core.dz.copy_from_slice(&self.tangent.z);
+        let mut longest = 0.9 * self.core.reach();
+        if self.tangent.theta < 0.0 {
+            longest = longest.min(0.95 * theta / -self.tangent.theta);
+        }
+        let length = self.length.min(longest).min(1e6);
+        self.core.advance(length);
+        self.theta = theta + length * self.tangent.theta;
+        self.core.look(problem, state, length);
+        let mut near = false;
+        let mut corrections = 0;
+        let mut distance = self.distance();
+        while corrections < CORRECTORS && distance.is_finite() {
+            if distance <= NEAR {
+                near = true;
+                break;
+            }
+            if self.correct(problem, state).is_err() {
+                break;
+            }
+            corrections += 1;
+            let now = self.distance();
+            // Newton's method that does not contract will not do so later.
+            if now > 2.0 * distance && corrections > 1 {
+                break;
+            }
+            distance = now;
+        }
+        near = near || distance <= NEAR;
+        if !near {
+            self.core.pairs.copy_from_slice(&self.kept);
+            self.theta = theta;
+            self.length = 0.25 * length;
+            self.refused += 1;
+            return Ok(self.core.look(problem, state, 0.0));
+        }
+        self.refused = 0;
+        self.length = if corrections <= 2 { 2.0 * length } else { length };
+        Ok(self.core.look(problem, state, length))
+    }
+
+    /// The path has come to an end: steps of no length.
+    pub fn stuck(&self) -> bool {
+        self.length < SHORTEST * self.theta.max(1e-6)
+    }
+
+    /// `slope`: the derivative of (x, z) by −θ along the path.
+    fn differentiate<P: Linearised<D>>(&mut self, problem: &P, state: &mut P::State) {
+        let core = &mut self.core;
+        for c in 0..core.pairs.len() {
+            let mut minus_e = [0.0; D];
+            minus_e[0] = -1.0;
+            core.d[c] = core.scalings[c].divide(&minus_e);
+        }
+        // ρ must fall by ρ₀.
+        std::mem::swap(&mut core.rho, &mut self.first);
+        core.newton(problem, state, 1.0);
+        std::mem::swap(&mut core.rho, &mut self.first);
+        self.slope.x.copy_from_slice(&core.dx);
+        self.slope.z.copy_from_slice(&core.dz);
+    }
+
+    /// The unit tangent, on from the last one.
+    fn turn(&mut self) {
+        let Self { core, slope, tangent, theta, .. } = self;
+        let size = (core.product(slope, slope, *theta)).sqrt();
+        let along = core.product(slope, tangent, *theta);
+        let sign = if along < 0.0 { -1.0 } else { 1.0 };
+        for (to, from) in [(&mut tangent.x, &slope.x), (&mut tangent.z, &slope.z)] {
+            to.iter_mut().zip(from).for_each(|(t, s)| *t = s.map(|v| sign * v / size));
+        }
+        tangent.theta = -sign / size;
+    }
+
+    /// The largest relative distance of the present point from the path.
+    fn distance(&self) -> f64 {
+        let mut largest = 0.0_f64;
+        for pair in &self.core.pairs {
+            let scaling = crate::contact::parts::nt::Scaling::new(pair);
+            let mut off = scaling.product(&scaling.lambda, &scaling.lambda);
+            off[0] -= self.theta;
+            let size = off.iter().map(|v| v * v).sum::<f64>().sqrt();
+            largest = largest.max(size / self.theta);
+        }
+        let (mut off, mut size) = (0.0, 1.0);
+        for (rho, first) in self.core.rho.iter().zip(&self.first) {
+            for k in 0..D {
+                off += (rho[k] - self.theta * first[k]).powi(2);
+                size += first[k] * first[k];
+            }
+        }
+        // Below the rounding of the equations there is no path to be near to.
+        largest.max((off / size).sqrt() / self.theta.max(ROUNDING))
+    }
+
+    /// One Newton step on the path's equations, orthogonal to the tangent.
+    fn correct<P: Linearised<D>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+    ) -> Result<(), Singular> {
+        self.core.factorise(problem, state)?;
+        self.differentiate(problem, state);
+        let Self { core, tangent, slope, first, theta, .. } = self;
+        for c in 0..core.pairs.len() {
+            let scaling = &core.scalings[c];
+            let mut g = [0.0; D];
+            g[0] = *theta;
+            let toward = scaling.divide(&g);
+            for k in 0..D {
+                core.d[c][k] = toward[k] - scaling.lambda[k];
+                core.rho[c][k] -= *theta * first[c][k];
+            }
+        }
+        core.newton(problem, state, 1.0);
+        let across = core.product(tangent, slope, *theta);
+        let missing = core.inner((&tangent.x, &tangent.z), (&core.dx, &core.dz)) / *theta;
+        let change = missing / across;
+        if !change.is_finite() {
+            return Err(Singular);
+        }
+        for c in 0..core.pairs.len() {
+            for k in 0..D {
+                core.dx[c][k] -= change * slope.x[c][k];
+                core.dz[c][k] -= change * slope.z[c][k];
+            }
+        }
+        let mut alpha = (0.95 * core.reach()).min(1.0);
+        if change < 0.0 {
+            alpha = alpha.min(0.95 * *theta / -change);
+        }
+        core.advance(alpha);
+        *theta += alpha * change;
+        core.look(problem, state, alpha);
+        Ok(())
+    }
+}
+
+impl<const D: usize> Central<D> {
+    /// The scalar product of two directions in the local metric, in which the path towards a small θ looks the same as
+    /// towards a large one: `(aₓᵀS²bₓ + a_zᵀS⁻²b_z)/θ + nc a_θ b_θ/θ²`.
+    fn product(&self, a: &Direction<D>, b: &Direction<D>, theta: f64) -> f64 {
+        let along = self.pairs.len() as f64 * (a.theta / theta) * (b.theta / theta);
+        self.inner((&a.x, &a.z), (&b.x, &b.z)) / theta + along
+    }
+
+    /// `aₓᵀS²bₓ + a_zᵀS⁻²b_z`.
+    fn inner(&self, a: (&[[f64; D]], &[[f64; D]]), b: (&[[f64; D]], &[[f64; D]])) -> f64 {
+        let dot = |a: [f64; D], b: [f64; D]| (0..D).map(|k| a[k] * b[k]).sum::<f64>();
+        let contact = |c: usize| {
+            let s = &self.scalings[c];
+            // Of a half line only the normal part counts, and the others are zero.
+            dot(s.apply(&a.0[c]), s.apply(&b.0[c]))
+                + dot(s.apply_inverse(&a.1[c]), s.apply_inverse(&b.1[c]))
+        };
+        (0..self.pairs.len()).map(contact).sum()
+    }
+}

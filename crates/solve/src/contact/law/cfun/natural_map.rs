@@ -1,0 +1,72 @@
+//! The natural map of the cone complementarity problem.
+//!
+//! ```text
+//! Φ = r − P_K(r − ρ ũ),   ũ = u + mu‖u_T‖ e_N          (108)(109)
+//! ```
+//!
+//! Vanishes exactly at the solutions, for any ρ > 0. Its kinks are those of the projection and, in every stick and at no speed,
+//! that of ‖u_T‖; so it is semismooth, not smooth, at sticking contacts.
+//!
+//! Source: AcaryBremondHuber2018; Acary, lecture (108)(109), with the sign of docs/notation.md.
+
+use super::{ContactFunction, Law, Linearisation, modified_velocity};
+use crate::contact::law::cone::{self, Region};
+
+/// `x − P_K(x − ũ)` by the three regions of the cone, so that a large x does not round ũ away.
+#[inline(always)]
+pub fn natural_map<const D: usize>(x: &[f64; D], modified: &[f64; D], mu: f64) -> [f64; D] {
+    let mut y = *x;
+    for k in 0..D {
+        y[k] -= modified[k];
+    }
+    match cone::region(&y, mu) {
+        Region::Inside => *modified,
+        Region::Polar => *x,
+        Region::Outside => {
+            // ũ + d n, with the distance d of y from K and the outward normal n.
+            let size = cone::tangential_norm(&y);
+            let scale = (size - mu * y[0]) / (1.0 + mu * mu);
+            let mut phi = *modified;
+            phi[0] -= mu * scale;
+            for k in 1..D {
+                phi[k] += scale * (y[k] / size);
+            }
+            phi
+        }
+    }
+}
+
+/// One contact's part of the natural residual, `‖w r − P_K(w r − ũ)‖²`, `ũ = u + mu‖u_T‖ e_N`.
+#[inline(always)]
+pub fn natural_residual<const D: usize>(w: f64, r: &[f64; D], u: &[f64; D], mu: f64) -> f64 {
+    let mut modified = *u;
+    modified[0] += mu * cone::tangential_norm(u);
+    natural_map(&r.map(|r| w * r), &modified, mu).iter().map(|v| v * v).sum()
+}
+
+/// The natural map.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NaturalMap;
+
+impl<const D: usize> ContactFunction<D> for NaturalMap {
+    fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
+        let (mu, rho) = (law.mu, law.rho_cone);
+        let (modified, t) = modified_velocity(u, mu, 0.0);
+        let scaled = modified.map(|v| rho * v);
+        let mut out = Linearisation::zero();
+        out.phi = natural_map(r, &scaled, mu);
+        let mut x = *r;
+        for k in 0..D {
+            x[k] -= scaled[k];
+        }
+        // ∂Φ/∂r = I − P', ∂Φ/∂u = ρ P' ∂ũ/∂u, ∂ũ/∂u = I + mu e_N tᵀ.
+        let slope = cone::projection_jacobian(&x, mu);
+        for k in 0..D {
+            for l in 0..D {
+                out.b[k][l] = f64::from(u8::from(k == l)) - slope[k][l];
+                out.a[k][l] = rho * (slope[k][l] + mu * slope[k][0] * t[l]);
+            }
+        }
+        out
+    }
+}

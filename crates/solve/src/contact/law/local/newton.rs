@@ -1,0 +1,114 @@
+//! One frictional contact by a safeguarded semismooth Newton method.
+//!
+//! Solves `Φ(W r + q, r) = 0` with the Alart–Curnier or Jean–Moreau function: `(A W + B) dr = −Φ`, `ρ_N = 1/W_NN`,
+//! `ρ_T = 1/λ_max(W_TT)` (bounded). The step is halved until ‖Φ‖ decreases. Without convergence in 20 steps, or where the
+//! Newton matrix is singular, the exact local solver answers instead, so that no sweep is lost.
+//!
+//! Source: AlartCurnier1991; Acary, lecture (88)–(96). Cost: about 150 flops a step, 2 to 5 steps.
+
+use nonsmooth_problem::linalg::small::{self, mul};
+
+use super::{Exact, LocalSolver, norm_bound, velocity};
+use crate::contact::law::cfun::{Disk, Radii, alart_curnier};
+
+/// The Newton local solver.
+#[derive(Debug, Clone, Copy)]
+pub struct Newton {
+    /// The radius of the friction disk.
+    pub disk: Disk,
+    /// The residual in units of velocity below which it stops; 0: to rounding.
+    pub tolerance: f64,
+}
+
+impl Newton {
+    /// With the disk given, to rounding.
+    pub fn new(disk: Disk) -> Self {
+        Self { disk, tolerance: 0.0 }
+    }
+}
+
+/// The scaling parameters and the exact solver's memo.
+#[derive(Debug, Clone)]
+pub struct NewtonMemo<const D: usize> {
+    rho: Option<Radii>,
+    exact: <Exact as LocalSolver<D>>::Memo,
+}
+
+const STEPS: usize = 20;
+const HALVINGS: usize = 6;
+
+impl<const D: usize> LocalSolver<D> for Newton {
+    type Memo = NewtonMemo<D>;
+
+    fn tolerate(&mut self, velocity: f64) {
+        self.tolerance = velocity;
+    }
+
+    fn prepare(&self, w: &[[f64; D]; D], mu: f64) -> NewtonMemo<D> {
+        let mut tangential = *w;
+        tangential[0] = [0.0; D];
+        tangential.iter_mut().for_each(|row| row[0] = 0.0);
+        let rho = Radii { normal: 1.0 / w[0][0], tangential: 1.0 / norm_bound(&tangential) };
+        let usable = [rho.normal, rho.tangential].iter().all(|r| *r > 0.0 && r.is_finite());
+        NewtonMemo { rho: usable.then_some(rho), exact: Exact.prepare(w, mu) }
+    }
+
+    fn solve(
+        &self,
+        memo: &mut NewtonMemo<D>,
+        w: &[[f64; D]; D],
+        q: &[f64; D],
+        mu: f64,
+        r: &[f64; D],
+    ) -> [f64; D] {
+        memo.rho
+            .and_then(|rho| newton(self, w, q, mu, rho, r))
+            .unwrap_or_else(|| Exact.solve(&mut memo.exact, w, q, mu, r))
+    }
+}
+
+fn newton<const D: usize>(
+    solver: &Newton,
+    w: &[[f64; D]; D],
+    q: &[f64; D],
+    mu: f64,
+    rho: Radii,
+    start: &[f64; D],
+) -> Option<[f64; D]> {
+    let linearise = |r: &[f64; D]| alart_curnier(solver.disk, &velocity(w, q, r), r, mu, rho);
+    let size = |x: &[f64; D]| x.iter().map(|v| v * v).sum::<f64>().sqrt();
+    // Rounding in Φ is that of ρ q and of r.
+    let impulse = rho.normal.max(rho.tangential);
+    let floor = impulse * (4.0 * f64::EPSILON * size(q)).max(solver.tolerance);
+    let mut r = *start;
+    let mut at = linearise(&r);
+    for _ in 0..STEPS {
+        let merit = size(&at.phi);
+        if merit <= floor + 4.0 * f64::EPSILON * size(&r) {
+            return Some(r);
+        }
+        let mut jacobian = at.b;
+        for i in 0..D {
+            for j in 0..D {
+                for k in 0..D {
+                    jacobian[i][j] += at.a[i][k] * w[k][j];
+                }
+            }
+        }
+        let step = mul(&small::inverse(&jacobian)?, &at.phi);
+        let mut length = 1.0;
+        let mut trial = r;
+        for _ in 0..HALVINGS {
+            for k in 0..D {
+                trial[k] = r[k] - length * step[k];
+            }
+            at = linearise(&trial);
+            if size(&at.phi) < (1.0 - 1e-4 * length) * merit {
+                break;
+            }
+            length *= 0.5;
+        }
+        r = trial;
+    }
+    None
+}

@@ -1,0 +1,476 @@
+//! Semismooth Newton methods on a complementarity function of each contact.
+//!
+//! ```text
+//! Φ_c(u_c, r_c) = 0 for all contacts,   u = W r + q
+//! (Q + P W) Δr = −Φ,   P = diag ∂Φ_c/∂u_c,   Q = diag ∂Φ_c/∂r_c,   r ← r + t Δr
+//! ```
+//!
+//! One skeleton ([`Semismooth`]), one file for each function. The linear system is [`Linearised`]'s: in contact space
+//! where W is known, over the degrees of freedom where M and H are.
+//!
+//! All is done in pure numbers, `û = u/s` and `r̂ = w_c r/s` with `s = ‖q‖/√nc`, `w_c = tr(W_cc)/D`: units change neither steps
+//! nor decisions, and light and heavy contacts weigh the same in the merit `Ψ = ½ Σ‖Φ_c‖²`.
+//!
+//! *Globalisation.* A few Gauss–Seidel sweeps come first. A line search shortens steps that do not decrease Ψ; where none does, or
+//! the matrix is singular, or Ψ has not fallen to a new low for [`PATIENCE`] steps, sweeps take over for one step. After
+//! [`RESCUES`] such rescues without a new low the method says that it is stuck.
+//!
+//! Cost of a step: one sparse factorisation, one to ten products with W. Storage: the factor, 6 vectors, 2 blocks a contact.
+//!
+//! Fails: where W is rank deficient (hyperstatic) and many contacts stick, Newton's matrix is nearly singular and its
+//! neighbourhood of convergence tiny: use a proximal method around it.
+
+mod alart_curnier;
+mod chen_mangasarian;
+mod fischer_burmeister;
+mod fischer_burmeister_smoothed;
+mod hueber_stadler_wohlmuth;
+mod jean_moreau;
+mod natural_map;
+mod park_kwak;
+mod scaling;
+#[cfg(test)]
+mod tests;
+mod xuewen_soh_wanji;
+
+use nonsmooth_problem::linalg::{Block, budget, small};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::contact::form::{Access, Linearised};
+use crate::contact::law::cfun::{ContactFunction, Law, Linearisation};
+use crate::contact::parts::Sweep;
+use crate::core::line_search::{LineSearch, Search};
+use crate::core::settings::Settings;
+use crate::{SolveError, Solver, Step};
+
+pub use alart_curnier::NewtonAc;
+pub use chen_mangasarian::NewtonCm;
+pub use fischer_burmeister::NewtonFb;
+pub use fischer_burmeister_smoothed::NewtonFbSmooth;
+pub use hueber_stadler_wohlmuth::NewtonHsw;
+pub use jean_moreau::NewtonJm;
+pub use natural_map::NewtonNm;
+pub use park_kwak::NewtonPk;
+pub use scaling::RhoRule;
+pub use xuewen_soh_wanji::NewtonXsw;
+
+/// The hyperparameters that all Newton methods have.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(inline)]
+pub struct Newton {
+    /// How the line search accepts a step, on half the square of the function.
+    pub line_search: LineSearch,
+    /// How rho of each contact follows from its block of W.
+    pub rho_rule: RhoRule,
+    /// The factor of the rule, positive: a pure number.
+    pub rho: f64,
+    /// Gauss-Seidel sweeps before the first Newton step.
+    pub warm_up: usize,
+    /// Gauss-Seidel sweeps that take over for one step where Newton's fails, doubled up to 64-fold while that does not help;
+    /// 0 gives up at once.
+    pub rescue: usize,
+    /// Smoothed functions: the smoothing parameter is at most this fraction of the residual, at least 0. The others do not look at it.
+    pub smoothing: f64,
+}
+
+impl Default for Newton {
+    fn default() -> Self {
+        Self {
+            line_search: LineSearch::default(),
+            rho_rule: RhoRule::default(),
+            rho: 1.0,
+            warm_up: 10,
+            rescue: 20,
+            smoothing: 0.1,
+        }
+    }
+}
+
+impl Settings for Newton {
+    fn validate(&self) -> Result<(), String> {
+        for (key, sweeps) in [("warm_up", self.warm_up), ("rescue", self.rescue)] {
+            if sweeps > MOST_SWEEPS {
+                return Err(format!("{key}: expected at most {MOST_SWEEPS}, found {sweeps}"));
+            }
+        }
+        if !(self.rho > 0.0 && self.rho.is_finite()) {
+            return Err(format!("rho: expected a positive number, found {}", self.rho));
+        }
+        if !(self.smoothing >= 0.0 && self.smoothing.is_finite()) {
+            return Err(format!("smoothing: expected at least 0, found {}", self.smoothing));
+        }
+        Ok(())
+    }
+}
+
+/// A Newton method by its hyperparameters: those of the skeleton, and a function.
+pub trait Method: Send {
+    /// The function.
+    type Function: Send;
+
+    /// The skeleton's hyperparameters.
+    fn newton(&self) -> Newton;
+
+    /// The function, with its own hyperparameters.
+    fn function(&self) -> Self::Function;
+}
+
+/// The Newton method on the function F for contacts of dimension D.
+#[derive(Debug, Clone, Copy)]
+pub struct Semismooth<F, const D: usize> {
+    settings: Newton,
+    function: F,
+}
+
+impl<F, const D: usize> Semismooth<F, D> {
+    /// The solver that a method's hyperparameters describe.
+    pub fn new<M: Method<Function = F>>(method: &M) -> Self {
+        Self { settings: method.newton(), function: method.function() }
+    }
+}
+
+/// The most sweeps that may be asked for in one step: time limits act between steps.
+const MOST_SWEEPS: usize = 1000;
+/// Rescues without a new low after which the method is stuck.
+pub const RESCUES: usize = 12;
+/// Each rescue in a row has twice as many sweeps as the one before, this often.
+const DOUBLINGS: usize = 6;
+/// Newton steps without a new low after which sweeps take over.
+pub const PATIENCE: usize = 25;
+
+/// The workspace: the problem's view, the scaling of each contact, and the vectors of a step.
+pub struct Work<P: Linearised<D>, const D: usize> {
+    state: P::State,
+    sweep: Sweep<D>,
+    laws: Vec<Law>,
+    /// `w_c`, positive.
+    unit: Vec<f64>,
+    /// `‖q‖/√nc`.
+    scale: f64,
+    /// The velocities at the present impulses.
+    u: Vec<f64>,
+    trial: Vec<f64>,
+    trial_u: Vec<f64>,
+    step: Vec<f64>,
+    step_u: Vec<f64>,
+    b: Vec<f64>,
+    p: Vec<Block<D>>,
+    q: Vec<Block<D>>,
+    search: Search,
+    phase: Phase,
+}
+
+/// How the solve is going.
+#[derive(Debug, Clone, Copy)]
+struct Phase {
+    /// No step was made yet.
+    fresh: bool,
+    /// The smallest merit since the last change of rho, and Newton steps since then.
+    low: f64,
+    since_low: usize,
+    rescues: usize,
+    smoothing: f64,
+    /// The place in the ladder of rho.
+    rung: usize,
+}
+
+impl Phase {
+    fn new() -> Self {
+        Self {
+            fresh: true,
+            low: f64::INFINITY,
+            since_low: 0,
+            rescues: 0,
+            smoothing: f64::INFINITY,
+            rung: 0,
+        }
+    }
+
+    /// Notes a merit; a new low forgives the rescues.
+    fn note(&mut self, merit: f64) {
+        if merit < 0.98 * self.low {
+            if self.low.is_finite() {
+                self.rescues = 0;
+            }
+            (self.low, self.since_low) = (merit, 0);
+        } else {
+            self.since_low += 1;
+        }
+    }
+}
+
+impl<P, F, const D: usize> Solver<P> for Semismooth<F, D>
+where
+    P: Linearised<D>,
+    F: ContactFunction<D>,
+{
+    type Work = Work<P, D>;
+
+    fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
+        let state = problem.state(Access::Newton)?;
+        let mut work = Work {
+            sweep: Sweep::new(problem, &state),
+            state,
+            laws: vec![],
+            unit: vec![],
+            scale: 1.0,
+            u: vec![],
+            trial: vec![],
+            trial_u: vec![],
+            step: vec![],
+            step_u: vec![],
+            b: vec![],
+            p: vec![],
+            q: vec![],
+            search: Search::new(self.settings.line_search),
+            phase: Phase::new(),
+        };
+        self.fill(problem, &mut work);
+        Ok(work)
+    }
+
+    fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
+        problem.refill(&mut work.state)?;
+        work.sweep.fill(problem, &work.state);
+        self.fill(problem, work);
+        Ok(())
+    }
+
+    fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        work.search.restart();
+        if work.phase.rung > 0 {
+            work.phase.rung = 0;
+            self.scale_contacts(problem, work);
+        }
+        work.phase = Phase::new();
+        problem.velocities(&mut work.state, P::impulses(point), &mut work.u);
+    }
+
+    fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
+        if let Some(ray) = problem.contradiction(&work.state) {
+            return Step::NoSolution(ray.clone().into());
+        }
+        if std::mem::take(&mut work.phase.fresh) && self.settings.warm_up > 0 {
+            return self.sweeps(problem, point, work, self.settings.warm_up);
+        }
+        if F::SMOOTHED {
+            self.reduce_smoothing(P::impulses(point), work);
+        }
+        let r = P::impulses(point);
+        let merit = self.linearise(r, work); //                          Φ, P, Q
+        if !F::SMOOTHED {
+            work.phase.note(merit);
+        }
+        if work.phase.since_low > PATIENCE {
+            return self.rescue(
+                problem,
+                point,
+                work,
+                "Newton's method is stuck: its merit no longer decreases",
+            );
+        }
+        if problem.linearise(&mut work.state, &work.p, &work.q).is_err() {
+            return self.rescue(
+                problem,
+                point,
+                work,
+                "Newton's method is stuck: its matrix is singular",
+            );
+        }
+        let Work { state, u, trial, trial_u, step, step_u, b, search, laws, unit, scale, .. } =
+            work;
+        problem.solve_linearised(state, b, step, step_u); //             (Q + P W) Δr = −Φ
+        if step.iter().any(|x| !x.is_finite()) {
+            return self.rescue(
+                problem,
+                point,
+                work,
+                "Newton's method is stuck: its step is not finite",
+            );
+        }
+        let found = search.search(merit, |t| {
+            for i in 0..r.len() {
+                trial[i] = r[i] + t * step[i];
+            }
+            // Recomputed, not u + t W Δr: rounding does not gather.
+            problem.velocities(state, trial, trial_u);
+            merit_at(&self.function, laws, unit, *scale, trial_u, trial)
+        });
+        if !(found.accepted || found.merit < merit) {
+            return self.rescue(
+                problem,
+                point,
+                work,
+                "Newton's method is stuck: no step along its direction decreases the merit",
+            );
+        }
+        r.copy_from_slice(trial); //                                     r ← r + t Δr
+        std::mem::swap(u, trial_u);
+        Step::Continue { estimate: (2.0 * found.merit / laws.len() as f64).sqrt() }
+    }
+
+    fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        problem.complete(&mut work.state, point);
+    }
+}
+
+impl<F, const D: usize> Semismooth<F, D> {
+    fn fill<P: Linearised<D>>(&self, problem: &P, work: &mut Work<P, D>) {
+        let n = problem.mu().len();
+        work.scale = problem.velocity_scale(&work.state) / (n as f64).sqrt();
+        work.unit.clear();
+        let state = &work.state;
+        work.unit.extend((0..n).map(|c| small::mean_diagonal(&problem.diagonal_block(state, c))));
+        let mean = work.unit.iter().sum::<f64>() / n as f64;
+        for w in &mut work.unit {
+            if *w <= 0.0 {
+                *w = if mean > 0.0 { mean } else { 1.0 };
+            }
+        }
+        for x in [
+            &mut work.u,
+            &mut work.trial,
+            &mut work.trial_u,
+            &mut work.step,
+            &mut work.step_u,
+            &mut work.b,
+        ] {
+            x.resize(D * n, 0.0);
+        }
+        work.p.resize(n, [[0.0; D]; D]);
+        work.q.resize(n, [[0.0; D]; D]);
+        self.scale_contacts(problem, work);
+    }
+
+    /// ρ of every contact for the present rung.
+    fn scale_contacts<P: Linearised<D>>(&self, problem: &P, work: &mut Work<P, D>) {
+        let Newton { rho_rule, rho, .. } = self.settings;
+        let factor = scaling::LADDER[work.phase.rung % scaling::LADDER.len()];
+        work.laws.clear();
+        for (c, (&mu, &unit)) in problem.mu().iter().zip(&work.unit).enumerate() {
+            let w = problem.diagonal_block(&work.state, c);
+            let (parts, whole) = scaling::radii(rho_rule, rho * factor, &w, unit);
+            work.laws.push(Law { mu, rho: parts, rho_cone: whole, smoothing: 0.0 });
+        }
+    }
+
+    /// `count` sweeps on the point; the velocities after them.
+    fn sweeps<P>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut Work<P, D>,
+        count: usize,
+    ) -> Step
+    where
+        P: Linearised<D>,
+    {
+        problem.enter(&mut work.state, point);
+        let r = P::impulses(point);
+        let mut moves = 0.0;
+        for _ in 0..count {
+            moves = work.sweep.sweep(problem, &mut work.state, r);
+            if budget::over() {
+                break;
+            }
+        }
+        problem.velocities(&mut work.state, r, &mut work.u);
+        Step::Continue { estimate: moves.sqrt() / (work.scale * (work.laws.len() as f64).sqrt()) }
+    }
+
+    /// Sweeps in place of a Newton step that failed, and another ρ where that is asked for; stuck after too many of them.
+    fn rescue<P>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut Work<P, D>,
+        why: &'static str,
+    ) -> Step
+    where
+        P: Linearised<D>,
+    {
+        if self.settings.rescue == 0 || work.phase.rescues >= RESCUES {
+            return Step::Stuck(why.into());
+        }
+        // Longer each time in a row: where W is rank deficient, Newton needs a start that few sweeps do not give.
+        let count = self.settings.rescue << work.phase.rescues.min(DOUBLINGS);
+        work.phase.rescues += 1;
+        work.phase.since_low = 0;
+        work.search.restart();
+        if self.settings.rho_rule == RhoRule::Adaptive {
+            work.phase.rung += 1;
+            work.phase.low = f64::INFINITY;
+            self.scale_contacts(problem, work);
+        }
+        self.sweeps(problem, point, work, count)
+    }
+}
+
+impl<F: ContactFunction<D>, const D: usize> Semismooth<F, D> {
+    /// Φ, P, Q at the present point into `b = −Φ`, `p`, `q`, in the problem's units; the merit.
+    fn linearise<P: Linearised<D>>(&self, r: &[f64], work: &mut Work<P, D>) -> f64 {
+        let Work { laws, unit, scale, u, b, p, q, .. } = work;
+        let mut merit = 0.0;
+        for (c, (law, &w)) in laws.iter().zip(&*unit).enumerate() {
+            let at = contact(&self.function, law, w, *scale, u, r, c);
+            for k in 0..D {
+                merit += 0.5 * at.phi[k] * at.phi[k];
+                b[D * c + k] = -*scale * at.phi[k];
+            }
+            p[c] = at.a;
+            q[c] = at.b.map(|row| row.map(|x| w * x));
+        }
+        merit
+    }
+
+    /// ε: at most a fraction of the residual without smoothing and, near the solution, of its square; never larger than before.
+    fn reduce_smoothing<P: Linearised<D>>(&self, r: &[f64], work: &mut Work<P, D>) {
+        let phase = &mut work.phase;
+        work.laws.iter_mut().for_each(|law| law.smoothing = 0.0);
+        let merit = merit_at(&self.function, &work.laws, &work.unit, work.scale, &work.u, r);
+        phase.note(merit);
+        let rms = (2.0 * merit / work.laws.len() as f64).sqrt();
+        let bound = self.settings.smoothing * rms * rms.min(1.0);
+        if bound < phase.smoothing {
+            phase.smoothing = bound;
+            work.search.restart();
+        }
+        let epsilon = phase.smoothing;
+        work.laws.iter_mut().for_each(|law| law.smoothing = epsilon);
+    }
+}
+
+/// The function of contact c at `(u, r)`, in pure numbers.
+#[inline(always)]
+fn contact<F: ContactFunction<D>, const D: usize>(
+    function: &F,
+    law: &Law,
+    w: f64,
+    scale: f64,
+    u: &[f64],
+    r: &[f64],
+    c: usize,
+) -> Linearisation<D> {
+    let u: [f64; D] = small::block(u, c);
+    let r: [f64; D] = small::block(r, c);
+    function.linearise(law, &u.map(|x| x / scale), &r.map(|x| x * (w / scale)))
+}
+
+/// `½ Σ‖Φ_c‖²`.
+fn merit_at<F: ContactFunction<D>, const D: usize>(
+    function: &F,
+    laws: &[Law],
+    unit: &[f64],
+    scale: f64,
+    u: &[f64],
+    r: &[f64],
+) -> f64 {
+    let mut merit = 0.0;
+    for (c, (law, &w)) in laws.iter().zip(unit).enumerate() {
+        let phi = contact(function, law, w, scale, u, r, c).phi;
+        merit += 0.5 * phi.iter().map(|x| x * x).sum::<f64>();
+    }
+    merit
+}

@@ -1,0 +1,14 @@
+//! What two families of the wing share.
+
+mod anderson;
+mod central;
+mod clarabel;
+mod conic;
+pub mod nt;
+mod sweep;
+
+pub use anderson::{Accelerator, Anderson};
+pub use central::{Central, Iterate as CentralIterate};
+pub use clarabel::{Clarabel, Ended, Shape};
+pub use conic::{ConvexEnd, ConvexIp};
+pub use sweep::Sweep;

@@ -1,0 +1,133 @@
+//! A plain Gauss–Seidel sweep with the exact local solver, for methods that start from a few sweeps or mix them in.
+//!
+//! Visits the contacts in the order given; each gets the solution of its own problem with all other impulses frozen. It is
+//! NSGS (JourdanAlartJean1998; Acary, lecture (107)) without its options: no relaxation, no freezing, no shuffling.
+//!
+//! Cost of a sweep: one pass over the blocks of W (or over the rows of H and M⁻¹H) plus nc local solves. Storage: the
+//! diagonal block and the local solver's memo of each contact.
+
+use nonsmooth_problem::linalg::{norm, small};
+
+use crate::contact::form::{Blockwise, Contacts};
+use crate::contact::law::cfun::natural_residual;
+use crate::contact::law::local::{Exact, LocalSolver, frictionless};
+
+/// What sweeps keep for each contact.
+#[derive(Debug, Clone, Default)]
+pub struct Sweep<const D: usize> {
+    contacts: Vec<Visited<D>>,
+}
+
+#[derive(Debug, Clone)]
+struct Visited<const D: usize> {
+    w: [[f64; D]; D],
+    mu: f64,
+    /// `tr(W_cc)/D`.
+    unit: f64,
+    memo: <Exact as LocalSolver<D>>::Memo,
+}
+
+impl<const D: usize> Sweep<D> {
+    /// Sweeps over `problem`'s contacts.
+    pub fn new<P: Contacts<D>>(problem: &P, state: &P::State) -> Self {
+        let mut sweep = Self { contacts: Vec::with_capacity(problem.mu().len()) };
+        sweep.fill(problem, state);
+        sweep
+    }
+
+    /// Takes another problem; allocates nothing where the number of contacts is the same.
+    pub fn fill<P: Contacts<D>>(&mut self, problem: &P, state: &P::State) {
+        self.contacts.clear();
+        for (c, &mu) in problem.mu().iter().enumerate() {
+            let w = problem.diagonal_block(state, c);
+            let unit = small::mean_diagonal(&w).abs();
+            self.contacts.push(Visited { w, mu, unit, memo: Exact.prepare(&w, mu) });
+        }
+    }
+
+    /// One sweep on `r`, which `state` must know already (`enter`); returns `Σ (w_c‖Δr_c‖)²`, `w_c = tr(W_cc)/D`.
+    pub fn sweep<P: Blockwise<D>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        r: &mut [f64],
+    ) -> f64 {
+        let mut moves = 0.0;
+        for (c, contact) in self.contacts.iter_mut().enumerate() {
+            let old: [f64; D] = small::block(r, c);
+            let mut q = problem.velocity(state, r, c);
+            let own = small::mul(&contact.w, &old);
+            for k in 0..D {
+                q[k] -= own[k];
+            }
+            let new = if contact.mu > 0.0 {
+                Exact.solve(&mut contact.memo, &contact.w, &q, contact.mu, &old)
+            } else {
+                frictionless(&contact.w, &q, &old)
+            };
+            let mut dr = new;
+            for k in 0..D {
+                dr[k] -= old[k];
+            }
+            if dr.iter().any(|x| *x != 0.0) {
+                r[D * c..D * c + D].copy_from_slice(&new);
+                problem.moved(state, c, &dr);
+                moves += dr.iter().map(|x| (contact.unit * x).powi(2)).sum::<f64>();
+            }
+        }
+        moves
+    }
+
+    /// `max_c w_c‖r_c‖`, a velocity.
+    pub fn largest(&self, r: &[f64]) -> f64 {
+        let of = |(c, contact): (usize, &Visited<D>)| contact.unit * norm(&small::block::<D>(r, c));
+        self.contacts.iter().enumerate().map(of).fold(0.0, f64::max)
+    }
+
+    /// The natural residual `‖( w_c r_c − P_K(w_c r_c − ũ_c) )_c‖` at r, whose velocities are u.
+    pub fn residual(&self, u: &[f64], r: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        for (c, contact) in self.contacts.iter().enumerate() {
+            let (u, r) = (small::block::<D>(u, c), small::block(r, c));
+            sum += natural_residual(contact.unit, &r, &u, contact.mu);
+        }
+        sum.sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nonsmooth_problem::Problem;
+    use nonsmooth_problem::planted::Planted;
+
+    use super::*;
+    use crate::contact::form::Access;
+
+    /// Sweeps until they no longer move; the distance to the planted solution.
+    fn distance<const D: usize, P>(problem: &P, known: &[f64]) -> f64
+    where
+        P: Blockwise<D> + Problem,
+    {
+        let mut point = problem.origin();
+        let mut state = problem.state(Access::Visits).unwrap();
+        let mut sweep = Sweep::new(problem, &state);
+        problem.enter(&mut state, &point);
+        let first = sweep.sweep(problem, &mut state, P::impulses(&mut point));
+        let mut last = first;
+        for _ in 0..3000 {
+            last = sweep.sweep(problem, &mut state, P::impulses(&mut point));
+        }
+        assert!(last < 1e-20 * first, "{first:e} {last:e}");
+        let r = P::impulses(&mut point);
+        r.iter().zip(known).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn sweeps_end_at_the_planted_solution_in_both_forms() {
+        let case = Planted { contacts: 8, dofs: 60, mu: (0.0, 0.6), seed: 5, ..Planted::default() };
+        let (problem, known) = case.local::<3>();
+        assert!(distance(&problem, &known.r) < 1e-8);
+        let (problem, known) = case.global::<2>();
+        assert!(distance(&problem, &known.r) < 1e-8);
+    }
+}

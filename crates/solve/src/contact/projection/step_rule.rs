@@ -1,0 +1,104 @@
+//! The self-adaptive step length of the projection methods.
+//!
+//! Shorten ρ while the ratio of a rule is above `accept`, with `r̄ = P_K(r − ρF(r))`; lengthen it after a step whose ratio was
+//! small. In the metric of the methods (`diag(w_c)` for impulses, its inverse for velocities) the ratios are
+//!
+//! ```text
+//! ρ ‖F(r) − F(r̄)‖ / ‖r − r̄‖                  Khobotov
+//! ρ (F(r) − F(r̄))ᵀ(r − r̄) / ‖r − r̄‖²         Solodov–Tseng
+//! ```
+//!
+//! The second is never larger than the first, so it allows longer steps. It is what makes `F(r̄)ᵀ(x − r̄) = 0` separate r
+//! from the solutions (monotone F): `F(r̄)ᵀ(r − r̄) ≥ (1 − accept)‖r − r̄‖²/ρ`.
+//!
+//! Source: Khobotov1987; SolodovTseng1996; HanLo2002 for steps that grow again; AcaryBremondHuber2018, who call the two
+//! rules UPK and UPTS.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::at_least_one;
+use super::field::Field;
+use crate::contact::form::Linear;
+use crate::core::settings::Settings;
+
+/// The hyperparameters of a projection method with a self-adaptive step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+#[schemars(inline)]
+pub struct StepRule {
+    /// What a step length is measured by.
+    pub rule: Ratio,
+    /// Accept a step whose ratio is at most this, in (0, 1).
+    pub accept: f64,
+    /// Lengthen the next step after a ratio below this, in (0, accept).
+    pub grow_below: f64,
+    /// The factor by which a step is shortened, in (0, 1); its inverse lengthens.
+    pub shrink: f64,
+    /// Steps between two evaluations of the true residual, unless the estimate asks for one earlier.
+    pub check_every: usize,
+}
+
+/// The ratios that bound a step length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Ratio {
+    /// `rho |F(r) - F(r')| / |r - r'|`, a bound on the Lipschitz constant (Khobotov).
+    #[default]
+    Khobotov,
+    /// `rho (F(r) - F(r'))'(r - r') / |r - r'|^2`, longer steps (Solodov and Tseng).
+    SolodovTseng,
+}
+
+impl Default for StepRule {
+    fn default() -> Self {
+        Self { rule: Ratio::Khobotov, accept: 0.9, grow_below: 0.3, shrink: 0.67, check_every: 20 }
+    }
+}
+
+impl Settings for StepRule {
+    fn validate(&self) -> Result<(), String> {
+        let inside = |name: &str, x: f64, high: f64| {
+            if x > 0.0 && x < high {
+                Ok(())
+            } else {
+                Err(format!("{name}: expected a number in (0, {high}), found {x}"))
+            }
+        };
+        inside("accept", self.accept, 1.0)?;
+        inside("grow_below", self.grow_below, self.accept)?;
+        inside("shrink", self.shrink, 1.0)?;
+        at_least_one("check_every", self.check_every)
+    }
+}
+
+impl StepRule {
+    /// From `field.f = F(r)`: `trial = P_K(r − ρ F(r))` and `trial_f = F(trial)` with an acceptable ρ; the ratio.
+    pub(super) fn predict<P: Linear<D>, const D: usize>(
+        &self,
+        problem: &P,
+        r: &[f64],
+        field: &mut Field<P, D>,
+    ) -> f64 {
+        loop {
+            field.project(problem, r, false);
+            Field::evaluate(&mut field.state, problem, &field.trial, &mut field.trial_f);
+            let ratio = match self.rule {
+                Ratio::Khobotov => field.lipschitz_ratio(r),
+                Ratio::SolodovTseng => field.monotone_ratio(r),
+            };
+            // NaN: nothing moved, or F is not finite, which the driver notices.
+            if ratio.is_nan() || ratio <= self.accept || field.rho < 1e-300 {
+                return ratio;
+            }
+            field.rho *= self.shrink;
+        }
+    }
+
+    /// Lengthens the next step where the last was timid.
+    pub(super) fn adapt(&self, ratio: f64, rho: &mut f64) {
+        if ratio < self.grow_below {
+            *rho /= self.shrink;
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! Which solvers there are for frictional contact: one line each.
+
+use nonsmooth_problem::check::Kinematic;
+
+use crate::Boxed;
+use crate::contact::auto::{Auto, Hybrid};
+use crate::contact::form::{Concurrent, Explicit, Linear, Linearised, Regularised};
+use crate::contact::interior::{Pursued, Relaxed};
+use crate::contact::law::cfun::ContactFunction;
+use crate::contact::newton::{
+    Method as NewtonMethod, NewtonAc, NewtonCm, NewtonFb, NewtonFbSmooth, NewtonHsw, NewtonJm,
+    NewtonNm, NewtonPk, NewtonXsw, Semismooth,
+};
+use crate::contact::optimisation::{Alternation, CadouxSteps, TrescaSteps};
+use crate::contact::projection::{
+    DeSaxce, Extragradient, FixedPoint, Hyperplane, Method, Projected,
+};
+use crate::contact::proximal::AdmmSteps;
+use crate::contact::splitting::{Colored, Nsgs, Psor};
+use crate::core::register::{Described, Entry};
+
+/// A Newton method, by its function.
+fn newton<P, M, const D: usize>() -> Entry<P>
+where
+    P: Linearised<D> + 'static,
+    M: NewtonMethod<Function: ContactFunction<D> + 'static> + Described,
+{
+    Entry::new(|method: M| Boxed::new(Semismooth::<M::Function, D>::new(&method)))
+}
+
+/// A projection method.
+fn projected<P, M, const D: usize>() -> Entry<P>
+where
+    P: Linear<D> + 'static,
+    M: Method + Described + 'static,
+{
+    Entry::new(|method: M| Boxed::new(Projected::<M, D>(method)))
+}
+
+/// The solvers of problems that can be seen by their contacts.
+pub fn solvers<P, const D: usize>() -> Vec<Entry<P>>
+where
+    P: Concurrent<D> + Linearised<D> + Explicit<D> + Kinematic<D> + 'static,
+{
+    vec![
+        Entry::new(|s: Auto| Boxed::new(Hybrid::<D>(s))),
+        Entry::new(Nsgs::boxed::<P, D>),
+        Entry::new(Colored::boxed::<P, D>),
+        Entry::new(|s: Psor| Boxed::new(s.sweeps::<D>())),
+        projected::<P, DeSaxce, D>(),
+        projected::<P, FixedPoint, D>(),
+        projected::<P, Extragradient, D>(),
+        projected::<P, Hyperplane, D>(),
+        Entry::new(|s| Boxed::new(AdmmSteps::<D>(s))),
+        newton::<P, NewtonAc, D>(),
+        newton::<P, NewtonJm, D>(),
+        newton::<P, NewtonNm, D>(),
+        newton::<P, NewtonFb, D>(),
+        newton::<P, NewtonFbSmooth, D>(),
+        newton::<P, NewtonCm, D>(),
+        newton::<P, NewtonXsw, D>(),
+        newton::<P, NewtonPk, D>(),
+        newton::<P, NewtonHsw, D>(),
+        Entry::new(|s| Boxed::new(TrescaSteps::<D>(s))),
+        Entry::new(|s| Boxed::new(Alternation::<D>(s))),
+        Entry::new(|s| Boxed::new(CadouxSteps::<D>(s))),
+        Entry::new(|s| Boxed::new(Pursued::<D>(s))),
+        Entry::new(|s| Boxed::new(Relaxed::<D>(s))),
+    ]
+}
+
+/// The solvers that the proximal point method may have inside: those that gain from a regular W.
+pub fn inner_solvers<P, const D: usize>() -> Vec<Entry<Regularised<P>>>
+where
+    P: Concurrent<D> + Linearised<D> + 'static,
+    Regularised<P>: Concurrent<D> + Linearised<D>,
+{
+    vec![
+        Entry::new(Nsgs::boxed::<Regularised<P>, D>),
+        projected::<_, Extragradient, D>(),
+        Entry::new(|s| Boxed::new(AdmmSteps::<D>(s))),
+        newton::<_, NewtonAc, D>(),
+        newton::<_, NewtonNm, D>(),
+        newton::<_, NewtonFb, D>(),
+    ]
+}

@@ -1,0 +1,77 @@
+//! One contact as the sweeps see it, and the answer to a visit.
+
+use nonsmooth_problem::linalg::small;
+
+use crate::contact::law::cone;
+use crate::contact::law::local::{LocalSolver, frictionless};
+
+/// What the sweeps keep of a contact.
+pub(super) struct Contact<Memo, const D: usize> {
+    w: [[f64; D]; D],
+    mu: f64,
+    /// `tr(W_cc)/D` over ‖q‖: turns an impulse into a relative velocity.
+    pub(super) unit: f64,
+    /// Visits in a row with hardly a move; beyond `freeze_after` it counts sweeps slept.
+    pub(super) settled: u32,
+    memo: Memo,
+}
+
+/// What a visit comes to.
+pub(super) struct Answer<const D: usize> {
+    pub(super) new: [f64; D],
+    pub(super) dr: [f64; D],
+    /// `(w_c‖Δr_c‖/‖q‖)²`.
+    pub(super) moved: f64,
+}
+
+/// The square of a relative move that is far below any rounding: impulses that die away end as zeros instead of
+/// as subnormal numbers, which are slow.
+pub(super) const NEGLIGIBLE: f64 = 1e-80;
+
+impl<Memo, const D: usize> Contact<Memo, D> {
+    pub(super) fn new<L>(local: &L, w: [[f64; D]; D], mu: f64, scale: f64) -> Self
+    where
+        L: LocalSolver<D, Memo = Memo>,
+    {
+        let unit = small::mean_diagonal(&w).abs() / scale;
+        Self { memo: local.prepare(&w, mu), w, mu, unit, settled: 0 }
+    }
+
+    /// The answer to the velocity `u` with the present impulse `old`, relaxed by ω.
+    #[inline(always)]
+    pub(super) fn answer<L>(
+        &mut self,
+        local: &L,
+        u: &[f64; D],
+        old: &[f64; D],
+        omega: f64,
+    ) -> Answer<D>
+    where
+        L: LocalSolver<D, Memo = Memo>,
+    {
+        let own = small::mul(&self.w, old);
+        let mut q = *u;
+        for k in 0..D {
+            q[k] -= own[k];
+        }
+        let mut new = if self.mu > 0.0 {
+            local.solve(&mut self.memo, &self.w, &q, self.mu, old)
+        } else {
+            frictionless(&self.w, &q, old)
+        };
+        if omega != 1.0 {
+            for k in 0..D {
+                new[k] = (1.0 - omega) * old[k] + omega * new[k];
+            }
+            if omega > 1.0 {
+                new = cone::project(&new, self.mu);
+            }
+        }
+        let mut dr = new;
+        for k in 0..D {
+            dr[k] -= old[k];
+        }
+        let moved = dr.iter().map(|x| (self.unit * x).powi(2)).sum();
+        Answer { new, dr, moved }
+    }
+}

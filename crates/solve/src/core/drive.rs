@@ -1,0 +1,826 @@
+//! The only loop: iterations, wall clock, cancellation, non-finite iterates, best point, history, verdict.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use cpu_time::ProcessTime;
+use nonsmooth_problem::Problem;
+use nonsmooth_problem::check::{Certificate, Evidence, Measure, Proof};
+use nonsmooth_problem::linalg::budget::{Budget, Scope};
+use nonsmooth_problem::linalg::factorisations;
+
+use crate::core::guard;
+use crate::core::trace::Trace;
+use crate::{SolveError, Solver, Step};
+
+/// When to stop.
+#[derive(Debug, Clone)]
+pub struct Limits {
+    /// The relative residual (unit-free, see [`Measure`]) to reach. Nominal 1e-3 … 1e-12; below about 1e-14
+    /// rounding in the data's products cannot be told from an error.
+    pub tolerance: f64,
+    /// At most this many steps.
+    pub max_iterations: usize,
+    /// At most this many seconds of wall clock, the preparation of judge and workspace included. Looked at after every step and inside long ones; what
+    /// cannot be interrupted is given up (see [`guard`](crate::core::guard)).
+    pub time_limit: Option<f64>,
+    /// Set to true from anywhere to stop, as promptly as at the time limit.
+    pub cancel: Option<Arc<AtomicBool>>,
+    /// The bytes of memory that one factorisation may take: a larger one is refused before it begins. Without a number, what the machine has free.
+    pub memory_limit: Option<u64>,
+    /// Whether to keep the method's own record of its iterations ([`Session::trace`]); it grows with their number.
+    pub trace: bool,
+    /// Whether to read the processor's clock too ([`Outcome::cpu_seconds`]), which costs two system calls: as much as a small contact problem.
+    pub cpu_time: bool,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            tolerance: 1e-8,
+            max_iterations: 1_000_000,
+            time_limit: None,
+            cancel: None,
+            memory_limit: None,
+            trace: false,
+            cpu_time: false,
+        }
+    }
+}
+
+impl Limits {
+    /// What kernels look at, if the clock runs from `begun`.
+    pub(crate) fn budget(&self, begun: Instant) -> Budget {
+        // A limit beyond the reach of the clock is none.
+        let deadline = |t: f64| begun.checked_add(Duration::try_from_secs_f64(t).ok()?);
+        Budget {
+            deadline: self.time_limit.and_then(deadline),
+            cancel: self.cancel.clone(),
+            memory: self.memory_limit,
+        }
+    }
+
+    /// Which of the limits that come from outside is reached, if the clock runs from `begun`.
+    pub(crate) fn reached(&self, begun: Instant) -> Option<Limit> {
+        let late = |t: f64| begun.elapsed().as_secs_f64() >= t;
+        if self.cancel.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed)) {
+            Some(Limit::Cancelled)
+        } else if self.time_limit.is_some_and(late) {
+            Some(Limit::Time)
+        } else {
+            None
+        }
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), SolveError> {
+        // The residual of doing nothing is about 1: beyond, everything would pass.
+        if !(self.tolerance > 0.0 && self.tolerance <= 1.0) {
+            return Err(SolveError::Limits {
+                name: "tolerance",
+                expected: "a positive number of at most 1",
+                found: self.tolerance.to_string(),
+            });
+        }
+        match self.time_limit {
+            Some(t) if t.is_nan() || t < 0.0 => Err(SolveError::Limits {
+                name: "time limit",
+                expected: "a number of seconds of at least 0",
+                found: t.to_string(),
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The answer to "is it solved, and if not, why did it stop". `Solved` is the judge's word, never the solver's.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Status {
+    /// The judge accepts the point at the tolerance asked for.
+    Solved,
+    /// There is no solution: proved, in exact arithmetic on the stored data.
+    Infeasible(Proof),
+    /// There is no solution for data that differ from those stored by rounding; nothing is known of the problem as stored.
+    NearlyInfeasible {
+        /// What holds nearly.
+        certificate: Certificate,
+        /// The relative change of the data that makes it true.
+        change: f64,
+    },
+    /// The solver ended on a ray that the judge does not accept as a proof.
+    NoConclusion(Certificate),
+    /// A limit came first.
+    Limit(Limit),
+    /// The solver could not go on.
+    Stalled(Cow<'static, str>),
+}
+
+/// Which limit came first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Limit {
+    /// `max_iterations` steps were done.
+    Iterations,
+    /// `time_limit` seconds have passed.
+    Time,
+    /// `cancel` was set.
+    Cancelled,
+}
+
+impl Status {
+    /// What the status rests on, where it is about there being no solution.
+    pub fn certificate(&self) -> Option<&Certificate> {
+        match self {
+            Status::Infeasible(proof) => Some(proof.certificate()),
+            Status::NearlyInfeasible { certificate, .. } | Status::NoConclusion(certificate) => {
+                Some(certificate)
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether it says that there is no solution, proved or up to rounding.
+    pub fn refutes(&self) -> bool {
+        matches!(self, Status::Infeasible(_) | Status::NearlyInfeasible { .. })
+    }
+
+    /// A short name: `solved`, `infeasible`, `nearly_infeasible`, `no_conclusion`, `iteration_limit`,
+    /// `time_limit`, `cancelled`, `stalled`.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Status::Solved => "solved",
+            Status::Infeasible(_) => "infeasible",
+            Status::NearlyInfeasible { .. } => "nearly_infeasible",
+            Status::NoConclusion(_) => "no_conclusion",
+            Status::Limit(Limit::Iterations) => "iteration_limit",
+            Status::Limit(Limit::Time) => "time_limit",
+            Status::Limit(Limit::Cancelled) => "cancelled",
+            Status::Stalled(_) => "stalled",
+        }
+    }
+}
+
+impl std::fmt::Display for Status {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Status::Solved => f.write_str("solved"),
+            Status::Infeasible(proof) => {
+                write!(f, "infeasible: {proof}; proved in exact arithmetic")
+            }
+            Status::NearlyInfeasible { certificate, change } => write!(
+                f,
+                "not solved, nearly infeasible: {certificate}, up to rounding: a relative change of the data by {change:.0e} would make it so"
+            ),
+            Status::NoConclusion(_) => {
+                f.write_str("no conclusion: the solver ended on a ray that proves nothing")
+            }
+            Status::Limit(Limit::Iterations) => f.write_str("not solved: iteration limit reached"),
+            Status::Limit(Limit::Time) => f.write_str("not solved: time limit reached"),
+            Status::Limit(Limit::Cancelled) => f.write_str("not solved: cancelled"),
+            Status::Stalled(why) => write!(f, "not solved: {why}"),
+        }
+    }
+}
+
+/// What a solve came to. The point itself is the caller's, overwritten with the best one judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Whether it is solved and, if not, why it stopped.
+    pub status: Status,
+    /// The judge's residuals of the point returned.
+    pub measure: Measure,
+    /// Steps done.
+    pub iterations: usize,
+    /// Matrices factorised for the solve, as far as they grow with the problem: M, a Newton matrix, but not the
+    /// blocks of single contacts, nor what the judge factorises for itself.
+    pub factorisations: u64,
+    /// Wall clock of the solve: set-up of the workspace, steps and judgements, but no file and no final report.
+    pub seconds: f64,
+    /// Processor time of the whole process meanwhile, all threads, if [`Limits::cpu_time`] asked for it: below `seconds` where the process had to wait.
+    pub cpu_seconds: Option<f64>,
+}
+
+/// One visit of the judge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Steps done so far.
+    pub iteration: usize,
+    /// Seconds since the start of the solve.
+    pub seconds: f64,
+    /// The relative residual; where another criterion is worse (bilateral constraints, dynamics), that.
+    pub relative: f64,
+}
+
+/// What a solve uses up, from the preparation of the workspace on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Meter {
+    /// When the solve was asked for: limits count from here, with the judge's preparation.
+    pub(crate) begun: Instant,
+    wall: Instant,
+    cpu: Option<ProcessTime>,
+    factorisations: u64,
+}
+
+impl Meter {
+    pub(crate) fn start(begun: Instant, limits: &Limits) -> Self {
+        let cpu = limits.cpu_time.then(ProcessTime::now);
+        Self { begun, wall: Instant::now(), cpu, factorisations: factorisations() }
+    }
+
+    pub(crate) fn seconds(&self) -> f64 {
+        self.wall.elapsed().as_secs_f64()
+    }
+
+    /// What a failure of the preparation comes to: where a limit was reached, a preparation that was cut short proves nothing of the problem.
+    fn ended(
+        &self,
+        measure: Measure,
+        limits: &Limits,
+        scope: &Scope,
+        error: SolveError,
+    ) -> Result<Outcome, SolveError> {
+        let inapplicable = error.is_inapplicable();
+        match (raised(scope), scope.refused()) {
+            (Some(limit), _) if inapplicable => {
+                let limit = limits.reached(self.begun).unwrap_or(limit);
+                Ok(self.outcome(Status::Limit(limit), measure, 0))
+            }
+            (_, Some(refused)) if inapplicable => Err(refused.into()),
+            _ => Err(error),
+        }
+    }
+
+    pub(crate) fn outcome(&self, status: Status, measure: Measure, iterations: usize) -> Outcome {
+        Outcome {
+            status,
+            measure,
+            iterations,
+            factorisations: factorisations() - self.factorisations,
+            seconds: self.seconds(),
+            cpu_seconds: self.cpu.map(|cpu| cpu.elapsed().as_secs_f64()),
+        }
+    }
+}
+
+/// What a watcher sees after every step.
+#[derive(Debug, Clone, Copy)]
+pub struct Progress {
+    /// The last visit of the judge.
+    pub judged: Sample,
+    /// The smallest residual judged so far.
+    pub best: f64,
+    /// Steps done so far.
+    pub iteration: usize,
+    /// Seconds since the start of the solve.
+    pub seconds: f64,
+}
+
+/// Who follows a solve from outside.
+pub trait Observer<P: Problem> {
+    /// Called after every step.
+    fn step(&mut self, progress: &Progress);
+
+    /// Whether [`best`](Self::best) is to be called, which costs a judgement of the start.
+    fn keeps_best(&self) -> bool {
+        false
+    }
+
+    /// Called with each point that would be returned if the solve stopped now.
+    fn best(&mut self, _point: &P::Point, _measure: &Measure) {}
+}
+
+/// An observer of steps alone.
+struct Steps<'a>(&'a mut dyn FnMut(&Progress));
+
+impl<P: Problem> Observer<P> for Steps<'_> {
+    fn step(&mut self, progress: &Progress) {
+        (self.0)(progress);
+    }
+}
+
+/// A solver whose type is forgotten: what the registry hands out. One virtual call per solve, none per step.
+pub trait Session<P: Problem>: Send {
+    /// Solves `problem` from `point`, which is overwritten with the best point found whatever stops the solve.
+    ///
+    /// `watch` is called after every step, but for a large problem with a limit on time or a flag to cancel: then now and then. Errors are the
+    /// caller's mistakes only.
+    fn solve(
+        &mut self,
+        problem: &P,
+        point: &mut P::Point,
+        limits: &Limits,
+        watch: &mut dyn FnMut(&Progress),
+    ) -> Result<Outcome, SolveError> {
+        self.observe(problem, point, limits, &mut Steps(watch))
+    }
+
+    /// As [`solve`](Self::solve), with an observer who may also see the best point so far.
+    fn observe(
+        &mut self,
+        problem: &P,
+        point: &mut P::Point,
+        limits: &Limits,
+        observer: &mut dyn Observer<P>,
+    ) -> Result<Outcome, SolveError>;
+
+    /// The judge's visits during the last solve, thinned evenly where there were very many.
+    fn history(&self) -> &[Sample];
+
+    /// The method's own record of the last solve, if [`Limits::trace`] asked for it and the method keeps one.
+    fn trace(&self) -> Trace;
+
+    /// What the solver says that it did during the last solve; empty where it has nothing to tell.
+    fn account(&self) -> Vec<String>;
+}
+
+/// The most samples that a history keeps.
+const HISTORY: usize = 4096;
+
+/// Drives a solver. Keeps its workspace, so that a second solve of the same shape allocates nothing.
+pub struct Driver<P: Problem, S: Solver<P>> {
+    solver: S,
+    // Boxed: workspaces are large to move.
+    gauge: Option<Box<P::Gauge>>,
+    kept: Option<Box<Kept<P, S>>>,
+    history: Vec<Sample>,
+}
+
+struct Kept<P: Problem, S: Solver<P>> {
+    work: S::Work,
+    best: P::Point,
+    tidied: P::Point,
+    /// A limit was reached inside a kernel, which left something unfinished.
+    torn: bool,
+}
+
+impl<P: Problem, S: Solver<P>> Driver<P, S> {
+    /// A driver for `solver`, without a workspace yet.
+    pub fn new(solver: S) -> Self {
+        Self { solver, gauge: None, kept: None, history: Vec::with_capacity(HISTORY) }
+    }
+
+    /// The solver.
+    pub fn solver(&self) -> &S {
+        &self.solver
+    }
+}
+
+impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
+    fn observe(
+        &mut self,
+        problem: &P,
+        point: &mut P::Point,
+        limits: &Limits,
+        observer: &mut dyn Observer<P>,
+    ) -> Result<Outcome, SolveError> {
+        let begun = Instant::now();
+        limits.validate()?;
+        problem.validate_point(point)?;
+        let scope = limits.budget(begun).enter();
+        let Self { solver, gauge, kept, history } = self;
+        history.clear();
+        // What was cut short in a kernel is begun anew.
+        let (earlier, gauge_before) = (kept.take().filter(|k| !k.torn), gauge.take());
+        // The judge's own preparation is not part of the solve's time.
+        let judge = match gauge_before.filter(|_| earlier.is_some()) {
+            Some(mut gauge) => problem.regauge(&mut gauge).map(|()| gauge),
+            None => problem.gauge().map(Box::new),
+        };
+        let meter = Meter::start(begun, limits);
+        let judge: &mut P::Gauge = match judge {
+            Ok(judge) => gauge.insert(judge),
+            Err(e) => return meter.ended(Measure::unknown(), limits, &scope, e.into()),
+        };
+        // Whatever happens in the preparation, there is a judged point.
+        let start = observer.keeps_best().then(|| {
+            let measure = problem.measure(point, judge);
+            observer.best(point, &measure);
+            measure
+        });
+        let ready = match earlier {
+            Some(mut k) => solver.refill(problem, &mut k.work).map(|()| k),
+            None => solver.work(problem).map(|work| {
+                Box::new(Kept { work, best: point.clone(), tidied: point.clone(), torn: false })
+            }),
+        };
+        let mut now = match ready {
+            Ok(now) => now,
+            Err(e) => {
+                let measure = match start {
+                    Some(measure) => measure,
+                    None if scope.raised() => problem.measure(point, judge),
+                    None => Measure::unknown(),
+                };
+                return meter.ended(measure, limits, &scope, e);
+            }
+        };
+        let outcome = {
+            let Kept { work, best, tidied, .. } = &mut *now;
+            P::copy_point(point, best);
+            let mut run = Run {
+                problem,
+                solver,
+                work,
+                judge: Judge::new(judge, best, tidied, history, meter, solver.latest()),
+                limits,
+                scope: &scope,
+                observer,
+            };
+            run.solve(point)
+        };
+        now.torn = scope.raised();
+        *kept = Some(now);
+        Ok(outcome)
+    }
+
+    fn history(&self) -> &[Sample] {
+        &self.history
+    }
+
+    fn trace(&self) -> Trace {
+        self.kept.as_ref().map_or(Trace::None, |kept| self.solver.trace(&kept.work))
+    }
+
+    fn account(&self) -> Vec<String> {
+        self.kept.as_ref().map_or(vec![], |kept| self.solver.account(&kept.work))
+    }
+}
+
+/// The limit at which a kernel was cut short, if one was.
+fn raised(scope: &Scope) -> Option<Limit> {
+    let limit = || if scope.cancelled() { Limit::Cancelled } else { Limit::Time };
+    scope.raised().then(limit)
+}
+
+struct Run<'a, P: Problem, S: Solver<P>> {
+    problem: &'a P,
+    solver: &'a S,
+    work: &'a mut S::Work,
+    judge: Judge<'a, P>,
+    limits: &'a Limits,
+    scope: &'a Scope,
+    observer: &'a mut dyn Observer<P>,
+}
+
+/// A residual of a large problem above this many tolerances is not doubted at a limit of time: another judgement, in doubled precision, takes long and
+/// could not make it pass.
+const DOUBTFUL: f64 = 1e3;
+
+impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
+    fn solve(&mut self, point: &mut P::Point) -> Outcome {
+        let mut iterations = 0;
+        self.solver.aim(self.limits.tolerance, self.work);
+        self.solver.record(self.limits.trace, self.work);
+        self.solver.start(self.problem, point, self.work);
+        self.judge(point, 0, false);
+        let mut estimate = f64::NAN;
+        let mut since_judged = 0;
+        let mut claim = None;
+        let status = loop {
+            if self.judge.last.passes(self.limits.tolerance) {
+                break Status::Solved;
+            }
+            if let Some(claim) = claim.take() {
+                break claim;
+            }
+            if let Some(limit) = self.limit(iterations) {
+                if since_judged > 0 {
+                    // A last look: the steps since the last one may have been enough.
+                    self.judge(point, iterations, false);
+                    if self.judge.last.passes(self.limits.tolerance) {
+                        break Status::Solved;
+                    }
+                }
+                break Status::Limit(limit);
+            }
+            let step = self.solver.step(self.problem, point, self.work);
+            iterations += 1;
+            since_judged += 1;
+            match step {
+                Step::Continue { estimate: e } => estimate = e,
+                // What ends because a kernel was cut short has not failed.
+                Step::Stuck(_) | Step::Done if self.scope.raised() => {}
+                ended => claim = Some(self.conclusion(ended)),
+            }
+            let due = since_judged >= self.solver.check_every()
+                || self.judge.ratio * estimate <= self.limits.tolerance;
+            if due || claim.is_some() {
+                self.judge(point, iterations, claim.is_some());
+                self.judge.calibrate(estimate);
+                since_judged = 0;
+                if !self.judge.last.merit().is_finite() {
+                    claim = Some(Status::Stalled("the iterates are no longer finite".into()));
+                } else if claim.is_none() {
+                    claim = self.floor(iterations);
+                }
+            }
+            self.observer.step(&self.judge.progress(iterations));
+        };
+        P::copy_point(self.judge.best, point);
+        let late = matches!(status, Status::Limit(Limit::Time | Limit::Cancelled));
+        let hopeless = self.problem.unknowns() > guard::SMALL
+            && self.judge.best_measure.merit() > DOUBTFUL * self.limits.tolerance;
+        let measure = match self.judge.certified {
+            Some(measure) => measure,
+            None if late && hopeless => self.judge.best_measure,
+            None => {
+                // The gauge may have been at another point since.
+                let _ = self.problem.measure(point, self.judge.gauge);
+                let (measure, tidied) =
+                    self.judge.certify(self.problem, point, self.limits.tolerance);
+                if tidied {
+                    P::copy_point(self.judge.tidied, point);
+                }
+                measure
+            }
+        };
+        // Plain arithmetic may have refused, at rounding level, what doubled precision accepts.
+        let status = match status {
+            Status::Limit(_) | Status::Stalled(_) if measure.passes(self.limits.tolerance) => {
+                Status::Solved
+            }
+            // A solver that goes on without what memory refused it says what it lacked.
+            Status::Limit(Limit::Iterations) => match self.scope.refused() {
+                Some(refused) => {
+                    Status::Stalled(format!("iteration limit reached; {refused}").into())
+                }
+                None => status,
+            },
+            other => other,
+        };
+        self.judge.meter.outcome(status, measure, iterations)
+    }
+
+    /// `closely`: a solver's last word is looked at in doubled precision, even if it seems no solution.
+    fn judge(&mut self, point: &mut P::Point, iteration: usize, closely: bool) {
+        self.solver.publish(self.problem, point, self.work);
+        let tolerance = self.limits.tolerance;
+        let better = self.judge.judge(self.problem, point, iteration, tolerance, closely);
+        if better && self.observer.keeps_best() {
+            self.observer.best(self.judge.best, &self.judge.best_measure);
+        }
+    }
+
+    fn limit(&self, iterations: usize) -> Option<Limit> {
+        if iterations >= self.limits.max_iterations {
+            return Some(Limit::Iterations);
+        }
+        self.limits.reached(self.judge.meter.begun).or_else(|| raised(self.scope))
+    }
+
+    /// The end of a solve that the rounding of its impulses keeps from the tolerance: nothing has come of it for long, and the best point is at
+    /// the floor that the judge finds for it.
+    fn floor(&mut self, iterations: usize) -> Option<Status> {
+        let work = self.judge.idle(iterations)?;
+        let measure = self.judge.certify_best(self.problem);
+        let floor = measure.floor.filter(|floor| floor.is_finite())?;
+        let tolerance = self.limits.tolerance;
+        // Impulses that are that large may be those of a problem without a solution: a solver that asks has its time.
+        if floor > RUNAWAY && work < LATE * IDLE {
+            return None;
+        }
+        // A point near the floor may still meet a tolerance little below it by chance.
+        let (near, below) = if work < LATE * IDLE { (AT_FLOOR, 4.0) } else { (NEAR_FLOOR, 1.0) };
+        (floor > below * tolerance && measure.merit() <= near * floor)
+            .then(|| Status::Stalled(floor_of(floor).into()))
+    }
+
+    /// What a solver's last word comes to if the judge does not accept its point.
+    fn conclusion(&self, step: Step) -> Status {
+        match step {
+            Step::Stuck(why) => match self.scope.refused() {
+                Some(refused) => Status::Stalled(format!("{why}: {refused}").into()),
+                None => Status::Stalled(why),
+            },
+            Step::NoSolution(certificate) => match self.problem.evidence(&certificate) {
+                Evidence::Proved(proof) => Status::Infeasible(proof),
+                Evidence::Nearly { change } => Status::NearlyInfeasible { certificate, change },
+                Evidence::Nothing => Status::NoConclusion(certificate),
+            },
+            Step::Done | Step::Continue { .. } => {
+                Status::Stalled("the solver has finished, but its answer fails the check".into())
+            }
+        }
+    }
+}
+
+/// What is said of a floor, by its decade: without allocation, so that a solve that ends there costs none.
+fn floor_of(floor: f64) -> &'static str {
+    macro_rules! texts {
+        ($($decade:literal)*) => {
+            [$(concat!(
+                "the rounding of the unknowns to double precision alone makes a residual of about 1e-",
+                $decade
+            )),*]
+        };
+    }
+    const TEXTS: [&str; 18] = texts!(0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17);
+    TEXTS[(-floor.log10()).round().clamp(0.0, 17.0) as usize]
+}
+
+/// A solve that has not halved its merit in so many steps is asked whether it is at the floor; a factorisation counts as three steps more.
+const IDLE: u64 = 1200;
+/// A floor above this is one of impulses that run away.
+const RUNAWAY: f64 = 1e-6;
+/// How much later it may be asked the second question, and each later time than the one before.
+const LATE: u64 = 4;
+/// What counts as at the floor, and as near it.
+const AT_FLOOR: f64 = 10.0;
+const NEAR_FLOOR: f64 = 1000.0;
+
+/// The most steps between two looks at a point of which a single contact is not done: a look costs several steps.
+const MOST_WAIT: usize = 16;
+
+/// Since when a solve gets no further.
+#[derive(Debug, Clone, Copy)]
+struct Halved {
+    merit: f64,
+    iteration: usize,
+    factorisations: u64,
+    /// The work without a halving after which the floor is looked at.
+    patience: u64,
+}
+
+impl Halved {
+    fn now(merit: f64, iteration: usize) -> Self {
+        Self { merit, iteration, factorisations: factorisations(), patience: IDLE }
+    }
+}
+
+/// The judge's visits, the best point among them, and the history.
+struct Judge<'a, P: Problem> {
+    gauge: &'a mut P::Gauge,
+    best: &'a mut P::Point,
+    /// The point last certified with its variables exactly on their bounds.
+    tidied: &'a mut P::Point,
+    history: &'a mut Vec<Sample>,
+    meter: Meter,
+    /// Whether the latest point counts as the best.
+    latest: bool,
+    last: Measure,
+    best_measure: Measure,
+    /// The best point's residuals in doubled precision, where they were needed.
+    certified: Option<Measure>,
+    /// When the best merit was last halved.
+    halved: Halved,
+    /// The own residual of the contact for which a point was last refused, the step from which it is asked again, and the last wait.
+    own: Option<f64>,
+    own_again: usize,
+    own_wait: usize,
+    /// Judged residual over the solver's estimate, when last compared.
+    ratio: f64,
+    /// Keep every `stride`-th visit in the history.
+    stride: usize,
+    visits: usize,
+}
+
+impl<'a, P: Problem> Judge<'a, P> {
+    fn new(
+        gauge: &'a mut P::Gauge,
+        best: &'a mut P::Point,
+        tidied: &'a mut P::Point,
+        history: &'a mut Vec<Sample>,
+        meter: Meter,
+        latest: bool,
+    ) -> Self {
+        let nothing = Measure::unknown();
+        Self {
+            gauge,
+            best,
+            tidied,
+            history,
+            meter,
+            latest,
+            last: nothing,
+            best_measure: nothing,
+            certified: None,
+            halved: Halved::now(f64::INFINITY, 0),
+            own: None,
+            own_again: 0,
+            own_wait: 0,
+            ratio: 1.0,
+            stride: 1,
+            visits: 0,
+        }
+    }
+
+    /// Whether the point is now the best.
+    fn judge(
+        &mut self,
+        problem: &P,
+        point: &P::Point,
+        iteration: usize,
+        tolerance: f64,
+        closely: bool,
+    ) -> bool {
+        self.last = problem.measure(point, self.gauge);
+        let (mut certified, mut tidied) = (None, false);
+        if !self.last.passes(tolerance) {
+            // What is zero but for rounding may hide how good the rest is.
+            P::copy_point(point, self.tidied);
+            if problem.tidy(self.tidied, self.gauge, true) {
+                let measure = problem.measure(self.tidied, self.gauge);
+                if measure.is_better_than(&self.last) {
+                    (self.last, tidied) = (measure, true);
+                }
+                if measure.passes(tolerance) {
+                    // Back to the point that is to be tidied for good.
+                    let _ = problem.measure(point, self.gauge);
+                }
+            }
+        }
+        if let (Some(own), true) = (self.own, iteration < self.own_again) {
+            // Refused a moment ago for a single contact: as yet as good as then.
+            self.last.own = Some(own);
+        } else if closely || self.last.passes(tolerance) {
+            // What looks solved is looked at again, in doubled precision.
+            (self.last, tidied) = self.certify(problem, point, tolerance);
+            certified = Some(self.last);
+            if self.last.fails_own_only(tolerance) {
+                self.own = self.last.own;
+                self.own_wait = (2 * self.own_wait).clamp(1, MOST_WAIT);
+                self.own_again = iteration + self.own_wait;
+            }
+        }
+        // What passes counts as the best, though its merit may be that of a point with a contact that is not done.
+        let better = self.visits == 0
+            || self.latest
+            || self.last.is_better_than(&self.best_measure)
+            || self.last.passes(tolerance);
+        if better {
+            self.best_measure = self.last;
+            self.certified = certified;
+            P::copy_point(if tidied { self.tidied } else { point }, self.best);
+        }
+        if self.history.len() == HISTORY {
+            let mut k = 0;
+            self.history.retain(|_| {
+                k += 1;
+                k % 2 == 1
+            });
+            self.stride *= 2;
+        }
+        let merit = self.last.merit();
+        if self.visits.is_multiple_of(self.stride) || merit <= self.best_measure.merit() {
+            self.history.push(Sample { iteration, seconds: self.meter.seconds(), relative: merit });
+        }
+        self.visits += 1;
+        better
+    }
+
+    /// The certified residuals of the point last measured, or of the same with its variables exactly on their bounds if those are better; which.
+    fn certify(&mut self, problem: &P, point: &P::Point, tolerance: f64) -> (Measure, bool) {
+        let mut plain = None;
+        for boldly in [true, false] {
+            P::copy_point(point, self.tidied);
+            if !problem.tidy(self.tidied, self.gauge, boldly) {
+                continue;
+            }
+            let tidied = problem.certify(self.tidied, self.gauge);
+            let plain = plain.insert(problem.certify(point, self.gauge));
+            if tidied.passes(tolerance) || tidied.is_better_than(plain) {
+                return (tidied, true);
+            }
+        }
+        (plain.unwrap_or_else(|| problem.certify(point, self.gauge)), false)
+    }
+
+    /// The work since the best merit was last halved, where it is time to look at the floor.
+    fn idle(&mut self, iteration: usize) -> Option<u64> {
+        let merit = self.best_measure.merit();
+        if merit <= 0.5 * self.halved.merit {
+            self.halved = Halved::now(merit, iteration);
+            return None;
+        }
+        let Halved { iteration: since, factorisations: before, patience, .. } = self.halved;
+        let work = (iteration - since) as u64 + 3 * (factorisations() - before);
+        if work < patience {
+            return None;
+        }
+        self.halved.patience *= 2;
+        Some(work)
+    }
+
+    /// The best point's residuals in doubled precision.
+    fn certify_best(&mut self, problem: &P) -> Measure {
+        let measure = *self.certified.get_or_insert_with(|| problem.certify(self.best, self.gauge));
+        self.best_measure = measure;
+        measure
+    }
+
+    /// The solver's estimate is proportional to the residual, near enough: learn the factor.
+    fn calibrate(&mut self, estimate: f64) {
+        let ratio = self.last.merit() / estimate;
+        self.ratio = if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 };
+    }
+
+    fn progress(&self, iteration: usize) -> Progress {
+        let seconds = self.meter.seconds();
+        let judged = self.history.last().copied().unwrap_or(Sample {
+            iteration,
+            seconds,
+            relative: f64::NAN,
+        });
+        Progress { judged, best: self.best_measure.merit(), iteration, seconds }
+    }
+}

@@ -1,0 +1,16 @@
+//! What both wings stand on: the contract of a solver, the one loop, settings, the shape of the registry, and the few numerical means that both use.
+
+pub(crate) mod boxed;
+pub(crate) mod clarabel;
+pub(crate) mod drive;
+pub(crate) mod error;
+pub(crate) mod exact_cones;
+pub mod guard;
+pub(crate) mod guarded;
+pub mod line_search;
+pub(crate) mod reformulation;
+pub(crate) mod register;
+pub mod settings;
+pub(crate) mod solver;
+pub mod trace;
+pub(crate) mod via;

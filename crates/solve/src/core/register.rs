@@ -1,0 +1,282 @@
+//! The shape of the registry: what is said of a solver, how one is made from its name, and what may stand before the name.
+//!
+//! A name is a path, `condense/facet_inner/lemke`: each prefix is a reformulation to another kind of problem (or to the same kind with a proximal
+//! term), which has solvers and prefixes of its own; the last part is a solver there.
+
+use nonsmooth_problem::{Kind, Problem};
+use serde::Serialize;
+
+use crate::core::boxed::Boxed;
+use crate::core::drive::{Driver, Session};
+use crate::core::error::SolveError;
+use crate::core::guarded::Guarded;
+use crate::core::settings::{Setting, Settings, SettingsMap, parse};
+
+/// The solver that is used when none is named.
+pub const DEFAULT: &str = "auto";
+
+/// A solver, described.
+#[derive(Debug, Serialize)]
+pub struct About {
+    /// The name by which it is asked for.
+    pub name: &'static str,
+    /// The family: the folder of its file.
+    pub family: &'static str,
+    /// What its answers are solutions of.
+    pub solves: Solves,
+    /// One line.
+    pub summary: &'static str,
+    /// What it needs of a problem, in words; empty where it takes any.
+    pub needs: &'static [&'static str],
+    /// Keys of `docs/refs.bib`.
+    pub cites: &'static [&'static str],
+    /// Settings (`key=value`) that the conformance tests and benchmarks run besides the defaults.
+    pub variants: &'static [&'static str],
+    /// The documented settings.
+    #[serde(serialize_with = "settings_now")]
+    pub settings: fn() -> Vec<Setting>,
+}
+
+/// What a solver's answers are solutions of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Solves {
+    /// The problem that it is given, in this case Coulomb's law.
+    Law,
+    /// A relaxation, whose answers obey the law in special cases only: the judge, who knows the law alone, says in which.
+    Relaxation,
+}
+
+fn settings_now<S: serde::Serializer>(
+    settings: &fn() -> Vec<Setting>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    settings().serialize(serializer)
+}
+
+/// A reformulation that can stand before a solver's name.
+#[derive(Debug, Serialize)]
+pub struct Prefix {
+    /// The name before the slash.
+    pub name: &'static str,
+    /// One line.
+    pub summary: &'static str,
+    /// The kinds of problem that it takes.
+    pub from: &'static [Kind],
+    /// Keys of `docs/refs.bib`.
+    pub cites: &'static [&'static str],
+    /// The documented settings that it adds to those of the solver.
+    #[serde(serialize_with = "settings_now")]
+    pub settings: fn() -> Vec<Setting>,
+}
+
+/// Hyperparameters that describe their solver: the description stands in the solver's own file.
+pub trait Described: Settings {
+    /// What the solver is and needs.
+    const ABOUT: &'static About;
+}
+
+/// How a solver is made from its settings.
+type Make<T> = Box<dyn Fn(&SettingsMap) -> Result<T, String>>;
+
+/// What was made, if there is such a name and the settings are right.
+pub(crate) type Made<T> = Option<Result<T, String>>;
+
+/// One solver of problems of type `P`.
+pub struct Entry<P: Problem> {
+    /// What it is and needs.
+    pub about: &'static About,
+    make: Maker<P>,
+}
+
+enum Maker<P: Problem> {
+    Solver(Make<Boxed<P>>),
+    /// Runs whole sessions of others, so it is one itself and has no steps that a prefix could lead to.
+    Session(Make<Box<dyn Session<P>>>),
+}
+
+impl<P: Problem + 'static> Entry<P> {
+    /// A solver, by what makes it of its hyperparameters.
+    pub(crate) fn new<S: Described>(make: impl Fn(S) -> Boxed<P> + 'static) -> Self {
+        let make = move |settings: &SettingsMap| parse(settings).map(&make);
+        Self { about: S::ABOUT, make: Maker::Solver(Box::new(make)) }
+    }
+
+    /// A whole session, by what makes it of its hyperparameters.
+    pub(crate) fn session<S: Described, T: Session<P> + 'static>(
+        make: impl Fn(S) -> T + 'static,
+    ) -> Self {
+        let make = move |settings: &SettingsMap| {
+            Ok(Box::new(make(parse(settings)?)) as Box<dyn Session<P>>)
+        };
+        Self { about: S::ABOUT, make: Maker::Session(Box::new(make)) }
+    }
+
+    fn has_steps(&self) -> bool {
+        matches!(self.make, Maker::Solver(_))
+    }
+}
+
+/// What may stand before the name of a solver of another kind of problem, and makes of it a solver of `P`.
+pub trait Composed<P: Problem> {
+    /// The other kind of problem.
+    type To: Registered;
+    /// Its own hyperparameters; [`NoSettings`](crate::settings::NoSettings) where it has none.
+    type Settings: Settings;
+    /// What it is. The keys of its settings begin with [`KEYS`](Self::KEYS).
+    const PREFIX: &'static Prefix;
+    /// How its keys begin, so that they can be told from the solver's.
+    const KEYS: &'static str = "";
+    /// Whether the solutions of the other problem are those of the first only nearly.
+    const NEARLY: bool = false;
+
+    /// The solver of `P` that has `solver` inside.
+    fn compose(settings: Self::Settings, solver: Boxed<Self::To>) -> Boxed<P>;
+
+    /// Whether the solver of this name is listed behind the prefix. Others can be named all the same, and say for themselves whether they apply.
+    fn lists(_solver: &str) -> bool {
+        true
+    }
+}
+
+/// One prefix of the solvers of problems of type `P`.
+pub struct Edge<P: Problem> {
+    prefix: &'static Prefix,
+    solver: fn(&str, &SettingsMap) -> Made<Boxed<P>>,
+    describe: fn(&str) -> Option<(&'static About, Solves)>,
+    names: fn() -> Vec<String>,
+}
+
+impl<P: Problem> Edge<P> {
+    /// The edge that is `C`.
+    pub(crate) fn new<C: Composed<P>>() -> Self {
+        Self {
+            prefix: C::PREFIX,
+            solver: |name, settings| {
+                let own = |key: &str| !C::KEYS.is_empty() && key.starts_with(C::KEYS);
+                let (own, inner): (SettingsMap, SettingsMap) =
+                    settings.clone().into_iter().partition(|(key, _)| own(key));
+                let solver = solver::<C::To>(name, &inner)?;
+                Some(parse(&own).and_then(|own| Ok(C::compose(own, solver?))))
+            },
+            describe: |name| {
+                let (about, solves) = describe::<C::To>(name)?;
+                Some((about, if C::NEARLY { Solves::Relaxation } else { solves }))
+            },
+            names: || {
+                let names = with_steps::<C::To>().into_iter().filter(|name| C::lists(name));
+                names.map(|name| format!("{}/{name}", C::PREFIX.name)).collect()
+            },
+        }
+    }
+}
+
+/// A kind of problem that has solvers.
+///
+/// Implemented for each kind by itself, not for all dimensions at once: so the solvers are compiled here, and not again by
+/// every crate that asks for one.
+pub trait Registered: Problem<Point: 'static> + Clone + Send + Sync + Sized + 'static {
+    /// The solvers that work on it directly.
+    fn solvers() -> Vec<Entry<Self>>;
+
+    /// What may stand before the names of solvers of other problems.
+    fn edges() -> Vec<Edge<Self>> {
+        vec![]
+    }
+}
+
+/// The solver behind a name.
+fn solver<P: Registered>(name: &str, settings: &SettingsMap) -> Made<Boxed<P>> {
+    if let Some((prefix, name)) = name.split_once('/') {
+        let edge = P::edges().into_iter().find(|edge| edge.prefix.name == prefix)?;
+        return (edge.solver)(name, settings);
+    }
+    match P::solvers().into_iter().find(|entry| entry.about.name == name)?.make {
+        Maker::Solver(make) => Some(make(settings)),
+        Maker::Session(_) => None,
+    }
+}
+
+/// What is behind a name, and what its answers are solutions of.
+fn describe<P: Registered>(name: &str) -> Option<(&'static About, Solves)> {
+    if let Some((prefix, name)) = name.split_once('/') {
+        let edge = P::edges().into_iter().find(|edge| edge.prefix.name == prefix)?;
+        return (edge.describe)(name);
+    }
+    let about = P::solvers().into_iter().find(|entry| entry.about.name == name)?.about;
+    Some((about, about.solves))
+}
+
+/// The names of solvers that a prefix can lead to.
+fn with_steps<P: Registered>() -> Vec<String> {
+    let solvers = P::solvers().into_iter().filter(Entry::has_steps);
+    let mut names: Vec<String> = solvers.map(|entry| entry.about.name.into()).collect();
+    names.extend(composed_names::<P>());
+    names
+}
+
+/// The descriptions of the solvers that work on problems of type `P` directly.
+pub fn abouts<P: Registered>() -> Vec<&'static About> {
+    P::solvers().into_iter().map(|entry| entry.about).collect()
+}
+
+/// The prefixes of the solvers of problems of type `P`.
+pub fn prefixes<P: Registered>() -> Vec<&'static Prefix> {
+    P::edges().into_iter().map(|edge| edge.prefix).collect()
+}
+
+/// The composed names `reformulation/solver` that are listed for problems of type `P`.
+pub fn composed_names<P: Registered>() -> Vec<String> {
+    P::edges().into_iter().flat_map(|edge| (edge.names)()).collect()
+}
+
+/// Every name that is listed for problems of type `P`; [`session`] takes these, and composed ones besides.
+pub fn solver_names<P: Registered>() -> Vec<String> {
+    let mut all: Vec<String> = abouts::<P>().iter().map(|about| about.name.into()).collect();
+    all.extend(composed_names::<P>());
+    all
+}
+
+/// The description behind a name, composed or not.
+pub fn about<P: Registered>(name: &str) -> Option<&'static About> {
+    Some(describe::<P>(name)?.0)
+}
+
+/// What the answers of the solver behind a name, composed or not, are solutions of.
+pub fn solves<P: Registered>(name: &str) -> Option<Solves> {
+    Some(describe::<P>(name)?.1)
+}
+
+/// A session of the solver called `name`, with the settings given and defaults for the rest.
+///
+/// It keeps its limits whatever the solver does, see [`guard`](crate::guard).
+/// Errors: an unknown name, an unknown key, a value of the wrong type or out of range.
+pub fn session<P: Registered>(
+    name: &str,
+    settings: &SettingsMap,
+) -> Result<Box<dyn Session<P>>, SolveError> {
+    let bare = bare::<P>(name, settings)?;
+    Ok(Box::new(Guarded::new(bare, name, settings)))
+}
+
+/// As [`session`], for callers who are guarded themselves.
+pub(crate) fn bare<P: Registered>(
+    name: &str,
+    settings: &SettingsMap,
+) -> Result<Box<dyn Session<P>>, SolveError> {
+    let entry = P::solvers().into_iter().find(|entry| entry.about.name == name);
+    let made = match entry.map(|entry| entry.make) {
+        Some(Maker::Session(make)) => Some(make(settings)),
+        Some(Maker::Solver(make)) => Some(make(settings).map(driven)),
+        None => solver::<P>(name, settings).map(|made| made.map(driven)),
+    };
+    made.ok_or_else(|| SolveError::UnknownSolver {
+        name: name.into(),
+        known: solver_names::<P>().join(", "),
+    })?
+    .map_err(|problem| SolveError::Settings { solver: name.into(), problem })
+}
+
+fn driven<P: Problem + 'static>(solver: Boxed<P>) -> Box<dyn Session<P>> {
+    Box::new(Driver::new(solver))
+}

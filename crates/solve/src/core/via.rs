@@ -1,0 +1,169 @@
+//! A solver of one problem, made into a solver of another by a reformulation.
+
+use nonsmooth_problem::Problem;
+use nonsmooth_problem::check::Measure;
+
+use crate::core::trace::Trace;
+use crate::{Reformulation, SolveError, Solver, Step};
+
+/// `Via { reformulation, solver }` reduces a problem of type `P`, lets `solver` work on the other problem, and
+/// lifts its point back whenever the judge of the *first* problem asks. Itself a solver.
+#[derive(Debug, Clone, Copy)]
+pub struct Via<R, S> {
+    /// The way there and back.
+    pub reformulation: R,
+    /// The solver of the other problem.
+    pub solver: S,
+}
+
+/// The other problem, the way back, and the solver's workspace there.
+///
+/// Where the reformulation [approximates](Reformulation::approximates), the other problem's judge is called like the first one's: at the end, when the
+/// estimate promises something, and every so many steps.
+pub struct ViaWork<P, R, S>
+where
+    P: Problem,
+    R: Reformulation<P>,
+    S: Solver<R::To>,
+{
+    reduced: R::To,
+    memo: R::Memo,
+    point: <R::To as Problem>::Point,
+    work: S::Work,
+    /// Of the other problem.
+    gauge: Option<<R::To as Problem>::Gauge>,
+    measure: Measure,
+    tolerance: f64,
+    ratio: f64,
+    unjudged: usize,
+}
+
+/// What is said when the solver says that it has finished, and the other problem's judge does not agree.
+const FAILED: &str =
+    "the solver of the reformulated problem has finished, but its answer fails the check";
+
+impl<R, S> Via<R, S> {
+    /// Asks the judge of the other problem, if the reformulation approximates: what the step comes to.
+    fn approximate<P>(&self, step: Step, work: &mut ViaWork<P, R, S>) -> Step
+    where
+        P: Problem,
+        R: Reformulation<P>,
+        S: Solver<R::To>,
+    {
+        let (Some(said), Some(gauge)) = (self.reformulation.approximates(), &mut work.gauge) else {
+            return step;
+        };
+        work.unjudged += 1;
+        let estimate = match step {
+            Step::Continue { estimate } => estimate,
+            _ => f64::NAN,
+        };
+        let going = matches!(step, Step::Continue { .. });
+        let due =
+            work.unjudged >= self.solver.check_every() || work.ratio * estimate <= work.tolerance;
+        if going && !due {
+            return step;
+        }
+        self.solver.publish(&work.reduced, &mut work.point, &mut work.work);
+        work.measure = work.reduced.certify(&work.point, gauge);
+        work.unjudged = 0;
+        let ratio = work.measure.merit() / estimate;
+        work.ratio = if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 };
+        match step {
+            _ if work.measure.passes(work.tolerance) => Step::Stuck(said.into()),
+            Step::Done => Step::Stuck(FAILED.into()),
+            step => step,
+        }
+    }
+}
+
+impl<P, R, S> Solver<P> for Via<R, S>
+where
+    P: Problem,
+    R: Reformulation<P>,
+    S: Solver<R::To>,
+{
+    type Work = ViaWork<P, R, S>;
+
+    fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
+        let (reduced, memo) = self.reformulation.reduce(problem)?;
+        let work = self.solver.work(&reduced)?;
+        let point = reduced.origin();
+        let gauge = self.reformulation.approximates().map(|_| reduced.gauge()).transpose()?;
+        let (measure, tolerance) = (Measure::unknown(), 0.0);
+        Ok(ViaWork {
+            reduced,
+            memo,
+            point,
+            work,
+            gauge,
+            measure,
+            tolerance,
+            ratio: 1.0,
+            unjudged: 0,
+        })
+    }
+
+    fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
+        self.reformulation.reduce_again(problem, &mut work.reduced, &mut work.memo)?;
+        if let Some(gauge) = &mut work.gauge {
+            work.reduced.regauge(gauge)?;
+        }
+        self.solver.refill(&work.reduced, &mut work.work)
+    }
+
+    fn aim(&self, tolerance: f64, work: &mut Self::Work) {
+        work.tolerance = tolerance;
+        self.solver.aim(tolerance, &mut work.work);
+    }
+
+    fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        (work.measure, work.ratio, work.unjudged) = (Measure::unknown(), 1.0, 0);
+        self.reformulation.lower(problem, point, &work.memo, &mut work.point);
+        self.solver.start(&work.reduced, &mut work.point, &mut work.work);
+    }
+
+    fn step(&self, _problem: &P, _point: &mut P::Point, work: &mut Self::Work) -> Step {
+        if let Some(ray) = self.reformulation.contradiction(&work.memo) {
+            return Step::NoSolution(ray);
+        }
+        match self.solver.step(&work.reduced, &mut work.point, &mut work.work) {
+            Step::NoSolution(certificate) => {
+                Step::NoSolution(self.reformulation.lift_certificate(certificate, &work.memo))
+            }
+            other => self.approximate(other, work),
+        }
+    }
+
+    fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        self.solver.publish(&work.reduced, &mut work.point, &mut work.work);
+        self.reformulation.lift(problem, &work.point, &mut work.memo, point);
+    }
+
+    fn record(&self, on: bool, work: &mut Self::Work) {
+        self.solver.record(on, &mut work.work);
+    }
+
+    fn trace(&self, work: &Self::Work) -> Trace {
+        self.solver.trace(&work.work)
+    }
+
+    fn account(&self, work: &Self::Work) -> Vec<String> {
+        let mut account = self.solver.account(&work.work);
+        if work.gauge.is_some() && work.measure.relative.is_finite() {
+            let (unknowns, relative) = (work.reduced.unknowns(), work.measure.relative);
+            account.push(format!(
+                "the reformulated problem has {unknowns} unknowns; its own relative residual is {relative:.1e}"
+            ));
+        }
+        account
+    }
+
+    fn latest(&self) -> bool {
+        self.reformulation.approximates().is_some() || self.solver.latest()
+    }
+
+    fn check_every(&self) -> usize {
+        self.solver.check_every()
+    }
+}
