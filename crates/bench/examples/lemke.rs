@@ -8,7 +8,7 @@
 
 use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::{Lcp, Problem};
-use nonsmooth_solve::complementarity::pivoting::{BasisKind, Lemke, LemkePath, Ties};
+use nonsmooth_solve::complementarity::pivoting::{BasisKind, Lemke, Ties};
 use nonsmooth_solve::{Driver, Limits, Outcome, Session};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -108,7 +108,7 @@ fn contacts(n: usize, rng: &mut Pcg64Mcg) -> Lcp {
 
 fn solve(problem: &Lcp, basis: BasisKind) -> Outcome {
     let settings = Lemke { basis, ties: Ties::Perturbed, ..Lemke::default() };
-    let mut driver = Driver::new(LemkePath::new(settings));
+    let mut driver = Driver::new(settings);
     let limits = Limits { tolerance: 1e-10, cpu_time: true, ..Limits::default() };
     driver.solve(problem, &mut problem.origin(), &limits, &mut |_| {}).expect("it applies")
 }

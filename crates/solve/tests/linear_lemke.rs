@@ -3,7 +3,7 @@
 use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::linalg::{Csc, Dense, Matrix, norm};
 use nonsmooth_problem::{Lcp, LcpPoint, Mlcp, Problem};
-use nonsmooth_solve::complementarity::pivoting::{BasisKind, Covering, Lemke, LemkePath, Ties};
+use nonsmooth_solve::complementarity::pivoting::{BasisKind, Covering, Lemke, Ties};
 use nonsmooth_solve::trace::{Pivot, Trace, Variable};
 use nonsmooth_solve::{Driver, Limits, Outcome, Session, Status};
 use rand::{RngExt, SeedableRng};
@@ -22,7 +22,7 @@ struct Run {
     pivots: Vec<Pivot>,
 }
 
-fn run_with<P>(problem: &P, solver: LemkePath, start: &[f64], tolerance: f64) -> Run
+fn run_with<P>(problem: &P, solver: Lemke, start: &[f64], tolerance: f64) -> Run
 where
     P: Problem<Point = LcpPoint> + nonsmooth_solve::complementarity::form::Complementary,
 {
@@ -41,7 +41,7 @@ fn run<P>(problem: &P, settings: Lemke) -> Run
 where
     P: Problem<Point = LcpPoint> + nonsmooth_solve::complementarity::form::Complementary,
 {
-    run_with(problem, LemkePath::new(settings), &[], 1e-11)
+    run_with(problem, settings, &[], 1e-11)
 }
 
 fn lcp<const N: usize>(rows: [[f64; N]; N], q: [f64; N]) -> Lcp {
@@ -214,7 +214,7 @@ fn ties_without_a_rule_cycle_and_are_noticed() {
 /// What the three bases agree on.
 fn same_pivots(problem: &Lcp, settings: Lemke, what: &str) -> Run {
     let mut runs: Vec<Run> =
-        BASES.iter().map(|&basis| run(problem, Lemke { basis, ..settings })).collect();
+        BASES.iter().map(|&basis| run(problem, Lemke { basis, ..settings.clone() })).collect();
     let first = runs.remove(0);
     let exchanges = |r: &Run| r.pivots.iter().map(|p| (p.entering, p.leaving)).collect::<Vec<_>>();
     for other in &runs {
@@ -444,7 +444,7 @@ fn a_solution_is_a_first_basis() {
     let cold = run(&problem, Lemke::default());
     let warm = run_with(
         &problem,
-        LemkePath::new(Lemke::default()),
+        Lemke::default(),
         &z.iter().map(|z| 1.01 * z).collect::<Vec<_>>(),
         1e-11,
     );
@@ -457,7 +457,7 @@ fn a_solution_is_a_first_basis() {
     }
     for basis in BASES {
         let settings = Lemke { basis, ..Lemke::default() };
-        let warm = run_with(&problem, LemkePath::new(settings), &off, 1e-11);
+        let warm = run_with(&problem, settings, &off, 1e-11);
         assert_eq!(warm.outcome.status, Status::Solved);
         assert!(
             warm.pivots.len() < cold.pivots.len(),
@@ -481,7 +481,7 @@ fn nothing_to_do_is_done_at_once() {
 fn the_first_pivot_is_an_argmax() {
     // Acary2018 (26)–(28): z0 = max −q_i/d_i.
     let problem = lcp([[2.0, 0.0], [0.0, 2.0]], [-3.0, -5.0]);
-    let solver = LemkePath::with_covering(plain(), vec![1.0, 4.0]);
+    let solver = Lemke { covering_vector: Some(vec![1.0, 4.0]), ..plain() };
     let found = run_with(&problem, solver, &[], 1e-11);
     let first = found.pivots[0];
     assert_eq!((first.entering, first.leaving), (Variable::Artificial, Variable::W(0)));
@@ -652,7 +652,7 @@ fn equalities_that_cannot_be_met_are_refuted_or_named() {
     for basis in BASES {
         let settings = Lemke { basis, ..plain() };
         let redundant = Mlcp::new(matrix(), vec![-1.0, -1.0, 0.5], 2).unwrap();
-        assert_eq!(run(&redundant, settings).outcome.status, Status::Solved, "{basis:?}");
+        assert_eq!(run(&redundant, settings.clone()).outcome.status, Status::Solved, "{basis:?}");
         let contradictory = Mlcp::new(matrix(), vec![-1.0, -2.0, 0.5], 2).unwrap();
         let found = run(&contradictory, settings).outcome.status;
         assert!(
@@ -753,7 +753,7 @@ fn almost_singular_problems_end() {
         let q = (0..2 * n).map(|i| size(i) * problem.q[i % n]).collect();
         let problem = Lcp::new(twice, q).unwrap();
         for basis in BASES {
-            let found = run_with(&problem, LemkePath::new(Lemke { basis, ..plain() }), &[], 1e-8);
+            let found = run_with(&problem, Lemke { basis, ..plain() }, &[], 1e-8);
             let named = match &found.outcome.status {
                 Status::Stalled(why) => !why.is_empty(),
                 Status::Solved | Status::NoConclusion(_) => true,
@@ -770,7 +770,7 @@ fn almost_singular_problems_end() {
 
 #[test]
 fn a_session_solves_one_problem_after_another() {
-    let mut driver = Driver::new(LemkePath::new(Lemke::default()));
+    let mut driver = Driver::new(Lemke::default());
     for (n, seed) in [(20, 1), (20, 2), (60, 3), (20, 4), (60, 5)] {
         let (problem, z) = planted(n, Class::Definite, 0.0, seed);
         let mut point = problem.origin();

@@ -6,10 +6,8 @@ use std::cell::Cell;
 use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::planted::{JournalBearing, Membrane, energy, torsion};
 use nonsmooth_problem::{BoxLcp, Lcp, LcpPoint, Mlcp, Problem};
-use nonsmooth_solve::complementarity::quadratic::{Mprgp, Proportioning};
-use nonsmooth_solve::complementarity::splitting::{
-    Direction, Proximal, Psor, Relaxation, Rpsor, Searched, SplittingLs, Sweep,
-};
+use nonsmooth_solve::complementarity::quadratic::Mprgp;
+use nonsmooth_solve::complementarity::splitting::{Direction, Psor, Rpsor, SplittingLs, Sweep};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::settings;
 use nonsmooth_solve::{Limits, Outcome, Session, SolveError, Solver, Status};
@@ -201,7 +199,7 @@ fn gauss_seidel_on_m_matrices_rises_to_the_least_solution() {
     )
     .unwrap();
     let (z, _) = solved(&problem, "mprgp");
-    let solver = Relaxation(Psor { omega: 1.0, adapt: false, ..Psor::default() });
+    let solver = Psor { omega: 1.0, adapt: false, ..Psor::default() };
     let mut work = solver.work(&problem).unwrap();
     let mut point = problem.origin();
     solver.start(&problem, &mut point, &mut work);
@@ -377,7 +375,7 @@ fn the_first_sweep_by_hand() {
     let m = Dense::from_rows(&[[2.0, 1.0], [3.0, 4.0]]).unwrap();
     let problem = Lcp::new(m, vec![-2.0, -8.0]).unwrap();
     let one = |omega| {
-        let solver = Relaxation(Psor { omega, adapt: false, ..Psor::default() });
+        let solver = Psor { omega, adapt: false, ..Psor::default() };
         let mut work = solver.work(&problem).unwrap();
         let mut point = LcpPoint { z: vec![1.0, 1.0] };
         solver.start(&problem, &mut point, &mut work);
@@ -388,7 +386,7 @@ fn the_first_sweep_by_hand() {
     assert_eq!(one(1.0), [0.5, 1.0 + 2.5 / 4.0]);
     assert_eq!(one(1.5), [0.25, 1.0 + 1.5 * 3.25 / 4.0]);
     // RPSOR: units from balancing; a second sweep from the same centre feels ρ (z − z̃).
-    let solver = Proximal(Rpsor { omega: 1.0, adapt: false, fraction: 1e-9, ..Rpsor::default() });
+    let solver = Rpsor { omega: 1.0, adapt: false, fraction: 1e-9, ..Rpsor::default() };
     let zero = Lcp::new(Dense::from_rows(&[[0.0]]).unwrap(), vec![-1.0]).unwrap();
     let mut work = solver.work(&zero).unwrap();
     let mut point = zero.origin();
@@ -411,12 +409,8 @@ fn backward_sweeps_go_backward() {
         std::cmp::Ordering::Greater => 0.0,
     });
     let problem = Lcp::new(m, vec![-1.0; 12]).unwrap();
-    let solver = Relaxation(Psor {
-        omega: 1.0,
-        adapt: false,
-        direction: Direction::Symmetric,
-        ..Psor::default()
-    });
+    let solver =
+        Psor { omega: 1.0, adapt: false, direction: Direction::Symmetric, ..Psor::default() };
     let mut work = solver.work(&problem).unwrap();
     let mut point = problem.origin();
     solver.start(&problem, &mut point, &mut work);
@@ -437,7 +431,7 @@ fn the_line_search_lowers_the_energy_in_every_step() {
     let (outcome, _) = try_solve(&problem, "projected_jacobi", &limits(1e-8, 5000)).unwrap();
     assert_ne!(outcome.status, Status::Solved);
     for sweep in [Sweep::Psor, Sweep::Jacobi] {
-        let solver = Searched(SplittingLs { sweep, ..SplittingLs::default() });
+        let solver = SplittingLs { sweep, ..SplittingLs::default() };
         let mut work = solver.work(&problem).unwrap();
         let mut point = LcpPoint { z: vec![1.0; 40] };
         solver.start(&problem, &mut point, &mut work);
@@ -460,7 +454,7 @@ fn the_line_search_lowers_the_energy_in_every_step() {
 #[test]
 fn proportioning_lowers_the_energy_in_every_step() {
     let problem = torsion(20, 5.0);
-    let solver = Proportioning(Mprgp::default());
+    let solver = Mprgp::default();
     let mut work = solver.work(&problem).unwrap();
     let mut point = problem.origin();
     solver.start(&problem, &mut point, &mut work);

@@ -3,19 +3,16 @@
 use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 
 use crate::Boxed;
-use crate::complementarity::auto::LinearAuto;
+use crate::complementarity::auto::{LinearAuto, Planned};
 use crate::complementarity::form::{Bounded, Complementary, Paired};
-use crate::complementarity::interior::{Mehrotra, Mty};
+use crate::complementarity::interior::{MehrotraType, MizunoToddYe};
 use crate::complementarity::newton::{Method, NewtonFb, NewtonMin, NewtonPfb, Semismooth};
 use crate::complementarity::pivoting::{
-    BardPivoting, BlockPrincipal, CrissCrossPivoting, Enumerate, EnumerateExactly, KellerPivoting,
-    LemkePath, MurtyPivoting,
+    Bard, BlockPivoting, CrissCross, Enumeration, EnumerationExact, Keller, Lemke, Murty,
 };
-use crate::complementarity::quadratic::{Programmed, Proportioning};
+use crate::complementarity::quadratic::{Mprgp, QuadraticProgram};
 use crate::complementarity::reform::{Mixed, Reduce, Split};
-use crate::complementarity::splitting::{
-    Jacobi, Pgs, Proximal, Psor, Relaxation, Rpgs, Rpsor, Searched,
-};
+use crate::complementarity::splitting::{Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs};
 use crate::core::register::{Described, Edge, Entry, Registered};
 
 /// A Newton method, by its function.
@@ -26,37 +23,37 @@ fn newton<P: Bounded + 'static, M: Method<Function: 'static> + Described>() -> E
 /// The solvers that take bounds of any kind.
 fn bounded<P: Bounded + 'static>() -> Vec<Entry<P>> {
     vec![
-        Entry::new(|s| Boxed::new(Jacobi(s))),
-        Entry::new(|s: Pgs| Boxed::new(Relaxation(Psor::from(s)))),
-        Entry::new(|s| Boxed::new(Relaxation(s))),
-        Entry::new(|s: Rpgs| Boxed::new(Proximal(Rpsor::from(s)))),
-        Entry::new(|s| Boxed::new(Proximal(s))),
-        Entry::new(|s| Boxed::new(Searched(s))),
-        Entry::new(|s| Boxed::new(Proportioning(s))),
-        Entry::new(|s| Boxed::new(Programmed(s))),
+        Entry::of::<ProjectedJacobi>(),
+        Entry::new(|s: Pgs| Boxed::new(Psor::from(s))),
+        Entry::of::<Psor>(),
+        Entry::new(|s: Rpgs| Boxed::new(Rpsor::from(s))),
+        Entry::of::<Rpsor>(),
+        Entry::of::<SplittingLs>(),
+        Entry::of::<Mprgp>(),
+        Entry::of::<QuadraticProgram>(),
         newton::<P, NewtonMin>(),
         newton::<P, NewtonFb>(),
         newton::<P, NewtonPfb>(),
-        Entry::new(|s| Boxed::new(EnumerateExactly(s))),
+        Entry::of::<EnumerationExact>(),
     ]
 }
 
 /// The pivoting methods.
 fn pivoting<P: Complementary + 'static>() -> Vec<Entry<P>> {
     vec![
-        Entry::new(|s| Boxed::new(LemkePath::new(s))),
-        Entry::new(|s| Boxed::new(KellerPivoting(s))),
-        Entry::new(|s| Boxed::new(CrissCrossPivoting(s))),
-        Entry::new(|s| Boxed::new(MurtyPivoting(s))),
-        Entry::new(|s| Boxed::new(BardPivoting(s))),
-        Entry::new(|s| Boxed::new(BlockPrincipal(s))),
-        Entry::new(|s| Boxed::new(Enumerate(s))),
+        Entry::of::<Lemke>(),
+        Entry::of::<Keller>(),
+        Entry::of::<CrissCross>(),
+        Entry::of::<Murty>(),
+        Entry::of::<Bard>(),
+        Entry::of::<BlockPivoting>(),
+        Entry::of::<Enumeration>(),
     ]
 }
 
 /// The solvers that follow pairs of variables.
 fn paired<P: Paired + 'static>() -> Vec<Entry<P>> {
-    vec![Entry::new(|s| Boxed::new(Mty(s))), Entry::new(|s| Boxed::new(Mehrotra(s)))]
+    vec![Entry::of::<MizunoToddYe>(), Entry::of::<MehrotraType>()]
 }
 
 /// The solvers of problems whose variables are free or nonnegative: all but `auto`.
@@ -65,7 +62,7 @@ fn complementary<P: Complementary + Paired + 'static>() -> Vec<Entry<P>> {
 }
 
 /// `auto` runs whole sessions of the others.
-fn with_auto<P: crate::complementarity::auto::Planned>(others: Vec<Entry<P>>) -> Vec<Entry<P>> {
+fn with_auto<P: Planned>(others: Vec<Entry<P>>) -> Vec<Entry<P>> {
     let auto = Entry::session(|auto: LinearAuto| auto.session::<P>());
     std::iter::once(auto).chain(others).collect()
 }
@@ -99,7 +96,7 @@ impl Registered for BoxLcp {
 impl Registered for Hlcp {
     fn solvers() -> Vec<Entry<Self>> {
         let mut solvers = paired();
-        solvers.push(Entry::new(|s| Boxed::new(EnumerateExactly(s))));
+        solvers.push(Entry::of::<EnumerationExact>());
         with_auto(solvers)
     }
 

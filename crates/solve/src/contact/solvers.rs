@@ -2,22 +2,32 @@
 
 use nonsmooth_problem::check::Kinematic;
 
-use crate::Boxed;
-use crate::contact::auto::{Auto, Hybrid};
-use crate::contact::form::{Concurrent, Explicit, Linear, Linearised, Regularised};
-use crate::contact::interior::{Pursued, Relaxed};
+use crate::contact::auto::Auto;
+use crate::contact::form::{Concurrent, Explicit, Linear, Linearised, OnContacts, Regularised};
+use crate::contact::interior::{ConvexRelaxation, Interior};
 use crate::contact::law::cfun::ContactFunction;
 use crate::contact::newton::{
     Method as NewtonMethod, NewtonAc, NewtonCm, NewtonFb, NewtonFbSmooth, NewtonHsw, NewtonJm,
     NewtonNm, NewtonPk, NewtonXsw, Semismooth,
 };
-use crate::contact::optimisation::{Alternation, CadouxSteps, TrescaSteps};
+use crate::contact::optimisation::{Cadoux, Panagiotopoulos, Tresca};
 use crate::contact::projection::{
     DeSaxce, Extragradient, FixedPoint, Hyperplane, Method, Projected,
 };
-use crate::contact::proximal::AdmmSteps;
+use crate::contact::proximal::Admm;
 use crate::contact::splitting::{Colored, Nsgs, Psor};
 use crate::core::register::{Described, Entry};
+use crate::{Boxed, Solver};
+
+/// A method that is its hyperparameters.
+fn on<P, S, const D: usize>() -> Entry<P>
+where
+    P: Linear<D> + 'static,
+    S: Described + 'static,
+    OnContacts<S, D>: Solver<P, Work: 'static>,
+{
+    Entry::new(|method: S| Boxed::new(OnContacts(method)))
+}
 
 /// A Newton method, by its function.
 fn newton<P, M, const D: usize>() -> Entry<P>
@@ -43,7 +53,7 @@ where
     P: Concurrent<D> + Linearised<D> + Explicit<D> + Kinematic<D> + 'static,
 {
     vec![
-        Entry::new(|s: Auto| Boxed::new(Hybrid::<D>(s))),
+        on::<P, Auto, D>(),
         Entry::new(Nsgs::boxed::<P, D>),
         Entry::new(Colored::boxed::<P, D>),
         Entry::new(|s: Psor| Boxed::new(s.sweeps::<D>())),
@@ -51,7 +61,7 @@ where
         projected::<P, FixedPoint, D>(),
         projected::<P, Extragradient, D>(),
         projected::<P, Hyperplane, D>(),
-        Entry::new(|s| Boxed::new(AdmmSteps::<D>(s))),
+        on::<_, Admm, D>(),
         newton::<P, NewtonAc, D>(),
         newton::<P, NewtonJm, D>(),
         newton::<P, NewtonNm, D>(),
@@ -61,11 +71,11 @@ where
         newton::<P, NewtonXsw, D>(),
         newton::<P, NewtonPk, D>(),
         newton::<P, NewtonHsw, D>(),
-        Entry::new(|s| Boxed::new(TrescaSteps::<D>(s))),
-        Entry::new(|s| Boxed::new(Alternation::<D>(s))),
-        Entry::new(|s| Boxed::new(CadouxSteps::<D>(s))),
-        Entry::new(|s| Boxed::new(Pursued::<D>(s))),
-        Entry::new(|s| Boxed::new(Relaxed::<D>(s))),
+        on::<P, Tresca, D>(),
+        on::<P, Panagiotopoulos, D>(),
+        on::<P, Cadoux, D>(),
+        on::<P, Interior, D>(),
+        on::<P, ConvexRelaxation, D>(),
     ]
 }
 
@@ -78,7 +88,7 @@ where
     vec![
         Entry::new(Nsgs::boxed::<Regularised<P>, D>),
         projected::<_, Extragradient, D>(),
-        Entry::new(|s| Boxed::new(AdmmSteps::<D>(s))),
+        on::<_, Admm, D>(),
         newton::<_, NewtonAc, D>(),
         newton::<_, NewtonNm, D>(),
         newton::<_, NewtonFb, D>(),

@@ -11,6 +11,7 @@ use crate::core::drive::{Driver, Session};
 use crate::core::error::SolveError;
 use crate::core::guarded::Guarded;
 use crate::core::settings::{Setting, Settings, SettingsMap, parse};
+use crate::core::solver::Solver;
 
 /// The solver that is used when none is named.
 pub const DEFAULT: &str = "auto";
@@ -100,6 +101,11 @@ impl<P: Problem + 'static> Entry<P> {
     pub(crate) fn new<S: Described>(make: impl Fn(S) -> Boxed<P> + 'static) -> Self {
         let make = move |settings: &SettingsMap| parse(settings).map(&make);
         Self { about: S::ABOUT, make: Maker::Solver(Box::new(make)) }
+    }
+
+    /// A solver that is its hyperparameters.
+    pub(crate) fn of<S: Described + Solver<P, Work: 'static> + 'static>() -> Self {
+        Self::new(Boxed::new::<S>)
     }
 
     /// A whole session, by what makes it of its hyperparameters.

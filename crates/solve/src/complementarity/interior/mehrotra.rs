@@ -65,10 +65,6 @@ impl Described for MehrotraType {
     };
 }
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct Mehrotra(pub MehrotraType);
-
 /// The workspace.
 pub struct MehrotraWork {
     path: PairPath,
@@ -79,7 +75,7 @@ const PACE: f64 = 1e2;
 /// Below this step length another direction is tried.
 const SHORT: f64 = 0.1;
 
-impl<P: Paired> Solver<P> for Mehrotra {
+impl<P: Paired> Solver<P> for MehrotraType {
     type Work = MehrotraWork;
 
     fn work(&self, problem: &P) -> Result<MehrotraWork, SolveError> {
@@ -95,7 +91,7 @@ impl<P: Paired> Solver<P> for Mehrotra {
 
     fn start(&self, _: &P, point: &mut P::Point, work: &mut MehrotraWork) {
         P::read(point, &mut work.path.z, &mut work.path.s);
-        work.path.begin(self.0.start);
+        work.path.begin(self.start);
     }
 
     fn step(&self, _: &P, _: &mut P::Point, work: &mut MehrotraWork) -> Step {
@@ -104,12 +100,12 @@ impl<P: Paired> Solver<P> for Mehrotra {
             return end;
         }
         if path.factorise().is_err() {
-            return path.given_up(SINGULAR, self.0.start);
+            return path.given_up(SINGULAR, self.start);
         }
         let mu = path.now().mu;
         // The predictor, σ = 0, says how much centring the corrector needs.
         if !path.direct(1.0, |product, _| -product) {
-            return path.given_up(SINGULAR, self.0.start);
+            return path.given_up(SINGULAR, self.start);
         }
         let ahead = path.ahead(path.boundary()).mu;
         let sigma = (ahead / mu).clamp(0.0, 1.0).powi(3).max(1e-9);
@@ -121,10 +117,10 @@ impl<P: Paired> Solver<P> for Mehrotra {
             step = self.length(path, mu);
         }
         if step == 0.0 || path.advance(step).is_none() {
-            return path.given_up("no step stays in the neighbourhood", self.0.start);
+            return path.given_up("no step stays in the neighbourhood", self.start);
         }
         path.record(step);
-        path.concluded(self.0.patience, self.0.start)
+        path.concluded(self.patience, self.start)
     }
 
     fn publish(&self, _: &P, point: &mut P::Point, work: &mut MehrotraWork) {
@@ -144,7 +140,7 @@ impl<P: Paired> Solver<P> for Mehrotra {
     }
 }
 
-impl Mehrotra {
+impl MehrotraType {
     /// The longest step, near enough, that stays in the neighbourhood; zero where there is none.
     fn length(&self, path: &PairPath, mu: f64) -> f64 {
         let boundary = path.boundary();
@@ -154,7 +150,7 @@ impl Mehrotra {
         for _ in 0..60 {
             let ahead = path.ahead(step);
             if ahead.mu > 0.0
-                && ahead.least >= self.0.epsilon
+                && ahead.least >= self.epsilon
                 && path.keeps_pace(step, 1.0, ahead.mu, PACE)
             {
                 return step;

@@ -9,8 +9,8 @@
 mod mehrotra;
 mod mty;
 
-pub use mehrotra::{Mehrotra, MehrotraType, MehrotraWork};
-pub use mty::{MizunoToddYe, Mty, MtyWork};
+pub use mehrotra::{MehrotraType, MehrotraWork};
+pub use mty::{MizunoToddYe, MtyWork};
 
 fn above_zero(name: &str, value: f64) -> Result<(), String> {
     if value > 0.0 && value.is_finite() {

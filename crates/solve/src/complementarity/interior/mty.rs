@@ -68,10 +68,6 @@ impl Described for MizunoToddYe {
     };
 }
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct Mty(pub MizunoToddYe);
-
 /// The workspace.
 pub struct MtyWork {
     path: PairPath,
@@ -82,7 +78,7 @@ const PACE: f64 = 1e2;
 /// Correctors in a row, of which theory needs one.
 const CORRECTORS: usize = 4;
 
-impl<P: Paired> Solver<P> for Mty {
+impl<P: Paired> Solver<P> for MizunoToddYe {
     type Work = MtyWork;
 
     fn work(&self, problem: &P) -> Result<MtyWork, SolveError> {
@@ -98,7 +94,7 @@ impl<P: Paired> Solver<P> for Mty {
 
     fn start(&self, _: &P, point: &mut P::Point, work: &mut MtyWork) {
         P::read(point, &mut work.path.z, &mut work.path.s);
-        work.path.begin(self.0.start);
+        work.path.begin(self.start);
     }
 
     fn step(&self, _: &P, _: &mut P::Point, work: &mut MtyWork) -> Step {
@@ -109,32 +105,32 @@ impl<P: Paired> Solver<P> for Mty {
         let outside = "a corrector does not come back to the neighbourhood: M may not be monotone";
         // Predictor, (43) with σ = 0: x ∘ s becomes (1 − α) x ∘ s + α² dx ∘ ds.
         if path.factorise().is_err() || !path.direct(1.0, |product, _| -product) {
-            return path.given_up(SINGULAR, self.0.start);
+            return path.given_up(SINGULAR, self.start);
         }
         let step = self.length(path);
         if step == 0.0 || path.advance(step).is_none() {
-            return path.given_up("no step stays in the neighbourhood", self.0.start);
+            return path.given_up("no step stays in the neighbourhood", self.start);
         }
         path.record(step);
         // Corrector, σ = 1: the residual stays.
         for _ in 0..CORRECTORS {
             let mu = path.now().mu;
             if path.factorise().is_err() || !path.direct(0.0, |product, _| mu - product) {
-                return path.given_up(SINGULAR, self.0.start);
+                return path.given_up(SINGULAR, self.start);
             }
             let mut step = path.boundary();
-            while path.ahead(step).delta > 2.0 * self.0.theta && step > 1e-3 {
+            while path.ahead(step).delta > 2.0 * self.theta && step > 1e-3 {
                 step *= 0.5;
             }
             if path.advance(step).is_none() {
-                return path.given_up(outside, self.0.start);
+                return path.given_up(outside, self.start);
             }
             path.record(step);
-            if path.now().delta <= self.0.theta {
-                return path.concluded(self.0.patience, self.0.start);
+            if path.now().delta <= self.theta {
+                return path.concluded(self.patience, self.start);
             }
         }
-        path.given_up(outside, self.0.start)
+        path.given_up(outside, self.start)
     }
 
     fn publish(&self, _: &P, point: &mut P::Point, work: &mut MtyWork) {
@@ -154,7 +150,7 @@ impl<P: Paired> Solver<P> for Mty {
     }
 }
 
-impl Mty {
+impl MizunoToddYe {
     /// The longest predictor that stays in `N₂(2θ)`, by bisection on a quartic whose coefficients are three sums; zero where there is none.
     fn length(&self, path: &PairPath) -> f64 {
         let free = path.z.len() - path.s.len();
@@ -181,7 +177,7 @@ impl Mty {
             let level = rest + step * step * bend;
             let squares = rest * rest * a + 2.0 * rest * step * step * b + step.powi(4) * c;
             level > 0.0
-                && squares <= (2.0 * self.0.theta * level).powi(2)
+                && squares <= (2.0 * self.theta * level).powi(2)
                 && path.keeps_pace(step, 1.0, level * mu, PACE)
         };
         let most = path.boundary() * (1.0 - 1e-12);

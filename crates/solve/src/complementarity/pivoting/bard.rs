@@ -54,10 +54,6 @@ impl Described for Bard {
     };
 }
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct BardPivoting(pub Bard);
-
 /// The workspace.
 pub struct BardWork {
     tableau: Tableau,
@@ -66,7 +62,7 @@ pub struct BardWork {
     least: bool,
 }
 
-impl<P: Complementary> Solver<P> for BardPivoting {
+impl<P: Complementary> Solver<P> for Bard {
     type Work = BardWork;
 
     fn work(&self, problem: &P) -> Result<BardWork, SolveError> {
@@ -101,7 +97,7 @@ impl<P: Complementary> Solver<P> for BardPivoting {
             if *least {
                 return Step::Stuck("the pivots cycle: M is not a P-matrix".into());
             }
-            if !self.0.protect {
+            if !self.protect {
                 return Step::Stuck("the pivots cycle".into());
             }
             *least = true;

@@ -59,10 +59,6 @@ impl Described for BlockPivoting {
 /// Up to this many variables a dense tableau says which pairs a singular A needs in the first basis.
 const MOST_PAIRED: usize = 2000;
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct BlockPrincipal(pub BlockPivoting);
-
 /// The workspace.
 pub struct BlockWork {
     free: usize,
@@ -259,7 +255,7 @@ impl BlockWork {
     }
 }
 
-impl<P: Complementary> Solver<P> for BlockPrincipal {
+impl<P: Complementary> Solver<P> for BlockPivoting {
     type Work = BlockWork;
 
     fn work(&self, problem: &P) -> Result<BlockWork, SolveError> {
@@ -306,7 +302,7 @@ impl<P: Complementary> Solver<P> for BlockPrincipal {
             basis[i] = i < work.free || (scaled > 0.0 && scaled > w.sums[i].value() * rows[i]);
         }
         work.before.copy_from_slice(&work.basis);
-        (work.least, work.left) = (usize::MAX, self.0.patience);
+        (work.least, work.left) = (usize::MAX, self.patience);
         (work.single, work.whole) = (false, false);
         (work.steps, work.singles) = (0, 0);
         work.cycle.begin(&work.basis);
@@ -354,12 +350,12 @@ impl<P: Complementary> Solver<P> for BlockPrincipal {
             return Step::Done;
         }
         if count < work.least {
-            (work.least, work.left, work.single) = (count, self.0.patience, false);
+            (work.least, work.left, work.single) = (count, self.patience, false);
             work.cycle.begin(&work.basis);
         } else if !work.single {
             match work.left.checked_sub(1) {
                 Some(left) => work.left = left,
-                None if self.0.fallback => {
+                None if self.fallback => {
                     work.single = true;
                     work.cycle.begin(&work.basis);
                 }
@@ -367,7 +363,7 @@ impl<P: Complementary> Solver<P> for BlockPrincipal {
             }
         }
         work.change(!work.single);
-        if work.cycle.returns(&work.basis) && (work.single || !self.0.fallback) {
+        if work.cycle.returns(&work.basis) && (work.single || !self.fallback) {
             return Step::Stuck(if work.single {
                 "single changes cycle: M is not a P-matrix".into()
             } else {

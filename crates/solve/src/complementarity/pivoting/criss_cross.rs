@@ -46,17 +46,13 @@ impl Described for CrissCross {
     };
 }
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct CrissCrossPivoting(pub CrissCross);
-
 /// The workspace.
 pub struct CrissCrossWork {
     tableau: Tableau,
     cycle: Cycle,
 }
 
-impl<P: Complementary> Solver<P> for CrissCrossPivoting {
+impl<P: Complementary> Solver<P> for CrissCross {
     type Work = CrissCrossWork;
 
     fn work(&self, problem: &P) -> Result<CrissCrossWork, SolveError> {
@@ -77,7 +73,7 @@ impl<P: Complementary> Solver<P> for CrissCrossPivoting {
         if let Some(end) = ended(tableau) {
             return end;
         }
-        let Some(r) = tableau.first_negative(self.0.descending) else {
+        let Some(r) = tableau.first_negative(self.descending) else {
             return polished(tableau, cycle);
         };
         match tableau.diagonal(r) {
@@ -88,7 +84,7 @@ impl<P: Complementary> Solver<P> for CrissCrossPivoting {
                 let eligible = |j: &usize| *j != r && tableau.entry(r, *j) > tableau.threshold(*j);
                 let mut pairs = tableau.pairs();
                 let partner =
-                    if self.0.descending { pairs.rfind(eligible) } else { pairs.find(eligible) };
+                    if self.descending { pairs.rfind(eligible) } else { pairs.find(eligible) };
                 match partner {
                     None => {
                         let proof = tableau.farkas(r);

@@ -64,10 +64,6 @@ impl Described for Enumeration {
     };
 }
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct Enumerate(pub Enumeration);
-
 /// The workspace.
 pub struct EnumerateWork {
     data: Data,
@@ -80,12 +76,12 @@ pub struct EnumerateWork {
     cases: usize,
 }
 
-impl<P: Complementary> Solver<P> for Enumerate {
+impl<P: Complementary> Solver<P> for Enumeration {
     type Work = EnumerateWork;
 
     fn work(&self, problem: &P) -> Result<EnumerateWork, SolveError> {
         Ok(EnumerateWork {
-            data: Data::new(&problem.rowwise(), self.0.max_pairs)?,
+            data: Data::new(&problem.rowwise(), self.max_pairs)?,
             refuting: problem.system().ok().and_then(|system| refuting_row(&system, &mut vec![])),
             open: vec![],
             separating: vec![],
@@ -114,7 +110,7 @@ impl<P: Complementary> Solver<P> for Enumerate {
             }
             *started = true;
         }
-        for _ in 0..self.0.batch {
+        for _ in 0..self.batch {
             let Some(case) = open.pop() else {
                 return Step::NoSolution(Certificate::Cones {
                     separating: std::mem::take(separating),

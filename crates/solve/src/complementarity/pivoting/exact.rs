@@ -59,10 +59,6 @@ impl Described for EnumerationExact {
 /// What is said where an exact solution, rounded, is none.
 const BEYOND: &str = "there is a solution, found exactly, but it is beyond double precision: rounded, it fails the check";
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct EnumerateExactly(pub EnumerationExact);
-
 /// The workspace.
 pub struct ExactWork<P: Problem> {
     search: ExactCones,
@@ -70,17 +66,17 @@ pub struct ExactWork<P: Problem> {
     found: Option<P::Point>,
 }
 
-impl<P: Problem> Solver<P> for EnumerateExactly {
+impl<P: Problem> Solver<P> for EnumerationExact {
     type Work = ExactWork<P>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
         let needs = |found: &str| SolveError::needs("the entries of M (dense or sparse)", found);
         let system = problem.cones().ok_or_else(|| needs("an operator"))?;
         let pairs = system.pairs.len();
-        if pairs > self.0.max_pairs {
+        if pairs > self.max_pairs {
             return Err(SolveError::needs(
                 "at most `max_pairs` complementary pairs",
-                format!("{pairs} (max_pairs = {})", self.0.max_pairs),
+                format!("{pairs} (max_pairs = {})", self.max_pairs),
             ));
         }
         Ok(ExactWork { search: ExactCones::new(system), pairs, found: None })

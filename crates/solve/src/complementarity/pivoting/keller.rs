@@ -47,10 +47,6 @@ impl Described for Keller {
     };
 }
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct KellerPivoting(pub Keller);
-
 /// The workspace.
 pub struct KellerWork {
     tableau: Tableau,
@@ -199,7 +195,7 @@ impl KellerWork {
     }
 }
 
-impl<P: Complementary> Solver<P> for KellerPivoting {
+impl<P: Complementary> Solver<P> for Keller {
     type Work = KellerWork;
 
     fn work(&self, problem: &P) -> Result<KellerWork, SolveError> {
@@ -242,7 +238,7 @@ impl<P: Complementary> Solver<P> for KellerPivoting {
         if work.restarts != work.tableau.restarts() {
             work.begin();
         }
-        let chosen = work.distinguished.or_else(|| work.choose(self.0.least_index));
+        let chosen = work.distinguished.or_else(|| work.choose(self.least_index));
         if let Some(r) = chosen {
             let word = work.drive(r);
             // What is unpleasant is heard twice, the second time from a tableau fresh from the data.

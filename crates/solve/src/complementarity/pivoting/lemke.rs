@@ -80,11 +80,14 @@ pub enum BasisKind {
 }
 
 /// The hyperparameters of Lemke's method.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Lemke {
     /// The covering vector d.
     pub covering: Covering,
+    /// A covering vector `d > 0` of the caller's own, one entry a row; those of equalities are not used. Not a setting of the command line.
+    #[serde(skip)]
+    pub covering_vector: Option<Vec<f64>>,
     /// Seed of random covering vectors and of the perturbation.
     pub seed: u64,
     /// How ties are broken.
@@ -105,6 +108,7 @@ impl Default for Lemke {
     fn default() -> Self {
         Self {
             covering: Covering::Auto,
+            covering_vector: None,
             seed: 1,
             ties: Ties::Auto,
             basis: BasisKind::Auto,
@@ -168,25 +172,6 @@ const SOLVED: f64 = 1e-9;
 /// How often a path is tried again for reasons of rounding.
 const TRIES: usize = 3;
 
-/// The solver.
-#[derive(Debug, Clone)]
-pub struct LemkePath {
-    settings: Lemke,
-    covering: Option<Vec<f64>>,
-}
-
-impl LemkePath {
-    /// Lemke's method with these settings.
-    pub fn new(settings: Lemke) -> Self {
-        Self { settings, covering: None }
-    }
-
-    /// With a covering vector `d > 0` of the caller's, one entry a row; those of equalities are not used.
-    pub fn with_covering(settings: Lemke, d: Vec<f64>) -> Self {
-        Self { settings, covering: Some(d) }
-    }
-}
-
 /// Where the method is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
@@ -230,7 +215,7 @@ pub struct LemkeWork {
     record: Recorder<Pivot>,
 }
 
-impl<P: Complementary> Solver<P> for LemkePath {
+impl<P: Complementary> Solver<P> for Lemke {
     type Work = LemkeWork;
 
     fn work(&self, problem: &P) -> Result<LemkeWork, SolveError> {
@@ -258,7 +243,7 @@ impl<P: Complementary> Solver<P> for LemkePath {
             alpha: vec![],
             w: vec![],
             sizes: vec![],
-            rng: Pcg64Mcg::seed_from_u64(self.settings.seed),
+            rng: Pcg64Mcg::seed_from_u64(self.seed),
             record: Recorder::default(),
         })
     }
@@ -274,7 +259,7 @@ impl<P: Complementary> Solver<P> for LemkePath {
     }
 
     fn start(&self, _: &P, point: &mut LcpPoint, work: &mut LemkeWork) {
-        let settings = &self.settings;
+        let settings = self;
         let free = work.path.data.free;
         let somewhere = point.z[free..].iter().any(|z| *z > 0.0);
         work.phase = if settings.warm && somewhere { Phase::Warm } else { Phase::Cold };
@@ -362,13 +347,13 @@ impl<P: Complementary> Solver<P> for LemkePath {
     }
 }
 
-impl LemkePath {
+impl Lemke {
     fn applies<'a, P: Complementary>(&self, problem: &'a P) -> Result<System<'a>, SolveError> {
         let system = problem.system()?;
         system.needs_entries()?;
         let fits =
             |d: &[f64]| d.len() == system.dim() && d.iter().all(|d| *d > 0.0 && d.is_finite());
-        match &self.covering {
+        match &self.covering_vector {
             Some(d) if !fits(d) => Err(SolveError::needs(
                 "a covering vector with a positive entry for each row",
                 "another",
@@ -380,7 +365,7 @@ impl LemkePath {
     /// The basis that `Auto` stands for.
     fn kind(&self, system: &System) -> BasisKind {
         let n = system.dim();
-        match (self.settings.basis, system.matrix) {
+        match (self.basis, system.matrix) {
             (BasisKind::Auto, _) if n <= TABLEAU_LIMIT => BasisKind::Tableau,
             (BasisKind::Auto, Matrix::Sparse(m)) if (m.nnz() as f64) < DENSITY * (n * n) as f64 => {
                 BasisKind::Sparse
@@ -456,14 +441,14 @@ impl LemkePath {
         g.clear();
         g.resize(n, 0.0);
         let rows = &path.data.row;
-        let kinds = [self.settings.covering, Covering::RowNorms, Covering::Random];
+        let kinds = [self.covering, Covering::RowNorms, Covering::Random];
         let mut kind = kinds[(*rays).min(2)];
         if kind == Covering::Auto {
             let range = |of: fn(f64, f64) -> f64| rows.iter().copied().reduce(of).unwrap_or(1.0);
             let even = range(f64::max) <= EVEN * range(f64::min);
             kind = if even { Covering::Ones } else { Covering::Scaled };
         }
-        match (&self.covering, kind) {
+        match (&self.covering_vector, kind) {
             (Some(d), _) if *rays == 0 => g.copy_from_slice(d),
             (_, Covering::Auto | Covering::Ones) => g.fill(1.0),
             (_, Covering::Scaled) => g.iter_mut().zip(rows).for_each(|(g, r)| *g = 1.0 / r),
@@ -500,7 +485,7 @@ impl LemkePath {
         work.phase = Phase::Cold;
         if !work.warm || work.rays > 0 {
             work.rays += 1;
-            if work.rays > self.settings.restarts {
+            if work.rays > self.restarts {
                 work.phase = Phase::Running;
                 return Step::NoSolution(work.first_ray.take().unwrap_or(ray));
             }

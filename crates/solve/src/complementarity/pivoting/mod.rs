@@ -13,15 +13,15 @@ mod murty;
 mod path;
 mod start;
 
-pub use bard::{Bard, BardPivoting};
-pub use block::{BlockPivoting, BlockPrincipal};
-pub use criss_cross::{CrissCross, CrissCrossPivoting};
-pub use enumeration::{Enumerate, Enumeration, Face, Solutions, all_solutions};
-pub use exact::{EnumerateExactly, EnumerationExact};
-pub use keller::{Keller, KellerPivoting};
-pub use lemke::{BasisKind, Covering, Lemke, LemkePath, LemkeWork, Ties};
+pub use bard::Bard;
+pub use block::BlockPivoting;
+pub use criss_cross::CrissCross;
+pub use enumeration::{Enumeration, Face, Solutions, all_solutions};
+pub use exact::EnumerationExact;
+pub use keller::Keller;
+pub use lemke::{BasisKind, Covering, Lemke, LemkeWork, Ties};
 pub use lemke_howson::{Equilibrium, game, lemke_howson};
-pub use murty::{Murty, MurtyPivoting};
+pub use murty::Murty;
 
 use crate::Step;
 use crate::complementarity::parts::{Cycle, Polished, Tableau};

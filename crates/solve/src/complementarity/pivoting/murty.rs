@@ -49,17 +49,13 @@ impl Described for Murty {
     };
 }
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct MurtyPivoting(pub Murty);
-
 /// The workspace.
 pub struct MurtyWork {
     tableau: Tableau,
     cycle: Cycle,
 }
 
-impl<P: Complementary> Solver<P> for MurtyPivoting {
+impl<P: Complementary> Solver<P> for Murty {
     type Work = MurtyWork;
 
     fn work(&self, problem: &P) -> Result<MurtyWork, SolveError> {
@@ -80,7 +76,7 @@ impl<P: Complementary> Solver<P> for MurtyPivoting {
         if let Some(end) = ended(tableau) {
             return end;
         }
-        let Some(r) = tableau.first_negative(self.0.descending) else {
+        let Some(r) = tableau.first_negative(self.descending) else {
             return polished(tableau, cycle);
         };
         if tableau.diagonal(r) == 0.0 {

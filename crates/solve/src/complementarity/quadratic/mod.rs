@@ -3,5 +3,5 @@
 mod mprgp;
 mod qp;
 
-pub use mprgp::{Mprgp, Proportioning};
-pub use qp::{Form, Programmed, QpWork, QuadraticProgram};
+pub use mprgp::Mprgp;
+pub use qp::{Form, QpWork, QuadraticProgram};

@@ -73,10 +73,6 @@ impl Described for Mprgp {
     };
 }
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct Proportioning(pub Mprgp);
-
 /// The workspace.
 #[derive(Debug, Clone, Default)]
 pub struct ProportioningWork {
@@ -116,7 +112,7 @@ const SYMMETRIC: f64 = 1e-12;
 /// Products for the estimate of ‖D⁻¹M‖.
 const POWERS: usize = 12;
 
-impl<P: Bounded> Solver<P> for Proportioning {
+impl<P: Bounded> Solver<P> for Mprgp {
     type Work = ProportioningWork;
 
     fn work(&self, problem: &P) -> Result<ProportioningWork, SolveError> {
@@ -133,7 +129,7 @@ impl<P: Bounded> Solver<P> for Proportioning {
         let system = system(problem);
         let project = |(i, z): (usize, &mut f64)| *z = system.bounds.project(i, *z);
         point.z.iter_mut().enumerate().for_each(project);
-        work.alpha = self.0.expansion / work.norm;
+        work.alpha = self.expansion / work.norm;
         work.steps = 0;
         work.renew(&system, &point.z);
         work.at = work.gradients(&system.bounds, &point.z);
@@ -147,7 +143,7 @@ impl<P: Bounded> Solver<P> for Proportioning {
         if work.steps.is_multiple_of(DRIFT) {
             work.gradient(&system, z);
         }
-        let proportional = work.at.chopped <= self.0.gamma.powi(2) * work.at.reduced;
+        let proportional = work.at.chopped <= self.gamma.powi(2) * work.at.reduced;
         if !proportional {
             work.chopped_direction(&bounds, z);
         }
@@ -183,7 +179,7 @@ impl<P: Bounded> Solver<P> for Proportioning {
     }
 
     fn check_every(&self) -> usize {
-        self.0.check_every
+        self.check_every
     }
 }
 

@@ -83,10 +83,6 @@ impl Described for QuadraticProgram {
     };
 }
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct Programmed(pub QuadraticProgram);
-
 /// The workspace.
 pub struct QpWork {
     scaled: Scaled,
@@ -134,7 +130,7 @@ const EXACT: f64 = 2e-15;
 /// A given point with a residual below this is polished first.
 const WARM: f64 = 0.1;
 
-impl<P: Bounded> Solver<P> for Programmed {
+impl<P: Bounded> Solver<P> for QuadraticProgram {
     type Work = QpWork;
 
     fn work(&self, problem: &P) -> Result<QpWork, SolveError> {
@@ -228,7 +224,7 @@ impl<P: Bounded> Solver<P> for Programmed {
     }
 }
 
-impl Programmed {
+impl QuadraticProgram {
     fn fill(&self, system: &System, work: &mut QpWork) -> Result<(), SolveError> {
         system.needs_entries()?;
         let n = system.dim();
@@ -236,7 +232,7 @@ impl Programmed {
             Equations { matrix: system.matrix, slack: None, q: system.q, free: system.free() };
         let boxed = matches!(system.bounds, Bounds::Box { .. });
         work.scaled.refill(&equations);
-        work.energy = match self.0.form {
+        work.energy = match self.form {
             Form::Auto => work.scaled.symmetric || boxed,
             Form::Energy => true,
             Form::Gap => false,
@@ -281,13 +277,13 @@ impl Programmed {
     fn program(&self, work: &mut QpWork) -> Result<Option<Vec<f64>>, &'static str> {
         let program = if work.energy { energy(work) } else { gap(work) };
         let settings = DefaultSettings {
-            max_iter: self.0.inner_iterations,
+            max_iter: self.inner_iterations,
             verbose: false,
             max_threads: 1,
             presolve_enable: false,
-            tol_gap_abs: self.0.inner_tolerance,
-            tol_gap_rel: self.0.inner_tolerance,
-            tol_feas: self.0.inner_tolerance,
+            tol_gap_abs: self.inner_tolerance,
+            tol_gap_rel: self.inner_tolerance,
+            tol_feas: self.inner_tolerance,
             ..DefaultSettings::default()
         };
         let Program { quadratic, linear, constraints, bound, cones } = &program;

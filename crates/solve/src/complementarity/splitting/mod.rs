@@ -9,9 +9,9 @@ mod rpsor;
 mod splitting_ls;
 
 pub use pgs::Pgs;
-pub use projected_jacobi::{Jacobi, ProjectedJacobi};
-pub use psor::{Psor, Relaxation};
+pub use projected_jacobi::ProjectedJacobi;
+pub use psor::Psor;
 pub use rows::Direction;
 pub use rpgs::Rpgs;
-pub use rpsor::{Proximal, Rpsor};
-pub use splitting_ls::{Searched, SplittingLs, Sweep};
+pub use rpsor::Rpsor;
+pub use splitting_ls::{SplittingLs, Sweep};

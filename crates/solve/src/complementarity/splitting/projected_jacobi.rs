@@ -61,10 +61,6 @@ impl Described for ProjectedJacobi {
     };
 }
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct Jacobi(pub ProjectedJacobi);
-
 /// The workspace: w and the diagonal.
 #[derive(Debug, Clone, Default)]
 pub struct JacobiWork {
@@ -73,7 +69,7 @@ pub struct JacobiWork {
     scale: f64,
 }
 
-impl<P: Bounded> Solver<P> for Jacobi {
+impl<P: Bounded> Solver<P> for ProjectedJacobi {
     type Work = JacobiWork;
 
     fn work(&self, problem: &P) -> Result<JacobiWork, SolveError> {
@@ -113,14 +109,14 @@ impl<P: Bounded> Solver<P> for Jacobi {
         let mut moved = 0.0;
         for (i, z) in point.z.iter_mut().enumerate() {
             let w = work.w[i] + system.q[i];
-            let new = system.bounds.project(i, *z - self.0.omega / work.diagonal[i] * w);
+            let new = system.bounds.project(i, *z - self.omega / work.diagonal[i] * w);
             moved += (work.diagonal[i] * (new - *z)).powi(2);
             *z = new;
         }
-        Step::Continue { estimate: moved.sqrt() / (work.scale * self.0.omega) }
+        Step::Continue { estimate: moved.sqrt() / (work.scale * self.omega) }
     }
 
     fn check_every(&self) -> usize {
-        self.0.check_every
+        self.check_every
     }
 }

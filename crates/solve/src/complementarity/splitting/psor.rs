@@ -63,10 +63,6 @@ impl Described for Psor {
     };
 }
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct Relaxation(pub Psor);
-
 /// The workspace: M by rows, the steps, and what is known of the rate.
 #[derive(Debug, Clone, Default)]
 pub struct RelaxationWork {
@@ -104,7 +100,7 @@ const YOUNG: usize = 10;
 /// The largest ω that is tried: what Young's relation overstates costs more than what it understates.
 const LARGEST: f64 = 1.995;
 
-impl<P: Bounded> Solver<P> for Relaxation {
+impl<P: Bounded> Solver<P> for Psor {
     type Work = RelaxationWork;
 
     fn work(&self, problem: &P) -> Result<RelaxationWork, SolveError> {
@@ -122,7 +118,7 @@ impl<P: Bounded> Solver<P> for Relaxation {
         point.z.iter_mut().enumerate().for_each(|(i, z)| *z = bounds.project(i, *z));
         work.backward = false;
         work.rate = Rate::default();
-        work.relax(&system(problem), self.0.omega);
+        work.relax(&system(problem), self.omega);
     }
 
     fn step(&self, problem: &P, point: &mut LcpPoint, work: &mut RelaxationWork) -> Step {
@@ -132,11 +128,11 @@ impl<P: Bounded> Solver<P> for Relaxation {
         let mut sum = 0.0;
         let note = |i: usize, move_i: f64| sum += (rows.diagonal[i] * move_i).powi(2);
         rows.sweep(system.matrix, &pass, &mut point.z, |_, _| 0.0, note);
-        *backward = self.0.direction == Direction::Symmetric && !*backward;
+        *backward = self.direction == Direction::Symmetric && !*backward;
         let moves = sum.sqrt();
         let estimate = moves / (*scale * rate.omega);
-        if self.0.adapt
-            && self.0.direction == Direction::Forward
+        if self.adapt
+            && self.direction == Direction::Forward
             && let Some(omega) = rate.next(moves)
         {
             work.relax(&system, omega);
@@ -145,11 +141,11 @@ impl<P: Bounded> Solver<P> for Relaxation {
     }
 
     fn check_every(&self) -> usize {
-        self.0.check_every
+        self.check_every
     }
 }
 
-impl Relaxation {
+impl Psor {
     fn fill(&self, system: &System, work: &mut RelaxationWork) -> Result<(), SolveError> {
         work.rows.fill(system)?;
         work.rows.needs_diagonal(&system.bounds)?;

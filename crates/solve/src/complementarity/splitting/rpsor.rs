@@ -79,10 +79,6 @@ impl Described for Rpsor {
     };
 }
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct Proximal(pub Rpsor);
-
 /// The workspace: M by rows, the centre, the regularisation and the steps.
 #[derive(Debug, Clone, Default)]
 pub struct ProximalWork {
@@ -122,7 +118,7 @@ const MANY: usize = 60;
 /// Sweeps that balance |M|.
 const BALANCES: usize = 8;
 
-impl<P: Bounded> Solver<P> for Proximal {
+impl<P: Bounded> Solver<P> for Rpsor {
     type Work = ProximalWork;
 
     fn work(&self, problem: &P) -> Result<ProximalWork, SolveError> {
@@ -140,8 +136,8 @@ impl<P: Bounded> Solver<P> for Proximal {
         point.z.iter_mut().enumerate().for_each(|(i, z)| *z = bounds.project(i, *z));
         work.center.clone_from(&point.z);
         work.backward = false;
-        work.inner = Inner { rho: self.0.rho, ..Inner::default() };
-        work.regularise(&system(problem), self.0.omega);
+        work.inner = Inner { rho: self.rho, ..Inner::default() };
+        work.regularise(&system(problem), self.omega);
     }
 
     fn step(&self, problem: &P, point: &mut LcpPoint, work: &mut ProximalWork) -> Step {
@@ -154,36 +150,36 @@ impl<P: Bounded> Solver<P> for Proximal {
         };
         let proximal = |i: usize, z: f64| rho[i] * (z - center[i]); //    ρ_i (z_i − z̃_i)
         rows.sweep(system.matrix, &pass, &mut point.z, proximal, note);
-        *backward = self.0.direction == Direction::Symmetric && !*backward;
-        let moves = sum.sqrt() / self.0.omega;
+        *backward = self.direction == Direction::Symmetric && !*backward;
+        let moves = sum.sqrt() / self.omega;
         let each = point.z.iter().zip(center.iter()).zip(rho.iter());
         let pull = each.map(|((z, c), rho)| (rho * (z - c)).powi(2)).sum::<f64>().sqrt();
         inner.sweeps += 1;
         let estimate = (moves + pull) / *scale;
         let grown = inner.sweeps > 1 && moves > 10.0 * inner.smallest;
         inner.smallest = if inner.sweeps == 1 { moves } else { inner.smallest.min(moves) };
-        if self.0.adapt && (grown || inner.sweeps >= MANY) {
+        if self.adapt && (grown || inner.sweeps >= MANY) {
             // Back to the last point that is known to be one.
             if grown {
                 point.z.clone_from(center);
             }
             (inner.least, inner.sweeps) = (1.5 * inner.rho, 0);
             inner.rho *= 2.0;
-            work.regularise(&system, self.0.omega);
-        } else if moves <= self.0.fraction * pull {
+            work.regularise(&system, self.omega);
+        } else if moves <= self.fraction * pull {
             center.clone_from(&point.z);
             let few = inner.sweeps <= FEW;
             inner.sweeps = 0;
-            if self.0.adapt && few && 0.7 * inner.rho >= inner.least {
+            if self.adapt && few && 0.7 * inner.rho >= inner.least {
                 inner.rho *= 0.7;
-                work.regularise(&system, self.0.omega);
+                work.regularise(&system, self.omega);
             }
         }
         Step::Continue { estimate }
     }
 
     fn check_every(&self) -> usize {
-        self.0.check_every
+        self.check_every
     }
 }
 

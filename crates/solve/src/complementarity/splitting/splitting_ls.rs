@@ -68,10 +68,6 @@ impl Described for SplittingLs {
     };
 }
 
-/// The solver.
-#[derive(Debug, Clone, Copy)]
-pub struct Searched(pub SplittingLs);
-
 /// The workspace: M by rows, the steps, w, d, M d.
 #[derive(Debug, Clone, Default)]
 pub struct SearchedWork {
@@ -91,7 +87,7 @@ const DRIFT: usize = 50;
 /// The largest `|M_ij − M_ji|`, in units of the largest entry, of a matrix that counts as symmetric.
 const SYMMETRIC: f64 = 1e-12;
 
-impl<P: Bounded> Solver<P> for Searched {
+impl<P: Bounded> Solver<P> for SplittingLs {
     type Work = SearchedWork;
 
     fn work(&self, problem: &P) -> Result<SearchedWork, SolveError> {
@@ -119,7 +115,7 @@ impl<P: Bounded> Solver<P> for Searched {
             w.iter_mut().zip(q).for_each(|(w, q)| *w += q);
         }
         *steps += 1;
-        match self.0.sweep {
+        match self.sweep {
             Sweep::Psor => {
                 d.clone_from(z);
                 let pass = Pass { q, bounds, step, backward: false };
@@ -145,15 +141,15 @@ impl<P: Bounded> Solver<P> for Searched {
             z[i] = bounds.project(i, z[i] + alpha * d[i]);
             w[i] += alpha * md[i];
         }
-        Step::Continue { estimate: sum.sqrt() / (*scale * self.0.omega) }
+        Step::Continue { estimate: sum.sqrt() / (*scale * self.omega) }
     }
 
     fn check_every(&self) -> usize {
-        self.0.check_every
+        self.check_every
     }
 }
 
-impl Searched {
+impl SplittingLs {
     fn fill(&self, system: &System, work: &mut SearchedWork) -> Result<(), SolveError> {
         let SearchedWork { rows, step, w, d, md, scale, .. } = work;
         rows.fill(system)?;
@@ -171,7 +167,7 @@ impl Searched {
         }
         step.clear();
         step.extend(rows.diagonal.iter().enumerate().map(|(i, &d)| {
-            if d == 0.0 || is_fixed(&system.bounds, i) { 0.0 } else { self.0.omega / d }
+            if d == 0.0 || is_fixed(&system.bounds, i) { 0.0 } else { self.omega / d }
         }));
         for x in [w, d, md] {
             x.resize(system.dim(), 0.0);

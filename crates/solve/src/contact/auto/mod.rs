@@ -34,7 +34,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::auto::proximal_newton::ProximalNewton;
 use crate::contact::existence;
-use crate::contact::form::{Access, Costs, Linearised};
+use crate::contact::form::{Access, Costs, Linearised, OnContacts};
 use crate::contact::parts::{Central, Sweep};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
@@ -71,10 +71,6 @@ impl Described for Auto {
         settings: described::<Self>,
     };
 }
-
-/// `auto` for contacts of dimension D.
-#[derive(Debug, Clone)]
-pub struct Hybrid<const D: usize>(pub Auto);
 
 /// A first stage of sweeps is at least this long, unless it ends at the tolerance.
 const FIRST_SWEEPS: usize = 30;
@@ -164,7 +160,7 @@ struct Done {
     strategies: usize,
 }
 
-impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
+impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for OnContacts<Auto, D> {
     type Work = HybridWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
@@ -272,7 +268,7 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for Hybrid<D> {
 
 const FIRST: Stage = Stage::Sweeps { last: f64::NAN, claims: 0 };
 
-impl<const D: usize> Hybrid<D> {
+impl<const D: usize> OnContacts<Auto, D> {
     /// Puts zero in place of impulses that solve the problem no better than zero does: a bad guess must not cost anything.
     fn choose_start<P: Linearised<D>>(
         &self,

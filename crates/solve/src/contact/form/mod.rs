@@ -138,3 +138,7 @@ pub trait Linearised<const D: usize>: Linear<D> + Blockwise<D> {
     /// What sweeps and factorisations cost on this problem. Makes the symbolic analysis.
     fn costs(&self, state: &mut Self::State) -> Costs;
 }
+
+/// The method S, which is its hyperparameters, on contacts of dimension D.
+#[derive(Debug, Clone, Copy)]
+pub struct OnContacts<S, const D: usize>(pub S);

@@ -14,7 +14,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::form::{Access, Linearised};
+use crate::contact::form::{Access, Linearised, OnContacts};
 use crate::contact::parts::ConvexIp;
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
@@ -62,10 +62,6 @@ impl Described for ConvexRelaxation {
     };
 }
 
-/// The convex relaxation for contacts of dimension D.
-#[derive(Debug, Clone, Copy)]
-pub struct Relaxed<const D: usize>(pub ConvexRelaxation);
-
 /// The workspace.
 pub struct RelaxedWork<P: Linearised<D>, const D: usize> {
     state: P::State,
@@ -76,7 +72,7 @@ pub struct RelaxedWork<P: Linearised<D>, const D: usize> {
     since_best: usize,
 }
 
-impl<P: Linearised<D>, const D: usize> Solver<P> for Relaxed<D> {
+impl<P: Linearised<D>, const D: usize> Solver<P> for OnContacts<ConvexRelaxation, D> {
     type Work = RelaxedWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {

@@ -16,7 +16,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::form::{Access, Linearised};
+use crate::contact::form::{Access, Linearised, OnContacts};
 use crate::contact::interior::pursuit::Pursuit;
 use crate::contact::parts::{Central, CentralIterate};
 use crate::core::register::{About, Described, Solves};
@@ -86,10 +86,6 @@ const SHORT: f64 = 1e-6;
 /// and after this many of them in a row there will be none.
 const MANY_SHORT: usize = 6;
 
-/// The nonsmooth interior-point method for contacts of dimension D.
-#[derive(Debug, Clone, Copy)]
-pub struct Pursued<const D: usize>(pub Interior);
-
 /// The workspace.
 pub struct PursuedWork<P: Linearised<D>, const D: usize> {
     state: P::State,
@@ -99,7 +95,7 @@ pub struct PursuedWork<P: Linearised<D>, const D: usize> {
     since_best: usize,
 }
 
-impl<P: Linearised<D>, const D: usize> Solver<P> for Pursued<D> {
+impl<P: Linearised<D>, const D: usize> Solver<P> for OnContacts<Interior, D> {
     type Work = PursuedWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {

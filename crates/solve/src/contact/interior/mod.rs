@@ -5,5 +5,5 @@ mod convex;
 mod exact;
 mod pursuit;
 
-pub use convex::{ConvexRelaxation, Relaxed};
-pub use exact::{Interior, Path, Pursued};
+pub use convex::ConvexRelaxation;
+pub use exact::{Interior, Path};

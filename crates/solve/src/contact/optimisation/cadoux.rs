@@ -27,7 +27,7 @@ use super::convex::Convex;
 use super::inner::{Conic, Effort};
 use super::sets::Set;
 use super::{MEMORY, at_most, fraction, positive};
-use crate::contact::form::{Access, Explicit, Linearised};
+use crate::contact::form::{Access, Explicit, Linearised, OnContacts};
 use crate::contact::law::cone;
 use crate::contact::parts::{Accelerator, ConvexIp, Shape};
 use crate::core::register::{About, Described, Solves};
@@ -132,10 +132,6 @@ impl Described for Cadoux {
     };
 }
 
-/// Cadoux' approach for contacts of dimension D.
-#[derive(Debug, Clone, Copy)]
-pub struct CadouxSteps<const D: usize>(pub Cadoux);
-
 /// The workspace of Cadoux' approach.
 pub struct CadouxWork<P: Linearised<D> + Explicit<D>, const D: usize> {
     convex: Convex<P, D>,
@@ -168,7 +164,7 @@ struct Trial {
     wait: usize,
 }
 
-impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for CadouxSteps<D> {
+impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for OnContacts<Cadoux, D> {
     type Work = CadouxWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {

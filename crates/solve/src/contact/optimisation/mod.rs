@@ -14,10 +14,10 @@ mod panagiotopoulos;
 mod sets;
 mod tresca;
 
-pub use cadoux::{Cadoux, CadouxSteps, CadouxWork, ConeSolver, Update};
+pub use cadoux::{Cadoux, CadouxWork, ConeSolver, Update};
 pub use inner::CylinderSolver;
-pub use panagiotopoulos::{Alternation, AlternationWork, HalfSolver, Panagiotopoulos};
-pub use tresca::{Tresca, TrescaSteps, TrescaWork};
+pub use panagiotopoulos::{AlternationWork, HalfSolver, Panagiotopoulos};
+pub use tresca::{Tresca, TrescaWork};
 
 fn fraction(name: &str, value: f64) -> Result<(), String> {
     if value > 0.0 && value < 1.0 {

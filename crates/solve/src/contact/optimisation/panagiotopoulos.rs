@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use super::convex::Convex;
 use super::sets::Set;
 use super::{fraction, positive};
-use crate::contact::form::{Access, Blockwise, Linearised};
+use crate::contact::form::{Access, Blockwise, Linearised, OnContacts};
 use crate::contact::law::cone::ConvexSet;
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
@@ -78,10 +78,6 @@ impl Described for Panagiotopoulos {
     };
 }
 
-/// Panagiotopoulos' alternation for contacts of dimension D.
-#[derive(Debug, Clone, Copy)]
-pub struct Alternation<const D: usize>(pub Panagiotopoulos);
-
 /// The workspace of the alternation.
 pub struct AlternationWork<P: Blockwise<D> + Linearised<D>, const D: usize> {
     convex: Convex<P, D>,
@@ -97,7 +93,7 @@ enum Half {
     Tangential,
 }
 
-impl<P: Blockwise<D> + Linearised<D>, const D: usize> Solver<P> for Alternation<D> {
+impl<P: Blockwise<D> + Linearised<D>, const D: usize> Solver<P> for OnContacts<Panagiotopoulos, D> {
     type Work = AlternationWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use super::inner::{CylinderSolver, Cylinders, Effort};
 use super::sets::Set;
 use super::{MEMORY, at_most, fraction, positive};
-use crate::contact::form::{Explicit, Linearised};
+use crate::contact::form::{Explicit, Linearised, OnContacts};
 use crate::contact::parts::Accelerator;
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
@@ -81,10 +81,6 @@ impl Described for Tresca {
     };
 }
 
-/// The Tresca fixed point for contacts of dimension D.
-#[derive(Debug, Clone, Copy)]
-pub struct TrescaSteps<const D: usize>(pub Tresca);
-
 /// The workspace of the Tresca fixed point.
 pub struct TrescaWork<P: Linearised<D> + Explicit<D>, const D: usize> {
     inner: Cylinders<P, D>,
@@ -95,7 +91,7 @@ pub struct TrescaWork<P: Linearised<D> + Explicit<D>, const D: usize> {
     error: f64,
 }
 
-impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for TrescaSteps<D> {
+impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for OnContacts<Tresca, D> {
     type Work = TrescaWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
@@ -178,7 +174,7 @@ mod tests {
         for inner in
             [CylinderSolver::ActiveSet, CylinderSolver::ProjectedGradient, CylinderSolver::Conic]
         {
-            let solver = TrescaSteps::<3>(Tresca { inner, ..Tresca::default() });
+            let solver = OnContacts::<_, 3>(Tresca { inner, ..Tresca::default() });
             let (mut work, mut point) = (solver.work(&problem).unwrap(), problem.origin());
             solver.start(&problem, &mut point, &mut work);
             for expected in [[1.0, 0.0, 0.0], [1.0, -0.5, 0.0]] {

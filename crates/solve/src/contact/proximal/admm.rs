@@ -25,7 +25,7 @@ use nonsmooth_problem::linalg::{Block, small};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::form::{Access, Linearised};
+use crate::contact::form::{Access, Linearised, OnContacts};
 use crate::contact::law::cone;
 use crate::contact::parts::Accelerator;
 use crate::core::register::{About, Described, Solves};
@@ -123,10 +123,6 @@ impl Described for Admm {
     };
 }
 
-/// ADMM for contacts of dimension D.
-#[derive(Debug, Clone)]
-pub struct Steps<const D: usize>(pub Admm);
-
 /// The workspace: the problem's view with its factorisation, and the iterate.
 pub struct StepsWork<P: Linearised<D>, const D: usize> {
     state: P::State,
@@ -157,7 +153,7 @@ const POWER_STEPS: usize = 15;
 /// Residuals whose ratio is below this are balanced.
 const BALANCED: f64 = 5.0;
 
-impl<P: Linearised<D>, const D: usize> Solver<P> for Steps<D> {
+impl<P: Linearised<D>, const D: usize> Solver<P> for OnContacts<Admm, D> {
     type Work = StepsWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
@@ -406,7 +402,7 @@ mod tests {
         let w = Bsr::from_csc(&Csc::diagonal(&[2.0; 2]));
         let problem = FrictionLocal::<2>::new(w, vec![-2.0, 0.0], vec![0.0]).unwrap();
         let settings = Admm { rho: 1.0, eta: 0.0, alpha: 1.5, ..Admm::default() };
-        let solver = Steps::<2>(settings);
+        let solver = OnContacts::<_, 2>(settings);
         let mut work = solver.work(&problem).unwrap();
         let mut point = problem.origin();
         solver.start(&problem, &mut point, &mut work);
@@ -421,7 +417,7 @@ mod tests {
     fn eigenvalues_give_rho() {
         let w = Bsr::from_csc(&Csc::diagonal(&[1.0, 3.0]));
         let problem = FrictionLocal::<2>::new(w, vec![-1.0, 0.0], vec![0.1]).unwrap();
-        let solver = Steps::<2>(Admm::default());
+        let solver = OnContacts::<_, 2>(Admm::default());
         let mut work = solver.work(&problem).unwrap();
         // w = 2: eigenvalues 1/2 and 3/2.
         assert!((work.spectral(&problem) - 0.75_f64.sqrt()).abs() < 1e-2);
@@ -438,7 +434,7 @@ mod tests {
             (RhoRule::Balanced, 0.0, 5),
         ] {
             let settings = Admm { rule, rho, anderson, ..Admm::default() };
-            let mut driver = Driver::new(Steps::<3>(settings));
+            let mut driver = Driver::new(OnContacts::<_, 3>(settings));
             let mut point = problem.origin();
             let limits = Limits { tolerance: 1e-11, max_iterations: 50_000, ..Limits::default() };
             let outcome = driver.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();

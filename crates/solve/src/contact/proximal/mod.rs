@@ -3,5 +3,5 @@
 mod admm;
 mod proximal_point;
 
-pub use admm::{Admm, RhoRule, Steps as AdmmSteps};
+pub use admm::{Admm, RhoRule};
 pub use proximal_point::{AlphaRule, Outer, Proximal, ProximalPoint};
