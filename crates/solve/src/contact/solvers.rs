@@ -5,11 +5,11 @@ use nonsmooth_problem::check::Kinematic;
 use crate::contact::auto::Auto;
 use crate::contact::form::{Concurrent, Explicit, Linear, Linearised, OnContacts, Regularised};
 use crate::contact::interior::{ConvexRelaxation, Interior};
-use crate::contact::law::cfun::ContactFunction;
-use crate::contact::newton::{
-    Method as NewtonMethod, NewtonAc, NewtonCm, NewtonFb, NewtonFbSmooth, NewtonHsw, NewtonJm,
-    NewtonNm, NewtonPk, NewtonXsw, Semismooth,
+use crate::contact::law::cfun::{
+    AlartCurnier, ChenMangasarian, FischerBurmeister, HueberStadlerWohlmuth, JeanMoreau,
+    NaturalMap, ParkKwak, SmoothedFischerBurmeister, XuewenSohWanji,
 };
+use crate::contact::newton::Newton;
 use crate::contact::optimisation::{Cadoux, Panagiotopoulos, Tresca};
 use crate::contact::projection::{
     DeSaxce, Extragradient, FixedPoint, Hyperplane, Method, Projected,
@@ -27,15 +27,6 @@ where
     OnContacts<S, D>: Solver<P, Work: 'static>,
 {
     Entry::new(|method: S| Boxed::new(OnContacts(method)))
-}
-
-/// A Newton method, by its function.
-fn newton<P, M, const D: usize>() -> Entry<P>
-where
-    P: Linearised<D> + 'static,
-    M: NewtonMethod<Function: ContactFunction<D> + 'static> + Described,
-{
-    Entry::new(|method: M| Boxed::new(Semismooth::<M::Function, D>::new(&method)))
 }
 
 /// A projection method.
@@ -62,15 +53,15 @@ where
         projected::<P, Extragradient, D>(),
         projected::<P, Hyperplane, D>(),
         on::<_, Admm, D>(),
-        newton::<P, NewtonAc, D>(),
-        newton::<P, NewtonJm, D>(),
-        newton::<P, NewtonNm, D>(),
-        newton::<P, NewtonFb, D>(),
-        newton::<P, NewtonFbSmooth, D>(),
-        newton::<P, NewtonCm, D>(),
-        newton::<P, NewtonXsw, D>(),
-        newton::<P, NewtonPk, D>(),
-        newton::<P, NewtonHsw, D>(),
+        on::<P, Newton<AlartCurnier>, D>(),
+        on::<P, Newton<JeanMoreau>, D>(),
+        on::<P, Newton<NaturalMap>, D>(),
+        on::<P, Newton<FischerBurmeister>, D>(),
+        on::<P, Newton<SmoothedFischerBurmeister>, D>(),
+        on::<P, Newton<ChenMangasarian>, D>(),
+        on::<P, Newton<XuewenSohWanji>, D>(),
+        on::<P, Newton<ParkKwak>, D>(),
+        on::<P, Newton<HueberStadlerWohlmuth>, D>(),
         on::<P, Tresca, D>(),
         on::<P, Panagiotopoulos, D>(),
         on::<P, Cadoux, D>(),
@@ -89,8 +80,8 @@ where
         Entry::new(Nsgs::boxed::<Regularised<P>, D>),
         projected::<_, Extragradient, D>(),
         on::<_, Admm, D>(),
-        newton::<_, NewtonAc, D>(),
-        newton::<_, NewtonNm, D>(),
-        newton::<_, NewtonFb, D>(),
+        on::<_, Newton<AlartCurnier>, D>(),
+        on::<_, Newton<NaturalMap>, D>(),
+        on::<_, Newton<FischerBurmeister>, D>(),
     ]
 }

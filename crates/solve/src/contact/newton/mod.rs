@@ -5,7 +5,7 @@
 //! (Q + P W) Δr = −Φ,   P = diag ∂Φ_c/∂u_c,   Q = diag ∂Φ_c/∂r_c,   r ← r + t Δr
 //! ```
 //!
-//! One skeleton ([`Semismooth`]), one file for each function. The linear system is [`Linearised`]'s: in contact space
+//! One skeleton ([`Newton`]); the functions stand in [`cfun`](crate::contact::law::cfun), each with its paper and what its method is called. The linear system is [`Linearised`]'s: in contact space
 //! where W is known, over the degrees of freedom where M and H are.
 //!
 //! All is done in pure numbers, `û = u/s` and `r̂ = w_c r/s` with `s = ‖q‖/√nc`, `w_c = tr(W_cc)/D`: units change neither steps
@@ -20,46 +20,32 @@
 //! Fails: where W is rank deficient (hyperstatic) and many contacts stick, Newton's matrix is nearly singular and its
 //! neighbourhood of convergence tiny: use a proximal method around it.
 
-mod alart_curnier;
-mod chen_mangasarian;
-mod fischer_burmeister;
-mod fischer_burmeister_smoothed;
-mod hueber_stadler_wohlmuth;
-mod jean_moreau;
-mod natural_map;
-mod park_kwak;
 mod scaling;
 #[cfg(test)]
 mod tests;
-mod xuewen_soh_wanji;
 
 use nonsmooth_problem::linalg::{Block, budget, small};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::form::{Access, Linearised};
-use crate::contact::law::cfun::{ContactFunction, Law, Linearisation};
+use crate::contact::form::{Access, Linearised, OnContacts};
+use crate::contact::law::cfun::{ContactFunction, Law, Linearisation, NewtonFunction};
 use crate::contact::parts::Sweep;
 use crate::core::line_search::{LineSearch, Search};
-use crate::core::settings::Settings;
+use crate::core::register::{About, Described, Solves};
+use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
-pub use alart_curnier::NewtonAc;
-pub use chen_mangasarian::NewtonCm;
-pub use fischer_burmeister::NewtonFb;
-pub use fischer_burmeister_smoothed::NewtonFbSmooth;
-pub use hueber_stadler_wohlmuth::NewtonHsw;
-pub use jean_moreau::NewtonJm;
-pub use natural_map::NewtonNm;
-pub use park_kwak::NewtonPk;
 pub use scaling::RhoRule;
-pub use xuewen_soh_wanji::NewtonXsw;
 
-/// The hyperparameters that all Newton methods have.
+/// Newton's method on the function F. (Unknown keys are refused where settings are parsed; serde cannot refuse them beside `flatten`.)
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-#[schemars(inline)]
-pub struct Newton {
+#[serde(default, bound = "F: NewtonFunction")]
+#[schemars(bound = "F: NewtonFunction")]
+pub struct Newton<F> {
+    /// The function, with hyperparameters of its own.
+    #[serde(flatten)]
+    pub function: F,
     /// How the line search accepts a step, on half the square of the function.
     pub line_search: LineSearch,
     /// How rho of each contact follows from its block of W.
@@ -75,9 +61,10 @@ pub struct Newton {
     pub smoothing: f64,
 }
 
-impl Default for Newton {
+impl<F: Default> Default for Newton<F> {
     fn default() -> Self {
         Self {
+            function: F::default(),
             line_search: LineSearch::default(),
             rho_rule: RhoRule::default(),
             rho: 1.0,
@@ -88,8 +75,9 @@ impl Default for Newton {
     }
 }
 
-impl Settings for Newton {
+impl<F: NewtonFunction> Settings for Newton<F> {
     fn validate(&self) -> Result<(), String> {
+        self.function.validate()?;
         for (key, sweeps) in [("warm_up", self.warm_up), ("rescue", self.rescue)] {
             if sweeps > MOST_SWEEPS {
                 return Err(format!("{key}: expected at most {MOST_SWEEPS}, found {sweeps}"));
@@ -105,30 +93,17 @@ impl Settings for Newton {
     }
 }
 
-/// A Newton method by its hyperparameters: those of the skeleton, and a function.
-pub trait Method: Send {
-    /// The function.
-    type Function: Send;
-
-    /// The skeleton's hyperparameters.
-    fn newton(&self) -> Newton;
-
-    /// The function, with its own hyperparameters.
-    fn function(&self) -> Self::Function;
-}
-
-/// The Newton method on the function F for contacts of dimension D.
-#[derive(Debug, Clone, Copy)]
-pub struct Semismooth<F, const D: usize> {
-    settings: Newton,
-    function: F,
-}
-
-impl<F, const D: usize> Semismooth<F, D> {
-    /// The solver that a method's hyperparameters describe.
-    pub fn new<M: Method<Function = F>>(method: &M) -> Self {
-        Self { settings: method.newton(), function: method.function() }
-    }
+impl<F: NewtonFunction> Described for Newton<F> {
+    const ABOUT: &'static About = &About {
+        name: F::METHOD.name,
+        family: "newton",
+        solves: Solves::Law,
+        summary: F::METHOD.summary,
+        needs: &[],
+        cites: F::METHOD.cites,
+        variants: F::METHOD.variants,
+        settings: described::<Self>,
+    };
 }
 
 /// The most sweeps that may be asked for in one step: time limits act between steps.
@@ -201,7 +176,7 @@ impl Phase {
     }
 }
 
-impl<P, F, const D: usize> Solver<P> for Semismooth<F, D>
+impl<P, F, const D: usize> Solver<P> for OnContacts<Newton<F>, D>
 where
     P: Linearised<D>,
     F: ContactFunction<D>,
@@ -224,7 +199,7 @@ where
             b: vec![],
             p: vec![],
             q: vec![],
-            search: Search::new(self.settings.line_search),
+            search: Search::new(self.0.line_search),
             phase: Phase::new(),
         };
         self.fill(problem, &mut work);
@@ -252,8 +227,8 @@ where
         if let Some(ray) = problem.contradiction(&work.state) {
             return Step::NoSolution(ray.clone().into());
         }
-        if std::mem::take(&mut work.phase.fresh) && self.settings.warm_up > 0 {
-            return self.sweeps(problem, point, work, self.settings.warm_up);
+        if std::mem::take(&mut work.phase.fresh) && self.0.warm_up > 0 {
+            return self.sweeps(problem, point, work, self.0.warm_up);
         }
         if F::SMOOTHED {
             self.reduce_smoothing(P::impulses(point), work);
@@ -296,7 +271,7 @@ where
             }
             // Recomputed, not u + t W Δr: rounding does not gather.
             problem.velocities(state, trial, trial_u);
-            merit_at(&self.function, laws, unit, *scale, trial_u, trial)
+            merit_at(&self.0.function, laws, unit, *scale, trial_u, trial)
         });
         if !(found.accepted || found.merit < merit) {
             return self.rescue(
@@ -316,7 +291,7 @@ where
     }
 }
 
-impl<F, const D: usize> Semismooth<F, D> {
+impl<F, const D: usize> OnContacts<Newton<F>, D> {
     fn fill<P: Linearised<D>>(&self, problem: &P, work: &mut Work<P, D>) {
         let n = problem.mu().len();
         work.scale = problem.velocity_scale(&work.state) / (n as f64).sqrt();
@@ -346,7 +321,7 @@ impl<F, const D: usize> Semismooth<F, D> {
 
     /// ρ of every contact for the present rung.
     fn scale_contacts<P: Linearised<D>>(&self, problem: &P, work: &mut Work<P, D>) {
-        let Newton { rho_rule, rho, .. } = self.settings;
+        let Newton { rho_rule, rho, .. } = self.0;
         let factor = scaling::LADDER[work.phase.rung % scaling::LADDER.len()];
         work.laws.clear();
         for (c, (&mu, &unit)) in problem.mu().iter().zip(&work.unit).enumerate() {
@@ -391,15 +366,15 @@ impl<F, const D: usize> Semismooth<F, D> {
     where
         P: Linearised<D>,
     {
-        if self.settings.rescue == 0 || work.phase.rescues >= RESCUES {
+        if self.0.rescue == 0 || work.phase.rescues >= RESCUES {
             return Step::Stuck(why.into());
         }
         // Longer each time in a row: where W is rank deficient, Newton needs a start that few sweeps do not give.
-        let count = self.settings.rescue << work.phase.rescues.min(DOUBLINGS);
+        let count = self.0.rescue << work.phase.rescues.min(DOUBLINGS);
         work.phase.rescues += 1;
         work.phase.since_low = 0;
         work.search.restart();
-        if self.settings.rho_rule == RhoRule::Adaptive {
+        if self.0.rho_rule == RhoRule::Adaptive {
             work.phase.rung += 1;
             work.phase.low = f64::INFINITY;
             self.scale_contacts(problem, work);
@@ -408,13 +383,13 @@ impl<F, const D: usize> Semismooth<F, D> {
     }
 }
 
-impl<F: ContactFunction<D>, const D: usize> Semismooth<F, D> {
+impl<F: ContactFunction<D>, const D: usize> OnContacts<Newton<F>, D> {
     /// Φ, P, Q at the present point into `b = −Φ`, `p`, `q`, in the problem's units; the merit.
     fn linearise<P: Linearised<D>>(&self, r: &[f64], work: &mut Work<P, D>) -> f64 {
         let Work { laws, unit, scale, u, b, p, q, .. } = work;
         let mut merit = 0.0;
         for (c, (law, &w)) in laws.iter().zip(&*unit).enumerate() {
-            let at = contact(&self.function, law, w, *scale, u, r, c);
+            let at = contact(&self.0.function, law, w, *scale, u, r, c);
             for k in 0..D {
                 merit += 0.5 * at.phi[k] * at.phi[k];
                 b[D * c + k] = -*scale * at.phi[k];
@@ -429,10 +404,10 @@ impl<F: ContactFunction<D>, const D: usize> Semismooth<F, D> {
     fn reduce_smoothing<P: Linearised<D>>(&self, r: &[f64], work: &mut Work<P, D>) {
         let phase = &mut work.phase;
         work.laws.iter_mut().for_each(|law| law.smoothing = 0.0);
-        let merit = merit_at(&self.function, &work.laws, &work.unit, work.scale, &work.u, r);
+        let merit = merit_at(&self.0.function, &work.laws, &work.unit, work.scale, &work.u, r);
         phase.note(merit);
         let rms = (2.0 * merit / work.laws.len() as f64).sqrt();
-        let bound = self.settings.smoothing * rms * rms.min(1.0);
+        let bound = self.0.smoothing * rms * rms.min(1.0);
         if bound < phase.smoothing {
             phase.smoothing = bound;
             work.search.restart();

@@ -11,7 +11,11 @@
 //! Vanishes exactly at the solutions of `K* ∋ u + mu‖u_T‖e_N ⟂ r ∈ K`, for any ρ > 0.
 //! Source: AlartCurnier1991; Jean1999; Acary, lecture (88)–(94) with the Jacobian as corrected in docs/notation.md.
 
-use super::{ContactFunction, Law, Linearisation, Radii};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{ContactFunction, Law, Linearisation, Named, NewtonFunction, Radii};
+use crate::core::settings::Settings;
 
 /// Which radius the friction disk has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,17 +27,58 @@ pub enum Disk {
 }
 
 /// The Alart–Curnier function.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct AlartCurnier;
+///
+/// Newton's method on it is `newton_ac`: AlartCurnier1991; Acary, lecture (88)–(96). Fails: as the skeleton: rank deficient W with much sticking.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct AlartCurnier {}
 
 /// The Jean–Moreau variant.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct JeanMoreau;
+///
+/// Newton's method on it is `newton_jm`: Jean1999; Acary, lecture (88)–(96), with the radius mu r_N. Fails: as the skeleton. The radius sees r_N, which may be negative on the way: such contacts count as open.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct JeanMoreau {}
+
+impl Settings for AlartCurnier {}
+
+impl NewtonFunction for AlartCurnier {
+    const METHOD: Named = Named {
+        name: "newton_ac",
+        summary: "semismooth Newton on the Alart-Curnier function",
+        cites: &[
+            "AlartCurnier1991",
+            "Acary2018",
+            "GoldsteinPrice1967",
+            "GrippoLamparielloLucidi1986",
+        ],
+        variants: &[
+            "line_search=none",
+            "line_search=goldstein_price",
+            "line_search=nonmonotone",
+            "rho_rule=fixed",
+            "rho_rule=norm",
+            "rho_rule=adaptive",
+            "warm_up=0",
+        ],
+    };
+}
 
 impl<const D: usize> ContactFunction<D> for AlartCurnier {
     fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
         alart_curnier(Disk::AlartCurnier, u, r, law.mu, law.rho)
     }
+}
+
+impl Settings for JeanMoreau {}
+
+impl NewtonFunction for JeanMoreau {
+    const METHOD: Named = Named {
+        name: "newton_jm",
+        summary: "semismooth Newton on the Jean-Moreau function",
+        cites: &["AlartCurnier1991", "Jean1999", "Acary2018"],
+        variants: &[],
+    };
 }
 
 impl<const D: usize> ContactFunction<D> for JeanMoreau {

@@ -16,8 +16,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation, SelfDual};
+use super::{ContactFunction, Law, Linearisation, Named, NewtonFunction, SelfDual};
 use crate::contact::law::cone::jordan;
+use crate::core::settings::Settings;
 
 /// ĝ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -57,7 +58,10 @@ impl Kernel {
 }
 
 /// The smoothed natural map with the kernel given; ε is [`Law::smoothing`].
-#[derive(Debug, Clone, Copy, Default)]
+///
+/// Newton's method on it is `newton_cm`: ChenMangasarian1996; FukushimaLuoTseng2001, section 4. Fails: as `newton_fb`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct ChenMangasarian {
     /// ĝ.
     pub kernel: Kernel,
@@ -68,6 +72,17 @@ enum Piece {
     Inside,
     Polar,
     Outside,
+}
+
+impl Settings for ChenMangasarian {}
+
+impl NewtonFunction for ChenMangasarian {
+    const METHOD: Named = Named {
+        name: "newton_cm",
+        summary: "smoothing Newton on the Chen-Mangasarian class over the second-order cone",
+        cites: &["ChenMangasarian1996", "FukushimaLuoTseng2001"],
+        variants: &["kernel=neural_network"],
+    };
 }
 
 impl<const D: usize> ContactFunction<D> for ChenMangasarian {

@@ -12,21 +12,53 @@
 //! Source: FukushimaLuoTseng2001; Acary, lecture (116)(117). In the unscaled coordinates:
 //! docs/derivations/cone-functions.md.
 
-use super::{ContactFunction, Law, Linearisation, SelfDual};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{ContactFunction, Law, Linearisation, Named, NewtonFunction, SelfDual};
 use crate::contact::law::cone::jordan::{self, Spectral};
+use crate::core::settings::Settings;
 
 /// The Fischer–Burmeister function.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct FischerBurmeister;
+///
+/// Newton's method on it is `newton_fb`: FukushimaLuoTseng2001; Acary, lecture (111)–(116). Fails: coordinates stretched by mu: small coefficients of friction make it ill conditioned; and as the natural map.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct FischerBurmeister {}
 
 /// Its smoothing, with ε from [`Law::smoothing`].
-#[derive(Debug, Clone, Copy, Default)]
-pub struct SmoothedFischerBurmeister;
+///
+/// Newton's method on it is `newton_fb_smooth`: FukushimaLuoTseng2001; Acary, lecture (117). Fails: as `newton_fb`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct SmoothedFischerBurmeister {}
+
+impl Settings for FischerBurmeister {}
+
+impl NewtonFunction for FischerBurmeister {
+    const METHOD: Named = Named {
+        name: "newton_fb",
+        summary: "semismooth Newton on the Fischer-Burmeister function over the second-order cone",
+        cites: &["FukushimaLuoTseng2001", "Acary2018"],
+        variants: &[],
+    };
+}
 
 impl<const D: usize> ContactFunction<D> for FischerBurmeister {
     fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
         function(&Law { smoothing: 0.0, ..*law }, u, r)
     }
+}
+
+impl Settings for SmoothedFischerBurmeister {}
+
+impl NewtonFunction for SmoothedFischerBurmeister {
+    const METHOD: Named = Named {
+        name: "newton_fb_smooth",
+        summary: "smoothing Newton on the Fischer-Burmeister function over the second-order cone",
+        cites: &["FukushimaLuoTseng2001", "Acary2018"],
+        variants: &[],
+    };
 }
 
 impl<const D: usize> ContactFunction<D> for SmoothedFischerBurmeister {

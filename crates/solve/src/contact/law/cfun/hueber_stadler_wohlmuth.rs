@@ -17,8 +17,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation};
+use super::{ContactFunction, Law, Linearisation, Named, NewtonFunction};
 use crate::contact::law::cone::tangential_norm;
+use crate::core::settings::Settings;
 
 /// The derivative that is used while sliding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -32,7 +33,10 @@ pub enum SlipBlock {
 }
 
 /// The function of Hüeber, Stadler and Wohlmuth.
-#[derive(Debug, Clone, Copy, Default)]
+///
+/// Newton's method on it is `newton_hsw`: HueberStadlerWohlmuth2008; docs/derivations/hueber-stadler-wohlmuth.md. Fails: as `newton_ac`; the modified block is not a derivative, so a short step need not decrease the merit.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct HueberStadlerWohlmuth {
     /// The derivative that is used while sliding.
     pub slip: SlipBlock,
@@ -43,6 +47,17 @@ enum Piece {
     Stick,
     Slip,
     Open,
+}
+
+impl Settings for HueberStadlerWohlmuth {}
+
+impl NewtonFunction for HueberStadlerWohlmuth {
+    const METHOD: Named = Named {
+        name: "newton_hsw",
+        summary: "semismooth Newton on the function of Hueber, Stadler and Wohlmuth",
+        cites: &["HueberStadlerWohlmuth2008"],
+        variants: &["slip=exact"],
+    };
 }
 
 impl<const D: usize> ContactFunction<D> for HueberStadlerWohlmuth {

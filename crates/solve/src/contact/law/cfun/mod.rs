@@ -10,6 +10,7 @@ mod park_kwak;
 mod xuewen_soh_wanji;
 
 use crate::contact::law::cone;
+use crate::core::settings::Settings;
 
 pub use alart_curnier::{AlartCurnier, Disk, JeanMoreau, alart_curnier};
 pub use chen_mangasarian::{ChenMangasarian, Kernel};
@@ -76,6 +77,25 @@ pub trait ContactFunction<const D: usize>: Send {
 
     /// Φ with an element of its generalised Jacobian (or what the method puts in its place).
     fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D>;
+}
+
+/// What Newton's method on a function is called and rests on.
+#[derive(Debug)]
+pub struct Named {
+    /// The method's name.
+    pub name: &'static str,
+    /// One line.
+    pub summary: &'static str,
+    /// Keys of `docs/refs.bib`.
+    pub cites: &'static [&'static str],
+    /// Settings that tests and benchmarks run besides the defaults.
+    pub variants: &'static [&'static str],
+}
+
+/// A function that has a Newton method. The struct is its hyperparameters.
+pub trait NewtonFunction: Settings + Copy + Send + 'static {
+    /// The method.
+    const METHOD: Named;
 }
 
 /// De Saxcé's modified velocity `ũ = u + mu s e_N`, `s = √(‖u_T‖² + ε²) − ε`, and ∂s/∂u_T as `(0, t)`.

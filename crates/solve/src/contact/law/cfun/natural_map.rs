@@ -9,8 +9,12 @@
 //!
 //! Source: AcaryBremondHuber2018; Acary, lecture (108)(109), with the sign of docs/notation.md.
 
-use super::{ContactFunction, Law, Linearisation, modified_velocity};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{ContactFunction, Law, Linearisation, Named, NewtonFunction, modified_velocity};
 use crate::contact::law::cone::{self, Region};
+use crate::core::settings::Settings;
 
 /// `x − P_K(x − ũ)` by the three regions of the cone, so that a large x does not round ũ away.
 #[inline(always)]
@@ -45,8 +49,22 @@ pub fn natural_residual<const D: usize>(w: f64, r: &[f64; D], u: &[f64; D], mu: 
 }
 
 /// The natural map.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct NaturalMap;
+///
+/// Newton's method on it is `newton_nm`: AcaryBremondHuber2018; Acary, lecture (108)–(110). Fails: ‖u_T‖ has its kink at every sticking contact, so fewer starts converge than with Alart–Curnier.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct NaturalMap {}
+
+impl Settings for NaturalMap {}
+
+impl NewtonFunction for NaturalMap {
+    const METHOD: Named = Named {
+        name: "newton_nm",
+        summary: "semismooth Newton on the natural map of the cone",
+        cites: &["AcaryBremondHuber2018", "Acary2018"],
+        variants: &[],
+    };
+}
 
 impl<const D: usize> ContactFunction<D> for NaturalMap {
     fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {

@@ -20,12 +20,19 @@
 //!
 //! Source: ParkKwak1994; LeungChenChen1998; Acary, lecture (97)(98). Not differentiable where `x_T = 0`; the frame stands still there.
 
-use super::{ContactFunction, Law, Linearisation};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{ContactFunction, Law, Linearisation, Named, NewtonFunction};
 use crate::contact::law::cone::tangential_norm;
+use crate::core::settings::Settings;
 
 /// The function of Park and Kwak.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct ParkKwak;
+///
+/// Newton's method on it is `newton_pk`: ParkKwak1994; LeungChenChen1998; Acary, lecture (97)(98); docs/derivations/sliding-angle.md. Fails: where `x_T` is nearly zero the frame turns fast and steps are short. In the plane it is `newton_ac`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct ParkKwak {}
 
 /// The pieces of the tangential part.
 #[derive(Clone, Copy)]
@@ -36,6 +43,17 @@ enum Piece {
     Slip,
     /// `R = 0`.
     Open,
+}
+
+impl Settings for ParkKwak {}
+
+impl NewtonFunction for ParkKwak {
+    const METHOD: Named = Named {
+        name: "newton_pk",
+        summary: "semismooth Newton on the equations of Park and Kwak, with the sliding angle in space",
+        cites: &["ParkKwak1994", "LeungChenChen1998", "Acary2018"],
+        variants: &[],
+    };
 }
 
 impl<const D: usize> ContactFunction<D> for ParkKwak {

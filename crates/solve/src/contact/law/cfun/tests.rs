@@ -16,13 +16,13 @@ fn boxed<F: ContactFunction<D> + 'static, const D: usize>(f: F) -> Function<D> {
 /// All but Hüeber–Stadler–Wohlmuth's, whose matrix is on purpose not the derivative of its value (it has its own tests).
 fn differentiable<const D: usize>() -> Vec<(&'static str, Function<D>)> {
     vec![
-        ("alart_curnier", boxed(AlartCurnier)),
-        ("jean_moreau", boxed(JeanMoreau)),
-        ("park_kwak", boxed(ParkKwak)),
-        ("xuewen_soh_wanji", boxed(XuewenSohWanji)),
-        ("natural_map", boxed(NaturalMap)),
-        ("fischer_burmeister", boxed(FischerBurmeister)),
-        ("smoothed_fischer_burmeister", boxed(SmoothedFischerBurmeister)),
+        ("alart_curnier", boxed(AlartCurnier {})),
+        ("jean_moreau", boxed(JeanMoreau {})),
+        ("park_kwak", boxed(ParkKwak {})),
+        ("xuewen_soh_wanji", boxed(XuewenSohWanji {})),
+        ("natural_map", boxed(NaturalMap {})),
+        ("fischer_burmeister", boxed(FischerBurmeister {})),
+        ("smoothed_fischer_burmeister", boxed(SmoothedFischerBurmeister {})),
         ("chks", boxed(ChenMangasarian { kernel: Kernel::Chks })),
         ("neural_network", boxed(ChenMangasarian { kernel: Kernel::NeuralNetwork })),
     ]
@@ -195,7 +195,7 @@ fn lawful<const D: usize>(mu: f64, rng: &mut Pcg64) -> Vec<([f64; D], [f64; D])>
 
 /// The distance by which the law is missed: the natural map.
 fn missed<const D: usize>(law: &Law, u: &[f64; D], r: &[f64; D]) -> f64 {
-    size(&NaturalMap.linearise(law, u, r).phi)
+    size(&NaturalMap {}.linearise(law, u, r).phi)
 }
 
 fn zeros_are_solutions<const D: usize>() {
@@ -252,9 +252,9 @@ fn smoothed_functions_tend_to_what_they_smooth() {
     for _ in 0..500 {
         let (u, r) = (vector::<3>(&mut rng), vector::<3>(&mut rng));
         let of = |f: &dyn Fn(&Law) -> [f64; 3], e: f64| f(&law(0.6, e));
-        let fb = |law: &Law| SmoothedFischerBurmeister.linearise(law, &u, &r).phi;
+        let fb = |law: &Law| SmoothedFischerBurmeister {}.linearise(law, &u, &r).phi;
         let cm = |kernel| move |law: &Law| ChenMangasarian { kernel }.linearise(law, &u, &r).phi;
-        let limit = FischerBurmeister.linearise(&law(0.6, 0.0), &u, &r).phi;
+        let limit = FischerBurmeister {}.linearise(&law(0.6, 0.0), &u, &r).phi;
         for e in [1e-1, 1e-3, 1e-6, 1e-300] {
             assert!(gap(&of(&fb, e), &limit) <= 5.0 * e + 1e-14);
             for kernel in [Kernel::Chks, Kernel::NeuralNetwork] {

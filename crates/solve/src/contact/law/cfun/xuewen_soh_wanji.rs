@@ -14,12 +14,19 @@
 //!
 //! Source: Acary, lecture (99), which cites Xuewen, Soh and Wanji (2000), with `u_Tᵀr_T` as in docs/notation.md.
 
-use super::{ContactFunction, Law, Linearisation, direction};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{ContactFunction, Law, Linearisation, Named, NewtonFunction, direction};
 use crate::contact::law::cone::tangential_norm;
+use crate::core::settings::Settings;
 
 /// The function of Xuewen, Soh and Wanji.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct XuewenSohWanji;
+///
+/// Newton's method on it is `newton_xsw`: Acary, lecture (99). Fails: |·| and ‖·‖ have their kinks at every solution, and contacts that stick with `r_T = 0` make the matrix singular: it leans on its rescues more than the others.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct XuewenSohWanji {}
 
 /// Which argument a minimum takes.
 #[derive(Clone, Copy, PartialEq)]
@@ -32,6 +39,17 @@ impl Smaller {
     fn of(velocity: f64, impulse: f64) -> Self {
         if velocity < impulse { Smaller::Velocity } else { Smaller::Impulse }
     }
+}
+
+impl Settings for XuewenSohWanji {}
+
+impl NewtonFunction for XuewenSohWanji {
+    const METHOD: Named = Named {
+        name: "newton_xsw",
+        summary: "semismooth Newton on the direct equations of Xuewen, Soh and Wanji",
+        cites: &["Acary2018"],
+        variants: &[],
+    };
 }
 
 impl<const D: usize> ContactFunction<D> for XuewenSohWanji {
