@@ -12,10 +12,10 @@ fn of<F: ScalarFunction + 'static>(f: F) -> Function {
 
 fn all() -> Vec<(&'static str, Function)> {
     vec![
-        ("min", of(Min)),
+        ("min", of(Min {})),
         ("min(w, 3z)", of(MinRho { rho: 3.0, side: Side::Z })),
         ("min(z, w/2)", of(MinRho { rho: 0.5, side: Side::W })),
-        ("fischer_burmeister", of(FischerBurmeister)),
+        ("fischer_burmeister", of(FischerBurmeister {})),
         ("penalised", of(Penalised { lambda: 0.8 })),
         ("evtushenko_purtov", of(EvtushenkoPurtov)),
     ]
@@ -112,8 +112,8 @@ fn slopes_are_not_negative() {
 fn fischer_burmeister_keeps_its_digits() {
     // For small ε: z + ε − √(z² + ε²) = ε − ε²/2z + …
     for (z, e) in [(1.0, 1e-9), (1e8, 1e-8), (1e-8, 1e-17), (1e200, 1e-100)] {
-        for at in [FischerBurmeister.at(z, e), {
-            let t = FischerBurmeister.at(e, z);
+        for at in [FischerBurmeister {}.at(z, e), {
+            let t = FischerBurmeister {}.at(e, z);
             Slope { z: t.w, w: t.z, ..t }
         }] {
             assert!((at.value - e).abs() <= e * (e / z) + 1e-15 * e, "{at:?}");
@@ -125,7 +125,7 @@ fn fischer_burmeister_keeps_its_digits() {
             assert!((at.w - (1.0 - e / z)).abs() < 1e-15);
         }
     }
-    assert_eq!(FischerBurmeister.at(-3.0, -4.0).value, -12.0);
+    assert_eq!(FischerBurmeister {}.at(-3.0, -4.0).value, -12.0);
 }
 
 #[test]
@@ -134,7 +134,7 @@ fn two_bounds_nest() {
     let middle = |z: f64, w: f64, l: f64, u: f64| (z - l).min(w.max(z - u));
     for (z, w) in points(300) {
         for (l, u) in [(-0.3, 0.4), (-0.3, inf), (-inf, 0.4), (-inf, inf), (0.2, 0.2)] {
-            let at = boxed(&Min, z, w, l, u);
+            let at = boxed(&Min {}, z, w, l, u);
             if l < u {
                 assert!((at.value - middle(z, w, l, u)).abs() < 1e-15);
             } else {

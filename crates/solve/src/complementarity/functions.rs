@@ -20,6 +20,12 @@
 //!
 //! References: Acary2018 (74); Fischer1992; ChenChenKanzow2000; EvtushenkoPurtov1984; Billups1995 (two bounds).
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::core::register::Named;
+use crate::core::settings::Settings;
+
 /// The value of a function of (z, w) and its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slope {
@@ -43,9 +49,45 @@ pub trait ScalarFunction: Copy + Send {
     }
 }
 
+/// A function that has a Newton method. The struct is its hyperparameters.
+pub trait NewtonFunction: ScalarFunction + Settings + 'static {
+    /// The function whose half square is the merit.
+    type Merit: ScalarFunction + 'static;
+    /// Whether steps on `min(z, w)` come first.
+    const MINIMUM_FIRST: bool = false;
+    /// The method.
+    const METHOD: Named;
+
+    /// The merit's function.
+    fn merit(&self) -> Self::Merit;
+}
+
 /// `min(z, w)`: on the tie z counts as the smaller.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Min;
+///
+/// Newton's method on it is `newton_min`: `z_i = 0` where `z_i ≤ w_i`, `w_i = 0` elsewhere, solved for z. The plain method (a primal–dual active set) is finite where
+/// M is an M-matrix, and cycles on some P-matrices (BenGharbiaGilbert2012): where its full steps stop helping, they must decrease the merit of Fischer's and
+/// Burmeister's function (DeLucaFacchineiKanzow1996), and give way to that function's direction where they do not. Ends with the exact solution of the active set.
+/// Fails: stationary points of the merit, where M is not P0.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct Min {}
+
+impl Settings for Min {}
+
+impl NewtonFunction for Min {
+    type Merit = FischerBurmeister;
+    const MINIMUM_FIRST: bool = true;
+    const METHOD: Named = Named {
+        name: "newton_min",
+        summary: "semismooth Newton on min(z, w), globalised by the Fischer-Burmeister merit",
+        cites: &["Acary2018", "BenGharbiaGilbert2012", "DeLucaFacchineiKanzow1996"],
+        variants: &["line_search=armijo"],
+    };
+
+    fn merit(&self) -> FischerBurmeister {
+        FischerBurmeister {}
+    }
+}
 
 impl ScalarFunction for Min {
     #[inline]
@@ -79,7 +121,7 @@ impl ScalarFunction for MinRho {
             Side::Z => (self.rho, 1.0),
             Side::W => (1.0, self.rho),
         };
-        let at = Min.at(of_z * z, of_w * w);
+        let at = Min {}.at(of_z * z, of_w * w);
         Slope { z: of_z * at.z, w: of_w * at.w, ..at }
     }
 }
@@ -88,8 +130,28 @@ impl ScalarFunction for MinRho {
 ///
 /// No digits are lost where the sum cancels with the root: for `z + w > 0` the value is `2zw / (z + w + √(z² + w²))`, and `1 − z/r` with `z > 0` is
 /// `(w/r) (w/(r + z))`. At the origin the derivative along (1, 1) is taken.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct FischerBurmeister;
+///
+/// Newton's method on it is `newton_fb` (Fischer1992; DeLucaFacchineiKanzow1996): its merit is differentiable and, for M of class P0, has no stationary point but
+/// solutions; equalities in any number. Fails: stationary points of the merit, where M is not P0; merits that decrease forever, where there is no solution.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct FischerBurmeister {}
+
+impl Settings for FischerBurmeister {}
+
+impl NewtonFunction for FischerBurmeister {
+    type Merit = Self;
+    const METHOD: Named = Named {
+        name: "newton_fb",
+        summary: "semismooth Newton on the Fischer-Burmeister function; equalities in any number",
+        cites: &["Acary2018", "Fischer1992", "DeLucaFacchineiKanzow1996"],
+        variants: &["line_search=armijo"],
+    };
+
+    fn merit(&self) -> Self {
+        *self
+    }
+}
 
 impl ScalarFunction for FischerBurmeister {
     #[inline]
@@ -109,16 +171,49 @@ impl ScalarFunction for FischerBurmeister {
 }
 
 /// `λ(z + w − √(z² + w²)) + (1 − λ) z₊ w₊`: grows in the positive quadrant, where Fischer's and Burmeister's function is flat.
-#[derive(Debug, Clone, Copy)]
+///
+/// Newton's method on it is `newton_pfb` (ChenChenKanzow2000). Where z and w are both large and positive the function sees it, which Fischer's and Burmeister's hardly
+/// does; its level sets are bounded for more matrices. Fails: as Newton's method on Fischer's and Burmeister's function.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct Penalised {
-    /// λ in (0, 1].
+    /// The weight of the Fischer-Burmeister function, in (0, 1]; the rest is the penalty's.
     pub lambda: f64,
+}
+
+impl Default for Penalised {
+    fn default() -> Self {
+        Self { lambda: 0.8 }
+    }
+}
+
+impl Settings for Penalised {
+    fn validate(&self) -> Result<(), String> {
+        if !(self.lambda > 0.0 && self.lambda <= 1.0) {
+            return Err(format!("lambda: expected a number in (0, 1], found {}", self.lambda));
+        }
+        Ok(())
+    }
+}
+
+impl NewtonFunction for Penalised {
+    type Merit = Self;
+    const METHOD: Named = Named {
+        name: "newton_pfb",
+        summary: "semismooth Newton on the penalised Fischer-Burmeister function",
+        cites: &["Acary2018", "ChenChenKanzow2000"],
+        variants: &["lambda=0.95"],
+    };
+
+    fn merit(&self) -> Self {
+        *self
+    }
 }
 
 impl ScalarFunction for Penalised {
     #[inline]
     fn at(&self, z: f64, w: f64) -> Slope {
-        let fb = FischerBurmeister.at(z, w);
+        let fb = FischerBurmeister {}.at(z, w);
         let (lambda, rest) = (self.lambda, 1.0 - self.lambda);
         // On the axes the derivative is taken from within the quadrant.
         let (z_plus, w_plus) = if z >= 0.0 && w >= 0.0 { (z, w) } else { (0.0, 0.0) };

@@ -5,20 +5,16 @@ use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 use crate::Boxed;
 use crate::complementarity::auto::{LinearAuto, Planned};
 use crate::complementarity::form::{Bounded, Complementary, Paired};
+use crate::complementarity::functions::{FischerBurmeister, Min, Penalised};
 use crate::complementarity::interior::{MehrotraType, MizunoToddYe};
-use crate::complementarity::newton::{Method, NewtonFb, NewtonMin, NewtonPfb, Semismooth};
+use crate::complementarity::newton::Newton;
 use crate::complementarity::pivoting::{
     Bard, BlockPivoting, CrissCross, Enumeration, EnumerationExact, Keller, Lemke, Murty,
 };
 use crate::complementarity::quadratic::{Mprgp, QuadraticProgram};
 use crate::complementarity::reform::{Mixed, Reduce, Split};
 use crate::complementarity::splitting::{Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs};
-use crate::core::register::{Described, Edge, Entry, Registered};
-
-/// A Newton method, by its function.
-fn newton<P: Bounded + 'static, M: Method<Function: 'static> + Described>() -> Entry<P> {
-    Entry::new(|method: M| Boxed::new(Semismooth::new(&method)))
-}
+use crate::core::register::{Edge, Entry, Registered};
 
 /// The solvers that take bounds of any kind.
 fn bounded<P: Bounded + 'static>() -> Vec<Entry<P>> {
@@ -31,9 +27,9 @@ fn bounded<P: Bounded + 'static>() -> Vec<Entry<P>> {
         Entry::of::<SplittingLs>(),
         Entry::of::<Mprgp>(),
         Entry::of::<QuadraticProgram>(),
-        newton::<P, NewtonMin>(),
-        newton::<P, NewtonFb>(),
-        newton::<P, NewtonPfb>(),
+        Entry::of::<Newton<Min>>(),
+        Entry::of::<Newton<FischerBurmeister>>(),
+        Entry::of::<Newton<Penalised>>(),
         Entry::of::<EnumerationExact>(),
     ]
 }

@@ -77,6 +77,19 @@ pub trait Described: Settings {
     const ABOUT: &'static About;
 }
 
+/// What a method is called and rests on, where the description stands with a part of it: a complementarity function, say.
+#[derive(Debug)]
+pub struct Named {
+    /// The method's name.
+    pub name: &'static str,
+    /// One line.
+    pub summary: &'static str,
+    /// Keys of `docs/refs.bib`.
+    pub cites: &'static [&'static str],
+    /// Settings that tests and benchmarks run besides the defaults.
+    pub variants: &'static [&'static str],
+}
+
 /// How a solver is made from its settings.
 type Make<T> = Box<dyn Fn(&SettingsMap) -> Result<T, String>>;
 

@@ -5,7 +5,7 @@
 //! (diag(∂Φ/∂z) + diag(∂Φ/∂w) M) d = −Φ,   z ← z + t d
 //! ```
 //!
-//! One skeleton ([`Semismooth`]), one file for each function. All is done in pure numbers: rows and columns of M scaled to entries of about one, so
+//! One skeleton ([`Newton`]); the functions stand in [`functions`], each with what its method is called. All is done in pure numbers: rows and columns of M scaled to entries of about one, so
 //! units change neither steps nor decisions.
 //!
 //! *Globalisation.* The merit is `Ψ = ½‖Φ‖²` of a function whose square is differentiable (Fischer–Burmeister or penalised). A step goes down a ladder until one
@@ -34,9 +34,6 @@
 //! Cost of a step: one LU of the size of M (Levenberg–Marquardt: twice the size), a few products. Storage: M twice, the factor, ten vectors.
 
 mod factor;
-mod fischer_burmeister;
-mod min;
-mod penalised;
 mod scaled;
 
 use nonsmooth_problem::LcpPoint;
@@ -46,37 +43,38 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::complementarity::form::Rowwise;
-use crate::complementarity::functions::{self, Min, ScalarFunction, Slope};
+use crate::complementarity::functions::{self, Min, NewtonFunction, ScalarFunction, Slope};
 use crate::core::line_search::{LineSearch, Search};
-use crate::core::settings::Settings;
+use crate::core::register::{About, Described, Solves};
+use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
-
-pub use fischer_burmeister::NewtonFb;
-pub use min::NewtonMin;
-pub use penalised::NewtonPfb;
 
 use factor::Factor;
 use scaled::{Jacobian, Scaled};
 
-/// The hyperparameters that all of them have.
+/// Newton's method on the function F. (Unknown keys are refused where settings are parsed; serde cannot refuse them beside `flatten`.)
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-#[schemars(inline)]
-pub struct Newton {
+#[serde(default, bound = "F: NewtonFunction")]
+#[schemars(bound = "F: NewtonFunction")]
+pub struct Newton<F> {
+    /// The function, with hyperparameters of its own.
+    #[serde(flatten)]
+    pub function: F,
     /// How the line search accepts a step, on half the square of the function; `none` takes every full step and knows no other directions.
     pub line_search: LineSearch,
     /// How often the method starts again elsewhere after it got stuck.
     pub restarts: usize,
 }
 
-impl Default for Newton {
+impl<F: Default> Default for Newton<F> {
     fn default() -> Self {
-        Self { line_search: LineSearch::Nonmonotone, restarts: 4 }
+        Self { function: F::default(), line_search: LineSearch::Nonmonotone, restarts: 4 }
     }
 }
 
-impl Settings for Newton {
+impl<F: NewtonFunction> Settings for Newton<F> {
     fn validate(&self) -> Result<(), String> {
+        self.function.validate()?;
         if self.restarts > 1000 {
             return Err(format!("restarts: expected at most 1000, found {}", self.restarts));
         }
@@ -84,34 +82,17 @@ impl Settings for Newton {
     }
 }
 
-/// A Newton method by its hyperparameters: those of the skeleton, and a function.
-pub trait Method: Settings {
-    /// The function whose half square is the merit.
-    type Function: ScalarFunction;
-    /// Whether steps on `min(z, w)` come first.
-    const MINIMUM_FIRST: bool;
-
-    /// The skeleton's hyperparameters.
-    fn newton(&self) -> Newton;
-
-    /// The function, with its own hyperparameters.
-    fn function(&self) -> Self::Function;
-}
-
-/// The Newton method on the function F.
-#[derive(Debug, Clone, Copy)]
-pub struct Semismooth<F> {
-    settings: Newton,
-    function: F,
-    minimum_first: bool,
-}
-
-impl<F> Semismooth<F> {
-    /// The solver that a method's hyperparameters describe.
-    pub fn new<M: Method<Function = F>>(method: &M) -> Self {
-        let (settings, function) = (method.newton(), method.function());
-        Self { settings, function, minimum_first: M::MINIMUM_FIRST }
-    }
+impl<F: NewtonFunction> Described for Newton<F> {
+    const ABOUT: &'static About = &About {
+        name: F::METHOD.name,
+        family: "newton",
+        solves: Solves::Law,
+        summary: F::METHOD.summary,
+        needs: &["the entries of M"],
+        cites: F::METHOD.cites,
+        variants: F::METHOD.variants,
+        settings: described::<Self>,
+    };
 }
 
 /// Steps without a new low after which the method starts again elsewhere.
@@ -245,7 +226,7 @@ struct Merit {
     largest: f64,
 }
 
-impl<P: Rowwise, F: ScalarFunction> Solver<P> for Semismooth<F> {
+impl<P: Rowwise, F: NewtonFunction> Solver<P> for Newton<F> {
     type Work = Work;
 
     fn work(&self, problem: &P) -> Result<Work, SolveError> {
@@ -256,7 +237,7 @@ impl<P: Rowwise, F: ScalarFunction> Solver<P> for Semismooth<F> {
             jacobian: Jacobian::new(&problem),
             problem,
             augmented_lu: SquareLu::default(),
-            search: Search::new(self.settings.line_search),
+            search: Search::new(self.line_search),
             x: vec![0.0; n],
             w: vec![0.0; m],
             best: vec![0.0; n],
@@ -285,7 +266,7 @@ impl<P: Rowwise, F: ScalarFunction> Solver<P> for Semismooth<F> {
     }
 
     fn start(&self, _: &P, point: &mut LcpPoint, work: &mut Work) {
-        work.search = Search::new(self.settings.line_search);
+        work.search = Search::new(self.line_search);
         work.phase = Phase::new();
         let Work { problem, x, w, .. } = work;
         problem.enter(&point.z, x);
@@ -317,7 +298,7 @@ impl<P: Rowwise, F: ScalarFunction> Solver<P> for Semismooth<F> {
                 if self.by_minimum(phase)
                     && phase.blind
                     && phase.since_low > CREDIT
-                    && self.settings.line_search != LineSearch::None
+                    && self.line_search != LineSearch::None
                 {
                     // The full steps lead nowhere: back, and downhill from now on.
                     (phase.blind, phase.since_low) = (false, 0);
@@ -358,7 +339,7 @@ impl<P: Rowwise, F: ScalarFunction> Solver<P> for Semismooth<F> {
         let (square, large) = (work.x.len() == work.w.len(), dense_and_large(work));
         let phase = &mut work.phase;
         phase.rung = match rung {
-            _ if self.settings.line_search == LineSearch::None => None,
+            _ if self.line_search == LineSearch::None => None,
             Rung::Minimum if phase.singular => Some(Rung::Proximal),
             Rung::Minimum => Some(Rung::Newton),
             Rung::Newton => Some(Rung::Proximal),
@@ -412,7 +393,7 @@ fn merit_at<F: ScalarFunction>(f: &F, problem: &Scaled, x: &[f64], w: &[f64]) ->
     (0..w.len()).map(|i| 0.5 * row(f, problem, x, w, i).value.powi(2)).sum()
 }
 
-impl<F: ScalarFunction> Semismooth<F> {
+impl<F: NewtonFunction> Newton<F> {
     fn first_rung(&self, work: &mut Work, merit: Merit) -> Rung {
         let phase = &mut work.phase;
         if work.x.len() != work.w.len() {
@@ -431,12 +412,12 @@ impl<F: ScalarFunction> Semismooth<F> {
 
     /// Whether this start is the minimum's: every other one.
     fn by_minimum(&self, phase: &Phase) -> bool {
-        self.minimum_first == phase.restarts.is_multiple_of(2)
+        F::MINIMUM_FIRST == phase.restarts.is_multiple_of(2)
     }
 
     /// Whether steps on the minimum come first: not where they have not helped for a while.
     fn leads(&self, phase: &Phase) -> bool {
-        let plain = self.settings.line_search == LineSearch::None;
+        let plain = self.line_search == LineSearch::None;
         self.by_minimum(phase) && (plain || phase.since_low <= CREDIT)
     }
 
@@ -445,7 +426,7 @@ impl<F: ScalarFunction> Semismooth<F> {
         let Work { problem, x, w, phi, of_z, of_w, .. } = work;
         let mut merit = Merit { value: 0.0, largest: 0.0 };
         for i in 0..w.len() {
-            let at = row(&self.function, problem, x, w, i);
+            let at = row(&self.function.merit(), problem, x, w, i);
             (phi[i], of_z[i], of_w[i]) = (at.value, at.z, at.w);
             merit.value += 0.5 * at.value * at.value;
             merit.largest = merit.largest.max(at.value.abs());
@@ -540,7 +521,7 @@ impl<F: ScalarFunction> Semismooth<F> {
             for (to, (w, d)) in trial_w.iter_mut().zip(w.iter().zip(&*d_w)) {
                 *to = w + t * d;
             }
-            merit_at(&self.function, problem, trial, trial_w)
+            merit_at(&self.function.merit(), problem, trial, trial_w)
         });
         if found.accepted {
             Self::take(work, merit);
@@ -561,7 +542,7 @@ impl<F: ScalarFunction> Semismooth<F> {
         {
             let Work { problem, x, w, phi, of_z, of_w, .. } = work;
             for i in 0..w.len() {
-                let at = row(&Min, problem, x, w, i);
+                let at = row(&Min {}, problem, x, w, i);
                 (phi[i], of_z[i], of_w[i]) = (at.value, at.z, at.w);
             }
         }
@@ -598,13 +579,13 @@ impl<F: ScalarFunction> Semismooth<F> {
             }
         }
         problem.multiply(trial, trial_w, merit.largest < PRECISE_BELOW);
-        let full = merit_at(&self.function, problem, trial, trial_w);
+        let full = merit_at(&self.function.merit(), problem, trial, trial_w);
         let good = if self.leads(&work.phase) {
             full <= GOOD * work.search.reference(merit.value)
         } else {
             full <= FINISHED * merit.value
         };
-        let plain = self.settings.line_search == LineSearch::None;
+        let plain = self.line_search == LineSearch::None;
         let blind = self.leads(&work.phase) && (plain || work.phase.blind);
         let accepted = (good || blind) && full.is_finite();
         if accepted {
@@ -679,14 +660,14 @@ impl<F: ScalarFunction> Semismooth<F> {
 
     /// Starts again elsewhere, if that is still allowed.
     fn restart(&self, work: &mut Work) -> Step {
-        if work.phase.restarts >= self.settings.restarts {
+        if work.phase.restarts >= self.restarts {
             let why =
                 "Newton's method is stuck: its merit has stationary points that solve nothing";
             return Step::Stuck(why.into());
         }
         work.phase.anew();
         // What the one rule does not reach the other may.
-        let other = match (self.settings.line_search, work.phase.restarts / 2 % 2) {
+        let other = match (self.line_search, work.phase.restarts / 2 % 2) {
             (LineSearch::Nonmonotone, 1) => LineSearch::Armijo,
             (LineSearch::Armijo, 1) => LineSearch::Nonmonotone,
             (rule, _) => rule,

@@ -14,7 +14,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation, Named, NewtonFunction, Radii};
+use super::{ContactFunction, Law, Linearisation, NewtonFunction, Radii};
+use crate::core::register::Named;
 use crate::core::settings::Settings;
 
 /// Which radius the friction disk has.

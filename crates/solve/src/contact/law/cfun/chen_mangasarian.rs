@@ -16,8 +16,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation, Named, NewtonFunction, SelfDual};
+use super::{ContactFunction, Law, Linearisation, NewtonFunction, SelfDual};
 use crate::contact::law::cone::jordan;
+use crate::core::register::Named;
 use crate::core::settings::Settings;
 
 /// ĝ.

@@ -15,8 +15,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation, Named, NewtonFunction, SelfDual};
+use super::{ContactFunction, Law, Linearisation, NewtonFunction, SelfDual};
 use crate::contact::law::cone::jordan::{self, Spectral};
+use crate::core::register::Named;
 use crate::core::settings::Settings;
 
 /// The Fischer–Burmeister function.

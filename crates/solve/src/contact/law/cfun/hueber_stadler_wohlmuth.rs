@@ -17,8 +17,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation, Named, NewtonFunction};
+use super::{ContactFunction, Law, Linearisation, NewtonFunction};
 use crate::contact::law::cone::tangential_norm;
+use crate::core::register::Named;
 use crate::core::settings::Settings;
 
 /// The derivative that is used while sliding.

@@ -10,6 +10,7 @@ mod park_kwak;
 mod xuewen_soh_wanji;
 
 use crate::contact::law::cone;
+use crate::core::register::Named;
 use crate::core::settings::Settings;
 
 pub use alart_curnier::{AlartCurnier, Disk, JeanMoreau, alart_curnier};
@@ -77,19 +78,6 @@ pub trait ContactFunction<const D: usize>: Send {
 
     /// Φ with an element of its generalised Jacobian (or what the method puts in its place).
     fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D>;
-}
-
-/// What Newton's method on a function is called and rests on.
-#[derive(Debug)]
-pub struct Named {
-    /// The method's name.
-    pub name: &'static str,
-    /// One line.
-    pub summary: &'static str,
-    /// Keys of `docs/refs.bib`.
-    pub cites: &'static [&'static str],
-    /// Settings that tests and benchmarks run besides the defaults.
-    pub variants: &'static [&'static str],
 }
 
 /// A function that has a Newton method. The struct is its hyperparameters.

@@ -12,8 +12,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation, Named, NewtonFunction, modified_velocity};
+use super::{ContactFunction, Law, Linearisation, NewtonFunction, modified_velocity};
 use crate::contact::law::cone::{self, Region};
+use crate::core::register::Named;
 use crate::core::settings::Settings;
 
 /// `x − P_K(x − ũ)` by the three regions of the cone, so that a large x does not round ũ away.

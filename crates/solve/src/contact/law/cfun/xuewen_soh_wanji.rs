@@ -17,8 +17,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation, Named, NewtonFunction, direction};
+use super::{ContactFunction, Law, Linearisation, NewtonFunction, direction};
 use crate::contact::law::cone::tangential_norm;
+use crate::core::register::Named;
 use crate::core::settings::Settings;
 
 /// The function of Xuewen, Soh and Wanji.
