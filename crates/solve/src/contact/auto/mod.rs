@@ -8,7 +8,7 @@
 //!    factorisations would. Many problems end here.
 //! 2. **Interior point** on the exact law ([`Central`]), a starter: some 8 to 20 iterations lead near the solution of a problem
 //!    at rest; where the central path turns back it is left again.
-//! 3. **Proximal point, semismooth Newton inside** ([`ProximalNewton`]): ε falls as fast as the subproblems are solved
+//! 3. **Proximal point, semismooth Newton inside** (`proximal_newton.rs`): ε falls as fast as the subproblems are solved
 //!    easily, and rises where they are not. It keeps full accuracy on hyperstatic problems.
 //! 4. **Sweeps between the proximal steps**, while they help: they move the impulses within the null space of W, which Newton leaves
 //!    where they are.

@@ -9,7 +9,7 @@
 //! whose solution is a motion and whose multipliers are the impulses that refute (`program`); for problems without a
 //! solution the same program without friction, a linear one. What is found is polished, made exact and verified by the judge's
 //! crate: a verdict never rests on a tolerance of the program. Problems of few contacts that these means leave open are decided by
-//! enumeration of their cases in exact arithmetic ([`ExactCones`]).
+//! enumeration of their cases in exact arithmetic (`core/exact_cones.rs`).
 //!
 //! References: AcaryCadouxLemarechalMalick2011; KlarbringPang1998; GoulartChen2024.
 //!

@@ -1,5 +1,5 @@
 //! Interior-point methods with Nesterov–Todd scaling: on the convex problem, and on Coulomb's law itself.
-//! The iteration is [`parts::Central`](crate::contact::parts::Central). Those of linear complementarity problems are in [`linear`].
+//! The iteration is [`parts::Central`](crate::contact::parts::Central).
 
 mod convex;
 mod exact;
