@@ -13,7 +13,7 @@ use serde_json::json;
 use crate::report::{Object, count, fields};
 
 /// A problem that has a judge and a place in a file.
-pub trait Form: Judged<Counts: Counts, Status: Send + 'static> {
+pub trait Form: Judged<Counts: Counts> {
     /// How files store its points.
     type Stored;
 
@@ -28,9 +28,6 @@ pub trait Form: Judged<Counts: Counts, Status: Send + 'static> {
 
     /// A stored point to start from; the rest is the solver's to recompute.
     fn start(&self, stored: &Self::Stored) -> Self::Point;
-
-    /// The relative velocity u, or w, of a point in plain arithmetic: where the judge had no time.
-    fn velocity(&self, point: &Self::Point) -> Vec<f64>;
 
     /// A point to store, with the relative velocity u, or w, that the judge computed.
     fn store(&self, point: Self::Point, w: Vec<f64>) -> Self::Stored;
@@ -99,15 +96,6 @@ impl<const D: usize> Form for FrictionLocal<D> {
         Self::Point { r: stored.r.clone(), lambda: multipliers(stored, lambda) }
     }
 
-    fn velocity(&self, point: &Self::Point) -> Vec<f64> {
-        let mut u = self.q.clone();
-        self.W.mul_plus(&point.r, &self.q, &mut u);
-        if let Some(bilateral) = &self.bilateral {
-            bilateral.V.mul_add(1.0, &point.lambda, &mut u);
-        }
-        u
-    }
-
     fn store(&self, point: Self::Point, u: Vec<f64>) -> StoredPoint {
         StoredPoint { v: None, u, r: point.r, lambda: some(point.lambda) }
     }
@@ -131,12 +119,6 @@ impl<const D: usize> Form for FrictionGlobal<D> {
     fn start(&self, stored: &StoredPoint) -> Self::Point {
         let Self::Point { v, lambda, .. } = self.origin();
         Self::Point { v, r: stored.r.clone(), lambda: multipliers(stored, lambda) }
-    }
-
-    fn velocity(&self, point: &Self::Point) -> Vec<f64> {
-        let mut u = self.w.clone();
-        self.H.mul_transpose_add(1.0, &point.v, &mut u);
-        u
     }
 
     fn store(&self, point: Self::Point, u: Vec<f64>) -> StoredPoint {
@@ -173,13 +155,6 @@ macro_rules! points_of_z {
 
         fn start(&self, stored: &LinearPoint) -> LcpPoint {
             stored.to_lcp()
-        }
-
-        fn velocity(&self, point: &LcpPoint) -> Vec<f64> {
-            let mut w = vec![0.0; self.q.len()];
-            self.M.mul(&point.z, &mut w);
-            w.iter_mut().zip(&self.q).for_each(|(w, q)| *w += q);
-            w
         }
     };
 }
@@ -267,10 +242,6 @@ impl Form for Hlcp {
 
     fn start(&self, stored: &LinearPoint) -> HlcpPoint {
         stored.to_hlcp()
-    }
-
-    fn velocity(&self, point: &HlcpPoint) -> Vec<f64> {
-        point.s.clone()
     }
 
     fn store(&self, point: HlcpPoint, _: Vec<f64>) -> LinearPoint {

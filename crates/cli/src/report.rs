@@ -55,22 +55,6 @@ pub fn verdict_json<S, C: Counts>(verdict: &Verdict<S, C>, tolerance: f64, worst
     }))
 }
 
-/// A verdict without the status of each contact: the judge had no time to say it.
-pub fn unjudged<S, C: Counts>(
-    measure: Measure,
-    tolerance: f64,
-    velocity: Vec<f64>,
-) -> Verdict<S, C> {
-    Verdict {
-        measure,
-        solved: measure.passes(tolerance),
-        counts: C::default(),
-        statuses: vec![],
-        velocity,
-        worst: vec![],
-    }
-}
-
 fn uncounted<S, C: Counts>(verdict: &Verdict<S, C>) -> bool {
     verdict.statuses.is_empty() && !verdict.velocity.is_empty()
 }

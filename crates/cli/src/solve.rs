@@ -8,14 +8,12 @@ use std::time::Instant;
 use nonsmooth_io::Content;
 use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
 use nonsmooth_io::linear::{self, LinearFile, LinearPoint};
-use nonsmooth_problem::check::{ContactStatus, Judged, StatusCounts, Verdict, VerdictOf};
-use nonsmooth_problem::{
-    Complementarity, Friction, Problem, ProblemError, with_complementarity, with_friction,
-};
+use nonsmooth_problem::check::{ContactStatus, Judged, StatusCounts, Verdict};
+use nonsmooth_problem::{Complementarity, Friction, OfAny, with_complementarity, with_friction};
 use nonsmooth_solve::registry::{self, Registered, Solves};
 use nonsmooth_solve::settings::{self, SettingsMap};
 use nonsmooth_solve::trace::Trace;
-use nonsmooth_solve::{Limit, Limits, Outcome, Sample, SolveError, Status, guard};
+use nonsmooth_solve::{Answer, Limit, Limits, Sample, Solve, SolveError, Status};
 use serde_json::{Value, json};
 
 use crate::kinds::{Class, Form, takes};
@@ -113,11 +111,15 @@ pub struct Plan<'a> {
 /// What came of a solve; of a contact problem, where nothing else is said.
 pub struct Solved<S = ContactStatus, C = StatusCounts, T = StoredPoint> {
     /// The loop's word.
-    pub outcome: Outcome,
+    pub status: Status,
     /// The judge's word.
     pub verdict: Verdict<S, C>,
     /// The best point.
     pub point: T,
+    /// Steps done.
+    pub iterations: usize,
+    /// Wall clock.
+    pub seconds: f64,
     /// What the solver says that it did.
     account: Vec<String>,
     /// The residuals on the way.
@@ -252,7 +254,7 @@ fn guess_of(from: &Path, file: &Path, problem: &Friction) -> Result<StoredPoint,
         format!("--warm-start {}: expected {expected}, found {found}", path.display())
     };
     let size = |p: &Friction| {
-        let dimension = with_friction!(p, p => p.kind().dimension());
+        let dimension = p.kind().dimension();
         format!("{} in {dimension}D", report::count(p.contacts(), "contact"))
     };
     let (ours, theirs) = (size(problem), size(&other.problem));
@@ -285,7 +287,7 @@ fn cancelled(flag: &Arc<AtomicBool>) -> bool {
     flag.load(Ordering::Relaxed)
 }
 
-fn one<P: Form + Registered>(
+fn one<P: Form + Registered + OfAny>(
     file: &Path,
     problem: &P,
     guess: Option<&P::Stored>,
@@ -305,17 +307,17 @@ fn one<P: Form + Registered>(
         all.extend(report::fields(json!({
             "solver": plan.solver,
             "settings": plan.settings,
-            "status": solved.outcome.status.name(),
-            "iterations": solved.outcome.iterations,
+            "status": solved.status.name(),
+            "iterations": solved.iterations,
         })));
         all.extend(report::fields(json!(solved.trace)));
         format!("{}\n", json!(all))
     });
-    let Solved { outcome, point, history, trace, .. } = solved;
-    let is_solved = outcome.status == Status::Solved;
-    let proof = certificate(&outcome.status).map(|certificate| {
+    let Solved { status, point, history, trace, .. } = solved;
+    let is_solved = status == Status::Solved;
+    let proof = certificate(&status).map(|certificate| {
         let mut all = report::problem_json(file, problem);
-        all.insert("status".into(), json!(outcome.status.name()));
+        all.insert("status".into(), json!(status.name()));
         all.insert("certificate".into(), certificate);
         format!("{}\n", json!(all))
     });
@@ -384,56 +386,35 @@ fn keep_contact(
 }
 
 /// Solves a problem from a stored point, or from zero. `file` is its name in messages.
-pub fn solve<P: Form + Registered>(
+pub fn solve<P: Form + Registered + OfAny>(
     file: &Path,
     problem: &P,
     start: Option<&P::Stored>,
     plan: &Plan,
 ) -> Result<SolvedOf<P>, String> {
-    let mistake = |e: &dyn std::fmt::Display| format!("{}: {e}", file.display());
-    let session = registry::session::<P>(plan.solver, plan.settings);
-    let mut session = session.map_err(|e| match (&e, takes(plan.solver)) {
-        (SolveError::UnknownSolver { name, .. }, Some(problems)) => {
-            let kind = problem.kind().name();
-            mistake(&format!("solver `{name}` takes {problems} problems only (this file: {kind})"))
-        }
-        _ => mistake(&e),
-    })?;
-    let mut point = start.map_or_else(|| problem.origin(), |s| problem.start(s));
+    let mut how = Solve::new().solver(plan.solver).settings(plan.settings.clone());
+    how = how.limits(files::left(&plan.limits, plan.begun));
+    if let Some(stored) = start {
+        how = how.warm(&problem.start(stored));
+    }
     let mut bar = Bar::new(&name(file), plan.limits.tolerance, plan.progress);
-    let outcome = session
-        .solve(problem, &mut point, &files::left(&plan.limits, plan.begun), &mut |p| bar.watch(p))
-        .map_err(|e| mistake(&e))?;
+    let answer = how.watched(problem, &mut |p| bar.watch(p)).map_err(|e| {
+        let file = file.display();
+        match (&e, takes(plan.solver)) {
+            (SolveError::UnknownSolver { name, .. }, Some(problems)) => {
+                let kind = problem.kind().name();
+                format!(
+                    "{file}: solver `{name}` takes {problems} problems only (this file: {kind})"
+                )
+            }
+            _ => format!("{file}: {e}"),
+        }
+    })?;
     drop(bar);
-    let left = files::left(&plan.limits, plan.begun);
-    let verdict = judged(problem, &point, &outcome, &left).map_err(|e| mistake(&e))?;
-    Ok(Solved {
-        outcome,
-        point: problem.store(point, verdict.velocity.clone()),
-        verdict,
-        account: session.account(),
-        history: session.history().to_vec(),
-        trace: session.trace(),
-    })
-}
-
-/// The judge's word on each contact, or on the point alone where the limits leave no time for more.
-fn judged<P: Form + Registered>(
-    problem: &P,
-    point: &P::Point,
-    outcome: &Outcome,
-    limits: &Limits,
-) -> Result<VerdictOf<P>, ProblemError> {
-    let tolerance = limits.tolerance;
-    let unlimited = limits.time_limit.is_none() && !limits.cancel.as_ref().is_some_and(cancelled);
-    if unlimited || problem.unknowns() <= guard::SMALL {
-        return problem.judge(point, tolerance);
-    }
-    let copy = (problem.clone(), point.clone());
-    match guard::run(limits, || {}, move |_| copy.0.judge(&copy.1, tolerance)) {
-        Ok(verdict) => verdict,
-        Err(_) => Ok(report::unjudged(outcome.measure, tolerance, problem.velocity(point))),
-    }
+    let Answer { point, status, verdict, iterations, seconds, account, history, trace, .. } =
+        answer;
+    let point = problem.store(point, verdict.velocity.clone());
+    Ok(Solved { status, verdict, iterations, seconds, point, account, history, trace })
 }
 
 fn name(file: &Path) -> String {
@@ -458,19 +439,19 @@ fn certificate(status: &Status) -> Option<Value> {
 const WORST: usize = 3;
 
 fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &SolvedOf<P>) -> String {
-    let Solved { outcome, verdict, account, .. } = solved;
+    let Solved { status, verdict, account, .. } = solved;
     let mut all = report::problem_json(file, problem);
     all.extend(report::fields(json!({
         "solver": plan.solver,
         "settings": plan.settings,
         "tolerance": plan.limits.tolerance,
-        "status": outcome.status.name(),
-        "message": outcome.status.to_string(),
-        "iterations": outcome.iterations,
-        "seconds": outcome.seconds,
+        "status": status.name(),
+        "message": status.to_string(),
+        "iterations": solved.iterations,
+        "seconds": solved.seconds,
         "account": account,
     })));
-    if let Some(certificate) = certificate(&outcome.status) {
+    if let Some(certificate) = certificate(status) {
         all.insert("certificate".into(), certificate);
     }
     all.extend(report::verdict_json(verdict, plan.limits.tolerance, verdict.worst.len()));
@@ -483,17 +464,17 @@ fn text<P: Form + Registered>(
     plan: &Plan,
     solved: &SolvedOf<P>,
 ) -> String {
-    let Solved { outcome, verdict, .. } = solved;
+    let Solved { status, verdict, .. } = solved;
     let tolerance = plan.limits.tolerance;
-    let is_solved = outcome.status == Status::Solved;
-    let says = outcome.status.to_string();
+    let is_solved = *status == Status::Solved;
+    let says = status.to_string();
     let mut text = report::headline(file, &says, &verdict.measure, tolerance);
     row(&mut text, "problem", report::problem_text(problem));
     let settings = plan.settings.iter().map(|(k, v)| match v.as_str() {
         Some(word) => format!(" {k}={word}"),
         None => format!(" {k}={v}"),
     });
-    let iterations = report::count(outcome.iterations, "iteration");
+    let iterations = report::count(solved.iterations, "iteration");
     row(
         &mut text,
         "solver",
@@ -501,18 +482,18 @@ fn text<P: Form + Registered>(
             "{}{}, {iterations}, {}",
             plan.solver,
             settings.collect::<String>(),
-            seconds(outcome.seconds)
+            seconds(solved.seconds)
         ),
     );
     for (k, line) in solved.account.iter().enumerate() {
         row(&mut text, if k == 0 { "account" } else { "" }, line);
     }
     // Where there is no solution, no row is to blame.
-    let settled = is_solved || matches!(outcome.status, Status::Infeasible(_));
+    let settled = is_solved || matches!(status, Status::Infeasible(_));
     let worst = if settled { 0 } else { WORST };
     report::verdict_text(&mut text, verdict, tolerance, worst);
     let stuck = stuck(&solved.history);
-    if let (Status::Limit(_), Some(since)) = (&outcome.status, stuck) {
+    if let (Status::Limit(_), Some(since)) = (status, stuck) {
         row(&mut text, "stuck", format!("no progress since iteration {since}"));
     }
     if let Some(hint) = hint(problem, solved, plan, stuck.is_some()) {
@@ -557,7 +538,7 @@ fn hint<P: Form + Registered>(
         return None;
     }
     let about = registry::about::<P>(plan.solver)?;
-    let more = match &solved.outcome.status {
+    let more = match &solved.status {
         Status::Solved | Status::Infeasible(_) | Status::Limit(Limit::Cancelled) => return None,
         Status::Limit(_) if stuck => OTHER_WAYS
             .iter()

@@ -3,6 +3,8 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use nonsmooth_problem::AnyProblem;
+
 use crate::IoError;
 use crate::fclib::{self, FclibFile};
 use crate::linear::{self, LinearFile, market};
@@ -16,6 +18,16 @@ pub enum Content {
     Friction(FclibFile),
     /// A linear complementarity problem.
     Linear(LinearFile),
+}
+
+impl Content {
+    /// The problem alone.
+    pub fn into_problem(self) -> AnyProblem {
+        match self {
+            Content::Friction(file) => file.problem.into(),
+            Content::Linear(file) => file.problem.into(),
+        }
+    }
 }
 
 /// The formats.
@@ -45,6 +57,13 @@ pub fn read_any(path: impl AsRef<Path>) -> Result<Content, IoError> {
         Some(Format::Siconos) => linear::siconos::read(path).map(Content::Linear),
         None => Err(IoError::Unknown { file: path.into(), found: describe(&glance(path)?) }),
     }
+}
+
+/// The problem in a file of any kind; [`read_any`] gives the rest of what it holds too.
+///
+/// Errors: as [`read_any`].
+pub fn read(path: impl AsRef<Path>) -> Result<AnyProblem, IoError> {
+    Ok(read_any(path)?.into_problem())
 }
 
 /// Whether a file looks like one that holds a problem, from its extension and first bytes: to find problems among other files. The

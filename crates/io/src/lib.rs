@@ -13,6 +13,6 @@ mod hdf5;
 pub mod linear;
 mod replace;
 
-pub use any::{Content, holds_problem, parts, read_any};
+pub use any::{Content, holds_problem, parts, read, read_any};
 pub use error::IoError;
 pub use replace::beside;

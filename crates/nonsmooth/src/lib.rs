@@ -1,5 +1,10 @@
 //! Numerical methods for nonsmooth mechanical systems: state, solve and judge frictional contact and linear complementarity problems.
 //!
+//! # The door
+//!
+//! [`solve`]`(&problem)` solves any problem with the default solver, which needs no setting; [`Solve`] says how where that is to be said;
+//! [`read`]`(path)` reads a problem from a file. What comes out is an [`Answer`]: the point, the status, the judge's verdict.
+//!
 //! Unilateral contact with exact Coulomb friction, contact by contact:
 //!
 //! ```text
@@ -9,7 +14,7 @@
 //! A box of 1 kg on the floor is pressed down and pushed sideways beyond what friction holds:
 //!
 //! ```
-//! use nonsmooth::{Bsr, FrictionLocal, Judged, Limits, Motion, Problem, Status, session};
+//! use nonsmooth::{Bsr, FrictionLocal, Motion, Solve, solve};
 //!
 //! let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 //! let problem = FrictionLocal::<3>::new(
@@ -18,63 +23,70 @@
 //!     vec![0.5],                                 // mu
 //! )?;
 //!
-//! let mut solver = session::<FrictionLocal<3>>("auto", &Default::default())?;
-//! let mut point = problem.origin();
-//! let outcome = solver.solve(&problem, &mut point, &Limits::default(), &mut |_| {})?;
-//! assert_eq!(outcome.status, Status::Solved);
+//! let answer = solve(&problem)?;
+//! assert!(answer.is_solved()); // the judge's word, who shares nothing with the solver
+//! assert_eq!(answer.verdict.statuses[0].status, Motion::Slip);
+//! assert!((answer.point.r[1] + 0.5).abs() < 1e-8); // r_T = −mu r_N against the sliding velocity
 //!
-//! // The judge shares nothing with the solver: it recomputes everything from the problem's data.
-//! let verdict = problem.judge(&point, 1e-8)?;
-//! println!("relative residual {:.1e}, {:?}", verdict.measure.relative, verdict.counts);
-//! assert!(verdict.solved);
-//! assert_eq!(verdict.statuses[0].status, Motion::Slip);
-//! assert!((point.r[1] + 0.5).abs() < 1e-8); // r_T = −mu r_N against the sliding velocity
+//! // By another method, more closely, from there.
+//! let again = Solve::new().solver("nsgs").set("omega", 0.9).tolerance(1e-12).warm(&answer.point);
+//! assert!(again.run(&problem)?.verdict.measure.relative <= 1e-12);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Linear complementarity problems, `0 ≤ z ⟂ M z + q ≥ 0`, are stated and solved the same way. This one has no solution, which is proved:
+//! Linear complementarity problems, `0 ≤ z ⟂ M z + q ≥ 0`, go through the same door. This one has no solution, which is proved:
 //!
 //! ```
-//! use nonsmooth::{Dense, Lcp, Limits, Problem, Status, session};
+//! use nonsmooth::{Dense, Lcp, Problem, Status, solve};
 //!
 //! let m = Dense::from_rows(&[[-2.0, 1.0], [1.0, -2.0]]).expect("two rows of two");
 //! let problem = Lcp::new(m, vec![-1.0, -1.0])?;
-//! let mut point = problem.origin();
-//! let outcome = session::<Lcp>("auto", &Default::default())?
-//!     .solve(&problem, &mut point, &Limits::default(), &mut |_| {})?;
-//! let Status::Infeasible(proof) = outcome.status else { panic!("{}", outcome.status) };
-//! assert!(problem.verify(proof.certificate())); // by the problem's own judge, from M and q alone, in exact arithmetic
+//! let answer = solve(&problem)?;
+//! assert!(matches!(answer.status, Status::Infeasible(_)));
+//! // Verified by the problem's own judge, from M and q alone, in exact arithmetic.
+//! assert!(problem.verify(answer.certificate().expect("a proof")));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! | module | what |
-//! | --- | --- |
-//! | [`problem`] | the statement as plain validated data, the judge, instances with a known solution |
-//! | [`solve`] | the contract of a solver, the one loop, the registry, the algorithms |
-//! | [`dynamics`] | rigid bodies, elastic solids, contacts and scenes that become problems |
-//! | [`io`] | FCLIB's HDF5 files, and linear complementarity problems as text, read and written |
+//! # What is here
 //!
-//! What most programs need is re-exported at the root.
+//! | to | |
+//! | --- | --- |
+//! | state a problem | [`FrictionLocal`], [`FrictionGlobal`], [`Lcp`], [`Mlcp`], [`Hlcp`], [`BoxLcp`]; [`AnyProblem`] where the kind is known only from a file |
+//! | solve it | [`solve`], [`Solve`], [`Answer`]; [`session`] for many problems of one shape, step by step, without allocation |
+//! | judge a point | [`Judged::judge`], [`Verdict`]; [`exists`] asks whether there is a solution at all |
+//! | read and write files | [`read`], [`read_any`], [`fclib`], [`linear`] |
+//! | make problems | [`Planted`], with a known solution; [`Scene`], of bodies |
+//! | write a solver | [`Solver`], [`Step`], [`Driver`] |
+//!
+//! The crates below (`nonsmooth-problem`, `nonsmooth-solve`, `nonsmooth-io`, `nonsmooth-dynamics`) have all the rest: kernels, single methods, forms.
 
-pub use nonsmooth_dynamics as dynamics;
-pub use nonsmooth_io as io;
-pub use nonsmooth_problem as problem;
-pub use nonsmooth_solve as solve;
+#[doc(inline)]
+pub use nonsmooth_solve::{Answer, Solvable, Solve, solve};
+
+#[doc(inline)]
+pub use nonsmooth_io::read;
 
 pub use nonsmooth_dynamics::{Scene, SceneError};
-pub use nonsmooth_io::{Content, IoError, fclib, read_any};
-pub use nonsmooth_problem::check::{Certificate, Existence, Judged, Measure, Motion, Verdict};
-pub use nonsmooth_problem::linalg::{Bsr, Csc, Dense, Matrix, Operator};
-pub use nonsmooth_problem::planted::Planted;
-pub use nonsmooth_problem::{
-    BilateralGlobal, BilateralLocal, BoxLcp, Complementarity, Friction, FrictionGlobal,
-    FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Kind, Lcp, LcpPoint, LocalPoint, Mlcp, Problem,
-    ProblemError,
+pub use nonsmooth_io::{Content, IoError, fclib, linear, read_any};
+pub use nonsmooth_problem::check::{
+    Certificate, ContactStatus, Existence, Judged, Measure, Motion, Proof, RowCounts, RowStatus,
+    StatusCounts, Verdict,
 };
-pub use nonsmooth_problem::{with_complementarity, with_friction};
+pub use nonsmooth_problem::linalg::{Bsr, Csc, Dense, Matrix, Operator};
+pub use nonsmooth_problem::planted::{Planted, PlantedLcp};
+pub use nonsmooth_problem::{
+    AnyCounts, AnyPoint, AnyProblem, AnyStatus, BilateralGlobal, BilateralLocal, BoxLcp,
+    Complementarity, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Kind,
+    Lcp, LcpPoint, LocalPoint, Mlcp, Problem, ProblemError,
+};
+pub use nonsmooth_problem::{with_complementarity, with_friction, with_problem};
+pub use nonsmooth_solve::existence::of as exists;
 pub use nonsmooth_solve::registry::{session, solver_names};
 pub use nonsmooth_solve::settings;
-pub use nonsmooth_solve::{Driver, Limits, Outcome, Session, SolveError, Solver, Status, Step};
+pub use nonsmooth_solve::{
+    Driver, Limit, Limits, Outcome, Progress, Sample, Session, SolveError, Solver, Status, Step,
+};
 
 /// The README's program compiles.
 #[cfg(doctest)]

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use nonsmooth::solve::registry;
 use nonsmooth::{BoxLcp, FrictionGlobal, FrictionLocal, Hlcp, Lcp, Mlcp};
+use nonsmooth_solve::registry;
 
 // ------------------------------------------------------------------------------------------------ floors
 
@@ -70,7 +70,7 @@ const SOLVE: Floors = Floors {
         &["contact/solvers", "complementarity/solvers"],
         &["bridges"],
         &["registry"],
-        &["diagnose"],
+        &["diagnose", "door"],
     ],
     others_mix: false,
     wings: &["contact", "complementarity"],

@@ -6,10 +6,10 @@ mod common;
 use std::collections::HashMap;
 use std::path::Path;
 
-use nonsmooth::problem::traits::{Spectrum, Traits};
 use nonsmooth::{Bsr, Friction, Scene, fclib};
 use nonsmooth_bench::traits_table::{self, Column};
 use nonsmooth_dynamics::scenes::{Family, SlidingBox, Stack};
+use nonsmooth_problem::traits::{Spectrum, Traits};
 
 /// The spectra of the global and of the condensed problem of a scene, which agree.
 fn spectra(scene: &Scene) -> [Spectrum; 2] {

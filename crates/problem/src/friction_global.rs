@@ -309,6 +309,12 @@ impl<const D: usize> Problem for FrictionGlobal<D> {
         gauge.measure(self, point, true)
     }
 
+    fn partner(&self, point: &GlobalPoint) -> Vec<f64> {
+        let mut u = vec![0.0; self.w.len()];
+        self.velocity_into(&point.v, &mut u);
+        u
+    }
+
     fn evidence(&self, certificate: &Certificate) -> Evidence {
         check::weigh(self, certificate)
     }

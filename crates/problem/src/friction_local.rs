@@ -127,13 +127,6 @@ impl<const D: usize> FrictionLocal<D> {
         Ok(())
     }
 
-    /// `u = W r + V lambda + q`, allocated.
-    pub fn velocity(&self, point: &LocalPoint) -> Vec<f64> {
-        let mut u = self.q.clone();
-        self.velocity_into(point, &mut u);
-        u
-    }
-
     /// `u = W r + V lambda + q` into `u`.
     pub fn velocity_into(&self, point: &LocalPoint, u: &mut [f64]) {
         self.W.mul_plus(&point.r, &self.q, u);
@@ -184,6 +177,12 @@ impl<const D: usize> Problem for FrictionLocal<D> {
 
     fn certify(&self, point: &LocalPoint, gauge: &mut Self::Gauge) -> Measure {
         gauge.measure(self, point, true)
+    }
+
+    fn partner(&self, point: &LocalPoint) -> Vec<f64> {
+        let mut u = self.q.clone();
+        self.velocity_into(point, &mut u);
+        u
     }
 
     fn evidence(&self, certificate: &Certificate) -> Evidence {

@@ -6,6 +6,7 @@
 //!
 //! Notation follows `docs/notation.md` and FCLIB's letters.
 
+mod any;
 pub mod check;
 mod complementarity;
 mod error;
@@ -17,6 +18,7 @@ pub mod planted;
 mod problem;
 pub mod traits;
 
+pub use any::{AnyCounts, AnyGauge, AnyPoint, AnyProblem, AnyStatus, OfAny, OfAnyPoint};
 pub use complementarity::{BoxLcp, Complementarity, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp};
 pub use error::ProblemError;
 pub use friction::Friction;

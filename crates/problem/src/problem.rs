@@ -70,7 +70,7 @@ impl Kind {
 /// what depends on the problem alone (norms, diagonal blocks, buffers) and [`measure`](Problem::measure) uses it.
 pub trait Problem {
     /// The unknown of the problem.
-    type Point: Clone + Send;
+    type Point: std::fmt::Debug + Clone + Send;
     /// The judge's constants and buffers for one problem.
     type Gauge: Send;
 
@@ -111,6 +111,10 @@ pub trait Problem {
     fn tidy(&self, _point: &mut Self::Point, _gauge: &mut Self::Gauge, _boldly: bool) -> bool {
         false
     }
+
+    /// What is complementary to the unknown, at a valid point and in plain arithmetic: the relative velocity u, or `w = M z + q`; of an hLCP its s. What the judge
+    /// computes of it is in its verdict.
+    fn partner(&self, point: &Self::Point) -> Vec<f64>;
 
     /// What `certificate`, which claims that the problem has no solution, is worth: decided from the data alone, in exact arithmetic.
     fn evidence(&self, certificate: &Certificate) -> Evidence;

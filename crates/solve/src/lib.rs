@@ -30,10 +30,13 @@ pub mod complementarity;
 pub mod contact;
 mod core;
 pub mod diagnose;
+mod door;
 pub mod registry;
 
 pub use self::complementarity::guarantees;
 pub use self::contact::existence;
+pub use door::{Answer, Solvable, Solve, solve};
+
 pub use self::core::boxed::Boxed;
 pub use self::core::drive::{
     Driver, Limit, Limits, Observer, Outcome, Progress, Sample, Session, Status,

@@ -145,7 +145,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         files::write_text("--draw", path, &svg)?;
     }
     output::print(&text(label, &scene, &content.problem, solved.as_ref(), args.tol));
-    let is_solved = |s: &Solved| s.outcome.status == Status::Solved;
+    let is_solved = |s: &Solved| s.status == Status::Solved;
     Ok(Exit::solved(solved.as_ref().is_none_or(is_solved)))
 }
 
@@ -193,7 +193,7 @@ fn linear_problem(maker: &Maker, args: &Args) -> Result<Exit, String> {
         let plan = Plan { solver: registry::DEFAULT, settings, limits, begun, progress: true };
         let solved = with_complementarity!(&content.problem, p => solve_one(path, p, None, &plan))?;
         solution(&mut text, &solved, tolerance);
-        exit = Exit::solved(solved.outcome.status == Status::Solved);
+        exit = Exit::solved(solved.status == Status::Solved);
         content.solution = Some(solved.point);
     }
     nonsmooth_io::linear::write(path, &content).map_err(|e| e.to_string())?;
@@ -301,12 +301,10 @@ fn text(
 
 /// What came of --solve.
 fn solution<S, C: Counts, T>(text: &mut String, solved: &Solved<S, C, T>, tolerance: f64) {
-    let Solved { outcome, verdict, .. } = solved;
-    let iterations = report::count(outcome.iterations, "iteration");
-    let time = seconds(outcome.seconds);
-    let status = &outcome.status;
+    let iterations = report::count(solved.iterations, "iteration");
+    let (status, time) = (&solved.status, seconds(solved.seconds));
     report::row(text, "solution", format!("{status}, {iterations}, {time}"));
-    report::verdict_text(text, verdict, tolerance, 0);
+    report::verdict_text(text, &solved.verdict, tolerance, 0);
 }
 
 /// The makers of linear complementarity problems and their settings.

@@ -30,7 +30,9 @@ mod write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint};
+use nonsmooth_problem::{
+    Friction, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem,
+};
 
 use crate::IoError;
 
@@ -85,12 +87,7 @@ pub struct StoredPoint {
 impl StoredPoint {
     /// A point of a local problem (of its lengths), with its relative velocity.
     pub fn from_local<const D: usize>(problem: &FrictionLocal<D>, point: &LocalPoint) -> Self {
-        Self {
-            v: None,
-            u: problem.velocity(point),
-            r: point.r.clone(),
-            lambda: some(&point.lambda),
-        }
+        Self { v: None, u: problem.partner(point), r: point.r.clone(), lambda: some(&point.lambda) }
     }
 
     /// A point of a global problem (of its lengths), with its relative velocity.

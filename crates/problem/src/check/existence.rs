@@ -609,7 +609,7 @@ mod tests {
             assert_ne!(local.monotone(), Monotone::Unknown);
             let k = local.kinematics();
             let x = FrictionLocal::<3>::motion(&point);
-            let u = local.velocity(&point);
+            let u = local.partner(&point);
             assert!((0..12).all(|i| (k.row(i, &x).0 - u[i]).abs() < 1e-12));
             assert!((12..12 + bilateral).all(|i| k.row(i, &x).0.abs() < 1e-12));
         }

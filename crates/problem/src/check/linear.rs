@@ -6,7 +6,7 @@ use super::proof::{Exact, FEW, exact, exactly_near};
 use super::rows::{Rows, doubt};
 use super::{Judged, Measure, Verdict};
 use crate::linalg::{Matrix, norm};
-use crate::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem, ProblemError};
+use crate::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem};
 
 /// The data of a problem in z with `w = M z + q`: row i belongs to an equality, or to the variable `free + i − equalities`.
 pub(crate) struct Data<'a> {
@@ -537,18 +537,17 @@ impl LinearGauge {
         floor(self.rows.sizes(), &self.scales)
     }
 
-    fn judge(
+    fn verdict(
+        &mut self,
         problem: &(impl Stated + Problem<Point = LcpPoint, Gauge = Self>),
         point: &LcpPoint,
         tolerance: f64,
-    ) -> Result<Verdict<RowStatus, RowCounts>, ProblemError> {
-        problem.validate_point(point)?;
-        let mut gauge = problem.gauge()?;
-        let measure = problem.certify(point, &mut gauge);
+    ) -> Verdict<RowStatus, RowCounts> {
+        let measure = problem.certify(point, self);
         let data = problem.data();
-        let rows = (0..gauge.w.len())
-            .map(|i| gauge.pair(&data, point, i).ok_or_else(|| share(gauge.w[i], gauge.scales[i])));
-        Ok(verdict(measure, rows, gauge.w.clone(), tolerance))
+        let rows = (0..self.w.len())
+            .map(|i| self.pair(&data, point, i).ok_or_else(|| share(self.w[i], self.scales[i])));
+        verdict(measure, rows, self.w.clone(), tolerance)
     }
 }
 
@@ -814,12 +813,13 @@ macro_rules! judged {
             type Status = RowStatus;
             type Counts = RowCounts;
 
-            fn judge(
+            fn verdict(
                 &self,
                 point: &LcpPoint,
+                gauge: &mut LinearGauge,
                 tolerance: f64,
-            ) -> Result<Verdict<RowStatus, RowCounts>, ProblemError> {
-                LinearGauge::judge(self, point, tolerance)
+            ) -> Verdict<RowStatus, RowCounts> {
+                gauge.verdict(self, point, tolerance)
             }
         }
     };
@@ -834,16 +834,15 @@ impl Judged for Hlcp {
     type Counts = RowCounts;
 
     /// The counts are those of the pairs; what is called w here is `Q x + R s − q`.
-    fn judge(
+    fn verdict(
         &self,
         point: &HlcpPoint,
+        gauge: &mut HlcpGauge,
         tolerance: f64,
-    ) -> Result<Verdict<RowStatus, RowCounts>, ProblemError> {
-        self.validate_point(point)?;
-        let mut gauge = self.gauge()?;
-        let measure = self.certify(point, &mut gauge);
+    ) -> Verdict<RowStatus, RowCounts> {
+        let measure = self.certify(point, gauge);
         let equalities = gauge.w.iter().zip(&gauge.scales).map(|(w, d)| Err(share(*w, *d)));
         let pairs = (0..self.dim()).map(|i| Ok(gauge.pair(point, i)));
-        Ok(verdict(measure, equalities.chain(pairs), gauge.w.clone(), tolerance))
+        verdict(measure, equalities.chain(pairs), gauge.w.clone(), tolerance)
     }
 }

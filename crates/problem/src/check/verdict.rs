@@ -1,5 +1,7 @@
 //! The full verdict on a point: residuals, the status of each contact, the worst contacts.
 
+use std::fmt;
+
 use serde::Serialize;
 
 use super::contact::{modified_velocity, natural_map, status};
@@ -46,25 +48,35 @@ pub type VerdictOf<P> = Verdict<<P as Judged>::Status, <P as Judged>::Counts>;
 /// A problem whose judge can say what each contact, or row, does.
 pub trait Judged: Problem {
     /// What a contact, or a row, may do.
-    type Status;
+    type Status: fmt::Debug + Clone + Send + 'static;
     /// How many do what.
-    type Counts;
+    type Counts: fmt::Debug + Clone + Default + Serialize + Send + 'static;
 
-    /// The full verdict on `point` at `tolerance`. Allocates; the loop uses [`Problem::measure`].
+    /// The full verdict on a valid `point` at `tolerance`, with a gauge of this problem, which is prepared once for all points: of a global problem, M
+    /// factorised. Allocates; the loop uses [`Problem::measure`].
+    fn verdict(
+        &self,
+        point: &Self::Point,
+        gauge: &mut Self::Gauge,
+        tolerance: f64,
+    ) -> VerdictOf<Self>;
+
+    /// The full verdict on `point` at `tolerance`.
     ///
     /// Errors: a point of the wrong shape or with entries that are not finite, a singular M.
-    fn judge(&self, point: &Self::Point, tolerance: f64) -> Result<VerdictOf<Self>, ProblemError>;
+    fn judge(&self, point: &Self::Point, tolerance: f64) -> Result<VerdictOf<Self>, ProblemError> {
+        self.validate_point(point)?;
+        Ok(self.verdict(point, &mut self.gauge()?, tolerance))
+    }
 }
 
 impl<const D: usize> Judged for FrictionLocal<D> {
     type Status = ContactStatus;
     type Counts = StatusCounts;
 
-    fn judge(&self, point: &LocalPoint, tolerance: f64) -> Result<Verdict, ProblemError> {
-        self.validate_point(point)?;
-        let mut gauge = self.gauge()?;
-        let measure = self.certify(point, &mut gauge);
-        Ok(verdict::<D>(measure, &gauge.law, &point.r, gauge.velocity(), &self.mu, tolerance))
+    fn verdict(&self, point: &LocalPoint, gauge: &mut Self::Gauge, tolerance: f64) -> Verdict {
+        let measure = self.certify(point, gauge);
+        verdict::<D>(measure, &gauge.law, &point.r, gauge.velocity(), &self.mu, tolerance)
     }
 }
 
@@ -72,11 +84,9 @@ impl<const D: usize> Judged for FrictionGlobal<D> {
     type Status = ContactStatus;
     type Counts = StatusCounts;
 
-    fn judge(&self, point: &GlobalPoint, tolerance: f64) -> Result<Verdict, ProblemError> {
-        self.validate_point(point)?;
-        let mut gauge = self.gauge()?;
-        let measure = self.certify(point, &mut gauge);
-        Ok(verdict::<D>(measure, &gauge.law, &point.r, gauge.velocity(), &self.mu, tolerance))
+    fn verdict(&self, point: &GlobalPoint, gauge: &mut Self::Gauge, tolerance: f64) -> Verdict {
+        let measure = self.certify(point, gauge);
+        verdict::<D>(measure, &gauge.law, &point.r, gauge.velocity(), &self.mu, tolerance)
     }
 }
 

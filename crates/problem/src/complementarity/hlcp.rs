@@ -103,6 +103,10 @@ impl Problem for Hlcp {
         gauge.tidy(point, boldly)
     }
 
+    fn partner(&self, point: &HlcpPoint) -> Vec<f64> {
+        point.s.clone()
+    }
+
     fn evidence(&self, certificate: &Certificate) -> Evidence {
         check::weigh(self, certificate)
     }

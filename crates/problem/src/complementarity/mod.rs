@@ -65,6 +65,13 @@ macro_rules! problem_in_z {
                 gauge.tidy(self, point, boldly)
             }
 
+            fn partner(&self, point: &Self::Point) -> Vec<f64> {
+                let mut w = vec![0.0; self.q.len()];
+                self.M.mul(&point.z, &mut w);
+                w.iter_mut().zip(&self.q).for_each(|(w, q)| *w += q);
+                w
+            }
+
             fn evidence(
                 &self,
                 certificate: &$crate::check::Certificate,

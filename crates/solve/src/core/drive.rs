@@ -331,6 +331,11 @@ pub trait Session<P: Problem>: Send {
 
     /// What the solver says that it did during the last solve; empty where it has nothing to tell.
     fn account(&self) -> Vec<String>;
+
+    /// The judge's gauge of the problem last solved, where there is a whole one: for a verdict without another preparation.
+    fn gauge(&mut self) -> Option<&mut P::Gauge> {
+        None
+    }
 }
 
 /// The most samples that a history keeps.
@@ -443,6 +448,11 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
 
     fn account(&self) -> Vec<String> {
         self.kept.as_ref().map_or(vec![], |kept| self.solver.account(&kept.work))
+    }
+
+    fn gauge(&mut self) -> Option<&mut P::Gauge> {
+        // Without a limit reached inside a kernel the solve left nothing unfinished.
+        self.kept.as_ref().filter(|kept| !kept.torn).and(self.gauge.as_deref_mut())
     }
 }
 

@@ -160,4 +160,8 @@ impl<P: Registered> Session<P> for Guarded<P> {
     fn account(&self) -> Vec<String> {
         self.session.as_ref().map_or_else(|| self.account.clone(), |session| session.account())
     }
+
+    fn gauge(&mut self) -> Option<&mut P::Gauge> {
+        self.session.as_mut()?.gauge()
+    }
 }

@@ -152,9 +152,10 @@ pub trait Composed<P: Problem> {
     /// The solver of `P` that has `solver` inside.
     fn compose(settings: Self::Settings, solver: Boxed<Self::To>) -> Boxed<P>;
 
-    /// Whether the solver of this name is listed behind the prefix. Others can be named all the same, and say for themselves whether they apply.
-    fn lists(_solver: &str) -> bool {
-        true
+    /// Whether the solver of this name is listed behind the prefix; those without a prefix are. Others can be named all the same, and say for themselves
+    /// whether they apply.
+    fn lists(solver: &str) -> bool {
+        !solver.contains('/')
     }
 }
 

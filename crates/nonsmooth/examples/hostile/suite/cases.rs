@@ -1,11 +1,11 @@
 //! Hostile problems of every kind, each a function of a seed and an index.
 
-use nonsmooth::solve::Reformulation;
-use nonsmooth::solve::contact::Condense;
 use nonsmooth::{
     BilateralGlobal, BilateralLocal, BoxLcp, Bsr, Csc, Dense, FrictionGlobal, FrictionLocal, Hlcp,
     Lcp, Matrix, Mlcp,
 };
+use nonsmooth_solve::Reformulation;
+use nonsmooth_solve::contact::Condense;
 
 use super::draft::{
     Draft, Rng, Rows, Truth, dot, gram, matrix, scaled, scaled_vector, times, transpose,

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use cpu_time::ThreadTime;
-use nonsmooth::solve::{existence, registry};
 use nonsmooth::{Limits, Session};
+use nonsmooth_solve::{existence, registry};
 
 use super::cases::{Case, Made};
 use super::draft::{Rng, Truth};

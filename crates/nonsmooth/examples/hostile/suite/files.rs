@@ -4,12 +4,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Instant;
 
-use nonsmooth::io::linear::{self, LinearFile};
-use nonsmooth::io::{Content, read_any};
 use nonsmooth::{
     BoxLcp, Complementarity, FrictionGlobal, FrictionLocal, Hlcp, Lcp, Matrix, Mlcp,
     with_complementarity,
 };
+use nonsmooth_io::linear::{self, LinearFile};
+use nonsmooth_io::{Content, read_any};
 
 use super::cases::Made;
 use super::claims::{Lie, Tally};

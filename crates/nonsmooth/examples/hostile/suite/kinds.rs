@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use nonsmooth::io::linear::{self, LinearFile};
-use nonsmooth::io::{IoError, fclib};
-use nonsmooth::problem::check::Judged;
-use nonsmooth::solve::registry::Registered;
 use nonsmooth::{
     BoxLcp, Complementarity, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, Hlcp, HlcpPoint,
     Lcp, LcpPoint, LocalPoint, Matrix, Mlcp,
 };
+use nonsmooth_io::linear::{self, LinearFile};
+use nonsmooth_io::{IoError, fclib};
+use nonsmooth_problem::check::Judged;
+use nonsmooth_solve::registry::Registered;
 
 use super::exact::{Dyadic, Sum};
 use super::oracle::{Cell, Union};

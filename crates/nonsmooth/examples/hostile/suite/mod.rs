@@ -12,8 +12,8 @@ pub mod oracle;
 
 use std::path::Path;
 
-use nonsmooth::io::IoError;
 use nonsmooth::{BoxLcp, FrictionGlobal, FrictionLocal, Hlcp, Lcp, Mlcp};
+use nonsmooth_io::IoError;
 
 use cases::Made;
 use claims::{Attack, Effort, Tally};

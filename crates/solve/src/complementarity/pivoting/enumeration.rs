@@ -182,7 +182,7 @@ impl Solutions {
 /// ```
 /// use nonsmooth_problem::Lcp;
 /// use nonsmooth_problem::linalg::Dense;
-/// use nonsmooth_solve::pivoting::all_solutions;
+/// use nonsmooth_solve::complementarity::pivoting::all_solutions;
 ///
 /// // w = −z + 1 has the solutions 0 and 1.
 /// let m = Dense::from_rows(&[[-1.0]]).expect("even rows");

@@ -94,6 +94,11 @@ impl<P: Problem> Problem for Regularised<P> {
         self.base.certify(point, gauge)
     }
 
+    /// Of the problem without the regularisation.
+    fn partner(&self, point: &Self::Point) -> Vec<f64> {
+        self.base.partner(point)
+    }
+
     fn evidence(&self, certificate: &Certificate) -> Evidence {
         self.base.evidence(certificate)
     }

@@ -1,0 +1,296 @@
+//! The one door: a problem of a known kind, or of any, in; point, status, verdict and account out.
+//!
+//! ```
+//! use nonsmooth_problem::planted::Planted;
+//! use nonsmooth_solve::{Solve, solve};
+//!
+//! let (problem, _known) = Planted::default().local::<3>();
+//! let answer = solve(&problem)?;
+//! assert!(answer.is_solved());
+//!
+//! let closer = Solve::new().solver("nsgs").set("omega", 0.9).tolerance(1e-10).warm(&answer.point);
+//! assert!(closer.run(&problem)?.verdict.measure.relative <= 1e-10);
+//! # Ok::<(), nonsmooth_solve::SolveError>(())
+//! ```
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use nonsmooth_problem::check::{Certificate, Judged, Verdict, VerdictOf};
+use nonsmooth_problem::{AnyPoint, AnyProblem, OfAny, OfAnyPoint, ProblemError, with_problem};
+use serde_json::Value;
+
+use crate::core::register::{DEFAULT, Described, Registered, session};
+use crate::core::settings::SettingsMap;
+use crate::core::trace::Trace;
+use crate::{Limit, Limits, Outcome, Progress, Sample, Session, SolveError, Status, guard};
+
+/// Solves a problem with `auto`, from zero, to the default tolerance and without other limits: [`Solve::new`]`.run(problem)`.
+///
+/// Errors: data at fault; a method that does not apply. That there is no solution, or that none was found, is a [`Status`].
+pub fn solve<P: Solvable>(problem: &P) -> Result<Answer<P>, SolveError> {
+    Solve::new().run(problem)
+}
+
+/// How to solve: a solver with its settings, limits, a point to start from. All have defaults.
+#[derive(Debug, Clone)]
+pub struct Solve {
+    solver: String,
+    settings: SettingsMap,
+    limits: Limits,
+    start: Option<AnyPoint>,
+}
+
+impl Default for Solve {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Solve {
+    /// `auto` with its defaults, [`Limits::default`], from zero.
+    pub fn new() -> Self {
+        Self {
+            solver: DEFAULT.into(),
+            settings: SettingsMap::new(),
+            limits: Limits::default(),
+            start: None,
+        }
+    }
+
+    /// By the solver of this name (`nonsmooth list` shows them), perhaps behind prefixes: `condense/nsgs`.
+    #[must_use]
+    pub fn solver(mut self, name: impl Into<String>) -> Self {
+        self.solver = name.into();
+        self
+    }
+
+    /// With this value of one of the solver's settings.
+    #[must_use]
+    pub fn set(mut self, key: impl Into<String>, value: impl Into<Value>) -> Self {
+        self.settings.insert(key.into(), value.into());
+        self
+    }
+
+    /// With these settings, as [`settings::from_texts`](crate::settings::from_texts) reads them, in place of all set before.
+    #[must_use]
+    pub fn settings(mut self, settings: SettingsMap) -> Self {
+        self.settings = settings;
+        self
+    }
+
+    /// By the solver that is this struct of hyperparameters, `with(&Nsgs { omega: 0.9, ..Nsgs::default() })`.
+    #[must_use]
+    pub fn with<S: Described>(mut self, method: &S) -> Self {
+        self.solver = S::ABOUT.name.into();
+        // A struct of settings becomes an object.
+        if let Ok(Value::Object(settings)) = serde_json::to_value(method) {
+            self.settings = settings;
+        }
+        self
+    }
+
+    /// To this relative residual, a pure number in (0, 1].
+    #[must_use]
+    pub fn tolerance(mut self, tolerance: f64) -> Self {
+        self.limits.tolerance = tolerance;
+        self
+    }
+
+    /// In at most this many iterations.
+    #[must_use]
+    pub fn max_iterations(mut self, iterations: usize) -> Self {
+        self.limits.max_iterations = iterations;
+        self
+    }
+
+    /// In at most this many seconds of wall clock, the verdict included.
+    #[must_use]
+    pub fn time_limit(mut self, seconds: f64) -> Self {
+        self.limits.time_limit = Some(seconds);
+        self
+    }
+
+    /// Until this flag is set.
+    #[must_use]
+    pub fn cancel(mut self, flag: Arc<AtomicBool>) -> Self {
+        self.limits.cancel = Some(flag);
+        self
+    }
+
+    /// With all these limits in place of those set before.
+    #[must_use]
+    pub fn limits(mut self, limits: Limits) -> Self {
+        self.limits = limits;
+        self
+    }
+
+    /// From this point, of the kind of the problem.
+    #[must_use]
+    pub fn warm<X: Clone + Into<AnyPoint>>(mut self, point: &X) -> Self {
+        self.start = Some(point.clone().into());
+        self
+    }
+
+    /// Solves a problem. Many problems of one shape, step by step, are solved without allocation by one
+    /// [`session`](crate::registry::session).
+    ///
+    /// Errors: an unknown solver or setting, data or a starting point at fault, an impossible limit; a method that does not apply.
+    pub fn run<P: Solvable>(&self, problem: &P) -> Result<Answer<P>, SolveError> {
+        self.watched(problem, &mut |_| {})
+    }
+
+    /// As [`run`](Self::run); `watch` sees how far it is after every iteration (of large problems, now and then).
+    pub fn watched<P: Solvable>(
+        &self,
+        problem: &P,
+        watch: &mut dyn FnMut(&Progress),
+    ) -> Result<Answer<P>, SolveError> {
+        problem.answer(self, watch)
+    }
+}
+
+/// What came of a solve.
+#[derive(Debug, Clone)]
+pub struct Answer<P: Judged> {
+    /// The best point found.
+    pub point: P::Point,
+    /// Whether it is solved, and if not, why it stopped.
+    pub status: Status,
+    /// The judge's word on the point: residuals, what each contact or row does, velocities.
+    pub verdict: VerdictOf<P>,
+    /// Steps done.
+    pub iterations: usize,
+    /// Matrices factorised that grow with the problem, see [`Outcome::factorisations`].
+    pub factorisations: u64,
+    /// Wall clock of the solve, see [`Outcome::seconds`].
+    pub seconds: f64,
+    /// Processor time, where [`Limits::cpu_time`] asked for it.
+    pub cpu_seconds: Option<f64>,
+    /// What the solver says that it did.
+    pub account: Vec<String>,
+    /// The residuals on the way.
+    pub history: Vec<Sample>,
+    /// The method's own record, where [`Limits::trace`] asked for it.
+    pub trace: Trace,
+}
+
+impl<P: Judged> Answer<P> {
+    /// Whether the judge accepts the point.
+    pub fn is_solved(&self) -> bool {
+        self.status == Status::Solved
+    }
+
+    /// What it rests on, where the status says that there is no solution.
+    pub fn certificate(&self) -> Option<&Certificate> {
+        self.status.certificate()
+    }
+}
+
+/// What the door takes: a problem of any of the kinds that have solvers, or an [`AnyProblem`].
+pub trait Solvable: Judged {
+    /// Solves the problem as `how` says.
+    fn answer(
+        &self,
+        how: &Solve,
+        watch: &mut dyn FnMut(&Progress),
+    ) -> Result<Answer<Self>, SolveError>
+    where
+        Self: Sized;
+}
+
+impl<P: Registered + OfAny> Solvable for P {
+    fn answer(
+        &self,
+        how: &Solve,
+        watch: &mut dyn FnMut(&Progress),
+    ) -> Result<Answer<P>, SolveError> {
+        let begun = Instant::now();
+        let mut session = session::<P>(&how.solver, &how.settings)?;
+        let mut point = match &how.start {
+            None => self.origin(),
+            Some(start) => P::Point::of(start).cloned().ok_or_else(|| ProblemError::Shape {
+                place: "the point to start from".into(),
+                expected: format!("one of a problem {}", self.kind().name()),
+                found: "one of another kind".into(),
+            })?,
+        };
+        let outcome = session.solve(self, &mut point, &how.limits, watch)?;
+        let verdict = verdict(self, &point, &outcome, &mut *session, &how.limits, begun)?;
+        Ok(Answer {
+            point,
+            status: outcome.status,
+            verdict,
+            iterations: outcome.iterations,
+            factorisations: outcome.factorisations,
+            seconds: outcome.seconds,
+            cpu_seconds: outcome.cpu_seconds,
+            account: session.account(),
+            history: session.history().to_vec(),
+            trace: session.trace(),
+        })
+    }
+}
+
+impl Solvable for AnyProblem {
+    fn answer(
+        &self,
+        how: &Solve,
+        watch: &mut dyn FnMut(&Progress),
+    ) -> Result<Answer<AnyProblem>, SolveError> {
+        with_problem!(self, p => p.answer(how, watch).map(of_any))
+    }
+}
+
+fn of_any<P: OfAny>(answer: Answer<P>) -> Answer<AnyProblem> {
+    Answer {
+        point: answer.point.into_any(),
+        status: answer.status,
+        verdict: P::any_verdict(answer.verdict),
+        iterations: answer.iterations,
+        factorisations: answer.factorisations,
+        seconds: answer.seconds,
+        cpu_seconds: answer.cpu_seconds,
+        account: answer.account,
+        history: answer.history,
+        trace: answer.trace,
+    }
+}
+
+/// The judge's word on the point, with the gauge of the solve where there is one: nothing is factorised twice. Where the limits leave no time for more it is
+/// the measure of the solve alone.
+fn verdict<P>(
+    problem: &P,
+    point: &P::Point,
+    outcome: &Outcome,
+    session: &mut dyn Session<P>,
+    limits: &Limits,
+    begun: Instant,
+) -> Result<VerdictOf<P>, SolveError>
+where
+    P: Registered + Judged,
+{
+    let tolerance = limits.tolerance;
+    if let Some(gauge) = session.gauge() {
+        return Ok(problem.verdict(point, gauge, tolerance));
+    }
+    if problem.unknowns() <= guard::SMALL {
+        return Ok(problem.judge(point, tolerance)?);
+    }
+    let spent = begun.elapsed().as_secs_f64();
+    let left = limits.time_limit.map(|t| (t - spent).max(0.0));
+    let left = Limits { time_limit: left, ..limits.clone() };
+    let copy = (problem.clone(), point.clone());
+    match guard::run(&left, || {}, move |_| copy.0.judge(&copy.1, tolerance)) {
+        Ok(verdict) => Ok(verdict?),
+        Err(Limit::Time | Limit::Cancelled | Limit::Iterations) => Ok(Verdict {
+            measure: outcome.measure,
+            solved: outcome.measure.passes(tolerance),
+            counts: P::Counts::default(),
+            statuses: vec![],
+            velocity: problem.partner(point),
+            worst: vec![],
+        }),
+    }
+}

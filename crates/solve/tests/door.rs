@@ -1,0 +1,104 @@
+//! The one door: whatever the kind, and whatever is asked of the solve.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use nonsmooth_problem::planted::{Planted, PlantedLcp, PlantedMlcp};
+use nonsmooth_problem::{AnyProblem, OfAny, OfAnyPoint, Problem};
+use nonsmooth_solve::contact::splitting::Nsgs;
+use nonsmooth_solve::registry::{self, Registered};
+use nonsmooth_solve::{Limit, Solvable, Solve, SolveError, Status, solve};
+
+/// A problem solved by the door, as itself and without its kind: the same bits, judged alike.
+fn goes_through<P: Registered + OfAny + Solvable>(problem: &P) {
+    let answer = solve(problem).unwrap();
+    assert!(answer.is_solved(), "{}: {}", problem.kind().name(), answer.status);
+    assert_eq!(answer.certificate(), None);
+    assert!(answer.verdict.solved && answer.verdict.measure.relative <= 1e-8);
+    assert!(!answer.account.is_empty() && !answer.history.is_empty());
+    let judged = problem.judge(&answer.point, 1e-8).unwrap();
+    assert_eq!(judged.measure, answer.verdict.measure, "the judge alone says the same");
+    assert_eq!(judged.velocity, answer.verdict.velocity);
+
+    let any: AnyProblem = problem.clone().into_any();
+    let other = solve(&any).unwrap();
+    assert_eq!(other.point, answer.point.clone().into_any());
+    assert_eq!((other.iterations, other.status), (answer.iterations, answer.status));
+    assert_eq!(other.verdict.velocity, answer.verdict.velocity);
+    assert_eq!(other.verdict.statuses.len(), answer.verdict.statuses.len());
+
+    let again = Solve::new().warm(&other.point).max_iterations(5).run(&any).unwrap();
+    assert!(again.is_solved(), "from its own solution");
+}
+
+#[test]
+fn every_kind_goes_through() {
+    let planted = Planted { contacts: 6, dofs: 36, bilateral: 2, ..Planted::default() };
+    goes_through(&planted.local::<2>().0);
+    goes_through(&planted.local::<3>().0);
+    goes_through(&planted.global::<2>().0);
+    goes_through(&planted.global::<3>().0);
+    let planted = PlantedLcp { n: 12, ..PlantedLcp::default() };
+    goes_through(&planted.lcp().0);
+    goes_through(&PlantedMlcp::default().mlcp().0);
+    goes_through(&planted.hlcp().0);
+    goes_through(&planted.boxed().0);
+}
+
+#[test]
+fn what_is_asked_is_done() {
+    let (problem, _) = Planted::default().local::<3>();
+    let by_name = Solve::new().solver("nsgs").set("omega", 0.9).tolerance(1e-10);
+    let answer = by_name.run(&problem).unwrap();
+    assert!(answer.is_solved() && answer.verdict.measure.relative <= 1e-10);
+    let by_type = Solve::new().with(&Nsgs { omega: 0.9, ..Nsgs::default() }).tolerance(1e-10);
+    assert_eq!(by_type.run(&problem).unwrap().point, answer.point);
+    let other = Solve::new().solver("nsgs").tolerance(1e-10).run(&problem).unwrap();
+    assert_ne!(other.point, answer.point, "omega is heard");
+    let mut steps = 0;
+    by_name.watched(&problem, &mut |_| steps += 1).unwrap();
+    assert_eq!(steps, answer.iterations);
+    let few = Solve::new().solver("nsgs").tolerance(1e-14).max_iterations(2).run(&problem).unwrap();
+    assert_eq!((few.status, few.iterations), (Status::Limit(Limit::Iterations), 2));
+}
+
+#[test]
+fn a_limit_leaves_an_answer_with_a_verdict() {
+    let (problem, _) = Planted { contacts: 400, dofs: 600, ..Planted::default() }.global::<3>();
+    let flag = Arc::new(AtomicBool::new(true));
+    for how in [Solve::new().cancel(flag), Solve::new().time_limit(0.0)] {
+        let answer = how.run(&problem).unwrap();
+        assert!(matches!(answer.status, Status::Limit(Limit::Cancelled | Limit::Time)));
+        assert!(!answer.verdict.solved);
+        assert_eq!(answer.verdict.velocity.len(), problem.w.len());
+    }
+}
+
+/// After a solve the session has the judge's gauge, in which M is factorised.
+#[test]
+fn nothing_is_prepared_twice() {
+    let (problem, _) = Planted::default().global::<3>();
+    let mut session = registry::session("nsgs", &Default::default()).unwrap();
+    assert!(session.gauge().is_none());
+    let mut point = problem.origin();
+    session.solve(&problem, &mut point, &Default::default(), &mut |_| {}).unwrap();
+    assert!(session.gauge().is_some());
+}
+
+#[test]
+fn mistakes_are_named() {
+    let (problem, _) = Planted::default().local::<3>();
+    let refused = |how: Solve| how.run(&problem).unwrap_err();
+    assert!(matches!(refused(Solve::new().solver("magic")), SolveError::UnknownSolver { .. }));
+    let said = refused(Solve::new().solver("nsgs").set("omega", 3.0)).to_string();
+    assert_eq!(said, "solver `nsgs`: omega: expected a number in (0, 2), found 3.0");
+    assert!(refused(Solve::new().tolerance(2.0)).to_string().contains("tolerance"));
+    let (lcp, point) = PlantedLcp::default().lcp();
+    let said = refused(Solve::new().warm(&point)).to_string();
+    assert_eq!(
+        said,
+        "the point to start from: expected one of a problem friction_local_3d, found one of another kind"
+    );
+    let said = Solve::new().warm(&problem.origin()).run(&lcp).unwrap_err().to_string();
+    assert!(said.contains("of a problem lcp"), "{said}");
+}
