@@ -12,8 +12,8 @@ use std::path::PathBuf;
 
 use drawing::{Curve, Panel, linear};
 use nonsmooth_bench::draw::{Axis, INK, Style, tick};
-use nonsmooth_dynamics::{BallState, TurningBall};
 use nonsmooth_problem::FrictionLocal;
+use nonsmooth_scenes::{BallState, TurningBall};
 use nonsmooth_solve::{Limits, registry, settings};
 
 const FACETS: [usize; 5] = [4, 6, 8, 16, 32];

@@ -13,9 +13,9 @@ use std::path::PathBuf;
 
 use drawing::{Curve, Panel};
 use nonsmooth_bench::draw::{Axis, Style};
-use nonsmooth_dynamics::scenes::{Family, SlidingBox};
 use nonsmooth_problem::planted::{Planted, PlantedMix};
 use nonsmooth_problem::{FrictionLocal, Problem};
+use nonsmooth_scenes::scenes::{Family, SlidingBox};
 use nonsmooth_solve::{Limits, Status, registry, settings};
 
 const FACETS: [usize; 6] = [4, 8, 16, 32, 64, 128];

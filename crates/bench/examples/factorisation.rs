@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use nonsmooth_io::fclib;
-use nonsmooth_problem::linalg::{BlockLu, Csc, Groups};
+use nonsmooth_linalg::{BlockLu, Csc, Groups};
 use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal};
 
 /// A matrix by blocks: sizes of nodes, blocks by rows.
@@ -153,7 +153,7 @@ mod peer {
     use faer::sparse::SymbolicSparseColMatRef;
     use faer::sparse::linalg::lu::{LuRef, LuSymbolicParams, NumericLu, factorize_symbolic_lu};
     use faer::{Conj, MatMut, Par};
-    use nonsmooth_problem::linalg::Csc;
+    use nonsmooth_linalg::Csc;
 
     use super::fastest;
 

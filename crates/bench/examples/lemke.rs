@@ -6,7 +6,7 @@
 //! obstacle problem on a square grid, random matrices with 5 entries a row, and frictionless contacts of a redundant stack (`W = Hᵀ H`, rank below n).
 //! Times are processor seconds of the driver: set-up, pivots and judgement. Each figure is the fastest of the repetitions, which are interleaved.
 
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
+use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::{Lcp, Problem};
 use nonsmooth_solve::complementarity::pivoting::{BasisKind, Lemke, Ties};
 use nonsmooth_solve::{Driver, Limits, Outcome, Session};

@@ -9,7 +9,7 @@
 use std::path::PathBuf;
 
 use nonsmooth_bench::figures::{Scaling, scaling};
-use nonsmooth_problem::linalg::{Csc, Dense};
+use nonsmooth_linalg::{Csc, Dense};
 use nonsmooth_problem::{Lcp, Problem};
 use nonsmooth_solve::registry;
 use nonsmooth_solve::settings;

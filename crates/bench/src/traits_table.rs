@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use comfy_table::{TableStyle, presets};
+use nonsmooth_analysis::{Spectrum, SpectrumError, Traits};
 use nonsmooth_io::{IoError, fclib};
-use nonsmooth_problem::traits::{Spectrum, SpectrumError, Traits};
 
 /// Which published families are like a family of ours: ours, theirs. Sizes, time steps and coefficients of friction
 /// differ. FCLIB has none of polyhedra (its capsules are another shape), nor of walls of rigid bricks.

@@ -1,5 +1,6 @@
 //! What the commands need of a kind of problem.
 
+use nonsmooth_bench::plural as count;
 use nonsmooth_io::fclib::StoredPoint;
 use nonsmooth_io::linear::LinearPoint;
 use nonsmooth_problem::check::{Judged, RowCounts, StatusCounts};
@@ -10,7 +11,7 @@ use nonsmooth_solve::registry::{self, About, Prefix, Registered};
 use serde::Serialize;
 use serde_json::json;
 
-use crate::report::{Object, count, fields};
+use crate::json::{Object, fields};
 
 /// A problem that has a judge and a place in a file.
 pub trait Form: Judged<Counts: Counts> {

@@ -13,6 +13,7 @@ mod files;
 mod generate;
 mod info;
 mod interrupt;
+mod json;
 mod kinds;
 mod list;
 mod output;
@@ -20,7 +21,6 @@ mod plot;
 mod progress;
 mod report;
 mod solve;
-mod suite;
 
 use std::process::ExitCode;
 

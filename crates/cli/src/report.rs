@@ -6,12 +6,10 @@ use std::path::Path;
 /// `1 contact`, `2 contacts`.
 pub use nonsmooth_bench::plural as count;
 use nonsmooth_problem::check::{self, Failing, Measure, Verdict};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
+pub use crate::json::{Object, fields};
 use crate::kinds::{Counts, Form};
-
-/// An object of JSON, in the order in which it is filled.
-pub type Object = Map<String, Value>;
 
 /// A line of a report: what it is about, and the rest.
 pub fn row(text: &mut String, label: &str, rest: impl std::fmt::Display) {
@@ -66,14 +64,6 @@ pub fn residual_json(measure: &Measure) -> Object {
         all.remove(of_one_contact);
     }
     all
-}
-
-/// The fields of an object.
-pub fn fields(value: Value) -> Object {
-    match value {
-        Value::Object(map) => map,
-        other => Object::from_iter([("value".into(), other)]),
-    }
 }
 
 /// The criterion of the contacts that comes first.

@@ -3,11 +3,11 @@
 mod common;
 
 use common::{Folder, has_keys};
-use nonsmooth_dynamics::SceneEntry;
 use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
-use nonsmooth_problem::linalg::Csc;
+use nonsmooth_linalg::Csc;
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{BilateralGlobal, Friction, FrictionGlobal, with_friction};
+use nonsmooth_scenes::SceneEntry;
 
 const JUDGED: &str = "file kind contacts unknowns status message tolerance residual/absolute residual/relative \
     residual/paper residual/peer residual/primal residual/dual residual/complementarity failing contacts_by_status/open \

@@ -5,10 +5,10 @@ mod common;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use nonsmooth_dynamics::SCENES;
 use nonsmooth_io::fclib;
 use nonsmooth_problem::check::Judged;
 use nonsmooth_problem::{Friction, Problem, with_friction};
+use nonsmooth_scenes::SCENES;
 
 use crate::common::{Folder, Run};
 

@@ -9,7 +9,7 @@ use std::process::Command;
 
 use nonsmooth_io::fclib::{self, FclibFile, Info, StoredPoint};
 use nonsmooth_io::linear::{LinearFile, LinearPoint, toml};
-use nonsmooth_problem::linalg::{Bsr, Csc, Dense, Matrix};
+use nonsmooth_linalg::{Bsr, Csc, Dense, Matrix};
 use nonsmooth_problem::{
     BilateralGlobal, BilateralLocal, BoxLcp, Complementarity, Friction, FrictionGlobal,
     FrictionLocal, Hlcp, Lcp, Mlcp,

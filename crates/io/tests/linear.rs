@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use common::real;
 use nonsmooth_io::linear::{self, LinearFile, LinearPoint, market, toml};
 use nonsmooth_io::{Content, holds_problem, parts, read_any};
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
+use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::{BoxLcp, Complementarity, Hlcp, Lcp, Mlcp};
 use proptest::collection::{btree_map, vec};
 use proptest::option;
@@ -279,7 +279,7 @@ fn mistakes_in_our_format_are_named() {
 #[derive(Debug)]
 struct Identity;
 
-impl nonsmooth_problem::linalg::Operator for Identity {
+impl nonsmooth_linalg::Operator for Identity {
     fn nrows(&self) -> usize {
         1
     }

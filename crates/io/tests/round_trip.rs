@@ -8,7 +8,7 @@ use std::process::Command;
 
 use common::{assert_same, sizes};
 use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
-use nonsmooth_problem::linalg::{Bsr, Csc};
+use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::{
     BilateralGlobal, BilateralLocal, Friction, FrictionGlobal, FrictionLocal, GlobalPoint,
     LocalPoint,

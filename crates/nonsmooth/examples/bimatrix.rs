@@ -6,7 +6,7 @@
 //! one for each label that is dropped first; some labels lead to the same. That it is one is then checked by what an equilibrium is: no pure strategy does
 //! better against the other player's. The game is an LCP, too: its solutions are the equilibria, scaled.
 
-use nonsmooth_problem::linalg::Dense;
+use nonsmooth_linalg::Dense;
 use nonsmooth_solve::complementarity::pivoting::{Equilibrium, lemke_howson};
 
 /// The most that a player gains by leaving the equilibrium alone.

@@ -59,7 +59,7 @@
 //! | make problems | [`Planted`], with a known solution; [`Scene`], of bodies |
 //! | write a solver | [`Solver`], [`Step`], [`Driver`] |
 //!
-//! The crates below (`nonsmooth-problem`, `nonsmooth-solve`, `nonsmooth-io`, `nonsmooth-dynamics`) have all the rest: kernels, single methods, forms.
+//! The crates below (`nonsmooth-problem`, `nonsmooth-solve`, `nonsmooth-io`, `nonsmooth-scenes`) have all the rest: kernels, single methods, forms.
 
 #[doc(inline)]
 pub use nonsmooth_solve::{Answer, Solvable, Solve, solve};
@@ -67,13 +67,12 @@ pub use nonsmooth_solve::{Answer, Solvable, Solve, solve};
 #[doc(inline)]
 pub use nonsmooth_io::read;
 
-pub use nonsmooth_dynamics::{Scene, SceneError};
 pub use nonsmooth_io::{Content, IoError, fclib, linear, read_any};
+pub use nonsmooth_linalg::{Bsr, Csc, Dense, Matrix, Operator};
 pub use nonsmooth_problem::check::{
     Certificate, ContactStatus, Existence, Judged, Measure, Motion, Proof, RowCounts, RowStatus,
     StatusCounts, Verdict,
 };
-pub use nonsmooth_problem::linalg::{Bsr, Csc, Dense, Matrix, Operator};
 pub use nonsmooth_problem::planted::{Planted, PlantedLcp};
 pub use nonsmooth_problem::{
     AnyCounts, AnyPoint, AnyProblem, AnyStatus, BilateralGlobal, BilateralLocal, BoxLcp,
@@ -81,6 +80,7 @@ pub use nonsmooth_problem::{
     Lcp, LcpPoint, LocalPoint, Mlcp, Problem, ProblemError,
 };
 pub use nonsmooth_problem::{with_complementarity, with_friction, with_problem};
+pub use nonsmooth_scenes::{Scene, SceneError};
 pub use nonsmooth_solve::existence::of as exists;
 pub use nonsmooth_solve::registry::{session, solver_names};
 pub use nonsmooth_solve::settings;

@@ -7,7 +7,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 
 use nonsmooth::{FrictionGlobal, FrictionLocal, Lcp, Limits, Planted, Session};
-use nonsmooth_problem::linalg::{BlockLu, Bsr, Csc};
+use nonsmooth_linalg::{BlockLu, Bsr, Csc};
 use nonsmooth_problem::planted::PlantedLcp;
 use nonsmooth_solve::registry::{self, Registered};
 

@@ -10,25 +10,35 @@ use nonsmooth_solve::registry;
 
 // ------------------------------------------------------------------------------------------------ floors
 
-/// The crates by the name that sources use, each with those it may depend on: `cli, python → bench →
-/// {dynamics, io} → solve → problem`, but `io → problem` only. `nonsmooth` is the facade.
+/// The crates by the name that sources use, each with those it may depend on: `cli, python → bench → {scenes, io} → solve → analysis →
+/// problem → linalg`, but `io → problem` only. `nonsmooth` is the facade.
 const CRATES: &[(&str, &[&str])] = &[
-    ("nonsmooth_problem", &[]),
-    ("nonsmooth_solve", &["nonsmooth_problem"]),
-    ("nonsmooth_io", &["nonsmooth_problem"]),
-    ("nonsmooth_dynamics", &["nonsmooth_problem", "nonsmooth_solve"]),
+    ("nonsmooth_linalg", &[]),
+    ("nonsmooth_problem", &["nonsmooth_linalg"]),
+    ("nonsmooth_analysis", &["nonsmooth_linalg", "nonsmooth_problem"]),
+    ("nonsmooth_solve", &["nonsmooth_linalg", "nonsmooth_problem", "nonsmooth_analysis"]),
+    ("nonsmooth_io", &["nonsmooth_linalg", "nonsmooth_problem"]),
+    ("nonsmooth_scenes", &["nonsmooth_linalg", "nonsmooth_problem", "nonsmooth_solve"]),
     ("nonsmooth_bench", &LIBRARIES),
     ("nonsmooth_cli", &UP_TO_BENCH),
     ("nonsmooth_python", &UP_TO_BENCH),
     ("nonsmooth", &LIBRARIES),
 ];
-const LIBRARIES: [&str; 4] =
-    ["nonsmooth_problem", "nonsmooth_solve", "nonsmooth_io", "nonsmooth_dynamics"];
-const UP_TO_BENCH: [&str; 5] = [
+const LIBRARIES: [&str; 6] = [
+    "nonsmooth_linalg",
     "nonsmooth_problem",
+    "nonsmooth_analysis",
     "nonsmooth_solve",
     "nonsmooth_io",
-    "nonsmooth_dynamics",
+    "nonsmooth_scenes",
+];
+const UP_TO_BENCH: [&str; 7] = [
+    "nonsmooth_linalg",
+    "nonsmooth_problem",
+    "nonsmooth_analysis",
+    "nonsmooth_solve",
+    "nonsmooth_io",
+    "nonsmooth_scenes",
     "nonsmooth_bench",
 ];
 
@@ -43,13 +53,9 @@ struct Floors {
     wings: &'static [&'static str],
 }
 
-/// `check → kinds → linalg`. A kind names the judge of its own as an associated type, so the two share a floor; what
-/// they must not do is lean on what describes them (traits) or on planted instances, and linalg must know neither.
-const PROBLEM: Floors = Floors {
-    floors: &[&["error"], &["linalg"], &["check", "*"], &["traits"], &["planted"]],
-    others_mix: true,
-    wings: &[],
-};
+/// A kind names the judge of its own as an associated type, so `check` and the kinds share a floor; what they must not do is lean on planted instances.
+const PROBLEM: Floors =
+    Floors { floors: &[&["error"], &["check", "*"], &["planted"]], others_mix: true, wings: &[] };
 
 /// `diagnose → registry → bridges → {contact, complementarity} → core`; inside a wing `solvers → families → what they share → form → law`.
 /// The question of existence and the elimination of velocities are no families: any may ask them.
@@ -496,9 +502,11 @@ fn the_checker_finds_planted_violations() {
         planted("nonsmooth_io", "lib.rs", "use nonsmooth_solve::Driver;"),
         ["nonsmooth_io must not depend on nonsmooth_solve::Driver"]
     );
-    assert_eq!(solve("core/drive.rs", "fn f() { nonsmooth_dynamics::x() }").len(), 1);
+    assert_eq!(solve("core/drive.rs", "fn f() { nonsmooth_scenes::x() }").len(), 1);
     assert_eq!(solve("core/drive.rs", "use nonsmooth_bench as b;").len(), 1);
     assert_eq!(planted("nonsmooth_new", "lib.rs", "").len(), 1);
+    assert_eq!(planted("nonsmooth_linalg", "csc.rs", "use nonsmooth_problem::Lcp;").len(), 1);
+    assert_eq!(planted("nonsmooth_analysis", "x.rs", "use nonsmooth_solve::solve;").len(), 1);
     // A family and another family, by every way of writing it.
     for text in [
         "use crate::contact::newton::X;",
@@ -541,11 +549,8 @@ fn the_checker_finds_planted_violations() {
     assert_eq!(solve("core/drive.rs", "use crate::contact::form::Linear;").len(), 1);
     assert_eq!(solve("core/drive.rs", "use crate::contact::Condense;").len(), 1, "a whole wing");
     assert_eq!(solve("contact/law/local.rs", "use crate::*;").len(), 1);
-    assert_eq!(problem("linalg/bsr.rs", "use crate::check::Measure;").len(), 1);
-    assert_eq!(problem("linalg/bsr.rs", "use crate::lcp::Lcp;").len(), 1);
     assert_eq!(problem("check/local.rs", "use super::super::planted::Planted;").len(), 1);
     assert_eq!(problem("lcp.rs", "use super::planted::Planted;").len(), 1);
-    assert_eq!(problem("lcp.rs", "use crate::traits::Traits;").len(), 1);
     // After an item under test the file goes on.
     let text = "#[cfg(test)] mod tests { fn f() {} } use crate::planted::Planted;";
     assert_eq!(problem("lcp.rs", text).len(), 1);
@@ -592,13 +597,13 @@ fn the_checker_lets_the_house_live() {
         ("contact/law/mod.rs", "pub(crate) fn f() {} pub(super) fn g() {}"),
         (
             "contact/form/mod.rs",
-            "use nonsmooth_problem::{Problem, linalg::Csc}; use crate::SolveError;",
+            "use nonsmooth_problem::{Problem, Kind}; use nonsmooth_linalg::Csc; use crate::SolveError;",
         ),
     ] {
         assert_eq!(solve(place, text), [""; 0], "{text}");
     }
     for (place, text) in [
-        ("lcp.rs", "use crate::check::{self, Measure}; use crate::linalg::Csc;"),
+        ("lcp.rs", "use crate::check::{self, Measure}; use nonsmooth_linalg::Csc;"),
         ("check/lcp.rs", "use crate::lcp::Lcp; use super::Measure;"),
         ("planted/lcp.rs", "use crate::check::Measure; use crate::lcp::Lcp;"),
         ("friction.rs", "macro_rules! m { () => { $crate::Friction } }"),
@@ -629,7 +634,7 @@ fn the_judge_multiplies_by_itself() {
         assert!(shared.is_none(), "{} uses {shared:?}", file.display());
     }
     // They exist under these names, so that the test means something.
-    let bsr = tokens(&read(&root_folder().join("crates/problem/src/linalg/bsr.rs")));
+    let bsr = tokens(&read(&root_folder().join("crates/linalg/src/bsr.rs")));
     assert!(kernels.iter().all(|k| bsr.iter().any(|t| t == k)));
 }
 

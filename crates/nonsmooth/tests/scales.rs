@@ -1,8 +1,8 @@
 //! Problems whose parts differ by many orders of magnitude: what is small is solved too or not called solved, and what double precision
 //! cannot hold ends soon, with a status that says so.
 
+use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::linalg::{Bsr, Csc};
 use nonsmooth_problem::{BilateralLocal, FrictionGlobal, FrictionLocal, Problem};
 use nonsmooth_solve::registry::{self, Registered, Solves};
 use nonsmooth_solve::{Limits, Outcome, Status};

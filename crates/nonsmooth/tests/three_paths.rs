@@ -4,8 +4,8 @@
 mod common;
 
 use nonsmooth_io::fclib;
+use nonsmooth_linalg::norm;
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::linalg::norm;
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{Friction, FrictionGlobal, GlobalPoint, Problem};
 use nonsmooth_solve::contact::Condense;

@@ -7,9 +7,9 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use nonsmooth::{Bsr, Friction, Scene, fclib};
+use nonsmooth_analysis::{Spectrum, Traits};
 use nonsmooth_bench::traits_table::{self, Column};
-use nonsmooth_dynamics::scenes::{Family, SlidingBox, Stack};
-use nonsmooth_problem::traits::{Spectrum, Traits};
+use nonsmooth_scenes::scenes::{Family, SlidingBox, Stack};
 
 /// The spectra of the global and of the condensed problem of a scene, which agree.
 fn spectra(scene: &Scene) -> [Spectrum; 2] {

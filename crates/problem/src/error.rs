@@ -1,5 +1,7 @@
 //! A caller's mistake in the data of a problem.
 
+use nonsmooth_linalg::MatrixError;
+
 /// What is wrong with a problem's data: the place, what was expected there and what was found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProblemError {
@@ -37,6 +39,16 @@ pub enum ProblemError {
         /// How the singularity showed.
         found: String,
     },
+}
+
+impl From<MatrixError> for ProblemError {
+    fn from(error: MatrixError) -> Self {
+        match error {
+            MatrixError::Shape { place, expected, found } => Self::Shape { place, expected, found },
+            MatrixError::Value { place, expected, found } => Self::Value { place, expected, found },
+            MatrixError::Singular { place, found } => Self::Singular { place, found },
+        }
+    }
 }
 
 impl ProblemError {

@@ -2,8 +2,8 @@
 
 use crate::check::{self, Certificate, ConeSystem, Evidence, Impulses, Measure};
 use crate::error::{all_finite, friction_coefficients, vector};
-use crate::linalg::{Compensated, Csc, Inverse, Refine};
 use crate::{Kind, Problem, ProblemError};
+use nonsmooth_linalg::{Compensated, Csc, Inverse, Refine};
 
 /// **Find** `v`, `r` (and the multipliers `lambda` of bilateral constraints) such that
 ///

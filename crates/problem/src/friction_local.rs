@@ -2,8 +2,8 @@
 
 use crate::check::{self, Certificate, ConeSystem, Evidence, Measure};
 use crate::error::{all_finite, friction_coefficients, vector};
-use crate::linalg::{Bsr, Csc};
 use crate::{Kind, Problem, ProblemError};
+use nonsmooth_linalg::{Bsr, Csc};
 
 /// **Find** `r` (and the multipliers `lambda` of bilateral constraints) such that
 ///

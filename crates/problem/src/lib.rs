@@ -13,10 +13,8 @@ mod error;
 mod friction;
 mod friction_global;
 mod friction_local;
-pub mod linalg;
 pub mod planted;
 mod problem;
-pub mod traits;
 
 pub use any::{AnyCounts, AnyGauge, AnyPoint, AnyProblem, AnyStatus, OfAny, OfAnyPoint};
 pub use complementarity::{BoxLcp, Complementarity, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp};

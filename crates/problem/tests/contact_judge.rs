@@ -2,8 +2,8 @@
 //! let pass; the floor.
 
 use dashu_ratio::RBig;
+use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::check::{Judged, Measure};
-use nonsmooth_problem::linalg::{Bsr, Csc};
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{
     BilateralGlobal, BilateralLocal, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint,

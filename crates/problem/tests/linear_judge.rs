@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use nonsmooth_linalg::{Csc, Dense, Matrix, Operator};
 use nonsmooth_problem::check::{Certificate, Judged, Measure, RowStatus};
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix, Operator};
 use nonsmooth_problem::planted::{PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp};
 use nonsmooth_problem::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem};
 use proptest::prelude::*;

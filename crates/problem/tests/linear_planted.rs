@@ -1,7 +1,7 @@
 //! Planted linear problems: the judge accepts what was planted, and only that; the matrices are of the class they are said to be.
 
+use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::check::{Certificate, Judged};
-use nonsmooth_problem::linalg::Matrix;
 use nonsmooth_problem::planted::{PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp};
 use nonsmooth_problem::{LcpPoint, Problem};
 

@@ -1,7 +1,7 @@
 //! What the judge says of a linear complementarity problem does not depend on the units of its rows and columns, to the last bit, and what it accepts is a solution.
 
+use nonsmooth_linalg::{Dense, Matrix};
 use nonsmooth_problem::check::{Judged, Measure};
-use nonsmooth_problem::linalg::{Dense, Matrix};
 use nonsmooth_problem::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;

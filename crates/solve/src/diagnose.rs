@@ -4,9 +4,9 @@
 use std::borrow::Cow;
 use std::time::Instant;
 
+use nonsmooth_analysis::{Spectrum, Traits, rank};
+use nonsmooth_linalg::{Bsr, Csc, Delassus, Inverse, norm, small};
 use nonsmooth_problem::check::{Existence, Impulses};
-use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse, norm, small};
-use nonsmooth_problem::traits::{Spectrum, Traits, rank};
 use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, with_friction};
 use serde::Serialize;
 

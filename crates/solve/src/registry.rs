@@ -169,7 +169,7 @@ mod tests {
             u
         };
         let reference = motion("nsgs", &[]);
-        let size = nonsmooth_problem::linalg::norm(&problem.q);
+        let size = nonsmooth_linalg::norm(&problem.q);
         for (name, texts) in [
             ("psor", vec![]),
             ("nsgs_colored", vec!["threads=2", "serial_below=1"]),

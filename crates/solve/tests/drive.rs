@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::check::Impulses;
-use nonsmooth_problem::linalg::{Bsr, Csc};
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem};
 use nonsmooth_solve::registry;

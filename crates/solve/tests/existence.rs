@@ -1,7 +1,7 @@
 //! Existence: planted problems, squeezed bodies, wedges that can jam, clamps at rest; in both forms, dimensions and any units.
 
+use nonsmooth_linalg::{Bsr, Csc, Delassus, Inverse};
 use nonsmooth_problem::check::{Existence, Judged, Kinematic};
-use nonsmooth_problem::linalg::{Bsr, Csc, Delassus, Inverse};
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{
     BilateralGlobal, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem,

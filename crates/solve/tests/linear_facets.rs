@@ -2,8 +2,8 @@
 
 mod plain_lemke;
 
+use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::linalg::{Bsr, Csc};
 use nonsmooth_problem::planted::{Planted, PlantedMix};
 use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem};
 use nonsmooth_solve::bridges::{FacetInner, FacetOuter, Facets};

@@ -1,8 +1,8 @@
 //! The table of guarantees: what it says of known matrices, that its names and citations are real, and that it promises nothing of unknown matrices.
 
-use nonsmooth_problem::linalg::{Dense, Matrix};
+use nonsmooth_analysis::{Class, Classes};
+use nonsmooth_linalg::{Dense, Matrix};
 use nonsmooth_problem::planted::{PlantedClass, PlantedLcp};
-use nonsmooth_problem::traits::{Class, Classes};
 use nonsmooth_solve::guarantees::{guaranteed, likely};
 
 fn classes(m: &Matrix) -> Classes {

@@ -1,7 +1,7 @@
 //! Interior points and the convex QP on linear complementarity problems: planted, classic, degenerate, infeasible and badly scaled ones.
 
+use nonsmooth_linalg::{Csc, Dense, Matrix, norm};
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix, norm};
 use nonsmooth_problem::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::settings::from_texts;

@@ -1,7 +1,7 @@
 //! Lemke's method: known solutions and pivot counts, degeneracy, certificates, mixed problems, bad scaling, and that the bases agree.
 
+use nonsmooth_linalg::{Csc, Dense, Matrix, norm};
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix, norm};
 use nonsmooth_problem::{Lcp, LcpPoint, Mlcp, Problem};
 use nonsmooth_solve::complementarity::pivoting::{BasisKind, Covering, Lemke, Ties};
 use nonsmooth_solve::trace::{Pivot, Trace, Variable};

@@ -1,7 +1,7 @@
 //! Semismooth Newton methods on linear complementarity problems: known solutions, planted ones, cycling matrices, every shape of mixed problem.
 
+use nonsmooth_linalg::{Csc, Dense, Matrix, Operator, SquareLu};
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix, Operator, SquareLu};
 use nonsmooth_problem::{BoxLcp, Lcp, LcpPoint, Mlcp, Problem};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::settings::from_texts;

@@ -1,7 +1,7 @@
 //! Pivoting methods on linear complementarity problems: worked examples, pivot counts, certificates, random problems of known class.
 
+use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::planted::classics::{self, Classic, Costs, Known};
 use nonsmooth_problem::{Lcp, LcpPoint, Mlcp, Problem};
 use nonsmooth_solve::complementarity::pivoting::all_solutions;
@@ -711,7 +711,7 @@ fn mixed_problems_of_any_shape() {
 #[derive(Debug)]
 struct Products;
 
-impl nonsmooth_problem::linalg::Operator for Products {
+impl nonsmooth_linalg::Operator for Products {
     fn nrows(&self) -> usize {
         2
     }

@@ -1,7 +1,7 @@
 //! Reformulations of linear complementarity problems: there and back, certificates, refusals.
 
+use nonsmooth_linalg::{Dense, Matrix};
 use nonsmooth_problem::check::{Certificate, Evidence, Judged};
-use nonsmooth_problem::linalg::{Dense, Matrix};
 use nonsmooth_problem::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem};
 use nonsmooth_solve::Reformulation;
 use nonsmooth_solve::complementarity::reform::{Mixed, Reduce, Split};

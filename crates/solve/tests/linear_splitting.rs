@@ -3,7 +3,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
+use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::planted::{JournalBearing, Membrane, energy, torsion};
 use nonsmooth_problem::{BoxLcp, Lcp, LcpPoint, Mlcp, Problem};
 use nonsmooth_solve::complementarity::quadratic::Mprgp;

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use nonsmooth_problem::linalg::Dense;
+use nonsmooth_linalg::Dense;
 use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp, Problem};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::settings::SettingsMap;

@@ -1,14 +1,15 @@
 //! One job in one worker process, watched from outside.
 
 use std::collections::VecDeque;
+use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Read, Write};
+use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 use super::job::{Job, Said, Task};
-use super::pool::WorkerCommand;
 
 /// Seconds that reading a problem and preparing the judge may take.
 const LOADING: f64 = 600.0;
@@ -16,6 +17,15 @@ const LOADING: f64 = 600.0;
 const LOOK: Duration = Duration::from_millis(50);
 /// Bytes of a worker's last words that are kept.
 const LAST_WORDS: usize = 2000;
+
+/// How a worker is started: a program that calls [`serve`](super::serve).
+#[derive(Debug, Clone)]
+pub struct WorkerCommand {
+    /// The program.
+    pub program: PathBuf,
+    /// Its arguments.
+    pub arguments: Vec<OsString>,
+}
 
 /// What became of a job.
 #[derive(Debug, Clone, PartialEq)]

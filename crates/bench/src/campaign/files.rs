@@ -3,9 +3,9 @@
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use nonsmooth_analysis::Traits;
 use nonsmooth_io::linear::LinearFile;
 use nonsmooth_io::{Content, holds_problem, parts as files_of, read_any};
-use nonsmooth_problem::traits::Traits;
 use nonsmooth_problem::{Complementarity, Problem as _, with_complementarity};
 use sha2::{Digest, Sha256};
 

@@ -13,10 +13,11 @@ mod solvers;
 mod system;
 mod worker;
 
+pub use child::WorkerCommand;
 pub use files::{Input, describe, inputs};
 pub use job::{Job, Said, Task};
 pub use journal::Journal;
-pub use pool::{Event, Setup, Summary, WorkerCommand, run};
+pub use pool::{Event, Setup, Summary, run};
 pub use solvers::{Label, Registry, Solvers};
 pub use system::machine;
 pub use worker::serve;

@@ -1,8 +1,7 @@
 //! Worker processes side by side, and the campaign from its plan to its last line.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
-use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
@@ -10,7 +9,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use nonsmooth_problem::Kind;
 
-use super::child::{End, work};
+use super::child::{End, WorkerCommand, work};
 use super::files::Input;
 use super::job::{Job, Said, Task};
 use super::journal::Journal;
@@ -18,15 +17,6 @@ use super::solvers::{Label, Solvers};
 use super::system;
 use crate::record::{Ending, Key, Line, Plan, Problem, Residuals, Run};
 use crate::runs::Runs;
-
-/// How a worker is started: a program that calls [`serve`](super::serve).
-#[derive(Debug, Clone)]
-pub struct WorkerCommand {
-    /// The program.
-    pub program: PathBuf,
-    /// Its arguments.
-    pub arguments: Vec<OsString>,
-}
 
 /// What to run, and how.
 #[derive(Debug, Clone)]

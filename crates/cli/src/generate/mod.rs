@@ -1,23 +1,25 @@
 //! `nonsmooth gen`.
 
 mod linear;
+mod scene;
+mod suite;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use nonsmooth_dynamics::draw::{self, Drawing};
-use nonsmooth_dynamics::{Scene, SceneEntry, SceneError, scenes::SCENES};
-use nonsmooth_io::fclib::{self, FclibFile, Info};
+use nonsmooth_io::fclib;
 use nonsmooth_problem::{Friction, with_complementarity};
+use nonsmooth_scenes::draw::{self, Drawing};
+use nonsmooth_scenes::{Scene, SceneEntry, SceneError, scenes::SCENES};
 use nonsmooth_solve::registry;
 use nonsmooth_solve::settings::{self, Setting, SettingsMap};
 use nonsmooth_solve::{Limits, Status};
-use serde_json::Value;
 
 use self::linear::Maker;
+use self::scene::{Form, join, make, plain, summary};
 use crate::kinds::Counts;
 use crate::solve::{Plan, Solved, limits, linear_name, seconds, solve as solve_one, solve_any};
-use crate::{Exit, files, output, report, suite};
+use crate::{Exit, files, output, report};
 
 /// Generate the problem of a scene, or a linear complementarity problem.
 ///
@@ -80,15 +82,6 @@ Examples:
   nonsmooth gen --suite docs/benchmarks/suite.toml --out problems/
 
 Exit codes: 0 done; 1 --solve did not reach --tol (the best point is stored); 2 a mistake in the options.";
-
-/// How the problem is stated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Form {
-    /// M v = H r + f
-    Global,
-    /// u = W r + q
-    Local,
-}
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
@@ -201,56 +194,11 @@ fn linear_problem(maker: &Maker, args: &Args) -> Result<Exit, String> {
     Ok(exit)
 }
 
-/// The scene and the file of its problem.
-pub fn make(
-    entry: &SceneEntry,
-    settings: &SettingsMap,
-    form: Form,
-) -> Result<(Scene, FclibFile), SceneError> {
-    let scene = entry.make(settings)?;
-    let problem = match form {
-        Form::Global => Friction::Global3(scene.problem()?),
-        Form::Local => Friction::Local3(scene.condensed()?),
-    };
-    let mut content = FclibFile::new(problem);
-    content.info = info(entry, settings, &scene);
-    Ok((scene, content))
-}
-
 fn solve(label: &Path, problem: &Friction, limits: Limits) -> Result<Solved, String> {
     let settings = &SettingsMap::new();
     let begun = Instant::now();
     let plan = Plan { solver: registry::DEFAULT, settings, limits, begun, progress: true };
     solve_any(label, problem, &plan)
-}
-
-/// What made the file, so that it can be made again.
-fn info(entry: &SceneEntry, settings: &SettingsMap, scene: &Scene) -> Info {
-    let title = format!("{} {}", entry.name, join(settings));
-    let mut all: SettingsMap = entry.settings().into_iter().map(|s| (s.key, s.default)).collect();
-    all.extend(settings.clone());
-    Info {
-        title: Some(title.trim_end().into()),
-        description: Some(format!(
-            "One Moreau-Jean time step of the scene `{}` ({}), by nonsmooth {}: {}. SI units.",
-            entry.name,
-            entry.summary,
-            env!("CARGO_PKG_VERSION"),
-            join(&all)
-        )),
-        dofs: Some(scene.dofs()),
-        ..Info::default()
-    }
-}
-
-fn join(settings: &SettingsMap) -> String {
-    let each = settings.iter().map(|(k, v)| format!("{k}={}", plain(v)));
-    each.collect::<Vec<_>>().join(" ")
-}
-
-/// A value as it would be typed.
-pub fn plain(value: &Value) -> String {
-    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
 fn drawing(scene: &Scene, solved: Option<&Solved>) -> Result<String, SceneError> {
@@ -268,21 +216,6 @@ fn drawing(scene: &Scene, solved: Option<&Solved>) -> Result<String, SceneError>
         ..Drawing::default()
     };
     draw::svg(scene, &drawing)
-}
-
-/// What was made.
-pub fn summary(label: &Path, scene: &Scene, problem: &Friction) -> String {
-    format!(
-        "{}: {}, {} and {} ({})\n",
-        label.display(),
-        scene.name,
-        match scene.bodies.len() + scene.solids.len() {
-            1 => "1 body".into(),
-            n => format!("{n} bodies"),
-        },
-        report::count(problem.contacts(), "contact"),
-        problem.kind().name(),
-    )
 }
 
 fn text(

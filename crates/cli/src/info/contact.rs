@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use nonsmooth_analysis::{Components, Mass, MuRange, Spectrum, Traits};
 use nonsmooth_io::fclib::{FclibFile, StoredPoint};
+use nonsmooth_linalg::Inverse;
 use nonsmooth_problem::check::{ContactStatus, Existence, StatusCounts};
-use nonsmooth_problem::linalg::Inverse;
-use nonsmooth_problem::traits::{Components, Mass, MuRange, Spectrum, Traits};
 use nonsmooth_problem::{Dynamics, Friction, FrictionGlobal, ProblemError};
 use serde_json::{Value, json};
 
@@ -61,7 +61,7 @@ const SMALL_BODY: usize = 48;
 
 fn singular<const D: usize>(p: &FrictionGlobal<D>) -> Option<ProblemError> {
     // Bilateral constraints may make up for a singular M in the dynamics, but M⁻¹ is needed all the same.
-    Inverse::new(&p.M, "M").err().or_else(|| {
+    Inverse::new(&p.M, "M").err().map(ProblemError::from).or_else(|| {
         p.bilateral.as_ref()?;
         Dynamics::new(p).err()
     })

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use nonsmooth_analysis::{Classes, Effort, Finding};
 use nonsmooth_io::linear::LinearFile;
+use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::check::{Judged, RowCounts, RowStatus, Verdict};
-use nonsmooth_problem::linalg::Matrix;
-use nonsmooth_problem::traits::{Classes, Effort, Finding};
 use nonsmooth_problem::{Complementarity, Mlcp, with_complementarity};
 use nonsmooth_solve::guarantees::{Guarantee, guaranteed};
 use serde_json::{Value, json};
@@ -85,7 +85,7 @@ pub(super) fn facts(file: &Path, content: &LinearFile) -> Result<Facts, String> 
         q: Right {
             negative: q.iter().filter(|q| **q < 0.0).count(),
             zero: q.iter().filter(|q| **q == 0.0).count(),
-            norm: nonsmooth_problem::linalg::norm(q),
+            norm: nonsmooth_linalg::norm(q),
         },
         solution: solution.map_err(|e| format!("{}: {e}", file.display()))?,
     })

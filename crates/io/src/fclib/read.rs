@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::path::Path;
 
-use nonsmooth_problem::linalg::{Bsr, Csc};
+use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::{
     BilateralGlobal, BilateralLocal, Friction, FrictionGlobal, FrictionLocal, ProblemError,
 };

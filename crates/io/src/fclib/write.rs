@@ -9,7 +9,7 @@ use hdf5_pure::{
     AttrValue, CharacterSet, Datatype, Error, File, FileBuilder, FormatError, GroupBuilder, LibVer,
     StringPadding,
 };
-use nonsmooth_problem::linalg::Csc;
+use nonsmooth_linalg::Csc;
 use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal};
 
 use super::{FclibFile, Info, Sizes, StoredPoint, check_vector, group, guarded, read};

@@ -7,7 +7,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
+use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::{BoxLcp, Complementarity, Lcp};
 
 use super::tokens::Tokens;

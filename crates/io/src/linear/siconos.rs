@@ -20,7 +20,7 @@
 
 use std::path::Path;
 
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
+use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::{BoxLcp, Complementarity, Lcp, Mlcp, ProblemError};
 
 use super::tokens::Tokens;

@@ -6,7 +6,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
+use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::{BoxLcp, Complementarity, Hlcp, Kind, Lcp, Mlcp, ProblemError};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, MapAccess, SeqAccess, Visitor};
@@ -241,7 +241,7 @@ impl Keyed<'_> {
                     return Err(self.wrong(format!("{name}.entries[{k}]"), expected, found));
                 }
                 let made = Csc::from_triplets(rows, columns, entries.iter().copied());
-                made.map(Matrix::from).map_err(|problem| self.invalid(problem))
+                made.map(Matrix::from).map_err(|problem| self.invalid(problem.into()))
             }
         }
     }
@@ -266,7 +266,7 @@ impl Keyed<'_> {
             }
             _ => return self.mixed(k),
         };
-        made.map_err(|problem| self.invalid(problem))
+        made.map_err(|problem| self.invalid(problem.into()))
     }
 
     /// An MLCP, as M, q and the number of free variables, or by its blocks.
@@ -314,7 +314,7 @@ impl Keyed<'_> {
                 )
             }
         };
-        made.map(Complementarity::Mlcp).map_err(|problem| self.invalid(problem))
+        made.map(Complementarity::Mlcp).map_err(|problem| self.invalid(problem.into()))
     }
 
     fn point(&self, s: &Solution) -> Result<LinearPoint, IoError> {

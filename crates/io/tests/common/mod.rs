@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use hdf5_pure::{FileBuilder, GroupBuilder};
 use nonsmooth_io::fclib::{FclibFile, Info, StoredPoint};
-use nonsmooth_problem::linalg::{Bsr, Csc};
+use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::{BilateralGlobal, BilateralLocal, Friction, FrictionGlobal, FrictionLocal};
 use proptest::collection::{btree_map, vec};
 use proptest::option;

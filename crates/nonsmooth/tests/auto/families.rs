@@ -1,13 +1,13 @@
 //! Each family solves what the literature says that it does, and methods that have nothing in common find the same velocities.
 
 use crate::common::{self, Run, run, within};
-use nonsmooth_dynamics::scenes::{Chain, Family, Kapla, SpherePile, Stack, State, Wall};
+use nonsmooth_analysis::Spectrum;
 use nonsmooth_io::fclib;
+use nonsmooth_linalg::norm;
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::linalg::norm;
 use nonsmooth_problem::planted::{Planted, PlantedMix};
-use nonsmooth_problem::traits::Spectrum;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, with_friction};
+use nonsmooth_scenes::scenes::{Chain, Family, Kapla, SpherePile, Stack, State, Wall};
 use nonsmooth_solve::contact::Condense;
 use nonsmooth_solve::registry::Registered;
 use nonsmooth_solve::{Limits, Reformulation, Status};

@@ -6,14 +6,14 @@ mod common;
 mod families;
 
 use common::{run, within};
-use nonsmooth_dynamics::Scene;
-use nonsmooth_dynamics::scenes::{
-    Arch, Chain, Family, Kapla, SlidingBox, Spheres, Stack, State, Wall,
-};
+use nonsmooth_linalg::{Bsr, Csc, norm};
 use nonsmooth_problem::check::{Existence, Judged};
-use nonsmooth_problem::linalg::{Bsr, Csc, norm};
 use nonsmooth_problem::planted::{Planted, PlantedMix};
 use nonsmooth_problem::{BilateralGlobal, FrictionGlobal, FrictionLocal, GlobalPoint};
+use nonsmooth_scenes::Scene;
+use nonsmooth_scenes::scenes::{
+    Arch, Chain, Family, Kapla, SlidingBox, Spheres, Stack, State, Wall,
+};
 use nonsmooth_solve::contact::Condense;
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limit, Limits, Outcome, Reformulation, Status, existence};

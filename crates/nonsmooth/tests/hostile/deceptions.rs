@@ -1,8 +1,8 @@
 //! Problems made to deceive: without solution, contradictory, nearly singular, stiff, in absurd units. Whatever a solver
 //! believes, nothing is called solved that is not, and what can be solved is.
 
+use nonsmooth_linalg::{Bsr, Csc, Dense};
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::linalg::{Bsr, Csc, Dense};
 use nonsmooth_problem::{
     BilateralGlobal, BilateralLocal, FrictionGlobal, FrictionLocal, LocalPoint, Mlcp, Problem,
 };

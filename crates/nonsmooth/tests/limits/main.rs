@@ -8,13 +8,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use nonsmooth_dynamics::SceneEntry;
+use nonsmooth_linalg::Csc;
 use nonsmooth_problem::check::{Existence, Measure};
-use nonsmooth_problem::linalg::Csc;
 use nonsmooth_problem::planted::{PlantedClass, PlantedLcp, PlantedMlcp};
 use nonsmooth_problem::{
     BoxLcp, Friction, FrictionGlobal, FrictionLocal, Hlcp, Kind, Lcp, LcpPoint, Mlcp, Problem,
 };
+use nonsmooth_scenes::SceneEntry;
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::settings::{SettingsMap, from_texts};
 use nonsmooth_solve::{Limit, Limits, Status, existence};

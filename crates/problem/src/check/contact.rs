@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::linalg::{Real, power_of_two};
+use nonsmooth_linalg::{Real, power_of_two};
 
 /// What a contact does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]

@@ -22,9 +22,9 @@ use serde::Serialize;
 use super::contact::distance_to_cone;
 use super::proof::{Equation, exact, monotone, negative, satisfying};
 use super::{Certificate, Exact, ExactVector, Impulses, Monotone, Proof, rounded};
-use crate::linalg::small::{self, tangential_norm};
-use crate::linalg::{Compensated, Csc, norm};
 use crate::{FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem};
+use nonsmooth_linalg::small::{self, tangential_norm};
+use nonsmooth_linalg::{Compensated, Csc, norm};
 
 /// What is known of the existence of a solution. *Proved* is what holds in exact arithmetic on the stored doubles; what holds up to rounding is *nearly* so.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -508,9 +508,9 @@ impl Power {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linalg::Bsr;
     use crate::planted::Planted;
     use crate::{BilateralGlobal, BilateralLocal};
+    use nonsmooth_linalg::Bsr;
 
     /// One body of unit mass in space that touches planes with the normals given.
     fn touching(normals: &[[f64; 3]], w: &[f64], mu: f64) -> FrictionGlobal<3> {

@@ -4,8 +4,8 @@ use super::loads::ROUNDING;
 use super::local::{HALF_ULP, LawGauge, largest, unit, worst};
 use super::rows::{Rows, doubt};
 use super::{Measure, over};
-use crate::linalg::{Csc, Delassus, Doubled, Inverse, Refine, norm, norm_of, small};
 use crate::{Dynamics, FrictionGlobal, GlobalPoint, ProblemError};
+use nonsmooth_linalg::{Csc, Delassus, Doubled, Inverse, Refine, norm, norm_of, small};
 
 /// The judge's constants and buffers for a [`FrictionGlobal`]: among them its own factorisation of the dynamics.
 #[derive(Debug, Clone)]

@@ -61,8 +61,8 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linalg::{Bsr, Csc};
     use crate::{FrictionLocal, Problem};
+    use nonsmooth_linalg::{Bsr, Csc};
 
     /// A mass of 1 pressed between two opposite walls that approach each other: no motion is admissible.
     fn squeezed(mu: f64) -> (FrictionGlobal<2>, FrictionLocal<2>) {

@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::proof::{Exact, FEW, exact, exactly_near};
 use super::rows::{Rows, doubt};
 use super::{Judged, Measure, Verdict};
-use crate::linalg::{Matrix, norm};
 use crate::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem};
+use nonsmooth_linalg::{Matrix, norm};
 
 /// The data of a problem in z with `w = M z + q`: row i belongs to an equality, or to the variable `free + i − equalities`.
 pub(crate) struct Data<'a> {

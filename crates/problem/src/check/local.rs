@@ -4,8 +4,8 @@ use super::contact::{Share, is_at_rest_or_open, length, modified_velocity, natur
 use super::loads::Loads;
 use super::rows::{Rows, doubt};
 use super::{Measure, over};
-use crate::linalg::{Csc, Doubled, Real, norm, norm_of, power_of_two, small};
 use crate::{BilateralLocal, FrictionLocal, LocalPoint};
+use nonsmooth_linalg::{Csc, Doubled, Real, norm, norm_of, power_of_two, small};
 
 /// The judge's constants and buffers for a [`FrictionLocal`].
 #[derive(Debug, Clone)]

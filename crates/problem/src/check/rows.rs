@@ -1,6 +1,6 @@
 //! Sums of matrix–vector products, row by row, plainly or in doubled precision.
 
-use crate::linalg::{Bsr, Compensated, Csc, Doubled, Matrix, norm_of};
+use nonsmooth_linalg::{Bsr, Compensated, Csc, Doubled, Matrix, norm_of};
 
 /// One compensated sum for each row, and the sum of the sizes of its terms.
 #[derive(Debug, Clone, Default)]
@@ -137,7 +137,7 @@ pub(super) fn doubt(n: usize) -> f64 {
 /// The kernels in doubled precision, each compiled twice: the error of a product costs one operation on a machine with fused
 /// multiplication and addition (found at run time), else seventeen. Both make the same bits.
 mod fused {
-    use crate::linalg::{Bsr, Compensated, Csc, small};
+    use nonsmooth_linalg::{Bsr, Compensated, Csc, small};
 
     /// Defines a kernel that calls the faster of the two bodies.
     macro_rules! kernel {

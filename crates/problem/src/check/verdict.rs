@@ -7,8 +7,8 @@ use serde::Serialize;
 use super::contact::{modified_velocity, natural_map, status};
 use super::local::LawGauge;
 use super::{ContactStatus, Measure, Motion, over};
-use crate::linalg::small;
 use crate::{FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem, ProblemError};
+use nonsmooth_linalg::small;
 
 /// Everything that the judge says of a point.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -3,7 +3,7 @@
 use super::square;
 use crate::ProblemError;
 use crate::error::vector;
-use crate::linalg::Matrix;
+use nonsmooth_linalg::Matrix;
 
 /// `−(M z + q) ∈ N_[l, u](z)`: with `w = M z + q`, `w_i ≥ 0` where `z_i = l_i`, `w_i ≤ 0` where `z_i = u_i`, and `w_i = 0` between.
 ///

@@ -3,8 +3,8 @@
 use super::square;
 use crate::check::{self, Certificate, ConeSystem, Evidence, HlcpGauge, Measure};
 use crate::error::vector;
-use crate::linalg::Matrix;
 use crate::{Kind, Problem, ProblemError};
+use nonsmooth_linalg::Matrix;
 
 /// `Q x + R s = q`, `0 ≤ x ⟂ s ≥ 0`: lecture (33). An LCP is `Q = M, R = −I`, with −q on the right.
 #[derive(Debug, Clone, PartialEq)]

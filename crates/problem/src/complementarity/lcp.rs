@@ -3,7 +3,7 @@
 use super::square;
 use crate::ProblemError;
 use crate::error::vector;
-use crate::linalg::Matrix;
+use nonsmooth_linalg::Matrix;
 
 /// `0 ≤ z ⟂ w = M z + q ≥ 0`: LCP(M, q), lecture (6).
 #[derive(Debug, Clone, PartialEq)]

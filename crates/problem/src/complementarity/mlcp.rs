@@ -2,7 +2,7 @@
 
 use crate::ProblemError;
 use crate::error::vector;
-use crate::linalg::{Csc, Dense, Matrix};
+use nonsmooth_linalg::{Csc, Dense, Matrix};
 
 /// `A u + C v + a = 0`, `0 ≤ v ⟂ D u + B v + b ≥ 0`: MLCP, lecture (8).
 ///
@@ -85,7 +85,7 @@ impl Mlcp {
             let meaning = format!("{equalities} equalities, {free} free variables, {pairs} pairs");
             M.check_shape("M", equalities + pairs, free + pairs, &meaning)?;
         }
-        M.check_finite("M")
+        Ok(M.check_finite("M")?)
     }
 
     /// The number of complementary pairs m.

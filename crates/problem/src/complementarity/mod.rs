@@ -101,7 +101,7 @@ pub use lcp::{Lcp, LcpPoint};
 pub use mlcp::Mlcp;
 
 use crate::ProblemError;
-use crate::linalg::Matrix;
+use nonsmooth_linalg::Matrix;
 
 /// Any of the linear complementarity problems.
 #[derive(Debug, Clone, PartialEq)]
@@ -135,5 +135,5 @@ fn square(name: &str, m: &Matrix) -> Result<(), ProblemError> {
         return Err(ProblemError::shape(name, "at least one row", "none"));
     }
     m.check_shape(name, m.nrows(), m.nrows(), "square")?;
-    m.check_finite(name)
+    Ok(m.check_finite(name)?)
 }

@@ -10,7 +10,7 @@
 //! ```
 
 use crate::Lcp;
-use crate::linalg::Dense;
+use nonsmooth_linalg::Dense;
 
 /// An example.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,10 +8,10 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use crate::linalg::{Csc, Delassus, Inverse};
 use crate::{
     BilateralGlobal, BilateralLocal, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint,
 };
+use nonsmooth_linalg::{Csc, Delassus, Inverse};
 
 /// What to plant.
 #[derive(Debug, Clone, PartialEq)]
@@ -298,7 +298,7 @@ mod tests {
         let reference = problem.judge(&point, 1e-8).unwrap().measure;
         let (a, b) = (1e6, 1e-3);
         let scaled = FrictionLocal::<3>::new(
-            crate::linalg::Bsr::from_csc(&{
+            nonsmooth_linalg::Bsr::from_csc(&{
                 let w = problem.W.to_csc();
                 Csc::from_triplets(60, 60, w.triplets().map(|(i, j, x)| (i, j, x / a))).unwrap()
             }),

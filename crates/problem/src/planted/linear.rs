@@ -8,8 +8,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use crate::check::Certificate;
-use crate::linalg::{Compensated, Csc, Dense, Matrix};
 use crate::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp};
+use nonsmooth_linalg::{Compensated, Csc, Dense, Matrix};
 
 /// The classes from which matrices are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

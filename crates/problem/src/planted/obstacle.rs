@@ -12,8 +12,8 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use crate::linalg::{Csc, Matrix, Operator};
 use crate::{BoxLcp, Lcp};
+use nonsmooth_linalg::{Csc, Matrix, Operator};
 
 /// `φ(z) = ½ zᵀ M z + qᵀ z`. LCP(M, q) with symmetric M are the conditions of its minimum on `z ≥ 0`.
 #[allow(non_snake_case)]

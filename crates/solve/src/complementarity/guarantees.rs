@@ -5,7 +5,7 @@
 //!
 //! References, theorem by theorem, are in [`Guarantee::cites`]; most are in CottlePangStone2009, chapters 4 and 5.
 
-use nonsmooth_problem::traits::{Class, Classes, Finding};
+use nonsmooth_analysis::{Class, Classes, Finding};
 use serde::Serialize;
 
 /// A solver that is guaranteed to work, and why.

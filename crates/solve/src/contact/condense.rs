@@ -6,8 +6,8 @@
 //! Source: Acary, lecture (2)–(9). Cost: D solves per contact, then one product per pair of contacts that share
 //! a component of M. Storage: W. Fails where M is singular.
 
+use nonsmooth_linalg::{Csc, Delassus, budget};
 use nonsmooth_problem::check::{Certificate, Impulses};
-use nonsmooth_problem::linalg::{Csc, Delassus, budget};
 use nonsmooth_problem::{Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint};
 
 use crate::SolveError;

@@ -1,8 +1,8 @@
 //! What is asked before a program goes to Clarabel, whose factorisations cannot be interrupted.
 
 use clarabel::algebra::CscMatrix;
-use nonsmooth_problem::linalg::admit_sparse;
-use nonsmooth_problem::linalg::budget::{self, TooLarge};
+use nonsmooth_linalg::admit_sparse;
+use nonsmooth_linalg::budget::{self, TooLarge};
 
 /// Whether there is the memory for the factor of Clarabel's matrix `[P, Aᵀ; A, ·]`.
 pub fn admit_program(p: &CscMatrix<f64>, a: &CscMatrix<f64>) -> Result<(), TooLarge> {

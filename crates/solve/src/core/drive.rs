@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use cpu_time::ProcessTime;
+use nonsmooth_linalg::budget::{Budget, Scope};
+use nonsmooth_linalg::factorisations;
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::{Certificate, Evidence, Measure, Proof};
-use nonsmooth_problem::linalg::budget::{Budget, Scope};
-use nonsmooth_problem::linalg::factorisations;
 
 use crate::core::guard;
 use crate::core::trace::Trace;

@@ -1,7 +1,8 @@
 //! A caller's mistake, as opposed to a numerical outcome (which is a [`Status`](crate::Status)).
 
+use nonsmooth_linalg::MatrixError;
+use nonsmooth_linalg::budget::TooLarge;
 use nonsmooth_problem::ProblemError;
-use nonsmooth_problem::linalg::budget::TooLarge;
 
 /// Why a solve could not be started.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -46,6 +47,12 @@ pub enum SolveError {
         /// What it is.
         found: String,
     },
+}
+
+impl From<MatrixError> for SolveError {
+    fn from(error: MatrixError) -> Self {
+        Self::Problem(error.into())
+    }
 }
 
 impl SolveError {

@@ -13,8 +13,8 @@
 
 use dashu_int::ops::{BitTest, Gcd, UnsignedAbs};
 use dashu_int::{IBig, UBig};
+use nonsmooth_linalg::budget;
 use nonsmooth_problem::check::{ConeSystem, Exact, ExactVector};
-use nonsmooth_problem::linalg::budget;
 
 /// How the enumeration ended.
 #[derive(Debug, Clone, PartialEq)]
@@ -323,8 +323,8 @@ impl Case {
 
 #[cfg(test)]
 mod tests {
+    use nonsmooth_linalg::{Bsr, Csc, Dense};
     use nonsmooth_problem::check::{Certificate, Evidence};
-    use nonsmooth_problem::linalg::{Bsr, Csc, Dense};
     use nonsmooth_problem::{BoxLcp, FrictionLocal, Hlcp, Lcp, Mlcp, Problem};
 
     use super::*;

@@ -1,6 +1,6 @@
 //! Limits that hold whatever is under way.
 //!
-//! Kernels of this workspace look at their [`budget`](nonsmooth_problem::linalg::budget) every few milliseconds, and the loop after every step. What remains
+//! Kernels of this workspace look at their [`budget`](nonsmooth_linalg::budget) every few milliseconds, and the loop after every step. What remains
 //! are single calls into libraries (a sparse factorisation, an ordering, an iteration of a cone program) that end when they end: on a large problem after a minute.
 //! So the solve of a problem that is large enough for such calls to matter runs on a thread of its own, on a copy of the problem. The caller's thread
 //! waits for it, relays its progress, and watches the clock and the flag to cancel. What does not come back soon after the limit is given up: it ends by itself where it next

@@ -1,7 +1,7 @@
 //! Whether dynamics are monotone, proved or up to rounding.
 
 use super::exact::{Exact, exact, negative};
-use crate::linalg::{Csc, Groups, Matrix, SquareCholesky, is_positive_definite, norm};
+use nonsmooth_linalg::{Csc, Groups, Matrix, SquareCholesky, is_positive_definite, norm};
 
 /// What is known of a matrix A with the symmetric part S = (A + Aᵀ)/2: positive definite, or semidefinite with ker S ⊆ ker A, so that
 /// `A = Lᵀ K L` with K positive definite.

@@ -3,8 +3,8 @@
 use super::cones::{Column, ConeSystem};
 use super::evidence::Claim;
 use super::exact::{Exact, exact};
-use crate::linalg::{Csc, Matrix};
 use crate::{BoxLcp, FrictionGlobal, FrictionLocal, Hlcp, Lcp, Mlcp};
+use nonsmooth_linalg::{Csc, Matrix};
 
 /// The columns of M times `sign`, moved down by `row`; `None` of an operator.
 fn columns(m: &Matrix, sign: i8, wanted: &dyn Fn(usize) -> bool) -> Option<Vec<Column>> {

@@ -17,8 +17,8 @@
 //! Cost: `(ω + 1)²` products a block of W. Storage: as many entries. Unknowns: ω + 2 a contact, 1 where mu = 0.
 //! Fails: in space the answer is that of another law, see [the page of the family](super).
 
+use nonsmooth_linalg::{Block, small};
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Block, small};
 use nonsmooth_problem::{FrictionLocal, Lcp, LcpPoint, LocalPoint};
 
 use super::{

@@ -19,8 +19,8 @@ mod outer;
 pub use inner::{FacetInner, InnerMemo};
 pub use outer::{FacetOuter, OuterMemo};
 
+use nonsmooth_linalg::{Bsr, Csc, Matrix, small};
 use nonsmooth_problem::check::{Certificate, Impulses};
-use nonsmooth_problem::linalg::{Bsr, Csc, Matrix, small};
 use nonsmooth_problem::{FrictionLocal, LocalPoint};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

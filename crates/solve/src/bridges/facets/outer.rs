@@ -17,8 +17,8 @@
 //! Cost: one copy of W and 2ω entries a contact. Unknowns: ω + 1 and D − 1 free ones a contact, 1 where mu = 0.
 //! Fails: in space the answer is that of another law, see [the page of the family](super); its impulses may lie outside the cone.
 
+use nonsmooth_linalg::small;
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::small;
 use nonsmooth_problem::{FrictionLocal, LcpPoint, LocalPoint, Mlcp};
 
 use super::{

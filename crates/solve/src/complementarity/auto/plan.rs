@@ -1,7 +1,7 @@
 //! Which solvers `auto` tries on a linear complementarity problem, in which order, and why.
 
-use nonsmooth_problem::linalg::Matrix;
-use nonsmooth_problem::traits::{Class, Classes};
+use nonsmooth_analysis::{Class, Classes};
+use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 
 use super::portfolio::DECIDES;

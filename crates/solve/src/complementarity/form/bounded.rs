@@ -1,6 +1,6 @@
 //! Linear complementarity problems, seen by the methods that solve them.
 
-use nonsmooth_problem::linalg::{Matrix, norm_or_one};
+use nonsmooth_linalg::{Matrix, norm_or_one};
 use nonsmooth_problem::{BoxLcp, Lcp, LcpPoint, Mlcp, Problem};
 
 use crate::SolveError;

@@ -1,6 +1,6 @@
 //! Linear complementarity problems, seen as equations between pairs: what interior points follow.
 
-use nonsmooth_problem::linalg::Matrix;
+use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::{Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem};
 
 use super::Bounded;

@@ -3,8 +3,8 @@
 //! Matrices of a nearly symmetric sparse pattern go to the multifrontal LU with a fixed order of elimination ([`BlockLu`]), which is much the faster; its pivots are
 //! static, so the caller looks at residuals and, where they are bad, asks for row pivoting ([`SquareLu`]) from then on.
 
-use nonsmooth_problem::linalg::budget::TooLarge;
-use nonsmooth_problem::linalg::{BlockLu, Csc, Matrix, Slot, SquareLu};
+use nonsmooth_linalg::budget::TooLarge;
+use nonsmooth_linalg::{BlockLu, Csc, Matrix, Slot, SquareLu};
 
 /// The multifrontal LU is used where at least this part of the entries has its mirror image in the pattern.
 const SYMMETRIC: f64 = 0.9;

@@ -36,9 +36,9 @@
 mod factor;
 mod scaled;
 
+use nonsmooth_linalg::{Matrix, SquareLu, norm};
 use nonsmooth_problem::LcpPoint;
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Matrix, SquareLu, norm};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -3,7 +3,7 @@
 //! `ŵ = R w / σ`, `ẑ = C⁻¹ z / σ`, `M̂ = R M C`, `q̂ = R q / σ`. All factors are powers of two, so nothing is rounded: a residual of the scaled problem is one
 //! of the problem itself. R and C come from alternate scaling by the roots of the largest entries (Ruiz2001).
 
-use nonsmooth_problem::linalg::{Compensated, Csc, Dense, Matrix};
+use nonsmooth_linalg::{Compensated, Csc, Dense, Matrix};
 
 use crate::SolveError;
 use crate::complementarity::form::Rows;

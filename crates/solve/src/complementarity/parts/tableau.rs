@@ -15,8 +15,8 @@
 //!
 //! Cost: 2n² operations a pivot. Storage: two n × n matrices.
 
+use nonsmooth_linalg::{Compensated, Matrix, budget};
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Compensated, Matrix, budget};
 
 use crate::SolveError;
 use crate::complementarity::form::System;

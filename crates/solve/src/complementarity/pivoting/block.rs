@@ -12,9 +12,9 @@
 //! Fails: finite for P-matrices, and on M-matrices and most others after 5 to 10 factorisations at any size. A singular `M_αα` in the way or a basis that comes back
 //! among the single changes ends it, by name.
 
+use nonsmooth_linalg::{Compensated, Csc, Dense, Matrix, SquareLu};
 use nonsmooth_problem::LcpPoint;
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Compensated, Csc, Dense, Matrix, SquareLu};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

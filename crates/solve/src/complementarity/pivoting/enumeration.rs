@@ -11,9 +11,9 @@
 //! Cost: at most 2ᵐ cases for m pairs, usually far fewer, a few pivots of O(rows · columns) each. Storage: a tableau for each open case, at most m.
 //! Fails: by its cost; it is refused beyond `max_pairs` pairs.
 
+use nonsmooth_linalg::{Compensated, Matrix};
 use nonsmooth_problem::LcpPoint;
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Compensated, Matrix};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -181,7 +181,7 @@ impl Solutions {
 ///
 /// ```
 /// use nonsmooth_problem::Lcp;
-/// use nonsmooth_problem::linalg::Dense;
+/// use nonsmooth_linalg::Dense;
 /// use nonsmooth_solve::complementarity::pivoting::all_solutions;
 ///
 /// // w = −z + 1 has the solutions 0 and 1.

@@ -16,9 +16,9 @@
 //! solve more with the transpose. Storage: M again, and the tableau or the LU with at most `renew_every` columns.
 //! Fails: 2ⁿ pivots at worst. A ray proves that there is no solution where M is copositive-plus, and nothing elsewhere. Needs the entries of M.
 
+use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::LcpPoint;
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::Matrix;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use schemars::JsonSchema;

@@ -12,8 +12,8 @@
 //! Cost of a pivot: that of Lemke's method. Storage: as there.
 //! Fails: exponentially many pivots at worst; equilibria that no label reaches from the artificial one.
 
+use nonsmooth_linalg::Dense;
 use nonsmooth_problem::Lcp;
-use nonsmooth_problem::linalg::Dense;
 
 use super::basis::{Basis, Data, Factored, Tableau};
 use super::path::{Breaking, End, Event, Path};

@@ -1,6 +1,6 @@
 //! The almost complementary path: pivots on `B x_B = q` in which the complement of what has left enters next.
 
-use nonsmooth_problem::linalg::Compensated;
+use nonsmooth_linalg::Compensated;
 
 use super::basis::{Basis, Data};
 use crate::core::trace::Variable;

@@ -13,9 +13,9 @@
 //! Fails: needs a symmetric M without negative diagonal. Where M is not positive semidefinite, or φ has no lower bound on `[l, u]`, it ends on a ray. Steps grow with the root of the
 //! condition of D⁻¹M.
 
+use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::LcpPoint;
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -14,9 +14,9 @@
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
+use nonsmooth_linalg::{Compensated, Csc, Dense, Matrix, SquareCholesky, budget};
 use nonsmooth_problem::LcpPoint;
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Compensated, Csc, Dense, Matrix, SquareCholesky, budget};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

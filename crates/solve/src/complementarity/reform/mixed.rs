@@ -6,8 +6,8 @@
 //!
 //! Source: Acary, lecture (8)(33). Cost: a copy of Q and R. Storage: both, and an identity; dense only where both are.
 
+use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::{Hlcp, HlcpPoint, LcpPoint, Mlcp};
 
 use crate::SolveError;

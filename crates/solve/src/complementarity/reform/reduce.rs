@@ -8,8 +8,8 @@
 //! Source: Acary, lecture (8)(9), with the reduced matrix corrected. Cost: one LU of A, one solve and one product with D a column of C. Storage: M, dense, and the
 //! problem's matrix. Fails where A is singular, as it is in most circuits: those are to be solved as they are.
 
+use nonsmooth_linalg::{Csc, Dense, Matrix, SquareLu};
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix, SquareLu};
 use nonsmooth_problem::{Lcp, LcpPoint, Mlcp, ProblemError};
 
 use crate::SolveError;

@@ -15,8 +15,8 @@
 //!
 //! Source: Acary, lecture (8). Cost: O(entries of M). Storage: M again, with a row and a column more for every pair of bounds.
 
+use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::{BoxLcp, LcpPoint, Mlcp};
 
 use crate::SolveError;

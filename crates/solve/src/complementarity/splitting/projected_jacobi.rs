@@ -10,8 +10,8 @@
 //! Fails: needs a positive diagonal; converges for ω = 1 where M is an H-matrix with positive diagonal, else only for ω small enough where M is symmetric
 //! positive definite.
 
+use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::LcpPoint;
-use nonsmooth_problem::linalg::Matrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

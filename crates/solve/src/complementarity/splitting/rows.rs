@@ -6,7 +6,7 @@
 //!
 //! Cost of a sweep: one pass over the entries. Storage: 12 bytes an entry of a sparse matrix, none of a dense one.
 
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix};
+use nonsmooth_linalg::{Csc, Dense, Matrix};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -27,8 +27,8 @@
 mod controller;
 mod proximal_newton;
 
+use nonsmooth_linalg::budget;
 use nonsmooth_problem::check::{Existence, Kinematic};
-use nonsmooth_problem::linalg::budget;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -15,7 +15,7 @@
 //!
 //! Cost of an iteration: one factorisation of `Q + P W`, one to five products with W, O(nc) a trial of the line search.
 
-use nonsmooth_problem::linalg::{Block, small};
+use nonsmooth_linalg::{Block, small};
 
 use crate::contact::form::Linearised;
 use crate::contact::law::cfun::{Disk, Radii, alart_curnier, natural_residual};

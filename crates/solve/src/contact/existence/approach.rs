@@ -1,8 +1,8 @@
 //! Motions into the dual cone by Gauss–Seidel: the relaxation `K* ∋ u − τ e_N ⟂ r ∈ K` is convex, and its velocities come
 //! within τ of K* + τ e_N, that is into K*, after a few sweeps.
 
+use nonsmooth_linalg::small::{block, tangential_norm};
 use nonsmooth_problem::check::{Kinematic, Kinematics};
-use nonsmooth_problem::linalg::small::{block, tangential_norm};
 
 use super::{Clock, Found};
 use crate::contact::form::{Access, Blockwise};

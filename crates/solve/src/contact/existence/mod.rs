@@ -21,11 +21,11 @@ mod program;
 
 use std::time::Instant;
 
+use nonsmooth_linalg::budget;
 use nonsmooth_problem::Friction;
 use nonsmooth_problem::check::{
     Certificate, Evidence, ExactVector, Existence, Impulses, Kinematic, Kinematics, rounded,
 };
-use nonsmooth_problem::linalg::budget;
 use nonsmooth_problem::with_friction;
 
 use crate::contact::form::Blockwise;

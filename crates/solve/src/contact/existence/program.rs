@@ -3,8 +3,8 @@
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
+use nonsmooth_linalg::{Csc, budget};
 use nonsmooth_problem::check::{Impulses, Kinematics};
-use nonsmooth_problem::linalg::{Csc, budget};
 
 use super::Clock;
 use crate::core::clarabel::admit_program;

@@ -1,6 +1,6 @@
 //! The problem as entries of matrices, for solvers that take nothing else.
 
-use nonsmooth_problem::linalg::Csc;
+use nonsmooth_linalg::Csc;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal};
 
 use super::Linear;

@@ -5,11 +5,11 @@
 //! `Hᵀ M⁻¹ (H r + f) + w`, and need no Z. `complete` recomputes v exactly, so the rounding that the increments
 //! gather never reaches a judged point.
 
-use nonsmooth_problem::check::Impulses;
-use nonsmooth_problem::linalg::budget::{self, TooLarge};
-use nonsmooth_problem::linalg::{
+use nonsmooth_linalg::budget::{self, TooLarge};
+use nonsmooth_linalg::{
     Block, Bsr, Compensated, Csc, Delassus, Refine, Singular, norm_or_one, small,
 };
+use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
 
 use super::linearised::{BodyForm, ContactForm, Form, NEVER, Once, System, made, there};

@@ -8,8 +8,8 @@
 //! What is factorised has `Q + δ w_c P` in place of Q, δ = 1e-10, so that Q may be singular (sticking contacts of a
 //! Newton matrix) and W rank deficient; refinement against `Q + P W` itself removes the bias wherever that matrix is regular.
 
-use nonsmooth_problem::linalg::budget::TooLarge;
-use nonsmooth_problem::linalg::{Block, BlockLu, Bsr, Csc, Groups, Singular, Slot, norm, small};
+use nonsmooth_linalg::budget::TooLarge;
+use nonsmooth_linalg::{Block, BlockLu, Bsr, Csc, Groups, Singular, Slot, norm, small};
 
 /// The relative size of the regularisation.
 const DELTA: f64 = 1e-10;

@@ -3,10 +3,10 @@
 //! Bilateral rows `0 = Vᵀ r + R λ + s` are eliminated once: `W ← W − V R⁻¹ Vᵀ`, `q ← q − V R⁻¹ s`. Redundant
 //! constraints (a singular, positive semidefinite R) are honoured.
 
-use nonsmooth_problem::check::{Impulses, Kinematic};
-use nonsmooth_problem::linalg::{
+use nonsmooth_linalg::{
     Block, Bsr, Compensated, Csc, Delassus, Inverse, Refine, Singular, norm_or_one, small,
 };
+use nonsmooth_problem::check::{Impulses, Kinematic};
 use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint};
 
 use super::linearised::{ContactForm, Form, NEVER, Once, System, made, there};

@@ -17,9 +17,9 @@ mod linearised;
 mod local;
 mod regularised;
 
+use nonsmooth_linalg::{Block, Singular};
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Impulses;
-use nonsmooth_problem::linalg::{Block, Singular};
 
 pub use explicit::{Explicit, Model};
 pub use local::LocalState;

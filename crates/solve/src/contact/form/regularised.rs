@@ -3,8 +3,8 @@
 //! Everything is the base problem's, but for multiples of the identity on the diagonal blocks and what follows from them. The judge is
 //! the base problem's too: it tells how well a point solves *that*, which is what a proximal method is after.
 
+use nonsmooth_linalg::{Block, Singular};
 use nonsmooth_problem::check::{Certificate, ConeSystem, Evidence, Impulses, Measure};
-use nonsmooth_problem::linalg::{Block, Singular};
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem, ProblemError};
 
 use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised};
@@ -245,7 +245,7 @@ impl<P: Linearised<D>, const D: usize> Linearised<D> for Regularised<P> {
 
 #[cfg(test)]
 mod tests {
-    use nonsmooth_problem::linalg::{Bsr, Csc, small};
+    use nonsmooth_linalg::{Bsr, Csc, small};
     use nonsmooth_problem::planted::Planted;
 
     use super::*;

@@ -158,8 +158,8 @@ impl<P: Linearised<D>, const D: usize> Solver<P> for OnContacts<Interior, D> {
 
 #[cfg(test)]
 mod tests {
+    use nonsmooth_linalg::{Bsr, Csc};
     use nonsmooth_problem::FrictionLocal;
-    use nonsmooth_problem::linalg::{Bsr, Csc};
     use nonsmooth_problem::planted::{Planted, PlantedMix};
 
     use crate::core::register::Registered;

@@ -18,7 +18,7 @@
 //! Cost of a step: at most `1 + CORRECTORS` factorisations. Storage: [`Central`]'s and eight vectors.
 //! Fails: the path may end on the boundary, or run away to infinity.
 
-use nonsmooth_problem::linalg::Singular;
+use nonsmooth_linalg::Singular;
 
 use crate::contact::form::Linearised;
 use crate::contact::parts::nt::Pair;

@@ -24,7 +24,7 @@ mod scaling;
 #[cfg(test)]
 mod tests;
 
-use nonsmooth_problem::linalg::{Block, budget, small};
+use nonsmooth_linalg::{Block, budget, small};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

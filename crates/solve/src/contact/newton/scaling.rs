@@ -1,6 +1,6 @@
 //! ρ of each contact, from its block of W.
 
-use nonsmooth_problem::linalg::Block;
+use nonsmooth_linalg::Block;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,6 @@
 //! What every Newton method of the family does.
 
-use nonsmooth_problem::linalg::{Bsr, Csc};
+use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::planted::{Planted, PlantedMix};
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal};
 

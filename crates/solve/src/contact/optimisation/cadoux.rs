@@ -278,7 +278,7 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> CadouxWork<P, D> {
     fn evaluate(&mut self, problem: &P, r: &[f64]) {
         problem.velocities(&mut self.convex.state, r, &mut self.u);
         for (c, image) in self.image.iter_mut().enumerate() {
-            let u: [f64; D] = nonsmooth_problem::linalg::small::block(&self.u, c);
+            let u: [f64; D] = nonsmooth_linalg::small::block(&self.u, c);
             *image = cone::tangential_norm(&u);
         }
         self.error = self.convex.coulomb(problem.mu(), r, &self.u);

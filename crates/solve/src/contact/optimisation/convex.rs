@@ -11,7 +11,7 @@
 //!
 //! References: BirginMartinezRaydan2000; HueberStadlerWohlmuth2008.
 
-use nonsmooth_problem::linalg::{Block, budget, small};
+use nonsmooth_linalg::{Block, budget, small};
 
 use super::sets::Set;
 use crate::SolveError;

@@ -14,7 +14,7 @@
 //! Fails: as Tresca's fixed point, and it is slow where normal and tangential directions are strongly coupled (bodies that
 //! roll or tip), since each half knows nothing of the other.
 
-use nonsmooth_problem::linalg::{Block, budget, small};
+use nonsmooth_linalg::{Block, budget, small};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -161,7 +161,7 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for OnContacts<Tr
 
 #[cfg(test)]
 mod tests {
-    use nonsmooth_problem::linalg::{Bsr, Csc};
+    use nonsmooth_linalg::{Bsr, Csc};
     use nonsmooth_problem::{FrictionLocal, Problem};
 
     use super::*;

@@ -31,7 +31,7 @@
 //! Fails: the exact law is not monotone; its central path can turn back, and then the steps shrink. With a given s the
 //! method fails where the problem has no solution.
 
-use nonsmooth_problem::linalg::{Block, Singular, norm_of, small};
+use nonsmooth_linalg::{Block, Singular, norm_of, small};
 
 use super::nt::{Inner, Pair, Scaling, Shape};
 use crate::contact::form::Linearised;

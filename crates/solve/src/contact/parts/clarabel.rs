@@ -14,8 +14,8 @@
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
-use nonsmooth_problem::linalg::Csc;
-use nonsmooth_problem::linalg::budget::{self, TooLarge};
+use nonsmooth_linalg::Csc;
+use nonsmooth_linalg::budget::{self, TooLarge};
 
 use crate::contact::form::Model;
 use crate::core::clarabel::admit_program;
@@ -327,8 +327,8 @@ fn settings(tolerance: f64, iterations: u32) -> DefaultSettings<f64> {
 
 #[cfg(test)]
 mod tests {
+    use nonsmooth_linalg::small::{block, tangential_norm};
     use nonsmooth_problem::Problem;
-    use nonsmooth_problem::linalg::small::{block, tangential_norm};
     use nonsmooth_problem::planted::Planted;
 
     use super::*;
@@ -411,7 +411,7 @@ mod tests {
     #[test]
     fn an_unbounded_problem_is_told() {
         // No motion can separate this contact: W = 0, q_N < 0.
-        let w = nonsmooth_problem::linalg::Bsr::<3>::from_csc(&Csc::diagonal(&[0.0; 3]));
+        let w = nonsmooth_linalg::Bsr::<3>::from_csc(&Csc::diagonal(&[0.0; 3]));
         let problem =
             nonsmooth_problem::FrictionLocal::new(w, vec![-1.0, 0.0, 0.0], vec![0.5]).unwrap();
         assert!(problem.validate_point(&problem.origin()).is_ok());

@@ -7,7 +7,7 @@
 //! (the second where W is not symmetric: it is solved with W as it is). s = 0 is the convex relaxation of Coulomb's law;
 //! `s = ‖u_T‖` at the solution is the law itself. r is not unique where W is rank deficient: u is.
 
-use nonsmooth_problem::linalg::Singular;
+use nonsmooth_linalg::Singular;
 
 use super::central::{Central, Iterate};
 use crate::contact::form::Linearised;
@@ -98,7 +98,7 @@ const PATIENCE: usize = 12;
 
 #[cfg(test)]
 mod tests {
-    use nonsmooth_problem::linalg::norm_of;
+    use nonsmooth_linalg::norm_of;
     use nonsmooth_problem::planted::{Planted, PlantedMix};
     use nonsmooth_problem::{FrictionLocal, Problem};
 
@@ -260,18 +260,18 @@ mod tests {
         assert!(first.error <= 1e-9 && problem.unknowns() == 60);
     }
 
-    fn scaled(problem: &FrictionLocal<3>, factor: f64) -> nonsmooth_problem::linalg::Bsr<3> {
+    fn scaled(problem: &FrictionLocal<3>, factor: f64) -> nonsmooth_linalg::Bsr<3> {
         let w = problem.W.to_csc();
         let entries = w.triplets().map(|(i, j, x)| (i, j, factor * x));
-        let w = nonsmooth_problem::linalg::Csc::from_triplets(w.nrows(), w.ncols(), entries);
-        nonsmooth_problem::linalg::Bsr::from_csc(&w.expect("in range"))
+        let w = nonsmooth_linalg::Csc::from_triplets(w.nrows(), w.ncols(), entries);
+        nonsmooth_linalg::Bsr::from_csc(&w.expect("in range"))
     }
 
     #[test]
     fn a_problem_without_a_solution_ends() {
         // One contact pushed in by q with W = 0: r grows without bound.
-        let w = nonsmooth_problem::linalg::Csc::from_triplets(3, 3, std::iter::empty()).unwrap();
-        let w = nonsmooth_problem::linalg::Bsr::from_csc(&w);
+        let w = nonsmooth_linalg::Csc::from_triplets(3, 3, std::iter::empty()).unwrap();
+        let w = nonsmooth_linalg::Bsr::from_csc(&w);
         let problem = FrictionLocal::<3>::new(w, vec![-1.0, 0.0, 0.0], vec![0.5]).unwrap();
         let mut state = problem.state(Access::Newton).unwrap();
         let mut ip = ConvexIp::<3>::new();

@@ -11,7 +11,7 @@
 //!
 //! A half line (a contact without friction) is the case where only x_N exists; its eigenvectors are the unit vectors and S moves N alone.
 
-use nonsmooth_problem::linalg::{Block, small};
+use nonsmooth_linalg::{Block, small};
 
 use crate::contact::law::cone::tangential_norm;
 

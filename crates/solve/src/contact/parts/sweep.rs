@@ -6,7 +6,7 @@
 //! Cost of a sweep: one pass over the blocks of W (or over the rows of H and M⁻¹H) plus nc local solves. Storage: the
 //! diagonal block and the local solver's memo of each contact.
 
-use nonsmooth_problem::linalg::{norm, small};
+use nonsmooth_linalg::{norm, small};
 
 use crate::contact::form::{Blockwise, Contacts};
 use crate::contact::law::cfun::natural_residual;

@@ -1,6 +1,6 @@
 //! The field F and the projection step that the projection methods share.
 
-use nonsmooth_problem::linalg::small;
+use nonsmooth_linalg::small;
 
 use crate::SolveError;
 use crate::contact::form::{Access, Linear};

@@ -142,7 +142,7 @@ impl Method for Hyperplane {
 
 #[cfg(test)]
 mod tests {
-    use nonsmooth_problem::linalg::{Bsr, Csc};
+    use nonsmooth_linalg::{Bsr, Csc};
     use nonsmooth_problem::{FrictionLocal, Problem};
 
     use super::*;

@@ -21,7 +21,7 @@
 //! Storage: the factor of W in contact or velocity space and 9 vectors.
 //! Fails: no proof with the moving s; W with a negative symmetric part; slow where no ρ suits all contacts.
 
-use nonsmooth_problem::linalg::{Block, small};
+use nonsmooth_linalg::{Block, small};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -388,7 +388,7 @@ fn diagonal<const D: usize>(x: f64) -> Block<D> {
 
 #[cfg(test)]
 mod tests {
-    use nonsmooth_problem::linalg::{Bsr, Csc};
+    use nonsmooth_linalg::{Bsr, Csc};
     use nonsmooth_problem::planted::Planted;
     use nonsmooth_problem::{FrictionLocal, Problem};
 

@@ -12,7 +12,7 @@
 //! Cost of a step: one step of the inner solver, and one product with W every few of them. Storage: a copy of the problem and the inner solver's.
 //! Fails: the law is not monotone, so a small α is needed for a fast outer loop and a large one for the inner solver, and they may not meet.
 
-use nonsmooth_problem::linalg::small;
+use nonsmooth_linalg::small;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -341,7 +341,7 @@ fn units<P: Linear<D>, const D: usize>(problem: &P, state: &P::State, unit: &mut
 
 #[cfg(test)]
 mod tests {
-    use nonsmooth_problem::linalg::{Bsr, Csc};
+    use nonsmooth_linalg::{Bsr, Csc};
     use nonsmooth_problem::planted::Planted;
     use nonsmooth_problem::{FrictionLocal, Problem};
 

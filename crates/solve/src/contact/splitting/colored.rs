@@ -17,7 +17,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
 
-use nonsmooth_problem::linalg::small;
+use nonsmooth_linalg::small;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -138,7 +138,7 @@ mod tests {
     /// Random sparse graphs as patterns of W, one-sided couplings included.
     #[test]
     fn random_graphs() {
-        use nonsmooth_problem::linalg::{Bsr, Csc};
+        use nonsmooth_linalg::{Bsr, Csc};
         use rand::{RngExt, SeedableRng};
         let mut rng = rand_pcg::Pcg64::seed_from_u64(5);
         let mut coloring = Coloring::default();

@@ -1,6 +1,6 @@
 //! One contact as the sweeps see it, and the answer to a visit.
 
-use nonsmooth_problem::linalg::small;
+use nonsmooth_linalg::small;
 
 use crate::contact::law::cone;
 use crate::contact::law::local::{LocalSolver, frictionless};

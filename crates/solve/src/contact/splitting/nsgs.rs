@@ -17,7 +17,7 @@
 //! Fails: no convergence proof for friction; on hyperstatic problems (3nc > n) it slows down to thousands of sweeps below 1e-4,
 //! and it may circle for large mu with strongly coupled normal and tangential directions.
 
-use nonsmooth_problem::linalg::small;
+use nonsmooth_linalg::small;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -79,7 +79,7 @@ impl Psor {
 
 #[cfg(test)]
 mod tests {
-    use nonsmooth_problem::linalg::{Bsr, Csc};
+    use nonsmooth_linalg::{Bsr, Csc};
     use nonsmooth_problem::{FrictionLocal, Problem};
 
     use super::*;

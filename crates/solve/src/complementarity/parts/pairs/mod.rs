@@ -18,8 +18,8 @@ pub use polish::{Polish, Polished};
 pub use refute::{Side, clean, hopeless_row};
 pub use scale::Scaled;
 
+use nonsmooth_linalg::{Singular, norm};
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_problem::linalg::{Singular, norm};
 
 use crate::Step;
 use crate::complementarity::form::Equations;

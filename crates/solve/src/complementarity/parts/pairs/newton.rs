@@ -11,7 +11,7 @@
 //! definite where M is monotone. This is `M + X⁻¹S` in a good scale. Free variables have α = 1, β = 0. With α and β zero or one the same matrix is that of a
 //! guess which variables are positive.
 
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix, Singular, SquareCholesky, SquareLu};
+use nonsmooth_linalg::{Csc, Dense, Matrix, Singular, SquareCholesky, SquareLu};
 
 use super::scale::{Scaled, alike};
 

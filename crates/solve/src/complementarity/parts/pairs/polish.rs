@@ -4,7 +4,7 @@
 //! in doubled precision), so a singular `M_AA`, whose solutions are many, is no obstacle: the one nearest to the iterate is found. Signs that come out
 //! wrong are exchanged and the equations solved again, a few times: Newton's method for `min(x, s) = 0` from a good start. The best point met counts.
 
-use nonsmooth_problem::linalg::Compensated;
+use nonsmooth_linalg::Compensated;
 
 use super::newton::Newton;
 use super::scale::Scaled;

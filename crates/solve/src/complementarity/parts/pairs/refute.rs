@@ -4,7 +4,7 @@
 //! `x̂ᵀM x̂ = 0`, hence `Mᵀx̂ = −M x̂ ≤ 0`, and `qᵀx̂ < 0`: a Farkas vector, but for rounding and the path still to go. It is made exact by a projection: entries
 //! that should be zero, of y and of `Mᵀy`, are guessed, and the nearest vector with these zeros is taken. With R in general `Rᵀy = x̂`, `Qᵀy = ŝ`.
 
-use nonsmooth_problem::linalg::{Csc, Inverse, Matrix, budget};
+use nonsmooth_linalg::{Csc, Inverse, Matrix, budget};
 
 use super::scale::Scaled;
 use crate::complementarity::form::Equations;

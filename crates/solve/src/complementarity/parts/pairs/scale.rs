@@ -8,7 +8,7 @@
 //! where E and Z then differ by more than a factor of a thousand between pairs, the rows and columns were evidently scaled by different hands,
 //! and this undoes it; else both are replaced by their mean.
 
-use nonsmooth_problem::linalg::{Compensated, Csc, Dense, Matrix};
+use nonsmooth_linalg::{Compensated, Csc, Dense, Matrix};
 
 use crate::complementarity::form::Equations;
 

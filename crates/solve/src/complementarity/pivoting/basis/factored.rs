@@ -1,6 +1,6 @@
 //! The basis as an LU of its z-block and product-form updates.
 
-use nonsmooth_problem::linalg::{Csc, Dense, Matrix, Singular, SquareLu};
+use nonsmooth_linalg::{Csc, Dense, Matrix, Singular, SquareLu};
 
 use super::{Basis, Columns, Data};
 use crate::core::trace::Variable;

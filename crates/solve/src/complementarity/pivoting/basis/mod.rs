@@ -11,7 +11,7 @@ mod tableau;
 pub(super) use factored::Factored;
 pub(super) use tableau::Tableau;
 
-use nonsmooth_problem::linalg::{Compensated, Matrix, Singular};
+use nonsmooth_linalg::{Compensated, Matrix, Singular};
 
 use crate::complementarity::form::System;
 use crate::core::trace::Variable;

@@ -1,6 +1,6 @@
 //! The textbook's dense tableau.
 
-use nonsmooth_problem::linalg::{Singular, budget};
+use nonsmooth_linalg::{Singular, budget};
 
 use super::{Basis, Data};
 use crate::core::trace::Variable;

@@ -1,7 +1,7 @@
 //! What every complementarity function does: its Jacobian is the derivative on every region and that of neighbours at kinks,
 //! and it vanishes at the pairs that obey the law, and only there.
 
-use nonsmooth_problem::linalg::small::mul;
+use nonsmooth_linalg::small::mul;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 

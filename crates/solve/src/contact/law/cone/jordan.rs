@@ -196,7 +196,7 @@ pub fn root_of_squares<const D: usize>(x: &[f64; D], y: &[f64; D], epsilon: f64)
 
 #[cfg(test)]
 mod tests {
-    use nonsmooth_problem::linalg::small::mul;
+    use nonsmooth_linalg::small::mul;
 
     use super::*;
 

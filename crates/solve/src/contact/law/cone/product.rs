@@ -1,6 +1,6 @@
 //! Products of sets: one factor for each block of D entries.
 
-use nonsmooth_problem::linalg::small;
+use nonsmooth_linalg::small;
 
 use super::ConvexSet;
 

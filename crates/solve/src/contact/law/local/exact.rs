@@ -12,7 +12,7 @@
 //! W may be nonsymmetric. Cost: 30 to 150 flops. Source: DBB11, section 4 (the polynomial behind it is in
 //! [`Quartic`](super::Quartic)); JourdanAlartJean1998 for the block Gauss–Seidel that it serves.
 
-use nonsmooth_problem::linalg::small::mul;
+use nonsmooth_linalg::small::mul;
 
 use super::{LocalSolver, inverse_or_regularised};
 
@@ -254,8 +254,8 @@ pub(super) fn embed<const D: usize>(r: [f64; 3]) -> [f64; D] {
 
 #[cfg(test)]
 mod tests {
+    use nonsmooth_linalg::{Bsr, small};
     use nonsmooth_problem::check::Judged;
-    use nonsmooth_problem::linalg::{Bsr, small};
     use nonsmooth_problem::{FrictionLocal, LocalPoint};
     use proptest::prelude::*;
 

@@ -8,7 +8,7 @@ mod newton;
 mod projection;
 mod quartic;
 
-use nonsmooth_problem::linalg::small;
+use nonsmooth_linalg::small;
 
 use crate::contact::law::cone;
 

@@ -6,7 +6,7 @@
 //!
 //! Source: AlartCurnier1991; Acary, lecture (88)–(96). Cost: about 150 flops a step, 2 to 5 steps.
 
-use nonsmooth_problem::linalg::small::{self, mul};
+use nonsmooth_linalg::small::{self, mul};
 
 use super::{Exact, LocalSolver, norm_bound, velocity};
 use crate::contact::law::cfun::{Disk, Radii, alart_curnier};

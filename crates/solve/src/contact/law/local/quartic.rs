@@ -5,7 +5,7 @@
 //! residual is smallest is taken. Cost: about 500 flops.
 //! Source: BonnefonDaviet2011; DBB11, appendix B.
 
-use nonsmooth_problem::linalg::small;
+use nonsmooth_linalg::small;
 
 use super::exact::{Schur, Sliding, embed, stick};
 use super::{Exact, LocalSolver, inverse_or_regularised, modified_velocity};

@@ -1,0 +1,701 @@
+//! LU of block matrices with a symmetric pattern and any values: analysed once, factorised many times.
+//!
+//! `R A C = Pᵀ L U` with R, C powers of two and P exchanging rows inside fronts only. Nodes are ordered by approximate minimum
+//! degree; neighbours in the tree of elimination with (nearly) equal structure are eliminated together in dense fronts; each
+//! front takes over the remainders of its children (multifrontal method). The order never depends on values: rows are exchanged
+//! within a front's own pivots, and a pivot that vanishes against the scaled matrix is replaced, so the caller refines.
+//!
+//! References: DuffReid1983 (fronts), Liu1992 (tree, supernodes, stack), AmestoyDavisDuff1996 (order), LiDemmel2003 (static
+//! pivots), AshcraftGrimes1989 (merging). Storage: 8 bytes an entry of L, U and A, and a stack of remainders.
+//! Cost of a factorisation: [`BlockLu::flops`]; of a solve: one pass over L and U.
+//!
+//! Fails where elimination in a fixed order grows beyond double precision: the residual that the caller measures then says so.
+
+mod kernel;
+mod symbolic;
+
+use kernel::{At, Pivots, Simd, WIDTH};
+use symbolic::{Front, Run, Symbolic};
+
+use super::budget::{self, Pace, TooLarge};
+use super::inverse::count_factorisation;
+
+/// A matrix that cannot be factorised: without a non-zero entry, with one that is not finite, or with factors that overflow; or one for which there is
+/// not time or memory enough (see [`budget`]).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("a singular matrix")]
+pub struct Singular;
+
+/// The handle of a block, for [`BlockLu::add_at`]; of no use for another pattern.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Slot {
+    at: usize,
+    /// From one column to the next among the values.
+    stride: u32,
+    rows: u32,
+    columns: u32,
+}
+
+/// LU factors of a square matrix of blocks whose pattern is symmetric, values need not be.
+///
+/// ```
+/// use nonsmooth_linalg::BlockLu;
+/// let mut a = BlockLu::new(&[1, 2], [(0, 1)].into_iter()).unwrap();
+/// a.add(0, 0, &[2.0]);
+/// a.add(0, 1, &[1.0, 0.0]);
+/// a.add(1, 0, &[0.0, 1.0]);
+/// a.add(1, 1, &[0.0, 1.0, 4.0, 0.0]);
+/// a.factorise().unwrap();
+/// let mut x = [3.0, 1.0, 5.0];
+/// a.solve(&mut x);
+/// assert_eq!(x, [1.0, 1.0, 1.0]);
+/// ```
+#[derive(Debug, Clone)]
+pub struct BlockLu {
+    symbolic: Symbolic,
+    simd: Simd,
+    /// A, block by block, in the order in which fronts take them up.
+    values: Vec<f64>,
+    /// R and C in the order of elimination.
+    row_scale: Vec<f64>,
+    column_scale: Vec<f64>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    remainders: Vec<f64>,
+    /// Minus the inverses of the unit lower triangles of the diagonal blocks.
+    triangles: Vec<f64>,
+    /// Of each pivot: its inverse, and the row of its front that it was exchanged with.
+    inverses: Vec<f64>,
+    swaps: Vec<u32>,
+    /// A right-hand side in the order of elimination, and the part of it that a front sees.
+    x: Vec<f64>,
+    z: Vec<f64>,
+    perturbed: usize,
+}
+
+impl BlockLu {
+    /// Analyses the pattern: node i has `sizes[i]` unknowns; `edges` are the coupled nodes, in one or both orientations.
+    ///
+    /// The entries of the factors are allocated by the first factorisation: who only wants to know what one costs pays for the analysis alone. Cost: near
+    /// linear in the blocks of L.
+    /// Errors: factors that take more memory than there is (see [`budget::admit`]).
+    pub fn new(sizes: &[usize], edges: impl Iterator<Item = (u32, u32)>) -> Result<Self, TooLarge> {
+        let symbolic = Symbolic::new(sizes, edges);
+        let s = &symbolic;
+        let entries = [s.values_len, s.lower_len, s.upper_len, s.stack_len, s.triangles_len];
+        budget::admit("the factorisation", 8.0 * entries.iter().map(|&n| n as f64).sum::<f64>())?;
+        let n = symbolic.dim;
+        Ok(Self {
+            simd: Simd::best(),
+            values: vec![],
+            row_scale: vec![1.0; n],
+            column_scale: vec![1.0; n],
+            lower: vec![],
+            upper: vec![],
+            remainders: vec![],
+            triangles: vec![],
+            inverses: vec![1.0; n],
+            swaps: vec![0; n],
+            x: vec![0.0; n],
+            z: vec![0.0; symbolic.widest],
+            perturbed: 0,
+            symbolic,
+        })
+    }
+
+    /// The number of unknowns.
+    pub fn dim(&self) -> usize {
+        self.symbolic.dim
+    }
+
+    /// Floating-point operations of one factorisation, for callers who choose between forms.
+    pub fn flops(&self) -> f64 {
+        self.symbolic.flops
+    }
+
+    /// Entries of L and U together.
+    pub fn factor_len(&self) -> usize {
+        self.symbolic.lower_len + self.symbolic.upper_len
+    }
+
+    /// The number of dense fronts.
+    pub fn fronts(&self) -> usize {
+        self.symbolic.fronts.len()
+    }
+
+    /// Sets all values to zero; the pattern stays.
+    pub fn clear(&mut self) {
+        self.values.fill(0.0);
+        self.values.resize(self.symbolic.values_len, 0.0);
+    }
+
+    /// The handle of block (i, j), so that repeated assembly needs no search.
+    ///
+    /// Panics if i and j are not coupled.
+    pub fn slot(&self, i: usize, j: usize) -> Slot {
+        let groups = &self.symbolic.groups;
+        let entry = self.symbolic.find(groups.of[i] as usize, groups.of[j] as usize);
+        let entry = entry.unwrap_or_else(|| panic!("block ({i}, {j}) is not in the pattern"));
+        let place = &self.symbolic.places[self.symbolic.number[entry] as usize];
+        let (row, column) = (groups.within[i] as usize, groups.within[j] as usize);
+        Slot {
+            at: place.values + column * place.rows as usize + row,
+            stride: place.rows,
+            rows: groups.node_sizes[i],
+            columns: groups.node_sizes[j],
+        }
+    }
+
+    /// Whether matrices of this pattern, or of a part of it, can be factorised with this analysis.
+    pub fn serves(&self, sizes: &[usize], mut edges: impl Iterator<Item = (u32, u32)>) -> bool {
+        let groups = &self.symbolic.groups;
+        let mut pairs = groups.node_sizes.iter().zip(sizes);
+        let coupled = |(i, j): (u32, u32)| {
+            let (i, j) = (groups.of[i as usize] as usize, groups.of[j as usize] as usize);
+            self.symbolic.find(i, j).is_some()
+        };
+        groups.node_sizes.len() == sizes.len()
+            && pairs.all(|(a, b)| *a as usize == *b)
+            && edges.all(coupled)
+    }
+
+    /// `A_ij += block`, by rows, `sizes[i] × sizes[j]`.
+    ///
+    /// Panics if i and j are not coupled, or if the block has another size.
+    pub fn add(&mut self, i: usize, j: usize, block: &[f64]) {
+        self.add_at(self.slot(i, j), block);
+    }
+
+    /// [`add`](BlockLu::add) without the search.
+    #[inline]
+    pub fn add_at(&mut self, slot: Slot, block: &[f64]) {
+        let (rows, columns, stride) =
+            (slot.rows as usize, slot.columns as usize, slot.stride as usize);
+        assert_eq!(block.len(), rows * columns, "the size of a block");
+        if self.values.is_empty() {
+            self.clear();
+        }
+        let values = &mut self.values[slot.at..];
+        match (rows, columns) {
+            (3, 3) => add_transposed::<3>(block, values, stride),
+            (6, 6) => add_transposed::<6>(block, values, stride),
+            (1, 1) => values[0] += block[0],
+            _ => {
+                for c in 0..columns {
+                    let column = &mut values[c * stride..c * stride + rows];
+                    for (r, a) in column.iter_mut().enumerate() {
+                        *a += block[r * columns + c];
+                    }
+                }
+            }
+        }
+    }
+
+    /// `y = A x` with the values last added, nodes concatenated.
+    pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
+        let order = &self.symbolic.order;
+        y.fill(0.0);
+        // Without values, none were added: A = 0.
+        let places = if self.values.is_empty() { &[][..] } else { &self.symbolic.places };
+        for p in places {
+            let columns = self.values[p.values..].chunks_exact(p.rows as usize);
+            for (column, &c) in columns.zip(&order[p.column as usize..]).take(p.columns as usize) {
+                for (a, &r) in column.iter().zip(&order[p.row as usize..]) {
+                    y[r as usize] += a * x[c as usize];
+                }
+            }
+        }
+    }
+
+    /// Pivots that the last factorisation replaced: the matrix is singular to working precision in that many directions, or
+    /// its order of elimination unlucky.
+    pub fn perturbed(&self) -> usize {
+        self.perturbed
+    }
+
+    /// Factorises the values added so far, which stay.
+    ///
+    /// Rows and columns are scaled by powers of two to a largest entry of about one; a pivot below ε^(3/4) of that becomes
+    /// ε^(1/2). Errors: see [`Singular`]; the factors are then of no use.
+    pub fn factorise(&mut self) -> Result<(), Singular> {
+        count_factorisation();
+        self.make_room();
+        self.scale()?;
+        let mut outcome = Pivots::default();
+        let mut pace = Pace::default();
+        for f in 0..self.symbolic.fronts.len() {
+            let found = self.front(f, &mut pace).ok_or(Singular)?;
+            outcome.perturbed += found.perturbed;
+            outcome.broken |= found.broken;
+        }
+        self.perturbed = outcome.perturbed;
+        if outcome.broken { Err(Singular) } else { Ok(()) }
+    }
+
+    /// Allocates the values and the entries of the factors, where that has not been done.
+    fn make_room(&mut self) {
+        let Self { symbolic: s, values, lower, upper, remainders, triangles, .. } = self;
+        for (entries, count) in [
+            (values, s.values_len),
+            (lower, s.lower_len),
+            (upper, s.upper_len),
+            (remainders, s.stack_len),
+            (triangles, s.triangles_len),
+        ] {
+            if entries.is_empty() {
+                *entries = vec![0.0; count];
+            }
+        }
+    }
+
+    /// `x ← A⁻¹ x` with the last factors, nodes concatenated in the caller's order. One pass, not refined.
+    pub fn solve(&mut self, x: &mut [f64]) {
+        assert_eq!(x.len(), self.dim());
+        let Self { symbolic, row_scale, x: work, .. } = self;
+        for ((w, &i), scale) in work.iter_mut().zip(&symbolic.order).zip(row_scale.iter()) {
+            *w = x[i as usize] * scale;
+        }
+        self.forward();
+        self.backward();
+        for ((w, &i), scale) in
+            self.x.iter().zip(&self.symbolic.order).zip(self.column_scale.iter())
+        {
+            x[i as usize] = w * scale;
+        }
+    }
+
+    /// Powers of two such that first each row, then each column has a largest entry between one and two.
+    fn scale(&mut self) -> Result<(), Singular> {
+        let (rows, columns) = (&mut self.row_scale, &mut self.column_scale);
+        rows.fill(0.0);
+        columns.fill(0.0);
+        for p in &self.symbolic.places {
+            let height = p.rows as usize;
+            let block = &self.values[p.values..p.values + height * p.columns as usize];
+            let scale = &mut rows[p.row as usize..p.row as usize + height];
+            match height {
+                3 => row_maxima(block, 3, scale),
+                6 => row_maxima(block, 6, scale),
+                12 => row_maxima(block, 12, scale),
+                _ => row_maxima(block, height, scale),
+            }
+        }
+        if rows.iter().any(|r| !r.is_finite())
+            || (!rows.is_empty() && rows.iter().all(|&r| r == 0.0))
+        {
+            return Err(Singular);
+        }
+        rows.iter_mut().for_each(|r| *r = inverse_power(*r));
+        for p in &self.symbolic.places {
+            let height = p.rows as usize;
+            let block = &self.values[p.values..p.values + height * p.columns as usize];
+            let scale = &rows[p.row as usize..p.row as usize + height];
+            let columns = &mut columns[p.column as usize..];
+            match height {
+                3 => column_maxima(block, 3, scale, columns),
+                6 => column_maxima(block, 6, scale, columns),
+                12 => column_maxima(block, 12, scale, columns),
+                _ => column_maxima(block, height, scale, columns),
+            }
+        }
+        columns.iter_mut().for_each(|c| *c = inverse_power(*c));
+        Ok(())
+    }
+
+    /// Assembles and eliminates front f; `None` where the time is over.
+    fn front(&mut self, f: usize, pace: &mut Pace) -> Option<Pivots> {
+        let s = &self.symbolic;
+        let front = &s.fronts[f];
+        let (k, m, simd) = (front.pivots, front.rest, self.simd);
+        let ld = k + m;
+        if pace.over((ld * ld) as f64) {
+            return None;
+        }
+        let lower = &mut self.lower[front.lower..front.lower + k * ld];
+        let upper = &mut self.upper[front.upper..front.upper + k * m];
+        lower.fill(0.0);
+        upper.fill(0.0);
+        // The entries of A.
+        for p in &s.places[front.blocks.clone()] {
+            let (rows, columns) = (p.rows as usize, p.columns as usize);
+            let block = &self.values[p.values..p.values + rows * columns];
+            let row_scale = &self.row_scale[p.row as usize..p.row as usize + rows];
+            let column_scale = &self.column_scale[p.column as usize..p.column as usize + columns];
+            let (to, ld) = if p.upper {
+                (&mut upper[p.to - front.upper..], k)
+            } else {
+                (&mut lower[p.to - front.lower..], ld)
+            };
+            match rows {
+                3 => scatter(block, 3, row_scale, column_scale, to, ld),
+                6 => scatter(block, 6, row_scale, column_scale, to, ld),
+                12 => scatter(block, 12, row_scale, column_scale, to, ld),
+                _ => scatter(block, rows, row_scale, column_scale, to, ld),
+            }
+        }
+        // What the children leave in the pivots' rows and columns.
+        for &c in &s.children[front.children.clone()] {
+            let child = &s.fronts[c as usize];
+            let from = &self.remainders[child.remainder..child.remainder + child.rest * child.rest];
+            let (near, far) = (child.runs.start..child.beyond, child.beyond..child.runs.end);
+            for column in &s.runs[near.clone()] {
+                for l in 0..column.len as usize {
+                    let from = &from[(column.from as usize + l) * child.rest..][..child.rest];
+                    let to = &mut lower[(column.to as usize + l) * ld..][..ld];
+                    add_runs(&s.runs[child.runs.clone()], from, to, 0);
+                }
+            }
+            for column in &s.runs[far] {
+                for l in 0..column.len as usize {
+                    let from = &from[(column.from as usize + l) * child.rest..][..child.rest];
+                    let to = &mut upper[(column.to as usize + l - k) * k..][..k];
+                    add_runs(&s.runs[near.clone()], from, to, 0);
+                }
+            }
+        }
+        let mut elimination = Elimination {
+            simd,
+            k,
+            ld,
+            lower,
+            triangles: &mut self.triangles[front.triangles..],
+            inverses: &mut self.inverses[front.start..front.start + k],
+            swaps: &mut self.swaps[front.start..front.start + k],
+            outcome: Pivots::default(),
+            pace,
+        };
+        elimination.columns(0, k)?;
+        let outcome = elimination.outcome;
+        if m == 0 {
+            return Some(outcome);
+        }
+        let whole = At { at: 0, ld: k };
+        exchange(upper, whole, m, &self.swaps[front.start..front.start + k], 0);
+        let triangles = &self.triangles[front.triangles..];
+        // The remainder; children's follow on top of it.
+        let (begin, end) = (front.remainder, front.remainder + m * m);
+        let below = At { at: k, ld };
+        let each = (k * (k + 2 * m)) as f64;
+        for (j, n) in strips(m, each) {
+            let part = At { at: j * k, ld: k };
+            left_solve(simd, (0, k), (lower, ld), triangles, (upper, part), n);
+            let remainder = (&mut self.remainders[begin..end], At { at: j * m, ld: m });
+            kernel::product(simd, (m, n, k), (lower, below), (upper, part), remainder, true);
+            if pace.over(each * n as f64) {
+                return None;
+            }
+        }
+        for &c in &s.children[front.children.clone()] {
+            let child = &s.fronts[c as usize];
+            let from = child.remainder..child.remainder + child.rest * child.rest;
+            // The two lie apart in the stack.
+            let (from, to) = if from.start < begin {
+                let (low, high) = self.remainders.split_at_mut(begin);
+                (&low[from], &mut high[..m * m])
+            } else {
+                let (low, high) = self.remainders.split_at_mut(end);
+                (&high[from.start - end..from.end - end], &mut low[begin..])
+            };
+            let runs = &s.runs[child.beyond..child.runs.end];
+            for column in runs {
+                for l in 0..column.len as usize {
+                    let from = &from[(column.from as usize + l) * child.rest..][..child.rest];
+                    let to = &mut to[(column.to as usize + l - k) * m..][..m];
+                    add_runs(runs, from, to, k);
+                }
+            }
+        }
+        Some(outcome)
+    }
+
+    /// `x ← L⁻¹ P x`, front by front.
+    fn forward(&mut self) {
+        let simd = self.simd;
+        for front in &self.symbolic.fronts {
+            let Front { pivots: k, rest: m, start, .. } = *front;
+            let ld = k + m;
+            let lower = &self.lower[front.lower..front.lower + k * ld];
+            let z = &mut self.z[..ld];
+            let own = &mut self.x[start..start + k];
+            for (j, &p) in self.swaps[start..start + k].iter().enumerate() {
+                own.swap(j, p as usize);
+            }
+            z[..k].copy_from_slice(own);
+            z[k..].fill(0.0);
+            for b in (0..k).step_by(WIDTH) {
+                let e = (b + WIDTH).min(k);
+                let y: [f64; WIDTH] =
+                    std::array::from_fn(|i| if b + i < e { z[b + i] } else { 0.0 });
+                z[b..e].fill(0.0);
+                let triangle = At { at: front.triangles + b * WIDTH, ld: WIDTH };
+                let own = (&self.triangles[..], triangle);
+                kernel::product_vector(simd, own, &y[..e - b], &mut z[b..e]);
+                let (done, open) = z.split_at_mut(e);
+                kernel::product_vector(simd, (lower, At { at: b * ld + e, ld }), &done[b..], open);
+            }
+            own.copy_from_slice(&z[..k]);
+            for (&r, z) in self.symbolic.rows[front.rows..front.rows + m].iter().zip(&z[k..]) {
+                self.x[r as usize] += z;
+            }
+        }
+    }
+
+    /// `x ← U⁻¹ x`, front by front from the last.
+    fn backward(&mut self) {
+        let simd = self.simd;
+        for front in self.symbolic.fronts.iter().rev() {
+            let Front { pivots: k, rest: m, start, .. } = *front;
+            let ld = k + m;
+            let lower = &self.lower[front.lower..front.lower + k * ld];
+            let upper = &self.upper[front.upper..front.upper + k * m];
+            let inverses = &self.inverses[start..start + k];
+            let z = &mut self.z[..m];
+            for (&r, z) in self.symbolic.rows[front.rows..front.rows + m].iter().zip(&mut *z) {
+                *z = self.x[r as usize];
+            }
+            let own = &mut self.x[start..start + k];
+            kernel::product_vector(simd, (upper, At { at: 0, ld: k }), z, own);
+            let mut e = k;
+            while e > 0 {
+                let b = (e - 1) / WIDTH * WIDTH;
+                upper_solve(&lower[b * ld + b..], ld, &inverses[b..e], &mut own[b..e]);
+                let (open, done) = own.split_at_mut(b);
+                kernel::product_vector(simd, (lower, At { at: b * ld, ld }), &done[..e - b], open);
+                e = b;
+            }
+        }
+    }
+}
+
+/// `x ← U⁻¹ x` for a diagonal block of at most [`WIDTH`] rows.
+fn upper_solve(block: &[f64], ld: usize, inverses: &[f64], x: &mut [f64]) {
+    let w = x.len();
+    if w < WIDTH {
+        for j in (0..w).rev() {
+            x[j] *= inverses[j];
+            let y = x[j];
+            for i in 0..j {
+                x[i] -= block[j * ld + i] * y;
+            }
+        }
+        return;
+    }
+    // Whole columns, masked, in a register.
+    let mut z: [f64; WIDTH] = std::array::from_fn(|i| x[i]);
+    for j in (0..WIDTH).rev() {
+        let y = z[j] * inverses[j];
+        let column = &block[j * ld..j * ld + WIDTH];
+        for i in 0..WIDTH {
+            z[i] = match i.cmp(&j) {
+                std::cmp::Ordering::Less => z[i] - column[i] * y,
+                std::cmp::Ordering::Equal => y,
+                std::cmp::Ordering::Greater => z[i],
+            };
+        }
+    }
+    x.copy_from_slice(&z);
+}
+
+/// The power of two by which x comes to lie between one and two; one for zero.
+fn inverse_power(x: f64) -> f64 {
+    let exponent = (x.to_bits() >> 52) & 0x7ff;
+    if x == 0.0 {
+        1.0
+    } else {
+        // Subnormal numbers and the largest stay a little outside.
+        f64::from_bits((2046 - exponent.clamp(1, 2045)) << 52)
+    }
+}
+
+/// The largest entries of the rows of a block by columns of `height`, which is a constant after inlining. NaN
+/// is passed over: it is met again in a pivot.
+#[inline(always)]
+fn row_maxima(block: &[f64], height: usize, largest: &mut [f64]) {
+    let largest = &mut largest[..height];
+    for column in block.chunks_exact(height) {
+        for i in 0..height {
+            let a = column[i].abs();
+            largest[i] = if a > largest[i] { a } else { largest[i] };
+        }
+    }
+}
+
+/// The largest entries of its columns, rows scaled.
+#[inline(always)]
+fn column_maxima(block: &[f64], height: usize, scale: &[f64], largest: &mut [f64]) {
+    let scale = &scale[..height];
+    for (column, largest) in block.chunks_exact(height).zip(largest) {
+        for i in 0..height {
+            let a = (column[i] * scale[i]).abs();
+            *largest = if a > *largest { a } else { *largest };
+        }
+    }
+}
+
+/// A block, scaled, into columns of a front.
+#[inline(always)]
+fn scatter(
+    block: &[f64],
+    height: usize,
+    row_scale: &[f64],
+    column_scale: &[f64],
+    to: &mut [f64],
+    ld: usize,
+) {
+    let row_scale = &row_scale[..height];
+    for (c, (column, scale)) in block.chunks_exact(height).zip(column_scale).enumerate() {
+        let to = &mut to[c * ld..c * ld + height];
+        for i in 0..height {
+            to[i] = column[i] * row_scale[i] * scale;
+        }
+    }
+}
+
+/// Adds a D×D block by rows to columns.
+#[inline(always)]
+fn add_transposed<const D: usize>(block: &[f64], to: &mut [f64], stride: usize) {
+    let block = &block[..D * D];
+    for c in 0..D {
+        let column = &mut to[c * stride..c * stride + D];
+        for r in 0..D {
+            column[r] += block[r * D + c];
+        }
+    }
+}
+
+/// Adds the rows of a child's column to its parent's column, which begins at row `first` of the front.
+#[inline(always)]
+fn add_runs(runs: &[Run], from: &[f64], to: &mut [f64], first: usize) {
+    for run in runs {
+        let (f, t, len) = (run.from as usize, run.to as usize - first, run.len as usize);
+        to[t..t + len].iter_mut().zip(&from[f..f + len]).for_each(|(to, from)| *to += from);
+    }
+}
+
+/// Exchanges rows in `columns` columns as `swaps` says, rows counted from `first`.
+fn exchange(x: &mut [f64], part: At, columns: usize, swaps: &[u32], first: usize) {
+    if swaps.iter().enumerate().all(|(j, &p)| j + first == p as usize) {
+        return;
+    }
+    for c in 0..columns {
+        let column = &mut x[part.at + c * part.ld..];
+        for (j, &p) in swaps.iter().enumerate() {
+            column.swap(first + j, p as usize);
+        }
+    }
+}
+
+/// `X ← L⁻¹ X` with the unit lower triangle of pivots `a..b`, for `n` columns of X whose row 0 is that of pivot 0.
+fn left_solve(
+    simd: Simd,
+    (a, b): (usize, usize),
+    (lower, ld): (&[f64], usize),
+    triangles: &[f64],
+    (x, part): (&mut [f64], At),
+    n: usize,
+) {
+    if b - a <= WIDTH {
+        let negative = &triangles[a * WIDTH..a * WIDTH + WIDTH * WIDTH];
+        let rows = At { at: part.at + a, ld: part.ld };
+        kernel::replace(simd, (b - a, n), negative, (x, rows));
+        return;
+    }
+    let mid = middle(a, b);
+    left_solve(simd, (a, mid), (lower, ld), triangles, (x, part), n);
+    let beside = At { at: a * ld + mid, ld };
+    let (done, open) = (At { at: part.at + a, ld: part.ld }, At { at: part.at + mid, ld: part.ld });
+    kernel::product_below(simd, (b - mid, n, mid - a), (lower, beside), (x, done, open));
+    left_solve(simd, (mid, b), (lower, ld), triangles, (x, part), n);
+}
+
+/// Operations of a product that is made in one go: some 20 ms.
+const STRIP: f64 = 2e8;
+/// The least columns of a strip, so that the rest of the product's operands are not read too often.
+const NARROW: usize = 48;
+
+/// Cuts `columns` columns of `each` operations into strips (first column, number) of some milliseconds; all but the largest fronts are one strip.
+fn strips(columns: usize, each: f64) -> impl Iterator<Item = (usize, usize)> {
+    let whole = each * columns as f64 <= 2.0 * STRIP;
+    let width = if whole { columns.max(1) } else { ((STRIP / each) as usize).max(NARROW) };
+    (0..columns).step_by(width).map(move |j| (j, width.min(columns - j)))
+}
+
+/// Where a range of pivots is halved: at a multiple of the panel width from its start.
+fn middle(a: usize, b: usize) -> usize {
+    a + ((b - a) / 2).next_multiple_of(WIDTH)
+}
+
+/// The elimination of a front's pivots by halves: the left half, its effect on the right half, the right half.
+struct Elimination<'a> {
+    simd: Simd,
+    k: usize,
+    ld: usize,
+    lower: &'a mut [f64],
+    triangles: &'a mut [f64],
+    inverses: &'a mut [f64],
+    swaps: &'a mut [u32],
+    outcome: Pivots,
+    pace: &'a mut Pace,
+}
+
+impl Elimination<'_> {
+    /// `None` where the time is over.
+    fn columns(&mut self, a: usize, b: usize) -> Option<()> {
+        let (simd, k, ld) = (self.simd, self.k, self.ld);
+        if b - a <= WIDTH {
+            self.panel(a, b);
+            return Some(());
+        }
+        let mid = middle(a, b);
+        self.columns(a, mid)?;
+        let (left, right) = self.lower.split_at_mut(mid * ld);
+        let columns = At { at: 0, ld };
+        exchange(right, columns, b - mid, &self.swaps[a..mid], a);
+        let below = At { at: a * ld + mid, ld };
+        let each = ((mid - a) * (mid - a + 2 * (ld - mid))) as f64;
+        for (j, n) in strips(b - mid, each) {
+            let part = At { at: j * ld, ld };
+            left_solve(simd, (a, mid), (left, ld), self.triangles, (right, part), n);
+            let (done, open) = (At { at: j * ld + a, ld }, At { at: j * ld + mid, ld });
+            kernel::product_below(simd, (ld - mid, n, mid - a), (left, below), (right, done, open));
+            if self.pace.over(each * n as f64) {
+                return None;
+            }
+        }
+        self.columns(mid, b)?;
+        let columns = At { at: a * self.ld, ld: self.ld };
+        exchange(self.lower, columns, mid - a, &self.swaps[mid..b], mid);
+        debug_assert!(b <= k);
+        Some(())
+    }
+
+    /// Eliminates pivots `a..b`, at most [`WIDTH`], in their own columns.
+    fn panel(&mut self, a: usize, b: usize) {
+        let (simd, k, ld) = (self.simd, self.k, self.ld);
+        let diagonal = At { at: a * ld + a, ld };
+        let (swaps, inverses) = (&mut self.swaps[a..b], &mut self.inverses[a..b]);
+        let found = kernel::factor_panel(simd, k - a, (self.lower, diagonal), swaps, inverses);
+        self.outcome.perturbed += found.perturbed;
+        self.outcome.broken |= found.broken;
+        swaps.iter_mut().for_each(|p| *p += a as u32);
+        let rest = At { at: a * ld + k, ld };
+        kernel::right_solve(simd, ld - k, (self.lower, diagonal, rest), inverses);
+        // −L⁻¹ of the unit triangle, column by column; entries of L are at most one.
+        let w = b - a;
+        let triangle = &mut self.triangles[a * WIDTH..a * WIDTH + WIDTH * WIDTH];
+        for j in 0..w {
+            let column = &mut triangle[j * WIDTH..j * WIDTH + WIDTH];
+            column.fill(0.0);
+            column[j] = -1.0;
+            for p in j..w {
+                let y = column[p];
+                for i in p + 1..w {
+                    column[i] -= self.lower[diagonal.at + p * ld + i] * y;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

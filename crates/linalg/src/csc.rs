@@ -1,0 +1,264 @@
+//! General sparse matrices by compressed columns.
+
+use crate::MatrixError;
+
+/// A sparse matrix by compressed columns, row indices sorted and unique within each column.
+///
+/// Storage: `8·nnz` bytes of values, `8·nnz` of row indices, `8·(ncols+1)` of pointers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Csc {
+    nrows: usize,
+    ncols: usize,
+    col_ptr: Vec<usize>,
+    row_idx: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl Csc {
+    /// The `nrows × ncols` zero matrix.
+    pub fn zeros(nrows: usize, ncols: usize) -> Self {
+        Self { nrows, ncols, col_ptr: vec![0; ncols + 1], row_idx: vec![], values: vec![] }
+    }
+
+    /// The diagonal matrix with the given diagonal.
+    pub fn diagonal(d: &[f64]) -> Self {
+        Self {
+            nrows: d.len(),
+            ncols: d.len(),
+            col_ptr: (0..=d.len()).collect(),
+            row_idx: (0..d.len()).collect(),
+            values: d.to_vec(),
+        }
+    }
+
+    /// Assembles `(row, column, value)` entries; duplicates are added in the order in which they come.
+    ///
+    /// Explicit zeros are kept: they belong to the structure that the caller stated.
+    /// Errors: an index outside the matrix, by entry.
+    pub fn from_triplets(
+        nrows: usize,
+        ncols: usize,
+        entries: impl Iterator<Item = (usize, usize, f64)> + Clone,
+    ) -> Result<Self, MatrixError> {
+        let mut count = vec![0usize; ncols + 1];
+        for (k, (i, j, _)) in entries.clone().enumerate() {
+            if i >= nrows || j >= ncols {
+                return Err(MatrixError::value(
+                    format!("entry {k}"),
+                    format!("an index inside {nrows} × {ncols}"),
+                    format!("row {i}, column {j}"),
+                ));
+            }
+            count[j + 1] += 1;
+        }
+        for j in 0..ncols {
+            count[j + 1] += count[j];
+        }
+        // A stable bucket by columns, then a stable sort by rows, keeps duplicates in their order.
+        let mut next = count.clone();
+        let mut bucket = vec![(0usize, 0.0_f64); count[ncols]];
+        for (i, j, x) in entries {
+            bucket[next[j]] = (i, x);
+            next[j] += 1;
+        }
+        let mut out = Self::zeros(nrows, ncols);
+        out.row_idx.reserve(bucket.len());
+        out.values.reserve(bucket.len());
+        for j in 0..ncols {
+            let column = &mut bucket[count[j]..count[j + 1]];
+            column.sort_by_key(|e| e.0);
+            let start = out.row_idx.len();
+            for &(i, x) in column.iter() {
+                if out.row_idx.len() > start && *out.row_idx.last().expect("not empty") == i {
+                    *out.values.last_mut().expect("not empty") += x;
+                } else {
+                    out.row_idx.push(i);
+                    out.values.push(x);
+                }
+            }
+            out.col_ptr[j + 1] = out.row_idx.len();
+        }
+        Ok(out)
+    }
+
+    /// The number of rows.
+    pub fn nrows(&self) -> usize {
+        self.nrows
+    }
+
+    /// The number of columns.
+    pub fn ncols(&self) -> usize {
+        self.ncols
+    }
+
+    /// The number of stored entries.
+    pub fn nnz(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Column pointers (`ncols + 1` entries).
+    pub fn col_ptr(&self) -> &[usize] {
+        &self.col_ptr
+    }
+
+    /// Row indices, sorted within each column.
+    pub fn row_idx(&self) -> &[usize] {
+        &self.row_idx
+    }
+
+    /// Values, in the order of [`row_idx`](Csc::row_idx).
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Values, to be changed; the pattern stays.
+    pub fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
+    /// Column pointers, row indices, and the values to be changed: the structure stays.
+    pub fn parts_mut(&mut self) -> (&[usize], &[usize], &mut [f64]) {
+        (&self.col_ptr, &self.row_idx, &mut self.values)
+    }
+
+    /// Row indices and values of column `j`.
+    #[inline]
+    pub fn column(&self, j: usize) -> (&[usize], &[f64]) {
+        let range = self.col_ptr[j]..self.col_ptr[j + 1];
+        (&self.row_idx[range.clone()], &self.values[range])
+    }
+
+    /// All entries as `(row, column, value)`, column by column.
+    pub fn triplets(&self) -> impl Iterator<Item = (usize, usize, f64)> + Clone + '_ {
+        (0..self.ncols).flat_map(move |j| {
+            let (rows, values) = self.column(j);
+            rows.iter().zip(values).map(move |(&i, &x)| (i, j, x))
+        })
+    }
+
+    /// The entry at row `i`, column `j` (zero where nothing is stored).
+    pub fn get(&self, i: usize, j: usize) -> f64 {
+        let (rows, values) = self.column(j);
+        rows.binary_search(&i).map_or(0.0, |k| values[k])
+    }
+
+    /// The transpose. Cost: O(nnz).
+    pub fn transpose(&self) -> Self {
+        let mut out = Self::zeros(self.ncols, self.nrows);
+        for &i in &self.row_idx {
+            out.col_ptr[i + 1] += 1;
+        }
+        for i in 0..self.nrows {
+            out.col_ptr[i + 1] += out.col_ptr[i];
+        }
+        out.row_idx = vec![0; self.nnz()];
+        out.values = vec![0.0; self.nnz()];
+        let mut next = out.col_ptr.clone();
+        for (i, j, x) in self.triplets() {
+            out.row_idx[next[i]] = j;
+            out.values[next[i]] = x;
+            next[i] += 1;
+        }
+        out
+    }
+
+    /// `y += a · A x`.
+    pub fn mul_add(&self, a: f64, x: &[f64], y: &mut [f64]) {
+        debug_assert_eq!((x.len(), y.len()), (self.ncols, self.nrows));
+        for (j, &xj) in x.iter().enumerate() {
+            let (rows, values) = self.column(j);
+            let axj = a * xj;
+            if axj != 0.0 {
+                for (&i, &v) in rows.iter().zip(values) {
+                    y[i] += v * axj;
+                }
+            }
+        }
+    }
+
+    /// `y += a · Aᵀ x`.
+    pub fn mul_transpose_add(&self, a: f64, x: &[f64], y: &mut [f64]) {
+        debug_assert_eq!((x.len(), y.len()), (self.nrows, self.ncols));
+        for (j, yj) in y.iter_mut().enumerate() {
+            *yj += a * self.column_dot(j, x);
+        }
+    }
+
+    /// `(Aᵀ x)_j`.
+    #[inline]
+    pub fn column_dot(&self, j: usize, x: &[f64]) -> f64 {
+        let (rows, values) = self.column(j);
+        rows.iter().zip(values).map(|(&i, &v)| v * x[i]).sum()
+    }
+
+    /// `max |a_ij − a_ji| / max |a_ij|`, zero for an empty matrix. Cost: O(nnz).
+    pub fn asymmetry(&self) -> f64 {
+        let t = self.transpose();
+        let mut worst = 0.0_f64;
+        let mut largest = 0.0_f64;
+        for (i, j, x) in self.triplets() {
+            largest = largest.max(x.abs());
+            worst = worst.max((x - t.get(i, j)).abs());
+        }
+        if largest > 0.0 { worst / largest } else { 0.0 }
+    }
+
+    /// Every stored value is finite; the error names the entry of the matrix called `name`.
+    pub fn check_finite(&self, name: &str) -> Result<(), MatrixError> {
+        match self.triplets().find(|e| !e.2.is_finite()) {
+            Some((i, j, x)) => {
+                Err(MatrixError::value(format!("{name}[{i}, {j}]"), "a finite number", x))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The matrix has the shape that the problem asks for.
+    pub fn check_shape(
+        &self,
+        name: &str,
+        nrows: usize,
+        ncols: usize,
+        meaning: &str,
+    ) -> Result<(), MatrixError> {
+        if (self.nrows, self.ncols) == (nrows, ncols) {
+            return Ok(());
+        }
+        Err(MatrixError::shape(
+            name,
+            format!("{nrows} × {ncols} ({meaning})"),
+            format!("{} × {}", self.nrows, self.ncols),
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn duplicates_are_added_and_zeros_kept() {
+        let entries = [(1, 0, 2.0), (0, 0, 1.0), (1, 0, 0.5), (0, 1, 0.0)];
+        let a = Csc::from_triplets(2, 2, entries.into_iter()).unwrap();
+        assert_eq!(a.nnz(), 3);
+        assert_eq!((a.get(0, 0), a.get(1, 0), a.get(0, 1)), (1.0, 2.5, 0.0));
+    }
+
+    #[test]
+    fn an_index_outside_is_named() {
+        let e = Csc::from_triplets(2, 2, [(0, 0, 1.0), (2, 0, 1.0)].into_iter()).unwrap_err();
+        assert!(e.to_string().contains("entry 1") && e.to_string().contains("row 2"), "{e}");
+    }
+
+    #[test]
+    fn products_agree_with_the_transpose() {
+        let entries = [(0, 0, 1.0), (2, 0, -2.0), (1, 1, 3.0), (0, 2, 0.5)];
+        let a = Csc::from_triplets(3, 4, entries.into_iter()).unwrap();
+        let x = [1.0, 2.0, 3.0];
+        let (mut y, mut z) = ([0.0; 4], [0.0; 4]);
+        a.mul_transpose_add(2.0, &x, &mut y);
+        a.transpose().mul_add(2.0, &x, &mut z);
+        assert_eq!(y, z);
+        assert_eq!(a.transpose().transpose(), a);
+    }
+}

@@ -1,0 +1,275 @@
+//! The Delassus operator W = Hᵀ M⁻¹ H of a global problem: its diagonal, its condensation, and its factors
+//! contact by contact.
+
+use super::budget::Pace;
+use super::{Block, BlockRow, Bsr, Csc, Inverse};
+
+/// `W = Hᵀ M⁻¹ H` without W: for each contact c the rows of `H_c` (n × D) that are not zero and those of
+/// `Z_c = M⁻¹ H_c`.
+///
+/// `u_c = H_cᵀ v + w_c` and `v += Z_c Δr_c` cost O(rows touched): the movements of Gauss–Seidel in velocity space. With
+/// bilateral constraints `M⁻¹` stands for the velocity part of `[M, −G; Gᵀ, 0]⁻¹`.
+///
+/// Storage: `8 D + 4` bytes for each touched row, twice: 12 rows a contact between two rigid bodies, but all
+/// degrees of freedom of a finite element body in Z (condense those instead).
+#[derive(Debug, Clone)]
+pub struct Delassus<const D: usize> {
+    h: Columns<D>,
+    z: Columns<D>,
+    diagonal: Vec<Block<D>>,
+}
+
+impl<const D: usize> Delassus<D> {
+    /// Keeps H (n × D·nc) and `Z = M⁻¹ H`. `inverse` may carry bilateral rows after n.
+    ///
+    /// Cost: D solves for each contact and component of M that it touches.
+    pub fn new(h: &Csc, inverse: &Inverse) -> Self {
+        let (mut h_rows, mut z_rows) = (Columns::new(), Columns::new());
+        let diagonal = with_diagonal::<D>(h, inverse, |h, z| {
+            h_rows.push(h);
+            z_rows.push(z);
+        });
+        Self { h: h_rows, z: z_rows, diagonal }
+    }
+
+    /// The diagonal blocks `W_cc = H_cᵀ M⁻¹ H_c`. Cost as [`new`](Self::new); keeps nothing else.
+    pub fn diagonal(h: &Csc, inverse: &Inverse) -> Vec<Block<D>> {
+        with_diagonal::<D>(h, inverse, |_, _| {})
+    }
+
+    /// The diagonal block `W_cc`.
+    pub fn diagonal_block(&self, c: usize) -> &Block<D> {
+        &self.diagonal[c]
+    }
+
+    /// Forms W in block-sparse rows, `W_ij = H_iᵀ Z_j`, one Z_j at a time.
+    ///
+    /// Cost: the solves of [`new`](Self::new), and Σ over degrees of freedom of (contacts in H) × (contacts in Z).
+    pub fn condense(h: &Csc, inverse: &Inverse) -> Bsr<D> {
+        let nc = h.ncols() / D;
+        // Contacts whose H touches a degree of freedom.
+        let mut touching: Vec<Vec<(u32, [f64; D])>> = vec![Vec::new(); h.nrows()];
+        for c in 0..nc {
+            for (i, row) in block_column::<D>(h, c) {
+                touching[i as usize].push((c as u32, row));
+            }
+        }
+        let mut rows: Vec<BlockRow<D>> = vec![Vec::new(); nc];
+        let mut slot = vec![usize::MAX; nc];
+        let mut met: BlockRow<D> = Vec::new();
+        solve_columns::<D>(h, inverse, |j, _, z| {
+            for (dof, row) in z {
+                for &(i, ref h_row) in &touching[*dof as usize] {
+                    let at = &mut slot[i as usize];
+                    if *at == usize::MAX {
+                        *at = met.len();
+                        met.push((i, [[0.0; D]; D]));
+                    }
+                    add_outer(&mut met[*at].1, h_row, row);
+                }
+            }
+            for (i, w) in met.drain(..) {
+                slot[i as usize] = usize::MAX;
+                rows[i as usize].push((j as u32, w));
+            }
+        });
+        Bsr::from_rows(nc, &rows)
+    }
+
+    /// The bytes that [`condense`](Self::condense) takes, from above: every pair of contacts that touch the same component of M.
+    pub fn condensed_bytes(h: &Csc, inverse: &Inverse) -> f64 {
+        let pairs = |count: usize, _: usize| (count * count) as f64;
+        // The rows as they are filled, and the matrix that is made of them.
+        2.0 * (8 * D * D + 8) as f64 * sum_over_components::<D>(h, inverse, pairs)
+    }
+
+    /// The bytes that [`new`](Self::new) keeps of Z, from above.
+    pub fn kept_bytes(h: &Csc, inverse: &Inverse) -> f64 {
+        let rows = |count: usize, size: usize| (count * size) as f64;
+        (8 * D + 8) as f64 * sum_over_components::<D>(h, inverse, rows)
+    }
+
+    /// `H_cᵀ v`.
+    #[inline(always)]
+    pub fn local_velocity(&self, c: usize, v: &[f64]) -> [f64; D] {
+        let mut u = [0.0; D];
+        for (i, h) in self.h.column(c) {
+            for k in 0..D {
+                u[k] += h[k] * v[*i as usize];
+            }
+        }
+        u
+    }
+
+    /// `v += M⁻¹ H_c dr`.
+    #[inline(always)]
+    pub fn apply_impulse(&self, c: usize, dr: &[f64; D], v: &mut [f64]) {
+        for (i, z) in self.z.column(c) {
+            for k in 0..D {
+                v[*i as usize] += z[k] * dr[k];
+            }
+        }
+    }
+}
+
+/// A sparse n × (D·nc) matrix by block columns: for each contact, `(row, its D entries)`.
+#[derive(Debug, Clone)]
+struct Columns<const D: usize> {
+    ptr: Vec<usize>,
+    rows: Vec<(u32, [f64; D])>,
+}
+
+impl<const D: usize> Columns<D> {
+    fn new() -> Self {
+        Self { ptr: vec![0], rows: vec![] }
+    }
+
+    fn push(&mut self, rows: &[(u32, [f64; D])]) {
+        self.rows.extend_from_slice(rows);
+        self.ptr.push(self.rows.len());
+    }
+
+    #[inline(always)]
+    fn column(&self, c: usize) -> &[(u32, [f64; D])] {
+        &self.rows[self.ptr[c]..self.ptr[c + 1]]
+    }
+}
+
+/// `Σ f(contacts that touch it, size)` over the components of M.
+fn sum_over_components<const D: usize>(
+    h: &Csc,
+    inverse: &Inverse,
+    f: impl Fn(usize, usize) -> f64,
+) -> f64 {
+    let sizes: Vec<usize> = inverse.component_sizes().collect();
+    let (mut counts, mut last) = (vec![0_usize; sizes.len()], vec![usize::MAX; sizes.len()]);
+    for c in 0..h.ncols() / D {
+        for &i in (D * c..D * c + D).flat_map(|j| h.column(j).0) {
+            let k = inverse.component_of(i);
+            if last[k] != c {
+                last[k] = c;
+                counts[k] += 1;
+            }
+        }
+    }
+    counts.iter().zip(sizes).map(|(&count, size)| f(count, size)).sum()
+}
+
+/// `w += aᵀ b` for two rows.
+#[inline(always)]
+fn add_outer<const D: usize>(w: &mut Block<D>, a: &[f64; D], b: &[f64; D]) {
+    for k in 0..D {
+        for l in 0..D {
+            w[k][l] += a[k] * b[l];
+        }
+    }
+}
+
+/// The rows of `H_c` that hold something, in order.
+fn block_column<const D: usize>(h: &Csc, c: usize) -> Vec<(u32, [f64; D])> {
+    let mut rows: Vec<(u32, [f64; D])> = Vec::new();
+    for k in 0..D {
+        let (indices, values) = h.column(D * c + k);
+        for (&i, &value) in indices.iter().zip(values) {
+            let i = u32::try_from(i).expect("fewer than 2³² degrees of freedom");
+            let at = rows.binary_search_by_key(&i, |r| r.0).unwrap_or_else(|at| {
+                rows.insert(at, (i, [0.0; D]));
+                at
+            });
+            rows[at].1[k] = value;
+        }
+    }
+    rows
+}
+
+/// As [`solve_columns`], and returns the diagonal blocks.
+fn with_diagonal<const D: usize>(
+    h: &Csc,
+    inverse: &Inverse,
+    mut visit: impl FnMut(&[(u32, [f64; D])], &[(u32, [f64; D])]),
+) -> Vec<Block<D>> {
+    let mut blocks = Vec::with_capacity(h.ncols() / D);
+    let mut dense = vec![[0.0; D]; h.nrows()];
+    solve_columns::<D>(h, inverse, |_, h, z| {
+        h.iter().for_each(|&(i, row)| dense[i as usize] = row);
+        let mut w = [[0.0; D]; D];
+        z.iter().for_each(|(i, row)| add_outer(&mut w, &dense[*i as usize], row));
+        h.iter().for_each(|&(i, _)| dense[i as usize] = [0.0; D]);
+        blocks.push(w);
+        visit(h, z);
+    });
+    blocks
+}
+
+/// Contacts whose columns are solved together where a component is large: its factor is read from memory once for
+/// all of them.
+const TOGETHER: usize = 16;
+
+/// Hands `H_c` and `Z_c = M⁻¹ H_c` of each contact in turn to `visit`, both as rows that hold something. Once the time is over (see
+/// [`budget`](super::budget)) the rest of Z is empty.
+fn solve_columns<const D: usize>(
+    h: &Csc,
+    inverse: &Inverse,
+    mut visit: impl FnMut(usize, &[(u32, [f64; D])], &[(u32, [f64; D])]),
+) {
+    let n = h.nrows();
+    let (mut x, mut z, mut scratch) = (Vec::new(), Vec::new(), Vec::new());
+    let mut starts = Vec::new();
+    // Each component that a contact touches: (component, contact of the group).
+    let mut touched: Vec<(usize, usize)> = Vec::new();
+    let together = if inverse.has_sparse_factor() { TOGETHER } else { 1 };
+    let contacts: Vec<usize> = (0..h.ncols() / D).collect();
+    let mut pace = Pace::default();
+    let mut late = false;
+    for group in contacts.chunks(together) {
+        if late {
+            // Nobody will use it: the shape alone.
+            group.iter().for_each(|&c| visit(c, &block_column::<D>(h, c), &[]));
+            continue;
+        }
+        let rows: Vec<_> = group.iter().map(|&c| block_column::<D>(h, c)).collect();
+        touched.clear();
+        for (g, rows) in rows.iter().enumerate() {
+            touched.extend(rows.iter().map(|r| (inverse.component_of(r.0 as usize), g)));
+        }
+        touched.sort_unstable();
+        touched.dedup();
+        // The columns of each touched component lie one after the other, those of one component together.
+        let size = |component: usize| inverse.component(component).len();
+        x.clear();
+        starts.clear();
+        for &(component, g) in &touched {
+            let (start, size) = (x.len(), size(component));
+            starts.push(start);
+            x.resize(start + D * size, 0.0);
+            for (i, row) in &rows[g] {
+                if inverse.component_of(*i as usize) == component {
+                    let place = inverse.place_in_component(*i as usize);
+                    (0..D).for_each(|k| x[start + k * size + place] = row[k]);
+                }
+            }
+        }
+        late = pace.over(100.0 * x.len() as f64);
+        let mut start = 0;
+        for pairs in touched.chunk_by(|a, b| a.0 == b.0) {
+            let component = pairs[0].0;
+            let end = start + pairs.len() * D * size(component);
+            inverse.solve_columns(component, &mut x[start..end], &mut scratch);
+            start = end;
+        }
+        for (g, rows) in rows.iter().enumerate() {
+            z.clear();
+            for (&(component, _), start) in touched.iter().zip(&starts).filter(|t| t.0.1 == g) {
+                let size = size(component);
+                let at = |place: usize| std::array::from_fn(|k| x[start + k * size + place]);
+                let index = inverse.component(component).iter().enumerate();
+                z.extend(index.map(|(place, &i)| (i as u32, at(place))));
+            }
+            // Rows after n are multipliers of bilateral constraints, recovered on demand.
+            z.retain(|(i, row): &(u32, [f64; D])| {
+                (*i as usize) < n && row.iter().any(|&v| v != 0.0)
+            });
+            visit(group[g], rows, &z);
+        }
+    }
+}
