@@ -7,12 +7,14 @@
 //! [`BlockLu`]: LU of Newton matrices, analysed once and factorised many times.
 //! [`Compensated`], [`Doubled`]: sums and numbers in doubled precision.
 //! [`Delassus`]: W = Hᵀ M⁻¹ H as an operator, never formed, or condensed into a [`Bsr`].
+//! All of them are made from slices, and from and to matrices of faer, and with the features `nalgebra` and `sprs` of those crates.
 //! [`budget`]: the time and memory that all of these may use.
 
 mod block_lu;
 mod bsr;
 pub mod budget;
 mod compensated;
+mod convert;
 mod csc;
 mod delassus;
 mod dense;

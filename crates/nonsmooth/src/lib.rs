@@ -56,6 +56,7 @@
 //! | solve it | [`solve`], [`Solve`], [`Answer`]; [`session`] for many problems of one shape, step by step, without allocation |
 //! | judge a point | [`Judged::judge`], [`Verdict`]; [`exists`] asks whether there is a solution at all |
 //! | read and write files | [`read`], [`read_any`], [`fclib`], [`linear`] |
+//! | make matrices | [`Csc`], [`Bsr`], [`Dense`]: from slices, from faer, and behind features from nalgebra and sprs |
 //! | make problems | [`Planted`], with a known solution; [`Scene`], of bodies |
 //! | write a solver | [`Solver`], [`Step`], [`Driver`] |
 //!

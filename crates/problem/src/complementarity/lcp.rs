@@ -1,8 +1,8 @@
 //! The linear complementarity problem.
 
 use super::square;
-use crate::ProblemError;
 use crate::error::vector;
+use crate::{Problem, ProblemError};
 use nonsmooth_linalg::Matrix;
 
 /// `0 ≤ z ⟂ w = M z + q ≥ 0`: LCP(M, q), lecture (6).
@@ -20,6 +20,17 @@ pub struct Lcp {
 pub struct LcpPoint {
     /// The variables: z, or `(u, v)` of a mixed problem.
     pub z: Vec<f64>,
+}
+
+impl LcpPoint {
+    /// `w = M z + q` of this point, in plain arithmetic; what the judge computes of it is in its verdict.
+    ///
+    /// # Panics
+    ///
+    /// Where the point is not one of `problem`.
+    pub fn w(&self, problem: &impl Problem<Point = Self>) -> Vec<f64> {
+        problem.partner(self)
+    }
 }
 
 #[allow(non_snake_case)]
