@@ -91,7 +91,7 @@ fn mistakes_are_named() {
     let refused = |how: Solve| how.run(&problem).unwrap_err();
     assert!(matches!(refused(Solve::new().solver("magic")), SolveError::UnknownSolver { .. }));
     let said = refused(Solve::new().solver("nsgs").set("omega", 3.0)).to_string();
-    assert_eq!(said, "solver `nsgs`: omega: expected a number in (0, 2), found 3.0");
+    assert_eq!(said, "solver `nsgs`: omega: expected a number in (0, 2), found 3");
     assert!(refused(Solve::new().tolerance(2.0)).to_string().contains("tolerance"));
     let (lcp, point) = PlantedLcp::default().lcp();
     let said = refused(Solve::new().warm(&point)).to_string();

@@ -64,7 +64,7 @@ impl Kernel {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct ChenMangasarian {
-    /// ĝ.
+    /// The smoothing of the positive part.
     pub kernel: Kernel,
 }
 

@@ -39,7 +39,7 @@ pub enum SlipBlock {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct HueberStadlerWohlmuth {
-    /// The derivative that is used while sliding.
+    /// The derivative while sliding.
     pub slip: SlipBlock,
 }
 
