@@ -266,7 +266,7 @@ impl Keyed<'_> {
             }
             _ => return self.mixed(k),
         };
-        made.map_err(|problem| self.invalid(problem.into()))
+        made.map_err(|problem| self.invalid(problem))
     }
 
     /// An MLCP, as M, q and the number of free variables, or by its blocks.
@@ -314,7 +314,7 @@ impl Keyed<'_> {
                 )
             }
         };
-        made.map(Complementarity::Mlcp).map_err(|problem| self.invalid(problem.into()))
+        made.map(Complementarity::Mlcp).map_err(|problem| self.invalid(problem))
     }
 
     fn point(&self, s: &Solution) -> Result<LinearPoint, IoError> {
