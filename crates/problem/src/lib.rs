@@ -1,7 +1,7 @@
 //! The statement and the judge.
 //!
 //! This crate states the problems of nonsmooth mechanics as plain validated data ([`FrictionLocal`],
-//! [`FrictionGlobal`], [`Lcp`], [`Mlcp`], …), says how far a point is from solving them ([`check`]) and what they are like ([`traits`]),
+//! [`FrictionGlobal`], [`Lcp`], [`Mlcp`], …), says how far a point is from solving them ([`check`]),
 //! and makes instances with a known solution ([`planted`]). It holds no algorithm: nothing here is shared with a solver's kernels.
 //!
 //! Notation follows `docs/notation.md` and FCLIB's letters.
