@@ -338,8 +338,71 @@ pub trait Session<P: Problem>: Send {
     }
 }
 
-/// The most samples that a history keeps.
-const HISTORY: usize = 4096;
+/// The factor from a solver's own estimate to the judge's residual, learned at each judgement: the two are proportional, near enough.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Calibration(f64);
+
+impl Calibration {
+    /// Nothing learned yet.
+    pub(crate) fn new() -> Self {
+        Self(1.0)
+    }
+
+    /// Learns from a judgement at an estimate; NaN teaches nothing.
+    pub(crate) fn learn(&mut self, residual: f64, estimate: f64) {
+        let ratio = residual / estimate;
+        self.0 = if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 };
+    }
+
+    /// Whether an estimate promises that the judge will be content.
+    pub(crate) fn promises(self, estimate: f64, tolerance: f64) -> bool {
+        self.0 * estimate <= tolerance
+    }
+}
+
+/// The judge's visits during a solve, thinned evenly where there are very many.
+#[derive(Debug)]
+pub(crate) struct History {
+    samples: Vec<Sample>,
+    /// Every `stride`-th visit is kept.
+    stride: usize,
+    visits: usize,
+}
+
+impl History {
+    /// The most samples that are kept.
+    const MOST: usize = 4096;
+
+    /// An empty one, with room for all that it may keep.
+    pub(crate) fn new() -> Self {
+        Self { samples: Vec::with_capacity(Self::MOST), stride: 1, visits: 0 }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.samples.clear();
+        (self.stride, self.visits) = (1, 0);
+    }
+
+    /// Notes a visit; one that is `worth_it` is kept whatever the stride.
+    pub(crate) fn note(&mut self, sample: Sample, worth_it: bool) {
+        if self.samples.len() == Self::MOST {
+            let mut k = 0;
+            self.samples.retain(|_| {
+                k += 1;
+                k % 2 == 1
+            });
+            self.stride *= 2;
+        }
+        if worth_it || self.visits.is_multiple_of(self.stride) {
+            self.samples.push(sample);
+        }
+        self.visits += 1;
+    }
+
+    pub(crate) fn samples(&self) -> &[Sample] {
+        &self.samples
+    }
+}
 
 /// Drives a solver. Keeps its workspace, so that a second solve of the same shape allocates nothing.
 pub struct Driver<P: Problem, S: Solver<P>> {
@@ -347,7 +410,7 @@ pub struct Driver<P: Problem, S: Solver<P>> {
     // Boxed: workspaces are large to move.
     gauge: Option<Box<P::Gauge>>,
     kept: Option<Box<Kept<P, S>>>,
-    history: Vec<Sample>,
+    history: History,
 }
 
 struct Kept<P: Problem, S: Solver<P>> {
@@ -361,7 +424,7 @@ struct Kept<P: Problem, S: Solver<P>> {
 impl<P: Problem, S: Solver<P>> Driver<P, S> {
     /// A driver for `solver`, without a workspace yet.
     pub fn new(solver: S) -> Self {
-        Self { solver, gauge: None, kept: None, history: Vec::with_capacity(HISTORY) }
+        Self { solver, gauge: None, kept: None, history: History::new() }
     }
 
     /// The solver.
@@ -439,7 +502,7 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
     }
 
     fn history(&self) -> &[Sample] {
-        &self.history
+        self.history.samples()
     }
 
     fn trace(&self) -> Trace {
@@ -513,10 +576,10 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 ended => claim = Some(self.conclusion(ended)),
             }
             let due = since_judged >= self.solver.check_every()
-                || self.judge.ratio * estimate <= self.limits.tolerance;
+                || self.judge.calibration.promises(estimate, self.limits.tolerance);
             if due || claim.is_some() {
                 self.judge(point, iterations, claim.is_some());
-                self.judge.calibrate(estimate);
+                self.judge.calibration.learn(self.judge.last.merit(), estimate);
                 since_judged = 0;
                 if !self.judge.last.merit().is_finite() {
                     claim = Some(Status::Stalled("the iterates are no longer finite".into()));
@@ -663,7 +726,7 @@ struct Judge<'a, P: Problem> {
     best: &'a mut P::Point,
     /// The point last certified with its variables exactly on their bounds.
     tidied: &'a mut P::Point,
-    history: &'a mut Vec<Sample>,
+    history: &'a mut History,
     meter: Meter,
     /// Whether the latest point counts as the best.
     latest: bool,
@@ -677,11 +740,8 @@ struct Judge<'a, P: Problem> {
     own: Option<f64>,
     own_again: usize,
     own_wait: usize,
-    /// Judged residual over the solver's estimate, when last compared.
-    ratio: f64,
-    /// Keep every `stride`-th visit in the history.
-    stride: usize,
-    visits: usize,
+    calibration: Calibration,
+    visited: bool,
 }
 
 impl<'a, P: Problem> Judge<'a, P> {
@@ -689,7 +749,7 @@ impl<'a, P: Problem> Judge<'a, P> {
         gauge: &'a mut P::Gauge,
         best: &'a mut P::Point,
         tidied: &'a mut P::Point,
-        history: &'a mut Vec<Sample>,
+        history: &'a mut History,
         meter: Meter,
         latest: bool,
     ) -> Self {
@@ -708,9 +768,8 @@ impl<'a, P: Problem> Judge<'a, P> {
             own: None,
             own_again: 0,
             own_wait: 0,
-            ratio: 1.0,
-            stride: 1,
-            visits: 0,
+            calibration: Calibration::new(),
+            visited: false,
         }
     }
 
@@ -753,7 +812,7 @@ impl<'a, P: Problem> Judge<'a, P> {
             }
         }
         // What passes counts as the best, though its merit may be that of a point with a contact that is not done.
-        let better = self.visits == 0
+        let better = !self.visited
             || self.latest
             || self.last.is_better_than(&self.best_measure)
             || self.last.passes(tolerance);
@@ -762,19 +821,10 @@ impl<'a, P: Problem> Judge<'a, P> {
             self.certified = certified;
             P::copy_point(if tidied { self.tidied } else { point }, self.best);
         }
-        if self.history.len() == HISTORY {
-            let mut k = 0;
-            self.history.retain(|_| {
-                k += 1;
-                k % 2 == 1
-            });
-            self.stride *= 2;
-        }
         let merit = self.last.merit();
-        if self.visits.is_multiple_of(self.stride) || merit <= self.best_measure.merit() {
-            self.history.push(Sample { iteration, seconds: self.meter.seconds(), relative: merit });
-        }
-        self.visits += 1;
+        let sample = Sample { iteration, seconds: self.meter.seconds(), relative: merit };
+        self.history.note(sample, merit <= self.best_measure.merit());
+        self.visited = true;
         better
     }
 
@@ -818,15 +868,9 @@ impl<'a, P: Problem> Judge<'a, P> {
         measure
     }
 
-    /// The solver's estimate is proportional to the residual, near enough: learn the factor.
-    fn calibrate(&mut self, estimate: f64) {
-        let ratio = self.last.merit() / estimate;
-        self.ratio = if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 };
-    }
-
     fn progress(&self, iteration: usize) -> Progress {
         let seconds = self.meter.seconds();
-        let judged = self.history.last().copied().unwrap_or(Sample {
+        let judged = self.history.samples().last().copied().unwrap_or(Sample {
             iteration,
             seconds,
             relative: f64::NAN,

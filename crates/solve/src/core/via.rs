@@ -3,6 +3,7 @@
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Measure;
 
+use crate::core::drive::Calibration;
 use crate::core::trace::Trace;
 use crate::{Reformulation, SolveError, Solver, Step};
 
@@ -34,7 +35,7 @@ where
     gauge: Option<<R::To as Problem>::Gauge>,
     measure: Measure,
     tolerance: f64,
-    ratio: f64,
+    calibration: Calibration,
     unjudged: usize,
 }
 
@@ -59,16 +60,15 @@ impl<R, S> Via<R, S> {
             _ => f64::NAN,
         };
         let going = matches!(step, Step::Continue { .. });
-        let due =
-            work.unjudged >= self.solver.check_every() || work.ratio * estimate <= work.tolerance;
+        let due = work.unjudged >= self.solver.check_every()
+            || work.calibration.promises(estimate, work.tolerance);
         if going && !due {
             return step;
         }
         self.solver.publish(&work.reduced, &mut work.point, &mut work.work);
         work.measure = work.reduced.certify(&work.point, gauge);
         work.unjudged = 0;
-        let ratio = work.measure.merit() / estimate;
-        work.ratio = if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 };
+        work.calibration.learn(work.measure.merit(), estimate);
         match step {
             _ if work.measure.passes(work.tolerance) => Step::Stuck(said.into()),
             Step::Done => Step::Stuck(FAILED.into()),
@@ -99,7 +99,7 @@ where
             gauge,
             measure,
             tolerance,
-            ratio: 1.0,
+            calibration: Calibration::new(),
             unjudged: 0,
         })
     }
@@ -118,7 +118,8 @@ where
     }
 
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
-        (work.measure, work.ratio, work.unjudged) = (Measure::unknown(), 1.0, 0);
+        (work.measure, work.unjudged) = (Measure::unknown(), 0);
+        work.calibration = Calibration::new();
         self.reformulation.lower(problem, point, &work.memo, &mut work.point);
         self.solver.start(&work.reduced, &mut work.point, &mut work.work);
     }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Measure;
 
-use crate::core::drive::Meter;
+use crate::core::drive::{History, Meter};
 use crate::core::register::{self, Registered};
 use crate::core::settings::SettingsMap;
 use crate::core::trace::Trace;
@@ -34,13 +34,12 @@ pub struct Portfolio<P: Registered> {
     plan: Planner<P>,
     /// What was made for earlier problems, by name and settings.
     sessions: Vec<(&'static str, SettingsMap, Box<dyn Session<P>>)>,
-    history: Vec<Sample>,
+    /// The one that was last asked.
+    last: Option<usize>,
+    history: History,
     account: Vec<String>,
     trace: Trace,
 }
-
-/// The most samples that a history keeps.
-const HISTORY: usize = 4096;
 
 /// The method whose word is final where it has one.
 pub(super) const DECIDES: &str = "enumeration_exact";
@@ -55,7 +54,8 @@ impl<P: Registered> Portfolio<P> {
         Self {
             plan: Box::new(plan),
             sessions: vec![],
-            history: vec![],
+            last: None,
+            history: History::new(),
             account: vec![],
             trace: Trace::None,
         }
@@ -152,6 +152,7 @@ impl<P: Registered> Session<P> for Portfolio<P> {
         self.history.clear();
         self.account.clear();
         self.trace = Trace::None;
+        self.last = None;
         let mut tally = Tally::<P> {
             meter: Meter::start(Instant::now(), limits),
             iterations: 0,
@@ -186,12 +187,11 @@ impl<P: Registered> Session<P> for Portfolio<P> {
                 }
                 Err(e) => return Err(e),
             };
-            let shifted = session.history().iter().map(|s| Sample {
-                iteration: before + s.iteration,
-                seconds: begun + s.seconds,
-                relative: s.relative,
-            });
-            self.history.extend(shifted.take(HISTORY.saturating_sub(self.history.len())));
+            for s in session.history() {
+                let (iteration, seconds) = (before + s.iteration, begun + s.seconds);
+                self.history.note(Sample { iteration, seconds, relative: s.relative }, false);
+            }
+            self.last = Some(k);
             self.trace = session.trace();
             self.account.push(sentence(&candidate, &outcome));
             self.account.extend(session.account().into_iter().map(|line| format!("  {line}")));
@@ -233,7 +233,7 @@ impl<P: Registered> Session<P> for Portfolio<P> {
     }
 
     fn history(&self) -> &[Sample] {
-        &self.history
+        self.history.samples()
     }
 
     fn trace(&self) -> Trace {
@@ -242,6 +242,10 @@ impl<P: Registered> Session<P> for Portfolio<P> {
 
     fn account(&self) -> Vec<String> {
         self.account.clone()
+    }
+
+    fn gauge(&mut self) -> Option<&mut P::Gauge> {
+        self.sessions.get_mut(self.last?)?.2.gauge()
     }
 }
 
