@@ -272,10 +272,15 @@ where
     P: Registered + Judged,
 {
     let tolerance = limits.tolerance;
-    if let Some(gauge) = session.gauge() {
+    let small = problem.unknowns() <= guard::SMALL;
+    let unlimited = limits.time_limit.is_none() && limits.cancel.is_none();
+    // Where a limit has passed, nobody waits for a verdict on a large problem.
+    if (small || limits.reached(begun).is_none())
+        && let Some(gauge) = session.gauge()
+    {
         return Ok(problem.verdict(point, gauge, tolerance));
     }
-    if problem.unknowns() <= guard::SMALL {
+    if small || unlimited {
         return Ok(problem.judge(point, tolerance)?);
     }
     let spent = begun.elapsed().as_secs_f64();
