@@ -76,20 +76,21 @@ impl Default for AnyCounts {
     }
 }
 
-/// The kinds that an [`AnyProblem`] may hold, with their points.
-pub trait OfAny: Judged<Point: OfAnyPoint, Gauge: 'static> {
-    /// As a problem of any kind.
-    fn into_any(self) -> AnyProblem;
+/// The kinds that an [`AnyProblem`] may hold: what becomes one, with point, status and counts.
+pub trait OfAny:
+    Judged<Point: OfAnyPoint, Gauge: 'static, Status: Into<AnyStatus>, Counts: Into<AnyCounts>>
+    + Into<AnyProblem>
+{
+}
 
-    /// The verdict, with the statuses of any kind.
-    fn any_verdict(verdict: VerdictOf<Self>) -> VerdictOf<AnyProblem>;
+impl<P> OfAny for P where
+    P: Judged<Point: OfAnyPoint, Gauge: 'static, Status: Into<AnyStatus>, Counts: Into<AnyCounts>>
+        + Into<AnyProblem>
+{
 }
 
 /// Points that an [`AnyPoint`] may hold.
 pub trait OfAnyPoint: Sized + Into<AnyPoint> {
-    /// As a point of any kind.
-    fn into_any(self) -> AnyPoint;
-
     /// The point, if it is one of this type.
     fn of(any: &AnyPoint) -> Option<&Self>;
 
@@ -100,10 +101,6 @@ pub trait OfAnyPoint: Sized + Into<AnyPoint> {
 macro_rules! point_of_any {
     ($($variant:ident, $point:ty;)*) => {$(
         impl OfAnyPoint for $point {
-            fn into_any(self) -> AnyPoint {
-                AnyPoint::$variant(self)
-            }
-
             fn of(any: &AnyPoint) -> Option<&Self> {
                 match any {
                     AnyPoint::$variant(point) => Some(point),
@@ -134,55 +131,38 @@ point_of_any! {
     Hlcp, HlcpPoint;
 }
 
-macro_rules! of_any {
-    ($($wing:ident::$variant:ident, $problem:ty, $status:ident, $counts:ident;)*) => {$(
-        impl OfAny for $problem {
-            fn into_any(self) -> AnyProblem {
-                AnyProblem::$wing($wing::$variant(self))
-            }
-
-            fn any_verdict(verdict: VerdictOf<Self>) -> VerdictOf<AnyProblem> {
-                let Verdict { measure, solved, counts, statuses, velocity, worst } = verdict;
-                Verdict {
-                    measure,
-                    solved,
-                    counts: AnyCounts::$counts(counts),
-                    statuses: statuses.into_iter().map(AnyStatus::$status).collect(),
-                    velocity,
-                    worst,
-                }
-            }
-        }
-
-        impl From<$problem> for AnyProblem {
-            fn from(problem: $problem) -> Self {
-                problem.into_any()
+macro_rules! any_from {
+    ($($from:ty => $any:ident, |$x:ident| $made:expr;)*) => {$(
+        impl From<$from> for $any {
+            fn from($x: $from) -> Self {
+                $made
             }
         }
     )*};
 }
 
-of_any! {
-    Friction::Local2, FrictionLocal<2>, Contact, Contacts;
-    Friction::Local3, FrictionLocal<3>, Contact, Contacts;
-    Friction::Global2, FrictionGlobal<2>, Contact, Contacts;
-    Friction::Global3, FrictionGlobal<3>, Contact, Contacts;
-    Complementarity::Lcp, Lcp, Row, Rows;
-    Complementarity::Mlcp, Mlcp, Row, Rows;
-    Complementarity::Hlcp, Hlcp, Row, Rows;
-    Complementarity::Box, BoxLcp, Row, Rows;
+any_from! {
+    FrictionLocal<2> => AnyProblem, |p| Self::Friction(Friction::Local2(p));
+    FrictionLocal<3> => AnyProblem, |p| Self::Friction(Friction::Local3(p));
+    FrictionGlobal<2> => AnyProblem, |p| Self::Friction(Friction::Global2(p));
+    FrictionGlobal<3> => AnyProblem, |p| Self::Friction(Friction::Global3(p));
+    Lcp => AnyProblem, |p| Self::Complementarity(Complementarity::Lcp(p));
+    Mlcp => AnyProblem, |p| Self::Complementarity(Complementarity::Mlcp(p));
+    Hlcp => AnyProblem, |p| Self::Complementarity(Complementarity::Hlcp(p));
+    BoxLcp => AnyProblem, |p| Self::Complementarity(Complementarity::Box(p));
+    Friction => AnyProblem, |p| Self::Friction(p);
+    Complementarity => AnyProblem, |p| Self::Complementarity(p);
+    ContactStatus => AnyStatus, |status| Self::Contact(status);
+    RowStatus => AnyStatus, |status| Self::Row(status);
+    StatusCounts => AnyCounts, |counts| Self::Contacts(counts);
+    RowCounts => AnyCounts, |counts| Self::Rows(counts);
 }
 
-impl From<Friction> for AnyProblem {
-    fn from(problem: Friction) -> Self {
-        AnyProblem::Friction(problem)
-    }
-}
-
-impl From<Complementarity> for AnyProblem {
-    fn from(problem: Complementarity) -> Self {
-        AnyProblem::Complementarity(problem)
-    }
+/// The verdict with statuses and counts of any kind.
+pub fn any_verdict<P: OfAny>(verdict: VerdictOf<P>) -> VerdictOf<AnyProblem> {
+    let Verdict { measure, solved, counts, statuses, velocity, worst } = verdict;
+    let statuses = statuses.into_iter().map(Into::into).collect();
+    Verdict { measure, solved, counts: counts.into(), statuses, velocity, worst }
 }
 
 /// The point of the problem's kind.
@@ -225,7 +205,7 @@ impl Problem for AnyProblem {
     }
 
     fn origin(&self) -> AnyPoint {
-        with_problem!(self, p => p.origin().into_any())
+        with_problem!(self, p => p.origin().into())
     }
 
     fn validate_point(&self, any: &AnyPoint) -> Result<(), ProblemError> {
@@ -265,7 +245,7 @@ impl Problem for AnyProblem {
     }
 
     fn assembled(&self, unknowns: &[f64]) -> AnyPoint {
-        with_problem!(self, p => p.assembled(unknowns).into_any())
+        with_problem!(self, p => p.assembled(unknowns).into())
     }
 }
 
@@ -274,12 +254,16 @@ impl Judged for AnyProblem {
     type Counts = AnyCounts;
 
     fn verdict(&self, any: &AnyPoint, of: &mut AnyGauge, tolerance: f64) -> VerdictOf<Self> {
-        with_problem!(self, p => any_of(p, p.verdict(point(p, any), gauge(p, of), tolerance)))
+        fn judged<P: OfAny>(
+            problem: &P,
+            any: &AnyPoint,
+            of: &mut AnyGauge,
+            tolerance: f64,
+        ) -> VerdictOf<AnyProblem> {
+            any_verdict::<P>(problem.verdict(point(problem, any), gauge(problem, of), tolerance))
+        }
+        with_problem!(self, p => judged(p, any, of, tolerance))
     }
-}
-
-fn any_of<P: OfAny>(_: &P, verdict: VerdictOf<P>) -> VerdictOf<AnyProblem> {
-    P::any_verdict(verdict)
 }
 
 #[cfg(test)]
@@ -294,8 +278,8 @@ mod tests {
         where
             P::Point: Clone,
         {
-            let any = problem.clone().into_any();
-            let point = known.clone().into_any();
+            let any: AnyProblem = problem.clone().into();
+            let point: AnyPoint = known.clone().into();
             assert_eq!((any.kind(), any.unknowns()), (problem.kind(), problem.unknowns()));
             let (own, verdict) =
                 (problem.judge(known, 1e-8).unwrap(), any.judge(&point, 1e-8).unwrap());

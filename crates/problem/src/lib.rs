@@ -16,7 +16,9 @@ mod friction_local;
 pub mod planted;
 mod problem;
 
-pub use any::{AnyCounts, AnyGauge, AnyPoint, AnyProblem, AnyStatus, OfAny, OfAnyPoint};
+pub use any::{
+    AnyCounts, AnyGauge, AnyPoint, AnyProblem, AnyStatus, OfAny, OfAnyPoint, any_verdict,
+};
 pub use complementarity::{BoxLcp, Complementarity, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp};
 pub use error::ProblemError;
 pub use friction::Friction;

@@ -18,7 +18,9 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use nonsmooth_problem::check::{Certificate, Judged, Verdict, VerdictOf};
-use nonsmooth_problem::{AnyPoint, AnyProblem, OfAny, OfAnyPoint, ProblemError, with_problem};
+use nonsmooth_problem::{
+    AnyPoint, AnyProblem, OfAny, OfAnyPoint, ProblemError, any_verdict, with_problem,
+};
 use serde_json::Value;
 
 use crate::core::register::{DEFAULT, Described, Registered, session};
@@ -245,9 +247,9 @@ impl Solvable for AnyProblem {
 
 fn of_any<P: OfAny>(answer: Answer<P>) -> Answer<AnyProblem> {
     Answer {
-        point: answer.point.into_any(),
+        point: answer.point.into(),
         status: answer.status,
-        verdict: P::any_verdict(answer.verdict),
+        verdict: any_verdict::<P>(answer.verdict),
         iterations: answer.iterations,
         factorisations: answer.factorisations,
         seconds: answer.seconds,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use nonsmooth_problem::planted::{Planted, PlantedLcp, PlantedMlcp};
-use nonsmooth_problem::{AnyProblem, OfAny, OfAnyPoint, Problem};
+use nonsmooth_problem::{AnyProblem, OfAny, Problem};
 use nonsmooth_solve::contact::splitting::Nsgs;
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limit, Solvable, Solve, SolveError, Status, solve};
@@ -20,9 +20,9 @@ fn goes_through<P: Registered + OfAny + Solvable>(problem: &P) {
     assert_eq!(judged.measure, answer.verdict.measure, "the judge alone says the same");
     assert_eq!(judged.velocity, answer.verdict.velocity);
 
-    let any: AnyProblem = problem.clone().into_any();
+    let any: AnyProblem = problem.clone().into();
     let other = solve(&any).unwrap();
-    assert_eq!(other.point, answer.point.clone().into_any());
+    assert_eq!(other.point, answer.point.clone().into());
     assert_eq!((other.iterations, other.status), (answer.iterations, answer.status));
     assert_eq!(other.verdict.velocity, answer.verdict.velocity);
     assert_eq!(other.verdict.statuses.len(), answer.verdict.statuses.len());

@@ -92,8 +92,7 @@ impl StoredPoint {
 
     /// A point of a global problem (of its lengths), with its relative velocity.
     pub fn from_global<const D: usize>(problem: &FrictionGlobal<D>, point: &GlobalPoint) -> Self {
-        let mut u = vec![0.0; problem.w.len()];
-        problem.velocity_into(&point.v, &mut u);
+        let u = problem.partner(point);
         Self { v: some(&point.v), u, r: point.r.clone(), lambda: some(&point.lambda) }
     }
 

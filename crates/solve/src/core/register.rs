@@ -90,6 +90,19 @@ pub struct Named {
     pub variants: &'static [&'static str],
 }
 
+impl Named {
+    /// The description of the method, which answers the problem that it is given.
+    pub(crate) const fn about(
+        self,
+        family: &'static str,
+        needs: &'static [&'static str],
+        settings: fn() -> Vec<Setting>,
+    ) -> About {
+        let Self { name, summary, cites, variants } = self;
+        About { name, family, solves: Solves::Law, summary, needs, cites, variants, settings }
+    }
+}
+
 /// How a solver is made from its settings.
 type Make<T> = Box<dyn Fn(&SettingsMap) -> Result<T, String>>;
 
@@ -205,26 +218,37 @@ pub trait Registered: Problem<Point: 'static> + Clone + Send + Sync + Sized + 's
     }
 }
 
+/// Where a name leads from problems of type `P`: to a solver, or behind a prefix with the rest of the name.
+enum Way<'a, P: Problem> {
+    Here(Entry<P>),
+    Behind(Edge<P>, &'a str),
+}
+
+fn way<P: Registered>(name: &str) -> Option<Way<'_, P>> {
+    match name.split_once('/') {
+        Some((prefix, rest)) => {
+            let edge = P::edges().into_iter().find(|edge| edge.prefix.name == prefix)?;
+            Some(Way::Behind(edge, rest))
+        }
+        None => P::solvers().into_iter().find(|entry| entry.about.name == name).map(Way::Here),
+    }
+}
+
 /// The solver behind a name.
 fn solver<P: Registered>(name: &str, settings: &SettingsMap) -> Made<Boxed<P>> {
-    if let Some((prefix, name)) = name.split_once('/') {
-        let edge = P::edges().into_iter().find(|edge| edge.prefix.name == prefix)?;
-        return (edge.solver)(name, settings);
-    }
-    match P::solvers().into_iter().find(|entry| entry.about.name == name)?.make {
-        Maker::Solver(make) => Some(make(settings)),
-        Maker::Session(_) => None,
+    match way::<P>(name)? {
+        Way::Behind(edge, rest) => (edge.solver)(rest, settings),
+        Way::Here(Entry { make: Maker::Solver(make), .. }) => Some(make(settings)),
+        Way::Here(Entry { make: Maker::Session(_), .. }) => None,
     }
 }
 
 /// What is behind a name, and what its answers are solutions of.
 fn describe<P: Registered>(name: &str) -> Option<(&'static About, Solves)> {
-    if let Some((prefix, name)) = name.split_once('/') {
-        let edge = P::edges().into_iter().find(|edge| edge.prefix.name == prefix)?;
-        return (edge.describe)(name);
+    match way::<P>(name)? {
+        Way::Behind(edge, rest) => (edge.describe)(rest),
+        Way::Here(Entry { about, .. }) => Some((about, about.solves)),
     }
-    let about = P::solvers().into_iter().find(|entry| entry.about.name == name)?.about;
-    Some((about, about.solves))
 }
 
 /// The names of solvers that a prefix can lead to.
@@ -284,11 +308,9 @@ pub(crate) fn bare<P: Registered>(
     name: &str,
     settings: &SettingsMap,
 ) -> Result<Box<dyn Session<P>>, SolveError> {
-    let entry = P::solvers().into_iter().find(|entry| entry.about.name == name);
-    let made = match entry.map(|entry| entry.make) {
-        Some(Maker::Session(make)) => Some(make(settings)),
-        Some(Maker::Solver(make)) => Some(make(settings).map(driven)),
-        None => solver::<P>(name, settings).map(|made| made.map(driven)),
+    let made = match way::<P>(name) {
+        Some(Way::Here(Entry { make: Maker::Session(make), .. })) => Some(make(settings)),
+        _ => solver::<P>(name, settings).map(|made| made.map(driven)),
     };
     made.ok_or_else(|| SolveError::UnknownSolver {
         name: name.into(),

@@ -45,7 +45,7 @@ use serde::{Deserialize, Serialize};
 use crate::complementarity::form::Rowwise;
 use crate::complementarity::functions::{self, Min, NewtonFunction, ScalarFunction, Slope};
 use crate::core::line_search::{LineSearch, Search};
-use crate::core::register::{About, Described, Solves};
+use crate::core::register::{About, Described};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
@@ -83,16 +83,8 @@ impl<F: NewtonFunction> Settings for Newton<F> {
 }
 
 impl<F: NewtonFunction> Described for Newton<F> {
-    const ABOUT: &'static About = &About {
-        name: F::METHOD.name,
-        family: "newton",
-        solves: Solves::Law,
-        summary: F::METHOD.summary,
-        needs: &["the entries of M"],
-        cites: F::METHOD.cites,
-        variants: F::METHOD.variants,
-        settings: described::<Self>,
-    };
+    const ABOUT: &'static About =
+        &F::METHOD.about("newton", &["the entries of M"], described::<Self>);
 }
 
 /// Steps without a new low after which the method starts again elsewhere.

@@ -32,7 +32,7 @@ use crate::contact::form::{Access, Linearised, OnContacts};
 use crate::contact::law::cfun::{ContactFunction, Law, Linearisation, NewtonFunction};
 use crate::contact::parts::Sweep;
 use crate::core::line_search::{LineSearch, Search};
-use crate::core::register::{About, Described, Solves};
+use crate::core::register::{About, Described};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
@@ -94,16 +94,7 @@ impl<F: NewtonFunction> Settings for Newton<F> {
 }
 
 impl<F: NewtonFunction> Described for Newton<F> {
-    const ABOUT: &'static About = &About {
-        name: F::METHOD.name,
-        family: "newton",
-        solves: Solves::Law,
-        summary: F::METHOD.summary,
-        needs: &[],
-        cites: F::METHOD.cites,
-        variants: F::METHOD.variants,
-        settings: described::<Self>,
-    };
+    const ABOUT: &'static About = &F::METHOD.about("newton", &[], described::<Self>);
 }
 
 /// The most sweeps that may be asked for in one step: time limits act between steps.

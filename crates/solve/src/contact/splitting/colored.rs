@@ -23,12 +23,9 @@ use serde::{Deserialize, Serialize};
 
 use super::circles::Circles;
 use super::contact::{Answer, Contact, NEGLIGIBLE};
-use super::nsgs::LocalChoice;
+use super::nsgs::{LocalChoice, with_local};
 use crate::contact::form::{Access, Concurrent};
-use crate::contact::law::cfun::Disk;
-use crate::contact::law::local::{
-    Exact, LocalSolver, Newton, Projection, ProjectionIterated, Quartic,
-};
+use crate::contact::law::local::LocalSolver;
 use crate::contact::splitting::coloring::Coloring;
 use crate::contact::splitting::team::Team;
 use crate::core::register::{About, Described, Solves};
@@ -113,21 +110,7 @@ pub struct ColoredSweeps<L, const D: usize> {
 impl Colored {
     /// The method with its local solver known by type.
     pub(crate) fn boxed<P: Concurrent<D> + 'static, const D: usize>(self) -> Boxed<P> {
-        fn with<P, L, const D: usize>(settings: Colored, local: L) -> Boxed<P>
-        where
-            P: Concurrent<D> + 'static,
-            L: LocalSolver<D> + 'static,
-        {
-            Boxed::new(ColoredSweeps { settings, local })
-        }
-        match self.local {
-            LocalChoice::Exact => with(self, Exact),
-            LocalChoice::Quartic => with(self, Quartic),
-            LocalChoice::NewtonAc => with(self, Newton::new(Disk::AlartCurnier)),
-            LocalChoice::NewtonJm => with(self, Newton::new(Disk::JeanMoreau)),
-            LocalChoice::Projection => with(self, Projection::default()),
-            LocalChoice::ProjectionIterated => with(self, ProjectionIterated::default()),
-        }
+        with_local!(self.local, local => Boxed::new(ColoredSweeps { settings: self, local }))
     }
 }
 
@@ -363,6 +346,7 @@ mod tests {
     use nonsmooth_problem::planted::Planted;
 
     use super::*;
+    use crate::contact::law::local::Exact;
     use crate::contact::splitting::{Nsgs, Sweeps};
     use crate::{Driver, Limits, Session};
 

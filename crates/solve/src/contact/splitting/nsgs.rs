@@ -22,11 +22,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::form::{Access, Blockwise};
-use crate::contact::law::cfun::Disk;
 use crate::contact::law::cone;
-use crate::contact::law::local::{
-    Exact, LocalSolver, Newton, Projection, ProjectionIterated, Quartic,
-};
+use crate::contact::law::local::LocalSolver;
 use crate::contact::parts::Accelerator;
 use crate::contact::splitting::ordering::{Order, Ordering};
 use crate::core::register::{About, Described, Solves};
@@ -186,24 +183,45 @@ pub struct Sweeps<L, const D: usize> {
     pub local: L,
 }
 
+/// Evaluates an expression with the local solver of a [`LocalChoice`], known by type: the one list of them.
+macro_rules! with_local {
+    ($choice:expr, $local:ident => $body:expr) => {{
+        use $crate::contact::law::cfun::Disk;
+        use $crate::contact::law::local::{Exact, Newton, Projection, ProjectionIterated, Quartic};
+        match $choice {
+            LocalChoice::Exact => {
+                let $local = Exact;
+                $body
+            }
+            LocalChoice::Quartic => {
+                let $local = Quartic;
+                $body
+            }
+            LocalChoice::NewtonAc => {
+                let $local = Newton::new(Disk::AlartCurnier);
+                $body
+            }
+            LocalChoice::NewtonJm => {
+                let $local = Newton::new(Disk::JeanMoreau);
+                $body
+            }
+            LocalChoice::Projection => {
+                let $local = Projection::default();
+                $body
+            }
+            LocalChoice::ProjectionIterated => {
+                let $local = ProjectionIterated::default();
+                $body
+            }
+        }
+    }};
+}
+pub(super) use with_local;
+
 impl Nsgs {
     /// The method with its local solver known by type.
     pub(crate) fn boxed<P: Blockwise<D> + 'static, const D: usize>(self) -> Boxed<P> {
-        fn with<P, L, const D: usize>(settings: Nsgs, local: L) -> Boxed<P>
-        where
-            P: Blockwise<D> + 'static,
-            L: LocalSolver<D> + Clone + 'static,
-        {
-            Boxed::new(Sweeps { settings, local })
-        }
-        match self.local {
-            LocalChoice::Exact => with(self, Exact),
-            LocalChoice::Quartic => with(self, Quartic),
-            LocalChoice::NewtonAc => with(self, Newton::new(Disk::AlartCurnier)),
-            LocalChoice::NewtonJm => with(self, Newton::new(Disk::JeanMoreau)),
-            LocalChoice::Projection => with(self, Projection::default()),
-            LocalChoice::ProjectionIterated => with(self, ProjectionIterated::default()),
-        }
+        with_local!(self.local, local => Boxed::new(Sweeps { settings: self, local }))
     }
 }
 
