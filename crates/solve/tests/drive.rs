@@ -16,7 +16,7 @@ type P = FrictionLocal<3>;
 /// A solver that does whatever a test says.
 struct Scripted<F>(F);
 
-impl<F: Fn(usize, &mut LocalPoint) -> Step + Send> Solver<P> for Scripted<F> {
+impl<F: Fn(usize, &mut LocalPoint) -> Step + Send + Sync> Solver<P> for Scripted<F> {
     type Work = usize;
     fn work(&self, _: &P) -> Result<usize, SolveError> {
         Ok(0)

@@ -38,7 +38,7 @@ pub struct Slope {
 }
 
 /// A complementarity function of two numbers.
-pub trait ScalarFunction: Copy + Send {
+pub trait ScalarFunction: Copy + Send + Sync {
     /// ψ(z, w) and an element of its B-subdifferential.
     fn at(&self, z: f64, w: f64) -> Slope;
 

@@ -1,6 +1,6 @@
 //! A solver whose type is forgotten.
 
-use std::any::Any;
+use std::sync::Arc;
 
 use nonsmooth_problem::Problem;
 
@@ -10,7 +10,7 @@ use crate::core::trace::Trace;
 
 /// A solver of problems of type `P` whose type, and that of its workspace, are forgotten: what the registry makes, and what reformulations and outer loops
 /// have inside. Itself a solver. One virtual call a step; what a step does inside, contact by contact, is compiled for the solver's type.
-pub struct Boxed<P: Problem>(Box<dyn Erased<P>>);
+pub struct Boxed<P: Problem>(Arc<dyn Erased<P>>);
 
 impl<P: Problem> Boxed<P> {
     /// Forgets the type of `solver`.
@@ -18,63 +18,39 @@ impl<P: Problem> Boxed<P> {
     where
         S: Solver<P, Work: 'static> + 'static,
     {
-        Self(Box::new(solver))
+        Self(Arc::new(solver))
     }
 }
 
-/// [`Solver`] with a workspace of any type.
-trait Erased<P: Problem>: Send {
-    fn work(&self, problem: &P) -> Result<Box<dyn Any + Send>, SolveError>;
-    fn refill(&self, problem: &P, work: &mut dyn Any) -> Result<(), SolveError>;
-    fn aim(&self, tolerance: f64, work: &mut dyn Any);
-    fn start(&self, problem: &P, point: &mut P::Point, work: &mut dyn Any);
-    fn step(&self, problem: &P, point: &mut P::Point, work: &mut dyn Any) -> Step;
-    fn publish(&self, problem: &P, point: &mut P::Point, work: &mut dyn Any);
-    fn record(&self, on: bool, work: &mut dyn Any);
-    fn trace(&self, work: &dyn Any) -> Trace;
-    fn account(&self, work: &dyn Any) -> Vec<String>;
+/// What a solver is asked before there is a workspace.
+trait Erased<P: Problem>: Send + Sync {
+    fn work(self: Arc<Self>, problem: &P) -> Result<Box<dyn AtWork<P>>, SolveError>;
     fn latest(&self) -> bool;
     fn check_every(&self) -> usize;
 }
 
-/// Why a workspace is of the solver's own type.
-const OWN: &str = "a boxed solver is given the workspace that it made";
+/// A solver with its workspace. One object, so that a step need not ask whose workspace it was given.
+trait AtWork<P: Problem>: Send {
+    fn refill(&mut self, problem: &P) -> Result<(), SolveError>;
+    fn aim(&mut self, tolerance: f64);
+    fn start(&mut self, problem: &P, point: &mut P::Point);
+    fn step(&mut self, problem: &P, point: &mut P::Point) -> Step;
+    fn publish(&mut self, problem: &P, point: &mut P::Point);
+    fn record(&mut self, on: bool);
+    fn trace(&self) -> Trace;
+    fn account(&self) -> Vec<String>;
+}
 
-impl<P: Problem, S: Solver<P, Work: 'static>> Erased<P> for S {
-    fn work(&self, problem: &P) -> Result<Box<dyn Any + Send>, SolveError> {
-        Ok(Box::new(Solver::work(self, problem)?))
-    }
+/// What [`AtWork`] is of a solver S.
+struct Working<S, W> {
+    solver: Arc<S>,
+    work: W,
+}
 
-    fn refill(&self, problem: &P, work: &mut dyn Any) -> Result<(), SolveError> {
-        Solver::refill(self, problem, work.downcast_mut().expect(OWN))
-    }
-
-    fn aim(&self, tolerance: f64, work: &mut dyn Any) {
-        Solver::aim(self, tolerance, work.downcast_mut().expect(OWN));
-    }
-
-    fn start(&self, problem: &P, point: &mut P::Point, work: &mut dyn Any) {
-        Solver::start(self, problem, point, work.downcast_mut().expect(OWN));
-    }
-
-    fn step(&self, problem: &P, point: &mut P::Point, work: &mut dyn Any) -> Step {
-        Solver::step(self, problem, point, work.downcast_mut().expect(OWN))
-    }
-
-    fn publish(&self, problem: &P, point: &mut P::Point, work: &mut dyn Any) {
-        Solver::publish(self, problem, point, work.downcast_mut().expect(OWN));
-    }
-
-    fn record(&self, on: bool, work: &mut dyn Any) {
-        Solver::record(self, on, work.downcast_mut().expect(OWN));
-    }
-
-    fn trace(&self, work: &dyn Any) -> Trace {
-        Solver::trace(self, work.downcast_ref().expect(OWN))
-    }
-
-    fn account(&self, work: &dyn Any) -> Vec<String> {
-        Solver::account(self, work.downcast_ref().expect(OWN))
+impl<P: Problem, S: Solver<P, Work: 'static> + 'static> Erased<P> for S {
+    fn work(self: Arc<Self>, problem: &P) -> Result<Box<dyn AtWork<P>>, SolveError> {
+        let work = Solver::work(&*self, problem)?;
+        Ok(Box::new(Working { solver: self, work }))
     }
 
     fn latest(&self) -> bool {
@@ -86,43 +62,80 @@ impl<P: Problem, S: Solver<P, Work: 'static>> Erased<P> for S {
     }
 }
 
+impl<P: Problem, S: Solver<P>> AtWork<P> for Working<S, S::Work> {
+    fn refill(&mut self, problem: &P) -> Result<(), SolveError> {
+        self.solver.refill(problem, &mut self.work)
+    }
+
+    fn aim(&mut self, tolerance: f64) {
+        self.solver.aim(tolerance, &mut self.work);
+    }
+
+    fn start(&mut self, problem: &P, point: &mut P::Point) {
+        self.solver.start(problem, point, &mut self.work);
+    }
+
+    fn step(&mut self, problem: &P, point: &mut P::Point) -> Step {
+        self.solver.step(problem, point, &mut self.work)
+    }
+
+    fn publish(&mut self, problem: &P, point: &mut P::Point) {
+        self.solver.publish(problem, point, &mut self.work);
+    }
+
+    fn record(&mut self, on: bool) {
+        self.solver.record(on, &mut self.work);
+    }
+
+    fn trace(&self) -> Trace {
+        self.solver.trace(&self.work)
+    }
+
+    fn account(&self) -> Vec<String> {
+        self.solver.account(&self.work)
+    }
+}
+
+/// The workspace of a [`Boxed`] solver.
+pub struct BoxedWork<P: Problem>(Box<dyn AtWork<P>>);
+
 impl<P: Problem> Solver<P> for Boxed<P> {
-    type Work = Box<dyn Any + Send>;
+    type Work = BoxedWork<P>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
-        self.0.work(problem)
+        self.0.clone().work(problem).map(BoxedWork)
     }
 
     fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
-        self.0.refill(problem, &mut **work)
+        work.0.refill(problem)
     }
 
     fn aim(&self, tolerance: f64, work: &mut Self::Work) {
-        self.0.aim(tolerance, &mut **work);
+        work.0.aim(tolerance);
     }
 
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
-        self.0.start(problem, point, &mut **work);
+        work.0.start(problem, point);
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
-        self.0.step(problem, point, &mut **work)
+        work.0.step(problem, point)
     }
 
     fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
-        self.0.publish(problem, point, &mut **work);
+        work.0.publish(problem, point);
     }
 
     fn record(&self, on: bool, work: &mut Self::Work) {
-        self.0.record(on, &mut **work);
+        work.0.record(on);
     }
 
     fn trace(&self, work: &Self::Work) -> Trace {
-        self.0.trace(&**work)
+        work.0.trace()
     }
 
     fn account(&self, work: &Self::Work) -> Vec<String> {
-        self.0.account(&**work)
+        work.0.account()
     }
 
     fn latest(&self) -> bool {

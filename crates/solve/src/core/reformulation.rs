@@ -6,7 +6,7 @@ use nonsmooth_problem::check::Certificate;
 use crate::SolveError;
 
 /// An edge between two kinds of problem that can be walked both ways.
-pub trait Reformulation<P: Problem>: Send {
+pub trait Reformulation<P: Problem>: Send + Sync {
     /// The other kind of problem.
     type To: Problem + Send;
     /// What the way back needs.

@@ -17,7 +17,7 @@ use crate::core::trace::Trace;
 /// work ── start ──┬─ step ─┬─ publish ─ (the judge) ─┐
 ///                 └────────┴────────────────────────┘
 /// ```
-pub trait Solver<P: Problem>: Send {
+pub trait Solver<P: Problem>: Send + Sync {
     /// Everything that the method keeps between steps; survives between solves.
     type Work: Send;
 

@@ -23,7 +23,7 @@ use crate::contact::form::Linear;
 use crate::{SolveError, Solver, Step};
 
 /// What tells one projection method from another; [`Projected`] makes a solver of it.
-pub trait Method: Send {
+pub trait Method: Send + Sync {
     /// Prepares for the first step: `r` is the starting point.
     fn begin<P: Linear<D>, const D: usize>(&self, problem: &P, r: &[f64], field: &mut Field<P, D>);
 

@@ -72,7 +72,7 @@ impl<const D: usize> Linearisation<D> {
 
 /// A complementarity function of one contact: `Φ(u, r) = 0` exactly where `K* ∋ u + mu‖u_T‖e_N ⟂ r ∈ K`
 /// (for `smoothing = 0`).
-pub trait ContactFunction<const D: usize>: Send {
+pub trait ContactFunction<const D: usize>: Send + Sync {
     /// Whether the function has a smoothing parameter.
     const SMOOTHED: bool = false;
 
@@ -81,7 +81,7 @@ pub trait ContactFunction<const D: usize>: Send {
 }
 
 /// A function that has a Newton method. The struct is its hyperparameters.
-pub trait NewtonFunction: Settings + Copy + Send + 'static {
+pub trait NewtonFunction: Settings + Copy + Send + Sync + 'static {
     /// The method.
     const METHOD: Named;
 }
