@@ -209,7 +209,7 @@ impl Inverse {
         self.place.len()
     }
 
-    /// A itself.
+    /// A as it was given.
     pub fn matrix(&self) -> &Csc {
         &self.matrix
     }

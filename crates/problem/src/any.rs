@@ -16,9 +16,9 @@ use crate::{
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnyProblem {
-    /// Frictional contact.
+    /// Contacts, local or global, in the plane or in space.
     Friction(Friction),
-    /// Linear complementarity.
+    /// LCP, MLCP, horizontal or box LCP.
     Complementarity(Complementarity),
 }
 
@@ -54,9 +54,9 @@ pub struct AnyGauge(Box<dyn std::any::Any + Send>);
 /// What a contact or a row does.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum AnyStatus {
-    /// A contact.
+    /// Of a contact: open, sticking or slipping.
     Contact(ContactStatus),
-    /// A row.
+    /// Of a row: at which of its bounds, between them, or an equality.
     Row(RowStatus),
 }
 
@@ -64,9 +64,9 @@ pub enum AnyStatus {
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 #[serde(untagged)]
 pub enum AnyCounts {
-    /// Contacts.
+    /// Of a problem of frictional contact.
     Contacts(StatusCounts),
-    /// Rows.
+    /// Of a linear complementarity problem.
     Rows(RowCounts),
 }
 

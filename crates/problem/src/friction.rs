@@ -34,7 +34,7 @@ impl Friction {
         with_friction!(self, p => p.kind())
     }
 
-    /// The number of contacts.
+    /// nc.
     pub fn contacts(&self) -> usize {
         with_friction!(self, p => p.contacts())
     }
@@ -44,7 +44,7 @@ impl Friction {
         with_friction!(self, p => p.unknowns())
     }
 
-    /// The coefficients of friction.
+    /// mu, nc.
     pub fn mu(&self) -> &[f64] {
         with_friction!(self, p => &p.mu)
     }

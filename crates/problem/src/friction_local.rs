@@ -78,7 +78,7 @@ impl<const D: usize> FrictionLocal<D> {
         Ok(problem)
     }
 
-    /// The number of contacts.
+    /// nc.
     pub fn contacts(&self) -> usize {
         self.mu.len()
     }

@@ -80,7 +80,7 @@ pub trait Problem {
     /// The number of scalar unknowns that a solver works on.
     fn unknowns(&self) -> usize;
 
-    /// The zero point.
+    /// The point with all parts zero, of the lengths that the problem asks for.
     fn origin(&self) -> Self::Point;
 
     /// A caller's point, checked: every part has the right length and holds finite numbers.

@@ -40,7 +40,7 @@ pub enum Certificate {
     },
     /// The same in exact numbers, for any kind of problem: vectors over the rows of its [`ConeSystem`](super::ConeSystem).
     Separating {
-        /// The vectors.
+        /// y, by rows of the problem's cone system.
         vectors: Vec<ExactVector>,
     },
 }

@@ -48,7 +48,7 @@ pub enum Existence {
     NearlyProved {
         /// As above, in doubles.
         motion: Vec<f64>,
-        /// As above.
+        /// The margin of [`Self::Proved`], in doubles.
         margin: f64,
         /// What has to be added to the diagonal of M or W, in units of each entry, for the dynamics to be monotone: rounding at most,
         /// or the digits with which W was stored. Zero where only the motion is not exact.

@@ -770,7 +770,7 @@ pub struct RowCounts {
     pub lower: usize,
     /// Variables at their upper bound.
     pub upper: usize,
-    /// Equalities.
+    /// Rows without a bound, whose w must be zero.
     pub equalities: usize,
     /// Pairs, counted above as well, that are zero on both sides within the tolerance.
     pub degenerate: usize,

@@ -13,7 +13,7 @@ use nonsmooth_linalg::small;
 /// Everything that the judge says of a point.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict<Status = ContactStatus, Counts = StatusCounts> {
-    /// The residuals.
+    /// The residuals, each with its unit, recomputed from the data.
     pub measure: Measure,
     /// Whether they pass at the tolerance asked for.
     pub solved: bool,

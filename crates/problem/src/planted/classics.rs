@@ -12,12 +12,12 @@
 use crate::Lcp;
 use nonsmooth_linalg::Dense;
 
-/// An example.
+/// An LCP of the literature, with what is known of its solutions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Classic {
-    /// Its name.
+    /// The name under which tests and messages speak of it.
     pub name: &'static str,
-    /// The problem.
+    /// M and q as published.
     pub problem: Lcp,
     /// What is known of its solutions.
     pub known: Known,

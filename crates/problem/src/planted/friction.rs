@@ -13,7 +13,7 @@ use crate::{
 };
 use nonsmooth_linalg::{Csc, Delassus, Inverse};
 
-/// What to plant.
+/// The sizes and the state of a contact problem with a known solution.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planted {
     /// The number of contacts nc, at least 1.

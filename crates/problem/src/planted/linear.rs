@@ -37,7 +37,7 @@ pub enum PlantedClass {
 }
 
 impl PlantedClass {
-    /// All of them.
+    /// Every class, for tests that go through them.
     pub const ALL: [Self; 10] = [
         Self::Spd,
         Self::MMatrix,
@@ -71,7 +71,7 @@ impl PlantedClass {
 pub struct PlantedLcp {
     /// The number of variables, at least 2; rounded up to a multiple of 6 for [`PlantedClass::Contact`].
     pub n: usize,
-    /// The class of M.
+    /// The class that M is made to be in.
     pub class: PlantedClass,
     /// The share of entries that are not zero, about; 1 gives a dense matrix. A row has at least a few.
     pub density: f64,
@@ -587,7 +587,7 @@ pub enum PlantedBlocks {
 }
 
 impl PlantedBlocks {
-    /// All of them.
+    /// Every shape of the blocks, for tests that go through them.
     pub const ALL: [Self; 3] = [Self::Regular, Self::SingularA, Self::NoB];
 }
 

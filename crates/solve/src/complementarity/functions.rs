@@ -55,7 +55,7 @@ pub trait NewtonFunction: ScalarFunction + Settings + 'static {
     type Merit: ScalarFunction + 'static;
     /// Whether steps on `min(z, w)` come first.
     const MINIMUM_FIRST: bool = false;
-    /// The method.
+    /// What the registry says of the method that has this function: name, summary, citations.
     const METHOD: Named;
 
     /// The merit's function.
@@ -110,7 +110,7 @@ pub enum Side {
 pub struct MinRho {
     /// ρ.
     pub rho: f64,
-    /// Where it stands.
+    /// The argument of the minimum that ρ multiplies.
     pub side: Side,
 }
 

@@ -34,7 +34,6 @@ fn bounded<P: Bounded + 'static>() -> Vec<Entry<P>> {
     ]
 }
 
-/// The pivoting methods.
 fn pivoting<P: Complementary + 'static>() -> Vec<Entry<P>> {
     vec![
         Entry::of::<Lemke>(),

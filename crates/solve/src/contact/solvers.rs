@@ -29,7 +29,6 @@ where
     Entry::new(|method: S| Boxed::new(OnContacts(method)))
 }
 
-/// A projection method.
 fn projected<P, M, const D: usize>() -> Entry<P>
 where
     P: Linear<D> + 'static,

@@ -277,7 +277,7 @@ pub struct Progress {
 
 /// Who follows a solve from outside.
 pub trait Observer<P: Problem> {
-    /// Called after every step.
+    /// Called after every step, judged or not.
     fn step(&mut self, progress: &Progress);
 
     /// Whether [`best`](Self::best) is to be called, which costs a judgement of the start.
@@ -427,7 +427,7 @@ impl<P: Problem, S: Solver<P>> Driver<P, S> {
         Self { solver, gauge: None, kept: None, history: History::new() }
     }
 
-    /// The solver.
+    /// The solver that is driven, with its settings.
     pub fn solver(&self) -> &S {
         &self.solver
     }

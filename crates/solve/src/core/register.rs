@@ -16,7 +16,7 @@ use crate::core::solver::Solver;
 /// The solver that is used when none is named.
 pub const DEFAULT: &str = "auto";
 
-/// A solver, described.
+/// What is known of a solver without a problem: lists, help and documentation are made of it.
 #[derive(Debug, Serialize)]
 pub struct About {
     /// The name by which it is asked for.
@@ -25,7 +25,7 @@ pub struct About {
     pub family: &'static str,
     /// What its answers are solutions of.
     pub solves: Solves,
-    /// One line.
+    /// One line, without the name.
     pub summary: &'static str,
     /// What it needs of a problem, in words; empty where it takes any.
     pub needs: &'static [&'static str],
@@ -60,7 +60,7 @@ fn settings_now<S: serde::Serializer>(
 pub struct Prefix {
     /// The name before the slash.
     pub name: &'static str,
-    /// One line.
+    /// One line, without the name.
     pub summary: &'static str,
     /// The kinds of problem that it takes.
     pub from: &'static [Kind],
@@ -82,7 +82,7 @@ pub trait Described: Settings {
 pub struct Named {
     /// The method's name.
     pub name: &'static str,
-    /// One line.
+    /// One line, without the name.
     pub summary: &'static str,
     /// Keys of `docs/refs.bib`.
     pub cites: &'static [&'static str],

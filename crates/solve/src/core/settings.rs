@@ -26,9 +26,9 @@ impl Settings for NoSettings {}
 /// One setting, as help texts show it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Setting {
-    /// The key.
+    /// As it stands before the `=`.
     pub key: String,
-    /// The default value.
+    /// Its value where the user says nothing.
     pub default: Value,
     /// The names it may take, where it is a choice.
     pub choices: Vec<String>,

@@ -38,7 +38,7 @@ pub trait Solver<P: Problem>: Send + Sync {
     /// Takes `point` as the starting point. Called once per solve, after `work` or `refill`.
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work);
 
-    /// One iteration.
+    /// One iteration: improves `point` (or the iterate in `work`) and says how far off it is.
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step;
 
     /// Brings `point` up to date with `work`. Called before the point is judged or returned; methods whose
@@ -77,7 +77,7 @@ pub enum Step {
     /// Go on. `estimate` is the method's own cheap estimate of the relative residual, up to a factor that the
     /// driver calibrates at each judgement; NaN where it has none.
     Continue {
-        /// The estimate.
+        /// Of the relative residual, by the method's own means; the loop calibrates it by the judge.
         estimate: f64,
     },
     /// The method has finished and cannot improve the point.

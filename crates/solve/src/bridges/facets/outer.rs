@@ -74,7 +74,6 @@ impl<const D: usize> OuterMemo<D> {
         self.free[self.free.len() - 1]
     }
 
-    /// The number of variables.
     fn len(&self) -> usize {
         self.tangents() + self.pairs[self.pairs.len() - 1]
     }

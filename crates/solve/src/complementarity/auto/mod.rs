@@ -58,7 +58,7 @@ pub trait Planned: Registered {
 }
 
 impl LinearAuto {
-    /// The session.
+    /// A session without history: the plan is made of the first problem that it meets.
     pub fn session<P: Planned>(self) -> Portfolio<P> {
         Portfolio::new(move |problem: &P| problem.plan(&self))
     }

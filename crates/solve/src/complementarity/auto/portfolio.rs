@@ -17,7 +17,7 @@ use crate::{Limit, Limits, Observer, Outcome, Progress, Sample, Session, SolveEr
 pub struct Candidate {
     /// The name in the registry.
     pub name: &'static str,
-    /// Its settings.
+    /// What departs from its defaults.
     pub settings: SettingsMap,
     /// At most this many iterations, before the next one has its turn.
     pub iterations: usize,

@@ -19,7 +19,7 @@ pub struct Rows<'a> {
     pub matrix: &'a Matrix,
     /// q, one entry a row.
     pub q: &'a [f64],
-    /// The number of equalities.
+    /// How many rows are equalities: the first ones, whose variables are free.
     pub equalities: usize,
     /// The number of variables that belong to no row; they come first, and are free.
     pub free: usize,

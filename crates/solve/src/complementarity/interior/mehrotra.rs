@@ -24,7 +24,7 @@ use crate::core::settings::{Settings, described};
 use crate::core::trace::Trace;
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters.
+/// The neighbourhood, the size of the start, and when the method gives up.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MehrotraType {
@@ -65,7 +65,7 @@ impl Described for MehrotraType {
     };
 }
 
-/// The workspace.
+/// The iterate with its Newton system; a second problem of the same shape reuses both.
 pub struct MehrotraWork {
     path: PairPath,
 }

@@ -27,7 +27,7 @@ use crate::core::settings::{Settings, described};
 use crate::core::trace::Trace;
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters.
+/// Predictor and corrector by turns, between two narrow neighbourhoods of the central path.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MizunoToddYe {
@@ -68,7 +68,7 @@ impl Described for MizunoToddYe {
     };
 }
 
-/// The workspace.
+/// The iterate with its Newton system; a second problem of the same shape reuses both.
 pub struct MtyWork {
     path: PairPath,
 }

@@ -11,16 +11,16 @@ use crate::complementarity::form::Rows;
 /// Sweeps of the scaling; each halves the logarithm of what is left to do.
 const SWEEPS: usize = 8;
 
-/// The scaled problem.
+/// M̂, q̂ and the bounds of ẑ, with the powers of two that lead back.
 #[derive(Debug, Clone)]
 pub struct Scaled {
     /// M̂. Sparse: with a stored entry wherever a row meets its own variable.
     pub matrix: Matrix,
     /// q̂.
     pub q: Vec<f64>,
-    /// The bounds of ẑ.
+    /// Lower bounds of ẑ; −∞ where there is none.
     pub lower: Vec<f64>,
-    /// The bounds of ẑ.
+    /// Upper bounds of ẑ; ∞ where there is none.
     pub upper: Vec<f64>,
     /// The first rows, which are equalities.
     pub equalities: usize,
@@ -153,12 +153,12 @@ impl Scaled {
         (self.row, self.unit) = (row, column);
     }
 
-    /// The number of rows.
+    /// Rows of M̂: as many as variables, except in rectangular MLCP.
     pub fn nrows(&self) -> usize {
         self.q.len()
     }
 
-    /// The number of variables.
+    /// Entries of ẑ, without multipliers or slacks.
     pub fn dim(&self) -> usize {
         self.unit.len()
     }

@@ -116,7 +116,7 @@ pub enum Polished {
     Exhausted,
 }
 
-/// The tableau.
+/// q̄ and t of the present basis, with M and q to compute them anew from.
 #[derive(Debug, Clone, Default)]
 pub struct Tableau {
     n: usize,
@@ -133,7 +133,6 @@ pub struct Tableau {
     q: Vec<f64>,
     /// The size of the terms that q̄ came from.
     size: Vec<f64>,
-    /// Whether z_i is basic.
     basic: Vec<bool>,
     /// Equations that say nothing; their free variables stay zero.
     dropped: Vec<bool>,
@@ -342,7 +341,7 @@ impl Tableau {
         Ok(())
     }
 
-    /// The number of variables.
+    /// n: pairs and free variables.
     pub fn dim(&self) -> usize {
         self.n
     }

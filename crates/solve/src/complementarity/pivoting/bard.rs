@@ -22,7 +22,7 @@ use crate::core::settings::{Settings, described};
 use crate::core::trace::Trace;
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters of Bard's method.
+/// The most negative variable leaves: few pivots, but nothing keeps it from cycling by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Bard {
@@ -54,7 +54,7 @@ impl Described for Bard {
     };
 }
 
-/// The workspace.
+/// The tableau, and the bases visited.
 pub struct BardWork {
     tableau: Tableau,
     cycle: Cycle,

@@ -59,7 +59,7 @@ impl Described for BlockPivoting {
 /// Up to this many variables a dense tableau says which pairs a singular A needs in the first basis.
 const MOST_PAIRED: usize = 2000;
 
-/// The workspace.
+/// The principal block of the present basis with its factors, and the best basis seen.
 pub struct BlockWork {
     free: usize,
     /// Powers of two that scale rows and columns.

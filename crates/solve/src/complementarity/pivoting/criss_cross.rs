@@ -46,7 +46,7 @@ impl Described for CrissCross {
     };
 }
 
-/// The workspace.
+/// The tableau, and the bases visited.
 pub struct CrissCrossWork {
     tableau: Tableau,
     cycle: Cycle,

@@ -23,7 +23,7 @@ use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters of enumeration.
+/// How many pairs are taken on, since the cases double with each.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Enumeration {
@@ -64,11 +64,10 @@ impl Described for Enumeration {
     };
 }
 
-/// The workspace.
+/// The cases still open, and one tableau for the case that is looked at.
 pub struct EnumerateWork {
     data: Data,
     refuting: Option<usize>,
-    /// The cases still open.
     open: Vec<Case>,
     separating: Vec<Vec<f64>>,
     started: bool,
@@ -146,7 +145,7 @@ impl<P: Complementary> Solver<P> for Enumeration {
 pub struct Solutions {
     /// Isolated solutions and families, none contained in another.
     pub faces: Vec<Face>,
-    /// Whether these are all.
+    /// True if every case was decided: there are no other solutions.
     pub complete: bool,
 }
 
@@ -166,7 +165,7 @@ pub struct Face {
 }
 
 impl Solutions {
-    /// The isolated solutions.
+    /// Faces of dimension 0.
     pub fn isolated(&self) -> impl Iterator<Item = &Face> {
         self.faces.iter().filter(|face| face.dimension == 0)
     }

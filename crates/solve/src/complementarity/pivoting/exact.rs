@@ -20,7 +20,7 @@ use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters of exact enumeration.
+/// How many pairs are taken on, since the cases double with each.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct EnumerationExact {
@@ -59,7 +59,7 @@ impl Described for EnumerationExact {
 /// What is said where an exact solution, rounded, is none.
 const BEYOND: &str = "there is a solution, found exactly, but it is beyond double precision: rounded, it fails the check";
 
-/// The workspace.
+/// The search in rational numbers, and the solution that it found, rounded once.
 pub struct ExactWork<P: Problem> {
     search: ExactCones,
     pairs: usize,

@@ -47,7 +47,7 @@ impl Described for Keller {
     };
 }
 
-/// The workspace.
+/// The tableau with the values of both variables of each pair, and the bases visited.
 pub struct KellerWork {
     tableau: Tableau,
     cycle: Cycle,

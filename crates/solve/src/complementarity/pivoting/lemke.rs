@@ -71,7 +71,7 @@ pub enum Ties {
 pub enum BasisKind {
     /// The tableau up to 40 variables, beyond as M is stored.
     Auto,
-    /// A dense tableau.
+    /// B⁻¹ itself, with all columns: n² numbers, changed in every pivot.
     Tableau,
     /// LU of the z-block, dense.
     Dense,
@@ -79,7 +79,7 @@ pub enum BasisKind {
     Sparse,
 }
 
-/// The hyperparameters of Lemke's method.
+/// How z0 covers the infeasibility, how ties break, and how the basis is kept.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Lemke {
@@ -172,7 +172,6 @@ const SOLVED: f64 = 1e-9;
 /// How often a path is tried again for reasons of rounding.
 const TRIES: usize = 3;
 
-/// Where the method is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     /// The first basis is to be made: from the caller's point.
@@ -189,7 +188,7 @@ enum Phase {
     Finished,
 }
 
-/// The workspace.
+/// The path with its basis, kept for problems of the same shape.
 pub struct LemkeWork {
     path: Path,
     kind: BasisKind,

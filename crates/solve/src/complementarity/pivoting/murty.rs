@@ -23,7 +23,7 @@ use crate::core::settings::{Settings, described};
 use crate::core::trace::Trace;
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters of Murty's method.
+/// The least index leaves, for which P-matrices guarantee an end.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Murty {
@@ -49,7 +49,7 @@ impl Described for Murty {
     };
 }
 
-/// The workspace.
+/// The tableau, and the bases visited.
 pub struct MurtyWork {
     tableau: Tableau,
     cycle: Cycle,

@@ -18,7 +18,6 @@ pub(super) enum Breaking {
     First,
 }
 
-/// Where the path ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum End {
     /// z0 leaves: Lemke.
@@ -63,7 +62,6 @@ pub(super) struct Path {
     pub pivot_tolerance: f64,
     /// Exchanges between two renewals of the basis.
     pub renew_every: usize,
-    /// The next entering variable.
     driving: Variable,
     /// The basic variables where the path began: the columns of the lexicographic order.
     start: Vec<Variable>,

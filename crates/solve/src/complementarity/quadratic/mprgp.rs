@@ -24,7 +24,7 @@ use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters of MPRGP.
+/// When bounds are dropped, and how long the projected steps are.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mprgp {
@@ -73,7 +73,7 @@ impl Described for Mprgp {
     };
 }
 
-/// The workspace.
+/// The gradient with its free and chopped parts, and the direction with its product.
 #[derive(Debug, Clone, Default)]
 pub struct ProportioningWork {
     /// D.

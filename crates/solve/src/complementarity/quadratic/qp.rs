@@ -27,7 +27,7 @@ use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
-/// Which program is solved.
+/// The objective and the constraints of the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Form {
@@ -39,7 +39,7 @@ pub enum Form {
     Gap,
 }
 
-/// The hyperparameters.
+/// The program that Clarabel gets; what follows it, identification and Newton's method, has no setting.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct QuadraticProgram {
@@ -83,7 +83,7 @@ impl Described for QuadraticProgram {
     };
 }
 
-/// The workspace.
+/// The scaled problem, and the Newton system that finishes the point.
 pub struct QpWork {
     scaled: Scaled,
     newton: Newton,

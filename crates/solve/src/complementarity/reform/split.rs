@@ -26,7 +26,7 @@ use crate::core::settings::NoSettings;
 use crate::{Boxed, Via};
 use nonsmooth_problem::Kind;
 
-/// The split of bounds.
+/// The prefix without settings: what becomes of a variable is decided by its bounds alone.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Split;
 

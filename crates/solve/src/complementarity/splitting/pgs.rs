@@ -17,7 +17,7 @@ use super::rows::{Direction, validate_check};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 
-/// The hyperparameters of projected Gauss–Seidel.
+/// ω is 1, so that only the order of the visits is left to choose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Pgs {

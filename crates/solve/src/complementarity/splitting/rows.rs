@@ -170,7 +170,6 @@ impl Rows {
     }
 }
 
-/// Neither bound is there.
 pub(super) fn is_free(bounds: &Bounds, i: usize) -> bool {
     bounds.lower(i) == f64::NEG_INFINITY && bounds.upper(i) == f64::INFINITY
 }

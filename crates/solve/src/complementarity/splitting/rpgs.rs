@@ -18,7 +18,7 @@ use super::rpsor::Rpsor;
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 
-/// The hyperparameters of RPGS.
+/// [`Rpsor`] without relaxation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rpgs {

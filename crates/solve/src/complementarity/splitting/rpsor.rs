@@ -22,7 +22,7 @@ use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters of RPSOR.
+/// The relaxation of the sweeps, and how strongly the proximal term regularises.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rpsor {
@@ -226,7 +226,6 @@ impl ProximalWork {
         unknown.for_each(|(unit, _)| *unit = mean);
     }
 
-    /// Takes another rho.
     fn regularise(&mut self, system: &System, omega: f64) {
         let Self { rows, signs, unit, rho, step, inner, .. } = self;
         rho.clear();

@@ -24,7 +24,7 @@ use crate::{SolveError, Solver, Step};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Sweep {
-    /// A forward PSOR sweep.
+    /// One sweep in the order of the indices.
     Psor,
     /// One projected step of every variable at once.
     Jacobi,

@@ -118,7 +118,6 @@ pub struct HybridWork<P: Linearised<D>, const D: usize> {
     existence: Option<Existence>,
     /// An exact solution, rounded, that the judge has yet to see.
     exact: Option<P::Point>,
-    /// Enumeration was tried.
     asked: bool,
     /// The interior point was left out.
     passed_by: bool,

@@ -29,7 +29,6 @@ pub(super) fn made<T>(
     slot.get_or_insert_with(make).as_mut().ok()
 }
 
-/// What is there.
 pub(super) fn there<T>(slot: &mut Once<T>) -> Option<&mut T> {
     slot.as_mut().and_then(|made| made.as_mut().ok())
 }

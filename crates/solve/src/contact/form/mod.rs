@@ -54,7 +54,7 @@ pub trait Contacts<const D: usize>: Problem {
     /// A verified certificate that the bilateral constraints contradict each other, if they do.
     fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Impulses>;
 
-    /// The coefficients of friction.
+    /// mu, nc, each ≥ 0.
     fn mu(&self) -> &[f64];
 
     /// The diagonal block `W_cc`.

@@ -13,7 +13,7 @@ use crate::SolveError;
 /// `P` with a proximal term.
 #[derive(Debug, Clone)]
 pub struct Regularised<P> {
-    /// The problem itself.
+    /// The problem with its own W.
     pub base: P,
     /// `α_c w_c`, for each contact.
     pub weight: Vec<f64>,

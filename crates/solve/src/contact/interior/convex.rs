@@ -20,7 +20,7 @@ use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters.
+/// When the convex problem counts as solved, and when as hopeless.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConvexRelaxation {
@@ -62,7 +62,7 @@ impl Described for ConvexRelaxation {
     };
 }
 
-/// The workspace.
+/// The iterate on the cones with its factors.
 pub struct RelaxedWork<P: Linearised<D>, const D: usize> {
     state: P::State,
     ip: ConvexIp<D>,

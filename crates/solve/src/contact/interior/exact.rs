@@ -34,7 +34,7 @@ pub enum Path {
     Continuation,
 }
 
-/// The hyperparameters.
+/// How the path is followed, from where a warm start begins, and when the method gives up.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Interior {
@@ -86,7 +86,7 @@ const SHORT: f64 = 1e-6;
 /// and after this many of them in a row there will be none.
 const MANY_SHORT: usize = 6;
 
-/// The workspace.
+/// The iterate with its factors, and the arc along which it moves.
 pub struct PursuedWork<P: Linearised<D>, const D: usize> {
     state: P::State,
     core: Central<D>,

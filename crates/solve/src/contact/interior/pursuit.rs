@@ -105,7 +105,6 @@ impl<const D: usize> Pursuit<D> {
         now
     }
 
-    /// The iterate.
     pub fn core(&self) -> &Central<D> {
         &self.core
     }

@@ -34,7 +34,7 @@ use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters of Cadoux' approach.
+/// The convex solver inside, the update of the speeds, and how exact the inner solves are.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Cadoux {
@@ -132,7 +132,7 @@ impl Described for Cadoux {
     };
 }
 
-/// The workspace of Cadoux' approach.
+/// The speeds s with their image F(s), and the memory of each inner solver, made when first used.
 pub struct CadouxWork<P: Linearised<D> + Explicit<D>, const D: usize> {
     convex: Convex<P, D>,
     conic: Option<Conic<D>>,

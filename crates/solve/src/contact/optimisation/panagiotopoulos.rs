@@ -27,7 +27,7 @@ use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters of the alternation.
+/// The solver of the halves, and how exactly each is solved.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Panagiotopoulos {
@@ -78,7 +78,7 @@ impl Described for Panagiotopoulos {
     };
 }
 
-/// The workspace of the alternation.
+/// The convex module that both halves share, and the step lengths of a visit.
 pub struct AlternationWork<P: Blockwise<D> + Linearised<D>, const D: usize> {
     convex: Convex<P, D>,
     /// Step lengths of a visit: 1/W_NN, and 1 over the largest eigenvalue of W_TT; 0 where they are not positive.
@@ -86,7 +86,6 @@ pub struct AlternationWork<P: Blockwise<D> + Linearised<D>, const D: usize> {
     error: f64,
 }
 
-/// Which half.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Half {
     Normal,

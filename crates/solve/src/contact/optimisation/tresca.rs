@@ -81,7 +81,7 @@ impl Described for Tresca {
     };
 }
 
-/// The workspace of the Tresca fixed point.
+/// The cylinders' convex solver, the thresholds θ, and the impulses' image of them.
 pub struct TrescaWork<P: Linearised<D> + Explicit<D>, const D: usize> {
     inner: Cylinders<P, D>,
     theta: Vec<f64>,

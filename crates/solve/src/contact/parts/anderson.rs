@@ -60,7 +60,7 @@ impl Anderson {
         self.clear();
     }
 
-    /// Forgets everything.
+    /// Drops the past steps and keeps the memory.
     pub fn clear(&mut self) {
         self.slots.clear();
         self.has_last = false;

@@ -56,7 +56,7 @@ pub struct Iterate {
     pub tau: f64,
     /// `‖ρ‖/√nc` after the step.
     pub residual: f64,
-    /// The step length.
+    /// The part of the Newton step that was taken, in (0, 1].
     pub alpha: f64,
 }
 

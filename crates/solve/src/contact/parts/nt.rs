@@ -165,7 +165,7 @@ impl<const D: usize> Inner<D> {
 /// A pair (x, z) inside the cone, and inside its dual.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair<const D: usize> {
-    /// The cone.
+    /// Fixed by mu: a half line without friction, else the second-order cone.
     pub shape: Shape,
     /// In the cone. Of a half line only the normal part counts.
     pub x: Inner<D>,
@@ -224,7 +224,7 @@ impl<const D: usize> Pair<D> {
 /// The Nesterov–Todd scaling of a pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scaling<const D: usize> {
-    /// The cone.
+    /// Fixed by mu: a half line without friction, else the second-order cone.
     pub shape: Shape,
     /// The eigenvectors of S, by rows.
     pub vectors: Block<D>,

@@ -9,7 +9,7 @@ use crate::contact::law::cone;
 /// Enough for a step length; the power method's estimate is from below by a few percent.
 const POWER_STEPS: usize = 20;
 
-/// The workspace of a projection method.
+/// F at the present impulses and at a trial point, and the step length that outlives a step.
 pub struct Field<P: Linear<D>, const D: usize> {
     pub(super) state: P::State,
     /// `w_c`, positive.

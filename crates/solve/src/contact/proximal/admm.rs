@@ -32,7 +32,7 @@ use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters of ADMM.
+/// How ρ is chosen and adapted, and how much is over-relaxed and extrapolated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Admm {
@@ -132,7 +132,6 @@ pub struct StepsWork<P: Linearised<D>, const D: usize> {
     rho: f64,
     identity: Vec<Block<D>>,
     penalty: Vec<Block<D>>,
-    /// The free velocity.
     q: Vec<f64>,
     r: Vec<f64>,
     z: Vec<f64>,

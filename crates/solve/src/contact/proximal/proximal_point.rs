@@ -33,7 +33,7 @@ pub struct ProximalPoint {
     pub prox_rule: AlphaRule,
     /// The first alpha, in units of w_c; the only one where prox_rule is fixed.
     pub prox_alpha: f64,
-    /// The smallest alpha.
+    /// No rule lets alpha fall below it.
     pub prox_alpha_min: f64,
     /// sigma of `alpha = sigma e^nu`, e the relative residual.
     pub prox_sigma: f64,

@@ -32,7 +32,7 @@ use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{Boxed, SolveError, Solver, Step};
 
-/// The hyperparameters of coloured NSGS.
+/// Those of NSGS that make sense for colours, and the number of threads.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Colored {

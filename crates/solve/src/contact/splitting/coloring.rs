@@ -70,7 +70,6 @@ impl Coloring {
         &self.colors
     }
 
-    /// The number of colours.
     pub fn count(&self) -> usize {
         self.count
     }

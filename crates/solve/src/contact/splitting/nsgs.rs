@@ -33,7 +33,7 @@ use crate::{Boxed, SolveError, Solver, Step};
 use super::circles::Circles;
 use super::contact::{Answer, Contact, NEGLIGIBLE};
 
-/// The hyperparameters of NSGS.
+/// The local solver, the order of the visits, relaxation, and what saves visits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Nsgs {
@@ -177,7 +177,7 @@ impl Described for Nsgs {
 /// NSGS with its local solver known by type, so that the kernel inlines.
 #[derive(Debug, Clone)]
 pub struct Sweeps<L, const D: usize> {
-    /// The hyperparameters.
+    /// As the user gave them; the local solver is already chosen by them.
     pub settings: Nsgs,
     /// The local solver (`settings.local` by type).
     pub local: L,

@@ -20,7 +20,7 @@ use crate::contact::splitting::ordering::Ordering;
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 
-/// The hyperparameters of PSOR.
+/// One projection a visit: its length, and the order of the visits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Psor {

@@ -28,7 +28,6 @@ impl Team {
         Self { size: others.as_ref().map_or(1, |p| p.current_num_threads() + 1), others }
     }
 
-    /// The number of members.
     pub fn size(&self) -> usize {
         self.size
     }

@@ -37,7 +37,7 @@ const ATTEMPTS: usize = 8;
 const STANDSTILL: usize = 4;
 /// μ that is nothing.
 const VANISHED: f64 = 1e-32;
-/// For messages.
+/// The reason of a solve that ends because K cannot be factorised.
 pub const SINGULAR: &str = "the matrix of the step is singular";
 
 /// What the products `x_i s_i` are like, here or a step ahead.
@@ -54,7 +54,7 @@ pub struct Ahead {
 /// The iterate, its direction, and the workspace.
 #[derive(Debug, Default)]
 pub struct PairPath {
-    /// The problem.
+    /// The problem in scaled units, in which the whole path is computed.
     pub scaled: Scaled,
     /// `(u, x)`.
     pub z: Vec<f64>,
@@ -62,9 +62,9 @@ pub struct PairPath {
     pub s: Vec<f64>,
     /// `Q z + R s + c`.
     pub r: Vec<f64>,
-    /// The direction.
+    /// The step of `(u, x)`.
     pub dz: Vec<f64>,
-    /// The direction.
+    /// The step of s.
     pub ds: Vec<f64>,
     newton: Newton,
     polish: Polish,
@@ -83,7 +83,7 @@ pub struct PairPath {
     try_below: f64,
     /// The size of x above which the next refutation is tried.
     refute_above: f64,
-    /// Iterations recorded.
+    /// One row an iteration, kept when the caller asks for a trace.
     pub recorder: Recorder<PathPoint>,
     /// The last merit of the iterate.
     pub merit: f64,
@@ -95,7 +95,6 @@ pub struct PairPath {
     warm: bool,
     /// Began again with a larger ξ.
     enlarged: bool,
-    /// Refutations tried.
     attempts: usize,
     /// Iterations of the solve, those since the last progress, and the least `μ + ‖r‖` at the time.
     iterations: usize,

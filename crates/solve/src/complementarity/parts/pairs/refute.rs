@@ -98,13 +98,13 @@ fn negative(c: &[f64], sign: f64, y: &[f64]) -> bool {
 /// Which bounds a variable has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
-    /// None.
+    /// −∞ and ∞.
     Free,
-    /// A lower one.
+    /// l and ∞.
     Lower,
-    /// An upper one.
+    /// −∞ and u.
     Upper,
-    /// Two.
+    /// l and u, both finite.
     Both,
 }
 

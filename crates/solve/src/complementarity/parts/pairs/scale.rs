@@ -27,7 +27,7 @@ pub struct Scaled {
     pub slack: Option<Matrix>,
     /// E c/θ.
     pub c: Vec<f64>,
-    /// The number of free variables.
+    /// How many variables are free (u): the first ones of z.
     pub free: usize,
     /// Whether the matrix is symmetric (and there is no R).
     pub symmetric: bool,
@@ -156,12 +156,12 @@ impl Scaled {
         self.c.len()
     }
 
-    /// The number of pairs.
+    /// m: pairs `(x_i, s_i)`, without the free variables.
     pub fn pairs(&self) -> usize {
         self.dim() - self.free
     }
 
-    /// The scaled matrix.
+    /// E Q Z of the problem that was scaled last.
     pub fn matrix(&self) -> &Matrix {
         self.matrix.as_ref().expect("filled")
     }

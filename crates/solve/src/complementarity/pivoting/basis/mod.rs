@@ -29,7 +29,6 @@ pub(super) enum Columns {
 /// The path of complementary pivoting does not depend on them; its tolerances do.
 #[derive(Debug, Clone)]
 pub(super) struct Data {
-    /// The order of M.
     pub n: usize,
     /// The free variables, which come first, and as many equalities.
     pub free: usize,
@@ -39,9 +38,9 @@ pub(super) struct Data {
     pub d: Vec<f64>,
     /// The right-hand side of the symbolic perturbation, or zero.
     pub p: Vec<f64>,
-    /// R.
+    /// R, one power of two a row.
     pub row: Vec<f64>,
-    /// C.
+    /// C, one power of two a column.
     pub col: Vec<f64>,
 }
 

@@ -33,7 +33,7 @@ pub struct Radii {
 /// One contact as a complementarity function sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Law {
-    /// The coefficient of friction.
+    /// mu of this contact; 0: no friction.
     pub mu: f64,
     /// What multiplies the velocity where its parts are treated apart.
     pub rho: Radii,
@@ -82,7 +82,7 @@ pub trait ContactFunction<const D: usize>: Send + Sync {
 
 /// A function that has a Newton method. The struct is its hyperparameters.
 pub trait NewtonFunction: Settings + Copy + Send + Sync + 'static {
-    /// The method.
+    /// What the registry says of Newton's method on this function: name, summary, citations.
     const METHOD: Named;
 }
 

@@ -93,7 +93,7 @@ pub fn projection_jacobian<const D: usize>(x: &[f64; D], mu: f64) -> [[f64; D]; 
 /// The Coulomb cone K as a set.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coulomb {
-    /// The coefficient of friction.
+    /// The slope of K: `‖r_T‖ ≤ mu r_N`.
     pub mu: f64,
 }
 
@@ -110,7 +110,7 @@ impl<const D: usize> ConvexSet<D> for Coulomb {
 /// The dual cone `K* = {mu‖x_T‖ ≤ x_N}`, a half space for `mu = 0`: by Moreau, `P_K*(x) = x + P_K(−x)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dual {
-    /// The coefficient of friction.
+    /// mu of K, whose dual this is: `u_N ≥ mu‖u_T‖`.
     pub mu: f64,
 }
 

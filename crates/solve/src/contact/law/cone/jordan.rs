@@ -24,7 +24,7 @@ pub struct Spectral<const D: usize> {
     pub axis: [f64; D],
 }
 
-/// The spectral decomposition.
+/// `x = λ₁ c₁ + λ₂ c₂` with `λ = x_N ∓ ‖x_T‖`; any axis where `x_T = 0`.
 #[inline(always)]
 pub fn spectral<const D: usize>(x: &[f64; D]) -> Spectral<D> {
     let size = tangential_norm(x);

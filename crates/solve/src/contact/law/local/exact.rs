@@ -16,7 +16,7 @@ use nonsmooth_linalg::small::mul;
 
 use super::{LocalSolver, inverse_or_regularised};
 
-/// The exact local solver.
+/// Solves to rounding, so there is nothing to set; each visit begins from the last one's root.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Exact;
 

@@ -11,7 +11,7 @@ use nonsmooth_linalg::small::{self, mul};
 use super::{Exact, LocalSolver, norm_bound, velocity};
 use crate::contact::law::cfun::{Disk, Radii, alart_curnier};
 
-/// The Newton local solver.
+/// The function, by its disk, and how exactly its root is found.
 #[derive(Debug, Clone, Copy)]
 pub struct Newton {
     /// The radius of the friction disk.
