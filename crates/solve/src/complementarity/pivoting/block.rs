@@ -25,7 +25,7 @@ use crate::core::settings::{Settings, described};
 use crate::core::trace::{Pivot, Recorder, Trace, Variable};
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters of block principal pivoting.
+/// How long infeasibility may not fall before single pivots take over.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct BlockPivoting {

@@ -23,7 +23,7 @@ use crate::core::settings::{Settings, described};
 use crate::core::trace::Trace;
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters of the criss-cross method.
+/// The order in which indices count as least.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct CrissCross {

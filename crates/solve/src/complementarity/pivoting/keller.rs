@@ -24,7 +24,7 @@ use crate::core::settings::{Settings, described};
 use crate::core::trace::Trace;
 use crate::{SolveError, Solver, Step};
 
-/// The hyperparameters of the principal pivoting method.
+/// Which of the negative variables is distinguished: driven to zero, the others kept from falling.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Keller {

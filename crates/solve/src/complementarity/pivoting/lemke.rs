@@ -71,7 +71,7 @@ pub enum Ties {
 pub enum BasisKind {
     /// The tableau up to 40 variables, beyond as M is stored.
     Auto,
-    /// B⁻¹ itself, with all columns: n² numbers, changed in every pivot.
+    /// All of `B⁻¹ [I, −M, −d]`: 2n² numbers, each changed by every pivot.
     Tableau,
     /// LU of the z-block, dense.
     Dense,

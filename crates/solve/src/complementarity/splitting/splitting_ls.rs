@@ -30,7 +30,7 @@ pub enum Sweep {
     Jacobi,
 }
 
-/// The hyperparameters of the splitting method with line search.
+/// The sweep that gives the direction, and its relaxation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SplittingLs {
