@@ -1,7 +1,5 @@
 //! Friction through facets: reduce, solve, lift, and the word of the friction problem's own judge.
 
-mod plain_lemke;
-
 use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::check::Judged;
 use nonsmooth_problem::planted::{Planted, PlantedMix};
@@ -11,7 +9,8 @@ use nonsmooth_solve::contact::Condense;
 use nonsmooth_solve::{
     Driver, Limits, Outcome, Reformulation, Session, SolveError, Solver, Status, Via, registry,
 };
-use plain_lemke::PlainLemke;
+
+use crate::plain_lemke::PlainLemke;
 
 const SEEDS: std::ops::Range<u64> = 0..8;
 

@@ -83,7 +83,7 @@ fn nothing_is_promised_of_what_is_not_known() {
 
 #[test]
 fn citations_are_in_the_bibliography() {
-    let bibliography = include_str!("../../../docs/refs.bib");
+    let bibliography = include_str!("../../../../docs/refs.bib");
     for class in PlantedClass::ALL {
         for guarantee in likely(&planted(class)) {
             assert!(!guarantee.cites.is_empty());

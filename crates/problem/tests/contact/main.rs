@@ -1,0 +1,4 @@
+//! Contact problems: their judge, and the operator W.
+
+mod delassus;
+mod judge;
