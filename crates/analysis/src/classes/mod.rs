@@ -206,78 +206,19 @@ impl Classes {
     // ------------------------------------------------------------------------------------------- the tests
 
     fn entries(&mut self, m: &Matrix) {
-        /// What of the difference of mirror images is rounding.
-        const ROUNDING: f64 = 16.0 * f64::EPSILON;
         let n = m.nrows();
         let diagonal = m.diagonal().unwrap_or_default();
-        let (mut unlike, mut near, mut above) = (None, true, None);
-        // Entries without a mirror image, and pairs of which one is not positive definite.
-        let mut minor: Option<Vec<usize>> = None;
-        let mut negative: Option<Vec<usize>> = None;
-        let mut lone = [None, None];
-        let mut down: Option<Vec<(usize, f64)>> = None;
-        let mut all_nonnegative = true;
-        let mut positive_in_row = vec![false; n];
-        m.for_each(|i, j, x| {
-            positive_in_row[i] |= x > 0.0;
-            if i == j {
-                return;
-            }
-            let y = entry(m, j, i);
-            if x != y && unlike.is_none_or(|_| near) {
-                let size = x.abs().max(y.abs()).max((diagonal[i] * diagonal[j]).abs().sqrt());
-                let rounding = (x - y).abs() <= ROUNDING * size;
-                if unlike.is_none() || !rounding {
-                    unlike = Some((i, j));
-                    near &= rounding;
-                }
-            }
-            if x > 0.0 && above.is_none() {
-                above = Some((i, j));
-            }
-            let pair = || vec![i.min(j), i.max(j)];
-            // Minors of two rows; cheaply first.
-            if negative.is_none() && x * y != 0.0 && x * y >= 0.99 * diagonal[i] * diagonal[j] {
-                let [a, b, c, d] = [diagonal[i], diagonal[j], x, y].map(Interval::from);
-                match Interval::cross(a, b, c, d).sign() {
-                    // Of a matrix of rank one the sign is a matter of rounding.
-                    Some(Ordering::Less)
-                        if x * y > (1.0 + ROUNDING) * diagonal[i] * diagonal[j] =>
-                    {
-                        negative = Some(pair());
-                    }
-                    Some(Ordering::Equal) if minor.is_none() => minor = Some(pair()),
-                    _ => {}
-                }
-            }
-            if y == 0.0 && x != 0.0 {
-                let (r, c) = (i, j);
-                for (side, k) in [c, r].into_iter().enumerate() {
-                    if diagonal[k] == 0.0 && lone[side].is_none() {
-                        lone[side] = Some(pair());
-                    }
-                }
-            }
-            let s = x + y;
-            all_nonnegative &= s >= 0.0;
-            if s < 0.0 && down.is_none() {
-                // sqrt(M_jj) e_i + sqrt(M_ii) e_j, or a step along e_j first where that bends nothing.
-                let (a, b) = (diagonal[i].max(0.0), diagonal[j].max(0.0));
-                let weights = match (a == 0.0, b == 0.0) {
-                    (false, false) => [b.sqrt(), a.sqrt()],
-                    (true, false) => [2.0 * b / -s, 1.0],
-                    (false, true) => [1.0, 2.0 * a / -s],
-                    (true, true) => [1.0, 1.0],
-                };
-                let mut x = vec![(i, weights[0]), (j, weights[1])];
-                x.sort_by_key(|e| e.0);
-                if a.sqrt() * b.sqrt() * 2.0 * (1.0 + ROUNDING) < -s
-                    && (Witness::Direction { x: x.clone() }).refutes(m, Class::Copositive)
-                {
-                    down = Some(x);
-                }
-            }
-        });
+        let Seen {
+            unlike,
+            near,
+            above,
+            minor,
+            negative,
+            lone,
+            down,
+            all_nonnegative,
+            positive_in_row,
+        } = Seen::in_matrix(m, &diagonal);
         match unlike {
             None => self.prove(Class::Symmetric, How::Entries),
             Some(_) if near => self.unsure(Class::Symmetric, Why::UpToRounding),
@@ -689,6 +630,101 @@ impl Classes {
 /// The operations of a visit of all principal pivotal transforms of n rows.
 fn transforms(n: usize) -> u64 {
     ((n * n) as u64) << n.min(40)
+}
+
+/// What a walk through the entries and their mirror images meets; of each kind the first.
+struct Seen {
+    /// An entry that differs from its mirror image, and whether all such differences are rounding.
+    unlike: Option<(usize, usize)>,
+    near: bool,
+    /// A positive entry off the diagonal.
+    above: Option<(usize, usize)>,
+    /// Rows of a minor that is zero, and of one that is negative.
+    minor: Option<Vec<usize>>,
+    negative: Option<Vec<usize>>,
+    /// An entry without a mirror image beside a zero on the diagonal: against column and row sufficiency.
+    lone: [Option<Vec<usize>>; 2],
+    /// x ≥ 0 with `xᵀM x < 0`.
+    down: Option<Vec<(usize, f64)>>,
+    /// Of M + Mᵀ, off the diagonal.
+    all_nonnegative: bool,
+    positive_in_row: Vec<bool>,
+}
+
+impl Seen {
+    fn in_matrix(m: &Matrix, diagonal: &[f64]) -> Self {
+        /// What of the difference of mirror images is rounding.
+        const ROUNDING: f64 = 16.0 * f64::EPSILON;
+        let n = m.nrows();
+        let (mut unlike, mut near, mut above) = (None, true, None);
+        let mut minor: Option<Vec<usize>> = None;
+        let mut negative: Option<Vec<usize>> = None;
+        let mut lone = [None, None];
+        let mut down: Option<Vec<(usize, f64)>> = None;
+        let mut all_nonnegative = true;
+        let mut positive_in_row = vec![false; n];
+        m.for_each(|i, j, x| {
+            positive_in_row[i] |= x > 0.0;
+            if i == j {
+                return;
+            }
+            let y = entry(m, j, i);
+            if x != y && unlike.is_none_or(|_| near) {
+                let size = x.abs().max(y.abs()).max((diagonal[i] * diagonal[j]).abs().sqrt());
+                let rounding = (x - y).abs() <= ROUNDING * size;
+                if unlike.is_none() || !rounding {
+                    unlike = Some((i, j));
+                    near &= rounding;
+                }
+            }
+            if x > 0.0 && above.is_none() {
+                above = Some((i, j));
+            }
+            let pair = || vec![i.min(j), i.max(j)];
+            // Minors of two rows; cheaply first.
+            if negative.is_none() && x * y != 0.0 && x * y >= 0.99 * diagonal[i] * diagonal[j] {
+                let [a, b, c, d] = [diagonal[i], diagonal[j], x, y].map(Interval::from);
+                match Interval::cross(a, b, c, d).sign() {
+                    // Of a matrix of rank one the sign is a matter of rounding.
+                    Some(Ordering::Less)
+                        if x * y > (1.0 + ROUNDING) * diagonal[i] * diagonal[j] =>
+                    {
+                        negative = Some(pair());
+                    }
+                    Some(Ordering::Equal) if minor.is_none() => minor = Some(pair()),
+                    _ => {}
+                }
+            }
+            if y == 0.0 && x != 0.0 {
+                let (r, c) = (i, j);
+                for (side, k) in [c, r].into_iter().enumerate() {
+                    if diagonal[k] == 0.0 && lone[side].is_none() {
+                        lone[side] = Some(pair());
+                    }
+                }
+            }
+            let s = x + y;
+            all_nonnegative &= s >= 0.0;
+            if s < 0.0 && down.is_none() {
+                // sqrt(M_jj) e_i + sqrt(M_ii) e_j, or a step along e_j first where that bends nothing.
+                let (a, b) = (diagonal[i].max(0.0), diagonal[j].max(0.0));
+                let weights = match (a == 0.0, b == 0.0) {
+                    (false, false) => [b.sqrt(), a.sqrt()],
+                    (true, false) => [2.0 * b / -s, 1.0],
+                    (false, true) => [1.0, 2.0 * a / -s],
+                    (true, true) => [1.0, 1.0],
+                };
+                let mut x = vec![(i, weights[0]), (j, weights[1])];
+                x.sort_by_key(|e| e.0);
+                if a.sqrt() * b.sqrt() * 2.0 * (1.0 + ROUNDING) < -s
+                    && (Witness::Direction { x: x.clone() }).refutes(m, Class::Copositive)
+                {
+                    down = Some(x);
+                }
+            }
+        });
+        Self { unlike, near, above, minor, negative, lone, down, all_nonnegative, positive_in_row }
+    }
 }
 
 /// `M e` and `Mᵀ e`.

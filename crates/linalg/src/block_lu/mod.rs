@@ -304,55 +304,16 @@ impl BlockLu {
 
     /// Assembles and eliminates front f; `None` where the time is over.
     fn front(&mut self, f: usize, pace: &mut Pace) -> Option<Pivots> {
-        let s = &self.symbolic;
-        let front = &s.fronts[f];
-        let (k, m, simd) = (front.pivots, front.rest, self.simd);
-        let ld = k + m;
+        let (k, m) = (self.symbolic.fronts[f].pivots, self.symbolic.fronts[f].rest);
+        let (ld, simd) = (k + m, self.simd);
         if pace.over((ld * ld) as f64) {
             return None;
         }
+        self.assemble(f);
+        let s = &self.symbolic;
+        let front = &s.fronts[f];
         let lower = &mut self.lower[front.lower..front.lower + k * ld];
         let upper = &mut self.upper[front.upper..front.upper + k * m];
-        lower.fill(0.0);
-        upper.fill(0.0);
-        // The entries of A.
-        for p in &s.places[front.blocks.clone()] {
-            let (rows, columns) = (p.rows as usize, p.columns as usize);
-            let block = &self.values[p.values..p.values + rows * columns];
-            let row_scale = &self.row_scale[p.row as usize..p.row as usize + rows];
-            let column_scale = &self.column_scale[p.column as usize..p.column as usize + columns];
-            let (to, ld) = if p.upper {
-                (&mut upper[p.to - front.upper..], k)
-            } else {
-                (&mut lower[p.to - front.lower..], ld)
-            };
-            match rows {
-                3 => scatter(block, 3, row_scale, column_scale, to, ld),
-                6 => scatter(block, 6, row_scale, column_scale, to, ld),
-                12 => scatter(block, 12, row_scale, column_scale, to, ld),
-                _ => scatter(block, rows, row_scale, column_scale, to, ld),
-            }
-        }
-        // What the children leave in the pivots' rows and columns.
-        for &c in &s.children[front.children.clone()] {
-            let child = &s.fronts[c as usize];
-            let from = &self.remainders[child.remainder..child.remainder + child.rest * child.rest];
-            let (near, far) = (child.runs.start..child.beyond, child.beyond..child.runs.end);
-            for column in &s.runs[near.clone()] {
-                for l in 0..column.len as usize {
-                    let from = &from[(column.from as usize + l) * child.rest..][..child.rest];
-                    let to = &mut lower[(column.to as usize + l) * ld..][..ld];
-                    add_runs(&s.runs[child.runs.clone()], from, to, 0);
-                }
-            }
-            for column in &s.runs[far] {
-                for l in 0..column.len as usize {
-                    let from = &from[(column.from as usize + l) * child.rest..][..child.rest];
-                    let to = &mut upper[(column.to as usize + l - k) * k..][..k];
-                    add_runs(&s.runs[near.clone()], from, to, 0);
-                }
-            }
-        }
         let mut elimination = Elimination {
             simd,
             k,
@@ -372,7 +333,7 @@ impl BlockLu {
         let whole = At { at: 0, ld: k };
         exchange(upper, whole, m, &self.swaps[front.start..front.start + k], 0);
         let triangles = &self.triangles[front.triangles..];
-        // The remainder; children's follow on top of it.
+        // The remainder; the children's follow on top of it.
         let (begin, end) = (front.remainder, front.remainder + m * m);
         let below = At { at: k, ld };
         let each = (k * (k + 2 * m)) as f64;
@@ -385,6 +346,64 @@ impl BlockLu {
                 return None;
             }
         }
+        self.add_remainders(f);
+        Some(outcome)
+    }
+
+    /// Fills the pivots' rows and columns of front f: the entries of A, and what the children leave there.
+    fn assemble(&mut self, f: usize) {
+        let s = &self.symbolic;
+        let front = &s.fronts[f];
+        let (k, m) = (front.pivots, front.rest);
+        let ld = k + m;
+        let lower = &mut self.lower[front.lower..front.lower + k * ld];
+        let upper = &mut self.upper[front.upper..front.upper + k * m];
+        lower.fill(0.0);
+        upper.fill(0.0);
+        for p in &s.places[front.blocks.clone()] {
+            let (rows, columns) = (p.rows as usize, p.columns as usize);
+            let block = &self.values[p.values..p.values + rows * columns];
+            let row_scale = &self.row_scale[p.row as usize..p.row as usize + rows];
+            let column_scale = &self.column_scale[p.column as usize..p.column as usize + columns];
+            let (to, ld) = if p.upper {
+                (&mut upper[p.to - front.upper..], k)
+            } else {
+                (&mut lower[p.to - front.lower..], ld)
+            };
+            match rows {
+                3 => scatter(block, 3, row_scale, column_scale, to, ld),
+                6 => scatter(block, 6, row_scale, column_scale, to, ld),
+                12 => scatter(block, 12, row_scale, column_scale, to, ld),
+                _ => scatter(block, rows, row_scale, column_scale, to, ld),
+            }
+        }
+        for &c in &s.children[front.children.clone()] {
+            let child = &s.fronts[c as usize];
+            let from = &self.remainders[child.remainder..child.remainder + child.rest * child.rest];
+            let (near, far) = (child.runs.start..child.beyond, child.beyond..child.runs.end);
+            for column in &s.runs[near.clone()] {
+                for l in 0..column.len as usize {
+                    let from = &from[(column.from as usize + l) * child.rest..][..child.rest];
+                    let to = &mut lower[(column.to as usize + l) * ld..][..ld];
+                    add_runs(&s.runs[child.runs.clone()], from, to, 0);
+                }
+            }
+            for column in &s.runs[far] {
+                for l in 0..column.len as usize {
+                    let from = &from[(column.from as usize + l) * child.rest..][..child.rest];
+                    let to = &mut upper[(column.to as usize + l - k) * k..][..k];
+                    add_runs(&s.runs[near.clone()], from, to, 0);
+                }
+            }
+        }
+    }
+
+    /// Adds what the children leave beyond the pivots of front f to its remainder.
+    fn add_remainders(&mut self, f: usize) {
+        let s = &self.symbolic;
+        let front = &s.fronts[f];
+        let (k, m) = (front.pivots, front.rest);
+        let (begin, end) = (front.remainder, front.remainder + m * m);
         for &c in &s.children[front.children.clone()] {
             let child = &s.fronts[c as usize];
             let from = child.remainder..child.remainder + child.rest * child.rest;
@@ -405,7 +424,6 @@ impl BlockLu {
                 }
             }
         }
-        Some(outcome)
     }
 
     /// `x ← L⁻¹ P x`, front by front.

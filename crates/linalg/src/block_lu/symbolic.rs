@@ -152,32 +152,12 @@ impl Symbolic {
     /// Numbers the unknowns, and gives everything its place. `order`: node of each step that `supers` speak of.
     fn lay_out(&mut self, order: &[u32], supers: Vec<Super>) {
         let n = self.groups.sizes.len();
-        // Postorder of the fronts that are left: parents have larger steps than their children, so lists are filled backwards.
-        let count = supers.len();
-        let (mut child, mut sibling) = (vec![NONE; count + 1], vec![NONE; count]);
-        for s in (0..count).rev().filter(|&s| !supers[s].merged) {
-            let parent = (supers[s].parent as usize).min(count);
-            sibling[s] = child[parent];
-            child[parent] = s as u32;
-        }
-        let mut sequence: Vec<u32> = Vec::new();
-        let mut stack = vec![];
-        let mut at = child[count];
-        // Depth first: down to the first child, out, to the sibling.
-        while at != NONE || !stack.is_empty() {
-            if at != NONE {
-                stack.push(at);
-                at = child[at as usize];
-            } else if let Some(s) = stack.pop() {
-                sequence.push(s);
-                at = sibling[s as usize];
-            }
-        }
+        let sequence = postorder(&supers);
         // Positions of groups.
         let mut position = vec![0_u32; n]; // of a group: its first unknown in the order of elimination
         let mut front_of = vec![0_u32; n];
         self.order.reserve(self.dim);
-        let mut number_of = vec![NONE; count];
+        let mut number_of = vec![NONE; supers.len()];
         for (f, &s) in sequence.iter().enumerate() {
             number_of[s as usize] = f as u32;
             for &c in &supers[s as usize].columns {
@@ -228,7 +208,7 @@ impl Symbolic {
         // Relative places: of the parent's rows in `local`, then runs of each child.
         let mut local = vec![0_u32; self.dim];
         for f in 0..self.fronts.len() {
-            let front = self.fronts[f].clone();
+            let front = &self.fronts[f];
             for k in 0..front.pivots {
                 local[front.start + k] = k as u32;
             }
@@ -236,73 +216,92 @@ impl Symbolic {
             for (k, &r) in rows.iter().enumerate() {
                 local[r as usize] = (front.pivots + k) as u32;
             }
-            let first_child = self.children.len();
-            for &c in &children[f] {
-                self.children.push(c);
-                let child = &self.fronts[c as usize];
-                let begin = self.runs.len();
-                let mut beyond = None;
-                for (k, &r) in self.rows[child.rows..child.rows + child.rest].iter().enumerate() {
-                    let to = local[r as usize];
-                    let crossing = beyond.is_none() && to as usize >= front.pivots;
-                    match self.runs[begin..].last_mut() {
-                        Some(run) if run.to + run.len == to && !crossing => run.len += 1,
-                        _ => self.runs.push(Run { from: k as u32, to, len: 1 }),
-                    }
-                    if crossing {
-                        beyond = Some(self.runs.len() - 1);
-                    }
-                }
-                let end = self.runs.len();
-                let child = &mut self.fronts[c as usize];
-                child.runs = begin..end;
-                child.beyond = beyond.unwrap_or(end);
-            }
-            self.fronts[f].children = first_child..self.children.len();
-            // Blocks of A with their first node of elimination in this front.
-            let begin = self.places.len();
-            for &c in &supers[sequence[f] as usize].columns {
-                let j = order[c as usize] as usize;
-                for e in self.pattern_start[j]..self.pattern_start[j + 1] {
-                    let i = self.pattern[e] as usize;
-                    let of = front_of[i] as usize;
-                    if of < f {
-                        continue;
-                    }
-                    // Block (i, j) in column j; and (j, i) in row j where i is not a pivot of this front.
-                    let (pi, pj) = (position[i], position[j]);
-                    let (si, sj) = (self.groups.sizes[i], self.groups.sizes[j]);
-                    let (li, lj) = (local[pi as usize] as usize, local[pj as usize] as usize);
-                    let mirror = self.find(i, j).expect("the pattern is symmetric");
-                    self.number[mirror] = self.places.len() as u32;
-                    self.places.push(Place {
-                        values: self.values_len,
-                        row: pi,
-                        column: pj,
-                        rows: si,
-                        columns: sj,
-                        to: front.lower + lj * (front.pivots + front.rest) + li,
-                        upper: false,
-                    });
-                    self.values_len += si as usize * sj as usize;
-                    if of > f {
-                        self.number[e] = self.places.len() as u32;
-                        self.places.push(Place {
-                            values: self.values_len,
-                            row: pj,
-                            column: pi,
-                            rows: sj,
-                            columns: si,
-                            to: front.upper + (li - front.pivots) * front.pivots + lj,
-                            upper: true,
-                        });
-                        self.values_len += si as usize * sj as usize;
-                    }
-                }
-            }
-            self.fronts[f].blocks = begin..self.places.len();
+            self.place_children(f, &children[f], &local);
+            let columns = supers[sequence[f] as usize].columns.iter();
+            let nodes = columns.map(|&c| order[c as usize] as usize);
+            self.place_blocks(f, nodes, &position, &front_of, &local);
         }
         self.place_remainders();
+    }
+
+    /// Where the remainders of f's children go in f: runs of rows. `local`: place in f of each unknown that f has.
+    fn place_children(&mut self, f: usize, children: &[u32], local: &[u32]) {
+        let pivots = self.fronts[f].pivots;
+        let first_child = self.children.len();
+        for &c in children {
+            self.children.push(c);
+            let child = &self.fronts[c as usize];
+            let begin = self.runs.len();
+            let mut beyond = None;
+            for (k, &r) in self.rows[child.rows..child.rows + child.rest].iter().enumerate() {
+                let to = local[r as usize];
+                let crossing = beyond.is_none() && to as usize >= pivots;
+                match self.runs[begin..].last_mut() {
+                    Some(run) if run.to + run.len == to && !crossing => run.len += 1,
+                    _ => self.runs.push(Run { from: k as u32, to, len: 1 }),
+                }
+                if crossing {
+                    beyond = Some(self.runs.len() - 1);
+                }
+            }
+            let end = self.runs.len();
+            let child = &mut self.fronts[c as usize];
+            child.runs = begin..end;
+            child.beyond = beyond.unwrap_or(end);
+        }
+        self.fronts[f].children = first_child..self.children.len();
+    }
+
+    /// The blocks of A whose first node of elimination is in front f: `nodes`, those that f eliminates.
+    fn place_blocks(
+        &mut self,
+        f: usize,
+        nodes: impl Iterator<Item = usize>,
+        position: &[u32],
+        front_of: &[u32],
+        local: &[u32],
+    ) {
+        let Front { pivots, rest, lower, upper, .. } = self.fronts[f];
+        let begin = self.places.len();
+        for j in nodes {
+            for e in self.pattern_start[j]..self.pattern_start[j + 1] {
+                let i = self.pattern[e] as usize;
+                let of = front_of[i] as usize;
+                if of < f {
+                    continue;
+                }
+                // Block (i, j) in column j; and (j, i) in row j where i is not a pivot of this front.
+                let (pi, pj) = (position[i], position[j]);
+                let (si, sj) = (self.groups.sizes[i], self.groups.sizes[j]);
+                let (li, lj) = (local[pi as usize] as usize, local[pj as usize] as usize);
+                let mirror = self.find(i, j).expect("the pattern is symmetric");
+                self.number[mirror] = self.places.len() as u32;
+                self.places.push(Place {
+                    values: self.values_len,
+                    row: pi,
+                    column: pj,
+                    rows: si,
+                    columns: sj,
+                    to: lower + lj * (pivots + rest) + li,
+                    upper: false,
+                });
+                self.values_len += si as usize * sj as usize;
+                if of > f {
+                    self.number[e] = self.places.len() as u32;
+                    self.places.push(Place {
+                        values: self.values_len,
+                        row: pj,
+                        column: pi,
+                        rows: sj,
+                        columns: si,
+                        to: upper + (li - pivots) * pivots + lj,
+                        upper: true,
+                    });
+                    self.values_len += si as usize * sj as usize;
+                }
+            }
+        }
+        self.fronts[f].blocks = begin..self.places.len();
     }
 
     /// The entry of the pattern that holds groups (i, j), if they are coupled.
@@ -363,59 +362,94 @@ impl Symbolic {
     }
 }
 
-/// The groups of nodes, and their symmetric pattern by rows, diagonal included, sorted.
-fn grouped(
-    sizes: &[usize],
-    edges: impl Iterator<Item = (u32, u32)>,
-) -> (Groups, Vec<usize>, Vec<u32>) {
-    let n = sizes.len();
-    let pairs: Vec<(u32, u32)> = edges.filter(|(i, j)| i != j).collect();
-    // Rows of nodes, diagonal first, duplicates out.
-    let mut start = vec![0_usize; n + 1];
-    for &(i, j) in &pairs {
-        assert!((i as usize) < n && (j as usize) < n, "an edge joins nodes");
-        start[i as usize + 1] += 1;
-        start[j as usize + 1] += 1;
+/// The fronts that are left after merging, children before their parents.
+fn postorder(supers: &[Super]) -> Vec<u32> {
+    // Parents have larger steps than their children, so lists are filled backwards.
+    let count = supers.len();
+    let (mut child, mut sibling) = (vec![NONE; count + 1], vec![NONE; count]);
+    for s in (0..count).rev().filter(|&s| !supers[s].merged) {
+        let parent = (supers[s].parent as usize).min(count);
+        sibling[s] = child[parent];
+        child[parent] = s as u32;
     }
-    (0..n).for_each(|i| start[i + 1] += start[i] + 1);
-    let mut rows = vec![0_u32; start[n]];
-    let mut end: Vec<usize> = start[..n].to_vec();
-    for i in 0..n {
-        rows[end[i]] = i as u32;
-        end[i] += 1;
+    let mut sequence: Vec<u32> = Vec::new();
+    let mut stack = vec![];
+    let mut at = child[count];
+    // Depth first: down to the first child, out, to the sibling.
+    while at != NONE || !stack.is_empty() {
+        if at != NONE {
+            stack.push(at);
+            at = child[at as usize];
+        } else if let Some(s) = stack.pop() {
+            sequence.push(s);
+            at = sibling[s as usize];
+        }
     }
-    for &(i, j) in &pairs {
-        for (i, j) in [(i as usize, j), (j as usize, i)] {
-            rows[end[i]] = j;
+    sequence
+}
+
+/// The nodes that each node is coupled with, itself first, none twice: `rows[start[i]..end[i]]`. Nodes with equal sets have equal keys, which are
+/// sorted, each with its node.
+struct NodeRows {
+    start: Vec<usize>,
+    end: Vec<usize>,
+    rows: Vec<u32>,
+    keys: Vec<(u64, u32)>,
+}
+
+impl NodeRows {
+    fn new(n: usize, edges: impl Iterator<Item = (u32, u32)>) -> Self {
+        let pairs: Vec<(u32, u32)> = edges.filter(|(i, j)| i != j).collect();
+        let mut start = vec![0_usize; n + 1];
+        for &(i, j) in &pairs {
+            assert!((i as usize) < n && (j as usize) < n, "an edge joins nodes");
+            start[i as usize + 1] += 1;
+            start[j as usize + 1] += 1;
+        }
+        (0..n).for_each(|i| start[i + 1] += start[i] + 1);
+        let mut rows = vec![0_u32; start[n]];
+        let mut end: Vec<usize> = start[..n].to_vec();
+        for i in 0..n {
+            rows[end[i]] = i as u32;
             end[i] += 1;
         }
-    }
-    drop(pairs);
-    let mut mark = vec![NONE; n];
-    // A sum of scrambled numbers is the same for equal sets in any order.
-    let scrambled = |j: u32| {
-        let x = (u64::from(j) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        (x ^ (x >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9)
-    };
-    let mut keys: Vec<(u64, u32)> = Vec::with_capacity(n);
-    for i in 0..n {
-        let (mut kept, mut sum) = (start[i], 0_u64);
-        for e in start[i]..end[i] {
-            let j = rows[e];
-            if mark[j as usize] != i as u32 {
-                mark[j as usize] = i as u32;
-                rows[kept] = j;
-                kept += 1;
-                sum = sum.wrapping_add(scrambled(j));
+        for &(i, j) in &pairs {
+            for (i, j) in [(i as usize, j), (j as usize, i)] {
+                rows[end[i]] = j;
+                end[i] += 1;
             }
         }
-        end[i] = kept;
-        keys.push((sum, i as u32));
+        let mut mark = vec![NONE; n];
+        // A sum of scrambled numbers is the same for equal sets in any order.
+        let scrambled = |j: u32| {
+            let x = (u64::from(j) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            (x ^ (x >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9)
+        };
+        let mut keys: Vec<(u64, u32)> = Vec::with_capacity(n);
+        for i in 0..n {
+            let (mut kept, mut sum) = (start[i], 0_u64);
+            for e in start[i]..end[i] {
+                let j = rows[e];
+                if mark[j as usize] != i as u32 {
+                    mark[j as usize] = i as u32;
+                    rows[kept] = j;
+                    kept += 1;
+                    sum = sum.wrapping_add(scrambled(j));
+                }
+            }
+            end[i] = kept;
+            keys.push((sum, i as u32));
+        }
+        keys.sort_unstable();
+        Self { start, end, rows, keys }
     }
-    keys.sort_unstable();
-    // Of each node: the first node with the same row.
+}
+
+/// Of each node: the first node with the same row.
+fn leaders_of(start: &[usize], end: &[usize], rows: &[u32], keys: &[(u64, u32)]) -> Vec<u32> {
+    let n = keys.len();
     let mut leader: Vec<u32> = (0..n as u32).collect();
-    mark.fill(NONE);
+    let mut mark = vec![NONE; n];
     let mut marked = NONE;
     let mut first = 0;
     for k in 1..n {
@@ -434,6 +468,17 @@ fn grouped(
             leader[i] = l as u32;
         }
     }
+    leader
+}
+
+/// The groups of nodes, and their symmetric pattern by rows, diagonal included, sorted.
+fn grouped(
+    sizes: &[usize],
+    edges: impl Iterator<Item = (u32, u32)>,
+) -> (Groups, Vec<usize>, Vec<u32>) {
+    let n = sizes.len();
+    let NodeRows { start, end, rows, keys } = NodeRows::new(n, edges);
+    let leader = leaders_of(&start, &end, &rows, &keys);
     // Groups in the order of their first nodes; keys are sorted, so a leader comes before those it leads.
     let mut groups = Groups {
         of: vec![0; n],
