@@ -11,7 +11,7 @@ use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal};
 ///
 /// The rank counts the singular values above `m ε σ_1`, ε = 2⁻⁵²: what rounding leaves of a zero is below. Where
 /// [`least`](Self::least) is close to the cut or [`dropped`](Self::dropped) close to `least`, the rank is a matter of
-/// taste, and with it the condition number.
+/// taste, and with it the condition number. Four of FCLIB's families met in Siconos' test data fall into the published ranges of both.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spectrum {
     /// The rows of W, m = D nc.

@@ -202,7 +202,7 @@ fn with_diagonal<const D: usize>(
 }
 
 /// Contacts whose columns are solved together where a component is large: its factor is read from memory once for
-/// all of them.
+/// all of them (55 566 degrees of freedom, 361 contacts: 13 s in place of about 390 s).
 const TOGETHER: usize = 16;
 
 /// Hands `H_c` and `Z_c = M⁻¹ H_c` of each contact in turn to `visit`, both as rows that hold something. Once the time is over (see

@@ -1,4 +1,11 @@
 //! The inverse of M, or of M under bilateral constraints, behind one face.
+//!
+//! Each connected component of M's graph is factorised by its own size and kind: a division, a dense LU, sparse Cholesky where it is symmetric positive definite
+//! and sparse LU where it is not (implicit gyroscopic terms). So block-diagonal M is found without being told, and `M⁻¹ H_c` stays sparse. A factorisation that
+//! cannot reproduce a known solution to two digits, with residuals in doubled precision, is refused as singular, by the component at fault.
+//!
+//! Under redundant constraints `[M, −G; Gᵀ, 0]` is singular though the problem is sound: velocities are then exact, and the multipliers one of the possible sets.
+//! Under contradicting ones refinement runs away along a null vector of G, which is the certificate that there is no solution.
 
 use std::cell::Cell;
 

@@ -6,6 +6,11 @@
 //! ([`SCENES`]), and [`draw::svg`] draws any scene. A contact may be with the periodic image of a body or with a
 //! moving wall ([`Image`]). SI units throughout: m, kg, s, rad.
 //!
+//! Scenes are made, not simulated. Packings are relaxed: overlap energy under a weight that fades, a last stage without weight, then an exact blow-up, so that nothing
+//! overlaps and radii are those asked for. Voronoi cells are cut by index, so neighbours agree on their faces; normals come from faces, and slivers do not touch. A
+//! contact knows the point that each side touches with, and a periodic image is an offset of the arm and a velocity in w, so bodies know nothing of the period. The unknowns of
+//! elastic solids come after those of the bodies; a contact reaches them through the shape functions of the element that it touches.
+//!
 //! ```
 //! use nonsmooth_scenes::scenes::{Family, Stack};
 //!

@@ -5,7 +5,7 @@
 /// With `A` the matrix from impulses to velocities, rows and columns may be in any units, `A → diag(s) A diag(t)`: the ratio
 /// of the units of two rows is `s_i/s_j = √(|A_ij||A_ii| / (|A_ji||A_jj|))`, of symmetric A that of the roots of its diagonal. The load that
 /// reaches row i is then `ω_i = max_j |q_j| s_i/s_j` over all rows j coupled to i, however far. In a wall at rest every contact but those
-/// of the ground has rounding for its q; they share the load of the ground.
+/// of the ground has rounding for its q; they share the load of the ground. (The load of one hop was tried: it refused walls at rest.)
 ///
 /// Cost: a union-find over the couplings, once a problem.
 #[derive(Debug, Clone, Default)]

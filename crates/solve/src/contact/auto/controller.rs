@@ -1,7 +1,11 @@
 //! When a proximal subproblem is solved, what ε the next one has, how many sweeps come between, and when to try something else.
 //!
 //! The numbers were chosen on a part of the problems of Siconos' numerics, of simulated rigid bodies and of this project's own
-//! scenes, by counts of factorisations; docs/choosing.md has the evidence.
+//! scenes, by counts of factorisations; docs/choosing.md has the evidence. What made the difference on the 217 problems of the corpus: the interior
+//! point as a starter (2024 contacts at rest: 9 factorisations instead of 98); ρ = 30/w_c in the self-dual metric of each contact instead of
+//! one ε for all (mass ratios: 12 instead of thousands); giving up a subproblem after 10 idle iterations, and staying above twice the ε at
+//! which one failed (a pile of 120 spheres: not solved before). Tried and dropped: Anderson acceleration of the proximal steps (no gain on
+//! six hard problems), ρ from 1/w_c to 10/w_c and above 100/w_c.
 
 use crate::contact::auto::proximal_newton::Inner;
 

@@ -7,6 +7,10 @@
 //!
 //! What is factorised has `Q + δ w_c P` in place of Q, δ = 1e-10, so that Q may be singular (sticking contacts of a
 //! Newton matrix) and W rank deficient; refinement against `Q + P W` itself removes the bias wherever that matrix is regular.
+//!
+//! Finite elements and mechanisms, whose M is one component, are condensed first; their velocities still come from the dynamics, because W carries the
+//! rounding of its condensation (4.6e-12 on one of our walls). The analysis of a matrix is used again while the pattern of W stays the same; over the bodies also
+//! while contacts change, as long as no two bodies touch that did not before. A new one costs as much as one or two factorisations.
 
 use nonsmooth_linalg::budget::TooLarge;
 use nonsmooth_linalg::{Block, BlockLu, Bsr, Csc, Groups, Singular, Slot, norm, small};
