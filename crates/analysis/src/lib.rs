@@ -115,7 +115,7 @@ impl Traits {
         p.M.triplets().filter(|e| e.2 != 0.0).for_each(|(i, j, _)| bodies.join(i, j));
         let components = by_frequency(bodies.sizes());
         // Bilateral constraints couple what they touch, in W as well.
-        if let Some(bilateral) = &p.bilateral {
+        if let Some(bilateral) = &p.rows {
             let columns = (0..bilateral.G.ncols()).map(|j| bilateral.G.column(j).0);
             columns.for_each(|touched| bodies.join_all(touched));
         }
@@ -208,7 +208,7 @@ mod tests {
         for (seed, dofs, bilateral) in [(1, 120, 0), (2, 600, 0), (3, 600, 40)] {
             let case = Planted { contacts: 60, dofs, bilateral, seed, ..Planted::default() };
             let (problem, _) = case.global::<3>();
-            let inverse = match &problem.bilateral {
+            let inverse = match &problem.rows {
                 None => Inverse::new(&problem.M, "M"),
                 Some(b) => Inverse::saddle(&problem.M, &b.G),
             };

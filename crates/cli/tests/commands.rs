@@ -6,7 +6,7 @@ use common::{Folder, has_keys};
 use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
 use nonsmooth_linalg::Csc;
 use nonsmooth_problem::planted::Planted;
-use nonsmooth_problem::{BilateralGlobal, Friction, FrictionGlobal, with_friction};
+use nonsmooth_problem::{Friction, FrictionGlobal, RowsGlobal, with_friction};
 use nonsmooth_scenes::SceneEntry;
 
 const JUDGED: &str = "file kind contacts unknowns status message tolerance residual/absolute residual/relative \
@@ -90,12 +90,12 @@ fn what_fails_besides_the_relative_residual_is_named() {
 fn contradictory_constraints_are_named_and_no_iterations_proposed() {
     let folder = Folder::new();
     let (mut problem, _) = Planted { bilateral: 1, ..Planted::default() }.global::<3>();
-    let old = problem.bilateral.take().unwrap();
+    let old = problem.rows.take().unwrap();
     let twice = old.G.triplets().flat_map(|(i, j, x)| [(i, j, x), (i, j + 1, x)]);
-    problem.bilateral = Some(BilateralGlobal {
-        G: Csc::from_triplets(problem.dofs(), 2, twice).unwrap(),
-        b: vec![old.b[0], old.b[0] + 1.0],
-    });
+    problem.rows = Some(RowsGlobal::bilateral(
+        Csc::from_triplets(problem.dofs(), 2, twice).unwrap(),
+        vec![old.b[0], old.b[0] + 1.0],
+    ));
     fclib::write(folder.path("a.hdf5"), &FclibFile::new(Friction::Global3(problem))).unwrap();
     let text = folder.run("solve a.hdf5 --max-iter 1e3").exits(1).stdout;
     assert!(text.contains("; fails bilateral constraints "), "{text}");

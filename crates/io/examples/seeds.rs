@@ -11,8 +11,8 @@ use nonsmooth_io::fclib::{self, FclibFile, Info, StoredPoint};
 use nonsmooth_io::linear::{LinearFile, LinearPoint, toml};
 use nonsmooth_linalg::{Bsr, Csc, Dense, Matrix};
 use nonsmooth_problem::{
-    BilateralGlobal, BilateralLocal, BoxLcp, Complementarity, Friction, FrictionGlobal,
-    FrictionLocal, Hlcp, Lcp, Mlcp,
+    BoxLcp, Complementarity, Friction, FrictionGlobal, FrictionLocal, Hlcp, Lcp, Mlcp, RowsGlobal,
+    RowsLocal,
 };
 
 fn diagonal(rows: usize, columns: usize) -> Csc {
@@ -22,14 +22,19 @@ fn diagonal(rows: usize, columns: usize) -> Csc {
 
 fn local<const D: usize>(bilateral: bool) -> FrictionLocal<D> {
     let bilateral =
-        bilateral.then(|| BilateralLocal { V: diagonal(D, 1), R: diagonal(1, 1), s: vec![0.5] });
-    FrictionLocal { W: Bsr::from_csc(&diagonal(D, D)), q: vec![-1.0; D], mu: vec![0.5], bilateral }
+        bilateral.then(|| RowsLocal::bilateral(diagonal(D, 1), diagonal(1, 1), vec![0.5]));
+    FrictionLocal {
+        W: Bsr::from_csc(&diagonal(D, D)),
+        q: vec![-1.0; D],
+        mu: vec![0.5],
+        rows: bilateral,
+    }
 }
 
 fn global<const D: usize>(bilateral: bool) -> FrictionGlobal<D> {
-    let bilateral = bilateral.then(|| BilateralGlobal { G: diagonal(4, 1), b: vec![0.25] });
+    let bilateral = bilateral.then(|| RowsGlobal::bilateral(diagonal(4, 1), vec![0.25]));
     let (M, H) = (diagonal(4, 4), diagonal(4, D));
-    FrictionGlobal { M, H, f: vec![1.0; 4], w: vec![-1.0; D], mu: vec![0.5], bilateral }
+    FrictionGlobal { M, H, f: vec![1.0; 4], w: vec![-1.0; D], mu: vec![0.5], rows: bilateral }
 }
 
 fn contact() -> Vec<FclibFile> {

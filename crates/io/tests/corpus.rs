@@ -31,7 +31,7 @@ fn every_file_loads_and_passes_through_unchanged() {
             let content = fclib::read(&path).unwrap_or_else(|e| panic!("{e}"));
             assert_eq!(content.problem.contacts().to_string(), nc, "{name}");
             assert_eq!(common::sizes(&content.problem).1.to_string(), m, "{name}");
-            with_friction!(&content.problem, p => assert!(p.bilateral.is_none(), "{name}"));
+            with_friction!(&content.problem, p => assert!(p.rows.is_none(), "{name}"));
             assert_eq!(fclib::read_problem(&path).unwrap(), content.problem);
             fclib::write(&copy, &content).unwrap();
             common::assert_same(&fclib::read(&copy).unwrap(), &content);

@@ -45,7 +45,7 @@ fn hand_made_files_read_as_stated() {
     assert_eq!(content.guesses[0].lambda, Some(vec![3.0]));
 
     let Friction::Local2(p) = read(&bilateral_tree()).problem else { panic!() };
-    let b = p.bilateral.unwrap();
+    let b = p.rows.unwrap();
     assert_eq!((b.V.get(3, 0), b.V.get(1, 0), b.R.get(0, 0), b.s[0]), (0.5, -0.5, 2.0, 0.125));
 }
 

@@ -10,8 +10,7 @@ use common::{assert_same, sizes};
 use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
 use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::{
-    BilateralGlobal, BilateralLocal, Friction, FrictionGlobal, FrictionLocal, GlobalPoint,
-    LocalPoint,
+    Friction, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RowsGlobal, RowsLocal,
 };
 use proptest::prelude::*;
 
@@ -61,7 +60,7 @@ fn local() -> FrictionLocal<2> {
         W: Bsr::from_csc(&csc(4, 4)),
         q: AWKWARD[..4].into(),
         mu: vec![0.0, 0.7],
-        bilateral: Some(BilateralLocal { V: csc(4, 2), R: csc(2, 2), s: AWKWARD[4..6].into() }),
+        rows: Some(RowsLocal::bilateral(csc(4, 2), csc(2, 2), AWKWARD[4..6].into())),
     }
 }
 
@@ -72,7 +71,7 @@ fn global() -> FrictionGlobal<3> {
         f: AWKWARD[..5].into(),
         w: AWKWARD[5..].into(),
         mu: vec![0.3],
-        bilateral: Some(BilateralGlobal { G: csc(5, 1), b: vec![-0.0] }),
+        rows: Some(RowsGlobal::bilateral(csc(5, 1), vec![-0.0])),
     }
 }
 
@@ -228,12 +227,12 @@ fn expected_dump(content: &FclibFile) -> String {
     };
     let (root, mut matrices, vectors) = match &content.problem {
         Friction::Local2(p) => {
-            let b = p.bilateral.as_ref().unwrap();
+            let b = p.rows.as_ref().unwrap();
             let matrices = vec![("W", p.W.to_csc()), ("V", b.V.clone()), ("R", b.R.clone())];
             ("/fclib_local", matrices, vec![("q", &p.q), ("mu", &p.mu), ("s", &b.s)])
         }
         Friction::Global3(p) => {
-            let b = p.bilateral.as_ref().unwrap();
+            let b = p.rows.as_ref().unwrap();
             let matrices = vec![("M", p.M.clone()), ("H", p.H.clone()), ("G", b.G.clone())];
             ("/fclib_global", matrices, vec![("f", &p.f), ("w", &p.w), ("mu", &p.mu), ("b", &b.b)])
         }
@@ -410,7 +409,7 @@ fn empty_multipliers_are_written_where_fclib_expects_them() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("file.hdf5");
     let problem =
-        FrictionGlobal { bilateral: Some(BilateralGlobal { G: csc(5, 0), b: vec![] }), ..global() };
+        FrictionGlobal { rows: Some(RowsGlobal::bilateral(csc(5, 0), vec![])), ..global() };
     let point =
         StoredPoint { v: Some(vec![0.5; 5]), u: vec![0.0; 3], r: vec![1.0; 3], lambda: None };
     let length = || {
@@ -427,7 +426,7 @@ fn empty_multipliers_are_written_where_fclib_expects_them() {
     assert_same(&fclib::read(&path).unwrap(), &content);
 
     let Friction::Global3(p) = &mut content.problem else { unreachable!() };
-    p.bilateral = None;
+    p.rows = None;
     fclib::write(&path, &content).unwrap();
     assert_eq!(length(), None);
     assert_same(&fclib::read(&path).unwrap(), &content);

@@ -128,6 +128,15 @@ impl Csc {
         (&self.row_idx[range.clone()], &self.values[range])
     }
 
+    /// The matrix of these columns, in this order.
+    pub fn columns(&self, which: &[usize]) -> Self {
+        let entries = which.iter().enumerate().flat_map(|(k, &j)| {
+            let (rows, values) = self.column(j);
+            rows.iter().zip(values).map(move |(&i, &x)| (i, k, x))
+        });
+        Self::from_triplets(self.nrows, which.len(), entries).expect("rows in range")
+    }
+
     /// All entries as `(row, column, value)`, column by column.
     pub fn triplets(&self) -> impl Iterator<Item = (usize, usize, f64)> + Clone + '_ {
         (0..self.ncols).flat_map(move |j| {

@@ -76,9 +76,9 @@ pub use nonsmooth_problem::check::{
 };
 pub use nonsmooth_problem::planted::{Planted, PlantedLcp};
 pub use nonsmooth_problem::{
-    AnyCounts, AnyPoint, AnyProblem, AnyStatus, BilateralGlobal, BilateralLocal, BoxLcp,
-    Complementarity, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Kind,
-    Lcp, LcpPoint, LocalPoint, Mlcp, Problem, ProblemError,
+    AnyCounts, AnyPoint, AnyProblem, AnyStatus, BoxLcp, Complementarity, Friction, FrictionGlobal,
+    FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Kind, Lcp, LcpPoint, LocalPoint, Mlcp, Problem,
+    ProblemError, RowsGlobal, RowsLocal,
 };
 pub use nonsmooth_problem::{with_complementarity, with_friction, with_problem};
 pub use nonsmooth_scenes::{Scene, SceneError};

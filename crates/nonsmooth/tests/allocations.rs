@@ -246,7 +246,7 @@ fn globals<const D: usize>(bilateral: usize) -> [FrictionGlobal<D>; 2] {
     second.f.iter_mut().for_each(|f| *f = 0.5 * *f - 0.1);
     second.w.iter_mut().for_each(|w| *w = 0.5 * *w - 0.1);
     second.mu.iter_mut().for_each(|mu| *mu *= 0.9);
-    if let Some(b) = &mut second.bilateral {
+    if let Some(b) = &mut second.rows {
         b.b.iter_mut().for_each(|b| *b *= 0.5);
     }
     [first, second]

@@ -3,7 +3,7 @@
 
 use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::{BilateralLocal, FrictionGlobal, FrictionLocal, Problem};
+use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Problem, RowsLocal};
 use nonsmooth_solve::registry::{self, Registered, Solves};
 use nonsmooth_solve::{Limits, Outcome, Status};
 
@@ -58,18 +58,14 @@ fn multipliers_that_cancel_impulses_deceive_nobody() {
     for big in [1e6, 1e10, 1e14] {
         let w = Csc::from_triplets(2, 2, [(0, 0, 1.0), (1, 1, 1.0)].into_iter()).unwrap();
         let column = [(0, 0, 1.0), (1, 0, 0.37)];
-        let bilateral = BilateralLocal {
-            V: Csc::from_triplets(2, 1, column.into_iter()).unwrap(),
-            // What is left of W is 1/big in the direction of V.
-            R: Csc::from_triplets(
-                1,
-                1,
-                [(0, 0, (1.0 + 0.37 * 0.37) * (1.0 + 1.0 / big))].into_iter(),
-            )
-            .unwrap(),
-            s: vec![0.3],
-        };
-        let problem = FrictionLocal::<2>::with_bilateral(
+        // What is left of W is 1/big in the direction of V.
+        let own = [(0, 0, (1.0 + 0.37 * 0.37) * (1.0 + 1.0 / big))];
+        let bilateral = RowsLocal::bilateral(
+            Csc::from_triplets(2, 1, column.into_iter()).unwrap(),
+            Csc::from_triplets(1, 1, own.into_iter()).unwrap(),
+            vec![0.3],
+        );
+        let problem = FrictionLocal::<2>::with_rows(
             Bsr::from_csc(&w),
             vec![-1.3, 0.77],
             vec![1.0],

@@ -2,14 +2,15 @@
 
 use crate::check::{self, Certificate, ConeSystem, Evidence, Measure};
 use crate::error::{all_finite, friction_coefficients, vector};
-use crate::{Kind, Problem, ProblemError};
+use crate::{Bounds, Kind, Problem, ProblemError};
 use nonsmooth_linalg::{Bsr, Csc};
 
-/// **Find** `r` (and the multipliers `lambda` of bilateral constraints) such that
+/// **Find** `r` (and the impulses `lambda` of scalar rows) such that
 ///
 /// ```text
-/// u = W r + q  (+ V lambda),      0 = Vᵀ r + R lambda + s,
-/// K* ∋ u + mu‖u_T‖ e_N  ⟂  r ∈ K    for each contact, K = {‖r_T‖ ≤ mu r_N}.
+/// u = W r + q  (+ V lambda),      c = Vᵀ r + R lambda + s,
+/// K* ∋ u + mu‖u_T‖ e_N  ⟂  r ∈ K    for each contact, K = {‖r_T‖ ≤ mu r_N},
+/// −c_j ∈ N_[l_j, u_j](lambda_j)       for each row; c = 0 for bilateral constraints.
 /// ```
 ///
 /// | field | meaning | shape | unit |
@@ -17,7 +18,7 @@ use nonsmooth_linalg::{Bsr, Csc};
 /// | `W` | Delassus operator Hᵀ M⁻¹ H, by D×D blocks; need not be symmetric | D·nc × D·nc | 1/kg |
 /// | `q` | free relative velocity, impact terms included | D·nc | m/s |
 /// | `mu` | coefficients of friction, 0 allowed | nc | 1 |
-/// | `bilateral` | `V`, `R`, `s` of FCLIB | D·nc × p, p × p, p | |
+/// | `rows` | `V`, `R`, `s` of FCLIB, and bounds | D·nc × p, p × p, p | |
 ///
 /// Each contact's entries are `[N, T]` (D = 2) or `[N, T1, T2]` (D = 3).
 /// Source: Acary, lecture (2)–(4); FCLIB `/fclib_local`.
@@ -30,20 +31,30 @@ pub struct FrictionLocal<const D: usize> {
     pub q: Vec<f64>,
     /// The coefficients of friction.
     pub mu: Vec<f64>,
-    /// Bilateral constraints, if the problem has any.
-    pub bilateral: Option<BilateralLocal>,
+    /// Scalar rows, such as bilateral constraints, if the problem has any.
+    pub rows: Option<RowsLocal>,
 }
 
-/// The bilateral part `0 = Vᵀ r + R lambda + s` of a [`FrictionLocal`], with `V lambda` added to u.
+/// The scalar rows `c = Vᵀ r + R lambda + s` of a [`FrictionLocal`], with `V lambda` added to u.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(non_snake_case)]
-pub struct BilateralLocal {
-    /// D·nc × p: relative velocity at the contacts for unit multipliers.
+pub struct RowsLocal {
+    /// D·nc × p: relative velocity at the contacts for unit impulses of the rows.
     pub V: Csc,
-    /// p × p: velocity of the constraints for unit multipliers.
+    /// p × p: velocity of the rows for unit impulses.
     pub R: Csc,
-    /// p: free velocity of the constraints.
+    /// p: free velocity of the rows.
     pub s: Vec<f64>,
+    /// What the impulses may be.
+    pub bounds: Bounds,
+}
+
+#[allow(non_snake_case)]
+impl RowsLocal {
+    /// Bilateral constraints, `0 = Vᵀ r + R lambda + s`.
+    pub fn bilateral(V: Csc, R: Csc, s: Vec<f64>) -> Self {
+        Self { V, R, s, bounds: Bounds::default() }
+    }
 }
 
 /// The unknown of a [`FrictionLocal`].
@@ -51,29 +62,29 @@ pub struct BilateralLocal {
 pub struct LocalPoint {
     /// Contact impulses, D·nc, in N·s.
     pub r: Vec<f64>,
-    /// Multipliers of the bilateral constraints, p (empty without any).
+    /// Impulses of the scalar rows, p (empty without any): of bilateral constraints their multipliers.
     pub lambda: Vec<f64>,
 }
 
 #[allow(non_snake_case)]
 impl<const D: usize> FrictionLocal<D> {
-    /// States a problem without bilateral constraints, validated.
+    /// States a problem without scalar rows, validated.
     ///
     /// Errors: no contacts, a wrong shape, a value that is not finite, a negative `mu`; each names its entry.
     pub fn new(W: Bsr<D>, q: Vec<f64>, mu: Vec<f64>) -> Result<Self, ProblemError> {
-        let problem = Self { W, q, mu, bilateral: None };
+        let problem = Self { W, q, mu, rows: None };
         problem.validate()?;
         Ok(problem)
     }
 
-    /// States a problem with bilateral constraints, validated.
-    pub fn with_bilateral(
+    /// States a problem with scalar rows, validated.
+    pub fn with_rows(
         W: Bsr<D>,
         q: Vec<f64>,
         mu: Vec<f64>,
-        bilateral: BilateralLocal,
+        rows: RowsLocal,
     ) -> Result<Self, ProblemError> {
-        let problem = Self { W, q, mu, bilateral: Some(bilateral) };
+        let problem = Self { W, q, mu, rows: Some(rows) };
         problem.validate()?;
         Ok(problem)
     }
@@ -83,9 +94,9 @@ impl<const D: usize> FrictionLocal<D> {
         self.mu.len()
     }
 
-    /// The number of bilateral multipliers.
+    /// The number of scalar rows p.
     pub fn multipliers(&self) -> usize {
-        self.bilateral.as_ref().map_or(0, |b| b.s.len())
+        self.rows.as_ref().map_or(0, |b| b.s.len())
     }
 
     /// Checks shapes and values; the fields are public, so call it after changing them.
@@ -117,12 +128,13 @@ impl<const D: usize> FrictionLocal<D> {
         }
         vector("q", &self.q, D * nc, "components of the contacts")?;
         friction_coefficients(&self.mu)?;
-        if let Some(BilateralLocal { V, R, s }) = &self.bilateral {
+        if let Some(RowsLocal { V, R, s, bounds }) = &self.rows {
             V.check_shape("V", D * nc, s.len(), "contact components × entries of s")?;
             R.check_shape("R", s.len(), s.len(), "entries of s")?;
             V.check_finite("V")?;
             R.check_finite("R")?;
             all_finite("s", s)?;
+            bounds.validate(s.len(), "entries of s")?;
         }
         Ok(())
     }
@@ -130,7 +142,7 @@ impl<const D: usize> FrictionLocal<D> {
     /// `u = W r + V lambda + q` into `u`.
     pub fn velocity_into(&self, point: &LocalPoint, u: &mut [f64]) {
         self.W.mul_plus(&point.r, &self.q, u);
-        if let Some(b) = &self.bilateral {
+        if let Some(b) = &self.rows {
             b.V.mul_add(1.0, &point.lambda, u);
         }
     }
@@ -154,7 +166,7 @@ impl<const D: usize> Problem for FrictionLocal<D> {
 
     fn validate_point(&self, point: &LocalPoint) -> Result<(), ProblemError> {
         vector("r", &point.r, D * self.contacts(), "components of the contacts")?;
-        vector("lambda", &point.lambda, self.multipliers(), "bilateral constraints")
+        vector("lambda", &point.lambda, self.multipliers(), "scalar rows")
     }
 
     fn copy_point(from: &LocalPoint, to: &mut LocalPoint) {

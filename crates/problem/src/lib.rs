@@ -9,19 +9,23 @@
 mod any;
 pub mod check;
 mod complementarity;
+mod dynamics;
 mod error;
 mod friction;
 mod friction_global;
 mod friction_local;
 pub mod planted;
 mod problem;
+mod rows;
 
 pub use any::{
     AnyCounts, AnyGauge, AnyPoint, AnyProblem, AnyStatus, OfAny, OfAnyPoint, any_verdict,
 };
 pub use complementarity::{BoxLcp, Complementarity, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp};
+pub use dynamics::Dynamics;
 pub use error::ProblemError;
 pub use friction::Friction;
-pub use friction_global::{BilateralGlobal, Dynamics, FrictionGlobal, GlobalPoint};
-pub use friction_local::{BilateralLocal, FrictionLocal, LocalPoint};
+pub use friction_global::{FrictionGlobal, GlobalPoint, RowsGlobal};
+pub use friction_local::{FrictionLocal, LocalPoint, RowsLocal};
 pub use problem::{Kind, Problem};
+pub use rows::Bounds;

@@ -127,7 +127,7 @@ impl<const D: usize> Seen<D> for FrictionLocal<D> {
     }
 
     fn constraints(&self) -> Option<Csc> {
-        let b = self.bilateral.as_ref()?;
+        let b = self.rows.as_ref()?;
         let m = self.q.len();
         let r = b.R.triplets().map(|(i, j, x)| (m + i, j, x));
         Csc::from_triplets(m + b.s.len(), b.s.len(), b.V.triplets().chain(r)).ok()
@@ -138,7 +138,7 @@ impl<const D: usize> Seen<D> for FrictionGlobal<D> {
     fn delassus(&self, traits: &Traits) -> Option<Cow<'_, Bsr<D>>> {
         let components = &traits.mass.as_ref()?.components;
         let small = components.iter().all(|c| c.size <= SMALL_BODY);
-        if !small || traits.W.blocks > BLOCKS || self.bilateral.is_some() {
+        if !small || traits.W.blocks > BLOCKS || self.rows.is_some() {
             return None;
         }
         let inverse = Inverse::new(&self.M, "M").ok()?;
@@ -146,7 +146,7 @@ impl<const D: usize> Seen<D> for FrictionGlobal<D> {
     }
 
     fn constraints(&self) -> Option<Csc> {
-        Some(self.bilateral.as_ref()?.G.clone())
+        Some(self.rows.as_ref()?.G.clone())
     }
 }
 
@@ -535,7 +535,7 @@ mod tests {
     #[test]
     fn redundant_constraints_are_counted() {
         let (mut p, _) = Planted { bilateral: 3, ..Planted::default() }.global::<2>();
-        let b = p.bilateral.as_mut().unwrap();
+        let b = p.rows.as_mut().unwrap();
         let twice = b.G.triplets().flat_map(|(i, j, x)| [(i, j, x), (i, j + 3, -2.0 * x)]);
         b.G = Csc::from_triplets(b.G.nrows(), 6, twice).unwrap();
         let more: Vec<f64> = b.b.iter().map(|b| -2.0 * b).collect();

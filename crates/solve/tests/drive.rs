@@ -33,7 +33,7 @@ impl<F: Fn(usize, &mut LocalPoint) -> Step + Send + Sync> Solver<P> for Scripted
 fn run(
     problem: &P,
     limits: &Limits,
-    script: impl Fn(usize, &mut LocalPoint) -> Step + Send,
+    script: impl Fn(usize, &mut LocalPoint) -> Step + Send + Sync,
 ) -> (Outcome, LocalPoint) {
     let mut point = problem.origin();
     let mut driver = Driver::new(Scripted(script));

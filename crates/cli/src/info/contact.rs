@@ -62,7 +62,7 @@ const SMALL_BODY: usize = 48;
 fn singular<const D: usize>(p: &FrictionGlobal<D>) -> Option<ProblemError> {
     // Bilateral constraints may make up for a singular M in the dynamics, but M⁻¹ is needed all the same.
     Inverse::new(&p.M, "M").err().map(ProblemError::from).or_else(|| {
-        p.bilateral.as_ref()?;
+        p.rows.as_ref()?;
         Dynamics::new(p).err()
     })
 }

@@ -178,11 +178,11 @@ struct Sizes {
 impl Sizes {
     fn of(problem: &Friction) -> Self {
         fn local<const D: usize>(p: &FrictionLocal<D>) -> Sizes {
-            let lambda = p.bilateral.as_ref().map(|b| b.s.len());
+            let lambda = p.rows.as_ref().map(|b| b.s.len());
             Sizes { v: None, contacts: D * p.contacts(), lambda }
         }
         fn global<const D: usize>(p: &FrictionGlobal<D>) -> Sizes {
-            let lambda = p.bilateral.as_ref().map(|b| b.b.len());
+            let lambda = p.rows.as_ref().map(|b| b.b.len());
             Sizes { v: Some(p.dofs()), contacts: D * p.contacts(), lambda }
         }
         match problem {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::{
-    BilateralGlobal, BilateralLocal, Friction, FrictionGlobal, FrictionLocal, ProblemError,
+    Friction, FrictionGlobal, FrictionLocal, ProblemError, RowsGlobal, RowsLocal,
 };
 
 use super::{FclibFile, Info, Sizes, StoredPoint, check_finite, check_vector, group};
@@ -123,14 +123,14 @@ fn local<const D: usize>(g: &Folder) -> Result<FrictionLocal<D>, IoError> {
             let s = vectors.reals("s", None)?;
             let p = s.len();
             let V = g.matrix("V", (m, p), &format!("{contacts}, by the entries of vectors/s"))?;
-            Some(BilateralLocal { V, R: g.matrix("R", (p, p), "the entries of vectors/s")?, s })
+            Some(RowsLocal::bilateral(V, g.matrix("R", (p, p), "the entries of vectors/s")?, s))
         }
         (V, R, s) => {
             let parts = [("V", V.is_some()), ("R", R.is_some()), ("vectors/s", s)];
             return Err(g.incomplete(&parts));
         }
     };
-    Ok(FrictionLocal { W: Bsr::from_csc(&W), q, mu, bilateral })
+    Ok(FrictionLocal { W: Bsr::from_csc(&W), q, mu, rows: bilateral })
 }
 
 #[allow(non_snake_case)]
@@ -149,11 +149,11 @@ fn global<const D: usize>(g: &Folder) -> Result<FrictionGlobal<D>, IoError> {
         (Some(_), true) => {
             let b = vectors.reals("b", None)?;
             let why = "the entries of vectors/f, by the entries of vectors/b";
-            Some(BilateralGlobal { G: g.matrix("G", (n, b.len()), why)?, b })
+            Some(RowsGlobal::bilateral(g.matrix("G", (n, b.len()), why)?, b))
         }
         (G, b) => return Err(g.incomplete(&[("G", G.is_some()), ("vectors/b", b)])),
     };
-    Ok(FrictionGlobal { M, H, f, w, mu, bilateral })
+    Ok(FrictionGlobal { M, H, f, w, mu, rows: bilateral })
 }
 
 fn info(problem: &Folder) -> Result<Info, IoError> {

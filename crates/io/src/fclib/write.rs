@@ -208,14 +208,14 @@ fn failed(path: &Path, e: Error) -> IoError {
 fn local<const D: usize>(g: &mut Out, problem: &FrictionLocal<D>) -> Result<(), IoError> {
     g.int("spacedim", D)?;
     g.matrix("W", &problem.W.to_csc())?;
-    if let Some(b) = &problem.bilateral {
+    if let Some(b) = &problem.rows {
         g.matrix("V", &b.V)?;
         g.matrix("R", &b.R)?;
     }
     g.child("vectors", |g| {
         g.reals("q", &problem.q);
         g.reals("mu", &problem.mu);
-        if let Some(b) = &problem.bilateral {
+        if let Some(b) = &problem.rows {
             g.reals("s", &b.s);
         }
         Ok(())
@@ -226,14 +226,14 @@ fn global<const D: usize>(g: &mut Out, problem: &FrictionGlobal<D>) -> Result<()
     g.int("spacedim", D)?;
     g.matrix("M", &problem.M)?;
     g.matrix("H", &problem.H)?;
-    if let Some(b) = &problem.bilateral {
+    if let Some(b) = &problem.rows {
         g.matrix("G", &b.G)?;
     }
     g.child("vectors", |g| {
         g.reals("f", &problem.f);
         g.reals("w", &problem.w);
         g.reals("mu", &problem.mu);
-        if let Some(b) = &problem.bilateral {
+        if let Some(b) = &problem.rows {
             g.reals("b", &b.b);
         }
         Ok(())

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use hdf5_pure::{FileBuilder, GroupBuilder};
 use nonsmooth_io::fclib::{FclibFile, Info, StoredPoint};
 use nonsmooth_linalg::{Bsr, Csc};
-use nonsmooth_problem::{BilateralGlobal, BilateralLocal, Friction, FrictionGlobal, FrictionLocal};
+use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, RowsGlobal, RowsLocal};
 use proptest::collection::{btree_map, vec};
 use proptest::option;
 use proptest::prelude::*;
@@ -43,8 +43,8 @@ fn local<const D: usize>() -> impl Strategy<Value = FrictionLocal<D>> {
         let m = D * nc;
         let bilateral = (csc(m, p), csc(p, p), vec(real(), p));
         (csc(m, m), vec(real(), m), mu(nc), option::of(bilateral)).prop_map(|(w, q, mu, b)| {
-            let bilateral = b.map(|(V, R, s)| BilateralLocal { V, R, s });
-            FrictionLocal { W: Bsr::from_csc(&w), q, mu, bilateral }
+            let bilateral = b.map(|(V, R, s)| RowsLocal::bilateral(V, R, s));
+            FrictionLocal { W: Bsr::from_csc(&w), q, mu, rows: bilateral }
         })
     })
 }
@@ -55,8 +55,8 @@ fn global<const D: usize>() -> impl Strategy<Value = FrictionGlobal<D>> {
         let bilateral = option::of((csc(n, p), vec(real(), p)));
         (csc(n, n), csc(n, m), vec(real(), n), vec(real(), m), mu(nc), bilateral).prop_map(
             |(M, H, f, w, mu, b)| {
-                let bilateral = b.map(|(G, b)| BilateralGlobal { G, b });
-                FrictionGlobal { M, H, f, w, mu, bilateral }
+                let bilateral = b.map(|(G, b)| RowsGlobal::bilateral(G, b));
+                FrictionGlobal { M, H, f, w, mu, rows: bilateral }
             },
         )
     })

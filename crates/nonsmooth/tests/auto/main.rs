@@ -9,7 +9,7 @@ use common::{run, within};
 use nonsmooth_linalg::{Bsr, Csc, norm};
 use nonsmooth_problem::check::{Existence, Judged};
 use nonsmooth_problem::planted::{Planted, PlantedMix};
-use nonsmooth_problem::{BilateralGlobal, FrictionGlobal, FrictionLocal, GlobalPoint};
+use nonsmooth_problem::{FrictionGlobal, FrictionLocal, GlobalPoint, RowsGlobal};
 use nonsmooth_scenes::Scene;
 use nonsmooth_scenes::scenes::{
     Arch, Chain, Family, Kapla, SlidingBox, Spheres, Stack, State, Wall,
@@ -67,7 +67,7 @@ where
 {
     let mut failed = solved_to(tolerance, problem, "auto", &format!("{what}, global"));
     failed.extend(solved_to(tolerance, problem, "condense/auto", &format!("{what}, global")));
-    if problem.bilateral.is_none() {
+    if problem.rows.is_none() {
         let (local, _) = Condense.reduce(problem).unwrap();
         failed.extend(solved_to(tolerance, &local, "auto", &format!("{what}, local")));
     }
@@ -363,12 +363,12 @@ fn a_problem_without_a_solution_is_refuted() {
 #[test]
 fn contradictory_constraints_are_refuted() {
     let (mut problem, _) = Planted { bilateral: 3, ..Planted::default() }.global::<3>();
-    let BilateralGlobal { G, b } = problem.bilateral.take().unwrap();
+    let RowsGlobal { G, b, .. } = problem.rows.take().unwrap();
     // The last constraint once more, to be met at another velocity.
     let again = G.triplets().filter(|&(_, j, _)| j == 2).map(|(i, _, x)| (i, 3, x));
     let g =
         Csc::from_triplets(G.nrows(), 4, G.triplets().chain(again.collect::<Vec<_>>())).unwrap();
-    problem.bilateral = Some(BilateralGlobal { G: g, b: [&b[..], &[b[2] + 1.0]].concat() });
+    problem.rows = Some(RowsGlobal::bilateral(g, [&b[..], &[b[2] + 1.0]].concat()));
     refuted(&problem, "auto", "a constraint twice");
 }
 

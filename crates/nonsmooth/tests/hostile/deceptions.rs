@@ -4,7 +4,7 @@
 use nonsmooth_linalg::{Bsr, Csc, Dense};
 use nonsmooth_problem::check::Judged;
 use nonsmooth_problem::{
-    BilateralGlobal, BilateralLocal, FrictionGlobal, FrictionLocal, LocalPoint, Mlcp, Problem,
+    FrictionGlobal, FrictionLocal, LocalPoint, Mlcp, Problem, RowsGlobal, RowsLocal,
 };
 use nonsmooth_solve::registry::{self, Registered, Solves};
 use nonsmooth_solve::{Limits, Status};
@@ -81,9 +81,9 @@ fn constrained(g: &[(usize, usize, f64)], b: Vec<f64>) -> FrictionGlobal<3> {
     let h = csc(6, 3, &[(2, 0, 1.0), (0, 1, 1.0), (1, 2, 1.0)]);
     let f = vec![0.5, 0.1, -1.0, 0.0, 0.0, 0.2];
     let g = csc(6, b.len(), g);
-    let bilateral = Some(BilateralGlobal { G: g, b });
+    let bilateral = Some(RowsGlobal::bilateral(g, b));
     let m = Csc::diagonal(&[1.0, 1.0, 1.0, 0.2, 0.2, 0.3]);
-    let problem = FrictionGlobal { M: m, H: h, f, w: vec![0.0; 3], mu: vec![0.4], bilateral };
+    let problem = FrictionGlobal { M: m, H: h, f, w: vec![0.0; 3], mu: vec![0.4], rows: bilateral };
     problem.validate().unwrap();
     problem
 }
@@ -113,8 +113,8 @@ fn redundant_and_nearly_redundant_constraints_are_satisfied() {
 fn local_with(r: f64, s: f64) -> FrictionLocal<3> {
     let w = Bsr::from_rows(1, &[vec![(0, [[2.0, 0.1, 0.0], [0.1, 1.5, 0.0], [0.0, 0.0, 1.0]])]]);
     let bilateral =
-        BilateralLocal { V: csc(3, 1, &[(1, 0, 0.5)]), R: csc(1, 1, &[(0, 0, r)]), s: vec![s] };
-    FrictionLocal::with_bilateral(w, vec![-1.0, 0.2, 0.1], vec![0.3], bilateral).unwrap()
+        RowsLocal::bilateral(csc(3, 1, &[(1, 0, 0.5)]), csc(1, 1, &[(0, 0, r)]), vec![s]);
+    FrictionLocal::with_rows(w, vec![-1.0, 0.2, 0.1], vec![0.3], bilateral).unwrap()
 }
 
 #[test]
@@ -133,11 +133,8 @@ fn any_invertible_r_is_taken_and_solved_below_the_regularisation() {
 #[test]
 fn a_constraint_that_nothing_can_meet_is_not_hidden_by_a_larger_one() {
     let mut problem = local_with(1.0, 0.0);
-    problem.bilateral = Some(BilateralLocal {
-        V: csc(3, 2, &[]),
-        R: csc(2, 2, &[(1, 1, 1e10)]),
-        s: vec![1.0, 1e10],
-    });
+    problem.rows =
+        Some(RowsLocal::bilateral(csc(3, 2, &[]), csc(2, 2, &[(1, 1, 1e10)]), vec![1.0, 1e10]));
     none_solves(&problem);
 }
 

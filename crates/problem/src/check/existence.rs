@@ -190,7 +190,7 @@ impl<const D: usize> Kinematic<D> for FrictionGlobal<D> {
         let mut rows = vec![];
         rows.extend(self.H.triplets().map(|(i, j, x)| (j, i, x)));
         let mut constant = self.w.clone();
-        if let Some(b) = &self.bilateral {
+        if let Some(b) = &self.rows {
             rows.extend(b.G.triplets().map(|(i, j, x)| (m + j, i, x)));
             constant.extend_from_slice(&b.b);
         }
@@ -215,7 +215,7 @@ impl<const D: usize> FrictionLocal<D> {
     fn bordered(&self) -> Vec<(usize, usize, f64)> {
         let m = self.q.len();
         let mut entries: Vec<_> = self.W.to_csc().triplets().collect();
-        if let Some(b) = &self.bilateral {
+        if let Some(b) = &self.rows {
             entries.extend(b.V.triplets().flat_map(|(i, j, x)| [(i, m + j, x), (m + j, i, x)]));
             entries.extend(b.R.triplets().map(|(i, j, x)| (m + i, m + j, x)));
         }
@@ -226,7 +226,7 @@ impl<const D: usize> FrictionLocal<D> {
 impl<const D: usize> Kinematic<D> for FrictionLocal<D> {
     fn kinematics(&self) -> Kinematics<D> {
         let mut constant = self.q.clone();
-        if let Some(b) = &self.bilateral {
+        if let Some(b) = &self.rows {
             constant.extend_from_slice(&b.s);
         }
         // W is computed: where it should be symmetric, its asymmetry tells its rounding.
@@ -509,7 +509,7 @@ impl Power {
 mod tests {
     use super::*;
     use crate::planted::Planted;
-    use crate::{BilateralGlobal, BilateralLocal};
+    use crate::{RowsGlobal, RowsLocal};
     use nonsmooth_linalg::Bsr;
 
     /// One body of unit mass in space that touches planes with the normals given.
@@ -623,7 +623,7 @@ mod tests {
         assert_eq!(with([1e9, -1e-8, 0.0, 1.0]), Monotone::Unknown, "no mean hides it");
         with([1.0; 4]);
         let (v, r) = (Csc::zeros(4, 1), Csc::diagonal(&[-1.0]));
-        local.bilateral = Some(BilateralLocal { V: v, R: r, s: vec![0.0] });
+        local.rows = Some(RowsLocal::bilateral(v, r, vec![0.0]));
         assert_eq!(local.monotone(), Monotone::Unknown);
     }
 
@@ -632,12 +632,12 @@ mod tests {
         // The floor would be left, but the body is held.
         let mut p = touching(&[UP], &[-1.0, 0.0, 0.0], 0.3);
         let g = Csc::from_triplets(3, 1, [(2, 0, 1.0)].into_iter()).unwrap();
-        p.bilateral = Some(BilateralGlobal { G: g, b: vec![0.0] });
+        p.rows = Some(RowsGlobal::bilateral(g, vec![0.0]));
         let k = p.kinematics();
         assert_eq!(k.margin(&[0.0, 0.0, 2.0]), None);
         let ray = |lambda| Impulses { r: vec![1.0, 0.0, 0.0], lambda: vec![lambda] };
         assert!(k.refutes(&ray(-1.0)) && !k.refutes(&ray(1.0)) && !k.refutes(&ray(0.0)));
-        p.bilateral.as_mut().unwrap().b[0] = -3.0;
+        p.rows.as_mut().unwrap().b[0] = -3.0;
         assert!(p.kinematics().margin(&[0.0, 0.0, 3.0]).is_some());
         assert!(!p.kinematics().refutes(&ray(-1.0)));
     }

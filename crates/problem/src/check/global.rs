@@ -109,7 +109,7 @@ impl Reach {
             }
         };
         add(&problem.H, r);
-        if let Some(b) = &problem.bilateral {
+        if let Some(b) = &problem.rows {
             add(&b.G, lambda);
         }
         // Of a large component at least what comes of it.
@@ -138,7 +138,7 @@ impl GlobalGauge {
     pub(crate) fn new<const D: usize>(problem: &FrictionGlobal<D>) -> Result<Self, ProblemError> {
         let dynamics = Dynamics::new(problem)?;
         // W = Hᵀ M⁻¹ H and q = Hᵀ M⁻¹ f + w are those of the free dynamics, with bilateral rows apart.
-        let free = match problem.bilateral {
+        let free = match problem.rows {
             Some(_) => {
                 let free = Inverse::new(&problem.M, "M")?;
                 let scratch = vec![0.0; free.scratch_len()];
@@ -219,7 +219,11 @@ impl GlobalGauge {
         q.iter_mut().zip(rows.values()).for_each(|(q, x)| *q = x);
         law.norm_q = norm(q);
         let motion = problem.contacts() + problem.multipliers();
-        let violations = problem.bilateral.iter().flat_map(|b| b.b.iter().map(|b| b.abs()));
+        let violations = problem.rows.iter().flat_map(|b| {
+            // An impulse that has to be there is a load too.
+            let given = |j: usize| of_impulse(problem, &b.G, j) * b.bounds.least(j).abs();
+            b.b.iter().enumerate().map(move |(j, b)| b.abs().max(given(j)))
+        });
         let forces = problem.f.iter().zip(&units[motion..]).map(|(f, unit)| f.abs() * unit * unit);
         law.loads.spread(q.chunks(D).map(norm).chain(violations).chain(forces));
     }
@@ -231,7 +235,7 @@ impl GlobalGauge {
         let (n, nc, p) = (problem.dofs(), problem.contacts(), problem.multipliers());
         let motion = nc + p;
         let of_contacts = problem.H.triplets().map(|(i, j, x)| (j / D, motion + i, x));
-        let constraints = problem.bilateral.iter().flat_map(|b| b.G.triplets());
+        let constraints = problem.rows.iter().flat_map(|b| b.G.triplets());
         let rows = of_contacts.chain(constraints.map(|(i, j, x)| (nc + j, motion + i, x)));
         let rows = || rows.clone().filter(|(_, _, x)| *x != 0.0);
         units.clear();
@@ -264,6 +268,7 @@ impl GlobalGauge {
         rows.add(1.0, &problem.H, &point.r);
         let force = norm(&problem.f).max(rows.norm());
         rows.precisely(precisely);
+        dynamics.hold(&point.lambda);
         let given = imbalance(problem, (&point.v, &[]), &point.r, &point.lambda, force, rows);
         let State { high, low, last, spare } = state;
         if precisely {
@@ -315,8 +320,8 @@ impl GlobalGauge {
         rows.add_transposed(&problem.H, buffer);
         measure.velocity_gap = Some(over(rows.norm(), law.norm_q));
 
-        if let Some(b) = &problem.bilateral {
-            // |Gᵀ v + b| against its terms, beyond what the rounding of velocities of a typical size makes of them.
+        if let Some(b) = &problem.rows {
+            // |Gᵀ v + b|, or what the bounds make of it, against its terms, beyond what the rounding of velocities of a typical size makes of them.
             let unit = |i: usize| unit(problem.M.get(i, i));
             let typical = (0..n).fold(0.0_f64, |t, i| t.max(point.v[i].abs() * unit(i)));
             rows.start(&b.b);
@@ -324,7 +329,15 @@ impl GlobalGauge {
             let shares = rows.values().zip(rows.sizes()).enumerate().map(|(j, (sum, &size))| {
                 let (at, values) = b.G.column(j);
                 let weight: f64 = at.iter().zip(values).map(|(&i, g)| g.abs() / unit(i)).sum();
-                law.loads.excused(problem.contacts() + j, sum, size, typical * weight)
+                let (left, size) = if b.bounds.is_free(j) {
+                    (sum, size)
+                } else {
+                    // The impulse is no term of c, but may be all there is.
+                    let w = of_impulse(problem, &b.G, j);
+                    let lambda = point.lambda[j];
+                    (b.bounds.residual(j, lambda, sum, w), size + (w * lambda).abs())
+                };
+                law.loads.excused(problem.contacts() + j, left, size, typical * weight)
             });
             measure.bilateral = Some(worst(shares));
         }
@@ -339,6 +352,12 @@ impl GlobalGauge {
     pub(super) fn velocity(&self) -> &[f64] {
         &self.u
     }
+}
+
+/// The velocity that a unit impulse of row j makes of itself, as if M were diagonal: a unit.
+fn of_impulse<const D: usize>(problem: &FrictionGlobal<D>, g: &Csc, j: usize) -> f64 {
+    let (rows, values) = g.column(j);
+    rows.iter().zip(values).map(|(&i, g)| (g / unit(problem.M.get(i, i))).powi(2)).sum()
 }
 
 /// What the rounding of r to doubles alone makes of the residual, in the root mean square: by one response to
@@ -377,7 +396,7 @@ fn imbalance<const D: usize>(
 ) -> Imbalance {
     rows.start(&problem.f);
     rows.add(1.0, &problem.H, r);
-    if let Some(b) = &problem.bilateral {
+    if let Some(b) = &problem.rows {
         rows.add(1.0, &b.G, lambda);
     }
     rows.add(-1.0, &problem.M, v);

@@ -129,7 +129,7 @@ mod tests {
         // v_0 = 1 and v_0 = 2 at once.
         let (mut global, _) = squeezed(0.5);
         let g = Csc::from_triplets(2, 2, [(0, 0, 1.0), (0, 1, 1.0)].into_iter()).unwrap();
-        global.bilateral = Some(crate::BilateralGlobal { G: g, b: vec![-1.0, -2.0] });
+        global.rows = Some(crate::RowsGlobal::bilateral(g, vec![-1.0, -2.0]));
         assert!(global.validate().is_ok());
         let ray = Impulses { r: vec![0.0; 4], lambda: vec![-1.0, 1.0] };
         assert!(global.verify(&ray.clone().into()));

@@ -4,7 +4,7 @@ use super::contact::{Share, is_at_rest_or_open, length, modified_velocity, natur
 use super::loads::Loads;
 use super::rows::{Rows, doubt};
 use super::{Measure, over};
-use crate::{BilateralLocal, FrictionLocal, LocalPoint};
+use crate::{FrictionLocal, LocalPoint, RowsLocal};
 use nonsmooth_linalg::{Csc, Doubled, Real, norm, norm_of, power_of_two, small};
 
 /// The judge's constants and buffers for a [`FrictionLocal`].
@@ -57,7 +57,11 @@ impl LocalGauge {
         let LawGauge { strength, loads, amounts, impulses, .. } = &mut self.law;
         amounts.clear();
         amounts.extend(problem.q.chunks(D).map(norm));
-        amounts.extend(problem.bilateral.iter().flat_map(|b| b.s.iter().map(|s| s.abs())));
+        amounts.extend(problem.rows.iter().flat_map(|b| {
+            // An impulse that has to be there is a load too.
+            let given = |j: usize| (b.R.get(j, j) * b.bounds.least(j)).abs();
+            b.s.iter().enumerate().map(move |(j, s)| s.abs().max(given(j)))
+        }));
         let n = amounts.len();
         strength.clear();
         strength.extend((0..n).map(|i| all.entry(i, i)));
@@ -119,14 +123,14 @@ impl LocalGauge {
         measure
     }
 
-    /// The largest `|(Vᵀ r + R λ + s)_j|` over the size of its terms, beyond what the rounding of impulses and multipliers of a typical
+    /// The largest `|c_j|`, `c = Vᵀ r + R λ + s`, or of a row with bounds what [`Bounds::residual`](crate::Bounds::residual) makes of it, over the size of its terms, beyond what the rounding of impulses and multipliers of a typical
     /// size makes in row j: of a constraint without load all terms are rounding. A row without coefficients has no such excuse.
     fn violation<const D: usize>(
         &mut self,
         problem: &FrictionLocal<D>,
         point: &LocalPoint,
     ) -> Option<f64> {
-        let BilateralLocal { V, R, s } = problem.bilateral.as_ref()?;
+        let RowsLocal { V, R, s, bounds } = problem.rows.as_ref()?;
         self.rows.start(s);
         self.rows.add_transposed(V, &point.r);
         self.rows.add(1.0, R, &point.lambda);
@@ -153,10 +157,10 @@ impl LocalGauge {
         }
         let nc = problem.contacts();
         let shares = self.rows.values().zip(self.rows.sizes()).zip(&*excuse).enumerate();
-        let share =
-            worst(shares.map(|(j, ((sum, &size), excuse))| {
-                self.law.loads.excused(nc + j, sum, size, *excuse)
-            }));
+        let share = worst(shares.map(|(j, ((sum, &size), excuse))| {
+            let left = bounds.residual(j, point.lambda[j], sum, unit(j).powi(2));
+            self.law.loads.excused(nc + j, left, size, *excuse)
+        }));
         self.sizes.truncate(point.r.len());
         Some(share)
     }
@@ -181,7 +185,7 @@ impl LocalGauge {
             }
             u[D * i..D * i + D].copy_from_slice(&sum);
         }
-        each_term(problem.bilateral.as_ref().map(|b| &b.V), &point.lambda, |i, a, x| u[i] += a * x);
+        each_term(problem.rows.as_ref().map(|b| &b.V), &point.lambda, |i, a, x| u[i] += a * x);
     }
 
     /// The same, each entry as one sum in doubled precision.
@@ -193,7 +197,7 @@ impl LocalGauge {
         let Self { u, exact, sizes, rows, .. } = self;
         rows.start(&problem.q);
         rows.add_blocks(&problem.W, &point.r);
-        if let Some(b) = &problem.bilateral {
+        if let Some(b) = &problem.rows {
             rows.add(1.0, &b.V, &point.lambda);
         }
         sizes.copy_from_slice(rows.sizes());
@@ -219,7 +223,7 @@ impl LocalGauge {
                 }
             }
         }
-        each_term(problem.bilateral.as_ref().map(|b| &b.V), &point.lambda, |i, a, x| {
+        each_term(problem.rows.as_ref().map(|b| &b.V), &point.lambda, |i, a, x| {
             squares[i] += (a * x * per).powi(2);
         });
         let spread = squares.iter().sum::<f64>().sqrt() * (unit / self.law.unit());
@@ -286,7 +290,7 @@ impl<const D: usize> Saddle<'_, D> {
     /// The largest modulus in row i and column j.
     fn entry(&self, i: usize, j: usize) -> f64 {
         let nc = self.0.contacts();
-        let Some(b) = self.0.bilateral.as_ref().filter(|_| i.max(j) >= nc) else {
+        let Some(b) = self.0.rows.as_ref().filter(|_| i.max(j) >= nc) else {
             return self.0.W.get(i, j).map_or(0.0, largest);
         };
         match (i.checked_sub(nc), j.checked_sub(nc)) {
@@ -310,7 +314,7 @@ impl<const D: usize> Saddle<'_, D> {
                 }
             }
         }
-        let Some(b) = &self.0.bilateral else { return };
+        let Some(b) = &self.0.rows else { return };
         for (i, j, v) in b.V.triplets().filter(|e| e.2 != 0.0) {
             if !(call(i / D, nc + j, v.abs()) && call(nc + j, i / D, v.abs())) {
                 return;

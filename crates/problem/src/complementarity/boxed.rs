@@ -3,6 +3,7 @@
 use super::square;
 use crate::ProblemError;
 use crate::error::vector;
+use crate::rows;
 use nonsmooth_linalg::Matrix;
 
 /// `−(M z + q) ∈ N_[l, u](z)`: with `w = M z + q`, `w_i ≥ 0` where `z_i = l_i`, `w_i ≤ 0` where `z_i = u_i`, and `w_i = 0` between.
@@ -42,23 +43,7 @@ impl BoxLcp {
         square("M", &self.M)?;
         let n = self.M.nrows();
         vector("q", &self.q, n, "rows of M")?;
-        for (name, bound) in [("l", &self.lower), ("u", &self.upper)] {
-            if bound.len() != n {
-                let found = format!("{} entries", bound.len());
-                return Err(ProblemError::shape(name, format!("{n} entries (rows of M)"), found));
-            }
-        }
-        for (i, (&l, &u)) in self.lower.iter().zip(&self.upper).enumerate() {
-            if !(l <= u && l < f64::INFINITY && u > f64::NEG_INFINITY) {
-                let found = format!("[{l}, {u}]");
-                return Err(ProblemError::value(
-                    format!("[l, u][{i}]"),
-                    "l ≤ u, l < ∞, u > −∞",
-                    found,
-                ));
-            }
-        }
-        Ok(())
+        rows::check([&self.lower, &self.upper], n, "rows of M")
     }
 
     /// The number of variables n.

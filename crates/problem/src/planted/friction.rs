@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use crate::{
-    BilateralGlobal, BilateralLocal, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint,
+    Bounds, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RowsGlobal, RowsLocal,
 };
 use nonsmooth_linalg::{Csc, Delassus, Inverse};
 
@@ -22,6 +22,8 @@ pub struct Planted {
     pub dofs: usize,
     /// The number of bilateral constraints; keep it below n.
     pub bilateral: usize,
+    /// The number of scalar rows with bounds (half lines and boxes in turn), which lie between those without.
+    pub bounded: usize,
     /// The shares of the contact statuses.
     pub mix: PlantedMix,
     /// Coefficients of friction are drawn between these.
@@ -51,6 +53,7 @@ impl Default for Planted {
             contacts: 20,
             dofs: 60,
             bilateral: 0,
+            bounded: 0,
             mix: PlantedMix { open: 1.0, stick: 1.0, slip: 1.0, degenerate: 0.0 },
             mu: (0.2, 0.9),
             skew: 0.0,
@@ -63,7 +66,8 @@ impl Planted {
     /// A global problem and a solution of it.
     pub fn global<const D: usize>(&self) -> (FrictionGlobal<D>, GlobalPoint) {
         let mut rng = Pcg64::seed_from_u64(self.seed);
-        let (n, m, p) = (self.dofs.max(1), D * self.contacts.max(1), self.bilateral);
+        let (n, m) = (self.dofs.max(1), D * self.contacts.max(1));
+        let p = self.bilateral + self.bounded;
         let mut normal = || {
             // The sum of four uniforms is normal enough to plant with.
             (0..4).map(|_| rng.random_range(-1.0..1.0)).sum::<f64>() * 0.866
@@ -71,7 +75,7 @@ impl Planted {
 
         let mass = mass_matrix(n, self.skew, &mut normal);
         let v: Vec<f64> = (0..n).map(|_| normal()).collect();
-        let lambda: Vec<f64> = (0..p).map(|_| normal()).collect();
+        let mut lambda: Vec<f64> = (0..p).map(|_| normal()).collect();
         let jacobian_rows = |c: usize, bodies: usize, normal: &mut dyn FnMut() -> f64| {
             let pick = |x: f64| ((x.abs() * 7919.0) as usize) % bodies;
             // Contacts visit the bodies in turn, so that each is touched when there are enough contacts.
@@ -103,6 +107,7 @@ impl Planted {
             let range = D * c..D * c + D;
             self.plant(mu[c], &mut rng, &mut u[range.clone()], &mut r[range]);
         }
+        let (bounds, mut b) = self.bounds(&mut rng, &mut lambda);
 
         let h = Csc::from_triplets(n, m, h.into_iter()).expect("rows and columns in range");
         let g = Csc::from_triplets(n, p, g.into_iter()).expect("rows and columns in range");
@@ -112,10 +117,9 @@ impl Planted {
         mass.mul_add(1.0, &v, &mut f);
         h.mul_add(-1.0, &r, &mut f);
         g.mul_add(-1.0, &lambda, &mut f);
-        let mut b = vec![0.0; p];
         g.mul_transpose_add(-1.0, &v, &mut b);
-        let bilateral = (p > 0).then_some(BilateralGlobal { G: g, b });
-        let problem = FrictionGlobal { M: mass, H: h, f, w, mu, bilateral };
+        let rows = (p > 0).then_some(RowsGlobal { G: g, b, bounds });
+        let problem = FrictionGlobal { M: mass, H: h, f, w, mu, rows };
         problem.validate().expect("a planted problem is valid");
         (problem, GlobalPoint { v, r, lambda })
     }
@@ -127,7 +131,7 @@ impl Planted {
         let inverse = Inverse::new(&global.M, "M").expect("a planted M is invertible");
         let mut q = vec![0.0; r.len()];
         global.velocity_into(&v, &mut q);
-        let bilateral = global.bilateral.as_ref().map(|BilateralGlobal { G, .. }| {
+        let rows = global.rows.as_ref().map(|RowsGlobal { G, b, bounds }| {
             let (n, p) = (G.nrows(), G.ncols());
             let (mut vv, mut rr) = (Vec::new(), Vec::new());
             let mut x = vec![0.0; n];
@@ -143,11 +147,15 @@ impl Planted {
             let vv =
                 Csc::from_triplets(r.len(), p, vv.into_iter().filter(stored)).expect("in range");
             let rr = Csc::from_triplets(p, p, rr.into_iter().filter(stored)).expect("in range");
-            let mut s = vec![0.0; p];
+            let velocity = |j: usize| match bounds.is_free(j) {
+                true => 0.0,
+                false => G.column_dot(j, &v) + b[j],
+            };
+            let mut s: Vec<f64> = (0..p).map(velocity).collect();
             vv.mul_transpose_add(-1.0, &r, &mut s);
             rr.mul_add(-1.0, &lambda, &mut s);
             vv.mul_add(-1.0, &lambda, &mut q);
-            BilateralLocal { V: vv, R: rr, s }
+            RowsLocal { V: vv, R: rr, s, bounds: bounds.clone() }
         });
         let w = Delassus::<D>::condense(&global.H, &inverse);
         for i in 0..w.nrows() {
@@ -156,9 +164,41 @@ impl Planted {
                 q[D * i + k] -= product[k];
             }
         }
-        let problem = FrictionLocal { W: w, q, mu: global.mu, bilateral };
+        let problem = FrictionLocal { W: w, q, mu: global.mu, rows };
         problem.validate().expect("a planted problem is valid");
         (problem, LocalPoint { r, lambda })
+    }
+
+    /// Draws bounds for the rows that have some, so that λ, moved where need be, obeys them; and the velocities that it obeys them with.
+    fn bounds(&self, rng: &mut Pcg64, lambda: &mut [f64]) -> (Bounds, Vec<f64>) {
+        let mut velocities = vec![0.0; lambda.len()];
+        if self.bounded == 0 {
+            return (Bounds::default(), velocities);
+        }
+        let mut bounds = Bounds {
+            lower: vec![f64::NEG_INFINITY; lambda.len()],
+            upper: vec![f64::INFINITY; lambda.len()],
+        };
+        // Every other row as long as there are two kinds of them, the rest at the end.
+        let odd = (0..lambda.len()).filter(|j| j % 2 == 1);
+        let even = (0..lambda.len()).filter(|j| j % 2 == 0);
+        for (k, j) in odd.chain(even).take(self.bounded).enumerate() {
+            let (size, speed) = (rng.random_range(0.2..1.0), rng.random_range(0.1..1.0));
+            let (l, u) = match k % 3 {
+                0 => (0.0, f64::INFINITY),
+                1 => (-size, size),
+                _ => (f64::NEG_INFINITY, size),
+            };
+            // At the lower bound, at the upper one, or between.
+            let (at, velocity) = match rng.random_range(0..3) {
+                0 if l.is_finite() => (l, speed),
+                1 if u.is_finite() => (u, -speed),
+                _ => (lambda[j].clamp(l, u), 0.0),
+            };
+            (bounds.lower[j], bounds.upper[j]) = (l, u);
+            (lambda[j], velocities[j]) = (at, velocity);
+        }
+        (bounds, velocities)
     }
 
     /// Draws `(u, r)` of one contact that obeys the law.

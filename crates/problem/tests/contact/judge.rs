@@ -6,8 +6,7 @@ use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::check::{Judged, Measure};
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{
-    BilateralGlobal, BilateralLocal, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint,
-    Problem,
+    FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem, RowsGlobal, RowsLocal,
 };
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -178,7 +177,7 @@ fn local<const D: usize>(random: &mut Pcg64, size: i32) -> (FrictionLocal<D>, Lo
     let s = left.iter().map(|x| -x.to_f64().value()).collect();
     let mut problem = FrictionLocal::new(Bsr::from_csc(&w), q, mu).unwrap();
     if p > 0 {
-        problem.bilateral = Some(BilateralLocal { V: v, R: rr, s });
+        problem.rows = Some(RowsLocal::bilateral(v, rr, s));
         problem.validate().unwrap();
     }
     (problem, LocalPoint { r, lambda })
@@ -189,7 +188,7 @@ fn local_agrees<const D: usize>(problem: &FrictionLocal<D>, point: &LocalPoint, 
     let q = all(&problem.q);
     let mut u = q.clone();
     product(&problem.W.to_csc(), &all(&point.r), &mut u);
-    if let Some(b) = &problem.bilateral {
+    if let Some(b) = &problem.rows {
         product(&b.V, &all(&point.lambda), &mut u);
     }
     let w: Vec<RBig> = (0..problem.contacts())
@@ -268,7 +267,7 @@ fn global<const D: usize>(random: &mut Pcg64, size: i32) -> (FrictionGlobal<D>, 
     let b = b.iter().map(|b| -b.to_f64().value()).collect();
     let mut problem = FrictionGlobal::new(mass, h, f, w, mu).unwrap();
     if p > 0 {
-        problem.bilateral = Some(BilateralGlobal { G: g, b });
+        problem.rows = Some(RowsGlobal::bilateral(g, b));
         problem.validate().unwrap();
     }
     (problem, GlobalPoint { v, r, lambda })
@@ -303,7 +302,7 @@ fn global_agrees<const D: usize>(problem: &FrictionGlobal<D>, point: &GlobalPoin
         .collect();
     let mut load = all(&problem.f);
     product(&problem.H, &all(&point.r), &mut load);
-    if let Some(b) = &problem.bilateral {
+    if let Some(b) = &problem.rows {
         mass.iter_mut().for_each(|row| row.resize(n + p, RBig::ZERO));
         mass.resize(n + p, vec![RBig::ZERO; n + p]);
         for (i, j, g) in b.G.triplets() {
@@ -342,7 +341,7 @@ fn multipliers_that_cancel_impulses_hide_nothing() {
     let inertia = Csc::from_triplets(1, 1, [(0, 0, 1.25)].into_iter()).unwrap();
     let q = vec![-off, -off];
     let mut problem = FrictionLocal::<2>::new(w, q, vec![1.0]).unwrap();
-    problem.bilateral = Some(BilateralLocal { V: v, R: inertia, s: vec![0.0] });
+    problem.rows = Some(RowsLocal::bilateral(v, inertia, vec![0.0]));
     problem.validate().unwrap();
     let verdict = problem.judge(&LocalPoint { r, lambda }, 1e-3).unwrap();
     assert!(!verdict.solved);

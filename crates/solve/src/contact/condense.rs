@@ -1,14 +1,17 @@
 //! Global → local: `W = Hᵀ M⁻¹ H`, `q = Hᵀ M⁻¹ f + w`.
 //!
 //! The velocities are eliminated, and with them the bilateral constraints: `M⁻¹` stands for the velocity part of
-//! `[M, −G; Gᵀ, 0]⁻¹`, so the local problem has none. The way back recovers `(v, λ)` from r by one solve.
+//! `[M, −G; Gᵀ, 0]⁻¹`, so the local problem has none. Of the scalar rows those with bounds stay: `V = Hᵀ M⁻¹ G`, `R = Gᵀ M⁻¹ G`,
+//! `s = Gᵀ M⁻¹ f + b`. The way back recovers `(v, λ)` from r, and the λ of those rows, by one solve.
 //!
 //! Source: Acary, lecture (2)–(9). Cost: D solves per contact, then one product per pair of contacts that share
 //! a component of M. Storage: W. Fails where M is singular.
 
-use nonsmooth_linalg::{Csc, Delassus, budget};
+use nonsmooth_linalg::{Csc, Delassus, Refine, budget};
 use nonsmooth_problem::check::{Certificate, Impulses};
-use nonsmooth_problem::{Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint};
+use nonsmooth_problem::{
+    Bounds, Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RowsLocal,
+};
 
 use crate::SolveError;
 use crate::core::reformulation::Reformulation;
@@ -66,7 +69,8 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
         let bytes = Delassus::<D>::condensed_bytes(&problem.H, &dynamics.inverse);
         budget::admit("the condensed W", bytes)?;
         let w = Delassus::condense(&problem.H, &dynamics.inverse); //                W = Hᵀ M⁻¹ H
-        let local = FrictionLocal::new(w, q, problem.mu.clone())?;
+        let mut local = FrictionLocal::new(w, q, problem.mu.clone())?;
+        local.rows = rows(problem, &mut dynamics);
         Ok((local, CondenseMemo { dynamics, h: problem.H.clone(), contradiction }))
     }
 
@@ -79,6 +83,7 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
         if memo.dynamics.serves(problem) && memo.h == problem.H {
             memo.contradiction = memo.dynamics.free_velocity(problem, &mut reduced.q);
             reduced.mu.clone_from(&problem.mu);
+            reduced.rows = rows(problem, &mut memo.dynamics);
             reduced.validate()?;
         } else {
             (*reduced, *memo) = self.reduce(problem)?;
@@ -92,12 +97,14 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
 
     fn lower(
         &self,
-        _: &FrictionGlobal<D>,
+        problem: &FrictionGlobal<D>,
         point: &GlobalPoint,
         _: &CondenseMemo,
         reduced: &mut LocalPoint,
     ) {
         reduced.r.clone_from(&point.r);
+        reduced.lambda.clear();
+        reduced.lambda.extend(bounded(problem).map(|j| point.lambda[j]));
     }
 
     fn lift(
@@ -108,6 +115,39 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
         point: &mut GlobalPoint,
     ) {
         point.r.clone_from(&reduced.r);
+        bounded(problem).zip(&reduced.lambda).for_each(|(j, x)| point.lambda[j] = *x);
         memo.dynamics.complete(problem, point);
     }
+}
+
+/// The rows with bounds.
+fn bounded<const D: usize>(problem: &FrictionGlobal<D>) -> impl Iterator<Item = usize> + '_ {
+    problem.rows.iter().flat_map(|b| b.bounds.bounded())
+}
+
+/// The rows with bounds as the local problem states them, if there are any.
+#[allow(non_snake_case)]
+fn rows<const D: usize>(problem: &FrictionGlobal<D>, dynamics: &mut Dynamics) -> Option<RowsLocal> {
+    let b = problem.rows.as_ref().filter(|b| !b.bounds.are_free())?;
+    let which: Vec<usize> = bounded(problem).collect();
+    let (mut v, mut r) = (vec![], vec![]);
+    for (k, &j) in which.iter().enumerate() {
+        let response = dynamics.respond_to_row(problem, j);
+        let of = |a: &Csc, i: usize| a.column_dot(i, response);
+        v.extend((0..problem.w.len()).map(|i| (i, k, of(&problem.H, i))));
+        r.extend(which.iter().enumerate().map(|(l, &i)| (l, k, of(&b.G, i))));
+    }
+    let there = |e: &(usize, usize, f64)| e.2 != 0.0;
+    let matrix = |rows: usize, entries: Vec<_>| {
+        let entries = entries.into_iter().filter(there);
+        Csc::from_triplets(rows, which.len(), entries).expect("in range")
+    };
+    // Without impulses, those of the rows included.
+    dynamics.hold(&vec![0.0; b.b.len()]);
+    let (free, _) = dynamics.solve(problem, &vec![0.0; problem.w.len()], Refine::Fully);
+    let s = which.iter().map(|&j| b.G.column_dot(j, free) + b.b[j]).collect();
+    let [lower, upper] =
+        [0, 1].map(|side| which.iter().map(|&j| b.bounds.of(j)[side]).collect::<Vec<f64>>());
+    let (V, R) = (matrix(problem.w.len(), v), matrix(which.len(), r));
+    Some(RowsLocal { V, R, s, bounds: Bounds { lower, upper } })
 }

@@ -4,7 +4,7 @@ use nonsmooth_linalg::{Bsr, Csc, Delassus, Inverse};
 use nonsmooth_problem::check::{Existence, Judged, Kinematic};
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{
-    BilateralGlobal, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem,
+    FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem, RowsGlobal,
 };
 use nonsmooth_solve::contact::form::Blockwise;
 use nonsmooth_solve::existence::{decide, glance_at};
@@ -78,7 +78,7 @@ fn in_units<const D: usize>(
     scaled.M = Csc::from_triplets(p.dofs(), p.dofs(), m).unwrap();
     scaled.f.iter_mut().for_each(|f| *f *= impulse);
     scaled.w.iter_mut().for_each(|w| *w *= velocity);
-    if let Some(b) = &mut scaled.bilateral {
+    if let Some(b) = &mut scaled.rows {
         b.b.iter_mut().for_each(|b| *b *= velocity);
     }
     scaled
@@ -210,13 +210,13 @@ fn bilateral_constraints_hold_a_body_in_place() {
     let mut p = point_mass(&[[Z, X, Y]], vec![-1.0, 0.0, 0.0], 0.3);
     assert_eq!(name(&p), "proved");
     let g = Csc::from_triplets(3, 1, [(2, 0, 1.0)].into_iter()).unwrap();
-    p.bilateral = Some(BilateralGlobal { G: g, b: vec![0.0] });
+    p.rows = Some(RowsGlobal::bilateral(g, vec![0.0]));
     assert_eq!(name(&p), "no_solution");
-    p.bilateral.as_mut().unwrap().b[0] = -2.0;
+    p.rows.as_mut().unwrap().b[0] = -2.0;
     assert_eq!(name(&p), "proved");
     // Two constraints that contradict each other.
     let g = Csc::from_triplets(3, 2, [(2, 0, 1.0), (2, 1, 1.0)].into_iter()).unwrap();
-    p.bilateral = Some(BilateralGlobal { G: g, b: vec![-2.0, -3.0] });
+    p.rows = Some(RowsGlobal::bilateral(g, vec![-2.0, -3.0]));
     assert_eq!(name(&p), "no_solution");
 }
 

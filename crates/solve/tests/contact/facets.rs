@@ -283,11 +283,11 @@ fn contradicting_constraints_are_refuted() {
     // λ would have to be 1 and 2 at once: V = 0, R = [1 1; 1 1], s = (−1, −2).
     let (mut problem, _) = planted(1, MIXED).local::<3>();
     let n = problem.q.len();
-    problem.bilateral = Some(nonsmooth_problem::BilateralLocal {
-        V: Csc::zeros(n, 2),
-        R: Csc::from_triplets(2, 2, (0..4).map(|k| (k / 2, k % 2, 1.0))).unwrap(),
-        s: vec![-1.0, -2.0],
-    });
+    problem.rows = Some(nonsmooth_problem::RowsLocal::bilateral(
+        Csc::zeros(n, 2),
+        Csc::from_triplets(2, 2, (0..4).map(|k| (k / 2, k % 2, 1.0))).unwrap(),
+        vec![-1.0, -2.0],
+    ));
     for outcome in [inner(facets(4), &problem).0, outer(facets(4), &problem).0] {
         assert_eq!(outcome.status.name(), "infeasible", "{}", outcome.status);
     }

@@ -1,8 +1,8 @@
 //! Hostile problems of every kind, each a function of a seed and an index.
 
 use nonsmooth::{
-    BilateralGlobal, BilateralLocal, BoxLcp, Bsr, Csc, Dense, FrictionGlobal, FrictionLocal, Hlcp,
-    Lcp, Matrix, Mlcp,
+    BoxLcp, Bsr, Csc, Dense, FrictionGlobal, FrictionLocal, Hlcp, Lcp, Matrix, Mlcp, RowsGlobal,
+    RowsLocal,
 };
 use nonsmooth_solve::Reformulation;
 use nonsmooth_solve::contact::Condense;
@@ -327,12 +327,11 @@ struct Local {
 fn local<const D: usize>(data: &Local) -> FrictionLocal<D> {
     let m = data.q.len();
     let w = Bsr::from_csc(&csc(&data.w, m));
-    let bilateral = data.bilateral.as_ref().map(|(v, r, s)| BilateralLocal {
-        V: csc(v, s.len()),
-        R: csc(r, s.len()),
-        s: s.clone(),
-    });
-    let problem = FrictionLocal { W: w, q: data.q.clone(), mu: data.mu.clone(), bilateral };
+    let bilateral = data
+        .bilateral
+        .as_ref()
+        .map(|(v, r, s)| RowsLocal::bilateral(csc(v, s.len()), csc(r, s.len()), s.clone()));
+    let problem = FrictionLocal { W: w, q: data.q.clone(), mu: data.mu.clone(), rows: bilateral };
     problem.validate().expect("valid");
     problem
 }
@@ -588,10 +587,10 @@ fn global<const D: usize>(data: &Global) -> FrictionGlobal<D> {
         f: data.f.clone(),
         w: data.w.clone(),
         mu: data.mu.clone(),
-        bilateral: data
+        rows: data
             .bilateral
             .as_ref()
-            .map(|(g, b)| BilateralGlobal { G: csc(g, b.len()), b: b.clone() }),
+            .map(|(g, b)| RowsGlobal::bilateral(csc(g, b.len()), b.clone())),
     };
     problem.validate().expect("valid");
     problem

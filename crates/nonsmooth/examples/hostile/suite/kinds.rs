@@ -336,7 +336,7 @@ impl<const D: usize> FrictionParts for FrictionLocal<D> {
         let mut union = Union::new(m + self.multipliers());
         let mut entries: Vec<Vec<(usize, f64)>> = vec![vec![]; m];
         self.W.to_csc().triplets().for_each(|(i, j, x)| entries[i].push((j, x)));
-        if let Some(b) = &self.bilateral {
+        if let Some(b) = &self.rows {
             b.V.triplets().for_each(|(i, j, x)| entries[i].push((m + j, x)));
             for j in 0..b.s.len() {
                 let (at, values) = b.V.column(j);
@@ -370,7 +370,7 @@ impl<const D: usize> FrictionParts for FrictionGlobal<D> {
         let mut entries: Vec<Vec<(usize, f64)>> = vec![vec![]; n];
         self.M.triplets().for_each(|(i, j, x)| entries[i].push((j, x)));
         self.H.triplets().for_each(|(i, j, x)| entries[i].push((n + j, -x)));
-        if let Some(b) = &self.bilateral {
+        if let Some(b) = &self.rows {
             b.G.triplets().for_each(|(i, j, x)| entries[i].push((n + m + j, -x)));
             for j in 0..b.b.len() {
                 let (at, values) = b.G.column(j);
@@ -453,7 +453,7 @@ impl<const D: usize> Judge for FrictionLocal<D> {
         let mut sums: Vec<Sum> = self.q.iter().map(|&q| Sum::of(q)).collect();
         self.W.to_csc().triplets().for_each(|(i, j, a)| sums[i].add(a, point.r[j]));
         let mut bilateral = 0.0;
-        if let Some(b) = &self.bilateral {
+        if let Some(b) = &self.rows {
             b.V.triplets().for_each(|(i, j, a)| sums[i].add(a, point.lambda[j]));
             let mut rows: Vec<Sum> = b.s.iter().map(|&s| Sum::of(s)).collect();
             b.V.triplets().for_each(|(i, j, a)| rows[j].add(a, point.r[i]));
@@ -531,7 +531,7 @@ impl<const D: usize> Judge for FrictionGlobal<D> {
             entry(&mut forms, j, n + p, self.w[j]);
         }
         let mut bilateral = 0.0;
-        if let Some(b) = &self.bilateral {
+        if let Some(b) = &self.rows {
             let mut rows: Vec<Sum> = b.b.iter().map(|&b| Sum::of(b)).collect();
             let mut weights = vec![0.0; p];
             b.G.triplets().for_each(|(i, j, x)| {
@@ -553,7 +553,7 @@ impl<const D: usize> Judge for FrictionGlobal<D> {
                 let (at, values) = self.M.column(j);
                 at.iter().zip(values).for_each(|(&i, &x)| load[i].add(-x, v));
             }
-            if let Some(b) = &self.bilateral {
+            if let Some(b) = &self.rows {
                 b.G.triplets().for_each(|(i, j, x)| load[i].add(x, point.lambda[j]));
             }
             let dynamics = violation(&load, |_| 0.0);

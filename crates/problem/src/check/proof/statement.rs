@@ -125,51 +125,14 @@ impl Exactly for Hlcp {
     }
 }
 
-/// `w − M (z − z₀) = q + M z₀` with z₀ at a bound of each variable. A variable between two bounds has its distances from both,
-/// x and y with `x + y = u − l`, and `w = w⁺ − w⁻`: pairs (w⁺, x) and (w⁻, y).
+/// `w − M (z − z₀) = q + M z₀` with z₀ at a bound of each variable.
 impl Exactly for BoxLcp {
     fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
         let mut system = ConeSystem::new(exacts(&self.q), wanted);
         let all = columns(&self.M, -1, &|i| system.wants(i))?;
         for (j, column) in all.into_iter().enumerate() {
-            let (l, u) = (self.lower[j], self.upper[j]);
-            let origin = exact(if l.is_finite() { l } else { u });
-            for (i, x) in &column {
-                system.rhs[*i] -= x * &origin;
-            }
-            let opposite = |c: &Column| c.iter().map(|(i, x)| (*i, -x)).collect::<Column>();
-            let unknown = match (l.is_finite(), u.is_finite()) {
-                (false, false) => {
-                    let z = system.column(column);
-                    system.free.push(z);
-                    vec![(z, Exact::ONE)]
-                }
-                (true, false) => {
-                    let pair = [system.unit(j, 1), system.column(column)];
-                    system.pairs.push(pair);
-                    vec![(pair[1], Exact::ONE)]
-                }
-                (false, true) => {
-                    let pair = [system.unit(j, -1), system.column(opposite(&column))];
-                    system.pairs.push(pair);
-                    vec![(pair[1], -Exact::ONE)]
-                }
-                (true, true) if l == u => {
-                    let w = system.unit(j, 1);
-                    system.free.push(w);
-                    vec![]
-                }
-                (true, true) => {
-                    let row = system.row(exact(u) - exact(l));
-                    let x = system.column([column, vec![(row, Exact::ONE)]].concat());
-                    let y = system.unit(row, 1);
-                    let pairs = [[system.unit(j, 1), x], [system.unit(j, -1), y]];
-                    system.pairs.extend(pairs);
-                    system.slack_rows.push((row, [x, y]));
-                    vec![(x, Exact::ONE)]
-                }
-            };
-            system.unknowns.push((origin, unknown));
+            let unknown = bounded(&mut system, j, column, [self.lower[j], self.upper[j]]);
+            system.unknowns.push(unknown);
         }
         Some(system)
     }
@@ -177,6 +140,53 @@ impl Exactly for BoxLcp {
     fn rows(&self) -> usize {
         self.q.len()
     }
+}
+
+/// The variable z of a row whose `w = M z + q` is its partner, with the column of −M: `−w ∈ N_[l, u](z)`. A variable between two bounds has its distances from
+/// both, x and y with `x + y = u − l`, and `w = w⁺ − w⁻`: pairs (w⁺, x) and (w⁻, y).
+fn bounded(
+    system: &mut ConeSystem,
+    row: usize,
+    column: Column,
+    [l, u]: [f64; 2],
+) -> (Exact, Vec<(usize, Exact)>) {
+    let origin = exact(if l.is_finite() { l } else { u });
+    for (i, x) in &column {
+        system.rhs[*i] -= x * &origin;
+    }
+    let opposite = |c: &Column| c.iter().map(|(i, x)| (*i, -x)).collect::<Column>();
+    let unknown = match (l.is_finite(), u.is_finite()) {
+        (false, false) => {
+            let z = system.column(column);
+            system.free.push(z);
+            vec![(z, Exact::ONE)]
+        }
+        (true, false) => {
+            let pair = [system.unit(row, 1), system.column(column)];
+            system.pairs.push(pair);
+            vec![(pair[1], Exact::ONE)]
+        }
+        (false, true) => {
+            let pair = [system.unit(row, -1), system.column(opposite(&column))];
+            system.pairs.push(pair);
+            vec![(pair[1], -Exact::ONE)]
+        }
+        (true, true) if l == u => {
+            let w = system.unit(row, 1);
+            system.free.push(w);
+            vec![]
+        }
+        (true, true) => {
+            let bound = system.row(exact(u) - exact(l));
+            let x = system.column([column, vec![(bound, Exact::ONE)]].concat());
+            let y = system.unit(bound, 1);
+            let pairs = [[system.unit(row, 1), x], [system.unit(row, -1), y]];
+            system.pairs.extend(pairs);
+            system.slack_rows.push((bound, [x, y]));
+            vec![(x, Exact::ONE)]
+        }
+    };
+    (origin, unknown)
 }
 
 /// The impulses and velocities of contacts: columns of r as given, in the rows that begin with `first` the velocities u.
@@ -250,23 +260,24 @@ fn under(first: Vec<Column>, second: Vec<Column>) -> Vec<Column> {
     first.into_iter().zip(second).map(|(a, b)| [a, b].concat()).collect()
 }
 
-/// `u − W r − V λ = q`, `−Vᵀ r − R λ = s`.
+/// `u − W r − V λ = q`, `c − Vᵀ r − R λ = s`.
 impl<const D: usize> Exactly for FrictionLocal<D> {
     fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
         let m = self.q.len();
         let mut rhs = exacts(&self.q);
-        rhs.extend(self.bilateral.iter().flat_map(|b| exacts(&b.s)));
+        rhs.extend(self.rows.iter().flat_map(|b| exacts(&b.s)));
         let mut system = ConeSystem::new(rhs, wanted);
         let mut impulses = opposite(&self.W.to_csc(), 0, &system);
         let mut multipliers = vec![];
-        if let Some(b) = &self.bilateral {
+        if let Some(b) = &self.rows {
             impulses = under(impulses, opposite(&b.V.transpose(), m, &system));
             let all = under(opposite(&b.V, 0, &system), opposite(&b.R, m, &system));
-            multipliers = all.into_iter().map(|c| system.column(c)).collect();
-            system.free.extend(&multipliers);
+            let all = all.into_iter().enumerate();
+            multipliers =
+                all.map(|(j, c)| bounded(&mut system, m + j, c, b.bounds.of(j))).collect();
         }
         system.unknowns = contacts::<D>(&mut system, 0, impulses, &self.mu);
-        system.unknowns.extend(multipliers.into_iter().map(just));
+        system.unknowns.extend(multipliers);
         Some(system)
     }
 
@@ -279,29 +290,32 @@ impl<const D: usize> Exactly for FrictionLocal<D> {
     }
 }
 
-/// `M v − H r − G λ = f`, `u − Hᵀ v = w`, `−Gᵀ v = b`.
+/// `M v − H r − G λ = f`, `u − Hᵀ v = w`, `c − Gᵀ v = b`.
 impl<const D: usize> Exactly for FrictionGlobal<D> {
     fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
         let (n, m) = (self.dofs(), self.w.len());
         let mut rhs = exacts(&[&self.f[..], &self.w].concat());
-        rhs.extend(self.bilateral.iter().flat_map(|b| exacts(&b.b)));
+        rhs.extend(self.rows.iter().flat_map(|b| exacts(&b.b)));
         let mut system = ConeSystem::new(rhs, wanted);
         let mut velocities = opposite(&self.M, 0, &system);
         velocities.iter_mut().flatten().for_each(|(_, x)| *x = -std::mem::take(x));
         velocities = under(velocities, opposite(&self.H.transpose(), n, &system));
         let mut multipliers = vec![];
-        if let Some(b) = &self.bilateral {
+        if let Some(b) = &self.rows {
             velocities = under(velocities, opposite(&b.G.transpose(), n + m, &system));
             multipliers = opposite(&b.G, 0, &system);
         }
         let velocities: Vec<_> = velocities.into_iter().map(|c| system.column(c)).collect();
-        let multipliers: Vec<_> = multipliers.into_iter().map(|c| system.column(c)).collect();
-        system.free.extend(velocities.iter().chain(&multipliers));
+        system.free.extend(&velocities);
+        let bounds = self.rows.iter().flat_map(|b| (0..b.b.len()).map(|j| b.bounds.of(j)));
+        let multipliers = multipliers.into_iter().zip(bounds).enumerate();
+        let of_row = |(j, (c, bounds))| bounded(&mut system, n + m + j, c, bounds);
+        let multipliers: Vec<_> = multipliers.map(of_row).collect();
         let impulses = opposite(&self.H, 0, &system);
         let impulses = contacts::<D>(&mut system, n, impulses, &self.mu);
         system.unknowns = velocities.into_iter().map(just).collect();
         system.unknowns.extend(impulses);
-        system.unknowns.extend(multipliers.into_iter().map(just));
+        system.unknowns.extend(multipliers);
         Some(system)
     }
 

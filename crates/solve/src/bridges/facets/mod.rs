@@ -169,7 +169,7 @@ fn velocity<const D: usize>(problem: &FrictionLocal<D>, point: &LocalPoint, c: u
     let mut u = problem.W.row_product(c, &point.r);
     for (k, u) in u.iter_mut().enumerate() {
         *u += problem.q[D * c + k];
-        if let Some(b) = &problem.bilateral {
+        if let Some(b) = &problem.rows {
             let each = point.lambda.iter().enumerate();
             *u += each.map(|(j, l)| b.V.get(D * c + k, j) * l).sum::<f64>();
         }

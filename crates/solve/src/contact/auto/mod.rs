@@ -15,6 +15,8 @@
 //! 5. **Another strategy** (other ρ, more sweeps, a cold start) where the error has not halved for long; at the first time
 //!    the existence of a solution is investigated, and a problem without one is given up with its certificate.
 //!
+//! A problem with scalar rows that have bounds stays with the sweeps, which visit them too: the later stages know no bounds.
+//!
 //! A starting point is taken where its residual is below that of zero impulses; near a solution it makes stage 2 needless.
 //!
 //! References: AcaryBremondHuber2018 for the evidence that proximal Newton methods solve hyperstatic problems; AlartCurnier1991; the
@@ -34,8 +36,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::auto::proximal_newton::ProximalNewton;
 use crate::contact::existence;
-use crate::contact::form::{Access, Costs, Linearised, OnContacts};
-use crate::contact::parts::{Central, Sweep};
+use crate::contact::form::{Access, Costs, Linearised, OnContacts, has_bounds};
+use crate::contact::parts::{Central, Sweep, put_within_bounds, sweep_rows};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{Limits, SolveError, Solver, Step};
@@ -103,6 +105,8 @@ const INVESTIGATION: f64 = 2.0;
 /// The workspace. The later stages' parts are made when they are first needed.
 pub struct HybridWork<P: Linearised<D>, const D: usize> {
     state: P::State,
+    /// The problem has rows with bounds.
+    bounded: bool,
     sweep: Sweep<D>,
     central: Option<Box<Central<D>>>,
     newton: Option<Box<ProximalNewton<D>>>,
@@ -163,8 +167,10 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for OnContacts<A
     type Work = HybridWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
-        let state = problem.state(Access::Newton)?;
+        let bounded = has_bounds(problem);
+        let state = problem.state(if bounded { Access::Rows } else { Access::Newton })?;
         Ok(HybridWork {
+            bounded,
             sweep: Sweep::new(problem, &state),
             central: None,
             newton: None,
@@ -186,6 +192,10 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for OnContacts<A
     }
 
     fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
+        if has_bounds(problem) != work.bounded {
+            *work = self.work(problem)?;
+            return Ok(());
+        }
         problem.refill(&mut work.state)?;
         work.sweep.fill(problem, &work.state);
         work.scale = problem.velocity_scale(&work.state);
@@ -202,7 +212,11 @@ impl<P: Linearised<D> + Kinematic<D>, const D: usize> Solver<P> for OnContacts<A
 
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
         work.done = Done::default();
-        work.done.start = self.choose_start(problem, P::impulses(point), work);
+        if work.bounded {
+            put_within_bounds(problem, point);
+        } else {
+            work.done.start = self.choose_start(problem, P::impulses(point), work);
+        }
         problem.enter(&mut work.state, point);
         work.stage = FIRST;
         (work.existence, work.exact, work.asked) = (None, None, false);
@@ -305,7 +319,9 @@ impl<const D: usize> OnContacts<Auto, D> {
     ) -> Step {
         let mut estimate = f64::NAN;
         for _ in 0..SWEEPS_A_STEP {
-            let moves = work.sweep.sweep(problem, &mut work.state, P::impulses(point));
+            let (r, lambda) = P::all_impulses(point);
+            let moves = work.sweep.sweep(problem, &mut work.state, r)
+                + sweep_rows(problem, &mut work.state, (r, lambda), 1.0);
             work.done.sweeps += 1;
             if budget::over() {
                 break;
@@ -317,6 +333,12 @@ impl<const D: usize> OnContacts<Auto, D> {
             }
         }
         work.stage = Stage::Sweeps { last: estimate, claims };
+        if work.bounded {
+            return match estimate.is_finite() || budget::over() {
+                true => Step::Continue { estimate },
+                false => Step::Stuck("sweeps send the impulses to infinity".into()),
+            };
+        }
         if !estimate.is_finite() && !budget::over() {
             // Where W is not positive semidefinite a sweep may send the impulses to infinity.
             P::impulses(point).fill(0.0);

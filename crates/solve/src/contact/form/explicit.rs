@@ -57,7 +57,7 @@ impl<const D: usize> Explicit<D> for FrictionGlobal<D> {
         let quadratic = Csc::from_triplets(size, size, quadratic).expect("indices in range");
         let dynamics = (mass.triplets().map(|(i, j, x)| (i, m + j, x)))
             .chain(self.H.triplets().map(|(i, j, x)| (i, j, -x)));
-        let bilateral = self.bilateral.iter().flat_map(|b| b.G.triplets());
+        let bilateral = self.rows.iter().flat_map(|b| b.G.triplets());
         let linear = dynamics.chain(bilateral.map(|(i, j, x)| (i, m + n + j, -x)));
         let linear = Csc::from_triplets(n, size, linear).expect("indices in range");
         Model { quadratic, linear, symmetric }

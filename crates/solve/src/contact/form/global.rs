@@ -10,10 +10,10 @@ use nonsmooth_linalg::{
     Block, Bsr, Compensated, Csc, Delassus, Refine, Singular, norm_or_one, small,
 };
 use nonsmooth_problem::check::Impulses;
-use nonsmooth_problem::{Dynamics, FrictionGlobal, GlobalPoint};
+use nonsmooth_problem::{Bounds, Dynamics, FrictionGlobal, GlobalPoint};
 
 use super::linearised::{BodyForm, ContactForm, Form, NEVER, Once, System, made, there};
-use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised};
+use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised, Rows};
 use crate::SolveError;
 
 /// What the view keeps.
@@ -29,8 +29,18 @@ pub struct GlobalState<const D: usize> {
     /// v in doubled precision, where it was asked for: high, low, the last correction.
     precise: [Vec<f64>; 3],
     contradiction: Option<Impulses>,
+    /// Of each row, where it has bounds.
+    rows: Vec<Option<RowResponse>>,
     /// Made when it is first asked for.
     system: Once<GlobalSystem<D>>,
+}
+
+/// What a unit impulse of a row does.
+struct RowResponse {
+    /// `M⁻¹ G_j`, its entries that are not zero.
+    velocities: Vec<(usize, f64)>,
+    /// `G_jᵀ M⁻¹ G_j`.
+    own: f64,
 }
 
 /// The linear system of a Newton method, over whichever graph suits M.
@@ -88,14 +98,16 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     type State = GlobalState<D>;
 
     fn state(&self, access: Access) -> Result<Self::State, SolveError> {
-        let dynamics = Dynamics::new(self)?;
+        access.admit(self.bounds())?;
+        let mut dynamics = Dynamics::new(self)?;
+        let rows = row_responses(self, &mut dynamics);
         let inverse = &dynamics.inverse;
         match access {
             Access::Newton if inverse.has_sparse_factor() => {
                 let bytes = Delassus::<D>::condensed_bytes(&self.H, inverse);
                 budget::admit("the condensed W", bytes)?;
             }
-            Access::Visits | Access::Newton => {
+            Access::Visits | Access::Rows | Access::Newton => {
                 let bytes = Delassus::<D>::kept_bytes(&self.H, inverse);
                 budget::admit("the velocities that impulses give", bytes)?;
             }
@@ -106,7 +118,7 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
                 Access::Newton if inverse.has_sparse_factor() => {
                     Operator::Condensed(Delassus::condense(&self.H, inverse))
                 }
-                Access::Visits | Access::Newton => {
+                Access::Visits | Access::Rows | Access::Newton => {
                     Operator::Visits(Delassus::new(&self.H, inverse))
                 }
                 Access::Products => Operator::Products(Delassus::diagonal(&self.H, inverse)),
@@ -118,6 +130,7 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
             v: vec![0.0; self.dofs()],
             precise: Default::default(),
             contradiction: None,
+            rows,
             system: None,
             dynamics,
         };
@@ -165,6 +178,7 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     }
 
     fn enter(&self, state: &mut Self::State, point: &GlobalPoint) {
+        state.dynamics.hold(&point.lambda);
         let (v, _) = state.dynamics.solve(self, &point.r, Refine::Once);
         state.v.copy_from_slice(v);
     }
@@ -172,6 +186,46 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     fn complete(&self, state: &mut Self::State, point: &mut GlobalPoint) {
         state.dynamics.complete(self, point);
         state.v.copy_from_slice(&point.v);
+    }
+}
+
+/// Of a problem with rows that have bounds, what their impulses do; of another, nothing.
+fn row_responses<const D: usize>(
+    problem: &FrictionGlobal<D>,
+    dynamics: &mut Dynamics,
+) -> Vec<Option<RowResponse>> {
+    let Some(b) = problem.rows.as_ref().filter(|b| !b.bounds.are_free()) else { return vec![] };
+    let mut of = |j: usize| {
+        let v = dynamics.respond_to_row(problem, j);
+        let moving = v.iter().enumerate().filter(|(_, v)| **v != 0.0);
+        RowResponse {
+            own: b.G.column_dot(j, v),
+            velocities: moving.map(|(i, &v)| (i, v)).collect(),
+        }
+    };
+    (0..b.b.len()).map(|j| (!b.bounds.is_free(j)).then(|| of(j))).collect()
+}
+
+impl<const D: usize> Rows<D> for FrictionGlobal<D> {
+    fn bounds(&self) -> Option<&Bounds> {
+        self.rows.as_ref().map(|b| &b.bounds)
+    }
+
+    fn all_impulses(point: &mut GlobalPoint) -> (&mut [f64], &mut [f64]) {
+        (&mut point.r, &mut point.lambda)
+    }
+
+    fn row_response(&self, state: &Self::State, j: usize) -> f64 {
+        state.rows[j].as_ref().map_or(0.0, |row| row.own)
+    }
+
+    fn row_velocity(&self, state: &Self::State, _: &[f64], _: &[f64], j: usize) -> f64 {
+        self.rows.as_ref().map_or(0.0, |b| b.G.column_dot(j, &state.v) + b.b[j])
+    }
+
+    fn row_moved(&self, state: &mut Self::State, j: usize, by: f64) {
+        let GlobalState { rows, v, .. } = state;
+        rows[j].iter().flat_map(|row| &row.velocities).for_each(|&(i, x)| v[i] += by * x);
     }
 }
 

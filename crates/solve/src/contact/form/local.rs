@@ -1,20 +1,22 @@
 //! The local problem by its contacts: rows of W.
 //!
 //! Bilateral rows `0 = Vᵀ r + R λ + s` are eliminated once: `W ← W − V R⁻¹ Vᵀ`, `q ← q − V R⁻¹ s`. Redundant
-//! constraints (a singular, positive semidefinite R) are honoured.
+//! constraints (a singular, positive semidefinite R) are honoured. Rows with bounds stay ([`Bounded`]); the q of the view holds what they do.
 
 use nonsmooth_linalg::{
     Block, Bsr, Compensated, Csc, Delassus, Inverse, Refine, Singular, norm_or_one, small,
 };
 use nonsmooth_problem::check::{Impulses, Kinematic};
-use nonsmooth_problem::{BilateralLocal, FrictionLocal, LocalPoint};
+use nonsmooth_problem::{Bounds, FrictionLocal, LocalPoint, RowsLocal};
 
 use super::linearised::{ContactForm, Form, NEVER, Once, System, made, there};
-use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised};
+use super::rows::Bounded;
+use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised, Rows};
 use crate::SolveError;
 
 /// What the view keeps: the norm of q, the problem without its bilateral rows where it has any, and the linear system.
 pub struct LocalState<const D: usize> {
+    access: Access,
     scale: f64,
     eliminated: Option<Eliminated<D>>,
     /// Made when it is first asked for.
@@ -37,56 +39,84 @@ struct Eliminated<const D: usize> {
     /// λ in doubled precision: high, low, the last correction.
     precise: [Vec<f64>; 3],
     contradiction: Option<Impulses>,
+    /// The places of the rows that are eliminated; and what is left of the others.
+    free: Vec<usize>,
+    bounded: Option<Bounded>,
 }
 
 impl<const D: usize> Eliminated<D> {
-    fn new(problem: &FrictionLocal<D>, b: &BilateralLocal) -> Result<Self, SolveError> {
-        let r_inverse = Inverse::of_multipliers(&b.R, "R")?;
+    fn new(problem: &FrictionLocal<D>, b: &RowsLocal) -> Result<Self, SolveError> {
+        let free: Vec<usize> = (0..b.s.len()).filter(|&j| b.bounds.is_free(j)).collect();
+        let (v, r) = match free.len() == b.s.len() {
+            true => (b.V.clone(), b.R.clone()),
+            false => {
+                (b.V.columns(&free), b.R.columns(&free).transpose().columns(&free).transpose())
+            }
+        };
+        let r_inverse = Inverse::of_multipliers(&r, "R")?;
+        let bounded = match b.bounds.are_free() {
+            true => None,
+            false => Some(Bounded::new(b, &free, &r_inverse)?),
+        };
         // V R⁻¹ Vᵀ is the Delassus operator of "H = Vᵀ, M = R".
-        let schur = Delassus::condense(&b.V.transpose(), &r_inverse);
+        let schur = Delassus::condense(&v.transpose(), &r_inverse);
+        let p = free.len();
         let mut eliminated = Self {
             w: problem.W.minus(&schur),
             q: vec![0.0; problem.q.len()],
             schur,
-            v: b.V.clone(),
-            r: b.R.clone(),
-            lambda: vec![0.0; b.s.len()],
+            v,
+            r,
+            lambda: vec![0.0; p],
             scratch: vec![0.0; r_inverse.scratch_len()],
             r_inverse,
-            residual: vec![0.0; b.s.len()],
-            precise: [0; 3].map(|_| vec![0.0; b.s.len()]),
+            residual: vec![0.0; p],
+            precise: [0; 3].map(|_| vec![0.0; p]),
             contradiction: None,
+            free,
+            bounded,
         };
         eliminated.update_free_velocity(problem, b);
         Ok(eliminated)
     }
 
-    /// Takes another problem with the same V and R and the same pattern of W; false where it is not so.
-    fn refill(&mut self, problem: &FrictionLocal<D>, b: &BilateralLocal) -> bool {
-        let same = self.v == b.V && self.r == b.R && self.w.set_difference(&problem.W, &self.schur);
+    /// Takes another problem with the same V and R and the same pattern of W; false where it is not so, or rows have bounds.
+    fn refill(&mut self, problem: &FrictionLocal<D>, b: &RowsLocal) -> bool {
+        let same = self.v == b.V
+            && self.r == b.R
+            && b.bounds.are_free()
+            && self.w.set_difference(&problem.W, &self.schur);
         if same {
             self.update_free_velocity(problem, b);
         }
         same
     }
 
-    fn update_free_velocity(&mut self, problem: &FrictionLocal<D>, b: &BilateralLocal) {
-        self.lambda.copy_from_slice(&b.s);
+    fn update_free_velocity(&mut self, problem: &FrictionLocal<D>, b: &RowsLocal) {
+        let s = || self.free.iter().map(|&j| b.s[j]);
+        self.lambda.iter_mut().zip(s()).for_each(|(x, s)| *x = s);
         self.r_inverse.solve_with(&mut self.lambda, &mut self.scratch, Refine::Fully);
         // What R λ = s leaves, where the constraints contradict each other.
-        self.residual.copy_from_slice(&b.s);
-        b.R.mul_add(-1.0, &self.lambda, &mut self.residual);
-        let violated = |(left, s): (&f64, &f64)| left.abs() > 1e-10 * s.abs();
+        self.residual.iter_mut().zip(s()).for_each(|(x, s)| *x = s);
+        self.r.mul_add(-1.0, &self.lambda, &mut self.residual);
+        let violated = |(left, s): (&f64, f64)| left.abs() > 1e-10 * s.abs();
         self.contradiction = None;
-        if self.residual.iter().zip(&b.s).any(violated) {
+        if self.residual.iter().zip(s()).any(violated) {
             let mut multipliers = self.residual.clone();
             self.r_inverse.null_direction(&mut multipliers);
+            let mut all = vec![0.0; b.s.len()];
+            self.free.iter().zip(&multipliers).for_each(|(&j, x)| all[j] = *x);
             let r = vec![0.0; problem.q.len()];
             self.contradiction =
-                Impulses::toward(r, multipliers, &[], &b.s, |c| problem.kinematics().refutes(c));
+                Impulses::toward(r, all, &[], &b.s, |c| problem.kinematics().refutes(c));
         }
-        self.q.copy_from_slice(&problem.q);
-        b.V.mul_add(-1.0, &self.lambda, &mut self.q);
+        self.without_rows(&problem.q);
+    }
+
+    /// q without impulses of rows that have bounds.
+    fn without_rows(&mut self, q: &[f64]) {
+        self.q.copy_from_slice(q);
+        self.v.mul_add(-1.0, &self.lambda, &mut self.q);
     }
 }
 
@@ -98,6 +128,10 @@ impl<const D: usize> LocalState<D> {
             None => (&problem.W, &problem.q),
             Some(e) => (&e.w, &e.q),
         }
+    }
+
+    fn bounded(&self) -> Option<&Bounded> {
+        self.eliminated.as_ref()?.bounded.as_ref()
     }
 
     /// The multipliers with which the bilateral constraints feel no motion from the impulses r: `Vᵀ r + R λ = 0`. Allocates.
@@ -114,20 +148,22 @@ impl<const D: usize> LocalState<D> {
 impl<const D: usize> Contacts<D> for FrictionLocal<D> {
     type State = LocalState<D>;
 
-    fn state(&self, _: Access) -> Result<Self::State, SolveError> {
-        let eliminated = self.bilateral.as_ref().map(|b| Eliminated::new(self, b)).transpose()?;
-        Ok(LocalState { scale: norm_or_one(&self.q), eliminated, system: None, sums: vec![] })
+    fn state(&self, access: Access) -> Result<Self::State, SolveError> {
+        access.admit(self.bounds())?;
+        let eliminated = self.rows.as_ref().map(|b| Eliminated::new(self, b)).transpose()?;
+        let scale = norm_or_one(&self.q);
+        Ok(LocalState { access, scale, eliminated, system: None, sums: vec![] })
     }
 
     fn refill(&self, state: &mut Self::State) -> Result<(), SolveError> {
         state.scale = norm_or_one(&self.q);
-        let kept = match (&mut state.eliminated, &self.bilateral) {
+        let kept = match (&mut state.eliminated, &self.rows) {
             (None, None) => true,
             (Some(eliminated), Some(b)) => eliminated.refill(self, b),
             _ => false,
         };
         if !kept {
-            *state = self.state(Access::Visits)?;
+            *state = self.state(state.access)?;
         }
         let LocalState { eliminated, system, .. } = state;
         let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
@@ -157,17 +193,51 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
         &mut point.r
     }
 
-    fn enter(&self, _: &mut Self::State, _: &LocalPoint) {}
+    fn enter(&self, state: &mut Self::State, point: &LocalPoint) {
+        let Some(e) = state.eliminated.as_mut().filter(|e| e.bounded.is_some()) else { return };
+        e.without_rows(&self.q);
+        if let Some(bounded) = &e.bounded {
+            bounded.effect.mul_add(1.0, &point.lambda, &mut e.q);
+        }
+    }
 
     fn complete(&self, state: &mut Self::State, point: &mut LocalPoint) {
-        if let (Some(b), Some(e)) = (&self.bilateral, &mut state.eliminated) {
-            // λ = −R⁻¹ (Vᵀ r + s).
-            for (l, s) in point.lambda.iter_mut().zip(&b.s) {
-                *l = -s;
+        let (Some(b), Some(e)) = (&self.rows, &mut state.eliminated) else { return };
+        // λ_F = −R_FF⁻¹ (V_Fᵀ r + R_FB λ_B + s_F).
+        let multipliers = &mut e.residual;
+        multipliers.iter_mut().zip(&e.free).for_each(|(x, &j)| *x = -b.s[j]);
+        e.v.mul_transpose_add(-1.0, &point.r, multipliers);
+        for j in b.bounds.bounded() {
+            for (x, &i) in multipliers.iter_mut().zip(&e.free) {
+                *x -= b.R.get(i, j) * point.lambda[j];
             }
-            b.V.mul_transpose_add(-1.0, &point.r, &mut point.lambda);
-            e.r_inverse.solve_with(&mut point.lambda, &mut e.scratch, Refine::Fully);
         }
+        e.r_inverse.solve_with(multipliers, &mut e.scratch, Refine::Fully);
+        e.free.iter().zip(&*multipliers).for_each(|(&j, x)| point.lambda[j] = *x);
+    }
+}
+
+impl<const D: usize> Rows<D> for FrictionLocal<D> {
+    fn bounds(&self) -> Option<&Bounds> {
+        self.rows.as_ref().map(|b| &b.bounds)
+    }
+
+    fn all_impulses(point: &mut LocalPoint) -> (&mut [f64], &mut [f64]) {
+        (&mut point.r, &mut point.lambda)
+    }
+
+    fn row_response(&self, state: &Self::State, j: usize) -> f64 {
+        state.bounded().map_or(0.0, |rows| rows.response(j))
+    }
+
+    fn row_velocity(&self, state: &Self::State, r: &[f64], lambda: &[f64], j: usize) -> f64 {
+        state.bounded().map_or(0.0, |rows| rows.velocity(r, lambda, j))
+    }
+
+    fn row_moved(&self, state: &mut Self::State, j: usize, by: f64) {
+        let Some(Eliminated { q, bounded: Some(rows), .. }) = &mut state.eliminated else { return };
+        let (at, values) = rows.effect.column(j);
+        at.iter().zip(values).for_each(|(&i, v)| q[i] += by * v);
     }
 }
 
@@ -216,9 +286,7 @@ impl<const D: usize> Linear<D> for FrictionLocal<D> {
                 }
             }
         }
-        if let (Some(BilateralLocal { V, s, .. }), Some(e)) =
-            (&self.bilateral, &mut state.eliminated)
-        {
+        if let (Some(RowsLocal { V, s, .. }), Some(e)) = (&self.rows, &mut state.eliminated) {
             // λ = −R⁻¹ (Vᵀ r + s), high and low.
             let [high, low, last] = &mut e.precise;
             for j in 0..s.len() {

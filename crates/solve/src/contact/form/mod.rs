@@ -3,7 +3,8 @@
 //! | capability | what a family may ask | offered by |
 //! | --- | --- | --- |
 //! | [`Contacts`] | the law's data, the diagonal blocks of W, ‖q‖, the impulses of a point | local, global |
-//! | [`Blockwise`] | one contact's velocity, and to be told that one contact's impulse moved | local (rows of W), global (velocity space) |
+//! | [`Rows`] | one scalar row's velocity, and to be told that its impulse moved | local, global |
+//! | [`Blockwise`] | in addition, one contact's velocity, and to be told that one contact's impulse moved | local (rows of W), global (velocity space) |
 //! | [`Concurrent`] | in addition, which contacts do not feel each other, and visits from several threads | local, global |
 //! | [`Linear`] | `u = W r + q` for all contacts | local (W), global (product form) |
 //! | [`Explicit`] | entries of matrices that state the symmetric part of W | local (W), global (M, H, G) |
@@ -16,10 +17,11 @@ mod global;
 mod linearised;
 mod local;
 mod regularised;
+mod rows;
 
 use nonsmooth_linalg::{Block, Singular};
-use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Impulses;
+use nonsmooth_problem::{Bounds, Problem};
 
 pub use explicit::{Explicit, Model};
 pub use local::LocalState;
@@ -36,6 +38,21 @@ pub enum Access {
     Products,
     /// In linear systems ([`Linearised`]), and in both ways above.
     Newton,
+    /// Contact by contact and scalar row by scalar row ([`Rows`]): all other ways refuse rows that have bounds.
+    Rows,
+}
+
+impl Access {
+    /// Errors: rows with bounds, for a method that knows none.
+    fn admit(self, bounds: Option<&Bounds>) -> Result<(), SolveError> {
+        match bounds.and_then(|bounds| bounds.bounded().next().map(|j| (j, bounds.of(j)))) {
+            Some((j, [l, u])) if self != Access::Rows => Err(SolveError::needs(
+                "scalar rows without bounds (nsgs and auto take bounds)",
+                format!("[l, u][{j}] = [{l}, {u}]"),
+            )),
+            _ => Ok(()),
+        }
+    }
 }
 
 /// A problem with D-dimensional frictional contacts, seen by its contacts.
@@ -73,8 +90,33 @@ pub trait Contacts<const D: usize>: Problem {
     fn complete(&self, state: &mut Self::State, point: &mut Self::Point);
 }
 
+/// Access to the scalar rows that have bounds, row by row. Those without are no concern of a visitor: the view keeps `c = 0` there.
+///
+/// The state must be made with [`Access::Rows`].
+pub trait Rows<const D: usize>: Contacts<D> {
+    /// The bounds, if the problem has rows.
+    fn bounds(&self) -> Option<&Bounds>;
+
+    /// The impulses of the contacts of a point, and those of all rows.
+    fn all_impulses(point: &mut Self::Point) -> (&mut [f64], &mut [f64]);
+
+    /// `∂c_j/∂λ_j`.
+    fn row_response(&self, state: &Self::State, j: usize) -> f64;
+
+    /// The velocity `c_j` of row j for the current impulses.
+    fn row_velocity(&self, state: &Self::State, r: &[f64], lambda: &[f64], j: usize) -> f64;
+
+    /// The impulse of row j moved by `by` (and λ holds it already).
+    fn row_moved(&self, state: &mut Self::State, j: usize, by: f64);
+}
+
+/// Whether the problem has rows with bounds.
+pub fn has_bounds<P: Rows<D>, const D: usize>(problem: &P) -> bool {
+    problem.bounds().is_some_and(|bounds| !bounds.are_free())
+}
+
 /// Access contact by contact, as block Gauss–Seidel needs it.
-pub trait Blockwise<const D: usize>: Contacts<D> {
+pub trait Blockwise<const D: usize>: Rows<D> {
     /// The relative velocity `u_c` for the current impulses `r`.
     fn velocity(&self, state: &Self::State, r: &[f64], c: usize) -> [f64; D];
 

@@ -5,9 +5,9 @@
 
 use nonsmooth_linalg::{Block, Singular};
 use nonsmooth_problem::check::{Certificate, ConeSystem, Evidence, Impulses, Measure};
-use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Kind, Problem, ProblemError};
+use nonsmooth_problem::{Bounds, FrictionGlobal, FrictionLocal, Kind, Problem, ProblemError};
 
-use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised};
+use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised, Rows};
 use crate::SolveError;
 
 /// `P` with a proximal term.
@@ -32,8 +32,8 @@ impl<const D: usize> Overwrite for FrictionLocal<D> {
         self.W.clone_from(&other.W);
         self.q.clone_from(&other.q);
         self.mu.clone_from(&other.mu);
-        if self.bilateral != other.bilateral {
-            self.bilateral.clone_from(&other.bilateral);
+        if self.rows != other.rows {
+            self.rows.clone_from(&other.rows);
         }
     }
 }
@@ -47,8 +47,10 @@ impl<const D: usize> Overwrite for FrictionGlobal<D> {
         self.f.clone_from(&other.f);
         self.w.clone_from(&other.w);
         self.mu.clone_from(&other.mu);
-        match (&mut self.bilateral, &other.bilateral) {
-            (Some(mine), Some(others)) if mine.G == others.G => mine.b.clone_from(&others.b),
+        match (&mut self.rows, &other.rows) {
+            (Some(mine), Some(others)) if mine.G == others.G && mine.bounds == others.bounds => {
+                mine.b.clone_from(&others.b);
+            }
             (mine, others) => mine.clone_from(others),
         }
     }
@@ -160,6 +162,28 @@ impl<P: Contacts<D>, const D: usize> Contacts<D> for Regularised<P> {
 
     fn complete(&self, state: &mut Self::State, point: &mut Self::Point) {
         self.base.complete(&mut state.base, point);
+    }
+}
+
+impl<P: Rows<D>, const D: usize> Rows<D> for Regularised<P> {
+    fn bounds(&self) -> Option<&Bounds> {
+        self.base.bounds()
+    }
+
+    fn all_impulses(point: &mut Self::Point) -> (&mut [f64], &mut [f64]) {
+        P::all_impulses(point)
+    }
+
+    fn row_response(&self, state: &Self::State, j: usize) -> f64 {
+        self.base.row_response(&state.base, j)
+    }
+
+    fn row_velocity(&self, state: &Self::State, r: &[f64], lambda: &[f64], j: usize) -> f64 {
+        self.base.row_velocity(&state.base, r, lambda, j)
+    }
+
+    fn row_moved(&self, state: &mut Self::State, j: usize, by: f64) {
+        self.base.row_moved(&mut state.base, j, by);
     }
 }
 

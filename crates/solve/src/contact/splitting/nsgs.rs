@@ -3,6 +3,8 @@
 //! Problem: `u = W r + q`, `K* ∋ u + mu‖u_T‖e_N ⟂ r ∈ K` for each contact, W given by its rows or, in velocity
 //! space, by `u_c = H_cᵀ v + w_c` and `v += M⁻¹ H_c Δr_c`.
 //!
+//! Scalar rows with bounds (limits, motors) are visited after the contacts, by projected SOR with the same ω; rows without are eliminated.
+//!
 //! Method: visit the contacts in turn; freeze all impulses but the visited contact's; solve that contact's own
 //! problem `u_c = W_cc r_c + (q_c + Σ_{j≠c} W_cj r_j)` with a local solver; go on with the new impulse. With relaxation
 //! `r_c ← (1 − ω) r_c + ω r_c^new`, projected back on K where ω > 1. Optionally every few sweeps are taken as one step of a fixed point
@@ -24,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use crate::contact::form::{Access, Blockwise};
 use crate::contact::law::cone;
 use crate::contact::law::local::LocalSolver;
-use crate::contact::parts::Accelerator;
+use crate::contact::parts::{Accelerator, put_within_bounds, sweep_rows};
 use crate::contact::splitting::ordering::{Order, Ordering};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
@@ -148,7 +150,7 @@ impl Described for Nsgs {
         name: "nsgs",
         family: "splitting",
         solves: Solves::Law,
-        summary: "nonsmooth block Gauss-Seidel over contacts, with a choice of local solvers",
+        summary: "nonsmooth block Gauss-Seidel over contacts and scalar rows with bounds, with a choice of local solvers",
         needs: &[],
         cites: &[
             "JourdanAlartJean1998",
@@ -250,7 +252,7 @@ where
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
         let n = problem.mu().len();
         let mut work = SweepsWork {
-            state: problem.state(Access::Visits)?,
+            state: problem.state(Access::Rows)?,
             local: self.local.clone(),
             contacts: Vec::with_capacity(n),
             order: Order::new(self.settings.ordering, n, self.settings.seed),
@@ -270,6 +272,7 @@ where
     }
 
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        put_within_bounds(problem, point);
         problem.enter(&mut work.state, point);
         work.mean_move = 0.0;
         work.circles.restart(self.settings.omega, self.settings.omega_min);
@@ -281,7 +284,7 @@ where
         if let Some(ray) = problem.contradiction(&work.state) {
             return Step::NoSolution(ray.clone().into());
         }
-        let r = P::impulses(point);
+        let (r, lambda) = P::all_impulses(point);
         let SweepsWork { state, local, contacts, order, mean_move, circles, .. } = work;
         let accelerated = work.accelerator.is_on();
         if accelerated && work.since == 0 {
@@ -320,6 +323,9 @@ where
             contact.settled = if moved <= settled_below { contact.settled + 1 } else { 0 };
             moves += moved;
         }
+        let of_rows = sweep_rows(problem, state, (r, lambda), omega);
+        still &= of_rows == 0.0;
+        moves += of_rows / problem.velocity_scale(state).powi(2);
         *mean_move = moves / contacts.len() as f64;
         let repeats = freeze_after == 0 && self.settings.ordering == Ordering::Given;
         if still && repeats && tolerance == 0.0 {

@@ -1,0 +1,127 @@
+//! The bounds of scalar rows.
+
+use crate::ProblemError;
+
+/// What the impulse λ_j of each scalar row may be, `l_j ≤ λ_j ≤ u_j`; with c the velocity of the row, `−c_j ∈ N_[l_j, u_j](λ_j)`: `c_j ≥ 0` where
+/// `λ_j = l_j`, `c_j ≤ 0` where `λ_j = u_j`, and `c_j = 0` between.
+///
+/// | bounds | the row is |
+/// | --- | --- |
+/// | `−∞, ∞` | free: a bilateral constraint, `c = 0` |
+/// | `0, ∞` | a half line: a limit of a joint, a rope, `0 ≤ λ ⟂ c ≥ 0` |
+/// | `l, u` | a box: a motor of limited strength, dry friction in a joint |
+///
+/// Units: those of the impulses of the row, N·s or N·m·s.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Bounds {
+    /// l, p, −∞ allowed; empty: all rows are free.
+    pub lower: Vec<f64>,
+    /// u, p, ∞ allowed; empty where l is.
+    pub upper: Vec<f64>,
+}
+
+impl Bounds {
+    /// `[l_j, u_j]`.
+    pub fn of(&self, row: usize) -> [f64; 2] {
+        let bound = |all: &[f64], none: f64| all.get(row).copied().unwrap_or(none);
+        [bound(&self.lower, f64::NEG_INFINITY), bound(&self.upper, f64::INFINITY)]
+    }
+
+    /// Whether row j has no bound.
+    pub fn is_free(&self, row: usize) -> bool {
+        self.of(row) == [f64::NEG_INFINITY, f64::INFINITY]
+    }
+
+    /// The rows that have a bound.
+    pub fn bounded(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.lower.len()).filter(|&j| !self.is_free(j))
+    }
+
+    /// Whether no row has a bound: all are bilateral constraints.
+    pub fn are_free(&self) -> bool {
+        self.bounded().next().is_none()
+    }
+
+    /// The impulse of row j that is nearest to none.
+    pub fn least(&self, row: usize) -> f64 {
+        let [l, u] = self.of(row);
+        0.0_f64.clamp(l, u)
+    }
+
+    /// The part of `w (λ_j − P_[l, u](λ_j − c/w))` that says how far λ_j and the velocity c are from the law of the row, a velocity: the one in the middle of
+    /// `w (λ − u)`, c and `w (λ − l)`. The factor w > 0, the velocity that a unit impulse makes, is its own unit only.
+    pub fn residual(&self, row: usize, lambda: f64, c: f64, w: f64) -> f64 {
+        let [l, u] = self.of(row);
+        // Neither `min` nor `max` lets a NaN through.
+        if c.is_nan() || lambda.is_nan() {
+            return f64::NAN;
+        }
+        c.min(w * (lambda - l)).max(w * (lambda - u))
+    }
+
+    /// The lengths fit and the bounds do not cross.
+    pub(crate) fn validate(&self, rows: usize, meaning: &str) -> Result<(), ProblemError> {
+        match self.lower.is_empty() && self.upper.is_empty() {
+            true => Ok(()),
+            false => check([&self.lower, &self.upper], rows, meaning),
+        }
+    }
+}
+
+/// Bounds `[l, u]`, each of so many entries, that are numbers and do not cross.
+pub(crate) fn check(
+    [lower, upper]: [&[f64]; 2],
+    rows: usize,
+    meaning: &str,
+) -> Result<(), ProblemError> {
+    for (name, bound) in [("l", lower), ("u", upper)] {
+        if bound.len() != rows {
+            let found = format!("{} entries", bound.len());
+            return Err(ProblemError::shape(name, format!("{rows} entries ({meaning})"), found));
+        }
+    }
+    let wrong = |(l, u): (&f64, &f64)| !(l <= u && *l < f64::INFINITY && *u > f64::NEG_INFINITY);
+    match lower.iter().zip(upper).position(wrong) {
+        Some(i) => Err(ProblemError::value(
+            format!("[l, u][{i}]"),
+            "l ≤ u, l < ∞, u > −∞",
+            format!("[{}, {}]", lower[i], upper[i]),
+        )),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// φ against its definition by a projection, and zero exactly where the law holds.
+    #[test]
+    fn the_residual_is_that_of_the_projection() {
+        let inf = f64::INFINITY;
+        let kinds: [[f64; 2]; 5] = [[-inf, inf], [0.0, inf], [-inf, 1.0], [-1.0, 2.0], [0.5, 0.5]];
+        for [l, u] in kinds {
+            let bounds = Bounds { lower: vec![l], upper: vec![u] };
+            for lambda in [-3.0_f64, -1.0, 0.0, 0.5, 1.0, 2.0, 3.0] {
+                for c in [-2.0, 0.0, 0.25, 4.0] {
+                    let w = 2.0;
+                    let direct = w * (lambda - (lambda - c / w).clamp(l, u));
+                    assert_eq!(bounds.residual(0, lambda, c, w), direct, "{l} {u} {lambda} {c}");
+                    let obeys = (l..=u).contains(&lambda)
+                        && (c == 0.0 || (c > 0.0 && lambda == l) || (c < 0.0 && lambda == u));
+                    assert_eq!(direct == 0.0, obeys, "{l} {u} {lambda} {c}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn bounds_that_cross_are_refused_by_name() {
+        let bounds = Bounds { lower: vec![0.0, 2.0], upper: vec![1.0, 1.0] };
+        let said = bounds.validate(2, "entries of b").unwrap_err().to_string();
+        assert!(said.contains("[l, u][1]") && said.contains("[2, 1]"), "{said}");
+        let said = bounds.validate(3, "entries of b").unwrap_err().to_string();
+        assert!(said.contains("3 entries"), "{said}");
+        assert!(Bounds::default().validate(3, "entries of b").is_ok());
+    }
+}

@@ -1,0 +1,123 @@
+//! Scalar rows with bounds: the judge on planted points, on points that break each part of the law, and in exact numbers.
+
+use nonsmooth_linalg::Csc;
+use nonsmooth_problem::check::{Evidence, Judged};
+use nonsmooth_problem::planted::Planted;
+use nonsmooth_problem::{Bounds, FrictionGlobal, GlobalPoint, Problem, RowsGlobal};
+
+fn cases() -> impl Iterator<Item = Planted> {
+    (0..12).map(|seed| Planted {
+        contacts: 6,
+        dofs: 40,
+        bilateral: seed as usize % 3,
+        bounded: 1 + seed as usize % 5,
+        seed,
+        ..Planted::default()
+    })
+}
+
+fn relative<P: Judged>(problem: &P, point: &P::Point) -> (bool, f64) {
+    let verdict = problem.judge(point, 1e-10).unwrap();
+    (verdict.solved, verdict.measure.bilateral.unwrap())
+}
+
+#[test]
+fn planted_points_are_solutions() {
+    for case in cases() {
+        fn check<const D: usize>(case: &Planted) {
+            let (global, point) = case.global::<D>();
+            assert!(global.rows.as_ref().unwrap().bounds.bounded().count() == case.bounded);
+            let (solved, bilateral) = relative(&global, &point);
+            assert!(solved && bilateral < 1e-12, "{case:?} {bilateral:e}");
+            let (local, point) = case.local::<D>();
+            let (solved, bilateral) = relative(&local, &point);
+            assert!(solved && bilateral < 1e-12, "{case:?} {bilateral:e}");
+        }
+        check::<2>(&case);
+        check::<3>(&case);
+    }
+}
+
+/// An impulse beyond its bound, a velocity of the wrong sign at a bound, and one that does not vanish between.
+#[test]
+fn each_part_of_the_law_of_a_row_is_judged() {
+    for case in cases() {
+        let (local, point) = case.local::<3>();
+        let rows = local.rows.as_ref().unwrap();
+        for j in rows.bounds.bounded() {
+            let [l, u] = rows.bounds.of(j);
+            // As if the bound lay where the impulse is not allowed to be.
+            let mut narrow = local.clone();
+            let own = &mut narrow.rows.as_mut().unwrap().bounds;
+            if u.is_finite() {
+                own.upper[j] = point.lambda[j] - 0.1;
+                own.lower[j] = l.min(own.upper[j]);
+            } else {
+                own.lower[j] = point.lambda[j] + 0.1;
+            }
+            assert!(!relative(&narrow, &point).0, "{case:?} row {j}");
+            // The velocity of the row turned round, or made where there was none.
+            let mut turned = local.clone();
+            let s = &mut turned.rows.as_mut().unwrap().s[j];
+            let at_lower = point.lambda[j] == l;
+            *s += if at_lower { -2.0 } else { 2.0 };
+            assert!(!relative(&turned, &point).0, "{case:?} row {j}");
+        }
+    }
+}
+
+/// A point mass on the ground with a motor along it: `M v = f + r + λ e_x`, the motor holds `v_x = 1` as long as its impulse stays within `[−τ, τ]`.
+fn motor(limit: f64) -> FrictionGlobal<2> {
+    // Columns of H by [N, T]: N is y, T is x.
+    let h = Csc::from_triplets(2, 2, [(1, 0, 1.0), (0, 1, 1.0)].into_iter()).unwrap();
+    let g = Csc::from_triplets(2, 1, [(0, 0, 1.0)].into_iter()).unwrap();
+    let mut problem = FrictionGlobal::new(
+        Csc::diagonal(&[1.0, 1.0]),
+        h,
+        vec![0.0, -2.0],
+        vec![0.0; 2],
+        vec![0.5],
+    )
+    .unwrap();
+    let bounds = Bounds { lower: vec![-limit], upper: vec![limit] };
+    problem.rows = Some(RowsGlobal { G: g, b: vec![-1.0], bounds });
+    problem.validate().unwrap();
+    problem
+}
+
+/// Weight 2, mu = 1/2: the motor needs λ = 1 to move the mass at all and 2 to reach its speed; with 1.5 it moves at 1/2, with 0.5 it stalls.
+#[test]
+fn a_motor_reaches_its_speed_saturates_or_stalls() {
+    for (limit, lambda, v, friction) in
+        [(3.0, 2.0, 1.0, -1.0), (1.5, 1.5, 0.5, -1.0), (0.5, 0.5, 0.0, -0.5)]
+    {
+        let problem = motor(limit);
+        let point = GlobalPoint { v: vec![v, 0.0], r: vec![2.0, friction], lambda: vec![lambda] };
+        assert!(problem.judge(&point, 1e-12).unwrap().solved, "{limit}");
+        // The answers of the other limits are none.
+        for other in [3.0, 1.5, 0.5].into_iter().filter(|x| *x != limit) {
+            assert!(!motor(other).judge(&point, 1e-6).unwrap().solved, "{limit} {other}");
+        }
+        // In exact numbers the coefficients say the same.
+        let system = problem.cones().unwrap();
+        assert!(system.complete);
+    }
+}
+
+/// Two limits of the same joint that leave no motion: refuted, in exact arithmetic, by the impulses of both.
+#[test]
+fn limits_that_contradict_each_other_are_refuted() {
+    let mut problem = motor(1.0);
+    let g = Csc::from_triplets(2, 2, [(0, 0, 1.0), (0, 1, -1.0)].into_iter()).unwrap();
+    // v_x ≥ 1 and v_x ≤ 1/2.
+    let bounds = Bounds { lower: vec![0.0; 2], upper: vec![f64::INFINITY; 2] };
+    problem.rows = Some(RowsGlobal { G: g, b: vec![-1.0, 0.5], bounds });
+    problem.validate().unwrap();
+    let mut y = vec![0.0; problem.unknowns()];
+    y[4..6].copy_from_slice(&[1.0, 1.0]);
+    let farkas = nonsmooth_problem::check::Certificate::Farkas { y: y.clone() };
+    assert!(matches!(problem.evidence(&farkas), Evidence::Proved(_)));
+    // A motor of limited strength cannot enforce anything.
+    problem.rows.as_mut().unwrap().bounds.upper = vec![5.0; 2];
+    assert!(matches!(problem.evidence(&farkas), Evidence::Nothing));
+}
