@@ -124,7 +124,7 @@ pub struct Comparison {
     pub additional: usize,
     /// What limits the comparison.
     pub warnings: Vec<String>,
-    /// Solved before and not any more.
+    /// Solved before and not any more, or the other way: with a solution where a proof said that there is none.
     pub newly_unsolved: Vec<Outcome>,
     /// Not solved before.
     pub newly_solved: Vec<Outcome>,
@@ -224,6 +224,8 @@ fn positive(seconds: Option<f64>) -> Option<f64> {
 fn outcome(all: &mut Comparison, a: &Run, b: &Run) {
     let ended = || Outcome { pair: pair(b), old: a.ending, new: b.ending };
     match (a.solved(), b.solved()) {
+        // A solution where a proof excluded one, or the reverse: one of the two is wrong.
+        (true, true) if a.ending != b.ending => all.newly_unsolved.push(ended()),
         (true, false) => all.newly_unsolved.push(ended()),
         (false, true) => all.newly_solved.push(ended()),
         (true, true) => {

@@ -204,14 +204,7 @@ impl<'a> Scene<'a> {
     }
 
     fn profile(&self, cost: Cost) -> Result<Option<Figure>, String> {
-        let mut costs = Costs::of(self.runs, self.selection, cost);
-        // A solver that does not count this cost would seem to fail.
-        let silent = |s: usize| costs.unknown[s] > 0 && costs.t[s].iter().all(|t| t.is_infinite());
-        let keep: Vec<bool> = (0..costs.solvers.len()).map(|s| !silent(s)).collect();
-        let left_out: Vec<String> = kept(&costs.solvers, &keep, false);
-        costs.solvers = kept(&costs.solvers, &keep, true);
-        costs.t = kept(&costs.t, &keep, true);
-        costs.missing = kept(&costs.missing, &keep, true);
+        let (costs, left_out) = Costs::of(self.runs, self.selection, cost).counted();
         let mut curves = performance(&costs);
         if curves.iter().all(|c| c.steps.is_empty()) {
             return Ok(None);
@@ -236,9 +229,14 @@ impl<'a> Scene<'a> {
                 n * costs.solvers.len()
             ));
         }
-        if !left_out.is_empty() {
-            notes.push(format!("without {}: {} not reported", left_out.join(", "), cost.name()));
+        let refused: usize = costs.refused.iter().sum();
+        if refused > 0 {
+            notes.push(format!(
+                "{refused} of {} pairs were refused and count for nothing",
+                n * costs.solvers.len()
+            ));
         }
+        notes.extend(without(&left_out, cost.name()));
         let panel = Panel {
             title: String::new(),
             series: self.series(&curves, &x, log),
@@ -285,8 +283,9 @@ impl<'a> Scene<'a> {
             })
             .collect();
         let n = progress.problems.len();
-        let notes =
+        let mut notes =
             vec![format!("share of {n} problems on which the residual is reached within the time")];
+        notes.extend(without(&progress.left_out, "residuals"));
         let mut rows = vec![];
         for (e, curves) in all.iter().rev() {
             rows.extend(cells(&number(Some(*e)), curves));
@@ -298,7 +297,7 @@ impl<'a> Scene<'a> {
     }
 
     fn success(&self) -> Result<Option<Figure>, String> {
-        let mut all = crate::profile::success(self.runs, self.selection);
+        let (mut all, left_out) = crate::profile::success(self.runs, self.selection);
         if all.is_empty() {
             return Ok(None);
         }
@@ -342,12 +341,13 @@ impl<'a> Scene<'a> {
             }
         }
         let tightest = self.runs.tolerances().last().copied().unwrap_or(0.0);
-        let notes = vec![format!(
+        let mut notes = vec![format!(
             "share of problems with a smaller residual in any run; runs stop at their own tolerance, the tightest is {tightest:e}"
         )];
+        notes.extend(without(&left_out, "residuals"));
         let csv = table(["size", "problems", "solver", "tolerance", "share"], rows);
-        let solvers: Vec<String> =
-            self.selection.solvers(self.runs).into_iter().map(String::from).collect();
+        let shown = self.selection.solvers(self.runs).into_iter().map(String::from);
+        let solvers: Vec<String> = shown.filter(|s| !left_out.contains(s)).collect();
         let title = "Success against tolerance".into();
         self.figure("success".into(), title, notes, &with_best(&solvers), &panels, csv).map(Some)
     }
@@ -386,8 +386,9 @@ impl<'a> Scene<'a> {
             })
             .collect();
         let n = progress.problems.len();
-        let notes =
+        let mut notes =
             vec![format!("the residual that is reached on so many of {n} problems, against time")];
+        notes.extend(without(&progress.left_out, "residuals"));
         let mut rows = vec![];
         for ((part, _), (_, curves)) in PARTS.into_iter().zip(&all) {
             rows.extend(cells(&number(Some(part)), curves));
@@ -415,8 +416,8 @@ impl<'a> Scene<'a> {
     }
 }
 
-fn kept<T: Clone>(all: &[T], keep: &[bool], which: bool) -> Vec<T> {
-    all.iter().zip(keep).filter(|(_, k)| **k == which).map(|(t, _)| t.clone()).collect()
+fn without(left_out: &[String], what: &str) -> Option<String> {
+    (!left_out.is_empty()).then(|| format!("without {}: {what} not reported", left_out.join(", ")))
 }
 
 fn with_best(solvers: &[String]) -> Vec<String> {

@@ -2,12 +2,12 @@
 //!
 //! Nothing on the page is written by hand, so that a new campaign makes a new page that is true.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use crate::figures::{self, Figure};
 use crate::plural;
 use crate::profile::{Cost, Selection, VIRTUAL_BEST};
-use crate::record::{Campaign, Ending};
+use crate::record::Campaign;
 use crate::runs::Runs;
 use crate::tables::{By, Row, Table, markdown_text, summary, summary_page, unsolved};
 use crate::traits_table;
@@ -30,18 +30,13 @@ pub fn page(
     folder: &str,
     command: &str,
 ) -> Result<Page, String> {
-    let kinds = kinds(runs);
+    let kinds = runs.kinds();
     let mut short = String::from("\n## In short\n\n");
     let (mut body, mut shown) = (String::new(), vec![]);
     for (kind, problems) in &kinds {
         let heading = heading(kind);
         body += &format!("\n## {heading}\n\n{}.\n", plural(*problems, "problem"));
-        let solvers = takers(runs, kind);
-        let at = |tolerance| Selection {
-            kinds: vec![kind.clone()],
-            solvers: solvers.clone(),
-            ..Selection::at(tolerance)
-        };
+        let at = |tolerance| Selection::at(kind, tolerance);
         let mut show = |figure: Option<Figure>, name: &str| {
             figure.map_or_else(String::new, |f| show(f, kind, name, folder, &mut shown))
         };
@@ -77,17 +72,6 @@ suite; `nonsmooth gen --list` says what can be set.
 
 ";
 
-/// The kinds of problem with the number of problems that were run, the most first.
-fn kinds(runs: &Runs) -> Vec<(String, usize)> {
-    let mut kinds: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
-    for run in &runs.runs {
-        kinds.entry(&run.kind).or_default().insert(&run.problem);
-    }
-    let mut kinds: Vec<_> = kinds.into_iter().map(|(k, all)| (k.to_owned(), all.len())).collect();
-    kinds.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
-    kinds
-}
-
 fn heading(kind: &str) -> String {
     match kind {
         "friction_local_2d" => "Local problems in the plane, u = W r + q".into(),
@@ -99,14 +83,7 @@ fn heading(kind: &str) -> String {
     }
 }
 
-/// The solvers that take problems of a kind.
-fn takers(runs: &Runs, kind: &str) -> Vec<String> {
-    let taken = runs.runs.iter().filter(|r| r.kind == kind && r.ending != Ending::Refused);
-    let takes: BTreeSet<&str> = taken.map(|r| r.solver.as_str()).collect();
-    runs.solvers().into_iter().filter(|s| takes.contains(s)).map(String::from).collect()
-}
-
-fn introduction(runs: &Runs, kinds: &[(String, usize)], command: &str) -> String {
+fn introduction(runs: &Runs, kinds: &[(&str, usize)], command: &str) -> String {
     let families: BTreeSet<_> = runs.runs.iter().map(|r| &r.family).collect();
     let problems: usize = kinds.iter().map(|k| k.1).sum();
     let solvers = runs.solvers();
@@ -128,7 +105,7 @@ fn introduction(runs: &Runs, kinds: &[(String, usize)], command: &str) -> String
         text += &format!("\n- {}", markdown_text(&measured(campaign)));
     }
     text += "\n\nWhat a run is and how it is timed: [benchmarking](benchmarking.md). *Solved* is the judge's word on the relative residual \
-             ([notation](notation.md)). *Fastest* is the share of problems on which the solver needs the least time, and the *ratios* are its \
+             ([notation](notation.md)), or on a proof that there is no solution. Problems that a solver *refuses* do not count in its shares. *Fastest* is the share of problems on which the solver needs the least time, and the *ratios* are its \
              time over that least time where it solves the problem; *seconds* are all its runs, failed ones included. The *virtual best* takes on each problem the \
              fastest solver. A profile shows the distance from the best; with more than two solvers it does not rank them (GouldScott2016).\n";
     text
@@ -211,16 +188,19 @@ fn listed(all: &[String]) -> String {
     }
 }
 
-/// Keeps a figure, under a name of its own, and says where the page shows it.
-fn show(figure: Figure, kind: &str, name: &str, folder: &str, all: &mut Vec<Figure>) -> String {
-    // Other programs' kinds may hold anything, and names must stay in the folder.
+/// A name for the files of a kind. Other programs' kinds may hold anything, and names must stay in the folder.
+pub fn slug(kind: &str) -> String {
     let letter = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
     let kind: String = match kind.strip_prefix("friction_").unwrap_or(kind) {
         "" => "unknown".into(),
         kind => kind.chars().map(letter).collect(),
     };
-    let kind = kind.trim_matches('-');
-    let name = format!("{kind}-{name}");
+    kind.trim_matches('-').into()
+}
+
+/// Keeps a figure, under a name of its own, and says where the page shows it.
+fn show(figure: Figure, kind: &str, name: &str, folder: &str, all: &mut Vec<Figure>) -> String {
+    let name = format!("{}-{name}", slug(kind));
     let free = |name: &String| all.iter().all(|f| f.name != *name);
     let mut names = std::iter::once(name.clone()).chain((2..).map(|k| format!("{name}-{k}")));
     let name = names.find(free).unwrap_or(name);
@@ -276,7 +256,7 @@ fn nobody(runs: &Runs, selection: &Selection) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{FORMAT, Machine, Residuals, Run, VERSION};
+    use crate::record::{Ending, FORMAT, Machine, Residuals, Run, VERSION};
 
     fn run(problem: &str, kind: &str, solver: &str, ending: Ending, seconds: f64) -> Run {
         Run {

@@ -150,9 +150,9 @@ pub struct Problem {
 pub enum Ending {
     /// The judge accepts the answer. For foreign runs: the program's own error is at most the tolerance.
     Solved,
-    /// There is no solution: proved.
+    /// There is no solution: proved, and the judge has verified the proof.
     Infeasible,
-    /// There is no solution up to rounding: not proved.
+    /// There is no solution up to rounding, or by a foreign program's word: not proved.
     NearlyInfeasible,
     /// The solver ended on a ray that proves nothing.
     NoConclusion,
@@ -313,9 +313,19 @@ pub struct Run {
 }
 
 impl Run {
-    /// Whether it counts as solved.
+    /// Whether it counts as solved: the judge accepts the answer, or the proof that there is none.
     pub fn solved(&self) -> bool {
-        self.ending == Ending::Solved
+        matches!(self.ending, Ending::Solved | Ending::Infeasible)
+    }
+
+    /// The residual down to which it answers the problem: what it reached; 0 for a proof that there is no solution, none
+    /// for a refusal.
+    pub fn reached(&self) -> Option<f64> {
+        match self.ending {
+            Ending::Infeasible => Some(0.0),
+            Ending::Refused => None,
+            _ => self.residuals.reached,
+        }
     }
 
     /// What makes it one run among those of a plan.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 
-use crate::record::{Campaign, FORMAT, Line, Plan, Problem, Run, VERSION};
+use crate::record::{Campaign, Ending, FORMAT, Line, Plan, Problem, Run, VERSION};
 
 /// Why a file of runs cannot be used. One line each.
 #[derive(Debug, thiserror::Error)]
@@ -109,9 +109,14 @@ impl Runs {
                 Line::Problem(problem) => {
                     all.problems.insert(problem.name.clone(), problem);
                 }
-                Line::Run(run) => {
+                Line::Run(mut run) => {
                     if let Some(found) = out_of_range(&run) {
                         return Err(RunsError::Line { file: file.into(), line: k + 1, found });
+                    }
+                    // No judge has seen a foreign program's proof.
+                    let foreign = || all.campaign(&run).is_some_and(|c| c.foreign);
+                    if run.ending == Ending::Infeasible && foreign() {
+                        run.ending = Ending::NearlyInfeasible;
                     }
                     if seen.insert(run.key()) {
                         all.runs.push(*run);
@@ -192,6 +197,17 @@ impl Runs {
             self.campaigns.iter().filter_map(|c| c.plan.as_ref()).flat_map(|p| &p.solvers);
         let named = planned.map(String::as_str).chain(self.runs.iter().map(|r| r.solver.as_str()));
         named.filter(|s| left.remove(s)).collect()
+    }
+
+    /// The kinds of problem with the number of problems that have runs, the most first.
+    pub fn kinds(&self) -> Vec<(&str, usize)> {
+        let mut all: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+        for run in &self.runs {
+            all.entry(&run.kind).or_default().insert(&run.problem);
+        }
+        let mut kinds: Vec<_> = all.into_iter().map(|(kind, of)| (kind, of.len())).collect();
+        kinds.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
+        kinds
     }
 
     /// The tolerances, the largest first.

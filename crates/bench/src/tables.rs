@@ -1,6 +1,6 @@
 //! Tables of a campaign: who solves what, how fast, and why not; as CSV and as Markdown.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use crate::profile::{Cost, Costs, Selection, VIRTUAL_BEST};
 use crate::record::{Ending, Run, Size};
@@ -28,6 +28,8 @@ pub struct Row {
     pub problems: usize,
     /// Those that the solver solved.
     pub solved: usize,
+    /// Problems that the solver refuses; of the virtual best, that every solver refuses. No share counts them.
+    pub refused: usize,
     /// Those on which it was the fastest; ties count for each.
     pub fastest: usize,
     /// The median of its time over the best time, on the problems that it solved.
@@ -43,14 +45,19 @@ pub struct Row {
 }
 
 impl Row {
-    /// The share of problems solved.
-    pub fn solved_share(&self) -> f64 {
-        self.solved as f64 / self.problems as f64
+    /// The share of problems solved, of those that it does not refuse; none where it refuses all.
+    pub fn solved_share(&self) -> Option<f64> {
+        self.share(self.solved)
     }
 
-    /// The share of problems on which it was the fastest.
-    pub fn fastest_share(&self) -> f64 {
-        self.fastest as f64 / self.problems as f64
+    /// The share of problems on which it was the fastest, of the same.
+    pub fn fastest_share(&self) -> Option<f64> {
+        self.share(self.fastest)
+    }
+
+    fn share(&self, part: usize) -> Option<f64> {
+        let of = self.problems - self.refused;
+        (of > 0).then(|| part as f64 / of as f64)
     }
 }
 
@@ -58,7 +65,7 @@ impl Row {
 pub fn summary(runs: &Runs, selection: &Selection, by: By) -> Vec<Row> {
     let solvers = selection.solvers(runs);
     let mut groups: BTreeMap<(usize, &str), Vec<&Run>> = BTreeMap::new();
-    for run in selection.taken(runs) {
+    for run in selection.taken(runs, &solvers) {
         let group = match by {
             By::All => (0, "all"),
             By::Family => (0, run.family.as_str()),
@@ -76,11 +83,13 @@ pub fn summary(runs: &Runs, selection: &Selection, by: By) -> Vec<Row> {
 fn of_group(solvers: &[&str], group: &str, runs: &[&Run]) -> Vec<Row> {
     let costs = Costs::over(solvers, runs, Cost::Seconds);
     let mut ended: HashMap<&str, ([usize; Ending::ALL.len()], f64)> = HashMap::new();
-    let mut solved = BTreeSet::new();
+    // By the endings: a solved run whose time is not known is solved.
+    let mut solved: HashMap<&str, HashSet<&str>> = HashMap::new();
+    for run in runs.iter().filter(|r| r.solved()) {
+        solved.entry(&run.solver).or_default().insert(&run.problem);
+    }
+    let by_any: HashSet<&str> = solved.values().flatten().copied().collect();
     for run in runs {
-        if run.solved() {
-            solved.insert(&run.problem);
-        }
         let (endings, seconds) = ended.entry(&run.solver).or_default();
         endings[Ending::ALL.iter().position(|e| *e == run.ending).unwrap_or(0)] += 1;
         *seconds += run.seconds.unwrap_or(0.0);
@@ -94,8 +103,8 @@ fn of_group(solvers: &[&str], group: &str, runs: &[&Run]) -> Vec<Row> {
             group: group.into(),
             solver: solver.clone(),
             problems: costs.problems.len(),
-            // By the endings: a solved run whose time is not known is solved.
-            solved: endings[0],
+            solved: solved.get(solver.as_str()).map_or(0, |problems| problems.len()),
+            refused: costs.refused[s],
             fastest: ratios.iter().filter(|r| **r <= 1.0).count(),
             ratio_median: median(&ratios),
             ratio_mean: geometric_mean(&ratios),
@@ -110,7 +119,8 @@ fn of_group(solvers: &[&str], group: &str, runs: &[&Run]) -> Vec<Row> {
         group: group.into(),
         solver: VIRTUAL_BEST.into(),
         problems: costs.problems.len(),
-        solved: solved.len(),
+        solved: by_any.len(),
+        refused: costs.refused_by_all,
         fastest: timed.len(),
         ratio_median: (!timed.is_empty()).then_some(1.0),
         ratio_mean: (!timed.is_empty()).then_some(1.0),
@@ -152,7 +162,7 @@ pub struct Unsolved {
 /// The problems on which solvers were run at the tolerance of the selection and that none solved.
 pub fn unsolved(runs: &Runs, selection: &Selection) -> Vec<Unsolved> {
     let mut all: BTreeMap<&str, Vec<&Run>> = BTreeMap::new();
-    for run in selection.taken(runs) {
+    for run in selection.taken(runs, &selection.solvers(runs)) {
         all.entry(&run.problem).or_default().push(run);
     }
     let none = all.into_iter().filter(|(_, runs)| !runs.iter().any(|r| r.solved()));
@@ -246,9 +256,9 @@ pub fn summary_table(rows: &[Row]) -> Table {
             row.solver.clone(),
             row.problems.to_string(),
             row.solved.to_string(),
-            number(Some(row.solved_share())),
+            number(row.solved_share()),
             row.fastest.to_string(),
-            number(Some(row.fastest_share())),
+            number(row.fastest_share()),
             number(row.ratio_median),
             number(row.ratio_mean),
             number(Some(row.seconds)),
@@ -284,7 +294,7 @@ pub fn summary_page(rows: &[Row]) -> Table {
     head.extend(causes.iter().map(|&k| Ending::ALL[k].name().replace('_', " ")));
     head.extend(missing.then(|| "not run".into()));
     let rows = rows.iter().map(|row| {
-        let share = |x: f64| format!("{:.1}", 100.0 * x);
+        let share = |x: Option<f64>| x.map_or(String::new(), |x| format!("{:.1}", 100.0 * x));
         let ratio = |x: Option<f64>| x.map_or(String::new(), significant);
         let mut cells = vec![];
         cells.extend(groups.then(|| row.group.clone()));

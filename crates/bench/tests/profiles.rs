@@ -49,13 +49,15 @@ fn example() -> Runs {
     runs
 }
 
+const KIND: &str = "friction_local_3d";
+
 fn curve(solver: &str, steps: &[(f64, f64)]) -> Curve {
     Curve { solver: solver.into(), steps: steps.into(), before: 0.0 }
 }
 
 #[test]
 fn a_profile_computed_by_hand() {
-    let costs = Costs::of(&example(), &Selection::at(1e-8), Cost::Seconds);
+    let costs = Costs::of(&example(), &Selection::at(KIND, 1e-8), Cost::Seconds);
     assert_eq!(costs.problems, ["f/p", "f/q", "g/r", "g/s"]);
     assert_eq!(costs.best(), [1.0, 3.0, 1.0, f64::INFINITY]);
     assert_eq!((costs.missing.as_slice(), costs.unknown.as_slice()), (&[0, 0, 1][..], &[0; 3][..]));
@@ -80,17 +82,17 @@ fn selections_narrow_the_problems_and_the_competition() {
     let runs = example();
     let only = |solvers: &[&str]| Selection {
         solvers: solvers.iter().map(|s| (*s).into()).collect(),
-        ..Selection::at(1e-8)
+        ..Selection::at(KIND, 1e-8)
     };
     // Without A, B is the best on p and C, not run on s, leaves B's failure there in P.
     let costs = Costs::of(&runs, &only(&["B", "C"]), Cost::Seconds);
     assert_eq!(performance(&costs)[0], curve("B", &[(1.0, 0.5), (5.0, 0.75)]));
     let costs = Costs::of(&runs, &only(&["C"]), Cost::Seconds);
     assert_eq!(costs.problems, ["f/p", "f/q", "g/r"]);
-    let g = Selection { families: vec!["g".into()], ..Selection::at(1e-8) };
+    let g = Selection { families: vec!["g".into()], ..Selection::at(KIND, 1e-8) };
     assert_eq!(Costs::of(&runs, &g, Cost::Seconds).problems, ["g/r", "g/s"]);
-    assert!(Costs::of(&runs, &Selection::at(1e-4), Cost::Seconds).problems.is_empty());
-    let large = Selection { sizes: vec![SIZES[2]], ..Selection::at(1e-8) };
+    assert!(Costs::of(&runs, &Selection::at(KIND, 1e-4), Cost::Seconds).problems.is_empty());
+    let large = Selection { sizes: vec![SIZES[2]], ..Selection::at(KIND, 1e-8) };
     assert!(Costs::of(&runs, &large, Cost::Seconds).problems.is_empty());
 }
 
@@ -99,18 +101,18 @@ fn costs_that_are_zero_or_not_known() {
     let mut runs = campaign("a");
     let with = |solver: &str, factorisations| Run { factorisations, ..run("f/p", solver, 0.0) };
     runs.runs = vec![with("A", Some(0)), with("B", Some(3)), with("C", None)];
-    let costs = Costs::of(&runs, &Selection::at(1e-8), Cost::Factorisations);
+    let costs = Costs::of(&runs, &Selection::at(KIND, 1e-8), Cost::Factorisations);
     assert_eq!(costs.t, [[1.0], [3.0], [f64::INFINITY]]);
     assert_eq!(costs.unknown, [0, 0, 1]);
     // Times of zero tie.
-    let costs = Costs::of(&runs, &Selection::at(1e-8), Cost::Seconds);
+    let costs = Costs::of(&runs, &Selection::at(KIND, 1e-8), Cost::Seconds);
     assert!(performance(&costs).iter().all(|c| c.steps == [(1.0, 1.0)]));
 }
 
 #[test]
 fn tables_computed_by_hand() {
     let runs = example();
-    let selection = Selection::at(1e-8);
+    let selection = Selection::at(KIND, 1e-8);
     let rows = summary(&runs, &selection, By::All);
     let find = |solver: &str| rows.iter().find(|r| r.solver == solver).unwrap();
     let b = find("B");
@@ -153,6 +155,59 @@ fn tables_computed_by_hand() {
 }
 
 #[test]
+fn refusals_leave_the_shares_and_proofs_are_answers() {
+    let mut runs = campaign("a");
+    let lcp = |solver: &str| Run { kind: "lcp".into(), ..run("l/1", solver, 9.0) };
+    runs.runs = vec![
+        run("f/p", "A", 1.0),
+        run("f/q", "A", 1.0),
+        run("f/p", "B", 2.0),
+        failed("f/q", "B", Ending::Refused, 1.0),
+        failed("f/p", "C", Ending::Refused, 1.0),
+        failed("f/q", "C", Ending::Refused, 1.0),
+        failed("f/r", "B", Ending::Refused, 1.0),
+        failed("f/s", "A", Ending::NearlyInfeasible, 1.0),
+        failed("f/s", "B", Ending::Infeasible, 1.0),
+        lcp("A"),
+        lcp("C"),
+    ];
+    let selection = Selection::at(KIND, 1e-8);
+    // C takes no problem of the kind; its runs on another kind say nothing here.
+    assert_eq!(selection.solvers(&runs), ["A", "B"]);
+    assert_eq!(selection.refusing(&runs), ["C"]);
+    let costs = Costs::of(&runs, &selection, Cost::Seconds);
+    assert_eq!(costs.problems, ["f/p", "f/q", "f/r", "f/s"]);
+    assert_eq!(
+        (&costs.refused, costs.refused_by_all, &costs.missing),
+        (&vec![0, 2], 1, &vec![1, 0])
+    );
+    let curves = performance(&costs);
+    assert_eq!(curves, [curve("A", &[(1.0, 0.5)]), curve("B", &[(1.0, 0.5), (2.0, 1.0)])]);
+    assert_eq!(performance_of_best(&costs), curve(VIRTUAL_BEST, &[(1.0, 1.0)]));
+    let rows = summary(&runs, &selection, By::All);
+    let shares: Vec<_> = rows.iter().map(|r| (r.solved, r.refused, r.solved_share())).collect();
+    assert_eq!(shares, [(2, 0, Some(0.5)), (2, 2, Some(1.0)), (3, 1, Some(1.0))]);
+    // A proof answers at every tolerance.
+    let (classes, left_out) = success(&runs, &selection);
+    let tightest = |k: usize| (classes[0].shares[k].0.as_str(), classes[0].shares[k].1[11]);
+    assert_eq!([tightest(0), tightest(1)], [("A", 0.0), ("B", 0.5)]);
+    assert_eq!(left_out, [""; 0]);
+    assert_eq!(Progress::of(&runs, &selection).data_profile(1e-14)[1].steps, [(10.0, 0.5)]);
+    // Nobody solves r, which those who were asked refuse.
+    assert_eq!(unsolved(&runs, &selection).iter().map(|u| &u.problem).collect::<Vec<_>>(), ["f/r"]);
+}
+
+#[test]
+fn a_foreign_proof_is_no_proof() {
+    let mut runs = campaign("a");
+    runs.runs = vec![failed("f/p", "A", Ending::Infeasible, 1.0)];
+    let read = |runs: &Runs| Runs::parse("r.jsonl".as_ref(), &runs.clone().text()).unwrap();
+    assert_eq!(read(&runs).runs[0].ending, Ending::Infeasible);
+    runs.campaigns[0].foreign = true;
+    assert_eq!(read(&runs).runs[0].ending, Ending::NearlyInfeasible);
+}
+
+#[test]
 fn texts_cannot_break_a_table() {
     let mut runs = campaign("a");
     let message = "a \"quoted\", comma\nand a line | pipe";
@@ -188,7 +243,7 @@ fn data_profiles_and_quantiles_computed_by_hand() {
         traced("f/q", 1e-4, &[], 2.0, 1e-4),
         traced("f/r", 1e-4, &[(1, 5.0, f64::NAN)], 8.0, 1e-1),
     ];
-    let progress = Progress::of(&runs, &Selection::at(1e-4));
+    let progress = Progress::of(&runs, &Selection::at(KIND, 1e-4));
     let p = [(1.0, 1e-2), (1.5, 1e-3), (4.0, 1e-5), (9.0, 1e-8)];
     assert_eq!(progress.steps[0][0], p);
     let third = 1.0 / 3.0;
@@ -220,7 +275,7 @@ fn success_computed_by_hand() {
         sized("f/q", "A", 2000, Some(1e-3)),
         sized("f/q", "B", 2000, Some(1e-5)),
     ];
-    let all = success(&runs, &Selection::at(1e-8));
+    let (all, _) = success(&runs, &Selection::at(KIND, 1e-8));
     let classes: Vec<_> = all.iter().map(|s| (s.size.map(|s| s.name), s.problems)).collect();
     assert_eq!(classes, [(None, 2), (Some("1-10"), 1), (Some("over 1000"), 1)]);
     let share = |class: usize, solver: &str, eps: f64| {
@@ -300,7 +355,7 @@ print(json.dumps([[at(line, tau) for tau in taus] for line in h]))
     }
     let folder = tempfile::tempdir().unwrap();
     for (seed, cost) in [(1, Cost::Seconds), (2, Cost::Seconds), (3, Cost::Iterations)] {
-        let costs = Costs::of(&random(seed, 5, 60), &Selection::at(1e-8), cost);
+        let costs = Costs::of(&random(seed, 5, 60), &Selection::at(KIND, 1e-8), cost);
         let curves = performance(&costs);
         // At every step, and between them; the package shows ratios up to the largest.
         let mut taus: Vec<f64> = curves.iter().flat_map(|c| c.steps.iter().map(|s| s.0)).collect();
@@ -316,9 +371,11 @@ print(json.dumps([[at(line, tau) for tau in taus] for line in h]))
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
         let theirs: Vec<Vec<f64>> = serde_json::from_slice(&out.stdout).unwrap();
         assert!(taus.len() > 100 && theirs.len() == curves.len());
-        for (curve, theirs) in curves.iter().zip(theirs) {
+        for (s, (curve, theirs)) in curves.iter().zip(theirs).enumerate() {
+            // The package knows no refusals: its shares are of all problems.
+            let part = costs.applicable(s) as f64 / costs.problems.len() as f64;
             for (&tau, rho) in taus.iter().zip(theirs) {
-                let ours = curve.at(tau);
+                let ours = part * curve.at(tau);
                 assert!((ours - rho).abs() < 1e-12, "{} at {tau}: {ours} {rho}", curve.solver);
             }
         }
@@ -331,40 +388,41 @@ proptest! {
     #[test]
     fn properties_of_profiles(seed: u64, solvers in 1..6usize, problems in 1..20usize) {
         let runs = random(seed, solvers, problems);
-        let selection = Selection::at(1e-8);
+        let selection = Selection::at(KIND, 1e-8);
         let costs = Costs::of(&runs, &selection, Cost::Seconds);
-        let n = costs.problems.len() as f64;
+        let any = costs.applicable_to_any() as f64;
         let best = performance_of_best(&costs);
         let curves = performance(&costs);
-        for curve in &curves {
+        for (s, curve) in curves.iter().enumerate() {
+            let n = costs.applicable(s) as f64;
             let rising = |w: &[(f64, f64)]| w[0].0 < w[1].0 && w[0].1 < w[1].1;
             prop_assert!(curve.steps.windows(2).all(rising));
             prop_assert!(curve.steps.first().is_none_or(|s| s.0 >= 1.0));
             let at = |r: &&Run| r.solver == curve.solver && r.tolerance == 1e-8 && r.solved();
             prop_assert_eq!((curve.last() * n).round() as usize, runs.runs.iter().filter(at).count());
             for tau in [1.0, 1.5, 3.0, 100.0] {
-                prop_assert!(curve.at(tau) <= best.at(tau));
+                prop_assert!(n * curve.at(tau) <= any * best.at(tau) + 1e-9);
             }
         }
-        let first: f64 = curves.iter().map(|c| c.at(1.0)).sum();
-        prop_assert!(first >= best.last() - 1e-12);
+        let first = |(s, c): (usize, &Curve)| costs.applicable(s) as f64 * c.at(1.0);
+        let first: f64 = curves.iter().enumerate().map(first).sum();
+        prop_assert!(first >= any * best.last() - 1e-9);
 
         let progress = Progress::of(&runs, &selection);
         let bound = progress.best();
         for (eps, t) in [(1e-1, 0.3), (1e-2, 1.0), (1e-8, 20.0)] {
-            let top = bound.data_profile(eps)[0].at(t);
-            let median = bound.quantile(0.5)[0].at(t);
-            for (d, q) in progress.data_profile(eps).iter().zip(progress.quantile(0.5)) {
-                prop_assert!(d.at(t) <= top && q.at(t) >= median);
+            let top = progress.applicable_to_any as f64 * bound.data_profile(eps)[0].at(t);
+            let both = progress.data_profile(eps).into_iter().zip(progress.quantile(0.5));
+            for ((d, q), n) in both.zip(&progress.applicable) {
+                prop_assert!(*n as f64 * d.at(t) <= top + 1e-9);
                 // Two ways to ask the same: half the problems are within eps by t.
                 prop_assert_eq!(d.at(t) >= 0.5, q.at(t) <= eps);
             }
         }
-        for class in success(&runs, &selection) {
-            let (_, top) = class.shares.last().unwrap();
+        for class in success(&runs, &selection).0 {
             for (_, shares) in &class.shares {
                 prop_assert!(shares.windows(2).all(|w| w[0] >= w[1]));
-                prop_assert!(shares.iter().zip(top).all(|(a, b)| a <= b));
+                prop_assert!(shares.iter().all(|share| (0.0..=1.0).contains(share)));
             }
         }
     }
@@ -375,7 +433,7 @@ proptest! {
 #[test]
 fn figures_are_drawn_and_carry_their_data() {
     let runs = random(7, 5, 40);
-    let all = figures(&runs, &Selection::at(1e-8)).unwrap();
+    let all = figures(&runs, &Selection::at(KIND, 1e-8)).unwrap();
     let names: Vec<&str> = all.iter().map(|f| f.name.as_str()).collect();
     let expected = [
         "profile-seconds",
@@ -396,7 +454,7 @@ fn figures_are_drawn_and_carry_their_data() {
         assert!(figure.svg.len() < 400_000, "{}: {}", figure.name, figure.svg.len());
     }
     // The data of the picture are those of the profile.
-    let costs = Costs::of(&runs, &Selection::at(1e-8), Cost::Seconds);
+    let costs = Costs::of(&runs, &Selection::at(KIND, 1e-8), Cost::Seconds);
     let mut reader = csv::Reader::from_reader(all[0].csv.as_bytes());
     let mut points = 0;
     for row in reader.records() {
@@ -412,7 +470,7 @@ fn figures_are_drawn_and_carry_their_data() {
 
 #[test]
 fn figures_of_little_or_nothing() {
-    let selection = Selection::at(1e-8);
+    let selection = Selection::at(KIND, 1e-8);
     assert_eq!(figures(&campaign("a"), &selection).unwrap(), []);
     let mut runs = campaign("a");
     runs.runs = vec![run("f/p", "A", 1e-3)];

@@ -1,10 +1,13 @@
-//! The data of a page: columns of numbers and of indices into tables of texts, so that 20 000 runs stay small.
+//! The data of a page: its views, and the runs as columns of numbers and of indices into tables of texts, so that 20 000
+//! of them stay small.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use serde::Serialize;
 
-use crate::record::{Ending, Problem, Run, SIZES};
+use super::views;
+use crate::profile::DECADES;
+use crate::record::{Ending, Problem, Run, SIZES, Size};
 use crate::runs::Runs;
 
 /// Points of traces in a page, about; what a run gets of them lies between the bounds of [`EVEN`].
@@ -17,10 +20,12 @@ const EVEN: (usize, usize) = (4, 24);
 pub struct Data<'a> {
     solvers: Vec<Solver<'a>>,
     families: Vec<&'a str>,
-    kinds: Vec<&'a str>,
-    sizes: Vec<Size>,
+    sizes: [&'static str; SIZES.len()],
     endings: Vec<&'static str>,
     tolerances: Vec<f64>,
+    /// The residuals of the figure of success.
+    decades: [f64; DECADES.len()],
+    kinds: Vec<views::Kind<'a>>,
     messages: Vec<&'a str>,
     problems: Problems<'a>,
     /// Name and error of each problem that could not be read.
@@ -40,19 +45,13 @@ struct Solver<'a> {
     machines: BTreeSet<&'a str>,
 }
 
-#[derive(Debug, Serialize)]
-struct Size {
-    name: &'static str,
-    /// The most contacts; none: no bound.
-    most: Option<usize>,
-}
-
 /// The problems that have runs.
 #[derive(Debug, Default, Serialize)]
 struct Problems<'a> {
     name: Vec<&'a str>,
     family: Vec<usize>,
     kind: Vec<usize>,
+    size: Vec<usize>,
     contacts: Vec<usize>,
     unknowns: Vec<usize>,
     #[serde(skip_serializing_if = "unknown")]
@@ -79,7 +78,6 @@ struct Columns {
     iterations: Vec<Option<u64>>,
     #[serde(skip_serializing_if = "unknown")]
     factorisations: Vec<Option<u64>>,
-    // Times and residuals stand with all their digits: ties, and comparisons with a tolerance, are decided by them.
     #[serde(skip_serializing_if = "unknown")]
     seconds: Vec<Option<f64>>,
     #[serde(skip_serializing_if = "unknown")]
@@ -118,7 +116,8 @@ impl<'a> Data<'a> {
         let tolerance: HashMap<u64, usize> =
             tolerances.iter().enumerate().map(|(k, t)| (t.to_bits(), k)).collect();
         let (mut names, mut labels) = (Texts::default(), Texts::default());
-        let (mut families, mut kinds) = (Texts::default(), Texts::default());
+        let mut families = Texts::default();
+        let kinds: Vec<&str> = all.kinds().into_iter().map(|(kind, _)| kind).collect();
         let mut messages = Texts::default();
         let mut problems = Problems::default();
         let blank = |label| Solver { label, foreign: false, machines: BTreeSet::new() };
@@ -130,12 +129,9 @@ impl<'a> Data<'a> {
         for run in &all.runs {
             let problem = names.index(&run.problem);
             if problem == problems.name.len() {
-                let known = all.problems.get(&run.problem);
-                let (family, kind) =
-                    known.map_or((&run.family, &run.kind), |p| (&p.family, &p.kind));
-                problems.family.push(families.index(family));
-                problems.kind.push(kinds.index(kind));
-                problems.push(run, known);
+                problems.family.push(families.index(&run.family));
+                problems.kind.push(kinds.iter().position(|k| *k == run.kind).unwrap_or_default());
+                problems.push(run, all.problems.get(&run.problem));
             }
             let solver = labels.index(&run.solver);
             if let Some(campaign) = campaigns.get(run.campaign.as_str()) {
@@ -154,16 +150,16 @@ impl<'a> Data<'a> {
             runs.peak_memory.push(run.peak_memory);
         }
         let error = |p: &'a Problem| p.error.as_ref().map(|e| (p.name.as_str(), e.as_str()));
+        let names =
+            views::Names { solvers: labels.index, problems: names.index, families: families.index };
         Self {
             solvers,
             families: families.all,
-            kinds: kinds.all,
-            sizes: SIZES
-                .iter()
-                .map(|s| Size { name: s.name, most: Some(s.most).filter(|&n| n < usize::MAX) })
-                .collect(),
+            sizes: SIZES.map(|s| s.name),
             endings: Ending::ALL.iter().map(|e| e.name()).collect(),
             tolerances,
+            decades: DECADES,
+            kinds: views::views(all, &names),
             messages: messages.all,
             problems,
             unreadable: all.problems.values().filter_map(error).collect(),
@@ -176,7 +172,9 @@ impl<'a> Data<'a> {
 impl<'a> Problems<'a> {
     fn push(&mut self, run: &'a Run, known: Option<&'a Problem>) {
         self.name.push(&run.problem);
-        self.contacts.push(known.map_or(run.contacts, |p| p.contacts));
+        let size = Size::of(run.contacts);
+        self.size.push(SIZES.iter().position(|s| *s == size).unwrap_or_default());
+        self.contacts.push(run.contacts);
         self.unknowns.push(known.map_or(0, |p| p.unknowns));
         self.dofs.push(known.and_then(|p| p.dofs));
         self.density.push(known.and_then(|p| p.density).map(rounded));
@@ -214,7 +212,7 @@ fn thinned(trace: &[(u64, f64, f64)], even: usize) -> BTreeSet<usize> {
 }
 
 /// Four digits.
-fn rounded(value: f64) -> f64 {
+pub(super) fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 

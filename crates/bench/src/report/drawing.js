@@ -246,9 +246,8 @@ const csvText = rows => rows.map(row => `${row.map(csvField).join(",")}\r\n`).jo
 function figureCsv(figure) {
   const many = figure.panels.some(panel => panel.title);
   const head = [...(many ? ["panel"] : []), "solver", figure.x.name, figure.y.name];
-  const plain = s => (s === BEST ? "virtual best" : data.solvers[s].label);
   return csvText([head, ...figure.panels.flatMap(panel => panel.curves.flatMap(curve => curve.x.map((x, k) => (
-    [...(many ? [panel.name] : []), plain(curve.solver), x, curve.y[k]]))))]);
+    [...(many ? [panel.name] : []), labelled(curve.solver), x, curve.y[k]]))))]);
 }
 
 function save(name, blob) {

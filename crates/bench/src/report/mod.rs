@@ -1,31 +1,27 @@
 //! A report: one HTML file that holds the runs and draws them, for a browser without a network.
 //!
-//! The page counts everything from the runs embedded in it whenever a filter changes, so its numbers are those of
-//! its selection. With P the problems of the selection that have a run of a selected solver at the tolerance, and
-//! `t_ps` the cost (time, iterations, factorisations) of solver s on problem p, infinite where it is not solved or the
-//! run is missing:
-//!
-//! - performance profile `ρ_s(τ) = |{p ∈ P : t_ps ≤ τ min_s t_ps}| / |P|` (DolanMore2002);
-//! - virtual best: the solver whose cost is `min_s t_ps`;
-//! - data profile at ε: the share of the problems whose best residual, over all runs of (p, s), is at most ε within t
-//!   seconds;
-//! - success at ε: the share of the problems whose smallest residual over all runs of (p, s) is at most ε.
+//! All its numbers are those of [`profile`](crate::profile) and [`tables`](crate::tables), counted once for each view: a kind
+//! of problem, a tolerance, and all problems, a family or a class of size. The script chooses a view, draws it, and hides the
+//! solvers that are not asked for; the best is that of all solvers of the kind, whatever is hidden.
 //!
 //! Texts from the runs reach the page as text nodes only, and a content security policy forbids every request.
 
 mod data;
+mod views;
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::fmt::Write;
 
 use crate::plural;
+use crate::profile::Selection;
 use crate::record::{Campaign, Plan};
 use crate::runs::Runs;
+use crate::tables::{self, By, Row};
 
 const PAGE: &str = include_str!("report.html");
 const STYLE: &str = include_str!("report.css");
 const SCRIPTS: [&str; 3] =
-    [include_str!("numbers.js"), include_str!("drawing.js"), include_str!("page.js")];
+    [include_str!("view.js"), include_str!("drawing.js"), include_str!("page.js")];
 
 /// What the page says besides the runs.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -54,7 +50,8 @@ pub fn html(runs: &Runs, options: &Options) -> String {
             "title" => page += &escaped(&options.title),
             "generator" => page += concat!("nonsmooth ", env!("CARGO_PKG_VERSION")),
             "style" => page += STYLE,
-            "stamp" => stamp(&mut page, runs),
+            "counts" => counts(&mut page, runs),
+            "measured" => measured(&mut page, runs),
             "summary" => summary(&mut page, runs),
             // In JSON `<` stands in texts only; without it nothing can end the element.
             "data" => page += &data.replace('<', "\\u003c"),
@@ -82,10 +79,10 @@ fn escaped(text: &str) -> String {
     })
 }
 
-// ------------------------------------------------------------------------------------------------ stamp
+// ------------------------------------------------------------------------------------------------ what was measured
 
-/// What was measured, by what, where and how.
-fn stamp(page: &mut String, all: &Runs) {
+/// What was measured.
+fn counts(page: &mut String, all: &Runs) {
     let with_runs: HashSet<&str> = all.runs.iter().map(|r| r.problem.as_str()).collect();
     let tolerances: Vec<String> = all.tolerances().iter().map(|t| format!("{t:e}")).collect();
     let waiting = all
@@ -112,9 +109,13 @@ fn stamp(page: &mut String, all: &Runs) {
         text += " The last line of the runs was torn and is left out: their measurement was broken off.";
     }
     let _ = writeln!(page, "<p>{}</p>", escaped(&text));
+}
+
+/// By what it was measured, where and how.
+fn measured(page: &mut String, all: &Runs) {
     for (campaign, parts) in groups(all) {
         let class = if campaign.foreign { " class=\"foreign\"" } else { "" };
-        let _ = writeln!(page, "<p{class}>{}</p>", escaped(&measured(campaign, parts)));
+        let _ = writeln!(page, "<p{class}>{}</p>", escaped(&conditions(campaign, parts)));
     }
     let by = concat!("Report by nonsmooth ", env!("CARGO_PKG_VERSION"), ".");
     let _ = writeln!(page, "<p class=\"small\">{by}</p>");
@@ -139,7 +140,7 @@ fn groups(all: &Runs) -> Vec<(&Campaign, usize)> {
     groups
 }
 
-fn measured(campaign: &Campaign, parts: usize) -> String {
+fn conditions(campaign: &Campaign, parts: usize) -> String {
     let mut text = match campaign.foreign {
         true => format!("† Foreign measurements: {}", campaign.program),
         false => format!("Measured: {}", campaign.program),
@@ -208,32 +209,32 @@ fn date(seconds: u64) -> String {
 
 // ------------------------------------------------------------------------------------------------ without a script
 
-/// The table for browsers without JavaScript: runs that solved, by solver and tolerance.
+/// The tables for browsers without JavaScript: problems solved of those that a solver does not refuse, by tolerance.
 fn summary(page: &mut String, all: &Runs) {
-    let tolerances = all.tolerances();
-    let mut counts: HashMap<(&str, u64), (usize, usize)> = HashMap::new();
-    for run in &all.runs {
-        let count = counts.entry((&run.solver, run.tolerance.to_bits())).or_default();
-        count.0 += usize::from(run.solved());
-        count.1 += 1;
-    }
-    *page += "<table><thead><tr><th>solver</th>";
-    for tolerance in &tolerances {
-        let _ = write!(page, "<th class=\"n\">{tolerance:e}</th>");
-    }
-    *page += "</tr></thead><tbody>\n";
-    for solver in all.solvers() {
-        let _ = write!(page, "<tr><td>{}</td>", escaped(solver));
+    for (kind, problems) in all.kinds() {
+        let kind = Selection::at(kind, 0.0);
+        let tolerances = all.tolerances();
+        let at =
+            |&tolerance| tables::summary(all, &Selection { tolerance, ..kind.clone() }, By::All);
+        let columns: Vec<Vec<Row>> = tolerances.iter().map(at).collect();
+        let name = escaped(&kind.kind);
+        let _ = write!(page, "<h2>{name}</h2><p>{}</p>", plural(problems, "problem"));
+        *page += "<table><thead><tr><th>solver</th>";
         for tolerance in &tolerances {
-            let cell = match counts.get(&(solver, tolerance.to_bits())) {
-                Some((solved, of)) => format!("{solved} of {of}"),
-                None => String::new(),
-            };
-            let _ = write!(page, "<td class=\"n\">{cell}</td>");
+            let _ = write!(page, "<th class=\"n\">{tolerance:e}</th>");
         }
-        *page += "</tr>\n";
+        *page += "</tr></thead><tbody>\n";
+        for solver in kind.solvers(all) {
+            let _ = write!(page, "<tr><td>{}</td>", escaped(solver));
+            for rows in &columns {
+                let row = rows.iter().find(|r| r.solver == solver);
+                let cell = row.map(|r| format!("{} of {}", r.solved, r.problems - r.refused));
+                let _ = write!(page, "<td class=\"n\">{}</td>", cell.unwrap_or_default());
+            }
+            *page += "</tr>\n";
+        }
+        *page += "</tbody></table>";
     }
-    *page += "</tbody></table>";
 }
 
 #[cfg(test)]

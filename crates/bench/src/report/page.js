@@ -24,45 +24,55 @@ const endingText = name => name.replaceAll("_", " ");
 
 // ------------------------------------------------------------------------------------------------ state
 
-const DIMENSIONS = {
-  families: { title: "Families", key: "families", labels: data.families.map(f => f || "(no family)") },
-  sizes: { title: "Contacts", key: "sizes", labels: data.sizes.map(s => s.name) },
-  kinds: { title: "Kinds", key: "kinds", labels: data.kinds.map(k => k || "(not known)") },
-  solvers: { title: "Solvers", key: "solvers", labels: data.solvers.map(s => s.label) },
-};
-
-/** The tolerance to begin with: the one nearest to 1e-8. */
-const usual = data.tolerances.reduce((best, v, k) => {
-  const far = t => Math.abs(Math.log10(t > 0 ? t : 1e-300) + 8);
-  return far(v) < far(data.tolerances[best] ?? 1) ? k : best;
-}, 0);
-
-const whatever = () => ({
-  tolerance: usual,
-  ...Object.fromEntries(Object.entries(DIMENSIONS).map(([name, d]) => [name, d.labels.map(() => true)])),
-});
-
 const state = {
-  selection: whatever(),
-  epsilon: null, // of the data profile; null: the tolerance of the selection
+  view: whatever(),
+  epsilon: null, // of the data profile; null: the tolerance of the view
   heat: "solved",
   theme: "",
   runs: { column: null, down: false, text: "", page: 0, all: false },
 };
-const epsilonOf = () => state.epsilon ?? data.tolerances[state.selection.tolerance] ?? 1e-8;
+const epsilonOf = () => state.epsilon ?? data.tolerances[state.view.tolerance];
+
+/** Keeps a view possible: another kind may lack the tolerance and the group. */
+function mended(view) {
+  if (!kindOf(view).tolerances.includes(view.tolerance)) view.tolerance = usual(view.kind);
+  if (!groupOf(view)) view.group = 0;
+  return view;
+}
+
+/** A view by names: { kind, tolerance, family or size, solvers }; what is not named is as in the beginning. */
+function viewOf(asked = {}) {
+  const view = whatever();
+  const find = (what, all, name) => {
+    const k = all.indexOf(name);
+    if (k < 0) throw new Error(`${what}: expected one of ${all.join(", ")}, found ${name}`);
+    return k;
+  };
+  if (asked.kind !== undefined) view.kind = find("kind", data.kinds.map(k => k.name), asked.kind);
+  view.tolerance = asked.tolerance === undefined ? usual(view.kind) : find("tolerance", data.tolerances, asked.tolerance);
+  const { groups } = kindOf(view);
+  if (asked.family !== undefined) view.group = find("family", groups.map(familyOfGroup), asked.family);
+  if (asked.size !== undefined) view.group = find("size", groups.map(sizeOfGroup), asked.size);
+  if (asked.solvers) {
+    view.solvers.fill(false);
+    for (const name of asked.solvers) view.solvers[find("solver", data.solvers.map(s => s.label), name)] = true;
+  }
+  return mended(view);
+}
 
 /** What differs from the state at the beginning, as the fragment of the address. */
 function toHash() {
   const parts = new URLSearchParams();
-  if (state.selection.tolerance !== usual) parts.set("tol", String(data.tolerances[state.selection.tolerance]));
-  for (const [name, d] of Object.entries(DIMENSIONS)) {
-    const flags = state.selection[name];
-    const [on, off] = [indices(flags), indices(flags.map(v => !v))];
-    if (!off.length) continue;
-    const fewer = on.length < off.length;
-    (fewer ? on : off).forEach(k => parts.append(fewer ? `only-${name}` : `not-${name}`, d.labels[k]));
-    if (fewer && !on.length) parts.set(`only-${name}`, "");
-  }
+  const { view } = state;
+  if (view.kind !== 0) parts.set("kind", kindOf(view).name);
+  if (view.tolerance !== usual(view.kind)) parts.set("tol", String(data.tolerances[view.tolerance]));
+  const [family, size] = [familyOfGroup(groupOf(view)), sizeOfGroup(groupOf(view))];
+  if (family !== null) parts.set("family", family);
+  if (size !== null) parts.set("size", size);
+  const [on, off] = [indices(view.solvers), indices(view.solvers.map(v => !v))];
+  const fewer = on.length < off.length;
+  if (off.length) (fewer ? on : off).forEach(s => parts.append(fewer ? "only" : "not", data.solvers[s].label));
+  if (fewer && !on.length) parts.set("only", "");
   if (state.epsilon !== null) parts.set("eps", String(state.epsilon));
   if (state.heat !== "solved") parts.set("heat", state.heat);
   if (state.theme) parts.set("theme", state.theme);
@@ -70,16 +80,19 @@ function toHash() {
   if (text !== location.hash.slice(1)) history.replaceState(null, "", text ? `#${text}` : location.pathname + location.search);
 }
 
+/** What an address says that this page does not know is passed over. */
 function fromHash() {
   const parts = new URLSearchParams(location.hash.slice(1));
-  const selection = whatever();
-  const tolerance = data.tolerances.indexOf(Number(parts.get("tol")));
-  if (tolerance >= 0) selection.tolerance = tolerance;
-  for (const [name, d] of Object.entries(DIMENSIONS)) {
-    const [only, not] = [parts.getAll(`only-${name}`), new Set(parts.getAll(`not-${name}`))];
-    selection[name] = d.labels.map(l => (only.length ? only.includes(l) : !not.has(l)));
-  }
-  state.selection = selection;
+  const view = whatever();
+  const known = (all, name) => Math.max(0, all.indexOf(name));
+  view.kind = known(data.kinds.map(k => k.name), parts.get("kind"));
+  view.tolerance = parts.has("tol") ? data.tolerances.indexOf(Number(parts.get("tol"))) : usual(view.kind);
+  const { groups } = kindOf(view);
+  if (parts.has("family")) view.group = known(groups.map(familyOfGroup), parts.get("family"));
+  if (parts.has("size")) view.group = known(groups.map(sizeOfGroup), parts.get("size"));
+  const [only, not] = [parts.getAll("only"), new Set(parts.getAll("not"))];
+  view.solvers = data.solvers.map(s => (only.length ? only.includes(s.label) : !not.has(s.label)));
+  state.view = mended(view);
   state.epsilon = parts.has("eps") && Number(parts.get("eps")) > 0 ? Number(parts.get("eps")) : null;
   state.heat = parts.get("heat") === "fastest" ? "fastest" : "solved";
   state.theme = ["light", "dark"].includes(parts.get("theme")) ? parts.get("theme") : "";
@@ -105,46 +118,50 @@ function decades(label, name, values) {
 }
 
 function without(leftOut, why) {
-  if (!leftOut.length) return "";
-  const names = leftOut.slice(0, 6).map(labelOf).join(", ") + (leftOut.length > 6 ? ` and ${leftOut.length - 6} more` : "");
+  const mine = leftOut.filter(s => shows(state.view, s));
+  if (!mine.length) return "";
+  const names = mine.slice(0, 6).map(labelOf).join(", ") + (mine.length > 6 ? ` and ${mine.length - 6} more` : "");
   return ` Not drawn, for ${why}: ${names}.`;
 }
 
 /** Times of several machines side by side are no comparison of methods. */
-function machinesNote(selection) {
-  const machines = new Set(indices(selection.solvers).flatMap(s => data.solvers[s].machines));
+function machinesNote() {
+  const machines = new Set(kindOf(state.view).solvers.filter(s => shows(state.view, s)).flatMap(s => data.solvers[s].machines));
   return machines.size > 1 ? " The times come from different machines." : "";
 }
 
 function profileFigure(cost) {
-  const { selection } = state;
-  const { problems, curves, leftOut } = performanceProfile(selection, cost);
+  const { view } = state;
+  const { problems, profiles: { [cost]: drawn } } = atOf(view);
+  const curves = curvesOf(view, drawn);
   const largest = Math.max(1, ...curves.map(c => c.x[c.x.length - 1] ?? 1));
   const max = largest > 100 ? powerAbove(largest) : Math.max(2, largest * 1.1);
-  const { name } = COSTS[cost];
-  const tolerance = toleranceText(data.tolerances[selection.tolerance]);
+  const name = COSTS[cost];
+  const tolerance = toleranceText(data.tolerances[view.tolerance]);
   const note = cost === "seconds"
-    ? `Share of ${plural(problems, "problem")} that a solver solves to ${tolerance} in at most τ times the least time of any selected solver (Dolan `
-      + "and Moré 2002). What fails, and a run that is missing, is not solved at any τ. A profile shows the distance from the best; with more than "
-      + `two solvers it does not rank them (Gould and Scott 2016).${machinesNote(selection)}`
+    ? `Share of ${plural(problems, "problem")} that a solver solves to ${tolerance} in at most τ times the least time of any solver, also of those not `
+      + "shown (Dolan and Moré 2002). What fails, and a run that is missing, is not solved at any τ; problems that a solver refuses do not count in its "
+      + `share. A profile shows the distance from the best; with more than two solvers it does not rank them (Gould and Scott 2016).${machinesNote()}`
     : `As by time, with the number of ${name} in place of the time; ${plural(problems, "problem")}, tolerance ${tolerance}.`;
   return {
     heading: `Performance profile by ${name}`,
     title: `Performance profile by ${name}, tolerance ${tolerance}`,
-    x: { label: "ratio τ to the best of the selected solvers", name: "tau", log: true, min: 1, max },
+    x: { label: "ratio τ to the best of all solvers", name: "tau", log: true, min: 1, max },
     y: shareAxis("share of problems", "rho"),
     stepped: true,
     panels: [{ title: "", curves: curves.map(c => ({ ...c, before: 0 })) }],
     solvers: solversOf(curves),
     at: x => `τ = ${short(x)}`,
     format: share,
-    note: note + without(leftOut, `their ${name} are not known`),
+    note: note + without(drawn.left_out, `their ${name} are not known`),
   };
 }
 
 function dataFigure() {
+  const { view } = state;
   const epsilon = epsilonOf();
-  const { problems, curves, leftOut } = dataProfile(state.selection, epsilon);
+  const drawn = groupOf(view).data[kindOf(view).epsilons.indexOf(epsilon)];
+  const curves = curvesOf(view, drawn);
   return {
     heading: "Data profile",
     title: `Data profile, residual ${toleranceText(epsilon)}`,
@@ -155,9 +172,9 @@ function dataFigure() {
     solvers: solversOf(curves),
     at: x => `t = ${short(x)} s`,
     format: share,
-    note: `Share of ${plural(problems, "problem")} on which the best residual that a solver has reached within t seconds is at most ${
+    note: `Share of ${plural(groupOf(view).problems, "problem")} on which the best residual that a solver has reached within t seconds is at most ${
       toleranceText(epsilon)}, over its runs at all tolerances: by the residual against time where it was kept, else at the end of the run. `
-      + `Failed runs count by the residual that they reached.${machinesNote(state.selection)}${without(leftOut, "their residuals or times are not known")}`,
+      + `Failed runs count by the residual that they reached.${machinesNote()}${without(drawn.left_out, "their residuals or times are not known")}`,
   };
 }
 
@@ -174,28 +191,30 @@ const residualsInTime = (curves, label) => ({
 });
 
 function medianFigure() {
-  const { problems, curves, leftOut } = medianResidual(state.selection);
+  const { problems, residual: drawn } = groupOf(state.view);
+  const curves = curvesOf(state.view, drawn);
   return {
     title: "Median residual against time",
     ...residualsInTime(curves, "median residual"),
     note: `Median over ${plural(problems, "problem")} of the best residual that a solver has reached within t seconds, over its runs at all `
       + `tolerances. A problem without an answer yet counts as infinite, so a curve begins where half of them have one.${
-        machinesNote(state.selection)}${without(leftOut, "their residuals or times are not known")}`,
+        machinesNote()}${without(drawn.left_out, "their residuals or times are not known")}`,
   };
 }
 
 function successFigure() {
-  const { classes: [all, ...sizes], leftOut } = success(state.selection);
-  // One class alone is all there is.
-  const classes = sizes.length > 1 ? [all, ...sizes] : sizes;
+  const { success, success_left_out: leftOut } = groupOf(state.view);
+  const classes = success.map(c => ({
+    ...c, curves: c.shares.filter(([s]) => shows(state.view, s)).map(([solver, y]) => ({ solver, x: data.decades, y })),
+  }));
   return {
     title: "Success against tolerance, by number of contacts",
     x: { label: "residual ε", name: "epsilon", log: true, min: 1e-3, max: 1e-14 },
     y: shareAxis("share of problems", "share"),
     stepped: false,
-    panels: classes.map(c => ({ title: `${c === all ? "all" : `${c.size} contacts`} (${c.problems})`, name: c.size, curves: c.curves })),
+    panels: classes.map(c => ({ title: `${c.size === "all" ? "all" : `${c.size} contacts`} (${c.problems})`, name: c.size, curves: c.curves })),
     solvers: solversOf(classes.flatMap(c => c.curves)),
-    at: x => `ε = ${toleranceText(EPSILONS.reduce((a, b) => (Math.abs(Math.log(b / x)) < Math.abs(Math.log(a / x)) ? b : a)))}`,
+    at: x => `ε = ${toleranceText(data.decades.reduce((a, b) => (Math.abs(Math.log(b / x)) < Math.abs(Math.log(a / x)) ? b : a)))}`,
     format: share,
     note: "Share of problems whose smallest residual, over the runs of a solver at all tolerances, is at most ε; in brackets their number. A run stops at its own tolerance, so "
       + `the shares below the smallest tolerance that was asked for (${toleranceText(Math.min(...data.tolerances))}) are what runs happened to reach.${
@@ -336,64 +355,75 @@ function emphasise(solver) {
 
 // ------------------------------------------------------------------------------------------------ filters
 
-function checklist(name, only) {
-  const d = DIMENSIONS[name];
-  const all = on => h("button", { type: "button", click: () => change(s => s[name].fill(on)) }, on ? "all" : "none");
-  const rows = d.labels.map((label, k) => {
-    const box = h("input", { type: "checkbox", change: () => change(s => { s[name][k] = box.checked; }) });
-    const row = h("label", {},
-      box, name === "solvers" ? swatch(k) : null,
-      h("span", { class: "label", title: clean(label) }, name === "solvers" ? labelOf(k) : label),
-      only[k] === undefined ? null : h("span", { class: "count" }, String(only[k])),
+/** The solvers of the kind; hiding one hides its curves and rows. */
+function solverList() {
+  const { solvers, refusing } = kindOf(state.view);
+  const all = on => h("button", { type: "button", click: () => change(v => v.solvers.fill(on)) }, on ? "all" : "none");
+  const rows = solvers.map(s => {
+    const box = h("input", { type: "checkbox", "data-solver": s, change: () => change(v => { v.solvers[s] = box.checked; }) });
+    const row = h("label", {}, box, swatch(s), h("span", { class: "label", title: clean(labelOf(s)) }, clean(labelOf(s))),
       h("button", {
-        type: "button", class: "only", "aria-label": `only ${clean(label)}`,
-        click: event => { event.preventDefault(); change(s => { s[name].fill(false); s[name][k] = true; }); },
+        type: "button", class: "only", "aria-label": `only ${clean(labelOf(s))}`,
+        click: event => { event.preventDefault(); change(v => { v.solvers.fill(false); v.solvers[s] = true; }); },
       }, "only"));
-    if (name === "solvers") {
-      row.addEventListener("pointerenter", () => emphasise(k));
-      row.addEventListener("pointerleave", () => emphasise(null));
-    }
+    row.addEventListener("pointerenter", () => emphasise(s));
+    row.addEventListener("pointerleave", () => emphasise(null));
     return row;
   });
-  return h("fieldset", { id: `filter-${name}` }, h("legend", {}, d.title, " ", h("span", { class: "exports" }, all(true), all(false))), rows);
+  return [h("legend", {}, "Solvers shown", " ", h("span", { class: "exports" }, all(true), all(false))), rows,
+    refusing.length ? h("details", { class: "note" }, h("summary", {}, `${refusing.length} take no problem of this kind`),
+      clean(refusing.map(labelOf).join(", "))) : null];
 }
 
-function buildFilters() {
-  const counts = (n, of) => {
-    const total = new Array(n).fill(0);
-    for (let p = 0; p < nProblems; p++) total[of(p)]++;
-    return total;
-  };
-  const tolerance = h("select", {
-    id: "filter-tolerance", change: () => change(s => { s.tolerance = tolerance.selectedIndex; }),
-  }, data.tolerances.map(t => h("option", {}, toleranceText(t))));
-  fill(byId("filters"),
-    h("label", { class: "line" }, "Tolerance ", tolerance),
-    checklist("solvers", []),
-    data.families.length > 1 ? checklist("families", counts(data.families.length, p => data.problems.family[p])) : null,
-    checklist("sizes", counts(data.sizes.length, p => sizeOf[p])),
-    data.kinds.length > 1 ? checklist("kinds", counts(data.kinds.length, p => data.problems.kind[p])) : null,
-    h("p", { class: "line" },
-      h("button", { type: "button", click: () => { state.selection = whatever(); state.epsilon = null; changed(); } }, "Reset"),
-      " ", h("button", { type: "button", id: "theme", click: () => turn() }, "Light or dark")));
+/** A select whose options have values of their own; `change` gets the value chosen. */
+function choice(id, title, options, choose) {
+  const select = h("select", { id, change: () => choose(Number(select.value)) }, options);
+  return h("label", { class: "line" }, title, " ", select);
 }
+const option = (value, text) => h("option", { value }, clean(text));
+
+/** The filters of the kind that is shown: it decides on tolerances, groups of problems and solvers. */
+function buildFilters() {
+  const { groups, tolerances } = kindOf(state.view);
+  const part = (title, name) => {
+    const options = groups.flatMap((group, k) => (name(group) === null ? [] : [option(k, `${name(group)} (${group.problems})`)]));
+    return options.length ? h("optgroup", { label: title }, options) : null;
+  };
+  fill(byId("filters"),
+    data.kinds.length > 1 ? choice("filter-kind", "Kind", data.kinds.map((k, i) => option(i, `${k.name || "(not known)"} (${k.groups[0].problems})`)), k => {
+      change(v => { v.kind = k; v.group = 0; });
+    }) : null,
+    choice("filter-tolerance", "Tolerance", tolerances.map(k => option(k, toleranceText(data.tolerances[k]))), k => change(v => { v.tolerance = k; })),
+    choice("filter-group", "Problems", [option(0, `all (${groups[0].problems})`), part("Family", familyOfGroup), part("Contacts", sizeOfGroup)]
+      .filter(o => o !== null), k => change(v => { v.group = k; })),
+    h("fieldset", { id: "filter-solvers" }, solverList().flat()),
+    h("p", { class: "line" },
+      h("button", { type: "button", click: () => { state.view = whatever(); state.epsilon = null; changed(); } }, "Reset"),
+      " ", h("button", { type: "button", id: "theme", click: () => turn() }, "Light or dark")));
+  const residuals = kindOf(state.view).epsilons;
+  fill(byId("epsilon"), h("option", { value: "" }, "residual: the tolerance"),
+    residuals.map(e => h("option", { value: String(e) }, `residual: ${toleranceText(e)}`)));
+  built = state.view.kind;
+}
+let built = null;
 
 function showFilters() {
-  const { selection } = state;
-  byId("filter-tolerance").selectedIndex = selection.tolerance;
-  for (const name of Object.keys(DIMENSIONS)) {
-    byId(`filter-${name}`)?.querySelectorAll("input").forEach((box, k) => { box.checked = selection[name][k]; });
+  const { view } = state;
+  if (built !== view.kind) buildFilters();
+  for (const [id, value] of [["kind", view.kind], ["tolerance", view.tolerance], ["group", view.group]]) {
+    const select = byId(`filter-${id}`);
+    if (select) select.value = String(value);
   }
-  const some = name => {
-    const [on, all] = [indices(selection[name]).length, selection[name].length];
-    return on === all ? plural(all, ...NOUNS[name]) : `${on} of ${plural(all, ...NOUNS[name])}`;
-  };
+  byId("filter-solvers").querySelectorAll("input").forEach(box => { box.checked = view.solvers[box.dataset.solver]; });
+  const { name, solvers } = kindOf(view);
+  const [family, size] = [familyOfGroup(groupOf(view)), sizeOfGroup(groupOf(view))];
+  const on = solvers.filter(s => view.solvers[s]).length;
   byId("filters-state").textContent = [
-    `tolerance ${toleranceText(data.tolerances[selection.tolerance])}`, some("solvers"), some("families"),
-    indices(selection.sizes).length < selection.sizes.length ? some("sizes") : "", plural(problemsOf(selection).length, "problem"),
+    data.kinds.length > 1 ? clean(name) : "", `tolerance ${toleranceText(data.tolerances[view.tolerance])}`,
+    family === null ? "" : clean(family), size === null ? "" : `${size} contacts`,
+    on < solvers.length ? `${on} of ${plural(solvers.length, "solver")} shown` : plural(on, "solver"), plural(atOf(view).problems, "problem"),
   ].filter(Boolean).join(" · ");
 }
-const NOUNS = { families: ["family", "families"], sizes: ["size class", "size classes"], kinds: ["kind"], solvers: ["solver"] };
 
 function turn() {
   const dark = state.theme ? state.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
@@ -418,76 +448,87 @@ function csvButton(name, rows) {
   }, "CSV"));
 }
 
-/** The causes of failure that occur in a summary. */
-const causes = rows => data.endings.map((_, e) => e).filter(e => e !== SOLVED && rows.some(r => r.endings?.[e]));
+/** The endings other than an answer that occur in a summary. */
+const causes = rows => data.endings.map((_, e) => e).filter(e => data.endings[e] !== "solved" && rows.some(r => r.endings?.[e]));
+const shownRows = rows => rows.filter(r => shows(state.view, r.solver));
+const labelled = s => (s === BEST ? "virtual best" : data.solvers[s].label);
 
-function summaryRows(rows) {
-  const failed = causes(rows);
-  const head = ["solver", "problems", "solved", "fastest", "median_ratio", "solved_seconds",
-    ...failed.map(e => data.endings[e]), "missing"];
+function summaryRows() {
+  const rows = shownRows(atOf(state.view).rows);
+  const ended = causes(rows);
+  const head = ["solver", "problems", "solved", "fastest", "median_ratio", "seconds", ...ended.map(e => data.endings[e]), "missing"];
   return [head, ...rows.map(r => [
-    r.solver === BEST ? "virtual best" : data.solvers[r.solver].label, r.problems, r.solved, r.fastest, r.medianRatio, r.seconds,
-    ...failed.map(e => (r.endings ? r.endings[e] : "")), r.endings ? r.missing : "",
+    labelled(r.solver), r.problems, r.solved, r.fastest, r.ratio, r.seconds,
+    ...ended.map(e => (r.endings ? r.endings[e] : "")), r.endings ? r.missing : "",
   ])];
 }
 
 function renderSummary() {
-  const rows = summary(state.selection);
-  const failed = causes(rows);
+  const { problems, rows: all } = atOf(state.view);
+  const rows = shownRows(all);
+  const ended = causes(rows);
   const missing = rows.some(r => r.missing);
   const sorted = [...rows].sort((a, b) => (a.solver === BEST) - (b.solver === BEST) || b.solved - a.solved || b.fastest - a.fastest);
   const table = h("table", { id: "summary" },
     h("thead", {}, h("tr", {},
-      h("th", {}, "solver"), ["solved", "", "fastest", "median ratio", "time solved, s"].map(t => h("th", { class: "n" }, t)),
-      failed.map(e => h("th", { class: "n" }, endingText(data.endings[e]))), missing ? h("th", { class: "n" }, "no run") : null)),
+      h("th", {}, "solver"), ["solved", "", "fastest", "median ratio", "seconds"].map(t => h("th", { class: "n" }, t)),
+      ended.map(e => h("th", { class: "n" }, endingText(data.endings[e]))), missing ? h("th", { class: "n" }, "no run") : null)),
     h("tbody", {}, sorted.map(r => h("tr", { class: r.solver === BEST ? "best" : null },
-      h("td", { class: "name" }, swatch(r.solver), labelOf(r.solver)),
-      number(r.solved), number(percent(r.solved, r.problems)), number(percent(r.fastest, r.problems)), number(short(r.medianRatio)),
-      number(r.solved ? short(r.seconds) : ""), failed.map(e => number(r.endings?.[e] || "")), missing ? number(r.missing || "") : null))));
-  const n = rows[0]?.problems ?? 0;
-  byId("summary-note").textContent = `${plural(n, "problem")} at tolerance ${toleranceText(data.tolerances[state.selection.tolerance])}. `
-    + "Fastest: the share of problems on which the solver needs the least time, ties for each. Median ratio: of its time to the least, over the "
-    + `problems that it solves. The other columns count failures by cause.${machinesNote(state.selection)}`;
+      h("td", { class: "name" }, swatch(r.solver), clean(labelOf(r.solver))),
+      number(r.solved), number(percent(r.solved, r.problems - r.refused)), number(percent(r.fastest, r.problems - r.refused)), number(short(r.ratio)),
+      number(short(r.seconds)), ended.map(e => number(r.endings?.[e] || "")), missing ? number(r.missing || "") : null))));
+  byId("summary-note").textContent = `${plural(problems, "problem")} at tolerance ${toleranceText(data.tolerances[state.view.tolerance])}. `
+    + "Solved: by an answer that the judge accepts, or by a verified proof that there is none (infeasible). Fastest: the share of problems on which "
+    + "the solver needs the least time of all solvers, ties for each. Shares leave out the problems that the solver refuses. Median ratio: of its time "
+    + "to the least, over the problems that it solves. Seconds: all its runs, failed ones included; of the virtual best those that solve. "
+    + `The other columns count endings.${machinesNote()}`;
   fill(byId("summary-place"), table);
 }
 
+/** The families of the view, each with its rows by solver. */
+const familiesOf = () => atOf(state.view).families.map(([family, rows]) => ({
+  family, problems: rows[0]?.problems ?? 0, rows: new Map(shownRows(rows).map(r => [r.solver, r])),
+}));
+
 function renderHeat() {
-  const { families, rows } = byFamily(state.selection);
+  const families = familiesOf();
   // Paper has no room for many columns side by side.
   const most = printing ? 14 : Math.max(1, families.length);
-  const parts = Array.from({ length: Math.ceil(families.length / most) }, (_, k) => k * most);
-  fill(byId("heat-place"), families.length ? null : h("p", {}, "Nothing to show."), parts.map(from => h("table", { class: families.length > 9 ? "many" : null },
-    h("thead", {}, h("tr", {}, h("th", {}, "solver"), families.slice(from, from + most).map((f, k) => (
-      h("th", { class: "n" }, h("span", {}, clean(DIMENSIONS.families.labels[f]), h("small", {}, ` ${rows[0]?.cells[from + k].problems ?? 0}`))))))),
-    h("tbody", {}, rows.map(r => h("tr", {}, h("td", { class: "name" }, swatch(r.solver), labelOf(r.solver)),
-      r.cells.slice(from, from + most).map(c => (c.runs ? h("td", {
-        class: "n heat", style: `--share:${((100 * c[state.heat]) / c.problems).toFixed(0)}%`, title: `${c[state.heat]} of ${c.problems}`,
-      }, String(Math.round((100 * c[state.heat]) / c.problems))) : h("td")))))))));
-  byId("heat-note").textContent = `Share of problems, in per cent, that a solver ${state.heat === "solved" ? "solves" : "solves in the least time of all selected"}, `
-    + "by family. The small numbers are those of the problems; where a solver has no run at all, its place is empty.";
+  const parts = Array.from({ length: Math.ceil(families.length / most) }, (_, k) => families.slice(k * most, (k + 1) * most));
+  const share = r => {
+    const of = r.problems - r.refused;
+    if (r.missing === r.problems || !of) return h("td", {}, r.refused ? h("small", {}, "refused") : "");
+    const part = (100 * r[state.heat]) / of;
+    return h("td", { class: "n heat", style: `--share:${part.toFixed(0)}%`, title: `${r[state.heat]} of ${of}${r.refused ? `, ${r.refused} refused` : ""}` },
+      String(Math.round(part)));
+  };
+  const solvers = kindOf(state.view).solvers.filter(s => shows(state.view, s));
+  fill(byId("heat-place"), families.length ? null : h("p", {}, "Nothing to show."), parts.map(part => h("table", { class: families.length > 9 ? "many" : null },
+    h("thead", {}, h("tr", {}, h("th", {}, "solver"), part.map(f => (
+      h("th", { class: "n" }, h("span", {}, clean(data.families[f.family] || "(no family)"), h("small", {}, ` ${f.problems}`))))))),
+    h("tbody", {}, solvers.map(s => h("tr", {}, h("td", { class: "name" }, swatch(s), clean(labelOf(s))), part.map(f => share(f.rows.get(s)))))))));
+  byId("heat-note").textContent = `Share of problems, in per cent, that a solver ${state.heat === "solved" ? "solves" : "solves in the least time of all"}, `
+    + "by family, of those that it does not refuse. The small numbers are those of the problems; where a solver has no run at all, its place is empty.";
 }
 
-const heatRows = () => {
-  const { families, rows } = byFamily(state.selection);
-  return [["solver", "family", "problems", "runs", "solved", "fastest"], ...rows.flatMap(r => r.cells.map((c, k) => (
-    [data.solvers[r.solver].label, data.families[families[k]], c.problems, c.runs, c.solved, c.fastest])))];
-};
+const heatRows = () => [["solver", "family", "problems", "refused", "missing", "solved", "fastest"], ...familiesOf().flatMap(f => [...f.rows.values()].map(r => [
+  labelled(r.solver), data.families[f.family], r.problems, r.refused, r.missing, r.solved, r.fastest]))];
 
 const problemLink = p => h("button", { type: "button", class: "link", click: () => openProblem(p) }, clean(data.problems.name[p]));
 
 function renderUnsolved() {
-  const found = unsolved(state.selection);
+  const found = atOf(state.view).unsolved;
   const most = 200;
   byId("unsolved-note").textContent = found.length
-    ? `${plural(found.length, "problem")} that none of the selected solvers solves to ${toleranceText(data.tolerances[state.selection.tolerance])}.${
+    ? `${plural(found.length, "problem")} that none of the solvers solves to ${toleranceText(data.tolerances[state.view.tolerance])}.${
       found.length > most ? ` The first ${most} are shown; the CSV has all.` : ""}`
-    : "None: every problem of the selection is solved by at least one of the selected solvers.";
+    : "None: every problem is solved by at least one of the solvers.";
   fill(byId("unsolved-place"), found.length ? h("table", { id: "unsolved" },
     h("thead", {}, h("tr", {}, h("th", {}, "problem"), h("th", {}, "family"), h("th", { class: "n" }, "contacts"),
       h("th", { class: "n" }, "least residual"), h("th", {}, "by"))),
-    h("tbody", {}, found.slice(0, most).map(({ problem: p, best }) => h("tr", {},
+    h("tbody", {}, found.slice(0, most).map(([p, closest]) => h("tr", {},
       h("td", {}, problemLink(p)), cell(familyOf(p)), number(data.problems.contacts[p]),
-      number(best < 0 ? "" : residual(runs.reached[best])), cell(best < 0 ? "" : labelOf(runs.solver[best])))))) : null);
+      number(closest ? residual(closest[1]) : ""), cell(closest ? labelOf(closest[0]) : ""))))) : null);
 }
 
 function renderUnreadable() {
@@ -519,16 +560,16 @@ const COLUMNS = [
 ].filter(c => !c.column || data.runs[c.column]);
 const SHOWN = COLUMNS.filter(c => !c.hidden);
 const PAGE = 50;
-const classOf = (c, r) => (c.n ? "n" : c.name === "ending" && runs.ending[r] !== SOLVED ? "failed" : c.name);
+const classOf = (c, r) => (c.n ? "n" : c.name === "ending" && !solved(r) ? "failed" : c.name);
 
-/** The runs of the selection, by the filter of texts and in the order of the table. */
+/** The runs of the view, by the filter of texts and in the order of the table. */
 function listedRuns() {
-  const { selection } = state;
+  const { view } = state;
   const { column, down, text, all } = state.runs;
   const words = text.toLowerCase().split(/\s+/).filter(Boolean);
   const found = [];
   for (let r = 0; r < nRuns; r++) {
-    if (!selection.solvers[runs.solver[r]] || (!all && runs.tolerance[r] !== selection.tolerance) || !passes(selection, runs.problem[r])) continue;
+    if (!view.solvers[runs.solver[r]] || (!all && runs.tolerance[r] !== view.tolerance) || !passes(view, runs.problem[r])) continue;
     if (words.length) {
       const line = [data.problems.name[runs.problem[r]], data.solvers[runs.solver[r]].label, endingText(data.endings[runs.ending[r]]), messageOf(r)]
         .join(" ").toLowerCase();
@@ -594,12 +635,12 @@ const runRows = found => [
 // ------------------------------------------------------------------------------------------------ one problem
 
 function traceFigure(p) {
-  const k = state.selection.tolerance;
-  const curves = data.solvers.flatMap((_, s) => {
-    const trace = data.traces[runAt(p, s, k)];
-    if (!trace) return [];
-    const points = trace[0].map((t, i) => [t, trace[1][i]]).filter(([t, v]) => t > 0 && v > 0);
-    return points.length ? [{ solver: s, x: points.map(v => v[0]), y: points.map(v => v[1]), ends: true }] : [];
+  const k = state.view.tolerance;
+  const traced = Object.keys(data.traces).map(Number).filter(r => runs.problem[r] === p && runs.tolerance[r] === k);
+  const curves = traced.flatMap(r => {
+    const [times, residuals] = data.traces[r];
+    const points = times.map((t, i) => [t, residuals[i]]).filter(([t, v]) => t > 0 && v > 0);
+    return points.length ? [{ solver: runs.solver[r], x: points.map(v => v[0]), y: points.map(v => v[1]), ends: true }] : [];
   });
   return {
     heading: "Residual against time",
@@ -612,16 +653,14 @@ function traceFigure(p) {
 function openProblem(p) {
   const { problems } = data;
   const facts = [
-    ["family", data.families[problems.family[p]]], ["kind", data.kinds[problems.kind[p]]], ["contacts", problems.contacts[p]],
+    ["family", data.families[problems.family[p]]], ["kind", data.kinds[problems.kind[p]].name], ["contacts", problems.contacts[p]],
     ["unknowns", problems.unknowns[p]], ["degrees of freedom", problems.dofs?.[p]], ["contact density", short(problems.density?.[p])],
     ["asymmetry", short(problems.asymmetry?.[p])],
     ["friction", problems.mu_min?.[p] === undefined || problems.mu_min[p] === null ? "" : problems.mu_min[p] === problems.mu_max?.[p]
       ? short(problems.mu_min[p]) : `${short(problems.mu_min[p])} to ${short(problems.mu_max?.[p])}`],
   ].filter(([, v]) => v !== "" && v !== undefined && v !== null && v !== 0);
-  const mine = [];
-  for (let s = 0; s < nSolvers; s++) for (let k = 0; k < nTolerances; k++) if (runAt(p, s, k) >= 0) mine.push(runAt(p, s, k));
-  mine.sort((a, b) => runs.tolerance[a] - runs.tolerance[b] || (runs.ending[a] === SOLVED ? 0 : 1) - (runs.ending[b] === SOLVED ? 0 : 1)
-    || runs.seconds[a] - runs.seconds[b]);
+  const mine = indices([...runs.problem].map(of => of === p));
+  mine.sort((a, b) => runs.tolerance[a] - runs.tolerance[b] || solved(b) - solved(a) || runs.seconds[a] - runs.seconds[b]);
   const columns = SHOWN.filter(c => !["problem", "family", "contacts"].includes(c.name));
   const traced = traceFigure(p).solvers.length > 0;
   const dialog = byId("problem");
@@ -644,12 +683,14 @@ function openProblem(p) {
 // ------------------------------------------------------------------------------------------------ the whole
 
 function change(how) {
-  how(state.selection);
+  how(state.view);
+  mended(state.view);
   state.runs.page = 0;
   changed();
 }
 
 function changed() {
+  if (!kindOf(state.view).epsilons.includes(state.epsilon)) state.epsilon = null;
   showFilters();
   for (const name of Object.keys(FIGURES)) render(name);
   byId("epsilon").value = String(state.epsilon ?? "");
@@ -661,17 +702,16 @@ function changed() {
 }
 
 function build() {
-  buildFilters();
   const epsilon = h("select", {
     id: "epsilon", "aria-label": "residual of the data profile",
     change: () => { state.epsilon = epsilon.value ? Number(epsilon.value) : null; render("data-profile"); toHash(); },
-  }, h("option", { value: "" }, "residual: the tolerance"), EPSILONS.map(e => h("option", { value: String(e) }, `residual: ${toleranceText(e)}`)));
+  });
   fill(byId("figures"), Object.entries(FIGURES).map(([name, figure]) => place(name, figure, name === "data-profile" ? epsilon : null)));
-  byId("summary-buttons").replaceWith(csvButton("summary", () => summaryRows(summary(state.selection))));
+  byId("summary-buttons").replaceWith(csvButton("summary", summaryRows));
   byId("heat-buttons").replaceWith(csvButton("families", heatRows));
   byId("unsolved-buttons").replaceWith(csvButton("unsolved", () => [["problem", "family", "contacts", "residual", "solver"],
-    ...unsolved(state.selection).map(({ problem: p, best }) => [data.problems.name[p], familyOf(p),
-      data.problems.contacts[p], best < 0 ? "" : runs.reached[best], best < 0 ? "" : data.solvers[runs.solver[best]].label])]));
+    ...atOf(state.view).unsolved.map(([p, closest]) => [data.problems.name[p], familyOf(p), data.problems.contacts[p],
+      closest ? closest[1] : "", closest ? labelled(closest[0]) : ""])]));
   byId("runs-buttons").replaceWith(csvButton("runs", () => runRows(listedRuns())));
   byId("heat-what").addEventListener("change", () => { state.heat = byId("heat-what").value; renderHeat(); toHash(); });
   let waiting = 0;
@@ -707,40 +747,15 @@ function build() {
   changed();
 }
 
-/** A selection by names; what is not named is not narrowed. */
-function selectionOf(asked = {}) {
-  const selection = whatever();
-  if (asked.tolerance !== undefined) {
-    selection.tolerance = data.tolerances.indexOf(asked.tolerance);
-    if (selection.tolerance < 0) throw new Error(`tolerance: expected one of ${data.tolerances.join(", ")}, found ${asked.tolerance}`);
-  }
-  for (const [name, d] of Object.entries(DIMENSIONS)) {
-    if (!asked[name]) continue;
-    const strange = asked[name].find(label => !d.labels.includes(label));
-    if (strange !== undefined) throw new Error(`${name}: expected one of ${d.labels.join(", ")}, found ${strange}`);
-    selection[name] = d.labels.map(label => asked[name].includes(label));
-  }
-  return selection;
-}
-
-const named = result => ({
-  ...result,
-  curves: result.curves.map(c => ({ ...c, solver: c.solver === BEST ? "virtual best" : data.solvers[c.solver].label })),
-});
-
 const began = performance.now();
 if (nRuns > 0) build();
 else byId("empty").hidden = false;
 
 /** For scripts: the numbers of the page by names, and what it shows. */
 window.report = {
-  profile: ({ cost = "seconds", ...asked } = {}) => named(performanceProfile(selectionOf(asked), cost)),
-  dataProfile: ({ epsilon, ...asked }) => named(dataProfile(selectionOf(asked), epsilon)),
-  medianResidual: asked => named(medianResidual(selectionOf(asked))),
-  success: asked => success(selectionOf(asked)).classes.map(named),
-  summary: asked => summary(selectionOf(asked)).map(r => ({ ...r, solver: r.solver === BEST ? "virtual best" : data.solvers[r.solver].label })),
-  unsolved: asked => unsolved(selectionOf(asked)).map(r => data.problems.name[r.problem]),
-  select: asked => { state.selection = selectionOf(asked); changed(); },
+  select: asked => { state.view = viewOf(asked); state.epsilon = asked?.epsilon ?? null; changed(); },
+  curves: name => shown[name].figure.panels.map(panel => panel.curves.map(c => ({ ...c, solver: labelled(c.solver) }))),
+  summary: () => summaryRows(),
   svg: name => svgText(shown[name].figure),
   png: name => pngBlob(shown[name].figure),
   csv: name => figureCsv(shown[name].figure),

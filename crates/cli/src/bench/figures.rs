@@ -1,10 +1,12 @@
 //! `nonsmooth bench figures`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use nonsmooth_bench::figures::figures;
+use nonsmooth_bench::page;
 use nonsmooth_bench::profile::Selection;
 use nonsmooth_bench::record::SIZES;
+use nonsmooth_bench::runs::Runs;
 use nonsmooth_bench::tables::{
     self, By, summary, summary_page, summary_table, unsolved, unsolved_table,
 };
@@ -16,7 +18,8 @@ use crate::{Exit, files, output};
 ///
 /// Writes into a folder: performance profiles by time, iterations and factorisations, data profiles, success against tolerance and
 /// residual against time, each as SVG and as CSV of its data; tables of what is solved, overall, by family and by
-/// size, and of what nobody solves, each as CSV and as Markdown; and all runs as runs.csv.
+/// size, and of what nobody solves, each as CSV and as Markdown; and all runs as runs.csv. Kinds of problem are never
+/// counted together: of several, each has a folder of its name.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
@@ -65,37 +68,54 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let Some(tolerance) = tol.or_else(|| runs.common_tolerance()) else {
         return Err("expected runs, found none in any file".into());
     };
-    let selection = Selection {
-        tolerance,
+    let of = |kind: &str| Selection {
         families: args.family.clone(),
-        sizes,
-        kinds: args.kind.clone(),
+        sizes: sizes.clone(),
         solvers: args.solver.clone(),
+        ..Selection::at(kind, tolerance)
     };
-    if !runs.runs.iter().any(|r| r.tolerance == tolerance && selection.takes(r)) {
+    let asked = |kind: &str| args.kind.is_empty() || args.kind.iter().any(|k| k == kind);
+    let kinds = runs.kinds().into_iter().map(|(kind, _)| kind).filter(|kind| asked(kind));
+    let chosen = kinds.map(of).filter(|selection| {
+        runs.runs.iter().any(|r| r.tolerance == tolerance && selection.takes(r))
+    });
+    let chosen: Vec<Selection> = chosen.collect();
+    if chosen.is_empty() {
         return Err(format!(
             "expected runs that are selected at tolerance {tolerance:e}, found none"
         ));
     }
-    files::folder("--out", &args.out)?;
-    let write = |name: String, text: &str| {
-        let path = args.out.join(&name);
-        files::write_text("--out", &path, text)?;
-        output::print(&format!("{}\n", path.display()));
-        Ok::<_, String>(())
-    };
-    for figure in figures(&runs, &selection)? {
-        write(format!("{}.svg", figure.name), &figure.svg)?;
-        write(format!("{}.csv", figure.name), &figure.csv)?;
+    for selection in &chosen {
+        let folder = match chosen.as_slice() {
+            [_] => args.out.clone(),
+            _ => args.out.join(page::slug(&selection.kind)),
+        };
+        write(&runs, selection, &folder)?;
+    }
+    write_text(&args.out, "runs.csv", &tables::runs_table(&runs).csv())?;
+    Ok(exit)
+}
+
+/// Writes the figures and the tables of a selection into a folder.
+fn write(runs: &Runs, selection: &Selection, folder: &Path) -> Result<(), String> {
+    files::folder("--out", folder)?;
+    for figure in figures(runs, selection)? {
+        write_text(folder, &format!("{}.svg", figure.name), &figure.svg)?;
+        write_text(folder, &format!("{}.csv", figure.name), &figure.csv)?;
     }
     for (name, by) in [("all", By::All), ("family", By::Family), ("size", By::Size)] {
-        let rows = summary(&runs, &selection, by);
-        write(format!("summary-{name}.csv"), &summary_table(&rows).csv())?;
-        write(format!("summary-{name}.md"), &summary_page(&rows).markdown())?;
+        let rows = summary(runs, selection, by);
+        write_text(folder, &format!("summary-{name}.csv"), &summary_table(&rows).csv())?;
+        write_text(folder, &format!("summary-{name}.md"), &summary_page(&rows).markdown())?;
     }
-    let nobody = unsolved_table(&unsolved(&runs, &selection));
-    write("unsolved.csv".into(), &nobody.csv())?;
-    write("unsolved.md".into(), &nobody.markdown())?;
-    write("runs.csv".into(), &tables::runs_table(&runs).csv())?;
-    Ok(exit)
+    let nobody = unsolved_table(&unsolved(runs, selection));
+    write_text(folder, "unsolved.csv", &nobody.csv())?;
+    write_text(folder, "unsolved.md", &nobody.markdown())
+}
+
+fn write_text(folder: &Path, name: &str, text: &str) -> Result<(), String> {
+    let path = folder.join(name);
+    files::write_text("--out", &path, text)?;
+    output::print(&format!("{}\n", path.display()));
+    Ok(())
 }
