@@ -90,11 +90,13 @@ pub struct Timing {
     pub noise: f64,
 }
 
-/// The times of one solver, over the pairs that are solved in both.
+/// The times of one solver on one kind of problem, over the pairs that are solved in both.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Pace {
     /// The solver.
     pub solver: String,
+    /// The kind: the same name is another method in each.
+    pub kind: String,
     /// Pairs.
     pub pairs: usize,
     /// The geometric mean of new over old.
@@ -105,6 +107,8 @@ pub struct Pace {
     pub faster: usize,
     /// See `faster`.
     pub slower: usize,
+    /// Whether it is slower as a whole: all of the interval lies beyond the limit.
+    pub worse: bool,
     /// The sign test: the probability of signs at least as uneven if neither were faster.
     pub sign_test: f64,
 }
@@ -140,9 +144,9 @@ pub struct Comparison {
     pub slower: Vec<Timing>,
     /// Faster beyond the limit and the noise, the best first.
     pub faster: Vec<Timing>,
-    /// The times by solver.
+    /// The times by solver and kind.
     pub solvers: Vec<Pace>,
-    /// Solvers that are slower as a whole.
+    /// Solvers that are slower as a whole on a kind of problem.
     pub slower_solvers: Vec<String>,
 }
 
@@ -152,7 +156,7 @@ pub fn compare(old: &Runs, new: &Runs, options: &Options) -> Comparison {
     let mut now: Vec<(Key, &Run)> = new.runs.iter().map(|r| (r.key(), r)).collect();
     now.sort_by(|a, b| a.0.cmp(&b.0));
     let mut all = Comparison::default();
-    let mut times: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    let mut times: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
     let mut reasons: BTreeMap<String, usize> = BTreeMap::new();
     let stand_in = usual_spread(old, new);
     let kept: HashSet<&Key> = now.iter().map(|(key, _)| key).collect();
@@ -179,7 +183,7 @@ pub fn compare(old: &Runs, new: &Runs, options: &Options) -> Comparison {
         }
         if let (Some(x), Some(y)) = (positive(a.seconds), positive(b.seconds)) {
             all.timed += 1;
-            times.entry(&b.solver).or_default().push((y / x).ln());
+            times.entry((&b.solver, &b.kind)).or_default().push((y / x).ln());
             let spread = |r: &Run| spread(r).unwrap_or(stand_in);
             let (ratio, noise) = (y / x, spread(a).max(spread(b)));
             let bound = options.slower.max(noise);
@@ -195,9 +199,11 @@ pub fn compare(old: &Runs, new: &Runs, options: &Options) -> Comparison {
     all.warnings.extend(reasons.into_iter().map(warning));
     all.slower.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
     all.faster.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
-    all.solvers = times.into_iter().map(|(solver, logs)| pace(solver, &logs)).collect();
-    let slower = |p: &&Pace| p.interval.is_some_and(|i| i.0 > options.slower);
-    all.slower_solvers = all.solvers.iter().filter(slower).map(|p| p.solver.clone()).collect();
+    all.solvers =
+        times.into_iter().map(|((s, kind), logs)| pace(s, kind, &logs, options.slower)).collect();
+    let slower = all.solvers.iter().filter(|p| p.worse);
+    all.slower_solvers = slower.map(|p| p.solver.clone()).collect();
+    all.slower_solvers.dedup();
     if all.missing > 0 {
         let n = plural(all.missing, "run");
         all.warnings.push(format!(
@@ -279,7 +285,7 @@ fn usual_spread(old: &Runs, new: &Runs) -> f64 {
 }
 
 /// The mean of the logarithms with its interval, and the sign test.
-fn pace(solver: &str, logs: &[f64]) -> Pace {
+fn pace(solver: &str, kind: &str, logs: &[f64], limit: f64) -> Pace {
     let n = logs.len() as f64;
     let mean = logs.iter().sum::<f64>() / n;
     let variance = logs.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / (n - 1.0);
@@ -294,8 +300,10 @@ fn pace(solver: &str, logs: &[f64]) -> Pace {
     let sign_test = (2.0 * signs.cdf(faster.min(slower) as u64)).min(1.0);
     Pace {
         solver: solver.into(),
+        kind: kind.into(),
         pairs: logs.len(),
         ratio: mean.exp(),
+        worse: interval.is_some_and(|(low, _)| low > limit),
         interval,
         faster,
         slower,
@@ -352,14 +360,19 @@ impl Comparison {
         list("faster", timings(&self.faster));
         list("other failure", outcomes(&self.other_failure));
         list("other iterations", self.iterations.iter().map(whole).collect());
+        let several = self.solvers.iter().any(|p| p.kind != self.solvers[0].kind);
         let pace = |p: &Pace| {
             let interval = p.interval.map_or("one pair only".into(), |(low, high)| {
                 format!("95 % interval {low:.3} to {high:.3}")
             });
-            let Pace { solver, pairs, ratio, faster, slower, sign_test, .. } = p;
-            let mark = if self.slower_solvers.contains(solver) { "  slower" } else { "" };
+            let Pace { solver, kind, pairs, ratio, faster, slower, sign_test, .. } = p;
+            let mark = if p.worse { "  slower" } else { "" };
+            let on = match several && !kind.is_empty() {
+                true => format!(" on {kind}").replace(char::is_control, " "),
+                false => String::new(),
+            };
             format!(
-                "{solver}: {ratio:.3}, {interval}, {pairs} pairs: {faster} faster, {slower} slower (sign test {sign_test:.2}){mark}"
+                "{solver}{on}: {ratio:.3}, {interval}, {pairs} pairs: {faster} faster, {slower} slower (sign test {sign_test:.2}){mark}"
             )
         };
         list(

@@ -198,12 +198,16 @@ pub fn slug(kind: &str) -> String {
     kind.trim_matches('-').into()
 }
 
+/// A name, and the next ones where it is taken: `a`, `a-2`, `a-3`, …
+pub fn names(name: String) -> impl Iterator<Item = String> {
+    std::iter::once(name.clone()).chain((2..).map(move |k| format!("{name}-{k}")))
+}
+
 /// Keeps a figure, under a name of its own, and says where the page shows it.
 fn show(figure: Figure, kind: &str, name: &str, folder: &str, all: &mut Vec<Figure>) -> String {
     let name = format!("{}-{name}", slug(kind));
     let free = |name: &String| all.iter().all(|f| f.name != *name);
-    let mut names = std::iter::once(name.clone()).chain((2..).map(|k| format!("{name}-{k}")));
-    let name = names.find(free).unwrap_or(name);
+    let name = names(name).find(free).unwrap_or_default();
     let text = format!("\n![{}]({}/{name}.svg)\n", figure.title, address(folder));
     all.push(Figure { name, ..figure });
     text

@@ -197,3 +197,47 @@ fn as_json_it_is_valid_also_where_nothing_was_reached() {
     assert_eq!(json["less_accurate"][0]["new"], serde_json::Value::Null);
     assert_eq!(json["other_failure"][0]["new"], "crashed");
 }
+
+#[test]
+fn a_name_on_two_kinds_is_two_solvers() {
+    let (old, mut new) = (noisy(1, 1.0, 0.01), noisy(1, 1.0, 0.01));
+    let linear = |runs: &Runs, factor: f64| -> Vec<Run> {
+        let timed = |x: Option<f64>| x.map(|x| factor * x);
+        let one = |r: &Run| Run {
+            kind: "lcp".into(),
+            problem: r.problem.replace("f/", "l/"),
+            seconds: timed(r.seconds),
+            seconds_max: timed(r.seconds_max),
+            ..r.clone()
+        };
+        runs.runs.iter().filter(|r| r.solver == "A").map(one).collect()
+    };
+    let mut both = old.clone();
+    both.runs.extend(linear(&old, 1.0));
+    new.runs.extend(linear(&old, 1.3));
+    let all = compare(&both, &new, &Options::default());
+    let paces: Vec<_> =
+        all.solvers.iter().map(|p| (p.solver.as_str(), p.kind.as_str(), p.worse)).collect();
+    let friction = "friction_local_3d";
+    assert_eq!(paces, [("A", friction, false), ("A", "lcp", true), ("B", friction, false)]);
+    assert_eq!(all.slower_solvers, ["A"]);
+    assert!(all.text().contains("  A on lcp: 1.3"), "{}", all.text());
+}
+
+#[test]
+fn a_proof_counts_as_solved_and_a_solution_in_its_place_is_worse() {
+    let ended = |ending| {
+        let mut runs = campaign("a");
+        runs.runs = vec![Run { ending, ..run("f/p", "A", 1.0) }];
+        runs
+    };
+    let [solved, proved, stalled] =
+        [Ending::Solved, Ending::Infeasible, Ending::Stalled].map(ended);
+    let compared = |a, b| compare(a, b, &Options::default());
+    assert!(!compared(&proved, &proved).worse);
+    assert_eq!(compared(&stalled, &proved).newly_solved.len(), 1);
+    for (a, b) in [(&proved, &stalled), (&proved, &solved), (&solved, &proved)] {
+        let all = compared(a, b);
+        assert!(all.worse && all.newly_unsolved.len() == 1, "{}", all.text());
+    }
+}

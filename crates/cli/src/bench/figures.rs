@@ -85,12 +85,17 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             "expected runs that are selected at tolerance {tolerance:e}, found none"
         ));
     }
+    let mut folders: Vec<PathBuf> = vec![];
     for selection in &chosen {
         let folder = match chosen.as_slice() {
             [_] => args.out.clone(),
-            _ => args.out.join(page::slug(&selection.kind)),
+            _ => {
+                let mut names = page::names(page::slug(&selection.kind)).map(|n| args.out.join(n));
+                names.find(|name| !folders.contains(name)).unwrap_or_default()
+            }
         };
         write(&runs, selection, &folder)?;
+        folders.push(folder);
     }
     write_text(&args.out, "runs.csv", &tables::runs_table(&runs).csv())?;
     Ok(exit)
