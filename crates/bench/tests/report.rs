@@ -476,8 +476,14 @@ fn kinds_stay_apart_refusals_cost_nothing_and_proofs_count() {
 fn the_page_begins_with_the_figure() {
     let text = page(&by_hand());
     let place = |part: &str| text.find(part).unwrap_or_else(|| panic!("{part}"));
-    let parts =
-        ["<h1>", "id=\"figures\"", "id=\"summary-place\"", "id=\"runs-place\"", "<h2>Measured"];
+    let parts = [
+        "<h1>",
+        "id=\"first\"",
+        "id=\"summary-place\"",
+        "id=\"figures\"",
+        "id=\"runs-place\"",
+        "<h2>Measured",
+    ];
     assert!(parts.map(place).is_sorted(), "{:?}", parts.map(place));
 }
 

@@ -71,6 +71,17 @@ fn figures_and_tables_are_written() {
     assert!(read("profile-seconds.svg").contains("† measured by others: Peer on here"));
     assert!(read("summary-all.md").contains("| SLOW (Peer) | 2 | 2 | 100.0 | 50.0 |"));
     assert_eq!(read("runs.csv").lines().count(), 5);
+    // Kinds are never counted together: of several, each has a folder.
+    let text = fs::read_to_string(folder.path("t.jsonl")).unwrap();
+    let linear = text.replace("unmatched/", "linear/").replace("\"kind\":\"\"", "\"kind\":\"lcp\"");
+    fs::write(folder.path("l.jsonl"), linear).unwrap();
+    folder.run("bench figures t.jsonl l.jsonl --out both").exits(0);
+    for kind in ["unknown", "lcp"] {
+        assert_eq!(read(&format!("../both/{kind}/profile-seconds.csv")), profile);
+    }
+    assert_eq!(read("../both/runs.csv").lines().count(), 9);
+    let one = folder.run("bench figures t.jsonl l.jsonl --out one --kind lcp").exits(0);
+    assert!(one.stdout.contains("one/profile-seconds.csv"), "{}", one.stdout);
     // A file that cannot be read is named; the rest goes on.
     let run = folder.run("bench figures none.jsonl t.jsonl --out out").exits(2);
     assert!(run.stderr.starts_with("error: none.jsonl: ") && run.stdout.contains("runs.csv"));

@@ -706,7 +706,9 @@ function build() {
     id: "epsilon", "aria-label": "residual of the data profile",
     change: () => { state.epsilon = epsilon.value ? Number(epsilon.value) : null; render("data-profile"); toHash(); },
   });
-  fill(byId("figures"), Object.entries(FIGURES).map(([name, figure]) => place(name, figure, name === "data-profile" ? epsilon : null)));
+  const [first, ...others] = Object.entries(FIGURES).map(([name, figure]) => place(name, figure, name === "data-profile" ? epsilon : null));
+  fill(byId("first"), first);
+  fill(byId("figures"), others);
   byId("summary-buttons").replaceWith(csvButton("summary", summaryRows));
   byId("heat-buttons").replaceWith(csvButton("families", heatRows));
   byId("unsolved-buttons").replaceWith(csvButton("unsolved", () => [["problem", "family", "contacts", "residual", "solver"],

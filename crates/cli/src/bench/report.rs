@@ -10,8 +10,8 @@ use crate::{Exit, files, output};
 
 /// Make the HTML report of measured runs.
 ///
-/// One file that works from disk, without a network: profiles, tables and every run, with filters by family, size,
-/// tolerance and solver. Several files of runs are joined; of a run that is in more than one, the first counts.
+/// One file that works from disk, without a network: profiles, tables and every run, by kind of problem, tolerance, and
+/// family or size; solvers can be hidden. Several files of runs are joined; of a run that is in more than one, the first counts.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
