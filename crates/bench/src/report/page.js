@@ -560,7 +560,7 @@ const COLUMNS = [
 ].filter(c => !c.column || data.runs[c.column]);
 const SHOWN = COLUMNS.filter(c => !c.hidden);
 const PAGE = 50;
-const classOf = (c, r) => (c.n ? "n" : c.name === "ending" && !solved(r) ? "failed" : c.name);
+const classOf = (c, r) => (c.n ? "n" : c.name === "ending" && !solved(r) && data.endings[runs.ending[r]] !== "refused" ? "failed" : c.name);
 
 /** The runs of the view, by the filter of texts and in the order of the table. */
 function listedRuns() {
