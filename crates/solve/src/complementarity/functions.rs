@@ -23,6 +23,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::core::ranges::up_to;
 use crate::core::register::Named;
 use crate::core::settings::Settings;
 
@@ -189,10 +190,7 @@ impl Default for Penalised {
 
 impl Settings for Penalised {
     fn validate(&self) -> Result<(), String> {
-        if !(self.lambda > 0.0 && self.lambda <= 1.0) {
-            return Err(format!("lambda: expected a number in (0, 1], found {}", self.lambda));
-        }
-        Ok(())
+        up_to("lambda", self.lambda, 1.0)
     }
 }
 

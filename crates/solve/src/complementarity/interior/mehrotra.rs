@@ -16,9 +16,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{above_zero, at_least_one};
 use crate::complementarity::form::Paired;
 use crate::complementarity::parts::pairs::{PairPath, SINGULAR};
+use crate::core::ranges::{at_least, positive, up_to};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::core::trace::Trace;
@@ -44,11 +44,9 @@ impl Default for MehrotraType {
 
 impl Settings for MehrotraType {
     fn validate(&self) -> Result<(), String> {
-        if !(self.epsilon > 0.0 && self.epsilon <= 0.5) {
-            return Err(format!("epsilon: expected a number in (0, 0.5], found {}", self.epsilon));
-        }
-        above_zero("start", self.start)?;
-        at_least_one("patience", self.patience)
+        up_to("epsilon", self.epsilon, 0.5)?;
+        positive("start", self.start)?;
+        at_least("patience", self.patience, 1)
     }
 }
 

@@ -11,15 +11,3 @@ mod mty;
 
 pub use mehrotra::{MehrotraType, MehrotraWork};
 pub use mty::{MizunoToddYe, MtyWork};
-
-fn above_zero(name: &str, value: f64) -> Result<(), String> {
-    if value > 0.0 && value.is_finite() {
-        Ok(())
-    } else {
-        Err(format!("{name}: expected a positive number, found {value}"))
-    }
-}
-
-fn at_least_one(name: &str, value: usize) -> Result<(), String> {
-    if value == 0 { Err(format!("{name}: expected at least 1, found 0")) } else { Ok(()) }
-}

@@ -19,9 +19,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{above_zero, at_least_one};
 use crate::complementarity::form::Paired;
 use crate::complementarity::parts::pairs::{PairPath, SINGULAR};
+use crate::core::ranges::{at_least, positive, up_to};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::core::trace::Trace;
@@ -47,11 +47,9 @@ impl Default for MizunoToddYe {
 
 impl Settings for MizunoToddYe {
     fn validate(&self) -> Result<(), String> {
-        if !(self.theta > 0.0 && self.theta <= 0.25) {
-            return Err(format!("theta: expected a number in (0, 0.25], found {}", self.theta));
-        }
-        above_zero("start", self.start)?;
-        at_least_one("patience", self.patience)
+        up_to("theta", self.theta, 0.25)?;
+        positive("start", self.start)?;
+        at_least("patience", self.patience, 1)
     }
 }
 

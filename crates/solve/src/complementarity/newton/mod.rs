@@ -45,6 +45,7 @@ use serde::{Deserialize, Serialize};
 use crate::complementarity::form::Rowwise;
 use crate::complementarity::functions::{self, Min, NewtonFunction, ScalarFunction, Slope};
 use crate::core::line_search::{LineSearch, Search};
+use crate::core::ranges::at_most;
 use crate::core::register::{About, Described};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -75,10 +76,7 @@ impl<F: Default> Default for Newton<F> {
 impl<F: NewtonFunction> Settings for Newton<F> {
     fn validate(&self) -> Result<(), String> {
         self.function.validate()?;
-        if self.restarts > 1000 {
-            return Err(format!("restarts: expected at most 1000, found {}", self.restarts));
-        }
-        Ok(())
+        at_most("restarts", self.restarts, 1000)
     }
 }
 

@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::complementarity::form::{Complementary, Rows};
 use crate::complementarity::parts::{equilibrate, refuting_row};
+use crate::core::ranges::{at_least, at_most};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -41,13 +42,8 @@ impl Default for Enumeration {
 
 impl Settings for Enumeration {
     fn validate(&self) -> Result<(), String> {
-        if self.max_pairs > 40 {
-            return Err(format!("max_pairs: expected at most 40, found {}", self.max_pairs));
-        }
-        if self.batch == 0 {
-            return Err("batch: expected at least 1, found 0".into());
-        }
-        Ok(())
+        at_most("max_pairs", self.max_pairs, 40)?;
+        at_least("batch", self.batch, 1)
     }
 }
 

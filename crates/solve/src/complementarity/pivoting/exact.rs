@@ -16,6 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::core::exact_cones::{ExactCones, Found as ExactlyFound};
+use crate::core::ranges::at_most;
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -36,10 +37,7 @@ impl Default for EnumerationExact {
 
 impl Settings for EnumerationExact {
     fn validate(&self) -> Result<(), String> {
-        if self.max_pairs > 40 {
-            return Err(format!("max_pairs: expected at most 40, found {}", self.max_pairs));
-        }
-        Ok(())
+        at_most("max_pairs", self.max_pairs, 40)
     }
 }
 

@@ -20,6 +20,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::complementarity::form::{Bounded, Bounds, System, system};
+use crate::core::ranges::{at_least, below, positive};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -44,19 +45,9 @@ impl Default for Mprgp {
 
 impl Settings for Mprgp {
     fn validate(&self) -> Result<(), String> {
-        if !(self.gamma > 0.0 && self.gamma.is_finite()) {
-            return Err(format!("gamma: expected a positive number, found {}", self.gamma));
-        }
-        if !(self.expansion > 0.0 && self.expansion < 2.0) {
-            return Err(format!(
-                "expansion: expected a number in (0, 2), found {}",
-                self.expansion
-            ));
-        }
-        if self.check_every == 0 {
-            return Err("check_every: expected at least 1, found 0".into());
-        }
-        Ok(())
+        positive("gamma", self.gamma)?;
+        below("expansion", self.expansion, 2.0)?;
+        at_least("check_every", self.check_every, 1)
     }
 }
 

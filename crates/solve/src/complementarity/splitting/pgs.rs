@@ -13,7 +13,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::psor::Psor;
-use super::rows::{Direction, validate_check};
+use super::rows::Direction;
+use crate::core::ranges::at_least;
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 
@@ -35,7 +36,7 @@ impl Default for Pgs {
 
 impl Settings for Pgs {
     fn validate(&self) -> Result<(), String> {
-        validate_check(self.check_every)
+        at_least("check_every", self.check_every, 1)
     }
 }
 

@@ -16,6 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::complementarity::form::{Bounded, system};
+use crate::core::ranges::{at_least, below};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -38,13 +39,8 @@ impl Default for ProjectedJacobi {
 
 impl Settings for ProjectedJacobi {
     fn validate(&self) -> Result<(), String> {
-        if !(self.omega > 0.0 && self.omega < 2.0) {
-            return Err(format!("omega: expected a number in (0, 2), found {}", self.omega));
-        }
-        if self.check_every == 0 {
-            return Err("check_every: expected at least 1, found 0".into());
-        }
-        Ok(())
+        below("omega", self.omega, 2.0)?;
+        at_least("check_every", self.check_every, 1)
     }
 }
 

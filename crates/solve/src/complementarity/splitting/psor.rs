@@ -17,8 +17,9 @@ use nonsmooth_problem::LcpPoint;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::rows::{Direction, Pass, Rows, is_fixed, validate_check, validate_omega};
+use super::rows::{Direction, Pass, Rows, is_fixed};
 use crate::complementarity::form::{Bounded, System, system};
+use crate::core::ranges::{at_least, below};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -45,8 +46,8 @@ impl Default for Psor {
 
 impl Settings for Psor {
     fn validate(&self) -> Result<(), String> {
-        validate_omega(self.omega)?;
-        validate_check(self.check_every)
+        below("omega", self.omega, 2.0)?;
+        at_least("check_every", self.check_every, 1)
     }
 }
 

@@ -179,22 +179,6 @@ pub(super) fn is_fixed(bounds: &Bounds, i: usize) -> bool {
     bounds.lower(i) == bounds.upper(i)
 }
 
-/// A step in the range that the methods allow.
-pub(super) fn validate_omega(omega: f64) -> Result<(), String> {
-    if !(omega > 0.0 && omega < 2.0) {
-        return Err(format!("omega: expected a number in (0, 2), found {omega}"));
-    }
-    Ok(())
-}
-
-/// At least one step between two judgements.
-pub(super) fn validate_check(check_every: usize) -> Result<(), String> {
-    if check_every == 0 {
-        return Err("check_every: expected at least 1, found 0".into());
-    }
-    Ok(())
-}
-
 impl SparseRows {
     fn fill(&mut self, a: &Csc) {
         let n = a.nrows();

@@ -16,8 +16,9 @@ use nonsmooth_problem::LcpPoint;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::rows::{Direction, Pass, Rows, is_fixed, is_free, validate_check, validate_omega};
+use super::rows::{Direction, Pass, Rows, is_fixed, is_free};
 use crate::complementarity::form::{Bounded, System, system};
+use crate::core::ranges::{at_least, below, positive};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -55,14 +56,10 @@ impl Default for Rpsor {
 
 impl Settings for Rpsor {
     fn validate(&self) -> Result<(), String> {
-        validate_omega(self.omega)?;
-        if !(self.rho > 0.0 && self.rho.is_finite()) {
-            return Err(format!("rho: expected a positive number, found {}", self.rho));
-        }
-        if !(self.fraction > 0.0 && self.fraction < 1.0) {
-            return Err(format!("fraction: expected a number in (0, 1), found {}", self.fraction));
-        }
-        validate_check(self.check_every)
+        below("omega", self.omega, 2.0)?;
+        positive("rho", self.rho)?;
+        below("fraction", self.fraction, 1.0)?;
+        at_least("check_every", self.check_every, 1)
     }
 }
 

@@ -14,8 +14,9 @@ use nonsmooth_problem::LcpPoint;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::rows::{Pass, Rows, is_fixed, is_free, validate_check, validate_omega};
+use super::rows::{Pass, Rows, is_fixed, is_free};
 use crate::complementarity::form::{Bounded, Bounds, System, system};
+use crate::core::ranges::{at_least, below};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -50,8 +51,8 @@ impl Default for SplittingLs {
 
 impl Settings for SplittingLs {
     fn validate(&self) -> Result<(), String> {
-        validate_omega(self.omega)?;
-        validate_check(self.check_every)
+        below("omega", self.omega, 2.0)?;
+        at_least("check_every", self.check_every, 1)
     }
 }
 

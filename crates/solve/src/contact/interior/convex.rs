@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::form::{Access, Linearised, OnContacts};
 use crate::contact::parts::ConvexIp;
+use crate::core::ranges::{at_least, positive};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -38,14 +39,8 @@ impl Default for ConvexRelaxation {
 
 impl Settings for ConvexRelaxation {
     fn validate(&self) -> Result<(), String> {
-        if !(self.convex_tolerance > 0.0 && self.convex_tolerance.is_finite()) {
-            let found = self.convex_tolerance;
-            return Err(format!("convex_tolerance: expected a positive number, found {found}"));
-        }
-        if self.patience == 0 {
-            return Err("patience: expected at least 1, found 0".into());
-        }
-        Ok(())
+        positive("convex_tolerance", self.convex_tolerance)?;
+        at_least("patience", self.patience, 1)
     }
 }
 

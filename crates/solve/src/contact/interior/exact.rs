@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use crate::contact::form::{Access, Linearised, OnContacts};
 use crate::contact::interior::pursuit::Pursuit;
 use crate::contact::parts::{Central, CentralIterate};
+use crate::core::ranges::{at_least, nonnegative};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -56,15 +57,9 @@ impl Default for Interior {
 
 impl Settings for Interior {
     fn validate(&self) -> Result<(), String> {
-        for (name, value) in [("smoothing", self.smoothing), ("warm_margin", self.warm_margin)] {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(format!("{name}: expected a number of at least 0, found {value}"));
-            }
-        }
-        if self.patience == 0 {
-            return Err("patience: expected at least 1, found 0".into());
-        }
-        Ok(())
+        nonnegative("smoothing", self.smoothing)?;
+        nonnegative("warm_margin", self.warm_margin)?;
+        at_least("patience", self.patience, 1)
     }
 }
 

@@ -32,6 +32,7 @@ use crate::contact::form::{Access, Linearised, OnContacts};
 use crate::contact::law::cfun::{ContactFunction, Law, Linearisation, NewtonFunction};
 use crate::contact::parts::Sweep;
 use crate::core::line_search::{LineSearch, Search};
+use crate::core::ranges::{at_most, nonnegative, positive};
 use crate::core::register::{About, Described};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -78,18 +79,10 @@ impl<F: Default> Default for Newton<F> {
 impl<F: NewtonFunction> Settings for Newton<F> {
     fn validate(&self) -> Result<(), String> {
         self.function.validate()?;
-        for (key, sweeps) in [("warm_up", self.warm_up), ("rescue", self.rescue)] {
-            if sweeps > MOST_SWEEPS {
-                return Err(format!("{key}: expected at most {MOST_SWEEPS}, found {sweeps}"));
-            }
-        }
-        if !(self.rho > 0.0 && self.rho.is_finite()) {
-            return Err(format!("rho: expected a positive number, found {}", self.rho));
-        }
-        if !(self.smoothing >= 0.0 && self.smoothing.is_finite()) {
-            return Err(format!("smoothing: expected at least 0, found {}", self.smoothing));
-        }
-        Ok(())
+        at_most("warm_up", self.warm_up, MOST_SWEEPS)?;
+        at_most("rescue", self.rescue, MOST_SWEEPS)?;
+        positive("rho", self.rho)?;
+        nonnegative("smoothing", self.smoothing)
     }
 }
 

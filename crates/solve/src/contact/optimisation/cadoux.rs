@@ -23,13 +23,14 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::MEMORY;
 use super::convex::Convex;
 use super::inner::{Conic, Effort};
 use super::sets::Set;
-use super::{MEMORY, at_most, fraction, positive};
 use crate::contact::form::{Access, Explicit, Linearised, OnContacts};
 use crate::contact::law::cone;
 use crate::contact::parts::{Accelerator, ConvexIp, Shape};
+use crate::core::ranges::{at_least, at_most, below, up_to};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -102,14 +103,11 @@ impl Cadoux {
 
 impl Settings for Cadoux {
     fn validate(&self) -> Result<(), String> {
-        if !(self.relaxation > 0.0 && self.relaxation <= 1.0) {
-            let found = self.relaxation;
-            return Err(format!("relaxation: expected a number in (0, 1], found {found}"));
-        }
-        positive("memory", self.memory)?;
+        up_to("relaxation", self.relaxation, 1.0)?;
+        at_least("memory", self.memory, 1)?;
         at_most("memory", self.memory, MEMORY)?;
-        fraction("inner_share", self.inner_share)?;
-        positive("inner_iterations", self.inner_iterations)
+        below("inner_share", self.inner_share, 1.0)?;
+        at_least("inner_iterations", self.inner_iterations, 1)
     }
 }
 

@@ -20,9 +20,9 @@ use serde::{Deserialize, Serialize};
 
 use super::convex::Convex;
 use super::sets::Set;
-use super::{fraction, positive};
 use crate::contact::form::{Access, Blockwise, Linearised, OnContacts};
 use crate::contact::law::cone::ConvexSet;
+use crate::core::ranges::{at_least, below};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -60,8 +60,8 @@ impl Default for Panagiotopoulos {
 
 impl Settings for Panagiotopoulos {
     fn validate(&self) -> Result<(), String> {
-        fraction("inner_share", self.inner_share)?;
-        positive("inner_iterations", self.inner_iterations)
+        below("inner_share", self.inner_share, 1.0)?;
+        at_least("inner_iterations", self.inner_iterations, 1)
     }
 }
 

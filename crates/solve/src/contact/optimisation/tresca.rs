@@ -17,11 +17,12 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::MEMORY;
 use super::inner::{CylinderSolver, Cylinders, Effort};
 use super::sets::Set;
-use super::{MEMORY, at_most, fraction, positive};
 use crate::contact::form::{Explicit, Linearised, OnContacts};
 use crate::contact::parts::Accelerator;
+use crate::core::ranges::{at_least, at_most, below, up_to};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -56,15 +57,10 @@ impl Default for Tresca {
 
 impl Settings for Tresca {
     fn validate(&self) -> Result<(), String> {
-        if !(self.relaxation > 0.0 && self.relaxation <= 1.0) {
-            return Err(format!(
-                "relaxation: expected a number in (0, 1], found {}",
-                self.relaxation
-            ));
-        }
+        up_to("relaxation", self.relaxation, 1.0)?;
         at_most("anderson", self.anderson, MEMORY)?;
-        fraction("inner_share", self.inner_share)?;
-        positive("inner_iterations", self.inner_iterations)
+        below("inner_share", self.inner_share, 1.0)?;
+        at_least("inner_iterations", self.inner_iterations, 1)
     }
 }
 

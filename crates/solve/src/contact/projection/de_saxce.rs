@@ -12,8 +12,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Field, Method, at_least_one};
+use super::{Field, Method};
 use crate::contact::form::Linear;
+use crate::core::ranges::{at_least, nonnegative};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 
@@ -35,10 +36,8 @@ impl Default for DeSaxce {
 
 impl Settings for DeSaxce {
     fn validate(&self) -> Result<(), String> {
-        if !(self.rho >= 0.0 && self.rho.is_finite()) {
-            return Err(format!("rho: expected a number of at least 0, found {}", self.rho));
-        }
-        at_least_one("check_every", self.check_every)
+        nonnegative("rho", self.rho)?;
+        at_least("check_every", self.check_every, 1)
     }
 }
 

@@ -23,8 +23,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::step_rule::Ratio;
-use super::{Field, Method, StepRule, at_least_one};
+use super::{Field, Method, StepRule};
 use crate::contact::form::Linear;
+use crate::core::ranges::{at_least, below};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 
@@ -83,11 +84,9 @@ impl Hyperplane {
 
 impl Settings for Hyperplane {
     fn validate(&self) -> Result<(), String> {
-        if !(self.gamma > 0.0 && self.gamma < 2.0) {
-            return Err(format!("gamma: expected a number in (0, 2), found {}", self.gamma));
-        }
+        below("gamma", self.gamma, 2.0)?;
         self.step_rule().validate()?;
-        at_least_one("check_every", self.check_every)
+        at_least("check_every", self.check_every, 1)
     }
 }
 

@@ -73,7 +73,3 @@ impl<M: Method, P: Linear<D>, const D: usize> Solver<P> for Projected<M, D> {
         self.0.check_every()
     }
 }
-
-fn at_least_one(name: &str, value: usize) -> Result<(), String> {
-    if value == 0 { Err(format!("{name}: expected at least 1, found 0")) } else { Ok(()) }
-}

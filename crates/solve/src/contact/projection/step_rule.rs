@@ -17,9 +17,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::at_least_one;
 use super::field::Field;
 use crate::contact::form::Linear;
+use crate::core::ranges::{at_least, below};
 use crate::core::settings::Settings;
 
 /// The hyperparameters of a projection method with a self-adaptive step.
@@ -58,17 +58,10 @@ impl Default for StepRule {
 
 impl Settings for StepRule {
     fn validate(&self) -> Result<(), String> {
-        let inside = |name: &str, x: f64, high: f64| {
-            if x > 0.0 && x < high {
-                Ok(())
-            } else {
-                Err(format!("{name}: expected a number in (0, {high}), found {x}"))
-            }
-        };
-        inside("accept", self.accept, 1.0)?;
-        inside("grow_below", self.grow_below, self.accept)?;
-        inside("shrink", self.shrink, 1.0)?;
-        at_least_one("check_every", self.check_every)
+        below("accept", self.accept, 1.0)?;
+        below("grow_below", self.grow_below, self.accept)?;
+        below("shrink", self.shrink, 1.0)?;
+        at_least("check_every", self.check_every, 1)
     }
 }
 

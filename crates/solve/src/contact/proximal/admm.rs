@@ -28,6 +28,7 @@ use serde::{Deserialize, Serialize};
 use crate::contact::form::{Access, Linearised, OnContacts};
 use crate::contact::law::cone;
 use crate::contact::parts::Accelerator;
+use crate::core::ranges::{at_least, at_most, nonnegative};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -82,29 +83,15 @@ impl Default for Admm {
 
 impl Settings for Admm {
     fn validate(&self) -> Result<(), String> {
-        for (key, x) in [("rho", self.rho), ("eta", self.eta)] {
-            if !(x >= 0.0 && x.is_finite()) {
-                return Err(format!("{key}: expected a number of at least 0, found {x}"));
-            }
-        }
+        nonnegative("rho", self.rho)?;
+        nonnegative("eta", self.eta)?;
         if !(1.0..=1.9).contains(&self.alpha) {
             return Err(format!("alpha: expected a number in [1, 1.9], found {}", self.alpha));
         }
-        if self.factorisations < 2 {
-            return Err(format!(
-                "factorisations: expected at least 2, found {}",
-                self.factorisations
-            ));
-        }
-        if self.anderson > 50 {
-            return Err(format!("anderson: expected at most 50, found {}", self.anderson));
-        }
-        for (key, n) in [("adapt_every", self.adapt_every), ("check_every", self.check_every)] {
-            if n == 0 {
-                return Err(format!("{key}: expected at least 1, found 0"));
-            }
-        }
-        Ok(())
+        at_least("factorisations", self.factorisations, 2)?;
+        at_most("anderson", self.anderson, 50)?;
+        at_least("adapt_every", self.adapt_every, 1)?;
+        at_least("check_every", self.check_every, 1)
     }
 }
 

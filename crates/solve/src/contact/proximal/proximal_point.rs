@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use crate::Boxed;
 use crate::contact::form::{Access, Linear, Overwrite, Regularised};
 use crate::contact::law::cfun::natural_residual;
+use crate::core::ranges::{at_least, below, positive};
 use crate::core::register::{Composed, Prefix, Registered};
 use crate::core::settings::Settings;
 use crate::core::settings::described;
@@ -74,26 +75,12 @@ impl Default for ProximalPoint {
 
 impl Settings for ProximalPoint {
     fn validate(&self) -> Result<(), String> {
-        for (key, x) in [
-            ("prox_alpha", self.prox_alpha),
-            ("prox_alpha_min", self.prox_alpha_min),
-            ("prox_sigma", self.prox_sigma),
-            ("prox_nu", self.prox_nu),
-        ] {
-            if !(x > 0.0 && x.is_finite()) {
-                return Err(format!("{key}: expected a positive number, found {x}"));
-            }
-        }
-        if !(self.prox_tolerance > 0.0 && self.prox_tolerance < 1.0) {
-            return Err(format!(
-                "prox_tolerance: expected a number in (0, 1), found {}",
-                self.prox_tolerance
-            ));
-        }
-        if self.prox_steps == 0 {
-            return Err("prox_steps: expected at least 1, found 0".into());
-        }
-        Ok(())
+        positive("prox_alpha", self.prox_alpha)?;
+        positive("prox_alpha_min", self.prox_alpha_min)?;
+        positive("prox_sigma", self.prox_sigma)?;
+        positive("prox_nu", self.prox_nu)?;
+        below("prox_tolerance", self.prox_tolerance, 1.0)?;
+        at_least("prox_steps", self.prox_steps, 1)
     }
 }
 

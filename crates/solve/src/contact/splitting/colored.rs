@@ -28,6 +28,7 @@ use crate::contact::form::{Access, Concurrent};
 use crate::contact::law::local::LocalSolver;
 use crate::contact::splitting::coloring::Coloring;
 use crate::contact::splitting::team::Team;
+use crate::core::ranges::{at_least, at_most, below};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{Boxed, SolveError, Solver, Step};
@@ -69,21 +70,10 @@ const THREADS_MOST: usize = 1024;
 
 impl Settings for Colored {
     fn validate(&self) -> Result<(), String> {
-        for (key, omega) in [("omega", self.omega), ("omega_min", self.omega_min)] {
-            if !(omega > 0.0 && omega < 2.0) {
-                return Err(format!("{key}: expected a number in (0, 2), found {omega}"));
-            }
-        }
-        if self.threads > THREADS_MOST {
-            return Err(format!(
-                "threads: expected at most {THREADS_MOST}, found {}",
-                self.threads
-            ));
-        }
-        if self.check_every == 0 {
-            return Err("check_every: expected at least 1, found 0".into());
-        }
-        Ok(())
+        below("omega", self.omega, 2.0)?;
+        below("omega_min", self.omega_min, 2.0)?;
+        at_most("threads", self.threads, THREADS_MOST)?;
+        at_least("check_every", self.check_every, 1)
     }
 }
 

@@ -28,6 +28,7 @@ use crate::contact::law::cone;
 use crate::contact::law::local::LocalSolver;
 use crate::contact::parts::{Accelerator, put_within_bounds, sweep_rows};
 use crate::contact::splitting::ordering::{Order, Ordering};
+use crate::core::ranges::{at_least, at_most, below};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{Boxed, SolveError, Solver, Step};
@@ -121,27 +122,14 @@ impl Default for Nsgs {
 
 impl Settings for Nsgs {
     fn validate(&self) -> Result<(), String> {
-        for (key, omega) in [("omega", self.omega), ("omega_min", self.omega_min)] {
-            if !(omega > 0.0 && omega < 2.0) {
-                return Err(format!("{key}: expected a number in (0, 2), found {omega}"));
-            }
-        }
-        if self.check_every == 0 {
-            return Err("check_every: expected at least 1, found 0".into());
-        }
+        below("omega", self.omega, 2.0)?;
+        below("omega_min", self.omega_min, 2.0)?;
+        at_least("check_every", self.check_every, 1)?;
         if self.freeze_after > 0 && self.freeze_for == 0 {
             return Err("freeze_for: expected at least 1 while freeze_after is set, found 0".into());
         }
-        if self.anderson > ANDERSON_MOST {
-            return Err(format!(
-                "anderson: expected at most {ANDERSON_MOST}, found {}",
-                self.anderson
-            ));
-        }
-        if self.anderson_every == 0 {
-            return Err("anderson_every: expected at least 1, found 0".into());
-        }
-        Ok(())
+        at_most("anderson", self.anderson, ANDERSON_MOST)?;
+        at_least("anderson_every", self.anderson_every, 1)
     }
 }
 

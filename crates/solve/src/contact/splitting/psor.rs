@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::nsgs::{LocalChoice, Nsgs, Sweeps};
 use crate::contact::law::local::Projection;
 use crate::contact::splitting::ordering::Ordering;
+use crate::core::ranges::{at_least, below};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 
@@ -42,13 +43,8 @@ impl Default for Psor {
 
 impl Settings for Psor {
     fn validate(&self) -> Result<(), String> {
-        if !(self.omega > 0.0 && self.omega < 2.0) {
-            return Err(format!("omega: expected a number in (0, 2), found {}", self.omega));
-        }
-        if self.check_every == 0 {
-            return Err("check_every: expected at least 1, found 0".into());
-        }
-        Ok(())
+        below("omega", self.omega, 2.0)?;
+        at_least("check_every", self.check_every, 1)
     }
 }
 
