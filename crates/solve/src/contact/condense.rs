@@ -15,7 +15,7 @@ use nonsmooth_problem::{
 
 use crate::SolveError;
 use crate::core::reformulation::Reformulation;
-use crate::core::register::{Composed, Prefix};
+use crate::core::register::Composed;
 use crate::core::settings::NoSettings;
 use crate::{Boxed, Via};
 use nonsmooth_problem::Kind;
@@ -30,13 +30,11 @@ where
 {
     type To = FrictionLocal<D>;
     type Settings = NoSettings;
-    const PREFIX: &'static Prefix = &Prefix {
-        name: "condense",
-        summary: "global to local: forms W = H' M^-1 H and q, bilateral constraints eliminated",
-        from: &[Kind::FrictionGlobal2d, Kind::FrictionGlobal3d],
-        cites: &["Acary2018"],
-        settings: Vec::new,
-    };
+    const NAME: &'static str = "condense";
+    const SUMMARY: &'static str =
+        "global to local: forms W = H' M^-1 H and q, bilateral constraints eliminated";
+    const FROM: &'static [Kind] = &[Kind::FrictionGlobal2d, Kind::FrictionGlobal3d];
+    const CITES: &'static [&'static str] = &["Acary2018"];
 
     fn compose(_: NoSettings, solver: Boxed<Self::To>) -> Boxed<FrictionGlobal<D>> {
         Boxed::new(Via { reformulation: Condense, solver })

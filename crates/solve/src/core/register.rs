@@ -10,7 +10,7 @@ use crate::core::boxed::Boxed;
 use crate::core::drive::{Driver, Session};
 use crate::core::error::SolveError;
 use crate::core::guarded::Guarded;
-use crate::core::settings::{Setting, Settings, SettingsMap, parse};
+use crate::core::settings::{Setting, Settings, SettingsMap, described, parse};
 use crate::core::solver::Solver;
 
 /// The solver that is used when none is named.
@@ -155,9 +155,23 @@ pub trait Composed<P: Problem> {
     type To: Registered;
     /// Its own hyperparameters; [`NoSettings`](crate::settings::NoSettings) where it has none.
     type Settings: Settings;
-    /// What it is. The keys of its settings begin with [`KEYS`](Self::KEYS).
-    const PREFIX: &'static Prefix;
-    /// How its keys begin, so that they can be told from the solver's.
+    /// The name before the slash.
+    const NAME: &'static str;
+    /// One line, without the name.
+    const SUMMARY: &'static str;
+    /// The kinds of problem that it takes.
+    const FROM: &'static [Kind];
+    /// Keys of `docs/refs.bib`.
+    const CITES: &'static [&'static str];
+    /// All of that and the settings, for lists and help.
+    const PREFIX: &'static Prefix = &Prefix {
+        name: Self::NAME,
+        summary: Self::SUMMARY,
+        from: Self::FROM,
+        cites: Self::CITES,
+        settings: described::<Self::Settings>,
+    };
+    /// How the keys of its settings begin, so that they can be told from the solver's.
     const KEYS: &'static str = "";
     /// Whether the solutions of the other problem are those of the first only nearly.
     const NEARLY: bool = false;
@@ -198,7 +212,7 @@ impl<P: Problem> Edge<P> {
             },
             names: || {
                 let names = with_steps::<C::To>().into_iter().filter(|name| C::lists(name));
-                names.map(|name| format!("{}/{name}", C::PREFIX.name)).collect()
+                names.map(|name| format!("{}/{name}", C::NAME)).collect()
             },
         }
     }

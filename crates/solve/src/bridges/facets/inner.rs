@@ -28,8 +28,7 @@ use super::{
 use crate::SolveError;
 use crate::contact::form::Contacts;
 use crate::core::reformulation::Reformulation;
-use crate::core::register::{Composed, Prefix};
-use crate::core::settings::described;
+use crate::core::register::Composed;
 use crate::{Boxed, Via};
 use nonsmooth_problem::Kind;
 
@@ -40,13 +39,11 @@ pub struct FacetInner<const D: usize>(pub Facets);
 impl<const D: usize> Composed<FrictionLocal<D>> for FacetInner<D> {
     type To = Lcp;
     type Settings = Facets;
-    const PREFIX: &'static Prefix = &Prefix {
-        name: "facet_inner",
-        summary: "contact to LCP: the disk of friction becomes an inscribed polygon; exact in the plane, an approximation in space",
-        from: &[Kind::FrictionLocal2d, Kind::FrictionLocal3d],
-        cites: &["StewartTrinkle1996", "AnitescuPotra1997", "Acary2018"],
-        settings: described::<Facets>,
-    };
+    const NAME: &'static str = "facet_inner";
+    const SUMMARY: &'static str = "contact to LCP: the disk of friction becomes an inscribed polygon; exact in the plane, an approximation in space";
+    const FROM: &'static [Kind] = &[Kind::FrictionLocal2d, Kind::FrictionLocal3d];
+    const CITES: &'static [&'static str] =
+        &["StewartTrinkle1996", "AnitescuPotra1997", "Acary2018"];
     const KEYS: &'static str = KEYS;
     const NEARLY: bool = approximates::<D>().is_some();
 

@@ -28,8 +28,7 @@ use super::{
 use crate::SolveError;
 use crate::contact::form::Contacts;
 use crate::core::reformulation::Reformulation;
-use crate::core::register::{Composed, Prefix};
-use crate::core::settings::described;
+use crate::core::register::Composed;
 use crate::{Boxed, Via};
 use nonsmooth_problem::Kind;
 
@@ -40,13 +39,10 @@ pub struct FacetOuter<const D: usize>(pub Facets);
 impl<const D: usize> Composed<FrictionLocal<D>> for FacetOuter<D> {
     type To = Mlcp;
     type Settings = Facets;
-    const PREFIX: &'static Prefix = &Prefix {
-        name: "facet_outer",
-        summary: "contact to MLCP: the disk of friction becomes a circumscribed polygon; exact in the plane, an approximation in space",
-        from: &[Kind::FrictionLocal2d, Kind::FrictionLocal3d],
-        cites: &["Klarbring1986", "Acary2018"],
-        settings: described::<Facets>,
-    };
+    const NAME: &'static str = "facet_outer";
+    const SUMMARY: &'static str = "contact to MLCP: the disk of friction becomes a circumscribed polygon; exact in the plane, an approximation in space";
+    const FROM: &'static [Kind] = &[Kind::FrictionLocal2d, Kind::FrictionLocal3d];
+    const CITES: &'static [&'static str] = &["Klarbring1986", "Acary2018"];
     const KEYS: &'static str = KEYS;
     const NEARLY: bool = approximates::<D>().is_some();
 

@@ -12,7 +12,7 @@ use nonsmooth_problem::{Hlcp, HlcpPoint, LcpPoint, Mlcp};
 
 use crate::SolveError;
 use crate::core::reformulation::Reformulation;
-use crate::core::register::{Composed, Prefix};
+use crate::core::register::Composed;
 use crate::core::settings::NoSettings;
 use crate::{Boxed, Via};
 use nonsmooth_problem::Kind;
@@ -24,13 +24,10 @@ pub struct Mixed;
 impl Composed<Hlcp> for Mixed {
     type To = Mlcp;
     type Settings = NoSettings;
-    const PREFIX: &'static Prefix = &Prefix {
-        name: "mixed",
-        summary: "horizontal LCP to MLCP: s is a free variable",
-        from: &[Kind::Hlcp],
-        cites: &["Acary2018"],
-        settings: Vec::new,
-    };
+    const NAME: &'static str = "mixed";
+    const SUMMARY: &'static str = "horizontal LCP to MLCP: s is a free variable";
+    const FROM: &'static [Kind] = &[Kind::Hlcp];
+    const CITES: &'static [&'static str] = &["Acary2018"];
 
     fn compose(_: NoSettings, solver: Boxed<Self::To>) -> Boxed<Hlcp> {
         Boxed::new(Via { reformulation: Mixed, solver })

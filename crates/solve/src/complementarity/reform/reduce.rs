@@ -14,7 +14,7 @@ use nonsmooth_problem::{Lcp, LcpPoint, Mlcp, ProblemError};
 
 use crate::SolveError;
 use crate::core::reformulation::Reformulation;
-use crate::core::register::{Composed, Prefix};
+use crate::core::register::Composed;
 use crate::core::settings::NoSettings;
 use crate::{Boxed, Via};
 use nonsmooth_problem::Kind;
@@ -26,13 +26,11 @@ pub struct Reduce;
 impl Composed<Mlcp> for Reduce {
     type To = Lcp;
     type Settings = NoSettings;
-    const PREFIX: &'static Prefix = &Prefix {
-        name: "reduce",
-        summary: "MLCP to LCP: the free variables eliminated, M = B - D A^-1 C, where A is invertible",
-        from: &[Kind::Mlcp],
-        cites: &["Acary2018"],
-        settings: Vec::new,
-    };
+    const NAME: &'static str = "reduce";
+    const SUMMARY: &'static str =
+        "MLCP to LCP: the free variables eliminated, M = B - D A^-1 C, where A is invertible";
+    const FROM: &'static [Kind] = &[Kind::Mlcp];
+    const CITES: &'static [&'static str] = &["Acary2018"];
 
     fn compose(_: NoSettings, solver: Boxed<Self::To>) -> Boxed<Mlcp> {
         Boxed::new(Via { reformulation: Reduce, solver })

@@ -21,7 +21,7 @@ use nonsmooth_problem::{BoxLcp, LcpPoint, Mlcp};
 
 use crate::SolveError;
 use crate::core::reformulation::Reformulation;
-use crate::core::register::{Composed, Prefix};
+use crate::core::register::Composed;
 use crate::core::settings::NoSettings;
 use crate::{Boxed, Via};
 use nonsmooth_problem::Kind;
@@ -33,13 +33,10 @@ pub struct Split;
 impl Composed<BoxLcp> for Split {
     type To = Mlcp;
     type Settings = NoSettings;
-    const PREFIX: &'static Prefix = &Prefix {
-        name: "split",
-        summary: "box LCP to MLCP: bounds by shifts, second bounds by multipliers",
-        from: &[Kind::BoxLcp],
-        cites: &["Acary2018"],
-        settings: Vec::new,
-    };
+    const NAME: &'static str = "split";
+    const SUMMARY: &'static str = "box LCP to MLCP: bounds by shifts, second bounds by multipliers";
+    const FROM: &'static [Kind] = &[Kind::BoxLcp];
+    const CITES: &'static [&'static str] = &["Acary2018"];
 
     fn compose(_: NoSettings, solver: Boxed<Self::To>) -> Boxed<BoxLcp> {
         Boxed::new(Via { reformulation: Split, solver })

@@ -20,9 +20,8 @@ use crate::Boxed;
 use crate::contact::form::{Access, Linear, Overwrite, Regularised};
 use crate::contact::law::cfun::natural_residual;
 use crate::core::ranges::{at_least, below, positive};
-use crate::core::register::{Composed, Prefix, Registered};
+use crate::core::register::{Composed, Registered};
 use crate::core::settings::Settings;
-use crate::core::settings::described;
 use crate::{SolveError, Solver, Step};
 use nonsmooth_problem::Kind;
 
@@ -94,18 +93,16 @@ where
 {
     type To = Regularised<P>;
     type Settings = ProximalPoint;
-    const PREFIX: &'static Prefix = &Prefix {
-        name: "proximal",
-        summary: "proximal point: the solver works on problems with W + alpha w in place of W",
-        from: &[
-            Kind::FrictionLocal2d,
-            Kind::FrictionLocal3d,
-            Kind::FrictionGlobal2d,
-            Kind::FrictionGlobal3d,
-        ],
-        cites: &["Rockafellar1976", "AcaryBremondHuber2018"],
-        settings: described::<ProximalPoint>,
-    };
+    const NAME: &'static str = "proximal";
+    const SUMMARY: &'static str =
+        "proximal point: the solver works on problems with W + alpha w in place of W";
+    const FROM: &'static [Kind] = &[
+        Kind::FrictionLocal2d,
+        Kind::FrictionLocal3d,
+        Kind::FrictionGlobal2d,
+        Kind::FrictionGlobal3d,
+    ];
+    const CITES: &'static [&'static str] = &["Rockafellar1976", "AcaryBremondHuber2018"];
     const KEYS: &'static str = "prox_";
 
     fn compose(settings: ProximalPoint, inner: Boxed<Regularised<P>>) -> Boxed<P> {
