@@ -2,7 +2,7 @@
 
 use crate::check::{self, Certificate, ConeSystem, Evidence, Measure};
 use crate::error::{all_finite, friction_coefficients, vector};
-use crate::{Bounds, Kind, Problem, ProblemError};
+use crate::{Bounds, Coulomb, Kind, Problem, ProblemError};
 use nonsmooth_linalg::{Bsr, Csc};
 
 /// **Find** `r` (and the impulses `lambda` of scalar rows) such that
@@ -92,6 +92,11 @@ impl<const D: usize> FrictionLocal<D> {
     /// nc.
     pub fn contacts(&self) -> usize {
         self.mu.len()
+    }
+
+    /// The law of contact c.
+    pub fn law(&self, c: usize) -> Coulomb {
+        Coulomb { mu: self.mu[c] }
     }
 
     /// The number of scalar rows p.

@@ -1,8 +1,9 @@
-//! One contact: distance to the cone, natural map and status, from the definitions.
+//! One contact: what the judge asks of a law, and Coulomb's answers from the definitions: distances to the cones, natural map, status.
 
 use serde::Serialize;
 
-use nonsmooth_linalg::{Real, power_of_two};
+use crate::Coulomb;
+use nonsmooth_linalg::{Real, norm, norm_of, power_of_two, small};
 
 /// What a contact does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
@@ -44,70 +45,151 @@ fn difference<T: Real, const D: usize>(x: &[T; D], y: &[T; D]) -> [T; D] {
     std::array::from_fn(|k| x[k] - y[k])
 }
 
-/// `ũ = u + mu‖u_T‖ e_N`, De Saxcé's modified velocity.
-pub(super) fn modified_velocity<T: Real, const D: usize>(u: &[T; D], mu: f64) -> [T; D] {
-    let mut modified = *u;
-    modified[0] = modified[0] + T::from(mu) * tangential(u);
-    modified
-}
-
-/// `dist(x, K)`, `K = {‖x_T‖ ≤ mu x_N}`. In the half-plane of `(x_N, ‖x_T‖)`: to the ray `(cos φ, sin φ)`, `tan φ = mu`, or to the apex.
+/// The law of a contact as the judge states it: `K* ∋ ũ ⟂ r ∈ K` with a closed convex cone K and a modified velocity ũ of u. Nothing of it is a solver's.
 ///
-/// What nearly cancels is done in T, the rest plainly: so are all distances here.
-pub(super) fn distance_to_cone<T: Real, const D: usize>(x: &[T; D], mu: f64) -> f64 {
-    let t = tangential(x);
-    let outside = t - T::from(mu) * x[0];
-    if outside <= T::from(0.0) && x[0] >= T::from(0.0) {
-        0.0
-    } else if x[0] + T::from(mu) * t <= T::from(0.0) {
-        length(&x.map(|v| v.value()))
-    } else {
-        outside.value() / 1.0.hypot(mu)
-    }
+/// `x = w r` is an impulse in units of velocity. What nearly cancels is done in T, the rest plainly.
+pub trait Law<const D: usize>: Copy {
+    /// ũ.
+    fn modified_velocity<T: Real>(self, u: &[T; D]) -> [T; D];
+
+    /// A constant L with `‖ũ(u) − ũ(u')‖ ≤ L ‖u − u'‖`.
+    fn growth(self) -> f64;
+
+    /// The natural map `x − P_K(x − ũ)`.
+    fn natural_map<T: Real>(self, x: &[T; D], modified: &[T; D]) -> [f64; D];
+
+    /// `dist(x, K)`.
+    fn distance_to_cone<T: Real>(self, x: &[T; D]) -> f64;
+
+    /// `dist(ũ, K*)`, from u.
+    fn distance_to_dual(self, u: &[f64; D]) -> f64;
+
+    /// What the square of that distance is multiplied by where K* is nearly the whole space, and velocities into the obstacle are near it.
+    fn opening(self) -> f64;
+
+    /// Whether `x − ũ`, which plain arithmetic knows up to `error`, surely lies in K or in its polar cone, so that the natural map is ũ or x itself and no difference.
+    fn is_at_rest_or_open(self, x: &[f64; D], modified: &[f64; D], error: f64) -> bool;
+
+    /// How far x and u are from each part of the law by itself.
+    fn apart(self, x: &[f64; D], u: &[f64; D]) -> f64;
+
+    /// What the contact does; `margin` is a velocity.
+    fn status(self, x: &[f64; D], modified: &[f64; D], margin: f64) -> ContactStatus;
 }
 
-/// `dist(ũ, K*)`, `K* = {mu‖y_T‖ ≤ y_N}`, from u: with Moreau's decomposition the size of the nearest point of K to −ũ, of which `−u_N` is
-/// the part along K's side.
-fn distance_to_dual<const D: usize>(u: &[f64; D], mu: f64) -> f64 {
-    let modified = modified_velocity(u, mu);
-    if u[0] >= 0.0 {
-        0.0
-    } else if tangential(u) + mu * modified[0] <= 0.0 {
-        length(&modified)
-    } else {
-        -u[0] / 1.0.hypot(mu)
+/// De Saxcé's `ũ = u + mu‖u_T‖ e_N`, `K = {‖x_T‖ ≤ mu x_N}`, `K* = {mu‖y_T‖ ≤ y_N}`.
+impl<const D: usize> Law<D> for Coulomb {
+    fn modified_velocity<T: Real>(self, u: &[T; D]) -> [T; D] {
+        let mut modified = *u;
+        modified[0] = modified[0] + T::from(self.mu) * tangential(u);
+        modified
     }
-}
 
-/// The natural map `x − P_K(x − ũ)`.
-///
-/// With `y = x − ũ` it is ũ where y lies in K, x where y lies in the polar cone, and else `ũ + d n` with the distance d of y
-/// from K and the outward normal n: the difference of x and a projection would round ũ away where x is large.
-pub(super) fn natural_map<T: Real, const D: usize>(
-    x: &[T; D],
-    modified: &[T; D],
-    mu: f64,
-) -> [f64; D] {
-    let y = difference(x, modified);
-    let (t, zero, friction) = (tangential(&y), T::from(0.0), T::from(mu));
-    let outside = t - friction * y[0];
-    if outside <= zero && y[0] >= zero {
-        return modified.map(|v| v.value());
+    fn growth(self) -> f64 {
+        1.0 + self.mu
     }
-    if y[0] + friction * t <= zero {
-        return x.map(|v| v.value());
-    }
-    // d n = outside/square (−mu, y_T/t), square = 1 + mu²; times the divisors, that T need not divide. A power of two keeps t from underflow.
-    let square = T::from(1.0) + T::of_product(mu, mu);
-    let per = 1.0 / power_of_two(t.value());
-    let divisor = square * t.times_power(per);
-    std::array::from_fn(|k| match k {
-        0 => (square * modified[0] - friction * outside).value() / square.value(),
-        _ if t > zero => {
-            (divisor * modified[k] + outside * y[k].times_power(per)).value() / divisor.value()
+
+    /// With `y = x − ũ` it is ũ where y lies in K, x where y lies in the polar cone, and else `ũ + d n` with the distance d of y
+    /// from K and the outward normal n: the difference of x and a projection would round ũ away where x is large.
+    fn natural_map<T: Real>(self, x: &[T; D], modified: &[T; D]) -> [f64; D] {
+        let mu = self.mu;
+        let y = difference(x, modified);
+        let (t, zero, friction) = (tangential(&y), T::from(0.0), T::from(mu));
+        let outside = t - friction * y[0];
+        if outside <= zero && y[0] >= zero {
+            return modified.map(|v| v.value());
         }
-        _ => modified[k].value(),
-    })
+        if y[0] + friction * t <= zero {
+            return x.map(|v| v.value());
+        }
+        // d n = outside/square (−mu, y_T/t), square = 1 + mu²; times the divisors, that T need not divide. A power of two keeps t from underflow.
+        let square = T::from(1.0) + T::of_product(mu, mu);
+        let per = 1.0 / power_of_two(t.value());
+        let divisor = square * t.times_power(per);
+        std::array::from_fn(|k| match k {
+            0 => (square * modified[0] - friction * outside).value() / square.value(),
+            _ if t > zero => {
+                (divisor * modified[k] + outside * y[k].times_power(per)).value() / divisor.value()
+            }
+            _ => modified[k].value(),
+        })
+    }
+
+    /// In the half-plane of `(x_N, ‖x_T‖)`: to the ray `(cos φ, sin φ)`, `tan φ = mu`, or to the apex.
+    fn distance_to_cone<T: Real>(self, x: &[T; D]) -> f64 {
+        let mu = self.mu;
+        let t = tangential(x);
+        let outside = t - T::from(mu) * x[0];
+        if outside <= T::from(0.0) && x[0] >= T::from(0.0) {
+            0.0
+        } else if x[0] + T::from(mu) * t <= T::from(0.0) {
+            length(&x.map(|v| v.value()))
+        } else {
+            outside.value() / 1.0.hypot(mu)
+        }
+    }
+
+    /// With Moreau's decomposition the size of the nearest point of K to −ũ, of which `−u_N` is the part along K's side.
+    fn distance_to_dual(self, u: &[f64; D]) -> f64 {
+        let mu = self.mu;
+        let modified = self.modified_velocity(u);
+        if u[0] >= 0.0 {
+            0.0
+        } else if tangential(u) + mu * modified[0] <= 0.0 {
+            length(&modified)
+        } else {
+            -u[0] / 1.0.hypot(mu)
+        }
+    }
+
+    /// With mu > 1 a velocity is as far from K* as with mu = 1.
+    fn opening(self) -> f64 {
+        let mu = self.mu;
+        ((1.0 + mu * mu) / (1.0 + mu.min(1.0).powi(2))).min(f64::MAX)
+    }
+
+    fn is_at_rest_or_open(self, x: &[f64; D], modified: &[f64; D], error: f64) -> bool {
+        let mu = self.mu;
+        let y = difference(x, modified);
+        let (t, margin) = (tangential(&y), (1.0 + mu) * error);
+        t - mu * y[0] < -margin || y[0] + mu * t < -margin
+    }
+
+    /// `r ∈ K`, `u_N > 0` only where r = 0, and `x_T = −mu x_N u_T/‖u_T‖` where `u_T ≠ 0`. With `u_N ≥ 0` all of that is the same as `K* ∋ ũ ⟂ r ∈ K`, but with much
+    /// friction K* is nearly the whole space and K nearly a half space, where far from the law is near in the distance to cones.
+    fn apart(self, x: &[f64; D], u: &[f64; D]) -> f64 {
+        let mu = self.mu;
+        let pressed = u[0].max(0.0).min(norm(x));
+        let sliding = small::tangential_norm(u);
+        let across = if sliding > 0.0 {
+            norm_of((1..D).map(|k| x[k] + mu * x[0] * (u[k] / sliding)))
+        } else {
+            0.0
+        };
+        let pulling = (-x[0]).max(small::tangential_norm(x) - mu * x[0].max(0.0)).max(0.0);
+        pressed.max(sliding.min(across)).max(pulling)
+    }
+
+    /// The region of the cone in which `x − ũ` lies.
+    fn status(self, x: &[f64; D], modified: &[f64; D], margin: f64) -> ContactStatus {
+        let mu = self.mu;
+        let y = difference(x, modified);
+        let t = tangential(&y);
+        let secant = (1.0 + mu * mu).sqrt();
+        // Signed distances of y into K and into its polar cone −K*.
+        let into_cone = (mu * y[0] - t) / secant;
+        let into_polar = (-y[0] - mu * t) / secant;
+        let status = if into_polar >= 0.0 {
+            Motion::Open
+        } else if mu > 0.0 && into_cone >= 0.0 {
+            Motion::Stick
+        } else {
+            Motion::Slip
+        };
+        // A frictionless contact slides or is open: its cone has no interior to be near to.
+        let near_stick = mu > 0.0 && into_cone.abs() <= margin;
+        ContactStatus { status, degenerate: into_polar.abs() <= margin || near_stick }
+    }
 }
 
 /// What one contact adds to the residuals, from x and ũ.
@@ -116,7 +198,7 @@ pub(super) struct Share {
     pub residual: f64,
     /// `dist(x, K)²`.
     pub primal: f64,
-    /// `dist(ũ, K*)²`, with mu > 1 as far as with mu = 1: much friction opens K* to nearly the whole space, and a velocity into the obstacle is near it.
+    /// `dist(ũ, K*)²` times the law's [opening](Law::opening).
     pub dual: f64,
     /// `|x · ũ|`.
     pub complementarity: f64,
@@ -124,59 +206,21 @@ pub(super) struct Share {
 
 impl Share {
     /// From x, u and ũ.
-    pub(super) fn new<T: Real, const D: usize>(
+    pub(super) fn new<T: Real, L: Law<D>, const D: usize>(
+        law: L,
         x: &[T; D],
         u: &[T; D],
         modified: &[T; D],
-        mu: f64,
     ) -> Self {
         let square = |x: [f64; D]| x.iter().map(|v| v * v).sum::<f64>();
-        let opening = ((1.0 + mu * mu) / (1.0 + mu.min(1.0).powi(2))).min(f64::MAX);
         let products = x.iter().zip(modified).map(|(&a, &b)| a * b);
         Self {
-            residual: square(natural_map(x, modified, mu)),
-            primal: distance_to_cone(x, mu).powi(2),
-            dual: opening * distance_to_dual(&u.map(|v| v.value()), mu).powi(2),
+            residual: square(law.natural_map(x, modified)),
+            primal: law.distance_to_cone(x).powi(2),
+            dual: law.opening() * law.distance_to_dual(&u.map(|v| v.value())).powi(2),
             complementarity: products.fold(T::from(0.0), |sum, p| sum + p).value().abs(),
         }
     }
-}
-
-/// Whether `x − ũ`, which plain arithmetic knows up to `error`, surely lies in K or in its polar cone, so that the natural map is ũ or x itself and no difference.
-pub(super) fn is_at_rest_or_open<const D: usize>(
-    x: &[f64; D],
-    modified: &[f64; D],
-    mu: f64,
-    error: f64,
-) -> bool {
-    let y = difference(x, modified);
-    let (t, margin) = (tangential(&y), (1.0 + mu) * error);
-    t - mu * y[0] < -margin || y[0] + mu * t < -margin
-}
-
-/// The status of a contact from `x = w r` and ũ; `margin` is a velocity.
-pub(super) fn status<const D: usize>(
-    x: &[f64; D],
-    modified: &[f64; D],
-    mu: f64,
-    margin: f64,
-) -> ContactStatus {
-    let y = difference(x, modified);
-    let t = tangential(&y);
-    let secant = (1.0 + mu * mu).sqrt();
-    // Signed distances of y into K and into its polar cone −K*.
-    let into_cone = (mu * y[0] - t) / secant;
-    let into_polar = (-y[0] - mu * t) / secant;
-    let status = if into_polar >= 0.0 {
-        Motion::Open
-    } else if mu > 0.0 && into_cone >= 0.0 {
-        Motion::Stick
-    } else {
-        Motion::Slip
-    };
-    // A frictionless contact slides or is open: its cone has no interior to be near to.
-    let near_stick = mu > 0.0 && into_cone.abs() <= margin;
-    ContactStatus { status, degenerate: into_polar.abs() <= margin || near_stick }
 }
 
 #[cfg(test)]
@@ -187,24 +231,24 @@ mod tests {
     fn the_three_regions() {
         let mu = 0.5;
         let at_rest = ([2.0, 0.1, 0.2], [0.0; 3]);
-        assert_eq!(status(&at_rest.0, &at_rest.1, mu, 1e-9).status, Motion::Stick);
-        let sliding = ([2.0, -1.0, 0.0], modified_velocity(&[0.0, 3.0, 0.0], mu));
-        assert_eq!(status(&sliding.0, &sliding.1, mu, 1e-9).status, Motion::Slip);
-        let flying = ([0.0; 3], modified_velocity(&[1.0, 3.0, 0.0], mu));
-        assert_eq!(status(&flying.0, &flying.1, mu, 1e-9).status, Motion::Open);
+        assert_eq!(Coulomb { mu }.status(&at_rest.0, &at_rest.1, 1e-9).status, Motion::Stick);
+        let sliding = ([2.0, -1.0, 0.0], Coulomb { mu }.modified_velocity(&[0.0, 3.0, 0.0]));
+        assert_eq!(Coulomb { mu }.status(&sliding.0, &sliding.1, 1e-9).status, Motion::Slip);
+        let flying = ([0.0; 3], Coulomb { mu }.modified_velocity(&[1.0, 3.0, 0.0]));
+        assert_eq!(Coulomb { mu }.status(&flying.0, &flying.1, 1e-9).status, Motion::Open);
         for (x, u) in [at_rest, sliding, flying] {
-            assert!(natural_map(&x, &u, mu).iter().all(|v| v.abs() < 1e-15));
-            assert!(!status(&x, &u, mu, 1e-9).degenerate);
+            assert!(Coulomb { mu }.natural_map(&x, &u).iter().all(|v| v.abs() < 1e-15));
+            assert!(!Coulomb { mu }.status(&x, &u, 1e-9).degenerate);
         }
-        assert!(status(&[0.0; 3], &[0.0; 3], mu, 1e-9).degenerate);
-        assert!(status(&[2.0, -1.0, 0.0], &[0.0; 3], mu, 1e-9).degenerate);
+        assert!(Coulomb { mu }.status(&[0.0; 3], &[0.0; 3], 1e-9).degenerate);
+        assert!(Coulomb { mu }.status(&[2.0, -1.0, 0.0], &[0.0; 3], 1e-9).degenerate);
     }
 
     #[test]
     fn frictionless_contacts_slide_or_are_open() {
-        let pressed = status(&[1.0, 0.0, 0.0], &[0.0, 0.0, 0.0], 0.0, 1e-9);
+        let pressed = Coulomb { mu: 0.0 }.status(&[1.0, 0.0, 0.0], &[0.0, 0.0, 0.0], 1e-9);
         assert_eq!(pressed, ContactStatus { status: Motion::Slip, degenerate: false });
-        let open = status(&[0.0; 3], &[1.0, 5.0, 0.0], 0.0, 1e-9);
+        let open = Coulomb { mu: 0.0 }.status(&[0.0; 3], &[1.0, 5.0, 0.0], 1e-9);
         assert_eq!(open, ContactStatus { status: Motion::Open, degenerate: false });
     }
 
@@ -216,12 +260,12 @@ mod tests {
             ([0.0, 0.0], [1.0, 0.0], 0.0),
             ([5.0, 0.0], [0.0, 0.0], 0.0),
         ] {
-            let phi = natural_map(&x, &modified, 0.0);
+            let phi = Coulomb { mu: 0.0 }.natural_map(&x, &modified);
             assert_eq!((phi[0].abs(), phi[1]), (residual, 0.0), "{x:?} {modified:?}");
         }
-        assert_eq!(distance_to_cone(&[-5.0, 0.0, 0.0], 0.0), 5.0);
-        assert_eq!(distance_to_dual(&[5.0, 0.0, 0.0], 0.0), 0.0);
-        assert_eq!(distance_to_dual(&[-5.0, 0.0, 0.0], 0.0), 5.0);
+        assert_eq!(Coulomb { mu: 0.0 }.distance_to_cone(&[-5.0, 0.0, 0.0]), 5.0);
+        assert_eq!(Coulomb { mu: 0.0 }.distance_to_dual(&[5.0, 0.0, 0.0]), 0.0);
+        assert_eq!(Coulomb { mu: 0.0 }.distance_to_dual(&[-5.0, 0.0, 0.0]), 5.0);
     }
 
     #[test]
@@ -230,7 +274,7 @@ mod tests {
             for i in 0..60 {
                 let a = f64::from(i) * 0.7;
                 let x = [2.0 * a.sin(), a.cos() * 1.5, (1.3 * a).sin()];
-                let best = distance_to_cone(&x, mu);
+                let best = Coulomb { mu }.distance_to_cone(&x);
                 for j in 0..2000 {
                     let b = f64::from(j);
                     let n = (b * 0.377).rem_euclid(4.0);

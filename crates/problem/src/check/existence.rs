@@ -19,10 +19,10 @@
 
 use serde::Serialize;
 
-use super::contact::distance_to_cone;
+use super::contact::Law;
 use super::proof::{Equation, exact, monotone, negative, satisfying};
 use super::{Certificate, Exact, ExactVector, Impulses, Monotone, Proof, rounded};
-use crate::{FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem};
+use crate::{Coulomb, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem};
 use nonsmooth_linalg::small::{self, tangential_norm};
 use nonsmooth_linalg::{Compensated, Csc, norm};
 
@@ -447,7 +447,7 @@ impl<const D: usize> Kinematics<D> {
             return None;
         }
         let inside = |(c, &mu): (usize, &f64)| {
-            distance_to_cone(&small::block::<D>(r, c), mu) <= INSIDE * scale
+            Coulomb { mu }.distance_to_cone(&small::block::<D>(r, c)) <= INSIDE * scale
         };
         if !mu.iter().enumerate().all(inside) {
             return None;

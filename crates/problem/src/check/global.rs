@@ -261,7 +261,7 @@ impl GlobalGauge {
         precisely: bool,
     ) -> Measure {
         let Self { law, dynamics, reach, u, exact, own: state, buffer, rows, .. } = self;
-        let (n, mu) = (problem.dofs(), &problem.mu[..]);
+        let n = problem.dofs();
         // A size needs no more digits.
         rows.precisely(false);
         rows.start_at_zero(n);
@@ -302,10 +302,10 @@ impl GlobalGauge {
                 let of_v: f64 = at.iter().zip(values).map(|(&j, h)| (h * last[j]).abs()).sum();
                 of_v + all * (sums[i] + sizes[i])
             };
-            law.measure::<_, D>(&point.r, exact, sizes, doubt, mu)
+            law.measure::<_, _, D>(&point.r, exact, sizes, doubt, |c| problem.law(c))
         } else {
             u.iter_mut().zip(rows.values()).for_each(|(u, x)| *u = x);
-            law.measure::<f64, D>(&point.r, u, &[], |_| 0.0, mu)
+            law.measure::<_, _, D>(&point.r, u, &[], |_| 0.0, |c| problem.law(c))
         };
 
         let worse = |a: f64, b: f64| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) };

@@ -1,6 +1,6 @@
 //! The judge of the local problem.
 
-use super::contact::{Share, is_at_rest_or_open, length, modified_velocity, natural_map};
+use super::contact::{Law, Share, length};
 use super::loads::Loads;
 use super::rows::{Rows, doubt};
 use super::{Measure, over};
@@ -112,12 +112,13 @@ impl LocalGauge {
             let Self { law, exact, sizes, terms, .. } = self;
             let doubt = doubt(*terms);
             let of = |i: usize| doubt * sizes[i];
-            let mut measure = law.measure::<_, D>(&point.r, exact, sizes, of, &problem.mu);
+            let mut measure =
+                law.measure::<_, _, D>(&point.r, exact, sizes, of, |c| problem.law(c));
             measure.floor = Some(self.floor(problem, point));
             measure
         } else {
             self.update_velocity(problem, point);
-            self.law.measure::<f64, D>(&point.r, &self.u, &[], |_| 0.0, &problem.mu)
+            self.law.measure::<_, _, D>(&point.r, &self.u, &[], |_| 0.0, |c| problem.law(c))
         };
         measure.bilateral = self.violation(problem, point);
         measure
@@ -268,21 +269,6 @@ pub(super) fn worst(shares: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
     })
 }
 
-/// How far a contact with `x = w r` is from each part of the law by itself: `r ∈ K`, `u_N > 0` only where r = 0, and `x_T = −mu x_N u_T/‖u_T‖` where
-/// `u_T ≠ 0`. With `u_N ≥ 0` all of that is the same as `K* ∋ ũ ⟂ r ∈ K`, but with much friction K* is nearly the whole space and K nearly a half space, where far from the law is near in the
-/// distance to cones.
-fn apart<const D: usize>(x: &[f64; D], u: &[f64; D], mu: f64) -> f64 {
-    let pressed = u[0].max(0.0).min(norm(x));
-    let sliding = small::tangential_norm(u);
-    let across = if sliding > 0.0 {
-        norm_of((1..D).map(|k| x[k] + mu * x[0] * (u[k] / sliding)))
-    } else {
-        0.0
-    };
-    let pulling = (-x[0]).max(small::tangential_norm(x) - mu * x[0].max(0.0)).max(0.0);
-    pressed.max(sliding.min(across)).max(pulling)
-}
-
 /// The matrix `[W, V; Vᵀ, R]` by contacts and constraints.
 struct Saddle<'a, const D: usize>(&'a FrictionLocal<D>);
 
@@ -385,13 +371,13 @@ impl LawGauge {
     ///
     /// All is done in units of a power of two near its scale, so that no square leaves the range of double precision
     /// before the data do.
-    pub(super) fn measure<T: Real, const D: usize>(
+    pub(super) fn measure<T: Real, L: Law<D>, const D: usize>(
         &self,
         r: &[f64],
         u: &[T],
         sizes: &[f64],
         doubt: impl Fn(usize) -> f64,
-        mu: &[f64],
+        law: impl Fn(usize) -> L,
     ) -> Measure {
         let unit = power_of_two(self.unit());
         let largest = u.iter().map(|u| u.value() / unit);
@@ -405,27 +391,28 @@ impl LawGauge {
         let (mut primal, mut dual, mut complementarity) = (0.0, 0.0, 0.0);
         let (mut worst_contact, mut worst) = (0, -1.0);
         let (mut own_contact, mut own) = (0, 0.0);
-        for (c, (&mu, &w)) in mu.iter().zip(&self.w).enumerate() {
+        for (c, &w) in self.w.iter().enumerate() {
+            let law = law(c);
             let rc: [f64; D] = small::block(r, c);
             let uc: [T; D] = std::array::from_fn(|k| u[D * c + k]);
             let plain_u = uc.map(|u| u.value());
-            let plain_modified = modified_velocity::<f64, D>(&plain_u, mu);
+            let plain_modified = law.modified_velocity(&plain_u);
             let near = (rc.map(|r| w * r * per), plain_modified.map(|u| u * per));
-            let plainly = || Share::new(&near.0, &plain_u.map(|u| u * per), &near.1, mu);
+            let plainly = || Share::new(law, &near.0, &plain_u.map(|u| u * per), &near.1);
             let (share, left) = if T::DOUBT == 0.0 {
                 (plainly(), 0.0)
             } else {
                 let size = length(&near.0) + length(&near.1);
                 // Of most contacts the natural map is ũ or x: once these are known, plain arithmetic is right to the last bits.
-                if is_at_rest_or_open(&near.0, &near.1, mu, PLAIN * size) {
+                if law.is_at_rest_or_open(&near.0, &near.1, PLAIN * size) {
                     let share = plainly();
                     let left = PLAIN * share.residual.sqrt();
                     (share, left)
                 } else {
                     let x = rc.map(|r| T::of_product(w, r).times_power(per));
                     let u = uc.map(|u| u.times_power(per));
-                    let modified = modified_velocity(&u, mu);
-                    (Share::new(&x, &u, &modified, mu), T::DOUBT * size)
+                    let modified = law.modified_velocity(&u);
+                    (Share::new(law, &x, &u, &modified), T::DOUBT * size)
                 }
             };
             if share.residual > worst || share.residual.is_nan() {
@@ -435,13 +422,13 @@ impl LawGauge {
             // Plain arithmetic decides nothing: it leaves out what only decides.
             if T::DOUBT > 0.0 {
                 let of_u = norm_of((D * c..D * c + D).map(|i| doubt(i) * per));
-                let left = left + (1.0 + mu) * of_u;
+                let left = left + law.growth() * of_u;
                 doubts += left * left;
                 // Impulses that run away along the kernel of W make terms of any size: no more than the loads excuse.
                 let load = self.loads.reaching(c) * per;
                 let strength = self.own_w(c);
                 let own_x = rc.map(|r| strength * r * per);
-                let apart = apart(&own_x, &plain_u.map(|u| u * per), mu);
+                let apart = law.apart(&own_x, &plain_u.map(|u| u * per));
                 // Of an empty block the impulse is no term, but may be all there is.
                 let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] * per));
                 let terms = terms.max(norm(&own_x)).min(load);
@@ -456,7 +443,7 @@ impl LawGauge {
                 }
             }
             let plain_r = rc.map(|r| r * plain_per);
-            let map = natural_map(&plain_r, &plain_modified.map(|u| u * plain_per), mu);
+            let map = law.natural_map(&plain_r, &plain_modified.map(|u| u * plain_per));
             peer += map.iter().map(|v| v * v).sum::<f64>();
             primal += share.primal;
             dual += share.dual;

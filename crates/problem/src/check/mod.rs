@@ -17,7 +17,7 @@ mod rows;
 mod verdict;
 
 pub use certificate::Certificate;
-pub use contact::{ContactStatus, Motion};
+pub use contact::{ContactStatus, Law, Motion};
 pub use existence::{Existence, Kinematic, Kinematics};
 pub use global::GlobalGauge;
 pub use impulses::Impulses;

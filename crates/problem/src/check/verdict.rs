@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::contact::{modified_velocity, natural_map, status};
+use super::contact::Law;
 use super::local::LawGauge;
 use super::{ContactStatus, Measure, Motion, over};
 use crate::{FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem, ProblemError};
@@ -76,7 +76,7 @@ impl<const D: usize> Judged for FrictionLocal<D> {
 
     fn verdict(&self, point: &LocalPoint, gauge: &mut Self::Gauge, tolerance: f64) -> Verdict {
         let measure = self.certify(point, gauge);
-        verdict::<D>(measure, &gauge.law, &point.r, gauge.velocity(), &self.mu, tolerance)
+        verdict::<_, D>(measure, &gauge.law, &point.r, gauge.velocity(), |c| self.law(c), tolerance)
     }
 }
 
@@ -86,26 +86,27 @@ impl<const D: usize> Judged for FrictionGlobal<D> {
 
     fn verdict(&self, point: &GlobalPoint, gauge: &mut Self::Gauge, tolerance: f64) -> Verdict {
         let measure = self.certify(point, gauge);
-        verdict::<D>(measure, &gauge.law, &point.r, gauge.velocity(), &self.mu, tolerance)
+        verdict::<_, D>(measure, &gauge.law, &point.r, gauge.velocity(), |c| self.law(c), tolerance)
     }
 }
 
-fn verdict<const D: usize>(
+fn verdict<L: Law<D>, const D: usize>(
     measure: Measure,
-    law: &LawGauge,
+    gauge: &LawGauge,
     r: &[f64],
     u: &[f64],
-    mu: &[f64],
+    law: impl Fn(usize) -> L,
     tolerance: f64,
 ) -> Verdict {
-    let margin = if law.norm_q > 0.0 { tolerance * law.norm_q } else { tolerance };
+    let margin = if gauge.norm_q > 0.0 { tolerance * gauge.norm_q } else { tolerance };
     let mut counts = StatusCounts::default();
-    let mut statuses = Vec::with_capacity(mu.len());
-    let mut worst = Vec::with_capacity(mu.len());
-    for (c, (&mu, &w)) in mu.iter().zip(&law.w).enumerate() {
+    let mut statuses = Vec::with_capacity(gauge.w.len());
+    let mut worst = Vec::with_capacity(gauge.w.len());
+    for (c, &w) in gauge.w.iter().enumerate() {
+        let law = law(c);
         let x = small::block::<D>(r, c).map(|v| w * v);
-        let modified = modified_velocity::<f64, D>(&small::block(u, c), mu);
-        let s = status(&x, &modified, mu, margin);
+        let modified = law.modified_velocity(&small::block(u, c));
+        let s = law.status(&x, &modified, margin);
         match s.status {
             Motion::Open => counts.open += 1,
             Motion::Stick => counts.stick += 1,
@@ -113,8 +114,8 @@ fn verdict<const D: usize>(
         }
         counts.degenerate += usize::from(s.degenerate);
         statuses.push(s);
-        let share = natural_map(&x, &modified, mu).iter().map(|v| v * v).sum::<f64>().sqrt();
-        worst.push((c, over(share, law.norm_q)));
+        let share = law.natural_map(&x, &modified).iter().map(|v| v * v).sum::<f64>().sqrt();
+        worst.push((c, over(share, gauge.norm_q)));
     }
     worst.sort_by(|a, b| b.1.total_cmp(&a.1));
     worst.truncate(10);

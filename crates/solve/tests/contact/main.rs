@@ -1,6 +1,7 @@
-//! Contact problems: whether a solution exists, friction through facets, the methods through convex optimisation.
+//! Contact problems: whether a solution exists, friction through facets, the methods through convex optimisation, scalar rows with bounds.
 
 mod existence;
 mod facets;
 mod optimisation;
 mod plain_lemke;
+mod scalar_rows;

@@ -47,7 +47,7 @@ impl Access {
     fn admit(self, bounds: Option<&Bounds>) -> Result<(), SolveError> {
         match bounds.and_then(|bounds| bounds.bounded().next().map(|j| (j, bounds.of(j)))) {
             Some((j, [l, u])) if self != Access::Rows => Err(SolveError::needs(
-                "scalar rows without bounds (nsgs and auto take bounds)",
+                "scalar rows without bounds (nsgs, psor and auto take bounds)",
                 format!("[l, u][{j}] = [{l}, {u}]"),
             )),
             _ => Ok(()),
