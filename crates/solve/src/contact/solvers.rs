@@ -3,7 +3,9 @@
 use nonsmooth_problem::check::Kinematic;
 
 use crate::contact::auto::Auto;
-use crate::contact::form::{Concurrent, Explicit, Linear, Linearised, OnContacts, Regularised};
+use crate::contact::form::{
+    Concurrent, Explicit, Frictional, Linear, Linearised, OnContacts, Regularised,
+};
 use crate::contact::interior::{ConvexRelaxation, Interior};
 use crate::contact::law::cfun::{
     AlartCurnier, ChenMangasarian, FischerBurmeister, HueberStadlerWohlmuth, JeanMoreau,
@@ -22,7 +24,7 @@ use crate::{Boxed, Solver};
 /// A method that is its hyperparameters.
 fn on<P, S, const D: usize>() -> Entry<P>
 where
-    P: Linear<D> + 'static,
+    P: Linear<D> + Frictional<D> + 'static,
     S: Described + 'static,
     OnContacts<S, D>: Solver<P, Work: 'static>,
 {
@@ -31,7 +33,7 @@ where
 
 fn projected<P, M, const D: usize>() -> Entry<P>
 where
-    P: Linear<D> + 'static,
+    P: Linear<D> + Frictional<D> + 'static,
     M: Method + Described + 'static,
 {
     Entry::new(|method: M| Boxed::new(Projected::<M, D>(method)))
@@ -40,7 +42,7 @@ where
 /// The solvers of problems that can be seen by their contacts.
 pub fn solvers<P, const D: usize>() -> Vec<Entry<P>>
 where
-    P: Concurrent<D> + Linearised<D> + Explicit<D> + Kinematic<D> + 'static,
+    P: Concurrent<D> + Frictional<D> + Linearised<D> + Explicit<D> + Kinematic<D> + 'static,
 {
     vec![
         on::<P, Auto, D>(),
@@ -72,7 +74,7 @@ where
 /// The solvers that the proximal point method may have inside: those that gain from a regular W.
 pub fn inner_solvers<P, const D: usize>() -> Vec<Entry<Regularised<P>>>
 where
-    P: Concurrent<D> + Linearised<D> + 'static,
+    P: Concurrent<D> + Frictional<D> + Linearised<D> + 'static,
     Regularised<P>: Concurrent<D> + Linearised<D>,
 {
     vec![

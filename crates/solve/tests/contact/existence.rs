@@ -6,13 +6,15 @@ use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{
     FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem, RowsGlobal,
 };
-use nonsmooth_solve::contact::form::Blockwise;
+use nonsmooth_solve::contact::form::{Blockwise, Frictional};
 use nonsmooth_solve::existence::{decide, glance_at};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limits, Status};
 
 /// The verdict, its certificate verified once more.
-fn verdict<P: Blockwise<D> + Kinematic<D>, const D: usize>(problem: &P) -> Existence {
+fn verdict<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: usize>(
+    problem: &P,
+) -> Existence {
     let existence = decide(problem, &Limits::default());
     let k = problem.kinematics();
     match &existence {
@@ -34,7 +36,9 @@ fn verdict<P: Blockwise<D> + Kinematic<D>, const D: usize>(problem: &P) -> Exist
     existence
 }
 
-fn name<P: Blockwise<D> + Kinematic<D>, const D: usize>(problem: &P) -> &'static str {
+fn name<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: usize>(
+    problem: &P,
+) -> &'static str {
     verdict(problem).name()
 }
 

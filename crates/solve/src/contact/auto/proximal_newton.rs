@@ -17,7 +17,7 @@
 
 use nonsmooth_linalg::{Block, small};
 
-use crate::contact::form::Linearised;
+use crate::contact::form::{Frictional, Linearised};
 use crate::contact::law::cfun::{Disk, Radii, alart_curnier, natural_residual};
 
 /// Trials of the line search.
@@ -76,7 +76,7 @@ pub struct Inner {
 
 impl<const D: usize> ProximalNewton<D> {
     /// For `problem`.
-    pub fn new<P: Linearised<D>>(problem: &P, state: &P::State) -> Self {
+    pub fn new<P: Linearised<D> + Frictional<D>>(problem: &P, state: &P::State) -> Self {
         let mut out = Self {
             contacts: vec![],
             scale: 1.0,
@@ -99,7 +99,7 @@ impl<const D: usize> ProximalNewton<D> {
     }
 
     /// Takes another problem; allocates nothing where the number of contacts is the same.
-    pub fn fill<P: Linearised<D>>(&mut self, problem: &P, state: &P::State) {
+    pub fn fill<P: Linearised<D> + Frictional<D>>(&mut self, problem: &P, state: &P::State) {
         let nc = problem.mu().len();
         self.scale = problem.velocity_scale(state);
         self.precise = false;
@@ -130,12 +130,22 @@ impl<const D: usize> ProximalNewton<D> {
 
     /// Takes `r` as the present impulses: computes their velocities, on which [`error`](Self::error) and [`residual`](Self::residual)
     /// rest, and returns the error.
-    pub fn look<P: Linearised<D>>(&mut self, problem: &P, state: &mut P::State, r: &[f64]) -> f64 {
+    pub fn look<P: Linearised<D> + Frictional<D>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        r: &[f64],
+    ) -> f64 {
         self.update(problem, state, r);
         self.error(r)
     }
 
-    fn update<P: Linearised<D>>(&mut self, problem: &P, state: &mut P::State, r: &[f64]) {
+    fn update<P: Linearised<D> + Frictional<D>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        r: &[f64],
+    ) {
         if self.precise {
             problem.velocities_precisely(state, r, &mut self.u);
         } else {
@@ -217,7 +227,7 @@ impl<const D: usize> ProximalNewton<D> {
     }
 
     /// One Newton iteration on `r` and `u`.
-    pub fn iterate<P: Linearised<D>>(
+    pub fn iterate<P: Linearised<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,

@@ -5,7 +5,7 @@ use nonsmooth_linalg::small::{block, tangential_norm};
 use nonsmooth_problem::check::{Kinematic, Kinematics};
 
 use super::{Clock, Found};
-use crate::contact::form::{Access, Blockwise};
+use crate::contact::form::{Access, Blockwise, Frictional};
 use crate::contact::law::cone;
 
 /// The margins τ that are tried, in units of the largest free velocity.
@@ -14,7 +14,7 @@ const MARGINS: [f64; 3] = [1.0, 1e-2, 1e-4];
 const LOOK: usize = 5;
 
 /// A verified motion, or a verified contradiction of bilateral constraints, if found within `sweeps` for each margin.
-pub(super) fn approach<P: Blockwise<D> + Kinematic<D>, const D: usize>(
+pub(super) fn approach<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: usize>(
     problem: &P,
     kinematics: &Kinematics<D>,
     sweeps: usize,

@@ -28,7 +28,7 @@ use nonsmooth_problem::check::{
 };
 use nonsmooth_problem::with_friction;
 
-use crate::contact::form::{Blockwise, Rows, has_bounds};
+use crate::contact::form::{Blockwise, Frictional, Rows, has_bounds};
 use crate::core::exact_cones::{ExactCones, Found as ExactlyFound};
 use crate::core::guard;
 use crate::{Limit, Limits};
@@ -85,7 +85,7 @@ pub fn glance(problem: &Friction) -> Existence {
 }
 
 /// As [`of`], for a problem of a known kind.
-pub fn decide<P: Blockwise<D> + Kinematic<D>, const D: usize>(
+pub fn decide<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: usize>(
     problem: &P,
     limits: &Limits,
 ) -> Existence {
@@ -182,7 +182,9 @@ fn normal<const D: usize>(kinematics: &Kinematics<D>, vector: &ExactVector) -> O
 }
 
 /// As [`glance`], for a problem of a known kind.
-pub fn glance_at<P: Blockwise<D> + Kinematic<D>, const D: usize>(problem: &P) -> Existence {
+pub fn glance_at<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: usize>(
+    problem: &P,
+) -> Existence {
     let limits = Limits::default();
     let clock = Clock { start: Instant::now(), limits: &limits };
     if has_bounds(problem) {

@@ -13,8 +13,9 @@ use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::{Bounds, Dynamics, FrictionGlobal, GlobalPoint};
 
 use super::linearised::{BodyForm, ContactForm, Form, NEVER, Once, System, made, there};
-use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised, Rows};
+use super::{Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Linear, Linearised, Rows};
 use crate::SolveError;
+use crate::contact::law::Coulomb;
 
 /// What the view keeps.
 pub struct GlobalState<const D: usize> {
@@ -95,6 +96,7 @@ impl<const D: usize> GlobalState<D> {
 }
 
 impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
+    type Law = Coulomb;
     type State = GlobalState<D>;
 
     fn state(&self, access: Access) -> Result<Self::State, SolveError> {
@@ -161,8 +163,13 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
         state.contradiction.as_ref()
     }
 
-    fn mu(&self) -> &[f64] {
-        &self.mu
+    fn contacts(&self) -> usize {
+        self.mu.len()
+    }
+
+    #[inline(always)]
+    fn law(&self, c: usize) -> Coulomb {
+        Coulomb { mu: self.mu[c] }
     }
 
     fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D] {
@@ -204,6 +211,12 @@ fn row_responses<const D: usize>(
         }
     };
     (0..b.b.len()).map(|j| (!b.bounds.is_free(j)).then(|| of(j))).collect()
+}
+
+impl<const D: usize> Frictional<D> for FrictionGlobal<D> {
+    fn mu(&self) -> &[f64] {
+        &self.mu
+    }
 }
 
 impl<const D: usize> Rows<D> for FrictionGlobal<D> {

@@ -449,7 +449,7 @@ mod tests {
 
     fn solved<P: Linearised<3>>(problem: &P) -> (Vec<f64>, Vec<f64>) {
         let mut state = problem.state(Access::Newton).unwrap();
-        let nc = problem.mu().len();
+        let nc = problem.contacts();
         let unit: Vec<f64> =
             (0..nc).map(|c| small::mean_diagonal(&problem.diagonal_block(&state, c))).collect();
         let (p, q) = blocks(unit.into_iter());
@@ -526,7 +526,7 @@ mod tests {
         let (local, _) = Condense.reduce(&global).unwrap();
         fn residual<P: Linearised<3>>(problem: &P) -> f64 {
             let mut state = problem.state(Access::Newton).unwrap();
-            let nc = problem.mu().len();
+            let nc = problem.contacts();
             let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
             let unit = |c| small::mean_diagonal(&problem.diagonal_block(&state, c));
             let q: Vec<_> =

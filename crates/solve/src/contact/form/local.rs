@@ -11,8 +11,9 @@ use nonsmooth_problem::{Bounds, FrictionLocal, LocalPoint, RowsLocal};
 
 use super::linearised::{ContactForm, Form, NEVER, Once, System, made, there};
 use super::rows::Bounded;
-use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised, Rows};
+use super::{Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Linear, Linearised, Rows};
 use crate::SolveError;
+use crate::contact::law::Coulomb;
 
 /// What the view keeps: the norm of q, the problem without its bilateral rows where it has any, and the linear system.
 pub struct LocalState<const D: usize> {
@@ -146,6 +147,7 @@ impl<const D: usize> LocalState<D> {
 }
 
 impl<const D: usize> Contacts<D> for FrictionLocal<D> {
+    type Law = Coulomb;
     type State = LocalState<D>;
 
     fn state(&self, access: Access) -> Result<Self::State, SolveError> {
@@ -177,8 +179,13 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
         state.eliminated.as_ref()?.contradiction.as_ref()
     }
 
-    fn mu(&self) -> &[f64] {
-        &self.mu
+    fn contacts(&self) -> usize {
+        self.mu.len()
+    }
+
+    #[inline(always)]
+    fn law(&self, c: usize) -> Coulomb {
+        Coulomb { mu: self.mu[c] }
     }
 
     fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D] {
@@ -214,6 +221,12 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
         }
         e.r_inverse.solve_with(multipliers, &mut e.scratch, Refine::Fully);
         e.free.iter().zip(&*multipliers).for_each(|(&j, x)| point.lambda[j] = *x);
+    }
+}
+
+impl<const D: usize> Frictional<D> for FrictionLocal<D> {
+    fn mu(&self) -> &[f64] {
+        &self.mu
     }
 }
 

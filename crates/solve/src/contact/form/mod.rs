@@ -2,7 +2,8 @@
 //!
 //! | capability | what a family may ask | offered by |
 //! | --- | --- | --- |
-//! | [`Contacts`] | the law's data, the diagonal blocks of W, ‖q‖, the impulses of a point | local, global |
+//! | [`Frictional`] | that the law is Coulomb's, and its coefficients | local, global |
+//! | [`Contacts`] | the law, the diagonal blocks of W, ‖q‖, the impulses of a point | local, global |
 //! | [`Rows`] | one scalar row's velocity, and to be told that its impulse moved | local, global |
 //! | [`Blockwise`] | in addition, one contact's velocity, and to be told that one contact's impulse moved | local (rows of W), global (velocity space) |
 //! | [`Concurrent`] | in addition, which contacts do not feel each other, and visits from several threads | local, global |
@@ -28,6 +29,7 @@ pub use local::LocalState;
 pub use regularised::{Overwrite, Regularised, RegularisedState};
 
 use crate::SolveError;
+use crate::contact::law::{ContactLaw, Coulomb};
 
 /// How a family uses W.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,6 +61,8 @@ impl Access {
 ///
 /// `State` is what the view keeps beside the problem: velocities, factorisations, buffers.
 pub trait Contacts<const D: usize>: Problem {
+    /// The law of the contacts.
+    type Law: ContactLaw<D>;
     /// What the view keeps between calls.
     type State: Send;
 
@@ -71,8 +75,11 @@ pub trait Contacts<const D: usize>: Problem {
     /// A verified certificate that the bilateral constraints contradict each other, if they do.
     fn contradiction<'a>(&self, state: &'a Self::State) -> Option<&'a Impulses>;
 
-    /// mu, nc, each ≥ 0.
-    fn mu(&self) -> &[f64];
+    /// The number of contacts nc.
+    fn contacts(&self) -> usize;
+
+    /// The law of contact c.
+    fn law(&self, c: usize) -> Self::Law;
 
     /// The diagonal block `W_cc`.
     fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D];
@@ -88,6 +95,12 @@ pub trait Contacts<const D: usize>: Problem {
 
     /// Completes `point` (velocities, multipliers) from its impulses, exactly.
     fn complete(&self, state: &mut Self::State, point: &mut Self::Point);
+}
+
+/// Contacts with Coulomb's law, for methods whose formulas are those of that law.
+pub trait Frictional<const D: usize>: Contacts<D, Law = Coulomb> {
+    /// mu, nc, each ≥ 0.
+    fn mu(&self) -> &[f64];
 }
 
 /// Access to the scalar rows that have bounds, row by row. Those without are no concern of a visitor: the view keeps `c = 0` there.

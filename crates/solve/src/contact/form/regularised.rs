@@ -7,7 +7,7 @@ use nonsmooth_linalg::{Block, Singular};
 use nonsmooth_problem::check::{Certificate, ConeSystem, Evidence, Impulses, Measure};
 use nonsmooth_problem::{Bounds, FrictionGlobal, FrictionLocal, Kind, Problem, ProblemError};
 
-use super::{Access, Blockwise, Concurrent, Contacts, Costs, Linear, Linearised, Rows};
+use super::{Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Linear, Linearised, Rows};
 use crate::SolveError;
 
 /// `P` with a proximal term.
@@ -122,6 +122,7 @@ pub struct RegularisedState<S, const D: usize> {
 }
 
 impl<P: Contacts<D>, const D: usize> Contacts<D> for Regularised<P> {
+    type Law = P::Law;
     type State = RegularisedState<P::State, D>;
 
     fn state(&self, access: Access) -> Result<Self::State, SolveError> {
@@ -136,8 +137,13 @@ impl<P: Contacts<D>, const D: usize> Contacts<D> for Regularised<P> {
         self.base.contradiction(&state.base)
     }
 
-    fn mu(&self) -> &[f64] {
-        self.base.mu()
+    fn contacts(&self) -> usize {
+        self.base.contacts()
+    }
+
+    #[inline(always)]
+    fn law(&self, c: usize) -> P::Law {
+        self.base.law(c)
     }
 
     fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D] {
@@ -162,6 +168,12 @@ impl<P: Contacts<D>, const D: usize> Contacts<D> for Regularised<P> {
 
     fn complete(&self, state: &mut Self::State, point: &mut Self::Point) {
         self.base.complete(&mut state.base, point);
+    }
+}
+
+impl<P: Frictional<D>, const D: usize> Frictional<D> for Regularised<P> {
+    fn mu(&self) -> &[f64] {
+        self.base.mu()
     }
 }
 

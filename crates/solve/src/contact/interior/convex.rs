@@ -14,7 +14,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::form::{Access, Linearised, OnContacts};
+use crate::contact::form::{Access, Frictional, Linearised, OnContacts};
 use crate::contact::parts::ConvexIp;
 use crate::core::ranges::{at_least, positive};
 use crate::core::register::{About, Described, Solves};
@@ -58,7 +58,7 @@ impl Described for ConvexRelaxation {
 }
 
 /// The iterate on the cones with its factors.
-pub struct RelaxedWork<P: Linearised<D>, const D: usize> {
+pub struct RelaxedWork<P: Linearised<D> + Frictional<D>, const D: usize> {
     state: P::State,
     ip: ConvexIp<D>,
     /// s = 0.
@@ -67,7 +67,9 @@ pub struct RelaxedWork<P: Linearised<D>, const D: usize> {
     since_best: usize,
 }
 
-impl<P: Linearised<D>, const D: usize> Solver<P> for OnContacts<ConvexRelaxation, D> {
+impl<P: Linearised<D> + Frictional<D>, const D: usize> Solver<P>
+    for OnContacts<ConvexRelaxation, D>
+{
     type Work = RelaxedWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {

@@ -16,7 +16,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::form::{Access, Linearised, OnContacts};
+use crate::contact::form::{Access, Frictional, Linearised, OnContacts};
 use crate::contact::interior::pursuit::Pursuit;
 use crate::contact::parts::{Central, CentralIterate};
 use crate::core::ranges::{at_least, nonnegative};
@@ -82,7 +82,7 @@ const SHORT: f64 = 1e-6;
 const MANY_SHORT: usize = 6;
 
 /// The iterate with its factors, and the arc along which it moves.
-pub struct PursuedWork<P: Linearised<D>, const D: usize> {
+pub struct PursuedWork<P: Linearised<D> + Frictional<D>, const D: usize> {
     state: P::State,
     core: Central<D>,
     pursuit: Pursuit<D>,
@@ -90,7 +90,7 @@ pub struct PursuedWork<P: Linearised<D>, const D: usize> {
     since_best: usize,
 }
 
-impl<P: Linearised<D>, const D: usize> Solver<P> for OnContacts<Interior, D> {
+impl<P: Linearised<D> + Frictional<D>, const D: usize> Solver<P> for OnContacts<Interior, D> {
     type Work = PursuedWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {

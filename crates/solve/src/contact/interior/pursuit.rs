@@ -20,7 +20,7 @@
 
 use nonsmooth_linalg::Singular;
 
-use crate::contact::form::Linearised;
+use crate::contact::form::{Frictional, Linearised};
 use crate::contact::parts::nt::Pair;
 use crate::contact::parts::{Central, CentralIterate};
 
@@ -78,7 +78,7 @@ const SHORTEST: f64 = 1e-12;
 
 impl<const D: usize> Pursuit<D> {
     /// Begins at `x = z = e`, with `smoothing` κ ≥ 0 and `start` as in [`Central::begin`].
-    pub fn begin<P: Linearised<D>>(
+    pub fn begin<P: Linearised<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -111,7 +111,7 @@ impl<const D: usize> Pursuit<D> {
 
     /// One step along the path: a predictor and its correctors. `alpha` of the answer is the step's length, zero
     /// where the step was refused.
-    pub fn iterate<P: Linearised<D>>(
+    pub fn iterate<P: Linearised<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -187,7 +187,11 @@ impl<const D: usize> Pursuit<D> {
     }
 
     /// `slope`: the derivative of (x, z) by −θ along the path.
-    fn differentiate<P: Linearised<D>>(&mut self, problem: &P, state: &mut P::State) {
+    fn differentiate<P: Linearised<D> + Frictional<D>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+    ) {
         let core = &mut self.core;
         for c in 0..core.pairs.len() {
             let mut minus_e = [0.0; D];
@@ -236,7 +240,7 @@ impl<const D: usize> Pursuit<D> {
     }
 
     /// One Newton step on the path's equations, orthogonal to the tangent.
-    fn correct<P: Linearised<D>>(
+    fn correct<P: Linearised<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,

@@ -28,7 +28,7 @@ use nonsmooth_linalg::{Block, budget, small};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::form::{Access, Linearised, OnContacts};
+use crate::contact::form::{Access, Frictional, Linearised, OnContacts};
 use crate::contact::law::cfun::{ContactFunction, Law, Linearisation, NewtonFunction};
 use crate::contact::parts::Sweep;
 use crate::core::line_search::{LineSearch, Search};
@@ -100,7 +100,7 @@ const DOUBLINGS: usize = 6;
 pub const PATIENCE: usize = 25;
 
 /// The workspace: the problem's view, the scaling of each contact, and the vectors of a step.
-pub struct Work<P: Linearised<D>, const D: usize> {
+pub struct Work<P: Linearised<D> + Frictional<D>, const D: usize> {
     state: P::State,
     sweep: Sweep<D>,
     laws: Vec<Law>,
@@ -162,7 +162,7 @@ impl Phase {
 
 impl<P, F, const D: usize> Solver<P> for OnContacts<Newton<F>, D>
 where
-    P: Linearised<D>,
+    P: Linearised<D> + Frictional<D>,
     F: ContactFunction<D>,
 {
     type Work = Work<P, D>;
@@ -276,7 +276,7 @@ where
 }
 
 impl<F, const D: usize> OnContacts<Newton<F>, D> {
-    fn fill<P: Linearised<D>>(&self, problem: &P, work: &mut Work<P, D>) {
+    fn fill<P: Linearised<D> + Frictional<D>>(&self, problem: &P, work: &mut Work<P, D>) {
         let n = problem.mu().len();
         work.scale = problem.velocity_scale(&work.state) / (n as f64).sqrt();
         work.unit.clear();
@@ -304,7 +304,7 @@ impl<F, const D: usize> OnContacts<Newton<F>, D> {
     }
 
     /// ρ of every contact for the present rung.
-    fn scale_contacts<P: Linearised<D>>(&self, problem: &P, work: &mut Work<P, D>) {
+    fn scale_contacts<P: Linearised<D> + Frictional<D>>(&self, problem: &P, work: &mut Work<P, D>) {
         let Newton { rho_rule, rho, .. } = self.0;
         let factor = scaling::LADDER[work.phase.rung % scaling::LADDER.len()];
         work.laws.clear();
@@ -324,7 +324,7 @@ impl<F, const D: usize> OnContacts<Newton<F>, D> {
         count: usize,
     ) -> Step
     where
-        P: Linearised<D>,
+        P: Linearised<D> + Frictional<D>,
     {
         problem.enter(&mut work.state, point);
         let r = P::impulses(point);
@@ -348,7 +348,7 @@ impl<F, const D: usize> OnContacts<Newton<F>, D> {
         why: &'static str,
     ) -> Step
     where
-        P: Linearised<D>,
+        P: Linearised<D> + Frictional<D>,
     {
         if self.0.rescue == 0 || work.phase.rescues >= RESCUES {
             return Step::Stuck(why.into());
@@ -369,7 +369,7 @@ impl<F, const D: usize> OnContacts<Newton<F>, D> {
 
 impl<F: ContactFunction<D>, const D: usize> OnContacts<Newton<F>, D> {
     /// Φ, P, Q at the present point into `b = −Φ`, `p`, `q`, in the problem's units; the merit.
-    fn linearise<P: Linearised<D>>(&self, r: &[f64], work: &mut Work<P, D>) -> f64 {
+    fn linearise<P: Linearised<D> + Frictional<D>>(&self, r: &[f64], work: &mut Work<P, D>) -> f64 {
         let Work { laws, unit, scale, u, b, p, q, .. } = work;
         let mut merit = 0.0;
         for (c, (law, &w)) in laws.iter().zip(&*unit).enumerate() {
@@ -385,7 +385,7 @@ impl<F: ContactFunction<D>, const D: usize> OnContacts<Newton<F>, D> {
     }
 
     /// ε: at most a fraction of the residual without smoothing and, near the solution, of its square; never larger than before.
-    fn reduce_smoothing<P: Linearised<D>>(&self, r: &[f64], work: &mut Work<P, D>) {
+    fn reduce_smoothing<P: Linearised<D> + Frictional<D>>(&self, r: &[f64], work: &mut Work<P, D>) {
         let phase = &mut work.phase;
         work.laws.iter_mut().for_each(|law| law.smoothing = 0.0);
         let merit = merit_at(&self.0.function, &work.laws, &work.unit, work.scale, &work.u, r);

@@ -27,7 +27,7 @@ use super::MEMORY;
 use super::convex::Convex;
 use super::inner::{Conic, Effort};
 use super::sets::Set;
-use crate::contact::form::{Access, Explicit, Linearised, OnContacts};
+use crate::contact::form::{Access, Explicit, Frictional, Linearised, OnContacts};
 use crate::contact::law::cone;
 use crate::contact::parts::{Accelerator, ConvexIp, Shape};
 use crate::core::ranges::{at_least, at_most, below, up_to};
@@ -131,7 +131,7 @@ impl Described for Cadoux {
 }
 
 /// The speeds s with their image F(s), and the memory of each inner solver, made when first used.
-pub struct CadouxWork<P: Linearised<D> + Explicit<D>, const D: usize> {
+pub struct CadouxWork<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> {
     convex: Convex<P, D>,
     conic: Option<Conic<D>>,
     interior: ConvexIp<D>,
@@ -162,7 +162,9 @@ struct Trial {
     wait: usize,
 }
 
-impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for OnContacts<Cadoux, D> {
+impl<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> Solver<P>
+    for OnContacts<Cadoux, D>
+{
     type Work = CadouxWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
@@ -235,7 +237,7 @@ impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for OnContacts<Ca
     }
 }
 
-impl<P: Linearised<D> + Explicit<D>, const D: usize> CadouxWork<P, D> {
+impl<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> CadouxWork<P, D> {
     /// The convex problem with the present speeds.
     fn solve(&mut self, problem: &P, r: &mut [f64], settings: &Cadoux) -> Result<(), &'static str> {
         let convex = &mut self.convex;

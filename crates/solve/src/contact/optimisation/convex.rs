@@ -15,7 +15,7 @@ use nonsmooth_linalg::{Block, budget, small};
 
 use super::sets::Set;
 use crate::SolveError;
-use crate::contact::form::{Access, Linear, Linearised};
+use crate::contact::form::{Access, Frictional, Linear, Linearised};
 use crate::contact::law::cfun::natural_residual;
 use crate::contact::law::cone;
 use crate::contact::law::cone::ConvexSet;
@@ -32,7 +32,7 @@ const RESCUE: usize = 10;
 const RHO: f64 = 10.0;
 
 /// A convex subproblem and the memory of its solvers.
-pub(super) struct Convex<P: Linear<D>, const D: usize> {
+pub(super) struct Convex<P: Linear<D> + Frictional<D>, const D: usize> {
     pub(super) state: P::State,
     /// `w_c`, positive.
     pub(super) unit: Vec<f64>,
@@ -59,7 +59,7 @@ struct Newton<const D: usize> {
     phi: Vec<f64>,
 }
 
-impl<P: Linear<D>, const D: usize> Convex<P, D> {
+impl<P: Linear<D> + Frictional<D>, const D: usize> Convex<P, D> {
     pub(super) fn new(problem: &P, access: Access) -> Result<Self, SolveError> {
         let n = problem.mu().len();
         let m = D * n;
@@ -227,7 +227,7 @@ impl<P: Linear<D>, const D: usize> Convex<P, D> {
     }
 }
 
-impl<P: Linearised<D>, const D: usize> Convex<P, D> {
+impl<P: Linearised<D> + Frictional<D>, const D: usize> Convex<P, D> {
     /// Semismooth Newton from `r` (whose `y` is known) until the residual is at most `tolerance`, at most `most` factorisations.
     /// `y` belongs to the new `r`. Returns the residual.
     pub(super) fn newton(
@@ -424,7 +424,7 @@ mod tests {
     }
 
     /// The speeds that the convex problem with the speeds `s` answers with, and its solution.
-    fn answer<P: Linearised<3> + Explicit<3>>(
+    fn answer<P: Linearised<3> + Frictional<3> + Explicit<3>>(
         problem: &P,
         convex: &mut Convex<P, 3>,
         s: &[f64],

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::convex::Convex;
 use crate::SolveError;
-use crate::contact::form::{Access, Explicit, Linearised};
+use crate::contact::form::{Access, Explicit, Frictional, Linearised};
 use crate::contact::parts::{Clarabel, Ended, Shape};
 
 /// The solvers of a convex problem over cylinders.
@@ -48,7 +48,7 @@ pub(super) struct Conic<const D: usize> {
 }
 
 impl<const D: usize> Conic<D> {
-    pub(super) fn new<P: Explicit<D>>(
+    pub(super) fn new<P: Explicit<D> + Frictional<D>>(
         problem: &P,
         convex: &Convex<P, D>,
         shape: Shape,
@@ -63,7 +63,7 @@ impl<const D: usize> Conic<D> {
         })
     }
 
-    pub(super) fn refill<P: Explicit<D>>(
+    pub(super) fn refill<P: Explicit<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         convex: &Convex<P, D>,
@@ -79,7 +79,7 @@ impl<const D: usize> Conic<D> {
     }
 
     /// Solves, polishes, and leaves `convex.y` at the new `r`; the residual reached.
-    pub(super) fn solve<P: Linearised<D> + Explicit<D>>(
+    pub(super) fn solve<P: Linearised<D> + Frictional<D> + Explicit<D>>(
         &mut self,
         problem: &P,
         convex: &mut Convex<P, D>,
@@ -118,12 +118,12 @@ impl<const D: usize> Conic<D> {
 }
 
 /// A convex subproblem over cylinders (or halves of them) with the solver chosen.
-pub(super) struct Cylinders<P: Linearised<D> + Explicit<D>, const D: usize> {
+pub(super) struct Cylinders<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> {
     pub(super) convex: Convex<P, D>,
     conic: Option<Conic<D>>,
 }
 
-impl<P: Linearised<D> + Explicit<D>, const D: usize> Cylinders<P, D> {
+impl<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> Cylinders<P, D> {
     pub(super) fn new(problem: &P, choice: CylinderSolver) -> Result<Self, SolveError> {
         let access = match choice {
             CylinderSolver::ProjectedGradient => Access::Products,

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use super::convex::Convex;
 use super::sets::Set;
-use crate::contact::form::{Access, Blockwise, Linearised, OnContacts};
+use crate::contact::form::{Access, Blockwise, Frictional, Linearised, OnContacts};
 use crate::contact::law::cone::ConvexSet;
 use crate::core::ranges::{at_least, below};
 use crate::core::register::{About, Described, Solves};
@@ -79,7 +79,7 @@ impl Described for Panagiotopoulos {
 }
 
 /// The convex module that both halves share, and the step lengths of a visit.
-pub struct AlternationWork<P: Blockwise<D> + Linearised<D>, const D: usize> {
+pub struct AlternationWork<P: Blockwise<D> + Frictional<D> + Linearised<D>, const D: usize> {
     convex: Convex<P, D>,
     /// Step lengths of a visit: 1/W_NN, and 1 over the largest eigenvalue of W_TT; 0 where they are not positive.
     lengths: Vec<[f64; 2]>,
@@ -92,7 +92,9 @@ enum Half {
     Tangential,
 }
 
-impl<P: Blockwise<D> + Linearised<D>, const D: usize> Solver<P> for OnContacts<Panagiotopoulos, D> {
+impl<P: Blockwise<D> + Frictional<D> + Linearised<D>, const D: usize> Solver<P>
+    for OnContacts<Panagiotopoulos, D>
+{
     type Work = AlternationWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
@@ -153,7 +155,7 @@ impl<P: Blockwise<D> + Linearised<D>, const D: usize> Solver<P> for OnContacts<P
     }
 }
 
-impl<P: Blockwise<D> + Linearised<D>, const D: usize> AlternationWork<P, D> {
+impl<P: Blockwise<D> + Frictional<D> + Linearised<D>, const D: usize> AlternationWork<P, D> {
     fn fill(&mut self, problem: &P) {
         let inverse = |x: f64| if x > 0.0 { 1.0 / x } else { 0.0 };
         self.lengths.clear();

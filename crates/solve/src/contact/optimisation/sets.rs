@@ -1,6 +1,7 @@
 //! The convex sets of the subproblems, one factor a contact.
 
-use crate::contact::law::cone::{ConvexSet, Coulomb, Cylinder};
+use crate::contact::law::Coulomb;
+use crate::contact::law::cone::{ConvexSet, Cylinder};
 
 /// The set that a contact's impulse lies in.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use super::MEMORY;
 use super::inner::{CylinderSolver, Cylinders, Effort};
 use super::sets::Set;
-use crate::contact::form::{Explicit, Linearised, OnContacts};
+use crate::contact::form::{Explicit, Frictional, Linearised, OnContacts};
 use crate::contact::parts::Accelerator;
 use crate::core::ranges::{at_least, at_most, below, up_to};
 use crate::core::register::{About, Described, Solves};
@@ -78,7 +78,7 @@ impl Described for Tresca {
 }
 
 /// The cylinders' convex solver, the thresholds θ, and the impulses' image of them.
-pub struct TrescaWork<P: Linearised<D> + Explicit<D>, const D: usize> {
+pub struct TrescaWork<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> {
     inner: Cylinders<P, D>,
     theta: Vec<f64>,
     /// The thresholds that follow from the impulses.
@@ -87,7 +87,9 @@ pub struct TrescaWork<P: Linearised<D> + Explicit<D>, const D: usize> {
     error: f64,
 }
 
-impl<P: Linearised<D> + Explicit<D>, const D: usize> Solver<P> for OnContacts<Tresca, D> {
+impl<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> Solver<P>
+    for OnContacts<Tresca, D>
+{
     type Work = TrescaWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {

@@ -34,7 +34,7 @@
 use nonsmooth_linalg::{Block, Singular, norm_of, small};
 
 use super::nt::{Inner, Pair, Scaling, Shape};
-use crate::contact::form::Linearised;
+use crate::contact::form::{Frictional, Linearised};
 use crate::contact::law::cfun::natural_map;
 use crate::contact::law::cone::tangential_norm;
 
@@ -98,7 +98,7 @@ impl<const D: usize> Central<D> {
     /// Begins with Coulomb's law. `smoothing` κ ≥ 0 makes `s = √(‖z_T‖² + (κτ)²)`.
     ///
     /// `start`: impulses to begin near, kept `margin` inside the cones; else `x = z = e`.
-    pub fn begin<P: Linearised<D>>(
+    pub fn begin<P: Linearised<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -113,7 +113,7 @@ impl<const D: usize> Central<D> {
     }
 
     /// Begins with the convex problem for the given `s` (a velocity for each contact); `start` as above.
-    pub fn begin_convex<P: Linearised<D>>(
+    pub fn begin_convex<P: Linearised<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -127,7 +127,7 @@ impl<const D: usize> Central<D> {
         self.enter(problem, state, start)
     }
 
-    fn enter<P: Linearised<D>>(
+    fn enter<P: Linearised<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -205,7 +205,7 @@ impl<const D: usize> Central<D> {
     }
 
     /// Makes r and u those of the best iterate. To go on, begin again.
-    pub fn restore<P: Linearised<D>>(&mut self, problem: &P, state: &mut P::State) {
+    pub fn restore<P: Linearised<D> + Frictional<D>>(&mut self, problem: &P, state: &mut P::State) {
         self.r.copy_from_slice(&self.best);
         problem.velocities(state, &self.r, &mut self.u);
     }
@@ -216,7 +216,7 @@ impl<const D: usize> Central<D> {
     }
 
     /// One predictor–corrector iteration. `Err`: the matrix is numerically singular; the iterate has not moved.
-    pub fn iterate<P: Linearised<D>>(
+    pub fn iterate<P: Linearised<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -275,7 +275,7 @@ impl<const D: usize> Central<D> {
     }
 
     /// Factorises the matrix of the Newton step at the present iterate.
-    pub(in crate::contact) fn factorise<P: Linearised<D>>(
+    pub(in crate::contact) fn factorise<P: Linearised<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -305,7 +305,7 @@ impl<const D: usize> Central<D> {
     }
 
     /// `dx` and `dz` for the present d, with ρ weighted.
-    pub(in crate::contact) fn newton<P: Linearised<D>>(
+    pub(in crate::contact) fn newton<P: Linearised<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -377,7 +377,7 @@ impl<const D: usize> Central<D> {
     }
 
     /// Everything that follows from x and z.
-    pub(in crate::contact) fn look<P: Linearised<D>>(
+    pub(in crate::contact) fn look<P: Linearised<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,

@@ -332,7 +332,7 @@ mod tests {
     use nonsmooth_problem::planted::Planted;
 
     use super::*;
-    use crate::contact::form::{Access, Contacts, Explicit};
+    use crate::contact::form::{Access, Contacts, Explicit, Frictional};
     use crate::contact::law::cone;
 
     fn cases() -> impl Iterator<Item = Planted> {
@@ -349,7 +349,11 @@ mod tests {
     }
 
     /// `q + mu‖u_T*‖e_N` with the planted velocities makes the planted impulses the convex problem's solution.
-    fn finds_planted<const D: usize, P: Explicit<D>>(problem: &P, planted: &[f64], at: &str) {
+    fn finds_planted<const D: usize, P: Explicit<D> + Frictional<D>>(
+        problem: &P,
+        planted: &[f64],
+        at: &str,
+    ) {
         let mut state = problem.state(Access::Products).unwrap();
         let m = planted.len();
         let (mut q, mut u, mut r) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);

@@ -10,7 +10,7 @@
 use nonsmooth_linalg::Singular;
 
 use super::central::{Central, Iterate};
-use crate::contact::form::Linearised;
+use crate::contact::form::{Frictional, Linearised};
 
 /// A solver of convex problems, with its workspace; a second problem of the same shape allocates nothing.
 ///
@@ -41,7 +41,7 @@ impl<const D: usize> ConvexIp<D> {
     ///
     /// `start`: impulses to begin near, and by how much (in units of the free velocity, say 1e-2) to stay inside the
     /// cones at first; else the start is cold. A good start saves some iterations, not most of them.
-    pub fn begin<P: Linearised<D>>(
+    pub fn begin<P: Linearised<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -52,7 +52,7 @@ impl<const D: usize> ConvexIp<D> {
     }
 
     /// One iteration. `Err`: the matrix is numerically singular, the iterate has not moved.
-    pub fn iterate<P: Linearised<D>>(
+    pub fn iterate<P: Linearised<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -61,7 +61,7 @@ impl<const D: usize> ConvexIp<D> {
     }
 
     /// Iterates until the error is at most `tolerance`, at most `most` times, and not on where it has stalled.
-    pub fn solve<P: Linearised<D>>(
+    pub fn solve<P: Linearised<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -130,7 +130,7 @@ mod tests {
     }
 
     /// The sliding speeds of a planted point, which make its convex problem Coulomb's.
-    fn speeds<P: Linear<D>, const D: usize>(
+    fn speeds<P: Linear<D> + Frictional<D>, const D: usize>(
         problem: &P,
         state: &mut P::State,
         r: &[f64],
@@ -141,7 +141,11 @@ mod tests {
         (u, s)
     }
 
-    fn reaches<P: Linearised<D>, const D: usize>(problem: &P, r: &[f64], what: &str) {
+    fn reaches<P: Linearised<D> + Frictional<D>, const D: usize>(
+        problem: &P,
+        r: &[f64],
+        what: &str,
+    ) {
         let mut state = problem.state(Access::Newton).unwrap();
         let (planted, s) = speeds::<P, D>(problem, &mut state, r);
         let mut ip = ConvexIp::<D>::new();

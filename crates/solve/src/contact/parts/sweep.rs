@@ -8,7 +8,8 @@
 
 use nonsmooth_linalg::{norm, small};
 
-use crate::contact::form::{Blockwise, Contacts};
+use crate::contact::form::{Blockwise, Contacts, Frictional};
+use crate::contact::law::Coulomb;
 use crate::contact::law::cfun::natural_residual;
 use crate::contact::law::local::{Exact, LocalSolver, frictionless};
 
@@ -29,24 +30,24 @@ struct Visited<const D: usize> {
 
 impl<const D: usize> Sweep<D> {
     /// Sweeps over `problem`'s contacts.
-    pub fn new<P: Contacts<D>>(problem: &P, state: &P::State) -> Self {
+    pub fn new<P: Contacts<D> + Frictional<D>>(problem: &P, state: &P::State) -> Self {
         let mut sweep = Self { contacts: Vec::with_capacity(problem.mu().len()) };
         sweep.fill(problem, state);
         sweep
     }
 
     /// Takes another problem; allocates nothing where the number of contacts is the same.
-    pub fn fill<P: Contacts<D>>(&mut self, problem: &P, state: &P::State) {
+    pub fn fill<P: Contacts<D> + Frictional<D>>(&mut self, problem: &P, state: &P::State) {
         self.contacts.clear();
         for (c, &mu) in problem.mu().iter().enumerate() {
             let w = problem.diagonal_block(state, c);
             let unit = small::mean_diagonal(&w).abs();
-            self.contacts.push(Visited { w, mu, unit, memo: Exact.prepare(&w, mu) });
+            self.contacts.push(Visited { w, mu, unit, memo: Exact.prepare(&w, Coulomb { mu }) });
         }
     }
 
     /// One sweep on `r`, which `state` must know already (`enter`); returns `Σ (w_c‖Δr_c‖)²`, `w_c = tr(W_cc)/D`.
-    pub fn sweep<P: Blockwise<D>>(
+    pub fn sweep<P: Blockwise<D> + Frictional<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -61,7 +62,7 @@ impl<const D: usize> Sweep<D> {
                 q[k] -= own[k];
             }
             let new = if contact.mu > 0.0 {
-                Exact.solve(&mut contact.memo, &contact.w, &q, contact.mu, &old)
+                Exact.solve(&mut contact.memo, &contact.w, &q, Coulomb { mu: contact.mu }, &old)
             } else {
                 frictionless(&contact.w, &q, &old)
             };
@@ -106,7 +107,7 @@ mod tests {
     /// Sweeps until they no longer move; the distance to the planted solution.
     fn distance<const D: usize, P>(problem: &P, known: &[f64]) -> f64
     where
-        P: Blockwise<D> + Problem,
+        P: Blockwise<D> + Frictional<D> + Problem,
     {
         let mut point = problem.origin();
         let mut state = problem.state(Access::Visits).unwrap();

@@ -4,7 +4,8 @@ use nonsmooth_linalg::small;
 
 use crate::SolveError;
 use crate::contact::form::{Access, Linear};
-use crate::contact::law::cone;
+use crate::contact::law::ContactLaw;
+use crate::contact::law::cone::ConvexSet;
 
 /// Enough for a step length; the power method's estimate is from below by a few percent.
 const POWER_STEPS: usize = 20;
@@ -25,7 +26,7 @@ pub struct Field<P: Linear<D>, const D: usize> {
 
 impl<P: Linear<D>, const D: usize> Field<P, D> {
     pub(super) fn new(problem: &P) -> Result<Self, SolveError> {
-        let m = D * problem.mu().len();
+        let m = D * problem.contacts();
         let mut field = Self {
             state: problem.state(Access::Products)?,
             unit: Vec::with_capacity(m / D),
@@ -41,7 +42,7 @@ impl<P: Linear<D>, const D: usize> Field<P, D> {
 
     pub(super) fn refill(&mut self, problem: &P) -> Result<(), SolveError> {
         problem.refill(&mut self.state)?;
-        let m = D * problem.mu().len();
+        let m = D * problem.contacts();
         for x in [&mut self.f, &mut self.trial_f, &mut self.trial] {
             x.resize(m, 0.0);
         }
@@ -52,7 +53,7 @@ impl<P: Linear<D>, const D: usize> Field<P, D> {
     fn fill(&mut self, problem: &P) {
         self.scale = problem.velocity_scale(&self.state);
         self.unit.clear();
-        let (state, n) = (&self.state, problem.mu().len());
+        let (state, n) = (&self.state, problem.contacts());
         self.unit.extend((0..n).map(|c| small::mean_diagonal(&problem.diagonal_block(state, c))));
         let mean = self.unit.iter().sum::<f64>() / n as f64;
         for w in &mut self.unit {
@@ -66,9 +67,9 @@ impl<P: Linear<D>, const D: usize> Field<P, D> {
     /// `f = F(r)`.
     pub(super) fn evaluate(state: &mut P::State, problem: &P, r: &[f64], f: &mut [f64]) {
         problem.velocities(state, r, f);
-        for (c, &mu) in problem.mu().iter().enumerate() {
+        for c in 0..problem.contacts() {
             let u: [f64; D] = small::block(f, c);
-            f[D * c] += mu * cone::tangential_norm(&u);
+            f[D * c] += problem.law(c).shift(&u);
         }
     }
 
@@ -80,12 +81,12 @@ impl<P: Linear<D>, const D: usize> Field<P, D> {
     /// As [`project`](Self::project), with another step length.
     pub(super) fn project_by(&mut self, rho: f64, problem: &P, r: &[f64], at_trial: bool) {
         let f = if at_trial { &self.trial_f } else { &self.f };
-        for (c, (&mu, &w)) in problem.mu().iter().zip(&self.unit).enumerate() {
+        for (c, &w) in self.unit.iter().enumerate() {
             let mut x: [f64; D] = small::block(r, c);
             for k in 0..D {
                 x[k] -= rho / w * f[D * c + k];
             }
-            let p = cone::project(&x, mu);
+            let p = problem.law(c).project(&x);
             self.trial[D * c..D * c + D].copy_from_slice(&p);
         }
     }

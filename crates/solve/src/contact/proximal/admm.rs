@@ -25,7 +25,7 @@ use nonsmooth_linalg::{Block, small};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::form::{Access, Linearised, OnContacts};
+use crate::contact::form::{Access, Frictional, Linearised, OnContacts};
 use crate::contact::law::cone;
 use crate::contact::parts::Accelerator;
 use crate::core::ranges::{at_least, at_most, nonnegative};
@@ -111,7 +111,7 @@ impl Described for Admm {
 }
 
 /// The workspace: the problem's view with its factorisation, and the iterate.
-pub struct StepsWork<P: Linearised<D>, const D: usize> {
+pub struct StepsWork<P: Linearised<D> + Frictional<D>, const D: usize> {
     state: P::State,
     /// `w_c`, positive.
     unit: Vec<f64>,
@@ -139,7 +139,7 @@ const POWER_STEPS: usize = 15;
 /// Residuals whose ratio is below this are balanced.
 const BALANCED: f64 = 5.0;
 
-impl<P: Linearised<D>, const D: usize> Solver<P> for OnContacts<Admm, D> {
+impl<P: Linearised<D> + Frictional<D>, const D: usize> Solver<P> for OnContacts<Admm, D> {
     type Work = StepsWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
@@ -256,7 +256,7 @@ impl<P: Linearised<D>, const D: usize> Solver<P> for OnContacts<Admm, D> {
     }
 }
 
-impl<P: Linearised<D>, const D: usize> StepsWork<P, D> {
+impl<P: Linearised<D> + Frictional<D>, const D: usize> StepsWork<P, D> {
     fn fill(&mut self, problem: &P) {
         let n = problem.mu().len();
         self.scale = problem.velocity_scale(&self.state);

@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Boxed;
-use crate::contact::form::{Access, Linear, Overwrite, Regularised};
+use crate::contact::form::{Access, Frictional, Linear, Overwrite, Regularised};
 use crate::contact::law::cfun::natural_residual;
 use crate::core::ranges::{at_least, below, positive};
 use crate::core::register::{Composed, Registered};
@@ -88,7 +88,7 @@ pub struct Proximal<const D: usize>;
 
 impl<P, const D: usize> Composed<P> for Proximal<D>
 where
-    P: Linear<D> + Overwrite + Send + 'static,
+    P: Linear<D> + Frictional<D> + Overwrite + Send + 'static,
     Regularised<P>: Registered<Point = P::Point> + Linear<D>,
 {
     type To = Regularised<P>;
@@ -127,7 +127,7 @@ pub struct Outer<S, const D: usize> {
 }
 
 /// The inner problem with its workspace and point, and what the outer loop measures with.
-pub struct OuterWork<P: Linear<D>, S: Solver<Regularised<P>>, const D: usize> {
+pub struct OuterWork<P: Linear<D> + Frictional<D>, S: Solver<Regularised<P>>, const D: usize> {
     problem: Regularised<P>,
     work: S::Work,
     point: P::Point,
@@ -152,7 +152,7 @@ const FAILURES_MOST: usize = 20;
 
 impl<P, S, const D: usize> Solver<P> for Outer<S, D>
 where
-    P: Linear<D> + Overwrite + Send,
+    P: Linear<D> + Frictional<D> + Overwrite + Send,
     S: Solver<Regularised<P>>,
 {
     type Work = OuterWork<P, S, D>;
@@ -259,7 +259,7 @@ impl<S, const D: usize> Outer<S, D> {
     /// Begins an inner problem around the present point: another problem, which the inner solver must be told of.
     fn begin<P>(&self, work: &mut OuterWork<P, S, D>) -> Result<(), SolveError>
     where
-        P: Linear<D>,
+        P: Linear<D> + Frictional<D>,
         S: Solver<Regularised<P>>,
     {
         (work.steps, work.since) = (0, 0);
@@ -282,7 +282,7 @@ impl<S, const D: usize> Outer<S, D> {
     }
 }
 
-impl<P: Linear<D>, S: Solver<Regularised<P>>, const D: usize> OuterWork<P, S, D> {
+impl<P: Linear<D> + Frictional<D>, S: Solver<Regularised<P>>, const D: usize> OuterWork<P, S, D> {
     fn weigh(&mut self, alpha: f64) {
         self.alpha = alpha;
         self.problem.weight.clear();
@@ -311,7 +311,11 @@ impl<P: Linear<D>, S: Solver<Regularised<P>>, const D: usize> OuterWork<P, S, D>
 }
 
 /// `w_c`, positive.
-fn units<P: Linear<D>, const D: usize>(problem: &P, state: &P::State, unit: &mut Vec<f64>) {
+fn units<P: Linear<D> + Frictional<D>, const D: usize>(
+    problem: &P,
+    state: &P::State,
+    unit: &mut Vec<f64>,
+) {
     let n = problem.mu().len();
     unit.clear();
     unit.extend((0..n).map(|c| small::mean_diagonal(&problem.diagonal_block(state, c))));

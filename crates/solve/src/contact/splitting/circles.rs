@@ -4,8 +4,10 @@
 //! [`WINDOW`] sweeps bring no progress at all. Where contacts without friction run away instead, the direction in which they run is offered to the judge as
 //! a certificate of infeasibility.
 
-use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::{Certificate, Impulses};
+
+use crate::contact::form::Contacts;
+use crate::contact::law::ContactLaw;
 
 /// The relaxation of the present sweep, lowered where the sweeps go in circles.
 ///
@@ -53,10 +55,9 @@ impl Circles {
 
     /// Takes a sweep's result and its move. `unit(c)` turns impulses of contact c into velocities. A certificate that there is no
     /// solution, verified, where the impulses run away along one.
-    pub(super) fn observe<P: Problem, const D: usize>(
+    pub(super) fn observe<P: Contacts<D>, const D: usize>(
         &mut self,
         problem: &P,
-        mu: &[f64],
         unit: impl Fn(usize) -> f64,
         r: &[f64],
         estimate: f64,
@@ -73,7 +74,7 @@ impl Circles {
         }
         let [first, second] = &self.marks;
         if alignment::<D>(unit, first, second, r) >= ALIGNED {
-            return runaway::<D>(mu, second, r)
+            return runaway(problem, second, r)
                 .map(Certificate::from)
                 .filter(|ray| problem.evidence(ray).holds());
         }
@@ -107,15 +108,20 @@ fn alignment<const D: usize>(
 
 /// The last move of the contacts without friction as a ray: where no motion is admissible, their impulses grow along one
 /// for ever, while all others have settled. A candidate that the judge must verify.
-fn runaway<const D: usize>(mu: &[f64], before: &[f64], r: &[f64]) -> Option<Impulses> {
-    if !mu.contains(&0.0) {
+fn runaway<P: Contacts<D>, const D: usize>(
+    problem: &P,
+    before: &[f64],
+    r: &[f64],
+) -> Option<Impulses> {
+    let nc = problem.contacts();
+    if !(0..nc).any(|c| problem.law(c).is_frictionless()) {
         return None;
     }
     let largest = before.iter().zip(r).fold(0.0_f64, |m, (b, r)| m.max((r - b).abs()));
     let mut ray = vec![0.0; r.len()];
-    for (c, &mu) in mu.iter().enumerate() {
+    for c in 0..nc {
         let i = D * c;
-        if mu == 0.0 {
+        if problem.law(c).is_frictionless() {
             ray[i] = ((r[i] - before[i]) / largest).max(0.0);
         } else if (i..i + D).any(|i| (r[i] - before[i]).abs() > 1e-12 * largest) {
             return None;

@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 use super::circles::Circles;
 use super::contact::{Answer, Contact, NEGLIGIBLE};
 use super::nsgs::{LocalChoice, with_local};
-use crate::contact::form::{Access, Concurrent};
+use crate::contact::form::{Access, Concurrent, Frictional};
 use crate::contact::law::local::LocalSolver;
 use crate::contact::splitting::coloring::Coloring;
 use crate::contact::splitting::team::Team;
@@ -99,7 +99,9 @@ pub struct ColoredSweeps<L, const D: usize> {
 
 impl Colored {
     /// The method with its local solver known by type.
-    pub(crate) fn boxed<P: Concurrent<D> + 'static, const D: usize>(self) -> Boxed<P> {
+    pub(crate) fn boxed<P: Concurrent<D> + Frictional<D> + 'static, const D: usize>(
+        self,
+    ) -> Boxed<P> {
         with_local!(self.local, local => Boxed::new(ColoredSweeps { settings: self, local }))
     }
 }
@@ -108,23 +110,23 @@ impl Colored {
 const PARTS: usize = 2;
 
 /// The workspace: the problem's view, the colours, and the contacts of each colour in parts.
-pub struct ColoredWork<P: Concurrent<D>, L: LocalSolver<D>, const D: usize> {
+pub struct ColoredWork<P: Concurrent<D>, L: LocalSolver<D, P::Law>, const D: usize> {
     state: P::State,
     team: Team,
     coloring: Coloring,
     /// The colours worth the team's while.
     shared: usize,
-    parts: Vec<Mutex<Part<L::Memo, D>>>,
+    parts: Vec<Mutex<Part<L::Memo, P::Law, D>>>,
     /// The contacts of the other colours.
-    rest: Vec<(usize, Contact<L::Memo, D>)>,
+    rest: Vec<(usize, Contact<L::Memo, P::Law, D>)>,
     units: Vec<f64>,
     circles: Circles,
     by_color: Vec<Vec<u32>>,
 }
 
 /// A part of every colour's contacts, and the answers to the present colour's visits.
-struct Part<Memo, const D: usize> {
-    contacts: Vec<(usize, Contact<Memo, D>)>,
+struct Part<Memo, Law, const D: usize> {
+    contacts: Vec<(usize, Contact<Memo, Law, D>)>,
     /// Where each shared colour's contacts begin; one more at the end.
     starts: Vec<usize>,
     answers: Vec<(usize, Answer<D>)>,
@@ -158,7 +160,7 @@ impl Moves {
 impl<const D: usize, P, L> Solver<P> for ColoredSweeps<L, D>
 where
     P: Concurrent<D>,
-    L: LocalSolver<D>,
+    L: LocalSolver<D, P::Law>,
 {
     type Work = ColoredWork<P, L, D>;
 
@@ -210,7 +212,7 @@ where
         }
         let estimate = moves.sum.sqrt();
         let unit = |c: usize| work.units[c];
-        match work.circles.observe::<P, D>(problem, problem.mu(), unit, r, estimate) {
+        match work.circles.observe(problem, unit, r, estimate) {
             Some(ray) => Step::NoSolution(ray),
             None => Step::Continue { estimate },
         }
@@ -237,7 +239,7 @@ impl<L, const D: usize> ColoredSweeps<L, D> {
     ) -> Moves
     where
         P: Concurrent<D>,
-        L: LocalSolver<D>,
+        L: LocalSolver<D, P::Law>,
     {
         let ColoredWork { state, team, shared, parts, .. } = work;
         if *shared == 0 {
@@ -274,9 +276,9 @@ impl<L, const D: usize> ColoredSweeps<L, D> {
     fn fill<P>(&self, problem: &P, work: &mut ColoredWork<P, L, D>)
     where
         P: Concurrent<D>,
-        L: LocalSolver<D>,
+        L: LocalSolver<D, P::Law>,
     {
-        let n = problem.mu().len();
+        let n = problem.contacts();
         let ColoredWork { state, coloring, parts, rest, units, by_color, .. } = work;
         let scale = problem.velocity_scale(state);
         coloring.fill(problem, state);
@@ -299,7 +301,7 @@ impl<L, const D: usize> ColoredSweeps<L, D> {
         let mut made = |c: u32| {
             let c = c as usize;
             let w = problem.diagonal_block(state, c);
-            let contact = Contact::new(&self.local, w, problem.mu()[c], scale);
+            let contact = Contact::new(&self.local, w, problem.law(c), scale);
             units[c] = contact.unit;
             (c, contact)
         };
@@ -344,7 +346,10 @@ mod tests {
         Planted { contacts: 60, dofs: 400, seed: 2, ..Planted::default() }
     }
 
-    fn solved<P: Concurrent<D>, const D: usize>(problem: &P, solver: impl Solver<P>) -> Vec<f64> {
+    fn solved<P: Concurrent<D> + Frictional<D>, const D: usize>(
+        problem: &P,
+        solver: impl Solver<P>,
+    ) -> Vec<f64> {
         let mut driver = Driver::new(solver);
         let mut point = problem.origin();
         let limits = Limits { tolerance: 1e-12, max_iterations: 20_000, ..Limits::default() };
@@ -359,7 +364,7 @@ mod tests {
     }
 
     /// The impulses after a few sweeps, as bits.
-    fn bits<P: Concurrent<D>, const D: usize>(
+    fn bits<P: Concurrent<D> + Frictional<D>, const D: usize>(
         problem: &P,
         threads: usize,
         below: usize,

@@ -30,7 +30,7 @@ impl Coloring {
         self.readers.iter_mut().for_each(Vec::clear);
         self.writers.iter_mut().for_each(Vec::clear);
         self.barred.clear();
-        for c in 0..problem.mu().len() {
+        for c in 0..problem.contacts() {
             self.reads.clear();
             self.writes.clear();
             problem.places(state, c, &mut self.reads, &mut self.writes);
@@ -91,7 +91,7 @@ mod tests {
     fn checked<P: Concurrent<D>, const D: usize>(problem: &P, coloring: &mut Coloring) {
         let mut state = problem.state(Access::Visits).unwrap();
         coloring.fill(problem, &state);
-        let n = problem.mu().len();
+        let n = problem.contacts();
         let (mut reads, mut writes) = (vec![vec![]; n], vec![vec![]; n]);
         for c in 0..n {
             problem.places(&state, c, &mut reads[c], &mut writes[c]);

@@ -2,13 +2,13 @@
 
 use nonsmooth_linalg::small;
 
-use crate::contact::law::cone;
+use crate::contact::law::ContactLaw;
 use crate::contact::law::local::{LocalSolver, frictionless};
 
 /// What the sweeps keep of a contact.
-pub(super) struct Contact<Memo, const D: usize> {
+pub(super) struct Contact<Memo, Law, const D: usize> {
     w: [[f64; D]; D],
-    mu: f64,
+    law: Law,
     /// `tr(W_cc)/D` over ‖q‖: turns an impulse into a relative velocity.
     pub(super) unit: f64,
     /// Visits in a row with hardly a move; beyond `freeze_after` it counts sweeps slept.
@@ -28,13 +28,13 @@ pub(super) struct Answer<const D: usize> {
 /// as subnormal numbers, which are slow.
 pub(super) const NEGLIGIBLE: f64 = 1e-80;
 
-impl<Memo, const D: usize> Contact<Memo, D> {
-    pub(super) fn new<L>(local: &L, w: [[f64; D]; D], mu: f64, scale: f64) -> Self
+impl<Memo, Law: ContactLaw<D>, const D: usize> Contact<Memo, Law, D> {
+    pub(super) fn new<L>(local: &L, w: [[f64; D]; D], law: Law, scale: f64) -> Self
     where
-        L: LocalSolver<D, Memo = Memo>,
+        L: LocalSolver<D, Law, Memo = Memo>,
     {
         let unit = small::mean_diagonal(&w).abs() / scale;
-        Self { memo: local.prepare(&w, mu), w, mu, unit, settled: 0 }
+        Self { memo: local.prepare(&w, law), w, law, unit, settled: 0 }
     }
 
     /// The answer to the velocity `u` with the present impulse `old`, relaxed by ω.
@@ -47,24 +47,24 @@ impl<Memo, const D: usize> Contact<Memo, D> {
         omega: f64,
     ) -> Answer<D>
     where
-        L: LocalSolver<D, Memo = Memo>,
+        L: LocalSolver<D, Law, Memo = Memo>,
     {
         let own = small::mul(&self.w, old);
         let mut q = *u;
         for k in 0..D {
             q[k] -= own[k];
         }
-        let mut new = if self.mu > 0.0 {
-            local.solve(&mut self.memo, &self.w, &q, self.mu, old)
-        } else {
+        let mut new = if self.law.is_frictionless() {
             frictionless(&self.w, &q, old)
+        } else {
+            local.solve(&mut self.memo, &self.w, &q, self.law, old)
         };
         if omega != 1.0 {
             for k in 0..D {
                 new[k] = (1.0 - omega) * old[k] + omega * new[k];
             }
             if omega > 1.0 {
-                new = cone::project(&new, self.mu);
+                new = self.law.project(&new);
             }
         }
         let mut dr = new;

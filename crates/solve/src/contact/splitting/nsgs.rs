@@ -23,8 +23,8 @@ use nonsmooth_linalg::small;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::form::{Access, Blockwise};
-use crate::contact::law::cone;
+use crate::contact::form::{Access, Blockwise, Frictional};
+use crate::contact::law::cone::ConvexSet;
 use crate::contact::law::local::LocalSolver;
 use crate::contact::parts::{Accelerator, put_within_bounds, sweep_rows};
 use crate::contact::splitting::ordering::{Order, Ordering};
@@ -210,17 +210,19 @@ pub(super) use with_local;
 
 impl Nsgs {
     /// The method with its local solver known by type.
-    pub(crate) fn boxed<P: Blockwise<D> + 'static, const D: usize>(self) -> Boxed<P> {
+    pub(crate) fn boxed<P: Blockwise<D> + Frictional<D> + 'static, const D: usize>(
+        self,
+    ) -> Boxed<P> {
         with_local!(self.local, local => Boxed::new(Sweeps { settings: self, local }))
     }
 }
 
 /// The workspace: the problem's view, and what each contact keeps.
-pub struct SweepsWork<P: Blockwise<D>, L: LocalSolver<D>, const D: usize> {
+pub struct SweepsWork<P: Blockwise<D>, L: LocalSolver<D, P::Law>, const D: usize> {
     state: P::State,
     /// The local solver with the tolerance of the present sweep.
     local: L,
-    contacts: Vec<Contact<L::Memo, D>>,
+    contacts: Vec<Contact<L::Memo, P::Law, D>>,
     order: Order,
     /// The mean of `w_c²‖Δr_c‖²/‖q‖²` in the last sweep, the yardstick of freezing and of the local tolerance.
     mean_move: f64,
@@ -233,12 +235,12 @@ pub struct SweepsWork<P: Blockwise<D>, L: LocalSolver<D>, const D: usize> {
 impl<const D: usize, P, L> Solver<P> for Sweeps<L, D>
 where
     P: Blockwise<D>,
-    L: LocalSolver<D> + Clone,
+    L: LocalSolver<D, P::Law> + Clone,
 {
     type Work = SweepsWork<P, L, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
-        let n = problem.mu().len();
+        let n = problem.contacts();
         let mut work = SweepsWork {
             state: problem.state(Access::Rows)?,
             local: self.local.clone(),
@@ -322,15 +324,15 @@ where
         }
         let estimate = moves.sqrt();
         let unit = |c: usize| contacts[c].unit;
-        if let Some(ray) = circles.observe::<P, D>(problem, problem.mu(), unit, r, estimate) {
+        if let Some(ray) = circles.observe(problem, unit, r, estimate) {
             return Step::NoSolution(ray);
         }
         work.since += 1;
         if accelerated && work.since >= self.settings.anderson_every {
             work.since = 0;
             work.accelerator.advance(r, |i| unit(i / D));
-            for (c, &mu) in problem.mu().iter().enumerate() {
-                let inside = cone::project(&small::block::<D>(r, c), mu);
+            for c in 0..problem.contacts() {
+                let inside = problem.law(c).project(&small::block::<D>(r, c));
                 r[D * c..D * c + D].copy_from_slice(&inside);
             }
             problem.enter(state, point);
@@ -351,17 +353,17 @@ impl<L, const D: usize> Sweeps<L, D> {
     fn fill<P>(&self, problem: &P, work: &mut SweepsWork<P, L, D>)
     where
         P: Blockwise<D>,
-        L: LocalSolver<D>,
+        L: LocalSolver<D, P::Law>,
     {
-        let n = problem.mu().len();
+        let n = problem.contacts();
         let scale = problem.velocity_scale(&work.state);
         work.order.restart(n, self.settings.seed);
         work.circles.resize(D * n);
         work.accelerator.resize(D * n);
         work.contacts.clear();
-        for (c, &mu) in problem.mu().iter().enumerate() {
+        for c in 0..n {
             let w = problem.diagonal_block(&work.state, c);
-            work.contacts.push(Contact::new(&self.local, w, mu, scale));
+            work.contacts.push(Contact::new(&self.local, w, problem.law(c), scale));
         }
     }
 }

@@ -6,6 +6,7 @@
 //! Source: Acary, lecture (112)–(115), in unscaled coordinates.
 
 use super::ConvexSet;
+use nonsmooth_problem::Coulomb;
 
 /// `‖x_T‖`. No `hypot`: it costs more than all the rest of a projection, and velocities whose squares leave
 /// the range of f64 are the judge's concern.
@@ -90,14 +91,9 @@ pub fn projection_jacobian<const D: usize>(x: &[f64; D], mu: f64) -> [[f64; D]; 
     out
 }
 
-/// The Coulomb cone K as a set.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Coulomb {
-    /// The slope of K: `‖r_T‖ ≤ mu r_N`.
-    pub mu: f64,
-}
-
+/// K.
 impl<const D: usize> ConvexSet<D> for Coulomb {
+    #[inline(always)]
     fn project(&self, x: &[f64; D]) -> [f64; D] {
         project(x, self.mu)
     }

@@ -6,7 +6,7 @@ pub mod jordan;
 mod product;
 mod tresca;
 
-pub use coulomb::{Coulomb, Dual, Region, project, projection_jacobian, region, tangential_norm};
+pub use coulomb::{Dual, Region, project, projection_jacobian, region, tangential_norm};
 pub use disk::Disk;
 pub use product::Product;
 pub use tresca::Cylinder;

@@ -2,6 +2,7 @@
 //! the derivative, and the projections agree with the judge's notion of nearness (the definition).
 
 use super::*;
+use crate::contact::law::Coulomb;
 
 fn points() -> Vec<[f64; 3]> {
     let mut points = vec![[0.0; 3], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.3, -0.4]];

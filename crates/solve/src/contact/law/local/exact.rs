@@ -12,6 +12,7 @@
 //! W may be nonsymmetric. Cost: 30 to 150 flops, 10 to 25 ns; [`Quartic`](super::Quartic), which finds all sliding solutions, takes ten times as long. Source: DBB11, section 4 (the polynomial behind it is in
 //! [`Quartic`](super::Quartic)); JourdanAlartJean1998 for the block Gauss–Seidel that it serves.
 
+use crate::contact::law::Coulomb;
 use nonsmooth_linalg::small::mul;
 
 use super::{LocalSolver, inverse_or_regularised};
@@ -31,7 +32,7 @@ pub struct ExactMemo<const D: usize> {
 impl<const D: usize> LocalSolver<D> for Exact {
     type Memo = ExactMemo<D>;
 
-    fn prepare(&self, w: &[[f64; D]; D], _mu: f64) -> ExactMemo<D> {
+    fn prepare(&self, w: &[[f64; D]; D], _: Coulomb) -> ExactMemo<D> {
         let schur = if D == 3 { Schur::new(w) } else { None };
         ExactMemo { inverse: inverse_or_regularised(w), schur, alpha: 0.0 }
     }
@@ -42,9 +43,10 @@ impl<const D: usize> LocalSolver<D> for Exact {
         memo: &mut ExactMemo<D>,
         w: &[[f64; D]; D],
         q: &[f64; D],
-        mu: f64,
+        law: Coulomb,
         r: &[f64; D],
     ) -> [f64; D] {
+        let Coulomb { mu } = law;
         if q[0] >= 0.0 {
             return [0.0; D];
         }
@@ -259,6 +261,7 @@ mod tests {
     use nonsmooth_problem::{FrictionLocal, LocalPoint};
     use proptest::prelude::*;
 
+    use crate::contact::law::Coulomb;
     use crate::contact::law::cfun::Disk;
     use crate::contact::law::local::{Exact, LocalSolver, Newton, ProjectionIterated, Quartic};
 
@@ -269,8 +272,8 @@ mod tests {
         q: &[f64; D],
         mu: f64,
     ) -> f64 {
-        let mut memo = solver.prepare(w, mu);
-        let r = solver.solve(&mut memo, w, q, mu, &[0.0; D]);
+        let mut memo = solver.prepare(w, Coulomb { mu });
+        let r = solver.solve(&mut memo, w, q, Coulomb { mu }, &[0.0; D]);
         let w = Bsr::from_rows(1, &[vec![(0, *w)]]);
         let problem = FrictionLocal::new(w, q.to_vec(), vec![mu]).unwrap();
         let point = LocalPoint { r: r.to_vec(), lambda: vec![] };
@@ -347,8 +350,8 @@ mod tests {
     #[test]
     fn blocks_that_cannot_move_do_no_harm() {
         for w in [[[0.0; 3]; 3], [[1.0, 0.0, 0.0], [0.0; 3], [0.0; 3]]] {
-            let mut memo = Exact.prepare(&w, 0.5);
-            let r = Exact.solve(&mut memo, &w, &[-1.0, 0.5, 0.0], 0.5, &[0.0; 3]);
+            let mut memo = Exact.prepare(&w, Coulomb { mu: 0.5 });
+            let r = Exact.solve(&mut memo, &w, &[-1.0, 0.5, 0.0], Coulomb { mu: 0.5 }, &[0.0; 3]);
             assert!(r.iter().all(|x| x.is_finite()), "{r:?}");
         }
         assert!(small::inverse(&[[0.0; 3]; 3]).is_none());
@@ -368,9 +371,9 @@ mod tests {
             [-0.9289108501326886, 7.939394965104379, -0.10318262759041308],
             [1.0260699007046814, -0.10318262759041308, 11.182318943370722],
         ];
-        let mut memo = Exact.prepare(&w, 0.5);
+        let mut memo = Exact.prepare(&w, Coulomb { mu: 0.5 });
         let q = [-1e-323, 2.17e-322, -1.53e-322];
-        let r = Exact.solve(&mut memo, &w, &q, 0.5, &[5e-324, 0.0, 0.0]);
+        let r = Exact.solve(&mut memo, &w, &q, Coulomb { mu: 0.5 }, &[5e-324, 0.0, 0.0]);
         assert!(r.iter().all(|x| x.is_finite()), "{r:?}");
     }
 }

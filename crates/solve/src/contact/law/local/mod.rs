@@ -1,7 +1,7 @@
 //! One-contact solvers: given `u = W r + q` with a single D×D block, find r that obeys the law, or come closer.
 //!
 //! Block Gauss–Seidel is generic over them, so the kernel inlines. A frictionless contact (`mu = 0`) has the closed
-//! form [`frictionless`], and a contact in the plane the closed form of [`Exact`]; neither depends on the choice.
+//! form [`frictionless`], and a contact in the plane the closed form of [`Exact`]; neither depends on the choice. The projecting solvers take any law.
 
 mod exact;
 mod newton;
@@ -10,15 +10,15 @@ mod quartic;
 
 use nonsmooth_linalg::small;
 
-use crate::contact::law::cone;
+use crate::contact::law::{ContactLaw, Coulomb};
 
 pub use exact::Exact;
 pub use newton::Newton;
 pub use projection::{Projection, ProjectionIterated};
 pub use quartic::Quartic;
 
-/// A solver of one contact.
-pub trait LocalSolver<const D: usize>: Send + Sync {
+/// A solver of one contact with the law L.
+pub trait LocalSolver<const D: usize, L = Coulomb>: Send + Sync {
     /// What it keeps for one contact between visits.
     type Memo: Send;
 
@@ -26,8 +26,8 @@ pub trait LocalSolver<const D: usize>: Send + Sync {
     /// allows. Ignored by solvers that have nothing to save.
     fn tolerate(&mut self, _velocity: f64) {}
 
-    /// Prepares for the block `w` of a contact with friction `mu > 0`.
-    fn prepare(&self, w: &[[f64; D]; D], mu: f64) -> Self::Memo;
+    /// Prepares for the block `w` of a contact that is not frictionless.
+    fn prepare(&self, w: &[[f64; D]; D], law: L) -> Self::Memo;
 
     /// A new impulse for the contact: `q` is its velocity without its own impulse, `r` its present impulse.
     fn solve(
@@ -35,7 +35,7 @@ pub trait LocalSolver<const D: usize>: Send + Sync {
         memo: &mut Self::Memo,
         w: &[[f64; D]; D],
         q: &[f64; D],
-        mu: f64,
+        law: L,
         r: &[f64; D],
     ) -> [f64; D];
 }
@@ -61,16 +61,16 @@ fn velocity<const D: usize>(w: &[[f64; D]; D], q: &[f64; D], r: &[f64; D]) -> [f
     u
 }
 
-/// `ũ = u + mu‖u_T‖ e_N`.
+/// ũ.
 #[inline(always)]
-fn modified_velocity<const D: usize>(
+fn modified_velocity<L: ContactLaw<D>, const D: usize>(
     w: &[[f64; D]; D],
     q: &[f64; D],
-    mu: f64,
+    law: L,
     r: &[f64; D],
 ) -> [f64; D] {
     let mut u = velocity(w, q, r);
-    u[0] += mu * cone::tangential_norm(&u);
+    u[0] += law.shift(&u);
     u
 }
 

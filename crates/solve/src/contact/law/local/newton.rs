@@ -9,6 +9,7 @@
 use nonsmooth_linalg::small::{self, mul};
 
 use super::{Exact, LocalSolver, norm_bound, velocity};
+use crate::contact::law::Coulomb;
 use crate::contact::law::cfun::{Disk, Radii, alart_curnier};
 
 /// The function, by its disk, and how exactly its root is found.
@@ -44,13 +45,13 @@ impl<const D: usize> LocalSolver<D> for Newton {
         self.tolerance = velocity;
     }
 
-    fn prepare(&self, w: &[[f64; D]; D], mu: f64) -> NewtonMemo<D> {
+    fn prepare(&self, w: &[[f64; D]; D], law: Coulomb) -> NewtonMemo<D> {
         let mut tangential = *w;
         tangential[0] = [0.0; D];
         tangential.iter_mut().for_each(|row| row[0] = 0.0);
         let rho = Radii { normal: 1.0 / w[0][0], tangential: 1.0 / norm_bound(&tangential) };
         let usable = [rho.normal, rho.tangential].iter().all(|r| *r > 0.0 && r.is_finite());
-        NewtonMemo { rho: usable.then_some(rho), exact: Exact.prepare(w, mu) }
+        NewtonMemo { rho: usable.then_some(rho), exact: Exact.prepare(w, law) }
     }
 
     fn solve(
@@ -58,12 +59,13 @@ impl<const D: usize> LocalSolver<D> for Newton {
         memo: &mut NewtonMemo<D>,
         w: &[[f64; D]; D],
         q: &[f64; D],
-        mu: f64,
+        law: Coulomb,
         r: &[f64; D],
     ) -> [f64; D] {
+        let Coulomb { mu } = law;
         memo.rho
             .and_then(|rho| newton(self, w, q, mu, rho, r))
-            .unwrap_or_else(|| Exact.solve(&mut memo.exact, w, q, mu, r))
+            .unwrap_or_else(|| Exact.solve(&mut memo.exact, w, q, law, r))
     }
 }
 

@@ -7,7 +7,7 @@
 //! per visit converges slowly when the block is badly conditioned, and may not at all for large mu.
 
 use super::{LocalSolver, modified_velocity, norm_bound};
-use crate::contact::law::cone;
+use crate::contact::law::ContactLaw;
 
 /// One projection step a visit.
 #[derive(Debug, Clone, Copy)]
@@ -37,10 +37,10 @@ impl Default for ProjectionIterated {
     }
 }
 
-impl<const D: usize> LocalSolver<D> for Projection {
+impl<L: ContactLaw<D>, const D: usize> LocalSolver<D, L> for Projection {
     type Memo = f64;
 
-    fn prepare(&self, w: &[[f64; D]; D], _mu: f64) -> f64 {
+    fn prepare(&self, w: &[[f64; D]; D], _: L) -> f64 {
         self.step * step_length(w)
     }
 
@@ -50,21 +50,21 @@ impl<const D: usize> LocalSolver<D> for Projection {
         rho: &mut f64,
         w: &[[f64; D]; D],
         q: &[f64; D],
-        mu: f64,
+        law: L,
         r: &[f64; D],
     ) -> [f64; D] {
-        projected(r, &modified_velocity(w, q, mu, r), *rho, mu)
+        projected(r, &modified_velocity(w, q, law, r), *rho, law)
     }
 }
 
-impl<const D: usize> LocalSolver<D> for ProjectionIterated {
+impl<L: ContactLaw<D>, const D: usize> LocalSolver<D, L> for ProjectionIterated {
     type Memo = f64;
 
     fn tolerate(&mut self, velocity: f64) {
         self.tolerance = velocity;
     }
 
-    fn prepare(&self, w: &[[f64; D]; D], _mu: f64) -> f64 {
+    fn prepare(&self, w: &[[f64; D]; D], _: L) -> f64 {
         step_length(w)
     }
 
@@ -73,17 +73,17 @@ impl<const D: usize> LocalSolver<D> for ProjectionIterated {
         rho: &mut f64,
         w: &[[f64; D]; D],
         q: &[f64; D],
-        mu: f64,
+        law: L,
         r: &[f64; D],
     ) -> [f64; D] {
         let distance =
             |x: &[f64; D], y: &[f64; D]| (0..D).map(|k| (x[k] - y[k]).powi(2)).sum::<f64>().sqrt();
         let mut r = *r;
-        let mut f = modified_velocity(w, q, mu, &r);
+        let mut f = modified_velocity(w, q, law, &r);
         for _ in 0..self.steps {
             let (next, f_next, ratio) = loop {
-                let next = projected(&r, &f, *rho, mu);
-                let f_next = modified_velocity(w, q, mu, &next);
+                let next = projected(&r, &f, *rho, law);
+                let f_next = modified_velocity(w, q, law, &next);
                 let ratio = *rho * distance(&f, &f_next) / distance(&r, &next);
                 // A NaN (no movement) is accepted, and ends the outer loop below.
                 if ratio.is_nan() || ratio <= 0.9 {
@@ -110,10 +110,15 @@ fn step_length<const D: usize>(w: &[[f64; D]; D]) -> f64 {
 }
 
 #[inline(always)]
-fn projected<const D: usize>(r: &[f64; D], f: &[f64; D], rho: f64, mu: f64) -> [f64; D] {
+fn projected<L: ContactLaw<D>, const D: usize>(
+    r: &[f64; D],
+    f: &[f64; D],
+    rho: f64,
+    law: L,
+) -> [f64; D] {
     let mut x = *r;
     for k in 0..D {
         x[k] -= rho * f[k];
     }
-    cone::project(&x, mu)
+    law.project(&x)
 }

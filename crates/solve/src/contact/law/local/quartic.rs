@@ -9,7 +9,7 @@ use nonsmooth_linalg::small;
 
 use super::exact::{Schur, Sliding, embed, stick};
 use super::{Exact, LocalSolver, inverse_or_regularised, modified_velocity};
-use crate::contact::law::cone;
+use crate::contact::law::{Coulomb, cone};
 
 /// The local solver that enumerates the roots of the quartic.
 #[derive(Debug, Clone, Copy, Default)]
@@ -26,9 +26,9 @@ pub struct QuarticMemo<const D: usize> {
 impl<const D: usize> LocalSolver<D> for Quartic {
     type Memo = QuarticMemo<D>;
 
-    fn prepare(&self, w: &[[f64; D]; D], mu: f64) -> QuarticMemo<D> {
+    fn prepare(&self, w: &[[f64; D]; D], law: Coulomb) -> QuarticMemo<D> {
         let schur = if D == 3 { Schur::new(w) } else { None };
-        QuarticMemo { inverse: inverse_or_regularised(w), schur, exact: Exact.prepare(w, mu) }
+        QuarticMemo { inverse: inverse_or_regularised(w), schur, exact: Exact.prepare(w, law) }
     }
 
     fn solve(
@@ -36,11 +36,12 @@ impl<const D: usize> LocalSolver<D> for Quartic {
         memo: &mut QuarticMemo<D>,
         w: &[[f64; D]; D],
         q: &[f64; D],
-        mu: f64,
+        law: Coulomb,
         r: &[f64; D],
     ) -> [f64; D] {
+        let Coulomb { mu } = law;
         if D == 2 {
-            return Exact.solve(&mut memo.exact, w, q, mu, r);
+            return Exact.solve(&mut memo.exact, w, q, law, r);
         }
         if q[0] >= 0.0 {
             return [0.0; D];
@@ -66,14 +67,14 @@ impl<const D: usize> LocalSolver<D> for Quartic {
             .map(embed)
             .min_by(|a, b| natural_residual(w, q, mu, a).total_cmp(&natural_residual(w, q, mu, b)))
             // Rounding may hide a double root: the bracketed search still finds it.
-            .unwrap_or_else(|| Exact.solve(&mut memo.exact, w, q, mu, r))
+            .unwrap_or_else(|| Exact.solve(&mut memo.exact, w, q, law, r))
     }
 }
 
 /// `‖w̄ r − P_K(w̄ r − ũ)‖²`, w̄ the mean diagonal.
 fn natural_residual<const D: usize>(w: &[[f64; D]; D], q: &[f64; D], mu: f64, r: &[f64; D]) -> f64 {
     let mean = small::mean_diagonal(w);
-    let u = modified_velocity(w, q, mu, r);
+    let u = modified_velocity(w, q, Coulomb { mu }, r);
     let mut x = [0.0; D];
     for k in 0..D {
         x[k] = mean * r[k] - u[k];

@@ -1,0 +1,180 @@
+//! Scalar rows with bounds: the methods that know them, held against planted points, a second method and a closed form; the others refuse them by name.
+
+use nonsmooth_linalg::{Csc, norm};
+use nonsmooth_problem::check::{Existence, Judged};
+use nonsmooth_problem::planted::Planted;
+use nonsmooth_problem::{
+    Bounds, BoxLcp, FrictionGlobal, FrictionLocal, Problem, RowsGlobal, RowsLocal,
+};
+use nonsmooth_solve::registry::{self, Registered};
+use nonsmooth_solve::{Limits, Solve, SolveError, Status, existence};
+
+fn cases() -> impl Iterator<Item = Planted> {
+    (0..9).map(|seed| Planted {
+        contacts: 6,
+        dofs: 48,
+        bilateral: [0, 3, 2][seed as usize % 3],
+        bounded: 1 + seed as usize % 4,
+        seed,
+        ..Planted::default()
+    })
+}
+
+fn solved<P>(problem: &P, solver: &str) -> P::Point
+where
+    P: Registered + Judged + nonsmooth_problem::OfAny,
+{
+    let answer = Solve::new().solver(solver).tolerance(1e-10).run(problem).unwrap();
+    assert_eq!(answer.status, Status::Solved, "{solver}: {:?}", answer.verdict.measure);
+    answer.point
+}
+
+#[test]
+fn planted_problems_are_solved_in_every_form() {
+    for case in cases() {
+        let (global, planted) = case.global::<3>();
+        let points = ["nsgs", "auto", "condense/nsgs"].map(|s| solved(&global, s));
+        for point in &points {
+            // M is definite and the Jacobian of all rows has full rank: there is one motion.
+            let gap: Vec<f64> = point.v.iter().zip(&planted.v).map(|(a, b)| a - b).collect();
+            assert!(norm(&gap) < 1e-6 * norm(&planted.v), "{case:?} {:e}", norm(&gap));
+        }
+        let (local, _) = case.local::<2>();
+        solved(&local, "nsgs");
+        solved(&local, "auto");
+        let (local, _) = case.local::<3>();
+        solved(&local, "nsgs");
+    }
+}
+
+/// Without friction a local problem in the plane is an LCP with two bounds in the normal impulses and the rows: another statement, other methods.
+#[test]
+fn frictionless_problems_agree_with_their_box_lcp() {
+    for case in cases() {
+        let case = Planted { mu: (0.0, 0.0), ..case };
+        let (local, _) = case.local::<2>();
+        let RowsLocal { V, R, s, bounds } = local.rows.as_ref().unwrap();
+        let (nc, p) = (local.contacts(), s.len());
+        let normal = |i: usize| (i % 2 == 0).then_some(i / 2);
+        let w = local.W.to_csc();
+        let of_w = w.triplets().filter_map(|(i, j, x)| Some((normal(i)?, normal(j)?, x)));
+        let of_v = V.triplets().filter_map(|(i, j, x)| Some((normal(i)?, nc + j, x)));
+        let turned = of_v.clone().map(|(i, j, x)| (j, i, x));
+        let of_r = R.triplets().map(|(i, j, x)| (nc + i, nc + j, x));
+        let all = of_w.chain(of_v).chain(turned).chain(of_r);
+        let m = Csc::from_triplets(nc + p, nc + p, all).unwrap();
+        let q = (0..nc).map(|c| local.q[2 * c]).chain(s.iter().copied()).collect();
+        let sides = |side: usize, of_contact: f64| {
+            let rows = (0..p).map(|j| bounds.of(j)[side]);
+            std::iter::repeat_n(of_contact, nc).chain(rows).collect::<Vec<f64>>()
+        };
+        let (lower, upper) = (sides(0, 0.0), sides(1, f64::INFINITY));
+        let boxed = BoxLcp::new(m, q, lower, upper).unwrap();
+        let answer = Solve::new().tolerance(1e-10).run(&boxed).unwrap();
+        assert_eq!(answer.status, Status::Solved);
+        let point = solved(&local, "nsgs");
+        for (k, z) in answer.point.z.iter().enumerate() {
+            let ours = if k < nc { point.r[2 * k] } else { point.lambda[k - nc] };
+            assert!((ours - z).abs() < 1e-6 * (1.0 + z.abs()), "{case:?} {k}: {ours} {z}");
+        }
+    }
+}
+
+/// R need not be symmetric where rows are eliminated.
+#[test]
+fn free_rows_are_eliminated_from_a_skew_problem() {
+    for seed in 0..6 {
+        let case =
+            Planted { contacts: 4, dofs: 40, bilateral: 2, bounded: 3, seed, ..Planted::default() };
+        let (mut local, planted) = case.local::<3>();
+        let rows = local.rows.as_mut().unwrap();
+        // A skew part, and the free velocities that keep the planted point.
+        let p = rows.s.len();
+        let skew = (0..p).flat_map(|i| {
+            (0..p).filter(move |&j| j != i).map(move |j| {
+                let size = 0.01 * (1 + i.min(j)) as f64;
+                (i, j, if i < j { size } else { -size })
+            })
+        });
+        let skew = Csc::from_triplets(p, p, skew).unwrap();
+        skew.mul_add(-1.0, &planted.lambda, &mut rows.s);
+        rows.R = Csc::from_triplets(p, p, rows.R.triplets().chain(skew.triplets())).unwrap();
+        assert!(local.judge(&planted, 1e-10).unwrap().solved);
+        let point = solved(&local, "nsgs");
+        for (a, b) in point.lambda.iter().zip(&planted.lambda) {
+            assert!((a - b).abs() < 1e-6 * (1.0 + b.abs()), "{seed}: {a} {b}");
+        }
+    }
+}
+
+/// Every other method says that it takes no bounds, and who does.
+#[test]
+fn methods_that_know_no_bounds_refuse_them_by_name() {
+    fn check<P: Registered + Judged + nonsmooth_problem::OfAny>(problem: &P, takers: &[&str]) {
+        let composed = registry::composed_names::<P>();
+        let names = registry::abouts::<P>().into_iter().map(|a| a.name.to_string());
+        for name in names.chain(composed) {
+            let takes = takers.contains(&name.as_str());
+            let ran = Solve::new().solver(&name).tolerance(1e-6).run(problem);
+            match ran {
+                Ok(answer) => {
+                    assert!(takes, "{name} took bounds");
+                    assert_eq!(answer.status, Status::Solved, "{name}");
+                }
+                Err(e) => {
+                    assert!(!takes, "{name}: {e}");
+                    assert!(matches!(e, SolveError::Needs { .. }), "{name}: {e}");
+                    let said = e.to_string();
+                    assert!(said.contains("bounds") && said.contains("nsgs"), "{name}: {said}");
+                }
+            }
+        }
+    }
+    let case = Planted { contacts: 3, dofs: 24, bounded: 2, ..Planted::default() };
+    let takers = ["nsgs", "psor", "auto", "condense/nsgs", "condense/psor", "condense/auto"];
+    check(&case.local::<3>().0, &takers);
+    check(&case.global::<2>().0, &takers);
+}
+
+/// Limits of a joint that leave no motion, and how existence is decided where rows have bounds.
+#[test]
+fn existence_with_bounds_is_decided_by_cases_or_left_open() {
+    let h = Csc::from_triplets(2, 2, [(1, 0, 1.0), (0, 1, 1.0)].into_iter()).unwrap();
+    let mut problem = FrictionGlobal::<2>::new(
+        Csc::diagonal(&[1.0, 1.0]),
+        h,
+        vec![0.0, -2.0],
+        vec![0.0; 2],
+        vec![0.5],
+    )
+    .unwrap();
+    let g = Csc::from_triplets(2, 2, [(0, 0, 1.0), (0, 1, -1.0)].into_iter()).unwrap();
+    let bounds = Bounds { lower: vec![0.0; 2], upper: vec![f64::INFINITY; 2] };
+    problem.rows = Some(RowsGlobal { G: g, b: vec![-1.0, 0.5], bounds });
+    let verdict = existence::decide(&problem, &Limits::default());
+    assert!(matches!(verdict, Existence::NoSolution { .. }), "{verdict}");
+    problem.rows.as_mut().unwrap().b[1] = 2.0;
+    let verdict = existence::decide(&problem, &Limits::default());
+    assert!(matches!(verdict, Existence::Solved { .. }), "{verdict}");
+    let many = Planted { contacts: 30, dofs: 90, bounded: 2, ..Planted::default() }.global::<3>().0;
+    let verdict = existence::decide(&many, &Limits::default()).to_string();
+    assert!(verdict.contains("bounds"), "{verdict}");
+}
+
+/// A session that meets a problem with bounds after one without, and the other way round.
+#[test]
+fn a_session_changes_between_problems_with_and_without_bounds() {
+    let with = Planted { contacts: 4, dofs: 30, bounded: 2, ..Planted::default() };
+    let without = Planted { bounded: 0, bilateral: 2, ..with.clone() };
+    let problems: [FrictionLocal<3>; 2] = [with.local().0, without.local().0];
+    for solver in ["nsgs", "auto"] {
+        let mut session =
+            registry::session::<FrictionLocal<3>>(solver, &Default::default()).unwrap();
+        for k in [0, 1, 0, 0, 1] {
+            let mut point = problems[k].origin();
+            let limits = Limits { tolerance: 1e-10, ..Limits::default() };
+            let outcome = session.solve(&problems[k], &mut point, &limits, &mut |_| {}).unwrap();
+            assert_eq!(outcome.status, Status::Solved, "{solver} {k}");
+        }
+    }
+}
