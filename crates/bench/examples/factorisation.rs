@@ -219,7 +219,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     mistakes.iter().for_each(|mistake| eprintln!("{mistake}"));
     for input in inputs {
         let name = input.name.rsplit('/').next().unwrap_or_default();
-        match fclib::read(&input.path).map(|file| file.problem) {
+        match fclib::read_problem(&input.path) {
             Ok(Friction::Local2(p)) => report(&of_contacts(&p), "local ", name)?,
             Ok(Friction::Local3(p)) => report(&of_contacts(&p), "local ", name)?,
             Ok(Friction::Global2(p)) => report(&of_bodies(&p), "global", name)?,

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use comfy_table::{TableStyle, presets};
 use nonsmooth_analysis::{Spectrum, SpectrumError, Traits};
-use nonsmooth_io::{IoError, fclib};
+use nonsmooth_io::{IoError, ProblemFile};
 
 /// Which published families are like a family of ours: ours, theirs. Sizes, time steps and coefficients of friction
 /// differ. FCLIB has none of polyhedra (its capsules are another shape), nor of walls of rigid bricks.
@@ -227,9 +227,10 @@ pub enum DescribeError {
 
 /// Reads the problem of a file and describes it, with its spectrum where the dense matrix has at most `limit` rows.
 pub fn describe(file: &Path, limit: usize) -> Result<Described, DescribeError> {
-    let content = fclib::read(file)?;
-    let traits = Traits::of(&content.problem, content.info.dofs);
-    let spectrum = match Spectrum::of(&content.problem, limit) {
+    let content = ProblemFile::read(file)?;
+    let problem = content.contacts(file)?;
+    let traits = Traits::of(problem, content.info.dofs);
+    let spectrum = match Spectrum::of(problem, limit) {
         Ok(spectrum) => Some(spectrum),
         Err(SpectrumError::TooLarge { .. }) => None,
         Err(source) => return Err(DescribeError::Spectrum { file: file.into(), source }),

@@ -12,9 +12,9 @@ use nonsmooth_bench::campaign::{
 };
 use nonsmooth_bench::record::{Campaign, Ending, FORMAT, Key, Line, Plan, Run, VERSION};
 use nonsmooth_bench::runs::{Joined, Runs, RunsError};
-use nonsmooth_io::fclib::{self, FclibFile};
+use nonsmooth_io::ProblemFile;
+use nonsmooth_problem::Problem;
 use nonsmooth_problem::planted::Planted;
-use nonsmooth_problem::{Friction, Problem};
 use nonsmooth_solve::registry::Registered;
 use nonsmooth_solve::settings::SettingsMap;
 use nonsmooth_solve::{Driver, Session, SolveError, Solver, Step};
@@ -146,8 +146,7 @@ fn problems(folder: &Path, count: u64) {
 
 fn problem(file: &Path, contacts: usize, seed: u64) {
     let planted = Planted { contacts, dofs: 12, seed, ..Planted::default() };
-    let problem = Friction::Local3(planted.local::<3>().0);
-    fclib::write(file, &FclibFile::new(problem)).unwrap();
+    ProblemFile::new(planted.local::<3>().0).write(file).unwrap();
 }
 
 fn plan(solvers: &[&str]) -> Plan {

@@ -2,12 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use nonsmooth_io::{Content, read_any};
 use nonsmooth_problem::check::{Certificate, Evidence, ExactVector, Kinematic, Monotone, Proof};
-use nonsmooth_problem::{Problem, with_complementarity, with_friction};
+use nonsmooth_problem::{AnyProblem, Problem, with_friction};
 use serde_json::{Value, json};
 
-use crate::kinds::Form;
 use crate::{Exit, files, output, report};
 
 /// What a certificate says that it is.
@@ -32,33 +30,25 @@ pub fn check(problems: &[PathBuf], path: &Path, as_json: bool) -> Result<Exit, S
     let claim = read(path)?;
     let claim = &claim;
     Ok(files::each(problems, as_json, |_, file| {
-        let (found, mut all, size) = match read_any(file).map_err(|e| e.to_string())? {
-            Content::Friction(content) => with_friction!(&content.problem, p => {
-                let found = match claim {
-                    Claim::None(value) => refutes(p, value, path)?,
-                    Claim::Motion(motion) => moves(p, motion),
-                    Claim::Solution(t) => solves(p, t),
-                };
-                (found, report::problem_json(file, p), report::problem_text(p))
-            }),
-            Content::Linear(content) => with_complementarity!(&content.problem, p => {
-                let found = match claim {
-                    Claim::None(value) => refutes(p, value, path)?,
-                    Claim::Motion(_) => nothing("a motion is no certificate for this kind of problem"),
-                    Claim::Solution(t) => solves(p, t),
-                };
-                (found, report::problem_json(file, p), report::problem_text(p))
-            }),
+        let problem = &nonsmooth_io::read(file).map_err(|e| e.to_string())?;
+        let found = match (claim, problem) {
+            (Claim::None(value), _) => refutes(problem, value, path)?,
+            (Claim::Solution(t), _) => solves(problem, t),
+            (Claim::Motion(motion), AnyProblem::Friction(p)) => {
+                with_friction!(p, p => moves(p, motion))
+            }
+            (Claim::Motion(_), _) => nothing("a motion is no certificate for this kind of problem"),
         };
         let Found { name, says, proved } = found;
         if as_json {
+            let mut all = report::problem_json(file, problem);
             all.extend(report::fields(json!({
                 "certificate": path.to_string_lossy(), "evidence": name, "message": says,
             })));
             output::print(&format!("{}\n", json!(all)));
         } else {
             let mut text = format!("{}: {says}\n", file.display());
-            report::row(&mut text, "problem", size);
+            report::row(&mut text, "problem", report::problem_text(problem));
             report::row(&mut text, "evidence", format!("{} ({name})", path.display()));
             output::print(&text);
         }
@@ -105,7 +95,7 @@ fn proved(what: &str) -> Found {
     Found { name: "proved", says: format!("{what}, proved in exact arithmetic"), proved: true }
 }
 
-fn refutes<P: Problem>(problem: &P, claimed: &Value, path: &Path) -> Result<Found, String> {
+fn refutes(problem: &AnyProblem, claimed: &Value, path: &Path) -> Result<Found, String> {
     let mistake = |e: String| format!("--certificate {}: {e}", path.display());
     let certificate = match claimed.get("exact") {
         // The vectors that were verified once are verified again.
@@ -136,7 +126,7 @@ fn refutes<P: Problem>(problem: &P, claimed: &Value, path: &Path) -> Result<Foun
     })
 }
 
-fn moves<P: Kinematic<D> + Form, const D: usize>(problem: &P, motion: &ExactVector) -> Found {
+fn moves<P: Kinematic<D>, const D: usize>(problem: &P, motion: &ExactVector) -> Found {
     match (problem.kinematics().exact_margin(motion), problem.monotone()) {
         (Some(_), Monotone::Proved { .. }) => {
             proved("a solution exists: the motion keeps all contacts in the dual cone")
@@ -146,7 +136,7 @@ fn moves<P: Kinematic<D> + Form, const D: usize>(problem: &P, motion: &ExactVect
     }
 }
 
-fn solves(problem: &impl Problem, t: &ExactVector) -> Found {
+fn solves(problem: &AnyProblem, t: &ExactVector) -> Found {
     match problem.cones().is_some_and(|s| s.complete && s.solved_by(&t.0)) {
         true => proved("a solution exists: it is given"),
         false => nothing("it is no solution of this problem"),

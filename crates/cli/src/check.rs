@@ -1,12 +1,11 @@
 //! `nonsmooth check`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use nonsmooth_io::{Content, read_any};
-use nonsmooth_problem::{with_complementarity, with_friction};
+use nonsmooth_io::ProblemFile;
+use nonsmooth_problem::check::Judged;
 use serde_json::json;
 
-use crate::kinds::Form;
 use crate::{Exit, certificate, files, output, report};
 
 /// Judge the solutions stored in files, or a certificate.
@@ -17,8 +16,7 @@ use crate::{Exit, certificate, files, output, report};
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Files with a solution: FCLIB's (HDF5), or linear complementarity problems (TOML, Matrix Market)
-    #[arg(required = true, value_name = "FILE")]
+    #[arg(required = true, value_name = "FILE", help = files::help("Files with a solution", |_| true))]
     files: Vec<PathBuf>,
     /// The relative residual that passes
     #[arg(long, value_name = "TOL", default_value = "1e-8", allow_hyphen_values = true)]
@@ -51,47 +49,31 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     }
     let tol = files::tolerance(args.tol)?;
     Ok(files::each(&args.files, args.json, |_, file| {
-        let none = |place: &str| {
-            let file = file.display();
-            format!("{file}: {place}: expected a solution to check, found none")
+        let content = ProblemFile::read(file).map_err(|e| e.to_string())?;
+        let Some(stored) = &content.solution else {
+            let (file, place) = (file.display(), files::about(file)?.solution);
+            return Err(format!("{file}: {place}: expected a solution to check, found none"));
         };
-        match read_any(file).map_err(|e| e.to_string())? {
-            Content::Friction(content) => {
-                let stored = content.solution.as_ref().ok_or_else(|| none("/solution"))?;
-                with_friction!(&content.problem, p => one(file, p, p.point(stored), tol, args))
-            }
-            Content::Linear(content) => {
-                let stored = content.solution.as_ref().ok_or_else(|| none("[solution]"))?;
-                with_complementarity!(&content.problem, p => one(file, p, p.point(stored), tol, args))
-            }
+        let problem = &content.problem;
+        let verdict = problem.judge(&stored.point, tol);
+        let verdict = verdict.map_err(|e| format!("{}: {e}", file.display()))?;
+        let (name, says) = match verdict.solved {
+            true => ("solved", "solved"),
+            false => ("not_solved", "not solved: the stored solution does not pass"),
+        };
+        if args.json {
+            let mut all = report::problem_json(file, problem);
+            all.extend(report::fields(json!({"tolerance": tol, "status": name, "message": says})));
+            let worst = args.worst.unwrap_or(verdict.worst.len());
+            all.extend(report::verdict_json(&verdict, tol, worst));
+            output::print(&format!("{}\n", json!(all)));
+        } else {
+            let mut text = report::headline(file, says, &verdict.measure, tol);
+            report::row(&mut text, "problem", report::problem_text(problem));
+            let worst = args.worst.unwrap_or(if verdict.solved { 0 } else { 3 });
+            report::verdict_text(&mut text, &verdict, tol, worst);
+            output::print(&text);
         }
+        Ok(Exit::solved(verdict.solved))
     }))
-}
-
-fn one<P: Form>(
-    file: &Path,
-    problem: &P,
-    point: P::Point,
-    tol: f64,
-    args: &Args,
-) -> Result<Exit, String> {
-    let verdict = problem.judge(&point, tol).map_err(|e| format!("{}: {e}", file.display()))?;
-    let (name, says) = match verdict.solved {
-        true => ("solved", "solved"),
-        false => ("not_solved", "not solved: the stored solution does not pass"),
-    };
-    if args.json {
-        let mut all = report::problem_json(file, problem);
-        all.extend(report::fields(json!({"tolerance": tol, "status": name, "message": says})));
-        let worst = args.worst.unwrap_or(verdict.worst.len());
-        all.extend(report::verdict_json(&verdict, tol, worst));
-        output::print(&format!("{}\n", json!(all)));
-    } else {
-        let mut text = report::headline(file, says, &verdict.measure, tol);
-        report::row(&mut text, "problem", report::problem_text(problem));
-        let worst = args.worst.unwrap_or(if verdict.solved { 0 } else { 3 });
-        report::verdict_text(&mut text, &verdict, tol, worst);
-        output::print(&text);
-    }
-    Ok(Exit::solved(verdict.solved))
 }

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use nonsmooth_problem::with_friction;
 use nonsmooth_solve::Limits;
 use nonsmooth_solve::diagnose::{Diagnosis, Effort, diagnose};
 use serde_json::json;
@@ -18,8 +17,7 @@ use crate::{Exit, files, interrupt, output};
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// FCLIB files (HDF5)
-    #[arg(required = true, value_name = "FILE")]
+    #[arg(required = true, value_name = "FILE", help = files::help("Files of contact problems", |k| !k.is_linear()))]
     files: Vec<PathBuf>,
     /// The most rows of W for which rank and condition number are computed
     #[arg(long, value_name = "ROWS", default_value = "1500", value_parser = files::whole)]
@@ -51,13 +49,14 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     };
     Ok(files::each(&args.files, args.json, |_, file| {
         let begun = Instant::now();
-        let content = match files::contact_within(file, &limits)? {
+        let content = match files::read_within(file, &limits)? {
             Ok(content) => content,
             Err(limit) => return Ok(files::late(file, args.json, limit, files::WHILE_READ)),
         };
         let left = files::left(&limits, begun);
         let effort = Effort { spectrum_limit: args.spectrum_limit, limits: left };
-        let diagnosis = match diagnose(&content.problem, content.info.dofs, &effort) {
+        let problem = content.contacts(file).map_err(|e| e.to_string())?;
+        let diagnosis = match diagnose(problem, content.info.dofs, &effort) {
             Ok(diagnosis) => diagnosis,
             Err(limit) => {
                 return Ok(files::late(
@@ -69,7 +68,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             }
         };
         output::print(&if args.json {
-            let mut all = with_friction!(&content.problem, p => report::problem_json(file, p));
+            let mut all = report::problem_json(file, &content.problem);
             all.extend(report::fields(json!(diagnosis)));
             format!("{}\n", json!(all))
         } else {

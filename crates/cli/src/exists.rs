@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use nonsmooth_problem::check::{Existence, Impulses};
-use nonsmooth_problem::with_friction;
 use nonsmooth_solve::{Limits, existence};
 use serde_json::{Value, json};
 
@@ -22,8 +21,7 @@ use crate::{Exit, files, interrupt, output};
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// FCLIB files (HDF5)
-    #[arg(required = true, value_name = "FILE")]
+    #[arg(required = true, value_name = "FILE", help = files::help("Files of contact problems", |k| !k.is_linear()))]
     files: Vec<PathBuf>,
     /// At most this many seconds for each file
     #[arg(long, value_name = "SECONDS", default_value = "60", allow_hyphen_values = true)]
@@ -64,19 +62,19 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     };
     Ok(files::each(&args.files, args.json, |k, file| {
         let start = Instant::now();
-        let content = match files::contact_within(file, &limits)? {
+        let content = match files::read_within(file, &limits)? {
             Ok(content) => content,
             Err(limit) => return Ok(files::late(file, args.json, limit, files::WHILE_READ)),
         };
-        let existence = existence::of(&content.problem, &files::left(&limits, start));
+        let problem = &content.problem;
+        let contacts = content.contacts(file).map_err(|e| e.to_string())?;
+        let existence = existence::of(contacts, &files::left(&limits, start));
         let seconds = start.elapsed().as_secs_f64();
-        let sizes = with_friction!(&content.problem, p => report::problem_json(file, p));
-        let size_text = with_friction!(&content.problem, p => report::problem_text(p));
-        let contacts = content.problem.contacts();
+        let (sizes, contacts) = (report::problem_json(file, problem), contacts.contacts());
         output::print(&if args.json {
             format!("{}\n", json(sizes.clone(), &existence, contacts, seconds))
         } else {
-            text(file, &size_text, &existence, contacts, seconds)
+            text(file, &report::problem_text(problem), &existence, contacts, seconds)
         });
         if let Some(path) = targets.as_ref().map(|t| &t[k]) {
             let mut all = sizes;

@@ -5,8 +5,8 @@ use std::fs::{self, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use nonsmooth_io::fclib::FclibFile;
-use nonsmooth_io::{Content, beside, read_any};
+use nonsmooth_io::{About, ProblemFile, beside, format, listed, writer};
+use nonsmooth_problem::Kind;
 use nonsmooth_solve::{Limit, Limits, Status, guard};
 use serde_json::json;
 
@@ -33,14 +33,19 @@ pub fn each(
     worst
 }
 
-fn contact(file: &Path, content: Content) -> Result<FclibFile, String> {
-    match content {
-        Content::Friction(content) => Ok(content),
-        Content::Linear(_) => Err(format!(
-            "{}: expected a frictional contact problem, found a linear complementarity problem",
-            file.display()
-        )),
-    }
+/// The help of an argument that names files of problems of some kinds.
+pub fn help(what: &str, kinds: impl Fn(Kind) -> bool) -> String {
+    format!("{what}: {}", listed(kinds))
+}
+
+/// What the format of a file that was read is.
+pub fn about(file: &Path) -> Result<&'static About, String> {
+    format(file).map(|format| format.about()).map_err(|e| e.to_string())
+}
+
+/// The file at `path` can hold a problem of a kind.
+pub fn holds(option: &str, path: &Path, kind: Kind) -> Result<(), String> {
+    writer(path, kind).map(|_| ()).map_err(|e| format!("{option} {e}"))
 }
 
 /// A whole number, written as `1000` or `1e3`.
@@ -83,25 +88,18 @@ pub fn size(text: &str) -> Result<u64, String> {
 /// Bytes of a file that are read in no time.
 const SHORT: u64 = 1 << 20;
 
-/// Reads a file of any kind within the limits; the limit if it came first.
-pub fn read_within(file: &Path, limits: &Limits) -> Result<Result<Content, Limit>, String> {
+/// Reads a file within the limits; the limit if it came first.
+pub fn read_within(file: &Path, limits: &Limits) -> Result<Result<ProblemFile, Limit>, String> {
     let length = fs::metadata(file).map_or(0, |m| m.len());
+    let read = |path: &Path| ProblemFile::read(path).map_err(|e| e.to_string());
     if length <= SHORT {
-        return read_any(file).map(Ok).map_err(|e| e.to_string());
+        return read(file).map(Ok);
     }
     let path = file.to_path_buf();
-    match guard::run(limits, || {}, move |_| read_any(path)) {
-        Ok(content) => content.map(Ok).map_err(|e| e.to_string()),
+    match guard::run(limits, || {}, move |_| read(&path)) {
+        Ok(content) => content.map(Ok),
         Err(limit) => Ok(Err(limit)),
     }
-}
-
-/// As [`read_within`], of a file that must hold a frictional contact problem.
-pub fn contact_within(file: &Path, limits: &Limits) -> Result<Result<FclibFile, Limit>, String> {
-    Ok(match read_within(file, limits)? {
-        Ok(content) => Ok(contact(file, content)?),
-        Err(limit) => Err(limit),
-    })
 }
 
 /// When a limit came that came early.

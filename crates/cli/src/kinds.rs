@@ -1,253 +1,137 @@
-//! What the commands need of a kind of problem.
+//! What the commands say of each kind of problem.
 
 use nonsmooth_bench::plural as count;
-use nonsmooth_io::fclib::StoredPoint;
-use nonsmooth_io::linear::LinearPoint;
-use nonsmooth_problem::check::{Judged, RowCounts, StatusCounts};
+use nonsmooth_io::StoredPoint;
+use nonsmooth_problem::check::VerdictOf;
 use nonsmooth_problem::{
-    BoxLcp, FrictionGlobal, FrictionLocal, Hlcp, HlcpPoint, Kind, Lcp, LcpPoint, Mlcp, Problem,
+    AnyCounts, AnyPoint, AnyProblem, BoxLcp, Complementarity, FrictionGlobal, FrictionLocal,
+    GlobalPoint, Hlcp, Kind, Lcp, LocalPoint, Mlcp, Problem, with_problem,
 };
 use nonsmooth_solve::registry::{self, About, Prefix, Registered};
-use serde::Serialize;
 use serde_json::json;
 
 use crate::json::{Object, fields};
 
-/// A problem that has a judge and a place in a file.
-pub trait Form: Judged<Counts: Counts> {
-    /// How files store its points.
-    type Stored;
+/// What the judge says of a point of any problem.
+pub type AnyVerdict = VerdictOf<AnyProblem>;
 
-    /// Its size, in words.
-    fn size(&self) -> String;
+/// The size of a problem, in words.
+pub fn size(problem: &AnyProblem) -> String {
+    let linear = match problem {
+        AnyProblem::Friction(p) => {
+            let (contacts, unknowns) = (p.contacts(), p.unknowns());
+            return format!("{}, {}", count(contacts, "contact"), count(unknowns, "unknown"));
+        }
+        AnyProblem::Complementarity(linear) => linear,
+    };
+    match linear {
+        Complementarity::Lcp(p) => count(p.dim(), "variable"),
+        Complementarity::Hlcp(p) => count(p.dim(), "pair"),
+        Complementarity::Box(p) => {
+            let bounded = |all: &[f64]| all.iter().filter(|x| x.is_finite()).count();
+            let variables = count(p.dim(), "variable");
+            let (lower, upper) = (bounded(&p.lower), bounded(&p.upper));
+            format!("{variables}, {} and {upper} upper", count(lower, "lower bound"))
+        }
+        Complementarity::Mlcp(p) => {
+            let equalities = match p.equalities {
+                1 => "1 equality".into(),
+                n => format!("{n} equalities"),
+            };
+            let (free, pairs) = (count(p.free, "free variable"), count(p.pairs(), "pair"));
+            format!("{equalities}, {free}, {pairs}")
+        }
+    }
+}
 
-    /// Its size by name, for JSON.
-    fn sizes(&self) -> Object;
+/// The size of a problem by name, for JSON.
+pub fn sizes(problem: &AnyProblem) -> Object {
+    let unknowns = problem.unknowns();
+    fields(match problem {
+        AnyProblem::Friction(p) => json!({"contacts": p.contacts(), "unknowns": unknowns}),
+        AnyProblem::Complementarity(linear) => match linear {
+            Complementarity::Lcp(p) => json!({"rows": p.dim(), "unknowns": unknowns}),
+            Complementarity::Box(p) => json!({"rows": p.dim(), "unknowns": unknowns}),
+            Complementarity::Hlcp(p) => {
+                json!({"rows": p.dim(), "unknowns": unknowns, "pairs": p.dim()})
+            }
+            Complementarity::Mlcp(p) => json!({
+                "rows": p.q.len(),
+                "unknowns": unknowns,
+                "equalities": p.equalities,
+                "free": p.free,
+                "pairs": p.pairs(),
+            }),
+        },
+    })
+}
 
-    /// A stored point as it is, to be judged.
-    fn point(&self, stored: &Self::Stored) -> Self::Point;
+/// What two problems have in common where a point of one is a start for the other: of contacts, their number alone.
+pub fn alike(problem: &AnyProblem) -> String {
+    match problem {
+        AnyProblem::Friction(p) => {
+            format!("{} in {}D", count(p.contacts(), "contact"), p.kind().dimension())
+        }
+        AnyProblem::Complementarity(_) => format!("{}, {}", problem.kind().name(), size(problem)),
+    }
+}
 
-    /// A stored point to start from; the rest is the solver's to recompute.
-    fn start(&self, stored: &Self::Stored) -> Self::Point;
-
-    /// A point to store, with the relative velocity u, or w, that the judge computed.
-    fn store(&self, point: Self::Point, w: Vec<f64>) -> Self::Stored;
+/// A stored point, perhaps of another problem that is [`alike`], to start from. Of contacts these are the impulses, and the multipliers if they fit;
+/// the rest follows from them.
+pub fn start(problem: &AnyProblem, stored: &StoredPoint) -> AnyPoint {
+    let mut origin = problem.origin();
+    let (impulses, multipliers) = match &stored.point {
+        AnyPoint::Local(LocalPoint { r, lambda }) => (r, lambda),
+        AnyPoint::Global(GlobalPoint { r, lambda, .. }) => (r, lambda),
+        point @ (AnyPoint::Lcp(_) | AnyPoint::Hlcp(_)) => return point.clone(),
+    };
+    if let AnyPoint::Local(LocalPoint { r, lambda })
+    | AnyPoint::Global(GlobalPoint { r, lambda, .. }) = &mut origin
+    {
+        r.clone_from(impulses);
+        if multipliers.len() == lambda.len() {
+            lambda.clone_from(multipliers);
+        }
+    }
+    origin
 }
 
 /// How many contacts, or rows, do what.
-pub trait Counts: Serialize + Default + Send + 'static {
+pub struct Counted {
     /// What is counted.
-    const WHAT: &'static str;
+    pub what: &'static str,
     /// The unit of the absolute residual, after a blank.
-    const UNIT: &'static str;
-
+    pub unit: &'static str,
     /// The numbers with their names; all that is counted is in one of them.
-    fn all(&self) -> Vec<(usize, &'static str)>;
-
+    pub all: Vec<(usize, &'static str)>,
     /// Those near another status.
-    fn degenerate(&self) -> usize;
+    pub degenerate: usize,
 }
 
-impl Counts for StatusCounts {
-    const WHAT: &'static str = "contact";
-    const UNIT: &'static str = " m/s";
-
-    fn all(&self) -> Vec<(usize, &'static str)> {
-        vec![(self.open, "open"), (self.stick, "stick"), (self.slip, "slip")]
-    }
-
-    fn degenerate(&self) -> usize {
-        self.degenerate
-    }
-}
-
-impl Counts for RowCounts {
-    const WHAT: &'static str = "row";
-    const UNIT: &'static str = "";
-
-    fn all(&self) -> Vec<(usize, &'static str)> {
-        let mut all = vec![(self.inside, "inside"), (self.lower, "at the lower bound")];
-        let others = [(self.upper, "at the upper bound"), (self.equalities, "equalities")];
-        all.extend(others.into_iter().filter(|c| c.0 > 0));
-        all
-    }
-
-    fn degenerate(&self) -> usize {
-        self.degenerate
-    }
-}
-
-impl<const D: usize> Form for FrictionLocal<D> {
-    type Stored = StoredPoint;
-
-    fn size(&self) -> String {
-        contact_size(self.contacts(), self)
-    }
-
-    fn sizes(&self) -> Object {
-        contact_sizes(self.contacts(), self)
-    }
-
-    fn point(&self, stored: &StoredPoint) -> Self::Point {
-        stored.to_local()
-    }
-
-    fn start(&self, stored: &StoredPoint) -> Self::Point {
-        let Self::Point { lambda, .. } = self.origin();
-        Self::Point { r: stored.r.clone(), lambda: multipliers(stored, lambda) }
-    }
-
-    fn store(&self, point: Self::Point, u: Vec<f64>) -> StoredPoint {
-        StoredPoint { v: None, u, r: point.r, lambda: some(point.lambda) }
-    }
-}
-
-impl<const D: usize> Form for FrictionGlobal<D> {
-    type Stored = StoredPoint;
-
-    fn size(&self) -> String {
-        contact_size(self.contacts(), self)
-    }
-
-    fn sizes(&self) -> Object {
-        contact_sizes(self.contacts(), self)
-    }
-
-    fn point(&self, stored: &StoredPoint) -> Self::Point {
-        stored.to_global()
-    }
-
-    fn start(&self, stored: &StoredPoint) -> Self::Point {
-        let Self::Point { v, lambda, .. } = self.origin();
-        Self::Point { v, r: stored.r.clone(), lambda: multipliers(stored, lambda) }
-    }
-
-    fn store(&self, point: Self::Point, u: Vec<f64>) -> StoredPoint {
-        StoredPoint { v: some(point.v), u, r: point.r, lambda: some(point.lambda) }
-    }
-}
-
-fn contact_size(contacts: usize, problem: &impl Problem) -> String {
-    format!("{}, {}", count(contacts, "contact"), count(problem.unknowns(), "unknown"))
-}
-
-fn contact_sizes(contacts: usize, problem: &impl Problem) -> Object {
-    fields(json!({"contacts": contacts, "unknowns": problem.unknowns()}))
-}
-
-/// The multipliers of a point, which may be another problem's, else `origin`: they follow from the impulses.
-fn multipliers(stored: &StoredPoint, origin: Vec<f64>) -> Vec<f64> {
-    let fits = stored.lambda.as_ref().filter(|l| l.len() == origin.len());
-    fits.cloned().unwrap_or(origin)
-}
-
-fn some(x: Vec<f64>) -> Option<Vec<f64>> {
-    Some(x).filter(|x| !x.is_empty())
-}
-
-/// The parts of [`Form`] that LCP, MLCP and box LCP share: their point is z, and w follows from it.
-macro_rules! points_of_z {
-    () => {
-        type Stored = LinearPoint;
-
-        fn point(&self, stored: &LinearPoint) -> LcpPoint {
-            stored.to_lcp()
+/// The counts of a verdict.
+pub fn counted(counts: &AnyCounts) -> Counted {
+    match counts {
+        AnyCounts::Contacts(c) => Counted {
+            what: "contact",
+            unit: " m/s",
+            all: vec![(c.open, "open"), (c.stick, "stick"), (c.slip, "slip")],
+            degenerate: c.degenerate,
+        },
+        AnyCounts::Rows(c) => {
+            let mut all = vec![(c.inside, "inside"), (c.lower, "at the lower bound")];
+            let others = [(c.upper, "at the upper bound"), (c.equalities, "equalities")];
+            all.extend(others.into_iter().filter(|c| c.0 > 0));
+            Counted { what: "row", unit: "", all, degenerate: c.degenerate }
         }
-
-        fn start(&self, stored: &LinearPoint) -> LcpPoint {
-            stored.to_lcp()
-        }
-    };
-}
-
-impl Form for Lcp {
-    points_of_z!();
-
-    fn size(&self) -> String {
-        count(self.dim(), "variable")
-    }
-
-    fn sizes(&self) -> Object {
-        fields(json!({"rows": self.dim(), "unknowns": self.unknowns()}))
-    }
-
-    fn store(&self, point: LcpPoint, w: Vec<f64>) -> LinearPoint {
-        LinearPoint { z: point.z, w: Some(w) }
     }
 }
 
-impl Form for BoxLcp {
-    points_of_z!();
-
-    fn size(&self) -> String {
-        let bounded = |all: &[f64]| all.iter().filter(|x| x.is_finite()).count();
-        let variables = count(self.dim(), "variable");
-        let (lower, upper) = (bounded(&self.lower), bounded(&self.upper));
-        format!("{variables}, {} and {upper} upper", count(lower, "lower bound"))
+/// What the registry says of a solver, perhaps behind prefixes, of such problems.
+pub fn about(problem: &AnyProblem, solver: &str) -> Option<&'static About> {
+    fn of<P: Registered>(_: &P, solver: &str) -> Option<&'static About> {
+        registry::about::<P>(solver)
     }
-
-    fn sizes(&self) -> Object {
-        fields(json!({"rows": self.dim(), "unknowns": self.unknowns()}))
-    }
-
-    fn store(&self, point: LcpPoint, w: Vec<f64>) -> LinearPoint {
-        LinearPoint { z: point.z, w: Some(w) }
-    }
-}
-
-impl Form for Mlcp {
-    points_of_z!();
-
-    fn size(&self) -> String {
-        format!(
-            "{}, {}, {}",
-            match self.equalities {
-                1 => "1 equality".into(),
-                n => format!("{n} equalities"),
-            },
-            count(self.free, "free variable"),
-            count(self.pairs(), "pair")
-        )
-    }
-
-    fn sizes(&self) -> Object {
-        fields(json!({
-            "rows": self.q.len(),
-            "unknowns": self.unknowns(),
-            "equalities": self.equalities,
-            "free": self.free,
-            "pairs": self.pairs(),
-        }))
-    }
-
-    fn store(&self, point: LcpPoint, mut w: Vec<f64>) -> LinearPoint {
-        w.drain(..self.equalities.min(w.len()));
-        LinearPoint { z: point.z, w: Some(w) }
-    }
-}
-
-impl Form for Hlcp {
-    type Stored = LinearPoint;
-
-    fn size(&self) -> String {
-        count(self.dim(), "pair")
-    }
-
-    fn sizes(&self) -> Object {
-        fields(json!({"rows": self.dim(), "unknowns": self.unknowns(), "pairs": self.dim()}))
-    }
-
-    fn point(&self, stored: &LinearPoint) -> HlcpPoint {
-        stored.to_hlcp()
-    }
-
-    fn start(&self, stored: &LinearPoint) -> HlcpPoint {
-        stored.to_hlcp()
-    }
-
-    fn store(&self, point: HlcpPoint, _: Vec<f64>) -> LinearPoint {
-        LinearPoint { z: point.x, w: Some(point.s) }
-    }
+    with_problem!(problem, p => of(p, solver))
 }
 
 /// Classes of problems: their solvers are listed apart, and may have the same names.
@@ -317,6 +201,11 @@ pub fn offers() -> [Offer; 8] {
         of::<Hlcp>(Kind::Hlcp),
         of::<BoxLcp>(Kind::BoxLcp),
     ]
+}
+
+/// The solvers of one kind of problem.
+pub fn solvers(of: Kind) -> Vec<&'static About> {
+    offers().into_iter().filter(|offer| offer.kind == of).flat_map(|offer| offer.solvers).collect()
 }
 
 /// The problems that a solver takes, in words such as `global`; `None` if no kind of problem has it.

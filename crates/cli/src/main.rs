@@ -1,6 +1,6 @@
 //! The command line of `nonsmooth`: arguments, progress, pictures and exit codes; all numerics live below.
 //!
-//! One file per command, and small shared parts: [`kinds`] (what a command needs of a kind of problem),
+//! One file per command, and small shared parts: [`kinds`] (what is said of each kind of problem),
 //! [`files`] (input and output files), [`report`] (verdicts as text and JSON), [`output`] (the two streams),
 //! [`progress`], [`interrupt`] and [`plot`].
 
@@ -25,6 +25,8 @@ mod solve;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use nonsmooth_io::listed;
+use nonsmooth_problem::Kind;
 
 /// What a command came to; the worst of several files counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -46,13 +48,16 @@ impl Exit {
 
 /// Solve, check, describe and generate frictional contact problems, and solve linear complementarity problems.
 #[derive(Debug, Parser)]
-#[command(name = "nonsmooth", version, after_help = EXAMPLES)]
+#[command(name = "nonsmooth", version, after_help = examples())]
 struct Cli {
     #[command(subcommand)]
     command: Command,
 }
 
-const EXAMPLES: &str = "\
+fn examples() -> String {
+    let (contact, linear) = (listed(|kind| !kind.is_linear()), listed(Kind::is_linear));
+    format!(
+        "\
 Examples:
   nonsmooth gen wall --set rows=8 --out wall.hdf5    a problem to begin with
   nonsmooth info wall.hdf5                           what it is
@@ -64,10 +69,12 @@ Examples:
   nonsmooth list                                     the solvers and their settings
   nonsmooth bench run problems/ --out runs.jsonl     compare solvers on folders of problems
 
-Files of contact problems are FCLIB's HDF5 files, local (W, q, mu) or global (M, H, f, w, mu), in 2D or 3D. Linear
-complementarity problems (LCP, mixed, horizontal, with bounds) are TOML, Matrix Market or Siconos' text.
+Contact problems, local (W, q, mu) or global (M, H, f, w, mu), in 2D or 3D, are {contact}. Linear
+complementarity problems (LCP, mixed, horizontal, with bounds) are {linear}.
 
-Exit codes: 0 solved; 1 not solved; 2 a mistake in a file or an option; 130 Ctrl-C pressed twice.";
+Exit codes: 0 solved; 1 not solved; 2 a mistake in a file or an option; 130 Ctrl-C pressed twice."
+    )
+}
 
 #[derive(Debug, Subcommand)]
 enum Command {

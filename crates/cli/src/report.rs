@@ -5,11 +5,12 @@ use std::path::Path;
 
 /// `1 contact`, `2 contacts`.
 pub use nonsmooth_bench::plural as count;
-use nonsmooth_problem::check::{self, Failing, Measure, Verdict};
+use nonsmooth_problem::check::{self, Failing, Measure};
+use nonsmooth_problem::{AnyProblem, Problem};
 use serde_json::{Value, json};
 
 pub use crate::json::{Object, fields};
-use crate::kinds::{Counts, Form};
+use crate::kinds::{self, AnyVerdict, Counted, counted};
 
 /// A line of a report: what it is about, and the rest.
 pub fn row(text: &mut String, label: &str, rest: impl std::fmt::Display) {
@@ -23,37 +24,38 @@ pub fn number(x: f64) -> String {
 }
 
 /// The file and the size of its problem.
-pub fn problem_json<P: Form>(file: &Path, problem: &P) -> Object {
+pub fn problem_json(file: &Path, problem: &AnyProblem) -> Object {
     let mut all = fields(json!({"file": file.to_string_lossy(), "kind": problem.kind().name()}));
-    all.extend(problem.sizes());
+    all.extend(kinds::sizes(problem));
     all
 }
 
 /// The size of a problem.
-pub fn problem_text<P: Form>(problem: &P) -> String {
-    format!("{}, {}", problem.kind().name(), problem.size())
+pub fn problem_text(problem: &AnyProblem) -> String {
+    format!("{}, {}", problem.kind().name(), kinds::size(problem))
 }
 
 /// The residuals, what of them fails at `tolerance`, the contacts (or rows) by status and the worst of them. Numbers that
 /// are not finite become null.
-pub fn verdict_json<S, C: Counts>(verdict: &Verdict<S, C>, tolerance: f64, worst: usize) -> Object {
+pub fn verdict_json(verdict: &AnyVerdict, tolerance: f64, worst: usize) -> Object {
+    let what = counted(&verdict.counts).what;
     let mut counts = json!(verdict.counts);
     let mut degenerate = counts.as_object_mut().and_then(|counts| counts.remove("degenerate"));
     if uncounted(verdict) {
         (counts, degenerate) = (Value::Null, None);
     }
     let worst = worst_of(verdict, worst)
-        .map(|(which, residual)| json!({(C::WHAT): which, "residual": residual}));
+        .map(|(which, residual)| json!({(what): which, "residual": residual}));
     fields(json!({
         "residual": residual_json(&verdict.measure),
         "failing": verdict.measure.failing(tolerance),
-        (format!("{}s_by_status", C::WHAT)): counts,
+        (format!("{what}s_by_status")): counts,
         "degenerate": degenerate,
-        (format!("worst_{}s", C::WHAT)): worst.collect::<Vec<_>>(),
+        (format!("worst_{what}s")): worst.collect::<Vec<_>>(),
     }))
 }
 
-fn uncounted<S, C: Counts>(verdict: &Verdict<S, C>) -> bool {
+fn uncounted(verdict: &AnyVerdict) -> bool {
     verdict.statuses.is_empty() && !verdict.velocity.is_empty()
 }
 
@@ -96,13 +98,9 @@ fn listed(failing: &[Failing], more: impl Fn(&Failing) -> String) -> String {
 
 /// The residuals, what else than the relative one fails at `tolerance`, the contacts (or rows) by status, and the
 /// `worst` of them where it is they that fail.
-pub fn verdict_text<S, C: Counts>(
-    text: &mut String,
-    verdict: &Verdict<S, C>,
-    tolerance: f64,
-    worst: usize,
-) {
-    residual_text(text, &verdict.measure, C::UNIT);
+pub fn verdict_text(text: &mut String, verdict: &AnyVerdict, tolerance: f64, worst: usize) {
+    let Counted { what, unit, all, degenerate } = counted(&verdict.counts);
+    residual_text(text, &verdict.measure, unit);
     let (relative, others) = failing(&verdict.measure, tolerance);
     if !others.is_empty() {
         let limit = |f: &Failing| {
@@ -114,17 +112,15 @@ pub fn verdict_text<S, C: Counts>(
         };
         row(text, "fails", listed(&others, limit));
     }
+    let what = format!("{what}s");
     if uncounted(verdict) {
-        let what = format!("{}s", C::WHAT);
         return row(text, &what, "not counted: the limit had passed");
     }
-    let counts = &verdict.counts;
-    let degenerate = match counts.degenerate() {
+    let degenerate = match degenerate {
         0 => String::new(),
         n => format!(" ({n} degenerate: near another status)"),
     };
-    let all: Vec<_> = counts.all().iter().map(|(n, what)| format!("{n} {what}")).collect();
-    let what = format!("{}s", C::WHAT);
+    let all: Vec<_> = all.iter().map(|(n, what)| format!("{n} {what}")).collect();
     row(text, &what, all.join(", ") + &degenerate);
     let worst = if relative || others.is_empty() { worst } else { 0 };
     let worst: Vec<_> = worst_of(verdict, worst)
@@ -159,10 +155,7 @@ fn named(parts: &[(&str, Option<f64>)]) -> String {
 }
 
 /// The contacts, or rows, with the largest residuals; those without any are not listed.
-fn worst_of<S, C>(
-    verdict: &Verdict<S, C>,
-    worst: usize,
-) -> impl Iterator<Item = (usize, f64)> + '_ {
+fn worst_of(verdict: &AnyVerdict, worst: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
     // A NaN is as bad as it gets: keep it.
     let bad = verdict.worst.iter().copied().filter(|&(_, x)| x != 0.0);
     bad.take(worst)

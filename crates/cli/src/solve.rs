@@ -5,18 +5,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use nonsmooth_io::Content;
-use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
-use nonsmooth_io::linear::{self, LinearFile, LinearPoint};
-use nonsmooth_problem::check::{ContactStatus, Judged, StatusCounts, Verdict};
-use nonsmooth_problem::{Complementarity, Friction, OfAny, with_complementarity, with_friction};
-use nonsmooth_solve::registry::{self, Registered, Solves};
+use nonsmooth_io::{ProblemFile, StoredPoint, keeper};
+use nonsmooth_problem::{AnyProblem, Problem};
+use nonsmooth_solve::registry::{self, Solves};
 use nonsmooth_solve::settings::{self, SettingsMap};
-use nonsmooth_solve::trace::Trace;
 use nonsmooth_solve::{Answer, Limit, Limits, Sample, Solve, SolveError, Status};
 use serde_json::{Value, json};
 
-use crate::kinds::{Class, Form, takes};
+use crate::kinds::{self, Class, alike, start, takes};
 use crate::progress::Bar;
 use crate::report::{self, row};
 use crate::{Exit, files, interrupt, output, plot};
@@ -29,8 +25,7 @@ use crate::{Exit, files, interrupt, output, plot};
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Files with one problem each: FCLIB's (HDF5), or linear complementarity problems (TOML, Matrix Market, Siconos' text)
-    #[arg(required = true, value_name = "FILE")]
+    #[arg(required = true, value_name = "FILE", help = files::help("Files with one problem each", |_| true))]
     files: Vec<PathBuf>,
     /// The solver, one of `nonsmooth list`
     #[arg(long, value_name = "NAME", default_value = registry::DEFAULT)]
@@ -108,28 +103,8 @@ pub struct Plan<'a> {
     pub progress: bool,
 }
 
-/// What came of a solve; of a contact problem, where nothing else is said.
-pub struct Solved<S = ContactStatus, C = StatusCounts, T = StoredPoint> {
-    /// The loop's word.
-    pub status: Status,
-    /// The judge's word.
-    pub verdict: Verdict<S, C>,
-    /// The best point.
-    pub point: T,
-    /// Steps done.
-    pub iterations: usize,
-    /// Wall clock.
-    pub seconds: f64,
-    /// What the solver says that it did.
-    account: Vec<String>,
-    /// The residuals on the way.
-    history: Vec<Sample>,
-    /// The method's own record.
-    trace: Trace,
-}
-
-/// What came of a solve of a problem P.
-type SolvedOf<P> = Solved<<P as Judged>::Status, <P as Judged>::Counts, <P as Form>::Stored>;
+/// What came of a solve.
+pub type Solved = Answer<AnyProblem>;
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
@@ -154,81 +129,54 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             return Ok(Exit::NotSolved);
         }
         let targets = targets.of(k);
-        let warm = args.warm_start.as_ref().map(Option::as_deref);
         let begun = Instant::now();
         let content = match files::read_within(file, &plan.limits)? {
             Ok(content) => content,
             Err(limit) => return Ok(files::late(file, args.json, limit, files::WHILE_READ)),
         };
+        let kind = content.problem.kind();
+        targets.out.map_or(Ok(()), |path| files::holds("--out", path, kind))?;
+        let guess = match &args.warm_start {
+            None => None,
+            Some(from) => Some(guess(from.as_deref(), file, &content)?),
+        };
         let plan = Plan { begun, ..plan.clone() };
-        match content {
-            Content::Friction(content) => {
-                let guess = match warm {
-                    None => None,
-                    Some(None) => Some(own_guess(file, &content)?),
-                    Some(Some(from)) => Some(guess_of(from, file, &content.problem)?),
-                };
-                let guess = guess.as_ref();
-                let done = with_friction!(&content.problem, p => one(file, p, guess, &plan, args))?;
-                done.keep(file, &plan, targets, |path, solution| {
-                    keep_contact(file, path, content, solution)
-                })
-            }
-            Content::Linear(content) => {
-                targets.out.map_or(Ok(()), linear_name)?;
-                let guess = match warm {
-                    None => None,
-                    Some(None) => Some(own_linear_guess(file, &content)?),
-                    Some(Some(from)) => Some(linear_guess_of(from, file, &content.problem)?),
-                };
-                let guess = guess.as_ref();
-                let problem = &content.problem;
-                let done = with_complementarity!(problem, p => one(file, p, guess, &plan, args))?;
-                done.keep(file, &plan, targets, |path, solution| {
-                    let content = LinearFile { solution: Some(solution), ..content };
-                    linear::write(path, &content).map_err(|e| e.to_string())
-                })
-            }
-        }
+        let solved = solve(file, &content.problem, guess.as_ref(), &plan)?;
+        Done::new(file, &content.problem, &plan, &solved, args)
+            .keep(file, content, solved, &plan, targets)
     };
     Ok(files::each(&args.files, args.json, one_file))
 }
 
-/// The name of a file for a linear complementarity problem.
-pub fn linear_name(path: &Path) -> Result<(), String> {
-    match path.extension().and_then(|e| e.to_str()) {
-        Some("toml" | "mtx") => Ok(()),
-        _ => Err(format!(
-            "--out {}: expected a file name that ends in .toml or .mtx for a linear complementarity problem",
-            path.display()
-        )),
-    }
-}
-
-/// The point of a linear file itself.
-fn own_linear_guess(file: &Path, content: &LinearFile) -> Result<LinearPoint, String> {
-    content.solution.clone().ok_or_else(|| {
-        format!("{}: [solution]: expected a point for --warm-start, found none", file.display())
-    })
-}
-
-/// The point that another linear file, or the one of the same name in a directory, holds for `problem`.
-fn linear_guess_of(
-    from: &Path,
-    file: &Path,
-    problem: &Complementarity,
-) -> Result<LinearPoint, String> {
+/// The point to start from that a file proposes itself, or that another one, or that of the same name in a directory, holds for its problem.
+fn guess(from: Option<&Path>, file: &Path, content: &ProblemFile) -> Result<StoredPoint, String> {
+    let Some(from) = from else {
+        let about = files::about(file)?;
+        // Formats without guesses propose the solution.
+        let (place, point) = match about.guess {
+            Some(place) => (place, content.guesses.first()),
+            None => (about.solution, content.solution.as_ref()),
+        };
+        let file = file.display();
+        return point.cloned().ok_or_else(|| {
+            format!("{file}: {place}: expected a point for --warm-start, found none")
+        });
+    };
     let path = other_file(from, file);
-    let other = linear::read(&path).map_err(|e| format!("--warm-start {e}"))?;
-    let size = |p: &Complementarity| with_complementarity!(p, p => report::problem_text(p));
-    let (ours, theirs) = (size(problem), size(&other.problem));
+    let other = ProblemFile::read(&path).map_err(|e| format!("--warm-start {e}"))?;
     let refused = |expected: String, found: &str| {
         format!("--warm-start {}: expected {expected}, found {found}", path.display())
     };
+    let (ours, theirs) = (alike(&content.problem), alike(&other.problem));
     if ours != theirs {
         return Err(refused(format!("{ours} as in {}", file.display()), &theirs));
     }
-    other.solution.ok_or_else(|| refused("a [solution]".into(), "none"))
+    let point = other.solution.or(other.guesses.into_iter().next());
+    let about = files::about(&path)?;
+    point.ok_or_else(|| match about.guess {
+        Some(guess) => refused(format!("a {} or {guess}", about.solution), "neither"),
+        None => refused(format!("a {}", about.solution), "none"),
+    })
 }
 
 /// A file, or that of the same name in a directory.
@@ -237,32 +185,6 @@ fn other_file(from: &Path, file: &Path) -> PathBuf {
         Some(name) if from.is_dir() => from.join(name),
         _ => from.into(),
     }
-}
-
-/// The point that a file proposes itself.
-fn own_guess(file: &Path, content: &FclibFile) -> Result<StoredPoint, String> {
-    content.guesses.first().cloned().ok_or_else(|| {
-        format!("{}: /guesses/1: expected a point for --warm-start, found none", file.display())
-    })
-}
-
-/// The point that another file, or the one of the same name in a directory, holds for `problem`.
-fn guess_of(from: &Path, file: &Path, problem: &Friction) -> Result<StoredPoint, String> {
-    let path = other_file(from, file);
-    let other = fclib::read(&path).map_err(|e| format!("--warm-start {e}"))?;
-    let refused = |expected: String, found: String| {
-        format!("--warm-start {}: expected {expected}, found {found}", path.display())
-    };
-    let size = |p: &Friction| {
-        let dimension = p.kind().dimension();
-        format!("{} in {dimension}D", report::count(p.contacts(), "contact"))
-    };
-    let (ours, theirs) = (size(problem), size(&other.problem));
-    if ours != theirs {
-        return Err(refused(format!("{ours} as in {}", file.display()), theirs));
-    }
-    let point = other.solution.or(other.guesses.into_iter().next());
-    point.ok_or_else(|| refused("a /solution or /guesses/1".into(), "neither".into()))
 }
 
 /// Limits from options; Ctrl-C is one of them. To be called once.
@@ -287,70 +209,60 @@ fn cancelled(flag: &Arc<AtomicBool>) -> bool {
     flag.load(Ordering::Relaxed)
 }
 
-fn one<P: Form + Registered + OfAny>(
-    file: &Path,
-    problem: &P,
-    guess: Option<&P::Stored>,
-    plan: &Plan,
-    args: &Args,
-) -> Result<Done<P::Stored>, String> {
-    let solved = solve(file, problem, guess, plan)?;
-    let report = match (args.json, args.quiet) {
-        (true, _) => json_line(file, problem, plan, &solved),
-        (false, true) => String::new(),
-        (false, false) => text(file, problem, plan, &solved),
-    };
-    let record = args.trace.as_ref().map(|_| {
-        let mut all = report::problem_json(file, problem);
-        // The rows of a trace are pivots or iterations.
-        all.remove("rows");
-        all.extend(report::fields(json!({
-            "solver": plan.solver,
-            "settings": plan.settings,
-            "status": solved.status.name(),
-            "iterations": solved.iterations,
-        })));
-        all.extend(report::fields(json!(solved.trace)));
-        format!("{}\n", json!(all))
-    });
-    let Solved { status, point, history, trace, .. } = solved;
-    let is_solved = status == Status::Solved;
-    let proof = certificate(&status).map(|certificate| {
-        let mut all = report::problem_json(file, problem);
-        all.insert("status".into(), json!(status.name()));
-        all.insert("certificate".into(), certificate);
-        format!("{}\n", json!(all))
-    });
-    Ok(Done { report, point, history, trace, record, proof, is_solved })
-}
-
 /// What is left to print and to write of a solve.
-struct Done<T> {
+struct Done {
     report: String,
-    point: T,
-    history: Vec<Sample>,
-    trace: Trace,
     /// The trace as JSON, if asked for.
     record: Option<String>,
     /// The certificate as JSON, where there is one.
     proof: Option<String>,
-    is_solved: bool,
 }
 
-impl<T> Done<T> {
-    /// Writes the files asked for, the solution by `write`, and prints the report.
+impl Done {
+    fn new(file: &Path, problem: &AnyProblem, plan: &Plan, solved: &Solved, args: &Args) -> Self {
+        let report = match (args.json, args.quiet) {
+            (true, _) => json_line(file, problem, plan, solved),
+            (false, true) => String::new(),
+            (false, false) => text(file, problem, plan, solved),
+        };
+        let status = &solved.status;
+        let record = args.trace.as_ref().map(|_| {
+            let mut all = report::problem_json(file, problem);
+            // The rows of a trace are pivots or iterations.
+            all.remove("rows");
+            all.extend(report::fields(json!({
+                "solver": plan.solver,
+                "settings": plan.settings,
+                "status": status.name(),
+                "iterations": solved.iterations,
+            })));
+            all.extend(report::fields(json!(solved.trace)));
+            format!("{}\n", json!(all))
+        });
+        let proof = certificate(status).map(|certificate| {
+            let mut all = report::problem_json(file, problem);
+            all.insert("status".into(), json!(status.name()));
+            all.insert("certificate".into(), certificate);
+            format!("{}\n", json!(all))
+        });
+        Self { report, record, proof }
+    }
+
+    /// Writes the files asked for and prints the report.
     fn keep(
         self,
         file: &Path,
+        content: ProblemFile,
+        solved: Solved,
         plan: &Plan,
         targets: Target,
-        write: impl FnOnce(&Path, T) -> Result<(), String>,
     ) -> Result<Exit, String> {
-        let Self { report, point, history, trace, record, proof, is_solved } = self;
+        let Self { report, record, proof } = self;
         let pictures = || {
             if let Some(path) = targets.plot {
                 let title = format!("{} on {}", plan.solver, name(file));
-                let svg = plot::svg(&title, &history, &trace, plan.limits.tolerance)?;
+                let tolerance = plan.limits.tolerance;
+                let svg = plot::svg(&title, &solved.history, &solved.trace, tolerance)?;
                 files::write_text("--plot", path, &svg)?;
             }
             for (option, path, text) in
@@ -363,42 +275,42 @@ impl<T> Done<T> {
             Ok(())
         };
         // Files first: whoever reads the report may be gone. But a file that fails must not cost the report.
-        let kept = targets.out.map_or(Ok(()), |path| write(path, point)).and_then(|()| pictures());
+        let kept = targets.out.map_or(Ok(()), |path| keep(file, path, content, &solved));
+        let kept = kept.and_then(|()| pictures());
         output::print(&report);
-        kept.map(|()| Exit::solved(is_solved))
+        kept.map(|()| Exit::solved(solved.is_solved()))
     }
 }
 
-/// Writes a contact problem with its solution.
-fn keep_contact(
-    file: &Path,
-    path: &Path,
-    content: FclibFile,
-    solution: StoredPoint,
-) -> Result<(), String> {
-    // In place, all else that the file holds stays as it is.
-    let written = if files::same(file, path) {
-        fclib::write_solution(path, &solution)
-    } else {
-        fclib::write(path, &FclibFile { solution: Some(solution), ..content })
-    };
+/// Writes a problem that was read from `file` with its solution.
+fn keep(file: &Path, path: &Path, content: ProblemFile, solved: &Solved) -> Result<(), String> {
+    let content = with_solution(content, solved);
+    let in_place = files::same(file, path);
+    let written = if in_place { content.write_solution(path) } else { content.write(path) };
     written.map_err(|e| e.to_string())
 }
 
+/// What a file holds after a solve.
+pub fn with_solution(content: ProblemFile, solved: &Solved) -> ProblemFile {
+    let (point, velocity) = (solved.point.clone(), solved.verdict.velocity.clone());
+    let solution = Some(StoredPoint::new(&content.problem, point, velocity));
+    ProblemFile { solution, ..content }
+}
+
 /// Solves a problem from a stored point, or from zero. `file` is its name in messages.
-pub fn solve<P: Form + Registered + OfAny>(
+pub fn solve(
     file: &Path,
-    problem: &P,
-    start: Option<&P::Stored>,
+    problem: &AnyProblem,
+    from: Option<&StoredPoint>,
     plan: &Plan,
-) -> Result<SolvedOf<P>, String> {
+) -> Result<Solved, String> {
     let mut how = Solve::new().solver(plan.solver).settings(plan.settings.clone());
     how = how.limits(files::left(&plan.limits, plan.begun));
-    if let Some(stored) = start {
-        how = how.warm(&problem.start(stored));
+    if let Some(stored) = from {
+        how = how.warm(&start(problem, stored));
     }
     let mut bar = Bar::new(&name(file), plan.limits.tolerance, plan.progress);
-    let answer = how.watched(problem, &mut |p| bar.watch(p)).map_err(|e| {
+    how.watched(problem, &mut |p| bar.watch(p)).map_err(|e| {
         let file = file.display();
         match (&e, takes(plan.solver)) {
             (SolveError::UnknownSolver { name, .. }, Some(problems)) => {
@@ -409,12 +321,7 @@ pub fn solve<P: Form + Registered + OfAny>(
             }
             _ => format!("{file}: {e}"),
         }
-    })?;
-    drop(bar);
-    let Answer { point, status, verdict, iterations, seconds, account, history, trace, .. } =
-        answer;
-    let point = problem.store(point, verdict.velocity.clone());
-    Ok(Solved { status, verdict, iterations, seconds, point, account, history, trace })
+    })
 }
 
 fn name(file: &Path) -> String {
@@ -438,7 +345,7 @@ fn certificate(status: &Status) -> Option<Value> {
 /// The worst contacts that a report of an unsolved problem lists.
 const WORST: usize = 3;
 
-fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &SolvedOf<P>) -> String {
+fn json_line(file: &Path, problem: &AnyProblem, plan: &Plan, solved: &Solved) -> String {
     let Solved { status, verdict, account, .. } = solved;
     let mut all = report::problem_json(file, problem);
     all.extend(report::fields(json!({
@@ -458,12 +365,7 @@ fn json_line<P: Form>(file: &Path, problem: &P, plan: &Plan, solved: &SolvedOf<P
     format!("{}\n", json!(all))
 }
 
-fn text<P: Form + Registered>(
-    file: &Path,
-    problem: &P,
-    plan: &Plan,
-    solved: &SolvedOf<P>,
-) -> String {
+fn text(file: &Path, problem: &AnyProblem, plan: &Plan, solved: &Solved) -> String {
     let Solved { status, verdict, .. } = solved;
     let tolerance = plan.limits.tolerance;
     let is_solved = *status == Status::Solved;
@@ -526,18 +428,13 @@ fn stuck(history: &[Sample]) -> Option<usize> {
 const OTHER_WAYS: [&str; 2] = ["local=projection", "ordering=shuffled"];
 
 /// What may help where the problem is not solved.
-fn hint<P: Form + Registered>(
-    problem: &P,
-    solved: &SolvedOf<P>,
-    plan: &Plan,
-    stuck: bool,
-) -> Option<String> {
+fn hint(problem: &AnyProblem, solved: &Solved, plan: &Plan, stuck: bool) -> Option<String> {
     // Iterations are of no help where the contacts are as they should be.
     let failing = solved.verdict.measure.failing(plan.limits.tolerance);
     if !failing.iter().any(|f| ["relative residual", "primal", "dual", "rows"].contains(&f.what)) {
         return None;
     }
-    let about = registry::about::<P>(plan.solver)?;
+    let about = kinds::about(problem, plan.solver)?;
     let more = match &solved.status {
         Status::Solved | Status::Infeasible(_) | Status::Limit(Limit::Cancelled) => return None,
         Status::Limit(_) if stuck => OTHER_WAYS
@@ -557,7 +454,7 @@ fn hint<P: Form + Registered>(
     };
     // The default, then the first solver of each other family.
     let mut families = vec![about.family];
-    let mut abouts = registry::abouts::<P>();
+    let mut abouts = kinds::solvers(problem.kind());
     abouts.retain(|a| a.solves == Solves::Law);
     abouts.sort_by_key(|a| a.name != registry::DEFAULT);
     let others = abouts.into_iter().filter_map(|about| {
@@ -594,9 +491,11 @@ struct Target<'a> {
 
 impl Targets {
     fn new(args: &Args) -> Result<Self, String> {
+        // In a directory, formats that hold no solution give way to others.
+        let names: Vec<_> = args.files.iter().map(|file| keeper(file)).collect();
         let place = |option: &str, to: &Option<PathBuf>, extension| {
             let to = to.as_deref();
-            to.map(|to| files::targets(option, to, &named(&args.files), extension)).transpose()
+            to.map(|to| files::targets(option, to, &names, extension)).transpose()
         };
         let out = place("--out", &args.out, None)?;
         let plot = place("--plot", &args.plot, Some("svg"))?;
@@ -639,18 +538,6 @@ impl Targets {
             certificate: path(&self.certificate, k),
         }
     }
-}
-
-/// The names of results in a directory: formats that hold no solution give way to ours.
-fn named(inputs: &[PathBuf]) -> Vec<PathBuf> {
-    let foreign = |p: &Path| p.extension().is_some_and(|e| e == "dat" || e == "mtx");
-    let each = inputs.iter().map(|p| if foreign(p) { p.with_extension("toml") } else { p.clone() });
-    each.collect()
-}
-
-/// A problem known only by its kind, solved as above.
-pub fn solve_any(file: &Path, problem: &Friction, plan: &Plan) -> Result<Solved, String> {
-    with_friction!(problem, p => solve(file, p, None, plan))
 }
 
 #[cfg(test)]

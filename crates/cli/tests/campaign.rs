@@ -8,8 +8,7 @@ use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use common::Folder;
-use nonsmooth_io::fclib::{self, FclibFile};
-use nonsmooth_problem::Friction;
+use nonsmooth_io::ProblemFile;
 use nonsmooth_problem::planted::Planted;
 use serde_json::Value;
 
@@ -20,8 +19,8 @@ fn problems(folder: &Folder, count: u64) {
             folder.path("problems").join(["arch", "pile", "stack", "wall"][seed as usize % 4]);
         std::fs::create_dir_all(&family).unwrap();
         let planted = Planted { contacts: 2, dofs: 12, seed, ..Planted::default() };
-        let problem = Friction::Local3(planted.local::<3>().0);
-        fclib::write(family.join(format!("p{seed}.hdf5")), &FclibFile::new(problem)).unwrap();
+        let (problem, _) = planted.local::<3>();
+        ProblemFile::new(problem).write(family.join(format!("p{seed}.hdf5"))).unwrap();
     }
 }
 

@@ -3,10 +3,10 @@
 mod common;
 
 use common::{Folder, has_keys};
-use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
+use nonsmooth_io::{ProblemFile, StoredPoint};
 use nonsmooth_linalg::Csc;
 use nonsmooth_problem::planted::Planted;
-use nonsmooth_problem::{Friction, FrictionGlobal, RowsGlobal, with_friction};
+use nonsmooth_problem::{AnyPoint, Friction, FrictionGlobal, RowsGlobal};
 use nonsmooth_scenes::SceneEntry;
 
 const JUDGED: &str = "file kind contacts unknowns status message tolerance residual/absolute residual/relative \
@@ -71,10 +71,12 @@ fn an_unsolved_problem_exits_with_1_and_says_what_to_try() {
 fn what_fails_besides_the_relative_residual_is_named() {
     let folder = Folder::with_problems();
     folder.run("solve wall.hdf5 --out off.hdf5 --quiet").exits(0);
-    let mut file = fclib::read(folder.path("off.hdf5")).unwrap();
-    let v = file.solution.as_mut().and_then(|s| s.v.as_mut()).unwrap();
-    v.iter_mut().for_each(|v| *v += 1.0);
-    fclib::write(folder.path("off.hdf5"), &file).unwrap();
+    let mut file = ProblemFile::read(folder.path("off.hdf5")).unwrap();
+    let Some(AnyPoint::Global(point)) = file.solution.as_mut().map(|s| &mut s.point) else {
+        panic!("a solution with velocities")
+    };
+    point.v.iter_mut().for_each(|v| *v += 1.0);
+    file.write(folder.path("off.hdf5")).unwrap();
     let text = folder.run("check off.hdf5").exits(1).stdout;
     let (headline, rows) = text.split_once('\n').unwrap();
     assert!(headline.contains("; fails ") && headline.contains("dynamics "), "{text}");
@@ -96,7 +98,7 @@ fn contradictory_constraints_are_named_and_no_iterations_proposed() {
         Csc::from_triplets(problem.dofs(), 2, twice).unwrap(),
         vec![old.b[0], old.b[0] + 1.0],
     ));
-    fclib::write(folder.path("a.hdf5"), &FclibFile::new(Friction::Global3(problem))).unwrap();
+    ProblemFile::new(Friction::Global3(problem)).write(folder.path("a.hdf5")).unwrap();
     let text = folder.run("solve a.hdf5 --max-iter 1e3").exits(1).stdout;
     assert!(text.contains("; fails bilateral constraints "), "{text}");
     assert!(!text.contains("--max-iter"), "{text}");
@@ -108,15 +110,13 @@ fn a_singular_mass_matrix_is_described() {
     let (mut problem, point) = Planted::default().global::<3>();
     let (n, a) = (problem.dofs(), problem.M.triplets().filter(|t| t.0 != 0 && t.1 != 0));
     problem.M = Csc::from_triplets(n, n, a).unwrap();
-    let mut file = FclibFile::new(Friction::Global3(problem));
+    let mut file = ProblemFile::new(Friction::Global3(problem));
     for stored in [false, true] {
         file.solution = stored.then(|| StoredPoint {
-            v: Some(point.v.clone()),
-            u: vec![0.0; point.r.len()],
-            r: point.r.clone(),
-            lambda: None,
+            point: point.clone().into(),
+            partner: Some(vec![0.0; point.r.len()]),
         });
-        fclib::write(folder.path("a.hdf5"), &file).unwrap();
+        file.write(folder.path("a.hdf5")).unwrap();
         let text = folder.run("info a.hdf5").exits(0).stdout;
         assert!(text.contains("M is singular: M "), "{text}");
         let line = folder.run("info a.hdf5 --json").exits(0).json().remove(0);
@@ -151,19 +151,19 @@ fn check_agrees_with_solve() {
 #[test]
 fn a_written_file_keeps_everything_else() {
     let folder = Folder::with_problems();
-    let before = fclib::read(folder.path("wall.hdf5")).unwrap();
+    let before = ProblemFile::read(folder.path("wall.hdf5")).unwrap();
     folder.run("solve wall.hdf5 --out copy.hdf5 --quiet").exits(0);
-    let copy = fclib::read(folder.path("copy.hdf5")).unwrap();
+    let copy = ProblemFile::read(folder.path("copy.hdf5")).unwrap();
     assert_eq!((&copy.problem, &copy.info), (&before.problem, &before.info));
     assert!(copy.info.title.as_deref().unwrap().starts_with("wall rows=3"));
 
     // In place, and through another name of the same file.
     let mut with_guess = before.clone();
     with_guess.guesses = copy.solution.clone().into_iter().collect();
-    fclib::write(folder.path("wall.hdf5"), &with_guess).unwrap();
+    with_guess.write(folder.path("wall.hdf5")).unwrap();
     folder.run("solve wall.hdf5 --out ./wall.hdf5 --quiet").exits(0);
-    let after = fclib::read(folder.path("wall.hdf5")).unwrap();
-    assert_eq!(after, FclibFile { solution: copy.solution, ..with_guess });
+    let after = ProblemFile::read(folder.path("wall.hdf5")).unwrap();
+    assert_eq!(after, ProblemFile { solution: copy.solution, ..with_guess });
 
     // Again and again, without a larger file; what a killed writer left goes.
     let size = || std::fs::metadata(folder.path("wall.hdf5")).unwrap().len();
@@ -210,18 +210,20 @@ fn every_kind_is_solved_warm_started_and_checked() {
     ];
     for problem in cases {
         let kind = problem.kind().name();
-        fclib::write(folder.path("a.hdf5"), &FclibFile::new(problem)).unwrap();
+        ProblemFile::new(problem).write(folder.path("a.hdf5")).unwrap();
         let cold = folder.run("solve a.hdf5 --out b.hdf5 --json").exits(0).json().remove(0);
         assert_eq!(cold["kind"], kind);
         folder.run("check b.hdf5").exits(0);
         folder.run("info b.hdf5").exits(0);
 
         // The solution as a guess, with a velocity that must not be believed.
-        let mut file = fclib::read(folder.path("b.hdf5")).unwrap();
-        let guess: StoredPoint = file.solution.take().unwrap();
-        let v = guess.v.as_ref().map(|v| vec![7.0; v.len()]);
-        file.guesses = vec![StoredPoint { v, ..guess }];
-        fclib::write(folder.path("c.hdf5"), &file).unwrap();
+        let mut file = ProblemFile::read(folder.path("b.hdf5")).unwrap();
+        let mut guess: StoredPoint = file.solution.take().unwrap();
+        if let AnyPoint::Global(point) = &mut guess.point {
+            point.v.fill(7.0);
+        }
+        file.guesses = vec![guess];
+        file.write(folder.path("c.hdf5")).unwrap();
         let warm = folder.run("solve c.hdf5 --warm-start --json").exits(0).json().remove(0);
         assert_eq!(warm["iterations"], 0, "{kind}");
         assert!(cold["iterations"].as_u64() > Some(0));
@@ -248,10 +250,12 @@ fn every_kind_is_solved_warm_started_and_checked() {
 fn a_bad_start_costs_nothing() {
     let folder = Folder::with_problems();
     folder.run("solve wall.hdf5 --out bad.hdf5 --quiet").exits(0);
-    let mut file = fclib::read(folder.path("bad.hdf5")).unwrap();
-    let solution = file.solution.as_mut().unwrap();
-    solution.r.iter_mut().for_each(|r| *r = -1e4);
-    fclib::write(folder.path("bad.hdf5"), &file).unwrap();
+    let mut file = ProblemFile::read(folder.path("bad.hdf5")).unwrap();
+    let Some(AnyPoint::Global(point)) = file.solution.as_mut().map(|s| &mut s.point) else {
+        panic!("a solution with velocities")
+    };
+    point.r.fill(-1e4);
+    file.write(folder.path("bad.hdf5")).unwrap();
     let cold = folder.run("solve wall.hdf5 --json").exits(0).json().remove(0);
     let warm = folder.run("solve wall.hdf5 --warm-start=bad.hdf5 --json").exits(0).json().remove(0);
     assert_eq!(warm["iterations"], cold["iterations"]);
@@ -267,7 +271,7 @@ fn auto_says_whether_a_solution_exists_where_it_finds_none() {
     let columns = [(0, 0, 1.0), (1, 1, 1.0), (2, 2, 1.0), (0, 3, -1.0), (1, 4, 1.0), (2, 5, 1.0)];
     problem.H = Csc::from_triplets(n, 6, columns.into_iter()).unwrap();
     problem.w = vec![-1.0, 0.0, 0.0, -1.0, 0.0, 0.0];
-    fclib::write(folder.path("a.hdf5"), &FclibFile::new(Friction::Global3(problem))).unwrap();
+    ProblemFile::new(Friction::Global3(problem)).write(folder.path("a.hdf5")).unwrap();
     let text = folder.run("solve a.hdf5").exits(1).stdout;
     assert!(text.contains("infeasible: no admissible motion exists; proved in exact"), "{text}");
     assert!(text.contains("existence of a solution: "), "{text}");
@@ -351,7 +355,7 @@ fn every_scene_is_generated_solved_and_drawn() {
         assert!(one.contains(&format!("\n{scene}: ")) && one.len() < text.len());
         let plain = format!("gen {scene} --out a.hdf5 --draw a.svg");
         assert!(folder.run(&plain).exits(0).stdout.contains("friction_global_3d"));
-        assert!(fclib::read(folder.path("a.hdf5")).unwrap().solution.is_none());
+        assert!(ProblemFile::read(folder.path("a.hdf5")).unwrap().solution.is_none());
 
         // The chute of seed 0 is one that `auto` does not solve in a minute (NSGS takes 16000 sweeps).
         let seed = if scene == "chute" { "--set seed=1" } else { "" };
@@ -361,13 +365,14 @@ fn every_scene_is_generated_solved_and_drawn() {
         );
         assert!(folder.run(&solved).exits(0).stdout.contains("friction_local_3d"));
         folder.run("check b.hdf5 --tol 1e-4").exits(0);
-        let file = fclib::read(folder.path("b.hdf5")).unwrap();
+        let file = ProblemFile::read(folder.path("b.hdf5")).unwrap();
         let settings = SceneEntry::find(scene).unwrap().settings();
         let default = |key: &str| settings.iter().find(|s| s.key == key).unwrap().default.clone();
         let density = format!("density={}", default("density"));
-        assert!(file.info.description.unwrap().contains(&density));
+        assert!(file.info.description.as_ref().unwrap().contains(&density));
         assert_eq!(file.info.dofs.unwrap() % 6, 0);
-        with_friction!(&file.problem, p => assert!(p.mu.iter().all(|&mu| default("mu") == mu)));
+        let problem = file.contacts(&folder.path("b.hdf5")).unwrap();
+        assert!(problem.mu().iter().all(|&mu| default("mu") == mu));
         let [plain, impulses] =
             ["a.svg", "b.svg"].map(|name| std::fs::read_to_string(folder.path(name)).unwrap());
         assert!(plain.starts_with("<svg") && impulses.contains("impulses: "));
@@ -376,7 +381,7 @@ fn every_scene_is_generated_solved_and_drawn() {
     folder.run("gen wall --solve --time-limit 0 --out c.hdf5").exits(1);
     folder.run("gen wall --solve --tol 1e-3 --out d.hdf5").exits(0);
     for file in ["c.hdf5", "d.hdf5"] {
-        assert!(fclib::read(folder.path(file)).unwrap().solution.is_some());
+        assert!(ProblemFile::read(folder.path(file)).unwrap().solution.is_some());
     }
 }
 
@@ -396,9 +401,10 @@ fn suites_expand_to_files_by_family() {
         ("stack/stack-count3-seed1-global", 12),
         ("chain/one", 10),
     ] {
-        let file = fclib::read(folder.path(&format!("all/{name}.hdf5"))).unwrap();
-        assert_eq!(file.problem.contacts(), contacts, "{name}");
-        let local = file.problem.kind().name().contains("local");
+        let file = ProblemFile::read(folder.path(&format!("all/{name}.hdf5"))).unwrap();
+        let problem = file.contacts(&folder.path(name)).unwrap();
+        assert_eq!(problem.contacts(), contacts, "{name}");
+        let local = problem.kind().name().contains("local");
         assert_eq!(local, name.ends_with("local"), "{name}");
     }
 }
@@ -451,7 +457,7 @@ fn exists_proves_refutes_and_writes_its_certificate() {
     assert!(kept["motion"].as_array().is_some_and(|v| v.len() > 6), "{kept}");
 
     for mu in [0.0, 0.8] {
-        fclib::write(folder.path("squeezed.hdf5"), &FclibFile::new(squeezed(mu))).unwrap();
+        ProblemFile::new(squeezed(mu)).write(folder.path("squeezed.hdf5")).unwrap();
         let text = folder.run("exists squeezed.hdf5").exits(1).stdout;
         assert!(text.contains("solution none, proved: ") && text.contains("2 contacts"), "{text}");
         let line = folder.run("exists squeezed.hdf5 --json").exits(1).json().remove(0);
@@ -469,7 +475,7 @@ fn info_says_whether_a_solution_exists() {
     let folder = Folder::with_problems();
     let text = folder.run("info wall.hdf5").exits(0).stdout;
     assert!(text.contains("  existence  proved: "), "{text}");
-    fclib::write(folder.path("squeezed.hdf5"), &FclibFile::new(squeezed(0.3))).unwrap();
+    ProblemFile::new(squeezed(0.3)).write(folder.path("squeezed.hdf5")).unwrap();
     let short = folder.run("info squeezed.hdf5 --json").exits(0).json().remove(0);
     assert_eq!(short["existence"]["verdict"], "unknown");
     let long = folder.run("info squeezed.hdf5 --existence --json").exits(0).json().remove(0);
@@ -496,7 +502,7 @@ fn diagnose_explains_and_names_solvers_that_exist() {
             assert!(known.contains(&name), "{name}");
         }
     }
-    fclib::write(folder.path("squeezed.hdf5"), &FclibFile::new(squeezed(1.5))).unwrap();
+    ProblemFile::new(squeezed(1.5)).write(folder.path("squeezed.hdf5")).unwrap();
     let text = folder.run("diagnose squeezed.hdf5").exits(0).stdout;
     assert!(text.contains("No solver can succeed") && !text.contains("--solver"), "{text}");
 }

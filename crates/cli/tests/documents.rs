@@ -5,9 +5,9 @@ mod common;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use nonsmooth_io::fclib;
+use nonsmooth_io::ProblemFile;
+use nonsmooth_problem::Friction;
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::{Friction, Problem, with_friction};
 use nonsmooth_scenes::SCENES;
 
 use crate::common::{Folder, Run};
@@ -41,13 +41,14 @@ fn the_suite_can_be_generated() {
         for entry in std::fs::read_dir(out.join(scene.name)).expect(scene.name) {
             let path = entry.unwrap().path();
             assert!(path.metadata().unwrap().len() < 20_000_000, "{}", path.display());
-            let file = fclib::read(&path).unwrap();
-            if let Friction::Global3(problem) = &file.problem {
+            let file = ProblemFile::read(&path).unwrap();
+            let problem = file.contacts(&path).unwrap();
+            if let Friction::Global3(problem) = problem {
                 assert_eq!(file.info.dofs, Some(problem.dofs()), "{}", path.display());
             }
-            least = least.min(file.problem.contacts());
-            most = most.max(file.problem.contacts());
-            kinds.insert(file.problem.kind().name());
+            least = least.min(problem.contacts());
+            most = most.max(problem.contacts());
+            kinds.insert(problem.kind().name());
         }
     }
     assert!(least == 3 && (4000..5000).contains(&most) && kinds.len() == 2, "{least} {most}");
@@ -67,17 +68,13 @@ fn the_examples_are_what_their_commands_make() {
             words.nth(1).unwrap_or_else(|| panic!("{line}: no {option}"))
         };
         let (problem, picture) = (after("--out"), after("--draw"));
-        let anew = fclib::read(folder.path(problem)).unwrap();
-        let kept = fclib::read(root().join("examples").join(problem)).unwrap();
+        let anew = ProblemFile::read(folder.path(problem)).unwrap();
+        let kept = ProblemFile::read(root().join("examples").join(problem)).unwrap();
         assert_eq!(anew.info, kept.info, "{line}");
         let solution = kept.solution.expect("the examples hold solutions");
-        with_friction!(&anew.problem, p => {
-            let mut point = p.origin();
-            point.r.clone_from(&solution.r);
-            // The velocities of a global problem follow from r; the residual looks at r alone.
-            let verdict = p.judge(&point, 1e-8).unwrap();
-            assert!(verdict.measure.relative <= 1e-9, "{line}: {:?}", verdict.measure);
-        });
+        // The velocities of a global problem follow from r; the residual looks at r alone.
+        let verdict = anew.problem.judge(&solution.point, 1e-8).unwrap();
+        assert!(verdict.measure.relative <= 1e-9, "{line}: {:?}", verdict.measure);
         assert!(root().join("examples").join(picture).exists(), "{line}");
         made += 1;
     }

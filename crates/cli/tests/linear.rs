@@ -5,7 +5,8 @@ mod common;
 use std::path::{Path, PathBuf};
 
 use common::{Folder, Run, has_keys};
-use nonsmooth_io::linear;
+use nonsmooth_io::ProblemFile;
+use nonsmooth_problem::AnyPoint;
 use serde_json::Value;
 
 const JUDGED: &str = "file kind rows unknowns status message tolerance residual/absolute residual/relative \
@@ -90,14 +91,18 @@ fn problems_are_solved_from_every_format() {
     let out = "solve lcp_two.dat two.mtx string.toml --solver projected_jacobi --tol 1e-12 --out solved/ --quiet";
     folder.run(out).exits(0);
     folder.run("check solved/lcp_two.toml solved/two.toml solved/string.toml --tol 1e-12").exits(0);
-    let [a, b] =
-        ["lcp_two", "two"].map(|n| linear::read(folder.path(&format!("solved/{n}.toml"))).unwrap());
-    let (a, b) = (a.solution.unwrap(), b.solution.unwrap());
-    assert!(a.z.iter().zip(&b.z).all(|(a, b)| (a - b).abs() < 1e-10), "{a:?} {b:?}");
-    assert!((a.z[0] - 26.0 / 14.0).abs() < 1e-10, "M is read by columns: {a:?}");
+    let [a, b] = ["lcp_two", "two"].map(|name| {
+        let file = ProblemFile::read(folder.path(&format!("solved/{name}.toml"))).unwrap();
+        match file.solution.unwrap().point {
+            AnyPoint::Lcp(point) => point.z,
+            other => panic!("{other:?}"),
+        }
+    });
+    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 1e-10), "{a:?} {b:?}");
+    assert!((a[0] - 26.0 / 14.0).abs() < 1e-10, "M is read by columns: {a:?}");
     // Titles stay.
-    let kept = linear::read(folder.path("solved/string.toml")).unwrap();
-    assert_eq!(kept.title.as_deref(), Some("string over an obstacle"));
+    let kept = ProblemFile::read(folder.path("solved/string.toml")).unwrap();
+    assert_eq!(kept.info.title.as_deref(), Some("string over an obstacle"));
     // Matrix Market has the solution beside; in place, the file itself gets it.
     folder
         .run("solve two.mtx --solver projected_jacobi --tol 1e-12 --out again.mtx --quiet")
@@ -255,7 +260,13 @@ fn mistakes_are_named() {
     std::fs::write(folder.path("other.txt"), "some text").unwrap();
     let cases: &[(&str, &[&str])] = &[
         ("solve bad.toml", &["bad.toml: M: expected 1 × 1 (square), found 1 × 2"]),
-        ("info other.txt", &["other.txt: expected an FCLIB file (HDF5)", "found another text"]),
+        (
+            "info other.txt",
+            &[
+                "other.txt: expected a file of FCLIB's HDF5 (.hdf5, .h5), TOML (.toml), ",
+                "found another text",
+            ],
+        ),
         (
             "solve string.toml --solver nsgs",
             &["solver `nsgs` takes friction problems only (this file: lcp)"],

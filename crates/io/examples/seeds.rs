@@ -7,12 +7,13 @@
 use std::path::Path;
 use std::process::Command;
 
-use nonsmooth_io::fclib::{self, FclibFile, Info, StoredPoint};
-use nonsmooth_io::linear::{LinearFile, LinearPoint, toml};
+use nonsmooth_io::fclib::Fclib;
+use nonsmooth_io::linear::toml::Toml;
+use nonsmooth_io::{Format, Info, ProblemFile, StoredPoint};
 use nonsmooth_linalg::{Bsr, Csc, Dense, Matrix};
 use nonsmooth_problem::{
-    BoxLcp, Complementarity, Friction, FrictionGlobal, FrictionLocal, Hlcp, Lcp, Mlcp, RowsGlobal,
-    RowsLocal,
+    BoxLcp, FrictionGlobal, FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Lcp, LcpPoint, LocalPoint,
+    Mlcp, RowsGlobal, RowsLocal,
 };
 
 fn diagonal(rows: usize, columns: usize) -> Csc {
@@ -37,52 +38,44 @@ fn global<const D: usize>(bilateral: bool) -> FrictionGlobal<D> {
     FrictionGlobal { M, H, f: vec![1.0; 4], w: vec![-1.0; D], mu: vec![0.5], rows: bilateral }
 }
 
-fn contact() -> Vec<FclibFile> {
+fn contact() -> Vec<ProblemFile> {
     let info = Info { title: Some("a seed".into()), dofs: Some(4), ..Info::default() };
-    let point = |v: Option<usize>, m: usize, p: usize| StoredPoint {
-        v: v.map(|n| vec![0.5; n]),
-        u: vec![0.0; m],
-        r: vec![1.0; m],
-        lambda: (p > 0).then(|| vec![0.5; p]),
-    };
-    let file = |problem, point: StoredPoint| FclibFile {
-        info: info.clone(),
-        guesses: vec![point.clone()],
-        solution: Some(point),
-        ..FclibFile::new(problem)
+    let (v, r, lambda) = (vec![0.5; 4], vec![1.0; 3], vec![0.5]);
+    let of_local = LocalPoint { r: r.clone(), lambda: lambda.clone() };
+    let of_global = GlobalPoint { v, r, lambda };
+    let with = |file: ProblemFile, point| {
+        let point = StoredPoint { point, partner: Some(vec![0.0; 3]) };
+        let guesses = vec![point.clone()];
+        ProblemFile { info: info.clone(), guesses, solution: Some(point), ..file }
     };
     vec![
-        FclibFile::new(Friction::Local2(local(false))),
-        file(Friction::Local3(local(true)), point(None, 3, 1)),
-        FclibFile::new(Friction::Global2(global(false))),
-        file(Friction::Global3(global(true)), point(Some(4), 3, 1)),
+        ProblemFile::new(local::<2>(false)),
+        with(ProblemFile::new(local::<3>(true)), of_local.into()),
+        ProblemFile::new(global::<2>(false)),
+        with(ProblemFile::new(global::<3>(true)), of_global.into()),
     ]
 }
 
-fn linear() -> Vec<LinearFile> {
+fn linear() -> Vec<ProblemFile> {
     let dense = |m: &Csc| Matrix::from(Dense::from_fn(m.nrows(), m.ncols(), |i, j| m.get(i, j)));
     let sparse = || Matrix::from(diagonal(2, 2));
     let full = || dense(&diagonal(2, 2));
     let q = || vec![-1.0, 2.0];
     let sound = "a valid problem";
-    let lcp = |m| Complementarity::Lcp(Lcp::new(m, q()).expect(sound));
+    let lcp = |m| ProblemFile::new(Lcp::new(m, q()).expect(sound));
     let mixed = Mlcp::rectangular(full(), q(), 1, 1).expect(sound);
     let bounded = BoxLcp::new(sparse(), q(), vec![0.0, f64::NEG_INFINITY], vec![1.0, 2.0]);
     let horizontal = Hlcp::new(full(), sparse(), q()).expect(sound);
-    let point = |z: &[f64], w: Option<Vec<f64>>| Some(LinearPoint { z: z.into(), w });
+    let point = || LcpPoint { z: vec![1.0, 0.0] }.into();
     let (title, description) = (Some("a \"seed\"\n".into()), Some("for fuzzers".into()));
+    let slack = HlcpPoint { x: vec![1.0, 0.0], s: vec![0.0, 1.0] };
+    let solved = |file, solution| ProblemFile { solution: Some(solution), ..file };
     vec![
-        LinearFile { title, description, ..LinearFile::new(lcp(full())) },
-        LinearFile { solution: point(&[1.0, 0.0], Some(q())), ..LinearFile::new(lcp(sparse())) },
-        LinearFile {
-            solution: point(&[1.0, 0.0], None),
-            ..LinearFile::new(Complementarity::Mlcp(mixed))
-        },
-        LinearFile::new(Complementarity::Box(bounded.expect(sound))),
-        LinearFile {
-            solution: point(&[1.0, 0.0], Some(vec![0.0, 1.0])),
-            ..LinearFile::new(Complementarity::Hlcp(horizontal))
-        },
+        ProblemFile { info: Info { title, description, ..Info::default() }, ..lcp(full()) },
+        solved(lcp(sparse()), StoredPoint { point: point(), partner: Some(q()) }),
+        solved(ProblemFile::new(mixed), StoredPoint { point: point(), partner: None }),
+        ProblemFile::new(bounded.expect(sound)),
+        solved(ProblemFile::new(horizontal), slack.into()),
     ]
 }
 
@@ -115,10 +108,10 @@ fn main() {
         std::fs::write(path, bytes).expect("a file can be written");
     };
     for (k, file) in contact().iter().enumerate() {
-        put("fclib", k, &fclib::to_bytes("seed", file).expect("a valid problem"));
+        put("fclib", k, &Fclib.to_bytes(Path::new("seed"), file).expect("a valid problem"));
     }
     for (k, file) in linear().iter().enumerate() {
-        put("toml", k, toml::to_text("seed", file).expect("a valid problem").as_bytes());
+        put("toml", k, &Toml.to_bytes(Path::new("seed"), file).expect("a valid problem"));
     }
     let blocks = "kind = \"mlcp\"\na = [1]\nb = [2]\nA = [[1]]\n[B]\nshape = [1, 1]\nentries = [[0, 0, 2.0]]\n";
     put("toml", 100, blocks.as_bytes());

@@ -3,7 +3,9 @@
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-use nonsmooth_problem::ProblemError;
+use nonsmooth_problem::{Kind, ProblemError};
+
+use crate::listed;
 
 /// What is wrong with a file. Each message is one line: the file, the place, what was expected and found.
 ///
@@ -70,31 +72,36 @@ pub enum IoError {
         found: String,
     },
     /// The file holds no problem in a format that is known.
-    #[error(
-        "{}: expected an FCLIB file (HDF5), or a linear complementarity problem in TOML, Matrix Market or Siconos' text, found {found}",
-        file.display()
-    )]
+    #[error("{}: expected a file of {}, found {found}", file.display(), listed(|_| true))]
     Unknown {
         /// The file.
         file: PathBuf,
         /// What it is instead.
-        found: String,
+        found: &'static str,
     },
-    /// The parts of a linear complementarity problem are readable but do not make a valid problem together.
-    #[error("{}: {problem}", file.display())]
-    Linear {
+    /// The name of a file to be written means no format that can hold the problem.
+    #[error("{}: expected a file name that ends in {known} for a problem {}", file.display(), kind.name())]
+    Name {
         /// The file.
         file: PathBuf,
-        /// What is wrong with the problem.
-        problem: ProblemError,
+        /// The kind of problem.
+        kind: Kind,
+        /// The extensions of formats that can hold it.
+        known: String,
     },
-    /// The parts of the problem are readable but do not make a valid problem together.
-    #[error("{}: {}{problem}", file.display(), folder(group, problem))]
+    /// The file holds, or is to hold, a problem of the other class.
+    #[error("{}: expected a frictional contact problem, found a linear complementarity problem", file.display())]
+    NoContacts {
+        /// The file.
+        file: PathBuf,
+    },
+    /// The parts of the problem, or of a point, are readable but do not make a valid one together.
+    #[error("{}: {group}{problem}", file.display())]
     Problem {
         /// The file.
         file: PathBuf,
-        /// The group of the problem.
-        group: &'static str,
+        /// The group of the part at fault and a slash, of formats that have groups.
+        group: Box<str>,
         /// What is wrong with the problem.
         problem: ProblemError,
     },
@@ -122,16 +129,11 @@ impl IoError {
             found: one_line(found),
         }
     }
-}
 
-/// Where FCLIB keeps the part of the problem that is at fault: matrices have capital letters.
-fn folder(group: &str, problem: &ProblemError) -> String {
-    let (ProblemError::Shape { place, .. }
-    | ProblemError::Value { place, .. }
-    | ProblemError::Empty { place }
-    | ProblemError::Singular { place, .. }) = problem;
-    let vectors = if place.starts_with(char::is_uppercase) { "" } else { "vectors/" };
-    format!("{group}/{vectors}")
+    /// Of a format without groups.
+    pub(crate) fn problem(file: &Path) -> impl Fn(ProblemError) -> Self + '_ {
+        move |problem| Self::Problem { file: file.into(), group: Box::default(), problem }
+    }
 }
 
 /// Names and texts from a file may hold anything; a message is one line.

@@ -4,17 +4,18 @@ mod common;
 
 use std::path::Path;
 
-use nonsmooth_io::fclib::{self, StoredPoint};
+use nonsmooth_io::Format;
+use nonsmooth_io::fclib::{self, Fclib};
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::TestRunner;
 
 /// Reads bytes as a file, and writes the solution that it holds, or zeros; the message of the error, if any.
 fn read(path: &Path, bytes: &[u8]) -> Option<String> {
     std::fs::write(path, bytes).unwrap();
-    let result = fclib::read(path).and_then(|content| {
+    let result = Fclib.read(path).and_then(|content| {
         let (v, m, p) = common::sizes(&content.problem);
-        let zeros = |n: usize| Some(vec![0.0; n]);
-        let point = StoredPoint { v: zeros(v), u: vec![0.0; m], r: vec![0.0; m], lambda: zeros(p) };
+        let zeros = |n: usize| vec![0.0; n];
+        let point = common::stored(v.map(zeros), zeros(m), zeros(m), zeros(p));
         fclib::write_solution(path, &content.solution.unwrap_or(point))
     });
     let message = result.err()?.to_string();
@@ -29,7 +30,7 @@ fn originals() -> Vec<Vec<u8>> {
     let path = folder.path().join("written.hdf5");
     let mut runner = TestRunner::deterministic();
     let content = common::content().prop_filter("small", |c| c.guesses.len() == 3);
-    fclib::write(&path, &content.new_tree(&mut runner).unwrap().current()).unwrap();
+    Fclib.write(&path, &content.new_tree(&mut runner).unwrap().current()).unwrap();
     let mut files = vec![
         std::fs::read(path).unwrap(),
         std::fs::read(common::global_tree().save(folder.path())).unwrap(),
@@ -113,7 +114,7 @@ with h5py.File(sys.argv[1], 'w', libver=('earliest', 'v108')) as f:
         let bytes = std::fs::read(&path).unwrap();
         for claimed in [1 << 60, 1 << 40, 1 << 33, u64::MAX - 1] {
             let bytes = claim(&bytes, 77, claimed);
-            let message = fclib::read_bytes("x", &bytes).unwrap_err().to_string();
+            let message = Fclib.parse(Path::new("x"), &bytes).unwrap_err().to_string();
             let expected = format!("data that fit in the {} bytes of the file", bytes.len());
             let found = format!("shape [{claimed}] of 8 bytes each");
             let place = "x: /fclib_local/vectors/mu";

@@ -5,17 +5,23 @@ mod common;
 use std::path::Path;
 
 use common::{Data, Tree, bilateral_tree, global_tree, local_tree};
-use nonsmooth_io::fclib::{self, FclibFile};
+use nonsmooth_io::fclib::{self, Fclib};
+use nonsmooth_io::{Format, ProblemFile};
 use nonsmooth_problem::Friction;
 
-fn read(tree: &Tree) -> FclibFile {
+/// The problem of contacts in a tree.
+fn problem(tree: &Tree) -> Friction {
+    fclib::read_problem(tree.save(tempfile::tempdir().unwrap().path())).unwrap()
+}
+
+fn read(tree: &Tree) -> ProblemFile {
     let folder = tempfile::tempdir().unwrap();
-    fclib::read(tree.save(folder.path())).unwrap_or_else(|e| panic!("{e}"))
+    Fclib.read(&tree.save(folder.path())).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// The message of reading that file, without the file's name.
 fn message(path: &Path) -> String {
-    let message = fclib::read(path).expect_err("a bad file").to_string();
+    let message = Fclib.read(path).expect_err("a bad file").to_string();
     assert!(!message.contains('\n'), "{message}");
     message.strip_prefix(&format!("{}: ", path.display())).expect(&message).to_string()
 }
@@ -29,7 +35,7 @@ fn refused(tree: &Tree, expected: &str) {
 #[test]
 fn hand_made_files_read_as_stated() {
     let content = read(&local_tree());
-    let Friction::Local2(p) = &content.problem else { panic!("{:?}", content.problem.kind()) };
+    let Friction::Local2(p) = common::contacts(&content) else { panic!("{:?}", content.problem) };
     let w = p.W.to_csc();
     for (i, row) in common::W.iter().enumerate() {
         for (j, &x) in row.iter().enumerate() {
@@ -39,12 +45,13 @@ fn hand_made_files_read_as_stated() {
     assert_eq!(content.info.title.as_deref(), Some("hand-made"));
 
     let content = read(&global_tree());
-    let Friction::Global3(p) = &content.problem else { panic!("{:?}", content.problem.kind()) };
+    let Friction::Global3(p) = common::contacts(&content) else { panic!("{:?}", content.problem) };
     assert_eq!((p.H.nrows(), p.H.ncols(), p.H.get(0, 2)), (2, 3, 0.5));
     assert_eq!(content.guesses, [content.solution.unwrap()]);
-    assert_eq!(content.guesses[0].lambda, Some(vec![3.0]));
+    let mut guess = content.guesses[0].clone();
+    assert_eq!(common::impulses(&mut guess).1, &[3.0]);
 
-    let Friction::Local2(p) = read(&bilateral_tree()).problem else { panic!() };
+    let Friction::Local2(p) = problem(&bilateral_tree()) else { panic!() };
     let b = p.rows.unwrap();
     assert_eq!((b.V.get(3, 0), b.V.get(1, 0), b.R.get(0, 0), b.s[0]), (0.5, -0.5, 2.0, 0.125));
 }
@@ -96,7 +103,7 @@ fn duplicates_are_added_in_the_order_of_the_file() {
     for (nz, p) in [(3, vec![0; 3]), (-1, vec![0, 3, 3]), (-2, vec![0, 3, 3])] {
         for (x, sum) in [([1e16, 1.0, 1.0], 1e16), ([1.0, 1.0, 1e16], 1e16 + 2.0)] {
             let tree = global_tree().matrix("fclib_global/M", (2, 2, nz), (&p, &[0; 3], &x));
-            let Friction::Global3(problem) = read(&tree).problem else { panic!() };
+            let Friction::Global3(problem) = problem(&tree) else { panic!() };
             assert_eq!(problem.M.get(0, 0), sum, "nz = {nz}");
         }
     }
@@ -119,7 +126,7 @@ fn other_widths_and_scalars_are_read() {
 fn integers_and_whole_reals_stand_for_each_other() {
     let q = |data| {
         let tree = local_tree().set("fclib_local/vectors/q", data);
-        let Friction::Local2(p) = read(&tree).problem else { panic!() };
+        let Friction::Local2(p) = problem(&tree) else { panic!() };
         p.q
     };
     assert_eq!(q(Data::I(vec![-1, 0, 2, i32::MIN])), [-1.0, 0.0, 2.0, -2147483648.0]);
@@ -192,7 +199,8 @@ fn multipliers_without_entries_may_be_there_or_not() {
         .set("solution/l", empty())
         .without("guesses/1/l");
     let content = read(&tree);
-    assert_eq!(content.solution.as_ref().unwrap().lambda, None);
+    let mut solution = content.solution.clone().unwrap();
+    assert!(common::impulses(&mut solution).1.is_empty());
     assert_eq!(content.guesses, [content.solution.unwrap()]);
     refused(
         &tree.set("solution/l", Data::F(vec![1.0])),
@@ -212,7 +220,10 @@ fn what_is_no_fclib_file_is_said() {
         message(&folder.path().join("absent.hdf5")),
         "expected a readable file, found: No such file or directory (os error 2)"
     );
-    assert_eq!(message(folder.path()), "expected an HDF5 file, found a directory");
+    assert_eq!(
+        message(folder.path()),
+        format!("expected a file of {}, found a directory", nonsmooth_io::listed(|_| true))
+    );
     assert_eq!(file("empty", b""), "expected an HDF5 file, found an empty file");
     assert_eq!(file("text", b"vectors 1 2 3\n"), "expected an HDF5 file, found other data");
     let bytes = std::fs::read(local_tree().save(folder.path())).unwrap();

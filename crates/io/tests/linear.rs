@@ -6,10 +6,11 @@ mod common;
 use std::path::{Path, PathBuf};
 
 use common::real;
-use nonsmooth_io::linear::{self, LinearFile, LinearPoint, market, toml};
-use nonsmooth_io::{Content, holds_problem, parts, read_any};
+use nonsmooth_io::{About, FORMATS, Format, Info, ProblemFile, StoredPoint, holds_problem, parts};
 use nonsmooth_linalg::{Csc, Dense, Matrix};
-use nonsmooth_problem::{BoxLcp, Complementarity, Hlcp, Lcp, Mlcp};
+use nonsmooth_problem::{
+    AnyPoint, AnyProblem, BoxLcp, Complementarity, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp,
+};
 use proptest::collection::{btree_map, vec};
 use proptest::option;
 use proptest::prelude::*;
@@ -33,13 +34,13 @@ impl Folder {
 
     /// What a file of this content is.
     fn read(&self, name: &str, text: &str) -> Complementarity {
-        linear::read(self.put(name, text)).unwrap_or_else(|e| panic!("{e}")).problem
+        linear(ProblemFile::read(self.put(name, text)).unwrap_or_else(|e| panic!("{e}")))
     }
 
     /// The message that refuses this content: one line that names the file and `all`.
     fn refused(&self, name: &str, text: &str, all: &[&str]) {
         let path = self.put(name, text);
-        let message = read_any(&path).expect_err(text).to_string();
+        let message = ProblemFile::read(&path).expect_err(text).to_string();
         assert!(
             message.starts_with(path.to_str().unwrap()) && !message.contains('\n'),
             "{message}"
@@ -47,6 +48,14 @@ impl Folder {
         for part in all {
             assert!(message.contains(part), "{part} in {message}");
         }
+    }
+}
+
+/// The problem of a file.
+fn linear(file: ProblemFile) -> Complementarity {
+    match file.problem {
+        AnyProblem::Complementarity(problem) => problem,
+        AnyProblem::Friction(_) => panic!("contacts"),
     }
 }
 
@@ -114,28 +123,34 @@ fn sizes(p: &Complementarity) -> (usize, usize) {
     }
 }
 
-fn content() -> impl Strategy<Value = LinearFile> {
+fn content() -> impl Strategy<Value = ProblemFile> {
     let point = |problem: Complementarity| {
         let (n, m) = sizes(&problem);
-        let always = matches!(problem, Complementarity::Hlcp(_));
-        let w = (any::<bool>(), vec(real(), m))
-            .prop_map(move |(there, w)| (there || always).then_some(w));
-        let solution = (vec(real(), n), w).prop_map(|(z, w)| LinearPoint { z, w });
+        let horizontal = matches!(problem, Complementarity::Hlcp(_));
+        let solution =
+            (any::<bool>(), vec(real(), n), vec(real(), m)).prop_map(move |(there, z, w)| {
+                match horizontal {
+                    true => HlcpPoint { x: z, s: w }.into(),
+                    false => {
+                        let point = AnyPoint::from(LcpPoint { z });
+                        StoredPoint { point, partner: there.then_some(w) }
+                    }
+                }
+            });
         (Just(problem), option::of(solution))
     };
     let texts = (option::of(any::<String>()), option::of(any::<String>()));
     (problem().prop_flat_map(point), texts).prop_map(
-        |((problem, solution), (title, description))| LinearFile {
-            problem,
-            title,
-            description,
+        |((problem, solution), (title, description))| ProblemFile {
+            info: Info { title, description, ..Info::default() },
             solution,
+            ..ProblemFile::new(problem)
         },
     )
 }
 
 /// Equal bit for bit: `0 == -0`, but they are two numbers.
-fn same(a: &LinearFile, b: &LinearFile) {
+fn same(a: &ProblemFile, b: &ProblemFile) {
     assert_eq!(a, b);
     assert_eq!(format!("{a:?}"), format!("{b:?}"));
 }
@@ -145,8 +160,8 @@ proptest! {
     fn our_format_keeps_every_bit(content in content()) {
         let folder = Folder::new();
         let path = folder.path("a.toml");
-        linear::write(&path, &content).unwrap();
-        same(&linear::read(&path).unwrap(), &content);
+        content.write(&path).unwrap();
+        same(&ProblemFile::read(&path).unwrap(), &content);
         prop_assert!(holds_problem(&path));
     }
 
@@ -154,13 +169,14 @@ proptest! {
     fn matrix_market_keeps_every_bit(content in content()) {
         let folder = Folder::new();
         let path = folder.path("a.mtx");
-        let content = LinearFile { title: None, description: None, ..content };
-        let fits = matches!(content.problem, Complementarity::Lcp(_) | Complementarity::Box(_));
-        let written = linear::write(&path, &content);
+        let content = ProblemFile { info: Info::default(), ..content };
+        let problem = linear(content.clone());
+        let fits = matches!(problem, Complementarity::Lcp(_) | Complementarity::Box(_));
+        let written = content.write(&path);
         prop_assert_eq!(written.is_ok(), fits, "{:?}", written);
         if fits {
-            let solution = content.solution.clone().map(|s| LinearPoint { w: None, ..s });
-            same(&market::read(&path).unwrap(), &LinearFile { solution, ..content });
+            let solution = content.solution.clone().map(|s| StoredPoint { partner: None, ..s });
+            same(&ProblemFile::read(&path).unwrap(), &ProblemFile { solution, ..content });
             prop_assert!(holds_problem(&path) && !holds_problem(&folder.path("a_q.mtx")));
             prop_assert!(parts(&path).len() >= 2);
         }
@@ -175,13 +191,38 @@ proptest! {
             for content in [&bytes[..], words.as_bytes()] {
                 std::fs::write(&path, content).unwrap();
                 holds_problem(&path);
-                if let Err(e) = read_any(&path) {
+                if let Err(e) = ProblemFile::read(&path) {
                     let message = e.to_string();
                     assert!(!message.contains('\n') && message.starts_with(path.to_str().unwrap()), "{message}");
                 }
             }
         }
     }
+}
+
+/// The table in docs/lcp-format.md is the list of formats.
+#[test]
+fn the_page_of_formats_lists_them() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/lcp-format.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let (_, table) = page.split_once("| --- | --- | --- | --- |\n").unwrap();
+    let stated: Vec<_> = table.lines().take_while(|line| line.starts_with('|')).collect();
+    let code = |all: &mut dyn Iterator<Item = &str>| {
+        all.map(|one| format!("`{one}`")).collect::<Vec<_>>().join(", ")
+    };
+    let row = |format: &dyn Format| {
+        let About { name, extensions, reads, writes, .. } = *format.about();
+        let endings: Vec<_> = extensions.iter().map(|e| format!(".{e}")).collect();
+        let endings = code(&mut endings.iter().map(String::as_str));
+        let kinds = code(&mut reads.iter().map(|kind| kind.name()));
+        let written = match writes {
+            [] => "none".into(),
+            _ if writes == reads => "the same".into(),
+            _ => code(&mut writes.iter().map(|kind| kind.name())),
+        };
+        format!("| {name} | {endings} | {kinds} | {written} |")
+    };
+    assert_eq!(stated, FORMATS.map(row));
 }
 
 // ------------------------------------------------------------------------------------------------ our format
@@ -197,11 +238,11 @@ M = [[2, 1], [1, 2]]
 [solution]
 z = [1.25, 2]
 ";
-    let file = linear::read(folder.put("a.toml", text)).unwrap();
+    let file = ProblemFile::read(folder.put("a.toml", text)).unwrap();
     let lcp = Lcp::new(rows(&[[2.0, 1.0], [1.0, 2.0]]), vec![-5.0, -6.0]).unwrap();
-    assert_eq!(file.problem, Complementarity::Lcp(lcp.clone()));
-    assert_eq!(file.title.as_deref(), Some("two rows"));
-    assert_eq!(file.solution, Some(LinearPoint { z: vec![1.25, 2.0], w: None }));
+    assert_eq!(file.problem, lcp.clone().into());
+    assert_eq!(file.info.title.as_deref(), Some("two rows"));
+    assert_eq!(file.solution, Some(LcpPoint { z: vec![1.25, 2.0] }.into()));
 
     let sparse = "kind = 'lcp'\nq = [-5, -6]\n[M]\nshape = [2, 2]\nentries = [[0, 0, 2], [0, 1, 1.0], [1, 0, 1], [1, 1, 2]]\n";
     let Complementarity::Lcp(read) = folder.read("b.toml", sparse) else { panic!() };
@@ -265,15 +306,19 @@ fn mistakes_in_our_format_are_named() {
     ] {
         folder.refused("a.toml", &format!("{lcp}{text}"), &all);
     }
-    let operator = LinearFile::new(Complementarity::Lcp(
-        Lcp::new(Matrix::Operator(std::sync::Arc::new(Identity)), vec![0.0]).unwrap(),
-    ));
+    let operator = Matrix::Operator(std::sync::Arc::new(Identity));
+    let operator = ProblemFile::new(Lcp::new(operator, vec![0.0]).unwrap());
     for name in ["o.toml", "o.mtx"] {
-        let message = linear::write(folder.path(name), &operator).unwrap_err().to_string();
+        let message = operator.write(folder.path(name)).unwrap_err().to_string();
         assert!(message.contains("found an operator"), "{message}");
         assert!(!folder.path(name).exists());
     }
-    assert!(linear::write(folder.path("o.txt"), &operator).is_err());
+    let message = operator.write(folder.path("o.txt")).unwrap_err().to_string();
+    let expected = "o.txt: expected a file name that ends in .toml or .mtx for a problem lcp";
+    assert!(message.ends_with(expected), "{message}");
+    let guesses = vec![LcpPoint { z: vec![0.0] }.into()];
+    let message = ProblemFile { guesses, ..operator }.write(folder.path("o.toml"));
+    assert!(message.unwrap_err().to_string().contains("guesses: expected none"));
 }
 
 #[derive(Debug)]
@@ -361,8 +406,8 @@ fn layouts_and_symmetries_of_matrix_market() {
     folder.put("b_u.mtx", "inf");
     assert!(matches!(folder.read("b.mtx", &alone), Complementarity::Box(_)));
     // What is there would become a part of an LCP.
-    let lcp = LinearFile::new(Complementarity::Lcp(Lcp::new(rows(&[[1.0]]), vec![1.0]).unwrap()));
-    let message = linear::write(folder.path("b.mtx"), &lcp).unwrap_err().to_string();
+    let lcp = ProblemFile::new(Lcp::new(rows(&[[1.0]]), vec![1.0]).unwrap());
+    let message = lcp.write(folder.path("b.mtx")).unwrap_err().to_string();
     assert!(message.contains("b_l.mtx"), "{message}");
 }
 
@@ -456,9 +501,13 @@ fn mistakes_in_siconos_files_are_named() {
     folder.refused("a.dat", "", &["an empty file"]);
     folder.refused("a.dat", "\u{0}\u{1}", &["another text"]);
     std::fs::write(folder.path("b.dat"), [0xff, 0xfe, 0x00]).unwrap();
-    assert!(read_any(folder.path("b.dat")).unwrap_err().to_string().contains("other data"));
-    assert!(read_any(folder.path("")).unwrap_err().to_string().contains("a directory"));
-    assert!(read_any(folder.path("none.dat")).unwrap_err().to_string().contains("none.dat"));
+    assert!(
+        ProblemFile::read(folder.path("b.dat")).unwrap_err().to_string().contains("other data")
+    );
+    assert!(ProblemFile::read(folder.path("")).unwrap_err().to_string().contains("a directory"));
+    assert!(
+        ProblemFile::read(folder.path("none.dat")).unwrap_err().to_string().contains("none.dat")
+    );
 }
 
 // ------------------------------------------------------------------------------------------------ damage
@@ -467,15 +516,16 @@ fn mistakes_in_siconos_files_are_named() {
 #[test]
 fn damaged_files_never_panic() {
     let folder = Folder::new();
-    let file = LinearFile {
-        title: Some("a \"title\"".into()),
-        solution: Some(LinearPoint { z: vec![1.0, 2.0, 3.0], w: Some(vec![4.0]) }),
-        ..LinearFile::new(Complementarity::Mlcp(
+    let point = LcpPoint { z: vec![1.0, 2.0, 3.0] }.into();
+    let file = ProblemFile {
+        info: Info { title: Some("a \"title\"".into()), ..Info::default() },
+        solution: Some(StoredPoint { point, partner: Some(vec![4.0]) }),
+        ..ProblemFile::new(
             Mlcp::new(rows(&[[1.0, 2.0, 3.0], [0.0, 5.0, 6.0], [7.0, 8.0, 9.0]]), vec![-1.0; 3], 2)
                 .unwrap(),
-        ))
+        )
     };
-    toml::write(folder.path("m.toml"), &file).unwrap();
+    file.write(folder.path("m.toml")).unwrap();
     folder.put("s_q.mtx", "1\n2\n");
     let mixed = std::fs::read_to_string(folder.path("m.toml")).unwrap();
     let texts = [
@@ -492,7 +542,7 @@ fn damaged_files_never_panic() {
         let path = folder.path(name);
         let read = |bytes: &[u8]| {
             std::fs::write(&path, bytes).unwrap();
-            if let Err(e) = read_any(&path) {
+            if let Err(e) = ProblemFile::read(&path) {
                 assert!(!e.to_string().contains('\n'), "{e}");
             }
         };
@@ -528,10 +578,8 @@ fn every_lcp_of_the_corpus_is_read() {
     let mut read = std::collections::BTreeMap::new();
     for path in &files {
         assert!(holds_problem(path), "{}", path.display());
-        let Content::Linear(file) = read_any(path).unwrap_or_else(|e| panic!("{e}")) else {
-            panic!()
-        };
-        let Complementarity::Lcp(lcp) = file.problem else { panic!("{}", path.display()) };
+        let file = ProblemFile::read(path).unwrap_or_else(|e| panic!("{e}"));
+        let Complementarity::Lcp(lcp) = linear(file) else { panic!("{}", path.display()) };
         let name = path.file_stem().unwrap().to_str().unwrap().to_owned();
         read.insert(name, lcp);
     }
@@ -580,20 +628,21 @@ fn every_mlcp_of_the_corpus_is_read() {
     assert_eq!(files.len(), sizes.len() + 1);
     for path in &files {
         let name = path.file_stem().unwrap().to_str().unwrap().trim_end_matches("_mlcp").to_owned();
-        let content = read_any(path);
+        let content = ProblemFile::read(path);
         if name == "Rectangular" {
             let message = content.unwrap_err().to_string();
             assert!(message.ends_with("the rows of M: expected 2, found `3`"), "{message}");
             continue;
         }
-        let Content::Linear(file) = content.unwrap_or_else(|e| panic!("{e}")) else { panic!() };
-        let Complementarity::Mlcp(p) = &file.problem else { panic!("{name}") };
+        let file = content.unwrap_or_else(|e| panic!("{e}"));
+        let problem = linear(file.clone());
+        let Complementarity::Mlcp(p) = &problem else { panic!("{name}") };
         let (_, n, m) = sizes.iter().find(|s| s.0 == name).expect(&name);
         assert_eq!((p.free, p.equalities, p.pairs()), (*n, *n, *m), "{name}");
         // What is read can be kept in our format.
         let folder = Folder::new();
-        toml::write(folder.path("a.toml"), &file).unwrap();
-        same(&toml::read(folder.path("a.toml")).unwrap(), &file);
-        assert_eq!(dense(&file.problem).nrows(), n + m);
+        file.write(folder.path("a.toml")).unwrap();
+        same(&ProblemFile::read(folder.path("a.toml")).unwrap(), &file);
+        assert_eq!(dense(&problem).nrows(), n + m);
     }
 }

@@ -4,9 +4,12 @@
 
 use std::path::Path;
 
-use nonsmooth_io::fclib;
-use nonsmooth_io::linear::{LinearFile, market, siconos, toml};
-use nonsmooth_problem::Friction;
+use nonsmooth_io::fclib::Fclib;
+use nonsmooth_io::linear::market;
+use nonsmooth_io::linear::siconos::Siconos;
+use nonsmooth_io::linear::toml::Toml;
+use nonsmooth_io::{Format, IoError, ProblemFile};
+use nonsmooth_problem::{AnyProblem, Friction, with_problem};
 
 /// Mutations of each format: `NONSMOOTH_MUTATIONS` says otherwise.
 fn rounds() -> usize {
@@ -67,23 +70,14 @@ fn refused(message: &str) {
     assert!(!message.contains('\n'), "{message}");
 }
 
-/// What was read is written and read again.
-fn linear(result: Result<LinearFile, nonsmooth_io::IoError>) {
+/// What was read is valid, is written in a format and read again.
+fn again(format: &dyn Format, result: Result<ProblemFile, IoError>) {
     match result {
         Ok(content) => {
-            let text = toml::to_text("x.toml", &content).unwrap();
-            assert_eq!(toml::parse("x.toml", &text).unwrap(), content);
-        }
-        Err(e) => refused(&e.to_string()),
-    }
-}
-
-fn hdf5(bytes: &[u8]) {
-    match fclib::read_bytes("x.hdf5", bytes) {
-        Ok(content) => {
-            content.problem.validate().unwrap();
-            let bytes = fclib::to_bytes("x.hdf5", &content).unwrap();
-            assert_eq!(fclib::read_bytes("x.hdf5", &bytes).unwrap(), content);
+            with_problem!(&content.problem, p => p.validate()).unwrap();
+            let name = Path::new("x");
+            let bytes = format.to_bytes(name, &content).unwrap();
+            assert_eq!(format.parse(name, &bytes).unwrap(), content);
         }
         Err(e) => refused(&e.to_string()),
     }
@@ -105,8 +99,8 @@ fn layouts() -> Vec<(String, Vec<u8>)> {
 #[test]
 fn layouts_of_other_writers_are_read() {
     for (name, bytes) in layouts() {
-        let content = fclib::read_bytes(&name, &bytes).unwrap_or_else(|e| panic!("{e}"));
-        let Friction::Local2(p) = content.problem else { panic!("{name}") };
+        let content = Fclib.parse(Path::new(&name), &bytes).unwrap_or_else(|e| panic!("{e}"));
+        let AnyProblem::Friction(Friction::Local2(p)) = content.problem else { panic!("{name}") };
         let w = p.W.to_csc();
         assert_eq!([w.get(0, 0), w.get(0, 1), w.get(1, 0), w.get(1, 1)], [2.0, 0.0, 0.0, 3.5]);
         assert_eq!((&p.q[..], &p.mu[..]), (&[-1.0, 0.5][..], &[0.5][..]), "{name}");
@@ -118,7 +112,8 @@ fn hdf5_files() {
     let seeds: Vec<_> = layouts().into_iter().map(|(_, bytes)| bytes).collect();
     let mut random = Random(1);
     for _ in 0..rounds() {
-        hdf5(&random.mutation(&seeds, &[]));
+        let bytes = random.mutation(&seeds, &[]);
+        again(&Fclib, Fclib.parse(Path::new("x"), &bytes));
     }
 }
 
@@ -138,7 +133,7 @@ fn toml_files() {
     let mut random = Random(2);
     for _ in 0..rounds() {
         let bytes = random.mutation(&seeds, &words);
-        linear(toml::parse("x.toml", &String::from_utf8_lossy(&bytes)));
+        again(&Toml, Toml.parse(Path::new("x"), &bytes));
     }
 }
 
@@ -172,7 +167,7 @@ fn market_files() {
         let mut files = text.split('\u{1}');
         let matrix = files.next().unwrap_or_default();
         let parts = [(); 4].map(|()| files.next().filter(|part| !part.is_empty()));
-        linear(market::parse("x.mtx", matrix, parts));
+        again(&Toml, market::parse("x.mtx", matrix, parts));
     }
 }
 
@@ -194,7 +189,7 @@ fn siconos_files() {
     for _ in 0..rounds() {
         let bytes = random.mutation(&seeds, &words);
         for name in ["lcp.dat", "relay.dat", "x.dat"] {
-            linear(siconos::parse(name, &String::from_utf8_lossy(&bytes)));
+            again(&Toml, Siconos.parse(Path::new(name), &bytes));
         }
     }
 }

@@ -6,11 +6,13 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use common::{assert_same, sizes};
-use nonsmooth_io::fclib::{self, FclibFile, StoredPoint};
+use common::{assert_same, contacts, impulses, sizes, stored};
+use nonsmooth_io::fclib::{self, Fclib};
+use nonsmooth_io::{Format, ProblemFile, StoredPoint};
 use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::{
-    Friction, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RowsGlobal, RowsLocal,
+    AnyPoint, AnyProblem, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint,
+    Problem, RowsGlobal, RowsLocal,
 };
 use proptest::prelude::*;
 
@@ -21,10 +23,10 @@ proptest! {
     fn files_pass_through_unchanged(content in common::content()) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file.hdf5");
-        fclib::write(&path, &content).unwrap();
-        let back = fclib::read(&path).unwrap();
+        Fclib.write(&path, &content).unwrap();
+        let back = Fclib.read(&path).unwrap();
         assert_same(&back, &content);
-        prop_assert_eq!(fclib::read_problem(&path).unwrap(), content.problem);
+        prop_assert_eq!(AnyProblem::from(fclib::read_problem(&path).unwrap()), content.problem);
         prop_assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
@@ -32,15 +34,15 @@ proptest! {
     fn a_solution_is_added_or_replaced(content in common::content()) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file.hdf5");
-        fclib::write(&path, &content).unwrap();
+        Fclib.write(&path, &content).unwrap();
         let (v, m, p) = sizes(&content.problem);
-        let some = |n: usize| (n > 0).then(|| vec![-0.0; n]);
-        let mut solution = StoredPoint { v: some(v), u: vec![1.5; m], r: vec![5e-324; m], lambda: some(p) };
+        let v = v.map(|n| vec![-0.0; n]);
+        let mut solution = stored(v, vec![1.5; m], vec![5e-324; m], vec![-0.0; p]);
         for _ in 0..2 {
             fclib::write_solution(&path, &solution).unwrap();
-            let expected = FclibFile { solution: Some(solution.clone()), ..content.clone() };
-            assert_same(&fclib::read(&path).unwrap(), &expected);
-            solution.r[0] = 2.0;
+            let expected = ProblemFile { solution: Some(solution.clone()), ..content.clone() };
+            assert_same(&Fclib.read(&path).unwrap(), &expected);
+            impulses(&mut solution).0[0] = 2.0;
         }
         prop_assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
@@ -75,46 +77,51 @@ fn global() -> FrictionGlobal<3> {
     }
 }
 
-fn contents() -> [FclibFile; 2] {
-    let mut local = FclibFile::new(Friction::Local2(local()));
+fn contents() -> [ProblemFile; 2] {
+    let mut local = ProblemFile::new(Friction::Local2(local()));
     let x = AWKWARD[..4].to_vec();
-    local.solution =
-        Some(StoredPoint { v: None, u: x.clone(), r: x, lambda: Some(vec![1.0, -0.0]) });
+    local.solution = Some(stored(None, x.clone(), x, vec![1.0, -0.0]));
     local.info.title = Some("a title".into());
     local.info.math_info = Some(String::new());
     local.info.dofs = Some(12);
-    let mut global = FclibFile::new(Friction::Global3(global()));
-    let point = GlobalPoint { v: AWKWARD[..5].into(), r: vec![1.0, 0.0, -0.0], lambda: vec![0.1] };
+    let mut global = ProblemFile::new(Friction::Global3(global()));
     // M is no matter here: u overflows where v meets f64::MAX.
-    let point = StoredPoint {
-        u: vec![0.5; 3],
-        ..StoredPoint { v: Some(point.v), u: vec![], r: point.r, lambda: Some(point.lambda) }
-    };
+    let point = stored(Some(AWKWARD[..5].into()), vec![0.5; 3], vec![1.0, 0.0, -0.0], vec![0.1]);
     global.guesses = vec![point; 11];
     global.info.description = Some("friction, größer".into());
     [local, global]
 }
 
 #[test]
-fn stored_points_carry_the_unknowns_and_the_velocity() {
+fn velocities_that_are_not_given_are_computed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file.hdf5");
+    let written = |problem: AnyProblem, point: AnyPoint| {
+        let solution = Some(StoredPoint::from(point));
+        ProblemFile { solution, ..ProblemFile::new(problem) }.write(&path).unwrap();
+        ProblemFile::read(&path).unwrap().solution.unwrap()
+    };
     let w = Csc::diagonal(&[2.0, 4.0]);
     let problem = FrictionLocal::<2>::new(Bsr::from_csc(&w), vec![-1.0, 0.5], vec![0.5]).unwrap();
     let point = LocalPoint { r: vec![0.5, 0.25], lambda: vec![] };
-    let stored = StoredPoint::from_local(&problem, &point);
-    assert_eq!(
-        stored,
-        StoredPoint { v: None, u: vec![0.0, 1.5], r: point.r.clone(), lambda: None }
-    );
-    assert_eq!(stored.to_local(), point);
+    let kept = written(problem.into(), point.clone().into());
+    assert_eq!(kept, stored(None, vec![0.0, 1.5], point.r, vec![]));
 
     let mut problem = global();
     problem.H = Csc::from_triplets(5, 3, [(0, 0, 2.0), (4, 2, -1.0)].into_iter()).unwrap();
     problem.w = vec![1.0, 2.0, 3.0];
     let point =
         GlobalPoint { v: vec![1.0, 0.0, 0.0, 0.0, 5.0], r: vec![1.0, 0.0, 0.0], lambda: vec![7.0] };
-    let stored = StoredPoint::from_global(&problem, &point);
-    assert_eq!(stored.u, [3.0, 2.0, -2.0]);
-    assert_eq!(stored.to_global(), point);
+    let kept = written(problem.into(), point.clone().into());
+    assert_eq!(kept.partner, Some(vec![3.0, 2.0, -2.0]));
+    assert_eq!(kept.point, point.into());
+    // A point of another kind.
+    let file = ProblemFile {
+        solution: Some(LocalPoint { r: vec![0.0; 3], lambda: vec![0.0] }.into()),
+        ..ProblemFile::new(global())
+    };
+    let message = file.write(&path).unwrap_err().to_string();
+    assert!(message.contains("/solution/v: expected 5 entries"), "{message}");
 }
 
 #[test]
@@ -122,13 +129,13 @@ fn an_existing_file_is_replaced_and_a_failure_leaves_it() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("file.hdf5");
     let [local, global] = contents();
-    fclib::write(&path, &local).unwrap();
-    fclib::write(&path, &global).unwrap();
-    assert_same(&fclib::read(&path).unwrap(), &global);
+    Fclib.write(&path, &local).unwrap();
+    Fclib.write(&path, &global).unwrap();
+    assert_same(&Fclib.read(&path).unwrap(), &global);
 
     let mut bad = local;
-    bad.solution.as_mut().unwrap().r[3] = f64::NAN;
-    let message = fclib::write(&path, &bad).unwrap_err().to_string();
+    impulses(bad.solution.as_mut().unwrap()).0[3] = f64::NAN;
+    let message = Fclib.write(&path, &bad).unwrap_err().to_string();
     assert!(
         message.ends_with(": /solution/r[3]: expected a finite number, found NaN"),
         "{message}"
@@ -136,7 +143,7 @@ fn an_existing_file_is_replaced_and_a_failure_leaves_it() {
     let message = fclib::write_solution(&path, &bad.solution.unwrap()).unwrap_err().to_string();
     let expected = ": /solution/v: expected 5 entries (degrees of freedom), found 0 entries";
     assert!(message.ends_with(expected), "{message}");
-    assert_same(&fclib::read(&path).unwrap(), &global);
+    assert_same(&Fclib.read(&path).unwrap(), &global);
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
@@ -145,8 +152,8 @@ fn what_cannot_be_written_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("file.hdf5");
     let [local, _] = contents();
-    let refused = |path: &Path, content: &FclibFile, expected: &str| {
-        let message = fclib::write(path, content).unwrap_err().to_string();
+    let refused = |path: &Path, content: &ProblemFile, expected: &str| {
+        let message = Fclib.write(path, content).unwrap_err().to_string();
         assert_eq!(message, format!("{}: {expected}", path.display()));
     };
     let mut bad = local.clone();
@@ -164,12 +171,21 @@ fn what_cannot_be_written_is_said() {
         "/fclib_local/info/@numberOfDegreeOfFreedom: expected at most 2147483647 (a C int), found 2147483648",
     );
     let mut bad = local.clone();
-    let Friction::Local2(p) = &mut bad.problem else { unreachable!() };
+    let AnyProblem::Friction(Friction::Local2(p)) = &mut bad.problem else { unreachable!() };
     p.mu[1] = -0.5;
     refused(
         &path,
         &bad,
         "/fclib_local/vectors/mu[1]: expected a coefficient of friction of at least 0, found -0.5",
+    );
+    let mut bad = local.clone();
+    let AnyProblem::Friction(Friction::Local2(p)) = &mut bad.problem else { unreachable!() };
+    let rows = p.rows.as_mut().unwrap();
+    (rows.bounds.lower, rows.bounds.upper) = (vec![0.0; 2], vec![f64::INFINITY; 2]);
+    refused(
+        &path,
+        &bad,
+        "/fclib_local: expected bilateral constraints alone, as FCLIB has no place for bounds, found rows with bounds",
     );
     let writable = "expected a file that can be written, found: ";
     let absent = folder.path().join("absent/file.hdf5");
@@ -185,8 +201,8 @@ fn what_cannot_be_written_is_said() {
         refused(&socket, &local, &device);
         refused(Path::new("/dev/null"), &local, &device);
         for path in [&socket, Path::new("/dev/null")] {
-            let message =
-                fclib::write_solution(path, &StoredPoint::default()).unwrap_err().to_string();
+            let nothing = stored(None, vec![], vec![], vec![]);
+            let message = fclib::write_solution(path, &nothing).unwrap_err().to_string();
             assert_eq!(message, format!("{}: {device}", path.display()));
         }
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
@@ -212,7 +228,7 @@ for path in sys.argv[1:]:
 "#;
 
 /// The lines that [`DUMP`] prints for the problem parts of a file.
-fn expected_dump(content: &FclibFile) -> String {
+fn expected_dump(content: &ProblemFile) -> String {
     let mut lines = vec![];
     fn hex(bytes: impl IntoIterator<Item = u8>) -> String {
         bytes.into_iter().fold(String::new(), |mut s, b| {
@@ -225,7 +241,7 @@ fn expected_dump(content: &FclibFile) -> String {
     let mut ints = |path: &str, x: &[usize]| {
         lines.push(format!("{path} int32 ({},) {}", x.len(), int(x)));
     };
-    let (root, mut matrices, vectors) = match &content.problem {
+    let (root, mut matrices, vectors) = match contacts(content) {
         Friction::Local2(p) => {
             let b = p.rows.as_ref().unwrap();
             let matrices = vec![("W", p.W.to_csc()), ("V", b.V.clone()), ("R", b.R.clone())];
@@ -264,12 +280,14 @@ fn expected_dump(content: &FclibFile) -> String {
         reals(&format!("{root}/vectors/{name}"), x);
     }
     let mut point = |path: &str, point: &StoredPoint| {
-        for (name, x) in [
-            ("u", Some(&point.u)),
-            ("r", Some(&point.r)),
-            ("v", point.v.as_ref()),
-            ("l", point.lambda.as_ref()),
-        ] {
+        let (v, r, lambda) = match &point.point {
+            AnyPoint::Local(p) => (None, &p.r, &p.lambda),
+            AnyPoint::Global(p) => (Some(&p.v), &p.r, &p.lambda),
+            other => panic!("{other:?}"),
+        };
+        for (name, x) in
+            [("u", point.partner.as_ref()), ("r", Some(r)), ("v", v), ("l", Some(lambda))]
+        {
             if let Some(x) = x {
                 reals(&format!("{path}/{name}"), x);
             }
@@ -323,12 +341,12 @@ fn h5py_reads_what_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("file.hdf5");
     for mut content in contents() {
-        fclib::write(&path, &content).unwrap();
+        Fclib.write(&path, &content).unwrap();
         let dump = || sorted_lines(Command::new("python3").args(["-c", DUMP]).arg(&path));
         assert_eq!(dump(), expected_dump(&content));
         // The same after a solution was added to the file.
         let mut solution = content.solution.take().unwrap_or_else(|| content.guesses[0].clone());
-        solution.r[1] = 0.625;
+        impulses(&mut solution).0[1] = 0.625;
         fclib::write_solution(&path, &solution).unwrap();
         content.solution = Some(solution);
         assert_eq!(dump(), expected_dump(&content));
@@ -345,7 +363,7 @@ with h5py.File(sys.argv[1], 'r+') as f:
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("file.hdf5");
     let [_, mut content] = contents();
-    fclib::write(&path, &content).unwrap();
+    Fclib.write(&path, &content).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     assert_eq!((&bytes[..8], bytes[8]), (&b"\x89HDF\r\n\x1a\n"[..], 2), "superblock of HDF5 1.8");
     let appended = Command::new("python3").args(["-c", APPEND]).arg(&path).output();
@@ -354,9 +372,8 @@ with h5py.File(sys.argv[1], 'r+') as f:
         return;
     }
     let zeros = |n| vec![-0.0; n];
-    content.solution =
-        Some(StoredPoint { v: Some(zeros(5)), u: zeros(3), r: zeros(3), lambda: Some(zeros(1)) });
-    assert_same(&fclib::read(&path).unwrap(), &content);
+    content.solution = Some(stored(Some(zeros(5)), zeros(3), zeros(3), zeros(1)));
+    assert_same(&Fclib.read(&path).unwrap(), &content);
 }
 
 #[test]
@@ -391,9 +408,9 @@ with h5py.File(sys.argv[1], 'w', libver=('earliest', 'v108')) as f:
         let before = dump();
         assert!(before.contains("/notes utf-8"), "{before}");
         let x = vec![0.5, 0.25];
-        let solution = StoredPoint { u: x.clone(), r: x, ..Default::default() };
+        let solution = stored(None, x.clone(), x, vec![]);
         fclib::write_solution(&path, &solution).unwrap();
-        let content = fclib::read(&path).unwrap();
+        let content = Fclib.read(&path).unwrap();
         assert_eq!((content.solution, content.info.involved_ds), (Some(solution), Some(3)));
         let rest = |dump: &str| {
             let lines = dump.lines().filter(|line| !line.starts_with("/solution"));
@@ -410,26 +427,25 @@ fn empty_multipliers_are_written_where_fclib_expects_them() {
     let path = folder.path().join("file.hdf5");
     let problem =
         FrictionGlobal { rows: Some(RowsGlobal::bilateral(csc(5, 0), vec![])), ..global() };
-    let point =
-        StoredPoint { v: Some(vec![0.5; 5]), u: vec![0.0; 3], r: vec![1.0; 3], lambda: None };
+    let point = stored(Some(vec![0.5; 5]), vec![0.0; 3], vec![1.0; 3], vec![]);
     let length = || {
         let file = hdf5_pure::File::open(&path).unwrap();
         file.dataset("solution/l").map(|l| l.shape().unwrap()).ok()
     };
-    let mut content = FclibFile::new(Friction::Global3(problem));
+    let mut content = ProblemFile::new(Friction::Global3(problem));
     content.solution = Some(point.clone());
-    fclib::write(&path, &content).unwrap();
+    Fclib.write(&path, &content).unwrap();
     assert_eq!(length(), Some(vec![0]));
-    assert_same(&fclib::read(&path).unwrap(), &content);
-    fclib::write_solution(&path, &StoredPoint { lambda: Some(vec![]), ..point.clone() }).unwrap();
+    assert_same(&Fclib.read(&path).unwrap(), &content);
+    fclib::write_solution(&path, &point).unwrap();
     assert_eq!(length(), Some(vec![0]));
-    assert_same(&fclib::read(&path).unwrap(), &content);
+    assert_same(&Fclib.read(&path).unwrap(), &content);
 
-    let Friction::Global3(p) = &mut content.problem else { unreachable!() };
+    let AnyProblem::Friction(Friction::Global3(p)) = &mut content.problem else { unreachable!() };
     p.rows = None;
-    fclib::write(&path, &content).unwrap();
+    Fclib.write(&path, &content).unwrap();
     assert_eq!(length(), None);
-    assert_same(&fclib::read(&path).unwrap(), &content);
+    assert_same(&Fclib.read(&path).unwrap(), &content);
 }
 
 #[test]
@@ -458,8 +474,8 @@ with h5py.File(source) as f, h5py.File(copy, 'w', libver=(format, 'latest')) as 
     let tree = common::local_tree().set("solution/u", common::Data::F(vec![0.5; 4]));
     let tree = tree.set("solution/r", common::Data::F(vec![0.25; 4]));
     std::fs::rename(tree.save(folder.path()), &written).unwrap();
-    let content = fclib::read(&written).unwrap();
-    let solution = StoredPoint { u: vec![1.5; 4], r: vec![1.25; 4], ..Default::default() };
+    let content = Fclib.read(&written).unwrap();
+    let solution = stored(None, vec![1.5; 4], vec![1.25; 4], vec![]);
     let link = |format: &str, name: &str, to: &str, target: &str| {
         let mut python = Command::new("python3");
         python.args(["-c", LINK]).args([&written, &path]).args([format, name, to, target]);
@@ -467,7 +483,7 @@ with h5py.File(source) as f, h5py.File(copy, 'w', libver=(format, 'latest')) as 
         assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     };
     let message = || {
-        let message = fclib::read(&path).unwrap_err().to_string();
+        let message = Fclib.read(&path).unwrap_err().to_string();
         message.strip_prefix(&format!("{}: ", path.display())).unwrap().to_string()
     };
     for format in ["earliest", "latest"] {
@@ -481,7 +497,7 @@ with h5py.File(source) as f, h5py.File(copy, 'w', libver=(format, 'latest')) as 
             ("/notes", "", "/nowhere"),
         ] {
             link(format, name, to, target);
-            assert_same(&fclib::read(&path).unwrap(), &content);
+            assert_same(&Fclib.read(&path).unwrap(), &content);
         }
         // To itself by way of a link that exists.
         link(format, "/fclib_local/W/p", "", "/near");
@@ -505,7 +521,7 @@ with h5py.File(source) as f, h5py.File(copy, 'w', libver=(format, 'latest')) as 
             match fclib::write_solution(&path, &solution) {
                 Ok(()) => {
                     assert_eq!(name, "/notes");
-                    assert_eq!(fclib::read(&path).unwrap().solution.as_ref(), Some(&solution));
+                    assert_eq!(Fclib.read(&path).unwrap().solution.as_ref(), Some(&solution));
                 }
                 Err(e) => {
                     let what =
@@ -572,10 +588,10 @@ fn every_layout_of_hdf5_is_read() {
     for format in ["earliest", "v108", "v110", "latest"] {
         for (number, layout) in layouts.iter().enumerate() {
             let path = folder.path().join(format!("{format}-{number}"));
-            let content = fclib::read(&path).unwrap_or_else(|e| panic!("{format} {layout}: {e}"));
+            let content = Fclib.read(&path).unwrap_or_else(|e| panic!("{format} {layout}: {e}"));
             assert_eq!(content.info.title.as_deref(), Some("layout"));
             assert_eq!((content.info.dofs, content.info.involved_ds), (Some(7), None));
-            let Friction::Local2(p) = content.problem else { panic!("{format} {layout}") };
+            let Friction::Local2(p) = contacts(&content) else { panic!("{format} {layout}") };
             let m = 1400;
             let w = p.W.to_csc();
             for k in 0..m {
@@ -592,10 +608,10 @@ fn every_layout_of_hdf5_is_read() {
                 lines.map(String::from).collect()
             };
             let before = rest(dump());
-            let solution = StoredPoint { u: vec![0.5; m], r: vec![0.25; m], ..Default::default() };
+            let solution = stored(None, vec![0.5; m], vec![0.25; m], vec![]);
             fclib::write_solution(&path, &solution).unwrap_or_else(|e| panic!("{layout}: {e}"));
             assert_eq!(rest(dump()), before, "{format} {layout}");
-            assert_eq!(fclib::read(&path).unwrap().solution, Some(solution));
+            assert_eq!(Fclib.read(&path).unwrap().solution, Some(solution));
         }
     }
 }
@@ -634,8 +650,8 @@ for format in ['earliest', 'v110', 'latest']:
     for format in ["earliest", "v110", "latest"] {
         for kind in ["endless", "fixed", "plane"] {
             let path = folder.path().join(format!("{format}-{kind}"));
-            let content = fclib::read(&path).unwrap_or_else(|e| panic!("{format} {kind}: {e}"));
-            let Friction::Local2(p) = content.problem else { panic!("{format} {kind}") };
+            let content = Fclib.read(&path).unwrap_or_else(|e| panic!("{format} {kind}: {e}"));
+            let Friction::Local2(p) = contacts(&content) else { panic!("{format} {kind}") };
             let w = p.W.to_csc();
             for k in 0..20 {
                 let expected = if (1..10).contains(&k) { k as f64 } else { 0.0 };
@@ -651,11 +667,11 @@ fn a_solution_written_again_does_not_make_the_file_larger() {
     let path = folder.path().join("again.hdf5");
     for mut content in contents() {
         content.solution = None;
-        fclib::write(&path, &content).unwrap();
+        Fclib.write(&path, &content).unwrap();
         let (v, m, p) = common::sizes(&content.problem);
         let point = |x: f64| {
-            let some = |n: usize| (n > 0).then(|| vec![x; n]);
-            StoredPoint { v: some(v), u: vec![x + 1.0; m], r: vec![x + 2.0; m], lambda: some(p) }
+            let v = v.map(|n| vec![x; n]);
+            stored(v, vec![x + 1.0; m], vec![x + 2.0; m], vec![x; p])
         };
         fclib::write_solution(&path, &point(0.0)).unwrap();
         let first = std::fs::read(&path).unwrap();
@@ -664,7 +680,7 @@ fn a_solution_written_again_does_not_make_the_file_larger() {
             let bytes = std::fs::read(&path).unwrap();
             assert_eq!(bytes.len(), first.len(), "at the {k}th time");
             content.solution = Some(point(k.into()));
-            assert_same(&fclib::read(&path).unwrap(), &content);
+            assert_same(&Fclib.read(&path).unwrap(), &content);
         }
         // Bytes change where the values stand, and nowhere else.
         fclib::write_solution(&path, &point(0.0)).unwrap();
@@ -704,9 +720,9 @@ with h5py.File(path, 'r+') as f:
         let mut size = None;
         for k in 0..3 {
             let x = f64::from(k);
-            let solution = StoredPoint { u: vec![x; 4], r: vec![-x; 4], ..Default::default() };
+            let solution = stored(None, vec![x; 4], vec![-x; 4], vec![]);
             fclib::write_solution(&path, &solution).unwrap();
-            assert_eq!(fclib::read(&path).unwrap().solution, Some(solution), "{kind}");
+            assert_eq!(Fclib.read(&path).unwrap().solution, Some(solution), "{kind}");
             assert_eq!(mine(&dump()), before, "{kind}");
             let now = std::fs::metadata(&path).unwrap().len();
             assert_eq!(*size.get_or_insert(now), now, "{kind}");
@@ -723,7 +739,7 @@ fn h5dump_reads_what_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("file.hdf5");
     for content in contents() {
-        fclib::write(&path, &content).unwrap();
+        Fclib.write(&path, &content).unwrap();
         let dump = |dataset: &str| {
             sorted_lines(Command::new("h5dump").args(["-m", "%a", "-d", dataset]).arg(&path))
         };

@@ -55,7 +55,7 @@
 //! | state a problem | [`FrictionLocal`], [`FrictionGlobal`], [`Lcp`], [`Mlcp`], [`Hlcp`], [`BoxLcp`]; [`AnyProblem`] where the kind is known only from a file |
 //! | solve it | [`solve`], [`Solve`], [`Answer`]; [`session`] for many problems of one shape, step by step, without allocation |
 //! | judge a point | [`Judged::judge`], [`Verdict`]; [`exists`] asks whether there is a solution at all |
-//! | read and write files | [`read`], [`read_any`], [`fclib`], [`linear`] |
+//! | read and write files | [`read`] a problem; [`ProblemFile`] with all that a file holds, in any of the [`FORMATS`] |
 //! | make matrices | [`Csc`], [`Bsr`], [`Dense`]: from slices, from faer, and behind features from nalgebra and sprs |
 //! | make problems | [`Planted`], with a known solution; [`Scene`], of bodies |
 //! | write a solver | [`Solver`], [`Step`], [`Driver`] |
@@ -68,7 +68,7 @@ pub use nonsmooth_solve::{Answer, Solvable, Solve, solve};
 #[doc(inline)]
 pub use nonsmooth_io::read;
 
-pub use nonsmooth_io::{Content, IoError, fclib, linear, read_any};
+pub use nonsmooth_io::{FORMATS, Format, Info, IoError, ProblemFile, StoredPoint, fclib, linear};
 pub use nonsmooth_linalg::{Bsr, Csc, Dense, Matrix, Operator};
 pub use nonsmooth_problem::check::{
     Certificate, ContactStatus, Existence, Judged, Measure, Motion, Proof, RowCounts, RowStatus,

@@ -10,14 +10,13 @@ use nonsmooth_solve::{Limits, registry};
 fn solved(setting: &str) -> (Vec<String>, usize) {
     let (mut names, mut all) = (vec![], 0);
     for path in common::corpus_files(&["siconos/fc3d"]) {
-        let Ok(file) = fclib::read(&path) else { continue };
-        let Friction::Local3(problem) = &file.problem else { continue };
+        let Ok(Friction::Local3(problem)) = fclib::read_problem(&path) else { continue };
         all += 1;
         let settings = nonsmooth_solve::settings::from_texts(&[setting, "patience=60"]).unwrap();
         let mut session = registry::session("ip", &settings).unwrap();
         let limits = Limits { tolerance: 1e-12, max_iterations: 300, ..Limits::default() };
         let mut point = problem.origin();
-        let outcome = session.solve(problem, &mut point, &limits, &mut |_| {}).unwrap();
+        let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
         if outcome.measure.relative <= 1e-12 {
             names.push(path.file_stem().unwrap().to_string_lossy().into_owned());
         }

@@ -74,7 +74,7 @@ fn the_global_corpus() {
     let (mut files, mut agreed) = (0, 0);
     for path in common::corpus_files(&["siconos/gfc3d", "siconos/gfc2d", "generated"]) {
         let name = path.display().to_string();
-        agreed += match fclib::read(&path).map(|f| f.problem) {
+        agreed += match fclib::read_problem(&path) {
             Ok(Friction::Global3(problem)) => agree(&problem, &name),
             Ok(Friction::Global2(problem)) => agree(&problem, &name),
             _ => continue,

@@ -4,9 +4,8 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use nonsmooth_analysis::Traits;
-use nonsmooth_io::linear::LinearFile;
-use nonsmooth_io::{Content, holds_problem, parts as files_of, read_any};
-use nonsmooth_problem::{Complementarity, Problem as _, with_complementarity};
+use nonsmooth_io::{FORMATS, ProblemFile, holds_problem, parts as files_of};
+use nonsmooth_problem::{AnyProblem, Complementarity, Problem as _};
 use sha2::{Digest, Sha256};
 
 use crate::finite;
@@ -25,7 +24,7 @@ pub struct Input {
     pub bytes: u64,
 }
 
-/// All files that look like problems (`.hdf5` and `.h5`; of `.toml`, `.mtx` and `.dat` those that begin like one) under the given
+/// All files that look like problems of one of the [`FORMATS`] (see [`holds_problem`]) under the given
 /// files and folders, each once, the smallest first. A link to a file has the name and the folder of the link.
 ///
 /// Second: what is wrong with them, one line each: a root that does not exist, cannot be listed, or holds no problem; a
@@ -39,9 +38,8 @@ pub fn inputs(roots: &[PathBuf]) -> (Vec<Input>, Vec<String>) {
         walk(root, root, &mut here, &mut mistakes);
         if here.is_empty() && mistakes.len() == before {
             let root = root.display();
-            mistakes.push(format!(
-                "{root}: expected problems (*.hdf5, *.toml, *.mtx, *.dat), found none"
-            ));
+            let named = FORMATS.map(|f| format!("*.{}", f.about().extensions[0])).join(", ");
+            mistakes.push(format!("{root}: expected problems ({named}), found none"));
         }
         for path in here {
             // The same file may be reached from two roots.
@@ -99,42 +97,39 @@ pub fn describe(file: &Path) -> Result<Problem, String> {
         digest.update(&bytes);
     }
     let digest: String = digest.finalize().iter().take(8).map(|b| format!("{b:02x}")).collect();
-    let described = match read_any(file).map_err(|e| e.to_string())? {
-        Content::Friction(content) => {
-            let traits = Traits::of(&content.problem, content.info.dofs);
+    let content = ProblemFile::read(file).map_err(|e| e.to_string())?;
+    let problem = &content.problem;
+    let all = Problem {
+        digest,
+        kind: problem.kind().name().into(),
+        unknowns: problem.unknowns(),
+        ..Problem::default()
+    };
+    Ok(match problem {
+        AnyProblem::Friction(contacts) => {
+            let traits = Traits::of(contacts, content.info.dofs);
             Problem {
-                kind: traits.kind.name().into(),
                 contacts: traits.contacts,
-                unknowns: traits.unknowns,
                 dofs: traits.dofs,
                 density: traits.density(),
                 asymmetry: finite(traits.asymmetry),
                 mu_min: finite(traits.mu.min),
                 mu_max: finite(traits.mu.max),
-                ..Problem::default()
+                ..all
             }
         }
-        Content::Linear(content) => linear(&content),
-    };
-    Ok(Problem { digest, ..described })
-}
-
-/// A linear complementarity problem: its pairs stand where contacts do.
-fn linear(content: &LinearFile) -> Problem {
-    let (pairs, matrix) = match &content.problem {
-        Complementarity::Lcp(p) => (p.dim(), &p.M),
-        Complementarity::Mlcp(p) => (p.pairs(), &p.M),
-        Complementarity::Hlcp(p) => (p.dim(), &p.Q),
-        Complementarity::Box(p) => (p.dim(), &p.M),
-    };
-    let square = matrix.nrows() == matrix.ncols();
-    let asymmetry = if square { matrix.asymmetry() } else { None };
-    with_complementarity!(&content.problem, p => Problem {
-        kind: p.kind().name().into(),
-        contacts: pairs,
-        unknowns: p.unknowns(),
-        asymmetry: asymmetry.and_then(finite),
-        ..Problem::default()
+        AnyProblem::Complementarity(linear) => {
+            // Pairs stand where contacts do.
+            let (contacts, matrix) = match linear {
+                Complementarity::Lcp(p) => (p.dim(), &p.M),
+                Complementarity::Mlcp(p) => (p.pairs(), &p.M),
+                Complementarity::Hlcp(p) => (p.dim(), &p.Q),
+                Complementarity::Box(p) => (p.dim(), &p.M),
+            };
+            let square = matrix.nrows() == matrix.ncols();
+            let asymmetry = if square { matrix.asymmetry() } else { None };
+            Problem { contacts, asymmetry: asymmetry.and_then(finite), ..all }
+        }
     })
 }
 

@@ -3,9 +3,8 @@
 use std::io::{BufRead, Read, Write};
 use std::time::Instant;
 
-use nonsmooth_io::{Content, read_any};
 use nonsmooth_problem::check::Measure;
-use nonsmooth_problem::{with_complementarity, with_friction};
+use nonsmooth_problem::with_problem;
 use nonsmooth_solve::registry::Registered;
 use nonsmooth_solve::{Limit, Limits, Outcome, Sample, Status};
 
@@ -45,18 +44,10 @@ pub fn serve(solvers: &impl Solvers) -> Result<(), String> {
     system::limit_memory(job.memory_limit);
     say(&match &job.task {
         Task::Describe => describe(&job.file).map_or_else(Said::Unreadable, Said::Described),
-        Task::Solve { .. } => match read_any(&job.file) {
+        Task::Solve { .. } => match nonsmooth_io::read(&job.file) {
             Err(e) => Said::Unreadable(e.to_string()),
-            Ok(Content::Friction(file)) => {
-                let problem = file.problem;
-                with_friction!(&problem, p => solve(p, &job.task, solvers))
-                    .unwrap_or_else(Said::Refused)
-            }
-            Ok(Content::Linear(file)) => {
-                let problem = file.problem;
-                with_complementarity!(&problem, p => solve(p, &job.task, solvers))
-                    .unwrap_or_else(Said::Refused)
-            }
+            Ok(problem) => with_problem!(&problem, p => solve(p, &job.task, solvers))
+                .unwrap_or_else(Said::Refused),
         },
     });
     Ok(())

@@ -7,18 +7,18 @@ mod suite;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use nonsmooth_io::fclib;
-use nonsmooth_problem::{Friction, with_complementarity};
+use nonsmooth_io::ProblemFile;
+use nonsmooth_problem::check::Motion;
+use nonsmooth_problem::{AnyPoint, AnyProblem, AnyStatus, Problem};
 use nonsmooth_scenes::draw::{self, Drawing};
 use nonsmooth_scenes::{Scene, SceneEntry, SceneError, scenes::SCENES};
+use nonsmooth_solve::Limits;
 use nonsmooth_solve::registry;
 use nonsmooth_solve::settings::{self, Setting, SettingsMap};
-use nonsmooth_solve::{Limits, Status};
 
 use self::linear::Maker;
-use self::scene::{Form, join, make, plain, summary};
-use crate::kinds::Counts;
-use crate::solve::{Plan, Solved, limits, linear_name, seconds, solve as solve_one, solve_any};
+use self::scene::{Form, plain, summary, told};
+use crate::solve::{Plan, Solved, limits, seconds, solve, with_solution};
 use crate::{Exit, files, output, report};
 
 /// Generate the problem of a scene, or a linear complementarity problem.
@@ -92,22 +92,19 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         output::print(&format!("{}\n{}", list(SCENES), makers(linear::MAKERS)));
         return Ok(Exit::Solved);
     };
-    if let Some(maker) = Maker::find(name) {
-        return linear_problem(maker, args);
-    }
-    let entry = SceneEntry::find(name).map_err(|e| {
-        let others: Vec<_> = linear::MAKERS.iter().map(|m| m.name).collect();
-        format!("{e}; linear complementarity: {}", others.join(", "))
-    })?;
+    let made = Made::find(name)?;
     if args.list {
-        output::print(&list(std::slice::from_ref(entry)));
+        output::print(&made.list());
         return Ok(Exit::Solved);
     }
+    made.fits(args)?;
     let settings = settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))?;
     let Some(label) = args.out.as_deref().or(args.draw.as_deref()) else {
-        return Err(format!(
-            "gen {name}: expected --out FILE.hdf5 or --draw FILE.svg, found neither"
-        ));
+        let (expected, found) = match made {
+            Made::Scene(_) => ("--out FILE.hdf5 or --draw FILE.svg", "neither"),
+            Made::Linear(_) => ("--out FILE.toml", "none"),
+        };
+        return Err(format!("gen {name}: expected {expected}, found {found}"));
     };
     for (option, path) in [("--out", &args.out), ("--draw", &args.draw)] {
         path.as_deref().map_or(Ok(()), |path| files::writable(option, path))?;
@@ -126,91 +123,122 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         true => Some(limits(args.tol, None, args.time_limit)?),
         false => None,
     };
-    let mistake = |e| format!("scene {name}: {e}");
-    let (scene, mut content) = make(entry, &settings, args.form).map_err(mistake)?;
-    let solved = limits.map(|limits| solve(label, &content.problem, limits)).transpose()?;
-    content.solution = solved.as_ref().map(|s| s.point.clone());
-    if let Some(path) = &args.out {
-        fclib::write(path, &content).map_err(|e| e.to_string())?;
+    let (scene, mut content) = made.make(&settings, args.form)?;
+    let kind = content.problem.kind();
+    args.out.as_deref().map_or(Ok(()), |path| files::holds("--out", path, kind))?;
+    let solved =
+        limits.map(|limits| solve_by_default(label, &content.problem, limits)).transpose()?;
+    if let Some(solved) = &solved {
+        content = with_solution(content, solved);
     }
-    if let Some(path) = &args.draw {
-        let svg = drawing(&scene, solved.as_ref()).map_err(mistake)?;
+    if let Some(path) = &args.out {
+        content.write(path).map_err(|e| e.to_string())?;
+    }
+    if let (Some(path), Some(scene)) = (&args.draw, &scene) {
+        let svg = drawing(scene, solved.as_ref()).map_err(|e| format!("scene {name}: {e}"))?;
         files::write_text("--draw", path, &svg)?;
     }
-    output::print(&text(label, &scene, &content.problem, solved.as_ref(), args.tol));
-    let is_solved = |s: &Solved| s.status == Status::Solved;
-    Ok(Exit::solved(solved.as_ref().is_none_or(is_solved)))
-}
-
-/// Writes a linear complementarity problem.
-fn linear_problem(maker: &Maker, args: &Args) -> Result<Exit, String> {
-    let name = maker.name;
-    if args.list {
-        output::print(&makers(std::slice::from_ref(maker)));
-        return Ok(Exit::Solved);
-    }
-    if args.draw.is_some() || args.form != Form::Global {
-        let option = if args.draw.is_some() { "--draw" } else { "--form" };
-        return Err(format!(
-            "{option}: expected a scene, found {name}, a linear complementarity problem"
-        ));
-    }
-    let settings = settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))?;
-    let Some(path) = args.out.as_deref() else {
-        return Err(format!("gen {name}: expected --out FILE.toml, found none"));
+    let mut text = match &scene {
+        Some(scene) => summary(label, scene, &content.problem),
+        None => format!("{}: {}\n", label.display(), report::problem_text(&content.problem)),
     };
-    linear_name(path)?;
-    files::writable("--out", path)?;
-    let limits = match args.solve {
-        true => Some(limits(args.tol, None, args.time_limit)?),
-        false => None,
-    };
-    let mut content = maker.make(&settings)?;
-    let all = (maker.settings)().into_iter().map(|s| (s.key, s.default));
-    let mut all: SettingsMap = all.collect();
-    all.extend(settings.clone());
-    content.title = Some(format!("{name} {}", join(&settings)).trim_end().into());
-    content.description = Some(format!(
-        "{}, by nonsmooth {}: {}.",
-        maker.summary,
-        env!("CARGO_PKG_VERSION"),
-        join(&all)
-    ));
-    let sizes = with_complementarity!(&content.problem, p => report::problem_text(p));
-    let mut text = format!("{}: {sizes}\n", path.display());
-    let mut exit = Exit::Solved;
-    if let Some(limits) = limits {
-        let tolerance = limits.tolerance;
-        let settings = &SettingsMap::new();
-        let begun = Instant::now();
-        let plan = Plan { solver: registry::DEFAULT, settings, limits, begun, progress: true };
-        let solved = with_complementarity!(&content.problem, p => solve_one(path, p, None, &plan))?;
-        solution(&mut text, &solved, tolerance);
-        exit = Exit::solved(solved.status == Status::Solved);
-        content.solution = Some(solved.point);
+    if let Some(solved) = &solved {
+        solution(&mut text, solved, args.tol);
     }
-    nonsmooth_io::linear::write(path, &content).map_err(|e| e.to_string())?;
     output::print(&text);
-    Ok(exit)
+    Ok(Exit::solved(solved.as_ref().is_none_or(Solved::is_solved)))
 }
 
-fn solve(label: &Path, problem: &Friction, limits: Limits) -> Result<Solved, String> {
+/// What makes a problem.
+#[derive(Clone, Copy)]
+enum Made {
+    Scene(&'static SceneEntry),
+    Linear(&'static Maker),
+}
+
+impl Made {
+    fn find(name: &str) -> Result<Self, String> {
+        if let Some(maker) = Maker::find(name) {
+            return Ok(Self::Linear(maker));
+        }
+        SceneEntry::find(name).map(Self::Scene).map_err(|e| {
+            let others: Vec<_> = linear::MAKERS.iter().map(|m| m.name).collect();
+            format!("{e}; linear complementarity: {}", others.join(", "))
+        })
+    }
+
+    fn list(self) -> String {
+        match self {
+            Self::Scene(entry) => list(std::slice::from_ref(entry)),
+            Self::Linear(maker) => makers(std::slice::from_ref(maker)),
+        }
+    }
+
+    /// Options that only scenes have.
+    fn fits(self, args: &Args) -> Result<(), String> {
+        match self {
+            Self::Linear(maker) if args.draw.is_some() || args.form != Form::Global => {
+                let option = if args.draw.is_some() { "--draw" } else { "--form" };
+                let name = maker.name;
+                Err(format!(
+                    "{option}: expected a scene, found {name}, a linear complementarity problem"
+                ))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The file of the problem, and its scene if it has one.
+    fn make(
+        self,
+        settings: &SettingsMap,
+        form: Form,
+    ) -> Result<(Option<Scene>, ProblemFile), String> {
+        match self {
+            Self::Scene(entry) => {
+                let made = scene::make(entry, settings, form);
+                let (scene, content) = made.map_err(|e| format!("scene {}: {e}", entry.name))?;
+                Ok((Some(scene), content))
+            }
+            Self::Linear(maker) => {
+                let mut content = maker.make(settings)?;
+                let by = |all: &str| {
+                    format!("{}, by nonsmooth {}: {all}.", maker.summary, env!("CARGO_PKG_VERSION"))
+                };
+                content.info = told(maker.name, settings, (maker.settings)(), by);
+                Ok((None, content))
+            }
+        }
+    }
+}
+
+fn solve_by_default(label: &Path, problem: &AnyProblem, limits: Limits) -> Result<Solved, String> {
     let settings = &SettingsMap::new();
     let begun = Instant::now();
     let plan = Plan { solver: registry::DEFAULT, settings, limits, begun, progress: true };
-    solve_any(label, problem, &plan)
+    solve(label, problem, None, &plan)
 }
 
 fn drawing(scene: &Scene, solved: Option<&Solved>) -> Result<String, SceneError> {
     let Some(Solved { verdict, point, .. }) = solved else {
         return draw::svg(scene, &Drawing::default());
     };
-    let motions: Vec<_> = verdict.statuses.iter().map(|s| s.status).collect();
-    let counts = &verdict.counts;
-    let caption =
-        format!("impulses: {} stick, {} slip; {} open", counts.stick, counts.slip, counts.open);
+    // A scene's problem is one of contacts.
+    let motion = |status: &AnyStatus| match status {
+        AnyStatus::Contact(contact) => Some(contact.status),
+        AnyStatus::Row(_) => None,
+    };
+    let motions: Vec<_> = verdict.statuses.iter().filter_map(motion).collect();
+    let impulses = match point {
+        AnyPoint::Local(point) => Some(&point.r[..]),
+        AnyPoint::Global(point) => Some(&point.r[..]),
+        AnyPoint::Lcp(_) | AnyPoint::Hlcp(_) => None,
+    };
+    let count = |of: Motion| motions.iter().filter(|m| **m == of).count();
+    let (open, stick, slip) = (count(Motion::Open), count(Motion::Stick), count(Motion::Slip));
+    let caption = format!("impulses: {stick} stick, {slip} slip; {open} open");
     let drawing = Drawing {
-        impulses: Some(&point.r),
+        impulses,
         motions: Some(&motions),
         caption: Some(&caption),
         ..Drawing::default()
@@ -218,22 +246,8 @@ fn drawing(scene: &Scene, solved: Option<&Solved>) -> Result<String, SceneError>
     draw::svg(scene, &drawing)
 }
 
-fn text(
-    label: &Path,
-    scene: &Scene,
-    problem: &Friction,
-    solved: Option<&Solved>,
-    tolerance: f64,
-) -> String {
-    let mut text = summary(label, scene, problem);
-    if let Some(solved) = solved {
-        solution(&mut text, solved, tolerance);
-    }
-    text
-}
-
 /// What came of --solve.
-fn solution<S, C: Counts, T>(text: &mut String, solved: &Solved<S, C, T>, tolerance: f64) {
+fn solution(text: &mut String, solved: &Solved, tolerance: f64) {
     let iterations = report::count(solved.iterations, "iteration");
     let (status, time) = (&solved.status, seconds(solved.seconds));
     report::row(text, "solution", format!("{status}, {iterations}, {time}"));

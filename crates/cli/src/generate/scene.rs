@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use nonsmooth_io::fclib::{FclibFile, Info};
-use nonsmooth_problem::Friction;
+use nonsmooth_io::{Info, ProblemFile};
+use nonsmooth_problem::{AnyProblem, Problem};
 use nonsmooth_scenes::{Scene, SceneEntry, SceneError};
-use nonsmooth_solve::settings::SettingsMap;
+use nonsmooth_solve::settings::{Setting, SettingsMap};
 use serde_json::Value;
 
 use crate::report;
@@ -24,37 +24,42 @@ pub fn make(
     entry: &SceneEntry,
     settings: &SettingsMap,
     form: Form,
-) -> Result<(Scene, FclibFile), SceneError> {
+) -> Result<(Scene, ProblemFile), SceneError> {
     let scene = entry.make(settings)?;
-    let problem = match form {
-        Form::Global => Friction::Global3(scene.problem()?),
-        Form::Local => Friction::Local3(scene.condensed()?),
+    let mut content = match form {
+        Form::Global => ProblemFile::new(scene.problem()?),
+        Form::Local => ProblemFile::new(scene.condensed()?),
     };
-    let mut content = FclibFile::new(problem);
-    content.info = info(entry, settings, &scene);
-    Ok((scene, content))
-}
-
-/// What made the file, so that it can be made again.
-fn info(entry: &SceneEntry, settings: &SettingsMap, scene: &Scene) -> Info {
-    let title = format!("{} {}", entry.name, join(settings));
-    let mut all: SettingsMap = entry.settings().into_iter().map(|s| (s.key, s.default)).collect();
-    all.extend(settings.clone());
-    Info {
-        title: Some(title.trim_end().into()),
-        description: Some(format!(
-            "One Moreau-Jean time step of the scene `{}` ({}), by nonsmooth {}: {}. SI units.",
+    let by = |all: &str| {
+        format!(
+            "One Moreau-Jean time step of the scene `{}` ({}), by nonsmooth {}: {all}. SI units.",
             entry.name,
             entry.summary,
             env!("CARGO_PKG_VERSION"),
-            join(&all)
-        )),
-        dofs: Some(scene.dofs()),
+        )
+    };
+    let info = told(entry.name, settings, entry.settings(), by);
+    content.info = Info { dofs: Some(scene.dofs()), ..info };
+    Ok((scene, content))
+}
+
+/// What made the file, so that it can be made again: the settings given, and `by` what with all of them.
+pub fn told(
+    name: &str,
+    given: &SettingsMap,
+    settings: Vec<Setting>,
+    by: impl FnOnce(&str) -> String,
+) -> Info {
+    let mut all: SettingsMap = settings.into_iter().map(|s| (s.key, s.default)).collect();
+    all.extend(given.clone());
+    Info {
+        title: Some(format!("{name} {}", join(given)).trim_end().into()),
+        description: Some(by(&join(&all))),
         ..Info::default()
     }
 }
 
-pub fn join(settings: &SettingsMap) -> String {
+fn join(settings: &SettingsMap) -> String {
     let each = settings.iter().map(|(k, v)| format!("{k}={}", plain(v)));
     each.collect::<Vec<_>>().join(" ")
 }
@@ -65,7 +70,7 @@ pub fn plain(value: &Value) -> String {
 }
 
 /// What was made.
-pub fn summary(label: &Path, scene: &Scene, problem: &Friction) -> String {
+pub fn summary(label: &Path, scene: &Scene, problem: &AnyProblem) -> String {
     format!(
         "{}: {}, {} and {} ({})\n",
         label.display(),
@@ -74,7 +79,7 @@ pub fn summary(label: &Path, scene: &Scene, problem: &Friction) -> String {
             1 => "1 body".into(),
             n => format!("{n} bodies"),
         },
-        report::count(problem.contacts(), "contact"),
+        report::count(scene.contacts.len(), "contact"),
         problem.kind().name(),
     )
 }

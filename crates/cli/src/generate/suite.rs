@@ -15,7 +15,6 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-use nonsmooth_io::fclib;
 use nonsmooth_scenes::SceneEntry;
 use nonsmooth_solve::settings::SettingsMap;
 use serde::Deserialize;
@@ -80,7 +79,7 @@ pub fn run(file: &Path, folder: &Path) -> Result<Exit, String> {
         files::writable("--out", &path)?;
         let (made, content) = make(scene, settings, *form)
             .map_err(|e| format!("--suite {at}, {}/{name}: {e}", scene.name))?;
-        fclib::write(&path, &content).map_err(|e| e.to_string())?;
+        content.write(&path).map_err(|e| e.to_string())?;
         output::print(&summary(&path, &made, &content.problem));
     }
     Ok(Exit::Solved)

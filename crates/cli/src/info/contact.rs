@@ -1,59 +1,30 @@
 //! What `nonsmooth info` says of frictional contact problems.
 
-use std::path::Path;
-
 use nonsmooth_analysis::{Components, Mass, MuRange, Spectrum, Traits};
-use nonsmooth_io::fclib::{FclibFile, StoredPoint};
 use nonsmooth_linalg::Inverse;
-use nonsmooth_problem::check::{ContactStatus, Existence, StatusCounts};
+use nonsmooth_problem::check::Existence;
 use nonsmooth_problem::{Dynamics, Friction, FrictionGlobal, ProblemError};
+use nonsmooth_solve::diagnose::spectrum;
+use nonsmooth_solve::{Limits, existence};
 use serde_json::{Value, json};
 
-use super::{JUDGED_AT, symmetry};
+use super::{Args, symmetry};
 use crate::exists;
-use crate::kinds::Form;
 use crate::report::{self, Object, count, number, row};
 
 /// What there is to say of a problem.
 pub(super) struct Facts {
-    sizes: Object,
-    size_text: String,
     traits: Traits,
     /// Why a global problem's dynamics cannot be inverted, so that there is nothing to solve.
-    pub(super) singular: Option<ProblemError>,
+    singular: Option<ProblemError>,
     /// If asked for, or cheap.
-    pub(super) existence: Option<Existence>,
+    existence: Option<Existence>,
     /// If asked for.
-    pub(super) spectrum: Option<Result<Spectrum, String>>,
-    solution: Option<nonsmooth_problem::check::Verdict>,
+    spectrum: Option<Result<Spectrum, String>>,
 }
 
-/// Everything about a problem but its spectrum and the existence of a solution.
-pub(super) fn facts<P>(file: &Path, problem: &P, content: &FclibFile) -> Result<Facts, String>
-where
-    P: Form<Stored = StoredPoint, Status = ContactStatus, Counts = StatusCounts>,
-{
-    let judge = |stored| problem.judge(&problem.point(stored), JUDGED_AT);
-    let solution = match content.solution.as_ref().map(judge).transpose() {
-        // Said of M.
-        Err(ProblemError::Singular { .. }) => None,
-        judged => judged.map_err(|e| format!("{}: {e}", file.display()))?,
-    };
-    Ok(Facts {
-        sizes: report::problem_json(file, problem),
-        size_text: report::problem_text(problem),
-        traits: Traits::of(&content.problem, content.info.dofs),
-        singular: match &content.problem {
-            Friction::Local2(_) | Friction::Local3(_) => None,
-            Friction::Global2(p) => singular(p),
-            Friction::Global3(p) => singular(p),
-        },
-        existence: None,
-        spectrum: None,
-        solution,
-    })
-}
-
+/// The time for the existence of a solution.
+const EXISTENCE_SECONDS: f64 = 60.0;
 /// A short search for existence takes up to about a second with so many contacts, unless a body has many unknowns.
 const FEW_CONTACTS: usize = 2000;
 /// Unknowns of a rigid body or a small elastic one.
@@ -68,26 +39,50 @@ fn singular<const D: usize>(p: &FrictionGlobal<D>) -> Option<ProblemError> {
 }
 
 impl Facts {
+    /// Everything about a problem but its spectrum and the existence of a solution.
+    pub(super) fn of(problem: &Friction, dofs: Option<usize>) -> Self {
+        let singular = match problem {
+            Friction::Local2(_) | Friction::Local3(_) => None,
+            Friction::Global2(p) => singular(p),
+            Friction::Global3(p) => singular(p),
+        };
+        Self { traits: Traits::of(problem, dofs), singular, existence: None, spectrum: None }
+    }
+
+    /// Spectrum and existence within the limits that are left, as far as they are asked for or cheap.
+    pub(super) fn search(&mut self, problem: &Friction, args: &Args, left: impl Fn() -> Limits) {
+        if args.spectrum {
+            self.spectrum = Some(spectrum(problem, args.spectrum_limit, &left()));
+        }
+        if self.singular.is_some() {
+            return;
+        }
+        self.existence = if args.existence {
+            let left = left();
+            let time_limit = Some(left.time_limit.unwrap_or(EXISTENCE_SECONDS));
+            Some(existence::of(problem, &Limits { time_limit, ..left }))
+        } else {
+            self.is_small().then(|| existence::glance(problem))
+        };
+    }
+
     /// A short search for existence costs next to nothing.
-    pub(super) fn is_small(&self) -> bool {
+    fn is_small(&self) -> bool {
         let bodies = self.traits.mass.iter().flat_map(|m| &m.components);
         self.traits.contacts <= FEW_CONTACTS && bodies.map(|c| c.size).all(|s| s <= SMALL_BODY)
     }
 
     /// As JSON.
-    pub(super) fn json(&self, content: &FclibFile) -> Value {
-        let mut all = self.sizes.clone();
+    pub(super) fn json(&self) -> Object {
         let traits = &self.traits;
-        all.extend(report::fields(json!({
-            "title": content.info.title,
-            "description": content.info.description,
+        let mut all = report::fields(json!({
             "form": if traits.mass.is_some() { "global" } else { "local" },
             "dimension": traits.kind.dimension(),
             "dofs": traits.dofs,
             "contact_density": traits.density(),
             "mu": traits.mu,
             "bilateral_rows": traits.bilateral_rows,
-        })));
+        }));
         if let Some(Mass { entries, components }) = &traits.mass {
             let singular = self.singular.as_ref().map(ProblemError::to_string);
             all.extend(report::fields(json!({
@@ -112,17 +107,11 @@ impl Facts {
             let verdict = exists::fields(existence, traits.contacts);
             all.insert("existence".into(), Value::Object(verdict));
         }
-        all.extend(report::fields(json!({
-            "guesses": content.guesses.len(),
-            "solution": self.solution.as_ref().map(|v| report::verdict_json(v, JUDGED_AT, v.worst.len())),
-        })));
-        Value::Object(all)
+        all
     }
 
     /// As text.
-    pub(super) fn text(&self, file: &Path, content: &FclibFile) -> String {
-        let mut text = format!("{}: {}\n", file.display(), self.size_text);
-        super::texts(&mut text, &content.info.title, &content.info.description);
+    pub(super) fn text(&self, text: &mut String) {
         let traits = &self.traits;
         let dofs = match (traits.dofs, traits.density()) {
             (Some(n), Some(c)) => {
@@ -131,14 +120,14 @@ impl Facts {
             }
             _ => "degrees of freedom unknown, so contact density unknown".into(),
         };
-        row(&mut text, "density", dofs);
+        row(text, "density", dofs);
         let MuRange { min, max, frictionless } = traits.mu;
         let mu = if min == max {
             format!("mu = {min}")
         } else {
             format!("mu from {min} to {max}, {} without friction", count(frictionless, "contact"))
         };
-        row(&mut text, "friction", mu);
+        row(text, "friction", mu);
         let pattern = &traits.W;
         let blocks = format!(
             "{} of {d} x {d}, by row {} to {}, {:.1} on average; {}",
@@ -151,41 +140,26 @@ impl Facts {
         );
         let symmetry = symmetry(traits.asymmetry);
         match &traits.mass {
-            None => row(&mut text, "W", format!("{blocks}, {symmetry}")),
+            None => row(text, "W", format!("{blocks}, {symmetry}")),
             Some(Mass { entries, components }) => {
                 let m = format!("{} entries, {symmetry}, {}", entries.M, sizes(components));
-                row(&mut text, "M", m);
+                row(text, "M", m);
                 if let Some(e) = &self.singular {
-                    row(&mut text, "", format!("M is singular: {e}"));
+                    row(text, "", format!("M is singular: {e}"));
                 }
-                row(&mut text, "H", format!("{} entries", entries.H));
-                row(&mut text, "W", format!("if condensed: {blocks}"));
+                row(text, "H", format!("{} entries", entries.H));
+                row(text, "W", format!("if condensed: {blocks}"));
             }
         }
         if let Some(spectrum) = &self.spectrum {
-            row(&mut text, "spectrum", spectrum_text(spectrum));
+            row(text, "spectrum", spectrum_text(spectrum));
         }
         if let Some(existence) = &self.existence {
-            row(&mut text, "existence", existence);
+            row(text, "existence", existence);
         }
         if traits.bilateral_rows > 0 {
-            row(&mut text, "bilateral", count(traits.bilateral_rows, "row"));
+            row(text, "bilateral", count(traits.bilateral_rows, "row"));
         }
-        if !content.guesses.is_empty() {
-            row(&mut text, "guesses", content.guesses.len());
-        }
-        match &self.solution {
-            None if content.solution.is_some() => {
-                row(&mut text, "solution", "stored, but M is singular: it cannot be judged");
-            }
-            None => row(&mut text, "solution", "none stored"),
-            Some(verdict) => {
-                let passes = if verdict.solved { "passes" } else { "does not pass" };
-                row(&mut text, "solution", format!("stored, {passes} at {JUDGED_AT:e}"));
-                report::verdict_text(&mut text, verdict, JUDGED_AT, 0);
-            }
-        }
-        text
     }
 }
 

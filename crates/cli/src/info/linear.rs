@@ -1,30 +1,24 @@
 //! What `nonsmooth info` says of linear complementarity problems.
 
-use std::path::Path;
-
 use nonsmooth_analysis::{Classes, Effort, Finding};
-use nonsmooth_io::linear::LinearFile;
 use nonsmooth_linalg::Matrix;
-use nonsmooth_problem::check::{Judged, RowCounts, RowStatus, Verdict};
-use nonsmooth_problem::{Complementarity, Mlcp, with_complementarity};
+use nonsmooth_problem::{Complementarity, Mlcp};
 use nonsmooth_solve::guarantees::{Guarantee, guaranteed};
 use serde_json::{Value, json};
 
-use super::{JUDGED_AT, symmetry, texts};
-use crate::kinds::Form;
+use super::symmetry;
 use crate::report::{self, Object, count, number, row};
 
 /// What there is to say of a problem.
 pub(super) struct Facts {
-    sizes: Object,
-    size_text: String,
     matrices: Vec<(&'static str, Entries)>,
     q: Right,
     /// What is known of M; of problems that have no other.
     classes: Option<Classes>,
     /// The solvers that are sure to work; of an LCP.
     guaranteed: Vec<Guarantee>,
-    solution: Option<Verdict<RowStatus, RowCounts>>,
+    /// Whether z = 0 solves the problem; of an LCP.
+    trivial: bool,
 }
 
 /// What the entries of a matrix say at a glance.
@@ -52,43 +46,37 @@ struct Right {
     norm: f64,
 }
 
-pub(super) fn facts(file: &Path, content: &LinearFile) -> Result<Facts, String> {
-    let (matrices, q): (Vec<(&'static str, &Matrix)>, &[f64]) = match &content.problem {
-        Complementarity::Lcp(p) => (vec![("M", &p.M)], &p.q),
-        Complementarity::Box(p) => (vec![("M", &p.M)], &p.q),
-        Complementarity::Mlcp(p) => (vec![("M", &p.M)], &p.q),
-        Complementarity::Hlcp(p) => (vec![("Q", &p.Q), ("R", &p.R)], &p.q),
-    };
-    let mut matrices: Vec<_> = matrices.into_iter().map(|(n, m)| (n, Entries::of(m))).collect();
-    if let Complementarity::Mlcp(p) = &content.problem {
-        matrices.extend(blocks(p));
+impl Facts {
+    pub(super) fn of(problem: &Complementarity) -> Self {
+        let (matrices, q): (Vec<(&'static str, &Matrix)>, &[f64]) = match problem {
+            Complementarity::Lcp(p) => (vec![("M", &p.M)], &p.q),
+            Complementarity::Box(p) => (vec![("M", &p.M)], &p.q),
+            Complementarity::Mlcp(p) => (vec![("M", &p.M)], &p.q),
+            Complementarity::Hlcp(p) => (vec![("Q", &p.Q), ("R", &p.R)], &p.q),
+        };
+        let mut matrices: Vec<_> = matrices.into_iter().map(|(n, m)| (n, Entries::of(m))).collect();
+        if let Complementarity::Mlcp(p) = problem {
+            matrices.extend(blocks(p));
+        }
+        let classes = match problem {
+            Complementarity::Lcp(p) => Some(classes(&p.M)),
+            Complementarity::Box(p) => Some(classes(&p.M)),
+            Complementarity::Mlcp(_) | Complementarity::Hlcp(_) => None,
+        };
+        let is_lcp = matches!(problem, Complementarity::Lcp(_));
+        let negative = q.iter().filter(|q| **q < 0.0).count();
+        Self {
+            guaranteed: classes.as_ref().filter(|_| is_lcp).map_or(vec![], guaranteed),
+            classes,
+            matrices,
+            q: Right {
+                negative,
+                zero: q.iter().filter(|q| **q == 0.0).count(),
+                norm: nonsmooth_linalg::norm(q),
+            },
+            trivial: is_lcp && negative == 0,
+        }
     }
-    let solution = with_complementarity!(&content.problem, p => {
-        let judge = |stored| p.judge(&p.point(stored), JUDGED_AT);
-        content.solution.as_ref().map(judge).transpose()
-    });
-    let classes = match &content.problem {
-        Complementarity::Lcp(p) => Some(classes(&p.M)),
-        Complementarity::Box(p) => Some(classes(&p.M)),
-        Complementarity::Mlcp(_) | Complementarity::Hlcp(_) => None,
-    };
-    let guaranteed = match (&content.problem, &classes) {
-        (Complementarity::Lcp(_), Some(classes)) => guaranteed(classes),
-        _ => vec![],
-    };
-    Ok(Facts {
-        classes,
-        guaranteed,
-        sizes: with_complementarity!(&content.problem, p => report::problem_json(file, p)),
-        size_text: with_complementarity!(&content.problem, p => report::problem_text(p)),
-        matrices,
-        q: Right {
-            negative: q.iter().filter(|q| **q < 0.0).count(),
-            zero: q.iter().filter(|q| **q == 0.0).count(),
-            norm: nonsmooth_linalg::norm(q),
-        },
-        solution: solution.map_err(|e| format!("{}: {e}", file.display()))?,
-    })
 }
 
 /// What the entries, a few factorisations, and of small matrices exact tests say of M.
@@ -236,50 +224,31 @@ impl Entries {
 
 impl Facts {
     /// As JSON.
-    pub(super) fn json(&self, content: &LinearFile) -> Value {
-        let mut all = self.sizes.clone();
+    pub(super) fn json(&self) -> Object {
         let matrices: Object =
             self.matrices.iter().map(|(name, m)| ((*name).to_owned(), m.json())).collect();
-        all.extend(report::fields(json!({
-            "title": content.title,
-            "description": content.description,
+        report::fields(json!({
             "matrices": matrices,
             "q": {"negative": self.q.negative, "zero": self.q.zero, "norm": self.q.norm},
             "classes": self.classes,
             "guaranteed": self.guaranteed,
-            "solution": self.solution.as_ref().map(|v| report::verdict_json(v, JUDGED_AT, v.worst.len())),
-        })));
-        Value::Object(all)
+        }))
     }
 
     /// As text.
-    pub(super) fn text(&self, file: &Path, content: &LinearFile) -> String {
-        let mut text = format!("{}: {}\n", file.display(), self.size_text);
-        texts(&mut text, &content.title, &content.description);
+    pub(super) fn text(&self, text: &mut String) {
         for (name, m) in &self.matrices {
-            row(&mut text, name, m.text());
+            row(text, name, m.text());
         }
         if let Some(classes) = &self.classes {
-            classes_text(&mut text, classes);
+            classes_text(text, classes);
         }
         for (k, guarantee) in self.guaranteed.iter().enumerate() {
-            row(&mut text, if k == 0 { "sure" } else { "" }, guarantee);
+            row(text, if k == 0 { "sure" } else { "" }, guarantee);
         }
         let Right { negative, zero, norm } = self.q;
-        let trivial = match (&content.problem, negative) {
-            (Complementarity::Lcp(_), 0) => "; z = 0 solves it",
-            _ => "",
-        };
+        let trivial = if self.trivial { "; z = 0 solves it" } else { "" };
         let q = format!("{negative} negative, {zero} zero, norm {}{trivial}", number(norm));
-        row(&mut text, "q", q);
-        match &self.solution {
-            None => row(&mut text, "solution", "none stored"),
-            Some(verdict) => {
-                let passes = if verdict.solved { "passes" } else { "does not pass" };
-                row(&mut text, "solution", format!("stored, {passes} at {JUDGED_AT:e}"));
-                report::verdict_text(&mut text, verdict, JUDGED_AT, 0);
-            }
-        }
-        text
+        row(text, "q", q);
     }
 }

@@ -3,15 +3,17 @@
 mod contact;
 mod linear;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use nonsmooth_io::Content;
-use nonsmooth_problem::with_friction;
-use nonsmooth_solve::diagnose::spectrum;
-use nonsmooth_solve::{Limits, existence, guard};
+use nonsmooth_io::{ProblemFile, StoredPoint};
+use nonsmooth_problem::check::Judged;
+use nonsmooth_problem::{AnyProblem, ProblemError};
+use nonsmooth_solve::{Limits, guard};
+use serde_json::{Value, json};
 
-use crate::report::{number, row};
+use crate::kinds::AnyVerdict;
+use crate::report::{self, fields, number, row};
 use crate::{Exit, files, interrupt, output};
 
 /// Describe the problems in files: sizes, structure, friction or the matrix's signs and symmetry, and what is stored besides.
@@ -24,8 +26,7 @@ use crate::{Exit, files, interrupt, output};
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Files of contact problems (FCLIB's HDF5) or of linear complementarity problems (TOML, Matrix Market, Siconos' text)
-    #[arg(required = true, value_name = "FILE")]
+    #[arg(required = true, value_name = "FILE", help = files::help("Files with one problem each", |_| true))]
     files: Vec<PathBuf>,
     /// Contact: compute the singular values of W: its rank, rank ratio and condition number. Time grows with the third
     /// power of the rows of W: a second or so for 1000
@@ -64,58 +65,105 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         let late =
             |limit| Ok(files::late(file, args.json, limit, "before the problem was described"));
         let content = match files::read_within(file, &limits)? {
-            Ok(Content::Friction(content)) => content,
-            Ok(Content::Linear(content)) => {
-                let (path, copy) = (file.to_path_buf(), content.clone());
-                let left = files::left(&limits, begun);
-                let facts = match guard::run(&left, || {}, move |_| linear::facts(&path, &copy)) {
-                    Ok(facts) => facts?,
-                    Err(limit) => return late(limit),
-                };
-                output::print(&if args.json {
-                    format!("{}\n", facts.json(&content))
-                } else {
-                    facts.text(file, &content)
-                });
-                return Ok(Exit::Solved);
-            }
+            Ok(content) => content,
             Err(limit) => return late(limit),
         };
-        let (path, copy) = (file.to_path_buf(), content.clone());
-        let left = files::left(&limits, begun);
-        let facts = guard::run(
-            &left,
-            || {},
-            move |_| with_friction!(&copy.problem, p => contact::facts(&path, p, &copy)),
-        );
-        let mut facts = match facts {
-            Ok(facts) => facts?,
+        let copy = content.clone();
+        let left = || files::left(&limits, begun);
+        let facts = match guard::run(&left(), || {}, move |_| Facts::of(&copy)) {
+            Ok(facts) => facts,
             Err(limit) => return late(limit),
         };
-        if args.spectrum {
-            let left = files::left(&limits, begun);
-            facts.spectrum = Some(spectrum(&content.problem, args.spectrum_limit, &left));
+        let mut facts = facts.map_err(|e| format!("{}: {e}", file.display()))?;
+        if let (Details::Contact(facts), AnyProblem::Friction(problem)) =
+            (&mut facts.details, &content.problem)
+        {
+            facts.search(problem, args, left);
         }
-        if facts.singular.is_none() {
-            facts.existence = if args.existence {
-                let left = files::left(&limits, begun);
-                let time_limit = Some(left.time_limit.unwrap_or(EXISTENCE_SECONDS));
-                Some(existence::of(&content.problem, &Limits { time_limit, ..left }))
-            } else {
-                facts.is_small().then(|| existence::glance(&content.problem))
-            };
-        }
-        output::print(&if args.json {
-            format!("{}\n", facts.json(&content))
-        } else {
-            facts.text(file, &content)
+        output::print(&match args.json {
+            true => format!("{}\n", facts.json(file, &content)),
+            false => facts.text(file, &content),
         });
         Ok(Exit::Solved)
     }))
 }
 
-/// The time for the existence of a solution.
-const EXISTENCE_SECONDS: f64 = 60.0;
+/// What there is to say of a file.
+struct Facts {
+    details: Details,
+    solution: Option<AnyVerdict>,
+}
+
+/// What there is to say of the problem, by class.
+// One a file: its size does not matter.
+#[allow(clippy::large_enum_variant)]
+enum Details {
+    Contact(contact::Facts),
+    Linear(linear::Facts),
+}
+
+impl Facts {
+    /// Everything but the spectrum and the existence of a solution.
+    fn of(content: &ProblemFile) -> Result<Self, ProblemError> {
+        let judge = |stored: &StoredPoint| content.problem.judge(&stored.point, JUDGED_AT);
+        let solution = match content.solution.as_ref().map(judge).transpose() {
+            // Said of M.
+            Err(ProblemError::Singular { .. }) => None,
+            judged => judged?,
+        };
+        let details = match &content.problem {
+            AnyProblem::Friction(p) => Details::Contact(contact::Facts::of(p, content.info.dofs)),
+            AnyProblem::Complementarity(p) => Details::Linear(linear::Facts::of(p)),
+        };
+        Ok(Self { details, solution })
+    }
+
+    fn json(&self, file: &Path, content: &ProblemFile) -> Value {
+        let mut all = report::problem_json(file, &content.problem);
+        let ProblemFile { info, guesses, .. } = content;
+        all.extend(fields(json!({"title": info.title, "description": info.description})));
+        match &self.details {
+            Details::Contact(facts) => {
+                all.extend(facts.json());
+                all.insert("guesses".into(), json!(guesses.len()));
+            }
+            Details::Linear(facts) => all.extend(facts.json()),
+        }
+        let judged = |v: &AnyVerdict| report::verdict_json(v, JUDGED_AT, v.worst.len());
+        all.insert("solution".into(), json!(self.solution.as_ref().map(judged)));
+        Value::Object(all)
+    }
+
+    fn text(&self, file: &Path, content: &ProblemFile) -> String {
+        let ProblemFile { problem, info, guesses, .. } = content;
+        let mut text = format!("{}: {}\n", file.display(), report::problem_text(problem));
+        for (label, said) in [("title", &info.title), ("about", &info.description)] {
+            if let Some(said) = said.as_deref().map(str::trim).filter(|s| !s.is_empty()) {
+                row(&mut text, label, said.replace('\n', "\n             "));
+            }
+        }
+        match &self.details {
+            Details::Contact(facts) => facts.text(&mut text),
+            Details::Linear(facts) => facts.text(&mut text),
+        }
+        if !guesses.is_empty() {
+            row(&mut text, "guesses", guesses.len());
+        }
+        match &self.solution {
+            None if content.solution.is_some() => {
+                row(&mut text, "solution", "stored, but M is singular: it cannot be judged");
+            }
+            None => row(&mut text, "solution", "none stored"),
+            Some(verdict) => {
+                let passes = if verdict.solved { "passes" } else { "does not pass" };
+                row(&mut text, "solution", format!("stored, {passes} at {JUDGED_AT:e}"));
+                report::verdict_text(&mut text, verdict, JUDGED_AT, 0);
+            }
+        }
+        text
+    }
+}
+
 /// The tolerance at which a stored solution is judged.
 const JUDGED_AT: f64 = 1e-8;
 
@@ -123,14 +171,5 @@ fn symmetry(asymmetry: f64) -> String {
     match asymmetry {
         0.0 => "symmetric".into(),
         a => format!("asymmetry {}", number(a)),
-    }
-}
-
-/// What the author of a file says.
-fn texts(text: &mut String, title: &Option<String>, description: &Option<String>) {
-    for (label, said) in [("title", title), ("about", description)] {
-        if let Some(said) = said.as_deref().map(str::trim).filter(|s| !s.is_empty()) {
-            row(text, label, said.replace('\n', "\n             "));
-        }
     }
 }

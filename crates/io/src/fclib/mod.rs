@@ -30,139 +30,81 @@ mod write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use nonsmooth_problem::{
-    Friction, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem,
-};
+use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, Kind, ProblemError};
 
-use crate::IoError;
+use crate::format::{About, bytes};
+use crate::hdf5::is_hdf5;
+use crate::{Format, IoError, ProblemFile, StoredPoint};
 
-/// What an FCLIB file holds.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FclibFile {
-    /// The problem.
-    pub problem: Friction,
-    /// What its author says about it.
-    pub info: Info,
-    /// `/solution`, if there is one. Nothing says how accurate it is.
-    pub solution: Option<StoredPoint>,
-    /// `/guesses/1`, `/guesses/2`, ...: points to start from.
-    pub guesses: Vec<StoredPoint>,
-}
+const SOLUTION: &str = "/solution";
+const KINDS: &[Kind] =
+    &[Kind::FrictionLocal2d, Kind::FrictionLocal3d, Kind::FrictionGlobal2d, Kind::FrictionGlobal3d];
 
-impl FclibFile {
-    /// A file with the problem alone.
-    pub fn new(problem: Friction) -> Self {
-        Self { problem, info: Info::default(), solution: None, guesses: vec![] }
-    }
-}
-
-/// The group `info` of a problem. `None`: not in the file.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Info {
-    /// The dataset `title`.
-    pub title: Option<String>,
-    /// The dataset `description`.
-    pub description: Option<String>,
-    /// The dataset `math_info`.
-    pub math_info: Option<String>,
-    /// The attribute `numberOfDegreeOfFreedom`; anything but one non-negative C int reads as `None`.
-    pub dofs: Option<usize>,
-    /// The attribute `numberOfInvolvedDS` of older files: the number of bodies, read like `dofs`.
-    pub involved_ds: Option<usize>,
-}
-
-/// A point as `/solution` and `/guesses/k` store it. Its lengths must fit the problem of the file.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct StoredPoint {
-    /// `v`: generalised velocities, n, of a global problem; `None` (or empty) for a local one.
-    pub v: Option<Vec<f64>>,
-    /// `u`: relative velocities at the contacts, m.
-    pub u: Vec<f64>,
-    /// `r`: contact impulses, m.
-    pub r: Vec<f64>,
-    /// `l`: multipliers of the bilateral constraints, p; `None` (or empty) without any.
-    pub lambda: Option<Vec<f64>>,
-}
-
-impl StoredPoint {
-    /// A point of a local problem (of its lengths), with its relative velocity.
-    pub fn from_local<const D: usize>(problem: &FrictionLocal<D>, point: &LocalPoint) -> Self {
-        Self { v: None, u: problem.partner(point), r: point.r.clone(), lambda: some(&point.lambda) }
-    }
-
-    /// A point of a global problem (of its lengths), with its relative velocity.
-    pub fn from_global<const D: usize>(problem: &FrictionGlobal<D>, point: &GlobalPoint) -> Self {
-        let u = problem.partner(point);
-        Self { v: some(&point.v), u, r: point.r.clone(), lambda: some(&point.lambda) }
-    }
-
-    /// The unknowns of a local problem.
-    pub fn to_local(&self) -> LocalPoint {
-        LocalPoint { r: self.r.clone(), lambda: self.lambda.clone().unwrap_or_default() }
-    }
-
-    /// The unknowns of a global problem.
-    pub fn to_global(&self) -> GlobalPoint {
-        let LocalPoint { r, lambda } = self.to_local();
-        GlobalPoint { v: self.v.clone().unwrap_or_default(), r, lambda }
-    }
-}
-
-fn some(x: &[f64]) -> Option<Vec<f64>> {
-    (!x.is_empty()).then(|| x.to_vec())
-}
-
-/// Reads a file: the problem, its info, the solution and the guesses.
+/// The format.
 ///
-/// Errors: anything that is missing, of a wrong type or shape, not finite or out of range, by its place in
-/// the file; rolling friction, by its group. A `/solution` needs `u` and `r`, `v` if the problem is global,
-/// `l` if it has bilateral constraints; [`read_problem`] does not look at it.
-/// Not read: `nzmax`, matrix info (`conditioning`, ...), guesses beyond `number_of_guesses`, other groups.
+/// Reading: a `/solution` needs `u` and `r`, `v` if the problem is global, `l` if it has bilateral constraints; rolling friction is refused, by its group.
+/// Not read: `nzmax`, matrix info (`conditioning`, ...), guesses beyond `number_of_guesses`, other groups. Soft links are followed, up to 16 in a
+/// row; one that leads nowhere is an error that says where to. External links are refused. The cost is proportional to the size of the file in time and
+/// memory, whatever the file says of itself; a dataset that the file has no room for is refused before anything is allocated by its size.
 ///
-/// Soft links are followed, up to 16 in a row; one that leads nowhere is an error that says where to. External links are refused.
+/// Writing: what is not read does not pass from one file to another. Texts with a NUL character and more than 2³¹ − 1 entries in one matrix are refused.
 ///
-/// Cost: proportional to the size of the file in time and memory, whatever the file says of itself; a dataset that the file has no room for is
-/// refused before anything is allocated by its size.
-pub fn read(path: impl AsRef<Path>) -> Result<FclibFile, IoError> {
-    let path = path.as_ref();
-    read::parse(path, &read::bytes(path)?, true)
+/// Writing a solution alone keeps all else in the file, known to this crate or not. Other hard links to it keep the old content. Where an old `/solution`
+/// holds the same parts as plain 64-bit reals, their values are replaced where they stand and the file keeps its size; else the space of the old
+/// one is not used again. Refused are a `/solution` that is a soft link, and soft links in the root group that would be lost.
+#[derive(Debug, Clone, Copy)]
+pub struct Fclib;
+
+impl Format for Fclib {
+    fn about(&self) -> &'static About {
+        const ABOUT: About = About {
+            name: "FCLIB's HDF5",
+            extensions: &["hdf5", "h5"],
+            reads: KINDS,
+            writes: KINDS,
+            solution: SOLUTION,
+            guess: Some("/guesses/1"),
+            ..About::TEXT
+        };
+        &ABOUT
+    }
+
+    fn begins(&self, bytes: &[u8]) -> bool {
+        is_hdf5(bytes)
+    }
+
+    /// Damaged files are to be seen.
+    fn holds_problem(&self, _: &Path, _: &[u8]) -> bool {
+        true
+    }
+
+    fn parse(&self, name: &Path, bytes: &[u8]) -> Result<ProblemFile, IoError> {
+        read::parse(name, bytes)
+    }
+
+    fn to_bytes(&self, name: &Path, file: &ProblemFile) -> Result<Vec<u8>, IoError> {
+        write::to_bytes(name, file)
+    }
+
+    fn write(&self, path: &Path, file: &ProblemFile) -> Result<(), IoError> {
+        write::write(path, file)
+    }
+
+    fn write_solution(&self, path: &Path, file: &ProblemFile) -> Result<(), IoError> {
+        match &file.solution {
+            Some(solution) => write_solution(path, solution),
+            None => Err(IoError::data(path, SOLUTION, "a point to write", "none")),
+        }
+    }
 }
 
-/// Reads a file that is in memory already; `name` stands for it in messages. Errors and cost: as [`read`].
-pub fn read_bytes(name: impl AsRef<Path>, bytes: &[u8]) -> Result<FclibFile, IoError> {
-    read::parse(name.as_ref(), bytes, true)
-}
-
-/// Reads the problem of a file, whatever its `/solution` and `/guesses` hold. Errors: as [`read`].
+/// Reads the problem of a file, whatever its `/solution` and `/guesses` hold. Errors: as of [`Fclib`].
 pub fn read_problem(path: impl AsRef<Path>) -> Result<Friction, IoError> {
     let path = path.as_ref();
-    Ok(read::parse(path, &read::bytes(path)?, false)?.problem)
+    read::problem(path, &bytes(path)?)
 }
 
-/// Writes a file, in place of the one of that name if there is one.
-///
-/// The file holds what `content` does and nothing else: what [`read`] skips (other groups, `conditioning`, ...)
-/// does not pass from one file to another; [`write_solution`] keeps it.
-///
-/// The new file is completed beside the old one and then renamed, so that nobody sees half of it.
-/// Errors: a problem that is not valid, a point that does not fit it, a text that holds a NUL character,
-/// more than 2³¹ − 1 entries in one matrix, a target that is no regular file (a directory, a device, ...), and
-/// what the system refuses.
-pub fn write(path: impl AsRef<Path>, content: &FclibFile) -> Result<(), IoError> {
-    write::write(path.as_ref(), content)
-}
-
-/// The bytes of the file that [`write()`] makes; `name` stands for it in messages. Errors: as [`write()`], but for the system's.
-pub fn to_bytes(name: impl AsRef<Path>, content: &FclibFile) -> Result<Vec<u8>, IoError> {
-    write::to_bytes(name.as_ref(), content)
-}
-
-/// Sets `/solution` in an existing file and keeps all else in it, known to this crate or not.
-///
-/// The file is replaced by renaming, as in [`write()`]: other hard links to it keep the old content. Where an old `/solution` holds the same parts as
-/// plain 64-bit reals, their values are replaced where they stand and the file keeps its size; else the space of the old one is not used again.
-/// Errors: a file whose problem cannot be read, a point that does not fit it, a target that is no regular file, a `/solution` that is a soft link,
-/// soft links in the root group that would be lost, and what the system refuses.
+/// Sets `/solution` in an existing file, whatever it is so far, and keeps all else in it. Errors: as of [`Fclib`]; a point that does not fit.
 pub fn write_solution(path: impl AsRef<Path>, solution: &StoredPoint) -> Result<(), IoError> {
     write::write_solution(path.as_ref(), solution)
 }
@@ -220,6 +162,18 @@ fn group(problem: &Friction) -> &'static str {
     match problem {
         Friction::Local2(_) | Friction::Local3(_) => "/fclib_local",
         Friction::Global2(_) | Friction::Global3(_) => "/fclib_global",
+    }
+}
+
+/// What is wrong with a problem, by where in its group FCLIB keeps the part at fault: matrices have capital letters.
+fn invalid(file: &Path, group: &str) -> impl Fn(ProblemError) -> IoError {
+    move |problem| {
+        let (ProblemError::Shape { place, .. }
+        | ProblemError::Value { place, .. }
+        | ProblemError::Empty { place }
+        | ProblemError::Singular { place, .. }) = &problem;
+        let vectors = if place.starts_with(char::is_uppercase) { "" } else { "vectors/" };
+        IoError::Problem { file: file.into(), group: format!("{group}/{vectors}").into(), problem }
     }
 }
 

@@ -5,22 +5,14 @@ use std::path::Path;
 
 use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::{
-    Friction, FrictionGlobal, FrictionLocal, ProblemError, RowsGlobal, RowsLocal,
+    Friction, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, ProblemError, RowsGlobal,
+    RowsLocal,
 };
 
-use super::{FclibFile, Info, Sizes, StoredPoint, check_finite, check_vector, group};
-use crate::IoError;
+use super::{Sizes, check_finite, check_vector, group, invalid};
 use crate::error::one_line;
 use crate::hdf5::{self, Dataset, Fault, File, Group, Link, Object, Type};
-
-/// The bytes of a file.
-pub(super) fn bytes(path: &Path) -> Result<Vec<u8>, IoError> {
-    let expected = "a readable file";
-    if std::fs::metadata(path).map_err(|e| IoError::os(path, expected, e))?.is_dir() {
-        return Err(IoError::NotHdf5 { file: path.into(), found: "a directory" });
-    }
-    std::fs::read(path).map_err(|e| IoError::os(path, expected, e))
-}
+use crate::{Info, IoError, ProblemFile, StoredPoint};
 
 /// The HDF5 file in those bytes.
 pub(super) fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<File<'a>, IoError> {
@@ -31,32 +23,38 @@ pub(super) fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<File<'a>, IoError
     File::new(bytes).map_err(|e| fault(path, "/", e))
 }
 
-/// Reads a file, with its solution and guesses if `points`.
-pub(super) fn parse(path: &Path, bytes: &[u8], points: bool) -> Result<FclibFile, IoError> {
-    let file = open(path, bytes)?;
-    let root = file.root().map_err(|e| fault(path, "/", e))?;
-    let root = Folder { file: path, data: &file, path: String::new(), group: root };
-    let mut content = FclibFile::new(problem(&root)?);
-    content.problem.validate().map_err(|problem| IoError::Problem {
-        file: path.into(),
-        group: group(&content.problem),
-        problem,
-    })?;
-    content.info = info(&root.need(&group(&content.problem)[1..])?)?;
-    if points {
-        let sizes = Sizes::of(&content.problem);
-        content.solution = root.folder("solution")?.map(|g| point(&g, sizes)).transpose()?;
-        if let Some(guesses) = root.folder("guesses")? {
-            let number = guesses.int("number_of_guesses")?;
-            if number < 0 {
-                return Err(guesses.error("number_of_guesses", "a number of at least 0", number));
-            }
-            for k in 1..=number {
-                content.guesses.push(point(&guesses.need(&k.to_string())?, sizes)?);
-            }
+/// Reads a file.
+pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<ProblemFile, IoError> {
+    let data = open(path, bytes)?;
+    let root = Folder::root(path, &data)?;
+    let problem = valid(&root)?;
+    let info = info(&root.need(&group(&problem)[1..])?)?;
+    let sizes = Sizes::of(&problem);
+    let solution = root.folder("solution")?.map(|g| point(&g, sizes)).transpose()?;
+    let mut file = ProblemFile { info, solution, ..ProblemFile::new(problem) };
+    if let Some(guesses) = root.folder("guesses")? {
+        let number = guesses.int("number_of_guesses")?;
+        if number < 0 {
+            return Err(guesses.error("number_of_guesses", "a number of at least 0", number));
+        }
+        for k in 1..=number {
+            file.guesses.push(point(&guesses.need(&k.to_string())?, sizes)?);
         }
     }
-    Ok(content)
+    Ok(file)
+}
+
+/// The problem of a file.
+pub(super) fn problem(path: &Path, bytes: &[u8]) -> Result<Friction, IoError> {
+    let data = open(path, bytes)?;
+    valid(&Folder::root(path, &data)?)
+}
+
+/// The one problem of a file.
+fn valid(root: &Folder) -> Result<Friction, IoError> {
+    let problem = stated(root)?;
+    problem.validate().map_err(invalid(root.file, group(&problem)))?;
+    Ok(problem)
 }
 
 /// What keeps a part of a file from being read, as an error that names the part.
@@ -76,8 +74,8 @@ pub(super) fn fault(file: &Path, place: &str, fault: Fault) -> IoError {
     }
 }
 
-/// The one problem of a file, not validated as a whole.
-fn problem(root: &Folder) -> Result<Friction, IoError> {
+/// As [`valid`], not validated as a whole.
+fn stated(root: &Folder) -> Result<Friction, IoError> {
     const LOCAL: &str = "fclib_local";
     const GLOBAL: &str = "fclib_global";
     for rolling in ["fclib_global_rolling", "fclib_local_rolling"] {
@@ -112,7 +110,7 @@ fn problem(root: &Folder) -> Result<Friction, IoError> {
 #[allow(non_snake_case)]
 fn local<const D: usize>(g: &Folder) -> Result<FrictionLocal<D>, IoError> {
     let vectors = g.need("vectors")?;
-    let mu = g.mu(&vectors, "/fclib_local")?;
+    let mu = g.mu(&vectors)?;
     let m = D * mu.len();
     let contacts = format!("{D} for each entry of vectors/mu");
     let W = g.matrix("W", (m, m), &contacts)?;
@@ -136,7 +134,7 @@ fn local<const D: usize>(g: &Folder) -> Result<FrictionLocal<D>, IoError> {
 #[allow(non_snake_case)]
 fn global<const D: usize>(g: &Folder) -> Result<FrictionGlobal<D>, IoError> {
     let vectors = g.need("vectors")?;
-    let mu = g.mu(&vectors, "/fclib_global")?;
+    let mu = g.mu(&vectors)?;
     let m = D * mu.len();
     let f = vectors.reals("f", None)?;
     let n = f.len();
@@ -182,13 +180,13 @@ fn point(g: &Folder, sizes: Sizes) -> Result<StoredPoint, IoError> {
         Some(0) if !g.has(name)? => Ok(None),
         Some(len) => Ok(Some(g.vector(name, len, meaning)?).filter(|x| !x.is_empty())),
     };
-    let [v, u, r, l] = sizes.parts();
-    Ok(StoredPoint {
-        v: part(v)?,
-        u: part(u)?.unwrap_or_default(),
-        r: part(r)?.unwrap_or_default(),
-        lambda: part(l)?,
-    })
+    let [v, u, r, l] = sizes.parts().map(part);
+    let (v, u, r, lambda) = (v?, u?, r?.unwrap_or_default(), l?.unwrap_or_default());
+    let point = match sizes.v {
+        None => LocalPoint { r, lambda }.into(),
+        Some(_) => GlobalPoint { v: v.unwrap_or_default(), r, lambda }.into(),
+    };
+    Ok(StoredPoint { point, partner: Some(u.unwrap_or_default()) })
 }
 
 fn name_of(object: &Object) -> &'static str {
@@ -219,6 +217,11 @@ struct Folder<'f, 'a> {
 }
 
 impl<'f, 'a> Folder<'f, 'a> {
+    fn root(file: &'f Path, data: &'f File<'a>) -> Result<Self, IoError> {
+        let group = data.root().map_err(|e| fault(file, "/", e))?;
+        Ok(Self { file, data, path: String::new(), group })
+    }
+
     fn place(&self, name: impl Display) -> String {
         format!("{}/{name}", self.path)
     }
@@ -376,11 +379,11 @@ impl<'f, 'a> Folder<'f, 'a> {
     }
 
     /// `mu`, checked first: all other sizes follow from its length.
-    fn mu(&self, vectors: &Folder, group: &'static str) -> Result<Vec<f64>, IoError> {
+    fn mu(&self, vectors: &Folder) -> Result<Vec<f64>, IoError> {
         let mu = vectors.reals("mu", None)?;
         if mu.is_empty() {
             let problem = ProblemError::Empty { place: "mu".into() };
-            return Err(IoError::Problem { file: self.file.into(), group, problem });
+            return Err(invalid(self.file, &self.path)(problem));
         }
         Ok(mu)
     }

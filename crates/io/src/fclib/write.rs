@@ -1,5 +1,6 @@
 //! Writing.
 
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{Seek, SeekFrom, Write};
 use std::ops::Range;
@@ -10,31 +11,33 @@ use hdf5_pure::{
     StringPadding,
 };
 use nonsmooth_linalg::Csc;
-use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal};
+use nonsmooth_problem::{
+    AnyPoint, AnyProblem, Friction, FrictionGlobal, FrictionLocal, Problem, with_friction,
+};
 
-use super::{FclibFile, Info, Sizes, StoredPoint, check_vector, group, guarded, read};
-use crate::IoError;
+use super::{SOLUTION, Sizes, check_vector, group, guarded, invalid, read};
+use crate::format::bytes as bytes_of;
 use crate::hdf5::{Dataset, Group, Link, Object, Type};
 use crate::replace::{WRITABLE, check_target, replace};
+use crate::{Info, IoError, ProblemFile, StoredPoint};
 
-pub(super) fn write(path: &Path, content: &FclibFile) -> Result<(), IoError> {
-    let file = build(path, content)?;
+pub(super) fn write(path: &Path, file: &ProblemFile) -> Result<(), IoError> {
+    let file = build(path, file)?;
     replace(path, |temporary| file.write(temporary).map_err(|e| failed(path, e)))
 }
 
-pub(super) fn to_bytes(path: &Path, content: &FclibFile) -> Result<Vec<u8>, IoError> {
-    build(path, content)?.finish().map_err(|e| failed(path, e))
+pub(super) fn to_bytes(path: &Path, file: &ProblemFile) -> Result<Vec<u8>, IoError> {
+    build(path, file)?.finish().map_err(|e| failed(path, e))
 }
 
-fn build(path: &Path, content: &FclibFile) -> Result<FileBuilder, IoError> {
-    let problem = &content.problem;
+fn build(path: &Path, content: &ProblemFile) -> Result<FileBuilder, IoError> {
+    let problem = content.contacts(path)?;
     let root = group(problem);
-    problem.validate().map_err(|problem| IoError::Problem {
-        file: path.into(),
-        group: root,
-        problem,
-    })?;
-    let sizes = Sizes::of(problem);
+    problem.validate().map_err(invalid(path, root))?;
+    if !with_friction!(problem, p => p.rows.as_ref().is_none_or(|rows| rows.bounds.are_free())) {
+        let expected = "bilateral constraints alone, as FCLIB has no place for bounds";
+        return Err(IoError::data(path, root, expected, "rows with bounds"));
+    }
 
     let mut file = FileBuilder::new();
     // The oldest format that the builder knows, for the sake of old readers.
@@ -56,13 +59,13 @@ fn build(path: &Path, content: &FclibFile) -> Result<FileBuilder, IoError> {
         g.child("info", |g| info(g, &content.info))
     })?;
     if let Some(solution) = &content.solution {
-        top("/solution", &|g| point(g, solution, sizes))?;
+        top(SOLUTION, &|g| point(g, solution, problem))?;
     }
     if !content.guesses.is_empty() {
         top("/guesses", &|g| {
             g.int("number_of_guesses", content.guesses.len())?;
             let mut guesses = content.guesses.iter().enumerate();
-            guesses.try_for_each(|(k, x)| g.child(&(k + 1).to_string(), |g| point(g, x, sizes)))
+            guesses.try_for_each(|(k, x)| g.child(&(k + 1).to_string(), |g| point(g, x, problem)))
         })?;
     }
     Ok(file)
@@ -71,9 +74,8 @@ fn build(path: &Path, content: &FclibFile) -> Result<FileBuilder, IoError> {
 pub(super) fn write_solution(path: &Path, solution: &StoredPoint) -> Result<(), IoError> {
     // First of all: to read a pipe may never end.
     check_target(path)?;
-    let bytes = read::bytes(path)?;
-    let sizes = Sizes::of(&read::parse(path, &bytes, false)?.problem);
-    let parts = stored_parts(path, "/solution", solution, sizes)?;
+    let bytes = bytes_of(path)?;
+    let parts = stored_parts(path, SOLUTION, solution, &read::problem(path, &bytes)?)?;
     let places = places(path, &bytes, &parts)?;
     let links = root_links(path, &bytes)?;
     drop(bytes);
@@ -84,7 +86,7 @@ pub(super) fn write_solution(path: &Path, solution: &StoredPoint) -> Result<(), 
         }
         guarded(path, || edit(path, temporary, &parts))?;
         // The library that edits knows no soft links, and must not lose them.
-        let links_now = root_links(path, &read::bytes(temporary)?)?;
+        let links_now = root_links(path, &bytes_of(temporary)?)?;
         match links == links_now {
             true => Ok(()),
             false => Err(soft_links(path, "/")),
@@ -108,15 +110,11 @@ fn root_links(path: &Path, bytes: &[u8]) -> Result<Vec<(Vec<u8>, bool)>, IoError
 type Places<'x> = Vec<(Range<usize>, &'x [f64])>;
 
 /// Where the values of a `/solution` that is there can be replaced where they stand, so that the file does not grow; `None`: nowhere.
-fn places<'x>(
-    path: &Path,
-    bytes: &[u8],
-    parts: &[(&'static str, &'x [f64])],
-) -> Result<Option<Places<'x>>, IoError> {
+fn places<'x>(path: &Path, bytes: &[u8], parts: &'x [Part]) -> Result<Option<Places<'x>>, IoError> {
     let file = read::open(path, bytes)?;
     let root = file.root().map_err(|e| read::fault(path, "/", e))?;
     if matches!(root.links.get(&b"solution"[..]), Some(Link::Soft(_) | Link::External)) {
-        return Err(soft_links(path, "/solution"));
+        return Err(soft_links(path, SOLUTION));
     }
     // What is damaged is replaced as a whole.
     let Ok(Some(Object::Group(group))) = file.find(&root, "solution") else { return Ok(None) };
@@ -137,7 +135,7 @@ fn places<'x>(
         fits.then(|| if x.is_empty() { Some(0..0) } else { file.place(d) }).flatten()
     };
     let mut places: Places = vec![];
-    for &(name, x) in parts {
+    for (name, x) in parts {
         let Ok(Some(Object::Dataset(d))) = file.find(&group, name) else { return Ok(None) };
         match place(&d, x) {
             Some(range)
@@ -162,14 +160,14 @@ fn overwrite(file: &Path, places: &Places) -> std::io::Result<()> {
 }
 
 /// Replaces `/solution` in the file `temporary`, which is to become `path`.
-fn edit(path: &Path, temporary: &Path, parts: &[(&'static str, &[f64])]) -> Result<(), IoError> {
+fn edit(path: &Path, temporary: &Path, parts: &[Part]) -> Result<(), IoError> {
     let fail = |e| failed(path, e);
     let file = File::open_rw(temporary).map_err(fail)?;
     let root = file.root();
     match root.group("solution") {
         Err(Error::Format(FormatError::PathNotFound(_))) => {}
         Ok(_) | Err(Error::NotAGroup(_)) => root.delete("solution").map_err(fail)?,
-        Err(e) => return Err(lookup(path, "/solution", e)),
+        Err(e) => return Err(lookup(path, SOLUTION, e)),
     }
     // An old root group with a soft link, which cannot be listed, would be spoilt by the change.
     root.groups().map_err(|e| lookup(path, "/", e))?;
@@ -261,31 +259,48 @@ fn info(g: &mut Out, info: &Info) -> Result<(), IoError> {
     Ok(())
 }
 
-fn point(g: &mut Out, point: &StoredPoint, sizes: Sizes) -> Result<(), IoError> {
-    for (name, x) in stored_parts(g.file, &g.path, point, sizes)? {
-        g.reals(name, x);
+fn point(g: &mut Out, point: &StoredPoint, problem: &Friction) -> Result<(), IoError> {
+    for (name, x) in stored_parts(g.file, &g.path, point, problem)? {
+        g.reals(name, &x);
     }
     Ok(())
 }
+
+/// A part of a point: its name and values.
+type Part<'a> = (&'static str, Cow<'a, [f64]>);
 
 /// The parts of a point that FCLIB stores, checked against the problem.
 fn stored_parts<'a>(
     file: &Path,
     place: &str,
-    point: &'a StoredPoint,
-    sizes: Sizes,
-) -> Result<Vec<(&'static str, &'a [f64])>, IoError> {
-    let slices =
-        [point.v.as_deref(), Some(&point.u[..]), Some(&point.r[..]), point.lambda.as_deref()];
-    let mut stored = vec![];
-    for ((name, len, meaning), x) in sizes.parts().into_iter().zip(slices) {
-        let x = x.unwrap_or_default();
-        check_vector(file, &format!("{place}/{name}"), x, len.unwrap_or(0), meaning)?;
-        if len.is_some() {
-            stored.push((name, x));
+    stored: &'a StoredPoint,
+    problem: &Friction,
+) -> Result<Vec<Part<'a>>, IoError> {
+    let (v, r, lambda) = match &stored.point {
+        AnyPoint::Local(p) => (&[][..], &p.r, &p.lambda),
+        AnyPoint::Global(p) => (&p.v[..], &p.r, &p.lambda),
+        AnyPoint::Lcp(_) | AnyPoint::Hlcp(_) => {
+            return Err(IoError::data(file, place, "a point of contacts", "one of another kind"));
         }
+    };
+    let parts = Sizes::of(problem).parts();
+    let check = |(name, len, meaning): (&str, Option<usize>, _), x: &[f64]| {
+        check_vector(file, &format!("{place}/{name}"), x, len.unwrap_or(0), meaning)
+    };
+    for (part, x) in [(parts[0], v), (parts[2], r), (parts[3], lambda)] {
+        check(part, x)?;
     }
-    Ok(stored)
+    let u = match &stored.partner {
+        Some(u) => Cow::from(u),
+        None => {
+            let problem = AnyProblem::from(problem.clone());
+            problem.validate_point(&stored.point).map_err(IoError::problem(file))?;
+            problem.partner(&stored.point).into()
+        }
+    };
+    check(parts[1], &u)?;
+    let all = parts.into_iter().zip([v.into(), u, r.into(), lambda.into()]);
+    Ok(all.filter(|(part, _)| part.1.is_some()).map(|(part, x)| (part.0, x)).collect())
 }
 
 /// A group under construction, with what messages about its members need.

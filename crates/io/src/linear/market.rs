@@ -8,52 +8,96 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use nonsmooth_linalg::{Csc, Dense, Matrix};
-use nonsmooth_problem::{BoxLcp, Complementarity, Lcp};
+use nonsmooth_problem::{AnyProblem, BoxLcp, Complementarity, Kind, Lcp, LcpPoint};
 
 use super::tokens::Tokens;
-use super::{Digits, LinearFile, LinearPoint, check, text, toml};
-use crate::IoError;
-use crate::replace::{WRITABLE, replace};
+use super::{Digits, check, text, toml, unknowns};
+use crate::format::{About, bytes, put};
+use crate::{Format, IoError, ProblemFile};
 
 /// What stands between the name of the matrix and the extension of its vectors' files: q, lower and upper bounds, a solution.
 const PARTS: [&str; 4] = ["_q", "_l", "_u", "_z"];
 
+const KINDS: &[Kind] = &[Kind::Lcp, Kind::BoxLcp];
+
+/// The format.
+///
+/// Errors of reading: no file of q; a file that is damaged, by its line; one bound without the other; parts that do not fit. Of writing: another kind; a
+/// problem that is known by its products only; a file in the place of a vector that the content lacks.
+#[derive(Debug, Clone, Copy)]
+pub struct Market;
+
+impl Format for Market {
+    fn about(&self) -> &'static About {
+        const ABOUT: About = About {
+            name: "Matrix Market",
+            extensions: &["mtx"],
+            reads: KINDS,
+            writes: KINDS,
+            keeps_solutions: false,
+            ..About::TEXT
+        };
+        &ABOUT
+    }
+
+    fn begins(&self, bytes: &[u8]) -> bool {
+        bytes.starts_with(b"%%MatrixMarket")
+    }
+
+    fn holds_problem(&self, path: &Path, bytes: &[u8]) -> bool {
+        self.begins(bytes) && !is_part(path)
+    }
+
+    fn parts(&self, path: &Path) -> Vec<PathBuf> {
+        let vectors = vectors(path).into_iter().filter(|p| p.is_file());
+        std::iter::once(path.into()).chain(vectors).collect()
+    }
+
+    /// The matrix without the vectors beside it, which is no problem yet.
+    fn parse(&self, name: &Path, bytes: &[u8]) -> Result<ProblemFile, IoError> {
+        parse(name, &text(bytes), [None; 4])
+    }
+
+    fn read(&self, path: &Path) -> Result<ProblemFile, IoError> {
+        let matrix = bytes(path)?;
+        let mut parts = [const { None }; 4];
+        for (part, file) in parts.iter_mut().zip(&vectors(path)) {
+            *part = if file.is_file() { Some(bytes(file)?) } else { None };
+        }
+        let parts = parts.each_ref().map(|part| part.as_deref().map(text));
+        parse(path, &text(&matrix), parts.each_ref().map(Option::as_deref))
+    }
+
+    /// Refused: the vectors have files of their own.
+    fn to_bytes(&self, name: &Path, _: &ProblemFile) -> Result<Vec<u8>, IoError> {
+        let expected = "a name, as the vectors stand in files beside the matrix";
+        Err(IoError::data(name, "the file", expected, "one stream of bytes"))
+    }
+
+    fn write(&self, path: &Path, file: &ProblemFile) -> Result<(), IoError> {
+        write(path, file)
+    }
+}
+
 /// The files of q, l, u and z that belong to the matrix in `path`.
-pub(crate) fn vectors(path: &Path) -> [PathBuf; 4] {
+fn vectors(path: &Path) -> [PathBuf; 4] {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     PARTS.map(|part| path.with_file_name(format!("{stem}{part}.mtx")))
 }
 
 /// Whether a file is the vector of a matrix beside it.
-pub(crate) fn is_part(path: &Path) -> bool {
+fn is_part(path: &Path) -> bool {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let matrix = PARTS.iter().find_map(|part| stem.strip_suffix(part));
     matrix.is_some_and(|matrix| path.with_file_name(format!("{matrix}.mtx")).is_file())
 }
 
-/// Reads M and the vectors beside it.
-///
-/// Errors: no file of q; a file that is damaged, by its line; one bound without the other; parts that do not fit.
-pub fn read(path: impl AsRef<Path>) -> Result<LinearFile, IoError> {
-    let path = path.as_ref();
-    let there = |file: &PathBuf| match file.is_file() {
-        true => text(file).map(Some),
-        false => Ok(None),
-    };
-    let matrix = text(path)?;
-    let mut parts = [None, None, None, None];
-    for (part, file) in parts.iter_mut().zip(&vectors(path)) {
-        *part = there(file)?;
-    }
-    parse(path, &matrix, parts.each_ref().map(Option::as_deref))
-}
-
-/// Reads the texts of the matrix and of q, l, u and z, where they are; `path` is the name of the matrix in messages. Errors: as [`read`].
+/// Reads the texts of the matrix and of q, l, u and z, where they are; `path` is the name of the matrix in messages. Errors: as of [`Market`].
 pub fn parse(
     path: impl AsRef<Path>,
     text: &str,
     parts: [Option<&str>; 4],
-) -> Result<LinearFile, IoError> {
+) -> Result<ProblemFile, IoError> {
     let path = path.as_ref();
     let m = matrix(path, text)?;
     let files = vectors(path);
@@ -64,19 +108,19 @@ pub fn parse(
         return Err(IoError::data(path, "q", expected, "none"));
     };
     let problem = match (part(1)?, part(2)?) {
-        (None, None) => Lcp::new(m, q).map(Complementarity::Lcp),
-        (Some(l), Some(u)) => BoxLcp::new(m, q, l, u).map(Complementarity::Box),
+        (None, None) => Lcp::new(m, q).map(AnyProblem::from),
+        (Some(l), Some(u)) => BoxLcp::new(m, q, l, u).map(AnyProblem::from),
         (l, _) => {
             let (missing, there) = if l.is_some() { (2, 1) } else { (1, 2) };
             let expected = format!("a file {} beside {}", name(missing), name(there));
             return Err(IoError::data(path, "bounds", expected, "none"));
         }
     };
-    let problem = problem.map_err(|problem| IoError::Linear { file: path.into(), problem })?;
-    let solution = part(3)?.map(|z| LinearPoint { z, w: None });
-    let content = LinearFile { solution, ..LinearFile::new(problem) };
-    check(path, &content)?;
-    Ok(content)
+    let problem = problem.map_err(IoError::problem(path))?;
+    let solution = part(3)?.map(|z| LcpPoint { z }.into());
+    let file = ProblemFile { solution, ..ProblemFile::new(problem) };
+    check(path, &file)?;
+    Ok(file)
 }
 
 /// What the first line says.
@@ -248,14 +292,9 @@ fn vector(path: &Path, text: &str) -> Result<Vec<f64>, IoError> {
     Ok(all)
 }
 
-/// Writes M to `path` and the vectors beside it: an LCP or a box LCP, with the solution if there is one.
-///
-/// Errors: another kind; a problem that is not valid or is known by its products only; a file in the place of a vector that the content lacks; what
-/// the system refuses.
-pub fn write(path: impl AsRef<Path>, content: &LinearFile) -> Result<(), IoError> {
-    let path = path.as_ref();
-    check(path, content)?;
-    let (m, q, bounds) = match &content.problem {
+/// Writes M to `path` and the vectors beside it, with the solution if there is one.
+fn write(path: &Path, file: &ProblemFile) -> Result<(), IoError> {
+    let (m, q, bounds) = match check(path, file)? {
         Complementarity::Lcp(p) => (&p.M, &p.q, None),
         Complementarity::Box(p) => (&p.M, &p.q, Some((&p.lower, &p.upper))),
         Complementarity::Mlcp(_) | Complementarity::Hlcp(_) => {
@@ -286,10 +325,10 @@ pub fn write(path: impl AsRef<Path>, content: &LinearFile) -> Result<(), IoError
         Matrix::Operator(_) => return Err(toml::operator(path)),
     };
     let parts = [
-        Some(q),
-        bounds.map(|b| b.0),
-        bounds.map(|b| b.1),
-        content.solution.as_ref().map(|s| &s.z),
+        Some(&q[..]),
+        bounds.map(|b| &b.0[..]),
+        bounds.map(|b| &b.1[..]),
+        file.solution.as_ref().map(|s| unknowns(&s.point)),
     ];
     let files = vectors(path);
     let each = || files.iter().zip(parts);
@@ -297,12 +336,12 @@ pub fn write(path: impl AsRef<Path>, content: &LinearFile) -> Result<(), IoError
         let expected = "no such file, as it would become a part of the problem";
         return Err(IoError::data(file, "the file", expected, "one"));
     }
-    put(path, &matrix)?;
+    put(path, matrix.as_bytes())?;
     for (file, x) in each() {
         if let Some(x) = x {
             let mut out = format!("%%MatrixMarket matrix array real general\n{} 1\n", x.len());
             x.iter().for_each(|&x| line(&mut out, x));
-            put(file, &out)?;
+            put(file, out.as_bytes())?;
         }
     }
     Ok(())
@@ -311,10 +350,4 @@ pub fn write(path: impl AsRef<Path>, content: &LinearFile) -> Result<(), IoError
 fn line(out: &mut String, x: f64) {
     // Writing to a String cannot fail.
     let _ = writeln!(out, "{}", Digits(x));
-}
-
-fn put(path: &Path, text: &str) -> Result<(), IoError> {
-    replace(path, |temporary| {
-        std::fs::write(temporary, text).map_err(|e| IoError::os(path, WRITABLE, e))
-    })
 }

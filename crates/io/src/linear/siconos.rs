@@ -21,24 +21,48 @@
 use std::path::Path;
 
 use nonsmooth_linalg::{Csc, Dense, Matrix};
-use nonsmooth_problem::{BoxLcp, Complementarity, Lcp, Mlcp, ProblemError};
+use nonsmooth_problem::{BoxLcp, Complementarity, Kind, Lcp, Mlcp};
 
+use super::text;
 use super::tokens::Tokens;
-use super::{LinearFile, text};
-use crate::IoError;
+use crate::format::About;
+use crate::{Format, IoError, ProblemFile};
 
-/// Reads an LCP, a relay problem or an MLCP, whichever the content is.
+/// The format: read, not written.
 ///
-/// Errors: a file that is none of them, by the line at which it ceases to be the most likely; one that may be two of them.
-pub fn read(path: impl AsRef<Path>) -> Result<LinearFile, IoError> {
-    let path = path.as_ref();
-    parse(path, &text(path)?)
+/// Errors: a file that is none of the three, by the line at which it ceases to be the most likely; one that may be two of them.
+#[derive(Debug, Clone, Copy)]
+pub struct Siconos;
+
+impl Format for Siconos {
+    fn about(&self) -> &'static About {
+        const ABOUT: About = About {
+            name: "Siconos' text",
+            extensions: &["dat"],
+            owns_extensions: false,
+            reads: &[Kind::Lcp, Kind::Mlcp, Kind::BoxLcp],
+            keeps_solutions: false,
+            ..About::TEXT
+        };
+        &ABOUT
+    }
+
+    /// With a number.
+    fn begins(&self, bytes: &[u8]) -> bool {
+        text(bytes).split_whitespace().next().is_some_and(|word| word.parse::<f64>().is_ok())
+    }
+
+    fn parse(&self, name: &Path, bytes: &[u8]) -> Result<ProblemFile, IoError> {
+        parse(name, &text(bytes))
+    }
+
+    fn to_bytes(&self, name: &Path, _: &ProblemFile) -> Result<Vec<u8>, IoError> {
+        Err(IoError::data(name, "the format", "one that is written", self.about().name))
+    }
 }
 
-/// Reads the text of a file; `path` is its name in messages, and where it names `lcp` or `relay` it says which of these the file is.
-/// Errors: as [`read`].
-pub fn parse(path: impl AsRef<Path>, text: &str) -> Result<LinearFile, IoError> {
-    let path = path.as_ref();
+/// Reads the text of a file; where the name in `path` has `lcp` or `relay` it says which of these the file is.
+fn parse(path: &Path, text: &str) -> Result<ProblemFile, IoError> {
     type Reader = fn(&mut Tokens, &Path) -> Result<Complementarity, IoError>;
     let kinds: [(&str, Reader); 3] =
         [("an MLCP", mixed), ("an MLCP of the old format", mixed_old), ("an LCP", lcp)];
@@ -59,8 +83,8 @@ pub fn parse(path: impl AsRef<Path>, text: &str) -> Result<LinearFile, IoError> 
     }
     match (found.len(), nearest) {
         (0, Some((_, e))) => Err(e),
-        (0 | 1, _) => found.pop().map(|(_, problem)| LinearFile::new(problem)).ok_or_else(|| {
-            IoError::Unknown { file: path.into(), found: "none of Siconos' problems".into() }
+        (0 | 1, _) => found.pop().map(|(_, problem)| ProblemFile::new(problem)).ok_or_else(|| {
+            IoError::Unknown { file: path.into(), found: "none of Siconos' problems" }
         }),
         _ => {
             let names: Vec<_> = found.iter().map(|f| f.0).collect();
@@ -70,16 +94,13 @@ pub fn parse(path: impl AsRef<Path>, text: &str) -> Result<LinearFile, IoError> 
     }
 }
 
-fn wrong(file: &Path) -> impl Fn(ProblemError) -> IoError + '_ {
-    move |problem| IoError::Linear { file: file.into(), problem }
-}
-
 /// An LCP, or a relay problem, which goes on with bounds.
 fn lcp(t: &mut Tokens, path: &Path) -> Result<Complementarity, IoError> {
     let n = t.count("the size n")?;
     let m = matrix(t, n, n)?;
     let q = t.reals("q", n)?;
-    let lcp = || Lcp::new(m.clone(), q.clone()).map(Complementarity::Lcp).map_err(wrong(path));
+    let lcp =
+        || Lcp::new(m.clone(), q.clone()).map(Complementarity::Lcp).map_err(IoError::problem(path));
     let mut rest = t.clone();
     let bounds = (rest.reals("l", n), rest.reals("u", n));
     let (Ok(lower), Ok(upper)) = bounds else { return lcp() };
@@ -87,7 +108,7 @@ fn lcp(t: &mut Tokens, path: &Path) -> Result<Complementarity, IoError> {
     let name = path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
     let relay = || {
         let bounded = BoxLcp::new(m.clone(), q.clone(), lower.clone(), upper.clone());
-        bounded.map(Complementarity::Box).map_err(wrong(path))
+        bounded.map(Complementarity::Box).map_err(IoError::problem(path))
     };
     match (name.contains("relay"), name.contains("lcp")) {
         _ if !fits => lcp(),
@@ -144,7 +165,7 @@ fn mixed(t: &mut Tokens, path: &Path) -> Result<Complementarity, IoError> {
         (None, Some((m, q))) => (m.into(), q),
         (None, None) => unreachable!("one of the two is stored"),
     };
-    Mlcp::new(matrix, q, n).map(Complementarity::Mlcp).map_err(wrong(path))
+    Mlcp::new(matrix, q, n).map(Complementarity::Mlcp).map_err(IoError::problem(path))
 }
 
 /// M and q with their blocks, brought into our order: equalities first.
@@ -233,7 +254,7 @@ fn mixed_old(t: &mut Tokens, path: &Path) -> Result<Complementarity, IoError> {
     if let Some(word) = t.word() {
         return Err(t.wrong("after b", "the end of the file", Some(word)));
     }
-    Mlcp::rectangular(matrix, q, p, n).map(Complementarity::Mlcp).map_err(wrong(path))
+    Mlcp::rectangular(matrix, q, p, n).map(Complementarity::Mlcp).map_err(IoError::problem(path))
 }
 
 /// A matrix, which must be `rows` × `columns`.

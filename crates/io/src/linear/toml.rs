@@ -7,13 +7,16 @@ use std::fmt::Write;
 use std::path::Path;
 
 use nonsmooth_linalg::{Csc, Dense, Matrix};
-use nonsmooth_problem::{BoxLcp, Complementarity, Hlcp, Kind, Lcp, Mlcp, ProblemError};
+use nonsmooth_problem::{
+    AnyPoint, BoxLcp, Complementarity, Hlcp, HlcpPoint, Kind, Lcp, LcpPoint, Mlcp, OfAnyPoint,
+    ProblemError,
+};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, MapAccess, SeqAccess, Visitor};
 
-use super::{Digits, LinearFile, LinearPoint, check, text};
-use crate::IoError;
-use crate::replace::{WRITABLE, replace};
+use super::{Digits, check, text, unknowns};
+use crate::format::About;
+use crate::{Format, Info, IoError, ProblemFile, StoredPoint};
 
 /// All keys of all kinds; which belong to a kind is said by [`KEYS`].
 #[derive(Debug, Default, Deserialize)]
@@ -97,17 +100,45 @@ const KEYS: [(Kind, &[&str], &[&str]); 4] = [
     (Kind::BoxLcp, &["M", "q", "lower", "upper"], &["z", "w"]),
 ];
 
-/// Reads a file.
+const KINDS: &[Kind] = &[Kind::Lcp, Kind::Mlcp, Kind::Hlcp, Kind::BoxLcp];
+
+/// The format.
 ///
-/// Errors: what is no TOML or has a wrong type, by its line; what is missing, superfluous, of a wrong shape or not finite, by its key.
-pub fn read(path: impl AsRef<Path>) -> Result<LinearFile, IoError> {
-    let path = path.as_ref();
-    parse(path, &text(path)?)
+/// Errors of reading: what is no TOML or has a wrong type, by its line; what is missing, superfluous, of a wrong shape or not finite, by its key. Of writing:
+/// a problem that is known by its products only.
+#[derive(Debug, Clone, Copy)]
+pub struct Toml;
+
+impl Format for Toml {
+    fn about(&self) -> &'static About {
+        const ABOUT: About = About {
+            name: "TOML",
+            extensions: &["toml"],
+            reads: KINDS,
+            writes: KINDS,
+            ..About::TEXT
+        };
+        &ABOUT
+    }
+
+    /// Whether a line sets `kind`, which no other TOML file of ours has at its top.
+    fn begins(&self, bytes: &[u8]) -> bool {
+        let sets = |rest: &str| rest.trim_start().starts_with('=');
+        text(bytes).lines().any(|l| l.trim_start().strip_prefix("kind").is_some_and(sets))
+    }
+
+    fn parse(&self, name: &Path, bytes: &[u8]) -> Result<ProblemFile, IoError> {
+        parse(name, &text(bytes))
+    }
+
+    fn to_bytes(&self, name: &Path, file: &ProblemFile) -> Result<Vec<u8>, IoError> {
+        let problem = check(name, file)?;
+        Ok(format(file, problem).ok_or_else(|| operator(name))?.into_bytes())
+    }
 }
 
-/// Reads the text of a file; `path` is its name in messages. Errors: as [`read`].
-pub fn parse(path: impl AsRef<Path>, text: &str) -> Result<LinearFile, IoError> {
-    let path = path.as_ref();
+/// Reads the text of a file.
+fn parse(path: &Path, text: &str) -> Result<ProblemFile, IoError> {
     let keys: Keys = toml::from_str(text).map_err(|e| {
         let line = e.span().map_or(1, |s| 1 + text[..s.start].matches('\n').count());
         IoError::data(
@@ -130,12 +161,12 @@ pub fn parse(path: impl AsRef<Path>, text: &str) -> Result<LinearFile, IoError> 
     }
     let Keys { title, description, solution, .. } = &keys;
     let (title, description) = (title.clone(), description.clone());
-    let solution = match solution {
-        Some(solution) => Some(file.point(solution)?),
-        None => None,
+    let solution = solution.as_ref().map(|solution| file.point(solution)).transpose()?;
+    let content = ProblemFile {
+        info: Info { title, description, ..Info::default() },
+        solution,
+        ..ProblemFile::new(file.problem(keys)?)
     };
-    let problem = file.problem(keys)?;
-    let content = LinearFile { problem, title, description, solution };
     check(path, &content)?;
     Ok(content)
 }
@@ -247,7 +278,7 @@ impl Keyed<'_> {
     }
 
     fn invalid(&self, problem: ProblemError) -> IoError {
-        IoError::Linear { file: self.path.into(), problem }
+        IoError::problem(self.path)(problem)
     }
 
     fn problem(&self, k: Keys) -> Result<Complementarity, IoError> {
@@ -317,36 +348,17 @@ impl Keyed<'_> {
         made.map(Complementarity::Mlcp).map_err(|problem| self.invalid(problem))
     }
 
-    fn point(&self, s: &Solution) -> Result<LinearPoint, IoError> {
+    fn point(&self, s: &Solution) -> Result<StoredPoint, IoError> {
         let need = |key: &str, value: &Option<Vec<f64>>| {
             self.need(&format!("solution.{key}"), value.clone())
         };
-        Ok(match self.kind {
-            Kind::Hlcp => LinearPoint { z: need("x", &s.x)?, w: Some(need("s", &s.s)?) },
-            Kind::Mlcp => {
-                LinearPoint { z: [need("u", &s.u)?, need("v", &s.v)?].concat(), w: s.w.clone() }
-            }
-            _ => LinearPoint { z: need("z", &s.z)?, w: s.w.clone() },
-        })
+        let point: AnyPoint = match self.kind {
+            Kind::Hlcp => HlcpPoint { x: need("x", &s.x)?, s: need("s", &s.s)? }.into(),
+            Kind::Mlcp => LcpPoint { z: [need("u", &s.u)?, need("v", &s.v)?].concat() }.into(),
+            _ => LcpPoint { z: need("z", &s.z)? }.into(),
+        };
+        Ok(StoredPoint { point, partner: s.w.clone() })
     }
-}
-
-/// Writes a file, in place of the one of that name if there is one. It is completed beside the old one and then renamed.
-///
-/// Errors: a problem that is not valid or is known by its products only, a point that does not fit, what the system refuses.
-pub fn write(path: impl AsRef<Path>, content: &LinearFile) -> Result<(), IoError> {
-    let path = path.as_ref();
-    let text = to_text(path, content)?;
-    replace(path, |temporary| {
-        std::fs::write(temporary, &text).map_err(|e| IoError::os(path, WRITABLE, e))
-    })
-}
-
-/// The text of the file that [`write()`] makes; `path` is its name in messages. Errors: as [`write()`], but for the system's.
-pub fn to_text(path: impl AsRef<Path>, content: &LinearFile) -> Result<String, IoError> {
-    let path = path.as_ref();
-    check(path, content)?;
-    format(content).ok_or_else(|| operator(path))
 }
 
 /// The refusal of a matrix without entries.
@@ -355,9 +367,9 @@ pub(super) fn operator(path: &Path) -> IoError {
 }
 
 /// The text of a file; `None` of an operator.
-fn format(content: &LinearFile) -> Option<String> {
+fn format(file: &ProblemFile, problem: &Complementarity) -> Option<String> {
     let mut out = String::new();
-    let kind = match &content.problem {
+    let kind = match problem {
         Complementarity::Lcp(_) => (Kind::Lcp, "0 <= z, w = M z + q >= 0, z'w = 0"),
         Complementarity::Mlcp(_) => (
             Kind::Mlcp,
@@ -370,12 +382,12 @@ fn format(content: &LinearFile) -> Option<String> {
     };
     line(&mut out, &format!("# {}", kind.1));
     line(&mut out, &format!("kind = \"{}\"", kind.0.name()));
-    for (key, said) in [("title", &content.title), ("description", &content.description)] {
+    for (key, said) in [("title", &file.info.title), ("description", &file.info.description)] {
         if let Some(said) = said {
             line(&mut out, &format!("{key} = {}", quoted(said)));
         }
     }
-    let matrices: Vec<(&str, &Matrix)> = match &content.problem {
+    let matrices: Vec<(&str, &Matrix)> = match problem {
         Complementarity::Lcp(p) => {
             vector(&mut out, "q", &p.q);
             vec![("M", &p.M)]
@@ -423,15 +435,15 @@ fn format(content: &LinearFile) -> Option<String> {
             Matrix::Operator(_) => return None,
         }
     }
-    if let Some(LinearPoint { z, w }) = &content.solution {
+    if let Some(StoredPoint { point, partner }) = &file.solution {
         line(&mut out, "\n[solution]");
-        let w = w.as_deref();
-        let parts = match &content.problem {
+        let (z, w) = (unknowns(point), partner.as_deref());
+        let parts = match problem {
             Complementarity::Mlcp(p) => {
                 vec![("u", Some(&z[..p.free])), ("v", Some(&z[p.free..])), ("w", w)]
             }
-            Complementarity::Hlcp(_) => vec![("x", Some(&z[..])), ("s", w)],
-            _ => vec![("z", Some(&z[..])), ("w", w)],
+            Complementarity::Hlcp(_) => vec![("x", Some(z)), ("s", slack(point))],
+            _ => vec![("z", Some(z)), ("w", w)],
         };
         for (key, x) in parts {
             if let Some(x) = x {
@@ -440,6 +452,11 @@ fn format(content: &LinearFile) -> Option<String> {
         }
     }
     Some(out)
+}
+
+/// s of a horizontal problem's point.
+fn slack(point: &AnyPoint) -> Option<&[f64]> {
+    HlcpPoint::of(point).map(|point| &point.s[..])
 }
 
 fn line(out: &mut String, text: &str) {

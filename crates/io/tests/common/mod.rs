@@ -6,9 +6,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use hdf5_pure::{FileBuilder, GroupBuilder};
-use nonsmooth_io::fclib::{FclibFile, Info, StoredPoint};
+use nonsmooth_io::{Info, ProblemFile, StoredPoint};
 use nonsmooth_linalg::{Bsr, Csc};
-use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, RowsGlobal, RowsLocal};
+use nonsmooth_problem::{
+    AnyPoint, AnyProblem, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint,
+    RowsGlobal, RowsLocal,
+};
 use proptest::collection::{btree_map, vec};
 use proptest::option;
 use proptest::prelude::*;
@@ -62,19 +65,37 @@ fn global<const D: usize>() -> impl Strategy<Value = FrictionGlobal<D>> {
     })
 }
 
-fn problem() -> impl Strategy<Value = Friction> {
+fn problem() -> impl Strategy<Value = AnyProblem> {
     prop_oneof![
-        local().prop_map(Friction::Local2),
-        local().prop_map(Friction::Local3),
-        global().prop_map(Friction::Global2),
-        global().prop_map(Friction::Global3),
+        local::<2>().prop_map(AnyProblem::from),
+        local::<3>().prop_map(AnyProblem::from),
+        global::<2>().prop_map(AnyProblem::from),
+        global::<3>().prop_map(AnyProblem::from),
     ]
 }
 
-fn point(v: usize, m: usize, p: usize) -> impl Strategy<Value = StoredPoint> {
-    let some = |x: Vec<f64>| (!x.is_empty()).then_some(x);
-    (vec(real(), v), vec(real(), m), vec(real(), m), vec(real(), p))
-        .prop_map(move |(v, u, r, l)| StoredPoint { v: some(v), u, r, lambda: some(l) })
+/// A point as FCLIB stores it; with v, of a global problem.
+pub fn stored(v: Option<Vec<f64>>, u: Vec<f64>, r: Vec<f64>, lambda: Vec<f64>) -> StoredPoint {
+    let point = match v {
+        None => LocalPoint { r, lambda }.into(),
+        Some(v) => GlobalPoint { v, r, lambda }.into(),
+    };
+    StoredPoint { point, partner: Some(u) }
+}
+
+/// The impulses and the multipliers of a point of contacts.
+pub fn impulses(stored: &mut StoredPoint) -> (&mut Vec<f64>, &mut Vec<f64>) {
+    match &mut stored.point {
+        AnyPoint::Local(LocalPoint { r, lambda }) => (r, lambda),
+        AnyPoint::Global(GlobalPoint { r, lambda, .. }) => (r, lambda),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn point((v, m, p): (Option<usize>, usize, usize)) -> impl Strategy<Value = StoredPoint> {
+    let v_real = vec(real(), v.unwrap_or(0));
+    (v_real, vec(real(), m), vec(real(), m), vec(real(), p))
+        .prop_map(move |(x, u, r, l)| stored(v.map(|_| x), u, r, l))
 }
 
 fn info() -> impl Strategy<Value = Info> {
@@ -91,33 +112,34 @@ fn info() -> impl Strategy<Value = Info> {
     )
 }
 
+/// The problem of contacts in a file.
+pub fn contacts(file: &ProblemFile) -> &Friction {
+    file.contacts(Path::new("the file")).unwrap()
+}
+
 /// The lengths of v, of u and r, and of l.
-pub fn sizes(problem: &Friction) -> (usize, usize, usize) {
+pub fn sizes(problem: &AnyProblem) -> (Option<usize>, usize, usize) {
+    let AnyProblem::Friction(problem) = problem else { panic!("{problem:?}") };
     match problem {
-        Friction::Local2(p) => (0, p.q.len(), p.multipliers()),
-        Friction::Local3(p) => (0, p.q.len(), p.multipliers()),
-        Friction::Global2(p) => (p.dofs(), p.w.len(), p.multipliers()),
-        Friction::Global3(p) => (p.dofs(), p.w.len(), p.multipliers()),
+        Friction::Local2(p) => (None, p.q.len(), p.multipliers()),
+        Friction::Local3(p) => (None, p.q.len(), p.multipliers()),
+        Friction::Global2(p) => (Some(p.dofs()), p.w.len(), p.multipliers()),
+        Friction::Global3(p) => (Some(p.dofs()), p.w.len(), p.multipliers()),
     }
 }
 
 /// A whole file at random.
-pub fn content() -> impl Strategy<Value = FclibFile> {
+pub fn content() -> impl Strategy<Value = ProblemFile> {
     (problem(), info()).prop_flat_map(|(problem, info)| {
-        let (v, m, p) = sizes(&problem);
-        (option::of(point(v, m, p)), vec(point(v, m, p), 0..12)).prop_map(
-            move |(solution, guesses)| FclibFile {
-                problem: problem.clone(),
-                info: info.clone(),
-                solution,
-                guesses,
-            },
-        )
+        let sizes = sizes(&problem);
+        (option::of(point(sizes)), vec(point(sizes), 0..12)).prop_map(move |(solution, guesses)| {
+            ProblemFile { problem: problem.clone(), info: info.clone(), solution, guesses }
+        })
     })
 }
 
 /// Equality bit for bit: `Debug` tells -0.0 from 0.0, and its digits are those of one number only.
-pub fn assert_same(a: &FclibFile, b: &FclibFile) {
+pub fn assert_same(a: &ProblemFile, b: &ProblemFile) {
     assert_eq!(format!("{a:?}"), format!("{b:?}"));
 }
 

@@ -173,15 +173,15 @@ fn methods_agree_on_made_problems_of_full_rank() {
 fn methods_agree_on_the_corpus() {
     let (mut problems, mut agreed) = (0, 0);
     for path in common::corpus_files(&["siconos", "generated"]) {
-        let Ok(file) = fclib::read(&path) else { continue };
+        let Ok(problem) = fclib::read_problem(&path) else { continue };
         // The largest whose singular values are cheap.
-        let Ok(spectrum) = Spectrum::of(&file.problem, 300) else { continue };
+        let Ok(spectrum) = Spectrum::of(&problem, 300) else { continue };
         if spectrum.rank < spectrum.rows {
             continue;
         }
         let what = path.display().to_string();
         problems += 1;
-        agreed += with_friction!(&file.problem, p => agreements(p, &what, 2_000));
+        agreed += with_friction!(&problem, p => agreements(p, &what, 2_000));
     }
     eprintln!("{agreed} agreements on {problems} problems");
     assert!(problems == 0 || agreed > 2 * problems, "{agreed} agreements on {problems} problems");

@@ -6,11 +6,12 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
-use nonsmooth_io::{Content, read_any};
 use nonsmooth_problem::check::Judged;
 use nonsmooth_problem::planted::classics::{self, Classic, Known};
 use nonsmooth_problem::planted::{PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp};
-use nonsmooth_problem::{BoxLcp, Complementarity, Hlcp, Lcp, Mlcp, with_complementarity};
+use nonsmooth_problem::{
+    AnyProblem, BoxLcp, Complementarity, Hlcp, Lcp, Mlcp, with_complementarity,
+};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limits, Outcome, SolveError, Status};
 
@@ -214,9 +215,9 @@ fn corpus(folder: &str) -> Vec<(PathBuf, Complementarity)> {
         std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
     assert!(files.len() > 10, "{}", folder.display());
-    let content = |file: PathBuf| match read_any(&file) {
-        Ok(Content::Linear(linear)) => Some((file, linear.problem)),
-        Ok(Content::Friction(_)) => panic!("{}", file.display()),
+    let content = |file: PathBuf| match nonsmooth_io::read(&file) {
+        Ok(AnyProblem::Complementarity(problem)) => Some((file, problem)),
+        Ok(AnyProblem::Friction(_)) => panic!("{}", file.display()),
         Err(e) => {
             // Two entries of q for three rows.
             assert!(file.ends_with("Rectangular_mlcp.dat"), "{e}");

@@ -6,13 +6,17 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
+use super::{Recipe, share, size};
 use crate::check::Certificate;
 use crate::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp};
 use nonsmooth_linalg::{Compensated, Csc, Dense, Matrix};
 
 /// The classes from which matrices are drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum PlantedClass {
     /// Symmetric positive definite: `G Gᵀ + diag`.
     Spd,
@@ -67,19 +71,20 @@ impl PlantedClass {
 /// assert!(problem.judge(&known, 1e-13)?.solved);
 /// # Ok::<(), nonsmooth_problem::ProblemError>(())
 /// ```
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 pub struct PlantedLcp {
-    /// The number of variables, at least 2; rounded up to a multiple of 6 for [`PlantedClass::Contact`].
+    /// The number of variables, at least 2; a multiple of 6 for contact, or rounded up to one.
     pub n: usize,
-    /// The class that M is made to be in.
+    /// The class of the matrix.
     pub class: PlantedClass,
-    /// The share of entries that are not zero, about; 1 gives a dense matrix. A row has at least a few.
+    /// The share of entries that are not zero, about; 1 gives a dense matrix.
     pub density: f64,
-    /// The share of variables with `z_i > 0` among those that are not degenerate.
+    /// The share of variables with z > 0 among those that are not degenerate.
     pub active: f64,
-    /// The share of variables with `z_i = w_i = 0`.
+    /// The share of variables with z = w = 0.
     pub degenerate: f64,
-    /// Rows and columns are scaled by powers of two between 10^−decades and 10^decades, rows and columns alike where the class asks for it.
+    /// Rows and columns are scaled by powers of two from 10^-decades to 10^decades.
     pub decades: f64,
     /// The seed: the same seed gives the same problem to the bit.
     pub seed: u64,
@@ -95,6 +100,22 @@ impl Default for PlantedLcp {
             degenerate: 0.0,
             decades: 0.0,
             seed: 0,
+        }
+    }
+}
+
+/// A whole number of variables that a machine can hold.
+const MOST: usize = 100_000_000;
+
+impl Recipe for PlantedLcp {
+    fn validate(&self) -> Result<(), String> {
+        size("n", self.n, 2..=MOST)?;
+        share("density", self.density)?;
+        share("active", self.active)?;
+        share("degenerate", self.degenerate)?;
+        match (0.0..=20.0).contains(&self.decades) {
+            true => Ok(()),
+            false => Err(format!("decades: expected from 0 to 20, found {}", self.decades)),
         }
     }
 }
@@ -576,7 +597,8 @@ fn minus_product(w: &[f64], terms: &[(&Matrix, &Vec<f64>)]) -> Vec<f64> {
 }
 
 /// What the blocks of a planted mixed problem are like. `[A C; D B]` is positive semidefinite, with `D = −Cᵀ`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum PlantedBlocks {
     /// A and B are positive definite: the problem reduces to an LCP.
     Regular,
@@ -592,19 +614,20 @@ impl PlantedBlocks {
 }
 
 /// A mixed problem to plant.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 pub struct PlantedMlcp {
     /// The number of free variables, at least 1.
     pub free: usize,
     /// The number of complementary pairs, at least 1.
     pub pairs: usize,
-    /// What the blocks are like.
+    /// What the blocks are like: all regular, A of half its rank, or B zero.
     pub blocks: PlantedBlocks,
     /// Equalities that repeat another one, so that A has more rows than columns.
     pub redundant: usize,
     /// The share of entries that are not zero, about; 1 gives a dense matrix.
     pub density: f64,
-    /// The share of pairs with `v_i = w_i = 0`.
+    /// The share of pairs with v = w = 0.
     pub degenerate: f64,
     /// The seed: the same seed gives the same problem to the bit.
     pub seed: u64,
@@ -621,6 +644,16 @@ impl Default for PlantedMlcp {
             degenerate: 0.0,
             seed: 0,
         }
+    }
+}
+
+impl Recipe for PlantedMlcp {
+    fn validate(&self) -> Result<(), String> {
+        size("free", self.free, 1..=MOST)?;
+        size("pairs", self.pairs, 1..=MOST)?;
+        size("redundant", self.redundant, 0..=MOST)?;
+        share("density", self.density)?;
+        share("degenerate", self.degenerate)
     }
 }
 

@@ -6,12 +6,16 @@
 //! | maker | problem | reference |
 //! | --- | --- | --- |
 //! | [`Membrane`] | a membrane between obstacles | MoreToraldo1991 |
-//! | [`torsion`] | elastic-plastic torsion of a square bar | MoreToraldo1991 |
+//! | [`Torsion`] | elastic-plastic torsion of a square bar | MoreToraldo1991 |
 //! | [`JournalBearing`] | pressure in a journal bearing | MoreToraldo1991 |
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Recipe, finite, size};
 use crate::{BoxLcp, Lcp};
 use nonsmooth_linalg::{Csc, Matrix, Operator};
 
@@ -177,26 +181,86 @@ impl Operator for Membrane {
     }
 }
 
-/// Elastic-plastic torsion of a bar of square section, side 1: `−Δu = c` where `|u|` is less than the distance to the rim, which it does not exceed.
+/// The most points of a grid along a side.
+const SIDE: usize = 10_000;
+
+/// A membrane on the unit square above the obstacle `sin(3.2 x) sin(3.3 y)`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Obstacle {
+    /// Interior points along each side: n^2 variables.
+    pub n: usize,
+    /// The load that pulls the membrane up, a force per area; negative loads press it down.
+    pub load: f64,
+}
+
+impl Default for Obstacle {
+    fn default() -> Self {
+        Self { n: 20, load: 1.0 }
+    }
+}
+
+impl Obstacle {
+    /// As an LCP in the gap.
+    pub fn lcp(&self) -> Lcp {
+        let membrane = Membrane { load: self.load, ..Membrane::square(self.n) };
+        membrane.above(|x, y| (3.2 * x).sin() * (3.3 * y).sin())
+    }
+}
+
+impl Recipe for Obstacle {
+    fn validate(&self) -> Result<(), String> {
+        size("n", self.n, 1..=SIDE)?;
+        finite("load", self.load)
+    }
+}
+
+/// Elastic-plastic torsion of a bar of square section, side 1: `−Δu = load` where `|u|` is less than the distance to the rim, which it does not exceed.
 ///
-/// `n` × n interior points; CUTEst's TORSION1 with parameter Q is `n = 2Q − 2`, `c = 5`, with its weight of the rim.
-pub fn torsion(n: usize, c: f64) -> BoxLcp {
-    let distance = |x: f64, y: f64| x.min(1.0 - x).min(y).min(1.0 - y);
-    let membrane = Membrane { load: c, rim: 0.5, ..Membrane::square(n) };
-    membrane.between(|x, y| -distance(x, y), distance)
+/// CUTEst's TORSION1 with parameter Q is `n = 2Q − 2`, with its weight of the rim.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Torsion {
+    /// Interior points along each side: n^2 variables.
+    pub n: usize,
+    /// The angle of twist, as a load.
+    pub load: f64,
+}
+
+impl Default for Torsion {
+    fn default() -> Self {
+        Self { n: 20, load: 5.0 }
+    }
+}
+
+impl Torsion {
+    /// As a box LCP.
+    pub fn boxed(&self) -> BoxLcp {
+        let distance = |x: f64, y: f64| x.min(1.0 - x).min(y).min(1.0 - y);
+        let membrane = Membrane { load: self.load, rim: 0.5, ..Membrane::square(self.n) };
+        membrane.between(|x, y| -distance(x, y), distance)
+    }
+}
+
+impl Recipe for Torsion {
+    fn validate(&self) -> Result<(), String> {
+        size("n", self.n, 1..=SIDE)?;
+        finite("load", self.load)
+    }
 }
 
 /// The pressure in the lubricant of a journal bearing, which cavitates rather than becoming negative: the LCP of
-/// `min ½ ∫ ω |∇v|² − ε ∫ sin(ξ) v` over `v ≥ 0` on `(0, 2π) × (0, 2b)`, `v = 0` on the rim, `ω = (1 + ε cos ξ)³`, by linear finite elements on right triangles.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// `min ½ ∫ ω |∇v|² − ε ∫ sin(ξ) v` over `v ≥ 0` on `(0, 2π) × (0, 2b)`, `v = 0` on the rim, `ω = (1 + ε cos ξ)³`, of eccentricity ε and half width b, by linear finite elements on right triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 pub struct JournalBearing {
-    /// Interior points along the circumference ξ, at least 1.
+    /// Interior points along the circumference.
     pub nx: usize,
-    /// Interior points along the axis, at least 1.
+    /// Interior points along the axis.
     pub ny: usize,
-    /// The eccentricity ε, in (0, 1).
+    /// The eccentricity, between 0 and 1.
     pub eccentricity: f64,
-    /// Half of the axial extent, b.
+    /// Half of the axial extent, positive.
     pub half_width: f64,
 }
 
@@ -204,6 +268,21 @@ impl Default for JournalBearing {
     /// The one whose optima are published: ε = 0.1, b = 10.
     fn default() -> Self {
         Self { nx: 50, ny: 50, eccentricity: 0.1, half_width: 10.0 }
+    }
+}
+
+impl Recipe for JournalBearing {
+    fn validate(&self) -> Result<(), String> {
+        size("nx", self.nx, 1..=SIDE)?;
+        size("ny", self.ny, 1..=SIDE)?;
+        let Self { eccentricity, half_width, .. } = *self;
+        if !(eccentricity > 0.0 && eccentricity < 1.0) {
+            return Err(format!("eccentricity: expected a number in (0, 1), found {eccentricity}"));
+        }
+        match half_width > 0.0 && half_width.is_finite() {
+            true => Ok(()),
+            false => Err(format!("half_width: expected a positive number, found {half_width}")),
+        }
     }
 }
 
@@ -274,7 +353,7 @@ mod tests {
         let bearing = JournalBearing { nx: 6, ny: 9, ..JournalBearing::default() }.lcp();
         bearing.validate().unwrap();
         assert_eq!(bearing.M.asymmetry(), Some(0.0));
-        let bar = torsion(8, 5.0);
+        let bar = Torsion { n: 8, load: 5.0 }.boxed();
         bar.validate().unwrap();
         assert_eq!(bar.M.asymmetry(), Some(0.0));
         // One point, summed over its triangles by hand.

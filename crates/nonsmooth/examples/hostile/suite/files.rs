@@ -5,11 +5,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use nonsmooth::{
-    BoxLcp, Complementarity, FrictionGlobal, FrictionLocal, Hlcp, Lcp, Matrix, Mlcp,
-    with_complementarity,
+    AnyProblem, BoxLcp, FrictionGlobal, FrictionLocal, Hlcp, Lcp, Matrix, Mlcp, with_problem,
 };
-use nonsmooth_io::linear::{self, LinearFile};
-use nonsmooth_io::{Content, read_any};
+use nonsmooth_io::{ProblemFile, read};
 
 use super::cases::Made;
 use super::claims::{Lie, Tally};
@@ -52,7 +50,7 @@ pub fn run(folder: &Path, seed: u64, index: u64, rounds: usize) -> Tally {
         for _ in 0..rounds {
             std::fs::write(&path, damaged(&original, &mut rng)).expect("a folder of our own");
             let begun = Instant::now();
-            let read = catch_unwind(AssertUnwindSafe(|| read_any(&path).map(|c| is_valid(&c))));
+            let read = catch_unwind(AssertUnwindSafe(|| read(&path).map(|p| is_valid(&p))));
             let mut lie = |claim, why: String| {
                 tally.lies.push(Lie {
                     kind: "files",
@@ -100,16 +98,13 @@ pub fn run(folder: &Path, seed: u64, index: u64, rounds: usize) -> Tally {
     tally
 }
 
-fn is_valid(content: &Content) -> bool {
-    match content {
-        Content::Friction(file) => file.problem.validate().is_ok(),
-        Content::Linear(file) => with_complementarity!(&file.problem, p => p.validate().is_ok()),
-    }
+fn is_valid(problem: &AnyProblem) -> bool {
+    with_problem!(problem, p => p.validate().is_ok())
 }
 
 fn write(path: &Path, format: &str, seed: u64, index: u64, rng: &mut Rng) {
-    let lcp = || Complementarity::Lcp(Lcp::case(seed, index).problem);
-    let boxed = || Complementarity::Box(BoxLcp::case(seed, index).problem);
+    let lcp = || AnyProblem::from(Lcp::case(seed, index).problem);
+    let boxed = || AnyProblem::from(BoxLcp::case(seed, index).problem);
     match format {
         "hdf5" => match rng.below(4) {
             0 => FrictionLocal::<2>::case(seed, index).problem.save(path),
@@ -131,16 +126,16 @@ fn write(path: &Path, format: &str, seed: u64, index: u64, rng: &mut Rng) {
         }
         "mtx" => {
             let problem = if rng.chance(50) { lcp() } else { boxed() };
-            linear::write(path, &LinearFile::new(problem))
+            ProblemFile::new(problem).write(path)
         }
         _ => {
             let problem = match rng.below(4) {
                 0 => lcp(),
                 1 => boxed(),
-                2 => Complementarity::Mlcp(Mlcp::case(seed, index).problem),
-                _ => Complementarity::Hlcp(Hlcp::case(seed, index).problem),
+                2 => Mlcp::case(seed, index).problem.into(),
+                _ => Hlcp::case(seed, index).problem.into(),
             };
-            linear::write(path, &LinearFile::new(problem))
+            ProblemFile::new(problem).write(path)
         }
     }
     .expect("a valid problem");

@@ -3,11 +3,10 @@
 use std::path::Path;
 
 use nonsmooth::{
-    BoxLcp, Complementarity, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, Hlcp, HlcpPoint,
-    Lcp, LcpPoint, LocalPoint, Matrix, Mlcp,
+    BoxLcp, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Lcp, LcpPoint,
+    LocalPoint, Matrix, Mlcp,
 };
-use nonsmooth_io::linear::{self, LinearFile};
-use nonsmooth_io::{IoError, fclib};
+use nonsmooth_io::{IoError, ProblemFile};
 use nonsmooth_problem::check::Judged;
 use nonsmooth_solve::registry::Registered;
 
@@ -185,8 +184,7 @@ macro_rules! hostile_in_z {
                 None
             }
             fn save(&self, path: &Path) -> Result<(), IoError> {
-                let file = LinearFile::new(Complementarity::$variant(self.clone()));
-                linear::write(path.with_extension("toml"), &file)
+                ProblemFile::new(self.clone()).write(path.with_extension("toml"))
             }
         }
     };
@@ -263,8 +261,7 @@ impl Hostile for Hlcp {
     }
 
     fn save(&self, path: &Path) -> Result<(), IoError> {
-        let file = LinearFile::new(Complementarity::Hlcp(self.clone()));
-        linear::write(path.with_extension("toml"), &file)
+        ProblemFile::new(self.clone()).write(path.with_extension("toml"))
     }
 }
 
@@ -614,8 +611,7 @@ macro_rules! hostile_contact {
                 Some(Friction::$variant(self.clone()))
             }
             fn save(&self, path: &Path) -> Result<(), IoError> {
-                let file = fclib::FclibFile::new(Friction::$variant(self.clone()));
-                fclib::write(path.with_extension("hdf5"), &file)
+                ProblemFile::new(self.clone()).write(path.with_extension("hdf5"))
             }
         }
     };

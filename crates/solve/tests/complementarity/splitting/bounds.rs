@@ -1,7 +1,7 @@
 //! Free variables, equalities and boxes.
 
 use nonsmooth_linalg::Dense;
-use nonsmooth_problem::planted::torsion;
+use nonsmooth_problem::planted::Torsion;
 use nonsmooth_problem::{BoxLcp, Mlcp};
 
 use super::{Draw, SYMMETRIC, distance, gram, solved};
@@ -57,7 +57,7 @@ fn saddle_points_are_solved_whatever_the_sign_of_their_equalities() {
 
 #[test]
 fn boxes() {
-    let problem = torsion(14, 5.0);
+    let problem = Torsion { n: 14, load: 5.0 }.boxed();
     let (z, _) = solved(&problem, "mprgp");
     for label in SYMMETRIC {
         assert!(distance(&solved(&problem, label).0, &z) < 1e-6, "{label}");

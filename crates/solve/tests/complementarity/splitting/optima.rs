@@ -1,7 +1,7 @@
 //! Published optima of CUTEst and MCPLIB, and a file of Siconos.
 
 use nonsmooth_linalg::Matrix;
-use nonsmooth_problem::planted::{JournalBearing, Membrane, energy, torsion};
+use nonsmooth_problem::planted::{JournalBearing, Membrane, Torsion, energy};
 use nonsmooth_problem::{Lcp, LcpPoint, Problem};
 use nonsmooth_solve::registry::Registered;
 
@@ -54,7 +54,7 @@ fn obstacle_problems_of_cutest() {
 #[test]
 fn elastic_plastic_torsion_of_cutest() {
     for (q, published) in [(2, -5.1851852e-1), (5, -4.9234185e-1), (11, -4.5608771e-1)] {
-        let problem = torsion(2 * q - 2, 5.0);
+        let problem = Torsion { n: 2 * q - 2, load: 5.0 }.boxed();
         optimum("TORSION1", &problem, &problem.M, &problem.q, published, 8);
     }
 }

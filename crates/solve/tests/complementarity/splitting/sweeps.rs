@@ -1,7 +1,7 @@
 //! What single sweeps do: by hand, backward, down in energy, faster where the rate allows.
 
 use nonsmooth_linalg::Dense;
-use nonsmooth_problem::planted::{Membrane, energy, torsion};
+use nonsmooth_problem::planted::{Membrane, Torsion, energy};
 use nonsmooth_problem::{Lcp, LcpPoint, Problem};
 use nonsmooth_solve::complementarity::quadratic::Mprgp;
 use nonsmooth_solve::complementarity::splitting::{Direction, Psor, Rpsor, SplittingLs, Sweep};
@@ -93,7 +93,7 @@ fn the_line_search_lowers_the_energy_in_every_step() {
 
 #[test]
 fn proportioning_lowers_the_energy_in_every_step() {
-    let problem = torsion(20, 5.0);
+    let problem = Torsion { n: 20, load: 5.0 }.boxed();
     let solver = Mprgp::default();
     let mut work = solver.work(&problem).unwrap();
     let mut point = problem.origin();
