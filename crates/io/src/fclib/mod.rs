@@ -15,7 +15,8 @@
 //! /guesses     number_of_guesses, 1/, 2/, ... each like /solution
 //! ```
 //!
-//! with m = spacedim · nc; V, R, s and G, b come together or not at all. A matrix is a group of `m`, `n`,
+//! with m = spacedim · nc; V, R, s and G, b come together or not at all. Scalar rows that are no bilateral constraints have `vectors/lower` and `vectors/upper` (p each,
+//! infinities allowed) beside s or b: an addition of ours, which other readers of FCLIB do not see. A matrix is a group of `m`, `n`,
 //! `nz`, `nzmax`, `p`, `i`, `x`, zero-based: triplets with row `i`, column `p` (`nz ≥ 0` entries), compressed
 //! columns (`nz = -1`) or compressed rows (`nz = -2`). All three are read, in any order, duplicates added in
 //! the order of the file; triplets are written, because other readers of global files know nothing else.

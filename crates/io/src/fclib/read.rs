@@ -5,8 +5,8 @@ use std::path::Path;
 
 use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::{
-    Friction, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, ProblemError, RowsGlobal,
-    RowsLocal,
+    Bounds, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, ProblemError,
+    RowsGlobal, RowsLocal,
 };
 
 use super::{Sizes, check_finite, check_vector, group, invalid};
@@ -121,7 +121,8 @@ fn local<const D: usize>(g: &Folder) -> Result<FrictionLocal<D>, IoError> {
             let s = vectors.reals("s", None)?;
             let p = s.len();
             let V = g.matrix("V", (m, p), &format!("{contacts}, by the entries of vectors/s"))?;
-            Some(RowsLocal::bilateral(V, g.matrix("R", (p, p), "the entries of vectors/s")?, s))
+            let R = g.matrix("R", (p, p), "the entries of vectors/s")?;
+            Some(RowsLocal { V, R, s, bounds: vectors.bounds(p)? })
         }
         (V, R, s) => {
             let parts = [("V", V.is_some()), ("R", R.is_some()), ("vectors/s", s)];
@@ -147,7 +148,8 @@ fn global<const D: usize>(g: &Folder) -> Result<FrictionGlobal<D>, IoError> {
         (Some(_), true) => {
             let b = vectors.reals("b", None)?;
             let why = "the entries of vectors/f, by the entries of vectors/b";
-            Some(RowsGlobal::bilateral(g.matrix("G", (n, b.len()), why)?, b))
+            let (G, bounds) = (g.matrix("G", (n, b.len()), why)?, vectors.bounds(b.len())?);
+            Some(RowsGlobal { G, b, bounds })
         }
         (G, b) => return Err(g.incomplete(&[("G", G.is_some()), ("vectors/b", b)])),
     };
@@ -354,6 +356,26 @@ impl<'f, 'a> Folder<'f, 'a> {
         let x = self.reals(name, None)?;
         check_vector(self.file, &self.place(name), &x, len, meaning)?;
         Ok(x)
+    }
+
+    /// What the impulses of p scalar rows may be: our own addition to FCLIB. Without it all are free. Whether bounds cross the problem itself looks.
+    fn bounds(&self, p: usize) -> Result<Bounds, IoError> {
+        let side = |name: &str| {
+            let dataset = self.dataset(name)?;
+            let x = self.data.reals(&dataset).map_err(self.fault(name))?;
+            match x.len() == p {
+                true => Ok(x),
+                false => {
+                    let expected = format!("{p} entries (scalar rows)");
+                    Err(self.error(name, expected, format!("{} entries", x.len())))
+                }
+            }
+        };
+        match (self.has("lower")?, self.has("upper")?) {
+            (false, false) => Ok(Bounds::default()),
+            (true, true) => Ok(Bounds { lower: side("lower")?, upper: side("upper")? }),
+            (lower, upper) => Err(self.incomplete(&[("lower", lower), ("upper", upper)])),
+        }
     }
 
     /// A text that is there or not; bytes that are no UTF-8 are replaced, as it is only for people.

@@ -12,7 +12,7 @@ use hdf5_pure::{
 };
 use nonsmooth_linalg::Csc;
 use nonsmooth_problem::{
-    AnyPoint, AnyProblem, Friction, FrictionGlobal, FrictionLocal, Problem, with_friction,
+    AnyPoint, AnyProblem, Bounds, Friction, FrictionGlobal, FrictionLocal, Problem,
 };
 
 use super::{SOLUTION, Sizes, check_vector, group, guarded, invalid, read};
@@ -34,11 +34,6 @@ fn build(path: &Path, content: &ProblemFile) -> Result<FileBuilder, IoError> {
     let problem = content.contacts(path)?;
     let root = group(problem);
     problem.validate().map_err(invalid(path, root))?;
-    if !with_friction!(problem, p => p.rows.as_ref().is_none_or(|rows| rows.bounds.are_free())) {
-        let expected = "bilateral constraints alone, as FCLIB has no place for bounds";
-        return Err(IoError::data(path, root, expected, "rows with bounds"));
-    }
-
     let mut file = FileBuilder::new();
     // The oldest format that the builder knows, for the sake of old readers.
     file.with_libver_bounds(LibVer::V18, LibVer::V18);
@@ -215,6 +210,7 @@ fn local<const D: usize>(g: &mut Out, problem: &FrictionLocal<D>) -> Result<(), 
         g.reals("mu", &problem.mu);
         if let Some(b) = &problem.rows {
             g.reals("s", &b.s);
+            g.bounds(&b.bounds);
         }
         Ok(())
     })
@@ -233,6 +229,7 @@ fn global<const D: usize>(g: &mut Out, problem: &FrictionGlobal<D>) -> Result<()
         g.reals("mu", &problem.mu);
         if let Some(b) = &problem.rows {
             g.reals("b", &b.b);
+            g.bounds(&b.bounds);
         }
         Ok(())
     })
@@ -356,6 +353,14 @@ impl Out<'_> {
     }
 
     /// Triplets, column by column: row `i`, column `p`.
+    /// The bounds of scalar rows, where there are any.
+    fn bounds(&mut self, bounds: &Bounds) {
+        if !bounds.are_free() {
+            self.reals("lower", &bounds.lower);
+            self.reals("upper", &bounds.upper);
+        }
+    }
+
     fn matrix(&mut self, name: &str, a: &Csc) -> Result<(), IoError> {
         self.child(name, |g| {
             for (name, x) in
