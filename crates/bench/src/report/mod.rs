@@ -1,6 +1,6 @@
 //! A report: one HTML file that holds the runs and draws them, for a browser without a network.
 //!
-//! All its numbers are those of [`profile`](crate::profile) and [`tables`](crate::tables), counted once for each view: a kind
+//! All its numbers are those of [`profile`](crate::profile) and [`tables`], counted once for each view: a kind
 //! of problem, a tolerance, and all problems, a family or a class of size. The script chooses a view, draws it, and hides the
 //! solvers that are not asked for; the best is that of all solvers of the kind, whatever is hidden.
 //!
