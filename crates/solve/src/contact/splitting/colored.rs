@@ -22,7 +22,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::circles::Circles;
-use super::contact::{Answer, Contact, NEGLIGIBLE};
+use super::contact::{Answer, Contact, ContactOf, NEGLIGIBLE};
 use super::nsgs::{LocalChoice, with_local};
 use crate::contact::form::{Access, Concurrent, Frictional};
 use crate::contact::law::local::LocalSolver;
@@ -116,17 +116,17 @@ pub struct ColoredWork<P: Concurrent<D>, L: LocalSolver<D, P::Law>, const D: usi
     coloring: Coloring,
     /// The colours worth the team's while.
     shared: usize,
-    parts: Vec<Mutex<Part<L::Memo, P::Law, D>>>,
+    parts: Vec<Mutex<Part<ContactOf<P, L, D>, D>>>,
     /// The contacts of the other colours.
-    rest: Vec<(usize, Contact<L::Memo, P::Law, D>)>,
+    rest: Vec<(usize, ContactOf<P, L, D>)>,
     units: Vec<f64>,
     circles: Circles,
     by_color: Vec<Vec<u32>>,
 }
 
 /// A part of every colour's contacts, and the answers to the present colour's visits.
-struct Part<Memo, Law, const D: usize> {
-    contacts: Vec<(usize, Contact<Memo, Law, D>)>,
+struct Part<C, const D: usize> {
+    contacts: Vec<(usize, C)>,
     /// Where each shared colour's contacts begin; one more at the end.
     starts: Vec<usize>,
     answers: Vec<(usize, Answer<D>)>,

@@ -2,6 +2,7 @@
 
 use nonsmooth_linalg::small;
 
+use crate::contact::form::Contacts;
 use crate::contact::law::ContactLaw;
 use crate::contact::law::local::{LocalSolver, frictionless};
 
@@ -15,6 +16,10 @@ pub(super) struct Contact<Memo, Law, const D: usize> {
     pub(super) settled: u32,
     memo: Memo,
 }
+
+/// What the sweeps keep of a contact of the problem P for the local solver L.
+pub(super) type ContactOf<P, L, const D: usize> =
+    Contact<<L as LocalSolver<D, <P as Contacts<D>>::Law>>::Memo, <P as Contacts<D>>::Law, D>;
 
 /// What a visit comes to.
 pub(super) struct Answer<const D: usize> {

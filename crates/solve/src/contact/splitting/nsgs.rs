@@ -34,7 +34,7 @@ use crate::core::settings::{Settings, described};
 use crate::{Boxed, SolveError, Solver, Step};
 
 use super::circles::Circles;
-use super::contact::{Answer, Contact, NEGLIGIBLE};
+use super::contact::{Answer, Contact, ContactOf, NEGLIGIBLE};
 
 /// The local solver, the order of the visits, relaxation, and what saves visits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -222,7 +222,7 @@ pub struct SweepsWork<P: Blockwise<D>, L: LocalSolver<D, P::Law>, const D: usize
     state: P::State,
     /// The local solver with the tolerance of the present sweep.
     local: L,
-    contacts: Vec<Contact<L::Memo, P::Law, D>>,
+    contacts: Vec<ContactOf<P, L, D>>,
     order: Order,
     /// The mean of `w_c²‖Δr_c‖²/‖q‖²` in the last sweep, the yardstick of freezing and of the local tolerance.
     mean_move: f64,
