@@ -1,5 +1,6 @@
-//! Contact problems: whether a solution exists, friction through facets, the methods through convex optimisation, scalar rows with bounds.
+//! Contact problems: whether a solution exists, friction through facets, the methods through convex optimisation, scalar rows with bounds, a law of one's own.
 
+mod another_law;
 mod existence;
 mod facets;
 mod optimisation;
