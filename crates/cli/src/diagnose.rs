@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use nonsmooth_solve::Limits;
-use nonsmooth_solve::diagnose::{Diagnosis, Effort, diagnose};
+use nonsmooth_solve::diagnose::{Diagnosis, Effort, Trial, diagnose};
 use serde_json::json;
 
 use crate::report::{self, row};
@@ -92,9 +92,20 @@ fn text(file: &Path, diagnosis: &Diagnosis) -> String {
             row(&mut text, "", &finding.means);
         }
     }
-    if !diagnosis.suits.is_empty() {
-        let tries: Vec<_> = diagnosis.suits.iter().map(|s| format!("--solver {s}")).collect();
-        row(&mut text, "try", tries.join(", or "));
+    for (k, trial) in diagnosis.trials.iter().enumerate() {
+        let Trial { solver, status, relative, iterations, seconds } = trial;
+        let label = if k == 0 { "tried" } else { "" };
+        let steps = report::count(*iterations, "iteration");
+        let came = format!("{status}, relative {relative:.1e} after {steps} in {seconds:.3} s");
+        row(&mut text, label, format!("{solver}: {came}"));
+    }
+    match &diagnosis.suits[..] {
+        [] if diagnosis.trials.is_empty() => {}
+        [] => row(&mut text, "try", "more time: none of these solved it on trial"),
+        suits => {
+            let tries: Vec<_> = suits.iter().map(|s| format!("--solver {s}")).collect();
+            row(&mut text, "try", tries.join(", or "));
+        }
     }
     text
 }

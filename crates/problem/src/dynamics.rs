@@ -31,7 +31,7 @@ struct Held {
 
 impl Held {
     fn new(rows: &RowsGlobal) -> Option<Self> {
-        let free = (0..rows.b.len()).filter(|&j| rows.bounds.is_free(j)).collect::<Vec<_>>();
+        let free = rows.bounds.free(rows.b.len());
         let all = free.len() == rows.b.len();
         (!all).then(|| Self { free, lambda: vec![0.0; rows.b.len()] })
     }

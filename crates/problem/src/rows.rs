@@ -37,6 +37,11 @@ impl Bounds {
         (0..self.lower.len()).filter(|&j| !self.is_free(j))
     }
 
+    /// The rows of p that have none.
+    pub fn free(&self, rows: usize) -> Vec<usize> {
+        (0..rows).filter(|&j| self.is_free(j)).collect()
+    }
+
     /// Whether no row has a bound: all are bilateral constraints.
     pub fn are_free(&self) -> bool {
         self.bounded().next().is_none()

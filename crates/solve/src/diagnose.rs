@@ -6,16 +6,16 @@ use std::time::Instant;
 
 use nonsmooth_analysis::{Spectrum, Traits, rank};
 use nonsmooth_linalg::{Bsr, Csc, Delassus, Inverse, norm, small};
-use nonsmooth_problem::check::{Existence, Impulses};
-use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, with_friction};
+use nonsmooth_problem::check::{Existence, Impulses, Judged};
+use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, OfAny, with_friction};
 use serde::Serialize;
 
 use crate::contact::existence;
-use crate::contact::form::{Access, Linear};
+use crate::contact::form::{Access, Linear, Rows};
 use crate::core::guard;
 use crate::core::register::Registered;
 use crate::registry;
-use crate::{Limit, Limits};
+use crate::{Limit, Limits, Solve, Status};
 
 /// One thing worth knowing of a problem.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -37,8 +37,25 @@ pub struct Finding {
 pub struct Diagnosis {
     /// One entry a topic.
     pub findings: Vec<Finding>,
-    /// Solvers to try, the first first.
+    /// Solvers to try: those that solved the problem on trial, the fastest first.
     pub suits: Vec<&'static str>,
+    /// What came of every solver that the findings suggest.
+    pub trials: Vec<Trial>,
+}
+
+/// A short solve of the problem itself, so that nothing is advised that does not help.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Trial {
+    /// The solver.
+    pub solver: &'static str,
+    /// How it ended.
+    pub status: &'static str,
+    /// The relative residual that it reached, by the judge.
+    pub relative: f64,
+    /// Iterations.
+    pub iterations: usize,
+    /// Wall clock.
+    pub seconds: f64,
 }
 
 /// How much a diagnosis may cost.
@@ -46,7 +63,8 @@ pub struct Diagnosis {
 pub struct Effort {
     /// The most rows for which the singular values of W are computed.
     pub spectrum_limit: usize,
-    /// Limits of it all: half of the time for singular values, most of the rest for the question of existence.
+    /// Limits of it all: half of the time for singular values, most of the rest for the question of existence, what is then left for trials of solvers.
+    /// Their tolerance is that of the trials.
     pub limits: Limits,
 }
 
@@ -59,21 +77,59 @@ pub fn diagnose(
     effort: &Effort,
 ) -> Result<Diagnosis, Limit> {
     let copy = (problem.clone(), effort.spectrum_limit);
-    guard::run(&effort.limits, || {}, move |limits| {
-        let (problem, rows) = copy;
-        let begun = Instant::now();
-        let scope = limits.budget(begun).enter();
-        let traits = Traits::of(&problem, dofs);
-        let spectrum = spectrum(&problem, rows, &part(limits, begun, 0.5)).ok();
-        let existence = existence::of(&problem, &part(limits, begun, 0.8));
-        let found =
-            with_friction!(&problem, p => Patient { problem: p, traits, spectrum, existence }.diagnose());
-        match limits.reached(begun) {
-            Some(limit) if scope.raised() => Err(limit),
-            _ => Ok(found),
-        }
-    })
+    guard::run(
+        &effort.limits,
+        || {},
+        move |limits| {
+            let (problem, rows) = copy;
+            let begun = Instant::now();
+            let scope = limits.budget(begun).enter();
+            let traits = Traits::of(&problem, dofs);
+            let spectrum = spectrum(&problem, rows, &part(limits, begun, 0.5)).ok();
+            let existence = existence::of(&problem, &part(limits, begun, 0.8));
+            let found = with_friction!(&problem, p => {
+                let mut found = Patient { problem: p, traits, spectrum, existence }.diagnose();
+                found.put_to_the_test(p, &part(limits, begun, 0.8));
+                found
+            });
+            match limits.reached(begun) {
+                Some(limit) if scope.raised() => Err(limit),
+                _ => Ok(found),
+            }
+        },
+    )
     .and_then(|found| found)
+}
+
+/// A trial is no longer than this, in seconds.
+const TRIAL: f64 = 2.0;
+
+impl Diagnosis {
+    /// Tries what the findings suggest, each for a part of the time, and keeps what solves the problem.
+    fn put_to_the_test<P: Registered + Judged<Status: 'static> + OfAny>(
+        &mut self,
+        problem: &P,
+        limits: &Limits,
+    ) {
+        let each = limits.time_limit.map_or(TRIAL, |t| t / self.suits.len().max(1) as f64);
+        let limits = Limits { time_limit: Some(each.min(TRIAL)), ..limits.clone() };
+        for solver in std::mem::take(&mut self.suits) {
+            // One that does not apply is no advice.
+            let Ok(answer) = Solve::new().solver(solver).limits(limits.clone()).run(problem) else {
+                continue;
+            };
+            self.trials.push(Trial {
+                solver,
+                status: answer.status.name(),
+                relative: answer.verdict.measure.relative,
+                iterations: answer.iterations,
+                seconds: answer.seconds,
+            });
+        }
+        self.trials.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
+        let solved = self.trials.iter().filter(|t| t.status == Status::Solved.name());
+        self.suits = solved.map(|t| t.solver).collect();
+    }
 }
 
 /// A share of what is left of the time.
@@ -109,11 +165,11 @@ pub fn spectrum(problem: &Friction, rows: usize, limits: &Limits) -> Result<Spec
 }
 
 /// What a diagnosis needs of a kind of problem.
-trait Seen<const D: usize>: Linear<D> {
+trait Seen<const D: usize>: Linear<D> + Rows<D> {
     /// W, where it is stored or cheap to form.
     fn delassus(&self, traits: &Traits) -> Option<Cow<'_, Bsr<D>>>;
 
-    /// The bilateral constraints as columns, redundant where they depend on each other.
+    /// The bilateral constraints as columns, redundant where they depend on each other. Rows with bounds are none.
     fn constraints(&self) -> Option<Csc>;
 }
 
@@ -128,9 +184,11 @@ impl<const D: usize> Seen<D> for FrictionLocal<D> {
 
     fn constraints(&self) -> Option<Csc> {
         let b = self.rows.as_ref()?;
-        let m = self.q.len();
-        let r = b.R.triplets().map(|(i, j, x)| (m + i, j, x));
-        Csc::from_triplets(m + b.s.len(), b.s.len(), b.V.triplets().chain(r)).ok()
+        let (m, free) = (self.q.len(), b.bounds.free(b.s.len()));
+        let of_rows = b.R.columns(&free);
+        let r = of_rows.triplets().map(|(i, j, x)| (m + i, j, x));
+        let v = b.V.columns(&free);
+        Csc::from_triplets(m + b.s.len(), free.len(), v.triplets().chain(r)).ok()
     }
 }
 
@@ -146,7 +204,8 @@ impl<const D: usize> Seen<D> for FrictionGlobal<D> {
     }
 
     fn constraints(&self) -> Option<Csc> {
-        Some(self.rows.as_ref()?.G.clone())
+        let b = self.rows.as_ref()?;
+        Some(b.G.columns(&b.bounds.free(b.b.len())))
     }
 }
 
@@ -190,7 +249,13 @@ impl<P: Seen<D> + Registered, const D: usize> Patient<'_, P, D> {
         findings.extend(self.hyperstaticity());
         findings.extend(self.conditioning());
         findings.extend(self.asymmetry());
-        match self.problem.state(Access::Products) {
+        let bounded = self.problem.bounds().map_or(0, |bounds| bounds.bounded().count());
+        if bounded > 0 {
+            let says = format!("{bounded} scalar rows with bounds");
+            let mean = "Limits or motors: sweeps visit them; methods that know no bounds refuse the problem.";
+            findings.push(hard("rows", says, mean, vec!["nsgs", "auto"]));
+        }
+        match self.problem.state(if bounded > 0 { Access::Rows } else { Access::Products }) {
             Ok(state) => {
                 findings.push(self.mass_ratio(&state));
                 findings.push(self.motion(state));
@@ -216,7 +281,7 @@ impl<P: Seen<D> + Registered, const D: usize> Patient<'_, P, D> {
                 suits.push(name);
             }
         }
-        Diagnosis { findings, suits }
+        Diagnosis { findings, suits, trials: vec![] }
     }
 
     fn size(&self) -> Finding {
@@ -416,6 +481,9 @@ impl<P: Seen<D> + Registered, const D: usize> Patient<'_, P, D> {
     fn constraints(&self) -> Option<Finding> {
         let columns = self.problem.constraints()?;
         let p = columns.ncols();
+        if p == 0 {
+            return None;
+        }
         let Some(rank) = rank(&columns, DENSE) else {
             return Some(easy("bilateral", format!("{p} bilateral rows"), ""));
         };

@@ -47,7 +47,7 @@ struct Eliminated<const D: usize> {
 
 impl<const D: usize> Eliminated<D> {
     fn new(problem: &FrictionLocal<D>, b: &RowsLocal) -> Result<Self, SolveError> {
-        let free: Vec<usize> = (0..b.s.len()).filter(|&j| b.bounds.is_free(j)).collect();
+        let free = b.bounds.free(b.s.len());
         let (v, r) = match free.len() == b.s.len() {
             true => (b.V.clone(), b.R.clone()),
             false => {
