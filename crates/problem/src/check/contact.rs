@@ -79,18 +79,21 @@ pub trait Law<const D: usize>: Copy {
 
 /// De Saxcé's `ũ = u + mu‖u_T‖ e_N`, `K = {‖x_T‖ ≤ mu x_N}`, `K* = {mu‖y_T‖ ≤ y_N}`.
 impl<const D: usize> Law<D> for Coulomb {
+    #[inline(always)]
     fn modified_velocity<T: Real>(self, u: &[T; D]) -> [T; D] {
         let mut modified = *u;
         modified[0] = modified[0] + T::from(self.mu) * tangential(u);
         modified
     }
 
+    #[inline(always)]
     fn growth(self) -> f64 {
         1.0 + self.mu
     }
 
     /// With `y = x − ũ` it is ũ where y lies in K, x where y lies in the polar cone, and else `ũ + d n` with the distance d of y
     /// from K and the outward normal n: the difference of x and a projection would round ũ away where x is large.
+    #[inline(always)]
     fn natural_map<T: Real>(self, x: &[T; D], modified: &[T; D]) -> [f64; D] {
         let mu = self.mu;
         let y = difference(x, modified);
@@ -116,6 +119,7 @@ impl<const D: usize> Law<D> for Coulomb {
     }
 
     /// In the half-plane of `(x_N, ‖x_T‖)`: to the ray `(cos φ, sin φ)`, `tan φ = mu`, or to the apex.
+    #[inline(always)]
     fn distance_to_cone<T: Real>(self, x: &[T; D]) -> f64 {
         let mu = self.mu;
         let t = tangential(x);
@@ -130,6 +134,7 @@ impl<const D: usize> Law<D> for Coulomb {
     }
 
     /// With Moreau's decomposition the size of the nearest point of K to −ũ, of which `−u_N` is the part along K's side.
+    #[inline(always)]
     fn distance_to_dual(self, u: &[f64; D]) -> f64 {
         let mu = self.mu;
         let modified = self.modified_velocity(u);
@@ -143,11 +148,13 @@ impl<const D: usize> Law<D> for Coulomb {
     }
 
     /// With mu > 1 a velocity is as far from K* as with mu = 1.
+    #[inline(always)]
     fn opening(self) -> f64 {
         let mu = self.mu;
         ((1.0 + mu * mu) / (1.0 + mu.min(1.0).powi(2))).min(f64::MAX)
     }
 
+    #[inline(always)]
     fn is_at_rest_or_open(self, x: &[f64; D], modified: &[f64; D], error: f64) -> bool {
         let mu = self.mu;
         let y = difference(x, modified);
@@ -157,6 +164,7 @@ impl<const D: usize> Law<D> for Coulomb {
 
     /// `r ∈ K`, `u_N > 0` only where r = 0, and `x_T = −mu x_N u_T/‖u_T‖` where `u_T ≠ 0`. With `u_N ≥ 0` all of that is the same as `K* ∋ ũ ⟂ r ∈ K`, but with much
     /// friction K* is nearly the whole space and K nearly a half space, where far from the law is near in the distance to cones.
+    #[inline(always)]
     fn apart(self, x: &[f64; D], u: &[f64; D]) -> f64 {
         let mu = self.mu;
         let pressed = u[0].max(0.0).min(norm(x));
@@ -171,6 +179,7 @@ impl<const D: usize> Law<D> for Coulomb {
     }
 
     /// The region of the cone in which `x − ũ` lies.
+    #[inline(always)]
     fn status(self, x: &[f64; D], modified: &[f64; D], margin: f64) -> ContactStatus {
         let mu = self.mu;
         let y = difference(x, modified);

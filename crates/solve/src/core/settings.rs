@@ -62,6 +62,9 @@ pub fn from_texts<S: AsRef<str>>(texts: &[S]) -> Result<SettingsMap, String> {
 ///
 /// Errors: an unknown key, with those that exist; a value of the wrong type or out of range, by its key.
 pub fn parse<S: Settings>(map: &SettingsMap) -> Result<S, String> {
+    if map.is_empty() {
+        return Ok(S::default());
+    }
     let known = described::<S>();
     let mut map = map.clone();
     // One key at a time, so that the message can name the key at fault.
