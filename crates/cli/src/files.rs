@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use nonsmooth_io::{About, ProblemFile, beside, format, listed, writer};
 use nonsmooth_problem::Kind;
-use nonsmooth_solve::{Limit, Limits, Status, guard};
+use nonsmooth_solve::{Limit, Limits, Status, guard, spelling};
 use serde_json::json;
 
 use crate::{Exit, output};
@@ -91,7 +91,9 @@ const SHORT: u64 = 1 << 20;
 /// Reads a file within the limits; the limit if it came first.
 pub fn read_within(file: &Path, limits: &Limits) -> Result<Result<ProblemFile, Limit>, String> {
     let length = fs::metadata(file).map_or(0, |m| m.len());
-    let read = |path: &Path| ProblemFile::read(path).map_err(|e| e.to_string());
+    let read = |path: &Path| {
+        ProblemFile::read(path).map_err(|e| format!("{e}{}", meant(path).unwrap_or_default()))
+    };
     if length <= SHORT {
         return read(file).map(Ok);
     }
@@ -100,6 +102,18 @@ pub fn read_within(file: &Path, limits: &Limits) -> Result<Result<ProblemFile, L
         Ok(content) => content.map(Ok),
         Err(limit) => Ok(Err(limit)),
     }
+}
+
+/// `; did you mean …?` of a file that is not there and has one of nearly its name beside it.
+fn meant(missing: &Path) -> Option<String> {
+    if missing.exists() {
+        return None;
+    }
+    let folder = missing.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let names = fs::read_dir(folder).ok()?.flatten();
+    let names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let near = spelling::nearest(&missing.file_name()?.to_string_lossy(), names)?;
+    Some(format!("; did you mean `{}`?", missing.with_file_name(near).display()))
 }
 
 /// When a limit came that came early.

@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use nonsmooth_io::{ProblemFile, StoredPoint, keeper};
-use nonsmooth_problem::{AnyProblem, Problem};
+use nonsmooth_problem::{AnyProblem, Problem, with_problem};
+use nonsmooth_solve::diagnose;
 use nonsmooth_solve::registry::{self, Solves};
 use nonsmooth_solve::settings::{self, SettingsMap};
 use nonsmooth_solve::{Answer, Limit, Limits, Sample, Solve, SolveError, Status};
@@ -315,13 +316,26 @@ pub fn solve(
         match (&e, takes(plan.solver)) {
             (SolveError::UnknownSolver { name, .. }, Some(problems)) => {
                 let kind = problem.kind().name();
+                let tried = instead(problem, plan);
                 format!(
-                    "{file}: solver `{name}` takes {problems} problems only (this file: {kind})"
+                    "{file}: solver `{name}` takes {problems} problems only (this file: {kind}){tried}"
                 )
             }
+            _ if e.is_inapplicable() => format!("{file}: {e}{}", instead(problem, plan)),
             _ => format!("{file}: {e}"),
         }
     })
+}
+
+/// What solved the problem on trial where the solver asked for does not apply.
+fn instead(problem: &AnyProblem, plan: &Plan) -> String {
+    let limits = files::left(&plan.limits, plan.begun);
+    let solving = with_problem!(problem, p => diagnose::instead(p, plan.solver, &limits));
+    let names: Vec<_> = solving.iter().map(|name| format!("--solver {name}")).collect();
+    match &names[..] {
+        [] => String::new(),
+        names => format!("; on trial it was solved by {}", names.join(", ")),
+    }
 }
 
 fn name(file: &Path) -> String {

@@ -171,3 +171,39 @@ fn one_bad_file_does_not_not_keep_the_others_from_running() {
     let run = folder.run("info missing.hdf5 wall.hdf5").refused(&["missing.hdf5"]);
     assert!(run.stdout.starts_with("wall.hdf5: "));
 }
+
+/// A slip of a solver's, a setting's or a file's name is recognised.
+#[test]
+fn slips_are_answered_by_what_was_meant() {
+    let folder = Folder::with_problems();
+    for (command, meant) in [
+        ("solve box.hdf5 --solver nsg", "did you mean `nsgs`?"),
+        ("solve box.hdf5 --solver newton-ac", "did you mean `newton_ac`?"),
+        ("solve box.hdf5 --solver condense/nsg", "did you mean `condense/nsgs`?"),
+        ("solve box.hdf5 --solver nsgs --set omgea=0.9", "did you mean `omega`?"),
+        ("solve bocks.hdf5", "did you mean `box.hdf5`?"),
+        ("solve box.hdf --solver nsgs", "did you mean `box.hdf5`?"),
+    ] {
+        let said = folder.run(command).exits(2).stderr;
+        assert!(said.contains(meant), "{command}: {said}");
+    }
+}
+
+/// Where a method does not apply, what is suggested has solved the problem.
+#[test]
+fn suggestions_in_place_of_a_refused_solver_solve_the_problem() {
+    let folder = Folder::with_problems();
+    folder.run("gen box_lcp --set n=12 --out box.toml").exits(0);
+    folder.run("gen lcp --set class=kkt --set n=12 --out kkt.toml").exits(0);
+    for command in ["solve box.toml --solver lemke", "solve kkt.toml --solver psor"] {
+        let said = folder.run(command).exits(2).stderr;
+        let (_, tried) = said.split_once("on trial it was solved by ").expect(&said);
+        let file = command.split(' ').nth(1).unwrap();
+        let names: Vec<_> = tried.split("--solver ").skip(1).collect();
+        assert!(!names.is_empty(), "{said}");
+        for name in names {
+            let name = name.trim().trim_end_matches(',');
+            folder.run(&format!("solve {file} --solver {name} --quiet")).exits(0);
+        }
+    }
+}

@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::contact::existence;
 use crate::contact::form::{Access, Linear, Rows};
 use crate::core::guard;
-use crate::core::register::Registered;
+use crate::core::register::{Registered, Solves};
 use crate::registry;
 use crate::{Limit, Limits, Solve, Status};
 
@@ -130,6 +130,44 @@ impl Diagnosis {
         let solved = self.trials.iter().filter(|t| t.status == Status::Solved.name());
         self.suits = solved.map(|t| t.solver).collect();
     }
+}
+
+/// Trials of solvers in place of one that refused the problem take no longer than this together, in seconds, and name so many at most.
+const INSTEAD: f64 = 1.0;
+const MOST_INSTEAD: usize = 3;
+
+/// Solvers that solve the problem where `refused` does not apply: the same method behind a prefix, others of its family, `auto`; each was tried, for a quarter
+/// of a second at most.
+pub fn instead<P: Registered + Judged<Status: 'static> + OfAny>(
+    problem: &P,
+    refused: &str,
+    limits: &Limits,
+) -> Vec<String> {
+    let begun = Instant::now();
+    let method = refused.rsplit('/').next().unwrap_or(refused);
+    let abouts = registry::abouts::<P>();
+    let family = abouts.iter().find(|a| a.name == method).map(|a| a.family);
+    let behind = registry::composed_names::<P>();
+    let behind = behind.into_iter().filter(|n| n.rsplit('/').next() == Some(method));
+    let kin = abouts.iter().filter(|a| Some(a.family) == family && a.solves == Solves::Law);
+    let candidates = behind
+        .chain(kin.map(|a| a.name.to_owned()))
+        .chain([registry::DEFAULT.to_owned()])
+        .filter(|name| name != refused);
+    let total = limits.time_limit.unwrap_or(INSTEAD).min(INSTEAD);
+    let mut solving: Vec<String> = vec![];
+    for name in candidates {
+        let left = total - begun.elapsed().as_secs_f64();
+        if left <= 0.0 || solving.len() >= MOST_INSTEAD {
+            break;
+        }
+        let limits = Limits { time_limit: Some(left.min(0.25 * INSTEAD)), ..limits.clone() };
+        let answer = Solve::new().solver(&name).limits(limits).run(problem);
+        if answer.is_ok_and(|a| a.is_solved()) && !solving.contains(&name) {
+            solving.push(name);
+        }
+    }
+    solving
 }
 
 /// A share of what is left of the time.

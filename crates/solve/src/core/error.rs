@@ -11,10 +11,12 @@ pub enum SolveError {
     #[error(transparent)]
     Problem(#[from] ProblemError),
     /// No solver of that name exists for this kind of problem.
-    #[error("unknown solver `{name}` for this kind of problem; there are: {known}")]
+    #[error("unknown solver `{name}` for this kind of problem{meant}; there are: {known}")]
     UnknownSolver {
         /// The name asked for.
         name: String,
+        /// `; did you mean …?`, or nothing.
+        meant: String,
         /// The names that exist.
         known: String,
     },

@@ -13,5 +13,6 @@ pub(crate) mod reformulation;
 pub(crate) mod register;
 pub mod settings;
 pub(crate) mod solver;
+pub mod spelling;
 pub mod trace;
 pub(crate) mod via;

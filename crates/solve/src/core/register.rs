@@ -12,6 +12,7 @@ use crate::core::error::SolveError;
 use crate::core::guarded::Guarded;
 use crate::core::settings::{Setting, Settings, SettingsMap, described, parse};
 use crate::core::solver::Solver;
+use crate::core::spelling::meant;
 
 /// The solver that is used when none is named.
 pub const DEFAULT: &str = "auto";
@@ -328,6 +329,7 @@ pub(crate) fn bare<P: Registered>(
     };
     made.ok_or_else(|| SolveError::UnknownSolver {
         name: name.into(),
+        meant: meant(name, solver_names::<P>()),
         known: solver_names::<P>().join(", "),
     })?
     .map_err(|problem| SolveError::Settings { solver: name.into(), problem })

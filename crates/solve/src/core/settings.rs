@@ -5,6 +5,8 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Number, Value};
 
+use crate::core::spelling::meant;
+
 /// Settings by key, as they come from a command line or a file.
 pub type SettingsMap = Map<String, Value>;
 
@@ -71,7 +73,8 @@ pub fn parse<S: Settings>(map: &SettingsMap) -> Result<S, String> {
     for (key, value) in &mut map {
         let Some(setting) = known.iter().find(|s| s.key == *key) else {
             let keys: Vec<_> = known.iter().map(|s| s.key.as_str()).collect();
-            return Err(format!("unknown key `{key}`; there are: {}", keys.join(", ")));
+            let meant = meant(key, &keys);
+            return Err(format!("unknown key `{key}`{meant}; there are: {}", keys.join(", ")));
         };
         // 1e3 where a whole number is due is that whole number.
         if let (true, Some(x)) = (setting.default.is_u64(), value.as_f64())

@@ -155,13 +155,13 @@ impl Rows {
         for (i, &d) in self.diagonal.iter().enumerate() {
             if is_free(bounds, i) && d == 0.0 {
                 return Err(SolveError::needs(
-                    "a nonzero diagonal of M at free variables (rpsor and rpgs do without)",
+                    "a nonzero diagonal of M at free variables",
                     format!("M[{i}, {i}] = 0"),
                 ));
             }
             if !is_free(bounds, i) && !is_fixed(bounds, i) && d <= 0.0 {
                 return Err(SolveError::needs(
-                    "a positive diagonal of M (rpsor and rpgs do with zeros)",
+                    "a positive diagonal of M",
                     format!("M[{i}, {i}] = {d}"),
                 ));
             }
