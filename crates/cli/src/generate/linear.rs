@@ -1,12 +1,14 @@
 //! Linear complementarity problems by their settings, for `nonsmooth gen`.
 
+use std::borrow::Cow;
+
 use nonsmooth_io::{ProblemFile, StoredPoint};
 use nonsmooth_problem::planted::{
     JournalBearing, Obstacle, PlantedLcp, PlantedMlcp, Recipe, Torsion,
 };
 use nonsmooth_problem::{AnyPoint, AnyProblem};
 use nonsmooth_solve::settings::{Setting, Settings, SettingsMap, described, parse};
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -98,9 +100,20 @@ fn solved((problem, point): (impl Into<AnyProblem>, impl Into<AnyPoint>)) -> Pro
 }
 
 /// A recipe as settings.
-#[derive(Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Default, Serialize, Deserialize)]
 #[serde(transparent)]
 struct Of<R>(R);
+
+/// The recipe's own schema: a derived one would refer to it, and have no properties.
+impl<R: JsonSchema> JsonSchema for Of<R> {
+    fn schema_name() -> Cow<'static, str> {
+        R::schema_name()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        R::json_schema(generator)
+    }
+}
 
 impl<R: Recipe + DeserializeOwned + Serialize + JsonSchema + Default> Settings for Of<R> {
     fn validate(&self) -> Result<(), String> {
