@@ -193,7 +193,7 @@ fn go_on_watched(
     let worker = WorkerCommand { program, arguments: vec![WORKER.into()] };
     let (inputs, mistakes) = inputs(&[folder.into()]);
     assert!(mistakes.is_empty(), "{mistakes:?}");
-    let setup = Setup { worker, inputs, plan: plan.clone(), grace: 3.0 };
+    let setup = Setup { worker, inputs, plan: plan.clone(), named: true, grace: 3.0 };
     let cancel = AtomicBool::new(false);
     run(&setup, &WithFaulty, &there, &mut journal, &cancel, watch)
 }

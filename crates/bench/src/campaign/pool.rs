@@ -27,6 +27,9 @@ pub struct Setup {
     pub inputs: Vec<Input>,
     /// The rest.
     pub plan: Plan,
+    /// Whether a solver that takes no problems of a kind is recorded there as having refused, as where it was asked for by its name; else its runs are no part
+    /// of the campaign.
+    pub named: bool,
     /// Seconds beyond its time limit after which a solve that does not stop is ended; the time limit itself, where that
     /// is longer. A solver looks at the clock after a step only.
     pub grace: f64,
@@ -48,6 +51,15 @@ pub enum Event<'a> {
         all: usize,
         /// The problem; its [`error`](Problem::error) says if it cannot be used.
         problem: &'a Problem,
+    },
+    /// What is about to begin.
+    Planned {
+        /// Problems that can be used.
+        problems: usize,
+        /// Runs to make.
+        runs: usize,
+        /// How long these take at most: all to their time limits.
+        at_most: Duration,
     },
     /// A run has ended.
     Ended {
@@ -127,11 +139,15 @@ pub fn run(
             continue;
         }
         for (label, kinds, tolerance) in runs_of(&setup.plan, &kinds) {
+            let takes = kinds.iter().any(|kind| kind.name() == problem.kind);
+            if !takes && !setup.named {
+                continue;
+            }
             let run = blank(journal.campaign(), problem, label, tolerance);
             summary.all += 1;
             if let Some(ending) = before.get(&run.key()) {
                 summary.count(*ending);
-            } else if kinds.iter().all(|kind| kind.name() != problem.kind) {
+            } else if !takes {
                 let message = Some(format!("takes no {} problems", problem.kind));
                 refused.push(Run { ending: Ending::Refused, message, ..run });
             } else {
@@ -140,6 +156,12 @@ pub fn run(
             }
         }
     }
+    let limit = setup.plan.time_limit * jobs.len() as f64 / lanes.len().max(1) as f64;
+    watch(Event::Planned {
+        problems: described.len() - unreadable,
+        runs: jobs.len(),
+        at_most: Duration::try_from_secs_f64(limit).unwrap_or(Duration::MAX),
+    });
     let mut clock = Clock::new(jobs.iter().map(|((run, ..), _)| run), lanes.len());
     let mut ended = |run: Run, took: Option<Duration>, summary: &mut Summary| {
         journal.append(&Line::Run(Box::new(run.clone())))?;

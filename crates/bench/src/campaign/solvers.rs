@@ -32,11 +32,15 @@ impl Solvers for Registry {
 }
 
 impl Registry {
-    /// The names of all solvers of all kinds of problem, each once; with `variants` also the settings that the registry
-    /// holds worth comparing.
-    pub fn labels(variants: bool) -> Vec<String> {
-        fn of<P: Registered>(variants: bool, all: &mut Vec<String>) {
-            for name in registry::solver_names::<P>() {
+    /// The names of the solvers of all kinds of problem, each once: with `composed` also those behind a prefix, as `condense/nsgs`; with `variants` also the
+    /// settings that the registry holds worth comparing.
+    pub fn labels(composed: bool, variants: bool) -> Vec<String> {
+        fn of<P: Registered>((composed, variants): (bool, bool), all: &mut Vec<String>) {
+            let names = match composed {
+                true => registry::solver_names::<P>(),
+                false => registry::abouts::<P>().iter().map(|a| a.name.to_owned()).collect(),
+            };
+            for name in names {
                 let about = registry::about::<P>(&name).filter(|_| variants);
                 let settings = about.map_or(&[][..], |a| a.variants);
                 let labels = settings.iter().map(|s| format!("{name}:{s}"));
@@ -48,14 +52,14 @@ impl Registry {
             }
         }
         let mut all = vec![];
-        of::<FrictionLocal<3>>(variants, &mut all);
-        of::<FrictionLocal<2>>(variants, &mut all);
-        of::<FrictionGlobal<3>>(variants, &mut all);
-        of::<FrictionGlobal<2>>(variants, &mut all);
-        of::<Lcp>(variants, &mut all);
-        of::<Mlcp>(variants, &mut all);
-        of::<BoxLcp>(variants, &mut all);
-        of::<Hlcp>(variants, &mut all);
+        of::<FrictionLocal<3>>((composed, variants), &mut all);
+        of::<FrictionLocal<2>>((composed, variants), &mut all);
+        of::<FrictionGlobal<3>>((composed, variants), &mut all);
+        of::<FrictionGlobal<2>>((composed, variants), &mut all);
+        of::<Lcp>((composed, variants), &mut all);
+        of::<Mlcp>((composed, variants), &mut all);
+        of::<BoxLcp>((composed, variants), &mut all);
+        of::<Hlcp>((composed, variants), &mut all);
         all
     }
 }
@@ -133,9 +137,10 @@ mod tests {
 
     #[test]
     fn the_registry_lists_every_name_once() {
-        let plain = Registry::labels(false);
-        assert!(plain.contains(&"nsgs".into()) && plain.contains(&"condense/extragradient".into()));
-        let all = Registry::labels(true);
+        let plain = Registry::labels(false, false);
+        assert!(plain.contains(&"nsgs".into()) && plain.iter().all(|name| !name.contains('/')));
+        let all = Registry::labels(true, true);
+        assert!(all.contains(&"condense/extragradient".into()));
         assert!(all.contains(&"nsgs:local=quartic".into()));
         let unique: std::collections::HashSet<_> = all.iter().collect();
         assert_eq!(unique.len(), all.len());

@@ -26,7 +26,7 @@ pub struct Args {
 
 const EXAMPLES: &str = "\
 Examples:
-  nonsmooth bench run problems/ --out runs.jsonl              all solvers, 1e-4 and 1e-8, 10 s each
+  nonsmooth bench run problems/ --out runs.jsonl              the solvers that apply, 1e-4 and 1e-8, 10 s each
   nonsmooth bench run problems/ --out runs.jsonl --resume     go on where it was ended
   nonsmooth bench report runs.jsonl --out report.html         profiles, tables, all runs
   nonsmooth bench compare old.jsonl new.jsonl                 what got slower or unsolved";

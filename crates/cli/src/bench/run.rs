@@ -28,9 +28,12 @@ pub struct Args {
     #[arg(required = true, value_name = "FOLDER")]
     problems: Vec<PathBuf>,
     /// A solver of `nonsmooth list`, perhaps with settings, as auto or nsgs:omega=0.9,local=quartic; may be given
-    /// several times [default: all solvers]
+    /// several times [default: the solvers that take the kind of each problem, without prefixes]
     #[arg(long = "solver", value_name = "NAME[:KEY=VALUE,...]")]
     solvers: Vec<String>,
+    /// Without --solver: also the solvers behind a prefix, as condense/nsgs
+    #[arg(long, conflicts_with = "solvers")]
+    composed: bool,
     /// Without --solver: also the settings of each solver that are worth comparing
     #[arg(long, conflicts_with = "solvers")]
     variants: bool,
@@ -119,7 +122,8 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         program: this_program().map_err(|e| format!("this program: {e}"))?,
         arguments: super::WORKER.iter().map(Into::into).collect(),
     };
-    let setup = Setup { worker, inputs, plan, grace: Setup::GRACE };
+    let named = !args.solvers.is_empty();
+    let setup = Setup { worker, inputs, plan, named, grace: Setup::GRACE };
     let cancel = interrupt::flag();
     let mut progress = Progress::new(!args.quiet);
     let summary = campaign(&setup, &Registry, &there, &mut journal, &cancel, &mut |event| {
@@ -168,7 +172,7 @@ fn plan(args: &Args) -> Result<(Plan, Exit), String> {
         }
     }
     if args.solvers.is_empty() {
-        solvers = Registry::labels(args.variants);
+        solvers = Registry::labels(args.composed, args.variants);
     } else if solvers.is_empty() {
         return Err("--solver: expected a solver that exists, found none".into());
     }
@@ -304,6 +308,10 @@ impl Progress {
                 }
                 ("problems", done, all, problem.name.clone())
             }
+            Event::Planned { problems, runs, at_most } => {
+                self.plan(problems, runs, at_most);
+                return;
+            }
             Event::Ended { done, all, run, left } => {
                 let left = left.map_or_else(String::new, |left| format!("{} left, ", clock(left)));
                 let ending = run.ending.name();
@@ -328,6 +336,21 @@ impl Progress {
             // A campaign does not end because nobody reads of its progress.
             let _ = writeln!(std::io::stderr(), "{what} {done}/{all}, {message}");
         }
+    }
+
+    /// Says what is about to begin; how long it is likely to take, the bar says as soon as there are runs to go by.
+    fn plan(&self, problems: usize, runs: usize, at_most: Duration) {
+        if self.bar.is_none() && !self.lines {
+            return;
+        }
+        let (problems, runs) = (count(problems, "problem"), count(runs, "run"));
+        let at_most = clock(at_most);
+        self.aside(&|| {
+            let _ = writeln!(
+                std::io::stderr(),
+                "{problems}, {runs}, at most {at_most} if every one goes to its time limit"
+            );
+        });
     }
 
     /// Prints something while the bar is out of the way.
