@@ -30,7 +30,7 @@ pub fn check(problems: &[PathBuf], path: &Path, as_json: bool) -> Result<Exit, S
     let claim = read(path)?;
     let claim = &claim;
     Ok(files::each(problems, as_json, |_, file| {
-        let problem = &nonsmooth_io::read(file).map_err(|e| e.to_string())?;
+        let problem = &files::read(file)?.problem;
         let found = match (claim, problem) {
             (Claim::None(value), _) => refutes(problem, value, path)?,
             (Claim::Solution(t), _) => solves(problem, t),

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use nonsmooth_io::ProblemFile;
 use nonsmooth_problem::check::Judged;
 use serde_json::json;
 
@@ -49,7 +48,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     }
     let tol = files::tolerance(args.tol)?;
     Ok(files::each(&args.files, args.json, |_, file| {
-        let content = ProblemFile::read(file).map_err(|e| e.to_string())?;
+        let content = files::read(file)?;
         let Some(stored) = &content.solution else {
             let (file, place) = (file.display(), files::about(file)?.solution);
             return Err(format!("{file}: {place}: expected a solution to check, found none"));

@@ -2,10 +2,14 @@
 
 use std::collections::HashSet;
 use std::fs::{self, OpenOptions};
+use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::time::Instant;
 
-use nonsmooth_io::{About, ProblemFile, beside, format, listed, writer};
+use nonsmooth_io::{
+    About, FORMATS, Format, ProblemFile, beside, format, listed, named, sniffed, writer,
+};
 use nonsmooth_problem::Kind;
 use nonsmooth_solve::{Limit, Limits, Status, guard, spelling};
 use serde_json::json;
@@ -38,14 +42,92 @@ pub fn help(what: &str, kinds: impl Fn(Kind) -> bool) -> String {
     format!("{what}: {}", listed(kinds))
 }
 
-/// What the format of a file that was read is.
-pub fn about(file: &Path) -> Result<&'static About, String> {
-    format(file).map(|format| format.about()).map_err(|e| e.to_string())
+/// The name that stands for a standard stream.
+const STREAM: &str = "-";
+/// What the standard input is called in messages.
+const INPUT: &str = "standard input";
+
+/// Whether a name stands for a standard stream: where files are read the input, where they are written the output.
+pub fn is_stream(path: &Path) -> bool {
+    path.as_os_str() == STREAM
 }
 
-/// The file at `path` can hold a problem of a kind.
-pub fn holds(option: &str, path: &Path, kind: Kind) -> Result<(), String> {
-    writer(path, kind).map(|_| ()).map_err(|e| format!("{option} {e}"))
+/// All that comes on the standard input, which is read once.
+fn input() -> Result<&'static [u8], String> {
+    static BYTES: OnceLock<Result<Vec<u8>, String>> = OnceLock::new();
+    let read = || {
+        let mut bytes = vec![];
+        let done = std::io::stdin().lock().read_to_end(&mut bytes);
+        done.map(|_| bytes).map_err(|e| format!("{INPUT}: expected a problem, found: {e}"))
+    };
+    BYTES.get_or_init(read).as_deref().map_err(Clone::clone)
+}
+
+/// Reads a file, or the standard input.
+pub fn read(file: &Path) -> Result<ProblemFile, String> {
+    if is_stream(file) {
+        return ProblemFile::parse(INPUT, input()?).map_err(|e| e.to_string());
+    }
+    ProblemFile::read(file).map_err(|e| format!("{e}{}", meant(file).unwrap_or_default()))
+}
+
+/// What the format of a file that was read is.
+pub fn about(file: &Path) -> Result<&'static About, String> {
+    let format = match is_stream(file) {
+        true => sniffed(Path::new(INPUT), input()?),
+        false => format(file),
+    };
+    format.map(|format| format.about()).map_err(|e| e.to_string())
+}
+
+/// A format by its extension, as `--format` names it.
+pub fn format_named(extension: &str) -> Result<&'static dyn Format, String> {
+    named(extension).ok_or_else(|| {
+        let known = FORMATS.into_iter().filter(|f| !f.about().writes.is_empty());
+        let known: Vec<_> = known.flat_map(|f| f.about().extensions).copied().collect();
+        format!("expected one of {}", known.join(", "))
+    })
+}
+
+/// The format in which a problem of a kind is written to `path`: the one that is asked for, or that of the name. To the standard output: that of the
+/// file that was read, or the first that can hold the problem.
+pub fn target_format(
+    option: &str,
+    path: &Path,
+    asked: Option<&'static dyn Format>,
+    kind: Kind,
+    read: Option<&Path>,
+) -> Result<&'static dyn Format, String> {
+    let writes = |format: &&dyn Format| format.about().writes.contains(&kind);
+    if let Some(format) = asked {
+        return Some(format).filter(writes).ok_or_else(|| {
+            let (name, kind) = (format.about().name, kind.name());
+            let path = path.display();
+            format!("{option} {path}: expected a format that holds a problem {kind}, found {name}")
+        });
+    }
+    if !is_stream(path) {
+        return writer(path, kind).map_err(|e| format!("{option} {e}"));
+    }
+    let same = read.and_then(|file| about(file).ok()).and_then(|about| named(about.extensions[0]));
+    // Matrix Market has several files.
+    let one_file = |format: &&dyn Format| writes(format) && format.about().one_file;
+    let found = same.filter(one_file).or_else(|| FORMATS.into_iter().find(one_file));
+    found.ok_or_else(|| format!("{option} {STREAM}: expected a format that holds {}", kind.name()))
+}
+
+/// Writes a file, or to the standard output.
+pub fn write(
+    path: &Path,
+    format: &'static dyn Format,
+    content: &ProblemFile,
+) -> Result<(), String> {
+    if !is_stream(path) {
+        return format.write(path, content).map_err(|e| e.to_string());
+    }
+    let bytes = format.to_bytes(Path::new("standard output"), content);
+    output::print_bytes(&bytes.map_err(|e| e.to_string())?);
+    Ok(())
 }
 
 /// A whole number, written as `1000` or `1e3`.
@@ -91,9 +173,6 @@ const SHORT: u64 = 1 << 20;
 /// Reads a file within the limits; the limit if it came first.
 pub fn read_within(file: &Path, limits: &Limits) -> Result<Result<ProblemFile, Limit>, String> {
     let length = fs::metadata(file).map_or(0, |m| m.len());
-    let read = |path: &Path| {
-        ProblemFile::read(path).map_err(|e| format!("{e}{}", meant(path).unwrap_or_default()))
-    };
     if length <= SHORT {
         return read(file).map(Ok);
     }
@@ -168,6 +247,9 @@ pub fn targets(
     files: &[PathBuf],
     extension: Option<&str>,
 ) -> Result<Vec<PathBuf>, String> {
+    if is_stream(to) && files.len() == 1 {
+        return Ok(vec![to.into()]);
+    }
     let is_folder = to.is_dir() || to.to_string_lossy().ends_with(std::path::is_separator);
     if !is_folder {
         if files.len() > 1 {
@@ -211,6 +293,9 @@ pub fn folder(option: &str, path: &Path) -> Result<(), String> {
 
 /// A file can be put at `path`: found out before hours of work, not after.
 pub fn writable(option: &str, path: &Path) -> Result<(), String> {
+    if is_stream(path) {
+        return Ok(());
+    }
     let refused = |e| refusal(option, path, "a file that can be written", e);
     match fs::metadata(path) {
         Ok(there) if !there.is_file() => {

@@ -4,10 +4,15 @@
 //! [`files`] (input and output files), [`report`] (verdicts as text and JSON), [`output`] (the two streams),
 //! [`progress`], [`interrupt`] and [`plot`].
 
+mod answer;
 mod bench;
 mod certificate;
 mod check;
+mod completions;
+mod convert;
 mod diagnose;
+mod draw;
+mod enumerate;
 mod exists;
 mod files;
 mod generate;
@@ -24,7 +29,7 @@ mod solve;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use nonsmooth_io::listed;
 use nonsmooth_problem::Kind;
 
@@ -66,6 +71,8 @@ Examples:
   nonsmooth solve wall.hdf5 --out solved.hdf5        solve it and keep the solution
   nonsmooth check solved.hdf5                        have the solution judged again
   nonsmooth solve rectifier.toml --trace pivots.json a linear complementarity problem, and what the method did
+  nonsmooth convert solved.hdf5 contacts.csv         the solution as a table, or a problem in another format
+  nonsmooth draw solved.hdf5                         matrices, sizes of the impulses, friction cones
   nonsmooth list                                     the solvers and their settings
   nonsmooth bench run problems/ --out runs.jsonl     compare solvers on folders of problems
 
@@ -85,7 +92,10 @@ enum Command {
     Diagnose(diagnose::Args),
     List(list::Args),
     Gen(generate::Args),
+    Convert(convert::Args),
+    Draw(draw::Args),
     Bench(bench::Args),
+    Completions(completions::Args),
 }
 
 fn main() -> ExitCode {
@@ -106,7 +116,10 @@ fn main() -> ExitCode {
         Command::Diagnose(args) => diagnose::run(&args),
         Command::List(args) => list::run(&args),
         Command::Gen(args) => generate::run(&args),
+        Command::Convert(args) => convert::run(&args),
+        Command::Draw(args) => draw::run(&args),
         Command::Bench(args) => bench::run(&args),
+        Command::Completions(args) => Ok(completions::run(&args, Cli::command())),
     };
     let exit = done.unwrap_or_else(|mistake| {
         output::error(&mistake);

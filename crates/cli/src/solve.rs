@@ -5,18 +5,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use nonsmooth_io::{ProblemFile, StoredPoint, keeper};
+use nonsmooth_io::{Format, ProblemFile, StoredPoint, keeper};
 use nonsmooth_problem::{AnyProblem, Problem, with_problem};
 use nonsmooth_solve::diagnose;
 use nonsmooth_solve::registry::{self, Solves};
 use nonsmooth_solve::settings::{self, SettingsMap};
+use nonsmooth_solve::trace::Trace;
 use nonsmooth_solve::{Answer, Limit, Limits, Sample, Solve, SolveError, Status};
 use serde_json::{Value, json};
 
 use crate::kinds::{self, Class, alike, start, takes};
 use crate::progress::Bar;
 use crate::report::{self, row};
-use crate::{Exit, files, interrupt, output, plot};
+use crate::{Exit, answer, enumerate, files, interrupt, output, plot};
 
 /// Solve problems.
 ///
@@ -51,12 +52,23 @@ pub struct Args {
     /// solution of another file (or its /guesses/1) of the same size, with =DIRECTORY from the file of the same name there
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
     warm_start: Option<Option<PathBuf>>,
-    /// Write the problem with its /solution; a directory (existing or ending in `/`) for several files.
-    /// A new file holds the problem, its info, guesses and solution, and nothing else of the input; of the input
-    /// itself, which may be named, only /solution changes. Linear complementarity problems are written as TOML (.toml), or
-    /// as Matrix Market (.mtx) with vectors beside
+    /// Print the whole solution (impulses r and velocities u of each contact; z and w), however large; without this, reports of
+    /// at most 20 contacts or variables have it. With --json: as `solution`
+    #[arg(long)]
+    solution: bool,
+    /// List every solution of an LCP or MLCP of at most 40 pairs, isolated ones and families, by enumeration of the complementary
+    /// cones; with more than some 20 pairs this may take long (--time-limit)
+    #[arg(long, conflicts_with_all = ["solver", "settings", "warm_start", "out", "plot", "trace", "certificate", "max_iter"])]
+    all_solutions: bool,
+    /// Write the problem with its solution, in the format of the extension: FCLIB (.hdf5), TOML (.toml) or Matrix Market (.mtx,
+    /// vectors beside); .csv is a table of the solution alone. A directory (existing or ending in `/`) for several files, `-` for the
+    /// standard output. A new file holds the problem, its info, guesses and solution, and nothing else of the input; of the input
+    /// itself, which may be named, only the solution changes
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// The format of --out, whatever its name: hdf5, toml, mtx or csv [default: that of the extension; of `-`, that of the input]
+    #[arg(long, value_name = "EXTENSION", requires = "out", value_parser = files::format_named)]
+    format: Option<&'static dyn Format>,
     /// Draw the residual against iterations and time (SVG), and the pivots or the central path of methods that record
     /// them; a directory for several files
     #[arg(long, value_name = "FILE.svg")]
@@ -85,6 +97,9 @@ Examples:
   nonsmooth solve *.hdf5 --out solved/ --json > results.jsonl
   nonsmooth solve step2.hdf5 --warm-start=solved/step1.hdf5
   nonsmooth solve contact.toml --out solved.toml --trace pivots.json --plot pivots.svg
+  nonsmooth solve rectifier.toml --out table.csv
+  nonsmooth solve game.toml --all-solutions
+  nonsmooth gen lcp --out - | nonsmooth solve - --solution
   nonsmooth solve impossible.toml --certificate proof.json   # then: check impossible.toml --certificate proof.json
 
 Exit codes: 0 all solved; 1 some not solved; 2 some file or option at fault.";
@@ -135,16 +150,20 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             Ok(content) => content,
             Err(limit) => return Ok(files::late(file, args.json, limit, files::WHILE_READ)),
         };
+        if args.all_solutions {
+            return enumerate::run(file, &content, &files::left(&plan.limits, begun), args.json);
+        }
         let kind = content.problem.kind();
-        targets.out.map_or(Ok(()), |path| files::holds("--out", path, kind))?;
+        let format = |path| files::target_format("--out", path, args.format, kind, Some(file));
+        let out = targets.out.map(|path| Ok::<_, String>((path, format(path)?))).transpose()?;
         let guess = match &args.warm_start {
             None => None,
             Some(from) => Some(guess(from.as_deref(), file, &content)?),
         };
         let plan = Plan { begun, ..plan.clone() };
         let solved = solve(file, &content.problem, guess.as_ref(), &plan)?;
-        Done::new(file, &content.problem, &plan, &solved, args)
-            .keep(file, content, solved, &plan, targets)
+        let content = with_solution(content, &solved);
+        Done::new(file, &content, &plan, &solved, args).keep(file, content, solved, out, targets)
     };
     Ok(files::each(&args.files, args.json, one_file))
 }
@@ -164,7 +183,7 @@ fn guess(from: Option<&Path>, file: &Path, content: &ProblemFile) -> Result<Stor
         });
     };
     let path = other_file(from, file);
-    let other = ProblemFile::read(&path).map_err(|e| format!("--warm-start {e}"))?;
+    let other = files::read(&path).map_err(|e| format!("--warm-start {e}"))?;
     let refused = |expected: String, found: &str| {
         format!("--warm-start {}: expected {expected}, found {found}", path.display())
     };
@@ -217,14 +236,18 @@ struct Done {
     record: Option<String>,
     /// The certificate as JSON, where there is one.
     proof: Option<String>,
+    /// What the plot shows.
+    title: String,
+    tolerance: f64,
 }
 
 impl Done {
-    fn new(file: &Path, problem: &AnyProblem, plan: &Plan, solved: &Solved, args: &Args) -> Self {
+    fn new(file: &Path, content: &ProblemFile, plan: &Plan, solved: &Solved, args: &Args) -> Self {
+        let problem = &content.problem;
         let report = match (args.json, args.quiet) {
-            (true, _) => json_line(file, problem, plan, solved),
+            (true, _) => json_line(file, content, plan, solved, args.solution),
             (false, true) => String::new(),
-            (false, false) => text(file, problem, plan, solved),
+            (false, false) => text(file, content, plan, solved, args),
         };
         let status = &solved.status;
         let record = args.trace.as_ref().map(|_| {
@@ -246,7 +269,9 @@ impl Done {
             all.insert("certificate".into(), certificate);
             format!("{}\n", json!(all))
         });
-        Self { report, record, proof }
+        let (title, tolerance) =
+            (format!("{} on {}", plan.solver, name(file)), plan.limits.tolerance);
+        Self { report, record, proof, title, tolerance }
     }
 
     /// Writes the files asked for and prints the report.
@@ -255,14 +280,12 @@ impl Done {
         file: &Path,
         content: ProblemFile,
         solved: Solved,
-        plan: &Plan,
+        out: Option<(&Path, &'static dyn Format)>,
         targets: Target,
     ) -> Result<Exit, String> {
-        let Self { report, record, proof } = self;
+        let Self { report, record, proof, title, tolerance } = self;
         let pictures = || {
             if let Some(path) = targets.plot {
-                let title = format!("{} on {}", plan.solver, name(file));
-                let tolerance = plan.limits.tolerance;
                 let svg = plot::svg(&title, &solved.history, &solved.trace, tolerance)?;
                 files::write_text("--plot", path, &svg)?;
             }
@@ -276,26 +299,36 @@ impl Done {
             Ok(())
         };
         // Files first: whoever reads the report may be gone. But a file that fails must not cost the report.
-        let kept = targets.out.map_or(Ok(()), |path| keep(file, path, content, &solved));
+        let kept = out.map_or(Ok(()), |(path, format)| keep(file, path, format, &content));
         let kept = kept.and_then(|()| pictures());
-        output::print(&report);
+        match out {
+            // The standard output is the file's.
+            Some((path, _)) if files::is_stream(path) => output::remark(&report),
+            _ => output::print(&report),
+        }
         kept.map(|()| Exit::solved(solved.is_solved()))
     }
 }
 
 /// Writes a problem that was read from `file` with its solution.
-fn keep(file: &Path, path: &Path, content: ProblemFile, solved: &Solved) -> Result<(), String> {
-    let content = with_solution(content, solved);
-    let in_place = files::same(file, path);
-    let written = if in_place { content.write_solution(path) } else { content.write(path) };
-    written.map_err(|e| e.to_string())
+fn keep(
+    file: &Path,
+    path: &Path,
+    format: &'static dyn Format,
+    content: &ProblemFile,
+) -> Result<(), String> {
+    match files::same(file, path) {
+        true => format.write_solution(path, content).map_err(|e| e.to_string()),
+        false => files::write(path, format, content),
+    }
 }
 
 /// What a file holds after a solve.
 pub fn with_solution(content: ProblemFile, solved: &Solved) -> ProblemFile {
     let (point, velocity) = (solved.point.clone(), solved.verdict.velocity.clone());
-    let solution = Some(StoredPoint::new(&content.problem, point, velocity));
-    ProblemFile { solution, ..content }
+    let stored = StoredPoint::new(&content.problem, point, velocity);
+    let statuses = solved.verdict.statuses.clone();
+    ProblemFile { solution: Some(StoredPoint { statuses, ..stored }), ..content }
 }
 
 /// Solves a problem from a stored point, or from zero. `file` is its name in messages.
@@ -359,7 +392,14 @@ fn certificate(status: &Status) -> Option<Value> {
 /// The worst contacts that a report of an unsolved problem lists.
 const WORST: usize = 3;
 
-fn json_line(file: &Path, problem: &AnyProblem, plan: &Plan, solved: &Solved) -> String {
+fn json_line(
+    file: &Path,
+    content: &ProblemFile,
+    plan: &Plan,
+    solved: &Solved,
+    solution: bool,
+) -> String {
+    let problem = &content.problem;
     let Solved { status, verdict, account, .. } = solved;
     let mut all = report::problem_json(file, problem);
     all.extend(report::fields(json!({
@@ -376,10 +416,14 @@ fn json_line(file: &Path, problem: &AnyProblem, plan: &Plan, solved: &Solved) ->
         all.insert("certificate".into(), certificate);
     }
     all.extend(report::verdict_json(verdict, plan.limits.tolerance, verdict.worst.len()));
+    if let Some(stored) = content.solution.as_ref().filter(|_| solution) {
+        all.insert("solution".into(), answer::json(problem, stored, &content.info.names));
+    }
     format!("{}\n", json!(all))
 }
 
-fn text(file: &Path, problem: &AnyProblem, plan: &Plan, solved: &Solved) -> String {
+fn text(file: &Path, content: &ProblemFile, plan: &Plan, solved: &Solved, asked: &Args) -> String {
+    let problem = &content.problem;
     let Solved { status, verdict, .. } = solved;
     let tolerance = plan.limits.tolerance;
     let is_solved = *status == Status::Solved;
@@ -408,6 +452,19 @@ fn text(file: &Path, problem: &AnyProblem, plan: &Plan, solved: &Solved) -> Stri
     let settled = is_solved || matches!(status, Status::Infeasible(_));
     let worst = if settled { 0 } else { WORST };
     report::verdict_text(&mut text, verdict, tolerance, worst);
+    // A point that is none is shown to those who ask for it.
+    if is_solved {
+        answer::text(&mut text, "solution", content, asked.solution);
+    } else if asked.solution {
+        answer::text(&mut text, "best point", content, true);
+    }
+    if asked.trace.is_some() && solved.trace == Trace::None {
+        row(
+            &mut text,
+            "trace",
+            format!("{} keeps no record of its steps: none is in the file", plan.solver),
+        );
+    }
     let stuck = stuck(&solved.history);
     if let (Status::Limit(_), Some(since)) = (status, stuck) {
         row(&mut text, "stuck", format!("no progress since iteration {since}"));

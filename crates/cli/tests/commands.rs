@@ -115,6 +115,7 @@ fn a_singular_mass_matrix_is_described() {
         file.solution = stored.then(|| StoredPoint {
             point: point.clone().into(),
             partner: Some(vec![0.0; point.r.len()]),
+            statuses: vec![],
         });
         file.write(folder.path("a.hdf5")).unwrap();
         let text = folder.run("info a.hdf5").exits(0).stdout;

@@ -145,7 +145,7 @@ fn problems_are_generated_with_the_solution_planted() {
     }
     for (arguments, parts) in [
         ("gen lcp", ["--out FILE.toml", "found none"]),
-        ("gen lcp --out a.hdf5", ["--out a.hdf5", ".toml or .mtx"]),
+        ("gen lcp --out a.hdf5", ["--out a.hdf5", ".toml, .mtx or .csv"]),
         ("gen lcp --draw a.svg --out a.toml", ["--draw", "lcp"]),
         ("gen lcp --form local --out a.toml", ["--form", "lcp"]),
         ("gen lcp --set n=1 --out a.toml", ["n: expected from 2", "found 1"]),

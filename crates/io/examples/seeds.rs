@@ -44,7 +44,7 @@ fn contact() -> Vec<ProblemFile> {
     let of_local = LocalPoint { r: r.clone(), lambda: lambda.clone() };
     let of_global = GlobalPoint { v, r, lambda };
     let with = |file: ProblemFile, point| {
-        let point = StoredPoint { point, partner: Some(vec![0.0; 3]) };
+        let point = StoredPoint { point, partner: Some(vec![0.0; 3]), statuses: vec![] };
         let guesses = vec![point.clone()];
         ProblemFile { info: info.clone(), guesses, solution: Some(point), ..file }
     };
@@ -72,8 +72,11 @@ fn linear() -> Vec<ProblemFile> {
     let solved = |file, solution| ProblemFile { solution: Some(solution), ..file };
     vec![
         ProblemFile { info: Info { title, description, ..Info::default() }, ..lcp(full()) },
-        solved(lcp(sparse()), StoredPoint { point: point(), partner: Some(q()) }),
-        solved(ProblemFile::new(mixed), StoredPoint { point: point(), partner: None }),
+        solved(lcp(sparse()), StoredPoint { point: point(), partner: Some(q()), statuses: vec![] }),
+        solved(
+            ProblemFile::new(mixed),
+            StoredPoint { point: point(), partner: None, statuses: vec![] },
+        ),
         ProblemFile::new(bounded.expect(sound)),
         solved(ProblemFile::new(horizontal), slack.into()),
     ]

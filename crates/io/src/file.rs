@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, Friction, Problem};
+use nonsmooth_problem::{AnyPoint, AnyProblem, AnyStatus, Complementarity, Friction, Problem};
 
 use crate::{IoError, format};
 
@@ -32,6 +32,8 @@ pub struct Info {
     pub dofs: Option<usize>,
     /// The number of bodies in older files of FCLIB, read like `dofs`.
     pub involved_ds: Option<usize>,
+    /// Names of the variables of a linear complementarity problem, one for each; empty: none.
+    pub names: Vec<String>,
 }
 
 /// A point as files store it.
@@ -42,6 +44,8 @@ pub struct StoredPoint {
     /// What follows from them: u of contacts, w of complementary pairs. Of a horizontal problem `None`, as s belongs to the point. A format that
     /// must have it computes it where it is `None`.
     pub partner: Option<Vec<f64>>,
+    /// What each contact or row does, where the judge was asked; of points that were read: empty.
+    pub statuses: Vec<AnyStatus>,
 }
 
 impl ProblemFile {
@@ -56,6 +60,14 @@ impl ProblemFile {
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let path = path.as_ref();
         format::format(path)?.read(path)
+    }
+
+    /// Reads what the bytes of a file are, whose format its beginning says; `name` stands for it in messages.
+    ///
+    /// Errors: as [`read`](Self::read).
+    pub fn parse(name: impl AsRef<Path>, bytes: &[u8]) -> Result<Self, IoError> {
+        let name = name.as_ref();
+        format::sniffed(name, bytes)?.parse(name, bytes)
     }
 
     /// Writes a file in the format of its extension, in place of the one of that name if there is one: it is completed beside the old one and then
@@ -100,13 +112,13 @@ impl StoredPoint {
             }
             _ => Some(partner),
         };
-        Self { point, partner }
+        Self { point, partner, statuses: vec![] }
     }
 }
 
 /// Points without their partners.
 impl<P: Into<AnyPoint>> From<P> for StoredPoint {
     fn from(point: P) -> Self {
-        Self { point: point.into(), partner: None }
+        Self { point: point.into(), partner: None, statuses: vec![] }
     }
 }

@@ -4,17 +4,18 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use nonsmooth_problem::{AnyProblem, Kind};
+use nonsmooth_problem::{AnyProblem, Kind, Problem};
 
 use crate::fclib::Fclib;
 use crate::linear::market::Market;
-use crate::linear::siconos::Siconos;
 use crate::linear::toml::Toml;
 use crate::replace::{WRITABLE, replace};
+use crate::siconos::Siconos;
+use crate::table::Csv;
 use crate::{IoError, ProblemFile};
 
 /// All formats, as help texts, messages and searches list them. A new one is a type with this trait and its line here.
-pub static FORMATS: [&dyn Format; 4] = [&Fclib, &Toml, &Market, &Siconos];
+pub static FORMATS: [&dyn Format; 5] = [&Fclib, &Toml, &Market, &Siconos, &Csv];
 
 /// What a format is.
 #[derive(Debug, Clone, Copy)]
@@ -29,8 +30,12 @@ pub struct About {
     pub reads: &'static [Kind],
     /// The kinds of problems that it writes.
     pub writes: &'static [Kind],
+    /// Whether its files hold problems; else a solution alone.
+    pub holds_problems: bool,
     /// Whether the file of a problem has room for solution and texts.
     pub keeps_solutions: bool,
+    /// Whether a problem is one file, which may as well be a stream.
+    pub one_file: bool,
     /// What the place of the solution is called.
     pub solution: &'static str,
     /// What the place of the first guess is called; `None` of a format that has no guesses.
@@ -45,7 +50,9 @@ impl About {
         owns_extensions: true,
         reads: &[],
         writes: &[],
+        holds_problems: true,
         keeps_solutions: true,
+        one_file: true,
         solution: "[solution]",
         guess: None,
     };
@@ -57,7 +64,7 @@ impl About {
 }
 
 /// A format of files.
-pub trait Format: Sync {
+pub trait Format: Sync + std::fmt::Debug {
     /// What it is.
     fn about(&self) -> &'static About;
 
@@ -117,9 +124,21 @@ pub fn format(path: &Path) -> Result<&'static dyn Format, IoError> {
     if let Some(format) = of_extension(path).filter(|f| f.about().owns_extensions) {
         return Ok(format);
     }
-    let bytes = glance(path)?;
-    let format = FORMATS.into_iter().find(|f| f.begins(&bytes));
-    format.ok_or_else(|| IoError::Unknown { file: path.into(), found: kind_of(&bytes) })
+    sniffed(path, &glance(path)?)
+}
+
+/// The format of a file by its first bytes; `path` is its name in messages.
+///
+/// Errors: a content of no known format.
+pub fn sniffed(path: &Path, bytes: &[u8]) -> Result<&'static dyn Format, IoError> {
+    let format = FORMATS.into_iter().find(|f| f.begins(bytes));
+    format.ok_or_else(|| IoError::Unknown { file: path.into(), found: kind_of(bytes) })
+}
+
+/// The format whose files have an extension, given without its dot.
+pub fn named(extension: &str) -> Option<&'static dyn Format> {
+    let extension = extension.to_ascii_lowercase();
+    FORMATS.into_iter().find(|f| f.about().extensions.contains(&extension.as_str()))
 }
 
 /// The format in which a file of that name holds a problem of a kind: that of its extension, or that of the file that is there.
@@ -134,17 +153,21 @@ pub fn writer(path: &Path, kind: Kind) -> Result<&'static dyn Format, IoError> {
     })
 }
 
-/// The name under which the problem of a file is kept with a solution: its own, or with the extension of a format that has room for one.
+/// The name under which the problem of a file is kept with a solution: its own, or with the extension of a format that has room for one. Where several
+/// formats share what the file's holds, the file is read to know the kind.
 pub fn keeper(path: &Path) -> PathBuf {
     let Some(poor) = of_extension(path).filter(|f| !f.about().keeps_solutions) else {
         return path.into();
     };
-    let holds_all = |f: &&dyn Format| {
-        f.about().keeps_solutions
-            && poor.about().reads.iter().all(|kind| f.about().writes.contains(kind))
+    let rich = |kinds: &[Kind]| {
+        FORMATS.into_iter().map(Format::about).find(|about| {
+            let all = kinds.iter().all(|kind| about.writes.contains(kind));
+            about.holds_problems && about.keeps_solutions && all
+        })
     };
-    let extension = FORMATS.into_iter().find(holds_all).map(|f| f.about().extensions[0]);
-    extension.map_or_else(|| path.into(), |extension| path.with_extension(extension))
+    let of_file = || rich(&[poor.read(path).ok()?.problem.kind()]);
+    let about = rich(poor.about().reads).or_else(of_file);
+    about.map_or_else(|| path.into(), |about| path.with_extension(about.extensions[0]))
 }
 
 /// Whether a file looks like one that holds a problem, from its extension and first bytes: to find problems among other files. The
@@ -179,8 +202,7 @@ fn or(all: &[String]) -> String {
 }
 
 fn of_extension(path: &Path) -> Option<&'static dyn Format> {
-    let extension = path.extension()?.to_str()?.to_ascii_lowercase();
-    FORMATS.into_iter().find(|f| f.about().extensions.contains(&extension.as_str()))
+    named(path.extension()?.to_str()?)
 }
 
 /// What the first bytes of a file are, if they begin none of a known format.

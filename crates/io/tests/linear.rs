@@ -9,7 +9,7 @@ use common::real;
 use nonsmooth_io::{About, FORMATS, Format, Info, ProblemFile, StoredPoint, holds_problem, parts};
 use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::{
-    AnyPoint, AnyProblem, BoxLcp, Complementarity, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp,
+    AnyPoint, AnyProblem, BoxLcp, Complementarity, Friction, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp,
 };
 use proptest::collection::{btree_map, vec};
 use proptest::option;
@@ -133,7 +133,7 @@ fn content() -> impl Strategy<Value = ProblemFile> {
                     true => HlcpPoint { x: z, s: w }.into(),
                     false => {
                         let point = AnyPoint::from(LcpPoint { z });
-                        StoredPoint { point, partner: there.then_some(w) }
+                        StoredPoint { point, partner: there.then_some(w), statuses: vec![] }
                     }
                 }
             });
@@ -200,10 +200,10 @@ proptest! {
     }
 }
 
-/// The table in docs/lcp-format.md is the list of formats.
+/// The table in docs/formats.md is the list of formats.
 #[test]
 fn the_page_of_formats_lists_them() {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/lcp-format.md");
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/formats.md");
     let page = std::fs::read_to_string(page).unwrap();
     let (_, table) = page.split_once("| --- | --- | --- | --- |\n").unwrap();
     let stated: Vec<_> = table.lines().take_while(|line| line.starts_with('|')).collect();
@@ -214,7 +214,10 @@ fn the_page_of_formats_lists_them() {
         let About { name, extensions, reads, writes, .. } = *format.about();
         let endings: Vec<_> = extensions.iter().map(|e| format!(".{e}")).collect();
         let endings = code(&mut endings.iter().map(String::as_str));
-        let kinds = code(&mut reads.iter().map(|kind| kind.name()));
+        let kinds = match reads {
+            [] => "none".into(),
+            _ => code(&mut reads.iter().map(|kind| kind.name())),
+        };
         let written = match writes {
             [] => "none".into(),
             _ if writes == reads => "the same".into(),
@@ -510,6 +513,47 @@ fn mistakes_in_siconos_files_are_named() {
     );
 }
 
+#[test]
+fn siconos_problems_of_contacts() {
+    let folder = Folder::new();
+    let read = |text: &str| match ProblemFile::read(folder.put("a.dat", text)) {
+        Ok(ProblemFile { problem: AnyProblem::Friction(problem), .. }) => problem,
+        other => panic!("{other:?}"),
+    };
+    // By columns: W = [2 1; 0 3].
+    let Friction::Local2(p) = read("2\n1\n0\n2\n2\n2 2\n2 0\n1 3\n-4 -5\n0.7\n") else { panic!() };
+    assert_eq!(p.W.diagonal_block(0), [[2.0, 1.0], [0.0, 3.0]]);
+    assert_eq!((p.q, p.mu), (vec![-4.0, -5.0], vec![0.7]));
+    // Blocks, of two contacts of which the second has none beside the diagonal.
+    let blocks = "2\n2\n1\n4\n4\n2\n2 2\n2 4\n2 4\n3 2\n0 1 2\n0 1\n0\n1 0 0 2\n1\n3 0 0 4\n-1 0 -1 0\n0.5 0.6\n";
+    let Friction::Local2(p) = read(blocks) else { panic!() };
+    assert_eq!((p.W.nblocks(), p.W.diagonal_block(1)), (2, [[3.0, 0.0], [0.0, 4.0]]));
+    // A sparse M, a dense H (2 × 3, by columns), more after mu. All numbers of a local problem stand there as well.
+    let mut global = "3\n1\n2\n2\n2\n1\nCSparse Version 3.2.0\ntriplet: 2-by-2, nzmax: 2 nnz: 2\n0 0 : 2\n1 1 : 5\n\
+        0\n2\n3\n2 3\n1 0\n0 1\n0 6\n-1 -2\n7 8 9\n0.1\n0\n".to_owned();
+    let Friction::Global3(p) = read(&global) else { panic!() };
+    assert_eq!(p.M.to_dense(), rows(&[[2.0, 0.0], [0.0, 5.0]]));
+    assert_eq!(p.H.to_dense(), rows(&[[1.0, 0.0, 0.0], [0.0, 1.0, 6.0]]));
+    assert_eq!((p.f, p.w, p.mu), (vec![-1.0, -2.0], vec![7.0, 8.0, 9.0], vec![0.1]));
+
+    global.truncate(global.len() - 8);
+    folder.refused("a.dat", &global, &["b[2]", "a number", "the end of the file"]);
+    for (text, all) in [
+        (
+            "5\n1\n0\n1\n1\n1 1\n2\n0\n1\n5\n1 5\n1 1 1 1 1\n1\n1 1 1 1 1\n0.3\n",
+            &["rolling friction", "not supported"][..],
+        ),
+        ("3\n1\n0\n3\n3\n3 3\n1 0 0 0 1 0 0 0 1\n-1 0 0\n", &["mu[0]", "the end of the file"]),
+        ("3\n1\n0\n3\n3\n3 3\n1 0 0 0 1 0 0 0 1\n-1 0 0\n-0.5\n", &["mu"]),
+        (
+            "3\n1\n0\n4\n4\n4 4\n1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1\n-1 0 0 0\n0.5\n",
+            &["the storage of H", "`-1`"],
+        ),
+    ] {
+        folder.refused("a.dat", text, all);
+    }
+}
+
 // ------------------------------------------------------------------------------------------------ damage
 
 /// Every beginning of a file, and every file with one letter changed, is read or refused.
@@ -519,7 +563,7 @@ fn damaged_files_never_panic() {
     let point = LcpPoint { z: vec![1.0, 2.0, 3.0] }.into();
     let file = ProblemFile {
         info: Info { title: Some("a \"title\"".into()), ..Info::default() },
-        solution: Some(StoredPoint { point, partner: Some(vec![4.0]) }),
+        solution: Some(StoredPoint { point, partner: Some(vec![4.0]), statuses: vec![] }),
         ..ProblemFile::new(
             Mlcp::new(rows(&[[1.0, 2.0, 3.0], [0.0, 5.0, 6.0], [7.0, 8.0, 9.0]]), vec![-1.0; 3], 2)
                 .unwrap(),
@@ -631,7 +675,11 @@ fn every_mlcp_of_the_corpus_is_read() {
         let content = ProblemFile::read(path);
         if name == "Rectangular" {
             let message = content.unwrap_err().to_string();
-            assert!(message.ends_with("the rows of M: expected 2, found `3`"), "{message}");
+            assert!(
+                message.contains("the shape of M: expected 2 × 2, as the file states n = 1")
+                    && message.ends_with("found `3 × 2`"),
+                "{message}"
+            );
             continue;
         }
         let file = content.unwrap_or_else(|e| panic!("{e}"));

@@ -125,14 +125,15 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     };
     let (scene, mut content) = made.make(&settings, args.form)?;
     let kind = content.problem.kind();
-    args.out.as_deref().map_or(Ok(()), |path| files::holds("--out", path, kind))?;
+    let format = |path| files::target_format("--out", path, None, kind, None);
+    let out = args.out.as_deref().map(|path| Ok::<_, String>((path, format(path)?))).transpose()?;
     let solved =
         limits.map(|limits| solve_by_default(label, &content.problem, limits)).transpose()?;
     if let Some(solved) = &solved {
         content = with_solution(content, solved);
     }
-    if let Some(path) = &args.out {
-        content.write(path).map_err(|e| e.to_string())?;
+    if let Some((path, format)) = out {
+        files::write(path, format, &content)?;
     }
     if let (Some(path), Some(scene)) = (&args.draw, &scene) {
         let svg = drawing(scene, solved.as_ref()).map_err(|e| format!("scene {name}: {e}"))?;
@@ -145,7 +146,11 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     if let Some(solved) = &solved {
         solution(&mut text, solved, args.tol);
     }
-    output::print(&text);
+    match out {
+        // The standard output is the file's.
+        Some((path, _)) if files::is_stream(path) => output::remark(&text),
+        _ => output::print(&text),
+    }
     Ok(Exit::solved(solved.as_ref().is_none_or(Solved::is_solved)))
 }
 

@@ -1,5 +1,6 @@
 //! The history of a solve as a picture, and below it what the method recorded.
 
+pub mod problem;
 mod trace;
 
 use nonsmooth_bench::draw::{Axis, GRID, INK, decades, font, tick, ticks};

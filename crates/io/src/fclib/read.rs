@@ -172,6 +172,7 @@ fn info(problem: &Folder) -> Result<Info, IoError> {
         math_info: g.text("math_info")?,
         dofs: count("numberOfDegreeOfFreedom")?,
         involved_ds: count("numberOfInvolvedDS")?,
+        names: vec![],
     })
 }
 
@@ -188,7 +189,7 @@ fn point(g: &Folder, sizes: Sizes) -> Result<StoredPoint, IoError> {
         None => LocalPoint { r, lambda }.into(),
         Some(_) => GlobalPoint { v: v.unwrap_or_default(), r, lambda }.into(),
     };
-    Ok(StoredPoint { point, partner: Some(u.unwrap_or_default()) })
+    Ok(StoredPoint { point, partner: Some(u.unwrap_or_default()), statuses: vec![] })
 }
 
 fn name_of(object: &Object) -> &'static str {

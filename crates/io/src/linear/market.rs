@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::{AnyProblem, BoxLcp, Complementarity, Kind, Lcp, LcpPoint};
 
-use super::tokens::Tokens;
-use super::{Digits, check, text, toml, unknowns};
+use super::{Digits, check, toml, unknowns};
 use crate::format::{About, bytes, put};
+use crate::tokens::{Tokens, text};
 use crate::{Format, IoError, ProblemFile};
 
 /// What stands between the name of the matrix and the extension of its vectors' files: q, lower and upper bounds, a solution.
@@ -35,6 +35,7 @@ impl Format for Market {
             reads: KINDS,
             writes: KINDS,
             keeps_solutions: false,
+            one_file: false,
             ..About::TEXT
         };
         &ABOUT

@@ -1,14 +1,10 @@
 //! Linear complementarity problems as text: LCP, MLCP, horizontal and box-constrained.
 //!
-//! [`toml`] is our own format, with solution and texts (docs/lcp-format.md); [`market`] is Matrix Market, `NAME.mtx` with `NAME_q.mtx` beside;
-//! [`siconos`] reads the test data of Siconos.
+//! [`toml`] is our own format, with solution and texts (docs/formats.md); [`market`] is Matrix Market, `NAME.mtx` with `NAME_q.mtx` beside.
 
 pub mod market;
-pub mod siconos;
-mod tokens;
 pub mod toml;
 
-use std::borrow::Cow;
 use std::path::Path;
 
 use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, Problem, with_complementarity};
@@ -22,6 +18,11 @@ fn check<'a>(path: &Path, file: &'a ProblemFile) -> Result<&'a Complementarity, 
         return Err(IoError::data(path, "the problem", "one of linear complementarity", found));
     };
     with_complementarity!(problem, p => p.validate()).map_err(IoError::problem(path))?;
+    let (names, variables) = (file.info.names.len(), variables(problem));
+    if names != 0 && names != variables {
+        let expected = format!("none, or one for each of the {variables} variables");
+        return Err(IoError::data(path, "names", expected, names));
+    }
     if !file.guesses.is_empty() {
         let expected = "none, as the format has no place for them";
         return Err(IoError::data(path, "guesses", expected, file.guesses.len()));
@@ -45,6 +46,16 @@ fn check<'a>(path: &Path, file: &'a ProblemFile) -> Result<&'a Complementarity, 
     }
 }
 
+/// How many variables have a name: the pairs of a horizontal problem.
+fn variables(problem: &Complementarity) -> usize {
+    match problem {
+        Complementarity::Lcp(p) => p.dim(),
+        Complementarity::Mlcp(p) => p.free + p.pairs(),
+        Complementarity::Hlcp(p) => p.dim(),
+        Complementarity::Box(p) => p.dim(),
+    }
+}
+
 /// z of a checked point, x of a horizontal problem's.
 fn unknowns(point: &AnyPoint) -> &[f64] {
     match point {
@@ -52,11 +63,6 @@ fn unknowns(point: &AnyPoint) -> &[f64] {
         AnyPoint::Hlcp(point) => &point.x,
         AnyPoint::Local(_) | AnyPoint::Global(_) => &[],
     }
-}
-
-/// The text in the bytes of a file. What is no number ends a problem's data in Siconos' files: remarks may be in any encoding.
-fn text(bytes: &[u8]) -> Cow<'_, str> {
-    String::from_utf8_lossy(bytes)
 }
 
 /// A number with as many digits as tell it from all others.

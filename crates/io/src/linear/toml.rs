@@ -1,4 +1,4 @@
-//! Our own format: a linear complementarity problem as TOML, for people to read and write. docs/lcp-format.md describes it.
+//! Our own format: a linear complementarity problem as TOML, for people to read and write. docs/formats.md describes it.
 //!
 //! Numbers are written with as many digits as tell them from all others, so what is written reads back bit for bit, and so does the storage of the
 //! matrices (dense or sparse).
@@ -14,8 +14,9 @@ use nonsmooth_problem::{
 use serde::Deserialize;
 use serde::de::{self, Deserializer, MapAccess, SeqAccess, Visitor};
 
-use super::{Digits, check, text, unknowns};
+use super::{Digits, check, unknowns};
 use crate::format::About;
+use crate::tokens::text;
 use crate::{Format, Info, IoError, ProblemFile, StoredPoint};
 
 /// All keys of all kinds; which belong to a kind is said by [`KEYS`].
@@ -26,6 +27,7 @@ struct Keys {
     kind: String,
     title: Option<String>,
     description: Option<String>,
+    names: Option<Vec<String>>,
     M: Option<Stated>,
     Q: Option<Stated>,
     R: Option<Stated>,
@@ -92,7 +94,7 @@ impl<'de> Deserialize<'de> for Stated {
     }
 }
 
-/// The keys of each kind besides `kind`, `title`, `description` and `solution`; the `[solution]`'s.
+/// The keys of each kind besides `kind`, `title`, `description`, `names` and `solution`; the `[solution]`'s.
 const KEYS: [(Kind, &[&str], &[&str]); 4] = [
     (Kind::Lcp, &["M", "q"], &["z", "w"]),
     (Kind::Mlcp, &["M", "q", "free", "equalities", "A", "B", "C", "D", "a", "b"], &["u", "v", "w"]),
@@ -144,7 +146,7 @@ fn parse(path: &Path, text: &str) -> Result<ProblemFile, IoError> {
         IoError::data(
             path,
             format!("line {line}"),
-            "a problem as docs/lcp-format.md describes it",
+            "a problem as docs/formats.md describes it",
             e.message(),
         )
     })?;
@@ -159,11 +161,12 @@ fn parse(path: &Path, text: &str) -> Result<ProblemFile, IoError> {
     if let Some(solution) = &keys.solution {
         file.only(&solution.given(), of_point, "solution.")?;
     }
-    let Keys { title, description, solution, .. } = &keys;
+    let Keys { title, description, names, solution, .. } = &keys;
     let (title, description) = (title.clone(), description.clone());
+    let names = names.clone().unwrap_or_default();
     let solution = solution.as_ref().map(|solution| file.point(solution)).transpose()?;
     let content = ProblemFile {
-        info: Info { title, description, ..Info::default() },
+        info: Info { title, description, names, ..Info::default() },
         solution,
         ..ProblemFile::new(file.problem(keys)?)
     };
@@ -357,7 +360,7 @@ impl Keyed<'_> {
             Kind::Mlcp => LcpPoint { z: [need("u", &s.u)?, need("v", &s.v)?].concat() }.into(),
             _ => LcpPoint { z: need("z", &s.z)? }.into(),
         };
-        Ok(StoredPoint { point, partner: s.w.clone() })
+        Ok(StoredPoint { point, partner: s.w.clone(), statuses: vec![] })
     }
 }
 
@@ -386,6 +389,10 @@ fn format(file: &ProblemFile, problem: &Complementarity) -> Option<String> {
         if let Some(said) = said {
             line(&mut out, &format!("{key} = {}", quoted(said)));
         }
+    }
+    if !file.info.names.is_empty() {
+        let names: Vec<_> = file.info.names.iter().map(|name| quoted(name)).collect();
+        line(&mut out, &format!("names = [{}]", names.join(", ")));
     }
     let matrices: Vec<(&str, &Matrix)> = match problem {
         Complementarity::Lcp(p) => {
@@ -435,7 +442,7 @@ fn format(file: &ProblemFile, problem: &Complementarity) -> Option<String> {
             Matrix::Operator(_) => return None,
         }
     }
-    if let Some(StoredPoint { point, partner }) = &file.solution {
+    if let Some(StoredPoint { point, partner, .. }) = &file.solution {
         line(&mut out, "\n[solution]");
         let (z, w) = (unknowns(point), partner.as_deref());
         let parts = match problem {

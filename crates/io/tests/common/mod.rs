@@ -80,7 +80,7 @@ pub fn stored(v: Option<Vec<f64>>, u: Vec<f64>, r: Vec<f64>, lambda: Vec<f64>) -
         None => LocalPoint { r, lambda }.into(),
         Some(v) => GlobalPoint { v, r, lambda }.into(),
     };
-    StoredPoint { point, partner: Some(u) }
+    StoredPoint { point, partner: Some(u), statuses: vec![] }
 }
 
 /// The impulses and the multipliers of a point of contacts.
@@ -108,6 +108,7 @@ fn info() -> impl Strategy<Value = Info> {
             math_info,
             dofs,
             involved_ds,
+            names: vec![],
         },
     )
 }

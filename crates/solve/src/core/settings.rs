@@ -110,13 +110,7 @@ impl Setting {
 pub fn described<S: Settings>() -> Vec<Setting> {
     let schema = schemars::schema_for!(S);
     let defaults = serde_json::to_value(S::default()).unwrap_or_default();
-    // Of a type that is another one, the schema refers to that.
-    let other = || {
-        let name = schema.get("$ref")?.as_str()?.rsplit('/').next()?;
-        schema.get("$defs")?.get(name)?.get("properties")
-    };
-    let properties = schema.get("properties").or_else(other);
-    let Some(properties) = properties.and_then(Value::as_object) else {
+    let Some(properties) = schema.get("properties").and_then(Value::as_object) else {
         return vec![];
     };
     let text = |v: Option<&Value>| v.and_then(Value::as_str).unwrap_or_default().replace('\n', " ");

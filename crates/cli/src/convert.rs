@@ -1,0 +1,136 @@
+//! `nonsmooth convert`.
+
+use std::path::{Path, PathBuf};
+
+use nonsmooth_io::{Format, Info, ProblemFile};
+use nonsmooth_problem::{AnyPoint, GlobalPoint, LocalPoint, Problem};
+
+use crate::report::{self, row};
+use crate::{Exit, files, output};
+
+/// Write the problem of a file in another format.
+///
+/// The solution, the guesses and the texts that stand beside the problem go along as far as the new format has room for them; what is lost is
+/// said. The formats go by the extensions; of `-`, the standard input or output, by the first bytes or by --format.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    #[arg(value_name = "FROM", help = files::help("A file with a problem", |_| true))]
+    from: PathBuf,
+    /// The file to write: .hdf5 for contacts; .toml, or .mtx with vectors beside, for linear complementarity; .csv for the solution alone
+    #[arg(value_name = "TO")]
+    to: PathBuf,
+    /// The format of TO, whatever its name: hdf5, toml, mtx or csv
+    #[arg(long, value_name = "EXTENSION", value_parser = files::format_named)]
+    format: Option<&'static dyn Format>,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  nonsmooth convert diodes_mlcp.dat diodes.toml        Siconos' text as TOML
+  nonsmooth convert GFC3D_step.dat step.hdf5           Siconos' text as FCLIB's HDF5
+  nonsmooth convert solved.hdf5 contacts.csv           the solution as a table
+  nonsmooth convert rectifier.toml - --format csv
+
+Exit codes: 0 written; 2 a mistake in a file or an option.";
+
+/// Runs the command.
+pub fn run(args: &Args) -> Result<Exit, String> {
+    let Args { from, to, format } = args;
+    if files::same(from, to) {
+        let to = to.display();
+        return Err(format!(
+            "{to}: expected another file than the one that is read, found the same"
+        ));
+    }
+    files::writable("TO", to)?;
+    let content = files::read(from)?;
+    let kind = content.problem.kind();
+    let format = files::target_format("TO", to, *format, kind, None)?;
+    let there = content.guesses.len();
+    let mut room = content.clone();
+    if format.about().guess.is_none() {
+        // Formats refuse what they have no place for.
+        room.guesses.clear();
+    }
+    let kept = match files::is_stream(to) {
+        true => {
+            let name = Path::new("standard output");
+            let bytes = format.to_bytes(name, &room).map_err(|e| e.to_string())?;
+            output::print_bytes(&bytes);
+            format.about().holds_problems.then(|| format.parse(name, &bytes))
+        }
+        false => {
+            files::write(to, format, &room)?;
+            format.about().holds_problems.then(|| format.read(to))
+        }
+    };
+    // What can be read again is kept, whatever the format promises.
+    let kept = kept.transpose().map_err(|e| e.to_string())?;
+    let mut text = format!("{}: {}\n", to.display(), report::problem_text(&content.problem));
+    row(&mut text, "from", format!("{} ({})", from.display(), files::about(from)?.name));
+    row(&mut text, "format", format.about().name);
+    let (kept, lost): (Vec<_>, Vec<_>) =
+        parts(&content, kept.as_ref()).into_iter().partition(|part| part.1);
+    for (label, all) in [("kept", kept), ("lost", lost)] {
+        let names: Vec<_> = all
+            .into_iter()
+            .map(|(name, _)| match name {
+                "guesses" => format!("{there} guesses"),
+                name => name.into(),
+            })
+            .collect();
+        if !names.is_empty() {
+            row(&mut text, label, names.join(", "));
+        }
+    }
+    match files::is_stream(to) {
+        true => output::remark(&text),
+        false => output::print(&text),
+    }
+    Ok(Exit::Solved)
+}
+
+/// Whether a solution has velocities of bodies.
+fn bodies(file: &ProblemFile) -> bool {
+    matches!(file.solution.as_ref().map(|s| &s.point), Some(AnyPoint::Global(_)))
+}
+
+/// Whether a solution has multipliers of scalar rows.
+fn multipliers(file: &ProblemFile) -> bool {
+    match file.solution.as_ref().map(|s| &s.point) {
+        Some(
+            AnyPoint::Local(LocalPoint { lambda, .. })
+            | AnyPoint::Global(GlobalPoint { lambda, .. }),
+        ) => !lambda.is_empty(),
+        _ => false,
+    }
+}
+
+/// What a file holds, and whether another one has it too; `None`: a table of its solution.
+fn parts(file: &ProblemFile, kept: Option<&ProblemFile>) -> Vec<(&'static str, bool)> {
+    let has = |of: fn(&ProblemFile) -> bool| kept.is_some_and(of);
+    let info = |of: fn(&Info) -> bool, name| {
+        of(&file.info).then(|| (name, kept.is_some_and(|kept| of(&kept.info))))
+    };
+    let solved = file.solution.is_some();
+    let partner = |f: &ProblemFile| f.solution.as_ref().is_some_and(|s| s.partner.is_some());
+    let follows = if file.problem.kind().is_linear() { "its w" } else { "its u" };
+    let all = [
+        Some(("problem", kept.is_some())),
+        solved.then(|| ("solution", kept.is_none() || has(|f| f.solution.is_some()))),
+        partner(file).then(|| (follows, kept.is_none_or(partner))),
+        bodies(file).then(|| ("velocities of the bodies", has(bodies))),
+        multipliers(file).then(|| ("multipliers", has(multipliers))),
+        (!file.guesses.is_empty()).then(|| ("guesses", has(|f| !f.guesses.is_empty()))),
+        info(|i| i.title.is_some(), "title"),
+        info(|i| i.description.is_some(), "description"),
+        info(|i| i.math_info.is_some(), "remarks on the mathematics"),
+        info(|i| i.dofs.is_some(), "number of degrees of freedom"),
+        info(|i| i.involved_ds.is_some(), "number of bodies"),
+        // A table has them beside the values.
+        (!file.info.names.is_empty())
+            .then(|| ("names of the variables", kept.is_none_or(|f| !f.info.names.is_empty()))),
+    ];
+    all.into_iter().flatten().collect()
+}
