@@ -47,9 +47,9 @@ pub enum Measure {
     /// The relative residual, which decides for us.
     Relative,
     /// The natural map over ‖q‖.
-    Paper,
+    Literature,
     /// Siconos' error: the same over max(‖q‖, ‖r‖, ‖u‖).
-    Peer,
+    Siconos,
 }
 
 /// Whose measurements they are.
@@ -379,8 +379,8 @@ impl<'a> Reader<'a> {
         match self.source.measure {
             None => {}
             Some(Measure::Relative) => residuals.relative = error,
-            Some(Measure::Paper) => residuals.paper = error,
-            Some(Measure::Peer) => residuals.peer = error,
+            Some(Measure::Literature) => residuals.literature = error,
+            Some(Measure::Siconos) => residuals.siconos = error,
         }
         let run = Run {
             campaign: self.id.clone(),

@@ -226,11 +226,11 @@ pub struct Residuals {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub absolute: Option<f64>,
     /// The natural map with ρ = 1 over ‖q‖.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub paper: Option<f64>,
+    #[serde(alias = "paper", skip_serializing_if = "Option::is_none")]
+    pub literature: Option<f64>,
     /// The same over max(‖q‖, ‖r‖, ‖u‖), as Siconos has it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub peer: Option<f64>,
+    #[serde(alias = "peer", skip_serializing_if = "Option::is_none")]
+    pub siconos: Option<f64>,
     /// Distance of the impulses to their cones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub primal: Option<f64>,

@@ -361,8 +361,8 @@ pub fn runs_table(runs: &Runs) -> Table {
         "reached",
         "relative",
         "absolute",
-        "paper",
-        "peer",
+        "literature",
+        "siconos",
         "primal",
         "dual",
         "complementarity",
@@ -397,7 +397,7 @@ pub fn runs_table(runs: &Runs) -> Table {
             whole(r.peak_memory),
             whole(r.loaded_memory),
         ];
-        cells.extend([e.reached, e.relative, e.absolute, e.paper, e.peer].map(number));
+        cells.extend([e.reached, e.relative, e.absolute, e.literature, e.siconos].map(number));
         cells.extend([e.primal, e.dual, e.complementarity, e.dynamics, e.bilateral].map(number));
         cells
     });

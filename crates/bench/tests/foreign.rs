@@ -10,7 +10,11 @@ use nonsmooth_bench::record::{Ending, Problem};
 use nonsmooth_bench::runs::Runs;
 
 fn source() -> Source {
-    Source { program: "Peer 1.2".into(), machine: "a cluster".into(), measure: Some(Measure::Peer) }
+    Source {
+        program: "Peer 1.2".into(),
+        machine: "a cluster".into(),
+        measure: Some(Measure::Siconos),
+    }
 }
 
 fn known(name: &str, contacts: usize) -> Problem {
@@ -58,7 +62,7 @@ fn a_row_is_solved_by_its_error_and_never_by_its_status() {
     assert_eq!(runs[1].message.as_deref(), Some("status 0, error 2e-2"));
     assert_eq!(runs[3].message.as_deref(), Some("status timeout*, no finite error"));
     assert_eq!((runs[0].solver.as_str(), runs[0].seconds), ("NSGS (Peer 1.2)", Some(1e-3)));
-    assert_eq!((runs[0].residuals.peer, runs[0].residuals.reached), (Some(9e-5), Some(9e-5)));
+    assert_eq!((runs[0].residuals.siconos, runs[0].residuals.reached), (Some(9e-5), Some(9e-5)));
     assert_eq!(runs[0].residuals.relative, None);
     assert_eq!((runs[0].iterations, runs[3].iterations), (Some(12), None));
     // A solver that never counts above 0 does not count.

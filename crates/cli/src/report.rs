@@ -133,7 +133,11 @@ pub fn verdict_text(text: &mut String, verdict: &AnyVerdict, tolerance: f64, wor
 
 /// The residuals, in two lines.
 fn residual_text(text: &mut String, m: &Measure, unit: &str) {
-    let rest = [("relative", Some(m.relative)), ("paper", Some(m.paper)), ("peer", Some(m.peer))];
+    let rest = [
+        ("relative", Some(m.relative)),
+        ("literature", Some(m.literature)),
+        ("siconos", Some(m.siconos)),
+    ];
     let absolute = format!(", absolute {}{unit}", number(m.absolute));
     row(text, "residual", named(&rest) + &absolute);
     let parts = [

@@ -47,12 +47,12 @@ fn import_joins_problems_of_a_folder() {
     fs::create_dir(folder.path("walls")).unwrap();
     folder.run("gen wall --set rows=3 --set columns=2 --out walls/a.hdf5").exits(0);
     fs::write(folder.path("t.csv"), TABLE.replace(",5,", ",,")).unwrap();
-    folder.run(&format!("{IMPORT} --problems walls --error peer")).exits(0);
+    folder.run(&format!("{IMPORT} --problems walls --error siconos")).exits(0);
     let written = fs::read_to_string(folder.path("t.jsonl")).unwrap();
     let named = r#""name":"walls/a","family":"walls","kind":"friction_global_3d""#;
     assert!(written.contains(named), "{written}");
     assert!(written.contains(r#""name":"unmatched/b""#), "{written}");
-    assert!(written.contains(r#""reached":1e-9,"peer":1e-9"#), "{written}");
+    assert!(written.contains(r#""reached":1e-9,"siconos":1e-9"#), "{written}");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use nonsmooth_problem::{AnyPoint, Friction, FrictionGlobal, RowsGlobal};
 use nonsmooth_scenes::SceneEntry;
 
 const JUDGED: &str = "file kind contacts unknowns status message tolerance residual/absolute residual/relative \
-    residual/paper residual/peer residual/primal residual/dual residual/complementarity failing contacts_by_status/open \
+    residual/literature residual/siconos residual/primal residual/dual residual/complementarity failing contacts_by_status/open \
     contacts_by_status/stick contacts_by_status/slip degenerate worst_contacts";
 
 #[test]
@@ -19,7 +19,9 @@ fn solve_reports_as_text_and_as_json() {
     let text = folder.run("solve wall.hdf5").exits(0).stdout;
     assert!(text.starts_with("wall.hdf5: solved (relative residual "), "{text}");
     let account = "\n  account    ";
-    for part in ["friction_global_3d", "auto", account, "paper", "peer", "dynamics", "stick"] {
+    for part in
+        ["friction_global_3d", "auto", account, "literature", "siconos", "dynamics", "stick"]
+    {
         assert!(text.contains(part), "{part} in {text}");
     }
     let text = folder.run("solve wall.hdf5 --solver nsgs").exits(0).stdout;

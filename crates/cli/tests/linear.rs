@@ -10,7 +10,7 @@ use nonsmooth_problem::AnyPoint;
 use serde_json::Value;
 
 const JUDGED: &str = "file kind rows unknowns status message tolerance residual/absolute residual/relative \
-    residual/primal residual/peer failing rows_by_status/inside rows_by_status/lower rows_by_status/upper \
+    residual/primal residual/siconos failing rows_by_status/inside rows_by_status/lower rows_by_status/upper \
     rows_by_status/equalities degenerate worst_rows";
 
 fn examples() -> PathBuf {
@@ -336,7 +336,7 @@ fn campaigns_run_on_linear_problems() {
     let table = "problem,nc,tol,solver,status,iters,seconds,error\n\
         lcp_two.dat,2,1e-8,LEMKE,0,2,1e-6,1e-12\nlcp_two.dat,2,1e-8,PGS,1,9,1e-6,0.1\n";
     std::fs::write(folder.path("table.csv"), table).unwrap();
-    let import = "bench import table.csv --program Other --machine here --error peer --problems runs.jsonl --out other.jsonl";
+    let import = "bench import table.csv --program Other --machine here --error siconos --problems runs.jsonl --out other.jsonl";
     let text = folder.run(import).exits(0).stdout;
     assert!(text.contains("2 of 2 rows read; 1 problem matched, 0 not"), "{text}");
 }

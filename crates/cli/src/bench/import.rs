@@ -38,16 +38,18 @@ pub struct Args {
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum Error {
     /// Siconos' error
-    Peer,
+    #[value(alias = "peer")]
+    Siconos,
     /// The literature's: the natural map over the norm of q
-    Paper,
+    #[value(alias = "paper")]
+    Literature,
     /// The one that decides here
     Relative,
 }
 
 const EXAMPLES: &str = "\
 Example:
-  nonsmooth bench import siconos.csv --program Siconos --machine '2-core EPYC' --error peer \\
+  nonsmooth bench import siconos.csv --program Siconos --machine '2-core EPYC' --error siconos \\
       --problems runs.jsonl --out siconos.jsonl
 
 Exit codes: 0 every row was read; 2 some were not, or a mistake.";
@@ -69,8 +71,8 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         }
     }
     let measure = args.error.map(|e| match e {
-        Error::Peer => Measure::Peer,
-        Error::Paper => Measure::Paper,
+        Error::Siconos => Measure::Siconos,
+        Error::Literature => Measure::Literature,
         Error::Relative => Measure::Relative,
     });
     let source = Source { program: args.program.clone(), machine: args.machine.clone(), measure };

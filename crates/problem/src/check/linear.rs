@@ -89,7 +89,7 @@ const SMALLER: f64 = 1e-3;
 /// | `complementarity` | the largest error of a pair: the smaller of that of w and that of the distance from the bound that the sign of w asks for |
 /// | `relative` | the largest of the three; **decides** |
 /// | `absolute` | `‖(min(s_i z_i, w_i))_i‖₂`, `s_i` the largest modulus in row i, in the unit of q |
-/// | `paper`, `peer` | `‖min(z, w)‖₂ / ‖q‖₂`, as Siconos has it for an LCP |
+/// | `literature`, `siconos` | `‖min(z, w)‖₂ / ‖q‖₂`, as Siconos has it for an LCP |
 ///
 /// The unit `ω_i` is what q and the bounds make of row i: `ω_i = max(|q_i|, max_j |M_ij| ζ_j)`, where `ζ_j = max_k |q_k| / |M_kj|`, at least the smaller
 /// modulus of two finite bounds, is the unit of column j; what q does not reach gets its unit from its
@@ -328,8 +328,8 @@ impl Sum {
         Measure {
             absolute: self.scaled.sqrt() * self.unit,
             relative: worse(worse(primal, dual), complementarity),
-            paper: self.plain.sqrt(),
-            peer: self.plain.sqrt(),
+            literature: self.plain.sqrt(),
+            siconos: self.plain.sqrt(),
             primal,
             dual,
             complementarity,

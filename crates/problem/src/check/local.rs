@@ -387,7 +387,7 @@ impl LawGauge {
         };
         let plain_unit = power_of_two(plain);
         let (per, plain_per) = (1.0 / unit, 1.0 / plain_unit);
-        let (mut scaled, mut peer, mut doubts) = (0.0, 0.0, 0.0);
+        let (mut scaled, mut plain_map, mut doubts) = (0.0, 0.0, 0.0);
         let (mut primal, mut dual, mut complementarity) = (0.0, 0.0, 0.0);
         let (mut worst_contact, mut worst) = (0, -1.0);
         let (mut own_contact, mut own) = (0, 0.0);
@@ -444,7 +444,7 @@ impl LawGauge {
             }
             let plain_r = rc.map(|r| r * plain_per);
             let map = law.natural_map(&plain_r, &plain_modified.map(|u| u * plain_per));
-            peer += map.iter().map(|v| v * v).sum::<f64>();
+            plain_map += map.iter().map(|v| v * v).sum::<f64>();
             primal += share.primal;
             dual += share.dual;
             complementarity += share.complementarity;
@@ -455,8 +455,8 @@ impl LawGauge {
         Measure {
             absolute: relative * self.unit(),
             relative,
-            paper: peer.sqrt() * (plain_unit / self.unit()),
-            peer: peer.sqrt() * (plain_unit / plain),
+            literature: plain_map.sqrt() * (plain_unit / self.unit()),
+            siconos: plain_map.sqrt() * (plain_unit / plain),
             primal: primal.sqrt() * q,
             dual: dual.sqrt() * q,
             complementarity: complementarity * q * q,

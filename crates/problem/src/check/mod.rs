@@ -39,8 +39,8 @@ pub const DYNAMICS_TOLERANCE: f64 = 1e-10;
 /// | --- | --- |
 /// | `absolute` | `‖(x_c − P_K(x_c − ũ_c))_c‖₂`, a velocity in m/s |
 /// | `relative` | `absolute / ‖q‖₂`; **decides**. With q = 0, `absolute` itself |
-/// | `paper` | `‖r − P_K(r − ũ)‖₂ / ‖q‖₂` (natural map with ρ = 1) |
-/// | `peer` | `‖r − P_K(r − ũ)‖₂ / max(‖q‖, ‖r‖, ‖u‖)` |
+/// | `literature` | `‖r − P_K(r − ũ)‖₂ / ‖q‖₂` (natural map with ρ = 1) |
+/// | `siconos` | `‖r − P_K(r − ũ)‖₂ / max(‖q‖, ‖r‖, ‖u‖)` |
 ///
 /// u is recomputed from r (for global problems through the dynamics, with `q = Hᵀ M⁻¹ f + w`). Where a contact's
 /// `w_c` is not positive, the mean over the contacts stands in (1 if that is not positive either), so that
@@ -55,9 +55,9 @@ pub struct Measure {
     /// The unit-free residual that decides.
     pub relative: f64,
     /// The residual of the published campaigns.
-    pub paper: f64,
+    pub literature: f64,
     /// The residual that Siconos reports.
-    pub peer: f64,
+    pub siconos: f64,
     /// Infeasibility of the impulses: `‖(dist(x_c, K))_c‖ / ‖q‖`.
     pub primal: f64,
     /// Infeasibility of the velocities: `‖(dist(ũ_c, K*))_c‖ / ‖q‖`; a distance with mu > 1 counts as if the same velocity were into an obstacle with mu = 1,
@@ -121,8 +121,8 @@ impl Measure {
         Self {
             absolute: never,
             relative: never,
-            paper: never,
-            peer: never,
+            literature: never,
+            siconos: never,
             primal: never,
             dual: never,
             complementarity: never,

@@ -350,6 +350,9 @@ mod tests {
         let other = scaled.judge(&point, 1e-8).unwrap().measure;
         assert!((other.relative / reference.relative - 1.0).abs() < 1e-9);
         assert!((other.absolute / reference.absolute - b).abs() < 1e-9 * b);
-        assert!((other.paper / reference.paper - 1.0).abs() > 0.5, "the paper's does depend");
+        assert!(
+            (other.literature / reference.literature - 1.0).abs() > 0.5,
+            "the literature's does depend"
+        );
     }
 }

@@ -51,7 +51,7 @@ fn the_residuals_of_an_lcp_by_hand() {
     // Rows have the terms 9 and 15, less than the units 12 and 20 that q makes. Pair 1: 1/9. Pair 2: the smaller of 3/15, and 2 of max(1/9, 4/15).
     assert!(close(found.relative, 0.2) && found.complementarity == found.relative);
     // min(z, w) = (−1, 2).
-    assert!(close(found.paper, 5.0_f64.sqrt() / norm_q));
+    assert!(close(found.literature, 5.0_f64.sqrt() / norm_q));
     assert_eq!((found.primal, found.worst_contact), (0.0, 1));
     assert!(close(found.dual, 1.0 / 9.0) && found.worst == found.relative);
     let verdict = problem.judge(&at, 1e-8).unwrap();
@@ -272,8 +272,8 @@ impl Operator for Products {
 fn same(a: &Measure, b: &Measure) -> bool {
     let near = |x: f64, y: f64| (x - y).abs() <= 1e-12 * x.abs().max(y.abs()).max(1e-3);
     near(a.relative, b.relative)
-        && near(a.paper, b.paper)
-        && near(a.peer, b.peer)
+        && near(a.literature, b.literature)
+        && near(a.siconos, b.siconos)
         && near(a.primal, b.primal)
         && near(a.dual, b.dual)
         && near(a.complementarity, b.complementarity)
