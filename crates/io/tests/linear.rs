@@ -532,8 +532,8 @@ fn siconos_problems_of_contacts() {
     let mut global = "3\n1\n2\n2\n2\n1\nCSparse Version 3.2.0\ntriplet: 2-by-2, nzmax: 2 nnz: 2\n0 0 : 2\n1 1 : 5\n\
         0\n2\n3\n2 3\n1 0\n0 1\n0 6\n-1 -2\n7 8 9\n0.1\n0\n".to_owned();
     let Friction::Global3(p) = read(&global) else { panic!() };
-    assert_eq!(p.M.to_dense(), rows(&[[2.0, 0.0], [0.0, 5.0]]));
-    assert_eq!(p.H.to_dense(), rows(&[[1.0, 0.0, 0.0], [0.0, 1.0, 6.0]]));
+    assert_eq!(Matrix::from(p.M).to_dense().unwrap(), rows(&[[2.0, 0.0], [0.0, 5.0]]));
+    assert_eq!(Matrix::from(p.H).to_dense().unwrap(), rows(&[[1.0, 0.0, 0.0], [0.0, 1.0, 6.0]]));
     assert_eq!((p.f, p.w, p.mu), (vec![-1.0, -2.0], vec![7.0, 8.0, 9.0], vec![0.1]));
 
     global.truncate(global.len() - 8);

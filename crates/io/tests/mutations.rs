@@ -171,7 +171,7 @@ fn market_files() {
     }
 }
 
-const SICONOS: [&str; 7] = [
+const SICONOS: [&str; 9] = [
     "2\n0\n2 2\n2 2\n2 1\n1 2\n-5 -6\n",
     "2\n0\n2 2\n2 2\n2 1\n1 2\n-5 -6\n-1 -1\n1 1\n",
     "2\n1\n2 2\n1\n1\n1\n2\n2\n2\n1\n0 1\n0\n0\n2 1\n1 2\n-5 -6\n",
