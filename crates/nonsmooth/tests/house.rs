@@ -57,7 +57,7 @@ struct Floors {
 const PROBLEM: Floors =
     Floors { floors: &[&["error"], &["check", "*"], &["planted"]], others_mix: true, wings: &[] };
 
-/// `diagnose → registry → bridges → {contact, complementarity} → core`; inside a wing `solvers → families → what they share → form → law`.
+/// `diagnose → door → registry → bridges → {contact, complementarity} → core`; inside a wing `solvers → families → what they share → form → law`.
 /// The question of existence and the elimination of velocities are no families: any may ask them.
 const SOLVE: Floors = Floors {
     floors: &[
@@ -76,7 +76,8 @@ const SOLVE: Floors = Floors {
         &["contact/solvers", "complementarity/solvers"],
         &["bridges"],
         &["registry"],
-        &["diagnose", "door"],
+        &["door"],
+        &["diagnose"],
     ],
     others_mix: false,
     wings: &["contact", "complementarity"],
