@@ -148,11 +148,13 @@ fn impulses(problem: &Friction, solution: &Solution) -> Vec<Impulse> {
     each.map(|((r, &mu), status)| {
         let normal = r[0];
         let reach = mu * normal;
-        let part = (reach > 0.0).then(|| r[1..].iter().map(|t| t / reach).collect());
         let motion = match status {
             AnyStatus::Contact(contact) => contact.status,
             AnyStatus::Row(_) => Motion::Open,
         };
+        // What rounding leaves at an open contact is no impulse.
+        let part = (reach > 0.0 && motion != Motion::Open)
+            .then(|| r[1..].iter().map(|t| t / reach).collect());
         Impulse { normal, part, motion }
     })
     .collect()
@@ -244,7 +246,8 @@ fn histogram<DB: DrawingBackend>(area: &DrawingArea<DB, Shift>, impulses: &[Impu
 where
     DB::ErrorType: 'static,
 {
-    let closed: Vec<&Impulse> = impulses.iter().filter(|i| i.normal > 0.0).collect();
+    let closed: Vec<&Impulse> =
+        impulses.iter().filter(|i| i.normal > 0.0 && i.motion != Motion::Open).collect();
     let mean = closed.iter().map(|i| i.normal).sum::<f64>() / closed.len().max(1) as f64;
     let names = [(Motion::Stick, "stick"), (Motion::Slip, "slip"), (Motion::Open, "open")];
     legend(area, &format!("Normal impulses, mean {mean:.3e}"), impulses, &names)?;

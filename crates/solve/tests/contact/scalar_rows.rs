@@ -55,7 +55,7 @@ fn frictionless_problems_agree_with_their_box_lcp() {
         let (local, _) = case.local::<2>();
         let RowsLocal { V, R, s, bounds } = local.rows.as_ref().unwrap();
         let (nc, p) = (local.contacts(), s.len());
-        let normal = |i: usize| (i % 2 == 0).then_some(i / 2);
+        let normal = |i: usize| i.is_multiple_of(2).then_some(i / 2);
         let w = local.W.to_csc();
         let of_w = w.triplets().filter_map(|(i, j, x)| Some((normal(i)?, normal(j)?, x)));
         let of_v = V.triplets().filter_map(|(i, j, x)| Some((normal(i)?, nc + j, x)));

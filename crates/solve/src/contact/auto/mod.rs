@@ -66,7 +66,7 @@ impl Described for Auto {
         name: "auto",
         family: "auto",
         solves: Solves::Law,
-        summary: "needs no setting: sweeps, interior point, proximal semismooth Newton, each where it is the fastest",
+        summary: "needs no setting: sweeps, interior point, proximal semismooth Newton, each while it promises more than the next",
         needs: &[],
         cites: &["AcaryBremondHuber2018", "AlartCurnier1991", "Acary2018"],
         variants: &["interior=false"],
