@@ -344,8 +344,11 @@ fn refusal(option: &str, path: &Path, expected: &str, cause: std::io::Error) -> 
     format!("{option} {path}: expected {expected}, found: {cause}")
 }
 
-/// Whether two paths lead to the same file, which need not exist.
+/// Whether two paths lead to the same file, which need not exist. Standard streams are none.
 pub fn same(a: &Path, b: &Path) -> bool {
+    if is_stream(a) || is_stream(b) {
+        return false;
+    }
     let resolved = |path: &Path| {
         path.canonicalize().or_else(|_| {
             let parent = path.parent().filter(|p| !p.as_os_str().is_empty());

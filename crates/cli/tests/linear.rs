@@ -272,7 +272,7 @@ fn mistakes_are_named() {
             &["solver `nsgs` takes friction problems only (this file: lcp)"],
         ),
         ("solve box.hdf5 --solver projected_jacobi", &["takes lcp, mlcp, box_lcp problems only"]),
-        ("solve string.toml --out a.hdf5", &["--out a.hdf5", ".toml or .mtx"]),
+        ("solve string.toml --out a.hdf5", &["--out a.hdf5", ".toml, .mtx or .csv"]),
         ("solve rectifier.toml --solver projected_jacobi", &["rectifier.toml", "diagonal"]),
         ("solve two.mtx --warm-start", &["two.mtx: [solution]", "none"]),
         (

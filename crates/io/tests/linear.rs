@@ -317,7 +317,7 @@ fn mistakes_in_our_format_are_named() {
         assert!(!folder.path(name).exists());
     }
     let message = operator.write(folder.path("o.txt")).unwrap_err().to_string();
-    let expected = "o.txt: expected a file name that ends in .toml or .mtx for a problem lcp";
+    let expected = "o.txt: expected a file name that ends in .toml, .mtx or .csv for a problem lcp";
     assert!(message.ends_with(expected), "{message}");
     let guesses = vec![LcpPoint { z: vec![0.0] }.into()];
     let message = ProblemFile { guesses, ..operator }.write(folder.path("o.toml"));
