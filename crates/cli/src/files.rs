@@ -183,7 +183,7 @@ pub fn read_within(file: &Path, limits: &Limits) -> Result<Result<ProblemFile, L
     }
 }
 
-/// `; did you mean …?` of a file that is not there and has one of nearly its name beside it.
+/// ` (did you mean …?)` of a file that is not there and has one of nearly its name beside it.
 fn meant(missing: &Path) -> Option<String> {
     if missing.exists() {
         return None;
@@ -192,7 +192,7 @@ fn meant(missing: &Path) -> Option<String> {
     let names = fs::read_dir(folder).ok()?.flatten();
     let names = names.map(|entry| entry.file_name().to_string_lossy().into_owned());
     let near = spelling::nearest(&missing.file_name()?.to_string_lossy(), names)?;
-    Some(format!("; did you mean `{}`?", missing.with_file_name(near).display()))
+    Some(format!(" (did you mean `{}`?)", missing.with_file_name(near).display()))
 }
 
 /// When a limit came that came early.

@@ -15,7 +15,7 @@ pub enum SolveError {
     UnknownSolver {
         /// The name asked for.
         name: String,
-        /// `; did you mean …?`, or nothing.
+        /// ` (did you mean …?)`, or nothing.
         meant: String,
         /// The names that exist.
         known: String,

@@ -10,9 +10,9 @@ pub fn nearest<S: AsRef<str>>(word: &str, known: impl IntoIterator<Item = S>) ->
     alike.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name.as_ref().to_owned())
 }
 
-/// `; did you mean …?` for messages; nothing where no name is alike.
+/// ` (did you mean …?)` for messages; nothing where no name is alike.
 pub fn meant<S: AsRef<str>>(word: &str, known: impl IntoIterator<Item = S>) -> String {
-    nearest(word, known).map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
+    nearest(word, known).map_or_else(String::new, |name| format!(" (did you mean `{name}`?)"))
 }
 
 #[cfg(test)]
@@ -26,6 +26,6 @@ mod tests {
         assert_eq!(nearest("newton-ac", known).as_deref(), Some("newton_ac"));
         assert_eq!(nearest("condens/nsgs", known).as_deref(), Some("condense/nsgs"));
         assert_eq!(nearest("magic", known), None);
-        assert_eq!(meant("atuo", known), "; did you mean `auto`?");
+        assert_eq!(meant("atuo", known), " (did you mean `auto`?)");
     }
 }
