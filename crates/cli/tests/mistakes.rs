@@ -179,7 +179,7 @@ fn slips_are_answered_by_what_was_meant() {
     for (command, meant) in [
         ("solve box.hdf5 --solver nsg", "did you mean `nsgs`?"),
         ("solve box.hdf5 --solver newton-ac", "did you mean `newton_ac`?"),
-        ("solve box.hdf5 --solver condense/nsg", "did you mean `condense/nsgs`?"),
+        ("solve box.hdf5 --solver proximal/nsg", "did you mean `proximal/nsgs`?"),
         ("solve box.hdf5 --solver nsgs --set omgea=0.9", "did you mean `omega`?"),
         ("solve bocks.hdf5", "did you mean `box.hdf5`?"),
         ("solve box.hdf --solver nsgs", "did you mean `box.hdf5`?"),

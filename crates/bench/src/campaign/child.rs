@@ -174,6 +174,10 @@ fn autopsy(status: ExitStatus, words: &str, memory_limit: u64) -> End {
             let message = "killed from outside (signal 9), as systems do where memory is short";
             return End::OutOfMemory(message.into());
         }
+        // Ctrl-C reaches the whole group: a worker that has yet to learn to ignore it dies of it, before the campaign is told.
+        if signal == nix::libc::SIGINT {
+            return End::Cancelled;
+        }
         return End::Crashed(format!("signal {signal}{}", said(words)));
     }
     End::Crashed(format!("{status}{}", said(words)))

@@ -38,7 +38,9 @@ pub fn inputs(roots: &[PathBuf]) -> (Vec<Input>, Vec<String>) {
         walk(root, root, &mut here, &mut mistakes);
         if here.is_empty() && mistakes.len() == before {
             let root = root.display();
-            let named = FORMATS.map(|f| format!("*.{}", f.about().extensions[0])).join(", ");
+            let reads = FORMATS.iter().filter(|f| !f.about().reads.is_empty());
+            let named: Vec<_> = reads.map(|f| format!("*.{}", f.about().extensions[0])).collect();
+            let named = named.join(", ");
             mistakes.push(format!("{root}: expected problems ({named}), found none"));
         }
         for path in here {

@@ -346,10 +346,8 @@ impl Progress {
         let (problems, runs) = (count(problems, "problem"), count(runs, "run"));
         let at_most = clock(at_most);
         self.aside(&|| {
-            let _ = writeln!(
-                std::io::stderr(),
-                "{problems}, {runs}, at most {at_most} if every one goes to its time limit"
-            );
+            let limit = format!("at most {at_most} if every one goes to its time limit");
+            output::print(&format!("{problems}, {runs}, {limit}\n"));
         });
     }
 
