@@ -117,7 +117,11 @@ fn mistakes_are_named_on_one_line() {
             "rows: expected a whole number of at least 0, found \"many\"",
         ),
         ("wall", json!({"columns": 100_000_000}), "columns: expected a count from 1 to 1000"),
-        ("wall", json!({"row": 3}), "unknown key `row`; there are: rows, columns"),
+        (
+            "wall",
+            json!({"row": 3}),
+            "unknown key `row` (did you mean `rows`?); there are: rows, columns",
+        ),
         ("arch", json!({"blocks": 2}), "blocks: expected a count from 3 to 10000, found 2"),
         ("arch", json!({"thickness": 0}), "thickness: expected a positive number"),
         ("arch", json!({"mu": -0.1}), "mu: expected a number of at least 0, found -0.1"),

@@ -112,7 +112,7 @@ mod tests {
     fn mistakes_in_settings_name_key_expected_and_found() {
         assert_eq!(
             refusal(&["omga=1"]),
-            "solver `nsgs`: unknown key `omga`; there are: local, local_tolerance, omega, omega_min, \
+            "solver `nsgs`: unknown key `omga` (did you mean `omega`?); there are: local, local_tolerance, omega, omega_min, \
              ordering, seed, freeze_after, freeze_for, anderson, anderson_every, check_every"
         );
         assert_eq!(
