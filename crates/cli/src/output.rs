@@ -10,7 +10,7 @@ pub fn print(text: &str) {
     print_bytes(text.as_bytes());
 }
 
-/// As [`print`], of a result that need not be text.
+/// As [`print()`], of a result that need not be text.
 pub fn print_bytes(bytes: &[u8]) {
     let mut out = std::io::stdout().lock();
     let written = out.write_all(bytes).and_then(|()| out.flush());
