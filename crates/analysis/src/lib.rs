@@ -1,6 +1,8 @@
-//! What a problem is like before anybody solves it: [`Traits`] are cheap, a [`Spectrum`] is dense.
+//! What a problem is like before anybody solves it: [`Traits`] are cheap, a [`Spectrum`] is dense. And whether the impulses of a solution are the only ones: its
+//! [`Indeterminacy`].
 
 mod classes;
+mod indeterminacy;
 mod pattern;
 mod spectrum;
 
@@ -10,6 +12,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 pub use classes::{Class, Classes, Effort, Finding, How, Why, Witness};
+pub use indeterminacy::Indeterminacy;
 pub use pattern::Pattern;
 pub use spectrum::{Spectrum, SpectrumError, rank};
 

@@ -65,12 +65,14 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             all.extend(report::fields(json!({"tolerance": tol, "status": name, "message": says})));
             let worst = args.worst.unwrap_or(verdict.worst.len());
             all.extend(report::verdict_json(&verdict, tol, worst));
+            all.extend(report::uniqueness_json(&content, &stored.point, &verdict));
             output::print(&format!("{}\n", json!(all)));
         } else {
             let mut text = report::headline(file, says, &verdict.measure, tol);
             report::row(&mut text, "problem", report::problem_text(problem));
             let worst = args.worst.unwrap_or(if verdict.solved { 0 } else { 3 });
             report::verdict_text(&mut text, &verdict, tol, worst);
+            report::uniqueness_text(&mut text, &content, &stored.point, &verdict);
             output::print(&text);
         }
         Ok(Exit::solved(verdict.solved))

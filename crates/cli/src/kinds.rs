@@ -104,6 +104,8 @@ pub struct Counted {
     pub unit: &'static str,
     /// The numbers with their names; all that is counted is in one of them.
     pub all: Vec<(usize, &'static str)>,
+    /// Those of the second that stick at the limit of friction.
+    pub at_limit: usize,
     /// Those near another status.
     pub degenerate: usize,
 }
@@ -115,13 +117,14 @@ pub fn counted(counts: &AnyCounts) -> Counted {
             what: "contact",
             unit: " m/s",
             all: vec![(c.open, "open"), (c.stick, "stick"), (c.slip, "slip")],
+            at_limit: c.at_limit,
             degenerate: c.degenerate,
         },
         AnyCounts::Rows(c) => {
             let mut all = vec![(c.inside, "inside"), (c.lower, "at the lower bound")];
             let others = [(c.upper, "at the upper bound"), (c.equalities, "equalities")];
             all.extend(others.into_iter().filter(|c| c.0 > 0));
-            Counted { what: "row", unit: "", all, degenerate: c.degenerate }
+            Counted { what: "row", unit: "", all, at_limit: 0, degenerate: c.degenerate }
         }
     }
 }

@@ -3,10 +3,12 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use nonsmooth_analysis::Indeterminacy;
 /// `1 contact`, `2 contacts`.
 pub use nonsmooth_bench::plural as count;
+use nonsmooth_io::ProblemFile;
 use nonsmooth_problem::check::{self, Failing, Measure};
-use nonsmooth_problem::{AnyProblem, Problem};
+use nonsmooth_problem::{AnyPoint, AnyProblem, AnyStatus, GlobalPoint, LocalPoint, Problem};
 use serde_json::{Value, json};
 
 pub use crate::json::{Object, fields};
@@ -55,6 +57,53 @@ pub fn verdict_json(verdict: &AnyVerdict, tolerance: f64, worst: usize) -> Objec
     }))
 }
 
+/// Whether the motion of a solution determines its impulses; `dofs` as a file has them. Nothing of a point that is none, or of a complementarity problem.
+fn indeterminacy(
+    problem: &AnyProblem,
+    point: &AnyPoint,
+    dofs: Option<usize>,
+    verdict: &AnyVerdict,
+) -> Option<Indeterminacy> {
+    let (AnyPoint::Local(LocalPoint { r, lambda })
+    | AnyPoint::Global(GlobalPoint { r, lambda, .. })) = point
+    else {
+        return None;
+    };
+    let AnyProblem::Friction(problem) = problem else { return None };
+    let contact = |status: &AnyStatus| match status {
+        AnyStatus::Contact(contact) => Some(*contact),
+        AnyStatus::Row(_) => None,
+    };
+    let statuses: Vec<_> = verdict.statuses.iter().filter_map(contact).collect();
+    let found = || Indeterminacy::of(problem, (r, lambda), &statuses, dofs);
+    verdict.solved.then(found).flatten()
+}
+
+/// Says where the impulses of a solution are not the only ones.
+pub fn uniqueness_text(
+    text: &mut String,
+    content: &ProblemFile,
+    point: &AnyPoint,
+    verdict: &AnyVerdict,
+) {
+    let found = indeterminacy(&content.problem, point, content.info.dofs, verdict);
+    if let Some(Indeterminacy { rank, of, counted }) =
+        found.filter(|i| i.is_unique() == Some(false))
+    {
+        let how = if counted { "rank at most" } else { "rank" };
+        let says = format!("not unique: {how} {rank} of {of}; all of them give the same motion");
+        row(text, "impulses", says);
+    }
+}
+
+/// The same for JSON; null where it is not known.
+pub fn uniqueness_json(content: &ProblemFile, point: &AnyPoint, verdict: &AnyVerdict) -> Object {
+    let found = indeterminacy(&content.problem, point, content.info.dofs, verdict);
+    let AnyProblem::Friction(_) = content.problem else { return Object::new() };
+    let unique = found.as_ref().and_then(Indeterminacy::is_unique);
+    fields(json!({"impulses_unique": unique, "indeterminacy": found}))
+}
+
 fn uncounted(verdict: &AnyVerdict) -> bool {
     verdict.statuses.is_empty() && !verdict.velocity.is_empty()
 }
@@ -99,7 +148,7 @@ fn listed(failing: &[Failing], more: impl Fn(&Failing) -> String) -> String {
 /// The residuals, what else than the relative one fails at `tolerance`, the contacts (or rows) by status, and the
 /// `worst` of them where it is they that fail.
 pub fn verdict_text(text: &mut String, verdict: &AnyVerdict, tolerance: f64, worst: usize) {
-    let Counted { what, unit, all, degenerate } = counted(&verdict.counts);
+    let Counted { what, unit, all, at_limit, degenerate } = counted(&verdict.counts);
     residual_text(text, &verdict.measure, unit);
     let (relative, others) = failing(&verdict.measure, tolerance);
     if !others.is_empty() {
@@ -120,7 +169,11 @@ pub fn verdict_text(text: &mut String, verdict: &AnyVerdict, tolerance: f64, wor
         0 => String::new(),
         n => format!(" ({n} degenerate: near another status)"),
     };
-    let all: Vec<_> = all.iter().map(|(n, what)| format!("{n} {what}")).collect();
+    let limit = |what: &str| match at_limit {
+        n if n > 0 && what == "stick" => format!(" ({n} at the limit of friction)"),
+        _ => String::new(),
+    };
+    let all: Vec<_> = all.iter().map(|(n, what)| format!("{n} {what}{}", limit(what))).collect();
     row(text, &what, all.join(", ") + &degenerate);
     let worst = if relative || others.is_empty() { worst } else { 0 };
     let worst: Vec<_> = worst_of(verdict, worst)

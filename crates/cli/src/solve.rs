@@ -416,6 +416,7 @@ fn json_line(
         all.insert("certificate".into(), certificate);
     }
     all.extend(report::verdict_json(verdict, plan.limits.tolerance, verdict.worst.len()));
+    all.extend(report::uniqueness_json(content, &solved.point, verdict));
     if let Some(stored) = content.solution.as_ref().filter(|_| solution) {
         all.insert("solution".into(), answer::json(problem, stored, &content.info.names));
     }
@@ -452,6 +453,7 @@ fn text(file: &Path, content: &ProblemFile, plan: &Plan, solved: &Solved, asked:
     let settled = is_solved || matches!(status, Status::Infeasible(_));
     let worst = if settled { 0 } else { WORST };
     report::verdict_text(&mut text, verdict, tolerance, worst);
+    report::uniqueness_text(&mut text, content, &solved.point, verdict);
     // A point that is none is shown to those who ask for it.
     if is_solved {
         answer::text(&mut text, "solution", content, asked.solution);

@@ -190,6 +190,7 @@ fn word(status: &AnyStatus) -> &'static str {
     match status {
         AnyStatus::Contact(contact) => match contact.status {
             Motion::Open => "open",
+            Motion::Stick if contact.at_limit => "stick at limit",
             Motion::Stick => "stick",
             Motion::Slip => "slip",
         },

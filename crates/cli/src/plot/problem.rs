@@ -298,7 +298,7 @@ where
 
 /// The statuses that have a place in a cone.
 const CLOSED: [(Motion, &str); 2] =
-    [(Motion::Stick, "stick: inside"), (Motion::Slip, "slip: at the limit")];
+    [(Motion::Stick, "stick"), (Motion::Slip, "slip: at the limit")];
 
 /// In space: the tangential impulses over their largest size, in the unit disk.
 fn disk<DB: DrawingBackend>(area: &DrawingArea<DB, Shift>, impulses: &[Impulse]) -> Drawn

@@ -11,17 +11,19 @@ use nonsmooth_linalg::{Real, norm, norm_of, power_of_two, small};
 pub enum Motion {
     /// No impulse, separating: `r = 0`.
     Open,
-    /// Pressed and at rest: `u = 0`, `r` inside K.
+    /// Pressed and at rest: `u = 0`, `r` in K.
     Stick,
-    /// Pressed and sliding: `u_N = 0`, `r` on the boundary of K against the sliding velocity.
+    /// Pressed and sliding: `u_N = 0`, `u_T ≠ 0`, `r` on the boundary of K against the sliding velocity.
     Slip,
 }
 
 /// The status of a contact and whether it is certain at the tolerance asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct ContactStatus {
-    /// Open, stick or slip: the region of the cone in which `x − ũ` lies.
+    /// Open, stick or slip: the region of the cone in which `x − ũ` lies, and whether there is motion.
     pub status: Motion,
+    /// Sticking at the limit of friction: at rest, with the impulse on the boundary of K. Where impulses are not unique one answer has a contact there, another one does not.
+    pub at_limit: bool,
     /// The margin to another status is below the tolerance.
     pub degenerate: bool,
 }
@@ -178,7 +180,7 @@ impl<const D: usize> Law<D> for Coulomb {
         pressed.max(sliding.min(across)).max(pulling)
     }
 
-    /// The region of the cone in which `x − ũ` lies.
+    /// The region of the cone in which `x − ũ` lies: outside of both cones it slips if it moves, and else sticks at the limit.
     #[inline(always)]
     fn status(self, x: &[f64; D], modified: &[f64; D], margin: f64) -> ContactStatus {
         let mu = self.mu;
@@ -188,16 +190,21 @@ impl<const D: usize> Law<D> for Coulomb {
         // Signed distances of y into K and into its polar cone −K*.
         let into_cone = (mu * y[0] - t) / secant;
         let into_polar = (-y[0] - mu * t) / secant;
+        // A frictionless contact slides or is open: its cone has no interior to be in or near to.
+        let rough = mu > 0.0;
         let status = if into_polar >= 0.0 {
             Motion::Open
-        } else if mu > 0.0 && into_cone >= 0.0 {
+        } else if rough && (into_cone >= 0.0 || tangential(modified) <= margin) {
             Motion::Stick
         } else {
             Motion::Slip
         };
-        // A frictionless contact slides or is open: its cone has no interior to be near to.
-        let near_stick = mu > 0.0 && into_cone.abs() <= margin;
-        ContactStatus { status, degenerate: into_polar.abs() <= margin || near_stick }
+        let near_boundary = rough && into_cone.abs() <= margin;
+        ContactStatus {
+            status,
+            at_limit: status == Motion::Stick && (near_boundary || into_cone < 0.0),
+            degenerate: into_polar.abs() <= margin || near_boundary,
+        }
     }
 }
 
@@ -253,12 +260,35 @@ mod tests {
         assert!(Coulomb { mu }.status(&[2.0, -1.0, 0.0], &[0.0; 3], 1e-9).degenerate);
     }
 
+    /// On the boundary of K the velocity decides, not the last bit of the impulse.
+    #[test]
+    fn what_does_not_move_sticks_at_the_limit() {
+        let law = Coulomb { mu: 0.5 };
+        let on_boundary = |t: f64, u: f64| {
+            law.status(&[2.0, -t, 0.0], &law.modified_velocity(&[0.0, u, 0.0]), 1e-9)
+        };
+        for t in [1.0, 1.0 + 1e-12, 1.0 - 1e-12] {
+            let at_rest = on_boundary(t, 0.0);
+            assert_eq!((at_rest.status, at_rest.at_limit), (Motion::Stick, true), "{t}");
+            let moving = on_boundary(t, 1e-3);
+            assert_eq!((moving.status, moving.at_limit), (Motion::Slip, false), "{t}");
+        }
+        let inside = on_boundary(0.5, 0.0);
+        assert_eq!((inside.status, inside.at_limit), (Motion::Stick, false));
+    }
+
     #[test]
     fn frictionless_contacts_slide_or_are_open() {
         let pressed = Coulomb { mu: 0.0 }.status(&[1.0, 0.0, 0.0], &[0.0, 0.0, 0.0], 1e-9);
-        assert_eq!(pressed, ContactStatus { status: Motion::Slip, degenerate: false });
+        assert_eq!(
+            pressed,
+            ContactStatus { status: Motion::Slip, at_limit: false, degenerate: false }
+        );
         let open = Coulomb { mu: 0.0 }.status(&[0.0; 3], &[1.0, 5.0, 0.0], 1e-9);
-        assert_eq!(open, ContactStatus { status: Motion::Open, degenerate: false });
+        assert_eq!(
+            open,
+            ContactStatus { status: Motion::Open, at_limit: false, degenerate: false }
+        );
     }
 
     #[test]

@@ -29,7 +29,7 @@ pub struct Verdict<Status = ContactStatus, Counts = StatusCounts> {
     pub worst: Vec<(usize, f64)>,
 }
 
-/// How many contacts are open, stick and slip (they add up), and how many of those are degenerate.
+/// How many contacts are open, stick and slip (they add up), and how many of those are at a limit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct StatusCounts {
     /// Contacts without impulse.
@@ -38,6 +38,8 @@ pub struct StatusCounts {
     pub stick: usize,
     /// Sliding contacts.
     pub slip: usize,
+    /// Contacts, counted among those that stick, whose impulse is at the limit of friction.
+    pub at_limit: usize,
     /// Contacts, counted above as well, whose margin to another status is below the tolerance.
     pub degenerate: usize,
 }
@@ -112,6 +114,7 @@ fn verdict<L: Law<D>, const D: usize>(
             Motion::Stick => counts.stick += 1,
             Motion::Slip => counts.slip += 1,
         }
+        counts.at_limit += usize::from(s.at_limit);
         counts.degenerate += usize::from(s.degenerate);
         statuses.push(s);
         let share = law.natural_map(&x, &modified).iter().map(|v| v * v).sum::<f64>().sqrt();

@@ -1,0 +1,253 @@
+//! Whether the impulses of a solution are the only ones: static indeterminacy.
+
+use serde::Serialize;
+
+use nonsmooth_linalg::{Csc, norm};
+use nonsmooth_problem::check::{ContactStatus, Motion};
+use nonsmooth_problem::{Bounds, Friction, FrictionGlobal, FrictionLocal};
+
+use crate::rank;
+
+/// The largest dense matrix, in entries, of which a rank is computed: some 50 ms.
+const DENSE: usize = 100_000;
+
+/// How many of the directions in which the impulses of a solution may change the motion feels.
+///
+/// At a solution an impulse may grow and shrink along these directions A without leaving its law: a contact that sticks inside its cone, in all D; one that
+/// slips, or sticks at the limit of friction, along `r_c` itself; a scalar row between its bounds, in one. What `[H, G] A` maps to zero changes no velocity, so
+/// that with `rank < of` the problem has other solutions with the same motion; `of − rank` is the degree of static indeterminacy. With W in place of H the same
+/// holds of `[W, V; Vᵀ, R] A`.
+///
+/// Of matrices of more than 10⁵ entries the rank is not computed; it is then at most the number of degrees of freedom that the directions touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Indeterminacy {
+    /// The directions that the motion feels; at most so many where `counted`.
+    pub rank: usize,
+    /// The directions in which impulses may change.
+    pub of: usize,
+    /// Whether the rank is an upper bound by counting, in place of one of singular values, which holds up to rounding.
+    pub counted: bool,
+}
+
+impl Indeterminacy {
+    /// That of a solution with impulses r (D nc), λ (p) and these statuses (nc). `dofs`: the degrees of freedom that a local problem was condensed from, where
+    /// they are known. `None` where no impulse acts, or nothing is known.
+    ///
+    /// Cost: O(nnz), and the singular values of a matrix of at most 10⁵ entries.
+    pub fn of(
+        problem: &Friction,
+        (r, lambda): (&[f64], &[f64]),
+        statuses: &[ContactStatus],
+        dofs: Option<usize>,
+    ) -> Option<Self> {
+        match problem {
+            Friction::Local2(p) => local(p, r, lambda, statuses, dofs),
+            Friction::Local3(p) => local(p, r, lambda, statuses, dofs),
+            Friction::Global2(p) => global(p, r, lambda, statuses),
+            Friction::Global3(p) => global(p, r, lambda, statuses),
+        }
+    }
+
+    /// Whether the motion determines the impulses; a rank by counting does not say so.
+    pub fn is_unique(&self) -> Option<bool> {
+        match (self.rank < self.of, self.counted) {
+            (true, _) => Some(false),
+            (false, false) => Some(true),
+            (false, true) => None,
+        }
+    }
+}
+
+fn global<const D: usize>(
+    p: &FrictionGlobal<D>,
+    r: &[f64],
+    lambda: &[f64],
+    statuses: &[ContactStatus],
+) -> Option<Indeterminacy> {
+    let directions = directions::<D>(r, statuses);
+    let columns = directions.iter().map(|direction| direction.of(&p.H).collect());
+    let rows = p.rows.iter().flat_map(|rows| {
+        between(&rows.bounds, lambda).map(|j| entries(rows.G.column(j), 0).collect())
+    });
+    let all: Vec<Vec<_>> = columns.chain(rows).collect();
+    counted(&all, None)
+}
+
+fn local<const D: usize>(
+    p: &FrictionLocal<D>,
+    r: &[f64],
+    lambda: &[f64],
+    statuses: &[ContactStatus],
+    dofs: Option<usize>,
+) -> Option<Indeterminacy> {
+    let (w, m) = (p.W.to_csc(), p.q.len());
+    let directions = directions::<D>(r, statuses);
+    let across = p.rows.as_ref().map(|rows| rows.V.transpose());
+    let columns = directions.iter().map(|direction| {
+        let below = across.iter().flat_map(|v| direction.of(v));
+        direction.of(&w).chain(below.map(|(i, x)| (m + i, x))).collect()
+    });
+    let rows = p.rows.iter().flat_map(|rows| {
+        between(&rows.bounds, lambda)
+            .map(|j| entries(rows.V.column(j), 0).chain(entries(rows.R.column(j), m)).collect())
+    });
+    let all: Vec<Vec<_>> = columns.chain(rows).collect();
+    counted(&all, dofs)
+}
+
+/// From the columns by their entries; the rank is at most `most`.
+fn counted(columns: &[Vec<(usize, f64)>], most: Option<usize>) -> Option<Indeterminacy> {
+    let of = columns.len();
+    if of == 0 {
+        return None;
+    }
+    let mut touched: Vec<_> =
+        columns.iter().flatten().filter(|e| e.1 != 0.0).map(|e| e.0).collect();
+    touched.sort_unstable();
+    touched.dedup();
+    // Rows without an entry do not enlarge the dense matrix.
+    let place = |i: usize| touched.binary_search(&i).ok();
+    let triplets = columns
+        .iter()
+        .enumerate()
+        .flat_map(|(j, column)| column.iter().filter_map(move |&(i, x)| Some((place(i)?, j, x))));
+    let a = Csc::from_triplets(touched.len(), of, triplets.collect::<Vec<_>>().into_iter()).ok()?;
+    let bound = most.map_or(touched.len(), |n| n.min(touched.len()));
+    match rank(&a, DENSE) {
+        Some(rank) => Some(Indeterminacy { rank, of, counted: false }),
+        None => (bound < of).then_some(Indeterminacy { rank: bound, of, counted: true }),
+    }
+}
+
+/// A direction in the impulse of one contact.
+struct Direction<const D: usize> {
+    contact: usize,
+    along: [f64; D],
+}
+
+impl<const D: usize> Direction<D> {
+    /// The entries of `A d`, to be added up.
+    fn of<'a>(&'a self, a: &'a Csc) -> impl Iterator<Item = (usize, f64)> + 'a {
+        let each = self.along.iter().enumerate().filter(|(_, x)| **x != 0.0);
+        each.flat_map(|(k, &x)| {
+            entries(a.column(D * self.contact + k), 0).map(move |(i, a)| (i, a * x))
+        })
+    }
+}
+
+fn entries<'a>(
+    (rows, values): (&'a [usize], &'a [f64]),
+    after: usize,
+) -> impl Iterator<Item = (usize, f64)> + 'a {
+    rows.iter().zip(values).map(move |(&i, &x)| (after + i, x))
+}
+
+/// The directions in which the impulses of contacts may change.
+fn directions<const D: usize>(r: &[f64], statuses: &[ContactStatus]) -> Vec<Direction<D>> {
+    let mut all = vec![];
+    for (contact, (status, r)) in statuses.iter().zip(r.chunks_exact(D)).enumerate() {
+        let size = norm(r);
+        let inside = status.status == Motion::Stick && !status.at_limit;
+        if inside {
+            let axis = |k| std::array::from_fn(|l| f64::from(u8::from(k == l)));
+            all.extend((0..D).map(|k| Direction { contact, along: axis(k) }));
+        } else if status.status != Motion::Open && size > 0.0 {
+            all.push(Direction { contact, along: std::array::from_fn(|k| r[k] / size) });
+        }
+    }
+    all
+}
+
+/// The rows whose impulses are strictly between their bounds.
+fn between<'a>(bounds: &'a Bounds, lambda: &'a [f64]) -> impl Iterator<Item = usize> + 'a {
+    let inside = |&j: &usize| {
+        let [l, u] = bounds.of(j);
+        l < lambda[j] && lambda[j] < u
+    };
+    (0..lambda.len()).filter(inside)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nonsmooth_problem::GlobalPoint;
+    use nonsmooth_problem::check::Judged;
+    use nonsmooth_problem::planted::{Planted, PlantedMix};
+
+    /// A body of one degree of freedom on two supports below it, in the plane: the weight may be on either.
+    fn beam(supports: usize, mu: f64) -> (FrictionGlobal<2>, Vec<f64>) {
+        let h = (0..supports).flat_map(|c| [(0, 2 * c, 1.0), (1, 2 * c + 1, 1.0)]);
+        let h = Csc::from_triplets(2, 2 * supports, h).unwrap();
+        let problem = FrictionGlobal::new(
+            Csc::diagonal(&[1.0, 1.0]),
+            h,
+            vec![-1.0, 0.0],
+            vec![0.0; 2 * supports],
+            vec![mu; supports],
+        );
+        let r = (0..supports).flat_map(|_| [1.0 / supports as f64, 0.0]).collect();
+        (problem.unwrap(), r)
+    }
+
+    fn found<const D: usize>(p: &FrictionGlobal<D>, r: &[f64]) -> Option<Indeterminacy> {
+        let mut v = p.f.clone();
+        p.H.mul_add(1.0, r, &mut v);
+        let point = GlobalPoint { v, r: r.to_vec(), lambda: vec![] };
+        let verdict = p.judge(&point, 1e-10).unwrap();
+        assert!(verdict.solved, "{:?}", verdict.measure);
+        global(p, r, &[], &verdict.statuses)
+    }
+
+    #[test]
+    fn a_weight_on_two_supports_may_be_on_either() {
+        let some = |rank, of| Some(Indeterminacy { rank, of, counted: false });
+        let (one, r) = beam(1, 0.5);
+        assert_eq!(found(&one, &r), some(2, 2));
+        let (two, r) = beam(2, 0.5);
+        let indeterminate = found(&two, &r).unwrap();
+        assert_eq!(Some(indeterminate), some(2, 4));
+        assert_eq!(indeterminate.is_unique(), Some(false));
+        // Another solution with the same motion, and one at the limits of friction, which one line each is left of.
+        assert_eq!(found(&two, &[0.7, 0.1, 0.3, -0.1]), some(2, 4));
+        assert_eq!(found(&two, &[0.5, 0.25, 0.5, -0.25]), some(2, 2));
+        // All of it on one support: the other one is open.
+        assert_eq!(found(&two, &[1.0, 0.0, 0.0, 0.0]), some(2, 2));
+        let (smooth, r) = beam(3, 0.0);
+        assert_eq!(found(&smooth, &r), some(1, 3));
+        let (empty, _) = beam(2, 0.5);
+        let still = FrictionGlobal { f: vec![1.0, 0.0], ..empty };
+        assert_eq!(found(&still, &[0.0; 4]), None);
+    }
+
+    /// In the local form the degrees of freedom are gone, and the rank is the same.
+    #[test]
+    fn both_forms_agree_scalar_rows_included() {
+        for (contacts, dofs, bilateral) in [(4, 60, 0), (12, 24, 0), (12, 30, 5), (3, 60, 8)] {
+            let mix = PlantedMix { open: 1.0, stick: 3.0, slip: 2.0, degenerate: 0.0 };
+            let case = Planted { contacts, dofs, bilateral, mix, ..Planted::default() };
+            let (p, point) = case.global::<3>();
+            let statuses = p.judge(&point, 1e-8).unwrap().statuses;
+            let of_global = global(&p, &point.r, &point.lambda, &statuses).unwrap();
+            let (q, point) = case.local::<3>();
+            let of_local = local(&q, &point.r, &point.lambda, &statuses, None).unwrap();
+            assert_eq!(of_global, of_local);
+            let (stick, slip) = (Motion::Stick, Motion::Slip);
+            let count = |m: Motion| statuses.iter().filter(|s| s.status == m).count();
+            assert_eq!(of_global.of, 3 * count(stick) + count(slip) + bilateral);
+            assert_eq!(of_global.rank, of_global.of.min(dofs));
+        }
+    }
+
+    #[test]
+    fn what_is_too_large_for_singular_values_is_counted() {
+        let mix = PlantedMix { open: 0.0, stick: 1.0, slip: 0.0, degenerate: 0.0 };
+        let case = Planted { contacts: 200, dofs: 240, mix, ..Planted::default() };
+        let (p, point) = case.global::<3>();
+        let statuses = p.judge(&point, 1e-8).unwrap().statuses;
+        let counted = Indeterminacy { rank: 240, of: 600, counted: true };
+        assert_eq!(global(&p, &point.r, &[], &statuses), Some(counted));
+        let (q, point) = case.local::<3>();
+        assert_eq!(local(&q, &point.r, &[], &statuses, Some(240)), Some(counted));
+        assert_eq!(local(&q, &point.r, &[], &statuses, None), None);
+    }
+}
