@@ -12,14 +12,15 @@ use crate::{Exit, files, interrupt, output};
 
 /// Explain what makes problems hard, and what to try.
 ///
-/// Size, hyperstaticity, conditioning, asymmetry, mass ratio, impact, friction, duplicate contacts, independent groups,
-/// redundant constraints and the existence of a solution, each with its numbers and what follows from them for solvers.
+/// Of contacts: size, hyperstaticity, conditioning, asymmetry, mass ratio, impact, friction, duplicate contacts, independent groups,
+/// redundant constraints and the existence of a solution. Of complementarity problems: size, the class of M and what it promises, rank, scale and existence.
+/// Each with its numbers and what follows from them for solvers; every solver that they suggest is tried before it is advised.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    #[arg(required = true, value_name = "FILE", help = files::help("Files of contact problems", |k| !k.is_linear()))]
+    #[arg(required = true, value_name = "FILE", help = files::help("Files with one problem each", |_| true))]
     files: Vec<PathBuf>,
-    /// The most rows of W for which rank and condition number are computed
+    /// The most rows of W (or of M) for which rank and condition number are computed
     #[arg(long, value_name = "ROWS", default_value = "1500", value_parser = files::whole)]
     spectrum_limit: usize,
     /// At most this many seconds for each file, half of them for rank and condition number
@@ -36,6 +37,7 @@ pub struct Args {
 const EXAMPLES: &str = "\
 Examples:
   nonsmooth diagnose wall.hdf5
+  nonsmooth diagnose string.toml
   nonsmooth diagnose *.hdf5 --json";
 
 /// Runs the command.
@@ -55,8 +57,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         };
         let left = files::left(&limits, begun);
         let effort = Effort { spectrum_limit: args.spectrum_limit, limits: left };
-        let problem = content.contacts(file).map_err(|e| e.to_string())?;
-        let diagnosis = match diagnose(problem, content.info.dofs, &effort) {
+        let diagnosis = match diagnose(&content.problem, content.info.dofs, &effort) {
             Ok(diagnosis) => diagnosis,
             Err(limit) => {
                 return Ok(files::late(

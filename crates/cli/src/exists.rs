@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use nonsmooth_problem::AnyProblem;
 use nonsmooth_problem::check::{Existence, Impulses};
 use nonsmooth_solve::{Limits, existence};
 use serde_json::{Value, json};
@@ -14,14 +15,16 @@ use crate::{Exit, files, interrupt, output};
 ///
 /// What is called proved holds in exact arithmetic on the stored data; what holds up to rounding only is called nearly proved, and
 /// ends like what is not known.
-/// A solution exists if some motion keeps every contact inside the dual cone K* = {mu |u_T| <= u_N}. If none does, that
+/// Of contacts: a solution exists if some motion keeps every contact inside the dual cone K* = {mu |u_T| <= u_N}. If none does, that
 /// is certified by impulses in K that feel no motion; the problem may then still have a solution. Normal impulses that
 /// feel no motion prove that it has none, whatever the friction. Problems of a few contacts in the plane, or without friction, are
 /// decided completely.
+/// Of complementarity problems: the class of M (a P-matrix has one solution for every q), a solution in fractions where a solver found one, or a
+/// verified proof that there is none; few pairs are enumerated in exact arithmetic.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    #[arg(required = true, value_name = "FILE", help = files::help("Files of contact problems", |k| !k.is_linear()))]
+    #[arg(required = true, value_name = "FILE", help = files::help("Files with one problem each", |_| true))]
     files: Vec<PathBuf>,
     /// At most this many seconds for each file
     #[arg(long, value_name = "SECONDS", default_value = "60", allow_hyphen_values = true)]
@@ -40,6 +43,7 @@ pub struct Args {
 const EXAMPLES: &str = "\
 Examples:
   nonsmooth exists wall.hdf5
+  nonsmooth exists game.toml
   nonsmooth exists problems/*.hdf5 --json
   nonsmooth exists wall.hdf5 --certificate motion.json
 
@@ -67,10 +71,13 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             Err(limit) => return Ok(files::late(file, args.json, limit, files::WHILE_READ)),
         };
         let problem = &content.problem;
-        let contacts = content.contacts(file).map_err(|e| e.to_string())?;
-        let existence = existence::of(contacts, &files::left(&limits, start));
+        let existence = existence::of(problem, &files::left(&limits, start));
         let seconds = start.elapsed().as_secs_f64();
-        let (sizes, contacts) = (report::problem_json(file, problem), contacts.contacts());
+        let contacts = match problem {
+            AnyProblem::Friction(contacts) => contacts.contacts(),
+            AnyProblem::Complementarity(_) => 0,
+        };
+        let sizes = report::problem_json(file, problem);
         output::print(&if args.json {
             format!("{}\n", json(sizes.clone(), &existence, contacts, seconds))
         } else {
@@ -93,6 +100,10 @@ pub fn fields(existence: &Existence, contacts: usize) -> Object {
             json!({"verdict": existence.name(), "margin": margin})
         }
         Existence::Solved { .. } => json!({"verdict": existence.name()}),
+        Existence::EveryQ { because } => json!({"verdict": existence.name(), "because": because}),
+        Existence::NearlySolved { relative } => {
+            json!({"verdict": existence.name(), "relative": relative})
+        }
         Existence::NearlyProved { margin, shift, .. } => {
             json!({"verdict": existence.name(), "margin": margin, "shift": shift})
         }
@@ -127,6 +138,10 @@ fn text(file: &Path, size: &str, existence: &Existence, contacts: usize, seconds
     let rests = match existence {
         Existence::Proved { motion, .. } => Some((of_motion(motion.0.len()), exactly)),
         Existence::Solved { .. } => Some(("a solution in fractions".into(), exactly)),
+        Existence::EveryQ { .. } => {
+            Some(("a theorem and the entries of the problem".into(), exactly))
+        }
+        Existence::NearlySolved { .. } => Some(("a solution in doubles".into(), nearly)),
         Existence::NearlyProved { motion, .. } => Some((of_motion(motion.len()), nearly)),
         Existence::Weak { ray } | Existence::CriterionRefuted { ray } => {
             Some((squeezed(ray, contacts), nearly))

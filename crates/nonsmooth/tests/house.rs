@@ -57,7 +57,7 @@ struct Floors {
 const PROBLEM: Floors =
     Floors { floors: &[&["error"], &["check", "*"], &["planted"]], others_mix: true, wings: &[] };
 
-/// `diagnose → door → registry → bridges → {contact, complementarity} → core`; inside a wing `solvers → families → what they share → form → law`.
+/// `diagnose → existence → door → registry → bridges → {contact, complementarity} → core`; inside a wing `solvers → families → what they share → form → law`.
 /// The question of existence and the elimination of velocities are no families: any may ask them.
 const SOLVE: Floors = Floors {
     floors: &[
@@ -77,6 +77,7 @@ const SOLVE: Floors = Floors {
         &["bridges"],
         &["registry"],
         &["door"],
+        &["existence"],
         &["diagnose"],
     ],
     others_mix: false,
@@ -579,7 +580,7 @@ fn the_checker_lets_the_house_live() {
             "use crate::contact::form::Contacts; use crate::complementarity::solvers::x;",
         ),
         ("registry.rs", "use crate::{bridges::X, contact::solvers::x};"),
-        ("lib.rs", "pub mod contact; pub use contact::existence;"),
+        ("lib.rs", "pub mod contact; pub use contact::newton;"),
         (
             "core/via.rs",
             "use crate::core::reformulation::Reformulation; use crate::core::solver::Solver;",

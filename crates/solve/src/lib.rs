@@ -31,10 +31,10 @@ pub mod contact;
 mod core;
 pub mod diagnose;
 mod door;
+pub mod existence;
 pub mod registry;
 
 pub use self::complementarity::guarantees;
-pub use self::contact::existence;
 pub use door::{Answer, Solvable, Solve, solve};
 
 pub use self::core::boxed::Boxed;

@@ -60,7 +60,7 @@ impl Facts {
         self.existence = if args.existence {
             let left = left();
             let time_limit = Some(left.time_limit.unwrap_or(EXISTENCE_SECONDS));
-            Some(existence::of(problem, &Limits { time_limit, ..left }))
+            Some(existence::of_contacts(problem, &Limits { time_limit, ..left }))
         } else {
             self.is_small().then(|| existence::glance(problem))
         };

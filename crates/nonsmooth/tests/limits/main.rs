@@ -223,7 +223,7 @@ fn existence_ends_and_says_which_limit_came() {
     let problem = Friction::Global3(scene("sphere_pile", &["count=2500"]));
     let begun = Instant::now();
     let limits = Limits { time_limit: Some(0.1), ..Limits::default() };
-    let decided = existence::of(&problem, &limits);
+    let decided = existence::of_contacts(&problem, &limits);
     assert!(begun.elapsed().as_secs_f64() <= slack() * 0.31, "{:?}", begun.elapsed());
     if let Existence::Unknown { why } = decided {
         assert!(why.contains("time limit"), "{why}");
@@ -232,7 +232,7 @@ fn existence_ends_and_says_which_limit_came() {
     let flag = Arc::new(AtomicBool::new(true));
     let limits = Limits { cancel: Some(flag), ..Limits::default() };
     let begun = Instant::now();
-    let Existence::Unknown { why } = existence::of(&problem, &limits) else {
+    let Existence::Unknown { why } = existence::of_contacts(&problem, &limits) else {
         panic!("decided though cancelled");
     };
     assert!(begun.elapsed().as_secs_f64() <= slack() * 0.2, "{:?}", begun.elapsed());

@@ -44,6 +44,18 @@ pub enum Existence {
         /// The coefficients of the columns of the problem's [`crate::check::ConeSystem`].
         coefficients: ExactVector,
     },
+    /// A solution exists for every right-hand side q.
+    #[serde(rename = "proved")]
+    EveryQ {
+        /// Why, in words: a theorem on the class of the matrix, or on the bounds.
+        because: String,
+    },
+    /// A point passes the check: a solution up to rounding.
+    #[serde(rename = "nearly_proved")]
+    NearlySolved {
+        /// Its relative residual.
+        relative: f64,
+    },
     /// The criterion holds up to rounding.
     NearlyProved {
         /// As above, in doubles.
@@ -88,8 +100,8 @@ impl Existence {
     /// The verdict's name: `proved`, `nearly_proved`, `weak`, `criterion_refuted`, `no_solution`, `nearly_no_solution`, `unknown`.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Proved { .. } | Self::Solved { .. } => "proved",
-            Self::NearlyProved { .. } => "nearly_proved",
+            Self::Proved { .. } | Self::Solved { .. } | Self::EveryQ { .. } => "proved",
+            Self::NearlyProved { .. } | Self::NearlySolved { .. } => "nearly_proved",
             Self::Weak { .. } => "weak",
             Self::CriterionRefuted { .. } => "criterion_refuted",
             Self::NoSolution { .. } => "no_solution",
@@ -100,7 +112,7 @@ impl Existence {
 
     /// Whether a solution is proved to exist.
     pub fn is_proved(&self) -> bool {
-        matches!(self, Self::Proved { .. } | Self::Solved { .. })
+        matches!(self, Self::Proved { .. } | Self::Solved { .. } | Self::EveryQ { .. })
     }
 
     /// What a motion that meets the criterion, by this margin, proves of the problem.
@@ -139,6 +151,10 @@ impl std::fmt::Display for Existence {
                 write!(f, "proved: {cone} (relative margin {margin:.1e})")
             }
             Self::Solved { .. } => f.write_str("proved: an exact solution is known"),
+            Self::EveryQ { because } => write!(f, "proved: {because}"),
+            Self::NearlySolved { relative } => {
+                write!(f, "nearly proved: a point passes the check (relative residual {relative:.1e})")
+            }
             Self::NearlyProved { margin, shift, .. } => {
                 write!(f, "nearly proved: {cone} (relative margin {margin:.1e}), up to rounding only")?;
                 match shift {
@@ -161,11 +177,16 @@ impl std::fmt::Display for Existence {
                 ),
                 None => write!(f, "none, proved: {proof}"),
             },
-            Self::NearlyNoSolution { change, .. } => write!(
-                f,
-                "not known, nearly none: normal impulses that hardly feel any motion force bodies into each other; \
-                 a relative change of the data by {change:.0e} would prove it"
-            ),
+            Self::NearlyNoSolution { certificate, change } => {
+                let what = match certificate.impulses() {
+                    Some(_) => "normal impulses that hardly feel any motion force bodies into each other",
+                    None => "a vector separates all cases up to rounding",
+                };
+                write!(
+                    f,
+                    "not known, nearly none: {what}; a relative change of the data by {change:.0e} would prove it"
+                )
+            }
             Self::Unknown { why } => write!(f, "not known: {why}"),
         }
     }

@@ -14,7 +14,7 @@
 use dashu_int::ops::{BitTest, Gcd, UnsignedAbs};
 use dashu_int::{IBig, UBig};
 use nonsmooth_linalg::budget;
-use nonsmooth_problem::check::{ConeSystem, Exact, ExactVector};
+use nonsmooth_problem::check::{ConeSystem, Exact, ExactVector, rounded};
 
 /// How the enumeration ended.
 #[derive(Debug, Clone, PartialEq)]
@@ -126,6 +126,15 @@ impl ExactCones {
         search
     }
 
+    /// As [`within`](Self::within), of a search near a point with these unknowns: of each pair the column that is as good as zero there is left out, and cases remain only where both are.
+    /// That nothing is found says nothing of the system itself.
+    pub fn near(allowed: u64, mut system: ConeSystem, unknowns: &[f64]) -> Self {
+        for j in vanishing(&system, unknowns) {
+            system.columns[j].clear();
+        }
+        Self::within(allowed, system)
+    }
+
     /// Whether a limit ended the search, which then finds nothing any more.
     pub fn is_cut_short(&self) -> bool {
         self.cut
@@ -186,6 +195,44 @@ impl ExactCones {
         }
         t
     }
+}
+
+/// A partner is as good as zero where it is so much smaller than the other one.
+const SMALLER: f64 = 1e-6;
+
+/// Of each pair the column, if any, that is as good as zero where the problem's unknowns are these.
+fn vanishing(system: &ConeSystem, unknowns: &[f64]) -> Vec<usize> {
+    let mut t: Vec<Option<f64>> = vec![None; system.columns.len()];
+    // Columns that are an unknown itself, shifted.
+    for ((constant, terms), x) in system.unknowns.iter().zip(unknowns) {
+        if let [(j, factor)] = &terms[..] {
+            t[*j] = Some((x - rounded(constant)) / rounded(factor));
+        }
+    }
+    let mut left: Vec<f64> = system.rhs.iter().map(rounded).collect();
+    for (t, column) in t.iter().zip(&system.columns) {
+        let value = t.unwrap_or(0.0);
+        column.iter().for_each(|(i, x)| left[*i] -= value * rounded(x));
+    }
+    // The others are slacks of one row: the one with the sign of what is left takes it.
+    for (t, column) in t.iter_mut().zip(&system.columns) {
+        if let (None, [(i, x)]) = (&t, &column[..]) {
+            *t = Some((left[*i] / rounded(x)).max(0.0));
+        }
+    }
+    let size = |j: usize| {
+        let largest = system.columns[j].iter().map(|(_, x)| rounded(x).abs()).fold(0.0, f64::max);
+        t[j].map(|t| t.abs() * largest)
+    };
+    let smaller = |&[a, b]: &[usize; 2]| {
+        let (of_a, of_b) = (size(a)?, size(b)?);
+        match () {
+            () if of_a < SMALLER * of_b => Some(a),
+            () if of_b < SMALLER * of_a => Some(b),
+            () => None,
+        }
+    };
+    system.pairs.iter().filter_map(smaller).collect()
 }
 
 /// A positive number such that all x over it are whole and have nothing in common: the greatest common divisor of the numerators over the least common

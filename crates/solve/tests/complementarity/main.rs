@@ -1,6 +1,7 @@
 //! Linear complementarity problems, family by family.
 
 mod common;
+mod existence;
 mod functions;
 mod guarantees;
 mod interior;

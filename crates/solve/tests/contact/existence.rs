@@ -31,6 +31,9 @@ fn verdict<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: usize>(
         Existence::NearlyNoSolution { certificate, .. } => {
             assert!(problem.evidence(certificate).holds());
         }
+        Existence::EveryQ { .. } | Existence::NearlySolved { .. } => {
+            panic!("said of complementarity problems only")
+        }
         Existence::Unknown { .. } => {}
     }
     existence

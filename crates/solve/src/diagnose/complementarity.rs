@@ -1,0 +1,194 @@
+//! Of a linear complementarity problem.
+
+use nonsmooth_analysis::{Class, Classes, Effort, rank};
+use nonsmooth_linalg::Matrix;
+use nonsmooth_problem::check::Existence;
+use nonsmooth_problem::{Complementarity, Problem, with_complementarity};
+
+use super::{Finding, easy, hard};
+use crate::complementarity::guarantees::guaranteed;
+use crate::core::register::{Registered, Solves};
+use crate::{Limits, existence, registry};
+
+/// What there is to say; matrices of up to so many rows have their rank counted.
+pub(super) fn findings(
+    problem: &Complementarity,
+    rows: usize,
+    most: impl Fn() -> Limits,
+) -> (Vec<Finding>, Existence) {
+    let matrices = matrices(problem);
+    let mut findings = vec![size(problem)];
+    // The classes speak of one square matrix and variables with bounds.
+    if let Complementarity::Lcp(_) | Complementarity::Box(_) = problem {
+        findings.push(class(matrices[0].1, matches!(problem, Complementarity::Lcp(_))));
+    }
+    findings.extend(matrices.iter().filter_map(|(name, m)| deficiency(name, m, rows)));
+    findings.extend(scale(&matrices));
+    let existence = existence::of_complementarity(problem, &most());
+    findings.push(of_existence(&existence));
+    (findings, existence)
+}
+
+fn matrices(problem: &Complementarity) -> Vec<(&'static str, &Matrix)> {
+    match problem {
+        Complementarity::Lcp(p) => vec![("M", &p.M)],
+        Complementarity::Box(p) => vec![("M", &p.M)],
+        Complementarity::Mlcp(p) => vec![("M", &p.M)],
+        Complementarity::Hlcp(p) => vec![("Q", &p.Q), ("R", &p.R)],
+    }
+}
+
+/// The default and the first solver of each family.
+fn one_of_each<P: Registered>(_: &P) -> Vec<&'static str> {
+    let mut families = vec![];
+    let mut names = vec![registry::DEFAULT];
+    for about in registry::abouts::<P>() {
+        if about.solves == Solves::Law && !families.contains(&about.family) {
+            families.push(about.family);
+            if !names.contains(&about.name) {
+                names.push(about.name);
+            }
+        }
+    }
+    names
+}
+
+/// Up to so many unknowns a dense factorisation is nothing; up to so many it is a second.
+const SMALL: usize = 200;
+const MIDDLE: usize = 3000;
+
+fn size(problem: &Complementarity) -> Finding {
+    let (kind, n) = with_complementarity!(problem, p => (p.kind().name(), p.unknowns()));
+    let dense = matrices(problem).iter().any(|(_, m)| matches!(m, Matrix::Dense(_)));
+    let stored = if dense { "dense" } else { "sparse" };
+    let says = format!("{kind} of {n} unknowns, {stored}");
+    let means = match () {
+        _ if n <= SMALL => "Small: every solver's step is cheap.",
+        _ if !dense => {
+            "Sparse: sweeps and sparse factorisations are cheap; pivoting keeps a factorised basis."
+        }
+        _ if n <= MIDDLE => "Of middle size: dense factorisations take milliseconds to a second.",
+        _ => "Large and dense: each factorisation takes seconds or more.",
+    };
+    let suits = with_complementarity!(problem, p => one_of_each(p));
+    Finding { suits, ..easy("size", says, means) }
+}
+
+/// Rows above which a class is not asked for more than a glance.
+const MANY: usize = 500;
+
+/// The classes that promise something, the strongest first, and what they promise of an LCP.
+const PROMISES: [(Class, &str); 7] = [
+    (Class::P, "Every q has exactly one solution."),
+    (
+        Class::StrictlyCopositive,
+        "Every q has a solution, perhaps several; Lemke's method cannot end in a ray.",
+    ),
+    (
+        Class::PositiveSemidefinite,
+        "Monotone: the solutions form a convex set; interior points, Lemke's and Keller's method decide it.",
+    ),
+    (
+        Class::Sufficient,
+        "The solutions form a convex set; criss-cross and Lemke's method decide it.",
+    ),
+    (
+        Class::CopositivePlus,
+        "Lemke's method decides it: a solution, or a ray that proves that there is none.",
+    ),
+    (Class::Copositive, "Solutions may be many; a ray of Lemke's method proves nothing."),
+    (Class::P0, "Solutions may be many; few methods are guaranteed to work."),
+];
+
+fn class(m: &Matrix, is_lcp: bool) -> Finding {
+    let classes = match m.nrows() {
+        0..=MANY => Classes::of(m, Effort::default()),
+        _ => Classes::quick(m),
+    };
+    let is: Vec<_> =
+        classes.iter().filter(|(c, _)| classes.is(*c)).map(|(c, _)| c.to_string()).collect();
+    let says = match &is[..] {
+        [] => "M is in none of the known classes, as far as could be told".into(),
+        all => format!("M is {}", all.join(", ")),
+    };
+    let promised = PROMISES.iter().find(|(class, _)| classes.is(*class));
+    let mut suits: Vec<&'static str> = vec![];
+    if is_lcp {
+        for guarantee in guaranteed(&classes) {
+            if !suits.contains(&guarantee.solver) {
+                suits.push(guarantee.solver);
+            }
+        }
+    }
+    match promised {
+        Some((_, means)) => Finding { suits, ..easy("class", says, means) },
+        None => hard(
+            "class",
+            says,
+            "No theorem says that there is a solution, one or several, nor which method finds one; few pairs can be enumerated.",
+            suits,
+        ),
+    }
+}
+
+fn deficiency(name: &str, m: &Matrix, rows: usize) -> Option<Finding> {
+    let a = m.to_csc()?;
+    let rank = rank(&a, rows.saturating_mul(rows))?;
+    let least = m.nrows().min(m.ncols());
+    let says = format!("{name} has rank {rank} of {least}, up to rounding");
+    Some(match rank < least {
+        true => hard(
+            "rank",
+            says,
+            "Singular: solutions may be many or none; a block that a method inverts may be singular.",
+            vec![],
+        ),
+        false => easy("rank", says, ""),
+    })
+}
+
+/// Above this ratio of the sizes of rows, differences between them are a difficulty of their own.
+const SPREAD: f64 = 1e6;
+
+fn scale(matrices: &[(&'static str, &Matrix)]) -> Option<Finding> {
+    let mut largest = vec![0.0_f64; matrices.first()?.1.nrows()];
+    for (_, m) in matrices {
+        m.for_each(|i, _, x| largest[i] = largest[i].max(x.abs()));
+    }
+    let sizes = || largest.iter().copied().filter(|x| *x > 0.0);
+    let (least, most) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
+    let zero = largest.len() - sizes().count();
+    if zero > 0 {
+        let says = format!("{zero} rows without an entry");
+        return Some(hard("scale", says, "Their law holds by q alone or not at all.", vec![]));
+    }
+    let says = format!("rows of size {least:.1e} to {most:.1e}");
+    Some(match most > SPREAD * least {
+        true => hard(
+            "scale",
+            says,
+            "Widely spread: the judge's error is componentwise, so small rows count as much as large ones, but methods that know one step size for all get slow.",
+            vec![],
+        ),
+        false => easy("scale", says, ""),
+    })
+}
+
+fn of_existence(existence: &Existence) -> Finding {
+    let says = existence.to_string();
+    match existence {
+        Existence::NoSolution { .. } => hard(
+            "existence",
+            says,
+            "No solver can succeed: look at the signs of M and q, or at the units of a row.",
+            vec![],
+        ),
+        Existence::NearlyNoSolution { .. } => {
+            hard("existence", says, "Most likely no solver can succeed.", vec![])
+        }
+        found if found.is_proved() => {
+            easy("existence", says, "A solver that fails has failed; the problem is sound.")
+        }
+        _ => easy("existence", says, ""),
+    }
+}

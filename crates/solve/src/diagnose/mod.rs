@@ -1,0 +1,288 @@
+//! What makes a problem hard, in sentences: each with its numbers, what follows from them, and the solvers that suit,
+//! named by the registry and put to the test.
+
+mod complementarity;
+mod contact;
+
+use std::time::Instant;
+
+use nonsmooth_problem::check::{Existence, Judged};
+use nonsmooth_problem::{AnyProblem, OfAny, with_problem};
+use serde::Serialize;
+
+use crate::core::guard;
+use crate::core::register::{Registered, Solves};
+use crate::registry;
+use crate::{Limit, Limits, Solve, Status};
+
+pub use contact::spectrum;
+
+/// One thing worth knowing of a problem.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// What it is about, in a word.
+    pub about: &'static str,
+    /// The numbers.
+    pub says: String,
+    /// What follows for solvers; empty where nothing does.
+    pub means: String,
+    /// Whether it makes the problem hard.
+    pub hard: bool,
+    /// Solvers that suit, by the registry.
+    pub suits: Vec<&'static str>,
+}
+
+/// What was found, and what to try.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// One entry a topic.
+    pub findings: Vec<Finding>,
+    /// Solvers to try: those that solved the problem on trial, the fastest first.
+    pub suits: Vec<&'static str>,
+    /// What came of every solver that the findings suggest.
+    pub trials: Vec<Trial>,
+}
+
+/// A short solve of the problem itself, so that nothing is advised that does not help.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Trial {
+    /// The solver.
+    pub solver: &'static str,
+    /// How it ended.
+    pub status: &'static str,
+    /// The relative residual that it reached, by the judge.
+    pub relative: f64,
+    /// Iterations.
+    pub iterations: usize,
+    /// Wall clock.
+    pub seconds: f64,
+}
+
+/// How much a diagnosis may cost.
+#[derive(Debug, Clone)]
+pub struct Effort {
+    /// The most rows for which the singular values of W, or of a matrix of a complementarity problem, are computed.
+    pub spectrum_limit: usize,
+    /// Limits of it all: half of the time for singular values, most of the rest for the question of existence, what is then left for trials of solvers.
+    /// Their tolerance is that of the trials.
+    pub limits: Limits,
+}
+
+/// Explains a problem. `dofs` are the degrees of freedom that a local contact problem was condensed from, if known.
+///
+/// Errors: the limit that came before there was anything to say.
+pub fn diagnose(
+    problem: &AnyProblem,
+    dofs: Option<usize>,
+    effort: &Effort,
+) -> Result<Diagnosis, Limit> {
+    let copy = (problem.clone(), effort.spectrum_limit);
+    guard::run(
+        &effort.limits,
+        || {},
+        move |limits| {
+            let (problem, rows) = copy;
+            let begun = Instant::now();
+            let scope = limits.budget(begun).enter();
+            let half = || part(limits, begun, 0.5);
+            let most = || part(limits, begun, 0.8);
+            let (findings, existence) = match &problem {
+                AnyProblem::Friction(contacts) => {
+                    contact::findings(contacts, dofs, rows, half, most)
+                }
+                AnyProblem::Complementarity(linear) => {
+                    complementarity::findings(linear, rows, most)
+                }
+            };
+            let mut found = Diagnosis::new(findings, &existence);
+            with_problem!(&problem, p => found.put_to_the_test(p, &most()));
+            match limits.reached(begun) {
+                Some(limit) if scope.raised() => Err(limit),
+                _ => Ok(found),
+            }
+        },
+    )
+    .and_then(|found| found)
+}
+
+/// A trial is no longer than this, in seconds.
+const TRIAL: f64 = 2.0;
+
+impl Diagnosis {
+    /// With the solvers that the findings suggest, those of the hard ones first; none where no solver can succeed.
+    fn new(findings: Vec<Finding>, existence: &Existence) -> Self {
+        let mut suits: Vec<&'static str> = vec![];
+        if !matches!(existence, Existence::NoSolution { .. }) {
+            let (hard, easy): (Vec<&Finding>, Vec<_>) = findings.iter().partition(|f| f.hard);
+            for name in hard.into_iter().chain(easy).flat_map(|f| &f.suits) {
+                if !suits.contains(name) {
+                    suits.push(name);
+                }
+            }
+        }
+        Self { findings, suits, trials: vec![] }
+    }
+
+    /// Tries what the findings suggest, each for a part of the time, and keeps what solves the problem.
+    fn put_to_the_test<P: Registered + Judged<Status: 'static> + OfAny>(
+        &mut self,
+        problem: &P,
+        limits: &Limits,
+    ) {
+        let each = limits.time_limit.map_or(TRIAL, |t| t / self.suits.len().max(1) as f64);
+        let limits = Limits { time_limit: Some(each.min(TRIAL)), ..limits.clone() };
+        for solver in std::mem::take(&mut self.suits) {
+            // One that does not apply is no advice.
+            let Ok(answer) = Solve::new().solver(solver).limits(limits.clone()).run(problem) else {
+                continue;
+            };
+            self.trials.push(Trial {
+                solver,
+                status: answer.status.name(),
+                relative: answer.verdict.measure.relative,
+                iterations: answer.iterations,
+                seconds: answer.seconds,
+            });
+        }
+        self.trials.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
+        let solved = self.trials.iter().filter(|t| t.status == Status::Solved.name());
+        self.suits = solved.map(|t| t.solver).collect();
+    }
+}
+
+/// Trials of solvers in place of one that refused the problem take no longer than this together, in seconds, and name so many at most.
+const INSTEAD: f64 = 1.0;
+const MOST_INSTEAD: usize = 3;
+
+/// Solvers that solve the problem where `refused` does not apply: the same method behind a prefix, others of its family, `auto`; each was tried, for a quarter
+/// of a second at most.
+pub fn instead<P: Registered + Judged<Status: 'static> + OfAny>(
+    problem: &P,
+    refused: &str,
+    limits: &Limits,
+) -> Vec<String> {
+    let begun = Instant::now();
+    let method = refused.rsplit('/').next().unwrap_or(refused);
+    let abouts = registry::abouts::<P>();
+    let family = abouts.iter().find(|a| a.name == method).map(|a| a.family);
+    let behind = registry::composed_names::<P>();
+    let behind = behind.into_iter().filter(|n| n.rsplit('/').next() == Some(method));
+    let kin = abouts.iter().filter(|a| Some(a.family) == family && a.solves == Solves::Law);
+    let candidates = behind
+        .chain(kin.map(|a| a.name.to_owned()))
+        .chain([registry::DEFAULT.to_owned()])
+        .filter(|name| name != refused);
+    let total = limits.time_limit.unwrap_or(INSTEAD).min(INSTEAD);
+    let mut solving: Vec<String> = vec![];
+    for name in candidates {
+        let left = total - begun.elapsed().as_secs_f64();
+        if left <= 0.0 || solving.len() >= MOST_INSTEAD {
+            break;
+        }
+        let limits = Limits { time_limit: Some(left.min(0.25 * INSTEAD)), ..limits.clone() };
+        let answer = Solve::new().solver(&name).limits(limits).run(problem);
+        if answer.is_ok_and(|a| a.is_solved()) && !solving.contains(&name) {
+            solving.push(name);
+        }
+    }
+    solving
+}
+
+/// A share of what is left of the time.
+fn part(limits: &Limits, begun: Instant, share: f64) -> Limits {
+    let spent = begun.elapsed().as_secs_f64();
+    let time_limit = limits.time_limit.map(|t| share * (t - spent).max(0.0));
+    Limits { time_limit, ..limits.clone() }
+}
+
+fn easy(about: &'static str, says: String, means: &str) -> Finding {
+    Finding { about, says, means: means.into(), hard: false, suits: vec![] }
+}
+
+fn hard(about: &'static str, says: String, means: &str, suits: Vec<&'static str>) -> Finding {
+    Finding { about, says, means: means.into(), hard: true, suits }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nonsmooth_linalg::{Csc, Dense};
+    use nonsmooth_problem::planted::{Planted, PlantedClass, PlantedLcp};
+    use nonsmooth_problem::{Friction, Lcp};
+
+    fn of(problem: impl Into<AnyProblem>) -> Diagnosis {
+        let effort = Effort { spectrum_limit: 500, limits: Limits::default() };
+        diagnose(&problem.into(), None, &effort).unwrap()
+    }
+
+    fn says<'a>(diagnosis: &'a Diagnosis, about: &str) -> Option<&'a Finding> {
+        diagnosis.findings.iter().find(|f| f.about == about)
+    }
+
+    #[test]
+    fn a_regular_problem_is_sound_and_a_hyperstatic_one_hard() {
+        let regular = Planted { contacts: 8, dofs: 48, ..Planted::default() };
+        let d = of(Friction::Local3(regular.local().0));
+        assert!(!says(&d, "rank").unwrap().hard, "{d:?}");
+        assert!(says(&d, "existence").unwrap().says.starts_with("proved"), "{d:?}");
+        assert!(!d.suits.is_empty());
+        let hyperstatic = Planted { contacts: 20, dofs: 30, ..Planted::default() };
+        let d = of(Friction::Global3(hyperstatic.global().0));
+        let finding = says(&d, "rank").unwrap();
+        assert!(finding.hard && finding.says.contains("rank 30 of 60"), "{finding:?}");
+        assert!(finding.says.contains("c = 2.00"), "{finding:?}");
+    }
+
+    #[test]
+    fn what_is_planted_is_found() {
+        let case =
+            Planted { contacts: 6, dofs: 36, mu: (0.0, 0.0), skew: 0.3, ..Planted::default() };
+        let (mut p, _) = case.global::<3>();
+        let d = of(Friction::Global3(p.clone()));
+        assert!(says(&d, "asymmetry").unwrap().hard && says(&d, "duplicates").is_none());
+        assert!(says(&d, "friction").unwrap().means.contains("convex"));
+        // The second contact becomes a copy of the first, and is on a much lighter place.
+        let h = p.H.triplets().filter(|e| !(3..6).contains(&e.1)).collect::<Vec<_>>();
+        let copies = h.iter().filter(|e| e.1 < 3).map(|&(i, j, x)| (i, j + 3, 1e3 * x));
+        p.H = Csc::from_triplets(36, 18, h.iter().copied().chain(copies)).unwrap();
+        p.mu[2] = 1.5;
+        let d = of(Friction::Global3(p));
+        assert!(says(&d, "duplicates").unwrap().says.starts_with("2 contacts"), "{d:?}");
+        assert!(says(&d, "mass ratio").unwrap().hard && says(&d, "friction").unwrap().hard);
+    }
+
+    #[test]
+    fn redundant_constraints_are_counted() {
+        let (mut p, _) = Planted { bilateral: 3, ..Planted::default() }.global::<2>();
+        let b = p.rows.as_mut().unwrap();
+        let twice = b.G.triplets().flat_map(|(i, j, x)| [(i, j, x), (i, j + 3, -2.0 * x)]);
+        b.G = Csc::from_triplets(b.G.nrows(), 6, twice).unwrap();
+        let more: Vec<f64> = b.b.iter().map(|b| -2.0 * b).collect();
+        b.b.extend(more);
+        let d = of(Friction::Global2(p));
+        assert!(
+            says(&d, "bilateral").unwrap().says.contains("6 bilateral rows of rank 3"),
+            "{d:?}"
+        );
+    }
+
+    /// Of complementarity problems the class of M speaks, and what it promises holds on trial.
+    #[test]
+    fn the_class_of_a_matrix_says_what_to_try() {
+        for (class, word) in [(PlantedClass::P, "P"), (PlantedClass::Spd, "positive definite")] {
+            let d = of(PlantedLcp { n: 12, class, ..PlantedLcp::default() }.lcp().0);
+            let finding = says(&d, "class").unwrap();
+            assert!(!finding.hard && finding.says.contains(word), "{finding:?}");
+            assert!(says(&d, "existence").unwrap().says.starts_with("proved: M is"), "{d:?}");
+            assert!(d.suits.contains(&"lemke") && d.suits.contains(&"auto"), "{:?}", d.suits);
+        }
+        let none = Lcp::new(Dense::from_rows(&[[-1.0]]).unwrap(), vec![-1.0]).unwrap();
+        let d = of(none);
+        assert!(says(&d, "existence").unwrap().says.starts_with("none, proved"), "{d:?}");
+        assert!(d.suits.is_empty() && d.trials.is_empty());
+        let case =
+            PlantedLcp { n: 8, class: PlantedClass::Psd, decades: 9.0, ..PlantedLcp::default() };
+        let d = of(case.boxed().0);
+        assert!(says(&d, "scale").unwrap().hard && says(&d, "rank").unwrap().hard, "{d:?}");
+    }
+}

@@ -1,0 +1,169 @@
+//! Does a solution exist? Of contact problems by the criterion ([`contact::existence`]), of complementarity problems by what is here.
+//!
+//! Method, the cheapest proof first: the class of M (with a P or strictly copositive matrix, and on a bounded box, every q has a solution); `auto`, whose proof of
+//! infeasibility or whose point it is; at that point the problem is a linear system, which is solved in fractions; few pairs are enumerated in exact arithmetic. A point that
+//! only passes the check proves nothing, and is called nearly so.
+//!
+//! References: CottlePangStone2009 (theorems 3.3.7, 3.8.5); FacchineiPang2003 (corollary 2.2.5: continuous maps on compact convex sets).
+
+use std::time::Instant;
+
+use nonsmooth_analysis::{Class, Classes, Effort};
+use nonsmooth_linalg::Matrix;
+use nonsmooth_problem::check::{Certificate, Evidence, ExactVector, Existence};
+use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, Friction, Problem};
+
+use crate::contact;
+use crate::core::exact_cones::{ExactCones, Found};
+use crate::core::guard;
+use crate::{Limit, Limits, Solve, Status};
+
+pub use crate::contact::existence::{decide, glance, glance_at};
+
+/// What is known of the existence of a solution, within the time limit of `limits`; its other entries, but for the flag of cancellation and the limit on memory, are
+/// not used.
+pub fn of(problem: &AnyProblem, limits: &Limits) -> Existence {
+    match problem {
+        AnyProblem::Friction(contacts) => of_contacts(contacts, limits),
+        AnyProblem::Complementarity(linear) => of_complementarity(linear, limits),
+    }
+}
+
+/// As [`of`], of a contact problem.
+pub fn of_contacts(problem: &Friction, limits: &Limits) -> Existence {
+    contact::existence::of(problem, limits)
+}
+
+/// As [`of`], of a complementarity problem.
+pub fn of_complementarity(problem: &Complementarity, limits: &Limits) -> Existence {
+    let copy = problem.clone();
+    let decided = guard::run(limits, || {}, move |limits| decided(&copy, limits));
+    decided.unwrap_or_else(late)
+}
+
+/// What is said where a limit came first.
+fn late(limit: Limit) -> Existence {
+    let why = match limit {
+        Limit::Cancelled => "it was cancelled",
+        Limit::Time | Limit::Iterations => "the time limit came first",
+    };
+    Existence::Unknown { why: why.into() }
+}
+
+/// Rows above which a class is not asked for more than a glance.
+const MANY: usize = 500;
+/// Rows up to which a system is solved in fractions, and what that may cost, see [`ExactCones::within`]: some ten seconds.
+const ROWS: usize = 200;
+const WORK: u64 = 1_000_000_000;
+/// Pairs up to which all cases are enumerated.
+const PAIRS: usize = 20;
+
+fn decided(linear: &Complementarity, limits: &Limits) -> Existence {
+    let begun = Instant::now();
+    let _scope = limits.budget(begun).enter();
+    if let Some(by_class) = by_class(linear) {
+        return by_class;
+    }
+    let problem = AnyProblem::Complementarity(linear.clone());
+    let left = |share: f64| {
+        let spent = begun.elapsed().as_secs_f64();
+        let time_limit = limits.time_limit.map(|t| share * (t - spent).max(0.0));
+        Limits { time_limit, tolerance: ENOUGH, trace: false, ..limits.clone() }
+    };
+    let mut nearly = None;
+    if let Ok(answer) = Solve::new().limits(left(0.5)).run(&problem) {
+        match answer.status {
+            Status::Infeasible(proof) => return Existence::NoSolution { proof },
+            Status::NearlyInfeasible { certificate, change } => {
+                nearly = Some(Existence::NearlyNoSolution { certificate, change });
+            }
+            _ if answer.verdict.measure.passes(ENOUGH) => {
+                let relative = answer.verdict.measure.relative;
+                nearly = Some(Existence::NearlySolved { relative });
+            }
+            _ => {}
+        }
+        let near = || exactly(&problem, Some(&unknowns(&answer.point)));
+        if let Some(decided) = near().or_else(|| exactly(&problem, None)) {
+            return decided;
+        }
+    }
+    match (nearly, limits.reached(begun)) {
+        (Some(nearly), _) => nearly,
+        (None, Some(limit)) => late(limit),
+        (None, None) => Existence::Unknown {
+            why: "no solver found a solution, none proved that there is none, and there are too many cases to enumerate".into(),
+        },
+    }
+}
+
+/// What the solver is asked for, and what is called a solution up to rounding.
+const ENOUGH: f64 = 1e-8;
+
+/// Where every q has a solution.
+fn by_class(problem: &Complementarity) -> Option<Existence> {
+    let every = |because: String| Some(Existence::EveryQ { because });
+    let class_of = |m: &Matrix, wanted: &[Class]| {
+        let classes = match m.nrows() {
+            0..=MANY => Classes::of(m, Effort::default()),
+            _ => Classes::quick(m),
+        };
+        wanted.iter().copied().find(|&class| classes.is(class))
+    };
+    match problem {
+        Complementarity::Lcp(p) => {
+            let class = class_of(&p.M, &[Class::P, Class::StrictlyCopositive])?;
+            every(format!("M is {class}, and then every q has a solution"))
+        }
+        Complementarity::Box(p) => {
+            if p.lower.iter().chain(&p.upper).all(|b| b.is_finite()) {
+                return every("all bounds are finite, and then every q has a solution".into());
+            }
+            let class = class_of(&p.M, &[Class::P])?;
+            every(format!("M is {class}, and then every q has a solution between any bounds"))
+        }
+        Complementarity::Mlcp(_) | Complementarity::Hlcp(_) => None,
+    }
+}
+
+/// The unknowns of a point, in the order of the problem in exact numbers.
+fn unknowns(point: &AnyPoint) -> Vec<f64> {
+    match point {
+        AnyPoint::Lcp(point) => point.z.clone(),
+        AnyPoint::Hlcp(point) => [&point.x[..], &point.s].concat(),
+        AnyPoint::Local(_) | AnyPoint::Global(_) => vec![],
+    }
+}
+
+/// What the problem in fractions says, among the cases that a point proposes, or of few pairs among all.
+fn exactly(problem: &AnyProblem, point: Option<&[f64]>) -> Option<Existence> {
+    if problem.unknowns() > ROWS {
+        return None;
+    }
+    let system = problem.cones()?;
+    if point.is_none() && system.pairs.len() > PAIRS {
+        return None;
+    }
+    let mut search = match point {
+        Some(point) => ExactCones::near(WORK, system.clone(), point),
+        None => ExactCones::within(WORK, system.clone()),
+    };
+    while !search.is_cut_short() {
+        match search.advance() {
+            None => {}
+            Some(Found::Solution(t)) => {
+                let solved = system.solved_by(&t);
+                return solved.then_some(Existence::Solved { coefficients: ExactVector(t) });
+            }
+            // That there is none where a point is says nothing of the others.
+            Some(Found::Nothing(_)) if point.is_some() => return None,
+            Some(Found::Nothing(vectors)) => {
+                return match problem.evidence(&Certificate::Separating { vectors }) {
+                    Evidence::Proved(proof) => Some(Existence::NoSolution { proof }),
+                    _ => None,
+                };
+            }
+        }
+    }
+    None
+}

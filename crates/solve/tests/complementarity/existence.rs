@@ -1,0 +1,93 @@
+//! Whether a complementarity problem has a solution, on problems of which it is known.
+
+use nonsmooth_linalg::Dense;
+use nonsmooth_problem::check::{Existence, Judged};
+use nonsmooth_problem::planted::{PlantedClass, PlantedLcp};
+use nonsmooth_problem::{AnyProblem, BoxLcp, Hlcp, Lcp, Problem};
+use nonsmooth_solve::Limits;
+use nonsmooth_solve::existence::of;
+
+fn decided(problem: impl Into<AnyProblem>) -> Existence {
+    of(&problem.into(), &Limits { time_limit: Some(60.0), ..Limits::default() })
+}
+
+fn dense<const N: usize>(rows: [[f64; N]; N]) -> Dense {
+    Dense::from_rows(&rows).unwrap()
+}
+
+/// A solution that is called exact passes the judge's check, rounded, at the last digits.
+fn check_solution(problem: &AnyProblem, existence: &Existence) {
+    if let Existence::Solved { coefficients } = existence {
+        let system = problem.cones().unwrap();
+        assert!(system.solved_by(&coefficients.0));
+        let point = problem.assembled(&system.unknowns_at(&coefficients.0));
+        assert!(problem.judge(&point, 1e-12).unwrap().solved);
+    }
+}
+
+#[test]
+fn what_is_planted_has_a_solution() {
+    for class in PlantedClass::ALL {
+        for (n, degenerate) in [(6, 0.0), (18, 0.3), (40, 0.0)] {
+            let case = PlantedLcp { n, class, degenerate, ..PlantedLcp::default() };
+            let mut problems: Vec<AnyProblem> = vec![case.lcp().0.into(), case.boxed().0.into()];
+            problems.push(case.hlcp().0.into());
+            for problem in problems {
+                let existence = decided(problem.clone());
+                let said = format!("{class:?} {n} {}: {existence}", problem.kind().name());
+                // Planted digits are rounded once: of singular matrices that may cost the solution.
+                assert!(existence.name() != "no_solution" || class == PlantedClass::Psd, "{said}");
+                check_solution(&problem, &existence);
+                let sure = matches!(
+                    class,
+                    PlantedClass::Spd
+                        | PlantedClass::MMatrix
+                        | PlantedClass::HPlus
+                        | PlantedClass::P
+                        | PlantedClass::Lcprand
+                );
+                assert!(existence.is_proved() || !sure, "{said}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_planted_without_one_has_none() {
+    for class in [PlantedClass::Psd, PlantedClass::Kkt, PlantedClass::CopositivePlus] {
+        for n in [6, 15] {
+            let case = PlantedLcp { n, class, ..PlantedLcp::default() };
+            let existence = decided(case.infeasible().unwrap().0);
+            let fine = ["no_solution", "nearly_no_solution", "unknown"];
+            assert!(fine.contains(&existence.name()), "{class:?} {n}: {existence}");
+        }
+    }
+}
+
+#[test]
+fn small_problems_are_decided_by_their_theorem_or_in_fractions() {
+    let name = |p: AnyProblem| {
+        let existence = decided(p.clone());
+        check_solution(&p, &existence);
+        (existence.name(), existence.to_string())
+    };
+    // 0 ≤ z ⟂ −z − 1 ≥ 0 has no solution; 0 ≤ z ⟂ −z + 1 ≥ 0 has two.
+    let negative = |q: f64| Lcp::new(dense([[-1.0]]), vec![q]).unwrap();
+    assert_eq!(name(negative(-1.0).into()).0, "no_solution");
+    let (verdict, said) = name(negative(1.0).into());
+    assert!(verdict == "proved" && said.contains("exact solution"), "{said}");
+    // A P-matrix that is not definite, and a box without an end.
+    let p = dense([[1.0, 3.0], [0.0, 1.0]]);
+    let said = name(Lcp::new(p.clone(), vec![-1.0, -1.0]).unwrap().into()).1;
+    assert!(said.contains("M is P"), "{said}");
+    let inf = f64::INFINITY;
+    let boxed = |l: f64, u: f64| {
+        BoxLcp::new(dense([[0.0, 1.0], [1.0, 0.0]]), vec![-1.0; 2], vec![l; 2], vec![u; 2]).unwrap()
+    };
+    assert!(name(boxed(-1.0, 2.0).into()).1.contains("all bounds are finite"));
+    assert_eq!(name(boxed(-inf, inf).into()).0, "proved");
+    // x = −1 has no nonnegative solution, x − s = −1 has.
+    let pair = |r: f64| Hlcp::new(dense([[1.0]]), dense([[r]]), vec![-1.0]).unwrap();
+    assert_eq!(name(pair(1.0).into()).0, "no_solution");
+    assert_eq!(name(pair(-1.0).into()).0, "proved");
+}
