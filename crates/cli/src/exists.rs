@@ -99,7 +99,9 @@ pub fn fields(existence: &Existence, contacts: usize) -> Object {
         Existence::Proved { margin, .. } => {
             json!({"verdict": existence.name(), "margin": margin})
         }
-        Existence::Solved { .. } => json!({"verdict": existence.name()}),
+        Existence::Solved { representable, .. } => {
+            json!({"verdict": existence.name(), "representable": representable})
+        }
         Existence::EveryQ { because } => json!({"verdict": existence.name(), "because": because}),
         Existence::NearlySolved { relative } => {
             json!({"verdict": existence.name(), "relative": relative})

@@ -206,11 +206,6 @@ pub fn offers() -> [Offer; 8] {
     ]
 }
 
-/// The solvers of one kind of problem.
-pub fn solvers(of: Kind) -> Vec<&'static About> {
-    offers().into_iter().filter(|offer| offer.kind == of).flat_map(|offer| offer.solvers).collect()
-}
-
 /// The problems that a solver takes, in words such as `global`; `None` if no kind of problem has it.
 pub fn takes(solver: &str) -> Option<String> {
     let has = |offer: &Offer| {

@@ -8,13 +8,13 @@ use std::time::Instant;
 use nonsmooth_io::{Format, ProblemFile, StoredPoint, keeper};
 use nonsmooth_problem::{AnyProblem, Problem, with_problem};
 use nonsmooth_solve::diagnose;
-use nonsmooth_solve::registry::{self, Solves};
+use nonsmooth_solve::registry;
 use nonsmooth_solve::settings::{self, SettingsMap};
 use nonsmooth_solve::trace::Trace;
 use nonsmooth_solve::{Answer, Limit, Limits, Sample, Solve, SolveError, Status};
 use serde_json::{Value, json};
 
-use crate::kinds::{self, Class, alike, start, takes};
+use crate::kinds::{self, alike, start, takes};
 use crate::progress::Bar;
 use crate::report::{self, row};
 use crate::{Exit, answer, enumerate, files, interrupt, output, plot};
@@ -525,24 +525,12 @@ fn hint(problem: &AnyProblem, solved: &Solved, plan: &Plan, stuck: bool) -> Opti
         }
         Status::NearlyInfeasible { .. } | Status::NoConclusion(_) | Status::Stalled(_) => vec![],
     };
-    // The default, then the first solver of each other family.
-    let mut families = vec![about.family];
-    let mut abouts = kinds::solvers(problem.kind());
-    abouts.retain(|a| a.solves == Solves::Law);
-    abouts.sort_by_key(|a| a.name != registry::DEFAULT);
-    let others = abouts.into_iter().filter_map(|about| {
-        let new = !families.contains(&about.family);
-        families.push(about.family);
-        new.then(|| format!("--solver {}", about.name))
-    });
-    let tries: Vec<_> = more.into_iter().chain(others).take(3).collect();
-    let see = match Class::of(problem.kind()) {
-        Class::Contact => {
-            "see `nonsmooth list`; `nonsmooth diagnose` says what makes a problem hard"
-        }
-        Class::Linear => "see `nonsmooth list`; `nonsmooth info` says what is known of the matrix",
-    };
-    Some(format!("{} ({see})", tries.join(", or ")))
+    let limits = files::left(&plan.limits, plan.begun);
+    let others = with_problem!(problem, p => diagnose::others(p, plan.solver, &limits));
+    let others = others.iter().map(|name| format!("--solver {name}, which solved it on trial"));
+    let mut tries: Vec<_> = more.into_iter().chain(others).take(3).collect();
+    tries.push("`nonsmooth diagnose` says what makes the problem hard".into());
+    Some(tries.join(", or "))
 }
 
 /// The output files, one of each for each input.

@@ -214,3 +214,32 @@ fn a_method_without_a_record_says_so() {
     let text = folder.run("solve three.toml --solver lemke --trace trace.json").exits(0).stdout;
     assert!(!text.contains("keeps no record"), "{text}");
 }
+
+/// Whatever the solver, a hyperstatic problem has the same motion; how the load is shared differs, and a report says so.
+#[test]
+fn impulses_that_are_not_unique_are_said_to_be_so() {
+    let folder = Folder::new();
+    folder.run("gen arch --set blocks=5 --out arch.hdf5").exits(0);
+    let mut degrees = vec![];
+    for solver in ["auto", "nsgs", "ip", "newton_ac", "cadoux"] {
+        let run = folder.run(&format!("solve arch.hdf5 --tol 1e-9 --solver {solver} --json"));
+        let line = run.exits(0).json().remove(0);
+        // Nothing moves: sticking at the limit is no slip.
+        assert_eq!(line["contacts_by_status"]["slip"], 0, "{solver}: {line}");
+        assert_eq!(line["impulses_unique"], false, "{solver}: {line}");
+        let found = &line["indeterminacy"];
+        assert!(found["rank"].as_u64() < found["of"].as_u64(), "{found}");
+        degrees.push(found["rank"].clone());
+    }
+    let text = folder.run("solve arch.hdf5 --out solved.hdf5").exits(0).stdout;
+    let says = |text: &str| {
+        let line = text.lines().find(|l| l.starts_with("  impulses   not unique: rank "));
+        line.unwrap_or_else(|| panic!("{text}")).to_owned()
+    };
+    assert!(says(&text).ends_with("all of them give the same motion"), "{text}");
+    assert_eq!(says(&folder.run("check solved.hdf5").exits(0).stdout), says(&text));
+    // A box on three points of a slope slides: what moves determines the impulses.
+    folder.run("gen sliding_box --set contact_density=1.5 --form local --out box.hdf5").exits(0);
+    let line = folder.run("solve box.hdf5 --json").exits(0).json().remove(0);
+    assert_eq!(line["impulses_unique"], true, "{line}");
+}

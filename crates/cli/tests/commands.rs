@@ -51,19 +51,24 @@ fn solve_reports_as_text_and_as_json() {
 fn an_unsolved_problem_exits_with_1_and_says_what_to_try() {
     let folder = Folder::with_problems();
     let text = folder.run("solve wall.hdf5 box.hdf5 --tol 1e-13 --max-iter 2").exits(1).stdout;
-    for part in ["iteration limit", "worst", "--max-iter 20", "--solver "] {
+    for part in ["iteration limit", "worst", "--max-iter 20", "`nonsmooth diagnose`"] {
         assert!(text.contains(part), "{part} in {text}");
     }
+    // Who is named has solved it.
+    let text = folder.run("solve wall.hdf5 --solver de_saxce --max-iter 2").exits(1).stdout;
+    assert!(text.contains("--solver auto, which solved it on trial"), "{text}");
+    folder.run("solve wall.hdf5 --solver auto").exits(0);
     // Rounding: more iterations would bring nothing.
     let stuck = "solve wall.hdf5 --solver de_saxce --tol 1e-17 --max-iter 2e4";
     let text = folder.run(stuck).exits(1).stdout;
     assert!(
         (text.contains("no progress since iteration ")
             || text.contains("the rounding of the unknowns"))
-            && text.contains("--solver auto, or --solver nsgs"),
+            && text.contains("`nonsmooth diagnose` says what makes the problem hard"),
         "{text}"
     );
-    assert!(!text.contains("--max-iter"), "{text}");
+    // No solver gets there.
+    assert!(!text.contains("--max-iter") && !text.contains("--solver"), "{text}");
     let line = folder.run("solve wall.hdf5 --time-limit 0 --json").exits(1).json().remove(0);
     assert_eq!(line["status"], "time_limit");
     assert!(!line["worst_contacts"].as_array().unwrap().is_empty());

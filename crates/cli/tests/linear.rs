@@ -340,3 +340,53 @@ fn campaigns_run_on_linear_problems() {
     let text = folder.run(import).exits(0).stdout;
     assert!(text.contains("2 of 2 rows read; 1 problem matched, 0 not"), "{text}");
 }
+
+#[test]
+fn exists_and_diagnose_take_complementarity_problems() {
+    let folder = folder();
+    for (name, says, code) in [
+        ("string", "proved: M is P, and then every q has a solution", 0),
+        ("rectifier", "proved: an exact solution is known", 0),
+        ("blocks", "proved: all bounds are finite, and then every q has a solution", 0),
+        ("horizontal", "proved: an exact solution is known", 0),
+        ("impossible", "none, proved: row 1 is negative for every z >= 0", 1),
+    ] {
+        let text = folder.run(&format!("exists {name}.toml")).exits(code).stdout;
+        assert!(text.contains(&format!("existence of a solution {says}")), "{text}");
+        assert!(text.contains("verified in exact arithmetic"), "{text}");
+        let line = first(folder.run(&format!("exists {name}.toml --json")).exits(code));
+        has_keys(&line, "file kind rows unknowns verdict message seconds");
+        let text = folder.run(&format!("diagnose {name}.toml")).exits(0).stdout;
+        assert!(text.contains(says), "{text}");
+        // Advised is what solved the problem on trial.
+        let line = first(folder.run(&format!("diagnose {name}.toml --json")).exits(0));
+        let suits = line["suits"].as_array().unwrap();
+        assert_eq!(suits.is_empty(), code == 1, "{line}");
+        for solver in suits {
+            let solver = solver.as_str().unwrap();
+            folder.run(&format!("solve {name}.toml --solver {solver}")).exits(0);
+        }
+    }
+    // The proof is kept, and verified by another command.
+    folder.run("exists impossible.toml --certificate proof.json").exits(1);
+    assert!(std::fs::read_to_string(folder.path("proof.json")).unwrap().contains("no_solution"));
+}
+
+#[test]
+fn suites_list_complementarity_problems() {
+    let folder = Folder::new();
+    let suite = "[[problem]]\nfamily = \"lcp\"\nfolder = \"psd\"\nsettings = { class = \"psd\", n = [6, 8] }\n\
+        [[problem]]\nfamily = \"sliding_box\"\n[[problem]]\nfamily = \"torsion\"\nsettings = { n = 4 }\n";
+    std::fs::write(folder.path("s.toml"), suite).unwrap();
+    folder.run("gen --suite s.toml --out all").exits(0);
+    for made in [
+        "psd/lcp-psd-n6.toml",
+        "psd/lcp-psd-n8.toml",
+        "torsion/torsion-n4.toml",
+        "sliding_box/sliding_box.hdf5",
+    ] {
+        folder.run(&format!("solve all/{made}")).exits(0);
+    }
+    std::fs::write(folder.path("s.toml"), "[[problem]]\nfamily = \"lpc\"\n").unwrap();
+    folder.run("gen --suite s.toml --out all").refused(&["problem 1", "lpc", "obstacle"]);
+}

@@ -14,7 +14,7 @@ use nonsmooth_problem::check::{Certificate, Evidence, ExactVector, Existence};
 use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, Friction, Problem};
 
 use crate::contact;
-use crate::core::exact_cones::{ExactCones, Found};
+use crate::core::exact_cones::{ExactCones, Found, is_representable};
 use crate::core::guard;
 use crate::{Limit, Limits, Solve, Status};
 
@@ -152,8 +152,10 @@ fn exactly(problem: &AnyProblem, point: Option<&[f64]>) -> Option<Existence> {
         match search.advance() {
             None => {}
             Some(Found::Solution(t)) => {
-                let solved = system.solved_by(&t);
-                return solved.then_some(Existence::Solved { coefficients: ExactVector(t) });
+                return system.solved_by(&t).then(|| Existence::Solved {
+                    representable: is_representable(problem, &system, &t),
+                    coefficients: ExactVector(t),
+                });
             }
             // That there is none where a point is says nothing of the others.
             Some(Found::Nothing(_)) if point.is_some() => return None,

@@ -139,10 +139,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         let svg = drawing(scene, solved.as_ref()).map_err(|e| format!("scene {name}: {e}"))?;
         files::write_text("--draw", path, &svg)?;
     }
-    let mut text = match &scene {
-        Some(scene) => summary(label, scene, &content.problem),
-        None => format!("{}: {}\n", label.display(), report::problem_text(&content.problem)),
-    };
+    let mut text = said(label, scene.as_ref(), &content);
     if let Some(solved) = &solved {
         solution(&mut text, solved, args.tol);
     }
@@ -152,6 +149,14 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         _ => output::print(&text),
     }
     Ok(Exit::solved(solved.as_ref().is_none_or(Solved::is_solved)))
+}
+
+/// One line on what was made.
+fn said(label: &Path, scene: Option<&Scene>, content: &ProblemFile) -> String {
+    match scene {
+        Some(scene) => summary(label, scene, &content.problem),
+        None => format!("{}: {}\n", label.display(), report::problem_text(&content.problem)),
+    }
 }
 
 /// What makes a problem.
@@ -170,6 +175,14 @@ impl Made {
             let others: Vec<_> = linear::MAKERS.iter().map(|m| m.name).collect();
             format!("{e}; linear complementarity: {}", others.join(", "))
         })
+    }
+
+    /// Of the format in which a suite writes its problems.
+    fn extension(self) -> &'static str {
+        match self {
+            Self::Scene(_) => "hdf5",
+            Self::Linear(_) => "toml",
+        }
     }
 
     fn list(self) -> String {

@@ -1,26 +1,27 @@
-//! Suites: problems of scenes by the list.
+//! Suites: problems of scenes and of complementarity by the list.
 //!
 //! ```toml
 //! [[problem]]
-//! family = "wall"                      # a scene
+//! family = "wall"                      # a scene, or a maker of complementarity problems
 //! name = "wall"                        # of the files; else the family and all settings given
-//! form = ["local", "global"]           # or one of them; global if not given
+//! folder = "walls"                     # of the files; else the family
+//! form = ["local", "global"]           # of a scene, or one of them; global if not given
 //! settings = { rows = [4, 8], mu = 0.4, seed = [1, 2, 3] }
 //! ```
 //!
 //! Lists expand to their product, the last setting first; what a list varies is part of the file's name, so this entry
-//! makes `wall/wall-rows4-seed1-local.hdf5` and eleven more.
+//! makes `walls/wall-rows4-seed1-local.hdf5` and eleven more. Scenes are written as FCLIB's HDF5, complementarity problems as TOML.
 
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-use nonsmooth_scenes::SceneEntry;
 use nonsmooth_solve::settings::SettingsMap;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::scene::{Form, make, plain, summary};
+use super::scene::{Form, plain};
+use super::{Made, said};
 use crate::{Exit, files, output};
 
 #[derive(Debug, Deserialize)]
@@ -35,6 +36,7 @@ struct Suite {
 struct Entry {
     family: String,
     name: Option<String>,
+    folder: Option<String>,
     form: Option<Value>,
     #[serde(default)]
     settings: SettingsMap,
@@ -42,7 +44,8 @@ struct Entry {
 
 /// One problem to make.
 struct Planned {
-    scene: &'static SceneEntry,
+    made: Made,
+    folder: String,
     name: String,
     form: Form,
     settings: SettingsMap,
@@ -64,33 +67,40 @@ pub fn run(file: &Path, folder: &Path) -> Result<Exit, String> {
         planned.extend(all.map_err(|e| format!("--suite {at}, problem {}: {e}", k + 1))?);
     }
     let mut seen = HashMap::new();
-    for Planned { scene, name, .. } in &planned {
-        if seen.insert((scene.name, name), ()).is_some() {
+    for Planned { folder, name, .. } in &planned {
+        if seen.insert((folder, name), ()).is_some() {
             return Err(format!(
-                "--suite {at}: expected a name for each problem, found `{}/{name}` twice",
-                scene.name
+                "--suite {at}: expected a name for each problem, found `{folder}/{name}` twice"
             ));
         }
     }
-    for Planned { scene, name, form, settings } in &planned {
-        let below = folder.join(scene.name);
+    for Planned { made, folder: family, name, form, settings } in &planned {
+        let below = folder.join(family);
         files::folder("--out", &below)?;
-        let path = below.join(format!("{name}.hdf5"));
+        let path = below.join(format!("{name}.{}", made.extension()));
         files::writable("--out", &path)?;
-        let (made, content) = make(scene, settings, *form)
-            .map_err(|e| format!("--suite {at}, {}/{name}: {e}", scene.name))?;
+        let (scene, content) = made
+            .make(settings, *form)
+            .map_err(|e| format!("--suite {at}, {family}/{name}: {e}"))?;
         content.write(&path).map_err(|e| e.to_string())?;
-        output::print(&summary(&path, &made, &content.problem));
+        output::print(&said(&path, scene.as_ref(), &content));
     }
     Ok(Exit::Solved)
 }
 
 /// The problems of an entry: the product of its lists.
 fn plan(entry: &Entry) -> Result<Vec<Planned>, String> {
-    let scene = SceneEntry::find(&entry.family).map_err(|e| e.to_string())?;
+    let made = Made::find(&entry.family)?;
     let base = entry.name.as_deref().unwrap_or(&entry.family);
-    if base.is_empty() || base.contains(['/', '\\']) || base.starts_with('.') {
-        return Err(format!("name: expected a file name without folder, found `{base}`"));
+    let folder = entry.folder.as_deref().unwrap_or(&entry.family);
+    for (key, name) in [("name", base), ("folder", folder)] {
+        if name.is_empty() || name.contains(['/', '\\']) || name.starts_with('.') {
+            return Err(format!("{key}: expected a name without folders, found `{name}`"));
+        }
+    }
+    if let (Made::Linear(maker), Some(form)) = (made, &entry.form) {
+        let name = maker.name;
+        return Err(format!("form: expected one of a scene only, found {form} of {name}"));
     }
     let mut all = vec![(base.to_string(), SettingsMap::new())];
     for (key, value) in &entry.settings {
@@ -118,7 +128,8 @@ fn plan(entry: &Entry) -> Result<Vec<Planned>, String> {
     let forms = forms(entry.form.as_ref())?;
     let with = |(name, settings): (String, SettingsMap)| {
         let one = move |&(form, suffix): &(Form, &str)| Planned {
-            scene,
+            made,
+            folder: folder.to_owned(),
             name: format!("{name}{suffix}"),
             form,
             settings: settings.clone(),
@@ -165,5 +176,11 @@ mod tests {
             ["stack-local", "stack-global"]
         );
         assert_eq!(names(&format!("{entry}form = \"local\"")), ["stack"]);
+        let linear = "[[problem]]\nfamily = \"lcp\"\nname = \"x\"\nfolder = \"psd\"\n";
+        let all = names(&format!("{linear}settings = {{ class = \"psd\", n = [6, 12] }}"));
+        assert_eq!(all, ["x-n6", "x-n12"]);
+        let suite: Suite = toml::from_str(&format!("{linear}form = \"local\"")).unwrap();
+        let Err(said) = plan(&suite.problem[0]) else { panic!("an LCP has no form") };
+        assert!(said.contains("form: expected one of a scene only"), "{said}");
     }
 }

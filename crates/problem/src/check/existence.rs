@@ -43,6 +43,8 @@ pub enum Existence {
     Solved {
         /// The coefficients of the columns of the problem's [`crate::check::ConeSystem`].
         coefficients: ExactVector,
+        /// Whether it passes the check when it is rounded to doubles, at 1e-8. Data that are rounded may have a solution where those that were meant have none: a huge one.
+        representable: bool,
     },
     /// A solution exists for every right-hand side q.
     #[serde(rename = "proved")]
@@ -150,7 +152,12 @@ impl std::fmt::Display for Existence {
             Self::Proved { margin, .. } => {
                 write!(f, "proved: {cone} (relative margin {margin:.1e})")
             }
-            Self::Solved { .. } => f.write_str("proved: an exact solution is known"),
+            Self::Solved { representable: true, .. } => {
+                f.write_str("proved: an exact solution is known")
+            }
+            Self::Solved { representable: false, .. } => f.write_str(
+                "proved: an exact solution is known, but no double holds it: rounded, it fails the check",
+            ),
             Self::EveryQ { because } => write!(f, "proved: {because}"),
             Self::NearlySolved { relative } => {
                 write!(f, "nearly proved: a point passes the check (relative residual {relative:.1e})")

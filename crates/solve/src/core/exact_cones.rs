@@ -14,7 +14,10 @@
 use dashu_int::ops::{BitTest, Gcd, UnsignedAbs};
 use dashu_int::{IBig, UBig};
 use nonsmooth_linalg::budget;
+use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::{ConeSystem, Exact, ExactVector, rounded};
+
+use crate::Limits;
 
 /// How the enumeration ended.
 #[derive(Debug, Clone, PartialEq)]
@@ -195,6 +198,15 @@ impl ExactCones {
         }
         t
     }
+}
+
+/// Whether the solution of a problem with these coefficients passes the check when it is rounded to doubles, at the default tolerance.
+pub fn is_representable<P: Problem>(problem: &P, system: &ConeSystem, t: &[Exact]) -> bool {
+    let point = problem.assembled(&system.unknowns_at(t));
+    problem.validate_point(&point).is_ok()
+        && problem.gauge().is_ok_and(|mut gauge| {
+            problem.certify(&point, &mut gauge).passes(Limits::default().tolerance)
+        })
 }
 
 /// A partner is as good as zero where it is so much smaller than the other one.

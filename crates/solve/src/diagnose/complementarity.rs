@@ -5,10 +5,10 @@ use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::check::Existence;
 use nonsmooth_problem::{Complementarity, Problem, with_complementarity};
 
-use super::{Finding, easy, hard};
+use super::{Finding, easy, hard, one_of_each};
 use crate::complementarity::guarantees::guaranteed;
-use crate::core::register::{Registered, Solves};
-use crate::{Limits, existence, registry};
+use crate::core::register::Registered;
+use crate::{Limits, existence};
 
 /// What there is to say; matrices of up to so many rows have their rank counted.
 pub(super) fn findings(
@@ -39,18 +39,8 @@ fn matrices(problem: &Complementarity) -> Vec<(&'static str, &Matrix)> {
 }
 
 /// The default and the first solver of each family.
-fn one_of_each<P: Registered>(_: &P) -> Vec<&'static str> {
-    let mut families = vec![];
-    let mut names = vec![registry::DEFAULT];
-    for about in registry::abouts::<P>() {
-        if about.solves == Solves::Law && !families.contains(&about.family) {
-            families.push(about.family);
-            if !names.contains(&about.name) {
-                names.push(about.name);
-            }
-        }
-    }
-    names
+fn all_families<P: Registered>(_: &P) -> Vec<&'static str> {
+    one_of_each::<P>(None)
 }
 
 /// Up to so many unknowns a dense factorisation is nothing; up to so many it is a second.
@@ -70,12 +60,15 @@ fn size(problem: &Complementarity) -> Finding {
         _ if n <= MIDDLE => "Of middle size: dense factorisations take milliseconds to a second.",
         _ => "Large and dense: each factorisation takes seconds or more.",
     };
-    let suits = with_complementarity!(problem, p => one_of_each(p));
+    let suits = with_complementarity!(problem, p => all_families(p));
     Finding { suits, ..easy("size", says, means) }
 }
 
 /// Rows above which a class is not asked for more than a glance.
 const MANY: usize = 500;
+
+/// The classes that a diagnosis names besides the one that promises most; `nonsmooth info` names all.
+const TELLING: [Class; 4] = [Class::Symmetric, Class::PositiveDefinite, Class::K, Class::HPlus];
 
 /// The classes that promise something, the strongest first, and what they promise of an LCP.
 const PROMISES: [(Class, &str); 7] = [
@@ -105,13 +98,13 @@ fn class(m: &Matrix, is_lcp: bool) -> Finding {
         0..=MANY => Classes::of(m, Effort::default()),
         _ => Classes::quick(m),
     };
-    let is: Vec<_> =
-        classes.iter().filter(|(c, _)| classes.is(*c)).map(|(c, _)| c.to_string()).collect();
+    let promised = PROMISES.iter().find(|(class, _)| classes.is(*class));
+    let telling = TELLING.into_iter().filter(|&class| classes.is(class));
+    let is: Vec<_> = telling.chain(promised.map(|p| p.0)).map(|class| class.to_string()).collect();
     let says = match &is[..] {
         [] => "M is in none of the known classes, as far as could be told".into(),
         all => format!("M is {}", all.join(", ")),
     };
-    let promised = PROMISES.iter().find(|(class, _)| classes.is(*class));
     let mut suits: Vec<&'static str> = vec![];
     if is_lcp {
         for guarantee in guaranteed(&classes) {

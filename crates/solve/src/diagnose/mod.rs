@@ -105,8 +105,10 @@ pub fn diagnose(
     .and_then(|found| found)
 }
 
-/// A trial is no longer than this, in seconds.
+/// A trial is no longer than this, in seconds; so many solvers are tried, and so many of those that solved the problem are advised besides the default.
 const TRIAL: f64 = 2.0;
+const TRIED: usize = 8;
+const ADVISED: usize = 3;
 
 impl Diagnosis {
     /// With the solvers that the findings suggest, those of the hard ones first; none where no solver can succeed.
@@ -129,9 +131,11 @@ impl Diagnosis {
         problem: &P,
         limits: &Limits,
     ) {
-        let each = limits.time_limit.map_or(TRIAL, |t| t / self.suits.len().max(1) as f64);
+        let mut tried = std::mem::take(&mut self.suits);
+        tried.truncate(TRIED);
+        let each = limits.time_limit.map_or(TRIAL, |t| t / tried.len().max(1) as f64);
         let limits = Limits { time_limit: Some(each.min(TRIAL)), ..limits.clone() };
-        for solver in std::mem::take(&mut self.suits) {
+        for solver in tried {
             // One that does not apply is no advice.
             let Ok(answer) = Solve::new().solver(solver).limits(limits.clone()).run(problem) else {
                 continue;
@@ -146,7 +150,10 @@ impl Diagnosis {
         }
         self.trials.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
         let solved = self.trials.iter().filter(|t| t.status == Status::Solved.name());
-        self.suits = solved.map(|t| t.solver).collect();
+        let solved: Vec<_> = solved.map(|t| t.solver).collect();
+        let advised =
+            solved.iter().enumerate().filter(|(k, s)| *k < ADVISED || **s == registry::DEFAULT);
+        self.suits = advised.map(|(_, solver)| *solver).collect();
     }
 }
 
@@ -161,20 +168,56 @@ pub fn instead<P: Registered + Judged<Status: 'static> + OfAny>(
     refused: &str,
     limits: &Limits,
 ) -> Vec<String> {
-    let begun = Instant::now();
     let method = refused.rsplit('/').next().unwrap_or(refused);
     let abouts = registry::abouts::<P>();
     let family = abouts.iter().find(|a| a.name == method).map(|a| a.family);
     let behind = registry::composed_names::<P>();
     let behind = behind.into_iter().filter(|n| n.rsplit('/').next() == Some(method));
     let kin = abouts.iter().filter(|a| Some(a.family) == family && a.solves == Solves::Law);
-    let candidates = behind
-        .chain(kin.map(|a| a.name.to_owned()))
-        .chain([registry::DEFAULT.to_owned()])
-        .filter(|name| name != refused);
+    let candidates =
+        behind.chain(kin.map(|a| a.name.to_owned())).chain([registry::DEFAULT.to_owned()]);
+    solving(problem, candidates, refused, limits)
+}
+
+/// Solvers that solve the problem where `failed` did not: the default, and the first of each other family; each was tried, as by [`instead`].
+pub fn others<P: Registered + Judged<Status: 'static> + OfAny>(
+    problem: &P,
+    failed: &str,
+    limits: &Limits,
+) -> Vec<String> {
+    let method = failed.rsplit('/').next().unwrap_or(failed);
+    let abouts = registry::abouts::<P>();
+    let family = abouts.iter().find(|a| a.name == method).map(|a| a.family);
+    let others = one_of_each::<P>(family);
+    solving(problem, others.into_iter().map(str::to_owned), failed, limits)
+}
+
+/// The default, and the first solver of each family but one.
+fn one_of_each<P: Registered>(but: Option<&str>) -> Vec<&'static str> {
+    let mut families: Vec<_> = but.into_iter().collect();
+    let mut names = vec![registry::DEFAULT];
+    for about in registry::abouts::<P>() {
+        if about.solves == Solves::Law && !families.contains(&about.family) {
+            families.push(about.family);
+            if !names.contains(&about.name) {
+                names.push(about.name);
+            }
+        }
+    }
+    names
+}
+
+/// Which of the candidates solve the problem on a short trial.
+fn solving<P: Registered + Judged<Status: 'static> + OfAny>(
+    problem: &P,
+    candidates: impl Iterator<Item = String>,
+    but: &str,
+    limits: &Limits,
+) -> Vec<String> {
+    let begun = Instant::now();
     let total = limits.time_limit.unwrap_or(INSTEAD).min(INSTEAD);
     let mut solving: Vec<String> = vec![];
-    for name in candidates {
+    for name in candidates.filter(|name| name != but) {
         let left = total - begun.elapsed().as_secs_f64();
         if left <= 0.0 || solving.len() >= MOST_INSTEAD {
             break;

@@ -22,7 +22,7 @@ fn verdict<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: usize>(
         Existence::NearlyProved { motion, margin, .. } => {
             assert!(k.margin(motion).is_some() && *margin >= 0.0);
         }
-        Existence::Solved { coefficients } => {
+        Existence::Solved { coefficients, .. } => {
             assert!(problem.cones().unwrap().solved_by(&coefficients.0));
         }
         Existence::Weak { ray } => assert!(k.refutes_interior(ray) && !k.refutes_criterion(ray)),

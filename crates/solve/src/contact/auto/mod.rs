@@ -577,7 +577,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         match existence {
             Existence::NoSolution { proof } => Some(Step::NoSolution(proof.certificate().clone())),
             // An exact solution, found on the way: the judge has the last word on its rounding.
-            Existence::Solved { coefficients } => {
+            Existence::Solved { coefficients, .. } => {
                 let x = problem.cones()?.unknowns_at(&coefficients.0);
                 let exact = problem.assembled(&x);
                 P::copy_point(&exact, point);

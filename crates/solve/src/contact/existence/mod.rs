@@ -29,7 +29,7 @@ use nonsmooth_problem::check::{
 use nonsmooth_problem::with_friction;
 
 use crate::contact::form::{Blockwise, Frictional, Rows, has_bounds};
-use crate::core::exact_cones::{ExactCones, Found as ExactlyFound};
+use crate::core::exact_cones::{ExactCones, Found as ExactlyFound, is_representable};
 use crate::core::guard;
 use crate::{Limit, Limits};
 use program::{Program, Widest};
@@ -148,8 +148,11 @@ fn by_cases<P: Rows<D> + Kinematic<D>, const D: usize>(
         match search.advance() {
             None => {}
             Some(ExactlyFound::Solution(t)) => {
-                let verified = complete && search.system().solved_by(&t);
-                return verified.then_some(Existence::Solved { coefficients: ExactVector(t) });
+                let system = search.system();
+                return (complete && system.solved_by(&t)).then(|| Existence::Solved {
+                    representable: is_representable(problem, system, &t),
+                    coefficients: ExactVector(t),
+                });
             }
             Some(ExactlyFound::Nothing(vectors)) => {
                 // Normal impulses say more to a reader. With bounds the rows of a vector are others.
