@@ -4,8 +4,8 @@ use nonsmooth_bench::plural as count;
 use nonsmooth_io::StoredPoint;
 use nonsmooth_problem::check::VerdictOf;
 use nonsmooth_problem::{
-    AnyCounts, AnyPoint, AnyProblem, BoxLcp, Complementarity, FrictionGlobal, FrictionLocal,
-    GlobalPoint, Hlcp, Kind, Lcp, LocalPoint, Mlcp, Problem, with_problem,
+    AnyCounts, AnyPoint, AnyProblem, Complementarity, GlobalPoint, Kind, LocalPoint, OfAny,
+    Problem, each_kind, with_problem,
 };
 use nonsmooth_solve::registry::{self, About, Prefix, Registered};
 use serde_json::json;
@@ -185,25 +185,14 @@ pub struct Offer {
 }
 
 /// What the registry has, kind by kind.
-pub fn offers() -> [Offer; 8] {
-    fn of<P: Registered>(kind: Kind) -> Offer {
-        Offer {
-            kind,
-            solvers: registry::abouts::<P>(),
-            prefixes: registry::prefixes::<P>(),
-            composed: registry::composed_names::<P>(),
-        }
-    }
-    [
-        of::<FrictionLocal<2>>(Kind::FrictionLocal2d),
-        of::<FrictionLocal<3>>(Kind::FrictionLocal3d),
-        of::<FrictionGlobal<2>>(Kind::FrictionGlobal2d),
-        of::<FrictionGlobal<3>>(Kind::FrictionGlobal3d),
-        of::<Lcp>(Kind::Lcp),
-        of::<Mlcp>(Kind::Mlcp),
-        of::<Hlcp>(Kind::Hlcp),
-        of::<BoxLcp>(Kind::BoxLcp),
-    ]
+pub fn offers() -> impl Iterator<Item = Offer> {
+    let all = each_kind!(P => Offer {
+        kind: P::KIND,
+        solvers: registry::abouts::<P>(),
+        prefixes: registry::prefixes::<P>(),
+        composed: registry::composed_names::<P>(),
+    });
+    all.into_iter()
 }
 
 /// The problems that a solver takes, in words such as `global`; `None` if no kind of problem has it.
@@ -211,7 +200,7 @@ pub fn takes(solver: &str) -> Option<String> {
     let has = |offer: &Offer| {
         offer.solvers.iter().any(|a| a.name == solver) || offer.composed.iter().any(|c| c == solver)
     };
-    let (with, without): (Vec<_>, Vec<_>) = offers().into_iter().partition(has);
+    let (with, without): (Vec<_>, Vec<_>) = offers().partition(has);
     let words = |offer: &Offer| offer.kind.name().split('_').collect::<Vec<_>>();
     let shared = with.iter().map(words).reduce(|mut all, kind| {
         all.retain(|word| kind.contains(word));

@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use nonsmooth::{BoxLcp, FrictionGlobal, FrictionLocal, Hlcp, Lcp, Mlcp};
+use nonsmooth::{FrictionLocal, Hlcp, Lcp};
+use nonsmooth_problem::each_kind;
 use nonsmooth_solve::registry;
 
 // ------------------------------------------------------------------------------------------------ floors
@@ -47,15 +48,22 @@ const UP_TO_BENCH: [&str; 7] = [
 /// A room is a module, `check`, or one inside a wing, `contact/form`. `wing/*` stands for the rooms of a wing that are not named, `*` for all others.
 struct Floors {
     floors: &'static [&'static [&'static str]],
+    /// Rooms that have parts in the folders of others: every module below one of their name belongs to them.
+    scattered: &'static [&'static str],
     /// Whether the rooms that are not named may import each other.
     others_mix: bool,
     /// Wings never import each other; only rooms outside them see both.
     wings: &'static [&'static str],
 }
 
-/// A kind names the judge of its own as an associated type, so `check` and the kinds share a floor; what they must not do is lean on planted instances.
-const PROBLEM: Floors =
-    Floors { floors: &[&["error"], &["check", "*"], &["planted"]], others_mix: true, wings: &[] };
+/// A kind names the judge of its own as an associated type, so `check` and the kinds share a floor; what they must not do is lean on planted instances,
+/// which stand beside each kind.
+const PROBLEM: Floors = Floors {
+    floors: &[&["error"], &["check", "*"], &["planted"]],
+    scattered: &["planted"],
+    others_mix: true,
+    wings: &["kinds/contact", "kinds/complementarity"],
+};
 
 /// `diagnose → existence → door → registry → bridges → {contact, complementarity} → core`; inside a wing `solvers → families → what they share → form → law`.
 /// The question of existence and the elimination of velocities are no families: any may ask them.
@@ -80,6 +88,7 @@ const SOLVE: Floors = Floors {
         &["existence"],
         &["diagnose"],
     ],
+    scattered: &[],
     others_mix: false,
     wings: &["contact", "complementarity"],
 };
@@ -89,6 +98,9 @@ impl Floors {
     fn room(&self, module: &[String]) -> Option<(String, usize)> {
         let first = module.first()?;
         let floor = |name: &str| self.floors.iter().position(|floor| floor.contains(&name));
+        if let Some(name) = self.scattered.iter().find(|name| module.iter().any(|m| m == *name)) {
+            return Some(((*name).to_owned(), floor(name)?));
+        }
         if let Some(second) = module.get(1) {
             let room = format!("{first}/{second}");
             if let Some(at) = floor(&room).or_else(|| floor(&format!("{first}/*"))) {
@@ -106,7 +118,10 @@ impl Floors {
         let Some((to_room, b)) = self.room(to) else {
             return true; // a wing as a whole
         };
-        let wing = |module: &[String]| self.wings.iter().find(|wing| **wing == module[0]);
+        let begins = |module: &[String], wing: &str| {
+            wing.split('/').enumerate().all(|(k, part)| module.get(k).is_some_and(|m| m == part))
+        };
+        let wing = |module: &[String]| self.wings.iter().find(|wing| begins(module, wing));
         let across = wing(from).is_some() && wing(to).is_some() && wing(from) != wing(to);
         let mix = self.others_mix && self.floors[a].contains(&"*");
         across || (from_room != to_room && !(b < a || (a == b && mix)))
@@ -551,8 +566,16 @@ fn the_checker_finds_planted_violations() {
     assert_eq!(solve("core/drive.rs", "use crate::contact::form::Linear;").len(), 1);
     assert_eq!(solve("core/drive.rs", "use crate::contact::Condense;").len(), 1, "a whole wing");
     assert_eq!(solve("contact/law/local.rs", "use crate::*;").len(), 1);
-    assert_eq!(problem("check/local.rs", "use super::super::planted::Planted;").len(), 1);
-    assert_eq!(problem("lcp.rs", "use super::planted::Planted;").len(), 1);
+    assert_eq!(problem("check/rows.rs", "use super::super::planted::Planted;").len(), 1);
+    for (place, text) in [
+        ("kinds/contact/local/mod.rs", "use crate::planted::Planted;"),
+        ("kinds/contact/local/mod.rs", "use crate::kinds::contact::planted::Planted;"),
+        ("kinds/complementarity/lcp.rs", "use super::planted::PlantedLcp;"),
+        ("kinds/contact/rows.rs", "use crate::kinds::complementarity::Lcp;"),
+        ("kinds/complementarity/planted/linear.rs", "use crate::kinds::contact::planted::Planted;"),
+    ] {
+        assert_eq!(problem(place, text).len(), 1, "{place} {text}");
+    }
     // After an item under test the file goes on.
     let text = "#[cfg(test)] mod tests { fn f() {} } use crate::planted::Planted;";
     assert_eq!(problem("lcp.rs", text).len(), 1);
@@ -605,10 +628,11 @@ fn the_checker_lets_the_house_live() {
         assert_eq!(solve(place, text), [""; 0], "{text}");
     }
     for (place, text) in [
-        ("lcp.rs", "use crate::check::{self, Measure}; use nonsmooth_linalg::Csc;"),
-        ("check/lcp.rs", "use crate::lcp::Lcp; use super::Measure;"),
-        ("planted/lcp.rs", "use crate::check::Measure; use crate::lcp::Lcp;"),
-        ("friction.rs", "macro_rules! m { () => { $crate::Friction } }"),
+        ("kinds/contact/law.rs", "use crate::check::{self, Measure}; use nonsmooth_linalg::Csc;"),
+        ("check/mod.rs", "pub use crate::kinds::contact::Law; use super::Measure;"),
+        ("planted.rs", "pub use crate::kinds::contact::planted::Planted;"),
+        ("kinds/contact/planted.rs", "use crate::planted::Recipe; use crate::check::Measure;"),
+        ("kinds/mod.rs", "macro_rules! m { () => { $crate::Friction } }"),
     ] {
         assert_eq!(problem(place, text), [""; 0], "{text}");
     }
@@ -629,8 +653,14 @@ fn the_checker_lets_the_house_live() {
 fn the_judge_multiplies_by_itself() {
     // The products with W that solvers use.
     let kernels = ["row_product", "mul_plus"];
-    let check = root_folder().join("crates/problem/src/check");
-    for file in files(&check) {
+    let problem = root_folder().join("crates/problem/src");
+    let of_judge = |file: &PathBuf| {
+        let place = relative(file, &problem);
+        place.split(['/', '.']).any(|part| part == "check" || part == "judge")
+    };
+    let judge: Vec<_> = files(&problem).into_iter().filter(of_judge).collect();
+    assert!(judge.len() > 15, "{judge:?}");
+    for file in judge {
         let used = without_tests(tokens(&read(&file)));
         let shared = used.iter().find(|t| kernels.contains(&t.as_str()));
         assert!(shared.is_none(), "{} uses {shared:?}", file.display());
@@ -714,24 +744,9 @@ fn comments(source: &str) -> String {
 
 /// The keys that the registry cites, each with who cites it.
 fn registered() -> BTreeMap<String, String> {
-    let kinds = [
-        registry::abouts::<FrictionLocal<2>>(),
-        registry::abouts::<FrictionLocal<3>>(),
-        registry::abouts::<FrictionGlobal<2>>(),
-        registry::abouts::<FrictionGlobal<3>>(),
-        registry::abouts::<Lcp>(),
-        registry::abouts::<Mlcp>(),
-        registry::abouts::<BoxLcp>(),
-        registry::abouts::<Hlcp>(),
-    ];
-    let solvers = kinds.into_iter().flatten().map(|a| (a.name, a.cites));
-    let prefixes = [
-        registry::prefixes::<FrictionLocal<3>>(),
-        registry::prefixes::<FrictionGlobal<3>>(),
-        registry::prefixes::<Mlcp>(),
-        registry::prefixes::<BoxLcp>(),
-        registry::prefixes::<Hlcp>(),
-    ];
+    let abouts = each_kind!(P => registry::abouts::<P>());
+    let solvers = abouts.into_iter().flatten().map(|a| (a.name, a.cites));
+    let prefixes = each_kind!(P => registry::prefixes::<P>());
     let prefixes = prefixes.into_iter().flatten().map(|p| (p.name, p.cites));
     let cited = solvers.chain(prefixes).flat_map(|(name, cites)| {
         assert!(!cites.is_empty(), "{name} cites nothing");

@@ -1,14 +1,14 @@
 //! A problem whose kind is known only when a file is read, and its point.
 //!
-//! [`Friction`] and [`Complementarity`] list the kinds of their wings; a problem of any kind is one of theirs. It is a [`Problem`] itself, with its judge.
+//! [`Friction`] and [`Complementarity`] hold the kinds of their wings; a problem of any kind is one of theirs. It is a [`Problem`] itself, with its judge.
 
 use crate::check::{
     Certificate, ConeSystem, ContactStatus, Evidence, Judged, Measure, RowCounts, RowStatus,
     StatusCounts, Verdict, VerdictOf,
 };
 use crate::{
-    BoxLcp, Complementarity, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, Hlcp, HlcpPoint,
-    Kind, Lcp, LcpPoint, LocalPoint, Mlcp, Problem, ProblemError,
+    Complementarity, Friction, GlobalPoint, HlcpPoint, Kind, LcpPoint, LocalPoint, Problem,
+    ProblemError, with_problem,
 };
 
 /// A problem of any kind.
@@ -16,35 +16,22 @@ use crate::{
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnyProblem {
-    /// Contacts, local or global, in the plane or in space.
+    /// Contacts.
     Friction(Friction),
-    /// LCP, MLCP, horizontal or box LCP.
+    /// Linear complementarity.
     Complementarity(Complementarity),
-}
-
-/// Evaluates an expression for whichever problem an [`AnyProblem`] holds.
-#[macro_export]
-macro_rules! with_problem {
-    ($any:expr, $problem:ident => $body:expr) => {
-        match $any {
-            $crate::AnyProblem::Friction(any) => $crate::with_friction!(any, $problem => $body),
-            $crate::AnyProblem::Complementarity(any) => {
-                $crate::with_complementarity!(any, $problem => $body)
-            }
-        }
-    };
 }
 
 /// A point of a problem of any kind.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnyPoint {
-    /// Of a [`FrictionLocal`].
+    /// Of a [`FrictionLocal`](crate::FrictionLocal).
     Local(LocalPoint),
-    /// Of a [`FrictionGlobal`].
+    /// Of a [`FrictionGlobal`](crate::FrictionGlobal).
     Global(GlobalPoint),
-    /// Of an [`Lcp`], [`Mlcp`] or [`BoxLcp`].
+    /// Of a problem in z.
     Lcp(LcpPoint),
-    /// Of an [`Hlcp`].
+    /// Of a horizontal problem.
     Hlcp(HlcpPoint),
 }
 
@@ -76,17 +63,13 @@ impl Default for AnyCounts {
     }
 }
 
-/// The kinds that an [`AnyProblem`] may hold: what becomes one, with point, status and counts.
+/// The kinds that an [`AnyProblem`] may hold: what becomes one, with point, status and counts. The list of kinds says which they are.
 pub trait OfAny:
     Judged<Point: OfAnyPoint, Gauge: 'static, Status: Into<AnyStatus>, Counts: Into<AnyCounts>>
     + Into<AnyProblem>
 {
-}
-
-impl<P> OfAny for P where
-    P: Judged<Point: OfAnyPoint, Gauge: 'static, Status: Into<AnyStatus>, Counts: Into<AnyCounts>>
-        + Into<AnyProblem>
-{
+    /// Which kind it is.
+    const KIND: Kind;
 }
 
 /// Points that an [`AnyPoint`] may hold.
@@ -142,16 +125,6 @@ macro_rules! any_from {
 }
 
 any_from! {
-    FrictionLocal<2> => AnyProblem, |p| Self::Friction(Friction::Local2(p));
-    FrictionLocal<3> => AnyProblem, |p| Self::Friction(Friction::Local3(p));
-    FrictionGlobal<2> => AnyProblem, |p| Self::Friction(Friction::Global2(p));
-    FrictionGlobal<3> => AnyProblem, |p| Self::Friction(Friction::Global3(p));
-    Lcp => AnyProblem, |p| Self::Complementarity(Complementarity::Lcp(p));
-    Mlcp => AnyProblem, |p| Self::Complementarity(Complementarity::Mlcp(p));
-    Hlcp => AnyProblem, |p| Self::Complementarity(Complementarity::Hlcp(p));
-    BoxLcp => AnyProblem, |p| Self::Complementarity(Complementarity::Box(p));
-    Friction => AnyProblem, |p| Self::Friction(p);
-    Complementarity => AnyProblem, |p| Self::Complementarity(p);
     ContactStatus => AnyStatus, |status| Self::Contact(status);
     RowStatus => AnyStatus, |status| Self::Row(status);
     StatusCounts => AnyCounts, |counts| Self::Contacts(counts);

@@ -101,3 +101,26 @@ pub(crate) fn friction_coefficients(mu: &[f64]) -> Result<(), ProblemError> {
         None => Ok(()),
     }
 }
+
+/// Bounds `[l, u]`, each of so many entries, that are numbers and do not cross.
+pub(crate) fn bounds(
+    [lower, upper]: [&[f64]; 2],
+    rows: usize,
+    meaning: &str,
+) -> Result<(), ProblemError> {
+    for (name, bound) in [("l", lower), ("u", upper)] {
+        if bound.len() != rows {
+            let found = format!("{} entries", bound.len());
+            return Err(ProblemError::shape(name, format!("{rows} entries ({meaning})"), found));
+        }
+    }
+    let wrong = |(l, u): (&f64, &f64)| !(l <= u && *l < f64::INFINITY && *u > f64::NEG_INFINITY);
+    match lower.iter().zip(upper).position(wrong) {
+        Some(i) => Err(ProblemError::value(
+            format!("[l, u][{i}]"),
+            "l ≤ u, l < ∞, u > −∞",
+            format!("[{}, {}]", lower[i], upper[i]),
+        )),
+        None => Ok(()),
+    }
+}

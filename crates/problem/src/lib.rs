@@ -8,26 +8,19 @@
 
 mod any;
 pub mod check;
-mod complementarity;
-mod dynamics;
 mod error;
-mod friction;
-mod friction_global;
-mod friction_local;
-mod law;
+mod kinds;
 pub mod planted;
 mod problem;
-mod rows;
 
 pub use any::{
     AnyCounts, AnyGauge, AnyPoint, AnyProblem, AnyStatus, OfAny, OfAnyPoint, any_verdict,
 };
-pub use complementarity::{BoxLcp, Complementarity, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp};
-pub use dynamics::Dynamics;
 pub use error::ProblemError;
-pub use friction::Friction;
-pub use friction_global::{FrictionGlobal, GlobalPoint, RowsGlobal};
-pub use friction_local::{FrictionLocal, LocalPoint, RowsLocal};
-pub use law::Coulomb;
-pub use problem::{Kind, Problem};
-pub use rows::Bounds;
+pub use kinds::complementarity::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp};
+pub use kinds::contact::{
+    Bounds, Coulomb, Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RowsGlobal,
+    RowsLocal,
+};
+pub use kinds::{Complementarity, Friction, Kind};
+pub use problem::Problem;

@@ -1,68 +1,7 @@
 //! What every kind of problem offers to the loop that drives the solvers.
 
-use crate::ProblemError;
 use crate::check::{Certificate, ConeSystem, Evidence, Measure};
-
-/// The kinds of problem, by the name that files, reports and the registry use.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
-)]
-pub enum Kind {
-    /// `u = W r + q`, two-dimensional contacts.
-    #[serde(rename = "friction_local_2d")]
-    FrictionLocal2d,
-    /// `u = W r + q`, three-dimensional contacts.
-    #[serde(rename = "friction_local_3d")]
-    FrictionLocal3d,
-    /// `M v = H r + f`, `u = Hᵀ v + w`, two-dimensional contacts.
-    #[serde(rename = "friction_global_2d")]
-    FrictionGlobal2d,
-    /// `M v = H r + f`, `u = Hᵀ v + w`, three-dimensional contacts.
-    #[serde(rename = "friction_global_3d")]
-    FrictionGlobal3d,
-    /// `0 ≤ z ⟂ M z + q ≥ 0`.
-    #[serde(rename = "lcp")]
-    Lcp,
-    /// An LCP with equalities and free variables.
-    #[serde(rename = "mlcp")]
-    Mlcp,
-    /// `Q x + R s = q`, `0 ≤ x ⟂ s ≥ 0`.
-    #[serde(rename = "hlcp")]
-    Hlcp,
-    /// `−(M z + q) ∈ N_[l, u](z)`.
-    #[serde(rename = "box_lcp")]
-    BoxLcp,
-}
-
-impl Kind {
-    /// The name used in files, reports and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Kind::FrictionLocal2d => "friction_local_2d",
-            Kind::FrictionLocal3d => "friction_local_3d",
-            Kind::FrictionGlobal2d => "friction_global_2d",
-            Kind::FrictionGlobal3d => "friction_global_3d",
-            Kind::Lcp => "lcp",
-            Kind::Mlcp => "mlcp",
-            Kind::Hlcp => "hlcp",
-            Kind::BoxLcp => "box_lcp",
-        }
-    }
-
-    /// Whether this is a linear complementarity problem; the others are problems of frictional contact.
-    pub fn is_linear(self) -> bool {
-        matches!(self, Kind::Lcp | Kind::Mlcp | Kind::Hlcp | Kind::BoxLcp)
-    }
-
-    /// The components D of each contact; 1 for the pairs of a linear complementarity problem.
-    pub fn dimension(self) -> usize {
-        match self {
-            Kind::FrictionLocal2d | Kind::FrictionGlobal2d => 2,
-            Kind::FrictionLocal3d | Kind::FrictionGlobal3d => 3,
-            Kind::Lcp | Kind::Mlcp | Kind::Hlcp | Kind::BoxLcp => 1,
-        }
-    }
-}
+use crate::{Kind, ProblemError};
 
 /// A problem, stated: validated data, the shape of its unknown, and its own judge.
 ///

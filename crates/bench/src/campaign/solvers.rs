@@ -1,6 +1,6 @@
 //! Solvers by label, and who makes them.
 
-use nonsmooth_problem::{BoxLcp, FrictionGlobal, FrictionLocal, Hlcp, Kind, Lcp, Mlcp};
+use nonsmooth_problem::{Kind, OfAny, each_kind};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::settings::{self, SettingsMap};
 use nonsmooth_solve::{Session, SolveError};
@@ -35,31 +35,20 @@ impl Registry {
     /// The names of the solvers of all kinds of problem, each once: with `composed` also those behind a prefix, as `condense/nsgs`; with `variants` also the
     /// settings that the registry holds worth comparing.
     pub fn labels(composed: bool, variants: bool) -> Vec<String> {
-        fn of<P: Registered>((composed, variants): (bool, bool), all: &mut Vec<String>) {
-            let names = match composed {
-                true => registry::solver_names::<P>(),
-                false => registry::abouts::<P>().iter().map(|a| a.name.to_owned()).collect(),
-            };
-            for name in names {
-                let about = registry::about::<P>(&name).filter(|_| variants);
-                let settings = about.map_or(&[][..], |a| a.variants);
-                let labels = settings.iter().map(|s| format!("{name}:{s}"));
-                for label in std::iter::once(name.clone()).chain(labels) {
-                    if !all.contains(&label) {
-                        all.push(label);
-                    }
+        let of_kinds = each_kind!(P => match composed {
+            true => registry::solver_names::<P>(),
+            false => registry::abouts::<P>().iter().map(|a| a.name.to_owned()).collect(),
+        }.into_iter().map(|name| (registry::about::<P>(&name), name)).collect::<Vec<_>>());
+        let mut all = vec![];
+        for (about, name) in of_kinds.into_iter().flatten() {
+            let settings = about.filter(|_| variants).map_or(&[][..], |a| a.variants);
+            let labels = settings.iter().map(|s| format!("{name}:{s}"));
+            for label in std::iter::once(name.clone()).chain(labels) {
+                if !all.contains(&label) {
+                    all.push(label);
                 }
             }
         }
-        let mut all = vec![];
-        of::<FrictionLocal<3>>((composed, variants), &mut all);
-        of::<FrictionLocal<2>>((composed, variants), &mut all);
-        of::<FrictionGlobal<3>>((composed, variants), &mut all);
-        of::<FrictionGlobal<2>>((composed, variants), &mut all);
-        of::<Lcp>((composed, variants), &mut all);
-        of::<Mlcp>((composed, variants), &mut all);
-        of::<BoxLcp>((composed, variants), &mut all);
-        of::<Hlcp>((composed, variants), &mut all);
         all
     }
 }
@@ -88,27 +77,19 @@ impl Label {
     ///
     /// Errors: no kind takes it: an unknown name, an unknown key or a bad value.
     pub fn kinds(&self, solvers: &impl Solvers) -> Result<Vec<Kind>, String> {
-        let tries = [
-            (Kind::FrictionLocal3d, self.refusal::<FrictionLocal<3>>(solvers)),
-            (Kind::FrictionLocal2d, self.refusal::<FrictionLocal<2>>(solvers)),
-            (Kind::FrictionGlobal3d, self.refusal::<FrictionGlobal<3>>(solvers)),
-            (Kind::FrictionGlobal2d, self.refusal::<FrictionGlobal<2>>(solvers)),
-            (Kind::Lcp, self.refusal::<Lcp>(solvers)),
-            (Kind::Mlcp, self.refusal::<Mlcp>(solvers)),
-            (Kind::BoxLcp, self.refusal::<BoxLcp>(solvers)),
-            (Kind::Hlcp, self.refusal::<Hlcp>(solvers)),
-        ];
+        let tries = each_kind!(P => (P::KIND, self.refusal::<P>(solvers)));
         let takes =
             |(kind, refusal): &(Kind, Option<SolveError>)| refusal.is_none().then_some(*kind);
         let kinds: Vec<_> = tries.iter().filter_map(takes).collect();
         if !kinds.is_empty() {
             return Ok(kinds);
         }
-        // A kind that knows the name says more than one that does not; global problems know the most names.
+        // A kind that knows the name says more than one that does not, and then the one that knows the most names.
         let refusals: Vec<_> = tries.into_iter().filter_map(|(_, refusal)| refusal).collect();
-        let unknown = |e: &&SolveError| !matches!(e, SolveError::UnknownSolver { .. });
-        let telling = refusals.iter().find(unknown).or(refusals.get(2));
-        Err(telling.map_or_else(String::new, ToString::to_string))
+        let known = |e: &&SolveError| !matches!(e, SolveError::UnknownSolver { .. });
+        let names = each_kind!(P => registry::solver_names::<P>().len());
+        let most = refusals.iter().zip(names).max_by_key(|(_, names)| *names).map(|(e, _)| e);
+        Err(refusals.iter().find(known).or(most).map_or_else(String::new, ToString::to_string))
     }
 
     fn refusal<P: Registered>(&self, solvers: &impl Solvers) -> Option<SolveError> {
@@ -133,6 +114,40 @@ mod tests {
         assert!(kinds("nsgs:omga=1").unwrap_err().contains("unknown key `omga`"));
         assert!(kinds("condense/nsgs:omga=1").unwrap_err().contains("unknown key `omga`"));
         assert!(kinds("nsgs:omega").unwrap_err().contains("expected key=value"));
+    }
+
+    #[test]
+    fn tmp_order() {
+        use nonsmooth_problem::*;
+        fn of<P: Registered>((composed, variants): (bool, bool), all: &mut Vec<String>) {
+            let names = match composed {
+                true => registry::solver_names::<P>(),
+                false => registry::abouts::<P>().iter().map(|a| a.name.to_owned()).collect(),
+            };
+            for name in names {
+                let about = registry::about::<P>(&name).filter(|_| variants);
+                let settings = about.map_or(&[][..], |a| a.variants);
+                let labels = settings.iter().map(|s| format!("{name}:{s}"));
+                for label in std::iter::once(name.clone()).chain(labels) {
+                    if !all.contains(&label) {
+                        all.push(label);
+                    }
+                }
+            }
+        }
+        for x in [(false, false), (false, true), (true, false), (true, true)] {
+            let mut all = vec![];
+            of::<FrictionLocal<3>>(x, &mut all);
+            of::<FrictionLocal<2>>(x, &mut all);
+            of::<FrictionGlobal<3>>(x, &mut all);
+            of::<FrictionGlobal<2>>(x, &mut all);
+            of::<Lcp>(x, &mut all);
+            of::<Mlcp>(x, &mut all);
+            of::<BoxLcp>(x, &mut all);
+            of::<Hlcp>(x, &mut all);
+            assert_eq!(all, Registry::labels(x.0, x.1));
+        }
+        println!("{:?}", each_kind!(P => registry::solver_names::<P>().len()));
     }
 
     #[test]

@@ -19,10 +19,9 @@
 
 use serde::Serialize;
 
-use super::contact::Law;
-use super::proof::{Equation, exact, monotone, negative, satisfying};
-use super::{Certificate, Exact, ExactVector, Impulses, Monotone, Proof, rounded};
-use crate::{Coulomb, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem};
+use super::proof::{Equation, exact, negative, satisfying};
+use super::{Certificate, Exact, ExactVector, Impulses, Law, Monotone, Proof, rounded};
+use crate::{Coulomb, Problem};
 use nonsmooth_linalg::small::{self, tangential_norm};
 use nonsmooth_linalg::{Compensated, Csc, norm};
 
@@ -212,71 +211,6 @@ pub trait Kinematic<const D: usize>: Problem {
     fn monotone(&self) -> Monotone;
 }
 
-impl<const D: usize> Kinematic<D> for FrictionGlobal<D> {
-    fn kinematics(&self) -> Kinematics<D> {
-        let m = self.w.len();
-        let mut rows = vec![];
-        rows.extend(self.H.triplets().map(|(i, j, x)| (j, i, x)));
-        let mut constant = self.w.clone();
-        if let Some(b) = &self.rows {
-            rows.extend(b.G.triplets().map(|(i, j, x)| (m + j, i, x)));
-            constant.extend_from_slice(&b.b);
-        }
-        Kinematics::new(&rows, self.dofs(), constant, self.mu.clone(), 0.0)
-    }
-
-    fn motion(point: &GlobalPoint) -> Vec<f64> {
-        point.v.clone()
-    }
-
-    fn monotone(&self) -> Monotone {
-        match monotone(&self.M) {
-            // The motions of a semidefinite M need not be bounded; that of an invertible M cannot be nearly definite.
-            Monotone::Proved { definite: false } | Monotone::Nearly { .. } => Monotone::Unknown,
-            known => known,
-        }
-    }
-}
-
-impl<const D: usize> FrictionLocal<D> {
-    /// `[W, V; Vᵀ, R]` by entries.
-    fn bordered(&self) -> Vec<(usize, usize, f64)> {
-        let m = self.q.len();
-        let mut entries: Vec<_> = self.W.to_csc().triplets().collect();
-        if let Some(b) = &self.rows {
-            entries.extend(b.V.triplets().flat_map(|(i, j, x)| [(i, m + j, x), (m + j, i, x)]));
-            entries.extend(b.R.triplets().map(|(i, j, x)| (m + i, m + j, x)));
-        }
-        entries
-    }
-}
-
-impl<const D: usize> Kinematic<D> for FrictionLocal<D> {
-    fn kinematics(&self) -> Kinematics<D> {
-        let mut constant = self.q.clone();
-        if let Some(b) = &self.rows {
-            constant.extend_from_slice(&b.s);
-        }
-        // W is computed: where it should be symmetric, its asymmetry tells its rounding.
-        let noise = match self.W.asymmetry() {
-            a if a < NOISE => a,
-            _ => 0.0,
-        };
-        Kinematics::new(&self.bordered(), constant.len(), constant, self.mu.clone(), noise)
-    }
-
-    fn motion(point: &LocalPoint) -> Vec<f64> {
-        [&point.r[..], &point.lambda].concat()
-    }
-
-    fn monotone(&self) -> Monotone {
-        let size = self.q.len() + self.multipliers();
-        monotone(&Csc::from_triplets(size, size, self.bordered().into_iter()).expect("in range"))
-    }
-}
-
-/// An asymmetry of W below this is rounding, above it is meant.
-const NOISE: f64 = 1e-8;
 /// The relative rounding that "equals zero" forgives.
 const ZERO: f64 = 1e-10;
 /// The relative margin by which a power must be negative.
@@ -306,7 +240,7 @@ pub struct Kinematics<const D: usize> {
 }
 
 impl<const D: usize> Kinematics<D> {
-    fn new(
+    pub(crate) fn new(
         entries: &[(usize, usize, f64)],
         columns: usize,
         constant: Vec<f64>,
@@ -537,7 +471,7 @@ impl Power {
 mod tests {
     use super::*;
     use crate::planted::Planted;
-    use crate::{RowsGlobal, RowsLocal};
+    use crate::{FrictionGlobal, FrictionLocal, RowsGlobal, RowsLocal};
     use nonsmooth_linalg::Bsr;
 
     /// One body of unit mass in space that touches planes with the normals given.

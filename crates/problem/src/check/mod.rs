@@ -5,25 +5,15 @@
 //! is decided by [`Measure::passes`] at the `relative` residual.
 
 mod certificate;
-mod contact;
 mod existence;
-mod global;
-mod impulses;
-pub(crate) mod linear;
-mod loads;
-mod local;
-mod proof;
-mod rows;
+pub(crate) mod proof;
+pub(crate) mod rows;
 mod verdict;
 
+pub use crate::kinds::complementarity::{HlcpGauge, LinearGauge, RowCounts, RowStatus};
+pub use crate::kinds::contact::{ContactStatus, GlobalGauge, Impulses, Law, LocalGauge, Motion};
 pub use certificate::Certificate;
-pub use contact::{ContactStatus, Law, Motion};
 pub use existence::{Existence, Kinematic, Kinematics};
-pub use global::GlobalGauge;
-pub use impulses::Impulses;
-pub(crate) use impulses::holds;
-pub use linear::{HlcpGauge, LinearGauge, RowCounts, RowStatus};
-pub use local::LocalGauge;
 pub use proof::{Column, ConeSystem, Evidence, Exact, ExactVector, Monotone, NEAR, Proof, rounded};
 pub(crate) use proof::{Exactly, weigh};
 pub use verdict::{Judged, StatusCounts, Verdict, VerdictOf};
@@ -191,6 +181,6 @@ impl Measure {
 }
 
 /// `a / b`, or `a` itself where `b` is zero: a residual with nothing to scale by is absolute.
-fn over(a: f64, b: f64) -> f64 {
+pub(crate) fn over(a: f64, b: f64) -> f64 {
     if b > 0.0 { a / b } else { a }
 }

@@ -4,7 +4,7 @@ use nonsmooth_linalg::{Bsr, Compensated, Csc, Doubled, Matrix, norm_of};
 
 /// One compensated sum for each row, and the sum of the sizes of its terms.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Rows {
+pub(crate) struct Rows {
     sums: Vec<Compensated>,
     sizes: Vec<f64>,
     plainly: bool,
@@ -12,12 +12,12 @@ pub(super) struct Rows {
 
 impl Rows {
     /// Carries doubled precision from now on, or not.
-    pub(super) fn precisely(&mut self, precisely: bool) {
+    pub(crate) fn precisely(&mut self, precisely: bool) {
         self.plainly = !precisely;
     }
 
     /// Begins with `x`.
-    pub(super) fn start(&mut self, x: &[f64]) {
+    pub(crate) fn start(&mut self, x: &[f64]) {
         self.sums.clear();
         self.sums.extend(x.iter().map(|&x| Compensated::from(x)));
         self.sizes.clear();
@@ -25,7 +25,7 @@ impl Rows {
     }
 
     /// Begins with `n` zeros.
-    pub(super) fn start_at_zero(&mut self, n: usize) {
+    pub(crate) fn start_at_zero(&mut self, n: usize) {
         self.sums.clear();
         self.sums.resize(n, Compensated::default());
         self.sizes.clear();
@@ -33,7 +33,7 @@ impl Rows {
     }
 
     /// Adds `sign · A x`.
-    pub(super) fn add(&mut self, sign: f64, a: &Csc, x: &[f64]) {
+    pub(crate) fn add(&mut self, sign: f64, a: &Csc, x: &[f64]) {
         if self.plainly {
             for (j, &xj) in x.iter().enumerate() {
                 let (rows, values) = a.column(j);
@@ -49,7 +49,7 @@ impl Rows {
     }
 
     /// Adds `sign · A x`; false, and nothing added, where A is known by its products only.
-    pub(super) fn add_matrix(&mut self, sign: f64, a: &Matrix, x: &[f64]) -> bool {
+    pub(crate) fn add_matrix(&mut self, sign: f64, a: &Matrix, x: &[f64]) -> bool {
         match a {
             Matrix::Sparse(a) => self.add(sign, a, x),
             Matrix::Dense(a) => {
@@ -65,14 +65,14 @@ impl Rows {
     }
 
     /// Adds `x`.
-    pub(super) fn add_vector(&mut self, x: &[f64]) {
+    pub(crate) fn add_vector(&mut self, x: &[f64]) {
         for (row, &x) in x.iter().enumerate() {
             self.add_product(row, 1.0, x);
         }
     }
 
     /// Adds `Aᵀ x`.
-    pub(super) fn add_transposed(&mut self, a: &Csc, x: &[f64]) {
+    pub(crate) fn add_transposed(&mut self, a: &Csc, x: &[f64]) {
         if self.plainly {
             for j in 0..a.ncols() {
                 let (rows, values) = a.column(j);
@@ -91,7 +91,7 @@ impl Rows {
 
     /// Adds `a b` to a row.
     #[inline(always)]
-    pub(super) fn add_product(&mut self, row: usize, a: f64, b: f64) {
+    pub(crate) fn add_product(&mut self, row: usize, a: f64, b: f64) {
         let product = a * b;
         if self.plainly {
             self.sums[row].add_plainly(product);
@@ -102,34 +102,34 @@ impl Rows {
     }
 
     /// Adds `W x` in doubled precision.
-    pub(super) fn add_blocks<const D: usize>(&mut self, w: &Bsr<D>, x: &[f64]) {
+    pub(crate) fn add_blocks<const D: usize>(&mut self, w: &Bsr<D>, x: &[f64]) {
         fused::add_blocks(&mut self.sums, &mut self.sizes, (w, x));
     }
 
     /// The sums, each rounded once.
-    pub(super) fn values(&self) -> impl Iterator<Item = f64> + Clone + '_ {
+    pub(crate) fn values(&self) -> impl Iterator<Item = f64> + Clone + '_ {
         self.sums.iter().map(|s| s.value())
     }
 
     /// The sums with all their digits. Each is wrong by at most [`doubt`]`(n)` times the size of its n terms.
-    pub(super) fn doubled(&self) -> impl Iterator<Item = Doubled> + Clone + '_ {
+    pub(crate) fn doubled(&self) -> impl Iterator<Item = Doubled> + Clone + '_ {
         self.sums.iter().map(|s| s.doubled())
     }
 
     /// The sizes of the terms of each sum.
-    pub(super) fn sizes(&self) -> &[f64] {
+    pub(crate) fn sizes(&self) -> &[f64] {
         &self.sizes
     }
 
     /// The Euclidean norm of the sums.
-    pub(super) fn norm(&self) -> f64 {
+    pub(crate) fn norm(&self) -> f64 {
         norm_of(self.values())
     }
 }
 
 /// What a compensated sum of `n` terms may be wrong by, over the size of its terms (OgitaRumpOishi2005, the bound of Dot2 before its last
 /// rounding).
-pub(super) fn doubt(n: usize) -> f64 {
+pub(crate) fn doubt(n: usize) -> f64 {
     let gamma = 0.5 * f64::EPSILON * (n + 2) as f64;
     gamma * gamma
 }
@@ -142,7 +142,7 @@ mod fused {
     /// Defines a kernel that calls the faster of the two bodies.
     macro_rules! kernel {
         ($name:ident $([const $D:ident])?, $body:ident, $data:ty) => {
-            pub(super) fn $name$(<const $D: usize>)?(
+            pub(crate) fn $name$(<const $D: usize>)?(
                 sums: &mut [Compensated],
                 sizes: &mut [f64],
                 data: $data,

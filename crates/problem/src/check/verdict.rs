@@ -4,11 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::contact::Law;
-use super::local::LawGauge;
-use super::{ContactStatus, Measure, Motion, over};
-use crate::{FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem, ProblemError};
-use nonsmooth_linalg::small;
+use super::{ContactStatus, Measure};
+use crate::{Problem, ProblemError};
 
 /// Everything that the judge says of a point.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -69,65 +66,5 @@ pub trait Judged: Problem {
     fn judge(&self, point: &Self::Point, tolerance: f64) -> Result<VerdictOf<Self>, ProblemError> {
         self.validate_point(point)?;
         Ok(self.verdict(point, &mut self.gauge()?, tolerance))
-    }
-}
-
-impl<const D: usize> Judged for FrictionLocal<D> {
-    type Status = ContactStatus;
-    type Counts = StatusCounts;
-
-    fn verdict(&self, point: &LocalPoint, gauge: &mut Self::Gauge, tolerance: f64) -> Verdict {
-        let measure = self.certify(point, gauge);
-        verdict::<_, D>(measure, &gauge.law, &point.r, gauge.velocity(), |c| self.law(c), tolerance)
-    }
-}
-
-impl<const D: usize> Judged for FrictionGlobal<D> {
-    type Status = ContactStatus;
-    type Counts = StatusCounts;
-
-    fn verdict(&self, point: &GlobalPoint, gauge: &mut Self::Gauge, tolerance: f64) -> Verdict {
-        let measure = self.certify(point, gauge);
-        verdict::<_, D>(measure, &gauge.law, &point.r, gauge.velocity(), |c| self.law(c), tolerance)
-    }
-}
-
-fn verdict<L: Law<D>, const D: usize>(
-    measure: Measure,
-    gauge: &LawGauge,
-    r: &[f64],
-    u: &[f64],
-    law: impl Fn(usize) -> L,
-    tolerance: f64,
-) -> Verdict {
-    let margin = if gauge.norm_q > 0.0 { tolerance * gauge.norm_q } else { tolerance };
-    let mut counts = StatusCounts::default();
-    let mut statuses = Vec::with_capacity(gauge.w.len());
-    let mut worst = Vec::with_capacity(gauge.w.len());
-    for (c, &w) in gauge.w.iter().enumerate() {
-        let law = law(c);
-        let x = small::block::<D>(r, c).map(|v| w * v);
-        let modified = law.modified_velocity(&small::block(u, c));
-        let s = law.status(&x, &modified, margin);
-        match s.status {
-            Motion::Open => counts.open += 1,
-            Motion::Stick => counts.stick += 1,
-            Motion::Slip => counts.slip += 1,
-        }
-        counts.at_limit += usize::from(s.at_limit);
-        counts.degenerate += usize::from(s.degenerate);
-        statuses.push(s);
-        let share = law.natural_map(&x, &modified).iter().map(|v| v * v).sum::<f64>().sqrt();
-        worst.push((c, over(share, gauge.norm_q)));
-    }
-    worst.sort_by(|a, b| b.1.total_cmp(&a.1));
-    worst.truncate(10);
-    Verdict {
-        measure,
-        solved: measure.passes(tolerance),
-        counts,
-        statuses,
-        velocity: u.to_vec(),
-        worst,
     }
 }

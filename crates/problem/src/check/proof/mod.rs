@@ -16,8 +16,8 @@ pub use evidence::{Evidence, ExactVector, Proof};
 pub use exact::{Exact, rounded};
 pub use monotone::Monotone;
 
-pub(crate) use evidence::weigh;
+pub(crate) use evidence::{Claim, weigh};
 pub(crate) use exact::{Equation, exact, negative, satisfying};
 pub(crate) use monotone::monotone;
 pub(crate) use rounding::{FEW, exactly_near};
-pub(crate) use statement::Exactly;
+pub(crate) use statement::{Exactly, bounded, columns, exacts, just};

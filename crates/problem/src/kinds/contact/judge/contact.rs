@@ -38,7 +38,7 @@ fn tangential<T: Real, const D: usize>(x: &[T; D]) -> T {
 }
 
 /// `‖x‖`.
-pub(super) fn length<T: Real, const D: usize>(x: &[T; D]) -> T {
+pub(crate) fn length<T: Real, const D: usize>(x: &[T; D]) -> T {
     x[0].hypot(tangential(x))
 }
 
@@ -209,7 +209,7 @@ impl<const D: usize> Law<D> for Coulomb {
 }
 
 /// What one contact adds to the residuals, from x and ũ.
-pub(super) struct Share {
+pub(crate) struct Share {
     /// `‖x − P_K(x − ũ)‖²`.
     pub residual: f64,
     /// `dist(x, K)²`.
@@ -222,7 +222,7 @@ pub(super) struct Share {
 
 impl Share {
     /// From x, u and ũ.
-    pub(super) fn new<T: Real, L: Law<D>, const D: usize>(
+    pub(crate) fn new<T: Real, L: Law<D>, const D: usize>(
         law: L,
         x: &[T; D],
         u: &[T; D],

@@ -1,5 +1,9 @@
 //! The local (Delassus) frictional contact problem.
 
+mod judge;
+
+pub use judge::LocalGauge;
+
 use crate::check::{self, Certificate, ConeSystem, Evidence, Measure};
 use crate::error::{all_finite, friction_coefficients, vector};
 use crate::{Bounds, Coulomb, Kind, Problem, ProblemError};
@@ -155,7 +159,7 @@ impl<const D: usize> FrictionLocal<D> {
 
 impl<const D: usize> Problem for FrictionLocal<D> {
     type Point = LocalPoint;
-    type Gauge = check::LocalGauge;
+    type Gauge = LocalGauge;
 
     fn kind(&self) -> Kind {
         if D == 2 { Kind::FrictionLocal2d } else { Kind::FrictionLocal3d }
@@ -180,7 +184,7 @@ impl<const D: usize> Problem for FrictionLocal<D> {
     }
 
     fn gauge(&self) -> Result<Self::Gauge, ProblemError> {
-        Ok(check::LocalGauge::new(self))
+        Ok(LocalGauge::new(self))
     }
 
     fn regauge(&self, gauge: &mut Self::Gauge) -> Result<(), ProblemError> {

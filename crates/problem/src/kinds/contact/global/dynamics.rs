@@ -1,6 +1,7 @@
 //! The factorised dynamics of a global problem.
 
-use crate::check::{self, Impulses};
+use crate::check::Impulses;
+use crate::kinds::contact::judge;
 use crate::{FrictionGlobal, ProblemError, RowsGlobal};
 use nonsmooth_linalg::{Compensated, Csc, Inverse, Refine};
 
@@ -227,6 +228,6 @@ impl Dynamics {
         let mut multipliers = vec![0.0; b.b.len()];
         free().zip(&residual[problem.dofs()..]).for_each(|(j, x)| multipliers[j] = *x);
         let r = vec![0.0; problem.w.len()];
-        Impulses::toward(r, multipliers, &[], &b.b, |c| check::holds(problem, c))
+        Impulses::toward(r, multipliers, &[], &b.b, |c| judge::holds(problem, c))
     }
 }

@@ -1,6 +1,10 @@
 //! The mixed linear complementarity problem.
 
+use super::judge::{Data, InZ};
+use super::mixed;
 use crate::ProblemError;
+use crate::check::ConeSystem;
+use crate::check::proof::Exactly;
 use crate::error::vector;
 use nonsmooth_linalg::{Csc, Dense, Matrix};
 
@@ -110,3 +114,20 @@ impl Mlcp {
 }
 
 problem_in_z!(Mlcp, problem => problem.M.ncols(), vec![0.0; problem.M.ncols()]);
+
+impl InZ for Mlcp {
+    fn data(&self) -> Data<'_> {
+        let Self { M, q, equalities, free } = self;
+        Data { matrix: M, q, equalities: *equalities, free: *free, bounds: None }
+    }
+}
+
+impl Exactly for Mlcp {
+    fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
+        mixed(&self.M, &self.q, self.equalities, self.free, wanted)
+    }
+
+    fn rows(&self) -> usize {
+        self.q.len()
+    }
+}

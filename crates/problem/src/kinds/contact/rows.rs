@@ -1,6 +1,7 @@
 //! The bounds of scalar rows.
 
 use crate::ProblemError;
+use crate::error;
 
 /// What the impulse λ_j of each scalar row may be, `l_j ≤ λ_j ≤ u_j`; with c the velocity of the row, `−c_j ∈ N_[l_j, u_j](λ_j)`: `c_j ≥ 0` where
 /// `λ_j = l_j`, `c_j ≤ 0` where `λ_j = u_j`, and `c_j = 0` between.
@@ -68,31 +69,8 @@ impl Bounds {
     pub(crate) fn validate(&self, rows: usize, meaning: &str) -> Result<(), ProblemError> {
         match self.lower.is_empty() && self.upper.is_empty() {
             true => Ok(()),
-            false => check([&self.lower, &self.upper], rows, meaning),
+            false => error::bounds([&self.lower, &self.upper], rows, meaning),
         }
-    }
-}
-
-/// Bounds `[l, u]`, each of so many entries, that are numbers and do not cross.
-pub(crate) fn check(
-    [lower, upper]: [&[f64]; 2],
-    rows: usize,
-    meaning: &str,
-) -> Result<(), ProblemError> {
-    for (name, bound) in [("l", lower), ("u", upper)] {
-        if bound.len() != rows {
-            let found = format!("{} entries", bound.len());
-            return Err(ProblemError::shape(name, format!("{rows} entries ({meaning})"), found));
-        }
-    }
-    let wrong = |(l, u): (&f64, &f64)| !(l <= u && *l < f64::INFINITY && *u > f64::NEG_INFINITY);
-    match lower.iter().zip(upper).position(wrong) {
-        Some(i) => Err(ProblemError::value(
-            format!("[l, u][{i}]"),
-            "l ≤ u, l < ∞, u > −∞",
-            format!("[{}, {}]", lower[i], upper[i]),
-        )),
-        None => Ok(()),
     }
 }
 

@@ -1,6 +1,9 @@
 //! The linear complementarity problem.
 
-use super::square;
+use super::judge::{Data, InZ};
+use super::{mixed, square};
+use crate::check::ConeSystem;
+use crate::check::proof::{Claim, Exactly};
 use crate::error::vector;
 use crate::{Problem, ProblemError};
 use nonsmooth_linalg::Matrix;
@@ -57,3 +60,39 @@ impl Lcp {
 }
 
 problem_in_z!(Lcp, problem => problem.dim(), vec![0.0; problem.dim()]);
+
+impl InZ for Lcp {
+    fn data(&self) -> Data<'_> {
+        Data { matrix: &self.M, q: &self.q, equalities: 0, free: 0, bounds: None }
+    }
+}
+
+/// `w − M z = q`.
+impl Exactly for Lcp {
+    fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
+        mixed(&self.M, &self.q, 0, 0, wanted)
+    }
+
+    fn rows(&self) -> usize {
+        self.q.len()
+    }
+
+    fn is_plausible(&self, y: &Claim) -> bool {
+        plausible(&self.M, &self.q, y)
+    }
+}
+
+/// Whether `qᵀ y < 0` and `Mᵀ y ≤ 0`, up to much more than rounding: exact numbers of a large matrix are not made in vain.
+fn plausible(m: &Matrix, q: &[f64], y: &Claim) -> bool {
+    let Claim::Doubles(y) = y else { return true };
+    let terms = q.iter().zip(y).map(|(q, y)| q * y);
+    let (power, size) = terms.fold((0.0, 0.0), |(sum, size), t: f64| (sum + t, size + t.abs()));
+    let mut slopes = vec![(0.0, 0.0); m.ncols()];
+    m.for_each(|i, j, x| {
+        let (sum, size) = &mut slopes[j];
+        *sum += x * y[i];
+        *size += (x * y[i]).abs();
+    });
+    let nearly = |(sum, size): &(f64, f64)| *sum <= 1e-6 * size;
+    nearly(&(power, size)) && slopes.iter().all(nearly)
+}

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Kinematic;
 use crate::FrictionGlobal;
+use crate::check::Kinematic;
 
 /// Impulses that every admissible motion would have to feed: proof that a problem has no solution.
 ///
@@ -15,7 +15,7 @@ use crate::FrictionGlobal;
 /// Any solution has `u_N ≥ 0`, so `rᵀ u = Σ r_N u_N ≥ 0`, which the two equations make negative: a contradiction (Farkas'
 /// alternative), whatever mu. With `r_T ≠ 0` there is none: of a solution only `ũ ∈ K*` is known, so `rᵀ u ≥ −Σ mu r_N‖u_T‖`, which may
 /// be negative where contacts slide. Such an r is refused here; it refutes the criterion of existence only
-/// ([`super::Kinematics::refutes_criterion`]).
+/// ([`crate::check::Kinematics::refutes_criterion`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Impulses {
     /// Contact impulses of the ray.

@@ -9,7 +9,7 @@
 ///
 /// Cost: a union-find over the couplings, once a problem.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Loads {
+pub(crate) struct Loads {
     parent: Vec<usize>,
     /// `log₂ s` over that of the parent; sums of logarithms neither over- nor underflow.
     level: Vec<f64>,
@@ -23,7 +23,7 @@ pub(super) struct Loads {
 
 impl Loads {
     /// Begins with `n` rows, none coupled.
-    pub(super) fn start(&mut self, n: usize) {
+    pub(crate) fn start(&mut self, n: usize) {
         self.parent.clear();
         self.parent.extend(0..n);
         self.level.clear();
@@ -32,7 +32,7 @@ impl Loads {
     }
 
     /// Whether all rows are coupled: more couplings change nothing.
-    pub(super) fn are_joined(&self) -> bool {
+    pub(crate) fn are_joined(&self) -> bool {
         self.groups <= 1
     }
 
@@ -55,7 +55,7 @@ impl Loads {
     }
 
     /// Rows i and j are coupled; `ratio` is that of their units, asked for where they were not coupled before.
-    pub(super) fn couple(&mut self, i: usize, j: usize, ratio: impl FnOnce() -> f64) {
+    pub(crate) fn couple(&mut self, i: usize, j: usize, ratio: impl FnOnce() -> f64) {
         let ((a, of_i), (b, of_j)) = (self.root(i), self.root(j));
         if a != b {
             let ratio = ratio();
@@ -68,7 +68,7 @@ impl Loads {
     }
 
     /// Sets ω from the moduli of the loads, by row.
-    pub(super) fn spread(&mut self, loads: impl Iterator<Item = f64>) {
+    pub(crate) fn spread(&mut self, loads: impl Iterator<Item = f64>) {
         let n = self.parent.len();
         self.most.clear();
         self.most.resize(n, f64::NEG_INFINITY);
@@ -84,20 +84,20 @@ impl Loads {
     }
 
     /// ω_i: zero where no load reaches row i; unbounded where loads were never given.
-    pub(super) fn reaching(&self, i: usize) -> f64 {
+    pub(crate) fn reaching(&self, i: usize) -> f64 {
         self.reaching.get(i).copied().unwrap_or(f64::INFINITY)
     }
 }
 
 /// What rounding a few operations on terms of a typical size leaves, over that size.
-pub(super) const ROUNDING: f64 = 16.0 * f64::EPSILON;
+pub(crate) const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// Impulses are not so many times larger than what the loads ask for, if they are not to be those of a problem without a solution.
 const REACH: f64 = 1e5;
 
 impl Loads {
     /// The violation, the size it is compared with and the violation that is excused of an equation of row i: its terms are no larger than the loads
     /// make them, nor is the rounding of `typical` terms.
-    pub(super) fn excused(&self, i: usize, sum: f64, size: f64, typical: f64) -> (f64, f64, f64) {
+    pub(crate) fn excused(&self, i: usize, sum: f64, size: f64, typical: f64) -> (f64, f64, f64) {
         match self.reaching(i) {
             load if load > 0.0 => (sum, size.min(load), ROUNDING * typical.min(REACH * load)),
             _ => (sum, size, ROUNDING * typical),

@@ -1,9 +1,11 @@
 //! The linear complementarity problem with two bounds.
 
+use super::judge::{Data, InZ};
 use super::square;
 use crate::ProblemError;
-use crate::error::vector;
-use crate::rows;
+use crate::check::ConeSystem;
+use crate::check::proof::{Exactly, bounded, columns, exacts};
+use crate::error::{bounds, vector};
 use nonsmooth_linalg::Matrix;
 
 /// `−(M z + q) ∈ N_[l, u](z)`: with `w = M z + q`, `w_i ≥ 0` where `z_i = l_i`, `w_i ≤ 0` where `z_i = u_i`, and `w_i = 0` between.
@@ -43,7 +45,7 @@ impl BoxLcp {
         square("M", &self.M)?;
         let n = self.M.nrows();
         vector("q", &self.q, n, "rows of M")?;
-        rows::check([&self.lower, &self.upper], n, "rows of M")
+        bounds([&self.lower, &self.upper], n, "rows of M")
     }
 
     /// The number of variables n.
@@ -57,3 +59,27 @@ problem_in_z!(BoxLcp, problem => problem.dim(), {
     let bounds = problem.lower.iter().zip(&problem.upper);
     bounds.map(|(&l, &u)| 0.0_f64.clamp(l, u)).collect()
 });
+
+impl InZ for BoxLcp {
+    fn data(&self) -> Data<'_> {
+        let bounds = Some((&self.lower[..], &self.upper[..]));
+        Data { matrix: &self.M, q: &self.q, equalities: 0, free: 0, bounds }
+    }
+}
+
+/// `w − M (z − z₀) = q + M z₀` with z₀ at a bound of each variable.
+impl Exactly for BoxLcp {
+    fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
+        let mut system = ConeSystem::new(exacts(&self.q), wanted);
+        let all = columns(&self.M, -1, &|i| system.wants(i))?;
+        for (j, column) in all.into_iter().enumerate() {
+            let unknown = bounded(&mut system, j, column, [self.lower[j], self.upper[j]]);
+            system.unknowns.push(unknown);
+        }
+        Some(system)
+    }
+
+    fn rows(&self) -> usize {
+        self.q.len()
+    }
+}

@@ -1,9 +1,13 @@
 //! The horizontal linear complementarity problem.
 
+mod judge;
+
+pub use judge::HlcpGauge;
+
 use super::square;
-use crate::check::{self, Certificate, ConeSystem, Evidence, HlcpGauge, Measure};
+use crate::check::{self, Certificate, ConeSystem, Evidence, Measure};
 use crate::error::vector;
-use crate::{Kind, Problem, ProblemError};
+use crate::{Kind, OfAny, Problem, ProblemError};
 use nonsmooth_linalg::Matrix;
 
 /// `Q x + R s = q`, `0 ≤ x ⟂ s ≥ 0`: lecture (33). An LCP is `Q = M, R = −I`, with −q on the right.
@@ -61,7 +65,7 @@ impl Problem for Hlcp {
     type Gauge = HlcpGauge;
 
     fn kind(&self) -> Kind {
-        Kind::Hlcp
+        Self::KIND
     }
 
     fn unknowns(&self) -> usize {

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Recipe, finite, size};
+use crate::planted::{Recipe, finite, size};
 use crate::{BoxLcp, Lcp};
 use nonsmooth_linalg::{Csc, Matrix, Operator};
 

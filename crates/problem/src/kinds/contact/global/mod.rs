@@ -1,5 +1,11 @@
 //! The global (mixed linear) frictional contact problem.
 
+mod dynamics;
+mod judge;
+
+pub use dynamics::Dynamics;
+pub use judge::GlobalGauge;
+
 use crate::check::{self, Certificate, ConeSystem, Evidence, Measure};
 use crate::error::{all_finite, friction_coefficients, vector};
 use crate::{Bounds, Coulomb, Kind, Problem, ProblemError};
@@ -144,7 +150,7 @@ impl<const D: usize> FrictionGlobal<D> {
 
 impl<const D: usize> Problem for FrictionGlobal<D> {
     type Point = GlobalPoint;
-    type Gauge = check::GlobalGauge;
+    type Gauge = GlobalGauge;
 
     fn kind(&self) -> Kind {
         if D == 2 { Kind::FrictionGlobal2d } else { Kind::FrictionGlobal3d }
@@ -175,7 +181,7 @@ impl<const D: usize> Problem for FrictionGlobal<D> {
     }
 
     fn gauge(&self) -> Result<Self::Gauge, ProblemError> {
-        check::GlobalGauge::new(self)
+        GlobalGauge::new(self)
     }
 
     fn regauge(&self, gauge: &mut Self::Gauge) -> Result<(), ProblemError> {

@@ -9,8 +9,8 @@ use rand_pcg::Pcg64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Recipe, share, size};
 use crate::check::Certificate;
+use crate::planted::{Recipe, share, size};
 use crate::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp};
 use nonsmooth_linalg::{Compensated, Csc, Dense, Matrix};
 

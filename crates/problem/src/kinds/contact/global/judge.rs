@@ -1,16 +1,21 @@
 //! The judge of the global problem.
 
-use super::loads::ROUNDING;
-use super::local::{HALF_ULP, LawGauge, largest, unit, worst};
-use super::rows::{Rows, doubt};
-use super::{Measure, over};
-use crate::{Dynamics, FrictionGlobal, GlobalPoint, ProblemError};
+use crate::check::proof::{Exactly, bounded, exacts, just, monotone};
+use crate::check::rows::{Rows, doubt};
+use crate::check::{
+    ConeSystem, ContactStatus, Judged, Kinematic, Kinematics, Measure, Monotone, StatusCounts,
+    Verdict, over,
+};
+use crate::kinds::contact::judge::gauge::{HALF_ULP, LawGauge, largest, unit, verdict, worst};
+use crate::kinds::contact::judge::loads::ROUNDING;
+use crate::kinds::contact::judge::statement::{contacts, opposite, under};
+use crate::{Dynamics, FrictionGlobal, GlobalPoint, Problem, ProblemError};
 use nonsmooth_linalg::{Csc, Delassus, Doubled, Inverse, Refine, norm, norm_of, small};
 
 /// The judge's constants and buffers for a [`FrictionGlobal`]: among them its own factorisation of the dynamics.
 #[derive(Debug, Clone)]
 pub struct GlobalGauge {
-    pub(super) law: LawGauge,
+    law: LawGauge,
     dynamics: Dynamics,
     /// `M⁻¹` alone and its scratch, where bilateral constraints border the dynamics.
     free: Option<(Inverse, Vec<f64>)>,
@@ -404,5 +409,79 @@ fn imbalance<const D: usize>(
     Imbalance {
         residual: over(rows.norm(), force),
         rounding: over(16.0 * f64::EPSILON * norm(rows.sizes()), force),
+    }
+}
+
+impl<const D: usize> Judged for FrictionGlobal<D> {
+    type Status = ContactStatus;
+    type Counts = StatusCounts;
+
+    fn verdict(&self, point: &GlobalPoint, gauge: &mut Self::Gauge, tolerance: f64) -> Verdict {
+        let measure = self.certify(point, gauge);
+        verdict::<_, D>(measure, &gauge.law, &point.r, gauge.velocity(), |c| self.law(c), tolerance)
+    }
+}
+
+impl<const D: usize> Kinematic<D> for FrictionGlobal<D> {
+    fn kinematics(&self) -> Kinematics<D> {
+        let m = self.w.len();
+        let mut rows = vec![];
+        rows.extend(self.H.triplets().map(|(i, j, x)| (j, i, x)));
+        let mut constant = self.w.clone();
+        if let Some(b) = &self.rows {
+            rows.extend(b.G.triplets().map(|(i, j, x)| (m + j, i, x)));
+            constant.extend_from_slice(&b.b);
+        }
+        Kinematics::new(&rows, self.dofs(), constant, self.mu.clone(), 0.0)
+    }
+
+    fn motion(point: &GlobalPoint) -> Vec<f64> {
+        point.v.clone()
+    }
+
+    fn monotone(&self) -> Monotone {
+        match monotone(&self.M) {
+            // The motions of a semidefinite M need not be bounded; that of an invertible M cannot be nearly definite.
+            Monotone::Proved { definite: false } | Monotone::Nearly { .. } => Monotone::Unknown,
+            known => known,
+        }
+    }
+}
+
+/// `M v − H r − G λ = f`, `u − Hᵀ v = w`, `c − Gᵀ v = b`.
+impl<const D: usize> Exactly for FrictionGlobal<D> {
+    fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
+        let (n, m) = (self.dofs(), self.w.len());
+        let mut rhs = exacts(&[&self.f[..], &self.w].concat());
+        rhs.extend(self.rows.iter().flat_map(|b| exacts(&b.b)));
+        let mut system = ConeSystem::new(rhs, wanted);
+        let mut velocities = opposite(&self.M, 0, &system);
+        velocities.iter_mut().flatten().for_each(|(_, x)| *x = -std::mem::take(x));
+        velocities = under(velocities, opposite(&self.H.transpose(), n, &system));
+        let mut multipliers = vec![];
+        if let Some(b) = &self.rows {
+            velocities = under(velocities, opposite(&b.G.transpose(), n + m, &system));
+            multipliers = opposite(&b.G, 0, &system);
+        }
+        let velocities: Vec<_> = velocities.into_iter().map(|c| system.column(c)).collect();
+        system.free.extend(&velocities);
+        let bounds = self.rows.iter().flat_map(|b| (0..b.b.len()).map(|j| b.bounds.of(j)));
+        let multipliers = multipliers.into_iter().zip(bounds).enumerate();
+        let of_row = |(j, (c, bounds))| bounded(&mut system, n + m + j, c, bounds);
+        let multipliers: Vec<_> = multipliers.map(of_row).collect();
+        let impulses = opposite(&self.H, 0, &system);
+        let impulses = contacts::<D>(&mut system, n, impulses, &self.mu);
+        system.unknowns = velocities.into_iter().map(just).collect();
+        system.unknowns.extend(impulses);
+        system.unknowns.extend(multipliers);
+        Some(system)
+    }
+
+    fn rows(&self) -> usize {
+        self.dofs() + self.w.len() + self.multipliers()
+    }
+
+    fn impulses_from(&self) -> Option<usize> {
+        Some(self.dofs())
     }
 }

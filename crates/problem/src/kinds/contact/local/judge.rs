@@ -1,16 +1,20 @@
 //! The judge of the local problem.
 
-use super::contact::{Law, Share, length};
-use super::loads::Loads;
-use super::rows::{Rows, doubt};
-use super::{Measure, over};
-use crate::{FrictionLocal, LocalPoint, RowsLocal};
-use nonsmooth_linalg::{Csc, Doubled, Real, norm, norm_of, power_of_two, small};
+use crate::check::proof::{Exactly, bounded, exacts, monotone};
+use crate::check::rows::{Rows, doubt};
+use crate::check::{
+    ConeSystem, ContactStatus, Judged, Kinematic, Kinematics, Measure, Monotone, StatusCounts,
+    Verdict,
+};
+use crate::kinds::contact::judge::gauge::{HALF_ULP, LawGauge, largest, unit, verdict, worst};
+use crate::kinds::contact::judge::statement::{contacts, opposite, under};
+use crate::{FrictionLocal, LocalPoint, Problem, RowsLocal};
+use nonsmooth_linalg::{Csc, Doubled, Real, norm, power_of_two, small};
 
 /// The judge's constants and buffers for a [`FrictionLocal`].
 #[derive(Debug, Clone)]
 pub struct LocalGauge {
-    pub(super) law: LawGauge,
+    law: LawGauge,
     u: Vec<f64>,
     /// u with all its digits and the size of its terms, when it was last certified.
     exact: Vec<Doubled>,
@@ -233,14 +237,6 @@ impl LocalGauge {
     }
 }
 
-/// The rounding of a stored double, over its size, in the root mean square.
-pub(super) const HALF_ULP: f64 = 0.3 * f64::EPSILON;
-
-/// What plain arithmetic makes of x and ũ is wrong by less than this, over `‖x‖ + ‖ũ‖`.
-const PLAIN: f64 = 16.0 * f64::EPSILON;
-/// Terms below this share of ‖q‖ have lost digits to underflow.
-const LEAST: f64 = 1e-280;
-
 /// Calls `term(i, A_ij, x_j)` for the entries of A.
 fn each_term(a: Option<&Csc>, x: &[f64], mut term: impl FnMut(usize, f64, f64)) {
     let Some(a) = a else { return };
@@ -248,25 +244,6 @@ fn each_term(a: Option<&Csc>, x: &[f64], mut term: impl FnMut(usize, f64, f64)) 
         let (rows, values) = a.column(j);
         rows.iter().zip(values).for_each(|(&i, &v)| term(i, v, xj));
     }
-}
-
-/// `√|d|` of a diagonal entry, the unit of what belongs to it; 1 where it vanishes.
-pub(super) fn unit(d: f64) -> f64 {
-    match d.abs().sqrt() {
-        unit if unit > 0.0 => unit,
-        _ => 1.0,
-    }
-}
-
-/// The largest ratio of violation to size, beyond what each is excused for; infinite if any is NaN.
-pub(super) fn worst(shares: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
-    shares.fold(0.0, |worst: f64, (violation, size, excuse)| {
-        match over((violation.abs() - excuse).max(0.0), size) {
-            _ if violation.is_nan() => f64::INFINITY,
-            share if share.is_nan() => f64::INFINITY,
-            share => worst.max(share),
-        }
-    })
 }
 
 /// The matrix `[W, V; Vᵀ, R]` by contacts and constraints.
@@ -314,157 +291,82 @@ impl<const D: usize> Saddle<'_, D> {
     }
 }
 
-/// The largest modulus in a block.
-pub(super) fn largest<const D: usize>(block: &[[f64; D]; D]) -> f64 {
-    block.iter().flatten().fold(0.0, |l, x| l.max(x.abs()))
+impl<const D: usize> Judged for FrictionLocal<D> {
+    type Status = ContactStatus;
+    type Counts = StatusCounts;
+
+    fn verdict(&self, point: &LocalPoint, gauge: &mut Self::Gauge, tolerance: f64) -> Verdict {
+        let measure = self.certify(point, gauge);
+        verdict::<_, D>(measure, &gauge.law, &point.r, gauge.velocity(), |c| self.law(c), tolerance)
+    }
 }
 
-/// What the contact law's residual needs of a problem: `w_c` and `‖q‖`, and what stands for both where a contact is measured by itself.
-#[derive(Debug, Clone, Default)]
-pub(super) struct LawGauge {
-    pub(super) w: Vec<f64>,
-    /// The largest modulus of W_cc, which is there where the trace is not; zero where nothing is. Others may follow.
-    pub(super) strength: Vec<f64>,
-    pub(super) loads: Loads,
-    /// Moduli of loads, and room for as many.
-    amounts: Vec<f64>,
-    impulses: Vec<f64>,
-    pub(super) norm_q: f64,
+impl<const D: usize> FrictionLocal<D> {
+    /// `[W, V; Vᵀ, R]` by entries.
+    fn bordered(&self) -> Vec<(usize, usize, f64)> {
+        let m = self.q.len();
+        let mut entries: Vec<_> = self.W.to_csc().triplets().collect();
+        if let Some(b) = &self.rows {
+            entries.extend(b.V.triplets().flat_map(|(i, j, x)| [(i, m + j, x), (m + j, i, x)]));
+            entries.extend(b.R.triplets().map(|(i, j, x)| (m + i, m + j, x)));
+        }
+        entries
+    }
 }
 
-impl LawGauge {
-    pub(super) fn new(diagonal: impl Iterator<Item = f64>) -> Self {
-        let mut gauge = Self::default();
-        gauge.refill(diagonal, 0.0);
-        gauge
-    }
-
-    pub(super) fn refill(&mut self, diagonal: impl Iterator<Item = f64>, norm_q: f64) {
-        self.norm_q = norm_q;
-        self.w.clear();
-        self.w.extend(diagonal);
-        let mean = self.w.iter().sum::<f64>() / self.w.len().max(1) as f64;
-        let stand_in = if mean > 0.0 { mean } else { 1.0 };
-        for w in &mut self.w {
-            if *w <= 0.0 {
-                *w = stand_in;
-            }
+impl<const D: usize> Kinematic<D> for FrictionLocal<D> {
+    fn kinematics(&self) -> Kinematics<D> {
+        let mut constant = self.q.clone();
+        if let Some(b) = &self.rows {
+            constant.extend_from_slice(&b.s);
         }
-    }
-
-    /// What stands for w_c where contact c is measured by itself.
-    fn own_w(&self, c: usize) -> f64 {
-        match self.strength.get(c) {
-            Some(&strength) if strength > 0.0 => strength,
-            _ => self.w[c],
-        }
-    }
-
-    /// What the residual is relative to.
-    pub(super) fn unit(&self) -> f64 {
-        if self.norm_q > 0.0 { self.norm_q } else { 1.0 }
-    }
-
-    /// The residuals of the impulses `r` with the velocities `u`, whose terms have the `sizes` and whose entries may be wrong by
-    /// `doubt(i)`. What the arithmetic T leaves in doubt is added to the residuals that decide, so that they never
-    /// promise too much.
-    ///
-    /// All is done in units of a power of two near its scale, so that no square leaves the range of double precision
-    /// before the data do.
-    pub(super) fn measure<T: Real, L: Law<D>, const D: usize>(
-        &self,
-        r: &[f64],
-        u: &[T],
-        sizes: &[f64],
-        doubt: impl Fn(usize) -> f64,
-        law: impl Fn(usize) -> L,
-    ) -> Measure {
-        let unit = power_of_two(self.unit());
-        let largest = u.iter().map(|u| u.value() / unit);
-        let plain = match self.norm_q.max(norm(r)).max(unit * norm_of(largest)) {
-            largest if largest > 0.0 => largest,
-            _ => 1.0,
+        // W is computed: where it should be symmetric, its asymmetry tells its rounding.
+        let noise = match self.W.asymmetry() {
+            a if a < NOISE => a,
+            _ => 0.0,
         };
-        let plain_unit = power_of_two(plain);
-        let (per, plain_per) = (1.0 / unit, 1.0 / plain_unit);
-        let (mut scaled, mut plain_map, mut doubts) = (0.0, 0.0, 0.0);
-        let (mut primal, mut dual, mut complementarity) = (0.0, 0.0, 0.0);
-        let (mut worst_contact, mut worst) = (0, -1.0);
-        let (mut own_contact, mut own) = (0, 0.0);
-        for (c, &w) in self.w.iter().enumerate() {
-            let law = law(c);
-            let rc: [f64; D] = small::block(r, c);
-            let uc: [T; D] = std::array::from_fn(|k| u[D * c + k]);
-            let plain_u = uc.map(|u| u.value());
-            let plain_modified = law.modified_velocity(&plain_u);
-            let near = (rc.map(|r| w * r * per), plain_modified.map(|u| u * per));
-            let plainly = || Share::new(law, &near.0, &plain_u.map(|u| u * per), &near.1);
-            let (share, left) = if T::DOUBT == 0.0 {
-                (plainly(), 0.0)
-            } else {
-                let size = length(&near.0) + length(&near.1);
-                // Of most contacts the natural map is ũ or x: once these are known, plain arithmetic is right to the last bits.
-                if law.is_at_rest_or_open(&near.0, &near.1, PLAIN * size) {
-                    let share = plainly();
-                    let left = PLAIN * share.residual.sqrt();
-                    (share, left)
-                } else {
-                    let x = rc.map(|r| T::of_product(w, r).times_power(per));
-                    let u = uc.map(|u| u.times_power(per));
-                    let modified = law.modified_velocity(&u);
-                    (Share::new(law, &x, &u, &modified), T::DOUBT * size)
-                }
-            };
-            if share.residual > worst || share.residual.is_nan() {
-                (worst_contact, worst) = (c, share.residual);
-            }
-            scaled += share.residual;
-            // Plain arithmetic decides nothing: it leaves out what only decides.
-            if T::DOUBT > 0.0 {
-                let of_u = norm_of((D * c..D * c + D).map(|i| doubt(i) * per));
-                let left = left + law.growth() * of_u;
-                doubts += left * left;
-                // Impulses that run away along the kernel of W make terms of any size: no more than the loads excuse.
-                let load = self.loads.reaching(c) * per;
-                let strength = self.own_w(c);
-                let own_x = rc.map(|r| strength * r * per);
-                let apart = law.apart(&own_x, &plain_u.map(|u| u * per));
-                // Of an empty block the impulse is no term, but may be all there is.
-                let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] * per));
-                let terms = terms.max(norm(&own_x)).min(load);
-                let normal = (sizes[D * c] * per).min(load);
-                // Below the range of double precision there are no digits to be right.
-                let error = share.residual.sqrt().max(apart) + left;
-                // No sliding, however fast, excuses a velocity into the obstacle.
-                let sinking = over((-plain_u[0] * per).max(0.0), normal.max(LEAST));
-                let of_own = over(error, terms.max(LEAST)).max(sinking);
-                if load > 0.0 && (of_own > own || of_own.is_nan()) {
-                    (own_contact, own) = (c, of_own);
-                }
-            }
-            let plain_r = rc.map(|r| r * plain_per);
-            let map = law.natural_map(&plain_r, &plain_modified.map(|u| u * plain_per));
-            plain_map += map.iter().map(|v| v * v).sum::<f64>();
-            primal += share.primal;
-            dual += share.dual;
-            complementarity += share.complementarity;
+        Kinematics::new(&self.bordered(), constant.len(), constant, self.mu.clone(), noise)
+    }
+
+    fn motion(point: &LocalPoint) -> Vec<f64> {
+        [&point.r[..], &point.lambda].concat()
+    }
+
+    fn monotone(&self) -> Monotone {
+        let size = self.q.len() + self.multipliers();
+        monotone(&Csc::from_triplets(size, size, self.bordered().into_iter()).expect("in range"))
+    }
+}
+
+/// An asymmetry of W below this is rounding, above it is meant.
+const NOISE: f64 = 1e-8;
+
+/// `u − W r − V λ = q`, `c − Vᵀ r − R λ = s`.
+impl<const D: usize> Exactly for FrictionLocal<D> {
+    fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
+        let m = self.q.len();
+        let mut rhs = exacts(&self.q);
+        rhs.extend(self.rows.iter().flat_map(|b| exacts(&b.s)));
+        let mut system = ConeSystem::new(rhs, wanted);
+        let mut impulses = opposite(&self.W.to_csc(), 0, &system);
+        let mut multipliers = vec![];
+        if let Some(b) = &self.rows {
+            impulses = under(impulses, opposite(&b.V.transpose(), m, &system));
+            let all = under(opposite(&b.V, 0, &system), opposite(&b.R, m, &system));
+            let all = all.into_iter().enumerate();
+            multipliers =
+                all.map(|(j, c)| bounded(&mut system, m + j, c, b.bounds.of(j))).collect();
         }
-        // From units of a power of two to those of q.
-        let q = unit / self.unit();
-        let relative = (scaled.sqrt() + doubts.sqrt()) * q;
-        Measure {
-            absolute: relative * self.unit(),
-            relative,
-            literature: plain_map.sqrt() * (plain_unit / self.unit()),
-            siconos: plain_map.sqrt() * (plain_unit / plain),
-            primal: primal.sqrt() * q,
-            dual: dual.sqrt() * q,
-            complementarity: complementarity * q * q,
-            own: (T::DOUBT > 0.0).then_some(own),
-            own_contact: (T::DOUBT > 0.0).then_some(own_contact),
-            worst_contact,
-            worst: worst.sqrt() * q,
-            ..Measure::unknown()
-        }
+        system.unknowns = contacts::<D>(&mut system, 0, impulses, &self.mu);
+        system.unknowns.extend(multipliers);
+        Some(system)
+    }
+
+    fn rows(&self) -> usize {
+        self.q.len() + self.multipliers()
+    }
+
+    fn impulses_from(&self) -> Option<usize> {
+        Some(0)
     }
 }

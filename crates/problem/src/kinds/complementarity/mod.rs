@@ -1,4 +1,4 @@
-//! Linear complementarity problems as plain validated data.
+//! Linear complementarity problems as plain validated data, their judges and planted instances.
 //!
 //! | kind | statement |
 //! | --- | --- |
@@ -7,7 +7,7 @@
 //! | [`Hlcp`] | `Q x + R s = q`, `0 ≤ x ⟂ s ≥ 0` |
 //! | [`BoxLcp`] | `−(M z + q) ∈ N_[l, u](z)` |
 
-/// The [`Problem`](crate::Problem) of a kind whose point is z: what differs is the number of variables and the point to begin from.
+/// The [`Problem`](crate::Problem) of a kind whose point is z, and its verdict: what differs is the number of variables and the point to begin from.
 macro_rules! problem_in_z {
     ($kind:ident, $problem:ident => $unknowns:expr, $origin:expr) => {
         impl crate::Problem for $kind {
@@ -15,7 +15,7 @@ macro_rules! problem_in_z {
             type Gauge = $crate::check::LinearGauge;
 
             fn kind(&self) -> $crate::Kind {
-                $crate::Kind::$kind
+                <Self as $crate::OfAny>::KIND
             }
 
             fn unknowns(&self) -> usize {
@@ -87,47 +87,40 @@ macro_rules! problem_in_z {
                 $crate::LcpPoint { z: unknowns.to_vec() }
             }
         }
+
+        impl $crate::check::Judged for $kind {
+            type Status = $crate::check::RowStatus;
+            type Counts = $crate::check::RowCounts;
+
+            fn verdict(
+                &self,
+                point: &Self::Point,
+                gauge: &mut Self::Gauge,
+                tolerance: f64,
+            ) -> $crate::check::VerdictOf<Self> {
+                gauge.verdict(self, point, tolerance)
+            }
+        }
     };
 }
 
 mod boxed;
 mod hlcp;
+mod judge;
 mod lcp;
 mod mlcp;
+pub mod planted;
 
 pub use boxed::BoxLcp;
-pub use hlcp::{Hlcp, HlcpPoint};
+pub use hlcp::{Hlcp, HlcpGauge, HlcpPoint};
+pub use judge::{LinearGauge, RowCounts, RowStatus};
 pub use lcp::{Lcp, LcpPoint};
 pub use mlcp::Mlcp;
 
 use crate::ProblemError;
+use crate::check::ConeSystem;
+use crate::check::proof::{columns, exacts, just};
 use nonsmooth_linalg::Matrix;
-
-/// Any of the linear complementarity problems.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Complementarity {
-    /// `0 ≤ z ⟂ M z + q ≥ 0`.
-    Lcp(Lcp),
-    /// With equalities and free variables.
-    Mlcp(Mlcp),
-    /// `Q x + R s = q`, `0 ≤ x ⟂ s ≥ 0`.
-    Hlcp(Hlcp),
-    /// With two bounds.
-    Box(BoxLcp),
-}
-
-/// Evaluates an expression for whichever problem a [`Complementarity`] holds.
-#[macro_export]
-macro_rules! with_complementarity {
-    ($any:expr, $problem:ident => $body:expr) => {
-        match $any {
-            $crate::Complementarity::Lcp($problem) => $body,
-            $crate::Complementarity::Mlcp($problem) => $body,
-            $crate::Complementarity::Hlcp($problem) => $body,
-            $crate::Complementarity::Box($problem) => $body,
-        }
-    };
-}
 
 /// A square matrix with finite entries, and at least one.
 fn square(name: &str, m: &Matrix) -> Result<(), ProblemError> {
@@ -136,4 +129,27 @@ fn square(name: &str, m: &Matrix) -> Result<(), ProblemError> {
     }
     m.check_shape(name, m.nrows(), m.nrows(), "square")?;
     Ok(m.check_finite(name)?)
+}
+
+/// `w − M z = q` with pairs after the equalities and the free variables.
+fn mixed(
+    m: &Matrix,
+    q: &[f64],
+    equalities: usize,
+    free: usize,
+    wanted: Option<&[bool]>,
+) -> Option<ConeSystem> {
+    let mut system = ConeSystem::new(exacts(q), wanted);
+    for (j, column) in columns(m, -1, &|i| system.wants(i))?.into_iter().enumerate() {
+        let z = system.column(column);
+        system.unknowns.push(just(z));
+        match j.checked_sub(free) {
+            None => system.free.push(z),
+            Some(k) => {
+                let w = system.unit(equalities + k, 1);
+                system.pairs.push([w, z]);
+            }
+        }
+    }
+    Some(system)
 }

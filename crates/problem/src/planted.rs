@@ -1,13 +1,10 @@
 //! Instances with a known solution, of any size, and models whose optima are published.
 
-pub mod classics;
-mod friction;
-mod linear;
-mod obstacle;
-
-pub use friction::{Planted, PlantedMix};
-pub use linear::{PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp};
-pub use obstacle::{JournalBearing, Membrane, Obstacle, Torsion, energy};
+pub use crate::kinds::complementarity::planted::{
+    JournalBearing, Membrane, Obstacle, PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp,
+    Torsion, classics, energy,
+};
+pub use crate::kinds::contact::planted::{Planted, PlantedMix};
 
 /// What makes problems by its fields, which are documented, defaulted and read as settings are.
 pub trait Recipe {
@@ -16,7 +13,7 @@ pub trait Recipe {
 }
 
 /// Fails unless x is a share.
-fn share(key: &str, x: f64) -> Result<(), String> {
+pub(crate) fn share(key: &str, x: f64) -> Result<(), String> {
     match (0.0..=1.0).contains(&x) {
         true => Ok(()),
         false => Err(format!("{key}: expected a number from 0 to 1, found {x}")),
@@ -24,7 +21,11 @@ fn share(key: &str, x: f64) -> Result<(), String> {
 }
 
 /// Fails unless n is in a range.
-fn size(key: &str, n: usize, range: std::ops::RangeInclusive<usize>) -> Result<(), String> {
+pub(crate) fn size(
+    key: &str,
+    n: usize,
+    range: std::ops::RangeInclusive<usize>,
+) -> Result<(), String> {
     match range.contains(&n) {
         true => Ok(()),
         false => {
@@ -34,7 +35,7 @@ fn size(key: &str, n: usize, range: std::ops::RangeInclusive<usize>) -> Result<(
 }
 
 /// Fails unless x is finite.
-fn finite(key: &str, x: f64) -> Result<(), String> {
+pub(crate) fn finite(key: &str, x: f64) -> Result<(), String> {
     match x.is_finite() {
         true => Ok(()),
         false => Err(format!("{key}: expected a finite number, found {x}")),

@@ -1,0 +1,8 @@
+//! Linear complementarity problems with a planted solution, from the literature, and of obstacles.
+
+pub mod classics;
+mod linear;
+mod obstacle;
+
+pub use linear::{PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp};
+pub use obstacle::{JournalBearing, Membrane, Obstacle, Torsion, energy};

@@ -1,0 +1,229 @@
+//! The residuals of the contact law, which all judges of contacts share.
+
+use super::contact::{Law, Share, length};
+use super::loads::Loads;
+use crate::check::{Measure, Motion, StatusCounts, Verdict, over};
+use nonsmooth_linalg::{Real, norm, norm_of, power_of_two, small};
+
+/// The rounding of a stored double, over its size, in the root mean square.
+pub(crate) const HALF_ULP: f64 = 0.3 * f64::EPSILON;
+
+/// What plain arithmetic makes of x and ũ is wrong by less than this, over `‖x‖ + ‖ũ‖`.
+const PLAIN: f64 = 16.0 * f64::EPSILON;
+/// Terms below this share of ‖q‖ have lost digits to underflow.
+const LEAST: f64 = 1e-280;
+
+/// `√|d|` of a diagonal entry, the unit of what belongs to it; 1 where it vanishes.
+pub(crate) fn unit(d: f64) -> f64 {
+    match d.abs().sqrt() {
+        unit if unit > 0.0 => unit,
+        _ => 1.0,
+    }
+}
+
+/// The largest ratio of violation to size, beyond what each is excused for; infinite if any is NaN.
+pub(crate) fn worst(shares: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
+    shares.fold(0.0, |worst: f64, (violation, size, excuse)| {
+        match over((violation.abs() - excuse).max(0.0), size) {
+            _ if violation.is_nan() => f64::INFINITY,
+            share if share.is_nan() => f64::INFINITY,
+            share => worst.max(share),
+        }
+    })
+}
+
+/// The largest modulus in a block.
+pub(crate) fn largest<const D: usize>(block: &[[f64; D]; D]) -> f64 {
+    block.iter().flatten().fold(0.0, |l, x| l.max(x.abs()))
+}
+
+/// What the contact law's residual needs of a problem: `w_c` and `‖q‖`, and what stands for both where a contact is measured by itself.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct LawGauge {
+    pub(crate) w: Vec<f64>,
+    /// The largest modulus of W_cc, which is there where the trace is not; zero where nothing is. Others may follow.
+    pub(crate) strength: Vec<f64>,
+    pub(crate) loads: Loads,
+    /// Moduli of loads, and room for as many.
+    pub(crate) amounts: Vec<f64>,
+    pub(crate) impulses: Vec<f64>,
+    pub(crate) norm_q: f64,
+}
+
+impl LawGauge {
+    pub(crate) fn new(diagonal: impl Iterator<Item = f64>) -> Self {
+        let mut gauge = Self::default();
+        gauge.refill(diagonal, 0.0);
+        gauge
+    }
+
+    pub(crate) fn refill(&mut self, diagonal: impl Iterator<Item = f64>, norm_q: f64) {
+        self.norm_q = norm_q;
+        self.w.clear();
+        self.w.extend(diagonal);
+        let mean = self.w.iter().sum::<f64>() / self.w.len().max(1) as f64;
+        let stand_in = if mean > 0.0 { mean } else { 1.0 };
+        for w in &mut self.w {
+            if *w <= 0.0 {
+                *w = stand_in;
+            }
+        }
+    }
+
+    /// What stands for w_c where contact c is measured by itself.
+    pub(crate) fn own_w(&self, c: usize) -> f64 {
+        match self.strength.get(c) {
+            Some(&strength) if strength > 0.0 => strength,
+            _ => self.w[c],
+        }
+    }
+
+    /// What the residual is relative to.
+    pub(crate) fn unit(&self) -> f64 {
+        if self.norm_q > 0.0 { self.norm_q } else { 1.0 }
+    }
+
+    /// The residuals of the impulses `r` with the velocities `u`, whose terms have the `sizes` and whose entries may be wrong by
+    /// `doubt(i)`. What the arithmetic T leaves in doubt is added to the residuals that decide, so that they never
+    /// promise too much.
+    ///
+    /// All is done in units of a power of two near its scale, so that no square leaves the range of double precision
+    /// before the data do.
+    pub(crate) fn measure<T: Real, L: Law<D>, const D: usize>(
+        &self,
+        r: &[f64],
+        u: &[T],
+        sizes: &[f64],
+        doubt: impl Fn(usize) -> f64,
+        law: impl Fn(usize) -> L,
+    ) -> Measure {
+        let unit = power_of_two(self.unit());
+        let largest = u.iter().map(|u| u.value() / unit);
+        let plain = match self.norm_q.max(norm(r)).max(unit * norm_of(largest)) {
+            largest if largest > 0.0 => largest,
+            _ => 1.0,
+        };
+        let plain_unit = power_of_two(plain);
+        let (per, plain_per) = (1.0 / unit, 1.0 / plain_unit);
+        let (mut scaled, mut plain_map, mut doubts) = (0.0, 0.0, 0.0);
+        let (mut primal, mut dual, mut complementarity) = (0.0, 0.0, 0.0);
+        let (mut worst_contact, mut worst) = (0, -1.0);
+        let (mut own_contact, mut own) = (0, 0.0);
+        for (c, &w) in self.w.iter().enumerate() {
+            let law = law(c);
+            let rc: [f64; D] = small::block(r, c);
+            let uc: [T; D] = std::array::from_fn(|k| u[D * c + k]);
+            let plain_u = uc.map(|u| u.value());
+            let plain_modified = law.modified_velocity(&plain_u);
+            let near = (rc.map(|r| w * r * per), plain_modified.map(|u| u * per));
+            let plainly = || Share::new(law, &near.0, &plain_u.map(|u| u * per), &near.1);
+            let (share, left) = if T::DOUBT == 0.0 {
+                (plainly(), 0.0)
+            } else {
+                let size = length(&near.0) + length(&near.1);
+                // Of most contacts the natural map is ũ or x: once these are known, plain arithmetic is right to the last bits.
+                if law.is_at_rest_or_open(&near.0, &near.1, PLAIN * size) {
+                    let share = plainly();
+                    let left = PLAIN * share.residual.sqrt();
+                    (share, left)
+                } else {
+                    let x = rc.map(|r| T::of_product(w, r).times_power(per));
+                    let u = uc.map(|u| u.times_power(per));
+                    let modified = law.modified_velocity(&u);
+                    (Share::new(law, &x, &u, &modified), T::DOUBT * size)
+                }
+            };
+            if share.residual > worst || share.residual.is_nan() {
+                (worst_contact, worst) = (c, share.residual);
+            }
+            scaled += share.residual;
+            // Plain arithmetic decides nothing: it leaves out what only decides.
+            if T::DOUBT > 0.0 {
+                let of_u = norm_of((D * c..D * c + D).map(|i| doubt(i) * per));
+                let left = left + law.growth() * of_u;
+                doubts += left * left;
+                // Impulses that run away along the kernel of W make terms of any size: no more than the loads excuse.
+                let load = self.loads.reaching(c) * per;
+                let strength = self.own_w(c);
+                let own_x = rc.map(|r| strength * r * per);
+                let apart = law.apart(&own_x, &plain_u.map(|u| u * per));
+                // Of an empty block the impulse is no term, but may be all there is.
+                let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] * per));
+                let terms = terms.max(norm(&own_x)).min(load);
+                let normal = (sizes[D * c] * per).min(load);
+                // Below the range of double precision there are no digits to be right.
+                let error = share.residual.sqrt().max(apart) + left;
+                // No sliding, however fast, excuses a velocity into the obstacle.
+                let sinking = over((-plain_u[0] * per).max(0.0), normal.max(LEAST));
+                let of_own = over(error, terms.max(LEAST)).max(sinking);
+                if load > 0.0 && (of_own > own || of_own.is_nan()) {
+                    (own_contact, own) = (c, of_own);
+                }
+            }
+            let plain_r = rc.map(|r| r * plain_per);
+            let map = law.natural_map(&plain_r, &plain_modified.map(|u| u * plain_per));
+            plain_map += map.iter().map(|v| v * v).sum::<f64>();
+            primal += share.primal;
+            dual += share.dual;
+            complementarity += share.complementarity;
+        }
+        // From units of a power of two to those of q.
+        let q = unit / self.unit();
+        let relative = (scaled.sqrt() + doubts.sqrt()) * q;
+        Measure {
+            absolute: relative * self.unit(),
+            relative,
+            literature: plain_map.sqrt() * (plain_unit / self.unit()),
+            siconos: plain_map.sqrt() * (plain_unit / plain),
+            primal: primal.sqrt() * q,
+            dual: dual.sqrt() * q,
+            complementarity: complementarity * q * q,
+            own: (T::DOUBT > 0.0).then_some(own),
+            own_contact: (T::DOUBT > 0.0).then_some(own_contact),
+            worst_contact,
+            worst: worst.sqrt() * q,
+            ..Measure::unknown()
+        }
+    }
+}
+
+/// The verdict on impulses and velocities that have been measured.
+pub(crate) fn verdict<L: Law<D>, const D: usize>(
+    measure: Measure,
+    gauge: &LawGauge,
+    r: &[f64],
+    u: &[f64],
+    law: impl Fn(usize) -> L,
+    tolerance: f64,
+) -> Verdict {
+    let margin = if gauge.norm_q > 0.0 { tolerance * gauge.norm_q } else { tolerance };
+    let mut counts = StatusCounts::default();
+    let mut statuses = Vec::with_capacity(gauge.w.len());
+    let mut worst = Vec::with_capacity(gauge.w.len());
+    for (c, &w) in gauge.w.iter().enumerate() {
+        let law = law(c);
+        let x = small::block::<D>(r, c).map(|v| w * v);
+        let modified = law.modified_velocity(&small::block(u, c));
+        let s = law.status(&x, &modified, margin);
+        match s.status {
+            Motion::Open => counts.open += 1,
+            Motion::Stick => counts.stick += 1,
+            Motion::Slip => counts.slip += 1,
+        }
+        counts.at_limit += usize::from(s.at_limit);
+        counts.degenerate += usize::from(s.degenerate);
+        statuses.push(s);
+        let share = law.natural_map(&x, &modified).iter().map(|v| v * v).sum::<f64>().sqrt();
+        worst.push((c, over(share, gauge.norm_q)));
+    }
+    worst.sort_by(|a, b| b.1.total_cmp(&a.1));
+    worst.truncate(10);
+    Verdict {
+        measure,
+        solved: measure.passes(tolerance),
+        counts,
+        statuses,
+        velocity: u.to_vec(),
+        worst,
+    }
+}

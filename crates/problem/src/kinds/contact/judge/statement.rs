@@ -1,0 +1,76 @@
+//! Contacts as parts of a [`ConeSystem`].
+
+use crate::check::proof::{exact, just};
+use crate::check::{Column, ConeSystem, Exact};
+use nonsmooth_linalg::Csc;
+
+/// The impulses and velocities of contacts: columns of r as given, in the rows that begin with `first` the velocities u.
+///
+/// The law in the plane: `0 ≤ u_N ⟂ r_N ≥ 0`, `u_T = a − b`, `0 ≤ a ⟂ mu r_N + r_T ≥ 0`, `0 ≤ b ⟂ mu r_N − r_T ≥ 0`: r_T < mu r_N where it moves
+/// is excluded, and the pairs of a resting contact may have a = b. In space with friction only `0 ≤ u_N ⟂ r_N ≥ 0`, `|r_Tk| ≤ mu r_N` is said.
+pub(crate) fn contacts<const D: usize>(
+    system: &mut ConeSystem,
+    first: usize,
+    mut impulses: Vec<Column>,
+    mu: &[f64],
+) -> Vec<(Exact, Vec<(usize, Exact)>)> {
+    let mut unknowns = vec![];
+    for (c, &mu) in mu.iter().enumerate() {
+        let row = |k: usize| first + D * c + k;
+        let mut normal = std::mem::take(&mut impulses[D * c]);
+        let coefficient = exact(mu);
+        let mut tangential = vec![];
+        for k in 1..D {
+            if mu == 0.0 {
+                let u = system.unit(row(k), 1);
+                system.free.push(u);
+                tangential.push((Exact::ZERO, vec![]));
+                continue;
+            }
+            // With σ± = mu r_N ± r_T ≥ 0: r_T = σ⁺ − mu r_N, and σ⁺ + σ⁻ = 2 mu r_N in a row of its own.
+            let along = std::mem::take(&mut impulses[D * c + k]);
+            normal.extend(along.iter().map(|(i, x)| (*i, -(&coefficient * x))));
+            let bound = system.row(Exact::ZERO);
+            normal.push((bound, Exact::from(2u8) * &coefficient));
+            let plus = system.column([along, vec![(bound, -Exact::ONE)]].concat());
+            let minus = system.unit(bound, -1);
+            system.slack_rows.push((bound, [plus, minus]));
+            if D == 2 {
+                let (a, b) = (system.unit(row(k), 1), system.unit(row(k), -1));
+                system.pairs.extend([[a, plus], [b, minus]]);
+            } else {
+                let u = system.unit(row(k), 1);
+                system.free.push(u);
+                system.rays.extend([plus, minus]);
+                system.complete = false;
+            }
+            tangential.push((Exact::ZERO, vec![(plus, Exact::ONE)]));
+        }
+        let pair = [system.unit(row(0), 1), system.column(normal)];
+        system.pairs.push(pair);
+        unknowns.push(just(pair[1]));
+        for mut t in tangential {
+            if !t.1.is_empty() {
+                t.1.push((pair[1], -&coefficient));
+            }
+            unknowns.push(t);
+        }
+    }
+    unknowns
+}
+
+/// The columns of A times −1, its rows moved down by `row`.
+pub(crate) fn opposite(a: &Csc, row: usize, system: &ConeSystem) -> Vec<Column> {
+    let mut out = vec![Column::new(); a.ncols()];
+    for (i, j, x) in a.triplets() {
+        if system.wants(row + i) {
+            out[j].push((row + i, exact(-x)));
+        }
+    }
+    out
+}
+
+/// Adds the columns of the second to those of the first.
+pub(crate) fn under(first: Vec<Column>, second: Vec<Column>) -> Vec<Column> {
+    first.into_iter().zip(second).map(|(a, b)| [a, b].concat()).collect()
+}
