@@ -2,7 +2,9 @@
 
 use nonsmooth_io::table::{Column, Table};
 use nonsmooth_io::{ProblemFile, StoredPoint};
-use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, GlobalPoint, LocalPoint, Problem};
+use nonsmooth_problem::{
+    AnyPoint, AnyProblem, GlobalPoint, LocalPoint, Problem, Stated, with_complementarity,
+};
 use serde_json::{Value, json};
 
 use crate::json::Object;
@@ -41,7 +43,7 @@ fn rest(point: &AnyPoint) -> Vec<(&'static str, &[f64])> {
         AnyPoint::Global(GlobalPoint { v, lambda, .. }) => {
             vec![("velocities v", &v[..]), ("multipliers", &lambda[..])]
         }
-        AnyPoint::Lcp(_) | AnyPoint::Hlcp(_) => vec![],
+        _ => vec![],
     }
 }
 
@@ -105,19 +107,13 @@ pub fn json(problem: &AnyProblem, stored: &StoredPoint, names: &[String]) -> Val
             put("u", &partner);
             put("l", lambda);
         }
-        (AnyPoint::Hlcp(point), _) => {
-            put("x", &point.x);
-            put("s", &point.s);
+        (point, AnyProblem::Complementarity(linear)) => {
+            let parts = with_complementarity!(linear, p => p.parts_of(point, Some(&partner)));
+            for (name, x) in parts {
+                put(name, x);
+            }
         }
-        (AnyPoint::Lcp(point), AnyProblem::Complementarity(Complementarity::Mlcp(p))) => {
-            put("u", &point.z[..p.free]);
-            put("v", &point.z[p.free..]);
-            put("w", &partner);
-        }
-        (AnyPoint::Lcp(point), _) => {
-            put("z", &point.z);
-            put("w", &partner);
-        }
+        (_, AnyProblem::Friction(_)) => {}
     }
     let statuses = Table::new(problem, stored, names).ok();
     let statuses = statuses.as_ref().and_then(|table| table.column("status"));

@@ -58,9 +58,7 @@ fn solutions(problem: &Complementarity) -> Result<Solutions, SolveError> {
     match problem {
         Complementarity::Lcp(p) => all_solutions(p, MOST),
         Complementarity::Mlcp(p) => all_solutions(p, MOST),
-        Complementarity::Hlcp(_) | Complementarity::Box(_) => {
-            Err(SolveError::needs("an LCP or an MLCP", "another kind"))
-        }
+        _ => Err(SolveError::needs("an LCP or an MLCP", "another kind")),
     }
 }
 

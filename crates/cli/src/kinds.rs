@@ -4,8 +4,8 @@ use nonsmooth_bench::plural as count;
 use nonsmooth_io::StoredPoint;
 use nonsmooth_problem::check::VerdictOf;
 use nonsmooth_problem::{
-    AnyCounts, AnyPoint, AnyProblem, Complementarity, GlobalPoint, Kind, LocalPoint, OfAny,
-    Problem, each_kind, with_problem,
+    AnyCounts, AnyPoint, AnyProblem, GlobalPoint, Kind, LocalPoint, OfAny, Problem, Stated,
+    each_kind, with_complementarity, with_problem,
 };
 use nonsmooth_solve::registry::{self, About, Prefix, Registered};
 use serde_json::json;
@@ -17,53 +17,27 @@ pub type AnyVerdict = VerdictOf<AnyProblem>;
 
 /// The size of a problem, in words.
 pub fn size(problem: &AnyProblem) -> String {
-    let linear = match problem {
+    match problem {
         AnyProblem::Friction(p) => {
             let (contacts, unknowns) = (p.contacts(), p.unknowns());
-            return format!("{}, {}", count(contacts, "contact"), count(unknowns, "unknown"));
+            format!("{}, {}", count(contacts, "contact"), count(unknowns, "unknown"))
         }
-        AnyProblem::Complementarity(linear) => linear,
-    };
-    match linear {
-        Complementarity::Lcp(p) => count(p.dim(), "variable"),
-        Complementarity::Hlcp(p) => count(p.dim(), "pair"),
-        Complementarity::Box(p) => {
-            let bounded = |all: &[f64]| all.iter().filter(|x| x.is_finite()).count();
-            let variables = count(p.dim(), "variable");
-            let (lower, upper) = (bounded(&p.lower), bounded(&p.upper));
-            format!("{variables}, {} and {upper} upper", count(lower, "lower bound"))
-        }
-        Complementarity::Mlcp(p) => {
-            let equalities = match p.equalities {
-                1 => "1 equality".into(),
-                n => format!("{n} equalities"),
-            };
-            let (free, pairs) = (count(p.free, "free variable"), count(p.pairs(), "pair"));
-            format!("{equalities}, {free}, {pairs}")
-        }
+        AnyProblem::Complementarity(linear) => with_complementarity!(linear, p => p.size()),
     }
 }
 
 /// The size of a problem by name, for JSON.
 pub fn sizes(problem: &AnyProblem) -> Object {
     let unknowns = problem.unknowns();
-    fields(match problem {
-        AnyProblem::Friction(p) => json!({"contacts": p.contacts(), "unknowns": unknowns}),
-        AnyProblem::Complementarity(linear) => match linear {
-            Complementarity::Lcp(p) => json!({"rows": p.dim(), "unknowns": unknowns}),
-            Complementarity::Box(p) => json!({"rows": p.dim(), "unknowns": unknowns}),
-            Complementarity::Hlcp(p) => {
-                json!({"rows": p.dim(), "unknowns": unknowns, "pairs": p.dim()})
-            }
-            Complementarity::Mlcp(p) => json!({
-                "rows": p.q.len(),
-                "unknowns": unknowns,
-                "equalities": p.equalities,
-                "free": p.free,
-                "pairs": p.pairs(),
-            }),
-        },
-    })
+    match problem {
+        AnyProblem::Friction(p) => fields(json!({"contacts": p.contacts(), "unknowns": unknowns})),
+        AnyProblem::Complementarity(linear) => {
+            let (rows, others) = with_complementarity!(linear, p => (p.right().len(), p.sizes()));
+            let mut all = fields(json!({"rows": rows, "unknowns": unknowns}));
+            all.extend(others.into_iter().map(|(name, n)| (name.into(), json!(n))));
+            all
+        }
+    }
 }
 
 /// What two problems have in common where a point of one is a start for the other: of contacts, their number alone.
@@ -83,7 +57,7 @@ pub fn start(problem: &AnyProblem, stored: &StoredPoint) -> AnyPoint {
     let (impulses, multipliers) = match &stored.point {
         AnyPoint::Local(LocalPoint { r, lambda }) => (r, lambda),
         AnyPoint::Global(GlobalPoint { r, lambda, .. }) => (r, lambda),
-        point @ (AnyPoint::Lcp(_) | AnyPoint::Hlcp(_)) => return point.clone(),
+        point => return point.clone(),
     };
     if let AnyPoint::Local(LocalPoint { r, lambda })
     | AnyPoint::Global(GlobalPoint { r, lambda, .. }) = &mut origin

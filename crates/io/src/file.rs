@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use nonsmooth_problem::{AnyPoint, AnyProblem, AnyStatus, Complementarity, Friction, Problem};
+use nonsmooth_problem::{
+    AnyPoint, AnyProblem, AnyStatus, Friction, Problem, Stated, with_complementarity,
+};
 
 use crate::{IoError, format};
 
@@ -102,15 +104,12 @@ impl ProblemFile {
 
 impl StoredPoint {
     /// A point of the problem (of its lengths), with what [`Problem::partner`] gives, or the judge with more digits.
-    pub fn new(problem: &AnyProblem, point: AnyPoint, mut partner: Vec<f64>) -> Self {
+    pub fn new(problem: &AnyProblem, point: AnyPoint, partner: Vec<f64>) -> Self {
         let partner = match problem {
-            AnyProblem::Complementarity(Complementarity::Hlcp(_)) => None,
-            // Equalities come first, and have no w.
-            AnyProblem::Complementarity(Complementarity::Mlcp(p)) => {
-                partner.drain(..p.equalities.min(partner.len()));
-                Some(partner)
+            AnyProblem::Friction(_) => Some(partner),
+            AnyProblem::Complementarity(linear) => {
+                with_complementarity!(linear, p => p.kept(partner))
             }
-            _ => Some(partner),
         };
         Self { point, partner, statuses: vec![] }
     }

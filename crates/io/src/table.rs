@@ -14,7 +14,10 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use nonsmooth_problem::check::{Motion, RowStatus};
-use nonsmooth_problem::{AnyPoint, AnyProblem, AnyStatus, Complementarity, Kind, Mlcp, Problem};
+use nonsmooth_problem::{
+    AnyPoint, AnyProblem, AnyStatus, Complementarity, Kind, Mlcp, Problem, Stated,
+    with_complementarity,
+};
 
 use crate::format::About;
 use crate::{Format, IoError, ProblemFile, StoredPoint};
@@ -59,17 +62,13 @@ impl Table {
         let mut columns = match (&stored.point, problem) {
             (AnyPoint::Local(point), _) => contacts(problem.kind(), &point.r, &partner),
             (AnyPoint::Global(point), _) => contacts(problem.kind(), &point.r, &partner),
-            (AnyPoint::Hlcp(point), _) => {
-                vec![counted("pair", point.x.len()), numbers("x", &point.x), numbers("s", &point.s)]
-            }
             (AnyPoint::Lcp(point), AnyProblem::Complementarity(Complementarity::Mlcp(p))) => {
                 mixed(p, &point.z, &partner)
             }
-            (AnyPoint::Lcp(point), _) => vec![
-                counted("variable", point.z.len()),
-                numbers("z", &point.z),
-                numbers("w", &partner),
-            ],
+            (point, AnyProblem::Complementarity(linear)) => {
+                with_complementarity!(linear, p => parts(p, point, &partner))
+            }
+            (_, AnyProblem::Friction(_)) => vec![],
         };
         let mut table = Self { columns: vec![] };
         let first = columns.remove(0);
@@ -146,6 +145,13 @@ fn numbers(name: &'static str, x: &[f64]) -> (&'static str, Column) {
     (name, Column::Numbers(x.iter().copied().map(Some).collect()))
 }
 
+/// A row for each pair, a column for each part of the point.
+fn parts<P: Stated>(problem: &P, point: &AnyPoint, w: &[f64]) -> Vec<(&'static str, Column)> {
+    let parts = problem.parts_of(point, Some(w));
+    let columns = parts.iter().map(|(name, x)| numbers(name, x));
+    std::iter::once(counted(P::ROW, problem.pairs())).chain(columns).collect()
+}
+
 /// Impulses and relative velocities, components side by side.
 fn contacts(kind: Kind, r: &[f64], u: &[f64]) -> Vec<(&'static str, Column)> {
     const PLANE: [&[&str]; 2] = [&["r_n", "r_t"], &["u_n", "u_t"]];
@@ -213,16 +219,7 @@ impl Format for Csv {
             name: "a table of the solution",
             extensions: &["csv"],
             holds_problems: false,
-            writes: &[
-                Kind::FrictionLocal2d,
-                Kind::FrictionLocal3d,
-                Kind::FrictionGlobal2d,
-                Kind::FrictionGlobal3d,
-                Kind::Lcp,
-                Kind::Mlcp,
-                Kind::Hlcp,
-                Kind::BoxLcp,
-            ],
+            writes: Kind::ALL,
             ..About::TEXT
         };
         &ABOUT

@@ -73,7 +73,7 @@ pub trait OfAny:
 }
 
 /// Points that an [`AnyPoint`] may hold.
-pub trait OfAnyPoint: Sized + Into<AnyPoint> {
+pub trait OfAnyPoint: Sized + Into<AnyPoint> + 'static {
     /// The point, if it is one of this type.
     fn of(any: &AnyPoint) -> Option<&Self>;
 

@@ -17,7 +17,9 @@ pub use any::{
     AnyCounts, AnyGauge, AnyPoint, AnyProblem, AnyStatus, OfAny, OfAnyPoint, any_verdict,
 };
 pub use error::ProblemError;
-pub use kinds::complementarity::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp};
+pub use kinds::complementarity::{
+    BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Part, Parts, Shape, Stated, plural,
+};
 pub use kinds::contact::{
     Bounds, Coulomb, Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RowsGlobal,
     RowsLocal,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use nonsmooth_analysis::Traits;
 use nonsmooth_io::{FORMATS, ProblemFile, holds_problem, parts as files_of};
-use nonsmooth_problem::{AnyProblem, Complementarity, Problem as _};
+use nonsmooth_problem::{AnyProblem, Problem as _, Stated, with_complementarity};
 use sha2::{Digest, Sha256};
 
 use crate::finite;
@@ -122,14 +122,10 @@ pub fn describe(file: &Path) -> Result<Problem, String> {
         }
         AnyProblem::Complementarity(linear) => {
             // Pairs stand where contacts do.
-            let (contacts, matrix) = match linear {
-                Complementarity::Lcp(p) => (p.dim(), &p.M),
-                Complementarity::Mlcp(p) => (p.pairs(), &p.M),
-                Complementarity::Hlcp(p) => (p.dim(), &p.Q),
-                Complementarity::Box(p) => (p.dim(), &p.M),
-            };
-            let square = matrix.nrows() == matrix.ncols();
-            let asymmetry = if square { matrix.asymmetry() } else { None };
+            let (contacts, matrices) =
+                with_complementarity!(linear, p => (Stated::pairs(p), p.matrices()));
+            let first = matrices.first().filter(|(_, m)| m.nrows() == m.ncols());
+            let asymmetry = first.and_then(|(_, m)| m.asymmetry());
             Problem { contacts, asymmetry: asymmetry.and_then(finite), ..all }
         }
     })

@@ -250,7 +250,7 @@ fn drawing(scene: &Scene, solved: Option<&Solved>) -> Result<String, SceneError>
     let impulses = match point {
         AnyPoint::Local(point) => Some(&point.r[..]),
         AnyPoint::Global(point) => Some(&point.r[..]),
-        AnyPoint::Lcp(_) | AnyPoint::Hlcp(_) => None,
+        _ => None,
     };
     let count = |of: Motion| motions.iter().filter(|m| **m == of).count();
     let (open, stick, slip) = (count(Motion::Open), count(Motion::Stick), count(Motion::Slip));

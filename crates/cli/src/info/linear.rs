@@ -2,7 +2,7 @@
 
 use nonsmooth_analysis::{Classes, Effort, Finding};
 use nonsmooth_linalg::Matrix;
-use nonsmooth_problem::{Complementarity, Mlcp};
+use nonsmooth_problem::{Complementarity, Stated, with_complementarity};
 use nonsmooth_solve::guarantees::{Guarantee, guaranteed};
 use serde_json::{Value, json};
 
@@ -48,21 +48,12 @@ struct Right {
 
 impl Facts {
     pub(super) fn of(problem: &Complementarity) -> Self {
-        let (matrices, q): (Vec<(&'static str, &Matrix)>, &[f64]) = match problem {
-            Complementarity::Lcp(p) => (vec![("M", &p.M)], &p.q),
-            Complementarity::Box(p) => (vec![("M", &p.M)], &p.q),
-            Complementarity::Mlcp(p) => (vec![("M", &p.M)], &p.q),
-            Complementarity::Hlcp(p) => (vec![("Q", &p.Q), ("R", &p.R)], &p.q),
-        };
+        let (matrices, blocks, classified, q) = with_complementarity!(problem, p => {
+            (p.matrices(), p.blocks(), p.classified(), p.right())
+        });
         let mut matrices: Vec<_> = matrices.into_iter().map(|(n, m)| (n, Entries::of(m))).collect();
-        if let Complementarity::Mlcp(p) = problem {
-            matrices.extend(blocks(p));
-        }
-        let classes = match problem {
-            Complementarity::Lcp(p) => Some(classes(&p.M)),
-            Complementarity::Box(p) => Some(classes(&p.M)),
-            Complementarity::Mlcp(_) | Complementarity::Hlcp(_) => None,
-        };
+        matrices.extend(blocks.into_iter().map(|(name, block)| (name, Entries::of(&block.into()))));
+        let classes = classified.map(classes);
         let is_lcp = matches!(problem, Complementarity::Lcp(_));
         let negative = q.iter().filter(|q| **q < 0.0).count();
         Self {
@@ -104,20 +95,6 @@ fn classes_text(text: &mut String, classes: &Classes) {
             row(text, label, all.join(", "));
         }
     }
-}
-
-/// The blocks of a mixed problem.
-fn blocks(p: &Mlcp) -> Vec<(&'static str, Entries)> {
-    let (rows, columns) = (p.M.nrows(), p.M.ncols());
-    let (r, c) = (p.equalities, p.free);
-    let all = [
-        ("A", 0..r, 0..c),
-        ("B", r..rows, c..columns),
-        ("C", 0..r, c..columns),
-        ("D", r..rows, 0..c),
-    ];
-    let block = |(name, rows, columns)| Some((name, Entries::of(&p.block(rows, columns)?.into())));
-    all.into_iter().filter_map(block).collect()
 }
 
 impl Entries {

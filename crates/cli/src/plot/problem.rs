@@ -3,7 +3,7 @@
 use nonsmooth_bench::draw::{Axis, GRID, INK, font, tick, ticks};
 use nonsmooth_problem::check::Motion;
 use nonsmooth_problem::{
-    AnyPoint, AnyProblem, AnyStatus, Complementarity, Friction, Problem, with_friction,
+    AnyPoint, AnyProblem, AnyStatus, Friction, Problem, Stated, with_complementarity, with_friction,
 };
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -128,12 +128,10 @@ fn spies(problem: &AnyProblem) -> Vec<Spy> {
         AnyProblem::Friction(Friction::Local3(p)) => vec![blocks(&p.W)],
         AnyProblem::Friction(Friction::Global2(p)) => vec![sparse("M", &p.M), sparse("H", &p.H)],
         AnyProblem::Friction(Friction::Global3(p)) => vec![sparse("M", &p.M), sparse("H", &p.H)],
-        AnyProblem::Complementarity(linear) => match linear {
-            Complementarity::Lcp(p) => vec![any("M", &p.M)],
-            Complementarity::Mlcp(p) => vec![any("M", &p.M)],
-            Complementarity::Box(p) => vec![any("M", &p.M)],
-            Complementarity::Hlcp(p) => vec![any("Q", &p.Q), any("R", &p.R)],
-        },
+        AnyProblem::Complementarity(linear) => {
+            let matrices = with_complementarity!(linear, p => p.matrices());
+            matrices.into_iter().map(|(name, m)| any(name, m)).collect()
+        }
     }
 }
 

@@ -276,7 +276,7 @@ fn stored_parts<'a>(
     let (v, r, lambda) = match &stored.point {
         AnyPoint::Local(p) => (&[][..], &p.r, &p.lambda),
         AnyPoint::Global(p) => (&p.v[..], &p.r, &p.lambda),
-        AnyPoint::Lcp(_) | AnyPoint::Hlcp(_) => {
+        _ => {
             return Err(IoError::data(file, place, "a point of contacts", "one of another kind"));
         }
     };

@@ -8,9 +8,9 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use nonsmooth_linalg::{Csc, Dense, Matrix};
-use nonsmooth_problem::{AnyProblem, BoxLcp, Complementarity, Kind, Lcp, LcpPoint};
+use nonsmooth_problem::{AnyProblem, BoxLcp, Complementarity, Kind, Lcp, LcpPoint, OfAnyPoint};
 
-use super::{Digits, check, toml, unknowns};
+use super::{Digits, check, toml};
 use crate::format::{About, bytes, put};
 use crate::tokens::{Tokens, text};
 use crate::{Format, IoError, ProblemFile};
@@ -298,7 +298,7 @@ fn write(path: &Path, file: &ProblemFile) -> Result<(), IoError> {
     let (m, q, bounds) = match check(path, file)? {
         Complementarity::Lcp(p) => (&p.M, &p.q, None),
         Complementarity::Box(p) => (&p.M, &p.q, Some((&p.lower, &p.upper))),
-        Complementarity::Mlcp(_) | Complementarity::Hlcp(_) => {
+        _ => {
             let expected =
                 "a problem with one matrix and one vector (LCP or box LCP); TOML holds the others";
             return Err(IoError::data(path, "the problem", expected, "another kind"));
@@ -329,7 +329,7 @@ fn write(path: &Path, file: &ProblemFile) -> Result<(), IoError> {
         Some(&q[..]),
         bounds.map(|b| &b.0[..]),
         bounds.map(|b| &b.1[..]),
-        file.solution.as_ref().map(|s| unknowns(&s.point)),
+        file.solution.as_ref().and_then(|s| LcpPoint::of(&s.point)).map(|point| &point.z[..]),
     ];
     let files = vectors(path);
     let each = || files.iter().zip(parts);

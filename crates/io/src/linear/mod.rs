@@ -7,7 +7,7 @@ pub mod toml;
 
 use std::path::Path;
 
-use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, Problem, with_complementarity};
+use nonsmooth_problem::{AnyProblem, Complementarity, Problem, Stated, with_complementarity};
 
 use crate::{IoError, ProblemFile};
 
@@ -18,7 +18,8 @@ fn check<'a>(path: &Path, file: &'a ProblemFile) -> Result<&'a Complementarity, 
         return Err(IoError::data(path, "the problem", "one of linear complementarity", found));
     };
     with_complementarity!(problem, p => p.validate()).map_err(IoError::problem(path))?;
-    let (names, variables) = (file.info.names.len(), variables(problem));
+    let (names, variables) =
+        (file.info.names.len(), with_complementarity!(problem, p => p.variables()));
     if names != 0 && names != variables {
         let expected = format!("none, or one for each of the {variables} variables");
         return Err(IoError::data(path, "names", expected, names));
@@ -29,12 +30,7 @@ fn check<'a>(path: &Path, file: &'a ProblemFile) -> Result<&'a Complementarity, 
     }
     let Some(stored) = &file.solution else { return Ok(problem) };
     file.problem.validate_point(&stored.point).map_err(IoError::problem(path))?;
-    let pairs = match problem {
-        Complementarity::Lcp(p) => p.dim(),
-        Complementarity::Mlcp(p) => p.pairs(),
-        Complementarity::Hlcp(p) => p.dim(),
-        Complementarity::Box(p) => p.dim(),
-    };
+    let pairs = with_complementarity!(problem, p => Stated::pairs(p));
     let Some(w) = &stored.partner else { return Ok(problem) };
     if w.len() != pairs {
         let (expected, found) = (format!("{pairs} entries (pairs)"), w.len());
@@ -43,25 +39,6 @@ fn check<'a>(path: &Path, file: &'a ProblemFile) -> Result<&'a Complementarity, 
     match w.iter().position(|x| !x.is_finite()) {
         Some(k) => Err(IoError::data(path, format!("solution.w[{k}]"), "a finite number", w[k])),
         None => Ok(problem),
-    }
-}
-
-/// How many variables have a name: the pairs of a horizontal problem.
-fn variables(problem: &Complementarity) -> usize {
-    match problem {
-        Complementarity::Lcp(p) => p.dim(),
-        Complementarity::Mlcp(p) => p.free + p.pairs(),
-        Complementarity::Hlcp(p) => p.dim(),
-        Complementarity::Box(p) => p.dim(),
-    }
-}
-
-/// z of a checked point, x of a horizontal problem's.
-fn unknowns(point: &AnyPoint) -> &[f64] {
-    match point {
-        AnyPoint::Lcp(point) => &point.z,
-        AnyPoint::Hlcp(point) => &point.x,
-        AnyPoint::Local(_) | AnyPoint::Global(_) => &[],
     }
 }
 

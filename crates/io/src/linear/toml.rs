@@ -8,58 +8,138 @@ use std::path::Path;
 
 use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::{
-    AnyPoint, BoxLcp, Complementarity, Hlcp, HlcpPoint, Kind, Lcp, LcpPoint, Mlcp, OfAnyPoint,
-    ProblemError,
+    AnyPoint, AnyProblem, Complementarity, Kind, Part, Parts, ProblemError, Shape, Stated,
+    each_kind, with_complementarity,
 };
 use serde::Deserialize;
-use serde::de::{self, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::de::{self, DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 
-use super::{Digits, check, unknowns};
+use super::{Digits, check};
 use crate::format::About;
 use crate::tokens::text;
 use crate::{Format, Info, IoError, ProblemFile, StoredPoint};
 
-/// All keys of all kinds; which belong to a kind is said by [`KEYS`].
-#[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[allow(non_snake_case)]
-struct Keys {
-    kind: String,
-    title: Option<String>,
-    description: Option<String>,
-    names: Option<Vec<String>>,
-    M: Option<Stated>,
-    Q: Option<Stated>,
-    R: Option<Stated>,
-    A: Option<Stated>,
-    B: Option<Stated>,
-    C: Option<Stated>,
-    D: Option<Stated>,
-    q: Option<Vec<f64>>,
-    a: Option<Vec<f64>>,
-    b: Option<Vec<f64>>,
-    lower: Option<Vec<f64>>,
-    upper: Option<Vec<f64>>,
-    free: Option<usize>,
-    equalities: Option<usize>,
-    solution: Option<Solution>,
+/// The type of a key.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Type {
+    Text,
+    Texts,
+    Part(Shape),
+    Solution,
+}
+
+/// What stands at a key.
+#[derive(Debug)]
+enum Value {
+    Text(String),
+    Texts(Vec<String>),
+    Matrix(Given),
+    Vector(Vec<f64>),
+    Count(usize),
+    Solution(Keys),
+}
+
+/// The keys that a file, or its `[solution]`, has.
+type Keys = Vec<(&'static str, Value)>;
+
+/// The keys that may be there.
+#[derive(Clone, Copy)]
+struct Known<'a>(&'a [(&'static str, Type)]);
+
+impl<'de> DeserializeSeed<'de> for Known<'_> {
+    type Value = Keys;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Keys, D::Error> {
+        deserializer.deserialize_map(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Known<'_> {
+    type Value = Keys;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str("a table")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Keys, A::Error> {
+        let mut keys = vec![];
+        while let Some((key, of)) = map.next_key_seed(Key(self))? {
+            let value = match of {
+                Type::Text => Value::Text(map.next_value()?),
+                Type::Texts => Value::Texts(map.next_value()?),
+                Type::Part(Shape::Matrix) => Value::Matrix(map.next_value()?),
+                Type::Part(Shape::Vector) => Value::Vector(map.next_value()?),
+                Type::Part(Shape::Count) => Value::Count(map.next_value()?),
+                Type::Solution => Value::Solution(map.next_value_seed(Known(&of_solutions()))?),
+            };
+            keys.push((key, value));
+        }
+        Ok(keys)
+    }
+}
+
+/// One of the known keys.
+struct Key<'a>(Known<'a>);
+
+impl<'de> DeserializeSeed<'de> for Key<'_> {
+    type Value = (&'static str, Type);
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Self::Value, D::Error> {
+        let found = String::deserialize(deserializer)?;
+        let Known(all) = self.0;
+        all.iter().find(|key| key.0 == found).copied().ok_or_else(|| {
+            let all: Vec<_> = all.iter().map(|key| format!("`{}`", key.0)).collect();
+            let all = all.join(", ");
+            de::Error::custom(format!("unknown field `{found}`, expected one of {all}"))
+        })
+    }
+}
+
+/// All keys of all kinds; which belong to a kind it says itself.
+fn of_problems() -> Vec<(&'static str, Type)> {
+    let mut parts: Vec<(&str, Shape)> = vec![];
+    for part in each_kind!(P in Complementarity => P::PARTS).into_iter().flatten() {
+        if !parts.contains(part) {
+            parts.push(*part);
+        }
+    }
+    // Matrices, vectors, numbers.
+    parts.sort_by_key(|part| part.1);
+    let parts = parts.into_iter().map(|(name, shape)| (name, Type::Part(shape)));
+    let texts = [("kind", Type::Text), ("title", Type::Text), ("description", Type::Text)];
+    let before = texts.into_iter().chain([("names", Type::Texts)]);
+    before.chain(parts).chain([("solution", Type::Solution)]).collect()
 }
 
 /// All keys of solutions.
-#[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Solution {
-    z: Option<Vec<f64>>,
-    w: Option<Vec<f64>>,
-    u: Option<Vec<f64>>,
-    v: Option<Vec<f64>>,
-    x: Option<Vec<f64>>,
-    s: Option<Vec<f64>>,
+fn of_solutions() -> Vec<(&'static str, Type)> {
+    let mut all: Vec<(&str, Type)> = vec![];
+    for name in each_kind!(P in Complementarity => P::SOLUTION).into_iter().flatten() {
+        let key = (*name, Type::Part(Shape::Vector));
+        if !all.contains(&key) {
+            all.push(key);
+        }
+    }
+    all
+}
+
+/// Takes a key out.
+fn take(keys: &mut Keys, name: &str) -> Option<Value> {
+    let at = keys.iter().position(|key| key.0 == name)?;
+    Some(keys.swap_remove(at).1)
+}
+
+/// A text that may be there.
+fn take_text(keys: &mut Keys, name: &str) -> Option<String> {
+    match take(keys, name) {
+        Some(Value::Text(said)) => Some(said),
+        _ => None,
+    }
 }
 
 /// A matrix as it is stated: rows, or a shape and entries.
 #[derive(Debug)]
-enum Stated {
+enum Given {
     Rows(Vec<Vec<f64>>),
     Entries(Entries),
 }
@@ -71,38 +151,51 @@ struct Entries {
     entries: Vec<(usize, usize, f64)>,
 }
 
-impl<'de> Deserialize<'de> for Stated {
+impl<'de> Deserialize<'de> for Given {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Either;
         impl<'de> Visitor<'de> for Either {
-            type Value = Stated;
+            type Value = Given;
 
             fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
                 f.write_str("a matrix: an array of rows, or a table of shape and entries")
             }
 
-            fn visit_seq<A: SeqAccess<'de>>(self, all: A) -> Result<Stated, A::Error> {
-                Vec::deserialize(de::value::SeqAccessDeserializer::new(all)).map(Stated::Rows)
+            fn visit_seq<A: SeqAccess<'de>>(self, all: A) -> Result<Given, A::Error> {
+                Vec::deserialize(de::value::SeqAccessDeserializer::new(all)).map(Given::Rows)
             }
 
-            fn visit_map<A: MapAccess<'de>>(self, all: A) -> Result<Stated, A::Error> {
+            fn visit_map<A: MapAccess<'de>>(self, all: A) -> Result<Given, A::Error> {
                 let map = de::value::MapAccessDeserializer::new(all);
-                Entries::deserialize(map).map(Stated::Entries)
+                Entries::deserialize(map).map(Given::Entries)
             }
         }
         deserializer.deserialize_any(Either)
     }
 }
 
-/// The keys of each kind besides `kind`, `title`, `description`, `names` and `solution`; the `[solution]`'s.
-const KEYS: [(Kind, &[&str], &[&str]); 4] = [
-    (Kind::Lcp, &["M", "q"], &["z", "w"]),
-    (Kind::Mlcp, &["M", "q", "free", "equalities", "A", "B", "C", "D", "a", "b"], &["u", "v", "w"]),
-    (Kind::Hlcp, &["Q", "R", "q"], &["x", "s"]),
-    (Kind::BoxLcp, &["M", "q", "lower", "upper"], &["z", "w"]),
-];
+/// What is read and written of a kind.
+struct Read {
+    kind: Kind,
+    parts: Vec<&'static str>,
+    of_point: &'static [&'static str],
+    problem: fn(&mut dyn Parts) -> Result<AnyProblem, ProblemError>,
+    point: fn(&mut Keyed) -> Result<AnyPoint, ProblemError>,
+}
 
-const KINDS: &[Kind] = &[Kind::Lcp, Kind::Mlcp, Kind::Hlcp, Kind::BoxLcp];
+/// All kinds of linear complementarity.
+fn kinds() -> impl Iterator<Item = Read> {
+    fn of<P: Stated>() -> Read {
+        Read {
+            kind: P::KIND,
+            parts: P::PARTS.iter().map(|part| part.0).collect(),
+            of_point: P::SOLUTION,
+            problem: |parts| P::from_parts(parts).map(Into::into),
+            point: |keyed| P::point_from_parts(|name| keyed.vector(name)).map(Into::into),
+        }
+    }
+    each_kind!(P in Complementarity => of::<P>()).into_iter()
+}
 
 /// The format.
 ///
@@ -116,8 +209,8 @@ impl Format for Toml {
         const ABOUT: About = About {
             name: "TOML",
             extensions: &["toml"],
-            reads: KINDS,
-            writes: KINDS,
+            reads: Complementarity::KINDS,
+            writes: Complementarity::KINDS,
             ..About::TEXT
         };
         &ABOUT
@@ -141,226 +234,150 @@ impl Format for Toml {
 
 /// Reads the text of a file.
 fn parse(path: &Path, text: &str) -> Result<ProblemFile, IoError> {
-    let keys: Keys = toml::from_str(text).map_err(|e| {
+    let wrong = |e: &toml::de::Error| {
         let line = e.span().map_or(1, |s| 1 + text[..s.start].matches('\n').count());
-        IoError::data(
-            path,
-            format!("line {line}"),
-            "a problem as docs/formats.md describes it",
-            e.message(),
-        )
-    })?;
-    let file = Keyed { path, kind: Kind::Lcp, room: text.len().max(1 << 20) };
-    let Some(&(kind, of_problem, of_point)) = KEYS.iter().find(|k| k.0.name() == keys.kind) else {
-        let names: Vec<_> = KEYS.iter().map(|k| format!("\"{}\"", k.0.name())).collect();
-        let found = format!("\"{}\"", keys.kind);
+        let expected = "a problem as docs/formats.md describes it";
+        IoError::data(path, format!("line {line}"), expected, e.message())
+    };
+    let known = of_problems();
+    let parsed = toml::Deserializer::parse(text).map_err(|e| wrong(&e))?;
+    let mut keys = Known(&known).deserialize(parsed).map_err(|e| wrong(&e))?;
+    let Some(said) = take_text(&mut keys, "kind") else {
+        return Err(wrong(&de::Error::missing_field("kind")));
+    };
+    let Some(read) = kinds().find(|read| read.kind.name() == said) else {
+        let names: Vec<_> = kinds().map(|read| format!("\"{}\"", read.kind.name())).collect();
+        let found = format!("\"{said}\"");
         return Err(IoError::data(path, "kind", format!("one of {}", names.join(", ")), found));
     };
-    let file = Keyed { kind, ..file };
-    file.only(&keys.given(), of_problem, "")?;
-    if let Some(solution) = &keys.solution {
-        file.only(&solution.given(), of_point, "solution.")?;
+    let (title, description) = (take_text(&mut keys, "title"), take_text(&mut keys, "description"));
+    let names = match take(&mut keys, "names") {
+        Some(Value::Texts(names)) => names,
+        _ => vec![],
+    };
+    let room = text.len().max(1 << 20);
+    let solution = match take(&mut keys, "solution") {
+        Some(Value::Solution(keys)) => {
+            Some(Keyed { kind: read.kind, group: "solution.", keys, room })
+        }
+        _ => None,
+    };
+    let mut stated = Keyed { kind: read.kind, group: "", keys, room };
+    let invalid = IoError::problem(path);
+    stated.only(&known, &read.parts).map_err(&invalid)?;
+    if let Some(solution) = &solution {
+        solution.only(&of_solutions(), read.of_point).map_err(&invalid)?;
     }
-    let Keys { title, description, names, solution, .. } = &keys;
-    let (title, description) = (title.clone(), description.clone());
-    let names = names.clone().unwrap_or_default();
-    let solution = solution.as_ref().map(|solution| file.point(solution)).transpose()?;
+    let point = |mut keyed: Keyed| {
+        let point = (read.point)(&mut keyed)?;
+        let partner = if keyed.has("w") { Some(keyed.vector("w")?) } else { None };
+        Ok(StoredPoint { point, partner, statuses: vec![] })
+    };
+    let solution = solution.map(point).transpose().map_err(&invalid)?;
     let content = ProblemFile {
         info: Info { title, description, names, ..Info::default() },
         solution,
-        ..ProblemFile::new(file.problem(keys)?)
+        ..ProblemFile::new((read.problem)(&mut stated).map_err(&invalid)?)
     };
     check(path, &content)?;
     Ok(content)
 }
 
-impl Keys {
-    /// The keys that the file has.
-    fn given(&self) -> Vec<&'static str> {
-        let there = [
-            ("M", self.M.is_some()),
-            ("Q", self.Q.is_some()),
-            ("R", self.R.is_some()),
-            ("A", self.A.is_some()),
-            ("B", self.B.is_some()),
-            ("C", self.C.is_some()),
-            ("D", self.D.is_some()),
-            ("q", self.q.is_some()),
-            ("a", self.a.is_some()),
-            ("b", self.b.is_some()),
-            ("lower", self.lower.is_some()),
-            ("upper", self.upper.is_some()),
-            ("free", self.free.is_some()),
-            ("equalities", self.equalities.is_some()),
-        ];
-        there.into_iter().filter(|k| k.1).map(|k| k.0).collect()
-    }
-}
-
-impl Solution {
-    fn given(&self) -> Vec<&'static str> {
-        let there = [
-            ("z", self.z.is_some()),
-            ("w", self.w.is_some()),
-            ("u", self.u.is_some()),
-            ("v", self.v.is_some()),
-            ("x", self.x.is_some()),
-            ("s", self.s.is_some()),
-        ];
-        there.into_iter().filter(|k| k.1).map(|k| k.0).collect()
-    }
-}
-
-/// A file whose kind is known.
-struct Keyed<'a> {
-    path: &'a Path,
+/// The keys of a problem, or of its solution, whose kind is known.
+struct Keyed {
     kind: Kind,
+    /// What stands before the keys in messages.
+    group: &'static str,
+    keys: Keys,
     /// The most rows or columns that a matrix in the file can have: the vectors must have entries for them.
     room: usize,
 }
 
-impl Keyed<'_> {
-    fn wrong(
-        &self,
-        place: impl Into<String>,
-        expected: impl Into<String>,
-        found: impl std::fmt::Display,
-    ) -> IoError {
-        IoError::data(self.path, place, expected, found)
-    }
+fn wrong(
+    place: impl Into<String>,
+    expected: impl Into<String>,
+    found: impl std::fmt::Display,
+) -> ProblemError {
+    let (place, expected) = (place.into(), expected.into());
+    ProblemError::Value { place, expected, found: found.to_string() }
+}
 
-    /// No other keys than the kind has.
-    fn only(&self, given: &[&str], known: &[&str], group: &str) -> Result<(), IoError> {
-        match given.iter().find(|k| !known.contains(k)) {
+impl Keyed {
+    /// No other keys than the kind has, in the order of those that any kind has.
+    fn only(&self, all: &[(&'static str, Type)], known: &[&str]) -> Result<(), ProblemError> {
+        let given = all.iter().map(|key| key.0).filter(|key| self.has(key));
+        match given.into_iter().find(|key| !known.contains(key)) {
             Some(key) => {
-                let expected =
-                    format!("the keys of kind \"{}\": {}", self.kind.name(), known.join(", "));
-                Err(self.wrong(format!("{group}{key}"), expected, "this one"))
+                let (kind, known) = (self.kind.name(), known.join(", "));
+                let expected = format!("the keys of kind \"{kind}\": {known}");
+                Err(wrong(format!("{}{key}", self.group), expected, "this one"))
             }
             None => Ok(()),
         }
     }
 
-    fn need<T>(&self, key: &str, value: Option<T>) -> Result<T, IoError> {
-        value.ok_or_else(|| {
+    fn need(&mut self, key: &str) -> Result<Value, ProblemError> {
+        take(&mut self.keys, key).ok_or_else(|| {
             let expected = format!("this key, as the kind is \"{}\"", self.kind.name());
-            self.wrong(key, expected, "none")
+            wrong(format!("{}{key}", self.group), expected, "none")
         })
     }
 
-    fn matrix(&self, name: &str, stated: Option<Stated>) -> Result<Matrix, IoError> {
-        match self.need(name, stated)? {
-            Stated::Rows(rows) => match Dense::from_rows(&rows) {
+    /// The refusal of a part of another type than its name has in other kinds.
+    fn shaped(name: &str, expected: &str) -> ProblemError {
+        wrong(name, expected, "something else")
+    }
+}
+
+impl Parts for Keyed {
+    fn has(&self, name: &str) -> bool {
+        self.keys.iter().any(|key| key.0 == name)
+    }
+
+    fn vector(&mut self, name: &'static str) -> Result<Vec<f64>, ProblemError> {
+        match self.need(name)? {
+            Value::Vector(x) => Ok(x),
+            _ => Err(Self::shaped(name, "a vector")),
+        }
+    }
+
+    fn count(&mut self, name: &'static str) -> Result<usize, ProblemError> {
+        match self.need(name)? {
+            Value::Count(n) => Ok(n),
+            _ => Err(Self::shaped(name, "a number")),
+        }
+    }
+
+    fn matrix(&mut self, name: &'static str) -> Result<Matrix, ProblemError> {
+        let stated = match self.need(name)? {
+            Value::Matrix(stated) => stated,
+            _ => return Err(Self::shaped(name, "a matrix")),
+        };
+        match stated {
+            Given::Rows(rows) => match Dense::from_rows(&rows) {
                 Some(dense) => Ok(dense.into()),
                 None => {
                     let first = rows[0].len();
                     let k = rows.iter().position(|r| r.len() != first).unwrap_or_default();
                     let expected = format!("{first} entries, as in {name}[0]");
-                    Err(self.wrong(format!("{name}[{k}]"), expected, rows[k].len()))
+                    Err(wrong(format!("{name}[{k}]"), expected, rows[k].len()))
                 }
             },
-            Stated::Entries(Entries { shape: (rows, columns), entries }) => {
+            Given::Entries(Entries { shape: (rows, columns), entries }) => {
                 if rows.max(columns) > self.room {
                     let found = format!("{rows} × {columns}");
-                    return Err(self.wrong(
-                        format!("{name}.shape"),
-                        "a matrix that the vectors can fit",
-                        found,
-                    ));
+                    let expected = "a matrix that the vectors can fit";
+                    return Err(wrong(format!("{name}.shape"), expected, found));
                 }
                 if let Some(k) = entries.iter().position(|e| e.0 >= rows || e.1 >= columns) {
                     let expected =
                         format!("a row below {rows} and a column below {columns}, counted from 0");
                     let found = format!("{} and {}", entries[k].0, entries[k].1);
-                    return Err(self.wrong(format!("{name}.entries[{k}]"), expected, found));
+                    return Err(wrong(format!("{name}.entries[{k}]"), expected, found));
                 }
-                let made = Csc::from_triplets(rows, columns, entries.iter().copied());
-                made.map(Matrix::from).map_err(|problem| self.invalid(problem.into()))
+                Ok(Csc::from_triplets(rows, columns, entries.iter().copied())?.into())
             }
         }
-    }
-
-    fn invalid(&self, problem: ProblemError) -> IoError {
-        IoError::problem(self.path)(problem)
-    }
-
-    fn problem(&self, k: Keys) -> Result<Complementarity, IoError> {
-        let made = match self.kind {
-            Kind::Lcp => {
-                Lcp::new(self.matrix("M", k.M)?, self.need("q", k.q)?).map(Complementarity::Lcp)
-            }
-            Kind::BoxLcp => {
-                let (lower, upper) = (self.need("lower", k.lower)?, self.need("upper", k.upper)?);
-                BoxLcp::new(self.matrix("M", k.M)?, self.need("q", k.q)?, lower, upper)
-                    .map(Complementarity::Box)
-            }
-            Kind::Hlcp => {
-                Hlcp::new(self.matrix("Q", k.Q)?, self.matrix("R", k.R)?, self.need("q", k.q)?)
-                    .map(Complementarity::Hlcp)
-            }
-            _ => return self.mixed(k),
-        };
-        made.map_err(|problem| self.invalid(problem))
-    }
-
-    /// An MLCP, as M, q and the number of free variables, or by its blocks.
-    fn mixed(&self, k: Keys) -> Result<Complementarity, IoError> {
-        let given = k.given();
-        let blocks = ["A", "B", "C", "D", "a", "b"];
-        let block = given.iter().find(|g| blocks.contains(g));
-        let whole = given.iter().find(|g| !blocks.contains(g));
-        let made = match (block, whole) {
-            (Some(block), Some(whole)) => {
-                let expected = "either M, q and free, or A, B, C, D, a and b";
-                return Err(self.wrong(*block, expected, format!("both this and {whole}")));
-            }
-            (None, _) => {
-                let free = self.need("free", k.free)?;
-                let (matrix, q) = (self.matrix("M", k.M)?, self.need("q", k.q)?);
-                Mlcp::rectangular(matrix, q, k.equalities.unwrap_or(free), free)
-            }
-            (Some(_), None) => {
-                let (a, b) = (self.need("a", k.a)?, self.need("b", k.b)?);
-                let a_matrix = self.matrix("A", k.A)?;
-                let (p, n, m) = (a.len(), a_matrix.ncols(), b.len());
-                // What is not stated is zero.
-                let mut sparse = matches!(a_matrix, Matrix::Sparse(_));
-                let mut other = |name, stated: Option<Stated>, rows, columns| match stated {
-                    None => Ok(Csc::zeros(rows, columns)),
-                    stated => {
-                        let block = self.matrix(name, stated)?;
-                        sparse |= matches!(block, Matrix::Sparse(_));
-                        Ok(block.to_csc().unwrap_or_else(|| Csc::zeros(rows, columns)))
-                    }
-                };
-                let b_matrix = other("B", k.B, m, m)?;
-                let c_matrix = other("C", k.C, p, m)?;
-                let d_matrix = other("D", k.D, m, n)?;
-                let a_matrix = a_matrix.to_csc().unwrap_or_else(|| Csc::zeros(p, n));
-                Mlcp::from_blocks([&a_matrix, &b_matrix, &c_matrix, &d_matrix], &a, &b).map(
-                    |made| {
-                        match made.M.to_dense() {
-                            // Rows make a dense matrix, entries a sparse one.
-                            Some(dense) if !sparse => Mlcp { M: dense.into(), ..made },
-                            _ => made,
-                        }
-                    },
-                )
-            }
-        };
-        made.map(Complementarity::Mlcp).map_err(|problem| self.invalid(problem))
-    }
-
-    fn point(&self, s: &Solution) -> Result<StoredPoint, IoError> {
-        let need = |key: &str, value: &Option<Vec<f64>>| {
-            self.need(&format!("solution.{key}"), value.clone())
-        };
-        let point: AnyPoint = match self.kind {
-            Kind::Hlcp => HlcpPoint { x: need("x", &s.x)?, s: need("s", &s.s)? }.into(),
-            Kind::Mlcp => LcpPoint { z: [need("u", &s.u)?, need("v", &s.v)?].concat() }.into(),
-            _ => LcpPoint { z: need("z", &s.z)? }.into(),
-        };
-        Ok(StoredPoint { point, partner: s.w.clone(), statuses: vec![] })
     }
 }
 
@@ -372,19 +389,9 @@ pub(super) fn operator(path: &Path) -> IoError {
 /// The text of a file; `None` of an operator.
 fn format(file: &ProblemFile, problem: &Complementarity) -> Option<String> {
     let mut out = String::new();
-    let kind = match problem {
-        Complementarity::Lcp(_) => (Kind::Lcp, "0 <= z, w = M z + q >= 0, z'w = 0"),
-        Complementarity::Mlcp(_) => (
-            Kind::Mlcp,
-            "A u + C v + a = 0, 0 <= v, w = D u + B v + b >= 0, v'w = 0; M = [A C; D B], q = (a, b)",
-        ),
-        Complementarity::Hlcp(_) => (Kind::Hlcp, "Q x + R s = q, 0 <= x, s >= 0, x's = 0"),
-        Complementarity::Box(_) => {
-            (Kind::BoxLcp, "-(M z + q) in the normal cone of [lower, upper] at z")
-        }
-    };
-    line(&mut out, &format!("# {}", kind.1));
-    line(&mut out, &format!("kind = \"{}\"", kind.0.name()));
+    let (kind, statement) = with_complementarity!(problem, p => of(p));
+    line(&mut out, &format!("# {statement}"));
+    line(&mut out, &format!("kind = \"{}\"", kind.name()));
     for (key, said) in [("title", &file.info.title), ("description", &file.info.description)] {
         if let Some(said) = said {
             line(&mut out, &format!("{key} = {}", quoted(said)));
@@ -394,30 +401,14 @@ fn format(file: &ProblemFile, problem: &Complementarity) -> Option<String> {
         let names: Vec<_> = file.info.names.iter().map(|name| quoted(name)).collect();
         line(&mut out, &format!("names = [{}]", names.join(", ")));
     }
-    let matrices: Vec<(&str, &Matrix)> = match problem {
-        Complementarity::Lcp(p) => {
-            vector(&mut out, "q", &p.q);
-            vec![("M", &p.M)]
+    let mut matrices = vec![];
+    for (key, part) in with_complementarity!(problem, p => p.parts()) {
+        match part {
+            Part::Matrix(m) => matrices.push((key, m)),
+            Part::Vector(x) => vector(&mut out, key, x),
+            Part::Count(n) => line(&mut out, &format!("{key} = {n}")),
         }
-        Complementarity::Mlcp(p) => {
-            line(&mut out, &format!("free = {}", p.free));
-            if p.equalities != p.free {
-                line(&mut out, &format!("equalities = {}", p.equalities));
-            }
-            vector(&mut out, "q", &p.q);
-            vec![("M", &p.M)]
-        }
-        Complementarity::Hlcp(p) => {
-            vector(&mut out, "q", &p.q);
-            vec![("Q", &p.Q), ("R", &p.R)]
-        }
-        Complementarity::Box(p) => {
-            vector(&mut out, "q", &p.q);
-            vector(&mut out, "lower", &p.lower);
-            vector(&mut out, "upper", &p.upper);
-            vec![("M", &p.M)]
-        }
-    };
+    }
     // In TOML, what belongs to no table comes before all tables.
     for (name, m) in &matrices {
         if let Matrix::Dense(m) = m {
@@ -442,28 +433,17 @@ fn format(file: &ProblemFile, problem: &Complementarity) -> Option<String> {
             Matrix::Operator(_) => return None,
         }
     }
-    if let Some(StoredPoint { point, partner, .. }) = &file.solution {
+    if let Some(stored) = &file.solution {
         line(&mut out, "\n[solution]");
-        let (z, w) = (unknowns(point), partner.as_deref());
-        let parts = match problem {
-            Complementarity::Mlcp(p) => {
-                vec![("u", Some(&z[..p.free])), ("v", Some(&z[p.free..])), ("w", w)]
-            }
-            Complementarity::Hlcp(_) => vec![("x", Some(z)), ("s", slack(point))],
-            _ => vec![("z", Some(z)), ("w", w)],
-        };
-        for (key, x) in parts {
-            if let Some(x) = x {
-                vector(&mut out, key, x);
-            }
-        }
+        let partner = stored.partner.as_deref();
+        let parts = with_complementarity!(problem, p => p.parts_of(&stored.point, partner));
+        parts.into_iter().for_each(|(key, x)| vector(&mut out, key, x));
     }
     Some(out)
 }
 
-/// s of a horizontal problem's point.
-fn slack(point: &AnyPoint) -> Option<&[f64]> {
-    HlcpPoint::of(point).map(|point| &point.s[..])
+fn of<P: Stated>(_: &P) -> (Kind, &'static str) {
+    (P::KIND, P::STATEMENT)
 }
 
 fn line(out: &mut String, text: &str) {

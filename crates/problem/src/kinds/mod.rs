@@ -117,11 +117,14 @@ impl Kind {
 }
 
 /// An array with the value of an expression for each kind of problem, in the order of [`Kind::ALL`](crate::Kind::ALL); its type goes by the name given:
-/// `each_kind!(P => abouts::<P>())`.
+/// `each_kind!(P => abouts::<P>())`. With `in Complementarity` after the name, for those of linear complementarity alone.
 #[macro_export]
 macro_rules! each_kind {
     ($P:ident => $value:expr) => {
-        $crate::list_of_kinds!($crate::arms_of_kinds, array $P => $value;)
+        $crate::list_of_kinds!($crate::arms_of_kinds, all array $P => $value;)
+    };
+    ($P:ident in Complementarity => $value:expr) => {
+        $crate::list_of_kinds!($crate::arms_of_kinds, complementarity array $P => $value;)
     };
 }
 
@@ -129,7 +132,7 @@ macro_rules! each_kind {
 #[macro_export]
 macro_rules! with_friction {
     ($any:expr, $problem:ident => $body:expr) => {
-        $crate::list_of_kinds!($crate::arms_of_kinds, friction $any, $problem => $body;)
+        $crate::list_of_kinds!($crate::arms_of_kinds, friction match $any, $problem => $body;)
     };
 }
 
@@ -137,7 +140,7 @@ macro_rules! with_friction {
 #[macro_export]
 macro_rules! with_complementarity {
     ($any:expr, $problem:ident => $body:expr) => {
-        $crate::list_of_kinds!($crate::arms_of_kinds, complementarity $any, $problem => $body;)
+        $crate::list_of_kinds!($crate::arms_of_kinds, complementarity match $any, $problem => $body;)
     };
 }
 
@@ -159,7 +162,7 @@ macro_rules! with_problem {
 #[macro_export]
 macro_rules! arms_of_kinds {
     (
-        array $P:ident => $value:expr;
+        all array $P:ident => $value:expr;
         $($(#[$of_wing:meta])* $wing:ident {$(
             $(#[$doc:meta])* $kind:ident, $name:literal, $variant:ident, $type:ty, $dimension:literal;
         )*})*
@@ -167,26 +170,31 @@ macro_rules! arms_of_kinds {
         [$($({ type $P = $type; $value }),*),*]
     };
     (
-        friction $any:expr, $problem:ident => $body:expr;
-        $(#[$of_wing:meta])* $wing:ident $kinds:tt
-        $($others:tt)*
-    ) => {
-        $crate::arms_of_kinds!(wing $any, $problem => $body; $wing $kinds)
-    };
-    (
-        complementarity $any:expr, $problem:ident => $body:expr;
-        $(#[$of_other:meta])* $other:ident $others:tt
-        $(#[$of_wing:meta])* $wing:ident $kinds:tt
-    ) => {
-        $crate::arms_of_kinds!(wing $any, $problem => $body; $wing $kinds)
-    };
-    (
-        wing $any:expr, $problem:ident => $body:expr;
-        $wing:ident {$(
+        complementarity array $P:ident => $value:expr;
+        $(#[$of_other:meta])* Friction $others:tt
+        $(#[$of_wing:meta])* Complementarity {$(
             $(#[$doc:meta])* $kind:ident, $name:literal, $variant:ident, $type:ty, $dimension:literal;
         )*}
     ) => {
-        match $any { $($crate::$wing::$variant($problem) => $body,)* }
+        [$({ type $P = $type; $value }),*]
+    };
+    (
+        friction match $any:expr, $problem:ident => $body:expr;
+        $(#[$of_wing:meta])* Friction {$(
+            $(#[$doc:meta])* $kind:ident, $name:literal, $variant:ident, $type:ty, $dimension:literal;
+        )*}
+        $($others:tt)*
+    ) => {
+        match $any { $($crate::Friction::$variant($problem) => $body,)* }
+    };
+    (
+        complementarity match $any:expr, $problem:ident => $body:expr;
+        $(#[$of_other:meta])* Friction $others:tt
+        $(#[$of_wing:meta])* Complementarity {$(
+            $(#[$doc:meta])* $kind:ident, $name:literal, $variant:ident, $type:ty, $dimension:literal;
+        )*}
+    ) => {
+        match $any { $($crate::Complementarity::$variant($problem) => $body,)* }
     };
 }
 

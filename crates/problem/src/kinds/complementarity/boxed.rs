@@ -2,6 +2,8 @@
 
 use super::judge::{Data, InZ};
 use super::square;
+use super::stated::{Part, Parts, Shape, Stated, plural};
+use crate::LcpPoint;
 use crate::ProblemError;
 use crate::check::ConeSystem;
 use crate::check::proof::{Exactly, bounded, columns, exacts};
@@ -59,6 +61,64 @@ problem_in_z!(BoxLcp, problem => problem.dim(), {
     let bounds = problem.lower.iter().zip(&problem.upper);
     bounds.map(|(&l, &u)| 0.0_f64.clamp(l, u)).collect()
 });
+
+impl Stated for BoxLcp {
+    const STATEMENT: &'static str = "-(M z + q) in the normal cone of [lower, upper] at z";
+    const PARTS: &'static [(&'static str, Shape)] = &[
+        ("M", Shape::Matrix),
+        ("q", Shape::Vector),
+        ("lower", Shape::Vector),
+        ("upper", Shape::Vector),
+    ];
+    const SOLUTION: &'static [&'static str] = &["z", "w"];
+
+    fn parts(&self) -> Vec<(&'static str, Part<'_>)> {
+        vec![
+            ("q", Part::Vector(&self.q)),
+            ("lower", Part::Vector(&self.lower)),
+            ("upper", Part::Vector(&self.upper)),
+            ("M", Part::Matrix(&self.M)),
+        ]
+    }
+
+    fn from_parts(parts: &mut dyn Parts) -> Result<Self, ProblemError> {
+        let (lower, upper) = (parts.vector("lower")?, parts.vector("upper")?);
+        Self::new(parts.matrix("M")?, parts.vector("q")?, lower, upper)
+    }
+
+    fn point_parts<'a>(
+        &self,
+        point: &'a LcpPoint,
+        w: Option<&'a [f64]>,
+    ) -> Vec<(&'static str, &'a [f64])> {
+        std::iter::once(("z", &point.z[..])).chain(w.map(|w| ("w", w))).collect()
+    }
+
+    fn point_from_parts<E>(
+        mut part: impl FnMut(&'static str) -> Result<Vec<f64>, E>,
+    ) -> Result<LcpPoint, E> {
+        Ok(LcpPoint { z: part("z")? })
+    }
+
+    fn pairs(&self) -> usize {
+        self.dim()
+    }
+
+    fn size(&self) -> String {
+        let bounded = |all: &[f64]| all.iter().filter(|x| x.is_finite()).count();
+        let variables = plural(self.dim(), "variable");
+        let (lower, upper) = (bounded(&self.lower), bounded(&self.upper));
+        format!("{variables}, {} and {upper} upper", plural(lower, "lower bound"))
+    }
+
+    fn classified(&self) -> Option<&Matrix> {
+        Some(&self.M)
+    }
+
+    fn right(&self) -> &[f64] {
+        &self.q
+    }
+}
 
 impl InZ for BoxLcp {
     fn data(&self) -> Data<'_> {

@@ -1,6 +1,7 @@
 //! The linear complementarity problem.
 
 use super::judge::{Data, InZ};
+use super::stated::{Part, Parts, Shape, Stated, plural};
 use super::{mixed, square};
 use crate::check::ConeSystem;
 use crate::check::proof::{Claim, Exactly};
@@ -60,6 +61,50 @@ impl Lcp {
 }
 
 problem_in_z!(Lcp, problem => problem.dim(), vec![0.0; problem.dim()]);
+
+impl Stated for Lcp {
+    const STATEMENT: &'static str = "0 <= z, w = M z + q >= 0, z'w = 0";
+    const PARTS: &'static [(&'static str, Shape)] = &[("M", Shape::Matrix), ("q", Shape::Vector)];
+    const SOLUTION: &'static [&'static str] = &["z", "w"];
+
+    fn parts(&self) -> Vec<(&'static str, Part<'_>)> {
+        vec![("q", Part::Vector(&self.q)), ("M", Part::Matrix(&self.M))]
+    }
+
+    fn from_parts(parts: &mut dyn Parts) -> Result<Self, ProblemError> {
+        Self::new(parts.matrix("M")?, parts.vector("q")?)
+    }
+
+    fn point_parts<'a>(
+        &self,
+        point: &'a LcpPoint,
+        w: Option<&'a [f64]>,
+    ) -> Vec<(&'static str, &'a [f64])> {
+        std::iter::once(("z", &point.z[..])).chain(w.map(|w| ("w", w))).collect()
+    }
+
+    fn point_from_parts<E>(
+        mut part: impl FnMut(&'static str) -> Result<Vec<f64>, E>,
+    ) -> Result<LcpPoint, E> {
+        Ok(LcpPoint { z: part("z")? })
+    }
+
+    fn pairs(&self) -> usize {
+        self.dim()
+    }
+
+    fn size(&self) -> String {
+        plural(self.dim(), "variable")
+    }
+
+    fn classified(&self) -> Option<&Matrix> {
+        Some(&self.M)
+    }
+
+    fn right(&self) -> &[f64] {
+        &self.q
+    }
+}
 
 impl InZ for Lcp {
     fn data(&self) -> Data<'_> {

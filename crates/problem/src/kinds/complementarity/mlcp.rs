@@ -2,10 +2,11 @@
 
 use super::judge::{Data, InZ};
 use super::mixed;
-use crate::ProblemError;
+use super::stated::{Part, Parts, Shape, Stated, plural};
 use crate::check::ConeSystem;
 use crate::check::proof::Exactly;
 use crate::error::vector;
+use crate::{LcpPoint, ProblemError};
 use nonsmooth_linalg::{Csc, Dense, Matrix};
 
 /// `A u + C v + a = 0`, `0 ≤ v ⟂ D u + B v + b ≥ 0`: MLCP, lecture (8).
@@ -114,6 +115,142 @@ impl Mlcp {
 }
 
 problem_in_z!(Mlcp, problem => problem.M.ncols(), vec![0.0; problem.M.ncols()]);
+
+/// The parts of the whole, and those of the blocks that may stand in their place.
+const WHOLE: [&str; 4] = ["M", "q", "free", "equalities"];
+const BLOCKS: [&str; 6] = ["A", "B", "C", "D", "a", "b"];
+
+impl Mlcp {
+    /// Of blocks; B, C and D are zero where they are not stated.
+    fn from_stated_blocks(parts: &mut dyn Parts) -> Result<Self, ProblemError> {
+        let (a, b) = (parts.vector("a")?, parts.vector("b")?);
+        let a_matrix = parts.matrix("A")?;
+        let (p, n, m) = (a.len(), a_matrix.ncols(), b.len());
+        let mut sparse = matches!(a_matrix, Matrix::Sparse(_));
+        let mut other = |name, rows, columns| match parts.has(name) {
+            false => Ok(Csc::zeros(rows, columns)),
+            true => {
+                let block = parts.matrix(name)?;
+                sparse |= matches!(block, Matrix::Sparse(_));
+                Ok::<_, ProblemError>(block.to_csc().unwrap_or_else(|| Csc::zeros(rows, columns)))
+            }
+        };
+        let b_matrix = other("B", m, m)?;
+        let c_matrix = other("C", p, m)?;
+        let d_matrix = other("D", m, n)?;
+        let a_matrix = a_matrix.to_csc().unwrap_or_else(|| Csc::zeros(p, n));
+        let made = Self::from_blocks([&a_matrix, &b_matrix, &c_matrix, &d_matrix], &a, &b)?;
+        Ok(match made.M.to_dense() {
+            // Rows make a dense matrix, entries a sparse one.
+            Some(dense) if !sparse => Self { M: dense.into(), ..made },
+            _ => made,
+        })
+    }
+}
+
+impl Stated for Mlcp {
+    const STATEMENT: &'static str =
+        "A u + C v + a = 0, 0 <= v, w = D u + B v + b >= 0, v'w = 0; M = [A C; D B], q = (a, b)";
+    const PARTS: &'static [(&'static str, Shape)] = &[
+        ("M", Shape::Matrix),
+        ("q", Shape::Vector),
+        ("free", Shape::Count),
+        ("equalities", Shape::Count),
+        ("A", Shape::Matrix),
+        ("B", Shape::Matrix),
+        ("C", Shape::Matrix),
+        ("D", Shape::Matrix),
+        ("a", Shape::Vector),
+        ("b", Shape::Vector),
+    ];
+    const SOLUTION: &'static [&'static str] = &["u", "v", "w"];
+
+    fn parts(&self) -> Vec<(&'static str, Part<'_>)> {
+        let mut parts = vec![("free", Part::Count(self.free))];
+        if self.equalities != self.free {
+            parts.push(("equalities", Part::Count(self.equalities)));
+        }
+        parts.extend([("q", Part::Vector(&self.q)), ("M", Part::Matrix(&self.M))]);
+        parts
+    }
+
+    fn from_parts(parts: &mut dyn Parts) -> Result<Self, ProblemError> {
+        let first = |names: &[&'static str]| names.iter().copied().find(|name| parts.has(name));
+        match (first(&BLOCKS), first(&WHOLE)) {
+            (Some(block), Some(whole)) => {
+                let expected = "either M, q and free, or A, B, C, D, a and b";
+                Err(ProblemError::shape(block, expected, format!("both this and {whole}")))
+            }
+            (Some(_), None) => Self::from_stated_blocks(parts),
+            (None, _) => {
+                let free = parts.count("free")?;
+                let (matrix, q) = (parts.matrix("M")?, parts.vector("q")?);
+                let stated = parts.has("equalities");
+                let equalities = if stated { parts.count("equalities")? } else { free };
+                Self::rectangular(matrix, q, equalities, free)
+            }
+        }
+    }
+
+    fn point_parts<'a>(
+        &self,
+        point: &'a LcpPoint,
+        w: Option<&'a [f64]>,
+    ) -> Vec<(&'static str, &'a [f64])> {
+        let (u, v) = point.z.split_at(self.free);
+        [("u", u), ("v", v)].into_iter().chain(w.map(|w| ("w", w))).collect()
+    }
+
+    fn point_from_parts<E>(
+        mut part: impl FnMut(&'static str) -> Result<Vec<f64>, E>,
+    ) -> Result<LcpPoint, E> {
+        Ok(LcpPoint { z: [part("u")?, part("v")?].concat() })
+    }
+
+    /// Equalities come first, and have no w.
+    fn kept(&self, mut partner: Vec<f64>) -> Option<Vec<f64>> {
+        partner.drain(..self.equalities.min(partner.len()));
+        Some(partner)
+    }
+
+    fn pairs(&self) -> usize {
+        self.pairs()
+    }
+
+    fn variables(&self) -> usize {
+        self.free + self.pairs()
+    }
+
+    fn size(&self) -> String {
+        let equalities = match self.equalities {
+            1 => "1 equality".into(),
+            n => format!("{n} equalities"),
+        };
+        let (free, pairs) = (plural(self.free, "free variable"), plural(self.pairs(), "pair"));
+        format!("{equalities}, {free}, {pairs}")
+    }
+
+    fn sizes(&self) -> Vec<(&'static str, usize)> {
+        vec![("equalities", self.equalities), ("free", self.free), ("pairs", self.pairs())]
+    }
+
+    fn blocks(&self) -> Vec<(&'static str, Dense)> {
+        let (rows, columns) = (self.M.nrows(), self.M.ncols());
+        let (r, c) = (self.equalities, self.free);
+        let all = [
+            ("A", 0..r, 0..c),
+            ("B", r..rows, c..columns),
+            ("C", 0..r, c..columns),
+            ("D", r..rows, 0..c),
+        ];
+        let block = |(name, rows, columns)| Some((name, self.block(rows, columns)?));
+        all.into_iter().filter_map(block).collect()
+    }
+
+    fn right(&self) -> &[f64] {
+        &self.q
+    }
+}
 
 impl InZ for Mlcp {
     fn data(&self) -> Data<'_> {

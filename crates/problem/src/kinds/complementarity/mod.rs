@@ -110,12 +110,14 @@ mod judge;
 mod lcp;
 mod mlcp;
 pub mod planted;
+mod stated;
 
 pub use boxed::BoxLcp;
 pub use hlcp::{Hlcp, HlcpGauge, HlcpPoint};
 pub use judge::{LinearGauge, RowCounts, RowStatus};
 pub use lcp::{Lcp, LcpPoint};
 pub use mlcp::Mlcp;
+pub use stated::{Part, Parts, Shape, Stated, plural};
 
 use crate::ProblemError;
 use crate::check::ConeSystem;

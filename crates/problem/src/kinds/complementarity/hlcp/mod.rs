@@ -5,6 +5,7 @@ mod judge;
 pub use judge::HlcpGauge;
 
 use super::square;
+use super::stated::{Part, Parts, Shape, Stated, plural};
 use crate::check::{self, Certificate, ConeSystem, Evidence, Measure};
 use crate::error::vector;
 use crate::{Kind, OfAny, Problem, ProblemError};
@@ -122,5 +123,60 @@ impl Problem for Hlcp {
     fn assembled(&self, unknowns: &[f64]) -> Self::Point {
         let (x, s) = unknowns.split_at(self.dim());
         HlcpPoint { x: x.to_vec(), s: s.to_vec() }
+    }
+}
+
+impl Stated for Hlcp {
+    const STATEMENT: &'static str = "Q x + R s = q, 0 <= x, s >= 0, x's = 0";
+    const PARTS: &'static [(&'static str, Shape)] =
+        &[("Q", Shape::Matrix), ("R", Shape::Matrix), ("q", Shape::Vector)];
+    const SOLUTION: &'static [&'static str] = &["x", "s"];
+    const ROW: &'static str = "pair";
+
+    fn parts(&self) -> Vec<(&'static str, Part<'_>)> {
+        vec![
+            ("q", Part::Vector(&self.q)),
+            ("Q", Part::Matrix(&self.Q)),
+            ("R", Part::Matrix(&self.R)),
+        ]
+    }
+
+    fn from_parts(parts: &mut dyn Parts) -> Result<Self, ProblemError> {
+        Self::new(parts.matrix("Q")?, parts.matrix("R")?, parts.vector("q")?)
+    }
+
+    fn point_parts<'a>(
+        &self,
+        point: &'a HlcpPoint,
+        _: Option<&'a [f64]>,
+    ) -> Vec<(&'static str, &'a [f64])> {
+        vec![("x", &point.x), ("s", &point.s)]
+    }
+
+    fn point_from_parts<E>(
+        mut part: impl FnMut(&'static str) -> Result<Vec<f64>, E>,
+    ) -> Result<HlcpPoint, E> {
+        Ok(HlcpPoint { x: part("x")?, s: part("s")? })
+    }
+
+    /// s belongs to the point.
+    fn kept(&self, _: Vec<f64>) -> Option<Vec<f64>> {
+        None
+    }
+
+    fn pairs(&self) -> usize {
+        self.dim()
+    }
+
+    fn size(&self) -> String {
+        plural(self.dim(), "pair")
+    }
+
+    fn sizes(&self) -> Vec<(&'static str, usize)> {
+        vec![("pairs", self.dim())]
+    }
+
+    fn right(&self) -> &[f64] {
+        &self.q
     }
 }
