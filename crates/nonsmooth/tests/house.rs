@@ -648,6 +648,29 @@ fn the_checker_lets_the_house_live() {
     );
 }
 
+/// A kind is its folder, what solves it, and the formats with a layout for it alone: all else asks the problem.
+#[test]
+fn what_is_common_to_all_kinds_names_none() {
+    // The roots of the library export them, and types of points stand in `any`.
+    let others = ["problem/src/any.rs", "problem/src/lib.rs", "nonsmooth/src/lib.rs"];
+    let rooms = ["problem/src/kinds/", "solve/", "io/"].into_iter().chain(others);
+    let mut seen = 0;
+    for folder in crate_folders() {
+        for file in files(&folder.join("src")).into_iter().filter(|f| has_extension(f, "rs")) {
+            let place = relative(&file, &root_folder().join("crates"));
+            if rooms.clone().any(|room| place.starts_with(room)) || place.ends_with("/tests.rs") {
+                continue;
+            }
+            let used = without_tests(tokens(&read(&file)));
+            let named =
+                used.iter().find(|t| ["Hlcp", "BoxLcp", "FrictionGlobal2d"].contains(&t.as_str()));
+            assert!(named.is_none(), "{place} names {named:?}");
+            seen += 1;
+        }
+    }
+    assert!(seen > 100, "only {seen} sources found");
+}
+
 /// The judge and the solvers may not share a kernel: an error there would go unseen.
 #[test]
 fn the_judge_multiplies_by_itself() {

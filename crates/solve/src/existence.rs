@@ -122,7 +122,7 @@ fn by_class(problem: &Complementarity) -> Option<Existence> {
             let class = class_of(&p.M, &[Class::P])?;
             every(format!("M is {class}, and then every q has a solution between any bounds"))
         }
-        Complementarity::Mlcp(_) | Complementarity::Hlcp(_) => None,
+        _ => None,
     }
 }
 

@@ -117,40 +117,6 @@ mod tests {
     }
 
     #[test]
-    fn tmp_order() {
-        use nonsmooth_problem::*;
-        fn of<P: Registered>((composed, variants): (bool, bool), all: &mut Vec<String>) {
-            let names = match composed {
-                true => registry::solver_names::<P>(),
-                false => registry::abouts::<P>().iter().map(|a| a.name.to_owned()).collect(),
-            };
-            for name in names {
-                let about = registry::about::<P>(&name).filter(|_| variants);
-                let settings = about.map_or(&[][..], |a| a.variants);
-                let labels = settings.iter().map(|s| format!("{name}:{s}"));
-                for label in std::iter::once(name.clone()).chain(labels) {
-                    if !all.contains(&label) {
-                        all.push(label);
-                    }
-                }
-            }
-        }
-        for x in [(false, false), (false, true), (true, false), (true, true)] {
-            let mut all = vec![];
-            of::<FrictionLocal<3>>(x, &mut all);
-            of::<FrictionLocal<2>>(x, &mut all);
-            of::<FrictionGlobal<3>>(x, &mut all);
-            of::<FrictionGlobal<2>>(x, &mut all);
-            of::<Lcp>(x, &mut all);
-            of::<Mlcp>(x, &mut all);
-            of::<BoxLcp>(x, &mut all);
-            of::<Hlcp>(x, &mut all);
-            assert_eq!(all, Registry::labels(x.0, x.1));
-        }
-        println!("{:?}", each_kind!(P => registry::solver_names::<P>().len()));
-    }
-
-    #[test]
     fn the_registry_lists_every_name_once() {
         let plain = Registry::labels(false, false);
         assert!(plain.contains(&"nsgs".into()) && plain.iter().all(|name| !name.contains('/')));

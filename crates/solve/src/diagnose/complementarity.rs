@@ -3,7 +3,7 @@
 use nonsmooth_analysis::{Class, Classes, Effort, rank};
 use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::check::Existence;
-use nonsmooth_problem::{Complementarity, Problem, with_complementarity};
+use nonsmooth_problem::{Complementarity, Problem, Stated, with_complementarity};
 
 use super::{Finding, easy, hard, one_of_each};
 use crate::complementarity::guarantees::guaranteed;
@@ -19,8 +19,8 @@ pub(super) fn findings(
     let matrices = matrices(problem);
     let mut findings = vec![size(problem)];
     // The classes speak of one square matrix and variables with bounds.
-    if let Complementarity::Lcp(_) | Complementarity::Box(_) = problem {
-        findings.push(class(matrices[0].1, matches!(problem, Complementarity::Lcp(_))));
+    if let Some(m) = with_complementarity!(problem, p => p.classified()) {
+        findings.push(class(m, matches!(problem, Complementarity::Lcp(_))));
     }
     findings.extend(matrices.iter().filter_map(|(name, m)| deficiency(name, m, rows)));
     findings.extend(scale(&matrices));
@@ -30,12 +30,7 @@ pub(super) fn findings(
 }
 
 fn matrices(problem: &Complementarity) -> Vec<(&'static str, &Matrix)> {
-    match problem {
-        Complementarity::Lcp(p) => vec![("M", &p.M)],
-        Complementarity::Box(p) => vec![("M", &p.M)],
-        Complementarity::Mlcp(p) => vec![("M", &p.M)],
-        Complementarity::Hlcp(p) => vec![("Q", &p.Q), ("R", &p.R)],
-    }
+    with_complementarity!(problem, p => p.matrices())
 }
 
 /// The default and the first solver of each family.

@@ -91,7 +91,7 @@ impl Stated for BoxLcp {
         point: &'a LcpPoint,
         w: Option<&'a [f64]>,
     ) -> Vec<(&'static str, &'a [f64])> {
-        std::iter::once(("z", &point.z[..])).chain(w.map(|w| ("w", w))).collect()
+        point.parts(w)
     }
 
     fn point_from_parts<E>(
@@ -113,10 +113,6 @@ impl Stated for BoxLcp {
 
     fn classified(&self) -> Option<&Matrix> {
         Some(&self.M)
-    }
-
-    fn right(&self) -> &[f64] {
-        &self.q
     }
 }
 

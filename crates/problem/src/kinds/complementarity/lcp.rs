@@ -27,6 +27,11 @@ pub struct LcpPoint {
 }
 
 impl LcpPoint {
+    /// z, and w where it is known.
+    pub(super) fn parts<'a>(&'a self, w: Option<&'a [f64]>) -> Vec<(&'static str, &'a [f64])> {
+        std::iter::once(("z", &self.z[..])).chain(w.map(|w| ("w", w))).collect()
+    }
+
     /// `w = M z + q` of this point, in plain arithmetic; what the judge computes of it is in its verdict.
     ///
     /// # Panics
@@ -80,7 +85,7 @@ impl Stated for Lcp {
         point: &'a LcpPoint,
         w: Option<&'a [f64]>,
     ) -> Vec<(&'static str, &'a [f64])> {
-        std::iter::once(("z", &point.z[..])).chain(w.map(|w| ("w", w))).collect()
+        point.parts(w)
     }
 
     fn point_from_parts<E>(
@@ -99,10 +104,6 @@ impl Stated for Lcp {
 
     fn classified(&self) -> Option<&Matrix> {
         Some(&self.M)
-    }
-
-    fn right(&self) -> &[f64] {
-        &self.q
     }
 }
 

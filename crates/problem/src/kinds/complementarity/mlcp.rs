@@ -246,10 +246,6 @@ impl Stated for Mlcp {
         let block = |(name, rows, columns)| Some((name, self.block(rows, columns)?));
         all.into_iter().filter_map(block).collect()
     }
-
-    fn right(&self) -> &[f64] {
-        &self.q
-    }
 }
 
 impl InZ for Mlcp {

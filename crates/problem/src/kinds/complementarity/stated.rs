@@ -122,8 +122,14 @@ pub trait Stated: OfAny {
         self.parts().into_iter().filter_map(matrix).collect()
     }
 
-    /// The right-hand side.
-    fn right(&self) -> &[f64];
+    /// The right-hand side q.
+    fn right(&self) -> &[f64] {
+        let vector = |(name, part)| match part {
+            Part::Vector(x) if name == "q" => Some(x),
+            _ => None,
+        };
+        self.parts().into_iter().find_map(vector).unwrap_or_default()
+    }
 }
 
 /// `1 contact`, `2 contacts`.

@@ -175,8 +175,4 @@ impl Stated for Hlcp {
     fn sizes(&self) -> Vec<(&'static str, usize)> {
         vec![("pairs", self.dim())]
     }
-
-    fn right(&self) -> &[f64] {
-        &self.q
-    }
 }
