@@ -1,5 +1,7 @@
 //! Solvers by label, and who makes them.
 
+use std::cmp::Reverse;
+
 use nonsmooth_problem::{Kind, OfAny, each_kind};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::settings::{self, SettingsMap};
@@ -35,12 +37,17 @@ impl Registry {
     /// The names of the solvers of all kinds of problem, each once: with `composed` also those behind a prefix, as `condense/nsgs`; with `variants` also the
     /// settings that the registry holds worth comparing.
     pub fn labels(composed: bool, variants: bool) -> Vec<String> {
-        let of_kinds = each_kind!(P => match composed {
-            true => registry::solver_names::<P>(),
-            false => registry::abouts::<P>().iter().map(|a| a.name.to_owned()).collect(),
-        }.into_iter().map(|name| (registry::about::<P>(&name), name)).collect::<Vec<_>>());
+        let mut of_kinds = each_kind!(P => {
+            let names = match composed {
+                true => registry::solver_names::<P>(),
+                false => registry::abouts::<P>().iter().map(|a| a.name.to_owned()).collect(),
+            };
+            let about = |name: String| (registry::about::<P>(&name), name);
+            (P::KIND, names.into_iter().map(about).collect::<Vec<_>>())
+        });
+        of_kinds.sort_by_key(|(kind, _)| rank(*kind));
         let mut all = vec![];
-        for (about, name) in of_kinds.into_iter().flatten() {
+        for (about, name) in of_kinds.into_iter().flat_map(|(_, names)| names) {
             let settings = about.filter(|_| variants).map_or(&[][..], |a| a.variants);
             let labels = settings.iter().map(|s| format!("{name}:{s}"));
             for label in std::iter::once(name.clone()).chain(labels) {
@@ -51,6 +58,13 @@ impl Registry {
         }
         all
     }
+}
+
+/// The order of labels: that of the list of kinds, but space before the plane.
+fn rank(kind: Kind) -> (Option<usize>, Reverse<usize>) {
+    let form = |kind: Kind| kind.name().trim_end_matches("_2d").trim_end_matches("_3d");
+    let first = Kind::ALL.iter().position(|other| form(*other) == form(kind));
+    (first, Reverse(kind.dimension()))
 }
 
 /// A solver as it is asked for: `name` or `name:key=value,key=value`.
@@ -77,7 +91,8 @@ impl Label {
     ///
     /// Errors: no kind takes it: an unknown name, an unknown key or a bad value.
     pub fn kinds(&self, solvers: &impl Solvers) -> Result<Vec<Kind>, String> {
-        let tries = each_kind!(P => (P::KIND, self.refusal::<P>(solvers)));
+        let mut tries = each_kind!(P => (P::KIND, self.refusal::<P>(solvers)));
+        tries.sort_by_key(|(kind, _)| rank(*kind));
         let takes =
             |(kind, refusal): &(Kind, Option<SolveError>)| refusal.is_none().then_some(*kind);
         let kinds: Vec<_> = tries.iter().filter_map(takes).collect();
@@ -87,8 +102,10 @@ impl Label {
         // A kind that knows the name says more than one that does not, and then the one that knows the most names.
         let refusals: Vec<_> = tries.into_iter().filter_map(|(_, refusal)| refusal).collect();
         let known = |e: &&SolveError| !matches!(e, SolveError::UnknownSolver { .. });
-        let names = each_kind!(P => registry::solver_names::<P>().len());
-        let most = refusals.iter().zip(names).max_by_key(|(_, names)| *names).map(|(e, _)| e);
+        let mut names = each_kind!(P => (P::KIND, registry::solver_names::<P>().len()));
+        names.sort_by_key(|(kind, _)| rank(*kind));
+        let known_names = refusals.iter().zip(names.map(|(_, n)| n)).rev();
+        let most = known_names.max_by_key(|(_, n)| *n).map(|(e, _)| e);
         Err(refusals.iter().find(known).or(most).map_or_else(String::new, ToString::to_string))
     }
 
