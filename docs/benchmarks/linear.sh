@@ -20,4 +20,4 @@ done
 "$nonsmooth" bench report "$work/runs.jsonl" --out "$work/report.html"
 "$nonsmooth" bench page "$work/runs.jsonl" --out docs/benchmarks-linear.md \
     --command 'bash docs/benchmarks/linear.sh'
-cargo run --release --quiet -p nonsmooth-bench --example scaling -- docs/linear/figures
+cargo run --release --quiet -p nonsmooth-figures --example scaling -- docs/linear/figures

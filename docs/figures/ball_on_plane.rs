@@ -1,17 +1,15 @@
 //! The lecture's ball on a plane under a turning force: Coulomb's cone against facets, in one picture.
 //!
-//! `cargo run --release -p nonsmooth-bench --example ball_on_plane -- [DIRECTORY]`
+//! `cargo run --release -p nonsmooth-figures --example ball_on_plane -- [DIRECTORY]`
 //!
 //! Writes `ball-on-plane.svg`, `ball-on-plane.png` and `ball-on-plane.csv` (the positions at the end of the period) to the directory, by default
 //! docs/figures, and prints the table of docs/facets.md.
 
-mod drawing;
-
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use drawing::{Curve, Panel, linear};
 use nonsmooth_bench::draw::{Axis, INK, Style, tick};
+use nonsmooth_figures::{Curve, Panel, linear};
 use nonsmooth_problem::FrictionLocal;
 use nonsmooth_scenes::{BallState, TurningBall};
 use nonsmooth_solve::{Limits, registry, settings};
@@ -121,9 +119,9 @@ fn main() -> Result<(), String> {
         rest.panel("from rest, nearer", Some([-0.08, 0.24])),
     ];
     let title = "A ball on a plane under a force of the size of the friction limit that turns in 15 s: inner facets";
-    let svg = drawing::svg(title, &panels)?;
-    drawing::write(&directory.join("ball-on-plane.svg"), svg.as_bytes())?;
-    drawing::png(&svg, &directory.join("ball-on-plane.png"))?;
+    let svg = nonsmooth_figures::svg(title, &panels)?;
+    nonsmooth_figures::write(&directory.join("ball-on-plane.svg"), svg.as_bytes())?;
+    nonsmooth_figures::png(&svg, &directory.join("ball-on-plane.png"))?;
     let mut csv = String::from("start,law,facets,x_m,y_m,distance_m\n");
     for start in &starts {
         let [x, y] = end(&start.exact);
@@ -133,7 +131,7 @@ fn main() -> Result<(), String> {
             let _ = writeln!(csv, "{},{law},{facets},{x:.6},{y:.6},{far:.6}", start.name);
         }
     }
-    drawing::write(&directory.join("ball-on-plane.csv"), csv.as_bytes())?;
+    nonsmooth_figures::write(&directory.join("ball-on-plane.csv"), csv.as_bytes())?;
     println!("| law | launched: end (m) | off by (m) | from rest: end (m) | off by (m) |");
     println!("| --- | --- | --- | --- | --- |");
     for (a, b) in launched.ends().zip(rest.ends()) {

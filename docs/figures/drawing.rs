@@ -1,7 +1,4 @@
-//! Panels of curves side by side, as SVG and PNG.
-
-// Each example uses its part.
-#![allow(dead_code)]
+//! What the programs that make the documentation's figures share: panels of curves side by side, as SVG and PNG.
 
 use std::ops::Range;
 use std::path::Path;
@@ -16,22 +13,31 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 pub struct Curve {
     /// The entry of the legend; curves with the same label share it.
     pub label: String,
+    /// Of the line.
     pub colour: RGBColor,
+    /// Of the line, px of the design.
     pub width: u32,
+    /// Whether the line is dashed.
     pub dashed: bool,
     /// Whether a dot marks the last point.
     pub end: bool,
+    /// `(x, y)` in the units of the axes.
     pub points: Vec<(f64, f64)>,
 }
 
 /// A square panel.
 pub struct Panel {
+    /// Above it.
     pub title: String,
+    /// Of the two axes.
     pub labels: [&'static str; 2],
+    /// To the right.
     pub x: Axis,
+    /// Upwards.
     pub y: Axis,
     /// The texts of the ticks.
     pub texts: [fn(f64) -> String; 2],
+    /// Painted in this order.
     pub curves: Vec<Curve>,
 }
 
@@ -43,6 +49,8 @@ const TOP: u32 = 56 * FINE;
 const BOTTOM: u32 = 34 * FINE;
 
 /// The picture as SVG.
+///
+/// Errors: what the drawing library says.
 pub fn svg(title: &str, panels: &[Panel]) -> Result<String, String> {
     let mut text = String::new();
     let size = (SIDE * panels.len() as u32, TOP + SIDE + BOTTOM);
@@ -185,6 +193,8 @@ const FONTS: [&str; 6] =
     ["DejaVu Sans", "Liberation Sans", "Noto Sans", "Arial", "Helvetica", "Helvetica Neue"];
 
 /// The SVG as pixels, written to `path` as PNG.
+///
+/// Errors: no font without serifs, an SVG that cannot be read, a file that cannot be written.
 pub fn png(svg: &str, path: &Path) -> Result<(), String> {
     use resvg::{tiny_skia, usvg};
     let mut options = usvg::Options::default();
@@ -205,6 +215,8 @@ pub fn png(svg: &str, path: &Path) -> Result<(), String> {
 }
 
 /// Writes a file.
+///
+/// Errors: a file that cannot be written, by its path.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
     std::fs::write(path, bytes).map_err(|e| format!("{}: {e}", path.display()))
 }

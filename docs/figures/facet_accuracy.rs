@@ -1,18 +1,16 @@
 //! How far faceted friction is from Coulomb's law, against the number of facets: a table and a log–log plot.
 //!
-//! `cargo run --release -p nonsmooth-bench --example facet_accuracy -- [DIRECTORY]`
+//! `cargo run --release -p nonsmooth-figures --example facet_accuracy -- [DIRECTORY]`
 //!
 //! Writes `facet-accuracy.svg` and `facet-accuracy.csv` to the directory, by default docs/figures, and prints the table of docs/facets.md. A figure is the mean
 //! of the relative residual, by the friction problem's judge, over the problems of a family and four angles of the first facet.
-
-mod drawing;
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use drawing::{Curve, Panel};
 use nonsmooth_bench::draw::{Axis, Style};
+use nonsmooth_figures::{Curve, Panel};
 use nonsmooth_problem::planted::{Planted, PlantedMix};
 use nonsmooth_problem::{FrictionLocal, Problem};
 use nonsmooth_scenes::scenes::{Family, SlidingBox};
@@ -114,7 +112,7 @@ fn main() -> Result<(), String> {
             curves,
         });
     }
-    let svg = drawing::svg("How far faceted friction is from Coulomb's law", &panels)?;
-    drawing::write(&directory.join("facet-accuracy.svg"), svg.as_bytes())?;
-    drawing::write(&directory.join("facet-accuracy.csv"), csv.as_bytes())
+    let svg = nonsmooth_figures::svg("How far faceted friction is from Coulomb's law", &panels)?;
+    nonsmooth_figures::write(&directory.join("facet-accuracy.svg"), svg.as_bytes())?;
+    nonsmooth_figures::write(&directory.join("facet-accuracy.csv"), csv.as_bytes())
 }

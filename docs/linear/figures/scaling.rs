@@ -1,6 +1,6 @@
 //! Times against n of the methods for linear complementarity problems, as a table and a log–log plot.
 //!
-//! `cargo run --release -p nonsmooth-bench --example scaling -- [DIRECTORY]`
+//! `cargo run --release -p nonsmooth-figures --example scaling -- [DIRECTORY]`
 //!
 //! Two families with about half of the variables active: dense nonsymmetric positive definite M, and the obstacle problem (5-point Laplacian, sparse, symmetric). A
 //! method leaves a family after its first solve of more than two seconds. One thread; each figure is the faster of two solves to 1e-8, set-up included. With a
