@@ -241,3 +241,17 @@ fn a_proof_counts_as_solved_and_a_solution_in_its_place_is_worse() {
         assert!(all.worse && all.newly_unsolved.len() == 1, "{}", all.text());
     }
 }
+
+/// Files that were written before the residuals had the field's names.
+#[test]
+fn old_names_of_residuals_are_read() {
+    let mut runs = campaign("a");
+    let mut one = run("f/p", "A", 0.5);
+    (one.residuals.literature, one.residuals.siconos) = (Some(1e-9), Some(2e-9));
+    runs.runs = vec![one];
+    let text = runs.clone().text();
+    let old = text.replace("\"literature\"", "\"paper\"").replace("\"siconos\"", "\"peer\"");
+    assert!(text != old && old.contains("\"peer\":2e-9"), "{old}");
+    let read = Runs::parse(std::path::Path::new("old.jsonl"), &old).unwrap();
+    assert_eq!(read.runs, runs.runs);
+}
