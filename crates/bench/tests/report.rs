@@ -452,7 +452,7 @@ fn kinds_stay_apart_refusals_cost_nothing_and_proofs_count() {
     assert_eq!(browser.value(ended), json!(["stalled", "refused"]));
     assert_eq!(column(&mut browser, "summary", 7), json!(["1", "", ""]));
     let refusing = "document.querySelector('#filter-solvers details').textContent";
-    assert_eq!(browser.value(refusing), "1 take no problem of this kindlemke");
+    assert_eq!(browser.value(refusing), "1 takes no problem of this kindlemke");
 
     let linear = shown(&mut browser, &json!({"kind": "lcp"}), "profile-time");
     assert_eq!(curve(&linear, "lemke")["y"], json!([1]));

@@ -32,7 +32,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { title: "Solvers of frictional contact problems compared".into() }
+        Self { title: "Solvers compared".into() }
     }
 }
 

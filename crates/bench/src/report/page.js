@@ -371,7 +371,7 @@ function solverList() {
     return row;
   });
   return [h("legend", {}, "Solvers shown", " ", h("span", { class: "exports" }, all(true), all(false))), rows,
-    refusing.length ? h("details", { class: "note" }, h("summary", {}, `${refusing.length} take no problem of this kind`),
+    refusing.length ? h("details", { class: "note" }, h("summary", {}, `${refusing.length} ${refusing.length === 1 ? "takes" : "take"} no problem of this kind`),
       clean(refusing.map(labelOf).join(", "))) : null];
 }
 
