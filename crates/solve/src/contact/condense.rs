@@ -4,7 +4,7 @@
 //! `[M, −G; Gᵀ, 0]⁻¹`, so the local problem has none. Of the scalar rows those with bounds stay: `V = Hᵀ M⁻¹ G`, `R = Gᵀ M⁻¹ G`,
 //! `s = Gᵀ M⁻¹ f + b`. The way back recovers `(v, λ)` from r, and the λ of those rows, by one solve.
 //!
-//! Source: Acary, lecture (2)–(9). Cost: D solves per contact, then one product per pair of contacts that share
+//! Source: Acary, lecture (5). Cost: D solves per contact, then one product per pair of contacts that share
 //! a component of M. Storage: W. Fails where M is singular.
 
 use nonsmooth_linalg::{Csc, Delassus, Refine, budget};

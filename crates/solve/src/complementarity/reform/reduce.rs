@@ -5,7 +5,7 @@
 //!
 //! A certificate y of the LCP is one of the MLCP with `η = −A⁻ᵀ Dᵀ y` for the equalities: then `Aᵀη + Dᵀy = 0`, `Cᵀη + Bᵀy = Mᵀy`, `aᵀη + bᵀy = qᵀy`.
 //!
-//! Source: Acary, lecture (8)(9), with the reduced matrix corrected. Cost: one LU of A, one solve and one product with D a column of C. Storage: M, dense, and the
+//! Source: Acary, lecture (8) and the comment below it, with the reduced matrix corrected. Cost: one LU of A, one solve and one product with D a column of C. Storage: M, dense, and the
 //! problem's matrix. Fails where A is singular, as it is in most circuits: those are to be solved as they are.
 
 use nonsmooth_linalg::{Csc, Dense, Matrix, SquareLu};

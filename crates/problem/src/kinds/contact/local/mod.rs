@@ -25,7 +25,7 @@ use nonsmooth_linalg::{Bsr, Csc};
 /// | `rows` | `V`, `R`, `s` of FCLIB, and bounds | D·nc × p, p × p, p | |
 ///
 /// Each contact's entries are `[N, T]` (D = 2) or `[N, T1, T2]` (D = 3).
-/// Source: Acary, lecture (2)–(4); FCLIB `/fclib_local`.
+/// Source: Acary, lecture (3)(4), problem P_L; FCLIB `/fclib_local`.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(non_snake_case)]
 pub struct FrictionLocal<const D: usize> {
