@@ -25,6 +25,10 @@ fn main() {
         .map(|d| Trial::test(d.name.clone(), move || d.run()))
         .collect();
     trials.push(Trial::test("every command of the program is shown", || every_command(commands)));
+    trials.push(Trial::test("the tour of the lecture is complete", || {
+        the_tour_of_the_lecture_is_complete();
+        Ok(())
+    }));
     trials.push(Trial::test("documents are read as their readers read them", || {
         documents_are_read_as_their_readers_read_them();
         Ok(())
@@ -299,6 +303,65 @@ fn every_command(shown: Vec<String>) -> Result<(), Failed> {
         Ok(())
     } else {
         Err(format!("no document shows {}", missing.join(", ")).into())
+    }
+}
+
+/// Each of the lecture's equations has a row, each row a command or the reason why there is none, and what a command runs cites the lecture.
+fn the_tour_of_the_lecture_is_complete() {
+    let text = std::fs::read_to_string(root().join("docs/lecture.md")).unwrap();
+    let mut equations = BTreeSet::new();
+    for row in text
+        .lines()
+        .filter(|l| l.starts_with("| ") && !l.starts_with("| lecture ") && !l.starts_with("| ---"))
+    {
+        let cells: Vec<_> = row.trim_matches('|').split(" | ").map(str::trim).collect();
+        let [lecture, here, command, seen] = cells[..] else { panic!("four cells: {row}") };
+        let to_come = here.contains("comes with the nonlinear problems")
+            || here.contains("comes with the simulation");
+        assert_eq!(to_come, command == "–" && seen == "–", "{row}");
+        assert!(
+            to_come || command.starts_with("`nonsmooth ") && !here.is_empty() && !seen.is_empty(),
+            "{row}"
+        );
+        // (12), (74a) and ranges (33)–(45).
+        let number = |part: &str| {
+            part.trim_start_matches('(')
+                .split(|c: char| !c.is_ascii_digit())
+                .next()?
+                .parse::<usize>()
+                .ok()
+        };
+        let mut numbers = Vec::new();
+        for part in lecture.split_inclusive(')') {
+            let Some(at) = part.rfind('(') else { continue };
+            let Some(n) = number(&part[at..]) else { continue };
+            let first =
+                if part[..at].ends_with('–') { numbers.last().map_or(n, |l| l + 1) } else { n };
+            numbers.extend(first..=n);
+        }
+        equations.extend(numbers);
+    }
+    let missing: Vec<_> = (1..=124).filter(|n| !equations.contains(n)).collect();
+    assert!(missing.is_empty() && equations.len() == 124, "no row has {missing:?}");
+
+    let list: serde_json::Value =
+        serde_json::from_str(&Folder::new().run("list --json").exits(0).stdout).unwrap();
+    let citing: BTreeSet<&str> = ["solvers", "reformulations"]
+        .iter()
+        .flat_map(|k| list[k].as_array().unwrap())
+        .filter(|s| s["cites"].as_array().unwrap().iter().any(|c| c == "Acary2018"))
+        .map(|s| s["name"].as_str().unwrap().trim_end_matches('/'))
+        .collect();
+    let commands = commands(&text).unwrap();
+    let names = commands
+        .iter()
+        .flat_map(|c| c.line.split("--solver ").skip(1))
+        .map(|c| c.split([' ', ':']).next().unwrap());
+    for part in names.flat_map(|name| name.split('/')) {
+        assert!(
+            citing.contains(part),
+            "{part} is shown on the tour and does not cite Acary2018; {citing:?}"
+        );
     }
 }
 

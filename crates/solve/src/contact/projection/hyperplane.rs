@@ -13,7 +13,7 @@
 //!
 //! (in the metric of the methods: fields are divided by w_c).
 //!
-//! References: SolodovTseng1996 (residual); SolodovSvaiter1999 (field, projecting on the part of K behind the hyperplane);
+//! References: SolodovTseng1996 (residual); SolodovSvaiter1999 (field, projecting on the part of K behind the hyperplane); Acary, lecture, the variants of (105);
 //! AcaryBremondHuber2018, section on projection methods (field).
 //! Cost of a step: two products with W, more where the step is shortened. Storage: 4 vectors.
 //! Fails: as the extragradient method. With the normal F(r̄), which is not zero at open and sliding contacts, τ tends to zero: on planted
@@ -97,7 +97,7 @@ impl Described for Hyperplane {
         solves: Solves::Law,
         summary: "hyperplane projection with a self-adaptive prediction",
         needs: &[],
-        cites: &["SolodovTseng1996", "SolodovSvaiter1999", "AcaryBremondHuber2018"],
+        cites: &["SolodovTseng1996", "SolodovSvaiter1999", "AcaryBremondHuber2018", "Acary2018"],
         // normal=field is too slow for any problem that tests would run.
         variants: &["rule=khobotov"],
         settings: described::<Self>,

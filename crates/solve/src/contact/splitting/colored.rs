@@ -84,7 +84,7 @@ impl Described for Colored {
         solves: Solves::Law,
         summary: "nonsmooth block Gauss-Seidel on several threads, contacts by colour; the same bits for any number of threads",
         needs: &[],
-        cites: &["JourdanAlartJean1998", "JonesPlassmann1993"],
+        cites: &["JourdanAlartJean1998", "Acary2018", "JonesPlassmann1993"],
         variants: &["threads=2", "serial_below=1", "local=newton_ac"],
         settings: described::<Self>,
     };

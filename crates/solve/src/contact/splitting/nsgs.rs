@@ -143,6 +143,7 @@ impl Described for Nsgs {
         cites: &[
             "JourdanAlartJean1998",
             "Jean1999",
+            "Acary2018",
             "AcaryBremondHuber2018",
             "DBB11",
             "WalkerNi2011",

@@ -10,7 +10,7 @@
 //! `ĝ(a) − a = ĝ(−a)` for both, so `φ = y − P_ε(−z)`: the form without cancellation where z is inside L. Without friction it is
 //! the scalar function of `(r_N, ρ u_N)`, with `Φ_T = r_T`.
 //!
-//! Source: ChenMangasarian1996; FukushimaLuoTseng2001, section 4. In the unscaled coordinates:
+//! Source: ChenMangasarian1996; FukushimaLuoTseng2001, section 4; Acary, lecture, after (117). In the unscaled coordinates:
 //! docs/derivations/cone-functions.md.
 
 use schemars::JsonSchema;
@@ -81,7 +81,7 @@ impl NewtonFunction for ChenMangasarian {
     const METHOD: Named = Named {
         name: "newton_cm",
         summary: "smoothing Newton on the Chen-Mangasarian class over the second-order cone",
-        cites: &["ChenMangasarian1996", "FukushimaLuoTseng2001"],
+        cites: &["ChenMangasarian1996", "FukushimaLuoTseng2001", "Acary2018"],
         variants: &["kernel=neural_network"],
     };
 }
