@@ -1,4 +1,4 @@
-//! Does a solution exist? Of contact problems by the criterion ([`contact::existence`]), of complementarity problems by what is here.
+//! Does a solution exist? Of contact problems by the criterion ([`criterion`]), of complementarity problems by what is here.
 //!
 //! Method, the cheapest proof first: the class of M (with a P or strictly copositive matrix, and on a bounded box, every q has a solution); `auto`, whose proof of
 //! infeasibility or whose point it is; at that point the problem is a linear system, which is solved in fractions; few pairs are enumerated in exact arithmetic. A point that
@@ -13,7 +13,7 @@ use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::check::{Certificate, Evidence, ExactVector, Existence};
 use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, Friction, Problem};
 
-use crate::contact;
+use crate::contact::existence as criterion;
 use crate::core::exact_cones::{ExactCones, Found, is_representable};
 use crate::core::guard;
 use crate::{Limit, Limits, Solve, Status};
@@ -31,7 +31,7 @@ pub fn of(problem: &AnyProblem, limits: &Limits) -> Existence {
 
 /// As [`of`], of a contact problem.
 pub fn of_contacts(problem: &Friction, limits: &Limits) -> Existence {
-    contact::existence::of(problem, limits)
+    criterion::of(problem, limits)
 }
 
 /// As [`of`], of a complementarity problem.
