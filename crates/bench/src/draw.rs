@@ -124,6 +124,12 @@ impl Style {
         Self { colour: COLOURS[k % 8], dash, mark, width, shift: (k % 8) as u8 }
     }
 
+    /// The k-th of a few: colours alone, with dots that stand on the curve.
+    pub fn plain(k: usize) -> Self {
+        let colour = COLOURS[k % COLOURS.len()];
+        Self { colour, dash: None, mark: Some(Mark::Dot), width: 2, shift: 0 }
+    }
+
     /// The look of what bounds all solvers.
     pub fn bound() -> Self {
         Self { colour: RGBColor(150, 150, 150), dash: None, mark: None, width: 2, shift: 0 }

@@ -65,7 +65,17 @@ pub struct Scaling {
     pub curves: Vec<(String, Vec<(f64, f64)>)>,
 }
 
-/// Times against the number of unknowns, both logarithmic: a power of n is a straight line. A label looks the same in all panels.
+/// A family of solvers in [`scaling`], in panels of its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Family<'a> {
+    /// What they have in common.
+    pub title: &'a str,
+    /// Their labels.
+    pub labels: &'a [&'a str],
+}
+
+/// Times against the number of unknowns, both logarithmic: a power of n is a straight line. There is a row of panels for each family, a panel for
+/// each problem in it; `reference` is in all of them. Curves of no family are in the data alone.
 ///
 /// Errors: the drawing fails, or no point is positive.
 pub fn scaling(
@@ -73,47 +83,52 @@ pub fn scaling(
     title: &str,
     notes: &[String],
     all: &[Scaling],
+    families: &[Family],
+    reference: &str,
 ) -> Result<Figure, String> {
-    let mut labels: Vec<&String> = vec![];
-    for (label, _) in all.iter().flat_map(|panel| &panel.curves) {
-        if !labels.contains(&label) {
-            labels.push(label);
-        }
-    }
-    let style = |label: &String| {
-        labels.iter().position(|l| *l == label).map_or_else(Style::bound, Style::of)
-    };
-    let axis = |of: fn(&(f64, f64)) -> f64| {
-        let points = all.iter().flat_map(|panel| &panel.curves).flat_map(|(_, points)| points);
-        let logs = points.map(of).filter(|x| *x > 0.0).map(f64::log10);
+    type Curves<'a> = Vec<&'a (String, Vec<(f64, f64)>)>;
+    let axis = |curves: Curves, of: fn(&(f64, f64)) -> f64, step: f64| {
+        let logs = curves.iter().flat_map(|(_, p)| p).map(of).filter(|x| *x > 0.0).map(f64::log10);
         let (low, high) =
             logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-        let range = (low - 0.05).floor()..(high + 0.05).ceil();
+        let (low, high) = (((low - 0.05) / step).floor(), ((high + 0.05) / step).ceil());
+        let range = low * step..high * step;
         let ticks = decades(range.start, range.end, 9);
         (low <= high).then_some(Axis { range, ticks }).ok_or(format!("{name}: nothing to draw"))
     };
-    let (x, y) = (axis(|p| p.0)?, axis(|p| p.1)?);
-    let panel = |panel: &Scaling| Panel {
-        title: panel.title.clone(),
-        x: x.clone(),
-        y: y.clone(),
-        x_label: "unknowns n",
-        y_label: "time (s)",
-        x_text: ten_to,
-        y_text: ten_to,
-        series: panel
-            .curves
-            .iter()
-            .map(|(label, points)| Series {
-                style: style(label),
-                points: points.iter().map(|p| (p.0.log10(), p.1.log10())).collect(),
-            })
-            .collect(),
-    };
-    let panels: Vec<Panel> = all.iter().map(panel).collect();
-    let legend: Vec<_> = labels.iter().map(|l| ((*l).clone(), style(l))).collect();
+    let y = axis(all.iter().flat_map(|problem| &problem.curves).collect(), |p| p.1, 1.0)?;
+    let mut panels = vec![];
+    for family in families {
+        for problem in all {
+            let style = |label: &str| {
+                let place = family.labels.iter().position(|l| *l == label);
+                place.map_or_else(Style::bound, Style::plain)
+            };
+            let shown = |(label, _): &&(String, _)| {
+                label == reference || family.labels.contains(&label.as_str())
+            };
+            let curves: Curves = problem.curves.iter().filter(shown).collect();
+            panels.push(Panel {
+                title: format!("{}: {}", problem.title, family.title),
+                x: axis(problem.curves.iter().collect(), |p| p.0, 0.5)?,
+                y: y.clone(),
+                x_label: "unknowns n",
+                y_label: "time (s)",
+                x_text: ten_to,
+                y_text: ten_to,
+                legend: curves.iter().map(|(label, _)| (label.clone(), style(label))).collect(),
+                series: curves
+                    .iter()
+                    .map(|(label, points)| Series {
+                        style: style(label),
+                        points: points.iter().map(|p| (p.0.log10(), p.1.log10())).collect(),
+                    })
+                    .collect(),
+            });
+        }
+    }
     let mut svg = String::new();
-    sheet(&mut svg, title, notes, &panels, &legend).map_err(|e| format!("{name}: {e}"))?;
+    sheet(&mut svg, title, notes, &panels, &[]).map_err(|e| format!("{name}: {e}"))?;
     let rows = all.iter().flat_map(|panel| {
         panel.curves.iter().flat_map(move |(label, points)| {
             points.iter().map(move |(n, t)| {
@@ -154,6 +169,8 @@ struct Panel {
     x_text: fn(f64) -> String,
     y_text: fn(f64) -> String,
     series: Vec<Series>,
+    /// Entries of a legend in the upper left corner, where curves that rise leave room.
+    legend: Vec<(String, Style)>,
 }
 
 fn ten_to(x: f64) -> String {
@@ -246,6 +263,7 @@ impl<'a> Scene<'a> {
             y_label: "share of problems",
             x_text: if doubling { |x| tick(x.exp2()) } else { tick_of_decade },
             y_text: tick,
+            legend: vec![],
         };
         let mut rows = vec![];
         for curve in &curves {
@@ -279,6 +297,7 @@ impl<'a> Scene<'a> {
                 y_label: "share of problems",
                 x_text: ten_to,
                 y_text: tick,
+                legend: vec![],
                 series: self.series(curves, &x, f64::log10),
             })
             .collect();
@@ -320,6 +339,7 @@ impl<'a> Scene<'a> {
                 y_label: "share of problems",
                 x_text: |x| format!("1e-{x:.0}"),
                 y_text: tick,
+                legend: vec![],
                 series: shares_of
                     .map(|(solver, shares)| Series {
                         style: self.style(solver),
@@ -374,6 +394,7 @@ impl<'a> Scene<'a> {
                 y_label: "residual",
                 x_text: ten_to,
                 y_text: ten_to,
+                legend: vec![],
                 series: curves
                     .iter()
                     .map(|c| {
@@ -504,7 +525,10 @@ fn sheet(
     let rows = panels.len().div_ceil(columns.max(1)) as u32;
     let labels: Vec<String> = legend.iter().map(|(label, _)| cut(label)).collect();
     let longest = labels.iter().map(|l| l.chars().count()).max().unwrap_or(0);
-    let legend_width = 56 + (CHARACTER * longest as f64) as u32;
+    let legend_width = match longest {
+        0 => 0,
+        _ => 56 + (CHARACTER * longest as f64) as u32,
+    };
     let head_height = 40 + LINE * notes.len() as u32;
     let legend_height = LINE * legend.len() as u32 + 30;
     let height = if panels.len() > 1 { HEIGHT } else { legend_height.clamp(SINGLE.0, SINGLE.1) };
@@ -621,6 +645,12 @@ impl Panel {
             if points.len() > 1 {
                 line(area, &points, series.style)?;
             }
+        }
+        let left = Pos::new(HPos::Left, VPos::Center);
+        for (k, (label, style)) in (0..).zip(&self.legend) {
+            let y = 42 + 17 * k;
+            line(area, &[(74, y), (100, y)], *style)?;
+            area.draw_text(label, &font(12).pos(left), (107, y))?;
         }
         Ok(())
     }

@@ -107,7 +107,7 @@ fn picture(
 fn place(args: &Args) -> Result<PathBuf, String> {
     if let Some(out) = &args.out {
         if !files::is_stream(out) {
-            files::picture("--out", out)?;
+            files::picture("--out", out, &["svg"])?;
         }
         files::writable("--out", out)?;
         return Ok(out.clone());

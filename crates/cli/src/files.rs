@@ -218,15 +218,17 @@ pub fn left(limits: &Limits, begun: Instant) -> Limits {
     Limits { time_limit: limits.time_limit.map(|t| (t - spent).max(0.0)), ..limits.clone() }
 }
 
-/// A picture's name says what the picture is.
-pub fn picture(option: &str, path: &Path) -> Result<(), String> {
-    match path.extension() {
-        Some(e) if e.eq_ignore_ascii_case("svg") => Ok(()),
-        _ => Err(format!(
-            "{option} {}: expected a file name that ends in .svg, the one format there is",
-            path.display()
-        )),
+/// A picture's name says what the picture is: it ends in one of `extensions`.
+pub fn picture(option: &str, path: &Path, extensions: &[&str]) -> Result<(), String> {
+    let is = |end: &&str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(end));
+    if extensions.iter().any(is) {
+        return Ok(());
     }
+    let ends = match extensions {
+        [one] => format!(".{one}, the one format there is"),
+        several => several.iter().map(|e| format!(".{e}")).collect::<Vec<_>>().join(" or "),
+    };
+    Err(format!("{option} {}: expected a file name that ends in {ends}", path.display()))
 }
 
 /// A tolerance on the relative residual.

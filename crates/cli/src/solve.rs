@@ -567,7 +567,7 @@ impl Targets {
         {
             for path in all.iter().flatten() {
                 if option == "--plot" {
-                    files::picture(option, path)?;
+                    files::picture(option, path, &["svg"])?;
                 }
                 let mut taken = args.files.iter().chain(out.iter().flatten());
                 if taken.any(|other| files::same(path, other)) {

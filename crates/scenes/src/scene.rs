@@ -61,7 +61,7 @@ impl From<Polyhedron> for Obstacle {
 }
 
 /// A plane ground.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Ground {
     /// A point of the plane, m.
     pub point: Vec3,
@@ -74,6 +74,11 @@ pub struct Ground {
 impl Ground {
     /// The plane z = 0.
     pub const FLAT: Self = Self { point: [0.0; 3], normal: [0.0, 0.0, 1.0], along: X };
+
+    pub(crate) fn validate(&self) -> Result<(), SceneError> {
+        let across = norm(cross(self.normal, self.along));
+        require("ground", across, across > 0.0, "a normal and a direction across it")
+    }
 }
 
 impl Scene {
@@ -132,9 +137,8 @@ impl Scene {
     pub fn validate(&self) -> Result<(), SceneError> {
         positive("h", self.h)?;
         require("gravity", self.gravity.iter().sum(), true, "finite components")?;
-        if let Some(Ground { normal, along, .. }) = self.ground {
-            let across = norm(cross(normal, along));
-            require("ground", across, across > 0.0, "a normal and a direction across it")?;
+        if let Some(ground) = &self.ground {
+            ground.validate()?;
         }
         for (k, body) in self.bodies.iter().enumerate() {
             body.validate(&format!("bodies[{k}]"))?;

@@ -1,14 +1,15 @@
 //! Times against n of the methods for linear complementarity problems, as a table and a log–log plot.
 //!
-//! `cargo run --release -p nonsmooth-figures --example scaling -- [DIRECTORY]`
+//! `cargo run --release -p nonsmooth-figures --example scaling -- [DIRECTORY]` measures, `... -- --draw DIRECTORY` draws the times of `scaling.csv` in the directory
+//! again.
 //!
 //! Two families with about half of the variables active: dense nonsymmetric positive definite M, and the obstacle problem (5-point Laplacian, sparse, symmetric). A
 //! method leaves a family after its first solve of more than two seconds. One thread; each figure is the faster of two solves to 1e-8, set-up included. With a
 //! directory, `scaling.svg` and `scaling.csv` are written there.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use nonsmooth_bench::figures::{Scaling, scaling};
+use nonsmooth_bench::figures::{Family, Scaling, scaling};
 use nonsmooth_linalg::{Csc, Dense};
 use nonsmooth_problem::{Lcp, Problem};
 use nonsmooth_solve::registry;
@@ -110,8 +111,68 @@ fn family(title: &str, labels: &[&str], sizes: &[usize], make: fn(usize) -> Lcp)
     Scaling { title: title.into(), curves }
 }
 
+/// The families, one a row of panels.
+const FAMILIES: &[Family] = &[
+    Family {
+        title: "pivoting",
+        labels: &[
+            "lemke:basis=tableau",
+            "lemke:basis=dense",
+            "lemke:basis=sparse",
+            "keller",
+            "block_pivoting",
+        ],
+    },
+    Family {
+        title: "interior points, quadratic programs",
+        labels: &["ip_mehrotra", "ip_mty", "qp"],
+    },
+    Family { title: "semismooth Newton", labels: &["newton_min", "newton_fb"] },
+    Family { title: "splitting, projected gradients", labels: &["pgs", "psor", "mprgp"] },
+];
+
+/// The times that an earlier run kept.
+fn kept(path: &Path) -> Result<Vec<Scaling>, String> {
+    let bad = |e: csv::Error| format!("{}: {e}", path.display());
+    let mut all: Vec<Scaling> = vec![];
+    for row in csv::Reader::from_path(path).map_err(bad)?.deserialize() {
+        let (title, label, n, seconds): (String, String, f64, f64) = row.map_err(bad)?;
+        if all.last().is_none_or(|problem| problem.title != title) {
+            all.push(Scaling { title, curves: vec![] });
+        }
+        let curves = &mut all.last_mut().expect("one is there").curves;
+        if curves.last().is_none_or(|curve| curve.0 != label) {
+            curves.push((label, vec![]));
+        }
+        curves.last_mut().expect("one is there").1.push((n, seconds));
+    }
+    Ok(all)
+}
+
 fn main() -> Result<(), String> {
-    let directory = std::env::args().nth(1).map(PathBuf::from);
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let (panels, directory) = match &arguments[..] {
+        [] => (measured(), None),
+        [directory] => (measured(), Some(PathBuf::from(directory))),
+        [draw, directory] if draw == "--draw" => {
+            let directory = PathBuf::from(directory);
+            (kept(&directory.join("scaling.csv"))?, Some(directory))
+        }
+        other => return Err(format!("expected [--draw] DIRECTORY, found {}", other.join(" "))),
+    };
+    let notes = ["the faster of two solves to 1e-8, one thread, set-up included; a method leaves after its first solve of more than 2 s".to_owned()];
+    let title = "Linear complementarity: time against size";
+    let figure = scaling("scaling", title, &notes, &panels, FAMILIES, "auto")?;
+    if let Some(directory) = directory {
+        for (end, text) in [("svg", &figure.svg), ("csv", &figure.csv)] {
+            let path = directory.join(format!("scaling.{end}"));
+            std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))?;
+        }
+    }
+    Ok(())
+}
+
+fn measured() -> Vec<Scaling> {
     let on_dense = [
         "auto",
         "lemke:basis=tableau",
@@ -138,17 +199,8 @@ fn main() -> Result<(), String> {
         "psor",
         "mprgp",
     ];
-    let panels = [
+    vec![
         family("dense", &on_dense, &[10, 20, 50, 100, 200, 500, 1000, 2000], dense),
         family("obstacle", &on_sparse, &[4, 10, 32, 71, 100, 316, 1000], obstacle),
-    ];
-    let notes = ["the faster of two solves to 1e-8, one thread, set-up included; a method leaves after its first solve of more than 2 s".to_owned()];
-    let figure = scaling("scaling", "Linear complementarity: time against size", &notes, &panels)?;
-    if let Some(directory) = directory {
-        for (end, text) in [("svg", &figure.svg), ("csv", &figure.csv)] {
-            let path = directory.join(format!("scaling.{end}"));
-            std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))?;
-        }
-    }
-    Ok(())
+    ]
 }

@@ -8,9 +8,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use nonsmooth_io::ProblemFile;
-use nonsmooth_problem::check::Motion;
-use nonsmooth_problem::{AnyPoint, AnyProblem, AnyStatus, Problem};
-use nonsmooth_scenes::draw::{self, Drawing};
+use nonsmooth_problem::{AnyProblem, Problem};
+use nonsmooth_scenes::draw::Picture;
 use nonsmooth_scenes::{Scene, SceneEntry, SceneError, scenes::SCENES};
 use nonsmooth_solve::Limits;
 use nonsmooth_solve::registry;
@@ -18,6 +17,7 @@ use nonsmooth_solve::settings::{self, Setting, SettingsMap};
 
 use self::linear::Maker;
 use self::scene::{Form, plain, summary, told};
+use crate::plot::scene::{self as scene_plot, View};
 use crate::solve::{Plan, Solved, limits, seconds, solve, with_solution};
 use crate::{Exit, files, output, report};
 
@@ -50,9 +50,13 @@ pub struct Args {
     /// State it with the velocities of the bodies (M, H, f, w), or at the contacts alone (W, q)
     #[arg(long, value_enum, default_value_t = Form::Global)]
     form: Form,
-    /// Draw the scene (SVG); with --solve also the impulses, coloured by the status of the contact
-    #[arg(long, value_name = "FILE.svg", requires = "scene")]
+    /// Draw the scene, as .svg or as .html, a page that turns it in a browser, without a network; with --solve also the impulses, coloured by the status
+    /// of the contact
+    #[arg(long, value_name = "FILE", requires = "scene")]
     draw: Option<PathBuf>,
+    /// What the picture is to show well [default: forces, where bodies hide most of the impulses, else bodies]
+    #[arg(long, value_enum, requires = "draw")]
+    view: Option<View>,
     /// Solve the problem (default solver) and store its /solution
     #[arg(long, requires = "scene")]
     solve: bool,
@@ -78,6 +82,7 @@ Examples:
   nonsmooth gen --list
   nonsmooth gen wall --set rows=8 --set mu=0.4 --out wall.hdf5
   nonsmooth gen arch --out arch.hdf5 --form local --solve --draw arch.svg
+  nonsmooth gen sphere_pile --solve --draw pile.html
   nonsmooth gen lcp --set n=100 --set class=p --set degenerate=0.1 --out hard.toml
   nonsmooth gen --suite docs/benchmarks/suite.toml --out problems/
 
@@ -101,7 +106,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let settings = settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))?;
     let Some(label) = args.out.as_deref().or(args.draw.as_deref()) else {
         let (expected, found) = match made {
-            Made::Scene(_) => ("--out FILE.hdf5 or --draw FILE.svg", "neither"),
+            Made::Scene(_) => ("--out FILE.hdf5, --draw FILE.svg or --draw FILE.html", "neither"),
             Made::Linear(_) => ("--out FILE.toml", "none"),
         };
         return Err(format!("gen {name}: expected {expected}, found {found}"));
@@ -109,7 +114,9 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     for (option, path) in [("--out", &args.out), ("--draw", &args.draw)] {
         path.as_deref().map_or(Ok(()), |path| files::writable(option, path))?;
     }
-    args.draw.as_deref().map_or(Ok(()), |path| files::picture("--draw", path))?;
+    args.draw
+        .as_deref()
+        .map_or(Ok(()), |path| files::picture("--draw", path, scene_plot::EXTENSIONS))?;
     if let (Some(out), Some(draw)) = (&args.out, &args.draw)
         && files::same(out, draw)
     {
@@ -136,8 +143,9 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         files::write(path, format, &content)?;
     }
     if let (Some(path), Some(scene)) = (&args.draw, &scene) {
-        let svg = drawing(scene, solved.as_ref()).map_err(|e| format!("scene {name}: {e}"))?;
-        files::write_text("--draw", path, &svg)?;
+        let text = drawing(scene, solved.as_ref(), path, args.view);
+        let text = text.map_err(|e| format!("scene {name}: {e}"))?;
+        files::write_text("--draw", path, &text)?;
     }
     let mut text = said(label, scene.as_ref(), &content);
     if let Some(solved) = &solved {
@@ -237,31 +245,18 @@ fn solve_by_default(label: &Path, problem: &AnyProblem, limits: Limits) -> Resul
     solve(label, problem, None, &plan)
 }
 
-fn drawing(scene: &Scene, solved: Option<&Solved>) -> Result<String, SceneError> {
-    let Some(Solved { verdict, point, .. }) = solved else {
-        return draw::svg(scene, &Drawing::default());
+fn drawing(
+    scene: &Scene,
+    solved: Option<&Solved>,
+    path: &Path,
+    view: Option<View>,
+) -> Result<String, SceneError> {
+    let picture = Picture::new(scene)?;
+    let picture = match solved {
+        Some(solved) => scene_plot::solved(picture, &solved.point, &solved.verdict)?,
+        None => picture,
     };
-    // A scene's problem is one of contacts.
-    let motion = |status: &AnyStatus| match status {
-        AnyStatus::Contact(contact) => Some(contact.status),
-        AnyStatus::Row(_) => None,
-    };
-    let motions: Vec<_> = verdict.statuses.iter().filter_map(motion).collect();
-    let impulses = match point {
-        AnyPoint::Local(point) => Some(&point.r[..]),
-        AnyPoint::Global(point) => Some(&point.r[..]),
-        _ => None,
-    };
-    let count = |of: Motion| motions.iter().filter(|m| **m == of).count();
-    let (open, stick, slip) = (count(Motion::Open), count(Motion::Stick), count(Motion::Slip));
-    let caption = format!("impulses: {stick} stick, {slip} slip; {open} open");
-    let drawing = Drawing {
-        impulses,
-        motions: Some(&motions),
-        caption: Some(&caption),
-        ..Drawing::default()
-    };
-    draw::svg(scene, &drawing)
+    scene_plot::drawn(&picture, path, view)
 }
 
 /// What came of --solve.

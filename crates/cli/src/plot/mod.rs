@@ -1,6 +1,7 @@
 //! The history of a solve as a picture, and below it what the method recorded.
 
 pub mod problem;
+pub mod scene;
 mod trace;
 
 use nonsmooth_bench::draw::{Axis, GRID, INK, decades, font, tick, ticks};
@@ -18,6 +19,10 @@ const TOLERANCE: RGBColor = RGBColor(209, 80, 47);
 const DASHES: (i32, i32) = (6, 4);
 /// Points that a curve keeps: about two for each pixel.
 const KEPT: usize = 800;
+/// Samples that are so near, as a part of the panel's width, are joined whatever lies between them.
+const NEAR: f64 = 0.03;
+/// Of so many samples each has a mark.
+const MARKED: usize = 80;
 /// Decades that a picture shows at most.
 const DEPTH: f64 = 20.0;
 
@@ -185,18 +190,46 @@ impl<'a> Curves<'a> {
         let (dash, gap) = DASHES;
         chart.draw_series(DashedLineSeries::new(line, dash, gap, TOLERANCE.stroke_width(1)))?;
 
-        // The residual, in pieces where it was not finite.
-        for piece in points.split(|p| p.1.is_none()) {
-            let piece: Vec<_> = piece.iter().filter_map(|&(x, h)| Some((x, h?))).collect();
-            chart.draw_series(LineSeries::new(thinned(&piece, end), RESIDUAL.stroke_width(1)))?;
+        // The residual, in pieces where nobody looked or it was not finite; marks say where somebody did.
+        let known =
+            points.iter().zip(self.history).filter_map(|(&(x, h), s)| Some((x, h?, s.iteration)));
+        let known: Vec<_> = known.collect();
+        for piece in pieces(&known, end, first) {
+            let alone = piece.len() == 1;
+            let piece = thinned(&piece, end);
+            if alone || points.len() <= MARKED {
+                let dot = |&p: &(f64, f64)| Circle::new(p, 2, RESIDUAL.filled());
+                chart.draw_series(piece.iter().map(dot))?;
+            }
+            chart.draw_series(LineSeries::new(piece, RESIDUAL.stroke_width(1)))?;
         }
         let best = best(&points);
-        chart.draw_series(LineSeries::new(thinned(&best, end), BEST.stroke_width(2)))?;
+        chart.draw_series(LineSeries::new(stairs(&thinned(&best, end)), BEST.stroke_width(2)))?;
         // The point that is returned; the whole history where it is a single point.
         let last = best.iter().find(|p| Some(p.1) == best.last().map(|b| b.1));
         chart.draw_series(last.map(|&p| Circle::new(p, 3, BEST.filled())))?;
         Ok(())
     }
+}
+
+/// Samples that are joined by lines: `(x, height, iteration)` without the iterations. Where samples are far apart and steps lie between them, or, by time, a step
+/// took much longer than most (a stage of `auto` that the judge did not see), a line would show what nobody knows.
+fn pieces(samples: &[(f64, f64, usize)], end: f64, by_iterations: bool) -> Vec<Vec<(f64, f64)>> {
+    let mut gaps: Vec<f64> = samples.windows(2).map(|w| w[1].0 - w[0].0).collect();
+    gaps.sort_by(f64::total_cmp);
+    let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
+    let joined = |a: &(f64, f64, usize), b: &(f64, f64, usize)| {
+        let gap = b.0 - a.0;
+        let next = b.2 <= a.2 + 1;
+        gap <= NEAR * end || (next && (by_iterations || gap <= 4.0 * usual))
+    };
+    samples.chunk_by(joined).map(|piece| piece.iter().map(|s| (s.0, s.1)).collect()).collect()
+}
+
+/// A curve that keeps its height until the next point.
+fn stairs(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let corner = |w: &[(f64, f64)]| [(w[1].0, w[0].1), w[1]];
+    points.first().copied().into_iter().chain(points.windows(2).flat_map(corner)).collect()
 }
 
 /// The lowest height so far, from the first that is known.
@@ -269,6 +302,26 @@ mod tests {
     fn huge_histories_make_small_pictures() {
         let wild = (0..1_000_000).map(|k| (1.0 + f64::from(k % 7)) / (1.0 + f64::from(k)));
         assert!(picture(wild).len() < 200_000);
+    }
+
+    #[test]
+    fn no_line_spans_what_was_not_sampled() {
+        let cut = |samples: &[(f64, f64, usize)], by_iterations| -> Vec<usize> {
+            let end = samples.last().unwrap().0;
+            pieces(samples, end, by_iterations).iter().map(Vec::len).collect()
+        };
+        // Every iteration was seen, however few they are.
+        assert_eq!(cut(&[(0.0, 0.0, 0), (1.0, -1.0, 1), (2.0, -2.0, 2)], true), [3]);
+        // Lemke's method is seen at its ends.
+        assert_eq!(cut(&[(0.0, 0.0, 0), (200.0, -16.0, 200)], true), [1, 1]);
+        // A history that was thinned is dense all the same.
+        let thinned: Vec<_> = (0..100).map(|k| (f64::from(k), 0.0, 7 * k as usize)).collect();
+        assert_eq!(cut(&thinned, false), [100]);
+        // By time, one step was a stage of its own.
+        let stage = [(1.0, 0.0, 1), (2.0, 0.0, 2), (3.0, 0.0, 3), (20.0, -9.0, 4)];
+        assert_eq!(cut(&stage, false), [3, 1]);
+        assert_eq!(cut(&stage, true), [4]);
+        assert_eq!(stairs(&[(0.0, 0.0), (2.0, -1.0)]), [(0.0, 0.0), (2.0, 0.0), (2.0, -1.0)]);
     }
 
     #[test]

@@ -164,7 +164,11 @@ impl Panel {
             .draw()?;
         for Curve { colour, marks, points, .. } in &self.curves {
             let points: Vec<_> = points.iter().map(|&(x, y)| (x, self.height(y, low))).collect();
-            for piece in points.split(|p| p.1.is_none()) {
+            // Pivots and iterations are counted one by one: a jump is a stage of another method, or rows that are not there.
+            let next = |a: &(f64, Option<f64>), b: &(f64, Option<f64>)| {
+                *marks || (b.1.is_some() == a.1.is_some() && b.0 > a.0 && b.0 <= a.0 + 1.0)
+            };
+            for piece in points.chunk_by(next) {
                 let piece: Vec<_> = piece.iter().filter_map(|&(x, y)| Some((x, y?))).collect();
                 let piece = thinned(&piece, end);
                 let single = piece.len() == 1;

@@ -5,7 +5,7 @@ use crate::error::require;
 use crate::vec3::{Vec3, Z, add, cross, dot, normalise, scale, sub};
 
 /// Where a scene is seen from.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct View {
     /// Direction of the eye around the vertical, degrees from the x axis.
     pub azimuth: f64,
@@ -72,8 +72,12 @@ impl Camera {
     /// Pixels for a metre across the line of sight at `p`.
     pub fn magnification(&self, p: Vec3) -> f64 {
         // Points beside or behind the eye, in no sensible view, stay finite.
-        let depth = dot(sub(p, self.eye), self.forward).max(0.05 * self.distance);
-        self.scale * self.distance / depth
+        self.scale * self.distance / self.depth(p).max(0.05 * self.distance)
+    }
+
+    /// The distance along the line of sight.
+    pub fn depth(&self, p: Vec3) -> f64 {
+        dot(sub(p, self.eye), self.forward)
     }
 
     /// Scales and shifts so that `points` fill `width` but for `margin`; returns the height that they need.

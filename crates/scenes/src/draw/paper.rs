@@ -12,18 +12,24 @@ pub(super) fn shaded(colour: Colour, factor: f64) -> Colour {
     colour.map(|c| (factor * f64::from(c)).round().clamp(0.0, 255.0) as u8)
 }
 
-fn hex([r, g, b]: Colour) -> String {
+/// A colour on the way to white, which is 1.
+pub(super) fn paled(colour: Colour, part: f64) -> Colour {
+    colour.map(|c| (f64::from(c) + part * (255.0 - f64::from(c))).round() as u8)
+}
+
+pub(super) fn hex([r, g, b]: Colour) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
 /// A sign explained in the key, by its colour.
 pub(super) enum Mark {
-    Dot(&'static str),
-    Arrow(&'static str),
+    Dot(Colour),
+    Arrow(Colour),
+    Chain(Colour),
 }
 
-/// A grey for light and dark pages.
-pub(super) const GREY: &str = "#7d8792";
+/// The colour of texts, and of marks in the key that have several colours in the picture.
+pub(super) const GREY: Colour = [91, 101, 112];
 
 /// The size of the text, px, and the width of its letters on average.
 const TEXT: f64 = 14.0;
@@ -37,7 +43,7 @@ type Entry = (Mark, String);
 fn room(mark: &Mark) -> f64 {
     match mark {
         Mark::Dot(_) => 12.0,
-        Mark::Arrow(_) => 26.0,
+        Mark::Arrow(_) | Mark::Chain(_) => 26.0,
     }
 }
 
@@ -75,7 +81,8 @@ pub(super) struct Paper {
     width: f64,
     height: f64,
     title: String,
-    balls: Vec<Colour>,
+    /// The colours of balls, and how pale they are.
+    balls: Vec<(Colour, f64)>,
 }
 
 /// Writing to a string cannot fail.
@@ -112,21 +119,23 @@ impl Paper {
     }
 
     /// A sphere, lit from above left.
-    pub fn ball(&mut self, [x, y]: Point, r: f64, colour: Colour) {
-        let k = self.balls.iter().position(|&c| c == colour).unwrap_or_else(|| {
-            self.balls.push(colour);
+    pub fn ball(&mut self, [x, y]: Point, r: f64, colour: Colour, pale: f64) {
+        let look = (colour, pale);
+        let k = self.balls.iter().position(|&b| b == look).unwrap_or_else(|| {
+            self.balls.push(look);
             self.balls.len() - 1
         });
         put!(self, r#"<circle cx="{x:.1}" cy="{y:.1}" r="{r:.2}" fill="url(#ball{k})"/>"#);
     }
 
     /// A dot with a light rim, to be seen on dark and light faces; without one if it is small.
-    pub fn dot(&mut self, [x, y]: Point, r: f64, fill: &str, opacity: f64) {
+    pub fn dot(&mut self, [x, y]: Point, r: f64, fill: Colour, opacity: f64) {
         let rim = if r < 1.2 {
             String::new()
         } else {
             format!(r##" stroke="#fff" stroke-width="{:.2}""##, 0.3 * r)
         };
+        let fill = hex(fill);
         put!(
             self,
             r##"<circle cx="{x:.1}" cy="{y:.1}" r="{r:.2}" fill="{fill}"{rim} opacity="{opacity}"/>"##
@@ -134,7 +143,7 @@ impl Paper {
     }
 
     /// An arrow with a light rim; without one if it is small or the bodies are, of `size` px.
-    pub fn arrow(&mut self, from: Point, to: Point, size: f64, colour: &str, opacity: f64) {
+    pub fn arrow(&mut self, from: Point, to: Point, size: f64, colour: Colour, opacity: f64) {
         let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
         let length = dx.hypot(dy);
         // Seen from its tip it is a dot, which the contact or the body already is.
@@ -163,9 +172,30 @@ impl Paper {
         ];
         put!(
             self,
-            r##"<path fill="{colour}" opacity="{opacity}"{rim} d="{}"/>"##,
+            r##"<path fill="{}" opacity="{opacity}"{rim} d="{}"/>"##,
+            hex(colour),
             path(outline.into_iter())
         );
+    }
+
+    /// A line of this width with round ends, paler with its depth from 0 to 1, and a light rim if it is wide.
+    pub fn chain(
+        &mut self,
+        points: impl Iterator<Item = Point>,
+        width: f64,
+        colour: Colour,
+        depth: f64,
+    ) {
+        let d = path(points);
+        let d = d.trim_end_matches('Z');
+        // Not transparent: where chains cross, the nearer one is to be seen alone.
+        let colour = hex(paled(colour, 0.62 * depth));
+        let style =
+            format!(r#"fill="none" stroke-linecap="round" stroke-linejoin="round" d="{d}""#);
+        if width > 2.0 {
+            put!(self, r##"<path stroke="#fff" stroke-width="{:.1}" {style}/>"##, width + 1.4);
+        }
+        put!(self, r##"<path stroke="{colour}" stroke-width="{width:.1}" {style}/>"##);
     }
 
     /// A row of the key around the height `y`, in the middle.
@@ -175,6 +205,9 @@ impl Paper {
             match entry.0 {
                 Mark::Dot(colour) => self.dot([x + 4.0, y], 4.0, colour, 1.0),
                 Mark::Arrow(colour) => self.arrow([x, y], [x + 20.0, y], 0.0, colour, 1.0),
+                Mark::Chain(colour) => {
+                    self.chain([[x + 2.0, y], [x + 18.0, y]].into_iter(), 5.0, colour, 0.0);
+                }
             }
             self.text([x + room(&entry.0), y], "start", &entry.1);
             x += width(entry);
@@ -188,10 +221,10 @@ impl Paper {
 
     /// Text in [`GREY`].
     fn text(&mut self, [x, y]: Point, anchor: &str, text: &str) {
-        let (y, text) = (y + 0.35 * TEXT, escape(text));
+        let (y, text, fill) = (y + 0.35 * TEXT, escape(text), hex(GREY));
         put!(
             self,
-            r##"<text x="{x:.1}" y="{y:.1}" text-anchor="{anchor}" font-family="sans-serif" font-size="{TEXT}" fill="{GREY}">{text}</text>"##
+            r##"<text x="{x:.1}" y="{y:.1}" text-anchor="{anchor}" font-family="sans-serif" font-size="{TEXT}" fill="{fill}">{text}</text>"##
         );
     }
 
@@ -199,14 +232,15 @@ impl Paper {
         let (w, h) = (self.width.round(), self.height.round());
         let mut out = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {w} {h}\" width=\"{w}\" height=\"{h}\">\n\
-             <title>{}</title>\n",
+             <title>{}</title>\n\
+             <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
             self.title
         );
         if !self.balls.is_empty() {
             out += "<defs>\n";
-            for (k, &colour) in self.balls.iter().enumerate() {
+            for (k, &(colour, pale)) in self.balls.iter().enumerate() {
                 let stops = [(0, 1.1), (45, 0.95), (100, 0.56)].map(|(offset, factor)| {
-                    let colour = hex(shaded(colour, factor));
+                    let colour = hex(paled(shaded(colour, factor), pale));
                     format!(r#"<stop offset="{offset}%" stop-color="{colour}"/>"#)
                 });
                 out += &format!(
@@ -230,6 +264,6 @@ fn path(points: impl Iterator<Item = Point>) -> String {
     out + "Z"
 }
 
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

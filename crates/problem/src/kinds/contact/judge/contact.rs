@@ -1,12 +1,12 @@
 //! One contact: what the judge asks of a law, and Coulomb's answers from the definitions: distances to the cones, natural map, status.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::Coulomb;
 use nonsmooth_linalg::{Real, norm, norm_of, power_of_two, small};
 
 /// What a contact does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Motion {
     /// No impulse, separating: `r = 0`.
