@@ -123,6 +123,7 @@ fn parts(file: &ProblemFile, kept: Option<&ProblemFile>) -> Vec<(&'static str, b
         bodies(file).then(|| ("velocities of the bodies", has(bodies))),
         multipliers(file).then(|| ("multipliers", has(multipliers))),
         (!file.guesses.is_empty()).then(|| ("guesses", has(|f| !f.guesses.is_empty()))),
+        file.drawing.is_some().then(|| ("drawing of the bodies", has(|f| f.drawing.is_some()))),
         info(|i| i.title.is_some(), "title"),
         info(|i| i.description.is_some(), "description"),
         info(|i| i.math_info.is_some(), "remarks on the mathematics"),

@@ -6,26 +6,34 @@ use std::time::Instant;
 use nonsmooth_io::ProblemFile;
 use nonsmooth_problem::check::Judged;
 use nonsmooth_problem::{AnyPoint, AnyProblem};
+use nonsmooth_scenes::SceneError;
+use nonsmooth_scenes::draw::Picture;
 use nonsmooth_solve::registry;
 use nonsmooth_solve::settings::SettingsMap;
 
 use crate::kinds::AnyVerdict;
 use crate::plot::problem::{Solution, svg};
+use crate::plot::scene as scene_plot;
 use crate::solve::{Plan, limits, solve};
 use crate::{Exit, files, output, report};
 
-/// Draw a problem: the entries of its matrices, and of contacts the sizes of the impulses and where they lie in their friction cones.
+/// Draw a problem: its bodies with the impulses, where the file has bodies; else the entries of its matrices, and of contacts the sizes of the impulses and where they
+/// lie in their friction cones.
 ///
-/// The impulses are those of the file's solution; where there is none, the problem is solved first. Bodies are not in files of problems:
-/// `nonsmooth gen SCENE --draw` draws them.
+/// The impulses are those of the file's solution; where there is none, the problem is solved first. Files that `nonsmooth gen SCENE` has written hold
+/// bodies, and keep them through `solve --out` and `convert`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     #[arg(value_name = "FILE", help = files::help("A file with a problem", |_| true))]
     file: PathBuf,
-    /// The picture (SVG); `-` for the standard output [default: the file's name with .svg, unless that is there already]
-    #[arg(long, value_name = "FILE.svg")]
+    /// The picture, as .svg or, of bodies, as .html, a page that turns them in a browser, without a network; `-` for the standard output [default: the file's name
+    /// with .svg, unless that is there already]
+    #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// What the picture is to show well [default: bodies or forces, whichever shows more, if the file has bodies, else matrices]
+    #[arg(long, value_enum)]
+    view: Option<View>,
     /// Solve the problem even if the file has a solution
     #[arg(long)]
     solve: bool,
@@ -40,7 +48,8 @@ pub struct Args {
 const EXAMPLES: &str = "\
 Examples:
   nonsmooth draw wall.hdf5
-  nonsmooth draw solved.hdf5 --out forces.svg
+  nonsmooth draw solved.hdf5 --out forces.svg --view forces
+  nonsmooth draw solved.hdf5 --out view.html
 
 Exit codes: 0 drawn; 1 drawn with the best point of a problem that is not solved; 2 a mistake in a file or an option.";
 
@@ -50,6 +59,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let out = place(args)?;
     let limits = limits(args.tol, None, Some(args.time_limit))?;
     let content = files::read(file)?;
+    let scene = scene(args, &content, &out)?;
     let contacts = matches!(content.problem, AnyProblem::Friction(_));
     let stored = content.solution.as_ref().filter(|_| contacts && !args.solve);
     let found = match stored {
@@ -73,7 +83,11 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         }
         None => None,
     };
-    let text = picture(&content, found.as_ref())?;
+    let text = match scene {
+        Some(picture) => bodies(picture, found.as_ref(), &out, args.view)
+            .map_err(|e| format!("{}: /nonsmooth/drawing: {e}", file.display()))?,
+        None => picture(&content, found.as_ref())?,
+    };
     let mut said = format!("{}: {}\n", out.display(), report::problem_text(&content.problem));
     if let Some((_, verdict, says)) = &found {
         report::row(&mut said, "solution", says);
@@ -87,6 +101,54 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         output::print(&said);
     }
     Ok(Exit::solved(found.is_none_or(|(_, verdict, _)| verdict.solved)))
+}
+
+/// What the picture is to show well.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum View {
+    /// Bodies, with an arrow for each impulse
+    Bodies,
+    /// Impulses as force chains, as wide as they are large, in front of pale bodies
+    Forces,
+    /// The entries of the matrices, the sizes of the impulses, the friction cones
+    Matrices,
+}
+
+/// The bodies of the file, if they are to be drawn.
+fn scene(args: &Args, content: &ProblemFile, out: &Path) -> Result<Option<Picture>, String> {
+    let page = out.extension().is_some_and(|e| e.eq_ignore_ascii_case("html"));
+    let place = args.file.display();
+    match (&content.drawing, args.view) {
+        (_, Some(View::Matrices)) if page => {
+            Err(format!("--view matrices: expected --out FILE.svg, found {}", out.display()))
+        }
+        (_, Some(View::Matrices)) => Ok(None),
+        (None, view) if page || view.is_some() => Err(format!(
+            "{place}: expected a file with bodies, as nonsmooth gen SCENE writes it, found a problem alone"
+        )),
+        (None, _) => Ok(None),
+        (Some(drawing), _) => Picture::from_json(drawing)
+            .map(Some)
+            .map_err(|e| format!("{place}: /nonsmooth/drawing: {e}")),
+    }
+}
+
+fn bodies(
+    picture: Picture,
+    found: Option<&(AnyPoint, AnyVerdict, String)>,
+    out: &Path,
+    view: Option<View>,
+) -> Result<String, SceneError> {
+    let picture = match found {
+        Some((point, verdict, _)) => scene_plot::solved(picture, point, verdict)?,
+        None => picture,
+    };
+    let view = match view {
+        Some(View::Bodies) => Some(scene_plot::View::Bodies),
+        Some(View::Forces) => Some(scene_plot::View::Forces),
+        Some(View::Matrices) | None => None,
+    };
+    scene_plot::drawn(&picture, out, view)
 }
 
 fn picture(
@@ -107,7 +169,7 @@ fn picture(
 fn place(args: &Args) -> Result<PathBuf, String> {
     if let Some(out) = &args.out {
         if !files::is_stream(out) {
-            files::picture("--out", out, &["svg"])?;
+            files::picture("--out", out, scene_plot::EXTENSIONS)?;
         }
         files::writable("--out", out)?;
         return Ok(out.clone());

@@ -156,7 +156,7 @@ fn conversion_keeps_what_it_can_and_says_what_is_lost() {
 #[test]
 fn problems_are_drawn() {
     let folder = folder();
-    folder.run("draw wall.hdf5").exits(0);
+    folder.run("draw wall.hdf5 --view matrices").exits(0);
     let svg = std::fs::read_to_string(folder.path("wall.svg")).unwrap();
     for part in ["M: ", "H: ", "Normal impulses", "r_T / (mu r_N)", "solved by auto"] {
         assert!(svg.contains(part), "{part}");
@@ -166,7 +166,37 @@ fn problems_are_drawn() {
     let text = folder.run("draw box.hdf5 --out forces.svg").exits(0).stdout;
     assert!(text.contains("stored solution, passes"), "{text}");
     folder.run("draw three.toml --out m.svg").exits(0);
-    folder.run("draw wall.hdf5 --out a.png").refused(&["--out a.png", ".svg"]);
+    folder.run("draw wall.hdf5 --out a.png").refused(&["--out a.png", ".svg or .html"]);
+}
+
+#[test]
+fn files_of_scenes_hold_their_bodies() {
+    let folder = Folder::new();
+    let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
+    folder.run("gen sphere_pile --set count=30 --out pile.hdf5 --solve --draw pile.svg").exits(0);
+    folder.run("draw pile.hdf5 --out again.svg").exits(0);
+    // The same picture, but for numbers that the file has in single precision.
+    let count = |text: &str| text.matches("stroke-linecap").count();
+    assert!(count(&read("pile.svg")) > 40);
+    assert_eq!(count(&read("pile.svg")), count(&read("again.svg")));
+    folder.run("draw pile.hdf5 --out bodies.svg --view bodies").exits(0);
+    assert_eq!(count(&read("bodies.svg")), 0);
+    // Bodies pass through a solve and a conversion, and a table has no room for them.
+    folder.run("solve pile.hdf5 --out solved.hdf5").exits(0);
+    let text = folder.run("convert solved.hdf5 copy.h5").exits(0).stdout;
+    assert!(text.contains("drawing of the bodies") && !text.contains("lost"), "{text}");
+    folder.run("draw copy.h5 --out view.html").exits(0);
+    assert!(read("view.html").starts_with("<!DOCTYPE html>"));
+    let text = folder.run("convert solved.hdf5 copy.csv").exits(0).stdout;
+    assert!(text.lines().any(|l| l.contains("lost") && l.contains("drawing of the bodies")));
+    folder.run("draw pile.hdf5 --view matrices --out a.html").refused(&["--view", "a.html"]);
+    std::fs::write(folder.path("three.toml"), THREE).unwrap();
+    folder.run("draw three.toml --view bodies --out a.svg").refused(&["three.toml", "with bodies"]);
+    folder.run("gen wall --draw a.svg --view forces").refused(&["view", "impulses", "none"]);
+    folder.run("gen wall --solve --draw w.svg --view forces").exits(0);
+    assert!(count(&read("w.svg")) > 10);
+    folder.run("gen wall --solve --draw wall.html").exits(0);
+    assert!(read("wall.html").contains("\"status\":\"stick\""));
 }
 
 #[test]

@@ -19,6 +19,8 @@ pub struct ProblemFile {
     pub solution: Option<StoredPoint>,
     /// Points to start from.
     pub guesses: Vec<StoredPoint>,
+    /// What a drawing needs besides the problem, as text that this crate does not read: bodies and where they touch, as `nonsmooth-scenes` writes them.
+    pub drawing: Option<String>,
 }
 
 /// What the author of a file says about its problem. `None`: not in the file. Formats keep as much of it as they have places for.
@@ -53,7 +55,13 @@ pub struct StoredPoint {
 impl ProblemFile {
     /// A file with the problem alone.
     pub fn new(problem: impl Into<AnyProblem>) -> Self {
-        Self { problem: problem.into(), info: Info::default(), solution: None, guesses: vec![] }
+        Self {
+            problem: problem.into(),
+            info: Info::default(),
+            solution: None,
+            guesses: vec![],
+            drawing: None,
+        }
     }
 
     /// Reads a file of any format in [`FORMATS`](crate::FORMATS). The extension says which; of names without a known one, the first bytes.

@@ -84,6 +84,7 @@ fn contents() -> [ProblemFile; 2] {
     local.info.title = Some("a title".into());
     local.info.math_info = Some(String::new());
     local.info.dofs = Some(12);
+    local.drawing = Some("{\"größer\": 1}".into());
     let mut global = ProblemFile::new(Friction::Global3(global()));
     // M is no matter here: u overflows where v meets f64::MAX.
     let point = stored(Some(AWKWARD[..5].into()), vec![0.5; 3], vec![1.0, 0.0, -0.0], vec![0.1]);

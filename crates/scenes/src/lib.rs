@@ -3,7 +3,7 @@
 //!
 //! A [`Scene`] holds [`RigidBody`]s, [`ElasticBox`]es and [`Contact`]s; [`Scene::problem`] states the Moreau–Jean
 //! step as a global problem and [`Scene::condensed`] as a local one. [`scenes`] has families of scenes by name
-//! ([`SCENES`]), and [`draw::svg`] draws any scene. A contact may be with the periodic image of a body or with a
+//! ([`SCENES`]), [`draw::svg`](draw::svg()) draws any scene, and [`draw::html`](draw::html()) makes a page that turns it. A contact may be with the periodic image of a body or with a
 //! moving wall ([`Image`]). SI units throughout: m, kg, s, rad.
 //!
 //! Scenes are made, not simulated. Packings are relaxed: overlap energy under a weight that fades, a last stage without weight, then an exact blow-up, so that nothing

@@ -131,6 +131,9 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         false => None,
     };
     let (scene, mut content) = made.make(&settings, args.form)?;
+    let drawn = |e: SceneError| format!("scene {name}: {e}");
+    let picture = scene.as_ref().map(Picture::new).transpose().map_err(drawn)?;
+    content.drawing = picture.as_ref().map(Picture::json);
     let kind = content.problem.kind();
     let format = |path| files::target_format("--out", path, None, kind, None);
     let out = args.out.as_deref().map(|path| Ok::<_, String>((path, format(path)?))).transpose()?;
@@ -142,9 +145,8 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     if let Some((path, format)) = out {
         files::write(path, format, &content)?;
     }
-    if let (Some(path), Some(scene)) = (&args.draw, &scene) {
-        let text = drawing(scene, solved.as_ref(), path, args.view);
-        let text = text.map_err(|e| format!("scene {name}: {e}"))?;
+    if let (Some(path), Some(picture)) = (&args.draw, picture) {
+        let text = drawing(picture, solved.as_ref(), path, args.view).map_err(drawn)?;
         files::write_text("--draw", path, &text)?;
     }
     let mut text = said(label, scene.as_ref(), &content);
@@ -246,12 +248,11 @@ fn solve_by_default(label: &Path, problem: &AnyProblem, limits: Limits) -> Resul
 }
 
 fn drawing(
-    scene: &Scene,
+    picture: Picture,
     solved: Option<&Solved>,
     path: &Path,
     view: Option<View>,
 ) -> Result<String, SceneError> {
-    let picture = Picture::new(scene)?;
     let picture = match solved {
         Some(solved) => scene_plot::solved(picture, &solved.point, &solved.verdict)?,
         None => picture,

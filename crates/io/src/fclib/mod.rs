@@ -13,10 +13,12 @@
 //! /solution    v (n, global only)            info/          texts
 //!              u, r (m), l (p)
 //! /guesses     number_of_guesses, 1/, 2/, ... each like /solution
+//! /nonsmooth   drawing
 //! ```
 //!
 //! with m = spacedim · nc; V, R, s and G, b come together or not at all. Scalar rows that are no bilateral constraints have `vectors/lower` and `vectors/upper` (p each,
-//! infinities allowed) beside s or b: an addition of ours, which other readers of FCLIB do not see. A matrix is a group of `m`, `n`,
+//! infinities allowed) beside s or b: an addition of ours, which other readers of FCLIB do not see. So is the group `/nonsmooth`, whose text `drawing` says what
+//! the bodies look like ([`ProblemFile::drawing`]). A matrix is a group of `m`, `n`,
 //! `nz`, `nzmax`, `p`, `i`, `x`, zero-based: triplets with row `i`, column `p` (`nz ≥ 0` entries), compressed
 //! columns (`nz = -1`) or compressed rows (`nz = -2`). All three are read, in any order, duplicates added in
 //! the order of the file; triplets are written, because other readers of global files know nothing else.
@@ -38,6 +40,8 @@ use crate::hdf5::is_hdf5;
 use crate::{Format, IoError, ProblemFile, StoredPoint};
 
 const SOLUTION: &str = "/solution";
+/// The group of our own and the text in it.
+const DRAWING: (&str, &str) = ("nonsmooth", "drawing");
 const KINDS: &[Kind] =
     &[Kind::FrictionLocal2d, Kind::FrictionLocal3d, Kind::FrictionGlobal2d, Kind::FrictionGlobal3d];
 

@@ -9,7 +9,7 @@ use nonsmooth_problem::{
     RowsGlobal, RowsLocal,
 };
 
-use super::{Sizes, check_finite, check_vector, group, invalid};
+use super::{DRAWING, Sizes, check_finite, check_vector, group, invalid};
 use crate::error::one_line;
 use crate::hdf5::{self, Dataset, Fault, File, Group, Link, Object, Type};
 use crate::{Info, IoError, ProblemFile, StoredPoint};
@@ -31,7 +31,9 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<ProblemFile, IoError> {
     let info = info(&root.need(&group(&problem)[1..])?)?;
     let sizes = Sizes::of(&problem);
     let solution = root.folder("solution")?.map(|g| point(&g, sizes)).transpose()?;
-    let mut file = ProblemFile { info, solution, ..ProblemFile::new(problem) };
+    let ours = root.folder(DRAWING.0)?.map(|g| g.text(DRAWING.1)).transpose()?;
+    let drawing = ours.flatten();
+    let mut file = ProblemFile { info, solution, drawing, ..ProblemFile::new(problem) };
     if let Some(guesses) = root.folder("guesses")? {
         let number = guesses.int("number_of_guesses")?;
         if number < 0 {

@@ -15,7 +15,7 @@ use nonsmooth_problem::{
     AnyPoint, AnyProblem, Bounds, Friction, FrictionGlobal, FrictionLocal, Problem,
 };
 
-use super::{SOLUTION, Sizes, check_vector, group, guarded, invalid, read};
+use super::{DRAWING, SOLUTION, Sizes, check_vector, group, guarded, invalid, read};
 use crate::format::bytes as bytes_of;
 use crate::hdf5::{Dataset, Group, Link, Object, Type};
 use crate::replace::{WRITABLE, check_target, replace};
@@ -62,6 +62,9 @@ fn build(path: &Path, content: &ProblemFile) -> Result<FileBuilder, IoError> {
             let mut guesses = content.guesses.iter().enumerate();
             guesses.try_for_each(|(k, x)| g.child(&(k + 1).to_string(), |g| point(g, x, problem)))
         })?;
+    }
+    if let Some(drawing) = &content.drawing {
+        top(&format!("/{}", DRAWING.0), &|g| g.text(DRAWING.1, drawing))?;
     }
     Ok(file)
 }

@@ -133,9 +133,13 @@ pub fn sizes(problem: &AnyProblem) -> (Option<usize>, usize, usize) {
 pub fn content() -> impl Strategy<Value = ProblemFile> {
     (problem(), info()).prop_flat_map(|(problem, info)| {
         let sizes = sizes(&problem);
-        (option::of(point(sizes)), vec(point(sizes), 0..12)).prop_map(move |(solution, guesses)| {
-            ProblemFile { problem: problem.clone(), info: info.clone(), solution, guesses }
-        })
+        let drawing = option::of("[^\0]*");
+        (option::of(point(sizes)), vec(point(sizes), 0..12), drawing).prop_map(
+            move |(solution, guesses, drawing)| {
+                let (problem, info) = (problem.clone(), info.clone());
+                ProblemFile { problem, info, solution, guesses, drawing }
+            },
+        )
     })
 }
 
