@@ -139,7 +139,10 @@ fn conversion_keeps_what_it_can_and_says_what_is_lost() {
     assert!(text.contains("lost       names of the variables"), "{text}");
     let text = folder.run("convert solved.hdf5 table.csv").exits(0).stdout;
     let lost = text.lines().find(|l| l.trim_start().starts_with("lost")).unwrap();
-    assert!(lost.contains("problem, velocities of the bodies, drawing of the bodies, title"), "{text}");
+    assert!(
+        lost.contains("problem, velocities of the bodies, drawing of the bodies, title"),
+        "{text}"
+    );
     folder.run("convert GFC3D_one.dat one.hdf5").exits(0);
     folder.run("solve one.hdf5").exits(0);
     for (arguments, parts) in [

@@ -298,12 +298,15 @@ fn expected_dump(content: &ProblemFile) -> String {
         point(&format!("/guesses/{}", k + 1), guess);
     }
     let info = &content.info;
-    for (name, text) in
-        [("title", &info.title), ("description", &info.description), ("math_info", &info.math_info)]
-    {
+    let texts = [
+        (format!("{root}/info/title"), &info.title),
+        (format!("{root}/info/description"), &info.description),
+        (format!("{root}/info/math_info"), &info.math_info),
+        ("/nonsmooth/drawing".into(), &content.drawing),
+    ];
+    for (path, text) in texts {
         if let Some(text) = text {
             let encoding = if text.is_ascii() { "ascii" } else { "utf-8" };
-            let path = format!("{root}/info/{name}");
             let line = format!("{path} {encoding}{} () {}", text.len() + 1, hex(text.bytes()));
             lines.push(line.trim_end().into());
         }
