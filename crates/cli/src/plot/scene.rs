@@ -36,7 +36,7 @@ pub fn solved(
     let r = match point {
         AnyPoint::Local(point) => &point.r,
         AnyPoint::Global(point) => &point.r,
-        AnyPoint::Lcp(_) | AnyPoint::Hlcp(_) => return Ok(picture),
+        _ => return Ok(picture),
     };
     picture.with(&Answer { r, u: Some(&verdict.velocity), motions: Some(&motions) })
 }

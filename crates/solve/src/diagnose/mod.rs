@@ -222,7 +222,10 @@ fn solving<P: Registered + Judged<Status: 'static> + OfAny>(
         if left <= 0.0 || solving.len() >= MOST_INSTEAD {
             break;
         }
-        let limits = Limits { time_limit: Some(left.min(0.25 * INSTEAD)), ..limits.clone() };
+        // The caller's iterations are of another method.
+        let max_iterations = Limits::default().max_iterations;
+        let time_limit = Some(left.min(0.25 * INSTEAD));
+        let limits = Limits { time_limit, max_iterations, trace: false, ..limits.clone() };
         let answer = Solve::new().solver(&name).limits(limits).run(problem);
         if answer.is_ok_and(|a| a.is_solved()) && !solving.contains(&name) {
             solving.push(name);
