@@ -287,8 +287,6 @@ fn mistakes_are_named() {
         ("solve box.hdf5 --warm-start=string.toml", &["--warm-start", "string.toml"]),
         ("solve string.toml --trace string.toml", &["--trace", "a file of its own"]),
         ("solve string.toml --trace a.svg --plot a.svg", &["--trace", "that of --plot"]),
-        ("exists string.toml", &["string.toml: expected a frictional contact problem"]),
-        ("diagnose string.toml", &["string.toml: expected a frictional contact problem"]),
     ];
     for (arguments, parts) in cases {
         folder.run(arguments).refused(parts);

@@ -61,12 +61,10 @@ fn what_is_planted_without_one_has_none() {
             let problem: AnyProblem = case.infeasible().unwrap().0.into();
             let existence = decided(problem.clone());
             check_solution(&problem, &existence);
-            // Entries are rounded once, so that there may be a solution after all, which no double holds.
-            let fine = match &existence {
-                Existence::Solved { representable, .. } => !representable,
-                other => ["no_solution", "nearly_no_solution", "unknown"].contains(&other.name()),
-            };
-            assert!(fine, "{class:?} {n}: {existence}");
+            // Entries are rounded once, so that there may be a solution after all, a huge one: then it is verified.
+            let none = ["no_solution", "nearly_no_solution", "unknown"].contains(&existence.name());
+            let exact = matches!(existence, Existence::Solved { .. });
+            assert!(none || exact, "{class:?} {n}: {existence}");
         }
     }
 }
