@@ -16,7 +16,7 @@ use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, Friction, Problem
 use crate::contact::existence as criterion;
 use crate::core::exact_cones::{ExactCones, Found, is_representable};
 use crate::core::guard;
-use crate::{Limit, Limits, Solve, Status};
+use crate::{Limits, Solve, Status};
 
 pub use crate::contact::existence::{decide, glance, glance_at};
 
@@ -36,18 +36,26 @@ pub fn of_contacts(problem: &Friction, limits: &Limits) -> Existence {
 
 /// As [`of`], of a complementarity problem.
 pub fn of_complementarity(problem: &Complementarity, limits: &Limits) -> Existence {
-    let copy = problem.clone();
-    let decided = guard::run(limits, || {}, move |limits| decided(&copy, limits));
-    decided.unwrap_or_else(late)
+    classified(problem, None, limits)
 }
 
-/// What is said where a limit came first.
-fn late(limit: Limit) -> Existence {
-    let why = match limit {
-        Limit::Cancelled => "it was cancelled",
-        Limit::Time | Limit::Iterations => "the time limit came first",
-    };
-    Existence::Unknown { why: why.into() }
+/// As [`of_complementarity`]; `known`: the [`classes`] of the problem's matrix, where somebody has asked for them before.
+pub(crate) fn classified(
+    problem: &Complementarity,
+    known: Option<Classes>,
+    limits: &Limits,
+) -> Existence {
+    let copy = problem.clone();
+    let decided = guard::run(limits, || {}, move |limits| decided(&copy, known, limits));
+    decided.unwrap_or_else(criterion::late)
+}
+
+/// The classes of a matrix, as far as they cost no more than a solve.
+pub(crate) fn classes(m: &Matrix) -> Classes {
+    match m.nrows() {
+        0..=MANY => Classes::of(m, Effort::default()),
+        _ => Classes::quick(m),
+    }
 }
 
 /// Rows above which a class is not asked for more than a glance.
@@ -58,10 +66,10 @@ const WORK: u64 = 1_000_000_000;
 /// Pairs up to which all cases are enumerated.
 const PAIRS: usize = 20;
 
-fn decided(linear: &Complementarity, limits: &Limits) -> Existence {
+fn decided(linear: &Complementarity, known: Option<Classes>, limits: &Limits) -> Existence {
     let begun = Instant::now();
     let _scope = limits.budget(begun).enter();
-    if let Some(by_class) = by_class(linear) {
+    if let Some(by_class) = by_class(linear, known) {
         return by_class;
     }
     let problem = AnyProblem::Complementarity(linear.clone());
@@ -90,7 +98,7 @@ fn decided(linear: &Complementarity, limits: &Limits) -> Existence {
     }
     match (nearly, limits.reached(begun)) {
         (Some(nearly), _) => nearly,
-        (None, Some(limit)) => late(limit),
+        (None, Some(limit)) => criterion::late(limit),
         (None, None) => Existence::Unknown {
             why: "no solver found a solution, none proved that there is none, and there are too many cases to enumerate".into(),
         },
@@ -101,13 +109,10 @@ fn decided(linear: &Complementarity, limits: &Limits) -> Existence {
 const ENOUGH: f64 = 1e-8;
 
 /// Where every q has a solution.
-fn by_class(problem: &Complementarity) -> Option<Existence> {
+fn by_class(problem: &Complementarity, known: Option<Classes>) -> Option<Existence> {
     let every = |because: String| Some(Existence::EveryQ { because });
     let class_of = |m: &Matrix, wanted: &[Class]| {
-        let classes = match m.nrows() {
-            0..=MANY => Classes::of(m, Effort::default()),
-            _ => Classes::quick(m),
-        };
+        let classes = known.unwrap_or_else(|| classes(m));
         wanted.iter().copied().find(|&class| classes.is(class))
     };
     match problem {

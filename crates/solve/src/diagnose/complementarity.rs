@@ -1,6 +1,6 @@
 //! Of a linear complementarity problem.
 
-use nonsmooth_analysis::{Class, Classes, Effort, rank};
+use nonsmooth_analysis::{Class, Classes, rank};
 use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::check::Existence;
 use nonsmooth_problem::{Complementarity, Problem, Stated, with_complementarity};
@@ -19,12 +19,13 @@ pub(super) fn findings(
     let matrices = matrices(problem);
     let mut findings = vec![size(problem)];
     // The classes speak of one square matrix and variables with bounds.
-    if let Some(m) = with_complementarity!(problem, p => p.classified()) {
-        findings.push(class(m, matches!(problem, Complementarity::Lcp(_))));
+    let classes = with_complementarity!(problem, p => p.classified()).map(existence::classes);
+    if let Some(classes) = &classes {
+        findings.push(class(classes, matches!(problem, Complementarity::Lcp(_))));
     }
     findings.extend(matrices.iter().filter_map(|(name, m)| deficiency(name, m, rows)));
     findings.extend(scale(&matrices));
-    let existence = existence::of_complementarity(problem, &most());
+    let existence = existence::classified(problem, classes, &most());
     findings.push(of_existence(&existence));
     (findings, existence)
 }
@@ -59,9 +60,6 @@ fn size(problem: &Complementarity) -> Finding {
     Finding { suits, ..easy("size", says, means) }
 }
 
-/// Rows above which a class is not asked for more than a glance.
-const MANY: usize = 500;
-
 /// The classes that a diagnosis names besides the one that promises most; `nonsmooth info` names all.
 const TELLING: [Class; 4] = [Class::Symmetric, Class::PositiveDefinite, Class::K, Class::HPlus];
 
@@ -88,11 +86,7 @@ const PROMISES: [(Class, &str); 7] = [
     (Class::P0, "Solutions may be many; few methods are guaranteed to work."),
 ];
 
-fn class(m: &Matrix, is_lcp: bool) -> Finding {
-    let classes = match m.nrows() {
-        0..=MANY => Classes::of(m, Effort::default()),
-        _ => Classes::quick(m),
-    };
+fn class(classes: &Classes, is_lcp: bool) -> Finding {
     let promised = PROMISES.iter().find(|(class, _)| classes.is(*class));
     let telling = TELLING.into_iter().filter(|&class| classes.is(class));
     let is: Vec<_> = telling.chain(promised.map(|p| p.0)).map(|class| class.to_string()).collect();
@@ -102,7 +96,7 @@ fn class(m: &Matrix, is_lcp: bool) -> Finding {
     };
     let mut suits: Vec<&'static str> = vec![];
     if is_lcp {
-        for guarantee in guaranteed(&classes) {
+        for guarantee in guaranteed(classes) {
             if !suits.contains(&guarantee.solver) {
                 suits.push(guarantee.solver);
             }

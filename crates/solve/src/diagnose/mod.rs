@@ -168,12 +168,11 @@ pub fn instead<P: Registered + Judged<Status: 'static> + OfAny>(
     refused: &str,
     limits: &Limits,
 ) -> Vec<String> {
-    let method = refused.rsplit('/').next().unwrap_or(refused);
-    let abouts = registry::abouts::<P>();
-    let family = abouts.iter().find(|a| a.name == method).map(|a| a.family);
+    let (method, family) = method::<P>(refused);
     let behind = registry::composed_names::<P>();
     let behind = behind.into_iter().filter(|n| n.rsplit('/').next() == Some(method));
-    let kin = abouts.iter().filter(|a| Some(a.family) == family && a.solves == Solves::Law);
+    let kin = registry::abouts::<P>().into_iter();
+    let kin = kin.filter(|a| Some(a.family) == family && a.solves == Solves::Law);
     let candidates =
         behind.chain(kin.map(|a| a.name.to_owned())).chain([registry::DEFAULT.to_owned()]);
     solving(problem, candidates, refused, limits)
@@ -185,11 +184,15 @@ pub fn others<P: Registered + Judged<Status: 'static> + OfAny>(
     failed: &str,
     limits: &Limits,
 ) -> Vec<String> {
-    let method = failed.rsplit('/').next().unwrap_or(failed);
-    let abouts = registry::abouts::<P>();
-    let family = abouts.iter().find(|a| a.name == method).map(|a| a.family);
-    let others = one_of_each::<P>(family);
+    let others = one_of_each::<P>(method::<P>(failed).1);
     solving(problem, others.into_iter().map(str::to_owned), failed, limits)
+}
+
+/// The method that a name ends with, and its family.
+fn method<P: Registered>(name: &str) -> (&str, Option<&'static str>) {
+    let method = name.rsplit('/').next().unwrap_or(name);
+    let about = registry::abouts::<P>().into_iter().find(|a| a.name == method);
+    (method, about.map(|a| a.family))
 }
 
 /// The default, and the first solver of each family but one.

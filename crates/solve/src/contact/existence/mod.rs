@@ -72,7 +72,7 @@ pub fn of(problem: &Friction, limits: &Limits) -> Existence {
 }
 
 /// What is said where a limit came first.
-fn late(limit: Limit) -> Existence {
+pub(crate) fn late(limit: Limit) -> Existence {
     match limit {
         Limit::Cancelled => unknown("it was cancelled"),
         Limit::Time | Limit::Iterations => unknown("the time limit came first"),
