@@ -239,6 +239,37 @@ where
     Ok(())
 }
 
+type Chart<'a, DB> = ChartContext<'a, DB, Cartesian2d<Axis, Axis>>;
+
+/// The two axes of a panel with their labels; `x_text` is what stands at a tick to the right.
+fn chart<'a, DB: DrawingBackend>(
+    area: &DrawingArea<DB, Shift>,
+    [x, y]: [Axis; 2],
+    [x_label, y_label]: [&str; 2],
+    x_text: &dyn Fn(&f64) -> String,
+) -> Result<Chart<'a, DB>, DrawingAreaErrorKind<DB::ErrorType>> {
+    let mut chart = ChartBuilder::on(area)
+        .margin_right(24)
+        .margin_left(4)
+        .margin_bottom(8)
+        .x_label_area_size(40)
+        .y_label_area_size(52)
+        .build_cartesian_2d(x, y)?;
+    chart
+        .configure_mesh()
+        .bold_line_style(GRID)
+        .light_line_style(TRANSPARENT)
+        .axis_style(INK)
+        .label_style(font(12))
+        .axis_desc_style(font(13))
+        .x_label_formatter(x_text)
+        .y_label_formatter(&|y| tick(*y))
+        .x_desc(x_label)
+        .y_desc(y_label)
+        .draw()?;
+    Ok(chart)
+}
+
 /// How many contacts have a normal impulse of which size, in units of the mean of those that are closed.
 fn histogram<DB: DrawingBackend>(area: &DrawingArea<DB, Shift>, impulses: &[Impulse]) -> Drawn
 where
@@ -257,28 +288,11 @@ where
         counts[bar][usize::from(i.motion == Motion::Slip)] += 1;
     }
     let most = counts.iter().map(|c| c[0] + c[1]).max().unwrap_or(0).max(1) as f64;
-    let mut chart = ChartBuilder::on(&body)
-        .margin_right(24)
-        .margin_left(4)
-        .margin_bottom(8)
-        .x_label_area_size(40)
-        .y_label_area_size(52)
-        .build_cartesian_2d(
-            Axis { range: 0.0..end, ticks: ticks(end, 6, 0.0) },
-            Axis { range: 0.0..1.05 * most, ticks: ticks(most, 6, 1.0) },
-        )?;
-    chart
-        .configure_mesh()
-        .bold_line_style(GRID)
-        .light_line_style(TRANSPARENT)
-        .axis_style(INK)
-        .label_style(font(12))
-        .axis_desc_style(font(13))
-        .x_label_formatter(&|x| tick(*x))
-        .y_label_formatter(&|y| tick(*y))
-        .x_desc("normal impulse / mean")
-        .y_desc("contacts")
-        .draw()?;
+    let axes = [
+        Axis { range: 0.0..end, ticks: ticks(end, 6, 0.0) },
+        Axis { range: 0.0..1.05 * most, ticks: ticks(most, 6, 1.0) },
+    ];
+    let mut chart = chart(&body, axes, ["normal impulse / mean", "contacts"], &|x| tick(*x))?;
     let width = end / BARS as f64;
     for (k, [stick, slip]) in counts.iter().enumerate() {
         let (left, right) = (k as f64 * width, (k as f64 + 0.92) * width);
@@ -330,28 +344,12 @@ where
     legend(area, "Friction cone, r_T over mu", impulses, &CLOSED)?;
     let (_, body) = area.split_vertically(54);
     let top = impulses.iter().map(|i| i.normal).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
-    let mut chart = ChartBuilder::on(&body)
-        .margin_right(24)
-        .margin_left(4)
-        .margin_bottom(8)
-        .x_label_area_size(40)
-        .y_label_area_size(52)
-        .build_cartesian_2d(
-            Axis { range: -1.08..1.08, ticks: vec![-1.0, -0.5, 0.0, 0.5, 1.0] },
-            Axis { range: 0.0..1.05, ticks: vec![0.0, 0.25, 0.5, 0.75, 1.0] },
-        )?;
-    chart
-        .configure_mesh()
-        .bold_line_style(GRID)
-        .light_line_style(TRANSPARENT)
-        .axis_style(INK)
-        .label_style(font(12))
-        .axis_desc_style(font(13))
-        .x_label_formatter(&|x| format!("{x}"))
-        .y_label_formatter(&|y| tick(*y))
-        .x_desc("r_T / mu, in units of the largest r_N")
-        .y_desc("r_N")
-        .draw()?;
+    let axes = [
+        Axis { range: -1.08..1.08, ticks: vec![-1.0, -0.5, 0.0, 0.5, 1.0] },
+        Axis { range: 0.0..1.05, ticks: vec![0.0, 0.25, 0.5, 0.75, 1.0] },
+    ];
+    let mut chart =
+        chart(&body, axes, ["r_T / mu, in units of the largest r_N", "r_N"], &|x| format!("{x}"))?;
     let sides = vec![(-1.0, 1.0), (0.0, 0.0), (1.0, 1.0)];
     chart.draw_series(std::iter::once(PathElement::new(sides, INK.stroke_width(1))))?;
     let size = dot(impulses);
