@@ -81,6 +81,24 @@ impl Csc {
         Ok(out)
     }
 
+    /// The same matrix without stored zeros. Cost: O(nnz); nothing is copied where there are none.
+    #[must_use]
+    pub fn without_zeros(self) -> Self {
+        if self.values.iter().all(|x| *x != 0.0) {
+            return self;
+        }
+        let mut kept = Self::zeros(self.nrows, self.ncols);
+        for j in 0..self.ncols {
+            let (rows, values) = self.column(j);
+            for (&i, &x) in rows.iter().zip(values).filter(|e| *e.1 != 0.0) {
+                kept.row_idx.push(i);
+                kept.values.push(x);
+            }
+            kept.col_ptr[j + 1] = kept.values.len();
+        }
+        kept
+    }
+
     /// The number of rows.
     pub fn nrows(&self) -> usize {
         self.nrows
@@ -251,6 +269,9 @@ mod tests {
         let a = Csc::from_triplets(2, 2, entries.into_iter()).unwrap();
         assert_eq!(a.nnz(), 3);
         assert_eq!((a.get(0, 0), a.get(1, 0), a.get(0, 1)), (1.0, 2.5, 0.0));
+        let kept = a.clone().without_zeros();
+        assert_eq!((kept.nnz(), kept.ncols(), kept.get(1, 0)), (2, 2, 2.5));
+        assert_eq!(kept.clone().without_zeros(), kept);
     }
 
     #[test]

@@ -79,6 +79,15 @@ impl Matrix {
         }
     }
 
+    /// The same matrix without the zeros that a sparse one stores, which are as dear to every method as other entries.
+    #[must_use]
+    pub fn without_zeros(self) -> Self {
+        match self {
+            Self::Sparse(a) => Self::Sparse(a.without_zeros()),
+            other => other,
+        }
+    }
+
     /// The number of stored entries; `None` of an operator.
     pub fn nnz(&self) -> Option<usize> {
         match self {

@@ -37,7 +37,7 @@ impl BoxLcp {
         lower: Vec<f64>,
         upper: Vec<f64>,
     ) -> Result<Self, ProblemError> {
-        let problem = Self { M: M.into(), q, lower, upper };
+        let problem = Self { M: M.into().without_zeros(), q, lower, upper };
         problem.validate()?;
         Ok(problem)
     }

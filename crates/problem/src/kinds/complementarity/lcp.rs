@@ -48,7 +48,7 @@ impl Lcp {
     ///
     /// Errors: no rows, a matrix that is not square, a wrong length, a value that is not finite; each names its entry.
     pub fn new(M: impl Into<Matrix>, q: Vec<f64>) -> Result<Self, ProblemError> {
-        let problem = Self { M: M.into(), q };
+        let problem = Self { M: M.into().without_zeros(), q };
         problem.validate()?;
         Ok(problem)
     }

@@ -44,7 +44,7 @@ impl Mlcp {
         equalities: usize,
         free: usize,
     ) -> Result<Self, ProblemError> {
-        let problem = Self { M: M.into(), q, equalities, free };
+        let problem = Self { M: M.into().without_zeros(), q, equalities, free };
         problem.validate()?;
         Ok(problem)
     }

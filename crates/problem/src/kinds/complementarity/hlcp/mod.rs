@@ -42,7 +42,7 @@ impl Hlcp {
         R: impl Into<Matrix>,
         q: Vec<f64>,
     ) -> Result<Self, ProblemError> {
-        let problem = Self { Q: Q.into(), R: R.into(), q };
+        let problem = Self { Q: Q.into().without_zeros(), R: R.into().without_zeros(), q };
         problem.validate()?;
         Ok(problem)
     }
