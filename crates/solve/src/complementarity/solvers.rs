@@ -9,7 +9,8 @@ use crate::complementarity::functions::{FischerBurmeister, Min, Penalised};
 use crate::complementarity::interior::{MehrotraType, MizunoToddYe};
 use crate::complementarity::newton::Newton;
 use crate::complementarity::pivoting::{
-    Bard, BlockPivoting, CrissCross, Enumeration, EnumerationExact, Keller, Lemke, Murty,
+    Bard, BlockPivoting, CrissCross, Enumeration, EnumerationExact, Keller, Lemke, LemkeHowson,
+    Murty,
 };
 use crate::complementarity::quadratic::{Mprgp, QuadraticProgram};
 use crate::complementarity::reform::{Mixed, Reduce, Split};
@@ -37,6 +38,7 @@ fn bounded<P: Bounded + 'static>() -> Vec<Entry<P>> {
 fn pivoting<P: Complementary + 'static>() -> Vec<Entry<P>> {
     vec![
         Entry::of::<Lemke>(),
+        Entry::of::<LemkeHowson>(),
         Entry::of::<Keller>(),
         Entry::of::<CrissCross>(),
         Entry::of::<Murty>(),

@@ -1,5 +1,6 @@
 //! What two families of the wing share.
 
+pub mod game;
 pub mod pairs;
 mod tableau;
 

@@ -1,7 +1,9 @@
 //! **Lemke–Howson**: one equilibrium of a bimatrix game, by complementary pivots from the artificial one.
 //!
 //! Problem: payoffs A and B, m × n, of a row and a column player. Mixed strategies (x, y) such that neither gains by another one:
-//! `xᵀ A y ≥ x'ᵀ A y`, `xᵀ B y ≥ xᵀ B y'`.
+//! `xᵀ A y ≥ x'ᵀ A y`, `xᵀ B y ≥ xᵀ B y'`. As complementarity problems games come in two shapes, which are recognised whatever the order of the strategies and the
+//! scales of the rows: costs `K, L ≥ 0` with `0 ≤ x ⟂ K y − p ≥ 0`, `0 ≤ y ⟂ Lᵀ x − r ≥ 0` and p, r > 0 (an LCP with `M = [0 K; Lᵀ 0]`), whose x and y are strategies over
+//! their costs; and the mixed problem in which a free variable stands for the value of each player and an equality says that the strategies add up.
 //!
 //! Method: with payoffs made positive, an equilibrium is a solution other than zero of the LCP with `M = [0 −A; −Bᵀ 0]`, `q = 1`: w are the slacks of
 //! `A y ≤ 1`, `Bᵀ x ≤ 1`, and x, y are scaled to sum up to 1 at last. From `z = 0` a z_k is made basic (the label k is dropped), and complementary pivots follow until
@@ -13,22 +15,18 @@
 //! Fails: exponentially many pivots at worst; equilibria that no label reaches from the artificial one.
 
 use nonsmooth_linalg::Dense;
-use nonsmooth_problem::Lcp;
+use nonsmooth_problem::{Lcp, LcpPoint};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::basis::{Basis, Data, Factored, Tableau};
-use super::path::{Breaking, End, Event, Path};
-use crate::SolveError;
-use crate::complementarity::form::Bounded;
-use crate::core::trace::Variable;
-
-/// Strategies of the two players; each sums up to 1.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Equilibrium {
-    /// Of the row player, m.
-    pub x: Vec<f64>,
-    /// Of the column player, n.
-    pub y: Vec<f64>,
-}
+use super::path::{Breaking, End, Event, Exchange, Path};
+use crate::complementarity::form::{Bounded, Complementary, system};
+use crate::complementarity::parts::game::{Equilibrium, Game};
+use crate::core::register::{About, Described, Solves};
+use crate::core::settings::{Settings, described};
+use crate::core::trace::{Pivot, Recorder, Trace, Variable};
+use crate::{SolveError, Solver, Step};
 
 /// Beyond this, the basis is factorised.
 const TABLEAU_LIMIT: usize = 60;
@@ -57,47 +55,219 @@ pub fn game(a: &Dense, b: &Dense) -> Result<Lcp, SolveError> {
     Ok(Lcp::new(Dense::from_fn(m + n, m + n, entry), vec![1.0; m + n])?)
 }
 
+/// The path from the artificial equilibrium.
+struct Walk {
+    path: Path,
+    /// Strategies of the row player.
+    rows: usize,
+}
+
+impl Walk {
+    fn new(a: &Dense, b: &Dense) -> Result<Self, SolveError> {
+        let lcp = game(a, b)?;
+        let basis: Box<dyn Basis> = if lcp.dim() <= TABLEAU_LIMIT {
+            Box::new(Tableau::default())
+        } else {
+            Box::new(Factored::default())
+        };
+        let mut path = Path::new(Data::new(&lcp.system()?, true), basis);
+        path.breaking = Breaking::Lexicographic;
+        Ok(Self { path, rows: a.nrows() })
+    }
+
+    /// Goes back to the artificial equilibrium and drops label k.
+    fn begin(&mut self, k: usize) -> Result<(), &'static str> {
+        self.path.end = End::Pair(k);
+        self.path.place(&vec![false; self.path.data.n])?;
+        self.path.drive(Variable::Z(k));
+        Ok(())
+    }
+
+    /// What the last basis says. `None` where rounding has spoiled it.
+    fn equilibrium(&mut self) -> Option<Equilibrium> {
+        self.path.refine().ok()?;
+        let mut z = vec![0.0; self.path.data.n];
+        for (&v, &x) in self.path.basic.iter().zip(&self.path.x) {
+            if let Variable::Z(j) = v {
+                z[j] = x.max(0.0) * self.path.unit(v);
+            }
+        }
+        let share = |part: &[f64]| {
+            let sum: f64 = part.iter().sum();
+            (sum > 0.0).then(|| part.iter().map(|z| z / sum).collect::<Vec<_>>())
+        };
+        // x and y are not both zero, and where one is not, neither is the other.
+        let (x, y) = z.split_at(self.rows);
+        share(x).zip(share(y)).map(|(x, y)| Equilibrium { x, y })
+    }
+}
+
 /// The equilibrium to which label `k` leads: `k < m` a row of the row player, else a column. `None` where rounding spoils the path.
 ///
 /// Errors: as [`game`]; a label that does not exist.
 pub fn lemke_howson(a: &Dense, b: &Dense, k: usize) -> Result<Option<Equilibrium>, SolveError> {
-    let lcp = game(a, b)?;
-    let (m, n) = (a.nrows(), lcp.dim());
-    if k >= n {
+    let mut walk = Walk::new(a, b)?;
+    if k >= walk.path.data.n {
         return Err(SolveError::needs("a label below the number of strategies", k.to_string()));
     }
-    let basis: Box<dyn Basis> = if n <= TABLEAU_LIMIT {
-        Box::new(Tableau::default())
-    } else {
-        Box::new(Factored::default())
-    };
-    let mut path = Path::new(Data::new(&lcp.system()?, true), basis);
-    path.breaking = Breaking::Lexicographic;
-    path.end = End::Pair(k);
-    if path.place(&vec![false; n]).is_err() {
+    if walk.begin(k).is_err() {
         return Ok(None);
     }
-    path.drive(Variable::Z(k));
     loop {
-        match path.pivot() {
+        match walk.path.pivot() {
             Event::Pivoted(_) => {}
-            Event::Ended(_) => break,
+            Event::Ended(_) => return Ok(walk.equilibrium()),
             Event::Ray | Event::Trouble(_) => return Ok(None),
         }
     }
-    if path.refine().is_err() {
-        return Ok(None);
-    }
-    let mut z = vec![0.0; n];
-    for (&v, &x) in path.basic.iter().zip(&path.x) {
-        if let Variable::Z(j) = v {
-            z[j] = x.max(0.0) * path.unit(v);
+}
+
+/// Which label is dropped first.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct LemkeHowson {
+    /// The strategy whose label is dropped, counted over those of the row and then of the column player; where its path is spoiled by rounding the next ones follow.
+    pub label: usize,
+}
+
+impl Settings for LemkeHowson {}
+
+impl Described for LemkeHowson {
+    const ABOUT: &'static About = &About {
+        name: "lemke_howson",
+        family: "pivoting",
+        solves: Solves::Law,
+        summary: "Lemke–Howson: complementary pivots to an equilibrium of a bimatrix game",
+        needs: &[
+            "a bimatrix game: M = [0 K; Lᵀ 0], K, L ≥ 0, q < 0, in any order; or its mixed form with the players' values",
+        ],
+        cites: &["LemkeHowson1964", "CottlePangStone2009"],
+        variants: &[],
+        settings: described::<Self>,
+    };
+}
+
+/// The game, and the path on it.
+pub struct LemkeHowsonWork {
+    game: Game,
+    walk: Walk,
+    /// The label that is dropped, and how many were before.
+    label: usize,
+    tried: usize,
+    /// Whether the path has begun.
+    begun: bool,
+    pivots: usize,
+    z: Option<Vec<f64>>,
+    record: Recorder<Pivot>,
+}
+
+impl LemkeHowsonWork {
+    /// The path of this label has come to nothing: the next one.
+    fn next(&mut self) -> Step {
+        let labels = self.walk.path.data.n;
+        self.tried += 1;
+        self.label = (self.label + 1) % labels;
+        self.begun = false;
+        match self.tried < labels {
+            true => Step::Continue { estimate: f64::NAN },
+            false => {
+                Step::Stuck("no label leads to an equilibrium: rounding spoils all paths".into())
+            }
         }
     }
-    let share = |part: &[f64]| {
-        let sum: f64 = part.iter().sum();
-        (sum > 0.0).then(|| part.iter().map(|z| z / sum).collect::<Vec<_>>())
-    };
-    // x and y are not both zero, and where one is not, neither is the other.
-    Ok(share(&z[..m]).zip(share(&z[m..])).map(|(x, y)| Equilibrium { x, y }))
+
+    fn keep(&mut self, exchange: Exchange) {
+        self.pivots += 1;
+        let Exchange { entering, leaving, ratio } = exchange;
+        self.record.push(Pivot { iteration: self.pivots, entering, leaving, ratio, z0: None });
+    }
+}
+
+impl<P: Complementary> Solver<P> for LemkeHowson {
+    type Work = LemkeHowsonWork;
+
+    fn work(&self, problem: &P) -> Result<LemkeHowsonWork, SolveError> {
+        let none =
+            || SolveError::needs("a bimatrix game (see `nonsmooth list`)", "another problem");
+        let game = Game::of(&problem.system()?).ok_or_else(none)?;
+        let (a, b) = game.payoffs();
+        let walk = Walk::new(&a, &b)?;
+        let labels = walk.path.data.n;
+        if self.label >= labels {
+            let found = format!("{} of {labels}", self.label);
+            return Err(SolveError::needs("a label below the number of strategies", found));
+        }
+        Ok(LemkeHowsonWork {
+            game,
+            walk,
+            label: self.label,
+            tried: 0,
+            begun: false,
+            pivots: 0,
+            z: None,
+            record: Recorder::default(),
+        })
+    }
+
+    fn start(&self, _: &P, _: &mut LcpPoint, work: &mut LemkeHowsonWork) {
+        (work.label, work.tried, work.begun, work.pivots) = (self.label, 0, false, 0);
+        work.z = None;
+    }
+
+    fn step(&self, problem: &P, _: &mut LcpPoint, work: &mut LemkeHowsonWork) -> Step {
+        if !work.begun {
+            if work.walk.begin(work.label).is_err() {
+                return work.next();
+            }
+            work.begun = true;
+        }
+        match work.walk.path.pivot() {
+            Event::Pivoted(exchange) => {
+                work.keep(exchange);
+                Step::Continue { estimate: f64::NAN }
+            }
+            Event::Ended(exchange) => {
+                work.keep(exchange);
+                let mut z = vec![0.0; system(problem).dim()];
+                let found = work.walk.equilibrium();
+                match found.is_some_and(|e| work.game.solution(&e, &mut z)) {
+                    true => {
+                        work.z = Some(z);
+                        Step::Done
+                    }
+                    false => work.next(),
+                }
+            }
+            Event::Ray | Event::Trouble(_) => work.next(),
+        }
+    }
+
+    fn publish(&self, _: &P, point: &mut LcpPoint, work: &mut LemkeHowsonWork) {
+        if let Some(z) = &work.z {
+            point.z.copy_from_slice(z);
+        }
+    }
+
+    fn record(&self, on: bool, work: &mut LemkeHowsonWork) {
+        work.record.begin(on);
+    }
+
+    fn trace(&self, work: &LemkeHowsonWork) -> Trace {
+        Trace::Pivots(work.record.rows())
+    }
+
+    fn account(&self, work: &LemkeHowsonWork) -> Vec<String> {
+        let [x, y] = &work.game.strategies;
+        vec![format!(
+            "{} pivots, from label {}, in a game of {} × {} strategies",
+            work.pivots,
+            work.label,
+            x.len(),
+            y.len()
+        )]
+    }
+
+    fn check_every(&self) -> usize {
+        super::CHECK_EVERY
+    }
 }

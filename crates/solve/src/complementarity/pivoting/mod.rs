@@ -13,6 +13,7 @@ mod murty;
 mod path;
 mod start;
 
+pub use crate::complementarity::parts::game::Equilibrium;
 pub use bard::Bard;
 pub use block::BlockPivoting;
 pub use criss_cross::CrissCross;
@@ -20,7 +21,7 @@ pub use enumeration::{Enumeration, Face, Solutions, all_solutions};
 pub use exact::EnumerationExact;
 pub use keller::Keller;
 pub use lemke::{BasisKind, Covering, Lemke, LemkeWork, Ties};
-pub use lemke_howson::{Equilibrium, game, lemke_howson};
+pub use lemke_howson::{LemkeHowson, game, lemke_howson};
 pub use murty::Murty;
 
 use crate::Step;

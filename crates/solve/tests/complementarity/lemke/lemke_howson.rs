@@ -58,3 +58,61 @@ fn games_have_their_equilibria() {
         assert_eq!(game(&a, &b).unwrap().dim(), 2 * n);
     }
 }
+
+/// Games as the complementarity problems that people state, of any order of the strategies and scale of the rows.
+#[test]
+fn games_are_recognised_and_solved_as_problems() {
+    use nonsmooth_linalg::Csc;
+    use nonsmooth_problem::check::Judged;
+    use nonsmooth_problem::planted::{PlantedClass, PlantedLcp};
+    use nonsmooth_problem::{Lcp, Mlcp};
+    use nonsmooth_solve::Solve;
+    let by = |solver: &str| Solve::new().solver(solver).tolerance(1e-10);
+    for n in [4, 11, 40, 90] {
+        let class = PlantedClass::Bimatrix;
+        let case = PlantedLcp { n, class, decades: 2.0, seed: n as u64, ..PlantedLcp::default() };
+        let (lcp, _) = case.lcp();
+        // The strategies of both players in any order, as rows and columns.
+        let place = |i: usize| (7 * i + 3) % n;
+        let m = lcp.M.to_csc().unwrap();
+        let entries = m.triplets().map(|(i, j, x)| (place(i), place(j), x));
+        let mixed = Csc::from_triplets(n, n, entries.collect::<Vec<_>>().into_iter()).unwrap();
+        let mut q = vec![0.0; n];
+        (0..n).for_each(|i| q[place(i)] = lcp.q[i]);
+        let shuffled = if n % 7 == 0 { lcp.clone() } else { Lcp::new(mixed, q).unwrap() };
+        for problem in [lcp, shuffled] {
+            for solver in ["lemke_howson", "auto"] {
+                let answer = by(solver).run(&problem).unwrap();
+                assert!(answer.is_solved(), "{n} {solver}: {}", answer.status);
+            }
+        }
+    }
+    // The mixed form: values v₁, v₂, then x and y; payoffs of any sign.
+    for (m, n) in [(2, 2), (5, 3), (30, 20)] {
+        let mut rng = rng((m + n) as u64);
+        let size = 2 + m + n;
+        let mut entries = vec![];
+        for i in 0..m {
+            entries.extend([(0, 2 + i, 2.0), (2 + i, 0, 0.5)]);
+            entries.extend((0..n).map(|j| (2 + i, 2 + m + j, rng.random_range(-2.0..2.0))));
+        }
+        for j in 0..n {
+            entries.extend([(1, 2 + m + j, 1.0), (2 + m + j, 1, -1.0)]);
+            entries.extend((0..m).map(|i| (2 + m + j, 2 + i, rng.random_range(-2.0..2.0))));
+        }
+        let matrix = Csc::from_triplets(size, size, entries.into_iter()).unwrap();
+        let mut q = vec![0.0; size];
+        (q[0], q[1]) = (-2.0, -1.0);
+        let problem = Mlcp::new(matrix, q, 2).unwrap();
+        for label in [0, m + n - 1] {
+            let answer = by("lemke_howson").set("label", label).run(&problem).unwrap();
+            assert!(answer.is_solved(), "{m} {n} {label}: {}", answer.status);
+            assert!(problem.judge(&answer.point, 1e-12).unwrap().solved);
+        }
+        assert!(by("auto").run(&problem).unwrap().account[0].starts_with("lemke_howson"));
+    }
+    // What is none is refused.
+    let (spd, _) = PlantedLcp { n: 6, ..PlantedLcp::default() }.lcp();
+    let said = by("lemke_howson").run(&spd).unwrap_err().to_string();
+    assert!(said.contains("a bimatrix game"), "{said}");
+}
