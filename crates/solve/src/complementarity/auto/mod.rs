@@ -2,7 +2,8 @@
 //!
 //! Problem: LCP, MLCP, horizontal and box LCP.
 //!
-//! Method: a plan of solvers in the order of their promise on the problem at hand (`plan.rs`); each starts from the best point before it and has a budget of
+//! Method: on problems so small that a look at the matrix costs as much as a solve, pivots at once; then a plan of solvers in the order of their promise on the problem at hand
+//! (`plan.rs`); then, while time and iterations last, pivots from other covering vectors with ever larger budgets. Each starts from the best point before it and has a budget of
 //! iterations, never of seconds, so that a run repeats itself. The first that solves the problem, or proves that there is no solution, ends the solve.
 //!
 //! References: CottlePangStone2009; FacchineiPang2003; Acary2018 (how to choose); the solvers' own files.
@@ -53,37 +54,38 @@ impl Described for LinearAuto {
 
 /// A kind of problem that `auto` has a plan for.
 pub trait Planned: Registered {
-    /// The solvers to try, in this order.
-    fn plan(&self, settings: &LinearAuto) -> Vec<Candidate>;
+    /// The solvers to try at this stage, in this order: first those that need no look at the problem, then a plan by its class and structure, then what time
+    /// that is left is good for. None: the end.
+    fn plan(&self, settings: &LinearAuto, stage: usize) -> Vec<Candidate>;
 }
 
 impl LinearAuto {
     /// A session without history: the plan is made of the first problem that it meets.
     pub fn session<P: Planned>(self) -> Portfolio<P> {
-        Portfolio::new(move |problem: &P| problem.plan(&self))
+        Portfolio::new(move |problem: &P, stage| problem.plan(&self, stage))
     }
 }
 
 impl Planned for Lcp {
-    fn plan(&self, settings: &LinearAuto) -> Vec<Candidate> {
-        plan::of_lcp(self, settings)
+    fn plan(&self, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+        plan::of_lcp(self, settings, stage)
     }
 }
 
 impl Planned for Mlcp {
-    fn plan(&self, settings: &LinearAuto) -> Vec<Candidate> {
-        plan::of_mlcp(self, settings)
+    fn plan(&self, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+        plan::of_mlcp(self, settings, stage)
     }
 }
 
 impl Planned for BoxLcp {
-    fn plan(&self, settings: &LinearAuto) -> Vec<Candidate> {
-        plan::of_box(self, settings)
+    fn plan(&self, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+        plan::of_box(self, settings, stage)
     }
 }
 
 impl Planned for Hlcp {
-    fn plan(&self, settings: &LinearAuto) -> Vec<Candidate> {
-        plan::of_hlcp(self, settings)
+    fn plan(&self, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+        plan::of_hlcp(self, settings, stage)
     }
 }

@@ -6,6 +6,7 @@ use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 
 use super::portfolio::DECIDES;
 use super::{Candidate, LinearAuto};
+use crate::complementarity::parts::game::is_game;
 use crate::core::settings::SettingsMap;
 
 /// Up to this many variables a dense pivoting method is affordable.
@@ -125,7 +126,73 @@ fn exactly(plan: Plan) -> Plan {
     plan.then(DECIDES, ALL, "decides, whatever the class and the scaling").with("max_pairs", 40)
 }
 
-pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto) -> Vec<Candidate> {
+/// Of bimatrix games: every label leads to an equilibrium.
+fn games(n: usize) -> Plan {
+    let game = "a bimatrix game";
+    let mut plan = Plan::new().then("lemke_howson", PATIENT * pivots(n), game);
+    for label in (1..n).take(LABELS) {
+        plan = plan.then("lemke_howson", PATIENT * pivots(n), "another label").with("label", label);
+    }
+    plan.then("lemke", pivots(n), game).then("newton_fb", 500, "globalised")
+}
+
+/// Labels that are tried, and so many times the usual pivots: paths may be long, but each ends.
+const LABELS: usize = 7;
+const PATIENT: usize = 10;
+
+/// The stage before any look at the matrix, and that of the plan by class and structure; later ones spend what time is left.
+const AT_ONCE: usize = 0;
+const BY_CLASS: usize = 1;
+/// Up to this many variables a class costs as much as a solve by pivots, of dense and of sparse matrices.
+const SMALL: usize = 1000;
+const SMALL_SPARSE: usize = 60;
+
+/// Pivots before any look at the matrix, where these are cheap.
+fn at_once(m: &Matrix, pivoting: &'static str) -> Vec<Candidate> {
+    let n = m.nrows();
+    let small = match m {
+        Matrix::Dense(_) => n <= SMALL,
+        Matrix::Sparse(_) => n <= SMALL_SPARSE,
+        Matrix::Operator(_) => false,
+    };
+    Plan::new().when(small, |p| p.then(pivoting, pivots(n), "small")).0
+}
+
+/// Pivots from other covering vectors, with more patience each time, and all cases of few pairs.
+fn patiently(
+    [pivoting, all]: [&'static str; 2],
+    m: &Matrix,
+    pairs: usize,
+    stage: usize,
+) -> Vec<Candidate> {
+    let (n, turn) = (m.nrows(), stage - BY_CLASS);
+    if turn > TURNS || n > DENSE || matches!(m, Matrix::Operator(_)) {
+        return vec![];
+    }
+    let more = pivots(n).saturating_mul(1 << turn.min(20));
+    Plan::new()
+        .then(pivoting, more, "with patience")
+        .then(pivoting, more, "another covering vector")
+        .with("covering", "random")
+        .with("seed", turn + 1)
+        .when(turn == LAST && pairs <= MOST_PAIRS, |p| {
+            p.then(all, ALL, "decides, if it ends").with("max_pairs", MOST_PAIRS)
+        })
+        .0
+}
+
+/// Turns of [`patiently`]; after this one few pairs are enumerated, which may take any time.
+const TURNS: usize = 12;
+const LAST: usize = 4;
+const MOST_PAIRS: usize = 40;
+
+pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+    match stage {
+        AT_ONCE if is_game(problem) => return games(problem.dim()).0,
+        AT_ONCE => return at_once(&problem.M, "lemke"),
+        BY_CLASS => {}
+        _ => return patiently(["lemke", "enumeration"], &problem.M, problem.dim(), stage),
+    }
     let Some(facts) = Facts::of(&problem.M) else {
         return of_operator();
     };
@@ -156,11 +223,20 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto) -> Vec<Candidate> {
     plan.0
 }
 
-pub(super) fn of_mlcp(problem: &Mlcp, settings: &LinearAuto) -> Vec<Candidate> {
+pub(super) fn of_mlcp(problem: &Mlcp, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
     let pairs = problem.pairs();
+    let square = problem.equalities == problem.free;
+    match stage {
+        AT_ONCE if square && is_game(problem) => return games(problem.q.len()).0,
+        AT_ONCE if square => return at_once(&problem.M, "lemke"),
+        AT_ONCE => return vec![],
+        BY_CLASS => {}
+        _ if square => return patiently(["lemke", "enumeration"], &problem.M, pairs, stage),
+        _ => return vec![],
+    }
     let enumeration = |p: Plan| p.then("enumeration", ALL, "decides, whatever the class");
     let few = pairs <= EXACT && problem.q.len() + problem.free <= 4 * EXACT;
-    if problem.equalities != problem.free {
+    if !square {
         let why = "more or fewer equalities than free variables";
         return Plan::new()
             .then("newton_fb", 500, why)
@@ -189,7 +265,15 @@ pub(super) fn of_mlcp(problem: &Mlcp, settings: &LinearAuto) -> Vec<Candidate> {
         .0
 }
 
-pub(super) fn of_box(problem: &BoxLcp, settings: &LinearAuto) -> Vec<Candidate> {
+pub(super) fn of_box(problem: &BoxLcp, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+    match stage {
+        AT_ONCE => return vec![],
+        BY_CLASS => {}
+        _ => {
+            let solvers = ["split/lemke", "split/enumeration"];
+            return patiently(solvers, &problem.M, problem.dim(), stage);
+        }
+    }
     let Some(facts) = Facts::of(&problem.M) else {
         return of_operator();
     };
@@ -214,7 +298,15 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &LinearAuto) -> Vec<Candidate> 
         .0
 }
 
-pub(super) fn of_hlcp(problem: &Hlcp, settings: &LinearAuto) -> Vec<Candidate> {
+pub(super) fn of_hlcp(problem: &Hlcp, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+    match stage {
+        AT_ONCE => return vec![],
+        BY_CLASS => {}
+        _ => {
+            let solvers = ["mixed/lemke", "mixed/enumeration"];
+            return patiently(solvers, &problem.Q, problem.dim(), stage);
+        }
+    }
     let n = problem.dim();
     Plan::new()
         .then("ip_mehrotra", 200, "the method of horizontal problems")

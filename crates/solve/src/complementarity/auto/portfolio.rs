@@ -1,6 +1,7 @@
 //! Several solvers, one after the other, as one session.
 
 use std::borrow::Cow;
+use std::collections::VecDeque;
 use std::time::Instant;
 
 use nonsmooth_problem::Problem;
@@ -25,8 +26,8 @@ pub struct Candidate {
     pub because: String,
 }
 
-/// Who makes the plan for a problem.
-type Planner<P> = Box<dyn Fn(&P) -> Vec<Candidate> + Send>;
+/// Who makes the plan for a problem, stage by stage; an empty one ends it.
+type Planner<P> = Box<dyn Fn(&P, usize) -> Vec<Candidate> + Send>;
 
 /// A session that runs the solvers of a plan until one solves the problem or proves that it has no solution. Each starts from the best point that the ones before
 /// it have found.
@@ -50,7 +51,7 @@ const NONE: Status =
 
 impl<P: Registered> Portfolio<P> {
     /// A session that follows `plan`.
-    pub fn new(plan: impl Fn(&P) -> Vec<Candidate> + Send + 'static) -> Self {
+    pub fn new(plan: impl Fn(&P, usize) -> Vec<Candidate> + Send + 'static) -> Self {
         Self {
             plan: Box::new(plan),
             sessions: vec![],
@@ -72,6 +73,45 @@ impl<P: Registered> Portfolio<P> {
         let session = register::bare::<P>(candidate.name, &candidate.settings)?;
         self.sessions.push((candidate.name, candidate.settings.clone(), session));
         Ok(self.sessions.len() - 1)
+    }
+}
+
+const UNTIMED: usize = 4;
+
+/// The candidates of a plan one by one; the next stage is planned when those of one have failed.
+///
+/// Without a limit on time nobody says how much patience there is: no more than [`UNTIMED`] stages.
+#[derive(Default)]
+struct Stages {
+    stage: usize,
+    open: VecDeque<Candidate>,
+    tried: Vec<Candidate>,
+}
+
+impl Stages {
+    fn next<P>(&mut self, problem: &P, plan: &Planner<P>, limits: &Limits) -> Option<Candidate> {
+        let most = if limits.time_limit.is_some() { usize::MAX } else { UNTIMED };
+        loop {
+            while let Some(candidate) = self.open.pop_front() {
+                // What was tried with as much patience would do the same again.
+                let again = |t: &Candidate| {
+                    (t.name, &t.settings) == (candidate.name, &candidate.settings)
+                        && t.iterations >= candidate.iterations
+                };
+                if !self.tried.iter().any(again) {
+                    self.tried.push(candidate.clone());
+                    return Some(candidate);
+                }
+            }
+            if self.stage >= most {
+                return None;
+            }
+            self.open = plan(problem, self.stage).into();
+            if self.open.is_empty() && self.stage > 0 {
+                return None;
+            }
+            self.stage += 1;
+        }
     }
 }
 
@@ -166,7 +206,8 @@ impl<P: Registered> Session<P> for Portfolio<P> {
         }
         let mut status = Status::Stalled("no method applies to this problem".into());
         let mut nearly = None;
-        for candidate in (self.plan)(problem) {
+        let mut stages = Stages::default();
+        while let Some(candidate) = stages.next(problem, &self.plan, limits) {
             if let Some(limit) = limits.reached(tally.meter.begun) {
                 status = Status::Limit(limit);
                 break;
