@@ -9,6 +9,7 @@
 mod any;
 pub mod check;
 mod error;
+pub mod field;
 mod kinds;
 pub mod planted;
 mod problem;

@@ -1,0 +1,99 @@
+//! Functions `F: ℝⁿ → ℝⁿ` of nonlinear problems: where their values and Jacobians come from.
+//!
+//! | source | values | Jacobian |
+//! | --- | --- | --- |
+//! | [`Expressions`] | a graph of operations, in plain and in doubled precision | exact, sparse, backwards through each row |
+
+mod expression;
+
+use std::fmt::Debug;
+
+pub use expression::{Affine, Binary, Expressions, Graph, Id, Nary, Node, Piecewise, Unary};
+
+/// The places where a Jacobian may not be zero: columns of each row, ascending.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Pattern {
+    starts: Vec<usize>,
+    columns: Vec<usize>,
+}
+
+impl Pattern {
+    /// Of the columns of each row, ascending and without repetition.
+    pub fn new(rows: impl Iterator<Item: Iterator<Item = usize>>) -> Self {
+        let mut out = Self { starts: vec![0], columns: vec![] };
+        for row in rows {
+            out.columns.extend(row);
+            out.starts.push(out.columns.len());
+        }
+        out
+    }
+
+    /// The number of rows.
+    pub fn rows(&self) -> usize {
+        self.starts.len().saturating_sub(1)
+    }
+
+    /// The number of places.
+    pub fn len(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Whether there is no place.
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty()
+    }
+
+    /// Where row i stands among all places.
+    pub fn range(&self, i: usize) -> std::ops::Range<usize> {
+        self.starts[i]..self.starts[i + 1]
+    }
+
+    /// The columns of row i.
+    pub fn row(&self, i: usize) -> &[usize] {
+        &self.columns[self.range(i)]
+    }
+
+    /// Rows and columns of all places, row after row.
+    pub fn places(&self) -> impl Iterator<Item = (usize, usize)> + Clone + '_ {
+        (0..self.rows()).flat_map(|i| self.row(i).iter().map(move |&j| (i, j)))
+    }
+}
+
+/// `F: ℝⁿ → ℝⁿ`, which may be undefined somewhere, with its Jacobian.
+pub trait Field: Debug + Send + Sync {
+    /// n.
+    fn dim(&self) -> usize;
+
+    /// Where the Jacobian may not be zero.
+    fn pattern(&self) -> &Pattern;
+
+    /// What evaluates it, with memory of its own.
+    fn evaluator(&self) -> Box<dyn Evaluator>;
+
+    /// Where values and Jacobian come from, in words for an account.
+    fn source(&self) -> String;
+
+    /// The expressions that it is made of, if it is.
+    fn expressions(&self) -> Option<&Expressions> {
+        None
+    }
+}
+
+/// Evaluates a [`Field`].
+pub trait Evaluator: Send {
+    /// `f = F(x)`. False where F is not defined; then f is of no use.
+    fn value(&mut self, x: &[f64], f: &mut [f64]) -> bool;
+
+    /// F(x), and JF(x) along the [`Pattern`], row after row. False where one of them is not defined, or the time is over.
+    fn jacobian(&mut self, x: &[f64], f: &mut [f64], jacobian: &mut [f64]) -> bool;
+
+    /// F(x) in doubled precision, rounded once, as far as the source allows; of other sources as [`value`](Self::value).
+    fn precisely(&mut self, x: &[f64], f: &mut [f64]) -> bool {
+        self.value(x, f)
+    }
+
+    /// The size of the terms of each row at x: of a polynomial the sum of the moduli of its monomials. False where the source does not know terms.
+    fn sizes(&mut self, _x: &[f64], _sizes: &mut [f64]) -> bool {
+        false
+    }
+}
