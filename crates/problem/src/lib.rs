@@ -19,7 +19,7 @@ pub use any::{
 };
 pub use error::ProblemError;
 pub use kinds::complementarity::{
-    BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Part, Parts, Shape, Stated, plural,
+    BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mcp, Mlcp, Part, Parts, Shape, Stated, plural,
 };
 pub use kinds::contact::{
     Bounds, Coulomb, Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RowsGlobal,

@@ -10,7 +10,7 @@ pub(crate) mod proof;
 pub(crate) mod rows;
 mod verdict;
 
-pub use crate::kinds::complementarity::{HlcpGauge, LinearGauge, RowCounts, RowStatus};
+pub use crate::kinds::complementarity::{HlcpGauge, LinearGauge, McpGauge, RowCounts, RowStatus};
 pub use crate::kinds::contact::{ContactStatus, GlobalGauge, Impulses, Law, LocalGauge, Motion};
 pub use certificate::Certificate;
 pub use existence::{Existence, Kinematic, Kinematics};

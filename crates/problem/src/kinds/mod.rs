@@ -27,7 +27,7 @@ macro_rules! list_of_kinds {
                 /// `M v = H r + f`, `u = Hᵀ v + w`, three-dimensional contacts.
                 FrictionGlobal3d, "friction_global_3d", Global3, $crate::FrictionGlobal<3>, 3;
             }
-            /// Any of the linear complementarity problems.
+            /// Any of the complementarity problems.
             Complementarity {
                 /// `0 ≤ z ⟂ M z + q ≥ 0`.
                 Lcp, "lcp", Lcp, $crate::Lcp, 1;
@@ -37,6 +37,8 @@ macro_rules! list_of_kinds {
                 Hlcp, "hlcp", Hlcp, $crate::Hlcp, 1;
                 /// `−(M z + q) ∈ N_[l, u](z)`.
                 BoxLcp, "box_lcp", Box, $crate::BoxLcp, 1;
+                /// `−F(x) ∈ N_[l, u](x)`.
+                Mcp, "mcp", Mcp, $crate::Mcp, 1;
             }
         }
     };

@@ -1,4 +1,4 @@
-//! Linear complementarity problems as plain validated data, their judges and planted instances.
+//! Complementarity problems as plain validated data, their judges and planted instances.
 //!
 //! | kind | statement |
 //! | --- | --- |
@@ -6,6 +6,7 @@
 //! | [`Mlcp`] | `A u + C v + a = 0`, `0 ≤ v ⟂ D u + B v + b ≥ 0` |
 //! | [`Hlcp`] | `Q x + R s = q`, `0 ≤ x ⟂ s ≥ 0` |
 //! | [`BoxLcp`] | `−(M z + q) ∈ N_[l, u](z)` |
+//! | [`Mcp`] | `−F(x) ∈ N_[l, u](x)` |
 
 /// The [`Problem`](crate::Problem) of a kind whose point is z, and its verdict: what differs is the number of variables and the point to begin from.
 macro_rules! problem_in_z {
@@ -108,6 +109,7 @@ mod boxed;
 mod hlcp;
 mod judge;
 mod lcp;
+mod mcp;
 mod mlcp;
 pub mod planted;
 mod stated;
@@ -116,6 +118,7 @@ pub use boxed::BoxLcp;
 pub use hlcp::{Hlcp, HlcpGauge, HlcpPoint};
 pub use judge::{LinearGauge, RowCounts, RowStatus};
 pub use lcp::{Lcp, LcpPoint};
+pub use mcp::{Mcp, McpGauge};
 pub use mlcp::Mlcp;
 pub use stated::{Part, Parts, Shape, Stated, plural};
 

@@ -1,5 +1,6 @@
-//! What a linear complementarity problem says of itself. Files, pictures and reports are made of it and know no kinds.
+//! What a complementarity problem says of itself. Files, pictures and reports are made of it and know no kinds.
 
+use crate::field::Expressions;
 use crate::{AnyPoint, OfAny, OfAnyPoint, ProblemError};
 use nonsmooth_linalg::{Dense, Matrix};
 
@@ -12,6 +13,8 @@ pub enum Part<'a> {
     Vector(&'a [f64]),
     /// A number of rows or columns.
     Count(usize),
+    /// A function, one expression a row.
+    Expressions(&'a Expressions),
 }
 
 /// What a part is.
@@ -23,6 +26,8 @@ pub enum Shape {
     Vector,
     /// A number of rows or columns.
     Count,
+    /// A function, one expression a row.
+    Expressions,
 }
 
 /// Where the parts come from that a problem is made of, by their names: a file. A part that is not there is an error.
@@ -38,9 +43,12 @@ pub trait Parts {
 
     /// The number of a name.
     fn count(&mut self, name: &'static str) -> Result<usize, ProblemError>;
+
+    /// The function of a name.
+    fn expressions(&mut self, name: &'static str) -> Result<Expressions, ProblemError>;
 }
 
-/// A linear complementarity problem by its parts, and those of its points, by the names that files have for them.
+/// A complementarity problem by its parts, and those of its points, by the names that files have for them.
 pub trait Stated: OfAny {
     /// The statement, in a line of ASCII.
     const STATEMENT: &'static str;
@@ -117,7 +125,7 @@ pub trait Stated: OfAny {
     fn matrices(&self) -> Vec<(&'static str, &Matrix)> {
         let matrix = |(name, part)| match part {
             Part::Matrix(m) => Some((name, m)),
-            Part::Vector(_) | Part::Count(_) => None,
+            Part::Vector(_) | Part::Count(_) | Part::Expressions(_) => None,
         };
         self.parts().into_iter().filter_map(matrix).collect()
     }

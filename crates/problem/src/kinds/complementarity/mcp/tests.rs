@@ -1,0 +1,111 @@
+use super::*;
+use crate::field::{Binary, Graph};
+
+/// Josephy's problem of 1979, its rows multiplied by powers of `row`, its variables in units of powers of `column`.
+fn josephy(row: f64, column: f64) -> (Mcp, [f64; 4]) {
+    // Coefficients of x1², x1x2, x2², x1, x2, x3, x4, 1.
+    let rows: [[f64; 8]; 4] = [
+        [3.0, 2.0, 2.0, 0.0, 0.0, 1.0, 3.0, -6.0],
+        [2.0, 0.0, 1.0, 1.0, 0.0, 3.0, 2.0, -2.0],
+        [3.0, 1.0, 2.0, 0.0, 0.0, 2.0, 3.0, -1.0],
+        [1.0, 0.0, 3.0, 0.0, 0.0, 2.0, 3.0, -3.0],
+    ];
+    let unit = |j: usize| column.powi(j as i32);
+    let mut g = Graph::new(4);
+    let x: Vec<_> = (0..4)
+        .map(|j| {
+            let (x, c) = (g.variable(j), g.constant(unit(j)));
+            g.binary(Binary::Mul, c, x)
+        })
+        .collect();
+    let squares = [(0, 0), (0, 1), (1, 1)].map(|(a, b)| g.binary(Binary::Mul, x[a], x[b]));
+    let one = g.constant(1.0);
+    let basis = [squares[0], squares[1], squares[2], x[0], x[1], x[2], x[3], one];
+    let rows = rows.iter().enumerate().map(|(i, of)| {
+        let terms = of.iter().zip(basis).filter(|(c, _)| **c != 0.0);
+        let terms = terms.map(|(c, b)| {
+            let c = g.constant(c * row.powi(i as i32));
+            g.binary(Binary::Mul, c, b)
+        });
+        let terms = terms.collect();
+        g.sum(terms)
+    });
+    let rows = rows.collect();
+    let f = Expressions::new(g, rows).unwrap();
+    let solution = [6f64.sqrt() / 2.0, 0.0, 0.0, 0.5];
+    let scaled: Vec<f64> = (0..4).map(|j| solution[j] / unit(j)).collect();
+    (Mcp::ncp(f, vec![1.0; 4]).unwrap(), scaled.try_into().unwrap())
+}
+
+#[test]
+fn the_solution_of_josephy_is_one() {
+    let (problem, x) = josephy(1.0, 1.0);
+    let verdict = problem.judge(&LcpPoint { z: x.into() }, 1e-12).unwrap();
+    assert!(verdict.solved, "{:?}", verdict.measure);
+    // The third pair is not degenerate: F3 > 0.
+    assert_eq!((verdict.counts.inside, verdict.counts.lower), (2, 2));
+    assert!(verdict.measure.absolute < 1e-14);
+}
+
+#[test]
+fn scaling_rows_and_variables_changes_no_verdict() {
+    let (plain, x) = josephy(1.0, 1.0);
+    for (row, column) in [(1024.0, 1.0), (1.0, 0.0009765625), (1048576.0, 1024.0)] {
+        let (scaled, y) = josephy(row, column);
+        for error in [0.0, 1e-9, 1e-7, 1e-5] {
+            let at = |x: [f64; 4]| LcpPoint { z: x.map(|x| x * (1.0 + error)).into() };
+            let [a, b] =
+                [plain.judge(&at(x), 1e-8), scaled.judge(&at(y), 1e-8)].map(Result::unwrap);
+            assert_eq!(a.measure.relative, b.measure.relative, "{row} {column} {error}");
+            assert_eq!(a.solved, b.solved);
+            assert_eq!(a.statuses, b.statuses);
+        }
+    }
+}
+
+#[test]
+fn what_runs_away_solves_nothing() {
+    // x − y − 1 = 0, y − x = 0: the larger the point, the smaller the error in units of the terms.
+    let mut g = Graph::new(2);
+    let (x, y, one) = (g.variable(0), g.variable(1), g.constant(1.0));
+    let d = g.binary(Binary::Sub, x, y);
+    let r0 = g.binary(Binary::Sub, d, one);
+    let r1 = g.binary(Binary::Sub, y, x);
+    let f = Expressions::new(g, vec![r0, r1]).unwrap();
+    let free = f64::INFINITY;
+    let problem = Mcp::new(f, vec![-free; 2], vec![free; 2], vec![0.0; 2]).unwrap();
+    for size in [1e3, 1e10, 1e15, 1e17, 1e200] {
+        let verdict = problem.judge(&LcpPoint { z: vec![size; 2] }, 1e-8).unwrap();
+        assert!(!verdict.solved, "{size:e} {:?}", verdict.measure);
+    }
+    assert!(problem.affine().is_some_and(|(_, exact)| exact));
+    let y = vec![1.0, 1.0];
+    assert!(problem.verify(&Certificate::Farkas { y }));
+}
+
+#[test]
+fn undefined_points_are_no_solutions() {
+    let mut g = Graph::new(1);
+    let x = g.variable(0);
+    let row = g.unary(crate::field::Unary::Log, x);
+    let f = Expressions::new(g, vec![row]).unwrap();
+    let problem = Mcp::ncp(f, vec![0.0]).unwrap();
+    assert!(!problem.judge(&LcpPoint { z: vec![0.0] }, 1e-8).unwrap().solved);
+    assert!(problem.judge(&LcpPoint { z: vec![1.0] }, 1e-8).unwrap().solved);
+}
+
+#[test]
+fn callers_mistakes_are_errors() {
+    let f = || {
+        let mut g = Graph::new(1);
+        let x = g.variable(0);
+        Expressions::new(g, vec![x]).unwrap()
+    };
+    let said = |lower: &[f64], upper: &[f64], start: &[f64]| {
+        Mcp::new(f(), lower.into(), upper.into(), start.into()).unwrap_err().to_string()
+    };
+    assert!(said(&[0.0], &[1.0], &[0.0, 1.0]).contains("start"));
+    assert!(said(&[0.0], &[1.0], &[f64::NAN]).contains("start[0]"));
+    assert!(said(&[2.0], &[1.0], &[0.0]).contains("[l, u][0]"));
+    assert!(Expressions::new(Graph::new(1), vec![]).is_err());
+}
