@@ -1,8 +1,8 @@
-//! Linear complementarity problems, `0 ≤ z ⟂ M z + q ≥ 0` and their kin, and all methods for them.
+//! Complementarity problems, `0 ≤ z ⟂ M z + q ≥ 0` and its kin and `l ≤ x ≤ u ⟂ F(x)`, and all methods for them.
 //!
 //! | floor | rooms |
 //! | --- | --- |
-//! | families | [`splitting`], [`pivoting`], [`newton`], [`interior`], [`quadratic`], [`auto`] |
+//! | families | [`splitting`], [`pivoting`], [`newton`], [`interior`], [`quadratic`], [`proximal`], [`auto`] |
 //! | what families share | [`parts`], [`guarantees`], [`reform`] |
 //! | [`form`] | what a family may ask of a problem |
 //! | [`functions`] | scalar complementarity functions |
@@ -15,6 +15,7 @@ pub mod interior;
 pub mod newton;
 pub mod parts;
 pub mod pivoting;
+pub mod proximal;
 pub mod quadratic;
 pub mod reform;
 pub mod solvers;

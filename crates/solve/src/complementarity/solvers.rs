@@ -1,17 +1,18 @@
 //! Which solvers there are for linear complementarity problems: one line each.
 
-use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
+use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mcp, Mlcp};
 
 use crate::Boxed;
 use crate::complementarity::auto::{LinearAuto, Planned};
 use crate::complementarity::form::{Bounded, Complementary, Paired};
 use crate::complementarity::functions::{FischerBurmeister, Min, Penalised};
 use crate::complementarity::interior::{MehrotraType, MizunoToddYe};
-use crate::complementarity::newton::Newton;
+use crate::complementarity::newton::{Newton, Semismooth, Smooth};
 use crate::complementarity::pivoting::{
     Bard, BlockPivoting, CrissCross, Enumeration, EnumerationExact, Keller, Lemke, LemkeHowson,
     Murty,
 };
+use crate::complementarity::proximal::{Proxi, Semicomp};
 use crate::complementarity::quadratic::{Mprgp, QuadraticProgram};
 use crate::complementarity::reform::{Mixed, Reduce, Split};
 use crate::complementarity::splitting::{Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs};
@@ -99,5 +100,19 @@ impl Registered for Hlcp {
 
     fn edges() -> Vec<Edge<Self>> {
         vec![Edge::new::<Mixed>()]
+    }
+}
+
+impl Registered for Mcp {
+    fn solvers() -> Vec<Entry<Self>> {
+        vec![
+            Entry::of::<Semismooth>(),
+            Entry::of::<Smooth>(),
+            Entry::of::<Proxi>(),
+            Entry::of::<Semicomp>(),
+            Entry::of::<Newton<Min>>(),
+            Entry::of::<Newton<FischerBurmeister>>(),
+            Entry::of::<Newton<Penalised>>(),
+        ]
     }
 }

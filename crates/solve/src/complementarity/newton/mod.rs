@@ -33,8 +33,13 @@
 //!
 //! Cost of a step: one LU of the size of M (Levenberg–Marquardt: twice the size), a few products. Storage: M twice, the factor, ten vectors.
 
-mod factor;
+mod nonlinear;
 mod scaled;
+mod semismooth;
+mod smooth;
+
+pub use semismooth::Semismooth;
+pub use smooth::Smooth;
 
 use nonsmooth_linalg::{Matrix, SquareLu, norm};
 use nonsmooth_problem::LcpPoint;
@@ -50,7 +55,7 @@ use crate::core::register::{About, Described};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
-use factor::Factor;
+use crate::complementarity::parts::factor::Factor;
 use scaled::{Jacobian, Scaled};
 
 /// Newton's method on the function F. (Unknown keys are refused where settings are parsed; serde cannot refuse them beside `flatten`.)

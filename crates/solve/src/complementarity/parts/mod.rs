@@ -1,6 +1,8 @@
 //! What two families of the wing share.
 
+pub mod factor;
 pub mod game;
+pub mod nonlinear;
 pub mod pairs;
 mod tableau;
 

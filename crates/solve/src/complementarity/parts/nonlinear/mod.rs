@@ -1,0 +1,35 @@
+//! What methods for nonlinear problems share: where a solve is, one step of damped Newton methods, ways out of where these stall.
+
+mod crash;
+mod descent;
+mod escape;
+mod iterate;
+mod solve;
+
+pub use crash::Crash;
+pub use descent::{Descent, Options, Residual};
+pub use escape::{Escape, Inner};
+pub use iterate::Iterate;
+pub use solve::{CHECK_EVERY, STATIONARY, Solve, UNDEFINED};
+
+/// What a step came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Moved {
+    /// By Newton's direction.
+    Newton,
+    /// By Newton's direction of a regularised matrix.
+    Regularised,
+    /// Along the gradient of the merit.
+    Gradient,
+    /// Not at all: no direction decreases the merit.
+    Stuck,
+    /// Not at all: F or its Jacobian is not defined here, or the time is over.
+    Undefined,
+}
+
+impl Moved {
+    /// Whether the point is another one.
+    pub fn moved(self) -> bool {
+        matches!(self, Self::Newton | Self::Regularised | Self::Gradient)
+    }
+}

@@ -1,0 +1,8 @@
+//! Methods that leave stationary points by proximal problems with moving centres, each with another method inside.
+
+mod inner;
+mod proxi;
+mod semicomp;
+
+pub use proxi::Proxi;
+pub use semicomp::Semicomp;
