@@ -3,7 +3,7 @@
 use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mcp, Mlcp};
 
 use crate::Boxed;
-use crate::complementarity::auto::{LinearAuto, Planned};
+use crate::complementarity::auto::{LinearAuto, NonlinearAuto, Planned};
 use crate::complementarity::form::{Bounded, Complementary, Paired};
 use crate::complementarity::functions::{FischerBurmeister, Min, Penalised};
 use crate::complementarity::interior::{MehrotraType, MizunoToddYe};
@@ -106,6 +106,7 @@ impl Registered for Hlcp {
 impl Registered for Mcp {
     fn solvers() -> Vec<Entry<Self>> {
         vec![
+            Entry::session(NonlinearAuto::session),
             Entry::of::<Semismooth>(),
             Entry::of::<Smooth>(),
             Entry::of::<Proxi>(),

@@ -10,6 +10,7 @@
 //!
 //! Cost: that of the solvers tried. Fails: where all of them do.
 
+mod nonlinear;
 mod plan;
 mod portfolio;
 
@@ -21,6 +22,7 @@ use crate::core::register::Registered;
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 
+pub use nonlinear::NonlinearAuto;
 pub use portfolio::{Candidate, Portfolio};
 
 /// The hyperparameters of `auto` for linear complementarity problems; none needs to be set.

@@ -84,21 +84,38 @@ impl Facts {
 }
 
 /// A plan that grows.
-struct Plan(Vec<Candidate>);
+pub(super) struct Plan(pub(super) Vec<Candidate>);
 
 impl Plan {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self(vec![])
     }
 
-    fn then(mut self, name: &'static str, iterations: usize, because: impl Into<String>) -> Self {
-        let because = because.into();
-        self.0.push(Candidate { name, settings: SettingsMap::new(), iterations, because });
+    pub(super) fn then(
+        mut self,
+        name: &'static str,
+        iterations: usize,
+        because: impl Into<String>,
+    ) -> Self {
+        let (settings, because) = (SettingsMap::new(), because.into());
+        self.0.push(Candidate { name, settings, iterations, because, anew: false });
         self
     }
 
+    /// A candidate that begins where the solve began.
+    pub(super) fn anew(
+        self,
+        name: &'static str,
+        iterations: usize,
+        because: impl Into<String>,
+    ) -> Self {
+        let mut plan = self.then(name, iterations, because);
+        plan.0.iter_mut().next_back().into_iter().for_each(|last| last.anew = true);
+        plan
+    }
+
     /// The same with a setting for the last candidate.
-    fn with(mut self, key: &str, value: impl Into<serde_json::Value>) -> Self {
+    pub(super) fn with(mut self, key: &str, value: impl Into<serde_json::Value>) -> Self {
         if let Some(last) = self.0.last_mut() {
             last.settings.insert(key.into(), value.into());
         }
@@ -116,7 +133,7 @@ fn pivots(n: usize) -> usize {
 }
 
 /// Bases to enumerate: all of them.
-const ALL: usize = usize::MAX;
+pub(super) const ALL: usize = usize::MAX;
 
 /// Up to so many pairs exact arithmetic decides in milliseconds. It comes after the methods that may solve what rounding alone makes contradictory, such as
 /// equations that repeat each other nearly.

@@ -24,6 +24,8 @@ pub struct Candidate {
     pub iterations: usize,
     /// Why it is tried, in words that follow its name.
     pub because: String,
+    /// Whether it begins where the solve began, not at the best point so far.
+    pub anew: bool,
 }
 
 /// Who makes the plan for a problem, stage by stage; an empty one ends it.
@@ -213,7 +215,8 @@ impl<P: Registered> Session<P> for Portfolio<P> {
                 break;
             }
             let k = self.session(&candidate)?;
-            let mut trial = tally.best.as_ref().map_or_else(|| point.clone(), |b| b.0.clone());
+            let best = tally.best.as_ref().filter(|_| !candidate.anew);
+            let mut trial = best.map_or_else(|| point.clone(), |b| b.0.clone());
             let (before, begun) = (tally.iterations, tally.meter.seconds());
             let left = tally.left(limits, candidate.iterations);
             let session = &mut self.sessions[k].2;

@@ -1,0 +1,191 @@
+//! **auto** for nonlinear complementarity problems: quick methods first, then those that leave stationary points, then other starts.
+//!
+//! Problem: `l ≤ x ≤ u ⟂ F(x)`. Method: an affine F, known by its expressions, is the linear `auto`'s, with its certificates. Others go through a plan of solvers, each from the
+//! start of the solve; what is left of time and iterations goes to perturbed starts. The first that solves the problem ends the solve.
+//!
+//! References: Munson2002; Billups1995; the solvers' own files. Cost: that of the solvers tried. Fails: where all of them do.
+
+use nonsmooth_problem::{BoxLcp, LcpPoint, Mcp, Problem};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::plan::{ALL, Plan};
+use super::{Candidate, LinearAuto, Portfolio};
+use crate::core::register::{About, Described, Solves};
+use crate::core::settings::{Settings, described};
+use crate::core::trace::Trace;
+use crate::{Limits, Observer, Outcome, Progress, Sample, Session, SolveError, Status};
+
+/// The hyperparameters of `auto` for nonlinear complementarity problems; none needs to be set.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct NonlinearAuto {
+    /// How often it begins again at perturbed starts where nothing has solved the problem, without a limit on time.
+    pub restarts: usize,
+}
+
+impl Default for NonlinearAuto {
+    fn default() -> Self {
+        Self { restarts: 20 }
+    }
+}
+
+impl Settings for NonlinearAuto {}
+
+impl Described for NonlinearAuto {
+    const ABOUT: &'static About = &About {
+        name: "auto",
+        family: "auto",
+        solves: Solves::Law,
+        summary: "needs no setting: affine problems as linear ones, others by a plan of solvers from the start and from others, until one solves the problem",
+        needs: &[],
+        cites: &["Munson2002", "Billups1995", "Acary2018"],
+        variants: &[],
+        settings: described::<Self>,
+    };
+}
+
+impl NonlinearAuto {
+    /// A session without history.
+    pub fn session(self) -> AutoSession {
+        AutoSession {
+            linear: LinearAuto::default().session::<BoxLcp>(),
+            nonlinear: Portfolio::new(move |_: &Mcp, stage| self.plan(stage)),
+            affine: None,
+        }
+    }
+
+    /// The solvers of a stage.
+    fn plan(&self, stage: usize) -> Vec<Candidate> {
+        match stage {
+            0 => {
+                Plan::new()
+                    .then("semismooth", 60, "fast where the start is good")
+                    .with("restarts", false)
+                    .anew("proxi", 150, "leaves stationary points")
+                    .anew("smooth", 100, "another way")
+                    .0
+            }
+            1 => {
+                Plan::new()
+                    .anew("semismooth", 600, "with other options")
+                    .anew("semicomp", 3000, "leaves stationary points")
+                    .anew("proxi", 3000, "without crash")
+                    .with("crash", false)
+                    .0
+            }
+            _ => {
+                Plan::new()
+                    .anew("newton_pfb", ALL, "from other starts")
+                    .with("restarts", self.restarts.saturating_mul(1 << (stage - 2).min(10)))
+                    .0
+            }
+        }
+    }
+}
+
+/// The session: the linear `auto` of affine problems, the plan of others.
+pub struct AutoSession {
+    linear: Portfolio<BoxLcp>,
+    nonlinear: Portfolio<Mcp>,
+    /// The account of the linear solve, if there was one, and whether its word was the last.
+    affine: Option<(Vec<String>, bool)>,
+}
+
+/// Sees the linear problem's solve as one of the nonlinear problem: the points are the same.
+struct Same<'a>(&'a mut dyn Observer<Mcp>);
+
+impl Observer<BoxLcp> for Same<'_> {
+    fn step(&mut self, progress: &Progress) {
+        self.0.step(progress);
+    }
+
+    fn keeps_best(&self) -> bool {
+        self.0.keeps_best()
+    }
+
+    fn best(&mut self, point: &LcpPoint, measure: &nonsmooth_problem::check::Measure) {
+        self.0.best(point, measure);
+    }
+}
+
+impl Session<Mcp> for AutoSession {
+    fn observe(
+        &mut self,
+        problem: &Mcp,
+        point: &mut LcpPoint,
+        limits: &Limits,
+        observer: &mut dyn Observer<Mcp>,
+    ) -> Result<Outcome, SolveError> {
+        limits.validate()?;
+        problem.validate_point(point)?;
+        self.affine = None;
+        let Some((linear, _)) = problem.affine() else {
+            return self.nonlinear.observe(problem, point, limits, observer);
+        };
+        let begun = std::time::Instant::now();
+        let mut trial = point.clone();
+        let outcome = self.linear.observe(&linear, &mut trial, limits, &mut Same(observer))?;
+        let mut account = vec!["F is affine: the linear auto".to_owned()];
+        account.extend(self.linear.account().into_iter().map(|line| format!("  {line}")));
+        let measure = problem.certify(&trial, &mut problem.gauge()?);
+        // Proofs and solutions are looked at again: the coefficients may be rounded.
+        let status = match &outcome.status {
+            Status::Solved if measure.passes(limits.tolerance) => Some(Status::Solved),
+            Status::Infeasible(proof) => match problem.evidence(proof.certificate()) {
+                nonsmooth_problem::check::Evidence::Proved(proof) => {
+                    Some(Status::Infeasible(proof))
+                }
+                _ => None,
+            },
+            Status::Limit(limit) => Some(Status::Limit(*limit)),
+            _ => None,
+        };
+        self.affine = Some((account, status.is_some()));
+        if let Some(status) = status {
+            *point = trial;
+            return Ok(Outcome { status, measure, ..outcome });
+        }
+        let left = Limits {
+            time_limit: limits.time_limit.map(|t| (t - begun.elapsed().as_secs_f64()).max(0.0)),
+            max_iterations: limits.max_iterations.saturating_sub(outcome.iterations),
+            ..limits.clone()
+        };
+        let then = self.nonlinear.observe(problem, point, &left, observer)?;
+        let mut status = then.status;
+        if !matches!(status, Status::Solved) {
+            // What is known of the linear problem is more than that nothing solved it.
+            let near = matches!(outcome.status, Status::NearlyInfeasible { .. });
+            if near && !matches!(status, Status::Limit(_)) {
+                status = outcome.status;
+            }
+            if measure.is_better_than(&then.measure) {
+                *point = trial;
+                return Ok(Outcome { status, measure, ..then });
+            }
+        }
+        Ok(Outcome { status, iterations: outcome.iterations + then.iterations, ..then })
+    }
+
+    fn history(&self) -> &[Sample] {
+        match self.affine {
+            Some((_, true)) => self.linear.history(),
+            _ => self.nonlinear.history(),
+        }
+    }
+
+    fn trace(&self) -> Trace {
+        match self.affine {
+            Some((_, true)) => self.linear.trace(),
+            _ => self.nonlinear.trace(),
+        }
+    }
+
+    fn account(&self) -> Vec<String> {
+        match &self.affine {
+            Some((account, true)) => account.clone(),
+            Some((account, false)) => [account.clone(), self.nonlinear.account()].concat(),
+            None => self.nonlinear.account(),
+        }
+    }
+}
