@@ -70,6 +70,7 @@ fn dense(p: &Complementarity) -> Dense {
         Complementarity::Mlcp(p) => p.M.to_dense(),
         Complementarity::Box(p) => p.M.to_dense(),
         Complementarity::Hlcp(p) => p.Q.to_dense(),
+        Complementarity::Mcp(p) => p.affine().and_then(|(linear, _)| linear.M.to_dense()),
     }
     .unwrap()
 }
@@ -120,6 +121,7 @@ fn sizes(p: &Complementarity) -> (usize, usize) {
         Complementarity::Mlcp(p) => (p.M.ncols(), p.pairs()),
         Complementarity::Hlcp(p) => (p.dim(), p.dim()),
         Complementarity::Box(p) => (p.dim(), p.dim()),
+        Complementarity::Mcp(p) => (p.dim(), p.dim()),
     }
 }
 

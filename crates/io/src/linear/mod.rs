@@ -1,4 +1,4 @@
-//! Linear complementarity problems as text: LCP, MLCP, horizontal and box-constrained.
+//! Complementarity problems as text: LCP, MLCP, horizontal, box-constrained and nonlinear.
 //!
 //! [`toml`] is our own format, with solution and texts (docs/formats.md); [`market`] is Matrix Market, `NAME.mtx` with `NAME_q.mtx` beside.
 
@@ -15,7 +15,7 @@ use crate::{IoError, ProblemFile};
 fn check<'a>(path: &Path, file: &'a ProblemFile) -> Result<&'a Complementarity, IoError> {
     let AnyProblem::Complementarity(problem) = &file.problem else {
         let found = file.problem.kind().name();
-        return Err(IoError::data(path, "the problem", "one of linear complementarity", found));
+        return Err(IoError::data(path, "the problem", "one of complementarity", found));
     };
     with_complementarity!(problem, p => p.validate()).map_err(IoError::problem(path))?;
     let (names, variables) =
@@ -32,14 +32,19 @@ fn check<'a>(path: &Path, file: &'a ProblemFile) -> Result<&'a Complementarity, 
     file.problem.validate_point(&stored.point).map_err(IoError::problem(path))?;
     let pairs = with_complementarity!(problem, p => Stated::pairs(p));
     let Some(w) = &stored.partner else { return Ok(problem) };
+    let name = format!("solution.{}", with_complementarity!(problem, p => partner(p)));
     if w.len() != pairs {
         let (expected, found) = (format!("{pairs} entries (pairs)"), w.len());
-        return Err(IoError::data(path, "solution.w", expected, format!("{found} entries")));
+        return Err(IoError::data(path, name, expected, format!("{found} entries")));
     }
     match w.iter().position(|x| !x.is_finite()) {
-        Some(k) => Err(IoError::data(path, format!("solution.w[{k}]"), "a finite number", w[k])),
+        Some(k) => Err(IoError::data(path, format!("{name}[{k}]"), "a finite number", w[k])),
         None => Ok(problem),
     }
+}
+
+fn partner<P: Stated>(_: &P) -> &'static str {
+    P::PARTNER
 }
 
 /// A number with as many digits as tell it from all others.

@@ -1,12 +1,13 @@
-//! Our own format: a linear complementarity problem as TOML, for people to read and write. docs/formats.md describes it.
+//! Our own format: a complementarity problem as TOML, for people to read and write. docs/formats.md describes it.
 //!
 //! Numbers are written with as many digits as tell them from all others, so what is written reads back bit for bit, and so does the storage of the
-//! matrices (dense or sparse).
+//! matrices (dense or sparse). Functions are expressions, one text a row.
 
 use std::fmt::Write;
 use std::path::Path;
 
 use nonsmooth_linalg::{Csc, Dense, Matrix};
+use nonsmooth_problem::field::Expressions;
 use nonsmooth_problem::{
     AnyPoint, AnyProblem, Complementarity, Kind, Part, Parts, ProblemError, Shape, Stated,
     each_kind, with_complementarity,
@@ -70,6 +71,7 @@ impl<'de> Visitor<'de> for Known<'_> {
                 Type::Part(Shape::Matrix) => Value::Matrix(map.next_value()?),
                 Type::Part(Shape::Vector) => Value::Vector(map.next_value()?),
                 Type::Part(Shape::Count) => Value::Count(map.next_value()?),
+                Type::Part(Shape::Expressions) => Value::Texts(map.next_value()?),
                 Type::Solution => Value::Solution(map.next_value_seed(Known(&of_solutions()))?),
             };
             keys.push((key, value));
@@ -179,17 +181,19 @@ struct Read {
     kind: Kind,
     parts: Vec<&'static str>,
     of_point: &'static [&'static str],
+    partner: &'static str,
     problem: fn(&mut dyn Parts) -> Result<AnyProblem, ProblemError>,
-    point: fn(&mut Keyed) -> Result<AnyPoint, ProblemError>,
+    point: fn(&mut Keyed<'_>) -> Result<AnyPoint, ProblemError>,
 }
 
-/// All kinds of linear complementarity.
+/// All kinds of complementarity.
 fn kinds() -> impl Iterator<Item = Read> {
     fn of<P: Stated>() -> Read {
         Read {
             kind: P::KIND,
             parts: P::PARTS.iter().map(|part| part.0).collect(),
             of_point: P::SOLUTION,
+            partner: P::PARTNER,
             problem: |parts| P::from_parts(parts).map(Into::into),
             point: |keyed| P::point_from_parts(|name| keyed.vector(name)).map(Into::into),
         }
@@ -200,7 +204,7 @@ fn kinds() -> impl Iterator<Item = Read> {
 /// The format.
 ///
 /// Errors of reading: what is no TOML or has a wrong type, by its line; what is missing, superfluous, of a wrong shape or not finite, by its key. Of writing:
-/// a problem that is known by its products only.
+/// a problem that is known by its products or its values only.
 #[derive(Debug, Clone, Copy)]
 pub struct Toml;
 
@@ -228,7 +232,7 @@ impl Format for Toml {
 
     fn to_bytes(&self, name: &Path, file: &ProblemFile) -> Result<Vec<u8>, IoError> {
         let problem = check(name, file)?;
-        Ok(format(file, problem).ok_or_else(|| operator(name))?.into_bytes())
+        Ok(format(name, file, problem)?.into_bytes())
     }
 }
 
@@ -258,11 +262,11 @@ fn parse(path: &Path, text: &str) -> Result<ProblemFile, IoError> {
     let room = text.len().max(1 << 20);
     let solution = match take(&mut keys, "solution") {
         Some(Value::Solution(keys)) => {
-            Some(Keyed { kind: read.kind, group: "solution.", keys, room })
+            Some(Keyed { kind: read.kind, group: "solution.", keys, room, names: &[] })
         }
         _ => None,
     };
-    let mut stated = Keyed { kind: read.kind, group: "", keys, room };
+    let mut stated = Keyed { kind: read.kind, group: "", keys, room, names: &names };
     let invalid = IoError::problem(path);
     stated.only(&known, &read.parts).map_err(&invalid)?;
     if let Some(solution) = &solution {
@@ -270,27 +274,30 @@ fn parse(path: &Path, text: &str) -> Result<ProblemFile, IoError> {
     }
     let point = |mut keyed: Keyed| {
         let point = (read.point)(&mut keyed)?;
-        let partner = if keyed.has("w") { Some(keyed.vector("w")?) } else { None };
+        let partner = keyed.has(read.partner).then(|| keyed.vector(read.partner)).transpose()?;
         Ok(StoredPoint { point, partner, statuses: vec![] })
     };
     let solution = solution.map(point).transpose().map_err(&invalid)?;
+    let problem = (read.problem)(&mut stated).map_err(&invalid)?;
     let content = ProblemFile {
         info: Info { title, description, names, ..Info::default() },
         solution,
-        ..ProblemFile::new((read.problem)(&mut stated).map_err(&invalid)?)
+        ..ProblemFile::new(problem)
     };
     check(path, &content)?;
     Ok(content)
 }
 
 /// The keys of a problem, or of its solution, whose kind is known.
-struct Keyed {
+struct Keyed<'a> {
     kind: Kind,
     /// What stands before the keys in messages.
     group: &'static str,
     keys: Keys,
     /// The most rows or columns that a matrix in the file can have: the vectors must have entries for them.
     room: usize,
+    /// The names of variables in expressions, if they have any.
+    names: &'a [String],
 }
 
 fn wrong(
@@ -302,7 +309,7 @@ fn wrong(
     ProblemError::Value { place, expected, found: found.to_string() }
 }
 
-impl Keyed {
+impl Keyed<'_> {
     /// No other keys than the kind has, in the order of those that any kind has.
     fn only(&self, all: &[(&'static str, Type)], known: &[&str]) -> Result<(), ProblemError> {
         let given = all.iter().map(|key| key.0).filter(|key| self.has(key));
@@ -329,7 +336,7 @@ impl Keyed {
     }
 }
 
-impl Parts for Keyed {
+impl Parts for Keyed<'_> {
     fn has(&self, name: &str) -> bool {
         self.keys.iter().any(|key| key.0 == name)
     }
@@ -345,6 +352,13 @@ impl Parts for Keyed {
         match self.need(name)? {
             Value::Count(n) => Ok(n),
             _ => Err(Self::shaped(name, "a number")),
+        }
+    }
+
+    fn expressions(&mut self, name: &'static str) -> Result<Expressions, ProblemError> {
+        match self.need(name)? {
+            Value::Texts(texts) => Expressions::parse(&texts, self.names),
+            _ => Err(Self::shaped(name, "an array of texts")),
         }
     }
 
@@ -386,9 +400,13 @@ pub(super) fn operator(path: &Path) -> IoError {
     IoError::data(path, "M", "the entries of the matrix (dense or sparse)", "an operator")
 }
 
-/// The text of a file; `None` of an operator.
-fn format(file: &ProblemFile, problem: &Complementarity) -> Option<String> {
+/// The text of a file.
+fn format(path: &Path, file: &ProblemFile, problem: &Complementarity) -> Result<String, IoError> {
     let mut out = String::new();
+    if let Some(name) = with_complementarity!(problem, p => unstated(p)) {
+        let found = "a function that is known by its values only";
+        return Err(IoError::data(path, name, "expressions", found));
+    }
     let (kind, statement) = with_complementarity!(problem, p => of(p));
     line(&mut out, &format!("# {statement}"));
     line(&mut out, &format!("kind = \"{}\"", kind.name()));
@@ -407,6 +425,12 @@ fn format(file: &ProblemFile, problem: &Complementarity) -> Option<String> {
             Part::Matrix(m) => matrices.push((key, m)),
             Part::Vector(x) => vector(&mut out, key, x),
             Part::Count(n) => line(&mut out, &format!("{key} = {n}")),
+            Part::Expressions(f) => {
+                let texts = f.texts(&file.info.names).map_err(IoError::problem(path))?;
+                line(&mut out, &format!("{key} = ["));
+                texts.iter().for_each(|text| line(&mut out, &format!("  {},", quoted(text))));
+                line(&mut out, "]");
+            }
         }
     }
     // In TOML, what belongs to no table comes before all tables.
@@ -430,7 +454,7 @@ fn format(file: &ProblemFile, problem: &Complementarity) -> Option<String> {
                 }
                 line(&mut out, "]");
             }
-            Matrix::Operator(_) => return None,
+            Matrix::Operator(_) => return Err(operator(path)),
         }
     }
     if let Some(stored) = &file.solution {
@@ -439,7 +463,14 @@ fn format(file: &ProblemFile, problem: &Complementarity) -> Option<String> {
         let parts = with_complementarity!(problem, p => p.parts_of(&stored.point, partner));
         parts.into_iter().for_each(|(key, x)| vector(&mut out, key, x));
     }
-    Some(out)
+    Ok(out)
+}
+
+/// A function of the problem that is no expressions.
+fn unstated<P: Stated>(problem: &P) -> Option<&'static str> {
+    let parts = problem.parts();
+    let functions = P::PARTS.iter().filter(|part| part.1 == Shape::Expressions);
+    functions.map(|part| part.0).find(|name| parts.iter().all(|part| part.0 != *name))
 }
 
 fn of<P: Stated>(_: &P) -> (Kind, &'static str) {

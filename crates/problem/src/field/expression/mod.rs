@@ -4,6 +4,7 @@ mod affine;
 mod graph;
 mod operator;
 mod tape;
+mod text;
 
 use std::sync::Arc;
 

@@ -444,7 +444,7 @@ impl Nary {
     pub(super) fn of<T: Number>(self, arguments: impl Iterator<Item = T> + Clone) -> T {
         let truths = || arguments.clone().filter(|a| a.value() != 0.0).count();
         match self {
-            Self::Sum => arguments.fold(T::known(0.0), T::add),
+            Self::Sum => arguments.reduce(T::add).unwrap_or(T::known(0.0)),
             Self::Min | Self::Max => match self.chosen(arguments.clone().map(T::value)) {
                 Some(k) => arguments.clone().nth(k).unwrap_or(T::known(f64::NAN)),
                 None => T::known(f64::NAN),

@@ -265,9 +265,8 @@ impl Tape {
                 Code::Binary(op, a, b) => op.of(values[a as usize], values[b as usize]),
                 Code::Linear(from, to) => {
                     let terms = self.terms[from as usize..to as usize].iter();
-                    terms.fold(T::known(0.0), |sum, &(i, c)| {
-                        sum.add(T::known(c).mul(values[i as usize]))
-                    })
+                    let terms = terms.map(|&(i, c)| T::known(c).mul(values[i as usize]));
+                    terms.reduce(T::add).unwrap_or(T::known(0.0))
                 }
                 Code::Nary(op, from, to) => {
                     let all = &self.arguments[from as usize..to as usize];

@@ -56,6 +56,8 @@ pub trait Stated: OfAny {
     const PARTS: &'static [(&'static str, Shape)];
     /// The parts that a solution may have.
     const SOLUTION: &'static [&'static str];
+    /// Which of them is the partner of the point.
+    const PARTNER: &'static str = "w";
     /// What has a row of its own in a table of the solution.
     const ROW: &'static str = "variable";
 

@@ -221,12 +221,13 @@ impl Stated for Mcp {
         ("start", Shape::Vector),
     ];
     const SOLUTION: &'static [&'static str] = &["x", "F"];
+    const PARTNER: &'static str = "F";
 
     fn parts(&self) -> Vec<(&'static str, Part<'_>)> {
         let vectors = [("lower", &self.lower), ("upper", &self.upper), ("start", &self.start)];
         let vectors = vectors.map(|(name, x)| (name, Part::Vector(x)));
         let f = self.F.expressions().map(|f| ("F", Part::Expressions(f)));
-        vectors.into_iter().chain(f).collect()
+        f.into_iter().chain(vectors).collect()
     }
 
     fn from_parts(parts: &mut dyn Parts) -> Result<Self, ProblemError> {
