@@ -5,6 +5,7 @@
 //! LCP, box LCP        variable,status,z,w
 //! MLCP                variable,status,value,w                    u[0], ... then v[0], ...; only v has a w
 //! horizontal LCP      pair,status,x,s
+//! MCP                 variable,status,x,F
 //! ```
 //!
 //! `name` follows the first column where the file of the problem names its variables; `status` is there where the judge was asked. Rows are counted from

@@ -6,10 +6,13 @@ mod common;
 use std::path::{Path, PathBuf};
 
 use common::real;
+use nonsmooth_io::table::Table;
 use nonsmooth_io::{About, FORMATS, Format, Info, ProblemFile, StoredPoint, holds_problem, parts};
 use nonsmooth_linalg::{Csc, Dense, Matrix};
+use nonsmooth_problem::field::{Evaluator, Expressions, Field, Pattern};
 use nonsmooth_problem::{
-    AnyPoint, AnyProblem, BoxLcp, Complementarity, Friction, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp,
+    AnyPoint, AnyProblem, BoxLcp, Complementarity, Friction, Hlcp, HlcpPoint, Lcp, LcpPoint, Mcp,
+    Mlcp,
 };
 use proptest::collection::{btree_map, vec};
 use proptest::option;
@@ -111,7 +114,22 @@ fn problem() -> impl Strategy<Value = Complementarity> {
         let (l, u) = bounds.into_iter().unzip();
         Complementarity::Box(BoxLcp::new(m, q, l, u).unwrap())
     });
-    prop_oneof![lcp, mixed, horizontal, boxed]
+    let row = prop_oneof![
+        Just("2*x1 - exp(-x1)"),
+        Just("x1^3 + 0.1*x1"),
+        Just("-1.5"),
+        Just("max(x1, -x1^2)/(1 + x1^2)"),
+        Just("if(x1 >= 1, log(x1), 0)"),
+    ];
+    let nonlinear =
+        (1..4usize).prop_flat_map(move |n| (vec(row.clone(), n), reals(n), vec(bound(), n)));
+    let nonlinear = nonlinear.prop_map(|(rows, start, bounds)| {
+        let texts: Vec<_> = rows.iter().map(ToString::to_string).collect();
+        let (l, u) = bounds.into_iter().unzip();
+        let F = Expressions::parse(&texts, &[]).unwrap();
+        Complementarity::Mcp(Mcp::new(F, l, u, start).unwrap())
+    });
+    prop_oneof![lcp, mixed, horizontal, boxed, nonlinear]
 }
 
 /// The lengths of z and w.
@@ -265,6 +283,114 @@ z = [1.25, 2]
     let boxed = "kind = 'box_lcp'\nM = [[1]]\nq = [2]\nlower = [-inf]\nupper = [3]\n";
     let Complementarity::Box(boxed) = folder.read("e.toml", boxed) else { panic!() };
     assert_eq!((boxed.lower[0], boxed.upper[0]), (f64::NEG_INFINITY, 3.0));
+}
+
+#[test]
+fn nonlinear_problems_as_people_write_them() {
+    let folder = Folder::new();
+    let text = "\
+kind = 'mcp'
+names = ['q[1]', 'p']
+F = ['2 + q[1] - p', 'q[1] - 10/p^1.1']
+lower = [0, -inf]
+start = [1, 2]
+[solution]
+x = [1.5, 3.5]
+F = [0.0, 1]
+";
+    let file = ProblemFile::read(folder.put("a.toml", text)).unwrap();
+    let stored = file.solution.as_ref().unwrap();
+    assert_eq!(stored.point, LcpPoint { z: vec![1.5, 3.5] }.into());
+    assert_eq!(stored.partner, Some(vec![0.0, 1.0]));
+    let written = folder.path("b.toml");
+    file.write(&written).unwrap();
+    let again = ProblemFile::read(&written).unwrap();
+    assert_eq!(again, file);
+    let said = std::fs::read_to_string(&written).unwrap();
+    assert!(said.contains("F = [\n  \"2 + q[1] - p\",\n  \"q[1] - 10/p^1.1\",\n]\n"), "{said}");
+    let table = Table::new(&file.problem, stored, &file.info.names).unwrap();
+    assert_eq!(table.csv(), "variable,name,x,F\n0,q[1],1.5,0.0\n1,p,3.5,1.0\n");
+    let Complementarity::Mcp(problem) = linear(file) else { panic!() };
+    assert_eq!(problem.lower, [0.0, f64::NEG_INFINITY]);
+    assert_eq!(problem.upper, [f64::INFINITY; 2]);
+    assert_eq!(problem.start, [1.0, 2.0]);
+
+    let Complementarity::Mcp(plain) = folder.read("c.toml", "kind = 'mcp'\nF = ['x1^2 - 2']\n")
+    else {
+        panic!()
+    };
+    assert_eq!((plain.lower[0], plain.upper[0], plain.start[0]), (0.0, f64::INFINITY, 0.0));
+    for (rest, said) in [
+        (
+            "F = ['x1 +']",
+            "F[0], column 5: expected a number, a name, a function or `(`, found the end",
+        ),
+        ("F = ['1', 'y']", "F[1], column 1: expected a variable (x1, x2), found `y`"),
+        ("F = []", "F: expected 1 expressions (variables, at least one), found 0"),
+        (
+            "F = [1]",
+            "line 2: expected a problem as docs/formats.md describes it, found invalid type: integer `1`, expected a string",
+        ),
+        (
+            "names = ['a', 'a']\nF = ['1', '1']",
+            "names[1]: expected a name of its own, found `a`, as names[0]",
+        ),
+        (
+            "names = ['a']\nF = ['1', '1']",
+            "F: expected 1 expressions, as there are as many names, found 2",
+        ),
+        ("F = ['x1']\nlower = [1, 2]", "l: expected 1 entries (rows of F), found 2 entries"),
+        ("F = ['x1']\nstart = [nan]", "start[0]: expected a finite number, found NaN"),
+        (
+            "F = ['x1']\nM = [[1]]",
+            "M: expected the keys of kind \"mcp\": F, lower, upper, start, found this one",
+        ),
+        ("lower = [0]", "F: expected this key, as the kind is \"mcp\", found none"),
+        (
+            "F = ['x1']\n[solution]\nx = [1]\nF = [nan]",
+            "solution.F[0]: expected a finite number, found NaN",
+        ),
+        (
+            "F = ['x1']\n[solution]\nz = [1]",
+            "solution.z: expected the keys of kind \"mcp\": x, F, found this one",
+        ),
+    ] {
+        folder.refused("d.toml", &format!("kind = 'mcp'\n{rest}\n"), &[&format!(": {said}")]);
+    }
+    let values = Mcp::ncp(Values(Pattern::new(std::iter::once(std::iter::once(0)))), vec![0.0]);
+    let message = ProblemFile::new(values.unwrap()).write(folder.path("e.toml")).unwrap_err();
+    let said = "F: expected expressions, found a function that is known by its values only";
+    assert!(message.to_string().ends_with(said), "{message}");
+}
+
+/// `F(x) = x` without expressions.
+#[derive(Debug)]
+struct Values(Pattern);
+
+impl Field for Values {
+    fn dim(&self) -> usize {
+        1
+    }
+    fn pattern(&self) -> &Pattern {
+        &self.0
+    }
+    fn evaluator(&self) -> Box<dyn Evaluator> {
+        struct Same;
+        impl Evaluator for Same {
+            fn value(&mut self, x: &[f64], f: &mut [f64]) -> bool {
+                f.copy_from_slice(x);
+                true
+            }
+            fn jacobian(&mut self, x: &[f64], f: &mut [f64], jacobian: &mut [f64]) -> bool {
+                jacobian.fill(1.0);
+                self.value(x, f)
+            }
+        }
+        Box::new(Same)
+    }
+    fn source(&self) -> String {
+        "closures".into()
+    }
 }
 
 #[test]

@@ -117,19 +117,37 @@ fn hdf5_files() {
     }
 }
 
-const TOML: [&str; 5] = [
+const TOML: [&str; 7] = [
     "kind = \"lcp\"\ntitle = \"a\"\nq = [-4.0, -7.0]\nM = [[2.0, 1.0], [1.0, 3.0]]\n[solution]\nz = [1.0, 2.0]\nw = [0.0, 0.0]\n",
     "kind = \"lcp\"\nq = [-1, 2]\n[M]\nshape = [2, 2]\nentries = [[0, 0, 1.0], [1, 1, 2.0]]\n",
     "kind = \"mlcp\"\nA = [[1]]\nC = [[2]]\nD = [[3]]\nB = [[4]]\na = [1]\nb = [2]\n[solution]\nu = [1.0]\nv = [2.0]\n",
     "kind = \"hlcp\"\nQ = [[1.0]]\nR = [[-1.0]]\nq = [2.0]\n[solution]\nx = [2.0]\ns = [0.0]\n",
     "kind = \"box_lcp\"\nM = [[1.0, 0.0], [0.0, 1.0]]\nq = [1, -1]\nlower = [-inf, 0.0]\nupper = [inf, 1.0]\n",
+    "kind = \"mcp\"\nnames = [\"a[1]\", \"p\"]\nF = [\"2*a[1]^2 - exp(-p/3)\", \"max(a[1], p, 1e-3) - if(p >= 0, sqrt(p), 2)\"]\nlower = [0, -inf]\nstart = [1, 2]\n[solution]\nx = [0.5, 1]\nF = [0, 0]\n",
+    "kind = \"mcp\"\nF = [\"-x1^-2^x2*pi + `x1`\", \"!(x1 < x2 || x2 != 3) - piecewise(x1, -1, 0, 2)\"]\nupper = [inf, 3.0]\n",
 ];
 
 #[test]
 fn toml_files() {
     let seeds: Vec<_> = TOML.iter().map(|text| text.as_bytes().to_vec()).collect();
-    let words =
-        ["inf", "nan", "-0.0", "1e308", "18446744073709551615", "free = ", "[[", "\"mlcp\"", "1_0"];
+    let words = [
+        "inf",
+        "nan",
+        "-0.0",
+        "1e308",
+        "18446744073709551615",
+        "free = ",
+        "[[",
+        "\"mlcp\"",
+        "1_0",
+        "((",
+        "^",
+        "`",
+        "x1",
+        "-",
+        "atan2(",
+        ", ",
+    ];
     let mut random = Random(2);
     for _ in 0..rounds() {
         let bytes = random.mutation(&seeds, &words);
