@@ -1,6 +1,6 @@
 //! The judge of nonlinear problems.
 
-use super::super::judge::{NEVER, Pair, finite, natural, put, share, verdict, worse};
+use super::super::judge::{GENERATIONS, NEVER, Pair, finite, natural, put, share, verdict, worse};
 use super::Mcp;
 use crate::LcpPoint;
 use crate::Problem;
@@ -10,7 +10,8 @@ use crate::field::Evaluator;
 /// The judge's constants and buffers for a nonlinear problem.
 ///
 /// The error of row i is `|F_i| / D_i` (0/0 = 0), where D_i is the size of the row's terms at x: of a polynomial the sum of the moduli of its monomials, of
-/// other expressions the same to first order, of functions without expressions `|F_i − Σ_j J_ij x_j| + Σ_j |J_ij x_j|`. That a variable is d away from a bound
+/// other expressions the same to first order, of functions without expressions `|F_i − Σ_j J_ij x_j| + Σ_j |J_ij x_j|`; of rows that vanish with all their terms at least
+/// a ten-thousandth of ω_i, the size at the start, or, where that is zero, what a change of the other rows by their own ω makes of the row through the variables that they share. That a variable is d away from a bound
 /// counts as much as what it does to the rows, `max_k |J_kj| d / D_k`; where the Jacobian does not see it, d over the largest of `|x_j|`, `|start_j|` and the
 /// finite bounds. Therefore neither changes when rows or variables are multiplied by numbers.
 ///
@@ -20,7 +21,7 @@ use crate::field::Evaluator;
 /// | `dual` | the largest error of an F whose sign no bound allows |
 /// | `complementarity` | the largest error of a pair: the smaller of that of F and that of the distance from the bound that the sign of F asks for |
 /// | `relative` | the largest of the three; **decides** |
-/// | `own` | the largest `|F_i|` of those errors in units of the row's terms at the start: x that runs away excuses nothing |
+/// | `own` | the largest `|F_i|` of those errors in units of ω_i: x that runs away excuses nothing |
 /// | `absolute`, `literature`, `siconos` | the natural residual `‖x − mid(l, u, x − F(x))‖_∞` |
 ///
 /// [`certify`](Problem::certify) evaluates sums, products, quotients and roots of expressions in doubled precision.
@@ -30,7 +31,7 @@ pub struct McpGauge {
     jacobian: Vec<f64>,
     /// D at the point last measured.
     scales: Vec<f64>,
-    /// The same at the start.
+    /// ω
     units: Vec<f64>,
     /// The unit of each variable, but for its own value.
     lengths: Vec<f64>,
@@ -54,14 +55,43 @@ impl McpGauge {
             lengths: (0..n).map(length).collect(),
             effects: vec![0.0; n],
         };
+        gauge.units = vec![0.0; n];
         gauge.look(problem, &start, false);
         gauge.units = gauge.scales.clone();
+        gauge.hand_on(problem);
         gauge
+    }
+
+    /// Units of rows that have none, from their neighbours: `ω_i = max_j |J_ij| ζ_j`, `ζ_j = max_k ω_k / |J_kj|`.
+    fn hand_on(&mut self, problem: &Mcp) {
+        let Self { units, jacobian, .. } = self;
+        let mut columns = vec![0.0_f64; units.len()];
+        for _ in 0..GENERATIONS {
+            if units.iter().all(|u| *u > 0.0) {
+                return;
+            }
+            let places = || problem.F.pattern().places().zip(&*jacobian).filter(|(_, a)| **a != 0.0);
+            for ((k, j), a) in places().filter(|((k, _), _)| units[*k] > 0.0) {
+                columns[j] = columns[j].max(units[k] / a.abs());
+            }
+            let mut grown = false;
+            let mut next = units.clone();
+            for ((i, j), a) in places().filter(|((i, _), _)| units[*i] == 0.0) {
+                let unit = a.abs() * columns[j];
+                if unit > next[i] && unit.is_finite() {
+                    (next[i], grown) = (unit, true);
+                }
+            }
+            *units = next;
+            if !grown {
+                return;
+            }
+        }
     }
 
     /// F, D and what distances count at x. False where F is not defined.
     fn look(&mut self, problem: &Mcp, x: &[f64], precisely: bool) -> bool {
-        let Self { field, f, jacobian, scales, lengths, effects, .. } = self;
+        let Self { field, f, jacobian, scales, units, lengths, effects } = self;
         let pattern = problem.F.pattern();
         let smooth = field.jacobian(x, f, jacobian);
         let defined = match (precisely, smooth) {
@@ -82,9 +112,10 @@ impl McpGauge {
             }
         }
         // A size that is none, or less than the sum itself, is that of the sum.
-        scales.iter_mut().zip(&*f).for_each(|(d, f)| {
-            *d = if d.is_finite() { d.max(f.abs()) } else { f.abs() };
-        });
+        for ((d, f), unit) in scales.iter_mut().zip(&*f).zip(&*units) {
+            let own = if d.is_finite() { d.max(f.abs()) } else { f.abs() };
+            *d = own.max(VANISHING * unit);
+        }
         effects.fill(0.0);
         if smooth {
             for (i, d) in scales.iter().enumerate().filter(|(_, d)| **d > 0.0) {
@@ -198,6 +229,9 @@ impl McpGauge {
         verdict(measure, rows, self.f.clone(), tolerance)
     }
 }
+
+/// The part of ω that a row's terms count at least.
+const VANISHING: f64 = 1e-4;
 
 /// Where F is not defined: worse than anywhere else, and still a number.
 fn undefined() -> Measure {

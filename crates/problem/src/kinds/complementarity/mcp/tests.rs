@@ -34,7 +34,8 @@ fn josephy(row: f64, column: f64) -> (Mcp, [f64; 4]) {
     let f = Expressions::new(g, rows).unwrap();
     let solution = [6f64.sqrt() / 2.0, 0.0, 0.0, 0.5];
     let scaled: Vec<f64> = (0..4).map(|j| solution[j] / unit(j)).collect();
-    (Mcp::ncp(f, vec![1.0; 4]).unwrap(), scaled.try_into().unwrap())
+    let start = (0..4).map(|j| 1.0 / unit(j)).collect();
+    (Mcp::ncp(f, start).unwrap(), scaled.try_into().unwrap())
 }
 
 #[test]
@@ -108,4 +109,20 @@ fn callers_mistakes_are_errors() {
     assert!(said(&[0.0], &[1.0], &[f64::NAN]).contains("start[0]"));
     assert!(said(&[2.0], &[1.0], &[0.0]).contains("[l, u][0]"));
     assert!(Expressions::new(Graph::new(1), vec![]).is_err());
+}
+
+#[test]
+fn rows_that_vanish_with_all_their_terms_have_units_of_their_neighbours() {
+    // As Pyomo writes x² − 2 ⟂ x ≥ 0: b − (x² − 2) = 0, b ⟂ x. At the solution b is zero but for rounding.
+    let mut g = Graph::new(2);
+    let (x, b, two) = (g.variable(0), g.variable(1), g.constant(2.0));
+    let square = g.binary(Binary::Mul, x, x);
+    let f = g.binary(Binary::Sub, square, two);
+    let equation = g.binary(Binary::Sub, b, f);
+    let field = Expressions::new(g, vec![b, equation]).unwrap();
+    let (lower, upper) = (vec![0.0, f64::NEG_INFINITY], vec![f64::INFINITY; 2]);
+    let problem = Mcp::new(field, lower, upper, vec![1.0, 0.0]).unwrap();
+    let at = |b: f64| problem.judge(&LcpPoint { z: vec![2f64.sqrt(), b] }, 1e-10).unwrap();
+    assert!(at(4.4e-16).solved && at(0.0).solved);
+    assert!(!at(1e-9).solved);
 }
