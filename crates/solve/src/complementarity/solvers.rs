@@ -14,7 +14,7 @@ use crate::complementarity::pivoting::{
 };
 use crate::complementarity::proximal::{Proxi, Semicomp};
 use crate::complementarity::quadratic::{Mprgp, QuadraticProgram};
-use crate::complementarity::reform::{Mixed, Reduce, Split};
+use crate::complementarity::reform::{Mixed, Presolve, Reduce, Split};
 use crate::complementarity::splitting::{Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs};
 use crate::core::register::{Edge, Entry, Registered};
 
@@ -115,5 +115,9 @@ impl Registered for Mcp {
             Entry::of::<Newton<FischerBurmeister>>(),
             Entry::of::<Newton<Penalised>>(),
         ]
+    }
+
+    fn edges() -> Vec<Edge<Self>> {
+        vec![Edge::new::<Presolve>()]
     }
 }

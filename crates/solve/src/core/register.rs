@@ -3,6 +3,8 @@
 //! A name is a path, `condense/facet_inner/lemke`: each prefix is a reformulation to another kind of problem (or to the same kind with a proximal
 //! term), which has solvers and prefixes of its own; the last part is a solver there.
 
+use std::any::TypeId;
+
 use nonsmooth_problem::{Kind, Problem};
 use serde::Serialize;
 
@@ -195,7 +197,7 @@ pub struct Edge<P: Problem> {
     names: fn() -> Vec<String>,
 }
 
-impl<P: Problem> Edge<P> {
+impl<P: Problem + 'static> Edge<P> {
     /// The edge that is `C`.
     pub(crate) fn new<C: Composed<P>>() -> Self {
         Self {
@@ -212,7 +214,10 @@ impl<P: Problem> Edge<P> {
                 Some((about, if C::NEARLY { Solves::Relaxation } else { solves }))
             },
             names: || {
-                let names = with_steps::<C::To>().into_iter().filter(|name| C::lists(name));
+                // What leads back to the same kind is not gone through again.
+                let again = TypeId::of::<C::To>() == TypeId::of::<P>();
+                let names = if again { direct::<C::To>() } else { with_steps::<C::To>() };
+                let names = names.into_iter().filter(|name| C::lists(name));
                 names.map(|name| format!("{}/{name}", C::NAME)).collect()
             },
         }
@@ -268,10 +273,15 @@ fn describe<P: Registered>(name: &str) -> Option<(&'static About, Solves)> {
 
 /// The names of solvers that a prefix can lead to.
 fn with_steps<P: Registered>() -> Vec<String> {
-    let solvers = P::solvers().into_iter().filter(Entry::has_steps);
-    let mut names: Vec<String> = solvers.map(|entry| entry.about.name.into()).collect();
+    let mut names = direct::<P>();
     names.extend(composed_names::<P>());
     names
+}
+
+/// Those of them without a prefix of their own.
+fn direct<P: Registered>() -> Vec<String> {
+    let solvers = P::solvers().into_iter().filter(Entry::has_steps);
+    solvers.map(|entry| entry.about.name.into()).collect()
 }
 
 /// The descriptions of the solvers that work on problems of type `P` directly.

@@ -5,13 +5,17 @@
 //!
 //! References: Munson2002; Billups1995; the solvers' own files. Cost: that of the solvers tried. Fails: where all of them do.
 
+use std::borrow::Cow;
+
 use nonsmooth_problem::{BoxLcp, LcpPoint, Mcp, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::plan::{ALL, Plan};
 use super::{Candidate, LinearAuto, Portfolio};
-use crate::core::register::{About, Described, Solves};
+use crate::complementarity::reform::Presolve;
+use crate::complementarity::reform::presolve::reduces;
+use crate::core::register::{About, Composed, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::core::trace::Trace;
 use crate::{Limits, Observer, Outcome, Progress, Sample, Session, SolveError, Status};
@@ -50,37 +54,36 @@ impl NonlinearAuto {
     pub fn session(self) -> AutoSession {
         AutoSession {
             linear: LinearAuto::default().session::<BoxLcp>(),
-            nonlinear: Portfolio::new(move |_: &Mcp, stage| self.plan(stage)),
+            nonlinear: Portfolio::new(move |problem: &Mcp, stage| self.plan(problem, stage)),
             affine: None,
         }
     }
 
-    /// The solvers of a stage.
-    fn plan(&self, stage: usize) -> Vec<Candidate> {
-        match stage {
-            0 => {
-                Plan::new()
-                    .then("semismooth", 60, "fast where the start is good")
-                    .with("restarts", false)
-                    .anew("proxi", 150, "leaves stationary points")
-                    .anew("smooth", 100, "another way")
-                    .0
-            }
-            1 => {
-                Plan::new()
-                    .anew("semismooth", 600, "with other options")
-                    .anew("semicomp", 3000, "leaves stationary points")
-                    .anew("proxi", 3000, "without crash")
-                    .with("crash", false)
-                    .0
-            }
+    /// The solvers of a stage; without what a presolve takes away, where there is something.
+    fn plan(&self, problem: &Mcp, stage: usize) -> Vec<Candidate> {
+        let reduces = reduces(problem);
+        let named = |name: &'static str| -> Cow<'static, str> {
+            if reduces { format!("{}/{name}", Presolve::NAME).into() } else { name.into() }
+        };
+        let plan = Plan::new();
+        let plan = match stage {
+            0 => plan
+                .then(named("semismooth"), 60, "fast where the start is good")
+                .with("restarts", false)
+                .anew(named("proxi"), 150, "leaves stationary points")
+                .anew(named("smooth"), 100, "another way"),
+            1 => plan
+                .anew(named("semismooth"), 600, "with other options")
+                .anew(named("semicomp"), 3000, "leaves stationary points")
+                .anew(named("proxi"), 3000, "without crash")
+                .with("crash", false),
             _ => {
-                Plan::new()
-                    .anew("newton_pfb", ALL, "from other starts")
-                    .with("restarts", self.restarts.saturating_mul(1 << (stage - 2).min(10)))
-                    .0
+                let restarts = self.restarts.saturating_mul(1 << (stage - 2).min(10));
+                plan.anew(named("newton_pfb"), ALL, "from other starts")
+                    .with("restarts", restarts.min(1000))
             }
-        }
+        };
+        plan.0
     }
 }
 

@@ -1,5 +1,7 @@
 //! Which solvers `auto` tries on a linear complementarity problem, in which order, and why.
 
+use std::borrow::Cow;
+
 use nonsmooth_analysis::{Class, Classes};
 use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
@@ -93,11 +95,11 @@ impl Plan {
 
     pub(super) fn then(
         mut self,
-        name: &'static str,
+        name: impl Into<Cow<'static, str>>,
         iterations: usize,
         because: impl Into<String>,
     ) -> Self {
-        let (settings, because) = (SettingsMap::new(), because.into());
+        let (name, settings, because) = (name.into(), SettingsMap::new(), because.into());
         self.0.push(Candidate { name, settings, iterations, because, anew: false });
         self
     }
@@ -105,7 +107,7 @@ impl Plan {
     /// A candidate that begins where the solve began.
     pub(super) fn anew(
         self,
-        name: &'static str,
+        name: impl Into<Cow<'static, str>>,
         iterations: usize,
         because: impl Into<String>,
     ) -> Self {

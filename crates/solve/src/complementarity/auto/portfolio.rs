@@ -17,7 +17,7 @@ use crate::{Limit, Limits, Observer, Outcome, Progress, Sample, Session, SolveEr
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     /// The name in the registry.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// What departs from its defaults.
     pub settings: SettingsMap,
     /// At most this many iterations, before the next one has its turn.
@@ -36,7 +36,7 @@ type Planner<P> = Box<dyn Fn(&P, usize) -> Vec<Candidate> + Send>;
 pub struct Portfolio<P: Registered> {
     plan: Planner<P>,
     /// What was made for earlier problems, by name and settings.
-    sessions: Vec<(&'static str, SettingsMap, Box<dyn Session<P>>)>,
+    sessions: Vec<(Cow<'static, str>, SettingsMap, Box<dyn Session<P>>)>,
     /// The one that was last asked.
     last: Option<usize>,
     history: History,
@@ -66,14 +66,14 @@ impl<P: Registered> Portfolio<P> {
 
     /// The place of the candidate's session.
     fn session(&mut self, candidate: &Candidate) -> Result<usize, SolveError> {
-        let same = |(name, settings, _): &(&str, SettingsMap, _)| {
+        let same = |(name, settings, _): &(Cow<str>, SettingsMap, _)| {
             *name == candidate.name && *settings == candidate.settings
         };
         if let Some(k) = self.sessions.iter().position(same) {
             return Ok(k);
         }
-        let session = register::bare::<P>(candidate.name, &candidate.settings)?;
-        self.sessions.push((candidate.name, candidate.settings.clone(), session));
+        let session = register::bare::<P>(&candidate.name, &candidate.settings)?;
+        self.sessions.push((candidate.name.clone(), candidate.settings.clone(), session));
         Ok(self.sessions.len() - 1)
     }
 }
@@ -97,7 +97,7 @@ impl Stages {
             while let Some(candidate) = self.open.pop_front() {
                 // What was tried with as much patience would do the same again.
                 let again = |t: &Candidate| {
-                    (t.name, &t.settings) == (candidate.name, &candidate.settings)
+                    (&t.name, &t.settings) == (&candidate.name, &candidate.settings)
                         && t.iterations >= candidate.iterations
                 };
                 if !self.tried.iter().any(again) {

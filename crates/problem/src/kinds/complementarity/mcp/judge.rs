@@ -70,7 +70,8 @@ impl McpGauge {
             if units.iter().all(|u| *u > 0.0) {
                 return;
             }
-            let places = || problem.F.pattern().places().zip(&*jacobian).filter(|(_, a)| **a != 0.0);
+            let places =
+                || problem.F.pattern().places().zip(&*jacobian).filter(|(_, a)| **a != 0.0);
             for ((k, j), a) in places().filter(|((k, _), _)| units[*k] > 0.0) {
                 columns[j] = columns[j].max(units[k] / a.abs());
             }
