@@ -9,13 +9,14 @@ use nonsmooth_problem::{AnyProblem, Kind, Problem};
 use crate::fclib::Fclib;
 use crate::linear::market::Market;
 use crate::linear::toml::Toml;
+use crate::nl::Nl;
 use crate::replace::{WRITABLE, replace};
 use crate::siconos::Siconos;
 use crate::table::Csv;
 use crate::{IoError, ProblemFile};
 
 /// All formats, as help texts, messages and searches list them. A new one is a type with this trait and its line here.
-pub static FORMATS: [&dyn Format; 5] = [&Fclib, &Toml, &Market, &Siconos, &Csv];
+pub static FORMATS: [&dyn Format; 6] = [&Fclib, &Toml, &Market, &Nl, &Siconos, &Csv];
 
 /// What a format is.
 #[derive(Debug, Clone, Copy)]
