@@ -3,6 +3,8 @@
 
 mod classes;
 mod indeterminacy;
+mod jacobian;
+mod monotone;
 mod pattern;
 mod spectrum;
 
@@ -13,6 +15,8 @@ use serde::{Deserialize, Serialize};
 
 pub use classes::{Class, Classes, Effort, Finding, How, Why, Witness};
 pub use indeterminacy::Indeterminacy;
+pub use jacobian::{Entry, JacobianCheck};
+pub use monotone::{Apart, Sampled};
 pub use pattern::Pattern;
 pub use spectrum::{Spectrum, SpectrumError, rank};
 

@@ -32,7 +32,7 @@ pub fn sizes(problem: &AnyProblem) -> Object {
     match problem {
         AnyProblem::Friction(p) => fields(json!({"contacts": p.contacts(), "unknowns": unknowns})),
         AnyProblem::Complementarity(linear) => {
-            let (rows, others) = with_complementarity!(linear, p => (p.right().len(), p.sizes()));
+            let (rows, others) = with_complementarity!(linear, p => (p.equations(), p.sizes()));
             let mut all = fields(json!({"rows": rows, "unknowns": unknowns}));
             all.extend(others.into_iter().map(|(name, n)| (name.into(), json!(n))));
             all

@@ -22,7 +22,7 @@ pub(super) struct Facts {
 }
 
 /// What the entries of a matrix say at a glance.
-struct Entries {
+pub(super) struct Entries {
     rows: usize,
     columns: usize,
     dense: bool,
@@ -71,7 +71,7 @@ impl Facts {
 }
 
 /// What the entries, a few factorisations, and of small matrices exact tests say of M.
-fn classes(m: &Matrix) -> Classes {
+pub(super) fn classes(m: &Matrix) -> Classes {
     /// Rows above which more than a factorisation or two takes long.
     const MANY: usize = 2000;
     match m.nrows() {
@@ -81,7 +81,7 @@ fn classes(m: &Matrix) -> Classes {
 }
 
 /// Classes in three lines: those that M is in, is not in, and those of which nothing is known.
-fn classes_text(text: &mut String, classes: &Classes) {
+pub(super) fn classes_text(text: &mut String, classes: &Classes) {
     let (mut is, mut is_not, mut unknown) = (vec![], vec![], vec![]);
     for (class, finding) in classes.iter() {
         match finding {
@@ -98,7 +98,7 @@ fn classes_text(text: &mut String, classes: &Classes) {
 }
 
 impl Entries {
-    fn of(m: &Matrix) -> Self {
+    pub(super) fn of(m: &Matrix) -> Self {
         let (rows, columns) = (m.nrows(), m.ncols());
         let mut diagonal = [0, rows.min(columns), 0];
         let mut off = [0; 2];
@@ -156,7 +156,7 @@ impl Entries {
         format!("{diagonal}, {off}")
     }
 
-    fn json(&self) -> Value {
+    pub(super) fn json(&self) -> Value {
         let [positive, zero, negative] = self.diagonal;
         json!({
             "rows": self.rows,
@@ -172,7 +172,7 @@ impl Entries {
         })
     }
 
-    fn text(&self) -> String {
+    pub(super) fn text(&self) -> String {
         let Self { rows, columns, .. } = self;
         let stored = if self.dense { "dense" } else { "sparse" };
         if rows * columns == 0 || self.nonzeros == 0 {

@@ -2,13 +2,14 @@
 
 mod contact;
 mod linear;
+mod nonlinear;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use nonsmooth_io::{ProblemFile, StoredPoint};
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::{AnyProblem, ProblemError};
+use nonsmooth_problem::{AnyProblem, Complementarity, ProblemError};
 use nonsmooth_solve::{Limits, guard};
 use serde_json::{Value, json};
 
@@ -23,6 +24,9 @@ use crate::{Exit, files, interrupt, output};
 ///
 /// Of the matrix of a linear complementarity problem: in which classes it surely is or is not, with a witness, and which
 /// solvers are therefore sure to end in a solution.
+///
+/// Of a nonlinear one: where F and its Jacobian come from, which rows are affine, and whether F is monotone: of an affine one from the classes of its matrix, of
+/// others by sampled pairs of points, which may refute it but do not prove it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
@@ -100,6 +104,7 @@ struct Facts {
 enum Details {
     Contact(contact::Facts),
     Linear(linear::Facts),
+    Nonlinear(nonlinear::Facts),
 }
 
 impl Facts {
@@ -113,6 +118,9 @@ impl Facts {
         };
         let details = match &content.problem {
             AnyProblem::Friction(p) => Details::Contact(contact::Facts::of(p, content.info.dofs)),
+            AnyProblem::Complementarity(Complementarity::Mcp(p)) => {
+                Details::Nonlinear(nonlinear::Facts::of(p))
+            }
             AnyProblem::Complementarity(p) => Details::Linear(linear::Facts::of(p)),
         };
         Ok(Self { details, solution })
@@ -128,6 +136,7 @@ impl Facts {
                 all.insert("guesses".into(), json!(guesses.len()));
             }
             Details::Linear(facts) => all.extend(facts.json()),
+            Details::Nonlinear(facts) => all.extend(facts.json()),
         }
         let judged = |v: &AnyVerdict| report::verdict_json(v, JUDGED_AT, v.worst.len());
         all.insert("solution".into(), json!(self.solution.as_ref().map(judged)));
@@ -145,6 +154,7 @@ impl Facts {
         match &self.details {
             Details::Contact(facts) => facts.text(&mut text),
             Details::Linear(facts) => facts.text(&mut text),
+            Details::Nonlinear(facts) => facts.text(&mut text),
         }
         if !guesses.is_empty() {
             row(&mut text, "guesses", guesses.len());

@@ -3,7 +3,8 @@
 use nonsmooth_bench::draw::{Axis, GRID, INK, font, tick, ticks};
 use nonsmooth_problem::check::Motion;
 use nonsmooth_problem::{
-    AnyPoint, AnyProblem, AnyStatus, Friction, Problem, Stated, with_complementarity, with_friction,
+    AnyPoint, AnyProblem, AnyStatus, Complementarity, Friction, Mcp, Problem, Stated,
+    with_complementarity, with_friction,
 };
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -128,10 +129,28 @@ fn spies(problem: &AnyProblem) -> Vec<Spy> {
         AnyProblem::Friction(Friction::Local3(p)) => vec![blocks(&p.W)],
         AnyProblem::Friction(Friction::Global2(p)) => vec![sparse("M", &p.M), sparse("H", &p.H)],
         AnyProblem::Friction(Friction::Global3(p)) => vec![sparse("M", &p.M), sparse("H", &p.H)],
+        AnyProblem::Complementarity(Complementarity::Mcp(p)) => vec![jacobian(p)],
         AnyProblem::Complementarity(linear) => {
             let matrices = with_complementarity!(linear, p => p.matrices());
             matrices.into_iter().map(|(name, m)| any(name, m)).collect()
         }
+    }
+}
+
+/// Where the Jacobian is not zero at the start; where it is not defined there, all its places.
+fn jacobian(problem: &Mcp) -> Spy {
+    let (n, pattern) = (problem.dim(), problem.F.pattern());
+    let mut values = vec![0.0; pattern.len()];
+    let start = problem.origin().z;
+    let defined = problem.F.evaluator().jacobian(&start, &mut vec![0.0; n], &mut values);
+    let places = pattern.places().zip(&values).filter(|(_, x)| !defined || **x != 0.0);
+    let at = if defined { "at the start" } else { "undefined at the start: its places" };
+    Spy {
+        name: "Jacobian of F",
+        rows: n,
+        columns: n,
+        entries: places.map(|(place, _)| place).collect(),
+        counts: format!("{n} × {n}, {at}"),
     }
 }
 
@@ -415,6 +434,16 @@ mod tests {
         picture(&problem, Some(problem.origin()));
         assert!(!picture(&problem, None).contains("Normal impulses"));
         assert!(picture(&PlantedLcp::default().lcp().0.into(), None).contains("M: "));
+        // At the start 0 the second row has one entry, x1 being a factor; the first is not defined in the second problem.
+        for (texts, said) in [
+            (["x1 + x2", "x1*x2 + x2"], "Jacobian of F: 2 × 2, at the start, 75% filled"),
+            (["log(x1)", "x1*x2"], "undefined at the start: its places, 75% filled"),
+        ] {
+            let f = nonsmooth_problem::field::Expressions::parse(&texts.map(String::from), &[]);
+            let problem = Mcp::ncp(f.unwrap(), vec![0.0; 2]).unwrap();
+            let svg = picture(&problem.into(), None);
+            assert!(svg.contains(said), "{svg}");
+        }
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! | [`Expressions`] | a graph of operations, in plain and in doubled precision | exact, sparse, backwards through each row |
 
 mod expression;
+mod groups;
 
 use std::fmt::Debug;
 

@@ -105,6 +105,11 @@ pub trait Stated: OfAny {
         self.pairs()
     }
 
+    /// The number of rows.
+    fn equations(&self) -> usize {
+        self.right().len()
+    }
+
     /// The size, in words.
     fn size(&self) -> String;
 

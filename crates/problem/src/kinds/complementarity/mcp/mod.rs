@@ -260,6 +260,10 @@ impl Stated for Mcp {
         self.dim()
     }
 
+    fn equations(&self) -> usize {
+        self.dim()
+    }
+
     fn size(&self) -> String {
         let all = || self.lower.iter().zip(&self.upper);
         let count = |of: fn(f64, f64) -> bool| all().filter(|&(&l, &u)| of(l, u)).count();
