@@ -11,7 +11,7 @@ use nonsmooth_problem::{BoxLcp, LcpPoint, Mcp, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::plan::{ALL, Plan};
+use super::plan::Plan;
 use super::{Candidate, LinearAuto, Portfolio};
 use crate::complementarity::reform::Presolve;
 use crate::complementarity::reform::presolve::reduces;
@@ -24,7 +24,7 @@ use crate::{Limits, Observer, Outcome, Progress, Sample, Session, SolveError, St
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct NonlinearAuto {
-    /// How often it begins again at perturbed starts where nothing has solved the problem, without a limit on time.
+    /// How many perturbed starts it tries in a turn where nothing has solved the problem: two turns without a limit on time, else until it is over.
     pub restarts: usize,
 }
 
@@ -74,13 +74,17 @@ impl NonlinearAuto {
                 .anew(named("smooth"), 100, "another way"),
             1 => plan
                 .anew(named("semismooth"), 600, "with other options")
+                .anew(named("newton_pfb"), 300, "another memory, other starts")
                 .anew(named("semicomp"), 3000, "leaves stationary points")
                 .anew(named("proxi"), 3000, "without crash")
                 .with("crash", false),
             _ => {
-                let restarts = self.restarts.saturating_mul(1 << (stage - 2).min(10));
-                plan.anew(named("newton_pfb"), ALL, "from other starts")
-                    .with("restarts", restarts.min(1000))
+                let first = 1 + (stage - 2) * self.restarts;
+                (first..first + self.restarts).fold(plan, |plan, seed| {
+                    plan.anew(named("semismooth"), 200, "from another start")
+                        .with("restarts", false)
+                        .with("seed", seed)
+                })
             }
         };
         plan.0

@@ -88,7 +88,12 @@ struct Stages {
     stage: usize,
     open: VecDeque<Candidate>,
     tried: Vec<Candidate>,
+    /// Stages since the last new candidate.
+    barren: usize,
 }
+
+/// Stages without a new candidate after which a plan is over.
+const BARREN: usize = 3;
 
 impl Stages {
     fn next<P>(&mut self, problem: &P, plan: &Planner<P>, limits: &Limits) -> Option<Candidate> {
@@ -102,12 +107,15 @@ impl Stages {
                 };
                 if !self.tried.iter().any(again) {
                     self.tried.push(candidate.clone());
+                    self.barren = 0;
                     return Some(candidate);
                 }
             }
-            if self.stage >= most {
+            // A plan that has nothing new to say for several stages has nothing more to say.
+            if self.stage >= most || self.barren > BARREN {
                 return None;
             }
+            self.barren += 1;
             self.open = plan(problem, self.stage).into();
             if self.open.is_empty() && self.stage > 0 {
                 return None;

@@ -39,11 +39,13 @@ pub struct Semismooth {
     pub crash: bool,
     /// Whether it begins again with other options where it stalls.
     pub restarts: bool,
+    /// Where it begins: 0 at the start, other numbers at points around it, ever farther with the number modulo 4.
+    pub seed: u64,
 }
 
 impl Default for Semismooth {
     fn default() -> Self {
-        Self { lambda: 0.8, memory: 4, crash: true, restarts: true }
+        Self { lambda: 0.8, memory: 4, crash: true, restarts: true, seed: 0 }
     }
 }
 
@@ -62,7 +64,7 @@ impl Described for Semismooth {
         summary: "semismooth Newton on the penalised Fischer-Burmeister function, with crash and restarts (the code SEMI)",
         needs: &[],
         cites: &["DeLucaFacchineiKanzow1996", "ChenChenKanzow2000", "Munson2002", "Acary2018"],
-        variants: &["crash=false"],
+        variants: &["crash=false", "seed=1"],
         settings: described::<Self>,
     };
 }
@@ -123,6 +125,9 @@ impl Solver<Mcp> for Semismooth {
 
     fn start(&self, _: &Mcp, point: &mut LcpPoint, work: &mut Work) {
         work.solve.begin(point);
+        if self.seed > 0 {
+            work.solve.at.perturbed(&mut work.solve.model, self.seed);
+        }
         self.begin(0, work);
     }
 
