@@ -52,9 +52,16 @@ impl Rows {
     pub(crate) fn add_matrix(&mut self, sign: f64, a: &Matrix, x: &[f64]) -> bool {
         match a {
             Matrix::Sparse(a) => self.add(sign, a, x),
+            Matrix::Dense(a) if self.plainly => {
+                for i in 0..a.nrows() {
+                    let [sum, size] = dot(a.row(i), x);
+                    self.sums[i].add_plainly(sign * sum);
+                    self.sizes[i] += size;
+                }
+            }
             Matrix::Dense(a) => {
                 for i in 0..a.nrows() {
-                    for (&a, &x) in a.row(i).iter().zip(x) {
+                    for (&a, &x) in a.row(i).iter().zip(x).filter(|e| *e.1 != 0.0) {
                         self.add_product(i, sign * a, x);
                     }
                 }
@@ -225,4 +232,23 @@ mod fused {
             (*of_sums, *of_sizes) = (sum, size);
         }
     }
+}
+
+/// `Σ a_j x_j` and `Σ |a_j x_j|`, each as four sums side by side.
+fn dot(a: &[f64], x: &[f64]) -> [f64; 2] {
+    let ((a4, a), (x4, x)) = (a.as_chunks::<4>(), x.as_chunks::<4>());
+    let (mut sums, mut sizes) = ([0.0; 4], [0.0; 4]);
+    for (a, x) in a4.iter().zip(x4) {
+        for k in 0..4 {
+            let product = a[k] * x[k];
+            sums[k] += product;
+            sizes[k] += product.abs();
+        }
+    }
+    let (mut sum, mut size): (f64, f64) = (sums.iter().sum(), sizes.iter().sum());
+    for (a, x) in a.iter().zip(x) {
+        sum += a * x;
+        size += (a * x).abs();
+    }
+    [sum, size]
 }

@@ -15,10 +15,9 @@ use crate::core::settings::SettingsMap;
 const DENSE: usize = 2000;
 /// Up to this many variables a pivot on a sparse basis is.
 const SPARSE: usize = 10_000;
-/// Beyond this many variables sweeps over a sparse symmetric matrix come before its factorisation.
-const LARGE: usize = 2000;
-/// Sweeps that cost no more than a few factorisations.
-const SWEEPS: usize = 2000;
+/// Beyond this many variables of a sparse matrix an interior point's few factorisations are cheaper than many pivots, and Newton's than blocks of pivots that
+/// move a front from row to row.
+const LARGE: usize = 1000;
 /// Beyond this many variables the class is not asked for.
 const HUGE: usize = 50_000;
 
@@ -44,6 +43,10 @@ impl Facts {
         Some(Self { n, sparse, symmetric, positive_diagonal, classes })
     }
 
+    fn is_not(&self, class: Class) -> bool {
+        self.classes.as_ref().is_some_and(|c| c.is_not(class))
+    }
+
     fn is(&self, class: Class) -> bool {
         self.classes.as_ref().is_some_and(|c| c.is(class))
     }
@@ -53,9 +56,9 @@ impl Facts {
         self.classes.as_ref().is_some_and(|c| c.is_likely(Class::PositiveSemidefinite))
     }
 
-    /// Whether sweeps may well be the fastest.
-    fn sweepable(&self) -> bool {
-        self.symmetric && self.positive_diagonal && self.sparse && self.n > LARGE
+    /// Whether factorisations are so cheap, and pivots so many, that the fewest of them win.
+    fn large(&self) -> bool {
+        self.sparse && self.n > LARGE
     }
 
     /// Whether Lemke's method is affordable.
@@ -134,6 +137,9 @@ fn pivots(n: usize) -> usize {
     20 * n + 200
 }
 
+/// Single changes of block pivoting, each at the price of a factorisation, after which others have their turn.
+const SINGLES: usize = 20;
+
 /// Bases to enumerate: all of them.
 pub(super) const ALL: usize = usize::MAX;
 
@@ -164,17 +170,37 @@ const AT_ONCE: usize = 0;
 const BY_CLASS: usize = 1;
 /// Up to this many variables a class costs as much as a solve by pivots, of dense and of sparse matrices.
 const SMALL: usize = 1000;
-const SMALL_SPARSE: usize = 60;
+const SMALL_SPARSE: usize = 500;
+/// From this many variables on a few sweeps over a dense matrix are cheap beside pivots.
+const SWEPT: usize = 60;
 
-/// Pivots before any look at the matrix, where these are cheap.
-fn at_once(m: &Matrix, pivoting: &'static str) -> Vec<Candidate> {
+/// Sweeps that cost less than pivots and factorisations: on grids of n points over-relaxation takes O(√n).
+fn sweeps(m: &Matrix) -> usize {
+    let n = m.nrows() as f64;
+    match m {
+        Matrix::Sparse(_) => (50.0 + 10.0 * n.sqrt()).min(3000.0) as usize,
+        _ => 60,
+    }
+}
+
+/// What needs no look at the class: sweeps, as long as their rate promises an end, and pivots, where these are cheap.
+fn at_once(m: &Matrix, dense_from: usize, pivoting: &'static str, size: usize) -> Plan {
     let n = m.nrows();
-    let small = match m {
-        Matrix::Dense(_) => n <= SMALL,
-        Matrix::Sparse(_) => n <= SMALL_SPARSE,
-        Matrix::Operator(_) => false,
+    let (small, sweepable) = match m {
+        Matrix::Dense(_) => (size <= SMALL, n >= dense_from),
+        Matrix::Sparse(_) => (size <= SMALL_SPARSE, true),
+        Matrix::Operator(_) => (false, false),
     };
-    Plan::new().when(small, |p| p.then(pivoting, pivots(n), "small")).0
+    let positive = || m.diagonal().is_some_and(|d| d.iter().all(|d| *d > 0.0));
+    // Without symmetry over-relaxation has to show first that it does no harm.
+    let first = |m: &Matrix| if n > LARGE && m.asymmetry() == Some(0.0) { 1.3 } else { 1.0 };
+    Plan::new()
+        .when(sweepable && positive(), |p| {
+            let most = sweeps(m);
+            let p = p.then("psor", most, "as long as its rate is good").with("patience", most);
+            p.with("omega", first(m))
+        })
+        .when(small, |p| p.then(pivoting, pivots(size), "small"))
 }
 
 /// Pivots from other covering vectors, with more patience each time, and all cases of few pairs.
@@ -208,7 +234,7 @@ const MOST_PAIRS: usize = 40;
 pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
     match stage {
         AT_ONCE if is_game(problem) => return games(problem.dim()).0,
-        AT_ONCE => return at_once(&problem.M, "lemke"),
+        AT_ONCE => return at_once(&problem.M, SWEPT, "lemke", problem.dim()).0,
         BY_CLASS => {}
         _ => return patiently(["lemke", "enumeration"], &problem.M, problem.dim(), stage),
     }
@@ -216,15 +242,15 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto, stage: usize) -> Vec<
         return of_operator();
     };
     let n = facts.n;
-    let mut plan = Plan::new();
-    if facts.sweepable() {
-        plan = plan.then("psor", SWEEPS, format!("{}, sparse and large", facts.class()));
-    }
     // Finite for P; and a Z-matrix with a positive diagonal may well be one.
-    if facts.is(Class::P) || (facts.is(Class::Z) && facts.positive_diagonal) {
-        plan = plan.then("block_pivoting", 300, facts.class());
-    }
-    plan = plan
+    let blocks = facts.is(Class::P) || (facts.is(Class::Z) && facts.positive_diagonal);
+    let transport = facts.large() && !facts.symmetric && facts.is_not(Class::Z);
+    let plan = Plan::new()
+        .when(blocks && transport, |p| p.then("newton_fb", 100, "large and not symmetric"))
+        .when(blocks, |p| {
+            p.then("block_pivoting", 300, facts.class()).with("most_singles", SINGLES)
+        })
+        .when(facts.monotone() && facts.large(), |p| p.then("ip_mehrotra", 200, facts.class()))
         .when(facts.pivotal(), |p| p.then("lemke", pivots(n), facts.class()))
         .when(facts.monotone() || n > DENSE, |p| p.then("ip_mehrotra", 200, facts.class()))
         .then("newton_min", 300, "superlinear where it converges")
@@ -247,7 +273,9 @@ pub(super) fn of_mlcp(problem: &Mlcp, settings: &LinearAuto, stage: usize) -> Ve
     let square = problem.equalities == problem.free;
     match stage {
         AT_ONCE if square && is_game(problem) => return games(problem.q.len()).0,
-        AT_ONCE if square => return at_once(&problem.M, "lemke"),
+        AT_ONCE if square => {
+            return at_once(&problem.M, usize::MAX, "lemke", problem.q.len()).0;
+        }
         AT_ONCE => return vec![],
         BY_CLASS => {}
         _ if square => return patiently(["lemke", "enumeration"], &problem.M, pairs, stage),
@@ -268,6 +296,7 @@ pub(super) fn of_mlcp(problem: &Mlcp, settings: &LinearAuto, stage: usize) -> Ve
         return of_operator();
     };
     Plan::new()
+        .when(facts.monotone() && facts.large(), |p| p.then("ip_mehrotra", 200, facts.class()))
         .when(facts.pivotal(), |p| p.then("lemke", pivots(n), facts.class()))
         .when(facts.monotone(), |p| p.then("ip_mehrotra", 200, facts.class()))
         .then("newton_min", 300, "superlinear where it converges")
@@ -285,8 +314,25 @@ pub(super) fn of_mlcp(problem: &Mlcp, settings: &LinearAuto, stage: usize) -> Ve
 }
 
 pub(super) fn of_box(problem: &BoxLcp, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+    let bounds = problem.lower.iter().zip(&problem.upper);
+    // Second bounds become pairs of their own.
+    let twice = bounds.clone().filter(|(l, u)| l.is_finite() && u.is_finite() && l != u).count();
+    let finite: usize =
+        bounds.map(|(l, u)| usize::from(l.is_finite()) + usize::from(u.is_finite())).sum();
+    let n = problem.dim();
+    let split = n + twice;
     match stage {
-        AT_ONCE => return vec![],
+        AT_ONCE => {
+            let m = &problem.M;
+            let Plan(mut plan) = at_once(m, SWEPT_BOX, "split/lemke", split);
+            if n <= SMALL && m.asymmetry() == Some(0.0) {
+                // Conjugate gradients where sweeps are slow; pivots come after them.
+                let cg = Plan::new().then("mprgp", CONJUGATE, "symmetric");
+                let at = plan.len() - plan.iter().filter(|c| c.name == "split/lemke").count();
+                plan.splice(at..at, cg.0);
+            }
+            return plan;
+        }
         BY_CLASS => {}
         _ => {
             let solvers = ["split/lemke", "split/enumeration"];
@@ -296,26 +342,27 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &LinearAuto, stage: usize) -> V
     let Some(facts) = Facts::of(&problem.M) else {
         return of_operator();
     };
-    let bounds = problem.lower.iter().chain(&problem.upper);
-    let finite = bounds.filter(|b| b.is_finite()).count();
-    let n = facts.n;
     Plan::new()
-        .when(facts.sweepable(), |p| {
-            p.then("psor", SWEEPS, format!("{}, sparse and large", facts.class()))
+        .when(facts.monotone() && facts.large(), |p| {
+            p.then("split/ip_mehrotra", 200, facts.class())
         })
-        .then("newton_min", 300, facts.class())
-        .then("newton_fb", 500, "globalised")
+        .then("newton_min", 100, facts.class())
+        .then("newton_fb", 200, "globalised")
         .when(finite <= 2 * EXACT && n <= EXACT, exactly)
-        .when(facts.pivotal(), |p| {
-            p.then("split/lemke", pivots(n + finite), "decides more classes")
-        })
-        .when(facts.monotone(), |p| p.then("split/ip_mehrotra", 200, facts.class()))
+        .when(facts.pivotal(), |p| p.then("split/lemke", pivots(split), "decides more classes"))
+        .then("split/ip_mehrotra", 200, facts.class())
+        .then("newton_pfb", 500, "another merit function")
         .when(finite <= settings.enumerate_below, |p| {
             p.then("split/enumeration", ALL, "decides, whatever the class")
         })
         .then("rpsor", 100_000, "needs no factorisation")
         .0
 }
+
+/// From this many variables on a few sweeps over a dense box problem are cheap beside pivots with all bounds.
+const SWEPT_BOX: usize = 8;
+/// Steps of conjugate gradients that are cheap beside pivots.
+const CONJUGATE: usize = 150;
 
 pub(super) fn of_hlcp(problem: &Hlcp, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
     match stage {

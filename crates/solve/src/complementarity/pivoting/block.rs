@@ -33,11 +33,13 @@ pub struct BlockPivoting {
     pub patience: usize,
     /// Go on with single changes, which are finite for P-matrices; otherwise go on with all at once, and stop where they cycle.
     pub fallback: bool,
+    /// Single changes after which the method ends, as each costs a factorisation; 0: as many as it takes.
+    pub most_singles: usize,
 }
 
 impl Default for BlockPivoting {
     fn default() -> Self {
-        Self { patience: 10, fallback: true }
+        Self { patience: 10, fallback: true, most_singles: 0 }
     }
 }
 
@@ -361,6 +363,9 @@ impl<P: Complementary> Solver<P> for BlockPivoting {
                 }
                 None => {}
             }
+        }
+        if work.single && self.most_singles > 0 && work.singles >= self.most_singles {
+            return Step::Stuck("single changes prevail: see `most_singles`".into());
         }
         work.change(!work.single);
         if work.cycle.returns(&work.basis) && (work.single || !self.fallback) {

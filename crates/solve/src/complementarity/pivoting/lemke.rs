@@ -658,10 +658,16 @@ fn blocked_row(system: &System, lifted: &mut Vec<bool>) -> Option<usize> {
     let free = system.free();
     lifted.clear();
     lifted.extend(system.q.iter().enumerate().map(|(i, q)| i < free || *q >= 0.0));
-    system.matrix.for_each(|i, j, x| {
-        if x > 0.0 || (j < free && x != 0.0) {
-            lifted[i] = true;
+    let lifts = |j: usize, x: f64| x > 0.0 || (j < free && x != 0.0);
+    match system.matrix {
+        Matrix::Dense(a) => {
+            for (i, lifted) in lifted.iter_mut().enumerate().filter(|l| !*l.1) {
+                *lifted = a.row(i).iter().enumerate().any(|(j, &x)| lifts(j, x));
+            }
         }
-    });
+        m => {
+            m.for_each(|i, j, x| lifted[i] |= lifts(j, x));
+        }
+    }
     lifted.iter().position(|l| !l)
 }

@@ -55,6 +55,6 @@ impl Described for Pgs {
 
 impl From<Pgs> for Psor {
     fn from(Pgs { direction, check_every }: Pgs) -> Self {
-        Self { omega: 1.0, adapt: false, direction, check_every }
+        Self { omega: 1.0, adapt: false, direction, check_every, patience: 0 }
     }
 }

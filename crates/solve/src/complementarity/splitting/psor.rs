@@ -5,7 +5,8 @@
 //! Method: `z_i ← P(z_i − ω/M_ii (q_i + Σ_{j<i} M_ij z_j^new + Σ_{j≥i} M_ij z_j^old))`, ω in (0, 2). With `adapt`, ω follows the rate λ at which the moves
 //! shrink: Young's relation `(λ + ω − 1)² = λ ω² μ²` gives the spectral radius μ of the Jacobi iteration on the present face, and that the
 //! best `ω = 2/(1 + √(1 − μ²))`; on grids this takes O(n) sweeps for n points a side where ω = 1 takes O(n²). Where the relation does not hold, the new ω is measured
-//! against the old one, and the better stays.
+//! against the old one, and the better stays; where the moves grow, which they may when M is not symmetric, the over-relaxation is halved for good.
+//! With `patience`, the method ends as soon as the rate of a settled ω promises more sweeps than that.
 //!
 //! References: Acary2018 (12)(13), the latter with the second sum over j ≥ i; Cryer1971; CottlePangStone2009, chapter 5; HagemanYoung1981, chapter 9, for ω.
 //!
@@ -36,11 +37,14 @@ pub struct Psor {
     pub direction: Direction,
     /// Steps between two evaluations of the true residual, unless the estimate asks for one earlier.
     pub check_every: usize,
+    /// End where the observed rate of convergence promises more sweeps than this, with direction=forward; 0: never.
+    pub patience: usize,
 }
 
 impl Default for Psor {
     fn default() -> Self {
-        Self { omega: 1.3, adapt: true, direction: Direction::Forward, check_every: 50 }
+        let direction = Direction::Forward;
+        Self { omega: 1.3, adapt: true, direction, check_every: 50, patience: 0 }
     }
 }
 
@@ -73,6 +77,7 @@ pub struct RelaxationWork {
     scale: f64,
     backward: bool,
     rate: Rate,
+    tolerance: f64,
 }
 
 /// The present ω and what has been seen of its rate: what adapting ω goes by.
@@ -93,10 +98,27 @@ struct Rate {
     returned: bool,
     /// ω stays.
     settled: bool,
+    /// The moves of the first sweep with this ω.
+    first: f64,
+    /// The moves have grown: no larger ω.
+    most: Option<f64>,
+    /// Sweeps so far.
+    sweeps: usize,
+}
+
+/// What [`Rate::next`] says after a sweep.
+enum Verdict {
+    Stay,
+    Relax(f64),
+    /// So many sweeps are still to come, at the present rate.
+    Slow(f64),
 }
 
 /// Sweeps that a new ω is given before its rate is read.
 const YOUNG: usize = 10;
+
+/// Moves of an over-relaxed sweep that are so many times those of the first one with this ω do not come down by themselves.
+const GROWN: f64 = 10.0;
 
 /// The largest ω that is tried: what Young's relation overstates costs more than what it understates.
 const LARGEST: f64 = 1.995;
@@ -122,9 +144,13 @@ impl<P: Bounded> Solver<P> for Psor {
         work.relax(&system(problem), self.omega);
     }
 
+    fn aim(&self, tolerance: f64, work: &mut RelaxationWork) {
+        work.tolerance = tolerance;
+    }
+
     fn step(&self, problem: &P, point: &mut LcpPoint, work: &mut RelaxationWork) -> Step {
         let system = system(problem);
-        let RelaxationWork { rows, step, scale, backward, rate } = work;
+        let RelaxationWork { rows, step, scale, backward, rate, tolerance } = work;
         let pass = Pass { q: system.q, bounds: system.bounds, step, backward: *backward };
         let mut sum = 0.0;
         let note = |i: usize, move_i: f64| sum += (rows.diagonal[i] * move_i).powi(2);
@@ -132,11 +158,21 @@ impl<P: Bounded> Solver<P> for Psor {
         *backward = self.direction == Direction::Symmetric && !*backward;
         let moves = sum.sqrt();
         let estimate = moves / (*scale * rate.omega);
-        if self.adapt
-            && self.direction == Direction::Forward
-            && let Some(omega) = rate.next(moves)
-        {
-            work.relax(&system, omega);
+        if self.direction == Direction::Forward && (self.adapt || self.patience > 0) {
+            // The moves at which the estimate is the tolerance.
+            let target = *tolerance * *scale * rate.omega;
+            match rate.next(moves, target, self.adapt) {
+                Verdict::Stay => {}
+                Verdict::Relax(omega) => work.relax(&system, omega),
+                Verdict::Slow(left) => {
+                    let all = rate.sweeps as f64 + left;
+                    if self.patience > 0 && all > self.patience as f64 {
+                        return Step::Stuck(
+                            "too slow: the rate promises more sweeps than `patience`".into(),
+                        );
+                    }
+                }
+            }
         }
         Step::Continue { estimate }
     }
@@ -168,21 +204,46 @@ impl RelaxationWork {
 }
 
 impl Rate {
-    /// Takes the moves of a sweep; another ω, where it is time for one.
-    fn next(&mut self, moves: f64) -> Option<f64> {
+    /// Takes the moves of a sweep, and those that are small enough; another ω, where it is time for one, or how much longer it takes.
+    fn next(&mut self, moves: f64, target: f64, adapt: bool) -> Verdict {
         let ratio = moves / self.moves;
         let steady = (ratio - self.ratio).abs() <= 0.1 * (1.0 - ratio).abs();
         (self.moves, self.ratio, self.age) = (moves, ratio, self.age + 1);
-        if self.settled {
-            return None;
+        self.sweeps += 1;
+        if self.age == 1 {
+            self.first = moves;
         }
         // The slowest mode shows after some 1/(2 − ω) sweeps.
         let window = YOUNG + (3.0 / (2.0 - self.omega)) as usize;
-        if self.age == window {
+        let due = self.age > window && self.age.is_multiple_of(window);
+        let rate = (moves / self.mark).powf(1.0 / window as f64);
+        if self.age.is_multiple_of(window) {
             self.mark = moves;
-        } else if self.age == 2 * window {
-            return self.compare((moves / self.mark).powf(1.0 / window as f64));
         }
+        if adapt && self.omega > 1.0 && moves > GROWN * self.first {
+            let omega = 0.5 * (1.0 + self.omega);
+            (self.most, self.other) = (Some(omega), None);
+            return Verdict::Relax(omega);
+        }
+        if adapt && !self.settled {
+            if self.age == 2 * window
+                && let Some(omega) = self.compare(rate)
+            {
+                return Verdict::Relax(omega);
+            }
+            if let Some(omega) = self.larger(ratio, steady) {
+                return Verdict::Relax(omega);
+            }
+        }
+        if !due {
+            return Verdict::Stay;
+        }
+        let left = (target / moves).ln() / rate.ln();
+        Verdict::Slow(if rate < 1.0 { left.max(0.0) } else { f64::INFINITY })
+    }
+
+    /// By Young's relation, where the ratio of moves is steady.
+    fn larger(&mut self, ratio: f64, steady: bool) -> Option<f64> {
         if self.returned || self.age < YOUNG || !steady {
             return None;
         }
@@ -193,7 +254,7 @@ impl Rate {
         let omega = self.omega;
         let mu = (ratio + omega - 1.0) / (omega * ratio.sqrt()); //  (λ + ω − 1)² = λ ω² μ²
         let best = 2.0 / (1.0 + (1.0 - mu * mu).max(1e-10).sqrt());
-        let next = best.min(LARGEST);
+        let next = best.min(LARGEST).min(self.most.unwrap_or(LARGEST));
         ((2.0 - next) < 0.9 * (2.0 - omega)).then(|| {
             self.other = Some((omega, ratio));
             next

@@ -11,7 +11,7 @@ mod tableau;
 pub(super) use factored::Factored;
 pub(super) use tableau::Tableau;
 
-use nonsmooth_linalg::{Compensated, Matrix, Singular};
+use nonsmooth_linalg::{Compensated, Matrix, Singular, power_of_two};
 
 use crate::complementarity::form::System;
 use crate::core::trace::Variable;
@@ -47,10 +47,37 @@ pub(super) struct Data {
 /// Passes of the equilibration; each takes the square root of what is wrong with the largest entries.
 const PASSES: usize = 6;
 
-/// The power of two nearest to x > 0.
-fn power_of_two(x: f64) -> f64 {
+/// The power of two nearest to x > 0, in ratio.
+fn nearest_power(x: f64) -> f64 {
     // Beyond this range M has entries that cannot be told from zero in any unit.
-    x.log2().round().clamp(-300.0, 300.0).exp2()
+    const RANGE: f64 = 2.037_035_976_334_486e90; //  2³⁰⁰
+    power_of_two(std::f64::consts::SQRT_2 * x).clamp(1.0 / RANGE, RANGE)
+}
+
+/// The largest entries of rows and columns of `R M C`.
+fn largest(m: &Matrix, [row, col]: [&[f64]; 2], [rows, cols]: [&mut [f64]; 2]) {
+    rows.fill(0.0);
+    cols.fill(0.0);
+    match m {
+        Matrix::Dense(a) => {
+            for (i, largest) in rows.iter_mut().enumerate() {
+                let mut most = [0.0_f64; 4];
+                for (j, ((x, c), column)) in a.row(i).iter().zip(col).zip(&mut *cols).enumerate() {
+                    let x = x.abs() * row[i] * c;
+                    *column = column.max(x);
+                    most[j % 4] = most[j % 4].max(x);
+                }
+                *largest = most.into_iter().fold(0.0, f64::max);
+            }
+        }
+        _ => {
+            m.for_each(|i, j, x| {
+                let x = x.abs() * row[i] * col[j];
+                rows[i] = rows[i].max(x);
+                cols[j] = cols[j].max(x);
+            });
+        }
+    }
 }
 
 impl Data {
@@ -91,7 +118,18 @@ impl Data {
             Columns::Dense(values) => {
                 values.clear();
                 values.resize(n * n, 0.0);
-                system.matrix.for_each(|i, j, x| values[i + j * n] = x * row[i] * col[j]);
+                match system.matrix {
+                    Matrix::Dense(a) => {
+                        for i in 0..n {
+                            for (j, (x, c)) in a.row(i).iter().zip(col).enumerate() {
+                                values[i + j * n] = x * row[i] * c;
+                            }
+                        }
+                    }
+                    m => {
+                        m.for_each(|i, j, x| values[i + j * n] = x * row[i] * col[j]);
+                    }
+                }
             }
             Columns::Sparse { ptr, idx, val } => {
                 ptr.clear();
@@ -126,18 +164,12 @@ impl Data {
         // The largest entries of rows and columns; d and p serve as buffers.
         let (rows, cols) = (&mut self.d, &mut self.p);
         for _ in 0..PASSES {
-            rows.fill(0.0);
-            cols.fill(0.0);
-            m.for_each(|i, j, x| {
-                let x = x.abs() * self.row[i] * self.col[j];
-                rows[i] = rows[i].max(x);
-                cols[j] = cols[j].max(x);
-            });
+            largest(m, [&self.row, &self.col], [rows, cols]);
             let mut changed = false;
             for (scale, largest) in [(&mut self.row, &*rows), (&mut self.col, &*cols)] {
                 for (s, &l) in scale.iter_mut().zip(largest) {
                     if l > 0.0 && l.is_finite() {
-                        let by = power_of_two(1.0 / l.sqrt());
+                        let by = nearest_power(1.0 / l.sqrt());
                         changed |= by != 1.0;
                         *s *= by;
                     }
