@@ -12,11 +12,11 @@ nonsmooth=${CARGO_TARGET_DIR:-target}/release/nonsmooth
 "$nonsmooth" gen --suite docs/benchmarks/suite-linear.toml --out "$work/problems" >/dev/null
 
 solvers=()
-for name in auto lemke keller criss_cross block_pivoting ip_mehrotra ip_mty qp newton_min newton_fb newton_pfb psor rpsor mprgp; do
+for name in auto lemke lemke_howson keller criss_cross block_pivoting ip_mehrotra ip_mty qp newton_min newton_fb newton_pfb pgs psor rpsor mprgp split/lemke split/ip_mehrotra; do
     solvers+=(--solver "$name")
 done
 "$nonsmooth" bench run "$work/problems" "${solvers[@]}" --tol 1e-10 \
-    --time-limit 1 --repeat-below 0.05 --jobs 2 --out "$work/runs.jsonl" --resume
+    --time-limit 0.5 --repeat-below 0.05 --jobs 2 --out "$work/runs.jsonl" --resume
 "$nonsmooth" bench report "$work/runs.jsonl" --out "$work/report.html"
 "$nonsmooth" bench page "$work/runs.jsonl" --out docs/benchmarks-linear.md \
     --command 'bash docs/benchmarks/linear.sh'

@@ -200,7 +200,7 @@ fn at_once(m: &Matrix, dense_from: usize, pivoting: &'static str, size: usize) -
             let p = p.then("psor", most, "as long as its rate is good").with("patience", most);
             p.with("omega", first(m))
         })
-        .when(small, |p| p.then(pivoting, pivots(size), "small"))
+        .when(small, |p| p.then(pivoting, pivots(size), "small").with("restarts", 0))
 }
 
 /// Pivots from other covering vectors, with more patience each time, and all cases of few pairs.
@@ -252,7 +252,7 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto, stage: usize) -> Vec<
         })
         .when(facts.monotone() && facts.large(), |p| p.then("ip_mehrotra", 200, facts.class()))
         .when(facts.pivotal(), |p| p.then("lemke", pivots(n), facts.class()))
-        .when(facts.monotone() || n > DENSE, |p| p.then("ip_mehrotra", 200, facts.class()))
+        .then("ip_mehrotra", if facts.monotone() || n > DENSE { 200 } else { 50 }, facts.class())
         .then("newton_min", 300, "superlinear where it converges")
         .then("newton_fb", 500, "globalised")
         .when(n <= EXACT, exactly)
@@ -343,8 +343,8 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &LinearAuto, stage: usize) -> V
         return of_operator();
     };
     Plan::new()
-        .when(facts.monotone() && facts.large(), |p| {
-            p.then("split/ip_mehrotra", 200, facts.class())
+        .when(split <= SMALL || (facts.monotone() && facts.large()), |p| {
+            p.then("split/ip_mehrotra", 100, facts.class())
         })
         .then("newton_min", 100, facts.class())
         .then("newton_fb", 200, "globalised")

@@ -42,12 +42,21 @@ struct SparseRows {
 trait Row {
     /// `(M z)_i`.
     fn dot(&self, i: usize, z: &[f64]) -> f64;
+
+    /// `(M z)_i` without one of its products, and the factors of that: of the variable that the sweep has changed last, where the row knows it. What does not
+    /// wait for that variable is computed while it is.
+    fn parted(&self, i: usize, z: &[f64]) -> (f64, [f64; 2]);
 }
 
 impl Row for &Dense {
     #[inline]
     fn dot(&self, i: usize, z: &[f64]) -> f64 {
         dot(self.row(i), z)
+    }
+
+    #[inline]
+    fn parted(&self, i: usize, z: &[f64]) -> (f64, [f64; 2]) {
+        (dot(self.row(i), z), [0.0; 2])
     }
 }
 
@@ -57,6 +66,19 @@ impl Row for &SparseRows {
         let range = self.start[i]..self.start[i + 1];
         let (columns, values) = (&self.column[range.clone()], &self.value[range]);
         columns.iter().zip(values).map(|(&j, &v)| v * z[j as usize]).sum()
+    }
+
+    #[inline]
+    fn parted(&self, i: usize, z: &[f64]) -> (f64, [f64; 2]) {
+        let range = self.start[i]..self.start[i + 1];
+        let (columns, values) = (&self.column[range.clone()], &self.value[range]);
+        let (Some((&last, columns)), Some((&v, values))) =
+            (columns.split_last(), values.split_last())
+        else {
+            return (0.0, [0.0; 2]);
+        };
+        let head = columns.iter().zip(values).map(|(&j, &v)| v * z[j as usize]).sum();
+        (head, [v, z[last as usize]])
     }
 }
 
@@ -220,8 +242,10 @@ fn sweep(
     let n = z.len();
     let mut visit = |i: usize| {
         let old = z[i];
-        let w = pass.q[i] + rows.dot(i, z) + extra(i, old);
-        let new = pass.bounds.project(i, old - pass.step[i] * w);
+        let (head, [v, x]) = rows.parted(i, z);
+        let step = pass.step[i];
+        let most = old - step * (pass.q[i] + head + extra(i, old));
+        let new = pass.bounds.project(i, most - (step * v) * x);
         if new != old {
             z[i] = new;
             moved(i, new - old);

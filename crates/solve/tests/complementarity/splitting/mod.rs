@@ -4,6 +4,7 @@ mod allocations;
 mod bounds;
 mod optima;
 mod planted;
+mod rates;
 mod refusals;
 mod sizes;
 mod sweeps;
