@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use nonsmooth_problem::check::Judged;
 use serde_json::json;
 
-use crate::{Exit, certificate, files, output, report};
+use crate::{Exit, certificate, files, jacobian, output, report};
 
 /// Judge the solutions stored in files, or a certificate.
 ///
 /// The residual of the solution is recomputed from the problem's data: from the impulses `r` (and the multipliers
-/// `l`), through the dynamics for a global contact problem, or from z of a linear complementarity problem. The stored
+/// `l`), through the dynamics for a global contact problem, or from z of a complementarity problem. The stored
 /// `u` or `w` is not used.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
@@ -27,6 +27,10 @@ pub struct Args {
     /// place of a solution
     #[arg(long, value_name = "FILE.json", conflicts_with_all = ["tol", "worst"])]
     certificate: Option<PathBuf>,
+    /// Compare the Jacobian of a nonlinear complementarity problem, entry by entry, with central differences of F at the start, and at the solution if there is
+    /// one, in place of judging it
+    #[arg(long, conflicts_with_all = ["tol", "worst", "certificate"])]
+    jacobian: bool,
     /// Print one line of JSON for each file in place of the report
     #[arg(long)]
     json: bool,
@@ -38,13 +42,17 @@ Examples:
   nonsmooth check solved.toml
   nonsmooth check solved.hdf5 --tol 1e-12 --worst 10
   nonsmooth check impossible.toml --certificate proof.json
+  nonsmooth check nash_cournot.toml --jacobian
 
-Exit codes: 0 all pass, or the certificate is a proof; 1 some do not, or it is none; 2 a file without a solution, or at fault.";
+Exit codes: 0 all pass, the certificate is a proof, the Jacobian agrees; 1 some do not, or it is none; 2 a file without a solution, or at fault.";
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
     if let Some(path) = &args.certificate {
         return certificate::check(&args.files, path, args.json);
+    }
+    if args.jacobian {
+        return Ok(jacobian::check(&args.files, args.json));
     }
     let tol = files::tolerance(args.tol)?;
     Ok(files::each(&args.files, args.json, |_, file| {

@@ -18,6 +18,7 @@ mod files;
 mod generate;
 mod info;
 mod interrupt;
+mod jacobian;
 mod json;
 mod kinds;
 mod list;

@@ -1,8 +1,8 @@
 //! Instances with a known solution, of any size, and models whose optima are published.
 
 pub use crate::kinds::complementarity::planted::{
-    JournalBearing, Membrane, Obstacle, PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp,
-    Torsion, classics, energy,
+    Bratu, ClassicName, HarkerPang, JournalBearing, Membrane, NashCournot, NonlinearClassic,
+    Obstacle, PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp, Torsion, classics, energy,
 };
 pub use crate::kinds::contact::planted::{Planted, PlantedMix};
 

@@ -1,13 +1,13 @@
 //! `nonsmooth gen`.
 
-mod linear;
+mod complementarity;
 mod scene;
 mod suite;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use nonsmooth_io::ProblemFile;
+use nonsmooth_io::{Info, ProblemFile};
 use nonsmooth_problem::{AnyProblem, Problem};
 use nonsmooth_scenes::draw::Picture;
 use nonsmooth_scenes::{Scene, SceneEntry, SceneError, scenes::SCENES};
@@ -15,23 +15,23 @@ use nonsmooth_solve::Limits;
 use nonsmooth_solve::registry;
 use nonsmooth_solve::settings::{self, Setting, SettingsMap};
 
-use self::linear::Maker;
+use self::complementarity::Maker;
 use self::scene::{Form, plain, summary, told};
 use crate::plot::scene::{self as scene_plot, View};
 use crate::solve::{Plan, Solved, limits, seconds, solve, with_solution};
 use crate::{Exit, files, output, report};
 
-/// Generate the problem of a scene, or a linear complementarity problem.
+/// Generate the problem of a scene, or a complementarity problem.
 ///
 /// A scene is a set of rigid bodies or elastic solids in contact; its problem is one Moreau-Jean time step from
 /// the initial velocities. Without a scene, or with --list, the scenes and their settings are listed. A suite is a
 /// TOML file that lists problems: each [[problem]] has a family (a scene), and may have a name, a form and
-/// settings; where a setting or the form is a list, there is a problem for each combination. A linear complementarity problem
-/// (lcp, mlcp, obstacle, ...) is written with the solution that was planted in it, if one was.
+/// settings; where a setting or the form is a list, there is a problem for each combination. A complementarity problem
+/// (lcp, mlcp, obstacle, bratu, ...) is written with the solution that was planted in it, if one was.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES, group(clap::ArgGroup::new("what").args(["scene", "suite"])))]
 pub struct Args {
-    /// The scene or linear complementarity problem, one of `nonsmooth gen --list`
+    /// The scene or complementarity problem, one of `nonsmooth gen --list`
     scene: Option<String>,
     /// A setting of it; may be given several times
     #[arg(long = "set", value_name = "KEY=VALUE", requires = "scene")]
@@ -44,7 +44,7 @@ pub struct Args {
         conflicts_with_all = ["settings", "form", "draw", "solve", "list"]
     )]
     suite: Option<PathBuf>,
-    /// Write the problem: FCLIB (HDF5); a linear complementarity problem as .toml or .mtx
+    /// Write the problem: FCLIB (HDF5); a complementarity problem as .toml, a linear one also as .mtx
     #[arg(long, value_name = "FILE", requires = "what")]
     out: Option<PathBuf>,
     /// State it with the velocities of the bodies (M, H, f, w), or at the contacts alone (W, q)
@@ -94,7 +94,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         return suite::run(file, out);
     }
     let Some(name) = args.scene.as_deref() else {
-        output::print(&format!("{}\n{}", list(SCENES), makers(linear::MAKERS)));
+        output::print(&format!("{}\n{}", list(SCENES), makers(complementarity::MAKERS)));
         return Ok(Exit::Solved);
     };
     let made = Made::find(name)?;
@@ -107,7 +107,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let Some(label) = args.out.as_deref().or(args.draw.as_deref()) else {
         let (expected, found) = match made {
             Made::Scene(_) => ("--out FILE.hdf5, --draw FILE.svg or --draw FILE.html", "neither"),
-            Made::Linear(_) => ("--out FILE.toml", "none"),
+            Made::Complementarity(_) => ("--out FILE.toml", "none"),
         };
         return Err(format!("gen {name}: expected {expected}, found {found}"));
     };
@@ -173,17 +173,17 @@ fn said(label: &Path, scene: Option<&Scene>, content: &ProblemFile) -> String {
 #[derive(Clone, Copy)]
 enum Made {
     Scene(&'static SceneEntry),
-    Linear(&'static Maker),
+    Complementarity(&'static Maker),
 }
 
 impl Made {
     fn find(name: &str) -> Result<Self, String> {
         if let Some(maker) = Maker::find(name) {
-            return Ok(Self::Linear(maker));
+            return Ok(Self::Complementarity(maker));
         }
         SceneEntry::find(name).map(Self::Scene).map_err(|e| {
-            let others: Vec<_> = linear::MAKERS.iter().map(|m| m.name).collect();
-            format!("{e}; linear complementarity: {}", others.join(", "))
+            let others: Vec<_> = complementarity::MAKERS.iter().map(|m| m.name).collect();
+            format!("{e}; complementarity: {}", others.join(", "))
         })
     }
 
@@ -191,26 +191,24 @@ impl Made {
     fn extension(self) -> &'static str {
         match self {
             Self::Scene(_) => "hdf5",
-            Self::Linear(_) => "toml",
+            Self::Complementarity(_) => "toml",
         }
     }
 
     fn list(self) -> String {
         match self {
             Self::Scene(entry) => list(std::slice::from_ref(entry)),
-            Self::Linear(maker) => makers(std::slice::from_ref(maker)),
+            Self::Complementarity(maker) => makers(std::slice::from_ref(maker)),
         }
     }
 
     /// Options that only scenes have.
     fn fits(self, args: &Args) -> Result<(), String> {
         match self {
-            Self::Linear(maker) if args.draw.is_some() || args.form != Form::Global => {
+            Self::Complementarity(maker) if args.draw.is_some() || args.form != Form::Global => {
                 let option = if args.draw.is_some() { "--draw" } else { "--form" };
                 let name = maker.name;
-                Err(format!(
-                    "{option}: expected a scene, found {name}, a linear complementarity problem"
-                ))
+                Err(format!("{option}: expected a scene, found {name}, a complementarity problem"))
             }
             _ => Ok(()),
         }
@@ -228,12 +226,14 @@ impl Made {
                 let (scene, content) = made.map_err(|e| format!("scene {}: {e}", entry.name))?;
                 Ok((Some(scene), content))
             }
-            Self::Linear(maker) => {
+            Self::Complementarity(maker) => {
                 let mut content = maker.make(settings)?;
                 let by = |all: &str| {
                     format!("{}, by nonsmooth {}: {all}.", maker.summary, env!("CARGO_PKG_VERSION"))
                 };
-                content.info = told(maker.name, settings, (maker.settings)(), by);
+                let names = std::mem::take(&mut content.info.names);
+                let info = told(maker.name, settings, (maker.settings)(), by);
+                content.info = Info { names, ..info };
                 Ok((None, content))
             }
         }
@@ -268,10 +268,10 @@ fn solution(text: &mut String, solved: &Solved, tolerance: f64) {
     report::verdict_text(text, &solved.verdict, tolerance, 0);
 }
 
-/// The makers of linear complementarity problems and their settings.
+/// The makers of complementarity problems and their settings.
 fn makers(all: &[Maker]) -> String {
     let mut text = String::from(
-        "Linear complementarity problems and their settings, for `nonsmooth gen NAME --set key=value --out FILE.toml`\n",
+        "Complementarity problems and their settings, for `nonsmooth gen NAME --set key=value --out FILE.toml`\n",
     );
     // Those with the same settings, one after the other, have them once.
     let mut before: Option<Vec<Setting>> = None;

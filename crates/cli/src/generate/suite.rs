@@ -98,7 +98,7 @@ fn plan(entry: &Entry) -> Result<Vec<Planned>, String> {
             return Err(format!("{key}: expected a name without folders, found `{name}`"));
         }
     }
-    if let (Made::Linear(maker), Some(form)) = (made, &entry.form) {
+    if let (Made::Complementarity(maker), Some(form)) = (made, &entry.form) {
         let name = maker.name;
         return Err(format!("form: expected one of a scene only, found {form} of {name}"));
     }

@@ -1,8 +1,10 @@
-//! Linear complementarity problems with a planted solution, from the literature, and of obstacles.
+//! Complementarity problems with a planted solution, from the literature, and of obstacles.
 
 pub mod classics;
 mod linear;
+mod nonlinear;
 mod obstacle;
 
 pub use linear::{PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp};
+pub use nonlinear::{Bratu, ClassicName, HarkerPang, NashCournot, NonlinearClassic};
 pub use obstacle::{JournalBearing, Membrane, Obstacle, Torsion, energy};

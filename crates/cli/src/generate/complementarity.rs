@@ -1,10 +1,11 @@
-//! Linear complementarity problems by their settings, for `nonsmooth gen`.
+//! Complementarity problems by their settings, for `nonsmooth gen`.
 
 use std::borrow::Cow;
 
-use nonsmooth_io::{ProblemFile, StoredPoint};
+use nonsmooth_io::{Info, ProblemFile, StoredPoint};
 use nonsmooth_problem::planted::{
-    JournalBearing, Obstacle, PlantedLcp, PlantedMlcp, Recipe, Torsion,
+    Bratu, HarkerPang, JournalBearing, NashCournot, NonlinearClassic, Obstacle, PlantedLcp,
+    PlantedMlcp, Recipe, Torsion,
 };
 use nonsmooth_problem::{AnyPoint, AnyProblem};
 use nonsmooth_solve::settings::{Setting, Settings, SettingsMap, described, parse};
@@ -12,7 +13,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-/// What makes linear complementarity problems, by name.
+/// What makes complementarity problems, by name.
 pub struct Maker {
     /// The name.
     pub name: &'static str,
@@ -79,6 +80,38 @@ pub const MAKERS: &[Maker] = &[
         summary: "elastic-plastic torsion of a square bar: an LCP with two bounds, sparse",
         settings: described::<Of<Torsion>>,
         make: |s| Ok(ProblemFile::new(recipe::<Torsion>(s)?.boxed())),
+    },
+    Maker {
+        name: "harker_pang",
+        summary: "a strongly monotone NCP, M x + D arctan x + q, with a planted solution: dense",
+        settings: described::<Of<HarkerPang>>,
+        make: |s| Ok(solved(recipe::<HarkerPang>(s)?.mcp())),
+    },
+    Maker {
+        name: "nash_cournot",
+        summary: "an oligopoly: an NCP in the outputs of the firms and the price, with a planted equilibrium",
+        settings: described::<Of<NashCournot>>,
+        make: |s| {
+            let made = recipe::<NashCournot>(s)?;
+            let info = Info { names: made.names(), ..Info::default() };
+            Ok(ProblemFile { info, ..solved(made.mcp()) })
+        },
+    },
+    Maker {
+        name: "bratu",
+        summary: "a reaction that heats itself, below an obstacle, on the unit square: an MCP, sparse",
+        settings: described::<Of<Bratu>>,
+        make: |s| Ok(ProblemFile::new(recipe::<Bratu>(s)?.mcp())),
+    },
+    Maker {
+        name: "ncp_classic",
+        summary: "a worked example of nonlinear complementarity, with a solution",
+        settings: described::<Of<NonlinearClassic>>,
+        make: |s| {
+            let classic = recipe::<NonlinearClassic>(s)?;
+            let solution = classic.solutions().into_iter().next().map(StoredPoint::from);
+            Ok(ProblemFile { solution, ..ProblemFile::new(classic.mcp()) })
+        },
     },
 ];
 
