@@ -118,7 +118,7 @@ pub struct Problem {
     pub kind: String,
     /// The first 16 hexadecimal digits of the file's SHA-256; empty where it is not known.
     pub digest: String,
-    /// Contacts nc; of a linear complementarity problem its pairs.
+    /// Contacts nc; of a complementarity problem its pairs.
     pub contacts: usize,
     /// Unknowns.
     pub unknowns: usize,

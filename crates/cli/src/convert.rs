@@ -17,7 +17,7 @@ use crate::{Exit, files, output};
 pub struct Args {
     #[arg(value_name = "FROM", help = files::help("A file with a problem", |_| true))]
     from: PathBuf,
-    /// The file to write: .hdf5 for contacts; .toml, or .mtx with vectors beside, for linear complementarity; .csv for the solution alone
+    /// The file to write: .hdf5 for contacts; .toml, or .mtx with vectors beside, for complementarity; .csv for the solution alone
     #[arg(value_name = "TO")]
     to: PathBuf,
     /// The format of TO, whatever its name: hdf5, toml, mtx or csv
@@ -115,7 +115,7 @@ fn parts(file: &ProblemFile, kept: Option<&ProblemFile>) -> Vec<(&'static str, b
     };
     let solved = file.solution.is_some();
     let partner = |f: &ProblemFile| f.solution.as_ref().is_some_and(|s| s.partner.is_some());
-    let follows = if file.problem.kind().is_linear() { "its w" } else { "its u" };
+    let follows = if file.problem.kind().is_complementarity() { "its w" } else { "its u" };
     let all = [
         Some(("problem", kept.is_some())),
         solved.then(|| ("solution", kept.is_none() || has(|f| f.solution.is_some()))),

@@ -116,24 +116,24 @@ pub fn about(problem: &AnyProblem, solver: &str) -> Option<&'static About> {
 pub enum Class {
     /// Frictional contact.
     Contact,
-    /// Linear complementarity.
-    Linear,
+    /// Complementarity.
+    Complementarity,
 }
 
 impl Class {
     /// Both.
-    pub const ALL: [Self; 2] = [Self::Contact, Self::Linear];
+    pub const ALL: [Self; 2] = [Self::Contact, Self::Complementarity];
 
     /// The class of a kind.
     pub fn of(kind: Kind) -> Self {
-        if kind.is_linear() { Self::Linear } else { Self::Contact }
+        if kind.is_complementarity() { Self::Complementarity } else { Self::Contact }
     }
 
     /// In JSON and in anchors.
     pub fn name(self) -> &'static str {
         match self {
             Self::Contact => "contact",
-            Self::Linear => "linear",
+            Self::Complementarity => "complementarity",
         }
     }
 
@@ -141,7 +141,7 @@ impl Class {
     pub fn title(self) -> &'static str {
         match self {
             Self::Contact => "Frictional contact",
-            Self::Linear => "Linear complementarity",
+            Self::Complementarity => "Complementarity",
         }
     }
 }

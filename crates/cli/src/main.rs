@@ -52,7 +52,7 @@ impl Exit {
     }
 }
 
-/// Solve, check, describe and generate frictional contact problems, and solve linear complementarity problems.
+/// Solve, check, describe and generate frictional contact problems and complementarity problems.
 #[derive(Debug, Parser)]
 #[command(name = "nonsmooth", version, after_help = examples())]
 struct Cli {
@@ -61,7 +61,8 @@ struct Cli {
 }
 
 fn examples() -> String {
-    let (contact, linear) = (listed(|kind| !kind.is_linear()), listed(Kind::is_linear));
+    let (contact, pairs) =
+        (listed(|kind| !kind.is_complementarity()), listed(Kind::is_complementarity));
     format!(
         "\
 Examples:
@@ -71,14 +72,14 @@ Examples:
   nonsmooth diagnose wall.hdf5                       what makes it hard, and what to try
   nonsmooth solve wall.hdf5 --out solved.hdf5        solve it and keep the solution
   nonsmooth check solved.hdf5                        have the solution judged again
-  nonsmooth solve rectifier.toml --trace pivots.json a linear complementarity problem, and what the method did
+  nonsmooth solve rectifier.toml --trace pivots.json a complementarity problem, and what the method did
   nonsmooth convert solved.hdf5 contacts.csv         the solution as a table, or a problem in another format
   nonsmooth draw solved.hdf5                         matrices, sizes of the impulses, friction cones
   nonsmooth list                                     the solvers and their settings
   nonsmooth bench run problems/ --out runs.jsonl     compare solvers on folders of problems
 
-Contact problems, local (W, q, mu) or global (M, H, f, w, mu), in 2D or 3D, are {contact}. Linear
-complementarity problems (LCP, mixed, horizontal, with bounds) are {linear}.
+Contact problems, local (W, q, mu) or global (M, H, f, w, mu), in 2D or 3D, are {contact}.
+Complementarity problems (LCP, mixed, horizontal, with bounds, nonlinear) are {pairs}.
 
 Exit codes: 0 solved; 1 not solved; 2 a mistake in a file or an option; 130 Ctrl-C pressed twice."
     )

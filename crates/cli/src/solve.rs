@@ -48,7 +48,7 @@ pub struct Args {
     /// machine has free]
     #[arg(long, value_name = "SIZE", value_parser = files::size)]
     memory_limit: Option<u64>,
-    /// Start from the file's /guesses/1 (linear complementarity: its [solution]) in place of zero; with =FILE from the
+    /// Start from the file's /guesses/1 (complementarity: its [solution]) in place of zero; with =FILE from the
     /// solution of another file (or its /guesses/1) of the same size, with =DIRECTORY from the file of the same name there
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
     warm_start: Option<Option<PathBuf>>,

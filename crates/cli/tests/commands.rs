@@ -354,7 +354,7 @@ fn every_scene_is_generated_solved_and_drawn() {
     let folder = Folder::new();
     let text = folder.run("gen").exits(0).stdout;
     assert_eq!(text, folder.run("gen --list").exits(0).stdout);
-    let (scenes, _) = text.split_once("\nLinear complementarity problems").unwrap();
+    let (scenes, _) = text.split_once("\nComplementarity problems").unwrap();
     let scenes = scenes.lines().filter_map(|line| line.split_once(": "));
     let scenes: Vec<_> = scenes.filter(|(name, _)| !name.contains([' ', '='])).collect();
     assert!(scenes.len() >= 12);

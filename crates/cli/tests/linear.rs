@@ -151,7 +151,7 @@ fn problems_are_generated_with_the_solution_planted() {
         ("gen lcp --set n=1 --out a.toml", ["n: expected from 2", "found 1"]),
         ("gen lcp --set class=q --out a.toml", ["class", "spd"]),
         ("gen infeasible --out a.toml", ["class", "psd, kkt or copositive_plus"]),
-        ("gen magic --out a.toml", ["magic", "linear complementarity: lcp"]),
+        ("gen magic --out a.toml", ["magic", "complementarity: lcp"]),
     ] {
         folder.run(arguments).refused(&parts);
     }
@@ -298,7 +298,7 @@ fn mistakes_are_named() {
 fn solvers_of_both_classes_are_listed_apart() {
     let folder = Folder::new();
     let text = folder.run("list").exits(0).stdout;
-    let (contact, linear) = text.split_once("# Linear complementarity\n").unwrap();
+    let (contact, linear) = text.split_once("# Complementarity\n").unwrap();
     assert!(contact.contains("\nnsgs: ") && !contact.contains("\nprojected_jacobi: "));
     assert!(linear.contains("\nprojected_jacobi: ") && !linear.contains("\nnsgs: "));
     let both = folder.run("list auto").exits(0).stdout;

@@ -90,7 +90,7 @@ pub enum IoError {
         known: String,
     },
     /// The file holds, or is to hold, a problem of the other class.
-    #[error("{}: expected a frictional contact problem, found a linear complementarity problem", file.display())]
+    #[error("{}: expected a frictional contact problem, found a complementarity problem", file.display())]
     NoContacts {
         /// The file.
         file: PathBuf,

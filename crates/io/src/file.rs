@@ -36,7 +36,7 @@ pub struct Info {
     pub dofs: Option<usize>,
     /// The number of bodies in older files of FCLIB, read like `dofs`.
     pub involved_ds: Option<usize>,
-    /// Names of the variables of a linear complementarity problem, one for each; empty: none.
+    /// Names of the variables of a complementarity problem, one for each; empty: none.
     pub names: Vec<String>,
 }
 

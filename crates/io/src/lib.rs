@@ -1,7 +1,7 @@
 //! Files of nonsmooth mechanics.
 //!
 //! A [`ProblemFile`] is what any of them holds: a problem of any kind, what is said about it, a solution, guesses. [`FORMATS`] lists the
-//! formats: [`fclib`], the HDF5 files of the FCLIB collection of frictional contact problems; [`linear`], linear complementarity problems in our
+//! formats: [`fclib`], the HDF5 files of the FCLIB collection of frictional contact problems; [`linear`], complementarity problems in our
 //! own TOML, in Matrix Market; [`nl`], AMPL's models of nonlinear ones; [`siconos`], Siconos' text of either; [`table`], solutions as comma-separated values.
 //! Every failure is an [`IoError`] whose message is one line that names the file, the place in it, what was
 //! expected there and what was found. No file, however damaged, makes a function of this crate panic.

@@ -1,4 +1,4 @@
-//! Files of linear complementarity problems: round trips, formats, the mistakes, and damage.
+//! Files of complementarity problems: round trips, formats, the mistakes, and damage.
 #![allow(non_snake_case)]
 
 mod common;

@@ -210,7 +210,8 @@ fn siconos_files() {
         let bytes = random.mutation(&seeds, &words);
         for name in ["lcp.dat", "relay.dat", "x.dat"] {
             let read = Siconos.parse(Path::new(name), &bytes);
-            let contacts = read.as_ref().is_ok_and(|file| !file.problem.kind().is_linear());
+            let contacts =
+                read.as_ref().is_ok_and(|file| !file.problem.kind().is_complementarity());
             let keeps: &dyn Format = if contacts { &Fclib } else { &Toml };
             again(keeps, read);
         }

@@ -1,4 +1,4 @@
-//! Numerical methods for nonsmooth mechanical systems: state, solve and judge frictional contact and linear complementarity problems.
+//! Numerical methods for nonsmooth mechanical systems: state, solve and judge frictional contact and complementarity problems.
 //!
 //! # The door
 //!

@@ -18,7 +18,7 @@ use crate::{
 pub enum AnyProblem {
     /// Contacts.
     Friction(Friction),
-    /// Linear complementarity.
+    /// Complementarity.
     Complementarity(Complementarity),
 }
 
@@ -53,7 +53,7 @@ pub enum AnyStatus {
 pub enum AnyCounts {
     /// Of a problem of frictional contact.
     Contacts(StatusCounts),
-    /// Of a linear complementarity problem.
+    /// Of a complementarity problem.
     Rows(RowCounts),
 }
 

@@ -19,7 +19,7 @@ pub struct Verdict<Status = ContactStatus, Counts = StatusCounts> {
     /// The status of each contact, or row.
     #[serde(skip)]
     pub statuses: Vec<Status>,
-    /// The relative velocity u recomputed from the impulses, D·nc; of a linear complementarity problem `w = M z + q`.
+    /// The relative velocity u recomputed from the impulses, D·nc; of a complementarity problem `w = M z + q`, or F(x).
     #[serde(skip)]
     pub velocity: Vec<f64>,
     /// The contacts with the largest residuals over `‖q‖`, or the rows with the largest errors, worst first, at most ten.

@@ -70,7 +70,7 @@ macro_rules! kinds {
                 match self { $($(Self::$kind => $name,)*)* }
             }
 
-            /// The components D of each contact; 1 for the pairs of a linear complementarity problem.
+            /// The components D of each contact; 1 for the pairs of a complementarity problem.
             pub fn dimension(self) -> usize {
                 match self { $($(Self::$kind => $dimension,)*)* }
             }
@@ -112,14 +112,14 @@ macro_rules! kinds {
 list_of_kinds!(kinds,);
 
 impl Kind {
-    /// Whether this is a linear complementarity problem; the others are problems of frictional contact.
-    pub fn is_linear(self) -> bool {
+    /// Whether this is a complementarity problem; the others are problems of frictional contact.
+    pub fn is_complementarity(self) -> bool {
         Complementarity::KINDS.contains(&self)
     }
 }
 
 /// An array with the value of an expression for each kind of problem, in the order of [`Kind::ALL`](crate::Kind::ALL); its type goes by the name given:
-/// `each_kind!(P => abouts::<P>())`. With `in Complementarity` after the name, for those of linear complementarity alone.
+/// `each_kind!(P => abouts::<P>())`. With `in Complementarity` after the name, for those of complementarity alone.
 #[macro_export]
 macro_rules! each_kind {
     ($P:ident => $value:expr) => {
@@ -212,7 +212,7 @@ mod tests {
             let json = serde_json::to_string(&kind).unwrap();
             assert_eq!(json, format!("\"{}\"", kind.name()));
             assert_eq!(serde_json::from_str::<Kind>(&json).unwrap(), kind);
-            assert_eq!(kind.is_linear(), kind.dimension() == 1);
+            assert_eq!(kind.is_complementarity(), kind.dimension() == 1);
         }
         let names: std::collections::HashSet<_> = kinds.map(Kind::name).into();
         assert_eq!(names.len(), kinds.len());

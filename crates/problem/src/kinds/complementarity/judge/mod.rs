@@ -1,4 +1,4 @@
-//! The judges of linear complementarity problems: what an error is, of a row and of a pair, and what it is measured in.
+//! The judges of complementarity problems: what an error is, of a row and of a pair, and what it is measured in.
 
 mod linear;
 

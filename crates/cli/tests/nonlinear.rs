@@ -1,0 +1,139 @@
+//! The commands on nonlinear complementarity problems.
+
+mod common;
+
+use std::path::Path;
+
+use common::{Folder, has_keys};
+
+/// A folder with the example.
+fn folder() -> Folder {
+    let folder = Folder::new();
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/nash_cournot.toml");
+    std::fs::copy(example, folder.path("nash.toml")).unwrap();
+    let put = |name: &str, text: &str| std::fs::write(folder.path(name), text).unwrap();
+    put("kink.toml", "kind = 'mcp'\nF = ['abs(x1) + x2', 'x2 - x1^2']\nlower = [-inf, 0]\n");
+    put(
+        "affine.toml",
+        "kind = 'mcp'\nF = ['2*x1 - x2 - 1', 'x2 - (x1 - 3)/2']\nupper = [inf, 1]\n",
+    );
+    put("nowhere.toml", "kind = 'mcp'\nF = ['log(-1 - x1)']\n");
+    folder
+}
+
+#[test]
+fn the_example_is_solved_and_shown_by_name() {
+    let folder = folder();
+    folder.run("check nash.toml --tol 1e-12").exits(0);
+    let text = folder.run("solve nash.toml --out solved.toml").exits(0).stdout;
+    assert!(text.contains("solved"), "{text}");
+    folder.run("check solved.toml").exits(0);
+    folder.run("convert solved.toml solved.csv").exits(0);
+    let csv = std::fs::read_to_string(folder.path("solved.csv")).unwrap();
+    assert!(csv.starts_with("variable,name,x,F\n0,q1,36.93251"), "{csv}");
+    assert!(csv.contains("\n5,p,18.30058"), "{csv}");
+}
+
+#[test]
+fn info_says_what_is_known_of_f() {
+    let folder = folder();
+    let text = folder.run("info nash.toml").exits(0).stdout;
+    for said in [
+        "bounds     6 with a lower bound\n",
+        "F          expressions with exact derivatives, ",
+        "affine: 0 of 6 rows\n",
+        "Jacobian   16 entries, 2 to 6 a row, 6 on the diagonal\n",
+        "start      natural residual ",
+        "monotone   not monotone: a pair of points shows it\n",
+        "P0         on 100 sampled pairs\n",
+    ] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+    let line = folder.run("info nash.toml --json").exits(0).json().remove(0);
+    has_keys(
+        &line,
+        "file kind rows unknowns jacobian_entries title description bounds/lower bounds/upper bounds/both \
+         bounds/free bounds/fixed source operations affine_rows jacobian/entries jacobian/entries_per_row/min \
+         jacobian/entries_per_row/max jacobian/diagonal residual_at_start affine monotone p0 \
+         sampled/pairs sampled/undefined sampled/not_monotone/x sampled/not_monotone/y sampled/not_p0 solution",
+    );
+    assert_eq!(
+        (&line["rows"], &line["monotone"], &line["p0"]),
+        (&6.into(), &false.into(), &().into())
+    );
+    let text = folder.run("info affine.toml").exits(0).stdout;
+    for said in [
+        "bounds     1 with a lower bound, 1 between two bounds\n",
+        "affine: 2 of 2 rows\n",
+        "affine     F(x) = M x + q\n",
+        "M          2 x 2, sparse, 4 nonzeros",
+        "positive semidefinite",
+    ] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+    let line = folder.run("info affine.toml --json").exits(0).json().remove(0);
+    assert_eq!((&line["monotone"], &line["p0"]), (&true.into(), &true.into()));
+    let text = folder.run("info nowhere.toml").exits(0).stdout;
+    assert!(text.contains("start      F is not defined there\n"), "{text}");
+    assert!(text.contains("unknown: F is defined at no sampled pair of points\n"), "{text}");
+}
+
+#[test]
+fn a_jacobian_is_compared_with_differences() {
+    let folder = folder();
+    let text = folder.run("check nash.toml --jacobian").exits(0).stdout;
+    assert!(text.contains("the Jacobian agrees with differences of F\n"), "{text}");
+    assert!(text.contains("start      16 entries compared; worst dF["), "{text}");
+    assert!(text.contains("solution   16 entries compared; worst dF["), "{text}");
+    // At the kink the slope of one side is stated.
+    let text = folder.run("check kink.toml --jacobian").exits(1).stdout;
+    assert!(text.contains("1 wrong; worst dF[0]/dx[0] = 1.0, by differences 0.0\n"), "{text}");
+    let line = folder.run("check kink.toml --jacobian --json").exits(1).json().remove(0);
+    has_keys(
+        &line,
+        "file kind rows unknowns jacobian_entries status message jacobian/start/compared jacobian/start/undefined \
+         jacobian/start/wrong jacobian/start/worst/row jacobian/start/worst/column jacobian/start/worst/stated \
+         jacobian/start/worst/difference jacobian/start/worst/in_pattern jacobian/start/worst/excess",
+    );
+    let text = folder.run("check nowhere.toml --jacobian").exits(1).stdout;
+    assert!(text.contains("not defined where it is asked for\n"), "{text}");
+    folder.run("gen lcp --out lcp.toml").exits(0);
+    folder.run("check lcp.toml --jacobian").refused(&[
+        "lcp.toml",
+        "--jacobian",
+        "mcp",
+        "found lcp",
+    ]);
+}
+
+#[test]
+fn families_are_made_drawn_and_read_again() {
+    let folder = folder();
+    for made in [
+        "harker_pang --set n=12",
+        "nash_cournot --set firms=30 --set idle=0.3",
+        "ncp_classic --set name=billups",
+        "ncp_classic --set name=josephy",
+    ] {
+        folder.run(&format!("gen {made} --out made.toml")).exits(0);
+        folder.run("check made.toml --tol 1e-12").exits(0);
+        folder.run("check made.toml --jacobian").exits(0);
+        folder.run("draw made.toml --out made.svg").exits(0);
+        let svg = std::fs::read_to_string(folder.path("made.svg")).unwrap();
+        assert!(svg.contains("Jacobian of F: "), "{svg}");
+    }
+    let text = folder.run("gen bratu --set m=12 --out bratu.toml").exits(0).stdout;
+    assert!(
+        text.contains("mcp, 144 variables, 0 free, 144 between two bounds, 672 entries"),
+        "{text}"
+    );
+    folder.run("solve bratu.toml").exits(0);
+    for (setting, said) in [
+        ("nash_cournot --set firms=1", "firms: expected from 2 to 200000, found 1"),
+        ("nash_cournot --set elasticity=1", "elasticity: expected a number above 1"),
+        ("bratu --set lambda=-1", "lambda: expected a number of at least 0, found -1"),
+        ("ncp_classic --set name=kojima", "kojima_shindo"),
+    ] {
+        folder.run(&format!("gen {setting} --out no.toml")).refused(&[said]);
+    }
+}
