@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use nonsmooth_analysis::{Entry, JacobianCheck};
-use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, Mcp, Problem};
+use nonsmooth_problem::{AnyPoint, AnyProblem, Mcp, Problem, Stated, with_complementarity};
 use serde_json::{Value, json};
 
 use crate::{Exit, files, output, report};
@@ -12,7 +12,11 @@ use crate::{Exit, files, output, report};
 pub fn check(problems: &[PathBuf], as_json: bool) -> Exit {
     files::each(problems, as_json, |_, file| {
         let content = files::read(file)?;
-        let AnyProblem::Complementarity(Complementarity::Mcp(problem)) = &content.problem else {
+        let nonlinear = match &content.problem {
+            AnyProblem::Complementarity(p) => with_complementarity!(p, p => p.nonlinear()),
+            AnyProblem::Friction(_) => None,
+        };
+        let Some(problem) = nonlinear else {
             let found = content.problem.kind().name();
             return Err(format!(
                 "{}: --jacobian: expected a nonlinear complementarity problem (mcp), found {found}",

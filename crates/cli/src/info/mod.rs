@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use nonsmooth_io::{ProblemFile, StoredPoint};
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::{AnyProblem, Complementarity, ProblemError};
+use nonsmooth_problem::{AnyProblem, ProblemError, Stated, with_complementarity};
 use nonsmooth_solve::{Limits, guard};
 use serde_json::{Value, json};
 
@@ -118,10 +118,10 @@ impl Facts {
         };
         let details = match &content.problem {
             AnyProblem::Friction(p) => Details::Contact(contact::Facts::of(p, content.info.dofs)),
-            AnyProblem::Complementarity(Complementarity::Mcp(p)) => {
-                Details::Nonlinear(nonlinear::Facts::of(p))
-            }
-            AnyProblem::Complementarity(p) => Details::Linear(linear::Facts::of(p)),
+            AnyProblem::Complementarity(p) => match with_complementarity!(p, p => p.nonlinear()) {
+                Some(p) => Details::Nonlinear(nonlinear::Facts::of(p)),
+                None => Details::Linear(linear::Facts::of(p)),
+            },
         };
         Ok(Self { details, solution })
     }

@@ -3,8 +3,8 @@
 use nonsmooth_bench::draw::{Axis, GRID, INK, font, tick, ticks};
 use nonsmooth_problem::check::Motion;
 use nonsmooth_problem::{
-    AnyPoint, AnyProblem, AnyStatus, Complementarity, Friction, Mcp, Problem, Stated,
-    with_complementarity, with_friction,
+    AnyPoint, AnyProblem, AnyStatus, Friction, Mcp, Problem, Stated, with_complementarity,
+    with_friction,
 };
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -129,10 +129,11 @@ fn spies(problem: &AnyProblem) -> Vec<Spy> {
         AnyProblem::Friction(Friction::Local3(p)) => vec![blocks(&p.W)],
         AnyProblem::Friction(Friction::Global2(p)) => vec![sparse("M", &p.M), sparse("H", &p.H)],
         AnyProblem::Friction(Friction::Global3(p)) => vec![sparse("M", &p.M), sparse("H", &p.H)],
-        AnyProblem::Complementarity(Complementarity::Mcp(p)) => vec![jacobian(p)],
-        AnyProblem::Complementarity(linear) => {
-            let matrices = with_complementarity!(linear, p => p.matrices());
-            matrices.into_iter().map(|(name, m)| any(name, m)).collect()
+        AnyProblem::Complementarity(p) => {
+            let (matrices, nonlinear) =
+                with_complementarity!(p, p => (p.matrices(), p.nonlinear()));
+            let matrices = matrices.into_iter().map(|(name, m)| any(name, m));
+            matrices.chain(nonlinear.map(jacobian)).collect()
         }
     }
 }

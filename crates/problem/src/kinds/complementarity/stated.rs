@@ -1,5 +1,6 @@
 //! What a complementarity problem says of itself. Files, pictures and reports are made of it and know no kinds.
 
+use super::Mcp;
 use crate::field::Expressions;
 use crate::{AnyPoint, OfAny, OfAnyPoint, ProblemError};
 use nonsmooth_linalg::{Dense, Matrix};
@@ -120,6 +121,11 @@ pub trait Stated: OfAny {
 
     /// The matrix whose class says which methods work, where there is one.
     fn classified(&self) -> Option<&Matrix> {
+        None
+    }
+
+    /// The problem itself, where it is nonlinear.
+    fn nonlinear(&self) -> Option<&Mcp> {
         None
     }
 

@@ -279,6 +279,10 @@ impl Stated for Mcp {
         )
     }
 
+    fn nonlinear(&self) -> Option<&Mcp> {
+        Some(self)
+    }
+
     fn sizes(&self) -> Vec<(&'static str, usize)> {
         vec![("jacobian_entries", self.F.pattern().len())]
     }
