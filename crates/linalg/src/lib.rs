@@ -4,6 +4,7 @@
 //! [`Dense`], [`Matrix`]: the matrices of complementarity problems, dense, sparse or known by products.
 //! [`Inverse`]: factorisation of M (or of M with bilateral constraints) behind one face.
 //! [`SquareLu`]: LU of a dense or sparse square matrix, made again and again.
+//! [`RankLu`]: LU of a sparse matrix that may be singular, with the columns that depend on others named.
 //! [`BlockLu`]: LU of Newton matrices, analysed once and factorised many times.
 //! [`Compensated`], [`Doubled`]: sums and numbers in doubled precision.
 //! [`Delassus`]: W = Hᵀ M⁻¹ H as an operator, never formed, or condensed into a [`Bsr`].
@@ -24,6 +25,7 @@ mod fill;
 mod groups;
 mod inverse;
 mod matrix;
+mod rank_lu;
 mod row;
 pub mod small;
 mod square_cholesky;
@@ -41,6 +43,7 @@ pub use fill::admit_sparse;
 pub use groups::Groups;
 pub use inverse::{Inverse, Refine, factorisations, is_positive_definite};
 pub use matrix::{Matrix, Operator};
+pub use rank_lu::RankLu;
 pub use square_cholesky::SquareCholesky;
 pub use square_lu::SquareLu;
 

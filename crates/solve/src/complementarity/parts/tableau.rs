@@ -55,6 +55,21 @@ pub fn equilibrate(
     scratch: &mut Vec<f64>,
 ) {
     let (n, m) = (matrix.nrows(), matrix.ncols());
+    let visit = |each: &mut dyn FnMut(usize, usize, f64)| {
+        matrix.for_each(each);
+    };
+    equilibrate_entries(n, m, visit, rows, columns, scratch);
+}
+
+/// [`equilibrate`] of the matrix with n rows and m columns whose entries `visit` goes through.
+pub fn equilibrate_entries(
+    n: usize,
+    m: usize,
+    visit: impl Fn(&mut dyn FnMut(usize, usize, f64)),
+    rows: &mut Vec<f64>,
+    columns: &mut Vec<f64>,
+    scratch: &mut Vec<f64>,
+) {
     rows.clear();
     rows.resize(n, 1.0);
     columns.clear();
@@ -64,7 +79,7 @@ pub fn equilibrate(
         // The largest moduli of the rows, then those of the columns.
         scratch.clear();
         scratch.resize(n + m, 0.0);
-        matrix.for_each(|i, j, x| {
+        visit(&mut |i, j, x| {
             let x = (x * rows[i] * columns[j]).abs();
             scratch[i] = scratch[i].max(x);
             scratch[n + j] = scratch[n + j].max(x);

@@ -3,6 +3,7 @@
 use nonsmooth_linalg::Compensated;
 
 use super::basis::{Basis, Data};
+use crate::complementarity::parts::cycles::{Cycles, word};
 use crate::core::trace::Variable;
 
 /// How ties of the ratio test are broken.
@@ -89,45 +90,13 @@ const ROUNDING: f64 = 1e13;
 /// Entries of lexicographic rows that are closer than this are the same.
 const SAME: f64 = 1e-9;
 
-/// Says whether a basis has come back: by hashes, with Brent's method.
-#[derive(Debug, Clone, Default)]
-struct Cycles {
-    hash: u64,
-    kept: u64,
-    steps: u64,
-    next: u64,
-}
-
 /// A random word for each variable.
-fn word(v: Variable) -> u64 {
-    let code = match v {
+fn word_of(v: Variable) -> u64 {
+    word(match v {
         Variable::Z(i) => 2 * i as u64,
         Variable::W(i) => 2 * i as u64 + 1,
         Variable::Artificial => u64::MAX,
-    };
-    let mut x = code.wrapping_add(0x9e37_79b9_7f4a_7c15).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
-}
-
-impl Cycles {
-    fn begin(&mut self) {
-        *self = Self { hash: 0, kept: 0, steps: 0, next: 1 };
-    }
-
-    /// After an exchange: whether the basis is one that was there before.
-    fn exchange(&mut self, entering: Variable, leaving: Variable) -> bool {
-        self.hash ^= word(entering) ^ word(leaving);
-        self.steps += 1;
-        if self.hash == self.kept && self.steps > 1 {
-            return true;
-        }
-        if self.steps == self.next {
-            self.next *= 2;
-            self.kept = self.hash;
-        }
-        false
-    }
+    })
 }
 
 pub(super) fn complement(v: Variable) -> Variable {
@@ -524,7 +493,7 @@ impl Path {
         if self.ends(leaving) {
             return Event::Ended(exchange);
         }
-        if self.cycles.exchange(entering, leaving) {
+        if self.cycles.exchange(word_of(entering) ^ word_of(leaving)) {
             return Event::Trouble(match self.breaking {
                 Breaking::First | Breaking::Rows => "it cycles: a basis has come back",
                 _ => "a basis has come back: ties are decided by rounding",

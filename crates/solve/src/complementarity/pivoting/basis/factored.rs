@@ -3,6 +3,7 @@
 use nonsmooth_linalg::{Csc, Dense, Matrix, Singular, SquareLu};
 
 use super::{Basis, Columns, Data};
+use crate::complementarity::parts::product_form::Updates;
 use crate::core::trace::Variable;
 
 /// B at its last renewal, in the order of its slots, with α the basic z (and z0) and β the rows whose w is nonbasic:
@@ -38,63 +39,6 @@ pub(in super::super) struct Factored {
 
 /// Entries of a line of the cache.
 const LINE: usize = 8;
-
-/// The elementary matrices: column `y` in slot r.
-#[derive(Debug, Clone, Default)]
-struct Updates {
-    /// r, 1 / y_r and where the entries end.
-    heads: Vec<(usize, f64, usize)>,
-    slots: Vec<u32>,
-    values: Vec<f64>,
-}
-
-impl Updates {
-    fn clear(&mut self) {
-        self.heads.clear();
-        self.slots.clear();
-        self.values.clear();
-    }
-
-    fn push(&mut self, r: usize, y: &[f64]) {
-        for (i, &y) in y.iter().enumerate() {
-            if y != 0.0 && i != r {
-                self.slots.push(i as u32);
-                self.values.push(y);
-            }
-        }
-        self.heads.push((r, 1.0 / y[r], self.values.len()));
-    }
-
-    fn entries(&self, k: usize) -> (&[u32], &[f64]) {
-        let from = if k == 0 { 0 } else { self.heads[k - 1].2 };
-        let range = from..self.heads[k].2;
-        (&self.slots[range.clone()], &self.values[range])
-    }
-
-    /// `x ← E_c … E_1 x`.
-    fn forward(&self, x: &mut [f64]) {
-        for (k, &(r, inverse, _)) in self.heads.iter().enumerate() {
-            if x[r] == 0.0 {
-                continue;
-            }
-            let t = x[r] * inverse;
-            x[r] = t;
-            let (slots, values) = self.entries(k);
-            for (&i, &y) in slots.iter().zip(values) {
-                x[i as usize] -= y * t;
-            }
-        }
-    }
-
-    /// `s ← E_1ᵀ … E_cᵀ s`.
-    fn backward(&self, s: &mut [f64]) {
-        for (k, &(r, inverse, _)) in self.heads.iter().enumerate().rev() {
-            let (slots, values) = self.entries(k);
-            let sum: f64 = slots.iter().zip(values).map(|(&i, &y)| y * s[i as usize]).sum();
-            s[r] = (s[r] - sum) * inverse;
-        }
-    }
-}
 
 impl Factored {
     /// `x = B⁻¹ b` of the basis at its renewal; `self.rows` is b, and is overwritten.
@@ -213,7 +157,7 @@ impl Basis for Factored {
     }
 
     fn age(&self) -> usize {
-        self.updates.heads.len()
+        self.updates.len()
     }
 
     fn column(&mut self, data: &Data, v: Variable, y: &mut [f64]) {
