@@ -4,10 +4,10 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::colamd;
 
+use super::Csc;
 use super::block_lu::Singular;
 use super::budget::{self, Pace};
 use super::inverse::count_factorisation;
-use super::Csc;
 
 /// A candidate for the pivot is at least this part of the largest one.
 const THRESHOLD: f64 = 0.1;

@@ -2,7 +2,7 @@
 //!
 //! | floor | rooms |
 //! | --- | --- |
-//! | families | [`splitting`], [`pivoting`], [`newton`], [`interior`], [`quadratic`], [`proximal`], [`auto`] |
+//! | families | [`splitting`], [`pivoting`], [`newton`], [`interior`], [`quadratic`], [`proximal`], [`path`], [`auto`] |
 //! | what families share | [`parts`], [`guarantees`], [`reform`] |
 //! | [`form`] | what a family may ask of a problem |
 //! | [`functions`] | scalar complementarity functions |
@@ -14,6 +14,7 @@ pub mod guarantees;
 pub mod interior;
 pub mod newton;
 pub mod parts;
+pub mod path;
 pub mod pivoting;
 pub mod proximal;
 pub mod quadratic;

@@ -7,7 +7,8 @@ use crate::complementarity::auto::{LinearAuto, NonlinearAuto, Planned};
 use crate::complementarity::form::{Bounded, Complementary, Paired};
 use crate::complementarity::functions::{FischerBurmeister, Min, Penalised};
 use crate::complementarity::interior::{MehrotraType, MizunoToddYe};
-use crate::complementarity::newton::{Newton, Semismooth, Smooth};
+use crate::complementarity::newton::{Miles, Newton, Semismooth, Smooth};
+use crate::complementarity::path::PathSearch;
 use crate::complementarity::pivoting::{
     Bard, BlockPivoting, CrissCross, Enumeration, EnumerationExact, Keller, Lemke, LemkeHowson,
     Murty,
@@ -107,6 +108,8 @@ impl Registered for Mcp {
     fn solvers() -> Vec<Entry<Self>> {
         vec![
             Entry::session(NonlinearAuto::session),
+            Entry::of::<PathSearch>(),
+            Entry::of::<Miles>(),
             Entry::of::<Semismooth>(),
             Entry::of::<Smooth>(),
             Entry::of::<Proxi>(),

@@ -60,6 +60,11 @@ impl Model {
         (self.lower[i], self.upper[i])
     }
 
+    /// l and u.
+    pub fn boxed(&self) -> (&[f64], &[f64]) {
+        (&self.lower, &self.upper)
+    }
+
     /// The point of `[l_i, u_i]` nearest to x.
     #[inline]
     pub fn project(&self, i: usize, x: f64) -> f64 {

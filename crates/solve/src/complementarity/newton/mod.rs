@@ -33,11 +33,13 @@
 //!
 //! Cost of a step: one LU of the size of M (Levenberg–Marquardt: twice the size), a few products. Storage: M twice, the factor, ten vectors.
 
+mod josephy;
 mod nonlinear;
 mod scaled;
 mod semismooth;
 mod smooth;
 
+pub use josephy::Miles;
 pub use semismooth::Semismooth;
 pub use smooth::Smooth;
 

@@ -22,6 +22,7 @@
 //! pivot: one solve with the LU of the last renewal, and the product form of the pivots since. Storage: the LU, a column a pivot, 20 vectors.
 
 mod basis;
+mod linearised;
 #[cfg(test)]
 mod tests;
 
@@ -31,6 +32,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::cycles::Cycles;
 use basis::{Basis, Variable};
+pub use linearised::{Cell, Linearised};
 
 /// The problem whose solution the arc leads to.
 #[derive(Debug, Clone, Copy)]
@@ -184,13 +186,7 @@ impl Tracer {
     }
 
     /// Follows the arc of `problem` from y, by at most `pivots` pivots. Then y is where t was the largest: a solution where it ended [`Solved`](End::Solved).
-    pub fn follow(
-        &mut self,
-        problem: &Linear,
-        start: Start,
-        y: &mut [f64],
-        pivots: usize,
-    ) -> End {
+    pub fn follow(&mut self, problem: &Linear, start: Start, y: &mut [f64], pivots: usize) -> End {
         self.pivots = 0;
         let mut end = End::Singular;
         // Where a direction had to be chosen and led nowhere, the other one.
@@ -338,8 +334,7 @@ impl Tracer {
         self.keep_best();
         self.cycles.begin();
         let (mut still, mut perturbed) = (0, 0);
-        let mut driving =
-            Driving { variable: Variable::T, sign: 1.0, from: 0.0, chosen: false };
+        let mut driving = Driving { variable: Variable::T, sign: 1.0, from: 0.0, chosen: false };
         loop {
             if budget::over() {
                 return End::Over;
@@ -404,7 +399,11 @@ impl Tracer {
                         _ => {}
                     }
                     // Up or down: by the direction in which it went.
-                    (leaving, -step * self.alpha[slot] > 0.0 || (length == 0.0 && -driving.sign * self.alpha[slot] > 0.0))
+                    (
+                        leaving,
+                        -step * self.alpha[slot] > 0.0
+                            || (length == 0.0 && -driving.sign * self.alpha[slot] > 0.0),
+                    )
                 }
                 _ => (driving.variable, driving.sign > 0.0),
             };

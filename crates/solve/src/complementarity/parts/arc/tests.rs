@@ -113,7 +113,11 @@ fn arcs_of_p_matrices_end_in_the_solution() {
             let mut y = start(&problem, case);
             let end = tracer.follow(&problem.linear(), begin, &mut y, 2000);
             assert_eq!(end, End::Solved, "case {case}, {begin:?}");
-            assert!(problem.residual(&y) < 1e-8, "case {case}, {begin:?}: {:e}", problem.residual(&y));
+            assert!(
+                problem.residual(&y) < 1e-8,
+                "case {case}, {begin:?}: {:e}",
+                problem.residual(&y)
+            );
         }
     }
 }

@@ -73,6 +73,9 @@ pub struct Descent<D, F> {
     trial_f: Vec<f64>,
     /// The last merits.
     last: Vec<f64>,
+    /// Ψ and R at the point that was looked at.
+    merit_here: f64,
+    reference: f64,
 }
 
 /// Φ of the function at a point, with its slopes where these are asked for; ½‖Φ‖².
@@ -114,6 +117,8 @@ impl<D: Residual, F: Residual> Descent<D, F> {
             trial: zeros(),
             trial_f: zeros(),
             last: vec![],
+            merit_here: 0.0,
+            reference: 0.0,
         }
     }
 
@@ -131,27 +136,40 @@ impl<D: Residual, F: Residual> Descent<D, F> {
 
     /// One step.
     pub fn step(&mut self, model: &mut Model, at: &mut Iterate) -> Moved {
-        if !model.linearise(&at.x, &mut at.f) {
-            return Moved::Undefined;
-        }
-        let merit = self.differentiate(model, at);
-        if !merit.is_finite() {
-            return Moved::Undefined;
-        }
-        let reference = self.remember(merit);
+        let Some(merit) = self.look(model, at) else { return Moved::Undefined };
         let lambda = (0.1 * merit).clamp(1e-8, 1.0);
         for (k, lambda) in [0.0, lambda, (10.0 * lambda).min(1.0)].into_iter().enumerate() {
             if !self.solve(model, at, lambda) {
                 continue;
             }
-            if self.search(model, at, reference) {
+            if self.search(model, at) {
                 return if k == 0 { Moved::Newton } else { Moved::Regularised };
             }
         }
-        if self.options.gradient && self.steepest(model, at, merit, reference) {
+        if self.options.gradient && self.downhill(model, at) {
             return Moved::Gradient;
         }
         Moved::Stuck
+    }
+
+    /// Linearises F where the iterate is; Ψ there, which is remembered. None where it is not defined.
+    pub fn look(&mut self, model: &mut Model, at: &mut Iterate) -> Option<f64> {
+        if !model.linearise(&at.x, &mut at.f) {
+            return None;
+        }
+        let merit = self.differentiate(model, at);
+        if !merit.is_finite() {
+            return None;
+        }
+        self.merit_here = merit;
+        self.reference = self.remember(merit);
+        Some(merit)
+    }
+
+    /// Goes from the point [looked](Self::look) at towards another one, by the first length that decreases Ψ enough. Whether there was one.
+    pub fn towards(&mut self, model: &mut Model, at: &mut Iterate, end: &[f64]) -> bool {
+        self.d.iter_mut().zip(end).zip(&at.x).for_each(|((d, e), x)| *d = e - x);
+        self.search(model, at)
     }
 
     /// Slopes of the merit, its gradient; Ψ.
@@ -238,13 +256,13 @@ impl<D: Residual, F: Residual> Descent<D, F> {
     }
 
     /// Goes along the projected direction; whether Ψ decreased enough.
-    fn search(&mut self, model: &mut Model, at: &mut Iterate, reference: f64) -> bool {
+    fn search(&mut self, model: &mut Model, at: &mut Iterate) -> bool {
         let mut t = 1.0;
         while t >= self.options.least {
             for i in 0..at.x.len() {
                 self.trial[i] = model.project(i, at.x[i] + t * self.d[i]);
             }
-            if self.accepts(model, at, reference) {
+            if self.accepts(model, at) {
                 return true;
             }
             t *= 0.5;
@@ -253,14 +271,14 @@ impl<D: Residual, F: Residual> Descent<D, F> {
     }
 
     /// Whether Ψ at the trial point is small enough; then that is where the iterate is.
-    fn accepts(&mut self, model: &mut Model, at: &mut Iterate, reference: f64) -> bool {
+    fn accepts(&mut self, model: &mut Model, at: &mut Iterate) -> bool {
         if !model.value(&self.trial, &mut self.trial_f) {
             return false;
         }
         let merit = residuals(&self.merit, model, &self.trial, &self.trial_f, |_, _| {});
         let moves = at.x.iter().zip(&self.trial);
         let slope: f64 = self.gradient.iter().zip(moves).map(|(g, (x, y))| g * (x - y)).sum();
-        if !(merit <= reference - SIGMA * slope.max(0.0)) || self.trial == at.x {
+        if !(merit <= self.reference - SIGMA * slope.max(0.0)) || self.trial == at.x {
             return false;
         }
         std::mem::swap(&mut at.x, &mut self.trial);
@@ -269,14 +287,8 @@ impl<D: Residual, F: Residual> Descent<D, F> {
         true
     }
 
-    /// Goes along the projected gradient, first as far as is best for the linearisation.
-    fn steepest(
-        &mut self,
-        model: &mut Model,
-        at: &mut Iterate,
-        merit: f64,
-        reference: f64,
-    ) -> bool {
+    /// Goes from the point [looked](Self::look) at along the projected gradient, first as far as is best for the linearisation. Whether Ψ decreased enough.
+    pub fn downhill(&mut self, model: &mut Model, at: &mut Iterate) -> bool {
         // The slopes were those of the direction.
         self.differentiate(model, at);
         let Self { weights, of_x, of_f, gradient, .. } = self;
@@ -286,7 +298,7 @@ impl<D: Residual, F: Residual> Descent<D, F> {
         let pairs = weights.iter().zip(&*of_x).zip(of_f.iter().zip(&*gradient));
         let curvature: f64 = pairs.map(along).sum();
         let square = norm(gradient).powi(2);
-        if !(square > 1e-30 * merit.max(f64::MIN_POSITIVE)) {
+        if !(square > 1e-30 * self.merit_here.max(f64::MIN_POSITIVE)) {
             return false;
         }
         let mut t = if curvature > 0.0 { square / curvature } else { 1.0 };
@@ -294,7 +306,7 @@ impl<D: Residual, F: Residual> Descent<D, F> {
             for i in 0..at.x.len() {
                 self.trial[i] = model.project(i, at.x[i] - t * self.gradient[i]);
             }
-            if self.accepts(model, at, reference) {
+            if self.accepts(model, at) {
                 return true;
             }
             t *= 0.5;
