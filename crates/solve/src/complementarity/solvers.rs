@@ -13,8 +13,8 @@ use crate::complementarity::pivoting::{
     Bard, BlockPivoting, CrissCross, Enumeration, EnumerationExact, Keller, Lemke, LemkeHowson,
     Murty,
 };
-use crate::complementarity::proximal::{Proxi, Semicomp};
-use crate::complementarity::quadratic::{Mprgp, QuadraticProgram};
+use crate::complementarity::proximal::{Proxi, Qpcomp, Semicomp};
+use crate::complementarity::quadratic::{Mprgp, NeSqp, QuadraticProgram};
 use crate::complementarity::reform::{Mixed, Presolve, Reduce, Split};
 use crate::complementarity::splitting::{Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs};
 use crate::core::register::{Edge, Entry, Registered};
@@ -112,6 +112,8 @@ impl Registered for Mcp {
             Entry::of::<Miles>(),
             Entry::of::<Semismooth>(),
             Entry::of::<Smooth>(),
+            Entry::of::<NeSqp>(),
+            Entry::of::<Qpcomp>(),
             Entry::of::<Proxi>(),
             Entry::of::<Semicomp>(),
             Entry::of::<Newton<Min>>(),

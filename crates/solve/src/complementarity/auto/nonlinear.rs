@@ -55,6 +55,7 @@ impl NonlinearAuto {
         AutoSession {
             linear: LinearAuto::default().session::<BoxLcp>(),
             nonlinear: Portfolio::new(move |problem: &Mcp, stage| self.plan(problem, stage)),
+            polish: Portfolio::new(|_: &Mcp, stage| polish(stage)),
             affine: None,
         }
     }
@@ -91,10 +92,26 @@ impl NonlinearAuto {
     }
 }
 
+/// What is left of the limits.
+fn later(limits: &Limits, begun: std::time::Instant) -> Limits {
+    let left = |t: f64| (t - begun.elapsed().as_secs_f64()).max(0.0);
+    Limits { time_limit: limits.time_limit.map(left), ..limits.clone() }
+}
+
+/// A few Newton steps from a solution.
+fn polish(stage: usize) -> Vec<Candidate> {
+    if stage > 0 {
+        return vec![];
+    }
+    Plan::new().then("newton_min", 5, "to the last digits").0
+}
+
 /// The session: the linear `auto` of affine problems, the plan of others.
 pub struct AutoSession {
     linear: Portfolio<BoxLcp>,
     nonlinear: Portfolio<Mcp>,
+    /// Of what solves an affine problem in units of its rows, but not yet to the tolerance in those of F.
+    polish: Portfolio<Mcp>,
     /// The account of the linear solve, if there was one, and whether its word was the last.
     affine: Option<(Vec<String>, bool)>,
 }
@@ -149,15 +166,22 @@ impl Session<Mcp> for AutoSession {
             _ => None,
         };
         self.affine = Some((account, status.is_some()));
+        if status == Some(Status::Solved) && measure.absolute > limits.tolerance {
+            let mut finer = trial.clone();
+            let closer = (1e-4 * limits.tolerance).max(f64::EPSILON);
+            let left = Limits { tolerance: closer, ..later(limits, begun) };
+            let polished = self.polish.observe(problem, &mut finer, &left, observer)?.measure;
+            if polished.absolute < measure.absolute && polished.passes(limits.tolerance) {
+                *point = finer;
+                return Ok(Outcome { measure: polished, status: Status::Solved, ..outcome });
+            }
+        }
         if let Some(status) = status {
             *point = trial;
             return Ok(Outcome { status, measure, ..outcome });
         }
-        let left = Limits {
-            time_limit: limits.time_limit.map(|t| (t - begun.elapsed().as_secs_f64()).max(0.0)),
-            max_iterations: limits.max_iterations.saturating_sub(outcome.iterations),
-            ..limits.clone()
-        };
+        let max_iterations = limits.max_iterations.saturating_sub(outcome.iterations);
+        let left = Limits { max_iterations, ..later(limits, begun) };
         let then = self.nonlinear.observe(problem, point, &left, observer)?;
         let mut status = then.status;
         if !matches!(status, Status::Solved) {

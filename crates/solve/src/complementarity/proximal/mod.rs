@@ -2,7 +2,9 @@
 
 mod inner;
 mod proxi;
+mod qpcomp;
 mod semicomp;
 
 pub use proxi::Proxi;
+pub use qpcomp::Qpcomp;
 pub use semicomp::Semicomp;

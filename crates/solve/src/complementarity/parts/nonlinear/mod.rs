@@ -5,12 +5,14 @@ mod descent;
 mod escape;
 mod iterate;
 mod solve;
+mod squares;
 
 pub use crash::Crash;
 pub use descent::{Descent, Options, Residual};
 pub use escape::{Escape, Inner};
 pub use iterate::Iterate;
 pub use solve::{CHECK_EVERY, STATIONARY, Solve, UNDEFINED};
+pub use squares::Squares;
 
 /// What a step came to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
