@@ -3,7 +3,7 @@
 //! Problem: `l ≤ x ≤ u ⟂ F(x)`. Method: z solves the linear problem `l ≤ z ≤ u ⟂ F(x) + JF(x)(z − x)`, by pivots with implicit bounds
 //! ([`arc`](crate::complementarity::parts::arc)) from the basis that the signs of `x − F(x)` suggest, whose infeasibility is the covering column; then
 //! `x ← x + t (z − x)` with t = 1, ½, ¼, …, as soon as the deviation `‖x − π(x − F(x))‖₁` decreases, and no smaller than `least_step`, which is taken in any case. Where the pivots
-//! end on a ray, other bases and covering columns are tried; where the deviation does not decrease for long, the method begins again, once, from Lemke's ray.
+//! end on a ray, other bases and covering columns are tried, and at last the arc from x as far as it leads; where the deviation does not decrease for long, the method begins again, once, from Lemke's ray.
 //!
 //! References: Rutherford1993; Josephy1979; Acary2018 (70). Cost of a step: a sparse LU and a solve for each pivot.
 //! Fails: where linearisations have no solution, as with singular Jacobians; where the deviation has a local minimum.
@@ -92,7 +92,7 @@ fn deviation(model: &Model, x: &[f64], f: &[f64]) -> f64 {
 }
 
 impl Miles {
-    /// A solution of the linear problem; whether one was found.
+    /// A solution of the linear problem, or the point of the arc from x at which its residual is the smallest; whether one was found that is not x.
     fn linear_problem(&self, work: &mut Work) -> bool {
         let Work { solve, linear, unsolved, .. } = work;
         let at = (&solve.at.x[..], &solve.at.f[..]);
@@ -106,7 +106,9 @@ impl Miles {
             }
         }
         *unsolved += 1;
-        false
+        // As far as the arc from x leads.
+        let found = linear.solve(&solve.model, at, 0.0, BASES[1], self.pivots);
+        found != End::Over && linear.reached() > 0.0
     }
 
     /// A step towards the solution of the linear problem; whether F was defined there.

@@ -12,16 +12,23 @@
 //! | no t is accepted | back to the best point, along the gradient, at most five times |
 //! | Ψ has not halved for 100 steps, or neither helps | again from the start with other options |
 //!
-//! | start | crash | κ | λ | first basis | merit |
-//! | --- | --- | --- | --- | --- | --- |
-//! | first | yes | 20 | where singular | of x | `merit` |
-//! | second | no | 2 | .1 | of x | `merit` |
-//! | third | no | 20 | where singular | Lemke's ray | the other |
-//! | fourth | yes | 1, monotone | 1 | of x | the other |
+//! | start | from | κ | λ | merit |
+//! | --- | --- | --- | --- | --- |
+//! | first | x⁰ | `kappa` | where singular | `merit` |
+//! | second | x⁰ | 2 | .1 | `merit` |
+//! | third | x⁰ | `kappa` | none | normal map |
+//! | fourth | 10 % off x⁰ | `kappa` | where singular | `merit` |
+//! | fifth | 50 % off x⁰ | 2 | where singular | penalised |
+//! | sixth | x⁰, crash | 1, monotone | 1 | penalised |
+//!
+//! The search on the normal map goes along the arcs themselves; it is that of PATH's first versions (`merit=normal`).
 //!
 //! References: Robinson1992, Ralph1994, DirkseFerris1995 (normal map, path search, watchdog), FerrisMunson1999, Munson2002 (merit, gradient, proximal term, restarts),
 //! DirkseFerris1997 (crash), GrippoLamparielloLucidi1986; Acary2018 (71)(72). Cost of a step: a sparse LU, a solve for each pivot, an evaluation for each t.
 //! Fails: at stationary points of Ψ that are no solutions, where JF is not P0 there.
+
+mod normal;
+mod watchdog;
 
 use nonsmooth_problem::{LcpPoint, Mcp};
 use schemars::JsonSchema;
@@ -36,6 +43,8 @@ use crate::core::ranges::{at_least, at_most, nonnegative, positive};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
+use normal::Normal;
+use watchdog::Watchdog;
 
 /// The merit of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -45,22 +54,30 @@ pub enum Merit {
     Fischer,
     /// The same of the penalised one, with the weight 0.8.
     Penalised,
+    /// The size of the normal map, along the arcs themselves.
+    Normal,
 }
 
 impl Merit {
+    /// The function of the search; of the normal map's that of the crash.
     fn function(self) -> Penalised {
         match self {
-            Self::Fischer => Penalised { lambda: 1.0 },
+            Self::Fischer | Self::Normal => Penalised { lambda: 1.0 },
             Self::Penalised => Penalised { lambda: 0.8 },
         }
     }
+}
 
-    fn other(self) -> Self {
-        match self {
-            Self::Fischer => Self::Penalised,
-            Self::Penalised => Self::Fischer,
-        }
-    }
+/// When projected Newton steps that look for the active set come first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Crashing {
+    /// Where there are more than 500 variables: there pivots that look for it cost more.
+    Automatic,
+    /// Always, in the first and the last start.
+    Always,
+    /// Never.
+    Never,
 }
 
 /// When linear problems begin on Lemke's ray rather than in the basis of the point.
@@ -81,8 +98,8 @@ pub enum LemkeStart {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PathSearch {
-    /// Whether projected Newton steps that look for the active set come first.
-    pub crash: bool,
+    /// When projected Newton steps that look for the active set come first.
+    pub crash: Crashing,
     /// The merit that a step must decrease.
     pub merit: Merit,
     /// Of how many merits the largest is the reference of the search; 1: monotone.
@@ -95,7 +112,7 @@ pub struct PathSearch {
     pub proximal: f64,
     /// Whether full steps are taken for a while whatever the merit says.
     pub watchdog: bool,
-    /// How often it begins again with other options, at most 3.
+    /// How often it begins again with other options, at most 5.
     pub restarts: usize,
     /// The most pivots of one linear problem.
     pub pivots: usize,
@@ -104,14 +121,14 @@ pub struct PathSearch {
 impl Default for PathSearch {
     fn default() -> Self {
         Self {
-            crash: true,
+            crash: Crashing::Automatic,
             merit: Merit::Fischer,
             memory: 10,
             kappa: 20.0,
             lemke_start: LemkeStart::Automatic,
             proximal: 0.0,
             watchdog: true,
-            restarts: 3,
+            restarts: 5,
             pivots: 1000,
         }
     }
@@ -122,7 +139,7 @@ impl Settings for PathSearch {
         at_least("memory", self.memory, 1)?;
         positive("kappa", self.kappa)?;
         nonnegative("proximal", self.proximal)?;
-        at_most("restarts", self.restarts, 3)?;
+        at_most("restarts", self.restarts, 5)?;
         at_least("pivots", self.pivots, 1)
     }
 }
@@ -143,7 +160,7 @@ impl Described for PathSearch {
             "Munson2002",
             "Acary2018",
         ],
-        variants: &["lemke_start=always", "crash=false", "merit=penalised"],
+        variants: &["lemke_start=always", "crash=always", "merit=penalised", "merit=normal"],
         settings: described::<Self>,
     };
 }
@@ -169,26 +186,12 @@ pub struct Work {
     /// Steps along the gradient in this start.
     gradients: usize,
     watchdog: Watchdog,
+    /// The search on the normal map, and whether it has begun.
+    normal: Normal,
+    begun: bool,
     end: Vec<f64>,
     counts: Counts,
 }
-
-/// Full steps that no merit has tested.
-#[derive(Debug, Clone, Copy)]
-struct Watchdog {
-    /// How long a step may be.
-    radius: f64,
-    /// Since the last test.
-    untested: usize,
-    /// Returns to the best point.
-    returns: usize,
-}
-
-/// The first radius, by what it shrinks, steps without a test, returns.
-const RADIUS: f64 = 20.0;
-const SHRINK: f64 = 0.8;
-const UNTESTED: usize = 10;
-const RETURNS: usize = 5;
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Counts {
@@ -198,6 +201,8 @@ struct Counts {
     untested: usize,
 }
 
+/// Above this number of variables the crash is worth its steps.
+const LARGE: usize = 500;
 /// Steps along the gradient in one start.
 const GRADIENTS: usize = 5;
 /// Steps in which Ψ must have halved.
@@ -206,25 +211,28 @@ const PATIENCE: usize = 100;
 impl PathSearch {
     /// The settings of a start.
     fn turned(&self, turn: usize) -> Self {
-        let second = Self { crash: false, kappa: 2.0, proximal: 0.1, ..*self };
+        let other = match self.merit {
+            Merit::Normal => Merit::Fischer,
+            _ => Merit::Normal,
+        };
+        let plain = Self { crash: Crashing::Never, ..*self };
+        let penalised = Self { merit: Merit::Penalised, kappa: 2.0, ..plain };
         match turn {
             0 => *self,
-            1 => second,
-            2 => Self {
-                crash: false,
-                lemke_start: LemkeStart::Always,
-                merit: self.merit.other(),
-                watchdog: false,
-                ..*self
-            },
+            1 => Self { kappa: 2.0, proximal: 0.1, ..plain },
+            2 => Self { merit: other, ..plain },
+            3 => plain,
+            4 => penalised,
             _ => Self {
-                crash: true,
+                crash: match self.crash {
+                    Crashing::Never => Crashing::Never,
+                    _ => Crashing::Always,
+                },
                 memory: 1,
                 kappa: 1.0,
                 proximal: 1.0,
-                merit: self.merit.other(),
                 watchdog: false,
-                ..*self
+                ..penalised
             },
         }
     }
@@ -233,13 +241,18 @@ impl PathSearch {
     fn begin(&self, turn: usize, work: &mut Work) {
         work.options = self.turned(turn);
         let Self { crash, merit, memory, kappa, proximal, .. } = work.options;
-        work.crash.begin(crash);
+        let wanted = match crash {
+            Crashing::Automatic => work.end.len() > LARGE,
+            crash => crash == Crashing::Always,
+        };
+        work.crash.begin(wanted);
         let function = merit.function();
         let options = Options { memory, slack: kappa, ..Options::default() };
         work.descent.restart(Min {}, function, options);
         (work.lambda, work.problems, work.gradients) = (proximal, 0, 0);
         (work.idle, work.low, work.best_merit) = (0, f64::INFINITY, f64::INFINITY);
-        work.watchdog = Watchdog { radius: RADIUS, untested: 0, returns: 0 };
+        work.watchdog = Watchdog::new(work.options.watchdog);
+        work.begun = false;
     }
 
     /// Follows arcs of the linearisation until one leads somewhere; whether one does.
@@ -291,13 +304,41 @@ impl PathSearch {
         reached > 0.0
     }
 
+    /// A step of the path search.
+    fn step_on_normal_map(&self, work: &mut Work) -> Step {
+        let Work { solve, linear, options, lambda, normal, begun, counts, .. } = work;
+        if !*begun {
+            normal.begin(&solve.model, &solve.at, options.memory, options.watchdog);
+            *begun = true;
+        }
+        let before = normal.untested();
+        let moved = normal.step(&mut solve.model, &mut solve.at, linear, (*lambda, options.pivots));
+        counts.untested += normal.untested() - before;
+        solve.note(moved);
+        let least = normal.least();
+        *lambda = (0.4 * *lambda).min(0.05 * least * least);
+        work.idle += 1;
+        if least < 0.5 * work.low {
+            (work.idle, work.low) = (0, least);
+        }
+        if moved.moved() && work.idle <= PATIENCE {
+            return work.solve.goes_on();
+        }
+        self.another(work, if moved == Moved::Undefined { UNDEFINED } else { STATIONARY })
+    }
+
     /// The next start, or the end.
     fn another(&self, work: &mut Work, why: &'static str) -> Step {
         if work.solve.is_done() || work.solve.restarts >= self.restarts {
             return work.solve.ends(why);
         }
         work.solve.restarts += 1;
-        work.solve.at.again(&mut work.solve.model);
+        let Solve { model, at, restarts, .. } = &mut work.solve;
+        match restarts {
+            3 => at.perturbed(model, 1),
+            4 => at.perturbed(model, 2),
+            _ => at.again(model),
+        }
         self.begin(work.solve.restarts, work);
         work.solve.goes_on()
     }
@@ -306,13 +347,9 @@ impl PathSearch {
 impl Work {
     /// A full step that is not tested; whether it was made.
     fn leap(&mut self) -> bool {
-        let Self { solve, watchdog, end, options, counts, .. } = self;
-        if !options.watchdog || watchdog.returns >= RETURNS || watchdog.untested >= UNTESTED {
-            return false;
-        }
+        let Self { solve, watchdog, end, counts, .. } = self;
         let moves = solve.at.x.iter().zip(&*end);
-        let length = moves.fold(0.0_f64, |m, (x, e)| m.max((x - e).abs()));
-        if length > watchdog.radius {
+        if !watchdog.allows(moves.fold(0.0_f64, |m, (x, e)| m.max((x - e).abs()))) {
             return false;
         }
         std::mem::swap(&mut solve.at.x, end);
@@ -321,8 +358,6 @@ impl Work {
             solve.at.arrive(&mut solve.model);
             return false;
         }
-        watchdog.radius *= SHRINK;
-        watchdog.untested += 1;
         counts.untested += 1;
         true
     }
@@ -377,7 +412,9 @@ impl Solver<Mcp> for PathSearch {
             best: vec![0.0; n],
             best_merit: f64::INFINITY,
             gradients: 0,
-            watchdog: Watchdog { radius: RADIUS, untested: 0, returns: 0 },
+            watchdog: Watchdog::new(self.watchdog),
+            normal: Normal::new(n),
+            begun: false,
             end: vec![0.0; n],
             counts: Counts::default(),
         })
@@ -401,11 +438,13 @@ impl Solver<Mcp> for PathSearch {
             counts.crash += crash.steps() - before;
             return solve.goes_on();
         }
+        if work.options.merit == Merit::Normal {
+            return self.step_on_normal_map(work);
+        }
         let Work { solve, descent, .. } = &mut *work;
         let Some(merit) = descent.look(&mut solve.model, &mut solve.at) else {
             // Untested steps may end where the Jacobian is not defined.
-            if work.retreat() {
-                work.watchdog.returns = RETURNS;
+            if work.watchdog.gives_up() && work.retreat() {
                 return work.solve.goes_on();
             }
             return self.another(work, UNDEFINED);
@@ -421,14 +460,10 @@ impl Solver<Mcp> for PathSearch {
         if work.idle > PATIENCE {
             return self.another(work, STATIONARY);
         }
-        if work.watchdog.untested >= UNTESTED {
-            // A new low, or back to the last one.
-            work.watchdog.untested = 0;
-            if work.best_merit < merit {
-                work.watchdog.returns += 1;
-                work.retreat();
-                return work.solve.goes_on();
-            }
+        if work.watchdog.is_due() && work.best_merit < merit {
+            work.watchdog.turns_back();
+            work.retreat();
+            return work.solve.goes_on();
         }
         let moved = if Self::follow(work, merit) {
             if work.leap() {

@@ -63,7 +63,7 @@ pub enum Start {
 pub enum End {
     /// At t = 1: a solution.
     Solved,
-    /// On a ray, on which t does not reach 1.
+    /// On a ray, or in a loop, on which t does not reach 1.
     Ray,
     /// The basis is singular to working accuracy.
     Singular,
@@ -83,6 +83,8 @@ const SUSPECT: f64 = 1e-7;
 const TOLERANCE: f64 = 1e-10;
 /// Pivots between two factorisations.
 const RENEW: usize = 64;
+/// A step of no length.
+const STILL: f64 = 1e-13;
 /// Steps of no length after which values are moved off their bounds.
 const STANDSTILL: usize = 30;
 /// How often that is done.
@@ -117,6 +119,8 @@ pub struct Tracer {
     rng: Pcg64Mcg,
     /// t at the end.
     t: f64,
+    /// Where it is to end.
+    until: f64,
     /// Pivots of the last arc.
     pivots: usize,
     /// Columns of its first basis that depended on others.
@@ -165,6 +169,7 @@ impl Tracer {
             cycles: Cycles::default(),
             rng: Pcg64Mcg::seed_from_u64(0),
             t: 0.0,
+            until: 1.0,
             pivots: 0,
             dependent: 0,
         }
@@ -187,7 +192,19 @@ impl Tracer {
 
     /// Follows the arc of `problem` from y, by at most `pivots` pivots. Then y is where t was the largest: a solution where it ended [`Solved`](End::Solved).
     pub fn follow(&mut self, problem: &Linear, start: Start, y: &mut [f64], pivots: usize) -> End {
-        self.pivots = 0;
+        self.follow_until(problem, start, y, pivots, 1.0)
+    }
+
+    /// As [`follow`](Self::follow), to `t = until` in place of 1.
+    pub fn follow_until(
+        &mut self,
+        problem: &Linear,
+        start: Start,
+        y: &mut [f64],
+        pivots: usize,
+        until: f64,
+    ) -> End {
+        (self.pivots, self.until) = (0, until);
         let mut end = End::Singular;
         // Where a direction had to be chosen and led nowhere, the other one.
         for sign in [1.0, -1.0] {
@@ -333,7 +350,8 @@ impl Tracer {
         (self.t, self.best_t, self.slot_t) = (0.0, 0.0, None);
         self.keep_best();
         self.cycles.begin();
-        let (mut still, mut perturbed) = (0, 0);
+        // Steps of no length since the last one that had some, and since the cycle was begun; perturbations.
+        let (mut still, mut moved, mut perturbed) = (0, false, 0);
         let mut driving = Driving { variable: Variable::T, sign: 1.0, from: 0.0, chosen: false };
         loop {
             if budget::over() {
@@ -409,19 +427,23 @@ impl Tracer {
             };
             self.t = match self.slot_t {
                 Some(slot) => self.z[slot],
-                None if leaving.0 == Variable::T => 1.0,
+                None if leaving.0 == Variable::T => self.until,
                 None => self.t,
             };
-            still = if length > 1e-14 { 0 } else { still + 1 };
+            still = if length > STILL { 0 } else { still + 1 };
+            moved |= length > STILL;
             let words = driving.variable.word() ^ leaving.0.word();
             if leaving.0 == Variable::T {
-                self.best_t = 1.0;
+                self.best_t = self.until;
                 return End::Solved;
             }
             driving = self.next(leaving, sign);
             // With a bit for the direction.
             let next = driving.variable.word().rotate_left(u32::from(driving.sign > 0.0));
             let back = self.cycles.exchange_and_drive(words, next);
+            if back && moved {
+                return End::Ray;
+            }
             if back || still >= STANDSTILL {
                 if perturbed == PERTURBATIONS {
                     return End::Cycle;
@@ -438,7 +460,7 @@ impl Tracer {
     fn block(&self, driving: &Driving, largest: f64) -> (Block, f64) {
         let least = ZERO * largest;
         let room = |slot: usize, rate: f64| {
-            let (l, u) = range(&self.lower, &self.upper, self.basis.basic[slot]);
+            let (l, u) = self.range(self.basis.basic[slot]);
             let z = self.z[slot];
             if rate < 0.0 { z - l } else { u - z }
         };
@@ -475,12 +497,20 @@ impl Tracer {
                 }
             }
         }
-        let (l, u) = range(&self.lower, &self.upper, driving.variable);
+        let (l, u) = self.range(driving.variable);
         let own = if driving.sign > 0.0 { u - driving.from } else { driving.from - l };
         if own <= length && own.is_finite() {
             return (Block::Own, own.max(0.0));
         }
         (found, length)
+    }
+
+    /// The bounds of a variable.
+    fn range(&self, v: Variable) -> (f64, f64) {
+        match v {
+            Variable::T => (f64::NEG_INFINITY, self.until),
+            v => range(&self.lower, &self.upper, v),
+        }
     }
 
     /// What is moved after a variable has reached its upper or lower bound.
@@ -536,7 +566,7 @@ impl Tracer {
     fn perturb(&mut self) {
         for slot in 0..self.z.len() {
             let variable = self.basis.basic[slot];
-            let (l, u) = range(&self.lower, &self.upper, variable);
+            let (l, u) = self.range(variable);
             let z = self.z[slot];
             let near = PERTURBATION * (1.0 + z.abs());
             if matches!(variable, Variable::T | Variable::Artificial(_)) || u - l < 4.0 * near {
@@ -574,6 +604,8 @@ impl Tracer {
             // With the q that was given, refined once.
             let Self { basis, q0, resting, parked, right, z, alpha, .. } = self;
             Self::right_side(basis, q0, resting, parked, right);
+            let share = 1.0 - self.until;
+            right.iter_mut().zip(&basis.r).for_each(|(b, r)| *b += share * r);
             let mut rest = right.clone();
             basis.solve(right, alpha);
             if alpha.iter().all(|x| x.is_finite()) {
@@ -584,7 +616,7 @@ impl Tracer {
                 let sum = z.iter_mut().zip(&*alpha);
                 sum.for_each(|(z, x)| *z = if z.is_finite() { *z + x } else { *x });
             }
-            self.t = 1.0;
+            self.t = self.until;
             self.keep_best();
         } else if self.t > self.best_t {
             self.keep_best();
@@ -603,13 +635,12 @@ impl Tracer {
     }
 }
 
-/// The bounds of a variable.
+/// The bounds of a variable; t has them elsewhere.
 fn range(lower: &[f64], upper: &[f64], v: Variable) -> (f64, f64) {
     match v {
         Variable::X(i) => (lower[i], upper[i]),
         Variable::W(_) | Variable::V(_) => (0.0, f64::INFINITY),
-        Variable::Artificial(_) => (0.0, 0.0),
-        Variable::T => (f64::NEG_INFINITY, 1.0),
+        Variable::Artificial(_) | Variable::T => (0.0, 0.0),
     }
 }
 
