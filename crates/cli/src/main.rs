@@ -22,6 +22,7 @@ mod jacobian;
 mod json;
 mod kinds;
 mod list;
+mod multistart;
 mod output;
 mod plot;
 mod progress;

@@ -15,6 +15,7 @@ use nonsmooth_solve::{Answer, Limit, Limits, Sample, Solve, SolveError, Status};
 use serde_json::{Value, json};
 
 use crate::kinds::{self, alike, start, takes};
+use crate::multistart::{self, Starts};
 use crate::progress::Bar;
 use crate::report::{self, row};
 use crate::{Exit, answer, enumerate, files, interrupt, output, plot};
@@ -60,6 +61,12 @@ pub struct Args {
     /// cones; with more than some 20 pairs this may take long (--time-limit)
     #[arg(long, conflicts_with_all = ["solver", "settings", "warm_start", "out", "plot", "trace", "certificate", "max_iter"])]
     all_solutions: bool,
+    /// Begin at the start of a nonlinear problem and at random points, so many in all, and list the solutions that differ
+    #[arg(long, value_name = "K", conflicts_with_all = ["all_solutions", "warm_start", "out", "plot", "trace", "certificate"], value_parser = files::whole)]
+    multistart: Option<usize>,
+    /// The seed of the random points of --multistart
+    #[arg(long, value_name = "S", requires = "multistart", default_value = "0")]
+    seed: u64,
     /// Write the problem with its solution, in the format of the extension: FCLIB (.hdf5), TOML (.toml) or Matrix Market (.mtx,
     /// vectors beside); .csv is a table of the solution alone. A directory (existing or ending in `/`) for several files, `-` for the
     /// standard output. A new file holds the problem, its info, guesses and solution, and nothing else of the input; of the input
@@ -99,6 +106,7 @@ Examples:
   nonsmooth solve contact.toml --out solved.toml --trace pivots.json --plot pivots.svg
   nonsmooth solve rectifier.toml --out table.csv
   nonsmooth solve game.toml --all-solutions
+  nonsmooth solve kojima.toml --multistart 50 --seed 1
   nonsmooth gen lcp --out - | nonsmooth solve - --solution
   nonsmooth solve impossible.toml --certificate proof.json   # then: check impossible.toml --certificate proof.json
 
@@ -152,6 +160,12 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         };
         if args.all_solutions {
             return enumerate::run(file, &content, &files::left(&plan.limits, begun), args.json);
+        }
+        if let Some(number) = args.multistart {
+            let starts =
+                Starts { number, seed: args.seed, solver: &args.solver, settings: &settings };
+            let limits = files::left(&plan.limits, begun);
+            return multistart::run(file, &content, &starts, &limits, args.json);
         }
         let kind = content.problem.kind();
         let format = |path| files::target_format("--out", path, args.format, kind, Some(file));

@@ -74,11 +74,12 @@ pub use nonsmooth_problem::check::{
     Certificate, ContactStatus, Existence, Judged, Measure, Motion, Proof, RowCounts, RowStatus,
     StatusCounts, Verdict,
 };
+pub use nonsmooth_problem::field;
 pub use nonsmooth_problem::planted::{Planted, PlantedLcp};
 pub use nonsmooth_problem::{
     AnyCounts, AnyPoint, AnyProblem, AnyStatus, BoxLcp, Complementarity, Friction, FrictionGlobal,
-    FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Kind, Lcp, LcpPoint, LocalPoint, Mlcp, Problem,
-    ProblemError, RowsGlobal, RowsLocal,
+    FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Kind, Lcp, LcpPoint, LocalPoint, Mcp, Mlcp,
+    Problem, ProblemError, RowsGlobal, RowsLocal,
 };
 pub use nonsmooth_problem::{with_complementarity, with_friction, with_problem};
 pub use nonsmooth_scenes::{Scene, SceneError};

@@ -32,10 +32,12 @@ mod core;
 pub mod diagnose;
 mod door;
 pub mod existence;
+mod multistart;
 pub mod registry;
 
 pub use self::complementarity::guarantees;
 pub use door::{Answer, Solvable, Solve, solve};
+pub use multistart::{Found, multistart};
 
 pub use self::core::boxed::Boxed;
 pub use self::core::drive::{
