@@ -120,6 +120,13 @@ fn main() {
     put("toml", 100, blocks.as_bytes());
     MARKET.iter().enumerate().for_each(|(k, text)| put("market", k, text.as_bytes()));
     SICONOS.iter().enumerate().for_each(|(k, text)| put("siconos", k, text.as_bytes()));
+    let models = [
+        &include_bytes!("../tests/nl/pairs.nl")[..],
+        include_bytes!("../tests/nl/ampl.nl"),
+        include_bytes!("../tests/nl/pairs-little.nl"),
+        include_bytes!("../tests/nl/pairs-big.nl"),
+    ];
+    models.iter().enumerate().for_each(|(k, bytes)| put("nl", k, bytes));
     let runs = std::fs::read_to_string(here.join("../.ci/outcomes.jsonl")).expect("a file of runs");
     let lines: Vec<&str> = runs.lines().collect();
     let of = |kind: &str, n: usize| {

@@ -7,6 +7,7 @@ use std::path::Path;
 use nonsmooth_io::fclib::Fclib;
 use nonsmooth_io::linear::market;
 use nonsmooth_io::linear::toml::Toml;
+use nonsmooth_io::nl::{Model, Nl, Options};
 use nonsmooth_io::siconos::Siconos;
 use nonsmooth_io::{Format, IoError, ProblemFile};
 use nonsmooth_problem::{AnyProblem, Friction, Problem, with_problem};
@@ -214,6 +215,50 @@ fn siconos_files() {
                 read.as_ref().is_ok_and(|file| !file.problem.kind().is_complementarity());
             let keeps: &dyn Format = if contacts { &Fclib } else { &Toml };
             again(keeps, read);
+        }
+    }
+}
+
+#[test]
+fn nl_files() {
+    let seeds = [
+        &include_bytes!("nl/pairs.nl")[..],
+        include_bytes!("nl/ampl.nl"),
+        include_bytes!("nl/pairs-little.nl"),
+        include_bytes!("nl/pairs-big.nl"),
+    ]
+    .map(<[u8]>::to_vec);
+    let words = [
+        "\nC2\n",
+        "\nV3 1 0\n",
+        "\no54\n3\n",
+        "\no64\n2\n",
+        "\no11\n",
+        "\no35\n",
+        "\nv3\n",
+        "\nn1e308\n",
+        "nan",
+        "inf",
+        "1e30",
+        "-1",
+        "4294967296",
+        "99999999999999999999",
+        "\nh3:abc\n",
+        "\nf0 1\n",
+        "\nO0 0\n",
+        "\n5 3 2\n",
+        "\n4 1\n",
+        "\n3\n",
+        "#",
+    ];
+    let mut random = Random(5);
+    let allowed = Options { side_inequalities: true, ..Options::default() };
+    for _ in 0..rounds() {
+        let bytes = random.mutation(&seeds, &words);
+        again(&Nl, Nl.parse(Path::new("x"), &bytes));
+        match Model::parse(Path::new("x"), &bytes, &allowed) {
+            Ok(model) => model.problem.validate().unwrap(),
+            Err(e) => refused(&e.to_string()),
         }
     }
 }

@@ -324,6 +324,6 @@ fn without_remark(line: &[u8]) -> &[u8] {
 /// What was found, in a message.
 pub(super) fn quoted(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes);
-    let printable = |c: &char| !c.is_control();
-    format!("`{}`", text.chars().filter(printable).take(40).collect::<String>())
+    let plain = |c: char| if c.is_control() { ' ' } else { c };
+    format!("`{}`", text.trim_end().chars().map(plain).take(40).collect::<String>())
 }

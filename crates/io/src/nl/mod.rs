@@ -30,8 +30,9 @@ mod write;
 
 use std::path::{Path, PathBuf};
 
-use nonsmooth_problem::{AnyProblem, Complementarity, Kind, Mcp, Problem};
+use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, Kind, LcpPoint, Mcp, Problem};
 
+use crate::error::one_line;
 use crate::format::{About, bytes, put};
 use crate::{Format, Info, IoError, ProblemFile};
 
@@ -115,12 +116,15 @@ impl Model {
 
 /// The lines of a file that has one for each of n things; objectives may follow those of rows.
 fn names(path: &Path, n: usize) -> Vec<String> {
+    if !path.is_file() {
+        return vec![];
+    }
     let text = bytes(path).map(|b| String::from_utf8_lossy(&b).into_owned()).unwrap_or_default();
     let names: Vec<_> = text.lines().map(|line| line.trim().to_owned()).take(n).collect();
     if names.len() == n { names } else { vec![] }
 }
 
-/// The format. Read with the names in `.col`, which is written too where there are names.
+/// The format, with names in the file `.col` beside it and the solution in `.sol`, each written too where there is one. A `.sol` that answers another model is passed by.
 ///
 /// Errors: whatever is not as the format says, by line or byte; what is no MCP: inequalities without a variable, not as many rows as variables, discrete variables,
 /// logical constraints, external functions. Written: a function that is not made of expressions.
@@ -134,8 +138,7 @@ impl Format for Nl {
             extensions: &["nl"],
             reads: &[Kind::Mcp],
             writes: &[Kind::Mcp],
-            keeps_solutions: false,
-            solution: "the file .sol",
+            solution: "a .sol beside the file",
             ..About::TEXT
         };
         &ABOUT
@@ -151,18 +154,24 @@ impl Format for Nl {
     }
 
     fn parts(&self, path: &Path) -> Vec<PathBuf> {
-        let names = ["col", "row"].map(|e| path.with_extension(e)).into_iter();
+        let names = ["col", "row", "sol"].map(|e| path.with_extension(e)).into_iter();
         std::iter::once(path.into()).chain(names.filter(|p| p.is_file())).collect()
     }
 
     fn parse(&self, name: &Path, bytes: &[u8]) -> Result<ProblemFile, IoError> {
         let model = Model::parse(name, bytes, &Options::default());
-        model.map(Model::file).map_err(|refusal| refusal.error)
+        model.map(Model::file).map_err(|refusal| *refusal.error)
     }
 
     fn read(&self, path: &Path) -> Result<ProblemFile, IoError> {
-        let model = Model::read(path, &Options::default());
-        model.map(Model::file).map_err(|refusal| refusal.error)
+        let model = Model::read(path, &Options::default()).map_err(|refusal| *refusal.error)?;
+        let solution = path.with_extension("sol");
+        let x = match solution.is_file() {
+            true => sol::values(&model.echo, &bytes(&solution)?),
+            false => None,
+        };
+        let solution = x.map(|z| LcpPoint { z }.into());
+        Ok(ProblemFile { solution, ..model.file() })
     }
 
     fn to_bytes(&self, name: &Path, file: &ProblemFile) -> Result<Vec<u8>, IoError> {
@@ -177,16 +186,40 @@ impl Format for Nl {
         }
     }
 
+    /// The names go into `.col`, and the solution into `.sol` beside the model; what is left there of another model is removed.
     fn write(&self, path: &Path, file: &ProblemFile) -> Result<(), IoError> {
-        put(path, &self.to_bytes(path, file)?)?;
-        let names = &file.info.names;
-        match names.is_empty() {
-            true => Ok(()),
-            false => {
-                let lines: String =
-                    names.iter().map(|n| crate::error::one_line(n) + "\n").collect();
-                put(&path.with_extension("col"), lines.as_bytes())
-            }
+        let text = self.to_bytes(path, file)?;
+        let [names, solution] = ["col", "sol"].map(|e| path.with_extension(e));
+        if path.is_file() {
+            // Names and solution of the model that is written over are none of this one. What cannot be removed is written over, or does not fit.
+            let _ = [&names, &solution].map(std::fs::remove_file);
+        }
+        put(path, &text)?;
+        if !file.info.names.is_empty() {
+            let lines: String = file.info.names.iter().map(|n| one_line(n) + "\n").collect();
+            put(&names, lines.as_bytes())?;
+        }
+        match file.solution {
+            Some(_) => self.write_solution(path, file),
+            None => Ok(()),
         }
     }
+
+    /// Into `.sol`; the model stays as it is.
+    fn write_solution(&self, path: &Path, file: &ProblemFile) -> Result<(), IoError> {
+        let Some(AnyPoint::Lcp(LcpPoint { z })) = file.solution.as_ref().map(|s| &s.point) else {
+            return Err(IoError::data(path, "the solution", "a point x", "none"));
+        };
+        let model = Model::read(path, &Options::default()).map_err(|refusal| *refusal.error)?;
+        if z.len() != model.echo.variables {
+            let expected = format!("{} values, as the model has variables", model.echo.variables);
+            return Err(IoError::data(path, "the solution", expected, z.len()));
+        }
+        let message = "A point kept with the model";
+        let solution = Solution { echo: &model.echo, message, x: z, result: UNJUDGED };
+        solution.write(&path.with_extension("sol"))
+    }
 }
+
+/// How a point ends of which a file does not say how accurate it is: AMPL calls it `solved?`.
+const UNJUDGED: u16 = 100;

@@ -16,14 +16,14 @@ use crate::IoError;
 #[error("{error}")]
 pub struct Refusal {
     /// What is wrong, and where.
-    pub error: IoError,
+    pub error: Box<IoError>,
     /// What a solution may tell AMPL, with the number of the reason; `None` where the file itself is at fault.
-    pub answer: Option<(Echo, u16)>,
+    pub answer: Option<Box<(Echo, u16)>>,
 }
 
 impl From<IoError> for Refusal {
     fn from(error: IoError) -> Self {
-        Self { error, answer: None }
+        Self { error: Box::new(error), answer: None }
     }
 }
 
@@ -77,8 +77,8 @@ pub(super) fn model(
 ) -> Result<Model, Refusal> {
     let Contents { title, echo, graph, rows, conditions, bounds, start } = contents;
     let refused = |result, place: String, expected: &str, found: String| Refusal {
-        error: IoError::data(file, place, expected, found),
-        answer: Some((echo.clone(), result)),
+        error: Box::new(IoError::data(file, place, expected, found)),
+        answer: Some(Box::new((echo.clone(), result))),
     };
     let at = |mark, what: String| format!("{}, {what}", Input::place(echo.form, mark));
     let row_name = |i: usize| format!("row {i}{}", named(&names.rows, i));
@@ -203,8 +203,8 @@ pub(super) fn model(
     }
 
     let invalid = |problem| Refusal {
-        error: IoError::problem(file)(problem),
-        answer: Some((echo.clone(), MISSTATED)),
+        error: Box::new(IoError::problem(file)(problem)),
+        answer: Some(Box::new((echo.clone(), MISSTATED))),
     };
     let f = Expressions::new(square.graph, square.rows).map_err(invalid)?;
     let (lower, upper) = square.bounds.iter().map(|[l, u]| (*l, *u)).unzip();
@@ -220,7 +220,9 @@ pub(super) fn model(
 fn widened(graph: &Graph, variables: usize) -> Graph {
     let mut wide = Graph::new(variables);
     // Nodes are numbered as they are added.
-    graph.nodes().iter().for_each(|node| drop(wide.add(node.clone())));
+    for node in graph.nodes() {
+        wide.add(node.clone());
+    }
     wide
 }
 

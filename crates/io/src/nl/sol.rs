@@ -1,4 +1,4 @@
-//! Solutions as AMPL reads them.
+//! Solutions as AMPL reads them, and their values read again.
 
 use std::path::Path;
 
@@ -63,6 +63,65 @@ impl Solution<'_> {
         out.push(format!("objno 0 {}", self.result));
         out.join("\n") + "\n"
     }
+}
+
+/// The values in the solution of a model that says this of itself; `None`: it has none, or answers another model.
+pub(super) fn values(echo: &Echo, bytes: &[u8]) -> Option<Vec<f64>> {
+    let fits = |sizes: &[i64]| {
+        let sizes: &[i64; 4] = sizes.try_into().ok()?;
+        let own = sizes[0] == echo.rows as i64 && sizes[2] == echo.variables as i64;
+        (own && sizes[3] == sizes[2]).then(|| usize::try_from(sizes[1]).ok()).flatten()
+    };
+    let options = echo.options.len();
+    let x: Vec<f64> = match echo.form {
+        Form::Text => {
+            let text = std::str::from_utf8(bytes).ok()?;
+            let mut lines = text.lines().map(str::trim).skip_while(|line| *line != "Options");
+            let sizes: Option<Vec<i64>> =
+                lines.by_ref().skip(2 + options).take(4).map(|line| line.parse().ok()).collect();
+            let before = fits(&sizes?)? + usize::from(echo.tolerance.is_some());
+            lines
+                .skip(before)
+                .take(echo.variables)
+                .map(|line| line.parse().ok())
+                .collect::<Option<_>>()?
+        }
+        form => {
+            let whole = |bytes: &[u8]| {
+                let bytes: [u8; 4] = bytes.try_into().ok()?;
+                Some(match form {
+                    Form::LittleEndian => i32::from_le_bytes(bytes),
+                    _ => i32::from_be_bytes(bytes),
+                })
+            };
+            let mut rest = bytes;
+            let mut record = |more: usize| {
+                let length = usize::try_from(whole(rest.get(..4)?)?).ok()?;
+                let record = rest.get(4..4usize.checked_add(length)?)?;
+                rest = rest.get(length.checked_add(8 + more)?..)?;
+                Some(record)
+            };
+            // The message, and an empty record behind it.
+            while !record(0)?.is_empty() {}
+            let numbers = record(8 * usize::from(echo.tolerance.is_some()))?;
+            let numbers: Option<Vec<i64>> = numbers
+                .strip_prefix(b"Options")?
+                .chunks(4)
+                .map(|b| whole(b).map(i64::from))
+                .collect();
+            fits(numbers?.get(1 + options..)?)?;
+            record(0)?;
+            let number = |bytes: &[u8]| {
+                let bytes = bytes.try_into().ok()?;
+                Some(match form {
+                    Form::LittleEndian => f64::from_le_bytes(bytes),
+                    _ => f64::from_be_bytes(bytes),
+                })
+            };
+            record(0)?.chunks(8).map(number).collect::<Option<_>>()?
+        }
+    };
+    (x.len() == echo.variables && x.iter().all(|x| x.is_finite())).then_some(x)
 }
 
 /// Records between their lengths.
