@@ -17,10 +17,10 @@ use crate::{Exit, files, output};
 pub struct Args {
     #[arg(value_name = "FROM", help = files::help("A file with a problem", |_| true))]
     from: PathBuf,
-    /// The file to write: .hdf5 for contacts; .toml, or .mtx with vectors beside, for complementarity; .csv for the solution alone
+    /// The file to write: .hdf5 for contacts; .toml, or .mtx with vectors beside, for linear complementarity; .toml or .nl for nonlinear; .csv for the solution alone
     #[arg(value_name = "TO")]
     to: PathBuf,
-    /// The format of TO, whatever its name: hdf5, toml, mtx or csv
+    /// The format of TO, whatever its name: hdf5, toml, mtx, nl or csv
     #[arg(long, value_name = "EXTENSION", value_parser = files::format_named)]
     format: Option<&'static dyn Format>,
 }

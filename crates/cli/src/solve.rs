@@ -73,7 +73,7 @@ pub struct Args {
     /// itself, which may be named, only the solution changes
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// The format of --out, whatever its name: hdf5, toml, mtx or csv [default: that of the extension; of `-`, that of the input]
+    /// The format of --out, whatever its name: hdf5, toml, mtx, nl or csv [default: that of the extension; of `-`, that of the input]
     #[arg(long, value_name = "EXTENSION", requires = "out", value_parser = files::format_named)]
     format: Option<&'static dyn Format>,
     /// Draw the residual against iterations and time (SVG), and the pivots or the central path of methods that record

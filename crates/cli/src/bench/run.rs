@@ -100,7 +100,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     if inputs.is_empty() {
         return Err("expected problems, found none".into());
     }
-    let program = format!("{} {}", env!("CARGO_BIN_NAME"), env!("CARGO_PKG_VERSION"));
+    let program = format!("{} {}", "nonsmooth", env!("CARGO_PKG_VERSION"));
     let now =
         std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
     let header = Campaign {

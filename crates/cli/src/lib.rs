@@ -1,9 +1,10 @@
 //! The command line of `nonsmooth`: arguments, progress, pictures and exit codes; all numerics live below.
 //!
-//! One file per command, and small shared parts: [`kinds`] (what is said of each kind of problem),
-//! [`files`] (input and output files), [`report`] (verdicts as text and JSON), [`output`] (the two streams),
-//! [`progress`], [`interrupt`] and [`plot`].
+//! One file per command, and small shared parts: `kinds` (what is said of each kind of problem),
+//! `files` (input and output files), `report` (verdicts as text and JSON), `output` (the two streams),
+//! `progress`, `interrupt` and `plot`. `ampl` is the program as AMPL calls it. The library is for the two programs `nonsmooth` and `nonsmooth-ampl` alone.
 
+mod ampl;
 mod answer;
 mod bench;
 mod certificate;
@@ -37,7 +38,7 @@ use nonsmooth_problem::Kind;
 
 /// What a command came to; the worst of several files counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Exit {
+pub(crate) enum Exit {
     /// Everything asked for was done, every problem is solved.
     Solved = 0,
     /// A numerical outcome other than solved.
@@ -48,7 +49,7 @@ pub enum Exit {
 
 impl Exit {
     /// `Solved` if `solved`, else `NotSolved`.
-    pub fn solved(solved: bool) -> Self {
+    pub(crate) fn solved(solved: bool) -> Self {
         if solved { Self::Solved } else { Self::NotSolved }
     }
 }
@@ -101,7 +102,11 @@ enum Command {
     Completions(completions::Args),
 }
 
-fn main() -> ExitCode {
+/// The program `nonsmooth`: one of its commands, or, with `-AMPL` among the arguments, what AMPL asks for.
+pub fn nonsmooth() -> ExitCode {
+    if ampl::calls(&arguments()) {
+        return nonsmooth_ampl();
+    }
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(e) if e.to_string().starts_with("error: ") => {
@@ -129,6 +134,20 @@ fn main() -> ExitCode {
         Exit::Mistake
     });
     ExitCode::from(exit as u8)
+}
+
+/// The program `nonsmooth-ampl`, a solver for AMPL.
+pub fn nonsmooth_ampl() -> ExitCode {
+    let exit = ampl::run(&arguments()).unwrap_or_else(|mistake| {
+        output::error(&mistake);
+        Exit::Mistake
+    });
+    ExitCode::from(exit as u8)
+}
+
+/// The name by which the program was called, and its arguments.
+fn arguments() -> Vec<String> {
+    std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect()
 }
 
 /// A usage error as one line: its paragraphs up to the usage text, joined.
