@@ -1,11 +1,11 @@
 //! What `psor` does by the rate that it measures, and what `auto` makes of it.
 
 use nonsmooth_linalg::Csc;
-use nonsmooth_problem::planted::{Membrane, classics};
-use nonsmooth_problem::{Lcp, LcpPoint};
+use nonsmooth_problem::Lcp;
+use nonsmooth_problem::planted::{Membrane, PlantedClass, PlantedLcp};
 use nonsmooth_solve::{Solve, Status};
 
-use super::{bump, limits, session, solved, try_solve};
+use super::{bump, limits, solved, try_solve};
 
 /// Convection and diffusion on `side × side` points above an obstacle, upwind: an M-matrix that is not symmetric.
 fn transport(side: usize, diffusion: f64) -> Lcp {
@@ -58,25 +58,22 @@ fn a_poor_rate_ends_sweeps_that_have_a_patience() {
     assert!(sweeps < 1000, "{sweeps}");
 }
 
+fn planted(n: usize, class: PlantedClass) -> Lcp {
+    PlantedLcp { n, class, seed: 3, ..PlantedLcp::default() }.lcp().0
+}
+
 #[test]
 fn single_changes_end_block_pivoting_where_they_are_limited() {
-    // Changes of all at once cycle on this one.
-    let problem = classics::ben_gharbia_gilbert(9).problem;
-    let mut start = vec![0.0; 9];
-    start[0] = 1.0;
-    let run = |label: &str| {
-        let mut point = LcpPoint { z: start.clone() };
-        let mut session = session::<Lcp>(label);
-        session.solve(&problem, &mut point, &limits(1e-10, 1000), &mut |_| {}).unwrap()
-    };
-    assert_eq!(run("block_pivoting").status, Status::Solved);
-    let outcome = run("block_pivoting most_singles=1");
+    let problem = planted(60, PlantedClass::Kkt);
+    solved(&problem, "block_pivoting");
+    let outcome =
+        try_solve(&problem, "block_pivoting most_singles=1", &limits(1e-10, 1000)).unwrap().0;
     assert!(matches!(&outcome.status, Status::Stalled(why) if why.contains("most_singles")));
 }
 
 #[test]
-fn auto_begins_with_sweeps_where_their_rate_is_good() {
-    for (problem, last) in [(transport(60, 1e-3), "psor"), (transport(30, 10.0), "block_pivoting")]
+fn auto_begins_with_sweeps_and_goes_on_with_pivots_where_their_rate_is_poor() {
+    for (problem, last) in [(transport(60, 1e-3), "psor"), (planted(100, PlantedClass::P), "lemke")]
     {
         let answer = Solve::new().solver("auto").tolerance(1e-8).run(&problem).unwrap();
         assert!(answer.is_solved(), "{}", answer.status);
