@@ -40,7 +40,7 @@ pub fn solve<P: Solvable>(problem: &P) -> Result<Answer<P>, SolveError> {
 pub struct Solve {
     solver: String,
     settings: SettingsMap,
-    limits: Limits,
+    pub(crate) limits: Limits,
     start: Option<AnyPoint>,
 }
 
