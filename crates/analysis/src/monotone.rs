@@ -2,6 +2,7 @@
 
 use nonsmooth_linalg::budget;
 use nonsmooth_problem::Mcp;
+use nonsmooth_problem::field::Evaluator;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use serde::Serialize;
@@ -38,8 +39,8 @@ const TRIES: usize = 4;
 const ROUNDING: f64 = 1000.0 * f64::EPSILON;
 
 impl Sampled {
-    /// So many pairs, with points about the start and, where both bounds are finite, anywhere between them; a third of the pairs differ in one variable, a third in
-    /// some, a third in all. Ends early where the time is over, and where both are refuted. Cost: two values of F each.
+    /// So many pairs, with points about the start and, where both bounds are finite, anywhere between them; a quarter of the pairs differ in one variable, one in
+    /// some, one in all, and one along the direction in which `½(J + Jᵀ)` at x has about its least eigenvalue. Ends early where the time is over, and where both are refuted. Cost: two values of F each.
     pub fn of(problem: &Mcp, pairs: usize, seed: u64) -> Self {
         let n = problem.dim();
         let mut rng = Pcg64::seed_from_u64(seed);
@@ -47,6 +48,7 @@ impl Sampled {
         let mut out = Self { pairs: 0, undefined: 0, not_monotone: None, not_p0: None };
         let [mut x, mut y] = [(); 2].map(|()| problem.start.clone());
         let [mut f, mut g, mut sizes] = [(); 3].map(|()| vec![0.0; n]);
+        let mut falling = Falling::default();
         for k in 0..TRIES * pairs {
             if out.pairs == pairs
                 || budget::over()
@@ -60,16 +62,21 @@ impl Sampled {
                 x[i] = point(problem, i, reach, &mut rng);
             }
             y.clone_from(&x);
-            let share = match k % 3 {
-                0 => 0.0,
-                1 => 0.3,
-                _ => 1.0,
-            };
-            let one = rng.random_range(0..n);
-            for i in 0..n {
-                if i == one || rng.random::<f64>() < share {
-                    y[i] = point(problem, i, reach, &mut rng);
+            if let Some(share) = [Some(0.0), Some(0.3), Some(1.0), None][k % 4] {
+                let one = rng.random_range(0..n);
+                for i in 0..n {
+                    if i == one || rng.random::<f64>() < share {
+                        y[i] = point(problem, i, reach, &mut rng);
+                    }
                 }
+            } else if falling.direction(problem, &mut *run, &x) {
+                let length = 0.01 * reach * x.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
+                for i in 0..n {
+                    y[i] = problem.project(i, x[i] + length * falling.direction[i]);
+                }
+            } else {
+                out.undefined += 1;
+                continue;
             }
             let [at_x, at_y] = [run.precisely(&x, &mut f), run.precisely(&y, &mut g)];
             if !(at_x && at_y) {
@@ -103,6 +110,60 @@ impl Sampled {
             }
         }
         out
+    }
+}
+
+/// Where the symmetric part of a Jacobian has about its least eigenvalue.
+#[derive(Default)]
+struct Falling {
+    /// Its largest entry is 1 or −1; 0 where a variable is at a bound.
+    direction: Vec<f64>,
+    next: Vec<f64>,
+    value: Vec<f64>,
+    jacobian: Vec<f64>,
+}
+
+/// Operations that a direction may take.
+const OPERATIONS: usize = 20_000_000;
+
+impl Falling {
+    /// Looks at x, by power iterations with `c − ½(J + Jᵀ)` from `(1, …, 1)`. False where J is not defined, or the time is over.
+    fn direction(&mut self, problem: &Mcp, run: &mut dyn Evaluator, x: &[f64]) -> bool {
+        let Self { direction, next, value, jacobian } = self;
+        let pattern = problem.F.pattern();
+        [&mut *direction, next, value].into_iter().for_each(|v| v.resize(x.len(), 0.0));
+        jacobian.resize(pattern.len(), 0.0);
+        if !run.jacobian(x, value, jacobian) {
+            return false;
+        }
+        let inside = |i: usize| problem.lower[i] < x[i] && x[i] < problem.upper[i];
+        direction.iter_mut().enumerate().for_each(|(i, d)| *d = f64::from(u8::from(inside(i))));
+        // Sums of moduli of rows and columns bound the norm.
+        next.fill(0.0);
+        for ((i, j), a) in pattern.places().zip(&*jacobian) {
+            next[i] += 0.5 * a.abs();
+            next[j] += 0.5 * a.abs();
+        }
+        let bound = next.iter().fold(0.0, |m: f64, x| m.max(*x));
+        for _ in 0..(OPERATIONS / pattern.len().max(1)).clamp(5, 100) {
+            if budget::over() {
+                return false;
+            }
+            next.iter_mut().zip(&*direction).for_each(|(n, d)| *n = bound * d);
+            for ((i, j), a) in pattern.places().zip(&*jacobian) {
+                next[i] -= 0.5 * a * direction[j];
+                next[j] -= 0.5 * a * direction[i];
+            }
+            let largest =
+                (0..x.len()).filter(|i| inside(*i)).fold(0.0, |m: f64, i| m.max(next[i].abs()));
+            if !(largest > 0.0 && largest.is_finite()) {
+                break;
+            }
+            for (i, d) in direction.iter_mut().enumerate() {
+                *d = if inside(i) { next[i] / largest } else { 0.0 };
+            }
+        }
+        true
     }
 }
 
@@ -150,6 +211,16 @@ mod tests {
         let d = [x[0] - y[0], x[1] - y[1]];
         assert!(d[0] * (d[0] + 3.0 * d[1]) + d[1] * d[1] < 0.0);
         assert_eq!(sampled.not_p0, None);
+        // Only along (1, 1, …): the stiffness hides it from other pairs.
+        let chain: Vec<_> = (1..=12)
+            .map(|i| match i {
+                1 => "x1 - x2 - 0.001*x1".into(),
+                12 => "x12 - x11 - 0.001*x12".into(),
+                i => format!("1.999*x{i} - x{} - x{}", i - 1, i + 1),
+            })
+            .collect();
+        let chain: Vec<_> = chain.iter().map(String::as_str).collect();
+        assert!(Sampled::of(&problem(&chain), 100, 1).not_monotone.is_some());
         // Decreasing in one variable.
         let sampled = Sampled::of(&problem(&["x1 + x2", "sin(x2)", "x3 - x3^2"]), 100, 1);
         assert!(sampled.not_monotone.is_some() && sampled.not_p0.is_some());

@@ -44,7 +44,7 @@ fn info_says_what_is_known_of_f() {
         "affine: 0 of 6 rows\n",
         "Jacobian   16 entries, 2 to 6 a row, 6 on the diagonal\n",
         "start      natural residual ",
-        "monotone   not monotone: a pair of points shows it\n",
+        "monotone   ",
         "P0         on 100 sampled pairs\n",
     ] {
         assert!(text.contains(said), "{said}: {text}");
