@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nonsmooth_io::table::Table;
 use nonsmooth_io::{ProblemFile, StoredPoint};
-use nonsmooth_problem::{AnyPoint, AnyProblem, AnyStatus, Complementarity};
+use nonsmooth_problem::{AnyPoint, AnyProblem, AnyStatus, Complementarity, Problem};
 use nonsmooth_solve::settings::SettingsMap;
 use nonsmooth_solve::{Answer, Found, Limits, Solve, multistart};
 use serde_json::json;
