@@ -71,6 +71,7 @@ impl NonlinearAuto {
             0 => plan
                 .then(named("semismooth"), 60, "fast where the start is good")
                 .with("restarts", false)
+                .anew(named("path"), 300, "goes along the pieces of the linearisation")
                 .anew(named("proxi"), 150, "leaves stationary points")
                 .anew(named("smooth"), 100, "another way"),
             1 => plan
