@@ -109,7 +109,7 @@ impl Squares {
         let Matrix::Sparse(all) = &normal else { unreachable!("made sparse") };
         let mut matrix = normal.clone();
         let mut factor = Factor::new(&matrix);
-        let mut first = f64::NAN;
+        let mut first = None;
         for _ in 0..STEPS {
             // Aᵀ(r + A d) + εd
             let d = std::mem::take(&mut self.d);
@@ -127,11 +127,10 @@ impl Squares {
                     most = most.max(g.abs());
                 }
             }
-            if !(most > SOLVED * first.max(0.0)) && !first.is_nan() || most == 0.0 {
+            // The first one is what the others are compared with.
+            let limit = SOLVED * *first.get_or_insert(most);
+            if most <= limit || most == 0.0 {
                 return true;
-            }
-            if first.is_nan() {
-                first = most;
             }
             let Matrix::Sparse(to) = &mut matrix else { unreachable!("made sparse") };
             let (pointers, rows) = (all.col_ptr(), all.row_idx());
@@ -220,7 +219,7 @@ impl Inner for Squares {
         self.d = d;
         let z = 0.5 * self.product.iter().map(|p| p * p).sum::<f64>();
         // Stationary: the linearised residual cannot be made smaller.
-        if !(z > f64::EPSILON * theta) {
+        if z <= f64::EPSILON * theta || z.is_nan() {
             return Moved::Stuck;
         }
         let mut t = 1.0;
