@@ -31,12 +31,15 @@ pub struct Candidate {
 /// Who makes the plan for a problem, stage by stage; an empty one ends it.
 type Planner<P> = Box<dyn Fn(&P, usize) -> Vec<Candidate> + Send>;
 
+/// A session, with the name and the settings of its solver.
+type Made<P> = (Cow<'static, str>, SettingsMap, Box<dyn Session<P>>);
+
 /// A session that runs the solvers of a plan until one solves the problem or proves that it has no solution. Each starts from the best point that the ones before
 /// it have found.
 pub struct Portfolio<P: Registered> {
     plan: Planner<P>,
     /// What was made for earlier problems, by name and settings.
-    sessions: Vec<(Cow<'static, str>, SettingsMap, Box<dyn Session<P>>)>,
+    sessions: Vec<Made<P>>,
     /// The one that was last asked.
     last: Option<usize>,
     history: History,

@@ -17,17 +17,11 @@ use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
 /// The hyperparameters.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Qpcomp {
     /// Whether projected Newton steps that look for the active set come first; the published method has none.
     pub crash: bool,
-}
-
-impl Default for Qpcomp {
-    fn default() -> Self {
-        Self { crash: false }
-    }
 }
 
 impl Settings for Qpcomp {}

@@ -278,7 +278,8 @@ impl<D: Residual, F: Residual> Descent<D, F> {
         let merit = residuals(&self.merit, model, &self.trial, &self.trial_f, |_, _| {});
         let moves = at.x.iter().zip(&self.trial);
         let slope: f64 = self.gradient.iter().zip(moves).map(|(g, (x, y))| g * (x - y)).sum();
-        if !(merit <= self.reference - SIGMA * slope.max(0.0)) || self.trial == at.x {
+        let enough = merit <= self.reference - SIGMA * slope.max(0.0);
+        if !enough || self.trial == at.x {
             return false;
         }
         std::mem::swap(&mut at.x, &mut self.trial);
@@ -298,7 +299,8 @@ impl<D: Residual, F: Residual> Descent<D, F> {
         let pairs = weights.iter().zip(&*of_x).zip(of_f.iter().zip(&*gradient));
         let curvature: f64 = pairs.map(along).sum();
         let square = norm(gradient).powi(2);
-        if !(square > 1e-30 * self.merit_here.max(f64::MIN_POSITIVE)) {
+        let stationary = square <= 1e-30 * self.merit_here.max(f64::MIN_POSITIVE);
+        if stationary || square.is_nan() {
             return false;
         }
         let mut t = if curvature > 0.0 { square / curvature } else { 1.0 };

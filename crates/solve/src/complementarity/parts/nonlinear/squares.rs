@@ -144,7 +144,9 @@ impl Squares {
                     };
                 }
             }
-            if !factor.factorise(&matrix) && !(factor.distrust() && factor.factorise(&matrix)) {
+            let factorised =
+                factor.factorise(&matrix) || (factor.distrust() && factor.factorise(&matrix));
+            if !factorised {
                 return false;
             }
             for i in 0..n {
