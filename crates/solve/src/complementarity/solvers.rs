@@ -3,7 +3,7 @@
 use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mcp, Mlcp};
 
 use crate::Boxed;
-use crate::complementarity::auto::{LinearAuto, NonlinearAuto, Planned};
+use crate::complementarity::auto::{Auto, Planned};
 use crate::complementarity::form::{Bounded, Complementary, Paired};
 use crate::complementarity::functions::{FischerBurmeister, Min, Penalised};
 use crate::complementarity::interior::{MehrotraType, MizunoToddYe};
@@ -62,7 +62,7 @@ fn complementary<P: Complementary + Paired + 'static>() -> Vec<Entry<P>> {
 
 /// `auto` runs whole sessions of the others.
 fn with_auto<P: Planned>(others: Vec<Entry<P>>) -> Vec<Entry<P>> {
-    let auto = Entry::session(|auto: LinearAuto| auto.session::<P>());
+    let auto = Entry::session(|auto: Auto| auto.session::<P>());
     std::iter::once(auto).chain(others).collect()
 }
 
@@ -107,7 +107,7 @@ impl Registered for Hlcp {
 impl Registered for Mcp {
     fn solvers() -> Vec<Entry<Self>> {
         vec![
-            Entry::session(NonlinearAuto::session),
+            Entry::session(Auto::nonlinear),
             Entry::of::<PathSearch>(),
             Entry::of::<Miles>(),
             Entry::of::<Semismooth>(),

@@ -1,6 +1,6 @@
-//! **auto** for linear complementarity problems: chooses by size, class and structure, falls back, and says what it tried and why.
+//! **auto** for complementarity problems: chooses by size, class and structure, falls back, and says what it tried and why.
 //!
-//! Problem: LCP, MLCP, horizontal and box LCP.
+//! Problem: LCP, MLCP, horizontal and box LCP; of nonlinear problems see `nonlinear.rs`.
 //!
 //! Method: on problems so small that a look at the matrix costs as much as a solve, pivots at once; then a plan of solvers in the order of their promise on the problem at hand
 //! (`plan.rs`); then, while time and iterations last, pivots from other covering vectors with ever larger budgets. Each starts from the best point before it and has a budget of
@@ -22,33 +22,34 @@ use crate::core::register::Registered;
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 
-pub use nonlinear::NonlinearAuto;
 pub use portfolio::{Candidate, Portfolio};
 
-/// The hyperparameters of `auto` for linear complementarity problems; none needs to be set.
+/// The hyperparameters of `auto` for complementarity problems; none needs to be set.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct LinearAuto {
+pub struct Auto {
     /// Enumerate all complementary bases, as the last resort, up to this many complementary pairs.
     pub enumerate_below: usize,
+    /// Perturbed starts of a nonlinear problem that are tried in a turn where nothing has solved it: two turns without a limit on time, else until it is over.
+    pub restarts: usize,
 }
 
-impl Default for LinearAuto {
+impl Default for Auto {
     fn default() -> Self {
-        Self { enumerate_below: 20 }
+        Self { enumerate_below: 20, restarts: 20 }
     }
 }
 
-impl Settings for LinearAuto {}
+impl Settings for Auto {}
 
-impl Described for LinearAuto {
+impl Described for Auto {
     const ABOUT: &'static About = &About {
         name: "auto",
         family: "auto",
         solves: Solves::Law,
-        summary: "needs no setting: a plan of solvers by size, class and structure of M, until one solves the problem or proves that there is no solution",
+        summary: "needs no setting: a plan of solvers by size, class and structure, until one solves the problem or proves that there is no solution",
         needs: &[],
-        cites: &["CottlePangStone2009", "FacchineiPang2003", "Acary2018"],
+        cites: &["CottlePangStone2009", "FacchineiPang2003", "Munson2002", "Acary2018"],
         variants: &[],
         settings: described::<Self>,
     };
@@ -58,10 +59,10 @@ impl Described for LinearAuto {
 pub trait Planned: Registered {
     /// The solvers to try at this stage, in this order: first those that need no look at the problem, then a plan by its class and structure, then what time
     /// that is left is good for. None: the end.
-    fn plan(&self, settings: &LinearAuto, stage: usize) -> Vec<Candidate>;
+    fn plan(&self, settings: &Auto, stage: usize) -> Vec<Candidate>;
 }
 
-impl LinearAuto {
+impl Auto {
     /// A session without history: the plan is made of the first problem that it meets.
     pub fn session<P: Planned>(self) -> Portfolio<P> {
         Portfolio::new(move |problem: &P, stage| problem.plan(&self, stage))
@@ -69,25 +70,25 @@ impl LinearAuto {
 }
 
 impl Planned for Lcp {
-    fn plan(&self, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+    fn plan(&self, settings: &Auto, stage: usize) -> Vec<Candidate> {
         plan::of_lcp(self, settings, stage)
     }
 }
 
 impl Planned for Mlcp {
-    fn plan(&self, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+    fn plan(&self, settings: &Auto, stage: usize) -> Vec<Candidate> {
         plan::of_mlcp(self, settings, stage)
     }
 }
 
 impl Planned for BoxLcp {
-    fn plan(&self, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+    fn plan(&self, settings: &Auto, stage: usize) -> Vec<Candidate> {
         plan::of_box(self, settings, stage)
     }
 }
 
 impl Planned for Hlcp {
-    fn plan(&self, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+    fn plan(&self, settings: &Auto, stage: usize) -> Vec<Candidate> {
         plan::of_hlcp(self, settings, stage)
     }
 }

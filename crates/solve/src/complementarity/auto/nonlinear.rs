@@ -8,60 +8,28 @@
 use std::borrow::Cow;
 
 use nonsmooth_problem::{BoxLcp, LcpPoint, Mcp, Problem};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use super::plan::Plan;
-use super::{Candidate, LinearAuto, Portfolio};
+use super::{Auto, Candidate, Portfolio};
 use crate::complementarity::reform::Presolve;
 use crate::complementarity::reform::presolve::reduces;
-use crate::core::register::{About, Composed, Described, Solves};
-use crate::core::settings::{Settings, described};
+use crate::core::register::Composed;
 use crate::core::trace::Trace;
 use crate::{Limits, Observer, Outcome, Progress, Sample, Session, SolveError, Status};
 
-/// The hyperparameters of `auto` for nonlinear complementarity problems; none needs to be set.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct NonlinearAuto {
-    /// How many perturbed starts it tries in a turn where nothing has solved the problem: two turns without a limit on time, else until it is over.
-    pub restarts: usize,
-}
-
-impl Default for NonlinearAuto {
-    fn default() -> Self {
-        Self { restarts: 20 }
-    }
-}
-
-impl Settings for NonlinearAuto {}
-
-impl Described for NonlinearAuto {
-    const ABOUT: &'static About = &About {
-        name: "auto",
-        family: "auto",
-        solves: Solves::Law,
-        summary: "needs no setting: affine problems as linear ones, others by a plan of solvers from the start and from others, until one solves the problem",
-        needs: &[],
-        cites: &["Munson2002", "Billups1995", "Acary2018"],
-        variants: &[],
-        settings: described::<Self>,
-    };
-}
-
-impl NonlinearAuto {
-    /// A session without history.
-    pub fn session(self) -> AutoSession {
+impl Auto {
+    /// A session for nonlinear problems, without history.
+    pub fn nonlinear(self) -> AutoSession {
         AutoSession {
-            linear: LinearAuto::default().session::<BoxLcp>(),
-            nonlinear: Portfolio::new(move |problem: &Mcp, stage| self.plan(problem, stage)),
+            linear: self.session::<BoxLcp>(),
+            nonlinear: Portfolio::new(move |problem: &Mcp, stage| self.plan_of(problem, stage)),
             polish: Portfolio::new(|_: &Mcp, stage| polish(stage)),
             affine: None,
         }
     }
 
     /// The solvers of a stage; without what a presolve takes away, where there is something.
-    fn plan(&self, problem: &Mcp, stage: usize) -> Vec<Candidate> {
+    fn plan_of(&self, problem: &Mcp, stage: usize) -> Vec<Candidate> {
         let reduces = reduces(problem);
         let named = |name: &'static str| -> Cow<'static, str> {
             if reduces { format!("{}/{name}", Presolve::NAME).into() } else { name.into() }

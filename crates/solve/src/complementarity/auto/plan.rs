@@ -7,7 +7,7 @@ use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 
 use super::portfolio::DECIDES;
-use super::{Candidate, LinearAuto};
+use super::{Auto, Candidate};
 use crate::complementarity::parts::game::is_game;
 use crate::core::settings::SettingsMap;
 
@@ -231,7 +231,7 @@ const TURNS: usize = 12;
 const LAST: usize = 4;
 const MOST_PAIRS: usize = 40;
 
-pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+pub(super) fn of_lcp(problem: &Lcp, settings: &Auto, stage: usize) -> Vec<Candidate> {
     match stage {
         AT_ONCE if is_game(problem) => return games(problem.dim()).0,
         AT_ONCE => return at_once(&problem.M, SWEPT, "lemke", problem.dim()).0,
@@ -268,7 +268,7 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &LinearAuto, stage: usize) -> Vec<
     plan.0
 }
 
-pub(super) fn of_mlcp(problem: &Mlcp, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+pub(super) fn of_mlcp(problem: &Mlcp, settings: &Auto, stage: usize) -> Vec<Candidate> {
     let pairs = problem.pairs();
     let square = problem.equalities == problem.free;
     match stage {
@@ -313,7 +313,7 @@ pub(super) fn of_mlcp(problem: &Mlcp, settings: &LinearAuto, stage: usize) -> Ve
         .0
 }
 
-pub(super) fn of_box(problem: &BoxLcp, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+pub(super) fn of_box(problem: &BoxLcp, settings: &Auto, stage: usize) -> Vec<Candidate> {
     let bounds = problem.lower.iter().zip(&problem.upper);
     // Second bounds become pairs of their own.
     let twice = bounds.clone().filter(|(l, u)| l.is_finite() && u.is_finite() && l != u).count();
@@ -364,7 +364,7 @@ const SWEPT_BOX: usize = 8;
 /// Steps of conjugate gradients that are cheap beside pivots.
 const CONJUGATE: usize = 150;
 
-pub(super) fn of_hlcp(problem: &Hlcp, settings: &LinearAuto, stage: usize) -> Vec<Candidate> {
+pub(super) fn of_hlcp(problem: &Hlcp, settings: &Auto, stage: usize) -> Vec<Candidate> {
     match stage {
         AT_ONCE => return vec![],
         BY_CLASS => {}
