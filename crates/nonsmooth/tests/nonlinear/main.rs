@@ -277,3 +277,54 @@ fn the_eight_on_the_corpus() {
         println!("{name}: {solved} of {}", all.len());
     }
 }
+
+/// The models of the corpus that a solver does not solve to a natural residual of 1e-6, within steps, not seconds: the same on every machine.
+fn unsolved(solver: &str, settings: &[&str]) -> Vec<String> {
+    let limits = Limits { tolerance: 1e-8, max_iterations: 5000, ..Limits::default() };
+    let mut models = corpus();
+    models.retain(|(_, problem)| {
+        let run = run(problem, solver, settings, &limits);
+        run.outcome.status != Status::Solved || run.verdict.measure.absolute > 1e-6
+    });
+    models.into_iter().map(|(name, _)| name).collect()
+}
+
+/// Munson's tables have PATH solve all of these but Billups' problem, whose merit has a minimum between the start and the solution.
+#[test]
+fn path_solves_all_models_but_that_of_billups() {
+    let expected = ["P03_billups_s1", "P03_billups_s2"];
+    let found = unsolved("path", &[]);
+    assert!(found.iter().all(|name| expected.contains(&&name[..])), "{found:?}");
+    let found = unsolved("path", &["merit=normal", "restarts=0"]);
+    assert!(found.len() <= 22, "{found:?}");
+}
+
+/// From the origin, the linearisation of Kojima's and Shindo's problem has no solution; the others have singular Jacobians, or far starts.
+#[test]
+fn miles_solves_models_whose_linearisations_have_solutions() {
+    let expected = [
+        "P01_kojshin_s1",
+        "P02_josephy_s1",
+        "P03_billups_s1",
+        "P03_billups_s2",
+        "P11_ehl_k40_hertz",
+        "P11_ehl_kost_hertz",
+        "P30_colvdual_s1",
+        "P30_colvdual_s3",
+        "pyomo_P01_kojshin",
+        "pyomo_P02_josephy",
+        "pyomo_P30_colvdual",
+    ];
+    let found = unsolved("miles", &[]);
+    assert!(found.iter().all(|name| expected.contains(&&name[..])), "{found:?}");
+}
+
+#[test]
+fn pivotal_methods_take_few_factorisations_on_a_grid() {
+    let problem = Bratu { m: 60, ..Bratu::default() }.mcp();
+    for solver in ["path", "miles"] {
+        let run = run(&problem, solver, &[], &Limits::default());
+        assert_eq!(run.outcome.status, Status::Solved, "{solver}: {:?}", run.account);
+        assert!(run.outcome.factorisations <= 20, "{solver}: {}", run.outcome.factorisations);
+    }
+}

@@ -285,9 +285,7 @@ impl PathSearch {
             if found == End::Over {
                 return false;
             }
-            if found != End::Solved {
-                counts.rays += 1;
-            }
+            counts.rays += usize::from(!matches!(found, End::Solved | End::Pivots));
             // The path from Lemke's ray does not begin at x.
             let t = if found == End::Solved || basis == own { linear.reached() } else { 0.0 };
             if t > reached {
@@ -299,6 +297,10 @@ impl PathSearch {
                     *lambda = regular;
                 }
                 return true;
+            }
+            if found == End::Pivots && reached > 0.0 {
+                // The next arc goes on from there.
+                break;
             }
         }
         reached > 0.0
@@ -399,8 +401,12 @@ impl Solver<Mcp> for PathSearch {
         let solve = Solve::new(problem);
         let n = solve.model.dim();
         let function = self.merit.function();
+        let mut crash = Crash::new(&solve.model);
+        if n > LARGE {
+            crash.persist();
+        }
         Ok(Work {
-            crash: Crash::new(&solve.model),
+            crash,
             linear: Linearised::new(&solve.model),
             descent: Descent::new(Min {}, function, Options::default(), &solve.model),
             solve,

@@ -19,6 +19,8 @@ pub struct Crash {
     sides: Vec<i8>,
     steps: usize,
     over: bool,
+    /// Steps of a regularised matrix do not end it.
+    persistent: bool,
 }
 
 const OPTIONS: Options = Options { memory: 1, slack: 1.0, least: 1e-4, gradient: false };
@@ -27,7 +29,7 @@ impl Crash {
     /// For problems of this model.
     pub fn new(model: &Model) -> Self {
         let descent = Descent::new(Min {}, Penalised::default(), OPTIONS, model);
-        Self { descent, sides: vec![0; model.dim()], steps: 0, over: false }
+        Self { descent, sides: vec![0; model.dim()], steps: 0, over: false, persistent: false }
     }
 
     /// Begins anew; with no step at all where it is not `wanted`.
@@ -35,6 +37,11 @@ impl Crash {
         self.descent.restart(Min {}, Penalised::default(), OPTIONS);
         (self.steps, self.over) = (0, !wanted);
         self.sides.fill(i8::MAX);
+    }
+
+    /// From now on a step with a regularised matrix does not end it.
+    pub fn persist(&mut self) {
+        self.persistent = true;
     }
 
     /// Whether it has ended.
@@ -58,6 +65,7 @@ impl Crash {
             let now = i8::from(x >= u) - i8::from(x <= l);
             changes += usize::from(std::mem::replace(side, now) != now);
         }
-        self.over = moved != Moved::Newton || changes <= 1 || self.steps >= STEPS;
+        let goes_on = moved == Moved::Newton || (self.persistent && moved == Moved::Regularised);
+        self.over = !goes_on || changes <= 1 || self.steps >= STEPS;
     }
 }
