@@ -48,11 +48,44 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! Nonlinear problems `l ≤ x ≤ u ⟂ F(x)` take F as [`field::Expressions`], as a function that is generic over its numbers, whose sparse Jacobian is then exact, or as closures.
+//! Josephy's problem, with F written as one would:
+//!
+//! ```
+//! # #[cfg(feature = "duals")] {
+//! use nonsmooth::field::{Duals, Function, Number};
+//! use nonsmooth::{Mcp, solve};
+//!
+//! struct Josephy;
+//!
+//! impl Function for Josephy {
+//!     fn dim(&self) -> usize {
+//!         4
+//!     }
+//!
+//!     fn at<T: Number>(&self, x: &[T], f: &mut [T]) {
+//!         let [a, b, c, d] = [x[0], x[1], x[2], x[3]];
+//!         f[0] = a * a * 3.0 + a * b * 2.0 + b * b * 2.0 + c + d * 3.0 - 6.0;
+//!         f[1] = a * a * 2.0 + a + b * b + c * 3.0 + d * 2.0 - 2.0;
+//!         f[2] = a * a * 3.0 + a * b + b * b * 2.0 + c * 2.0 + d * 3.0 - 1.0;
+//!         f[3] = a * a + b * b * 3.0 + c * 2.0 + d * 3.0 - 3.0;
+//!     }
+//! }
+//!
+//! let start = vec![0.0; 4];
+//! let problem = Mcp::ncp(Duals::new(Josephy, &start)?, start)?; // 0 ≤ x ⟂ F(x) ≥ 0
+//! let answer = solve(&problem)?;
+//! assert!(answer.is_solved());
+//! assert!((answer.point.z[0] - 6f64.sqrt() / 2.0).abs() < 1e-6);
+//! # }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! # What is here
 //!
 //! | to | |
 //! | --- | --- |
-//! | state a problem | [`FrictionLocal`], [`FrictionGlobal`], [`Lcp`], [`Mlcp`], [`Hlcp`], [`BoxLcp`]; [`AnyProblem`] where the kind is known only from a file |
+//! | state a problem | [`FrictionLocal`], [`FrictionGlobal`], [`Lcp`], [`Mlcp`], [`Hlcp`], [`BoxLcp`], [`Mcp`] with its [`field`]; [`AnyProblem`] where the kind is known only from a file |
 //! | solve it | [`solve`], [`Solve`], [`Answer`]; [`session`] for many problems of one shape, step by step, without allocation |
 //! | judge a point | [`Judged::judge`], [`Verdict`]; [`exists`] asks whether there is a solution at all |
 //! | read and write files | [`read`] a problem; [`ProblemFile`] with all that a file holds, in any of the [`FORMATS`] |

@@ -2,6 +2,29 @@
 
 use super::Pattern;
 
+/// The columns of a pattern in groups, and the group of each column.
+#[derive(Debug, Clone)]
+pub(super) struct Groups {
+    pub(super) columns: Vec<Vec<usize>>,
+    pub(super) of_column: Vec<usize>,
+}
+
+impl Groups {
+    pub(super) fn of(pattern: &Pattern, columns: usize) -> Self {
+        let groups = pattern.groups(columns);
+        let mut of_column = vec![0; columns];
+        for (k, group) in groups.iter().enumerate() {
+            group.iter().for_each(|&j| of_column[j] = k);
+        }
+        Self { columns: groups, of_column }
+    }
+
+    /// Their number, in words.
+    pub(super) fn said(&self) -> String {
+        crate::plural(self.columns.len(), "colour")
+    }
+}
+
 impl Pattern {
     /// Columns in groups such that no row has places in two columns of a group: greedy, from the first column on. Columns without a place are in the first
     /// group. Cost: for each place the length of its row.
@@ -10,6 +33,10 @@ impl Pattern {
     pub fn groups(&self, columns: usize) -> Vec<Vec<usize>> {
         let mut rows = vec![vec![]; columns];
         self.places().for_each(|(i, j)| rows[j].push(i));
+        // A full row sees every two.
+        if (0..self.rows()).any(|i| self.row(i).len() == columns) {
+            return (0..columns).map(|j| vec![j]).collect();
+        }
         let mut group = vec![usize::MAX; columns];
         let mut groups: Vec<Vec<usize>> = vec![];
         // For which column a group was last seen to be taken.

@@ -3,12 +3,30 @@
 //! | source | values | Jacobian |
 //! | --- | --- | --- |
 //! | [`Expressions`] | a graph of operations, in plain and in doubled precision | exact, sparse, backwards through each row |
+//! | `Duals` (feature `duals`) | a function generic over its numbers | exact, sparse, forwards, several columns at once |
+//! | [`Closures`] | a closure | another closure |
+//! | [`Differences`] | a closure | central differences, several columns at once |
+//!
+//! The last three do not know the terms of a row: the judge takes them from the Jacobian, and has F in plain arithmetic only.
 
+mod closures;
+mod differences;
+#[cfg(feature = "duals")]
+mod duals;
 mod expression;
 mod groups;
+mod probe;
+#[cfg(test)]
+mod tests;
 
 use std::fmt::Debug;
 
+use crate::ProblemError;
+
+pub use closures::Closures;
+pub use differences::Differences;
+#[cfg(feature = "duals")]
+pub use duals::{Duals, Function, Number};
 pub use expression::{Affine, Binary, Expressions, Graph, Id, Nary, Node, Piecewise, Unary};
 
 /// The places where a Jacobian may not be zero: columns of each row, ascending.
@@ -27,6 +45,31 @@ impl Pattern {
             out.starts.push(out.columns.len());
         }
         out
+    }
+
+    /// All places of n rows and columns.
+    pub fn dense(n: usize) -> Self {
+        Self::new((0..n).map(|_| 0..n))
+    }
+
+    /// Checks that there are as many columns as rows, at least one, and that the columns of each row ascend without repetition.
+    pub fn validate(&self) -> Result<(), ProblemError> {
+        let n = self.rows();
+        if n == 0 {
+            return Err(ProblemError::shape("pattern", "at least one row", "none"));
+        }
+        for i in 0..n {
+            let row = self.row(i);
+            let wrong = |k: &usize| row[*k] >= n || (*k > 0 && row[*k] <= row[*k - 1]);
+            if let Some(k) = (0..row.len()).find(wrong) {
+                return Err(ProblemError::value(
+                    format!("pattern[{i}][{k}]"),
+                    format!("columns below {n} in ascending order"),
+                    row[k],
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// The number of rows.
