@@ -5,6 +5,7 @@
 //! values     v_k = op(v_a, v_b)                       once for all
 //! slopes     of a unit: backwards to variables (A) and to shared nodes (B); ∇D_k of shared nodes first, then
 //! Jacobian   ∇row = A + Σ_k B_k ∇D_k
+//! sums       Σ c_k v_k is one operation, sums and differences inside it included
 //! ```
 //!
 //! Cost of values: one operation a node. Of the Jacobian: two more a node, and for each use of a shared node the variables that it depends on.
@@ -84,7 +85,10 @@ impl Tape {
     pub(crate) fn new(graph: &Graph, rows: &[Id]) -> Self {
         let n = graph.variables;
         let owners = owners(graph, rows);
-        let is_code = |k: usize| !matches!(graph.nodes[k], Node::Constant(_) | Node::Variable(_));
+        let inlined = inlined(graph, rows);
+        let is_code = |k: usize| {
+            !inlined[k] && !matches!(graph.nodes[k], Node::Constant(_) | Node::Variable(_))
+        };
         // Shared nodes in their order, then rows.
         let mut unit_of_shared = vec![u32::MAX; graph.nodes.len()];
         let mut roots = vec![];
@@ -135,49 +139,61 @@ impl Tape {
             patterns: vec![],
         };
         let mut seen = vec![usize::MAX; n + shared];
+        let mut terms = vec![];
         for (u, members) in members.iter().enumerate() {
             let code = tape.code.len() as u32..(tape.code.len() + members.len()) as u32;
             let (mut pattern, mut used) = (vec![], vec![]);
-            let mut sees =
-                |k: usize, pattern: &mut Vec<u32>, used: &mut Vec<u32>| match &graph.nodes[k] {
-                    Node::Constant(_) => {}
-                    Node::Variable(i) => {
-                        if std::mem::replace(&mut seen[*i], u) != u {
-                            pattern.push(*i as u32);
-                        }
-                    }
-                    _ => {
-                        let d = unit_of_shared[k];
-                        if d != u32::MAX
-                            && d as usize != u
-                            && std::mem::replace(&mut seen[n + d as usize], u) != u
-                        {
-                            used.push(d);
-                        }
-                    }
-                };
-            for &k in members {
-                let node = &graph.nodes[k as usize];
-                for a in node.arguments().iter() {
-                    sees(a.0 as usize, &mut pattern, &mut used);
+            let mut sees_variable = |i: usize, pattern: &mut Vec<u32>| {
+                if std::mem::replace(&mut seen[i], u) != u {
+                    pattern.push(i as u32);
                 }
-                tape.translate(node, &place);
+            };
+            let mut shares = vec![];
+            let mut sees = |k: usize, pattern: &mut Vec<u32>| match &graph.nodes[k] {
+                Node::Constant(_) => {}
+                Node::Variable(i) => sees_variable(*i, pattern),
+                _ => shares.push(unit_of_shared[k]),
+            };
+            for &k in members {
+                let k = k as usize;
+                let node = &graph.nodes[k];
+                if combination(graph, k, &inlined, &mut terms) {
+                    let from = tape.terms.len() as u32;
+                    for &(operand, c) in &terms {
+                        let at = match operand {
+                            Operand::Node(a) => {
+                                sees(a, &mut pattern);
+                                place[a]
+                            }
+                            Operand::Variable(i) => i as u32,
+                        };
+                        tape.terms.push((at, c));
+                    }
+                    tape.code.push(Code::Linear(from, tape.terms.len() as u32));
+                } else {
+                    node.arguments().iter().for_each(|a| sees(a.0 as usize, &mut pattern));
+                    tape.translate(node, &place);
+                }
             }
             let root = match u.checked_sub(shared) {
                 Some(i) => {
-                    sees(rows[i].0 as usize, &mut pattern, &mut used);
+                    sees(rows[i].0 as usize, &mut pattern);
                     rows[i].0
                 }
                 None => roots[u] as u32,
             };
             // The variables of linear forms, and those of what is used.
-            for &k in members {
-                if let Node::Linear(terms) = &graph.nodes[k as usize] {
-                    for &(i, _) in terms {
-                        if std::mem::replace(&mut seen[i], u) != u {
-                            pattern.push(i as u32);
-                        }
-                    }
+            let at = code.start as usize;
+            for code in &tape.code[at..] {
+                if let Code::Linear(from, to) = *code {
+                    let terms = tape.terms[from as usize..to as usize].iter();
+                    let variables = terms.map(|term| term.0 as usize).filter(|&i| i < n);
+                    variables.for_each(|i| sees_variable(i, &mut pattern));
+                }
+            }
+            for d in shares.into_iter().filter(|&d| d != u32::MAX && d as usize != u) {
+                if std::mem::replace(&mut seen[n + d as usize], u) != u {
+                    used.push(d);
                 }
             }
             for &d in &used {
@@ -213,16 +229,12 @@ impl Tape {
                 self.arguments.extend(all.iter().map(at));
                 Code::Nary(*op, from, self.arguments.len() as u32)
             }
-            Node::Linear(terms) => {
-                let from = self.terms.len() as u32;
-                self.terms.extend(terms.iter().map(|&(i, c)| (i as u32, c)));
-                Code::Linear(from, self.terms.len() as u32)
-            }
             Node::If([a, b, c]) => Code::If([at(a), at(b), at(c)]),
             Node::Piecewise(piece, a) => {
                 self.pieces.push(piece.clone());
                 Code::Piecewise(self.pieces.len() as u32 - 1, at(a))
             }
+            Node::Linear(_) => unreachable!("a combination"),
             Node::Constant(_) | Node::Variable(_) => unreachable!("no code"),
         };
         self.code.push(code);
@@ -376,6 +388,84 @@ impl Tape {
             }
         }
     }
+}
+
+/// What a sum is of.
+#[derive(Debug, Clone, Copy)]
+enum Operand {
+    Variable(usize),
+    Node(usize),
+}
+
+/// The summands of a sum, a difference, a negation, a linear form or a multiple, as (node, factor); none of other nodes.
+fn summands(graph: &Graph, k: usize) -> Option<Vec<(Operand, f64)>> {
+    let of = |a: Id, c: f64| (Operand::Node(a.0 as usize), c);
+    let constant = |a: Id| match graph.nodes[a.0 as usize] {
+        Node::Constant(c) => Some(c),
+        _ => None,
+    };
+    Some(match &graph.nodes[k] {
+        Node::Unary(Unary::Neg, a) => vec![of(*a, -1.0)],
+        Node::Binary(Binary::Add, a, b) => vec![of(*a, 1.0), of(*b, 1.0)],
+        Node::Binary(Binary::Sub, a, b) => vec![of(*a, 1.0), of(*b, -1.0)],
+        Node::Binary(Binary::Mul, a, b) => match (constant(*a), constant(*b)) {
+            (Some(c), None) => vec![of(*b, c)],
+            (None, Some(c)) => vec![of(*a, c)],
+            _ => return None,
+        },
+        Node::Nary(Nary::Sum, all) => all.iter().map(|a| of(*a, 1.0)).collect(),
+        Node::Linear(terms) => terms.iter().map(|&(i, c)| (Operand::Variable(i), c)).collect(),
+        _ => return None,
+    })
+}
+
+/// Which nodes are sums themselves and used by one sum alone, so that their summands become its own: multiples anywhere, others where they come first, so that all is
+/// added in the same order and no bit of the result changes. Only behind factors of 1 and −1: others would be rounded where they are multiplied, which doubled
+/// precision would see.
+fn inlined(graph: &Graph, rows: &[Id]) -> Vec<bool> {
+    let mut uses = vec![0_u8; graph.nodes.len()];
+    let mut used = |a: &Id| uses[a.0 as usize] = uses[a.0 as usize].saturating_add(1);
+    rows.iter().for_each(&mut used);
+    graph.nodes.iter().for_each(|node| node.arguments().iter().for_each(&mut used));
+    let mut inlined = vec![false; graph.nodes.len()];
+    // How many summands a node has with those that become its own: none, one, more.
+    let mut counts = vec![0_u8; graph.nodes.len()];
+    for k in 0..graph.nodes.len() {
+        for (at, (operand, c)) in summands(graph, k).unwrap_or_default().into_iter().enumerate() {
+            let mut count = 1;
+            if let Operand::Node(a) = operand
+                && uses[a] == 1
+                && (counts[a] == 1 && c.abs() == 1.0 || counts[a] > 1 && at == 0 && c == 1.0)
+            {
+                inlined[a] = true;
+                count = counts[a];
+            }
+            counts[k] = (counts[k] + count).min(2);
+        }
+    }
+    inlined
+}
+
+/// The summands of a sum with those of the sums in it, from left to right. False for what is no sum, and for one operation on two nodes, which is as good.
+fn combination(graph: &Graph, k: usize, inlined: &[bool], terms: &mut Vec<(Operand, f64)>) -> bool {
+    let Some(mut left) = summands(graph, k) else { return false };
+    let is_inlined = |operand: &Operand| matches!(operand, Operand::Node(a) if inlined[*a]);
+    let plain = matches!(graph.nodes[k], Node::Unary(..) | Node::Binary(..));
+    if plain && !left.iter().any(|(operand, _)| is_inlined(operand)) {
+        return false;
+    }
+    terms.clear();
+    left.reverse();
+    while let Some((operand, c)) = left.pop() {
+        match operand {
+            Operand::Node(a) if inlined[a] => {
+                let inner = summands(graph, a).unwrap_or_default();
+                left.extend(inner.into_iter().rev().map(|(operand, d)| (operand, c * d)));
+            }
+            _ => terms.push((operand, c)),
+        }
+    }
+    true
 }
 
 /// To which row each node belongs, if to one alone; a node that several use belongs to itself.

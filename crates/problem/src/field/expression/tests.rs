@@ -194,3 +194,27 @@ fn a_chain_of_a_million_sums_is_no_recursion() {
     assert_eq!((value[0], jacobian[0]), (1_000_001.0, 1_000_001.0));
     assert!(f.affine().is_some());
 }
+
+/// `x − 3 z + y − 2 (x − (y − z)) − (x + y)`: sums that come first and multiples are part of a sum, what would be added in another order is not.
+#[test]
+fn sums_in_sums_are_one_operation() {
+    let mut g = Graph::new(3);
+    let [x, y, z] = [0, 1, 2].map(|i| g.variable(i));
+    let (two, three) = (g.constant(2.0), g.constant(3.0));
+    let tripled = g.binary(Binary::Mul, three, z);
+    let first = g.binary(Binary::Sub, x, tripled);
+    let second = g.binary(Binary::Add, first, y);
+    let inner = g.binary(Binary::Sub, y, z);
+    let outer = g.binary(Binary::Sub, x, inner);
+    let doubled = g.binary(Binary::Mul, two, outer);
+    let third = g.binary(Binary::Sub, second, doubled);
+    let shared = g.binary(Binary::Add, x, y);
+    let row = g.binary(Binary::Sub, third, shared);
+    let f = Expressions::new(g, vec![row, x, shared]).unwrap();
+    // One sum of x, 3 z, y, 2 outer and shared; shared, inner and outer.
+    assert_eq!(f.operations(), (1 + 5) + 3);
+    let (mut value, mut jacobian) = ([0.0; 3], [0.0; 6]);
+    assert!(f.evaluator().jacobian(&[1.0, 10.0, 100.0], &mut value, &mut jacobian));
+    assert_eq!(value, [-482.0, 1.0, 11.0]);
+    assert_eq!(jacobian, [-2.0, 2.0, -5.0, 1.0, 1.0, 1.0]);
+}
