@@ -4,7 +4,7 @@
 
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint};
 
-use crate::bridges::{FacetInner, FacetOuter};
+use crate::bridges::{AsNcp, FacetInner, FacetOuter, First, Glocker};
 use crate::contact::condense::Condense;
 use crate::contact::form::Regularised;
 use crate::contact::proximal::Proximal;
@@ -60,7 +60,13 @@ fn of_local<const D: usize>() -> Vec<Edge<FrictionLocal<D>>>
 where
     Regularised<FrictionLocal<D>>: Registered<Point = LocalPoint>,
 {
-    vec![Edge::new::<Proximal<D>>(), Edge::new::<FacetInner<D>>(), Edge::new::<FacetOuter<D>>()]
+    vec![
+        Edge::new::<Proximal<D>>(),
+        Edge::new::<FacetInner<D>>(),
+        Edge::new::<FacetOuter<D>>(),
+        Edge::new::<AsNcp<First>>(),
+        Edge::new::<AsNcp<Glocker>>(),
+    ]
 }
 
 /// What may stand before a solver's name on a global problem.

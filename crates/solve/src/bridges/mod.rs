@@ -1,5 +1,8 @@
 //! From contact to complementarity: the one place that sees both wings.
 
 mod facets;
+mod kept;
+mod ncp;
 
 pub use facets::{FacetInner, FacetOuter, Facets, InnerMemo, OuterMemo};
+pub use ncp::{AsNcp, First, Formulation, Glocker, NcpMemo, Slot};

@@ -21,11 +21,9 @@ use nonsmooth_linalg::{Block, small};
 use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::{FrictionLocal, Lcp, LcpPoint, LocalPoint};
 
-use super::{
-    Entries, Facets, KEYS, Kept, LISTED, approximates, decompose, dot, normal_impulses, tangential,
-    velocity,
-};
+use super::{Entries, Facets, KEYS, LISTED, approximates};
 use crate::SolveError;
+use crate::bridges::kept::{Kept, decompose, dot, normal_impulses, tangential, velocity};
 use crate::contact::form::Contacts;
 use crate::core::reformulation::Reformulation;
 use crate::core::register::Composed;
@@ -156,7 +154,7 @@ impl<const D: usize> Reformulation<FrictionLocal<D>> for FacetInner<D> {
     type Memo = InnerMemo<D>;
 
     fn reduce(&self, problem: &FrictionLocal<D>) -> Result<(Lcp, InnerMemo<D>), SolveError> {
-        let kept = Kept::new(problem, &self.0)?;
+        let kept = self.0.keep(problem)?;
         let mut memo = InnerMemo { kept, starts: vec![], entries: Entries::default() };
         let n = memo.number(&problem.mu);
         let mut entries = Entries::default();
@@ -190,7 +188,7 @@ impl<const D: usize> Reformulation<FrictionLocal<D>> for FacetInner<D> {
 
     fn lift_certificate(&self, certificate: Certificate, memo: &InnerMemo<D>) -> Certificate {
         let contacts = memo.starts.len() - 1;
-        normal_impulses(certificate, &memo.kept, contacts, |c| memo.starts[c])
+        normal_impulses(certificate, &memo.kept, contacts, |c| memo.starts[c], |_| 1.0)
     }
 
     fn approximates(&self) -> Option<&'static str> {

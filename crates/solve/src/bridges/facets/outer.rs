@@ -21,11 +21,9 @@ use nonsmooth_linalg::small;
 use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::{FrictionLocal, LcpPoint, LocalPoint, Mlcp};
 
-use super::{
-    Entries, Facets, KEYS, Kept, LISTED, approximates, decompose, normal_impulses, tangential,
-    velocity,
-};
+use super::{Entries, Facets, KEYS, LISTED, approximates};
 use crate::SolveError;
+use crate::bridges::kept::{Kept, decompose, normal_impulses, tangential, velocity};
 use crate::contact::form::Contacts;
 use crate::core::reformulation::Reformulation;
 use crate::core::register::Composed;
@@ -158,7 +156,7 @@ impl<const D: usize> Reformulation<FrictionLocal<D>> for FacetOuter<D> {
     type Memo = OuterMemo<D>;
 
     fn reduce(&self, problem: &FrictionLocal<D>) -> Result<(Mlcp, OuterMemo<D>), SolveError> {
-        let kept = Kept::new(problem, &self.0)?;
+        let kept = self.0.keep(problem)?;
         let mut entries = Entries::default();
         let mut memo = OuterMemo { kept, free: vec![], pairs: vec![], entries: Entries::default() };
         memo.number(&problem.mu);
@@ -192,7 +190,7 @@ impl<const D: usize> Reformulation<FrictionLocal<D>> for FacetOuter<D> {
 
     fn lift_certificate(&self, certificate: Certificate, memo: &OuterMemo<D>) -> Certificate {
         let contacts = memo.free.len() - 1;
-        normal_impulses(certificate, &memo.kept, contacts, |c| memo.normal(c))
+        normal_impulses(certificate, &memo.kept, contacts, |c| memo.normal(c), |_| 1.0)
     }
 
     fn approximates(&self) -> Option<&'static str> {
