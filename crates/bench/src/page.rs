@@ -9,7 +9,9 @@ use crate::plural;
 use crate::profile::{Cost, Selection, VIRTUAL_BEST};
 use crate::record::Campaign;
 use crate::runs::Runs;
-use crate::tables::{By, Row, Table, markdown_text, summary, summary_page, unsolved};
+use crate::tables::{
+    By, Row, Table, competitive, markdown_text, summary, summary_page, unsolved,
+};
 use crate::traits_table;
 
 /// A page and its figures.
@@ -48,6 +50,8 @@ pub fn page(
             let profile = figures::profile(runs, &selection, Cost::Seconds)?;
             let reached = format!("{tolerance:e}").replace('.', "p");
             body += &show(profile, &format!("profile-seconds-{reached}"));
+            body += COMPETITIVE;
+            body += &competitive(runs, &selection).markdown();
             body += &winners(runs, &selection);
             body += &nobody(runs, &selection);
         }
@@ -62,6 +66,11 @@ pub fn page(
     }
     Ok(Page { markdown: introduction(runs, &kinds, command) + &short + &body, figures: shown })
 }
+
+const COMPETITIVE: &str = "
+Solved within 4/3 and within twice the least time T_min, *very competitive* and *competitive* (BillupsDirkseFerris1997):
+
+";
 
 const TRAITS: &str = "
 ## The families
@@ -344,6 +353,7 @@ mod tests {
             "- Local problems, u = W r + q, to 1e-8: most problems are solved by `sure`, 2 of 3; one is solved by none. Most often the fastest is `quick` and `sure`, on 1.",
         );
         has("| arch | 2 | 1 | `sure` (1) | `sure` (1) |");
+        has("| quick | 3 | 1 | 1 | 1 |\n| sure | 3 | 2 | 1 | 2 |");
         has("| wall | 1 | 1 | all (1) | `quick` (1) |");
         has("| arch/c | 20 | `quick` reaches 2.0e-5 |");
         has("## Global problems, M v = H r + f\n\n1 problem.");

@@ -142,6 +142,24 @@ fn geometric_mean(all: &[f64]) -> Option<f64> {
     (!all.is_empty()).then(|| (sum / all.len() as f64).exp())
 }
 
+/// The factors of the least time within which a solver of BillupsDirkseFerris1997 is *very competitive*, and *competitive*.
+pub const COMPETITIVE: [f64; 2] = [4.0 / 3.0, 2.0];
+
+/// For each solver of the selection: problems solved, and those solved in `T ≤ 4/3 T_min` and `T ≤ 2 T_min`, with T_min the least time of the selected solvers.
+///
+/// References: BillupsDirkseFerris1997.
+pub fn competitive(runs: &Runs, selection: &Selection) -> Table {
+    let costs = Costs::of(runs, selection, Cost::Seconds);
+    let head = ["solver", "problems", "solved", "T ≤ 4/3 T_min", "T ≤ 2 T_min"];
+    let rows = costs.solvers.iter().zip(costs.ratios()).enumerate().map(|(s, (solver, ratios))| {
+        let within = |factor: f64| ratios.iter().filter(|r| **r <= factor).count();
+        let [very, fairly] = COMPETITIVE.map(within);
+        let counts = [costs.applicable(s), within(f64::MAX), very, fairly];
+        std::iter::once(solver.clone()).chain(counts.map(|n| n.to_string())).collect()
+    });
+    Table { head: head.map(String::from).into(), rows: rows.collect() }
+}
+
 /// A problem that no solver of the selection solves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unsolved {
