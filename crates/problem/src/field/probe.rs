@@ -35,6 +35,7 @@ pub(super) fn probed(
     lanes: usize,
     mut see: impl FnMut(&[Vec<usize>], &mut [Vec<Seen>]),
 ) -> Pattern {
+    #[allow(clippy::single_range_in_vec_init)] // Ranges, of which there is one at first.
     let mut blocks = vec![0..n];
     let mut rows = vec![vec![0]; n];
     loop {
