@@ -72,17 +72,22 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let file = arguments.next().ok_or("expected RUNS.jsonl [MANIFEST.csv], found nothing")?;
     let runs = Runs::read(Path::new(&file)).map_err(|e| e.to_string())?;
     let manifest = arguments.next();
-    print!("{}", among_themselves(&runs));
-    match manifest {
-        Some(manifest) => {
-            println!("{}", published(&runs));
-            println!("{}", peers(&runs, Path::new(&manifest))?);
-        }
-        None => println!(
-            "\nThe problems are the families of [suite-nonlinear.toml](benchmarks/suite-nonlinear.toml); published counts and other programs' results are of other problems."
-        ),
+    print!("{}{}", problems(manifest.is_some()), among_themselves(&runs));
+    if let Some(manifest) = manifest {
+        print!("{}{}", published(&runs), peers(&runs, Path::new(&manifest))?);
     }
     Ok(())
+}
+
+/// Where the problems are from.
+fn problems(published: bool) -> &'static str {
+    if published {
+        "\n## The problems\n\nProblems of MCPLIB, of GAMS' library and of papers, written anew as AMPL's `.nl` files, one a start; a family is a problem with all its starts, and \
+         `degenerate_ncp` is small ones that are degenerate or singular at their solution. They are not distributed with this project: they are the files `P*.nl` of \
+         `$NONSMOOTH_CORPUS/mcp`, and where that is not set the same command takes the families of [suite-nonlinear.toml](benchmarks/suite-nonlinear.toml).\n"
+    } else {
+        "\n## The problems\n\nThe families of [suite-nonlinear.toml](benchmarks/suite-nonlinear.toml), made by `nonsmooth gen`.\n"
+    }
 }
 
 fn table(head: &[&str], rows: Vec<Vec<String>>) -> String {
@@ -91,28 +96,33 @@ fn table(head: &[&str], rows: Vec<Vec<String>>) -> String {
 
 /// The eight without `auto`, and whether the lecture's three are ahead.
 fn among_themselves(runs: &Runs) -> String {
-    let eight = Selection {
-        solvers: EIGHT.map(String::from).into(),
-        ..Selection::at(KIND, TOLERANCE)
-    };
+    let eight =
+        Selection { solvers: EIGHT.map(String::from).into(), ..Selection::at(KIND, TOLERANCE) };
     let counted = competitive(runs, &eight);
     let mut text = format!(
         "\n## The eight among themselves\n\nThe least time T_min is that of the eight here, without `auto`.\n\n{}\n\
-         The lecture (Acary2018) reports of the comparisons of 1997 that PROXI, PATH and SMOOTH are superior. Here:\n\n",
+         The lecture (Acary2018) reports of comparisons of these codes that PROXI, PATH and SMOOTH are superior. Of our solvers of these names:\n\n",
         counted.markdown()
     );
-    for (column, what) in [(2, "solved"), (4, "within twice the least time"), (3, "within 4/3 of it")] {
-        let mut order: Vec<(&str, u32)> = (counted.rows.iter())
-            .map(|r| (r[0].as_str(), r[column].parse().unwrap_or(0)))
-            .collect();
+    let columns = [(2, "solved"), (4, "within twice the least time"), (3, "within 4/3 of it")];
+    for (column, what) in columns {
+        let count = |row: &Vec<String>| row[column].parse().unwrap_or(0);
+        let mut order: Vec<(&str, u32)> =
+            counted.rows.iter().map(|r| (r[0].as_str(), count(r))).collect();
         order.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
-        let of = |ahead: bool| order.iter().filter(move |o| AHEAD.contains(&o.0) == ahead);
-        let last = of(true).map(|o| o.1).min().unwrap_or(0);
-        let before: Vec<_> = of(false).filter(|o| o.1 > last).map(|o| format!("`{}`", o.0)).collect();
+        // Those that fewer than three are before.
+        let third = order.get(2).map_or(0, |o| o.1);
+        let (first, behind): (Vec<&str>, Vec<&str>) =
+            AHEAD.iter().partition(|name| order.iter().any(|o| o.0 == **name && o.1 >= third));
         let list: Vec<_> = order.iter().map(|(s, n)| format!("`{s}` {n}")).collect();
-        let word = match before.as_slice() {
-            [] => "confirmed".to_owned(),
-            some => format!("not confirmed: {} before the last of the three", some.join(", ")),
+        let word = match (first.as_slice(), behind.as_slice()) {
+            (_, []) => "confirmed".to_owned(),
+            ([], _) => "not confirmed: none of the three is among the first three".to_owned(),
+            (some, rest) => format!(
+                "confirmed of `{}`, not of `{}`, by the first three places",
+                some.join("` and `"),
+                rest.join("` and `")
+            ),
         };
         text += &format!("- *{what}*: {}; {word}.\n", list.join(", "));
     }
@@ -121,9 +131,9 @@ fn among_themselves(runs: &Runs) -> String {
 
 /// The runs at the tolerance, by solver.
 fn of<'a>(runs: &'a Runs, solver: &'a str) -> impl Iterator<Item = &'a Run> {
-    runs.runs.iter().filter(move |r| {
-        r.kind == KIND && r.tolerance == TOLERANCE && r.solver == solver
-    })
+    runs.runs
+        .iter()
+        .filter(move |r| r.kind == KIND && r.tolerance == TOLERANCE && r.solver == solver)
 }
 
 /// PATH and SEMI, problem by problem.
@@ -157,7 +167,11 @@ fn published(runs: &Runs) -> String {
     let n = rows.len();
     let said = |below: &[String]| match below {
         [] => format!("reaches the published share on all {n} problems"),
-        some => format!("reaches the published share on {} of {n} problems, not on {}", n - some.len(), some.join(", ")),
+        some => format!(
+            "reaches the published share on {} of {n} problems, not on {}",
+            n - some.len(),
+            some.join(", ")
+        ),
     };
     format!(
         "\n## Beside the published PATH and SEMI\n\nSolved starts of all, by problem. The published counts (Munson2002, PATH 4 and SEMI with restarts) are of other starts where their numbers differ, and of models of the \
@@ -179,12 +193,16 @@ fn peers(runs: &Runs, manifest: &Path) -> Result<String, Box<dyn std::error::Err
         reached.insert(stem.to_owned(), PEERS.map(|(column, _)| of(column)));
     }
     let stem = |r: &Run| r.problem.rsplit('/').next().unwrap_or_default().to_owned();
-    let files: Vec<String> = of(runs, "auto").map(stem).filter(|f| reached.contains_key(f)).collect();
+    let files: Vec<String> =
+        of(runs, "auto").map(stem).filter(|f| reached.contains_key(f)).collect();
     let small = |x: Option<f64>| x.is_some_and(|x| x <= TOLERANCE);
-    let mut counts: Vec<(String, usize)> = std::iter::once("auto").chain(EIGHT).map(|solver| {
-        let good = |r: &&Run| files.contains(&stem(r)) && small(r.residuals.absolute);
-        (format!("`{solver}`"), of(runs, solver).filter(good).count())
-    }).collect();
+    let mut counts: Vec<(String, usize)> = std::iter::once("auto")
+        .chain(EIGHT)
+        .map(|solver| {
+            let good = |r: &&Run| files.contains(&stem(r)) && small(r.residuals.absolute);
+            (format!("`{solver}`"), of(runs, solver).filter(good).count())
+        })
+        .collect();
     for (k, (_, name)) in PEERS.iter().enumerate() {
         let good = files.iter().filter(|f| small(reached[*f][k])).count();
         counts.push(((*name).to_owned(), good));

@@ -9,9 +9,7 @@ use crate::plural;
 use crate::profile::{Cost, Selection, VIRTUAL_BEST};
 use crate::record::Campaign;
 use crate::runs::Runs;
-use crate::tables::{
-    By, Row, Table, competitive, markdown_text, summary, summary_page, unsolved,
-};
+use crate::tables::{By, Row, Table, competitive, markdown_text, summary, summary_page, unsolved};
 use crate::traits_table;
 
 /// A page and its figures.
