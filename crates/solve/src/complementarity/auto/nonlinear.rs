@@ -17,6 +17,9 @@ use crate::core::register::Composed;
 use crate::core::trace::Trace;
 use crate::{Limits, Observer, Outcome, Progress, Sample, Session, SolveError, Status};
 
+/// Up to this many variables arcs come before Newton's steps.
+const FEW: usize = 500;
+
 impl Auto {
     /// A session for nonlinear problems, without history.
     pub fn nonlinear(self) -> AutoSession {
@@ -36,12 +39,25 @@ impl Auto {
         };
         let plan = Plan::new();
         let plan = match stage {
-            0 => plan
-                .then(named("semismooth"), 60, "fast where the start is good")
-                .with("restarts", false)
-                .anew(named("path"), 300, "goes along the pieces of the linearisation")
-                .anew(named("proxi"), 150, "leaves stationary points")
-                .anew(named("smooth"), 100, "another way"),
+            0 => {
+                let arcs = |plan: Plan| {
+                    plan.anew(named("path"), 300, "goes along the pieces of the linearisation")
+                };
+                let newton = |plan: Plan| {
+                    plan.anew(named("semismooth"), 60, "fast where the start is good")
+                        .with("restarts", false)
+                };
+                // Pivots are the cheaper the fewer variables there are.
+                let plan = match problem.dim() <= FEW {
+                    true => newton(arcs(plan)),
+                    false => arcs(newton(plan)),
+                };
+                plan.anew(named("proxi"), 150, "leaves stationary points").anew(
+                    named("smooth"),
+                    100,
+                    "another way",
+                )
+            }
             1 => plan
                 .anew(named("semismooth"), 600, "with other options")
                 .anew(named("newton_pfb"), 300, "another memory, other starts")
