@@ -5,4 +5,4 @@ mod kept;
 mod ncp;
 
 pub use facets::{FacetInner, FacetOuter, Facets, InnerMemo, OuterMemo};
-pub use ncp::{AsNcp, First, Formulation, Glocker, NcpMemo, Slot};
+pub use ncp::{AsNcp, First, Formulation, Glocker, Law, NcpMemo, Slot};

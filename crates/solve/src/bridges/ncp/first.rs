@@ -17,7 +17,7 @@
 use nonsmooth_linalg::small;
 use nonsmooth_problem::field::{Binary, Graph, Id, Node, Unary};
 
-use super::{Formulation, Slot, affine};
+use super::{Formulation, LIMIT, Law, Slot, affine};
 
 /// `κ r_T + mu r_N u_T = 0`, `0 ≤ κ ⟂ mu r_N − ‖r_T‖ ≥ 0`.
 #[derive(Debug, Clone, Copy, Default)]
@@ -31,7 +31,7 @@ impl<const D: usize> Formulation<D> for First {
 
     fn state(graph: &mut Graph, slot: &Slot<D>, _: &[[f64; 2]], rows: &mut Vec<Id>) {
         let kappa = graph.variable(slot.kappa(0));
-        let most = graph.add(Node::Linear(vec![(slot.first, slot.mu)]));
+        let most = graph.add(Node::Linear(vec![(slot.first, slot.law.mu)]));
         let mut squares = vec![];
         for (k, (terms, constant)) in slot.velocity.iter().enumerate().skip(1) {
             let r = graph.variable(slot.first + k);
@@ -50,8 +50,8 @@ impl<const D: usize> Formulation<D> for First {
     }
 
     /// `κ = ‖u_T‖` where the impulse is on the cone's boundary.
-    fn multipliers(mu: f64, _: &[[f64; 2]], r: &[f64; D], u: &[f64; D], kappa: &mut [f64]) {
-        if small::tangential_norm(r) >= super::LIMIT * mu * r[0] {
+    fn multipliers(law: Law, _: &[[f64; 2]], r: &[f64; D], u: &[f64; D], kappa: &mut [f64]) {
+        if small::tangential_norm(r) >= LIMIT * law.mu * r[0] {
             kappa[0] = small::tangential_norm(u);
         }
     }

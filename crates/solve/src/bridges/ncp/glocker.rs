@@ -8,7 +8,8 @@
 //! ```
 //!
 //! The three half-planes hold the disk, so they change no law; where the disk is the point 0 its own gradient is zero, and their normals carry the sliding of a contact without
-//! impulse. A contact that slides has `κ_D = ‖u_T‖ / (2 mu r_N)`. In the plane the disk is the segment between two half-lines, `e_1 = 1, e_2 = −1`; there is no κ_D, F is affine, and the problem is that of
+//! impulse. A contact that slides has `κ_D = ‖u_T‖ / (2 mu r_N)`; σ_D is stated in units of the usual
+//! mu r_N ([`Law::usual`](super::Law::usual)), and κ_D in those of its inverse, because a square says little of contacts with small impulses: an error ε of σ_D is one of ε/(2 mu r_N) of r_T. In the plane the disk is the segment between two half-lines, `e_1 = 1, e_2 = −1`; there is no κ_D, F is affine, and the problem is that of
 //! [`FacetOuter`](crate::bridges::FacetOuter) for the methods of nonlinear ones.
 //!
 //! References: Glocker1999; Acary2018 (81)–(86).
@@ -17,7 +18,7 @@
 
 use nonsmooth_problem::field::{Binary, Graph, Id, Node, Unary};
 
-use super::{Formulation, LIMIT, Slot};
+use super::{Formulation, LIMIT, Law, Slot};
 use crate::bridges::kept::{decompose, dot, tangential};
 
 /// `u_T + Σ κ_i e_i + 2 κ_D r_T = 0`, `0 ≤ κ_j ⟂ σ_j ≥ 0`.
@@ -51,7 +52,7 @@ impl<const D: usize> Formulation<D> for Glocker {
             let mut all = vec![linear, constant];
             if let Some(kappa) = disk {
                 let r = graph.variable(slot.first + k);
-                let twice = graph.add(Node::Linear(vec![(slot.first + k, 2.0)]));
+                let twice = graph.add(Node::Linear(vec![(slot.first + k, 2.0 / slot.law.usual)]));
                 all.push(graph.binary(Binary::Mul, kappa, twice));
                 squares.push(graph.unary(Unary::Square, r));
             }
@@ -59,32 +60,36 @@ impl<const D: usize> Formulation<D> for Glocker {
         }
         for e in directions {
             let against = (1..D).map(|k| (slot.first + k, -e[k - 1])).filter(|(_, e)| *e != 0.0);
-            let terms = std::iter::once((slot.first, slot.mu)).chain(against).collect();
+            let terms = std::iter::once((slot.first, slot.law.mu)).chain(against).collect();
             rows.push(graph.add(Node::Linear(terms)));
         }
         if D > 2 {
-            let most = graph.add(Node::Linear(vec![(slot.first, slot.mu)]));
+            let most = graph.add(Node::Linear(vec![(slot.first, slot.law.mu)]));
             let most = graph.unary(Unary::Square, most);
             let square = graph.sum(squares);
-            rows.push(graph.binary(Binary::Sub, most, square));
+            let saturation = graph.binary(Binary::Sub, most, square);
+            let per_unit = graph.constant(1.0 / slot.law.usual);
+            rows.push(graph.binary(Binary::Mul, per_unit, saturation));
         }
     }
 
     /// κ_D that opposes u_T along an impulse on the boundary of the disk; where that is a point, or in the plane, the κ_i of the neighbours of −u_T.
     fn multipliers(
-        mu: f64,
+        law: Law,
         directions: &[[f64; 2]],
         r: &[f64; D],
         u: &[f64; D],
         kappa: &mut [f64],
     ) {
         let (r_t, u_t) = (tangential(r), tangential(u));
-        let (most, square) = (mu * r[0], dot(r_t, r_t));
+        let (most, square) = (law.mu * r[0], dot(r_t, r_t));
         if square < (LIMIT * most).powi(2) {
             return;
         }
         match kappa.get_mut(directions.len()) {
-            Some(disk) if square > 0.0 => *disk = (-dot(u_t, r_t) / (2.0 * square)).max(0.0),
+            Some(disk) if square > 0.0 => {
+                *disk = (-law.usual * dot(u_t, r_t) / (2.0 * square)).max(0.0)
+            }
             _ => decompose(directions, u_t.map(|u| -u), |i, a| kappa[i] = a),
         }
     }

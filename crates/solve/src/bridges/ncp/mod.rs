@@ -54,13 +54,28 @@ pub trait Formulation<const D: usize>: Copy + Default + Send + Sync + 'static {
     fn state(graph: &mut Graph, slot: &Slot<D>, directions: &[[f64; 2]], rows: &mut Vec<Id>);
 
     /// The multipliers at an impulse of the cone and the velocity that it is to oppose; κ comes as zeros.
-    fn multipliers(mu: f64, directions: &[[f64; 2]], r: &[f64; D], u: &[f64; D], kappa: &mut [f64]);
+    fn multipliers(
+        law: Law,
+        directions: &[[f64; 2]],
+        r: &[f64; D],
+        u: &[f64; D],
+        kappa: &mut [f64],
+    );
+}
+
+/// What the rows of a contact with friction are made with, besides its velocity.
+#[derive(Debug, Clone, Copy)]
+pub struct Law {
+    /// The coefficient of friction, positive.
+    pub mu: f64,
+    /// The `mu r_N` by which the contact alone would end its approach, 1 where it does not approach: a unit for its tangential impulse.
+    pub usual: f64,
 }
 
 /// A contact with friction in the problem that is being stated.
 pub struct Slot<const D: usize> {
-    /// The coefficient of friction, positive.
-    pub mu: f64,
+    /// The law.
+    pub law: Law,
     /// The variable of r_N; those of r_T follow, then those of κ.
     pub first: usize,
     /// u, by the coefficients of the variables and a constant.
@@ -76,6 +91,9 @@ impl<const D: usize> Slot<D> {
 
 /// The part of `mu r_N` from which on an impulse is taken to be on the boundary of the cone.
 const LIMIT: f64 = 1.0 - 1e-12;
+
+/// An impulse that is taken for none, in units of s.
+const NEGLIGIBLE: f64 = 1e-10;
 
 /// `Σ c_i x_i + constant`.
 fn affine(graph: &mut Graph, terms: Vec<(usize, f64)>, constant: f64) -> Id {
@@ -138,6 +156,13 @@ impl<const D: usize> NcpMemo<D> {
         self.starts[self.starts.len() - 1]
     }
 
+    fn law(&self, problem: &FrictionLocal<D>, c: usize) -> Law {
+        let mu = problem.mu[c];
+        let (_, free) = self.kept.state.operator(problem);
+        let usual = -mu * free[D * c] / (self.root[c] * self.size);
+        Law { mu, usual: if usual > NEGLIGIBLE { usual } else { 1.0 } }
+    }
+
     /// How many components of contact c's impulse are variables.
     fn components(&self, c: usize) -> usize {
         if self.starts[c + 1] - self.starts[c] > 1 { D } else { 1 }
@@ -170,7 +195,7 @@ impl<const D: usize> NcpMemo<D> {
             if self.components(c) > 1 {
                 lower[first + 1..first + D].fill(f64::NEG_INFINITY);
                 let velocity = std::array::from_fn(|k| self.velocity(problem, c, k));
-                let slot = Slot { mu, first, velocity };
+                let slot = Slot { law: self.law(problem, c), first, velocity };
                 F::state(&mut graph, &slot, &self.kept.directions, &mut rows);
             }
         }
@@ -203,7 +228,7 @@ impl<const D: usize> NcpMemo<D> {
             z[first..first + components].copy_from_slice(&x[..components]);
             let kappa = &mut z[first + components..self.starts[c + 1]];
             if !kappa.is_empty() {
-                F::multipliers(mu, &self.kept.directions, &x, &u, kappa);
+                F::multipliers(self.law(problem, c), &self.kept.directions, &x, &u, kappa);
             }
         }
     }
