@@ -2,7 +2,8 @@
 
 pub use crate::kinds::complementarity::planted::{
     Bratu, ClassicName, HarkerPang, JournalBearing, Membrane, NashCournot, NonlinearClassic,
-    Obstacle, PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp, Torsion, classics, energy,
+    Obstacle, PendulumStep, PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp, Torsion,
+    classics, energy,
 };
 pub use crate::kinds::contact::planted::{Planted, PlantedMix};
 

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use nonsmooth_io::{Info, ProblemFile, StoredPoint};
 use nonsmooth_problem::planted::{
-    Bratu, HarkerPang, JournalBearing, NashCournot, NonlinearClassic, Obstacle, PlantedLcp,
-    PlantedMlcp, Recipe, Torsion,
+    Bratu, HarkerPang, JournalBearing, NashCournot, NonlinearClassic, Obstacle, PendulumStep,
+    PlantedLcp, PlantedMlcp, Recipe, Torsion,
 };
 use nonsmooth_problem::{AnyPoint, AnyProblem};
 use nonsmooth_solve::settings::{Setting, Settings, SettingsMap, described, parse};
@@ -102,6 +102,12 @@ pub const MAKERS: &[Maker] = &[
         summary: "a reaction that heats itself, below an obstacle, on the unit square: an MCP, sparse",
         settings: described::<Of<Bratu>>,
         make: |s| Ok(ProblemFile::new(recipe::<Bratu>(s)?.mcp())),
+    },
+    Maker {
+        name: "pendulum",
+        summary: "a frictionless step with impacts of a pendulum of many links, nonlinear",
+        settings: described::<Of<PendulumStep>>,
+        make: |s| Ok(ProblemFile::new(recipe::<PendulumStep>(s)?.mcp())),
     },
     Maker {
         name: "ncp_classic",

@@ -3,6 +3,7 @@
 mod another_law;
 mod existence;
 mod facets;
+mod ncp;
 mod optimisation;
 mod plain_lemke;
 mod scalar_rows;

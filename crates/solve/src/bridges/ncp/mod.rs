@@ -92,6 +92,9 @@ impl<const D: usize> Slot<D> {
 /// The part of `mu r_N` from which on an impulse is taken to be on the boundary of the cone.
 const LIMIT: f64 = 1.0 - 1e-12;
 
+/// The solver that is listed behind the prefixes: the one that solves most.
+const LISTED: &[&str] = &["path"];
+
 /// An impulse that is taken for none, in units of s.
 const NEGLIGIBLE: f64 = 1e-10;
 
@@ -116,6 +119,10 @@ impl<F: Formulation<D>, const D: usize> Composed<FrictionLocal<D>> for AsNcp<F> 
 
     fn compose(_: NoSettings, solver: Boxed<Mcp>) -> Boxed<FrictionLocal<D>> {
         Boxed::new(Via { reformulation: Self::default(), solver })
+    }
+
+    fn lists(solver: &str) -> bool {
+        LISTED.contains(&solver)
     }
 }
 

@@ -4,7 +4,9 @@ pub mod classics;
 mod linear;
 mod nonlinear;
 mod obstacle;
+mod pendulum;
 
 pub use linear::{PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp};
 pub use nonlinear::{Bratu, ClassicName, HarkerPang, NashCournot, NonlinearClassic};
 pub use obstacle::{JournalBearing, Membrane, Obstacle, Torsion, energy};
+pub use pendulum::PendulumStep;
