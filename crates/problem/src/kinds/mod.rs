@@ -1,10 +1,11 @@
-//! The kinds of problem, each in a folder or file of its wing, and the one list of them.
+//! The kinds of problem, each in a folder or file of its wing, and the one list of them: of those that files hold. Variational inequalities are of the library alone.
 //!
 //! A line of [`list_of_kinds`](crate::list_of_kinds) makes [`Kind`]'s variant and its names, the variant of the wing's enum, the arms of
 //! [`with_problem`](crate::with_problem) and the entry in all that is made by [`each_kind`](crate::each_kind).
 
 pub mod complementarity;
 pub mod contact;
+pub mod variational;
 
 use crate::{AnyProblem, OfAny};
 
@@ -59,20 +60,23 @@ macro_rules! kinds {
         )]
         pub enum Kind {
             $($($(#[$doc])* #[serde(rename = $name)] $kind,)*)*
+            /// `−F(x) ∈ N_X(x)`: of the library alone, no file holds one.
+            #[serde(rename = "vi")]
+            Vi,
         }
 
         impl Kind {
-            /// All kinds.
+            /// All kinds that files hold.
             pub const ALL: &'static [Self] = &[$($(Self::$kind),*),*];
 
             /// The name used in files, reports and on the command line.
             pub fn name(self) -> &'static str {
-                match self { $($(Self::$kind => $name,)*)* }
+                match self { $($(Self::$kind => $name,)*)* Self::Vi => "vi" }
             }
 
             /// The components D of each contact; 1 for the pairs of a complementarity problem.
             pub fn dimension(self) -> usize {
-                match self { $($(Self::$kind => $dimension,)*)* }
+                match self { $($(Self::$kind => $dimension,)*)* Self::Vi => 1 }
             }
         }
 
@@ -112,7 +116,7 @@ macro_rules! kinds {
 list_of_kinds!(kinds,);
 
 impl Kind {
-    /// Whether this is a complementarity problem; the others are problems of frictional contact.
+    /// Whether this is a complementarity problem; the others are problems of frictional contact and variational inequalities.
     pub fn is_complementarity(self) -> bool {
         Complementarity::KINDS.contains(&self)
     }

@@ -1,0 +1,265 @@
+//! The judge of variational inequalities.
+
+mod projection;
+
+use serde::Serialize;
+
+use super::{Set, Vi};
+use crate::LcpPoint;
+use crate::Problem;
+use crate::check::{Measure, Verdict};
+use crate::field::Evaluator;
+pub(super) use projection::Projection;
+
+/// Where x is with respect to a constraint of the set: a bounded variable of a box, an inequality of a polyhedron, a ball, a cone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SetStatus {
+    /// Away from the border.
+    Inside,
+    /// On it.
+    Border,
+    /// At the point of a cone.
+    Apex,
+}
+
+/// How many constraints of the set are where.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct SetCounts {
+    /// Away from the border.
+    pub inside: usize,
+    /// On it, the points of cones included.
+    pub border: usize,
+}
+
+/// The judge's constants and buffers for a variational inequality.
+///
+/// `r = x − P_X(x − γ F(x))` vanishes at solutions, for any γ > 0. It is taken with `γ = ξ/φ` and divided by ξ, where ξ is the size of x (the largest modulus in x, in the start and in
+/// [`Set::size`]; where all are zero, φ and γ = 1) and φ that of F (the largest size of a row's terms at x, as the [`McpGauge`](crate::check::McpGauge) has it). So it does not change
+/// where F, or x with the set, is multiplied by a positive number. Variables and rows of one problem share their unit: a set that mixes variables knows no other.
+///
+/// | field of [`Measure`] | formula |
+/// | --- | --- |
+/// | `primal` | how far x violates a constraint: of a bound, a half-space, a ball the distance from it, of a cone `(‖x̄‖ − x_1)/√2`; the largest over ξ |
+/// | `dual`, `relative` | `‖r‖_∞ / ξ`, and what the projection violates added; **decides** |
+/// | `complementarity` | `|F(x)ᵀ r| / (n φ ξ)` |
+/// | `absolute`, `literature`, `siconos` | `‖x − P_X(x − F(x))‖_∞` |
+///
+/// The projections are the judge's own: of cones in the half-plane of the axis and the norm of the rest, of polyhedra by nonnegative least squares
+/// (LawsonHanson1974, ch. 23), exact but for rounding after finitely many steps. [`certify`](Problem::certify) evaluates expressions in doubled precision.
+pub struct ViGauge {
+    field: Box<dyn Evaluator>,
+    f: Vec<f64>,
+    jacobian: Vec<f64>,
+    sizes: Vec<f64>,
+    /// `x − γ F`, and its projection.
+    from: Vec<f64>,
+    y: Vec<f64>,
+    projections: Vec<Projection>,
+    /// Of the start and the set.
+    size: f64,
+}
+
+impl ViGauge {
+    pub(super) fn new(problem: &Vi) -> Self {
+        let n = problem.dim();
+        let zeros = || vec![0.0; n];
+        Self {
+            field: problem.F.evaluator(),
+            f: zeros(),
+            jacobian: vec![0.0; problem.F.pattern().len()],
+            sizes: zeros(),
+            from: zeros(),
+            y: zeros(),
+            projections: problem.set.parts().iter().map(|(_, set)| Projection::new(set)).collect(),
+            size: largest(&problem.start).max(problem.set.size()),
+        }
+    }
+
+    /// F at x, and φ. False where F is not defined.
+    fn look(&mut self, problem: &Vi, x: &[f64], precisely: bool) -> Option<f64> {
+        let Self { field, f, jacobian, sizes, .. } = self;
+        let smooth = field.jacobian(x, f, jacobian);
+        let defined = match (precisely, smooth) {
+            (true, _) => field.precisely(x, f),
+            (false, true) => true,
+            (false, false) => field.value(x, f),
+        };
+        if !defined || f.iter().any(|f| !f.is_finite()) {
+            return None;
+        }
+        if !field.sizes(x, sizes) {
+            let pattern = problem.F.pattern();
+            for i in 0..f.len() {
+                let terms = || jacobian[pattern.range(i)].iter().zip(pattern.row(i));
+                let linear: f64 = terms().map(|(a, &j)| a * x[j]).sum();
+                let moduli: f64 = terms().map(|(a, &j)| (a * x[j]).abs()).sum();
+                sizes[i] = if smooth { (f[i] - linear).abs() + moduli } else { 0.0 };
+            }
+        }
+        let sizes = sizes.iter().filter(|d| d.is_finite());
+        Some(sizes.fold(largest(f), |size, d| size.max(*d)))
+    }
+
+    /// `‖x − P_X(x − γ F)‖_∞` with what the projection violates, for F as it was looked at; the projection is left in y.
+    fn natural(&mut self, problem: &Vi, x: &[f64], gamma: f64) -> f64 {
+        let Self { f, from, y, projections, .. } = self;
+        from.iter_mut().zip(x).zip(f).for_each(|((from, x), f)| *from = x - gamma * *f);
+        let mut missed = 0.0_f64;
+        for ((first, set), projection) in problem.set.parts().into_iter().zip(projections) {
+            let range = first..first + set.dim();
+            if !projection.onto(set, &from[range.clone()], &mut y[range.clone()]) {
+                return f64::INFINITY;
+            }
+            missed = missed.max(violation(set, &y[range]));
+        }
+        let moved = x.iter().zip(&*y).fold(0.0_f64, |size, (x, y)| size.max((x - y).abs()));
+        moved + missed
+    }
+
+    pub(super) fn measure(&mut self, problem: &Vi, point: &LcpPoint, precisely: bool) -> Measure {
+        let (x, n) = (&point.z, problem.dim() as f64);
+        if x.iter().any(|x| !x.is_finite()) {
+            return Measure::unknown();
+        }
+        let Some(phi) = self.look(problem, x, precisely) else { return Measure::unknown() };
+        let absolute = self.natural(problem, x, 1.0);
+        let size = largest(x).max(self.size);
+        let (xi, gamma) = match (size > 0.0, phi > 0.0) {
+            (true, true) => (size, size / phi),
+            (false, true) => (phi, 1.0),
+            (true, false) => (size, 0.0),
+            // x = 0 and F = 0
+            (false, false) => (1.0, 0.0),
+        };
+        let relative = self.natural(problem, x, gamma) / xi;
+        let moved = || x.iter().zip(&self.y).map(|(x, y)| x - y);
+        let gap: f64 = moved().zip(&self.f).map(|(r, f)| r * f).sum();
+        let worst = moved()
+            .map(f64::abs)
+            .enumerate()
+            .fold((0, 0.0), |worst, (i, r)| if r > worst.1 { (i, r) } else { worst });
+        let outside = problem.set.parts().into_iter().fold(0.0_f64, |outside, (first, set)| {
+            outside.max(violation(set, &x[first..first + set.dim()]))
+        });
+        Measure {
+            absolute,
+            relative,
+            literature: absolute,
+            siconos: absolute,
+            primal: outside / xi,
+            dual: relative,
+            complementarity: if phi > 0.0 { gap.abs() / (n * phi * xi) } else { 0.0 },
+            worst_contact: worst.0,
+            worst: worst.1 / xi,
+            ..Measure::unknown()
+        }
+    }
+
+    pub(super) fn verdict(
+        &mut self,
+        problem: &Vi,
+        point: &LcpPoint,
+        tolerance: f64,
+    ) -> Verdict<SetStatus, SetCounts> {
+        let measure = self.measure(problem, point, true);
+        let near = tolerance * largest(&point.z).max(self.size);
+        let mut statuses = vec![];
+        for (first, set) in problem.set.parts() {
+            statuses_of(set, &point.z[first..first + set.dim()], near, &mut statuses);
+        }
+        let inside = statuses.iter().filter(|s| **s == SetStatus::Inside).count();
+        let counts = SetCounts { inside, border: statuses.len() - inside };
+        // Of the last projection, in the unit of the worst.
+        let moved = point.z.iter().zip(&self.y).map(|(x, y)| (x - y).abs());
+        let most = moved.clone().fold(0.0, f64::max);
+        let mut worst: Vec<_> = moved.enumerate().filter(|(_, r)| *r > 0.0).collect();
+        worst.sort_by(|a, b| b.1.total_cmp(&a.1));
+        worst.truncate(10);
+        worst.iter_mut().for_each(|(_, r)| *r *= measure.worst / most);
+        Verdict {
+            measure,
+            solved: measure.passes(tolerance),
+            counts,
+            statuses,
+            velocity: problem.partner(point),
+            worst,
+        }
+    }
+}
+
+fn largest(x: &[f64]) -> f64 {
+    x.iter().fold(0.0, |size, x| size.max(x.abs()))
+}
+
+/// How far x violates a set that is no product.
+fn violation(set: &Set, x: &[f64]) -> f64 {
+    let mut worst = 0.0_f64;
+    match set {
+        Set::Box { lower, upper } => {
+            for ((x, l), u) in x.iter().zip(lower).zip(upper) {
+                worst = worst.max(l - x).max(x - u);
+            }
+        }
+        Set::Polyhedron { .. } => {
+            rows(set, x, |excess, bound| {
+                worst = worst.max(if bound { excess } else { excess.abs() })
+            });
+        }
+        Set::Ball { centre, radius } => worst = distance(x, centre) - radius,
+        Set::SecondOrderCone { .. } => worst = (norm(&x[1..]) - x[0]) / 2f64.sqrt(),
+        Set::Product(_) => {}
+    }
+    worst.max(0.0)
+}
+
+/// `(m_i x − rhs_i) / ‖m_i‖` of each row of a polyhedron, and whether it is an inequality; of rows without entries `−rhs_i`.
+fn rows(set: &Set, x: &[f64], mut each: impl FnMut(f64, bool)) {
+    let Set::Polyhedron { A, b, C, d } = set else { return };
+    for (m, rhs, bound) in [(A, b, true), (C, d, false)] {
+        let (mut excess, mut squares) = (vec![0.0; rhs.len()], vec![0.0_f64; rhs.len()]);
+        for (i, j, a) in m.triplets() {
+            excess[i] += a * x[j];
+            squares[i] += a * a;
+        }
+        for i in 0..rhs.len() {
+            let size = if squares[i] > 0.0 { squares[i].sqrt() } else { 1.0 };
+            each((excess[i] - rhs[i]) / size, bound);
+        }
+    }
+}
+
+fn norm(x: &[f64]) -> f64 {
+    // By the largest entry, so that nothing overflows.
+    let size = largest(x);
+    if size == 0.0 {
+        return 0.0;
+    }
+    size * x.iter().map(|x| (x / size).powi(2)).sum::<f64>().sqrt()
+}
+
+pub(super) fn distance(x: &[f64], y: &[f64]) -> f64 {
+    norm(&x.iter().zip(y).map(|(x, y)| x - y).collect::<Vec<_>>())
+}
+
+fn statuses_of(set: &Set, x: &[f64], near: f64, to: &mut Vec<SetStatus>) {
+    let on = |border: bool| if border { SetStatus::Border } else { SetStatus::Inside };
+    match set {
+        Set::Box { lower, upper } => {
+            let bounded = x.iter().zip(lower).zip(upper);
+            let bounded = bounded.filter(|((_, l), u)| l.is_finite() || u.is_finite());
+            to.extend(bounded.map(|((x, l), u)| on(x - l <= near || u - x <= near)));
+        }
+        Set::Polyhedron { .. } => rows(set, x, |excess, bound| {
+            if bound {
+                to.push(on(excess >= -near));
+            }
+        }),
+        Set::Ball { centre, radius } => to.push(on(distance(x, centre) >= radius - near)),
+        Set::SecondOrderCone { .. } => to.push(match x[0] {
+            t if t.abs().max(norm(&x[1..])) <= near => SetStatus::Apex,
+            t => on(t - norm(&x[1..]) <= near),
+        }),
+        Set::Product(_) => {}
+    }
+}

@@ -1,0 +1,230 @@
+//! The judge's projections.
+//!
+//! ```text
+//! polyhedron   y = p + s,  min ‖s‖  with  g_k s ≥ h_k, = h_k
+//!              min_u ‖[Gᵀ; hᵀ] u − e_{n+1}‖,  u_k ≥ 0 of inequalities;  s along the residual: the rows with u_k > 0 hold with equality
+//! ```
+//!
+//! There is no such y where the residual vanishes: the polyhedron is empty. Source: LawsonHanson1974, ch. 23. Cost: for k active rows `n k²` operations a step, and about as many
+//! steps as the active rows change: those of the last projection are tried first.
+
+use nonsmooth_linalg::budget;
+
+use super::super::Set;
+use super::{distance, largest, norm};
+
+/// Columns that are nearer to others than this are their combinations.
+const DEPENDENT: f64 = 1e-12;
+
+/// A projection with what it keeps from one time to the next.
+pub(in super::super) struct Projection {
+    /// Of a polyhedron: its rows with norm 1, `g_k` of −A and then of C, and their norms before.
+    rows: Vec<Vec<f64>>,
+    norms: Vec<f64>,
+    equalities: usize,
+    passive: Vec<usize>,
+}
+
+impl Projection {
+    pub(in super::super) fn new(set: &Set) -> Self {
+        let mut out = Self { rows: vec![], norms: vec![], equalities: 0, passive: vec![] };
+        if let Set::Polyhedron { A, C, .. } = set {
+            out.rows = vec![vec![0.0; A.ncols()]; A.nrows() + C.nrows()];
+            A.triplets().for_each(|(i, j, a)| out.rows[i][j] = -a);
+            C.triplets().for_each(|(i, j, a)| out.rows[A.nrows() + i][j] = a);
+            out.equalities = C.nrows();
+            for row in &mut out.rows {
+                let size = norm(row);
+                let size = if size > 0.0 { size } else { 1.0 };
+                row.iter_mut().for_each(|g| *g /= size);
+                out.norms.push(size);
+            }
+        }
+        out
+    }
+
+    /// `y = P_X(p)`. False where the set is empty, or the projection was not found.
+    pub(in super::super) fn onto(&mut self, set: &Set, p: &[f64], y: &mut [f64]) -> bool {
+        match set {
+            Set::Box { lower, upper } => {
+                for i in 0..p.len() {
+                    y[i] = p[i].max(lower[i]).min(upper[i]);
+                }
+                true
+            }
+            Set::Polyhedron { b, d, .. } => self.onto_polyhedron(b, d, p, y),
+            Set::Ball { centre, radius } => {
+                let far = distance(p, centre);
+                let share = if far > *radius { radius / far } else { 1.0 };
+                for i in 0..p.len() {
+                    y[i] = if share < 1.0 { centre[i] + share * (p[i] - centre[i]) } else { p[i] };
+                }
+                true
+            }
+            Set::SecondOrderCone { .. } => {
+                // In the half-plane of (x_1, ‖x̄‖): onto the ray along (1, 1).
+                let (t, far) = (p[0], norm(&p[1..]));
+                let (height, share) = match (far <= t, far <= -t) {
+                    (true, _) => (t, 1.0),
+                    (_, true) => (0.0, 0.0),
+                    _ => (0.5 * t + 0.5 * far, (0.5 * t + 0.5 * far) / far),
+                };
+                y[0] = height;
+                for i in 1..p.len() {
+                    y[i] = share * p[i];
+                }
+                true
+            }
+            Set::Product(_) => true,
+        }
+    }
+
+    fn onto_polyhedron(&mut self, b: &[f64], d: &[f64], p: &[f64], y: &mut [f64]) -> bool {
+        let Self { rows, norms, equalities, passive } = self;
+        let (n, m, bounds) = (p.len(), rows.len(), rows.len() - *equalities);
+        let rhs = b.iter().map(|b| -b).chain(d.iter().copied());
+        let h = |(k, rhs): (usize, f64)| {
+            rhs / norms[k] - rows[k].iter().zip(p).map(|(g, p)| g * p).sum::<f64>()
+        };
+        let mut h: Vec<f64> = rhs.enumerate().map(h).collect();
+        y.copy_from_slice(p);
+        let size = largest(&h);
+        if size == 0.0 || (*equalities == 0 && h.iter().all(|h| *h <= 0.0)) {
+            passive.clear();
+            return true;
+        }
+        h.iter_mut().for_each(|h| *h /= size);
+        let column = |k: usize| rows[k].iter().copied().chain([h[k]]);
+        passive.retain(|&k| k < bounds);
+        passive.extend(bounds..m);
+        let mut u = vec![0.0; m];
+        // Of the last time, what is positive with all the others.
+        loop {
+            let next = least_squares(passive, &column, n);
+            let keeps = |k: usize, z: f64| k >= bounds || z > 0.0;
+            passive.iter().zip(&next).for_each(|(&k, &z)| u[k] = if keeps(k, z) { z } else { 0.0 });
+            if passive.iter().zip(&next).all(|(&k, &z)| keeps(k, z)) {
+                break;
+            }
+            passive.retain(|&k| keeps(k, u[k]));
+        }
+        // Columns that are combinations of the passive ones.
+        let mut blocked = vec![false; m];
+        for _ in 0..3 * m + 10 {
+            if budget::over() {
+                return false;
+            }
+            // Least squares over the passive columns, one after the other dropped that would be negative.
+            loop {
+                let next = least_squares(passive, &column, n);
+                let (mut alpha, mut least) = (1.0, None);
+                for (&k, &z) in
+                    passive.iter().zip(&next).filter(|(k, z)| **k < bounds && **z <= 0.0)
+                {
+                    let share = if u[k] > 0.0 { u[k] / (u[k] - z) } else { 0.0 };
+                    if least.is_none() || share < alpha {
+                        (alpha, least) = (share, Some(k));
+                    }
+                }
+                passive.iter().zip(&next).for_each(|(&k, &z)| u[k] += alpha * (z - u[k]));
+                let Some(least) = least else { break };
+                u[least] = 0.0;
+                passive.retain(|&k| k >= bounds || u[k] > 0.0);
+                blocked.fill(false);
+            }
+            let mut residual = vec![0.0; n + 1];
+            residual[n] = 1.0;
+            for &k in passive.iter() {
+                residual.iter_mut().zip(column(k)).for_each(|(r, e)| *r -= u[k] * e);
+            }
+            if norm(&residual) < DEPENDENT {
+                return false;
+            }
+            let slope = |k: usize| column(k).zip(&residual).map(|(e, r)| e * r).sum::<f64>();
+            let open = (0..bounds).filter(|k| !blocked[*k] && !passive.contains(k));
+            let steepest = open.map(|k| (k, slope(k))).max_by(|a, b| a.1.total_cmp(&b.1));
+            match steepest {
+                Some((k, slope)) if slope > DEPENDENT * norm(&residual) => {
+                    passive.push(k);
+                    let grown = least_squares(passive, &column, n);
+                    // Against the slope, which is rounding then.
+                    if grown.last().is_none_or(|z| *z <= 0.0) {
+                        passive.pop();
+                        blocked[k] = true;
+                    }
+                }
+                _ => {
+                    for (y, s) in y.iter_mut().zip(nearest(passive, rows, &h, n)) {
+                        *y += size * s;
+                    }
+                    return y.iter().all(|y| y.is_finite());
+                }
+            }
+        }
+        false
+    }
+}
+
+/// Orthonormal columns with the same span as far as they are independent, and R by columns; of dependent ones none.
+fn orthonormal<C: Iterator<Item = f64>>(
+    columns: impl Iterator<Item = C>,
+) -> (Vec<Vec<f64>>, Vec<Option<Vec<f64>>>) {
+    let (mut q, mut r): (Vec<Vec<f64>>, Vec<_>) = (vec![], vec![]);
+    for column in columns {
+        let mut x: Vec<f64> = column.collect();
+        let before = norm(&x);
+        let mut along = vec![0.0; q.len()];
+        // Twice is enough.
+        for _ in 0..2 {
+            for (q, along) in q.iter().zip(&mut along) {
+                let c: f64 = q.iter().zip(&x).map(|(q, x)| q * x).sum();
+                x.iter_mut().zip(q).for_each(|(x, q)| *x -= c * q);
+                *along += c;
+            }
+        }
+        let left = norm(&x);
+        if left <= DEPENDENT * before {
+            r.push(None);
+            continue;
+        }
+        along.push(left);
+        x.iter_mut().for_each(|x| *x /= left);
+        q.push(x);
+        r.push(Some(along));
+    }
+    (q, r)
+}
+
+/// `min ‖Σ_k u_k e_k − e_{n+1}‖` over these columns of n + 1 entries; 0 for those that depend on the ones before.
+fn least_squares<C: Iterator<Item = f64>>(
+    which: &[usize],
+    column: impl Fn(usize) -> C,
+    n: usize,
+) -> Vec<f64> {
+    let (q, r) = orthonormal(which.iter().map(|&k| column(k)));
+    let mut right: Vec<f64> = q.iter().map(|q| q[n]).collect();
+    let mut u = vec![0.0; which.len()];
+    let mut at = q.len();
+    for (u, r) in u.iter_mut().zip(&r).rev() {
+        let Some(r) = r else { continue };
+        at -= 1;
+        *u = right[at] / r[at];
+        right.iter_mut().zip(r).take(at).for_each(|(b, r)| *b -= r * *u);
+    }
+    u
+}
+
+/// The least s with `g_k s = h_k` of these rows, as far as they are independent.
+fn nearest(which: &[usize], rows: &[Vec<f64>], h: &[f64], n: usize) -> Vec<f64> {
+    let (q, r) = orthonormal(which.iter().map(|&k| rows[k].iter().copied()));
+    let (mut s, mut along) = (vec![0.0; n], vec![]);
+    for (&k, r) in which.iter().zip(&r) {
+        let Some(r) = r else { continue };
+        let at = along.len();
+        let known: f64 = r.iter().zip(&along).map(|(r, z)| r * z).sum();
+        let z = (h[k] - known) / r[at];
+        s.iter_mut().zip(&q[at]).for_each(|(s, q)| *s += z * q);
+        along.push(z);
+    }
+    s
+}

@@ -1,0 +1,161 @@
+//! Variational inequalities over simple convex sets, and their judge.
+//!
+//! | kind | statement |
+//! | --- | --- |
+//! | [`Vi`] | `−F(x) ∈ N_X(x)`, X a box, a polyhedron, a ball, a second-order cone or a product of these |
+
+mod judge;
+mod set;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+pub use judge::{SetCounts, SetStatus, ViGauge};
+pub use set::Set;
+
+use crate::check::proof::Exactly;
+use crate::check::{Certificate, ConeSystem, Evidence, Judged, Measure, VerdictOf, weigh};
+use crate::error::vector;
+use crate::field::Field;
+use crate::{Kind, LcpPoint, Problem, ProblemError};
+
+/// The variational inequality: find x ∈ X with `F(x)ᵀ(y − x) ≥ 0` for all y ∈ X; that is `x = P_X(x − γ F(x))` for any γ > 0.
+///
+/// F may be undefined somewhere. Over a box this is an [`Mcp`](crate::Mcp).
+#[derive(Debug, Clone)]
+#[allow(non_snake_case)]
+pub struct Vi {
+    /// F: ℝⁿ → ℝⁿ.
+    pub F: Arc<dyn Field>,
+    /// X ⊂ ℝⁿ.
+    pub set: Set,
+    /// Where solvers begin, n; they begin at its projection on X.
+    pub start: Vec<f64>,
+}
+
+#[allow(non_snake_case)]
+impl Vi {
+    /// States a problem, validated.
+    ///
+    /// ```
+    /// use nonsmooth_problem::check::Judged;
+    /// use nonsmooth_problem::field::Expressions;
+    /// use nonsmooth_problem::{LcpPoint, Set, Vi};
+    ///
+    /// // The point of the unit disk nearest to (3, 4): F(x) = x − (3, 4).
+    /// let field = Expressions::parse(&["x1 - 3".into(), "x2 - 4".into()], &[])?;
+    /// let disk = Set::Ball { centre: vec![0.0; 2], radius: 1.0 };
+    /// let problem = Vi::new(field, disk, vec![0.0; 2])?;
+    /// assert!(problem.judge(&LcpPoint { z: vec![0.6, 0.8] }, 1e-12)?.solved);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// Errors: a set at fault, F or a start of another dimension than the set, a start that is not finite.
+    pub fn new(F: impl Field + 'static, set: Set, start: Vec<f64>) -> Result<Self, ProblemError> {
+        Self::of(Arc::new(F), set, start)
+    }
+
+    /// As [`new`](Self::new), of a function that others have too.
+    ///
+    /// Errors: likewise.
+    pub fn of(F: Arc<dyn Field>, set: Set, start: Vec<f64>) -> Result<Self, ProblemError> {
+        let problem = Self { F, set, start };
+        problem.validate()?;
+        Ok(problem)
+    }
+
+    /// Checks shapes and values; the fields are public, so call it after changing them.
+    pub fn validate(&self) -> Result<(), ProblemError> {
+        self.set.validate()?;
+        let (n, rows) = (self.set.dim(), self.F.dim());
+        if rows != n {
+            let expected = format!("{n} rows (variables of the set)");
+            return Err(ProblemError::shape("F", expected, rows.to_string()));
+        }
+        vector("start", &self.start, n, "variables of the set")
+    }
+
+    /// The number of variables n.
+    pub fn dim(&self) -> usize {
+        self.start.len()
+    }
+}
+
+impl Problem for Vi {
+    type Point = LcpPoint;
+    type Gauge = ViGauge;
+
+    fn kind(&self) -> Kind {
+        Kind::Vi
+    }
+
+    fn unknowns(&self) -> usize {
+        self.dim()
+    }
+
+    fn origin(&self) -> LcpPoint {
+        LcpPoint { z: self.start.clone() }
+    }
+
+    fn validate_point(&self, point: &LcpPoint) -> Result<(), ProblemError> {
+        vector("x", &point.z, self.dim(), "variables")
+    }
+
+    fn copy_point(from: &LcpPoint, to: &mut LcpPoint) {
+        to.z.clone_from(&from.z);
+    }
+
+    fn gauge(&self) -> Result<ViGauge, ProblemError> {
+        Ok(ViGauge::new(self))
+    }
+
+    fn measure(&self, point: &LcpPoint, gauge: &mut ViGauge) -> Measure {
+        gauge.measure(self, point, false)
+    }
+
+    fn certify(&self, point: &LcpPoint, gauge: &mut ViGauge) -> Measure {
+        gauge.measure(self, point, true)
+    }
+
+    /// F(x); NaN where it is not defined.
+    fn partner(&self, point: &LcpPoint) -> Vec<f64> {
+        let mut f = vec![0.0; self.dim()];
+        if !self.F.evaluator().value(&point.z, &mut f) {
+            f.iter_mut().filter(|f| !f.is_finite()).for_each(|f| *f = f64::NAN);
+        }
+        f
+    }
+
+    fn evidence(&self, certificate: &Certificate) -> Evidence {
+        weigh(self, certificate)
+    }
+
+    fn cones(&self) -> Option<ConeSystem> {
+        self.system(None)
+    }
+
+    fn assembled(&self, unknowns: &[f64]) -> LcpPoint {
+        LcpPoint { z: unknowns.to_vec() }
+    }
+}
+
+impl Judged for Vi {
+    type Status = SetStatus;
+    type Counts = SetCounts;
+
+    fn verdict(&self, point: &LcpPoint, gauge: &mut ViGauge, tolerance: f64) -> VerdictOf<Self> {
+        gauge.verdict(self, point, tolerance)
+    }
+}
+
+/// Nothing is proved of variational inequalities.
+impl Exactly for Vi {
+    fn system(&self, _wanted: Option<&[bool]>) -> Option<ConeSystem> {
+        None
+    }
+
+    fn rows(&self) -> usize {
+        self.dim()
+    }
+}

@@ -1,0 +1,134 @@
+use nonsmooth_linalg::Csc;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::*;
+use crate::field::{Differences, Expressions, Pattern};
+use judge::Projection;
+
+/// `P_X(p)` by the judge.
+fn projected(set: &Set, p: &[f64]) -> Option<Vec<f64>> {
+    let mut y = vec![0.0; p.len()];
+    for (first, set) in set.parts() {
+        let range = first..first + set.dim();
+        if !Projection::new(set).onto(set, &p[range.clone()], &mut y[range]) {
+            return None;
+        }
+    }
+    Some(y)
+}
+
+fn random_polyhedron(n: usize, seed: u64) -> Set {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let inside: Vec<f64> = (0..n).map(|_| random.random_range(-1.0..1.0)).collect();
+    let mut matrix = |m: usize| {
+        let entries: Vec<_> =
+            (0..m * n).map(|k| (k / n, k % n, f64::from(random.random_range(-3..4)))).collect();
+        let m = Csc::from_triplets(m, n, entries).unwrap();
+        let mut at = vec![0.0; m.nrows()];
+        m.mul_add(1.0, &inside, &mut at);
+        (m, at)
+    };
+    // More rows than variables, some of them through the same point, and each equality twice.
+    let ((a, mut b), (c, d)) = (matrix(2 * n), matrix(n / 3));
+    b.iter_mut().skip(n / 2).for_each(|b| *b += 0.5);
+    let twice =
+        |c: &Csc| c.triplets().flat_map(|(i, j, x)| [(2 * i, j, x), (2 * i + 1, j, -2.0 * x)]);
+    let doubled = Csc::from_triplets(2 * c.nrows(), n, twice(&c).collect::<Vec<_>>()).unwrap();
+    let d = d.into_iter().flat_map(|d| [d, -2.0 * d]).collect();
+    Set::Polyhedron { A: a, b, C: doubled, d }
+}
+
+/// Idempotent, in the set, nonexpansive, and what is left is at an obtuse angle with all that is in the set.
+#[test]
+fn projections_are_projections() {
+    for seed in 0..60 {
+        let n = 2 + seed as usize % 7;
+        let sets = [
+            random_polyhedron(n, seed),
+            Set::Ball { centre: vec![0.5; n], radius: 1.5 },
+            Set::SecondOrderCone { dimension: n },
+            Set::Product(vec![
+                Set::Box { lower: vec![-1.0; n], upper: vec![0.5; n] },
+                Set::Product(vec![random_polyhedron(n, seed + 1000), Set::orthant(1)]),
+            ]),
+        ];
+        let mut random = Pcg64::seed_from_u64(seed);
+        for set in sets {
+            let n = set.dim();
+            let mut any = || (0..n).map(|_| random.random_range(-5.0..5.0)).collect::<Vec<f64>>();
+            let points = [any(), any(), any(), vec![0.0; n]];
+            let all = points.each_ref().map(|p| projected(&set, p).expect("not empty"));
+            for (p, y) in points.iter().zip(&all) {
+                let again = projected(&set, y).unwrap();
+                assert!(judge::distance(y, &again) < 1e-12, "{seed} {y:?} {again:?}");
+                for z in &all {
+                    let angle: f64 = (0..n).map(|i| (p[i] - y[i]) * (z[i] - y[i])).sum();
+                    assert!(angle < 1e-10, "{seed} {set:?} {angle:e}");
+                }
+            }
+            for (p, x) in points.iter().zip(&all) {
+                for (q, y) in points.iter().zip(&all) {
+                    assert!(judge::distance(x, y) <= judge::distance(p, q) + 1e-11);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn an_empty_polyhedron_has_no_projection() {
+    // x1 ≤ −1 and −x1 ≤ 0
+    let rows = Csc::from_triplets(2, 2, [(0, 0, 1.0), (1, 0, -1.0)]).unwrap();
+    assert_eq!(projected(&Set::inequalities(rows, vec![-1.0, 0.0]), &[0.0, 0.0]), None);
+    // x1 + x2 = 1 and = 2
+    let c = Csc::from_triplets(2, 2, [(0, 0, 1.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 1.0)]).unwrap();
+    let set = Set::Polyhedron { A: Csc::zeros(0, 2), b: vec![], C: c, d: vec![1.0, 2.0] };
+    assert_eq!(projected(&set, &[0.0, 0.0]), None);
+}
+
+/// A cone with the solution planted on its border: `F(x) = M (x − x*) + w`, w in the dual cone, orthogonal to x*.
+#[test]
+fn verdicts_keep_with_the_units() {
+    for (scale, of_x) in [(1.0, 1.0), (1e9, 1e-7)] {
+        let (solution, w) = ([5.0 * of_x, 3.0 * of_x, 4.0 * of_x], [5.0, -3.0, -4.0]);
+        let pattern = Pattern::dense(3);
+        let field = Differences::new(pattern, move |x, f| {
+            let d = [0, 1, 2].map(|i| (x[i] - solution[i]) / of_x);
+            for i in 0..3 {
+                f[i] = scale * (2.0 * d[i] + d[(i + 1) % 3] - d[(i + 2) % 3] + 0.2 * w[i]);
+            }
+        });
+        let cone = Set::SecondOrderCone { dimension: 3 };
+        let problem = Vi::new(field.unwrap(), cone, vec![0.0; 3]).unwrap();
+        let verdict = problem.judge(&LcpPoint { z: solution.to_vec() }, 1e-12).unwrap();
+        assert!(verdict.solved, "{:?}", verdict.measure);
+        assert_eq!(verdict.statuses, [SetStatus::Border]);
+        let off = LcpPoint { z: vec![5.0 * of_x, 3.0 * of_x, 4.01 * of_x] };
+        let verdict = problem.judge(&off, 1e-8).unwrap();
+        assert!(!verdict.solved && verdict.worst[0].0 < 3);
+        let relative = verdict.measure.relative;
+        assert!((1e-4..1e-2).contains(&relative), "{relative}");
+        assert!(verdict.measure.primal > 1e-4);
+        let apex = problem.judge(&problem.origin(), 1e-8).unwrap();
+        assert_eq!(apex.statuses, [SetStatus::Apex]);
+        assert!(!apex.solved && apex.measure.relative > 0.1, "{:?}", apex.measure);
+    }
+}
+
+#[test]
+fn mistakes_are_named() {
+    let field = || Expressions::parse(&["x1".into(), "x2".into()], &[]).unwrap();
+    let said = |set, start| Vi::new(field(), set, start).unwrap_err().to_string();
+    assert_eq!(
+        said(Set::orthant(3), vec![0.0; 3]),
+        "F: expected 3 rows (variables of the set), found 2"
+    );
+    let ball = |radius| Set::Ball { centre: vec![0.0; 2], radius };
+    assert_eq!(said(ball(-1.0), vec![0.0; 2]), "radius: expected a number ≥ 0, found -1");
+    assert!(said(ball(1.0), vec![0.0; 3]).starts_with("start: expected 2 entries"));
+    let set = Set::inequalities(Csc::zeros(1, 2), vec![]);
+    assert!(said(set, vec![0.0; 2]).starts_with("b: expected 1 entries"));
+    let product = Set::Product(vec![]);
+    assert_eq!(said(product, vec![]), "set: expected at least one variable, found none");
+}
