@@ -190,7 +190,7 @@ impl<P: Judged> Answer<P> {
     }
 }
 
-/// What the door takes: a problem of any of the kinds that have solvers, or an [`AnyProblem`].
+/// What the door takes: a problem of any kind that has solvers, or an [`AnyProblem`].
 pub trait Solvable: Judged {
     /// Solves the problem as `how` says.
     fn answer(
@@ -202,7 +202,7 @@ pub trait Solvable: Judged {
         Self: Sized;
 }
 
-impl<P: Registered + OfAny> Solvable for P {
+impl<P: Registered + Judged<Point: OfAnyPoint>> Solvable for P {
     fn answer(
         &self,
         how: &Solve,

@@ -1,4 +1,4 @@
-//! All numerics: contracts, the one loop, and one file per algorithm, in two wings that never open each other's files.
+//! All numerics: contracts, the one loop, and one file per algorithm, in wings that never open each other's files.
 //!
 //! A *problem* (crate `nonsmooth-problem`) is data with its own judge. A *solver* is a struct that is its
 //! hyperparameters, with `work` and `step` ([`Solver`]). [`Driver`] is the only loop: it counts, times, judges and
@@ -11,6 +11,9 @@
 //! | [`complementarity`] | linear complementarity problems: functions, forms, families of methods, reformulations |
 //! | [`bridges`] | from contact to complementarity: facets, and friction as a nonlinear problem |
 //! | `core` | what both wings stand on: the contract of a solver, the loop, settings, the shape of the registry |
+//! | [`variational`] | variational inequalities over simple sets: projection methods, multipliers |
+//! | [`bridges`] | from contact to complementarity: facets |
+//! | `core` | what the wings stand on: the contract of a solver, the loop, settings, the shape of the registry |
 //!
 //! ```
 //! use nonsmooth_problem::{FrictionLocal, Problem, planted::Planted};
@@ -34,6 +37,7 @@ mod door;
 pub mod existence;
 mod multistart;
 pub mod registry;
+pub mod variational;
 
 pub use self::complementarity::guarantees;
 pub use door::{Answer, Solvable, Solve, solve};

@@ -14,5 +14,6 @@ pub(crate) mod register;
 pub mod settings;
 pub(crate) mod solver;
 pub mod spelling;
+pub mod step_rule;
 pub mod trace;
 pub(crate) mod via;

@@ -255,7 +255,7 @@ fn way<P: Registered>(name: &str) -> Option<Way<'_, P>> {
 }
 
 /// The solver behind a name.
-fn solver<P: Registered>(name: &str, settings: &SettingsMap) -> Made<Boxed<P>> {
+pub(crate) fn solver<P: Registered>(name: &str, settings: &SettingsMap) -> Made<Boxed<P>> {
     match way::<P>(name)? {
         Way::Behind(edge, rest) => (edge.solver)(rest, settings),
         Way::Here(Entry { make: Maker::Solver(make), .. }) => Some(make(settings)),

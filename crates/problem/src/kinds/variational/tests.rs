@@ -24,7 +24,7 @@ fn random_polyhedron(n: usize, seed: u64) -> Set {
     let mut matrix = |m: usize| {
         let entries: Vec<_> =
             (0..m * n).map(|k| (k / n, k % n, f64::from(random.random_range(-3..4)))).collect();
-        let m = Csc::from_triplets(m, n, entries).unwrap();
+        let m = Csc::from_triplets(m, n, entries.into_iter()).unwrap();
         let mut at = vec![0.0; m.nrows()];
         m.mul_add(1.0, &inside, &mut at);
         (m, at)
@@ -34,7 +34,7 @@ fn random_polyhedron(n: usize, seed: u64) -> Set {
     b.iter_mut().skip(n / 2).for_each(|b| *b += 0.5);
     let twice =
         |c: &Csc| c.triplets().flat_map(|(i, j, x)| [(2 * i, j, x), (2 * i + 1, j, -2.0 * x)]);
-    let doubled = Csc::from_triplets(2 * c.nrows(), n, twice(&c).collect::<Vec<_>>()).unwrap();
+    let doubled = Csc::from_triplets(2 * c.nrows(), n, twice(&c)).unwrap();
     let d = d.into_iter().flat_map(|d| [d, -2.0 * d]).collect();
     Set::Polyhedron { A: a, b, C: doubled, d }
 }
@@ -79,10 +79,12 @@ fn projections_are_projections() {
 #[test]
 fn an_empty_polyhedron_has_no_projection() {
     // x1 ≤ −1 and −x1 ≤ 0
-    let rows = Csc::from_triplets(2, 2, [(0, 0, 1.0), (1, 0, -1.0)]).unwrap();
+    let rows = Csc::from_triplets(2, 2, [(0, 0, 1.0), (1, 0, -1.0)].into_iter()).unwrap();
     assert_eq!(projected(&Set::inequalities(rows, vec![-1.0, 0.0]), &[0.0, 0.0]), None);
     // x1 + x2 = 1 and = 2
-    let c = Csc::from_triplets(2, 2, [(0, 0, 1.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 1.0)]).unwrap();
+    let c =
+        Csc::from_triplets(2, 2, [(0, 0, 1.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 1.0)].into_iter())
+            .unwrap();
     let set = Set::Polyhedron { A: Csc::zeros(0, 2), b: vec![], C: c, d: vec![1.0, 2.0] };
     assert_eq!(projected(&set, &[0.0, 0.0]), None);
 }

@@ -52,7 +52,7 @@ impl Method for Extragradient {
         field: &mut Field<P, D>,
     ) -> f64 {
         Field::evaluate(&mut field.state, problem, r, &mut field.f); // F(r)
-        let ratio = self.0.predict(problem, r, field); //                r̄ = P_K(r − ρ F(r)), F(r̄)
+        let ratio = field.predict(&self.0, problem, r); //                r̄ = P_K(r − ρ F(r)), F(r̄)
         let estimate = field.estimate(r);
         field.project(problem, r, true); //                              P_K(r − ρ F(r̄))
         r.copy_from_slice(&field.trial);

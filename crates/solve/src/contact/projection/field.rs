@@ -6,6 +6,7 @@ use crate::SolveError;
 use crate::contact::form::{Access, Linear};
 use crate::contact::law::ContactLaw;
 use crate::contact::law::cone::ConvexSet;
+use crate::core::step_rule::{Ratio, StepRule};
 
 /// Enough for a step length; the power method's estimate is from below by a few percent.
 const POWER_STEPS: usize = 20;
@@ -89,6 +90,20 @@ impl<P: Linear<D>, const D: usize> Field<P, D> {
             let p = problem.law(c).project(&x);
             self.trial[D * c..D * c + D].copy_from_slice(&p);
         }
+    }
+
+    /// From `f = F(r)`: `trial = P_K(r − ρ F(r))` and `trial_f = F(trial)` with a ρ that the rule accepts; the ratio.
+    pub(super) fn predict(&mut self, rule: &StepRule, problem: &P, r: &[f64]) -> f64 {
+        let mut rho = self.rho;
+        rule.shorten(&mut rho, |rho| {
+            self.rho = rho;
+            self.project(problem, r, false);
+            Self::evaluate(&mut self.state, problem, &self.trial, &mut self.trial_f);
+            match rule.rule {
+                Ratio::Khobotov => self.lipschitz_ratio(r),
+                Ratio::SolodovTseng => self.monotone_ratio(r),
+            }
+        })
     }
 
     /// The largest eigenvalue of `diag(w)^(-1/2) W diag(w)^(-1/2)`, by the power method.

@@ -52,7 +52,7 @@ impl Method for FixedPoint {
         r: &mut [f64],
         field: &mut Field<P, D>,
     ) -> f64 {
-        let ratio = self.0.predict(problem, r, field); // r̄ = P_K(r − ρ F(r)), F(r̄)
+        let ratio = field.predict(&self.0, problem, r); // r̄ = P_K(r − ρ F(r)), F(r̄)
         let estimate = field.estimate(r);
         r.copy_from_slice(&field.trial); //               r ← r̄, and F(r) is known
         std::mem::swap(&mut field.f, &mut field.trial_f);

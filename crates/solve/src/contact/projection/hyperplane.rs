@@ -22,8 +22,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::step_rule::Ratio;
-use super::{Field, Method, StepRule};
+use super::{Field, Method, Ratio, StepRule};
 use crate::contact::form::Linear;
 use crate::core::ranges::{at_least, below};
 use crate::core::register::{About, Described, Solves};
@@ -115,7 +114,7 @@ impl Method for Hyperplane {
     ) -> f64 {
         let rule = self.step_rule();
         Field::evaluate(&mut field.state, problem, r, &mut field.f); // F(r)
-        let ratio = rule.predict(problem, r, field); //                 r̄ = P_K(r − ρ F(r)), F(r̄)
+        let ratio = field.predict(&rule, problem, r); //                 r̄ = P_K(r − ρ F(r)), F(r̄)
         let estimate = field.estimate(r);
         let tau = match self.normal {
             Normal::Field => field.step_to_hyperplane(r),

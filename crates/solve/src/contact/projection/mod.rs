@@ -10,14 +10,13 @@ mod extragradient;
 mod field;
 mod fixed_point;
 mod hyperplane;
-mod step_rule;
 
+pub use crate::core::step_rule::{Ratio, StepRule};
 pub use de_saxce::DeSaxce;
 pub use extragradient::Extragradient;
 pub use field::Field;
 pub use fixed_point::FixedPoint;
 pub use hyperplane::{Hyperplane, Normal};
-pub use step_rule::{Ratio, StepRule};
 
 use crate::contact::form::Linear;
 use crate::{SolveError, Solver, Step};

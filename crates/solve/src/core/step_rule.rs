@@ -1,7 +1,7 @@
 //! The self-adaptive step length of the projection methods.
 //!
 //! Shorten ρ while the ratio of a rule is above `accept`, with `r̄ = P_K(r − ρF(r))`; lengthen it after a step whose ratio was
-//! small. In the metric of the methods (`diag(w_c)` for impulses, its inverse for velocities) the ratios are
+//! small. In the metric of the methods (of contacts `diag(w_c)` for impulses, its inverse for velocities) the ratios are
 //!
 //! ```text
 //! ρ ‖F(r) − F(r̄)‖ / ‖r − r̄‖                  Khobotov
@@ -17,8 +17,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::field::Field;
-use crate::contact::form::Linear;
 use crate::core::ranges::{at_least, below};
 use crate::core::settings::Settings;
 
@@ -66,30 +64,19 @@ impl Settings for StepRule {
 }
 
 impl StepRule {
-    /// From `field.f = F(r)`: `trial = P_K(r − ρ F(r))` and `trial_f = F(trial)` with an acceptable ρ; the ratio.
-    pub(super) fn predict<P: Linear<D>, const D: usize>(
-        &self,
-        problem: &P,
-        r: &[f64],
-        field: &mut Field<P, D>,
-    ) -> f64 {
+    /// Shortens ρ until the ratio that the prediction has with it is acceptable; the ratio. NaN, where nothing moves, is; infinite, where F is not defined, is not, whatever ρ.
+    pub(crate) fn shorten(&self, rho: &mut f64, mut predict: impl FnMut(f64) -> f64) -> f64 {
         loop {
-            field.project(problem, r, false);
-            Field::evaluate(&mut field.state, problem, &field.trial, &mut field.trial_f);
-            let ratio = match self.rule {
-                Ratio::Khobotov => field.lipschitz_ratio(r),
-                Ratio::SolodovTseng => field.monotone_ratio(r),
-            };
-            // NaN: nothing moved, or F is not finite, which the driver notices.
-            if ratio.is_nan() || ratio <= self.accept || field.rho < 1e-300 {
+            let ratio = predict(*rho);
+            if ratio.is_nan() || ratio <= self.accept || *rho < 1e-300 {
                 return ratio;
             }
-            field.rho *= self.shrink;
+            *rho *= self.shrink;
         }
     }
 
     /// Lengthens the next step where the last was timid.
-    pub(super) fn adapt(&self, ratio: f64, rho: &mut f64) {
+    pub(crate) fn adapt(&self, ratio: f64, rho: &mut f64) {
         if ratio < self.grow_below {
             *rho /= self.shrink;
         }

@@ -1,0 +1,5 @@
+//! Variational inequalities as complementarity problems.
+
+mod multipliers;
+
+pub use multipliers::Multipliers;
