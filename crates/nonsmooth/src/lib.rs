@@ -85,7 +85,7 @@
 //!
 //! | to | |
 //! | --- | --- |
-//! | state a problem | [`FrictionLocal`], [`FrictionGlobal`], [`Lcp`], [`Mlcp`], [`Hlcp`], [`BoxLcp`], [`Mcp`] with its [`field`]; [`AnyProblem`] where the kind is known only from a file |
+//! | state a problem | [`FrictionLocal`], [`FrictionGlobal`], [`Lcp`], [`Mlcp`], [`Hlcp`], [`BoxLcp`], [`Mcp`] with its [`field`], [`Vi`] over a [`Set`]; [`AnyProblem`] where the kind is known only from a file |
 //! | solve it | [`solve`], [`Solve`], [`Answer`]; [`session`] for many problems of one shape, step by step, without allocation |
 //! | judge a point | [`Judged::judge`], [`Verdict`]; [`exists`] asks whether there is a solution at all |
 //! | read and write files | [`read`] a problem; [`ProblemFile`] with all that a file holds, in any of the [`FORMATS`] |
@@ -105,14 +105,14 @@ pub use nonsmooth_io::{FORMATS, Format, Info, IoError, ProblemFile, StoredPoint,
 pub use nonsmooth_linalg::{Bsr, Csc, Dense, Matrix, Operator};
 pub use nonsmooth_problem::check::{
     Certificate, ContactStatus, Existence, Judged, Measure, Motion, Proof, RowCounts, RowStatus,
-    StatusCounts, Verdict,
+    SetCounts, SetStatus, StatusCounts, Verdict,
 };
 pub use nonsmooth_problem::field;
 pub use nonsmooth_problem::planted::{Planted, PlantedLcp};
 pub use nonsmooth_problem::{
     AnyCounts, AnyPoint, AnyProblem, AnyStatus, BoxLcp, Complementarity, Friction, FrictionGlobal,
     FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Kind, Lcp, LcpPoint, LocalPoint, Mcp, Mlcp,
-    Problem, ProblemError, RowsGlobal, RowsLocal,
+    Problem, ProblemError, RowsGlobal, RowsLocal, Set, Vi,
 };
 pub use nonsmooth_problem::{with_complementarity, with_friction, with_problem};
 pub use nonsmooth_scenes::{Scene, SceneError};

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use nonsmooth::{FrictionLocal, Hlcp, Lcp};
+use nonsmooth::{FrictionLocal, Hlcp, Lcp, Vi};
 use nonsmooth_problem::each_kind;
 use nonsmooth_solve::registry;
 
@@ -65,7 +65,7 @@ const PROBLEM: Floors = Floors {
     wings: &["kinds/contact", "kinds/complementarity"],
 };
 
-/// `diagnose → existence → door → registry → bridges → {contact, complementarity} → core`; inside a wing `solvers → families → what they share → form → law`.
+/// `diagnose → existence → door → registry → bridges → {contact, complementarity, variational} → core`; inside a wing `solvers → families → what they share → form → law`.
 /// The question of existence and the elimination of velocities are no families: any may ask them.
 const SOLVE: Floors = Floors {
     floors: &[
@@ -79,9 +79,11 @@ const SOLVE: Floors = Floors {
             "complementarity/parts",
             "complementarity/guarantees",
             "complementarity/reform",
+            "variational/parts",
         ],
-        &["contact/*", "complementarity/*"],
-        &["contact/solvers", "complementarity/solvers"],
+        &["contact/*", "complementarity/*", "variational/*"],
+        &["variational/auto"],
+        &["contact/solvers", "complementarity/solvers", "variational/solvers"],
         &["bridges"],
         &["registry"],
         &["door"],
@@ -90,7 +92,7 @@ const SOLVE: Floors = Floors {
     ],
     scattered: &[],
     others_mix: false,
-    wings: &["contact", "complementarity"],
+    wings: &["contact", "complementarity", "variational"],
 };
 
 impl Floors {
@@ -768,9 +770,12 @@ fn comments(source: &str) -> String {
 /// The keys that the registry cites, each with who cites it.
 fn registered() -> BTreeMap<String, String> {
     let abouts = each_kind!(P => registry::abouts::<P>());
-    let solvers = abouts.into_iter().flatten().map(|a| (a.name, a.cites));
+    // No file holds a variational inequality.
+    let abouts = abouts.into_iter().chain([registry::abouts::<Vi>()]);
+    let solvers = abouts.flatten().map(|a| (a.name, a.cites));
     let prefixes = each_kind!(P => registry::prefixes::<P>());
-    let prefixes = prefixes.into_iter().flatten().map(|p| (p.name, p.cites));
+    let prefixes = prefixes.into_iter().chain([registry::prefixes::<Vi>()]);
+    let prefixes = prefixes.flatten().map(|p| (p.name, p.cites));
     let cited = solvers.chain(prefixes).flat_map(|(name, cites)| {
         assert!(!cites.is_empty(), "{name} cites nothing");
         cites.iter().map(move |key| ((*key).to_owned(), format!("the registry's {name}")))
@@ -847,6 +852,7 @@ fn the_family_of_a_solver_is_its_folder() {
         ("contact", registry::abouts::<FrictionLocal<3>>()),
         ("complementarity", registry::abouts::<Lcp>()),
         ("complementarity", registry::abouts::<Hlcp>()),
+        ("variational", registry::abouts::<Vi>()),
     ] {
         for about in abouts {
             let folder = root_folder().join("crates/solve/src").join(wing).join(about.family);

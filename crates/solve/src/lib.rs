@@ -10,9 +10,7 @@
 //! | [`contact`] | frictional contact: the law, forms of the problem, families of methods |
 //! | [`complementarity`] | linear complementarity problems: functions, forms, families of methods, reformulations |
 //! | [`bridges`] | from contact to complementarity: facets, and friction as a nonlinear problem |
-//! | `core` | what both wings stand on: the contract of a solver, the loop, settings, the shape of the registry |
 //! | [`variational`] | variational inequalities over simple sets: projection methods, multipliers |
-//! | [`bridges`] | from contact to complementarity: facets |
 //! | `core` | what the wings stand on: the contract of a solver, the loop, settings, the shape of the registry |
 //!
 //! ```

@@ -1,4 +1,4 @@
-//! What both wings stand on: the contract of a solver, the one loop, settings, the shape of the registry, and the few numerical means that both use.
+//! What the wings stand on: the contract of a solver, the one loop, settings, the shape of the registry, and the few numerical means that several use.
 
 pub(crate) mod boxed;
 pub(crate) mod clarabel;
