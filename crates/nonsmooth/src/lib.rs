@@ -127,3 +127,8 @@ pub use nonsmooth_solve::{
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 struct Readme;
+
+/// The program on variational inequalities runs.
+#[cfg(all(doctest, feature = "duals"))]
+#[doc = include_str!("../../../docs/nonlinear/variational.md")]
+struct Variational;

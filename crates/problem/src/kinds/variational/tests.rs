@@ -32,9 +32,8 @@ fn random_polyhedron(n: usize, seed: u64) -> Set {
     // More rows than variables, some of them through the same point, and each equality twice.
     let ((a, mut b), (c, d)) = (matrix(2 * n), matrix(n / 3));
     b.iter_mut().skip(n / 2).for_each(|b| *b += 0.5);
-    let twice =
-        |c: &Csc| c.triplets().flat_map(|(i, j, x)| [(2 * i, j, x), (2 * i + 1, j, -2.0 * x)]);
-    let doubled = Csc::from_triplets(2 * c.nrows(), n, twice(&c)).unwrap();
+    let twice = c.triplets().flat_map(|(i, j, x)| [(2 * i, j, x), (2 * i + 1, j, -2.0 * x)]);
+    let doubled = Csc::from_triplets(2 * c.nrows(), n, twice).unwrap();
     let d = d.into_iter().flat_map(|d| [d, -2.0 * d]).collect();
     Set::Polyhedron { A: a, b, C: doubled, d }
 }
