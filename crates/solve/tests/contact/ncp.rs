@@ -200,6 +200,13 @@ fn a_pendulum_swings_against_a_wall() {
     let (coarse, fine) = (drift(free, 40), drift(PendulumStep { step: 0.0025, ..free }, 160));
     assert!(fine < 0.35 * coarse && coarse < 0.2, "{coarse:e} {fine:e}");
 
+    // A straight pendulum that hits the wall with all its masses at once leaves it with e times their speeds.
+    for links in [1, 4, 20] {
+        let recipe = PendulumStep { links, ..Default::default() };
+        let (_, speeds, pushed) = swing(recipe, 1);
+        assert!(pushed && speeds.iter().all(|v| (v + 0.5).abs() < 1e-3), "{speeds:?}");
+    }
+
     let hit = PendulumStep { speed: 3.0, wall: 0.6, restitution: 0.0, ..free };
     let (angles, speeds, pushed) = swing(hit, 40);
     assert!(pushed);

@@ -195,7 +195,7 @@ impl<const D: usize> NcpMemo<D> {
         let mut graph = Graph::new(n);
         let mut rows = Vec::with_capacity(n);
         let (mut lower, upper) = (vec![0.0; n], vec![f64::INFINITY; n]);
-        for (c, &mu) in problem.mu.iter().enumerate() {
+        for c in 0..problem.mu.len() {
             let first = self.starts[c];
             let (terms, constant) = self.velocity(problem, c, 0);
             rows.push(affine(&mut graph, terms, constant));
