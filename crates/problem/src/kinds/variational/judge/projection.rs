@@ -100,7 +100,7 @@ impl Projection {
         let mut u = vec![0.0; m];
         // Of the last time, what is positive with all the others.
         loop {
-            let next = least_squares(passive, &column, n);
+            let next = least_squares(passive, column, n);
             let keeps = |k: usize, z: f64| k >= bounds || z > 0.0;
             passive.iter().zip(&next).for_each(|(&k, &z)| u[k] = if keeps(k, z) { z } else { 0.0 });
             if passive.iter().zip(&next).all(|(&k, &z)| keeps(k, z)) {
@@ -116,7 +116,7 @@ impl Projection {
             }
             // Least squares over the passive columns, one after the other dropped that would be negative.
             loop {
-                let next = least_squares(passive, &column, n);
+                let next = least_squares(passive, column, n);
                 let (mut alpha, mut least) = (1.0, None);
                 for (&k, &z) in
                     passive.iter().zip(&next).filter(|(k, z)| **k < bounds && **z <= 0.0)
@@ -146,7 +146,7 @@ impl Projection {
             match steepest {
                 Some((k, slope)) if slope > DEPENDENT * norm(&residual) => {
                     passive.push(k);
-                    let grown = least_squares(passive, &column, n);
+                    let grown = least_squares(passive, column, n);
                     // Against the slope, which is rounding then.
                     if grown.last().is_none_or(|z| *z <= 0.0) {
                         passive.pop();
