@@ -15,7 +15,7 @@ pub use extragradient::Extragradient;
 pub use fixed_point::FixedPoint;
 pub use hyperplane::{Hyperplane, Normal};
 
-use super::Projector;
+use super::parts::Projector;
 use crate::{SolveError, Solver, Step};
 
 /// F at x and at a prediction, and the step length that outlives a step.
