@@ -103,9 +103,9 @@ enum Command {
 }
 
 /// The program `nonsmooth`: one of its commands, or, with `-AMPL` among the arguments, what AMPL asks for.
-pub fn nonsmooth() -> ExitCode {
+pub fn program() -> ExitCode {
     if ampl::calls(&arguments()) {
-        return nonsmooth_ampl();
+        return program_for_ampl();
     }
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
@@ -137,7 +137,7 @@ pub fn nonsmooth() -> ExitCode {
 }
 
 /// The program `nonsmooth-ampl`, a solver for AMPL.
-pub fn nonsmooth_ampl() -> ExitCode {
+pub fn program_for_ampl() -> ExitCode {
     let exit = ampl::run(&arguments()).unwrap_or_else(|mistake| {
         output::error(&mistake);
         Exit::Mistake

@@ -1,5 +1,5 @@
 //! `nonsmooth-ampl`: a solver for AMPL and Pyomo, `nonsmooth-ampl STUB -AMPL [key=value …]`.
 
 fn main() -> std::process::ExitCode {
-    nonsmooth_cli::nonsmooth_ampl()
+    nonsmooth_cli::program_for_ampl()
 }

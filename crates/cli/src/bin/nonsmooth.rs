@@ -1,5 +1,5 @@
 //! `nonsmooth`: solve, check, describe and generate problems of nonsmooth mechanics.
 
 fn main() -> std::process::ExitCode {
-    nonsmooth_cli::nonsmooth()
+    nonsmooth_cli::program()
 }
