@@ -92,7 +92,7 @@ pub struct Measure {
 }
 
 /// The name of the criterion of each contact by its own terms.
-pub const OWN: &str = "own residual of a contact";
+pub const OWN: &str = "own residual of a contact or row";
 
 /// A criterion that a point does not meet.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
