@@ -354,7 +354,7 @@ mod tests {
         let only = [registry::DEFAULT.to_owned(), "nsgs".to_owned()];
         let text = text(&Catalogue::new().only(&only).unwrap());
         assert!(text.starts_with("# Frictional contact\n\nauto (the default): "), "{text}");
-        assert!(text.contains("\nnsgs: ") && text.contains("# Linear complementarity\n\nauto "));
+        assert!(text.contains("\nnsgs: ") && text.contains("# Complementarity\n\nauto "));
         assert!(text.contains("local=exact") && text.contains("One of exact, quartic"));
         assert!(!text.contains("extragradient"));
         assert!(Catalogue::new().only(&["magic".to_owned()]).is_err());

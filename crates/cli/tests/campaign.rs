@@ -140,7 +140,7 @@ fn mistakes_are_named_and_the_rest_goes_on() {
     assert!(errors[1].contains("nsgs:omega=7: solver `nsgs`: omega: expected a number in (0, 2)"));
     assert_eq!(
         errors[2],
-        "error: empty: expected problems (*.hdf5, *.toml, *.mtx, *.dat), found none"
+        "error: empty: expected problems (*.hdf5, *.toml, *.mtx, *.nl, *.dat), found none"
     );
     assert!(errors[3].starts_with("error: nowhere: "));
     assert!(errors[4].contains("broken.hdf5"));

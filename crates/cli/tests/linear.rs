@@ -304,7 +304,7 @@ fn solvers_of_both_classes_are_listed_apart() {
     let both = folder.run("list auto").exits(0).stdout;
     assert_eq!(both.matches("auto (the default): ").count(), 2, "{both}");
     let page = folder.run("list --markdown").exits(0).stdout;
-    assert!(page.contains("](#auto)") && page.contains("](#auto-linear)"));
+    assert!(page.contains("](#auto)") && page.contains("](#auto-complementarity)"));
     assert_eq!(page.matches("\n### auto\n").count(), 1);
 }
 

@@ -44,8 +44,8 @@ fn info_says_what_is_known_of_f() {
         "affine: 0 of 6 rows\n",
         "Jacobian   16 entries, 2 to 6 a row, 6 on the diagonal\n",
         "start      natural residual ",
-        "monotone   ",
-        "P0         on 100 sampled pairs\n",
+        "monotone   not monotone: a pair of points shows it\n",
+        "P0         no: a pair of points shows it\n",
     ] {
         assert!(text.contains(said), "{said}: {text}");
     }
@@ -55,11 +55,11 @@ fn info_says_what_is_known_of_f() {
         "file kind rows unknowns jacobian_entries title description bounds/lower bounds/upper bounds/both \
          bounds/free bounds/fixed source operations affine_rows jacobian/entries jacobian/entries_per_row/min \
          jacobian/entries_per_row/max jacobian/diagonal residual_at_start affine monotone p0 \
-         sampled/pairs sampled/undefined sampled/not_monotone/x sampled/not_monotone/y sampled/not_p0 solution",
+         sampled/pairs sampled/undefined sampled/not_monotone/x sampled/not_monotone/y sampled/not_p0/x sampled/not_p0/y solution",
     );
     assert_eq!(
         (&line["rows"], &line["monotone"], &line["p0"]),
-        (&6.into(), &false.into(), &().into())
+        (&6.into(), &false.into(), &false.into())
     );
     let text = folder.run("info affine.toml").exits(0).stdout;
     for said in [

@@ -266,7 +266,8 @@ mod tests {
         let (found, mistakes) = inputs(&[dir.path().into(), dir.path().join("nowhere")]);
         assert!(found.is_empty());
         assert!(
-            mistakes[0].ends_with("expected problems (*.hdf5, *.toml, *.mtx, *.dat), found none"),
+            mistakes[0]
+                .ends_with("expected problems (*.hdf5, *.toml, *.mtx, *.nl, *.dat), found none"),
             "{mistakes:?}"
         );
         assert!(mistakes[1].contains("nowhere: No such file"), "{mistakes:?}");
