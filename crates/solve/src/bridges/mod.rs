@@ -1,4 +1,4 @@
-//! From contact to complementarity: the one place that sees both wings.
+//! From contact to complementarity: the one place that sees both of these wings.
 
 mod facets;
 mod kept;

@@ -6,6 +6,8 @@ use crate::ProblemError;
 use crate::error::{all_finite, bounds, vector};
 
 /// A closed convex set in ℝⁿ.
+// One a problem: its size does not matter.
+#[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone, PartialEq)]
 #[allow(non_snake_case)]
 pub enum Set {
