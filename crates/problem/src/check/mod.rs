@@ -129,6 +129,22 @@ impl Measure {
         }
     }
 
+    /// The residuals of a point at which the problem has no value: worse than any other, and still numbers, so that a solver may go on from there.
+    pub(crate) fn never() -> Self {
+        let never = f64::MAX;
+        Self {
+            absolute: never,
+            relative: never,
+            literature: never,
+            siconos: never,
+            primal: never,
+            dual: never,
+            complementarity: never,
+            worst: never,
+            ..Self::unknown()
+        }
+    }
+
     /// The criteria: what, value, limit at `tolerance`.
     fn criteria(&self, tolerance: f64) -> impl Iterator<Item = Failing> {
         let rounding = self.dynamics_rounding.unwrap_or(0.0).max(DYNAMICS_TOLERANCE);

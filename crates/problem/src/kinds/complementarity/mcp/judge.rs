@@ -1,6 +1,6 @@
 //! The judge of nonlinear problems.
 
-use super::super::judge::{GENERATIONS, NEVER, Pair, finite, natural, put, share, verdict, worse};
+use super::super::judge::{GENERATIONS, Pair, finite, natural, put, share, verdict, worse};
 use super::Mcp;
 use crate::LcpPoint;
 use crate::Problem;
@@ -138,7 +138,7 @@ impl McpGauge {
             return Measure::unknown();
         }
         if !self.look(problem, x, precisely) {
-            return undefined();
+            return Measure::never();
         }
         let mut measure = Measure {
             absolute: 0.0,
@@ -148,7 +148,7 @@ impl McpGauge {
             complementarity: 0.0,
             own: Some(0.0),
             worst: -1.0,
-            ..undefined()
+            ..Measure::never()
         };
         let mut own: f64 = 0.0;
         for i in 0..x.len() {
@@ -233,18 +233,3 @@ impl McpGauge {
 
 /// The part of ω that a row's terms count at least.
 const VANISHING: f64 = 1e-4;
-
-/// Where F is not defined: worse than anywhere else, and still a number.
-fn undefined() -> Measure {
-    Measure {
-        absolute: NEVER,
-        relative: NEVER,
-        literature: NEVER,
-        siconos: NEVER,
-        primal: NEVER,
-        dual: NEVER,
-        complementarity: NEVER,
-        worst: NEVER,
-        ..Measure::unknown()
-    }
-}

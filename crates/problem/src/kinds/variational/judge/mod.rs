@@ -35,7 +35,7 @@ pub struct SetCounts {
 /// The judge's constants and buffers for a variational inequality.
 ///
 /// `r = x − P_X(x − γ F(x))` vanishes at solutions, for any γ > 0. It is taken with `γ = ξ/φ` and divided by ξ, where ξ is the size of x (the largest modulus in x, in the start and in
-/// [`Set::size`]; where all are zero, φ and γ = 1) and φ that of F (the largest size of a row's terms at x, as the [`McpGauge`](crate::check::McpGauge) has it). So it does not change
+/// [`Set::size`]; where all are zero, φ and γ = 1) and φ that of F (the largest size of a row's terms at x, as the [`McpGauge`](crate::check::McpGauge) has it; at least a ten-thousandth of that at the start). So it does not change
 /// where F, or x with the set, is multiplied by a positive number. Variables and rows of one problem share their unit: a set that mixes variables knows no other.
 ///
 /// | field of [`Measure`] | formula |
@@ -58,13 +58,19 @@ pub struct ViGauge {
     projections: Vec<Projection>,
     /// Of the start and the set.
     size: f64,
+    /// φ at the start.
+    unit: f64,
 }
+
+/// The part of φ at the start that φ is at least: where F vanishes with all its terms, these give no unit.
+const VANISHING: f64 = 1e-4;
 
 impl ViGauge {
     pub(super) fn new(problem: &Vi) -> Self {
         let n = problem.dim();
         let zeros = || vec![0.0; n];
-        Self {
+        let mut gauge = Self {
+            unit: 0.0,
             field: problem.F.evaluator(),
             f: zeros(),
             jacobian: vec![0.0; problem.F.pattern().len()],
@@ -73,7 +79,9 @@ impl ViGauge {
             y: zeros(),
             projections: problem.set.parts().iter().map(|(_, set)| Projection::new(set)).collect(),
             size: largest(&problem.start).max(problem.set.size()),
-        }
+        };
+        gauge.unit = gauge.look(problem, &problem.start, false).unwrap_or(0.0);
+        gauge
     }
 
     /// F at x, and φ. False where F is not defined.
@@ -122,7 +130,8 @@ impl ViGauge {
         if x.iter().any(|x| !x.is_finite()) {
             return Measure::unknown();
         }
-        let Some(phi) = self.look(problem, x, precisely) else { return Measure::unknown() };
+        let Some(phi) = self.look(problem, x, precisely) else { return Measure::never() };
+        let phi = phi.max(VANISHING * self.unit);
         let absolute = self.natural(problem, x, 1.0);
         let size = largest(x).max(self.size);
         let (xi, gamma) = match (size > 0.0, phi > 0.0) {
@@ -133,6 +142,10 @@ impl ViGauge {
             (false, false) => (1.0, 0.0),
         };
         let relative = self.natural(problem, x, gamma) / xi;
+        if !(absolute.is_finite() && relative.is_finite()) {
+            // Nothing projects onto an empty set.
+            return Measure::never();
+        }
         let moved = || x.iter().zip(&self.y).map(|(x, y)| x - y);
         let gap: f64 = moved().zip(&self.f).map(|(r, f)| r * f).sum();
         let worst = moved()
