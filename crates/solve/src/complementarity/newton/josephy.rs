@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::complementarity::form::Model;
 use crate::complementarity::parts::arc::{Cell, End, Linearised, Start};
-use crate::complementarity::parts::nonlinear::{CHECK_EVERY, Moved, Solve, UNDEFINED};
+use crate::complementarity::parts::nonlinear::{CHECK_EVERY, Idle, Moved, Solve, UNDEFINED};
 use crate::core::ranges::{at_least, below};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
@@ -70,9 +70,8 @@ pub struct Work {
     linear: Linearised,
     trial: Vec<f64>,
     trial_f: Vec<f64>,
-    /// Steps since the deviation was last halved, and that deviation.
-    idle: usize,
-    low: f64,
+    /// Of the deviation.
+    idle: Idle,
     /// Linear problems that were not solved.
     unsolved: usize,
 }
@@ -146,8 +145,7 @@ impl Solver<Mcp> for Miles {
             solve,
             trial: vec![0.0; n],
             trial_f: vec![0.0; n],
-            idle: 0,
-            low: f64::INFINITY,
+            idle: Idle::default(),
             unsolved: 0,
         })
     }
@@ -158,7 +156,7 @@ impl Solver<Mcp> for Miles {
 
     fn start(&self, _: &Mcp, point: &mut LcpPoint, work: &mut Work) {
         work.solve.begin(point);
-        (work.idle, work.low) = (0, f64::INFINITY);
+        work.idle = Idle::default();
         (work.linear.pivots, work.unsolved) = (0, 0);
     }
 
@@ -173,11 +171,7 @@ impl Solver<Mcp> for Miles {
         } else {
             work.solve.note(Moved::Newton);
             let now = deviation(&work.solve.model, &work.solve.at.x, &work.solve.at.f);
-            work.idle += 1;
-            if now < 0.5 * work.low {
-                (work.idle, work.low) = (0, now);
-            }
-            if work.idle <= self.patience {
+            if work.idle.note(now) <= self.patience {
                 return work.solve.goes_on();
             }
             STALLED
@@ -186,7 +180,7 @@ impl Solver<Mcp> for Miles {
             return work.solve.ends(why);
         }
         work.solve.restarts += 1;
-        (work.idle, work.low) = (0, f64::INFINITY);
+        work.idle = Idle::default();
         work.solve.at.again(&mut work.solve.model);
         work.solve.goes_on()
     }

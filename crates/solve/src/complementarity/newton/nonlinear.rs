@@ -12,7 +12,7 @@ use nonsmooth_problem::{LcpPoint, Mcp};
 use super::Newton;
 use crate::complementarity::functions::NewtonFunction;
 use crate::complementarity::parts::nonlinear::{
-    CHECK_EVERY, Descent, Moved, Options, STATIONARY, Solve, UNDEFINED,
+    CHECK_EVERY, Descent, Idle, Inner, Options, Solve,
 };
 use crate::core::line_search::LineSearch;
 use crate::{SolveError, Solver, Step};
@@ -21,9 +21,7 @@ use crate::{SolveError, Solver, Step};
 pub struct Work<F: NewtonFunction> {
     solve: Solve,
     descent: Descent<F, F::Merit>,
-    /// Steps since the residual was last halved.
-    idle: usize,
-    low: f64,
+    idle: Idle,
 }
 
 /// Steps in which the residual must halve.
@@ -45,7 +43,7 @@ impl<F: NewtonFunction> Solver<Mcp> for Newton<F> {
         let solve = Solve::new(problem);
         let (function, options) = (self.function, options(self.line_search));
         let descent = Descent::new(function, function.merit(), options, &solve.model);
-        Ok(Work { solve, descent, idle: 0, low: f64::INFINITY })
+        Ok(Work { solve, descent, idle: Idle::default() })
     }
 
     fn aim(&self, tolerance: f64, work: &mut Work<F>) {
@@ -55,28 +53,24 @@ impl<F: NewtonFunction> Solver<Mcp> for Newton<F> {
     fn start(&self, _: &Mcp, point: &mut LcpPoint, work: &mut Work<F>) {
         work.solve.begin(point);
         work.descent.restart(self.function, self.function.merit(), options(self.line_search));
-        (work.idle, work.low) = (0, f64::INFINITY);
+        work.idle = Idle::default();
     }
 
     fn step(&self, _: &Mcp, _: &mut LcpPoint, work: &mut Work<F>) -> Step {
-        let Work { solve, descent, idle, low } = work;
+        let Work { solve, descent, idle } = work;
         let moved = descent.step(&mut solve.model, &mut solve.at);
         solve.note(moved);
-        *idle += 1;
-        if solve.at.residual < 0.5 * *low {
-            (*idle, *low) = (0, solve.at.residual);
-        }
-        if moved.moved() && *idle <= PATIENCE {
+        let idle_for = idle.note(solve.at.residual);
+        if moved.moved() && idle_for <= PATIENCE {
             return solve.goes_on();
         }
         if solve.is_done() || solve.restarts == self.restarts {
-            let why = if moved == Moved::Undefined { UNDEFINED } else { STATIONARY };
-            return solve.ends(why);
+            return solve.ends(moved.why());
         }
         solve.restarts += 1;
         solve.at.perturbed(&mut solve.model, solve.restarts as u64);
         descent.restart(self.function, self.function.merit(), options(self.line_search));
-        (*idle, *low) = (0, f64::INFINITY);
+        *idle = Idle::default();
         solve.goes_on()
     }
 

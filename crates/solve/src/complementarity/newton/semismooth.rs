@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::complementarity::functions::Penalised;
 use crate::complementarity::parts::nonlinear::{
-    CHECK_EVERY, Crash, Descent, Moved, Options, STATIONARY, Solve, UNDEFINED,
+    CHECK_EVERY, Crash, Descent, Idle, Inner, Options, Solve,
 };
 use crate::core::ranges::{at_least, up_to};
 use crate::core::register::{About, Described, Solves};
@@ -74,9 +74,7 @@ pub struct Work {
     solve: Solve,
     crash: Crash,
     descent: Descent<Penalised, Penalised>,
-    /// Steps since the residual was last halved, and that residual.
-    idle: usize,
-    low: f64,
+    idle: Idle,
 }
 
 /// Steps in which the residual must halve.
@@ -104,7 +102,7 @@ impl Semismooth {
         let Some((crash, function, options)) = self.start_of(turn) else { return false };
         work.crash.begin(crash);
         work.descent.restart(function, function, options);
-        (work.idle, work.low) = (0, f64::INFINITY);
+        work.idle = Idle::default();
         true
     }
 }
@@ -116,7 +114,7 @@ impl Solver<Mcp> for Semismooth {
         let solve = Solve::new(problem);
         let function = Penalised { lambda: self.lambda };
         let descent = Descent::new(function, function, Options::default(), &solve.model);
-        Ok(Work { crash: Crash::new(&solve.model), descent, solve, idle: 0, low: f64::INFINITY })
+        Ok(Work { crash: Crash::new(&solve.model), descent, solve, idle: Idle::default() })
     }
 
     fn aim(&self, tolerance: f64, work: &mut Work) {
@@ -132,18 +130,15 @@ impl Solver<Mcp> for Semismooth {
     }
 
     fn step(&self, _: &Mcp, _: &mut LcpPoint, work: &mut Work) -> Step {
-        let Work { solve, crash, descent, idle, low } = work;
+        let Work { solve, crash, descent, idle } = work;
         if !crash.is_over() {
             crash.step(&mut solve.model, &mut solve.at);
             return solve.goes_on();
         }
         let moved = descent.step(&mut solve.model, &mut solve.at);
         solve.note(moved);
-        *idle += 1;
-        if solve.at.residual < 0.5 * *low {
-            (*idle, *low) = (0, solve.at.residual);
-        }
-        if moved.moved() && *idle <= PATIENCE {
+        let idle_for = idle.note(solve.at.residual);
+        if moved.moved() && idle_for <= PATIENCE {
             return solve.goes_on();
         }
         if work.solve.is_done() {
@@ -151,8 +146,7 @@ impl Solver<Mcp> for Semismooth {
         }
         let turn = work.solve.restarts + 1;
         if !self.begin(turn, work) {
-            let why = if moved == Moved::Undefined { UNDEFINED } else { STATIONARY };
-            return work.solve.ends(why);
+            return work.solve.ends(moved.why());
         }
         work.solve.restarts = turn;
         work.solve.at.again(&mut work.solve.model);

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::complementarity::functions::Slope;
 use crate::complementarity::parts::nonlinear::{
-    CHECK_EVERY, Crash, Descent, Moved, Options, Residual, STATIONARY, Solve, UNDEFINED,
+    CHECK_EVERY, Crash, Descent, Idle, Inner, Moved, Options, Residual, STATIONARY, Solve,
 };
 use crate::core::ranges::positive;
 use crate::core::register::{About, Described, Solves};
@@ -105,9 +105,7 @@ pub struct Work {
     crash: Crash,
     descent: Descent<Smoothed, Smoothed>,
     beta: f64,
-    /// Steps since the residual was last halved, and that residual.
-    idle: usize,
-    low: f64,
+    idle: Idle,
 }
 
 /// Steps in which the residual must halve.
@@ -126,7 +124,7 @@ impl Solver<Mcp> for Smooth {
         let function = Smoothed { beta: self.beta };
         let descent = Descent::new(function, function, MONOTONE, &solve.model);
         let crash = Crash::new(&solve.model);
-        Ok(Work { solve, crash, descent, beta: self.beta, idle: 0, low: f64::INFINITY })
+        Ok(Work { solve, crash, descent, beta: self.beta, idle: Idle::default() })
     }
 
     fn aim(&self, tolerance: f64, work: &mut Work) {
@@ -136,11 +134,11 @@ impl Solver<Mcp> for Smooth {
     fn start(&self, _: &Mcp, point: &mut LcpPoint, work: &mut Work) {
         work.solve.begin(point);
         work.crash.begin(self.crash);
-        (work.beta, work.idle, work.low) = (self.beta, 0, f64::INFINITY);
+        (work.beta, work.idle) = (self.beta, Idle::default());
     }
 
     fn step(&self, _: &Mcp, _: &mut LcpPoint, work: &mut Work) -> Step {
-        let Work { solve, crash, descent, beta, idle, low } = work;
+        let Work { solve, crash, descent, beta, idle } = work;
         if !crash.is_over() {
             crash.step(&mut solve.model, &mut solve.at);
             return solve.goes_on();
@@ -156,12 +154,8 @@ impl Solver<Mcp> for Smooth {
         descent.restart(function, function, MONOTONE);
         let moved = descent.step(&mut solve.model, &mut solve.at);
         solve.note(moved);
-        *idle += 1;
-        if solve.at.residual < 0.5 * *low {
-            (*idle, *low) = (0, solve.at.residual);
-        }
-        if *idle > PATIENCE || moved == Moved::Undefined {
-            return solve.ends(if moved == Moved::Undefined { UNDEFINED } else { STATIONARY });
+        if idle.note(solve.at.residual) > PATIENCE || moved == Moved::Undefined {
+            return solve.ends(moved.why());
         }
         if !moved.moved() {
             if *beta >= LARGEST {

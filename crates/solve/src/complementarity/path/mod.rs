@@ -37,7 +37,7 @@ use serde::{Deserialize, Serialize};
 use crate::complementarity::functions::{Min, Penalised};
 use crate::complementarity::parts::arc::{Cell, End, Linearised, Start};
 use crate::complementarity::parts::nonlinear::{
-    CHECK_EVERY, Crash, Descent, Moved, Options, STATIONARY, Solve, UNDEFINED,
+    CHECK_EVERY, Crash, Descent, Idle, Moved, Options, STATIONARY, Solve, UNDEFINED,
 };
 use crate::core::ranges::{at_least, at_most, nonnegative, positive};
 use crate::core::register::{About, Described, Solves};
@@ -177,9 +177,8 @@ pub struct Work {
     lambda: f64,
     /// Linear problems of this start.
     problems: usize,
-    /// Steps since Ψ was last halved, and that Ψ.
-    idle: usize,
-    low: f64,
+    /// Of Ψ, or of the normal map.
+    idle: Idle,
     /// The point with the least Ψ of this start, and that.
     best: Vec<f64>,
     best_merit: f64,
@@ -250,7 +249,7 @@ impl PathSearch {
         let options = Options { memory, slack: kappa, ..Options::default() };
         work.descent.restart(Min {}, function, options);
         (work.lambda, work.problems, work.gradients) = (proximal, 0, 0);
-        (work.idle, work.low, work.best_merit) = (0, f64::INFINITY, f64::INFINITY);
+        (work.idle, work.best_merit) = (Idle::default(), f64::INFINITY);
         work.watchdog = Watchdog::new(work.options.watchdog);
         work.begun = false;
     }
@@ -319,14 +318,11 @@ impl PathSearch {
         solve.note(moved);
         let least = normal.least();
         *lambda = (0.4 * *lambda).min(0.05 * least * least);
-        work.idle += 1;
-        if least < 0.5 * work.low {
-            (work.idle, work.low) = (0, least);
-        }
-        if moved.moved() && work.idle <= PATIENCE {
+        let idle_for = work.idle.note(least);
+        if moved.moved() && idle_for <= PATIENCE {
             return work.solve.goes_on();
         }
-        self.another(work, if moved == Moved::Undefined { UNDEFINED } else { STATIONARY })
+        self.another(work, moved.why())
     }
 
     /// The next start, or the end.
@@ -413,8 +409,7 @@ impl Solver<Mcp> for PathSearch {
             options: *self,
             lambda: 0.0,
             problems: 0,
-            idle: 0,
-            low: f64::INFINITY,
+            idle: Idle::default(),
             best: vec![0.0; n],
             best_merit: f64::INFINITY,
             gradients: 0,
@@ -459,11 +454,7 @@ impl Solver<Mcp> for PathSearch {
             work.best_merit = merit;
             work.best.copy_from_slice(&work.solve.at.x);
         }
-        work.idle += 1;
-        if merit < 0.5 * work.low {
-            (work.idle, work.low) = (0, merit);
-        }
-        if work.idle > PATIENCE {
+        if work.idle.note(merit) > PATIENCE {
             return self.another(work, STATIONARY);
         }
         if work.watchdog.is_due() && work.best_merit < merit {

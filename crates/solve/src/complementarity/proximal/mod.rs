@@ -1,6 +1,6 @@
 //! Methods that leave stationary points by proximal problems with moving centres, each with another method inside.
 
-mod inner;
+mod escaping;
 mod proxi;
 mod qpcomp;
 mod semicomp;

@@ -6,16 +6,15 @@
 //!
 //! References: Billups1995; BillupsFerris1997 (QPCOMP's escape); Acary2018. Cost of a step: one LU of the pattern of JF. Fails: where no λ helps; escapes may be long.
 
-use nonsmooth_problem::{LcpPoint, Mcp};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::inner::{Damped, Work};
+use super::escaping::Escaping;
+use crate::complementarity::form::Model;
 use crate::complementarity::functions::Min;
-use crate::complementarity::parts::nonlinear::{CHECK_EVERY, Descent, Options, Solve};
+use crate::complementarity::parts::nonlinear::{Descent, Options};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
-use crate::{SolveError, Solver, Step};
 
 /// The hyperparameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -48,36 +47,14 @@ impl Described for Proxi {
 
 const OPTIONS: Options = Options { memory: 1, slack: 1.0, least: 1e-8, gradient: false };
 
-impl Solver<Mcp> for Proxi {
-    type Work = Work<Damped<Min, Min>>;
+impl Escaping for Proxi {
+    type Inner = Descent<Min, Min>;
 
-    fn work(&self, problem: &Mcp) -> Result<Self::Work, SolveError> {
-        let solve = Solve::new(problem);
-        let descent = Descent::new(Min {}, Min {}, OPTIONS, &solve.model);
-        Ok(Work::new(solve, Damped { descent, function: (Min {}, Min {}), options: OPTIONS }))
+    fn inner(&self, model: &Model) -> Self::Inner {
+        Descent::new(Min {}, Min {}, OPTIONS, model)
     }
 
-    fn aim(&self, tolerance: f64, work: &mut Self::Work) {
-        work.solve.aim(tolerance);
-    }
-
-    fn start(&self, _: &Mcp, point: &mut LcpPoint, work: &mut Self::Work) {
-        work.begin(point, self.crash);
-    }
-
-    fn step(&self, _: &Mcp, _: &mut LcpPoint, work: &mut Self::Work) -> Step {
-        work.step()
-    }
-
-    fn publish(&self, _: &Mcp, point: &mut LcpPoint, work: &mut Self::Work) {
-        work.solve.publish(point);
-    }
-
-    fn account(&self, work: &Self::Work) -> Vec<String> {
-        work.account()
-    }
-
-    fn check_every(&self) -> usize {
-        CHECK_EVERY
+    fn crash(&self) -> bool {
+        self.crash
     }
 }

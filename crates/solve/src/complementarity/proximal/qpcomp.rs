@@ -6,15 +6,14 @@
 //!
 //! References: BillupsFerris1997; PangGabriel1993; Acary2018. Cost of a step: a few LU factorisations of the pattern of JFᵀJF. Fails: where no λ helps; escapes may be long.
 
-use nonsmooth_problem::{LcpPoint, Mcp};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::inner::Work;
-use crate::complementarity::parts::nonlinear::{CHECK_EVERY, Solve, Squares};
+use super::escaping::Escaping;
+use crate::complementarity::form::Model;
+use crate::complementarity::parts::nonlinear::Squares;
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
-use crate::{SolveError, Solver, Step};
 
 /// The hyperparameters.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -39,35 +38,14 @@ impl Described for Qpcomp {
     };
 }
 
-impl Solver<Mcp> for Qpcomp {
-    type Work = Work<Squares>;
+impl Escaping for Qpcomp {
+    type Inner = Squares;
 
-    fn work(&self, problem: &Mcp) -> Result<Self::Work, SolveError> {
-        let solve = Solve::new(problem);
-        Ok(Work::new(solve, Squares::new(problem.dim())))
+    fn inner(&self, model: &Model) -> Self::Inner {
+        Squares::new(model.dim())
     }
 
-    fn aim(&self, tolerance: f64, work: &mut Self::Work) {
-        work.solve.aim(tolerance);
-    }
-
-    fn start(&self, _: &Mcp, point: &mut LcpPoint, work: &mut Self::Work) {
-        work.begin(point, self.crash);
-    }
-
-    fn step(&self, _: &Mcp, _: &mut LcpPoint, work: &mut Self::Work) -> Step {
-        work.step()
-    }
-
-    fn publish(&self, _: &Mcp, point: &mut LcpPoint, work: &mut Self::Work) {
-        work.solve.publish(point);
-    }
-
-    fn account(&self, work: &Self::Work) -> Vec<String> {
-        work.account()
-    }
-
-    fn check_every(&self) -> usize {
-        CHECK_EVERY
+    fn crash(&self) -> bool {
+        self.crash
     }
 }

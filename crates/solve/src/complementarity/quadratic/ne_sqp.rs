@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::complementarity::parts::nonlinear::{
-    CHECK_EVERY, Inner, Moved, STATIONARY, Solve, Squares, UNDEFINED,
+    CHECK_EVERY, Inner, Solve, Squares,
 };
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
@@ -61,11 +61,7 @@ impl Solver<Mcp> for NeSqp {
         let Work { solve, squares } = work;
         let moved = squares.step(&mut solve.model, &mut solve.at);
         solve.note(moved);
-        match moved {
-            Moved::Stuck => solve.ends(STATIONARY),
-            Moved::Undefined => solve.ends(UNDEFINED),
-            _ => solve.goes_on(),
-        }
+        if moved.moved() { solve.goes_on() } else { solve.ends(moved.why()) }
     }
 
     fn publish(&self, _: &Mcp, point: &mut LcpPoint, work: &mut Work) {

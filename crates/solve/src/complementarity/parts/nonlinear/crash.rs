@@ -5,7 +5,7 @@
 //!
 //! References: DirkseFerris1997; Munson2002.
 
-use super::{Descent, Iterate, Moved, Options};
+use super::{Descent, Inner, Iterate, Moved, Options};
 use crate::complementarity::form::Model;
 use crate::complementarity::functions::{Min, Penalised};
 

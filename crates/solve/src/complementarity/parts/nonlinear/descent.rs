@@ -12,7 +12,7 @@
 
 use nonsmooth_linalg::{Matrix, norm};
 
-use super::{Iterate, Moved};
+use super::{Inner, Iterate, Moved};
 use crate::complementarity::form::Model;
 use crate::complementarity::functions::{self, ScalarFunction, Slope};
 use crate::complementarity::parts::factor::Factor;
@@ -95,6 +95,30 @@ fn residuals<F: Residual>(
     sum
 }
 
+impl<D: Residual, F: Residual> Inner for Descent<D, F> {
+    fn step(&mut self, model: &mut Model, at: &mut Iterate) -> Moved {
+        let Some(merit) = self.look(model, at) else { return Moved::Undefined };
+        let lambda = (0.1 * merit).clamp(1e-8, 1.0);
+        for (k, lambda) in [0.0, lambda, (10.0 * lambda).min(1.0)].into_iter().enumerate() {
+            if !self.solve(model, at, lambda) {
+                continue;
+            }
+            if self.search(model, at) {
+                return if k == 0 { Moved::Newton } else { Moved::Regularised };
+            }
+        }
+        if self.options.gradient && self.downhill(model, at) {
+            return Moved::Gradient;
+        }
+        Moved::Stuck
+    }
+
+    fn forget(&mut self) {
+        self.last.clear();
+        self.factor.trust();
+    }
+}
+
 impl<D: Residual, F: Residual> Descent<D, F> {
     /// For problems of this model.
     pub fn new(direction: D, merit: F, options: Options, model: &Model) -> Self {
@@ -125,31 +149,7 @@ impl<D: Residual, F: Residual> Descent<D, F> {
     /// Begins anew, with other functions and options.
     pub fn restart(&mut self, direction: D, merit: F, options: Options) {
         (self.direction, self.merit, self.options) = (direction, merit, options);
-        self.last.clear();
-        self.factor.trust();
-    }
-
-    /// Ψ where the iterate is.
-    pub fn merit(&self, model: &Model, at: &Iterate) -> f64 {
-        residuals(&self.merit, model, &at.x, &at.f, |_, _| {})
-    }
-
-    /// One step.
-    pub fn step(&mut self, model: &mut Model, at: &mut Iterate) -> Moved {
-        let Some(merit) = self.look(model, at) else { return Moved::Undefined };
-        let lambda = (0.1 * merit).clamp(1e-8, 1.0);
-        for (k, lambda) in [0.0, lambda, (10.0 * lambda).min(1.0)].into_iter().enumerate() {
-            if !self.solve(model, at, lambda) {
-                continue;
-            }
-            if self.search(model, at) {
-                return if k == 0 { Moved::Newton } else { Moved::Regularised };
-            }
-        }
-        if self.options.gradient && self.downhill(model, at) {
-            return Moved::Gradient;
-        }
-        Moved::Stuck
+        self.forget();
     }
 
     /// Linearises F where the iterate is; Ψ there, which is remembered. None where it is not defined.

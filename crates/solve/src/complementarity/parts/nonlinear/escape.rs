@@ -10,7 +10,7 @@
 //!
 //! References: BillupsFerris1997; Billups1995. Cost: that of the inner steps.
 
-use super::{Iterate, Moved};
+use super::{Idle, Iterate, Moved};
 use crate::complementarity::form::Model;
 
 /// A method that makes steps on whatever problem the model states.
@@ -18,7 +18,7 @@ pub trait Inner: Send {
     /// One step.
     fn step(&mut self, model: &mut Model, at: &mut Iterate) -> Moved;
 
-    /// The model states another problem from now on, or begins elsewhere.
+    /// The model states another problem from now on, or the solve begins elsewhere.
     fn forget(&mut self);
 }
 
@@ -37,8 +37,8 @@ const PATIENCE: usize = 60;
 /// Where the escape is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
-    /// On the problem itself; steps since the residual was last halved, and that residual.
-    Descent { idle: usize, low: f64 },
+    /// On the problem itself.
+    Descent { idle: Idle },
     /// On a proximal problem; steps there, centres so far, the residual to fall to.
     Proximal { steps: usize, centres: usize, goal: f64 },
 }
@@ -60,7 +60,7 @@ impl<I: Inner> Escape<I> {
     pub fn new(inner: I, n: usize) -> Self {
         Self {
             inner,
-            phase: Phase::Descent { idle: 0, low: f64::INFINITY },
+            phase: Phase::Descent { idle: Idle::default() },
             lambda: FIRST,
             centre: vec![0.0; n],
             f: vec![0.0; n],
@@ -70,27 +70,19 @@ impl<I: Inner> Escape<I> {
 
     /// Begins anew.
     pub fn begin(&mut self) {
-        self.phase = Phase::Descent { idle: 0, low: f64::INFINITY };
+        self.phase = Phase::Descent { idle: Idle::default() };
         (self.lambda, self.counts) = (FIRST, [0; 2]);
         self.inner.forget();
-    }
-
-    /// Whether the residual of the iterate is that of the problem itself.
-    pub fn is_descending(&self) -> bool {
-        matches!(self.phase, Phase::Descent { .. })
     }
 
     /// One step; stuck where even the strongest proximal term does not help.
     pub fn step(&mut self, model: &mut Model, at: &mut Iterate) -> Moved {
         match self.phase {
-            Phase::Descent { idle, low } => {
+            Phase::Descent { mut idle } => {
                 let moved = self.inner.step(model, at);
-                let halved = at.residual < 0.5 * low;
-                self.phase = match halved {
-                    true => Phase::Descent { idle: 0, low: at.residual },
-                    false => Phase::Descent { idle: idle + 1, low },
-                };
-                if moved.moved() && (halved || idle < PATIENCE) {
+                let idle_for = idle.note(at.residual);
+                self.phase = Phase::Descent { idle };
+                if moved.moved() && idle_for <= PATIENCE {
                     return moved;
                 }
                 // Away from here, from the best point of this descent.
@@ -116,7 +108,7 @@ impl<I: Inner> Escape<I> {
                 let own = if defined { model.natural(&at.x, &self.f) } else { f64::INFINITY };
                 if own <= goal {
                     at.arrive(model);
-                    self.phase = Phase::Descent { idle: 0, low: own };
+                    self.phase = Phase::Descent { idle: Idle::from(own) };
                     self.inner.forget();
                     return Moved::Regularised;
                 }

@@ -3,6 +3,7 @@
 mod crash;
 mod descent;
 mod escape;
+mod idle;
 mod iterate;
 mod solve;
 mod squares;
@@ -10,6 +11,7 @@ mod squares;
 pub use crash::Crash;
 pub use descent::{Descent, Options, Residual};
 pub use escape::{Escape, Inner};
+pub use idle::Idle;
 pub use iterate::Iterate;
 pub use solve::{CHECK_EVERY, STATIONARY, Solve, UNDEFINED};
 pub use squares::Squares;
@@ -33,5 +35,10 @@ impl Moved {
     /// Whether the point is another one.
     pub fn moved(self) -> bool {
         matches!(self, Self::Newton | Self::Regularised | Self::Gradient)
+    }
+
+    /// Why a method ends that did not move.
+    pub fn why(self) -> &'static str {
+        if self == Self::Undefined { UNDEFINED } else { STATIONARY }
     }
 }
