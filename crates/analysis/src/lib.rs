@@ -6,6 +6,7 @@ mod indeterminacy;
 mod jacobian;
 mod monotone;
 mod pattern;
+mod regularity;
 mod spectrum;
 
 use std::cmp::Reverse;
@@ -18,6 +19,7 @@ pub use indeterminacy::Indeterminacy;
 pub use jacobian::{Entry, JacobianCheck};
 pub use monotone::{Apart, Sampled};
 pub use pattern::Pattern;
+pub use regularity::Regularity;
 pub use spectrum::{Spectrum, SpectrumError, rank};
 
 use nonsmooth_linalg::Groups;

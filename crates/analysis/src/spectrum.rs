@@ -133,9 +133,18 @@ pub fn rank(a: &Csc, limit: usize) -> Option<usize> {
             (0..a.nrows()).for_each(|i| unit[(i, j)] /= size);
         }
     }
-    let values = singular_values(&unit).ok()?;
-    let cut =
-        a.nrows().max(a.ncols()) as f64 * f64::EPSILON * values.first().copied().unwrap_or(0.0);
+    above(&unit, 0.0)
+}
+
+/// The number of singular values above `relative` times the largest, and above rounding. `None` where an entry is not finite.
+pub(crate) fn rank_above(a: &Csc, relative: f64) -> Option<usize> {
+    above(&dense(a), relative)
+}
+
+fn above(a: &Mat<f64>, relative: f64) -> Option<usize> {
+    let values = singular_values(a).ok()?;
+    let rounding = a.nrows().max(a.ncols()) as f64 * f64::EPSILON;
+    let cut = relative.max(rounding) * values.first().copied().unwrap_or(0.0);
     Some(values.iter().filter(|&&s| s > cut).count())
 }
 

@@ -3,12 +3,14 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use nonsmooth_analysis::Indeterminacy;
+use nonsmooth_analysis::{Indeterminacy, Regularity};
 /// `1 contact`, `2 contacts`.
 pub use nonsmooth_bench::plural as count;
 use nonsmooth_io::ProblemFile;
 use nonsmooth_problem::check::{self, Failing, Measure};
-use nonsmooth_problem::{AnyPoint, AnyProblem, AnyStatus, GlobalPoint, LocalPoint, Problem};
+use nonsmooth_problem::{
+    AnyPoint, AnyProblem, AnyStatus, GlobalPoint, LocalPoint, Problem, Stated, with_complementarity,
+};
 use serde_json::{Value, json};
 
 pub use crate::json::{Object, fields};
@@ -79,7 +81,22 @@ fn indeterminacy(
     verdict.solved.then(found).flatten()
 }
 
-/// Says where the impulses of a solution are not the only ones.
+/// Whether the Jacobian says that a solution of a nonlinear problem is isolated. Nothing of a point that is none, or of another problem.
+fn regularity(problem: &AnyProblem, point: &AnyPoint, verdict: &AnyVerdict) -> Option<Regularity> {
+    let (AnyProblem::Complementarity(problem), AnyPoint::Lcp(point)) = (problem, point) else {
+        return None;
+    };
+    let row = |status: &AnyStatus| match status {
+        AnyStatus::Row(row) => Some(*row),
+        AnyStatus::Contact(_) => None,
+    };
+    let statuses: Vec<_> = verdict.statuses.iter().filter_map(row).collect();
+    let found = |mcp| Regularity::of(mcp, &point.z, &statuses, verdict.measure.relative);
+    let nonlinear = with_complementarity!(problem, p => p.nonlinear());
+    nonlinear.filter(|_| verdict.solved).and_then(found)
+}
+
+/// Says where the impulses of a solution are not the only ones, and whether a solution of a nonlinear problem is isolated.
 pub fn uniqueness_text(
     text: &mut String,
     content: &ProblemFile,
@@ -94,12 +111,29 @@ pub fn uniqueness_text(
         let says = format!("not unique: {how} {rank} of {of}; all of them give the same motion");
         row(text, "impulses", says);
     }
+    if let Some(found) = regularity(&content.problem, point, verdict) {
+        let Regularity { rank, of } = found;
+        let degenerate = counted(&verdict.counts).degenerate > 0;
+        let says = match (found.is_regular(), degenerate) {
+            (false, _) => {
+                ": the solution need not be isolated, and is less accurate than the residual"
+            }
+            (true, true) => ", but pairs are degenerate",
+            (true, false) => ": an isolated solution",
+        };
+        row(text, "Jacobian", format!("rank {rank} of {of} on the active set{says}"));
+    }
 }
 
 /// The same for JSON; null where it is not known.
 pub fn uniqueness_json(content: &ProblemFile, point: &AnyPoint, verdict: &AnyVerdict) -> Object {
     let found = indeterminacy(&content.problem, point, content.info.dofs, verdict);
-    let AnyProblem::Friction(_) = content.problem else { return Object::new() };
+    if let AnyProblem::Complementarity(problem) = &content.problem {
+        let found = regularity(&content.problem, point, verdict);
+        let nonlinear = with_complementarity!(problem, p => p.nonlinear());
+        let said = nonlinear.map(|_| fields(json!({"jacobian_on_active_set": found})));
+        return said.unwrap_or_default();
+    }
     let unique = found.as_ref().and_then(Indeterminacy::is_unique);
     fields(json!({"impulses_unique": unique, "indeterminacy": found}))
 }

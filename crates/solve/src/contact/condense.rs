@@ -15,8 +15,9 @@ use nonsmooth_problem::{
 
 use crate::SolveError;
 use crate::core::reformulation::Reformulation;
-use crate::core::register::Composed;
+use crate::core::register::{Composed, Over};
 use crate::core::settings::NoSettings;
+use crate::core::via_session::ViaSession;
 use crate::{Boxed, Via};
 use nonsmooth_problem::Kind;
 
@@ -35,6 +36,9 @@ where
         "global to local: forms W = H' M^-1 H and q, bilateral constraints eliminated";
     const FROM: &'static [Kind] = &[Kind::FrictionGlobal2d, Kind::FrictionGlobal3d];
     const CITES: &'static [&'static str] = &["Acary2018"];
+
+    const SESSION: Option<Over<NoSettings, FrictionLocal<D>, FrictionGlobal<D>>> =
+        Some(|_, session| Box::new(ViaSession::new(Self, session)));
 
     fn compose(_: NoSettings, solver: Boxed<Self::To>) -> Boxed<FrictionGlobal<D>> {
         Boxed::new(Via { reformulation: Condense, solver })

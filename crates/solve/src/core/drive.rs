@@ -232,7 +232,7 @@ impl Meter {
     }
 
     /// What a failure of the preparation comes to: where a limit was reached, a preparation that was cut short proves nothing of the problem.
-    fn ended(
+    pub(crate) fn ended(
         &self,
         measure: Measure,
         limits: &Limits,
@@ -666,15 +666,20 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 Some(refused) => Status::Stalled(format!("{why}: {refused}").into()),
                 None => Status::Stalled(why),
             },
-            Step::NoSolution(certificate) => match self.problem.evidence(&certificate) {
-                Evidence::Proved(proof) => Status::Infeasible(proof),
-                Evidence::Nearly { change } => Status::NearlyInfeasible { certificate, change },
-                Evidence::Nothing => Status::NoConclusion(certificate),
-            },
+            Step::NoSolution(certificate) => concluded(self.problem, certificate),
             Step::Done | Step::Continue { .. } => {
                 Status::Stalled("the solver has finished, but its answer fails the check".into())
             }
         }
+    }
+}
+
+/// The judge's word on a certificate that a solver has found.
+pub(crate) fn concluded<P: Problem>(problem: &P, certificate: Certificate) -> Status {
+    match problem.evidence(&certificate) {
+        Evidence::Proved(proof) => Status::Infeasible(proof),
+        Evidence::Nearly { change } => Status::NearlyInfeasible { certificate, change },
+        Evidence::Nothing => Status::NoConclusion(certificate),
     }
 }
 

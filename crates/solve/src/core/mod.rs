@@ -17,3 +17,4 @@ pub mod spelling;
 pub mod step_rule;
 pub mod trace;
 pub(crate) mod via;
+pub(crate) mod via_session;

@@ -109,6 +109,12 @@ impl Named {
 /// How a solver is made from its settings.
 type Make<T> = Box<dyn Fn(&SettingsMap) -> Result<T, String>>;
 
+/// A session whose type is forgotten.
+pub type AnySession<P> = Box<dyn Session<P>>;
+
+/// What makes a session of `P` of one of `To`, and of a prefix's settings `S`.
+pub type Over<S, To, P> = fn(S, AnySession<To>) -> AnySession<P>;
+
 /// What was made, if there is such a name and the settings are right.
 pub(crate) type Made<T> = Option<Result<T, String>>;
 
@@ -122,7 +128,7 @@ pub struct Entry<P: Problem> {
 enum Maker<P: Problem> {
     Solver(Make<Boxed<P>>),
     /// Runs whole sessions of others, so it is one itself and has no steps that a prefix could lead to.
-    Session(Make<Box<dyn Session<P>>>),
+    Session(Make<AnySession<P>>),
 }
 
 impl<P: Problem + 'static> Entry<P> {
@@ -141,9 +147,8 @@ impl<P: Problem + 'static> Entry<P> {
     pub(crate) fn session<S: Described, T: Session<P> + 'static>(
         make: impl Fn(S) -> T + 'static,
     ) -> Self {
-        let make = move |settings: &SettingsMap| {
-            Ok(Box::new(make(parse(settings)?)) as Box<dyn Session<P>>)
-        };
+        let make =
+            move |settings: &SettingsMap| Ok(Box::new(make(parse(settings)?)) as AnySession<P>);
         Self { about: S::ABOUT, make: Maker::Session(Box::new(make)) }
     }
 
@@ -179,6 +184,9 @@ pub trait Composed<P: Problem> {
     /// Whether the solutions of the other problem are those of the first only nearly.
     const NEARLY: bool = false;
 
+    /// The session of `P` that has another inside, of prefixes that stand before whole sessions, too.
+    const SESSION: Option<Over<Self::Settings, Self::To, P>> = None;
+
     /// The solver of `P` that has `solver` inside.
     fn compose(settings: Self::Settings, solver: Boxed<Self::To>) -> Boxed<P>;
 
@@ -193,6 +201,7 @@ pub trait Composed<P: Problem> {
 pub struct Edge<P: Problem> {
     prefix: &'static Prefix,
     solver: fn(&str, &SettingsMap) -> Made<Boxed<P>>,
+    session: fn(&str, &SettingsMap) -> Made<AnySession<P>>,
     describe: fn(&str) -> Option<(&'static About, Solves)>,
     names: fn() -> Vec<String>,
 }
@@ -203,11 +212,15 @@ impl<P: Problem + 'static> Edge<P> {
         Self {
             prefix: C::PREFIX,
             solver: |name, settings| {
-                let own = |key: &str| !C::KEYS.is_empty() && key.starts_with(C::KEYS);
-                let (own, inner): (SettingsMap, SettingsMap) =
-                    settings.clone().into_iter().partition(|(key, _)| own(key));
+                let (own, inner) = parted::<P, C>(settings);
                 let solver = solver::<C::To>(name, &inner)?;
                 Some(parse(&own).and_then(|own| Ok(C::compose(own, solver?))))
+            },
+            session: |name, settings| {
+                let (own, inner) = parted::<P, C>(settings);
+                let over = C::SESSION?;
+                let session = made::<C::To>(name, &inner)?;
+                Some(parse(&own).and_then(|own| Ok(over(own, session?))))
             },
             describe: |name| {
                 let (about, solves) = describe::<C::To>(name)?;
@@ -216,7 +229,11 @@ impl<P: Problem + 'static> Edge<P> {
             names: || {
                 // What leads back to the same kind is not gone through again.
                 let again = TypeId::of::<C::To>() == TypeId::of::<P>();
-                let names = if again { direct::<C::To>() } else { with_steps::<C::To>() };
+                let mut names = if again { direct::<C::To>() } else { with_steps::<C::To>() };
+                if C::SESSION.is_some() {
+                    let sessions = C::To::solvers().into_iter().filter(|entry| !entry.has_steps());
+                    names.extend(sessions.map(|entry| entry.about.name.into()));
+                }
                 let names = names.into_iter().filter(|name| C::lists(name));
                 names.map(|name| format!("{}/{name}", C::NAME)).collect()
             },
@@ -260,6 +277,24 @@ pub(crate) fn solver<P: Registered>(name: &str, settings: &SettingsMap) -> Made<
         Way::Behind(edge, rest) => (edge.solver)(rest, settings),
         Way::Here(Entry { make: Maker::Solver(make), .. }) => Some(make(settings)),
         Way::Here(Entry { make: Maker::Session(_), .. }) => None,
+    }
+}
+
+/// A prefix's own settings, and those of the solver behind it.
+fn parted<P: Problem, C: Composed<P>>(settings: &SettingsMap) -> (SettingsMap, SettingsMap) {
+    let own = |key: &str| !C::KEYS.is_empty() && key.starts_with(C::KEYS);
+    settings.clone().into_iter().partition(|(key, _)| own(key))
+}
+
+/// The session behind a name: one of its own, or a solver that is driven.
+fn made<P: Registered>(name: &str, settings: &SettingsMap) -> Made<AnySession<P>> {
+    if let Some(solver) = solver::<P>(name, settings) {
+        return Some(solver.map(driven));
+    }
+    match way::<P>(name)? {
+        Way::Here(Entry { make: Maker::Session(make), .. }) => Some(make(settings)),
+        Way::Here(_) => None,
+        Way::Behind(edge, rest) => (edge.session)(rest, settings),
     }
 }
 
@@ -323,7 +358,7 @@ pub fn solves<P: Registered>(name: &str) -> Option<Solves> {
 pub fn session<P: Registered>(
     name: &str,
     settings: &SettingsMap,
-) -> Result<Box<dyn Session<P>>, SolveError> {
+) -> Result<AnySession<P>, SolveError> {
     let bare = bare::<P>(name, settings)?;
     Ok(Box::new(Guarded::new(bare, name, settings)))
 }
@@ -332,19 +367,16 @@ pub fn session<P: Registered>(
 pub(crate) fn bare<P: Registered>(
     name: &str,
     settings: &SettingsMap,
-) -> Result<Box<dyn Session<P>>, SolveError> {
-    let made = match way::<P>(name) {
-        Some(Way::Here(Entry { make: Maker::Session(make), .. })) => Some(make(settings)),
-        _ => solver::<P>(name, settings).map(|made| made.map(driven)),
-    };
-    made.ok_or_else(|| SolveError::UnknownSolver {
-        name: name.into(),
-        meant: meant(name, solver_names::<P>()),
-        known: solver_names::<P>().join(", "),
-    })?
-    .map_err(|problem| SolveError::Settings { solver: name.into(), problem })
+) -> Result<AnySession<P>, SolveError> {
+    made::<P>(name, settings)
+        .ok_or_else(|| SolveError::UnknownSolver {
+            name: name.into(),
+            meant: meant(name, solver_names::<P>()),
+            known: solver_names::<P>().join(", "),
+        })?
+        .map_err(|problem| SolveError::Settings { solver: name.into(), problem })
 }
 
-fn driven<P: Problem + 'static>(solver: Boxed<P>) -> Box<dyn Session<P>> {
+fn driven<P: Problem + 'static>(solver: Boxed<P>) -> AnySession<P> {
     Box::new(Driver::new(solver))
 }

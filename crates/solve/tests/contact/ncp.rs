@@ -94,7 +94,7 @@ fn path_solves_planted_problems() {
     for contacts in 1..=5 {
         for seed in 0..10 {
             let case = planted(contacts, seed);
-            for solver in ["glocker/path", "glocker/semismooth"] {
+            for solver in ["glocker/path", "glocker/semismooth", "glocker/auto", "ncp/auto"] {
                 assert!(solved(&case.local::<3>().0, solver, 1e-8), "{solver} {case:?}");
                 assert!(solved(&case.local::<2>().0, solver, 1e-8), "{solver} 2D {case:?}");
             }
@@ -144,7 +144,7 @@ fn units_change_nothing() {
 #[test]
 fn rows_with_bounds_are_refused_by_name() {
     let (problem, _) = Planted { bounded: 2, ..planted(3, 0) }.local::<3>();
-    for solver in ["glocker/path", "ncp/path"] {
+    for solver in ["glocker/path", "ncp/path", "glocker/auto"] {
         let mut session =
             registry::session::<FrictionLocal<3>>(solver, &Default::default()).unwrap();
         let mut point = problem.origin();
@@ -157,14 +157,16 @@ fn rows_with_bounds_are_refused_by_name() {
 /// A second problem of the same shape, in a session that has met the first.
 #[test]
 fn a_session_takes_another_problem() {
-    let mut session =
-        registry::session::<FrictionLocal<3>>("glocker/path", &Default::default()).unwrap();
-    // Another number of contacts, and contacts that lose their friction.
-    for (contacts, mu) in [(3, (0.2, 0.6)), (3, (0.1, 0.3)), (5, (0.2, 0.6)), (5, (0.0, 0.0))] {
-        let (problem, _) = Planted { mu, ..planted(contacts, 1) }.local::<3>();
-        let mut point = problem.origin();
-        let outcome = session.solve(&problem, &mut point, &limits(1e-8), &mut |_| {}).unwrap();
-        assert_eq!(outcome.status, Status::Solved, "{contacts} {mu:?}");
+    for solver in ["glocker/path", "glocker/auto"] {
+        let mut session =
+            registry::session::<FrictionLocal<3>>(solver, &Default::default()).unwrap();
+        // Another number of contacts, and contacts that lose their friction.
+        for (contacts, mu) in [(3, (0.2, 0.6)), (3, (0.1, 0.3)), (5, (0.2, 0.6)), (5, (0.0, 0.0))] {
+            let (problem, _) = Planted { mu, ..planted(contacts, 1) }.local::<3>();
+            let mut point = problem.origin();
+            let outcome = session.solve(&problem, &mut point, &limits(1e-8), &mut |_| {}).unwrap();
+            assert_eq!(outcome.status, Status::Solved, "{solver} {contacts} {mu:?}");
+        }
     }
 }
 

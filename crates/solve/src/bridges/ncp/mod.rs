@@ -30,8 +30,9 @@ use super::kept::{Kept, normal_impulses};
 use crate::contact::form::Contacts;
 use crate::contact::law::cone;
 use crate::core::reformulation::Reformulation;
-use crate::core::register::Composed;
+use crate::core::register::{Composed, Over};
 use crate::core::settings::NoSettings;
+use crate::core::via_session::ViaSession;
 use crate::{Boxed, SolveError, Via};
 
 /// A way to say Coulomb's law of a contact by pairs and equations: rows for r_T, and multipliers κ ≥ 0, each with a row.
@@ -92,8 +93,8 @@ impl<const D: usize> Slot<D> {
 /// The part of `mu r_N` from which on an impulse is taken to be on the boundary of the cone.
 const LIMIT: f64 = 1.0 - 1e-12;
 
-/// The solver that is listed behind the prefixes: the one that solves most.
-const LISTED: &[&str] = &["path"];
+/// The solvers that are listed behind the prefixes: the one that solves most, and `auto`.
+const LISTED: &[&str] = &["path", "auto"];
 
 /// An impulse that is taken for none, in units of s.
 const NEGLIGIBLE: f64 = 1e-10;
@@ -116,6 +117,8 @@ impl<F: Formulation<D>, const D: usize> Composed<FrictionLocal<D>> for AsNcp<F> 
     const SUMMARY: &'static str = F::SUMMARY;
     const FROM: &'static [Kind] = &[Kind::FrictionLocal2d, Kind::FrictionLocal3d];
     const CITES: &'static [&'static str] = F::CITES;
+    const SESSION: Option<Over<NoSettings, Mcp, FrictionLocal<D>>> =
+        Some(|_, session| Box::new(ViaSession::new(Self::default(), session)));
 
     fn compose(_: NoSettings, solver: Boxed<Mcp>) -> Boxed<FrictionLocal<D>> {
         Boxed::new(Via { reformulation: Self::default(), solver })

@@ -14,6 +14,8 @@ pub struct Model {
     places: Vec<usize>,
     diagonal: Vec<usize>,
     values: Vec<f64>,
+    /// A point beside one where the Jacobian is infinite, and F there.
+    beside: [Vec<f64>; 2],
     lower: Vec<f64>,
     upper: Vec<f64>,
     lambda: f64,
@@ -21,6 +23,10 @@ pub struct Model {
     /// How often F, and JF, were evaluated.
     pub evaluations: [u64; 2],
 }
+
+/// How far a variable is moved, in units of its size, at which a derivative is infinite: that of a root or a power at a bound, say. The steep slope beside it
+/// keeps the variable where it is, or lets it go.
+const BESIDE: [f64; 4] = [1e-10, 1e-8, 1e-6, 1e-4];
 
 impl Model {
     /// The model of a problem.
@@ -39,6 +45,7 @@ impl Model {
             places: pattern.places().map(|(i, j)| place(i, j)).collect(),
             diagonal: (0..n).map(|i| place(i, i)).collect(),
             values: vec![0.0; pattern.len()],
+            beside: [vec![0.0; n], vec![0.0; n]],
             matrix: matrix.into(),
             pattern,
             lower: problem.lower.clone(),
@@ -108,10 +115,10 @@ impl Model {
         defined
     }
 
-    /// F(x) and the [`matrix`](Self::matrix) JF(x). False where one of them is not defined, or the time is over.
+    /// F(x) and the [`matrix`](Self::matrix) JF(x). False where F is not defined, or JF neither at x nor [beside](BESIDE) it, or the time is over.
     pub fn linearise(&mut self, x: &[f64], f: &mut [f64]) -> bool {
         self.evaluations[1] += 1;
-        let defined = self.field.jacobian(x, f, &mut self.values);
+        let defined = self.field.jacobian(x, f, &mut self.values) || self.beside(x, f);
         self.add_term(x, f);
         let Matrix::Sparse(matrix) = &mut self.matrix else { unreachable!("made sparse") };
         let values = matrix.values_mut();
@@ -122,6 +129,28 @@ impl Model {
             self.diagonal.iter().for_each(|&k| values[k] += self.lambda);
         }
         defined
+    }
+
+    /// F(x), and the Jacobian where the variables that make it infinite are moved inside their bounds.
+    fn beside(&mut self, x: &[f64], f: &mut [f64]) -> bool {
+        let infinite = self.pattern.places().zip(&self.values).filter(|(_, v)| !v.is_finite());
+        let mut columns: Vec<usize> = infinite.map(|((_, j), _)| j).collect();
+        if columns.is_empty() || !self.field.value(x, f) {
+            return false;
+        }
+        columns.sort_unstable();
+        columns.dedup();
+        let [y, scratch] = &mut self.beside;
+        y.copy_from_slice(x);
+        BESIDE.iter().any(|distance| {
+            for &j in &columns {
+                let (l, u) = (self.lower[j], self.upper[j]);
+                let d = (distance * x[j].abs().max(1.0)).min(0.5 * (u - l));
+                y[j] = if x[j] + d <= u { x[j] + d } else { x[j] - d };
+            }
+            self.evaluations[1] += 1;
+            self.field.jacobian(y, scratch, &mut self.values)
+        })
     }
 
     /// JF at the point last linearised.
