@@ -141,7 +141,7 @@ impl<'a> Writer<'a> {
             let count = uses.entry(id).or_insert(0);
             *count += 1;
             if *count == 1 {
-                left.extend(graph.node(id).arguments().iter());
+                left.extend(graph.node(id).arguments());
             }
         }
         let mut writer = Self { graph, defined: BTreeMap::new(), uses, out: String::new() };
@@ -332,7 +332,7 @@ impl<'a> Writer<'a> {
             if let Node::Unary(Unary::Square, _) = node {
                 left.push(Left::Two);
             }
-            left.extend(node.arguments().iter().rev().map(|&id| Left::Node(id)));
+            left.extend(node.arguments().rev().map(Left::Node));
         }
     }
 }

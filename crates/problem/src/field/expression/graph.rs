@@ -6,6 +6,13 @@ use super::operator::{Binary, Nary, Unary};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Id(pub(super) u32);
 
+impl Id {
+    /// Its place among the [`nodes`](Graph::nodes).
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
 /// What a node is.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Node {
@@ -196,7 +203,7 @@ impl Graph {
             if !alike {
                 return false;
             }
-            left.extend(x.arguments().iter().copied().zip(y.arguments().iter().copied()));
+            left.extend(x.arguments().zip(y.arguments()));
         }
         true
     }
@@ -204,13 +211,14 @@ impl Graph {
 
 impl Node {
     /// The nodes that it uses.
-    pub fn arguments(&self) -> std::borrow::Cow<'_, [Id]> {
-        match self {
-            Self::Constant(_) | Self::Variable(_) | Self::Linear(_) => vec![].into(),
-            Self::Unary(_, a) | Self::Piecewise(_, a) => vec![*a].into(),
-            Self::Binary(_, a, b) => vec![*a, *b].into(),
-            Self::Nary(_, all) => all.as_slice().into(),
-            Self::If(all) => all.as_slice().into(),
-        }
+    pub fn arguments(&self) -> impl DoubleEndedIterator<Item = Id> + '_ {
+        let (few, many): ([Option<Id>; 2], &[Id]) = match self {
+            Self::Constant(_) | Self::Variable(_) | Self::Linear(_) => ([None; 2], &[]),
+            Self::Unary(_, a) | Self::Piecewise(_, a) => ([Some(*a), None], &[]),
+            Self::Binary(_, a, b) => ([Some(*a), Some(*b)], &[]),
+            Self::Nary(_, all) => ([None; 2], all),
+            Self::If(all) => ([None; 2], all),
+        };
+        few.into_iter().flatten().chain(many.iter().copied())
     }
 }

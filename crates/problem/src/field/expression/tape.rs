@@ -171,7 +171,7 @@ impl Tape {
                     }
                     tape.code.push(Code::Linear(from, tape.terms.len() as u32));
                 } else {
-                    node.arguments().iter().for_each(|a| sees(a.0 as usize, &mut pattern));
+                    node.arguments().for_each(|a| sees(a.0 as usize, &mut pattern));
                     tape.translate(node, &place);
                 }
             }
@@ -424,9 +424,9 @@ fn summands(graph: &Graph, k: usize) -> Option<Vec<(Operand, f64)>> {
 /// precision would see.
 fn inlined(graph: &Graph, rows: &[Id]) -> Vec<bool> {
     let mut uses = vec![0_u8; graph.nodes.len()];
-    let mut used = |a: &Id| uses[a.0 as usize] = uses[a.0 as usize].saturating_add(1);
-    rows.iter().for_each(&mut used);
-    graph.nodes.iter().for_each(|node| node.arguments().iter().for_each(&mut used));
+    let mut used = |a: Id| uses[a.0 as usize] = uses[a.0 as usize].saturating_add(1);
+    rows.iter().copied().for_each(&mut used);
+    graph.nodes.iter().for_each(|node| node.arguments().for_each(&mut used));
     let mut inlined = vec![false; graph.nodes.len()];
     // How many summands a node has with those that become its own: none, one, more.
     let mut counts = vec![0_u8; graph.nodes.len()];
@@ -485,7 +485,7 @@ fn owners(graph: &Graph, rows: &[Id]) -> Vec<Owner> {
         if owners[k] == Owner::Nobody {
             continue;
         }
-        for a in graph.nodes[k].arguments().iter() {
+        for a in graph.nodes[k].arguments() {
             let by = owners[k];
             claim(&mut owners, a.0 as usize, by);
         }

@@ -20,6 +20,10 @@ use crate::{Limits, Observer, Outcome, Progress, Sample, Session, SolveError, St
 /// Up to this many variables arcs come before Newton's steps.
 const FEW: usize = 500;
 
+/// Iterations of arcs before another method is asked, where they are few: most problems need less. And after it has failed.
+const SHORT: usize = 40;
+const LONG: usize = 300;
+
 impl Auto {
     /// A session for nonlinear problems, without history.
     pub fn nonlinear(self) -> AutoSession {
@@ -40,8 +44,8 @@ impl Auto {
         let plan = Plan::new();
         let plan = match stage {
             0 => {
-                let arcs = |plan: Plan| {
-                    plan.anew(named("path"), 300, "goes along the pieces of the linearisation")
+                let arcs = |plan: Plan, most: usize| {
+                    plan.anew(named("path"), most, "goes along the pieces of the linearisation")
                 };
                 let newton = |plan: Plan| {
                     plan.anew(named("semismooth"), 60, "fast where the start is good")
@@ -49,8 +53,8 @@ impl Auto {
                 };
                 // Pivots are the cheaper the fewer variables there are.
                 let plan = match problem.dim() <= FEW {
-                    true => newton(arcs(plan)),
-                    false => arcs(newton(plan)),
+                    true => arcs(newton(arcs(plan, SHORT)), LONG),
+                    false => arcs(newton(plan), LONG),
                 };
                 plan.anew(named("proxi"), 150, "leaves stationary points").anew(
                     named("smooth"),

@@ -147,7 +147,7 @@ fn users(graph: &Graph, root: Id, b: usize) -> HashSet<Id> {
     while let Some(id) = left.pop() {
         if seen.insert(id) {
             order.push(id);
-            left.extend(graph.node(id).arguments().iter().copied());
+            left.extend(graph.node(id).arguments());
         }
     }
     // Arguments have smaller numbers.
@@ -158,7 +158,7 @@ fn users(graph: &Graph, root: Id, b: usize) -> HashSet<Id> {
         let own = match node {
             Node::Variable(j) => *j == b,
             Node::Linear(terms) => terms.iter().any(|t| t.0 == b),
-            _ => node.arguments().iter().any(|a| uses.contains(a)),
+            _ => node.arguments().any(|a| uses.contains(&a)),
         };
         if own {
             uses.insert(id);
@@ -179,7 +179,11 @@ struct Copier<'a> {
     from: &'a Graph,
     to: Graph,
     stands: Vec<Stands>,
-    done: HashMap<Id, Id>,
+    /// The copy of each node, where there is one that is kept.
+    done: Vec<Option<Id>>,
+    /// The last copy that met each node.
+    seen: Vec<u32>,
+    copies: u32,
 }
 
 impl Copier<'_> {
@@ -187,26 +191,29 @@ impl Copier<'_> {
     fn copy(&mut self, root: Id, apart: &HashSet<Id>) -> Id {
         let mut order = vec![];
         let mut left = vec![root];
+        let is_apart = |id: Id| !apart.is_empty() && apart.contains(&id);
+        // The copies that are not kept.
         let mut here: HashMap<Id, Id> = HashMap::new();
-        let mut seen = HashSet::new();
+        self.copies += 1;
         while let Some(id) = left.pop() {
-            let known = !apart.contains(&id) && self.done.contains_key(&id);
-            if !known && seen.insert(id) {
+            let known = !is_apart(id) && self.done[id.index()].is_some();
+            if !known && std::mem::replace(&mut self.seen[id.index()], self.copies) != self.copies {
                 order.push(id);
-                left.extend(self.from.node(id).arguments().iter().copied());
+                left.extend(self.from.node(id).arguments());
             }
         }
         order.sort_unstable();
         for id in order {
-            let at = |a: &Id| match here.get(a) {
-                Some(copy) => *copy,
-                None => self.done[a],
+            let at = |a: &Id| match here.get(a).copied().or(self.done[a.index()]) {
+                Some(copy) => copy,
+                None => unreachable!("arguments come first"),
             };
             let node = match self.from.node(id) {
                 Node::Constant(x) => Node::Constant(*x),
                 Node::Variable(j) => match self.stands[*j] {
                     Stands::Variable(k) => Node::Variable(k),
                     Stands::Node(copy) => {
+                        // It may stand for something else in the next expression.
                         here.insert(id, copy);
                         continue;
                     }
@@ -218,20 +225,21 @@ impl Copier<'_> {
                 Node::Piecewise(piece, a) => Node::Piecewise(piece.clone(), at(a)),
                 Node::Linear(terms) => {
                     let copy = self.linear(terms);
-                    here.insert(id, copy);
-                    if !apart.contains(&id) {
-                        self.done.insert(id, copy);
-                    }
+                    self.keep(id, copy, is_apart(id), &mut here);
                     continue;
                 }
             };
             let copy = self.to.add(node);
-            here.insert(id, copy);
-            if !apart.contains(&id) {
-                self.done.insert(id, copy);
-            }
+            self.keep(id, copy, is_apart(id), &mut here);
         }
-        here.get(&root).copied().unwrap_or_else(|| self.done[&root])
+        here.get(&root).copied().or(self.done[root.index()]).expect("the root was copied")
+    }
+
+    fn keep(&mut self, id: Id, copy: Id, apart: bool, here: &mut HashMap<Id, Id>) {
+        match apart {
+            true => drop(here.insert(id, copy)),
+            false => self.done[id.index()] = Some(copy),
+        }
     }
 
     fn linear(&mut self, terms: &[(usize, f64)]) -> Id {
@@ -298,7 +306,9 @@ impl Reformulation<Mcp> for Presolve {
             from: f.graph(),
             to: Graph::new(kept.len()),
             stands: vec![Stands::Variable(0); n],
-            done: HashMap::new(),
+            done: vec![None; f.graph().nodes().len()],
+            seen: vec![0; f.graph().nodes().len()],
+            copies: 0,
         };
         for (k, &i) in kept.iter().enumerate() {
             copier.stands[i] = Stands::Variable(k);
