@@ -92,6 +92,28 @@ impl<const D: usize> Bsr<D> {
         out
     }
 
+    /// Empties the matrix, keeping its memory, to be filled again by [`push`](Self::push) and [`end_row`](Self::end_row).
+    pub fn clear(&mut self, ncols: usize) {
+        self.ncols = ncols;
+        self.row_ptr.truncate(1);
+        self.col_idx.clear();
+        self.blocks.clear();
+    }
+
+    /// Appends a block to the row that is being filled; its column lies after those that the row has.
+    #[inline]
+    pub fn push(&mut self, column: usize, block: Block<D>) {
+        debug_assert!(column < self.ncols);
+        self.col_idx.push(column as u32);
+        self.blocks.push(block);
+    }
+
+    /// Ends the row that is being filled.
+    #[inline]
+    pub fn end_row(&mut self) {
+        self.row_ptr.push(self.blocks.len());
+    }
+
     /// The number of block rows.
     pub fn nrows(&self) -> usize {
         self.row_ptr.len() - 1
@@ -241,6 +263,18 @@ mod tests {
             }
         }
         assert_eq!(Bsr::<2>::from_csc(&back), b);
+    }
+
+    #[test]
+    fn a_matrix_filled_again_is_the_one_made_of_rows() {
+        let rows = vec![vec![(0, [[1.0, 2.0], [3.0, 4.0]]), (2, [[5.0; 2]; 2])], vec![]];
+        let mut again = Bsr::<2>::from_csc(&example());
+        again.clear(3);
+        for row in &rows {
+            row.iter().for_each(|&(j, block)| again.push(j as usize, block));
+            again.end_row();
+        }
+        assert_eq!(again, Bsr::from_rows(3, &rows));
     }
 
     #[test]

@@ -32,7 +32,7 @@ mod polyhedron;
 mod scene;
 pub mod scenes;
 mod turning_ball;
-mod vec3;
+pub mod vec3;
 mod voronoi;
 
 pub use body::{RigidBody, Rotation, Shape};

@@ -23,7 +23,7 @@ pub struct MassProperties {
 
 impl MassProperties {
     /// Those of some solids, at least one, taken as one body.
-    pub(crate) fn joined(parts: &[Self]) -> Self {
+    pub fn joined(parts: &[Self]) -> Self {
         let mass = parts.iter().map(|p| p.mass).sum();
         let first = parts.iter().fold([0.0; 3], |s, p| add(s, scale(p.mass, p.centre)));
         let centre = scale(1.0 / mass, first);

@@ -9,41 +9,48 @@ pub(crate) const X: Vec3 = [1.0, 0.0, 0.0];
 pub(crate) const Y: Vec3 = [0.0, 1.0, 0.0];
 pub(crate) const Z: Vec3 = [0.0, 0.0, 1.0];
 
-pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
+/// `a · b`.
+pub fn dot(a: Vec3, b: Vec3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
+/// `a × b`.
+pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-pub(crate) fn add(a: Vec3, b: Vec3) -> Vec3 {
+/// `a + b`.
+pub fn add(a: Vec3, b: Vec3) -> Vec3 {
     std::array::from_fn(|k| a[k] + b[k])
 }
 
-pub(crate) fn sub(a: Vec3, b: Vec3) -> Vec3 {
+/// `a − b`.
+pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
     std::array::from_fn(|k| a[k] - b[k])
 }
 
-pub(crate) fn scale(s: f64, a: Vec3) -> Vec3 {
+/// `s a`.
+pub fn scale(s: f64, a: Vec3) -> Vec3 {
     a.map(|x| s * x)
 }
 
-pub(crate) fn norm(a: Vec3) -> f64 {
+/// `‖a‖`.
+pub fn norm(a: Vec3) -> f64 {
     dot(a, a).sqrt()
 }
 
-pub(crate) fn normalise(a: Vec3) -> Vec3 {
+/// `a/‖a‖`; components that are not finite where a is zero.
+pub fn normalise(a: Vec3) -> Vec3 {
     scale(1.0 / norm(a), a)
 }
 
 /// `A x`.
-pub(crate) fn apply(a: &Mat3, x: Vec3) -> Vec3 {
+pub fn apply(a: &Mat3, x: Vec3) -> Vec3 {
     a.map(|row| dot(row, x))
 }
 
 /// `A B Aᵀ`.
-pub(crate) fn congruence(a: &Mat3, b: &Mat3) -> Mat3 {
+pub fn congruence(a: &Mat3, b: &Mat3) -> Mat3 {
     let ab: Mat3 = a.map(|row| std::array::from_fn(|j| (0..3).map(|k| row[k] * b[k][j]).sum()));
     ab.map(|row| std::array::from_fn(|j| dot(row, a[j])))
 }

@@ -1,0 +1,46 @@
+//! Rigid bodies in motion through impacts, sticking and sliding: contact detection, Moreau–Jean time stepping, every step judged.
+//!
+//! A [`World`] is plain data: [`Body`]s of [`Part`]s, laws of contact by pairs of materials, gravity. A [`Simulation`] moves it: each [`step`](Simulation::step) states
+//! the frictional contact problem of its islands, has them solved by the solvers of `nonsmooth-solve`, and says in a [`StepReport`] whether the judge accepts
+//! what came out, and where every joule went. Nothing is frozen that turns: rotations are implicit midpoint steps with the Cayley map, exact in energy and
+//! momentum; directions of contacts are taken at the extrapolated midpoint. SI units; velocities given and reported in the world frame.
+//!
+//! ```
+//! use nonsmooth_simulate::{Body, Law, MoreauJean, Shape, Simulation, World};
+//!
+//! let mut world = World::new([0.0, 0.0, -9.81]).with_law(Law { mu: 0.3, e: 0.8, e_t: 0.0 });
+//! world.add(Body::floor());
+//! let ball = Body::solid(Shape::Sphere { radius: 0.1 }, 1000.0)?;
+//! let ball = world.add(ball.at([0.0, 0.0, 1.1]).moving([1.0, 0.0, 0.0], [0.0; 3]));
+//!
+//! let mut simulation = Simulation::new(world, MoreauJean::default())?;
+//! let run = simulation.run(2.0, 1e-3, &mut ())?;
+//! assert!(run.is_solved() && run.residual <= 1e-10 && run.imbalance <= 1e-12);
+//! assert!(simulation.state().position[ball.index()][0] > 1.0);
+//! # Ok::<(), nonsmooth_simulate::SimulateError>(())
+//! ```
+//!
+//! Scenes of `nonsmooth-scenes` are worlds too: `World::try_from(&scene)`.
+
+mod detect;
+mod error;
+mod islands;
+mod moreau_jean;
+mod report;
+pub mod rotation;
+mod shape;
+mod simulation;
+mod state;
+mod step;
+mod world;
+
+pub use detect::Key;
+pub use error::{Overlap, SimulateError};
+pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean};
+pub use report::{
+    ContactReport, Counts, Drift, EnergyBalance, RunReport, StepReport, StepStatus, Timings,
+};
+pub use shape::{Part, Shape, plane};
+pub use simulation::{Control, Force, Observer, Simulation, Wrenches};
+pub use state::{ContactMemory, State};
+pub use world::{Body, BodyId, Law, Motion, World};

@@ -1,0 +1,120 @@
+//! The settings of the scheme, and of the solver inside.
+
+use serde::{Deserialize, Serialize};
+
+use crate::SimulateError;
+use crate::error::require;
+
+/// Moreau–Jean's θ-scheme for rigid bodies; the mathematics stands at the head of `step.rs`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MoreauJean {
+    /// The weight of the end of the step, from ½ to 1. ½ keeps energy; impacts dissipate for `½ ≤ θ ≤ 1/(1 + e)`.
+    pub theta: f64,
+    /// How the gyroscopic torque enters.
+    pub gyroscopic: Gyroscopic,
+    /// Where normals and arms are taken.
+    pub geometry: Geometry,
+    /// Which contacts a step knows.
+    pub activation: Activation,
+    /// What u⁻, u⁺ and r have to do with each other at an impact.
+    pub impact: Impact,
+    /// No restitution where bodies approach more slowly than this, m/s.
+    pub restitution_threshold: f64,
+    /// Passes over rotation and contact end when they change velocities by less than this share.
+    pub tolerance: f64,
+    /// The most passes in a step.
+    pub passes: u32,
+    /// How often a step that fails may be cut in two.
+    pub halvings: u8,
+}
+
+impl Default for MoreauJean {
+    fn default() -> Self {
+        Self {
+            theta: 0.5,
+            gyroscopic: Gyroscopic::Split,
+            geometry: Geometry::Extrapolated,
+            activation: Activation::default(),
+            impact: Impact::Newton,
+            restitution_threshold: 0.0,
+            tolerance: 1e-10,
+            passes: 20,
+            halvings: 0,
+        }
+    }
+}
+
+/// How the gyroscopic torque `Ω × J Ω` enters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Gyroscopic {
+    /// By the last pass, so that M stays symmetric; a fixed point that contracts by about `h ‖Ω‖`. At its end the rotation solves the implicit rule.
+    Split,
+    /// Not at all: `J Ω' = torque`. Neither energy nor momentum of asymmetric bodies is kept; to see what the term does.
+    Off,
+}
+
+/// Where the directions of a step are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Geometry {
+    /// At the beginning of the step.
+    Frozen,
+    /// Impulses at the middle of the step, extrapolated by the velocities at its beginning; velocities of contacts that persist at its end, so that what
+    /// rolls or slides on a curved surface stays on it to second order.
+    Extrapolated,
+}
+
+/// Which contacts take part in a step; g is the gap and `u_N` its rate at the beginning.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Activation {
+    /// Those with `g + γ h u_N ≤ slack`: the forecast index set.
+    Forecast {
+        /// γ.
+        gamma: f64,
+        /// What counts as touching, as a share of the smaller body: above rounding, below everything else.
+        slack: f64,
+    },
+    /// Those that could close during the step, with the law `0 ≤ u_N + max(g, 0)/h ⟂ r_N ≥ 0`: no penetration to first order and no restitution before
+    /// the gap is closed. For piles and coarse steps.
+    Gap,
+}
+
+impl Default for Activation {
+    fn default() -> Self {
+        Self::Forecast { gamma: 0.5, slack: 1e-9 }
+    }
+}
+
+/// The law of impact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Impact {
+    /// Newton's: `u_N⁺ ≥ −e u_N⁻`, Coulomb's law with u_T⁺ (or `u_T⁺ + e_T u_T⁻`). With e > 0 and friction energy may grow.
+    Newton,
+    /// Frémond's: Coulomb's law with the mean velocity of the step; every contact dissipates for `½ ≤ θ ≤ 1/(1 + e)`. A contact that stuck in
+    /// the step before has u_T⁺, else what is left of u_T would change its sign for ever.
+    Fremond,
+}
+
+impl MoreauJean {
+    /// Checks every value.
+    pub(crate) fn validate(&self) -> Result<(), SimulateError> {
+        let key = |name: &'static str| move || format!("integrator.{name}");
+        let t = self.theta;
+        require(key("theta"), t, (0.5..=1.0).contains(&t), "a number from 0.5 to 1")?;
+        let tol = self.tolerance;
+        require(key("tolerance"), tol, tol > 0.0 && tol < 1.0, "a number between 0 and 1")?;
+        let u = self.restitution_threshold;
+        require(key("restitution_threshold"), u, u >= 0.0, "a velocity of at least 0")?;
+        require(key("passes"), self.passes.into(), self.passes > 0, "at least 1")?;
+        if let Activation::Forecast { gamma, slack } = self.activation {
+            let unit = 0.0..=1.0;
+            require(key("activation.gamma"), gamma, unit.contains(&gamma), "a number from 0 to 1")?;
+            require(key("activation.slack"), slack, slack >= 0.0, "a number of at least 0")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,251 @@
+//! What a step and a run come to.
+
+use std::collections::BTreeMap;
+
+use nonsmooth_scenes::vec3::Vec3;
+use nonsmooth_solve::Status;
+
+use crate::BodyId;
+use crate::detect::Key;
+
+/// How a step ended; caller's mistakes are errors.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StepStatus {
+    /// The judge accepts the impulses of every island, and rotation and contact agree.
+    Solved,
+    /// The contact problem of an island is not solved; the best impulses found were taken.
+    Solver(Status),
+    /// Rotation and contact did not settle in the passes allowed; the last pass was taken.
+    NewtonLimit,
+    /// Solved after it was cut into `2^n` parts.
+    Halved(u8),
+    /// A force or a velocity is no finite number; the state is that before the step.
+    NotFinite,
+}
+
+impl StepStatus {
+    /// Whether the law of contact holds at the tolerance asked for.
+    pub fn is_solved(&self) -> bool {
+        matches!(self, StepStatus::Solved | StepStatus::Halved(_))
+    }
+
+    /// A short name: `solved`, `solver: …`, `newton_limit`, `halved`, `not_finite`.
+    pub fn name(&self) -> String {
+        match self {
+            StepStatus::Solved => "solved".into(),
+            StepStatus::Solver(status) => format!("solver: {}", status.name()),
+            StepStatus::NewtonLimit => "newton_limit".into(),
+            StepStatus::Halved(_) => "halved".into(),
+            StepStatus::NotFinite => "not_finite".into(),
+        }
+    }
+}
+
+/// The energy of a step by terms, J. `T⁺ − T = gravity + forces + normal + tangential + drives − numerical + imbalance`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct EnergyBalance {
+    /// Kinetic energy before the step.
+    pub kinetic_before: f64,
+    /// Kinetic energy after it.
+    pub kinetic: f64,
+    /// Potential energy after it, of the weights alone, zero at the origin.
+    pub potential: f64,
+    /// Work of the weights.
+    pub gravity: f64,
+    /// Work of given forces and torques.
+    pub forces: f64,
+    /// `Σ u_{N,θ} r_N`: work of normal impulses on the bodies relative to each other.
+    pub normal: f64,
+    /// `Σ u_{T,θ} · r_T`: work of friction.
+    pub tangential: f64,
+    /// Work of surfaces and tables that move as they are told.
+    pub drives: f64,
+    /// `(θ − ½) ‖v⁺ − v‖²_M`: what the scheme itself dissipates.
+    pub numerical: f64,
+    /// What is left: rounding, unless something is wrong.
+    pub imbalance: f64,
+    /// What the imbalance is to be compared with: the sizes of all terms, and the kinetic energy that gravity gives all bodies in a step.
+    pub scale: f64,
+}
+
+impl EnergyBalance {
+    /// `|imbalance| / scale`, zero where nothing moves.
+    pub fn relative_imbalance(&self) -> f64 {
+        if self.scale > 0.0 { self.imbalance.abs() / self.scale } else { 0.0 }
+    }
+
+    /// The sum of two steps, the second of which follows the first.
+    pub(crate) fn then(self, next: Self) -> Self {
+        Self {
+            kinetic_before: self.kinetic_before,
+            kinetic: next.kinetic,
+            potential: next.potential,
+            gravity: self.gravity + next.gravity,
+            forces: self.forces + next.forces,
+            normal: self.normal + next.normal,
+            tangential: self.tangential + next.tangential,
+            drives: self.drives + next.drives,
+            numerical: self.numerical + next.numerical,
+            imbalance: self.imbalance + next.imbalance,
+            scale: self.scale.max(next.scale),
+        }
+    }
+}
+
+/// How many of what a step had.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Points where bodies are near each other.
+    pub near: usize,
+    /// Contacts that took part.
+    pub active: usize,
+    /// Of these, those without impulse.
+    pub open: usize,
+    /// Of these, those that stick.
+    pub stick: usize,
+    /// Of these, those that slide.
+    pub slip: usize,
+    /// Contacts that began with the impulse of the last step.
+    pub warm: usize,
+    /// Islands that were solved apart.
+    pub islands: usize,
+    /// The most contacts in an island.
+    pub largest: usize,
+    /// Iterations of the solver, all islands together.
+    pub iterations: usize,
+}
+
+/// How far the configuration is from what it should be, at the beginning of the step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Drift {
+    /// The deepest penetration, m.
+    pub penetration: f64,
+    /// The largest `|‖q‖ − 1|` of a quaternion, before it was made one.
+    pub quaternion: f64,
+}
+
+/// Where the time of a step went, s.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Timings {
+    /// Broad and narrow phase.
+    pub detection: f64,
+    /// Index set, frames, W, q.
+    pub assembly: f64,
+    /// Solvers and judge.
+    pub solve: f64,
+    /// All of the step.
+    pub total: f64,
+}
+
+/// What a step came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepReport {
+    /// How it ended.
+    pub status: StepStatus,
+    /// The time after it, s.
+    pub t: f64,
+    /// Its length, s.
+    pub h: f64,
+    /// The judge's relative residual, the worst of all islands.
+    pub residual: f64,
+    /// The energy by terms.
+    pub energy: EnergyBalance,
+    /// How many of what.
+    pub counts: Counts,
+    /// Passes over rotation and contact.
+    pub newton: u32,
+    /// How far off the configuration is.
+    pub drift: Drift,
+    /// Where the time went.
+    pub timings: Timings,
+}
+
+/// What a contact of the last step did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactReport {
+    /// Which features touch.
+    pub key: Key,
+    /// The first body.
+    pub a: BodyId,
+    /// The second body, which the impulse acts on.
+    pub b: BodyId,
+    /// Where, m.
+    pub point: Vec3,
+    /// `[N, T1, T2]`, N from a to b.
+    pub frame: [Vec3; 3],
+    /// The gap at the beginning of the step, m; negative where they penetrate.
+    pub gap: f64,
+    /// Coefficient of friction.
+    pub mu: f64,
+    /// Whether the contact took part in the step; else its impulse is zero.
+    pub active: bool,
+    /// `[r_N, r_T1, r_T2]`, N·s; the force is r/h unless there was an impact.
+    pub impulse: [f64; 3],
+    /// `[u_N, u_T1, u_T2]` before the step, m/s.
+    pub before: [f64; 3],
+    /// The same after it.
+    pub after: [f64; 3],
+}
+
+impl ContactReport {
+    /// The impulse on b in the world frame, N·s.
+    pub fn world_impulse(&self) -> Vec3 {
+        let [n, s, t] = self.frame;
+        std::array::from_fn(|k| {
+            n[k] * self.impulse[0] + s[k] * self.impulse[1] + t[k] * self.impulse[2]
+        })
+    }
+}
+
+/// What a run came to.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RunReport {
+    /// Steps done.
+    pub steps: u64,
+    /// The number of steps by how they ended.
+    pub statuses: BTreeMap<String, u64>,
+    /// The largest residual of a step.
+    pub residual: f64,
+    /// The largest relative imbalance of energy of a step.
+    pub imbalance: f64,
+    /// The deepest penetration, m.
+    pub penetration: f64,
+    /// The time at the end, s.
+    pub t: f64,
+    /// Whether the observer stopped it before the end.
+    pub stopped: bool,
+}
+
+impl RunReport {
+    /// Whether every step was solved.
+    pub fn is_solved(&self) -> bool {
+        self.statuses.keys().all(|name| name == "solved" || name == "halved")
+    }
+
+    pub(crate) fn note(&mut self, step: &StepReport) {
+        self.steps += 1;
+        *self.statuses.entry(step.status.name()).or_default() += 1;
+        // A maximum that a NaN is not lost in.
+        let worse = |old: f64, new: f64| if new > old || new.is_nan() { new } else { old };
+        self.residual = worse(self.residual, step.residual);
+        self.imbalance = worse(self.imbalance, step.energy.relative_imbalance());
+        self.penetration = worse(self.penetration, step.drift.penetration);
+        self.t = step.t;
+    }
+}
+
+impl std::fmt::Display for RunReport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let statuses: Vec<_> = self.statuses.iter().map(|(n, k)| format!("{k} {n}")).collect();
+        let ended = if self.stopped { ", stopped" } else { "" };
+        write!(
+            f,
+            "{} steps to t = {:.6} s{ended}: {}; residual at most {:.1e}, energy imbalance at most {:.1e}",
+            self.steps,
+            self.t,
+            statuses.join(", "),
+            self.residual,
+            self.imbalance
+        )
+    }
+}

@@ -1,0 +1,161 @@
+//! Shapes of bodies.
+
+use nonsmooth_scenes::vec3::{Vec3, norm};
+use nonsmooth_scenes::{MassProperties, Polyhedron, Rotation, SceneError};
+
+use crate::SimulateError;
+use crate::error::require;
+
+/// A convex solid in a frame of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shape {
+    /// A ball about the origin.
+    Sphere {
+        /// Radius, m.
+        radius: f64,
+    },
+    /// A box about the origin, sides along the axes.
+    Box {
+        /// Half sides, m.
+        half: Vec3,
+    },
+    /// All points within `radius` of the segment from `−half_length` to `half_length` on the third axis.
+    Capsule {
+        /// Half the length of the segment, m.
+        half_length: f64,
+        /// Radius, m.
+        radius: f64,
+    },
+    /// The half space below the plane through the origin whose normal is the third axis; for bodies that do not move freely.
+    Plane,
+    /// A convex polyhedron, where its vertices are.
+    Polyhedron(Polyhedron),
+}
+
+impl Shape {
+    /// What it is called in messages.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Shape::Sphere { .. } => "sphere",
+            Shape::Box { .. } => "box",
+            Shape::Capsule { .. } => "capsule",
+            Shape::Plane => "plane",
+            Shape::Polyhedron(_) => "polyhedron",
+        }
+    }
+
+    /// The largest distance of its points from its origin, m; infinite for a plane.
+    pub fn radius(&self) -> f64 {
+        match self {
+            Shape::Sphere { radius } => *radius,
+            Shape::Box { half } => norm(*half),
+            Shape::Capsule { half_length, radius } => half_length + radius,
+            Shape::Plane => f64::INFINITY,
+            Shape::Polyhedron(p) => p.radius_about([0.0; 3]),
+        }
+    }
+
+    /// Mass, mass centre and inertia for a density in kg/m³.
+    ///
+    /// Errors: a length or density that is not positive; a plane, which has no mass.
+    pub fn mass_properties(&self, density: f64) -> Result<MassProperties, SimulateError> {
+        use nonsmooth_scenes::Shape as Solid;
+        Ok(match self {
+            Shape::Sphere { radius } => {
+                Solid::Sphere { radius: *radius }.mass_properties(density)?
+            }
+            Shape::Box { half } => Solid::Box { half: *half }.mass_properties(density)?,
+            Shape::Polyhedron(p) => Solid::Polyhedron(p.clone()).mass_properties(density)?,
+            Shape::Plane => {
+                return Err(SimulateError::value("shape", "a solid with a mass", "a plane"));
+            }
+            Shape::Capsule { half_length: l, radius: r } => {
+                for (key, x) in [("half_length", *l), ("radius", *r), ("density", density)] {
+                    require(|| key.into(), x, x > 0.0, "a positive number")?;
+                }
+                // A cylinder and two half balls, whose mass centres lie 3r/8 beyond its ends.
+                let cylinder = density * std::f64::consts::PI * r * r * 2.0 * l;
+                let ball = density * std::f64::consts::PI * 4.0 / 3.0 * r.powi(3);
+                let axial = 0.5 * cylinder * r * r + 0.4 * ball * r * r;
+                let across = cylinder * (r * r / 4.0 + l * l / 3.0)
+                    + ball * (0.4 * r * r + l * l + 0.75 * l * r);
+                let inertia = [[across, 0.0, 0.0], [0.0, across, 0.0], [0.0, 0.0, axial]];
+                MassProperties { mass: cylinder + ball, centre: [0.0; 3], inertia }
+            }
+        })
+    }
+
+    /// Checks its lengths; `key` names it in messages.
+    pub(crate) fn validate(&self, key: &str) -> Result<(), SimulateError> {
+        let lengths: &[(&str, f64)] = match self {
+            Shape::Sphere { radius } => &[("radius", *radius)],
+            Shape::Box { half: [a, b, c] } => &[("half", *a), ("half", *b), ("half", *c)],
+            Shape::Capsule { half_length, radius } => {
+                &[("half_length", *half_length), ("radius", *radius)]
+            }
+            Shape::Plane | Shape::Polyhedron(_) => &[],
+        };
+        for (name, x) in lengths {
+            require(|| format!("{key}.{name}"), *x, *x > 0.0, "a positive number")?;
+        }
+        Ok(())
+    }
+}
+
+impl From<Polyhedron> for Shape {
+    fn from(polyhedron: Polyhedron) -> Self {
+        Shape::Polyhedron(polyhedron)
+    }
+}
+
+/// A shape of a body: where it is in the frame of the body, and what it is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// The shape.
+    pub shape: Shape,
+    /// The origin of the shape's frame in the frame of the body, m.
+    pub position: Vec3,
+    /// The orientation of the shape's frame in that of the body.
+    pub rotation: Rotation,
+    /// The material, as [`World::material`](crate::World::material) counts them; 0 is that of all who ask for none.
+    pub material: usize,
+}
+
+impl Part {
+    /// The shape in the frame of the body.
+    pub fn new(shape: impl Into<Shape>) -> Self {
+        Self { shape: shape.into(), position: [0.0; 3], rotation: Rotation::IDENTITY, material: 0 }
+    }
+
+    /// The same shape elsewhere.
+    #[must_use]
+    pub fn at(self, position: Vec3, rotation: Rotation) -> Self {
+        Self { position, rotation, ..self }
+    }
+
+    /// The same shape of another material.
+    #[must_use]
+    pub fn of(self, material: usize) -> Self {
+        Self { material, ..self }
+    }
+}
+
+/// The half space below the plane through `point` with the outward `normal`, as a part of a body whose frame is that of the world.
+///
+/// Errors: a normal without direction.
+pub fn plane(point: Vec3, normal: Vec3) -> Result<Part, SceneError> {
+    let length = norm(normal);
+    if !(length > 0.0 && length.is_finite()) {
+        let (key, expected) = ("normal".into(), "a direction".into());
+        return Err(SceneError::Value { key, expected, found: format!("{normal:?}") });
+    }
+    let n = normal.map(|x| x / length);
+    // The shortest turn from the third axis; upside down by half a turn about the first.
+    let rotation = if n[2] > -1.0 + 1e-12 {
+        let s = (2.0 * (1.0 + n[2])).sqrt();
+        Rotation([0.5 * s, -n[1] / s, n[0] / s, 0.0])
+    } else {
+        Rotation([0.0, 1.0, 0.0, 0.0])
+    };
+    Ok(Part::new(Shape::Plane).at(point, rotation))
+}

@@ -1,0 +1,340 @@
+//! A world in motion.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use nonsmooth_problem::FrictionLocal;
+use nonsmooth_scenes::vec3::{Vec3, add, cross, sub};
+use nonsmooth_solve::Limits;
+use nonsmooth_solve::settings::SettingsMap;
+
+use crate::error::{Overlap, require};
+use crate::report::{ContactReport, RunReport, StepReport, StepStatus};
+use crate::state::State;
+use crate::step::{Inner, Tools};
+use crate::world::oscillation;
+use crate::{BodyId, MoreauJean, Motion, SimulateError, World};
+
+/// Bodies that overlap by more than this share of the smaller one are refused at the start.
+const OVERLAP: f64 = 1e-6;
+
+/// Forces (N) and torques about the mass centre (N·m) on all bodies, in the world frame.
+#[derive(Debug, Clone, Default)]
+pub struct Wrenches {
+    pub(crate) force: Vec<Vec3>,
+    pub(crate) torque: Vec<Vec3>,
+}
+
+impl Wrenches {
+    pub(crate) fn clear(&mut self, bodies: usize) {
+        for list in [&mut self.force, &mut self.torque] {
+            list.clear();
+            list.resize(bodies, [0.0; 3]);
+        }
+    }
+
+    /// Adds a force at the mass centre.
+    pub fn force(&mut self, body: BodyId, force: Vec3) {
+        let f = &mut self.force[body.index()];
+        *f = add(*f, force);
+    }
+
+    /// Adds a torque.
+    pub fn torque(&mut self, body: BodyId, torque: Vec3) {
+        let t = &mut self.torque[body.index()];
+        *t = add(*t, torque);
+    }
+
+    /// Adds a force that acts at `point`.
+    pub fn force_at(&mut self, state: &State, body: BodyId, force: Vec3, point: Vec3) {
+        self.force(body, force);
+        self.torque(body, cross(sub(point, state.position[body.index()]), force));
+    }
+}
+
+/// A force that depends on time and state: springs, fields, controllers.
+pub trait Force: Send {
+    /// Adds to what acts during a step. `state` is that in the middle of the step, extrapolated, with the velocities of its beginning: forces that are
+    /// smooth are taken to second order. A number that is not finite ends the step with [`StepStatus::NotFinite`].
+    fn add(&mut self, state: &State, wrenches: &mut Wrenches);
+}
+
+impl<F: FnMut(&State, &mut Wrenches) + Send> Force for F {
+    fn add(&mut self, state: &State, wrenches: &mut Wrenches) {
+        self(state, wrenches);
+    }
+}
+
+/// Whether a run goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Control {
+    /// It does.
+    Continue,
+    /// It ends here.
+    Stop,
+}
+
+/// Who follows a run: recorders, plots, tests.
+pub trait Observer {
+    /// Called after each step.
+    fn step(&mut self, simulation: &Simulation, report: &StepReport) -> Control;
+}
+
+impl Observer for () {
+    fn step(&mut self, _: &Simulation, _: &StepReport) -> Control {
+        Control::Continue
+    }
+}
+
+impl<F: FnMut(&Simulation, &StepReport) -> Control> Observer for F {
+    fn step(&mut self, simulation: &Simulation, report: &StepReport) -> Control {
+        self(simulation, report)
+    }
+}
+
+/// A world, the scheme, the solver, and the state that they move.
+pub struct Simulation {
+    world: World,
+    scheme: MoreauJean,
+    state: State,
+    forces: Vec<Box<dyn Force>>,
+    tools: Tools,
+    solver: String,
+    settings: SettingsMap,
+    limits: Limits,
+    warnings: Vec<String>,
+}
+
+impl Simulation {
+    /// Sets a world in motion, its contact problems solved by `auto` to 1e-10.
+    ///
+    /// Errors: those of [`World::validate`]; settings of the scheme that are not possible; pairs of shapes that may meet and are not
+    /// supported; bodies that overlap by more than 1e-6 of their size, all of them listed.
+    pub fn new(mut world: World, scheme: MoreauJean) -> Result<Self, SimulateError> {
+        let warnings = world.validate()?;
+        scheme.validate()?;
+        let mut state = State::of(&world);
+        for (k, body) in world.bodies.iter().enumerate() {
+            if let Motion::Oscillating { amplitude, frequency, phase } = body.motion {
+                let (x, v) = oscillation(amplitude, frequency, phase, 0.0);
+                (state.position[k], state.velocity[k]) = (add(body.position, x), v);
+            }
+        }
+        let mut tools = Tools::new(&world, &state)?;
+        let found = tools.overlaps(&world, &mut state, OVERLAP);
+        if !found.is_empty() {
+            let name = |k: u32| world.label(k as usize);
+            let pairs =
+                found.iter().map(|&(a, b, depth)| Overlap { a: name(a), b: name(b), depth });
+            return Err(SimulateError::Overlap(pairs.collect()));
+        }
+        Ok(Self {
+            world,
+            scheme,
+            state,
+            forces: vec![],
+            tools,
+            solver: "auto".into(),
+            settings: SettingsMap::new(),
+            limits: Limits { tolerance: 1e-10, max_iterations: 100_000, ..Limits::default() },
+            warnings,
+        })
+    }
+
+    /// With contact problems solved by the solver of this name, with these settings.
+    ///
+    /// Errors: an unknown solver or setting.
+    pub fn with_solver(
+        mut self,
+        solver: &str,
+        settings: SettingsMap,
+    ) -> Result<Self, SimulateError> {
+        nonsmooth_solve::registry::session::<FrictionLocal<3>>(solver, &settings)?;
+        (self.solver, self.settings) = (solver.into(), settings);
+        self.tools = Tools::new(&self.world, &self.state)?;
+        Ok(self)
+    }
+
+    /// With contact problems solved to this relative residual.
+    #[must_use]
+    pub fn with_tolerance(mut self, tolerance: f64) -> Self {
+        self.limits.tolerance = tolerance;
+        self
+    }
+
+    /// With these limits on the solution of each contact problem; their `cancel` also ends [`run`](Self::run).
+    #[must_use]
+    pub fn with_limits(self, limits: Limits) -> Self {
+        Self { limits, ..self }
+    }
+
+    /// With one more force.
+    #[must_use]
+    pub fn with_force(mut self, force: impl Force + 'static) -> Self {
+        self.forces.push(Box::new(force));
+        self
+    }
+
+    /// The world.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// The scheme.
+    pub fn scheme(&self) -> &MoreauJean {
+        &self.scheme
+    }
+
+    /// The state.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// The state, to be changed between steps: velocities that are given, bodies that are put elsewhere.
+    pub fn state_mut(&mut self) -> &mut State {
+        &mut self.state
+    }
+
+    /// What was changed in the world to make it valid, in words.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// The contacts of the last step, by key: all points where bodies were near each other.
+    pub fn contacts(&self) -> &[ContactReport] {
+        &self.tools.contacts
+    }
+
+    /// Does one step of length h > 0, s.
+    ///
+    /// Errors: h that is no positive number; a solver that does not apply. What numerics come to is in the report.
+    pub fn step(&mut self, h: f64) -> Result<StepReport, SimulateError> {
+        require(|| "h".into(), h, h > 0.0, "a positive number")?;
+        self.advance(h, 0)
+    }
+
+    fn advance(&mut self, h: f64, level: u8) -> Result<StepReport, SimulateError> {
+        let Self { world, scheme, state, forces, tools, solver, settings, limits, .. } = self;
+        let inner = Inner { solver, settings, limits };
+        let mut report = tools.attempt(scheme, (world, state), forces, &inner, h)?;
+        let solved = report.status == StepStatus::Solved;
+        if !solved && level < scheme.halvings {
+            let first = self.advance(0.5 * h, level + 1)?;
+            if first.status == StepStatus::NotFinite {
+                return Ok(first);
+            }
+            let second = self.advance(0.5 * h, level + 1)?;
+            return Ok(joined(first, second));
+        }
+        if report.status != StepStatus::NotFinite {
+            report.drift.quaternion = tools.commit(scheme, world, state, h);
+            report.t = state.t;
+        } else {
+            tools.contacts.clear();
+        }
+        Ok(report)
+    }
+
+    /// Steps of length h until `until`, s; the last one is shorter where h does not divide what is left. A step that is not solved is counted and the run
+    /// goes on from the best that was found; one that is not finite ends it.
+    ///
+    /// Errors: those of [`step`](Self::step).
+    pub fn run(
+        &mut self,
+        until: f64,
+        h: f64,
+        observer: &mut dyn Observer,
+    ) -> Result<RunReport, SimulateError> {
+        require(|| "h".into(), h, h > 0.0, "a positive number")?;
+        require(|| "until".into(), until, true, "a finite time")?;
+        let mut run = RunReport { t: self.state.t, ..RunReport::default() };
+        // What is left of the last step up to rounding is no step.
+        while self.state.t < until - 1e-9 * h {
+            if self.is_cancelled() {
+                run.stopped = true;
+                break;
+            }
+            let left = until - self.state.t;
+            let report = self.step(if left < h * (1.0 + 1e-9) { left } else { h })?;
+            run.note(&report);
+            let ended = report.status == StepStatus::NotFinite;
+            if observer.step(self, &report) == Control::Stop || ended {
+                run.stopped = true;
+                break;
+            }
+        }
+        Ok(run)
+    }
+
+    fn is_cancelled(&self) -> bool {
+        let set = |flag: &Arc<AtomicBool>| flag.load(Ordering::Relaxed);
+        self.limits.cancel.as_ref().is_some_and(set)
+    }
+
+    /// The contact problem of the next step, were it of length h, as it is solved in the first pass, all islands together; none without contacts. The state
+    /// stays as it is.
+    ///
+    /// Errors: those of [`step`](Self::step).
+    pub fn problem(&mut self, h: f64) -> Result<Option<FrictionLocal<3>>, SimulateError> {
+        require(|| "h".into(), h, h > 0.0, "a positive number")?;
+        let Self { world, scheme, state, forces, tools, solver, settings, limits, .. } = self;
+        let axes = state.memory.axes.clone();
+        let inner = Inner { solver, settings, limits };
+        let problem = tools.problem(scheme, (world, state), forces, &inner, h);
+        state.memory.axes = axes;
+        problem
+    }
+
+    /// The state as bytes (JSON): all that a simulation of the same world needs to go on as if it had never stopped, bit for bit.
+    pub fn checkpoint(&self) -> Vec<u8> {
+        serde_json::to_vec(&self.state).expect("numbers and lists of numbers")
+    }
+
+    /// Goes on from a checkpoint of the same world.
+    ///
+    /// Errors: bytes that are none.
+    pub fn restore(&mut self, checkpoint: &[u8]) -> Result<(), SimulateError> {
+        let bodies = self.world.bodies.len();
+        let wrong = |found: String| SimulateError::Checkpoint { bodies, found };
+        let state: State = serde_json::from_slice(checkpoint).map_err(|e| wrong(e.to_string()))?;
+        let lengths =
+            [state.position.len(), state.rotation.len(), state.velocity.len(), state.spin.len()];
+        if lengths != [bodies; 4] {
+            return Err(wrong(format!("one of {lengths:?} positions, rotations and velocities")));
+        }
+        self.state = state;
+        Ok(())
+    }
+}
+
+/// The report of two halves of a step.
+fn joined(first: StepReport, second: StepReport) -> StepReport {
+    let depth = |s: &StepStatus| match s {
+        StepStatus::Halved(n) => Some(n + 1),
+        StepStatus::Solved => Some(1),
+        _ => None,
+    };
+    let status = match (depth(&first.status), depth(&second.status)) {
+        (Some(a), Some(b)) => StepStatus::Halved(a.max(b)),
+        (None, _) => first.status.clone(),
+        (_, None) => second.status.clone(),
+    };
+    let mut drift = second.drift;
+    drift.penetration = drift.penetration.max(first.drift.penetration);
+    drift.quaternion = drift.quaternion.max(first.drift.quaternion);
+    let mut timings = second.timings;
+    timings.detection += first.timings.detection;
+    timings.assembly += first.timings.assembly;
+    timings.solve += first.timings.solve;
+    timings.total += first.timings.total;
+    StepReport {
+        status,
+        h: first.h + second.h,
+        residual: first.residual.max(second.residual),
+        energy: first.energy.then(second.energy),
+        newton: first.newton.max(second.newton),
+        drift,
+        timings,
+        ..second
+    }
+}

@@ -1,0 +1,103 @@
+//! What a simulation knows at a time.
+
+use nonsmooth_scenes::Rotation;
+use nonsmooth_scenes::vec3::{Vec3, apply};
+use serde::{Deserialize, Serialize};
+
+use crate::detect::Key;
+use crate::rotation::{Pose, apply_transposed};
+use crate::{BodyId, World};
+
+/// Time, configuration, velocities, and what is remembered of contacts. All that the next step depends on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// s.
+    pub t: f64,
+    /// Steps done.
+    pub steps: u64,
+    /// Mass centres, m.
+    pub position: Vec<Vec3>,
+    /// Orientations, as unit quaternions `[w, x, y, z]`.
+    pub rotation: Vec<[f64; 4]>,
+    /// Velocities of the mass centres, m/s.
+    pub velocity: Vec<Vec3>,
+    /// Angular velocities Ω in the **body** frame, rad/s; [`State::angular_velocity`] has them in the world frame.
+    pub spin: Vec<Vec3>,
+    /// What is remembered of contacts.
+    pub memory: ContactMemory,
+}
+
+impl State {
+    /// That of a world before its first step.
+    pub(crate) fn of(world: &World) -> Self {
+        let bodies = &world.bodies;
+        Self {
+            t: 0.0,
+            steps: 0,
+            position: bodies.iter().map(|b| b.position).collect(),
+            rotation: bodies.iter().map(|b| b.rotation.0).collect(),
+            velocity: bodies.iter().map(|b| b.velocity).collect(),
+            spin: bodies
+                .iter()
+                .map(|b| apply_transposed(&b.rotation.matrix(), b.angular_velocity))
+                .collect(),
+            memory: ContactMemory::default(),
+        }
+    }
+
+    /// The rotation of a body.
+    pub fn rotation(&self, body: BodyId) -> Rotation {
+        Rotation(self.rotation[body.index()])
+    }
+
+    /// The angular velocity of a body in the world frame, rad/s.
+    pub fn angular_velocity(&self, body: BodyId) -> Vec3 {
+        apply(&self.rotation(body).matrix(), self.spin[body.index()])
+    }
+
+    /// Sets it.
+    pub fn set_angular_velocity(&mut self, body: BodyId, omega: Vec3) {
+        self.spin[body.index()] = apply_transposed(&self.rotation(body).matrix(), omega);
+    }
+
+    pub(crate) fn pose(&self, body: usize) -> Pose {
+        Pose { x: self.position[body], r: Rotation(self.rotation[body]).matrix() }
+    }
+}
+
+/// What is remembered from step to step: impulses by key, for warm starts; frames and separating axes, which change only for a reason.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct ContactMemory {
+    /// The contacts of the last step, by key.
+    pub(crate) contacts: Vec<Remembered>,
+    /// The separating axis of each pair of polyhedra that was near, by pair of shapes.
+    pub(crate) axes: Vec<((u32, u32), Axis)>,
+    /// The step that the impulses are of, s.
+    pub(crate) h: f64,
+}
+
+/// One contact of the last step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Remembered {
+    pub key: Key,
+    /// In the world frame, N·s, on b.
+    pub impulse: Vec3,
+    pub normal: Vec3,
+    pub point: Vec3,
+    /// The axis of the world that the first tangent is nearest to.
+    pub axis: u8,
+    /// Whether it took part in the step.
+    pub active: bool,
+    pub stuck: bool,
+}
+
+/// The kind of separating axis of two polyhedra.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum Axis {
+    /// The normal of a face of the first.
+    FaceA(u32),
+    /// The normal of a face of the second.
+    FaceB(u32),
+    /// Across two edges.
+    Edges(u32, u32),
+}

@@ -1,0 +1,1040 @@
+//! One step of Moreau–Jean's θ-scheme for rigid bodies.
+//!
+//! With Ω in the body frame, `v_θ = θ v⁺ + (1 − θ) v_k`, impulses r over the whole step and d each of the three directions of a contact,
+//!
+//! ```text
+//! m (v⁺ − v_k) = h (m g + F) + Σ ± d r,                                        x⁺ = x_k + h v_θ
+//! J (Ω⁺ − Ω_k) + h Ω_θ × J Ω_θ = (I − ½ h Ω̂_θ) R_kᵀ (h τ + Σ ± (p − x) × d r),   R⁺ = R_k cay(h Ω_θ)
+//! K* ∋ u⁺ + w + mu‖u_T⁺ + w_T‖ e_N  ⟂  r ∈ K,   w_N = e min(u_{N,k}, 0),   w_T = e_T u_{T,k}   for the contacts of the index set, r = 0 elsewhere.
+//! ```
+//!
+//! `(I − ½ h Ω̂_θ) R_kᵀ` is the inverse of the mean of R_k and R⁺ at θ = ½: a torque that is fixed in space changes the momentum in space by just that, and
+//! `Ω_θ · (…) = (R_k Ω_θ) · L`, so momentum and energy are exact at any h (SimoWong1991 for the free body). Bodies whose inertia is isotropic have
+//! no gyroscopic torque; their velocities are taken in the world frame, where nothing has to be solved.
+//!
+//! Method: bodies move freely, contacts of the index set (`g + γ h u_N ≤ 0`; Acary2018) get their directions at the extrapolated midpoint, islands are solved one by one as
+//! local problems in r by a session of the project's solvers, judged by the problem's own judge. Gyroscopic torque and the frames of torques are those of the last
+//! pass; with the impulses found each body's rotation is solved exactly, and where that moves no velocity by more than the tolerance, the step is done.
+//! A persistent contact has the velocity in its law at the extrapolated end of the step. Frémond's law has `w_T = (1 − θ)/θ u_{T,k}`: u_θ in place of u⁺.
+//!
+//! Energy: `T⁺ − T_k = Σ u_θ · r − s_θ · r + h v_θ · (m g + F) + h ω_θ · τ − (θ − ½) ‖v⁺ − v_k‖²_M`, s the velocity of surfaces that are moved; what is left is rounding.
+//! Cost: W has a block for each pair of contacts that share a body. Fails (a status, never silence) where a contact problem is not solved, or where h ‖Ω‖ is so
+//! large that passes do not contract.
+
+use std::time::Instant;
+
+use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem};
+use nonsmooth_scenes::Rotation;
+use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, cross, dot, norm, scale, sub};
+use nonsmooth_solve::{Limits, Session, Status, registry, settings::SettingsMap};
+
+use crate::detect::{Detector, Near, Place};
+use crate::islands::Islands;
+use crate::report::{ContactReport, Counts, Drift, EnergyBalance, StepReport, StepStatus, Timings};
+use crate::rotation::{Pose, apply_transposed, cayley, hat, inverse, product, unit};
+use crate::state::{Remembered, State};
+use crate::world::oscillation;
+use crate::{
+    Activation, BodyId, Force, Geometry, Gyroscopic, Impact, MoreauJean, Motion, SimulateError,
+    World, Wrenches,
+};
+
+/// A body during a step. `spin` is Ω in the body frame, or ω in the world frame where the inertia is isotropic.
+#[derive(Debug, Clone, Copy)]
+struct Moving {
+    free: bool,
+    isotropic: bool,
+    mass: f64,
+    inertia: Mat3,
+    inverse: Mat3,
+    radius: f64,
+    start: Pose,
+    v: Vec3,
+    spin: Vec3,
+    /// `h (m g + F)` and `h τ`, in the world frame.
+    push: Vec3,
+    twist: Vec3,
+    /// `m g`.
+    weight: Vec3,
+    middle: Pose,
+    end: Pose,
+    /// Of a body that is moved: `linear + angular × (p − x)`, at the beginning and the end.
+    linear: [Vec3; 2],
+    angular: Vec3,
+    /// Takes a torque of the world into the frame of `spin`.
+    frame: Mat3,
+    /// The same for velocities at the end of the step.
+    frame_end: Mat3,
+    /// Velocities after the step.
+    v_new: Vec3,
+    spin_new: Vec3,
+    /// Velocities of the pass without contacts.
+    v_free: Vec3,
+    spin_free: Vec3,
+    /// The sum of impulses and of their moments, in the world frame.
+    impulse: Vec3,
+    moment: Vec3,
+}
+
+/// One side of a contact: sign, body, and angular columns: of impulses, of those through the inverse of J, of velocities.
+#[derive(Debug, Clone, Copy)]
+struct Arm {
+    body: u32,
+    sign: f64,
+    free: bool,
+    /// `(p − x) × d` in the world frame, for impulses and for velocities.
+    moment: [Vec3; 3],
+    moment_end: [Vec3; 3],
+    columns: [Vec3; 3],
+    solved: [Vec3; 3],
+    rows: [Vec3; 3],
+}
+
+/// A contact of the index set.
+#[derive(Debug, Clone, Copy)]
+struct Row {
+    mu: f64,
+    place: Place,
+    /// Directions of impulses and of velocities.
+    frame: [Vec3; 3],
+    frame_end: [Vec3; 3],
+    arms: [Arm; 2],
+    /// Velocity of what is moved, along the directions: at the end of the step (in the law), and weighted by θ (in the energy).
+    given: [f64; 3],
+    given_mean: [f64; 3],
+    /// Relative velocity at the beginning.
+    before: [f64; 3],
+    /// What the law adds to u⁺.
+    shift: [f64; 3],
+    r: [f64; 3],
+    warm: bool,
+}
+
+/// One contact problem with what solves it.
+struct Slot {
+    session: Box<dyn Session<FrictionLocal<3>>>,
+    problem: FrictionLocal<3>,
+    point: LocalPoint,
+}
+
+/// All memory of a simulation that is not its state.
+pub(crate) struct Tools {
+    detector: Detector,
+    sizes: Vec<f64>,
+    margins: Vec<f64>,
+    reach: Vec<f64>,
+    near: Vec<Near>,
+    known: Vec<Option<Remembered>>,
+    taken: Vec<bool>,
+    axes: Vec<u8>,
+    bodies: Vec<Moving>,
+    rows: Vec<Row>,
+    /// For each contact near, its row.
+    row_of: Vec<u32>,
+    islands: Islands,
+    /// The first contact of each body in the island, and for each contact the next one of its two bodies.
+    heads: Vec<u32>,
+    next: Vec<[u32; 2]>,
+    slots: Vec<Slot>,
+    wrenches: Wrenches,
+    middle: State,
+    pub contacts: Vec<ContactReport>,
+}
+
+/// The solver of contact problems and its limits.
+pub(crate) struct Inner<'a> {
+    pub solver: &'a str,
+    pub settings: &'a SettingsMap,
+    pub limits: &'a Limits,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Tools {
+    pub fn new(world: &World, state: &State) -> Result<Self, SimulateError> {
+        let detector = Detector::new(world)?;
+        let sizes = detector.sizes(world.bodies.len());
+        let reach = world
+            .bodies
+            .iter()
+            .map(|b| {
+                let finite = b.parts.iter().filter(|p| p.shape.radius().is_finite());
+                finite.map(|p| norm(p.position) + p.shape.radius()).fold(0.0, f64::max)
+            })
+            .collect();
+        Ok(Self {
+            detector,
+            sizes,
+            reach,
+            margins: vec![],
+            near: vec![],
+            known: vec![],
+            taken: vec![],
+            axes: vec![],
+            bodies: vec![],
+            rows: vec![],
+            row_of: vec![],
+            islands: Islands::default(),
+            heads: vec![],
+            next: vec![],
+            slots: vec![],
+            wrenches: Wrenches::default(),
+            middle: State { memory: Default::default(), ..state.clone() },
+            contacts: vec![],
+        })
+    }
+
+    /// Pairs of bodies that overlap by more than `share` of the smaller one, with the deepest penetration of each.
+    pub fn overlaps(
+        &mut self,
+        world: &World,
+        state: &mut State,
+        share: f64,
+    ) -> Vec<(u32, u32, f64)> {
+        let margins = vec![0.0; world.bodies.len()];
+        self.detector.detect(world, state, &margins, &mut self.near);
+        let mut found: Vec<(u32, u32, f64)> = vec![];
+        for n in self.near.iter().filter(|n| n.place.gap < -share * n.size) {
+            match found.last_mut() {
+                Some(last) if (last.0, last.1) == (n.a, n.b) => last.2 = last.2.max(-n.place.gap),
+                _ => found.push((n.a, n.b, -n.place.gap)),
+            }
+        }
+        found
+    }
+
+    /// Everything up to the velocities after the step; the state is as before but for the axes of its memory.
+    pub fn attempt(
+        &mut self,
+        scheme: &MoreauJean,
+        (world, state): (&World, &mut State),
+        forces: &mut [Box<dyn Force>],
+        inner: &Inner,
+        h: f64,
+    ) -> Result<StepReport, SimulateError> {
+        let begun = Instant::now();
+        let mut timings = Timings::default();
+        let finite = self.start(scheme, world, state, forces, h);
+        let mut report = StepReport {
+            status: StepStatus::Solved,
+            t: state.t,
+            h,
+            residual: 0.0,
+            energy: EnergyBalance::default(),
+            counts: Counts::default(),
+            newton: 1,
+            drift: Drift::default(),
+            timings,
+        };
+        if !finite {
+            report.status = StepStatus::NotFinite;
+            report.timings.total = begun.elapsed().as_secs_f64();
+            return Ok(report);
+        }
+        let detecting = Instant::now();
+        self.detector.detect(world, state, &self.margins, &mut self.near);
+        timings.detection = detecting.elapsed().as_secs_f64();
+        self.contacts(scheme, world, state, h);
+        let mut status = StepStatus::Solved;
+        let mut solving = 0.0;
+        let mut first = 0;
+        for k in 0..self.islands.ends.len() {
+            let end = self.islands.ends[k];
+            if self.slots.len() == k {
+                self.slots.push(Slot::new(inner)?);
+            }
+            let (now, passes, measure, iterations, seconds) =
+                self.island(scheme, (first, end), k, inner, h)?;
+            report.newton = report.newton.max(passes);
+            report.residual = f64::max(report.residual, measure);
+            report.counts.iterations += iterations;
+            report.counts.largest = report.counts.largest.max(end - first);
+            solving += seconds;
+            if status == StepStatus::Solved || now == StepStatus::NotFinite {
+                status = now;
+            }
+            first = end;
+        }
+        let new = self.bodies.iter().flat_map(|b| [b.v_new, b.spin_new]).flatten();
+        if !new.map(|x| 0.0 * x).sum::<f64>().is_finite() {
+            status = StepStatus::NotFinite;
+        }
+        report.status = status;
+        report.energy = self.energy(scheme, world, state, h);
+        self.count(&mut report);
+        timings.solve = solving;
+        timings.total = begun.elapsed().as_secs_f64();
+        timings.assembly = timings.total - timings.solve - timings.detection;
+        report.timings = timings;
+        Ok(report)
+    }
+
+    /// The contact problem of a step of length h in the first pass, all islands together; none without contacts.
+    pub fn problem(
+        &mut self,
+        scheme: &MoreauJean,
+        (world, state): (&World, &mut State),
+        forces: &mut [Box<dyn Force>],
+        inner: &Inner,
+        h: f64,
+    ) -> Result<Option<FrictionLocal<3>>, SimulateError> {
+        if !self.start(scheme, world, state, forces, h) {
+            return Ok(None);
+        }
+        self.detector.detect(world, state, &self.margins, &mut self.near);
+        self.contacts(scheme, world, state, h);
+        if self.rows.is_empty() {
+            return Ok(None);
+        }
+        if self.slots.is_empty() {
+            self.slots.push(Slot::new(inner)?);
+        }
+        for b in &mut self.bodies {
+            b.pass(scheme, h);
+        }
+        self.islands.order.clear();
+        self.islands.order.extend(0..self.rows.len() as u32);
+        let all = (0, self.rows.len());
+        self.columns(all);
+        self.assemble(all, 0);
+        Ok(Some(self.slots[0].problem.clone()))
+    }
+
+    /// Bodies at the beginning of a step, with forces and margins; false where something is no finite number.
+    fn start(
+        &mut self,
+        scheme: &MoreauJean,
+        world: &World,
+        state: &State,
+        forces: &mut [Box<dyn Force>],
+        h: f64,
+    ) -> bool {
+        self.wrenches.clear(world.bodies.len());
+        if !forces.is_empty() {
+            let middle = &mut self.middle;
+            middle.t = state.t + 0.5 * h;
+            middle.steps = state.steps;
+            for k in 0..world.bodies.len() {
+                let to = advanced(state, k, 0.5 * h);
+                middle.position[k] = to.0;
+                middle.rotation[k] = to.1.0;
+            }
+            middle.velocity.clone_from(&state.velocity);
+            middle.spin.clone_from(&state.spin);
+            for force in forces.iter_mut() {
+                force.add(middle, &mut self.wrenches);
+            }
+        }
+        self.bodies.clear();
+        self.margins.clear();
+        let gravity = norm(world.gravity);
+        let (gamma, slack) = match scheme.activation {
+            Activation::Forecast { gamma, slack } => (gamma, slack),
+            Activation::Gap => (1.0, 0.0),
+        };
+        let mut finite = true;
+        for (k, body) in world.bodies.iter().enumerate() {
+            let start = state.pose(k);
+            let free = body.is_free();
+            let j = &body.inertia;
+            let isotropic =
+                j[0][0] == j[1][1] && j[1][1] == j[2][2] && [j[0][1], j[0][2], j[1][2]] == [0.0; 3];
+            let weight = if free { scale(body.mass, world.gravity) } else { [0.0; 3] };
+            let push = add(weight, add(body.force, self.wrenches.force[k]));
+            let twist = add(body.torque, self.wrenches.torque[k]);
+            let omega = apply(&start.r, state.spin[k]);
+            let (mut middle, mut end) = (start, start);
+            let (mut linear, mut angular) = ([[0.0; 3]; 2], [0.0; 3]);
+            match body.motion {
+                Motion::Free if scheme.geometry == Geometry::Extrapolated => {
+                    for (pose, part) in [(&mut middle, 0.5), (&mut end, 1.0)] {
+                        let (x, q) = advanced(state, k, part * h);
+                        *pose = Pose { x, r: q.matrix() };
+                    }
+                }
+                Motion::Free | Motion::Fixed => {}
+                Motion::Surface { linear: l, angular: a } => (linear, angular) = ([l; 2], a),
+                Motion::Oscillating { amplitude, frequency, phase } => {
+                    let at = |t: f64| oscillation(amplitude, frequency, phase, t);
+                    linear = [at(state.t).1, at(state.t + h).1];
+                    if scheme.geometry == Geometry::Extrapolated {
+                        middle.x = add(body.position, at(state.t + 0.5 * h).0);
+                        end.x = add(body.position, at(state.t + h).0);
+                    }
+                }
+            }
+            let speed = match body.motion {
+                Motion::Free => norm(state.velocity[k]) + norm(omega) * self.reach[k],
+                Motion::Fixed | Motion::Surface { .. } => 0.0,
+                Motion::Oscillating { amplitude, frequency, .. } => {
+                    norm(amplitude) * frequency.abs()
+                }
+            };
+            let fall = if free { h * h * gravity } else { 0.0 };
+            let least = (1e-6_f64).max(slack) * self.sizes[k];
+            self.margins.push((gamma + 1.0) * h * speed + fall + least);
+            let check: f64 = push.iter().chain(&twist).map(|x| 0.0 * x).sum();
+            finite &= check == 0.0;
+            self.bodies.push(Moving {
+                free,
+                isotropic,
+                mass: body.mass,
+                inertia: *j,
+                inverse: if free { inverse(j) } else { [[0.0; 3]; 3] },
+                radius: self.reach[k].max(self.sizes[k]),
+                start,
+                v: state.velocity[k],
+                spin: if isotropic { omega } else { state.spin[k] },
+                push: scale(h, push),
+                twist: scale(h, twist),
+                weight,
+                middle,
+                end,
+                linear,
+                angular,
+                frame: [[0.0; 3]; 3],
+                frame_end: [[0.0; 3]; 3],
+                v_new: state.velocity[k],
+                spin_new: if isotropic { omega } else { state.spin[k] },
+                v_free: [0.0; 3],
+                spin_free: [0.0; 3],
+                impulse: [0.0; 3],
+                moment: [0.0; 3],
+            });
+            let b = self.bodies.last_mut().expect("pushed");
+            if free {
+                b.rotate(scheme, h);
+            }
+        }
+        finite
+    }
+
+    /// Index set, frames, warm starts, islands.
+    fn contacts(&mut self, scheme: &MoreauJean, world: &World, state: &State, h: f64) {
+        self.recall(state);
+        self.rows.clear();
+        self.row_of.clear();
+        self.axes.clear();
+        let rest = 2.0 * h * norm(world.gravity);
+        let scaled = if state.memory.h > 0.0 { h / state.memory.h } else { 0.0 };
+        for (k, near) in self.near.iter().enumerate() {
+            let known = self.known[k];
+            let axis = tangent_axis(near.place.normal, known.map(|m| m.axis));
+            self.axes.push(axis);
+            let [a, b] = [near.a, near.b].map(|i| &self.bodies[i as usize]);
+            let n = near.place.normal;
+            let approach =
+                dot(n, sub(b.velocity_at(near.place.point), a.velocity_at(near.place.point)));
+            let gap = near.place.gap;
+            let active = match scheme.activation {
+                Activation::Forecast { gamma, slack } => {
+                    gap + gamma * h * approach <= slack * near.size
+                }
+                Activation::Gap => true,
+            };
+            if !active {
+                self.row_of.push(NONE);
+                continue;
+            }
+            self.row_of.push(self.rows.len() as u32);
+            let place = near.witness.place(&a.middle, &b.middle, n);
+            let frame = frame(place.normal, axis);
+            let pushed = known.is_some_and(|m| m.active && m.impulse != [0.0; 3]);
+            let persists = pushed && (near.law.e == 0.0 || approach >= -rest);
+            let (place_end, frame_end) = match persists && scheme.geometry == Geometry::Extrapolated
+            {
+                true => {
+                    let place = near.witness.place(&a.end, &b.end, place.normal);
+                    (place, self::frame(place.normal, axis))
+                }
+                false => (place, frame),
+            };
+            let later = persists && scheme.geometry == Geometry::Extrapolated;
+            let arm = |body: u32, sign: f64| {
+                let b = &self.bodies[body as usize];
+                let x_end = if later { b.end.x } else { b.middle.x };
+                let free = b.free;
+                let moment = frame.map(|d| cross(sub(place.point, b.middle.x), d));
+                let moment_end = frame_end.map(|d| cross(sub(place_end.point, x_end), d));
+                let zero = [[0.0; 3]; 3];
+                Arm {
+                    body,
+                    sign,
+                    free,
+                    moment,
+                    moment_end,
+                    columns: zero,
+                    solved: zero,
+                    rows: zero,
+                }
+            };
+            let arms = [arm(near.a, -1.0), arm(near.b, 1.0)];
+            let (mut given, mut given_mean, mut before) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+            let theta = scheme.theta;
+            for Arm { body, sign, moment, .. } in &arms {
+                let m = &self.bodies[*body as usize];
+                if m.free {
+                    let omega = m.omega(m.spin);
+                    for i in 0..3 {
+                        before[i] += sign * (dot(frame[i], m.v) + dot(moment[i], omega));
+                    }
+                } else {
+                    let [first, last] = m.linear;
+                    let turn = |p: Vec3| cross(m.angular, sub(p, m.start.x));
+                    let (mid, end) = (turn(place.point), turn(place_end.point));
+                    for i in 0..3 {
+                        let of = |v: Vec3| sign * dot(frame[i], add(v, mid));
+                        before[i] += of(first);
+                        given[i] += sign * dot(frame_end[i], add(last, end));
+                        given_mean[i] += theta * of(last) + (1.0 - theta) * of(first);
+                    }
+                }
+            }
+            let law = near.law;
+            let mut shift = [0.0, law.e_t * before[1], law.e_t * before[2]];
+            if scheme.impact == Impact::Fremond && !(persists && known.is_some_and(|m| m.stuck)) {
+                let share = (1.0 - theta) / theta;
+                shift = [0.0, share * before[1], share * before[2]];
+            }
+            // Restitution on approach only, and in the gap's form only where it is closed.
+            let closed = scheme.activation != Activation::Gap || gap <= 0.0;
+            if closed && before[0] < -scheme.restitution_threshold {
+                shift[0] = law.e * before[0];
+            }
+            if scheme.activation == Activation::Gap {
+                shift[0] += gap.max(0.0) / h;
+            }
+            let r = match known.filter(|_| pushed) {
+                Some(m) => clipped(frame.map(|d| scaled * dot(d, m.impulse)), law.mu),
+                None => [0.0; 3],
+            };
+            self.rows.push(Row {
+                mu: law.mu,
+                place,
+                frame,
+                frame_end,
+                arms,
+                given,
+                given_mean,
+                before,
+                shift,
+                r,
+                warm: pushed,
+            });
+        }
+        let free = |arm: &Arm| arm.free.then_some(arm.body);
+        let pairs = self.rows.iter().map(|row| [free(&row.arms[0]), free(&row.arms[1])]);
+        self.islands.find(self.bodies.len(), pairs);
+    }
+
+    /// For each contact near what is remembered of it: by its key, else the nearest of the same two shapes with nearly the same normal.
+    fn recall(&mut self, state: &State) {
+        let memory = &state.memory.contacts;
+        self.known.clear();
+        self.taken.clear();
+        self.taken.resize(memory.len(), false);
+        let mut m = 0;
+        for near in &self.near {
+            while m < memory.len() && memory[m].key < near.key {
+                m += 1;
+            }
+            let same = m < memory.len() && memory[m].key == near.key;
+            if same {
+                self.taken[m] = true;
+            }
+            self.known.push(same.then(|| memory[m]));
+        }
+        let pair = |key: crate::Key| (key.shape_a, key.shape_b);
+        for (near, known) in self.near.iter().zip(&mut self.known) {
+            if known.is_some() {
+                continue;
+            }
+            let first = memory.partition_point(|m| pair(m.key) < pair(near.key));
+            let mut best = (0.05 * near.size, None);
+            for (k, m) in memory.iter().enumerate().skip(first) {
+                if pair(m.key) != pair(near.key) {
+                    break;
+                }
+                let far = norm(sub(m.point, near.place.point));
+                if !self.taken[k] && far < best.0 && dot(m.normal, near.place.normal) > 0.95 {
+                    best = (far, Some(k));
+                }
+            }
+            if let Some(k) = best.1 {
+                self.taken[k] = true;
+                *known = Some(memory[k]);
+            }
+        }
+    }
+
+    /// Solves one island: the contacts `range` of the order of islands, in slot k. Returns status, passes, residual, iterations and the seconds of the solver.
+    fn island(
+        &mut self,
+        scheme: &MoreauJean,
+        range: (usize, usize),
+        k: usize,
+        inner: &Inner,
+        h: f64,
+    ) -> Result<(StepStatus, u32, f64, usize, f64), SimulateError> {
+        let (mut passes, mut iterations, mut seconds) = (0, 0, 0.0);
+        loop {
+            passes += 1;
+            for c in range.0..range.1 {
+                let arms = self.rows[self.islands.order[c] as usize].arms;
+                for arm in arms.iter().filter(|a| a.free) {
+                    self.bodies[arm.body as usize].pass(scheme, h);
+                }
+            }
+            self.columns(range);
+            if !self.assemble(range, k) {
+                return Ok((StepStatus::NotFinite, passes, f64::NAN, iterations, seconds));
+            }
+            let Slot { session, problem, point } = &mut self.slots[k];
+            let begun = Instant::now();
+            let outcome = session.solve(problem, point, inner.limits, &mut |_| {})?;
+            seconds += begun.elapsed().as_secs_f64();
+            iterations += outcome.iterations;
+            for c in range.0..range.1 {
+                let row = &mut self.rows[self.islands.order[c] as usize];
+                row.r.copy_from_slice(&point.r[3 * (c - range.0)..][..3]);
+            }
+            let change = self.respond(scheme, range, h);
+            let residual = outcome.measure.relative;
+            if outcome.status != Status::Solved {
+                return Ok((
+                    StepStatus::Solver(outcome.status),
+                    passes,
+                    residual,
+                    iterations,
+                    seconds,
+                ));
+            }
+            if change <= scheme.tolerance {
+                return Ok((StepStatus::Solved, passes, residual, iterations, seconds));
+            }
+            if passes >= scheme.passes || !change.is_finite() {
+                return Ok((StepStatus::NewtonLimit, passes, residual, iterations, seconds));
+            }
+        }
+    }
+
+    /// The columns of H and the rows of the velocities, in the frames of this pass.
+    fn columns(&mut self, range: (usize, usize)) {
+        for c in range.0..range.1 {
+            let row = &mut self.rows[self.islands.order[c] as usize];
+            for arm in row.arms.iter_mut().filter(|a| a.free) {
+                let b = &self.bodies[arm.body as usize];
+                for i in 0..3 {
+                    arm.columns[i] = apply(&b.frame, arm.moment[i]);
+                    arm.solved[i] = apply(&b.inverse, arm.columns[i]);
+                }
+                arm.rows = arm.columns;
+                if row.frame_end != row.frame || arm.moment_end != arm.moment {
+                    arm.rows = arm.moment_end.map(|m| apply(&b.frame_end, m));
+                }
+            }
+        }
+    }
+
+    /// States the contact problem of an island in slot k; false where it has a number that is not finite.
+    fn assemble(&mut self, range: (usize, usize), k: usize) -> bool {
+        let Self { islands, rows, bodies, heads, next, slots, .. } = self;
+        let order = &islands.order[range.0..range.1];
+        let n = order.len();
+        // The contacts of each body as a list, in order: made from the back.
+        heads.resize(bodies.len(), NONE);
+        next.clear();
+        next.resize(n, [NONE; 2]);
+        for &c in order {
+            rows[c as usize].arms.iter().for_each(|a| heads[a.body as usize] = NONE);
+        }
+        for c in (0..n).rev() {
+            let arms = &rows[order[c] as usize].arms;
+            for (side, arm) in arms.iter().enumerate().filter(|a| a.1.free) {
+                next[c][side] = std::mem::replace(&mut heads[arm.body as usize], c as u32);
+            }
+        }
+        let after = |c: u32, body: u32| {
+            let side = usize::from(rows[order[c as usize] as usize].arms[0].body != body);
+            next[c as usize][side]
+        };
+        let Slot { problem, point, .. } = &mut slots[k];
+        problem.W.clear(n);
+        problem.q.clear();
+        problem.mu.clear();
+        point.r.clear();
+        let mut check = 0.0;
+        for c in 0..n {
+            let row = &rows[order[c] as usize];
+            problem.mu.push(row.mu);
+            point.r.extend_from_slice(&row.r);
+            for i in 0..3 {
+                let mut q = row.given[i] + row.shift[i];
+                for arm in row.arms.iter().filter(|a| a.free) {
+                    let b = &bodies[arm.body as usize];
+                    q += arm.sign
+                        * (dot(row.frame_end[i], b.v_free) + dot(arm.rows[i], b.spin_free));
+                }
+                problem.q.push(q);
+                check += 0.0 * q;
+            }
+            // The contacts of the two bodies, merged; a body that is not free has none.
+            let [mut p, mut q] =
+                row.arms.map(|a| if a.free { heads[a.body as usize] } else { NONE });
+            while p.min(q) != NONE {
+                let j = p.min(q);
+                if p == j {
+                    p = after(j, row.arms[0].body);
+                }
+                if q == j {
+                    q = after(j, row.arms[1].body);
+                }
+                let other = &rows[order[j as usize] as usize];
+                let block = coupling(row, other, bodies);
+                check += 0.0 * (block[0][0] + block[1][1] + block[2][2]);
+                problem.W.push(j as usize, block);
+            }
+            problem.W.end_row();
+        }
+        check == 0.0
+    }
+
+    /// Velocities after the step with the impulses of an island; how much solving the rotations exactly has changed them, relative.
+    fn respond(&mut self, scheme: &MoreauJean, range: (usize, usize), h: f64) -> f64 {
+        let Self { islands, rows, bodies, .. } = self;
+        let order = &islands.order[range.0..range.1];
+        for &c in order {
+            for arm in rows[c as usize].arms.iter().filter(|a| a.free) {
+                let b = &mut bodies[arm.body as usize];
+                (b.impulse, b.moment) = ([0.0; 3], [0.0; 3]);
+            }
+        }
+        for &c in order {
+            let row = &rows[c as usize];
+            for arm in row.arms.iter().filter(|a| a.free) {
+                let b = &mut bodies[arm.body as usize];
+                for i in 0..3 {
+                    let x = arm.sign * row.r[i];
+                    b.impulse = add(b.impulse, scale(x, row.frame[i]));
+                    b.moment = add(b.moment, scale(x, arm.moment[i]));
+                }
+            }
+        }
+        let (mut change, mut size): (f64, f64) = (0.0, f64::MIN_POSITIVE);
+        for &c in order {
+            for arm in rows[c as usize].arms.iter().filter(|a| a.free) {
+                let b = &mut bodies[arm.body as usize];
+                let linear = add(b.spin_free, apply(&b.inverse, apply(&b.frame, b.moment)));
+                b.rotate(scheme, h);
+                let moved = norm(sub(b.spin_new, linear)) * b.radius;
+                // Larger of the two, or the one that is no number.
+                change = if moved > change || moved.is_nan() { moved } else { change };
+                let spin = norm(b.spin).max(norm(b.spin_new)) * b.radius;
+                size = size.max(norm(b.v)).max(norm(b.v_new)).max(spin);
+                size = size.max(norm(b.push) / b.mass);
+            }
+        }
+        change / size
+    }
+
+    fn energy(&self, scheme: &MoreauJean, world: &World, state: &State, h: f64) -> EnergyBalance {
+        let theta = scheme.theta;
+        let mean = |old: Vec3, new: Vec3| add(scale(theta, new), scale(1.0 - theta, old));
+        let mut e = EnergyBalance::default();
+        for (k, b) in self.bodies.iter().enumerate().filter(|b| b.1.free) {
+            let kinetic = |v: Vec3, spin: Vec3| {
+                0.5 * (b.mass * dot(v, v) + dot(spin, apply(&b.inertia, spin)))
+            };
+            let (v, spin) = (mean(b.v, b.v_new), mean(b.spin, b.spin_new));
+            e.kinetic_before += kinetic(b.v, b.spin);
+            e.kinetic += kinetic(b.v_new, b.spin_new);
+            let (dv, ds) = (sub(b.v_new, b.v), sub(b.spin_new, b.spin));
+            e.numerical += 2.0 * (theta - 0.5) * kinetic(dv, ds);
+            let gravity = h * dot(b.weight, v);
+            let given = sub(b.push, scale(h, b.weight));
+            let forces = dot(given, v) + dot(b.twist, b.omega(spin));
+            e.gravity += gravity;
+            e.forces += forces;
+            let x = add(state.position[k], scale(h, v));
+            e.potential -= b.mass * dot(world.gravity, x);
+            let fall = h * norm(world.gravity);
+            e.scale += gravity.abs() + forces.abs() + 0.5 * b.mass * fall * fall;
+        }
+        for row in &self.rows {
+            for i in 0..3 {
+                let mut u = row.given_mean[i];
+                for arm in row.arms.iter().filter(|a| a.free) {
+                    let b = &self.bodies[arm.body as usize];
+                    let omega = b.omega(mean(b.spin, b.spin_new));
+                    let v = mean(b.v, b.v_new);
+                    u += arm.sign * (dot(row.frame[i], v) + dot(arm.moment[i], omega));
+                }
+                let work = u * row.r[i];
+                if i == 0 {
+                    e.normal += work
+                } else {
+                    e.tangential += work
+                }
+                let drive = row.given_mean[i] * row.r[i];
+                e.drives -= drive;
+                e.scale += work.abs() + drive.abs();
+            }
+        }
+        e.scale += e.kinetic_before + e.kinetic + e.numerical;
+        let work = e.gravity + e.forces + e.normal + e.tangential + e.drives;
+        e.imbalance = e.kinetic - e.kinetic_before - (work - e.numerical);
+        e
+    }
+
+    fn count(&self, report: &mut StepReport) {
+        let counts = &mut report.counts;
+        counts.near = self.near.len();
+        counts.active = self.rows.len();
+        counts.islands = self.islands.ends.len();
+        for row in &self.rows {
+            counts.warm += usize::from(row.warm);
+            if row.r[0] <= 0.0 {
+                counts.open += 1;
+            } else if sticks(&row.r, row.mu) {
+                counts.stick += 1;
+            } else {
+                counts.slip += 1;
+            }
+        }
+        let gaps = self.near.iter().map(|n| -n.place.gap);
+        report.drift.penetration = gaps.fold(0.0, f64::max);
+    }
+
+    /// Takes the step: velocities and configuration, what is remembered, the reports of contacts. Returns how far quaternions were from length one.
+    pub fn commit(&mut self, scheme: &MoreauJean, world: &World, state: &mut State, h: f64) -> f64 {
+        let theta = scheme.theta;
+        let mut off: f64 = 0.0;
+        for (k, b) in self.bodies.iter().enumerate() {
+            if let Motion::Oscillating { amplitude, frequency, phase } = world.bodies[k].motion {
+                let (x, v) = oscillation(amplitude, frequency, phase, state.t + h);
+                state.position[k] = add(world.bodies[k].position, x);
+                state.velocity[k] = v;
+            }
+            if !b.free {
+                continue;
+            }
+            let mean = |old: Vec3, new: Vec3| add(scale(theta, new), scale(1.0 - theta, old));
+            state.position[k] = add(state.position[k], scale(h, mean(b.v, b.v_new)));
+            state.velocity[k] = b.v_new;
+            let (old, turn) =
+                (Rotation(state.rotation[k]), cayley(scale(h, mean(b.spin, b.spin_new))));
+            let new = if b.isotropic { turn.after(old) } else { old.after(turn) };
+            let length = new.0.iter().map(|x| x * x).sum::<f64>().sqrt();
+            off = off.max((length - 1.0).abs());
+            let new = unit(new);
+            state.rotation[k] = new.0;
+            state.spin[k] = match b.isotropic {
+                true => apply_transposed(&new.matrix(), b.spin_new),
+                false => b.spin_new,
+            };
+        }
+        state.t += h;
+        state.steps += 1;
+        self.remember(state, h);
+        off
+    }
+
+    fn remember(&mut self, state: &mut State, h: f64) {
+        let memory = &mut state.memory;
+        memory.h = h;
+        memory.contacts.clear();
+        self.contacts.clear();
+        for (k, near) in self.near.iter().enumerate() {
+            let axis = self.axes[k];
+            let row = self.rows.get(self.row_of[k] as usize);
+            let frame = row.map_or_else(|| frame(near.place.normal, axis), |row| row.frame);
+            let mut report = ContactReport {
+                key: near.key,
+                a: BodyId(near.a),
+                b: BodyId(near.b),
+                point: row.map_or(near.place.point, |row| row.place.point),
+                frame,
+                gap: near.place.gap,
+                mu: near.law.mu,
+                active: row.is_some(),
+                impulse: [0.0; 3],
+                before: [0.0; 3],
+                after: [0.0; 3],
+            };
+            if let Some(row) = row {
+                (report.impulse, report.before) = (row.r, row.before);
+                for i in 0..3 {
+                    report.after[i] = row.given[i];
+                    for arm in row.arms.iter().filter(|a| a.free) {
+                        let b = &self.bodies[arm.body as usize];
+                        let u = dot(row.frame_end[i], b.v_new) + dot(arm.rows[i], b.spin_new);
+                        report.after[i] += arm.sign * u;
+                    }
+                }
+            }
+            memory.contacts.push(Remembered {
+                key: near.key,
+                impulse: report.world_impulse(),
+                normal: near.place.normal,
+                point: near.place.point,
+                axis,
+                active: row.is_some(),
+                stuck: row.is_some_and(|row| row.r[0] > 0.0 && sticks(&row.r, row.mu)),
+            });
+            self.contacts.push(report);
+        }
+    }
+}
+
+impl Slot {
+    fn new(inner: &Inner) -> Result<Self, SimulateError> {
+        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let w = nonsmooth_linalg::Bsr::from_rows(1, &[vec![(0, identity)]]);
+        let problem = FrictionLocal::new(w, vec![0.0; 3], vec![0.0])
+            .map_err(nonsmooth_solve::SolveError::from)?;
+        let point = problem.origin();
+        let session = registry::session::<FrictionLocal<3>>(inner.solver, inner.settings)?;
+        Ok(Self { session, problem, point })
+    }
+}
+
+impl Moving {
+    /// The angular velocity in the world frame that belongs to `spin`, of the beginning of the step or weighted by θ.
+    fn omega(&self, spin: Vec3) -> Vec3 {
+        if self.isotropic { spin } else { apply(&self.start.r, spin) }
+    }
+
+    /// The velocity of its point p at the beginning of the step.
+    fn velocity_at(&self, p: Vec3) -> Vec3 {
+        let (v, omega) = match self.free {
+            true => (self.v, self.omega(self.spin)),
+            false => (self.linear[0], self.angular),
+        };
+        add(v, cross(omega, sub(p, self.start.x)))
+    }
+
+    /// The frames and the free velocities of a pass, about the rotation found last.
+    fn pass(&mut self, scheme: &MoreauJean, h: f64) {
+        if !self.free {
+            return;
+        }
+        self.v_free = add(self.v, scale(1.0 / self.mass, self.push));
+        if self.isotropic {
+            self.frame = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+            self.frame_end = self.frame;
+            self.spin_free = add(self.spin, apply(&self.inverse, self.twist));
+            return;
+        }
+        let theta = scheme.theta;
+        let mean = add(scale(theta, self.spin_new), scale(1.0 - theta, self.spin));
+        let r = self.start.r;
+        let back: Mat3 = std::array::from_fn(|i| std::array::from_fn(|j| r[j][i]));
+        let mut turn = hat(scale(-0.5 * h, mean));
+        (0..3).for_each(|i| turn[i][i] += 1.0);
+        self.frame = product(&turn, &back);
+        let end = self.end.r;
+        self.frame_end = std::array::from_fn(|i| std::array::from_fn(|j| end[j][i]));
+        let gyroscopic = match scheme.gyroscopic {
+            Gyroscopic::Split => scale(h, cross(mean, apply(&self.inertia, mean))),
+            Gyroscopic::Off => [0.0; 3],
+        };
+        let torque = sub(apply(&self.frame, self.twist), gyroscopic);
+        self.spin_free = add(self.spin, apply(&self.inverse, torque));
+    }
+
+    /// Velocities after the step with the impulses and moments that it has: of rotation by Newton's method on the implicit rule.
+    fn rotate(&mut self, scheme: &MoreauJean, h: f64) {
+        self.v_new = add(self.v, scale(1.0 / self.mass, add(self.push, self.impulse)));
+        let total = add(self.twist, self.moment);
+        if self.isotropic {
+            self.spin_new = add(self.spin, apply(&self.inverse, total));
+            return;
+        }
+        let (theta, j) = (scheme.theta, &self.inertia);
+        let l = apply_transposed(&self.start.r, total);
+        let gyroscopic = f64::from(u8::from(scheme.gyroscopic == Gyroscopic::Split));
+        let mut x = self.spin_new;
+        for _ in 0..30 {
+            let mean = add(scale(theta, x), scale(1.0 - theta, self.spin));
+            let momentum = apply(j, mean);
+            let inertial = apply(j, sub(x, self.spin));
+            let turning = scale(gyroscopic * h, cross(mean, momentum));
+            let residual = add(add(inertial, turning), sub(scale(0.5 * h, cross(mean, l)), l));
+            let (wj, jw, lh) = (product(&hat(mean), j), hat(momentum), hat(l));
+            let derivative: Mat3 = std::array::from_fn(|i| {
+                std::array::from_fn(|k| {
+                    let turning = gyroscopic * (wj[i][k] - jw[i][k]) - 0.5 * lh[i][k];
+                    j[i][k] + h * theta * turning
+                })
+            });
+            let step = apply(&inverse(&derivative), residual);
+            x = sub(x, step);
+            let moved = norm(step);
+            if moved <= 1e-15 * norm(x).max(norm(self.spin)) || !moved.is_finite() {
+                break;
+            }
+        }
+        self.spin_new = x;
+    }
+}
+
+/// Position and rotation of a body after it has moved for a time with its velocities.
+fn advanced(state: &State, k: usize, time: f64) -> (Vec3, Rotation) {
+    let x = add(state.position[k], scale(time, state.velocity[k]));
+    (x, Rotation(state.rotation[k]).after(cayley(scale(time, state.spin[k]))))
+}
+
+/// The block of W of two contacts, `Σ` over the bodies that they share.
+#[inline]
+fn coupling(row: &Row, other: &Row, bodies: &[Moving]) -> [[f64; 3]; 3] {
+    let mut block = [[0.0; 3]; 3];
+    for p in row.arms.iter().filter(|p| p.free) {
+        for q in other.arms.iter().filter(|q| q.free && q.body == p.body) {
+            let sign = p.sign * q.sign;
+            let linear = sign / bodies[p.body as usize].mass;
+            for i in 0..3 {
+                for j in 0..3 {
+                    block[i][j] += linear * dot(row.frame_end[i], other.frame[j])
+                        + sign * dot(p.rows[i], q.solved[j]);
+                }
+            }
+        }
+    }
+    block
+}
+
+/// The axis of the world whose part across the normal makes the first tangent: that of the last step unless it has come near the normal.
+fn tangent_axis(n: Vec3, last: Option<u8>) -> u8 {
+    const NEAR: f64 = 0.9;
+    if let Some(axis) = last
+        && n[axis as usize].abs() <= NEAR
+    {
+        return axis;
+    }
+    let least = |a: u8, b: u8| if n[b as usize].abs() < n[a as usize].abs() { b } else { a };
+    least(least(0, 1), 2)
+}
+
+/// `[N, T1, T2]`, right-handed.
+fn frame(n: Vec3, axis: u8) -> [Vec3; 3] {
+    let mut e = [0.0; 3];
+    e[axis as usize] = 1.0;
+    let t = sub(e, scale(n[axis as usize], n));
+    let t = scale(1.0 / norm(t), t);
+    [n, t, cross(n, t)]
+}
+
+/// An impulse moved into the cone: none where it pulls, friction cut to its bound.
+fn clipped(r: [f64; 3], mu: f64) -> [f64; 3] {
+    if r[0] <= 0.0 {
+        return [0.0; 3];
+    }
+    let (tangential, bound) = (r[1].hypot(r[2]), mu * r[0]);
+    let cut = if tangential > bound { bound / tangential } else { 1.0 };
+    [r[0], cut * r[1], cut * r[2]]
+}
+
+/// Whether an impulse lies within the cone, not on its boundary.
+fn sticks(r: &[f64; 3], mu: f64) -> bool {
+    r[1].hypot(r[2]) < (1.0 - 1e-6) * mu * r[0]
+}

@@ -1,0 +1,554 @@
+//! The world: bodies, what they are made of, and what drives them. Plain data, checked by [`World::validate`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nonsmooth_scenes::vec3::{Mat3, Vec3, add, dot, norm, scale, sub};
+use nonsmooth_scenes::{self as scenes, MassProperties, Rotation, Scene};
+
+use crate::error::{finite, require};
+use crate::rotation::unit;
+use crate::shape::plane;
+use crate::{Part, Shape, SimulateError};
+
+/// The number of a body; never used again for another one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct BodyId(pub u32);
+
+impl BodyId {
+    /// Its place among [`World::bodies`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// How a body moves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Motion {
+    /// As forces and contacts make it.
+    Free,
+    /// Not at all.
+    Fixed,
+    /// Its shapes stay, its surface moves with `linear + angular × (p − position)`: a conveyor belt, a turntable; m/s and rad/s.
+    Surface {
+        /// At the position of the body, m/s.
+        linear: Vec3,
+        /// rad/s.
+        angular: Vec3,
+    },
+    /// About its position by `amplitude sin(frequency t + phase)`: a shaking table.
+    Oscillating {
+        /// m.
+        amplitude: Vec3,
+        /// rad/s.
+        frequency: f64,
+        /// rad.
+        phase: f64,
+    },
+}
+
+/// A rigid body with any number of shapes. Velocities are in the world frame; the origin of its frame is its mass centre.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Body {
+    /// What messages and files call it; may be empty.
+    pub name: String,
+    /// How it moves.
+    pub motion: Motion,
+    /// Mass, kg; without meaning unless it moves freely.
+    pub mass: f64,
+    /// Inertia about the mass centre in the body frame, kg·m².
+    pub inertia: Mat3,
+    /// Mass centre, m.
+    pub position: Vec3,
+    /// Orientation of the body frame.
+    pub rotation: Rotation,
+    /// Velocity of the mass centre, m/s.
+    pub velocity: Vec3,
+    /// Angular velocity in the world frame, rad/s.
+    pub angular_velocity: Vec3,
+    /// Constant force at the mass centre besides the weight, N.
+    pub force: Vec3,
+    /// Constant torque in the world frame, N·m.
+    pub torque: Vec3,
+    /// Its shapes.
+    pub parts: Vec<Part>,
+    /// The groups that it belongs to, one a bit.
+    pub membership: u32,
+    /// The groups that it may touch, one a bit; two bodies touch where each may touch the other.
+    pub collides_with: u32,
+}
+
+impl Body {
+    fn bare(motion: Motion, parts: Vec<Part>) -> Self {
+        Self {
+            name: String::new(),
+            motion,
+            mass: 1.0,
+            inertia: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            position: [0.0; 3],
+            rotation: Rotation::IDENTITY,
+            velocity: [0.0; 3],
+            angular_velocity: [0.0; 3],
+            force: [0.0; 3],
+            torque: [0.0; 3],
+            parts,
+            membership: u32::MAX,
+            collides_with: u32::MAX,
+        }
+    }
+
+    /// A homogeneous body at rest. Spheres, boxes and capsules are centred at the origin, polyhedra stay where their vertices are.
+    ///
+    /// Errors: those of [`Shape::mass_properties`].
+    pub fn solid(shape: impl Into<Shape>, density: f64) -> Result<Self, SimulateError> {
+        Self::composed(vec![(Part::new(shape), density)])
+    }
+
+    /// A body of parts with a density each, kg/m³, where the parts are. Parts that overlap count twice.
+    ///
+    /// Errors: those of [`Shape::mass_properties`]; no parts.
+    pub fn composed(parts: Vec<(Part, f64)>) -> Result<Self, SimulateError> {
+        if parts.is_empty() {
+            return Err(SimulateError::value("parts", "at least one", "none"));
+        }
+        let mut all = vec![];
+        for (part, density) in &parts {
+            let p = part.shape.mass_properties(*density)?;
+            let r = part.rotation.matrix();
+            all.push(MassProperties {
+                mass: p.mass,
+                centre: add(part.position, scenes::vec3::apply(&r, p.centre)),
+                inertia: scenes::vec3::congruence(&r, &p.inertia),
+            });
+        }
+        let MassProperties { mass, centre, inertia } = MassProperties::joined(&all);
+        let parts = parts
+            .into_iter()
+            .map(|(p, _)| Part { position: sub(p.position, centre), ..p })
+            .collect();
+        let body = Self::bare(Motion::Free, parts);
+        Ok(Self { mass, inertia, position: centre, ..body })
+    }
+
+    /// A body of given mass and inertia, kg and kg·m², about the origin of its parts.
+    pub fn with_mass(mass: f64, inertia: Mat3, parts: Vec<Part>) -> Self {
+        Self { mass, inertia, ..Self::bare(Motion::Free, parts) }
+    }
+
+    /// A body that does not move.
+    pub fn fixed(parts: Vec<Part>) -> Self {
+        Self::bare(Motion::Fixed, parts)
+    }
+
+    /// The plane z = 0, with all below it.
+    pub fn floor() -> Self {
+        Self::fixed(vec![Part::new(Shape::Plane)])
+    }
+
+    /// With this name.
+    #[must_use]
+    pub fn named(self, name: impl Into<String>) -> Self {
+        Self { name: name.into(), ..self }
+    }
+
+    /// With its mass centre at `position`.
+    #[must_use]
+    pub fn at(self, position: Vec3) -> Self {
+        Self { position, ..self }
+    }
+
+    /// With this orientation.
+    #[must_use]
+    pub fn turned(self, rotation: Rotation) -> Self {
+        Self { rotation, ..self }
+    }
+
+    /// With these velocities, both in the world frame.
+    #[must_use]
+    pub fn moving(self, velocity: Vec3, angular_velocity: Vec3) -> Self {
+        Self { velocity, angular_velocity, ..self }
+    }
+
+    /// With all its parts of this material.
+    #[must_use]
+    pub fn of(mut self, material: usize) -> Self {
+        self.parts.iter_mut().for_each(|p| p.material = material);
+        self
+    }
+
+    /// Whether forces and contacts move it.
+    pub fn is_free(&self) -> bool {
+        self.motion == Motion::Free
+    }
+}
+
+/// The law of contact between two materials.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Law {
+    /// Coefficient of friction, at least 0.
+    pub mu: f64,
+    /// Coefficient of restitution, from 0 to 1.
+    pub e: f64,
+    /// Tangential coefficient of restitution, in (−1, 1]; with Newton's law energy may grow where it is not 0.
+    pub e_t: f64,
+}
+
+impl Law {
+    /// Friction alone.
+    pub fn friction(mu: f64) -> Self {
+        Self { mu, ..Self::default() }
+    }
+
+    fn validate(&self, key: &str) -> Result<(), SimulateError> {
+        let Self { mu, e, e_t } = *self;
+        require(|| format!("{key}.mu"), mu, mu >= 0.0, "a coefficient of at least 0")?;
+        require(|| format!("{key}.e"), e, (0.0..=1.0).contains(&e), "a coefficient from 0 to 1")?;
+        let allowed = -1.0 < e_t && e_t <= 1.0;
+        require(|| format!("{key}.e_t"), e_t, allowed, "a coefficient above -1 and at most 1")
+    }
+}
+
+/// Bodies, materials and gravity.
+#[derive(Debug, Clone, PartialEq)]
+pub struct World {
+    /// All bodies; a [`BodyId`] is a place here.
+    pub bodies: Vec<Body>,
+    /// Acceleration of gravity, m/s².
+    pub gravity: Vec3,
+    /// The law where no other is given for two materials.
+    pub law: Law,
+    materials: Vec<String>,
+    pairs: BTreeMap<(usize, usize), Law>,
+    apart: BTreeSet<(BodyId, BodyId)>,
+}
+
+impl Default for World {
+    fn default() -> Self {
+        Self::new([0.0, 0.0, -9.81])
+    }
+}
+
+impl World {
+    /// An empty world, frictionless and without restitution.
+    pub fn new(gravity: Vec3) -> Self {
+        Self {
+            bodies: vec![],
+            gravity,
+            law: Law::default(),
+            materials: vec!["default".into()],
+            pairs: BTreeMap::new(),
+            apart: BTreeSet::new(),
+        }
+    }
+
+    /// With this law between all materials that have no other.
+    #[must_use]
+    pub fn with_law(self, law: Law) -> Self {
+        Self { law, ..self }
+    }
+
+    /// Adds a body.
+    pub fn add(&mut self, body: Body) -> BodyId {
+        self.bodies.push(body);
+        BodyId(self.bodies.len() as u32 - 1)
+    }
+
+    /// The number of the material of this name, which is made where there is none.
+    pub fn material(&mut self, name: &str) -> usize {
+        self.materials.iter().position(|m| m == name).unwrap_or_else(|| {
+            self.materials.push(name.into());
+            self.materials.len() - 1
+        })
+    }
+
+    /// The names of the materials.
+    pub fn materials(&self) -> &[String] {
+        &self.materials
+    }
+
+    /// Gives two materials, which may be the same, a law of their own.
+    pub fn pair(&mut self, a: usize, b: usize, law: Law) {
+        self.pairs.insert((a.min(b), a.max(b)), law);
+    }
+
+    /// The law between two materials.
+    pub fn law_between(&self, a: usize, b: usize) -> Law {
+        self.pairs.get(&(a.min(b), a.max(b))).copied().unwrap_or(self.law)
+    }
+
+    /// Lets two bodies pass through each other: partners of a joint.
+    pub fn keep_apart(&mut self, a: BodyId, b: BodyId) {
+        self.apart.insert((a.min(b), a.max(b)));
+    }
+
+    /// Whether two bodies may touch.
+    pub fn may_touch(&self, a: BodyId, b: BodyId) -> bool {
+        let (p, q) = (&self.bodies[a.index()], &self.bodies[b.index()]);
+        (p.is_free() || q.is_free())
+            && p.membership & q.collides_with != 0
+            && q.membership & p.collides_with != 0
+            && !self.apart.contains(&(a.min(b), a.max(b)))
+    }
+
+    /// What messages call a body.
+    pub fn label(&self, body: usize) -> String {
+        match self.bodies[body].name.as_str() {
+            "" => format!("bodies[{body}]"),
+            name => format!("`{name}`"),
+        }
+    }
+
+    /// Checks every value and makes quaternions that are nearly of length one exactly so; returns what it changed, in words.
+    ///
+    /// Errors: the first value that is not possible, by its place: masses that are not positive, inertia that no solid has (it must be symmetric, positive
+    /// and satisfy the triangle inequality), quaternions whose squared length is off by more than 1e-3, a plane that moves freely, a material that does not exist.
+    pub fn validate(&mut self) -> Result<Vec<String>, SimulateError> {
+        let mut said = vec![];
+        finite(|| "gravity".into(), &self.gravity)?;
+        self.law.validate("law")?;
+        let count = self.materials.len();
+        for (&(a, b), law) in &self.pairs {
+            let name = |k: usize| self.materials.get(k).map_or("?", String::as_str);
+            let key = format!("pairs[{}, {}]", name(a), name(b));
+            if b >= count {
+                let expected = format!("two of the {count} materials");
+                return Err(SimulateError::value(key, expected, format!("{a} and {b}")));
+            }
+            law.validate(&key)?;
+        }
+        for (k, body) in self.bodies.iter_mut().enumerate() {
+            let key = match body.name.as_str() {
+                "" => format!("bodies[{k}]"),
+                name => format!("bodies[{k}] ({name})"),
+            };
+            body.validate(&key, count, &mut said)?;
+        }
+        Ok(said)
+    }
+}
+
+impl Body {
+    fn validate(
+        &mut self,
+        key: &str,
+        materials: usize,
+        said: &mut Vec<String>,
+    ) -> Result<(), SimulateError> {
+        for (name, x) in [
+            ("position", self.position),
+            ("velocity", self.velocity),
+            ("angular_velocity", self.angular_velocity),
+            ("force", self.force),
+            ("torque", self.torque),
+        ] {
+            finite(|| format!("{key}.{name}"), &x)?;
+        }
+        unit_quaternion(&format!("{key}.rotation"), &mut self.rotation, said)?;
+        match self.motion {
+            Motion::Free => {
+                let mass = self.mass;
+                require(|| format!("{key}.mass"), mass, mass > 0.0, "a positive number")?;
+                inertia(&format!("{key}.inertia"), &mut self.inertia)?;
+            }
+            Motion::Fixed => {}
+            Motion::Surface { linear, angular } => {
+                finite(|| format!("{key}.motion.linear"), &linear)?;
+                finite(|| format!("{key}.motion.angular"), &angular)?;
+            }
+            Motion::Oscillating { amplitude, frequency, phase } => {
+                finite(|| format!("{key}.motion.amplitude"), &amplitude)?;
+                finite(|| format!("{key}.motion.frequency"), &[frequency, phase])?;
+            }
+        }
+        for (s, part) in self.parts.iter_mut().enumerate() {
+            let key = format!("{key}.parts[{s}]");
+            part.shape.validate(&key)?;
+            finite(|| format!("{key}.position"), &part.position)?;
+            unit_quaternion(&format!("{key}.rotation"), &mut part.rotation, said)?;
+            if part.material >= materials {
+                let expected = format!("one of the {materials} materials");
+                return Err(SimulateError::value(
+                    format!("{key}.material"),
+                    expected,
+                    part.material,
+                ));
+            }
+            if part.shape == Shape::Plane && self.motion == Motion::Free {
+                let expected = "a solid: a plane cannot move freely";
+                return Err(SimulateError::value(format!("{key}.shape"), expected, "a plane"));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn unit_quaternion(
+    key: &str,
+    q: &mut Rotation,
+    said: &mut Vec<String>,
+) -> Result<(), SimulateError> {
+    let square = q.0.iter().map(|x| x * x).sum::<f64>();
+    let off = (square - 1.0).abs();
+    if off.is_nan() || off >= 1e-3 {
+        return Err(SimulateError::value(
+            key,
+            "a unit quaternion [w, x, y, z]",
+            format!("{:?}", q.0),
+        ));
+    }
+    if off > 1e-12 {
+        said.push(format!(
+            "{key}: a quaternion of squared length {square} was made one of length 1"
+        ));
+    }
+    if off > 0.0 {
+        *q = unit(*q);
+    }
+    Ok(())
+}
+
+/// Symmetric, positive, and with `½ tr(J) I − J = ∫ x xᵀ` positive semidefinite: the triangle inequality of the principal moments.
+fn inertia(key: &str, j: &mut Mat3) -> Result<(), SimulateError> {
+    let bad = |expected: &str, j: &Mat3| Err(SimulateError::value(key, expected, format!("{j:?}")));
+    let trace = j[0][0] + j[1][1] + j[2][2];
+    let tiny = 1e-9 * trace.abs();
+    let skew = (0..3).map(|k| (j[k][(k + 1) % 3] - j[(k + 1) % 3][k]).abs()).fold(0.0, f64::max);
+    if !trace.is_finite() || skew.is_nan() || skew > tiny {
+        return bad("a symmetric matrix", j);
+    }
+    for k in 0..3 {
+        for l in 0..k {
+            let mean = 0.5 * (j[k][l] + j[l][k]);
+            (j[k][l], j[l][k]) = (mean, mean);
+        }
+    }
+    let least = |a: &Mat3, slack: f64| {
+        let minor = |k: usize, l: usize| a[k][k] * a[l][l] - a[k][l] * a[k][l];
+        let det = dot(a[0], scenes::vec3::cross(a[1], a[2]));
+        (0..3).all(|k| a[k][k] > -slack)
+            && [(0, 1), (1, 2), (0, 2)].iter().all(|&(k, l)| minor(k, l) > -slack * trace)
+            && det > -slack * trace * trace
+    };
+    if !least(j, 0.0) {
+        return bad("a positive definite matrix", j);
+    }
+    let mut second: Mat3 = j.map(|row| row.map(|x| -x));
+    (0..3).for_each(|k| second[k][k] += 0.5 * trace);
+    if !least(&second, tiny.max(f64::MIN_POSITIVE)) {
+        return bad("an inertia whose principal moments satisfy the triangle inequality", j);
+    }
+    Ok(())
+}
+
+/// Two planes are one where their normals and offsets differ by less than this share of the scene.
+const SAME_PLANE: f64 = 1e-6;
+
+impl TryFrom<&Scene> for World {
+    type Error = SimulateError;
+
+    /// The rigid bodies of a scene, its ground and obstacles fixed, gravity, and the law of its contacts. Contacts with the ground that neither the
+    /// ground nor an obstacle explains are with walls, which become planes; a wall that moves keeps its velocity.
+    ///
+    /// Errors: elastic solids, and images of bodies in a periodic domain, which are not simulated; contacts of different laws.
+    fn try_from(scene: &Scene) -> Result<Self, SimulateError> {
+        scene.validate()?;
+        if !scene.solids.is_empty() {
+            return Err(SimulateError::value("solids", "rigid bodies alone", scene.solids.len()));
+        }
+        let law =
+            scene.contacts.first().map_or(Law::default(), |c| Law { mu: c.mu, e: c.e, e_t: 0.0 });
+        for (k, c) in scene.contacts.iter().enumerate() {
+            if (c.mu, c.e) != (law.mu, law.e) {
+                let expected = format!("mu = {} and e = {} as of contacts[0]", law.mu, law.e);
+                let found = format!("mu = {} and e = {}", c.mu, c.e);
+                return Err(SimulateError::value(format!("contacts[{k}]"), expected, found));
+            }
+            if c.a.is_some() && c.image != scenes::Image::default() {
+                let expected = "no periodic images";
+                return Err(SimulateError::value(format!("contacts[{k}].image"), expected, "one"));
+            }
+        }
+        let mut world = World::new(scene.gravity).with_law(law);
+        for body in &scene.bodies {
+            world.add(Body {
+                mass: body.mass,
+                inertia: body.inertia,
+                position: body.position,
+                rotation: body.rotation,
+                velocity: body.velocity,
+                angular_velocity: body.angular_velocity,
+                force: body.force,
+                ..Body::bare(Motion::Free, parts(&body.shape))
+            });
+        }
+        for (k, obstacle) in scene.obstacles.iter().enumerate() {
+            let body = Body::fixed(parts(&obstacle.shape)).at(obstacle.position);
+            world.add(body.named(format!("obstacle {k}")));
+        }
+        let mut planes: Vec<(Vec3, Vec3, Vec3)> = vec![];
+        if let Some(ground) = &scene.ground {
+            planes.push((ground.point, ground.normal, [0.0; 3]));
+        }
+        let size = scene.bodies.iter().map(|b| b.shape.radius()).fold(0.0, f64::max);
+        for c in scene.contacts.iter().filter(|c| c.a.is_none()) {
+            let n = c.frame()[0];
+            let on_plane = |&(p, m, v): &(Vec3, Vec3, Vec3)| {
+                dot(n, m) > 1.0 - SAME_PLANE
+                    && dot(m, sub(c.point, p)).abs() < 0.1 * size
+                    && v == c.image.velocity
+            };
+            let on_obstacle =
+                scene.obstacles.iter().any(|o| touches(o, c.point, SAME_PLANE * size));
+            if !on_obstacle && !planes.iter().any(on_plane) {
+                planes.push((c.point, n, c.image.velocity));
+            }
+        }
+        for (k, (point, normal, velocity)) in planes.into_iter().enumerate() {
+            let body = Body::fixed(vec![plane(point, normal)?]).named(format!("plane {k}"));
+            let motion = match velocity == [0.0; 3] {
+                true => Motion::Fixed,
+                false => Motion::Surface { linear: velocity, angular: [0.0; 3] },
+            };
+            world.add(Body { motion, ..body });
+        }
+        Ok(world)
+    }
+}
+
+/// The parts of a shape of a scene.
+fn parts(shape: &scenes::Shape) -> Vec<Part> {
+    match shape {
+        scenes::Shape::Box { half } => vec![Part::new(Shape::Box { half: *half })],
+        scenes::Shape::Sphere { radius } => vec![Part::new(Shape::Sphere { radius: *radius })],
+        scenes::Shape::Polyhedron(p) => vec![Part::new(p.clone())],
+        scenes::Shape::Compound(parts) => parts.iter().cloned().map(Part::new).collect(),
+    }
+}
+
+/// Whether a point lies on, or within `slack` of, an obstacle.
+fn touches(obstacle: &scenes::Obstacle, point: Vec3, slack: f64) -> bool {
+    let p = sub(point, obstacle.position);
+    let inside = |q: &scenes::Polyhedron| {
+        (0..q.faces().len()).all(|k| {
+            let (n, d) = q.plane(k);
+            dot(n, p) - d <= slack
+        })
+    };
+    match &obstacle.shape {
+        scenes::Shape::Box { half } => (0..3).all(|k| p[k].abs() <= half[k] + slack),
+        scenes::Shape::Sphere { radius } => norm(p) <= radius + slack,
+        scenes::Shape::Polyhedron(q) => inside(q),
+        scenes::Shape::Compound(parts) => parts.iter().any(inside),
+    }
+}
+
+impl From<scenes::Polyhedron> for Part {
+    fn from(polyhedron: scenes::Polyhedron) -> Self {
+        Part::new(polyhedron)
+    }
+}
+
+/// `amplitude sin(frequency t + phase)` and its rate.
+pub(crate) fn oscillation(amplitude: Vec3, frequency: f64, phase: f64, t: f64) -> (Vec3, Vec3) {
+    let (s, c) = (frequency * t + phase).sin_cos();
+    (scale(s, amplitude), scale(frequency * c, amplitude))
+}
