@@ -16,6 +16,14 @@ pub enum SimulateError {
         /// What stands there.
         found: String,
     },
+    /// What a file says in a place that cannot be read there.
+    #[error("{path}: {problem}")]
+    Schema {
+        /// The path in the document, for example `bodies[3].shape`.
+        path: String,
+        /// What is wrong.
+        problem: String,
+    },
     /// Two shapes that may meet and whose contact is not implemented.
     #[error("{a} and {b}: contact between a {first} and a {second} is not supported")]
     Pair {

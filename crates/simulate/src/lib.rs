@@ -20,7 +20,7 @@
 //! # Ok::<(), nonsmooth_simulate::SimulateError>(())
 //! ```
 //!
-//! Scenes of `nonsmooth-scenes` are worlds too: `World::try_from(&scene)`.
+//! Scenes of `nonsmooth-scenes` are worlds too: `World::try_from(&scene)`. Scenes in files are [`SceneFile`]s.
 
 mod detect;
 mod error;
@@ -28,6 +28,7 @@ mod islands;
 mod moreau_jean;
 mod report;
 pub mod rotation;
+pub mod scene_file;
 mod shape;
 mod simulation;
 mod state;
@@ -40,6 +41,7 @@ pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean};
 pub use report::{
     ContactReport, Counts, Drift, EnergyBalance, RunReport, StepReport, StepStatus, Timings,
 };
+pub use scene_file::SceneFile;
 pub use shape::{Part, Shape, plane};
 pub use simulation::{Control, Force, Observer, Simulation, Wrenches};
 pub use state::{ContactMemory, State};

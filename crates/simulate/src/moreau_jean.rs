@@ -1,12 +1,13 @@
 //! The settings of the scheme, and of the solver inside.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::SimulateError;
 use crate::error::require;
 
 /// Moreau–Jean's θ-scheme for rigid bodies; the mathematics stands at the head of `step.rs`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MoreauJean {
     /// The weight of the end of the step, from ½ to 1. ½ keeps energy; impacts dissipate for `½ ≤ θ ≤ 1/(1 + e)`.
@@ -46,7 +47,7 @@ impl Default for MoreauJean {
 }
 
 /// How the gyroscopic torque `Ω × J Ω` enters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Gyroscopic {
     /// By the last pass, so that M stays symmetric; a fixed point that contracts by about `h ‖Ω‖`. At its end the rotation solves the implicit rule.
@@ -56,7 +57,7 @@ pub enum Gyroscopic {
 }
 
 /// Where the directions of a step are taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Geometry {
     /// At the beginning of the step.
@@ -67,7 +68,7 @@ pub enum Geometry {
 }
 
 /// Which contacts take part in a step; g is the gap and `u_N` its rate at the beginning.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Activation {
     /// Those with `g + γ h u_N ≤ slack`: the forecast index set.
@@ -89,7 +90,7 @@ impl Default for Activation {
 }
 
 /// The law of impact.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Impact {
     /// Newton's: `u_N⁺ ≥ −e u_N⁻`, Coulomb's law with u_T⁺ (or `u_T⁺ + e_T u_T⁻`). With e > 0 and friction energy may grow.

@@ -76,6 +76,9 @@ pub enum Control {
 
 /// Who follows a run: recorders, plots, tests.
 pub trait Observer {
+    /// Called before each step, of length h.
+    fn before(&mut self, _simulation: &mut Simulation, _h: f64) {}
+
     /// Called after each step.
     fn step(&mut self, simulation: &Simulation, report: &StepReport) -> Control;
 }
@@ -255,7 +258,9 @@ impl Simulation {
                 break;
             }
             let left = until - self.state.t;
-            let report = self.step(if left < h * (1.0 + 1e-9) { left } else { h })?;
+            let h = if left < h * (1.0 + 1e-9) { left } else { h };
+            observer.before(self, h);
+            let report = self.step(h)?;
             run.note(&report);
             let ended = report.status == StepStatus::NotFinite;
             if observer.step(self, &report) == Control::Stop || ended {

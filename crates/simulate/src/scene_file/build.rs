@@ -1,0 +1,484 @@
+//! From a [`SceneFile`] to bodies in a world.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nonsmooth_scenes::vec3::{Mat3, Vec3, add, norm};
+use nonsmooth_scenes::{Polyhedron, Rotation, SceneEntry};
+
+use super::{
+    BodyTable, ForceTable, GenerateTable, LawTable, MotionTable, PartTable, RotationTable,
+    SceneFile, ShapeOrName, ShapeTable,
+};
+use crate::error::{finite, require};
+use crate::shape::plane;
+use crate::{
+    Body, BodyId, Law, Motion, Part, Shape, SimulateError, Simulation, State, World, Wrenches,
+};
+
+/// Groups have a bit each.
+const GROUPS: usize = 32;
+
+impl From<LawTable> for Law {
+    fn from(LawTable { mu, e, e_t }: LawTable) -> Self {
+        Self { mu, e, e_t }
+    }
+}
+
+impl SceneFile {
+    /// The world of the scene.
+    ///
+    /// Errors: a value that is not possible, by its path; names that are not known, or there twice; materials that may meet without a law.
+    pub fn world(&self) -> Result<World, SimulateError> {
+        finite(|| "gravity".into(), &self.gravity)?;
+        let mut builder = Builder::new(self)?;
+        for (k, table) in self.bodies.iter().enumerate() {
+            let key = match table.name.as_str() {
+                "" => format!("bodies[{k}]"),
+                name => format!("bodies[{k}] ({name})"),
+            };
+            let body = builder.body(table, &key)?;
+            builder.add(body, &key)?;
+        }
+        for (k, table) in self.generate.iter().enumerate() {
+            builder.family(table, &format!("generate[{k}]"))?;
+        }
+        builder.laws()?;
+        Ok(builder.world)
+    }
+
+    /// The scene, ready to move.
+    ///
+    /// Errors: those of [`world`](Self::world) and of [`Simulation::new`]; forces on bodies that there are not; an unknown solver or setting.
+    pub fn build(&self) -> Result<Simulation, SimulateError> {
+        let Self { time, solver, .. } = self;
+        require(|| "time.h".into(), time.h, time.h > 0.0, "a positive number of seconds")?;
+        require(
+            || "time.end".into(),
+            time.end,
+            time.end >= 0.0,
+            "a number of seconds of at least 0",
+        )?;
+        let within = solver.tol > 0.0 && solver.tol <= 1.0;
+        require(|| "solver.tol".into(), solver.tol, within, "a positive number of at most 1")?;
+        if self.output.every == 0 {
+            return Err(SimulateError::value("output.every", "at least one step", 0));
+        }
+        let world = self.world()?;
+        let forces = self.forces.iter().enumerate();
+        let forces: Vec<_> = forces
+            .map(|(k, table)| acting(table, &world, &format!("forces[{k}]")))
+            .collect::<Result<_, _>>()?;
+        let mut simulation = Simulation::new(world, self.integrator)?
+            .with_solver(&solver.name, solver.settings.clone())?
+            .with_tolerance(solver.tol);
+        for force in forces {
+            simulation = simulation.with_force(force);
+        }
+        Ok(simulation)
+    }
+}
+
+/// A force of the file, as the simulation asks for it.
+fn acting(
+    table: &ForceTable,
+    world: &World,
+    key: &str,
+) -> Result<impl FnMut(&State, &mut Wrenches) + Send + use<>, SimulateError> {
+    let ForceTable { force, torque, at, .. } = table.clone();
+    for (name, vector) in [("force", force), ("torque", torque), ("at", at)] {
+        finite(|| format!("{key}.{name}"), &vector)?;
+    }
+    let (from, until) =
+        (table.from.unwrap_or(f64::NEG_INFINITY), table.until.unwrap_or(f64::INFINITY));
+    if from.is_nan() || until.is_nan() || from >= until {
+        let expected = "an end after the beginning";
+        return Err(SimulateError::value(
+            format!("{key}.until"),
+            expected,
+            format!("{from} to {until}"),
+        ));
+    }
+    let place = world.bodies.iter().position(|b| b.name == table.body && !b.name.is_empty());
+    let Some(place) = place else {
+        let names = world.bodies.iter().map(|b| b.name.as_str()).filter(|n| !n.is_empty());
+        return Err(unknown(&format!("{key}.body"), "body", &table.body, names));
+    };
+    let body = BodyId(place as u32);
+    Ok(move |state: &State, wrenches: &mut Wrenches| {
+        // `state` is that of the middle of the step.
+        if from <= state.t && state.t < until {
+            let [w, x, y, z] = state.rotation[place];
+            let arm = nonsmooth_scenes::vec3::apply(&Rotation([w, x, y, z]).matrix(), at);
+            wrenches.force_at(state, body, force, add(state.position[place], arm));
+            wrenches.torque(body, torque);
+        }
+    })
+}
+
+fn unknown<'a>(
+    key: &str,
+    what: &str,
+    name: &str,
+    known: impl Iterator<Item = &'a str> + Clone,
+) -> SimulateError {
+    let meant = nonsmooth_solve::spelling::meant(name, known);
+    SimulateError::value(key, format!("the name of a {what}"), format!("`{name}`{meant}"))
+}
+
+/// A world that is being filled.
+struct Builder<'a> {
+    file: &'a SceneFile,
+    world: World,
+    shapes: BTreeMap<&'a str, &'a ShapeTable>,
+    groups: Vec<&'a str>,
+    names: BTreeSet<String>,
+    /// Pairs of materials with a law.
+    stated: BTreeSet<(usize, usize)>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(file: &'a SceneFile) -> Result<Self, SimulateError> {
+        let mut world = World::new(file.gravity);
+        if let Some(law) = file.pairs_default {
+            world.law = law.into();
+        }
+        file.materials.keys().for_each(|name| {
+            world.material(name);
+        });
+        for (name, material) in &file.materials {
+            if let Some(density) = material.density {
+                let key = || format!("materials.{name}.density");
+                require(key, density, density > 0.0, "a positive number")?;
+            }
+        }
+        let mut shapes = BTreeMap::new();
+        for (k, named) in file.shapes.iter().enumerate() {
+            if shapes.insert(named.name.as_str(), &named.shape).is_some() {
+                return Err(twice(&format!("shapes[{k}].name"), &named.name));
+            }
+        }
+        Ok(Self {
+            file,
+            world,
+            shapes,
+            groups: vec![],
+            names: BTreeSet::new(),
+            stated: BTreeSet::new(),
+        })
+    }
+
+    fn add(&mut self, body: Body, key: &str) -> Result<(), SimulateError> {
+        if !body.name.is_empty() && !self.names.insert(body.name.clone()) {
+            return Err(twice(&format!("{key}.name"), &body.name));
+        }
+        self.world.add(body);
+        Ok(())
+    }
+
+    fn body(&mut self, table: &'a BodyTable, key: &str) -> Result<Body, SimulateError> {
+        let parts = self.parts(table, key)?;
+        let driven = table.fixed || table.motion.is_some();
+        let at = |name: &str| format!("{key}.{name}");
+        let density = match (table.density, &table.material) {
+            (Some(density), _) => Some(density),
+            (None, Some(material)) => self.file.materials.get(material).and_then(|m| m.density),
+            (None, None) => None,
+        };
+        let rotation = rotation(table.rotation.as_ref(), &at("rotation"))?;
+        let mut body = match (driven, table.mass, density) {
+            (true, Some(_), _) => {
+                return Err(SimulateError::value(
+                    at("mass"),
+                    "none of a body that does not move freely",
+                    "one",
+                ));
+            }
+            (true, None, _) => Body::fixed(parts).at(table.position),
+            (false, Some(mass), _) => {
+                if table.density.is_some() {
+                    return Err(SimulateError::value(
+                        at("density"),
+                        "either a mass or a density",
+                        "both",
+                    ));
+                }
+                let inertia = inertia(table.inertia.as_deref(), &at("inertia"))?;
+                Body::with_mass(mass, inertia, parts).at(table.position)
+            }
+            (false, None, Some(density)) => {
+                if table.inertia.is_some() {
+                    let expected = "none with a density, which it follows from";
+                    return Err(SimulateError::value(at("inertia"), expected, "one"));
+                }
+                require(|| at("density"), density, density > 0.0, "a positive number")?;
+                let dense = parts.into_iter().map(|part| (part, density)).collect();
+                let body = Body::composed(dense).map_err(|e| placed(e, key))?;
+                let offset = nonsmooth_scenes::vec3::apply(&rotation.matrix(), body.position);
+                let position = add(table.position, offset);
+                body.at(position)
+            }
+            (false, None, None) => {
+                let expected =
+                    "a mass with inertia, a density, a material with one, or fixed = true";
+                return Err(SimulateError::value(at("mass"), expected, "none of them"));
+            }
+        };
+        if table.inertia.is_some() && table.mass.is_none() {
+            return Err(SimulateError::value(at("mass"), "one where an inertia is given", "none"));
+        }
+        body.motion = match (table.fixed, table.motion) {
+            (true, Some(_)) => {
+                return Err(SimulateError::value(at("motion"), "none of a fixed body", "one"));
+            }
+            (true, None) => Motion::Fixed,
+            (false, Some(MotionTable::Surface { velocity, angular_velocity })) => {
+                Motion::Surface { linear: velocity, angular: angular_velocity }
+            }
+            (false, Some(MotionTable::Sine { amplitude, frequency, phase })) => {
+                Motion::Oscillating { amplitude, frequency, phase }
+            }
+            (false, None) => Motion::Free,
+        };
+        (body.force, body.torque) = (table.force, table.torque);
+        if !table.groups.is_empty() {
+            body.membership = self.bits(&table.groups, &at("groups"))?;
+        }
+        if !table.collides_with.is_empty() {
+            body.collides_with = self.bits(&table.collides_with, &at("collides_with"))?;
+        }
+        Ok(body.named(&table.name).turned(rotation).moving(table.velocity, table.angular_velocity))
+    }
+
+    fn parts(&mut self, table: &'a BodyTable, key: &str) -> Result<Vec<Part>, SimulateError> {
+        let material = self.material(table.material.as_deref(), &format!("{key}.material"))?;
+        match (&table.shape, &table.shapes[..]) {
+            (Some(shape), []) => Ok(vec![self.part(shape, &format!("{key}.shape"))?.of(material)]),
+            (None, shapes) => {
+                let each = shapes.iter().enumerate();
+                each.map(|(k, part)| self.placed(part, material, &format!("{key}.shapes[{k}]")))
+                    .collect()
+            }
+            (Some(_), _) => {
+                let key = format!("{key}.shapes");
+                Err(SimulateError::value(key, "either shape or shapes", "both"))
+            }
+        }
+    }
+
+    fn placed(
+        &mut self,
+        table: &'a PartTable,
+        material: usize,
+        key: &str,
+    ) -> Result<Part, SimulateError> {
+        let own = match &table.material {
+            None => material,
+            name => self.material(name.as_deref(), &format!("{key}.material"))?,
+        };
+        let part = self.part(&table.shape, &format!("{key}.shape"))?;
+        let turned = rotation(table.rotation.as_ref(), &format!("{key}.rotation"))?;
+        let position =
+            add(table.position, nonsmooth_scenes::vec3::apply(&turned.matrix(), part.position));
+        finite(|| format!("{key}.position"), &table.position)?;
+        Ok(part.clone().at(position, turned.after(part.rotation)).of(own))
+    }
+
+    fn material(&mut self, name: Option<&str>, key: &str) -> Result<usize, SimulateError> {
+        let Some(name) = name else { return Ok(0) };
+        match self.file.materials.contains_key(name) {
+            true => Ok(self.world.material(name)),
+            false => {
+                let known = self.file.materials.keys().map(String::as_str);
+                Err(unknown(key, "material of [materials]", name, known))
+            }
+        }
+    }
+
+    fn part(&self, shape: &ShapeOrName, key: &str) -> Result<Part, SimulateError> {
+        let table = match shape {
+            ShapeOrName::Shape(table) => table,
+            ShapeOrName::Name(name) => {
+                self.shapes.get(name.as_str()).copied().ok_or_else(|| {
+                    unknown(key, "shape of [[shapes]]", name, self.shapes.keys().copied())
+                })?
+            }
+        };
+        let solid = |made: Result<Polyhedron, nonsmooth_scenes::SceneError>| {
+            made.map(|p| Part::new(Shape::Polyhedron(p)))
+                .map_err(|e| SimulateError::Schema { path: key.into(), problem: e.to_string() })
+        };
+        Ok(match table {
+            ShapeTable::Sphere { radius } => Part::new(Shape::Sphere { radius: *radius }),
+            ShapeTable::Box { half } => Part::new(Shape::Box { half: *half }),
+            ShapeTable::Capsule { half_length, radius } => {
+                Part::new(Shape::Capsule { half_length: *half_length, radius: *radius })
+            }
+            ShapeTable::Plane { normal } => plane([0.0; 3], *normal)
+                .map_err(|e| SimulateError::Schema { path: key.into(), problem: e.to_string() })?,
+            ShapeTable::Polyhedron { vertices, faces } => {
+                solid(Polyhedron::new(vertices.clone(), faces.clone()))?
+            }
+            ShapeTable::Prism { base, half_height } => {
+                let h = *half_height;
+                require(|| format!("{key}.half_height"), h, h > 0.0, "a positive number")?;
+                let base: Vec<Vec3> = base.iter().map(|[x, y]| [*x, *y, -h]).collect();
+                solid(Polyhedron::prism(&base, [0.0, 0.0, 2.0 * h]))?
+            }
+        })
+    }
+
+    /// The bits of groups, which are numbered as they are met.
+    fn bits(&mut self, names: &'a [String], key: &str) -> Result<u32, SimulateError> {
+        let mut bits = 0;
+        for name in names {
+            let k = self.groups.iter().position(|g| g == name).unwrap_or(self.groups.len());
+            if k == GROUPS {
+                let expected = format!("at most {GROUPS} groups in a scene");
+                return Err(SimulateError::value(key, expected, format!("`{name}` as another")));
+            }
+            if k == self.groups.len() {
+                self.groups.push(name);
+            }
+            bits |= 1 << k;
+        }
+        Ok(bits)
+    }
+
+    /// Adds the bodies of a family.
+    fn family(&mut self, table: &GenerateTable, key: &str) -> Result<(), SimulateError> {
+        finite(|| format!("{key}.position"), &table.position)?;
+        let wrong = |problem: String| SimulateError::Schema { path: key.into(), problem };
+        let scene = SceneEntry::find(&table.scene).and_then(|entry| entry.make(&table.set));
+        let scene = scene.map_err(|e| wrong(e.to_string()))?;
+        let made = World::try_from(&scene).map_err(|e| wrong(e.to_string()))?;
+        let name = table.name.as_deref().unwrap_or(&table.scene);
+        let material = self.world.material(name);
+        self.world.pair(material, material, made.law);
+        self.stated.insert((material, material));
+        for (k, body) in made.bodies.into_iter().enumerate() {
+            let own = match body.name.as_str() {
+                "" => format!("{name} {k}"),
+                of => format!("{name} {of}"),
+            };
+            let position = add(body.position, table.position);
+            self.add(body.named(own).at(position).of(material), key)?;
+        }
+        Ok(())
+    }
+
+    /// The laws of pairs; whoever may meet must have one.
+    fn laws(&mut self) -> Result<(), SimulateError> {
+        for (k, pair) in self.file.pairs.iter().enumerate() {
+            let [a, b] = &pair.between;
+            let number = |name: &str| {
+                let known = self.world.materials();
+                match known.iter().position(|m| m == name) {
+                    Some(k) => Ok(k),
+                    None => {
+                        let key = format!("pairs[{k}].between");
+                        Err(unknown(&key, "material", name, known.iter().map(String::as_str)))
+                    }
+                }
+            };
+            let (a, b) = (number(a)?, number(b)?);
+            let fresh = self.stated.insert((a.min(b), a.max(b)));
+            let own = self.file.generate.iter().any(|g| {
+                let name = g.name.as_deref().unwrap_or(&g.scene);
+                a == b && self.world.materials()[a] == name
+            });
+            if !fresh && !own {
+                let names = format!("{} and {}", pair.between[0], pair.between[1]);
+                return Err(twice(&format!("pairs[{k}].between"), &names));
+            }
+            self.world.pair(a, b, Law { mu: pair.mu, e: pair.e, e_t: pair.e_t });
+        }
+        match self.file.pairs_default {
+            Some(_) => Ok(()),
+            None => self.all_stated(),
+        }
+    }
+
+    fn all_stated(&self) -> Result<(), SimulateError> {
+        // Of each combination of materials and groups one body is enough; those that do not move freely differ from those that do.
+        let mut kinds: BTreeMap<_, usize> = BTreeMap::new();
+        for (k, body) in self.world.bodies.iter().enumerate() {
+            for part in &body.parts {
+                let like = (part.material, body.membership, body.collides_with, body.is_free());
+                kinds.entry((like, 0)).or_insert(k);
+                // Two of a kind may meet, too.
+                if kinds[&(like, 0)] != k {
+                    kinds.entry((like, 1)).or_insert(k);
+                }
+            }
+        }
+        let all: Vec<_> = kinds.iter().map(|(((material, ..), _), &k)| (*material, k)).collect();
+        for (i, &(m, a)) in all.iter().enumerate() {
+            for &(n, b) in &all[i + 1..] {
+                let meet = a != b && self.world.may_touch(BodyId(a as u32), BodyId(b as u32));
+                if meet && !self.stated.contains(&(m.min(n), m.max(n))) {
+                    let name = |k: usize| &self.world.materials()[k];
+                    let expected = format!(
+                        "a law between the materials `{}` and `{}`, for {} and {} may meet, or [pairs_default]",
+                        name(m),
+                        name(n),
+                        self.world.label(a),
+                        self.world.label(b)
+                    );
+                    return Err(SimulateError::value("pairs", expected, "none"));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn twice(key: &str, name: &str) -> SimulateError {
+    SimulateError::value(key, "a name that is not taken", format!("`{name}` again"))
+}
+
+/// An error of a part of a body, at its place in the file.
+fn placed(error: SimulateError, key: &str) -> SimulateError {
+    SimulateError::Schema { path: key.into(), problem: error.to_string() }
+}
+
+fn rotation(table: Option<&RotationTable>, key: &str) -> Result<Rotation, SimulateError> {
+    let Some(table) = table else { return Ok(Rotation::IDENTITY) };
+    let wrong = |found: &str| {
+        let expected = "axis with angle or angle_deg, or quaternion";
+        Err(SimulateError::value(key, expected, found))
+    };
+    match *table {
+        RotationTable { quaternion: Some(q), axis: None, angle: None, angle_deg: None } => {
+            finite(|| format!("{key}.quaternion"), &q)?;
+            Ok(Rotation(q))
+        }
+        RotationTable { quaternion: None, axis: Some(axis), angle, angle_deg } => {
+            let angle = match (angle, angle_deg) {
+                (Some(angle), None) => angle,
+                (None, Some(degrees)) => degrees.to_radians(),
+                (None, None) => return wrong("axis alone"),
+                (Some(_), Some(_)) => return wrong("both angle and angle_deg"),
+            };
+            require(|| format!("{key}.angle"), angle, true, "a finite number")?;
+            let length = norm(axis);
+            if !(length > 0.0 && length.is_finite()) {
+                let found = format!("{axis:?}");
+                return Err(SimulateError::value(format!("{key}.axis"), "a direction", found));
+            }
+            Ok(Rotation::about(axis, angle))
+        }
+        RotationTable { quaternion: Some(_), .. } => wrong("quaternion and more"),
+        RotationTable { axis: None, .. } => wrong("no axis"),
+    }
+}
+
+fn inertia(values: Option<&[f64]>, key: &str) -> Result<Mat3, SimulateError> {
+    match values {
+        Some(&[a, b, c]) => Ok([[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, c]]),
+        Some(&[a, b, c, ab, ac, bc]) => Ok([[a, ab, ac], [ab, b, bc], [ac, bc, c]]),
+        Some(other) => {
+            Err(SimulateError::value(key, "3 or 6 numbers", format!("{} numbers", other.len())))
+        }
+        None => Err(SimulateError::value(key, "3 or 6 numbers, since a mass is given", "none")),
+    }
+}

@@ -1,0 +1,402 @@
+//! Scenes as files: TOML, or the same document as JSON.
+//!
+//! A [`SceneFile`] is what the file says, with defaults for the rest; [`build`](SceneFile::build) makes a [`Simulation`](crate::Simulation) of it. Names are ids, bodies have the order of the file, lengths are
+//! metres, masses kilograms, angles radians. Friction belongs to pairs of materials: nothing is mixed. Whatever is wrong is one line that begins with the
+//! place, for example `bodies[2].mass`.
+//!
+//! ```
+//! use nonsmooth_simulate::SceneFile;
+//!
+//! let scene = SceneFile::parse(r#"
+//!     format = "nonsmooth-scene"
+//!     version = 1
+//!     time = { h = 1e-3, end = 1.0 }
+//!     pairs_default = { e = 0.8 }
+//!     bodies = [
+//!         { name = "floor", shape = { kind = "plane" }, fixed = true },
+//!         { name = "ball", shape = { kind = "sphere", radius = 0.1 }, density = 1000, position = [0, 0, 1.1] },
+//!     ]
+//! "#, &[])?;
+//! let mut simulation = scene.build()?;
+//! let run = simulation.run(scene.time.end, scene.time.h, &mut ())?;
+//! assert!(run.is_solved() && run.steps == 1000);
+//! # Ok::<(), nonsmooth_simulate::SimulateError>(())
+//! ```
+
+mod build;
+mod read;
+
+use std::collections::BTreeMap;
+
+use nonsmooth_solve::settings::SettingsMap;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::MoreauJean;
+
+/// What `format` has to say.
+pub const FORMAT: &str = "nonsmooth-scene";
+/// The version of the format that is read.
+pub const VERSION: u32 = 1;
+
+/// A scene: bodies, what they are made of, how long they move and what is kept of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFile {
+    /// `nonsmooth-scene`.
+    pub format: String,
+    /// 1.
+    pub version: u32,
+    /// The title of pictures and files.
+    #[serde(default)]
+    pub name: String,
+    /// Acceleration of gravity, m/s².
+    #[serde(default = "earth")]
+    pub gravity: [f64; 3],
+    /// How long, and in which steps.
+    pub time: Time,
+    /// The scheme.
+    #[serde(default)]
+    pub integrator: MoreauJean,
+    /// Who solves the contact problems.
+    #[serde(default)]
+    pub solver: SolverTable,
+    /// Materials by name.
+    #[serde(default)]
+    pub materials: BTreeMap<String, Material>,
+    /// The law of contact of each pair of materials that meets.
+    #[serde(default)]
+    pub pairs: Vec<PairTable>,
+    /// The law of pairs that are not listed. Without it, a pair that may meet and is not listed is refused.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pairs_default: Option<LawTable>,
+    /// Shapes that several bodies have.
+    #[serde(default)]
+    pub shapes: Vec<NamedShape>,
+    /// Bodies, one by one.
+    #[serde(default)]
+    pub bodies: Vec<BodyTable>,
+    /// Bodies of the families of `nonsmooth gen`: walls, piles, arches.
+    #[serde(default)]
+    pub generate: Vec<GenerateTable>,
+    /// Forces that do not act at the mass centre, or not always.
+    #[serde(default)]
+    pub forces: Vec<ForceTable>,
+    /// What is kept of a run.
+    #[serde(default)]
+    pub output: OutputTable,
+}
+
+/// How long, and in which steps.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Time {
+    /// Time step, s.
+    pub h: f64,
+    /// End of the run, s.
+    pub end: f64,
+}
+
+/// Who solves the contact problems of a step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SolverTable {
+    /// A solver of `nonsmooth list` for local problems in 3D.
+    pub name: String,
+    /// The relative residual at which the judge is content.
+    pub tol: f64,
+    /// What departs from the solver's defaults.
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    pub settings: SettingsMap,
+}
+
+impl Default for SolverTable {
+    fn default() -> Self {
+        Self { name: "auto".into(), tol: 1e-10, settings: SettingsMap::new() }
+    }
+}
+
+/// What bodies are made of.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Material {
+    /// kg/m³; for bodies that have no density or mass of their own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub density: Option<f64>,
+}
+
+/// A law of contact.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct LawTable {
+    /// Coefficient of friction.
+    pub mu: f64,
+    /// Newton's coefficient of restitution, from 0 to 1.
+    pub e: f64,
+    /// Tangential coefficient of restitution, above −1 and at most 1.
+    pub e_t: f64,
+}
+
+/// The law of contact of two materials.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PairTable {
+    /// Two materials, which may be the same.
+    pub between: [String; 2],
+    /// Coefficient of friction.
+    #[serde(default)]
+    pub mu: f64,
+    /// Newton's coefficient of restitution, from 0 to 1.
+    #[serde(default)]
+    pub e: f64,
+    /// Tangential coefficient of restitution, above −1 and at most 1.
+    #[serde(default)]
+    pub e_t: f64,
+}
+
+/// A shape.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum ShapeTable {
+    /// A ball about the origin.
+    Sphere {
+        /// m.
+        radius: f64,
+    },
+    /// A box about the origin, sides along the axes.
+    Box {
+        /// Half sides, m.
+        half: [f64; 3],
+    },
+    /// All points within the radius of a segment on the third axis about the origin.
+    Capsule {
+        /// Half the length of the segment, m.
+        half_length: f64,
+        /// m.
+        radius: f64,
+    },
+    /// The half space below a plane through the origin; of bodies that are fixed.
+    Plane {
+        /// Its normal, of any length.
+        #[serde(default = "upwards")]
+        normal: [f64; 3],
+    },
+    /// A convex polyhedron.
+    Polyhedron {
+        /// m.
+        vertices: Vec<[f64; 3]>,
+        /// The vertices of each face by number, counterclockwise from outside.
+        faces: Vec<Vec<usize>>,
+    },
+    /// A straight prism on a convex polygon, counterclockwise from above, that it has in the plane z = −half_height.
+    Prism {
+        /// Corners (x, y), m.
+        base: Vec<[f64; 2]>,
+        /// m.
+        half_height: f64,
+    },
+}
+
+/// A shape that bodies ask for by name.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NamedShape {
+    /// The name.
+    pub name: String,
+    /// The shape.
+    #[serde(flatten)]
+    pub shape: ShapeTable,
+}
+
+/// A shape, or the name of one of `shapes`.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum ShapeOrName {
+    /// One of `shapes`.
+    Name(String),
+    /// One of its own.
+    Shape(ShapeTable),
+}
+
+/// An orientation: `axis` with `angle` (or `angle_deg`), or `quaternion`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RotationTable {
+    /// The axis, of any length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[f64; 3]>,
+    /// rad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle: Option<f64>,
+    /// Degrees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle_deg: Option<f64>,
+    /// `[w, x, y, z]`, of length 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quaternion: Option<[f64; 4]>,
+}
+
+/// One of several shapes of a body.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PartTable {
+    /// The shape.
+    pub shape: ShapeOrName,
+    /// The origin of the shape in the body, m.
+    #[serde(default)]
+    pub position: [f64; 3],
+    /// The orientation of the shape in the body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<RotationTable>,
+    /// The material, in place of the body's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<String>,
+}
+
+/// A body. With a density, its own or its material's, mass and inertia are those of its shapes, and its frame moves to their mass centre; else `mass` and `inertia`
+/// are about the origin of its frame.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct BodyTable {
+    /// The name, an id where it is given.
+    pub name: String,
+    /// Its shape,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape: Option<ShapeOrName>,
+    /// or shapes.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub shapes: Vec<PartTable>,
+    /// One of `materials`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub material: Option<String>,
+    /// kg/m³, in place of the material's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub density: Option<f64>,
+    /// kg.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mass: Option<f64>,
+    /// kg·m²: `[xx, yy, zz]` or `[xx, yy, zz, xy, xz, yz]`, in the body frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inertia: Option<Vec<f64>>,
+    /// Where the origin of its frame is, m.
+    pub position: [f64; 3],
+    /// The orientation of its frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<RotationTable>,
+    /// Of the mass centre, m/s.
+    pub velocity: [f64; 3],
+    /// In the world frame, rad/s.
+    pub angular_velocity: [f64; 3],
+    /// Whether it stays where it is.
+    pub fixed: bool,
+    /// How it is driven, if it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motion: Option<MotionTable>,
+    /// Constant force at the mass centre besides the weight, N.
+    pub force: [f64; 3],
+    /// Constant torque in the world frame, N·m.
+    pub torque: [f64; 3],
+    /// The groups that it belongs to; of all, where none is named.
+    pub groups: Vec<String>,
+    /// The groups that it may touch; all, where none is named.
+    pub collides_with: Vec<String>,
+}
+
+/// How a driven body moves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum MotionTable {
+    /// It stays, its surface moves: a conveyor belt, a turntable.
+    Surface {
+        /// At the origin of the body, m/s.
+        #[serde(default)]
+        velocity: [f64; 3],
+        /// rad/s.
+        #[serde(default)]
+        angular_velocity: [f64; 3],
+    },
+    /// About its position by `amplitude sin(frequency t + phase)`: a shaking table.
+    Sine {
+        /// m.
+        amplitude: [f64; 3],
+        /// rad/s.
+        frequency: f64,
+        /// rad.
+        #[serde(default)]
+        phase: f64,
+    },
+}
+
+/// The bodies of a family of `nonsmooth gen`, with its ground and the law of its contacts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GenerateTable {
+    /// One of `nonsmooth gen --list`.
+    pub scene: String,
+    /// Its settings.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    pub set: SettingsMap,
+    /// The name of its material, for pairs with others; also how the names of its bodies begin. The family's name, where none is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// By how much all is moved, m.
+    #[serde(default)]
+    pub position: [f64; 3],
+}
+
+/// A force on a body.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ForceTable {
+    /// The name of the body.
+    pub body: String,
+    /// In the world frame, N.
+    #[serde(default)]
+    pub force: [f64; 3],
+    /// In the world frame, N·m.
+    #[serde(default)]
+    pub torque: [f64; 3],
+    /// Where the force acts, in the body frame, m.
+    #[serde(default)]
+    pub at: [f64; 3],
+    /// It begins here, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<f64>,
+    /// It ends here, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub until: Option<f64>,
+}
+
+/// What is kept of a run, and where: files beside the scene's, unless the command line says otherwise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct OutputTable {
+    /// Steps between two frames.
+    pub every: u64,
+    /// The trajectory, HDF5.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trajectory: Option<String>,
+    /// A page that plays it in a browser, without a network.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub html: Option<String>,
+    /// A table of time, energy and residual, a row a step.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub csv: Option<String>,
+    /// A folder for ParaView.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vtk: Option<String>,
+}
+
+impl Default for OutputTable {
+    fn default() -> Self {
+        Self { every: 1, trajectory: None, html: None, csv: None, vtk: None }
+    }
+}
+
+fn earth() -> [f64; 3] {
+    [0.0, 0.0, -9.81]
+}
+
+fn upwards() -> [f64; 3] {
+    [0.0, 0.0, 1.0]
+}

@@ -1,0 +1,159 @@
+//! From text to a [`SceneFile`], and back.
+
+use nonsmooth_solve::settings::SettingsMap;
+use nonsmooth_solve::spelling::meant;
+use serde::Deserialize;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, Visitor};
+
+use super::{FORMAT, GenerateTable, LawTable, SceneFile, ShapeOrName, ShapeTable, Time, VERSION};
+use crate::{MoreauJean, SimulateError};
+
+impl SceneFile {
+    /// Reads a scene from TOML, or from JSON where the text begins with `{`; `changes` are `key=value` with a path like `time.h` or `bodies[0].mass` and a TOML value (a word stands for itself).
+    ///
+    /// Errors: one line that begins with the place.
+    pub fn parse(text: &str, changes: &[&str]) -> Result<Self, SimulateError> {
+        let mut document: toml::Value = match text.trim_start().starts_with('{') {
+            true => serde_json::from_str(text).map_err(|e| {
+                let place = format!("line {}, column {}", e.line(), e.column());
+                SimulateError::value(place, "valid JSON", said(&e.to_string()))
+            })?,
+            false => toml::from_str(text).map(toml::Value::Table).map_err(|e| {
+                let before = &text[..e.span().map_or(0, |s| s.start.min(text.len()))];
+                let place = format!("line {}", before.matches('\n').count() + 1);
+                SimulateError::value(place, "valid TOML", said(e.message()))
+            })?,
+        };
+        for change in changes {
+            apply(&mut document, change)?;
+        }
+        let scene: Self = serde_path_to_error::deserialize(document).map_err(|e| {
+            let path = match e.path().to_string() {
+                root if root == "." => "the scene".to_owned(),
+                path => path,
+            };
+            SimulateError::Schema { path, problem: explained(&said(&e.into_inner().to_string())) }
+        })?;
+        scene.identified()
+    }
+
+    fn identified(self) -> Result<Self, SimulateError> {
+        if self.format != FORMAT {
+            let expected = format!("\"{FORMAT}\"");
+            return Err(SimulateError::value("format", expected, format!("\"{}\"", self.format)));
+        }
+        if self.version != VERSION {
+            return Err(SimulateError::value("version", VERSION.to_string(), self.version));
+        }
+        Ok(self)
+    }
+
+    /// The bodies of a family of `nonsmooth gen`, in motion: its time step, and `end`, s.
+    ///
+    /// Errors: a time step that is no number.
+    pub fn of_family(family: &str, set: SettingsMap, h: f64, end: f64) -> Self {
+        Self {
+            format: FORMAT.into(),
+            version: VERSION,
+            name: family.into(),
+            gravity: super::earth(),
+            time: Time { h, end },
+            integrator: MoreauJean::default(),
+            solver: Default::default(),
+            materials: Default::default(),
+            pairs: vec![],
+            pairs_default: Some(LawTable::default()),
+            shapes: vec![],
+            bodies: vec![],
+            generate: vec![GenerateTable {
+                scene: family.into(),
+                set,
+                name: None,
+                position: [0.0; 3],
+            }],
+            forces: vec![],
+            output: Default::default(),
+        }
+    }
+
+    /// The document, with all defaults written out, as TOML.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("tables of numbers, words and lists")
+    }
+
+    /// The JSON Schema of the format.
+    pub fn schema() -> serde_json::Value {
+        schemars::schema_for!(SceneFile).to_value()
+    }
+}
+
+/// A message on one line.
+fn said(message: &str) -> String {
+    message.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// With the key that may have been meant, where one is unknown.
+fn explained(message: &str) -> String {
+    let mut words = message.split('`').skip(1).step_by(2);
+    match words.next() {
+        Some(word) if message.starts_with("unknown") => {
+            format!("{message}{}", meant(word, words))
+        }
+        _ => message.into(),
+    }
+}
+
+/// Sets one value of the document.
+fn apply(document: &mut toml::Value, change: &str) -> Result<(), SimulateError> {
+    let wrong = |expected: &str| SimulateError::value("--set", expected, format!("`{change}`"));
+    let (path, text) = change.split_once('=').ok_or_else(|| wrong("KEY=VALUE"))?;
+    let value = match toml::from_str::<toml::Table>(&format!("x = {text}")) {
+        Ok(mut table) => table.remove("x").ok_or_else(|| wrong("KEY=VALUE"))?,
+        Err(_) => toml::Value::String(text.trim().into()),
+    };
+    let mut at = document;
+    for step in path.split('.') {
+        let (key, places) = match step.split_once('[') {
+            Some((key, rest)) => (key, rest.split('[').collect()),
+            None => (step, vec![]),
+        };
+        let table = at.as_table_mut().ok_or_else(|| wrong("a key of a table"))?;
+        let empty = || toml::Value::Table(toml::Table::new());
+        at = table.entry(key.trim()).or_insert_with(empty);
+        for place in places {
+            let k = place.strip_suffix(']').and_then(|k| k.parse::<usize>().ok());
+            let k = k.ok_or_else(|| wrong("a path like bodies[0].mass"))?;
+            let list = at.as_array_mut().ok_or_else(|| wrong("a place of a list"))?;
+            let length = list.len();
+            at = list.get_mut(k).ok_or_else(|| {
+                let key = format!("--set {path}");
+                SimulateError::value(key, format!("a place below {length}"), k)
+            })?;
+        }
+    }
+    *at = value;
+    Ok(())
+}
+
+impl<'de> Deserialize<'de> for ShapeOrName {
+    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = ShapeOrName;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str("the name of a shape, or a table with its kind")
+            }
+
+            fn visit_str<E>(self, name: &str) -> Result<ShapeOrName, E> {
+                Ok(ShapeOrName::Name(name.into()))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<ShapeOrName, A::Error> {
+                ShapeTable::deserialize(MapAccessDeserializer::new(map)).map(ShapeOrName::Shape)
+            }
+        }
+        from.deserialize_any(Either)
+    }
+}

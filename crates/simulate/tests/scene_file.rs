@@ -1,0 +1,300 @@
+//! Scenes as files: what they mean, and what is said of mistakes.
+
+use nonsmooth_simulate::scene_file::ShapeOrName;
+use nonsmooth_simulate::{SceneFile, SimulateError};
+
+/// A ball, a box on a belt, a composed body, and a wall of `gen`.
+const SCENE: &str = r#"
+format = "nonsmooth-scene"
+version = 1
+name = "all kinds"
+gravity = [0, 0, -9.81]
+
+[time]
+h = 1e-3
+end = 0.01
+
+[integrator]
+theta = 0.5
+
+[solver]
+name = "nsgs"
+tol = 1e-9
+settings = { local = "quartic" }
+
+[materials.stone]
+density = 2400
+[materials.rubber]
+
+[[pairs]]
+between = ["stone", "rubber"]
+mu = 0.5
+[[pairs]]
+between = ["stone", "stone"]
+mu = 0.6
+e = 0.1
+[pairs_default]
+mu = 0.3
+
+[[shapes]]
+name = "brick"
+kind = "box"
+half = [0.1, 0.2, 0.05]
+
+[[bodies]]
+name = "belt"
+shape = { kind = "plane" }
+material = "rubber"
+motion = { kind = "surface", velocity = [1, 0, 0] }
+
+[[bodies]]
+name = "block"
+shape = "brick"
+material = "stone"
+position = [0, 0, 0.05]
+rotation = { axis = [0, 0, 2], angle_deg = 90 }
+
+[[bodies]]
+name = "ball"
+shape = { kind = "sphere", radius = 0.1 }
+mass = 2.0
+inertia = [0.008, 0.008, 0.008]
+position = [2, 0, 0.1]
+velocity = [1, 0, 0]
+groups = ["balls"]
+
+[[bodies]]
+name = "dumbbell"
+density = 1000
+position = [0, 3, 0.1]
+shapes = [
+    { shape = { kind = "sphere", radius = 0.1 }, position = [-0.3, 0, 0] },
+    { shape = { kind = "sphere", radius = 0.1 }, position = [0.3, 0, 0], material = "stone" },
+]
+
+[[generate]]
+scene = "wall"
+set = { rows = 2, columns = 2, density = 1800.0 }
+position = [10, 0, 0]
+
+[[forces]]
+body = "ball"
+force = [0, 0.5, 0]
+at = [0, 0, 0.1]
+until = 0.005
+"#;
+
+#[test]
+fn a_scene_of_all_kinds_moves() {
+    let scene = SceneFile::parse(SCENE, &[]).unwrap();
+    let world = scene.world().unwrap();
+    let place = |name: &str| world.bodies.iter().position(|b| b.name == name).unwrap();
+    let block = &world.bodies[place("block")];
+    // A box of 2 × (0.1, 0.2, 0.05) m.
+    let mass = 2400.0 * 0.2 * 0.4 * 0.1;
+    assert!((block.mass - mass).abs() <= 1e-12 * mass);
+    let dumbbell = &world.bodies[place("dumbbell")];
+    let ball = 1000.0 * 4.0 / 3.0 * std::f64::consts::PI * 1e-3;
+    assert!((dumbbell.mass - 2.0 * ball).abs() <= 1e-12 * ball);
+    let across = 2.0 * ball * (0.4 * 0.01 + 0.09);
+    assert!((dumbbell.inertia[2][2] - across).abs() <= 1e-12 * across);
+    let [stone, rubber] =
+        ["stone", "rubber"].map(|name| world.materials().iter().position(|m| m == name).unwrap());
+    assert_eq!(world.law_between(rubber, stone).mu, 0.5);
+    assert_eq!(world.law_between(rubber, rubber).mu, 0.3);
+    assert_eq!(dumbbell.parts[1].material, stone);
+    assert!(world.bodies.iter().any(|b| b.name == "wall 0" && b.position[0] > 5.0));
+
+    let mut simulation = scene.build().unwrap();
+    let run = simulation.run(scene.time.end, scene.time.h, &mut ()).unwrap();
+    assert!(run.is_solved() && run.steps == 10, "{run}");
+    let state = simulation.state();
+    // The belt takes the block along: mu g t, and the ball is pushed sideways.
+    assert!((state.velocity[place("block")][0] - 0.5 * 9.81 * 0.01).abs() < 1e-6);
+    assert!(state.velocity[place("ball")][1] > 0.0);
+}
+
+#[test]
+fn the_completed_document_is_the_same_scene() {
+    let scene = SceneFile::parse(SCENE, &[]).unwrap();
+    let again = SceneFile::parse(&scene.to_toml(), &[]).unwrap();
+    assert_eq!(scene, again);
+    let json = serde_json::to_string(&scene).unwrap();
+    assert_eq!(scene, SceneFile::parse(&json, &[]).unwrap());
+}
+
+#[test]
+fn values_can_be_changed_by_their_paths() {
+    let changes = ["time.end=0.5", "bodies[2].mass = 3", "solver.name=auto", "name=other"];
+    let scene = SceneFile::parse(SCENE, &changes).unwrap();
+    assert_eq!((scene.time.end, scene.bodies[2].mass), (0.5, Some(3.0)));
+    assert_eq!((scene.solver.name.as_str(), scene.name.as_str()), ("auto", "other"));
+    for (change, says) in [
+        ("time.end", "--set: expected KEY=VALUE"),
+        ("bodies[9].mass=1", "--set bodies[9].mass: expected a place below 4, found 9"),
+        ("time.step=1", "time.step: unknown field `step`"),
+    ] {
+        let error = SceneFile::parse(SCENE, &[change]).unwrap_err().to_string();
+        assert!(error.contains(says), "{error}");
+    }
+}
+
+/// What is said where one line is another one.
+fn said(from: &str, to: &str) -> String {
+    assert!(SCENE.contains(from), "{from}");
+    let text = SCENE.replacen(from, to, 1);
+    let made = SceneFile::parse(&text, &[]).and_then(|scene| scene.build());
+    let error = made.err().unwrap_or_else(|| panic!("{to} is taken")).to_string();
+    assert!(!error.contains('\n'), "{error}");
+    error
+}
+
+#[test]
+fn mistakes_are_named_by_their_place() {
+    for (from, to, says) in [
+        ("h = 1e-3", "h = 0.0", "time.h: expected a positive number of seconds, found 0"),
+        ("h = 1e-3", "h = nan", "time.h"),
+        ("h = 1e-3", "h = \"fast\"", "time.h: invalid type: string \"fast\""),
+        ("h = 1e-3", "", "time: missing field `h`"),
+        ("h = 1e-3", "h = = 2", "line 8: expected valid TOML"),
+        ("theta = 0.5", "theta = 2.0", "integrator.theta: expected a number from 0.5 to 1"),
+        ("version = 1", "version = 7", "version: expected 1, found 7"),
+        ("\"nonsmooth-scene\"", "\"sdf\"", "format: expected \"nonsmooth-scene\""),
+        ("name = \"nsgs\"", "name = \"ngs\"", "did you mean `nsgs`?"),
+        ("local = \"quartic\"", "locl = \"quartic\"", "locl"),
+        ("density = 2400", "density = -1", "materials.stone.density: expected a positive number"),
+        (
+            "[\"stone\", \"rubber\"]",
+            "[\"stone\", \"ruber\"]",
+            "pairs[0].between: expected the name of a material, found `ruber` (did you mean `rubber`?)",
+        ),
+        ("mu = 0.6", "mu = -0.6", "pairs[stone, stone].mu: expected a coefficient of at least 0"),
+        (
+            "shape = \"brick\"",
+            "shape = \"bric\"",
+            "bodies[1] (block).shape: expected the name of a shape of [[shapes]], found `bric` (did you mean `brick`?)",
+        ),
+        (
+            "kind = \"sphere\", radius = 0.1 }\nmass",
+            "kind = \"ball\", radius = 0.1 }\nmass",
+            "bodies[2].shape: unknown variant `ball`",
+        ),
+        ("radius = 0.1 }\nmass", "radius = -0.1 }\nmass", "bodies[2] (ball)"),
+        ("mass = 2.0", "mas = 2.0", "bodies[2].mas: unknown field `mas`"),
+        ("mass = 2.0", "mass = -2.0", "bodies[2] (ball).mass"),
+        (
+            "inertia = [0.008, 0.008, 0.008]",
+            "inertia = [0.008, 0.008]",
+            "bodies[2] (ball).inertia: expected 3 or 6 numbers, found 2 numbers",
+        ),
+        (
+            "inertia = [0.008, 0.008, 0.008]",
+            "inertia = [0.001, 0.001, 0.008]",
+            "bodies[2] (ball).inertia",
+        ),
+        (
+            "inertia = [0.008, 0.008, 0.008]",
+            "",
+            "bodies[2] (ball).inertia: expected 3 or 6 numbers",
+        ),
+        (
+            "axis = [0, 0, 2], angle_deg = 90",
+            "axis = [0, 0, 0], angle = 1",
+            "bodies[1] (block).rotation.axis: expected a direction",
+        ),
+        ("axis = [0, 0, 2], angle_deg = 90", "quaternion = [1, 1, 1, 1]", "bodies[1] (block)"),
+        (
+            "axis = [0, 0, 2], angle_deg = 90",
+            "angle = 90",
+            "bodies[1] (block).rotation: expected axis with angle or angle_deg, or quaternion, found no axis",
+        ),
+        ("position = [0, 0, 0.05]", "position = [0, 0]", "bodies[1].position"),
+        (
+            "position = [0, 0, 0.05]",
+            "position = [0, 0, -0.05]",
+            "bodies overlap at the start: `belt` and `block` by 1.000e-1 m",
+        ),
+        (
+            "name = \"ball\"",
+            "name = \"block\"",
+            "name: expected a name that is not taken, found `block` again",
+        ),
+        (
+            "body = \"ball\"",
+            "body = \"bal\"",
+            "forces[0].body: expected the name of a body, found `bal` (did you mean `ball`?)",
+        ),
+        (
+            "force = [0, 0.5, 0]",
+            "force = [0, inf, 0]",
+            "forces[0].force: expected finite components",
+        ),
+        ("scene = \"wall\"", "scene = \"wal\"", "generate[0]"),
+        ("rows = 2,", "row = 2,", "generate[0]"),
+        ("[pairs_default]\nmu = 0.3", "", "pairs: expected a law between the materials"),
+        ("motion = { kind = \"surface\", velocity = [1, 0, 0] }", "", "bodies[0] (belt)"),
+    ] {
+        let error = said(from, to);
+        assert!(error.contains(says), "{to}: {error}");
+    }
+}
+
+#[test]
+fn keys_of_tables_are_refused_with_a_guess() {
+    let error = said("[integrator]\ntheta", "[integrator]\ntheta = 0.6\nthetta");
+    assert!(error.contains("(did you mean `theta`?)"), "{error}");
+}
+
+#[test]
+fn the_schema_lists_what_is_read() {
+    let schema = SceneFile::schema();
+    let text = schema.to_string();
+    for key in ["bodies", "pairs_default", "half_length", "restitution_threshold"] {
+        assert!(text.contains(&format!("\"{key}\"")), "{key}");
+    }
+    let shape: ShapeOrName = serde_json::from_str("\"brick\"").unwrap();
+    assert_eq!(shape, ShapeOrName::Name("brick".into()));
+}
+
+/// Whatever a scene says, the answer is a scene or one line.
+#[test]
+fn mutated_scenes_do_not_panic() {
+    use rand::{RngExt, SeedableRng};
+    let mut random = rand_pcg::Pcg64::seed_from_u64(7);
+    let words = ["-1", "0", "nan", "inf", "1e308", "\"\"", "[]", "{}", "true", "[1, 2]", "x"];
+    let lines: Vec<&str> = SCENE.lines().collect();
+    for _ in 0..2000 {
+        let mut text: Vec<String> = lines.iter().map(|l| (*l).to_owned()).collect();
+        for _ in 0..random.random_range(1..4) {
+            let k = random.random_range(0..text.len());
+            let word = words[random.random_range(0..words.len())];
+            match random.random_range(0..4) {
+                0 => drop(text.remove(k)),
+                1 => text[k] = text[k].split('=').next().unwrap().to_owned() + "= " + word,
+                2 => {
+                    let other = text[random.random_range(0..text.len())].clone();
+                    text.insert(k, other);
+                }
+                _ => {
+                    let mut bytes: Vec<char> = text[k].chars().collect();
+                    if !bytes.is_empty() {
+                        let at = random.random_range(0..bytes.len());
+                        bytes[at] = ['=', '[', '9', '"', '-', 'e'][random.random_range(0..6)];
+                    }
+                    text[k] = bytes.into_iter().collect();
+                }
+            }
+        }
+        let read = SceneFile::parse(&text.join("\n"), &[]);
+        // Scenes of a million bodies are possible, and no matter of this test.
+        let small = |scene: &SceneFile| {
+            let sizes = scene.generate.iter().flat_map(|g| g.set.values());
+            sizes.into_iter().all(|x| x.as_f64().is_none_or(|x| x.abs() < 10_000.0))
+        };
+        if let Err(error) = read.and_then(|s| if small(&s) { s.build().map(drop) } else { Ok(()) })
+        {
+            assert!(!error.to_string().contains('\n'), "{error}");
+            assert!(!matches!(error, SimulateError::Checkpoint { .. }));
+        }
+    }
+}
