@@ -255,7 +255,7 @@ impl Simulation {
                 break;
             }
             let left = until - self.state.t;
-            let report = self.step(if left < h * (1.0 + 1e-9) { left } else { h })?;
+            let report = self.step(if left < h * (1.0 - 1e-9) { left } else { h })?;
             run.note(&report);
             let ended = report.status == StepStatus::NotFinite;
             if observer.step(self, &report) == Control::Stop || ended {

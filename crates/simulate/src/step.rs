@@ -428,9 +428,19 @@ impl Tools {
             let approach =
                 dot(n, sub(b.velocity_at(near.place.point), a.velocity_at(near.place.point)));
             let gap = near.place.gap;
+            let extrapolated = scheme.geometry == Geometry::Extrapolated;
+            let persistent = known.is_some_and(|m| m.active);
             let active = match scheme.activation {
                 Activation::Forecast { gamma, slack } => {
-                    gap + gamma * h * approach <= slack * near.size
+                    let slack = slack * near.size;
+                    let beyond = gap + gamma * h * approach - slack;
+                    // What runs along a curved surface leaves it by as much as a step is curved: that is no separation.
+                    beyond <= 0.0
+                        || (persistent && extrapolated && {
+                            let end = near.witness.place(&a.end, &b.end, n);
+                            let turned = norm(sub(end.normal, n));
+                            beyond <= turned * norm(sub(end.point, near.place.point))
+                        })
                 }
                 Activation::Gap => true,
             };
@@ -446,17 +456,16 @@ impl Tools {
             };
             let place = on_surface(near.witness.place(&a.middle, &b.middle, n));
             let frame = frame(place.normal, axis);
-            let pushed = known.is_some_and(|m| m.active && m.impulse != [0.0; 3]);
-            let persists = pushed && (near.law.e == 0.0 || approach >= -rest);
-            let (place_end, frame_end) = match persists && scheme.geometry == Geometry::Extrapolated
-            {
+            let pushed = known.is_some_and(|m| m.impulse != [0.0; 3]);
+            let persists = persistent && (near.law.e == 0.0 || approach >= -rest);
+            let later = persists && extrapolated;
+            let (place_end, frame_end) = match later {
                 true => {
                     let place = on_surface(near.witness.place(&a.end, &b.end, place.normal));
                     (place, self::frame(place.normal, axis))
                 }
                 false => (place, frame),
             };
-            let later = persists && scheme.geometry == Geometry::Extrapolated;
             let arm = |body: u32, sign: f64| {
                 let b = &self.bodies[body as usize];
                 let x_end = if later { b.end.x } else { b.middle.x };

@@ -137,9 +137,9 @@ fn collisions_of_free_bodies_keep_both_momenta() {
     for k in 0..5 {
         let at = f64::from(k);
         let turned = Rotation::about([0.2, 1.0, 0.1 * at], 0.4 + at);
-        let body = block([0.2, 0.1, 0.15]).at([0.45 * at, 0.03 * at, 0.02]).turned(turned);
+        let body = block([0.2, 0.1, 0.15]).at([0.6 * at, 0.03 * at, 0.02]).turned(turned);
         world.add(body.moving([1.0 - 0.5 * at, 0.1, 0.0], [1.0, 2.0 - at, 3.0]));
-        let b = ball(0.12).at([0.45 * at, 0.35, 0.1]);
+        let b = ball(0.12).at([0.6 * at, 0.45, 0.1]);
         world.add(b.moving([0.0, -1.0, 0.0], [4.0, 0.0, at]));
     }
     let mut simulation = simulation(world);
@@ -213,7 +213,7 @@ fn a_run_that_is_interrupted_goes_on_bit_for_bit() {
     // And a run repeats itself.
     let mut twice = simulation(heap());
     run(&mut twice, 0.9, H);
-    assert_eq!(whole.checkpoint(), twice.checkpoint());
+    assert!(whole.checkpoint() == twice.checkpoint());
     // Looking at the problem of the next step changes nothing.
     let mut looked = simulation(heap());
     while looked.state().t < 0.9 - 1e-9 {
