@@ -462,7 +462,7 @@ impl Tools {
             let (place_end, frame_end) = match later {
                 true => {
                     let place = on_surface(near.witness.place(&a.end, &b.end, place.normal));
-                    (place, self::frame(place.normal, axis))
+                    (place, transported(&frame, place.normal))
                 }
                 false => (place, frame),
             };
@@ -1038,6 +1038,13 @@ fn frame(n: Vec3, axis: u8) -> [Vec3; 3] {
     let t = sub(e, scale(n[axis as usize], n));
     let t = scale(1.0 / norm(t), t);
     [n, t, cross(n, t)]
+}
+
+/// The frame turned so that its normal becomes n, on the shortest way: what a frame built anew would turn about the normal would turn friction with it.
+fn transported(frame: &[Vec3; 3], n: Vec3) -> [Vec3; 3] {
+    let sum = add(frame[0], n);
+    let tangent = |t: Vec3| sub(t, scale(dot(n, t) / (1.0 + dot(frame[0], n)), sum));
+    [n, tangent(frame[1]), tangent(frame[2])]
 }
 
 /// An impulse moved into the cone: none where it pulls, friction cut to its bound.

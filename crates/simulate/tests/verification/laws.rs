@@ -2,39 +2,46 @@
 
 use nonsmooth_scenes::Rotation;
 use nonsmooth_simulate::{
-    Activation, Body, Control, Force, Impact, Law, MoreauJean, Shape, SimulateError, Simulation,
-    State, StepReport, StepStatus, World, Wrenches,
+    Activation, Body, Control, Force, Impact, Law, MoreauJean, Part, Shape, SimulateError,
+    Simulation, State, StepReport, StepStatus, World, Wrenches,
 };
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use crate::{G, ball, block, check, near, run, weightless, world};
 
-/// A rod between two planes that make a corner, with random velocities: impacts with two contacts and friction.
+/// A plane body that touches two walls at random places and moves towards both: what an impact makes of its energy. None where there is no such body, or where
+/// wedged bodies have no solution.
 fn wedged(rng: &mut Pcg64, impact: Impact, e: f64) -> Option<f64> {
     let mu = rng.random_range(0.1..1.5);
     let mut world = weightless(mu, e);
-    let tilt: f64 = rng.random_range(0.2..1.3);
-    let plane = |n| nonsmooth_simulate::plane([0.0; 3], n).unwrap();
-    world.add(Body::fixed(vec![
-        plane([tilt.sin(), 0.0, tilt.cos()]),
-        plane([-tilt.sin(), 0.0, tilt.cos()]),
-    ]));
-    // A capsule that touches both planes: its ends are at the distance r from them.
-    let (r, l): (f64, f64) = (0.1, 0.5);
-    let up = (l * tilt.sin() + r) / tilt.cos();
-    let lying = Rotation::about([0.0, 1.0, 0.0], std::f64::consts::FRAC_PI_2);
-    let rod = Body::solid(Shape::Capsule { half_length: l, radius: r }, 1000.0).unwrap();
-    let mut speed = || rng.random_range(-1.0..1.0);
-    let (v, w) = ([speed(), 0.0, -1.0 - speed()], [0.0, 3.0 * speed(), 0.0]);
-    world.add(rod.turned(lying).at([0.0, 0.0, up]).moving(v, w));
-    let scheme = MoreauJean { impact, ..MoreauJean::default() };
+    let radius = 0.01;
+    let mut knob = || {
+        let [x, z, angle]: [f64; 3] = [1.0, 1.0, 3.0].map(|most| rng.random_range(-most..most));
+        let (at, n) = ([x, 0.0, z], [angle.sin(), 0.0, angle.cos()]);
+        let foot = std::array::from_fn(|k| at[k] - radius * n[k]);
+        let wall = nonsmooth_simulate::plane(foot, n).unwrap();
+        (Part::new(Shape::Sphere { radius }).at(at, Rotation::IDENTITY), wall, at, n)
+    };
+    let (first, second) = (knob(), knob());
+    let [vx, vz, w] = [0; 3].map(|_| rng.random_range(-1.0..1.0));
+    let approaches =
+        |at: [f64; 3], n: [f64; 3]| n[0] * (vx + w * at[2]) + n[2] * (vz - w * at[0]) < 0.0;
+    if !approaches(first.2, first.3) || !approaches(second.2, second.3) {
+        return None;
+    }
+    world.add(Body::fixed(vec![first.1, second.1]));
+    let j = 0.3;
+    let inertia = [[j, 0.0, 0.0], [0.0, j, 0.0], [0.0, 0.0, j]];
+    let body = Body::with_mass(1.0, inertia, vec![first.0, second.0]);
+    world.add(body.moving([vx, 0.0, vz], [0.0, w, 0.0]));
     let limits =
-        nonsmooth_solve::Limits { tolerance: 1e-10, max_iterations: 2000, ..Default::default() };
-    let mut simulation = Simulation::new(world, scheme).unwrap().with_limits(limits);
-    let report = simulation.step(1e-6).unwrap();
+        nonsmooth_solve::Limits { tolerance: 1e-10, max_iterations: 500, ..Default::default() };
+    let scheme = MoreauJean { impact, ..MoreauJean::default() };
+    let mut simulation = Simulation::new(world, scheme).ok()?.with_limits(limits);
+    let report = simulation.step(1e-9).unwrap();
     assert!(report.energy.relative_imbalance() < 1e-12);
-    // Where a wedged body must come apart there may be no solution.
+    assert_eq!(report.counts.active, 2);
     let solved = report.status == StepStatus::Solved;
     solved.then(|| report.energy.kinetic / report.energy.kinetic_before)
 }
@@ -42,8 +49,8 @@ fn wedged(rng: &mut Pcg64, impact: Impact, e: f64) -> Option<f64> {
 #[test]
 fn fremonds_law_never_gains_energy_where_newtons_does() {
     let mut rng = Pcg64::seed_from_u64(7);
-    let (mut gains, mut unsolved) = ([0, 0, 0], [0, 0, 0]);
-    for _ in 0..400 {
+    let (mut gains, mut impacts) = ([0, 0, 0], [0, 0, 0]);
+    for _ in 0..6000 {
         let state = rng.clone();
         for (k, (impact, e)) in
             [(Impact::Newton, 0.7), (Impact::Fremond, 0.7), (Impact::Newton, 0.0)]
@@ -52,14 +59,17 @@ fn fremonds_law_never_gains_energy_where_newtons_does() {
         {
             rng = state.clone();
             match wedged(&mut rng, impact, e) {
-                Some(ratio) => gains[k] += usize::from(ratio > 1.0 + 1e-5),
-                None => unsolved[k] += 1,
+                Some(ratio) => {
+                    impacts[k] += 1;
+                    gains[k] += usize::from(ratio > 1.0 + 1e-7);
+                }
+                None => {}
             }
         }
     }
+    assert!(impacts.iter().all(|&n| n > 150), "{impacts:?}");
     assert!(gains[0] > 0, "{gains:?}");
     assert_eq!(gains[1..], [0, 0]);
-    assert!(unsolved[0] < 40 && unsolved[1..] == [0, 0], "{unsolved:?}");
 }
 
 #[test]
@@ -87,17 +97,21 @@ fn the_energy_of_every_step_is_accounted_for() {
         }
         let scheme = MoreauJean { theta, impact, activation, ..MoreauJean::default() };
         let mut simulation = Simulation::new(world, scheme).unwrap();
-        let mut passes = 0;
+        let (mut passes, mut energy) = (0, f64::INFINITY);
         let mut watch = |_: &Simulation, r: &StepReport| {
             passes = passes.max(r.newton);
             let e = &r.energy;
-            assert!(e.numerical >= 0.0 && e.normal <= 1e-4 * e.scale, "{e:?}");
+            // A contact that persists has its velocity at the end of the step, so that its work is zero to second order only.
+            assert!(e.numerical >= 0.0 && e.normal <= 1e-3 * e.scale, "{e:?}");
+            let now = e.kinetic + e.potential;
+            assert!(now <= energy + 1e-3 * e.scale, "{now} {energy}");
+            energy = energy.min(now);
             Control::Continue
         };
         let report = simulation.run(1.5, 2e-3, &mut watch).unwrap();
         check(&report);
         assert!(passes > 1, "rotation and contact were never iterated");
-        assert!(report.penetration < 0.02, "{report:?}");
+        assert!(report.penetration < 0.04, "{report:?}");
     }
 }
 
