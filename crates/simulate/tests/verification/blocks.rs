@@ -191,7 +191,7 @@ fn three_logs_rest_or_fall_apart() {
         let mut simulation = simulation(world);
         run(&mut simulation, 0.5, 5e-3);
         let fallen = r * (1.0 + 3f64.sqrt()) - simulation.state().position[3][2];
-        assert!(fallen < 1e-9 || fallen > 1e-6, "{fallen:e}");
+        assert!(!(1e-9..=1e-6).contains(&fallen), "{fallen:e}");
         fallen < 1e-9
     };
     assert!(rests(critical + 1e-4, 0.5) && rests(0.5, floor + 1e-4));
@@ -217,7 +217,7 @@ fn four_balls_rest_or_fall_apart() {
         let mut simulation = simulation(world);
         run(&mut simulation, 0.5, 5e-3);
         let fallen = top - simulation.state().position[4][2];
-        assert!(fallen < 1e-8 || fallen > 1e-6, "{fallen:e}");
+        assert!(!(1e-8..=1e-6).contains(&fallen), "{fallen:e}");
         fallen < 1e-8
     };
     assert!(rests(critical + 1e-4, 0.5) && rests(0.5, floor + 1e-4));
@@ -241,7 +241,7 @@ fn a_tilted_column_overturns_as_one() {
         let mut simulation = simulation(world);
         run(&mut simulation, 1.0, 5e-3);
         let turned = simulation.state().spin[n as usize][1].abs();
-        assert!(turned < 1e-8 || turned > 1e-4, "{turned:e}");
+        assert!(!(1e-8..=1e-4).contains(&turned), "{turned:e}");
         turned < 1e-8
     };
     assert!(stands(critical * (1.0 - 1e-3)) && !stands(critical * (1.0 + 1e-3)));

@@ -58,12 +58,9 @@ fn fremonds_law_never_gains_energy_where_newtons_does() {
                 .enumerate()
         {
             rng = state.clone();
-            match wedged(&mut rng, impact, e) {
-                Some(ratio) => {
-                    impacts[k] += 1;
-                    gains[k] += usize::from(ratio > 1.0 + 1e-7);
-                }
-                None => {}
+            if let Some(ratio) = wedged(&mut rng, impact, e) {
+                impacts[k] += 1;
+                gains[k] += usize::from(ratio > 1.0 + 1e-7);
             }
         }
     }
