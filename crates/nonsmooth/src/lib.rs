@@ -91,9 +91,10 @@
 //! | read and write files | [`read`] a problem; [`ProblemFile`] with all that a file holds, in any of the [`FORMATS`] |
 //! | make matrices | [`Csc`], [`Bsr`], [`Dense`]: from slices, from faer, and behind features from nalgebra and sprs |
 //! | make problems | [`Planted`], with a known solution; [`Scene`], of bodies |
+//! | move bodies | [`simulate`]: a world, step by step, every step judged |
 //! | write a solver | [`Solver`], [`Step`], [`Driver`] |
 //!
-//! The crates below (`nonsmooth-problem`, `nonsmooth-solve`, `nonsmooth-io`, `nonsmooth-scenes`) have all the rest: kernels, single methods, forms.
+//! The crates below (`nonsmooth-problem`, `nonsmooth-solve`, `nonsmooth-io`, `nonsmooth-scenes`, `nonsmooth-simulate`) have all the rest: kernels, single methods, forms.
 
 #[doc(inline)]
 pub use nonsmooth_solve::{Answer, Solvable, Solve, solve};
@@ -116,6 +117,8 @@ pub use nonsmooth_problem::{
 };
 pub use nonsmooth_problem::{with_complementarity, with_friction, with_problem};
 pub use nonsmooth_scenes::{Scene, SceneError};
+#[doc(inline)]
+pub use nonsmooth_simulate as simulate;
 pub use nonsmooth_solve::existence::of as exists;
 pub use nonsmooth_solve::registry::{session, solver_names};
 pub use nonsmooth_solve::settings;

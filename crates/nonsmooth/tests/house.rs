@@ -11,8 +11,8 @@ use nonsmooth_solve::registry;
 
 // ------------------------------------------------------------------------------------------------ floors
 
-/// The crates by the name that sources use, each with those it may depend on: `cli, python → bench → {scenes, io} → solve → analysis →
-/// problem → linalg`, but `io → problem` only. `nonsmooth` is the facade.
+/// The crates by the name that sources use, each with those it may depend on: `cli, python → bench → {simulate, scenes, io} → solve → analysis →
+/// problem → linalg`, but `simulate → scenes` and `io → problem` only. `nonsmooth` is the facade.
 const CRATES: &[(&str, &[&str])] = &[
     ("nonsmooth_linalg", &[]),
     ("nonsmooth_problem", &["nonsmooth_linalg"]),
@@ -20,26 +20,32 @@ const CRATES: &[(&str, &[&str])] = &[
     ("nonsmooth_solve", &["nonsmooth_linalg", "nonsmooth_problem", "nonsmooth_analysis"]),
     ("nonsmooth_io", &["nonsmooth_linalg", "nonsmooth_problem"]),
     ("nonsmooth_scenes", &["nonsmooth_linalg", "nonsmooth_problem", "nonsmooth_solve"]),
+    (
+        "nonsmooth_simulate",
+        &["nonsmooth_linalg", "nonsmooth_problem", "nonsmooth_solve", "nonsmooth_scenes"],
+    ),
     ("nonsmooth_bench", &LIBRARIES),
     ("nonsmooth_cli", &UP_TO_BENCH),
     ("nonsmooth_python", &UP_TO_BENCH),
     ("nonsmooth", &LIBRARIES),
 ];
-const LIBRARIES: [&str; 6] = [
+const LIBRARIES: [&str; 7] = [
     "nonsmooth_linalg",
     "nonsmooth_problem",
     "nonsmooth_analysis",
     "nonsmooth_solve",
     "nonsmooth_io",
     "nonsmooth_scenes",
+    "nonsmooth_simulate",
 ];
-const UP_TO_BENCH: [&str; 7] = [
+const UP_TO_BENCH: [&str; 8] = [
     "nonsmooth_linalg",
     "nonsmooth_problem",
     "nonsmooth_analysis",
     "nonsmooth_solve",
     "nonsmooth_io",
     "nonsmooth_scenes",
+    "nonsmooth_simulate",
     "nonsmooth_bench",
 ];
 

@@ -258,7 +258,7 @@ impl Simulation {
                 break;
             }
             let left = until - self.state.t;
-            let h = if left < h * (1.0 + 1e-9) { left } else { h };
+            let h = if left < h * (1.0 - 1e-9) { left } else { h };
             observer.before(self, h);
             let report = self.step(h)?;
             run.note(&report);

@@ -9,13 +9,15 @@
 //! ```
 //!
 //! `(I − ½ h Ω̂_θ) R_kᵀ` is the inverse of the mean of R_k and R⁺ at θ = ½: a torque that is fixed in space changes the momentum in space by just that, and
-//! `Ω_θ · (…) = (R_k Ω_θ) · L`, so momentum and energy are exact at any h (SimoWong1991 for the free body). Bodies whose inertia is isotropic have
+//! `Ω_θ · (…) = (R_k Ω_θ) · L`, so momentum and energy are exact at any h. Bodies whose inertia is isotropic have
 //! no gyroscopic torque; their velocities are taken in the world frame, where nothing has to be solved.
 //!
-//! Method: bodies move freely, contacts of the index set (`g + γ h u_N ≤ 0`; Acary2018) get their directions at the extrapolated midpoint, islands are solved one by one as
+//! Method: bodies move freely, contacts of the index set (`g + γ h u_N ≤ 0`) get their directions at the extrapolated midpoint, islands are solved one by one as
 //! local problems in r by a session of the project's solvers, judged by the problem's own judge. Gyroscopic torque and the frames of torques are those of the last
 //! pass; with the impulses found each body's rotation is solved exactly, and where that moves no velocity by more than the tolerance, the step is done.
 //! A persistent contact has the velocity in its law at the extrapolated end of the step. Frémond's law has `w_T = (1 − θ)/θ u_{T,k}`: u_θ in place of u⁺.
+//!
+//! References: Moreau1988 and Jean1999 for the scheme, Acary2016 for its energy, SimoWong1991 for the rotation, Acary2018 for the index set.
 //!
 //! Energy: `T⁺ − T_k = Σ u_θ · r − s_θ · r + h v_θ · (m g + F) + h ω_θ · τ − (θ − ½) ‖v⁺ − v_k‖²_M`, s the velocity of surfaces that are moved; what is left is rounding.
 //! Cost: W has a block for each pair of contacts that share a body. Fails (a status, never silence) where a contact problem is not solved, or where h ‖Ω‖ is so
@@ -426,9 +428,19 @@ impl Tools {
             let approach =
                 dot(n, sub(b.velocity_at(near.place.point), a.velocity_at(near.place.point)));
             let gap = near.place.gap;
+            let extrapolated = scheme.geometry == Geometry::Extrapolated;
+            let persistent = known.is_some_and(|m| m.active);
             let active = match scheme.activation {
                 Activation::Forecast { gamma, slack } => {
-                    gap + gamma * h * approach <= slack * near.size
+                    let slack = slack * near.size;
+                    let beyond = gap + gamma * h * approach - slack;
+                    // What runs along a curved surface leaves it by as much as a step is curved: that is no separation.
+                    beyond <= 0.0
+                        || (persistent && extrapolated && {
+                            let end = near.witness.place(&a.end, &b.end, n);
+                            let turned = norm(sub(end.normal, n));
+                            beyond <= turned * norm(sub(end.point, near.place.point))
+                        })
                 }
                 Activation::Gap => true,
             };
@@ -437,19 +449,23 @@ impl Tools {
                 continue;
             }
             self.row_of.push(self.rows.len() as u32);
-            let place = near.witness.place(&a.middle, &b.middle, n);
+            // A body that nothing moves has no momentum to keep: the arm ends on the surface of the other one. Else both arms end midway.
+            let on_surface = |place: Place| {
+                let half = 0.5 * (f64::from(u8::from(b.free)) - f64::from(u8::from(a.free)));
+                Place { point: add(place.point, scale(half * place.gap, place.normal)), ..place }
+            };
+            let place = on_surface(near.witness.place(&a.middle, &b.middle, n));
             let frame = frame(place.normal, axis);
-            let pushed = known.is_some_and(|m| m.active && m.impulse != [0.0; 3]);
-            let persists = pushed && (near.law.e == 0.0 || approach >= -rest);
-            let (place_end, frame_end) = match persists && scheme.geometry == Geometry::Extrapolated
-            {
+            let pushed = known.is_some_and(|m| m.impulse != [0.0; 3]);
+            let persists = persistent && (near.law.e == 0.0 || approach >= -rest);
+            let later = persists && extrapolated;
+            let (place_end, frame_end) = match later {
                 true => {
-                    let place = near.witness.place(&a.end, &b.end, place.normal);
-                    (place, self::frame(place.normal, axis))
+                    let place = on_surface(near.witness.place(&a.end, &b.end, place.normal));
+                    (place, transported(&frame, place.normal))
                 }
                 false => (place, frame),
             };
-            let later = persists && scheme.geometry == Geometry::Extrapolated;
             let arm = |body: u32, sign: f64| {
                 let b = &self.bodies[body as usize];
                 let x_end = if later { b.end.x } else { b.middle.x };
@@ -1022,6 +1038,13 @@ fn frame(n: Vec3, axis: u8) -> [Vec3; 3] {
     let t = sub(e, scale(n[axis as usize], n));
     let t = scale(1.0 / norm(t), t);
     [n, t, cross(n, t)]
+}
+
+/// The frame turned so that its normal becomes n, on the shortest way: what a frame built anew would turn about the normal would turn friction with it.
+fn transported(frame: &[Vec3; 3], n: Vec3) -> [Vec3; 3] {
+    let sum = add(frame[0], n);
+    let tangent = |t: Vec3| sub(t, scale(dot(n, t) / (1.0 + dot(frame[0], n)), sum));
+    [n, tangent(frame[1]), tangent(frame[2])]
 }
 
 /// An impulse moved into the cone: none where it pulls, friction cut to its bound.

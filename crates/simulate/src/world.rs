@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, dot, norm, scale, sub};
-use nonsmooth_scenes::{self as scenes, MassProperties, Rotation, Scene};
+use nonsmooth_scenes::{self as scenes, MassProperties, Polyhedron, Rotation, Scene};
 
 use crate::error::{finite, require};
 use crate::rotation::unit;
@@ -488,6 +488,7 @@ impl TryFrom<&Scene> for World {
         if let Some(ground) = &scene.ground {
             planes.push((ground.point, ground.normal, [0.0; 3]));
         }
+        let grounds = planes.len();
         let size = scene.bodies.iter().map(|b| b.shape.radius()).fold(0.0, f64::max);
         for c in scene.contacts.iter().filter(|c| c.a.is_none()) {
             let n = c.frame()[0];
@@ -498,8 +499,18 @@ impl TryFrom<&Scene> for World {
             };
             let on_obstacle =
                 scene.obstacles.iter().any(|o| touches(o, c.point, SAME_PLANE * size));
-            if !on_obstacle && !planes.iter().any(on_plane) {
+            if on_obstacle {
+                continue;
+            }
+            // A contact may be some gap away from its wall; no body is behind it.
+            let known = planes.iter().position(on_plane).unwrap_or_else(|| {
                 planes.push((c.point, n, c.image.velocity));
+                planes.len() - 1
+            });
+            let (point, m, _) = &mut planes[known];
+            let behind = lowest(&scene.bodies[c.b], *m) - dot(*m, *point);
+            if known >= grounds && behind < 0.0 {
+                *point = add(*point, scale(behind, *m));
             }
         }
         for (k, (point, normal, velocity)) in planes.into_iter().enumerate() {
@@ -511,6 +522,24 @@ impl TryFrom<&Scene> for World {
             world.add(Body { motion, ..body });
         }
         Ok(world)
+    }
+}
+
+/// The least `n · x` of the points x of a body.
+fn lowest(body: &scenes::RigidBody, n: Vec3) -> f64 {
+    let of = |p: &Polyhedron| {
+        let heights = p.vertices().iter().map(|&v| dot(n, body.to_world(v)));
+        heights.fold(f64::INFINITY, f64::min)
+    };
+    match &body.shape {
+        scenes::Shape::Sphere { radius } => dot(n, body.position) - radius,
+        scenes::Shape::Box { half } => {
+            let r = body.rotation.matrix();
+            let along = |k: usize| n[0] * r[0][k] + n[1] * r[1][k] + n[2] * r[2][k];
+            dot(n, body.position) - (0..3).map(|k| (along(k) * half[k]).abs()).sum::<f64>()
+        }
+        scenes::Shape::Polyhedron(p) => of(p),
+        scenes::Shape::Compound(parts) => parts.iter().map(of).fold(f64::INFINITY, f64::min),
     }
 }
 

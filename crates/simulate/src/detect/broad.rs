@@ -137,7 +137,7 @@ mod tests {
     #[test]
     fn every_pair_that_meets_is_found_once() {
         let mut rng = Pcg64::seed_from_u64(3);
-        for (n, spread, large) in [(40, 1.0, 0), (500, 1.0, 2), (500, 8.0, 0), (700, 1.0, 100)] {
+        for (n, spread, large) in [(40, 6.0, 0), (500, 1.0, 2), (500, 8.0, 0), (700, 1.0, 100)] {
             let mut boxes = vec![];
             for k in 0..n {
                 let size = if k < large { 20.0 } else { rng.random_range(0.5..=0.5 + spread) };

@@ -18,8 +18,12 @@ use crate::state::Axis;
 const HYSTERESIS: f64 = 1e-4;
 /// By which share of the size edges must separate better than faces to be taken at first sight.
 const FIRST: f64 = 1e-6;
-/// Points nearer than this share of the size are one; so far outside a side a point is still inside.
-const SAME: f64 = 1e-9;
+/// A point outside a side by no more than this share of the size is inside.
+const INSIDE: f64 = 1e-9;
+/// Corners nearer to each other than this share of the size are one: bodies that are turned against each other by rounding have no more contacts for it.
+const SAME: f64 = 1e-6;
+/// By which share of the size edges may miss each other and touch.
+const BESIDE: f64 = 1e-4;
 /// Edges that are parallel up to this have no common normal.
 const PARALLEL: f64 = 1e-6;
 
@@ -143,8 +147,8 @@ impl Clip {
         // Edges that pass beside each other's ends do not touch, whatever their lines do.
         let (p, q) = (s.placed(a.2), t.placed(b.2));
         let (x, y) = closest(&p, &q);
-        let apart = norm(sub(q.at(y), p.at(x)));
-        if apart <= prediction.max(0.0) + edges.separation.abs() + 1e-3 * norm(p.d).min(norm(q.d)) {
+        let across = sub(sub(q.at(y), p.at(x)), scale(edges.separation, edges.normal));
+        if norm(across) <= BESIDE * a.0.size.min(b.0.size) {
             found(features, Witness::Edges { s, t, sign });
         }
     }
@@ -161,7 +165,8 @@ impl Clip {
         let (hull, posed, pose) = reference;
         let n = posed.normals[face];
         let sides = &hull.faces[face];
-        let same = SAME * hull.size.min(incident.0.size);
+        let size = hull.size.min(incident.0.size);
+        let inside_by = INSIDE * size;
         let Self { polygon, next } = self;
         polygon.clear();
         let loops = &incident.0.faces[other];
@@ -180,7 +185,7 @@ impl Clip {
             for i in 0..polygon.len() {
                 let (here, there) = (polygon[i], polygon[(i + 1) % polygon.len()]);
                 let (d, e) = (beyond(here.point), beyond(there.point));
-                let (inside, stays) = (d <= same, e <= same);
+                let (inside, stays) = (d <= inside_by, e <= inside_by);
                 if inside {
                     next.push(here);
                 }
@@ -206,7 +211,7 @@ impl Clip {
                 return;
             }
         }
-        tidy(polygon, n, same);
+        tidy(polygon, n, SAME * size);
         let offset = posed.offsets[face];
         for corner in polygon.iter() {
             let gap = dot(n, corner.point) - offset;
@@ -243,7 +248,7 @@ fn tidy(polygon: &mut Vec<Corner>, n: Vec3, same: f64) {
     let mut k = 0;
     while polygon.len() > 1 && k < polygon.len() {
         let j = (k + 1) % polygon.len();
-        if norm(across(sub(polygon[j].point, polygon[k].point))) <= 4.0 * same {
+        if norm(across(sub(polygon[j].point, polygon[k].point))) <= same {
             // A vertex has the better name.
             let worse = if rank(&polygon[j]) < rank(&polygon[k]) { k } else { j };
             polygon.remove(worse);
@@ -257,7 +262,7 @@ fn tidy(polygon: &mut Vec<Corner>, n: Vec3, same: f64) {
         let [p, q, r] = [k + m - 1, k, k + 1].map(|i| across(polygon[i % m].point));
         let (u, v) = (sub(q, p), sub(r, q));
         let chord = norm(sub(r, p));
-        let turns = norm(cross(u, v)) > 4.0 * same * chord;
+        let turns = norm(cross(u, v)) > same * chord;
         if turns {
             k += 1;
         } else {

@@ -351,3 +351,6 @@ fn corners<'a>(
     let both = hull.vertices.iter().zip(&posed.vertices);
     both.enumerate().map(|(k, (&p, &q))| (Feature::Vertex(k as u32), p, q))
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,264 @@
+//! What must not matter: place, orientation, names, units, the order of bodies; and what must be kept: momentum, bits.
+
+use nonsmooth_scenes::Rotation;
+use nonsmooth_scenes::vec3::{Vec3, add, apply, cross, scale, sub};
+use nonsmooth_simulate::{Body, Law, MoreauJean, Simulation, World, plane};
+
+use crate::{G, ball, block, near, run, simulation, weightless, world};
+
+/// Bodies that fall on each other and on a floor: impacts, sliding, rolling, piling.
+fn heap() -> World {
+    let mut world = world(0.4, 0.3);
+    world.add(Body::fixed(vec![plane([0.0; 3], [0.0, 0.0, 1.0]).unwrap()]));
+    for k in 0..3 {
+        let z = 0.3 + 0.5 * f64::from(k);
+        let turned = Rotation::about([0.2, 1.0, 0.1], 0.4 + f64::from(k));
+        let body = block([0.2, 0.1, 0.15]).at([0.02, 0.01 * f64::from(k), z]).turned(turned);
+        world.add(body.moving([0.3, 0.0, -0.5], [0.5, 1.0, 0.2]));
+        world.add(ball(0.12).at([0.5, 0.1, z]).moving([-1.0, 0.0, 0.0], [0.0, 2.0, 0.5]));
+    }
+    world
+}
+
+/// The world with every vector turned and then moved.
+fn moved(world: &World, rotation: Rotation, by: Vec3) -> World {
+    let r = rotation.matrix();
+    let mut out = world.clone();
+    out.gravity = apply(&r, world.gravity);
+    for body in &mut out.bodies {
+        body.position = add(by, apply(&r, body.position));
+        body.rotation = rotation.after(body.rotation);
+        body.velocity = apply(&r, body.velocity);
+        body.angular_velocity = apply(&r, body.angular_velocity);
+    }
+    out
+}
+
+fn positions(mut simulation: Simulation, until: f64, h: f64) -> Vec<Vec3> {
+    run(&mut simulation, until, h);
+    simulation.state().position.clone()
+}
+
+const H: f64 = 2e-3;
+const UNTIL: f64 = 0.4;
+
+#[test]
+fn a_turned_and_moved_world_moves_alike() {
+    let reference = positions(simulation(heap()), UNTIL, H);
+    let rotation = Rotation::about([1.0, -2.0, 0.5], 1.1);
+    let by = [10.0, -20.0, 5.0];
+    let found = positions(simulation(moved(&heap(), rotation, by)), UNTIL, H);
+    for (p, q) in reference.iter().zip(&found) {
+        let expected = add(by, apply(&rotation.matrix(), *p));
+        (0..3).for_each(|k| near(q[k], expected[k], 1e-8));
+    }
+}
+
+#[test]
+fn bodies_in_another_order_move_alike() {
+    let reference = positions(simulation(heap()), UNTIL, H);
+    let mut world = heap();
+    world.bodies.reverse();
+    let found = positions(simulation(world), UNTIL, H);
+    for (p, q) in reference.iter().zip(found.iter().rev()) {
+        (0..3).for_each(|k| near(q[k], p[k], 1e-8));
+    }
+}
+
+#[test]
+fn a_mirrored_world_moves_alike() {
+    let reference = positions(simulation(heap()), UNTIL, H);
+    let mut world = heap();
+    for body in &mut world.bodies {
+        body.position[1] *= -1.0;
+        body.velocity[1] *= -1.0;
+        // Axial vectors turn the other way about the axes in the mirror; quaternions with them.
+        let w = &mut body.angular_velocity;
+        *w = [-w[0], w[1], -w[2]];
+        let q = &mut body.rotation.0;
+        *q = [q[0], -q[1], q[2], -q[3]];
+    }
+    let found = positions(simulation(world), UNTIL, H);
+    for (p, q) in reference.iter().zip(&found) {
+        near(q[0], p[0], 1e-8);
+        near(q[1], -p[1], 1e-8);
+        near(q[2], p[2], 1e-8);
+    }
+}
+
+#[test]
+fn units_do_not_matter() {
+    let reference = positions(simulation(heap()), UNTIL, H);
+    for (length, mass, time) in
+        [(1e3, 1.0, 1.0), (1e-3, 1.0, 1.0), (1.0, 1e3, 1.0), (1.0, 1.0, 1e-3)]
+    {
+        let mut world = heap();
+        let speed = length / time;
+        world.gravity = scale(speed / time, world.gravity);
+        for body in &mut world.bodies {
+            body.mass *= mass;
+            body.inertia = body.inertia.map(|row| row.map(|j| mass * length * length * j));
+            body.position = scale(length, body.position);
+            body.velocity = scale(speed, body.velocity);
+            body.angular_velocity = scale(1.0 / time, body.angular_velocity);
+            for part in &mut body.parts {
+                use nonsmooth_simulate::Shape;
+                part.shape = match &part.shape {
+                    Shape::Sphere { radius } => Shape::Sphere { radius: length * radius },
+                    Shape::Box { half } => Shape::Box { half: half.map(|x| length * x) },
+                    other => other.clone(),
+                };
+            }
+        }
+        let found = positions(simulation(world), UNTIL * time, H * time);
+        for (p, q) in reference.iter().zip(&found) {
+            (0..3).for_each(|k| near(q[k] / length, p[k], 1e-8));
+        }
+    }
+}
+
+/// Linear and angular momentum about the origin.
+fn momenta(simulation: &Simulation) -> [Vec3; 2] {
+    let (world, state) = (simulation.world(), simulation.state());
+    let (mut linear, mut angular) = ([0.0; 3], [0.0; 3]);
+    for (k, body) in world.bodies.iter().enumerate() {
+        let p = scale(body.mass, state.velocity[k]);
+        linear = add(linear, p);
+        let r = state.rotation(nonsmooth_simulate::BodyId(k as u32)).matrix();
+        let spin = apply(&r, apply(&body.inertia, state.spin[k]));
+        angular = add(angular, add(cross(state.position[k], p), spin));
+    }
+    [linear, angular]
+}
+
+#[test]
+fn collisions_of_free_bodies_keep_both_momenta() {
+    let mut world = weightless(0.5, 0.4);
+    for k in 0..5 {
+        let at = f64::from(k);
+        let turned = Rotation::about([0.2, 1.0, 0.1 * at], 0.4 + at);
+        let body = block([0.2, 0.1, 0.15]).at([0.6 * at, 0.03 * at, 0.02]).turned(turned);
+        world.add(body.moving([1.0 - 0.5 * at, 0.1, 0.0], [1.0, 2.0 - at, 3.0]));
+        let b = ball(0.12).at([0.6 * at, 0.45, 0.1]);
+        world.add(b.moving([0.0, -1.0, 0.0], [4.0, 0.0, at]));
+    }
+    let mut simulation = simulation(world);
+    let start = momenta(&simulation);
+    let mut impacts = 0;
+    for _ in 0..300 {
+        let before = momenta(&simulation);
+        let report = simulation.step(2e-3).unwrap();
+        assert!(report.status.is_solved());
+        impacts += report.counts.stick + report.counts.slip;
+        let now = momenta(&simulation);
+        for (a, b) in before.iter().zip(&now) {
+            (0..3).for_each(|k| near(b[k], a[k], 2e-12));
+        }
+    }
+    assert!(impacts > 10, "{impacts}");
+    for (a, b) in start.iter().zip(&momenta(&simulation)) {
+        (0..3).for_each(|k| near(b[k], a[k], 1e-10));
+    }
+}
+
+#[test]
+fn elastic_motion_without_friction_goes_back_in_time() {
+    let mut world = weightless(0.0, 1.0);
+    let spin = [0.3, 2.0, 0.5];
+    world.add(block([0.2, 0.1, 0.15]).moving([0.2, 0.0, 0.1], spin));
+    world.add(ball(0.1).at([2.0, 0.0, 0.0]).moving([0.0, 0.3, 0.0], [1.0, 0.0, 0.0]));
+    let start = world.clone();
+    let mut simulation = simulation(world);
+    run(&mut simulation, 1.0, 1e-2);
+    for k in 0..2 {
+        let state = simulation.state_mut();
+        state.velocity[k] = scale(-1.0, state.velocity[k]);
+        state.spin[k] = scale(-1.0, state.spin[k]);
+    }
+    run(&mut simulation, 2.0, 1e-2);
+    for (k, body) in start.bodies.iter().enumerate() {
+        (0..3).for_each(|i| near(simulation.state().position[k][i], body.position[i], 1e-13));
+        (0..4).for_each(|i| near(simulation.state().rotation[k][i], body.rotation.0[i], 1e-13));
+    }
+}
+
+#[test]
+fn a_boost_along_the_floor_changes_nothing() {
+    use nonsmooth_simulate::Motion;
+    let reference = positions(simulation(heap()), UNTIL, H);
+    let boost = [3.0, -1.0, 0.0];
+    let mut world = heap();
+    world.bodies[0].motion = Motion::Surface { linear: boost, angular: [0.0; 3] };
+    for body in &mut world.bodies[1..] {
+        body.velocity = add(body.velocity, boost);
+    }
+    let found = positions(simulation(world), UNTIL, H);
+    for (p, q) in reference.iter().zip(&found).skip(1) {
+        let back = sub(*q, scale(UNTIL, boost));
+        (0..3).for_each(|k| near(back[k], p[k], 1e-8));
+    }
+}
+
+#[test]
+fn a_run_that_is_interrupted_goes_on_bit_for_bit() {
+    let mut whole = simulation(heap());
+    run(&mut whole, 0.3, H);
+    let checkpoint = whole.checkpoint();
+    run(&mut whole, 0.9, H);
+    let mut again = simulation(heap());
+    again.restore(&checkpoint).unwrap();
+    run(&mut again, 0.9, H);
+    assert_eq!(whole.state(), again.state());
+    assert_eq!(whole.contacts(), again.contacts());
+    // And a run repeats itself.
+    let mut twice = simulation(heap());
+    run(&mut twice, 0.9, H);
+    assert!(whole.checkpoint() == twice.checkpoint());
+    // Looking at the problem of the next step changes nothing.
+    let mut looked = simulation(heap());
+    while looked.state().t < 0.9 - 1e-9 {
+        looked.problem(H).unwrap();
+        looked.step(H).unwrap();
+    }
+    assert_eq!(looked.state().position, twice.state().position);
+    let refused = again.restore(b"{}").unwrap_err().to_string();
+    assert!(refused.starts_with("checkpoint: expected one of a world of 7 bodies"), "{refused}");
+}
+
+#[test]
+fn islands_together_move_as_they_do_apart() {
+    let apart = |copies: &[f64]| {
+        let mut world = world(0.4, 0.3);
+        world.add(Body::floor());
+        for &at in copies {
+            for k in 0..4 {
+                let z = 0.1 + 0.21 * f64::from(k);
+                let speed = if at > 0.0 { 0.7 } else { -0.2 };
+                let body = block([0.2, 0.15, 0.1]).at([at, 0.03 * f64::from(k), z]);
+                world.add(body.moving([speed, 0.1, 0.0], [0.0; 3]));
+            }
+        }
+        let mut simulation = simulation(world);
+        run(&mut simulation, 0.5, H);
+        simulation.state().position[1..].to_vec()
+    };
+    let (left, right, both) = (apart(&[-4.0]), apart(&[4.0]), apart(&[-4.0, 4.0]));
+    assert_eq!([left, right].concat(), both);
+}
+
+#[test]
+fn the_law_of_a_pair_of_materials_counts() {
+    let mut world = World::new([0.0, 0.0, -G]).with_law(Law::friction(0.5));
+    let ice = world.material("ice");
+    world.pair(0, ice, Law::default());
+    world.add(Body::floor());
+    for material in [0, ice] {
+        let at = [0.0, material as f64, 0.1];
+        let body = block([0.3, 0.2, 0.1]).at(at).of(material);
+        world.add(body.moving([1.0, 0.0, 0.0], [0.0; 3]));
+    }
+    let mut simulation = Simulation::new(world, MoreauJean::default()).unwrap();
+    run(&mut simulation, 0.1, 1e-3);
+    near(simulation.state().velocity[1][0], 1.0 - 0.5 * G * 0.1, 1e-10);
+    near(simulation.state().velocity[2][0], 1.0, 1e-12);
+}

@@ -1,0 +1,65 @@
+//! Scenes of `gen` in motion: what should stand stands.
+
+use nonsmooth_scenes::scenes::{Arch, Family, SpherePile, Stack};
+use nonsmooth_simulate::{Control, MoreauJean, Simulation, StepReport, World};
+
+use crate::check;
+
+/// Runs a scene and returns how far its bodies have moved.
+fn moved(scene: &nonsmooth_scenes::Scene, until: f64, h: f64) -> f64 {
+    let world = World::try_from(scene).unwrap();
+    let mut simulation = Simulation::new(world, MoreauJean::default()).unwrap();
+    let mut far: f64 = 0.0;
+    let mut watch = |s: &Simulation, _: &StepReport| {
+        for (b, x) in scene.bodies.iter().zip(&s.state().position) {
+            let square = (0..3).map(|k| (x[k] - b.position[k]).powi(2)).sum::<f64>();
+            far = far.max(square.sqrt());
+        }
+        // What falls need not be followed to the ground.
+        if far > 1e-2 { Control::Stop } else { Control::Continue }
+    };
+    check(&simulation.run(until, h, &mut watch).unwrap());
+    far
+}
+
+#[test]
+fn a_stack_of_a_scene_stands() {
+    let scene = Stack { count: 6, ..Stack::default() }.build().unwrap();
+    let far = moved(&scene, 1.0, 1e-2);
+    assert!(far < 1e-9, "{far:e}");
+}
+
+#[test]
+fn an_arch_stands_or_falls_by_its_thickness_and_friction() {
+    // 15 voussoirs without slip stand from t/R = 0.106266 on, R the mean radius; at t/R = 0.15 from mu = 0.34657 on.
+    let arch = |share: f64, mu: f64| {
+        let radius = 2.0;
+        let thickness = share * radius / (1.0 - 0.5 * share);
+        Arch { radius, thickness, mu, ..Arch::default() }.build().unwrap()
+    };
+    for (share, mu, stands) in [
+        (0.106266 * 1.005, 1.0, true),
+        (0.106266 * 0.995, 1.0, false),
+        (0.15, 0.34657 * 1.01, true),
+        (0.15, 0.34657 * 0.99, false),
+    ] {
+        let far = moved(&arch(share, mu), 3.0, 1e-2);
+        assert_eq!(far < 1e-6, stands, "{share} {mu}: {far:e}");
+        assert!(stands || far > 1e-3, "{share} {mu}: {far:e}");
+    }
+}
+
+#[test]
+fn a_pile_of_spheres_comes_to_rest() {
+    let scene = SpherePile { count: 60, ..SpherePile::default() }.build().unwrap();
+    let mut world = World::try_from(&scene).unwrap();
+    // Four walls and the floor.
+    assert_eq!(world.bodies.iter().filter(|b| !b.is_free()).count(), 5);
+    world.law.e = 0.0;
+    let mut simulation = Simulation::new(world, MoreauJean::default()).unwrap();
+    let report = simulation.run(2.0, 5e-3, &mut ()).unwrap();
+    check(&report);
+    let fastest = simulation.state().velocity.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
+    assert!(fastest < 0.05, "{fastest}");
+    assert!(report.penetration < 5e-3, "{report:?}");
+}
