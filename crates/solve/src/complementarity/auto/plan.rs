@@ -137,6 +137,11 @@ fn pivots(n: usize) -> usize {
     20 * n + 200
 }
 
+/// As many pivots as are needed where all goes well: on a longer path other methods have their turn first.
+fn short_path(n: usize) -> usize {
+    5 * n + 50
+}
+
 /// Single changes of block pivoting, each at the price of a factorisation, after which others have their turn.
 const SINGLES: usize = 20;
 
@@ -174,22 +179,33 @@ const SMALL_SPARSE: usize = 500;
 /// From this many variables on a few sweeps over a dense matrix are cheap beside pivots.
 const SWEPT: usize = 60;
 
-/// Sweeps that cost less than pivots and factorisations: on grids of n points over-relaxation takes O(√n).
+/// Sweeps that cost less than pivots and factorisations: on grids of n points over-relaxation takes O(√n), and n pivots on a dense tableau cost as much as some
+/// 30 sweeps.
 fn sweeps(m: &Matrix) -> usize {
     let n = m.nrows() as f64;
     match m {
         Matrix::Sparse(_) => (50.0 + 10.0 * n.sqrt()).min(3000.0) as usize,
-        _ => 60,
+        _ => 30,
+    }
+}
+
+/// Whether pivots come before any look at the class, where `size` pairs and equations are pivoted on.
+fn is_small(m: &Matrix, size: usize) -> bool {
+    match m {
+        Matrix::Dense(_) => size <= SMALL,
+        Matrix::Sparse(_) => size <= SMALL_SPARSE,
+        Matrix::Operator(_) => false,
     }
 }
 
 /// What needs no look at the class: sweeps, as long as their rate promises an end, and pivots, where these are cheap.
 fn at_once(m: &Matrix, dense_from: usize, pivoting: &'static str, size: usize) -> Plan {
     let n = m.nrows();
-    let (small, sweepable) = match m {
-        Matrix::Dense(_) => (size <= SMALL, n >= dense_from),
-        Matrix::Sparse(_) => (size <= SMALL_SPARSE, true),
-        Matrix::Operator(_) => (false, false),
+    let small = is_small(m, size);
+    let sweepable = match m {
+        Matrix::Dense(_) => n >= dense_from,
+        Matrix::Sparse(_) => true,
+        Matrix::Operator(_) => false,
     };
     let positive = || m.diagonal().is_some_and(|d| d.iter().all(|d| *d > 0.0));
     // Without symmetry over-relaxation has to show first that it does no harm.
@@ -198,9 +214,11 @@ fn at_once(m: &Matrix, dense_from: usize, pivoting: &'static str, size: usize) -
         .when(sweepable && positive(), |p| {
             let most = sweeps(m);
             let p = p.then("psor", most, "as long as its rate is good").with("patience", most);
-            p.with("omega", first(m))
+            // Few sweeps leave no time to learn another ω.
+            p.with("omega", first(m)).with("adapt", matches!(m, Matrix::Sparse(_)))
         })
-        .when(small, |p| p.then(pivoting, pivots(size), "small").with("restarts", 0))
+        // From zero: the basis that sweeps without an end leave is far from the path.
+        .when(small, |p| p.anew(pivoting, short_path(size), "small").with("restarts", 0))
 }
 
 /// Pivots from other covering vectors, with more patience each time, and all cases of few pairs.
@@ -241,7 +259,7 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &Auto, stage: usize) -> Vec<Candid
     let Some(facts) = Facts::of(&problem.M) else {
         return of_operator();
     };
-    let n = facts.n;
+    let (n, tried) = (facts.n, is_small(&problem.M, facts.n));
     // Finite for P; and a Z-matrix with a positive diagonal may well be one.
     let blocks = facts.is(Class::P) || (facts.is(Class::Z) && facts.positive_diagonal);
     let transport = facts.large() && !facts.symmetric && facts.is_not(Class::Z);
@@ -251,6 +269,11 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &Auto, stage: usize) -> Vec<Candid
             p.then("block_pivoting", 300, facts.class()).with("most_singles", SINGLES)
         })
         .when(facts.monotone() && facts.large(), |p| p.then("ip_mehrotra", 200, facts.class()))
+        .when(tried && !facts.monotone(), |p| {
+            p.anew("newton_pfb", 12, "globalised, superlinear where it converges")
+                .anew("ip_mehrotra", 60, "as long as it goes well")
+                .anew("newton_pfb", 200, "with patience")
+        })
         .when(facts.pivotal(), |p| p.then("lemke", pivots(n), facts.class()))
         .then("ip_mehrotra", if facts.monotone() || n > DENSE { 200 } else { 50 }, facts.class())
         .then("newton_min", 300, "superlinear where it converges")
@@ -343,6 +366,7 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &Auto, stage: usize) -> Vec<Can
         return of_operator();
     };
     Plan::new()
+        .when(split <= SMALL, |p| p.anew("newton_pfb", 100, "globalised, whatever the class"))
         .when(split <= SMALL || (facts.monotone() && facts.large()), |p| {
             p.then("split/ip_mehrotra", 100, facts.class())
         })

@@ -104,6 +104,9 @@ struct Rate {
     most: Option<f64>,
     /// Sweeps so far.
     sweeps: usize,
+    /// Sweeps after which the rate is read twice, to say how much longer it takes, and the moves at the last of these.
+    watch: usize,
+    watched: f64,
 }
 
 /// What [`Rate::next`] says after a sweep.
@@ -140,7 +143,7 @@ impl<P: Bounded> Solver<P> for Psor {
         let bounds = system(problem).bounds;
         point.z.iter_mut().enumerate().for_each(|(i, z)| *z = bounds.project(i, *z));
         work.backward = false;
-        work.rate = Rate::default();
+        work.rate = Rate { watch: (self.patience / 6).max(2), ..Rate::default() };
         work.relax(&system(problem), self.omega);
     }
 
@@ -215,7 +218,13 @@ impl Rate {
         }
         // The slowest mode shows after some 1/(2 − ω) sweeps.
         let window = YOUNG + (3.0 / (2.0 - self.omega)) as usize;
-        let due = self.age > window && self.age.is_multiple_of(window);
+        // With little patience the rate is read sooner.
+        let watch = window.min(self.watch);
+        let due = self.age > watch && self.age.is_multiple_of(watch);
+        let seen = (moves / self.watched).powf(1.0 / watch as f64);
+        if self.age.is_multiple_of(watch) {
+            self.watched = moves;
+        }
         let rate = (moves / self.mark).powf(1.0 / window as f64);
         if self.age.is_multiple_of(window) {
             self.mark = moves;
@@ -238,8 +247,8 @@ impl Rate {
         if !due {
             return Verdict::Stay;
         }
-        let left = (target / moves).ln() / rate.ln();
-        Verdict::Slow(if rate < 1.0 { left.max(0.0) } else { f64::INFINITY })
+        let left = (target / moves).ln() / seen.ln();
+        Verdict::Slow(if seen < 1.0 { left.max(0.0) } else { f64::INFINITY })
     }
 
     /// By Young's relation, where the ratio of moves is steady.
