@@ -189,6 +189,9 @@ fn sweeps(m: &Matrix) -> usize {
     }
 }
 
+/// Steps of multigrid: on grids a dozen or two is enough, and where it gets no further it ends by itself.
+const MULTIGRID: usize = 100;
+
 /// Whether pivots come before any look at the class, where `size` pairs and equations are pivoted on.
 fn is_small(m: &Matrix, size: usize) -> bool {
     match m {
@@ -207,16 +210,24 @@ fn at_once(m: &Matrix, dense_from: usize, pivoting: &'static str, size: usize) -
         Matrix::Sparse(_) => true,
         Matrix::Operator(_) => false,
     };
-    let positive = || m.diagonal().is_some_and(|d| d.iter().all(|d| *d > 0.0));
-    // Without symmetry over-relaxation has to show first that it does no harm.
-    let first = |m: &Matrix| if n > LARGE && m.asymmetry() == Some(0.0) { 1.3 } else { 1.0 };
+    let sweepable = sweepable && m.diagonal().is_some_and(|d| d.iter().all(|d| *d > 0.0));
+    let sparse = matches!(m, Matrix::Sparse(_));
+    let symmetric = sparse && m.asymmetry() == Some(0.0);
+    let (large, most) = (sparse && n > LARGE, sweeps(m));
+    let relaxed = |p: Plan, omega: f64, adapt: bool, patience: usize| {
+        let p = p.then("psor", patience, "as long as its rate is good").with("patience", patience);
+        p.with("omega", omega).with("adapt", adapt)
+    };
+    // Without symmetry over-relaxation may do harm, so that it comes second; few sweeps leave no time to learn another ω.
     Plan::new()
-        .when(sweepable && positive(), |p| {
-            let most = sweeps(m);
-            let p = p.then("psor", most, "as long as its rate is good").with("patience", most);
-            // Few sweeps leave no time to learn another ω.
-            p.with("omega", first(m)).with("adapt", matches!(m, Matrix::Sparse(_)))
+        .when(sweepable && symmetric && large, |p| {
+            p.then("tnnmg", MULTIGRID, "large and symmetric")
         })
+        .when(sweepable && symmetric, |p| relaxed(p, if large { 1.3 } else { 1.0 }, true, most))
+        .when(sweepable && !symmetric, |p| {
+            relaxed(p, 1.0, false, if large { most / 3 } else { most })
+        })
+        .when(sweepable && !symmetric && large && !small, |p| relaxed(p, 1.3, true, most))
         // From zero: the basis that sweeps without an end leave is far from the path.
         .when(small, |p| p.anew(pivoting, short_path(size), "small").with("restarts", 0))
 }
@@ -275,6 +286,10 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &Auto, stage: usize) -> Vec<Candid
                 .anew("newton_pfb", 200, "with patience")
         })
         .when(facts.pivotal(), |p| p.then("lemke", pivots(n), facts.class()))
+        .when(n > HUGE, |p| p.then("psor", 3000, "sweeps cost less than factorisations"))
+        .when(!facts.pivotal(), |p| {
+            p.then("newton_min", 30, "from the face that sweeps have found")
+        })
         .then("ip_mehrotra", if facts.monotone() || n > DENSE { 200 } else { 50 }, facts.class())
         .then("newton_min", 300, "superlinear where it converges")
         .then("newton_fb", 500, "globalised")
@@ -350,7 +365,9 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &Auto, stage: usize) -> Vec<Can
             let Plan(mut plan) = at_once(m, SWEPT_BOX, "split/lemke", split);
             if n <= SMALL && m.asymmetry() == Some(0.0) {
                 // Conjugate gradients where sweeps are slow; pivots come after them.
-                let cg = Plan::new().then("mprgp", CONJUGATE, "symmetric");
+                let most =
+                    if matches!(m, Matrix::Sparse(_)) { CONJUGATE.max(2 * n) } else { CONJUGATE };
+                let cg = Plan::new().then("mprgp", most, "symmetric");
                 let at = plan.len() - plan.iter().filter(|c| c.name == "split/lemke").count();
                 plan.splice(at..at, cg.0);
             }
@@ -385,7 +402,7 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &Auto, stage: usize) -> Vec<Can
 
 /// From this many variables on a few sweeps over a dense box problem are cheap beside pivots with all bounds.
 const SWEPT_BOX: usize = 8;
-/// Steps of conjugate gradients that are cheap beside pivots.
+/// Steps of conjugate gradients that are cheap beside pivots, over a dense matrix; over a sparse one more of them are.
 const CONJUGATE: usize = 150;
 
 pub(super) fn of_hlcp(problem: &Hlcp, settings: &Auto, stage: usize) -> Vec<Candidate> {
