@@ -189,6 +189,8 @@ fn sweeps(m: &Matrix) -> usize {
     }
 }
 
+/// Sweeps that are cheaper than the levels of multigrid.
+const FEW_SWEEPS: usize = 40;
 /// Steps of multigrid: on grids a dozen or two is enough, and where it gets no further it ends by itself.
 const MULTIGRID: usize = 100;
 
@@ -218,16 +220,18 @@ fn at_once(m: &Matrix, dense_from: usize, pivoting: &'static str, size: usize) -
         let p = p.then("psor", patience, "as long as its rate is good").with("patience", patience);
         p.with("omega", omega).with("adapt", adapt)
     };
-    // Without symmetry over-relaxation may do harm, so that it comes second; few sweeps leave no time to learn another ω.
+    // Where a few sweeps do not do, multigrid from zero, then over-relaxation. Without symmetry that may do harm, and waves take their time.
+    let first = match (large, symmetric) {
+        (true, true) => FEW_SWEEPS,
+        (true, false) => most / 3,
+        _ => most,
+    };
     Plan::new()
-        .when(sweepable && symmetric && large, |p| {
-            p.then("tnnmg", MULTIGRID, "large and symmetric")
+        .when(sweepable, |p| relaxed(p, 1.0, symmetric && !large, first))
+        .when(sweepable && large && symmetric, |p| {
+            p.anew("tnnmg", MULTIGRID, "large and symmetric")
         })
-        .when(sweepable && symmetric, |p| relaxed(p, if large { 1.3 } else { 1.0 }, true, most))
-        .when(sweepable && !symmetric, |p| {
-            relaxed(p, 1.0, false, if large { most / 3 } else { most })
-        })
-        .when(sweepable && !symmetric && large && !small, |p| relaxed(p, 1.3, true, most))
+        .when(sweepable && large, |p| relaxed(p, 1.3, true, most))
         // From zero: the basis that sweeps without an end leave is far from the path.
         .when(small, |p| p.anew(pivoting, short_path(size), "small").with("restarts", 0))
 }

@@ -17,10 +17,11 @@ use super::rows::dot;
 
 /// Below this many unknowns there is no coarser level.
 const COARSEST: usize = 16;
-/// A level that is not smaller than this share of the one before is none.
-const COARSENS: f64 = 0.7;
-/// Sweeps forth and back that solve the coarsest level.
+/// A level with more than this share of the unknowns or entries of the one before is none: graphs without geometry fill up.
+const COARSENS: f64 = 0.6;
+/// Sweeps forth and back that solve the coarsest level, up to so many unknowns; of more, where nothing coarser was found, one is the preconditioner.
 const SWEEPS: usize = 12;
+const SOLVED: usize = 200;
 /// A first step of conjugate gradients that leaves less than this of the residual needs no second.
 const ENOUGH: f64 = 0.25;
 /// What of a diagonal entry is rounding, in units of those that it is the sum of.
@@ -185,6 +186,9 @@ pub(super) fn levels(a: &Csc) -> Vec<Level> {
         }
         let aggregate: Vec<u32> = pair.iter().map(|&p| pair_of_pair[p as usize]).collect();
         let (coarse, target) = fine.summed(&aggregate, count);
+        if coarse.column.len() as f64 > COARSENS * fine.column.len() as f64 {
+            break;
+        }
         (fine.aggregate, fine.target) = (aggregate, target);
         levels.push(coarse);
     }
@@ -240,7 +244,8 @@ pub(super) fn cycle(levels: &mut [Level], b: &[f64], x: &mut [f64]) {
         return;
     }
     let Some(coarse) = below.first_mut() else {
-        for _ in 0..SWEEPS {
+        let sweeps = if fine.order() <= SOLVED { SWEEPS } else { 1 };
+        for _ in 0..sweeps {
             fine.sweep(b, x, false);
             fine.sweep(b, x, true);
         }
