@@ -16,7 +16,9 @@ use crate::complementarity::pivoting::{
 use crate::complementarity::proximal::{Proxi, Qpcomp, Semicomp};
 use crate::complementarity::quadratic::{Mprgp, NeSqp, QuadraticProgram};
 use crate::complementarity::reform::{Mixed, Presolve, Reduce, Split};
-use crate::complementarity::splitting::{Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs};
+use crate::complementarity::splitting::{
+    Pgs, ProjectedJacobi, Psor, Rpgs, Rpsor, SplittingLs, Tnnmg,
+};
 use crate::core::register::{Edge, Entry, Registered};
 
 /// The solvers that take bounds of any kind.
@@ -28,6 +30,7 @@ fn bounded<P: Bounded + 'static>() -> Vec<Entry<P>> {
         Entry::new(|s: Rpgs| Boxed::new(Rpsor::from(s))),
         Entry::of::<Rpsor>(),
         Entry::of::<SplittingLs>(),
+        Entry::of::<Tnnmg>(),
         Entry::of::<Mprgp>(),
         Entry::of::<QuadraticProgram>(),
         Entry::of::<Newton<Min>>(),

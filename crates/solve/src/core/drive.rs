@@ -336,6 +336,14 @@ pub trait Session<P: Problem>: Send {
     fn gauge(&mut self) -> Option<&mut P::Gauge> {
         None
     }
+
+    /// Hands over a gauge of the problem that is solved next, which then prepares none of its own; by default it is not used.
+    fn lend(&mut self, _gauge: Box<P::Gauge>) {}
+
+    /// Takes the gauge out, where [`gauge`](Self::gauge) shows one.
+    fn reclaim(&mut self) -> Option<Box<P::Gauge>> {
+        None
+    }
 }
 
 /// The factor from a solver's own estimate to the judge's residual, learned at each judgement: the two are proportional, near enough.
@@ -409,6 +417,8 @@ pub struct Driver<P: Problem, S: Solver<P>> {
     solver: S,
     // Boxed: workspaces are large to move.
     gauge: Option<Box<P::Gauge>>,
+    /// The gauge is one of the next problem already.
+    lent: bool,
     kept: Option<Box<Kept<P, S>>>,
     history: History,
 }
@@ -424,7 +434,7 @@ struct Kept<P: Problem, S: Solver<P>> {
 impl<P: Problem, S: Solver<P>> Driver<P, S> {
     /// A driver for `solver`, without a workspace yet.
     pub fn new(solver: S) -> Self {
-        Self { solver, gauge: None, kept: None, history: History::new() }
+        Self { solver, gauge: None, lent: false, kept: None, history: History::new() }
     }
 
     /// The solver that is driven, with its settings.
@@ -445,12 +455,14 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
         limits.validate()?;
         problem.validate_point(point)?;
         let scope = limits.budget(begun).enter();
-        let Self { solver, gauge, kept, history } = self;
+        let Self { solver, gauge, lent, kept, history } = self;
         history.clear();
+        let lent = std::mem::take(lent);
         // What was cut short in a kernel is begun anew.
         let (earlier, gauge_before) = (kept.take().filter(|k| !k.torn), gauge.take());
         // The judge's own preparation is not part of the solve's time.
-        let judge = match gauge_before.filter(|_| earlier.is_some()) {
+        let judge = match gauge_before.filter(|_| lent || earlier.is_some()) {
+            Some(gauge) if lent => Ok(gauge),
             Some(mut gauge) => problem.regauge(&mut gauge).map(|()| gauge),
             None => problem.gauge().map(Box::new),
         };
@@ -516,6 +528,15 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
     fn gauge(&mut self) -> Option<&mut P::Gauge> {
         // Without a limit reached inside a kernel the solve left nothing unfinished.
         self.kept.as_ref().filter(|kept| !kept.torn).and(self.gauge.as_deref_mut())
+    }
+
+    fn lend(&mut self, gauge: Box<P::Gauge>) {
+        (self.gauge, self.lent) = (Some(gauge), true);
+    }
+
+    fn reclaim(&mut self) -> Option<Box<P::Gauge>> {
+        let whole = self.kept.as_ref().is_none_or(|kept| !kept.torn);
+        self.gauge.take().filter(|_| whole)
     }
 }
 

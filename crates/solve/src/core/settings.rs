@@ -67,6 +67,14 @@ pub fn parse<S: Settings>(map: &SettingsMap) -> Result<S, String> {
     if map.is_empty() {
         return Ok(S::default());
     }
+    // The schema is made where there is something to correct or to explain: it costs as much as a small solve.
+    if let Ok(settings) = serde_json::from_value::<S>(Value::Object(map.clone()))
+        && let Ok(Value::Object(all)) = serde_json::to_value(&settings)
+        && map.keys().all(|key| all.contains_key(key))
+    {
+        settings.validate()?;
+        return Ok(settings);
+    }
     let known = described::<S>();
     let mut map = map.clone();
     // One key at a time, so that the message can name the key at fault.

@@ -137,6 +137,11 @@ fn pivots(n: usize) -> usize {
     20 * n + 200
 }
 
+/// As many pivots as are needed where all goes well: on a longer path other methods have their turn first.
+fn short_path(n: usize) -> usize {
+    5 * n + 50
+}
+
 /// Single changes of block pivoting, each at the price of a factorisation, after which others have their turn.
 const SINGLES: usize = 20;
 
@@ -174,33 +179,61 @@ const SMALL_SPARSE: usize = 500;
 /// From this many variables on a few sweeps over a dense matrix are cheap beside pivots.
 const SWEPT: usize = 60;
 
-/// Sweeps that cost less than pivots and factorisations: on grids of n points over-relaxation takes O(√n).
+/// Sweeps that cost less than pivots and factorisations: on grids of n points over-relaxation takes O(√n), and n pivots on a dense tableau cost as much as some
+/// 30 sweeps.
 fn sweeps(m: &Matrix) -> usize {
     let n = m.nrows() as f64;
     match m {
         Matrix::Sparse(_) => (50.0 + 10.0 * n.sqrt()).min(3000.0) as usize,
-        _ => 60,
+        _ => 30,
+    }
+}
+
+/// Sweeps that are cheaper than the levels of multigrid.
+const FEW_SWEEPS: usize = 40;
+/// Steps of multigrid: on grids a dozen or two is enough, and where it gets no further it ends by itself.
+const MULTIGRID: usize = 100;
+
+/// Whether pivots come before any look at the class, where `size` pairs and equations are pivoted on.
+fn is_small(m: &Matrix, size: usize) -> bool {
+    match m {
+        Matrix::Dense(_) => size <= SMALL,
+        Matrix::Sparse(_) => size <= SMALL_SPARSE,
+        Matrix::Operator(_) => false,
     }
 }
 
 /// What needs no look at the class: sweeps, as long as their rate promises an end, and pivots, where these are cheap.
 fn at_once(m: &Matrix, dense_from: usize, pivoting: &'static str, size: usize) -> Plan {
     let n = m.nrows();
-    let (small, sweepable) = match m {
-        Matrix::Dense(_) => (size <= SMALL, n >= dense_from),
-        Matrix::Sparse(_) => (size <= SMALL_SPARSE, true),
-        Matrix::Operator(_) => (false, false),
+    let small = is_small(m, size);
+    let sweepable = match m {
+        Matrix::Dense(_) => n >= dense_from,
+        Matrix::Sparse(_) => true,
+        Matrix::Operator(_) => false,
     };
-    let positive = || m.diagonal().is_some_and(|d| d.iter().all(|d| *d > 0.0));
-    // Without symmetry over-relaxation has to show first that it does no harm.
-    let first = |m: &Matrix| if n > LARGE && m.asymmetry() == Some(0.0) { 1.3 } else { 1.0 };
+    let sweepable = sweepable && m.diagonal().is_some_and(|d| d.iter().all(|d| *d > 0.0));
+    let sparse = matches!(m, Matrix::Sparse(_));
+    let symmetric = sparse && m.asymmetry() == Some(0.0);
+    let (large, most) = (sparse && n > LARGE, sweeps(m));
+    let relaxed = |p: Plan, omega: f64, adapt: bool, patience: usize| {
+        let p = p.then("psor", patience, "as long as its rate is good").with("patience", patience);
+        p.with("omega", omega).with("adapt", adapt)
+    };
+    // Where a few sweeps do not do, multigrid from zero, then over-relaxation. Without symmetry that may do harm, and waves take their time.
+    let first = match (large, symmetric) {
+        (true, true) => FEW_SWEEPS,
+        (true, false) => most / 3,
+        _ => most,
+    };
     Plan::new()
-        .when(sweepable && positive(), |p| {
-            let most = sweeps(m);
-            let p = p.then("psor", most, "as long as its rate is good").with("patience", most);
-            p.with("omega", first(m))
+        .when(sweepable, |p| relaxed(p, 1.0, symmetric && !large, first))
+        .when(sweepable && large && symmetric, |p| {
+            p.anew("tnnmg", MULTIGRID, "large and symmetric")
         })
-        .when(small, |p| p.then(pivoting, pivots(size), "small").with("restarts", 0))
+        .when(sweepable && large, |p| relaxed(p, 1.3, true, most))
+        // From zero: the basis that sweeps without an end leave is far from the path.
+        .when(small, |p| p.anew(pivoting, short_path(size), "small").with("restarts", 0))
 }
 
 /// Pivots from other covering vectors, with more patience each time, and all cases of few pairs.
@@ -241,7 +274,7 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &Auto, stage: usize) -> Vec<Candid
     let Some(facts) = Facts::of(&problem.M) else {
         return of_operator();
     };
-    let n = facts.n;
+    let (n, tried) = (facts.n, is_small(&problem.M, facts.n));
     // Finite for P; and a Z-matrix with a positive diagonal may well be one.
     let blocks = facts.is(Class::P) || (facts.is(Class::Z) && facts.positive_diagonal);
     let transport = facts.large() && !facts.symmetric && facts.is_not(Class::Z);
@@ -251,7 +284,16 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &Auto, stage: usize) -> Vec<Candid
             p.then("block_pivoting", 300, facts.class()).with("most_singles", SINGLES)
         })
         .when(facts.monotone() && facts.large(), |p| p.then("ip_mehrotra", 200, facts.class()))
+        .when(tried && !facts.monotone(), |p| {
+            p.anew("newton_pfb", 12, "globalised, superlinear where it converges")
+                .anew("ip_mehrotra", 60, "as long as it goes well")
+                .anew("newton_pfb", 200, "with patience")
+        })
         .when(facts.pivotal(), |p| p.then("lemke", pivots(n), facts.class()))
+        .when(n > HUGE, |p| p.then("psor", 3000, "sweeps cost less than factorisations"))
+        .when(!facts.pivotal(), |p| {
+            p.then("newton_min", 30, "from the face that sweeps have found")
+        })
         .then("ip_mehrotra", if facts.monotone() || n > DENSE { 200 } else { 50 }, facts.class())
         .then("newton_min", 300, "superlinear where it converges")
         .then("newton_fb", 500, "globalised")
@@ -327,7 +369,9 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &Auto, stage: usize) -> Vec<Can
             let Plan(mut plan) = at_once(m, SWEPT_BOX, "split/lemke", split);
             if n <= SMALL && m.asymmetry() == Some(0.0) {
                 // Conjugate gradients where sweeps are slow; pivots come after them.
-                let cg = Plan::new().then("mprgp", CONJUGATE, "symmetric");
+                let most =
+                    if matches!(m, Matrix::Sparse(_)) { CONJUGATE.max(2 * n) } else { CONJUGATE };
+                let cg = Plan::new().then("mprgp", most, "symmetric");
                 let at = plan.len() - plan.iter().filter(|c| c.name == "split/lemke").count();
                 plan.splice(at..at, cg.0);
             }
@@ -343,6 +387,7 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &Auto, stage: usize) -> Vec<Can
         return of_operator();
     };
     Plan::new()
+        .when(split <= SMALL, |p| p.anew("newton_pfb", 100, "globalised, whatever the class"))
         .when(split <= SMALL || (facts.monotone() && facts.large()), |p| {
             p.then("split/ip_mehrotra", 100, facts.class())
         })
@@ -361,7 +406,7 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &Auto, stage: usize) -> Vec<Can
 
 /// From this many variables on a few sweeps over a dense box problem are cheap beside pivots with all bounds.
 const SWEPT_BOX: usize = 8;
-/// Steps of conjugate gradients that are cheap beside pivots.
+/// Steps of conjugate gradients that are cheap beside pivots, over a dense matrix; over a sparse one more of them are.
 const CONJUGATE: usize = 150;
 
 pub(super) fn of_hlcp(problem: &Hlcp, settings: &Auto, stage: usize) -> Vec<Candidate> {

@@ -40,8 +40,8 @@ pub struct Portfolio<P: Registered> {
     plan: Planner<P>,
     /// What was made for earlier problems, by name and settings.
     sessions: Vec<Made<P>>,
-    /// The one that was last asked.
-    last: Option<usize>,
+    /// The judge's, which goes from one candidate to the next.
+    gauge: Option<Box<P::Gauge>>,
     history: History,
     account: Vec<String>,
     trace: Trace,
@@ -60,7 +60,7 @@ impl<P: Registered> Portfolio<P> {
         Self {
             plan: Box::new(plan),
             sessions: vec![],
-            last: None,
+            gauge: None,
             history: History::new(),
             account: vec![],
             trace: Trace::None,
@@ -200,23 +200,28 @@ impl<P: Registered> Session<P> for Portfolio<P> {
         limits: &Limits,
         observer: &mut dyn Observer<P>,
     ) -> Result<Outcome, SolveError> {
+        let begun = Instant::now();
         limits.validate()?;
         problem.validate_point(point)?;
         self.history.clear();
         self.account.clear();
         self.trace = Trace::None;
-        self.last = None;
-        let mut tally = Tally::<P> {
-            meter: Meter::start(Instant::now(), limits),
-            iterations: 0,
-            factorisations: 0,
-            best: None,
+        let scope = limits.budget(begun).enter();
+        // As in every session, the judge's own preparation is not part of the solve's time.
+        let mut gauge = match self.gauge.take() {
+            Some(mut gauge) => {
+                problem.regauge(&mut gauge)?;
+                gauge
+            }
+            None => Box::new(problem.gauge()?),
         };
-        let scope = limits.budget(tally.meter.begun).enter();
+        let meter = Meter::start(begun, limits);
+        let mut tally = Tally::<P> { meter, iterations: 0, factorisations: 0, best: None };
         if observer.keeps_best() {
             // The plan asks for the classes of the matrix, which may take all the time there is.
-            observer.best(point, &problem.measure(point, &mut problem.gauge()?));
+            observer.best(point, &problem.measure(point, &mut gauge));
         }
+        self.gauge = Some(gauge);
         let mut status = Status::Stalled("no method applies to this problem".into());
         let mut nearly = None;
         let mut stages = Stages::default();
@@ -233,7 +238,11 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             let session = &mut self.sessions[k].2;
             let merit = tally.best.as_ref().map_or(f64::INFINITY, |b| b.1.merit());
             let mut part = Part { observer, iterations: before, seconds: begun, merit };
+            if let Some(gauge) = self.gauge.take() {
+                session.lend(gauge);
+            }
             let tried = session.observe(problem, &mut trial, &left, &mut part);
+            self.gauge = session.reclaim();
             let outcome = match tried {
                 Ok(outcome) => outcome,
                 Err(e) if e.is_inapplicable() => {
@@ -246,7 +255,6 @@ impl<P: Registered> Session<P> for Portfolio<P> {
                 let (iteration, seconds) = (before + s.iteration, begun + s.seconds);
                 self.history.note(Sample { iteration, seconds, relative: s.relative }, false);
             }
-            self.last = Some(k);
             self.trace = session.trace();
             self.account.push(sentence(&candidate, &outcome));
             self.account.extend(session.account().into_iter().map(|line| format!("  {line}")));
@@ -281,7 +289,10 @@ impl<P: Registered> Session<P> for Portfolio<P> {
                 P::copy_point(&best, point);
                 measure
             }
-            None => problem.certify(point, &mut problem.gauge()?),
+            None => match &mut self.gauge {
+                Some(gauge) => problem.certify(point, gauge),
+                None => problem.certify(point, &mut problem.gauge()?),
+            },
         };
         let outcome = tally.meter.outcome(status, measure, tally.iterations);
         Ok(Outcome { factorisations: tally.factorisations, ..outcome })
@@ -300,7 +311,7 @@ impl<P: Registered> Session<P> for Portfolio<P> {
     }
 
     fn gauge(&mut self) -> Option<&mut P::Gauge> {
-        self.sessions.get_mut(self.last?)?.2.gauge()
+        self.gauge.as_deref_mut()
     }
 }
 

@@ -1,5 +1,6 @@
 //! Splitting methods for linear complementarity problems.
 
+mod aggregates;
 mod pgs;
 mod projected_jacobi;
 mod psor;
@@ -7,6 +8,7 @@ mod rows;
 mod rpgs;
 mod rpsor;
 mod splitting_ls;
+mod tnnmg;
 
 pub use pgs::Pgs;
 pub use projected_jacobi::ProjectedJacobi;
@@ -15,3 +17,4 @@ pub use rows::Direction;
 pub use rpgs::Rpgs;
 pub use rpsor::Rpsor;
 pub use splitting_ls::{SplittingLs, Sweep};
+pub use tnnmg::Tnnmg;

@@ -6,7 +6,7 @@
 //! shrink: Young's relation `(λ + ω − 1)² = λ ω² μ²` gives the spectral radius μ of the Jacobi iteration on the present face, and that the
 //! best `ω = 2/(1 + √(1 − μ²))`; on grids this takes O(n) sweeps for n points a side where ω = 1 takes O(n²). Where the relation does not hold, the new ω is measured
 //! against the old one, and the better stays; where the moves grow, which they may when M is not symmetric, the over-relaxation is halved for good.
-//! With `patience`, the method ends as soon as the rate of a settled ω promises more sweeps than that.
+//! With `patience`, the method ends as soon as the rate of a settled ω promises more sweeps than that; without `adapt` after a quarter of them at the earliest.
 //!
 //! References: Acary2018 (12)(13), the latter with the second sum over j ≥ i; Cryer1971; CottlePangStone2009, chapter 5; HagemanYoung1981, chapter 9, for ω.
 //!
@@ -37,7 +37,7 @@ pub struct Psor {
     pub direction: Direction,
     /// Steps between two evaluations of the true residual, unless the estimate asks for one earlier.
     pub check_every: usize,
-    /// End where the observed rate of convergence promises more sweeps than this, with direction=forward; 0: never.
+    /// End where the observed rate of convergence promises more sweeps than this, with direction=forward; 0: never. Without adapt it is read after a quarter of them.
     pub patience: usize,
 }
 
@@ -104,6 +104,9 @@ struct Rate {
     most: Option<f64>,
     /// Sweeps so far.
     sweeps: usize,
+    /// Every how many sweeps the rate is read, to say how much longer it takes, and the moves when it was last.
+    watch: usize,
+    watched: f64,
 }
 
 /// What [`Rate::next`] says after a sweep.
@@ -119,6 +122,9 @@ const YOUNG: usize = 10;
 
 /// Moves of an over-relaxed sweep that are so many times those of the first one with this ω do not come down by themselves.
 const GROWN: f64 = 10.0;
+
+/// Moves that are so many times the first ones have no end.
+const RUNAWAY: f64 = 1e4;
 
 /// The largest ω that is tried: what Young's relation overstates costs more than what it understates.
 const LARGEST: f64 = 1.995;
@@ -140,7 +146,8 @@ impl<P: Bounded> Solver<P> for Psor {
         let bounds = system(problem).bounds;
         point.z.iter_mut().enumerate().for_each(|(i, z)| *z = bounds.project(i, *z));
         work.backward = false;
-        work.rate = Rate::default();
+        let watch = if self.adapt { usize::MAX } else { (self.patience / 8).max(5) };
+        work.rate = Rate { watch, ..Rate::default() };
         work.relax(&system(problem), self.omega);
     }
 
@@ -215,7 +222,13 @@ impl Rate {
         }
         // The slowest mode shows after some 1/(2 − ω) sweeps.
         let window = YOUNG + (3.0 / (2.0 - self.omega)) as usize;
-        let due = self.age > window && self.age.is_multiple_of(window);
+        // An ω that stays has its rate read as late as the patience allows: waves have to leave first, where M is not symmetric.
+        let watch = if self.watch == usize::MAX { window } else { self.watch };
+        let due = self.age > watch && self.age.is_multiple_of(watch);
+        let seen = (moves / self.watched).powf(1.0 / watch as f64);
+        if self.age.is_multiple_of(watch) {
+            self.watched = moves;
+        }
         let rate = (moves / self.mark).powf(1.0 / window as f64);
         if self.age.is_multiple_of(window) {
             self.mark = moves;
@@ -235,11 +248,14 @@ impl Rate {
                 return Verdict::Relax(omega);
             }
         }
+        if !adapt && moves > RUNAWAY * self.first {
+            return Verdict::Slow(f64::INFINITY);
+        }
         if !due {
             return Verdict::Stay;
         }
-        let left = (target / moves).ln() / rate.ln();
-        Verdict::Slow(if rate < 1.0 { left.max(0.0) } else { f64::INFINITY })
+        let left = (target / moves).ln() / seen.ln();
+        Verdict::Slow(if seen < 1.0 { left.max(0.0) } else { f64::INFINITY })
     }
 
     /// By Young's relation, where the ratio of moves is steady.

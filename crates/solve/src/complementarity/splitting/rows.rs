@@ -259,7 +259,7 @@ fn sweep(
 }
 
 /// Four sums side by side, which one instruction adds.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (heads_a, tail_a) = a.as_chunks::<4>();
     let (heads_b, tail_b) = b[..a.len()].as_chunks::<4>();
     let mut sums = [0.0; 4];

@@ -1,11 +1,11 @@
-//! What `psor` does by the rate that it measures, and what `auto` makes of it.
+//! What `psor` does by the rate that it measures, how few steps multigrid takes, and what `auto` makes of both.
 
 use nonsmooth_linalg::Csc;
-use nonsmooth_problem::Lcp;
 use nonsmooth_problem::planted::{Membrane, PlantedClass, PlantedLcp};
+use nonsmooth_problem::{Lcp, Problem};
 use nonsmooth_solve::{Solve, Status};
 
-use super::{bump, limits, solved, try_solve};
+use super::{bump, distance, limits, session, solved, try_solve};
 
 /// Convection and diffusion on `side × side` points above an obstacle, upwind: an M-matrix that is not symmetric.
 fn transport(side: usize, diffusion: f64) -> Lcp {
@@ -56,6 +56,80 @@ fn a_poor_rate_ends_sweeps_that_have_a_patience() {
     // Over-relaxation keeps what the patience asks for.
     let (_, sweeps) = solved(&problem, "psor patience=1000");
     assert!(sweeps < 1000, "{sweeps}");
+}
+
+#[test]
+fn little_patience_ends_sweeps_early() {
+    // Sweeps converge on positive semidefinite matrices, but slowly; on those of H+ a dozen is enough.
+    let limits = limits(1e-10, 10_000);
+    let label = "psor omega=1 adapt=false patience=30";
+    let outcome = try_solve(&planted(100, PlantedClass::Psd), label, &limits).unwrap().0;
+    assert!(matches!(&outcome.status, Status::Stalled(why) if why.contains("patience")));
+    assert_eq!(outcome.iterations, 10);
+    // Where M is not symmetric a wave has to cross the grid first: its moves say nothing of the rate.
+    let label = "psor omega=1 adapt=false patience=650";
+    let outcome = try_solve(&transport(60, 1e-3), label, &limits).unwrap().0;
+    assert_eq!(outcome.status, Status::Solved, "{outcome:?}");
+    let outcome = try_solve(&planted(100, PlantedClass::HPlus), label, &limits).unwrap().0;
+    assert_eq!(outcome.status, Status::Solved);
+}
+
+#[test]
+fn the_steps_of_multigrid_hardly_depend_on_the_number_of_points() {
+    let steps = |side: usize, label: &str| {
+        let problem = Membrane { load: -1.0, ..Membrane::square(side) }.above(bump);
+        let (z, steps) = solved(&problem, label);
+        if side < 50 {
+            assert!(distance(&z, &solved(&problem, "mprgp").0) < 1e-7, "{side}");
+        }
+        steps
+    };
+    for side in [1, 2, 3, 20, 40, 80, 160] {
+        let found = steps(side, "tnnmg");
+        assert!(found <= 15, "{side}: {found}");
+    }
+    // What the cascade saves grows with the number of points that a front has to pass.
+    assert!(steps(160, "tnnmg") < steps(160, "tnnmg cascade=false"));
+}
+
+#[test]
+fn multigrid_that_gets_no_further_says_so() {
+    // Indefinite: no minimum between no bounds.
+    let entries =
+        (0..40).flat_map(|i| [(i, i, 1.0), (i, (i + 1) % 40, 2.0), ((i + 1) % 40, i, 2.0)]);
+    let m = Csc::from_triplets(40, 40, entries.collect::<Vec<_>>().into_iter()).unwrap();
+    let q = (0..40).map(|i| if i % 3 == 0 { -1.0 } else { 0.5 }).collect();
+    let outcome = try_solve(&Lcp::new(m, q).unwrap(), "tnnmg", &limits(1e-10, 1000)).unwrap().0;
+    assert!(!matches!(outcome.status, Status::Limit(_)), "{outcome:?}");
+}
+
+#[test]
+fn auto_takes_multigrid_where_a_matrix_is_large_sparse_and_symmetric_and_sweeps_are_slow() {
+    let problem = Membrane { load: -1.0, ..Membrane::square(60) }.above(bump);
+    let answer = Solve::new().solver("auto").tolerance(1e-8).run(&problem).unwrap();
+    assert!(answer.is_solved(), "{}", answer.status);
+    let tried: Vec<_> = answer.account.iter().filter(|line| !line.starts_with(' ')).collect();
+    assert!(tried[0].starts_with("psor") && tried[1].starts_with("tnnmg"), "{tried:?}");
+    assert_eq!(tried.len(), 2, "{tried:?}");
+}
+
+#[test]
+fn a_session_of_auto_goes_from_one_shape_to_another_and_back() {
+    // The judge's gauge goes from solver to solver, and from solve to solve.
+    let problems = [(40, PlantedClass::Kkt), (100, PlantedClass::Psd), (12, PlantedClass::HPlus)];
+    let mut session = session::<Lcp>("auto");
+    for (n, class) in [problems, problems].concat() {
+        let problem = planted(n, class);
+        let mut point = problem.origin();
+        let outcome = session.solve(&problem, &mut point, &limits(1e-10, 100_000), &mut |_| {});
+        let outcome = outcome.unwrap();
+        assert_eq!(outcome.status, Status::Solved, "{n}");
+        // What a gauge of another problem would have measured is something else.
+        let fresh = problem.certify(&point, &mut problem.gauge().unwrap());
+        assert_eq!(fresh.relative, outcome.measure.relative, "{n}");
+        let kept = session.gauge().map(|gauge| problem.certify(&point, gauge).relative);
+        assert_eq!(kept, Some(fresh.relative), "{n}");
+    }
 }
 
 fn planted(n: usize, class: PlantedClass) -> Lcp {

@@ -23,7 +23,7 @@ fn refusals_say_what_is_missing() {
         Lcp::new(Dense::from_rows(rows).unwrap(), vec![-1.0; rows.len()]).unwrap()
     };
     let zero = lcp(&[&[1.0, 1.0], &[-1.0, 0.0]]);
-    for label in ["pgs", "psor"] {
+    for label in ["pgs", "psor", "tnnmg"] {
         let text = refusal(&zero, label);
         assert!(text.contains("positive diagonal") && text.contains("M[1, 1] = 0"), "{text}");
         // Who can is found out by trial: a text does not know the problem.
@@ -33,13 +33,16 @@ fn refusals_say_what_is_missing() {
         let text = refusal(&zero, label);
         assert!(text.contains("symmetric M") && text.contains("2.0e0"), "{text}");
     }
+    let skew = lcp(&[&[1.0, 1.0], &[-1.0, 1.0]]);
+    let text = refusal(&skew, "tnnmg");
+    assert!(text.contains("symmetric M") && text.contains("2.0e0"), "{text}");
     let negative = lcp(&[&[1.0, 0.0], &[0.0, -1.0]]);
     for label in ["rpgs", "rpsor", "mprgp"] {
         let text = refusal(&negative, label);
         assert!(text.contains("M[1, 1] = -1"), "{text}");
     }
     let products = Membrane::square(5).above_by_products(|_, _| -1.0);
-    for label in ["pgs", "psor", "rpgs", "rpsor", "splitting_ls"] {
+    for label in ["pgs", "psor", "rpgs", "rpsor", "splitting_ls", "tnnmg"] {
         let text = refusal(&products, label);
         assert!(text.contains("entries of M") && text.contains("operator"), "{text}");
     }
