@@ -14,11 +14,12 @@ use std::sync::Arc;
 pub use judge::{SetCounts, SetStatus, ViGauge};
 pub use set::Set;
 
+use super::complementarity::stated::{Part, Parts, Shape, Stated, of_jacobian, plural, x_and_f};
 use crate::check::proof::Exactly;
 use crate::check::{Certificate, ConeSystem, Evidence, Judged, Measure, VerdictOf, weigh};
 use crate::error::vector;
-use crate::field::Field;
-use crate::{Kind, LcpPoint, Problem, ProblemError};
+use crate::field::{Expressions, Field, same};
+use crate::{Kind, LcpPoint, Mcp, OfAny, Problem, ProblemError};
 
 /// The variational inequality: find x ∈ X with `F(x)ᵀ(y − x) ≥ 0` for all y ∈ X; that is `x = P_X(x − γ F(x))` for any γ > 0.
 ///
@@ -32,6 +33,13 @@ pub struct Vi {
     pub set: Set,
     /// Where solvers begin, n; they begin at its projection on X.
     pub start: Vec<f64>,
+}
+
+impl PartialEq for Vi {
+    /// Functions are equal where they are the same expressions, or the same object.
+    fn eq(&self, other: &Self) -> bool {
+        same(&self.F, &other.F) && self.set == other.set && self.start == other.start
+    }
 }
 
 #[allow(non_snake_case)]
@@ -80,6 +88,12 @@ impl Vi {
     pub fn dim(&self) -> usize {
         self.start.len()
     }
+
+    /// The same problem as a mixed complementarity problem, where the set is a box or a product of boxes.
+    pub fn mcp(&self) -> Option<Mcp> {
+        let (lower, upper) = self.set.bounds()?;
+        Some(Mcp { F: self.F.clone(), lower, upper, start: self.start.clone() })
+    }
 }
 
 impl Problem for Vi {
@@ -87,7 +101,7 @@ impl Problem for Vi {
     type Gauge = ViGauge;
 
     fn kind(&self) -> Kind {
-        Kind::Vi
+        <Self as OfAny>::KIND
     }
 
     fn unknowns(&self) -> usize {
@@ -157,5 +171,65 @@ impl Exactly for Vi {
 
     fn rows(&self) -> usize {
         self.dim()
+    }
+}
+
+impl Stated for Vi {
+    const STATEMENT: &'static str = "F(x)'(y - x) >= 0 for all y in the set, x in the set";
+    const PARTS: &'static [(&'static str, Shape)] =
+        &[("F", Shape::Expressions), ("set", Shape::Set), ("start", Shape::Vector)];
+    const SOLUTION: &'static [&'static str] = &["x", "F"];
+    const PARTNER: &'static str = "F";
+
+    fn parts(&self) -> Vec<(&'static str, Part<'_>)> {
+        let f = self.F.expressions().map(|f| ("F", Part::Expressions(f)));
+        let others = [("start", Part::Vector(&self.start)), ("set", Part::Set(&self.set))];
+        f.into_iter().chain(others).collect()
+    }
+
+    fn from_parts(parts: &mut dyn Parts) -> Result<Self, ProblemError> {
+        let f: Expressions = parts.expressions("F")?;
+        let n = f.dim();
+        let set = parts.set("set", n)?;
+        let start = if parts.has("start") { parts.vector("start")? } else { vec![0.0; n] };
+        Self::new(f, set, start)
+    }
+
+    fn point_parts<'a>(
+        &self,
+        point: &'a LcpPoint,
+        f: Option<&'a [f64]>,
+    ) -> Vec<(&'static str, &'a [f64])> {
+        x_and_f(point, f)
+    }
+
+    fn point_from_parts<E>(
+        mut part: impl FnMut(&'static str) -> Result<Vec<f64>, E>,
+    ) -> Result<LcpPoint, E> {
+        Ok(LcpPoint { z: part("x")? })
+    }
+
+    fn pairs(&self) -> usize {
+        self.dim()
+    }
+
+    fn equations(&self) -> usize {
+        self.dim()
+    }
+
+    fn size(&self) -> String {
+        let (variables, jacobian) = (plural(self.dim(), "variable"), of_jacobian(&*self.F));
+        format!("{variables} in {}, {jacobian}", self.set)
+    }
+
+    fn function(&self) -> Option<&dyn Field> {
+        Some(&*self.F)
+    }
+
+    fn sizes(&self) -> Vec<(&'static str, usize)> {
+        vec![
+            ("jacobian_entries", self.F.pattern().len()),
+            ("parts_of_the_set", self.set.parts().len()),
+        ]
     }
 }

@@ -11,9 +11,7 @@ use nonsmooth_problem::{LcpPoint, Mcp};
 
 use super::Newton;
 use crate::complementarity::functions::NewtonFunction;
-use crate::complementarity::parts::nonlinear::{
-    CHECK_EVERY, Descent, Idle, Inner, Options, Solve,
-};
+use crate::complementarity::parts::nonlinear::{CHECK_EVERY, Descent, Idle, Inner, Options, Solve};
 use crate::core::line_search::LineSearch;
 use crate::{SolveError, Solver, Step};
 

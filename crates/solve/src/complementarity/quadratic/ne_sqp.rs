@@ -9,9 +9,7 @@ use nonsmooth_problem::{LcpPoint, Mcp};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::complementarity::parts::nonlinear::{
-    CHECK_EVERY, Inner, Solve, Squares,
-};
+use crate::complementarity::parts::nonlinear::{CHECK_EVERY, Inner, Solve, Squares};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
