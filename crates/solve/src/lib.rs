@@ -48,5 +48,5 @@ pub use self::core::drive::{
 pub use self::core::error::SolveError;
 pub use self::core::reformulation::Reformulation;
 pub use self::core::solver::{Solver, Step};
-pub use self::core::via::Via;
+pub use self::core::via::{Via, ViaSession};
 pub use self::core::{guard, line_search, settings, spelling, trace};

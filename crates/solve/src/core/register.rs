@@ -182,6 +182,14 @@ pub trait Composed<P: Problem> {
     /// The solver of `P` that has `solver` inside.
     fn compose(settings: Self::Settings, solver: Boxed<Self::To>) -> Boxed<P>;
 
+    /// The session of `P` that has a whole session inside, where there is a way for such: those that run other solvers have no steps.
+    fn compose_session(
+        _: Self::Settings,
+        _: Box<dyn Session<Self::To>>,
+    ) -> Option<Box<dyn Session<P>>> {
+        None
+    }
+
     /// Whether the solver of this name is listed behind the prefix; those without a prefix are. Others can be named all the same, and say for themselves
     /// whether they apply.
     fn lists(solver: &str) -> bool {
@@ -193,6 +201,7 @@ pub trait Composed<P: Problem> {
 pub struct Edge<P: Problem> {
     prefix: &'static Prefix,
     solver: fn(&str, &SettingsMap) -> Made<Boxed<P>>,
+    session: fn(&str, &SettingsMap) -> Made<Box<dyn Session<P>>>,
     describe: fn(&str) -> Option<(&'static About, Solves)>,
     names: fn() -> Vec<String>,
 }
@@ -203,11 +212,15 @@ impl<P: Problem + 'static> Edge<P> {
         Self {
             prefix: C::PREFIX,
             solver: |name, settings| {
-                let own = |key: &str| !C::KEYS.is_empty() && key.starts_with(C::KEYS);
-                let (own, inner): (SettingsMap, SettingsMap) =
-                    settings.clone().into_iter().partition(|(key, _)| own(key));
+                let (own, inner) = parted::<P, C>(settings);
                 let solver = solver::<C::To>(name, &inner)?;
                 Some(parse(&own).and_then(|own| Ok(C::compose(own, solver?))))
+            },
+            session: |name, settings| {
+                let (own, inner) = parted::<P, C>(settings);
+                let session = whole::<C::To>(name, &inner)?;
+                let made = parse(&own).and_then(|own| Ok(C::compose_session(own, session?)));
+                made.transpose()
             },
             describe: |name| {
                 let (about, solves) = describe::<C::To>(name)?;
@@ -222,6 +235,12 @@ impl<P: Problem + 'static> Edge<P> {
             },
         }
     }
+}
+
+/// The settings of a prefix, and those of what is behind it.
+fn parted<P: Problem, C: Composed<P>>(settings: &SettingsMap) -> (SettingsMap, SettingsMap) {
+    let own = |key: &str| !C::KEYS.is_empty() && key.starts_with(C::KEYS);
+    settings.clone().into_iter().partition(|(key, _)| own(key))
 }
 
 /// A kind of problem that has solvers.
@@ -260,6 +279,15 @@ pub(crate) fn solver<P: Registered>(name: &str, settings: &SettingsMap) -> Made<
         Way::Behind(edge, rest) => (edge.solver)(rest, settings),
         Way::Here(Entry { make: Maker::Solver(make), .. }) => Some(make(settings)),
         Way::Here(Entry { make: Maker::Session(_), .. }) => None,
+    }
+}
+
+/// The whole session behind a name, where it is no solver with steps.
+fn whole<P: Registered>(name: &str, settings: &SettingsMap) -> Made<Box<dyn Session<P>>> {
+    match way::<P>(name)? {
+        Way::Behind(edge, rest) => (edge.session)(rest, settings),
+        Way::Here(Entry { make: Maker::Session(make), .. }) => Some(make(settings)),
+        Way::Here(Entry { make: Maker::Solver(_), .. }) => None,
     }
 }
 
@@ -333,10 +361,8 @@ pub(crate) fn bare<P: Registered>(
     name: &str,
     settings: &SettingsMap,
 ) -> Result<Box<dyn Session<P>>, SolveError> {
-    let made = match way::<P>(name) {
-        Some(Way::Here(Entry { make: Maker::Session(make), .. })) => Some(make(settings)),
-        _ => solver::<P>(name, settings).map(|made| made.map(driven)),
-    };
+    let steps = || solver::<P>(name, settings).map(|made| made.map(driven));
+    let made = whole::<P>(name, settings).or_else(steps);
     made.ok_or_else(|| SolveError::UnknownSolver {
         name: name.into(),
         meant: meant(name, solver_names::<P>()),

@@ -1,11 +1,16 @@
 //! A solver of one problem, made into a solver of another by a reformulation.
 
-use nonsmooth_problem::Problem;
-use nonsmooth_problem::check::Measure;
+use std::time::Instant;
 
-use crate::core::drive::Calibration;
+use nonsmooth_problem::Problem;
+use nonsmooth_problem::check::{Evidence, Measure};
+
+use crate::core::drive::{Calibration, Meter};
 use crate::core::trace::Trace;
-use crate::{Reformulation, SolveError, Solver, Step};
+use crate::{
+    Limits, Observer, Outcome, Progress, Reformulation, Sample, Session, SolveError, Solver,
+    Status, Step,
+};
 
 /// `Via { reformulation, solver }` reduces a problem of type `P`, lets `solver` work on the other problem, and
 /// lifts its point back whenever the judge of the *first* problem asks. Itself a solver.
@@ -166,5 +171,181 @@ where
 
     fn check_every(&self) -> usize {
         self.solver.check_every()
+    }
+}
+
+/// A whole session of one problem, made into a session of another by a reformulation.
+///
+/// The session has its own judge, who may be content before the judge of the first problem is: then it goes on from its point, to a closer tolerance.
+pub struct ViaSession<P, R>
+where
+    P: Problem,
+    R: Reformulation<P>,
+{
+    reformulation: R,
+    session: Box<dyn Session<R::To>>,
+    gauge: Option<P::Gauge>,
+}
+
+impl<P, R> ViaSession<P, R>
+where
+    P: Problem,
+    R: Reformulation<P>,
+{
+    /// Of the way there and back, and the session of the other problem.
+    pub fn new(reformulation: R, session: Box<dyn Session<R::To>>) -> Self {
+        Self { reformulation, session, gauge: None }
+    }
+}
+
+/// The tolerances that are tried, in units of the one before, and how often.
+const CLOSER: f64 = 1e-2;
+const TRIES: usize = 4;
+
+/// What is said of a proof that is none of the problem as it is stated.
+const WITHOUT: &str = "the reformulated problem has no solution, which is proved of it alone";
+
+/// Sees the session of the other problem as one of the first.
+struct Lifted<'a, P, R>
+where
+    P: Problem,
+    R: Reformulation<P>,
+{
+    problem: &'a P,
+    reformulation: &'a R,
+    memo: &'a mut R::Memo,
+    gauge: &'a mut P::Gauge,
+    point: P::Point,
+    observer: &'a mut dyn Observer<P>,
+    iterations: usize,
+    begun: Instant,
+    merit: f64,
+}
+
+impl<P, R> Observer<R::To> for Lifted<'_, P, R>
+where
+    P: Problem,
+    R: Reformulation<P>,
+{
+    fn step(&mut self, progress: &Progress) {
+        let iteration = self.iterations + progress.iteration;
+        let seconds = self.begun.elapsed().as_secs_f64();
+        self.observer.step(&Progress { iteration, seconds, ..*progress });
+    }
+
+    fn keeps_best(&self) -> bool {
+        self.observer.keeps_best()
+    }
+
+    fn best(&mut self, reduced: &<R::To as Problem>::Point, _: &Measure) {
+        self.reformulation.lift(self.problem, reduced, self.memo, &mut self.point);
+        let measure = self.problem.measure(&self.point, self.gauge);
+        if measure.merit() < self.merit {
+            self.merit = measure.merit();
+            self.observer.best(&self.point, &measure);
+        }
+    }
+}
+
+impl<P, R> Session<P> for ViaSession<P, R>
+where
+    P: Problem<Gauge: Send>,
+    R: Reformulation<P>,
+{
+    fn observe(
+        &mut self,
+        problem: &P,
+        point: &mut P::Point,
+        limits: &Limits,
+        observer: &mut dyn Observer<P>,
+    ) -> Result<Outcome, SolveError> {
+        limits.validate()?;
+        problem.validate_point(point)?;
+        let meter = Meter::start(Instant::now(), limits);
+        let scope = limits.budget(meter.begun).enter();
+        let (other, mut memo) = self.reformulation.reduce(problem)?;
+        let mut reduced = other.origin();
+        self.reformulation.lower(problem, point, &memo, &mut reduced);
+        let gauge = self.gauge.insert(problem.gauge()?);
+        let mut trial = problem.origin();
+        let mut best: Option<(P::Point, Measure)> = None;
+        let (asked, mut tolerance) = (limits.tolerance, limits.tolerance);
+        let (mut iterations, mut factorisations) = (0, 0);
+        let mut status = Status::Stalled(FAILED.into());
+        for _ in 0..TRIES {
+            let left = |t: f64| (t - meter.seconds()).max(0.0);
+            let limits = Limits {
+                tolerance,
+                max_iterations: limits.max_iterations.saturating_sub(iterations),
+                time_limit: limits.time_limit.map(left),
+                ..limits.clone()
+            };
+            let mut lifted = Lifted {
+                problem,
+                reformulation: &self.reformulation,
+                memo: &mut memo,
+                gauge,
+                point: problem.origin(),
+                observer,
+                iterations,
+                begun: meter.begun,
+                merit: best.as_ref().map_or(f64::INFINITY, |b| b.1.merit()),
+            };
+            let outcome = self.session.observe(&other, &mut reduced, &limits, &mut lifted)?;
+            iterations += outcome.iterations;
+            factorisations += outcome.factorisations;
+            self.reformulation.lift(problem, &reduced, &mut memo, &mut trial);
+            let measure = problem.certify(&trial, gauge);
+            let passes = measure.passes(asked);
+            if best.as_ref().is_none_or(|b| measure.is_better_than(&b.1)) {
+                best = Some((trial.clone(), measure));
+            }
+            status = match outcome.status {
+                _ if passes => Status::Solved,
+                Status::Solved => Status::Stalled(FAILED.into()),
+                Status::Infeasible(proof) => {
+                    let lifted =
+                        self.reformulation.lift_certificate(proof.certificate().clone(), &memo);
+                    match problem.evidence(&lifted) {
+                        Evidence::Proved(proof) => Status::Infeasible(proof),
+                        _ => Status::Stalled(WITHOUT.into()),
+                    }
+                }
+                Status::NearlyInfeasible { .. } | Status::NoConclusion(_) => Status::Stalled(
+                    "the reformulated problem has no solution, up to rounding".into(),
+                ),
+                other => other,
+            };
+            if status != Status::Stalled(FAILED.into()) {
+                break;
+            }
+            tolerance = (CLOSER * tolerance).max(f64::EPSILON);
+        }
+        drop(scope);
+        let measure = match best {
+            Some((best, measure)) => {
+                P::copy_point(&best, point);
+                measure
+            }
+            None => problem.certify(point, gauge),
+        };
+        let outcome = meter.outcome(status, measure, iterations);
+        Ok(Outcome { factorisations, ..outcome })
+    }
+
+    fn history(&self) -> &[Sample] {
+        self.session.history()
+    }
+
+    fn trace(&self) -> Trace {
+        self.session.trace()
+    }
+
+    fn account(&self) -> Vec<String> {
+        self.session.account()
+    }
+
+    fn gauge(&mut self) -> Option<&mut P::Gauge> {
+        self.gauge.as_mut()
     }
 }
