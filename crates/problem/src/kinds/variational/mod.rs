@@ -5,6 +5,7 @@
 //! | [`Vi`] | `−F(x) ∈ N_X(x)`, X a box, a polyhedron, a ball, a second-order cone or a product of these |
 
 mod judge;
+pub mod planted;
 mod set;
 #[cfg(test)]
 mod tests;
@@ -163,10 +164,10 @@ impl Judged for Vi {
     }
 }
 
-/// Nothing is proved of variational inequalities.
+/// Over a box that of the complementarity problem: nothing is proved of others.
 impl Exactly for Vi {
-    fn system(&self, _wanted: Option<&[bool]>) -> Option<ConeSystem> {
-        None
+    fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
+        self.mcp()?.system(wanted)
     }
 
     fn rows(&self) -> usize {

@@ -60,6 +60,15 @@ impl Set {
         Self::Polyhedron { A, b, C, d: vec![] }
     }
 
+    /// Whether this is bounded and not empty, as far as it shows at once: balls, and boxes with finite bounds.
+    pub fn is_compact(&self) -> bool {
+        self.parts().into_iter().all(|(_, set)| match set {
+            Self::Box { lower, upper } => lower.iter().chain(upper).all(|x| x.is_finite()),
+            Self::Ball { .. } => true,
+            Self::Polyhedron { .. } | Self::SecondOrderCone { .. } | Self::Product(_) => false,
+        })
+    }
+
     /// l and u, where this is a box or a product of boxes.
     pub fn bounds(&self) -> Option<(Vec<f64>, Vec<f64>)> {
         let (mut l, mut u) = (vec![], vec![]);
