@@ -258,6 +258,12 @@ pub(super) fn read(
             None => Ok(None),
         };
         let (from, to) = (variable("from", &part.from)?, variable("to", &part.to)?);
+        if let (Some(first), Some(last)) = (from, to)
+            && last < first
+        {
+            let expected = format!("`{}` or one behind it", named(first, names));
+            return Err(wrong(format!("{at}.to"), expected, format!("`{}`", named(last, names))));
+        }
         let inside = format!("{at}.{}", sort.name());
         let own = sort.dim();
         let first = match (from, to, own) {
@@ -274,6 +280,7 @@ pub(super) fn read(
         if count == 0 || count > most || own.is_some_and(|own| own != count) {
             let expected = match to {
                 Some(_) => format!("{count} variables, as from and to say"),
+                None if most == 0 => format!("some of the {n} variables to be left for it"),
                 None => format!("1 to {most} of the {n} variables"),
             };
             return Err(wrong(inside, expected, own.unwrap_or(count)));
