@@ -79,7 +79,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             let mut text = report::headline(file, says, &verdict.measure, tol);
             report::row(&mut text, "problem", report::problem_text(problem));
             let worst = args.worst.unwrap_or(if verdict.solved { 0 } else { 3 });
-            report::verdict_text(&mut text, &verdict, tol, worst);
+            report::verdict_text(&mut text, &content, &verdict, tol, worst);
             report::uniqueness_text(&mut text, &content, &stored.point, &verdict);
             output::print(&text);
         }

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use nonsmooth_io::{Format, Info, ProblemFile};
-use nonsmooth_problem::{AnyPoint, GlobalPoint, LocalPoint, Problem};
+use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, GlobalPoint, LocalPoint, Problem};
+use nonsmooth_solve::Reformulation;
+use nonsmooth_solve::variational::reform::Multipliers;
 
 use crate::report::{self, row};
 use crate::{Exit, files, output};
@@ -17,12 +19,15 @@ use crate::{Exit, files, output};
 pub struct Args {
     #[arg(value_name = "FROM", help = files::help("A file with a problem", |_| true))]
     from: PathBuf,
-    /// The file to write: .hdf5 for contacts; .toml, or .mtx with vectors beside, for linear complementarity; .toml or .nl for nonlinear; .csv for the solution alone
+    /// The file to write: .hdf5 for contacts; .toml, or .mtx with vectors beside, for linear complementarity; .toml or .nl for nonlinear; .toml for variational inequalities; .csv for the solution alone
     #[arg(value_name = "TO")]
     to: PathBuf,
     /// The format of TO, whatever its name: hdf5, toml, mtx, nl or csv
     #[arg(long, value_name = "EXTENSION", value_parser = files::format_named)]
     format: Option<&'static dyn Format>,
+    /// Write a variational inequality over boxes and polyhedra as a mixed complementarity problem: over a box it is one, over a polyhedron multipliers are variables behind x
+    #[arg(long)]
+    as_mcp: bool,
 }
 
 const EXAMPLES: &str = "\
@@ -31,12 +36,13 @@ Examples:
   nonsmooth convert GFC3D_step.dat step.hdf5           Siconos' text as FCLIB's HDF5
   nonsmooth convert solved.hdf5 contacts.csv           the solution as a table
   nonsmooth convert rectifier.toml - --format csv
+  nonsmooth convert obstacle_vi.toml obstacle.nl       over boxes and polyhedra as AMPL's model
 
 Exit codes: 0 written; 2 a mistake in a file or an option.";
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
-    let Args { from, to, format } = args;
+    let Args { from, to, format, as_mcp } = args;
     if files::same(from, to) {
         let to = to.display();
         return Err(format!(
@@ -44,9 +50,28 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         ));
     }
     files::writable("TO", to)?;
-    let content = files::read(from)?;
-    let kind = content.problem.kind();
-    let format = files::target_format("TO", to, *format, kind, None)?;
+    let read = files::read(from)?;
+    let format_of = |content: &ProblemFile| {
+        files::target_format("TO", to, *format, content.problem.kind(), None)
+    };
+    let (content, format, rewritten) = match (as_mcp, format_of(&read)) {
+        (false, Ok(format)) => (read, format, None),
+        (false, Err(refused)) => {
+            // A format may hold the same problem under its other name.
+            let (content, how) = rewritten(read).ok_or_else(|| refused.clone())?;
+            let format = format_of(&content).map_err(|_| refused)?;
+            (content, format, Some(how))
+        }
+        (true, _) => {
+            let found = read.problem.kind().name();
+            let (content, how) = rewritten(read).ok_or_else(|| {
+                let expected = "expected a problem vi over boxes and polyhedra";
+                format!("{}: --as-mcp: {expected}, found {found}", from.display())
+            })?;
+            let format = format_of(&content)?;
+            (content, format, Some(how))
+        }
+    };
     let there = content.guesses.len();
     let mut room = content.clone();
     if format.about().guess.is_none() {
@@ -70,6 +95,9 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let mut text = format!("{}: {}\n", to.display(), report::problem_text(&content.problem));
     row(&mut text, "from", format!("{} ({})", from.display(), files::about(from)?.name));
     row(&mut text, "format", format.about().name);
+    if let Some(how) = rewritten {
+        row(&mut text, "as", how);
+    }
     let (kept, lost): (Vec<_>, Vec<_>) =
         parts(&content, kept.as_ref()).into_iter().partition(|part| part.1);
     for (label, all) in [("kept", kept), ("lost", lost)] {
@@ -89,6 +117,29 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         false => output::print(&text),
     }
     Ok(Exit::Solved)
+}
+
+/// A variational inequality over boxes and polyhedra as a mixed complementarity problem, and how; of others none.
+fn rewritten(content: ProblemFile) -> Option<(ProblemFile, String)> {
+    let AnyProblem::Complementarity(Complementarity::Vi(problem)) = &content.problem else {
+        return None;
+    };
+    let (mcp, ()) = Multipliers.reduce(problem).ok()?;
+    let multipliers = mcp.dim() - problem.dim();
+    let mut info = content.info.clone();
+    if !info.names.is_empty() {
+        info.names.extend((1..=multipliers).map(|k| format!("multiplier[{k}]")));
+    }
+    let how = match (multipliers, &content.solution) {
+        (0, _) => "mcp, as the variational inequality over a box is one".to_owned(),
+        (n, solution) => {
+            let without =
+                if solution.is_some() { "; without the solution, which knows none" } else { "" };
+            format!("mcp, with {} as variables behind x{without}", report::count(n, "multiplier"))
+        }
+    };
+    let solution = content.solution.filter(|_| multipliers == 0);
+    Some((ProblemFile { info, solution, ..ProblemFile::new(mcp) }, how))
 }
 
 /// Whether a solution has velocities of bodies.

@@ -91,7 +91,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let mut said = format!("{}: {}\n", out.display(), report::problem_text(&content.problem));
     if let Some((_, verdict, says)) = &found {
         report::row(&mut said, "solution", says);
-        report::verdict_text(&mut said, verdict, args.tol, 0);
+        report::verdict_text(&mut said, &content, verdict, args.tol, 0);
     }
     if files::is_stream(&out) {
         output::print(&text);

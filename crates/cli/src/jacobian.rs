@@ -3,23 +3,24 @@
 use std::path::{Path, PathBuf};
 
 use nonsmooth_analysis::{Entry, JacobianCheck};
-use nonsmooth_problem::{AnyPoint, AnyProblem, Mcp, Problem, Stated, with_complementarity};
+use nonsmooth_problem::field::Field;
+use nonsmooth_problem::{AnyPoint, AnyProblem, Problem, Stated, with_complementarity};
 use serde_json::{Value, json};
 
-use crate::{Exit, files, output, report};
+use crate::{Exit, files, kinds, output, report};
 
 /// Compares at the start of each problem, and at its solution where the file has one.
 pub fn check(problems: &[PathBuf], as_json: bool) -> Exit {
     files::each(problems, as_json, |_, file| {
         let content = files::read(file)?;
-        let nonlinear = match &content.problem {
-            AnyProblem::Complementarity(p) => with_complementarity!(p, p => p.nonlinear()),
+        let function = match &content.problem {
+            AnyProblem::Complementarity(p) => with_complementarity!(p, p => p.function()),
             AnyProblem::Friction(_) => None,
         };
-        let Some(problem) = nonlinear else {
+        let Some(field) = function else {
             let found = content.problem.kind().name();
             return Err(format!(
-                "{}: --jacobian: expected a nonlinear complementarity problem (mcp), found {found}",
+                "{}: --jacobian: expected a problem by a function (mcp, vi), found {found}",
                 file.display()
             ));
         };
@@ -27,10 +28,10 @@ pub fn check(problems: &[PathBuf], as_json: bool) -> Exit {
             AnyPoint::Lcp(point) => Some(("solution", &point.z)),
             _ => None,
         });
-        let start = problem.origin().z;
+        let start = kinds::start_of(&content.problem);
         let points: Vec<_> = std::iter::once(("start", &start)).chain(stored).collect();
         let checks: Vec<_> =
-            points.iter().map(|(name, x)| (*name, JacobianCheck::of(&*problem.F, x))).collect();
+            points.iter().map(|(name, x)| (*name, JacobianCheck::of(field, x))).collect();
         let agrees = checks.iter().all(|(_, c)| c.as_ref().is_none_or(JacobianCheck::agrees));
         let compared = checks.iter().any(|(_, c)| c.is_some());
         let (name, says) = match (compared, agrees) {
@@ -40,7 +41,7 @@ pub fn check(problems: &[PathBuf], as_json: bool) -> Exit {
         };
         output::print(&match as_json {
             true => line(file, &content.problem, name, says, &checks),
-            false => text(file, &content.problem, problem, says, &checks, &content.info.names),
+            false => text(file, &content.problem, field, says, &checks, &content.info.names),
         });
         Ok(Exit::solved(compared && agrees))
     })
@@ -59,14 +60,14 @@ fn line(file: &Path, any: &AnyProblem, name: &str, says: &str, checks: &Checks) 
 fn text(
     file: &Path,
     any: &AnyProblem,
-    problem: &Mcp,
+    field: &dyn Field,
     says: &str,
     checks: &Checks,
     names: &[String],
 ) -> String {
     let mut text = format!("{}: {says}\n", file.display());
     report::row(&mut text, "problem", report::problem_text(any));
-    report::row(&mut text, "Jacobian", problem.F.source());
+    report::row(&mut text, "Jacobian", field.source());
     for (name, check) in checks {
         let said = match check {
             None => "F or its Jacobian is not defined there".into(),

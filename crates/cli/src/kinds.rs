@@ -1,7 +1,7 @@
 //! What the commands say of each kind of problem.
 
 use nonsmooth_bench::plural as count;
-use nonsmooth_io::StoredPoint;
+use nonsmooth_io::{ProblemFile, StoredPoint};
 use nonsmooth_problem::check::VerdictOf;
 use nonsmooth_problem::{
     AnyCounts, AnyPoint, AnyProblem, GlobalPoint, Kind, LocalPoint, OfAny, Problem, Stated,
@@ -23,6 +23,14 @@ pub fn size(problem: &AnyProblem) -> String {
             format!("{}, {}", count(contacts, "contact"), count(unknowns, "unknown"))
         }
         AnyProblem::Complementarity(linear) => with_complementarity!(linear, p => p.size()),
+    }
+}
+
+/// The start of a problem whose unknowns are one vector; of others none.
+pub fn start_of(problem: &AnyProblem) -> Vec<f64> {
+    match problem.origin() {
+        AnyPoint::Lcp(point) => point.z,
+        AnyPoint::Hlcp(_) | AnyPoint::Local(_) | AnyPoint::Global(_) => vec![],
     }
 }
 
@@ -70,10 +78,12 @@ pub fn start(problem: &AnyProblem, stored: &StoredPoint) -> AnyPoint {
     origin
 }
 
-/// How many contacts, or rows, do what.
+/// How many contacts, rows or constraints do what.
 pub struct Counted {
     /// What is counted.
     pub what: &'static str,
+    /// What the residuals belong to.
+    pub judged: &'static str,
     /// The unit of the absolute residual, after a blank.
     pub unit: &'static str,
     /// The numbers with their names; all that is counted is in one of them.
@@ -84,11 +94,21 @@ pub struct Counted {
     pub degenerate: usize,
 }
 
+/// The names of the rows that the judge speaks of: those of the variables, where each has a row of F.
+pub fn names_of_rows(content: &ProblemFile) -> &[String] {
+    let by_function = match &content.problem {
+        AnyProblem::Complementarity(p) => with_complementarity!(p, p => p.function().is_some()),
+        AnyProblem::Friction(_) => false,
+    };
+    if by_function { &content.info.names } else { &[] }
+}
+
 /// The counts of a verdict.
 pub fn counted(counts: &AnyCounts) -> Counted {
     match counts {
         AnyCounts::Contacts(c) => Counted {
             what: "contact",
+            judged: "contact",
             unit: " m/s",
             all: vec![(c.open, "open"), (c.stick, "stick"), (c.slip, "slip")],
             at_limit: c.at_limit,
@@ -98,8 +118,17 @@ pub fn counted(counts: &AnyCounts) -> Counted {
             let mut all = vec![(c.inside, "inside"), (c.lower, "at the lower bound")];
             let others = [(c.upper, "at the upper bound"), (c.equalities, "equalities")];
             all.extend(others.into_iter().filter(|c| c.0 > 0));
-            Counted { what: "row", unit: "", all, at_limit: 0, degenerate: c.degenerate }
+            let degenerate = c.degenerate;
+            Counted { what: "row", judged: "row", unit: "", all, at_limit: 0, degenerate }
         }
+        AnyCounts::Sets(c) => Counted {
+            what: "constraint",
+            judged: "variable",
+            unit: "",
+            all: vec![(c.inside, "inside"), (c.border, "on the border")],
+            at_limit: 0,
+            degenerate: 0,
+        },
     }
 }
 

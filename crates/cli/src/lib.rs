@@ -81,7 +81,7 @@ Examples:
   nonsmooth bench run problems/ --out runs.jsonl     compare solvers on folders of problems
 
 Contact problems, local (W, q, mu) or global (M, H, f, w, mu), in 2D or 3D, are {contact}.
-Complementarity problems (LCP, mixed, horizontal, with bounds, nonlinear) are {pairs}.
+Complementarity problems (LCP, mixed, horizontal, with bounds, nonlinear) and variational inequalities are {pairs}.
 
 Exit codes: 0 solved; 1 not solved; 2 a mistake in a file or an option; 130 Ctrl-C pressed twice."
     )

@@ -9,7 +9,8 @@ pub use nonsmooth_bench::plural as count;
 use nonsmooth_io::ProblemFile;
 use nonsmooth_problem::check::{self, Failing, Measure};
 use nonsmooth_problem::{
-    AnyPoint, AnyProblem, AnyStatus, GlobalPoint, LocalPoint, Problem, Stated, with_complementarity,
+    AnyCounts, AnyPoint, AnyProblem, AnyStatus, GlobalPoint, LocalPoint, Problem, Stated,
+    with_complementarity,
 };
 use serde_json::{Value, json};
 
@@ -42,20 +43,20 @@ pub fn problem_text(problem: &AnyProblem) -> String {
 /// The residuals, what of them fails at `tolerance`, the contacts (or rows) by status and the worst of them. Numbers that
 /// are not finite become null.
 pub fn verdict_json(verdict: &AnyVerdict, tolerance: f64, worst: usize) -> Object {
-    let what = counted(&verdict.counts).what;
+    let Counted { what, judged, .. } = counted(&verdict.counts);
     let mut counts = json!(verdict.counts);
     let mut degenerate = counts.as_object_mut().and_then(|counts| counts.remove("degenerate"));
     if uncounted(verdict) {
         (counts, degenerate) = (Value::Null, None);
     }
     let worst = worst_of(verdict, worst)
-        .map(|(which, residual)| json!({(what): which, "residual": residual}));
+        .map(|(which, residual)| json!({(judged): which, "residual": residual}));
     fields(json!({
         "residual": residual_json(&verdict.measure),
         "failing": verdict.measure.failing(tolerance),
         (format!("{what}s_by_status")): counts,
         "degenerate": degenerate,
-        (format!("worst_{what}s")): worst.collect::<Vec<_>>(),
+        (format!("worst_{judged}s")): worst.collect::<Vec<_>>(),
     }))
 }
 
@@ -74,7 +75,7 @@ fn indeterminacy(
     let AnyProblem::Friction(problem) = problem else { return None };
     let contact = |status: &AnyStatus| match status {
         AnyStatus::Contact(contact) => Some(*contact),
-        AnyStatus::Row(_) => None,
+        AnyStatus::Row(_) | AnyStatus::Set(_) => None,
     };
     let statuses: Vec<_> = verdict.statuses.iter().filter_map(contact).collect();
     let found = || Indeterminacy::of(problem, (r, lambda), &statuses, dofs);
@@ -139,7 +140,9 @@ pub fn uniqueness_json(content: &ProblemFile, point: &AnyPoint, verdict: &AnyVer
 }
 
 fn uncounted(verdict: &AnyVerdict) -> bool {
-    verdict.statuses.is_empty() && !verdict.velocity.is_empty()
+    // A set may have no constraint.
+    let counts = !matches!(verdict.counts, AnyCounts::Sets(_));
+    counts && verdict.statuses.is_empty() && !verdict.velocity.is_empty()
 }
 
 /// The residuals by name.
@@ -181,15 +184,28 @@ fn listed(failing: &[Failing], more: impl Fn(&Failing) -> String) -> String {
 
 /// The residuals, what else than the relative one fails at `tolerance`, the contacts (or rows) by status, and the
 /// `worst` of them where it is they that fail.
-pub fn verdict_text(text: &mut String, verdict: &AnyVerdict, tolerance: f64, worst: usize) {
-    let Counted { what, unit, all, at_limit, degenerate } = counted(&verdict.counts);
+///
+/// Rows and variables go by their names in `content`, where they have any.
+pub fn verdict_text(
+    text: &mut String,
+    content: &ProblemFile,
+    verdict: &AnyVerdict,
+    tolerance: f64,
+    worst: usize,
+) {
+    let Counted { what, judged, unit, all, at_limit, degenerate } = counted(&verdict.counts);
+    let names = kinds::names_of_rows(content);
+    let called = |i: usize| match names.get(i) {
+        Some(name) => format!("{i} `{name}`"),
+        None => i.to_string(),
+    };
     residual_text(text, &verdict.measure, unit);
     let (relative, others) = failing(&verdict.measure, tolerance);
     if !others.is_empty() {
         let limit = |f: &Failing| {
             let limit = format!("limit {:.1e}", f.limit).replace(".0e", "e");
             match verdict.measure.own_contact.filter(|_| f.what == check::OWN) {
-                Some(c) => format!(" (contact {c}, {limit})"),
+                Some(c) => format!(" ({judged} {}, {limit})", called(c)),
                 None => format!(" ({limit})"),
             }
         };
@@ -211,10 +227,10 @@ pub fn verdict_text(text: &mut String, verdict: &AnyVerdict, tolerance: f64, wor
     row(text, &what, all.join(", ") + &degenerate);
     let worst = if relative || others.is_empty() { worst } else { 0 };
     let worst: Vec<_> = worst_of(verdict, worst)
-        .map(|(which, residual)| format!("{which} ({})", number(residual)))
+        .map(|(which, residual)| format!("{} ({})", called(which), number(residual)))
         .collect();
     if !worst.is_empty() {
-        row(text, "worst", format!("{what} {}", worst.join(", ")));
+        row(text, "worst", format!("{judged}s {}", worst.join(", ")));
     }
 }
 

@@ -466,7 +466,7 @@ fn text(file: &Path, content: &ProblemFile, plan: &Plan, solved: &Solved, asked:
     // Where there is no solution, no row is to blame.
     let settled = is_solved || matches!(status, Status::Infeasible(_));
     let worst = if settled { 0 } else { WORST };
-    report::verdict_text(&mut text, verdict, tolerance, worst);
+    report::verdict_text(&mut text, content, verdict, tolerance, worst);
     report::uniqueness_text(&mut text, content, &solved.point, verdict);
     // A point that is none is shown to those who ask for it.
     if is_solved {

@@ -6,6 +6,7 @@
 //! MLCP                variable,status,value,w                    u[0], ... then v[0], ...; only v has a w
 //! horizontal LCP      pair,status,x,s
 //! MCP                 variable,status,x,F
+//! VI                  variable,x,F
 //! ```
 //!
 //! `name` follows the first column where the file of the problem names its variables; `status` is there where the judge was asked. Rows are counted from
@@ -14,7 +15,7 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-use nonsmooth_problem::check::{Motion, RowStatus};
+use nonsmooth_problem::check::{Motion, RowStatus, SetStatus};
 use nonsmooth_problem::{
     AnyPoint, AnyProblem, AnyStatus, Complementarity, Kind, Mlcp, Problem, Stated,
     with_complementarity,
@@ -183,6 +184,10 @@ fn mixed(problem: &Mlcp, z: &[f64], w: &[f64]) -> Vec<(&'static str, Column)> {
 
 /// What each row of the table does; `None` where nobody asked the judge.
 fn statuses(problem: &AnyProblem, statuses: &[AnyStatus], rows: usize) -> Option<Vec<String>> {
+    if let AnyProblem::Complementarity(Complementarity::Vi(_)) = problem {
+        // Of constraints, not of variables.
+        return None;
+    }
     let mut words: Vec<String> = statuses.iter().map(|s| word(s).into()).collect();
     if let AnyProblem::Complementarity(Complementarity::Mlcp(p)) = problem {
         // The judge speaks of rows, equalities first; the table of variables, free ones first.
@@ -205,6 +210,9 @@ fn word(status: &AnyStatus) -> &'static str {
         AnyStatus::Row(RowStatus::Lower) => "lower",
         AnyStatus::Row(RowStatus::Upper) => "upper",
         AnyStatus::Row(RowStatus::Equality) => "equality",
+        AnyStatus::Set(SetStatus::Inside) => "inside",
+        AnyStatus::Set(SetStatus::Border) => "border",
+        AnyStatus::Set(SetStatus::Apex) => "apex",
     }
 }
 

@@ -12,7 +12,7 @@ use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::field::{Evaluator, Expressions, Field, Pattern};
 use nonsmooth_problem::{
     AnyPoint, AnyProblem, BoxLcp, Complementarity, Friction, Hlcp, HlcpPoint, Lcp, LcpPoint, Mcp,
-    Mlcp,
+    Mlcp, Set, Vi,
 };
 use proptest::collection::{btree_map, vec};
 use proptest::option;
@@ -74,6 +74,7 @@ fn dense(p: &Complementarity) -> Dense {
         Complementarity::Box(p) => p.M.to_dense(),
         Complementarity::Hlcp(p) => p.Q.to_dense(),
         Complementarity::Mcp(p) => p.affine().and_then(|(linear, _)| linear.M.to_dense()),
+        Complementarity::Vi(_) => None,
     }
     .unwrap()
 }
@@ -121,15 +122,55 @@ fn problem() -> impl Strategy<Value = Complementarity> {
         Just("max(x1, -x1^2)/(1 + x1^2)"),
         Just("if(x1 >= 1, log(x1), 0)"),
     ];
+    let expressions = |rows: Vec<&str>| {
+        let texts: Vec<_> = rows.iter().map(ToString::to_string).collect();
+        Expressions::parse(&texts, &[]).unwrap()
+    };
+    let of_sets = row.clone();
+    let inequality = set().prop_flat_map(move |set| {
+        let n = set.dim();
+        (vec(of_sets.clone(), n), reals(n), Just(set))
+    });
+    let inequality = inequality.prop_map(move |(rows, start, set)| {
+        Complementarity::Vi(Vi::new(expressions(rows), set, start).unwrap())
+    });
     let nonlinear =
         (1..4usize).prop_flat_map(move |n| (vec(row.clone(), n), reals(n), vec(bound(), n)));
     let nonlinear = nonlinear.prop_map(|(rows, start, bounds)| {
-        let texts: Vec<_> = rows.iter().map(ToString::to_string).collect();
         let (l, u) = bounds.into_iter().unzip();
-        let F = Expressions::parse(&texts, &[]).unwrap();
-        Complementarity::Mcp(Mcp::new(F, l, u, start).unwrap())
+        Complementarity::Mcp(Mcp::new(expressions(rows), l, u, start).unwrap())
     });
-    prop_oneof![lcp, mixed, horizontal, boxed, nonlinear]
+    prop_oneof![lcp, mixed, horizontal, boxed, nonlinear, inequality]
+}
+
+/// A set, or a product of a few.
+fn set() -> impl Strategy<Value = Set> {
+    let sparse = |m: Matrix| match m {
+        Matrix::Sparse(m) => m,
+        m => {
+            let mut entries: Vec<(usize, usize, f64)> = vec![];
+            m.for_each(|i, j, x| entries.push((i, j, x)));
+            Csc::from_triplets(m.nrows(), m.ncols(), entries.into_iter()).unwrap()
+        }
+    };
+    let bounds = (1..4usize).prop_flat_map(|n| (vec(real(), n), vec(option::of(real()), n)));
+    let bounds = bounds.prop_map(|(lower, above)| {
+        let upper = lower.iter().zip(above).map(|(l, u)| u.map_or(f64::INFINITY, |u| u.max(*l)));
+        Set::Box { upper: upper.collect(), lower }
+    });
+    let polyhedron = (0..3usize, 0..3usize, 1..4usize)
+        .prop_flat_map(|(m, k, n)| (matrix(m, n), vec(real(), m), matrix(k, n), vec(real(), k)));
+    let polyhedron = polyhedron.prop_map(move |(a, b, c, d)| Set::Polyhedron {
+        A: sparse(a),
+        b,
+        C: sparse(c),
+        d,
+    });
+    let ball = ((1..4usize).prop_flat_map(|n| vec(real(), n)), real());
+    let ball = ball.prop_map(|(centre, r)| Set::Ball { centre, radius: r.abs() });
+    let cone = (1..4usize).prop_map(|dimension| Set::SecondOrderCone { dimension });
+    let one = prop_oneof![bounds, polyhedron, ball, cone].boxed();
+    prop_oneof![one.clone(), vec(one, 1..4).prop_map(Set::Product)]
 }
 
 /// The lengths of z and w.
@@ -140,6 +181,7 @@ fn sizes(p: &Complementarity) -> (usize, usize) {
         Complementarity::Hlcp(p) => (p.dim(), p.dim()),
         Complementarity::Box(p) => (p.dim(), p.dim()),
         Complementarity::Mcp(p) => (p.dim(), p.dim()),
+        Complementarity::Vi(p) => (p.dim(), p.dim()),
     }
 }
 
@@ -283,6 +325,137 @@ z = [1.25, 2]
     let boxed = "kind = 'box_lcp'\nM = [[1]]\nq = [2]\nlower = [-inf]\nupper = [3]\n";
     let Complementarity::Box(boxed) = folder.read("e.toml", boxed) else { panic!() };
     assert_eq!((boxed.lower[0], boxed.upper[0]), (f64::NEG_INFINITY, 3.0));
+}
+
+#[test]
+fn variational_inequalities_as_people_write_them() {
+    let folder = Folder::new();
+    let inf = f64::INFINITY;
+    let set = |names: &str, n: usize, set: &str| {
+        let f = vec!["'1'"; n].join(", ");
+        let text = format!("kind = 'vi'\n{names}\nF = [{f}]\n{set}\n");
+        let Complementarity::Vi(problem) = folder.read("a.toml", &text) else { panic!() };
+        assert_eq!(problem.start, vec![0.0; n]);
+        problem.set
+    };
+    let ball = |centre: &[f64], radius| Set::Ball { centre: centre.to_vec(), radius };
+    let cone = |dimension| Set::SecondOrderCone { dimension };
+    let free = |n| Set::Box { lower: vec![-inf; n], upper: vec![inf; n] };
+    assert_eq!(
+        set("", 2, "set = { ball = { centre = [0, 1], radius = 2 } }"),
+        ball(&[0.0, 1.0], 2.0)
+    );
+    assert_eq!(set("", 2, "[set.ball]\nradius = 2"), ball(&[0.0, 0.0], 2.0));
+    assert_eq!(set("", 3, "set = { second_order_cone = {} }"), cone(3));
+    assert_eq!(set("", 2, "set = { box = {} }"), Set::orthant(2));
+    let bounds = Set::Box { lower: vec![-inf, 1.0], upper: vec![inf, 2.0] };
+    assert_eq!(set("", 2, "set.box = { lower = [-inf, 1], upper = [inf, 2] }"), bounds);
+    // Bounds are rows behind those that are stated.
+    let Set::Polyhedron { A, b, C, d } = set(
+        "",
+        2,
+        "set.polyhedron = { A = [[1, 2]], b = [3], C = { shape = [1, 2], entries = [[0, 1, 5]] }, d = [6], lower = [0, -inf], upper = [inf, 7] }",
+    ) else {
+        panic!()
+    };
+    let all: Vec<_> = A.triplets().collect();
+    assert_eq!(all, [(0, 0, 1.0), (1, 0, -1.0), (0, 1, 2.0), (2, 1, 1.0)]);
+    assert_eq!((b, C.triplets().collect(), d), (vec![3.0, 0.0, 7.0], vec![(0, 1, 5.0)], vec![6.0]));
+    // One after the other; by their variables, the others free.
+    let two = "set = [{ ball = { radius = 1, centre = [0, 0] } }, { second_order_cone = {} }]";
+    assert_eq!(set("", 5, two), Set::Product(vec![ball(&[0.0; 2], 1.0), cone(3)]));
+    let placed = "[[set]]\nfrom = 'd'\nto = 'e'\nsecond_order_cone = {}\n[[set]]\nto = 'b'\nball = { radius = 1, centre = [0] }\n";
+    let names = "names = ['a', 'b', 'c', 'd', 'e', 'f']";
+    let product = Set::Product(vec![free(1), ball(&[0.0], 1.0), free(1), cone(2), free(1)]);
+    assert_eq!(set(names, 6, placed), product);
+    assert_eq!(
+        set("", 3, "set = { from = 'x2', ball = { radius = 1 } }"),
+        Set::Product(vec![free(1), ball(&[0.0; 2], 1.0)])
+    );
+
+    for (rest, said) in [
+        ("", "set: expected this key, as the kind is \"vi\", found none"),
+        (
+            "set = 3",
+            "line 3: expected a problem as docs/formats.md describes it, found invalid type: integer `3`, expected a set: a table with box, polyhedron, ball or second_order_cone, or an array of such",
+        ),
+        (
+            "set = {}",
+            "set: expected one of box, polyhedron, ball, second_order_cone; several sets are an array, found none",
+        ),
+        (
+            "set = { box = {}, ball = { radius = 1 } }",
+            "set: expected one of box, polyhedron, ball, second_order_cone; several sets are an array, found box and ball",
+        ),
+        ("set = { bowl = {} }", "unknown field `bowl`"),
+        ("set = { ball = { radius = -1 } }", "set.ball.radius: expected a number ≥ 0, found -1"),
+        ("set = { ball = {} }", "missing field `radius`"),
+        (
+            "set = { ball = { centre = [0, nan], radius = 1 } }",
+            "set.ball.centre[1]: expected a finite number, found NaN",
+        ),
+        (
+            "set = { ball = { centre = [0, 0, 0], radius = 1 } }",
+            "set.ball: expected 1 to 2 of the 2 variables, found 3",
+        ),
+        (
+            "set = { ball = { centre = [0], radius = 1 } }",
+            "set: expected a set of all 2 variables, found 1",
+        ),
+        (
+            "set = { box = { lower = [0, 0], upper = [1] } }",
+            "set.box.u: expected 2 entries (variables), found 1 entries",
+        ),
+        (
+            "set = { box = { lower = [0, 3], upper = [1, 2] } }",
+            "set.box.[l, u][1]: expected l ≤ u, l < ∞, u > −∞, found [3, 2]",
+        ),
+        (
+            "set = { second_order_cone = { dimension = 0 } }",
+            "set.second_order_cone: expected 1 to 2 of the 2 variables, found 0",
+        ),
+        (
+            "set = { second_order_cone = { dimension = 999999999999 } }",
+            "set.second_order_cone: expected 1 to 2 of the 2 variables, found 999999999999",
+        ),
+        (
+            "set = [{ second_order_cone = {} }, { box = {} }]",
+            "set[1].box: expected some of the 2 variables to be left for it, found 0",
+        ),
+        ("set = { from = 'x3', box = {} }", "set.from: expected a variable (x1, x2), found `x3`"),
+        (
+            "set = { from = 'x2', to = 'x1', box = {} }",
+            "set.to: expected `x2` or one behind it, found `x1`",
+        ),
+        (
+            "set = [{ from = 'x1', to = 'x2', box = {} }, { from = 'x2', second_order_cone = {} }]",
+            "set[1]: expected variables of no other part, found x2",
+        ),
+        (
+            "set = { polyhedron = { A = [[1, 1]] } }",
+            "set.polyhedron.b: expected 1 entries (rows of A), found 0",
+        ),
+        (
+            "set = { polyhedron = { A = [[1, 1], [1]], b = [1, 1] } }",
+            "set.polyhedron.A[1]: expected 2 entries, as in A[0], found 1",
+        ),
+        ("set = { polyhedron = { A = [[1, inf]], b = [1] } }", "set.polyhedron.A"),
+        ("set = { polyhedron = { A = [[1, 1]], b = [1], C = [[1]], d = [1] } }", "set.polyhedron"),
+        (
+            "set = { polyhedron = { A = [[1, 1]], b = [1], lower = [inf, 0] } }",
+            "set.polyhedron.lower[0]: expected a number or -inf, found inf",
+        ),
+        (
+            "set = { polyhedron = { A = [[1, 1]], b = [1], upper = [1] } }",
+            "set.polyhedron.upper: expected 2 entries, found 1",
+        ),
+        (
+            "set = { box = {} }\nlower = [0, 0]",
+            "lower: expected the keys of kind \"vi\": F, set, start, found this one",
+        ),
+    ] {
+        folder.refused("d.toml", &format!("kind = 'vi'\nF = ['x1', 'x2']\n{rest}\n"), &[said]);
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use nonsmooth::{FrictionLocal, Hlcp, Lcp, Vi};
+use nonsmooth::{FrictionLocal, Hlcp, Lcp};
 use nonsmooth_problem::each_kind;
 use nonsmooth_solve::registry;
 
@@ -776,12 +776,9 @@ fn comments(source: &str) -> String {
 /// The keys that the registry cites, each with who cites it.
 fn registered() -> BTreeMap<String, String> {
     let abouts = each_kind!(P => registry::abouts::<P>());
-    // No file holds a variational inequality.
-    let abouts = abouts.into_iter().chain([registry::abouts::<Vi>()]);
-    let solvers = abouts.flatten().map(|a| (a.name, a.cites));
+    let solvers = abouts.into_iter().flatten().map(|a| (a.name, a.cites));
     let prefixes = each_kind!(P => registry::prefixes::<P>());
-    let prefixes = prefixes.into_iter().chain([registry::prefixes::<Vi>()]);
-    let prefixes = prefixes.flatten().map(|p| (p.name, p.cites));
+    let prefixes = prefixes.into_iter().flatten().map(|p| (p.name, p.cites));
     let cited = solvers.chain(prefixes).flat_map(|(name, cites)| {
         assert!(!cites.is_empty(), "{name} cites nothing");
         cites.iter().map(move |key| ((*key).to_owned(), format!("the registry's {name}")))

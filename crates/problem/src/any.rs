@@ -4,7 +4,7 @@
 
 use crate::check::{
     Certificate, ConeSystem, ContactStatus, Evidence, Judged, Measure, RowCounts, RowStatus,
-    StatusCounts, Verdict, VerdictOf,
+    SetCounts, SetStatus, StatusCounts, Verdict, VerdictOf,
 };
 use crate::{
     Complementarity, Friction, GlobalPoint, HlcpPoint, Kind, LcpPoint, LocalPoint, Problem,
@@ -18,7 +18,7 @@ use crate::{
 pub enum AnyProblem {
     /// Contacts.
     Friction(Friction),
-    /// Complementarity.
+    /// Complementarity, and variational inequalities.
     Complementarity(Complementarity),
 }
 
@@ -38,16 +38,18 @@ pub enum AnyPoint {
 /// The judge's constants and buffers for a problem of any kind.
 pub struct AnyGauge(Box<dyn std::any::Any + Send>);
 
-/// What a contact or a row does.
+/// What a contact or a row does, or where a point is with respect to a constraint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum AnyStatus {
     /// Of a contact: open, sticking or slipping.
     Contact(ContactStatus),
     /// Of a row: at which of its bounds, between them, or an equality.
     Row(RowStatus),
+    /// Of a constraint of a set: within it or at its border.
+    Set(SetStatus),
 }
 
-/// How many contacts or rows do what.
+/// How many contacts, rows or constraints do what.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 #[serde(untagged)]
 pub enum AnyCounts {
@@ -55,6 +57,8 @@ pub enum AnyCounts {
     Contacts(StatusCounts),
     /// Of a complementarity problem.
     Rows(RowCounts),
+    /// Of a variational inequality: the constraints of its set.
+    Sets(SetCounts),
 }
 
 impl Default for AnyCounts {
@@ -127,8 +131,10 @@ macro_rules! any_from {
 any_from! {
     ContactStatus => AnyStatus, |status| Self::Contact(status);
     RowStatus => AnyStatus, |status| Self::Row(status);
+    SetStatus => AnyStatus, |status| Self::Set(status);
     StatusCounts => AnyCounts, |counts| Self::Contacts(counts);
     RowCounts => AnyCounts, |counts| Self::Rows(counts);
+    SetCounts => AnyCounts, |counts| Self::Sets(counts);
 }
 
 /// The verdict with statuses and counts of any kind.

@@ -52,6 +52,17 @@ impl From<MatrixError> for ProblemError {
 }
 
 impl ProblemError {
+    /// The same of a part that stands at `at` in something larger: the place becomes `at.place`.
+    #[must_use]
+    pub fn within(mut self, at: &str) -> Self {
+        let (Self::Shape { place, .. }
+        | Self::Value { place, .. }
+        | Self::Empty { place }
+        | Self::Singular { place, .. }) = &mut self;
+        *place = if place.is_empty() { at.into() } else { format!("{at}.{place}") };
+        self
+    }
+
     pub(crate) fn shape(
         place: impl Into<String>,
         expected: impl Into<String>,

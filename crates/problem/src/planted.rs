@@ -6,6 +6,7 @@ pub use crate::kinds::complementarity::planted::{
     classics, energy,
 };
 pub use crate::kinds::contact::planted::{Planted, PlantedMix};
+pub use crate::kinds::variational::planted::{BallsAndCones, Traffic};
 
 /// What makes problems by its fields, which are documented, defaulted and read as settings are.
 pub trait Recipe {

@@ -11,7 +11,7 @@ use std::time::Instant;
 use nonsmooth_analysis::{Class, Classes, Effort};
 use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::check::{Certificate, Evidence, ExactVector, Existence};
-use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, Friction, Problem};
+use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, Friction, Problem, field};
 
 use crate::contact::existence as criterion;
 use crate::core::exact_cones::{ExactCones, Found, is_representable};
@@ -126,6 +126,10 @@ fn by_class(problem: &Complementarity, known: Option<Classes>) -> Option<Existen
             }
             let class = class_of(&p.M, &[Class::P])?;
             every(format!("M is {class}, and then every q has a solution between any bounds"))
+        }
+        // An affine F is defined, and continuous, everywhere.
+        Complementarity::Vi(p) if p.set.is_compact() && field::linear(&*p.F).is_some() => {
+            every("F is affine and the set bounded, and then there is a solution".into())
         }
         _ => None,
     }

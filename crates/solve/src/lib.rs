@@ -49,4 +49,5 @@ pub use self::core::error::SolveError;
 pub use self::core::reformulation::Reformulation;
 pub use self::core::solver::{Solver, Step};
 pub use self::core::via::Via;
+pub use self::core::via_session::ViaSession;
 pub use self::core::{guard, line_search, settings, spelling, trace};

@@ -1,11 +1,11 @@
-//! Complementarity problems by their settings, for `nonsmooth gen`.
+//! Complementarity problems and variational inequalities by their settings, for `nonsmooth gen`.
 
 use std::borrow::Cow;
 
 use nonsmooth_io::{Info, ProblemFile, StoredPoint};
 use nonsmooth_problem::planted::{
-    Bratu, HarkerPang, JournalBearing, NashCournot, NonlinearClassic, Obstacle, PendulumStep,
-    PlantedLcp, PlantedMlcp, Recipe, Torsion,
+    BallsAndCones, Bratu, HarkerPang, JournalBearing, NashCournot, NonlinearClassic, Obstacle,
+    PendulumStep, PlantedLcp, PlantedMlcp, Recipe, Torsion, Traffic,
 };
 use nonsmooth_problem::{AnyPoint, AnyProblem};
 use nonsmooth_solve::settings::{Setting, Settings, SettingsMap, described, parse};
@@ -108,6 +108,22 @@ pub const MAKERS: &[Maker] = &[
         summary: "a frictionless step with impacts of a pendulum of many links, nonlinear",
         settings: described::<Of<PendulumStep>>,
         make: |s| Ok(ProblemFile::new(recipe::<PendulumStep>(s)?.mcp())),
+    },
+    Maker {
+        name: "traffic",
+        summary: "drivers in a grid of streets, each on a shortest way: a VI over a polyhedron, with a planted equilibrium",
+        settings: described::<Of<Traffic>>,
+        make: |s| {
+            let made = recipe::<Traffic>(s)?;
+            let info = Info { names: made.names(), ..Info::default() };
+            Ok(ProblemFile { info, ..solved(made.vi()) })
+        },
+    },
+    Maker {
+        name: "balls_and_cones",
+        summary: "a strongly monotone VI over a product of balls and second-order cones, with a planted solution: dense",
+        settings: described::<Of<BallsAndCones>>,
+        make: |s| Ok(solved(recipe::<BallsAndCones>(s)?.vi())),
     },
     Maker {
         name: "ncp_classic",

@@ -151,7 +151,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     }
     let mut text = said(label, scene.as_ref(), &content);
     if let Some(solved) = &solved {
-        solution(&mut text, solved, args.tol);
+        solution(&mut text, &content, solved, args.tol);
     }
     match out {
         // The standard output is the file's.
@@ -261,17 +261,17 @@ fn drawing(
 }
 
 /// What came of --solve.
-fn solution(text: &mut String, solved: &Solved, tolerance: f64) {
+fn solution(text: &mut String, content: &ProblemFile, solved: &Solved, tolerance: f64) {
     let iterations = report::count(solved.iterations, "iteration");
     let (status, time) = (&solved.status, seconds(solved.seconds));
     report::row(text, "solution", format!("{status}, {iterations}, {time}"));
-    report::verdict_text(text, &solved.verdict, tolerance, 0);
+    report::verdict_text(text, content, &solved.verdict, tolerance, 0);
 }
 
-/// The makers of complementarity problems and their settings.
+/// The makers of complementarity problems and variational inequalities, and their settings.
 fn makers(all: &[Maker]) -> String {
     let mut text = String::from(
-        "Complementarity problems and their settings, for `nonsmooth gen NAME --set key=value --out FILE.toml`\n",
+        "Complementarity problems, variational inequalities and their settings, for `nonsmooth gen NAME --set key=value --out FILE.toml`\n",
     );
     // Those with the same settings, one after the other, have them once.
     let mut before: Option<Vec<Setting>> = None;

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use nonsmooth_io::{ProblemFile, StoredPoint};
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::{AnyProblem, ProblemError, Stated, with_complementarity};
+use nonsmooth_problem::{AnyProblem, Complementarity, ProblemError, Stated, with_complementarity};
 use nonsmooth_solve::{Limits, guard};
 use serde_json::{Value, json};
 
@@ -118,6 +118,9 @@ impl Facts {
         };
         let details = match &content.problem {
             AnyProblem::Friction(p) => Details::Contact(contact::Facts::of(p, content.info.dofs)),
+            AnyProblem::Complementarity(Complementarity::Vi(p)) => {
+                Details::Nonlinear(nonlinear::Facts::of_inequality(p))
+            }
             AnyProblem::Complementarity(p) => match with_complementarity!(p, p => p.nonlinear()) {
                 Some(p) => Details::Nonlinear(nonlinear::Facts::of(p)),
                 None => Details::Linear(linear::Facts::of(p)),
@@ -167,7 +170,7 @@ impl Facts {
             Some(verdict) => {
                 let passes = if verdict.solved { "passes" } else { "does not pass" };
                 row(&mut text, "solution", format!("stored, {passes} at {JUDGED_AT:e}"));
-                report::verdict_text(&mut text, verdict, JUDGED_AT, 0);
+                report::verdict_text(&mut text, content, verdict, JUDGED_AT, 0);
             }
         }
         text

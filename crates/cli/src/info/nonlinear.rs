@@ -1,7 +1,8 @@
-//! What `nonsmooth info` says of nonlinear complementarity problems.
+//! What `nonsmooth info` says of nonlinear complementarity problems and variational inequalities.
 
 use nonsmooth_analysis::{Apart, Class, Classes, Finding, Sampled};
-use nonsmooth_problem::{Mcp, Problem};
+use nonsmooth_problem::field::{self, Field};
+use nonsmooth_problem::{LcpPoint, Mcp, Problem, Set, Vi};
 use serde_json::{Value, json};
 
 use super::linear::{Entries, classes, classes_text};
@@ -9,8 +10,9 @@ use crate::report::{self, Object, count, number, row};
 
 /// What there is to say of a problem.
 pub(super) struct Facts {
-    bounds: Bounds,
+    domain: Domain,
     source: String,
+    rows: usize,
     /// Of expressions: operations of an evaluation, and affine rows.
     expressions: Option<[usize; 2]>,
     /// Entries of the Jacobian: all, the fewest and the most of a row, on the diagonal.
@@ -21,6 +23,21 @@ pub(super) struct Facts {
     affine: Option<Affine>,
     /// Of others.
     sampled: Option<Sampled>,
+}
+
+/// Where x may be.
+enum Domain {
+    Box(Bounds),
+    /// The parts of a set, one by one.
+    Set(Vec<SetPart>),
+}
+
+/// A part of a set: a sort with its numbers, of each by name how many it has.
+struct SetPart {
+    sort: &'static str,
+    first: usize,
+    dimension: usize,
+    numbers: Vec<(&'static str, usize)>,
 }
 
 /// Variables by their bounds.
@@ -39,13 +56,16 @@ struct Affine {
     exact: bool,
 }
 
+/// Parts of a set that are listed.
+const PARTS: usize = 6;
+
 /// Pairs of points on which monotonicity is tried.
 const PAIRS: usize = 100;
 
 impl Bounds {
-    fn of(problem: &Mcp) -> Self {
+    fn of(lower: &[f64], upper: &[f64]) -> Self {
         let mut out = Self { lower: 0, upper: 0, both: 0, free: 0, fixed: 0 };
-        for (&l, &u) in problem.lower.iter().zip(&problem.upper) {
+        for (&l, &u) in lower.iter().zip(upper) {
             *match (l.is_finite(), u.is_finite()) {
                 _ if l == u => &mut out.fixed,
                 (true, true) => &mut out.both,
@@ -66,26 +86,77 @@ impl Bounds {
             (self.fixed, "fixed", "fixed"),
         ]
     }
+
+    fn text(&self) -> String {
+        let some: Vec<_> = self.all().into_iter().filter(|b| b.0 > 0).collect();
+        let some: Vec<_> = some.iter().map(|(n, _, what)| format!("{n} {what}")).collect();
+        some.join(", ")
+    }
+}
+
+impl SetPart {
+    fn of((first, set): (usize, &Set)) -> Self {
+        let (sort, numbers) = match set {
+            Set::Box { lower, upper } => {
+                let all = Bounds::of(lower, upper).all();
+                ("box", all.map(|(n, name, _)| (name, n)).into())
+            }
+            Set::Polyhedron { A, C, .. } => {
+                ("polyhedron", vec![("inequalities", A.nrows()), ("equalities", C.nrows())])
+            }
+            Set::Ball { .. } => ("ball", vec![]),
+            Set::SecondOrderCone { .. } => ("second_order_cone", vec![]),
+            Set::Product(_) => ("product", vec![]),
+        };
+        Self { sort, first, dimension: set.dim(), numbers }
+    }
+
+    fn text(&self) -> String {
+        let some = self.numbers.iter().filter(|(_, n)| *n > 0);
+        let some: Vec<_> = some.map(|(name, n)| format!(", {n} {name}")).collect();
+        let sort = self.sort.replace('_', " ");
+        format!("{sort} in {}{}", count(self.dimension, "variable"), some.concat())
+    }
+
+    fn json(&self) -> Value {
+        let mut all = json!({"sort": self.sort, "first": self.first, "dimension": self.dimension});
+        if let Some(all) = all.as_object_mut() {
+            all.extend(self.numbers.iter().map(|(name, n)| ((*name).to_owned(), json!(n))));
+        }
+        all
+    }
 }
 
 impl Facts {
     pub(super) fn of(problem: &Mcp) -> Self {
-        let pattern = problem.F.pattern();
-        let per_row = || (0..problem.dim()).map(|i| pattern.row(i).len());
-        let diagonal = (0..problem.dim()).filter(|i| pattern.row(*i).binary_search(i).is_ok());
-        let expressions = problem.F.expressions();
-        let affine = problem.affine().map(|(linear, exact)| Affine {
-            matrix: Entries::of(&linear.M),
-            classes: classes(&linear.M),
-            exact,
+        let domain = Domain::Box(Bounds::of(&problem.lower, &problem.upper));
+        let facts = Self::with(problem, &*problem.F, domain);
+        let sampled = facts.affine.is_none().then(|| Sampled::of(problem, PAIRS, 0));
+        Self { sampled, ..facts }
+    }
+
+    /// Nothing is sampled: a pair of points apart from the set says nothing.
+    pub(super) fn of_inequality(problem: &Vi) -> Self {
+        let parts = problem.set.parts().into_iter().map(SetPart::of).collect();
+        Self::with(problem, &*problem.F, Domain::Set(parts))
+    }
+
+    fn with<P: Problem<Point = LcpPoint>>(problem: &P, field: &dyn Field, domain: Domain) -> Self {
+        let (n, pattern) = (field.dim(), field.pattern());
+        let per_row = || (0..n).map(|i| pattern.row(i).len());
+        let diagonal = (0..n).filter(|i| pattern.row(*i).binary_search(i).is_ok());
+        let expressions = field.expressions();
+        let affine = field::linear(field).map(|(m, _, exact)| {
+            let m = m.into();
+            Affine { matrix: Entries::of(&m), classes: classes(&m), exact }
         });
-        let measured =
-            problem.gauge().map(|mut gauge| problem.measure(&problem.origin(), &mut gauge));
-        let start = &problem.origin().z;
-        let defined = problem.F.evaluator().value(start, &mut vec![0.0; start.len()]);
+        let start = problem.origin();
+        let measured = problem.gauge().map(|mut gauge| problem.measure(&start, &mut gauge));
+        let defined = field.evaluator().value(&start.z, &mut vec![0.0; n]);
         Self {
-            bounds: Bounds::of(problem),
-            source: problem.F.source(),
+            domain,
+            source: field.source(),
+            rows: n,
             expressions: expressions
                 .map(|f| [f.operations(), f.affine_rows().iter().filter(|a| **a).count()]),
             entries: [
@@ -95,22 +166,30 @@ impl Facts {
                 diagonal.count(),
             ],
             residual: measured.ok().filter(|_| defined).map(|m| m.absolute),
-            sampled: affine.is_none().then(|| Sampled::of(problem, PAIRS, 0)),
+            sampled: None,
             affine,
         }
     }
 
     /// As JSON.
     pub(super) fn json(&self) -> Object {
-        let bounds: Object =
-            self.bounds.all().into_iter().map(|(n, name, _)| (name.into(), json!(n))).collect();
+        let domain = match &self.domain {
+            Domain::Box(bounds) => {
+                let all = bounds.all().into_iter();
+                let all: Object = all.map(|(n, name, _)| (name.into(), json!(n))).collect();
+                json!({"bounds": all})
+            }
+            Domain::Set(parts) => {
+                json!({"set": parts.iter().map(SetPart::json).collect::<Vec<_>>()})
+            }
+        };
         let [entries, least, most, diagonal] = self.entries;
         let affine = self
             .affine
             .as_ref()
             .map(|a| json!({"exact": a.exact, "M": a.matrix.json(), "classes": a.classes}));
-        report::fields(json!({
-            "bounds": bounds,
+        let mut all = report::fields(domain);
+        all.extend(report::fields(json!({
             "source": self.source,
             "operations": self.expressions.map(|e| e[0]),
             "affine_rows": self.expressions.map(|e| e[1]),
@@ -124,7 +203,8 @@ impl Facts {
             "monotone": self.answer(Class::PositiveSemidefinite, |s| &s.not_monotone),
             "p0": self.answer(Class::P0, |s| &s.not_p0),
             "sampled": self.sampled,
-        }))
+        })));
+        all
     }
 
     /// Yes or no where it is proved, else null.
@@ -144,14 +224,24 @@ impl Facts {
 
     /// As text.
     pub(super) fn text(&self, text: &mut String) {
-        let some: Vec<_> = self.bounds.all().into_iter().filter(|b| b.0 > 0).collect();
-        let some: Vec<_> = some.iter().map(|(n, _, what)| format!("{n} {what}")).collect();
-        row(text, "bounds", some.join(", "));
+        match &self.domain {
+            Domain::Box(bounds) => row(text, "bounds", bounds.text()),
+            Domain::Set(parts) => {
+                for (k, part) in parts.iter().take(PARTS).enumerate() {
+                    row(text, if k == 0 { "set" } else { "" }, part.text());
+                }
+                if parts.len() > PARTS {
+                    row(text, "", format!("and {} others", parts.len() - PARTS));
+                }
+                if parts.iter().all(|part| part.sort == "box") {
+                    row(text, "", "over a box it is a mixed complementarity problem (mcp)");
+                }
+            }
+        }
         let mut f = self.source.clone();
         if let Some([operations, affine]) = self.expressions {
-            let rows = self.bounds.all().iter().map(|b| b.0).sum::<usize>();
             let operations = count(operations, "operation");
-            f += &format!(", {operations}; affine: {affine} of {}", count(rows, "row"));
+            f += &format!(", {operations}; affine: {affine} of {}", count(self.rows, "row"));
         }
         row(text, "F", f);
         let [entries, least, most, diagonal] = self.entries;

@@ -2,15 +2,16 @@
 
 use nonsmooth_bench::draw::{Axis, GRID, INK, font, tick, ticks};
 use nonsmooth_problem::check::Motion;
+use nonsmooth_problem::field::Field;
 use nonsmooth_problem::{
-    AnyPoint, AnyProblem, AnyStatus, Friction, Mcp, Problem, Stated, with_complementarity,
-    with_friction,
+    AnyPoint, AnyProblem, AnyStatus, Friction, Problem, Stated, with_complementarity, with_friction,
 };
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::{BEST, Drawn, TOLERANCE};
+use crate::kinds::start_of;
 
 /// The width and height of a panel, px.
 const PANEL: (u32, u32) = (420, 420);
@@ -130,20 +131,19 @@ fn spies(problem: &AnyProblem) -> Vec<Spy> {
         AnyProblem::Friction(Friction::Global2(p)) => vec![sparse("M", &p.M), sparse("H", &p.H)],
         AnyProblem::Friction(Friction::Global3(p)) => vec![sparse("M", &p.M), sparse("H", &p.H)],
         AnyProblem::Complementarity(p) => {
-            let (matrices, nonlinear) =
-                with_complementarity!(p, p => (p.matrices(), p.nonlinear()));
+            let (matrices, function) = with_complementarity!(p, p => (p.matrices(), p.function()));
             let matrices = matrices.into_iter().map(|(name, m)| any(name, m));
-            matrices.chain(nonlinear.map(jacobian)).collect()
+            let spy = |f| jacobian(f, &start_of(problem));
+            matrices.chain(function.map(spy)).collect()
         }
     }
 }
 
 /// Where the Jacobian is not zero at the start; where it is not defined there, all its places.
-fn jacobian(problem: &Mcp) -> Spy {
-    let (n, pattern) = (problem.dim(), problem.F.pattern());
+fn jacobian(field: &dyn Field, start: &[f64]) -> Spy {
+    let (n, pattern) = (field.dim(), field.pattern());
     let mut values = vec![0.0; pattern.len()];
-    let start = problem.origin().z;
-    let defined = problem.F.evaluator().jacobian(&start, &mut vec![0.0; n], &mut values);
+    let defined = field.evaluator().jacobian(start, &mut vec![0.0; n], &mut values);
     let places = pattern.places().zip(&values).filter(|(_, x)| !defined || **x != 0.0);
     let at = if defined { "at the start" } else { "undefined at the start: its places" };
     Spy {
@@ -168,7 +168,7 @@ fn impulses(problem: &Friction, solution: &Solution) -> Vec<Impulse> {
         let reach = mu * normal;
         let motion = match status {
             AnyStatus::Contact(contact) => contact.status,
-            AnyStatus::Row(_) => Motion::Open,
+            AnyStatus::Row(_) | AnyStatus::Set(_) => Motion::Open,
         };
         // What rounding leaves at an open contact is no impulse.
         let part = (reach > 0.0 && motion != Motion::Open)

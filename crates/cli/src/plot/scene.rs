@@ -30,7 +30,7 @@ pub fn solved(
     // A scene's problem is one of contacts.
     let motion = |status: &AnyStatus| match status {
         AnyStatus::Contact(contact) => Some(contact.status),
-        AnyStatus::Row(_) => None,
+        AnyStatus::Row(_) | AnyStatus::Set(_) => None,
     };
     let motions: Vec<_> = verdict.statuses.iter().filter_map(motion).collect();
     let r = match point {

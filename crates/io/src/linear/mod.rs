@@ -1,8 +1,9 @@
-//! Complementarity problems as text: LCP, MLCP, horizontal, box-constrained and nonlinear.
+//! Complementarity problems as text: LCP, MLCP, horizontal, box-constrained and nonlinear; and variational inequalities.
 //!
 //! [`toml`] is our own format, with solution and texts (docs/formats.md); [`market`] is Matrix Market, `NAME.mtx` with `NAME_q.mtx` beside.
 
 pub mod market;
+mod set;
 pub mod toml;
 
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Our own format: a complementarity problem as TOML, for people to read and write. docs/formats.md describes it.
+//! Our own format: a complementarity problem or a variational inequality as TOML, for people to read and write. docs/formats.md describes it.
 //!
 //! Numbers are written with as many digits as tell them from all others, so what is written reads back bit for bit, and so does the storage of the
 //! matrices (dense or sparse). Functions are expressions, one text a row.
@@ -9,13 +9,13 @@ use std::path::Path;
 use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::field::Expressions;
 use nonsmooth_problem::{
-    AnyPoint, AnyProblem, Complementarity, Kind, Part, Parts, ProblemError, Shape, Stated,
+    AnyPoint, AnyProblem, Complementarity, Kind, Part, Parts, ProblemError, Set, Shape, Stated,
     each_kind, with_complementarity,
 };
 use serde::Deserialize;
 use serde::de::{self, DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 
-use super::{Digits, check};
+use super::{Digits, check, set};
 use crate::format::About;
 use crate::tokens::text;
 use crate::{Format, Info, IoError, ProblemFile, StoredPoint};
@@ -37,6 +37,7 @@ enum Value {
     Matrix(Given),
     Vector(Vec<f64>),
     Count(usize),
+    Set(set::Stated),
     Solution(Keys),
 }
 
@@ -72,6 +73,7 @@ impl<'de> Visitor<'de> for Known<'_> {
                 Type::Part(Shape::Vector) => Value::Vector(map.next_value()?),
                 Type::Part(Shape::Count) => Value::Count(map.next_value()?),
                 Type::Part(Shape::Expressions) => Value::Texts(map.next_value()?),
+                Type::Part(Shape::Set) => Value::Set(map.next_value()?),
                 Type::Solution => Value::Solution(map.next_value_seed(Known(&of_solutions()))?),
             };
             keys.push((key, value));
@@ -141,14 +143,14 @@ fn take_text(keys: &mut Keys, name: &str) -> Option<String> {
 
 /// A matrix as it is stated: rows, or a shape and entries.
 #[derive(Debug)]
-enum Given {
+pub(super) enum Given {
     Rows(Vec<Vec<f64>>),
     Entries(Entries),
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Entries {
+pub(super) struct Entries {
     shape: (usize, usize),
     entries: Vec<(usize, usize, f64)>,
 }
@@ -186,7 +188,7 @@ struct Read {
     point: fn(&mut Keyed<'_>) -> Result<AnyPoint, ProblemError>,
 }
 
-/// All kinds of complementarity.
+/// All kinds that the format has.
 fn kinds() -> impl Iterator<Item = Read> {
     fn of<P: Stated>() -> Read {
         Read {
@@ -300,7 +302,7 @@ struct Keyed<'a> {
     names: &'a [String],
 }
 
-fn wrong(
+pub(super) fn wrong(
     place: impl Into<String>,
     expected: impl Into<String>,
     found: impl std::fmt::Display,
@@ -363,34 +365,45 @@ impl Parts for Keyed<'_> {
     }
 
     fn matrix(&mut self, name: &'static str) -> Result<Matrix, ProblemError> {
-        let stated = match self.need(name)? {
-            Value::Matrix(stated) => stated,
-            _ => return Err(Self::shaped(name, "a matrix")),
-        };
-        match stated {
-            Given::Rows(rows) => match Dense::from_rows(&rows) {
-                Some(dense) => Ok(dense.into()),
-                None => {
-                    let first = rows[0].len();
-                    let k = rows.iter().position(|r| r.len() != first).unwrap_or_default();
-                    let expected = format!("{first} entries, as in {name}[0]");
-                    Err(wrong(format!("{name}[{k}]"), expected, rows[k].len()))
-                }
-            },
-            Given::Entries(Entries { shape: (rows, columns), entries }) => {
-                if rows.max(columns) > self.room {
-                    let found = format!("{rows} × {columns}");
-                    let expected = "a matrix that the vectors can fit";
-                    return Err(wrong(format!("{name}.shape"), expected, found));
-                }
-                if let Some(k) = entries.iter().position(|e| e.0 >= rows || e.1 >= columns) {
-                    let expected =
-                        format!("a row below {rows} and a column below {columns}, counted from 0");
-                    let found = format!("{} and {}", entries[k].0, entries[k].1);
-                    return Err(wrong(format!("{name}.entries[{k}]"), expected, found));
-                }
-                Ok(Csc::from_triplets(rows, columns, entries.iter().copied())?.into())
+        match self.need(name)? {
+            Value::Matrix(stated) => matrix_of(name, stated, self.room),
+            _ => Err(Self::shaped(name, "a matrix")),
+        }
+    }
+
+    fn set(&mut self, name: &'static str, variables: usize) -> Result<Set, ProblemError> {
+        match self.need(name)? {
+            Value::Set(stated) => set::read(stated, name, variables, self.names, self.room),
+            _ => Err(Self::shaped(name, "a set")),
+        }
+    }
+}
+
+/// The matrix that is stated at `name`, with at most `room` rows and columns where they are only said.
+pub(super) fn matrix_of(name: &str, stated: Given, room: usize) -> Result<Matrix, ProblemError> {
+    match stated {
+        Given::Rows(rows) => match Dense::from_rows(&rows) {
+            Some(dense) => Ok(dense.into()),
+            None => {
+                let first = rows[0].len();
+                let k = rows.iter().position(|r| r.len() != first).unwrap_or_default();
+                let expected = format!("{first} entries, as in {name}[0]");
+                Err(wrong(format!("{name}[{k}]"), expected, rows[k].len()))
             }
+        },
+        Given::Entries(Entries { shape: (rows, columns), entries }) => {
+            if rows.max(columns) > room {
+                let found = format!("{rows} × {columns}");
+                let expected = "a matrix that the vectors can fit";
+                return Err(wrong(format!("{name}.shape"), expected, found));
+            }
+            if let Some(k) = entries.iter().position(|e| e.0 >= rows || e.1 >= columns) {
+                let expected =
+                    format!("a row below {rows} and a column below {columns}, counted from 0");
+                let found = format!("{} and {}", entries[k].0, entries[k].1);
+                return Err(wrong(format!("{name}.entries[{k}]"), expected, found));
+            }
+            Ok(Csc::from_triplets(rows, columns, entries.iter().copied())?.into())
         }
     }
 }
@@ -419,10 +432,11 @@ fn format(path: &Path, file: &ProblemFile, problem: &Complementarity) -> Result<
         let names: Vec<_> = file.info.names.iter().map(|name| quoted(name)).collect();
         line(&mut out, &format!("names = [{}]", names.join(", ")));
     }
-    let mut matrices = vec![];
+    let (mut matrices, mut sets) = (vec![], vec![]);
     for (key, part) in with_complementarity!(problem, p => p.parts()) {
         match part {
             Part::Matrix(m) => matrices.push((key, m)),
+            Part::Set(set) => sets.push((key, set)),
             Part::Vector(x) => vector(&mut out, key, x),
             Part::Count(n) => line(&mut out, &format!("{key} = {n}")),
             Part::Expressions(f) => {
@@ -457,6 +471,7 @@ fn format(path: &Path, file: &ProblemFile, problem: &Complementarity) -> Result<
             Matrix::Operator(_) => return Err(operator(path)),
         }
     }
+    sets.iter().for_each(|(key, set)| set::write(&mut out, key, set, &file.info.names));
     if let Some(stored) = &file.solution {
         line(&mut out, "\n[solution]");
         let partner = stored.partner.as_deref();
@@ -477,22 +492,22 @@ fn of<P: Stated>(_: &P) -> (Kind, &'static str) {
     (P::KIND, P::STATEMENT)
 }
 
-fn line(out: &mut String, text: &str) {
+pub(super) fn line(out: &mut String, text: &str) {
     // Writing to a String cannot fail.
     let _ = writeln!(out, "{text}");
 }
 
-fn vector(out: &mut String, key: &str, x: &[f64]) {
+pub(super) fn vector(out: &mut String, key: &str, x: &[f64]) {
     line(out, &format!("{key} = {}", list(x)));
 }
 
-fn list(x: &[f64]) -> String {
+pub(super) fn list(x: &[f64]) -> String {
     let each: Vec<_> = x.iter().map(|&x| Digits(x).to_string()).collect();
     format!("[{}]", each.join(", "))
 }
 
 /// A basic string of TOML.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {
         match c {

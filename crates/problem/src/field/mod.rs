@@ -20,6 +20,9 @@ mod probe;
 mod tests;
 
 use std::fmt::Debug;
+use std::sync::Arc;
+
+use nonsmooth_linalg::Csc;
 
 use crate::ProblemError;
 
@@ -121,6 +124,26 @@ pub trait Field: Debug + Send + Sync {
     fn expressions(&self) -> Option<&Expressions> {
         None
     }
+}
+
+/// Functions are the same where they are the same expressions, or the same object.
+pub(crate) fn same(a: &Arc<dyn Field>, b: &Arc<dyn Field>) -> bool {
+    match (a.expressions(), b.expressions()) {
+        (Some(a), Some(b)) => a.same(b),
+        _ => Arc::ptr_eq(a, b),
+    }
+}
+
+/// M and q of `F(x) = M x + q`, where F is known to be affine, and whether they are exact: the coefficients of F without any rounding.
+pub fn linear(field: &dyn Field) -> Option<(Csc, Vec<f64>, bool)> {
+    let n = field.dim();
+    let affine = field.expressions()?.affine()?;
+    let finite = affine.entries.iter().all(|e| e.2.is_finite());
+    if !finite || affine.constants.iter().any(|q| !q.is_finite()) {
+        return None;
+    }
+    let matrix = Csc::from_triplets(n, n, affine.entries.iter().copied()).ok()?;
+    Some((matrix, affine.constants, affine.exact))
 }
 
 /// Evaluates a [`Field`].

@@ -1,4 +1,4 @@
-//! The kinds of problem, each in a folder or file of its wing, and the one list of them: of those that files hold. Variational inequalities are of the library alone.
+//! The kinds of problem, each in a folder or file of its wing, and the one list of them. Variational inequalities stand in it among the complementarity problems, which they generalise: files, tables and reports state them by their parts as they state those.
 //!
 //! A line of [`list_of_kinds`](crate::list_of_kinds) makes [`Kind`]'s variant and its names, the variant of the wing's enum, the arms of
 //! [`with_problem`](crate::with_problem) and the entry in all that is made by [`each_kind`](crate::each_kind).
@@ -28,7 +28,7 @@ macro_rules! list_of_kinds {
                 /// `M v = H r + f`, `u = Hᵀ v + w`, three-dimensional contacts.
                 FrictionGlobal3d, "friction_global_3d", Global3, $crate::FrictionGlobal<3>, 3;
             }
-            /// Any of the complementarity problems.
+            /// Any of the complementarity problems, and the variational inequality that they are cases of.
             Complementarity {
                 /// `0 ≤ z ⟂ M z + q ≥ 0`.
                 Lcp, "lcp", Lcp, $crate::Lcp, 1;
@@ -40,6 +40,8 @@ macro_rules! list_of_kinds {
                 BoxLcp, "box_lcp", Box, $crate::BoxLcp, 1;
                 /// `−F(x) ∈ N_[l, u](x)`.
                 Mcp, "mcp", Mcp, $crate::Mcp, 1;
+                /// `−F(x) ∈ N_X(x)`, X a box, a polyhedron, a ball, a second-order cone or a product of these.
+                Vi, "vi", Vi, $crate::Vi, 1;
             }
         }
     };
@@ -60,23 +62,20 @@ macro_rules! kinds {
         )]
         pub enum Kind {
             $($($(#[$doc])* #[serde(rename = $name)] $kind,)*)*
-            /// `−F(x) ∈ N_X(x)`: of the library alone, no file holds one.
-            #[serde(rename = "vi")]
-            Vi,
         }
 
         impl Kind {
-            /// All kinds that files hold.
+            /// All kinds.
             pub const ALL: &'static [Self] = &[$($(Self::$kind),*),*];
 
             /// The name used in files, reports and on the command line.
             pub fn name(self) -> &'static str {
-                match self { $($(Self::$kind => $name,)*)* Self::Vi => "vi" }
+                match self { $($(Self::$kind => $name,)*)* }
             }
 
             /// The components D of each contact; 1 for the pairs of a complementarity problem.
             pub fn dimension(self) -> usize {
-                match self { $($(Self::$kind => $dimension,)*)* Self::Vi => 1 }
+                match self { $($(Self::$kind => $dimension,)*)* }
             }
         }
 
@@ -116,7 +115,7 @@ macro_rules! kinds {
 list_of_kinds!(kinds,);
 
 impl Kind {
-    /// Whether this is a complementarity problem; the others are problems of frictional contact and variational inequalities.
+    /// Whether this is a complementarity problem or a variational inequality; the others are problems of frictional contact.
     pub fn is_complementarity(self) -> bool {
         Complementarity::KINDS.contains(&self)
     }

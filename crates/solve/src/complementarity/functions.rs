@@ -3,8 +3,8 @@
 //! | lecture | here, positive where z and w are | type |
 //! | --- | --- | --- |
 //! | (74a) `min(w, z)` | the same | [`Min`] |
-//! | (74b) `max(0, w − ρz) − w` | `min(w, ρz)` | [`MinRho`] with `Side::Z` |
-//! | (74c) `max(0, z − ρw) − z` | `min(z, ρw)` | [`MinRho`] with `Side::W` |
+//! | (74b) `max(0, w − ρz) − w` | `min(w, ρz)` | [`MinRho`] with [`Side::Z`] |
+//! | (74c) `max(0, z − ρw) − z` | `min(z, ρw)` | [`MinRho`] with [`Side::W`] |
 //! | (74d) `√(w² + z²) − z − w` | `z + w − √(z² + w²)` | [`FischerBurmeister`] |
 //! | (74e) `λ(√(w² + z²) − z − w) − (1 − λ) w₊ z₊` | its negative | [`Penalised`] |
 //! | (74f) `−wz + ½ min(0, w + z)²` | its negative | [`EvtushenkoPurtov`] |
@@ -23,7 +23,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::core::ranges::up_to;
+use crate::core::ranges::{positive, up_to};
 use crate::core::register::Named;
 use crate::core::settings::Settings;
 
@@ -97,33 +97,89 @@ impl ScalarFunction for Min {
     }
 }
 
-/// Which of the two is multiplied by ρ.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Which of the two is multiplied by rho.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Side {
-    /// `min(w, ρz)`.
+    /// `min(w, rho z)`, lecture (74b).
+    #[default]
     Z,
-    /// `min(z, ρw)`.
+    /// `min(z, rho w)`, lecture (74c).
     W,
 }
 
 /// The minimum with one side multiplied by `ρ > 0`.
-#[derive(Debug, Clone, Copy)]
+///
+/// Newton's method on it is `newton_min_rho`: `z_i = 0` where `ρ z_i ≤ w_i` (or `z_i ≤ ρ w_i`), `w_i = 0` elsewhere, so ρ is a trade of the units of z and w: with the side `w`
+/// it does what 1/ρ does with the side `z`. A step must decrease the merit of Fischer's and Burmeister's function of the arguments so multiplied.
+/// Fails: as Newton's method on the minimum; where ρ is far from the ratio of w to z, the sets of the first steps are bad guesses.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
 pub struct MinRho {
-    /// ρ.
+    /// The factor rho, positive; 1: the minimum itself.
     pub rho: f64,
-    /// The argument of the minimum that ρ multiplies.
+    /// The argument of the minimum that rho multiplies.
     pub side: Side,
+}
+
+impl Default for MinRho {
+    fn default() -> Self {
+        Self { rho: 2.0, side: Side::Z }
+    }
+}
+
+impl Settings for MinRho {
+    fn validate(&self) -> Result<(), String> {
+        positive("rho", self.rho)
+    }
+}
+
+impl MinRho {
+    /// Another function of the arguments as this one multiplies them.
+    fn weigh<F: ScalarFunction>(&self, function: F) -> Weighted<F> {
+        let (of_z, of_w) = match self.side {
+            Side::Z => (self.rho, 1.0),
+            Side::W => (1.0, self.rho),
+        };
+        Weighted { function, of_z, of_w }
+    }
+}
+
+impl NewtonFunction for MinRho {
+    type Merit = Weighted<FischerBurmeister>;
+    const MINIMUM_FIRST: bool = true;
+    const METHOD: Named = Named {
+        name: "newton_min_rho",
+        summary: "semismooth Newton on min(w, rho z) or min(z, rho w), globalised by the Fischer-Burmeister merit",
+        cites: &["Acary2018", "DeLucaFacchineiKanzow1996"],
+        variants: &["side=w"],
+    };
+
+    fn merit(&self) -> Self::Merit {
+        self.weigh(FischerBurmeister {})
+    }
 }
 
 impl ScalarFunction for MinRho {
     #[inline]
     fn at(&self, z: f64, w: f64) -> Slope {
-        let (of_z, of_w) = match self.side {
-            Side::Z => (self.rho, 1.0),
-            Side::W => (1.0, self.rho),
-        };
-        let at = Min {}.at(of_z * z, of_w * w);
-        Slope { z: of_z * at.z, w: of_w * at.w, ..at }
+        self.weigh(Min {}).at(z, w)
+    }
+}
+
+/// `ψ(α z, β w)` with `α, β > 0`: of a complementarity function another one.
+#[derive(Debug, Clone, Copy)]
+pub struct Weighted<F> {
+    function: F,
+    of_z: f64,
+    of_w: f64,
+}
+
+impl<F: ScalarFunction> ScalarFunction for Weighted<F> {
+    #[inline]
+    fn at(&self, z: f64, w: f64) -> Slope {
+        let at = self.function.at(self.of_z * z, self.of_w * w);
+        Slope { z: self.of_z * at.z, w: self.of_w * at.w, ..at }
     }
 }
 
@@ -223,9 +279,29 @@ impl ScalarFunction for Penalised {
     }
 }
 
-/// `zw − ½ min(0, z + w)²`: differentiable everywhere, but its derivative vanishes at (0, 0), so Newton's method is slow at degenerate solutions.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct EvtushenkoPurtov;
+/// `zw − ½ min(0, z + w)²`: differentiable everywhere, but its derivative vanishes at (0, 0).
+///
+/// Newton's method on it is `newton_ep`, smooth where F is. Between two bounds it nests as the others do, since it has the sign of w where z is positive. Fails: at degenerate solutions
+/// the Jacobian is singular and the method slow; it does not increase in z and w where their sum is negative, so its merit has more stationary points than that of Fischer and Burmeister.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+pub struct EvtushenkoPurtov {}
+
+impl Settings for EvtushenkoPurtov {}
+
+impl NewtonFunction for EvtushenkoPurtov {
+    type Merit = Self;
+    const METHOD: Named = Named {
+        name: "newton_ep",
+        summary: "Newton on the function of Evtushenko and Purtov, which is differentiable",
+        cites: &["Acary2018", "EvtushenkoPurtov1984"],
+        variants: &["line_search=armijo"],
+    };
+
+    fn merit(&self) -> Self {
+        *self
+    }
+}
 
 impl ScalarFunction for EvtushenkoPurtov {
     #[inline]

@@ -5,7 +5,9 @@ use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mcp, Mlcp};
 use crate::Boxed;
 use crate::complementarity::auto::{Auto, Planned};
 use crate::complementarity::form::{Bounded, Complementary, Paired};
-use crate::complementarity::functions::{FischerBurmeister, Min, Penalised};
+use crate::complementarity::functions::{
+    EvtushenkoPurtov, FischerBurmeister, Min, MinRho, Penalised,
+};
 use crate::complementarity::interior::{MehrotraType, MizunoToddYe};
 use crate::complementarity::newton::{Miles, Newton, Semismooth, Smooth};
 use crate::complementarity::path::PathSearch;
@@ -120,8 +122,10 @@ impl Registered for Mcp {
             Entry::of::<Proxi>(),
             Entry::of::<Semicomp>(),
             Entry::of::<Newton<Min>>(),
+            Entry::of::<Newton<MinRho>>(),
             Entry::of::<Newton<FischerBurmeister>>(),
             Entry::of::<Newton<Penalised>>(),
+            Entry::of::<Newton<EvtushenkoPurtov>>(),
         ]
     }
 

@@ -17,8 +17,7 @@ use crate::SolveError;
 use crate::core::reformulation::Reformulation;
 use crate::core::register::{Composed, Over};
 use crate::core::settings::NoSettings;
-use crate::core::via_session::ViaSession;
-use crate::{Boxed, Via};
+use crate::{Boxed, Via, ViaSession};
 use nonsmooth_problem::Kind;
 
 /// The condensation of a global problem.

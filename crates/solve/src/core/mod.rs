@@ -8,6 +8,7 @@ pub(crate) mod exact_cones;
 pub mod guard;
 pub(crate) mod guarded;
 pub mod line_search;
+pub(crate) mod portfolio;
 pub(crate) mod ranges;
 pub(crate) mod reformulation;
 pub(crate) mod register;

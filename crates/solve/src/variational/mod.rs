@@ -5,7 +5,7 @@
 //! | `parts` | projections on the sets |
 //! | [`projection`] | methods that project on X, and need monotone F |
 //! | [`reform`] | by multipliers to a complementarity problem, for boxes and polyhedra |
-//! | [`auto`] | first the multipliers, then projections |
+//! | [`auto`] | the multipliers' complementarity problem, then projections |
 
 pub mod auto;
 mod parts;

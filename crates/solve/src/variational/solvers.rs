@@ -10,7 +10,7 @@ use crate::core::register::{Edge, Entry, Registered};
 impl Registered for Vi {
     fn solvers() -> Vec<Entry<Self>> {
         vec![
-            Entry::of::<VariationalAuto>(),
+            Entry::session(VariationalAuto::session),
             Entry::of::<FixedPoint>(),
             Entry::of::<Extragradient>(),
             Entry::of::<Hyperplane>(),

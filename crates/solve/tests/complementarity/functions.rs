@@ -17,7 +17,7 @@ fn all() -> Vec<(&'static str, Function)> {
         ("min(z, w/2)", of(MinRho { rho: 0.5, side: Side::W })),
         ("fischer_burmeister", of(FischerBurmeister {})),
         ("penalised", of(Penalised { lambda: 0.8 })),
-        ("evtushenko_purtov", of(EvtushenkoPurtov)),
+        ("evtushenko_purtov", of(EvtushenkoPurtov {})),
     ]
 }
 
@@ -154,12 +154,18 @@ fn two_bounds_nest() {
             }
         }
     }
-    for f in [Penalised { lambda: 1.0 }, Penalised { lambda: 0.7 }] {
-        for (z, w) in [(-0.3, 0.0), (-0.3, 2.0), (0.4, -1.0), (0.4, 0.0), (0.1, 0.0)] {
-            assert!(boxed(&f, z, w, -0.3, 0.4).value.abs() < 1e-15, "({z}, {w})");
-        }
-        for (z, w) in [(-0.3, -1.0), (0.4, 1.0), (0.1, 0.5), (0.1, -0.5), (0.5, 0.0)] {
-            assert!(boxed(&f, z, w, -0.3, 0.4).value.abs() > 1e-3, "({z}, {w})");
-        }
+    roots_between_bounds(Penalised { lambda: 1.0 });
+    roots_between_bounds(Penalised { lambda: 0.7 });
+    roots_between_bounds(MinRho { rho: 3.0, side: Side::Z });
+    roots_between_bounds(MinRho { rho: 0.5, side: Side::W });
+    roots_between_bounds(EvtushenkoPurtov {});
+}
+
+fn roots_between_bounds<F: ScalarFunction>(f: F) {
+    for (z, w) in [(-0.3, 0.0), (-0.3, 2.0), (0.4, -1.0), (0.4, 0.0), (0.1, 0.0)] {
+        assert!(boxed(&f, z, w, -0.3, 0.4).value.abs() < 1e-15, "({z}, {w})");
+    }
+    for (z, w) in [(-0.3, -1.0), (0.4, 1.0), (0.1, 0.5), (0.1, -0.5), (0.5, 0.0), (-0.4, 1.0)] {
+        assert!(boxed(&f, z, w, -0.3, 0.4).value.abs() > 1e-3, "({z}, {w})");
     }
 }

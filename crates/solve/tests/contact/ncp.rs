@@ -1,10 +1,13 @@
 //! Friction as a nonlinear complementarity problem: reduce, solve, lift, and the word of the friction problem's own judge.
 
+use std::time::{Duration, Instant};
+
+use nonsmooth_linalg::budget::Budget;
 use nonsmooth_problem::check::Judged;
 use nonsmooth_problem::planted::{PendulumStep, Planted, PlantedMix};
 use nonsmooth_problem::{FrictionLocal, LcpPoint, Mcp, Problem};
 use nonsmooth_solve::bridges::{AsNcp, First, Formulation, Glocker};
-use nonsmooth_solve::{Limits, Reformulation, SolveError, Status, registry};
+use nonsmooth_solve::{Limit, Limits, Reformulation, SolveError, Status, registry};
 
 const MIXED: PlantedMix = PlantedMix { open: 1.0, stick: 1.0, slip: 1.0, degenerate: 0.0 };
 
@@ -216,4 +219,34 @@ fn a_pendulum_swings_against_a_wall() {
     // What a step moves past the wall before its contact is forecast.
     let gaps = hit.gaps(&angles);
     assert!(gaps.iter().all(|gap| *gap > -3.0 * hit.step), "{gaps:?}");
+}
+
+/// A dense W takes a while to be stated: where a limit comes first, it is not stated to the end.
+#[test]
+fn stating_looks_at_the_limits() {
+    let case = Planted { contacts: 250, dofs: 40, ..planted(250, 1) };
+    let (problem, _) = case.local::<3>();
+    let edge = AsNcp(Glocker);
+    let begun = Instant::now();
+    assert!(edge.reduce(&problem).is_ok());
+    let whole = begun.elapsed();
+    let begun = Instant::now();
+    let over = Budget { deadline: Some(begun), ..Budget::default() };
+    let scope = over.enter();
+    let refused = edge.reduce(&problem).map(|_| ()).unwrap_err();
+    assert!(refused.is_inapplicable() && scope.raised(), "{refused}");
+    assert!(
+        begun.elapsed() < whole / 2 + Duration::from_millis(20),
+        "{:?} {whole:?}",
+        begun.elapsed()
+    );
+    drop(scope);
+    // The loop reads it as the limit.
+    for name in ["glocker/path", "ncp/path"] {
+        let limits = Limits { time_limit: Some(0.01), ..limits(1e-12) };
+        let mut session = registry::session::<FrictionLocal<3>>(name, &Default::default()).unwrap();
+        let mut point = problem.origin();
+        let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+        assert_eq!(outcome.status, Status::Limit(Limit::Time), "{name}");
+    }
 }

@@ -31,7 +31,7 @@ pub struct Expressions {
 impl Expressions {
     /// As many rows as the graph has variables.
     ///
-    /// Errors: no rows, or another number of them.
+    /// Errors: no rows, or another number of them; the limit of time that is in force for the thread.
     pub fn new(graph: Graph, rows: Vec<Id>) -> Result<Self, ProblemError> {
         let n = graph.variables();
         if n == 0 || rows.len() != n {
@@ -41,7 +41,11 @@ impl Expressions {
                 rows.len().to_string(),
             ));
         }
-        let tape = Arc::new(Tape::new(&graph, &rows));
+        let late = || {
+            let found = "the end of the time before it was compiled".into();
+            ProblemError::Singular { place: "F".into(), found }
+        };
+        let tape = Arc::new(Tape::new(&graph, &rows).ok_or_else(late)?);
         let of_row = |i| tape.pattern(i).iter().map(|&j| j as usize);
         let pattern = Pattern::new((0..n).map(of_row));
         Ok(Self { graph, rows, tape, pattern })

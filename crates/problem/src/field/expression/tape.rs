@@ -12,7 +12,7 @@
 
 use std::ops::Range;
 
-use nonsmooth_linalg::budget;
+use nonsmooth_linalg::budget::{self, Pace};
 
 use super::graph::{Graph, Id, Node, Piecewise};
 use super::operator::{Binary, Nary, Number, Unary, slopes2};
@@ -69,6 +69,8 @@ pub(crate) struct Memory<T> {
     gradients: Vec<f64>,
 }
 
+/// Operations that an operation or a term takes to compile, or so.
+const EACH: f64 = 30.0;
 /// Units between two looks at the clock.
 const UNITS: usize = 512;
 
@@ -81,8 +83,8 @@ enum Owner {
 }
 
 impl Tape {
-    /// The rows, as code.
-    pub(crate) fn new(graph: &Graph, rows: &[Id]) -> Self {
+    /// The rows, as code. `None` where the time is over before.
+    pub(crate) fn new(graph: &Graph, rows: &[Id]) -> Option<Self> {
         let n = graph.variables;
         let owners = owners(graph, rows);
         let inlined = inlined(graph, rows);
@@ -140,7 +142,9 @@ impl Tape {
         };
         let mut seen = vec![usize::MAX; n + shared];
         let mut terms = vec![];
+        let mut pace = Pace::default();
         for (u, members) in members.iter().enumerate() {
+            let before = tape.terms.len();
             let code = tape.code.len() as u32..(tape.code.len() + members.len()) as u32;
             let (mut pattern, mut used) = (vec![], vec![]);
             let mut sees_variable = |i: usize, pattern: &mut Vec<u32>| {
@@ -215,8 +219,12 @@ impl Tape {
                 shared: of_shared..from(&tape.shared),
                 pattern: of_patterns..from(&tape.patterns),
             });
+            let made = members.len() + tape.terms.len() - before;
+            if pace.over(EACH * made as f64) {
+                return None;
+            }
         }
-        tape
+        Some(tape)
     }
 
     fn translate(&mut self, node: &Node, place: &[u32]) {

@@ -112,7 +112,7 @@ mod lcp;
 mod mcp;
 mod mlcp;
 pub mod planted;
-mod stated;
+pub(crate) mod stated;
 
 pub use boxed::BoxLcp;
 pub use hlcp::{Hlcp, HlcpGauge, HlcpPoint};

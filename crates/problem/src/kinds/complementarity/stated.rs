@@ -1,7 +1,8 @@
-//! What a complementarity problem says of itself. Files, pictures and reports are made of it and know no kinds.
+//! What a complementarity problem or a variational inequality says of itself. Files, pictures and reports are made of it and know no kinds.
 
-use super::Mcp;
-use crate::field::Expressions;
+use super::{LcpPoint, Mcp};
+use crate::field::{Expressions, Field};
+use crate::kinds::variational::Set;
 use crate::{AnyPoint, OfAny, OfAnyPoint, ProblemError};
 use nonsmooth_linalg::{Dense, Matrix};
 
@@ -16,6 +17,8 @@ pub enum Part<'a> {
     Count(usize),
     /// A function, one expression a row.
     Expressions(&'a Expressions),
+    /// A convex set.
+    Set(&'a Set),
 }
 
 /// What a part is.
@@ -29,6 +32,8 @@ pub enum Shape {
     Count,
     /// A function, one expression a row.
     Expressions,
+    /// A convex set.
+    Set,
 }
 
 /// Where the parts come from that a problem is made of, by their names: a file. A part that is not there is an error.
@@ -47,9 +52,12 @@ pub trait Parts {
 
     /// The function of a name.
     fn expressions(&mut self, name: &'static str) -> Result<Expressions, ProblemError>;
+
+    /// The set of a name, in so many variables.
+    fn set(&mut self, name: &'static str, variables: usize) -> Result<Set, ProblemError>;
 }
 
-/// A complementarity problem by its parts, and those of its points, by the names that files have for them.
+/// A complementarity problem or a variational inequality by its parts, and those of its points, by the names that files have for them.
 pub trait Stated: OfAny {
     /// The statement, in a line of ASCII.
     const STATEMENT: &'static str;
@@ -124,8 +132,13 @@ pub trait Stated: OfAny {
         None
     }
 
-    /// The problem itself, where it is nonlinear.
+    /// The problem itself, where it is a nonlinear complementarity problem.
     fn nonlinear(&self) -> Option<&Mcp> {
+        None
+    }
+
+    /// The function that the problem is of, where it is not stated by matrices.
+    fn function(&self) -> Option<&dyn Field> {
         None
     }
 
@@ -138,7 +151,7 @@ pub trait Stated: OfAny {
     fn matrices(&self) -> Vec<(&'static str, &Matrix)> {
         let matrix = |(name, part)| match part {
             Part::Matrix(m) => Some((name, m)),
-            Part::Vector(_) | Part::Count(_) | Part::Expressions(_) => None,
+            Part::Vector(_) | Part::Count(_) | Part::Expressions(_) | Part::Set(_) => None,
         };
         self.parts().into_iter().filter_map(matrix).collect()
     }
@@ -150,6 +163,22 @@ pub trait Stated: OfAny {
             _ => None,
         };
         self.parts().into_iter().find_map(vector).unwrap_or_default()
+    }
+}
+
+/// A point of a nonlinear problem, with F there where it is known.
+pub(crate) fn x_and_f<'a>(
+    point: &'a LcpPoint,
+    f: Option<&'a [f64]>,
+) -> Vec<(&'static str, &'a [f64])> {
+    std::iter::once(("x", &point.z[..])).chain(f.map(|f| ("F", f))).collect()
+}
+
+/// `1 entry of the Jacobian`, `2 entries of the Jacobian`.
+pub(crate) fn of_jacobian(field: &dyn Field) -> String {
+    match field.pattern().len() {
+        1 => "1 entry of the Jacobian".into(),
+        k => format!("{k} entries of the Jacobian"),
     }
 }
 

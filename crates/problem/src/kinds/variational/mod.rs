@@ -5,6 +5,7 @@
 //! | [`Vi`] | `−F(x) ∈ N_X(x)`, X a box, a polyhedron, a ball, a second-order cone or a product of these |
 
 mod judge;
+pub mod planted;
 mod set;
 #[cfg(test)]
 mod tests;
@@ -14,11 +15,12 @@ use std::sync::Arc;
 pub use judge::{SetCounts, SetStatus, ViGauge};
 pub use set::Set;
 
+use super::complementarity::stated::{Part, Parts, Shape, Stated, of_jacobian, plural, x_and_f};
 use crate::check::proof::Exactly;
 use crate::check::{Certificate, ConeSystem, Evidence, Judged, Measure, VerdictOf, weigh};
 use crate::error::vector;
-use crate::field::Field;
-use crate::{Kind, LcpPoint, Problem, ProblemError};
+use crate::field::{Expressions, Field, same};
+use crate::{Kind, LcpPoint, Mcp, OfAny, Problem, ProblemError};
 
 /// The variational inequality: find x ∈ X with `F(x)ᵀ(y − x) ≥ 0` for all y ∈ X; that is `x = P_X(x − γ F(x))` for any γ > 0.
 ///
@@ -32,6 +34,13 @@ pub struct Vi {
     pub set: Set,
     /// Where solvers begin, n; they begin at its projection on X.
     pub start: Vec<f64>,
+}
+
+impl PartialEq for Vi {
+    /// Functions are equal where they are the same expressions, or the same object.
+    fn eq(&self, other: &Self) -> bool {
+        same(&self.F, &other.F) && self.set == other.set && self.start == other.start
+    }
 }
 
 #[allow(non_snake_case)]
@@ -80,6 +89,12 @@ impl Vi {
     pub fn dim(&self) -> usize {
         self.start.len()
     }
+
+    /// The same problem as a mixed complementarity problem, where the set is a box or a product of boxes.
+    pub fn mcp(&self) -> Option<Mcp> {
+        let (lower, upper) = self.set.bounds()?;
+        Some(Mcp { F: self.F.clone(), lower, upper, start: self.start.clone() })
+    }
 }
 
 impl Problem for Vi {
@@ -87,7 +102,7 @@ impl Problem for Vi {
     type Gauge = ViGauge;
 
     fn kind(&self) -> Kind {
-        Kind::Vi
+        <Self as OfAny>::KIND
     }
 
     fn unknowns(&self) -> usize {
@@ -149,13 +164,73 @@ impl Judged for Vi {
     }
 }
 
-/// Nothing is proved of variational inequalities.
+/// Over a box that of the complementarity problem: nothing is proved of others.
 impl Exactly for Vi {
-    fn system(&self, _wanted: Option<&[bool]>) -> Option<ConeSystem> {
-        None
+    fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
+        self.mcp()?.system(wanted)
     }
 
     fn rows(&self) -> usize {
         self.dim()
+    }
+}
+
+impl Stated for Vi {
+    const STATEMENT: &'static str = "F(x)'(y - x) >= 0 for all y in the set, x in the set";
+    const PARTS: &'static [(&'static str, Shape)] =
+        &[("F", Shape::Expressions), ("set", Shape::Set), ("start", Shape::Vector)];
+    const SOLUTION: &'static [&'static str] = &["x", "F"];
+    const PARTNER: &'static str = "F";
+
+    fn parts(&self) -> Vec<(&'static str, Part<'_>)> {
+        let f = self.F.expressions().map(|f| ("F", Part::Expressions(f)));
+        let others = [("start", Part::Vector(&self.start)), ("set", Part::Set(&self.set))];
+        f.into_iter().chain(others).collect()
+    }
+
+    fn from_parts(parts: &mut dyn Parts) -> Result<Self, ProblemError> {
+        let f: Expressions = parts.expressions("F")?;
+        let n = f.dim();
+        let set = parts.set("set", n)?;
+        let start = if parts.has("start") { parts.vector("start")? } else { vec![0.0; n] };
+        Self::new(f, set, start)
+    }
+
+    fn point_parts<'a>(
+        &self,
+        point: &'a LcpPoint,
+        f: Option<&'a [f64]>,
+    ) -> Vec<(&'static str, &'a [f64])> {
+        x_and_f(point, f)
+    }
+
+    fn point_from_parts<E>(
+        mut part: impl FnMut(&'static str) -> Result<Vec<f64>, E>,
+    ) -> Result<LcpPoint, E> {
+        Ok(LcpPoint { z: part("x")? })
+    }
+
+    fn pairs(&self) -> usize {
+        self.dim()
+    }
+
+    fn equations(&self) -> usize {
+        self.dim()
+    }
+
+    fn size(&self) -> String {
+        let (variables, jacobian) = (plural(self.dim(), "variable"), of_jacobian(&*self.F));
+        format!("{variables} in {}, {jacobian}", self.set)
+    }
+
+    fn function(&self) -> Option<&dyn Field> {
+        Some(&*self.F)
+    }
+
+    fn sizes(&self) -> Vec<(&'static str, usize)> {
+        vec![
+            ("jacobian_entries", self.F.pattern().len()),
+            ("parts_of_the_set", self.set.parts().len()),
+        ]
     }
 }

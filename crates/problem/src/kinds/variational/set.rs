@@ -1,5 +1,7 @@
 //! The sets over which variational inequalities are stated.
 
+use std::fmt::{Display, Formatter};
+
 use nonsmooth_linalg::Csc;
 
 use crate::ProblemError;
@@ -56,6 +58,26 @@ impl Set {
     pub fn inequalities(A: Csc, b: Vec<f64>) -> Self {
         let C = Csc::zeros(0, A.ncols());
         Self::Polyhedron { A, b, C, d: vec![] }
+    }
+
+    /// Whether this is bounded and not empty, as far as it shows at once: balls, and boxes with finite bounds.
+    pub fn is_compact(&self) -> bool {
+        self.parts().into_iter().all(|(_, set)| match set {
+            Self::Box { lower, upper } => lower.iter().chain(upper).all(|x| x.is_finite()),
+            Self::Ball { .. } => true,
+            Self::Polyhedron { .. } | Self::SecondOrderCone { .. } | Self::Product(_) => false,
+        })
+    }
+
+    /// l and u, where this is a box or a product of boxes.
+    pub fn bounds(&self) -> Option<(Vec<f64>, Vec<f64>)> {
+        let (mut l, mut u) = (vec![], vec![]);
+        for (_, set) in self.parts() {
+            let Self::Box { lower, upper } = set else { return None };
+            l.extend(lower);
+            u.extend(upper);
+        }
+        Some((l, u))
     }
 
     /// n
@@ -127,6 +149,33 @@ impl Set {
             Self::SecondOrderCone { .. } | Self::Product(_) => 0.0,
         };
         self.parts().into_iter().fold(0.0, |size, (_, set)| of(set).max(size))
+    }
+}
+
+/// In words, `a box` or `a ball x 2 second-order cones`, equal sorts together.
+impl Display for Set {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let mut sorts: Vec<(&str, usize)> = vec![];
+        for (_, part) in self.parts() {
+            let sort = match part {
+                Self::Box { .. } => "box",
+                Self::Polyhedron { .. } => "polyhedron",
+                Self::Ball { .. } => "ball",
+                Self::SecondOrderCone { .. } => "second-order cone",
+                Self::Product(_) => continue,
+            };
+            match sorts.iter_mut().find(|known| known.0 == sort) {
+                Some(known) => known.1 += 1,
+                None => sorts.push((sort, 1)),
+            }
+        }
+        let each = sorts.iter().map(|&(sort, count)| match (sort, count) {
+            (sort, 1) => format!("a {sort}"),
+            ("box", count) => format!("{count} boxes"),
+            ("polyhedron", count) => format!("{count} polyhedra"),
+            (sort, count) => format!("{count} {sort}s"),
+        });
+        f.write_str(&each.collect::<Vec<_>>().join(" x "))
     }
 }
 

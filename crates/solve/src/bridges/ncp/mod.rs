@@ -21,6 +21,7 @@ mod glocker;
 pub use first::First;
 pub use glocker::Glocker;
 
+use nonsmooth_linalg::budget::Pace;
 use nonsmooth_linalg::small;
 use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::field::{Expressions, Graph, Id, Node};
@@ -32,8 +33,7 @@ use crate::contact::law::cone;
 use crate::core::reformulation::Reformulation;
 use crate::core::register::{Composed, Over};
 use crate::core::settings::NoSettings;
-use crate::core::via_session::ViaSession;
-use crate::{Boxed, SolveError, Via};
+use crate::{Boxed, SolveError, Via, ViaSession};
 
 /// A way to say Coulomb's law of a contact by pairs and equations: rows for r_T, and multipliers κ ≥ 0, each with a row.
 pub trait Formulation<const D: usize>: Copy + Default + Send + Sync + 'static {
@@ -95,6 +95,9 @@ const LIMIT: f64 = 1.0 - 1e-12;
 
 /// The solvers that are listed behind the prefixes: the one that solves most, and `auto`.
 const LISTED: &[&str] = &["path", "auto"];
+
+/// Operations that an entry of W takes to be stated, or so.
+const EACH: f64 = 100.0;
 
 /// An impulse that is taken for none, in units of s.
 const NEGLIGIBLE: f64 = 1e-10;
@@ -198,7 +201,15 @@ impl<const D: usize> NcpMemo<D> {
         let mut graph = Graph::new(n);
         let mut rows = Vec::with_capacity(n);
         let (mut lower, upper) = (vec![0.0; n], vec![f64::INFINITY; n]);
+        let mut pace = Pace::default();
         for c in 0..problem.mu.len() {
+            let entries = D * D * self.kept.state.operator(problem).0.row(c).0.len();
+            if pace.over(EACH * entries as f64) {
+                return Err(SolveError::needs(
+                    "the time to state its equations",
+                    format!("a limit that was reached at contact {c}"),
+                ));
+            }
             let first = self.starts[c];
             let (terms, constant) = self.velocity(problem, c, 0);
             rows.push(affine(&mut graph, terms, constant));
@@ -255,7 +266,7 @@ impl<F: Formulation<D>, const D: usize> Reformulation<FrictionLocal<D>> for AsNc
         Ok((memo.state::<F>(problem)?, memo))
     }
 
-    /// The expressions are stated anew.
+    /// The expressions are stated anew, as [`reduce`](Reformulation::reduce) does: both look at the limits every few milliseconds.
     fn reduce_again(
         &self,
         problem: &FrictionLocal<D>,

@@ -12,7 +12,6 @@
 
 mod nonlinear;
 mod plan;
-mod portfolio;
 
 use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 use schemars::JsonSchema;
@@ -22,7 +21,7 @@ use crate::core::register::Registered;
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 
-pub use portfolio::{Candidate, Portfolio};
+pub use crate::core::portfolio::{Candidate, Portfolio};
 
 /// The hyperparameters of `auto` for complementarity problems; none needs to be set.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]

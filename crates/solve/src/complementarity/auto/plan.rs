@@ -6,9 +6,9 @@ use nonsmooth_analysis::{Class, Classes};
 use nonsmooth_linalg::Matrix;
 use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 
-use super::portfolio::DECIDES;
 use super::{Auto, Candidate};
 use crate::complementarity::parts::game::is_game;
+use crate::core::portfolio::DECIDES;
 use crate::core::settings::SettingsMap;
 
 /// Up to this many variables a dense pivoting method is affordable.

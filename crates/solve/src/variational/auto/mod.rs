@@ -1,34 +1,37 @@
-//! **auto** for variational inequalities: Newton's methods behind multipliers where they apply, then projections.
+//! **auto** for variational inequalities: the multipliers' complementarity problem where there is one, projections else and after it.
 //!
-//! Problem: find x ∈ X with `F(x)ᵀ(y − x) ≥ 0` for all y ∈ X. Method: over boxes and polyhedra the multipliers' complementarity problem by `semismooth` and, where that does not solve it, by `proxi`,
-//! each from the start; over other sets, and in the end, the hyperplane projection and the extragradient method by turns, each from where the one before ended. A method that says that it has finished, or that it cannot go on, is left for the next.
+//! Problem: find x ∈ X with `F(x)ᵀ(y − x) ≥ 0` for all y ∈ X. Method: over boxes and polyhedra the `auto` of mixed complementarity problems, on the problem itself or with multipliers as variables; then, and over
+//! other sets at once, the hyperplane projection and the extragradient method by turns, each from the best point so far. The turns come again with budgets that grow, of iterations, never of seconds, so that a run repeats itself; all share
+//! the limits of the solve, and the natural residual of the inequality judges them all.
 //!
 //! References: the solvers' own files; FacchineiPang2003. Cost: that of the solvers tried. Fails: where F is not monotone and the set is a ball or a cone: projections need monotone F.
 
-use nonsmooth_problem::{LcpPoint, Mcp, Vi};
+use nonsmooth_problem::{LcpPoint, Set, Vi};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::projection::{Extragradient, Hyperplane};
+use super::parts::Projector;
+use super::projection::NO_PROJECTION;
 use super::reform::Multipliers;
-use crate::core::boxed::BoxedWork;
-use crate::core::register::{About, Described, Solves, solver};
+use crate::core::portfolio::{Candidate, Portfolio};
+use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, SettingsMap, described};
-use crate::{Boxed, SolveError, Solver, Step, Via};
+use crate::core::trace::Trace;
+use crate::{Limits, Observer, Outcome, Sample, Session, SolveError, Status};
 
 /// The hyperparameters of `auto` for variational inequalities; none needs to be set.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct VariationalAuto {
-    /// The most steps of each of Newton's methods.
-    pub newton: usize,
-    /// The steps of a projection method in its turn.
+    /// The iterations of the complementarity problem's `auto` in its first turn; ten times as many in each that follows.
+    pub multipliers: usize,
+    /// The iterations of a projection method in its first turn; four times as many in each that follows.
     pub projections: usize,
 }
 
 impl Default for VariationalAuto {
     fn default() -> Self {
-        Self { newton: 300, projections: 5000 }
+        Self { multipliers: 1000, projections: 5000 }
     }
 }
 
@@ -39,7 +42,7 @@ impl Described for VariationalAuto {
         name: "auto",
         family: "auto",
         solves: Solves::Law,
-        summary: "needs no setting: Newton's methods behind multipliers where they apply, then projections",
+        summary: "needs no setting: over boxes and polyhedra the auto of mcp behind multipliers, then projections",
         needs: &[],
         cites: &["FacchineiPang2003"],
         variants: &[],
@@ -47,145 +50,95 @@ impl Described for VariationalAuto {
     };
 }
 
-/// One of the solvers tried.
-struct Stage {
-    name: &'static str,
-    solver: Boxed<Vi>,
-    steps: usize,
-    /// From the start of the solve, not from where the one before ended.
-    anew: bool,
-}
-
-/// The solvers to come, and the one at work.
-pub struct Work {
-    stages: Vec<Stage>,
-    at: usize,
-    current: Option<(BoxedWork<Vi>, usize)>,
-    start: LcpPoint,
-    tolerance: f64,
-    account: Vec<String>,
-}
+/// Turns after which no budget is too small any more.
+const TURNS: usize = 10;
+/// Entries of the rows of polyhedra, zeros included, above which projections are too dear: they are stored dense.
+const DENSE: usize = 10_000_000;
 
 impl VariationalAuto {
-    fn stages(&self, problem: &Vi) -> Vec<Stage> {
-        let mut stages = vec![];
+    /// A session without history.
+    pub fn session(self) -> AutoSession {
+        AutoSession(Portfolio::new(move |problem: &Vi, stage| self.plan(problem, stage)))
+    }
+
+    fn plan(&self, problem: &Vi, stage: usize) -> Vec<Candidate> {
+        if stage >= TURNS {
+            return vec![];
+        }
+        let grown = |first: usize, by: usize| first.saturating_mul(by.pow(stage as u32));
+        let candidate = |name: &'static str, iterations, because: &str, anew| Candidate {
+            name: name.into(),
+            settings: SettingsMap::new(),
+            iterations,
+            because: because.into(),
+            anew,
+        };
+        let mut plan = vec![];
+        if projects(problem) {
+            let steps = grown(self.projections, 4);
+            plan.push(candidate("hyperplane", steps, "needs values of F and projections", false));
+            plan.push(candidate("extragradient", steps, "needs no hyperplane", false));
+        }
         if Multipliers::applies(&problem.set) {
-            for name in ["semismooth", "proxi"] {
-                if let Some(Ok(newton)) = solver::<Mcp>(name, &SettingsMap::new()) {
-                    let solver = Boxed::new(Via { reformulation: Multipliers, solver: newton });
-                    stages.push(Stage { name, solver, steps: self.newton, anew: true });
-                }
-            }
+            let because = if problem.set.bounds().is_some() {
+                "over a box it is a complementarity problem"
+            } else {
+                "over a polyhedron its multipliers are variables"
+            };
+            let steps = grown(self.multipliers, 10);
+            let multipliers = candidate("multipliers/auto", steps, because, true);
+            // At first, and after the projections where these had their turn.
+            plan.insert(if stage == 0 { 0 } else { plan.len() }, multipliers);
         }
-        let steps = self.projections;
-        let mut projection = |name, solver| stages.push(Stage { name, solver, steps, anew: false });
-        projection("hyperplane", Boxed::new(Hyperplane::default()));
-        projection("extragradient", Boxed::new(Extragradient::default()));
-        stages
+        plan
     }
 }
 
-impl Work {
-    /// The next solver at work, the projections by turns. False where none begins.
-    fn next(&mut self, problem: &Vi, point: &mut LcpPoint) -> bool {
-        // Each once more, at most.
-        for _ in 0..2 * self.stages.len() {
-            let stage = &self.stages[self.at];
-            match stage.solver.work(problem) {
-                Ok(mut work) => {
-                    if stage.anew {
-                        point.z.copy_from_slice(&self.start.z);
-                    }
-                    stage.solver.aim(self.tolerance, &mut work);
-                    stage.solver.start(problem, point, &mut work);
-                    self.current = Some((work, 0));
-                    return true;
-                }
-                Err(refused) => self.account.push(format!("{}: {refused}", stage.name)),
-            }
-            self.advance();
-        }
-        false
-    }
-
-    fn advance(&mut self) {
-        self.at += 1;
-        if self.at == self.stages.len() {
-            self.at -= 2;
-        }
-    }
+/// Whether the projection on the set is affordable.
+fn projects(problem: &Vi) -> bool {
+    let entries = |set: &Set| match set {
+        Set::Polyhedron { A, C, .. } => (A.nrows() + C.nrows()).saturating_mul(A.ncols()),
+        _ => 0,
+    };
+    problem.set.parts().into_iter().map(|(_, set)| entries(set)).sum::<usize>() <= DENSE
 }
 
-impl Solver<Vi> for VariationalAuto {
-    type Work = Work;
+/// The session: the solvers of the plan, and what is said where none of them can succeed.
+pub struct AutoSession(Portfolio<Vi>);
 
-    fn work(&self, problem: &Vi) -> Result<Work, SolveError> {
-        Ok(Work {
-            stages: self.stages(problem),
-            at: 0,
-            current: None,
-            start: LcpPoint { z: problem.start.clone() },
-            tolerance: 1e-8,
-            account: vec![],
-        })
-    }
-
-    fn aim(&self, tolerance: f64, work: &mut Work) {
-        work.tolerance = tolerance;
-    }
-
-    fn start(&self, _: &Vi, point: &mut LcpPoint, work: &mut Work) {
-        (work.at, work.current) = (0, None);
-        work.account.clear();
-        work.start.z.clone_from(&point.z);
-    }
-
-    fn step(&self, problem: &Vi, point: &mut LcpPoint, work: &mut Work) -> Step {
-        if work.current.is_none() && !work.next(problem, point) {
-            return Step::Stuck("no method applies".into());
-        }
-        let Work { stages, at, current: Some((inner, steps)), account, .. } = work else {
-            return Step::Stuck("no method applies".into());
-        };
-        let stage = &stages[*at];
-        *steps += 1;
-        let why = match stage.solver.step(problem, point, inner) {
-            Step::Continue { estimate } if *steps < stage.steps => {
-                return Step::Continue { estimate };
+impl Session<Vi> for AutoSession {
+    fn observe(
+        &mut self,
+        problem: &Vi,
+        point: &mut LcpPoint,
+        limits: &Limits,
+        observer: &mut dyn Observer<Vi>,
+    ) -> Result<Outcome, SolveError> {
+        let begun = std::time::Instant::now();
+        let mut outcome = self.0.observe(problem, point, limits, observer)?;
+        if matches!(outcome.status, Status::Stalled(_)) && projects(problem) {
+            let scope = limits.budget(begun).enter();
+            let found = Projector::new(&problem.set).onto(&point.z, &mut vec![0.0; problem.dim()]);
+            if !found && !scope.raised() {
+                outcome.status = Status::Stalled(NO_PROJECTION.into());
             }
-            Step::Continue { .. } => "its steps are done".to_owned(),
-            Step::Done => "it has finished".to_owned(),
-            Step::Stuck(why) => why.into_owned(),
-            Step::NoSolution(_) => "it ended on a ray".to_owned(),
-        };
-        account.push(format!("{}: {} steps, {why}", stage.name, *steps));
-        stage.solver.publish(problem, point, inner);
-        let (last, steps) = (work.at + 1 == work.stages.len(), *steps);
-        // A projection that cannot go on at once will not in its next turn.
-        if last && steps <= 1 {
-            return Step::Stuck(why.into());
         }
-        work.current = None;
-        work.advance();
-        // The judge looks at what there is.
-        Step::Continue { estimate: 0.0 }
+        Ok(outcome)
     }
 
-    fn publish(&self, problem: &Vi, point: &mut LcpPoint, work: &mut Work) {
-        if let Some((inner, _)) = &mut work.current {
-            work.stages[work.at].solver.publish(problem, point, inner);
-        }
+    fn history(&self) -> &[Sample] {
+        self.0.history()
     }
 
-    fn account(&self, work: &Work) -> Vec<String> {
-        let mut account = work.account.clone();
-        if let Some((_, steps)) = &work.current {
-            account.push(format!("{}: {steps} steps", work.stages[work.at].name));
-        }
-        account
+    fn trace(&self) -> Trace {
+        self.0.trace()
     }
 
-    fn check_every(&self) -> usize {
-        10
+    fn account(&self) -> Vec<String> {
+        self.0.account()
+    }
+
+    fn gauge(&mut self) -> Option<&mut <Vi as nonsmooth_problem::Problem>::Gauge> {
+        self.0.gauge()
     }
 }

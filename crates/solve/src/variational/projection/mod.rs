@@ -153,6 +153,6 @@ solver!(FixedPoint);
 solver!(Extragradient);
 solver!(Hyperplane);
 
-const NO_PROJECTION: &str = "there is no projection on the set: a polyhedron is empty";
+pub(super) const NO_PROJECTION: &str = "there is no projection on the set: a polyhedron is empty";
 
 const UNDEFINED: &str = "F is not defined at the iterate, nor near it along a step";

@@ -4,7 +4,7 @@
 //! l ≤ x ≤ u  ⟂  F(x) + Aᵀλ + Cᵀμ,     0 ≤ λ  ⟂  b − A x,     μ free,  d − C x = 0
 //! ```
 //!
-//! Equivalent, since the constraints are affine (FacchineiPang2003, prop. 1.2.1); monotone where F is. F by expressions stays so: the result keeps its doubled precision, and where F is
+//! An inequality of one variable is a bound and needs no multiplier. Equivalent, since the constraints are affine (FacchineiPang2003, prop. 1.2.1); monotone where F is. F by expressions stays so: the result keeps its doubled precision, and where F is
 //! affine it is a linear problem. Cost: a copy of the constraints, and of the graph. Fails: balls and cones, whose multipliers belong to functions that are not affine.
 
 use std::sync::Arc;
@@ -13,9 +13,9 @@ use nonsmooth_problem::field::{Binary, Evaluator, Expressions, Field, Graph, Nod
 use nonsmooth_problem::{Kind, LcpPoint, Mcp, Set, Vi};
 
 use crate::core::reformulation::Reformulation;
-use crate::core::register::Composed;
+use crate::core::register::{Composed, Over};
 use crate::core::settings::NoSettings;
-use crate::{Boxed, SolveError, Via};
+use crate::{Boxed, SolveError, Via, ViaSession};
 
 /// The constraints' multipliers as variables.
 #[derive(Debug, Clone, Copy, Default)]
@@ -38,6 +38,9 @@ impl Composed<Vi> for Multipliers {
     const FROM: &'static [Kind] = &[Kind::Vi];
     const CITES: &'static [&'static str] = &["FacchineiPang2003"];
 
+    const SESSION: Option<Over<NoSettings, Mcp, Vi>> =
+        Some(|_, session| Box::new(ViaSession::new(Multipliers, session)));
+
     fn compose(_: NoSettings, solver: Boxed<Mcp>) -> Boxed<Vi> {
         Boxed::new(Via { reformulation: Multipliers, solver })
     }
@@ -53,19 +56,37 @@ struct Constraints {
 }
 
 impl Constraints {
-    fn of(set: &Set) -> Self {
+    /// The constraints that are no bounds, and the bounds of x.
+    fn of(set: &Set) -> (Self, [Vec<f64>; 2]) {
         let mut out = Self::default();
+        let [mut lower, mut upper] = [f64::NEG_INFINITY, f64::INFINITY].map(|x| vec![x; set.dim()]);
         for (first, set) in set.parts() {
-            let Set::Polyhedron { A, b, C, d } = set else { continue };
-            for (m, rhs, free) in [(A, b, false), (C, d, true)] {
-                let at = out.rows.len();
-                out.rows.resize(at + m.nrows(), vec![]);
-                m.triplets().for_each(|(i, j, x)| out.rows[at + i].push((first + j, -x)));
-                out.rhs.extend(rhs);
-                out.free.resize(at + m.nrows(), free);
+            match set {
+                Set::Box { lower: l, upper: u } => {
+                    lower[first..first + l.len()].copy_from_slice(l);
+                    upper[first..first + u.len()].copy_from_slice(u);
+                }
+                Set::Polyhedron { A, b, C, d } => {
+                    for (m, rhs, free) in [(A, b, false), (C, d, true)] {
+                        let mut rows = vec![vec![]; m.nrows()];
+                        m.triplets().for_each(|(i, j, x)| rows[i].push((first + j, -x)));
+                        for (row, &rhs) in rows.into_iter().zip(rhs) {
+                            match row[..] {
+                                [(j, x)]
+                                    if !free && bound(-x, rhs, &mut lower[j], &mut upper[j]) => {}
+                                _ => {
+                                    out.rows.push(row);
+                                    out.rhs.push(rhs);
+                                    out.free.push(free);
+                                }
+                            }
+                        }
+                    }
+                }
+                Set::Ball { .. } | Set::SecondOrderCone { .. } | Set::Product(_) => {}
             }
         }
-        out
+        (out, [lower, upper])
     }
 
     /// The constraints of each of n variables, with minus their coefficients.
@@ -78,6 +99,17 @@ impl Constraints {
     }
 }
 
+/// Tightens l and u by `a x ≤ b`. False where that is no bound between which there is a number.
+fn bound(a: f64, b: f64, l: &mut f64, u: &mut f64) -> bool {
+    let x = b / a;
+    let (low, high) = if a > 0.0 { (*l, u.min(x)) } else { (l.max(x), *u) };
+    let is = a != 0.0 && x.is_finite() && low <= high;
+    if is {
+        (*l, *u) = (low, high);
+    }
+    is
+}
+
 impl Reformulation<Vi> for Multipliers {
     type To = Mcp;
     type Memo = ();
@@ -86,20 +118,7 @@ impl Reformulation<Vi> for Multipliers {
         if !Self::applies(&problem.set) {
             return Err(SolveError::needs("a set of boxes and polyhedra", "a ball or a cone"));
         }
-        let constraints = Constraints::of(&problem.set);
-        let (mut lower, mut upper) = (vec![], vec![]);
-        for (_, set) in problem.set.parts() {
-            match set {
-                Set::Box { lower: l, upper: u } => {
-                    lower.extend(l);
-                    upper.extend(u);
-                }
-                set => {
-                    lower.resize(lower.len() + set.dim(), f64::NEG_INFINITY);
-                    upper.resize(lower.len(), f64::INFINITY);
-                }
-            }
-        }
+        let (constraints, [mut lower, mut upper]) = Constraints::of(&problem.set);
         lower.extend(
             constraints.free.iter().map(|free| if *free { f64::NEG_INFINITY } else { 0.0 }),
         );

@@ -2,6 +2,7 @@
 
 mod corpus;
 mod known;
+mod nonlinear;
 mod planted;
 mod shapes;
 mod sizes;

@@ -6,18 +6,16 @@ mod tests;
 
 use std::sync::Arc;
 
-use nonsmooth_linalg::Csc;
-
 pub use judge::McpGauge;
 
-use super::stated::{Part, Parts, Shape, Stated, plural};
+use super::stated::{Part, Parts, Shape, Stated, of_jacobian, plural, x_and_f};
 use super::{BoxLcp, LcpPoint};
 use crate::check::proof::Exactly;
 use crate::check::{
     Certificate, ConeSystem, Evidence, Judged, Measure, RowCounts, RowStatus, VerdictOf, weigh,
 };
 use crate::error::{bounds, vector};
-use crate::field::{Expressions, Field};
+use crate::field::{Expressions, Field, linear, same};
 use crate::{Kind, OfAny, Problem, ProblemError};
 
 /// `l ≤ x ≤ u ⟂ F(x)`: `F_i(x) ≥ 0` where `x_i = l_i`, `F_i(x) ≤ 0` where `x_i = u_i`, and `F_i(x) = 0` between; that is
@@ -41,11 +39,10 @@ pub struct Mcp {
 impl PartialEq for Mcp {
     /// Functions are equal where they are the same expressions, or the same object.
     fn eq(&self, other: &Self) -> bool {
-        let same = match (self.F.expressions(), other.F.expressions()) {
-            (Some(a), Some(b)) => a.same(b),
-            _ => Arc::ptr_eq(&self.F, &other.F),
-        };
-        same && self.lower == other.lower && self.upper == other.upper && self.start == other.start
+        same(&self.F, &other.F)
+            && self.lower == other.lower
+            && self.upper == other.upper
+            && self.start == other.start
     }
 }
 
@@ -109,20 +106,10 @@ impl Mcp {
     /// The same problem with `F(x) = M x + q` by its matrix, where F is known to be affine, and whether M and q are exact: the coefficients of F without any
     /// rounding.
     pub fn affine(&self) -> Option<(BoxLcp, bool)> {
-        let affine = self.F.expressions()?.affine()?;
-        let n = self.dim();
-        let finite = affine.entries.iter().all(|e| e.2.is_finite());
-        if !finite || affine.constants.iter().any(|q| !q.is_finite()) {
-            return None;
-        }
-        let matrix = Csc::from_triplets(n, n, affine.entries.iter().copied()).ok()?;
-        let problem = BoxLcp {
-            M: matrix.into(),
-            q: affine.constants,
-            lower: self.lower.clone(),
-            upper: self.upper.clone(),
-        };
-        Some((problem, affine.exact))
+        let (matrix, q, exact) = linear(&*self.F)?;
+        let problem =
+            BoxLcp { M: matrix.into(), q, lower: self.lower.clone(), upper: self.upper.clone() };
+        Some((problem, exact))
     }
 }
 
@@ -247,7 +234,7 @@ impl Stated for Mcp {
         point: &'a LcpPoint,
         f: Option<&'a [f64]>,
     ) -> Vec<(&'static str, &'a [f64])> {
-        std::iter::once(("x", &point.z[..])).chain(f.map(|f| ("F", f))).collect()
+        x_and_f(point, f)
     }
 
     fn point_from_parts<E>(
@@ -270,17 +257,18 @@ impl Stated for Mcp {
         let free = count(|l, u| l.is_infinite() && u.is_infinite());
         let two = count(|l, u| l.is_finite() && u.is_finite());
         format!(
-            "{}, {free} free, {two} between two bounds, {} of the Jacobian",
+            "{}, {free} free, {two} between two bounds, {}",
             plural(self.dim(), "variable"),
-            match self.F.pattern().len() {
-                1 => "1 entry".into(),
-                k => format!("{k} entries"),
-            }
+            of_jacobian(&*self.F)
         )
     }
 
     fn nonlinear(&self) -> Option<&Mcp> {
         Some(self)
+    }
+
+    fn function(&self) -> Option<&dyn Field> {
+        Some(&*self.F)
     }
 
     fn sizes(&self) -> Vec<(&'static str, usize)> {

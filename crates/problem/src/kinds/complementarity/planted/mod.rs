@@ -7,6 +7,7 @@ mod obstacle;
 mod pendulum;
 
 pub use linear::{PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp};
+pub(crate) use nonlinear::with_values;
 pub use nonlinear::{Bratu, ClassicName, HarkerPang, NashCournot, NonlinearClassic};
 pub use obstacle::{JournalBearing, Membrane, Obstacle, Torsion, energy};
 pub use pendulum::PendulumStep;

@@ -17,7 +17,7 @@ use crate::planted::{Recipe, share, size};
 use crate::{LcpPoint, Mcp};
 
 /// Adds what makes of F its value `w` at x: `F + (w − F(x))`, summed in doubled precision and rounded once.
-fn planted(f: impl Fn(&[f64]) -> Expressions, x: &[f64], w: &[f64]) -> Expressions {
+pub(crate) fn with_values(f: impl Fn(&[f64]) -> Expressions, x: &[f64], w: &[f64]) -> Expressions {
     let mut at_zero = vec![0.0; x.len()];
     f(&at_zero).evaluator().precisely(x, &mut at_zero);
     f(&w.iter().zip(&at_zero).map(|(w, f)| w - f).collect::<Vec<_>>())
@@ -104,7 +104,7 @@ impl HarkerPang {
             let rows = rows.collect();
             made(g, rows)
         };
-        let f = planted(f, &x, &w);
+        let f = with_values(f, &x, &w);
         (Mcp::ncp(f, vec![0.0; n]).expect("as many rows as variables"), LcpPoint { z: x })
     }
 }
@@ -209,7 +209,7 @@ impl NashCournot {
             rows.push(g.binary(Binary::Add, surplus, rest));
             made(g, rows)
         };
-        let f = planted(f, &x, &w);
+        let f = with_values(f, &x, &w);
         let lower = (0..n).map(|_| 0.0).chain([0.001]).collect();
         // A price at which the market takes what everybody begins with.
         let first = (demand / (10.0 * n as f64)).powf(1.0 / gamma);

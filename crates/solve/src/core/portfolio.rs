@@ -48,7 +48,7 @@ pub struct Portfolio<P: Registered> {
 }
 
 /// The method whose word is final where it has one.
-pub(super) const DECIDES: &str = "enumeration_exact";
+pub(crate) const DECIDES: &str = "enumeration_exact";
 
 /// What is said at the end of a plan.
 const NONE: Status =
