@@ -43,7 +43,8 @@ half = [0.1, 0.2, 0.05]
 
 [[bodies]]
 name = "belt"
-shape = { kind = "plane" }
+shape = { kind = "box", half = [5, 5, 0.1] }
+position = [0, 0, -0.1]
 material = "rubber"
 motion = { kind = "surface", velocity = [1, 0, 0] }
 
@@ -75,7 +76,7 @@ shapes = [
 [[generate]]
 scene = "wall"
 set = { rows = 2, columns = 2, density = 1800.0 }
-position = [10, 0, 0]
+position = [10, 0, -1]
 
 [[forces]]
 body = "ball"
@@ -110,7 +111,8 @@ fn a_scene_of_all_kinds_moves() {
     assert!(run.is_solved() && run.steps == 10, "{run}");
     let state = simulation.state();
     // The belt takes the block along: mu g t, and the ball is pushed sideways.
-    assert!((state.velocity[place("block")][0] - 0.5 * 9.81 * 0.01).abs() < 1e-6);
+    let block = state.velocity[place("block")][0];
+    assert!((block - 0.5 * 9.81 * 0.01).abs() < 1e-6, "{block}");
     assert!(state.velocity[place("ball")][1] > 0.0);
 }
 
@@ -177,7 +179,7 @@ fn mistakes_are_named_by_their_place() {
         (
             "kind = \"sphere\", radius = 0.1 }\nmass",
             "kind = \"ball\", radius = 0.1 }\nmass",
-            "bodies[2].shape: unknown variant `ball`",
+            "bodies[2].shape.kind: unknown variant `ball`",
         ),
         ("radius = 0.1 }\nmass", "radius = -0.1 }\nmass", "bodies[2] (ball)"),
         ("mass = 2.0", "mas = 2.0", "bodies[2].mas: unknown field `mas`"),

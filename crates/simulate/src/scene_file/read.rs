@@ -33,7 +33,7 @@ impl SceneFile {
                 root if root == "." => "the scene".to_owned(),
                 path => path,
             };
-            SimulateError::Schema { path, problem: explained(&said(&e.into_inner().to_string())) }
+            SimulateError::Schema { path, problem: explained(&said(e.into_inner().message())) }
         })?;
         scene.identified()
     }
