@@ -95,8 +95,8 @@ fn every_solver_solves_symmetric_dominant_problems() {
 }
 
 /// Sweeps have no reason to converge where equalities and free variables are coupled by a skew part; with `D = −Cᵀ` M is not symmetric.
-const SWEEPS: [&str; 7] =
-    ["projected_jacobi", "pgs", "psor", "rpgs", "rpsor", "splitting_ls", "mprgp"];
+const SWEEPS: [&str; 8] =
+    ["projected_jacobi", "pgs", "psor", "rpgs", "rpsor", "splitting_ls", "tnnmg", "mprgp"];
 /// Pivoting rules for P-matrices have no reason to end with a solution where diagonals vanish; some forms of the quadratic program take no box.
 const RULES: [&str; 4] = ["murty", "bard", "block_pivoting", "qp"];
 

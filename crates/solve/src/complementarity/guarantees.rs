@@ -75,6 +75,13 @@ const TABLE: &[Row] = &[
         &["CottlePangStone2009"],
     ),
     (
+        &["tnnmg"],
+        &[PositiveDefinite, Symmetric],
+        "its sweeps decrease the energy, and the correction of the face never raises it",
+        None,
+        &["GraserKornhuber2009"],
+    ),
+    (
         &["rpgs", "rpsor"],
         &[PositiveSemidefinite, Symmetric],
         "proximal steps converge to a solution if there is one; their problems are positive definite",

@@ -338,7 +338,9 @@ pub trait Session<P: Problem>: Send {
     }
 
     /// Hands over a gauge of the problem that is solved next, which then prepares none of its own; by default it is not used.
-    fn lend(&mut self, _gauge: Box<P::Gauge>) {}
+    fn lend(&mut self, gauge: Box<P::Gauge>) {
+        drop(gauge);
+    }
 
     /// Takes the gauge out, where [`gauge`](Self::gauge) shows one.
     fn reclaim(&mut self) -> Option<Box<P::Gauge>> {

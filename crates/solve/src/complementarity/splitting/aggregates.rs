@@ -9,7 +9,7 @@
 //!
 //! References: Notay2010 (aggregation), NotayVassilevski2008 (K-cycle), Kornhuber1994 (truncation).
 //!
-//! Cost of a cycle: some 6 passes over the entries of A. Storage: 20 bytes for each entry of A, 28 for each of the coarser matrices, together half as many.
+//! Cost of a cycle: some 7 passes over the entries of A. Storage: 16 bytes for each entry of A and of the coarser matrices, which have a third as many.
 
 use nonsmooth_linalg::{Csc, budget};
 

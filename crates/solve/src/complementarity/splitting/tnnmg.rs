@@ -68,8 +68,8 @@ impl Described for Tnnmg {
 
 /// The largest `|M_ij − M_ji|`, in units of the largest entry, of a matrix that counts as symmetric.
 const SYMMETRIC: f64 = 1e-12;
-/// Steps that do not halve the residual, after which it is over.
-const IDLE: usize = 12;
+/// Steps that do not halve the residual, after which it is over: the residual need not fall while the face grows, some rows of points a step.
+const IDLE: usize = 50;
 /// Steps on each level of the cascade.
 const CASCADE: usize = 4;
 /// Sweeps by which the stiffness of a level is compared with that of the next one.
