@@ -112,6 +112,9 @@ type Make<T> = Box<dyn Fn(&SettingsMap) -> Result<T, String>>;
 /// What was made, if there is such a name and the settings are right.
 pub(crate) type Made<T> = Option<Result<T, String>>;
 
+/// As [`Made`], of a session.
+type MadeSession<P> = Made<Box<dyn Session<P>>>;
+
 /// One solver of problems of type `P`.
 pub struct Entry<P: Problem> {
     /// What it is and needs.
@@ -201,7 +204,7 @@ pub trait Composed<P: Problem> {
 pub struct Edge<P: Problem> {
     prefix: &'static Prefix,
     solver: fn(&str, &SettingsMap) -> Made<Boxed<P>>,
-    session: fn(&str, &SettingsMap) -> Made<Box<dyn Session<P>>>,
+    session: fn(&str, &SettingsMap) -> MadeSession<P>,
     describe: fn(&str) -> Option<(&'static About, Solves)>,
     names: fn() -> Vec<String>,
 }
@@ -283,7 +286,7 @@ pub(crate) fn solver<P: Registered>(name: &str, settings: &SettingsMap) -> Made<
 }
 
 /// The whole session behind a name, where it is no solver with steps.
-fn whole<P: Registered>(name: &str, settings: &SettingsMap) -> Made<Box<dyn Session<P>>> {
+fn whole<P: Registered>(name: &str, settings: &SettingsMap) -> MadeSession<P> {
     match way::<P>(name)? {
         Way::Behind(edge, rest) => (edge.session)(rest, settings),
         Way::Here(Entry { make: Maker::Session(make), .. }) => Some(make(settings)),
