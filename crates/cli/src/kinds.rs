@@ -147,15 +147,21 @@ pub enum Class {
     Contact,
     /// Complementarity.
     Complementarity,
+    /// Variational inequalities.
+    Variational,
 }
 
 impl Class {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Contact, Self::Complementarity];
+    /// All.
+    pub const ALL: [Self; 3] = [Self::Contact, Self::Complementarity, Self::Variational];
 
     /// The class of a kind.
     pub fn of(kind: Kind) -> Self {
-        if kind.is_complementarity() { Self::Complementarity } else { Self::Contact }
+        match kind {
+            Kind::Vi => Self::Variational,
+            kind if kind.is_complementarity() => Self::Complementarity,
+            _ => Self::Contact,
+        }
     }
 
     /// In JSON and in anchors.
@@ -163,6 +169,7 @@ impl Class {
         match self {
             Self::Contact => "contact",
             Self::Complementarity => "complementarity",
+            Self::Variational => "variational",
         }
     }
 
@@ -171,6 +178,7 @@ impl Class {
         match self {
             Self::Contact => "Frictional contact",
             Self::Complementarity => "Complementarity",
+            Self::Variational => "Variational inequalities",
         }
     }
 }

@@ -137,3 +137,102 @@ fn families_are_made_drawn_and_read_again() {
         folder.run(&format!("gen {setting} --out no.toml")).refused(&[said]);
     }
 }
+
+/// The own residual speaks of a row, by the name of its variable.
+#[test]
+fn rows_are_told_by_their_names() {
+    let folder = folder();
+    let text = "kind = 'mcp'\nnames = ['q', 'p']\nF = ['q', 'sqrt(p^2) + 1 - p']\nlower = [0, -inf]\nstart = [0, 0]\n[solution]\nx = [0, 1e14]\n";
+    std::fs::write(folder.path("away.toml"), text).unwrap();
+    let text = folder.run("check away.toml").exits(1).stdout;
+    assert!(text.contains("(row 1 `p`, limit 1e-4)"), "{text}");
+    assert!(!text.contains("contact"), "{text}");
+    std::fs::write(folder.path("far.toml"), text_of_no_solution()).unwrap();
+    let text = folder.run("solve far.toml --max-iter 50").exits(1).stdout;
+    assert!(text.contains("worst      rows 1 `p` ("), "{text}");
+    let nameless = text_of_no_solution().replace("names = ['q', 'p']\n", "").replace('p', "x2");
+    std::fs::write(folder.path("far.toml"), nameless).unwrap();
+    let text = folder.run("solve far.toml --max-iter 50").exits(1).stdout;
+    assert!(text.contains("worst      rows 1 ("), "{text}");
+}
+
+fn text_of_no_solution() -> String {
+    "kind = 'mcp'\nnames = ['q', 'p']\nF = ['1', 'exp(p) + 1']\nlower = [0, -inf]\n".into()
+}
+
+#[test]
+fn variational_inequalities_go_through_all_commands() {
+    let folder = folder();
+    for (made, size) in [
+        ("traffic --set m=3 --set streams=2", "vi, 48 variables in a polyhedron"),
+        ("balls_and_cones", "vi, 15 variables in 2 balls x 3 second-order cones"),
+    ] {
+        let text = folder.run(&format!("gen {made} --out made.toml")).exits(0).stdout;
+        assert!(text.contains(size), "{text}");
+        folder.run("check made.toml --tol 1e-12").exits(0);
+        folder.run("check made.toml --jacobian").exits(0);
+        let text = folder.run("info made.toml").exits(0).stdout;
+        assert!(text.contains("\n  set        "), "{text}");
+        assert!(text.contains("solution   stored, passes at 1e-8\n"), "{text}");
+        folder.run("draw made.toml --out made.svg").exits(0);
+        let svg = std::fs::read_to_string(folder.path("made.svg")).unwrap();
+        assert!(svg.contains("Jacobian of F: "), "{svg}");
+        let text = folder.run("solve made.toml --tol 1e-10 --out solved.toml").exits(0).stdout;
+        assert!(text.contains("  constraints "), "{text}");
+        folder.run("check solved.toml --tol 1e-10").exits(0);
+        folder.run("solve made.toml --solver hyperplane --tol 1e-6").exits(0);
+        folder.run("solve made.toml --out solved.csv").exits(0);
+        let table = std::fs::read_to_string(folder.path("solved.csv")).unwrap();
+        assert!(table.lines().next().unwrap().ends_with(",x,F"), "{table}");
+    }
+    let line = folder.run("info made.toml --json").exits(0).json().remove(0);
+    has_keys(&line, "file kind rows unknowns jacobian_entries parts_of_the_set set");
+    assert_eq!(line["set"][2]["sort"], "second_order_cone");
+    let line = folder.run("solve made.toml --json").exits(0).json().remove(0);
+    has_keys(&line, "constraints_by_status/inside constraints_by_status/border worst_variables");
+    // Projections need no multipliers, and multipliers no ball.
+    folder
+        .run("solve made.toml --solver multipliers/path")
+        .refused(&["boxes and polyhedra", "on trial"]);
+    let text = folder.run("bench run made.toml --solver auto --solver extragradient --solver hyperplane --out runs.jsonl").exits(0).stdout;
+    assert!(text.contains("made"), "{text}");
+    let text = folder.run("list auto fixed_point extragradient hyperplane multipliers").stdout;
+    let (_, own) = text.split_once("# Variational inequalities\n").unwrap();
+    for name in ["auto", "fixed_point", "extragradient", "hyperplane", "multipliers/SOLVER"] {
+        assert!(
+            own.contains(&format!("{name}: ")) || own.contains(&format!("{name} (the default): ")),
+            "{name}: {own}"
+        );
+    }
+    folder.run("solve made.toml --multistart 3").refused(&["--multistart", "found vi"]);
+}
+
+#[test]
+fn a_variational_inequality_over_boxes_and_polyhedra_is_an_mcp() {
+    let folder = folder();
+    let boxed = "kind = 'vi'\nnames = ['a', 'b']\nF = ['a + b - 1', 'b - a^3 - 2']\nset = { box = { upper = [2, 5] } }\n";
+    std::fs::write(folder.path("boxed.toml"), boxed).unwrap();
+    let text = folder.run("info boxed.toml").exits(0).stdout;
+    assert!(text.contains("over a box it is a mixed complementarity problem (mcp)\n"), "{text}");
+    folder.run("solve boxed.toml --out solved.toml").exits(0);
+    let text = folder.run("convert solved.toml boxed.nl").exits(0).stdout;
+    assert!(
+        text.contains("as         mcp, as the variational inequality over a box is one\n"),
+        "{text}"
+    );
+    folder.run("solve boxed.nl").exits(0);
+    folder.run("convert solved.toml mcp.toml --as-mcp").exits(0);
+    let text = folder.run("check mcp.toml").exits(0).stdout;
+    assert!(text.contains("mcp, 2 variables, 0 free, 2 between two bounds"), "{text}");
+    folder.run("gen traffic --set m=2 --set streams=1 --out traffic.toml").exits(0);
+    let text = folder.run("convert traffic.toml traffic.nl").exits(0).stdout;
+    assert!(
+        text.contains("mcp, with 3 multipliers as variables behind x; without the solution"),
+        "{text}"
+    );
+    folder.run("solve traffic.nl").exits(0);
+    folder.run("gen balls_and_cones --out cones.toml").exits(0);
+    folder.run("convert cones.toml cones.nl").refused(&["cones.nl", "vi"]);
+    folder.run("convert cones.toml mcp.toml --as-mcp").refused(&["--as-mcp", "found vi"]);
+    folder.run("convert boxed.nl mcp.toml --as-mcp").refused(&["--as-mcp", "found mcp"]);
+}

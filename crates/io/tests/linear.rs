@@ -136,7 +136,7 @@ fn problem() -> impl Strategy<Value = Complementarity> {
     });
     let nonlinear =
         (1..4usize).prop_flat_map(move |n| (vec(row.clone(), n), reals(n), vec(bound(), n)));
-    let nonlinear = nonlinear.prop_map(|(rows, start, bounds)| {
+    let nonlinear = nonlinear.prop_map(move |(rows, start, bounds)| {
         let (l, u) = bounds.into_iter().unzip();
         Complementarity::Mcp(Mcp::new(expressions(rows), l, u, start).unwrap())
     });

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use nonsmooth::{FrictionLocal, Hlcp, Lcp};
+use nonsmooth::{FrictionLocal, Hlcp, Lcp, Vi};
 use nonsmooth_problem::each_kind;
 use nonsmooth_solve::registry;
 

@@ -114,7 +114,7 @@ impl SetPart {
     fn text(&self) -> String {
         let some = self.numbers.iter().filter(|(_, n)| *n > 0);
         let some: Vec<_> = some.map(|(name, n)| format!(", {n} {name}")).collect();
-        let sort = self.sort.replace('_', " ");
+        let sort = self.sort.replace("second_order", "second-order").replace('_', " ");
         format!("{sort} in {}{}", count(self.dimension, "variable"), some.concat())
     }
 

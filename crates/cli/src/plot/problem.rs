@@ -441,7 +441,7 @@ mod tests {
             (["log(x1)", "x1*x2"], "undefined at the start: its places, 75% filled"),
         ] {
             let f = nonsmooth_problem::field::Expressions::parse(&texts.map(String::from), &[]);
-            let problem = Mcp::ncp(f.unwrap(), vec![0.0; 2]).unwrap();
+            let problem = nonsmooth_problem::Mcp::ncp(f.unwrap(), vec![0.0; 2]).unwrap();
             let svg = picture(&problem.into(), None);
             assert!(svg.contains(said), "{svg}");
         }

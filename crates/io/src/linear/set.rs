@@ -94,6 +94,8 @@ impl<'de> Deserialize<'de> for Stated {
 }
 
 /// A sort of sets with its data, before its variables are counted.
+// One a set: its size does not matter.
+#[allow(clippy::large_enum_variant)]
 enum Sort {
     Box([Option<Vec<f64>>; 2]),
     Polyhedron([(Option<Matrix>, Vec<f64>); 2], [Option<Vec<f64>>; 2]),

@@ -97,6 +97,9 @@ impl Vi {
     }
 }
 
+/// The most entries of a polyhedron's rows, zeros included: 400 MB.
+const DENSE: usize = 50_000_000;
+
 impl Problem for Vi {
     type Point = LcpPoint;
     type Gauge = ViGauge;
@@ -121,7 +124,19 @@ impl Problem for Vi {
         to.z.clone_from(&from.z);
     }
 
+    /// Errors: polyhedra that are too large to be projected on.
     fn gauge(&self) -> Result<ViGauge, ProblemError> {
+        let entries = |set: &Set| match set {
+            Set::Polyhedron { A, C, .. } => (A.nrows() + C.nrows()).saturating_mul(A.ncols()),
+            _ => 0,
+        };
+        let found = self.set.parts().into_iter().map(|(_, set)| entries(set)).max().unwrap_or(0);
+        if found > DENSE {
+            let expected = format!(
+                "at most {DENSE} as the rows times the variables of a polyhedron, on which the judge projects"
+            );
+            return Err(ProblemError::value("set", expected, found));
+        }
         Ok(ViGauge::new(self))
     }
 

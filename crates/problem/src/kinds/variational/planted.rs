@@ -56,8 +56,8 @@ impl Default for Traffic {
 
 impl Recipe for Traffic {
     fn validate(&self) -> Result<(), String> {
-        size("m", self.m, 2..=30)?;
-        size("streams", self.streams, 1..=20)?;
+        size("m", self.m, 2..=15)?;
+        size("streams", self.streams, 1..=10)?;
         share("gamma", self.gamma)
     }
 }

@@ -133,3 +133,56 @@ fn mistakes_are_named() {
     let product = Set::Product(vec![]);
     assert_eq!(said(product, vec![]), "set: expected at least one variable, found none");
 }
+
+/// What is planted solves what was made; sizes are refused where the judge cannot project.
+#[test]
+fn planted_inequalities_are_solved_by_what_was_planted() {
+    use crate::check::Judged;
+    use crate::planted::{BallsAndCones, Traffic};
+    for seed in 0..5 {
+        for gamma in [0.0, 0.5] {
+            let (problem, known) = Traffic { m: 3, streams: 4, gamma, seed }.vi();
+            assert!(problem.judge(&known, 1e-12).unwrap().solved, "traffic {seed}");
+            assert!(!problem.judge(&problem.origin(), 1e-3).unwrap().solved);
+            assert_eq!(Traffic { m: 3, streams: 4, gamma, seed }.names().len(), problem.dim());
+        }
+        for (active, dimension) in [(0.0, 2), (1.0, 3), (0.5, 7)] {
+            let made = BallsAndCones { active, dimension, seed, ..BallsAndCones::default() };
+            let (problem, known) = made.vi();
+            let verdict = problem.judge(&known, 1e-12).unwrap();
+            assert!(verdict.solved, "{made:?}: {:?}", verdict.measure);
+            let expected = if active == 0.0 {
+                0
+            } else if active == 1.0 {
+                5
+            } else {
+                verdict.counts.border
+            };
+            assert_eq!(verdict.counts.border, expected, "{made:?}");
+        }
+    }
+    let n = 10_000;
+    let rows = Csc::from_triplets(n, n, (0..n).map(|i| (i, i, 1.0))).unwrap();
+    let field = Expressions::parse(&vec!["1".to_owned(); n], &[]).unwrap();
+    let large = Vi::new(field, Set::inequalities(rows, vec![1.0; n]), vec![0.0; n]).unwrap();
+    let said = large.gauge().map(|_| ()).unwrap_err().to_string();
+    assert!(said.contains("at most 50000000") && said.ends_with("found 100000000"), "{said}");
+}
+
+#[test]
+fn a_box_is_a_complementarity_problem() {
+    let field = || Expressions::parse(&["x1 - 2".into(), "x2 + x1".into()], &[]).unwrap();
+    let parts = |u: f64| Set::Box { lower: vec![0.0], upper: vec![u] };
+    let set = Set::Product(vec![parts(1.0), parts(f64::INFINITY)]);
+    assert_eq!(set.to_string(), "2 boxes");
+    assert!(!set.is_compact() && parts(1.0).is_compact());
+    let problem = Vi::new(field(), set, vec![0.5; 2]).unwrap();
+    let mcp = problem.mcp().unwrap();
+    assert_eq!((&mcp.lower[..], &mcp.upper[..]), (&[0.0, 0.0][..], &[1.0, f64::INFINITY][..]));
+    let system = problem.system(None);
+    assert!(system.is_some());
+    assert_eq!(format!("{system:?}"), format!("{:?}", mcp.system(None)));
+    let ball = Set::Ball { centre: vec![0.0; 2], radius: 1.0 };
+    assert!(ball.is_compact());
+    assert!(Vi::new(field(), ball, vec![0.0; 2]).unwrap().mcp().is_none());
+}

@@ -6,6 +6,7 @@
 //!
 //! References: the solvers' own files; FacchineiPang2003. Cost: that of the solvers tried. Fails: where F is not monotone and the set is a ball or a cone: projections need monotone F.
 
+use nonsmooth_linalg::budget;
 use nonsmooth_problem::{LcpPoint, Set, Vi};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -62,7 +63,7 @@ impl VariationalAuto {
     }
 
     fn plan(&self, problem: &Vi, stage: usize) -> Vec<Candidate> {
-        if stage >= TURNS {
+        if stage >= TURNS || (stage > 0 && is_empty(problem)) {
             return vec![];
         }
         let grown = |first: usize, by: usize| first.saturating_mul(by.pow(stage as u32));
@@ -94,6 +95,14 @@ impl VariationalAuto {
     }
 }
 
+/// Whether the set is known to have no point; not where that costs too much, or the time is over.
+fn is_empty(problem: &Vi) -> bool {
+    let mut nearest = vec![0.0; problem.dim()];
+    projects(problem)
+        && !Projector::new(&problem.set).onto(&problem.start, &mut nearest)
+        && !budget::over()
+}
+
 /// Whether the projection on the set is affordable.
 fn projects(problem: &Vi) -> bool {
     let entries = |set: &Set| match set {
@@ -116,10 +125,9 @@ impl Session<Vi> for AutoSession {
     ) -> Result<Outcome, SolveError> {
         let begun = std::time::Instant::now();
         let mut outcome = self.0.observe(problem, point, limits, observer)?;
-        if matches!(outcome.status, Status::Stalled(_)) && projects(problem) {
-            let scope = limits.budget(begun).enter();
-            let found = Projector::new(&problem.set).onto(&point.z, &mut vec![0.0; problem.dim()]);
-            if !found && !scope.raised() {
+        if matches!(outcome.status, Status::Stalled(_)) {
+            let _scope = limits.budget(begun).enter();
+            if is_empty(problem) {
                 outcome.status = Status::Stalled(NO_PROJECTION.into());
             }
         }

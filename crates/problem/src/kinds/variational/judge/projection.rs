@@ -98,15 +98,21 @@ impl Projection {
         passive.retain(|&k| k < bounds);
         passive.extend(bounds..m);
         let mut u = vec![0.0; m];
+        let span = |passive: &[usize]| Span::of(passive.iter().map(|&k| column(k)));
+        let mut known = span(passive);
         // Of the last time, what is positive with all the others.
         loop {
-            let next = least_squares(passive, column, n);
+            if budget::over() {
+                return false;
+            }
+            let next = known.least_squares(n);
             let keeps = |k: usize, z: f64| k >= bounds || z > 0.0;
             passive.iter().zip(&next).for_each(|(&k, &z)| u[k] = if keeps(k, z) { z } else { 0.0 });
             if passive.iter().zip(&next).all(|(&k, &z)| keeps(k, z)) {
                 break;
             }
             passive.retain(|&k| keeps(k, u[k]));
+            known = span(passive);
         }
         // Columns that are combinations of the passive ones.
         let mut blocked = vec![false; m];
@@ -116,7 +122,7 @@ impl Projection {
             }
             // Least squares over the passive columns, one after the other dropped that would be negative.
             loop {
-                let next = least_squares(passive, column, n);
+                let next = known.least_squares(n);
                 let (mut alpha, mut least) = (1.0, None);
                 for (&k, &z) in
                     passive.iter().zip(&next).filter(|(k, z)| **k < bounds && **z <= 0.0)
@@ -130,7 +136,11 @@ impl Projection {
                 let Some(least) = least else { break };
                 u[least] = 0.0;
                 passive.retain(|&k| k >= bounds || u[k] > 0.0);
+                known = span(passive);
                 blocked.fill(false);
+                if budget::over() {
+                    return false;
+                }
             }
             let mut residual = vec![0.0; n + 1];
             residual[n] = 1.0;
@@ -146,10 +156,12 @@ impl Projection {
             match steepest {
                 Some((k, slope)) if slope > DEPENDENT * norm(&residual) => {
                     passive.push(k);
-                    let grown = least_squares(passive, column, n);
+                    known.push(column(k));
+                    let grown = known.least_squares(n);
                     // Against the slope, which is rounding then.
                     if grown.last().is_none_or(|z| *z <= 0.0) {
                         passive.pop();
+                        known.pop();
                         blocked[k] = true;
                     }
                 }
@@ -165,12 +177,22 @@ impl Projection {
     }
 }
 
-/// Orthonormal columns with the same span as far as they are independent, and R by columns; of dependent ones none.
-fn orthonormal<C: Iterator<Item = f64>>(
-    columns: impl Iterator<Item = C>,
-) -> (Vec<Vec<f64>>, Vec<Option<Vec<f64>>>) {
-    let (mut q, mut r): (Vec<Vec<f64>>, Vec<_>) = (vec![], vec![]);
-    for column in columns {
+/// Columns one after the other: orthonormal ones with the same span as far as they are independent, and R by columns; of dependent ones none.
+struct Span {
+    q: Vec<Vec<f64>>,
+    r: Vec<Option<Vec<f64>>>,
+}
+
+impl Span {
+    fn of<C: Iterator<Item = f64>>(columns: impl Iterator<Item = C>) -> Self {
+        let mut out = Self { q: vec![], r: vec![] };
+        columns.for_each(|column| out.push(column));
+        out
+    }
+
+    /// One column more. Cost: its entries times the columns that are there.
+    fn push(&mut self, column: impl Iterator<Item = f64>) {
+        let Self { q, r } = self;
         let mut x: Vec<f64> = column.collect();
         let before = norm(&x);
         let mut along = vec![0.0; q.len()];
@@ -185,38 +207,40 @@ fn orthonormal<C: Iterator<Item = f64>>(
         let left = norm(&x);
         if left <= DEPENDENT * before {
             r.push(None);
-            continue;
+            return;
         }
         along.push(left);
         x.iter_mut().for_each(|x| *x /= left);
         q.push(x);
         r.push(Some(along));
     }
-    (q, r)
-}
 
-/// `min ‖Σ_k u_k e_k − e_{n+1}‖` over these columns of n + 1 entries; 0 for those that depend on the ones before.
-fn least_squares<C: Iterator<Item = f64>>(
-    which: &[usize],
-    column: impl Fn(usize) -> C,
-    n: usize,
-) -> Vec<f64> {
-    let (q, r) = orthonormal(which.iter().map(|&k| column(k)));
-    let mut right: Vec<f64> = q.iter().map(|q| q[n]).collect();
-    let mut u = vec![0.0; which.len()];
-    let mut at = q.len();
-    for (u, r) in u.iter_mut().zip(&r).rev() {
-        let Some(r) = r else { continue };
-        at -= 1;
-        *u = right[at] / r[at];
-        right.iter_mut().zip(r).take(at).for_each(|(b, r)| *b -= r * *u);
+    /// Without the last column.
+    fn pop(&mut self) {
+        if let Some(Some(_)) = self.r.pop() {
+            self.q.pop();
+        }
     }
-    u
+
+    /// `min ‖Σ_k u_k e_k − e_{n+1}‖` over the columns, of n + 1 entries; 0 for those that depend on the ones before.
+    fn least_squares(&self, n: usize) -> Vec<f64> {
+        let Self { q, r } = self;
+        let mut right: Vec<f64> = q.iter().map(|q| q[n]).collect();
+        let mut u = vec![0.0; r.len()];
+        let mut at = q.len();
+        for (u, r) in u.iter_mut().zip(r).rev() {
+            let Some(r) = r else { continue };
+            at -= 1;
+            *u = right[at] / r[at];
+            right.iter_mut().zip(r).take(at).for_each(|(b, r)| *b -= r * *u);
+        }
+        u
+    }
 }
 
 /// The least s with `g_k s = h_k` of these rows, as far as they are independent.
 fn nearest(which: &[usize], rows: &[Vec<f64>], h: &[f64], n: usize) -> Vec<f64> {
-    let (q, r) = orthonormal(which.iter().map(|&k| rows[k].iter().copied()));
+    let Span { q, r } = Span::of(which.iter().map(|&k| rows[k].iter().copied()));
     let (mut s, mut along) = (vec![0.0; n], vec![]);
     for (&k, r) in which.iter().zip(&r) {
         let Some(r) = r else { continue };
