@@ -35,6 +35,7 @@ use std::path::Path;
 
 use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, Kind, ProblemError};
 
+use crate::folder::check_finite;
 use crate::format::{About, bytes};
 use crate::hdf5::is_hdf5;
 use crate::{Format, IoError, ProblemFile, StoredPoint};
@@ -195,11 +196,4 @@ fn check_vector(
         return Err(IoError::data(file, place, expected, format!("{} entries", x.len())));
     }
     check_finite(file, place, x)
-}
-
-fn check_finite(file: &Path, place: &str, x: &[f64]) -> Result<(), IoError> {
-    match x.iter().position(|v| !v.is_finite()) {
-        Some(k) => Err(IoError::data(file, format!("{place}[{k}]"), "a finite number", x[k])),
-        None => Ok(()),
-    }
 }

@@ -1,6 +1,5 @@
 //! Reading.
 
-use std::fmt::Display;
 use std::path::Path;
 
 use nonsmooth_linalg::{Bsr, Csc};
@@ -9,19 +8,11 @@ use nonsmooth_problem::{
     RowsGlobal, RowsLocal,
 };
 
-use super::{DRAWING, Sizes, check_finite, check_vector, group, invalid};
+use super::{DRAWING, Sizes, check_vector, group, invalid};
 use crate::error::one_line;
-use crate::hdf5::{self, Dataset, Fault, File, Group, Link, Object, Type};
+use crate::folder::{Folder, Used, fault, open};
+use crate::hdf5::{Link, Object};
 use crate::{Info, IoError, ProblemFile, StoredPoint};
-
-/// The HDF5 file in those bytes.
-pub(super) fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<File<'a>, IoError> {
-    if !hdf5::is_hdf5(bytes) {
-        let found = if bytes.is_empty() { "an empty file" } else { "other data" };
-        return Err(IoError::NotHdf5 { file: path.into(), found });
-    }
-    File::new(bytes).map_err(|e| fault(path, "/", e))
-}
 
 /// Reads a file.
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<ProblemFile, IoError> {
@@ -57,23 +48,6 @@ fn valid(root: &Folder) -> Result<Friction, IoError> {
     let problem = stated(root)?;
     problem.validate().map_err(invalid(root.file, group(&problem)))?;
     Ok(problem)
-}
-
-/// What keeps a part of a file from being read, as an error that names the part.
-pub(super) fn fault(file: &Path, place: &str, fault: Fault) -> IoError {
-    match fault {
-        Fault::Damaged(found) => IoError::hdf5(file, place, found),
-        Fault::Unsupported(what) => {
-            IoError::Unsupported { file: file.into(), place: place.into(), what }
-        }
-        Fault::Dangling(found) => {
-            IoError::data(file, place, "a soft link that leads somewhere", found)
-        }
-        Fault::Size(size, found) => {
-            let expected = format!("data that fit in the {size} bytes of the file");
-            IoError::data(file, place, expected, found)
-        }
-    }
 }
 
 /// As [`valid`], not validated as a whole.
@@ -194,60 +168,8 @@ fn point(g: &Folder, sizes: Sizes) -> Result<StoredPoint, IoError> {
     Ok(StoredPoint { point, partner: Some(u.unwrap_or_default()), statuses: vec![] })
 }
 
-fn name_of(object: &Object) -> &'static str {
-    match object {
-        Object::Group(_) => "a group",
-        Object::Dataset(_) => "a dataset",
-        Object::Other => "something else",
-    }
-}
-
-/// The leading entries of a dataset that count; what follows them may be anything.
-#[derive(Clone, Copy)]
-struct Used<'a> {
-    entries: u64,
-    /// What says so.
-    why: &'a str,
-}
-
-/// A group of the file, with what messages about its members need.
-///
-/// Members are opened by name, so that those that do not matter cannot do harm.
-struct Folder<'f, 'a> {
-    file: &'f Path,
-    data: &'f File<'a>,
-    /// Empty for the root.
-    path: String,
-    group: Group<'a>,
-}
-
-impl<'f, 'a> Folder<'f, 'a> {
-    fn root(file: &'f Path, data: &'f File<'a>) -> Result<Self, IoError> {
-        let group = data.root().map_err(|e| fault(file, "/", e))?;
-        Ok(Self { file, data, path: String::new(), group })
-    }
-
-    fn place(&self, name: impl Display) -> String {
-        format!("{}/{name}", self.path)
-    }
-
-    fn error(
-        &self,
-        name: impl Display,
-        expected: impl Into<String>,
-        found: impl Display,
-    ) -> IoError {
-        IoError::data(self.file, self.place(name), expected, found)
-    }
-
-    fn fault(&self, name: &str) -> impl Fn(Fault) -> IoError {
-        move |e| fault(self.file, &self.place(name), e)
-    }
-
-    fn find(&self, name: &str) -> Result<Option<Object<'a>>, IoError> {
-        self.data.find(&self.group, name).map_err(self.fault(name))
-    }
-
+/// What FCLIB has of its own.
+impl Folder<'_, '_> {
     /// The names of the groups in it, for people.
     fn groups(&self) -> Vec<String> {
         let is_group = |link: &Link| match link {
@@ -256,103 +178,6 @@ impl<'f, 'a> Folder<'f, 'a> {
         };
         let groups = self.group.links.iter().filter(|(_, link)| is_group(link));
         groups.map(|(name, _)| String::from_utf8_lossy(name).into_owned()).collect()
-    }
-
-    fn has(&self, name: &str) -> Result<bool, IoError> {
-        Ok(self.find(name)?.is_some())
-    }
-
-    /// The group `name`, if there is one.
-    fn folder(&self, name: &str) -> Result<Option<Folder<'f, 'a>>, IoError> {
-        match self.find(name)? {
-            None => Ok(None),
-            Some(Object::Group(group)) => {
-                let path = self.place(name);
-                Ok(Some(Folder { file: self.file, data: self.data, path, group }))
-            }
-            Some(other) => Err(self.error(name, "a group", name_of(&other))),
-        }
-    }
-
-    /// The group `name`.
-    fn need(&self, name: &str) -> Result<Folder<'f, 'a>, IoError> {
-        self.folder(name)?.ok_or_else(|| self.error(name, "a group", "nothing of that name"))
-    }
-
-    fn dataset(&self, name: &str) -> Result<Dataset<'a>, IoError> {
-        match self.find(name)? {
-            Some(Object::Dataset(dataset)) => Ok(dataset),
-            other => {
-                let found = other.as_ref().map_or("nothing of that name", name_of);
-                Err(self.error(name, "a dataset", found))
-            }
-        }
-    }
-
-    /// Integers: those `used`, or all. Reals that are whole numbers will do.
-    fn ints(&self, name: &str, used: Option<Used>) -> Result<Vec<i64>, IoError> {
-        let dataset = self.dataset(name)?;
-        match dataset.kind {
-            // What does not fit is too large for any use here; the range checks say so.
-            Type::Int { .. } => self.used(name, self.data.ints(&dataset), used),
-            Type::Real { .. } => {
-                // The first real beyond i64, exactly.
-                const END: f64 = -(i64::MIN as f64);
-                let whole = |(k, x): (usize, f64)| {
-                    // Not so for NaN and infinities either.
-                    if x.fract() == 0.0 && (-END..END).contains(&x) {
-                        Ok(x as i64)
-                    } else {
-                        let place = format_args!("{name}[{k}]");
-                        Err(self.error(place, "a whole number of at most 64 bits", x))
-                    }
-                };
-                let x = self.used(name, self.data.reals(&dataset), used)?;
-                x.into_iter().enumerate().map(whole).collect()
-            }
-            other => Err(self.error(name, "integers", other.name())),
-        }
-    }
-
-    fn int(&self, name: &str) -> Result<i64, IoError> {
-        match self.ints(name, None)?[..] {
-            [x] => Ok(x),
-            ref x => Err(self.error(name, "one integer", format!("{} entries", x.len()))),
-        }
-    }
-
-    /// Finite reals: those `used`, or all. Integers will do; the widest round as they do in C.
-    fn reals(&self, name: &str, used: Option<Used>) -> Result<Vec<f64>, IoError> {
-        let dataset = self.dataset(name)?;
-        match dataset.kind {
-            Type::Int { .. } | Type::Real { .. } => {
-                let x = self.used(name, self.data.reals(&dataset), used)?;
-                check_finite(self.file, &self.place(name), &x)?;
-                Ok(x)
-            }
-            other => Err(self.error(name, "reals", other.name())),
-        }
-    }
-
-    /// The values that count, out of all.
-    fn used<T>(
-        &self,
-        name: &str,
-        values: Result<Vec<T>, Fault>,
-        used: Option<Used>,
-    ) -> Result<Vec<T>, IoError> {
-        let mut values = values.map_err(self.fault(name))?;
-        if let Some(Used { entries, why }) = used {
-            let found = values.len();
-            match usize::try_from(entries) {
-                Ok(entries) if entries <= found => values.truncate(entries),
-                _ => {
-                    let expected = format!("{entries} entries ({why})");
-                    return Err(self.error(name, expected, format!("{found} entries")));
-                }
-            }
-        }
-        Ok(values)
     }
 
     fn vector(&self, name: &str, len: usize, meaning: &str) -> Result<Vec<f64>, IoError> {
@@ -378,21 +203,6 @@ impl<'f, 'a> Folder<'f, 'a> {
             (false, false) => Ok(Bounds::default()),
             (true, true) => Ok(Bounds { lower: side("lower")?, upper: side("upper")? }),
             (lower, upper) => Err(self.incomplete(&[("lower", lower), ("upper", upper)])),
-        }
-    }
-
-    /// A text that is there or not; bytes that are no UTF-8 are replaced, as it is only for people.
-    fn text(&self, name: &str) -> Result<Option<String>, IoError> {
-        if !self.has(name)? {
-            return Ok(None);
-        }
-        let dataset = self.dataset(name)?;
-        match dataset.kind {
-            Type::Text | Type::VariableText => {
-                let bytes = self.data.text(&dataset).map_err(self.fault(name))?;
-                Ok(Some(String::from_utf8_lossy(&bytes).into_owned()))
-            }
-            other => Err(self.error(name, "a text", other.name())),
         }
     }
 

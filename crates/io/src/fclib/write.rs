@@ -1,21 +1,18 @@
 //! Writing.
 
 use std::borrow::Cow;
-use std::fmt::Display;
 use std::io::{Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::Path;
 
-use hdf5_pure::{
-    AttrValue, CharacterSet, Datatype, Error, File, FileBuilder, FormatError, GroupBuilder, LibVer,
-    StringPadding,
-};
+use hdf5_pure::{AttrValue, Error, File, FileBuilder, FormatError, LibVer};
 use nonsmooth_linalg::Csc;
 use nonsmooth_problem::{
     AnyPoint, AnyProblem, Bounds, Friction, FrictionGlobal, FrictionLocal, Problem,
 };
 
 use super::{DRAWING, SOLUTION, Sizes, check_vector, group, guarded, invalid, read};
+use crate::folder::{Out, failed, fault, open};
 use crate::format::bytes as bytes_of;
 use crate::hdf5::{Dataset, Group, Link, Object, Type};
 use crate::replace::{WRITABLE, check_target, replace};
@@ -99,7 +96,7 @@ fn soft_links(path: &Path, place: &str) -> IoError {
 
 /// The names in the root group but for the solution, with whether each is an object of this file.
 fn root_links(path: &Path, bytes: &[u8]) -> Result<Vec<(Vec<u8>, bool)>, IoError> {
-    let root = read::open(path, bytes)?.root().map_err(|e| read::fault(path, "/", e))?;
+    let root = open(path, bytes)?.root().map_err(|e| fault(path, "/", e))?;
     let others = root.links.iter().filter(|(name, _)| **name != b"solution");
     Ok(others.map(|(name, link)| (name.to_vec(), matches!(link, Link::Hard(_)))).collect())
 }
@@ -109,8 +106,8 @@ type Places<'x> = Vec<(Range<usize>, &'x [f64])>;
 
 /// Where the values of a `/solution` that is there can be replaced where they stand, so that the file does not grow; `None`: nowhere.
 fn places<'x>(path: &Path, bytes: &[u8], parts: &'x [Part]) -> Result<Option<Places<'x>>, IoError> {
-    let file = read::open(path, bytes)?;
-    let root = file.root().map_err(|e| read::fault(path, "/", e))?;
+    let file = open(path, bytes)?;
+    let root = file.root().map_err(|e| fault(path, "/", e))?;
     if matches!(root.links.get(&b"solution"[..]), Some(Link::Soft(_) | Link::External)) {
         return Err(soft_links(path, SOLUTION));
     }
@@ -194,13 +191,6 @@ fn lookup(file: &Path, place: &str, e: Error) -> IoError {
 }
 
 /// A failure of the HDF5 writer: nearly always the system's.
-fn failed(path: &Path, e: Error) -> IoError {
-    match e {
-        Error::Io(e) => IoError::os(path, WRITABLE, e),
-        e => IoError::hdf5(path, "/", e),
-    }
-}
-
 fn local<const D: usize>(g: &mut Out, problem: &FrictionLocal<D>) -> Result<(), IoError> {
     g.int("spacedim", D)?;
     g.matrix("W", &problem.W.to_csc())?;
@@ -303,59 +293,8 @@ fn stored_parts<'a>(
     Ok(all.filter(|(part, _)| part.1.is_some()).map(|(part, x)| (part.0, x)).collect())
 }
 
-/// A group under construction, with what messages about its members need.
-struct Out<'a> {
-    file: &'a Path,
-    path: String,
-    group: GroupBuilder,
-}
-
+/// What FCLIB has of its own.
 impl Out<'_> {
-    fn child(
-        &mut self,
-        name: &str,
-        fill: impl FnOnce(&mut Out) -> Result<(), IoError>,
-    ) -> Result<(), IoError> {
-        let group = self.group.create_group(name);
-        let mut child = Out { file: self.file, path: format!("{}/{name}", self.path), group };
-        fill(&mut child)?;
-        self.group.add_group(child.group.finish());
-        Ok(())
-    }
-
-    /// A C int, which is what FCLIB has for sizes and indices.
-    fn as_int(&self, name: impl Display, x: usize) -> Result<i32, IoError> {
-        let place = || format!("{}/{name}", self.path);
-        let expected = || format!("at most {} (a C int)", i32::MAX);
-        i32::try_from(x).map_err(|_| IoError::data(self.file, place(), expected(), x))
-    }
-
-    fn int(&mut self, name: &str, x: usize) -> Result<(), IoError> {
-        let x = self.as_int(name, x)?;
-        self.group.create_dataset(name).with_i32_data(&[x]);
-        Ok(())
-    }
-
-    fn reals(&mut self, name: &str, x: &[f64]) {
-        self.group.create_dataset(name).with_f64_data(x);
-    }
-
-    /// A scalar string with the terminating NUL that C readers allocate by.
-    fn text(&mut self, name: &str, text: &str) -> Result<(), IoError> {
-        let place = format!("{}/{name}", self.path);
-        if text.contains('\0') {
-            let expected = "a text without NUL characters";
-            return Err(IoError::data(self.file, place, expected, "one with"));
-        }
-        let size = self.as_int(name, text.len() + 1)? as u32;
-        let charset = if text.is_ascii() { CharacterSet::Ascii } else { CharacterSet::Utf8 };
-        let datatype = Datatype::String { size, padding: StringPadding::NullTerminate, charset };
-        let bytes = [text.as_bytes(), b"\0"].concat();
-        self.group.create_dataset(name).with_raw_data(datatype, bytes, 1).with_shape(&[]);
-        Ok(())
-    }
-
-    /// Triplets, column by column: row `i`, column `p`.
     /// The bounds of scalar rows, where there are any.
     fn bounds(&mut self, bounds: &Bounds) {
         if !bounds.are_free() {
@@ -364,6 +303,7 @@ impl Out<'_> {
         }
     }
 
+    /// Triplets, column by column: row `i`, column `p`.
     fn matrix(&mut self, name: &str, a: &Csc) -> Result<(), IoError> {
         self.child(name, |g| {
             for (name, x) in
