@@ -139,6 +139,13 @@ impl Sort {
             Self::Polyhedron([(a, mut b), (c, d)], [lower, upper]) => {
                 let lower = lower.unwrap_or_else(|| infinite(-1.0));
                 let upper = upper.unwrap_or_else(|| infinite(1.0));
+                for (name, m) in [("A", &a), ("C", &c)] {
+                    if let Some(m) = m
+                        && m.ncols() != n
+                    {
+                        return Err(wrong(name, format!("{n} columns"), m.ncols()));
+                    }
+                }
                 let mut rows = triplets(a.as_ref());
                 let mut m = a.map_or(0, |a| a.nrows());
                 let all = [("lower", &lower, -1.0), ("upper", &upper, 1.0)];
