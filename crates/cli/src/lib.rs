@@ -28,6 +28,7 @@ mod output;
 mod plot;
 mod progress;
 mod report;
+mod simulate;
 mod solve;
 
 use std::process::ExitCode;
@@ -77,6 +78,7 @@ Examples:
   nonsmooth solve rectifier.toml --trace pivots.json a complementarity problem, and what the method did
   nonsmooth convert solved.hdf5 contacts.csv         the solution as a table, or a problem in another format
   nonsmooth draw solved.hdf5                         matrices, sizes of the impulses, friction cones
+  nonsmooth simulate wall --end 0.5 --html wall.html bodies in motion, as a page that plays
   nonsmooth list                                     the solvers and their settings
   nonsmooth bench run problems/ --out runs.jsonl     compare solvers on folders of problems
 
@@ -98,6 +100,8 @@ enum Command {
     Gen(generate::Args),
     Convert(convert::Args),
     Draw(draw::Args),
+    Simulate(simulate::Args),
+    Play(simulate::PlayArgs),
     Bench(bench::Args),
     Completions(completions::Args),
 }
@@ -126,6 +130,8 @@ pub fn program() -> ExitCode {
         Command::Gen(args) => generate::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Draw(args) => draw::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
+        Command::Play(args) => simulate::play(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Completions(args) => Ok(completions::run(&args, Cli::command())),
     };

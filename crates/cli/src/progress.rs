@@ -1,7 +1,7 @@
 //! The progress bar of a solve: on a terminal only, and cheap between two pictures.
 
 use std::io::IsTerminal;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use nonsmooth_solve::Progress;
@@ -28,14 +28,7 @@ pub struct Bar {
 impl Bar {
     /// A bar for one solve; none unless stderr is a terminal and `wanted`.
     pub fn new(name: &str, tolerance: f64, wanted: bool) -> Self {
-        let bar = (wanted && std::io::stderr().is_terminal()).then(|| {
-            let bar = ProgressBar::with_draw_target(Some(FULL), ProgressDrawTarget::hidden());
-            // The wide message is cut to what is left of the line.
-            let style = ProgressStyle::with_template("{prefix} [{bar:8.blue}] {wide_msg}");
-            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-            bar.set_prefix(shortened(name));
-            bar
-        });
+        let bar = bar(name, wanted);
         Self {
             next: if bar.is_some() { PATIENCE } else { f64::INFINITY },
             bar,
@@ -78,6 +71,63 @@ impl Drop for Bar {
             bar.finish_and_clear();
         }
     }
+}
+
+/// How far a run of a simulation has come.
+pub struct RunBar {
+    bar: Option<ProgressBar>,
+    end: f64,
+    begun: Instant,
+    next: f64,
+}
+
+impl RunBar {
+    /// A bar for a run until `end`, s; none unless stderr is a terminal and `wanted`.
+    pub fn new(name: &str, end: f64, wanted: bool) -> Self {
+        let bar = bar(name, wanted);
+        let next = if bar.is_some() { PATIENCE } else { f64::INFINITY };
+        Self { bar, end, begun: Instant::now(), next }
+    }
+
+    /// Takes note of a step that ended at t, with so many active contacts and this residual.
+    pub fn watch(&mut self, t: f64, active: usize, residual: f64) {
+        let Some(bar) = &self.bar else { return };
+        let seconds = self.begun.elapsed().as_secs_f64();
+        if seconds < self.next {
+            return;
+        }
+        self.next = seconds + INTERVAL;
+        bar.set_draw_target(ProgressDrawTarget::stderr_with_hz(15));
+        let share = (t / self.end).clamp(0.0, 1.0);
+        let left = if share > 0.0 { seconds / share - seconds } else { f64::NAN };
+        let left = if left.is_finite() { format!(", {} left", clock(left)) } else { String::new() };
+        let residual = number(residual);
+        bar.set_message(format!(
+            "t = {t:.4} of {} s, {active} contacts, residual {residual}{left}",
+            self.end
+        ));
+        bar.set_position((share * FULL as f64) as u64);
+    }
+}
+
+impl Drop for RunBar {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// A bar that is not shown yet; none unless stderr is a terminal and `wanted`.
+fn bar(name: &str, wanted: bool) -> Option<ProgressBar> {
+    (wanted && std::io::stderr().is_terminal()).then(|| {
+        let bar = ProgressBar::with_draw_target(Some(FULL), ProgressDrawTarget::hidden());
+        // The wide message is cut to what is left of the line.
+        let style = ProgressStyle::with_template("{prefix} [{bar:8.blue}] {wide_msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_prefix(shortened(name));
+        bar
+    })
 }
 
 /// A name with its middle left out where it is long.

@@ -89,7 +89,7 @@ fn regularity(problem: &AnyProblem, point: &AnyPoint, verdict: &AnyVerdict) -> O
     };
     let row = |status: &AnyStatus| match status {
         AnyStatus::Row(row) => Some(*row),
-        AnyStatus::Contact(_) => None,
+        AnyStatus::Contact(_) | AnyStatus::Set(_) => None,
     };
     let statuses: Vec<_> = verdict.statuses.iter().filter_map(row).collect();
     let found = |mcp| Regularity::of(mcp, &point.z, &statuses, verdict.measure.relative);

@@ -382,14 +382,11 @@ pub struct OutputTable {
     /// A table of time, energy and residual, a row a step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub csv: Option<String>,
-    /// A folder for ParaView.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub vtk: Option<String>,
 }
 
 impl Default for OutputTable {
     fn default() -> Self {
-        Self { every: 1, trajectory: None, html: None, csv: None, vtk: None }
+        Self { every: 1, trajectory: None, html: None, csv: None }
     }
 }
 

@@ -1,0 +1,259 @@
+//! `nonsmooth simulate` and `nonsmooth play`.
+
+mod record;
+mod said;
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use nonsmooth_io::trajectory::Trajectory;
+use nonsmooth_scenes::SceneEntry;
+use nonsmooth_simulate::{Control, RunReport, SceneFile, Simulation, StepReport};
+use nonsmooth_solve::Limits;
+use nonsmooth_solve::settings;
+
+use self::record::Recorder;
+use crate::progress::RunBar;
+use crate::{Exit, files, interrupt, output};
+
+/// Move the bodies of a scene through impacts, sticking and sliding: Moreau-Jean time stepping, every step judged.
+///
+/// A scene is a TOML (or JSON) file of bodies, materials, pairs and forces, or one of the families of `nonsmooth gen --list` with its
+/// rigid bodies. Each step states and solves a frictional contact problem with Coulomb's law itself; the residual that is reported is the judge's, and the
+/// energy of each step is accounted for by terms.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// The scene: a .toml or .json file, or the name of a family of `nonsmooth gen --list`
+    #[arg(required_unless_present = "schema")]
+    scene: Option<PathBuf>,
+    /// A value of the scene by its path (time.h=5e-4, bodies[0].mass=2), or a setting of the family; may be given several times
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    settings: Vec<String>,
+    /// The time at the end, s [default: the scene's time.end; 1 for a family]
+    #[arg(long, value_name = "T", allow_hyphen_values = true)]
+    end: Option<f64>,
+    /// Steps between two frames of the files written [default: the scene's output.every]
+    #[arg(long, value_name = "STEPS")]
+    every: Option<u64>,
+    /// Write the trajectory (HDF5), at least every five seconds: what is written stays readable whatever happens
+    #[arg(long, value_name = "FILE.h5")]
+    out: Option<PathBuf>,
+    /// Write a page that plays the motion in a browser, without a network
+    #[arg(long, value_name = "FILE.html")]
+    html: Option<PathBuf>,
+    /// Write time, energy by terms, residual and counts, a row a step
+    #[arg(long, value_name = "FILE.csv")]
+    csv: Option<PathBuf>,
+    /// Write the contact problem of each step that is not solved, and with --dump-every of others, as FCLIB files in this folder
+    #[arg(long, value_name = "DIR")]
+    dump_fclib: Option<PathBuf>,
+    /// Write the contact problem of every so many steps, too
+    #[arg(long, value_name = "STEPS", requires = "dump_fclib")]
+    dump_every: Option<u64>,
+    /// Go on from the end of a trajectory of the same scene, and append to it unless --out names another file
+    #[arg(long, value_name = "FILE.h5")]
+    resume: Option<PathBuf>,
+    /// Stop after this many seconds of the wall clock, at the end of a step
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    time_limit: Option<f64>,
+    /// Say where the time went
+    #[arg(long)]
+    timings: bool,
+    /// Report as JSON, one object
+    #[arg(long)]
+    json: bool,
+    /// Print the completed scene, with every default, and do nothing
+    #[arg(long)]
+    explain: bool,
+    /// Print the JSON Schema of scenes, and do nothing
+    #[arg(long)]
+    schema: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  nonsmooth simulate wall --end 0.5 --html wall.html        a family of `nonsmooth gen`, as a page that plays
+  nonsmooth simulate scene.toml --out run.h5 --csv run.csv  a scene of your own
+  nonsmooth simulate scene.toml --set time.h=5e-4           with another step
+  nonsmooth simulate scene.toml --resume run.h5 --end 10    further
+  nonsmooth simulate scene.toml --explain                   the scene with every default
+  nonsmooth play run.h5 --html run.html                     a page from a trajectory
+
+Exit codes: 0 every step is solved; 1 a step is not solved, or the run was stopped; 2 a mistake in a file or an option; 130 Ctrl-C pressed twice.";
+
+/// Make a page that plays a trajectory in a browser.
+#[derive(Debug, clap::Args)]
+pub struct PlayArgs {
+    /// A trajectory that `nonsmooth simulate --out` has written
+    file: PathBuf,
+    /// The page, without a network [default: the file's name with .html]
+    #[arg(long, value_name = "FILE.html")]
+    html: Option<PathBuf>,
+}
+
+/// The end of a family's run, s, where nobody says another.
+const FAMILY_END: f64 = 1.0;
+
+/// A scene from a file or a family.
+fn scene(args: &Args) -> Result<SceneFile, String> {
+    let Some(path) = &args.scene else { return Err("expected a scene, found none".into()) };
+    let changes: Vec<&str> = args.settings.iter().map(String::as_str).collect();
+    let name = path.to_string_lossy();
+    let is_file = path.extension().is_some() || path.components().count() > 1;
+    let mut scene = match SceneEntry::find(&name) {
+        Ok(family) if !path.exists() => {
+            let set = settings::from_texts(&changes).map_err(|e| format!("--set: {e}"))?;
+            let made = family.make(&set).map_err(|e| format!("{name}: {e}"))?;
+            SceneFile::of_family(&name, set, made.h, FAMILY_END)
+        }
+        Err(e) if !path.exists() && !is_file => {
+            return Err(format!("{name}: expected a file or a family of scenes, and {e}"));
+        }
+        _ => {
+            let text = std::fs::read_to_string(path)
+                .map_err(|e| format!("{name}: expected a readable file, found: {e}"))?;
+            SceneFile::parse(&text, &changes).map_err(|e| format!("{name}: {e}"))?
+        }
+    };
+    if let Some(end) = args.end {
+        scene.time.end = end;
+    }
+    if let Some(every) = args.every {
+        scene.output.every = every;
+    }
+    Ok(scene)
+}
+
+/// Where an output goes: to what the option says, or to a file beside the scene that the scene names.
+fn target(option: &Option<PathBuf>, named: &Option<String>, scene: &Path) -> Option<PathBuf> {
+    let beside = |name: &String| scene.parent().unwrap_or(Path::new("")).join(name);
+    option.clone().or_else(|| named.as_ref().map(beside))
+}
+
+/// Runs `simulate`.
+pub fn run(args: &Args) -> Result<Exit, String> {
+    if args.schema {
+        output::print(&format!("{:#}\n", SceneFile::schema()));
+        return Ok(Exit::Solved);
+    }
+    let scene = scene(args)?;
+    let path = args.scene.clone().unwrap_or_default();
+    if args.explain {
+        output::print(&scene.to_toml());
+        return Ok(Exit::Solved);
+    }
+    let limit = files::time_limit(args.time_limit)?;
+    let out = target(&args.out, &scene.output.trajectory, &path).or_else(|| args.resume.clone());
+    let html = target(&args.html, &scene.output.html, &path);
+    let csv = target(&args.csv, &scene.output.csv, &path);
+    for (option, path) in [("--out", &out), ("--html", &html), ("--csv", &csv)] {
+        if let Some(path) = path {
+            files::writable(option, path)?;
+        }
+    }
+    if let Some(folder) = &args.dump_fclib {
+        files::folder("--dump-fclib", folder)?;
+    }
+    let wrong = |e| format!("{}: {e}", path.display());
+    let cancel = interrupt::flag();
+    let limits = Limits {
+        tolerance: scene.solver.tol,
+        max_iterations: 100_000,
+        cancel: Some(cancel.clone()),
+        ..Limits::default()
+    };
+    let mut simulation = scene.build().map_err(wrong)?.with_limits(limits);
+    simulation.warnings().iter().for_each(|w| output::remark(&format!("warning: {w}\n")));
+    let frames = out.is_some() || html.is_some();
+    let mut recorder = Recorder::new(&scene, &simulation, frames);
+    if let Some(file) = &args.resume {
+        recorder.resume(file, &mut simulation)?;
+    }
+    let begun = Instant::now();
+    let mut bar = RunBar::new(&path.to_string_lossy(), scene.time.end, !args.json);
+    let mut mistake = None;
+    let mut watch = |simulation: &Simulation, report: &StepReport| {
+        let kept = recorder.step(simulation, report);
+        bar.watch(report.t, report.counts.active, report.residual);
+        let late = limit.is_some_and(|t| begun.elapsed().as_secs_f64() >= t);
+        let flushed = match &out {
+            Some(out) => recorder.flush(out, simulation, false),
+            None => Ok(()),
+        };
+        match kept.and(flushed) {
+            Ok(()) if !late => Control::Continue,
+            Ok(()) => Control::Stop,
+            Err(e) => {
+                mistake = Some(e);
+                Control::Stop
+            }
+        }
+    };
+    let mut observer = record::Dump {
+        folder: args.dump_fclib.as_deref(),
+        every: args.dump_every,
+        title: &scene.name,
+        problem: None,
+        mistake: None,
+        watch: &mut watch,
+    };
+    let report = simulation.run(scene.time.end, scene.time.h, &mut observer).map_err(wrong)?;
+    let unwritten = observer.mistake;
+    drop(bar);
+    if let Some(mistake) = mistake.or(unwritten) {
+        return Err(mistake);
+    }
+    let seconds = begun.elapsed().as_secs_f64();
+    let mut written = vec![];
+    if let Some(out) = &out {
+        recorder.flush(out, &simulation, true)?;
+        written.push(out.clone());
+    }
+    if let Some(csv) = &csv {
+        files::write_text("--csv", csv, &recorder.csv())?;
+        written.push(csv.clone());
+    }
+    if let Some(html) = &html {
+        files::write_text(
+            "--html",
+            html,
+            &record::page(&recorder.trajectory, &scene, simulation.world())?,
+        )?;
+        written.push(html.clone());
+    }
+    let run = said::Run {
+        path: &path,
+        scene: &scene,
+        simulation: &simulation,
+        recorder: &recorder,
+        report: &report,
+        seconds,
+        written: &written,
+    };
+    match args.json {
+        true => output::print(&format!("{}\n", run.json())),
+        false => output::print(&run.text(args.timings)),
+    }
+    Ok(Exit::solved(complete(&report)))
+}
+
+fn complete(report: &RunReport) -> bool {
+    report.is_solved() && !report.stopped
+}
+
+/// Runs `play`.
+pub fn play(args: &PlayArgs) -> Result<Exit, String> {
+    let file = &args.file;
+    let html = args.html.clone().unwrap_or_else(|| file.with_extension("html"));
+    files::writable("--html", &html)?;
+    let trajectory = Trajectory::read(file).map_err(|e| e.to_string())?;
+    let wrong = |e| format!("{}: /scene: {e}", file.display());
+    let scene = SceneFile::parse(&trajectory.scene, &[]).map_err(wrong)?;
+    let world = scene.world().map_err(wrong)?;
+    files::write_text("--html", &html, &record::page(&trajectory, &scene, &world)?)?;
+    let (frames, steps) = (trajectory.frames.len(), trajectory.steps.len());
+    let (file, html) = (file.display(), html.display());
+    output::print(&format!("{file}: {frames} frames of {steps} steps\n  page       {html}\n"));
+    Ok(Exit::Solved)
+}

@@ -1,0 +1,327 @@
+//! What is kept of a run: the trajectory, and what is made of it.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use nonsmooth_io::trajectory::{
+    Checkpoint, Contact, Energy, Frame, Named, State, Step, Trajectory,
+};
+use nonsmooth_io::{Info, ProblemFile};
+use nonsmooth_problem::check::Motion;
+use nonsmooth_problem::{AnyProblem, Friction, FrictionLocal, Problem};
+use nonsmooth_scenes::draw::playback::{self, Drawn, Form, Moment, Placed, Playback};
+use nonsmooth_scenes::draw::{Pose, Touch};
+use nonsmooth_simulate::{
+    ContactReport, Control, Observer, SceneFile, Shape, Simulation, StepReport, World,
+};
+
+use crate::files;
+
+/// Seconds between two times that the trajectory is written, at least; more where writing takes long.
+const FLUSH: Duration = Duration::from_secs(5);
+/// Writing may take one part in so many of the time.
+const SHARE: u32 = 20;
+
+/// The trajectory of a run, as it grows.
+pub struct Recorder {
+    pub trajectory: Trajectory,
+    every: u64,
+    /// Whether frames are asked for; steps are always kept.
+    frames: bool,
+    flushed: Instant,
+    wait: Duration,
+    /// Steps of the trajectory that was gone on from.
+    pub earlier: usize,
+}
+
+impl Recorder {
+    pub fn new(scene: &SceneFile, simulation: &Simulation, frames: bool) -> Self {
+        let bodies = simulation.world().bodies.iter();
+        let named = bodies.map(|b| Named { name: b.name.clone(), fixed: !b.is_free() });
+        let mut recorder = Self {
+            trajectory: Trajectory {
+                scene: scene.to_toml(),
+                program: concat!("nonsmooth ", env!("CARGO_PKG_VERSION")).into(),
+                bodies: named.collect(),
+                ..Trajectory::default()
+            },
+            every: scene.output.every,
+            frames,
+            flushed: Instant::now(),
+            wait: FLUSH,
+            earlier: 0,
+        };
+        recorder.frame(simulation);
+        recorder
+    }
+
+    /// Goes on from the end of a trajectory of the same scene.
+    pub fn resume(&mut self, file: &Path, simulation: &mut Simulation) -> Result<(), String> {
+        let name = file.display();
+        let earlier = Trajectory::read(file).map_err(|e| e.to_string())?;
+        let like = |text: &str| {
+            let scene = SceneFile::parse(text, &[]).map_err(|e| format!("{name}: /scene: {e}"))?;
+            let mut scene = SceneFile { output: Default::default(), ..scene };
+            scene.time.end = 0.0;
+            Ok::<_, String>(scene)
+        };
+        if like(&earlier.scene)? != like(&self.trajectory.scene)? {
+            return Err(format!(
+                "--resume {name}: expected a trajectory of the same scene but for time.end and output, found one of another"
+            ));
+        }
+        let Some(checkpoint) = &earlier.checkpoint else {
+            return Err(format!(
+                "--resume {name}: expected a trajectory with a checkpoint, found none"
+            ));
+        };
+        simulation.restore(&checkpoint.state).map_err(|e| format!("--resume {name}: {e}"))?;
+        self.earlier = earlier.steps.len();
+        let scene = std::mem::take(&mut self.trajectory.scene);
+        self.trajectory = Trajectory { scene, ..earlier };
+        Ok(())
+    }
+
+    /// Takes note of a step.
+    pub fn step(&mut self, simulation: &Simulation, report: &StepReport) -> Result<(), String> {
+        let number = simulation.state().steps;
+        self.trajectory.steps.push(step(number, report));
+        if self.frames && number.is_multiple_of(self.every) {
+            self.frame(simulation);
+        }
+        Ok(())
+    }
+
+    fn frame(&mut self, simulation: &Simulation) {
+        if !self.frames {
+            return;
+        }
+        let state = simulation.state();
+        let bodies = (0..state.position.len()).map(|k| State {
+            position: state.position[k],
+            rotation: state.rotation[k],
+            velocity: state.velocity[k],
+            angular_velocity: state.angular_velocity(nonsmooth_simulate::BodyId(k as u32)),
+        });
+        self.trajectory.frames.push(Frame {
+            step: state.steps,
+            time: state.t,
+            bodies: bodies.collect(),
+            contacts: simulation.contacts().iter().map(contact).collect(),
+        });
+    }
+
+    /// Writes the trajectory, if it is time to, or `now`.
+    pub fn flush(&mut self, out: &Path, simulation: &Simulation, now: bool) -> Result<(), String> {
+        if !now && self.flushed.elapsed() < self.wait {
+            return Ok(());
+        }
+        let begun = Instant::now();
+        let state = simulation.state();
+        self.trajectory.checkpoint =
+            Some(Checkpoint { step: state.steps, time: state.t, state: simulation.checkpoint() });
+        self.trajectory.write(out).map_err(|e| format!("--out {e}"))?;
+        self.wait = FLUSH.max(SHARE * begun.elapsed());
+        self.flushed = Instant::now();
+        Ok(())
+    }
+
+    /// Time, energies, residual and counts, a row a step.
+    pub fn csv(&self) -> String {
+        let mut text = String::from(
+            "step,t,h,status,residual,kinetic,work_gravity,work_forces,work_normal,work_tangential,work_drives,numerical,imbalance,near,active,open,stick,slip,penetration,iterations,newton\n",
+        );
+        for s in &self.trajectory.steps {
+            let e = &s.energy;
+            let status = match s.status.contains([',', '"']) {
+                true => format!("\"{}\"", s.status.replace('"', "\"\"")),
+                false => s.status.clone(),
+            };
+            text += &format!(
+                "{},{},{},{status},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{},{},{},{},{},{:e},{},{}\n",
+                s.number,
+                s.time,
+                s.h,
+                s.residual,
+                e.kinetic,
+                e.gravity,
+                e.forces,
+                e.normal,
+                e.tangential,
+                e.drives,
+                e.numerical,
+                e.imbalance,
+                s.near,
+                s.active,
+                s.open,
+                s.stick,
+                s.slip,
+                s.penetration,
+                s.iterations,
+                s.newton
+            );
+        }
+        text
+    }
+}
+
+fn step(number: u64, report: &StepReport) -> Step {
+    let (e, c) = (&report.energy, &report.counts);
+    Step {
+        number,
+        time: report.t,
+        h: report.h,
+        status: report.status.name(),
+        residual: report.residual,
+        iterations: c.iterations as u64,
+        newton: report.newton,
+        near: c.near as u32,
+        active: c.active as u32,
+        open: c.open as u32,
+        stick: c.stick as u32,
+        slip: c.slip as u32,
+        penetration: report.drift.penetration,
+        wall: report.timings.total,
+        energy: Energy {
+            kinetic: e.kinetic,
+            potential: e.potential,
+            gravity: e.gravity,
+            forces: e.forces,
+            normal: e.normal,
+            tangential: e.tangential,
+            drives: e.drives,
+            numerical: e.numerical,
+            imbalance: e.imbalance,
+        },
+    }
+}
+
+/// What a contact does, told from impulse and velocity: a contact without impulse is open, one that moves along slips.
+fn motion(c: &ContactReport) -> Option<Motion> {
+    let tangential = |x: &[f64; 3]| x[1].hypot(x[2]);
+    c.active.then(|| match c.impulse {
+        [n, ..] if n <= 0.0 => Motion::Open,
+        _ if tangential(&c.after) > 1e-8 * (1.0 + tangential(&c.before)) => Motion::Slip,
+        _ => Motion::Stick,
+    })
+}
+
+fn contact(c: &ContactReport) -> Contact {
+    Contact {
+        key: [c.key.shape_a, c.key.shape_b, c.key.feature_a, c.key.feature_b],
+        a: c.a.0,
+        b: c.b.0,
+        point: c.point,
+        frame: c.frame,
+        gap: c.gap,
+        mu: c.mu,
+        r: c.impulse,
+        u: c.after,
+        status: motion(c),
+    }
+}
+
+/// The shapes of a world, as they are drawn.
+fn drawn(world: &World) -> Vec<Drawn> {
+    let form = |shape: &Shape| match shape {
+        Shape::Sphere { radius } => Form::Sphere { radius: *radius },
+        Shape::Box { half } => Form::Box { half: *half },
+        Shape::Capsule { half_length, radius } => {
+            Form::Capsule { half_length: *half_length, radius: *radius }
+        }
+        Shape::Plane => Form::Plane,
+        Shape::Polyhedron(p) => {
+            Form::Polyhedron { vertices: p.vertices().to_vec(), faces: p.faces().to_vec() }
+        }
+    };
+    let placed = |part: &nonsmooth_simulate::Part| Placed {
+        form: form(&part.shape),
+        position: part.position,
+        rotation: part.rotation,
+    };
+    let bodies = world.bodies.iter().map(|body| Drawn {
+        name: body.name.clone(),
+        fixed: !body.is_free(),
+        parts: body.parts.iter().map(placed).collect(),
+    });
+    bodies.collect()
+}
+
+fn playback(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Playback {
+    let pose =
+        |s: &State| Pose { position: s.position, rotation: s.rotation, velocity: s.velocity };
+    let touch = |c: &Contact| Touch {
+        a: Some(c.a as usize),
+        b: c.b as usize,
+        point: c.point,
+        offset: [0.0; 3],
+        frame: c.frame,
+        mu: c.mu,
+        r: Some(c.r),
+        u: Some(c.u),
+        status: c.status,
+    };
+    let frames = trajectory.frames.iter().map(|f| Moment {
+        time: f.time,
+        poses: f.bodies.iter().map(pose).collect(),
+        contacts: f.contacts.iter().map(touch).collect(),
+    });
+    let energy = trajectory.steps.iter().map(|s| playback::Energy {
+        time: s.time,
+        kinetic: s.energy.kinetic,
+        potential: s.energy.potential,
+    });
+    Playback {
+        title: scene.name.clone(),
+        bodies: drawn(world),
+        frames: frames.collect(),
+        energy: energy.collect(),
+        residual: trajectory.steps.iter().map(|s| [s.time, s.residual]).collect(),
+    }
+}
+
+/// The page that plays a trajectory.
+pub fn page(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Result<String, String> {
+    playback(trajectory, scene, world).html(playback::LIMIT).map_err(|e| e.to_string())
+}
+
+/// Writes contact problems of steps, and lets another observer see them.
+pub struct Dump<'a> {
+    pub folder: Option<&'a Path>,
+    pub every: Option<u64>,
+    pub title: &'a str,
+    /// The problem of the step that is being done.
+    pub problem: Option<FrictionLocal<3>>,
+    /// What went wrong.
+    pub mistake: Option<String>,
+    pub watch: &'a mut dyn FnMut(&Simulation, &StepReport) -> Control,
+}
+
+impl Observer for Dump<'_> {
+    fn before(&mut self, simulation: &mut Simulation, h: f64) {
+        if self.folder.is_some() {
+            self.problem = simulation.problem(h).ok().flatten();
+        }
+    }
+
+    fn step(&mut self, simulation: &Simulation, report: &StepReport) -> Control {
+        let number = simulation.state().steps;
+        let due =
+            self.every.is_some_and(|n| number.is_multiple_of(n)) || !report.status.is_solved();
+        if let (Some(folder), Some(problem), true) = (self.folder, self.problem.take(), due) {
+            let path = folder.join(format!("step-{number:07}.hdf5"));
+            if let Err(e) = fclib(&path, problem, self.title) {
+                self.mistake.get_or_insert(e);
+                return Control::Stop;
+            }
+        }
+        (self.watch)(simulation, report)
+    }
+}
+
+fn fclib(path: &Path, problem: FrictionLocal<3>, title: &str) -> Result<(), String> {
+    let problem = AnyProblem::Friction(Friction::Local3(problem));
+    let format = files::target_format("--dump-fclib", path, None, problem.kind(), None)?;
+    let info = Info { title: Some(title.into()), ..Info::default() };
+    files::write(path, format, &ProblemFile { info, ..ProblemFile::new(problem) })
+}

@@ -1,0 +1,132 @@
+//! What is said of a run.
+
+use std::path::{Path, PathBuf};
+
+use nonsmooth_simulate::{RunReport, SceneFile, Simulation};
+use serde_json::{Value, json};
+
+use super::record::Recorder;
+use crate::report::{number, row};
+use crate::solve::seconds;
+
+/// A run that has ended.
+pub struct Run<'a> {
+    pub path: &'a Path,
+    pub scene: &'a SceneFile,
+    pub simulation: &'a Simulation,
+    pub recorder: &'a Recorder,
+    pub report: &'a RunReport,
+    pub seconds: f64,
+    pub written: &'a [PathBuf],
+}
+
+impl Run<'_> {
+    /// The report. Its last line says whether every step is solved.
+    pub fn text(&self, timings: bool) -> String {
+        let Self { scene, simulation, report, .. } = self;
+        let mut text = format!("{}: {report}\n", self.path.display());
+        let world = simulation.world();
+        let free = world.bodies.iter().filter(|b| b.is_free()).count();
+        let name = if scene.name.is_empty() { String::new() } else { format!("{}, ", scene.name) };
+        row(
+            &mut text,
+            "scene",
+            format!("{name}{} bodies, {free} of them free", world.bodies.len()),
+        );
+        let scheme = format!(
+            "h = {} s, theta = {}, contacts by {} to {:e}",
+            scene.time.h, scene.integrator.theta, scene.solver.name, scene.solver.tol
+        );
+        row(&mut text, "scheme", scheme);
+        let steps = &self.recorder.trajectory.steps[self.recorder.earlier..];
+        if let Some(last) = steps.last() {
+            let most = steps.iter().map(|s| s.active).max().unwrap_or(0);
+            let counts = format!(
+                "{} active at the end ({} open, {} stick, {} slip), at most {most}",
+                last.active, last.open, last.stick, last.slip
+            );
+            row(&mut text, "contacts", counts);
+            let e = &last.energy;
+            let energy = format!(
+                "kinetic {} J, potential {} J at the end; imbalance of a step at most {} of its terms",
+                number(e.kinetic),
+                number(e.potential),
+                number(report.imbalance)
+            );
+            row(&mut text, "energy", energy);
+        }
+        row(&mut text, "drift", format!("penetration at most {} m", number(report.penetration)));
+        let rate = report.steps as f64 / self.seconds.max(1e-9);
+        row(&mut text, "time", format!("{}, {rate:.0} steps a second", seconds(self.seconds)));
+        if timings {
+            let total: f64 = steps.iter().map(|s| s.wall).sum();
+            let mut walls: Vec<f64> = steps.iter().map(|s| s.wall).collect();
+            walls.sort_by(f64::total_cmp);
+            let at = |share: f64| {
+                let k = (share * walls.len() as f64) as usize;
+                walls.get(k.min(walls.len().saturating_sub(1))).copied().unwrap_or(0.0)
+            };
+            let says = format!(
+                "{} in steps; a step: median {}, 95 % below {}",
+                seconds(total),
+                seconds(at(0.5)),
+                seconds(at(0.95))
+            );
+            row(&mut text, "", says);
+        }
+        for path in self.written {
+            row(&mut text, "written", path.display());
+        }
+        row(&mut text, "result", self.result());
+        text
+    }
+
+    fn result(&self) -> String {
+        let report = self.report;
+        let stopped = if report.stopped {
+            format!(", stopped at t = {} s of {} s", report.t, self.scene.time.end)
+        } else {
+            String::new()
+        };
+        let solved = ["solved", "halved"].iter().filter_map(|name| report.statuses.get(*name));
+        let solved: u64 = solved.sum();
+        match report.steps - solved {
+            0 => format!("every one of {} steps solved{stopped}", report.steps),
+            n => {
+                let steps = &self.recorder.trajectory.steps[self.recorder.earlier..];
+                let bad = |s: &&nonsmooth_io::trajectory::Step| {
+                    s.status != "solved" && s.status != "halved"
+                };
+                let first = steps.iter().find(bad).map_or(f64::NAN, |s| s.time);
+                format!(
+                    "NOT SOLVED: {n} of {} steps, the first at t = {first} s{stopped}",
+                    report.steps
+                )
+            }
+        }
+    }
+
+    /// The report as JSON.
+    pub fn json(&self) -> Value {
+        let Self { report, simulation, .. } = self;
+        let last = self.recorder.trajectory.steps.last();
+        json!({
+            "scene": self.path,
+            "name": self.scene.name,
+            "bodies": simulation.world().bodies.len(),
+            "status": if super::complete(report) { "solved" } else { "not_solved" },
+            "message": self.result(),
+            "steps": report.steps,
+            "statuses": report.statuses,
+            "t": report.t,
+            "stopped": report.stopped,
+            "residual": report.residual,
+            "imbalance": report.imbalance,
+            "penetration": report.penetration,
+            "seconds": self.seconds,
+            "kinetic": last.map(|s| s.energy.kinetic),
+            "potential": last.map(|s| s.energy.potential),
+            "written": self.written,
+        })
+    }
+}

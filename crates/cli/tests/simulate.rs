@@ -1,0 +1,136 @@
+//! `simulate` and `play`: what a run says, what it leaves, and how it goes on.
+
+mod common;
+
+use common::Folder;
+use serde_json::Value;
+
+/// A box that is dropped on its edge and comes to rest.
+const BOX: &str = r#"
+format = "nonsmooth-scene"
+version = 1
+name = "a box"
+time = { h = 1e-3, end = 0.2 }
+pairs_default = { mu = 0.4, e = 0.1 }
+
+[[bodies]]
+name = "floor"
+shape = { kind = "plane" }
+fixed = true
+
+[[bodies]]
+name = "box"
+shape = { kind = "box", half = [0.1, 0.1, 0.1] }
+density = 1000
+position = [0, 0, 0.2]
+rotation = { axis = [0, 1, 0], angle = 0.3 }
+"#;
+
+fn folder() -> Folder {
+    let folder = Folder::new();
+    std::fs::write(folder.path("box.toml"), BOX).unwrap();
+    folder
+}
+
+#[test]
+fn a_run_says_whether_every_step_is_solved() {
+    let folder = folder();
+    let run = folder.run("simulate box.toml --csv box.csv --html box.html --out box.h5 --timings");
+    let text = run.exits(0).stdout;
+    let last = text.trim_end().lines().last().unwrap();
+    assert!(last.contains("every one of 200 steps solved"), "{text}");
+    for says in
+        ["200 steps to t = 0.2", "2 bodies, 1 of them free", "penetration at most", "box.h5"]
+    {
+        assert!(text.contains(says), "{says}: {text}");
+    }
+    let table = std::fs::read_to_string(folder.path("box.csv")).unwrap();
+    assert_eq!(table.lines().count(), 201);
+    let columns = table.lines().next().unwrap().split(',').count();
+    assert!(table.lines().all(|line| line.split(',').count() == columns));
+    let page = std::fs::read_to_string(folder.path("box.html")).unwrap();
+    assert!(page.contains("a box") && !page.contains("https://"), "no network");
+
+    let json = folder.run("simulate box.toml --json --end 0.05");
+    let json: Value = serde_json::from_str(&json.exits(0).stdout).unwrap();
+    assert_eq!(json["status"], "solved");
+    assert_eq!(json["statuses"]["solved"], 50);
+    assert!(json["residual"].as_f64().unwrap() <= 1e-10);
+    assert!(json["imbalance"].as_f64().unwrap() <= 1e-12);
+}
+
+#[test]
+fn a_run_that_is_not_solved_says_so_and_exits_1() {
+    let folder = folder();
+    let run = folder.run(
+        "simulate box.toml --set solver.name=nsgs --set solver.tol=1e-300 --end 0.15 --dump-fclib steps",
+    );
+    let text = run.exits(1).stdout;
+    let last = text.trim_end().lines().last().unwrap();
+    assert!(last.contains("NOT SOLVED") && last.contains("the first at t = "), "{text}");
+    let dumped = std::fs::read_dir(folder.path("steps")).unwrap().next();
+    let name = dumped.unwrap().unwrap().file_name();
+    folder.run(&format!("solve steps/{} --tol 1e-8", name.to_string_lossy())).exits(0);
+}
+
+#[test]
+fn a_run_goes_on_where_it_ended_as_if_it_had_not() {
+    let folder = folder();
+    folder.run("simulate box.toml --out whole.h5 --csv whole.csv").exits(0);
+    folder.run("simulate box.toml --end 0.07 --out part.h5").exits(0);
+    let resumed = folder.run("simulate box.toml --resume part.h5 --csv resumed.csv").exits(0);
+    assert!(resumed.stdout.contains("every one of 130 steps"), "{}", resumed.stdout);
+    let [whole, resumed] = ["whole.csv", "resumed.csv"]
+        .map(|name| std::fs::read_to_string(folder.path(name)).unwrap());
+    assert_eq!(whole, resumed, "to the last bit");
+    folder.run("play part.h5 --html again.html").exits(0);
+    assert!(folder.path("again.html").exists());
+
+    let other = folder.run("simulate box.toml --resume part.h5 --set bodies[1].density=500");
+    other.refused(&["a trajectory of the same scene"]);
+}
+
+#[test]
+fn families_of_gen_move() {
+    let folder = Folder::new();
+    let run = folder.run("simulate stack --set count=3 --end 0.05").exits(0);
+    assert!(run.stdout.contains("every one of 5 steps solved"), "{}", run.stdout);
+}
+
+#[test]
+fn scenes_are_explained() {
+    let folder = folder();
+    let explained = folder.run("simulate box.toml --explain").exits(0).stdout;
+    std::fs::write(folder.path("explained.toml"), &explained).unwrap();
+    let again = folder.run("simulate explained.toml --explain").exits(0).stdout;
+    assert_eq!(explained, again);
+    assert!(explained.contains("theta = 0.5"), "{explained}");
+    let schema = folder.run("simulate --schema").exits(0).stdout;
+    let schema: Value = serde_json::from_str(&schema).unwrap();
+    assert!(schema["properties"]["bodies"].is_object());
+}
+
+#[test]
+fn mistakes_are_one_line() {
+    let folder = folder();
+    std::fs::write(folder.path("broken.toml"), "bodies = [").unwrap();
+    for (command, says) in [
+        ("simulate", "SCENE"),
+        ("simulate nowhere.toml", "nowhere.toml: expected a readable file"),
+        ("simulate wal", "wal: expected a file or a family of scenes"),
+        ("simulate broken.toml", "broken.toml: line 1: expected valid TOML"),
+        ("simulate box.toml --set time.h=-1", "box.toml: time.h: expected a positive number"),
+        ("simulate box.toml --set bodies[1].hight=3", "bodies[1].hight: unknown field"),
+        (
+            "simulate box.toml --set bodies[1].position=[0,0,0]",
+            "bodies overlap at the start: `floor` and `box` by",
+        ),
+        ("simulate box.toml --set solver.name=atuo", "did you mean `auto`?"),
+        ("simulate box.toml --out nowhere/run.h5", "--out nowhere/run.h5"),
+        ("simulate box.toml --time-limit -1", "--time-limit: expected a number of seconds"),
+        ("simulate stack --set cuont=3", "cuont"),
+        ("play box.toml", "box.toml"),
+    ] {
+        folder.run(command).refused(&[says]);
+    }
+}

@@ -1,0 +1,164 @@
+//! The scenes of examples/scenes: each step solved, the energy accounted for, and the number that each has to meet.
+
+use std::path::Path;
+
+use nonsmooth::simulate::{RunReport, SceneFile, Simulation, StepReport};
+
+/// A scene after its run; `watch` sees each step.
+fn run(name: &str, mut watch: impl FnMut(&Simulation, &StepReport)) -> (Simulation, RunReport) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/scenes");
+    let text = std::fs::read_to_string(folder.join(name).with_extension("toml")).unwrap();
+    let scene = SceneFile::parse(&text, &[]).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let mut simulation = scene.build().unwrap_or_else(|e| panic!("{name}: {e}"));
+    let mut see = |simulation: &Simulation, report: &StepReport| {
+        watch(simulation, report);
+        nonsmooth::simulate::Control::Continue
+    };
+    let report = simulation.run(scene.time.end, scene.time.h, &mut see).unwrap();
+    assert!(report.is_solved(), "{name}: {report}");
+    assert!(report.residual <= 1e-10, "{name}: {report}");
+    assert!(report.imbalance <= 1e-12, "{name}: {report}");
+    (simulation, report)
+}
+
+fn place(simulation: &Simulation, name: &str) -> usize {
+    simulation.world().bodies.iter().position(|b| b.name == name).expect("a body of this name")
+}
+
+#[test]
+fn every_scene_has_a_test() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/scenes");
+    let tests = include_str!("scenes.rs");
+    let mut count = 0;
+    for file in std::fs::read_dir(folder).unwrap() {
+        let path = file.unwrap().path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+            assert!(tests.contains(&format!("run(\"{name}\"")), "{name}");
+            count += 1;
+        }
+    }
+    assert!(count >= 10);
+}
+
+/// At rest from t = √(2z/g) (1 + e)/(1 − e) = 1.354571 s on; half of the speed, so a quarter of the energy, after the first impact.
+#[test]
+fn a_bouncing_ball_comes_to_rest_in_time() {
+    let mut last = 0.0;
+    let (simulation, _) = run("bouncing_ball", |simulation, report| {
+        if simulation.state().velocity[1][2].abs() > 1e-9 {
+            last = report.t;
+        }
+    });
+    assert!((last - 1.35457092295719).abs() < 0.01, "{last}");
+    let height = simulation.state().position[1][2];
+    assert!((height - 0.1).abs() < 1e-5, "{height}");
+    let force = simulation.contacts()[0].impulse[0] / 1e-3;
+    let weight = simulation.world().bodies[1].mass * 9.81;
+    assert!((force - weight).abs() <= 1e-9 * weight);
+}
+
+#[test]
+fn the_last_ball_of_a_cradle_leaves_with_the_speed() {
+    let (simulation, _) = run("newtons_cradle", |_, _| {});
+    let speeds: Vec<f64> = simulation.state().velocity.iter().map(|v| v[0]).collect();
+    for (k, speed) in speeds.iter().enumerate() {
+        let expected = if k == 4 { 1.0 } else { 0.0 };
+        assert!((speed - expected).abs() < 1e-9, "{speeds:?}");
+    }
+}
+
+/// η = 1 − (3/2) sin² α at the first impact on the other edge.
+#[test]
+fn a_rocking_block_loses_what_housner_says() {
+    let mut spins = vec![];
+    run("rocking_block", |simulation, _| {
+        let block = place(simulation, "block");
+        spins.push(simulation.state().spin[block][1]);
+    });
+    // The largest loss of angular velocity from one step to the next.
+    let drop = |k: &usize| (spins[*k] - spins[*k - 1]).abs();
+    let k = (1..spins.len() / 2).max_by(|a, b| drop(a).total_cmp(&drop(b))).unwrap();
+    let eta = spins[k] / spins[k - 1];
+    assert!((eta - 0.911764705882).abs() < 2e-3, "{eta}");
+}
+
+#[test]
+fn a_sliding_ball_rolls_with_five_sevenths() {
+    let mut rolls = None;
+    let (simulation, _) = run("sliding_to_rolling", |simulation, report| {
+        if report.counts.stick == 1 && rolls.is_none() {
+            rolls = Some(simulation.state().t);
+        }
+    });
+    let ball = place(&simulation, "ball");
+    let [v, _, _] = simulation.state().velocity[ball];
+    assert!((v - 15.0 / 7.0).abs() < 1e-10, "{v}");
+    assert!((rolls.unwrap() - 0.291247997670).abs() <= 2e-3, "{rolls:?}");
+}
+
+#[test]
+fn a_box_takes_the_speed_of_the_belt() {
+    let mut arrives = f64::NAN;
+    run("conveyor", |simulation, report| {
+        let v = simulation.state().velocity[place(simulation, "box")][0];
+        if arrives.is_nan() && v >= 2.0 - 1e-9 {
+            arrives = report.t;
+        }
+    });
+    assert!((arrives - 0.679578661230).abs() <= 2e-3, "{arrives}");
+}
+
+/// A ω² = 3.95 m/s² is more than mu g = 2.94: the blocks slide, but never faster than the table could make them.
+#[test]
+fn blocks_slide_on_a_shaking_table() {
+    let mut slipping = 0;
+    let (simulation, _) = run("shaking_table", |_, report| {
+        slipping += usize::from(report.counts.slip > 0);
+    });
+    assert!(slipping > 100, "{slipping}");
+    for name in ["lower block", "middle block", "upper block"] {
+        let v = simulation.state().velocity[place(&simulation, name)];
+        assert!(v[0].abs() <= 0.1 * std::f64::consts::TAU, "{name} {v:?}");
+    }
+}
+
+#[test]
+fn an_arch_stands() {
+    let (simulation, report) = run("arch", |_, _| {});
+    for (body, v) in simulation.world().bodies.iter().zip(&simulation.state().velocity) {
+        assert!(v.iter().all(|v| v.abs() < 1e-8), "{} {v:?}", body.name);
+    }
+    assert!(report.penetration < 1e-9);
+}
+
+#[test]
+fn a_ball_knocks_over_a_tower() {
+    let (simulation, _) = run("kapla_tower", |_, _| {});
+    let moved = simulation.world().bodies.iter().zip(&simulation.state().position);
+    let moved = moved.filter(|(b, x)| b.is_free() && (b.position[0] - x[0]).abs() > 0.005);
+    assert!(moved.count() > 2);
+}
+
+#[test]
+fn a_heap_of_balls_runs_out() {
+    let radius = |simulation: &Simulation| {
+        let free = simulation.world().bodies.iter().zip(&simulation.state().position);
+        let free = free.filter(|(b, _)| b.is_free());
+        free.map(|(_, x)| x[0].hypot(x[1])).fold(0.0, f64::max)
+    };
+    let mut first = None;
+    let (simulation, _) = run("granular_collapse", |simulation, _| {
+        first.get_or_insert(radius(simulation));
+    });
+    assert!(radius(&simulation) > 1.05 * first.unwrap());
+}
+
+/// 600 N on four boxes of 8 kg: the friction of three boxes' weights and of four on the floor lets the lowest one slip away from under them.
+#[test]
+fn the_lowest_box_slips_out_under_the_others() {
+    let (simulation, _) = run("pushed_stack", |_, _| {});
+    let x = |name: &str| simulation.state().position[place(&simulation, name)][0];
+    assert!(x("box 1") > x("box 2") + 0.01, "{} {}", x("box 1"), x("box 2"));
+    assert!(x("box 2") > 0.001);
+}
