@@ -59,6 +59,9 @@ pub(super) fn to_bytes(path: &Path, run: &Trajectory) -> Result<Vec<u8>, IoError
     file.finish().map_err(|e| failed(path, e))
 }
 
+/// A vector of a body or contact by its name in a file.
+type Vector<T> = (&'static str, fn(&T) -> [f64; 3]);
+
 /// What the layout cannot hold.
 fn check(path: &Path, run: &Trajectory) -> Result<(), IoError> {
     let bodies = run.bodies.len();
@@ -82,7 +85,7 @@ fn bodies(g: &mut Out, run: &Trajectory) -> Result<(), IoError> {
     g.bytes("fixed", run.bodies.iter().map(|b| u8::from(b.fixed)));
     let (n, b) = (run.frames.len(), run.bodies.len());
     let all = || run.frames.iter().flat_map(|f| &f.bodies);
-    let vectors: [(&str, fn(&State) -> [f64; 3]); 3] = [
+    let vectors: [Vector<State>; 3] = [
         ("position", |s| s.position),
         ("velocity", |s| s.velocity),
         ("angular_velocity", |s| s.angular_velocity),
@@ -106,7 +109,7 @@ fn contacts(g: &mut Out, run: &Trajectory) {
     g.ints("key", &[c, 4], all().flat_map(|t| t.key));
     g.ints("a", &[c], all().map(|t| t.a));
     g.ints("b", &[c], all().map(|t| t.b));
-    let vectors: [(&str, fn(&Contact) -> [f64; 3]); 4] = [
+    let vectors: [Vector<Contact>; 4] = [
         ("point", |t| t.point),
         ("r", Contact::world_impulse),
         ("r_local", |t| t.r),
@@ -137,11 +140,12 @@ fn steps(g: &mut Out, steps: &[Step]) -> Result<(), IoError> {
     g.texts("status_name", names.into_iter())?;
     g.longs("number", steps.iter().map(|s| s.number));
     g.longs("iterations", steps.iter().map(|s| s.iterations));
+    let mut steps = steps.to_vec();
     for (name, of) in super::STEP_REALS {
-        g.table(name, &s, steps.iter().map(|s| *of(&mut s.clone())));
+        g.table(name, &s, steps.iter_mut().map(|s| *of(s)));
     }
     for (name, of) in super::STEP_COUNTS {
-        g.ints(name, &s, steps.iter().map(|s| *of(&mut s.clone())));
+        g.ints(name, &s, steps.iter_mut().map(|s| *of(s)));
     }
     Ok(())
 }

@@ -12,10 +12,11 @@ use super::svg::{self, Drawing, shows_forces};
 use crate::SceneError;
 
 const PAGE: &str = include_str!("page/view.html");
-const STYLE: &str = include_str!("page/view.css");
+pub(super) const STYLE: &str = include_str!("page/view.css");
 const SCRIPT: &str = include_str!("page/view.js");
 const THREE: &str = include_str!("page/three.module.min.js");
 const CONTROLS: &str = include_str!("page/OrbitControls.js");
+const COMMON: &str = include_str!("page/common.js");
 
 /// What the script reads.
 #[derive(Serialize)]
@@ -33,8 +34,9 @@ struct Data<'a> {
     colours: Colours,
 }
 
+/// What is drawn in which colour.
 #[derive(Serialize)]
-struct Colours {
+pub(super) struct Colours {
     bodies: Vec<String>,
     obstacle: String,
     edge: String,
@@ -45,24 +47,11 @@ struct Colours {
     velocity: String,
 }
 
-/// Draws a picture as a page of HTML that holds it whole, with three.js: to turn, to come near, to see through.
-///
-/// The page begins with the view and with the bodies or forces that `drawing` asks for; its width and marks follow the window.
-///
-/// Errors: those of [`svg`](super::svg()).
-pub fn html(picture: &Picture, drawing: &Drawing) -> Result<String, SceneError> {
-    drawing.validate(picture)?;
-    let size = svg::body_size(picture);
-    let motion = |m| hex(svg::motion_colour(m));
-    let [open, stick, slip] = svg::MOTIONS.map(|m| motion(Some(m)));
-    let data = Data {
-        picture,
-        chains: picture.frames.iter().map(|frame| chains(picture, frame)).collect(),
-        size,
-        width: (0.15 * size).min(0.8 * svg::body_thickness(picture)),
-        forces: shows_forces(picture, drawing),
-        view: drawing.view,
-        colours: Colours {
+impl Default for Colours {
+    fn default() -> Self {
+        let motion = |m| hex(svg::motion_colour(m));
+        let [open, stick, slip] = svg::MOTIONS.map(|m| motion(Some(m)));
+        Self {
             bodies: svg::BODY.map(hex).to_vec(),
             obstacle: hex(svg::OBSTACLE),
             edge: svg::EDGE.into(),
@@ -71,28 +60,54 @@ pub fn html(picture: &Picture, drawing: &Drawing) -> Result<String, SceneError> 
             stick,
             slip,
             velocity: hex(svg::VELOCITY),
-        },
+        }
+    }
+}
+
+/// Draws a picture as a page of HTML that holds it whole, with three.js: to turn, to come near, to see through.
+///
+/// The page begins with the view and with the bodies or forces that `drawing` asks for; its width and marks follow the window.
+///
+/// Errors: those of [`svg`](super::svg()).
+pub fn html(picture: &Picture, drawing: &Drawing) -> Result<String, SceneError> {
+    drawing.validate(picture)?;
+    let size = svg::body_size(picture);
+    let data = Data {
+        picture,
+        chains: picture.frames.iter().map(|frame| chains(picture, frame)).collect(),
+        size,
+        width: (0.15 * size).min(0.8 * svg::body_thickness(picture)),
+        forces: shows_forces(picture, drawing),
+        view: drawing.view,
+        colours: Colours::default(),
     };
+    let title = escape(&picture.name);
+    Ok(filled(PAGE, &title, &short_json(&data), STYLE, SCRIPT))
+}
+
+/// A page with its parts in their places, each between `{{` and `}}`: title (as HTML), data (JSON), style, libraries and script.
+pub(super) fn filled(page: &str, title: &str, data: &str, style: &str, script: &str) -> String {
     let address =
         |script: &str| format!("data:text/javascript;base64,{}", BASE64_STANDARD.encode(script));
-    let mut page = String::with_capacity(2 * THREE.len());
+    let mut out = String::with_capacity(2 * THREE.len() + data.len());
     // Only the page itself is searched for places: what is put in may hold anything.
-    let mut rest = PAGE;
+    let mut rest = page;
     while let Some((before, after)) = rest.split_once("{{") {
         let (place, after) = after.split_once("}}").expect("a place of the page is closed");
-        page += before;
+        out += before;
         match place {
-            "title" => page += &escape(&picture.name),
-            "generator" => page += concat!("nonsmooth ", env!("CARGO_PKG_VERSION")),
-            "style" => page += STYLE,
+            "title" => out += title,
+            "generator" => out += concat!("nonsmooth ", env!("CARGO_PKG_VERSION")),
+            "style" => out += style,
             // In JSON `<` stands in texts only; without it nothing can end the element.
-            "data" => page += &short_json(&data).replace('<', "\\u003c"),
-            "three" => page += &address(THREE),
-            "controls" => page += &address(CONTROLS),
-            "script" => page += SCRIPT,
+            "data" => out += &data.replace('<', "\\u003c"),
+            "three" => out += &address(THREE),
+            "controls" => out += &address(CONTROLS),
+            "common" => out += &address(COMMON),
+            "script" => out += script,
             _ => unreachable!("a place of the page that nothing fills: {place}"),
         }
         rest = after;
     }
-    Ok(page + rest)
+    out + rest
 }

@@ -1,4 +1,4 @@
-//! Scenes as pictures: what is drawn ([`Picture`]), as a standalone SVG in perspective ([`svg`]) and as a page that can be turned ([`html`]).
+//! Scenes as pictures: what is drawn ([`Picture`]), as a standalone SVG in perspective ([`svg`]) and as a page that can be turned ([`html`]). Motion is a page that plays it ([`playback`]).
 
 mod camera;
 mod chains;
@@ -7,6 +7,8 @@ mod html;
 mod order;
 mod paper;
 mod picture;
+pub mod playback;
+mod surface;
 mod svg;
 
 pub use camera::View;

@@ -329,7 +329,7 @@ impl Body {
 }
 
 impl Part {
-    fn validate(&self, key: &str) -> Result<(), SceneError> {
+    pub(super) fn validate(&self, key: &str) -> Result<(), SceneError> {
         match self {
             Part::Ball { radius } => positive(&format!("{key}.radius"), *radius),
             Part::Convex { vertices, faces } => {
