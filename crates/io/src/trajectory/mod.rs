@@ -34,7 +34,7 @@ use crate::hdf5::File;
 const VERSION: (&str, i64) = ("trajectory_version", 1);
 
 /// What statuses of contacts are as numbers; 0 stands for those that took no part.
-const STATUSES: [Option<Motion>; 4] =
+pub(crate) const STATUSES: [Option<Motion>; 4] =
     [None, Some(Motion::Open), Some(Motion::Stick), Some(Motion::Slip)];
 
 /// A run of a simulation. SI units; the world frame unless it is said otherwise.
@@ -117,7 +117,16 @@ pub struct Contact {
 impl Contact {
     /// The impulse on b in the frame of the world, N·s.
     pub fn world_impulse(&self) -> [f64; 3] {
-        std::array::from_fn(|k| (0..3).map(|d| self.frame[d][k] * self.r[d]).sum())
+        self.in_world(self.r)
+    }
+
+    /// The relative velocity after the step in the frame of the world, m/s.
+    pub fn world_velocity(&self) -> [f64; 3] {
+        self.in_world(self.u)
+    }
+
+    fn in_world(&self, x: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|k| (0..3).map(|d| self.frame[d][k] * x[d]).sum())
     }
 }
 

@@ -167,7 +167,7 @@ function layGround() {
     const pose = poseOf(0, 0, body, new THREE.Matrix4()).multiply(local);
     const centre = ball.center.clone().applyMatrix4(pose.clone().invert()).setZ(0);
     const side = 3 * ball.radius;
-    const material = new THREE.MeshBasicMaterial({ color: themed('sheet'), transparent: true, opacity: 0.3, side: THREE.DoubleSide, depthWrite: false });
+    const material = new THREE.MeshBasicMaterial({ color: themed('sheet'), transparent: true, opacity: 0.3, side: THREE.DoubleSide, forceSinglePass: true, depthWrite: false });
     const sheet = new THREE.Mesh(new THREE.PlaneGeometry(side, side), material);
     sheet.position.copy(centre).setZ(-1e-3 * ball.radius);
     group.add(sheet, grid(side, sheet.position, new THREE.Vector3(1, 0, 0), new THREE.Vector3(0, 0, 1), [themed('line'), themed('thin')]));
