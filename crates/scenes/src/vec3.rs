@@ -10,41 +10,49 @@ pub(crate) const Y: Vec3 = [0.0, 1.0, 0.0];
 pub(crate) const Z: Vec3 = [0.0, 0.0, 1.0];
 
 /// `a · b`.
+#[inline]
 pub fn dot(a: Vec3, b: Vec3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// `a × b`.
+#[inline]
 pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// `a + b`.
+#[inline]
 pub fn add(a: Vec3, b: Vec3) -> Vec3 {
     std::array::from_fn(|k| a[k] + b[k])
 }
 
 /// `a − b`.
+#[inline]
 pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
     std::array::from_fn(|k| a[k] - b[k])
 }
 
 /// `s a`.
+#[inline]
 pub fn scale(s: f64, a: Vec3) -> Vec3 {
     a.map(|x| s * x)
 }
 
 /// `‖a‖`.
+#[inline]
 pub fn norm(a: Vec3) -> f64 {
     dot(a, a).sqrt()
 }
 
 /// `a/‖a‖`; components that are not finite where a is zero.
+#[inline]
 pub fn normalise(a: Vec3) -> Vec3 {
     scale(1.0 / norm(a), a)
 }
 
 /// `A x`.
+#[inline]
 pub fn apply(a: &Mat3, x: Vec3) -> Vec3 {
     a.map(|row| dot(row, x))
 }

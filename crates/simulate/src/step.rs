@@ -78,7 +78,10 @@ struct Moving {
     moment: Vec3,
 }
 
-/// One side of a contact: sign, body, and angular columns: of impulses, of those through the inverse of J, of velocities.
+/// Six components of a body for each direction of a contact; the fourth place is for the processor.
+type Columns = [[f64; 4]; 6];
+
+/// One side of a contact.
 #[derive(Debug, Clone, Copy)]
 struct Arm {
     body: u32,
@@ -87,9 +90,9 @@ struct Arm {
     /// `(p − x) × d` in the world frame, for impulses and for velocities.
     moment: [Vec3; 3],
     moment_end: [Vec3; 3],
-    columns: [Vec3; 3],
-    solved: [Vec3; 3],
-    rows: [Vec3; 3],
+    /// Velocities of the body to relative velocities, and impulses to velocities of the body.
+    rows: Columns,
+    solved: Columns,
 }
 
 /// A contact of the index set.
@@ -100,6 +103,8 @@ struct Row {
     /// Directions of impulses and of velocities.
     frame: [Vec3; 3],
     frame_end: [Vec3; 3],
+    /// Whether velocities are taken elsewhere than impulses.
+    later: bool,
     arms: [Arm; 2],
     /// Velocity of what is moved, along the directions: at the end of the step (in the law), and weighted by θ (in the energy).
     given: [f64; 3],
@@ -137,6 +142,10 @@ pub(crate) struct Tools {
     /// The first contact of each body in the island, and for each contact the next one of its two bodies.
     heads: Vec<u32>,
     next: Vec<[u32; 2]>,
+    /// For each contact the place of the last block of its row of W that was mirrored, at first the diagonal one.
+    mirrored: Vec<u32>,
+    /// The free bodies of the island that is being solved.
+    members: Vec<u32>,
     slots: Vec<Slot>,
     wrenches: Wrenches,
     middle: State,
@@ -151,6 +160,8 @@ pub(crate) struct Inner<'a> {
 }
 
 const NONE: u32 = u32::MAX;
+/// Directions that differ by less are the same, relative.
+const SAME: f64 = 1e-13;
 
 impl Tools {
     pub fn new(world: &World, state: &State) -> Result<Self, SimulateError> {
@@ -179,6 +190,8 @@ impl Tools {
             islands: Islands::default(),
             heads: vec![],
             next: vec![],
+            mirrored: vec![],
+            members: vec![],
             slots: vec![],
             wrenches: Wrenches::default(),
             middle: State { memory: Default::default(), ..state.clone() },
@@ -472,19 +485,21 @@ impl Tools {
                 let free = b.free;
                 let moment = frame.map(|d| cross(sub(place.point, b.middle.x), d));
                 let moment_end = frame_end.map(|d| cross(sub(place_end.point, x_end), d));
-                let zero = [[0.0; 3]; 3];
-                Arm {
-                    body,
-                    sign,
-                    free,
-                    moment,
-                    moment_end,
-                    columns: zero,
-                    solved: zero,
-                    rows: zero,
-                }
+                let (rows, solved) = ([[0.0; 4]; 6], [[0.0; 4]; 6]);
+                Arm { body, sign, free, moment, moment_end, rows, solved }
             };
-            let arms = [arm(near.a, -1.0), arm(near.b, 1.0)];
+            let mut arms = [arm(near.a, -1.0), arm(near.b, 1.0)];
+            // Where nothing moves the two ends are the same up to rounding; then W is symmetric to the last bit.
+            let mut frame_end = frame_end;
+            let far = |p: &[Vec3; 3], q: &[Vec3; 3]| {
+                (0..3).map(|i| norm(sub(p[i], q[i]))).fold(0.0, f64::max)
+            };
+            let apart = arms.iter().map(|a| far(&a.moment, &a.moment_end)).fold(0.0, f64::max);
+            let later = later && (far(&frame, &frame_end) > SAME || apart > SAME * near.size);
+            if !later {
+                frame_end = frame;
+                arms.iter_mut().for_each(|a| a.moment_end = a.moment);
+            }
             let (mut given, mut given_mean, mut before) = ([0.0; 3], [0.0; 3], [0.0; 3]);
             let theta = scheme.theta;
             for Arm { body, sign, moment, .. } in &arms {
@@ -529,6 +544,7 @@ impl Tools {
                 place,
                 frame,
                 frame_end,
+                later,
                 arms,
                 given,
                 given_mean,
@@ -593,13 +609,17 @@ impl Tools {
         h: f64,
     ) -> Result<(StepStatus, u32, f64, usize, f64), SimulateError> {
         let (mut passes, mut iterations, mut seconds) = (0, 0, 0.0);
+        self.members.clear();
+        for &c in &self.islands.order[range.0..range.1] {
+            let arms = &self.rows[c as usize].arms;
+            self.members.extend(arms.iter().filter(|a| a.free).map(|a| a.body));
+        }
+        self.members.sort_unstable();
+        self.members.dedup();
         loop {
             passes += 1;
-            for c in range.0..range.1 {
-                let arms = self.rows[self.islands.order[c] as usize].arms;
-                for arm in arms.iter().filter(|a| a.free) {
-                    self.bodies[arm.body as usize].pass(scheme, h);
-                }
+            for &b in &self.members {
+                self.bodies[b as usize].pass(scheme, h);
             }
             self.columns(range);
             if !self.assemble(range, k) {
@@ -641,12 +661,18 @@ impl Tools {
             for arm in row.arms.iter_mut().filter(|a| a.free) {
                 let b = &self.bodies[arm.body as usize];
                 for i in 0..3 {
-                    arm.columns[i] = apply(&b.frame, arm.moment[i]);
-                    arm.solved[i] = apply(&b.inverse, arm.columns[i]);
-                }
-                arm.rows = arm.columns;
-                if row.frame_end != row.frame || arm.moment_end != arm.moment {
-                    arm.rows = arm.moment_end.map(|m| apply(&b.frame_end, m));
+                    let column = apply(&b.frame, arm.moment[i]);
+                    let turned = match row.later {
+                        true => apply(&b.frame_end, arm.moment_end[i]),
+                        false => column,
+                    };
+                    let solved = apply(&b.inverse, column);
+                    for k in 0..3 {
+                        arm.rows[k][i] = arm.sign * row.frame_end[i][k];
+                        arm.rows[3 + k][i] = arm.sign * turned[k];
+                        arm.solved[k][i] = arm.sign * row.frame[i][k] / b.mass;
+                        arm.solved[3 + k][i] = arm.sign * solved[k];
+                    }
                 }
             }
         }
@@ -654,7 +680,7 @@ impl Tools {
 
     /// States the contact problem of an island in slot k; false where it has a number that is not finite.
     fn assemble(&mut self, range: (usize, usize), k: usize) -> bool {
-        let Self { islands, rows, bodies, heads, next, slots, .. } = self;
+        let Self { islands, rows, bodies, heads, next, mirrored, slots, .. } = self;
         let order = &islands.order[range.0..range.1];
         let n = order.len();
         // The contacts of each body as a list, in order: made from the back.
@@ -680,6 +706,9 @@ impl Tools {
         problem.mu.clear();
         point.r.clear();
         let mut check = 0.0;
+        let symmetric = order.iter().all(|&c| !rows[c as usize].later);
+        mirrored.clear();
+        mirrored.resize(n, 0_u32);
         for c in 0..n {
             let row = &rows[order[c] as usize];
             problem.mu.push(row.mu);
@@ -688,12 +717,12 @@ impl Tools {
                 let mut q = row.given[i] + row.shift[i];
                 for arm in row.arms.iter().filter(|a| a.free) {
                     let b = &bodies[arm.body as usize];
-                    q += arm.sign
-                        * (dot(row.frame_end[i], b.v_free) + dot(arm.rows[i], b.spin_free));
+                    q += arm.velocity(i, b.v_free, b.spin_free);
                 }
                 problem.q.push(q);
                 check += 0.0 * q;
             }
+            let mut width = 0;
             // The contacts of the two bodies, merged; a body that is not free has none.
             let [mut p, mut q] =
                 row.arms.map(|a| if a.free { heads[a.body as usize] } else { NONE });
@@ -705,8 +734,19 @@ impl Tools {
                 if q == j {
                     q = after(j, row.arms[1].body);
                 }
-                let other = &rows[order[j as usize] as usize];
-                let block = coupling(row, other, bodies);
+                let block = if symmetric && (j as usize) < c {
+                    // Row j has met later contacts in the order in which they ask for it.
+                    let at = &mut mirrored[j as usize];
+                    *at += 1;
+                    let there = &problem.W.row(j as usize).1[*at as usize];
+                    std::array::from_fn(|p| std::array::from_fn(|q| there[q][p]))
+                } else {
+                    if j as usize == c {
+                        mirrored[c] = width;
+                    }
+                    coupling(row, &rows[order[j as usize] as usize])
+                };
+                width += 1;
                 check += 0.0 * (block[0][0] + block[1][1] + block[2][2]);
                 problem.W.push(j as usize, block);
             }
@@ -717,13 +757,11 @@ impl Tools {
 
     /// Velocities after the step with the impulses of an island; how much solving the rotations exactly has changed them, relative.
     fn respond(&mut self, scheme: &MoreauJean, range: (usize, usize), h: f64) -> f64 {
-        let Self { islands, rows, bodies, .. } = self;
+        let Self { islands, rows, bodies, members, .. } = self;
         let order = &islands.order[range.0..range.1];
-        for &c in order {
-            for arm in rows[c as usize].arms.iter().filter(|a| a.free) {
-                let b = &mut bodies[arm.body as usize];
-                (b.impulse, b.moment) = ([0.0; 3], [0.0; 3]);
-            }
+        for &b in members.iter() {
+            let b = &mut bodies[b as usize];
+            (b.impulse, b.moment) = ([0.0; 3], [0.0; 3]);
         }
         for &c in order {
             let row = &rows[c as usize];
@@ -737,18 +775,16 @@ impl Tools {
             }
         }
         let (mut change, mut size): (f64, f64) = (0.0, f64::MIN_POSITIVE);
-        for &c in order {
-            for arm in rows[c as usize].arms.iter().filter(|a| a.free) {
-                let b = &mut bodies[arm.body as usize];
-                let linear = add(b.spin_free, apply(&b.inverse, apply(&b.frame, b.moment)));
-                b.rotate(scheme, h);
-                let moved = norm(sub(b.spin_new, linear)) * b.radius;
-                // Larger of the two, or the one that is no number.
-                change = if moved > change || moved.is_nan() { moved } else { change };
-                let spin = norm(b.spin).max(norm(b.spin_new)) * b.radius;
-                size = size.max(norm(b.v)).max(norm(b.v_new)).max(spin);
-                size = size.max(norm(b.push) / b.mass);
-            }
+        for &b in members.iter() {
+            let b = &mut bodies[b as usize];
+            let linear = add(b.spin_free, apply(&b.inverse, apply(&b.frame, b.moment)));
+            b.rotate(scheme, h);
+            let moved = norm(sub(b.spin_new, linear)) * b.radius;
+            // Larger of the two, or the one that is no number.
+            change = if moved > change || moved.is_nan() { moved } else { change };
+            let spin = norm(b.spin).max(norm(b.spin_new)) * b.radius;
+            size = size.max(norm(b.v)).max(norm(b.v_new)).max(spin);
+            size = size.max(norm(b.push) / b.mass);
         }
         change / size
     }
@@ -883,8 +919,7 @@ impl Tools {
                     report.after[i] = row.given[i];
                     for arm in row.arms.iter().filter(|a| a.free) {
                         let b = &self.bodies[arm.body as usize];
-                        let u = dot(row.frame_end[i], b.v_new) + dot(arm.rows[i], b.spin_new);
-                        report.after[i] += arm.sign * u;
+                        report.after[i] += arm.velocity(i, b.v_new, b.spin_new);
                     }
                 }
             }
@@ -1000,23 +1035,29 @@ fn advanced(state: &State, k: usize, time: f64) -> (Vec3, Rotation) {
     (x, Rotation(state.rotation[k]).after(cayley(scale(time, state.spin[k]))))
 }
 
-/// The block of W of two contacts, `Σ` over the bodies that they share.
+impl Arm {
+    /// Component i of the relative velocity that the body makes with these velocities.
+    fn velocity(&self, i: usize, v: Vec3, spin: Vec3) -> f64 {
+        (0..3).map(|k| self.rows[k][i] * v[k] + self.rows[3 + k][i] * spin[k]).sum()
+    }
+}
+
+/// The block of W of two contacts, a sum over the bodies that they share.
 #[inline]
-fn coupling(row: &Row, other: &Row, bodies: &[Moving]) -> [[f64; 3]; 3] {
-    let mut block = [[0.0; 3]; 3];
+fn coupling(row: &Row, other: &Row) -> [[f64; 3]; 3] {
+    let mut sum = [[0.0; 4]; 3];
     for p in row.arms.iter().filter(|p| p.free) {
-        for q in other.arms.iter().filter(|q| q.free && q.body == p.body) {
-            let sign = p.sign * q.sign;
-            let linear = sign / bodies[p.body as usize].mass;
-            for i in 0..3 {
-                for j in 0..3 {
-                    block[i][j] += linear * dot(row.frame_end[i], other.frame[j])
-                        + sign * dot(p.rows[i], q.solved[j]);
+        for q in other.arms.iter().filter(|q| q.body == p.body) {
+            for (left, right) in p.rows.iter().zip(&q.solved) {
+                for i in 0..3 {
+                    for j in 0..4 {
+                        sum[i][j] += left[i] * right[j];
+                    }
                 }
             }
         }
     }
-    block
+    sum.map(|[x, y, z, _]| [x, y, z])
 }
 
 /// The axis of the world whose part across the normal makes the first tangent: that of the last step unless it has come near the normal.
