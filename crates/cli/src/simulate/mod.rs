@@ -14,6 +14,7 @@ use nonsmooth_solve::settings;
 
 use self::record::Recorder;
 use crate::progress::RunBar;
+use crate::report::row;
 use crate::{Exit, files, interrupt, output};
 
 /// Move the bodies of a scene through impacts, sticking and sliding: Moreau-Jean time stepping, every step judged.
@@ -45,6 +46,9 @@ pub struct Args {
     /// Write time, energy by terms, residual and counts, a row a step
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
+    /// Write for ParaView: FILE.pvd, with the frames in a folder beside it
+    #[arg(long, value_name = "FILE.pvd")]
+    vtk: Option<PathBuf>,
     /// Write the contact problem of each step that is not solved, and with --dump-every of others, as FCLIB files in this folder
     #[arg(long, value_name = "DIR")]
     dump_fclib: Option<PathBuf>,
@@ -82,7 +86,7 @@ Examples:
 
 Exit codes: 0 every step is solved; 1 a step is not solved, or the run was stopped; 2 a mistake in a file or an option; 130 Ctrl-C pressed twice.";
 
-/// Make a page that plays a trajectory in a browser.
+/// Make a page that plays a trajectory in a browser, or files for ParaView and other viewers.
 #[derive(Debug, clap::Args)]
 pub struct PlayArgs {
     /// A trajectory that `nonsmooth simulate --out` has written
@@ -90,6 +94,12 @@ pub struct PlayArgs {
     /// The page, without a network [default: the file's name with .html]
     #[arg(long, value_name = "FILE.html")]
     html: Option<PathBuf>,
+    /// For ParaView: FILE.pvd, with the frames in a folder beside it
+    #[arg(long, value_name = "FILE.pvd")]
+    vtk: Option<PathBuf>,
+    /// As glTF, for Blender and other viewers
+    #[arg(long, value_name = "FILE.glb")]
+    glb: Option<PathBuf>,
 }
 
 /// The end of a family's run, s, where nobody says another.
@@ -147,7 +157,8 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let out = target(&args.out, &scene.output.trajectory, &path).or_else(|| args.resume.clone());
     let html = target(&args.html, &scene.output.html, &path);
     let csv = target(&args.csv, &scene.output.csv, &path);
-    for (option, path) in [("--out", &out), ("--html", &html), ("--csv", &csv)] {
+    let vtk = target(&args.vtk, &scene.output.vtk, &path);
+    for (option, path) in [("--out", &out), ("--html", &html), ("--csv", &csv), ("--vtk", &vtk)] {
         if let Some(path) = path {
             files::writable(option, path)?;
         }
@@ -165,7 +176,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     };
     let mut simulation = scene.build().map_err(wrong)?.with_limits(limits);
     simulation.warnings().iter().for_each(|w| output::remark(&format!("warning: {w}\n")));
-    let frames = out.is_some() || html.is_some();
+    let frames = out.is_some() || html.is_some() || vtk.is_some();
     let mut recorder = Recorder::new(&scene, &simulation, frames);
     if let Some(file) = &args.resume {
         recorder.resume(file, &mut simulation)?;
@@ -222,6 +233,10 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         )?;
         written.push(html.clone());
     }
+    if let Some(vtk) = &vtk {
+        record::paraview(vtk, &recorder.trajectory, simulation.world())?;
+        written.push(vtk.clone());
+    }
     let run = said::Run {
         path: &path,
         scene: &scene,
@@ -245,15 +260,31 @@ fn complete(report: &RunReport) -> bool {
 /// Runs `play`.
 pub fn play(args: &PlayArgs) -> Result<Exit, String> {
     let file = &args.file;
-    let html = args.html.clone().unwrap_or_else(|| file.with_extension("html"));
-    files::writable("--html", &html)?;
+    let page = args.html.is_some() || (args.vtk.is_none() && args.glb.is_none());
+    let html = page.then(|| args.html.clone().unwrap_or_else(|| file.with_extension("html")));
+    for (option, path) in [("--html", &html), ("--vtk", &args.vtk), ("--glb", &args.glb)] {
+        if let Some(path) = path {
+            files::writable(option, path)?;
+        }
+    }
     let trajectory = Trajectory::read(file).map_err(|e| e.to_string())?;
     let wrong = |e| format!("{}: /scene: {e}", file.display());
     let scene = SceneFile::parse(&trajectory.scene, &[]).map_err(wrong)?;
     let world = scene.world().map_err(wrong)?;
-    files::write_text("--html", &html, &record::page(&trajectory, &scene, &world)?)?;
     let (frames, steps) = (trajectory.frames.len(), trajectory.steps.len());
-    let (file, html) = (file.display(), html.display());
-    output::print(&format!("{file}: {frames} frames of {steps} steps\n  page       {html}\n"));
+    let mut said = format!("{}: {frames} frames of {steps} steps\n", file.display());
+    if let Some(html) = &html {
+        files::write_text("--html", html, &record::page(&trajectory, &scene, &world)?)?;
+        row(&mut said, "page", html.display());
+    }
+    if let Some(vtk) = &args.vtk {
+        record::paraview(vtk, &trajectory, &world)?;
+        row(&mut said, "ParaView", vtk.display());
+    }
+    if let Some(glb) = &args.glb {
+        record::gltf(glb, &trajectory, &world)?;
+        row(&mut said, "glTF", glb.display());
+    }
+    output::print(&said);
     Ok(Exit::Solved)
 }

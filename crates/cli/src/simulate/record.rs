@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 use nonsmooth_io::trajectory::{
     Checkpoint, Contact, Energy, Frame, Named, State, Step, Trajectory,
 };
-use nonsmooth_io::{Info, ProblemFile};
+
+use nonsmooth_io::{Info, Mesh, ProblemFile, vtk};
 use nonsmooth_problem::check::Motion;
 use nonsmooth_problem::{AnyProblem, Friction, FrictionLocal, Problem};
 use nonsmooth_scenes::draw::playback::{self, Drawn, Form, Moment, Placed, Playback};
@@ -283,6 +284,25 @@ fn playback(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Playba
 /// The page that plays a trajectory.
 pub fn page(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Result<String, String> {
     playback(trajectory, scene, world).html(playback::LIMIT).map_err(|e| e.to_string())
+}
+
+fn meshes(trajectory: &Trajectory, world: &World) -> Vec<Vec<Mesh>> {
+    let nameless = SceneFile::of_family("", Default::default(), 1.0, 0.0);
+    let surfaces = playback(trajectory, &nameless, world).surfaces();
+    let mesh = |s: playback::Surface| Mesh { vertices: s.vertices, faces: s.faces, smooth: s.smooth };
+    surfaces.into_iter().map(|all| all.into_iter().map(mesh).collect()).collect()
+}
+
+/// Files for ParaView.
+pub fn paraview(path: &Path, trajectory: &Trajectory, world: &World) -> Result<(), String> {
+    let meshes = meshes(trajectory, world);
+    vtk::write(path, trajectory, &meshes).map_err(|e| format!("--vtk {e}"))
+}
+
+/// A glTF file.
+pub fn gltf(path: &Path, trajectory: &Trajectory, world: &World) -> Result<(), String> {
+    let meshes = meshes(trajectory, world);
+    nonsmooth_io::gltf::write(path, trajectory, &meshes).map_err(|e| format!("--glb {e}"))
 }
 
 /// Writes contact problems of steps, and lets another observer see them.

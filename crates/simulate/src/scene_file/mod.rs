@@ -382,11 +382,14 @@ pub struct OutputTable {
     /// A table of time, energy and residual, a row a step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub csv: Option<String>,
+    /// For ParaView, a .pvd file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vtk: Option<String>,
 }
 
 impl Default for OutputTable {
     fn default() -> Self {
-        Self { every: 1, trajectory: None, html: None, csv: None }
+        Self { every: 1, trajectory: None, html: None, csv: None, vtk: None }
     }
 }
 
