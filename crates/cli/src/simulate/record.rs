@@ -289,7 +289,8 @@ pub fn page(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Result
 fn meshes(trajectory: &Trajectory, world: &World) -> Vec<Vec<Mesh>> {
     let nameless = SceneFile::of_family("", Default::default(), 1.0, 0.0);
     let surfaces = playback(trajectory, &nameless, world).surfaces();
-    let mesh = |s: playback::Surface| Mesh { vertices: s.vertices, faces: s.faces, smooth: s.smooth };
+    let mesh =
+        |s: playback::Surface| Mesh { vertices: s.vertices, faces: s.faces, smooth: s.smooth };
     surfaces.into_iter().map(|all| all.into_iter().map(mesh).collect()).collect()
 }
 
