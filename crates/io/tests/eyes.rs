@@ -1,7 +1,5 @@
 //! Runs for other programs: what stands in the files of ParaView and of glTF, read by other parsers than wrote them.
 
-// Of what tests of formats share this needs one function.
-#[allow(dead_code)]
 mod common;
 mod motion;
 

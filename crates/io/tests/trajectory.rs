@@ -1,7 +1,5 @@
 //! The file of a simulation: what is written is read, by us and by h5py; what is damaged or does not fit is one line.
 
-// Of what tests of other formats share this needs one function.
-#[allow(dead_code)]
 mod common;
 mod motion;
 

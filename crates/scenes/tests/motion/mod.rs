@@ -109,7 +109,7 @@ pub fn playback(frames: usize) -> Playback {
     let residual = |k: usize| {
         [
             0.01 * k as f64,
-            1e-11 * (1.5 + (0.7 * k as f64).sin()) * if k % 37 == 0 { 300.0 } else { 1.0 },
+            1e-11 * (1.5 + (0.7 * k as f64).sin()) * if k.is_multiple_of(37) { 300.0 } else { 1.0 },
         ]
     };
     Playback {
