@@ -55,9 +55,19 @@ impl State {
     /// A vector of the body's frame in that of the world.
     pub(crate) fn turned(&self, x: [f64; 3]) -> [f64; 3] {
         let [w, q @ ..] = self.rotation;
-        // x + 2 q × (q × x + w x)
-        let t = cross(q, x);
-        let s = cross(q, std::array::from_fn(|k| t[k] + w * x[k]));
-        std::array::from_fn(|k| x[k] + 2.0 * s[k])
+        rotated(w, q, x)
     }
+
+    /// A vector of the world in the body's frame.
+    pub(crate) fn turned_back(&self, x: [f64; 3]) -> [f64; 3] {
+        let [w, q @ ..] = self.rotation;
+        rotated(w, q.map(|c| -c), x)
+    }
+}
+
+/// `x + 2 q × (q × x + w x)`.
+fn rotated(w: f64, q: [f64; 3], x: [f64; 3]) -> [f64; 3] {
+    let t = cross(q, x);
+    let s = cross(q, std::array::from_fn(|k| t[k] + w * x[k]));
+    std::array::from_fn(|k| x[k] + 2.0 * s[k])
 }

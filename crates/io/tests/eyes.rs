@@ -9,6 +9,7 @@ use std::process::Command;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use motion::run;
+use nonsmooth_io::siconos::write_histories;
 use nonsmooth_io::{Mesh, gltf, vtk};
 use roxmltree::{Document, Node};
 use serde_json::Value;
@@ -244,4 +245,43 @@ fn what_cannot_be_shown_is_refused() {
     let bare = folder.path().join("run");
     assert!(line(vtk::write(&bare, &run(2), &meshes())).contains("ends in .pvd"));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn siconos_histories_are_tables_that_h5py_reads() {
+    const READ: &str = r#"
+import sys, h5py
+with h5py.File(sys.argv[1]) as f:
+    d = f["data"]
+    print(int(f.attrs["dimension"]), {k: v.shape for k, v in sorted(d.items())})
+    print(d["static"][1, :3].tolist(), d["dynamic"][3, :2].tolist(), [round(x, 12) + 0.0 for x in d["velocities"][2].tolist()])
+    print(d["cf"][-3].tolist())
+    print(d["cf"][-1].tolist())
+    print(d["solv"][1].tolist())
+"#;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("siconos.hdf5");
+    let mut content = run(5);
+    // Turned by a quarter about x, an angular velocity along z is one along y of the body.
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    content.frames[1].bodies[1].rotation = [half, half, 0.0, 0.0];
+    content.frames[1].bodies[1].angular_velocity = [0.0, 0.0, 0.5];
+    // The last contact from the other side: the floor is its second body.
+    let contact = content.frames[4].contacts.last_mut().unwrap();
+    (contact.a, contact.b) = (2, 0);
+    write_histories(&path, &content).unwrap();
+    let here = Command::new("python3").args(["-c", "import h5py"]).output();
+    if !here.is_ok_and(|o| o.status.success()) {
+        common::skipped("python3 with h5py is not here");
+        return;
+    }
+    let output = Command::new("python3").args(["-c", READ]).arg(&path).output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    // Of 0 to 4 contacts in five frames the first took no part.
+    let expected = "3 {'cf': (6, 26), 'dynamic': (10, 9), 'solv': (10, 4), 'static': (5, 9), 'velocities': (10, 8)}\n\
+        [0.01, -1.0, 0.0] [0.01, 3.0] [0.01, 2.0, 1.0, 0.0, -0.01, 0.0, 0.5, 0.0]\n\
+        [0.04, 0.3, 0.04, 1.0, 0.0, 0.04, 1.0, 0.0, 0.0, 0.0, 1.0, -0.5, 0.25, 2.0, -1e-09, 0.0, 0.0, 0.0, 0.125, 0.0, 2.0, -0.5, 0.25, 0.0, 3.0, 3.0]\n\
+        [0.04, 0.3, 0.04, 3.0, 0.0, 0.04, 3.0, 0.0, -0.0, -0.0, -1.0, 0.5, -0.25, -2.0, -1e-09, 0.0, 0.0, 0.0, 0.125, 0.0, 2.0, -0.5, 0.25, 2.0, 3.0, 3.0]\n\
+        [0.01, 3.0, 1e-12, 1e-12]\n";
+    assert_eq!(said, expected, "{}", String::from_utf8_lossy(&output.stderr));
 }

@@ -25,6 +25,7 @@
 mod friction;
 mod linear;
 mod matrix;
+mod mechanics;
 
 use std::path::Path;
 
@@ -33,6 +34,8 @@ use nonsmooth_problem::{AnyProblem, Kind};
 use crate::format::About;
 use crate::tokens::{Tokens, text};
 use crate::{Format, IoError, ProblemFile};
+
+pub use mechanics::write_histories;
 
 /// The format: read, not written.
 ///

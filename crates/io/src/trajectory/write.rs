@@ -12,7 +12,7 @@ use crate::folder::{Out, failed};
 const CHUNK: u64 = 1 << 17;
 
 pub(super) fn to_bytes(path: &Path, run: &Trajectory) -> Result<Vec<u8>, IoError> {
-    check(path, run)?;
+    run.check(path)?;
     let mut file = FileBuilder::new();
     // The oldest format that has chunks in the builder, for the sake of old readers.
     file.with_libver_bounds(LibVer::V110, LibVer::V110);
@@ -62,22 +62,36 @@ pub(super) fn to_bytes(path: &Path, run: &Trajectory) -> Result<Vec<u8>, IoError
 /// A vector of a body or contact by its name in a file.
 type Vector<T> = (&'static str, fn(&T) -> [f64; 3]);
 
-/// What the layout cannot hold.
-fn check(path: &Path, run: &Trajectory) -> Result<(), IoError> {
-    let bodies = run.bodies.len();
-    for (k, frame) in run.frames.iter().enumerate() {
-        if frame.bodies.len() != bodies {
-            let expected = format!("{bodies} bodies, as in /bodies/name");
-            return Err(IoError::data(path, format!("/frames[{k}]"), expected, frame.bodies.len()));
-        }
-        for (c, contact) in frame.contacts.iter().enumerate() {
-            if let Some(body) = [contact.a, contact.b].into_iter().find(|&i| i as usize >= bodies) {
-                let place = format!("/contacts of frame {k}, [{c}]");
-                return Err(IoError::data(path, place, format!("one of {bodies} bodies"), body));
+impl Trajectory {
+    /// What no layout of a run can hold.
+    pub(crate) fn check(&self, path: &Path) -> Result<(), IoError> {
+        let bodies = self.bodies.len();
+        for (k, frame) in self.frames.iter().enumerate() {
+            if frame.bodies.len() != bodies {
+                let expected = format!("{bodies} bodies, as in /bodies/name");
+                return Err(IoError::data(
+                    path,
+                    format!("/frames[{k}]"),
+                    expected,
+                    frame.bodies.len(),
+                ));
+            }
+            for (c, contact) in frame.contacts.iter().enumerate() {
+                if let Some(body) =
+                    [contact.a, contact.b].into_iter().find(|&i| i as usize >= bodies)
+                {
+                    let place = format!("/contacts of frame {k}, [{c}]");
+                    return Err(IoError::data(
+                        path,
+                        place,
+                        format!("one of {bodies} bodies"),
+                        body,
+                    ));
+                }
             }
         }
+        Ok(())
     }
-    Ok(())
 }
 
 fn bodies(g: &mut Out, run: &Trajectory) -> Result<(), IoError> {
@@ -152,7 +166,7 @@ fn steps(g: &mut Out, steps: &[Step]) -> Result<(), IoError> {
 
 /// Tables of trajectories.
 impl Out<'_> {
-    fn table(&mut self, name: &str, shape: &[usize], x: impl IntoIterator<Item = f64>) {
+    pub(crate) fn table(&mut self, name: &str, shape: &[usize], x: impl IntoIterator<Item = f64>) {
         let x: Vec<f64> = x.into_iter().collect();
         pack(self.group.create_dataset(name).with_f64_data(&x), shape, 8);
     }
