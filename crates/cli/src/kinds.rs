@@ -30,7 +30,7 @@ pub fn size(problem: &AnyProblem) -> String {
 pub fn start_of(problem: &AnyProblem) -> Vec<f64> {
     match problem.origin() {
         AnyPoint::Lcp(point) => point.z,
-        AnyPoint::Hlcp(_) | AnyPoint::Local(_) | AnyPoint::Global(_) => vec![],
+        _ => vec![],
     }
 }
 

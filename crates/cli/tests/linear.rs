@@ -302,7 +302,7 @@ fn solvers_of_both_classes_are_listed_apart() {
     assert!(contact.contains("\nnsgs: ") && !contact.contains("\nprojected_jacobi: "));
     assert!(linear.contains("\nprojected_jacobi: ") && !linear.contains("\nnsgs: "));
     let both = folder.run("list auto").exits(0).stdout;
-    assert_eq!(both.matches("auto (the default): ").count(), 2, "{both}");
+    assert_eq!(both.matches("auto (the default): ").count(), 3, "contact, mcp and vi: {both}");
     let page = folder.run("list --markdown").exits(0).stdout;
     assert!(page.contains("](#auto)") && page.contains("](#auto-complementarity)"));
     assert_eq!(page.matches("\n### auto\n").count(), 1);

@@ -83,8 +83,10 @@ fn a_run_goes_on_where_it_ended_as_if_it_had_not() {
     let [whole, resumed] = ["whole.csv", "resumed.csv"]
         .map(|name| std::fs::read_to_string(folder.path(name)).unwrap());
     assert_eq!(whole, resumed, "to the last bit");
-    folder.run("play part.h5 --html again.html").exits(0);
-    assert!(folder.path("again.html").exists());
+    folder.run("play part.h5 --html again.html --vtk again.pvd --glb again.glb").exits(0);
+    for name in ["again.html", "again.pvd", "again.glb"] {
+        assert!(folder.path(name).exists(), "{name}");
+    }
 
     let other = folder.run("simulate box.toml --resume part.h5 --set bodies[1].density=500");
     other.refused(&["a trajectory of the same scene"]);
@@ -130,6 +132,7 @@ fn mistakes_are_one_line() {
         ("simulate box.toml --time-limit -1", "--time-limit: expected a number of seconds"),
         ("simulate stack --set cuont=3", "cuont"),
         ("play box.toml", "box.toml"),
+        ("solve box.toml", "found a scene, which `nonsmooth simulate` moves"),
     ] {
         folder.run(command).refused(&[says]);
     }

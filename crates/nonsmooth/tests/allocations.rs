@@ -127,6 +127,7 @@ const LINEAR_EXCEPTIONS: &[(&str, &str)] = &[
     ("block_pivoting", FACTORS),
     ("ip_", "what could refute the problem is gathered in short vectors of its own"),
     ("enumeration", "a tableau for each case that is open"),
+    ("tnnmg", "matrices of the levels, which are those of the face, are made anew when it changes"),
 ];
 
 fn excepted(kind: &str, name: &str) -> bool {

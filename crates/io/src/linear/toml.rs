@@ -222,10 +222,10 @@ impl Format for Toml {
         &ABOUT
     }
 
-    /// Whether a line sets `kind`, which no other TOML file of ours has at its top.
+    /// Whether a line sets `kind`, and none `format`, as scenes do.
     fn begins(&self, bytes: &[u8]) -> bool {
-        let sets = |rest: &str| rest.trim_start().starts_with('=');
-        text(bytes).lines().any(|l| l.trim_start().strip_prefix("kind").is_some_and(sets))
+        let text = text(bytes);
+        sets(&text, "kind") && !sets(&text, "format")
     }
 
     fn parse(&self, name: &Path, bytes: &[u8]) -> Result<ProblemFile, IoError> {
@@ -238,11 +238,25 @@ impl Format for Toml {
     }
 }
 
+/// Whether a line begins with `key =`.
+fn sets(text: &str, key: &str) -> bool {
+    let sets = |rest: &str| rest.trim_start().starts_with('=');
+    text.lines().any(|l| l.trim_start().strip_prefix(key).is_some_and(sets))
+}
+
 /// Reads the text of a file.
 fn parse(path: &Path, text: &str) -> Result<ProblemFile, IoError> {
     let wrong = |e: &toml::de::Error| {
         let line = e.span().map_or(1, |s| 1 + text[..s.start].matches('\n').count());
         let expected = "a problem as docs/formats.md describes it";
+        if sets(text, "format") {
+            return IoError::data(
+                path,
+                "format",
+                expected,
+                "a scene, which `nonsmooth simulate` moves",
+            );
+        }
         IoError::data(path, format!("line {line}"), expected, e.message())
     };
     let known = of_problems();
