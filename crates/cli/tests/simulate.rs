@@ -99,6 +99,19 @@ fn families_of_gen_move() {
     assert!(run.stdout.contains("every one of 5 steps solved"), "{}", run.stdout);
 }
 
+/// A step that takes longer than there is time is not taken.
+#[test]
+fn time_limits_hold_within_a_step() {
+    let folder = Folder::new();
+    let begun = std::time::Instant::now();
+    let run = folder.run("simulate spheres --set base=7 --time-limit 0.5 --json");
+    let json: Value = serde_json::from_str(&run.exits(1).stdout).unwrap();
+    let slack = std::env::var("NONSMOOTH_SLACK").ok().and_then(|s| s.parse().ok()).unwrap_or(1.0);
+    assert!(begun.elapsed().as_secs_f64() < 0.55 + 0.5 * slack);
+    assert_eq!(json["stopped"], true);
+    assert!(json["residual"].as_f64().unwrap() <= 1e-10, "no step that is not solved: {json}");
+}
+
 #[test]
 fn scenes_are_explained() {
     let folder = folder();

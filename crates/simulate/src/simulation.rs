@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nonsmooth_problem::FrictionLocal;
 use nonsmooth_scenes::vec3::{Vec3, add, cross, sub};
-use nonsmooth_solve::Limits;
 use nonsmooth_solve::settings::SettingsMap;
+use nonsmooth_solve::{Limit, Limits, Status};
 
 use crate::error::{Overlap, require};
 use crate::report::{ContactReport, RunReport, StepReport, StepStatus};
@@ -17,6 +17,9 @@ use crate::{BodyId, MoreauJean, Motion, SimulateError, World};
 
 /// Bodies that overlap by more than this share of the smaller one are refused at the start.
 const OVERLAP: f64 = 1e-6;
+
+/// The status of a step that the caller's flag ended; it is not taken.
+const CANCELLED: StepStatus = StepStatus::Solver(Status::Limit(Limit::Cancelled));
 
 /// Forces (N) and torques about the mass centre (N·m) on all bodies, in the world frame.
 #[derive(Debug, Clone, Default)]
@@ -221,15 +224,21 @@ impl Simulation {
         let inner = Inner { solver, settings, limits };
         let mut report = tools.attempt(scheme, (world, state), forces, &inner, h)?;
         let solved = report.status == StepStatus::Solved;
-        if !solved && level < scheme.halvings {
+        let cancelled = report.status == CANCELLED;
+        if !solved && !cancelled && level < scheme.halvings {
+            let before = self.state.clone();
             let first = self.advance(0.5 * h, level + 1)?;
-            if first.status == StepStatus::NotFinite {
+            if first.status == StepStatus::NotFinite || first.status == CANCELLED {
                 return Ok(first);
             }
             let second = self.advance(0.5 * h, level + 1)?;
+            if second.status == CANCELLED {
+                self.state = before;
+                return Ok(second);
+            }
             return Ok(joined(first, second));
         }
-        if report.status != StepStatus::NotFinite {
+        if report.status != StepStatus::NotFinite && !cancelled {
             report.drift.quaternion = tools.commit(scheme, world, state, h);
             report.t = state.t;
         } else {
@@ -261,6 +270,11 @@ impl Simulation {
             let h = if left < h * (1.0 - 1e-9) { left } else { h };
             observer.before(self, h);
             let report = self.step(h)?;
+            if report.status == CANCELLED {
+                // Half an answer is none: the state is that before the step.
+                run.stopped = true;
+                break;
+            }
             run.note(&report);
             let ended = report.status == StepStatus::NotFinite;
             if observer.step(self, &report) == Control::Stop || ended {

@@ -4,7 +4,9 @@ mod record;
 mod said;
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use nonsmooth_io::trajectory::Trajectory;
 use nonsmooth_scenes::SceneEntry;
@@ -58,7 +60,7 @@ pub struct Args {
     /// Go on from the end of a trajectory of the same scene, and append to it unless --out names another file
     #[arg(long, value_name = "FILE.h5")]
     resume: Option<PathBuf>,
-    /// Stop after this many seconds of the wall clock, at the end of a step
+    /// Stop after this many seconds of the wall clock; the step that is being done then is not taken
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     time_limit: Option<f64>,
     /// Say where the time went
@@ -182,19 +184,20 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         recorder.resume(file, &mut simulation)?;
     }
     let begun = Instant::now();
+    if let Some(seconds) = limit {
+        end_after(seconds, cancel);
+    }
     let mut bar = RunBar::new(&path.to_string_lossy(), scene.time.end, !args.json);
     let mut mistake = None;
     let mut watch = |simulation: &Simulation, report: &StepReport| {
         let kept = recorder.step(simulation, report);
         bar.watch(report.t, report.counts.active, report.residual);
-        let late = limit.is_some_and(|t| begun.elapsed().as_secs_f64() >= t);
         let flushed = match &out {
             Some(out) => recorder.flush(out, simulation, false),
             None => Ok(()),
         };
         match kept.and(flushed) {
-            Ok(()) if !late => Control::Continue,
-            Ok(()) => Control::Stop,
+            Ok(()) => Control::Continue,
             Err(e) => {
                 mistake = Some(e);
                 Control::Stop
@@ -251,6 +254,17 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         false => output::print(&run.text(args.timings)),
     }
     Ok(Exit::solved(complete(&report)))
+}
+
+/// Sets the flag after so many seconds, however long a step takes.
+fn end_after(seconds: f64, flag: Arc<AtomicBool>) {
+    // A limit beyond the reach of the clock is none.
+    if let Ok(limit) = Duration::try_from_secs_f64(seconds) {
+        std::thread::spawn(move || {
+            std::thread::sleep(limit);
+            flag.store(true, Ordering::Relaxed);
+        });
+    }
 }
 
 fn complete(report: &RunReport) -> bool {

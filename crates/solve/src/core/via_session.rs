@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// What [`Via`](crate::Via) is of solvers, of whole sessions: those have no steps at which the judge of the first problem could be asked, so it is asked when they
-/// end. Where it is not content they go on from there, to a [`CLOSER`] tolerance of their own.
+/// end. Where it is not content they go on from there, to a closer tolerance of their own.
 pub struct ViaSession<P: Problem, R: Reformulation<P>> {
     reformulation: R,
     session: Box<dyn Session<R::To>>,

@@ -115,7 +115,7 @@ impl Model {
         defined
     }
 
-    /// F(x) and the [`matrix`](Self::matrix) JF(x). False where F is not defined, or JF neither at x nor [beside](BESIDE) it, or the time is over.
+    /// F(x) and the [`matrix`](Self::matrix) JF(x). False where F is not defined, or JF neither at x nor beside it, or the time is over.
     pub fn linearise(&mut self, x: &[f64], f: &mut [f64]) -> bool {
         self.evaluations[1] += 1;
         let defined = self.field.jacobian(x, f, &mut self.values) || self.beside(x, f);
