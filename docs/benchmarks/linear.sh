@@ -12,7 +12,7 @@ nonsmooth=${CARGO_TARGET_DIR:-target}/release/nonsmooth
 "$nonsmooth" gen --suite docs/benchmarks/suite-linear.toml --out "$work/problems" >/dev/null
 
 solvers=()
-for name in auto lemke lemke_howson keller criss_cross block_pivoting ip_mehrotra ip_mty qp newton_min newton_fb newton_pfb pgs psor rpsor mprgp split/lemke split/ip_mehrotra; do
+for name in auto lemke lemke_howson keller criss_cross block_pivoting ip_mehrotra ip_mty qp newton_min newton_fb newton_pfb pgs psor rpsor mprgp tnnmg split/lemke split/ip_mehrotra; do
     solvers+=(--solver "$name")
 done
 "$nonsmooth" bench run "$work/problems" "${solvers[@]}" --tol 1e-10 \
