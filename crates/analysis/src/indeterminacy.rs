@@ -7,9 +7,7 @@ use nonsmooth_problem::check::{ContactStatus, Motion};
 use nonsmooth_problem::{Bounds, Friction, FrictionGlobal, FrictionLocal};
 
 use crate::rank;
-
-/// The largest dense matrix, in entries, of which a rank is computed: some 50 ms.
-const DENSE: usize = 100_000;
+use crate::spectrum::DENSE;
 
 /// How many of the directions in which the impulses of a solution may change the motion feels.
 ///

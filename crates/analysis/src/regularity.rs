@@ -5,10 +5,7 @@ use nonsmooth_problem::Mcp;
 use nonsmooth_problem::check::RowStatus;
 use serde::Serialize;
 
-use crate::spectrum::rank_above;
-
-/// The largest dense matrix, in entries, of which a rank is computed: some 50 ms.
-const DENSE: usize = 100_000;
+use crate::spectrum::{DENSE, rank_above};
 
 /// The rank of the Jacobian `JF_αα` of the variables α whose rows are equations at a point: those strictly between their bounds, and free ones.
 ///

@@ -120,6 +120,9 @@ impl Spectrum {
     }
 }
 
+/// The largest dense matrix, in entries, of which a solution's rank is computed: some 50 ms.
+pub(crate) const DENSE: usize = 100_000;
+
 /// The rank of a sparse matrix whose columns count the same whatever their size: singular values above ε times the larger
 /// dimension times the largest. `None` where the dense matrix would have more than `limit` entries, or an entry is not finite.
 pub fn rank(a: &Csc, limit: usize) -> Option<usize> {

@@ -55,7 +55,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             Ok(content) => content,
             Err(limit) => return Ok(files::late(file, args.json, limit, files::WHILE_READ)),
         };
-        let left = files::left(&limits, begun);
+        let left = limits.left(begun);
         let effort = Effort { spectrum_limit: args.spectrum_limit, limits: left };
         let diagnosis = match diagnose(&content.problem, content.info.dofs, &effort) {
             Ok(diagnosis) => diagnosis,

@@ -71,7 +71,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             Err(limit) => return Ok(files::late(file, args.json, limit, files::WHILE_READ)),
         };
         let problem = &content.problem;
-        let existence = existence::of(problem, &files::left(&limits, start));
+        let existence = existence::of(problem, &limits.left(start));
         let seconds = start.elapsed().as_secs_f64();
         let contacts = match problem {
             AnyProblem::Friction(contacts) => contacts.contacts(),

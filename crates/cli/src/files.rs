@@ -5,7 +5,6 @@ use std::fs::{self, OpenOptions};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use std::time::Instant;
 
 use nonsmooth_io::{
     About, FORMATS, Format, ProblemFile, beside, format, listed, named, sniffed, writer,
@@ -210,12 +209,6 @@ pub fn late(file: &Path, json: bool, limit: Limit, meanwhile: &str) -> Exit {
         format!("{name}: {message}\n")
     });
     Exit::NotSolved
-}
-
-/// What is left of the limits of a file that was begun at `begun`.
-pub fn left(limits: &Limits, begun: Instant) -> Limits {
-    let spent = begun.elapsed().as_secs_f64();
-    Limits { time_limit: limits.time_limit.map(|t| (t - spent).max(0.0)), ..limits.clone() }
 }
 
 /// A picture's name says what the picture is: it ends in one of `extensions`.

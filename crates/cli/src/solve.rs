@@ -159,12 +159,12 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             Err(limit) => return Ok(files::late(file, args.json, limit, files::WHILE_READ)),
         };
         if args.all_solutions {
-            return enumerate::run(file, &content, &files::left(&plan.limits, begun), args.json);
+            return enumerate::run(file, &content, &plan.limits.left(begun), args.json);
         }
         if let Some(number) = args.multistart {
             let starts =
                 Starts { number, seed: args.seed, solver: &args.solver, settings: &settings };
-            let limits = files::left(&plan.limits, begun);
+            let limits = plan.limits.left(begun);
             return multistart::run(file, &content, &starts, &limits, args.json);
         }
         let kind = content.problem.kind();
@@ -353,7 +353,7 @@ pub fn solve(
     plan: &Plan,
 ) -> Result<Solved, String> {
     let mut how = Solve::new().solver(plan.solver).settings(plan.settings.clone());
-    how = how.limits(files::left(&plan.limits, plan.begun));
+    how = how.limits(plan.limits.left(plan.begun));
     if let Some(stored) = from {
         how = how.warm(&start(problem, stored));
     }
@@ -376,7 +376,7 @@ pub fn solve(
 
 /// What solved the problem on trial where the solver asked for does not apply.
 fn instead(problem: &AnyProblem, plan: &Plan) -> String {
-    let limits = files::left(&plan.limits, plan.begun);
+    let limits = plan.limits.left(plan.begun);
     let solving = with_problem!(problem, p => diagnose::instead(p, plan.solver, &limits));
     let names: Vec<_> = solving.iter().map(|name| format!("--solver {name}")).collect();
     match &names[..] {
@@ -539,7 +539,7 @@ fn hint(problem: &AnyProblem, solved: &Solved, plan: &Plan, stuck: bool) -> Opti
         }
         Status::NearlyInfeasible { .. } | Status::NoConclusion(_) | Status::Stalled(_) => vec![],
     };
-    let limits = files::left(&plan.limits, plan.begun);
+    let limits = plan.limits.left(plan.begun);
     let others = with_problem!(problem, p => diagnose::others(p, plan.solver, &limits));
     let others = others.iter().map(|name| format!("--solver {name}, which solved it on trial"));
     let mut tries: Vec<_> = more.into_iter().chain(others).take(3).collect();

@@ -204,6 +204,10 @@ pub struct RunReport {
     pub steps: u64,
     /// The number of steps by how they ended.
     pub statuses: BTreeMap<String, u64>,
+    /// Steps that were not solved.
+    pub unsolved: u64,
+    /// The time after the first of them, s.
+    pub first_unsolved: Option<f64>,
     /// The largest residual of a step.
     pub residual: f64,
     /// The largest relative imbalance of energy of a step.
@@ -219,12 +223,16 @@ pub struct RunReport {
 impl RunReport {
     /// Whether every step was solved.
     pub fn is_solved(&self) -> bool {
-        self.statuses.keys().all(|name| name == "solved" || name == "halved")
+        self.unsolved == 0
     }
 
     pub(crate) fn note(&mut self, step: &StepReport) {
         self.steps += 1;
         *self.statuses.entry(step.status.name()).or_default() += 1;
+        if !step.status.is_solved() {
+            self.unsolved += 1;
+            self.first_unsolved.get_or_insert(step.t);
+        }
         // A maximum that a NaN is not lost in.
         let worse = |old: f64, new: f64| if new > old || new.is_nan() { new } else { old };
         self.residual = worse(self.residual, step.residual);

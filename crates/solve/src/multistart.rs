@@ -40,14 +40,13 @@ pub fn multistart(
     let mut found = Found { solutions: vec![], starts: 0, limit: None };
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     for turn in 0..starts {
-        let mut limits = how.limits.clone();
         if turn > 0
-            && let Some(limit) = limits.reached(begun)
+            && let Some(limit) = how.limits.reached(begun)
         {
             found.limit = Some(limit);
             break;
         }
-        limits.time_limit = limits.time_limit.map(|t| (t - begun.elapsed().as_secs_f64()).max(0.0));
+        let limits = how.limits.left(begun);
         let start = match turn {
             0 => problem.origin(),
             _ => around(problem, SPREAD[turn % SPREAD.len()], &mut random),

@@ -73,7 +73,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             Err(limit) => return late(limit),
         };
         let copy = content.clone();
-        let left = || files::left(&limits, begun);
+        let left = || limits.left(begun);
         let facts = match guard::run(&left(), || {}, move |_| Facts::of(&copy)) {
             Ok(facts) => facts,
             Err(limit) => return late(limit),

@@ -190,13 +190,13 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let mut bar = RunBar::new(&path.to_string_lossy(), scene.time.end, !args.json);
     let mut mistake = None;
     let mut watch = |simulation: &Simulation, report: &StepReport| {
-        let kept = recorder.step(simulation, report);
+        recorder.step(simulation, report);
         bar.watch(report.t, report.counts.active, report.residual);
         let flushed = match &out {
             Some(out) => recorder.flush(out, simulation, false),
             None => Ok(()),
         };
-        match kept.and(flushed) {
+        match flushed {
             Ok(()) => Control::Continue,
             Err(e) => {
                 mistake = Some(e);

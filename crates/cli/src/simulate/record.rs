@@ -84,13 +84,12 @@ impl Recorder {
     }
 
     /// Takes note of a step.
-    pub fn step(&mut self, simulation: &Simulation, report: &StepReport) -> Result<(), String> {
+    pub fn step(&mut self, simulation: &Simulation, report: &StepReport) {
         let number = simulation.state().steps;
         self.trajectory.steps.push(step(number, report));
         if self.frames && number.is_multiple_of(self.every) {
             self.frame(simulation);
         }
-        Ok(())
     }
 
     fn frame(&mut self, simulation: &Simulation) {

@@ -88,20 +88,11 @@ impl Run<'_> {
         } else {
             String::new()
         };
-        let solved = ["solved", "halved"].iter().filter_map(|name| report.statuses.get(*name));
-        let solved: u64 = solved.sum();
-        match report.steps - solved {
-            0 => format!("every one of {} steps solved{stopped}", report.steps),
-            n => {
-                let steps = &self.recorder.trajectory.steps[self.recorder.earlier..];
-                let bad = |s: &&nonsmooth_io::trajectory::Step| {
-                    s.status != "solved" && s.status != "halved"
-                };
-                let first = steps.iter().find(bad).map_or(f64::NAN, |s| s.time);
-                format!(
-                    "NOT SOLVED: {n} of {} steps, the first at t = {first} s{stopped}",
-                    report.steps
-                )
+        let (steps, unsolved) = (report.steps, report.unsolved);
+        match report.first_unsolved {
+            None => format!("every one of {steps} steps solved{stopped}"),
+            Some(t) => {
+                format!("NOT SOLVED: {unsolved} of {steps} steps, the first at t = {t} s{stopped}")
             }
         }
     }

@@ -49,9 +49,7 @@ impl SceneFile {
         Ok(self)
     }
 
-    /// The bodies of a family of `nonsmooth gen`, in motion: its time step, and `end`, s.
-    ///
-    /// Errors: a time step that is no number.
+    /// The bodies of a family of `nonsmooth gen` with these settings, in steps of h until `end`, s.
     pub fn of_family(family: &str, set: SettingsMap, h: f64, end: f64) -> Self {
         Self {
             format: FORMAT.into(),

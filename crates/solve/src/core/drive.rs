@@ -74,6 +74,12 @@ impl Limits {
         }
     }
 
+    /// What is left of them for a part of what was begun at `begun`.
+    pub fn left(&self, begun: Instant) -> Self {
+        let spent = begun.elapsed().as_secs_f64();
+        Self { time_limit: self.time_limit.map(|t| (t - spent).max(0.0)), ..self.clone() }
+    }
+
     pub(crate) fn validate(&self) -> Result<(), SolveError> {
         // The residual of doing nothing is about 1: beyond, everything would pass.
         if !(self.tolerance > 0.0 && self.tolerance <= 1.0) {

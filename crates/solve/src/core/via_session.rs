@@ -146,12 +146,10 @@ where
             iterations,
         };
         let status = loop {
-            let left = |t: f64| (t - begun.elapsed().as_secs_f64()).max(0.0);
             let limits_there = Limits {
                 tolerance,
-                time_limit: limits.time_limit.map(left),
                 max_iterations: limits.max_iterations.saturating_sub(iterations),
-                ..limits.clone()
+                ..limits.left(begun)
             };
             let outcome = session.observe(reduced, &mut there, &limits_there, &mut seen)?;
             iterations += outcome.iterations;

@@ -81,12 +81,6 @@ impl Auto {
     }
 }
 
-/// What is left of the limits.
-fn later(limits: &Limits, begun: std::time::Instant) -> Limits {
-    let left = |t: f64| (t - begun.elapsed().as_secs_f64()).max(0.0);
-    Limits { time_limit: limits.time_limit.map(left), ..limits.clone() }
-}
-
 /// A few Newton steps from a solution.
 fn polish(stage: usize) -> Vec<Candidate> {
     if stage > 0 {
@@ -158,7 +152,7 @@ impl Session<Mcp> for AutoSession {
         if status == Some(Status::Solved) && measure.absolute > limits.tolerance {
             let mut finer = trial.clone();
             let closer = (1e-4 * limits.tolerance).max(f64::EPSILON);
-            let left = Limits { tolerance: closer, ..later(limits, begun) };
+            let left = Limits { tolerance: closer, ..limits.left(begun) };
             let polished = self.polish.observe(problem, &mut finer, &left, observer)?.measure;
             if polished.absolute < measure.absolute && polished.passes(limits.tolerance) {
                 *point = finer;
@@ -170,7 +164,7 @@ impl Session<Mcp> for AutoSession {
             return Ok(Outcome { status, measure, ..outcome });
         }
         let max_iterations = limits.max_iterations.saturating_sub(outcome.iterations);
-        let left = Limits { max_iterations, ..later(limits, begun) };
+        let left = Limits { max_iterations, ..limits.left(begun) };
         let then = self.nonlinear.observe(problem, point, &left, observer)?;
         let mut status = then.status;
         if !matches!(status, Status::Solved) {
