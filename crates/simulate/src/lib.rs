@@ -23,8 +23,10 @@
 //! Scenes of `nonsmooth-scenes` are worlds too: `World::try_from(&scene)`. Scenes in files are [`SceneFile`]s.
 
 mod detect;
+mod drive;
 mod error;
 mod islands;
+mod lagrangian;
 mod moreau_jean;
 mod report;
 pub mod rotation;
@@ -36,13 +38,18 @@ mod step;
 mod world;
 
 pub use detect::Key;
+pub use drive::{Control, Observer};
 pub use error::{Overlap, SimulateError};
+pub use lagrangian::{
+    Constant, Directions, Lagrangian, LagrangianContact, LagrangianScheme, LagrangianSimulation,
+    LagrangianState, LinearContact, LinearRow, LinearSystem, RelationsAt, RowLaw, Size,
+};
 pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean};
 pub use report::{
     ContactReport, Counts, Drift, EnergyBalance, RunReport, StepReport, StepStatus, Timings,
 };
 pub use scene_file::SceneFile;
 pub use shape::{Part, Shape, plane};
-pub use simulation::{Control, Force, Observer, Simulation, Wrenches};
+pub use simulation::{Force, Simulation, Wrenches};
 pub use state::{ContactMemory, State};
 pub use world::{Body, BodyId, Law, Motion, World};

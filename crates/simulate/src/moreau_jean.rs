@@ -111,11 +111,15 @@ impl MoreauJean {
         let u = self.restitution_threshold;
         require(key("restitution_threshold"), u, u >= 0.0, "a velocity of at least 0")?;
         require(key("passes"), self.passes.into(), self.passes > 0, "at least 1")?;
-        if let Activation::Forecast { gamma, slack } = self.activation {
-            let unit = 0.0..=1.0;
-            require(key("activation.gamma"), gamma, unit.contains(&gamma), "a number from 0 to 1")?;
-            require(key("activation.slack"), slack, slack >= 0.0, "a number of at least 0")?;
-        }
-        Ok(())
+        self.activation.validate("integrator")
+    }
+}
+
+impl Activation {
+    pub(crate) fn validate(&self, of: &str) -> Result<(), SimulateError> {
+        let Self::Forecast { gamma, slack } = *self else { return Ok(()) };
+        let key = |name: &'static str| move || format!("{of}.activation.{name}");
+        require(key("gamma"), gamma, (0.0..=1.0).contains(&gamma), "a number from 0 to 1")?;
+        require(key("slack"), slack, slack >= 0.0, "a number of at least 0")
     }
 }

@@ -15,8 +15,10 @@ pub enum StepStatus {
     Solved,
     /// The contact problem of an island is not solved; the best impulses found were taken.
     Solver(Status),
-    /// Rotation and contact did not settle in the passes allowed; the last pass was taken.
+    /// Rotation and contact, or Newton's method, did not settle in the passes allowed; the last pass was taken.
     NewtonLimit,
+    /// The projection onto relations and gaps did not reach its tolerance in the passes allowed; the last pass was taken.
+    ProjectionLimit,
     /// Solved after it was cut into `2^n` parts.
     Halved(u8),
     /// A force or a velocity is no finite number; the state is that before the step.
@@ -29,12 +31,13 @@ impl StepStatus {
         matches!(self, StepStatus::Solved | StepStatus::Halved(_))
     }
 
-    /// A short name: `solved`, `solver: …`, `newton_limit`, `halved`, `not_finite`.
+    /// A short name: `solved`, `solver: …`, `newton_limit`, `projection_limit`, `halved`, `not_finite`.
     pub fn name(&self) -> String {
         match self {
             StepStatus::Solved => "solved".into(),
             StepStatus::Solver(status) => format!("solver: {}", status.name()),
             StepStatus::NewtonLimit => "newton_limit".into(),
+            StepStatus::ProjectionLimit => "projection_limit".into(),
             StepStatus::Halved(_) => "halved".into(),
             StepStatus::NotFinite => "not_finite".into(),
         }
@@ -122,6 +125,8 @@ pub struct Drift {
     pub penetration: f64,
     /// The largest `|‖q‖ − 1|` of a quaternion, before it was made one.
     pub quaternion: f64,
+    /// The largest `|φ|` of a relation of a Lagrangian system, in its unit.
+    pub relation: f64,
 }
 
 /// Where the time of a step went, s.
@@ -152,7 +157,7 @@ pub struct StepReport {
     pub energy: EnergyBalance,
     /// How many of what.
     pub counts: Counts,
-    /// Passes over rotation and contact.
+    /// Passes over rotation and contact, or iterations of Newton's method.
     pub newton: u32,
     /// How far off the configuration is.
     pub drift: Drift,

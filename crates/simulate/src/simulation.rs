@@ -1,15 +1,13 @@
 //! A world in motion.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use nonsmooth_problem::FrictionLocal;
 use nonsmooth_scenes::vec3::{Vec3, add, cross, sub};
+use nonsmooth_solve::Limits;
 use nonsmooth_solve::settings::SettingsMap;
-use nonsmooth_solve::{Limit, Limits, Status};
 
+use crate::drive::{self, Driven, Observer};
 use crate::error::{Overlap, require};
-use crate::report::{ContactReport, RunReport, StepReport, StepStatus};
+use crate::report::{ContactReport, RunReport, StepReport};
 use crate::state::State;
 use crate::step::{Inner, Tools};
 use crate::world::oscillation;
@@ -17,9 +15,6 @@ use crate::{BodyId, MoreauJean, Motion, SimulateError, World};
 
 /// Bodies that overlap by more than this share of the smaller one are refused at the start.
 const OVERLAP: f64 = 1e-6;
-
-/// The status of a step that the caller's flag ended; it is not taken.
-const CANCELLED: StepStatus = StepStatus::Solver(Status::Limit(Limit::Cancelled));
 
 /// Forces (N) and torques about the mass centre (N·m) on all bodies, in the world frame.
 #[derive(Debug, Clone, Default)]
@@ -65,36 +60,6 @@ pub trait Force: Send {
 impl<F: FnMut(&State, &mut Wrenches) + Send> Force for F {
     fn add(&mut self, state: &State, wrenches: &mut Wrenches) {
         self(state, wrenches);
-    }
-}
-
-/// Whether a run goes on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Control {
-    /// It does.
-    Continue,
-    /// It ends here.
-    Stop,
-}
-
-/// Who follows a run: recorders, plots, tests.
-pub trait Observer {
-    /// Called before each step, of length h.
-    fn before(&mut self, _simulation: &mut Simulation, _h: f64) {}
-
-    /// Called after each step.
-    fn step(&mut self, simulation: &Simulation, report: &StepReport) -> Control;
-}
-
-impl Observer for () {
-    fn step(&mut self, _: &Simulation, _: &StepReport) -> Control {
-        Control::Continue
-    }
-}
-
-impl<F: FnMut(&Simulation, &StepReport) -> Control> Observer for F {
-    fn step(&mut self, simulation: &Simulation, report: &StepReport) -> Control {
-        self(simulation, report)
     }
 }
 
@@ -215,36 +180,7 @@ impl Simulation {
     ///
     /// Errors: h that is no positive number; a solver that does not apply. What numerics come to is in the report.
     pub fn step(&mut self, h: f64) -> Result<StepReport, SimulateError> {
-        require(|| "h".into(), h, h > 0.0, "a positive number")?;
-        self.advance(h, 0)
-    }
-
-    fn advance(&mut self, h: f64, level: u8) -> Result<StepReport, SimulateError> {
-        let Self { world, scheme, state, forces, tools, solver, settings, limits, .. } = self;
-        let inner = Inner { solver, settings, limits };
-        let mut report = tools.attempt(scheme, (world, state), forces, &inner, h)?;
-        let solved = report.status == StepStatus::Solved;
-        let cancelled = report.status == CANCELLED;
-        if !solved && !cancelled && level < scheme.halvings {
-            let before = self.state.clone();
-            let first = self.advance(0.5 * h, level + 1)?;
-            if first.status == StepStatus::NotFinite || first.status == CANCELLED {
-                return Ok(first);
-            }
-            let second = self.advance(0.5 * h, level + 1)?;
-            if second.status == CANCELLED {
-                self.state = before;
-                return Ok(second);
-            }
-            return Ok(joined(first, second));
-        }
-        if report.status != StepStatus::NotFinite && !cancelled {
-            report.drift.quaternion = tools.commit(scheme, world, state, h);
-            report.t = state.t;
-        } else {
-            tools.contacts.clear();
-        }
-        Ok(report)
+        drive::step(self, h)
     }
 
     /// Steps of length h until `until`, s; the last one is shorter where h does not divide what is left. A step that is not solved is counted and the run
@@ -257,37 +193,7 @@ impl Simulation {
         h: f64,
         observer: &mut dyn Observer,
     ) -> Result<RunReport, SimulateError> {
-        require(|| "h".into(), h, h > 0.0, "a positive number")?;
-        require(|| "until".into(), until, true, "a finite time")?;
-        let mut run = RunReport { t: self.state.t, ..RunReport::default() };
-        // What is left of the last step up to rounding is no step.
-        while self.state.t < until - 1e-9 * h {
-            if self.is_cancelled() {
-                run.stopped = true;
-                break;
-            }
-            let left = until - self.state.t;
-            let h = if left < h * (1.0 - 1e-9) { left } else { h };
-            observer.before(self, h);
-            let report = self.step(h)?;
-            if report.status == CANCELLED {
-                // Half an answer is none: the state is that before the step.
-                run.stopped = true;
-                break;
-            }
-            run.note(&report);
-            let ended = report.status == StepStatus::NotFinite;
-            if observer.step(self, &report) == Control::Stop || ended {
-                run.stopped = true;
-                break;
-            }
-        }
-        Ok(run)
-    }
-
-    fn is_cancelled(&self) -> bool {
-        let set = |flag: &Arc<AtomicBool>| flag.load(Ordering::Relaxed);
-        self.limits.cancel.as_ref().is_some_and(set)
+        drive::run(self, until, h, observer)
     }
 
     /// The contact problem of the next step, were it of length h, as it is solved in the first pass, all islands together; none without contacts. The state
@@ -326,34 +232,37 @@ impl Simulation {
     }
 }
 
-/// The report of two halves of a step.
-fn joined(first: StepReport, second: StepReport) -> StepReport {
-    let depth = |s: &StepStatus| match s {
-        StepStatus::Halved(n) => Some(n + 1),
-        StepStatus::Solved => Some(1),
-        _ => None,
-    };
-    let status = match (depth(&first.status), depth(&second.status)) {
-        (Some(a), Some(b)) => StepStatus::Halved(a.max(b)),
-        (None, _) => first.status.clone(),
-        (_, None) => second.status.clone(),
-    };
-    let mut drift = second.drift;
-    drift.penetration = drift.penetration.max(first.drift.penetration);
-    drift.quaternion = drift.quaternion.max(first.drift.quaternion);
-    let mut timings = second.timings;
-    timings.detection += first.timings.detection;
-    timings.assembly += first.timings.assembly;
-    timings.solve += first.timings.solve;
-    timings.total += first.timings.total;
-    StepReport {
-        status,
-        h: first.h + second.h,
-        residual: first.residual.max(second.residual),
-        energy: first.energy.then(second.energy),
-        newton: first.newton.max(second.newton),
-        drift,
-        timings,
-        ..second
+impl Driven for Simulation {
+    type State = State;
+
+    fn time(&self) -> f64 {
+        self.state.t
+    }
+
+    fn state(&mut self) -> &mut State {
+        &mut self.state
+    }
+
+    fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    fn halvings(&self) -> u8 {
+        self.scheme.halvings
+    }
+
+    fn attempt(&mut self, h: f64) -> Result<StepReport, SimulateError> {
+        let Self { world, scheme, state, forces, tools, solver, settings, limits, .. } = self;
+        let inner = Inner { solver, settings, limits };
+        tools.attempt(scheme, (world, state), forces, &inner, h)
+    }
+
+    fn take(&mut self, report: &mut StepReport, h: f64) {
+        let Self { world, scheme, state, tools, .. } = self;
+        report.drift.quaternion = tools.commit(scheme, world, state, h);
+    }
+
+    fn discard(&mut self) {
+        self.tools.contacts.clear();
     }
 }

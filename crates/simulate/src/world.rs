@@ -198,7 +198,7 @@ impl Law {
         Self { mu, ..Self::default() }
     }
 
-    fn validate(&self, key: &str) -> Result<(), SimulateError> {
+    pub(crate) fn validate(&self, key: &str) -> Result<(), SimulateError> {
         let Self { mu, e, e_t } = *self;
         require(|| format!("{key}.mu"), mu, mu >= 0.0, "a coefficient of at least 0")?;
         require(|| format!("{key}.e"), e, (0.0..=1.0).contains(&e), "a coefficient from 0 to 1")?;

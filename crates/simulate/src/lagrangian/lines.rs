@@ -1,0 +1,582 @@
+//! Lines: the directions of contacts, the gradients of relations and of scalar rows, and which of them take part in a step.
+
+use nonsmooth_linalg::{Csc, Dense};
+use nonsmooth_problem::{Bounds, FrictionLocal, LocalPoint, RowsLocal};
+
+use super::matrices::Matrices;
+use super::state::LagrangianState;
+use super::{Lagrangian, LagrangianScheme, RelationsAt, RowLaw, Size, differences};
+use crate::error::require;
+use crate::{Activation, Directions, Impact, Law, SimulateError};
+
+/// All lines of a system at one configuration: D of each contact, then relations, then scalar rows.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Gradients {
+    contacts: Dense,
+    relations: Dense,
+    rows: Dense,
+}
+
+impl Gradients {
+    /// Evaluates all of them at t, q; q is as before afterwards.
+    pub fn evaluate<L: Lagrangian<D> + ?Sized, const D: usize>(
+        &mut self,
+        system: &L,
+        t: f64,
+        q: &mut [f64],
+        work: &mut Vec<f64>,
+    ) {
+        let Size { dofs: n, contacts, relations, rows } = system.size();
+        let typical = system.typical();
+        self.contacts.reset(D * contacts, n);
+        if contacts > 0 && !system.directions(t, q, &mut self.contacts) {
+            let mut normals = Dense::zeros(contacts, n);
+            differences::jacobian(q, typical, work, &mut normals, |q, g| system.gaps(t, q, g));
+            self.contacts.reset(D * contacts, n);
+            for c in 0..contacts {
+                self.contacts.row_mut(D * c).copy_from_slice(normals.row(c));
+            }
+        }
+        self.relations.reset(relations, n);
+        if relations > 0 && !system.relation_gradients(t, q, &mut self.relations) {
+            self.relations.reset(relations, n);
+            let phi = |q: &[f64], phi: &mut [f64]| system.relations(t, q, phi);
+            differences::jacobian(q, typical, work, &mut self.relations, phi);
+        }
+        self.rows.reset(rows, n);
+        if rows > 0 && !system.row_gradients(t, q, &mut self.rows) {
+            self.rows.reset(rows, n);
+            let rows = |q: &[f64], x: &mut [f64]| system.rows(t, q, x);
+            differences::jacobian(q, typical, work, &mut self.rows, rows);
+        }
+    }
+
+    /// Line i of all.
+    pub fn line(&self, i: usize) -> &[f64] {
+        let (a, b) = (self.contacts.nrows(), self.relations.nrows());
+        if i < a {
+            self.contacts.row(i)
+        } else if i < a + b {
+            self.relations.row(i - a)
+        } else {
+            self.rows.row(i - a - b)
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.contacts.nrows() + self.relations.nrows() + self.rows.nrows()
+    }
+
+    pub fn is_finite(&self) -> bool {
+        let all = [&self.contacts, &self.relations, &self.rows];
+        all.iter().flat_map(|a| a.values()).all(|x| x.is_finite())
+    }
+}
+
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// A line that takes part in the step: the velocity in its law is `a·v⁺ + offset`, and its impulse acts along `a`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Line {
+    /// Its place among all lines.
+    pub index: usize,
+    /// Whether its velocity is taken with the gradient at the end of the step.
+    pub later: bool,
+    /// A relation on the mean velocity of the step.
+    pub mean: bool,
+    /// The part of its velocity that does not come from v: at the end of the step, and weighted by θ.
+    pub given: f64,
+    pub given_mean: f64,
+    /// The velocity before the step.
+    pub before: f64,
+    /// What the law adds to the velocity after it.
+    pub shift: f64,
+    /// What the law was solved with, `a·v⁺ + offset`, and what is added to `a·v⁺` in it.
+    pub velocity: f64,
+    pub offset: f64,
+    /// Its impulse.
+    pub impulse: f64,
+}
+
+/// A contact of the index set; its lines are D of those of the step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Touching {
+    pub contact: usize,
+    pub law: Law,
+    /// Persisted from the last step and sticking in it.
+    pub stuck: bool,
+}
+
+/// The lines of a step.
+#[derive(Default)]
+pub(super) struct Lines<const D: usize> {
+    pub start: Gradients,
+    pub now: Gradients,
+    pub end: Gradients,
+    pub gaps: Vec<f64>,
+    pub coordinates: Vec<f64>,
+    /// s and b at the beginning of the step, and where velocities are taken.
+    given: [Vec<f64>; 2],
+    pub touching: Vec<Touching>,
+    pub lines: Vec<Line>,
+    /// Of each scalar line that is a limit its restitution.
+    limits: Vec<Option<f64>>,
+    bounds: Bounds,
+    /// Whether a gap closes with more than what forces make in a step.
+    pub impact: bool,
+    /// M̂⁻¹ of the gradients `now`, line by line, whether that is so, and the gradients that they were made of.
+    solved: Dense,
+    fresh: Vec<bool>,
+    last: Gradients,
+    /// The lines that the matrices of the problem are made of.
+    stated: Vec<usize>,
+    phi: [Vec<f64>; 2],
+    pub warm: usize,
+    sums: Vec<f64>,
+}
+
+impl<const D: usize> Lines<D> {
+    /// The gaps and gradients at the beginning of a step.
+    pub fn begin<L: Lagrangian<D> + ?Sized>(
+        &mut self,
+        system: &L,
+        state: &LagrangianState,
+        q: &mut [f64],
+        work: &mut Vec<f64>,
+    ) {
+        let size = system.size();
+        self.start.evaluate(system, state.t, q, work);
+        for (out, len) in [(&mut self.gaps, size.contacts), (&mut self.coordinates, size.rows)] {
+            out.clear();
+            out.resize(len, 0.0);
+        }
+        system.gaps(state.t, q, &mut self.gaps);
+        system.rows(state.t, q, &mut self.coordinates);
+        given(system, state.t, q, &mut self.given[0]);
+    }
+
+    pub fn is_finite(&self) -> bool {
+        let vectors = [&self.gaps, &self.coordinates, &self.given[0], &self.given[1]];
+        self.start.is_finite()
+            && self.now.is_finite()
+            && vectors.into_iter().flatten().all(|x| x.is_finite())
+    }
+
+    /// The gradients at the middle and the end of the step.
+    pub fn evaluate<L: Lagrangian<D> + ?Sized>(
+        &mut self,
+        system: &L,
+        scheme: &LagrangianScheme,
+        (t, h): (f64, f64),
+        (middle, end): (&mut [f64], &mut [f64]),
+        work: &mut Vec<f64>,
+    ) {
+        let at = match scheme.directions {
+            Directions::Frozen => t,
+            _ => t + 0.5 * h,
+        };
+        self.now.evaluate(system, at, middle, work);
+        if scheme.directions == Directions::Frozen {
+            given(system, t + h, middle, &mut self.given[1]);
+            self.end.clone_from(&self.now);
+        } else {
+            given(system, t + h, end, &mut self.given[1]);
+            self.end.evaluate(system, t + h, end, work);
+        }
+    }
+
+    /// Chooses the contacts and rows that take part; `kick` is the velocity that forces make in the step.
+    pub fn choose<L: Lagrangian<D> + ?Sized>(
+        &mut self,
+        system: &L,
+        scheme: &LagrangianScheme,
+        state: &LagrangianState,
+        h: f64,
+        kick: &[f64],
+    ) -> Result<(), SimulateError> {
+        let size = system.size();
+        let (t, q, v, memory) = (state.t, &state.q, &state.v, &state.memory);
+        let scaled = if memory.h > 0.0 { h / memory.h } else { 0.0 };
+        let turning = scheme.directions != Directions::Frozen;
+        self.touching.clear();
+        self.lines.clear();
+        self.limits.clear();
+        self.bounds.lower.clear();
+        self.bounds.upper.clear();
+        (self.impact, self.warm) = (false, 0);
+        // Whether a gap takes part, whether it did in the last step and still rests there, and whether it closes with an impact.
+        let unilateral = |place: usize, line: usize, gap: f64, given: f64, e: f64| {
+            let rate = dot(self.start.line(line), v) + given;
+            let known = memory.active.get(place).copied().unwrap_or(false);
+            let rest = 2.0 * dot(self.start.line(line), kick).abs();
+            let active = match scheme.activation {
+                Activation::Gap => true,
+                Activation::Forecast { gamma, slack } => {
+                    let slack = slack.max(scheme.projection.unwrap_or(0.0));
+                    let beyond = gap + gamma * h * rate - slack;
+                    // What runs along a curved surface leaves it by as much as a step is curved: that is no separation.
+                    let curved = || {
+                        let turned = dot(self.end.line(line), v) - dot(self.start.line(line), v);
+                        beyond <= h * turned.abs()
+                    };
+                    beyond <= 0.0 || (known && turning && curved())
+                }
+            };
+            (active, known && (e == 0.0 || rate >= -rest), rate < -rest)
+        };
+        for c in 0..size.contacts {
+            let law = system.law(c, t, q, v);
+            law.validate(&format!("law({c})"))?;
+            let (gap, given) = (self.gaps[c], self.given[0][D * c]);
+            let (active, persists, impact) = unilateral(c, D * c, gap, given, law.e);
+            if !active {
+                continue;
+            }
+            self.impact |= impact && gap <= 0.0;
+            let stuck = persists && memory.stuck.get(c).copied().unwrap_or(false);
+            self.touching.push(Touching { contact: c, law, stuck });
+            let old = memory.contacts.get(D * c..D * (c + 1)).unwrap_or(&[]);
+            self.warm += usize::from(old.first().is_some_and(|r| *r > 0.0));
+            for i in 0..D {
+                let impulse = scaled * old.get(i).copied().unwrap_or(0.0);
+                self.lines.push(Line {
+                    later: turning && persists,
+                    impulse,
+                    ..Line::of(D * c + i)
+                });
+            }
+        }
+        let first = D * size.contacts;
+        let old = |k: usize| scaled * memory.scalars.get(k).copied().unwrap_or(0.0);
+        for k in 0..size.relations {
+            self.lines.push(Line { impulse: old(k), ..Line::of(first + k) });
+            self.limits.push(None);
+            self.bounds.lower.push(f64::NEG_INFINITY);
+            self.bounds.upper.push(f64::INFINITY);
+        }
+        for k in 0..size.rows {
+            let index = first + size.relations + k;
+            let line = Line { impulse: old(size.relations + k), ..Line::of(index) };
+            match system.row_law(k, t, q, v) {
+                RowLaw::Limit { e } => {
+                    let ok = (0.0..=1.0).contains(&e);
+                    require(|| format!("row_law({k}).e"), e, ok, "a coefficient from 0 to 1")?;
+                    let (gap, given) = (self.coordinates[k], self.given[0][first + k]);
+                    let (active, persists, impact) =
+                        unilateral(size.contacts + k, index, gap, given, e);
+                    if active {
+                        self.impact |= impact && gap <= 0.0;
+                        self.lines.push(Line { later: turning && persists, ..line });
+                        self.limits.push(Some(e));
+                        self.bounds.lower.push(0.0);
+                        self.bounds.upper.push(f64::INFINITY);
+                    }
+                }
+                RowLaw::Force { lower, upper } => {
+                    if !(lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY) {
+                        return Err(SimulateError::value(
+                            format!("row_law({k})"),
+                            "a lower bound of at most the upper one",
+                            format!("[{lower}, {upper}]"),
+                        ));
+                    }
+                    self.lines.push(Line { later: turning, ..line });
+                    self.limits.push(None);
+                    self.bounds.lower.push(h * lower);
+                    self.bounds.upper.push(h * upper);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What the laws add to the velocities, about the velocity `v` of this iteration.
+    pub fn shift<L: Lagrangian<D> + ?Sized>(
+        &mut self,
+        system: &L,
+        scheme: &LagrangianScheme,
+        state: &LagrangianState,
+        h: f64,
+        (q, v): ([&[f64]; 2], &[f64]),
+    ) {
+        let size = system.size();
+        let theta = scheme.theta;
+        let first = D * size.contacts;
+        // What moves relations by itself: over the step for mean velocities, about its end for those there.
+        let mean = scheme.relations == RelationsAt::Mean && !self.impact;
+        let (place, times) = match mean {
+            true => (q[0], [state.t, state.t + h]),
+            false => (q[1], [state.t, state.t + 2.0 * h]),
+        };
+        for (phi, t) in self.phi.iter_mut().zip(times) {
+            phi.clear();
+            phi.resize(size.relations, 0.0);
+            system.relations(t, place, phi);
+        }
+        let span = times[1] - times[0];
+        let Self { now, end, given, phi, lines, touching, limits, gaps, coordinates, .. } = self;
+        for line in lines.iter_mut() {
+            let a = now.line(line.index);
+            line.before = dot(a, &state.v);
+            if (first..first + size.relations).contains(&line.index) {
+                let k = line.index - first;
+                let rate = (phi[1][k] - phi[0][k]) / span;
+                (line.given, line.given_mean, line.mean, line.later) =
+                    (rate, rate, mean, !mean && scheme.directions != Directions::Frozen);
+                continue;
+            }
+            let k = if line.index < first { line.index } else { line.index - size.relations };
+            line.before += given[0][k];
+            line.given = given[1][k];
+            line.given_mean = theta * given[1][k] + (1.0 - theta) * given[0][k];
+        }
+        let normal = |gap: f64, e: f64, before: f64| {
+            let waiting = scheme.activation == Activation::Gap;
+            let bounces = (!waiting || gap <= 0.0) && before < -scheme.restitution_threshold;
+            let wait = if waiting { gap.max(0.0) / h } else { 0.0 };
+            wait + if bounces { e * before } else { 0.0 }
+        };
+        for (touch, lines) in touching.iter().zip(lines.chunks_exact_mut(D)) {
+            let tangential = match scheme.impact {
+                Impact::Fremond if touch.stuck => 0.0,
+                Impact::Fremond => (1.0 - theta) / theta,
+                Impact::Newton => touch.law.e_t,
+            };
+            lines[0].shift = normal(gaps[touch.contact], touch.law.e, lines[0].before);
+            for line in &mut lines[1..] {
+                line.shift = tangential * line.before;
+            }
+        }
+        let scalars = lines[D * touching.len()..].iter_mut().zip(limits.iter());
+        for (line, limit) in scalars {
+            if let Some(e) = limit {
+                let gap = coordinates[line.index - first - size.relations];
+                line.shift = normal(gap, *e, line.before);
+            }
+        }
+        for line in lines.iter_mut() {
+            let a = now.line(line.index);
+            line.offset = match line.mean {
+                true => ((1.0 - theta) * line.before + line.given) / theta,
+                false => {
+                    let turned = match line.later {
+                        true => dot(end.line(line.index), v) - dot(a, v),
+                        false => 0.0,
+                    };
+                    line.given + line.shift + turned
+                }
+            };
+        }
+    }
+
+    /// How much the velocities in the laws differ from those that the laws were solved with, relative to the velocities that they are made of.
+    pub fn change(&self, v: &[f64]) -> f64 {
+        let (mut change, mut size) = (0.0_f64, f64::MIN_POSITIVE);
+        for line in &self.lines {
+            let a = self.now.line(line.index);
+            let now = dot(a, v) + line.offset;
+            let by = (now - line.velocity).abs();
+            change = if by > change || by.is_nan() { by } else { change };
+            let parts: f64 = a.iter().zip(v).map(|(a, v)| (a * v).abs()).sum();
+            size = size.max(parts + line.offset.abs());
+        }
+        change / size
+    }
+
+    /// States the problem of an iteration whose velocity without impulses is `free`.
+    pub fn state(
+        &mut self,
+        matrices: &mut Matrices,
+        changed: bool,
+        free: &[f64],
+        problem: &mut FrictionLocal<D>,
+        point: &mut LocalPoint,
+    ) {
+        let nc = self.touching.len();
+        let same = self.solve_lines(matrices, changed, free.len())
+            && self.stated.iter().copied().eq(self.lines.iter().map(|l| l.index));
+        if !same {
+            self.stated.clear();
+            self.stated.extend(self.lines.iter().map(|l| l.index));
+            self.couple(problem);
+        }
+        let (contacts, scalars) = self.lines.split_at(D * nc);
+        let velocity = |line: &Line| dot(self.now.line(line.index), free) + line.offset;
+        problem.q.clear();
+        problem.q.extend(contacts.iter().map(velocity));
+        problem.mu.clear();
+        problem.mu.extend(self.touching.iter().map(|t| t.law.mu));
+        point.r.clear();
+        point.r.extend(contacts.iter().map(|l| l.impulse));
+        point.lambda.clear();
+        point.lambda.extend(scalars.iter().map(|l| l.impulse));
+        if let Some(rows) = &mut problem.rows {
+            rows.s.clear();
+            rows.s.extend(scalars.iter().map(velocity));
+            rows.bounds.lower.clone_from(&self.bounds.lower);
+            rows.bounds.upper.clone_from(&self.bounds.upper);
+        }
+        for (lambda, j) in point.lambda.iter_mut().zip(0..) {
+            *lambda = lambda.clamp(self.bounds.lower[j], self.bounds.upper[j]);
+        }
+    }
+
+    /// M̂⁻¹ of each line that takes part; whether all were there already.
+    fn solve_lines(&mut self, matrices: &mut Matrices, changed: bool, n: usize) -> bool {
+        let all = self.now.len();
+        if (self.solved.nrows(), self.solved.ncols()) != (all, n) {
+            self.solved.reset(all, n);
+            self.fresh.clear();
+            self.fresh.resize(all, false);
+        }
+        if changed {
+            self.fresh.fill(false);
+        }
+        if self.last != self.now {
+            for i in 0..all {
+                if self.last.len() != all || self.last.line(i) != self.now.line(i) {
+                    self.fresh[i] = false;
+                }
+            }
+            self.last.clone_from(&self.now);
+        }
+        let mut same = true;
+        for line in &self.lines {
+            let i = line.index;
+            if !self.fresh[i] {
+                same = false;
+                self.solved.row_mut(i).copy_from_slice(self.now.line(i));
+                matrices.solve_hat(self.solved.row_mut(i));
+                self.fresh[i] = true;
+            }
+        }
+        same
+    }
+
+    /// W, V and R of the lines that take part.
+    #[allow(non_snake_case)]
+    fn couple(&self, problem: &mut FrictionLocal<D>) {
+        let nc = self.touching.len();
+        let p = self.lines.len() - D * nc;
+        // Row i of the upper triangle first, so that what is below it is the same to the last bit.
+        let product = |i: usize, j: usize| {
+            let (a, b) = (self.lines[i.min(j)].index, self.lines[i.max(j)].index);
+            dot(self.now.line(a), self.solved.row(b))
+        };
+        problem.W.clear(nc);
+        for a in 0..nc {
+            for b in 0..nc {
+                let block =
+                    std::array::from_fn(|i| std::array::from_fn(|j| product(D * a + i, D * b + j)));
+                problem.W.push(b, block);
+            }
+            problem.W.end_row();
+        }
+        if p == 0 {
+            problem.rows = None;
+            return;
+        }
+        let fill = |out: &mut Csc, rows: usize, first: usize| {
+            let entries = (0..p).flat_map(|j| (0..rows).map(move |i| (i, j)));
+            if (out.nrows(), out.ncols(), out.nnz()) != (rows, p, rows * p) {
+                let ones = entries.clone().map(|(i, j)| (i, j, 1.0));
+                *out = Csc::from_triplets(rows, p, ones).expect("in range");
+            }
+            for (x, (i, j)) in out.values_mut().iter_mut().zip(entries) {
+                *x = product(first + i, D * nc + j);
+            }
+        };
+        let rows = problem.rows.get_or_insert_with(|| {
+            RowsLocal::bilateral(Csc::zeros(0, 0), Csc::zeros(0, 0), vec![])
+        });
+        fill(&mut rows.V, D * nc, 0);
+        fill(&mut rows.R, p, D * nc);
+    }
+
+    /// `v = free + M̂⁻¹ (H r + G λ)` with the impulses of the point, and the velocities in the laws. What is below the rounding of its own sum is zero, so that what
+    /// rests, rests exactly.
+    pub fn respond(&mut self, point: &LocalPoint, free: &[f64], v: &mut [f64]) {
+        v.copy_from_slice(free);
+        self.sums.clear();
+        self.sums.extend(free.iter().map(|x| x.abs()));
+        let impulses = point.r.iter().chain(&point.lambda);
+        for (line, &impulse) in self.lines.iter_mut().zip(impulses) {
+            line.impulse = impulse;
+            let solved = self.solved.row(line.index);
+            for ((v, sum), x) in v.iter_mut().zip(&mut self.sums).zip(solved) {
+                *v += impulse * x;
+                *sum += (impulse * x).abs();
+            }
+        }
+        for (v, sum) in v.iter_mut().zip(&self.sums) {
+            if v.abs() <= 8.0 * f64::EPSILON * sum {
+                *v = 0.0;
+            }
+        }
+        for line in &mut self.lines {
+            line.velocity = dot(self.now.line(line.index), v) + line.offset;
+        }
+    }
+
+    /// Adds `H r + G λ` to `out`.
+    pub fn push(&self, out: &mut [f64]) {
+        for line in self.lines.iter().filter(|l| l.impulse != 0.0) {
+            let a = self.now.line(line.index);
+            out.iter_mut().zip(a).for_each(|(out, a)| *out += line.impulse * a);
+        }
+    }
+
+    /// Whether line k of the step is a limit.
+    pub fn is_limit(&self, k: usize) -> bool {
+        let scalar = k.checked_sub(D * self.touching.len());
+        scalar.is_some_and(|j| self.limits[j].is_some())
+    }
+
+    /// The normals of the contacts and the limits that take part, among all lines.
+    pub fn unilateral(&self) -> impl Iterator<Item = usize> + '_ {
+        let nc = self.touching.len();
+        let normals = self.touching.iter().map(|t| D * t.contact);
+        let scalars = self.lines[D * nc..].iter().zip(&self.limits);
+        normals.chain(scalars.filter(|(_, limit)| limit.is_some()).map(|(line, _)| line.index))
+    }
+
+    /// The velocity of a line after the step, without what its law adds.
+    pub fn after(&self, line: &Line, v: &[f64]) -> f64 {
+        let at = if line.later { &self.end } else { &self.now };
+        dot(at.line(line.index), v) + line.given
+    }
+}
+
+impl Line {
+    fn of(index: usize) -> Self {
+        Self {
+            index,
+            later: false,
+            mean: false,
+            given: 0.0,
+            given_mean: 0.0,
+            before: 0.0,
+            shift: 0.0,
+            velocity: 0.0,
+            offset: 0.0,
+            impulse: 0.0,
+        }
+    }
+}
+
+/// s of contacts, then b of rows, at t and q.
+fn given<L: Lagrangian<D> + ?Sized, const D: usize>(
+    system: &L,
+    t: f64,
+    q: &[f64],
+    out: &mut Vec<f64>,
+) {
+    let size = system.size();
+    out.clear();
+    out.resize(D * size.contacts + size.rows, 0.0);
+    let (s, b) = out.split_at_mut(D * size.contacts);
+    system.surface(t, q, s);
+    system.row_velocities(t, q, b);
+}
