@@ -15,7 +15,7 @@
 //!
 //! A step ends when, at the new v, `‖R − H r − G λ‖_{M⁻¹}` is at most tol times the larger of `‖h F‖_{M⁻¹}`, `‖H r + G λ‖_{M⁻¹}` and `1e-12 ‖v‖_M`, and the velocities in the
 //! laws differ from those that the laws were solved with by at most tol: then v, r, λ solve the problem itself, whatever the last correction was. The first test has
-//! a floor of some roundings of `‖v‖_M`.
+//! a floor of some roundings of `‖v‖_M`; and an iterate within 100 tol that no longer improves is accepted, since rounding in the user's functions is not known.
 //!
 //! Frémond's law has `w_T = (1 − θ)/θ u_{T,k}`: u_θ in place of u⁺. References: Moreau1988 and Jean1999 for the scheme, Acary2018 for P_MNL and the index set,
 //! Acary2016 for the energy, Acary2013 for the projection (`project.rs`).
@@ -69,10 +69,14 @@ pub(super) struct Motion {
     pub push: Vec<f64>,
     /// R.
     residual: Vec<f64>,
+    /// How often the tolerance the last iterate missed the tests by.
+    merit: f64,
 }
 
 /// Roundings of `‖v‖_M` that no residual falls below.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// An iterate within so many tolerances that is no better than the last one is as good as rounding in the user's functions, or in their differences, allows.
+const ROUNDED: f64 = 100.0;
 
 /// Why the iteration of a step ended before its laws were met.
 enum Ended {
@@ -217,6 +221,7 @@ impl<const D: usize> Tools<D> {
         let m = &mut self.motion;
         m.start.clone_from(&state.q);
         m.v.clone_from(&state.v);
+        m.merit = f64::INFINITY;
         zero(&mut m.force, state.q.len());
         system.force(state.t, &state.q, &state.v, &mut m.force);
         self.lines.begin(system, state, &mut m.start, &mut self.work);
@@ -346,8 +351,10 @@ impl<const D: usize> Tools<D> {
             (2.0 * f64::max(matrices.half_square(&m.v), matrices.half_square(&state.v))).sqrt();
         let forces = f64::max(matrices.dual_norm(&m.drive), matrices.dual_norm(&m.push));
         let bound = scheme.tolerance * forces.max(1e-12 * speed);
-        matrices.dual_norm(&m.residual) <= bound.max(ROUNDING * speed)
-            && lines.change(&m.v) <= scheme.tolerance
+        let residual = matrices.dual_norm(&m.residual) / bound.max(ROUNDING * speed);
+        let merit = largest(residual, lines.change(&m.v) / scheme.tolerance);
+        let before = std::mem::replace(&mut m.merit, merit);
+        merit <= 1.0 || (merit <= ROUNDED && merit >= 0.5 * before)
     }
 
     /// Moves the coordinates at the end of the step onto relations and out of gaps.
@@ -518,6 +525,11 @@ fn advance(out: &mut Vec<f64>, state: &LagrangianState, v: &[f64], theta: f64, h
     out.clear();
     let mean = v.iter().zip(&state.v).map(|(new, old)| theta * new + (1.0 - theta) * old);
     out.extend(state.q.iter().zip(mean).map(|(q, v)| q + h * v));
+}
+
+/// The larger of the two, or the one that is no number.
+fn largest(a: f64, b: f64) -> f64 {
+    if a > b || a.is_nan() { a } else { b }
 }
 
 /// n zeros, in the memory it has.
