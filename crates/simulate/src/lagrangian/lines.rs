@@ -371,16 +371,17 @@ impl<const D: usize> Lines<D> {
         }
     }
 
-    /// How much the velocities in the laws differ from those that the laws were solved with, relative to the velocities that they are made of.
-    pub fn change(&self, v: &[f64]) -> f64 {
+    /// How much the velocities in the laws differ from those that the laws were solved with, relative to what velocities along lines may be, `‖a‖_{M̂⁻¹} ‖v‖_M`, and to what
+    /// is given.
+    pub fn change(&self, v: &[f64], speed: f64) -> f64 {
         let (mut change, mut size) = (0.0_f64, f64::MIN_POSITIVE);
         for line in &self.lines {
             let a = self.now.line(line.index);
             let now = dot(a, v) + line.offset;
             let by = (now - line.velocity).abs();
             change = if by > change || by.is_nan() { by } else { change };
-            let parts: f64 = a.iter().zip(v).map(|(a, v)| (a * v).abs()).sum();
-            size = size.max(parts + line.offset.abs());
+            let ease = dot(a, self.solved.row(line.index)).abs().sqrt();
+            size = size.max(ease * speed + line.offset.abs());
         }
         change / size
     }

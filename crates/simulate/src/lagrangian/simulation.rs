@@ -66,7 +66,7 @@ pub struct LagrangianSimulation<L: Lagrangian<D>, const D: usize> {
 }
 
 impl<L: Lagrangian<D>, const D: usize> LagrangianSimulation<L, D> {
-    /// Sets a system in motion from q and v at t = 0, its contact problems solved by `auto` to 1e-10.
+    /// Sets a system in motion from q and v at t = 0, its contact problems solved by `auto` to 1e-12.
     ///
     /// Errors: q or v of the wrong length or not finite; a scheme that is not possible; a mass matrix that is not positive definite; contacts with friction
     /// whose directions are not given; matrices of a constant system of the wrong shape.
@@ -118,7 +118,7 @@ impl<L: Lagrangian<D>, const D: usize> LagrangianSimulation<L, D> {
             }
         }
         let state = LagrangianState { q: q.to_vec(), v: v.to_vec(), ..LagrangianState::default() };
-        let limits = Limits { tolerance: 1e-10, max_iterations: 100_000, ..Limits::default() };
+        let limits = Limits { tolerance: 1e-12, max_iterations: 100_000, ..Limits::default() };
         Ok(Self { system, scheme, state, tools, limits })
     }
 

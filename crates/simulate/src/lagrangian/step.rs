@@ -352,7 +352,7 @@ impl<const D: usize> Tools<D> {
         let forces = f64::max(matrices.dual_norm(&m.drive), matrices.dual_norm(&m.push));
         let bound = scheme.tolerance * forces.max(1e-12 * speed);
         let residual = matrices.dual_norm(&m.residual) / bound.max(ROUNDING * speed);
-        let merit = largest(residual, lines.change(&m.v) / scheme.tolerance);
+        let merit = largest(residual, lines.change(&m.v, speed) / scheme.tolerance);
         let before = std::mem::replace(&mut m.merit, merit);
         merit <= 1.0 || (merit <= ROUNDED && merit >= 0.5 * before)
     }

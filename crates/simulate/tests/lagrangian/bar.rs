@@ -1,1 +1,121 @@
-//! TODO
+//! An elastic bar that hits a rigid wall.
+
+use nonsmooth_scenes::{ElasticBox, Material};
+use nonsmooth_simulate::{Control, LagrangianSimulation, Law, LinearSystem, StepReport};
+
+use crate::{near, theta};
+
+const LENGTH: f64 = 1.0;
+const YOUNG: f64 = 210e9;
+const DENSITY: f64 = 7800.0;
+const SECTION: f64 = 3.14e-4;
+const GAP: f64 = 5e-5;
+const SPEED: f64 = -0.1;
+
+/// Contact time, velocity of the centre, energy left, impulse, mean force while in contact.
+struct Rebound {
+    contact: f64,
+    speed: f64,
+    energy: f64,
+    impulse: f64,
+    force: f64,
+}
+
+fn rebound(elements: usize, h: f64, t: f64, e: f64) -> Rebound {
+    let l = LENGTH / elements as f64;
+    let mut masses = vec![DENSITY * SECTION * l; elements + 1];
+    masses[0] *= 0.5;
+    masses[elements] *= 0.5;
+    let springs = vec![YOUNG * SECTION / l; elements];
+    let bar = LinearSystem::<2>::chain(&masses, &springs).unwrap().with_limit(GAP, &[(0, 1.0)], e);
+    let (q, v) = (vec![0.0; elements + 1], vec![SPEED; elements + 1]);
+    let mut bar = LagrangianSimulation::new(bar, theta(t), &q, &v).unwrap();
+    let start = 0.5 * DENSITY * SECTION * LENGTH * SPEED * SPEED;
+    let (mut impulse, mut first, mut last) = (0.0, 0.0, 0.0);
+    let (mut energy, mut active) = (start, 0);
+    let mut watch = |s: &LagrangianSimulation<LinearSystem<2>, 2>, r: &StepReport| {
+        let now = r.energy.kinetic + r.energy.potential;
+        assert!(now <= start * (1.0 + 1e-9), "{} of {start}", now);
+        energy = now;
+        assert_eq!(r.newton, 1);
+        let force = s.row_impulses()[0];
+        if force > 0.0 {
+            first = if impulse == 0.0 { r.t - h } else { first };
+            last = r.t;
+            active += 1;
+        }
+        impulse += force;
+        Control::Continue
+    };
+    let report = bar.run(1.2e-3, h, &mut watch).unwrap();
+    assert!(report.is_solved() && report.imbalance <= 1e-9, "{report}");
+    let speed = bar.state().v.iter().zip(&masses).map(|(v, m)| v * m).sum::<f64>()
+        / (DENSITY * SECTION * LENGTH);
+    let (contact, force) = (last - first, impulse / (h * f64::from(active)));
+    println!("{elements} {h} {t} {e}: {contact} {speed} {} {impulse} {force}", energy / start);
+    Rebound { contact, speed, energy: energy / start, impulse, force }
+}
+
+#[test]
+fn the_bar_rebounds_by_its_own_waves() {
+    let exact = 2.0 * LENGTH / (YOUNG / DENSITY).sqrt();
+    near(exact, 3.854496446638e-4, 1e-15);
+    let coarse = rebound(10, 1e-6, 0.5, 0.0);
+    near(coarse.contact, 3.94e-4, 2e-6);
+    near(coarse.speed, 0.0928, 1e-4);
+    let fine = rebound(100, 1e-6, 0.5, 0.0);
+    near(fine.contact, 3.88e-4, 2e-6);
+    near(fine.speed, 0.09844, 1e-5);
+    near(fine.energy, 0.99437, 1e-5);
+    let damped = rebound(100, 1e-6, 1.0, 0.0);
+    near(damped.energy, 0.868, 1e-3);
+}
+
+#[test]
+fn a_fine_bar_comes_near_the_solution_of_the_wave_equation() {
+    let finest = rebound(1000, 2e-7, 0.5, 0.0);
+    near(finest.contact, 3.86e-4, 1e-6);
+    near(finest.speed, 0.09958, 1e-5);
+    near(finest.impulse, 0.48882, 1e-5);
+    near(finest.force, 1265.7, 0.5);
+    near(finest.energy, 0.99928, 1e-5);
+    assert!((finest.impulse / 0.48984 - 1.0).abs() < 3e-3);
+}
+
+#[test]
+fn with_restitution_the_energy_is_exact_and_the_force_a_comb() {
+    let comb = rebound(100, 1e-6, 0.5, 1.0);
+    near(comb.energy, 1.0, 1e-9);
+    assert!(comb.force > 1e4, "{}", comb.force);
+}
+
+/// A slender box of ν = 0 hits a wall end on: the same bar in three dimensions.
+#[test]
+fn an_elastic_box_rebounds_as_the_bar_does() {
+    let material = Material { density: DENSITY, young: YOUNG, poisson: 0.0, alpha: 0.0, beta: 0.0 };
+    let mut solid = ElasticBox::new([1.0, 0.02, 0.0157], [100, 1, 1], material).unwrap();
+    solid.position = [0.5 + GAP, 0.0, 0.0];
+    solid.lumped = true;
+    let wall = ([1.0, 0.0, 0.0], 0.0);
+    let bar = LinearSystem::elastic(&solid, [0.0; 3]).unwrap();
+    let bar = bar.against_plane(&solid, wall, 1e-3, Law::friction(0.3));
+    assert_eq!(bar.contacts.len(), 4);
+    let n = solid.dofs();
+    let v: Vec<f64> = (0..n).map(|i| if i % 3 == 0 { SPEED } else { 0.0 }).collect();
+    let mut bar = LagrangianSimulation::new(bar, theta(0.5), &vec![0.0; n], &v).unwrap();
+    let start = 0.5 * solid.mass() * SPEED * SPEED;
+    let mut impulse = 0.0;
+    let mut watch = |s: &LagrangianSimulation<LinearSystem<3>, 3>, r: &StepReport| {
+        let now = r.energy.kinetic + r.energy.potential;
+        assert!(now <= start * (1.0 + 1e-9));
+        impulse += s.contacts().iter().map(|c| c.impulse[0]).sum::<f64>();
+        Control::Continue
+    };
+    let report = bar.run(1.2e-3, 1e-6, &mut watch).unwrap();
+    println!("{report}");
+    assert!(report.is_solved() && report.imbalance <= 1e-9, "{report}");
+    let mean = bar.state().v.iter().step_by(3).sum::<f64>() / solid.nodes() as f64;
+    println!("{mean} {impulse}");
+    near(mean, 0.0984, 1e-3);
+    near(impulse, solid.mass() * (0.1 + 0.09844), 2e-3);
+}

@@ -38,19 +38,19 @@ fn the_dry_friction_oscillator_stops_where_it_should() {
         for (h, rest, digits) in table {
             let mut oscillator =
                 LagrangianSimulation::new(DryFriction, theta(t), &[12.0], &[6.0]).unwrap();
+            oscillator = oscillator.with_tolerance(1e-14);
             let (mut turns, mut last) = (vec![], 6.0);
             let mut watch = |s: &LagrangianSimulation<DryFriction, 2>, _: &StepReport| {
                 let (q, v) = (s.state().q[0], s.state().v[0]);
                 if v * last < 0.0 {
                     turns.push(q);
                 }
-                last = v;
+                last = if v == 0.0 { last } else { v };
                 assert!(s.row_impulses()[0].abs() <= h * (1.0 + 1e-12));
                 Control::Continue
             };
             check(&oscillator.run(30.0, h, &mut watch).unwrap());
             let (q, v) = (oscillator.state().q[0], oscillator.state().v[0]);
-            println!("theta {t} h {h}: rest at {q}, {} turns", turns.len());
             near(q, rest, digits);
             assert_eq!(v, 0.0);
             if t == 0.5 && h == 0.001 {
@@ -96,7 +96,6 @@ impl Lagrangian<2> for Belt {
 
 #[test]
 fn stick_and_slip_on_a_belt_is_a_limit_cycle() {
-    let mut errors = vec![];
     for h in [4e-3, 2e-3, 1e-3, 5e-4] {
         let belt = Belt { speed: 0.2, stick: 1.0, slip: 0.6 };
         let mut oscillator = LagrangianSimulation::new(belt, theta(0.5), &[0.0], &[0.0]).unwrap();
@@ -115,13 +114,10 @@ fn stick_and_slip_on_a_belt_is_a_limit_cycle() {
         };
         check(&oscillator.run(60.0, h, &mut watch).unwrap());
         let period = (slips[slips.len() - 1] - slips[0]) / (slips.len() - 1) as f64;
-        println!("h {h}: period {period}, x in {range:?}");
-        errors.push((h, (period - 8.068887871591).abs() + h * h));
-        near(period, 8.068887871591, 4.0 * h);
+        near(period, 8.068887871591, 2.5 * h);
         near(range.1, 1.047213595500, h);
         near(range.0, 0.152786404500, h);
     }
-    assert!(errors.len() == 4);
 }
 
 #[test]

@@ -1,1 +1,73 @@
-//! TODO
+//! Painlevé's rod: a rod that slides so steeply that Coulomb's law has no continuous solution.
+
+use nonsmooth_linalg::Dense;
+use nonsmooth_simulate::{
+    Control, Lagrangian, LagrangianScheme, LagrangianSimulation, Law, Size, StepReport,
+};
+
+use crate::check;
+
+/// A uniform rod of length 2 and mass 1 whose lower end slides over the ground: centre and angle to the ground.
+struct Rod {
+    mu: f64,
+}
+
+impl Lagrangian<2> for Rod {
+    fn size(&self) -> Size {
+        Size::new(3).contacts(1)
+    }
+    fn mass(&self, _: &[f64], mass: &mut Dense) {
+        (mass[(0, 0)], mass[(1, 1)], mass[(2, 2)]) = (1.0, 1.0, 1.0 / 3.0);
+    }
+    fn force(&self, _: f64, _: &[f64], _: &[f64], force: &mut [f64]) {
+        force[1] = -9.81;
+    }
+    fn potential(&self, _: f64, q: &[f64]) -> f64 {
+        9.81 * q[1]
+    }
+    fn gaps(&self, _: f64, q: &[f64], gaps: &mut [f64]) {
+        gaps[0] = q[1] - q[2].sin();
+    }
+    fn directions(&self, _: f64, q: &[f64], h: &mut Dense) -> bool {
+        h.row_mut(0).copy_from_slice(&[0.0, 1.0, -q[2].cos()]);
+        h.row_mut(1).copy_from_slice(&[1.0, 0.0, q[2].sin()]);
+        true
+    }
+    fn law(&self, _: usize, _: f64, _: &[f64], _: &[f64]) -> Law {
+        Law::friction(self.mu)
+    }
+}
+
+#[test]
+fn a_rod_in_painleves_region_steps_on() {
+    let mut jumps = 0;
+    for mu in [1.4, 1.6, 1.8, 2.0] {
+        // A = 1 + 3 cos θ (cos θ − mu sin θ) < 0 about tan θ = 2.
+        let angle = 2.0_f64.atan();
+        let ease = 1.0 + 3.0 * angle.cos() * (angle.cos() - mu * angle.sin());
+        assert!(ease < 0.0);
+        for (speed, turn) in [(-5.0, 0.0), (-5.0, -1.0), (-5.0, 1.0), (-1.0, 2.0), (5.0, 1.0)] {
+            // The lower end touches the ground and has the velocity (speed, 0).
+            let q = [0.0, angle.sin(), angle];
+            let v = [speed - turn * angle.sin(), turn * angle.cos(), turn];
+            let mut rod =
+                LagrangianSimulation::new(Rod { mu }, LagrangianScheme::default(), &q, &v).unwrap();
+            let (mut energy, mut slid) = (f64::INFINITY, speed);
+            let mut watch = |s: &LagrangianSimulation<Rod, 2>, r: &StepReport| {
+                let now = r.energy.kinetic + r.energy.potential;
+                assert!(now <= energy + 1e-9, "mu {mu}, t {}: {now} after {energy}", r.t);
+                energy = now;
+                let c = s.contacts()[0];
+                assert!(c.impulse.iter().all(|r| r.is_finite()));
+                if c.active {
+                    // Impact without collision: sliding ends within one step.
+                    jumps += usize::from(slid.abs() > 0.5 && c.after[1].abs() < 1e-9);
+                    slid = c.after[1];
+                }
+                Control::Continue
+            };
+            check(&rod.run(0.2, 1e-3, &mut watch).unwrap());
+        }
+    }
+    assert!(jumps >= 4, "{jumps}");
+}
