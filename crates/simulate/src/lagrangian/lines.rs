@@ -77,13 +77,16 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// A line that takes part in the step: the velocity in its law is `a·v⁺ + offset`, and its impulse acts along `a`.
+/// A line that takes part in the step: its impulse acts along the gradient a at the middle of the step, and the velocity in its law is stated as `s·v⁺ + offset`, where s is
+/// a, or in problems of relations alone the gradient at the end of the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Line {
     /// Its place among all lines.
     pub index: usize,
     /// Whether its velocity is taken with the gradient at the end of the step.
     pub later: bool,
+    /// Whether s is that gradient.
+    steep: bool,
     /// A relation on the mean velocity of the step.
     pub mean: bool,
     /// The part of its velocity that does not come from v: at the end of the step, and weighted by θ.
@@ -93,9 +96,10 @@ pub(super) struct Line {
     pub before: f64,
     /// What the law adds to the velocity after it.
     pub shift: f64,
-    /// What the law was solved with, `a·v⁺ + offset`, and what is added to `a·v⁺` in it.
-    pub velocity: f64,
-    pub offset: f64,
+    /// The velocity in its law at the present iterate, that which the law was solved with, and what is added to `s·v⁺` in it.
+    value: f64,
+    velocity: f64,
+    offset: f64,
     /// Its impulse.
     pub impulse: f64,
 }
@@ -133,6 +137,7 @@ pub(super) struct Lines<const D: usize> {
     /// The lines that the matrices of the problem are made of.
     stated: Vec<usize>,
     phi: [Vec<f64>; 2],
+    relations: usize,
     pub warm: usize,
     sums: Vec<f64>,
 }
@@ -248,6 +253,7 @@ impl<const D: usize> Lines<D> {
                 });
             }
         }
+        self.relations = size.relations;
         let first = D * size.contacts;
         let old = |k: usize| scaled * memory.scalars.get(k).copied().unwrap_or(0.0);
         for k in 0..size.relations {
@@ -356,34 +362,40 @@ impl<const D: usize> Lines<D> {
                 line.shift = normal(gap, *e, line.before);
             }
         }
+        let alone = lines.len() == size.relations && scheme.directions != Directions::Frozen;
         for line in lines.iter_mut() {
-            let a = now.line(line.index);
-            line.offset = match line.mean {
-                true => ((1.0 - theta) * line.before + line.given) / theta,
-                false => {
-                    let turned = match line.later {
-                        true => dot(end.line(line.index), v) - dot(a, v),
-                        false => 0.0,
-                    };
-                    line.given + line.shift + turned
-                }
+            let (a, b) = (now.line(line.index), end.line(line.index));
+            let (at_middle, at_end) = (dot(a, v), dot(b, v));
+            line.value = match line.mean {
+                true => at_middle + ((1.0 - theta) * line.before + line.given) / theta,
+                false => line.given + line.shift + if line.later { at_end } else { at_middle },
             };
+            // The derivative by v of a mean velocity, with the gradient at the middle of what v makes, is the gradient at the end.
+            line.steep = alone && (!line.mean || scheme.directions == Directions::Iterated);
+            line.offset = line.value - if line.steep { at_end } else { at_middle };
         }
     }
 
     /// How much the velocities in the laws differ from those that the laws were solved with, relative to what velocities along lines may be, `‖a‖_{M̂⁻¹} ‖v‖_M`, and to what
     /// is given.
-    pub fn change(&self, v: &[f64], speed: f64) -> f64 {
+    pub fn change(&self, speed: f64) -> f64 {
         let (mut change, mut size) = (0.0_f64, f64::MIN_POSITIVE);
         for line in &self.lines {
-            let a = self.now.line(line.index);
-            let now = dot(a, v) + line.offset;
-            let by = (now - line.velocity).abs();
+            let by = (line.value - line.velocity).abs();
             change = if by > change || by.is_nan() { by } else { change };
-            let ease = dot(a, self.solved.row(line.index)).abs().sqrt();
-            size = size.max(ease * speed + line.offset.abs());
+            size = size.max(self.ease(line) * speed + line.offset.abs());
         }
         change / size
+    }
+
+    /// The sum of `‖a‖_{M̂⁻¹} |r|` of the lines, which is not small where impulses cancel.
+    pub fn strength(&self) -> f64 {
+        self.lines.iter().map(|l| self.ease(l) * l.impulse.abs()).sum()
+    }
+
+    /// `‖a‖_{M̂⁻¹}`.
+    fn ease(&self, line: &Line) -> f64 {
+        dot(self.now.line(line.index), self.solved.row(line.index)).abs().sqrt()
     }
 
     /// States the problem of an iteration whose velocity without impulses is `free`.
@@ -396,7 +408,9 @@ impl<const D: usize> Lines<D> {
         point: &mut LocalPoint,
     ) {
         let nc = self.touching.len();
+        let steep = self.lines.iter().any(|l| l.steep);
         let same = self.solve_lines(matrices, changed, free.len())
+            && !steep
             && self.stated.iter().copied().eq(self.lines.iter().map(|l| l.index));
         if !same {
             self.stated.clear();
@@ -404,7 +418,7 @@ impl<const D: usize> Lines<D> {
             self.couple(problem);
         }
         let (contacts, scalars) = self.lines.split_at(D * nc);
-        let velocity = |line: &Line| dot(self.now.line(line.index), free) + line.offset;
+        let velocity = |line: &Line| dot(self.slope(line), free) + line.offset;
         problem.q.clear();
         problem.q.extend(contacts.iter().map(velocity));
         problem.mu.clear();
@@ -422,6 +436,17 @@ impl<const D: usize> Lines<D> {
         for (lambda, j) in point.lambda.iter_mut().zip(0..) {
             *lambda = lambda.clamp(self.bounds.lower[j], self.bounds.upper[j]);
         }
+    }
+
+    /// The gradient that the velocity of a line is stated with.
+    fn slope(&self, line: &Line) -> &[f64] {
+        let at = if line.steep { &self.end } else { &self.now };
+        at.line(line.index)
+    }
+
+    /// Whether the problem is to be symmetric: it has more than relations.
+    pub fn is_symmetric(&self) -> bool {
+        self.lines.len() > self.relations
     }
 
     /// M̂⁻¹ of each line that takes part; whether all were there already.
@@ -461,10 +486,10 @@ impl<const D: usize> Lines<D> {
     fn couple(&self, problem: &mut FrictionLocal<D>) {
         let nc = self.touching.len();
         let p = self.lines.len() - D * nc;
-        // Row i of the upper triangle first, so that what is below it is the same to the last bit.
         let product = |i: usize, j: usize| {
-            let (a, b) = (self.lines[i.min(j)].index, self.lines[i.max(j)].index);
-            dot(self.now.line(a), self.solved.row(b))
+            // Where the matrix is symmetric, what is below the diagonal is what is above it, to the last bit.
+            let (i, j) = if self.lines[i].steep { (i, j) } else { (i.min(j), i.max(j)) };
+            dot(self.slope(&self.lines[i]), self.solved.row(self.lines[j].index))
         };
         problem.W.clear(nc);
         for a in 0..nc {
@@ -517,7 +542,8 @@ impl<const D: usize> Lines<D> {
             }
         }
         for line in &mut self.lines {
-            line.velocity = dot(self.now.line(line.index), v) + line.offset;
+            let at = if line.steep { &self.end } else { &self.now };
+            line.velocity = dot(at.line(line.index), v) + line.offset;
         }
     }
 
@@ -555,11 +581,13 @@ impl Line {
         Self {
             index,
             later: false,
+            steep: false,
             mean: false,
             given: 0.0,
             given_mean: 0.0,
             before: 0.0,
             shift: 0.0,
+            value: 0.0,
             velocity: 0.0,
             offset: 0.0,
             impulse: 0.0,

@@ -9,11 +9,12 @@
 //! ```
 //!
 //! Method: Newton's. Each iterate `M̂ (v^{i+1} − v^i) = −R(v^i) + H r + G λ` with `M̂ = M − hθ ∂F/∂v − h²θ² ∂F/∂q` is one local problem in r and λ, warm started by
-//! the last one and solved by a session of the project's solvers. Derivatives of M, H and G are left out, and of M̂ the symmetric part is taken where impulses act,
-//! so that W is symmetric: the iteration contracts by about h times the rate at which directions turn. A velocity in a law that is taken with the
-//! directions at the end of the step (of what persists, and of relations there) has their difference to those at q_* from the last iterate, for the same reason.
+//! the last one and solved by a session of the project's solvers. Derivatives of M, H and G are left out, and of M̂ the symmetric part is taken where contacts or
+//! scalar rows act, so that W is symmetric: the iteration contracts by about h times the rate at which directions turn. A velocity in a law that is taken with the
+//! directions at the end of the step has their difference to those at q_* from the last iterate, for the same reason. Relations alone are linearised with the gradients
+//! at the end of the step, which is Newton's method for them and passes singular positions.
 //!
-//! A step ends when, at the new v, `‖R − H r − G λ‖_{M⁻¹}` is at most tol times the larger of `‖h F‖_{M⁻¹}`, `‖H r + G λ‖_{M⁻¹}` and `1e-12 ‖v‖_M`, and the velocities in the
+//! A step ends when, at the new v, `‖R − H r − G λ‖_{M⁻¹}` is at most tol times the larger of `‖h F‖_{M⁻¹}`, `‖H r‖_{M⁻¹}` and `1e-12 ‖v‖_M`, and the velocities in the
 //! laws differ from those that the laws were solved with by at most tol: then v, r, λ solve the problem itself, whatever the last correction was. The first test has
 //! a floor of some roundings of `‖v‖_M`; and an iterate within 100 tol that no longer improves is accepted, since rounding in the user's functions is not known.
 //!
@@ -36,6 +37,7 @@ use super::matrices::Matrices;
 use super::project::Projection;
 use super::state::LagrangianState;
 use super::{Lagrangian, LagrangianContact, LagrangianScheme};
+use crate::drive::CANCELLED;
 use crate::report::{Counts, Drift, EnergyBalance, StepReport, StepStatus, Timings};
 use crate::{Directions, SimulateError};
 
@@ -191,6 +193,9 @@ impl<const D: usize> Tools<D> {
         report: &mut StepReport,
     ) -> Result<(), Ended> {
         let h = report.h;
+        if limit() == CANCELLED {
+            return Err(Ended::Status(CANCELLED));
+        }
         self.begin(system, state)?;
         self.evaluate(system, scheme, state, h)?;
         self.choose(system, scheme, state, h)?;
@@ -291,7 +296,7 @@ impl<const D: usize> Tools<D> {
         h: f64,
     ) -> Result<(), Ended> {
         let Self { motion: m, matrices, lines, problem, point, work, .. } = self;
-        let symmetric = !lines.lines.is_empty();
+        let symmetric = lines.is_symmetric();
         advance(work, state, &m.v, scheme.theta, h);
         let at = (state.t + h, &mut work[..], &mut m.v[..]);
         let Ok(changed) = matrices.hat(system, at, (h, scheme.theta), symmetric) else {
@@ -304,7 +309,7 @@ impl<const D: usize> Tools<D> {
         m.free.clone_from(&m.residual);
         matrices.solve_hat(&mut m.free);
         m.free.iter_mut().zip(&m.v).for_each(|(free, v)| *free = v - *free);
-        if symmetric {
+        if !lines.lines.is_empty() {
             lines.state(matrices, changed, &m.free, problem, point);
         }
         Ok(())
@@ -349,10 +354,11 @@ impl<const D: usize> Tools<D> {
         m.residual.iter_mut().zip(&m.push).for_each(|(r, p)| *r -= p);
         let speed =
             (2.0 * f64::max(matrices.half_square(&m.v), matrices.half_square(&state.v))).sqrt();
-        let forces = f64::max(matrices.dual_norm(&m.drive), matrices.dual_norm(&m.push));
+        let forces = f64::max(matrices.dual_norm(&m.drive), lines.strength());
         let bound = scheme.tolerance * forces.max(1e-12 * speed);
-        let residual = matrices.dual_norm(&m.residual) / bound.max(ROUNDING * speed);
-        let merit = largest(residual, lines.change(&m.v, speed) / scheme.tolerance);
+        let bound = bound.max(ROUNDING * speed).max(f64::MIN_POSITIVE);
+        let residual = matrices.dual_norm(&m.residual) / bound;
+        let merit = largest(residual, lines.change(speed) / scheme.tolerance);
         let before = std::mem::replace(&mut m.merit, merit);
         merit <= 1.0 || (merit <= ROUNDED && merit >= 0.5 * before)
     }

@@ -55,7 +55,7 @@ fn a_rod_in_painleves_region_steps_on() {
             let (mut energy, mut slid) = (f64::INFINITY, speed);
             let mut watch = |s: &LagrangianSimulation<Rod, 2>, r: &StepReport| {
                 let now = r.energy.kinetic + r.energy.potential;
-                assert!(now <= energy + 1e-9, "mu {mu}, t {}: {now} after {energy}", r.t);
+                assert!(now <= energy * (1.0 + 1e-6), "mu {mu}, t {}: {now} after {energy}", r.t);
                 energy = now;
                 let c = s.contacts()[0];
                 assert!(c.impulse.iter().all(|r| r.is_finite()));

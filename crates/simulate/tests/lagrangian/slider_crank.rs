@@ -111,6 +111,5 @@ fn the_slider_without_clearance_is_near() {
         far = far.max((ideal.state().q[1] - real.state().q[1]).abs());
     }
     // The clearance is 0.001 m on a rod of 0.306 m.
-    println!("far {far}");
     assert!((1e-4..1e-2).contains(&far), "{far}");
 }
