@@ -91,7 +91,7 @@
 //! | read and write files | [`read`] a problem; [`ProblemFile`] with all that a file holds, in any of the [`FORMATS`] |
 //! | make matrices | [`Csc`], [`Bsr`], [`Dense`]: from slices, from faer, and behind features from nalgebra and sprs |
 //! | make problems | [`Planted`], with a known solution; [`Scene`], of bodies |
-//! | move bodies | [`simulate`]: a world, step by step, every step judged |
+//! | move bodies | [`simulate`]: a world or a Lagrangian system, step by step, every step judged |
 //! | write a solver | [`Solver`], [`Step`], [`Driver`] |
 //!
 //! The crates below (`nonsmooth-problem`, `nonsmooth-solve`, `nonsmooth-io`, `nonsmooth-scenes`, `nonsmooth-simulate`) have all the rest: kernels, single methods, forms.
@@ -130,6 +130,11 @@ pub use nonsmooth_solve::{
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 struct Readme;
+
+/// The program on Lagrangian systems runs.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/simulation/lagrangian.md")]
+struct Lagrangian;
 
 /// The program on variational inequalities runs.
 #[cfg(all(doctest, feature = "duals"))]

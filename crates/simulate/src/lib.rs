@@ -20,6 +20,8 @@
 //! # Ok::<(), nonsmooth_simulate::SimulateError>(())
 //! ```
 //!
+//! Mechanisms and oscillators in generalised coordinates are stated by the trait [`Lagrangian`] and moved by a [`LagrangianSimulation`].
+//!
 //! Scenes of `nonsmooth-scenes` are worlds too: `World::try_from(&scene)`. Scenes in files are [`SceneFile`]s.
 
 mod detect;

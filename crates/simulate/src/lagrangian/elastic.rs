@@ -1,7 +1,7 @@
 //! Elastic boxes as linear systems.
 
 use nonsmooth_linalg::Csc;
-use nonsmooth_scenes::vec3::{Vec3, add, cross, dot, norm, scale, sub};
+use nonsmooth_scenes::vec3::{Vec3, cross, dot, norm, scale, sub};
 use nonsmooth_scenes::{ElasticBox, SceneError};
 
 use super::{LinearContact, LinearSystem};
@@ -31,7 +31,7 @@ impl LinearSystem<3> {
         Ok(Self { damping, load, ..Self::new(mass, stiffness) })
     }
 
-    /// The same with a contact between each node of the box that is not held, lies within `reach` of the plane, and the half space `normal · x ≤ offset`.
+    /// The same with a contact between the half space `normal · x ≤ offset` and each node of the box that is not held and lies within `reach` of it.
     #[must_use]
     pub fn against_plane(
         mut self,
@@ -47,8 +47,8 @@ impl LinearSystem<3> {
         let tangent = sub(axis, scale(n[least], n));
         let tangent = scale(1.0 / norm(tangent), tangent);
         let frame = [n, tangent, cross(n, tangent)];
-        for (node, place) in solid.places().into_iter().enumerate() {
-            let gap = dot(n, add(place, [0.0; 3])) - offset / norm(normal);
+        for (node, place) in solid.places().enumerate() {
+            let gap = dot(n, place) - offset / norm(normal);
             if gap > reach || solid.held[node] {
                 continue;
             }

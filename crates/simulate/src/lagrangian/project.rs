@@ -51,15 +51,13 @@ impl<const D: usize> Projection<D> {
     }
 
     /// Moves q; whether `|φ|` and `−g` are at most `tolerance` afterwards.
-    #[allow(clippy::too_many_arguments)]
     pub fn project<L: Lagrangian<D> + ?Sized>(
         &mut self,
         system: &L,
         lines: &Lines<D>,
         matrices: &mut Matrices,
         (t, q): (f64, &mut Vec<f64>),
-        tolerance: f64,
-        limits: &Limits,
+        (tolerance, limits): (f64, &Limits),
         work: &mut Vec<f64>,
     ) -> Result<bool, SimulateError> {
         let size = system.size();

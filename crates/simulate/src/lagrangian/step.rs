@@ -376,7 +376,7 @@ impl<const D: usize> Tools<D> {
         advance(&mut m.end, state, &m.v, scheme.theta, report.h);
         let Some(tolerance) = scheme.projection else { return Ok(()) };
         let at = (state.t + report.h, &mut m.end);
-        let reached = projection.project(system, lines, matrices, at, tolerance, limits, work)?;
+        let reached = projection.project(system, lines, matrices, at, (tolerance, limits), work)?;
         if !reached && report.status == StepStatus::Solved {
             report.status = StepStatus::ProjectionLimit;
         }
