@@ -9,7 +9,7 @@
 
 use super::lines::dot;
 use super::state::LagrangianState;
-use super::step::Tools;
+use super::step::{Motion, Tools};
 use super::{Lagrangian, LagrangianScheme};
 use crate::EnergyBalance;
 
@@ -32,18 +32,20 @@ impl<const D: usize> Tools<D> {
         };
         let inertia = (e.kinetic - matrices.half_square(&m.v))
             - (e.kinetic_before - matrices.half_square(&state.v));
-        let both = m.v.iter().zip(&state.v);
-        let mean: Vec<f64> =
-            both.clone().map(|(new, old)| theta * new + (1.0 - theta) * old).collect();
-        let change: Vec<f64> = both.map(|(new, old)| new - old).collect();
-        let work = dot(&mean, &m.drive);
+        let Motion { v, drive, push: mean, residual: change, .. } = m;
+        let both = || v.iter().zip(&state.v);
+        mean.clear();
+        mean.extend(both().map(|(new, old)| theta * new + (1.0 - theta) * old));
+        change.clear();
+        change.extend(both().map(|(new, old)| new - old));
+        let work = dot(mean, drive);
         e.forces = work + inertia;
-        e.numerical = 2.0 * (theta - 0.5) * matrices.half_square(&change);
+        e.numerical = 2.0 * (theta - 0.5) * matrices.half_square(change);
         e.scale = e.kinetic_before + e.kinetic + e.numerical + work.abs() + inertia.abs();
         let size = system.size();
         let relations = D * size.contacts..D * size.contacts + size.relations;
         for (k, line) in lines.lines.iter().enumerate() {
-            let rate = dot(lines.now.line(line.index), &mean);
+            let rate = dot(lines.now.line(line.index), mean);
             let work = (rate + line.given_mean) * line.impulse;
             let drive = line.given_mean * line.impulse;
             e.scale += work.abs() + drive.abs();

@@ -92,9 +92,19 @@ impl Matrices {
         self.mass.refresh().map(|_| ())
     }
 
+    /// The largest `|M_ij − M_ji|` relative to the largest entry.
+    pub fn asymmetry(&self) -> f64 {
+        self.mass.matrix.asymmetry().unwrap_or(0.0)
+    }
+
     /// Whether all entries of M are finite.
     pub fn is_finite(&self) -> bool {
         entries(&self.mass.matrix).iter().all(|x| x.is_finite())
+    }
+
+    /// Whether all entries of M̂ are finite.
+    pub fn is_hat_finite(&self) -> bool {
+        entries(&self.hat.matrix).iter().all(|x| x.is_finite())
     }
 
     /// `M̂ = M − hθ ∂F/∂v − h²θ² ∂F/∂q` at t, q, v, its symmetric part if asked for, factorised; whether it has changed.

@@ -28,7 +28,9 @@ pub(super) struct Projection<const D: usize> {
     solved: Dense,
     /// The lines: all relations, then what is unilateral.
     lines: Vec<usize>,
-    values: [Vec<f64>; 3],
+    /// Gaps, φ and coordinates of all contacts, relations and rows, and those of the lines.
+    all: [Vec<f64>; 3],
+    values: Vec<f64>,
     session: Box<dyn Session<FrictionLocal<D>>>,
     problem: FrictionLocal<D>,
     point: LocalPoint,
@@ -43,7 +45,8 @@ impl<const D: usize> Projection<D> {
             gradients: Gradients::default(),
             solved: Dense::default(),
             lines: vec![],
-            values: Default::default(),
+            all: Default::default(),
+            values: vec![],
             session: registry::session::<FrictionLocal<D>>(solver, settings)?,
             problem: empty(),
             point: LocalPoint::default(),
@@ -74,79 +77,85 @@ impl<const D: usize> Projection<D> {
                 break;
             }
             self.gradients.evaluate(system, t, q, work);
-            let gradients = std::mem::take(&mut self.gradients);
-            let lines = std::mem::take(&mut self.lines);
-            let (values, each) = (self.rows(system, &lines), lines.iter().copied());
-            let solved =
-                self.correct(&gradients, (each, values), size.relations, matrices, limits, q);
-            (self.gradients, self.lines) = (gradients, lines);
-            if !solved? {
+            if !self.correct(size.relations, matrices, limits, q)? {
                 break;
             }
         }
         Ok(self.violation(system, t, q) <= tolerance)
     }
 
-    /// The largest of `|φ|` and `−g`.
+    /// `v ← v − M⁻¹ G (Gᵀ M⁻¹ G)⁻¹ (Gᵀ v + rate)` with the gradients of the relations, which are the lines from `first` on; whether that is solved.
+    pub fn project_velocity(
+        &mut self,
+        (gradients, first): (&Gradients, usize),
+        rate: &[f64],
+        matrices: &mut Matrices,
+        limits: &Limits,
+        v: &mut [f64],
+    ) -> Result<bool, SimulateError> {
+        self.gradients.clone_from(gradients);
+        self.lines.clear();
+        self.lines.extend(first..first + rate.len());
+        self.values.clear();
+        let violated = |(i, b): (&usize, &f64)| dot(gradients.line(*i), v) + b;
+        self.values.extend(self.lines.iter().zip(rate).map(violated));
+        self.correct(rate.len(), matrices, limits, v)
+    }
+
+    /// The largest of `|φ|` and `−g`, with the values of the lines.
     fn violation<L: Lagrangian<D> + ?Sized>(&mut self, system: &L, t: f64, q: &[f64]) -> f64 {
         let size = system.size();
-        let [gaps, phi, rows] = &mut self.values;
+        let [gaps, phi, rows] = &mut self.all;
         zero(gaps, size.contacts);
         zero(phi, size.relations);
         zero(rows, size.rows);
         system.gaps(t, q, gaps);
         system.relations(t, q, phi);
         system.rows(t, q, rows);
-        let violation = |(k, x): (usize, f64)| if k < size.relations { x.abs() } else { -x };
-        let all = self.rows(system, &self.lines).into_iter().enumerate().map(violation);
-        all.fold(0.0, |a, x| if x > a || x.is_nan() { x } else { a })
-    }
-
-    /// φ and g of the lines, as last evaluated.
-    fn rows<L: Lagrangian<D> + ?Sized>(&self, system: &L, lines: &[usize]) -> Vec<f64> {
-        let size = system.size();
-        let [gaps, phi, rows] = &self.values;
         let first = D * size.contacts;
         let value = |&i: &usize| match i {
             i if i < first => gaps[i / D],
             i if i < first + size.relations => phi[i - first],
             i => rows[i - first - size.relations],
         };
-        lines.iter().map(value).collect()
+        self.values.clear();
+        self.values.extend(self.lines.iter().map(value));
+        let violation = |(k, x): (usize, &f64)| if k < size.relations { x.abs() } else { -x };
+        let all = self.values.iter().enumerate().map(violation);
+        all.fold(0.0, |a, x| if x > a || x.is_nan() { x } else { a })
     }
 
     /// `x ← x + M⁻¹ A λ` for the lines A with the values c, `0 = AᵀM⁻¹A λ + c` for the first `free` of them and `0 ≤ λ ⟂ AᵀM⁻¹A λ + c ≥ 0` for the others; whether
     /// that is solved.
     #[allow(non_snake_case)]
-    pub fn correct(
+    fn correct(
         &mut self,
-        gradients: &Gradients,
-        (lines, values): (impl Iterator<Item = usize> + Clone, Vec<f64>),
         free: usize,
         matrices: &mut Matrices,
         limits: &Limits,
         x: &mut [f64],
     ) -> Result<bool, SimulateError> {
-        let p = values.len();
-        self.solved.reset(p, x.len());
-        for (k, i) in lines.clone().enumerate() {
-            self.solved.row_mut(k).copy_from_slice(gradients.line(i));
-            matrices.solve_mass(self.solved.row_mut(k));
+        let Self { gradients, solved, lines, values, .. } = self;
+        let p = lines.len();
+        solved.reset(p, x.len());
+        for (k, &i) in lines.iter().enumerate() {
+            solved.row_mut(k).copy_from_slice(gradients.line(i));
+            matrices.solve_mass(solved.row_mut(k));
         }
         let mut R = Dense::zeros(p, p);
-        for (i, line) in lines.enumerate() {
+        for (i, &line) in lines.iter().enumerate() {
             for j in i..p {
-                let x = dot(gradients.line(line), self.solved.row(j));
+                let x = dot(gradients.line(line), solved.row(j));
                 (R[(i, j)], R[(j, i)]) = (x, x);
             }
         }
-        if !R.values().iter().chain(&values).all(|x| x.is_finite()) {
+        if !R.values().iter().chain(&*values).all(|x| x.is_finite()) {
             return Ok(false);
         }
         let lower = (0..p).map(|k| if k < free { f64::NEG_INFINITY } else { 0.0 }).collect();
         let bounds = Bounds { lower, upper: vec![f64::INFINITY; p] };
         self.problem.rows =
-            Some(RowsLocal { V: Csc::zeros(0, p), R: R.to_csc(), s: values, bounds });
+            Some(RowsLocal { V: Csc::zeros(0, p), R: R.to_csc(), s: values.clone(), bounds });
         self.point.r.clear();
         zero(&mut self.point.lambda, p);
         let outcome = self.session.solve(&self.problem, &mut self.point, limits, &mut |_| {})?;

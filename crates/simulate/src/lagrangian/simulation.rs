@@ -110,6 +110,9 @@ impl<L: Lagrangian<D>, const D: usize> LagrangianSimulation<L, D> {
                 found,
             ));
         }
+        let asymmetry = tools.matrices.asymmetry();
+        let expected = "0, of a symmetric matrix";
+        require(|| "asymmetry of mass".into(), asymmetry, asymmetry <= 1e-10, expected)?;
         let mut directions = nonsmooth_linalg::Dense::zeros(D * system.size().contacts, n);
         if !system.directions(0.0, q, &mut directions) {
             for c in 0..system.size().contacts {
@@ -215,7 +218,8 @@ impl<L: Lagrangian<D>, const D: usize> LagrangianSimulation<L, D> {
             system.relations(state.t + sign * span, &q, &mut phi);
             rate.iter_mut().zip(&phi).for_each(|(r, phi)| *r += sign * phi / (2.0 * span));
         }
-        tools.project_velocity(system, &gradients, &rate, limits, &mut v)?;
+        let (at, Tools { projection, matrices, .. }) = ((&gradients, D * size.contacts), tools);
+        projection.project_velocity(at, &rate, matrices, limits, &mut v)?;
         Ok(v)
     }
 

@@ -32,7 +32,7 @@ use nonsmooth_problem::{FrictionLocal, LocalPoint, RowsLocal};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limit, Limits, Session, Status, settings::SettingsMap};
 
-use super::lines::{Gradients, Lines, dot};
+use super::lines::Lines;
 use super::matrices::Matrices;
 use super::project::Projection;
 use super::state::LagrangianState;
@@ -49,7 +49,7 @@ pub(super) struct Tools<const D: usize> {
     problem: FrictionLocal<D>,
     point: LocalPoint,
     session: Box<dyn Session<FrictionLocal<D>>>,
-    projection: Projection<D>,
+    pub projection: Projection<D>,
     pub contacts: Vec<LagrangianContact<D>>,
     work: Vec<f64>,
 }
@@ -70,7 +70,7 @@ pub(super) struct Motion {
     /// `H r + G λ`.
     pub push: Vec<f64>,
     /// R.
-    residual: Vec<f64>,
+    pub residual: Vec<f64>,
     /// How often the tolerance the last iterate missed the tests by.
     merit: f64,
 }
@@ -301,8 +301,11 @@ impl<const D: usize> Tools<D> {
         let at = (state.t + h, &mut work[..], &mut m.v[..]);
         let Ok(changed) = matrices.hat(system, at, (h, scheme.theta), symmetric) else {
             let singular = Status::Stalled("the iteration matrix is singular".into());
-            let status = if budget::over() { limit() } else { StepStatus::Solver(singular) };
-            return Err(Ended::Status(status));
+            return Err(Ended::Status(match matrices.is_hat_finite() {
+                _ if budget::over() => limit(),
+                true => StepStatus::Solver(singular),
+                false => StepStatus::NotFinite,
+            }));
         };
         lines.shift(system, scheme, state, h, ([&m.middle, &m.end], &m.v));
         m.residue(matrices, state);
@@ -380,30 +383,6 @@ impl<const D: usize> Tools<D> {
         if !reached && report.status == StepStatus::Solved {
             report.status = StepStatus::ProjectionLimit;
         }
-        Ok(())
-    }
-
-    /// `v ← v − M⁻¹ G (Gᵀ M⁻¹ G)⁻¹ (Gᵀ v + rate)` with the last M, by the solver of the projection.
-    pub fn project_velocity<L: Lagrangian<D> + ?Sized>(
-        &mut self,
-        system: &L,
-        gradients: &Gradients,
-        rate: &[f64],
-        limits: &Limits,
-        v: &mut [f64],
-    ) -> Result<(), SimulateError> {
-        let first = D * system.size().contacts;
-        let lines = (0..rate.len()).map(|k| first + k);
-        let violated = |(i, b): (usize, &f64)| dot(gradients.line(i), v) + b;
-        let values = lines.clone().zip(rate).map(violated).collect();
-        self.projection.correct(
-            gradients,
-            (lines, values),
-            rate.len(),
-            &mut self.matrices,
-            limits,
-            v,
-        )?;
         Ok(())
     }
 

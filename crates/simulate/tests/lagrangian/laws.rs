@@ -445,6 +445,12 @@ fn mistakes_are_named() {
     assert!(said(new(right, &[0.0], &[f64::NAN])).starts_with("v: expected finite components"));
     let mass = "mass: expected a symmetric positive definite matrix";
     assert!(said(new(Wrong { mass: -1.0, ..right }, &[2.0], &[0.0])).starts_with(mass));
+    let skew = LinearSystem::<2>::new(
+        Csc::from_triplets(2, 2, [(0, 0, 2.0), (0, 1, 1.0), (1, 1, 2.0)].into_iter()).unwrap(),
+        Csc::zeros(2, 2),
+    );
+    let text = said(LagrangianSimulation::new(skew, theta(0.5), &[0.0; 2], &[0.0; 2]).map(|_| ()));
+    assert_eq!(text, "asymmetry of mass: expected 0, of a symmetric matrix, found 0.5");
     let tangents = Wrong { law: Some(Law::friction(0.5)), ..right };
     let text = said(new(tangents, &[0.0], &[0.0]));
     assert!(text.starts_with("law(0).mu: expected 0, since `directions` gives no"), "{text}");
