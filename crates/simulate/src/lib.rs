@@ -25,7 +25,9 @@
 mod detect;
 mod error;
 mod islands;
+mod joints;
 mod moreau_jean;
+mod moving;
 mod report;
 pub mod rotation;
 pub mod scene_file;
@@ -37,7 +39,11 @@ mod world;
 
 pub use detect::Key;
 pub use error::{Overlap, SimulateError};
-pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean};
+pub use joints::{
+    Coordinate, Coupling, Drive, Driver, Joint, JointId, JointKind, JointLimits, JointReport,
+    Motor, Spring,
+};
+pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean, Stabilisation};
 pub use report::{
     ContactReport, Counts, Drift, EnergyBalance, RunReport, StepReport, StepStatus, Timings,
 };

@@ -13,7 +13,7 @@ use crate::report::{ContactReport, RunReport, StepReport, StepStatus};
 use crate::state::State;
 use crate::step::{Inner, Tools};
 use crate::world::oscillation;
-use crate::{BodyId, MoreauJean, Motion, SimulateError, World};
+use crate::{BodyId, JointReport, MoreauJean, Motion, SimulateError, World};
 
 /// Bodies that overlap by more than this share of the smaller one are refused at the start.
 const OVERLAP: f64 = 1e-6;
@@ -117,7 +117,7 @@ impl Simulation {
     /// Errors: those of [`World::validate`]; settings of the scheme that are not possible; pairs of shapes that may meet and are not
     /// supported; bodies that overlap by more than 1e-6 of their size, all of them listed.
     pub fn new(mut world: World, scheme: MoreauJean) -> Result<Self, SimulateError> {
-        let warnings = world.validate()?;
+        let mut warnings = world.validate()?;
         scheme.validate()?;
         let mut state = State::of(&world);
         for (k, body) in world.bodies.iter().enumerate() {
@@ -127,6 +127,13 @@ impl Simulation {
             }
         }
         let mut tools = Tools::new(&world, &state)?;
+        let violations = tools.joints.violations(&world, &state).0;
+        tools.joints.finish(&mut state, &violations);
+        if let Some((found, all)) = tools.joints.redundant(&world, &state) {
+            warnings.push(format!(
+                "{found} of {all} equations of joints are redundant: the motion is unique, the impulses of these joints are not"
+            ));
+        }
         let found = tools.overlaps(&world, &mut state, OVERLAP);
         if !found.is_empty() {
             let name = |k: u32| world.label(k as usize);
@@ -211,6 +218,11 @@ impl Simulation {
         &self.tools.contacts
     }
 
+    /// What the joints did in the last step, in their order.
+    pub fn joints(&self) -> &[JointReport] {
+        &self.tools.joints.reports
+    }
+
     /// Does one step of length h > 0, s.
     ///
     /// Errors: h that is no positive number; a solver that does not apply. What numerics come to is in the report.
@@ -239,7 +251,7 @@ impl Simulation {
             return Ok(joined(first, second));
         }
         if report.status != StepStatus::NotFinite && !cancelled {
-            report.drift.quaternion = tools.commit(scheme, world, state, h);
+            tools.commit(scheme, world, state, h, &mut report);
             report.t = state.t;
         } else {
             tools.contacts.clear();
@@ -341,6 +353,7 @@ fn joined(first: StepReport, second: StepReport) -> StepReport {
     let mut drift = second.drift;
     drift.penetration = drift.penetration.max(first.drift.penetration);
     drift.quaternion = drift.quaternion.max(first.drift.quaternion);
+    drift.joints = drift.joints.max(first.drift.joints);
     let mut timings = second.timings;
     timings.detection += first.timings.detection;
     timings.assembly += first.timings.assembly;
