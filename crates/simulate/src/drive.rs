@@ -147,7 +147,7 @@ fn joined(first: StepReport, second: StepReport) -> StepReport {
     let mut drift = second.drift;
     drift.penetration = drift.penetration.max(first.drift.penetration);
     drift.quaternion = drift.quaternion.max(first.drift.quaternion);
-    drift.relation = drift.relation.max(first.drift.relation);
+    drift.joints = drift.joints.max(first.drift.joints);
     let mut timings = second.timings;
     timings.detection += first.timings.detection;
     timings.assembly += first.timings.assembly;

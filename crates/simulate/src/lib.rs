@@ -28,8 +28,10 @@ mod detect;
 mod drive;
 mod error;
 mod islands;
+mod joints;
 mod lagrangian;
 mod moreau_jean;
+mod moving;
 mod report;
 pub mod rotation;
 pub mod scene_file;
@@ -42,11 +44,15 @@ mod world;
 pub use detect::Key;
 pub use drive::{Control, Observer};
 pub use error::{Overlap, SimulateError};
+pub use joints::{
+    Coordinate, Coupling, Drive, Driver, Joint, JointId, JointKind, JointLimits, JointReport,
+    Motor, Spring,
+};
 pub use lagrangian::{
     Constant, Directions, Lagrangian, LagrangianContact, LagrangianScheme, LagrangianSimulation,
     LagrangianState, LinearContact, LinearRow, LinearSystem, RelationsAt, RowLaw, Size,
 };
-pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean};
+pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean, Stabilisation};
 pub use report::{
     ContactReport, Counts, Drift, EnergyBalance, RunReport, StepReport, StepStatus, Timings,
 };

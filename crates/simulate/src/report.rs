@@ -44,7 +44,7 @@ impl StepStatus {
     }
 }
 
-/// The energy of a step by terms, J. `T⁺ − T = gravity + forces + normal + tangential + drives − numerical + imbalance`.
+/// The energy of a step by terms, J. `T⁺ − T = gravity + forces + normal + tangential + drives + joints − numerical + imbalance`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EnergyBalance {
     /// Kinetic energy before the step.
@@ -63,6 +63,8 @@ pub struct EnergyBalance {
     pub tangential: f64,
     /// Work of surfaces and tables that move as they are told.
     pub drives: f64,
+    /// Work of joints on the bodies: of springs, motors, friction and limits; equations between bodies do none. Of Lagrangian systems that of relations and rows.
+    pub joints: f64,
     /// `(θ − ½) ‖v⁺ − v‖²_M`: what the scheme itself dissipates.
     pub numerical: f64,
     /// What is left: rounding, unless something is wrong.
@@ -88,6 +90,7 @@ impl EnergyBalance {
             normal: self.normal + next.normal,
             tangential: self.tangential + next.tangential,
             drives: self.drives + next.drives,
+            joints: self.joints + next.joints,
             numerical: self.numerical + next.numerical,
             imbalance: self.imbalance + next.imbalance,
             scale: self.scale.max(next.scale),
@@ -110,6 +113,8 @@ pub struct Counts {
     pub slip: usize,
     /// Contacts that began with the impulse of the last step.
     pub warm: usize,
+    /// Scalar rows: equations, limits, motors, friction and springs of joints; relations and rows of Lagrangian systems.
+    pub rows: usize,
     /// Islands that were solved apart.
     pub islands: usize,
     /// The most contacts in an island.
@@ -125,8 +130,8 @@ pub struct Drift {
     pub penetration: f64,
     /// The largest `|‖q‖ − 1|` of a quaternion, before it was made one.
     pub quaternion: f64,
-    /// The largest `|φ|` of a relation of a Lagrangian system, in its unit.
-    pub relation: f64,
+    /// The most by which an equation of a joint, or a relation of a Lagrangian system, is violated after the step, in its unit.
+    pub joints: f64,
 }
 
 /// Where the time of a step went, s.

@@ -11,7 +11,7 @@ use crate::report::{ContactReport, RunReport, StepReport};
 use crate::state::State;
 use crate::step::{Inner, Tools};
 use crate::world::oscillation;
-use crate::{BodyId, MoreauJean, Motion, SimulateError, World};
+use crate::{BodyId, JointReport, MoreauJean, Motion, SimulateError, World};
 
 /// Bodies that overlap by more than this share of the smaller one are refused at the start.
 const OVERLAP: f64 = 1e-6;
@@ -82,7 +82,7 @@ impl Simulation {
     /// Errors: those of [`World::validate`]; settings of the scheme that are not possible; pairs of shapes that may meet and are not
     /// supported; bodies that overlap by more than 1e-6 of their size, all of them listed.
     pub fn new(mut world: World, scheme: MoreauJean) -> Result<Self, SimulateError> {
-        let warnings = world.validate()?;
+        let mut warnings = world.validate()?;
         scheme.validate()?;
         let mut state = State::of(&world);
         for (k, body) in world.bodies.iter().enumerate() {
@@ -92,6 +92,13 @@ impl Simulation {
             }
         }
         let mut tools = Tools::new(&world, &state)?;
+        let violations = tools.joints.violations(&world, &state).0;
+        tools.joints.finish(&mut state, &violations);
+        if let Some((found, all)) = tools.joints.redundant(&world, &state) {
+            warnings.push(format!(
+                "{found} of {all} equations of joints are redundant: the motion is unique, the impulses of these joints are not"
+            ));
+        }
         let found = tools.overlaps(&world, &mut state, OVERLAP);
         if !found.is_empty() {
             let name = |k: u32| world.label(k as usize);
@@ -174,6 +181,11 @@ impl Simulation {
     /// The contacts of the last step, by key: all points where bodies were near each other.
     pub fn contacts(&self) -> &[ContactReport] {
         &self.tools.contacts
+    }
+
+    /// What the joints did in the last step, in their order.
+    pub fn joints(&self) -> &[JointReport] {
+        &self.tools.joints.reports
     }
 
     /// Does one step of length h > 0, s.
@@ -259,7 +271,7 @@ impl Driven for Simulation {
 
     fn take(&mut self, report: &mut StepReport, h: f64) {
         let Self { world, scheme, state, tools, .. } = self;
-        report.drift.quaternion = tools.commit(scheme, world, state, h);
+        tools.commit(scheme, world, state, h, report);
     }
 
     fn discard(&mut self) {

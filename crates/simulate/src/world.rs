@@ -8,7 +8,7 @@ use nonsmooth_scenes::{self as scenes, MassProperties, Polyhedron, Rotation, Sce
 use crate::error::{finite, require};
 use crate::rotation::unit;
 use crate::shape::plane;
-use crate::{Part, Shape, SimulateError};
+use crate::{Coupling, Joint, JointId, Part, Shape, SimulateError};
 
 /// The number of a body; never used again for another one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -219,6 +219,10 @@ pub struct World {
     materials: Vec<String>,
     pairs: BTreeMap<(usize, usize), Law>,
     apart: BTreeSet<(BodyId, BodyId)>,
+    /// All joints; a [`JointId`] is a place here.
+    pub joints: Vec<Joint>,
+    /// Couplings of their coordinates.
+    pub couplings: Vec<Coupling>,
 }
 
 impl Default for World {
@@ -237,6 +241,8 @@ impl World {
             materials: vec!["default".into()],
             pairs: BTreeMap::new(),
             apart: BTreeSet::new(),
+            joints: vec![],
+            couplings: vec![],
         }
     }
 
@@ -250,6 +256,15 @@ impl World {
     pub fn add(&mut self, body: Body) -> BodyId {
         self.bodies.push(body);
         BodyId(self.bodies.len() as u32 - 1)
+    }
+
+    /// Adds a joint; its partners do not touch each other unless it says so.
+    pub fn join(&mut self, joint: Joint) -> JointId {
+        if let (Some(a), false) = (joint.a, joint.collide) {
+            self.keep_apart(a, joint.b);
+        }
+        self.joints.push(joint);
+        JointId(self.joints.len() as u32 - 1)
     }
 
     /// The number of the material of this name, which is made where there is none.
@@ -321,6 +336,16 @@ impl World {
                 name => format!("bodies[{k}] ({name})"),
             };
             body.validate(&key, count, &mut said)?;
+        }
+        let key = |list: &str, k: usize, name: &str| match name {
+            "" => format!("{list}[{k}]"),
+            name => format!("{list}[{k}] ({name})"),
+        };
+        for (k, joint) in self.joints.iter().enumerate() {
+            joint.validate(&key("joints", k, &joint.name), self)?;
+        }
+        for (k, coupling) in self.couplings.iter().enumerate() {
+            coupling.validate(&key("couplings", k, &coupling.name), self)?;
         }
         Ok(said)
     }

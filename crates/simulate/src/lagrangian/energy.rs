@@ -42,26 +42,23 @@ impl<const D: usize> Tools<D> {
         e.forces = work + inertia;
         e.numerical = 2.0 * (theta - 0.5) * matrices.half_square(change);
         e.scale = e.kinetic_before + e.kinetic + e.numerical + work.abs() + inertia.abs();
-        let size = system.size();
-        let relations = D * size.contacts..D * size.contacts + size.relations;
         for (k, line) in lines.lines.iter().enumerate() {
             let rate = dot(lines.now.line(line.index), mean);
-            let work = (rate + line.given_mean) * line.impulse;
             let drive = line.given_mean * line.impulse;
+            let work = rate * line.impulse + drive;
             e.scale += work.abs() + drive.abs();
-            if relations.contains(&line.index) {
-                e.drives += rate * line.impulse;
+            if k >= D * lines.touching.len() {
+                e.joints += rate * line.impulse;
                 continue;
             }
             e.drives -= drive;
-            let in_contact = k < D * lines.touching.len();
-            if (in_contact && k % D == 0) || lines.is_limit(k) {
+            if k % D == 0 {
                 e.normal += work;
             } else {
                 e.tangential += work;
             }
         }
-        let all = e.forces + e.normal + e.tangential + e.drives;
+        let all = e.forces + e.normal + e.tangential + e.drives + e.joints;
         e.imbalance = e.kinetic - e.kinetic_before - (all - e.numerical);
         e
     }

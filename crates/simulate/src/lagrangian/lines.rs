@@ -555,12 +555,6 @@ impl<const D: usize> Lines<D> {
         }
     }
 
-    /// Whether line k of the step is a limit.
-    pub fn is_limit(&self, k: usize) -> bool {
-        let scalar = k.checked_sub(D * self.touching.len());
-        scalar.is_some_and(|j| self.limits[j].is_some())
-    }
-
     /// The normals of the contacts and the limits that take part, among all lines.
     pub fn unilateral(&self) -> impl Iterator<Item = usize> + '_ {
         let nc = self.touching.len();

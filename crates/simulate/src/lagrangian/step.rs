@@ -397,6 +397,7 @@ impl<const D: usize> Tools<D> {
         let counts = &mut report.counts;
         counts.near = lines.gaps.len();
         counts.active = lines.touching.len();
+        counts.rows = lines.lines.len() - D * counts.active;
         counts.warm = lines.warm;
         counts.islands = usize::from(!lines.lines.is_empty());
         counts.largest = counts.active;
@@ -412,7 +413,7 @@ impl<const D: usize> Tools<D> {
         zero(work, system.size().relations);
         system.relations(state.t + report.h, &m.end, work);
         let worst = |x: &[f64], sign: f64| x.iter().fold(0.0_f64, |a, x| a.max(sign * x));
-        report.drift.relation = worst(work, 1.0).max(worst(work, -1.0));
+        report.drift.joints = worst(work, 1.0).max(worst(work, -1.0));
         report.drift.penetration = worst(&lines.gaps, -1.0);
     }
 

@@ -89,7 +89,7 @@ fn turned(windows: usize, until: f64, h: f64) -> ([f64; 2], f64) {
         angle += (now - last + 9.0 * std::f64::consts::PI).rem_euclid(2.0 * std::f64::consts::PI)
             - std::f64::consts::PI;
         last = now;
-        worst[0] = worst[0].max(r.drift.relation);
+        worst[0] = worst[0].max(r.drift.joints);
         worst[1] = worst[1].max((r.energy.kinetic + r.energy.potential - start).abs());
         Control::Continue
     };

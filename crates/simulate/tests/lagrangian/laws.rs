@@ -172,9 +172,9 @@ fn a_driven_block_is_where_it_is_told_and_the_drive_pays_for_friction() {
     let mut block = LagrangianSimulation::new(Driven, theta(0.5), &[0.0; 2], &[1.2, 0.0]).unwrap();
     let mut friction = 0.0;
     let mut watch = |_: &LagrangianSimulation<Driven, 2>, r: &StepReport| {
-        work += r.energy.drives;
+        work += r.energy.joints;
         friction += r.energy.tangential;
-        assert!(r.drift.relation <= 1e-12);
+        assert!(r.drift.joints <= 1e-12);
         Control::Continue
     };
     check(&block.run(2.0, 1e-3, &mut watch).unwrap());
@@ -322,7 +322,7 @@ fn projection_holds_relations_for_ever() {
     let mut rod = LagrangianSimulation::new(Rod, scheme, &[1.0, 0.0], &[0.0; 2]).unwrap();
     let mut far: f64 = 0.0;
     let mut watch = |_: &LagrangianSimulation<Rod, 2>, r: &StepReport| {
-        far = far.max(r.drift.relation);
+        far = far.max(r.drift.joints);
         Control::Continue
     };
     check(&rod.run(100.0, 1e-3, &mut watch).unwrap());
