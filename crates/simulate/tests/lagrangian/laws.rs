@@ -371,6 +371,13 @@ fn the_problem_of_the_next_step_is_the_one_that_is_solved() {
     }
     point.state_mut().q[1] = 1.0;
     assert_eq!(point.problem(1e-3).unwrap(), None);
+    // Relations alone are a problem without contacts.
+    let scheme = LagrangianScheme { directions: Directions::Extrapolated, ..theta(0.5) };
+    let mut rod = LagrangianSimulation::new(Rod, scheme, &[0.6, 0.8], &[0.8, -0.6]).unwrap();
+    let problem = rod.problem(1e-3).unwrap().expect("a relation");
+    let answer = Solve::new().tolerance(1e-12).run(&problem).unwrap();
+    rod.step(1e-3).unwrap();
+    near(answer.point.lambda[0], rod.relation_impulses()[0], 1e-14);
 }
 
 #[test]

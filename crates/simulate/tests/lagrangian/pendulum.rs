@@ -54,6 +54,8 @@ fn swing(bowl: bool, scheme: LagrangianScheme, h: f64) -> [f64; 3] {
         drift = drift.max((q[0].hypot(q[1]) - 1.0).abs());
         let e = r.energy.kinetic + r.energy.potential;
         energy = if e.abs() > energy.abs() { e } else { energy };
+        // What is not iterated is linear.
+        assert!(bowl || scheme.directions == Directions::Iterated || r.newton == 1);
         // The bead never leaves the bowl.
         assert!(!bowl || r.counts.active == 1, "{}", s.state().t);
         Control::Continue
