@@ -7,7 +7,7 @@
 //! The last two are what the change of M takes; with the work of the terms of F that are squares of velocities they vanish up to O(h³), and both are counted as
 //! work of forces.
 
-use super::lines::dot;
+use super::gradients::dot;
 use super::state::LagrangianState;
 use super::step::{Motion, Tools};
 use super::{Lagrangian, LagrangianScheme};

@@ -1,81 +1,13 @@
 //! Lines: the directions of contacts, the gradients of relations and of scalar rows, and which of them take part in a step.
 
-use nonsmooth_linalg::{Csc, Dense};
-use nonsmooth_problem::{Bounds, FrictionLocal, LocalPoint, RowsLocal};
+use nonsmooth_linalg::Dense;
+use nonsmooth_problem::Bounds;
 
-use super::matrices::Matrices;
+use super::gradients::{Gradients, dot, given};
 use super::state::LagrangianState;
-use super::{Lagrangian, LagrangianScheme, RelationsAt, RowLaw, Size, differences};
+use super::{Lagrangian, LagrangianScheme, RelationsAt, RowLaw};
 use crate::error::require;
 use crate::{Activation, Directions, Impact, Law, SimulateError};
-
-/// All lines of a system at one configuration: D of each contact, then relations, then scalar rows.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Gradients {
-    contacts: Dense,
-    relations: Dense,
-    rows: Dense,
-}
-
-impl Gradients {
-    /// Evaluates all of them at t, q; q is as before afterwards.
-    pub fn evaluate<L: Lagrangian<D> + ?Sized, const D: usize>(
-        &mut self,
-        system: &L,
-        t: f64,
-        q: &mut [f64],
-        work: &mut Vec<f64>,
-    ) {
-        let Size { dofs: n, contacts, relations, rows } = system.size();
-        let typical = system.typical();
-        self.contacts.reset(D * contacts, n);
-        if contacts > 0 && !system.directions(t, q, &mut self.contacts) {
-            let mut normals = Dense::zeros(contacts, n);
-            differences::jacobian(q, typical, work, &mut normals, |q, g| system.gaps(t, q, g));
-            self.contacts.reset(D * contacts, n);
-            for c in 0..contacts {
-                self.contacts.row_mut(D * c).copy_from_slice(normals.row(c));
-            }
-        }
-        self.relations.reset(relations, n);
-        if relations > 0 && !system.relation_gradients(t, q, &mut self.relations) {
-            self.relations.reset(relations, n);
-            let phi = |q: &[f64], phi: &mut [f64]| system.relations(t, q, phi);
-            differences::jacobian(q, typical, work, &mut self.relations, phi);
-        }
-        self.rows.reset(rows, n);
-        if rows > 0 && !system.row_gradients(t, q, &mut self.rows) {
-            self.rows.reset(rows, n);
-            let rows = |q: &[f64], x: &mut [f64]| system.rows(t, q, x);
-            differences::jacobian(q, typical, work, &mut self.rows, rows);
-        }
-    }
-
-    /// Line i of all.
-    pub fn line(&self, i: usize) -> &[f64] {
-        let (a, b) = (self.contacts.nrows(), self.relations.nrows());
-        if i < a {
-            self.contacts.row(i)
-        } else if i < a + b {
-            self.relations.row(i - a)
-        } else {
-            self.rows.row(i - a - b)
-        }
-    }
-
-    fn len(&self) -> usize {
-        self.contacts.nrows() + self.relations.nrows() + self.rows.nrows()
-    }
-
-    pub fn is_finite(&self) -> bool {
-        let all = [&self.contacts, &self.relations, &self.rows];
-        all.iter().flat_map(|a| a.values()).all(|x| x.is_finite())
-    }
-}
-
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
 
 /// A line that takes part in the step: its impulse acts along the gradient a at the middle of the step, and the velocity in its law is stated as `s·v⁺ + offset`, where s is
 /// a, or in problems of relations alone the gradient at the end of the step.
@@ -86,7 +18,7 @@ pub(super) struct Line {
     /// Whether its velocity is taken with the gradient at the end of the step.
     pub later: bool,
     /// Whether s is that gradient.
-    steep: bool,
+    pub steep: bool,
     /// A relation on the mean velocity of the step.
     pub mean: bool,
     /// The part of its velocity that does not come from v: at the end of the step, and weighted by θ.
@@ -97,9 +29,9 @@ pub(super) struct Line {
     /// What the law adds to the velocity after it.
     pub shift: f64,
     /// The velocity in its law at the present iterate, that which the law was solved with, and what is added to `s·v⁺` in it.
-    value: f64,
-    velocity: f64,
-    offset: f64,
+    pub value: f64,
+    pub velocity: f64,
+    pub offset: f64,
     /// Its impulse.
     pub impulse: f64,
 }
@@ -127,19 +59,19 @@ pub(super) struct Lines<const D: usize> {
     pub lines: Vec<Line>,
     /// Of each scalar line that is a limit its restitution.
     limits: Vec<Option<f64>>,
-    bounds: Bounds,
+    pub bounds: Bounds,
     /// Whether a gap closes with more than what forces make in a step.
     pub impact: bool,
     /// M̂⁻¹ of the gradients `now`, line by line, whether that is so, and the gradients that they were made of.
-    solved: Dense,
-    fresh: Vec<bool>,
-    last: Gradients,
+    pub solved: Dense,
+    pub fresh: Vec<bool>,
+    pub last: Gradients,
     /// The lines that the matrices of the problem are made of.
-    stated: Vec<usize>,
+    pub stated: Vec<usize>,
     phi: [Vec<f64>; 2],
-    relations: usize,
+    pub relations: usize,
     pub warm: usize,
-    sums: Vec<f64>,
+    pub sums: Vec<f64>,
 }
 
 impl<const D: usize> Lines<D> {
@@ -229,17 +161,20 @@ impl<const D: usize> Lines<D> {
                     beyond <= 0.0 || (known && turning && curved())
                 }
             };
-            (active, known && (e == 0.0 || rate >= -rest), rate < -rest)
+            let closes = rate < -rest && gap + h * rate <= 0.0;
+            (active, known && (e == 0.0 || rate >= -rest), closes)
         };
         for c in 0..size.contacts {
             let law = system.law(c, t, q, v);
-            law.validate(&format!("law({c})"))?;
+            if law.validate("").is_err() {
+                law.validate(&format!("law({c})"))?;
+            }
             let (gap, given) = (self.gaps[c], self.given[0][D * c]);
             let (active, persists, impact) = unilateral(c, D * c, gap, given, law.e);
             if !active {
                 continue;
             }
-            self.impact |= impact && gap <= 0.0;
+            self.impact |= impact;
             let stuck = persists && memory.stuck.get(c).copied().unwrap_or(false);
             self.touching.push(Touching { contact: c, law, stuck });
             let old = memory.contacts.get(D * c..D * (c + 1)).unwrap_or(&[]);
@@ -273,7 +208,7 @@ impl<const D: usize> Lines<D> {
                     let (active, persists, impact) =
                         unilateral(size.contacts + k, index, gap, given, e);
                     if active {
-                        self.impact |= impact && gap <= 0.0;
+                        self.impact |= impact;
                         self.lines.push(Line { later: turning && persists, ..line });
                         self.limits.push(Some(e));
                         self.bounds.lower.push(0.0);
@@ -398,155 +333,6 @@ impl<const D: usize> Lines<D> {
         dot(self.now.line(line.index), self.solved.row(line.index)).abs().sqrt()
     }
 
-    /// States the problem of an iteration whose velocity without impulses is `free`.
-    pub fn state(
-        &mut self,
-        matrices: &mut Matrices,
-        changed: bool,
-        free: &[f64],
-        problem: &mut FrictionLocal<D>,
-        point: &mut LocalPoint,
-    ) {
-        let nc = self.touching.len();
-        let steep = self.lines.iter().any(|l| l.steep);
-        let same = self.solve_lines(matrices, changed, free.len())
-            && !steep
-            && self.stated.iter().copied().eq(self.lines.iter().map(|l| l.index));
-        if !same {
-            self.stated.clear();
-            self.stated.extend(self.lines.iter().map(|l| l.index));
-            self.couple(problem);
-        }
-        let (contacts, scalars) = self.lines.split_at(D * nc);
-        let velocity = |line: &Line| dot(self.slope(line), free) + line.offset;
-        problem.q.clear();
-        problem.q.extend(contacts.iter().map(velocity));
-        problem.mu.clear();
-        problem.mu.extend(self.touching.iter().map(|t| t.law.mu));
-        point.r.clear();
-        point.r.extend(contacts.iter().map(|l| l.impulse));
-        point.lambda.clear();
-        point.lambda.extend(scalars.iter().map(|l| l.impulse));
-        if let Some(rows) = &mut problem.rows {
-            rows.s.clear();
-            rows.s.extend(scalars.iter().map(velocity));
-            rows.bounds.lower.clone_from(&self.bounds.lower);
-            rows.bounds.upper.clone_from(&self.bounds.upper);
-        }
-        for (lambda, j) in point.lambda.iter_mut().zip(0..) {
-            *lambda = lambda.clamp(self.bounds.lower[j], self.bounds.upper[j]);
-        }
-    }
-
-    /// The gradient that the velocity of a line is stated with.
-    fn slope(&self, line: &Line) -> &[f64] {
-        let at = if line.steep { &self.end } else { &self.now };
-        at.line(line.index)
-    }
-
-    /// Whether the problem is to be symmetric: it has more than relations.
-    pub fn is_symmetric(&self) -> bool {
-        self.lines.len() > self.relations
-    }
-
-    /// M̂⁻¹ of each line that takes part; whether all were there already.
-    fn solve_lines(&mut self, matrices: &mut Matrices, changed: bool, n: usize) -> bool {
-        let all = self.now.len();
-        if (self.solved.nrows(), self.solved.ncols()) != (all, n) {
-            self.solved.reset(all, n);
-            self.fresh.clear();
-            self.fresh.resize(all, false);
-        }
-        if changed {
-            self.fresh.fill(false);
-        }
-        if self.last != self.now {
-            for i in 0..all {
-                if self.last.len() != all || self.last.line(i) != self.now.line(i) {
-                    self.fresh[i] = false;
-                }
-            }
-            self.last.clone_from(&self.now);
-        }
-        let mut same = true;
-        for line in &self.lines {
-            let i = line.index;
-            if !self.fresh[i] {
-                same = false;
-                self.solved.row_mut(i).copy_from_slice(self.now.line(i));
-                matrices.solve_hat(self.solved.row_mut(i));
-                self.fresh[i] = true;
-            }
-        }
-        same
-    }
-
-    /// W, V and R of the lines that take part.
-    #[allow(non_snake_case)]
-    fn couple(&self, problem: &mut FrictionLocal<D>) {
-        let nc = self.touching.len();
-        let p = self.lines.len() - D * nc;
-        let product = |i: usize, j: usize| {
-            // Where the matrix is symmetric, what is below the diagonal is what is above it, to the last bit.
-            let (i, j) = if self.lines[i].steep { (i, j) } else { (i.min(j), i.max(j)) };
-            dot(self.slope(&self.lines[i]), self.solved.row(self.lines[j].index))
-        };
-        problem.W.clear(nc);
-        for a in 0..nc {
-            for b in 0..nc {
-                let block =
-                    std::array::from_fn(|i| std::array::from_fn(|j| product(D * a + i, D * b + j)));
-                problem.W.push(b, block);
-            }
-            problem.W.end_row();
-        }
-        if p == 0 {
-            problem.rows = None;
-            return;
-        }
-        let fill = |out: &mut Csc, rows: usize, first: usize| {
-            let entries = (0..p).flat_map(|j| (0..rows).map(move |i| (i, j)));
-            if (out.nrows(), out.ncols(), out.nnz()) != (rows, p, rows * p) {
-                let ones = entries.clone().map(|(i, j)| (i, j, 1.0));
-                *out = Csc::from_triplets(rows, p, ones).expect("in range");
-            }
-            for (x, (i, j)) in out.values_mut().iter_mut().zip(entries) {
-                *x = product(first + i, D * nc + j);
-            }
-        };
-        let rows = problem.rows.get_or_insert_with(|| {
-            RowsLocal::bilateral(Csc::zeros(0, 0), Csc::zeros(0, 0), vec![])
-        });
-        fill(&mut rows.V, D * nc, 0);
-        fill(&mut rows.R, p, D * nc);
-    }
-
-    /// `v = free + M̂⁻¹ (H r + G λ)` with the impulses of the point, and the velocities in the laws. What is below the rounding of its own sum is zero, so that what
-    /// rests, rests exactly.
-    pub fn respond(&mut self, point: &LocalPoint, free: &[f64], v: &mut [f64]) {
-        v.copy_from_slice(free);
-        self.sums.clear();
-        self.sums.extend(free.iter().map(|x| x.abs()));
-        let impulses = point.r.iter().chain(&point.lambda);
-        for (line, &impulse) in self.lines.iter_mut().zip(impulses) {
-            line.impulse = impulse;
-            let solved = self.solved.row(line.index);
-            for ((v, sum), x) in v.iter_mut().zip(&mut self.sums).zip(solved) {
-                *v += impulse * x;
-                *sum += (impulse * x).abs();
-            }
-        }
-        for (v, sum) in v.iter_mut().zip(&self.sums) {
-            if v.abs() <= 8.0 * f64::EPSILON * sum {
-                *v = 0.0;
-            }
-        }
-        for line in &mut self.lines {
-            let at = if line.steep { &self.end } else { &self.now };
-            line.velocity = dot(at.line(line.index), v) + line.offset;
-        }
-    }
-
     /// Adds `H r + G λ` to `out`.
     pub fn push(&self, out: &mut [f64]) {
         for line in self.lines.iter().filter(|l| l.impulse != 0.0) {
@@ -587,19 +373,4 @@ impl Line {
             impulse: 0.0,
         }
     }
-}
-
-/// s of contacts, then b of rows, at t and q.
-fn given<L: Lagrangian<D> + ?Sized, const D: usize>(
-    system: &L,
-    t: f64,
-    q: &[f64],
-    out: &mut Vec<f64>,
-) {
-    let size = system.size();
-    out.clear();
-    out.resize(D * size.contacts + size.rows, 0.0);
-    let (s, b) = out.split_at_mut(D * size.contacts);
-    system.surface(t, q, s);
-    system.row_velocities(t, q, b);
 }

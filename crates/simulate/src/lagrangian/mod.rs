@@ -3,9 +3,11 @@
 //! A user states what is in `M(q) dv = F(t, q, v) dt + H(q) di + G(q) dλ` by a [`Lagrangian`]; a [`LagrangianSimulation`] moves it. What is not given (derivatives
 //! of F, gradients of gaps and relations) is made by central differences.
 
+mod coupling;
 mod differences;
 mod elastic;
 mod energy;
+mod gradients;
 mod linear;
 mod lines;
 mod matrices;

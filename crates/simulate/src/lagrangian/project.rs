@@ -14,7 +14,8 @@ use nonsmooth_solve::settings::SettingsMap;
 use nonsmooth_solve::{Limits, Session, Status};
 
 use super::Lagrangian;
-use super::lines::{Gradients, Lines, dot};
+use super::gradients::{Gradients, dot};
+use super::lines::Lines;
 use super::matrices::Matrices;
 use super::step::{empty, zero};
 use crate::SimulateError;

@@ -5,7 +5,7 @@ use nonsmooth_solve::Limits;
 use nonsmooth_solve::registry::Registered;
 use nonsmooth_solve::settings::SettingsMap;
 
-use super::lines::Gradients;
+use super::gradients::Gradients;
 use super::state::{LagrangianContact, LagrangianState};
 use super::step::{Tools, zero};
 use super::{Lagrangian, LagrangianScheme};
