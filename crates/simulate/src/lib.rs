@@ -25,6 +25,7 @@
 mod detect;
 mod error;
 mod islands;
+mod mesh;
 mod moreau_jean;
 mod report;
 pub mod rotation;
@@ -37,6 +38,7 @@ mod world;
 
 pub use detect::Key;
 pub use error::{Overlap, SimulateError};
+pub use mesh::Mesh;
 pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean};
 pub use report::{
     ContactReport, Counts, Drift, EnergyBalance, RunReport, StepReport, StepStatus, Timings,
