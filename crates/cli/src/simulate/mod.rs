@@ -125,7 +125,10 @@ fn scene(args: &Args) -> Result<SceneFile, String> {
         _ => {
             let text = std::fs::read_to_string(path)
                 .map_err(|e| format!("{name}: expected a readable file, found: {e}"))?;
-            SceneFile::parse(&text, &changes).map_err(|e| format!("{name}: {e}"))?
+            let wrong = |e| format!("{name}: {e}");
+            let mut scene = SceneFile::parse(&text, &changes).map_err(wrong)?;
+            scene.load_meshes(path.parent().unwrap_or(Path::new(""))).map_err(wrong)?;
+            scene
         }
     };
     if let Some(end) = args.end {

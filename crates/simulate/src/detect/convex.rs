@@ -283,8 +283,9 @@ fn beside(a: &Side, b: &Side, meeting: &Meeting, found: &mut impl FnMut([Feature
     else {
         return points(found, f, g);
     };
-    // Of edges alone there is no distance where they overlap.
-    if *r + *o == 0.0 {
+    // Lines have a distance only where they are apart: two edges, or the line of a rod that has sunk in, do not say on which side they are.
+    let cylinders = [inner, other].into_iter().zip([r, o]).filter(|c| *c.0).map(|c| c.1);
+    if *r + *o == 0.0 || meeting.separation + cylinders.sum::<f64>() <= 0.0 {
         return points(found, f, g);
     }
     // Beyond its ends the mantle of a cylinder is none.

@@ -607,7 +607,7 @@ fn searched(world: &World, rng: &mut Pcg64) -> f64 {
 fn round_solids_agree_with_a_search_of_all_directions() {
     let mut rng = Pcg64::seed_from_u64(23);
     let (mut touching, mut apart) = (0, 0);
-    for round in 0..240 {
+    for round in 0..400 {
         let shape = |kind: usize, rng: &mut Pcg64| -> Body {
             let mut x = || rng.random_range(0.3..0.8);
             match kind {
@@ -737,7 +737,7 @@ fn a_mesh_of_a_box_touches_as_the_box() {
     let half = [0.5, 0.4, 0.3];
     let mut rng = Pcg64::seed_from_u64(12);
     let (mut touching, mut same) = (0, 0);
-    for round in 0..300 {
+    for round in 0..500 {
         let other = match round % 4 {
             0 => solid(Shape::Sphere { radius: 0.3 }),
             1 => cuboid([0.3, 0.4, 0.2]),

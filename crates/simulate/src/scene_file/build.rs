@@ -12,7 +12,7 @@ use super::{
 use crate::error::{finite, require};
 use crate::shape::plane;
 use crate::{
-    Body, BodyId, Law, Motion, Part, Shape, SimulateError, Simulation, State, World, Wrenches,
+    Body, BodyId, Law, Mesh, Motion, Part, Shape, SimulateError, Simulation, State, World, Wrenches,
 };
 
 /// Groups have a bit each.
@@ -312,6 +312,26 @@ impl<'a> Builder<'a> {
             ShapeTable::Box { half } => Part::new(Shape::Box { half: *half }),
             ShapeTable::Capsule { half_length, radius } => {
                 Part::new(Shape::Capsule { half_length: *half_length, radius: *radius })
+            }
+            ShapeTable::Cylinder { half_length, radius } => {
+                Part::new(Shape::Cylinder { half_length: *half_length, radius: *radius })
+            }
+            ShapeTable::Cone { half_length, radius } => {
+                Part::new(Shape::Cone { half_length: *half_length, radius: *radius })
+            }
+            ShapeTable::Mesh { file: Some(file), .. } => {
+                let expected = "a scene that was read with its files (SceneFile::load_meshes)";
+                return Err(SimulateError::value(format!("{key}.file"), expected, file));
+            }
+            ShapeTable::Mesh { scale: Some(scale), .. } => {
+                let expected = "none without a file";
+                return Err(SimulateError::value(format!("{key}.scale"), expected, scale));
+            }
+            ShapeTable::Mesh { vertices, triangles, .. } => {
+                Part::new(Mesh::new(vertices, triangles).map_err(|e| placed(e, key))?)
+            }
+            ShapeTable::Heightfield { heights, size } => {
+                Part::new(Mesh::heightfield(heights, *size).map_err(|e| placed(e, key))?)
             }
             ShapeTable::Plane { normal } => plane([0.0; 3], *normal)
                 .map_err(|e| SimulateError::Schema { path: key.into(), problem: e.to_string() })?,

@@ -7,6 +7,7 @@ mod impacts;
 mod invariance;
 mod laws;
 mod piles;
+mod solids;
 
 use nonsmooth_simulate::{
     Body, BodyId, Geometry, Law, MoreauJean, RunReport, Shape, Simulation, World,
