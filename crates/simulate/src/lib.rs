@@ -41,7 +41,8 @@ pub use error::{Overlap, SimulateError};
 pub use mesh::Mesh;
 pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean};
 pub use report::{
-    ContactReport, Counts, Drift, EnergyBalance, RunReport, StepReport, StepStatus, Timings,
+    ContactReport, Counts, Drift, EnergyBalance, RunReport, Settled, StepReport, StepStatus,
+    Timings,
 };
 pub use scene_file::SceneFile;
 pub use shape::{Part, Shape, plane};

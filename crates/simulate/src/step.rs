@@ -218,6 +218,69 @@ impl Tools {
         found
     }
 
+    /// Moves bodies apart that overlap: the smallest displacement in the norm of the masses after which no gap is negative, to first order, is
+    /// the velocity of a step of length 1 from rest whose frictionless contacts have the gaps to close. Bodies are looked for within `depth`, m, of
+    /// each other.
+    pub fn part(
+        &mut self,
+        (world, state): (&World, &mut State),
+        depth: f64,
+        inner: &Inner,
+    ) -> Result<(), SimulateError> {
+        const H: f64 = 1.0;
+        let scheme = MoreauJean {
+            theta: 1.0,
+            gyroscopic: Gyroscopic::Off,
+            geometry: Geometry::Frozen,
+            activation: Activation::Gap,
+            ..MoreauJean::default()
+        };
+        let mut still = world.clone();
+        still.gravity = [0.0; 3];
+        for body in &mut still.bodies {
+            (body.force, body.torque) = ([0.0; 3], [0.0; 3]);
+            if !body.is_free() {
+                body.motion = Motion::Fixed;
+            }
+        }
+        let zero = vec![[0.0; 3]; still.bodies.len()];
+        let mut rest = State {
+            velocity: zero.clone(),
+            spin: zero,
+            memory: Default::default(),
+            ..state.clone()
+        };
+        self.start(&scheme, &still, &rest, &mut [], H);
+        self.margins.iter_mut().for_each(|m| *m += depth);
+        self.detector.detect(&still, &mut rest, &self.margins, &mut self.near);
+        self.contacts(&scheme, &still, &rest, H);
+        for (near, &row) in self.near.iter().zip(&self.row_of) {
+            let row = &mut self.rows[row as usize];
+            (row.mu, row.shift, row.r) = (0.0, [near.place.gap / H, 0.0, 0.0], [0.0; 3]);
+        }
+        let mut first = 0;
+        for k in 0..self.islands.ends.len() {
+            let end = self.islands.ends[k];
+            if self.slots.len() == k {
+                self.slots.push(Slot::new(inner)?);
+            }
+            self.island(&scheme, (first, end), k, inner, H)?;
+            first = end;
+        }
+        self.commit(&scheme, &still, &mut rest, H);
+        self.contacts.clear();
+        if rest
+            .position
+            .iter()
+            .flatten()
+            .chain(rest.rotation.iter().flatten())
+            .all(|x| x.is_finite())
+        {
+            (state.position, state.rotation) = (rest.position, rest.rotation);
+        }
+        Ok(())
+    }
+
     /// Everything up to the velocities after the step; the state is as before but for the axes of its memory.
     pub fn attempt(
         &mut self,
@@ -462,16 +525,19 @@ impl Tools {
                 continue;
             }
             self.row_of.push(self.rows.len() as u32);
+            let at_middle = near.witness.place(&a.middle, &b.middle, n);
             // A body that nothing moves has no momentum to keep: the arm ends on the surface of the other one. Else both arms end midway.
             let on_surface = |place: Place| {
                 let half = 0.5 * (f64::from(u8::from(b.free)) - f64::from(u8::from(a.free)));
                 Place { point: add(place.point, scale(half * place.gap, place.normal)), ..place }
             };
-            let place = on_surface(near.witness.place(&a.middle, &b.middle, n));
+            let at_middle =
+                Place { normal: if near.deep { n } else { at_middle.normal }, ..at_middle };
+            let place = on_surface(at_middle);
             let frame = frame(place.normal, axis);
             let pushed = known.is_some_and(|m| m.impulse != [0.0; 3]);
             let persists = persistent && (near.law.e == 0.0 || approach >= -rest);
-            let later = persists && extrapolated;
+            let later = persists && extrapolated && !near.deep;
             let (place_end, frame_end) = match later {
                 true => {
                     let place = on_surface(near.witness.place(&a.end, &b.end, place.normal));
@@ -595,6 +661,11 @@ impl Tools {
             if let Some(k) = best.1 {
                 self.taken[k] = true;
                 *known = Some(memory[k]);
+            }
+        }
+        for (near, known) in self.near.iter_mut().zip(&self.known).filter(|n| n.0.deep) {
+            if let Some(m) = known.filter(|m| m.key == near.key) {
+                near.place.normal = m.normal;
             }
         }
     }
@@ -841,6 +912,7 @@ impl Tools {
     fn count(&self, report: &mut StepReport) {
         let counts = &mut report.counts;
         counts.near = self.near.len();
+        counts.deep = self.near.iter().filter(|n| n.deep).count();
         counts.active = self.rows.len();
         counts.islands = self.islands.ends.len();
         for row in &self.rows {

@@ -53,7 +53,12 @@ pub(crate) struct Near {
     pub size: f64,
     pub place: Place,
     pub witness: Witness,
+    /// Whether the bodies overlap so far that the normal is that of the step before, if there was one.
+    pub deep: bool,
 }
+
+/// Bodies that overlap by more than this share of the smaller one leave no normal of their own.
+const DEEP: f64 = 0.1;
 
 /// What a shape is made of, in the frame of its body.
 #[derive(Debug, Clone)]
@@ -337,7 +342,8 @@ impl Detector {
             let place = witness.place(a, b, fallback());
             if place.gap <= prediction {
                 let key = Key { shape_a: i, shape_b: j, feature_a: f.code(), feature_b: g.code() };
-                out.push(Near { key, a: s.body, b: t.body, law, size, place, witness });
+                let deep = place.gap < -DEEP * size;
+                out.push(Near { key, a: s.body, b: t.body, law, size, place, witness, deep });
             }
         };
         let center = |segment: &Segment, pose: &Pose| pose.point(segment.p);

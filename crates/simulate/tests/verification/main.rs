@@ -6,6 +6,7 @@ mod free_body;
 mod impacts;
 mod invariance;
 mod laws;
+mod overlap;
 mod piles;
 mod solids;
 
