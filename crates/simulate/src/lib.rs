@@ -24,6 +24,7 @@
 
 mod detect;
 mod error;
+pub mod import;
 mod islands;
 mod mesh;
 mod moreau_jean;
