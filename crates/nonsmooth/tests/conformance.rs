@@ -19,6 +19,8 @@ fn cases() -> Vec<Planted> {
         Planted { contacts: 20, dofs: 120, seed: 4, mu: (0.0, 0.0), ..base.clone() },
         Planted { contacts: 20, dofs: 120, seed: 5, skew: 0.02, ..base.clone() },
         Planted { contacts: 10, dofs: 90, bilateral: 4, seed: 6, ..base.clone() },
+        // Joints alone.
+        Planted { contacts: 0, dofs: 30, bilateral: 4, seed: 8, ..base.clone() },
         Planted {
             contacts: 12,
             dofs: 90,

@@ -1,10 +1,10 @@
-//! Islands: bodies that contacts join, by union–find; bodies that do not move freely join nothing.
+//! Islands: bodies that contacts and joints join, by union–find; bodies that do not move freely join nothing.
 
 /// Union–find with the least member as the name of each set, and the contacts of each set.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Islands {
     parent: Vec<u32>,
-    /// Contacts, those of one island together, in their order.
+    /// Contacts and rows, those of one island together, in their order.
     pub order: Vec<u32>,
     /// Where each island ends in `order`.
     pub ends: Vec<usize>,
@@ -13,22 +13,29 @@ pub(crate) struct Islands {
 }
 
 impl Islands {
-    /// Of contacts between `bodies` bodies, each with the free bodies that it touches; islands are in the order of their least bodies.
-    pub fn find(&mut self, bodies: usize, contacts: impl Iterator<Item = [Option<u32>; 2]>) {
+    /// Of `bodies` bodies; `each` calls with the free bodies, at least one, of every contact and then of every scalar row. Islands are in the order of their
+    /// least bodies.
+    pub fn find(
+        &mut self,
+        bodies: usize,
+        each: impl FnOnce(&mut dyn FnMut(&mut dyn Iterator<Item = u32>)),
+    ) {
         self.parent.clear();
         self.parent.extend(0..bodies as u32);
         self.number.clear();
-        for [a, b] in contacts {
-            let one = a.or(b).expect("one of two bodies is free");
+        let mut number = std::mem::take(&mut self.number);
+        each(&mut |members| {
+            let one = members.next().expect("one of the bodies is free");
             let mut root = self.root(one);
-            if let Some(other) = b {
+            for other in members {
                 let other = self.root(other);
                 let (low, high) = (root.min(other), root.max(other));
                 self.parent[high as usize] = low;
                 root = low;
             }
-            self.number.push(root);
-        }
+            number.push(root);
+        });
+        self.number = number;
         self.keyed.clear();
         for c in 0..self.number.len() {
             let root = self.root(self.number[c]);
@@ -68,7 +75,7 @@ mod tests {
             [Some(1), Some(7)],
         ];
         let mut islands = Islands::default();
-        islands.find(8, pairs.into_iter());
+        islands.find(8, |join| pairs.into_iter().for_each(|p| join(&mut p.into_iter().flatten())));
         assert_eq!(islands.order, [2, 4, 5, 1, 0, 3]);
         assert_eq!(islands.ends, [3, 4, 6]);
     }

@@ -26,8 +26,10 @@ mod detect;
 mod error;
 pub mod import;
 mod islands;
+mod joints;
 mod mesh;
 mod moreau_jean;
+mod moving;
 mod report;
 pub mod rotation;
 pub mod scene_file;
@@ -39,8 +41,12 @@ mod world;
 
 pub use detect::Key;
 pub use error::{Overlap, SimulateError};
+pub use joints::{
+    Coordinate, Coupling, Drive, Driver, Joint, JointId, JointKind, JointLimits, JointReport,
+    Motor, Spring,
+};
 pub use mesh::Mesh;
-pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean};
+pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean, Stabilisation};
 pub use report::{
     ContactReport, Counts, Drift, EnergyBalance, RunReport, Settled, StepReport, StepStatus,
     Timings,

@@ -41,7 +41,7 @@ impl StepStatus {
     }
 }
 
-/// The energy of a step by terms, J. `T⁺ − T = gravity + forces + normal + tangential + drives − numerical + imbalance`.
+/// The energy of a step by terms, J. `T⁺ − T = gravity + forces + normal + tangential + drives + joints − numerical + imbalance`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EnergyBalance {
     /// Kinetic energy before the step.
@@ -60,6 +60,8 @@ pub struct EnergyBalance {
     pub tangential: f64,
     /// Work of surfaces and tables that move as they are told.
     pub drives: f64,
+    /// Work of joints on the bodies: of springs, motors, friction and limits; equations between bodies do none.
+    pub joints: f64,
     /// `(θ − ½) ‖v⁺ − v‖²_M`: what the scheme itself dissipates.
     pub numerical: f64,
     /// What is left: rounding, unless something is wrong.
@@ -85,6 +87,7 @@ impl EnergyBalance {
             normal: self.normal + next.normal,
             tangential: self.tangential + next.tangential,
             drives: self.drives + next.drives,
+            joints: self.joints + next.joints,
             numerical: self.numerical + next.numerical,
             imbalance: self.imbalance + next.imbalance,
             scale: self.scale.max(next.scale),
@@ -109,6 +112,8 @@ pub struct Counts {
     pub warm: usize,
     /// Points where bodies overlap by more than a tenth of the smaller one. No normal is right there: that of the step before is kept while the features are the same.
     pub deep: usize,
+    /// Scalar rows: equations, limits, motors, friction and springs of joints.
+    pub rows: usize,
     /// Islands that were solved apart.
     pub islands: usize,
     /// The most contacts in an island.
@@ -124,6 +129,8 @@ pub struct Drift {
     pub penetration: f64,
     /// The largest `|‖q‖ − 1|` of a quaternion, before it was made one.
     pub quaternion: f64,
+    /// The most by which an equation of a joint is violated after the step, m or rad.
+    pub joints: f64,
 }
 
 /// Where the time of a step went, s.
@@ -160,6 +167,23 @@ pub struct StepReport {
     pub drift: Drift,
     /// Where the time went.
     pub timings: Timings,
+}
+
+impl StepReport {
+    /// That of a step of which nothing is known yet.
+    pub(crate) fn begun(t: f64, h: f64) -> Self {
+        Self {
+            status: StepStatus::Solved,
+            t,
+            h,
+            residual: 0.0,
+            energy: EnergyBalance::default(),
+            counts: Counts::default(),
+            newton: 1,
+            drift: Drift::default(),
+            timings: Timings::default(),
+        }
+    }
 }
 
 /// What a contact of the last step did.

@@ -13,7 +13,7 @@ use crate::report::{ContactReport, RunReport, Settled, StepReport, StepStatus};
 use crate::state::State;
 use crate::step::{Inner, Tools};
 use crate::world::oscillation;
-use crate::{BodyId, MoreauJean, Motion, SimulateError, World};
+use crate::{BodyId, JointReport, MoreauJean, Motion, SimulateError, World};
 
 /// Bodies that overlap by more than this share of the smaller one are refused at the start.
 const OVERLAP: f64 = 1e-6;
@@ -133,6 +133,8 @@ impl Simulation {
         let mut simulation = Self::placed(world, scheme)?;
         let mut settled = Settled::default();
         let before = simulation.state.position.clone();
+        let rest = simulation.world.at_rest();
+        let mut tools = Tools::new(&rest, &simulation.state)?;
         loop {
             let pairs = simulation.overlaps();
             let depth = pairs.iter().map(|p| p.depth).fold(0.0, f64::max);
@@ -146,13 +148,13 @@ impl Simulation {
                 return Err(SimulateError::Overlap(pairs));
             }
             settled.rounds += 1;
-            let Self { world, state, tools, solver, settings, limits, .. } = &mut simulation;
-            let inner = Inner { solver, settings, limits };
-            tools.part((world, state), depth, &inner)?;
+            let Self { state, solver, settings, limits, .. } = &mut simulation;
+            tools.part((&rest, state), depth, &Inner { solver, settings, limits })?;
         }
         let far = |(p, q): (&Vec3, &Vec3)| norm(sub(*q, *p));
         settled.moved = before.iter().zip(&simulation.state.position).map(far).fold(0.0, f64::max);
-        simulation.state.memory = Default::default();
+        simulation.state.memory.axes.clear();
+        simulation.remember_joints();
         Ok((simulation, settled))
     }
 
@@ -171,7 +173,7 @@ impl Simulation {
             }
         }
         let tools = Tools::new(&world, &state)?;
-        Ok(Self {
+        let mut simulation = Self {
             world,
             scheme,
             state,
@@ -181,7 +183,22 @@ impl Simulation {
             settings: SettingsMap::new(),
             limits: Limits { tolerance: 1e-10, max_iterations: 100_000, ..Limits::default() },
             warnings,
-        })
+        };
+        simulation.remember_joints();
+        let Self { world, state, tools, warnings, .. } = &mut simulation;
+        if let Some((found, all)) = tools.joints.redundant(world, state) {
+            warnings.push(format!(
+                "{found} of {all} equations of joints are redundant: the motion is unique, the impulses of these joints are not"
+            ));
+        }
+        Ok(simulation)
+    }
+
+    /// Notes where the joints are before the first step.
+    fn remember_joints(&mut self) {
+        let Self { world, state, tools, .. } = self;
+        let violations = tools.joints.violations(world, state).0;
+        tools.joints.finish(state, &violations);
     }
 
     /// Pairs of bodies that overlap by more than they may at the start.
@@ -256,6 +273,11 @@ impl Simulation {
         &self.tools.contacts
     }
 
+    /// What the joints did in the last step, in their order.
+    pub fn joints(&self) -> &[JointReport] {
+        &self.tools.joints.reports
+    }
+
     /// Does one step of length h > 0, s.
     ///
     /// Errors: h that is no positive number; a solver that does not apply. What numerics come to is in the report.
@@ -284,7 +306,7 @@ impl Simulation {
             return Ok(joined(first, second));
         }
         if report.status != StepStatus::NotFinite && !cancelled {
-            report.drift.quaternion = tools.commit(scheme, world, state, h);
+            tools.commit(scheme, world, state, h, &mut report);
             report.t = state.t;
         } else {
             tools.contacts.clear();
@@ -386,6 +408,7 @@ fn joined(first: StepReport, second: StepReport) -> StepReport {
     let mut drift = second.drift;
     drift.penetration = drift.penetration.max(first.drift.penetration);
     drift.quaternion = drift.quaternion.max(first.drift.quaternion);
+    drift.joints = drift.joints.max(first.drift.joints);
     let mut timings = second.timings;
     timings.detection += first.timings.detection;
     timings.assembly += first.timings.assembly;

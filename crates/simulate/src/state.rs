@@ -74,6 +74,25 @@ pub struct ContactMemory {
     pub(crate) axes: Vec<((u32, u32), Axis)>,
     /// The step that the impulses are of, s.
     pub(crate) h: f64,
+    /// The angle of each joint, which goes on beyond a full turn.
+    #[serde(default)]
+    pub(crate) angles: Vec<f64>,
+    /// The impulses of scalar rows, by joint and row.
+    #[serde(default)]
+    pub(crate) impulses: Vec<((u32, u32), f64)>,
+}
+
+impl ContactMemory {
+    /// What an impulse of the last step is worth in one of length h.
+    pub(crate) fn scaled(&self, h: f64) -> f64 {
+        if self.h > 0.0 { h / self.h } else { 0.0 }
+    }
+
+    /// The impulse of a scalar row in the last step.
+    pub(crate) fn impulse(&self, key: (u32, u32)) -> f64 {
+        let place = self.impulses.binary_search_by_key(&key, |e| e.0);
+        place.map_or(0.0, |k| self.impulses[k].1)
+    }
 }
 
 /// One contact of the last step.

@@ -25,58 +25,24 @@
 
 use std::time::Instant;
 
-use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem};
+use nonsmooth_linalg::Csc;
+use nonsmooth_problem::{Bounds, FrictionLocal, LocalPoint, Problem, RowsLocal};
 use nonsmooth_scenes::Rotation;
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, cross, dot, norm, scale, sub};
 use nonsmooth_solve::{Limits, Session, Status, registry, settings::SettingsMap};
 
 use crate::detect::{Detector, Near, Place};
 use crate::islands::Islands;
-use crate::report::{ContactReport, Counts, Drift, EnergyBalance, StepReport, StepStatus, Timings};
-use crate::rotation::{Pose, apply_transposed, cayley, hat, inverse, product, unit};
+use crate::joints::Joints;
+use crate::moving::Moving;
+use crate::report::{ContactReport, EnergyBalance, StepReport, StepStatus, Timings};
+use crate::rotation::{Pose, apply_transposed, cayley, inverse, unit};
 use crate::state::{Remembered, State};
 use crate::world::oscillation;
 use crate::{
     Activation, BodyId, Force, Geometry, Gyroscopic, Impact, MoreauJean, Motion, SimulateError,
-    World, Wrenches,
+    Stabilisation, World, Wrenches,
 };
-
-/// A body during a step. `spin` is Ω in the body frame, or ω in the world frame where the inertia is isotropic.
-#[derive(Debug, Clone, Copy)]
-struct Moving {
-    free: bool,
-    isotropic: bool,
-    mass: f64,
-    inertia: Mat3,
-    inverse: Mat3,
-    radius: f64,
-    start: Pose,
-    v: Vec3,
-    spin: Vec3,
-    /// `h (m g + F)` and `h τ`, in the world frame.
-    push: Vec3,
-    twist: Vec3,
-    /// `m g`.
-    weight: Vec3,
-    middle: Pose,
-    end: Pose,
-    /// Of a body that is moved: `linear + angular × (p − x)`, at the beginning and the end.
-    linear: [Vec3; 2],
-    angular: Vec3,
-    /// Takes a torque of the world into the frame of `spin`.
-    frame: Mat3,
-    /// The same for velocities at the end of the step.
-    frame_end: Mat3,
-    /// Velocities after the step.
-    v_new: Vec3,
-    spin_new: Vec3,
-    /// Velocities of the pass without contacts.
-    v_free: Vec3,
-    spin_free: Vec3,
-    /// The sum of impulses and of their moments, in the world frame.
-    impulse: Vec3,
-    moment: Vec3,
-}
 
 /// Six components of a body for each direction of a contact; the fourth place is for the processor.
 type Columns = [[f64; 4]; 6];
@@ -109,6 +75,8 @@ struct Row {
     /// Velocity of what is moved, along the directions: at the end of the step (in the law), and weighted by θ (in the energy).
     given: [f64; 3],
     given_mean: [f64; 3],
+    /// The same at the end of the step, along the directions of impulses.
+    given_middle: [f64; 3],
     /// Relative velocity at the beginning.
     before: [f64; 3],
     /// What the law adds to u⁺.
@@ -116,6 +84,9 @@ struct Row {
     r: [f64; 3],
     warm: bool,
 }
+
+/// Where an island's contacts begin in the order of islands, where they end and its scalar rows begin, where these end.
+type Span = (usize, usize, usize);
 
 /// One contact problem with what solves it.
 struct Slot {
@@ -139,6 +110,10 @@ pub(crate) struct Tools {
     /// For each contact near, its row.
     row_of: Vec<u32>,
     islands: Islands,
+    pub joints: Joints,
+    /// The scalar rows of each body in the island, and those of the island.
+    levers: Vec<(u32, u32, u32)>,
+    scalars: Vec<u32>,
     /// The first contact of each body in the island, and for each contact the next one of its two bodies.
     heads: Vec<u32>,
     next: Vec<[u32; 2]>,
@@ -160,6 +135,8 @@ pub(crate) struct Inner<'a> {
 }
 
 const NONE: u32 = u32::MAX;
+/// The most iterations on a problem that is linear.
+const LINEAR: usize = 10;
 /// Directions that differ by less are the same, relative.
 const SAME: f64 = 1e-13;
 
@@ -188,6 +165,9 @@ impl Tools {
             rows: vec![],
             row_of: vec![],
             islands: Islands::default(),
+            joints: Joints::new(world),
+            levers: vec![],
+            scalars: vec![],
             heads: vec![],
             next: vec![],
             mirrored: vec![],
@@ -218,8 +198,8 @@ impl Tools {
         found
     }
 
-    /// Moves bodies apart that overlap: the smallest displacement in the norm of the masses after which no gap is negative, to first order, is
-    /// the velocity of a step of length 1 from rest whose frictionless contacts have the gaps to close. Bodies are looked for within `depth`, m, of
+    /// Moves bodies of a world [at rest](World::at_rest) apart that overlap: the smallest displacement in the norm of the masses after which no gap is
+    /// negative, to first order, is the velocity of a step of length 1 whose frictionless contacts have the gaps to close. Bodies are looked for within `depth`, m, of
     /// each other.
     pub fn part(
         &mut self,
@@ -235,25 +215,12 @@ impl Tools {
             activation: Activation::Gap,
             ..MoreauJean::default()
         };
-        let mut still = world.clone();
-        still.gravity = [0.0; 3];
-        for body in &mut still.bodies {
-            (body.force, body.torque) = ([0.0; 3], [0.0; 3]);
-            if !body.is_free() {
-                body.motion = Motion::Fixed;
-            }
-        }
-        let zero = vec![[0.0; 3]; still.bodies.len()];
-        let mut rest = State {
-            velocity: zero.clone(),
-            spin: zero,
-            memory: Default::default(),
-            ..state.clone()
-        };
-        self.start(&scheme, &still, &rest, &mut [], H);
+        let zero = vec![[0.0; 3]; world.bodies.len()];
+        let mut rest = State { velocity: zero.clone(), spin: zero, ..state.clone() };
+        self.start(&scheme, world, &rest, &mut [], H);
         self.margins.iter_mut().for_each(|m| *m += depth);
-        self.detector.detect(&still, &mut rest, &self.margins, &mut self.near);
-        self.contacts(&scheme, &still, &rest, H);
+        self.detector.detect(world, &mut rest, &self.margins, &mut self.near);
+        self.contacts(&scheme, world, &rest, H);
         for (near, &row) in self.near.iter().zip(&self.row_of) {
             let row = &mut self.rows[row as usize];
             (row.mu, row.shift, row.r) = (0.0, [near.place.gap / H, 0.0, 0.0], [0.0; 3]);
@@ -264,18 +231,13 @@ impl Tools {
             if self.slots.len() == k {
                 self.slots.push(Slot::new(inner)?);
             }
-            self.island(&scheme, (first, end), k, inner, H)?;
+            let span = self.span(first, end);
+            self.island((&scheme, world), span, k, inner, H)?;
             first = end;
         }
-        self.commit(&scheme, &still, &mut rest, H);
-        self.contacts.clear();
-        if rest
-            .position
-            .iter()
-            .flatten()
-            .chain(rest.rotation.iter().flatten())
-            .all(|x| x.is_finite())
-        {
+        self.commit(&scheme, world, &mut rest, H, &mut StepReport::begun(state.t, H));
+        let places = rest.position.iter().flatten().chain(rest.rotation.iter().flatten());
+        if places.map(|x| 0.0 * x).sum::<f64>() == 0.0 {
             (state.position, state.rotation) = (rest.position, rest.rotation);
         }
         Ok(())
@@ -293,17 +255,7 @@ impl Tools {
         let begun = Instant::now();
         let mut timings = Timings::default();
         let finite = self.start(scheme, world, state, forces, h);
-        let mut report = StepReport {
-            status: StepStatus::Solved,
-            t: state.t,
-            h,
-            residual: 0.0,
-            energy: EnergyBalance::default(),
-            counts: Counts::default(),
-            newton: 1,
-            drift: Drift::default(),
-            timings,
-        };
+        let mut report = StepReport::begun(state.t, h);
         if !finite {
             report.status = StepStatus::NotFinite;
             report.timings.total = begun.elapsed().as_secs_f64();
@@ -321,12 +273,13 @@ impl Tools {
             if self.slots.len() == k {
                 self.slots.push(Slot::new(inner)?);
             }
+            let span = self.span(first, end);
             let (now, passes, measure, iterations, seconds) =
-                self.island(scheme, (first, end), k, inner, h)?;
+                self.island((scheme, world), span, k, inner, h)?;
             report.newton = report.newton.max(passes);
             report.residual = f64::max(report.residual, measure);
             report.counts.iterations += iterations;
-            report.counts.largest = report.counts.largest.max(end - first);
+            report.counts.largest = report.counts.largest.max(span.1 - first);
             solving += seconds;
             if status == StepStatus::Solved || now == StepStatus::NotFinite {
                 status = now;
@@ -361,7 +314,7 @@ impl Tools {
         }
         self.detector.detect(world, state, &self.margins, &mut self.near);
         self.contacts(scheme, world, state, h);
-        if self.rows.is_empty() {
+        if self.rows.is_empty() && self.joints.rows.is_empty() {
             return Ok(None);
         }
         if self.slots.is_empty() {
@@ -370,10 +323,11 @@ impl Tools {
         for b in &mut self.bodies {
             b.pass(scheme, h);
         }
+        let (contacts, scalars) = (self.rows.len(), self.joints.rows.len());
         self.islands.order.clear();
-        self.islands.order.extend(0..self.rows.len() as u32);
-        let all = (0, self.rows.len());
-        self.columns(all);
+        self.islands.order.extend(0..(contacts + scalars) as u32);
+        let all = self.span(0, contacts + scalars);
+        self.columns(scheme, all);
         self.assemble(all, 0);
         Ok(Some(self.slots[0].problem.clone()))
     }
@@ -424,7 +378,7 @@ impl Tools {
             let (mut middle, mut end) = (start, start);
             let (mut linear, mut angular) = ([[0.0; 3]; 2], [0.0; 3]);
             match body.motion {
-                Motion::Free if scheme.geometry == Geometry::Extrapolated => {
+                Motion::Free if scheme.geometry != Geometry::Frozen => {
                     for (pose, part) in [(&mut middle, 0.5), (&mut end, 1.0)] {
                         let (x, q) = advanced(state, k, part * h);
                         *pose = Pose { x, r: q.matrix() };
@@ -435,7 +389,7 @@ impl Tools {
                 Motion::Oscillating { amplitude, frequency, phase } => {
                     let at = |t: f64| oscillation(amplitude, frequency, phase, t);
                     linear = [at(state.t).1, at(state.t + h).1];
-                    if scheme.geometry == Geometry::Extrapolated {
+                    if scheme.geometry != Geometry::Frozen {
                         middle.x = add(body.position, at(state.t + 0.5 * h).0);
                         end.x = add(body.position, at(state.t + h).0);
                     }
@@ -494,7 +448,7 @@ impl Tools {
         self.row_of.clear();
         self.axes.clear();
         let rest = 2.0 * h * norm(world.gravity);
-        let scaled = if state.memory.h > 0.0 { h / state.memory.h } else { 0.0 };
+        let scaled = state.memory.scaled(h);
         for (k, near) in self.near.iter().enumerate() {
             let known = self.known[k];
             let axis = tangent_axis(near.place.normal, known.map(|m| m.axis));
@@ -504,7 +458,7 @@ impl Tools {
             let approach =
                 dot(n, sub(b.velocity_at(near.place.point), a.velocity_at(near.place.point)));
             let gap = near.place.gap;
-            let extrapolated = scheme.geometry == Geometry::Extrapolated;
+            let extrapolated = scheme.geometry != Geometry::Frozen;
             let persistent = known.is_some_and(|m| m.active);
             let active = match scheme.activation {
                 Activation::Forecast { gamma, slack } => {
@@ -566,7 +520,7 @@ impl Tools {
                 frame_end = frame;
                 arms.iter_mut().for_each(|a| a.moment_end = a.moment);
             }
-            let (mut given, mut given_mean, mut before) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+            let [mut given, mut given_mean, mut given_middle, mut before] = [[0.0; 3]; 4];
             let theta = scheme.theta;
             for Arm { body, sign, moment, .. } in &arms {
                 let m = &self.bodies[*body as usize];
@@ -583,6 +537,7 @@ impl Tools {
                         let of = |v: Vec3| sign * dot(frame[i], add(v, mid));
                         before[i] += of(first);
                         given[i] += sign * dot(frame_end[i], add(last, end));
+                        given_middle[i] += of(last);
                         given_mean[i] += theta * of(last) + (1.0 - theta) * of(first);
                     }
                 }
@@ -614,15 +569,37 @@ impl Tools {
                 arms,
                 given,
                 given_mean,
+                given_middle,
                 before,
                 shift,
                 r,
                 warm: pushed,
             });
         }
-        let free = |arm: &Arm| arm.free.then_some(arm.body);
-        let pairs = self.rows.iter().map(|row| [free(&row.arms[0]), free(&row.arms[1])]);
-        self.islands.find(self.bodies.len(), pairs);
+        self.joints.begin(scheme, world, state, &self.bodies, h);
+        let Self { rows, joints, islands, bodies, .. } = self;
+        let contacts = rows.iter().map(|row| row.arms.each_ref().map(|a| a.free.then_some(a.body)));
+        let scalars = (0..joints.rows.len()).map(|k| joints.levers(k));
+        islands.find(bodies.len(), |join| {
+            contacts.for_each(|pair| join(&mut pair.into_iter().flatten()));
+            scalars.for_each(|levers| join(&mut levers.iter().map(|l| l.body)));
+        });
+        // Where rows of joints act on a body its contacts have one direction for impulses and velocities: a problem has one V for both.
+        if !joints.rows.is_empty() {
+            let mut jointed = vec![false; bodies.len()];
+            for k in 0..joints.rows.len() {
+                joints.levers(k).iter().for_each(|l| jointed[l.body as usize] = true);
+            }
+            let touched = |row: &Row| row.arms.iter().any(|a| a.free && jointed[a.body as usize]);
+            rows.iter_mut().filter(|row| row.later && touched(row)).for_each(Row::at_the_middle);
+        }
+    }
+
+    /// An island of the order: where its contacts begin, where they end and its scalar rows begin, where these end.
+    fn span(&self, first: usize, end: usize) -> Span {
+        let contacts = self.rows.len() as u32;
+        let order = &self.islands.order[first..end];
+        (first, first + order.partition_point(|&c| c < contacts), end)
     }
 
     /// For each contact near what is remembered of it: by its key, else the nearest of the same two shapes with nearly the same normal.
@@ -670,20 +647,26 @@ impl Tools {
         }
     }
 
-    /// Solves one island: the contacts `range` of the order of islands, in slot k. Returns status, passes, residual, iterations and the seconds of the solver.
+    /// Solves one island, in slot k. Returns status, passes, residual, iterations and the seconds of the solver.
     fn island(
         &mut self,
-        scheme: &MoreauJean,
-        range: (usize, usize),
+        (scheme, world): (&MoreauJean, &World),
+        span: Span,
         k: usize,
         inner: &Inner,
         h: f64,
     ) -> Result<(StepStatus, u32, f64, usize, f64), SimulateError> {
         let (mut passes, mut iterations, mut seconds) = (0, 0, 0.0);
         self.members.clear();
-        for &c in &self.islands.order[range.0..range.1] {
+        for &c in &self.islands.order[span.0..span.1] {
             let arms = &self.rows[c as usize].arms;
             self.members.extend(arms.iter().filter(|a| a.free).map(|a| a.body));
+        }
+        let contacts = self.rows.len() as u32;
+        self.scalars.clear();
+        self.scalars.extend(self.islands.order[span.1..span.2].iter().map(|k| k - contacts));
+        for &k in &self.scalars {
+            self.members.extend(self.joints.levers(k as usize).iter().map(|l| l.body));
         }
         self.members.sort_unstable();
         self.members.dedup();
@@ -692,20 +675,33 @@ impl Tools {
             for &b in &self.members {
                 self.bodies[b as usize].pass(scheme, h);
             }
-            self.columns(range);
-            if !self.assemble(range, k) {
+            self.columns(scheme, span);
+            if !self.assemble(span, k) {
                 return Ok((StepStatus::NotFinite, passes, f64::NAN, iterations, seconds));
             }
             let Slot { session, problem, point } = &mut self.slots[k];
             let begun = Instant::now();
-            let outcome = session.solve(problem, point, inner.limits, &mut |_| {})?;
+            // Equations alone are solved at once, or not at all.
+            let linear = problem.rows.as_ref().is_some_and(|r| r.bounds.are_free());
+            let most = if linear && problem.mu.is_empty() { LINEAR } else { usize::MAX };
+            let limits = Limits {
+                max_iterations: inner.limits.max_iterations.min(most),
+                ..inner.limits.clone()
+            };
+            let outcome = session.solve(problem, point, &limits, &mut |_| {})?;
             seconds += begun.elapsed().as_secs_f64();
             iterations += outcome.iterations;
-            for c in range.0..range.1 {
+            for c in span.0..span.1 {
                 let row = &mut self.rows[self.islands.order[c] as usize];
-                row.r.copy_from_slice(&point.r[3 * (c - range.0)..][..3]);
+                row.r.copy_from_slice(&point.r[3 * (c - span.0)..][..3]);
             }
-            let change = self.respond(scheme, range, h);
+            for (&k, lambda) in self.scalars.iter().zip(&point.lambda) {
+                self.joints.rows[k as usize].lambda = *lambda;
+            }
+            let mut change = self.respond(scheme, span, h);
+            if scheme.geometry == Geometry::Midpoint && !self.scalars.is_empty() {
+                change = change.max(self.to_the_middle(scheme, world, h));
+            }
             let residual = outcome.measure.relative;
             if outcome.status != Status::Solved {
                 return Ok((
@@ -725,9 +721,33 @@ impl Tools {
         }
     }
 
+    /// Takes the joints of the island at the middle that this pass has come to; how far that has moved the bodies since the last one, relative.
+    fn to_the_middle(&mut self, scheme: &MoreauJean, world: &World, h: f64) -> f64 {
+        let Self { members, bodies, joints, scalars, .. } = self;
+        let (mut moved, mut size): (f64, f64) = (0.0, f64::MIN_POSITIVE);
+        for &k in members.iter() {
+            let b = &mut bodies[k as usize];
+            let pose = b.mean_pose(scheme, h);
+            let turned = |r: &Mat3| r.iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
+            let turn: Mat3 = std::array::from_fn(|i| sub(pose.r[i], b.middle.r[i]));
+            let far = norm(sub(pose.x, b.middle.x)) + b.radius * turned(&turn);
+            moved = if far > moved || far.is_nan() { far } else { moved };
+            let speed =
+                norm(b.v).max(norm(b.v_new)) + norm(b.spin).max(norm(b.spin_new)) * b.radius;
+            size = size.max(0.5 * h * (speed + norm(b.push) / b.mass));
+            b.middle = pose;
+        }
+        joints.place_at(world, scalars, |k| bodies[k as usize].middle);
+        moved / size
+    }
+
     /// The columns of H and the rows of the velocities, in the frames of this pass.
-    fn columns(&mut self, range: (usize, usize)) {
-        for c in range.0..range.1 {
+    fn columns(&mut self, scheme: &MoreauJean, span: Span) {
+        let contacts = self.rows.len() as u32;
+        self.scalars.clear();
+        self.scalars.extend(self.islands.order[span.1..span.2].iter().map(|k| k - contacts));
+        self.joints.columns(scheme, &self.scalars, &self.bodies);
+        for c in span.0..span.1 {
             let row = &mut self.rows[self.islands.order[c] as usize];
             for arm in row.arms.iter_mut().filter(|a| a.free) {
                 let b = &self.bodies[arm.body as usize];
@@ -750,9 +770,10 @@ impl Tools {
     }
 
     /// States the contact problem of an island in slot k; false where it has a number that is not finite.
-    fn assemble(&mut self, range: (usize, usize), k: usize) -> bool {
-        let Self { islands, rows, bodies, heads, next, mirrored, slots, .. } = self;
-        let order = &islands.order[range.0..range.1];
+    fn assemble(&mut self, span: Span, k: usize) -> bool {
+        let Self { islands, rows, bodies, joints, scalars, heads, next, mirrored, slots, .. } =
+            self;
+        let order = &islands.order[span.0..span.1];
         let n = order.len();
         // The contacts of each body as a list, in order: made from the back.
         heads.resize(bodies.len(), NONE);
@@ -760,6 +781,9 @@ impl Tools {
         next.resize(n, [NONE; 2]);
         for &c in order {
             rows[c as usize].arms.iter().for_each(|a| heads[a.body as usize] = NONE);
+        }
+        for &k in scalars.iter() {
+            joints.levers(k as usize).iter().for_each(|l| heads[l.body as usize] = NONE);
         }
         for c in (0..n).rev() {
             let arms = &rows[order[c] as usize].arms;
@@ -823,13 +847,83 @@ impl Tools {
             }
             problem.W.end_row();
         }
-        check == 0.0
+        check == 0.0 && self.state_rows(span, k)
+    }
+
+    /// The scalar rows of an island, in slot k, after its contacts: `V`, `R`, `s` and the bounds.
+    #[allow(non_snake_case)]
+    fn state_rows(&mut self, span: Span, k: usize) -> bool {
+        let Self { islands, rows, bodies, joints, levers, scalars, slots, heads, next, .. } = self;
+        let Slot { problem, point, .. } = &mut slots[k];
+        point.lambda.clear();
+        if scalars.is_empty() {
+            problem.rows = None;
+            return true;
+        }
+        let order = &islands.order[span.0..span.1];
+        levers.clear();
+        for (j, &k) in scalars.iter().enumerate() {
+            let each = joints.levers(k as usize).iter().enumerate();
+            levers.extend(each.map(|(l, lever)| (lever.body, j as u32, l as u32)));
+        }
+        levers.sort_unstable();
+        let (n, p) = (order.len(), scalars.len());
+        let (mut v, mut r) = (vec![], vec![]);
+        let lever =
+            |(_, j, l): (u32, u32, u32)| &joints.levers(scalars[j as usize] as usize)[l as usize];
+        for same in levers.chunk_by(|a, b| a.0 == b.0) {
+            let body = same[0].0;
+            for &e in same {
+                let solved = &lever(e).solved;
+                // One half and its mirror image: the other differs by rounding, and rounding is no coupling.
+                for &other in same.iter().filter(|o| o.1 <= e.1) {
+                    let row = &lever(other).row;
+                    let entry: f64 = row.iter().zip(solved).map(|(a, b)| a * b).sum();
+                    let (i, j) = (other.1 as usize, e.1 as usize);
+                    r.push((i, j, entry));
+                    if i != j {
+                        r.push((j, i, entry));
+                    }
+                }
+                let mut c = heads[body as usize];
+                while c != NONE {
+                    let row = &rows[order[c as usize] as usize];
+                    let side = usize::from(row.arms[0].body != body);
+                    for i in 0..3 {
+                        let arm = &row.arms[side].rows;
+                        let entry: f64 = (0..6).map(|k| arm[k][i] * solved[k]).sum();
+                        v.push((3 * c as usize + i, e.1 as usize, entry));
+                    }
+                    c = next[c as usize][side];
+                }
+            }
+        }
+        let (mut lower, mut upper, mut s) = (vec![], vec![], vec![]);
+        for (j, &k) in scalars.iter().enumerate() {
+            let row = &joints.rows[k as usize];
+            let mut free = row.shift;
+            for lever in joints.levers(k as usize) {
+                let b = &bodies[lever.body as usize];
+                free += lever.rate(b.v_free, b.spin_free);
+            }
+            s.push(free);
+            lower.push(row.bounds[0]);
+            upper.push(row.bounds[1]);
+            point.lambda.push(row.lambda);
+            r.push((j, j, row.compliance));
+        }
+        let finite = r.iter().chain(&v).all(|e| e.2.is_finite()) && s.iter().all(|x| x.is_finite());
+        let (of_contacts, own) =
+            (Csc::from_triplets(3 * n, p, v.into_iter()), Csc::from_triplets(p, p, r.into_iter()));
+        let (V, R) = (of_contacts.expect("in range"), own.expect("in range"));
+        problem.rows = Some(RowsLocal { V, R, s, bounds: Bounds { lower, upper } });
+        finite
     }
 
     /// Velocities after the step with the impulses of an island; how much solving the rotations exactly has changed them, relative.
-    fn respond(&mut self, scheme: &MoreauJean, range: (usize, usize), h: f64) -> f64 {
-        let Self { islands, rows, bodies, members, .. } = self;
-        let order = &islands.order[range.0..range.1];
+    fn respond(&mut self, scheme: &MoreauJean, span: Span, h: f64) -> f64 {
+        let Self { islands, rows, bodies, members, joints, scalars, .. } = self;
+        let order = &islands.order[span.0..span.1];
         for &b in members.iter() {
             let b = &mut bodies[b as usize];
             (b.impulse, b.moment) = ([0.0; 3], [0.0; 3]);
@@ -843,6 +937,14 @@ impl Tools {
                     b.impulse = add(b.impulse, scale(x, row.frame[i]));
                     b.moment = add(b.moment, scale(x, arm.moment[i]));
                 }
+            }
+        }
+        for &k in scalars.iter() {
+            let lambda = joints.rows[k as usize].lambda;
+            for lever in joints.levers(k as usize) {
+                let b = &mut bodies[lever.body as usize];
+                b.impulse = add(b.impulse, scale(lambda, lever.force));
+                b.moment = add(b.moment, scale(lambda, lever.moment));
             }
         }
         let (mut change, mut size): (f64, f64) = (0.0, f64::MIN_POSITIVE);
@@ -903,8 +1005,17 @@ impl Tools {
                 e.scale += work.abs() + drive.abs();
             }
         }
+        for (k, row) in self.joints.rows.iter().enumerate() {
+            for lever in self.joints.levers(k) {
+                let b = &self.bodies[lever.body as usize];
+                let (v, omega) = (mean(b.v, b.v_new), b.omega(mean(b.spin, b.spin_new)));
+                let work = row.lambda * (dot(lever.force, v) + dot(lever.moment, omega));
+                e.joints += work;
+                e.scale += work.abs();
+            }
+        }
         e.scale += e.kinetic_before + e.kinetic + e.numerical;
-        let work = e.gravity + e.forces + e.normal + e.tangential + e.drives;
+        let work = e.gravity + e.forces + e.normal + e.tangential + e.drives + e.joints;
         e.imbalance = e.kinetic - e.kinetic_before - (work - e.numerical);
         e
     }
@@ -915,6 +1026,7 @@ impl Tools {
         counts.deep = self.near.iter().filter(|n| n.deep).count();
         counts.active = self.rows.len();
         counts.islands = self.islands.ends.len();
+        counts.rows = self.joints.rows.len();
         for row in &self.rows {
             counts.warm += usize::from(row.warm);
             if row.r[0] <= 0.0 {
@@ -929,8 +1041,16 @@ impl Tools {
         report.drift.penetration = gaps.fold(0.0, f64::max);
     }
 
-    /// Takes the step: velocities and configuration, what is remembered, the reports of contacts. Returns how far quaternions were from length one.
-    pub fn commit(&mut self, scheme: &MoreauJean, world: &World, state: &mut State, h: f64) -> f64 {
+    /// Takes the step: velocities and configuration, what is remembered, the reports of contacts and joints. Says how far quaternions were from length one, and
+    /// joints are from closed.
+    pub fn commit(
+        &mut self,
+        scheme: &MoreauJean,
+        world: &World,
+        state: &mut State,
+        h: f64,
+        StepReport { drift, energy, .. }: &mut StepReport,
+    ) {
         let theta = scheme.theta;
         let mut off: f64 = 0.0;
         for (k, b) in self.bodies.iter().enumerate() {
@@ -960,7 +1080,21 @@ impl Tools {
         state.t += h;
         state.steps += 1;
         self.remember(state, h);
-        off
+        drift.quaternion = off;
+        let violations = match scheme.stabilisation {
+            Stabilisation::None => self.joints.violations(world, state).0,
+            Stabilisation::DirectProjection => {
+                let violations = self.joints.project(world, state);
+                if !self.joints.is_empty() {
+                    let change = self.joints.project_velocities(world, state);
+                    energy.kinetic += change;
+                    energy.numerical -= change;
+                }
+                violations
+            }
+        };
+        drift.joints = violations.iter().copied().fold(0.0, f64::max);
+        self.joints.finish(state, &violations);
     }
 
     fn remember(&mut self, state: &mut State, h: f64) {
@@ -1021,90 +1155,20 @@ impl Slot {
     }
 }
 
-impl Moving {
-    /// The angular velocity in the world frame that belongs to `spin`, of the beginning of the step or weighted by θ.
-    fn omega(&self, spin: Vec3) -> Vec3 {
-        if self.isotropic { spin } else { apply(&self.start.r, spin) }
-    }
-
-    /// The velocity of its point p at the beginning of the step.
-    fn velocity_at(&self, p: Vec3) -> Vec3 {
-        let (v, omega) = match self.free {
-            true => (self.v, self.omega(self.spin)),
-            false => (self.linear[0], self.angular),
-        };
-        add(v, cross(omega, sub(p, self.start.x)))
-    }
-
-    /// The frames and the free velocities of a pass, about the rotation found last.
-    fn pass(&mut self, scheme: &MoreauJean, h: f64) {
-        if !self.free {
-            return;
-        }
-        self.v_free = add(self.v, scale(1.0 / self.mass, self.push));
-        if self.isotropic {
-            self.frame = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-            self.frame_end = self.frame;
-            self.spin_free = add(self.spin, apply(&self.inverse, self.twist));
-            return;
-        }
-        let theta = scheme.theta;
-        let mean = add(scale(theta, self.spin_new), scale(1.0 - theta, self.spin));
-        let r = self.start.r;
-        let back: Mat3 = std::array::from_fn(|i| std::array::from_fn(|j| r[j][i]));
-        let mut turn = hat(scale(-0.5 * h, mean));
-        (0..3).for_each(|i| turn[i][i] += 1.0);
-        self.frame = product(&turn, &back);
-        let end = self.end.r;
-        self.frame_end = std::array::from_fn(|i| std::array::from_fn(|j| end[j][i]));
-        let gyroscopic = match scheme.gyroscopic {
-            Gyroscopic::Split => scale(h, cross(mean, apply(&self.inertia, mean))),
-            Gyroscopic::Off => [0.0; 3],
-        };
-        let torque = sub(apply(&self.frame, self.twist), gyroscopic);
-        self.spin_free = add(self.spin, apply(&self.inverse, torque));
-    }
-
-    /// Velocities after the step with the impulses and moments that it has: of rotation by Newton's method on the implicit rule.
-    fn rotate(&mut self, scheme: &MoreauJean, h: f64) {
-        self.v_new = add(self.v, scale(1.0 / self.mass, add(self.push, self.impulse)));
-        let total = add(self.twist, self.moment);
-        if self.isotropic {
-            self.spin_new = add(self.spin, apply(&self.inverse, total));
-            return;
-        }
-        let (theta, j) = (scheme.theta, &self.inertia);
-        let l = apply_transposed(&self.start.r, total);
-        let gyroscopic = f64::from(u8::from(scheme.gyroscopic == Gyroscopic::Split));
-        let mut x = self.spin_new;
-        for _ in 0..30 {
-            let mean = add(scale(theta, x), scale(1.0 - theta, self.spin));
-            let momentum = apply(j, mean);
-            let inertial = apply(j, sub(x, self.spin));
-            let turning = scale(gyroscopic * h, cross(mean, momentum));
-            let residual = add(add(inertial, turning), sub(scale(0.5 * h, cross(mean, l)), l));
-            let (wj, jw, lh) = (product(&hat(mean), j), hat(momentum), hat(l));
-            let derivative: Mat3 = std::array::from_fn(|i| {
-                std::array::from_fn(|k| {
-                    let turning = gyroscopic * (wj[i][k] - jw[i][k]) - 0.5 * lh[i][k];
-                    j[i][k] + h * theta * turning
-                })
-            });
-            let step = apply(&inverse(&derivative), residual);
-            x = sub(x, step);
-            let moved = norm(step);
-            if moved <= 1e-15 * norm(x).max(norm(self.spin)) || !moved.is_finite() {
-                break;
-            }
-        }
-        self.spin_new = x;
-    }
-}
-
 /// Position and rotation of a body after it has moved for a time with its velocities.
 fn advanced(state: &State, k: usize, time: f64) -> (Vec3, Rotation) {
     let x = add(state.position[k], scale(time, state.velocity[k]));
     (x, Rotation(state.rotation[k]).after(cayley(scale(time, state.spin[k]))))
+}
+
+impl Row {
+    /// Takes velocities where impulses are.
+    fn at_the_middle(&mut self) {
+        self.later = false;
+        self.frame_end = self.frame;
+        self.given = self.given_middle;
+        self.arms.iter_mut().for_each(|a| a.moment_end = a.moment);
+    }
 }
 
 impl Arm {

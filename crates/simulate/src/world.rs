@@ -8,7 +8,7 @@ use nonsmooth_scenes::{self as scenes, MassProperties, Polyhedron, Rotation, Sce
 use crate::error::{finite, require};
 use crate::rotation::unit;
 use crate::shape::plane;
-use crate::{Part, Shape, SimulateError};
+use crate::{Coupling, Joint, JointId, Part, Shape, SimulateError};
 
 /// The number of a body; never used again for another one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -219,6 +219,10 @@ pub struct World {
     materials: Vec<String>,
     pairs: BTreeMap<(usize, usize), Law>,
     apart: BTreeSet<(BodyId, BodyId)>,
+    /// All joints; a [`JointId`] is a place here.
+    pub joints: Vec<Joint>,
+    /// Couplings of their coordinates.
+    pub couplings: Vec<Coupling>,
 }
 
 impl Default for World {
@@ -237,6 +241,8 @@ impl World {
             materials: vec!["default".into()],
             pairs: BTreeMap::new(),
             apart: BTreeSet::new(),
+            joints: vec![],
+            couplings: vec![],
         }
     }
 
@@ -252,6 +258,15 @@ impl World {
         BodyId(self.bodies.len() as u32 - 1)
     }
 
+    /// Adds a joint; its partners do not touch each other unless it says so.
+    pub fn join(&mut self, joint: Joint) -> JointId {
+        if let (Some(a), false) = (joint.a, joint.collide) {
+            self.keep_apart(a, joint.b);
+        }
+        self.joints.push(joint);
+        JointId(self.joints.len() as u32 - 1)
+    }
+
     /// The number of the material of this name, which is made where there is none.
     pub fn material(&mut self, name: &str) -> usize {
         self.materials.iter().position(|m| m == name).unwrap_or_else(|| {
@@ -263,6 +278,19 @@ impl World {
     /// The names of the materials.
     pub fn materials(&self) -> &[String] {
         &self.materials
+    }
+
+    /// The same bodies and joints without anything that moves them: for what concerns positions alone.
+    pub(crate) fn at_rest(&self) -> Self {
+        let mut rest = Self { gravity: [0.0; 3], ..self.clone() };
+        for body in &mut rest.bodies {
+            (body.force, body.torque) = ([0.0; 3], [0.0; 3]);
+            if !body.is_free() {
+                body.motion = Motion::Fixed;
+            }
+        }
+        rest.joints.iter_mut().for_each(|joint| joint.drives.clear());
+        rest
     }
 
     /// Gives two materials, which may be the same, a law of their own.
@@ -321,6 +349,16 @@ impl World {
                 name => format!("bodies[{k}] ({name})"),
             };
             body.validate(&key, count, &mut said)?;
+        }
+        let key = |list: &str, k: usize, name: &str| match name {
+            "" => format!("{list}[{k}]"),
+            name => format!("{list}[{k}] ({name})"),
+        };
+        for (k, joint) in self.joints.iter().enumerate() {
+            joint.validate(&key("joints", k, &joint.name), self)?;
+        }
+        for (k, coupling) in self.couplings.iter().enumerate() {
+            coupling.validate(&key("couplings", k, &coupling.name), self)?;
         }
         Ok(said)
     }

@@ -71,6 +71,18 @@ fn links_are_bodies_and_joints_stand_where_they_are() {
 }
 
 #[test]
+fn a_robot_swings_as_its_joints_let_it() {
+    // The wheel turns three times as fast as the shoulder.
+    let scene = SceneFile::parse(&urdf(ROBOT).unwrap().scene, &[]).unwrap();
+    let mut simulation = scene.build().unwrap();
+    let run = simulation.run(0.2, 1e-3, &mut ()).unwrap();
+    assert!(run.is_solved(), "{run}");
+    let [shoulder, axle] = simulation.joints() else { panic!() };
+    assert!(shoulder.angle.abs() > 0.05 && (axle.angle - 3.0 * shoulder.angle).abs() < 1e-6);
+    assert!(shoulder.violation < 1e-8 && axle.violation < 1e-8);
+}
+
+#[test]
 fn a_robot_of_one_body_falls() {
     let cut = |text: &str, from: &str, to: &str| {
         let (i, j) = (text.find(from).unwrap(), text.find(to).unwrap());

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use nonsmooth_io::trajectory::{
-    Checkpoint, Contact, Energy, Frame, Named, State, Step, Trajectory,
+    Checkpoint, Contact, Energy, Frame, Joint, Named, State, Step, Trajectory,
 };
 
 use nonsmooth_io::{Info, Mesh, ProblemFile, vtk};
@@ -13,7 +13,7 @@ use nonsmooth_problem::{AnyProblem, Friction, FrictionLocal, Problem};
 use nonsmooth_scenes::draw::playback::{self, Drawn, Form, Moment, Placed, Playback};
 use nonsmooth_scenes::draw::{Pose, Touch};
 use nonsmooth_simulate::{
-    ContactReport, Control, Observer, SceneFile, Shape, Simulation, StepReport, World,
+    ContactReport, Control, JointReport, Observer, SceneFile, Shape, Simulation, StepReport, World,
 };
 
 use crate::files;
@@ -44,6 +44,7 @@ impl Recorder {
                 scene: scene.to_toml(),
                 program: concat!("nonsmooth ", env!("CARGO_PKG_VERSION")).into(),
                 bodies: named.collect(),
+                joints: simulation.world().joints.iter().map(|j| j.name.clone()).collect(),
                 ..Trajectory::default()
             },
             every: scene.output.every,
@@ -108,6 +109,7 @@ impl Recorder {
             time: state.t,
             bodies: bodies.collect(),
             contacts: simulation.contacts().iter().map(contact).collect(),
+            joints: simulation.joints().iter().map(joint).collect(),
         });
     }
 
@@ -129,7 +131,7 @@ impl Recorder {
     /// Time, energies, residual and counts, a row a step.
     pub fn csv(&self) -> String {
         let mut text = String::from(
-            "step,t,h,status,residual,kinetic,work_gravity,work_forces,work_normal,work_tangential,work_drives,numerical,imbalance,near,active,open,stick,slip,penetration,iterations,newton\n",
+            "step,t,h,status,residual,kinetic,work_gravity,work_forces,work_normal,work_tangential,work_drives,work_joints,numerical,imbalance,near,active,open,stick,slip,penetration,iterations,newton\n",
         );
         for s in &self.trajectory.steps {
             let e = &s.energy;
@@ -138,7 +140,7 @@ impl Recorder {
                 false => s.status.clone(),
             };
             text += &format!(
-                "{},{},{},{status},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{},{},{},{},{},{:e},{},{}\n",
+                "{},{},{},{status},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{},{},{},{},{},{:e},{},{}\n",
                 s.number,
                 s.time,
                 s.h,
@@ -149,6 +151,7 @@ impl Recorder {
                 e.normal,
                 e.tangential,
                 e.drives,
+                e.joints,
                 e.numerical,
                 e.imbalance,
                 s.near,
@@ -190,6 +193,7 @@ fn step(number: u64, report: &StepReport) -> Step {
             normal: e.normal,
             tangential: e.tangential,
             drives: e.drives,
+            joints: e.joints,
             numerical: e.numerical,
             imbalance: e.imbalance,
         },
@@ -204,6 +208,16 @@ fn motion(c: &ContactReport) -> Option<Motion> {
         _ if tangential(&c.after) > 1e-8 * (1.0 + tangential(&c.before)) => Motion::Slip,
         _ => Motion::Stick,
     })
+}
+
+fn joint(j: &JointReport) -> Joint {
+    Joint {
+        angle: j.angle,
+        slide: j.slide,
+        impulse: j.impulse,
+        moment: j.moment,
+        violation: j.violation,
+    }
 }
 
 fn contact(c: &ContactReport) -> Contact {

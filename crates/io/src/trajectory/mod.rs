@@ -1,20 +1,21 @@
 //! What a simulation leaves behind: motion, contacts, energy and the fate of every step in one HDF5 file.
 //!
 //! ```text
-//! /trajectory_version          1
+//! /trajectory_version          2
 //! /scene/                      text, sha256, program
 //! /bodies/                     name (b), fixed (b); position, velocity, angular_velocity (n, b, 3), rotation (n, b, 4)
 //! /frames/                     step (n), time (n)
 //! /contacts/                   offset (n + 1): those of frame k are offset[k] .. offset[k + 1]
 //!                              key (c, 4), a, b (c), point (c, 3), frame (c, 3, 3), gap, mu (c)
 //!                              r, r_local, u (c, 3), status (c): 0 took no part, 1 open, 2 stick, 3 slip
+//! /joints/                     name (j); angle, slide, violation (n, j), impulse, moment (n, j, 3)
 //! /steps/                      number, time, h, status, residual, iterations, newton, near, active, open, stick, slip,
 //!                              penetration, wall (s); status_name: what the numbers of status mean
-//! /energy/                     kinetic, potential, gravity, forces, normal, tangential, drives, numerical, imbalance (s)
+//! /energy/                     kinetic, potential, gravity, forces, normal, tangential, drives, joints, numerical, imbalance (s)
 //! /checkpoint/                 step, time, state (bytes); absent where a run cannot be resumed
 //! ```
 //!
-//! with n frames of b bodies, c contacts in all frames together and s steps, of which frames are a part. Reals have 64 bits and pass bit for bit, infinities
+//! with n frames of b bodies and j joints, c contacts in all frames together and s steps, of which frames are a part. Reals have 64 bits and pass bit for bit, infinities
 //! and NaN too: the last step of a run that failed is what one wants to see. Tables are in chunks with shuffle, deflate and Fletcher's checksum, in the
 //! format of HDF5 1.10, which h5py and h5dump read. A file is made whole beside the old one and renamed, so it opens whatever happens to
 //! the program; what is lost is what came after the last [`Trajectory::write`].
@@ -31,7 +32,7 @@ use crate::IoError;
 use crate::hdf5::File;
 
 /// What tells a trajectory from other files of HDF5, and the version of its layout.
-const VERSION: (&str, i64) = ("trajectory_version", 1);
+const VERSION: (&str, i64) = ("trajectory_version", 2);
 
 /// What statuses of contacts are as numbers; 0 stands for those that took no part.
 pub(crate) const STATUSES: [Option<Motion>; 4] =
@@ -46,6 +47,8 @@ pub struct Trajectory {
     pub program: String,
     /// The bodies, in the order of their numbers.
     pub bodies: Vec<Named>,
+    /// The names of the joints, in the order of their numbers; they may be empty.
+    pub joints: Vec<String>,
     /// What was recorded of the motion, in the order of time.
     pub frames: Vec<Frame>,
     /// All steps, also those without a frame.
@@ -74,6 +77,23 @@ pub struct Frame {
     pub bodies: Vec<State>,
     /// The contacts of the step.
     pub contacts: Vec<Contact>,
+    /// What each joint did.
+    pub joints: Vec<Joint>,
+}
+
+/// What a joint did in a step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Joint {
+    /// By which its second body has turned about the axis, rad.
+    pub angle: f64,
+    /// By which it has moved along the axis, m.
+    pub slide: f64,
+    /// The impulse on the second body in the world frame, N·s.
+    pub impulse: [f64; 3],
+    /// Its moment about the anchor, N·m·s.
+    pub moment: [f64; 3],
+    /// The most by which an equation is violated, m or rad.
+    pub violation: f64,
 }
 
 /// Where a body is and how it moves.
@@ -187,7 +207,7 @@ const STEP_COUNTS: [(&str, Of<u32>); 6] = [
     ("slip", |s| &mut s.slip),
 ];
 
-/// The energy of a step by terms, J: `T⁺ − T = gravity + forces + normal + tangential + drives − numerical + imbalance`.
+/// The energy of a step by terms, J: `T⁺ − T = gravity + forces + normal + tangential + drives + joints − numerical + imbalance`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Energy {
     /// Kinetic energy after the step.
@@ -204,6 +224,8 @@ pub struct Energy {
     pub tangential: f64,
     /// Work of what moves as it is told.
     pub drives: f64,
+    /// Work of joints: of springs, motors, friction and limits.
+    pub joints: f64,
     /// What the scheme itself dissipates.
     pub numerical: f64,
     /// What is left.
@@ -212,7 +234,7 @@ pub struct Energy {
 
 impl Energy {
     /// The terms by their names in a file.
-    fn terms(&mut self) -> [(&'static str, &mut f64); 9] {
+    fn terms(&mut self) -> [(&'static str, &mut f64); 10] {
         [
             ("kinetic", &mut self.kinetic),
             ("potential", &mut self.potential),
@@ -221,6 +243,7 @@ impl Energy {
             ("normal", &mut self.normal),
             ("tangential", &mut self.tangential),
             ("drives", &mut self.drives),
+            ("joints", &mut self.joints),
             ("numerical", &mut self.numerical),
             ("imbalance", &mut self.imbalance),
         ]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{
-    Checkpoint, Contact, Energy, Frame, Named, STATUSES, State, Step, Trajectory, VERSION,
+    Checkpoint, Contact, Energy, Frame, Joint, Named, STATUSES, State, Step, Trajectory, VERSION,
 };
 use crate::IoError;
 use crate::folder::{Folder, open};
@@ -26,6 +26,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Trajectory, IoError> {
         scene: text("text")?,
         program: text("program")?,
         bodies: named(&root.need("bodies")?)?,
+        joints: root.need("joints")?.texts("name")?,
         frames: vec![],
         steps: steps(&root)?,
         checkpoint: root.folder("checkpoint")?.map(|g| checkpoint(&g)).transpose()?,
@@ -72,6 +73,22 @@ fn fill(root: &Folder, run: &mut Trajectory) -> Result<(), IoError> {
     };
     for (f, frame) in run.frames.iter_mut().enumerate() {
         frame.bodies = (f * b..(f + 1) * b).map(state).collect();
+    }
+
+    let (g, j) = (root.need("joints")?, run.joints.len());
+    let reals = |name| g.table(name, &[n, j]);
+    let (angle, slide, violation) = (reals("angle")?, reals("slide")?, reals("violation")?);
+    let vectors = |name| g.vectors::<3>(name, &[n, j, 3]);
+    let (impulse, moment) = (vectors("impulse")?, vectors("moment")?);
+    let joint = |k: usize| Joint {
+        angle: angle[k],
+        slide: slide[k],
+        impulse: impulse[k],
+        moment: moment[k],
+        violation: violation[k],
+    };
+    for (f, frame) in run.frames.iter_mut().enumerate() {
+        frame.joints = (f * j..(f + 1) * j).map(joint).collect();
     }
 
     let g = root.need("contacts")?;

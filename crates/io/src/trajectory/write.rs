@@ -39,6 +39,7 @@ pub(super) fn to_bytes(path: &Path, run: &Trajectory) -> Result<Vec<u8>, IoError
         contacts(g, run);
         Ok(())
     })?;
+    top("joints", &|g| joints(g, run))?;
     top("steps", &|g| steps(g, &run.steps))?;
     top("energy", &|g| {
         let terms: Vec<_> =
@@ -76,6 +77,11 @@ impl Trajectory {
                     frame.bodies.len(),
                 ));
             }
+            if frame.joints.len() != self.joints.len() {
+                let expected = format!("{} joints, as in /joints/name", self.joints.len());
+                let (place, found) = (format!("/frames[{k}]"), frame.joints.len());
+                return Err(IoError::data(path, place, expected, found));
+            }
             for (c, contact) in frame.contacts.iter().enumerate() {
                 if let Some(body) =
                     [contact.a, contact.b].into_iter().find(|&i| i as usize >= bodies)
@@ -108,6 +114,18 @@ fn bodies(g: &mut Out, run: &Trajectory) -> Result<(), IoError> {
         g.table(name, &[n, b, 3], all().flat_map(of));
     }
     g.table("rotation", &[n, b, 4], all().flat_map(|s| s.rotation));
+    Ok(())
+}
+
+fn joints(g: &mut Out, run: &Trajectory) -> Result<(), IoError> {
+    g.texts("name", run.joints.iter().map(|name| &name[..]))?;
+    let (n, j) = (run.frames.len(), run.joints.len());
+    let all = || run.frames.iter().flat_map(|f| &f.joints);
+    g.table("angle", &[n, j], all().map(|x| x.angle));
+    g.table("slide", &[n, j], all().map(|x| x.slide));
+    g.table("violation", &[n, j], all().map(|x| x.violation));
+    g.table("impulse", &[n, j, 3], all().flat_map(|x| x.impulse));
+    g.table("moment", &[n, j, 3], all().flat_map(|x| x.moment));
     Ok(())
 }
 

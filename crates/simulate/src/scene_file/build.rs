@@ -44,7 +44,9 @@ impl SceneFile {
             builder.family(table, &format!("generate[{k}]"))?;
         }
         builder.laws()?;
-        Ok(builder.world)
+        let mut world = builder.world;
+        super::joints::join(&mut world, &self.joints, &self.couplings)?;
+        Ok(world)
     }
 
     /// The scene, ready to move.
@@ -132,7 +134,7 @@ fn acting(
     })
 }
 
-fn unknown<'a>(
+pub(super) fn unknown<'a>(
     key: &str,
     what: &str,
     name: &str,
@@ -469,7 +471,7 @@ impl<'a> Builder<'a> {
     }
 }
 
-fn twice(key: &str, name: &str) -> SimulateError {
+pub(super) fn twice(key: &str, name: &str) -> SimulateError {
     SimulateError::value(key, "a name that is not taken", format!("`{name}` again"))
 }
 

@@ -24,6 +24,7 @@
 //! ```
 
 mod build;
+mod joints;
 mod meshes;
 mod read;
 
@@ -80,6 +81,12 @@ pub struct SceneFile {
     /// Bodies of the families of `nonsmooth gen`: walls, piles, arches.
     #[serde(default)]
     pub generate: Vec<GenerateTable>,
+    /// Joints between bodies, or a body and the world.
+    #[serde(default)]
+    pub joints: Vec<JointTable>,
+    /// Gears, racks, pulleys: coordinates of joints whose weighted sum does not change.
+    #[serde(default)]
+    pub couplings: Vec<CouplingTable>,
     /// Forces that do not act at the mass centre, or not always.
     #[serde(default)]
     pub forces: Vec<ForceTable>,
@@ -402,6 +409,204 @@ pub struct ForceTable {
     /// It ends here, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub until: Option<f64>,
+}
+
+/// A joint. Anchors and axes are in the world frame, where the bodies stand at the beginning.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JointTable {
+    /// The name, an id where it is given.
+    #[serde(default)]
+    pub name: String,
+    /// What it leaves free.
+    pub kind: JointName,
+    /// The first body, or `world`.
+    pub a: String,
+    /// The second one, or `world`.
+    pub b: String,
+    /// Where it is, m.
+    #[serde(default)]
+    pub anchor: [f64; 3],
+    /// The end on b of a `distance`, m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub anchor_b: Option<[f64; 3]>,
+    /// Its axis, of any length.
+    #[serde(default = "upwards")]
+    pub axis: [f64; 3],
+    /// Of a `universal` joint the axis on b, at a right angle to `axis`, which is that on a; of others a direction across the axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<[f64; 3]>,
+    /// Of a `screw` the slide per angle, m/rad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pitch: Option<f64>,
+    /// Whether its two bodies may touch each other.
+    #[serde(default)]
+    pub collide: bool,
+    /// How far its coordinate may go: the slide of a `prismatic` joint and of a `point_on_line`, the angle of others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<LimitsTable>,
+    /// A spring and a damper along its coordinate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spring: Option<SpringTable>,
+    /// Dry friction along its coordinate, N or N·m.
+    #[serde(default)]
+    pub friction: f64,
+    /// A motor along its coordinate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motor: Option<MotorTable>,
+    /// A motion of its coordinate that is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<DriverTable>,
+    /// What acts along the slide of a `cylindrical` joint or a `screw`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slide: Option<DriveTable>,
+}
+
+/// The kinds of joints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum JointName {
+    /// A weld.
+    Fixed,
+    /// A turn about the axis.
+    Revolute,
+    /// A slide along the axis.
+    Prismatic,
+    /// Both.
+    Cylindrical,
+    /// Both, one proportional to the other.
+    Screw,
+    /// A ball in a socket.
+    Spherical,
+    /// Cardan's joint.
+    Universal,
+    /// Slides across the axis and a turn about it.
+    Planar,
+    /// A point of b stays on a line of a.
+    PointOnLine,
+    /// A point of b stays on a plane of a.
+    PointOnPlane,
+    /// A rod without mass.
+    Distance,
+}
+
+/// What acts along a coordinate.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct DriveTable {
+    /// How far it may go.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limits: Option<LimitsTable>,
+    /// A spring and a damper.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spring: Option<SpringTable>,
+    /// Dry friction, N or N·m.
+    pub friction: f64,
+    /// A motor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motor: Option<MotorTable>,
+    /// A motion that is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motion: Option<DriverTable>,
+}
+
+/// How far a coordinate may go; it is zero at the beginning.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LimitsTable {
+    /// rad or m; none where it is not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lower: Option<f64>,
+    /// rad or m; none where it is not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upper: Option<f64>,
+    /// Coefficient of restitution.
+    #[serde(default)]
+    pub e: f64,
+}
+
+/// A spring with a damper.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SpringTable {
+    /// N/m or N·m/rad.
+    #[serde(default)]
+    pub stiffness: f64,
+    /// N·s/m or N·m·s/rad.
+    #[serde(default)]
+    pub damping: f64,
+    /// Where it is without force, m or rad.
+    #[serde(default)]
+    pub rest: f64,
+}
+
+/// A motor: to a `velocity`, or to a `position` by a stiffness and a damping.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MotorTable {
+    /// m/s or rad/s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<f64>,
+    /// m or rad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position: Option<f64>,
+    /// N/m or N·m/rad, of a motor to a position.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness: Option<f64>,
+    /// N·s/m or N·m·s/rad, of a motor to a position.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub damping: Option<f64>,
+    /// The most force or torque, N or N·m; no bound where it is not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max: Option<f64>,
+}
+
+/// A motion that is given: `velocity t + amplitude (sin(frequency t + phase) − sin(phase))`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct DriverTable {
+    /// m/s or rad/s.
+    pub velocity: f64,
+    /// m or rad.
+    pub amplitude: f64,
+    /// rad/s.
+    pub frequency: f64,
+    /// rad.
+    pub phase: f64,
+}
+
+/// Coordinates of joints with `Σ weight · coordinate` constant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CouplingTable {
+    /// The name.
+    #[serde(default)]
+    pub name: String,
+    /// The coordinates.
+    pub terms: Vec<TermTable>,
+}
+
+/// A coordinate with its weight.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TermTable {
+    /// The name of a joint.
+    pub joint: String,
+    /// Which of its coordinates; its only one, where none is named.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coordinate: Option<CoordinateName>,
+    /// The weight.
+    pub weight: f64,
+}
+
+/// A coordinate of a joint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CoordinateName {
+    /// rad.
+    Angle,
+    /// m.
+    Slide,
 }
 
 /// What is kept of a run, and where: files beside the scene's, unless the command line says otherwise.

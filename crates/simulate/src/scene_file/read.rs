@@ -70,6 +70,8 @@ impl SceneFile {
                 name: None,
                 position: [0.0; 3],
             }],
+            joints: vec![],
+            couplings: vec![],
             forces: vec![],
             output: Default::default(),
         }

@@ -5,6 +5,7 @@ mod blocks;
 mod free_body;
 mod impacts;
 mod invariance;
+mod joints;
 mod laws;
 mod overlap;
 mod piles;

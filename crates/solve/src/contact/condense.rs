@@ -70,8 +70,9 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
         let bytes = Delassus::<D>::condensed_bytes(&problem.H, &dynamics.inverse);
         budget::admit("the condensed W", bytes)?;
         let w = Delassus::condense(&problem.H, &dynamics.inverse); //                W = Hᵀ M⁻¹ H
-        let mut local = FrictionLocal::new(w, q, problem.mu.clone())?;
-        local.rows = rows(problem, &mut dynamics);
+        let rows = rows(problem, &mut dynamics);
+        let local = FrictionLocal { W: w, q, mu: problem.mu.clone(), rows };
+        checked(&local)?;
         Ok((local, CondenseMemo { dynamics, h: problem.H.clone(), contradiction }))
     }
 
@@ -85,7 +86,7 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
             memo.contradiction = memo.dynamics.free_velocity(problem, &mut reduced.q);
             reduced.mu.clone_from(&problem.mu);
             reduced.rows = rows(problem, &mut memo.dynamics);
-            reduced.validate()?;
+            checked(reduced)?;
         } else {
             (*reduced, *memo) = self.reduce(problem)?;
         }
@@ -119,6 +120,14 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
         bounded(problem).zip(&reduced.lambda).for_each(|(j, x)| point.lambda[j] = *x);
         memo.dynamics.complete(problem, point);
     }
+}
+
+/// Bilateral constraints that nothing touches leave an empty problem, which is solved.
+fn checked<const D: usize>(reduced: &FrictionLocal<D>) -> Result<(), SolveError> {
+    if reduced.contacts() + reduced.multipliers() > 0 {
+        reduced.validate()?;
+    }
+    Ok(())
 }
 
 /// The rows with bounds.

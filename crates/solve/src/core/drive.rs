@@ -407,7 +407,7 @@ impl History {
                 k += 1;
                 k % 2 == 1
             });
-            self.stride *= 2;
+            self.stride = self.stride.saturating_mul(2);
         }
         if worth_it || self.visits.is_multiple_of(self.stride) {
             self.samples.push(sample);

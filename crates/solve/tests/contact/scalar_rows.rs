@@ -47,6 +47,28 @@ fn planted_problems_are_solved_in_every_form() {
     }
 }
 
+/// Joints with motors and limits that nothing touches.
+#[test]
+fn rows_without_contacts_are_solved() {
+    for seed in 0..4 {
+        let case =
+            Planted { contacts: 0, dofs: 30, bilateral: 3, bounded: 3, seed, ..Planted::default() };
+        let (global, planted) = case.global::<3>();
+        for solver in ["nsgs", "psor", "auto", "condense/nsgs", "condense/auto"] {
+            let point = solved(&global, solver);
+            let gap: Vec<f64> = point.v.iter().zip(&planted.v).map(|(a, b)| a - b).collect();
+            assert!(norm(&gap) < 1e-6 * norm(&planted.v), "{solver} {case:?} {:e}", norm(&gap));
+        }
+        let (local, planted) = case.local::<2>();
+        for solver in ["nsgs", "psor", "auto"] {
+            let point = solved(&local, solver);
+            for (a, b) in point.lambda.iter().zip(&planted.lambda) {
+                assert!((a - b).abs() < 1e-6 * (1.0 + b.abs()), "{solver} {seed}: {a} {b}");
+            }
+        }
+    }
+}
+
 /// Without friction a local problem in the plane is an LCP with two bounds in the normal impulses and the rows: another statement, other methods.
 #[test]
 fn frictionless_problems_agree_with_their_box_lcp() {
@@ -176,5 +198,38 @@ fn a_session_changes_between_problems_with_and_without_bounds() {
             let outcome = session.solve(&problems[k], &mut point, &limits, &mut |_| {}).unwrap();
             assert_eq!(outcome.status, Status::Solved, "{solver} {k}");
         }
+    }
+}
+
+/// One row alone, of any size.
+#[test]
+fn a_single_constraint_is_solved() {
+    for s in [1.0, -3e-7, 1e5, 0.0, 0.049] {
+        let one = |x: f64| Csc::from_triplets(1, 1, std::iter::once((0, 0, x))).unwrap();
+        let rows = RowsLocal::bilateral(Csc::zeros(0, 1), one(1.000243), vec![s]);
+        let problem = FrictionLocal::<3>::with_rows(
+            nonsmooth_linalg::Bsr::from_rows(0, &[]),
+            vec![],
+            vec![],
+            rows,
+        )
+        .unwrap();
+        let point = solved(&problem, "auto");
+        assert!((point.lambda[0] + s / 1.000243).abs() <= 1e-15 * s.abs());
+    }
+    // And by one session, from the last impulses.
+    let mut session = registry::session::<FrictionLocal<3>>("auto", &Default::default()).unwrap();
+    let mut point = nonsmooth_problem::LocalPoint::default();
+    point.lambda.push(0.0);
+    for k in 0..40 {
+        let (r, s) = (1.0 + 1e-16 * f64::from(k % 3), f64::from(k).sin());
+        let one = Csc::from_triplets(1, 1, std::iter::once((0, 0, r))).unwrap();
+        let rows = RowsLocal::bilateral(Csc::zeros(0, 1), one, vec![s]);
+        let w = nonsmooth_linalg::Bsr::from_rows(0, &[]);
+        let problem = FrictionLocal::<3>::with_rows(w, vec![], vec![], rows).unwrap();
+        let limits = Limits { tolerance: 1e-10, ..Limits::default() };
+        let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+        assert_eq!(outcome.status, Status::Solved, "{k} {:?}", outcome.measure);
+        assert!((point.lambda[0] + s / r).abs() <= 1e-15 * s.abs());
     }
 }

@@ -16,7 +16,7 @@ use nonsmooth_linalg::{Csc, Delassus, Inverse};
 /// The sizes and the state of a contact problem with a known solution.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planted {
-    /// The number of contacts nc, at least 1.
+    /// The number of contacts nc, at least 1 where there are no rows.
     pub contacts: usize,
     /// The number of degrees of freedom n, at least 1. W has rank `min(n, D·nc)` when every body is touched.
     pub dofs: usize,
@@ -66,8 +66,8 @@ impl Planted {
     /// A global problem and a solution of it.
     pub fn global<const D: usize>(&self) -> (FrictionGlobal<D>, GlobalPoint) {
         let mut rng = Pcg64::seed_from_u64(self.seed);
-        let (n, m) = (self.dofs.max(1), D * self.contacts.max(1));
         let p = self.bilateral + self.bounded;
+        let (n, m) = (self.dofs.max(1), D * self.contacts.max(usize::from(p == 0)));
         let mut normal = || {
             // The sum of four uniforms is normal enough to plant with.
             (0..4).map(|_| rng.random_range(-1.0..1.0)).sum::<f64>() * 0.866

@@ -28,6 +28,8 @@ use nonsmooth_linalg::Csc;
 /// | `mu` | coefficients of friction, 0 allowed | nc | 1 |
 /// | `rows` | `G`, `b` of FCLIB, and bounds | n × p, p | |
 ///
+/// A problem with scalar rows may have no contacts.
+///
 /// Source: Acary, lecture, problems P_ML and P_ML_b; FCLIB `/fclib_global`.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(non_snake_case)]
@@ -81,7 +83,7 @@ pub struct GlobalPoint {
 impl<const D: usize> FrictionGlobal<D> {
     /// States a problem without scalar rows, validated.
     ///
-    /// Errors: no contacts, a wrong shape, a value that is not finite, a negative `mu`; each names its entry.
+    /// Errors: neither contacts nor rows, a wrong shape, a value that is not finite, a negative `mu`; each names its entry.
     /// A singular M is found when it is factorised: by the judge ([`Problem::gauge`]) or by a solver.
     pub fn new(
         M: Csc,
@@ -119,7 +121,7 @@ impl<const D: usize> FrictionGlobal<D> {
     pub fn validate(&self) -> Result<(), ProblemError> {
         const { assert!(D == 2 || D == 3, "contacts have 2 or 3 components") };
         let (n, nc) = (self.dofs(), self.contacts());
-        if nc == 0 {
+        if nc + self.multipliers() == 0 {
             return Err(ProblemError::Empty { place: "mu".into() });
         }
         if n == 0 {

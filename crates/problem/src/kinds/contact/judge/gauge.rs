@@ -107,7 +107,7 @@ impl LawGauge {
         let (per, plain_per) = (1.0 / unit, 1.0 / plain_unit);
         let (mut scaled, mut plain_map, mut doubts) = (0.0, 0.0, 0.0);
         let (mut primal, mut dual, mut complementarity) = (0.0, 0.0, 0.0);
-        let (mut worst_contact, mut worst) = (0, -1.0);
+        let (mut worst_contact, mut worst) = (0, 0.0);
         let (mut own_contact, mut own) = (0, 0.0);
         for (c, &w) in self.w.iter().enumerate() {
             let law = law(c);

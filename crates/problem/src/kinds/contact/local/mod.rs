@@ -24,7 +24,7 @@ use nonsmooth_linalg::{Bsr, Csc};
 /// | `mu` | coefficients of friction, 0 allowed | nc | 1 |
 /// | `rows` | `V`, `R`, `s` of FCLIB, and bounds | D·nc × p, p × p, p | |
 ///
-/// Each contact's entries are `[N, T]` (D = 2) or `[N, T1, T2]` (D = 3).
+/// Each contact's entries are `[N, T]` (D = 2) or `[N, T1, T2]` (D = 3). A problem with scalar rows may have no contacts.
 /// Source: Acary, lecture (3)(4), problem P_L; FCLIB `/fclib_local`.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(non_snake_case)]
@@ -74,7 +74,7 @@ pub struct LocalPoint {
 impl<const D: usize> FrictionLocal<D> {
     /// States a problem without scalar rows, validated.
     ///
-    /// Errors: no contacts, a wrong shape, a value that is not finite, a negative `mu`; each names its entry.
+    /// Errors: neither contacts nor rows, a wrong shape, a value that is not finite, a negative `mu`; each names its entry.
     pub fn new(W: Bsr<D>, q: Vec<f64>, mu: Vec<f64>) -> Result<Self, ProblemError> {
         let problem = Self { W, q, mu, rows: None };
         problem.validate()?;
@@ -112,7 +112,7 @@ impl<const D: usize> FrictionLocal<D> {
     pub fn validate(&self) -> Result<(), ProblemError> {
         const { assert!(D == 2 || D == 3, "contacts have 2 or 3 components") };
         let nc = self.contacts();
-        if nc == 0 {
+        if nc + self.multipliers() == 0 {
             return Err(ProblemError::Empty { place: "mu".into() });
         }
         if (self.W.nrows(), self.W.ncols()) != (nc, nc) {

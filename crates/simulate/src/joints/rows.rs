@@ -1,0 +1,460 @@
+//! The scalar rows of a step: equations of joints, and what acts along their coordinates.
+//!
+//! ```text
+//! equations, springs, drivers:   c = Gᵀ v_θ + b,   0 = c + κ λ        on the mean velocity, with G at the extrapolated midpoint: second order, exact in energy
+//! limits:                        c = Gᵀ (v⁺ + e v_k),   0 ≤ λ ⟂ c ≥ 0     where the forecast closes them
+//! motors, dry friction:          c = Gᵀ v⁺ − target,   −c ∈ N_[−h F, h F](λ)
+//! spring k, damper d:            κ = 1/(h (d + h θ k)),   b = k (s_k − rest)/(d + h θ k):    λ = −h (k (s_k + h θ s'_θ − rest) + d s'_θ)
+//! ```
+//!
+//! A row on the mean velocity would throw back a velocity that does not fit the joint: where that at the beginning does not, the row is on v⁺.
+
+use nonsmooth_scenes::vec3::{Vec3, apply, dot, norm, scale};
+
+use super::equations::{Equation, Linkage, Reach, coupled};
+use super::{Coordinate, Drive, JointId, JointReport, Motor, Spring};
+use crate::moving::Moving;
+use crate::rotation::Pose;
+use crate::state::State;
+use crate::world::oscillation;
+use crate::{Activation, MoreauJean, Motion, World};
+
+/// What a row does to a free body, and the rates that its velocities make.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lever {
+    pub body: u32,
+    /// In the world frame.
+    pub force: Vec3,
+    pub moment: Vec3,
+    /// In the frame of the body's velocities.
+    pub row: [f64; 6],
+    pub solved: [f64; 6],
+}
+
+/// A scalar row of a step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ScalarRow {
+    /// Joint or, beyond the joints, coupling; and which of its rows.
+    pub key: (u32, u32),
+    /// Its levers.
+    levers: (u32, u32),
+    pub bounds: [f64; 2],
+    pub compliance: f64,
+    /// Whether the velocity is the mean one.
+    mean: bool,
+    /// What bodies that are moved, targets and springs add to c.
+    given: f64,
+    /// What c has besides the velocities of free bodies after the step.
+    pub shift: f64,
+    pub lambda: f64,
+}
+
+/// The joints of a world, and the rows of a step.
+pub(crate) struct Joints {
+    pub linkages: Vec<Linkage>,
+    pub rows: Vec<ScalarRow>,
+    levers: Vec<Lever>,
+    /// Angle and slide at the beginning of the step.
+    coordinates: Vec<[f64; 2]>,
+    pub reports: Vec<JointReport>,
+}
+
+/// A velocity that is off by more than this share of those that make it does not fit the joint.
+const UNFIT: f64 = 0.05;
+
+/// The number of a row that acts along a coordinate, after those of the equations.
+fn number(drive: usize, what: u32) -> u32 {
+    EQUATIONS + 8 * drive as u32 + what
+}
+
+/// A joint has fewer equations.
+const EQUATIONS: u32 = 8;
+/// What acts along a coordinate, by number.
+const LOWER: u32 = 0;
+const UPPER: u32 = 1;
+const SPRING: u32 = 2;
+const FRICTION: u32 = 3;
+const MOTOR: u32 = 4;
+const DRIVER: u32 = 5;
+
+impl Joints {
+    /// Those of a world whose bodies stand as they were built.
+    pub fn new(world: &World) -> Self {
+        Self {
+            linkages: world.joints.iter().map(|j| Linkage::new(j, world)).collect(),
+            rows: vec![],
+            levers: vec![],
+            coordinates: vec![],
+            reports: vec![],
+        }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.linkages.is_empty()
+    }
+
+    /// The levers of a row.
+    pub fn levers(&self, row: usize) -> &[Lever] {
+        let (first, last) = self.rows[row].levers;
+        &self.levers[first as usize..last as usize]
+    }
+
+    /// The coordinates of all joints at poses that follow those of `state`.
+    fn coordinates(&self, state: &State, pose: impl Fn(u32) -> Pose) -> Vec<[f64; 2]> {
+        let last = |j: usize| state.memory.angles.get(j).copied().unwrap_or(0.0);
+        let each = self.linkages.iter().enumerate();
+        each.map(|(j, l)| l.coordinates(&l.place(&pose), last(j))).collect()
+    }
+
+    /// States the rows of a step of length h.
+    pub fn begin(
+        &mut self,
+        scheme: &MoreauJean,
+        world: &World,
+        state: &State,
+        bodies: &[Moving],
+        h: f64,
+    ) {
+        self.rows.clear();
+        self.levers.clear();
+        if self.is_empty() {
+            return;
+        }
+        self.coordinates = self.coordinates(state, |k| bodies[k as usize].start);
+        let step = Step { scheme, world, state, bodies, h };
+        let places: Vec<_> =
+            self.linkages.iter().map(|l| l.place(|k| bodies[k as usize].middle)).collect();
+        for j in 0..self.linkages.len() {
+            let (at, [angle, slide]) = (&places[j], self.coordinates[j]);
+            let equations = self.linkages[j].equations(at, angle);
+            for (k, equation) in equations.into_iter().enumerate() {
+                let key = (j as u32, k as u32);
+                self.push(&step, key, &equation.gradient, Wanted::bilateral());
+            }
+            for (d, drive) in world.joints[j].drives.iter().enumerate() {
+                let reach = self.linkages[j].gradient(at, drive.coordinate);
+                let s = match drive.coordinate {
+                    Coordinate::Angle => angle,
+                    Coordinate::Slide => slide,
+                };
+                self.drive(&step, (j as u32, d), drive, s, &reach);
+            }
+        }
+        for (c, coupling) in world.couplings.iter().enumerate() {
+            let linkages = &self.linkages;
+            let reach = coupled(coupling, |joint, coordinate| {
+                let j = joint.index();
+                (0.0, linkages[j].gradient(&places[j], coordinate))
+            })
+            .gradient;
+            let key = ((world.joints.len() + c) as u32, 0);
+            self.push(&step, key, &reach, Wanted::bilateral());
+        }
+    }
+
+    /// The rows along one coordinate, which is s.
+    fn drive(
+        &mut self,
+        step: &Step,
+        (joint, d): (u32, usize),
+        drive: &Drive,
+        s: f64,
+        reach: &[Reach],
+    ) {
+        let (h, theta) = (step.h, step.scheme.theta);
+        let key = |what: u32| (joint, number(d, what));
+        let rate = step.rate(reach);
+        if let Some(limits) = drive.limits {
+            let gamma = match step.scheme.activation {
+                Activation::Forecast { gamma, .. } => gamma,
+                Activation::Gap => 1.0,
+            };
+            let sides = [(LOWER, s - limits.lower, 1.0), (UPPER, limits.upper - s, -1.0)];
+            for (what, gap, sign) in sides {
+                if gap + gamma * h * sign * rate > 0.0 {
+                    continue;
+                }
+                let turned: Vec<Reach> = reach.iter().map(|r| r.times(sign)).collect();
+                let given = limits.e * (sign * rate).min(0.0);
+                let wanted = Wanted::end([0.0, f64::INFINITY], given);
+                self.push(step, key(what), &turned, wanted);
+            }
+        }
+        let pull = |spring: &Spring, max: f64| {
+            let Spring { stiffness, damping, rest } = *spring;
+            let resistance = damping + h * theta * stiffness;
+            (resistance > 0.0).then(|| Wanted {
+                bounds: [-h * max, h * max],
+                compliance: 1.0 / (h * resistance),
+                mean: true,
+                given: stiffness * (s - rest) / resistance,
+            })
+        };
+        if let Some(wanted) = drive.spring.as_ref().and_then(|s| pull(s, f64::INFINITY)) {
+            self.push(step, key(SPRING), reach, wanted);
+        }
+        if drive.friction > 0.0 {
+            let most = h * drive.friction;
+            self.push(step, key(FRICTION), reach, Wanted::end([-most, most], 0.0));
+        }
+        let motor = match &drive.motor {
+            Some(Motor::Velocity { velocity, max }) => {
+                Some(Wanted::end([-h * max, h * max], -velocity))
+            }
+            Some(Motor::Position { spring, max }) => pull(spring, *max),
+            None => None,
+        };
+        if let Some(wanted) = motor {
+            self.push(step, key(MOTOR), reach, wanted);
+        }
+        if let Some(driver) = &drive.driver {
+            let t = step.state.t;
+            let given = -(driver.at(t + h) - driver.at(t)) / h;
+            self.push(step, key(DRIVER), reach, Wanted { given, ..Wanted::bilateral() });
+        }
+    }
+
+    fn push(&mut self, step: &Step, key: (u32, u32), reach: &[Reach], wanted: Wanted) {
+        let Wanted { bounds, compliance, mean, given } = wanted;
+        let theta = step.scheme.theta;
+        let first = self.levers.len() as u32;
+        let (mut before, mut moved, mut moved_end, mut size) = (0.0, 0.0, 0.0, given.abs());
+        for r in reach {
+            let b = &step.bodies[r.body as usize];
+            if b.free {
+                let (v, omega) = (b.v, b.omega(b.spin));
+                before += dot(r.force, v) + dot(r.moment, omega);
+                size += norm(r.force) * norm(v) + norm(r.moment) * norm(omega);
+                self.levers.push(Lever {
+                    body: r.body,
+                    force: r.force,
+                    moment: r.moment,
+                    row: [0.0; 6],
+                    solved: [0.0; 6],
+                });
+            } else {
+                let (mean, end) = step.moved(r.body as usize);
+                moved += dot(r.force, mean);
+                moved_end += dot(r.force, end);
+            }
+        }
+        if self.levers.len() as u32 == first {
+            return;
+        }
+        // What has a compliance is a force, no constraint: nothing is thrown back.
+        let fits = compliance > 0.0 || (before + moved + given).abs() <= UNFIT * size;
+        let mean = mean && fits;
+        let (given, compliance) = match mean {
+            true => ((moved + given) / theta, compliance / theta),
+            false => (moved_end + given, compliance),
+        };
+        let scaled = step.state.memory.scaled(step.h);
+        let [l, u] = bounds;
+        let lambda = (scaled * step.state.memory.impulse(key)).clamp(l, u);
+        let levers = (first, self.levers.len() as u32);
+        let row = ScalarRow { key, levers, bounds, compliance, mean, given, shift: given, lambda };
+        self.rows.push(row);
+    }
+
+    /// The rows in the frames of this pass.
+    pub fn columns(&mut self, scheme: &MoreauJean, rows: &[u32], bodies: &[Moving]) {
+        let share = (1.0 - scheme.theta) / scheme.theta;
+        for &k in rows {
+            let row = &mut self.rows[k as usize];
+            let mut before = 0.0;
+            let (first, last) = row.levers;
+            for lever in &mut self.levers[first as usize..last as usize] {
+                let b = &bodies[lever.body as usize];
+                let turned = apply(&b.frame, lever.moment);
+                let solved = apply(&b.inverse, turned);
+                for i in 0..3 {
+                    lever.row[i] = lever.force[i];
+                    lever.row[3 + i] = turned[i];
+                    lever.solved[i] = lever.force[i] / b.mass;
+                    lever.solved[3 + i] = solved[i];
+                }
+                before += lever.rate(b.v, b.spin);
+            }
+            row.shift = row.given + if row.mean { share * before } else { 0.0 };
+        }
+    }
+
+    /// Takes the gradients of these rows at other poses: those of the middle of the step as the last pass has it, `½ (R_k + R⁺)` for rotations. With the velocities
+    /// that belong to them the equations of joints keep their values to rounding.
+    pub fn place_at(&mut self, world: &World, rows: &[u32], pose: impl Fn(u32) -> Pose) {
+        let Self { linkages, coordinates, rows: all, levers, .. } = self;
+        let places: Vec<_> = linkages.iter().map(|l| l.place(&pose)).collect();
+        let mut own: (u32, Vec<Equation>) = (u32::MAX, vec![]);
+        for &k in rows {
+            let row = &all[k as usize];
+            let (owner, which) = row.key;
+            let j = owner as usize;
+            let reach = if let Some(coupling) = j.checked_sub(linkages.len()) {
+                let gradient = |joint: JointId, c: Coordinate| {
+                    (0.0, linkages[joint.index()].gradient(&places[joint.index()], c))
+                };
+                coupled(&world.couplings[coupling], gradient).gradient
+            } else if which < EQUATIONS {
+                if own.0 != owner {
+                    own = (owner, linkages[j].equations(&places[j], coordinates[j][0]));
+                }
+                own.1[which as usize].gradient.clone()
+            } else {
+                let (drive, what) = ((which - EQUATIONS) / 8, (which - EQUATIONS) % 8);
+                let along = world.joints[j].drives[drive as usize].coordinate;
+                let sign = if what == UPPER { -1.0 } else { 1.0 };
+                let reach = linkages[j].gradient(&places[j], along);
+                reach.iter().map(|r| r.times(sign)).collect()
+            };
+            let free = reach.iter().filter(|r| world.bodies[r.body as usize].is_free());
+            let (first, last) = row.levers;
+            for (lever, r) in levers[first as usize..last as usize].iter_mut().zip(free) {
+                (lever.force, lever.moment) = (r.force, r.moment);
+            }
+        }
+    }
+
+    /// Keeps what the step did, and says it: coordinates, impulses. `violations` are those of the joints after the step.
+    pub fn finish(&mut self, state: &mut State, violations: &[f64]) {
+        if self.is_empty() {
+            return;
+        }
+        self.coordinates = self.coordinates(state, |k| state.pose(k as usize));
+        let memory = &mut state.memory;
+        memory.angles.clear();
+        memory.angles.extend(self.coordinates.iter().map(|c| c[0]));
+        memory.impulses.clear();
+        memory.impulses.extend(self.rows.iter().map(|row| (row.key, row.lambda)));
+        self.reports.clear();
+        for (j, linkage) in self.linkages.iter().enumerate() {
+            let (mut impulse, mut moment) = ([0.0; 3], [0.0; 3]);
+            for (k, row) in self.rows.iter().enumerate().filter(|r| r.1.key.0 as usize == j) {
+                for lever in self.levers(k).iter().filter(|l| l.body == linkage.b) {
+                    for i in 0..3 {
+                        impulse[i] += row.lambda * lever.force[i];
+                        moment[i] += row.lambda * lever.moment[i];
+                    }
+                }
+            }
+            let at = linkage.place(|k| state.pose(k as usize));
+            let arm = nonsmooth_scenes::vec3::sub(at.anchor(), state.position[linkage.b as usize]);
+            let about = nonsmooth_scenes::vec3::cross(arm, impulse);
+            let [angle, slide] = self.coordinates[j];
+            let has = |c: Coordinate, x: f64| if linkage.kind.has(c) { x } else { 0.0 };
+            self.reports.push(JointReport {
+                joint: JointId(j as u32),
+                angle: has(Coordinate::Angle, angle),
+                slide: has(Coordinate::Slide, slide),
+                impulse,
+                moment: nonsmooth_scenes::vec3::sub(moment, about),
+                violation: violations.get(j).copied().unwrap_or(0.0),
+            });
+        }
+    }
+
+    /// The equations of all joints, drivers and couplings at poses, each with the joint that it belongs to.
+    pub fn equations(
+        &self,
+        world: &World,
+        state: &State,
+        pose: impl Fn(u32) -> Pose,
+    ) -> Vec<(usize, Equation)> {
+        let coordinates = self.coordinates(state, &pose);
+        let places: Vec<_> = self.linkages.iter().map(|l| l.place(&pose)).collect();
+        let coordinate = |j: usize, c: Coordinate| {
+            let [angle, slide] = coordinates[j];
+            let value = if c == Coordinate::Angle { angle } else { slide };
+            (value, self.linkages[j].gradient(&places[j], c))
+        };
+        let mut out = vec![];
+        for (j, linkage) in self.linkages.iter().enumerate() {
+            let own = linkage.equations(&places[j], coordinates[j][0]);
+            out.extend(own.into_iter().map(|e| (j, e)));
+            for drive in &world.joints[j].drives {
+                if let Some(driver) = &drive.driver {
+                    let (value, gradient) = coordinate(j, drive.coordinate);
+                    let equation = Equation::new(value - driver.at(state.t), gradient);
+                    out.push((j, Equation { target: driver.rate(state.t), ..equation }));
+                }
+            }
+        }
+        for coupling in &world.couplings {
+            let j = coupling.terms[0].0.index();
+            out.push((j, coupled(coupling, |joint, c| coordinate(joint.index(), c))));
+        }
+        out
+    }
+}
+
+impl Lever {
+    /// The rate that the body's velocities make.
+    pub fn rate(&self, v: Vec3, spin: Vec3) -> f64 {
+        (0..3).map(|k| self.row[k] * v[k] + self.row[3 + k] * spin[k]).sum()
+    }
+}
+
+impl Reach {
+    fn times(&self, factor: f64) -> Self {
+        Self {
+            body: self.body,
+            force: scale(factor, self.force),
+            moment: scale(factor, self.moment),
+        }
+    }
+}
+
+/// What a row is to have.
+struct Wanted {
+    bounds: [f64; 2],
+    compliance: f64,
+    mean: bool,
+    given: f64,
+}
+
+impl Wanted {
+    fn bilateral() -> Self {
+        let bounds = [f64::NEG_INFINITY, f64::INFINITY];
+        Self { bounds, compliance: 0.0, mean: true, given: 0.0 }
+    }
+
+    /// On the velocity after the step.
+    fn end(bounds: [f64; 2], given: f64) -> Self {
+        Self { bounds, compliance: 0.0, mean: false, given }
+    }
+}
+
+/// All that rows are made of.
+struct Step<'a> {
+    scheme: &'a MoreauJean,
+    world: &'a World,
+    state: &'a State,
+    bodies: &'a [Moving],
+    h: f64,
+}
+
+impl Step<'_> {
+    /// The rate of a row at the beginning.
+    fn rate(&self, reach: &[Reach]) -> f64 {
+        let each = reach.iter().map(|r| {
+            let b = &self.bodies[r.body as usize];
+            match b.free {
+                true => dot(r.force, b.v) + dot(r.moment, b.omega(b.spin)),
+                false => dot(r.force, self.moved(r.body as usize).0),
+            }
+        });
+        each.sum()
+    }
+
+    /// The mean velocity in the step and that at its end of a body that is moved.
+    fn moved(&self, k: usize) -> (Vec3, Vec3) {
+        match self.world.bodies[k].motion {
+            Motion::Oscillating { amplitude, frequency, phase } => {
+                let at = |t: f64| oscillation(amplitude, frequency, phase, t);
+                let (first, last) = (at(self.state.t), at(self.state.t + self.h));
+                let mean = std::array::from_fn(|i| (last.0[i] - first.0[i]) / self.h);
+                (mean, last.1)
+            }
+            _ => ([0.0; 3], [0.0; 3]),
+        }
+    }
+}

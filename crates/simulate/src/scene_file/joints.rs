@@ -1,0 +1,173 @@
+//! From the joints of a file to those of a world.
+
+use super::build::{twice, unknown};
+use super::{
+    CoordinateName, CouplingTable, DriveTable, DriverTable, JointName, JointTable, LimitsTable,
+    MotorTable, SpringTable,
+};
+use crate::{
+    BodyId, Coordinate, Coupling, Drive, Driver, Joint, JointId, JointKind, JointLimits, Motor,
+    SimulateError, Spring, World,
+};
+
+/// The name of what is no body.
+const WORLD: &str = "world";
+
+/// Adds the joints and couplings of a file to a world that has its bodies.
+pub(super) fn join(
+    world: &mut World,
+    joints: &[JointTable],
+    couplings: &[CouplingTable],
+) -> Result<(), SimulateError> {
+    for (k, table) in joints.iter().enumerate() {
+        let key = match table.name.as_str() {
+            "" => format!("joints[{k}]"),
+            name => format!("joints[{k}] ({name})"),
+        };
+        if !table.name.is_empty() && world.joints.iter().any(|j| j.name == table.name) {
+            return Err(twice(&format!("{key}.name"), &table.name));
+        }
+        let joint = joint(table, world, &key)?;
+        world.join(joint);
+    }
+    for (k, table) in couplings.iter().enumerate() {
+        let coupling = coupling(table, world, &format!("couplings[{k}]"))?;
+        world.couplings.push(coupling);
+    }
+    Ok(())
+}
+
+fn body(name: &str, world: &World, key: String) -> Result<Option<BodyId>, SimulateError> {
+    if name == WORLD {
+        return Ok(None);
+    }
+    let place = world.bodies.iter().position(|b| b.name == name && !name.is_empty());
+    place.map(|k| Some(BodyId(k as u32))).ok_or_else(|| {
+        let names = world.bodies.iter().map(|b| b.name.as_str()).filter(|n| !n.is_empty());
+        unknown(&key, "body", name, names.chain([WORLD]))
+    })
+}
+
+fn joint(table: &JointTable, world: &World, key: &str) -> Result<Joint, SimulateError> {
+    let at = |name: &str| format!("{key}.{name}");
+    let bodies = (body(&table.a, world, at("a"))?, body(&table.b, world, at("b"))?);
+    let anchors = [table.anchor, table.anchor_b.unwrap_or(table.anchor)];
+    // A joint has its second body: where that is the world, the two change places and the axis turns round.
+    let (a, b, anchors, axis) = match bodies {
+        (a, Some(b)) => (a, b, anchors, table.axis),
+        (Some(a), None) => (None, a, [anchors[1], anchors[0]], table.axis.map(|x| -x)),
+        (None, None) => {
+            return Err(SimulateError::value(at("b"), "a body on one side", "`world` on both"));
+        }
+    };
+    if table.anchor_b.is_some() && table.kind != JointName::Distance {
+        return Err(SimulateError::value(at("anchor_b"), "one of a `distance` only", "one"));
+    }
+    let pitch = match (table.kind, table.pitch) {
+        (JointName::Screw, Some(pitch)) => pitch,
+        (JointName::Screw, None) => {
+            return Err(SimulateError::value(at("pitch"), "the slide per angle, m/rad", "none"));
+        }
+        (_, Some(_)) => {
+            return Err(SimulateError::value(at("pitch"), "one of a `screw` only", "one"));
+        }
+        (_, None) => 0.0,
+    };
+    let kind = match table.kind {
+        JointName::Fixed => JointKind::Fixed,
+        JointName::Revolute => JointKind::Revolute,
+        JointName::Prismatic => JointKind::Prismatic,
+        JointName::Cylindrical => JointKind::Cylindrical,
+        JointName::Screw => JointKind::Screw { pitch },
+        JointName::Spherical => JointKind::Spherical,
+        JointName::Universal => JointKind::Universal,
+        JointName::Planar => JointKind::Planar,
+        JointName::PointOnLine => JointKind::PointOnLine,
+        JointName::PointOnPlane => JointKind::PointOnPlane,
+        JointName::Distance => JointKind::Distance,
+    };
+    let main = match kind {
+        JointKind::Prismatic | JointKind::PointOnLine => Coordinate::Slide,
+        _ => Coordinate::Angle,
+    };
+    let JointTable { limits, spring, friction, motor, motion, .. } = *table;
+    let own = DriveTable { limits, spring, friction, motor, motion };
+    let mut drives = vec![];
+    if own != DriveTable::default() {
+        drives.push(drive(main, &own, key)?);
+    }
+    if let Some(slide) = &table.slide {
+        drives.push(drive(Coordinate::Slide, slide, &at("slide"))?);
+    }
+    Ok(Joint {
+        name: table.name.clone(),
+        kind,
+        a,
+        b,
+        anchors,
+        axis,
+        reference: table.reference,
+        collide: table.collide,
+        drives,
+    })
+}
+
+fn drive(coordinate: Coordinate, table: &DriveTable, key: &str) -> Result<Drive, SimulateError> {
+    let limits = table.limits.map(|LimitsTable { lower, upper, e }| JointLimits {
+        lower: lower.unwrap_or(f64::NEG_INFINITY),
+        upper: upper.unwrap_or(f64::INFINITY),
+        e,
+    });
+    let spring = table.spring.map(|SpringTable { stiffness, damping, rest }| Spring {
+        stiffness,
+        damping,
+        rest,
+    });
+    let driver = table.motion.map(|DriverTable { velocity, amplitude, frequency, phase }| Driver {
+        velocity,
+        amplitude,
+        frequency,
+        phase,
+    });
+    let motor = table.motor.map(|motor| self::motor(&motor, key)).transpose()?;
+    Ok(Drive { coordinate, limits, spring, friction: table.friction, motor, driver })
+}
+
+fn motor(table: &MotorTable, key: &str) -> Result<Motor, SimulateError> {
+    let MotorTable { velocity, position, stiffness, damping, max } = *table;
+    let max = max.unwrap_or(f64::INFINITY);
+    match (velocity, position) {
+        (Some(velocity), None) if stiffness.is_none() && damping.is_none() => {
+            Ok(Motor::Velocity { velocity, max })
+        }
+        (None, Some(rest)) => {
+            let [stiffness, damping] = [stiffness, damping].map(|x| x.unwrap_or(0.0));
+            Ok(Motor::Position { spring: Spring { stiffness, damping, rest }, max })
+        }
+        _ => Err(SimulateError::value(
+            format!("{key}.motor"),
+            "a velocity, or a position with stiffness and damping",
+            format!("velocity {velocity:?}, position {position:?}"),
+        )),
+    }
+}
+
+fn coupling(table: &CouplingTable, world: &World, key: &str) -> Result<Coupling, SimulateError> {
+    let mut terms = vec![];
+    for (k, term) in table.terms.iter().enumerate() {
+        let key = format!("{key}.terms[{k}]");
+        let place = world.joints.iter().position(|j| j.name == term.joint && !j.name.is_empty());
+        let Some(place) = place else {
+            let names = world.joints.iter().map(|j| j.name.as_str()).filter(|n| !n.is_empty());
+            return Err(unknown(&format!("{key}.joint"), "joint", &term.joint, names));
+        };
+        let coordinate = match term.coordinate {
+            Some(CoordinateName::Angle) => Coordinate::Angle,
+            Some(CoordinateName::Slide) => Coordinate::Slide,
+            None if world.joints[place].kind.has(Coordinate::Angle) => Coordinate::Angle,
+            None => Coordinate::Slide,
+        };
+        terms.push((JointId(place as u32), coordinate, term.weight));
+    }
+    Ok(Coupling { name: table.name.clone(), terms })
+}
