@@ -24,8 +24,10 @@
 
 mod detect;
 mod error;
+pub mod import;
 mod islands;
 mod joints;
+mod mesh;
 mod moreau_jean;
 mod moving;
 mod report;
@@ -43,9 +45,11 @@ pub use joints::{
     Coordinate, Coupling, Drive, Driver, Joint, JointId, JointKind, JointLimits, JointReport,
     Motor, Spring,
 };
+pub use mesh::Mesh;
 pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean, Stabilisation};
 pub use report::{
-    ContactReport, Counts, Drift, EnergyBalance, RunReport, StepReport, StepStatus, Timings,
+    ContactReport, Counts, Drift, EnergyBalance, RunReport, Settled, StepReport, StepStatus,
+    Timings,
 };
 pub use scene_file::SceneFile;
 pub use shape::{Part, Shape, plane};
