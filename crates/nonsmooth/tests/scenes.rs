@@ -41,6 +41,24 @@ fn every_scene_has_a_test() {
     assert!(count >= 10);
 }
 
+/// The centre rests, the inclination stays, the point of contact runs round with Ω² = 4 g / (a sin α).
+#[test]
+fn a_disc_rolls_on_its_rim() {
+    let mut far: f64 = 0.0;
+    let mut last = [0.1, 0.0];
+    let mut turned = 0.0;
+    run("rolling_disc", |simulation, _| {
+        let [x, y, z] = simulation.state().position[1];
+        far = far.max(x.hypot(y)).max((z - 0.05).abs());
+        let [px, py, _] = simulation.contacts()[0].point;
+        turned += (last[0] * py - last[1] * px).atan2(last[0] * px + last[1] * py);
+        last = [px, py];
+    });
+    assert!(far < 2e-3, "{far}");
+    let expected: f64 = 0.5 * 28.014282072;
+    assert!((turned.abs() - expected).abs() < 5e-3 * expected, "{turned}");
+}
+
 /// At rest from t = √(2z/g) (1 + e)/(1 − e) = 1.354571 s on; half of the speed, so a quarter of the energy, after the first impact.
 #[test]
 fn a_bouncing_ball_comes_to_rest_in_time() {
@@ -170,7 +188,8 @@ fn a_four_bar_stalls_at_its_limit() {
     let joints = simulation.joints();
     assert!((joints[3].angle - 0.3).abs() < 2e-3, "{:?}", joints[3]);
     // The links from the pivots: crank at φ, rocker at ψ, 0.5 m between their heads.
-    let first = (0.397_909_618_f64).atan2(0.459_163_847 - 0.5);
+    let z = (0.16 + 0.5824_f64.sqrt()) / 2.32;
+    let first = z.atan2(0.4 * z - 0.2);
     let psi = first + joints[3].angle;
     let head = [0.5 + 0.4 * psi.cos(), 0.4 * psi.sin()];
     let phi = std::f64::consts::FRAC_PI_2 + joints[0].angle;

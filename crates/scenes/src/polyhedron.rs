@@ -22,6 +22,40 @@ pub struct MassProperties {
 }
 
 impl MassProperties {
+    /// Those of the solid inside a closed surface of triangles, counter-clockwise from outside, for a density in kg/m³, exact; a volume of zero makes them NaN.
+    ///
+    /// The solid is the signed union of the tetrahedra between `inner`, best a point in the middle, and the triangles;
+    /// over one with corners 0, a, b, c and volume V, with s = a + b + c:
+    /// `∫x = V s/4` and `∫x xᵀ = V/20 (a aᵀ + b bᵀ + c cᵀ + s sᵀ)`.
+    pub fn inside(triangles: impl Iterator<Item = [Vec3; 3]>, inner: Vec3, density: f64) -> Self {
+        let (mut volume, mut first, mut second) = (0.0, [0.0; 3], [[0.0; 3]; 3]);
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|p| sub(p, inner));
+            let v = dot(a, cross(b, c)) / 6.0;
+            let s = add(a, add(b, c));
+            volume += v;
+            first = add(first, scale(v / 4.0, s));
+            for k in 0..3 {
+                for l in 0..3 {
+                    second[k][l] +=
+                        v / 20.0 * (a[k] * a[l] + b[k] * b[l] + c[k] * c[l] + s[k] * s[l]);
+                }
+            }
+        }
+        let centre = scale(1.0 / volume, first);
+        for k in 0..3 {
+            for l in 0..3 {
+                second[k][l] -= volume * centre[k] * centre[l];
+            }
+        }
+        let trace = second[0][0] + second[1][1] + second[2][2];
+        let mut inertia = second.map(|row| scale(-density, row));
+        for k in 0..3 {
+            inertia[k][k] += density * trace;
+        }
+        Self { mass: density * volume, centre: add(inner, centre), inertia }
+    }
+
     /// Those of some solids, at least one, taken as one body.
     pub fn joined(parts: &[Self]) -> Self {
         let mass = parts.iter().map(|p| p.mass).sum();
@@ -146,42 +180,13 @@ impl Polyhedron {
     }
 
     /// Mass, mass centre and inertia for a density in kg/m³, exact.
-    ///
-    /// The solid is the signed union of the tetrahedra between an inner point and triangles of the faces;
-    /// over one with corners 0, a, b, c and volume V, with s = a + b + c:
-    /// `∫x = V s/4` and `∫x xᵀ = V/20 (a aᵀ + b bᵀ + c cᵀ + s sᵀ)`.
     pub fn mass_properties(&self, density: f64) -> MassProperties {
         // About an inner point, so that a solid far from the origin loses no digits.
-        let inner = mean(&self.vertices);
-        let (mut volume, mut first, mut second) = (0.0, [0.0; 3], [[0.0; 3]; 3]);
-        for face in &self.faces {
-            let p = |i: usize| sub(self.vertices[face[i]], inner);
-            for i in 1..face.len() - 1 {
-                let (a, b, c) = (p(0), p(i), p(i + 1));
-                let v = dot(a, cross(b, c)) / 6.0;
-                let s = add(a, add(b, c));
-                volume += v;
-                first = add(first, scale(v / 4.0, s));
-                for k in 0..3 {
-                    for l in 0..3 {
-                        second[k][l] +=
-                            v / 20.0 * (a[k] * a[l] + b[k] * b[l] + c[k] * c[l] + s[k] * s[l]);
-                    }
-                }
-            }
-        }
-        let centre = scale(1.0 / volume, first);
-        for k in 0..3 {
-            for l in 0..3 {
-                second[k][l] -= volume * centre[k] * centre[l];
-            }
-        }
-        let trace = second[0][0] + second[1][1] + second[2][2];
-        let mut inertia = second.map(|row| scale(-density, row));
-        for k in 0..3 {
-            inertia[k][k] += density * trace;
-        }
-        MassProperties { mass: density * volume, centre: add(inner, centre), inertia }
+        let fan = |face: &'_ Vec<usize>| -> Vec<[Vec3; 3]> {
+            let p = |i: usize| self.vertices[face[i]];
+            (1..face.len() - 1).map(|i| [p(0), p(i), p(i + 1)]).collect()
+        };
+        MassProperties::inside(self.faces.iter().flat_map(fan), mean(&self.vertices), density)
     }
 }
 

@@ -27,9 +27,11 @@
 mod detect;
 mod drive;
 mod error;
+pub mod import;
 mod islands;
 mod joints;
 mod lagrangian;
+mod mesh;
 mod moreau_jean;
 mod moving;
 mod report;
@@ -52,9 +54,11 @@ pub use lagrangian::{
     Constant, Directions, Lagrangian, LagrangianContact, LagrangianScheme, LagrangianSimulation,
     LagrangianState, LinearContact, LinearRow, LinearSystem, RelationsAt, RowLaw, Size,
 };
+pub use mesh::Mesh;
 pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean, Stabilisation};
 pub use report::{
-    ContactReport, Counts, Drift, EnergyBalance, RunReport, StepReport, StepStatus, Timings,
+    ContactReport, Counts, Drift, EnergyBalance, RunReport, Settled, StepReport, StepStatus,
+    Timings,
 };
 pub use scene_file::SceneFile;
 pub use shape::{Part, Shape, plane};

@@ -113,6 +113,8 @@ pub struct Counts {
     pub slip: usize,
     /// Contacts that began with the impulse of the last step.
     pub warm: usize,
+    /// Points where bodies overlap by more than a tenth of the smaller one. No normal is right there: that of the step before is kept while the features are the same.
+    pub deep: usize,
     /// Scalar rows: equations, limits, motors, friction and springs of joints; relations and rows of Lagrangian systems.
     pub rows: usize,
     /// Islands that were solved apart.
@@ -170,6 +172,23 @@ pub struct StepReport {
     pub timings: Timings,
 }
 
+impl StepReport {
+    /// That of a step of which nothing is known yet.
+    pub(crate) fn begun(t: f64, h: f64) -> Self {
+        Self {
+            status: StepStatus::Solved,
+            t,
+            h,
+            residual: 0.0,
+            energy: EnergyBalance::default(),
+            counts: Counts::default(),
+            newton: 1,
+            drift: Drift::default(),
+            timings: Timings::default(),
+        }
+    }
+}
+
 /// What a contact of the last step did.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactReport {
@@ -207,6 +226,19 @@ impl ContactReport {
     }
 }
 
+/// How bodies that overlapped at the start were moved apart.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Settled {
+    /// Pairs of bodies that overlapped.
+    pub pairs: usize,
+    /// How deep at most, m.
+    pub depth: f64,
+    /// How often bodies were moved; 0 where none overlapped.
+    pub rounds: u32,
+    /// The farthest that a mass centre was moved, m.
+    pub moved: f64,
+}
+
 /// What a run came to.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RunReport {
@@ -224,6 +256,10 @@ pub struct RunReport {
     pub imbalance: f64,
     /// The deepest penetration, m.
     pub penetration: f64,
+    /// Steps with [deep](Counts::deep) contacts.
+    pub deep: u64,
+    /// The time after the first of them, s.
+    pub first_deep: Option<f64>,
     /// The time at the end, s.
     pub t: f64,
     /// Whether the observer stopped it before the end.
@@ -242,6 +278,10 @@ impl RunReport {
         if !step.status.is_solved() {
             self.unsolved += 1;
             self.first_unsolved.get_or_insert(step.t);
+        }
+        if step.counts.deep > 0 {
+            self.deep += 1;
+            self.first_deep.get_or_insert(step.t);
         }
         // A maximum that a NaN is not lost in.
         let worse = |old: f64, new: f64| if new > old || new.is_nan() { new } else { old };

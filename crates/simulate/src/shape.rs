@@ -1,12 +1,14 @@
 //! Shapes of bodies.
 
+use std::sync::Arc;
+
 use nonsmooth_scenes::vec3::{Vec3, norm};
 use nonsmooth_scenes::{MassProperties, Polyhedron, Rotation, SceneError};
 
-use crate::SimulateError;
 use crate::error::require;
+use crate::{Mesh, SimulateError};
 
-/// A convex solid in a frame of its own.
+/// A solid in a frame of its own, or a surface; all but surfaces are convex.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// A ball about the origin.
@@ -30,6 +32,22 @@ pub enum Shape {
     Plane,
     /// A convex polyhedron, where its vertices are.
     Polyhedron(Polyhedron),
+    /// All points within `radius` of the third axis and not farther than `half_length` from the origin along it.
+    Cylinder {
+        /// Half the length, m.
+        half_length: f64,
+        /// Radius, m.
+        radius: f64,
+    },
+    /// The cone about the third axis with its base at `−half_length` and its point at `half_length`.
+    Cone {
+        /// Half the height, m.
+        half_length: f64,
+        /// Radius of the base, m.
+        radius: f64,
+    },
+    /// A surface of triangles.
+    Mesh(Arc<Mesh>),
 }
 
 impl Shape {
@@ -41,6 +59,9 @@ impl Shape {
             Shape::Capsule { .. } => "capsule",
             Shape::Plane => "plane",
             Shape::Polyhedron(_) => "polyhedron",
+            Shape::Cylinder { .. } => "cylinder",
+            Shape::Cone { .. } => "cone",
+            Shape::Mesh(_) => "mesh",
         }
     }
 
@@ -52,12 +73,16 @@ impl Shape {
             Shape::Capsule { half_length, radius } => half_length + radius,
             Shape::Plane => f64::INFINITY,
             Shape::Polyhedron(p) => p.radius_about([0.0; 3]),
+            Shape::Cylinder { half_length, radius } | Shape::Cone { half_length, radius } => {
+                half_length.hypot(*radius)
+            }
+            Shape::Mesh(mesh) => mesh.vertices().iter().map(|&v| norm(v)).fold(0.0, f64::max),
         }
     }
 
     /// Mass, mass centre and inertia for a density in kg/m³.
     ///
-    /// Errors: a length or density that is not positive; a plane, which has no mass.
+    /// Errors: a length or density that is not positive; a plane, which has no mass; those of [`Mesh::mass_properties`].
     pub fn mass_properties(&self, density: f64) -> Result<MassProperties, SimulateError> {
         use nonsmooth_scenes::Shape as Solid;
         Ok(match self {
@@ -68,6 +93,24 @@ impl Shape {
             Shape::Polyhedron(p) => Solid::Polyhedron(p.clone()).mass_properties(density)?,
             Shape::Plane => {
                 return Err(SimulateError::value("shape", "a solid with a mass", "a plane"));
+            }
+            Shape::Mesh(mesh) => mesh.mass_properties(density)?,
+            Shape::Cylinder { half_length: l, radius: r }
+            | Shape::Cone { half_length: l, radius: r } => {
+                for (key, x) in [("half_length", *l), ("radius", *r), ("density", density)] {
+                    require(|| key.into(), x, x > 0.0, "a positive number")?;
+                }
+                let cylinder = density * std::f64::consts::PI * r * r * 2.0 * l;
+                // A cone of height 2 l has a third of the mass, its mass centre l/2 below the middle, and J = m (3/10 r²; 3/20 r² + 3/80 (2 l)²).
+                let (mass, centre, axial, across) = match self {
+                    Shape::Cylinder { .. } => {
+                        (cylinder, 0.0, 0.5 * r * r, r * r / 4.0 + l * l / 3.0)
+                    }
+                    _ => (cylinder / 3.0, -0.5 * l, 0.3 * r * r, 0.15 * (r * r + l * l)),
+                };
+                let [axial, across] = [axial, across].map(|x| mass * x);
+                let inertia = [[across, 0.0, 0.0], [0.0, across, 0.0], [0.0, 0.0, axial]];
+                MassProperties { mass, centre: [0.0, 0.0, centre], inertia }
             }
             Shape::Capsule { half_length: l, radius: r } => {
                 for (key, x) in [("half_length", *l), ("radius", *r), ("density", density)] {
@@ -90,15 +133,23 @@ impl Shape {
         let lengths: &[(&str, f64)] = match self {
             Shape::Sphere { radius } => &[("radius", *radius)],
             Shape::Box { half: [a, b, c] } => &[("half", *a), ("half", *b), ("half", *c)],
-            Shape::Capsule { half_length, radius } => {
+            Shape::Capsule { half_length, radius }
+            | Shape::Cylinder { half_length, radius }
+            | Shape::Cone { half_length, radius } => {
                 &[("half_length", *half_length), ("radius", *radius)]
             }
-            Shape::Plane | Shape::Polyhedron(_) => &[],
+            Shape::Plane | Shape::Polyhedron(_) | Shape::Mesh(_) => &[],
         };
         for (name, x) in lengths {
             require(|| format!("{key}.{name}"), *x, *x > 0.0, "a positive number")?;
         }
         Ok(())
+    }
+}
+
+impl From<Mesh> for Shape {
+    fn from(mesh: Mesh) -> Self {
+        Shape::Mesh(Arc::new(mesh))
     }
 }
 

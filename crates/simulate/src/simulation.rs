@@ -1,13 +1,13 @@
 //! A world in motion.
 
 use nonsmooth_problem::FrictionLocal;
-use nonsmooth_scenes::vec3::{Vec3, add, cross, sub};
+use nonsmooth_scenes::vec3::{Vec3, add, cross, norm, sub};
 use nonsmooth_solve::Limits;
 use nonsmooth_solve::settings::SettingsMap;
 
 use crate::drive::{self, Driven, Observer};
 use crate::error::{Overlap, require};
-use crate::report::{ContactReport, RunReport, StepReport};
+use crate::report::{ContactReport, RunReport, Settled, StepReport};
 use crate::state::State;
 use crate::step::{Inner, Tools};
 use crate::world::oscillation;
@@ -81,8 +81,54 @@ impl Simulation {
     ///
     /// Errors: those of [`World::validate`]; settings of the scheme that are not possible; pairs of shapes that may meet and are not
     /// supported; bodies that overlap by more than 1e-6 of their size, all of them listed.
-    pub fn new(mut world: World, scheme: MoreauJean) -> Result<Self, SimulateError> {
-        let mut warnings = world.validate()?;
+    pub fn new(world: World, scheme: MoreauJean) -> Result<Self, SimulateError> {
+        let mut simulation = Self::placed(world, scheme)?;
+        match simulation.overlaps() {
+            pairs if pairs.is_empty() => Ok(simulation),
+            pairs => Err(SimulateError::Overlap(pairs)),
+        }
+    }
+
+    /// The same, of a world whose bodies may overlap: they are moved apart before it starts, by displacements that are small in the norm of the masses and
+    /// have nothing to do with velocities. `min ½‖Δ‖²_M` with `g + HᵀΔ ≥ 0` at all contacts is a frictionless contact problem with `W = Hᵀ M⁻¹ H`, `q = g`; it is stated and
+    /// solved anew until no overlap is left, at most [`SETTLING`](Self::SETTLING) times.
+    ///
+    /// Errors: those of [`new`](Self::new), with the overlaps that are left.
+    pub fn settled(world: World, scheme: MoreauJean) -> Result<(Self, Settled), SimulateError> {
+        let mut simulation = Self::placed(world, scheme)?;
+        let mut settled = Settled::default();
+        let before = simulation.state.position.clone();
+        let rest = simulation.world.at_rest();
+        let mut tools = Tools::new(&rest, &simulation.state)?;
+        loop {
+            let pairs = simulation.overlaps();
+            let depth = pairs.iter().map(|p| p.depth).fold(0.0, f64::max);
+            if settled.rounds == 0 {
+                (settled.pairs, settled.depth) = (pairs.len(), depth);
+            }
+            if pairs.is_empty() {
+                break;
+            }
+            if settled.rounds == Self::SETTLING {
+                return Err(SimulateError::Overlap(pairs));
+            }
+            settled.rounds += 1;
+            let Self { state, solver, settings, limits, .. } = &mut simulation;
+            tools.part((&rest, state), depth, &Inner { solver, settings, limits })?;
+        }
+        let far = |(p, q): (&Vec3, &Vec3)| norm(sub(*q, *p));
+        settled.moved = before.iter().zip(&simulation.state.position).map(far).fold(0.0, f64::max);
+        simulation.state.memory.axes.clear();
+        simulation.remember_joints();
+        Ok((simulation, settled))
+    }
+
+    /// How often [`settled`](Self::settled) moves bodies at most.
+    pub const SETTLING: u32 = 100;
+
+    /// A world at its start, wherever its bodies are.
+    fn placed(mut world: World, scheme: MoreauJean) -> Result<Self, SimulateError> {
+        let warnings = world.validate()?;
         scheme.validate()?;
         let mut state = State::of(&world);
         for (k, body) in world.bodies.iter().enumerate() {
@@ -91,22 +137,8 @@ impl Simulation {
                 (state.position[k], state.velocity[k]) = (add(body.position, x), v);
             }
         }
-        let mut tools = Tools::new(&world, &state)?;
-        let violations = tools.joints.violations(&world, &state).0;
-        tools.joints.finish(&mut state, &violations);
-        if let Some((found, all)) = tools.joints.redundant(&world, &state) {
-            warnings.push(format!(
-                "{found} of {all} equations of joints are redundant: the motion is unique, the impulses of these joints are not"
-            ));
-        }
-        let found = tools.overlaps(&world, &mut state, OVERLAP);
-        if !found.is_empty() {
-            let name = |k: u32| world.label(k as usize);
-            let pairs =
-                found.iter().map(|&(a, b, depth)| Overlap { a: name(a), b: name(b), depth });
-            return Err(SimulateError::Overlap(pairs.collect()));
-        }
-        Ok(Self {
+        let tools = Tools::new(&world, &state)?;
+        let mut simulation = Self {
             world,
             scheme,
             state,
@@ -116,7 +148,30 @@ impl Simulation {
             settings: SettingsMap::new(),
             limits: Limits { tolerance: 1e-10, max_iterations: 100_000, ..Limits::default() },
             warnings,
-        })
+        };
+        simulation.remember_joints();
+        let Self { world, state, tools, warnings, .. } = &mut simulation;
+        if let Some((found, all)) = tools.joints.redundant(world, state) {
+            warnings.push(format!(
+                "{found} of {all} equations of joints are redundant: the motion is unique, the impulses of these joints are not"
+            ));
+        }
+        Ok(simulation)
+    }
+
+    /// Notes where the joints are before the first step.
+    fn remember_joints(&mut self) {
+        let Self { world, state, tools, .. } = self;
+        let violations = tools.joints.violations(world, state).0;
+        tools.joints.finish(state, &violations);
+    }
+
+    /// Pairs of bodies that overlap by more than they may at the start.
+    fn overlaps(&mut self) -> Vec<Overlap> {
+        let Self { world, state, tools, .. } = self;
+        let found = tools.overlaps(world, state, OVERLAP);
+        let name = |k: u32| world.label(k as usize);
+        found.iter().map(|&(a, b, depth)| Overlap { a: name(a), b: name(b), depth }).collect()
     }
 
     /// With contact problems solved by the solver of this name, with these settings.

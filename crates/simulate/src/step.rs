@@ -35,13 +35,13 @@ use crate::detect::{Detector, Near, Place};
 use crate::islands::Islands;
 use crate::joints::Joints;
 use crate::moving::Moving;
-use crate::report::{ContactReport, Counts, Drift, EnergyBalance, StepReport, StepStatus, Timings};
+use crate::report::{ContactReport, EnergyBalance, StepReport, StepStatus, Timings};
 use crate::rotation::{Pose, apply_transposed, cayley, inverse, unit};
 use crate::state::{Remembered, State};
 use crate::world::oscillation;
 use crate::{
-    Activation, BodyId, Force, Geometry, Impact, MoreauJean, Motion, SimulateError, Stabilisation,
-    World, Wrenches,
+    Activation, BodyId, Force, Geometry, Gyroscopic, Impact, MoreauJean, Motion, SimulateError,
+    Stabilisation, World, Wrenches,
 };
 
 /// Six components of a body for each direction of a contact; the fourth place is for the processor.
@@ -198,6 +198,51 @@ impl Tools {
         found
     }
 
+    /// Moves bodies of a world [at rest](World::at_rest) apart that overlap: the smallest displacement in the norm of the masses after which no gap is
+    /// negative, to first order, is the velocity of a step of length 1 whose frictionless contacts have the gaps to close. Bodies are looked for within `depth`, m, of
+    /// each other.
+    pub fn part(
+        &mut self,
+        (world, state): (&World, &mut State),
+        depth: f64,
+        inner: &Inner,
+    ) -> Result<(), SimulateError> {
+        const H: f64 = 1.0;
+        let scheme = MoreauJean {
+            theta: 1.0,
+            gyroscopic: Gyroscopic::Off,
+            geometry: Geometry::Frozen,
+            activation: Activation::Gap,
+            ..MoreauJean::default()
+        };
+        let zero = vec![[0.0; 3]; world.bodies.len()];
+        let mut rest = State { velocity: zero.clone(), spin: zero, ..state.clone() };
+        self.start(&scheme, world, &rest, &mut [], H);
+        self.margins.iter_mut().for_each(|m| *m += depth);
+        self.detector.detect(world, &mut rest, &self.margins, &mut self.near);
+        self.contacts(&scheme, world, &rest, H);
+        for (near, &row) in self.near.iter().zip(&self.row_of) {
+            let row = &mut self.rows[row as usize];
+            (row.mu, row.shift, row.r) = (0.0, [near.place.gap / H, 0.0, 0.0], [0.0; 3]);
+        }
+        let mut first = 0;
+        for k in 0..self.islands.ends.len() {
+            let end = self.islands.ends[k];
+            if self.slots.len() == k {
+                self.slots.push(Slot::new(inner)?);
+            }
+            let span = self.span(first, end);
+            self.island((&scheme, world), span, k, inner, H)?;
+            first = end;
+        }
+        self.commit(&scheme, world, &mut rest, H, &mut StepReport::begun(state.t, H));
+        let places = rest.position.iter().flatten().chain(rest.rotation.iter().flatten());
+        if places.map(|x| 0.0 * x).sum::<f64>() == 0.0 {
+            (state.position, state.rotation) = (rest.position, rest.rotation);
+        }
+        Ok(())
+    }
+
     /// Everything up to the velocities after the step; the state is as before but for the axes of its memory.
     pub fn attempt(
         &mut self,
@@ -210,17 +255,7 @@ impl Tools {
         let begun = Instant::now();
         let mut timings = Timings::default();
         let finite = self.start(scheme, world, state, forces, h);
-        let mut report = StepReport {
-            status: StepStatus::Solved,
-            t: state.t,
-            h,
-            residual: 0.0,
-            energy: EnergyBalance::default(),
-            counts: Counts::default(),
-            newton: 1,
-            drift: Drift::default(),
-            timings,
-        };
+        let mut report = StepReport::begun(state.t, h);
         if !finite {
             report.status = StepStatus::NotFinite;
             report.timings.total = begun.elapsed().as_secs_f64();
@@ -444,16 +479,19 @@ impl Tools {
                 continue;
             }
             self.row_of.push(self.rows.len() as u32);
+            let at_middle = near.witness.place(&a.middle, &b.middle, n);
             // A body that nothing moves has no momentum to keep: the arm ends on the surface of the other one. Else both arms end midway.
             let on_surface = |place: Place| {
                 let half = 0.5 * (f64::from(u8::from(b.free)) - f64::from(u8::from(a.free)));
                 Place { point: add(place.point, scale(half * place.gap, place.normal)), ..place }
             };
-            let place = on_surface(near.witness.place(&a.middle, &b.middle, n));
+            let at_middle =
+                Place { normal: if near.deep { n } else { at_middle.normal }, ..at_middle };
+            let place = on_surface(at_middle);
             let frame = frame(place.normal, axis);
             let pushed = known.is_some_and(|m| m.impulse != [0.0; 3]);
             let persists = persistent && (near.law.e == 0.0 || approach >= -rest);
-            let later = persists && extrapolated;
+            let later = persists && extrapolated && !near.deep;
             let (place_end, frame_end) = match later {
                 true => {
                     let place = on_surface(near.witness.place(&a.end, &b.end, place.normal));
@@ -600,6 +638,11 @@ impl Tools {
             if let Some(k) = best.1 {
                 self.taken[k] = true;
                 *known = Some(memory[k]);
+            }
+        }
+        for (near, known) in self.near.iter_mut().zip(&self.known).filter(|n| n.0.deep) {
+            if let Some(m) = known.filter(|m| m.key == near.key) {
+                near.place.normal = m.normal;
             }
         }
     }
@@ -980,6 +1023,7 @@ impl Tools {
     fn count(&self, report: &mut StepReport) {
         let counts = &mut report.counts;
         counts.near = self.near.len();
+        counts.deep = self.near.iter().filter(|n| n.deep).count();
         counts.active = self.rows.len();
         counts.islands = self.islands.ends.len();
         counts.rows = self.joints.rows.len();

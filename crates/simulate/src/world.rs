@@ -280,6 +280,19 @@ impl World {
         &self.materials
     }
 
+    /// The same bodies and joints without anything that moves them: for what concerns positions alone.
+    pub(crate) fn at_rest(&self) -> Self {
+        let mut rest = Self { gravity: [0.0; 3], ..self.clone() };
+        for body in &mut rest.bodies {
+            (body.force, body.torque) = ([0.0; 3], [0.0; 3]);
+            if !body.is_free() {
+                body.motion = Motion::Fixed;
+            }
+        }
+        rest.joints.iter_mut().for_each(|joint| joint.drives.clear());
+        rest
+    }
+
     /// Gives two materials, which may be the same, a law of their own.
     pub fn pair(&mut self, a: usize, b: usize, law: Law) {
         self.pairs.insert((a.min(b), a.max(b)), law);

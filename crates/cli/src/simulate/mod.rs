@@ -57,6 +57,9 @@ pub struct Args {
     /// Write the contact problem of every so many steps, too
     #[arg(long, value_name = "STEPS", requires = "dump_fclib")]
     dump_every: Option<u64>,
+    /// Move bodies apart that overlap at the start, by displacements that are small in the norm of the masses, in place of refusing them
+    #[arg(long)]
+    settle: bool,
     /// Go on from the end of a trajectory of the same scene, and append to it unless --out names another file
     #[arg(long, value_name = "FILE.h5")]
     resume: Option<PathBuf>,
@@ -125,7 +128,10 @@ fn scene(args: &Args) -> Result<SceneFile, String> {
         _ => {
             let text = std::fs::read_to_string(path)
                 .map_err(|e| format!("{name}: expected a readable file, found: {e}"))?;
-            SceneFile::parse(&text, &changes).map_err(|e| format!("{name}: {e}"))?
+            let wrong = |e| format!("{name}: {e}");
+            let mut scene = SceneFile::parse(&text, &changes).map_err(wrong)?;
+            scene.load_meshes(path.parent().unwrap_or(Path::new(""))).map_err(wrong)?;
+            scene
         }
     };
     if let Some(end) = args.end {
@@ -176,7 +182,12 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         cancel: Some(cancel.clone()),
         ..Limits::default()
     };
-    let mut simulation = scene.build().map_err(wrong)?.with_limits(limits);
+    let (simulation, settled) = match args.settle {
+        true => scene.build_settled().map(|(made, settled)| (made, Some(settled))),
+        false => scene.build().map(|made| (made, None)),
+    }
+    .map_err(wrong)?;
+    let mut simulation = simulation.with_limits(limits);
     simulation.warnings().iter().for_each(|w| output::remark(&format!("warning: {w}\n")));
     let frames = out.is_some() || html.is_some() || vtk.is_some();
     let mut recorder = Recorder::new(&scene, &simulation, frames);
@@ -246,6 +257,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         simulation: &simulation,
         recorder: &recorder,
         report: &report,
+        settled,
         seconds,
         written: &written,
     };

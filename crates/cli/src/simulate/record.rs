@@ -247,6 +247,16 @@ fn drawn(world: &World) -> Vec<Drawn> {
         Shape::Polyhedron(p) => {
             Form::Polyhedron { vertices: p.vertices().to_vec(), faces: p.faces().to_vec() }
         }
+        Shape::Cylinder { half_length, radius } => {
+            Form::Cylinder { half_length: *half_length, radius: *radius }
+        }
+        Shape::Cone { half_length, radius } => {
+            Form::Cone { half_length: *half_length, radius: *radius }
+        }
+        Shape::Mesh(mesh) => {
+            let faces = mesh.triangles().iter().map(|t| t.map(|k| k as usize).to_vec()).collect();
+            Form::Mesh { vertices: mesh.vertices().to_vec(), faces }
+        }
     };
     let placed = |part: &nonsmooth_simulate::Part| Placed {
         form: form(&part.shape),

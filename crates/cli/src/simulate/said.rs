@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use nonsmooth_simulate::{RunReport, SceneFile, Simulation};
+use nonsmooth_simulate::{RunReport, SceneFile, Settled, Simulation};
 use serde_json::{Value, json};
 
 use super::record::Recorder;
@@ -16,6 +16,7 @@ pub struct Run<'a> {
     pub simulation: &'a Simulation,
     pub recorder: &'a Recorder,
     pub report: &'a RunReport,
+    pub settled: Option<Settled>,
     pub seconds: f64,
     pub written: &'a [PathBuf],
 }
@@ -38,6 +39,16 @@ impl Run<'_> {
             scene.time.h, scene.integrator.theta, scene.solver.name, scene.solver.tol
         );
         row(&mut text, "scheme", scheme);
+        if let Some(s) = self.settled.filter(|s| s.rounds > 0) {
+            let says = format!(
+                "{} pairs overlapped by up to {} m; moved apart in {} rounds, by up to {} m",
+                s.pairs,
+                number(s.depth),
+                s.rounds,
+                number(s.moved)
+            );
+            row(&mut text, "settled", says);
+        }
         let steps = &self.recorder.trajectory.steps[self.recorder.earlier..];
         if let Some(last) = steps.last() {
             let most = steps.iter().map(|s| s.active).max().unwrap_or(0);
@@ -88,11 +99,20 @@ impl Run<'_> {
         } else {
             String::new()
         };
+        let deep = match report.first_deep {
+            Some(t) => format!(
+                ", but bodies overlap by more than a tenth of their size in {} of them, first at t = {t} s",
+                report.deep
+            ),
+            None => String::new(),
+        };
         let (steps, unsolved) = (report.steps, report.unsolved);
         match report.first_unsolved {
-            None => format!("every one of {steps} steps solved{stopped}"),
+            None => format!("every one of {steps} steps solved{deep}{stopped}"),
             Some(t) => {
-                format!("NOT SOLVED: {unsolved} of {steps} steps, the first at t = {t} s{stopped}")
+                format!(
+                    "NOT SOLVED: {unsolved} of {steps} steps, the first at t = {t} s{deep}{stopped}"
+                )
             }
         }
     }
@@ -114,6 +134,10 @@ impl Run<'_> {
             "residual": report.residual,
             "imbalance": report.imbalance,
             "penetration": report.penetration,
+            "deep": report.deep,
+            "settled": self.settled.map(|s| json!({
+                "pairs": s.pairs, "depth": s.depth, "rounds": s.rounds, "moved": s.moved,
+            })),
             "seconds": self.seconds,
             "kinetic": last.map(|s| s.energy.kinetic),
             "potential": last.map(|s| s.energy.potential),

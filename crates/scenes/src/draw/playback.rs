@@ -100,6 +100,27 @@ pub enum Form {
         /// By indices of vertices, counter-clockwise seen from outside.
         faces: Vec<Vec<usize>>,
     },
+    /// All points within `radius` of the third axis and not farther than `half_length` from the origin along it.
+    Cylinder {
+        /// Half the length, m.
+        half_length: f64,
+        /// m.
+        radius: f64,
+    },
+    /// The cone about the third axis with its base at `−half_length` and its point at `half_length`.
+    Cone {
+        /// Half the height, m.
+        half_length: f64,
+        /// Of the base, m.
+        radius: f64,
+    },
+    /// Any surface; what is behind a face may be seen.
+    Mesh {
+        /// m.
+        vertices: Vec<Vec3>,
+        /// By indices of vertices, counter-clockwise seen from outside.
+        faces: Vec<Vec<usize>>,
+    },
 }
 
 /// A frame.
@@ -132,7 +153,10 @@ impl Form {
             Form::Box { half } => norm(*half),
             Form::Capsule { half_length, radius } => half_length + radius,
             Form::Plane => 0.0,
-            Form::Polyhedron { vertices, .. } => {
+            Form::Cylinder { half_length, radius } | Form::Cone { half_length, radius } => {
+                half_length.hypot(*radius)
+            }
+            Form::Polyhedron { vertices, .. } | Form::Mesh { vertices, .. } => {
                 vertices.iter().map(|&v| norm(v)).fold(0.0, f64::max)
             }
         }
@@ -143,12 +167,16 @@ impl Form {
         match self {
             Form::Sphere { radius } => positive(&at("radius"), *radius),
             Form::Box { half } => half.iter().try_for_each(|x| positive(&at("half"), *x)),
+            Form::Cylinder { half_length, radius } | Form::Cone { half_length, radius } => {
+                positive(&at("radius"), *radius)?;
+                positive(&at("half_length"), *half_length)
+            }
             Form::Capsule { half_length, radius } => {
                 positive(&at("radius"), *radius)?;
                 require(&at("half_length"), *half_length, *half_length >= 0.0, "no negative number")
             }
             Form::Plane => Ok(()),
-            Form::Polyhedron { vertices, faces } => {
+            Form::Polyhedron { vertices, faces } | Form::Mesh { vertices, faces } => {
                 Part::Convex { vertices: vertices.clone(), faces: faces.clone() }.validate(key)
             }
         }
@@ -351,8 +379,13 @@ impl Playback {
                     vec![Part::Ball { radius: *radius }]
                 }
                 _ => {
-                    let convex = |s: Surface| Part::Convex { vertices: s.vertices, faces: s.faces };
-                    solid.surfaces(1.0).into_iter().map(convex).collect()
+                    // A painter needs convex parts: of a mesh these are its faces.
+                    let parts = solid.parts.iter().zip(solid.surfaces(1.0));
+                    let convex = |(part, s): (&Placed, Surface)| match part.form {
+                        Form::Mesh { .. } => s.faces.iter().map(|f| face(&s.vertices, f)).collect(),
+                        _ => vec![Part::Convex { vertices: s.vertices, faces: s.faces }],
+                    };
+                    parts.flat_map(convex).collect()
                 }
             };
             numbers.push((!body.fixed && !parts.is_empty()).then_some(bodies.len()));
@@ -381,6 +414,12 @@ impl Playback {
         picture.validate()?;
         Ok(picture)
     }
+}
+
+/// One face of a surface.
+fn face(vertices: &[Vec3], corners: &[usize]) -> Part {
+    let vertices = corners.iter().map(|&k| vertices[k]).collect();
+    Part::Convex { vertices, faces: vec![(0..corners.len()).collect()] }
 }
 
 /// What the script reads. Tables are base64 of little-endian numbers.

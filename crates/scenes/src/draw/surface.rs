@@ -60,11 +60,36 @@ impl Form {
                 let vertices = vec![[-s, -s, 0.0], [s, -s, 0.0], [s, s, 0.0], [-s, s, 0.0]];
                 Surface { vertices, faces: vec![vec![0, 1, 2, 3]], smooth: false }
             }
-            Form::Polyhedron { vertices, faces } => {
+            Form::Cylinder { half_length, radius } => turned(*half_length, *radius, *radius),
+            Form::Cone { half_length, radius } => turned(*half_length, *radius, 0.0),
+            Form::Polyhedron { vertices, faces } | Form::Mesh { vertices, faces } => {
                 Surface { vertices: vertices.clone(), faces: faces.clone(), smooth: false }
             }
         }
     }
+}
+
+/// A cylinder, or a cone where the upper radius is zero, with flat ends.
+fn turned(half_length: f64, lower: f64, upper: f64) -> Surface {
+    let ring = |z: f64, radius: f64| {
+        (0..MERIDIANS).map(move |k| {
+            let (s, c) = (2.0 * PI * k as f64 / MERIDIANS as f64).sin_cos();
+            [radius * c, radius * s, z]
+        })
+    };
+    let mut vertices: Vec<Vec3> = ring(-half_length, lower).collect();
+    let mut faces = vec![(0..MERIDIANS).rev().collect::<Vec<_>>()];
+    let next = |k: usize| (k + 1) % MERIDIANS;
+    if upper > 0.0 {
+        vertices.extend(ring(half_length, upper));
+        faces.push((MERIDIANS..2 * MERIDIANS).collect());
+        let side = |k: usize| vec![k, next(k), MERIDIANS + next(k), MERIDIANS + k];
+        faces.extend((0..MERIDIANS).map(side));
+    } else {
+        vertices.push([0.0, 0.0, half_length]);
+        faces.extend((0..MERIDIANS).map(|k| vec![k, next(k), MERIDIANS]));
+    }
+    Surface { vertices, faces, smooth: false }
 }
 
 /// A ball whose halves are `2 half_length` apart along the third axis.
@@ -133,6 +158,8 @@ mod tests {
                 4.0 / 3.0 * PI * r.powi(3) + 2.0 * l * PI * r * r,
                 0.08,
             ),
+            (Form::Cylinder { half_length: l, radius: r }, 2.0 * l * PI * r * r, 0.08),
+            (Form::Cone { half_length: l, radius: r }, 2.0 * l * PI * r * r / 3.0, 0.08),
         ];
         for (form, expected, share) in forms {
             let part = super::super::playback::Placed {
@@ -156,7 +183,9 @@ mod tests {
             }
             let sum = surface.vertices.iter().fold([0.0; 3], |s, v| add(s, *v));
             let middle = scale(1.0 / surface.vertices.len() as f64, sum);
-            assert!(dot(sub(middle, [1.0, -2.0, 0.5]), [1.0; 3]).abs() < 1e-12);
+            let part = &drawn.parts[0];
+            let symmetric = !matches!(part.form, Form::Cone { .. });
+            assert!(!symmetric || dot(sub(middle, part.position), [1.0; 3]).abs() < 1e-12);
         }
     }
 }

@@ -14,7 +14,7 @@ pub(crate) struct Aabb {
 
 impl Aabb {
     #[inline]
-    fn meets(&self, other: &Self) -> bool {
+    pub fn meets(&self, other: &Self) -> bool {
         (0..3).all(|k| self.low[k] <= other.high[k] && other.low[k] <= self.high[k])
     }
 

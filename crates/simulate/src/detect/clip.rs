@@ -95,7 +95,7 @@ impl Clip {
         let by_a = best_a >= best_b - FIRST * size;
         let best = best_a.max(best_b);
         let (reference, incident, face) = if by_a { (a, b, face_a) } else { (b, a, face_b) };
-        let other = facing(incident, reference.1.normals[face]);
+        let other = incident.1.facing(reference.1.normals[face]);
         // Where two faces are parallel no edges can be better by more than rounding.
         let parallel = {
             let (n, m) = (reference.1.normals[face], incident.1.normals[other]);
@@ -123,6 +123,19 @@ impl Clip {
         }
         self.faces(reference, incident, (face, other), by_a, prediction, found);
         Some(axis)
+    }
+
+    /// All points where b is nearer than `prediction` to a face of a, along the normal of that.
+    pub fn on_face(
+        &mut self,
+        a: Side,
+        b: Side,
+        face: usize,
+        prediction: f64,
+        found: impl FnMut([Feature; 2], Witness),
+    ) {
+        let other = b.1.facing(a.1.normals[face]);
+        self.faces(a, b, (face, other), true, prediction, found);
     }
 
     fn cross(
@@ -176,10 +189,14 @@ impl Clip {
             incident: Feature::Vertex(loops[k]),
             line: Line::Incident(incident.0.face_edges[other][k]),
         }));
-        for k in 0..sides.len() {
-            let [p, q] = [k, (k + 1) % sides.len()].map(|i| posed.vertices[sides[i] as usize]);
+        // The side of a triangle without thickness is a line, which ends at its corners, too.
+        let count = sides.len();
+        let cuts = if count == 2 { 4 } else { count };
+        for k in 0..cuts {
+            let [p, q] = [k, k + 1].map(|i| posed.vertices[sides[i % count] as usize]);
             let edge = sub(q, p);
-            let outwards = scale(1.0 / norm(edge), cross(edge, n));
+            let across = if k < count { cross(edge, n) } else { scale(-1.0, edge) };
+            let outwards = scale(1.0 / norm(edge), across);
             let beyond = |x: Vec3| dot(outwards, sub(x, p));
             next.clear();
             for i in 0..polygon.len() {
@@ -193,16 +210,22 @@ impl Clip {
                     let point = add(here.point, scale(d / (d - e), sub(there.point, here.point)));
                     // Going out the polygon follows the side, coming in its own line.
                     let line = if inside { Line::Side(k) } else { here.line };
-                    let (of_reference, of_incident) = match here.line {
-                        Line::Incident(edge) => {
+                    let (reference, incident) = match here.line {
+                        Line::Incident(edge) if k < count => {
                             (Feature::Edge(hull.face_edges[face][k]), Feature::Edge(edge))
                         }
+                        Line::Incident(edge) => {
+                            (Feature::Vertex(sides[k - count]), Feature::Edge(edge))
+                        }
                         Line::Side(j) => {
-                            let corner = if (j + 1) % sides.len() == k { k } else { j };
+                            let corner = match j.max(k) {
+                                end if end >= count => end - count,
+                                _ if (j + 1) % count == k => k,
+                                _ => j,
+                            };
                             (Feature::Vertex(sides[corner]), Feature::Face(other as u32))
                         }
                     };
-                    let (reference, incident) = (of_reference, of_incident);
                     next.push(Corner { point, reference, incident, line });
                 }
             }
@@ -290,18 +313,6 @@ fn deepest(a: Side, b: Side) -> (usize, f64) {
     best
 }
 
-/// The face that looks against n most.
-fn facing(side: Side, n: Vec3) -> usize {
-    let mut best = (0, f64::INFINITY);
-    for (f, &m) in side.1.normals.iter().enumerate() {
-        let now = dot(n, m);
-        if now < best.1 {
-            best = (f, now);
-        }
-    }
-    best.0
-}
-
 struct Edges {
     i: u32,
     j: u32,
@@ -339,7 +350,8 @@ fn edges(a: Side, b: Side, last: Option<Axis>, size: f64) -> Option<Edges> {
                 continue;
             }
             let mut normal = scale(1.0 / length, product);
-            if dot(normal, sub(p, a.1.centre)) < 0.0 {
+            // Outwards: between the normals of the two faces.
+            if dot(normal, add(n0, n1)) < 0.0 {
                 normal = scale(-1.0, normal);
             }
             let separation = dot(normal, sub(q, p));

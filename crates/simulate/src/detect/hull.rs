@@ -172,6 +172,30 @@ pub(crate) struct PosedHull {
 }
 
 impl PosedHull {
+    /// The face that looks against n most.
+    pub fn facing(&self, n: Vec3) -> usize {
+        let mut best = (0, f64::INFINITY);
+        for (f, &m) in self.normals.iter().enumerate() {
+            let now = dot(n, m);
+            if now < best.1 {
+                best = (f, now);
+            }
+        }
+        best.0
+    }
+
+    /// A vertex farthest along d.
+    pub fn support(&self, d: Vec3) -> Vec3 {
+        let mut best = (f64::NEG_INFINITY, [0.0; 3]);
+        for &v in &self.vertices {
+            let now = dot(d, v);
+            if now > best.0 {
+                best = (now, v);
+            }
+        }
+        best.1
+    }
+
     pub fn set(&mut self, hull: &Hull, pose: &Pose) {
         self.vertices.clear();
         self.vertices.extend(hull.vertices.iter().map(|&v| pose.point(v)));

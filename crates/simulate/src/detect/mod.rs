@@ -6,15 +6,23 @@
 //! | sphere with box, polyhedron | nearest vertex, edge or face |
 //! | box, polyhedron with plane | all vertices |
 //! | box, polyhedron with each other | separating axes with hysteresis, whole faces clipped |
+//! | cylinder, cone with plane | the lowest point of each rim; flat ends stand on eight points of the body, too |
+//! | cylinder, cone with sphere | closed form in the half plane through the axis |
+//! | capsule with box, polyhedron; cylinder, cone with all that is convex | [`convex`]: distance, then features |
+//! | mesh, heightfield with all that is convex; mesh with plane | [`surface`]: triangles in a tree of boxes, filtered at inner edges |
 //!
 //! What is drawn is what touches: no margin, no skin. A point is reported where the gap is at most the prediction of the pair, so that a step
 //! knows what it may run into. Every list is sorted by key: the same bodies give the same contacts in the same order.
 
 mod broad;
 mod clip;
+mod convex;
+mod gjk;
 mod hull;
 mod rounds;
 mod segments;
+mod surface;
+mod turned;
 mod witness;
 
 use nonsmooth_scenes::Polyhedron;
@@ -25,8 +33,11 @@ use crate::state::{Axis, State};
 use crate::{BodyId, Law, Shape, SimulateError, World};
 use broad::{Aabb, Broad};
 use clip::Clip;
+use convex::{Extent, Flat, Side};
 use hull::{Hull, PosedHull};
 use segments::Segment;
+use surface::{Scratch, Surface};
+use turned::Turned;
 use witness::Feature;
 pub use witness::Key;
 pub(crate) use witness::{Place, Witness};
@@ -42,7 +53,12 @@ pub(crate) struct Near {
     pub size: f64,
     pub place: Place,
     pub witness: Witness,
+    /// Whether the bodies overlap so far that the normal is that of the step before, if there was one.
+    pub deep: bool,
 }
+
+/// Bodies that overlap by more than this share of the smaller one leave no normal of their own.
+const DEEP: f64 = 0.1;
 
 /// What a shape is made of, in the frame of its body.
 #[derive(Debug, Clone)]
@@ -50,6 +66,8 @@ enum Solid {
     Rounded(Segment, f64),
     Plane(Pose),
     Hull(Box<Hull>),
+    Turned(Box<Turned>),
+    Surface(Box<Surface>),
 }
 
 #[derive(Debug, Clone)]
@@ -60,6 +78,11 @@ struct Solids {
     size: f64,
 }
 
+/// Points of a surface nearer to each other than this share of the size are one,
+const SAME: f64 = 1e-6;
+/// where the cosine between their normals is larger than this.
+const ALIKE: f64 = 0.9999;
+
 /// Broad and narrow phase, with the memory that they use.
 #[derive(Debug, Clone)]
 pub(crate) struct Detector {
@@ -68,13 +91,17 @@ pub(crate) struct Detector {
     planes: Vec<u32>,
     finite: Vec<u32>,
     poses: Vec<Pose>,
+    /// Vertices and faces where they are.
     hulls: Vec<PosedHull>,
     boxes: Vec<Aabb>,
+    /// For each shape the place of its box.
+    box_of: Vec<u32>,
     box_moves: Vec<bool>,
     broad: Broad,
     pairs: Vec<(u32, u32)>,
     axes: Vec<((u32, u32), Axis)>,
     clip: Clip,
+    scratch: Scratch,
 }
 
 impl Detector {
@@ -100,27 +127,35 @@ impl Detector {
                     Shape::Plane => Solid::Plane(pose),
                     Shape::Box { half } => hull(&Polyhedron::cuboid(*half)?),
                     Shape::Polyhedron(p) => hull(p),
+                    Shape::Cylinder { half_length, radius } => {
+                        let radii = [*radius, *radius];
+                        Solid::Turned(Box::new(Turned::new(&pose, *half_length, radii)))
+                    }
+                    Shape::Cone { half_length, radius } => {
+                        let radii = [*radius, 0.0];
+                        Solid::Turned(Box::new(Turned::new(&pose, *half_length, radii)))
+                    }
+                    Shape::Mesh(mesh) => Solid::Surface(Box::new(Surface::new(mesh, &pose))),
                 };
                 let size = match &solid {
                     Solid::Hull(hull) => hull.size,
+                    Solid::Surface(surface) => surface.size,
                     _ => part.shape.radius(),
                 };
                 solids.push(Solids { body: k as u32, material: part.material, solid, size });
                 names.push((k, s, part.shape.name()));
             }
         }
-        let capsule =
-            |k: usize| matches!(&solids[k].solid, Solid::Rounded(s, _) if s.d != [0.0; 3]);
-        let hull = |k: usize| matches!(&solids[k].solid, Solid::Hull(_));
-        let capsules: Vec<usize> = (0..solids.len()).filter(|&k| capsule(k)).collect();
-        for &i in &capsules {
-            let meets = |&j: &usize| {
-                let (p, q) = (solids[i].body, solids[j].body);
-                p != q && hull(j) && world.may_touch(BodyId(p), BodyId(q))
+        // Surfaces do not meet each other.
+        let surfaces: Vec<usize> =
+            (0..solids.len()).filter(|&k| matches!(solids[k].solid, Solid::Surface(_))).collect();
+        for (n, &i) in surfaces.iter().enumerate() {
+            let meets = |j: &usize| {
+                let (p, q) = (solids[i].body, solids[*j].body);
+                p != q && world.may_touch(BodyId(p), BodyId(q))
             };
-            if let Some(j) = (0..solids.len()).find(meets) {
+            if let Some(&j) = surfaces[n + 1..].iter().find(|j| meets(j)) {
                 let place = |k: usize| format!("{}.parts[{}]", world.label(names[k].0), names[k].1);
-                let (i, j) = (i.min(j), i.max(j));
                 let (first, second) = (names[i].2, names[j].2);
                 return Err(SimulateError::Pair { a: place(i), b: place(j), first, second });
             }
@@ -129,6 +164,8 @@ impl Detector {
         let is_plane = |k: &u32| matches!(solids[*k as usize].solid, Solid::Plane(_));
         let (planes, finite): (Vec<u32>, Vec<u32>) =
             (0..solids.len() as u32).partition(|k| is_plane(k));
+        let mut box_of = vec![0; solids.len()];
+        finite.iter().enumerate().for_each(|(place, &k)| box_of[k as usize] = place as u32);
         let box_moves = finite.iter().map(|&k| moves[solids[k as usize].body as usize]).collect();
         Ok(Self {
             hulls: vec![PosedHull::default(); solids.len()],
@@ -142,6 +179,8 @@ impl Detector {
             pairs: vec![],
             axes: vec![],
             clip: Clip::default(),
+            scratch: Scratch::default(),
+            box_of,
             solids,
         })
     }
@@ -198,6 +237,10 @@ impl Detector {
             let now = self.narrow(world, i, j, axis, prediction, out);
             self.axes.extend(now.map(|now| ((i, j), now)));
             out[first..].sort_unstable_by_key(|n| n.key);
+            let surface = |k: u32| matches!(self.solids[k as usize].solid, Solid::Surface(_));
+            if surface(i) || surface(j) {
+                merge(out, first);
+            }
         }
         self.pairs = pairs;
         std::mem::swap(&mut state.memory.axes, &mut self.axes);
@@ -221,11 +264,16 @@ impl Detector {
                     let by = |f: fn(f64, f64) -> f64| std::array::from_fn(|i| f(s.p[i], end[i]));
                     (by(f64::min), by(f64::max), margin + radius)
                 }
-                Solid::Hull(hull) => {
+                Solid::Hull(_) | Solid::Surface(_) => {
                     let posed = &mut self.hulls[k as usize];
                     let still = matches!(world.bodies[*body as usize].motion, crate::Motion::Fixed);
-                    if anew || !still {
-                        posed.set(hull, pose);
+                    match solid {
+                        Solid::Hull(hull) if anew || !still => posed.set(hull, pose),
+                        Solid::Surface(surface) if anew || !still => {
+                            posed.vertices.clear();
+                            posed.vertices.extend(surface.vertices.iter().map(|&v| pose.point(v)));
+                        }
+                        _ => {}
                     }
                     let by = |start: f64, f: fn(f64, f64) -> f64| {
                         posed
@@ -234,6 +282,16 @@ impl Detector {
                             .fold([start; 3], |s, v| std::array::from_fn(|i| f(s[i], v[i])))
                     };
                     (by(f64::INFINITY, f64::min), by(f64::NEG_INFINITY, f64::max), margin)
+                }
+                Solid::Turned(turned) => {
+                    let placed = turned.placed(pose);
+                    let reach = |i: usize, sign: f64| {
+                        let mut e = [0.0; 3];
+                        e[i] = sign;
+                        placed.support(e)[i]
+                    };
+                    let by = |sign: f64| std::array::from_fn(|i| reach(i, sign));
+                    (by(-1.0), by(1.0), margin)
                 }
                 Solid::Plane(_) => continue,
             };
@@ -269,7 +327,7 @@ impl Detector {
         prediction: f64,
         out: &mut Vec<Near>,
     ) -> Option<Axis> {
-        let Self { solids, poses, hulls, clip, .. } = self;
+        let Self { solids, poses, hulls, boxes, box_of, clip, scratch, .. } = self;
         let (s, t) = (&solids[i as usize], &solids[j as usize]);
         let (a, b) = (&poses[s.body as usize], &poses[t.body as usize]);
         let law = world.law_between(s.material, t.material);
@@ -284,7 +342,8 @@ impl Detector {
             let place = witness.place(a, b, fallback());
             if place.gap <= prediction {
                 let key = Key { shape_a: i, shape_b: j, feature_a: f.code(), feature_b: g.code() };
-                out.push(Near { key, a: s.body, b: t.body, law, size, place, witness });
+                let deep = place.gap < -DEEP * size;
+                out.push(Near { key, a: s.body, b: t.body, law, size, place, witness, deep });
             }
         };
         let center = |segment: &Segment, pose: &Pose| pose.point(segment.p);
@@ -313,16 +372,63 @@ impl Detector {
                 rounds::plane(false, &b.then(plane), b, points, 0.0, prediction, found);
                 None
             }
-            (Solid::Hull(hull), Solid::Rounded(q, r)) => {
+            (Solid::Hull(hull), Solid::Rounded(q, r)) if q.is_point() => {
                 let side = (&**hull, &hulls[i as usize], a);
                 let ball = (q.p, center(q, b), *r);
                 rounds::ball_and_hull(ball, side, true, prediction, found);
                 None
             }
-            (Solid::Rounded(q, r), Solid::Hull(hull)) => {
+            (Solid::Rounded(q, r), Solid::Hull(hull)) if q.is_point() => {
                 let side = (&**hull, &hulls[j as usize], b);
                 let ball = (q.p, center(q, a), *r);
                 rounds::ball_and_hull(ball, side, false, prediction, found);
+                None
+            }
+            (Solid::Turned(turned), Solid::Rounded(q, r)) if q.is_point() => {
+                let ball = (q.p, center(q, b), *r);
+                turned::ball(ball, (turned, &turned.placed(a)), true, found);
+                None
+            }
+            (Solid::Rounded(q, r), Solid::Turned(turned)) if q.is_point() => {
+                let ball = (q.p, center(q, a), *r);
+                turned::ball(ball, (turned, &turned.placed(b)), false, found);
+                None
+            }
+            (Solid::Plane(plane), Solid::Turned(_)) => {
+                let side = side(&t.solid, &hulls[j as usize], b);
+                let flat = half_space(a.then(plane), a);
+                side.iter().for_each(|s| convex::on_flat(&flat, true, s, prediction, &mut found));
+                None
+            }
+            (Solid::Turned(_), Solid::Plane(plane)) => {
+                let side = side(&s.solid, &hulls[i as usize], a);
+                let flat = half_space(b.then(plane), b);
+                side.iter().for_each(|s| convex::on_flat(&flat, false, s, prediction, &mut found));
+                None
+            }
+            (Solid::Plane(plane), Solid::Surface(surface)) => {
+                let points = knots(surface, &hulls[j as usize]);
+                rounds::plane(true, &a.then(plane), a, points, 0.0, prediction, found);
+                None
+            }
+            (Solid::Surface(surface), Solid::Plane(plane)) => {
+                let points = knots(surface, &hulls[i as usize]);
+                rounds::plane(false, &b.then(plane), b, points, 0.0, prediction, found);
+                None
+            }
+            (Solid::Surface(surface), other) => {
+                if let Some(other) = side(other, &hulls[j as usize], b) {
+                    let bounds = &boxes[box_of[j as usize] as usize];
+                    surface.collide((a, &other, bounds), prediction, (clip, scratch), found);
+                }
+                None
+            }
+            (other, Solid::Surface(surface)) => {
+                if let Some(other) = side(other, &hulls[i as usize], a) {
+                    let bounds = &boxes[box_of[i as usize] as usize];
+                    let swapped = |[f, g]: [Feature; 2], w: Witness| found([g, f], w.swapped());
+                    surface.collide((b, &other, bounds), prediction, (clip, scratch), swapped);
+                }
                 None
             }
             (Solid::Hull(p), Solid::Hull(q)) => {
@@ -331,8 +437,70 @@ impl Detector {
                 clip.collide(first, second, axis, prediction, &mut found)
             }
             (Solid::Plane(_), Solid::Plane(_)) => None,
+            (p, q) => {
+                let both = (side(p, &hulls[i as usize], a), side(q, &hulls[j as usize], b));
+                if let (Some(p), Some(q)) = both {
+                    convex::collide(&p, &q, prediction, found);
+                }
+                None
+            }
         }
     }
+}
+
+/// Points of a surface and another shape at the same place with the same normal become one, that of the least key.
+fn merge(out: &mut Vec<Near>, first: usize) {
+    let mut kept = first;
+    for k in first..out.len() {
+        let Near { key, place, size, .. } = out[k];
+        let same = |other: &Near| {
+            let far = nonsmooth_scenes::vec3::norm(sub(other.place.point, place.point));
+            other.key == key
+                || (far <= SAME * size
+                    && nonsmooth_scenes::vec3::dot(other.place.normal, place.normal) > ALIKE)
+        };
+        if !out[first..kept].iter().any(same) {
+            out[kept] = out[k];
+            kept += 1;
+        }
+    }
+    out.truncate(kept);
+}
+
+/// A convex solid that is neither a half space nor a surface, where it is.
+fn side<'a>(solid: &'a Solid, posed: &'a PosedHull, pose: &'a Pose) -> Option<Side<'a>> {
+    match solid {
+        Solid::Hull(hull) => Some(Side::Hull { hull, posed, pose }),
+        Solid::Turned(turned) => {
+            Some(Side::Turned { local: turned, world: turned.placed(pose), pose })
+        }
+        Solid::Rounded(local, radius) => {
+            let world = local.placed(pose);
+            Some(Side::Rod { local: *local, world, radius: *radius, pose })
+        }
+        Solid::Plane(_) | Solid::Surface(_) => None,
+    }
+}
+
+/// The half space below the first two axes of `plane`, of the body at `pose`.
+fn half_space(plane: Pose, pose: &Pose) -> Flat<'_> {
+    let normal = plane.direction([0.0, 0.0, 1.0]);
+    Flat {
+        feature: Feature::Face(0),
+        normal,
+        local: pose.local_direction(normal),
+        point: plane.x,
+        pose,
+        extent: Extent::All,
+    }
+}
+
+/// The vertices of a surface that are more than points of a plane, as features, in the frame of the body and in the world.
+fn knots<'a>(
+    surface: &'a Surface,
+    posed: &'a PosedHull,
+) -> impl Iterator<Item = (Feature, Vec3, Vec3)> + 'a {
+    surface.corners().map(|k| (Feature::Vertex(k as u32), surface.vertices[k], posed.vertices[k]))
 }
 
 /// The ends of a segment as features, in the frame of the body and in the world; one of a point.

@@ -18,6 +18,10 @@ impl Segment {
         Self { p, d: sub(q, p) }
     }
 
+    pub fn is_point(&self) -> bool {
+        self.d == [0.0; 3]
+    }
+
     #[inline]
     pub fn at(&self, t: f64) -> Vec3 {
         add(self.p, scale(t, self.d))

@@ -400,3 +400,378 @@ fn no_pose_makes_it_panic() {
     }
     assert!(seen > 20_000);
 }
+
+fn cylinder(half_length: f64, radius: f64) -> Body {
+    solid(Shape::Cylinder { half_length, radius })
+}
+
+fn cone(half_length: f64, radius: f64) -> Body {
+    solid(Shape::Cone { half_length, radius })
+}
+
+fn gaps(world: &World) -> Vec<f64> {
+    let mut gaps: Vec<f64> = contacts(world).iter().map(|n| n.place.gap).collect();
+    gaps.sort_by(f64::total_cmp);
+    gaps
+}
+
+/// A turn of the third axis into the first.
+fn lying() -> Rotation {
+    Rotation::about([0.0, 1.0, 0.0], std::f64::consts::FRAC_PI_2)
+}
+
+#[test]
+fn cylinders_and_cones_on_a_plane() {
+    let floor = Body::floor;
+    let near = |found: Vec<f64>, expected: &[f64]| {
+        assert_eq!(found.len(), expected.len(), "{found:?} {expected:?}");
+        for (x, y) in found.iter().zip(expected) {
+            assert!((x - y).abs() < 1e-14, "{found:?} {expected:?}");
+        }
+    };
+    // Upright on eight points, lying on two, inclined on one: z_c − h cos α − r sin α.
+    near(gaps(&two(floor(), cylinder(0.5, 0.2).at([1.0, 2.0, 0.51]))), &[0.01; 8]);
+    near(gaps(&two(floor(), cylinder(0.5, 0.2).turned(lying()).at([1.0, 2.0, 0.19]))), &[-0.01; 2]);
+    for alpha in [1e-3, 0.3, 1.2] {
+        let (s, c) = f64::sin_cos(alpha);
+        let turn = Rotation::about([0.6, 0.8, 0.0], alpha);
+        let disc = cylinder(0.005, 0.2).turned(turn).at([0.0, 0.0, 0.2 * s + 0.005 * c]);
+        let found = gaps(&two(floor(), disc));
+        assert!(found[0].abs() < 1e-14, "{found:?}");
+        // Both rims of a thin disc; points to stand on where it is nearly flat only.
+        assert_eq!(found.len() > 2, alpha < 0.01, "{found:?}");
+    }
+    // A cone on its base, on its point and on its side, whose line has the angle atan(r/2h) with the axis.
+    near(gaps(&two(floor(), cone(0.5, 0.2).at([0.0, 0.0, 0.25]))), &[0.0; 8]);
+    let over = Rotation::about([1.0, 0.0, 0.0], std::f64::consts::PI);
+    near(gaps(&two(floor(), cone(0.5, 0.2).turned(over).at([0.0, 0.0, 0.76]))), &[0.01]);
+    let (r, h): (f64, f64) = (0.2, 1.0);
+    let angle = (r / h).atan();
+    let turn = Rotation::about([0.0, 1.0, 0.0], std::f64::consts::FRAC_PI_2 + angle);
+    let middle = 0.5 * h * angle.sin();
+    near(
+        gaps(&two(
+            floor(),
+            Body::with_mass(
+                1.0,
+                [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+                vec![Part::new(Shape::Cone { half_length: 0.5, radius: 0.2 })],
+            )
+            .turned(turn)
+            .at([0.0, 0.0, middle]),
+        )),
+        &[0.0; 2],
+    );
+}
+
+#[test]
+fn balls_on_cylinders_and_cones() {
+    let ball = |x: Vec3| solid(Shape::Sphere { radius: 0.3 }).at(x);
+    let post = || Body::fixed(vec![Part::new(Shape::Cylinder { half_length: 1.0, radius: 0.5 })]);
+    let spike = || Body::fixed(vec![Part::new(Shape::Cone { half_length: 1.0, radius: 0.5 })]);
+    // The mantle of the cone rises by 2 over 0.5: its normal is (4, 0, 1).
+    let mantle = normalise([4.0, 0.0, 1.0]);
+    let beside = add([0.25, 0.0, 0.0], scale(0.31, mantle));
+    for (body, at, gap, normal) in [
+        (post(), [0.1, 0.2, 1.29], -0.01, [0.0, 0.0, 1.0]),
+        (post(), [0.48, 0.64, 0.3], 0.0, [0.6, 0.8, 0.0]),
+        (post(), [0.6 * 0.7, 0.8 * 0.7, 1.2], 0.08_f64.sqrt() - 0.3, [0.6, 0.8, 1.0]),
+        (post(), [0.1, 0.0, 0.9], -0.4, [0.0, 0.0, 1.0]),
+        (post(), [0.4, 0.0, 0.2], -0.4, [1.0, 0.0, 0.0]),
+        (spike(), [0.0, 0.0, 1.31], 0.01, [0.0, 0.0, 1.0]),
+        (spike(), beside, 0.01, mantle),
+        (spike(), [0.1, 0.1, -1.29], -0.01, [0.0, 0.0, -1.0]),
+    ] {
+        let found = contacts(&two(body.clone(), ball(at)));
+        assert_eq!(found.len(), 1, "{at:?} {found:?}");
+        let place = found[0].place;
+        assert!((place.gap - gap).abs() < 1e-14, "{at:?} {place:?}");
+        assert!(norm(sub(place.normal, normalise(normal))) < 1e-14, "{at:?} {place:?}");
+        // The other way round.
+        let mut world = World::default();
+        world.add(ball(at));
+        world.add(body);
+        let other = contacts(&world);
+        assert!((other[0].place.gap - gap).abs() < 1e-14);
+        assert!(norm(add(other[0].place.normal, place.normal)) < 1e-14);
+    }
+}
+
+#[test]
+fn flat_ends_and_lines_touch_as_wholes() {
+    let plate = |half: Vec3| Body::fixed(vec![Part::new(Shape::Box { half })]);
+    let table = || plate([1.0, 1.0, 0.5]);
+    let post = || Body::fixed(vec![Part::new(Shape::Cylinder { half_length: 0.5, radius: 0.3 })]);
+    let rod = || solid(Shape::Capsule { half_length: 0.4, radius: 0.1 });
+    for (a, b, count, gap) in [
+        // A cylinder upright on a face, on part of it (four of its points, and two where the edge cuts the rim), on a corner of it.
+        (table(), cylinder(0.2, 0.3).at([0.1, 0.2, 0.71]), 8, 0.01),
+        (table(), cylinder(0.2, 0.3).at([0.99, 0.0, 0.71]), 5 + 2, 0.01),
+        (plate([0.1, 0.1, 0.5]), cylinder(0.2, 0.3).at([0.0, 0.0, 0.71]), 4, 0.01),
+        (post(), cuboid([0.1, 0.1, 0.2]).at([0.0, 0.1, 0.71]), 4, 0.01),
+        // Lying, and lying across the edge.
+        (table(), cylinder(0.2, 0.3).turned(lying()).at([0.1, 0.2, 0.81]), 2, 0.01),
+        (table(), cylinder(0.2, 0.3).turned(lying()).at([0.95, 0.2, 0.81]), 2, 0.01),
+        // Ends on each other; a rod on an end; a lying one on an end.
+        (post(), cylinder(0.5, 0.3).at([0.0, 0.0, 1.01]), 8, 0.01),
+        (post(), cylinder(0.2, 0.1).at([0.1, 0.0, 0.71]), 8, 0.01),
+        (post(), rod().turned(lying()).at([0.0, 0.1, 0.61]), 2, 0.01),
+        (post(), cylinder(0.4, 0.1).turned(lying()).at([0.0, 0.1, 0.61]), 2, 0.01),
+        // Side by side, crossed.
+        (post(), cylinder(0.5, 0.2).at([0.51, 0.0, 0.3]), 2, 0.01),
+        (post(), cylinder(0.5, 0.2).turned(lying()).at([0.0, 0.51, 0.3]), 1, 0.01),
+        // Capsules with boxes: on a face, across an edge, end first, over a corner.
+        (table(), rod().turned(lying()).at([0.0, 0.0, 0.61]), 2, 0.01),
+        (table(), rod().at([0.0, 0.0, 1.01]), 1, 0.01),
+        (table(), rod().turned(lying()).at([1.2, 0.0, 0.59]), 2, -0.01),
+        (
+            table(),
+            rod().turned(Rotation::about([1.0, 0.0, 0.0], 0.3)).at([1.11, 0.0, 0.3]),
+            2,
+            0.01,
+        ),
+        // Cones.
+        (table(), cone(0.2, 0.3).at([0.0, 0.0, 0.61]), 8, 0.01),
+        (post(), cone(0.2, 0.3).at([0.0, 0.0, 0.61]), 8, 0.01),
+    ] {
+        let world = two(a, b);
+        let found = contacts(&world);
+        assert_eq!(found.len(), count, "{world:?} {found:#?}");
+        for near in &found {
+            assert!((near.place.gap - gap).abs() < 1e-12, "{gap} {near:?}");
+        }
+    }
+}
+
+/// The largest separation of two convex shapes along any direction, by search.
+fn searched(world: &World, rng: &mut Pcg64) -> f64 {
+    let support = |k: usize, d: Vec3| -> Vec3 {
+        let body = &world.bodies[k];
+        let r = body.rotation.matrix();
+        let pose = Pose { x: body.position, r };
+        let d = pose.local_direction(d);
+        let part = &body.parts[0];
+        let flat = d[0].hypot(d[1]).max(1e-300);
+        let out = |r: f64| [r * d[0] / flat, r * d[1] / flat];
+        let local = match &part.shape {
+            Shape::Cylinder { half_length, radius } => {
+                let [x, y] = out(*radius);
+                [x, y, half_length * d[2].signum()]
+            }
+            Shape::Cone { half_length, radius } => {
+                let [x, y] = out(*radius);
+                let base = [x, y, -half_length];
+                let point = [0.0, 0.0, *half_length];
+                if dot(base, d) > dot(point, d) { base } else { point }
+            }
+            Shape::Capsule { half_length, radius } => {
+                add([0.0, 0.0, half_length * d[2].signum()], scale(*radius, normalise(d)))
+            }
+            Shape::Box { half } => std::array::from_fn(|i| half[i] * d[i].signum()),
+            Shape::Polyhedron(p) => {
+                let by = |v: &Vec3| dot(*v, d);
+                *p.vertices().iter().max_by(|v, w| by(v).total_cmp(&by(w))).unwrap()
+            }
+            _ => unreachable!(),
+        };
+        pose.point(add(part.position, local))
+    };
+    let separation = |n: Vec3| dot(n, sub(support(1, scale(-1.0, n)), support(0, n)));
+    let mut starts: Vec<(f64, Vec3)> = (0..300)
+        .map(|_| {
+            let n = normalise(vector(rng, 1.0));
+            (separation(n), n)
+        })
+        .collect();
+    starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut best = f64::NEG_INFINITY;
+    for (mut value, mut n) in starts.into_iter().take(8) {
+        let mut step = 0.2;
+        while step > 1e-9 {
+            let better = (0..30).find_map(|_| {
+                let m = normalise(add(n, scale(step, vector(rng, 1.0))));
+                let now = separation(m);
+                (now > value).then_some((now, m))
+            });
+            match better {
+                Some((now, m)) => (value, n) = (now, m),
+                None => step *= 0.5,
+            }
+        }
+        best = best.max(value);
+    }
+    best
+}
+
+#[test]
+fn round_solids_agree_with_a_search_of_all_directions() {
+    let mut rng = Pcg64::seed_from_u64(23);
+    let (mut touching, mut apart) = (0, 0);
+    for round in 0..400 {
+        let shape = |kind: usize, rng: &mut Pcg64| -> Body {
+            let mut x = || rng.random_range(0.3..0.8);
+            match kind {
+                0 => cylinder(x(), x()),
+                1 => cone(x(), x()),
+                2 => cuboid([x(), x(), x()]),
+                3 => solid(Shape::Capsule { half_length: x(), radius: 0.5 * x() }),
+                _ => solid(rock(rng, 9)),
+            }
+        };
+        let (a, b) = (shape(round % 2, &mut rng), shape(round % 5, &mut rng));
+        // The second body first in every other pair.
+        let (a, b) = if round % 4 < 2 { (a, b) } else { (b, a) };
+        let (a, b) = match round % 3 {
+            0 if round % 5 != 3 => (a, b),
+            _ if round % 5 == 3 && round % 3 == 0 => {
+                (solid(Shape::Capsule { half_length: 0.5, radius: 0.2 }), cuboid([0.5, 0.4, 0.3]))
+            }
+            _ => (a, b),
+        };
+        let direction = normalise(vector(&mut rng, 1.0));
+        let far = rng.random_range(0.4..1.4);
+        let world = two(
+            a.turned(rotation(&mut rng)).at([0.0; 3]),
+            b.turned(rotation(&mut rng)).at(scale(far, direction)),
+        );
+        let truth = searched(&world, &mut rng);
+        let found = contacts(&world);
+        if truth > 2.0 * MARGIN + 1e-6 {
+            assert!(found.is_empty(), "{round} {truth} {found:?}");
+            apart += 1;
+            continue;
+        }
+        if truth < -0.1 {
+            // Deep inside there are several local maxima: any of them is an answer.
+            assert!(!found.is_empty(), "{round} {truth}");
+            continue;
+        }
+        assert!(!found.is_empty(), "{round} {truth}\n{world:?}");
+        let least = found.iter().map(|n| n.place.gap).fold(f64::INFINITY, f64::min);
+        // The search comes near the maximum from below.
+        assert!(
+            least > truth - 1e-7 && least < truth + 1e-4,
+            "{round} {least} {truth}\n{found:?}\n{world:?}"
+        );
+        touching += 1;
+    }
+    assert!(touching > 50 && apart > 30, "{touching} {apart}");
+}
+
+fn grid(n: usize, height: impl Fn(f64, f64) -> f64) -> Body {
+    let at = |k: usize| 4.0 * (k as f64 / (n - 1) as f64 - 0.5);
+    let row = |i: usize| (0..n).map(|j| height(at(j), at(i))).collect();
+    let heights: Vec<Vec<f64>> = (0..n).map(row).collect();
+    Body::fixed(vec![Part::new(crate::Mesh::heightfield(&heights, [4.0, 4.0]).unwrap())])
+}
+
+#[test]
+fn triangulated_ground_is_like_the_ground() {
+    // A flat field of 200 triangles and a wavy one of coplanar strips: what stands there has the contacts that it has on a plane.
+    let flat = || grid(11, |_, _| 0.0);
+    let shapes = [
+        solid(Shape::Sphere { radius: 0.3 }),
+        cuboid([0.7, 0.5, 0.3]),
+        solid(Shape::Capsule { half_length: 0.9, radius: 0.3 }).turned(lying()),
+        cylinder(0.3, 0.9),
+        cylinder(0.9, 0.3).turned(lying()),
+        cone(0.6, 0.5),
+    ];
+    for shape in shapes {
+        for gap in [0.01, 0.0, -0.01] {
+            let at = [0.13, -0.27, 0.3 + gap];
+            let turn = Rotation::about([0.0, 0.0, 1.0], 0.4).after(shape.rotation);
+            let there = shape.clone().turned(turn).at(at);
+            let on_plane = contacts(&two(Body::floor(), there.clone()));
+            let mut on_field = contacts(&two(flat(), there));
+            assert_eq!(on_field.len(), on_plane.len(), "{gap} {:?} {on_field:#?}", shape.parts);
+            for near in &on_plane {
+                let p = near.place;
+                let found = on_field.iter().position(|n| norm(sub(n.place.point, p.point)) < 1e-9);
+                let place = on_field.swap_remove(found.expect("the same point")).place;
+                assert!(
+                    (place.gap - p.gap).abs() < 1e-12 && norm(sub(place.normal, p.normal)) < 1e-12
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn inner_edges_do_not_stop_what_slides_over_them() {
+    // All normals of a plane inclined field are the plane's, wherever the body is.
+    let slope = |x: f64, y: f64| 0.3 * x - 0.2 * y;
+    let n = normalise([-0.3, 0.2, 1.0]);
+    let mut rng = Pcg64::seed_from_u64(8);
+    let mut seen = 0;
+    for round in 0..400 {
+        let shape = match round % 5 {
+            0 => solid(Shape::Sphere { radius: 0.2 }),
+            1 => cuboid([0.2, 0.3, 0.1]),
+            2 => solid(Shape::Capsule { half_length: 0.3, radius: 0.1 }),
+            3 => cylinder(0.2, 0.2),
+            _ => solid(rock(&mut rng, 8)),
+        };
+        let [x, y, _] = vector(&mut rng, 1.2);
+        let z = slope(x, y) + rng.random_range(0.1..0.9);
+        let there = shape.turned(rotation(&mut rng)).at([x, y, z]);
+        for near in contacts(&two(grid(9, slope), there)) {
+            assert!(norm(sub(near.place.normal, n)) < 1e-9, "{round} {near:?}");
+            seen += 1;
+        }
+    }
+    assert!(seen > 100, "{seen}");
+}
+
+/// A box as a closed mesh of twelve triangles.
+fn crate_mesh(half: Vec3) -> crate::Mesh {
+    let p = Polyhedron::cuboid(half).unwrap();
+    let fan = |f: &Vec<usize>| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]];
+    let triangles: Vec<[usize; 3]> = p.faces().iter().flat_map(fan).collect();
+    crate::Mesh::new(p.vertices(), &triangles).unwrap()
+}
+
+#[test]
+fn a_mesh_of_a_box_touches_as_the_box() {
+    let half = [0.5, 0.4, 0.3];
+    let mut rng = Pcg64::seed_from_u64(12);
+    let (mut touching, mut same) = (0, 0);
+    for round in 0..500 {
+        let other = match round % 4 {
+            0 => solid(Shape::Sphere { radius: 0.3 }),
+            1 => cuboid([0.3, 0.4, 0.2]),
+            2 => solid(Shape::Capsule { half_length: 0.3, radius: 0.2 }),
+            _ => cylinder(0.3, 0.3),
+        };
+        let far = rng.random_range(0.5..0.9);
+        let there = scale(far, normalise(vector(&mut rng, 1.0)));
+        let other = other.turned(rotation(&mut rng)).at(there);
+        let (turn, mesh) = (rotation(&mut rng), solid(crate_mesh(half)));
+        assert!((mesh.mass - cuboid(half).mass).abs() < 1e-14);
+        let as_box = contacts(&two(cuboid(half).turned(turn), other.clone()));
+        let as_mesh = contacts(&two(mesh.turned(turn), other));
+        let least = |list: &[Near]| list.iter().map(|n| n.place.gap).fold(f64::INFINITY, f64::min);
+        let (p, q) = (least(&as_box), least(&as_mesh));
+        if !(-0.05..0.05).contains(&p) {
+            continue;
+        }
+        touching += 1;
+        assert!(!as_mesh.is_empty(), "{round} {as_box:?}");
+        // The surface knows one triangle at a time: inside, it may find another face than the nearest one.
+        same += usize::from((p - q).abs() < 1e-6);
+        if p > 0.0 {
+            assert!((p - q).abs() < 1e-5, "{round} {p} {q}\n{as_box:#?}\n{as_mesh:#?}");
+        }
+    }
+    assert!(touching > 60 && 10 * same > 8 * touching, "{same} of {touching}");
+    // On a plane it stands on its corners, not on points inside its faces.
+    assert_eq!(gaps(&two(Body::floor(), solid(crate_mesh(half)).at([0.0, 0.0, 0.31]))).len(), 4);
+}
+
+#[test]
+fn surfaces_do_not_meet_each_other() {
+    let mesh = || solid(crate_mesh([0.5; 3]));
+    let error = Detector::new(&two(grid(3, |_, _| 0.0), mesh())).err().unwrap().to_string();
+    let says = "bodies[0].parts[0] and bodies[1].parts[0]: contact between a mesh and a mesh is not supported";
+    assert_eq!(error, says);
+}

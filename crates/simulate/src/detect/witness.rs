@@ -4,6 +4,7 @@ use nonsmooth_scenes::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 use serde::{Deserialize, Serialize};
 
 use crate::detect::segments::{Segment, closest};
+use crate::detect::turned::beside;
 use crate::rotation::Pose;
 
 /// Which features of which shapes touch; the same key in the next step is the same contact.
@@ -68,6 +69,21 @@ pub(crate) enum Witness {
     },
     /// Two rounded segments, each in the frame of its body.
     Rounds { s: Segment, s_radius: f64, t: Segment, t_radius: f64 },
+    /// A plane with the outward `normal` of one body, through `foot`, and that point of a circle of the other which is lowest above it. `side` is the
+    /// direction from the centre where no point is lowest.
+    Rim { on_a: bool, normal: Vec3, foot: Vec3, centre: Vec3, axis: Vec3, side: Vec3, radius: f64 },
+    /// A line of the half plane (ρ, z) about an axis of one body, which is a surface of revolution, and a ball of the other.
+    Revolved {
+        on_a: bool,
+        centre: Vec3,
+        axis: Vec3,
+        side: Vec3,
+        line: [[f64; 2]; 2],
+        ball: Vec3,
+        radius: f64,
+    },
+    /// Two points, and the `normal` from a to b, in the frame of one of them: where curved surfaces meet edges or each other, to first order.
+    Points { s: Vec3, t: Vec3, normal: Vec3, on_a: bool },
     /// Two crossing edges; `sign` makes the product of their directions point from a to b.
     Edges { s: Segment, t: Segment, sign: f64 },
 }
@@ -90,6 +106,29 @@ impl Segment {
 }
 
 impl Witness {
+    /// The same contact with its bodies named the other way round.
+    pub fn swapped(self) -> Self {
+        match self {
+            Witness::Face { on_a, normal, other, foot, radius, anchor } => {
+                Witness::Face { on_a: !on_a, normal, other, foot, radius, anchor }
+            }
+            Witness::Rounds { s, s_radius, t, t_radius } => {
+                Witness::Rounds { s: t, s_radius: t_radius, t: s, t_radius: s_radius }
+            }
+            Witness::Rim { on_a, normal, foot, centre, axis, side, radius } => {
+                Witness::Rim { on_a: !on_a, normal, foot, centre, axis, side, radius }
+            }
+            Witness::Revolved { on_a, centre, axis, side, line, ball, radius } => {
+                Witness::Revolved { on_a: !on_a, centre, axis, side, line, ball, radius }
+            }
+            Witness::Points { s, t, normal, on_a } => {
+                Witness::Points { s: t, t: s, normal: scale(-1.0, normal), on_a: !on_a }
+            }
+            // Both the product of the edges and the normal turn about.
+            Witness::Edges { s, t, sign } => Witness::Edges { s: t, t: s, sign },
+        }
+    }
+
     /// Where the contact is with the bodies at these poses; `normal` is that to fall back on where the bodies leave none.
     pub fn place(&self, a: &Pose, b: &Pose, normal: Vec3) -> Place {
         match self {
@@ -118,6 +157,42 @@ impl Witness {
                 };
                 let gap = distance - s_radius - t_radius;
                 Place { normal: n, point: add(p, scale(s_radius + 0.5 * gap, n)), gap }
+            }
+            Witness::Rim { on_a, normal, foot, centre, axis, side, radius } => {
+                let (face, rest, sign) = if *on_a { (a, b, 1.0) } else { (b, a, -1.0) };
+                let n = face.direction(*normal);
+                let axis = rest.direction(*axis);
+                let down = sub(scale(dot(n, axis), axis), n);
+                let sine = norm(down);
+                let out = match sine > DEGENERATE {
+                    true => scale(1.0 / sine, down),
+                    false => rest.direction(*side),
+                };
+                let p = add(rest.point(*centre), scale(*radius, out));
+                let gap = dot(n, sub(p, face.point(*foot)));
+                Place { normal: scale(sign, n), point: sub(p, scale(0.5 * gap, n)), gap }
+            }
+            Witness::Revolved { on_a, centre, axis, side, line, ball, radius } => {
+                let (solid, rest, sign) = if *on_a { (a, b, 1.0) } else { (b, a, -1.0) };
+                let (axis, x) = (solid.direction(*axis), rest.point(*ball));
+                let d = sub(x, solid.point(*centre));
+                let z = dot(d, axis);
+                let across = sub(d, scale(z, axis));
+                let rho = norm(across);
+                let out = match rho > DEGENERATE * norm(d) {
+                    true => scale(1.0 / rho, across),
+                    false => solid.direction(*side),
+                };
+                let (distance, [radial, axial]) = beside(line, [rho, z]);
+                let n = add(scale(radial, out), scale(axial, axis));
+                let gap = distance - radius;
+                let point = sub(x, scale(radius + 0.5 * gap, n));
+                Place { normal: scale(sign, n), point, gap }
+            }
+            Witness::Points { s, t, normal, on_a } => {
+                let n = if *on_a { a.direction(*normal) } else { b.direction(*normal) };
+                let (p, q) = (a.point(*s), b.point(*t));
+                Place { normal: n, point: scale(0.5, add(p, q)), gap: dot(n, sub(q, p)) }
             }
             Witness::Edges { s, t, sign } => {
                 let (s, t) = (s.placed(a), t.placed(b));

@@ -12,7 +12,8 @@ use super::{
 use crate::error::{finite, require};
 use crate::shape::plane;
 use crate::{
-    Body, BodyId, Law, Motion, Part, Shape, SimulateError, Simulation, State, World, Wrenches,
+    Body, BodyId, Law, Mesh, Motion, Part, Settled, Shape, SimulateError, Simulation, State, World,
+    Wrenches,
 };
 
 /// Groups have a bit each.
@@ -52,6 +53,21 @@ impl SceneFile {
     ///
     /// Errors: those of [`world`](Self::world) and of [`Simulation::new`]; forces on bodies that there are not; an unknown solver or setting.
     pub fn build(&self) -> Result<Simulation, SimulateError> {
+        Ok(self.made(|world| Ok((Simulation::new(world, self.integrator)?, ())))?.0)
+    }
+
+    /// The same with bodies that overlap moved apart, as [`Simulation::settled`] does it.
+    ///
+    /// Errors: as of [`build`](Self::build), with the overlaps that are left.
+    pub fn build_settled(&self) -> Result<(Simulation, Settled), SimulateError> {
+        self.made(|world| Simulation::settled(world, self.integrator))
+    }
+
+    /// The scene, its world set in motion by `start`, and what else that says.
+    fn made<T>(
+        &self,
+        start: impl FnOnce(World) -> Result<(Simulation, T), SimulateError>,
+    ) -> Result<(Simulation, T), SimulateError> {
         let Self { time, solver, .. } = self;
         require(|| "time.h".into(), time.h, time.h > 0.0, "a positive number of seconds")?;
         require(
@@ -70,13 +86,14 @@ impl SceneFile {
         let forces: Vec<_> = forces
             .map(|(k, table)| acting(table, &world, &format!("forces[{k}]")))
             .collect::<Result<_, _>>()?;
-        let mut simulation = Simulation::new(world, self.integrator)?
+        let (simulation, said) = start(world)?;
+        let mut simulation = simulation
             .with_solver(&solver.name, solver.settings.clone())?
             .with_tolerance(solver.tol);
         for force in forces {
             simulation = simulation.with_force(force);
         }
-        Ok(simulation)
+        Ok((simulation, said))
     }
 }
 
@@ -314,6 +331,26 @@ impl<'a> Builder<'a> {
             ShapeTable::Box { half } => Part::new(Shape::Box { half: *half }),
             ShapeTable::Capsule { half_length, radius } => {
                 Part::new(Shape::Capsule { half_length: *half_length, radius: *radius })
+            }
+            ShapeTable::Cylinder { half_length, radius } => {
+                Part::new(Shape::Cylinder { half_length: *half_length, radius: *radius })
+            }
+            ShapeTable::Cone { half_length, radius } => {
+                Part::new(Shape::Cone { half_length: *half_length, radius: *radius })
+            }
+            ShapeTable::Mesh { file: Some(file), .. } => {
+                let expected = "a scene that was read with its files (SceneFile::load_meshes)";
+                return Err(SimulateError::value(format!("{key}.file"), expected, file));
+            }
+            ShapeTable::Mesh { scale: Some(scale), .. } => {
+                let expected = "none without a file";
+                return Err(SimulateError::value(format!("{key}.scale"), expected, scale));
+            }
+            ShapeTable::Mesh { vertices, triangles, .. } => {
+                Part::new(Mesh::new(vertices, triangles).map_err(|e| placed(e, key))?)
+            }
+            ShapeTable::Heightfield { heights, size } => {
+                Part::new(Mesh::heightfield(heights, *size).map_err(|e| placed(e, key))?)
             }
             ShapeTable::Plane { normal } => plane([0.0; 3], *normal)
                 .map_err(|e| SimulateError::Schema { path: key.into(), problem: e.to_string() })?,

@@ -25,6 +25,7 @@
 
 mod build;
 mod joints;
+mod meshes;
 mod read;
 
 use std::collections::BTreeMap;
@@ -181,6 +182,42 @@ pub enum ShapeTable {
         half_length: f64,
         /// m.
         radius: f64,
+    },
+    /// All points within the radius of the third axis and not farther than half the length from the origin along it.
+    Cylinder {
+        /// Half the length, m.
+        half_length: f64,
+        /// m.
+        radius: f64,
+    },
+    /// A cone about the third axis, its base below the origin, its point above.
+    Cone {
+        /// Half the height, m.
+        half_length: f64,
+        /// Of the base, m.
+        radius: f64,
+    },
+    /// A surface of triangles, from a file or written out. A closed one is solid; one that is not is a sheet, of a body that is fixed or has a given mass.
+    Mesh {
+        /// STL or OBJ, beside the scene.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        file: Option<String>,
+        /// What its coordinates are multiplied by: 0.001 where they are in millimetres.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        scale: Option<f64>,
+        /// m.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        vertices: Vec<[f64; 3]>,
+        /// Vertices by number, counterclockwise from outside.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        triangles: Vec<[usize; 3]>,
+    },
+    /// The ground below heights at the knots of a grid about the origin, solid below; of bodies that do not meet others of their kind.
+    Heightfield {
+        /// m; a row for each place along the second axis.
+        heights: Vec<Vec<f64>>,
+        /// Its sides along the first two axes, m.
+        size: [f64; 2],
     },
     /// The half space below a plane through the origin; of bodies that are fixed.
     Plane {

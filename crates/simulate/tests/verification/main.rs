@@ -7,7 +7,9 @@ mod impacts;
 mod invariance;
 mod joints;
 mod laws;
+mod overlap;
 mod piles;
+mod solids;
 
 use nonsmooth_simulate::{
     Body, BodyId, Geometry, Law, MoreauJean, RunReport, Shape, Simulation, World,

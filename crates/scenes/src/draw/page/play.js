@@ -120,6 +120,17 @@ function shapeOf(form) {
     const make = () => [shaded(new THREE.CapsuleGeometry(radius, 2 * half, 10, 24).rotateX(Math.PI / 2), (x, y) => x * y > 0), null];
     return { key: `capsule ${half} ${radius}`, scale: [1, 1, 1], make };
   }
+  const round = form.cylinder ?? form.cone;
+  if (round) {
+    const { half_length: half, radius } = round;
+    const top = form.cone ? 0 : radius;
+    const make = () => {
+      const geometry = new THREE.CylinderGeometry(top, radius, 2 * half, 32).rotateX(Math.PI / 2);
+      return [shaded(geometry, (x, y) => x * y > 0), null];
+    };
+    return { key: `cylinder ${half} ${radius} ${top}`, scale: [1, 1, 1], make };
+  }
+  if (form.mesh) return { key: JSON.stringify(form.mesh), scale: [1, 1, 1], make: () => [plain(polyhedra([form.mesh])[0]), null] };
   return { key: JSON.stringify(form.polyhedron), scale: [1, 1, 1], make: () => solid(form.polyhedron) };
 }
 const rotationOf = ([w, x, y, z]) => new THREE.Quaternion(x, y, z, w);

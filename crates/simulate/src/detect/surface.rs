@@ -1,0 +1,423 @@
+//! Surfaces of triangles with convex solids.
+//!
+//! Triangles near a solid are found in a tree of boxes. Each is a polyhedron without thickness for the narrow phase of polyhedra and round solids; for balls there is a
+//! closed form. The surface is more than its triangles: a normal is one of the surface where it lies in the cone of normals of the feature that touches, so that what slides over the edge
+//! between two triangles does not stumble. A triangle that is touched with another normal is met with its own. Points on edges between coplanar triangles are left out: they are there
+//! because of the triangulation, not of the surface. A feature that two triangles share touches once.
+//!
+//! What is behind a closed mesh or below a heightfield is solid: there the outward normals alone are possible.
+
+use std::collections::BTreeMap;
+
+use nonsmooth_scenes::vec3::{Vec3, cross, dot, norm, scale, sub};
+
+use crate::Mesh;
+use crate::detect::broad::Aabb;
+use crate::detect::clip::Clip;
+use crate::detect::convex::{self, Side};
+use crate::detect::hull::{Edge, Hull, PosedHull};
+use crate::detect::segments::Segment;
+use crate::detect::witness::{Anchor, Feature, Witness};
+use crate::rotation::Pose;
+
+/// A normal that leaves its cone by less is one of the surface.
+const CONE: f64 = 1e-6;
+/// Triangles whose normals differ by less are coplanar.
+const COPLANAR: f64 = 1e-6;
+/// A normal that differs from that of a face by less than this is the face's.
+const FACING: f64 = 1e-2;
+/// A triangle is met with its own normal where it is not deeper than this share of the size of the other solid.
+const DEEP: f64 = 0.25;
+/// Triangles in a leaf of the tree.
+const LEAF: usize = 4;
+const NONE: u32 = u32::MAX;
+
+/// A surface in the frame of its body.
+#[derive(Debug, Clone)]
+pub(crate) struct Surface {
+    pub vertices: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    one_sided: bool,
+    normals: Vec<Vec3>,
+    /// Side k of a triangle, from its corner k to the next one.
+    sides: Vec<[u32; 3]>,
+    /// The two triangles of each edge, the second one may be none, and whether they are coplanar.
+    edges: Vec<([u32; 2], bool)>,
+    /// For each vertex the vertices that it has an edge with, and whether all its triangles are coplanar.
+    around: Vec<(Vec<u32>, bool)>,
+    tree: Vec<Node>,
+    order: Vec<u32>,
+    pub size: f64,
+}
+
+/// A box and what is in it: two nodes from `first` on, or `count` triangles.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    bounds: Aabb,
+    first: u32,
+    count: u32,
+}
+
+/// Memory for one triangle at a time.
+#[derive(Debug, Clone)]
+pub(crate) struct Scratch {
+    hull: Hull,
+    posed: PosedHull,
+    near: Vec<u32>,
+    found: Vec<([Feature; 2], Witness)>,
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        // Front, back and three sides without area; each edge is there twice, between a side and the front or the back.
+        let faces = vec![vec![0, 1, 2], vec![0, 2, 1], vec![0, 1], vec![1, 2], vec![2, 0]];
+        let ends = |k: u32| [k, (k + 1) % 3];
+        let edges = (0..6).map(|e| Edge { ends: ends(e % 3), faces: [e / 3, 2 + e % 3] });
+        let face_edges = vec![vec![0, 1, 2], vec![5, 4, 3], vec![0, 3], vec![1, 4], vec![2, 5]];
+        let hull = Hull {
+            vertices: vec![[0.0; 3]; 3],
+            faces,
+            face_edges,
+            normals: vec![[0.0; 3]; 5],
+            edges: edges.collect(),
+            centre: [0.0; 3],
+            size: 1.0,
+        };
+        Self { hull, posed: PosedHull::default(), near: vec![], found: vec![] }
+    }
+}
+
+impl Surface {
+    /// Of a mesh that stands at `pose` in the frame of its body.
+    pub fn new(mesh: &Mesh, pose: &Pose) -> Self {
+        let vertices: Vec<Vec3> = mesh.vertices().iter().map(|&v| pose.point(v)).collect();
+        let triangles = mesh.triangles().to_vec();
+        let at = |v: u32| vertices[v as usize];
+        let unit = |[a, b, c]: &[u32; 3]| {
+            let n = cross(sub(at(*b), at(*a)), sub(at(*c), at(*a)));
+            scale(1.0 / norm(n), n)
+        };
+        let normals: Vec<Vec3> = triangles.iter().map(unit).collect();
+        let mut numbers: BTreeMap<[u32; 2], u32> = BTreeMap::new();
+        let mut edges: Vec<([u32; 2], bool)> = vec![];
+        let mut around = vec![(vec![], true); vertices.len()];
+        let mut sides = vec![];
+        for (t, corners) in triangles.iter().enumerate() {
+            let side = |k: usize| {
+                let (i, j) = (corners[k], corners[(k + 1) % 3]);
+                let e = *numbers.entry([i.min(j), i.max(j)]).or_insert_with(|| {
+                    edges.push(([t as u32, NONE], false));
+                    edges.len() as u32 - 1
+                });
+                let (of, flat) = &mut edges[e as usize];
+                if of[0] != t as u32 && of[1] == NONE {
+                    of[1] = t as u32;
+                    *flat = norm(sub(normals[of[0] as usize], normals[t])) < COPLANAR;
+                }
+                e
+            };
+            sides.push([0, 1, 2].map(side));
+        }
+        for ([i, j], &e) in &numbers {
+            for (v, w) in [(*i, *j), (*j, *i)] {
+                let (others, flat) = &mut around[v as usize];
+                others.push(w);
+                *flat &= edges[e as usize].1;
+            }
+        }
+        let middle = scale(
+            0.5,
+            [0, 1, 2].map(|d| {
+                let x = || vertices.iter().map(|v| v[d]);
+                x().fold(f64::INFINITY, f64::min) + x().fold(f64::NEG_INFINITY, f64::max)
+            }),
+        );
+        let size = vertices.iter().map(|&v| norm(sub(v, middle))).fold(0.0, f64::max);
+        let mut out = Self {
+            vertices,
+            triangles,
+            one_sided: mesh.is_one_sided(),
+            normals,
+            sides,
+            edges,
+            around,
+            tree: vec![],
+            order: vec![],
+            size,
+        };
+        out.grow();
+        out
+    }
+
+    /// Vertices that are more than points of a plane.
+    pub fn corners(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.vertices.len()).filter(|&v| !self.around[v].1 && !self.around[v].0.is_empty())
+    }
+
+    /// Makes the tree: boxes are cut in two at the median along their longest side.
+    fn grow(&mut self) {
+        let bounds_of = |t: u32| {
+            let corners = self.triangles[t as usize].map(|v| self.vertices[v as usize]);
+            let by = |f: fn(f64, f64) -> f64| {
+                std::array::from_fn(|d| f(f(corners[0][d], corners[1][d]), corners[2][d]))
+            };
+            Aabb { low: by(f64::min), high: by(f64::max) }
+        };
+        let mut order: Vec<u32> = (0..self.triangles.len() as u32).collect();
+        let mut tree = vec![Node {
+            bounds: Aabb { low: [0.0; 3], high: [0.0; 3] },
+            first: 0,
+            count: order.len() as u32,
+        }];
+        let mut k = 0;
+        while k < tree.len() {
+            let Node { first, count, .. } = tree[k];
+            let members = &mut order[first as usize..(first + count) as usize];
+            let start = Aabb { low: [f64::INFINITY; 3], high: [f64::NEG_INFINITY; 3] };
+            let bounds = members.iter().fold(start, |all, &t| {
+                let one = bounds_of(t);
+                Aabb {
+                    low: std::array::from_fn(|d| all.low[d].min(one.low[d])),
+                    high: std::array::from_fn(|d| all.high[d].max(one.high[d])),
+                }
+            });
+            tree[k].bounds = bounds;
+            if members.len() > LEAF {
+                let extent = |d: &usize| bounds.high[*d] - bounds.low[*d];
+                let longest = (0..3).max_by(|a, b| extent(a).total_cmp(&extent(b))).unwrap_or(0);
+                let middle = |t: u32| {
+                    let one = bounds_of(t);
+                    one.low[longest] + one.high[longest]
+                };
+                let half = members.len() / 2;
+                members.select_nth_unstable_by(half, |&a, &b| {
+                    middle(a).total_cmp(&middle(b)).then(a.cmp(&b))
+                });
+                let children = tree.len() as u32;
+                (tree[k].first, tree[k].count) = (children, 0);
+                let half = half as u32;
+                for (first, count) in [(first, half), (first + half, count - half)] {
+                    tree.push(Node { bounds, first, count });
+                }
+            }
+            k += 1;
+        }
+        (self.tree, self.order) = (tree, order);
+    }
+
+    /// The triangles whose boxes meet a box of the world, in order.
+    fn near(&self, pose: &Pose, bounds: &Aabb, out: &mut Vec<u32>) {
+        let middle = std::array::from_fn(|d| 0.5 * (bounds.low[d] + bounds.high[d]));
+        let half: Vec3 = std::array::from_fn(|d| 0.5 * (bounds.high[d] - bounds.low[d]));
+        let middle = pose.local_point(middle);
+        let reach: Vec3 =
+            std::array::from_fn(|d| (0..3).map(|k| pose.r[k][d].abs() * half[k]).sum());
+        let mine = Aabb {
+            low: std::array::from_fn(|d| middle[d] - reach[d]),
+            high: std::array::from_fn(|d| middle[d] + reach[d]),
+        };
+        out.clear();
+        let mut stack = vec![0_u32];
+        while let Some(k) = stack.pop() {
+            let node = &self.tree[k as usize];
+            if !node.bounds.meets(&mine) {
+                continue;
+            }
+            match node.count {
+                0 => stack.extend([node.first, node.first + 1]),
+                n => out.extend(&self.order[node.first as usize..(node.first + n) as usize]),
+            }
+        }
+        out.sort_unstable();
+    }
+
+    /// From edge k of a triangle into it, across the edge, not of unit length.
+    fn inwards(&self, t: u32, e: u32) -> Vec3 {
+        let sides = self.sides[t as usize];
+        let k = sides.iter().position(|&s| s == e).unwrap_or(0);
+        let [p, q] = [k, k + 1].map(|i| self.vertices[self.triangles[t as usize][i % 3] as usize]);
+        cross(self.normals[t as usize], sub(q, p))
+    }
+
+    /// Whether n, in the frame of the body, is a normal of the surface at a feature: it goes into no triangle there.
+    fn has_normal(&self, feature: Feature, n: Vec3) -> bool {
+        let away = |d: Vec3| dot(n, d) <= CONE * norm(d);
+        match feature {
+            Feature::Edge(e) => {
+                let of = self.edges[e as usize].0;
+                of.iter().filter(|t| **t != NONE).all(|&t| {
+                    away(self.inwards(t, e))
+                        && (!self.one_sided || dot(n, self.normals[t as usize]) >= -CONE)
+                })
+            }
+            Feature::Vertex(v) => {
+                let at = |v: u32| self.vertices[v as usize];
+                self.around[v as usize].0.iter().all(|&w| away(sub(at(w), at(v))))
+            }
+            Feature::Face(_) | Feature::Curved(_) => false,
+        }
+    }
+
+    fn is_flat(&self, feature: Feature) -> bool {
+        match feature {
+            Feature::Edge(e) => self.edges[e as usize].1,
+            Feature::Vertex(v) => self.around[v as usize].1,
+            Feature::Face(_) | Feature::Curved(_) => false,
+        }
+    }
+
+    /// A feature of triangle t as one of the surface.
+    fn named(&self, t: u32, feature: Feature) -> Feature {
+        let sides = self.sides[t as usize];
+        match feature {
+            Feature::Vertex(k) => Feature::Vertex(self.triangles[t as usize][k as usize]),
+            Feature::Edge(e) => Feature::Edge(sides[e as usize % 3]),
+            Feature::Face(f) if f < 2 => Feature::Face(2 * t + f),
+            Feature::Face(f) => Feature::Edge(sides[f as usize - 2]),
+            curved @ Feature::Curved(_) => curved,
+        }
+    }
+
+    /// All points where the surface is nearer to another solid than `prediction`; `bounds` is the box of that, in the world. The surface is the first of the two.
+    pub fn collide(
+        &self,
+        (pose, other, bounds): (&Pose, &Side, &Aabb),
+        prediction: f64,
+        (clip, scratch): (&mut Clip, &mut Scratch),
+        mut found: impl FnMut([Feature; 2], Witness),
+    ) {
+        let mut near = std::mem::take(&mut scratch.near);
+        self.near(pose, bounds, &mut near);
+        if let Side::Rod { local, world, radius, .. } = other
+            && world.d == [0.0; 3]
+        {
+            for &t in &near {
+                self.ball(t, (local.p, pose.local_point(world.p), *radius), &mut found);
+            }
+            scratch.near = near;
+            return;
+        }
+        for &t in &near {
+            self.template(t, pose, scratch);
+            let Scratch { hull, posed, found: list, .. } = &mut *scratch;
+            list.clear();
+            let triangle = Side::Hull { hull, posed, pose };
+            if let Side::Hull { hull: h, posed: p, pose: q } = other {
+                let (first, second) = ((&*hull, &*posed, pose), (*h, *p, *q));
+                clip.collide(first, second, None, prediction, |f, w| list.push((f, w)));
+            } else {
+                convex::collide(&triangle, other, prediction, |f, w| list.push((f, w)));
+            }
+            let (mut met, mut foreign) = (false, false);
+            for ([feature, own], witness) in list.drain(..) {
+                let n = witness.place(pose, other.pose(), [0.0, 0.0, 1.0]).normal;
+                let n = pose.local_direction(n);
+                let front = dot(n, self.normals[t as usize]);
+                let facing =
+                    if self.one_sided { front } else { front.abs() } > 1.0 - FACING * FACING;
+                let feature = self.named(t, feature);
+                let surface = match feature {
+                    // A triangle that lies on a face of the other solid, or is its reference.
+                    _ if facing => true,
+                    _ => self.has_normal(feature, n),
+                };
+                if !surface {
+                    foreign = true;
+                } else {
+                    met = true;
+                    if !(facing && self.is_flat(feature)) {
+                        found([feature, own], witness);
+                    }
+                }
+            }
+            if met || !foreign {
+                continue;
+            }
+            // Another triangle is nearer there; with its own normal this one may touch elsewhere.
+            let middle = other.middle();
+            let behind = dot(posed.normals[0], middle) < posed.offsets[0];
+            let face = usize::from(behind && !self.one_sided);
+            let deepest = -DEEP * other.size();
+            let mut keep = |[feature, own]: [Feature; 2], witness: Witness| {
+                let feature = self.named(t, feature);
+                let gap = witness.place(pose, other.pose(), [0.0, 0.0, 1.0]).gap;
+                if gap >= deepest && !self.is_flat(feature) {
+                    found([feature, own], witness);
+                }
+            };
+            if let Side::Hull { hull: h, posed: p, pose: q } = other {
+                let (first, second) = ((&*hull, &*posed, pose), (*h, *p, *q));
+                clip.on_face(first, second, face, prediction, keep);
+            } else if let Some(flat) = triangle.flat(posed.normals[face]) {
+                convex::on_flat(&flat, true, other, prediction, &mut keep);
+            }
+        }
+        scratch.near = near;
+    }
+
+    /// Makes the polyhedron without thickness that triangle t is.
+    fn template(&self, t: u32, pose: &Pose, scratch: &mut Scratch) {
+        let Scratch { hull, posed, .. } = scratch;
+        let corners = self.triangles[t as usize].map(|v| self.vertices[v as usize]);
+        let n = self.normals[t as usize];
+        hull.vertices.copy_from_slice(&corners);
+        hull.centre = scale(1.0 / 3.0, std::array::from_fn(|d| corners.iter().map(|c| c[d]).sum()));
+        hull.size = corners.iter().map(|&c| norm(sub(c, hull.centre))).fold(0.0, f64::max);
+        (hull.normals[0], hull.normals[1]) = (n, scale(-1.0, n));
+        for k in 0..3 {
+            let edge = sub(corners[(k + 1) % 3], corners[k]);
+            hull.normals[2 + k] = scale(1.0 / norm(edge), cross(edge, n));
+        }
+        posed.set(hull, pose);
+    }
+
+    /// A ball with triangle t: its nearest point, if no other triangle is nearer there.
+    fn ball(
+        &self,
+        t: u32,
+        (centre, at, radius): (Vec3, Vec3, f64),
+        found: &mut impl FnMut([Feature; 2], Witness),
+    ) {
+        let corners = self.triangles[t as usize];
+        let [a, b, c] = corners.map(|v| self.vertices[v as usize]);
+        let n = self.normals[t as usize];
+        let height = dot(n, sub(at, a));
+        let own = Feature::Curved(0);
+        let beyond = |p: Vec3, q: Vec3| dot(cross(sub(q, p), n), sub(at, p)) > 0.0;
+        if ![(a, b), (b, c), (c, a)].iter().any(|&(p, q)| beyond(p, q)) {
+            let back = height < 0.0 && !self.one_sided;
+            // A ball that is below the ground as a whole is not on it.
+            if height < -radius && self.one_sided {
+                return;
+            }
+            let normal = if back { scale(-1.0, n) } else { n };
+            let foot = sub(at, scale(height, n));
+            let anchor = Anchor::Other;
+            let witness = Witness::Face { on_a: true, normal, other: centre, foot, radius, anchor };
+            return found([Feature::Face(2 * t + u32::from(back)), own], witness);
+        }
+        let mut best = (f64::INFINITY, 0, 0.0);
+        for (k, (p, q)) in [(a, b), (b, c), (c, a)].into_iter().enumerate() {
+            let segment = Segment::between(p, q);
+            let x = segment.nearest(at);
+            let far = norm(sub(at, segment.at(x)));
+            if far < best.0 {
+                best = (far, k, x);
+            }
+        }
+        let (far, k, x) = best;
+        let [p, q] = [k, (k + 1) % 3].map(|i| self.vertices[corners[i] as usize]);
+        let (feature, line) = match x {
+            0.0 => (Feature::Vertex(corners[k]), Segment::point(p)),
+            1.0 => (Feature::Vertex(corners[(k + 1) % 3]), Segment::point(q)),
+            _ => (Feature::Edge(self.sides[t as usize][k]), Segment::between(p, q)),
+        };
+        let toward = sub(at, Segment::between(p, q).at(x));
+        let outside = !self.one_sided || dot(toward, n) >= -CONE * far;
+        if far > 0.0 && outside && self.has_normal(feature, scale(1.0 / far, toward)) {
+            let ball = Segment::point(centre);
+            let witness = Witness::Rounds { s: line, s_radius: 0.0, t: ball, t_radius: radius };
+            found([feature, own], witness);
+        }
+    }
+}

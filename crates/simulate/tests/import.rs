@@ -1,0 +1,157 @@
+//! Robots as scenes.
+
+use nonsmooth_simulate::SceneFile;
+use nonsmooth_simulate::import::urdf;
+
+/// A base that nothing moves, an arm of two links that are one body, a wheel and a finger that follows it.
+const ROBOT: &str = r#"<?xml version="1.0"?>
+<robot name="arm">
+  <link name="base">
+    <collision><origin xyz="0 0 0.5"/><geometry><box size="1 2 1"/></geometry></collision>
+  </link>
+  <link name="arm">
+    <inertial><origin xyz="0.5 0 0"/><mass value="2"/><inertia ixx="0.1" iyy="0.2" izz="0.3"/></inertial>
+    <collision><origin xyz="0.5 0 0" rpy="0 1.5707963267948966 0"/><geometry><cylinder radius="0.1" length="1"/></geometry></collision>
+  </link>
+  <link name="hand">
+    <inertial><mass value="1"/><inertia ixx="0.01" iyy="0.02" izz="0.03"/></inertial>
+  </link>
+  <link name="wheel">
+    <inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial>
+    <collision><geometry><sphere radius="0.2"/></geometry></collision>
+  </link>
+  <joint name="shoulder" type="revolute">
+    <parent link="base"/><child link="arm"/><origin xyz="0 0 2" rpy="0 0 1.5707963267948966"/>
+    <axis xyz="0 1 0"/><limit lower="-1" upper="2" effort="10" velocity="1"/><dynamics damping="0.5" friction="0.1"/>
+  </joint>
+  <joint name="wrist" type="fixed"><parent link="arm"/><child link="hand"/><origin xyz="1 0 0"/></joint>
+  <joint name="axle" type="continuous">
+    <parent link="hand"/><child link="wheel"/><origin xyz="0.5 0 0"/><axis xyz="0 0 2"/>
+    <mimic joint="shoulder" multiplier="3"/>
+  </joint>
+</robot>"#;
+
+fn near(found: &toml::Value, expected: &[f64]) {
+    let found: Vec<f64> = found.as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect();
+    assert_eq!(found.len(), expected.len());
+    for (x, y) in found.iter().zip(expected) {
+        assert!((x - y).abs() < 1e-12, "{found:?} {expected:?}");
+    }
+}
+
+#[test]
+fn links_are_bodies_and_joints_stand_where_they_are() {
+    let made = urdf(ROBOT).unwrap();
+    let scene: toml::Table = toml::from_str(&made.scene).unwrap();
+    let [base, arm, wheel] = &scene["bodies"].as_array().unwrap()[..] else { panic!() };
+    assert_eq!(base["fixed"].as_bool(), Some(true));
+    near(&base["shapes"][0]["position"], &[0.0, 0.0, 0.5]);
+    near(&base["shapes"][0]["shape"]["half"], &[0.5, 1.0, 0.5]);
+    // Two links of 2 kg at 0.5 and 1 kg at 1: 3 kg at 2/3 along the arm, which points to y.
+    assert_eq!(arm["mass"].as_float(), Some(3.0));
+    near(&arm["position"], &[0.0, 2.0 / 3.0, 2.0]);
+    let steiner = 2.0 / 36.0 + 1.0 / 9.0;
+    near(&arm["inertia"], &[0.11, 0.22 + steiner, 0.33 + steiner, 0.0, 0.0, 0.0]);
+    near(&arm["shapes"][0]["position"], &[0.5 - 2.0 / 3.0, 0.0, 0.0]);
+    assert_eq!(arm["shapes"][0]["shape"]["half_length"].as_float(), Some(0.5));
+    near(&wheel["position"], &[0.0, 1.5, 2.0]);
+    let [shoulder, axle] = &scene["joints"].as_array().unwrap()[..] else { panic!() };
+    assert_eq!((shoulder["a"].as_str(), shoulder["b"].as_str()), (Some("base"), Some("arm")));
+    near(&shoulder["anchor"], &[0.0, 0.0, 2.0]);
+    near(&shoulder["axis"], &[-1.0, 0.0, 0.0]);
+    assert_eq!(shoulder["limits"]["upper"].as_float(), Some(2.0));
+    assert_eq!(shoulder["spring"]["damping"].as_float(), Some(0.5));
+    assert_eq!(shoulder["friction"].as_float(), Some(0.1));
+    // The hand is part of the arm.
+    assert_eq!((axle["a"].as_str(), axle["kind"].as_str()), (Some("arm"), Some("revolute")));
+    assert!(axle.get("limits").is_none());
+    assert_eq!(scene["couplings"][0]["terms"][1]["weight"].as_float(), Some(-3.0));
+    assert!(made.warnings.iter().any(|w| w.contains("`shoulder`: effort")), "{:?}", made.warnings);
+    assert!(made.warnings.iter().any(|w| w.contains("no law of contact")));
+}
+
+#[test]
+fn a_robot_swings_as_its_joints_let_it() {
+    // The wheel turns three times as fast as the shoulder.
+    let scene = SceneFile::parse(&urdf(ROBOT).unwrap().scene, &[]).unwrap();
+    let mut simulation = scene.build().unwrap();
+    let run = simulation.run(0.2, 1e-3, &mut ()).unwrap();
+    assert!(run.is_solved(), "{run}");
+    let [shoulder, axle] = simulation.joints() else { panic!() };
+    assert!(shoulder.angle.abs() > 0.05 && (axle.angle - 3.0 * shoulder.angle).abs() < 1e-6);
+    assert!(shoulder.violation < 1e-8 && axle.violation < 1e-8);
+}
+
+#[test]
+fn a_robot_of_one_body_falls() {
+    let cut = |text: &str, from: &str, to: &str| {
+        let (i, j) = (text.find(from).unwrap(), text.find(to).unwrap());
+        [&text[..i], &text[j..]].concat()
+    };
+    let text = cut(ROBOT, "  <joint name=\"axle\"", "</robot>");
+    let text = cut(&text, "  <link name=\"wheel\"", "  <joint name=\"shoulder\"");
+    let made = urdf(&text.replace("\"revolute\"", "\"floating\"")).unwrap();
+    let scene = SceneFile::parse(&made.scene, &[]).unwrap();
+    let mut simulation = scene.build().unwrap();
+    let run = simulation.run(0.1, 1e-3, &mut ()).unwrap();
+    assert!(run.is_solved() && simulation.state().velocity[1][2] < -0.97, "{run}");
+}
+
+#[test]
+fn what_is_no_robot_is_refused_in_one_line() {
+    for (from, to, says) in [
+        ("<robot name=\"arm\">", "<robot", "robot: expected an XML document"),
+        ("type=\"revolute\"", "type=\"hinge\"", "joint `shoulder`.type: expected fixed, revolute"),
+        ("type=\"revolute\"", "", "joint `shoulder`: expected <joint> with `type`, found none"),
+        (
+            "<child link=\"arm\"/>",
+            "<child link=\"ram\"/>",
+            "joint `shoulder`: expected a child that is a link, found `ram`",
+        ),
+        (
+            "<child link=\"hand\"/>",
+            "<child link=\"arm\"/>",
+            "joint `wrist`: expected a tree of links, found another joint",
+        ),
+        (
+            "<parent link=\"base\"/>",
+            "<parent link=\"wheel\"/>",
+            "expected a tree of links, found a ring",
+        ),
+        (
+            "<mass value=\"2\"/>",
+            "<mass value=\"two\"/>",
+            "link `arm`.mass.value: expected finite numbers, found `two`",
+        ),
+        (
+            "<box size=\"1 2 1\"/>",
+            "<box size=\"1 2\"/>",
+            "link `base`.collision.box.size: expected 3 numbers, found 2",
+        ),
+        (
+            "<box size=\"1 2 1\"/>",
+            "<torus/>",
+            "link `base`.collision: expected box, cylinder, sphere, capsule or mesh, found <torus>",
+        ),
+        (
+            "<sphere radius=\"0.2\"/>",
+            "<mesh filename=\"package://a/b.stl\" scale=\"1 1 2\"/>",
+            "expected the same scale along all axes",
+        ),
+        (
+            "<mass value=\"1\"/><inertia ixx=\"0.01\" iyy=\"0.01\" izz=\"0.01\"/>",
+            "",
+            "link `wheel`: expected a mass, for joint `axle` of type continuous moves it",
+        ),
+        (
+            "<link name=\"base\">",
+            "<link name=\"alone\"/><link name=\"base\">",
+            "robot: expected one link above all others, found alone, base",
+        ),
+        ("<link name=\"base\">", "<xacro:macro/><link name=\"base\">", "robot: expected"),
+    ] {
+        assert!(ROBOT.contains(from), "{from}");
+        let error = urdf(&ROBOT.replacen(from, to, 1)).unwrap_err().to_string();
+        assert!(error.contains(says) && !error.contains('\n'), "{error}");
+    }
+}
