@@ -53,7 +53,7 @@ impl Wrenches {
 /// A force that depends on time and state: springs, fields, controllers.
 pub trait Force: Send {
     /// Adds to what acts during a step. `state` is that in the middle of the step, extrapolated, with the velocities of its beginning: forces that are
-    /// smooth are taken to second order. A number that is not finite ends the step with [`StepStatus::NotFinite`].
+    /// smooth are taken to second order. A number that is not finite ends the step with [`StepStatus::NotFinite`](crate::StepStatus::NotFinite).
     fn add(&mut self, state: &State, wrenches: &mut Wrenches);
 }
 
