@@ -113,12 +113,21 @@ pub fn fields(existence: &Existence, contacts: usize) -> Object {
             json!({"verdict": existence.name(), "pressed_contacts": pressed(ray)})
         }
         Existence::NoSolution { proof } => {
-            let pressed = proof.certificate().impulses().map(pressed);
-            json!({"verdict": existence.name(), "pressed_contacts": pressed})
+            // A complementarity problem has no contacts to press.
+            match proof.certificate().impulses().map(pressed) {
+                Some(pressed) => {
+                    json!({"verdict": existence.name(), "pressed_contacts": pressed})
+                }
+                None => json!({"verdict": existence.name()}),
+            }
         }
         Existence::NearlyNoSolution { certificate, change } => {
-            let pressed = certificate.impulses().map(pressed);
-            json!({"verdict": existence.name(), "pressed_contacts": pressed, "change": change})
+            match certificate.impulses().map(pressed) {
+                Some(pressed) => {
+                    json!({"verdict": existence.name(), "pressed_contacts": pressed, "change": change})
+                }
+                None => json!({"verdict": existence.name(), "change": change}),
+            }
         }
         Existence::Unknown { why } => json!({"verdict": existence.name(), "why": why}),
     })

@@ -180,3 +180,35 @@ fn the_lowest_box_slips_out_under_the_others() {
     assert!(x("box 1") > x("box 2") + 0.01, "{} {}", x("box 1"), x("box 2"));
     assert!(x("box 2") > 0.001);
 }
+
+/// The motor turns the crank until the rocker is at its limit; where the crank then is follows from the lengths of the links.
+#[test]
+fn a_four_bar_stalls_at_its_limit() {
+    let (simulation, report) = run("four_bar", |_, _| {});
+    let joints = simulation.joints();
+    assert!((joints[3].angle - 0.3).abs() < 2e-3, "{:?}", joints[3]);
+    // The links from the pivots: crank at φ, rocker at ψ, 0.5 m between their heads.
+    let first = (0.397_909_618_f64).atan2(0.459_163_847 - 0.5);
+    let psi = first + joints[3].angle;
+    let head = [0.5 + 0.4 * psi.cos(), 0.4 * psi.sin()];
+    let phi = std::f64::consts::FRAC_PI_2 + joints[0].angle;
+    let far = (head[0] - 0.2 * phi.cos()).hypot(head[1] - 0.2 * phi.sin());
+    assert!((far - 0.5).abs() < 1e-8, "{far}");
+    // It pushes with all it has: 2 N·m about −y.
+    assert!((joints[0].moment[1] / 1e-3 + 2.0).abs() < 1e-9, "{:?}", joints[0]);
+    assert!(simulation.state().spin.iter().flatten().all(|w| w.abs() < 1e-8));
+    assert!(joints.iter().all(|j| j.violation < 1e-12) && report.steps == 1000);
+}
+
+#[test]
+fn a_slider_follows_its_crank() {
+    let (l1, l2): (f64, f64) = (0.153, 0.306);
+    let mut worst: f64 = 0.0;
+    run("slider_crank", |simulation, report| {
+        let slider = place(simulation, "slider");
+        let (s, c) = (10.0 * report.t).sin_cos();
+        let exact = l1 * c + (l2 * l2 - l1 * l1 * s * s).sqrt();
+        worst = worst.max((simulation.state().position[slider][0] - exact).abs());
+    });
+    assert!(worst < 1e-10, "{worst:e}");
+}

@@ -418,3 +418,76 @@ fn mutated_scenes_do_not_panic() {
         }
     }
 }
+
+/// What is wrong with a joint is one line that begins with its place.
+#[test]
+fn mistakes_in_joints_are_named_by_their_place() {
+    let scene = |joints: &str| {
+        let text = format!(
+            r#"
+            format = "nonsmooth-scene"
+            version = 1
+            time = {{ h = 1e-3, end = 1.0 }}
+            bodies = [{{ name = "arm", mass = 1, inertia = [1, 1, 1] }}]
+            {joints}
+            "#
+        );
+        SceneFile::parse(&text, &[]).and_then(|s| s.build()).map(|_| ()).unwrap_err().to_string()
+    };
+    let cases = [
+        (r#"joints = [{ kind = "revolut", a = "world", b = "arm" }]"#, "joints[0].kind"),
+        (
+            r#"joints = [{ kind = "revolute", a = "world", b = "amr" }]"#,
+            "joints[0].b: expected the name of a body, found `amr` (did you mean `arm`?)",
+        ),
+        (r#"joints = [{ kind = "revolute", a = "world", b = "world" }]"#, "joints[0].b"),
+        (
+            r#"joints = [{ name = "h", kind = "screw", a = "world", b = "arm" }]"#,
+            "joints[0] (h).pitch",
+        ),
+        (
+            r#"joints = [{ kind = "fixed", a = "world", b = "arm", friction = 1 }]"#,
+            "joints[0].angle: expected no angle of a fixed joint",
+        ),
+        (
+            r#"joints = [{ kind = "revolute", a = "world", b = "arm", motor = { max = 1 } }]"#,
+            "joints[0].motor",
+        ),
+        (
+            r#"joints = [{ kind = "revolute", a = "world", b = "arm", axis = [0, 0, 0] }]"#,
+            "joints[0].axis",
+        ),
+        (r#"joints = [{ kind = "distance", a = "world", b = "arm" }]"#, "joints[0].anchor_b"),
+        (
+            r#"couplings = [{ terms = [{ joint = "x", weight = 1 }] }]"#,
+            "couplings[0].terms[0].joint",
+        ),
+    ];
+    for (joints, place) in cases {
+        let said = scene(joints);
+        assert!(said.starts_with(place), "{joints}: {said}");
+        assert!(!said.contains('\n'), "{said}");
+    }
+}
+
+/// A joint whose second body is the world is the one with the two exchanged.
+#[test]
+fn a_joint_to_the_world_may_be_told_either_way() {
+    let angle = |a: &str, b: &str, sign: f64| {
+        let text = format!(
+            r#"
+            format = "nonsmooth-scene"
+            version = 1
+            gravity = [0, 0, 0]
+            time = {{ h = 1e-3, end = 0.1 }}
+            bodies = [{{ name = "arm", mass = 1, inertia = [1, 1, 1], angular_velocity = [0, 0, {sign}] }}]
+            joints = [{{ kind = "revolute", a = "{a}", b = "{b}" }}]
+            "#
+        );
+        let mut simulation = SceneFile::parse(&text, &[]).unwrap().build().unwrap();
+        simulation.run(0.1, 1e-3, &mut ()).unwrap();
+        simulation.joints()[0].angle
+    };
+    assert!((angle("world", "arm", 1.0) - 0.1).abs() < 1e-6);
+    assert!((angle("arm", "world", -1.0) - 0.1).abs() < 1e-6);
+}

@@ -113,7 +113,14 @@ impl SetPart {
 
     fn text(&self) -> String {
         let some = self.numbers.iter().filter(|(_, n)| *n > 0);
-        let some: Vec<_> = some.map(|(name, n)| format!(", {n} {name}")).collect();
+        let words = |name: &str| match name {
+            "lower" | "upper" => {
+                format!("with {} {name} bound", if name == "upper" { "an" } else { "a" })
+            }
+            "both" => "between two bounds".into(),
+            other => other.to_owned(),
+        };
+        let some: Vec<_> = some.map(|(name, n)| format!(", {n} {}", words(name))).collect();
         let sort = self.sort.replace("second_order", "second-order").replace('_', " ");
         format!("{sort} in {}{}", count(self.dimension, "variable"), some.concat())
     }

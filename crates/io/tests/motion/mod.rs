@@ -1,7 +1,7 @@
 //! A small run to be written: a floor, a ball that bounces and a box that slides.
 
 use nonsmooth_io::trajectory::{
-    Checkpoint, Contact, Energy, Frame, Named, State, Step, Trajectory,
+    Checkpoint, Contact, Energy, Frame, Joint, Named, State, Step, Trajectory,
 };
 use nonsmooth_problem::check::Motion;
 
@@ -34,6 +34,13 @@ pub fn run(frames: usize) -> Trajectory {
             time: t,
             bodies: vec![state(0.0, 0.0, 0.0), state(t, 0.2 + bounce, t), state(-t, 0.5, 0.0)],
             contacts: (0..k % 5).map(contact).collect(),
+            joints: vec![Joint {
+                angle: t,
+                slide: -t,
+                impulse: [1.0, t, 0.0],
+                moment: [0.0, 0.5, t],
+                violation: 1e-16,
+            }],
         }
     };
     let step = |k: usize| Step {
@@ -51,12 +58,19 @@ pub fn run(frames: usize) -> Trajectory {
         slip: 2,
         penetration: 1e-9,
         wall: 1e-4,
-        energy: Energy { kinetic: 1.0, potential: k as f64, imbalance: -0.0, ..Energy::default() },
+        energy: Energy {
+            kinetic: 1.0,
+            joints: -2.0,
+            potential: k as f64,
+            imbalance: -0.0,
+            ..Energy::default()
+        },
     };
     Trajectory {
         scene: "title = \"Käfer\"\n[[body]]\n".into(),
         program: "nonsmooth 0.1.0".into(),
         bodies: vec![named("floor", true), named("Kugel ⌀ 0.4", false), named("", false)],
+        joints: vec!["Gelenk".into()],
         frames: (0..frames).map(frame).collect(),
         steps: (0..2 * frames).map(step).collect(),
         checkpoint: Some(Checkpoint {

@@ -43,10 +43,10 @@ impl SceneFile {
         for (k, table) in self.generate.iter().enumerate() {
             builder.family(table, &format!("generate[{k}]"))?;
         }
+        // Partners of a joint need no law of contact.
+        super::joints::join(&mut builder.world, &self.joints, &self.couplings)?;
         builder.laws()?;
-        let mut world = builder.world;
-        super::joints::join(&mut world, &self.joints, &self.couplings)?;
-        Ok(world)
+        Ok(builder.world)
     }
 
     /// The scene, ready to move.
