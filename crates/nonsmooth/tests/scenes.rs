@@ -188,7 +188,8 @@ fn a_four_bar_stalls_at_its_limit() {
     let joints = simulation.joints();
     assert!((joints[3].angle - 0.3).abs() < 2e-3, "{:?}", joints[3]);
     // The links from the pivots: crank at φ, rocker at ψ, 0.5 m between their heads.
-    let first = (0.397_909_618_f64).atan2(0.459_163_847 - 0.5);
+    let z = (0.16 + 0.5824_f64.sqrt()) / 2.32;
+    let first = z.atan2(0.4 * z - 0.2);
     let psi = first + joints[3].angle;
     let head = [0.5 + 0.4 * psi.cos(), 0.4 * psi.sin()];
     let phi = std::f64::consts::FRAC_PI_2 + joints[0].angle;

@@ -55,4 +55,4 @@ pub use scene_file::SceneFile;
 pub use shape::{Part, Shape, plane};
 pub use simulation::{Control, Force, Observer, Simulation, Wrenches};
 pub use state::{ContactMemory, State};
-pub use world::{Body, BodyId, Law, Motion, World};
+pub use world::{Body, BodyId, Compliance, Law, Motion, World};

@@ -40,8 +40,8 @@ use crate::rotation::{Pose, apply_transposed, cayley, inverse, unit};
 use crate::state::{Remembered, State};
 use crate::world::oscillation;
 use crate::{
-    Activation, BodyId, Force, Geometry, Gyroscopic, Impact, MoreauJean, Motion, SimulateError,
-    Stabilisation, World, Wrenches,
+    Activation, BodyId, Compliance, Force, Geometry, Gyroscopic, Impact, MoreauJean, Motion,
+    SimulateError, Stabilisation, World, Wrenches,
 };
 
 /// Six components of a body for each direction of a contact; the fourth place is for the processor.
@@ -65,6 +65,8 @@ struct Arm {
 #[derive(Debug, Clone, Copy)]
 struct Row {
     mu: f64,
+    /// What a normal impulse gives way by, over it.
+    compliance: f64,
     place: Place,
     /// Directions of impulses and of velocities.
     frame: [Vec3; 3],
@@ -474,6 +476,11 @@ impl Tools {
                 }
                 Activation::Gap => true,
             };
+            // A spring acts where it is compressed at the end of the step.
+            let active = match near.compliance {
+                Some(_) => gap + h * approach.min(0.0) <= 0.0,
+                None => active,
+            };
             if !active {
                 self.row_of.push(NONE);
                 continue;
@@ -553,7 +560,12 @@ impl Tools {
             if closed && before[0] < -scheme.restitution_threshold {
                 shift[0] = law.e * before[0];
             }
-            if scheme.activation == Activation::Gap {
+            let compliance = near.compliance.map_or(0.0, |Compliance { stiffness, damping }| {
+                let resistance = damping + h * stiffness;
+                shift[0] = stiffness * gap / resistance;
+                1.0 / (h * resistance)
+            });
+            if scheme.activation == Activation::Gap && near.compliance.is_none() {
                 shift[0] += gap.max(0.0) / h;
             }
             let r = match known.filter(|_| pushed) {
@@ -562,6 +574,7 @@ impl Tools {
             };
             self.rows.push(Row {
                 mu: law.mu,
+                compliance,
                 place,
                 frame,
                 frame_end,
@@ -836,10 +849,12 @@ impl Tools {
                     let there = &problem.W.row(j as usize).1[*at as usize];
                     std::array::from_fn(|p| std::array::from_fn(|q| there[q][p]))
                 } else {
+                    let mut block = coupling(row, &rows[order[j as usize] as usize]);
                     if j as usize == c {
                         mirrored[c] = width;
+                        block[0][0] += row.compliance;
                     }
-                    coupling(row, &rows[order[j as usize] as usize])
+                    block
                 };
                 width += 1;
                 check += 0.0 * (block[0][0] + block[1][1] + block[2][2]);

@@ -207,6 +207,21 @@ impl Law {
     }
 }
 
+/// A contact that gives way, by Kelvin and Voigt's law: `r_N = h (−k g⁺ − d u_N⁺)₊` with `g⁺ = g + h u_N⁺`, which is
+///
+/// ```text
+/// 0 ≤ r_N ⟂ u_N + c r_N + k g/(d + h k) ≥ 0,     c = 1/(h (d + h k)):
+/// ```
+///
+/// a diagonal on W and a term in q. Friction as before. Implicit: stable for every stiffness and step, and of first order.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Compliance {
+    /// k of each contact point, N/m.
+    pub stiffness: f64,
+    /// d of each contact point, N·s/m.
+    pub damping: f64,
+}
+
 /// Bodies, materials and gravity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct World {
@@ -218,6 +233,7 @@ pub struct World {
     pub law: Law,
     materials: Vec<String>,
     pairs: BTreeMap<(usize, usize), Law>,
+    compliances: BTreeMap<(usize, usize), Compliance>,
     apart: BTreeSet<(BodyId, BodyId)>,
     /// All joints; a [`JointId`] is a place here.
     pub joints: Vec<Joint>,
@@ -240,6 +256,7 @@ impl World {
             law: Law::default(),
             materials: vec!["default".into()],
             pairs: BTreeMap::new(),
+            compliances: BTreeMap::new(),
             apart: BTreeSet::new(),
             joints: vec![],
             couplings: vec![],
@@ -298,6 +315,16 @@ impl World {
         self.pairs.insert((a.min(b), a.max(b)), law);
     }
 
+    /// Lets contacts of two materials give way. They have no restitution: their rebound is that of the spring.
+    pub fn comply(&mut self, a: usize, b: usize, compliance: Compliance) {
+        self.compliances.insert((a.min(b), a.max(b)), compliance);
+    }
+
+    /// How contacts of two materials give way, if they do.
+    pub fn compliance_between(&self, a: usize, b: usize) -> Option<Compliance> {
+        self.compliances.get(&(a.min(b), a.max(b))).copied()
+    }
+
     /// The law between two materials.
     pub fn law_between(&self, a: usize, b: usize) -> Law {
         self.pairs.get(&(a.min(b), a.max(b))).copied().unwrap_or(self.law)
@@ -342,6 +369,16 @@ impl World {
                 return Err(SimulateError::value(key, expected, format!("{a} and {b}")));
             }
             law.validate(&key)?;
+        }
+        for (&(a, b), compliance) in &self.compliances {
+            let name = |k: usize| self.materials.get(k).map_or("?", String::as_str);
+            let key = format!("pairs[{}, {}]", name(a), name(b));
+            let Compliance { stiffness, damping } = *compliance;
+            let place = |field: &str| format!("{key}.compliance.{field}");
+            require(|| place("stiffness"), stiffness, stiffness > 0.0, "a positive number")?;
+            require(|| place("damping"), damping, damping >= 0.0, "a number of at least 0")?;
+            let e = self.law_between(a, b).e;
+            require(|| format!("{key}.e"), e, e == 0.0, "0 where contacts have a compliance")?;
         }
         for (k, body) in self.bodies.iter_mut().enumerate() {
             let key = match body.name.as_str() {

@@ -439,8 +439,8 @@ fn mistakes_in_joints_are_named_by_their_place() {
     let cases = [
         (r#"joints = [{ kind = "revolut", a = "world", b = "arm" }]"#, "joints[0].kind"),
         (
-            r#"joints = [{ kind = "revolute", a = "world", b = "amr" }]"#,
-            "joints[0].b: expected the name of a body, found `amr` (did you mean `arm`?)",
+            r#"joints = [{ kind = "revolute", a = "world", b = "arn" }]"#,
+            "joints[0].b: expected the name of a body, found `arn` (did you mean `arm`?)",
         ),
         (r#"joints = [{ kind = "revolute", a = "world", b = "world" }]"#, "joints[0].b"),
         (

@@ -30,7 +30,7 @@ use nonsmooth_scenes::vec3::{Vec3, add, scale, sub};
 
 use crate::rotation::Pose;
 use crate::state::{Axis, State};
-use crate::{BodyId, Law, Shape, SimulateError, World};
+use crate::{BodyId, Compliance, Law, Shape, SimulateError, World};
 use broad::{Aabb, Broad};
 use clip::Clip;
 use convex::{Extent, Flat, Side};
@@ -49,6 +49,7 @@ pub(crate) struct Near {
     pub a: u32,
     pub b: u32,
     pub law: Law,
+    pub compliance: Option<Compliance>,
     /// The size of the smaller shape.
     pub size: f64,
     pub place: Place,
@@ -331,6 +332,7 @@ impl Detector {
         let (s, t) = (&solids[i as usize], &solids[j as usize]);
         let (a, b) = (&poses[s.body as usize], &poses[t.body as usize]);
         let law = world.law_between(s.material, t.material);
+        let compliance = world.compliance_between(s.material, t.material);
         let size = s.size.min(t.size);
         let fallback = || {
             // Bodies that coincide leave no direction: from the one centre to the other, upwards if these do too.
@@ -343,7 +345,8 @@ impl Detector {
             if place.gap <= prediction {
                 let key = Key { shape_a: i, shape_b: j, feature_a: f.code(), feature_b: g.code() };
                 let deep = place.gap < -DEEP * size;
-                out.push(Near { key, a: s.body, b: t.body, law, size, place, witness, deep });
+                let (a, b) = (s.body, t.body);
+                out.push(Near { key, a, b, law, compliance, size, place, witness, deep });
             }
         };
         let center = |segment: &Segment, pose: &Pose| pose.point(segment.p);

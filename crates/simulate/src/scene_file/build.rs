@@ -6,14 +6,14 @@ use nonsmooth_scenes::vec3::{Mat3, Vec3, add, norm};
 use nonsmooth_scenes::{Polyhedron, Rotation, SceneEntry};
 
 use super::{
-    BodyTable, ForceTable, GenerateTable, LawTable, MotionTable, PartTable, RotationTable,
-    SceneFile, ShapeOrName, ShapeTable,
+    BodyTable, ComplianceTable, ForceTable, GenerateTable, LawTable, MotionTable, PartTable,
+    RotationTable, SceneFile, ShapeOrName, ShapeTable,
 };
 use crate::error::{finite, require};
 use crate::shape::plane;
 use crate::{
-    Body, BodyId, Law, Mesh, Motion, Part, Settled, Shape, SimulateError, Simulation, State, World,
-    Wrenches,
+    Body, BodyId, Compliance, Law, Mesh, Motion, Part, Settled, Shape, SimulateError, Simulation,
+    State, World, Wrenches,
 };
 
 /// Groups have a bit each.
@@ -430,6 +430,9 @@ impl<'a> Builder<'a> {
                 return Err(twice(&format!("pairs[{k}].between"), &names));
             }
             self.world.pair(a, b, Law { mu: pair.mu, e: pair.e, e_t: pair.e_t });
+            if let Some(ComplianceTable { stiffness, damping }) = pair.compliance {
+                self.world.comply(a, b, Compliance { stiffness, damping });
+            }
         }
         match self.file.pairs_default {
             Some(_) => Ok(()),

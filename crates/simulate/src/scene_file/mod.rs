@@ -160,6 +160,20 @@ pub struct PairTable {
     /// Tangential coefficient of restitution, above −1 and at most 1.
     #[serde(default)]
     pub e_t: f64,
+    /// How contacts give way, if they do; then without restitution.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compliance: Option<ComplianceTable>,
+}
+
+/// A spring and a damper at each contact point.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ComplianceTable {
+    /// N/m.
+    pub stiffness: f64,
+    /// N·s/m.
+    #[serde(default)]
+    pub damping: f64,
 }
 
 /// A shape.

@@ -245,3 +245,46 @@ fn mistakes_are_named_by_their_place() {
     assert!(refused.err().unwrap().to_string().starts_with("integrator.theta"));
     near(G, 9.81, 0.0);
 }
+
+/// A ball of 1 kg on a spring of 1e4 N/m sinks in by its weight over the stiffness; dropped, it is thrown back after half a period.
+#[test]
+fn a_contact_that_gives_way_has_its_stiffness() {
+    let (k, mass) = (1e4, 1.0);
+    let stand = |damping: f64, height: f64| {
+        let mut world = crate::world(0.3, 0.0);
+        world.comply(0, 0, nonsmooth_simulate::Compliance { stiffness: k, damping });
+        world.add(nonsmooth_simulate::Body::floor());
+        world.add(crate::ball(0.1).at([0.0, 0.0, 0.1 + height]));
+        crate::simulation(world)
+    };
+    let mut resting = stand(20.0, 0.0);
+    crate::run(&mut resting, 3.0, 1e-3);
+    crate::near(resting.state().position[1][2], 0.1 - mass * crate::G / k, 1e-9);
+    crate::near(resting.contacts()[0].impulse[0], mass * crate::G * 1e-3, 1e-12);
+
+    let mut dropped = stand(0.0, 0.05);
+    let (mut began, mut ended) = (None, None);
+    let h = 1e-5;
+    while dropped.state().t < 0.2 {
+        assert!(dropped.step(h).unwrap().status.is_solved());
+        let touches = dropped.contacts().iter().any(|c| c.impulse[0] > 0.0);
+        let t = dropped.state().t;
+        match (touches, began) {
+            (true, None) => began = Some(t),
+            (false, Some(_)) if ended.is_none() => ended = Some(t),
+            _ => {}
+        }
+    }
+    // The time in contact: x = v/ω sin ωt + g/ω² (1 − cos ωt) back to zero.
+    let (omega, v) = ((k / mass).sqrt(), (2.0 * crate::G * 0.05).sqrt());
+    let lasts = (std::f64::consts::TAU - 2.0 * (v * omega / crate::G).atan()) / omega;
+    crate::near(ended.unwrap() - began.unwrap(), lasts, 3e-4 * lasts + 2.0 * h);
+}
+
+#[test]
+fn a_compliance_leaves_no_room_for_restitution() {
+    let mut world = crate::world(0.3, 0.5);
+    world.comply(0, 0, nonsmooth_simulate::Compliance { stiffness: 1e4, damping: 0.0 });
+    let said = world.validate().unwrap_err().to_string();
+    assert!(said.contains("pairs[default, default].e: expected 0"), "{said}");
+}
