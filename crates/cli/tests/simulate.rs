@@ -88,6 +88,16 @@ fn a_run_goes_on_where_it_ended_as_if_it_had_not() {
         assert!(folder.path(name).exists(), "{name}");
     }
 
+    folder.run("play part.h5 --svg last.svg").exits(0);
+    folder.run("play part.h5 --svg frames").exits(0);
+    let drawn = std::fs::read_to_string(folder.path("last.svg")).unwrap();
+    assert!(drawn.starts_with("<svg") && drawn.contains("</svg>"));
+    let frames = std::fs::read_dir(folder.path("frames")).unwrap().count();
+    assert!(frames > 1 && !folder.path("last.html").exists(), "{frames}");
+    let last = std::fs::read_to_string(folder.path(&format!("frames/frame-{:06}.svg", frames - 1)));
+    assert_eq!(last.unwrap(), drawn);
+    folder.run("play part.h5 --svg last.png").refused(&["--svg last.png", ".svg"]);
+
     let other = folder.run("simulate box.toml --resume part.h5 --set bodies[1].density=500");
     other.refused(&["a trajectory of the same scene"]);
 }

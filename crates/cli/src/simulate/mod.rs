@@ -51,6 +51,9 @@ pub struct Args {
     /// Write for ParaView: FILE.pvd, with the frames in a folder beside it
     #[arg(long, value_name = "FILE.pvd")]
     vtk: Option<PathBuf>,
+    /// Draw a picture on paper of the last frame; or, as the name of a folder, pictures of all frames
+    #[arg(long, value_name = "FILE.svg|DIR")]
+    svg: Option<PathBuf>,
     /// Write the contact problem of each step that is not solved, and with --dump-every of others, as FCLIB files in this folder
     #[arg(long, value_name = "DIR")]
     dump_fclib: Option<PathBuf>,
@@ -88,6 +91,7 @@ Examples:
   nonsmooth simulate scene.toml --resume run.h5 --end 10    further
   nonsmooth simulate scene.toml --explain                   the scene with every default
   nonsmooth play run.h5 --html run.html                     a page from a trajectory
+  nonsmooth play run.h5 --svg frames                        a picture of each frame, in a folder
 
 Exit codes: 0 every step is solved; 1 a step is not solved, or the run was stopped; 2 a mistake in a file or an option; 130 Ctrl-C pressed twice.";
 
@@ -105,6 +109,9 @@ pub struct PlayArgs {
     /// As glTF, for Blender and other viewers
     #[arg(long, value_name = "FILE.glb")]
     glb: Option<PathBuf>,
+    /// A picture on paper of the last frame; or, as the name of a folder, pictures of all frames
+    #[arg(long, value_name = "FILE.svg|DIR")]
+    svg: Option<PathBuf>,
 }
 
 /// The end of a family's run, s, where nobody says another.
@@ -174,6 +181,9 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     if let Some(folder) = &args.dump_fclib {
         files::folder("--dump-fclib", folder)?;
     }
+    if let Some(svg) = &args.svg {
+        record::drawable(svg)?;
+    }
     let wrong = |e| format!("{}: {e}", path.display());
     let cancel = interrupt::flag();
     let limits = Limits {
@@ -189,7 +199,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     .map_err(wrong)?;
     let mut simulation = simulation.with_limits(limits);
     simulation.warnings().iter().for_each(|w| output::remark(&format!("warning: {w}\n")));
-    let frames = out.is_some() || html.is_some() || vtk.is_some();
+    let frames = out.is_some() || html.is_some() || vtk.is_some() || args.svg.is_some();
     let mut recorder = Recorder::new(&scene, &simulation, frames);
     if let Some(file) = &args.resume {
         recorder.resume(file, &mut simulation)?;
@@ -251,6 +261,10 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         record::paraview(vtk, &recorder.trajectory, simulation.world())?;
         written.push(vtk.clone());
     }
+    if let Some(svg) = &args.svg {
+        record::drawings(svg, &recorder.trajectory, &scene, simulation.world())?;
+        written.push(svg.clone());
+    }
     let run = said::Run {
         path: &path,
         scene: &scene,
@@ -286,12 +300,16 @@ fn complete(report: &RunReport) -> bool {
 /// Runs `play`.
 pub fn play(args: &PlayArgs) -> Result<Exit, String> {
     let file = &args.file;
-    let page = args.html.is_some() || (args.vtk.is_none() && args.glb.is_none());
+    let others = [&args.vtk, &args.glb, &args.svg];
+    let page = args.html.is_some() || others.iter().all(|path| path.is_none());
     let html = page.then(|| args.html.clone().unwrap_or_else(|| file.with_extension("html")));
     for (option, path) in [("--html", &html), ("--vtk", &args.vtk), ("--glb", &args.glb)] {
         if let Some(path) = path {
             files::writable(option, path)?;
         }
+    }
+    if let Some(svg) = &args.svg {
+        record::drawable(svg)?;
     }
     let trajectory = Trajectory::read(file).map_err(|e| e.to_string())?;
     let wrong = |e| format!("{}: /scene: {e}", file.display());
@@ -310,6 +328,10 @@ pub fn play(args: &PlayArgs) -> Result<Exit, String> {
     if let Some(glb) = &args.glb {
         record::gltf(glb, &trajectory, &world)?;
         row(&mut said, "glTF", glb.display());
+    }
+    if let Some(svg) = &args.svg {
+        record::drawings(svg, &trajectory, &scene, &world)?;
+        row(&mut said, "pictures", svg.display());
     }
     output::print(&said);
     Ok(Exit::Solved)

@@ -10,8 +10,9 @@ use nonsmooth_io::trajectory::{
 use nonsmooth_io::{Info, Mesh, ProblemFile, vtk};
 use nonsmooth_problem::check::Motion;
 use nonsmooth_problem::{AnyProblem, Friction, FrictionLocal, Problem};
+use nonsmooth_scenes::SceneError;
 use nonsmooth_scenes::draw::playback::{self, Drawn, Form, Moment, Placed, Playback};
-use nonsmooth_scenes::draw::{Pose, Touch};
+use nonsmooth_scenes::draw::{self, Drawing, Pose, Touch};
 use nonsmooth_simulate::{
     ContactReport, Control, JointReport, Observer, SceneFile, Shape, Simulation, StepReport, World,
 };
@@ -327,6 +328,44 @@ pub fn paraview(path: &Path, trajectory: &Trajectory, world: &World) -> Result<(
 pub fn gltf(path: &Path, trajectory: &Trajectory, world: &World) -> Result<(), String> {
     let meshes = meshes(trajectory, world);
     nonsmooth_io::gltf::write(path, trajectory, &meshes).map_err(|e| format!("--glb {e}"))
+}
+
+/// Whether pictures go to a folder; else to one file.
+fn is_folder(path: &Path) -> bool {
+    path.extension().is_none()
+}
+
+/// Checks that pictures can be written there.
+pub fn drawable(path: &Path) -> Result<(), String> {
+    match path.extension() {
+        None => files::folder("--svg", path),
+        Some(e) if e == "svg" => files::writable("--svg", path),
+        Some(_) => Err(format!(
+            "--svg {}: expected a name that ends in .svg, or the name of a folder, found another ending",
+            path.display()
+        )),
+    }
+}
+
+/// Pictures of frames: of the last one in a file, or of all in a folder.
+pub fn drawings(
+    path: &Path,
+    trajectory: &Trajectory,
+    scene: &SceneFile,
+    world: &World,
+) -> Result<(), String> {
+    let playback = playback(trajectory, scene, world);
+    let wrong = |e: SceneError| format!("--svg: {e}");
+    let draw = |frame: usize, to: &Path| {
+        let picture = playback.picture(frame).map_err(wrong)?;
+        let text = draw::svg(&picture, &Drawing::default()).map_err(wrong)?;
+        files::write_text("--svg", to, &text)
+    };
+    let frames = trajectory.frames.len();
+    match is_folder(path) {
+        true => (0..frames).try_for_each(|k| draw(k, &path.join(format!("frame-{k:06}.svg")))),
+        false => draw(frames.saturating_sub(1), path),
+    }
 }
 
 /// Writes contact problems of steps, and lets another observer see them.
