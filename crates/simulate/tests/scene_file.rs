@@ -87,19 +87,21 @@ name = "wedge"
 shape = { kind = "mesh", vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], triangles = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] }
 density = 500
 position = [-4, 0, 0]
+groups = ["wedges"]
 
 [[bodies]]
 name = "hills"
 shape = { kind = "heightfield", heights = [[0, 0.1], [0.2, 0], [0, 0.1]], size = [2, 3] }
 position = [0, 20, 0]
 fixed = true
+collides_with = ["balls"]
 
 [[joints]]
 name = "hook"
 kind = "revolute"
 a = "world"
-b = "ball"
-anchor = [2, 0, 0.2]
+b = "reel"
+anchor = [-2, 0, 0.6]
 axis = [0, 1, 0]
 limits = { lower = -1, upper = 1 }
 
@@ -163,7 +165,7 @@ fn values_can_be_changed_by_their_paths() {
     assert_eq!((scene.solver.name.as_str(), scene.name.as_str()), ("auto", "other"));
     for (change, says) in [
         ("time.end", "--set: expected KEY=VALUE"),
-        ("bodies[9].mass=1", "--set bodies[9].mass: expected a place below 4, found 9"),
+        ("bodies[9].mass=1", "--set bodies[9].mass: expected a place below 7, found 9"),
         ("time.step=1", "time.step: unknown field `step`"),
     ] {
         let error = SceneFile::parse(SCENE, &[change]).unwrap_err().to_string();

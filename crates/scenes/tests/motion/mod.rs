@@ -21,6 +21,16 @@ pub fn playback(frames: usize) -> Playback {
         Placed { position: [0.0, 0.0, 0.2], ..placed(Form::Box { half: [0.05, 0.12, 0.05] }) },
         placed(Form::Capsule { half_length: 0.15, radius: 0.03 }),
     ];
+    let beside = |x: f64| move |form| Placed { position: [x, 0.0, 0.0], ..placed(form) };
+    let block = vec![
+        placed(Form::Box { half: [0.1, 0.5, 0.3] }),
+        beside(0.4)(Form::Cylinder { half_length: 0.2, radius: 0.1 }),
+        beside(0.8)(Form::Cone { half_length: 0.2, radius: 0.1 }),
+        beside(1.2)(Form::Mesh {
+            vertices: vec![[0.0; 3], [0.2, 0.0, 0.0], [0.0, 0.2, 0.1]],
+            faces: vec![vec![0, 1, 2]],
+        }),
+    ];
     let bodies = vec![
         drawn("floor", true, vec![placed(Form::Plane)]),
         drawn("ball", false, vec![placed(Form::Sphere { radius: 0.2 })]),
@@ -35,7 +45,7 @@ pub fn playback(frames: usize) -> Playback {
             })],
         ),
         drawn("hammer", false, hammer),
-        drawn("block", true, vec![placed(Form::Box { half: [0.1, 0.5, 0.3] })]),
+        drawn("block", true, block),
     ];
     let moment = |k: usize| {
         let t = 0.01 * k as f64;
