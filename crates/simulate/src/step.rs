@@ -713,7 +713,7 @@ impl Tools {
             }
             let mut change = self.respond(scheme, span, h);
             if scheme.geometry == Geometry::Midpoint && !self.scalars.is_empty() {
-                change = change.max(self.to_the_middle(scheme, world, h));
+                change = change.max(self.recentre(scheme, world, h));
             }
             let residual = outcome.measure.relative;
             if outcome.status != Status::Solved {
@@ -735,7 +735,7 @@ impl Tools {
     }
 
     /// Takes the joints of the island at the middle that this pass has come to; how far that has moved the bodies since the last one, relative.
-    fn to_the_middle(&mut self, scheme: &MoreauJean, world: &World, h: f64) -> f64 {
+    fn recentre(&mut self, scheme: &MoreauJean, world: &World, h: f64) -> f64 {
         let Self { members, bodies, joints, scalars, .. } = self;
         let (mut moved, mut size): (f64, f64) = (0.0, f64::MIN_POSITIVE);
         for &k in members.iter() {
