@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use nonsmooth_problem::check::Measure;
 use nonsmooth_scenes::vec3::Vec3;
 use nonsmooth_solve::Status;
 
@@ -158,7 +159,7 @@ pub struct StepReport {
     pub t: f64,
     /// Its length, s.
     pub h: f64,
-    /// The judge's relative residual, the worst of all islands.
+    /// The judge's relative residual of contacts and scalar rows, the worst of all islands.
     pub residual: f64,
     /// The energy by terms.
     pub energy: EnergyBalance,
@@ -186,6 +187,15 @@ impl StepReport {
             drift: Drift::default(),
             timings: Timings::default(),
         }
+    }
+}
+
+/// What the judge compares with the tolerance: of the contacts, and of the scalar rows, which may be alone.
+pub(crate) fn worst_share(measure: &Measure) -> f64 {
+    match measure.bilateral {
+        // A maximum that a NaN is not lost in.
+        Some(rows) if rows > measure.relative || rows.is_nan() => rows,
+        _ => measure.relative,
     }
 }
 

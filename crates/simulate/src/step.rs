@@ -35,7 +35,7 @@ use crate::detect::{Detector, Near, Place};
 use crate::islands::Islands;
 use crate::joints::Joints;
 use crate::moving::Moving;
-use crate::report::{ContactReport, EnergyBalance, StepReport, StepStatus, Timings};
+use crate::report::{ContactReport, EnergyBalance, StepReport, StepStatus, Timings, worst_share};
 use crate::rotation::{Pose, apply_transposed, cayley, inverse, unit};
 use crate::state::{Remembered, State};
 use crate::world::oscillation;
@@ -715,7 +715,7 @@ impl Tools {
             if scheme.geometry == Geometry::Midpoint && !self.scalars.is_empty() {
                 change = change.max(self.recentre(scheme, world, h));
             }
-            let residual = outcome.measure.relative;
+            let residual = worst_share(&outcome.measure);
             if outcome.status != Status::Solved {
                 return Ok((
                     StepStatus::Solver(outcome.status),

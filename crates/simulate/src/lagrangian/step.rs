@@ -38,7 +38,7 @@ use super::project::Projection;
 use super::state::LagrangianState;
 use super::{Lagrangian, LagrangianContact, LagrangianScheme};
 use crate::drive::CANCELLED;
-use crate::report::{Counts, Drift, EnergyBalance, StepReport, StepStatus, Timings};
+use crate::report::{Counts, Drift, EnergyBalance, StepReport, StepStatus, Timings, worst_share};
 use crate::{Directions, SimulateError};
 
 /// All memory of a simulation that is not its state.
@@ -333,7 +333,7 @@ impl<const D: usize> Tools<D> {
         let outcome = session.solve(problem, point, limits, &mut |_| {})?;
         report.timings.solve += begun.elapsed().as_secs_f64();
         report.counts.iterations += outcome.iterations;
-        report.residual = outcome.measure.relative;
+        report.residual = worst_share(&outcome.measure);
         lines.respond(point, &m.free, &mut m.v);
         match outcome.status {
             Status::Solved => Ok(()),
