@@ -1,7 +1,8 @@
-//! How long a step takes: `cargo run --release -p nonsmooth-simulate --example steps -- [tolerance] [steps]`.
+//! How long a step takes: `cargo run --release -p nonsmooth-simulate --example steps -- [tolerance] [steps] [FOLDER]`.
 //!
 //! A pyramid of 55 boxes, piles of 500 and of 1000 spheres: medians in ms over steps of 5 ms once they have come to rest: processor time, wall clock,
-//! and the phases by wall clock.
+//! and the phases by wall clock. With a folder the worlds at rest are written there as JSON, for peers to do the same
+//! (docs/benchmarks/simulation_mujoco.py).
 
 use std::error::Error;
 
@@ -29,10 +30,32 @@ fn pile(count: usize) -> Result<World, SimulateError> {
     World::try_from(&SpherePile { count, mu: 0.4, ..SpherePile::default() }.build()?)
 }
 
+/// Bodies with their shapes and places, as JSON.
+fn written(simulation: &Simulation) -> String {
+    let (world, state) = (simulation.world(), simulation.state());
+    let bodies = world.bodies.iter().enumerate().map(|(k, body)| {
+        let parts = body.parts.iter().map(|part| match &part.shape {
+            Shape::Sphere { radius } => format!(r#"{{"sphere": {radius}}}"#),
+            Shape::Box { half } => format!(r#"{{"box": {half:?}}}"#),
+            _ => r#"{"plane": true}"#.into(),
+        });
+        format!(
+            r#"{{"free": {}, "mass": {:?}, "position": {:?}, "rotation": {:?}, "shapes": [{}]}}"#,
+            body.is_free(),
+            body.mass,
+            state.position[k],
+            state.rotation[k],
+            parts.collect::<Vec<_>>().join(", ")
+        )
+    });
+    format!("[\n{}\n]\n", bodies.collect::<Vec<_>>().join(",\n"))
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let tolerance: f64 = arguments.next().map_or(Ok(1e-8), |t| t.parse())?;
     let steps: usize = arguments.next().map_or(Ok(1000), |t| t.parse())?;
+    let folder = arguments.next().map(std::path::PathBuf::from);
     println!(
         "{:<12} {:>7} {:>8} {:>8} {:>8} {:>8} {:>8} {:>6} {:>8} {:>7}",
         "scene",
@@ -55,6 +78,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             Simulation::new(world, MoreauJean::default())?.with_tolerance(tolerance);
         for _ in 0..settling {
             simulation.step(5e-3)?;
+        }
+        if let Some(folder) = &folder {
+            let file = folder.join(name.replace(' ', "-")).with_extension("json");
+            std::fs::write(file, written(&simulation))?;
         }
         let mut cpu = vec![];
         let mut reports: Vec<StepReport> = vec![];

@@ -218,3 +218,24 @@ fn meshes_come_from_files_beside_the_scene() {
     }
     std::fs::remove_dir_all(&folder).unwrap();
 }
+
+/// Closed forms: m (3 r² + h²)/12 and m r²/2 of a cylinder; a cone's centre is a quarter of its height above its base, with 3 m (r² + h²/4)/20 and 3 m r²/10.
+#[test]
+fn round_solids_have_the_moments_of_the_tables() {
+    let (r, half, density) = (0.3_f64, 0.4, 500.0);
+    let h: f64 = 2.0 * half;
+    let cylinder = Body::solid(Shape::Cylinder { half_length: half, radius: r }, density).unwrap();
+    let m = std::f64::consts::PI * r * r * h * density;
+    near(cylinder.mass, m, 1e-12 * m);
+    let across = m * (3.0 * r * r + h * h) / 12.0;
+    for (k, moment) in [across, across, 0.5 * m * r * r].into_iter().enumerate() {
+        near(cylinder.inertia[k][k], moment, 1e-12 * m);
+    }
+    let cone = Body::solid(Shape::Cone { half_length: half, radius: r }, density).unwrap();
+    near(cone.mass, m / 3.0, 1e-12 * m);
+    near(cone.position[2], -half + h / 4.0, 1e-14);
+    let across = 3.0 * (m / 3.0) * (r * r + 0.25 * h * h) / 20.0;
+    for (k, moment) in [across, across, 0.3 * (m / 3.0) * r * r].into_iter().enumerate() {
+        near(cone.inertia[k][k], moment, 1e-12 * m);
+    }
+}
