@@ -112,7 +112,7 @@ pub enum Impact {
 pub enum Stabilisation {
     /// Nothing: they drift apart, by O(h²) at θ = ½.
     None,
-    /// After each step the smallest correction of positions in the norm of the masses that closes them; velocities stay.
+    /// After each step the smallest corrections of positions and of velocities, in the norm of the masses, that close them.
     DirectProjection,
 }
 
