@@ -35,6 +35,10 @@ fn every_scene_has_a_test() {
         if path.extension().is_some_and(|e| e == "toml") {
             let name = path.file_stem().unwrap().to_string_lossy().into_owned();
             assert!(tests.contains(&format!("run(\"{name}\"")), "{name}");
+            let page = include_str!("../../../examples/scenes/README.md");
+            assert!(page.contains(&format!("({name}.toml)")), "README.md: {name}");
+            assert!(page.contains(&format!("({name}.svg)")), "README.md: {name}");
+            assert!(path.with_extension("svg").exists(), "bash examples/scenes/make.sh: {name}");
             count += 1;
         }
     }
@@ -212,4 +216,23 @@ fn a_slider_follows_its_crank() {
         worst = worst.max((simulation.state().position[slider][0] - exact).abs());
     });
     assert!(worst < 1e-10, "{worst:e}");
+}
+
+/// A motor turns the arm at 1 rad/s, the arm pushes a box of 1.44 kg: friction on the floor takes mu m g along the way of the box, and more for what it turns and
+/// for the hand that slides along it.
+#[test]
+fn an_arm_pushes_a_box() {
+    let (mut way, mut friction, mut last) = (0.0, 0.0, None);
+    let (simulation, _) = run("sweeper", |simulation, report| {
+        let x = simulation.state().position[place(simulation, "box")];
+        let last = last.replace(x).unwrap_or(x);
+        way += (x[0] - last[0]).hypot(x[1] - last[1]);
+        friction -= report.energy.tangential;
+    });
+    let share = friction / (0.4 * 1.44 * 9.81 * way);
+    assert!((1.0..1.3).contains(&share) && way > 0.3, "{share} {way}");
+    let shoulder = simulation.joints()[0];
+    assert!((simulation.state().spin[1][2] - 1.0).abs() < 1e-9, "{:?}", simulation.state().spin);
+    // All its torque goes through the joint: friction, damper and push together.
+    assert!(shoulder.violation < 1e-12 && shoulder.angle > 1.0, "{shoulder:?}");
 }

@@ -188,7 +188,7 @@ fn the_key_explains_what_is_shown_and_nothing_else() {
         texts.map(|t| t.rsplit('>').next().unwrap().to_string()).collect::<Vec<_>>()
     };
     let all = Drawing::default();
-    let velocity = "velocity before the step, up to 1 m/s";
+    let velocity = "velocity, up to 1 m/s";
     assert_eq!(explained(&bare(&scene), &all), ["contact", velocity]);
     let none = Drawing { contacts: false, velocities: false, ..all };
     assert!(explained(&bare(&scene), &none).is_empty());

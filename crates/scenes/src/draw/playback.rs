@@ -391,7 +391,10 @@ impl Playback {
             numbers.push((!body.fixed && !parts.is_empty()).then_some(bodies.len()));
             if !parts.is_empty() {
                 bodies.push(Body { fixed: body.fixed, parts });
-                poses.push(pose.clone());
+                // What only rounding moves has no arrow.
+                let rests = norm(pose.velocity) <= REST;
+                let velocity = if rests { [0.0; 3] } else { pose.velocity };
+                poses.push(Pose { velocity, ..pose.clone() });
             }
         }
         let touch = |touch: &Touch| {
@@ -415,6 +418,9 @@ impl Playback {
         Ok(picture)
     }
 }
+
+/// Bodies that are slower rest on paper, m/s.
+const REST: f64 = 1e-6;
 
 /// One face of a surface.
 fn face(vertices: &[Vec3], corners: &[usize]) -> Part {

@@ -267,7 +267,7 @@ fn key(
     let sized = [
         (largest, Mark::Chain(paper::GREY), "impulse by width", "N s"),
         (impulse, Mark::Arrow(paper::GREY), "impulse", "N s"),
-        (longest(What::Velocity), Mark::Arrow(VELOCITY), "velocity before the step", "m/s"),
+        (longest(What::Velocity), Mark::Arrow(VELOCITY), "velocity", "m/s"),
     ];
     out.extend(sized.into_iter().filter_map(|(longest, mark, what, unit)| {
         Some((mark, format!("{what}, up to {} {unit}", paper::short(longest?))))
