@@ -68,7 +68,14 @@ where
             let problem = make(&case);
             let mut point = problem.origin();
             let limits = Limits { tolerance: 1e-6, max_iterations: 200_000, ..Limits::default() };
-            let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+            let outcome = match session.solve(&problem, &mut point, &limits, &mut |_| {}) {
+                // There is nothing to restate as another problem.
+                Err(e) if case.contacts == 0 => {
+                    assert!(e.is_inapplicable() && e.to_string().contains("contact"), "{name} {e}");
+                    continue;
+                }
+                outcome => outcome.unwrap(),
+            };
             let verdict = problem.judge(&point, limits.tolerance).unwrap();
             assert_eq!(outcome.status == Status::Solved, verdict.solved, "{name} {case:?}");
             assert_eq!(outcome.measure, verdict.measure, "{name} {settings:?} {case:?}");

@@ -62,11 +62,12 @@ pub(super) struct Kept<const D: usize> {
 }
 
 impl<const D: usize> Kept<D> {
-    /// Errors: rows with bounds, which are refused.
+    /// Errors: rows with bounds, which are refused; no contacts, of which there is nothing to be restated.
     pub(super) fn new(
         problem: &FrictionLocal<D>,
         directions: Vec<[f64; 2]>,
     ) -> Result<Self, SolveError> {
+        has_contacts(problem)?;
         let state = problem.state(Access::Visits)?;
         let mut kept = Self { state, unit: vec![], directions, contradiction: None };
         kept.update(problem);
@@ -74,6 +75,7 @@ impl<const D: usize> Kept<D> {
     }
 
     pub(super) fn refill(&mut self, problem: &FrictionLocal<D>) -> Result<(), SolveError> {
+        has_contacts(problem)?;
         problem.refill(&mut self.state)?;
         self.update(problem);
         Ok(())
@@ -82,6 +84,17 @@ impl<const D: usize> Kept<D> {
     fn update(&mut self, problem: &FrictionLocal<D>) {
         units(self.state.operator(problem).0, &mut self.unit);
         self.contradiction = problem.contradiction(&self.state).cloned();
+    }
+}
+
+/// Errors: a problem of scalar rows alone.
+fn has_contacts<const D: usize>(problem: &FrictionLocal<D>) -> Result<(), SolveError> {
+    match problem.mu.is_empty() {
+        true => Err(SolveError::needs(
+            "at least one contact (scalar rows alone go to nsgs, psor and auto)",
+            "none",
+        )),
+        false => Ok(()),
     }
 }
 
