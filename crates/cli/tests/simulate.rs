@@ -103,6 +103,24 @@ fn a_run_goes_on_where_it_ended_as_if_it_had_not() {
 }
 
 #[test]
+fn trajectories_keep_joints() {
+    let folder = Folder::new();
+    let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let scene = scene.join("../../examples/scenes/four_bar.toml");
+    let run =
+        format!("simulate {} --every 50 --out run.h5 --html run.html --end 0.5", scene.display());
+    folder.run(&run).exits(0);
+    let run = nonsmooth_io::trajectory::Trajectory::read(folder.path("run.h5")).unwrap();
+    assert_eq!(run.joints, ["motor", "elbow", "wrist", "bearing"]);
+    let (first, last) = (&run.frames[0].joints, &run.frames[run.frames.len() - 1].joints);
+    assert!(first.len() == 4 && first[0].angle == 0.0 && last[0].angle > 0.1, "{last:?}");
+    assert!(last.iter().all(|j| j.violation < 1e-12));
+    // Resumed, it begins where the file ends.
+    let more = format!("simulate {} --every 50 --resume run.h5 --end 0.6", scene.display());
+    folder.run(&more).exits(0);
+}
+
+#[test]
 fn families_of_gen_move() {
     let folder = Folder::new();
     let run = folder.run("simulate stack --set count=3 --end 0.05").exits(0);

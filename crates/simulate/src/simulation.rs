@@ -185,6 +185,7 @@ impl Simulation {
         nonsmooth_solve::registry::session::<FrictionLocal<3>>(solver, &settings)?;
         (self.solver, self.settings) = (solver.into(), settings);
         self.tools = Tools::new(&self.world, &self.state)?;
+        self.remember_joints();
         Ok(self)
     }
 
