@@ -178,7 +178,7 @@ fn h5py_reads_it() {
     let said = String::from_utf8(output.stdout).unwrap();
     let z = run.frames[4].bodies[1].position[2];
     let expected = format!(
-        "1 title = \"Käfer\"\n\
+        "2 title = \"Käfer\"\n\
          ['floor', 'Kugel ⌀ 0.4', ''] (40,) {z:?}\n\
          [-0.5, 0.25, 2.0] [0, 1, 2] [0, 3, 7, 4294967293]\n\
          ['solved', 'solver: limit', 'solver: limit'] True 7.0\n\

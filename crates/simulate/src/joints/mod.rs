@@ -378,7 +378,7 @@ impl Drive {
         let some = "a number of at least 0";
         let at = |name: &'static str| move || format!("{key}.{name}");
         if let Some(JointLimits { lower, upper, e }) = self.limits {
-            let expected = "at least the lower limit, which is at most 0 as upper is at least";
+            let expected = "a number of at least the lower limit";
             require(at("limits.upper"), upper, lower <= upper, expected)?;
             let unit = (0.0..=1.0).contains(&e);
             require(at("limits.e"), e, unit, "a coefficient from 0 to 1")?;

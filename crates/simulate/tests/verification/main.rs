@@ -10,6 +10,7 @@ mod laws;
 mod overlap;
 mod piles;
 mod solids;
+mod tops;
 
 use nonsmooth_simulate::{
     Body, BodyId, Geometry, Law, MoreauJean, RunReport, Shape, Simulation, World,
