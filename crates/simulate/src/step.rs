@@ -329,6 +329,7 @@ impl Tools {
         self.islands.order.clear();
         self.islands.order.extend(0..(contacts + scalars) as u32);
         let all = self.span(0, contacts + scalars);
+        self.gather(all);
         self.columns(scheme, all);
         self.assemble(all, 0);
         Ok(Some(self.slots[0].problem.clone()))
@@ -660,6 +661,13 @@ impl Tools {
         }
     }
 
+    /// The scalar rows of an island, by their places among those of the step.
+    fn gather(&mut self, span: Span) {
+        let contacts = self.rows.len() as u32;
+        self.scalars.clear();
+        self.scalars.extend(self.islands.order[span.1..span.2].iter().map(|k| k - contacts));
+    }
+
     /// Solves one island, in slot k. Returns status, passes, residual, iterations and the seconds of the solver.
     fn island(
         &mut self,
@@ -675,9 +683,7 @@ impl Tools {
             let arms = &self.rows[c as usize].arms;
             self.members.extend(arms.iter().filter(|a| a.free).map(|a| a.body));
         }
-        let contacts = self.rows.len() as u32;
-        self.scalars.clear();
-        self.scalars.extend(self.islands.order[span.1..span.2].iter().map(|k| k - contacts));
+        self.gather(span);
         for &k in &self.scalars {
             self.members.extend(self.joints.levers(k as usize).iter().map(|l| l.body));
         }
@@ -756,9 +762,6 @@ impl Tools {
 
     /// The columns of H and the rows of the velocities, in the frames of this pass.
     fn columns(&mut self, scheme: &MoreauJean, span: Span) {
-        let contacts = self.rows.len() as u32;
-        self.scalars.clear();
-        self.scalars.extend(self.islands.order[span.1..span.2].iter().map(|k| k - contacts));
         self.joints.columns(scheme, &self.scalars, &self.bodies);
         for c in span.0..span.1 {
             let row = &mut self.rows[self.islands.order[c] as usize];

@@ -35,6 +35,17 @@ struct System {
     levers: Vec<Effect>,
 }
 
+impl System {
+    /// κ with `Gᵀ M⁻¹ G κ = −residual`; none where it is not to be had or not finite.
+    fn answer(&self, residual: &[f64]) -> Option<Vec<f64>> {
+        let inverse = Inverse::of_multipliers(&self.matrix, "R").ok()?;
+        let mut kappa: Vec<f64> = residual.iter().map(|x| -x).collect();
+        let mut scratch = vec![0.0; inverse.scratch_len()];
+        inverse.solve_with(&mut kappa, &mut scratch, Refine::Fully);
+        kappa.iter().all(|x| x.is_finite()).then_some(kappa)
+    }
+}
+
 /// What all rows of a body make of it.
 fn summed(effects: &[Effect], kappa: &[f64]) -> (Vec3, Vec3) {
     let zero = ([0.0; 3], [0.0; 3]);
@@ -83,18 +94,10 @@ impl Joints {
 
     /// Makes the velocities fit the joints; by how much that changes the kinetic energy, J.
     pub fn project_velocities(&self, world: &World, state: &mut State) -> f64 {
-        let Some(System { matrix, rates, levers, .. }) = self.system(world, state) else {
-            return 0.0;
-        };
-        let Ok(inverse) = Inverse::of_multipliers(&matrix, "R") else { return 0.0 };
-        let mut kappa: Vec<f64> = rates.iter().map(|x| -x).collect();
-        let mut scratch = vec![0.0; inverse.scratch_len()];
-        inverse.solve_with(&mut kappa, &mut scratch, Refine::Fully);
-        if kappa.iter().any(|x| !x.is_finite()) {
-            return 0.0;
-        }
+        let Some(system) = self.system(world, state) else { return 0.0 };
+        let Some(kappa) = system.answer(&system.rates) else { return 0.0 };
         let mut change = 0.0;
-        for same in levers.chunk_by(|a, b| a.0 == b.0) {
+        for same in system.levers.chunk_by(|a, b| a.0 == b.0) {
             let k = same[0].0 as usize;
             let (slide, turn) = summed(same, &kappa);
             let body = &world.bodies[k];
@@ -168,12 +171,9 @@ impl Joints {
 
     /// One iteration.
     fn correct(&self, world: &World, state: &mut State) -> Option<()> {
-        let System { matrix, phi, levers, .. } = self.system(world, state)?;
-        let inverse = Inverse::of_multipliers(&matrix, "R").ok()?;
-        let mut kappa: Vec<f64> = phi.iter().map(|x| -x).collect();
-        let mut scratch = vec![0.0; inverse.scratch_len()];
-        inverse.solve_with(&mut kappa, &mut scratch, Refine::Fully);
-        for same in levers.chunk_by(|a, b| a.0 == b.0) {
+        let system = self.system(world, state)?;
+        let kappa = system.answer(&system.phi)?;
+        for same in system.levers.chunk_by(|a, b| a.0 == b.0) {
             let k = same[0].0 as usize;
             let (slide, turn) = summed(same, &kappa);
             if !(norm(slide) + norm(turn)).is_finite() {

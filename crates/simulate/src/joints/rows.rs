@@ -9,7 +9,7 @@
 //!
 //! A row on the mean velocity would throw back a velocity that does not fit the joint: where that at the beginning does not, the row is on v⁺.
 
-use nonsmooth_scenes::vec3::{Vec3, apply, dot, norm, scale};
+use nonsmooth_scenes::vec3::{Vec3, apply, cross, dot, norm, scale, sub};
 
 use super::equations::{Equation, Linkage, Reach, coupled};
 use super::{Coordinate, Drive, JointId, JointReport, Motor, Spring};
@@ -328,7 +328,10 @@ impl Joints {
         self.reports.clear();
         for (j, linkage) in self.linkages.iter().enumerate() {
             let (mut impulse, mut moment) = ([0.0; 3], [0.0; 3]);
-            for (k, row) in self.rows.iter().enumerate().filter(|r| r.1.key.0 as usize == j) {
+            // Rows are in the order of their joints.
+            let first = self.rows.partition_point(|r| (r.key.0 as usize) < j);
+            let own = self.rows.iter().enumerate().skip(first);
+            for (k, row) in own.take_while(|r| r.1.key.0 as usize == j) {
                 for lever in self.levers(k).iter().filter(|l| l.body == linkage.b) {
                     for i in 0..3 {
                         impulse[i] += row.lambda * lever.force[i];
@@ -337,8 +340,8 @@ impl Joints {
                 }
             }
             let at = linkage.place(|k| state.pose(k as usize));
-            let arm = nonsmooth_scenes::vec3::sub(at.anchor(), state.position[linkage.b as usize]);
-            let about = nonsmooth_scenes::vec3::cross(arm, impulse);
+            let arm = sub(at.anchor(), state.position[linkage.b as usize]);
+            let about = cross(arm, impulse);
             let [angle, slide] = self.coordinates[j];
             let has = |c: Coordinate, x: f64| if linkage.kind.has(c) { x } else { 0.0 };
             self.reports.push(JointReport {
@@ -346,7 +349,7 @@ impl Joints {
                 angle: has(Coordinate::Angle, angle),
                 slide: has(Coordinate::Slide, slide),
                 impulse,
-                moment: nonsmooth_scenes::vec3::sub(moment, about),
+                moment: sub(moment, about),
                 violation: violations.get(j).copied().unwrap_or(0.0),
             });
         }
