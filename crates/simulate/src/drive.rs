@@ -55,7 +55,7 @@ pub(crate) trait Driven {
     /// A step as it would be.
     fn attempt(&mut self, h: f64) -> Result<StepReport, SimulateError>;
     /// Takes the step tried last.
-    fn take(&mut self, report: &mut StepReport, h: f64);
+    fn take(&mut self, report: &mut StepReport, h: f64) -> Result<(), SimulateError>;
     /// Forgets it.
     fn discard(&mut self);
 }
@@ -84,7 +84,7 @@ fn advance<S: Driven>(s: &mut S, h: f64, level: u8) -> Result<StepReport, Simula
         return Ok(joined(first, second));
     }
     if report.status != StepStatus::NotFinite && !cancelled {
-        s.take(&mut report, h);
+        s.take(&mut report, h)?;
         report.t = s.time();
     } else {
         s.discard();

@@ -34,6 +34,7 @@ mod lagrangian;
 mod mesh;
 mod moreau_jean;
 mod moving;
+mod projection;
 mod report;
 pub mod rotation;
 pub mod scene_file;

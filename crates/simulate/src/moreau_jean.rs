@@ -20,7 +20,7 @@ pub struct MoreauJean {
     pub activation: Activation,
     /// What u⁻, u⁺ and r have to do with each other at an impact.
     pub impact: Impact,
-    /// What keeps joints closed.
+    /// What keeps joints closed and bodies out of each other.
     pub stabilisation: Stabilisation,
     /// No restitution where bodies approach more slowly than this, m/s.
     pub restitution_threshold: f64,
@@ -106,14 +106,26 @@ pub enum Impact {
     Fremond,
 }
 
-/// What keeps joints closed, whose equations hold for velocities.
+/// What keeps joints closed and bodies out of each other, whose laws hold for velocities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Stabilisation {
     /// Nothing: they drift apart, by O(h²) at θ = ½.
     None,
-    /// After each step the smallest corrections of positions and of velocities, in the norm of the masses, that close them.
+    /// After each step the smallest corrections of positions and of velocities, in the norm of the masses, that close joints.
     DirectProjection,
+    /// The same, and positions are moved out of penetration too, velocities are not; also limits of joints are kept. A step costs a detection more, and where
+    /// something penetrates some frictionless problems.
+    ContactProjection,
+    /// The same, and contacts that the projection pushes but the forecast had open take part in the step, which is tried anew until no more come.
+    CombinedProjection,
+}
+
+impl Stabilisation {
+    /// Whether contacts are projected.
+    pub fn has_contacts(self) -> bool {
+        matches!(self, Self::ContactProjection | Self::CombinedProjection)
+    }
 }
 
 impl MoreauJean {

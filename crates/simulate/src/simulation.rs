@@ -7,11 +7,12 @@ use nonsmooth_solve::settings::SettingsMap;
 
 use crate::drive::{self, Driven, Observer};
 use crate::error::{Overlap, require};
-use crate::report::{ContactReport, RunReport, Settled, StepReport};
+use crate::projection::Projection;
+use crate::report::{ContactReport, RunReport, Settled, StepReport, StepStatus};
 use crate::state::State;
 use crate::step::{Inner, Tools};
 use crate::world::oscillation;
-use crate::{BodyId, JointReport, MoreauJean, Motion, SimulateError, World};
+use crate::{BodyId, JointReport, MoreauJean, Motion, SimulateError, Stabilisation, World};
 
 /// Bodies that overlap by more than this share of the smaller one are refused at the start.
 const OVERLAP: f64 = 1e-6;
@@ -70,6 +71,7 @@ pub struct Simulation {
     state: State,
     forces: Vec<Box<dyn Force>>,
     tools: Tools,
+    projection: Option<Projection>,
     solver: String,
     settings: SettingsMap,
     limits: Limits,
@@ -144,6 +146,7 @@ impl Simulation {
             state,
             forces: vec![],
             tools,
+            projection: None,
             solver: "auto".into(),
             settings: SettingsMap::new(),
             limits: Limits { tolerance: 1e-10, max_iterations: 100_000, ..Limits::default() },
@@ -162,8 +165,15 @@ impl Simulation {
     /// Notes where the joints are before the first step.
     fn remember_joints(&mut self) {
         let Self { world, state, tools, .. } = self;
-        let violations = tools.joints.violations(world, state).0;
-        tools.joints.finish(state, &violations);
+        tools.joints.tell(world, state);
+    }
+
+    /// Makes the projection ready where the scheme has one of contacts.
+    fn projecting(&mut self) -> Result<(), SimulateError> {
+        if self.scheme.stabilisation.has_contacts() && self.projection.is_none() {
+            self.projection = Some(Projection::new(&self.world, &self.state)?);
+        }
+        Ok(())
     }
 
     /// Pairs of bodies that overlap by more than they may at the start.
@@ -185,6 +195,7 @@ impl Simulation {
         nonsmooth_solve::registry::session::<FrictionLocal<3>>(solver, &settings)?;
         (self.solver, self.settings) = (solver.into(), settings);
         self.tools = Tools::new(&self.world, &self.state)?;
+        self.projection = None;
         self.remember_joints();
         Ok(self)
     }
@@ -272,6 +283,7 @@ impl Simulation {
         require(|| "h".into(), h, h > 0.0, "a positive number")?;
         let Self { world, scheme, state, forces, tools, solver, settings, limits, .. } = self;
         let axes = state.memory.axes.clone();
+        tools.insisted.clear();
         let inner = Inner { solver, settings, limits };
         let problem = tools.problem(scheme, (world, state), forces, &inner, h);
         state.memory.axes = axes;
@@ -320,14 +332,45 @@ impl Driven for Simulation {
     }
 
     fn attempt(&mut self, h: f64) -> Result<StepReport, SimulateError> {
-        let Self { world, scheme, state, forces, tools, solver, settings, limits, .. } = self;
-        let inner = Inner { solver, settings, limits };
-        tools.attempt(scheme, (world, state), forces, &inner, h)
+        self.projecting()?;
+        let Self { world, scheme, state, forces, tools, projection, .. } = self;
+        let inner = Inner { solver: &self.solver, settings: &self.settings, limits: &self.limits };
+        tools.insisted.clear();
+        let mut report = tools.attempt(scheme, (world, state), forces, &inner, h)?;
+        let Some(projection) = projection
+            .as_mut()
+            .filter(|_| scheme.stabilisation == Stabilisation::CombinedProjection)
+        else {
+            return Ok(report);
+        };
+        while report.status == StepStatus::Solved {
+            let mut trial = state.clone();
+            tools.commit(scheme, world, &mut trial, h, &mut report.clone());
+            let pushed = projection.project(world, &mut trial, &inner)?.pushed;
+            if !tools.insist(&pushed) {
+                break;
+            }
+            report = tools.attempt(scheme, (world, state), forces, &inner, h)?;
+        }
+        Ok(report)
     }
 
-    fn take(&mut self, report: &mut StepReport, h: f64) {
-        let Self { world, scheme, state, tools, .. } = self;
+    fn take(&mut self, report: &mut StepReport, h: f64) -> Result<(), SimulateError> {
+        let Self { world, scheme, state, tools, projection, .. } = self;
         tools.commit(scheme, world, state, h, report);
+        if let Some(projection) = projection {
+            let inner =
+                Inner { solver: &self.solver, settings: &self.settings, limits: &self.limits };
+            let found = projection.project(world, state, &inner)?;
+            if !found.closed && report.status == StepStatus::Solved {
+                report.status = StepStatus::ProjectionLimit;
+            }
+            if found.moved {
+                report.energy.potential = world.potential(state);
+                report.drift.joints = tools.joints.tell(world, state);
+            }
+        }
+        Ok(())
     }
 
     fn discard(&mut self) {

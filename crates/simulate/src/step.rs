@@ -31,7 +31,7 @@ use nonsmooth_scenes::Rotation;
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, cross, dot, norm, scale, sub};
 use nonsmooth_solve::{Limits, Session, Status, registry, settings::SettingsMap};
 
-use crate::detect::{Detector, Near, Place};
+use crate::detect::{Detector, Key, Near, Place};
 use crate::islands::Islands;
 use crate::joints::Joints;
 use crate::moving::Moving;
@@ -111,6 +111,8 @@ pub(crate) struct Tools {
     rows: Vec<Row>,
     /// For each contact near, its row.
     row_of: Vec<u32>,
+    /// Contacts that take part whatever the forecast says, sorted.
+    pub insisted: Vec<Key>,
     islands: Islands,
     pub joints: Joints,
     /// The scalar rows of each body in the island, and those of the island.
@@ -166,6 +168,7 @@ impl Tools {
             bodies: vec![],
             rows: vec![],
             row_of: vec![],
+            insisted: vec![],
             islands: Islands::default(),
             joints: Joints::new(world),
             levers: vec![],
@@ -182,6 +185,7 @@ impl Tools {
     }
 
     /// Pairs of bodies that overlap by more than `share` of the smaller one, with the deepest penetration of each.
+    /// What contacts give way by is no overlap.
     pub fn overlaps(
         &mut self,
         world: &World,
@@ -191,7 +195,8 @@ impl Tools {
         let margins = vec![0.0; world.bodies.len()];
         self.detector.detect(world, state, &margins, &mut self.near);
         let mut found: Vec<(u32, u32, f64)> = vec![];
-        for n in self.near.iter().filter(|n| n.place.gap < -share * n.size) {
+        let hard = self.near.iter().filter(|n| n.compliance.is_none());
+        for n in hard.filter(|n| n.place.gap < -share * n.size) {
             match found.last_mut() {
                 Some(last) if (last.0, last.1) == (n.a, n.b) => last.2 = last.2.max(-n.place.gap),
                 _ => found.push((n.a, n.b, -n.place.gap)),
@@ -200,15 +205,27 @@ impl Tools {
         found
     }
 
+    /// Takes contacts of the last attempt that were open into the index set of the next ones; whether there was one.
+    pub fn insist(&mut self, pushed: &[Key]) -> bool {
+        let before = self.insisted.len();
+        for (near, &row) in self.near.iter().zip(&self.row_of) {
+            if row == NONE && pushed.contains(&near.key) {
+                self.insisted.push(near.key);
+            }
+        }
+        self.insisted.sort_unstable();
+        self.insisted.len() > before
+    }
+
     /// Moves bodies of a world [at rest](World::at_rest) apart that overlap: the smallest displacement in the norm of the masses after which no gap is
-    /// negative, to first order, is the velocity of a step of length 1 whose frictionless contacts have the gaps to close. Bodies are looked for within `depth`, m, of
-    /// each other.
+    /// negative, to first order, is the velocity of a step of length 1 whose frictionless contacts, and limits of joints, have the gaps to close. Bodies are
+    /// looked for within `depth`, m, of each other. What pushes is in the reports of contacts. Whether the problem was solved.
     pub fn part(
         &mut self,
         (world, state): (&World, &mut State),
         depth: f64,
         inner: &Inner,
-    ) -> Result<(), SimulateError> {
+    ) -> Result<bool, SimulateError> {
         const H: f64 = 1.0;
         let scheme = MoreauJean {
             theta: 1.0,
@@ -222,19 +239,23 @@ impl Tools {
         self.start(&scheme, world, &rest, &mut [], H);
         self.margins.iter_mut().for_each(|m| *m += depth);
         self.detector.detect(world, &mut rest, &self.margins, &mut self.near);
+        self.near.retain(|near| near.compliance.is_none());
         self.contacts(&scheme, world, &rest, H);
+        self.joints.close_limits(world, H);
         for (near, &row) in self.near.iter().zip(&self.row_of) {
             let row = &mut self.rows[row as usize];
             (row.mu, row.shift, row.r) = (0.0, [near.place.gap / H, 0.0, 0.0], [0.0; 3]);
         }
         let mut first = 0;
+        let mut solved = true;
         for k in 0..self.islands.ends.len() {
             let end = self.islands.ends[k];
             if self.slots.len() == k {
                 self.slots.push(Slot::new(inner)?);
             }
             let span = self.span(first, end);
-            self.island((&scheme, world), span, k, inner, H)?;
+            let status = self.island((&scheme, world), span, k, inner, H)?.0;
+            solved &= status == StepStatus::Solved;
             first = end;
         }
         self.commit(&scheme, world, &mut rest, H, &mut StepReport::begun(state.t, H));
@@ -242,7 +263,7 @@ impl Tools {
         if places.map(|x| 0.0 * x).sum::<f64>() == 0.0 {
             (state.position, state.rotation) = (rest.position, rest.rotation);
         }
-        Ok(())
+        Ok(solved)
     }
 
     /// Everything up to the velocities after the step; the state is as before but for the axes of its memory.
@@ -482,7 +503,7 @@ impl Tools {
                 Some(_) => gap + h * approach.min(0.0) <= 0.0,
                 None => active,
             };
-            if !active {
+            if !active && self.insisted.binary_search(&near.key).is_err() {
                 self.row_of.push(NONE);
                 continue;
             }
@@ -633,7 +654,7 @@ impl Tools {
             }
             self.known.push(same.then(|| memory[m]));
         }
-        let pair = |key: crate::Key| (key.shape_a, key.shape_b);
+        let pair = |key: Key| (key.shape_a, key.shape_b);
         for (near, known) in self.near.iter().zip(&mut self.known) {
             if known.is_some() {
                 continue;
@@ -1101,7 +1122,7 @@ impl Tools {
         drift.quaternion = off;
         let violations = match scheme.stabilisation {
             Stabilisation::None => self.joints.violations(world, state).0,
-            Stabilisation::DirectProjection => {
+            _ => {
                 let violations = self.joints.project(world, state);
                 if !self.joints.is_empty() {
                     let change = self.joints.project_velocities(world, state);

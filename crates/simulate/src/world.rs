@@ -8,7 +8,8 @@ use nonsmooth_scenes::{self as scenes, MassProperties, Polyhedron, Rotation, Sce
 use crate::error::{finite, require};
 use crate::rotation::unit;
 use crate::shape::plane;
-use crate::{Coupling, Joint, JointId, Part, Shape, SimulateError};
+use crate::state::State;
+use crate::{Coupling, Drive, Driver, Joint, JointId, Part, Shape, SimulateError};
 
 /// The number of a body; never used again for another one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -297,6 +298,12 @@ impl World {
         &self.materials
     }
 
+    /// The energy of the weights of free bodies, J, zero at the origin.
+    pub(crate) fn potential(&self, state: &State) -> f64 {
+        let free = self.bodies.iter().zip(&state.position).filter(|(b, _)| b.is_free());
+        -free.map(|(b, x)| b.mass * dot(self.gravity, *x)).sum::<f64>()
+    }
+
     /// The same bodies and joints without anything that moves them: for what concerns positions alone.
     pub(crate) fn at_rest(&self) -> Self {
         let mut rest = Self { gravity: [0.0; 3], ..self.clone() };
@@ -306,7 +313,11 @@ impl World {
                 body.motion = Motion::Fixed;
             }
         }
-        rest.joints.iter_mut().for_each(|joint| joint.drives.clear());
+        for drive in rest.joints.iter_mut().flat_map(|joint| &mut joint.drives) {
+            let Drive { coordinate, limits, driver, .. } = *drive;
+            let driver = driver.map(|_| Driver::default());
+            *drive = Drive { limits, driver, ..Drive::along(coordinate) };
+        }
         rest
     }
 

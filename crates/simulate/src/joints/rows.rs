@@ -67,6 +67,12 @@ fn number(drive: usize, what: u32) -> u32 {
     EQUATIONS + 8 * drive as u32 + what
 }
 
+/// The other way: the drive that a row belongs to, and what it is there; none of equations and couplings.
+fn drive_of(number: u32) -> Option<(usize, u32)> {
+    let beyond = number.checked_sub(EQUATIONS)?;
+    Some(((beyond / 8) as usize, beyond % 8))
+}
+
 /// A joint has fewer equations.
 const EQUATIONS: u32 = 8;
 /// What acts along a coordinate, by number.
@@ -256,6 +262,42 @@ impl Joints {
         self.rows.push(row);
     }
 
+    /// The most by which a limit is violated, as a share of one radian or of the size of its joint.
+    pub fn overshoot(&self, world: &World, state: &State) -> f64 {
+        let limited = |j: &crate::Joint| j.drives.iter().any(|d| d.limits.is_some());
+        if !world.joints.iter().any(limited) {
+            return 0.0;
+        }
+        let coordinates = self.coordinates(state, |k| state.pose(k as usize));
+        let mut worst: f64 = 0.0;
+        for (j, joint) in world.joints.iter().enumerate() {
+            let [angle, slide] = coordinates[j];
+            for (drive, limits) in joint.drives.iter().filter_map(|d| Some((d, d.limits?))) {
+                let (s, unit) = match drive.coordinate {
+                    Coordinate::Angle => (angle, 1.0),
+                    Coordinate::Slide => (slide, self.linkages[j].size().max(f64::MIN_POSITIVE)),
+                };
+                worst = worst.max((limits.lower - s).max(s - limits.upper) / unit);
+            }
+        }
+        worst
+    }
+
+    /// Makes rows of limits close what a limit is violated by in a step of length h.
+    pub fn close_limits(&mut self, world: &World, h: f64) {
+        for row in &mut self.rows {
+            let Some((drive, what)) = drive_of(row.key.1) else { continue };
+            let (LOWER | UPPER) = what else { continue };
+            let j = row.key.0 as usize;
+            let drive = &world.joints[j].drives[drive];
+            let Some(limits) = drive.limits else { continue };
+            let [angle, slide] = self.coordinates[j];
+            let s = if drive.coordinate == Coordinate::Angle { angle } else { slide };
+            let gap = if what == LOWER { s - limits.lower } else { limits.upper - s };
+            row.given = gap / h;
+        }
+    }
+
     /// The rows in the frames of this pass.
     pub fn columns(&mut self, scheme: &MoreauJean, rows: &[u32], bodies: &[Moving]) {
         let share = (1.0 - scheme.theta) / scheme.theta;
@@ -294,17 +336,16 @@ impl Joints {
                     (0.0, linkages[joint.index()].gradient(&places[joint.index()], c))
                 };
                 coupled(&world.couplings[coupling], gradient).gradient
-            } else if which < EQUATIONS {
+            } else if let Some((drive, what)) = drive_of(which) {
+                let along = world.joints[j].drives[drive].coordinate;
+                let sign = if what == UPPER { -1.0 } else { 1.0 };
+                let reach = linkages[j].gradient(&places[j], along);
+                reach.iter().map(|r| r.times(sign)).collect()
+            } else {
                 if own.0 != owner {
                     own = (owner, linkages[j].equations(&places[j], coordinates[j][0]));
                 }
                 own.1[which as usize].gradient.clone()
-            } else {
-                let (drive, what) = ((which - EQUATIONS) / 8, (which - EQUATIONS) % 8);
-                let along = world.joints[j].drives[drive as usize].coordinate;
-                let sign = if what == UPPER { -1.0 } else { 1.0 };
-                let reach = linkages[j].gradient(&places[j], along);
-                reach.iter().map(|r| r.times(sign)).collect()
             };
             let free = reach.iter().filter(|r| world.bodies[r.body as usize].is_free());
             let (first, last) = row.levers;
@@ -312,6 +353,13 @@ impl Joints {
                 (lever.force, lever.moment) = (r.force, r.moment);
             }
         }
+    }
+
+    /// Says where the joints are, and by how much they are violated at most.
+    pub fn tell(&mut self, world: &World, state: &mut State) -> f64 {
+        let violations = self.violations(world, state).0;
+        self.finish(state, &violations);
+        violations.into_iter().fold(0.0, f64::max)
     }
 
     /// Keeps what the step did, and says it: coordinates, impulses. `violations` are those of the joints after the step.

@@ -297,8 +297,9 @@ impl<L: Lagrangian<D>, const D: usize> Driven for LagrangianSimulation<L, D> {
         self.tools.attempt(&self.system, &self.scheme, &self.state, &self.limits, h)
     }
 
-    fn take(&mut self, _report: &mut StepReport, h: f64) {
+    fn take(&mut self, _report: &mut StepReport, h: f64) -> Result<(), SimulateError> {
         self.tools.commit(&self.system, &mut self.state, h);
+        Ok(())
     }
 
     fn discard(&mut self) {

@@ -9,6 +9,7 @@ mod joints;
 mod laws;
 mod overlap;
 mod piles;
+mod projection;
 mod solids;
 mod tops;
 
