@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use nonsmooth_problem::check::Measure;
+use nonsmooth_problem::check::{Measure, Motion};
 use nonsmooth_scenes::vec3::Vec3;
 use nonsmooth_solve::Status;
 
@@ -126,6 +126,16 @@ pub struct Counts {
     pub iterations: usize,
 }
 
+impl Counts {
+    /// What the contacts of a step do.
+    pub(crate) fn tell(&mut self, contacts: &[ContactReport]) {
+        let of = |motion| contacts.iter().filter(|c| c.motion() == Some(motion)).count();
+        self.open = of(Motion::Open);
+        self.stick = of(Motion::Stick);
+        self.slip = of(Motion::Slip);
+    }
+}
+
 /// How far the configuration is from what it should be, at the beginning of the step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Drift {
@@ -199,6 +209,9 @@ pub(crate) fn worst_share(measure: &Measure) -> f64 {
     }
 }
 
+/// A contact that moves along by less than this, m/s, and by less than this share of what it did before, sticks.
+const SLIP: f64 = 1e-8;
+
 /// What a contact of the last step did.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactReport {
@@ -227,6 +240,16 @@ pub struct ContactReport {
 }
 
 impl ContactReport {
+    /// What the contact does, if it takes part: without an impulse it is open, with one it slips where it moves along.
+    pub fn motion(&self) -> Option<Motion> {
+        let tangential = |x: &[f64; 3]| x[1].hypot(x[2]);
+        self.active.then(|| match self.impulse {
+            [n, ..] if n <= 0.0 => Motion::Open,
+            _ if tangential(&self.after) > SLIP * (1.0 + tangential(&self.before)) => Motion::Slip,
+            _ => Motion::Stick,
+        })
+    }
+
     /// The impulse on b in the world frame, N·s.
     pub fn world_impulse(&self) -> Vec3 {
         let [n, s, t] = self.frame;

@@ -1066,16 +1066,7 @@ impl Tools {
         counts.active = self.rows.len();
         counts.islands = self.islands.ends.len();
         counts.rows = self.joints.rows.len();
-        for row in &self.rows {
-            counts.warm += usize::from(row.warm);
-            if row.r[0] <= 0.0 {
-                counts.open += 1;
-            } else if sticks(&row.r, row.mu) {
-                counts.stick += 1;
-            } else {
-                counts.slip += 1;
-            }
-        }
+        counts.warm = self.rows.iter().filter(|row| row.warm).count();
         let gaps = self.near.iter().map(|n| -n.place.gap);
         report.drift.penetration = gaps.fold(0.0, f64::max);
     }
@@ -1088,7 +1079,7 @@ impl Tools {
         world: &World,
         state: &mut State,
         h: f64,
-        StepReport { drift, energy, .. }: &mut StepReport,
+        StepReport { drift, energy, counts, .. }: &mut StepReport,
     ) {
         let theta = scheme.theta;
         let mut off: f64 = 0.0;
@@ -1119,6 +1110,7 @@ impl Tools {
         state.t += h;
         state.steps += 1;
         self.remember(state, h);
+        counts.tell(&self.contacts);
         drift.quaternion = off;
         let violations = match scheme.stabilisation {
             Stabilisation::None => self.joints.violations(world, state).0,

@@ -198,7 +198,6 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     }
     .map_err(wrong)?;
     let mut simulation = simulation.with_limits(limits);
-    simulation.warnings().iter().for_each(|w| output::remark(&format!("warning: {w}\n")));
     let frames = out.is_some() || html.is_some() || vtk.is_some() || args.svg.is_some();
     let mut recorder = Recorder::new(&scene, &simulation, frames);
     if let Some(file) = &args.resume {

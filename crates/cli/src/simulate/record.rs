@@ -8,7 +8,6 @@ use nonsmooth_io::trajectory::{
 };
 
 use nonsmooth_io::{Info, Mesh, ProblemFile, vtk};
-use nonsmooth_problem::check::Motion;
 use nonsmooth_problem::{AnyProblem, Friction, FrictionLocal, Problem};
 use nonsmooth_scenes::SceneError;
 use nonsmooth_scenes::draw::playback::{self, Drawn, Form, Moment, Placed, Playback};
@@ -201,16 +200,6 @@ fn step(number: u64, report: &StepReport) -> Step {
     }
 }
 
-/// What a contact does, told from impulse and velocity: a contact without impulse is open, one that moves along slips.
-fn motion(c: &ContactReport) -> Option<Motion> {
-    let tangential = |x: &[f64; 3]| x[1].hypot(x[2]);
-    c.active.then(|| match c.impulse {
-        [n, ..] if n <= 0.0 => Motion::Open,
-        _ if tangential(&c.after) > 1e-8 * (1.0 + tangential(&c.before)) => Motion::Slip,
-        _ => Motion::Stick,
-    })
-}
-
 fn joint(j: &JointReport) -> Joint {
     Joint {
         angle: j.angle,
@@ -232,7 +221,7 @@ fn contact(c: &ContactReport) -> Contact {
         mu: c.mu,
         r: c.impulse,
         u: c.after,
-        status: motion(c),
+        status: c.motion(),
     }
 }
 

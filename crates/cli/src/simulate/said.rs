@@ -66,6 +66,14 @@ impl Run<'_> {
             );
             row(&mut text, "energy", energy);
         }
+        if let Some(violation) = self.violation() {
+            let says = format!(
+                "{}, violated by {} at most at the end",
+                world.joints.len(),
+                number(violation)
+            );
+            row(&mut text, "joints", says);
+        }
         row(&mut text, "drift", format!("penetration at most {} m", number(report.penetration)));
         let rate = report.steps as f64 / self.seconds.max(1e-9);
         row(&mut text, "time", format!("{}, {rate:.0} steps a second", seconds(self.seconds)));
@@ -88,8 +96,16 @@ impl Run<'_> {
         for path in self.written {
             row(&mut text, "written", path.display());
         }
+        for warning in simulation.warnings() {
+            row(&mut text, "note", warning);
+        }
         row(&mut text, "result", self.result());
         text
+    }
+
+    /// The most by which an equation of a joint is violated at the end, where there are joints.
+    fn violation(&self) -> Option<f64> {
+        self.simulation.joints().iter().map(|j| j.violation).reduce(f64::max)
     }
 
     fn result(&self) -> String {
@@ -135,6 +151,8 @@ impl Run<'_> {
             "imbalance": report.imbalance,
             "penetration": report.penetration,
             "deep": report.deep,
+            "joint_violation": self.violation(),
+            "notes": simulation.warnings(),
             "settled": self.settled.map(|s| json!({
                 "pairs": s.pairs, "depth": s.depth, "rounds": s.rounds, "moved": s.moved,
             })),
