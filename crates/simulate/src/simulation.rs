@@ -153,9 +153,8 @@ impl Simulation {
             warnings,
         };
         simulation.remember_joints();
-        let Self { world, state, tools, warnings, .. } = &mut simulation;
-        if let Some((found, all)) = tools.joints.redundant(world, state) {
-            warnings.push(format!(
+        if let Some((found, all)) = simulation.tools.joints.redundant {
+            simulation.warnings.push(format!(
                 "{found} of {all} equations of joints are redundant: the motion is unique, the impulses of these joints are not"
             ));
         }

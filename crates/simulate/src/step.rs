@@ -156,6 +156,8 @@ impl Tools {
                 finite.map(|p| norm(p.position) + p.shape.radius()).fold(0.0, f64::max)
             })
             .collect();
+        let mut joints = Joints::new(world);
+        joints.redundant = joints.redundant(world, state);
         Ok(Self {
             detector,
             sizes,
@@ -170,7 +172,7 @@ impl Tools {
             row_of: vec![],
             insisted: vec![],
             islands: Islands::default(),
-            joints: Joints::new(world),
+            joints,
             levers: vec![],
             scalars: vec![],
             heads: vec![],
@@ -462,7 +464,29 @@ impl Tools {
                 b.rotate(scheme, h);
             }
         }
+        if self.joints.redundant.is_some() && scheme.geometry != Geometry::Frozen {
+            self.close_middle(world, state, h);
+        }
         finite
+    }
+
+    /// Puts the extrapolated middle of the step on the joints: elsewhere equations that follow from the others where a loop is closed contradict them, and the
+    /// loop would be locked.
+    fn close_middle(&mut self, world: &World, state: &State, h: f64) {
+        let Self { middle, bodies, joints, .. } = self;
+        middle.t = state.t + 0.5 * h;
+        middle.memory.angles.clone_from(&state.memory.angles);
+        for (k, body) in bodies.iter().enumerate() {
+            middle.position[k] = body.middle.x;
+            middle.rotation[k] = match body.free {
+                true => advanced(state, k, 0.5 * h).1.0,
+                false => state.rotation[k],
+            };
+        }
+        joints.project(world, middle);
+        for (k, body) in bodies.iter_mut().enumerate().filter(|b| b.1.free) {
+            body.middle = middle.pose(k);
+        }
     }
 
     /// Index set, frames, warm starts, islands.

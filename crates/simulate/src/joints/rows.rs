@@ -57,6 +57,8 @@ pub(crate) struct Joints {
     /// Angle and slide at the beginning of the step.
     coordinates: Vec<[f64; 2]>,
     pub reports: Vec<JointReport>,
+    /// How many of how many equations follow from the others at the beginning.
+    pub redundant: Option<(usize, usize)>,
 }
 
 /// A velocity that is off by more than this share of those that make it does not fit the joint.
@@ -92,6 +94,7 @@ impl Joints {
             levers: vec![],
             coordinates: vec![],
             reports: vec![],
+            redundant: None,
         }
     }
 

@@ -7,6 +7,7 @@ mod impacts;
 mod invariance;
 mod joints;
 mod laws;
+mod mechanisms;
 mod overlap;
 mod piles;
 mod projection;

@@ -29,9 +29,9 @@ pub(crate) struct Equation {
 /// Values that satisfy all equations exactly and differ from those given only in one unknown for each independent equation,
 /// the one whose coefficient times weight is largest: with the unknown's own size as its weight, the one which that moves least relative to itself.
 /// Unknowns without weight stay as they are. `None` where the equations contradict each other, or would cost more than `budget`
-/// rational operations.
+/// operations on rational numbers as short as doubles are: a longer one counts as many as its words take the greatest common divisor.
 ///
-/// Cost: one elimination, rows · unknowns · rank operations at most.
+/// Cost: one elimination, rows · unknowns · rank operations at most, on numbers whose length grows with the rank.
 pub(crate) fn satisfying(
     equations: Vec<Equation>,
     values: &[Exact],
@@ -55,13 +55,13 @@ pub(crate) fn satisfying(
         while let Some((k, a)) = row.first_with(|j| place[j]) {
             row.remove(reduced[k].0);
             for (j, b) in &reduced[k].1.0 {
-                spent += 1;
+                spent += cost(&a, b);
+                if spent > budget {
+                    return None;
+                }
                 row.add(*j, -(&a * b));
             }
             constant -= &a * &reduced[k].2;
-        }
-        if spent > budget {
-            return None;
         }
         let weight = |(j, a): &(usize, Exact)| rounded(a).abs() * weights[*j];
         let Some((pivot, a)) = row.0.iter().max_by(|x, y| weight(x).total_cmp(&weight(y))).cloned()
@@ -86,6 +86,13 @@ pub(crate) fn satisfying(
         out[*pivot] = sum;
     }
     Some(out)
+}
+
+/// What a product takes, in units of that of two doubles.
+fn cost(a: &Exact, b: &Exact) -> usize {
+    let words =
+        |x: &Exact| x.numerator().as_sign_words().1.len() + x.denominator().as_words().len();
+    1 + words(a) * words(b) / 16
 }
 
 /// A sparse row, sorted by unknown.
@@ -125,6 +132,25 @@ impl Row {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn long_numbers_cost_more() {
+        // A dense system whose numbers grow to hundreds of words would take seconds.
+        let n = 60;
+        let entry = |i: usize, j: usize| ((i * 37 + j * 91) as f64 * 0.618).sin() + 1.5;
+        let dense = || {
+            (0..n).map(|i| {
+                let terms: Vec<_> = (0..n).map(|j| (j, entry(i, j))).collect();
+                equation(&terms, 1.0)
+            })
+        };
+        let (values, weights) = (vec![Exact::ZERO; n], vec![1.0; n]);
+        let begun = std::time::Instant::now();
+        assert!(satisfying(dense().collect(), &values, &weights, 200_000).is_none());
+        assert!(begun.elapsed().as_secs_f64() < 2.0, "{:?}", begun.elapsed());
+        // Without the length of its numbers it would not be too dear.
+        assert!(n * n * n / 3 < 200_000);
+    }
 
     fn equation(terms: &[(usize, f64)], constant: f64) -> Equation {
         Equation {
