@@ -7,6 +7,7 @@ mod laws;
 mod oscillators;
 mod painleve;
 mod pendulum;
+mod rattleback;
 mod slider_crank;
 mod woodpecker;
 
