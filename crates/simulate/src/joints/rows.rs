@@ -11,7 +11,7 @@
 
 use nonsmooth_scenes::vec3::{Vec3, apply, cross, dot, norm, scale, sub};
 
-use super::equations::{Equation, Linkage, Reach, coupled};
+use super::equations::{Equation, Linkage, Placed, Reach, coupled};
 use super::{Coordinate, Drive, JointId, JointReport, Motor, Spring};
 use crate::moving::Moving;
 use crate::rotation::Pose;
@@ -130,139 +130,36 @@ impl Joints {
             return;
         }
         self.coordinates = self.coordinates(state, |k| bodies[k as usize].start);
+        let Self { linkages, rows, levers, coordinates, .. } = self;
         let step = Step { scheme, world, state, bodies, h };
-        let places: Vec<_> =
-            self.linkages.iter().map(|l| l.place(|k| bodies[k as usize].middle)).collect();
-        for j in 0..self.linkages.len() {
-            let (at, [angle, slide]) = (&places[j], self.coordinates[j]);
-            let equations = self.linkages[j].equations(at, angle);
-            for (k, equation) in equations.into_iter().enumerate() {
-                let key = (j as u32, k as u32);
-                self.push(&step, key, &equation.gradient, Wanted::bilateral());
+        let middle = |k: u32| bodies[k as usize].middle;
+        let mut gradients = Gradients::at(world, linkages, coordinates, middle);
+        let mut push = |key: (u32, u32), reach: &[Reach], wanted: Wanted| {
+            let first = levers.len() as u32;
+            levers.extend(reach.iter().filter(|r| step.is_free(r)).map(Lever::of));
+            if levers.len() as u32 > first {
+                rows.push(step.row(key, reach, (first, levers.len() as u32), wanted));
             }
-            for (d, drive) in world.joints[j].drives.iter().enumerate() {
-                let reach = self.linkages[j].gradient(at, drive.coordinate);
-                let s = match drive.coordinate {
-                    Coordinate::Angle => angle,
-                    Coordinate::Slide => slide,
-                };
-                self.drive(&step, (j as u32, d), drive, s, &reach);
+        };
+        for (j, joint) in world.joints.iter().enumerate() {
+            for k in 0..gradients.equations(j as u32).len() as u32 {
+                let key = (j as u32, k);
+                push(key, &gradients.of(key), Wanted::bilateral());
             }
-        }
-        for (c, coupling) in world.couplings.iter().enumerate() {
-            let linkages = &self.linkages;
-            let reach = coupled(coupling, |joint, coordinate| {
-                let j = joint.index();
-                (0.0, linkages[j].gradient(&places[j], coordinate))
-            })
-            .gradient;
-            let key = ((world.joints.len() + c) as u32, 0);
-            self.push(&step, key, &reach, Wanted::bilateral());
-        }
-    }
-
-    /// The rows along one coordinate, which is s.
-    fn drive(
-        &mut self,
-        step: &Step,
-        (joint, d): (u32, usize),
-        drive: &Drive,
-        s: f64,
-        reach: &[Reach],
-    ) {
-        let (h, theta) = (step.h, step.scheme.theta);
-        let key = |what: u32| (joint, number(d, what));
-        let rate = step.rate(reach);
-        if let Some(limits) = drive.limits {
-            let gamma = match step.scheme.activation {
-                Activation::Forecast { gamma, .. } => gamma,
-                Activation::Gap => 1.0,
-            };
-            let sides = [(LOWER, s - limits.lower, 1.0), (UPPER, limits.upper - s, -1.0)];
-            for (what, gap, sign) in sides {
-                if gap + gamma * h * sign * rate > 0.0 {
-                    continue;
+            for (d, drive) in joint.drives.iter().enumerate() {
+                let [angle, slide] = coordinates[j];
+                let s = if drive.coordinate == Coordinate::Angle { angle } else { slide };
+                let rate = step.rate(&gradients.of((j as u32, number(d, SPRING))));
+                for (what, wanted) in step.along(drive, s, rate) {
+                    let key = (j as u32, number(d, what));
+                    push(key, &gradients.of(key), wanted);
                 }
-                let turned: Vec<Reach> = reach.iter().map(|r| r.times(sign)).collect();
-                let given = limits.e * (sign * rate).min(0.0);
-                let wanted = Wanted::end([0.0, f64::INFINITY], given);
-                self.push(step, key(what), &turned, wanted);
             }
         }
-        let pull = |spring: &Spring, max: f64| {
-            let Spring { stiffness, damping, rest } = *spring;
-            let resistance = damping + h * theta * stiffness;
-            (resistance > 0.0).then(|| Wanted {
-                bounds: [-h * max, h * max],
-                compliance: 1.0 / (h * resistance),
-                mean: true,
-                given: stiffness * (s - rest) / resistance,
-            })
-        };
-        if let Some(wanted) = drive.spring.as_ref().and_then(|s| pull(s, f64::INFINITY)) {
-            self.push(step, key(SPRING), reach, wanted);
+        for c in 0..world.couplings.len() {
+            let key = ((world.joints.len() + c) as u32, 0);
+            push(key, &gradients.of(key), Wanted::bilateral());
         }
-        if drive.friction > 0.0 {
-            let most = h * drive.friction;
-            self.push(step, key(FRICTION), reach, Wanted::end([-most, most], 0.0));
-        }
-        let motor = match &drive.motor {
-            Some(Motor::Velocity { velocity, max }) => {
-                Some(Wanted::end([-h * max, h * max], -velocity))
-            }
-            Some(Motor::Position { spring, max }) => pull(spring, *max),
-            None => None,
-        };
-        if let Some(wanted) = motor {
-            self.push(step, key(MOTOR), reach, wanted);
-        }
-        if let Some(driver) = &drive.driver {
-            let t = step.state.t;
-            let given = -(driver.at(t + h) - driver.at(t)) / h;
-            self.push(step, key(DRIVER), reach, Wanted { given, ..Wanted::bilateral() });
-        }
-    }
-
-    fn push(&mut self, step: &Step, key: (u32, u32), reach: &[Reach], wanted: Wanted) {
-        let Wanted { bounds, compliance, mean, given } = wanted;
-        let theta = step.scheme.theta;
-        let first = self.levers.len() as u32;
-        let (mut before, mut moved, mut moved_end, mut size) = (0.0, 0.0, 0.0, given.abs());
-        for r in reach {
-            let b = &step.bodies[r.body as usize];
-            if b.free {
-                let (v, omega) = (b.v, b.omega(b.spin));
-                before += dot(r.force, v) + dot(r.moment, omega);
-                size += norm(r.force) * norm(v) + norm(r.moment) * norm(omega);
-                self.levers.push(Lever {
-                    body: r.body,
-                    force: r.force,
-                    moment: r.moment,
-                    row: [0.0; 6],
-                    solved: [0.0; 6],
-                });
-            } else {
-                let (mean, end) = step.moved(r.body as usize);
-                moved += dot(r.force, mean);
-                moved_end += dot(r.force, end);
-            }
-        }
-        if self.levers.len() as u32 == first {
-            return;
-        }
-        // What has a compliance is a force, no constraint: nothing is thrown back.
-        let fits = compliance > 0.0 || (before + moved + given).abs() <= UNFIT * size;
-        let mean = mean && fits;
-        let (given, compliance) = match mean {
-            true => ((moved + given) / theta, compliance / theta),
-            false => (moved_end + given, compliance),
-        };
-        let scaled = step.state.memory.scaled(step.h);
-        let [l, u] = bounds;
-        let lambda = (scaled * step.state.memory.impulse(key)).clamp(l, u);
-        let levers = (first, self.levers.len() as u32);
-        let row = ScalarRow { key, levers, bounds, compliance, mean, given, shift: given, lambda };
-        self.rows.push(row);
     }
 
     /// The most by which a limit is violated, as a share of one radian or of the size of its joint.
@@ -328,28 +225,10 @@ impl Joints {
     /// that belong to them the equations of joints keep their values to rounding.
     pub fn place_at(&mut self, world: &World, rows: &[u32], pose: impl Fn(u32) -> Pose) {
         let Self { linkages, coordinates, rows: all, levers, .. } = self;
-        let places: Vec<_> = linkages.iter().map(|l| l.place(&pose)).collect();
-        let mut own: (u32, Vec<Equation>) = (u32::MAX, vec![]);
+        let mut gradients = Gradients::at(world, linkages, coordinates, pose);
         for &k in rows {
             let row = &all[k as usize];
-            let (owner, which) = row.key;
-            let j = owner as usize;
-            let reach = if let Some(coupling) = j.checked_sub(linkages.len()) {
-                let gradient = |joint: JointId, c: Coordinate| {
-                    (0.0, linkages[joint.index()].gradient(&places[joint.index()], c))
-                };
-                coupled(&world.couplings[coupling], gradient).gradient
-            } else if let Some((drive, what)) = drive_of(which) {
-                let along = world.joints[j].drives[drive].coordinate;
-                let sign = if what == UPPER { -1.0 } else { 1.0 };
-                let reach = linkages[j].gradient(&places[j], along);
-                reach.iter().map(|r| r.times(sign)).collect()
-            } else {
-                if own.0 != owner {
-                    own = (owner, linkages[j].equations(&places[j], coordinates[j][0]));
-                }
-                own.1[which as usize].gradient.clone()
-            };
+            let reach = gradients.of(row.key);
             let free = reach.iter().filter(|r| world.bodies[r.body as usize].is_free());
             let (first, last) = row.levers;
             for (lever, r) in levers[first as usize..last as usize].iter_mut().zip(free) {
@@ -441,6 +320,11 @@ impl Joints {
 }
 
 impl Lever {
+    fn of(r: &Reach) -> Self {
+        let (row, solved) = ([0.0; 6], [0.0; 6]);
+        Self { body: r.body, force: r.force, moment: r.moment, row, solved }
+    }
+
     /// The rate that the body's velocities make.
     pub fn rate(&self, v: Vec3, spin: Vec3) -> f64 {
         (0..3).map(|k| self.row[k] * v[k] + self.row[3 + k] * spin[k]).sum()
@@ -453,6 +337,54 @@ impl Reach {
             body: self.body,
             force: scale(factor, self.force),
             moment: scale(factor, self.moment),
+        }
+    }
+}
+
+/// The gradients of rows at a configuration, by their keys.
+struct Gradients<'a> {
+    world: &'a World,
+    linkages: &'a [Linkage],
+    coordinates: &'a [[f64; 2]],
+    places: Vec<Placed>,
+    /// The equations of the joint that was asked for last.
+    own: (u32, Vec<Equation>),
+}
+
+impl<'a> Gradients<'a> {
+    fn at(
+        world: &'a World,
+        linkages: &'a [Linkage],
+        coordinates: &'a [[f64; 2]],
+        pose: impl Fn(u32) -> Pose,
+    ) -> Self {
+        let places = linkages.iter().map(|l| l.place(&pose)).collect();
+        Self { world, linkages, coordinates, places, own: (u32::MAX, vec![]) }
+    }
+
+    fn equations(&mut self, joint: u32) -> &[Equation] {
+        if self.own.0 != joint {
+            let j = joint as usize;
+            let equations = self.linkages[j].equations(&self.places[j], self.coordinates[j][0]);
+            self.own = (joint, equations);
+        }
+        &self.own.1
+    }
+
+    fn of(&mut self, (owner, which): (u32, u32)) -> Vec<Reach> {
+        let Self { world, linkages, places, .. } = self;
+        let j = owner as usize;
+        if let Some(coupling) = j.checked_sub(linkages.len()) {
+            let gradient = |joint: JointId, c: Coordinate| {
+                (0.0, linkages[joint.index()].gradient(&places[joint.index()], c))
+            };
+            coupled(&world.couplings[coupling], gradient).gradient
+        } else if let Some((drive, what)) = drive_of(which) {
+            let along = world.joints[j].drives[drive].coordinate;
+            let sign = if what == UPPER { -1.0 } else { 1.0 };
+            linkages[j].gradient(&places[j], along).iter().map(|r| r.times(sign)).collect()
+        } else {
+            self.equations(owner)[which as usize].gradient.clone()
         }
     }
 }
@@ -487,6 +419,95 @@ struct Step<'a> {
 }
 
 impl Step<'_> {
+    fn is_free(&self, r: &Reach) -> bool {
+        self.bodies[r.body as usize].free
+    }
+
+    /// What acts along a coordinate, which is s and changes at `rate`.
+    fn along(&self, drive: &Drive, s: f64, rate: f64) -> Vec<(u32, Wanted)> {
+        let (h, theta) = (self.h, self.scheme.theta);
+        let mut all = vec![];
+        if let Some(limits) = drive.limits {
+            let gamma = match self.scheme.activation {
+                Activation::Forecast { gamma, .. } => gamma,
+                Activation::Gap => 1.0,
+            };
+            let sides = [(LOWER, s - limits.lower, 1.0), (UPPER, limits.upper - s, -1.0)];
+            for (what, gap, sign) in sides {
+                if gap + gamma * h * sign * rate <= 0.0 {
+                    let given = limits.e * (sign * rate).min(0.0);
+                    all.push((what, Wanted::end([0.0, f64::INFINITY], given)));
+                }
+            }
+        }
+        let pull = |spring: &Spring, max: f64| {
+            let Spring { stiffness, damping, rest } = *spring;
+            let resistance = damping + h * theta * stiffness;
+            (resistance > 0.0).then(|| Wanted {
+                bounds: [-h * max, h * max],
+                compliance: 1.0 / (h * resistance),
+                mean: true,
+                given: stiffness * (s - rest) / resistance,
+            })
+        };
+        let spring = drive.spring.as_ref().and_then(|s| pull(s, f64::INFINITY));
+        all.extend(spring.map(|wanted| (SPRING, wanted)));
+        if drive.friction > 0.0 {
+            let most = h * drive.friction;
+            all.push((FRICTION, Wanted::end([-most, most], 0.0)));
+        }
+        let motor = match &drive.motor {
+            Some(Motor::Velocity { velocity, max }) => {
+                Some(Wanted::end([-h * max, h * max], -velocity))
+            }
+            Some(Motor::Position { spring, max }) => pull(spring, *max),
+            None => None,
+        };
+        all.extend(motor.map(|wanted| (MOTOR, wanted)));
+        if let Some(driver) = &drive.driver {
+            let t = self.state.t;
+            let given = -(driver.at(t + h) - driver.at(t)) / h;
+            all.push((DRIVER, Wanted { given, ..Wanted::bilateral() }));
+        }
+        all
+    }
+
+    /// The row of these levers that has what is wanted.
+    fn row(
+        &self,
+        key: (u32, u32),
+        reach: &[Reach],
+        levers: (u32, u32),
+        wanted: Wanted,
+    ) -> ScalarRow {
+        let Wanted { bounds, compliance, mean, given } = wanted;
+        let (mut before, mut moved, mut moved_end, mut size) = (0.0, 0.0, 0.0, given.abs());
+        for r in reach {
+            let b = &self.bodies[r.body as usize];
+            if b.free {
+                let (v, omega) = (b.v, b.omega(b.spin));
+                before += dot(r.force, v) + dot(r.moment, omega);
+                size += norm(r.force) * norm(v) + norm(r.moment) * norm(omega);
+            } else {
+                let (mean, end) = self.moved(r.body as usize);
+                moved += dot(r.force, mean);
+                moved_end += dot(r.force, end);
+            }
+        }
+        // What has a compliance is a force, no constraint: nothing is thrown back.
+        let fits = compliance > 0.0 || (before + moved + given).abs() <= UNFIT * size;
+        let mean = mean && fits;
+        let theta = self.scheme.theta;
+        let (given, compliance) = match mean {
+            true => ((moved + given) / theta, compliance / theta),
+            false => (moved_end + given, compliance),
+        };
+        let [l, u] = bounds;
+        let memory = &self.state.memory;
+        let lambda = (memory.scaled(self.h) * memory.impulse(key)).clamp(l, u);
+        ScalarRow { key, levers, bounds, compliance, mean, given, shift: given, lambda }
+    }
+
     /// The rate of a row at the beginning.
     fn rate(&self, reach: &[Reach]) -> f64 {
         let each = reach.iter().map(|r| {
