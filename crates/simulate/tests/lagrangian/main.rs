@@ -6,6 +6,7 @@ mod four_bars;
 mod laws;
 mod oscillators;
 mod painleve;
+mod patch;
 mod pendulum;
 mod rattleback;
 mod slider_crank;
