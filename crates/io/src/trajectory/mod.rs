@@ -282,12 +282,14 @@ impl Trajectory {
     }
 
     /// Writes the whole file beside the old one and gives it its name, when it is on the disk: at each moment there is one that opens. Costs time in proportion
-    /// to the run so far; a run that is written as it grows has a [`Writer`].
+    /// to the run so far; a run that is written as it grows has a [`Writer`]. Parts that one left beside the file are removed.
     ///
     /// Errors: what the system refuses; frames that do not have all bodies; contacts of bodies that are not there; NUL characters in texts.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
         let path = path.as_ref();
-        crate::format::put(path, &self.to_bytes(path)?)
+        crate::format::put(path, &self.to_bytes(path)?)?;
+        parts::remove(path);
+        Ok(())
     }
 
     /// The file in memory; `name` is for messages. Errors: as of [`write`](Self::write).

@@ -106,7 +106,6 @@ impl Writer {
             remove(&self.path);
         }
         run.write(&self.path)?;
-        remove(&self.path);
         self.parts.clear();
         self.begun = true;
         self.reached = Extent { frames: run.frames.len(), steps: run.steps.len() };
@@ -142,7 +141,7 @@ fn beside(path: &Path) -> Vec<PathBuf> {
 }
 
 /// Removes the parts of a file. That they cannot be is no mistake: what a file covers is passed over.
-fn remove(path: &Path) {
+pub(super) fn remove(path: &Path) {
     for file in beside(path) {
         let _ = std::fs::remove_file(file);
     }
