@@ -275,6 +275,43 @@ fn the_models_that_are_compared_with_mujoco_are_scenes() {
 }
 
 #[test]
+fn models_with_mistakes_are_one_line_and_never_a_panic() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mjcf");
+    let models: Vec<String> = ["arm", "cartpole", "loops", "misc"]
+        .iter()
+        .map(|name| std::fs::read_to_string(folder.join(format!("{name}.xml"))).unwrap())
+        .collect();
+    let mut random = 1_u64;
+    let mut draw = |below: usize| {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (random >> 33) as usize % below
+    };
+    let words = ["", "-1", "1e308", "0", "nan", "1 2", "x", "\"", "<body>", "free", "ball", "mesh"];
+    let mut refused = 0;
+    for k in 0..4000 {
+        let model = &models[k % models.len()];
+        // A word of it becomes another one.
+        let mut parts: Vec<&str> = model.split_inclusive([' ', '"', '\n', '>']).collect();
+        let (at, word) = (draw(parts.len()), words[draw(words.len())]);
+        let kept: String;
+        let end = parts[at].chars().last();
+        kept = match draw(3) {
+            0 => word.into(),
+            _ => format!("{word}{}", end.map_or(String::new(), String::from)),
+        };
+        parts[at] = &kept;
+        match mjcf(&parts.concat(), &folder) {
+            Ok(made) => assert!(SceneFile::parse(&made.scene, &[]).is_ok()),
+            Err(error) => {
+                refused += 1;
+                assert!(!error.to_string().contains('\n'), "{error}");
+            }
+        }
+    }
+    assert!(refused > 1000 && refused < 3900, "{refused}");
+}
+
+#[test]
 fn what_is_not_in_the_subset_is_one_line_with_element_and_line() {
     let body = |inner: &str| {
         format!(

@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 
 use super::write::View;
-use super::{Step, Trajectory, digest, write};
+use super::{Frame, Step, Trajectory, digest, write};
 use crate::IoError;
 use crate::replace::WRITABLE;
 
@@ -174,7 +174,9 @@ pub(super) fn join(path: &Path, run: &mut Trajectory) -> Result<(), IoError> {
             let expected = format!("a part of the same run that goes on after step {done}");
             return Err(IoError::data(&file, "/steps/number", expected, first));
         }
-        run.frames.extend(part.frames.into_iter().filter(|frame| frame.step > done));
+        let seen = run.frames.last().map(|frame| frame.step);
+        let fresh = |frame: &Frame| seen.is_none_or(|seen| frame.step > seen);
+        run.frames.extend(part.frames.into_iter().filter(fresh));
         run.steps.extend(part.steps.into_iter().filter(|step| step.number > done));
         run.checkpoint = part.checkpoint;
     }

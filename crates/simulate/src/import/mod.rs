@@ -5,10 +5,12 @@ mod urdf;
 
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, congruence, scale};
 use nonsmooth_scenes::{MassProperties, Rotation};
+use serde_json::Value;
 
 pub use mjcf::mjcf;
 pub use urdf::urdf;
 
+use crate::SimulateError;
 use crate::rotation::unit;
 
 /// A scene that was made of another format.
@@ -66,4 +68,14 @@ fn about(k: usize, angle: f64) -> Rotation {
 /// An inertia as scenes write it: xx, yy, zz, xy, xz, yz.
 fn entries(j: &Mat3) -> [f64; 6] {
     [j[0][0], j[1][1], j[2][2], j[0][1], j[0][2], j[1][2]]
+}
+
+/// A scene as text. Errors: numbers that became infinite.
+fn text(scene: &Value) -> Result<String, SimulateError> {
+    // JSON has no infinite numbers and puts null in their places, which TOML does not have.
+    let table = toml::Value::try_from(scene);
+    let text = table.ok().and_then(|table| toml::to_string(&table).ok());
+    text.ok_or_else(|| {
+        SimulateError::value("scene", "finite numbers", "others, as sums of large ones")
+    })
 }

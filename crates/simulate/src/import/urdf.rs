@@ -9,7 +9,7 @@ use nonsmooth_scenes::vec3::{Mat3, Vec3, apply, congruence, sub};
 use roxmltree::{Document, Node};
 use serde_json::{Value, json};
 
-use super::{Frame, Imported, about, entries};
+use super::{Frame, Imported, about, entries, text as text_of};
 use crate::SimulateError;
 use crate::rotation::unit;
 
@@ -91,9 +91,7 @@ pub fn urdf(text: &str) -> Result<Imported, SimulateError> {
     }
     let mut robot = Robot { links: &links, joints: &joints, warnings: vec![] };
     let scene = robot.scene(document.root_element().attribute("name").unwrap_or("robot"))?;
-    let table = toml::Value::try_from(&scene).expect("numbers, words and lists");
-    let scene = toml::to_string(&table).expect("a table");
-    Ok(Imported { scene, warnings: robot.warnings })
+    Ok(Imported { scene: text_of(&scene)?, warnings: robot.warnings })
 }
 
 /// Where link k is, by way of all links above it.

@@ -215,7 +215,8 @@ impl<'a> Assets<'a> {
         let Some(heights) = item.numbers("elevation")? else {
             return Err(item.wrong("heights as `elevation`", "none"));
         };
-        if rows < 2 || columns < 2 || heights.len() as i64 != rows * columns {
+        let count = rows.checked_mul(columns).filter(|_| rows >= 2 && columns >= 2);
+        if count != Some(heights.len() as i64) {
             let expected = format!("{rows} × {columns} heights, at least 2 × 2");
             return Err(item.wrong(expected, heights.len()));
         }

@@ -25,7 +25,7 @@ use self::document::{Defaults, Element, MAIN};
 use self::geoms::Assets;
 use self::joints::Joints;
 use self::model::Tree;
-use super::{Frame, Imported, entries};
+use super::{Frame, Imported, entries, text as text_of};
 use crate::SimulateError;
 
 /// The model of an MJCF document in `folder`, which files that it includes and meshes are looked for in. It stands as its first keyframe says, else with its joints at
@@ -69,8 +69,7 @@ pub fn mjcf(text: &str, folder: &Path) -> Result<Imported, SimulateError> {
         scene["couplings"] = json!(couplings);
     }
     remarks(&mut tree, &scene);
-    let table = toml::Value::try_from(&scene).expect("numbers, words and lists");
-    Ok(Imported { scene: toml::to_string(&table).expect("a table"), warnings: tree.said })
+    Ok(Imported { scene: text_of(&scene)?, warnings: tree.said })
 }
 
 /// Says which parts of the document are left out, and refuses what there is none of.
