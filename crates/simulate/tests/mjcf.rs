@@ -131,7 +131,7 @@ fn a_two_link_arm_keeps_its_energy_and_falls_as_both_frames_say() {
     let (s, c) = 0.7_f64.sin_cos();
     let (s2, c2) = 0.35_f64.sin_cos();
     let ways = [
-        format!("euler=\"0 0.7 0\""),
+        "euler=\"0 0.7 0\"".to_owned(),
         format!("quat=\"{} 0 {} 0\"", 2.0 * c2, 2.0 * s2),
         "axisangle=\"0 3 0 0.7\"".to_owned(),
         format!("xyaxes=\"{c} 0 {} 0 2 0\"", -s),
@@ -293,10 +293,9 @@ fn models_with_mistakes_are_one_line_and_never_a_panic() {
         // A word of it becomes another one.
         let mut parts: Vec<&str> = model.split_inclusive([' ', '"', '\n', '>']).collect();
         let (at, word) = (draw(parts.len()), words[draw(words.len())]);
-        let kept: String;
         let end = parts[at].chars().last();
-        kept = match draw(3) {
-            0 => word.into(),
+        let kept = match draw(3) {
+            0 => word.to_owned(),
             _ => format!("{word}{}", end.map_or(String::new(), String::from)),
         };
         parts[at] = &kept;

@@ -17,7 +17,7 @@ use crate::{Mesh, Shape, SimulateError};
 const DENSITY: f64 = 1000.0;
 
 /// Attributes of geoms that are read, or that have to do with pictures or with a law of contact that is not ours.
-const KNOWN: [&str; 35] = [
+const KNOWN: [&str; 31] = [
     "name",
     "class",
     "type",
@@ -49,10 +49,6 @@ const KNOWN: [&str; 35] = [
     "solmix",
     "fluidshape",
     "fluidcoef",
-    "plugin",
-    "surfacevel",
-    "subgroup",
-    "shadow",
 ];
 
 /// A geom of a body.

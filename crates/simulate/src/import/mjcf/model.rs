@@ -199,7 +199,7 @@ impl<'a> Tree<'a> {
                     self.bodies[place.body].masses.push(own);
                 }
                 // What has no mass and touches nothing.
-                "inertial" | "site" | "camera" | "light" | "plugin" | "user" => {}
+                "inertial" | "site" | "camera" | "light" | "plugin" => {}
                 tag => {
                     let expected =
                         "body, frame, inertial, joint, freejoint, geom, site, camera or light";
