@@ -109,10 +109,10 @@ fn trajectories_keep_joints() {
     let scene = scene.join("../../examples/scenes/four_bar.toml");
     let run =
         format!("simulate {} --every 50 --out run.h5 --html run.html --end 0.5", scene.display());
-    // Equations that are redundant are said beside the report.
+    // Equations that are redundant are said in the report.
     let ran = folder.run(&run);
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    assert!(ran.stderr.contains("3 of 20 equations of joints are redundant"), "{}", ran.stderr);
+    assert!(ran.stdout.contains("3 of 20 equations of joints are redundant"), "{}", ran.stdout);
     let run = nonsmooth_io::trajectory::Trajectory::read(folder.path("run.h5")).unwrap();
     assert_eq!(run.joints, ["motor", "elbow", "wrist", "bearing"]);
     let (first, last) = (&run.frames[0].joints, &run.frames[run.frames.len() - 1].joints);

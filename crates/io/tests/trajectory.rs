@@ -10,7 +10,7 @@ use motion::run;
 use nonsmooth_io::Format;
 use nonsmooth_io::IoError;
 use nonsmooth_io::fclib::Fclib;
-use nonsmooth_io::trajectory::{Trajectory, holds};
+use nonsmooth_io::trajectory::{Trajectory, Writer, holds};
 
 const NAME: &str = "run.h5";
 
@@ -54,6 +54,75 @@ fn long_runs_fill_several_chunks_and_are_compressed() {
     let contacts: usize = long.frames.iter().map(|f| f.contacts.len()).sum();
     let plain = 8 * (4000 * 3 * 13 + 26 * contacts);
     assert!(2 * file.len() < plain, "{} of {plain} bytes", file.len());
+}
+
+/// What stands in a folder, by name.
+fn files(folder: &Path) -> Vec<(std::ffi::OsString, Vec<u8>)> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().map(Result::unwrap);
+    let mut all: Vec<_> =
+        entries.map(|e| (e.file_name(), std::fs::read(e.path()).unwrap())).collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn a_run_that_grows_is_written_by_parts_and_read_as_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let (path, parts) = (folder.path().join(NAME), folder.path().join("run.h5.parts"));
+    let all = run(140);
+    let until = |k: usize| Trajectory {
+        frames: all.frames[..k].to_vec(),
+        steps: all.steps[..2 * k].to_vec(),
+        ..all.clone()
+    };
+    let mut writer = Writer::new(&path, false);
+    let (mut written, mut before) = (0, vec![]);
+    for k in 1..=140 {
+        let now = until(k);
+        writer.flush(&now).unwrap();
+        assert_same(&Trajectory::read(&path).unwrap(), &now);
+        let left = files(&parts);
+        assert!(left.len() <= 7 * 3, "{} parts of {k} flushes", left.len());
+        let fresh = left.iter().filter(|file| !before.contains(*file));
+        written += fresh.map(|file| parse(&file.1).unwrap().steps.len()).sum::<usize>();
+        // A writer that is killed before it removes what it has joined leaves both.
+        for (name, content) in &before {
+            if !left.iter().any(|(other, _)| other == name) {
+                std::fs::write(parts.join(name), content).unwrap();
+                assert_same(&Trajectory::read(&path).unwrap(), &now);
+                std::fs::remove_file(parts.join(name)).unwrap();
+            }
+        }
+        before = left;
+    }
+    // Each row is written a few times, not once a flush.
+    assert!(written <= 3 * all.steps.len(), "{written} rows");
+    // Nothing new is nothing written; the end is one file.
+    writer.flush(&all).unwrap();
+    assert_eq!(files(&parts), before);
+    writer.finish(&all).unwrap();
+    assert!(!parts.exists());
+    assert_same(&Trajectory::parse(&path, &std::fs::read(&path).unwrap()).unwrap(), &all);
+
+    // Another run in the same place has nothing of the one before, nor are its parts taken for its own.
+    let mut writer = Writer::new(&path, true);
+    writer.flush(&until(1)).unwrap();
+    writer.flush(&until(9)).unwrap();
+    assert_eq!(files(&parts).len(), 1);
+    let other = Trajectory { scene: "another".into(), ..until(1) };
+    Writer::new(&path, false).flush(&other).unwrap();
+    assert_same(&Trajectory::read(&path).unwrap(), &other);
+    std::fs::create_dir_all(&parts).unwrap();
+    std::fs::write(parts.join("000000000003.h5"), &before[0].1).unwrap();
+    assert_same(&Trajectory::read(&path).unwrap(), &other);
+    // What a person put there stays; a part with a gap before it is an error that names it.
+    std::fs::write(parts.join("notes.txt"), "mine").unwrap();
+    until(1).write(&path).unwrap();
+    assert_eq!(files(&parts).len(), 1);
+    let last = before.last().unwrap();
+    std::fs::write(parts.join(&last.0), &last.1).unwrap();
+    let error = Trajectory::read(&path).unwrap_err().to_string();
+    assert!(error.contains("a part of the same run that goes on after step 2"), "{error}");
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Convex polyhedra: faces for drawing, exact mass properties for dynamics.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use crate::SceneError;
 use crate::vec3::{Mat3, Vec3, add, cross, dot, mean, norm, rectangle, scale, sub};
 
@@ -114,6 +116,58 @@ impl Polyhedron {
         Self { vertices, faces }
     }
 
+    /// The convex hull of points, its faces triangles; points within 1e-10 of the size of what others span are left out. Points are added one by one, each in place of
+    /// the faces that it sees: O(n f) for n points and a hull of f faces.
+    ///
+    /// Errors: coordinates that are not finite; points of a plane; those of [`Polyhedron::new`], where points lie so that rounding hides which are outside.
+    pub fn hull(points: &[Vec3]) -> Result<Self, SceneError> {
+        if let Some(k) = points.iter().position(|v| v.iter().any(|x| !x.is_finite())) {
+            let found = format!("{:?}", points[k]);
+            return Err(SceneError::value(format!("vertices[{k}]"), "finite coordinates", found));
+        }
+        let flat = || {
+            let found = format!("{} in a plane", points.len());
+            SceneError::value("vertices", "points that span a solid", found)
+        };
+        // A large simplex to begin with: each corner the farthest point from what the corners before it span.
+        let far = |distance: &dyn Fn(Vec3) -> f64| {
+            let distances = points.iter().map(|&p| distance(p)).enumerate();
+            distances.fold((0, 0.0), |best, d| if d.1 > best.1 { d } else { best })
+        };
+        let Some(&first) = points.first() else { return Err(flat()) };
+        let (a, _) = far(&|p| norm(sub(p, first)));
+        let (b, size) = far(&|p| norm(sub(p, points[a])));
+        let slack = 1e-10 * size;
+        let along = sub(points[b], points[a]);
+        let (c, width) = far(&|p| norm(cross(sub(p, points[a]), along)) / size);
+        let normal = cross(along, sub(points[c], points[a]));
+        let (d, height) = far(&|p| (dot(normal, sub(p, points[a])) / norm(normal)).abs());
+        if !(width > slack && height > slack) {
+            return Err(flat());
+        }
+        let front = |[a, b, c]: [usize; 3], p: Vec3| {
+            let n = cross(sub(points[b], points[a]), sub(points[c], points[a]));
+            dot(n, sub(p, points[a])) / norm(n)
+        };
+        let (b, c) = if front([a, b, c], points[d]) > 0.0 { (c, b) } else { (b, c) };
+        let mut faces = vec![[a, b, c], [a, c, d], [c, b, d], [b, a, d]];
+        for (k, &p) in points.iter().enumerate() {
+            let (seen, kept): (Vec<_>, Vec<_>) =
+                faces.iter().partition(|&&face| front(face, p) > slack);
+            let edges = |&[a, b, c]: &[usize; 3]| [(a, b), (b, c), (c, a)];
+            let around: BTreeSet<_> = seen.iter().flat_map(edges).collect();
+            faces = kept;
+            // What it sees ends at edges whose other side it does not see.
+            let rim = around.iter().filter(|(a, b)| !around.contains(&(*b, *a)));
+            faces.extend(rim.map(|&(a, b)| [a, b, k]));
+        }
+        let corners: BTreeSet<usize> = faces.iter().flatten().copied().collect();
+        let number: BTreeMap<usize, usize> =
+            corners.iter().enumerate().map(|(new, &old)| (old, new)).collect();
+        let faces = faces.iter().map(|face| face.iter().map(|k| number[k]).collect()).collect();
+        Self::new(corners.iter().map(|&k| points[k]).collect(), faces)
+    }
+
     /// The plane convex polygon `base` (either sense) extruded by `along`, for example a voussoir.
     ///
     /// Errors: those of [`Polyhedron::new`].
@@ -193,6 +247,35 @@ impl Polyhedron {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_hull_is_what_its_points_span() {
+        // A grid in a box, most points on its faces or inside.
+        let half = [0.5, 0.2, 1.1];
+        let knots = (0..5 * 5 * 5).map(|k| [k % 5, k / 5 % 5, k / 25]);
+        let grid: Vec<Vec3> = knots
+            .map(|k| std::array::from_fn(|i| half[i] * (0.5 * f64::from(k[i]) - 1.0)))
+            .collect();
+        let hull = Polyhedron::hull(&grid).unwrap();
+        let exact = 8.0 * half[0] * half[1] * half[2];
+        assert!((hull.mass_properties(1.0).mass - exact).abs() < 1e-14);
+        // Points on a ball are all corners, and inside of nothing.
+        let ball: Vec<Vec3> = (0..200)
+            .map(|k| {
+                let (z, angle) = (-0.995 + 0.01 * f64::from(k), 2.4 * f64::from(k));
+                let r = (1.0_f64 - z * z).sqrt();
+                [r * angle.cos(), r * angle.sin(), z]
+            })
+            .collect();
+        let hull = Polyhedron::hull(&ball).unwrap();
+        assert_eq!((hull.vertices().len(), hull.faces().len()), (200, 2 * 200 - 4));
+        let volume = hull.mass_properties(1.0).mass;
+        assert!(volume < 4.19 && volume > 4.0, "{volume}");
+        let flat: Vec<Vec3> = grid.iter().map(|p| [p[0], p[1], 0.5]).collect();
+        let error = Polyhedron::hull(&flat).unwrap_err().to_string();
+        assert!(error.contains("points that span a solid, found 125 in a plane"), "{error}");
+        assert!(Polyhedron::hull(&[]).is_err() && Polyhedron::hull(&[[1.0; 3]; 9]).is_err());
+    }
 
     #[test]
     fn inertia_of_a_box_has_its_closed_form_anywhere() {

@@ -39,9 +39,12 @@ pub struct Args {
     /// Steps between two frames of the files written [default: the scene's output.every]
     #[arg(long, value_name = "STEPS")]
     every: Option<u64>,
-    /// Write the trajectory (HDF5), at least every five seconds: what is written stays readable whatever happens
+    /// Write the trajectory (HDF5), while the run goes on into parts beside it: what is written stays readable whatever happens
     #[arg(long, value_name = "FILE.h5")]
     out: Option<PathBuf>,
+    /// Seconds after which what is new of the trajectory is written
+    #[arg(long, value_name = "S", default_value_t = 5.0)]
+    flush: f64,
     /// Write a page that plays the motion in a browser, without a network
     #[arg(long, value_name = "FILE.html")]
     html: Option<PathBuf>,
@@ -203,6 +206,10 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     if let Some(file) = &args.resume {
         recorder.resume(file, &mut simulation)?;
     }
+    if let Some(out) = &out {
+        let resumed = args.resume.as_ref().is_some_and(|file| files::same(file, out));
+        recorder.write_to(out, resumed, pause(args.flush)?);
+    }
     let begun = Instant::now();
     if let Some(seconds) = limit {
         end_after(seconds, cancel);
@@ -212,11 +219,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let mut watch = |simulation: &Simulation, report: &StepReport| {
         recorder.step(simulation, report);
         bar.watch(report.t, report.counts.active, report.residual);
-        let flushed = match &out {
-            Some(out) => recorder.flush(out, simulation, false),
-            None => Ok(()),
-        };
-        match flushed {
+        match recorder.flush(simulation) {
             Ok(()) => Control::Continue,
             Err(e) => {
                 mistake = Some(e);
@@ -241,7 +244,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let seconds = begun.elapsed().as_secs_f64();
     let mut written = vec![];
     if let Some(out) = &out {
-        recorder.flush(out, &simulation, true)?;
+        recorder.finish(&simulation)?;
         written.push(out.clone());
     }
     if let Some(csv) = &csv {
@@ -279,6 +282,13 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         false => output::print(&run.text(args.timings)),
     }
     Ok(Exit::solved(complete(&report)))
+}
+
+/// The time between two flushes.
+fn pause(seconds: f64) -> Result<Duration, String> {
+    Duration::try_from_secs_f64(seconds).map_err(|_| {
+        format!("--flush: expected a number of seconds of at least 0, found {seconds}")
+    })
 }
 
 /// Sets the flag after so many seconds, however long a step takes.

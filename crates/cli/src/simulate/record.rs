@@ -4,10 +4,10 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use nonsmooth_io::trajectory::{
-    Checkpoint, Contact, Energy, Frame, Joint, Named, State, Step, Trajectory,
+    Checkpoint, Contact, Energy, Frame, Joint, Named, State, Step, Trajectory, Writer,
 };
 
-use nonsmooth_io::{Info, Mesh, ProblemFile, vtk};
+use nonsmooth_io::{Info, IoError, Mesh, ProblemFile, vtk};
 use nonsmooth_problem::{AnyProblem, Friction, FrictionLocal, Problem};
 use nonsmooth_scenes::SceneError;
 use nonsmooth_scenes::draw::playback::{self, Drawn, Form, Moment, Placed, Playback};
@@ -18,18 +18,16 @@ use nonsmooth_simulate::{
 
 use crate::files;
 
-/// Seconds between two times that the trajectory is written, at least; more where writing takes long.
-const FLUSH: Duration = Duration::from_secs(5);
-/// Writing may take one part in so many of the time.
-const SHARE: u32 = 20;
-
 /// The trajectory of a run, as it grows.
 pub struct Recorder {
     pub trajectory: Trajectory,
     every: u64,
     /// Whether frames are asked for; steps are always kept.
     frames: bool,
+    writer: Option<Writer>,
     flushed: Instant,
+    /// Between two flushes, at least; a flush that takes longer is followed by as long a time without.
+    pause: Duration,
     wait: Duration,
     /// Steps of the trajectory that was gone on from.
     pub earlier: usize,
@@ -49,8 +47,10 @@ impl Recorder {
             },
             every: scene.output.every,
             frames,
+            writer: None,
             flushed: Instant::now(),
-            wait: FLUSH,
+            pause: Duration::MAX,
+            wait: Duration::MAX,
             earlier: 0,
         };
         recorder.frame(simulation);
@@ -113,17 +113,37 @@ impl Recorder {
         });
     }
 
-    /// Writes the trajectory, if it is time to, or `now`.
-    pub fn flush(&mut self, out: &Path, simulation: &Simulation, now: bool) -> Result<(), String> {
-        if !now && self.flushed.elapsed() < self.wait {
-            return Ok(());
+    /// Writes the trajectory to a file with at least so long a time between; `resumed` if what stands there is its beginning.
+    pub fn write_to(&mut self, out: &Path, resumed: bool, pause: Duration) {
+        self.writer = Some(Writer::new(out, resumed));
+        (self.pause, self.wait) = (pause, pause);
+    }
+
+    /// Writes what is new of the trajectory, if it is time to.
+    pub fn flush(&mut self, simulation: &Simulation) -> Result<(), String> {
+        match self.flushed.elapsed() < self.wait {
+            true => Ok(()),
+            false => self.write(simulation, Writer::flush),
         }
+    }
+
+    /// Writes the whole trajectory.
+    pub fn finish(&mut self, simulation: &Simulation) -> Result<(), String> {
+        self.write(simulation, Writer::finish)
+    }
+
+    fn write(
+        &mut self,
+        simulation: &Simulation,
+        how: fn(&mut Writer, &Trajectory) -> Result<(), IoError>,
+    ) -> Result<(), String> {
+        let Some(writer) = &mut self.writer else { return Ok(()) };
         let begun = Instant::now();
         let state = simulation.state();
         self.trajectory.checkpoint =
             Some(Checkpoint { step: state.steps, time: state.t, state: simulation.checkpoint() });
-        self.trajectory.write(out).map_err(|e| format!("--out {e}"))?;
-        self.wait = FLUSH.max(SHARE * begun.elapsed());
+        how(writer, &self.trajectory).map_err(|e| format!("--out {e}"))?;
+        self.wait = self.pause.max(begun.elapsed());
         self.flushed = Instant::now();
         Ok(())
     }

@@ -11,7 +11,7 @@ use nonsmooth_problem::{
 use super::{DRAWING, Sizes, check_vector, group, invalid};
 use crate::error::one_line;
 use crate::folder::{Folder, Used, fault, open};
-use crate::hdf5::{Link, Object};
+use crate::hdf5::{Dataset, Link, Object, Type};
 use crate::{Info, IoError, ProblemFile, StoredPoint};
 
 /// Reads a file.
@@ -137,10 +137,14 @@ fn info(problem: &Folder) -> Result<Info, IoError> {
         return Ok(Info::default());
     };
     let count = |name: &str| -> Result<Option<usize>, IoError> {
-        let found = g.data.attribute(g.group.address, name);
-        let found = found.map_err(|e| fault(g.file, &g.path, e))?;
-        // FCLIB has a C int here.
-        Ok(found.and_then(|n| u32::try_from(i32::try_from(n).ok()?).ok()).map(|n| n as usize))
+        let fault = |e| fault(g.file, &g.path, e);
+        let found = g.data.attribute(g.group.address, name).map_err(fault)?;
+        // FCLIB has a C int here; what is none is not known.
+        let one =
+            |d: &Dataset| matches!(d.kind, Type::Int { .. }) && d.shape.iter().all(|n| *n == 1);
+        let Some(found) = found.filter(one) else { return Ok(None) };
+        let value = g.data.ints(&found).map_err(fault)?.first().copied();
+        Ok(value.and_then(|n| u32::try_from(i32::try_from(n).ok()?).ok()).map(|n| n as usize))
     };
     Ok(Info {
         title: g.text("title")?,

@@ -515,8 +515,8 @@ impl<'a> File<'a> {
         Ok(text[..end].to_vec())
     }
 
-    /// The value of an attribute of a group that is one integer; `None`: anything else.
-    pub(crate) fn attribute(&self, address: u64, name: &str) -> Result<Option<i64>> {
+    /// An attribute of the object at an address; `None`: there is none of that name, or its kind is not read here.
+    pub(crate) fn attribute(&self, address: u64, name: &str) -> Result<Option<Dataset<'a>>> {
         let header = self.header(address)?;
         for message in header.all(header::ATTRIBUTE) {
             if let Ok(body) = self.body(message)
@@ -533,7 +533,6 @@ impl<'a> File<'a> {
                 c.skip(2)?;
             }
             if let (Some(heap), Some(names)) = (c.address()?, c.address()?) {
-                // What is not read here is no integer.
                 let heap = match super::heap::Heap::open(self, heap) {
                     Err(Fault::Unsupported(_)) => return Ok(None),
                     heap => heap?,
@@ -552,8 +551,8 @@ impl<'a> File<'a> {
         Ok(found)
     }
 
-    /// The integer in an attribute of that name.
-    fn named(&self, body: &'a [u8], wanted: &str) -> Option<i64> {
+    /// The attribute, if it has that name, with its values where they stand.
+    fn named(&self, body: &'a [u8], wanted: &str) -> Option<Dataset<'a>> {
         let mut c = self.over(body);
         let version = c.version("an attribute", 1..=3).ok()?;
         let flags = c.u8().ok()?;
@@ -568,16 +567,18 @@ impl<'a> File<'a> {
             return None;
         }
         let (kind, width) = self.datatype(c.take(padded(kind)).ok()?).ok()?;
-        let (shape, _) = self.dataspace(c.take(padded(space)).ok()?).ok()?;
-        let Type::Int { big, signed, shift, bits } = kind else { return None };
-        if shape.iter().any(|&n| n != 1) {
-            return None;
-        }
-        let x = word(c.take(width as usize).ok()?, big) >> shift << (64 - bits);
-        match signed {
-            true => Some(x as i64 >> (64 - bits)),
-            false => i64::try_from(x >> (64 - bits)).ok(),
-        }
+        let (shape, most) = self.dataspace(c.take(padded(space)).ok()?).ok()?;
+        let layout = Layout::Compact(c.rest());
+        Some(Dataset {
+            kind,
+            width,
+            shape,
+            most,
+            layout,
+            filters: vec![],
+            fill: &[],
+            references: 1,
+        })
     }
 }
 

@@ -54,9 +54,12 @@ impl<'a> File<'a> {
 
     /// The object of that name in a group, soft links followed; `None`: no such name.
     pub(crate) fn find(&self, group: &Group<'a>, name: &str) -> Result<Option<Object<'a>>> {
-        let mut left = MOST_LINKS;
-        let address = self.lead(group, name.as_bytes(), &mut left)?;
-        address.map(|address| self.object(address)).transpose()
+        self.address(group, name)?.map(|address| self.object(address)).transpose()
+    }
+
+    /// Where the object of that name is, soft links followed.
+    pub(crate) fn address(&self, group: &Group<'a>, name: &str) -> Result<Option<u64>> {
+        self.lead(group, name.as_bytes(), &mut { MOST_LINKS })
     }
 
     pub(crate) fn object(&self, address: u64) -> Result<Object<'a>> {

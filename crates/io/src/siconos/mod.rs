@@ -26,6 +26,7 @@ mod friction;
 mod linear;
 mod matrix;
 mod mechanics;
+mod scene;
 
 use std::path::Path;
 
@@ -36,6 +37,10 @@ use crate::tokens::{Tokens, text};
 use crate::{Format, IoError, ProblemFile};
 
 pub use mechanics::write_histories;
+pub use scene::{
+    MechanicsContactor, MechanicsForm, MechanicsJoint, MechanicsLaw, MechanicsObject,
+    MechanicsScene, MechanicsShape,
+};
 
 /// The format: read, not written.
 ///

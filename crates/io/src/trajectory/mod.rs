@@ -18,10 +18,14 @@
 //! with n frames of b bodies and j joints, c contacts in all frames together and s steps, of which frames are a part. Reals have 64 bits and pass bit for bit, infinities
 //! and NaN too: the last step of a run that failed is what one wants to see. Tables are in chunks with shuffle, deflate and Fletcher's checksum, in the
 //! format of HDF5 1.10, which h5py and h5dump read. A file is made whole beside the old one and renamed, so it opens whatever happens to
-//! the program; what is lost is what came after the last [`Trajectory::write`].
+//! the program. While a run goes on, what is new is put into parts beside the file ([`Writer`]), which [`Trajectory::read`] joins to it; what is lost is what came after the
+//! last [`Writer::flush`].
 
+mod parts;
 mod read;
 mod write;
+
+pub use parts::Writer;
 
 use std::path::Path;
 
@@ -262,12 +266,14 @@ pub struct Checkpoint {
 }
 
 impl Trajectory {
-    /// Reads a file. Time and memory in proportion to its size.
+    /// Reads a file, and the parts of it that a [`Writer`] which was killed left beside it. Time and memory in proportion to their size.
     ///
     /// Errors: a file that is none, or damaged, or whose parts do not fit each other, by the part; a scene that its SHA-256 does not belong to.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let path = path.as_ref();
-        Self::parse(path, &crate::format::bytes(path)?)
+        let mut run = Self::parse(path, &crate::format::bytes(path)?)?;
+        parts::join(path, &mut run)?;
+        Ok(run)
     }
 
     /// Reads the bytes of a file; `name` is for messages. Errors: as of [`read`](Self::read).
@@ -276,23 +282,30 @@ impl Trajectory {
     }
 
     /// Writes the whole file beside the old one and gives it its name, when it is on the disk: at each moment there is one that opens. Costs time in proportion
-    /// to the run so far, so a run that calls it at intervals of a fixed share of its own age pays in proportion to its length.
+    /// to the run so far; a run that is written as it grows has a [`Writer`]. Parts that one left beside the file are removed.
     ///
     /// Errors: what the system refuses; frames that do not have all bodies; contacts of bodies that are not there; NUL characters in texts.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), IoError> {
         let path = path.as_ref();
-        crate::format::put(path, &self.to_bytes(path)?)
+        crate::format::put(path, &self.to_bytes(path)?)?;
+        parts::remove(path);
+        Ok(())
     }
 
     /// The file in memory; `name` is for messages. Errors: as of [`write`](Self::write).
     pub fn to_bytes(&self, name: &Path) -> Result<Vec<u8>, IoError> {
-        write::to_bytes(name, self)
+        write::to_bytes(name, &self.into())
     }
 
     /// SHA-256 of the scene in hexadecimal digits.
     pub fn digest(&self) -> String {
-        Sha256::digest(&self.scene).iter().map(|byte| format!("{byte:02x}")).collect()
+        digest(&self.scene)
     }
+}
+
+/// SHA-256 in hexadecimal digits.
+fn digest(text: &str) -> String {
+    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Whether these are the bytes of a trajectory, intact or not.

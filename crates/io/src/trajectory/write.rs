@@ -4,14 +4,41 @@ use std::path::Path;
 
 use hdf5_pure::{CharacterSet, DatasetBuilder, Datatype, FileBuilder, LibVer, StringPadding};
 
-use super::{Contact, STATUSES, State, Step, Trajectory, VERSION};
+use super::{
+    Checkpoint, Contact, Frame, Named, STATUSES, State, Step, Trajectory, VERSION, digest,
+};
 use crate::IoError;
 use crate::folder::{Out, failed};
 
 /// Bytes of a chunk, about: small enough for one body's path to be read alone, large enough to compress.
 const CHUNK: u64 = 1 << 17;
 
-pub(super) fn to_bytes(path: &Path, run: &Trajectory) -> Result<Vec<u8>, IoError> {
+/// What a file holds of a run: all of it, or what came after a step.
+pub(super) struct View<'a> {
+    pub scene: &'a str,
+    pub program: &'a str,
+    pub bodies: &'a [Named],
+    pub joints: &'a [String],
+    pub frames: &'a [Frame],
+    pub steps: &'a [Step],
+    pub checkpoint: Option<&'a Checkpoint>,
+}
+
+impl<'a> From<&'a Trajectory> for View<'a> {
+    fn from(run: &'a Trajectory) -> Self {
+        Self {
+            scene: &run.scene,
+            program: &run.program,
+            bodies: &run.bodies,
+            joints: &run.joints,
+            frames: &run.frames,
+            steps: &run.steps,
+            checkpoint: run.checkpoint.as_ref(),
+        }
+    }
+}
+
+pub(super) fn to_bytes(path: &Path, run: &View) -> Result<Vec<u8>, IoError> {
     run.check(path)?;
     let mut file = FileBuilder::new();
     // The oldest format that has chunks in the builder, for the sake of old readers.
@@ -25,9 +52,9 @@ pub(super) fn to_bytes(path: &Path, run: &Trajectory) -> Result<Vec<u8>, IoError
         Ok::<(), IoError>(())
     };
     top("scene", &|g| {
-        g.text("text", &run.scene)?;
-        g.text("sha256", &run.digest())?;
-        g.text("program", &run.program)
+        g.text("text", run.scene)?;
+        g.text("sha256", &digest(run.scene))?;
+        g.text("program", run.program)
     })?;
     top("bodies", &|g| bodies(g, run))?;
     top("frames", &|g| {
@@ -40,7 +67,7 @@ pub(super) fn to_bytes(path: &Path, run: &Trajectory) -> Result<Vec<u8>, IoError
         Ok(())
     })?;
     top("joints", &|g| joints(g, run))?;
-    top("steps", &|g| steps(g, &run.steps))?;
+    top("steps", &|g| steps(g, run.steps))?;
     top("energy", &|g| {
         let terms: Vec<_> =
             run.steps.iter().map(|s| s.energy.clone().terms().map(|t| *t.1)).collect();
@@ -49,7 +76,7 @@ pub(super) fn to_bytes(path: &Path, run: &Trajectory) -> Result<Vec<u8>, IoError
         }
         Ok(())
     })?;
-    if let Some(checkpoint) = &run.checkpoint {
+    if let Some(checkpoint) = run.checkpoint {
         top("checkpoint", &|g| {
             g.longs("step", [checkpoint.step]);
             g.table("time", &[1], [checkpoint.time]);
@@ -63,9 +90,9 @@ pub(super) fn to_bytes(path: &Path, run: &Trajectory) -> Result<Vec<u8>, IoError
 /// A vector of a body or contact by its name in a file.
 type Vector<T> = (&'static str, fn(&T) -> [f64; 3]);
 
-impl Trajectory {
+impl View<'_> {
     /// What no layout of a run can hold.
-    pub(crate) fn check(&self, path: &Path) -> Result<(), IoError> {
+    fn check(&self, path: &Path) -> Result<(), IoError> {
         let bodies = self.bodies.len();
         for (k, frame) in self.frames.iter().enumerate() {
             if frame.bodies.len() != bodies {
@@ -100,7 +127,14 @@ impl Trajectory {
     }
 }
 
-fn bodies(g: &mut Out, run: &Trajectory) -> Result<(), IoError> {
+impl Trajectory {
+    /// What no layout of a run can hold.
+    pub(crate) fn check(&self, path: &Path) -> Result<(), IoError> {
+        View::from(self).check(path)
+    }
+}
+
+fn bodies(g: &mut Out, run: &View) -> Result<(), IoError> {
     g.texts("name", run.bodies.iter().map(|b| &b.name[..]))?;
     g.bytes("fixed", run.bodies.iter().map(|b| u8::from(b.fixed)));
     let (n, b) = (run.frames.len(), run.bodies.len());
@@ -117,7 +151,7 @@ fn bodies(g: &mut Out, run: &Trajectory) -> Result<(), IoError> {
     Ok(())
 }
 
-fn joints(g: &mut Out, run: &Trajectory) -> Result<(), IoError> {
+fn joints(g: &mut Out, run: &View) -> Result<(), IoError> {
     g.texts("name", run.joints.iter().map(|name| &name[..]))?;
     let (n, j) = (run.frames.len(), run.joints.len());
     let all = || run.frames.iter().flat_map(|f| &f.joints);
@@ -129,7 +163,7 @@ fn joints(g: &mut Out, run: &Trajectory) -> Result<(), IoError> {
     Ok(())
 }
 
-fn contacts(g: &mut Out, run: &Trajectory) {
+fn contacts(g: &mut Out, run: &View) {
     let all = || run.frames.iter().flat_map(|f| &f.contacts);
     let c = all().count();
     let mut end = 0;

@@ -32,7 +32,8 @@ impl SceneFile {
     }
 }
 
-fn load(shape: &mut ShapeTable, folder: &Path, key: &str) -> Result<(), SimulateError> {
+/// Puts the mesh of a file into a shape that names one; `key` is for messages.
+pub(crate) fn load(shape: &mut ShapeTable, folder: &Path, key: &str) -> Result<(), SimulateError> {
     let ShapeTable::Mesh { file, scale, vertices, triangles } = shape else { return Ok(()) };
     let Some(name) = file else { return Ok(()) };
     if !vertices.is_empty() || !triangles.is_empty() {

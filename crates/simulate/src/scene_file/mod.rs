@@ -28,6 +28,8 @@ mod joints;
 mod meshes;
 mod read;
 
+pub(crate) use meshes::load as load_mesh;
+
 use std::collections::BTreeMap;
 
 use nonsmooth_solve::settings::SettingsMap;

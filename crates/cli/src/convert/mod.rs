@@ -1,17 +1,19 @@
 //! `nonsmooth convert`.
 
+mod mechanics;
+mod scene;
+
 use std::path::{Path, PathBuf};
 
 use nonsmooth_io::{Format, Info, ProblemFile};
 use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, GlobalPoint, LocalPoint, Problem};
-use nonsmooth_simulate::import::urdf;
 use nonsmooth_solve::Reformulation;
 use nonsmooth_solve::variational::reform::Multipliers;
 
 use crate::report::{self, row};
 use crate::{Exit, files, output};
 
-/// Write the problem of a file in another format, or a robot of URDF as a scene.
+/// Write the problem of a file in another format, or a robot of URDF or MJCF or a scene of Siconos as a scene.
 ///
 /// The solution, the guesses and the texts that stand beside the problem go along as far as the new format has room for them; what is lost is
 /// said. The formats go by the extensions; of `-`, the standard input or output, by the first bytes or by --format.
@@ -39,14 +41,16 @@ Examples:
   nonsmooth convert rectifier.toml - --format csv
   nonsmooth convert obstacle_vi.toml obstacle.nl       over boxes and polyhedra as AMPL's model
   nonsmooth convert robot.urdf robot.toml              a scene for `nonsmooth simulate`
+  nonsmooth convert robot.xml robot.toml               the same of a model of MuJoCo
+  nonsmooth convert run.hdf5 scene.toml                the same of a mechanics file of Siconos
 
 Exit codes: 0 written; 2 a mistake in a file or an option.";
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
     let Args { from, to, format, as_mcp } = args;
-    if from.extension().is_some_and(|e| e.eq_ignore_ascii_case("urdf")) {
-        return robot(args);
+    if let Some(origin) = scene::origin(from) {
+        return scene::write(args, origin);
     }
     if files::same(from, to) {
         let to = to.display();
@@ -121,34 +125,6 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         true => output::remark(&text),
         false => output::print(&text),
     }
-    Ok(Exit::Solved)
-}
-
-/// A robot of a URDF file as a scene of `simulate`.
-fn robot(Args { from, to, format, as_mcp }: &Args) -> Result<Exit, String> {
-    let (name, target) = (from.display(), to.display());
-    if format.is_some() || *as_mcp {
-        return Err(format!(
-            "{name}: a robot becomes a scene: expected neither --format nor --as-mcp"
-        ));
-    }
-    let stream = files::is_stream(to);
-    if !stream && to.extension().is_none_or(|e| e != "toml") {
-        return Err(format!("{target}: expected a name that ends in .toml, for a scene"));
-    }
-    files::writable("TO", to)?;
-    let text = std::fs::read_to_string(from)
-        .map_err(|e| format!("{name}: expected a readable file, found: {e}"))?;
-    let made = urdf(&text).map_err(|e| format!("{name}: {e}"))?;
-    made.warnings.iter().for_each(|w| output::remark(&format!("warning: {w}\n")));
-    if stream {
-        output::print(&made.scene);
-        return Ok(Exit::Solved);
-    }
-    files::write_text("TO", to, &made.scene)?;
-    let mut said = format!("{target}: a scene for `nonsmooth simulate`\n");
-    row(&mut said, "from", format!("{name} (URDF)"));
-    output::print(&said);
     Ok(Exit::Solved)
 }
 

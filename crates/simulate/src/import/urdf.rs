@@ -1,49 +1,20 @@
-//! Robots of other formats as scenes.
-//!
 //! URDF: links are bodies, those that fixed joints connect one body; collision geometry is box, cylinder, sphere, capsule, mesh (STL, OBJ). Joints are revolute,
 //! continuous, prismatic, planar, spherical and floating, with limits, damping, friction and mimic. What it does not know, and what is not taken over, is said in warnings:
 //! the law of contact, effort and velocity limits, transmissions, and what is there to be looked at. xacro has to be expanded before.
 
 use std::collections::BTreeMap;
 
-use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, congruence, sub};
-use nonsmooth_scenes::{MassProperties, Rotation};
+use nonsmooth_scenes::MassProperties;
+use nonsmooth_scenes::vec3::{Mat3, Vec3, apply, congruence, sub};
 use roxmltree::{Document, Node};
 use serde_json::{Value, json};
 
+use super::{Frame, Imported, about, entries, text as text_of};
 use crate::SimulateError;
 use crate::rotation::unit;
 
-/// A scene that was made of another format.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Imported {
-    /// The scene as TOML.
-    pub scene: String,
-    /// What was left out or is to be decided, a line each.
-    pub warnings: Vec<String>,
-}
-
-/// Friction of all pairs in what is imported from formats that know none.
+/// Friction of all pairs: the format knows none.
 const MU: f64 = 0.5;
-
-/// Where something is: turned first.
-#[derive(Debug, Clone, Copy)]
-struct Frame {
-    x: Vec3,
-    q: Rotation,
-}
-
-impl Frame {
-    const HERE: Self = Self { x: [0.0; 3], q: Rotation::IDENTITY };
-
-    fn point(&self, p: Vec3) -> Vec3 {
-        add(self.x, apply(&self.q.matrix(), p))
-    }
-
-    fn then(&self, inner: &Self) -> Self {
-        Self { x: self.point(inner.x), q: unit(self.q.after(inner.q)) }
-    }
-}
 
 struct Link<'a> {
     name: &'a str,
@@ -120,9 +91,7 @@ pub fn urdf(text: &str) -> Result<Imported, SimulateError> {
     }
     let mut robot = Robot { links: &links, joints: &joints, warnings: vec![] };
     let scene = robot.scene(document.root_element().attribute("name").unwrap_or("robot"))?;
-    let table = toml::Value::try_from(&scene).expect("numbers, words and lists");
-    let scene = toml::to_string(&table).expect("a table");
-    Ok(Imported { scene, warnings: robot.warnings })
+    Ok(Imported { scene: text_of(&scene)?, warnings: robot.warnings })
 }
 
 /// Where link k is, by way of all links above it.
@@ -230,12 +199,7 @@ impl Robot<'_> {
     /// A body of links that do not move against each other, in the axes of the first; none of a root with neither mass nor shape.
     fn body(&mut self, root: usize, members: &[usize]) -> Result<Option<Value>, SimulateError> {
         let frame = self.frame(root);
-        let back = Rotation([frame.q.0[0], -frame.q.0[1], -frame.q.0[2], -frame.q.0[3]]);
-        let inner = |link: usize| {
-            let there = self.frame(link);
-            let x = apply(&back.matrix(), sub(there.x, frame.x));
-            Frame { x, q: unit(back.after(there.q)) }
-        };
+        let inner = |link: usize| frame.back().then(&self.frame(link));
         let (mut masses, mut shapes) = (vec![], vec![]);
         for &k in members {
             let (link, place) = (&self.links[k], inner(k));
@@ -243,9 +207,7 @@ impl Robot<'_> {
             if let Some(node) = element(link.node, "inertial")
                 && let Some(own) = inertial(node, &key)?
             {
-                let r = place.q.matrix();
-                let inertia = congruence(&r, &own.inertia);
-                masses.push(MassProperties { centre: place.point(own.centre), inertia, ..own });
+                masses.push(place.mass(&own));
             }
             for node in elements(link.node, "collision") {
                 let at = place.then(&origin(node, &key)?);
@@ -257,9 +219,9 @@ impl Robot<'_> {
         let mut body = json!({"name": name});
         let centre = match masses.is_empty() {
             false => {
-                let MassProperties { mass, centre, inertia: j } = MassProperties::joined(&masses);
+                let MassProperties { mass, centre, inertia } = MassProperties::joined(&masses);
                 body["mass"] = json!(mass);
-                body["inertia"] = json!([j[0][0], j[1][1], j[2][2], j[0][1], j[0][2], j[1][2]]);
+                body["inertia"] = json!(entries(&inertia));
                 centre
             }
             true => match moved {
@@ -410,11 +372,6 @@ fn origin<'a>(node: Node<'a, 'a>, key: &str) -> Result<Frame, SimulateError> {
     let Some(node) = element(node, "origin") else { return Ok(Frame::HERE) };
     let x = triple(node, "xyz", key)?.unwrap_or_default();
     let [r, p, y] = triple(node, "rpy", key)?.unwrap_or_default();
-    let about = |k: usize, angle: f64| {
-        let mut axis = [0.0; 3];
-        axis[k] = 1.0;
-        Rotation::about(axis, angle)
-    };
     Ok(Frame { x, q: unit(about(2, y).after(about(1, p)).after(about(0, r))) })
 }
 

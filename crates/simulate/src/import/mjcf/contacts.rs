@@ -1,0 +1,151 @@
+//! Who touches whom, and with which friction.
+
+use std::collections::BTreeSet;
+
+use serde_json::{Value, json};
+
+use super::document::{Defaults, Element, MAIN};
+use super::geoms::{Geom, Touch};
+use super::model::Tree;
+use crate::SimulateError;
+
+/// A scene has so many groups of bodies; one is that of nobody.
+const CLASSES: usize = 31;
+
+/// The kinds of bodies that touch the same others, and the materials.
+pub(super) struct Contacts {
+    /// The class of each body that has geoms, by the body of the scene.
+    classes: Vec<Option<usize>>,
+    /// Which classes touch each other.
+    meet: Vec<Vec<bool>>,
+    materials: Vec<Touch>,
+}
+
+/// What bodies of one class have in common: the bits of their geoms, and their number where pairs of bodies are excluded.
+type Class = (BTreeSet<[u32; 2]>, Option<usize>);
+
+impl Contacts {
+    pub fn read(root: &Element, defaults: &Defaults, tree: &Tree) -> Result<Self, SimulateError> {
+        let numbers = tree.numbers();
+        // The body of the scene that a body is part of.
+        let part_of = |k: usize| match tree.carrier(k) {
+            0 => k,
+            carrier => carrier,
+        };
+        let mut apart: BTreeSet<[usize; 2]> = BTreeSet::new();
+        for element in root.named("contact").flat_map(|c| c.named("exclude")) {
+            let item = defaults.item(element, MAIN)?;
+            let of = |name: &str| {
+                let body = item.text(name).unwrap_or_default();
+                let found = numbers.get(body).map(|&k| part_of(k));
+                found.ok_or_else(|| item.wrong(format!("a body as `{name}`"), format!("`{body}`")))
+            };
+            let (a, b) = (of("body1")?, of("body2")?);
+            apart.insert([a.min(b), a.max(b)]);
+        }
+        let mut bits: Vec<BTreeSet<[u32; 2]>> = vec![BTreeSet::new(); tree.bodies.len()];
+        let mut materials: Vec<Touch> = vec![];
+        for (k, body) in tree.bodies.iter().enumerate() {
+            for geom in body.geoms.iter().filter(|g| g.shape.is_some()) {
+                bits[part_of(k)].insert(geom.touch.bits);
+                if !materials.iter().any(|m| alike(m, &geom.touch)) {
+                    materials.push(geom.touch);
+                }
+            }
+        }
+        let excluded: BTreeSet<usize> = apart.iter().flatten().copied().collect();
+        let mut kinds: Vec<Class> = vec![];
+        let mut classes = vec![None; tree.bodies.len()];
+        for (k, bits) in bits.into_iter().enumerate().filter(|(_, bits)| !bits.is_empty()) {
+            let own = (bits, excluded.contains(&k).then_some(k));
+            let place = kinds.iter().position(|kind| *kind == own).unwrap_or_else(|| {
+                kinds.push(own);
+                kinds.len() - 1
+            });
+            classes[k] = Some(place);
+        }
+        let meet: Vec<Vec<bool>> = kinds
+            .iter()
+            .map(|(p, a)| {
+                let with = |(q, b): &Class| {
+                    let out = a.zip(*b).is_some_and(|(a, b)| apart.contains(&[a.min(b), a.max(b)]));
+                    let bits = |p: &[u32; 2]| q.iter().any(|q| p[0] & q[1] | q[0] & p[1] != 0);
+                    !out && p.iter().any(bits)
+                };
+                kinds.iter().map(with).collect()
+            })
+            .collect();
+        let all = meet.iter().flatten().all(|m| *m);
+        if !all && kinds.len() > CLASSES {
+            let expected = format!("at most {CLASSES} kinds of bodies that touch different others");
+            return Err(SimulateError::value("contact", expected, kinds.len()));
+        }
+        Ok(Self { classes, meet: if all { vec![] } else { meet }, materials })
+    }
+
+    /// Gives a body of the scene its groups.
+    pub fn of(&self, body: usize, table: &mut Value) {
+        let Some(class) = self.classes[body].filter(|_| !self.meet.is_empty()) else { return };
+        let name = |k: usize| format!("class {k}");
+        let row = self.meet[class].iter().enumerate();
+        let mut met: Vec<String> = row.filter(|(_, meet)| **meet).map(|(k, _)| name(k)).collect();
+        if met.is_empty() {
+            met.push("nothing".into());
+        }
+        table["groups"] = json!([name(class)]);
+        table["collides_with"] = json!(met);
+    }
+
+    /// Gives a part of a body its material.
+    pub fn material(&self, geom: &Geom, part: &mut Value) {
+        if self.materials.len() > 1
+            && let Some(k) = self.materials.iter().position(|m| alike(m, &geom.touch))
+        {
+            part["material"] = json!(self.name(k));
+        }
+    }
+
+    fn name(&self, k: usize) -> String {
+        let Touch { friction, rough, priority, .. } = self.materials[k];
+        let mut name = match rough {
+            true => format!("friction {friction}"),
+            false => format!("friction {friction} of condim 1"),
+        };
+        if priority != 0 {
+            name += &format!(", priority {priority}");
+        }
+        name
+    }
+
+    /// The laws of contact of all pairs of materials.
+    pub fn laws(&self, scene: &mut Value) {
+        if let [] | [_] = self.materials[..] {
+            let mu = self.materials.first().map_or(0.0, |m| law(m, m));
+            scene["pairs_default"] = json!({"mu": mu});
+            return;
+        }
+        let mut pairs = vec![];
+        for (k, a) in self.materials.iter().enumerate() {
+            scene["materials"][self.name(k)] = json!({});
+            for (l, b) in self.materials.iter().enumerate().skip(k) {
+                pairs.push(json!({"between": [self.name(k), self.name(l)], "mu": law(a, b)}));
+            }
+        }
+        scene["pairs"] = json!(pairs);
+    }
+}
+
+/// Whether two geoms have the same law with all others.
+fn alike(a: &Touch, b: &Touch) -> bool {
+    (a.friction, a.rough, a.priority) == (b.friction, b.rough, b.priority)
+}
+
+/// The coefficient of friction of two: that of higher priority, else the larger one; none where both have normal forces only.
+fn law(a: &Touch, b: &Touch) -> f64 {
+    let (friction, rough) = match a.priority.cmp(&b.priority) {
+        std::cmp::Ordering::Greater => (a.friction, a.rough),
+        std::cmp::Ordering::Less => (b.friction, b.rough),
+        std::cmp::Ordering::Equal => (a.friction.max(b.friction), a.rough || b.rough),
+    };
+    if rough { friction } else { 0.0 }
+}

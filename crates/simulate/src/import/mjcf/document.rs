@@ -1,0 +1,276 @@
+//! Elements with their places, files that are included put in, and classes of defaults.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use roxmltree::{Document, Node};
+
+use crate::SimulateError;
+
+/// Elements may stand in each other so deep.
+const DEPTH: usize = 200;
+
+/// An element of a model.
+#[derive(Debug)]
+pub(super) struct Element {
+    pub tag: String,
+    pub attributes: BTreeMap<String, String>,
+    pub children: Vec<Self>,
+    /// The line, with the file where that is an included one.
+    pub place: String,
+}
+
+impl Element {
+    pub fn named<'a>(&'a self, tag: &'a str) -> impl Iterator<Item = &'a Self> {
+        self.children.iter().filter(move |e| e.tag == tag)
+    }
+
+    /// What messages call it.
+    pub fn key(&self) -> String {
+        match self.attributes.get("name") {
+            Some(name) => format!("<{}> `{name}` ({})", self.tag, self.place),
+            None => format!("<{}> ({})", self.tag, self.place),
+        }
+    }
+
+    pub fn wrong(&self, expected: impl Into<String>, found: impl ToString) -> SimulateError {
+        SimulateError::value(self.key(), expected, found)
+    }
+}
+
+/// The elements of a model in `folder`, with those of the files that it includes in their places.
+pub(super) fn read(text: &str, folder: &Path) -> Result<Element, SimulateError> {
+    let mut root = document(text, None)?;
+    if root.tag != "mujoco" {
+        return Err(SimulateError::value("mujoco", "an MJCF document", format!("<{}>", root.tag)));
+    }
+    include(&mut root, folder, &mut BTreeSet::new())?;
+    Ok(root)
+}
+
+fn document(text: &str, file: Option<&str>) -> Result<Element, SimulateError> {
+    let document = Document::parse(text).map_err(|e| {
+        let found = e.to_string().replace('\n', " ");
+        SimulateError::value(file.unwrap_or("mujoco"), "an XML document", found)
+    })?;
+    // Lines are found by bisection: counting them for each element would take quadratic time.
+    let ends: Vec<usize> = text.match_indices('\n').map(|(at, _)| at).collect();
+    element(document.root_element(), &ends, file, 0)
+}
+
+fn element(
+    node: Node,
+    ends: &[usize],
+    file: Option<&str>,
+    depth: usize,
+) -> Result<Element, SimulateError> {
+    let line = 1 + ends.partition_point(|&end| end < node.range().start);
+    let place = match file {
+        Some(file) => format!("{file} line {line}"),
+        None => format!("line {line}"),
+    };
+    if depth > DEPTH {
+        let found = "one deeper";
+        return Err(SimulateError::value(place, format!("elements {DEPTH} deep at most"), found));
+    }
+    let children = node.children().filter(Node::is_element);
+    Ok(Element {
+        tag: node.tag_name().name().into(),
+        attributes: node.attributes().map(|a| (a.name().into(), a.value().into())).collect(),
+        children: children
+            .map(|child| element(child, ends, file, depth + 1))
+            .collect::<Result<_, _>>()?,
+        place,
+    })
+}
+
+/// Puts the elements of included files where the model includes them; each file may be included once.
+fn include(
+    element: &mut Element,
+    folder: &Path,
+    known: &mut BTreeSet<PathBuf>,
+) -> Result<(), SimulateError> {
+    let mut children = vec![];
+    for mut child in std::mem::take(&mut element.children) {
+        if child.tag != "include" {
+            include(&mut child, folder, known)?;
+            children.push(child);
+            continue;
+        }
+        let Some(name) = child.attributes.get("file") else {
+            return Err(child.wrong("`file`", "none"));
+        };
+        let path = folder.join(name);
+        if !known.insert(path.clone()) {
+            return Err(child.wrong("a file that is included once", format!("`{name}` again")));
+        }
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| child.wrong("a readable file", format!("`{name}`: {e}")))?;
+        let mut inner = document(&text, Some(name))?;
+        include(&mut inner, folder, known)?;
+        children.append(&mut inner.children);
+    }
+    element.children = children;
+    Ok(())
+}
+
+type Attributes = BTreeMap<String, String>;
+
+/// The attributes that elements have where they say none, by class and tag.
+pub(super) struct Defaults {
+    classes: BTreeMap<String, BTreeMap<String, Attributes>>,
+}
+
+/// The class of elements that name none.
+pub(super) const MAIN: &str = "main";
+
+impl Defaults {
+    pub fn read(root: &Element) -> Result<Self, SimulateError> {
+        let mut out = Self { classes: BTreeMap::from([(MAIN.to_owned(), BTreeMap::new())]) };
+        for top in root.named("default") {
+            // The outermost one is of the main class, whatever it is called.
+            out.class(top, MAIN, None)?;
+            if let Some(name) = top.attributes.get("class") {
+                let own = out.classes[MAIN].clone();
+                out.classes.insert(name.clone(), own);
+            }
+        }
+        Ok(out)
+    }
+
+    fn class(
+        &mut self,
+        element: &Element,
+        name: &str,
+        parent: Option<&str>,
+    ) -> Result<(), SimulateError> {
+        let mut own = match parent {
+            Some(parent) => self.classes[parent].clone(),
+            None => self.classes.remove(name).unwrap_or_default(),
+        };
+        for child in element.children.iter().filter(|e| e.tag != "default") {
+            let attributes = child.attributes.iter().map(|(k, v)| (k.clone(), v.clone()));
+            own.entry(child.tag.clone()).or_default().extend(attributes);
+        }
+        self.classes.insert(name.into(), own);
+        for child in element.named("default") {
+            let Some(class) = child.attributes.get("class") else {
+                return Err(child.wrong("`class`", "none"));
+            };
+            if self.classes.contains_key(class) {
+                return Err(child.wrong("a class that is not there yet", format!("`{class}`")));
+            }
+            self.class(child, class, Some(name))?;
+        }
+        Ok(())
+    }
+
+    /// An element with the defaults of its class, or else of the class that is in force where it stands.
+    pub fn item<'a>(
+        &'a self,
+        element: &'a Element,
+        force: &str,
+    ) -> Result<Item<'a>, SimulateError> {
+        let class = element.attributes.get("class").map_or(force, String::as_str);
+        let Some(tags) = self.classes.get(class) else {
+            return Err(element.wrong("a class of <default>", format!("`{class}`")));
+        };
+        // What the shorthands of <general> have in common may be said of it.
+        let general = match element.tag.as_str() {
+            "motor" | "position" | "velocity" => tags.get("general"),
+            _ => None,
+        };
+        // Constraints of all kinds have one default.
+        let tag = match element.tag.as_str() {
+            "connect" | "weld" => "equality",
+            tag => tag,
+        };
+        Ok(Item { element, defaults: [tags.get(tag), general] })
+    }
+
+    /// The same of an equality, whose tag <joint> would be that of a joint of a body.
+    pub fn equality<'a>(&'a self, element: &'a Element) -> Result<Item<'a>, SimulateError> {
+        let item = self.item(element, MAIN)?;
+        let class = element.attributes.get("class").map_or(MAIN, String::as_str);
+        Ok(Item { defaults: [self.classes[class].get("equality"), None], ..item })
+    }
+}
+
+/// An element with its defaults.
+#[derive(Clone, Copy)]
+pub(super) struct Item<'a> {
+    pub element: &'a Element,
+    defaults: [Option<&'a Attributes>; 2],
+}
+
+impl<'a> Item<'a> {
+    pub fn text(&self, name: &str) -> Option<&'a str> {
+        let defaults = self.defaults.iter().flatten();
+        let own = std::iter::once(&self.element.attributes);
+        own.chain(defaults.copied()).find_map(|all| all.get(name)).map(String::as_str)
+    }
+
+    /// The names of all its attributes, of the defaults too.
+    pub fn names(&self) -> BTreeSet<&'a str> {
+        let all = std::iter::once(&self.element.attributes);
+        let all = all.chain(self.defaults.iter().flatten().copied());
+        all.flat_map(|a| a.keys().map(String::as_str)).collect()
+    }
+
+    pub fn key(&self) -> String {
+        self.element.key()
+    }
+
+    pub fn wrong(&self, expected: impl Into<String>, found: impl ToString) -> SimulateError {
+        self.element.wrong(expected, found)
+    }
+
+    /// The numbers of an attribute, each finite, if it is there.
+    pub fn numbers(&self, name: &str) -> Result<Option<Vec<f64>>, SimulateError> {
+        let Some(text) = self.text(name) else { return Ok(None) };
+        let words = text.split_whitespace();
+        let read = words.map(|word| word.parse().ok().filter(|x: &f64| x.is_finite()));
+        read.collect::<Option<Vec<f64>>>()
+            .map(Some)
+            .ok_or_else(|| self.wrong(format!("finite numbers as `{name}`"), format!("`{text}`")))
+    }
+
+    /// Exactly so many of them.
+    pub fn some<const N: usize>(&self, name: &str) -> Result<Option<[f64; N]>, SimulateError> {
+        let Some(found) = self.numbers(name)? else { return Ok(None) };
+        let count = found.len();
+        found
+            .try_into()
+            .map(Some)
+            .map_err(|_| self.wrong(format!("{N} numbers as `{name}`"), count))
+    }
+
+    /// The first of them: of lists whose end may be left out.
+    pub fn first(&self, name: &str) -> Result<Option<f64>, SimulateError> {
+        Ok(self.numbers(name)?.and_then(|x| x.first().copied()))
+    }
+
+    /// A number, or what stands for it where none is given.
+    pub fn real(&self, name: &str, other: f64) -> Result<f64, SimulateError> {
+        Ok(self.some::<1>(name)?.map_or(other, |[x]| x))
+    }
+
+    /// A whole number of 32 bits.
+    pub fn whole(&self, name: &str, other: i64) -> Result<i64, SimulateError> {
+        let Some(text) = self.text(name) else { return Ok(other) };
+        let number = text.trim().parse().ok().filter(|x: &i64| x.unsigned_abs() <= 1 << 32);
+        number.ok_or_else(|| self.wrong(format!("a whole number as `{name}`"), format!("`{text}`")))
+    }
+
+    /// `true`, `false`, or what stands for `auto` and nothing.
+    pub fn flag(&self, name: &str, other: bool) -> Result<bool, SimulateError> {
+        match self.text(name) {
+            Some("true" | "enable") => Ok(true),
+            Some("false" | "disable") => Ok(false),
+            Some("auto") | None => Ok(other),
+            Some(text) => {
+                Err(self.wrong(format!("true, false or auto as `{name}`"), format!("`{text}`")))
+            }
+        }
+    }
+}

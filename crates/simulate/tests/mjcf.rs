@@ -1,0 +1,360 @@
+//! Models of MuJoCo as scenes. What MuJoCo itself makes of models like these is compared by `compare_mujoco.py`.
+
+use std::path::Path;
+
+use nonsmooth_simulate::import::{Imported, mjcf};
+use nonsmooth_simulate::{SceneFile, Simulation};
+
+fn import(text: &str) -> Imported {
+    mjcf(text, Path::new("")).unwrap()
+}
+
+fn table(made: &Imported) -> toml::Table {
+    toml::from_str(&made.scene).unwrap()
+}
+
+fn simulation(made: &Imported) -> Simulation {
+    SceneFile::parse(&made.scene, &[]).unwrap().build().unwrap()
+}
+
+fn near(found: &toml::Value, expected: &[f64]) {
+    let found: Vec<f64> = found.as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect();
+    assert_eq!(found.len(), expected.len());
+    for (x, y) in found.iter().zip(expected) {
+        assert!((x - y).abs() < 1e-12, "{found:?} {expected:?}");
+    }
+}
+
+fn said(made: &Imported, words: &str) -> bool {
+    made.warnings.iter().any(|w| w.contains(words))
+}
+
+#[test]
+fn a_pendulum_swings_with_the_period_of_its_inertia() {
+    // A ball of 3 kg on an arm without mass, 0.5 m below the pivot; degrees are the unit of ranges.
+    let made = import(
+        r#"<mujoco model="pendulum"><option timestep="0.001"/><worldbody>
+             <body name="bob" pos="0 0 1">
+               <joint name="pivot" axis="0 1 0" range="-90 45"/>
+               <geom type="sphere" pos="0 0 -0.5" size="0.1" mass="3"/>
+             </body>
+           </worldbody>
+           <keyframe><key qpos="0.02"/></keyframe></mujoco>"#,
+    );
+    let scene = table(&made);
+    let body = &scene["bodies"][0];
+    assert_eq!(body["mass"].as_float(), Some(3.0));
+    let j = 0.4 * 3.0 * 0.01;
+    near(&body["inertia"], &[j, j, j, 0.0, 0.0, 0.0]);
+    let (sin, cos) = 0.02_f64.sin_cos();
+    near(&body["position"], &[-0.5 * sin, 0.0, 1.0 - 0.5 * cos]);
+    let joint = &scene["joints"][0];
+    assert_eq!((joint["a"].as_str(), joint["kind"].as_str()), (Some("world"), Some("revolute")));
+    let quarter = std::f64::consts::FRAC_PI_4;
+    near(&toml::Value::Array(vec![joint["limits"]["lower"].clone()]), &[-2.0 * quarter - 0.02]);
+    near(&toml::Value::Array(vec![joint["limits"]["upper"].clone()]), &[quarter - 0.02]);
+    // After half a period it is on the other side.
+    let omega = (3.0 * 9.81 * 0.5 / (j + 3.0 * 0.25)).sqrt();
+    let mut simulation = simulation(&made);
+    let run = simulation.run(std::f64::consts::PI / omega, 1e-3, &mut ()).unwrap();
+    assert!(run.is_solved(), "{run}");
+    assert!((simulation.joints()[0].angle + 0.04).abs() < 1e-5, "{}", simulation.joints()[0].angle);
+}
+
+#[test]
+fn defaults_are_inherited_by_class_and_actuators_are_motors() {
+    let made = import(
+        r#"<mujoco model="cart-pole">
+          <compiler angle="radian"/>
+          <default>
+            <joint damping="1"/><geom contype="0" conaffinity="0" density="500"/>
+            <default class="pole"><joint damping="0.2" stiffness="3" springref="0.1"/></default>
+          </default>
+          <worldbody>
+            <geom type="capsule" size="0.02 1" euler="0 1.57 0"/>
+            <body name="cart">
+              <joint name="slider" type="slide" axis="2 0 0" range="-1 1" armature="0.1"/>
+              <geom type="box" size="0.1 0.2 0.3"/>
+              <body name="pole" childclass="pole">
+                <joint name="hinge" axis="0 1 0" ref="0.4"/>
+                <geom type="capsule" fromto="0 0 0 0 0 0.6" size="0.05"/>
+                <body pos="0 0 0.6"><geom size="0.1" mass="1"/></body>
+              </body>
+            </body>
+          </worldbody>
+          <actuator>
+            <motor joint="slider" name="push"/>
+            <position joint="hinge" kp="20" kv="2" gear="3" forcerange="-4 4"/>
+          </actuator>
+        </mujoco>"#,
+    );
+    let scene = table(&made);
+    let [cart, pole] = &scene["bodies"].as_array().unwrap()[..] else { panic!() };
+    assert!((cart["mass"].as_float().unwrap() - 500.0 * 0.048).abs() < 1e-12);
+    assert!(cart.get("shapes").is_none() && pole.get("shapes").is_none());
+    let capsule = 500.0 * std::f64::consts::PI * 0.0025 * (0.6 + 4.0 / 3.0 * 0.05);
+    assert!((pole["mass"].as_float().unwrap() - capsule - 1.0).abs() < 1e-12);
+    let [slider, hinge] = &scene["joints"].as_array().unwrap()[..] else { panic!() };
+    assert_eq!(slider["kind"].as_str(), Some("prismatic"));
+    near(&slider["axis"], &[1.0, 0.0, 0.0]);
+    assert_eq!(slider["limits"]["upper"].as_float(), Some(1.0));
+    assert_eq!(slider["spring"]["damping"].as_float(), Some(1.0));
+    assert!(slider.get("motor").is_none());
+    assert_eq!((hinge["a"].as_str(), hinge["b"].as_str()), (Some("cart"), Some("pole")));
+    assert_eq!(hinge["spring"]["damping"].as_float(), Some(0.2));
+    // Coordinates begin at zero in a scene, at the reference there.
+    assert!((hinge["spring"]["rest"].as_float().unwrap() + 0.3).abs() < 1e-15);
+    assert_eq!(hinge["motor"]["position"].as_float(), Some(-0.4));
+    assert_eq!(hinge["motor"]["stiffness"].as_float(), Some(180.0));
+    assert_eq!(hinge["motor"]["max"].as_float(), Some(12.0));
+    for words in ["`armature` is left out", "<motor> `push`", "(line 10)", "solref"] {
+        assert!(said(&made, words), "{words}: {:?}", made.warnings);
+    }
+    let run = simulation(&made).run(0.2, 2e-3, &mut ()).unwrap();
+    assert!(run.is_solved(), "{run}");
+}
+
+#[test]
+fn a_two_link_arm_keeps_its_energy_and_falls_as_both_frames_say() {
+    let arm = |orientation: &str| {
+        format!(
+            r#"<mujoco><compiler angle="radian" eulerseq="XYZ"/><option timestep="1e-3"/><worldbody>
+              <body name="upper" pos="0 0 1" {orientation}>
+                <inertial pos="0.2 0 0" mass="2" fullinertia="0.02 0.04 0.05 0.001 0 0.002"/>
+                <joint axis="0 0 1"/><geom contype="0" conaffinity="0" size="1"/>
+                <frame pos="0.4 0 0"><body name="fore"><joint axis="0 1 0" pos="0 0 0"/>
+                  <inertial pos="0.1 0 0" quat="1 1 0 0" mass="1" diaginertia="0.01 0.02 0.02"/></body></frame>
+              </body></worldbody></mujoco>"#
+        )
+    };
+    // One orientation in five ways.
+    let (s, c) = 0.7_f64.sin_cos();
+    let (s2, c2) = 0.35_f64.sin_cos();
+    let ways = [
+        "euler=\"0 0.7 0\"".to_owned(),
+        format!("quat=\"{} 0 {} 0\"", 2.0 * c2, 2.0 * s2),
+        "axisangle=\"0 3 0 0.7\"".to_owned(),
+        format!("xyaxes=\"{c} 0 {} 0 2 0\"", -s),
+        format!("zaxis=\"{s} 0 {c}\""),
+    ];
+    let positions = ways.map(|way| {
+        let mut simulation = simulation(&import(&arm(&way)));
+        let run = simulation.run(0.5, 1e-3, &mut ()).unwrap();
+        assert!(run.is_solved() && run.imbalance < 1e-12, "{run}");
+        simulation.state().position[1]
+    });
+    for other in &positions[1..] {
+        for k in 0..3 {
+            assert!((positions[0][k] - other[k]).abs() < 1e-9, "{positions:?}");
+        }
+    }
+    assert!(positions[0][2] < 0.9, "{positions:?}");
+}
+
+#[test]
+fn a_box_slides_on_a_plane_with_the_larger_friction_and_filters_hold() {
+    let made = import(
+        r#"<mujoco><option timestep="0.001" gravity="3 0 -10"/><worldbody>
+          <geom type="plane" size="1 1 1" friction="0.1"/>
+          <body name="box" pos="0 0 0.1"><freejoint/><geom type="box" size="0.1 0.1 0.1" friction="0.2"/></body>
+          <body name="ghost" pos="1 0 0.1"><freejoint/><geom size="0.1" contype="2" conaffinity="4" friction="0.2"/></body>
+          <body name="smooth" pos="0 1 0.1"><freejoint/><geom type="box" size="0.1 0.1 0.1" friction="0.9" condim="1" priority="1"/></body>
+          <body name="left" pos="0 2 0.1"><freejoint/><geom size="0.1"/></body>
+          <body name="right" pos="0.15 2 0.1"><freejoint/><geom size="0.1"/></body>
+        </worldbody><contact><exclude body1="left" body2="right"/></contact></mujoco>"#,
+    );
+    let mut simulation = simulation(&made);
+    let run = simulation.run(0.5, 1e-3, &mut ()).unwrap();
+    assert!(run.is_solved(), "{run}");
+    let scene = table(&made);
+    let names: Vec<_> =
+        scene["bodies"].as_array().unwrap().iter().map(|b| b["name"].as_str().unwrap()).collect();
+    let of = |name: &str| names.iter().position(|n| *n == name).unwrap();
+    let v = |name: &str| simulation.state().velocity[of(name)];
+    // a = 3 − 0.2 · 10 of the box, 3 without friction; the ghost falls through the plane.
+    assert!((v("box")[0] - 0.5).abs() < 1e-9 && (v("smooth")[0] - 1.5).abs() < 1e-9);
+    assert!((v("ghost")[2] + 5.0).abs() < 1e-9);
+    assert!(v("left")[2].abs() < 1e-9 && (v("left")[0] - v("right")[0]).abs() < 1e-9);
+}
+
+#[test]
+fn equalities_are_joints_and_couplings() {
+    let made = import(
+        r#"<mujoco><compiler angle="radian"/><default><geom contype="0" conaffinity="0"/></default><worldbody>
+          <body name="crank" pos="0 0 1"><joint name="c" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0.2 0 0" size="0.02"/>
+            <body name="rod" pos="0.2 0 0"><joint name="r" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0.6 0 0" size="0.02"/></body></body>
+          <body name="slider" pos="0.8 0 1"><joint name="s" type="slide" axis="1 0 0"/><geom size="0.05"/></body>
+          <body name="bolt" pos="0 1 1"><joint name="turn" axis="0 0 1"/><joint name="lift" type="slide" axis="0 0 1"/><geom type="cylinder" size="0.1 0.2"/></body>
+          <body name="still" pos="0 2 1"><joint name="stuck" axis="1 0 0"/><geom pos="0 1 0" size="0.1"/></body>
+        </worldbody><equality>
+          <connect body1="rod" body2="slider" anchor="0.6 0 0"/>
+          <joint joint1="lift" joint2="turn" polycoef="0 0.01"/>
+          <joint joint1="stuck"/>
+          <weld body1="bolt" body2="still" active="false"/>
+        </equality></mujoco>"#,
+    );
+    let mut simulation = simulation(&made);
+    let run = simulation.run(0.3, 1e-3, &mut ()).unwrap();
+    assert!(run.is_solved(), "{run}");
+    let joints = simulation.joints();
+    let x = &simulation.state().position;
+    // The slider stays on its line, the far end of the rod on the slider; the bolt turns as it sinks; what is stuck stays.
+    assert!(x[2][2] - 1.0 < 1e-9 && (x[2][0] - 0.8).abs() > 1e-3, "{x:?}");
+    assert!(joints[3].slide < -1e-5 && (joints[3].slide - 0.01 * joints[3].angle).abs() < 1e-9);
+    assert!(joints[4].angle.abs() < 1e-12);
+    assert!(said(&made, "<weld> (line 11): not active"), "{:?}", made.warnings);
+}
+
+#[test]
+fn meshes_and_height_fields_are_shapes_and_included_files_are_read() {
+    let folder = std::env::temp_dir().join(format!("nonsmooth-mjcf-{}", std::process::id()));
+    std::fs::create_dir_all(folder.join("parts")).unwrap();
+    // A tetrahedron of volume 1/6, in text.
+    let corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]];
+    let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    let mut stl = String::from("solid t\n");
+    for face in faces {
+        stl += "facet normal 0 0 0\nouter loop\n";
+        for k in face {
+            let [x, y, z]: [i32; 3] = corners[k];
+            stl += &format!("vertex {x} {y} {z}\n");
+        }
+        stl += "endloop\nendfacet\n";
+    }
+    std::fs::write(folder.join("parts/tetra.stl"), stl + "endsolid t\n").unwrap();
+    std::fs::write(
+        folder.join("body.xml"),
+        "<mujocoinclude>\n<body name='b' pos='0 0 2'><freejoint/><geom type='mesh' mesh='tetra' density='600'/></body>\n</mujocoinclude>",
+    )
+    .unwrap();
+    let model = r#"<mujoco><compiler meshdir="parts/"/><asset>
+          <mesh file="tetra.stl" scale="2 2 2"/>
+          <mesh name="hull" vertex="0 0 0  1 0 0  0 1 0  0 0 1  0.1 0.1 0.1" scale="1 1 -1"/>
+          <hfield name="hill" nrow="2" ncol="3" size="3 1 0.5 0.1" elevation="0 0 4  0 2 4"/>
+        </asset><worldbody>
+          <geom type="hfield" hfield="hill"/>
+          <include file="body.xml"/>
+          <body name="h" pos="3 0 2"><freejoint/><geom type="mesh" mesh="hull" mass="4"/></body>
+        </worldbody></mujoco>"#;
+    let made = mjcf(model, &folder).unwrap();
+    let scene = table(&made);
+    let [ground, mesh, hull] = &scene["bodies"].as_array().unwrap()[..] else { panic!() };
+    let heights = ground["shapes"][0]["shape"]["heights"].as_array().unwrap();
+    // The first row of the document is the far one.
+    near(&heights[0], &[0.0, 0.25, 0.5]);
+    near(&heights[1], &[0.0, 0.0, 0.5]);
+    assert!((mesh["mass"].as_float().unwrap() - 600.0 * 8.0 / 6.0).abs() < 1e-9);
+    near(&mesh["position"], &[0.5, 0.5, 2.5]);
+    let shape = &mesh["shapes"][0]["shape"];
+    assert_eq!(shape["file"].as_str(), Some("parts/tetra.stl"));
+    assert_eq!(shape["scale"].as_float(), Some(2.0));
+    near(&hull["position"], &[3.25, 0.25, 1.75]);
+    assert_eq!(hull["shapes"][0]["shape"]["vertices"].as_array().unwrap().len(), 4);
+    // Mistakes in an included file name it.
+    std::fs::write(folder.join("body.xml"), "<x>\n\n<body><geom size='-1'/></body></x>").unwrap();
+    let error = mjcf(model, &folder).unwrap_err().to_string();
+    assert!(error.starts_with("<geom> (body.xml line 3): expected 1 positive numbers"), "{error}");
+    let error = mjcf(&model.replace("tetra.stl", "none.stl"), &folder).map(|_| ());
+    assert!(error.is_err());
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn the_models_that_are_compared_with_mujoco_are_scenes() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mjcf");
+    let mut bodies = vec![];
+    for entry in std::fs::read_dir(&folder).unwrap() {
+        let path = entry.unwrap().path();
+        let made = mjcf(&std::fs::read_to_string(&path).unwrap(), &folder).unwrap();
+        let scene = SceneFile::parse(&made.scene, &[]).unwrap();
+        assert!(scene.world().is_ok(), "{}: {:?}", path.display(), scene.world().err());
+        bodies.push(scene.bodies.iter().filter(|body| !body.fixed).count());
+    }
+    bodies.sort_unstable();
+    assert_eq!(bodies, [1, 1, 2, 2, 3, 9]);
+}
+
+#[test]
+fn models_with_mistakes_are_one_line_and_never_a_panic() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mjcf");
+    let models: Vec<String> = ["arm", "cartpole", "loops", "misc"]
+        .iter()
+        .map(|name| std::fs::read_to_string(folder.join(format!("{name}.xml"))).unwrap())
+        .collect();
+    let mut random = 1_u64;
+    let mut draw = |below: usize| {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (random >> 33) as usize % below
+    };
+    let words = ["", "-1", "1e308", "0", "nan", "1 2", "x", "\"", "<body>", "free", "ball", "mesh"];
+    let mut refused = 0;
+    for k in 0..4000 {
+        let model = &models[k % models.len()];
+        // A word of it becomes another one.
+        let mut parts: Vec<&str> = model.split_inclusive([' ', '"', '\n', '>']).collect();
+        let (at, word) = (draw(parts.len()), words[draw(words.len())]);
+        let end = parts[at].chars().last();
+        let kept = match draw(3) {
+            0 => word.to_owned(),
+            _ => format!("{word}{}", end.map_or(String::new(), String::from)),
+        };
+        parts[at] = &kept;
+        match mjcf(&parts.concat(), &folder) {
+            Ok(made) => assert!(SceneFile::parse(&made.scene, &[]).is_ok()),
+            Err(error) => {
+                refused += 1;
+                assert!(!error.to_string().contains('\n'), "{error}");
+            }
+        }
+    }
+    assert!(refused > 1000 && refused < 3900, "{refused}");
+}
+
+#[test]
+fn what_is_not_in_the_subset_is_one_line_with_element_and_line() {
+    let body = |inner: &str| {
+        format!(
+            "<mujoco>\n<worldbody>\n<body name='b'><freejoint/>\n{inner}</body></worldbody></mujoco>"
+        )
+    };
+    let cases = [
+        ("<robot/>".to_owned(), "mujoco: expected an MJCF document, found <robot>"),
+        ("<mujoco".to_owned(), "mujoco: expected an XML document, found "),
+        ("<mujoco/>".to_owned(), "<mujoco> (line 1): expected <worldbody>, found none"),
+        ("<mujoco>\n<wheel/></mujoco>".to_owned(), "<wheel> (line 2): expected a part of a model"),
+        (body("<composite/>"), "<composite> (line 4): expected body, frame, "),
+        (body("<geom type='ellipsoid' size='1 1 1'/>"), "<geom> (line 4): expected plane, sphere,"),
+        (body("<geom name='g' size='1 x'/>"), "<geom> `g` (line 4): expected finite numbers as `size`, found `1 x`"),
+        (body("<geom type='plane' size='1 1 1'/><geom size='1'/>"), "<geom> (line 4): expected a solid of a body that moves"),
+        (body("<geom size='1' class='x'/>"), "<geom> (line 4): expected a class of <default>, found `x`"),
+        (body(""), "<body> `b` (line 3): expected a mass"),
+        (body("<geom size='1'/><body><freejoint/></body>"), "<freejoint> (line 4): expected a free joint of a body in the world"),
+        (body("<geom type='mesh' mesh='m'/>"), "<geom> (line 4): expected a mesh of <asset>, found `m`"),
+        (body("<geom size='1' quat='1 0 0 0' euler='0 0 0'/>"), "<geom> (line 4): expected one orientation"),
+        (
+            "<mujoco><worldbody>\n<body><joint/><joint type='ball'/><geom size='1'/></body></worldbody></mujoco>".to_owned(),
+            "<body> (line 2): expected joints that are free, ball, hinge,",
+        ),
+        ("<mujoco>\n<include file='none.xml'/></mujoco>".to_owned(), "<include> (line 2): expected a readable file"),
+        (
+            "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody>\n<keyframe><key qpos='0 0'/></keyframe></mujoco>".to_owned(),
+            "<key> (line 2): expected 7 numbers as `qpos`, found 2",
+        ),
+    ];
+    for (text, begins) in cases {
+        let error = mjcf(&text, Path::new("")).unwrap_err().to_string();
+        assert!(error.starts_with(begins) && !error.contains('\n'), "{error}\n{begins}");
+    }
+    let deep = format!(
+        "<mujoco><worldbody>{}{}</worldbody></mujoco>",
+        "<body>".repeat(300),
+        "</body>".repeat(300)
+    );
+    assert!(mjcf(&deep, Path::new("")).is_err());
+    let made = import(
+        &body("<geom size='1' fluidshape='none' odd='1'/>")
+            .replace("<freejoint/>", "<joint type='ball' damping='2'/>"),
+    );
+    assert!(said(&made, "<geom> (line 4): `odd` is left out"), "{:?}", made.warnings);
+    assert!(said(&made, "<joint> (line 3): `damping` is left out"), "{:?}", made.warnings);
+}
