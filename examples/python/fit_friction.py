@@ -39,9 +39,17 @@ def motion(mu: float) -> tuple[Vector, Vector]:
 TRUE = 0.23
 noise = 1e-4 * np.random.default_rng(0).normal(size=2 * STEPS)
 measured = motion(TRUE)[0] + noise
-fit = least_squares(
-    lambda mu: motion(mu[0])[0] - measured, [0.5], jac=lambda mu: motion(mu[0])[1][:, None]
-)
+
+
+def distance(mu: Vector) -> Vector:
+    return motion(mu[0])[0] - measured
+
+
+def slope(mu: Vector) -> Vector:
+    return motion(mu[0])[1][:, None]
+
+
+fit = least_squares(distance, [0.5], jac=slope)
 print(f"mu = {fit.x[0]:.5f} (the truth is {TRUE}), {fit.nfev} motions")
 assert abs(fit.x[0] - TRUE) < 1e-3
 

@@ -14,6 +14,7 @@ mod numbers;
 mod parts;
 mod problem;
 mod registry;
+mod runs;
 mod simulate;
 mod solve;
 mod wait;
@@ -48,6 +49,8 @@ mod _nonsmooth {
     use crate::problem::{Problem, kinds};
     #[pymodule_export]
     use crate::registry::{check, offers};
+    #[pymodule_export]
+    use crate::runs::Runs;
     #[pymodule_export]
     use crate::simulate::{Run, Simulation, Step, draw, read_scene};
     #[pymodule_export]

@@ -20,6 +20,7 @@ from ._nonsmooth import VERSION as __version__
 from ._nonsmooth import Error, Progress, Step
 from .answers import Answer, Status, Table, Unsolved, solve
 from .derivatives import Derivative, derivative
+from .comparing import Runs, bench, read_runs
 from .problems import HLCP, LCP, MCP, MLCP, VI, BoxLCP, Friction, Problem, read
 from .sets import Ball, Box, Polyhedron, Product, SecondOrderCone, Set
 from .settings import CLASSES as _CLASSES
@@ -49,6 +50,7 @@ __all__ = [
     "Product",
     "Progress",
     "Run",
+    "Runs",
     "SecondOrderCone",
     "Set",
     "Settings",
@@ -59,10 +61,12 @@ __all__ = [
     "Unsolved",
     "VI",
     "World",
+    "bench",
     "derivative",
     "draw",
     "load",
     "read",
+    "read_runs",
     "simulate",
     "solve",
     "solvers",

@@ -52,7 +52,7 @@ class Unsolved(RuntimeError):
         self.answer = answer
 
 
-class Table(np.ndarray):  # type: ignore[type-arg]
+class Table(np.ndarray[Any, np.dtype[np.void]]):
     """A structured array: a row for each contact or variable, columns by name."""
 
     def to_pandas(self) -> pandas.DataFrame:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .answers import Answer
+    from .comparing import Profile
     from .problems import Problem
     from .simulation import Run
 
@@ -114,5 +115,20 @@ def energies(run: Run, ax: Optional[Axes] = None) -> Axes:
     axes.plot(t, energy["kinetic"] + energy["potential"], "k-", lw=0.8, label="sum")
     axes.set_xlabel("t (s)")
     axes.set_ylabel("energy (J)")
+    axes.legend()
+    return axes
+
+
+def profiles(profile: Profile, ax: Optional[Axes] = None) -> Axes:
+    """Performance profiles: the share of problems by how many times the cost of the best a solver took."""
+    axes = _axes(ax)
+    most = max((steps[-1][0] for steps in profile.curves.values() if steps), default=1.0)
+    for solver, steps in profile.curves.items():
+        x, y = zip(*steps) if steps else ((1.0,), (0.0,))
+        axes.step([*x, 1.1 * most], [*y, y[-1]], where="post", label=solver)
+    axes.set_xscale("log")
+    axes.set_ylim(0, 1.02)
+    axes.set_xlabel(f"{profile.cost} over those of the best")
+    axes.set_ylabel("share of problems solved")
     axes.legend()
     return axes

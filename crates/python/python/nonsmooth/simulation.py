@@ -142,9 +142,8 @@ class World:
         joints = self._list("joints")
         name = name or f"joint{len(joints)}"
         limits = table.get("limits")
-        if limits is not None and not isinstance(limits, Mapping):
-            lower, upper = limits  # type: ignore[misc]
-            table["limits"] = {"lower": lower, "upper": upper}
+        if isinstance(limits, (tuple, list)):
+            table["limits"] = dict(zip(("lower", "upper"), limits))
         joints.append({"kind": kind, "a": a, "b": b, "name": name, **table})
         return name
 
