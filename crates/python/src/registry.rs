@@ -46,6 +46,11 @@ pub fn check(solver: &str, given: &Bound<'_, PyAny>) -> PyResult<()> {
         return Ok(());
     }
     let errors: Vec<_> = all.into_iter().filter_map(Result::err).collect();
-    let of_settings = errors.iter().find(|e| !matches!(e, SolveError::UnknownSolver { .. }));
-    of_settings.or(errors.first()).map_or(Ok(()), |e| Err(mistake(e)))
+    // What is nearest to the cause: a setting, a name that is like one, any unknown name.
+    let nearness = |e: &&SolveError| match e {
+        SolveError::UnknownSolver { meant, .. } if meant.is_empty() => 2,
+        SolveError::UnknownSolver { .. } => 1,
+        _ => 0,
+    };
+    errors.iter().min_by_key(nearness).map_or(Ok(()), |e| Err(mistake(e)))
 }
