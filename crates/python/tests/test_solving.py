@@ -20,6 +20,7 @@ def test_the_answer_of_a_sliding_box(box):
     np.testing.assert_allclose(answer.u, [0.0, 1.5, 0.0], atol=1e-8)
     assert answer.residual <= 1e-8 and answer.residuals["relative"] == answer.residual
     assert answer.counts["slip"] == 1 and answer.counts["open"] == 0
+    assert answer.contacts["contact"].tolist() == [0]
     assert answer.contacts["status"][0] == "slip" and answer.contacts["mu"][0] == 0.5
     assert answer.contacts.to_pandas().loc[0, "r_n"] == pytest.approx(1.0)
     assert answer.iterations >= 0 and answer.seconds >= 0 and answer.certificate is None

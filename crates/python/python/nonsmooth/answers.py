@@ -64,6 +64,10 @@ class Table(np.ndarray[Any, np.dtype[np.void]]):
 
 def _tabled(columns: Mapping[str, Any]) -> Table:
     arrays = {name: np.asarray(column) for name, column in columns.items()}
+    # Contacts and variables are counted, unless they have names.
+    for name, column in columns.items():
+        if isinstance(column, list) and column and all(word.isdigit() for word in column):
+            arrays[name] = np.array([int(word) for word in column])
     size = max((a.size for a in arrays.values()), default=0)
     kinds = [(name, a.dtype if a.size else np.dtype(float)) for name, a in arrays.items()]
     made = np.empty(size, dtype=kinds)
