@@ -2,6 +2,7 @@
 //! [`Indeterminacy`].
 
 mod classes;
+pub mod derivative;
 mod indeterminacy;
 mod jacobian;
 mod monotone;
@@ -15,6 +16,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 pub use classes::{Class, Classes, Effort, Finding, How, Why, Witness};
+pub use derivative::Derivative;
 pub use indeterminacy::Indeterminacy;
 pub use jacobian::{Entry, JacobianCheck};
 pub use monotone::{Apart, Sampled};

@@ -2,9 +2,7 @@
 
 use nonsmooth_io::table::{Column, Table};
 use nonsmooth_io::{ProblemFile, StoredPoint};
-use nonsmooth_problem::{
-    AnyPoint, AnyProblem, GlobalPoint, LocalPoint, Problem, Stated, with_complementarity,
-};
+use nonsmooth_problem::{AnyPoint, AnyProblem, GlobalPoint, LocalPoint, Problem};
 use serde_json::{Value, json};
 
 use crate::json::Object;
@@ -93,27 +91,9 @@ pub fn short(x: f64) -> String {
 /// A solution with all digits, by the names that its file formats use, and the status of each contact or variable.
 pub fn json(problem: &AnyProblem, stored: &StoredPoint, names: &[String]) -> Value {
     let mut all = Object::new();
-    let mut put = |name: &str, x: &[f64]| all.insert(name.into(), json!(x));
     let partner = stored.partner.clone().unwrap_or_else(|| problem.partner(&stored.point));
-    match (&stored.point, problem) {
-        (AnyPoint::Local(LocalPoint { r, lambda }), _) => {
-            put("r", r);
-            put("u", &partner);
-            put("l", lambda);
-        }
-        (AnyPoint::Global(GlobalPoint { v, r, lambda }), _) => {
-            put("v", v);
-            put("r", r);
-            put("u", &partner);
-            put("l", lambda);
-        }
-        (point, AnyProblem::Complementarity(linear)) => {
-            let parts = with_complementarity!(linear, p => p.parts_of(point, Some(&partner)));
-            for (name, x) in parts {
-                put(name, x);
-            }
-        }
-        (_, AnyProblem::Friction(_)) => {}
+    for (name, x) in problem.point_parts(&stored.point, &partner) {
+        all.insert(name.into(), json!(x));
     }
     let statuses = Table::new(problem, stored, names).ok();
     let statuses = statuses.as_ref().and_then(|table| table.column("status"));

@@ -97,7 +97,7 @@
 //! The crates below (`nonsmooth-problem`, `nonsmooth-solve`, `nonsmooth-io`, `nonsmooth-scenes`, `nonsmooth-simulate`) have all the rest: kernels, single methods, forms.
 
 #[doc(inline)]
-pub use nonsmooth_solve::{Answer, Solvable, Solve, solve};
+pub use nonsmooth_solve::{Answer, Kept, Solvable, Solve, solve};
 
 #[doc(inline)]
 pub use nonsmooth_io::read;

@@ -11,7 +11,7 @@ use nonsmooth_solve::registry;
 
 // ------------------------------------------------------------------------------------------------ floors
 
-/// The crates by the name that sources use, each with those it may depend on: `cli, python → bench → {simulate, scenes, io} → solve → analysis →
+/// The crates by the name that sources use, each with those it may depend on: `cli, python → {bench, record} → {simulate, scenes, io} → solve → analysis →
 /// problem → linalg`, but `simulate → scenes` and `io → problem` only. `nonsmooth` is the facade.
 const CRATES: &[(&str, &[&str])] = &[
     ("nonsmooth_linalg", &[]),
@@ -24,6 +24,7 @@ const CRATES: &[(&str, &[&str])] = &[
         "nonsmooth_simulate",
         &["nonsmooth_linalg", "nonsmooth_problem", "nonsmooth_solve", "nonsmooth_scenes"],
     ),
+    ("nonsmooth_record", &LIBRARIES),
     ("nonsmooth_bench", &LIBRARIES),
     ("nonsmooth_cli", &UP_TO_BENCH),
     ("nonsmooth_python", &UP_TO_BENCH),
@@ -38,7 +39,7 @@ const LIBRARIES: [&str; 7] = [
     "nonsmooth_scenes",
     "nonsmooth_simulate",
 ];
-const UP_TO_BENCH: [&str; 8] = [
+const UP_TO_BENCH: [&str; 9] = [
     "nonsmooth_linalg",
     "nonsmooth_problem",
     "nonsmooth_analysis",
@@ -46,6 +47,7 @@ const UP_TO_BENCH: [&str; 8] = [
     "nonsmooth_io",
     "nonsmooth_scenes",
     "nonsmooth_simulate",
+    "nonsmooth_record",
     "nonsmooth_bench",
 ];
 

@@ -8,7 +8,7 @@ use crate::check::{
 };
 use crate::{
     Complementarity, Friction, GlobalPoint, HlcpPoint, Kind, LcpPoint, LocalPoint, Problem,
-    ProblemError, with_problem,
+    ProblemError, Stated, with_complementarity, with_problem,
 };
 
 /// A problem of any kind.
@@ -142,6 +142,29 @@ pub fn any_verdict<P: OfAny>(verdict: VerdictOf<P>) -> VerdictOf<AnyProblem> {
     let Verdict { measure, solved, counts, statuses, velocity, worst } = verdict;
     let statuses = statuses.into_iter().map(Into::into).collect();
     Verdict { measure, solved, counts: counts.into(), statuses, velocity, worst }
+}
+
+impl AnyProblem {
+    /// The parts of a valid point by the names that files have for them, with [`Problem::partner`] among them: r, u and l of contacts (v first, of a global
+    /// problem), z and w of pairs. None where the point is another kind's.
+    pub fn point_parts<'a>(
+        &self,
+        point: &'a AnyPoint,
+        partner: &'a [f64],
+    ) -> Vec<(&'static str, &'a [f64])> {
+        match (point, self) {
+            (AnyPoint::Local(LocalPoint { r, lambda }), Self::Friction(_)) => {
+                vec![("r", r), ("u", partner), ("l", lambda)]
+            }
+            (AnyPoint::Global(GlobalPoint { v, r, lambda }), Self::Friction(_)) => {
+                vec![("v", v), ("r", r), ("u", partner), ("l", lambda)]
+            }
+            (point, Self::Complementarity(stated)) => {
+                with_complementarity!(stated, p => p.parts_of(point, Some(partner)))
+            }
+            (_, Self::Friction(_)) => vec![],
+        }
+    }
 }
 
 /// The point of the problem's kind.

@@ -13,6 +13,7 @@
 //! # Ok::<(), nonsmooth_solve::SolveError>(())
 //! ```
 
+use std::any::Any;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -23,7 +24,7 @@ use nonsmooth_problem::{
 };
 use serde_json::Value;
 
-use crate::core::register::{DEFAULT, Described, Registered, session};
+use crate::core::register::{AnySession, DEFAULT, Described, Registered, session};
 use crate::core::settings::SettingsMap;
 use crate::core::trace::Trace;
 use crate::{Limit, Limits, Outcome, Progress, Sample, Session, SolveError, Status, guard};
@@ -149,7 +150,68 @@ impl Solve {
         problem: &P,
         watch: &mut dyn FnMut(&Progress),
     ) -> Result<Answer<P>, SolveError> {
-        problem.answer(self, watch)
+        problem.answer(self, &mut Kept::default(), watch)
+    }
+
+    /// As [`watched`](Self::watched), by the session in `kept` where that is of this solver with these settings and of the problem's kind; the session of this solve is
+    /// kept there. What a session knows of a pattern (orderings, symbolic factors, memory) is so found once for many problems that differ by their numbers.
+    ///
+    /// ```
+    /// use nonsmooth_problem::planted::PlantedLcp;
+    /// use nonsmooth_solve::{Kept, Solve};
+    ///
+    /// let (mut problem, _known) = PlantedLcp::default().lcp();
+    /// let (solve, mut kept) = (Solve::new(), Kept::default());
+    /// for _ in 0..3 {
+    ///     problem.q.iter_mut().for_each(|q| *q *= 0.5);
+    ///     assert!(solve.again(&problem, &mut kept, &mut |_| {})?.is_solved());
+    /// }
+    /// # Ok::<(), nonsmooth_solve::SolveError>(())
+    /// ```
+    pub fn again<P: Solvable>(
+        &self,
+        problem: &P,
+        kept: &mut Kept,
+        watch: &mut dyn FnMut(&Progress),
+    ) -> Result<Answer<P>, SolveError> {
+        problem.answer(self, kept, watch)
+    }
+}
+
+/// The session of a solve, kept for the next one; see [`Solve::again`].
+#[derive(Default)]
+pub struct Kept(Option<KeptSession>);
+
+/// A session whose kind of problem is forgotten, with what it was made of.
+struct KeptSession {
+    solver: String,
+    settings: SettingsMap,
+    session: Box<dyn Any + Send>,
+}
+
+impl Kept {
+    /// The session that is kept if it is the one that is asked for, else a new one.
+    fn take<P: Registered>(&mut self, how: &Solve) -> Result<AnySession<P>, SolveError> {
+        let same = self.0.take_if(|kept| {
+            kept.solver == how.solver
+                && kept.settings == how.settings
+                && kept.session.is::<AnySession<P>>()
+        });
+        match same.and_then(|kept| kept.session.downcast::<AnySession<P>>().ok()) {
+            Some(session) => Ok(*session),
+            None => session::<P>(&how.solver, &how.settings),
+        }
+    }
+
+    fn put<P: Registered>(&mut self, how: &Solve, session: AnySession<P>) {
+        let (solver, settings) = (how.solver.clone(), how.settings.clone());
+        self.0 = Some(KeptSession { solver, settings, session: Box::new(session) });
+    }
+}
+
+impl std::fmt::Debug for Kept {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.debug_tuple("Kept").field(&self.0.as_ref().map(|kept| &kept.solver)).finish()
     }
 }
 
@@ -192,10 +254,11 @@ impl<P: Judged> Answer<P> {
 
 /// What the door takes: a problem of any kind that has solvers, or an [`AnyProblem`].
 pub trait Solvable: Judged {
-    /// Solves the problem as `how` says.
+    /// Solves the problem as `how` says, by the session in `kept` where it fits.
     fn answer(
         &self,
         how: &Solve,
+        kept: &mut Kept,
         watch: &mut dyn FnMut(&Progress),
     ) -> Result<Answer<Self>, SolveError>
     where
@@ -206,10 +269,11 @@ impl<P: Registered + Judged<Point: OfAnyPoint>> Solvable for P {
     fn answer(
         &self,
         how: &Solve,
+        kept: &mut Kept,
         watch: &mut dyn FnMut(&Progress),
     ) -> Result<Answer<P>, SolveError> {
         let begun = Instant::now();
-        let mut session = session::<P>(&how.solver, &how.settings)?;
+        let mut session = kept.take::<P>(how)?;
         let mut point = match &how.start {
             None => self.origin(),
             Some(start) => P::Point::of(start).cloned().ok_or_else(|| ProblemError::Shape {
@@ -220,6 +284,9 @@ impl<P: Registered + Judged<Point: OfAnyPoint>> Solvable for P {
         };
         let outcome = session.solve(self, &mut point, &how.limits, watch)?;
         let verdict = verdict(self, &point, &outcome, &mut *session, &how.limits, begun)?;
+        let (account, history) = (session.account(), session.history().to_vec());
+        let trace = session.trace();
+        kept.put(how, session);
         Ok(Answer {
             point,
             status: outcome.status,
@@ -228,9 +295,9 @@ impl<P: Registered + Judged<Point: OfAnyPoint>> Solvable for P {
             factorisations: outcome.factorisations,
             seconds: outcome.seconds,
             cpu_seconds: outcome.cpu_seconds,
-            account: session.account(),
-            history: session.history().to_vec(),
-            trace: session.trace(),
+            account,
+            history,
+            trace,
         })
     }
 }
@@ -239,9 +306,10 @@ impl Solvable for AnyProblem {
     fn answer(
         &self,
         how: &Solve,
+        kept: &mut Kept,
         watch: &mut dyn FnMut(&Progress),
     ) -> Result<Answer<AnyProblem>, SolveError> {
-        with_problem!(self, p => p.answer(how, watch).map(of_any))
+        with_problem!(self, p => p.answer(how, kept, watch).map(of_any))
     }
 }
 

@@ -38,7 +38,7 @@ pub mod registry;
 pub mod variational;
 
 pub use self::complementarity::guarantees;
-pub use door::{Answer, Solvable, Solve, solve};
+pub use door::{Answer, Kept, Solvable, Solve, solve};
 pub use multistart::{Found, multistart};
 
 pub use self::core::boxed::Boxed;

@@ -3,18 +3,12 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use nonsmooth_io::trajectory::{
-    Checkpoint, Contact, Energy, Frame, Joint, Named, State, Step, Trajectory, Writer,
-};
-
-use nonsmooth_io::{Info, IoError, Mesh, ProblemFile, vtk};
+use nonsmooth_io::trajectory::{Checkpoint, Trajectory, Writer};
+use nonsmooth_io::{Info, IoError, ProblemFile, vtk};
 use nonsmooth_problem::{AnyProblem, Friction, FrictionLocal, Problem};
 use nonsmooth_scenes::SceneError;
-use nonsmooth_scenes::draw::playback::{self, Drawn, Form, Moment, Placed, Playback};
-use nonsmooth_scenes::draw::{self, Drawing, Pose, Touch};
-use nonsmooth_simulate::{
-    ContactReport, Control, JointReport, Observer, SceneFile, Shape, Simulation, StepReport, World,
-};
+use nonsmooth_scenes::draw::{self, Drawing};
+use nonsmooth_simulate::{Control, Observer, SceneFile, Simulation, StepReport, World};
 
 use crate::files;
 
@@ -35,16 +29,8 @@ pub struct Recorder {
 
 impl Recorder {
     pub fn new(scene: &SceneFile, simulation: &Simulation, frames: bool) -> Self {
-        let bodies = simulation.world().bodies.iter();
-        let named = bodies.map(|b| Named { name: b.name.clone(), fixed: !b.is_free() });
         let mut recorder = Self {
-            trajectory: Trajectory {
-                scene: scene.to_toml(),
-                program: concat!("nonsmooth ", env!("CARGO_PKG_VERSION")).into(),
-                bodies: named.collect(),
-                joints: simulation.world().joints.iter().map(|j| j.name.clone()).collect(),
-                ..Trajectory::default()
-            },
+            trajectory: nonsmooth_record::begun(scene, simulation),
             every: scene.output.every,
             frames,
             writer: None,
@@ -87,30 +73,16 @@ impl Recorder {
     /// Takes note of a step.
     pub fn step(&mut self, simulation: &Simulation, report: &StepReport) {
         let number = simulation.state().steps;
-        self.trajectory.steps.push(step(number, report));
+        self.trajectory.steps.push(nonsmooth_record::step(number, report));
         if self.frames && number.is_multiple_of(self.every) {
             self.frame(simulation);
         }
     }
 
     fn frame(&mut self, simulation: &Simulation) {
-        if !self.frames {
-            return;
+        if self.frames {
+            self.trajectory.frames.push(nonsmooth_record::frame(simulation));
         }
-        let state = simulation.state();
-        let bodies = (0..state.position.len()).map(|k| State {
-            position: state.position[k],
-            rotation: state.rotation[k],
-            velocity: state.velocity[k],
-            angular_velocity: state.angular_velocity(nonsmooth_simulate::BodyId(k as u32)),
-        });
-        self.trajectory.frames.push(Frame {
-            step: state.steps,
-            time: state.t,
-            bodies: bodies.collect(),
-            contacts: simulation.contacts().iter().map(contact).collect(),
-            joints: simulation.joints().iter().map(joint).collect(),
-        });
     }
 
     /// Writes the trajectory to a file with at least so long a time between; `resumed` if what stands there is its beginning.
@@ -150,192 +122,24 @@ impl Recorder {
 
     /// Time, energies, residual and counts, a row a step.
     pub fn csv(&self) -> String {
-        let mut text = String::from(
-            "step,t,h,status,residual,kinetic,work_gravity,work_forces,work_normal,work_tangential,work_drives,work_joints,numerical,imbalance,near,active,open,stick,slip,penetration,iterations,newton\n",
-        );
-        for s in &self.trajectory.steps {
-            let e = &s.energy;
-            let status = match s.status.contains([',', '"']) {
-                true => format!("\"{}\"", s.status.replace('"', "\"\"")),
-                false => s.status.clone(),
-            };
-            text += &format!(
-                "{},{},{},{status},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{:e},{},{},{},{},{},{:e},{},{}\n",
-                s.number,
-                s.time,
-                s.h,
-                s.residual,
-                e.kinetic,
-                e.gravity,
-                e.forces,
-                e.normal,
-                e.tangential,
-                e.drives,
-                e.joints,
-                e.numerical,
-                e.imbalance,
-                s.near,
-                s.active,
-                s.open,
-                s.stick,
-                s.slip,
-                s.penetration,
-                s.iterations,
-                s.newton
-            );
-        }
-        text
-    }
-}
-
-fn step(number: u64, report: &StepReport) -> Step {
-    let (e, c) = (&report.energy, &report.counts);
-    Step {
-        number,
-        time: report.t,
-        h: report.h,
-        status: report.status.name(),
-        residual: report.residual,
-        iterations: c.iterations as u64,
-        newton: report.newton,
-        near: c.near as u32,
-        active: c.active as u32,
-        open: c.open as u32,
-        stick: c.stick as u32,
-        slip: c.slip as u32,
-        penetration: report.drift.penetration,
-        wall: report.timings.total,
-        energy: Energy {
-            kinetic: e.kinetic,
-            potential: e.potential,
-            gravity: e.gravity,
-            forces: e.forces,
-            normal: e.normal,
-            tangential: e.tangential,
-            drives: e.drives,
-            joints: e.joints,
-            numerical: e.numerical,
-            imbalance: e.imbalance,
-        },
-    }
-}
-
-fn joint(j: &JointReport) -> Joint {
-    Joint {
-        angle: j.angle,
-        slide: j.slide,
-        impulse: j.impulse,
-        moment: j.moment,
-        violation: j.violation,
-    }
-}
-
-fn contact(c: &ContactReport) -> Contact {
-    Contact {
-        key: [c.key.shape_a, c.key.shape_b, c.key.feature_a, c.key.feature_b],
-        a: c.a.0,
-        b: c.b.0,
-        point: c.point,
-        frame: c.frame,
-        gap: c.gap,
-        mu: c.mu,
-        r: c.impulse,
-        u: c.after,
-        status: c.motion(),
-    }
-}
-
-/// The shapes of a world, as they are drawn.
-fn drawn(world: &World) -> Vec<Drawn> {
-    let form = |shape: &Shape| match shape {
-        Shape::Sphere { radius } => Form::Sphere { radius: *radius },
-        Shape::Box { half } => Form::Box { half: *half },
-        Shape::Capsule { half_length, radius } => {
-            Form::Capsule { half_length: *half_length, radius: *radius }
-        }
-        Shape::Plane => Form::Plane,
-        Shape::Polyhedron(p) => {
-            Form::Polyhedron { vertices: p.vertices().to_vec(), faces: p.faces().to_vec() }
-        }
-        Shape::Cylinder { half_length, radius } => {
-            Form::Cylinder { half_length: *half_length, radius: *radius }
-        }
-        Shape::Cone { half_length, radius } => {
-            Form::Cone { half_length: *half_length, radius: *radius }
-        }
-        Shape::Mesh(mesh) => {
-            let faces = mesh.triangles().iter().map(|t| t.map(|k| k as usize).to_vec()).collect();
-            Form::Mesh { vertices: mesh.vertices().to_vec(), faces }
-        }
-    };
-    let placed = |part: &nonsmooth_simulate::Part| Placed {
-        form: form(&part.shape),
-        position: part.position,
-        rotation: part.rotation,
-    };
-    let bodies = world.bodies.iter().map(|body| Drawn {
-        name: body.name.clone(),
-        fixed: !body.is_free(),
-        parts: body.parts.iter().map(placed).collect(),
-    });
-    bodies.collect()
-}
-
-fn playback(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Playback {
-    let pose =
-        |s: &State| Pose { position: s.position, rotation: s.rotation, velocity: s.velocity };
-    let touch = |c: &Contact| Touch {
-        a: Some(c.a as usize),
-        b: c.b as usize,
-        point: c.point,
-        offset: [0.0; 3],
-        frame: c.frame,
-        mu: c.mu,
-        r: Some(c.r),
-        u: Some(c.u),
-        status: c.status,
-    };
-    let frames = trajectory.frames.iter().map(|f| Moment {
-        time: f.time,
-        poses: f.bodies.iter().map(pose).collect(),
-        contacts: f.contacts.iter().map(touch).collect(),
-    });
-    let energy = trajectory.steps.iter().map(|s| playback::Energy {
-        time: s.time,
-        kinetic: s.energy.kinetic,
-        potential: s.energy.potential,
-    });
-    Playback {
-        title: scene.name.clone(),
-        bodies: drawn(world),
-        frames: frames.collect(),
-        energy: energy.collect(),
-        residual: trajectory.steps.iter().map(|s| [s.time, s.residual]).collect(),
+        nonsmooth_record::csv(&self.trajectory)
     }
 }
 
 /// The page that plays a trajectory.
 pub fn page(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Result<String, String> {
-    playback(trajectory, scene, world).html(playback::LIMIT).map_err(|e| e.to_string())
-}
-
-fn meshes(trajectory: &Trajectory, world: &World) -> Vec<Vec<Mesh>> {
-    let nameless = SceneFile::of_family("", Default::default(), 1.0, 0.0);
-    let surfaces = playback(trajectory, &nameless, world).surfaces();
-    let mesh =
-        |s: playback::Surface| Mesh { vertices: s.vertices, faces: s.faces, smooth: s.smooth };
-    surfaces.into_iter().map(|all| all.into_iter().map(mesh).collect()).collect()
+    nonsmooth_record::page(trajectory, scene, world).map_err(|e| e.to_string())
 }
 
 /// Files for ParaView.
 pub fn paraview(path: &Path, trajectory: &Trajectory, world: &World) -> Result<(), String> {
-    let meshes = meshes(trajectory, world);
+    let meshes = nonsmooth_record::meshes(trajectory, world);
     vtk::write(path, trajectory, &meshes).map_err(|e| format!("--vtk {e}"))
 }
 
 /// A glTF file.
 pub fn gltf(path: &Path, trajectory: &Trajectory, world: &World) -> Result<(), String> {
-    let meshes = meshes(trajectory, world);
+    let meshes = nonsmooth_record::meshes(trajectory, world);
     nonsmooth_io::gltf::write(path, trajectory, &meshes).map_err(|e| format!("--glb {e}"))
 }
 
@@ -363,7 +167,7 @@ pub fn drawings(
     scene: &SceneFile,
     world: &World,
 ) -> Result<(), String> {
-    let playback = playback(trajectory, scene, world);
+    let playback = nonsmooth_record::playback(trajectory, scene, world);
     let wrong = |e: SceneError| format!("--svg: {e}");
     let draw = |frame: usize, to: &Path| {
         let picture = playback.picture(frame).map_err(wrong)?;

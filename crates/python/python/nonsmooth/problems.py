@@ -1,0 +1,359 @@
+"""Problems, by the letters of their statements."""
+
+from __future__ import annotations
+
+import html
+import os
+from typing import TYPE_CHECKING, Any, Callable, ClassVar, Optional, Sequence, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _nonsmooth
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from .answers import Answer
+    from .sets import Set
+
+Vector = npt.NDArray[np.float64]
+Numbers = npt.ArrayLike
+"""What numpy makes an array of real numbers of."""
+Matrix = Any
+"""An array of two dimensions, or a sparse matrix of scipy (csr, csc, bsr, coo, or what has ``tocsc``)."""
+Path = Union[str, "os.PathLike[str]"]
+Function = Callable[[Vector], Numbers]
+"""x to the n values of F(x); NaN where F is not defined."""
+Jacobian = Callable[[Vector], Matrix]
+"""x to JF(x), n × n, with all entries or sparse."""
+
+
+class Problem:
+    """A problem of any kind. Its parts are attributes by their letters (``problem.q``), copies of what is there."""
+
+    __slots__ = ("_native",)
+    _native: _nonsmooth.Problem
+    _kind: ClassVar[str] = ""
+
+    @classmethod
+    def _of(cls, native: _nonsmooth.Problem) -> Problem:
+        problem: Problem = object.__new__(_BY_KIND[native.kind])
+        problem._native = native
+        return problem
+
+    def update(self, **parts: Any) -> None:
+        """Puts other parts in the place of those that are there: ``problem.update(q=q)``.
+
+        What a solver has found out of the pattern of the matrices is kept for the next solve with it.
+        Cost: a copy of the problem. Raises :class:`Error` where the parts do not fit; then nothing is changed.
+        """
+        self._native.update(parts)
+
+    def save(self, path: Path, answer: Optional[Answer] = None) -> None:
+        """Writes the problem, with the answer as its solution, in the format of the extension (.hdf5, .toml, .mtx, .nl, .dat, ...)."""
+        self._native.save(path, None if answer is None else answer._native)
+
+    def judge(self, point: object, tol: float = 1e-8) -> dict[str, Any]:
+        """What the judge says of a point: an answer, a dictionary of its parts, or the array z (x; of contacts the impulses r)."""
+        from .answers import Answer
+
+        return self._native.judge(point._native if isinstance(point, Answer) else point, tol)
+
+    @property
+    def kind(self) -> str:
+        """The kind's name in files and reports."""
+        return self._native.kind
+
+    @property
+    def unknowns(self) -> int:
+        """The number of scalar unknowns."""
+        return self._native.unknowns
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the variables, if the file has any."""
+        return self._native.names
+
+    @property
+    def title(self) -> Optional[str]:
+        """The title in the file."""
+        return self._native.title
+
+    @property
+    def solution(self) -> Optional[dict[str, Vector]]:
+        """The solution that the file has, by its parts. Nobody has judged it."""
+        return self._native.solution()
+
+    @property
+    def parts(self) -> dict[str, Any]:
+        """All parts by their letters."""
+        return {name: self._part(name) for name in self._native.letters()}
+
+    def _part(self, name: str) -> Any:
+        part = self._native.part(name)
+        if isinstance(part, dict):
+            from scipy.sparse import csc_matrix
+
+            return csc_matrix(
+                (part["data"], part["indices"], part["indptr"]), shape=part["shape"]
+            )
+        return part
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        part = self._part(name)
+        if part is None:
+            letters = ", ".join(self._native.letters())
+            raise AttributeError(
+                f"{type(self).__name__}: expected one of the parts {letters}, found {name}"
+            )
+        return part
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._native.letters()]
+
+    def __repr__(self) -> str:
+        title = f" {self.title!r}" if self.title else ""
+        return f"<{type(self).__name__}{title}: {self._native.size}, {self.unknowns} unknowns>"
+
+    def _repr_html_(self) -> str:
+        rows = [("kind", self.kind), ("size", f"{self._native.size}, {self.unknowns} unknowns")]
+        statement = STATEMENTS.get(self.kind)
+        if statement:
+            rows.insert(1, ("statement", statement))
+        for name in self._native.letters():
+            rows.append((name, _described(self._native.part(name))))
+        return _table(self.title or type(self).__name__, rows)
+
+    def spy(self, ax: Optional[Axes] = None) -> Axes:
+        """Draws where the entries of the matrix of the problem are (W, M, Q), with matplotlib."""
+        from .plots import spy
+
+        return spy(self, ax)
+
+
+def _described(part: Any) -> str:
+    if isinstance(part, dict):
+        m, n = part["shape"]
+        return f"{m} × {n}, {len(part['data'])} entries"
+    if isinstance(part, np.ndarray):
+        if part.ndim == 1:
+            shown = ", ".join(f"{x:.4g}" for x in part[:6])
+            return f"[{shown}{', …' if part.size > 6 else ''}] ({part.size})"
+        return " × ".join(map(str, part.shape))
+    if isinstance(part, list):
+        return "; ".join(part[:4]) + ("; …" if len(part) > 4 else "")
+    return str(part)
+
+
+def _table(title: str, rows: Sequence[tuple[str, str]]) -> str:
+    cells = "".join(
+        f"<tr><th style='text-align:left'>{html.escape(name)}</th>"
+        f"<td style='text-align:left'>{html.escape(text)}</td></tr>"
+        for name, text in rows
+    )
+    return f"<table><caption>{html.escape(title)}</caption>{cells}</table>"
+
+
+class Friction(Problem):
+    """Unilateral contacts with Coulomb friction.
+
+    For each contact ``K* ∋ u + mu ‖u_T‖ e_N ⟂ r ∈ K``, ``K = {‖r_T‖ ≤ mu r_N}``; entries by contact, ``[N, T]`` or ``[N, T1, T2]``.
+
+    *Local form*, ``u = W r + q``: ``Friction(W=, q=, mu=)``. W is D·nc × D·nc in 1/kg, q in m/s.
+    Scalar rows ``c = Vᵀ r + R λ + s`` with ``lower ≤ λ ≤ upper``: V, R, s, lower, upper.
+
+    *Global form*, ``M v = H r + f``, ``u = Hᵀ v + w``: ``Friction(M=, H=, f=, w=, mu=)``. M is n × n in kg, H is n × D·nc,
+    f in N·s, w in m/s. Scalar rows ``c = Gᵀ v + b``: G, b, lower, upper.
+
+    ``mu`` is one number for all contacts or one for each. q and w may be given as nc × D. ``dimension`` is 2 or 3 where it does not
+    follow from the shapes (a single mu: 3). Rows without bounds are bilateral constraints, ``c = 0``.
+    """
+
+    __slots__ = ()
+
+    def __init__(
+        self,
+        *,
+        mu: Optional[Numbers] = None,
+        W: Optional[Matrix] = None,
+        q: Optional[Numbers] = None,
+        V: Optional[Matrix] = None,
+        R: Optional[Matrix] = None,
+        s: Optional[Numbers] = None,
+        M: Optional[Matrix] = None,
+        H: Optional[Matrix] = None,
+        f: Optional[Numbers] = None,
+        w: Optional[Numbers] = None,
+        G: Optional[Matrix] = None,
+        b: Optional[Numbers] = None,
+        lower: Optional[Numbers] = None,
+        upper: Optional[Numbers] = None,
+        dimension: Optional[int] = None,
+    ) -> None:
+        parts = dict(
+            mu=mu, W=W, q=q, V=V, R=R, s=s, M=M, H=H, f=f, w=w, G=G, b=b, lower=lower, upper=upper
+        )
+        self._native = _nonsmooth.Problem.friction(parts, dimension)
+
+    @property
+    def contacts(self) -> int:
+        """The number of contacts."""
+        return self._native.contacts or 0
+
+    @property
+    def dimension(self) -> int:
+        """The components of each contact, 2 or 3."""
+        return self._native.dimension
+
+
+class LCP(Problem):
+    """The linear complementarity problem ``0 ≤ z ⟂ w = M z + q ≥ 0``, M n × n."""
+
+    __slots__ = ()
+    _kind = "lcp"
+
+    def __init__(self, M: Matrix, q: Numbers) -> None:
+        self._native = _nonsmooth.Problem.stated(self._kind, dict(M=M, q=q))
+
+
+class MLCP(Problem):
+    """The mixed one, ``A u + C v + a = 0``, ``0 ≤ v ⟂ D u + B v + b ≥ 0``.
+
+    Either by blocks A, B, C, D, a, b, or as ``M z + q`` whose first ``free`` variables are free; the first ``equalities`` rows
+    are then equalities (as many as there are free variables, where nothing else is said).
+    """
+
+    __slots__ = ()
+    _kind = "mlcp"
+
+    def __init__(
+        self,
+        M: Optional[Matrix] = None,
+        q: Optional[Numbers] = None,
+        free: Optional[int] = None,
+        *,
+        equalities: Optional[int] = None,
+        A: Optional[Matrix] = None,
+        B: Optional[Matrix] = None,
+        C: Optional[Matrix] = None,
+        D: Optional[Matrix] = None,
+        a: Optional[Numbers] = None,
+        b: Optional[Numbers] = None,
+    ) -> None:
+        parts = dict(M=M, q=q, free=free, equalities=equalities, A=A, B=B, C=C, D=D, a=a, b=b)
+        self._native = _nonsmooth.Problem.stated(self._kind, parts)
+
+
+class HLCP(Problem):
+    """The horizontal one, ``Q x + R s = q``, ``0 ≤ x ⟂ s ≥ 0``."""
+
+    __slots__ = ()
+    _kind = "hlcp"
+
+    def __init__(self, Q: Matrix, R: Matrix, q: Numbers) -> None:
+        self._native = _nonsmooth.Problem.stated(self._kind, dict(Q=Q, R=R, q=q))
+
+
+class BoxLCP(Problem):
+    """``−(M z + q) ∈ N_[lower, upper](z)``; bounds may be infinite."""
+
+    __slots__ = ()
+    _kind = "box_lcp"
+
+    def __init__(self, M: Matrix, q: Numbers, lower: Numbers, upper: Numbers) -> None:
+        self._native = _nonsmooth.Problem.stated(
+            self._kind, dict(M=M, q=q, lower=lower, upper=upper)
+        )
+
+
+class MCP(Problem):
+    """The nonlinear mixed complementarity problem ``−F(x) ∈ N_[lower, upper](x)``.
+
+    F is a function of an array, or a list of expressions in x1, x2, … (then values and Jacobian are exact and compiled). ``jac`` gives JF(x), n × n, with
+    all entries or sparse; without it differences are taken, along ``pattern`` (a matrix, zero where JF is) where that is given; else F is called with NaN in some
+    places to find out what depends on what. Where ``jac`` gives a sparse matrix and there is no pattern, the entries stored at ``x0`` are the pattern. ``x0`` is where solvers begin. Bounds are 0 and ∞ where nothing is said.
+
+    An exception in F or jac ends the solve and is raised from it.
+    """
+
+    __slots__ = ()
+    _kind = "mcp"
+
+    def __init__(
+        self,
+        F: Union[Function, Sequence[str]],
+        x0: Optional[Numbers] = None,
+        *,
+        jac: Optional[Jacobian] = None,
+        lower: Optional[Numbers] = None,
+        upper: Optional[Numbers] = None,
+        pattern: Optional[Matrix] = None,
+    ) -> None:
+        if not callable(F):
+            F = list(F)
+        n = len(F) if isinstance(F, list) else None
+        parts = dict(
+            F=F,
+            start=x0,
+            jac=jac,
+            lower=_all(lower, n),
+            upper=_all(upper, n),
+            pattern=pattern,
+        )
+        self._native = _nonsmooth.Problem.stated(self._kind, parts)
+
+    @staticmethod
+    def from_nl(path: Path) -> MCP:
+        """The problem in a file of AMPL's format .nl, as AMPL and Pyomo write it."""
+        problem = read(path)
+        if not isinstance(problem, MCP):
+            raise _nonsmooth.Error(f"{path}: expected a problem mcp, found {problem.kind}")
+        return problem
+
+
+class VI(Problem):
+    """The variational inequality ``F(x)ᵀ (y − x) ≥ 0`` for all y of a convex set: find x in ``set``. F, jac and pattern as of :class:`MCP`."""
+
+    __slots__ = ()
+    _kind = "vi"
+
+    def __init__(
+        self,
+        F: Union[Function, Sequence[str]],
+        set: Set,
+        x0: Optional[Numbers] = None,
+        *,
+        jac: Optional[Jacobian] = None,
+        pattern: Optional[Matrix] = None,
+    ) -> None:
+        parts = dict(
+            F=F if callable(F) else list(F), set=set, start=x0, jac=jac, pattern=pattern
+        )
+        self._native = _nonsmooth.Problem.stated(self._kind, parts)
+
+
+def _all(bound: Optional[Numbers], n: Optional[int]) -> Optional[Numbers]:
+    """One bound for all n variables, where it is one."""
+    if n is not None and bound is not None and np.ndim(bound) == 0:
+        return np.full(n, bound)
+    return bound
+
+
+_STATED: tuple[type[Problem], ...] = (LCP, MLCP, HLCP, BoxLCP, MCP, VI)
+_BY_KIND: dict[str, type[Problem]] = {
+    **{kind._kind: kind for kind in _STATED},
+    **{offer["kind"]: Friction for offer in _nonsmooth.offers() if "friction" in offer["kind"]},
+}
+STATEMENTS: dict[str, str] = {kind["kind"]: kind["statement"] for kind in _nonsmooth.kinds()}
+"""The statements of complementarity problems by their kinds."""
+
+
+def read(path: Path) -> Any:
+    """The problem in a file of any format: FCLIB (.hdf5), TOML, Matrix Market (.mtx), AMPL (.nl), Siconos' text (.dat).
+
+    It is one of :class:`Friction`, :class:`LCP`, :class:`MLCP`, :class:`HLCP`, :class:`BoxLCP`, :class:`MCP`, :class:`VI`.
+    """
+    return Problem._of(_nonsmooth.Problem.read(path))

@@ -1,0 +1,449 @@
+"""Worlds in motion."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import html
+import json
+import pathlib
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Callable, Mapping, Optional, Sequence, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _nonsmooth
+from ._nonsmooth import Step
+from .answers import Table, _named, _plain
+from .problems import Friction, Path, Problem, Vector
+from .settings import Settings
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Triple = Union[Sequence[float], npt.NDArray[np.float64]]
+"""Three numbers."""
+WORLD = "world"
+"""What stands for the world where a joint asks for a body."""
+
+
+def _number(value: object) -> object:
+    """What JSON knows of what numpy has."""
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    raise _nonsmooth.Error(f"scene: expected numbers, words and lists, found {type(value).__name__}")
+
+
+class World:
+    """Bodies, the laws of their contacts and their joints: a scene, as a file of ``nonsmooth simulate`` states it.
+
+    The methods add to it and give back the names by which joints and forces speak of bodies. What they take beyond what is named here is what tables
+    of scene files have (docs/simulation): ``density`` or ``mass`` and ``inertia``, ``position``, ``rotation``, ``velocity``, ``angular_velocity``, ``material``,
+    ``fixed``, ``motion``, ``force``, ``torque``, ``groups``, ``collides_with`` of bodies. SI units. ``document`` is all of it.
+    """
+
+    def __init__(self, gravity: Triple = (0.0, 0.0, -9.81), name: str = "") -> None:
+        self.document: dict[str, Any] = {
+            "format": "nonsmooth-scene",
+            "version": 1,
+            "name": name,
+            "gravity": [float(x) for x in gravity],
+            "time": {"h": 1e-3, "end": 1.0},
+            "pairs_default": {"mu": 0.0, "e": 0.0},
+        }
+        self.warnings: list[str] = []
+
+    def _list(self, name: str) -> list[Any]:
+        made: list[Any] = self.document.setdefault(name, [])
+        return made
+
+    def body(self, shape: Optional[Mapping[str, object]] = None, *, name: str = "", **table: object) -> str:
+        """Adds a body with a shape (``{"kind": "sphere", "radius": 0.1}``), or ``shapes``; its name, made where none is given."""
+        bodies = self._list("bodies")
+        name = name or f"body{len(bodies)}"
+        entry: dict[str, object] = {"name": name, **table}
+        if shape is not None:
+            entry["shape"] = dict(shape)
+        bodies.append(entry)
+        return name
+
+    def plane(self, normal: Triple = (0.0, 0.0, 1.0), *, name: str = "", **table: object) -> str:
+        """A fixed half space below a plane through ``position``."""
+        return self.body({"kind": "plane", "normal": list(normal)}, name=name, **{"fixed": True, **table})
+
+    def sphere(self, radius: float, *, name: str = "", **table: object) -> str:
+        """A ball, radius in m."""
+        return self.body({"kind": "sphere", "radius": radius}, name=name, **table)
+
+    def box(self, half: Triple, *, name: str = "", **table: object) -> str:
+        """A box by its half sides, m."""
+        return self.body({"kind": "box", "half": list(half)}, name=name, **table)
+
+    def capsule(self, half_length: float, radius: float, *, name: str = "", **table: object) -> str:
+        """All points within the radius of a segment on the third axis, m."""
+        shape = {"kind": "capsule", "half_length": half_length, "radius": radius}
+        return self.body(shape, name=name, **table)
+
+    def cylinder(self, half_length: float, radius: float, *, name: str = "", **table: object) -> str:
+        """A cylinder about the third axis, m."""
+        shape = {"kind": "cylinder", "half_length": half_length, "radius": radius}
+        return self.body(shape, name=name, **table)
+
+    def cone(self, half_length: float, radius: float, *, name: str = "", **table: object) -> str:
+        """A cone about the third axis, its point above, m."""
+        shape = {"kind": "cone", "half_length": half_length, "radius": radius}
+        return self.body(shape, name=name, **table)
+
+    def polyhedron(
+        self, vertices: npt.ArrayLike, faces: Sequence[Sequence[int]], *, name: str = "", **table: object
+    ) -> str:
+        """A convex polyhedron: vertices (m), and the vertices of each face counterclockwise from outside."""
+        shape = {"kind": "polyhedron", "vertices": np.asarray(vertices), "faces": faces}
+        return self.body(shape, name=name, **table)
+
+    def mesh(
+        self, vertices: npt.ArrayLike, triangles: npt.ArrayLike, *, name: str = "", **table: object
+    ) -> str:
+        """A surface of triangles: vertices (m), and three of them by number, counterclockwise from outside."""
+        shape = {"kind": "mesh", "vertices": np.asarray(vertices), "triangles": np.asarray(triangles)}
+        return self.body(shape, name=name, **table)
+
+    def generate(self, scene: str, *, name: Optional[str] = None, **settings: object) -> None:
+        """Adds the bodies of a family of ``nonsmooth gen``: ``world.generate("wall", rows=4)``."""
+        entry: dict[str, object] = {"scene": scene, "set": settings}
+        if name is not None:
+            entry["name"] = name
+        self._list("generate").append(entry)
+
+    def material(self, name: str, density: Optional[float] = None) -> str:
+        """Adds a material; density in kg/m³."""
+        table = {} if density is None else {"density": density}
+        self.document.setdefault("materials", {})[name] = table
+        return name
+
+    def pair(
+        self, a: str, b: Optional[str] = None, *, mu: float = 0.0, e: float = 0.0, **table: object
+    ) -> None:
+        """The law of contact of two materials; of ``"default"`` that of all pairs that are not listed."""
+        if a == "default" and b is None:
+            self.document["pairs_default"] = {"mu": mu, "e": e, **table}
+        else:
+            self._list("pairs").append({"between": [a, b or a], "mu": mu, "e": e, **table})
+
+    def joint(self, kind: str, a: str, b: str, *, name: str = "", **table: object) -> str:
+        """Adds a joint between two bodies, or a body and ``"world"``; its name.
+
+        ``kind``: fixed, revolute, prismatic, cylindrical, screw, spherical, universal, planar, point_on_line, point_on_plane, distance. ``table``: ``anchor``, ``axis``
+        (in the frame of the world), ``limits`` (a pair, or a table), ``spring``, ``friction``, ``motor``, ``motion``, ...
+        """
+        joints = self._list("joints")
+        name = name or f"joint{len(joints)}"
+        limits = table.get("limits")
+        if isinstance(limits, (tuple, list)):
+            table["limits"] = dict(zip(("lower", "upper"), limits))
+        joints.append({"kind": kind, "a": a, "b": b, "name": name, **table})
+        return name
+
+    def revolute(
+        self, a: str, b: str, *, anchor: Triple, axis: Triple, name: str = "", **table: object
+    ) -> str:
+        """A hinge about an axis through an anchor."""
+        return self.joint("revolute", a, b, name=name, anchor=list(anchor), axis=list(axis), **table)
+
+    def prismatic(self, a: str, b: str, *, axis: Triple, name: str = "", **table: object) -> str:
+        """A slide along an axis."""
+        return self.joint("prismatic", a, b, name=name, axis=list(axis), **table)
+
+    def spherical(self, a: str, b: str, *, anchor: Triple, name: str = "", **table: object) -> str:
+        """A ball in a socket at an anchor."""
+        return self.joint("spherical", a, b, name=name, anchor=list(anchor), **table)
+
+    def force(self, body: str, force: Triple, **table: object) -> None:
+        """A force (N) on a body, perhaps ``at`` a point of it, ``from`` a time ``until`` another."""
+        self._list("forces").append({"body": body, "force": list(force), **table})
+
+    def json(self) -> str:
+        """The scene as a JSON document, which ``nonsmooth simulate`` takes."""
+        try:
+            return json.dumps(self.document, default=_number, allow_nan=False)
+        except ValueError as e:
+            raise _nonsmooth.Error(f"scene: expected finite numbers, found: {e}") from None
+
+    def save(self, path: Path) -> None:
+        """Writes the scene: with every default as TOML (.toml), else as JSON."""
+        target = pathlib.Path(path)
+        text = _nonsmooth.Simulation(self.json(), False).toml() if target.suffix == ".toml" else self.json()
+        target.write_text(text, encoding="utf-8")
+
+    def copy(self) -> World:
+        """A world like this one."""
+        return copy.deepcopy(self)
+
+    def __repr__(self) -> str:
+        counted = ((name, len(self.document.get(name, []))) for name in ("bodies", "joints", "generate"))
+        return f"<World: {', '.join(f'{n} {name}' for name, n in counted if n) or 'empty'}>"
+
+    def _repr_html_(self) -> str:
+        return draw(self).text
+
+
+class Picture:
+    """A drawing as SVG, which notebooks show."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def save(self, path: Path) -> None:
+        """Writes it."""
+        pathlib.Path(path).write_text(self.text, encoding="utf-8")
+
+    def _repr_svg_(self) -> str:
+        return self.text
+
+
+def draw(scene: Union[World, Run], frame: int = -1) -> Picture:
+    """A picture on paper of a world as it begins, or of a frame of a run."""
+    if isinstance(scene, Run):
+        return scene.draw(frame)
+    return Picture(_nonsmooth.draw(scene.json()))
+
+
+def load(path: Path) -> World:
+    """The world of a scene file (TOML or JSON), with its meshes, or of a robot (URDF). What was left out of a robot is in ``warnings``."""
+    text, warnings = _nonsmooth.read_scene(path)
+    world = World()
+    world.document, world.warnings = json.loads(text), warnings
+    return world
+
+
+class Simulation:
+    """A world in motion by Moreau–Jean time stepping; each step states a frictional contact problem, which is solved and judged.
+
+    ``h`` is the step in s (that of the world's file where nothing is said); ``solver`` a name or an object of settings for local problems in space; ``tol`` the residual that
+    the judge is content with. ``settle`` moves bodies apart that overlap at the start, in place of refusing them. ``integrator`` takes what the
+    table ``integrator`` of scene files has. Raises :class:`Error` for a world that is not possible.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        h: Optional[float] = None,
+        *,
+        solver: Union[str, Settings, None] = None,
+        tol: Optional[float] = None,
+        settle: bool = False,
+        **integrator: object,
+    ) -> None:
+        world = world.copy()
+        document = world.document
+        if h is not None:
+            document["time"]["h"] = h
+        if integrator:
+            document["integrator"] = {**document.get("integrator", {}), **integrator}
+        table = document.setdefault("solver", {})
+        if solver is not None:
+            name, settings = _named(solver)
+            table["name"], table["settings"] = name, _plain(settings) or {}
+        if tol is not None:
+            table["tol"] = tol
+        self.h = float(document["time"]["h"])
+        self._world = world
+        self._native = _nonsmooth.Simulation(world.json(), settle)
+
+    @property
+    def t(self) -> float:
+        """The time, s."""
+        return self._native.t
+
+    @property
+    def bodies(self) -> list[str]:
+        """The names of the bodies, in their order."""
+        return self._native.bodies
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is to be said of the world."""
+        return [*self._world.warnings, *self._native.warnings]
+
+    @property
+    def position(self) -> Vector:
+        """Mass centres as they are now, bodies × 3, m."""
+        return self._native.state()["position"]
+
+    @property
+    def rotation(self) -> Vector:
+        """Unit quaternions [w, x, y, z], bodies × 4."""
+        return self._native.state()["rotation"]
+
+    @property
+    def velocity(self) -> Vector:
+        """Velocities of the mass centres, bodies × 3, m/s."""
+        return self._native.state()["velocity"]
+
+    @property
+    def angular_velocity(self) -> Vector:
+        """bodies × 3, rad/s, in the frame of the world."""
+        return self._native.state()["angular_velocity"]
+
+    def problem(self) -> Optional[Friction]:
+        """The contact problem of the next step; None where nothing touches."""
+        native = self._native.problem(self.h)
+        problem = None if native is None else Problem._of(native)
+        assert problem is None or isinstance(problem, Friction)
+        return problem
+
+    def run(
+        self,
+        until: float,
+        *,
+        every: int = 1,
+        on_step: Optional[Callable[[Step], object]] = None,
+    ) -> Run:
+        """Moves on until the time ``until`` (s), a frame every so many steps.
+
+        ``on_step`` is called with each :class:`Step`; if it returns something true the run ends there; what it raises is raised here. Ctrl-C raises
+        KeyboardInterrupt. Either way the simulation is whole, and goes on from the last step.
+        """
+        return Run(self._native.run(until, self.h, every, on_step), self)
+
+
+class Run:
+    """What a simulation left behind: of each step time, energies, residual and counts; of each frame the motion and the contacts."""
+
+    def __init__(self, native: _nonsmooth.Run, simulation: Simulation) -> None:
+        self._native = native
+        self.simulation = simulation
+
+    @property
+    def solved(self) -> bool:
+        """Whether the judge accepts every step and the run came to its end."""
+        return self._native.solved
+
+    @property
+    def stopped(self) -> bool:
+        """Whether it was ended before."""
+        return self._native.stopped
+
+    @property
+    def bodies(self) -> list[str]:
+        """The names of the bodies."""
+        return self._native.bodies
+
+    @property
+    def status(self) -> list[str]:
+        """How each step ended."""
+        return self._native.status
+
+    @cached_property
+    def _frames(self) -> dict[str, Vector]:
+        return self._native.frames()
+
+    @cached_property
+    def steps(self) -> dict[str, Any]:
+        """Of each step: time, h, residual, penetration, wall (s); energy and counts by name."""
+        return self._native.steps()
+
+    @property
+    def t(self) -> Vector:
+        """The times of the frames, s."""
+        return self._frames["t"]
+
+    @property
+    def position(self) -> Vector:
+        """Mass centres, frames × bodies × 3, m."""
+        return self._frames["position"]
+
+    @property
+    def rotation(self) -> Vector:
+        """Unit quaternions [w, x, y, z], frames × bodies × 4."""
+        return self._frames["rotation"]
+
+    @property
+    def velocity(self) -> Vector:
+        """frames × bodies × 3, m/s."""
+        return self._frames["velocity"]
+
+    @property
+    def angular_velocity(self) -> Vector:
+        """frames × bodies × 3, rad/s, in the frame of the world."""
+        return self._frames["angular_velocity"]
+
+    @property
+    def energy(self) -> dict[str, Vector]:
+        """Of each step, J: kinetic and potential, the works (gravity, forces, normal, tangential, drives, joints, numerical), and what the balance lacks."""
+        energy: dict[str, Vector] = self.steps["energy"]
+        return energy
+
+    @property
+    def residual(self) -> Vector:
+        """The judge's relative residual of each step."""
+        residual: Vector = self.steps["residual"]
+        return residual
+
+    def contacts(self, frame: int = -1) -> Table:
+        """The contacts of a frame: bodies a and b, status, gap, mu, point, normal, r and u as [N, T1, T2], and the impulse on b in the frame of the world."""
+        columns = self._native.contacts(range(len(self.t))[frame])
+        kinds = [
+            (name, np.asarray(column).dtype, np.asarray(column).shape[1:])
+            if len(column)
+            else (name, "U5" if name == "status" else float, np.asarray(column).shape[1:])
+            for name, column in columns.items()
+        ]
+        made = np.empty(len(columns["a"]), dtype=kinds)
+        for name, column in columns.items():
+            made[name] = column
+        return made.view(Table)
+
+    def html(self, path: Optional[Path] = None) -> str:
+        """The page that plays the run in a browser, without a network; written where a path is given."""
+        page = self._native.html()
+        if path is not None:
+            pathlib.Path(path).write_text(page, encoding="utf-8")
+        return page
+
+    def save(self, path: Path) -> None:
+        """Writes the run: a trajectory (.h5), a table of the steps (.csv), a page (.html), for ParaView (.pvd) or Blender (.glb)."""
+        target = pathlib.Path(path)
+        if target.suffix == ".csv":
+            target.write_text(self._native.csv(), encoding="utf-8")
+        elif target.suffix == ".html":
+            self.html(target)
+        else:
+            self._native.save(target)
+
+    def draw(self, frame: int = -1) -> Picture:
+        """A picture on paper of a frame."""
+        return Picture(self._native.svg(range(len(self.t))[frame]))
+
+    def plot(self, ax: Optional[Axes] = None) -> Axes:
+        """Draws the energies, with matplotlib."""
+        from .plots import energies
+
+        return energies(self, ax)
+
+    def __repr__(self) -> str:
+        word = "solved" if self.solved else "stopped" if self.stopped else "not solved"
+        steps = len(self.steps["time"])
+        end = self.t[-1] if len(self.t) else self.simulation.t
+        return f"<Run: {len(self.bodies)} bodies, {steps} steps to t = {end:.6g} s, {word}>"
+
+    def _repr_html_(self) -> str:
+        page = base64.b64encode(self.html().encode()).decode()
+        return (
+            f"<p>{html.escape(repr(self))}</p><iframe style='width:100%;height:480px;border:0' "
+            f"src='data:text/html;base64,{page}'></iframe>"
+        )
+
+
+def simulate(
+    scene: Union[World, str, pathlib.Path], until: Optional[float] = None, **how: Any
+) -> Run:
+    """The run of a world, or of a scene file or robot, until a time (that of the scene where nothing is said)."""
+    world = scene if isinstance(scene, World) else load(scene)
+    every = how.pop("every", world.document.get("output", {}).get("every", 1))
+    on_step = how.pop("on_step", None)
+    end = world.document["time"]["end"] if until is None else until
+    return Simulation(world, **how).run(end, every=every, on_step=on_step)

@@ -1,0 +1,405 @@
+//! Problems of any kind.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
+
+use nonsmooth_io::{ProblemFile, StoredPoint};
+use nonsmooth_problem::{
+    AnyPoint, AnyProblem, Complementarity, Kind, Mcp, OfAny, Problem as _, Shape, Stated, Vi,
+    each_kind, with_complementarity,
+};
+use nonsmooth_solve::Kept;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::function::{self, Faults};
+use crate::parts::{Given, Shown};
+use crate::{contact, expected, mistake, numbers};
+
+/// A problem of any kind, with what a file says of it.
+#[pyclass(frozen, module = "nonsmooth._nonsmooth")]
+pub struct Problem {
+    file: RwLock<Arc<ProblemFile>>,
+    /// The session of the last solve; a solve takes it out and brings it back.
+    kept: Mutex<Kept>,
+    /// Where exceptions of its functions go.
+    pub faults: Arc<Faults>,
+}
+
+impl Problem {
+    pub fn new(file: ProblemFile, faults: Arc<Faults>) -> Self {
+        Self { file: RwLock::new(Arc::new(file)), kept: Mutex::new(Kept::default()), faults }
+    }
+
+    /// The problem as it is now; who has it keeps it, whatever becomes of this.
+    pub fn file(&self) -> Arc<ProblemFile> {
+        self.file.read().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// The session that is kept, for one solve.
+    pub fn take_kept(&self) -> Kept {
+        std::mem::take(&mut *self.kept.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Brings it back.
+    pub fn put_kept(&self, kept: Kept) {
+        *self.kept.lock().unwrap_or_else(PoisonError::into_inner) = kept;
+    }
+}
+
+/// What Python knows of a kind before there is a problem of it.
+#[derive(Clone, Copy)]
+struct Known {
+    kind: Kind,
+    statement: &'static str,
+    parts: &'static [(&'static str, Shape)],
+    solution: &'static [&'static str],
+    make: fn(&mut Given<'_, '_>) -> Result<AnyProblem, nonsmooth_problem::ProblemError>,
+}
+
+fn known() -> impl Iterator<Item = Known> {
+    let all = each_kind!(P in Complementarity => Known {
+        kind: P::KIND,
+        statement: P::STATEMENT,
+        parts: P::PARTS,
+        solution: P::SOLUTION,
+        make: |given| P::from_parts(given).map(Into::into),
+    });
+    all.into_iter()
+}
+
+fn letters(parts: &'static [(&'static str, Shape)]) -> Vec<&'static str> {
+    parts.iter().map(|(name, _)| *name).collect()
+}
+
+/// The kinds that are stated by parts: name, statement, parts with what they are, parts of a solution.
+#[pyfunction]
+pub fn kinds(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
+    let all = PyList::empty(py);
+    for Known { kind, statement, parts, solution, .. } in known() {
+        let shape = |shape: Shape| match shape {
+            Shape::Matrix => "matrix",
+            Shape::Vector => "vector",
+            Shape::Count => "count",
+            Shape::Expressions => "function",
+            Shape::Set => "set",
+        };
+        let parts: Vec<_> = parts.iter().map(|(name, part)| (*name, shape(*part))).collect();
+        let one = PyDict::new(py);
+        one.set_item("kind", kind.name())?;
+        one.set_item("statement", statement)?;
+        one.set_item("parts", parts)?;
+        one.set_item("solution", solution.to_vec())?;
+        all.append(one)?;
+    }
+    Ok(all)
+}
+
+/// The problem of a kind by its parts.
+fn stated(kind: &str, parts: &Bound<'_, PyDict>, faults: &Arc<Faults>) -> PyResult<AnyProblem> {
+    let known = known().find(|known| known.kind.name() == kind);
+    let Some(Known { kind, parts: letters_of, make, .. }) = known else {
+        return Err(expected("kind", "a kind of problem that is stated by parts", kind));
+    };
+    let all = letters(letters_of);
+    let mut given = Given::new(parts);
+    match given.get("F")? {
+        Some(f) if f.is_callable() => by_function(kind, parts, &f, &all, faults),
+        _ => {
+            let problem = make(&mut given);
+            given.made(problem, &all)
+        }
+    }
+}
+
+/// A problem whose F is a function of Python.
+fn by_function(
+    kind: Kind,
+    parts: &Bound<'_, PyDict>,
+    f: &Bound<'_, PyAny>,
+    letters: &[&'static str],
+    faults: &Arc<Faults>,
+) -> PyResult<AnyProblem> {
+    let mut given = Given::new(parts);
+    given.get("F")?;
+    let start = match given.get("start")? {
+        Some(start) => numbers::vector("x0", &start)?,
+        None => return Err(expected("x0", "where to begin, as F is a function", "nothing")),
+    };
+    let (jacobian, pattern) = (given.get("jac")?, given.get("pattern")?);
+    let n = start.len();
+    if let Some(k) = start.iter().position(|x| !x.is_finite()) {
+        return Err(expected(&format!("x0[{k}]"), "a finite number", start[k]));
+    }
+    if n == 0 {
+        return Err(expected("x0", "at least one variable", "none"));
+    }
+    if let Some(jacobian) = jacobian.as_ref().filter(|jacobian| !jacobian.is_callable()) {
+        return Err(expected("jac", "a function", crate::parts::type_name(jacobian)));
+    }
+    let field = function::field(f, jacobian.as_ref(), pattern.as_ref(), &start, faults)?;
+    let mut all = letters.to_vec();
+    all.extend(["jac", "pattern"]);
+    Ok(match kind {
+        Kind::Vi => {
+            let set = crate::parts::set("set", &given.need("set")?)?;
+            given.made(Vi::of(field, set, start), &all)?.into()
+        }
+        _ => {
+            let lower = given.vector_or("lower", n, 0.0)?;
+            let upper = given.vector_or("upper", n, f64::INFINITY)?;
+            given.made(Mcp::of(field, lower, upper, start), &all)?.into()
+        }
+    })
+}
+
+/// The parts of a problem that have something to show.
+fn shown(problem: &AnyProblem) -> Vec<(&'static str, Shown<'_>)> {
+    match problem {
+        AnyProblem::Friction(friction) => contact::shown(friction),
+        AnyProblem::Complementarity(stated) => {
+            let parts = with_complementarity!(stated, p => p.parts());
+            let shown = |(name, part)| Some((name, Shown::of(part)?));
+            parts.into_iter().filter_map(shown).collect()
+        }
+    }
+}
+
+/// Puts a vector that is given in the place of another.
+fn put(given: &mut Given<'_, '_>, name: &'static str, into: &mut Vec<f64>) -> PyResult<()> {
+    if let Some(new) = given.get(name)? {
+        *into = numbers::vector(name, &new)?;
+    }
+    Ok(())
+}
+
+/// The same problem with other parts; a function of Python stays as it is.
+fn changed(problem: &AnyProblem, parts: &Bound<'_, PyDict>) -> PyResult<AnyProblem> {
+    fn rebuilt<P: Stated>(problem: &P, parts: &Bound<'_, PyDict>) -> PyResult<P> {
+        let old = problem.parts();
+        let mut given = Given::over(parts, &old);
+        let made = P::from_parts(&mut given);
+        given.made(made, &letters(P::PARTS))
+    }
+    match problem {
+        AnyProblem::Friction(friction) => {
+            let mut other = friction.clone();
+            contact::change(&mut other, parts)?;
+            Ok(other.into())
+        }
+        AnyProblem::Complementarity(Complementarity::Mcp(p)) if p.F.expressions().is_none() => {
+            let (mut given, mut other) = (Given::new(parts), p.clone());
+            put(&mut given, "lower", &mut other.lower)?;
+            put(&mut given, "upper", &mut other.upper)?;
+            put(&mut given, "start", &mut other.start)?;
+            let valid = other.validate();
+            given.made(valid, &["lower", "upper", "start"])?;
+            Ok(other.into())
+        }
+        AnyProblem::Complementarity(Complementarity::Vi(p)) if p.F.expressions().is_none() => {
+            let (mut given, mut other) = (Given::new(parts), p.clone());
+            put(&mut given, "start", &mut other.start)?;
+            if let Some(set) = given.get("set")? {
+                other.set = crate::parts::set("set", &set)?;
+            }
+            let valid = other.validate();
+            given.made(valid, &["set", "start"])?;
+            Ok(other.into())
+        }
+        AnyProblem::Complementarity(stated) => {
+            with_complementarity!(stated, p => rebuilt(p, parts).map(Into::into))
+        }
+    }
+}
+
+#[pymethods]
+impl Problem {
+    /// A problem of a kind that is stated by parts.
+    #[staticmethod]
+    fn stated(kind: &str, parts: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let faults = Arc::new(Faults::default());
+        Ok(Self::new(ProblemFile::new(stated(kind, parts, &faults)?), faults))
+    }
+
+    /// A problem of contacts.
+    #[staticmethod]
+    #[pyo3(signature = (parts, dimension=None))]
+    fn friction(parts: &Bound<'_, PyDict>, dimension: Option<usize>) -> PyResult<Self> {
+        Ok(Self::new(ProblemFile::new(contact::made(parts, dimension)?), Arc::default()))
+    }
+
+    /// The problem in a file of any format.
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let file = py.detach(|| ProblemFile::read(path)).map_err(mistake)?;
+        Ok(Self::new(file, Arc::default()))
+    }
+
+    /// Writes the problem, with a solution if there is one, in the format of the extension.
+    #[pyo3(signature = (path, answer=None))]
+    fn save(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        answer: Option<&Bound<'_, crate::solve::Answer>>,
+    ) -> PyResult<()> {
+        let mut file = (*self.file()).clone();
+        if let Some(answer) = answer {
+            let answer = &answer.get().answer;
+            file.problem.validate_point(&answer.point).map_err(mistake)?;
+            let partner = answer.verdict.velocity.clone();
+            let stored = StoredPoint::new(&file.problem, answer.point.clone(), partner);
+            file.solution =
+                Some(StoredPoint { statuses: answer.verdict.statuses.clone(), ..stored });
+        }
+        py.detach(|| file.write(path)).map_err(mistake)
+    }
+
+    /// Puts other parts in the place of those that are there. The session that is kept goes on.
+    fn update(&self, parts: &Bound<'_, PyDict>) -> PyResult<()> {
+        let old = self.file();
+        let problem = changed(&old.problem, parts)?;
+        let ProblemFile { info, drawing, .. } = &*old;
+        let file = ProblemFile {
+            info: info.clone(),
+            drawing: drawing.clone(),
+            ..ProblemFile::new(problem)
+        };
+        *self.file.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(file);
+        Ok(())
+    }
+
+    /// The kind's name.
+    #[getter]
+    fn kind(&self) -> &'static str {
+        self.file().problem.kind().name()
+    }
+
+    /// The number of scalar unknowns.
+    #[getter]
+    fn unknowns(&self) -> usize {
+        self.file().problem.unknowns()
+    }
+
+    /// The number of contacts; `None` where there are no contacts but pairs.
+    #[getter]
+    fn contacts(&self) -> Option<usize> {
+        match &self.file().problem {
+            AnyProblem::Friction(friction) => Some(friction.contacts()),
+            AnyProblem::Complementarity(_) => None,
+        }
+    }
+
+    /// The components of a contact; 1 of pairs.
+    #[getter]
+    fn dimension(&self) -> usize {
+        self.file().problem.kind().dimension()
+    }
+
+    /// The title in the file.
+    #[getter]
+    fn title(&self) -> Option<String> {
+        self.file().info.title.clone()
+    }
+
+    /// The names of the variables.
+    #[getter]
+    fn names(&self) -> Vec<String> {
+        self.file().info.names.clone()
+    }
+
+    /// The size in words.
+    #[getter]
+    fn size(&self) -> String {
+        match &self.file().problem {
+            AnyProblem::Friction(p) => nonsmooth_problem::plural(p.contacts(), "contact"),
+            AnyProblem::Complementarity(stated) => with_complementarity!(stated, p => p.size()),
+        }
+    }
+
+    /// The names of the parts.
+    fn letters(&self) -> Vec<&'static str> {
+        shown(&self.file().problem).into_iter().map(|(name, _)| name).collect()
+    }
+
+    /// A part by its name: an array, a number, texts, or the arrays of a sparse matrix; `None` where there is none.
+    fn part<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let file = self.file();
+        let part = shown(&file.problem).into_iter().find(|(letter, _)| *letter == name);
+        part.map(|(_, part)| part.to_python(py)).transpose()
+    }
+
+    /// The parts of the solution that the file has.
+    fn solution<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let file = self.file();
+        let Some(stored) = &file.solution else { return Ok(None) };
+        let partner = stored.partner.clone();
+        let partner = partner.unwrap_or_else(|| file.problem.partner(&stored.point));
+        crate::solve::arrays(py, file.problem.point_parts(&stored.point, &partner)).map(Some)
+    }
+
+    /// The residuals of a point, by the judge.
+    fn judge<'py>(
+        &self,
+        py: Python<'py>,
+        point: &Bound<'py, PyAny>,
+        tolerance: f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        use nonsmooth_problem::check::Judged;
+        let file = self.file();
+        let point = self::point(&file.problem, point)?;
+        let verdict = py.detach(|| file.problem.judge(&point, tolerance)).map_err(mistake)?;
+        Ok(pythonize::pythonize(py, &verdict)?)
+    }
+}
+
+/// A point of the problem: of an answer, of its parts by their names, or of the array that it is made of: z or x, of contacts the impulses r.
+pub fn point(problem: &AnyProblem, given: &Bound<'_, PyAny>) -> PyResult<AnyPoint> {
+    fn by_parts<P: Stated>(_: &P, parts: &Bound<'_, PyDict>) -> PyResult<AnyPoint> {
+        let point = P::point_from_parts(|name| match parts.get_item(name)? {
+            Some(given) => numbers::vector(name, &given),
+            None => Err(expected(name, "this part of a point", "nothing")),
+        })?;
+        Ok(point.into())
+    }
+    const PLACE: &str = "warm_start";
+    if let Ok(answer) = given.cast::<crate::solve::Answer>() {
+        return Ok(answer.get().answer.point.clone());
+    }
+    let mut origin = problem.origin();
+    let parts = given.cast::<PyDict>().ok();
+    let part = |name: &str, into: &mut Vec<f64>| -> PyResult<()> {
+        let found = match parts {
+            Some(parts) => parts.get_item(name)?,
+            None => Some(given.clone()).filter(|_| name == "r"),
+        };
+        if let Some(found) = found {
+            *into = numbers::by_contact(if parts.is_some() { name } else { PLACE }, &found)?.0;
+        }
+        Ok(())
+    };
+    match (problem, &mut origin) {
+        (_, AnyPoint::Local(point)) => {
+            part("r", &mut point.r)?;
+            part("l", &mut point.lambda)?;
+        }
+        (_, AnyPoint::Global(point)) => {
+            part("r", &mut point.r)?;
+            part("v", &mut point.v)?;
+            part("l", &mut point.lambda)?;
+        }
+        (AnyProblem::Complementarity(stated), point) => match parts {
+            Some(parts) => *point = with_complementarity!(stated, p => by_parts(p, parts))?,
+            None => {
+                let all = numbers::vector(PLACE, given)?;
+                if all.len() != problem.unknowns() {
+                    let what = format!("{} numbers", problem.unknowns());
+                    return Err(expected(PLACE, &what, all.len()));
+                }
+                *point = problem.assembled(&all);
+            }
+        },
+        (AnyProblem::Friction(_), _) => {}
+    }
+    Ok(origin)
+}

@@ -1,0 +1,122 @@
+"""Functions of Python in problems: values, Jacobians, patterns, exceptions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+import nonsmooth as ns
+
+
+def josephy(x):
+    a, b, c, d = x
+    return [
+        3 * a * a + 2 * a * b + 2 * b * b + c + 3 * d - 6,
+        2 * a * a + a + b * b + 3 * c + 2 * d - 2,
+        3 * a * a + a * b + 2 * b * b + 2 * c + 3 * d - 1,
+        a * a + 3 * b * b + 2 * c + 3 * d - 3,
+    ]
+
+
+def jacobian(x):
+    a, b, c, d = x
+    return np.array(
+        [
+            [6 * a + 2 * b, 2 * a + 4 * b, 1, 3],
+            [4 * a + 1, 2 * b, 3, 2],
+            [6 * a + b, a + 4 * b, 2, 3],
+            [2 * a, 6 * b, 2, 3],
+        ]
+    )
+
+
+@pytest.mark.parametrize(
+    "jac",
+    [None, jacobian, lambda x: sp.csr_matrix(jacobian(x)), lambda x: jacobian(x).tolist()],
+)
+def test_josephys_problem(jac):
+    x0 = [1.0, 0.5, 0.5, 0.5]
+    answer = ns.solve(ns.MCP(josephy, x0, jac=jac)).raise_if_unsolved()
+    F = np.array(josephy(answer.x))
+    assert (F > -1e-6).all() and (answer.x > -1e-6).all() and abs(F @ answer.x) < 1e-6
+    np.testing.assert_allclose(answer.F, F, atol=1e-9)
+
+
+def test_patterns():
+    n = 50
+    # −x'' + x³ = 1 with 0 ≤ x
+    L = sp.diags([-np.ones(n - 1), 2 * np.ones(n), -np.ones(n - 1)], [-1, 0, 1]).tocsr() * n**2
+    calls = []
+
+    def F(x):
+        calls.append(1)
+        return L @ x + x**3 - 1
+
+    by_differences = ns.MCP(F, np.zeros(n), pattern=L)
+    x = ns.solve(by_differences).raise_if_unsolved().x
+    # Three colours, not n columns.
+    assert len(calls) < 400
+    exact = ns.MCP(F, np.zeros(n), jac=lambda x: L + sp.diags(3 * x**2))
+    np.testing.assert_allclose(ns.solve(exact).raise_if_unsolved().x, x, atol=1e-7)
+
+
+def test_a_jacobian_of_the_wrong_pattern_is_refused():
+    with pytest.raises(ns.Error, match=r"jac\(x\)\[0, 1\]: expected zero, as the pattern says"):
+        ns.MCP(lambda x: x, [1.0, 1.0], jac=lambda x: np.ones((2, 2)), pattern=np.eye(2))
+    with pytest.raises(ns.Error, match=r"jac\(x\): expected 2 × 2"):
+        ns.MCP(lambda x: x, [1.0, 1.0], jac=lambda x: np.ones((2, 3)))
+    with pytest.raises(ns.Error, match="pattern: expected 2 × 2"):
+        ns.MCP(lambda x: x, [1.0, 1.0], pattern=np.eye(3))
+    with pytest.raises(ns.Error):
+        ns.MCP(lambda x: x, [1.0, 1.0], jac=lambda x: [[1.0, float("nan")], [0, "x"]])
+
+
+@pytest.mark.parametrize("n", [2, 400])
+def test_what_a_function_raises_is_raised(n):
+    failing = False
+
+    def F(x):
+        if failing:
+            raise ZeroDivisionError("by nothing")
+        return x**2 - 2
+
+    problem = ns.MCP(F, np.ones(n), jac=lambda x: sp.diags(2 * x).tocsr())
+    failing = True
+    with pytest.raises(ZeroDivisionError, match="by nothing"):
+        ns.solve(problem)
+    # The problem is whole all the same.
+    failing = False
+    assert ns.solve(problem).solved
+
+
+def test_functions_of_no_use_are_refused_at_once():
+    with pytest.raises(ns.Error, match=r"F\(x\): expected 2 values, found 1"):
+        ns.MCP(lambda x: [1.0], [1.0, 1.0])
+    with pytest.raises(ns.Error, match=r"F\(x\): expected an array of real numbers"):
+        ns.MCP(lambda x: ["a", "b"], [1.0, 1.0])
+    with pytest.raises(ns.Error, match=r"F\(x\)"):
+        ns.MCP(lambda x: None, [1.0])
+    with pytest.raises(TypeError):
+        ns.MCP(lambda: [1.0], [1.0])
+    with pytest.raises(ns.Error, match="x0: expected where to begin"):
+        ns.MCP(lambda x: x)
+    with pytest.raises(ns.Error, match="jac: expected a function"):
+        ns.MCP(lambda x: x, [1.0], jac=np.eye(1))
+    with pytest.raises(ns.Error, match=r"x0\[1\]: expected a finite number, found inf"):
+        ns.MCP(lambda x: x, [1.0, np.inf])
+
+
+def test_a_function_may_be_undefined_somewhere():
+    problem = ns.MCP(lambda x: np.log(x) - 1 if x[0] > 0 else [np.nan], [0.5], lower=-np.inf)
+    with np.errstate(invalid="ignore"):
+        assert ns.solve(problem).x == pytest.approx([np.e])
+
+
+def test_a_function_may_solve_a_problem():
+    def F(x):
+        inner = ns.solve(ns.LCP(np.eye(1), [-x[0]]))
+        return inner.z - 2
+
+    # With a pattern nobody looks for one with NaN.
+    assert ns.solve(ns.MCP(F, [1.0], pattern=[[1]])).x == pytest.approx([2.0])

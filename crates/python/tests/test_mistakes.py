@@ -1,0 +1,139 @@
+"""Bad input gets an exception with one clear sentence, whatever it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+import nonsmooth as ns
+
+EYE = np.eye(3)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: ns.LCP(EYE, [1.0, 2.0]), "q: expected 3"),
+        (lambda: ns.LCP(EYE[:2], [1.0, 2.0]), "M: expected 2 × 2"),
+        (lambda: ns.LCP(EYE, [1.0, np.nan, 0.0]), r"q\[1\]: expected a finite number, found NaN"),
+        (lambda: ns.LCP(np.full((3, 3), np.inf), [1.0, 1.0, 0.0]), r"M\[0, 0\]"),
+        (lambda: ns.LCP(EYE + 1j, [1.0, 1.0, 0.0]), "M: expected an array of real numbers, found complex128"),
+        (lambda: ns.LCP([["a"]], [1.0]), "M: expected an array of real numbers"),
+        (lambda: ns.LCP([[1.0], [1.0, 2.0]], [1.0]), "M: expected an array of real numbers"),
+        (lambda: ns.LCP(EYE, None), "q: expected this part, found nothing"),
+        (lambda: ns.LCP(EYE, 1.0), "q: expected an array of one dimension, found a number"),
+        (lambda: ns.LCP(EYE, EYE), "q: expected an array of one dimension, found an array of 3 × 3"),
+        (lambda: ns.LCP([], []), "M: expected a matrix, found an array of 0"),
+        (lambda: ns.LCP(np.zeros((0, 0)), []), "M: expected at least one row, found none"),
+        (lambda: ns.LCP(object(), [1.0]), "M: expected an array of real numbers, found object"),
+        (lambda: ns.Friction(W=EYE, q=[1, 2, 3], mu=-0.1), "mu"),
+        (lambda: ns.Friction(W=EYE, q=[1, 2, 3], mu=[0.1] * 2), "q: expected 2 or 3 components"),
+        (lambda: ns.Friction(W=EYE[:2], q=[1, 2, 3], mu=0.1), "W: expected rows and columns by 3"),
+        (lambda: ns.Friction(W=np.eye(6), q=[1, 2, 3], mu=0.1), "W: expected 3 × 3"),
+        (lambda: ns.Friction(W=EYE, q=[1, 2, 3]), "mu: expected this part"),
+        (lambda: ns.Friction(W=EYE, mu=0.3), "q: expected this part, found nothing"),
+        (lambda: ns.Friction(W=EYE, M=EYE, q=[1, 2, 3], mu=0.1), "Friction: expected W, q and mu, or"),
+        (lambda: ns.Friction(W=EYE, q=[1, 2, 3], mu=0.1, b=[1.0]), "b: expected one of the parts"),
+        (lambda: ns.Friction(W=EYE, q=[1, 2, 3], mu=0.1, lower=0), "lower: expected a problem with scalar rows"),
+        (lambda: ns.Friction(), "M: expected this part, found nothing"),
+        (lambda: ns.Friction(W=EYE, q=[[[1]]], mu=0.1), "q: expected an array of one dimension, or"),
+        (lambda: ns.MLCP(EYE, [1.0] * 3, free=-1), "free: expected a whole number of at least 0, found -1"),
+        (lambda: ns.MLCP(EYE, [1.0] * 3, free=1, A=EYE), "expected either M, q and free, or"),
+        (lambda: ns.BoxLCP(EYE, [1.0] * 3, [1] * 3, [0] * 3), "expected"),
+        (lambda: ns.VI(["x1"], "disk"), "set: expected a set"),
+        (lambda: ns.VI(["x1"], ns.Ball([0.0], -1.0)), "radius"),
+        (lambda: ns.MCP(["x1 +"], [1.0]), "F"),
+        (lambda: ns.MCP([1.0], [1.0]), "F: expected a function, or a list of expressions"),
+    ],
+)
+def test_mistakes_are_one_sentence(make, said):
+    with pytest.raises(ns.Error, match=said) as caught:
+        make()
+    assert "\n" not in str(caught.value) and isinstance(caught.value, ValueError)
+
+
+def test_damaged_sparse_matrices_are_refused():
+    for damage in ("indptr", "indices", "data", "order"):
+        matrix = sp.csr_matrix(EYE)
+        if damage == "indptr":
+            matrix.indptr = np.array([0, 2, 1, 3], dtype=np.int32)
+        elif damage == "indices":
+            matrix.indices = np.array([0, 7, 2], dtype=np.int32)
+        elif damage == "data":
+            matrix.data = np.ones(2)
+        else:
+            matrix.indices = np.array([0, -1, 2], dtype=np.int32)
+        with pytest.raises(ns.Error, match="M"):
+            ns.LCP(matrix, np.ones(3))
+
+
+def test_wrong_objects_are_refused(tmp_path):
+    with pytest.raises((TypeError, AttributeError)):
+        ns.solve("a problem")
+    with pytest.raises(TypeError):
+        ns.read(3)
+    with pytest.raises(TypeError):
+        ns.solve(ns.LCP(EYE, np.ones(3)), tol="small")
+
+
+kinds = hnp.scalar_dtypes()
+arrays = hnp.arrays(
+    dtype=kinds | st.just(np.dtype(float)),
+    shape=hnp.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=4),
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(m=arrays, q=arrays)
+def test_any_arrays_give_a_problem_or_an_error(m, q):
+    try:
+        problem = ns.LCP(m, q)
+    except ns.Error as error:
+        assert "expected" in str(error) and "\n" not in str(error)
+        return
+    assert m.ndim == 2 and m.shape[0] == m.shape[1] == q.size
+    assert np.isfinite(problem.M).all() and np.isfinite(problem.q).all()
+    np.testing.assert_array_equal(problem.M, m.astype(float))
+
+
+@settings(max_examples=200, deadline=None)
+@given(w=arrays, q=arrays, mu=arrays)
+def test_any_arrays_give_contacts_or_an_error(w, q, mu):
+    try:
+        problem = ns.Friction(W=w, q=q, mu=mu)
+    except ns.Error as error:
+        assert "expected" in str(error) and "\n" not in str(error)
+        return
+    assert problem.unknowns == q.size and (problem.mu >= 0).all()
+
+
+# Entries of 1e-300 beside others of 1 are solved, but nothing says that all solvers do.
+numbers = st.integers(-2000, 2000).map(lambda k: k / 1000)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    n=st.integers(1, 6),
+    data=st.data(),
+    layout=st.sampled_from(["C", "F", "strided", "csr", "csc", "coo"]),
+)
+def test_layouts_do_not_matter(n, data, layout):
+    m = data.draw(hnp.arrays(float, (n, n), elements=numbers)) + 2 * n * np.eye(n)
+    q = data.draw(hnp.arrays(float, n, elements=numbers))
+    if layout == "strided":
+        big = np.zeros((2 * n, 3 * n))
+        big[::2, ::3] = m
+        given_m = big[::2, ::3]
+    elif layout in "CF":
+        given_m = np.array(m, order=layout)
+    else:
+        given_m = sp.csr_matrix(m).asformat(layout)
+    answer = ns.solve(ns.LCP(given_m, q))
+    reference = ns.solve(ns.LCP(m, q))
+    assert answer.solved and reference.solved
+    # M is strictly diagonally dominant: one solution.
+    np.testing.assert_allclose(answer.z, reference.z, atol=1e-6)

@@ -1,0 +1,207 @@
+"""Problems in and out: shapes, types, sparse matrices, files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from conftest import local, spd
+
+import nonsmooth as ns
+
+W = spd(6)
+Q = np.array([-1.0, 0.3, 0.1, -2.0, 0.0, 0.5])
+FORMATS = ["csr", "csc", "coo", "bsr", "dok", "lil", "dia"]
+
+
+def test_friction_local_and_its_parts():
+    problem = ns.Friction(W=W, q=Q, mu=0.4)
+    assert (problem.contacts, problem.dimension, problem.unknowns) == (2, 3, 6)
+    assert problem.kind == "friction_local_3d"
+    np.testing.assert_array_equal(problem.q, Q)
+    np.testing.assert_array_equal(problem.mu, [0.4, 0.4])
+    np.testing.assert_array_equal(problem.W.toarray(), W)
+    with pytest.raises(AttributeError, match="expected one of the parts W, q, mu, found H"):
+        problem.H
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_sparse_matrices_of_any_format_state_the_same(format):
+    matrix = sp.csr_matrix(W)
+    matrix = matrix.tobsr(blocksize=(3, 3)) if format == "bsr" else matrix.asformat(format)
+    problem = ns.Friction(W=matrix, q=Q, mu=0.4)
+    np.testing.assert_array_equal(problem.W.toarray(), W)
+    lcp = ns.LCP(matrix, Q)
+    np.testing.assert_array_equal(lcp.M.toarray(), W)
+    assert ns.solve(lcp).solved
+
+
+def test_the_sparse_arrays_of_scipy_and_long_indices_are_taken():
+    coo = sp.coo_array(W)
+    assert ns.solve(ns.LCP(coo, Q)).solved
+    csr = sp.csr_matrix(W)
+    csr.indices, csr.indptr = csr.indices.astype(np.int64), csr.indptr.astype(np.int64)
+    np.testing.assert_array_equal(ns.LCP(csr, Q).M.toarray(), W)
+
+
+def test_duplicate_and_unsorted_entries_are_added():
+    coo = sp.coo_matrix(([1.0, 2.0, 3.0], ([1, 0, 1], [1, 0, 1])), shape=(2, 2))
+    np.testing.assert_array_equal(ns.LCP(coo, [-1, -1]).M.toarray(), np.diag([2.0, 4.0]))
+
+
+@pytest.mark.parametrize("dtype", ["f4", "f8", "i4", "i8", "u1", "b1", ">f8"])
+def test_numbers_of_any_type_are_taken(dtype):
+    m = np.eye(3).astype(dtype)
+    np.testing.assert_array_equal(ns.LCP(m, [1, 2, 3]).M, np.eye(3))
+
+
+def test_layouts_are_taken():
+    m = np.asfortranarray(spd(4))
+    big = np.zeros((8, 8))
+    big[::2, ::2] = m
+    q = -np.ones(8)[::2]
+    readonly = m.copy()
+    readonly.flags.writeable = False
+    for matrix in (m, big[::2, ::2], readonly, m.tolist()):
+        np.testing.assert_array_equal(ns.LCP(matrix, q).M, m)
+
+
+def test_contacts_by_rows_and_in_the_plane():
+    problem = ns.Friction(W=np.eye(4), q=[[-1.0, 2.0], [-1.0, 0.1]], mu=[0.5, 0.5])
+    assert problem.dimension == 2
+    assert ns.Friction(W=np.eye(4), q=[-1, 2, -1, 0.1], mu=[0.5, 0.5]).dimension == 2
+    assert ns.Friction(W=np.eye(6), q=Q, mu=0.5, dimension=2).contacts == 3
+    answer = ns.solve(problem).raise_if_unsolved()
+    assert list(answer.contacts["status"]) == ["slip", "stick"]
+
+
+def test_friction_global_with_rows():
+    # Two boxes of 2 kg; a rope of the first one's fourth coordinate.
+    M = sp.diags([2.0] * 6).tocsc()
+    H = sp.identity(6, format="csr")
+    f = np.array([-2.0, 4.0, 0.0, -2.0, 0.0, 0.0])
+    problem = ns.Friction(
+        M=M, H=H, f=f, w=np.zeros(6), mu=[0.5, 0.5], G=np.eye(6)[:, 1:2], b=[0.0], lower=0.0
+    )
+    answer = ns.solve(problem).raise_if_unsolved()
+    assert answer.l.shape == (1,) and answer.v.shape == (6,)
+    np.testing.assert_allclose(problem.M @ answer.v, H @ answer.r + f + answer.l[0] * np.eye(6)[1])
+    bilateral = ns.Friction(M=M, H=H, f=f, w=np.zeros(6), mu=0.5, G=np.eye(6)[:, 1:2], b=[0.0])
+    assert abs(ns.solve(bilateral).raise_if_unsolved().v[1]) < 1e-9
+
+
+def test_rows_alone_are_a_problem():
+    problem = ns.Friction(R=[[2.0]], s=[-1.0], lower=0.0)
+    assert ns.solve(problem).raise_if_unsolved().l == pytest.approx([0.5])
+
+
+def test_complementarity_problems():
+    answer = ns.solve(ns.LCP([[2.0, 1.0], [1.0, 2.0]], [-5.0, -6.0]))
+    np.testing.assert_allclose(answer.z, [4 / 3, 7 / 3])
+    np.testing.assert_allclose(answer.w, 0, atol=1e-8)
+
+    m = ns.MLCP([[2.0, 1.0], [1.0, 2.0]], [-5.0, -6.0], free=1)
+    np.testing.assert_allclose(ns.solve(m).u, [4 / 3])
+    blocks = ns.MLCP(A=[[2.0]], C=[[1.0]], D=[[1.0]], B=[[2.0]], a=[-5.0], b=[-6.0])
+    np.testing.assert_allclose(ns.solve(blocks).v, [7 / 3])
+
+    h = ns.solve(ns.HLCP(Q=np.eye(2), R=-np.eye(2), q=[1.0, -1.0]))
+    np.testing.assert_allclose((h.x, h.s), ([1, 0], [0, 1]), atol=1e-9)
+
+    b = ns.solve(ns.BoxLCP(np.eye(2), [-5.0, 5.0], [-1, -1], [1, 1]))
+    np.testing.assert_allclose(b.z, [1, -1])
+
+
+def test_expressions_and_variational_inequalities():
+    mcp = ns.MCP(["x1^2 - 2"], x0=[1.0])
+    np.testing.assert_allclose(ns.solve(mcp).x, [2**0.5])
+    disk = ns.VI(["x1 - 3", "x2 - 4"], ns.Ball([0.0, 0.0], 1.0), [0.0, 0.0])
+    np.testing.assert_allclose(ns.solve(disk).x, [0.6, 0.8], atol=1e-7)
+    sets = ns.Product([ns.Box([0.0], [1.0]), ns.SecondOrderCone(2), ns.Polyhedron([[1.0]], [2.0])])
+    f = ns.VI(lambda x: x - 5, sets, np.zeros(4))
+    np.testing.assert_allclose(ns.solve(f).x, [1, 5, 5, 2], atol=1e-6)
+
+
+def test_update_keeps_the_problem_and_the_session():
+    problem = local(20)
+    first = ns.solve(problem)
+    q = problem.q * 0.5
+    problem.update(q=q)
+    second = ns.solve(problem)
+    assert second.solved
+    # Impulses are homogeneous in q.
+    np.testing.assert_allclose(second.r, first.r / 2, atol=1e-7)
+    np.testing.assert_array_equal(first._native.parts()["r"], first.r)
+    with pytest.raises(ns.Error, match="q: expected 60 entries"):
+        problem.update(q=[1.0])
+    with pytest.raises(ns.Error, match="expected one of the parts"):
+        problem.update(nonsense=1.0)
+    np.testing.assert_array_equal(problem.q, q)
+    lcp = ns.LCP(np.eye(2), [-1.0, -2.0])
+    lcp.update(q=[-3.0, 1.0])
+    np.testing.assert_allclose(ns.solve(lcp).z, [3, 0])
+    mcp = ns.MCP(lambda x: x - 2, [0.0])
+    mcp.update(upper=[1.0])
+    np.testing.assert_allclose(ns.solve(mcp).x, [1.0])
+
+
+def test_files_of_contacts(tmp_path):
+    problem = local(3)
+    answer = ns.solve(problem)
+    problem.save(tmp_path / "p.hdf5", answer)
+    again = ns.read(tmp_path / "p.hdf5")
+    assert isinstance(again, ns.Friction) and repr(again).startswith("<Friction")
+    np.testing.assert_array_equal(again.q, problem.q)
+    np.testing.assert_array_equal(again.solution["r"], answer.r)
+    problem.save(tmp_path / "p.csv", answer)
+    assert (tmp_path / "p.csv").read_text().startswith("contact,status,r_n,r_t1")
+
+
+@pytest.mark.parametrize("name", ["p.toml", "p.mtx"])
+def test_files_of_complementarity(tmp_path, name):
+    problem = ns.LCP(sp.csc_matrix(spd(4)), -np.ones(4))
+    problem.save(tmp_path / name)
+    again = ns.read(tmp_path / name)
+    assert isinstance(again, ns.LCP)
+    np.testing.assert_array_equal(again.M.toarray(), problem.M.toarray())
+
+
+def test_models_of_ampl(tmp_path):
+    problem = ns.MCP(["x1^2 + x2 - 2", "x2 - x1"], x0=[1.0, 1.0])
+    problem.save(tmp_path / "m.nl")
+    again = ns.MCP.from_nl(tmp_path / "m.nl")
+    np.testing.assert_allclose(ns.solve(again).x, ns.solve(problem).x)
+    local(1).save(tmp_path / "c.hdf5")
+    with pytest.raises(ns.Error, match="expected a problem mcp, found friction_local_3d"):
+        ns.MCP.from_nl(tmp_path / "c.hdf5")
+
+
+def test_mistakes_in_files_say_place_expected_and_found(tmp_path):
+    with pytest.raises(ns.Error, match="nothing.toml"):
+        ns.read(tmp_path / "nothing.toml")
+    (tmp_path / "bad.toml").write_text("kind = 'lcp'\nq = [1, 'x']\n")
+    with pytest.raises(ns.Error, match="bad.toml"):
+        ns.read(tmp_path / "bad.toml")
+    with pytest.raises(ns.Error, match="unknown.xyz"):
+        local(1).save(tmp_path / "unknown.xyz")
+
+
+def test_the_kinds_of_the_library_have_classes():
+    kinds = {kind["kind"] for kind in ns._nonsmooth.kinds()}
+    classes = {cls._kind: cls for cls in (ns.LCP, ns.MLCP, ns.HLCP, ns.BoxLCP, ns.MCP, ns.VI)}
+    assert kinds == set(classes)
+
+
+def test_pictures_in_notebooks(box):
+    assert "mu" in box._repr_html_() and "<table>" in box._repr_html_()
+    answer = ns.solve(box)
+    assert "solved" in answer._repr_html_()
+    assert "0 <= z" in ns.LCP(np.eye(2), [1, 1])._repr_html_().replace("&lt;", "<")
+
+
+def test_plots(box):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    assert len(ns.solve(box).plot().axes) == 3
+    assert len(ns.solve(ns.LCP(np.eye(2), [-1.0, 1.0])).plot().axes) == 1
+    assert "W, 3 × 3" in box.spy().get_title()

@@ -1,0 +1,161 @@
+"""Worlds in motion."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import signal
+import threading
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+EXAMPLES = pathlib.Path(__file__).parents[3] / "examples"
+
+
+def ball(e=0.0, mu=0.3, height=1.1, **table):
+    world = ns.World()
+    world.plane()
+    world.pair("default", mu=mu, e=e)
+    world.sphere(0.1, density=1000, position=[0, 0, height], name="ball", **table)
+    return world
+
+
+def test_a_ball_falls_as_by_hand():
+    simulation = ns.Simulation(ball(), h=1e-3)
+    run = simulation.run(0.4, every=10)
+    assert run.solved and run.bodies == ["body0", "ball"] and len(run.t) == 41
+    assert run.position.shape == (41, 2, 3) and run.rotation.shape == (41, 2, 4)
+    g = 9.81
+    np.testing.assert_allclose(run.position[:, 1, 2], 1.1 - g * run.t**2 / 2, atol=1e-9)
+    np.testing.assert_allclose(run.velocity[:, 1, 2], -g * run.t, atol=1e-9)
+    np.testing.assert_array_equal(simulation.position, run.position[-1])
+    # The same memory each time: no copies.
+    assert run.position is run.position and run.energy["kinetic"] is run.energy["kinetic"]
+    assert len(run.energy["kinetic"]) == 400 and np.abs(run.energy["imbalance"]).max() < 1e-10
+
+
+def test_a_sliding_ball_comes_to_roll_and_a_run_goes_on():
+    simulation = ns.Simulation(ball(height=0.1, velocity=[1, 0, 0]), h=1e-3)
+    first = simulation.run(0.05)
+    assert first.contacts()["status"].tolist() == ["slip"]
+    run = simulation.run(1.0)
+    assert simulation.t == pytest.approx(1.0) and run.solved
+    # 5/7 of the velocity is left.
+    assert simulation.velocity[1, 0] == pytest.approx(5 / 7, rel=1e-3)
+    contacts = run.contacts()
+    assert contacts["status"].tolist() == ["stick"] and contacts["r"].shape == (1, 3)
+    np.testing.assert_allclose(contacts["normal"], [[0, 0, 1]])
+    assert simulation.problem().contacts == 1
+
+
+def test_callbacks_see_and_end():
+    simulation, seen = ns.Simulation(ball(), h=1e-3), []
+
+    def watch(step):
+        seen.append((step.number, step.t, step.status, step.position[1, 2]))
+        return step.number == 7
+
+    run = simulation.run(1.0, on_step=watch)
+    assert run.stopped and not run.solved and [s[0] for s in seen] == list(range(1, 8))
+    assert seen[0][2] == "solved" and simulation.t == pytest.approx(7e-3)
+
+    def fails(step):
+        raise LookupError("mine")
+
+    with pytest.raises(LookupError, match="mine"):
+        simulation.run(1.0, on_step=fails)
+    with pytest.raises(ns.Error, match="one that is not running"):
+        simulation.run(1.0, on_step=lambda step: simulation.run(2.0))
+    assert simulation.run(0.1).solved
+
+
+def test_ctrl_c_ends_a_run():
+    simulation = ns.Simulation(ball(), h=1e-6)
+    threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        simulation.run(1e6, every=10**6)
+    assert simulation.t > 0
+
+
+def test_a_pendulum_has_its_period():
+    world = ns.World()
+    bob = world.sphere(0.01, mass=1.0, inertia=[1e-6, 1e-6, 1e-6], position=[0.01, 0, -1.0])
+    world.revolute("world", bob, anchor=[0, 0, 0], axis=[0, 1, 0])
+    run = ns.Simulation(world, h=1e-3).run(4.1)
+    x = run.position[:, 0, 0]
+    crossings = run.t[1:][(x[:-1] > 0) & (x[1:] <= 0)]
+    assert np.diff(crossings)[0] == pytest.approx(2 * np.pi / 9.81**0.5, rel=2e-3)
+
+
+def test_scenes_of_files_and_robots(tmp_path):
+    scenes = sorted((EXAMPLES / "scenes").glob("*.toml"))
+    assert scenes
+    world = ns.load(scenes[0])
+    assert ns.simulate(world, until=world.document["time"]["h"] * 3).solved
+    robots = sorted((EXAMPLES / "robots").glob("*.urdf"))
+    assert robots and ns.load(robots[0]).document["bodies"]
+    world = ball()
+    world.save(tmp_path / "scene.toml")
+    world.save(tmp_path / "scene.json")
+    for name in ("scene.toml", "scene.json"):
+        run = ns.simulate(tmp_path / name, until=0.01)
+        assert run.solved and run.bodies == ["body0", "ball"]
+
+
+def test_families(tmp_path):
+    world = ns.World()
+    world.generate("wall", rows=2, columns=2)
+    run = ns.simulate(world, until=0.01, solver=ns.Nsgs(), tol=1e-8)
+    assert run.solved and len(run.bodies) > 4
+
+
+def test_what_is_written_and_shown(tmp_path):
+    run = ns.simulate(ball(), until=0.02)
+    for name, begins in {
+        "r.h5": b"\x89HDF",
+        "r.csv": b"step,t",
+        "r.html": b"<!",
+        "r.glb": b"glTF",
+        "r.pvd": b"<",
+    }.items():
+        run.save(tmp_path / name)
+        assert (tmp_path / name).read_bytes().startswith(begins), name
+    assert "<svg" in run.draw()._repr_svg_() and "<svg" in ns.draw(ball())._repr_svg_()
+    assert "<iframe" in run._repr_html_() and "<svg" in ball()._repr_html_()
+    pytest.importorskip("matplotlib").use("Agg")
+    assert run.plot().get_xlabel() == "t (s)"
+    with pytest.raises(ns.Error, match="ends in .h5, .pvd or .glb"):
+        run.save(tmp_path / "r.doc")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda w: w.sphere(-1.0, density=1), r"bodies\[2\]"),
+        (lambda w: w.sphere(1.0, densty=1), "did you mean `density`"),
+        (lambda w: w.sphere(float("nan"), density=1), "scene: expected finite numbers"),
+        (lambda w: w.sphere(object(), density=1), "scene: expected numbers, words and lists"),
+        (lambda w: w.sphere(0.1, density=1, position=[0, 0, 1.15]), "overlap|penetrate|apart"),
+        (lambda w: w.joint("hinge", "world", "ball"), "revolute"),
+        (lambda w: w.revolute("world", "bal", anchor=[0] * 3, axis=[0, 0, 1]), "bal"),
+        (lambda w: w.pair("a", "b", mu=-1.0), "mu|a"),
+    ],
+)
+def test_mistakes_in_worlds_are_one_sentence(change, said):
+    world = ball()
+    change(world)
+    with pytest.raises(ns.Error, match=said):
+        ns.Simulation(world)
+
+
+def test_steps_that_are_none_are_refused():
+    simulation = ns.Simulation(ball())
+    with pytest.raises(ns.Error, match="every"):
+        simulation.run(1.0, every=0)
+    with pytest.raises(ns.Error, match="h: expected a positive number"):
+        ns.Simulation(ball(), h=-1.0).run(1.0)
+    with pytest.raises(ns.Error, match="until"):
+        simulation.run(float("inf"))
