@@ -82,7 +82,7 @@ def main(program, paths):
             )
         print(f"{path.name}: {len(a)} bodies, largest difference {off:.1e}")
         worst = max(worst, off)
-    sys.exit(worst > TOLERANCE)
+    sys.exit(int(worst > TOLERANCE))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-//! What <compiler> and <option> say: units, orders of turning, and which numbers follow from which.
+//! What `compiler` and `option` say: units, orders of turning, and which numbers follow from which.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ pub(super) struct Compiler {
     pub angle: f64,
     euler: [(usize, bool); 3],
     pub autolimits: bool,
-    /// Whether masses follow from geoms: always, never, or where there is no <inertial>.
+    /// Whether masses follow from geoms: always, never, or where there is no `inertial`.
     pub from_geoms: Option<bool>,
     /// The groups of geoms that have a mass.
     pub groups: [i64; 2],

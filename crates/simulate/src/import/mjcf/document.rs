@@ -188,7 +188,7 @@ impl Defaults {
         Ok(Item { element, defaults: [tags.get(tag), general] })
     }
 
-    /// The same of an equality, whose tag <joint> would be that of a joint of a body.
+    /// The same of an equality, whose tag `joint` would be that of a joint of a body.
     pub fn equality<'a>(&'a self, element: &'a Element) -> Result<Item<'a>, SimulateError> {
         let item = self.item(element, MAIN)?;
         let class = element.attributes.get("class").map_or(MAIN, String::as_str);

@@ -246,7 +246,7 @@ impl Rest<'_, '_> {
         }
     }
 
-    /// <connect> and <weld>: a ball joint, and a fixed one.
+    /// `connect` and `weld`: a ball joint, and a fixed one.
     fn bodies(&mut self, item: &Item, kind: &str) -> Result<(), SimulateError> {
         let numbers = self.tree.numbers();
         let body = |name: &str, other: Option<usize>| {
@@ -307,7 +307,7 @@ impl Rest<'_, '_> {
         (2..).map(|k| format!("{name} {k}")).find(|n| !taken(n)).unwrap_or(name)
     }
 
-    /// <joint>: a coordinate that follows another, or stays.
+    /// `joint`: a coordinate that follows another, or stays.
     fn joints(&mut self, item: &Item, compiler: &Compiler) -> Result<(), SimulateError> {
         let mut poly = item.numbers("polycoef")?.unwrap_or(vec![0.0, 1.0]);
         poly.resize(5, 0.0);

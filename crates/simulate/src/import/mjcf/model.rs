@@ -21,7 +21,7 @@ pub(super) struct Body<'a> {
     place: Frame,
     pub joints: Vec<Joint<'a>>,
     pub geoms: Vec<Geom<'a>>,
-    /// In its own frame, of <inertial> or its geoms.
+    /// In its own frame, of `inertial` or its geoms.
     pub masses: Vec<MassProperties>,
     /// In the frame of the world at the beginning, and where all joints are at their reference.
     pub at: Frame,
@@ -112,7 +112,7 @@ pub(super) struct Tree<'a> {
 #[derive(Clone)]
 struct Place {
     body: usize,
-    /// Of a <frame> in the body.
+    /// Of a `frame` in the body.
     frame: Frame,
     class: String,
 }
@@ -379,7 +379,7 @@ fn quaternion(joint: &Joint, q: [f64; 4]) -> Result<Rotation, SimulateError> {
     }
 }
 
-/// <inertial>, in the frame of its body.
+/// `inertial`, in the frame of its body.
 fn own_mass(item: &Item, compiler: &Compiler) -> Result<MassProperties, SimulateError> {
     let at = compiler.frame(item)?;
     let Some([mass]) = item.some::<1>("mass")? else {
