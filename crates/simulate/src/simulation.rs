@@ -184,7 +184,9 @@ impl Simulation {
     ) -> Result<Self, SimulateError> {
         nonsmooth_solve::registry::session::<FrictionLocal<3>>(solver, &settings)?;
         (self.solver, self.settings) = (solver.into(), settings);
+        let threads = self.tools.threads();
         self.tools = Tools::new(&self.world, &self.state)?;
+        self.tools.set_threads(threads);
         self.remember_joints();
         Ok(self)
     }
@@ -200,6 +202,13 @@ impl Simulation {
     #[must_use]
     pub fn with_limits(self, limits: Limits) -> Self {
         Self { limits, ..self }
+    }
+
+    /// With islands solved and contacts looked for by so many threads, 0 for one a core. By default there is one; the bits are the same for every number.
+    #[must_use]
+    pub fn with_threads(mut self, threads: usize) -> Self {
+        self.tools.set_threads(threads);
+        self
     }
 
     /// With one more force.
@@ -270,10 +279,9 @@ impl Simulation {
     /// Errors: those of [`step`](Self::step).
     pub fn problem(&mut self, h: f64) -> Result<Option<FrictionLocal<3>>, SimulateError> {
         require(|| "h".into(), h, h > 0.0, "a positive number")?;
-        let Self { world, scheme, state, forces, tools, solver, settings, limits, .. } = self;
+        let Self { world, scheme, state, forces, tools, .. } = self;
         let axes = state.memory.axes.clone();
-        let inner = Inner { solver, settings, limits };
-        let problem = tools.problem(scheme, (world, state), forces, &inner, h);
+        let problem = tools.problem(scheme, (world, state), forces, h);
         state.memory.axes = axes;
         problem
     }
