@@ -98,9 +98,9 @@ impl Drop for Scope {
     fn drop(&mut self) {
         let before = std::mem::take(&mut self.before);
         ARMED.set(before.deadline.is_some() || before.cancel.is_some());
+        // What an outer limit cut short inside was cut short outside too; what the inner scope gave itself is its own matter.
+        RAISED.set(self.raised || (RAISED.get() && before.is_over()));
         CURRENT.set(before);
-        // What was cut short inside was cut short outside too.
-        RAISED.set(RAISED.get() || self.raised);
         REFUSED.set(REFUSED.get().or(self.refused));
     }
 }
@@ -251,6 +251,25 @@ mod tests {
         let _inner = inner.enter();
         assert!(over());
         assert_eq!(current().memory, Some(1000));
+    }
+
+    #[test]
+    fn what_an_inner_scope_gave_itself_does_not_end_the_outer_one() {
+        let past = Some(Instant::now() - Duration::from_secs(1));
+        let outer = Budget::default().enter();
+        {
+            let inner = Budget { deadline: past, ..Budget::default() }.enter();
+            assert!(over() && inner.raised());
+        }
+        assert!(!over() && !outer.raised());
+        let flag = Arc::new(AtomicBool::new(false));
+        let cancelled = Budget { cancel: Some(flag.clone()), ..Budget::default() }.enter();
+        {
+            let _inner = Budget { deadline: past, ..Budget::default() }.enter();
+            flag.store(true, Ordering::Relaxed);
+            assert!(over());
+        }
+        assert!(cancelled.raised());
     }
 
     #[test]

@@ -24,6 +24,7 @@
 //!
 //! Scenes of `nonsmooth-scenes` are worlds too: `World::try_from(&scene)`. Scenes in files are [`SceneFile`]s.
 
+mod crew;
 mod detect;
 mod drive;
 mod error;

@@ -40,9 +40,10 @@ pub(crate) struct Projected {
 }
 
 impl Projection {
-    pub fn new(world: &World, state: &State) -> Result<Self, SimulateError> {
+    pub fn new(world: &World, state: &State, threads: usize) -> Result<Self, SimulateError> {
         let rest = world.at_rest();
-        let tools = Tools::new(&rest, state)?;
+        let mut tools = Tools::new(&rest, state)?;
+        tools.set_threads(threads);
         Ok(Self { rest, tools })
     }
 

@@ -170,7 +170,8 @@ impl Simulation {
     /// Makes the projection ready where the scheme has one of contacts.
     fn projecting(&mut self) -> Result<(), SimulateError> {
         if self.scheme.stabilisation.has_contacts() && self.projection.is_none() {
-            self.projection = Some(Projection::new(&self.world, &self.state)?);
+            let threads = self.tools.threads();
+            self.projection = Some(Projection::new(&self.world, &self.state, threads)?);
         }
         Ok(())
     }
@@ -193,8 +194,10 @@ impl Simulation {
     ) -> Result<Self, SimulateError> {
         nonsmooth_solve::registry::session::<FrictionLocal<3>>(solver, &settings)?;
         (self.solver, self.settings) = (solver.into(), settings);
+        let threads = self.tools.threads();
         self.tools = Tools::new(&self.world, &self.state)?;
         self.projection = None;
+        self.tools.set_threads(threads);
         self.remember_joints();
         Ok(self)
     }
@@ -210,6 +213,13 @@ impl Simulation {
     #[must_use]
     pub fn with_limits(self, limits: Limits) -> Self {
         Self { limits, ..self }
+    }
+
+    /// With islands solved and contacts looked for by so many threads, 0 for one a core. By default there is one; the bits are the same for every number.
+    #[must_use]
+    pub fn with_threads(mut self, threads: usize) -> Self {
+        self.tools.set_threads(threads);
+        self
     }
 
     /// With one more force.
@@ -280,11 +290,10 @@ impl Simulation {
     /// Errors: those of [`step`](Self::step).
     pub fn problem(&mut self, h: f64) -> Result<Option<FrictionLocal<3>>, SimulateError> {
         require(|| "h".into(), h, h > 0.0, "a positive number")?;
-        let Self { world, scheme, state, forces, tools, solver, settings, limits, .. } = self;
+        let Self { world, scheme, state, forces, tools, .. } = self;
         let axes = state.memory.axes.clone();
         tools.insisted.clear();
-        let inner = Inner { solver, settings, limits };
-        let problem = tools.problem(scheme, (world, state), forces, &inner, h);
+        let problem = tools.problem(scheme, (world, state), forces, h);
         state.memory.axes = axes;
         problem
     }

@@ -12,9 +12,10 @@
 //! `Ω_θ · (…) = (R_k Ω_θ) · L`, so momentum and energy are exact at any h. Bodies whose inertia is isotropic have
 //! no gyroscopic torque; their velocities are taken in the world frame, where nothing has to be solved.
 //!
-//! Method: bodies move freely, contacts of the index set (`g + γ h u_N ≤ 0`) get their directions at the extrapolated midpoint, islands are solved one by one as
-//! local problems in r by a session of the project's solvers, judged by the problem's own judge. Gyroscopic torque and the frames of torques are those of the last
+//! Method: bodies move freely, contacts of the index set (`g + γ h u_N ≤ 0`) get their directions at the extrapolated midpoint, islands are solved as
+//! local problems in r by sessions of the project's solvers ([`crate::crew`]), judged by the problem's own judge. Gyroscopic torque and the frames of torques are those of the last
 //! pass; with the impulses found each body's rotation is solved exactly, and where that moves no velocity by more than the tolerance, the step is done.
+//! An island that is slow and whose contacts are new is first asked whether it may stay at rest ([`crate::crew`]): a pile that can stand stands.
 //! A persistent contact has the velocity in its law at the extrapolated end of the step. Frémond's law has `w_T = (1 − θ)/θ u_{T,k}`: u_θ in place of u⁺.
 //!
 //! References: Moreau1988 and Jean1999 for the scheme, Acary2016 for its energy, SimoWong1991 for the rotation, Acary2018 for the index set.
@@ -26,11 +27,12 @@
 use std::time::Instant;
 
 use nonsmooth_linalg::Csc;
-use nonsmooth_problem::{Bounds, FrictionLocal, LocalPoint, Problem, RowsLocal};
+use nonsmooth_problem::{Bounds, FrictionLocal, RowsLocal};
 use nonsmooth_scenes::Rotation;
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, cross, dot, norm, scale, sub};
-use nonsmooth_solve::{Limits, Session, Status, registry, settings::SettingsMap};
+use nonsmooth_solve::{Limits, Outcome, Status, settings::SettingsMap};
 
+use crate::crew::{Asked, Crew, Slot};
 use crate::detect::{Detector, Key, Near, Place};
 use crate::islands::Islands;
 use crate::joints::Joints;
@@ -56,6 +58,11 @@ struct Arm {
     /// `(p − x) × d` in the world frame, for impulses and for velocities.
     moment: [Vec3; 3],
     moment_end: [Vec3; 3],
+}
+
+/// What one side of a contact is in the problem, in the frames of a pass. Apart from the contact, for it is written later, and large.
+#[derive(Debug, Clone, Copy, Default)]
+struct Side {
     /// Velocities of the body to relative velocities, and impulses to velocities of the body.
     rows: Columns,
     solved: Columns,
@@ -90,13 +97,6 @@ struct Row {
 /// Where an island's contacts begin in the order of islands, where they end and its scalar rows begin, where these end.
 type Span = (usize, usize, usize);
 
-/// One contact problem with what solves it.
-struct Slot {
-    session: Box<dyn Session<FrictionLocal<3>>>,
-    problem: FrictionLocal<3>,
-    point: LocalPoint,
-}
-
 /// All memory of a simulation that is not its state.
 pub(crate) struct Tools {
     detector: Detector,
@@ -109,6 +109,10 @@ pub(crate) struct Tools {
     axes: Vec<u8>,
     bodies: Vec<Moving>,
     rows: Vec<Row>,
+    /// Of each row the sides.
+    sides: Vec<[Side; 2]>,
+    /// The inverse of each body's inertia, and whether that is isotropic.
+    inertias: Vec<(Mat3, bool)>,
     /// For each contact near, its row.
     row_of: Vec<u32>,
     /// Contacts that take part whatever the forecast says, sorted.
@@ -123,9 +127,14 @@ pub(crate) struct Tools {
     next: Vec<[u32; 2]>,
     /// For each contact the place of the last block of its row of W that was mirrored, at first the diagonal one.
     mirrored: Vec<u32>,
-    /// The free bodies of the island that is being solved.
+    /// The free bodies of the island that is being solved, and for each body the last island that it was gathered for, counted through all steps.
     members: Vec<u32>,
+    gathered: Vec<u64>,
+    gatherings: u64,
     slots: Vec<Slot>,
+    /// The islands that are not solved yet.
+    open: Vec<u32>,
+    crew: Crew,
     wrenches: Wrenches,
     middle: State,
     pub contacts: Vec<ContactReport>,
@@ -136,6 +145,33 @@ pub(crate) struct Inner<'a> {
     pub solver: &'a str,
     pub settings: &'a SettingsMap,
     pub limits: &'a Limits,
+}
+
+impl Inner<'_> {
+    /// Whether the solver is the one that chooses for itself.
+    fn is_auto(&self) -> bool {
+        self.solver == "auto" && self.settings.is_empty()
+    }
+}
+
+/// What the islands of a step have come to.
+struct Solved {
+    /// That of the first island that is not solved.
+    status: StepStatus,
+    passes: u32,
+    residual: f64,
+    iterations: usize,
+    /// Contacts of the largest island.
+    largest: usize,
+    /// Wall clock of the solver.
+    seconds: f64,
+}
+
+impl Default for Solved {
+    fn default() -> Self {
+        let status = StepStatus::Solved;
+        Self { status, passes: 0, residual: 0.0, iterations: 0, largest: 0, seconds: 0.0 }
+    }
 }
 
 const NONE: u32 = u32::MAX;
@@ -158,6 +194,13 @@ impl Tools {
             .collect();
         let mut joints = Joints::new(world);
         joints.redundant = joints.redundant(world, state);
+        let inertias = world.bodies.iter().map(|body| {
+            let j = &body.inertia;
+            let isotropic =
+                j[0][0] == j[1][1] && j[1][1] == j[2][2] && [j[0][1], j[0][2], j[1][2]] == [0.0; 3];
+            (if body.is_free() { inverse(j) } else { [[0.0; 3]; 3] }, isotropic)
+        });
+        let inertias = inertias.collect();
         Ok(Self {
             detector,
             sizes,
@@ -169,6 +212,8 @@ impl Tools {
             axes: vec![],
             bodies: vec![],
             rows: vec![],
+            sides: vec![],
+            inertias,
             row_of: vec![],
             insisted: vec![],
             islands: Islands::default(),
@@ -179,11 +224,25 @@ impl Tools {
             next: vec![],
             mirrored: vec![],
             members: vec![],
+            gathered: vec![0; world.bodies.len()],
+            gatherings: 0,
             slots: vec![],
+            open: vec![],
+            crew: Crew::new(1),
             wrenches: Wrenches::default(),
             middle: State { memory: Default::default(), ..state.clone() },
             contacts: vec![],
         })
+    }
+
+    /// Lets so many threads solve islands and look for contacts, 0 for one a core.
+    pub fn set_threads(&mut self, threads: usize) {
+        self.crew = Crew::new(threads);
+    }
+
+    /// How many threads were asked for.
+    pub fn threads(&self) -> usize {
+        self.crew.threads
     }
 
     /// Pairs of bodies that overlap by more than `share` of the smaller one, with the deepest penetration of each.
@@ -195,7 +254,7 @@ impl Tools {
         share: f64,
     ) -> Vec<(u32, u32, f64)> {
         let margins = vec![0.0; world.bodies.len()];
-        self.detector.detect(world, state, &margins, &mut self.near);
+        self.detector.detect(world, state, &margins, self.crew.pool(), &mut self.near);
         let mut found: Vec<(u32, u32, f64)> = vec![];
         let hard = self.near.iter().filter(|n| n.compliance.is_none());
         for n in hard.filter(|n| n.place.gap < -share * n.size) {
@@ -240,7 +299,7 @@ impl Tools {
         let mut rest = State { velocity: zero.clone(), spin: zero, ..state.clone() };
         self.start(&scheme, world, &rest, &mut [], H);
         self.margins.iter_mut().for_each(|m| *m += depth);
-        self.detector.detect(world, &mut rest, &self.margins, &mut self.near);
+        self.detector.detect(world, &mut rest, &self.margins, self.crew.pool(), &mut self.near);
         self.near.retain(|near| near.compliance.is_none());
         self.contacts(&scheme, world, &rest, H);
         self.joints.close_limits(world, H);
@@ -248,18 +307,7 @@ impl Tools {
             let row = &mut self.rows[row as usize];
             (row.mu, row.shift, row.r) = (0.0, [near.place.gap / H, 0.0, 0.0], [0.0; 3]);
         }
-        let mut first = 0;
-        let mut solved = true;
-        for k in 0..self.islands.ends.len() {
-            let end = self.islands.ends[k];
-            if self.slots.len() == k {
-                self.slots.push(Slot::new(inner)?);
-            }
-            let span = self.span(first, end);
-            let status = self.island((&scheme, world), span, k, inner, H)?.0;
-            solved &= status == StepStatus::Solved;
-            first = end;
-        }
+        let solved = self.solve((&scheme, world), inner, H)?.status == StepStatus::Solved;
         self.commit(&scheme, world, &mut rest, H, &mut StepReport::begun(state.t, H));
         let places = rest.position.iter().flatten().chain(rest.rotation.iter().flatten());
         if places.map(|x| 0.0 * x).sum::<f64>() == 0.0 {
@@ -287,30 +335,15 @@ impl Tools {
             return Ok(report);
         }
         let detecting = Instant::now();
-        self.detector.detect(world, state, &self.margins, &mut self.near);
+        self.detector.detect(world, state, &self.margins, self.crew.pool(), &mut self.near);
         timings.detection = detecting.elapsed().as_secs_f64();
         self.contacts(scheme, world, state, h);
-        let mut status = StepStatus::Solved;
-        let mut solving = 0.0;
-        let mut first = 0;
-        for k in 0..self.islands.ends.len() {
-            let end = self.islands.ends[k];
-            if self.slots.len() == k {
-                self.slots.push(Slot::new(inner)?);
-            }
-            let span = self.span(first, end);
-            let (now, passes, measure, iterations, seconds) =
-                self.island((scheme, world), span, k, inner, h)?;
-            report.newton = report.newton.max(passes);
-            report.residual = f64::max(report.residual, measure);
-            report.counts.iterations += iterations;
-            report.counts.largest = report.counts.largest.max(span.1 - first);
-            solving += seconds;
-            if status == StepStatus::Solved || now == StepStatus::NotFinite {
-                status = now;
-            }
-            first = end;
-        }
+        let solved = self.solve((scheme, world), inner, h)?;
+        report.newton = solved.passes;
+        report.residual = solved.residual;
+        report.counts.iterations = solved.iterations;
+        report.counts.largest = solved.largest;
+        let mut status = solved.status;
         let new = self.bodies.iter().flat_map(|b| [b.v_new, b.spin_new]).flatten();
         if !new.map(|x| 0.0 * x).sum::<f64>().is_finite() {
             status = StepStatus::NotFinite;
@@ -318,7 +351,7 @@ impl Tools {
         report.status = status;
         report.energy = self.energy(scheme, world, state, h);
         self.count(&mut report);
-        timings.solve = solving;
+        timings.solve = solved.seconds;
         timings.total = begun.elapsed().as_secs_f64();
         timings.assembly = timings.total - timings.solve - timings.detection;
         report.timings = timings;
@@ -331,27 +364,26 @@ impl Tools {
         scheme: &MoreauJean,
         (world, state): (&World, &mut State),
         forces: &mut [Box<dyn Force>],
-        inner: &Inner,
         h: f64,
     ) -> Result<Option<FrictionLocal<3>>, SimulateError> {
         if !self.start(scheme, world, state, forces, h) {
             return Ok(None);
         }
-        self.detector.detect(world, state, &self.margins, &mut self.near);
+        self.detector.detect(world, state, &self.margins, self.crew.pool(), &mut self.near);
         self.contacts(scheme, world, state, h);
         if self.rows.is_empty() && self.joints.rows.is_empty() {
             return Ok(None);
         }
-        if self.slots.is_empty() {
-            self.slots.push(Slot::new(inner)?);
-        }
+        self.slots_for(1)?;
         for b in &mut self.bodies {
             b.pass(scheme, h);
         }
         let (contacts, scalars) = (self.rows.len(), self.joints.rows.len());
         self.islands.order.clear();
         self.islands.order.extend(0..(contacts + scalars) as u32);
-        let all = self.span(0, contacts + scalars);
+        self.islands.ends.clear();
+        self.islands.ends.push(contacts + scalars);
+        let all = self.span(0);
         self.gather(all);
         self.columns(scheme, all);
         self.assemble(all, 0);
@@ -394,9 +426,7 @@ impl Tools {
         for (k, body) in world.bodies.iter().enumerate() {
             let start = state.pose(k);
             let free = body.is_free();
-            let j = &body.inertia;
-            let isotropic =
-                j[0][0] == j[1][1] && j[1][1] == j[2][2] && [j[0][1], j[0][2], j[1][2]] == [0.0; 3];
+            let (inverse, isotropic) = self.inertias[k];
             let weight = if free { scale(body.mass, world.gravity) } else { [0.0; 3] };
             let push = add(weight, add(body.force, self.wrenches.force[k]));
             let twist = add(body.torque, self.wrenches.torque[k]);
@@ -437,8 +467,8 @@ impl Tools {
                 free,
                 isotropic,
                 mass: body.mass,
-                inertia: *j,
-                inverse: if free { inverse(j) } else { [[0.0; 3]; 3] },
+                inertia: body.inertia,
+                inverse,
                 radius: self.reach[k].max(self.sizes[k]),
                 start,
                 v: state.velocity[k],
@@ -558,8 +588,7 @@ impl Tools {
                 let free = b.free;
                 let moment = frame.map(|d| cross(sub(place.point, b.middle.x), d));
                 let moment_end = frame_end.map(|d| cross(sub(place_end.point, x_end), d));
-                let (rows, solved) = ([[0.0; 4]; 6], [[0.0; 4]; 6]);
-                Arm { body, sign, free, moment, moment_end, rows, solved }
+                Arm { body, sign, free, moment, moment_end }
             };
             let mut arms = [arm(near.a, -1.0), arm(near.b, 1.0)];
             // Where nothing moves the two ends are the same up to rounding; then W is symmetric to the last bit.
@@ -654,8 +683,10 @@ impl Tools {
         }
     }
 
-    /// An island of the order: where its contacts begin, where they end and its scalar rows begin, where these end.
-    fn span(&self, first: usize, end: usize) -> Span {
+    /// Where the contacts of island k begin in the order, where they end and its scalar rows begin, where these end.
+    fn span(&self, k: usize) -> Span {
+        let first = if k == 0 { 0 } else { self.islands.ends[k - 1] };
+        let end = self.islands.ends[k];
         let contacts = self.rows.len() as u32;
         let order = &self.islands.order[first..end];
         (first, first + order.partition_point(|&c| c < contacts), end)
@@ -706,83 +737,156 @@ impl Tools {
         }
     }
 
-    /// The scalar rows of an island, by their places among those of the step.
+    /// The scalar rows of an island, by their places among those of the step, and its free bodies.
     fn gather(&mut self, span: Span) {
-        let contacts = self.rows.len() as u32;
-        self.scalars.clear();
-        self.scalars.extend(self.islands.order[span.1..span.2].iter().map(|k| k - contacts));
+        let Self { islands, rows, joints, scalars, members, gathered, gatherings, .. } = self;
+        *gatherings += 1;
+        let contacts = rows.len() as u32;
+        members.clear();
+        let mut meet = |body: u32| {
+            let last = &mut gathered[body as usize];
+            if *last != *gatherings {
+                *last = *gatherings;
+                members.push(body);
+            }
+        };
+        for &c in &islands.order[span.0..span.1] {
+            let arms = &rows[c as usize].arms;
+            arms.iter().filter(|a| a.free).for_each(|a| meet(a.body));
+        }
+        scalars.clear();
+        scalars.extend(islands.order[span.1..span.2].iter().map(|k| k - contacts));
+        for &k in scalars.iter() {
+            joints.levers(k as usize).iter().for_each(|l| meet(l.body));
+        }
     }
 
-    /// Solves one island, in slot k. Returns status, passes, residual, iterations and the seconds of the solver.
-    fn island(
+    fn slots_for(&mut self, islands: usize) -> Result<(), SimulateError> {
+        while self.slots.len() < islands {
+            self.slots.push(Slot::new()?);
+        }
+        Ok(())
+    }
+
+    /// Solves the islands: in each pass all that are not done are stated, solved by the crew, and looked at, in their order.
+    fn solve(
         &mut self,
         (scheme, world): (&MoreauJean, &World),
-        span: Span,
-        k: usize,
         inner: &Inner,
         h: f64,
-    ) -> Result<(StepStatus, u32, f64, usize, f64), SimulateError> {
-        let (mut passes, mut iterations, mut seconds) = (0, 0, 0.0);
-        self.members.clear();
-        for &c in &self.islands.order[span.0..span.1] {
-            let arms = &self.rows[c as usize].arms;
-            self.members.extend(arms.iter().filter(|a| a.free).map(|a| a.body));
+    ) -> Result<Solved, SimulateError> {
+        let count = self.islands.ends.len();
+        self.slots_for(count)?;
+        self.open.clear();
+        self.open.extend(0..count as u32);
+        let mut solved = Solved::default();
+        for k in 0..count {
+            let (first, end, _) = self.span(k);
+            solved.largest = solved.largest.max(end - first);
         }
-        self.gather(span);
-        for &k in &self.scalars {
-            self.members.extend(self.joints.levers(k as usize).iter().map(|l| l.body));
-        }
-        self.members.sort_unstable();
-        self.members.dedup();
-        loop {
-            passes += 1;
-            for &b in &self.members {
-                self.bodies[b as usize].pass(scheme, h);
+        while !self.open.is_empty() {
+            solved.passes += 1;
+            let mut open = std::mem::take(&mut self.open);
+            for &k in &open {
+                self.state(scheme, k as usize, (solved.passes, inner), world, h);
             }
-            self.columns(scheme, span);
-            if !self.assemble(span, k) {
-                return Ok((StepStatus::NotFinite, passes, f64::NAN, iterations, seconds));
-            }
-            let Slot { session, problem, point } = &mut self.slots[k];
             let begun = Instant::now();
-            // Equations alone are solved at once, or not at all.
-            let linear = problem.rows.as_ref().is_some_and(|r| r.bounds.are_free());
-            let most = if linear && problem.mu.is_empty() { LINEAR } else { usize::MAX };
-            let limits = Limits {
-                max_iterations: inner.limits.max_iterations.min(most),
-                ..inner.limits.clone()
-            };
-            let outcome = session.solve(problem, point, &limits, &mut |_| {})?;
-            seconds += begun.elapsed().as_secs_f64();
-            iterations += outcome.iterations;
-            for c in span.0..span.1 {
-                let row = &mut self.rows[self.islands.order[c] as usize];
-                row.r.copy_from_slice(&point.r[3 * (c - span.0)..][..3]);
-            }
-            for (&k, lambda) in self.scalars.iter().zip(&point.lambda) {
-                self.joints.rows[k as usize].lambda = *lambda;
-            }
-            let mut change = self.respond(scheme, span, h);
-            if scheme.geometry == Geometry::Midpoint && !self.scalars.is_empty() {
-                change = change.max(self.recentre(scheme, world, h));
-            }
-            let residual = worst_share(&outcome.measure);
-            if outcome.status != Status::Solved {
-                return Ok((
-                    StepStatus::Solver(outcome.status),
-                    passes,
-                    residual,
-                    iterations,
-                    seconds,
-                ));
-            }
-            if change <= scheme.tolerance {
-                return Ok((StepStatus::Solved, passes, residual, iterations, seconds));
-            }
-            if passes >= scheme.passes || !change.is_finite() {
-                return Ok((StepStatus::NewtonLimit, passes, residual, iterations, seconds));
-            }
+            self.crew.solve(&mut self.slots[..count], &open, inner)?;
+            solved.seconds += begun.elapsed().as_secs_f64();
+            let mut taken = Ok(());
+            open.retain(|&k| {
+                let again = self.take_up((scheme, world), k as usize, &mut solved, h);
+                again.unwrap_or_else(|e| {
+                    taken = Err(e);
+                    false
+                })
+            });
+            self.open = open;
+            taken?;
         }
+        Ok(solved)
+    }
+
+    /// States the problem of island k and says what is asked of its solver.
+    fn state(
+        &mut self,
+        scheme: &MoreauJean,
+        k: usize,
+        (pass, inner): (u32, &Inner),
+        world: &World,
+        h: f64,
+    ) {
+        let span = self.span(k);
+        self.gather(span);
+        for &b in &self.members {
+            self.bodies[b as usize].pass(scheme, h);
+        }
+        self.columns(scheme, span);
+        let finite = self.assemble(span, k);
+        let rest = 2.0 * h * norm(world.gravity);
+        let may_rest = pass == 1 && inner.is_auto() && self.may_rest(span, rest);
+        let slot = &mut self.slots[k];
+        // Equations alone are solved at once, or not at all.
+        let linear = slot.problem.rows.as_ref().is_some_and(|r| r.bounds.are_free());
+        let linear = linear && slot.problem.mu.is_empty();
+        slot.asked = Asked { finite, may_rest, most: if linear { LINEAR } else { usize::MAX } };
+    }
+
+    /// Takes the impulses that the solver found for island k; whether another pass is due.
+    fn take_up(
+        &mut self,
+        (scheme, world): (&MoreauJean, &World),
+        k: usize,
+        solved: &mut Solved,
+        h: f64,
+    ) -> Result<bool, SimulateError> {
+        let Some(outcome) = self.slots[k].outcome.take() else {
+            solved.residual = f64::NAN;
+            solved.status = StepStatus::NotFinite;
+            return Ok(false);
+        };
+        let outcome: Outcome = outcome?;
+        let span = self.span(k);
+        self.gather(span);
+        let point = &self.slots[k].point;
+        for c in span.0..span.1 {
+            let row = &mut self.rows[self.islands.order[c] as usize];
+            row.r.copy_from_slice(&point.r[3 * (c - span.0)..][..3]);
+        }
+        for (&k, lambda) in self.scalars.iter().zip(&point.lambda) {
+            self.joints.rows[k as usize].lambda = *lambda;
+        }
+        let mut change = self.respond(scheme, span, h);
+        if scheme.geometry == Geometry::Midpoint && !self.scalars.is_empty() {
+            change = change.max(self.recentre(scheme, world, h));
+        }
+        solved.iterations += outcome.iterations;
+        let again = change > scheme.tolerance || change.is_nan();
+        let ended = if outcome.status != Status::Solved {
+            StepStatus::Solver(outcome.status)
+        } else if !again {
+            StepStatus::Solved
+        } else if solved.passes >= scheme.passes || !change.is_finite() {
+            StepStatus::NewtonLimit
+        } else {
+            return Ok(true);
+        };
+        solved.residual = f64::max(solved.residual, worst_share(&outcome.measure));
+        if solved.status == StepStatus::Solved {
+            solved.status = ended;
+        }
+        Ok(false)
+    }
+
+    /// Whether the bodies of an island are slower than `rest` while most of its contacts are new, so that no impulses of the step before lead on.
+    fn may_rest(&self, span: Span, rest: f64) -> bool {
+        let slow = |&b: &u32| {
+            let b = &self.bodies[b as usize];
+            norm(b.v) + norm(b.spin) * b.radius <= rest
+        };
+        let order = &self.islands.order[span.0..span.1];
+        let warm = order.iter().filter(|&&c| self.rows[c as usize].warm).count();
+        self.scalars.is_empty() && 2 * warm < order.len() && self.members.iter().all(slow)
     }
 
     /// Takes the joints of the island at the middle that this pass has come to; how far that has moved the bodies since the last one, relative.
@@ -808,9 +912,11 @@ impl Tools {
     /// The columns of H and the rows of the velocities, in the frames of this pass.
     fn columns(&mut self, scheme: &MoreauJean, span: Span) {
         self.joints.columns(scheme, &self.scalars, &self.bodies);
-        for c in span.0..span.1 {
-            let row = &mut self.rows[self.islands.order[c] as usize];
-            for arm in row.arms.iter_mut().filter(|a| a.free) {
+        self.sides.resize(self.rows.len(), [Side::default(); 2]);
+        for &c in &self.islands.order[span.0..span.1] {
+            let row = &self.rows[c as usize];
+            let sides = row.arms.iter().zip(&mut self.sides[c as usize]);
+            for (arm, side) in sides.filter(|a| a.0.free) {
                 let b = &self.bodies[arm.body as usize];
                 for i in 0..3 {
                     let column = apply(&b.frame, arm.moment[i]);
@@ -820,10 +926,10 @@ impl Tools {
                     };
                     let solved = apply(&b.inverse, column);
                     for k in 0..3 {
-                        arm.rows[k][i] = arm.sign * row.frame_end[i][k];
-                        arm.rows[3 + k][i] = arm.sign * turned[k];
-                        arm.solved[k][i] = arm.sign * row.frame[i][k] / b.mass;
-                        arm.solved[3 + k][i] = arm.sign * solved[k];
+                        side.rows[k][i] = arm.sign * row.frame_end[i][k];
+                        side.rows[3 + k][i] = arm.sign * turned[k];
+                        side.solved[k][i] = arm.sign * row.frame[i][k] / b.mass;
+                        side.solved[3 + k][i] = arm.sign * solved[k];
                     }
                 }
             }
@@ -832,8 +938,19 @@ impl Tools {
 
     /// States the contact problem of an island in slot k; false where it has a number that is not finite.
     fn assemble(&mut self, span: Span, k: usize) -> bool {
-        let Self { islands, rows, bodies, joints, scalars, heads, next, mirrored, slots, .. } =
-            self;
+        let Self {
+            islands,
+            rows,
+            sides,
+            bodies,
+            joints,
+            scalars,
+            heads,
+            next,
+            mirrored,
+            slots,
+            ..
+        } = self;
         let order = &islands.order[span.0..span.1];
         let n = order.len();
         // The contacts of each body as a list, in order: made from the back.
@@ -871,9 +988,11 @@ impl Tools {
             point.r.extend_from_slice(&row.r);
             for i in 0..3 {
                 let mut q = row.given[i] + row.shift[i];
-                for arm in row.arms.iter().filter(|a| a.free) {
-                    let b = &bodies[arm.body as usize];
-                    q += arm.velocity(i, b.v_free, b.spin_free);
+                for (arm, side) in row.arms.iter().zip(&sides[order[c] as usize]) {
+                    if arm.free {
+                        let b = &bodies[arm.body as usize];
+                        q += side.velocity(i, b.v_free, b.spin_free);
+                    }
                 }
                 problem.q.push(q);
                 check += 0.0 * q;
@@ -897,7 +1016,9 @@ impl Tools {
                     let there = &problem.W.row(j as usize).1[*at as usize];
                     std::array::from_fn(|p| std::array::from_fn(|q| there[q][p]))
                 } else {
-                    let mut block = coupling(row, &rows[order[j as usize] as usize]);
+                    let other = order[j as usize] as usize;
+                    let mut block =
+                        coupling((row, &sides[order[c] as usize]), (&rows[other], &sides[other]));
                     if j as usize == c {
                         mirrored[c] = width;
                         block[0][0] += row.compliance;
@@ -916,7 +1037,9 @@ impl Tools {
     /// The scalar rows of an island, in slot k, after its contacts: `V`, `R`, `s` and the bounds.
     #[allow(non_snake_case)]
     fn state_rows(&mut self, span: Span, k: usize) -> bool {
-        let Self { islands, rows, bodies, joints, levers, scalars, slots, heads, next, .. } = self;
+        let Self {
+            islands, rows, sides, bodies, joints, levers, scalars, slots, heads, next, ..
+        } = self;
         let Slot { problem, point, .. } = &mut slots[k];
         point.lambda.clear();
         if scalars.is_empty() {
@@ -950,10 +1073,10 @@ impl Tools {
                 }
                 let mut c = heads[body as usize];
                 while c != NONE {
-                    let row = &rows[order[c as usize] as usize];
-                    let side = usize::from(row.arms[0].body != body);
+                    let row = order[c as usize] as usize;
+                    let side = usize::from(rows[row].arms[0].body != body);
                     for i in 0..3 {
-                        let arm = &row.arms[side].rows;
+                        let arm = &sides[row][side].rows;
                         let entry: f64 = (0..6).map(|k| arm[k][i] * solved[k]).sum();
                         v.push((3 * c as usize + i, e.1 as usize, entry));
                     }
@@ -1049,12 +1172,13 @@ impl Tools {
             e.scale += gravity.abs() + forces.abs() + 0.5 * b.mass * fall * fall;
         }
         for row in &self.rows {
+            let motion = row.arms.each_ref().map(|arm| {
+                let b = &self.bodies[arm.body as usize];
+                (mean(b.v, b.v_new), b.omega(mean(b.spin, b.spin_new)))
+            });
             for i in 0..3 {
                 let mut u = row.given_mean[i];
-                for arm in row.arms.iter().filter(|a| a.free) {
-                    let b = &self.bodies[arm.body as usize];
-                    let omega = b.omega(mean(b.spin, b.spin_new));
-                    let v = mean(b.v, b.v_new);
+                for (arm, (v, omega)) in row.arms.iter().zip(motion).filter(|a| a.0.free) {
                     u += arm.sign * (dot(row.frame[i], v) + dot(arm.moment[i], omega));
                 }
                 let work = u * row.r[i];
@@ -1178,9 +1302,10 @@ impl Tools {
                 (report.impulse, report.before) = (row.r, row.before);
                 for i in 0..3 {
                     report.after[i] = row.given[i];
-                    for arm in row.arms.iter().filter(|a| a.free) {
+                    let sides = row.arms.iter().zip(&self.sides[self.row_of[k] as usize]);
+                    for (arm, side) in sides.filter(|a| a.0.free) {
                         let b = &self.bodies[arm.body as usize];
-                        report.after[i] += arm.velocity(i, b.v_new, b.spin_new);
+                        report.after[i] += side.velocity(i, b.v_new, b.spin_new);
                     }
                 }
             }
@@ -1195,18 +1320,6 @@ impl Tools {
             });
             self.contacts.push(report);
         }
-    }
-}
-
-impl Slot {
-    fn new(inner: &Inner) -> Result<Self, SimulateError> {
-        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let w = nonsmooth_linalg::Bsr::from_rows(1, &[vec![(0, identity)]]);
-        let problem = FrictionLocal::new(w, vec![0.0; 3], vec![0.0])
-            .map_err(nonsmooth_solve::SolveError::from)?;
-        let point = problem.origin();
-        let session = registry::session::<FrictionLocal<3>>(inner.solver, inner.settings)?;
-        Ok(Self { session, problem, point })
     }
 }
 
@@ -1226,29 +1339,63 @@ impl Row {
     }
 }
 
-impl Arm {
+impl Side {
     /// Component i of the relative velocity that the body makes with these velocities.
     fn velocity(&self, i: usize, v: Vec3, spin: Vec3) -> f64 {
         (0..3).map(|k| self.rows[k][i] * v[k] + self.rows[3 + k][i] * spin[k]).sum()
     }
 }
 
-/// The block of W of two contacts, a sum over the bodies that they share.
+/// The block of W of two contacts, a sum over the bodies that they share. With AVX2 (found at run time) four numbers at once and the same bits: nothing is fused.
 #[inline]
-fn coupling(row: &Row, other: &Row) -> [[f64; 3]; 3] {
+fn coupling(row: (&Row, &[Side; 2]), other: (&Row, &[Side; 2])) -> [[f64; 3]; 3] {
     let mut sum = [[0.0; 4]; 3];
-    for p in row.arms.iter().filter(|p| p.free) {
-        for q in other.arms.iter().filter(|q| q.body == p.body) {
-            for (left, right) in p.rows.iter().zip(&q.solved) {
-                for i in 0..3 {
-                    for j in 0..4 {
-                        sum[i][j] += left[i] * right[j];
-                    }
-                }
+    for (p, left) in row.0.arms.iter().zip(row.1).filter(|p| p.0.free) {
+        for (_, right) in other.0.arms.iter().zip(other.1).filter(|q| q.0.body == p.body) {
+            #[cfg(target_arch = "x86_64")]
+            if std::arch::is_x86_feature_detected!("avx2") {
+                // SAFETY: the processor has what the function is compiled for.
+                unsafe { add_product_avx2(&mut sum, &left.rows, &right.solved) };
+                continue;
             }
+            add_product(&mut sum, &left.rows, &right.solved);
         }
     }
     sum.map(|[x, y, z, _]| [x, y, z])
+}
+
+/// `sum += leftᵀ right`.
+#[inline]
+fn add_product(sum: &mut [[f64; 4]; 3], left: &Columns, right: &Columns) {
+    for (left, right) in left.iter().zip(right) {
+        for i in 0..3 {
+            for j in 0..4 {
+                sum[i][j] += left[i] * right[j];
+            }
+        }
+    }
+}
+
+/// The same.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn add_product_avx2(sum: &mut [[f64; 4]; 3], left: &Columns, right: &Columns) {
+    use std::arch::x86_64::{
+        _mm256_add_pd, _mm256_loadu_pd, _mm256_mul_pd, _mm256_set1_pd, _mm256_storeu_pd,
+    };
+    // SAFETY: each pointer is to an array of four numbers.
+    let mut rows = [0, 1, 2].map(|i: usize| unsafe { _mm256_loadu_pd(sum[i].as_ptr()) });
+    for (left, right) in left.iter().zip(right) {
+        // SAFETY: as above.
+        let right = unsafe { _mm256_loadu_pd(right.as_ptr()) };
+        for i in 0..3 {
+            rows[i] = _mm256_add_pd(rows[i], _mm256_mul_pd(_mm256_set1_pd(left[i]), right));
+        }
+    }
+    for (sum, row) in sum.iter_mut().zip(rows) {
+        // SAFETY: as above.
+        unsafe { _mm256_storeu_pd(sum.as_mut_ptr(), row) };
+    }
 }
 
 /// The axis of the world whose part across the normal makes the first tangent: that of the last step unless it has come near the normal.

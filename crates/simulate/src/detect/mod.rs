@@ -27,6 +27,7 @@ mod witness;
 
 use nonsmooth_scenes::Polyhedron;
 use nonsmooth_scenes::vec3::{Vec3, add, scale, sub};
+use rayon::ThreadPool;
 
 use crate::rotation::Pose;
 use crate::state::{Axis, State};
@@ -101,9 +102,21 @@ pub(crate) struct Detector {
     broad: Broad,
     pairs: Vec<(u32, u32)>,
     axes: Vec<((u32, u32), Axis)>,
+    /// One for each part of the pairs.
+    finders: Vec<Finder>,
+}
+
+/// The narrow phase of a part of the pairs: its buffers and what it has found.
+#[derive(Debug, Clone, Default)]
+struct Finder {
     clip: Clip,
     scratch: Scratch,
+    found: Vec<Near>,
+    axes: Vec<((u32, u32), Axis)>,
 }
+
+/// Fewer pairs than this are not worth another thread.
+const FEW_PAIRS: usize = 256;
 
 impl Detector {
     /// Of a valid world.
@@ -179,8 +192,7 @@ impl Detector {
             broad: Broad::default(),
             pairs: vec![],
             axes: vec![],
-            clip: Clip::default(),
-            scratch: Scratch::default(),
+            finders: vec![Finder::default()],
             box_of,
             solids,
         })
@@ -197,15 +209,15 @@ impl Detector {
     }
 
     /// All points where two bodies that may touch are within the sum of their margins (m, one a body), by key. The axes that separate polyhedra are left in
-    /// the memory of the state.
+    /// the memory of the state. The pairs are cut into consecutive parts, one for each thread of the pool: what is found is the same for any number.
     pub fn detect(
         &mut self,
         world: &World,
         state: &mut State,
         margins: &[f64],
+        pool: Option<&ThreadPool>,
         out: &mut Vec<Near>,
     ) {
-        out.clear();
         self.place(world, state, margins);
         self.pairs.clear();
         self.broad.pairs(&self.boxes, &self.box_moves, &mut self.pairs);
@@ -215,10 +227,52 @@ impl Detector {
         }
         self.pairs_with_planes(margins);
         self.pairs.sort_unstable();
+        let threads = pool.map_or(1, ThreadPool::current_num_threads);
+        let parts = threads.min(self.pairs.len() / FEW_PAIRS).max(1);
+        let mut finders = std::mem::take(&mut self.finders);
+        finders.resize_with(finders.len().max(parts), Finder::default);
+        let (this, known) = (&*self, &state.memory.axes[..]);
+        let share = this.pairs.len().div_ceil(parts).max(1);
+        let work = this.pairs.chunks(share).zip(&mut finders);
+        match pool.filter(|_| parts > 1) {
+            None => work.for_each(|(pairs, f)| this.find(world, margins, pairs, known, f)),
+            Some(pool) => pool.scope(|scope| {
+                for (pairs, f) in work {
+                    scope.spawn(move |_| this.find(world, margins, pairs, known, f));
+                }
+            }),
+        }
+        out.clear();
         self.axes.clear();
-        let pairs = std::mem::take(&mut self.pairs);
-        let (mut last, mut body_pair, mut may) = (0, (u32::MAX, u32::MAX), false);
-        for &(i, j) in &pairs {
+        let used = self.pairs.len().div_ceil(share);
+        if let [only] = &mut finders[..used] {
+            std::mem::swap(out, &mut only.found);
+            std::mem::swap(&mut self.axes, &mut only.axes);
+        } else {
+            for finder in &finders[..used] {
+                out.extend_from_slice(&finder.found);
+                self.axes.extend_from_slice(&finder.axes);
+            }
+        }
+        self.finders = finders;
+        std::mem::swap(&mut state.memory.axes, &mut self.axes);
+    }
+
+    /// The narrow phase of consecutive pairs, with the separating axes `known`; all lists are sorted.
+    fn find(
+        &self,
+        world: &World,
+        margins: &[f64],
+        pairs: &[(u32, u32)],
+        known: &[((u32, u32), Axis)],
+        finder: &mut Finder,
+    ) {
+        finder.found.clear();
+        finder.axes.clear();
+        let Some(&start) = pairs.first() else { return };
+        let mut last = known.partition_point(|k| k.0 < start);
+        let (mut body_pair, mut may) = ((u32::MAX, u32::MAX), false);
+        for &(i, j) in pairs {
             let (p, q) = (self.solids[i as usize].body, self.solids[j as usize].body);
             if (p, q) != body_pair {
                 body_pair = (p, q);
@@ -227,24 +281,20 @@ impl Detector {
             if !may {
                 continue;
             }
-            // Both lists are sorted.
-            let known = &state.memory.axes;
             while last < known.len() && known[last].0 < (i, j) {
                 last += 1;
             }
             let axis = known.get(last).filter(|k| k.0 == (i, j)).map(|k| k.1);
             let prediction = margins[p as usize] + margins[q as usize];
-            let first = out.len();
-            let now = self.narrow(world, i, j, axis, prediction, out);
-            self.axes.extend(now.map(|now| ((i, j), now)));
-            out[first..].sort_unstable_by_key(|n| n.key);
+            let first = finder.found.len();
+            let now = self.narrow(world, i, j, axis, prediction, finder);
+            finder.axes.extend(now.map(|now| ((i, j), now)));
+            finder.found[first..].sort_unstable_by_key(|n| n.key);
             let surface = |k: u32| matches!(self.solids[k as usize].solid, Solid::Surface(_));
             if surface(i) || surface(j) {
-                merge(out, first);
+                merge(&mut finder.found, first);
             }
         }
-        self.pairs = pairs;
-        std::mem::swap(&mut state.memory.axes, &mut self.axes);
     }
 
     /// Poses of bodies, vertices of polyhedra and boxes of finite shapes.
@@ -320,15 +370,15 @@ impl Detector {
     }
 
     fn narrow(
-        &mut self,
+        &self,
         world: &World,
         i: u32,
         j: u32,
         axis: Option<Axis>,
         prediction: f64,
-        out: &mut Vec<Near>,
+        Finder { clip, scratch, found: out, .. }: &mut Finder,
     ) -> Option<Axis> {
-        let Self { solids, poses, hulls, boxes, box_of, clip, scratch, .. } = self;
+        let Self { solids, poses, hulls, boxes, box_of, .. } = self;
         let (s, t) = (&solids[i as usize], &solids[j as usize]);
         let (a, b) = (&poses[s.body as usize], &poses[t.body as usize]);
         let law = world.law_between(s.material, t.material);

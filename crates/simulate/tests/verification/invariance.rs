@@ -262,3 +262,38 @@ fn the_law_of_a_pair_of_materials_counts() {
     near(simulation.state().velocity[1][0], 1.0 - 0.5 * G * 0.1, 1e-10);
     near(simulation.state().velocity[2][0], 1.0, 1e-12);
 }
+
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    // Small islands, some with two balls, and two large ones; more pairs than one thread looks at alone.
+    let scene = || {
+        let mut world = world(0.6, 0.3);
+        world.add(Body::floor());
+        for k in 0..400 {
+            let at = |z: f64| [3.0 * f64::from(k % 20), 3.0 * f64::from(k / 20), z];
+            world.add(ball(0.5).at(at(0.5)).moving([0.1, 0.0, -0.1], [0.0, 0.2, 0.0]));
+            world.add(ball(0.5).at(at(1.502)).moving([0.0, 0.01, -0.5], [0.0; 3]));
+        }
+        for (rows, y) in [(5, -5.0), (7, -9.0)] {
+            for k in 0..rows * (rows + 1) / 2 {
+                let row = (0..rows).find(|r| k < (r + 1) * (2 * rows - r) / 2).unwrap();
+                let place = k - row * (2 * rows - row + 1) / 2;
+                let at =
+                    [1.05 * (f64::from(place) + 0.5 * f64::from(row)), y, 0.5 + f64::from(row)];
+                world.add(block([0.5; 3]).at(at));
+            }
+        }
+        world
+    };
+    let moved = |threads: usize| {
+        let mut simulation = simulation(scene()).with_threads(threads);
+        for _ in 0..15 {
+            let report = simulation.step(5e-3).unwrap();
+            assert!(report.status.is_solved(), "{:?}", report.status);
+            assert!(report.counts.islands > 300 && report.counts.largest > 100);
+        }
+        simulation.checkpoint()
+    };
+    let alone = moved(1);
+    assert!(alone == moved(2) && alone == moved(3));
+}

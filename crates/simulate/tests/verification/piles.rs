@@ -1,9 +1,9 @@
 //! Scenes of `gen` in motion: what should stand stands.
 
 use nonsmooth_scenes::scenes::{Arch, Family, SpherePile, Stack};
-use nonsmooth_simulate::{Control, MoreauJean, Simulation, StepReport, World};
+use nonsmooth_simulate::{Body, Control, MoreauJean, Simulation, StepReport, World};
 
-use crate::check;
+use crate::{ball, check, simulation, world};
 
 /// Runs a scene and returns how far its bodies have moved.
 fn moved(scene: &nonsmooth_scenes::Scene, until: f64, h: f64) -> f64 {
@@ -62,4 +62,30 @@ fn a_pile_of_spheres_comes_to_rest() {
     let fastest = simulation.state().velocity.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
     assert!(fastest < 0.05, "{fastest}");
     assert!(report.penetration < 5e-3, "{report:?}");
+}
+
+#[test]
+fn a_pyramid_of_balls_that_can_stand_stands() {
+    // The line between the contacts of a ball with the floor and with the one above is at 22.5 degrees: mu = 0.8 holds it. The law has other solutions, which
+    // roll apart.
+    const ROWS: u32 = 5;
+    let mut world = world(0.8, 0.0);
+    world.add(Body::floor());
+    for layer in 0..ROWS {
+        for k in 0..(ROWS - layer).pow(2) {
+            let (i, j) = (k / (ROWS - layer), k % (ROWS - layer));
+            let at = |i: u32| f64::from(i) + 0.5 * f64::from(layer);
+            world.add(ball(0.5).at([at(i), at(j), 0.5 + 0.5_f64.sqrt() * f64::from(layer)]));
+        }
+    }
+    let mut simulation = simulation(world);
+    for _ in 0..20 {
+        let report = simulation.step(5e-3).unwrap();
+        assert!(report.status.is_solved(), "{:?}", report.status);
+        assert!(
+            report.energy.kinetic < 1e-12 * report.energy.potential,
+            "{:e}",
+            report.energy.kinetic
+        );
+    }
 }

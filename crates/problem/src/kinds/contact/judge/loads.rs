@@ -56,6 +56,10 @@ impl Loads {
 
     /// Rows i and j are coupled; `ratio` is that of their units, asked for where they were not coupled before.
     pub(crate) fn couple(&mut self, i: usize, j: usize, ratio: impl FnOnce() -> f64) {
+        // Most rows hang below their root at once.
+        if self.parent[i] == self.parent[j] {
+            return;
+        }
         let ((a, of_i), (b, of_j)) = (self.root(i), self.root(j));
         if a != b {
             let ratio = ratio();

@@ -1,0 +1,185 @@
+//! Who solves the islands of a step: one session for each large island, one for each thread for all small ones, on as many threads as are asked for.
+//!
+//! A session's answer depends on problem, start and limits alone, so neither the number of threads nor who takes which island changes a bit.
+//!
+//! `u = 0` solves Coulomb's law wherever `W r + q = 0` has a solution in K, which makes it one of the convex relaxation, `min ½ rᵀW r + qᵀr` in K: a few
+//! iterations of its interior point tell. The law itself may have other solutions, which move and take long to find. So bodies that are slow, whose contacts are
+//! new, are first asked whether they may stay at rest.
+
+use std::cmp::Reverse;
+
+use nonsmooth_linalg::{Bsr, budget};
+use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem};
+use nonsmooth_solve::settings::SettingsMap;
+use nonsmooth_solve::{Limits, Outcome, Session, SolveError, Status, registry};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::SimulateError;
+use crate::step::Inner;
+
+/// Islands of more contacts have a session of their own, which keeps what it knows of their pattern.
+const SMALL: usize = 32;
+/// What is asked first, and for how many iterations at most.
+const RELAXATION: &str = "convex_relaxation";
+const ITERATIONS: usize = 30;
+
+/// What is asked of the solver of an island.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Asked {
+    /// All numbers of the problem are finite; else nothing is solved.
+    pub finite: bool,
+    /// Whether the bodies may stay at rest comes first.
+    pub may_rest: bool,
+    /// At most so many iterations.
+    pub most: usize,
+}
+
+/// One contact problem, its start and its solution.
+pub(crate) struct Slot {
+    pub problem: FrictionLocal<3>,
+    pub point: LocalPoint,
+    pub asked: Asked,
+    /// What came of it; nothing where the problem is not finite.
+    pub outcome: Option<Result<Outcome, SolveError>>,
+    own: Option<Sessions>,
+}
+
+impl Slot {
+    pub fn new() -> Result<Self, SimulateError> {
+        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let w = Bsr::from_rows(1, &[vec![(0, identity)]]);
+        let problem = FrictionLocal::new(w, vec![0.0; 3], vec![0.0]).map_err(SolveError::from)?;
+        let point = problem.origin();
+        Ok(Self { problem, point, asked: Asked::default(), outcome: None, own: None })
+    }
+
+    fn is_large(&self) -> bool {
+        self.problem.mu.len() > SMALL
+    }
+
+    /// By its own sessions, or those of the thread.
+    fn solve(&mut self, shared: &mut Sessions, inner: &Inner) {
+        let mut own = self.own.take();
+        let solved = match own.as_mut().filter(|_| self.is_large()) {
+            Some(own) => own.solve(self, inner),
+            None => shared.solve(self, inner),
+        };
+        (self.own, self.outcome) = (own, solved.transpose());
+    }
+}
+
+/// The sessions that solve one problem after the other.
+struct Sessions {
+    law: Box<dyn Session<FrictionLocal<3>>>,
+    /// Made where it is first asked.
+    relaxation: Option<Box<dyn Session<FrictionLocal<3>>>>,
+}
+
+impl Sessions {
+    fn new(inner: &Inner) -> Result<Self, SolveError> {
+        Ok(Self { law: registry::session(inner.solver, inner.settings)?, relaxation: None })
+    }
+
+    fn solve(&mut self, slot: &mut Slot, inner: &Inner) -> Result<Option<Outcome>, SolveError> {
+        let Slot { problem, point, asked, .. } = slot;
+        let limits = |most: usize| Limits {
+            max_iterations: inner.limits.max_iterations.min(most),
+            ..inner.limits.clone()
+        };
+        if !asked.finite {
+            return Ok(None);
+        }
+        if asked.may_rest {
+            let relaxation = match &mut self.relaxation {
+                Some(relaxation) => relaxation,
+                None => self.relaxation.insert(registry::session(RELAXATION, &SettingsMap::new())?),
+            };
+            let start = point.clone();
+            let outcome = relaxation.solve(problem, point, &limits(ITERATIONS), &mut |_| {})?;
+            if outcome.status == Status::Solved {
+                return Ok(Some(outcome));
+            }
+            *point = start;
+        }
+        self.law.solve(problem, point, &limits(asked.most), &mut |_| {}).map(Some)
+    }
+}
+
+/// Threads with their sessions.
+pub(crate) struct Crew {
+    /// As asked for.
+    pub threads: usize,
+    /// None where the calling thread works alone.
+    pool: Option<ThreadPool>,
+    sessions: Vec<Sessions>,
+}
+
+impl Crew {
+    /// So many threads, 0 for one a core; fewer where the system gives no more.
+    pub fn new(threads: usize) -> Self {
+        let pool = || ThreadPoolBuilder::new().num_threads(threads).build().ok();
+        let pool = if threads == 1 { None } else { pool() };
+        let pool = pool.filter(|p| p.current_num_threads() > 1);
+        Self { threads, pool, sessions: vec![] }
+    }
+
+    /// The threads, where there are more than the calling one.
+    pub fn pool(&self) -> Option<&ThreadPool> {
+        self.pool.as_ref()
+    }
+
+    /// Solves the `open` ones of the slots, in ascending order. Each keeps its outcome, errors too.
+    ///
+    /// Errors: a solver that does not exist.
+    pub fn solve(
+        &mut self,
+        slots: &mut [Slot],
+        open: &[u32],
+        inner: &Inner,
+    ) -> Result<(), SimulateError> {
+        let threads = self.pool.as_ref().map_or(1, ThreadPool::current_num_threads);
+        while self.sessions.len() < threads {
+            self.sessions.push(Sessions::new(inner)?);
+        }
+        for &k in open {
+            let slot = &mut slots[k as usize];
+            if slot.is_large() && slot.own.is_none() {
+                slot.own = Some(Sessions::new(inner)?);
+            }
+        }
+        let Some(pool) = self.pool.as_ref().filter(|_| open.len() > 1) else {
+            for &k in open {
+                slots[k as usize].solve(&mut self.sessions[0], inner);
+            }
+            return Ok(());
+        };
+        let mut next = open.iter().peekable();
+        let is_open = |(k, _): &(usize, &mut Slot)| next.next_if(|&&o| o as usize == *k).is_some();
+        let (mut large, mut small): (Vec<_>, Vec<_>) =
+            slots.iter_mut().enumerate().filter(is_open).map(|s| s.1).partition(|s| s.is_large());
+        // What takes longest begins first.
+        large.sort_by_key(|slot| Reverse(slot.problem.mu.len()));
+        let budget = budget::current();
+        let share = small.len().div_ceil(threads).max(1);
+        pool.scope(|scope| {
+            for slot in large {
+                let budget = &budget;
+                scope.spawn(move |_| {
+                    let _scope = budget.enter();
+                    if let Some(mut own) = slot.own.take() {
+                        slot.solve(&mut own, inner);
+                        slot.own = Some(own);
+                    }
+                });
+            }
+            for (part, sessions) in small.chunks_mut(share).zip(&mut self.sessions) {
+                let budget = &budget;
+                scope.spawn(move |_| {
+                    let _scope = budget.enter();
+                    part.iter_mut().for_each(|slot| slot.solve(sessions, inner));
+                });
+            }
+        });
+        Ok(())
+    }
+}
