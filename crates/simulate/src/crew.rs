@@ -3,8 +3,8 @@
 //! A session's answer depends on problem, start and limits alone, so neither the number of threads nor who takes which island changes a bit.
 //!
 //! `u = 0` solves Coulomb's law wherever `W r + q = 0` has a solution in K, which makes it one of the convex relaxation, `min ½ rᵀW r + qᵀr` in K: a few
-//! iterations of its interior point tell. The law itself may have other solutions, which move and take long to find. So bodies that are slow, whose contacts are
-//! new, are first asked whether they may stay at rest.
+//! iterations of its interior point tell. The law itself may have other solutions, which move and take long to find. So the bodies of a large island that are slow,
+//! whose contacts are new, are first asked whether they may stay at rest.
 
 use std::cmp::Reverse;
 
@@ -19,9 +19,12 @@ use crate::step::Inner;
 
 /// Islands of more contacts have a session of their own, which keeps what it knows of their pattern.
 const SMALL: usize = 32;
-/// What is asked first, and for how many iterations at most.
+/// What is asked first of a large island, and for how many iterations at most. A small one is solved more sharply without.
 const RELAXATION: &str = "convex_relaxation";
 const ITERATIONS: usize = 30;
+/// It is solved so much better than asked for, an iteration or two, that the steps after it find the impulses good enough as they are; but no better than this.
+const FINER: f64 = 1e-3;
+const FINEST: f64 = 1e-12;
 
 /// What is asked of the solver of an island.
 #[derive(Debug, Clone, Copy, Default)]
@@ -89,15 +92,17 @@ impl Sessions {
         if !asked.finite {
             return Ok(None);
         }
-        if asked.may_rest {
+        if asked.may_rest && problem.mu.len() > SMALL {
             let relaxation = match &mut self.relaxation {
                 Some(relaxation) => relaxation,
                 None => self.relaxation.insert(registry::session(RELAXATION, &SettingsMap::new())?),
             };
             let start = point.clone();
-            let outcome = relaxation.solve(problem, point, &limits(ITERATIONS), &mut |_| {})?;
-            if outcome.status == Status::Solved {
-                return Ok(Some(outcome));
+            let tolerance = (FINER * inner.limits.tolerance).max(FINEST);
+            let finer = Limits { tolerance, ..limits(ITERATIONS) };
+            let outcome = relaxation.solve(problem, point, &finer, &mut |_| {})?;
+            if outcome.measure.passes(inner.limits.tolerance) {
+                return Ok(Some(Outcome { status: Status::Solved, ..outcome }));
             }
             *point = start;
         }

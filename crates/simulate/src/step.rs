@@ -15,7 +15,7 @@
 //! Method: bodies move freely, contacts of the index set (`g + γ h u_N ≤ 0`) get their directions at the extrapolated midpoint, islands are solved as
 //! local problems in r by sessions of the project's solvers ([`crate::crew`]), judged by the problem's own judge. Gyroscopic torque and the frames of torques are those of the last
 //! pass; with the impulses found each body's rotation is solved exactly, and where that moves no velocity by more than the tolerance, the step is done.
-//! An island that is slow and whose contacts are new is first asked whether it may stay at rest ([`crate::crew`]): a pile that can stand stands.
+//! A large island that is slow and whose contacts are new is first asked whether it may stay at rest ([`crate::crew`]): a pile that can stand stands.
 //! A persistent contact has the velocity in its law at the extrapolated end of the step. Frémond's law has `w_T = (1 − θ)/θ u_{T,k}`: u_θ in place of u⁺.
 //!
 //! References: Moreau1988 and Jean1999 for the scheme, Acary2016 for its energy, SimoWong1991 for the rotation, Acary2018 for the index set.
@@ -125,6 +125,8 @@ pub(crate) struct Tools {
     /// The first contact of each body in the island, and for each contact the next one of its two bodies.
     heads: Vec<u32>,
     next: Vec<[u32; 2]>,
+    /// The free bodies of each contact in the island.
+    pairs: Vec<[u32; 2]>,
     /// For each contact the place of the last block of its row of W that was mirrored, at first the diagonal one.
     mirrored: Vec<u32>,
     /// The free bodies of the island that is being solved, and for each body the last island that it was gathered for, counted through all steps.
@@ -222,6 +224,7 @@ impl Tools {
             scalars: vec![],
             heads: vec![],
             next: vec![],
+            pairs: vec![],
             mirrored: vec![],
             members: vec![],
             gathered: vec![0; world.bodies.len()],
@@ -947,6 +950,7 @@ impl Tools {
             scalars,
             heads,
             next,
+            pairs,
             mirrored,
             slots,
             ..
@@ -957,20 +961,24 @@ impl Tools {
         heads.resize(bodies.len(), NONE);
         next.clear();
         next.resize(n, [NONE; 2]);
-        for &c in order {
-            rows[c as usize].arms.iter().for_each(|a| heads[a.body as usize] = NONE);
+        pairs.clear();
+        pairs.extend(order.iter().map(|&c| {
+            let free = |a: &Arm| if a.free { a.body } else { NONE };
+            rows[c as usize].arms.each_ref().map(free)
+        }));
+        for &body in pairs.iter().flatten().filter(|&&b| b != NONE) {
+            heads[body as usize] = NONE;
         }
         for &k in scalars.iter() {
             joints.levers(k as usize).iter().for_each(|l| heads[l.body as usize] = NONE);
         }
         for c in (0..n).rev() {
-            let arms = &rows[order[c] as usize].arms;
-            for (side, arm) in arms.iter().enumerate().filter(|a| a.1.free) {
-                next[c][side] = std::mem::replace(&mut heads[arm.body as usize], c as u32);
+            for (side, &body) in pairs[c].iter().enumerate().filter(|b| *b.1 != NONE) {
+                next[c][side] = std::mem::replace(&mut heads[body as usize], c as u32);
             }
         }
         let after = |c: u32, body: u32| {
-            let side = usize::from(rows[order[c as usize] as usize].arms[0].body != body);
+            let side = usize::from(pairs[c as usize][0] != body);
             next[c as usize][side]
         };
         let Slot { problem, point, .. } = &mut slots[k];
@@ -999,15 +1007,15 @@ impl Tools {
             }
             let mut width = 0;
             // The contacts of the two bodies, merged; a body that is not free has none.
-            let [mut p, mut q] =
-                row.arms.map(|a| if a.free { heads[a.body as usize] } else { NONE });
+            let own = pairs[c];
+            let [mut p, mut q] = own.map(|b| if b == NONE { NONE } else { heads[b as usize] });
             while p.min(q) != NONE {
                 let j = p.min(q);
                 if p == j {
-                    p = after(j, row.arms[0].body);
+                    p = after(j, own[0]);
                 }
                 if q == j {
-                    q = after(j, row.arms[1].body);
+                    q = after(j, own[1]);
                 }
                 let block = if symmetric && (j as usize) < c {
                     // Row j has met later contacts in the order in which they ask for it.
@@ -1016,9 +1024,9 @@ impl Tools {
                     let there = &problem.W.row(j as usize).1[*at as usize];
                     std::array::from_fn(|p| std::array::from_fn(|q| there[q][p]))
                 } else {
-                    let other = order[j as usize] as usize;
+                    let other = &sides[order[j as usize] as usize];
                     let mut block =
-                        coupling((row, &sides[order[c] as usize]), (&rows[other], &sides[other]));
+                        coupling((own, &sides[order[c] as usize]), (pairs[j as usize], other));
                     if j as usize == c {
                         mirrored[c] = width;
                         block[0][0] += row.compliance;
@@ -1346,12 +1354,12 @@ impl Side {
     }
 }
 
-/// The block of W of two contacts, a sum over the bodies that they share. With AVX2 (found at run time) four numbers at once and the same bits: nothing is fused.
+/// The block of W of two contacts, with their free bodies, a sum over those that they share. With AVX2 (found at run time) four numbers at once and the same bits: nothing is fused.
 #[inline]
-fn coupling(row: (&Row, &[Side; 2]), other: (&Row, &[Side; 2])) -> [[f64; 3]; 3] {
+fn coupling(row: ([u32; 2], &[Side; 2]), other: ([u32; 2], &[Side; 2])) -> [[f64; 3]; 3] {
     let mut sum = [[0.0; 4]; 3];
-    for (p, left) in row.0.arms.iter().zip(row.1).filter(|p| p.0.free) {
-        for (_, right) in other.0.arms.iter().zip(other.1).filter(|q| q.0.body == p.body) {
+    for (p, left) in row.0.iter().zip(row.1).filter(|p| *p.0 != NONE) {
+        for (_, right) in other.0.iter().zip(other.1).filter(|q| q.0 == p) {
             #[cfg(target_arch = "x86_64")]
             if std::arch::is_x86_feature_detected!("avx2") {
                 // SAFETY: the processor has what the function is compiled for.
