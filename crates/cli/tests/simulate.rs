@@ -132,6 +132,22 @@ fn families_of_gen_move() {
 
 /// A step that takes longer than there is time is not taken.
 #[test]
+fn threads_change_no_digit() {
+    let folder = Folder::new();
+    let table = |threads: usize| {
+        let run = format!(
+            "simulate wall --set rows=3 --set columns=3 --end 0.01 --threads {threads} --csv {threads}.csv"
+        );
+        folder.run(&run).exits(0);
+        std::fs::read_to_string(folder.path(&format!("{threads}.csv"))).unwrap()
+    };
+    let one = table(1);
+    assert!(one.lines().count() > 2);
+    assert_eq!(one, table(2));
+    assert_eq!(one, table(0));
+}
+
+#[test]
 fn time_limits_hold_within_a_step() {
     let folder = Folder::new();
     let begun = std::time::Instant::now();

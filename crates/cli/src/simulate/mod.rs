@@ -72,6 +72,9 @@ pub struct Args {
     /// Stop after this many seconds of the wall clock; the step that is being done then is not taken
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     time_limit: Option<f64>,
+    /// Solve islands and look for contacts on so many threads, 0 for one a core; the results are the same, bit for bit
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    threads: usize,
     /// Say where the time went
     #[arg(long)]
     timings: bool,
@@ -200,7 +203,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         false => scene.build().map(|made| (made, None)),
     }
     .map_err(wrong)?;
-    let mut simulation = simulation.with_limits(limits);
+    let mut simulation = simulation.with_limits(limits).with_threads(args.threads);
     let frames = out.is_some() || html.is_some() || vtk.is_some() || args.svg.is_some();
     let mut recorder = Recorder::new(&scene, &simulation, frames);
     if let Some(file) = &args.resume {
