@@ -136,7 +136,7 @@ fn threads_change_no_digit() {
     let folder = Folder::new();
     let table = |threads: usize| {
         let run = format!(
-            "simulate wall --set rows=3 --set columns=3 --end 0.01 --threads {threads} --csv {threads}.csv"
+            "simulate wall --set rows=3 --set columns=3 --end 0.03 --threads {threads} --csv {threads}.csv"
         );
         folder.run(&run).exits(0);
         std::fs::read_to_string(folder.path(&format!("{threads}.csv"))).unwrap()
