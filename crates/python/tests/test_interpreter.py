@@ -118,7 +118,7 @@ def test_python_goes_on_while_a_problem_is_solved(contacts):
         time.sleep(0.001)
         now = time.perf_counter()
         ticks, longest, last = ticks + 1, max(longest, now - last), now
-    assert ticks > 20 / SLACK and longest < SLACK * 0.1
+    assert ticks > 4 and longest < SLACK * 0.1
 
 
 def test_one_problem_in_many_threads():
