@@ -22,7 +22,7 @@ use crate::{expected, mistake};
 /// Iterations that a step's solve may take, as the command line has it.
 const ITERATIONS: usize = 100_000;
 
-/// A scene as a JSON document, from a file of TOML or JSON, with its meshes, or from a robot's URDF; and what is to be said of it.
+/// A scene as a JSON document, from a file of TOML or JSON, with its meshes, or from a robot's URDF or a model of MuJoCo; and what is to be said of it.
 #[pyfunction]
 pub fn read_scene(py: Python<'_>, path: PathBuf) -> PyResult<(String, Vec<String>)> {
     py.detach(|| {
@@ -30,16 +30,16 @@ pub fn read_scene(py: Python<'_>, path: PathBuf) -> PyResult<(String, Vec<String
         let text = std::fs::read_to_string(&path)
             .map_err(|e| mistake(format!("{name}: expected a readable file, found: {e}")))?;
         let wrong = |e: SimulateError| mistake(format!("{name}: {e}"));
-        let is_urdf = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("urdf"));
-        let (text, warnings) = match is_urdf {
-            true => {
-                let made = import::urdf(&text).map_err(wrong)?;
-                (made.scene, made.warnings)
-            }
-            false => (text, vec![]),
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+        let made = match extension.as_deref() {
+            Some("urdf") => Some(import::urdf(&text).map_err(wrong)?),
+            Some("xml" | "mjcf") => Some(import::mjcf(&text, folder).map_err(wrong)?),
+            _ => None,
         };
+        let (text, warnings) = made.map_or((text, vec![]), |made| (made.scene, made.warnings));
         let mut scene = SceneFile::parse(&text, &[]).map_err(wrong)?;
-        scene.load_meshes(path.parent().unwrap_or(Path::new(""))).map_err(wrong)?;
+        scene.load_meshes(folder).map_err(wrong)?;
         let document = serde_json::to_string(&scene).map_err(mistake)?;
         Ok((document, warnings))
     })

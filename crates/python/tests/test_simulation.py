@@ -95,8 +95,9 @@ def test_scenes_of_files_and_robots(tmp_path):
     assert scenes
     world = ns.load(scenes[0])
     assert ns.simulate(world, until=world.document["time"]["h"] * 3).solved
-    robots = sorted((EXAMPLES / "robots").glob("*.urdf"))
-    assert robots and ns.load(robots[0]).document["bodies"]
+    for kind in ("*.urdf", "*.xml"):
+        robots = sorted((EXAMPLES / "robots").glob(kind))
+        assert robots and ns.load(robots[0]).document["bodies"]
     world = ball()
     world.save(tmp_path / "scene.toml")
     world.save(tmp_path / "scene.json")
