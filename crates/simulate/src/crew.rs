@@ -60,14 +60,16 @@ impl Slot {
         self.problem.mu.len() > SMALL
     }
 
-    /// By its own sessions, or those of the thread.
-    fn solve(&mut self, shared: &mut Sessions, inner: &Inner) {
-        let mut own = self.own.take();
-        let solved = match own.as_mut().filter(|_| self.is_large()) {
-            Some(own) => own.solve(self, inner),
-            None => shared.solve(self, inner),
-        };
-        (self.own, self.outcome) = (own, solved.transpose());
+    fn solve(&mut self, sessions: &mut Sessions, inner: &Inner) {
+        self.outcome = sessions.solve(self, inner).transpose();
+    }
+
+    /// By its own sessions.
+    fn solve_alone(&mut self, inner: &Inner) {
+        if let Some(mut own) = self.own.take() {
+            self.solve(&mut own, inner);
+            self.own = Some(own);
+        }
     }
 }
 
@@ -154,7 +156,11 @@ impl Crew {
         }
         let Some(pool) = self.pool.as_ref().filter(|_| open.len() > 1) else {
             for &k in open {
-                slots[k as usize].solve(&mut self.sessions[0], inner);
+                let slot = &mut slots[k as usize];
+                match slot.is_large() {
+                    true => slot.solve_alone(inner),
+                    false => slot.solve(&mut self.sessions[0], inner),
+                }
             }
             return Ok(());
         };
@@ -171,10 +177,7 @@ impl Crew {
                 let budget = &budget;
                 scope.spawn(move |_| {
                     let _scope = budget.enter();
-                    if let Some(mut own) = slot.own.take() {
-                        slot.solve(&mut own, inner);
-                        slot.own = Some(own);
-                    }
+                    slot.solve_alone(inner);
                 });
             }
             for (part, sessions) in small.chunks_mut(share).zip(&mut self.sessions) {
