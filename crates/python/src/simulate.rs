@@ -31,12 +31,8 @@ pub fn read_scene(py: Python<'_>, path: PathBuf) -> PyResult<(String, Vec<String
             .map_err(|e| mistake(format!("{name}: expected a readable file, found: {e}")))?;
         let wrong = |e: SimulateError| mistake(format!("{name}: {e}"));
         let folder = path.parent().unwrap_or(Path::new(""));
-        let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-        let made = match extension.as_deref() {
-            Some("urdf") => Some(import::urdf(&text).map_err(wrong)?),
-            Some("xml" | "mjcf") => Some(import::mjcf(&text, folder).map_err(wrong)?),
-            _ => None,
-        };
+        let made = import::format(&path).map(|format| (format.read)(&text, folder));
+        let made = made.transpose().map_err(wrong)?;
         let (text, warnings) = made.map_or((text, vec![]), |made| (made.scene, made.warnings));
         let mut scene = SceneFile::parse(&text, &[]).map_err(wrong)?;
         scene.load_meshes(folder).map_err(wrong)?;

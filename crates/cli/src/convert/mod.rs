@@ -50,7 +50,7 @@ Exit codes: 0 written; 2 a mistake in a file or an option.";
 pub fn run(args: &Args) -> Result<Exit, String> {
     let Args { from, to, format, as_mcp } = args;
     if let Some(origin) = scene::origin(from) {
-        return scene::write(args, origin);
+        return scene::write(args, &origin);
     }
     if files::same(from, to) {
         let to = to.display();

@@ -4,30 +4,43 @@ use std::path::Path;
 
 use nonsmooth_io::siconos::MechanicsScene;
 use nonsmooth_simulate::SimulateError;
-use nonsmooth_simulate::import::{Imported, mjcf, urdf};
+use nonsmooth_simulate::import::{self, Format, Imported};
 
 use super::Args;
 use crate::report::row;
 use crate::{Exit, files, output};
 
 /// A format that scenes are made of.
-pub struct Origin {
-    name: &'static str,
-    read: fn(&Path) -> Result<Imported, String>,
+pub enum Origin {
+    /// A text.
+    Text(Format),
+    /// Siconos' mechanics HDF5.
+    Mechanics,
 }
 
 /// The format of a file by its name, if scenes are made of it.
-pub fn origin(from: &Path) -> Option<&'static Origin> {
-    const URDF: Origin = Origin { name: "URDF", read: |from| text(from, |text, _| urdf(text)) };
-    const MJCF: Origin = Origin { name: "MJCF", read: |from| text(from, mjcf) };
-    const SICONOS: Origin =
-        Origin { name: "Siconos' mechanics HDF5", read: super::mechanics::read };
+pub fn origin(from: &Path) -> Option<Origin> {
+    if let Some(format) = import::format(from) {
+        return Some(Origin::Text(format));
+    }
     let extension = from.extension()?.to_str()?.to_ascii_lowercase();
-    match extension.as_str() {
-        "urdf" => Some(&URDF),
-        "xml" | "mjcf" => Some(&MJCF),
-        "h5" | "hdf5" if holds_mechanics(from) => Some(&SICONOS),
-        _ => None,
+    let holds = matches!(extension.as_str(), "h5" | "hdf5") && holds_mechanics(from);
+    holds.then_some(Origin::Mechanics)
+}
+
+impl Origin {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Text(format) => format.name,
+            Self::Mechanics => "Siconos' mechanics HDF5",
+        }
+    }
+
+    fn read(&self, from: &Path) -> Result<Imported, String> {
+        match self {
+            Self::Text(format) => text(from, format.read),
+            Self::Mechanics => super::mechanics::read(from),
+        }
     }
 }
 
@@ -56,7 +69,7 @@ pub fn write(Args { from, to, format, as_mcp }: &Args, origin: &Origin) -> Resul
         return Err(format!("{target}: expected a name that ends in .toml, for a scene"));
     }
     files::writable("TO", to)?;
-    let made = (origin.read)(from)?;
+    let made = origin.read(from)?;
     made.warnings.iter().for_each(|w| output::remark(&format!("warning: {w}\n")));
     if stream {
         output::print(&made.scene);
@@ -64,7 +77,7 @@ pub fn write(Args { from, to, format, as_mcp }: &Args, origin: &Origin) -> Resul
     }
     files::write_text("TO", to, &made.scene)?;
     let mut said = format!("{target}: a scene for `nonsmooth simulate`\n");
-    row(&mut said, "from", format!("{name} ({})", origin.name));
+    row(&mut said, "from", format!("{name} ({})", origin.name()));
     output::print(&said);
     Ok(Exit::Solved)
 }

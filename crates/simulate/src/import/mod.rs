@@ -3,6 +3,8 @@
 mod mjcf;
 mod urdf;
 
+use std::path::Path;
+
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, congruence, scale};
 use nonsmooth_scenes::{MassProperties, Rotation};
 use serde_json::Value;
@@ -20,6 +22,25 @@ pub struct Imported {
     pub scene: String,
     /// What was left out or is to be decided, a line each.
     pub warnings: Vec<String>,
+}
+
+/// A format of text that scenes are made of.
+#[derive(Debug, Clone, Copy)]
+pub struct Format {
+    /// What it is called.
+    pub name: &'static str,
+    /// Makes the scene of a text whose files lie in a folder.
+    pub read: fn(&str, &Path) -> Result<Imported, SimulateError>,
+}
+
+/// The format of a file by its extension: `.urdf`; `.xml` and `.mjcf`. None of other files.
+pub fn format(file: &Path) -> Option<Format> {
+    let extension = file.extension()?.to_str()?.to_ascii_lowercase();
+    match extension.as_str() {
+        "urdf" => Some(Format { name: "URDF", read: |text, _| urdf(text) }),
+        "xml" | "mjcf" => Some(Format { name: "MJCF", read: mjcf }),
+        _ => None,
+    }
 }
 
 /// Where something is: turned first.
