@@ -152,6 +152,15 @@ impl<const D: usize> Bsr<D> {
         self.get(i, i).copied().unwrap_or([[0.0; D]; D])
     }
 
+    /// Changes the block of each row and column in place.
+    pub fn change(&mut self, mut change: impl FnMut(usize, usize, &mut Block<D>)) {
+        for i in 0..self.nrows() {
+            for k in self.row_ptr[i]..self.row_ptr[i + 1] {
+                change(i, self.col_idx[k] as usize, &mut self.blocks[k]);
+            }
+        }
+    }
+
     /// `(A x)_i`, the product of block row `i`.
     #[inline(always)]
     pub fn row_product(&self, i: usize, x: &[f64]) -> [f64; D] {

@@ -101,16 +101,26 @@ pub(crate) fn vector(name: &str, x: &[f64], len: usize, meaning: &str) -> Result
 }
 
 /// Every coefficient of friction is finite and not negative; zero is allowed (a frictionless contact).
-pub(crate) fn friction_coefficients(mu: &[f64]) -> Result<(), ProblemError> {
-    all_finite("mu", mu)?;
+pub(crate) fn friction_coefficients(name: &str, mu: &[f64]) -> Result<(), ProblemError> {
+    all_finite(name, mu)?;
     match mu.iter().position(|&m| m < 0.0) {
         Some(c) => Err(ProblemError::value(
-            format!("mu[{c}]"),
+            format!("{name}[{c}]"),
             "a coefficient of friction of at least 0",
             mu[c],
         )),
         None => Ok(()),
     }
+}
+
+/// Coefficients of rolling friction of each of the contacts, of a law with more disks than one.
+pub(crate) fn rolling_coefficients(
+    mu_r: &[f64],
+    contacts: usize,
+    disks: usize,
+) -> Result<(), ProblemError> {
+    vector("mu_r", mu_r, if disks > 1 { contacts } else { 0 }, "contacts")?;
+    friction_coefficients("mu_r", mu_r)
 }
 
 /// Bounds `[l, u]`, each of so many entries, that are numbers and do not cross.

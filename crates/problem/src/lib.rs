@@ -22,8 +22,8 @@ pub use kinds::complementarity::{
     BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mcp, Mlcp, Part, Parts, Shape, Stated, plural,
 };
 pub use kinds::contact::{
-    Bounds, Coulomb, Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RowsGlobal,
-    RowsLocal,
+    Bounds, Coulomb, Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Rolling,
+    RollingData, RollingGlobal, RollingLocal, RowsGlobal, RowsLocal,
 };
 pub use kinds::variational::{Set, Vi};
 pub use kinds::{Complementarity, Friction, Kind};

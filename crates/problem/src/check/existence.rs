@@ -21,8 +21,8 @@ use serde::Serialize;
 
 use super::proof::{Equation, exact, negative, satisfying};
 use super::{Certificate, Exact, ExactVector, Impulses, Law, Monotone, Proof, rounded};
-use crate::{Coulomb, Problem};
-use nonsmooth_linalg::small::{self, tangential_norm};
+use crate::{Coulomb, Problem, Rolling};
+use nonsmooth_linalg::small;
 use nonsmooth_linalg::{Compensated, Csc, norm};
 
 /// What is known of the existence of a solution. *Proved* is what holds in exact arithmetic on the stored doubles; what holds up to rounding is *nearly* so.
@@ -235,6 +235,8 @@ pub struct Kinematics<const D: usize> {
     pub constant: Vec<f64>,
     /// The coefficients of friction.
     pub mu: Vec<f64>,
+    /// The coefficients of rolling friction, or empty.
+    pub mu_r: Vec<f64>,
     /// The relative uncertainty of `[A; E]`.
     pub noise: f64,
 }
@@ -244,17 +246,47 @@ impl<const D: usize> Kinematics<D> {
         entries: &[(usize, usize, f64)],
         columns: usize,
         constant: Vec<f64>,
-        mu: Vec<f64>,
+        (mu, mu_r): (&[f64], &[f64]),
         noise: f64,
     ) -> Self {
         let transposed = entries.iter().map(|&(i, j, x)| (j, i, x));
         let rows = Csc::from_triplets(columns, constant.len(), transposed).expect("in range");
-        Self { rows, constant, mu, noise: noise.max(UNCERTAINTY) }
+        let (mu, mu_r) = (mu.to_vec(), mu_r.to_vec());
+        Self { rows, constant, mu, mu_r, noise: noise.max(UNCERTAINTY) }
     }
 
     /// The number of components of u.
     pub fn contact_rows(&self) -> usize {
         D * self.mu.len()
+    }
+
+    /// The coefficients of the disks of contact c: of friction, and of rolling friction if there is any.
+    pub fn coefficients(&self, c: usize) -> impl Iterator<Item = f64> + Clone + use<'_, D> {
+        std::iter::once(self.mu[c]).chain(self.mu_r.get(c).copied())
+    }
+
+    /// The coefficient of the disk that row k ≥ 1 of contact c is of.
+    pub fn coefficient(&self, c: usize, k: usize) -> f64 {
+        match self.mu_r.get(c) {
+            Some(&mu_r) if k > (D - 1) / 2 => mu_r,
+            _ => self.mu[c],
+        }
+    }
+
+    /// The components of u in each disk of contact c, with the disk's coefficient.
+    fn disks<'a, T>(&'a self, c: usize, u: &'a [T; D]) -> impl Iterator<Item = (f64, &'a [T])> {
+        let rows = if self.mu_r.is_empty() { D - 1 } else { (D - 1) / 2 };
+        self.coefficients(c).zip(u[1..].chunks(rows))
+    }
+
+    /// `u_N − mu‖u_T‖ − mu_r‖u_R‖`.
+    fn gap(&self, c: usize, u: &[f64; D]) -> f64 {
+        self.disks(c, u).fold(u[0], |gap, (mu, part)| gap - mu * norm(part))
+    }
+
+    /// Whether K* of contact c is a polyhedron.
+    fn is_polyhedral(&self, c: usize) -> bool {
+        D == 2 || self.coefficients(c).all(|mu| mu == 0.0)
     }
 
     /// Row i of `[A x + c; E x + e]` in doubled precision, and the size of its terms.
@@ -288,17 +320,17 @@ impl<const D: usize> Kinematics<D> {
         let constrained = self.constant.len() > m;
         let still = x.iter().all(|&x| x == 0.0);
         let mut least = f64::INFINITY;
-        for (c, &mu) in self.mu.iter().enumerate() {
+        for c in 0..self.mu.len() {
             let mut u = [0.0; D];
             let mut size = 0.0;
             for k in 0..D {
                 let (value, terms) = self.row(D * c + k, x);
                 u[k] = value;
-                size += if k == 0 { terms } else { mu * terms };
+                size += if k == 0 { terms } else { self.coefficient(c, k) * terms };
             }
-            let gap = u[0] - mu * tangential_norm(&u);
+            let gap = self.gap(c, &u);
             // Multipliers of a polyhedron need no interior; without motion u is the data themselves.
-            let polyhedral = D == 2 || mu == 0.0;
+            let polyhedral = self.is_polyhedral(c);
             if polyhedral && still && gap >= 0.0 {
                 least = least.min(if size > 0.0 { gap / size } else { 0.0 });
                 continue;
@@ -352,29 +384,40 @@ impl<const D: usize> Kinematics<D> {
         let mut least = f64::INFINITY;
         let near: Vec<f64> = x.iter().map(rounded).collect();
         let doubles = near.iter().zip(x).all(|(near, x)| exact(*near) == *x);
-        for (c, &mu) in self.mu.iter().enumerate() {
+        for c in 0..self.mu.len() {
             // A margin beyond all rounding of doubled precision needs no closer look where x is made of doubles.
             if doubles {
                 let rows: [(f64, f64); D] = std::array::from_fn(|k| self.row(D * c + k, &near));
-                let size = rows[0].1 + mu * rows[1..].iter().map(|r| r.1).sum::<f64>();
-                let gap = rows[0].0 - mu * tangential_norm(&rows.map(|r| r.0));
+                let of = |k: usize| self.coefficient(c, k) * rows[k].1;
+                let size = rows[0].1 + (1..D).map(of).sum::<f64>();
+                let gap = self.gap(c, &rows.map(|r| r.0));
                 if gap > SURE * size && size.is_finite() {
                     least = least.min(gap / size);
                     continue;
                 }
             }
             let u: [Exact; D] = std::array::from_fn(|k| row(D * c + k));
-            let tangential = u[1..].iter().fold(Exact::ZERO, |sum, t| sum + t * t);
-            let mu_exact = exact(mu);
-            let gap = &u[0] * &u[0] - &mu_exact * &mu_exact * &tangential;
-            let polyhedral = D == 2 || mu == 0.0;
-            let inside = !negative(&u[0]) && !negative(&gap);
-            if !inside || (!polyhedral && (u[0].is_zero() || gap.is_zero())) {
+            // The squares of mu‖u_T‖ and mu_r‖u_R‖.
+            let squares = self.disks(c, &u).map(|(mu, part)| {
+                let square = part.iter().fold(Exact::ZERO, |sum, t| sum + t * t);
+                exact(mu) * exact(mu) * square
+            });
+            let squares: Vec<Exact> = squares.collect();
+            let gap = squares.iter().fold(&u[0] * &u[0], |gap, square| gap - square);
+            // u_N² > (a + b)² where u_N² − a² − b² > 0 and its square exceeds (2ab)²: no root is taken.
+            let crossed = match &squares[..] {
+                [a, b] => &gap * &gap - exact(4.0) * a * b,
+                _ => gap.clone(),
+            };
+            let inside = !negative(&u[0]) && !negative(&gap) && !negative(&crossed);
+            let touches = u[0].is_zero() || gap.is_zero() || crossed.is_zero();
+            if !inside || (!self.is_polyhedral(c) && touches) {
                 return None;
             }
             let normal = rounded(&u[0]);
-            let gap = normal - mu * rounded(&tangential).sqrt();
-            let size = self.row(D * c, &near).1 + mu * rounded(&tangential).sqrt();
+            let sliding: f64 = squares.iter().map(|square| rounded(square).sqrt()).sum();
+            let gap = normal - sliding;
+            let size = self.row(D * c, &near).1 + sliding;
             least = least.min(if size > 0.0 { (gap / size).max(0.0) } else { 0.0 });
         }
         Some(least)
@@ -382,25 +425,25 @@ impl<const D: usize> Kinematics<D> {
 
     /// Whether `ray` proves, up to rounding, that no motion has `u ∈ K*` at every contact.
     pub fn refutes_criterion(&self, ray: &Impulses) -> bool {
-        self.felt(ray, &self.mu).is_some_and(|felt| self.power(ray).is_negative(felt))
+        self.felt(ray, true).is_some_and(|felt| self.power(ray).is_negative(felt))
     }
 
     /// Whether `ray` proves, up to rounding, that no motion has `u ∈ int K*` at every contact.
     pub fn refutes_interior(&self, ray: &Impulses) -> bool {
         let power = self.power(ray);
         let some = ray.r.iter().any(|&r| r != 0.0);
-        some && self.felt(ray, &self.mu).is_some() && power.sum <= NEGATIVE * power.size
+        some && self.felt(ray, true).is_some() && power.sum <= NEGATIVE * power.size
     }
 
     /// Whether `certificate` proves, up to rounding, that no motion has `u_N ≥ 0` at every contact, and so that there is no solution.
     pub fn refutes(&self, certificate: &Impulses) -> bool {
-        let felt = self.felt(certificate, &vec![0.0; self.mu.len()]);
+        let felt = self.felt(certificate, false);
         felt.is_some_and(|felt| self.power(certificate).is_negative(felt))
     }
 
-    /// Where `r ∈ K` for the coefficients given and `(r, λ)ᵀ [A; E] = 0` up to rounding: the power that the rest of these products
+    /// Where `r ∈ K`, without friction `r_N ≥ 0` and nothing else, and `(r, λ)ᵀ [A; E] = 0` up to rounding: the power that the rest of these products
     /// can still have, with motions that are [`REACH`] times as fast as the largest velocity given.
-    fn felt(&self, ray: &Impulses, mu: &[f64]) -> Option<f64> {
+    fn felt(&self, ray: &Impulses, friction: bool) -> Option<f64> {
         let (r, lambda) = (&ray.r, &ray.lambda);
         let m = self.contact_rows();
         let scale = norm(r);
@@ -408,10 +451,15 @@ impl<const D: usize> Kinematics<D> {
         if !shaped || !scale.is_finite() || !norm(lambda).is_finite() {
             return None;
         }
-        let inside = |(c, &mu): (usize, &f64)| {
-            Coulomb { mu }.distance_to_cone(&small::block::<D>(r, c)) <= INSIDE * scale
+        let outside = |c: usize| {
+            let r = small::block::<D>(r, c);
+            match (friction, self.mu_r.get(c)) {
+                (false, _) => Coulomb { mu: 0.0 }.distance_to_cone(&r),
+                (true, None) => Coulomb { mu: self.mu[c] }.distance_to_cone(&r),
+                (true, Some(&mu_r)) => Rolling { mu: self.mu[c], mu_r }.distance_to_cone(&r),
+            }
         };
-        if !mu.iter().enumerate().all(inside) {
+        if (0..self.mu.len()).any(|c| !(outside(c) <= INSIDE * scale)) {
             return None;
         }
         // Contacts are all in m/s; each equation is in units of its own largest entry.

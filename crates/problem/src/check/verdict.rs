@@ -39,6 +39,13 @@ pub struct StatusCounts {
     pub at_limit: usize,
     /// Contacts, counted above as well, whose margin to another status is below the tolerance.
     pub degenerate: usize,
+    /// Contacts, counted above as well, that roll against rolling friction.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub rolling: usize,
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// The verdict on a point of a problem P.

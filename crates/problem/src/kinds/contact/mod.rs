@@ -2,15 +2,17 @@
 
 mod global;
 mod judge;
-mod law;
+pub(crate) mod law;
 mod local;
 pub mod planted;
 mod rows;
 
-pub use global::{Dynamics, FrictionGlobal, GlobalGauge, GlobalPoint, RowsGlobal};
+pub use global::{
+    Dynamics, FrictionGlobal, GlobalGauge, GlobalPoint, RollingGlobal, RowsGlobal,
+};
 pub use judge::{ContactStatus, Impulses, Law, Motion};
-pub use law::Coulomb;
-pub use local::{FrictionLocal, LocalGauge, LocalPoint, RowsLocal};
+pub use law::{Coulomb, Rolling, RollingData};
+pub use local::{FrictionLocal, LocalGauge, LocalPoint, RollingLocal, RowsLocal};
 pub use rows::Bounds;
 
 use crate::{Friction, Kind, Problem, ProblemError, with_friction};
@@ -34,6 +36,11 @@ impl Friction {
     /// mu, nc.
     pub fn mu(&self) -> &[f64] {
         with_friction!(self, p => &p.mu)
+    }
+
+    /// The coefficients of rolling friction, nc, or empty.
+    pub fn mu_r(&self) -> &[f64] {
+        with_friction!(self, p => p.mu_r.values())
     }
 
     /// Checks shapes and values.

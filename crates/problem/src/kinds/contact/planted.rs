@@ -9,8 +9,11 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use crate::{
-    Bounds, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RowsGlobal, RowsLocal,
+    Bounds, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RollingGlobal,
+    RollingLocal, RowsGlobal, RowsLocal,
 };
+use crate::check::Law;
+use crate::kinds::contact::law::RollingData;
 use nonsmooth_linalg::{Csc, Delassus, Inverse};
 
 /// The sizes and the state of a contact problem with a known solution.
@@ -28,6 +31,8 @@ pub struct Planted {
     pub mix: PlantedMix,
     /// Coefficients of friction are drawn between these.
     pub mu: (f64, f64),
+    /// Coefficients of rolling friction, of problems that have any, likewise.
+    pub mu_r: (f64, f64),
     /// The relative size of a skew-symmetric part in the blocks of M, and so in W.
     pub skew: f64,
     /// The seed: the same seed gives the same problem to the bit.
@@ -56,6 +61,7 @@ impl Default for Planted {
             bounded: 0,
             mix: PlantedMix { open: 1.0, stick: 1.0, slip: 1.0, degenerate: 0.0 },
             mu: (0.2, 0.9),
+            mu_r: (0.05, 0.5),
             skew: 0.0,
             seed: 0,
         }
@@ -65,6 +71,26 @@ impl Default for Planted {
 impl Planted {
     /// A global problem and a solution of it.
     pub fn global<const D: usize>(&self) -> (FrictionGlobal<D>, GlobalPoint) {
+        self.global_of()
+    }
+
+    /// A global problem with rolling friction and a solution of it. Rolling is drawn as sliding is, by itself.
+    pub fn rolling_global(&self) -> (RollingGlobal, GlobalPoint) {
+        self.global_of()
+    }
+
+    /// A local problem and a solution of it: the condensed form of [`global`](Self::global), with
+    /// `q` and `s` recomputed so that rounding in W does not disturb the solution.
+    pub fn local<const D: usize>(&self) -> (FrictionLocal<D>, LocalPoint) {
+        Self::condensed(self.global())
+    }
+
+    /// The same of [`rolling_global`](Self::rolling_global).
+    pub fn rolling_local(&self) -> (RollingLocal, LocalPoint) {
+        Self::condensed(self.rolling_global())
+    }
+
+    fn global_of<const D: usize, L: Law<D>>(&self) -> (FrictionGlobal<D, L>, GlobalPoint) {
         let mut rng = Pcg64::seed_from_u64(self.seed);
         let p = self.bilateral + self.bounded;
         let (n, m) = (self.dofs.max(1), D * self.contacts.max(usize::from(p == 0)));
@@ -101,11 +127,16 @@ impl Planted {
                 g.push((i, j, normal()));
             }
         }
-        let (mut u, mut r, mut mu) = (vec![0.0; m], vec![0.0; m], Vec::new());
+        let (mut u, mut r) = (vec![0.0; m], vec![0.0; m]);
+        let (mut mu, mut mu_r) = (Vec::new(), Vec::new());
         for c in 0..m / D {
             mu.push(rng.random_range(self.mu.0..=self.mu.1));
+            if L::DISKS > 1 {
+                mu_r.push(rng.random_range(self.mu_r.0..=self.mu_r.1));
+            }
             let range = D * c..D * c + D;
-            self.plant(mu[c], &mut rng, &mut u[range.clone()], &mut r[range]);
+            let coefficients: Vec<f64> = mu.last().into_iter().chain(mu_r.last()).copied().collect();
+            self.plant(&coefficients, &mut rng, &mut u[range.clone()], &mut r[range]);
         }
         let (bounds, mut b) = self.bounds(&mut rng, &mut lambda);
 
@@ -119,15 +150,15 @@ impl Planted {
         g.mul_add(-1.0, &lambda, &mut f);
         g.mul_transpose_add(-1.0, &v, &mut b);
         let rows = (p > 0).then_some(RowsGlobal { G: g, b, bounds });
-        let problem = FrictionGlobal { M: mass, H: h, f, w, mu, rows };
+        let mu_r = L::Rolling::of(mu_r);
+        let problem = FrictionGlobal { M: mass, H: h, f, w, mu, mu_r, rows };
         problem.validate().expect("a planted problem is valid");
         (problem, GlobalPoint { v, r, lambda })
     }
 
-    /// A local problem and a solution of it: the condensed form of [`global`](Self::global), with
-    /// `q` and `s` recomputed so that rounding in W does not disturb the solution.
-    pub fn local<const D: usize>(&self) -> (FrictionLocal<D>, LocalPoint) {
-        let (global, GlobalPoint { v, r, lambda }) = self.global::<D>();
+    fn condensed<const D: usize, L: Law<D>>(
+        (global, GlobalPoint { v, r, lambda }): (FrictionGlobal<D, L>, GlobalPoint),
+    ) -> (FrictionLocal<D, L>, LocalPoint) {
         let inverse = Inverse::new(&global.M, "M").expect("a planted M is invertible");
         let mut q = vec![0.0; r.len()];
         global.velocity_into(&v, &mut q);
@@ -164,7 +195,8 @@ impl Planted {
                 q[D * i + k] -= product[k];
             }
         }
-        let problem = FrictionLocal { W: w, q, mu: global.mu, rows };
+        let (mu, mu_r) = (global.mu, global.mu_r);
+        let problem = FrictionLocal { W: w, q, mu, mu_r, rows };
         problem.validate().expect("a planted problem is valid");
         (problem, LocalPoint { r, lambda })
     }
@@ -201,34 +233,44 @@ impl Planted {
         (bounds, velocities)
     }
 
-    /// Draws `(u, r)` of one contact that obeys the law.
-    fn plant(&self, mu: f64, rng: &mut Pcg64, u: &mut [f64], r: &mut [f64]) {
+    /// Draws `(u, r)` of one contact that obeys the law with the coefficients given, one a disk.
+    fn plant(&self, coefficients: &[f64], rng: &mut Pcg64, u: &mut [f64], r: &mut [f64]) {
         let PlantedMix { open, stick, slip, degenerate } = self.mix;
-        let mut draw = rng.random_range(0.0..open + stick + slip + degenerate);
-        let direction = direction(u.len() - 1, rng);
-        let size = rng.random_range(0.1..1.0);
-        let sliding = rng.random_range(0.1..1.0);
-        let inside = rng.random_range(0.0..0.9);
-        let apex = rng.random_range(0.0..1.0) < 0.5;
-        let tangential = |x: &mut [f64], a: f64| {
-            x[1..].iter_mut().zip(&direction).for_each(|(x, d)| *x = a * d);
-        };
-        if draw < open {
-            u[0] = size;
-            tangential(u, sliding);
-            return;
-        }
-        draw -= open;
-        if draw < stick {
-            r[0] = size;
-            tangential(r, inside * mu * size);
-        } else if draw - stick < slip {
-            r[0] = size;
-            tangential(r, -mu * size);
-            tangential(u, sliding);
-        } else if !apex {
-            r[0] = size;
-            tangential(r, mu * size);
+        let rows = (u.len() - 1) / coefficients.len();
+        let mut opened = false;
+        for (disk, &mu) in coefficients.iter().enumerate() {
+            let mut draw = rng.random_range(0.0..open + stick + slip + degenerate);
+            let direction = direction(rows, rng);
+            let size = rng.random_range(0.1..1.0);
+            let sliding = rng.random_range(0.1..1.0);
+            let inside = rng.random_range(0.0..0.9);
+            let apex = rng.random_range(0.0..1.0) < 0.5;
+            let part = 1 + disk * rows..1 + (disk + 1) * rows;
+            let tangential = |x: &mut [f64], a: f64| {
+                x[part.clone()].iter_mut().zip(&direction).for_each(|(x, d)| *x = a * d);
+            };
+            // The first disk says whether the contact is pressed, and how much.
+            let pressed = if disk == 0 { size } else { r[0] };
+            if opened || (disk == 0 && draw < open) {
+                if disk == 0 {
+                    u[0] = size;
+                    opened = true;
+                }
+                tangential(u, sliding);
+                continue;
+            }
+            draw = if disk == 0 { draw - open } else { draw.min(stick + slip) };
+            if draw < stick {
+                r[0] = pressed;
+                tangential(r, inside * mu * pressed);
+            } else if draw - stick < slip && (disk == 0 || pressed > 0.0) {
+                r[0] = pressed;
+                tangential(r, -mu * pressed);
+                tangential(u, sliding);
+            } else if !apex && (disk == 0 || pressed > 0.0) {
+                r[0] = pressed;
+                tangential(r, mu * pressed);
+            }
         }
     }
 }
@@ -295,6 +337,47 @@ mod tests {
             let (problem, point) = case.global::<2>();
             assert!(problem.judge(&point, 1e-12).unwrap().solved, "{case:?}");
         }
+    }
+
+    #[test]
+    fn rolling_friction_is_planted_and_judged_as_sliding_is() {
+        for case in cases() {
+            let (problem, point) = case.rolling_global();
+            let verdict = problem.judge(&point, 1e-12).unwrap();
+            assert!(verdict.solved, "{case:?}: {verdict:?}");
+            let (problem, point) = case.rolling_local();
+            let verdict = problem.judge(&point, 1e-12).unwrap();
+            assert!(verdict.solved, "{case:?}: {verdict:?}");
+            assert!(case.contacts < 20 || verdict.counts.rolling > 0);
+            for i in 0..point.r.len() {
+                let mut wrong = point.clone();
+                wrong.r[i] += 1e-3;
+                assert!(!problem.judge(&wrong, 1e-8).unwrap().solved, "{case:?} entry {i}");
+            }
+        }
+    }
+
+    /// A length in other units: angular rows of W and q, moments and mu_r change, and no residual but those that are reported as given.
+    #[test]
+    fn the_unit_of_length_of_rolling_does_not_matter() {
+        let (problem, mut point) = Planted::default().rolling_local();
+        point.r.iter_mut().enumerate().for_each(|(i, r)| *r += 1e-4 * (i as f64).sin());
+        let reference = problem.judge(&point, 1e-8).unwrap().measure;
+        let mut other = problem.clone();
+        let factor = |i: usize| if i % 5 > 2 { 1024.0 } else { 1.0 };
+        other.W.change(|i, j, block| {
+            for (k, row) in block.iter_mut().enumerate() {
+                let at = |j: usize, l: usize| factor(5 * j + l);
+                row.iter_mut().enumerate().for_each(|(l, x)| *x *= at(i, k) * at(j, l));
+            }
+        });
+        other.q.iter_mut().enumerate().for_each(|(i, q)| *q *= factor(i));
+        point.r.iter_mut().enumerate().for_each(|(i, r)| *r /= factor(i));
+        other.mu_r.iter_mut().for_each(|m| *m /= 1024.0);
+        let found = other.judge(&point, 1e-8).unwrap().measure;
+        assert_eq!(found.relative, reference.relative);
+        assert_eq!(found.own, reference.own);
+        assert_ne!(found.literature, reference.literature);
     }
 
     #[test]

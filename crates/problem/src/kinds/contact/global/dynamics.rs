@@ -1,6 +1,6 @@
 //! The factorised dynamics of a global problem.
 
-use crate::check::Impulses;
+use crate::check::{Impulses, Law};
 use crate::kinds::contact::judge;
 use crate::{FrictionGlobal, ProblemError, RowsGlobal};
 use nonsmooth_linalg::{Compensated, Csc, Inverse, Refine};
@@ -40,7 +40,7 @@ impl Held {
 
 impl Dynamics {
     /// Factorises. Errors: a singular M, by the component at fault.
-    pub fn new<const D: usize>(problem: &FrictionGlobal<D>) -> Result<Self, ProblemError> {
+    pub fn new<const D: usize, L: Law<D>>(problem: &FrictionGlobal<D, L>) -> Result<Self, ProblemError> {
         let held = problem.rows.as_ref().and_then(Held::new);
         let inverse = match (&problem.rows, &held) {
             (None, _) => Inverse::new(&problem.M, "M")?,
@@ -59,7 +59,7 @@ impl Dynamics {
     }
 
     /// Whether `problem` has the matrices that were factorised. Cost: one comparison of M and G.
-    pub fn serves<const D: usize>(&self, problem: &FrictionGlobal<D>) -> bool {
+    pub fn serves<const D: usize, L: Law<D>>(&self, problem: &FrictionGlobal<D, L>) -> bool {
         let borders = |j: usize| match &self.held {
             None => true,
             Some(held) => held.free.binary_search(&j).is_ok(),
@@ -81,9 +81,9 @@ impl Dynamics {
 
     /// `(v, lambda)` for the impulses `r`, by one solve as refined as asked for; allocates nothing unless M has a component that is
     /// factorised sparsely.
-    pub fn solve<const D: usize>(
+    pub fn solve<const D: usize, L: Law<D>>(
         &mut self,
-        problem: &FrictionGlobal<D>,
+        problem: &FrictionGlobal<D, L>,
         r: &[f64],
         refine: Refine,
     ) -> (&[f64], &[f64]) {
@@ -115,9 +115,9 @@ impl Dynamics {
 
     /// The velocities and multipliers for the impulses `r` in doubled precision: `high + low`, each n + p, and in `last` what is
     /// not known of them ([`Inverse::solve_doubled`]).
-    pub fn solve_doubled<const D: usize>(
+    pub fn solve_doubled<const D: usize, L: Law<D>>(
         &mut self,
-        problem: &FrictionGlobal<D>,
+        problem: &FrictionGlobal<D, L>,
         r: &[f64],
         [high, low, last]: [&mut [f64]; 3],
     ) {
@@ -162,9 +162,9 @@ impl Dynamics {
     }
 
     /// The change of velocity `M⁻¹ H r` that the impulses alone bring about, the constraints kept.
-    pub fn respond<const D: usize>(
+    pub fn respond<const D: usize, L: Law<D>>(
         &mut self,
-        problem: &FrictionGlobal<D>,
+        problem: &FrictionGlobal<D, L>,
         r: &[f64],
         refine: Refine,
     ) -> &[f64] {
@@ -176,9 +176,9 @@ impl Dynamics {
     }
 
     /// The change of velocity `M⁻¹ G_j` that a unit impulse of row j brings about, the constraints kept.
-    pub fn respond_to_row<const D: usize>(
+    pub fn respond_to_row<const D: usize, L: Law<D>>(
         &mut self,
-        problem: &FrictionGlobal<D>,
+        problem: &FrictionGlobal<D, L>,
         j: usize,
     ) -> &[f64] {
         self.state.fill(0.0);
@@ -191,9 +191,9 @@ impl Dynamics {
     }
 
     /// Completes `point` from its impulses.
-    pub fn complete<const D: usize>(
+    pub fn complete<const D: usize, L: Law<D>>(
         &mut self,
-        problem: &FrictionGlobal<D>,
+        problem: &FrictionGlobal<D, L>,
         point: &mut crate::GlobalPoint,
     ) {
         self.hold(&point.lambda);
@@ -204,9 +204,9 @@ impl Dynamics {
 
     /// `q = Hᵀ v_free + w`, the relative velocity without impulses (rows with bounds none either); and a certificate if the bilateral constraints
     /// contradict each other, so that no v satisfies `Gᵀ v + b = 0`.
-    pub fn free_velocity<const D: usize>(
+    pub fn free_velocity<const D: usize, L: Law<D>>(
         &mut self,
-        problem: &FrictionGlobal<D>,
+        problem: &FrictionGlobal<D, L>,
         q: &mut [f64],
     ) -> Option<Impulses> {
         if let Some(held) = &mut self.held {

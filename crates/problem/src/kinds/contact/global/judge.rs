@@ -3,12 +3,15 @@
 use crate::check::proof::{Exactly, bounded, exacts, just, monotone};
 use crate::check::rows::{Rows, doubt};
 use crate::check::{
-    ConeSystem, ContactStatus, Judged, Kinematic, Kinematics, Measure, Monotone, StatusCounts,
-    Verdict, over,
+    ConeSystem, ContactStatus, Judged, Kinematic, Kinematics, Law, Measure, Monotone,
+    StatusCounts, Verdict, over,
 };
 use crate::kinds::contact::judge::gauge::{HALF_ULP, LawGauge, largest, unit, verdict, worst};
 use crate::kinds::contact::judge::loads::ROUNDING;
+use crate::kinds::contact::judge::Weighed;
 use crate::kinds::contact::judge::statement::{contacts, opposite, under};
+use crate::kinds::contact::judge::weighed::{arm, as_given, impulses, velocities, weight};
+use crate::kinds::contact::law::RollingData;
 use crate::{Dynamics, FrictionGlobal, GlobalPoint, Problem, ProblemError};
 use nonsmooth_linalg::{Csc, Delassus, Doubled, Inverse, Refine, norm, norm_of, small};
 
@@ -97,9 +100,9 @@ impl Reach {
     }
 
     /// The sizes of the terms of each velocity for the impulses r and the multipliers.
-    fn update<const D: usize>(
+    fn update<const D: usize, L: Law<D>>(
         &mut self,
-        problem: &FrictionGlobal<D>,
+        problem: &FrictionGlobal<D, L>,
         w: &[f64],
         r: &[f64],
         (v, lambda): (&[f64], &[f64]),
@@ -140,7 +143,7 @@ impl Reach {
 }
 
 impl GlobalGauge {
-    pub(crate) fn new<const D: usize>(problem: &FrictionGlobal<D>) -> Result<Self, ProblemError> {
+    pub(crate) fn new<const D: usize, L: Law<D>>(problem: &FrictionGlobal<D, L>) -> Result<Self, ProblemError> {
         let dynamics = Dynamics::new(problem)?;
         // W = Hᵀ M⁻¹ H and q = Hᵀ M⁻¹ f + w are those of the free dynamics, with bilateral rows apart.
         let free = match problem.rows {
@@ -187,9 +190,9 @@ impl GlobalGauge {
         Ok(gauge)
     }
 
-    pub(crate) fn refill<const D: usize>(
+    pub(crate) fn refill<const D: usize, L: Law<D>>(
         &mut self,
-        problem: &FrictionGlobal<D>,
+        problem: &FrictionGlobal<D, L>,
     ) -> Result<(), ProblemError> {
         if self.dynamics.serves(problem) && self.h == problem.H {
             self.rescale(problem);
@@ -200,7 +203,7 @@ impl GlobalGauge {
     }
 
     /// q from the present f and w, in doubled precision before it is rounded: of a body nearly at rest its terms cancel.
-    fn rescale<const D: usize>(&mut self, problem: &FrictionGlobal<D>) {
+    fn rescale<const D: usize, L: Law<D>>(&mut self, problem: &FrictionGlobal<D, L>) {
         let Self { dynamics, free, own, rows, q, law, units, .. } = self;
         let n = problem.dofs();
         let State { high, low, last, .. } = own;
@@ -235,7 +238,7 @@ impl GlobalGauge {
 
     /// Velocities of bodies carry the loads from contact to contact. The unit of a velocity is 1/√M_ii, that of a row of Hᵀ or Gᵀ the most that it
     /// makes of such velocities: w_c would be too small where its terms cancel.
-    fn couple<const D: usize>(&mut self, problem: &FrictionGlobal<D>) {
+    fn couple<const D: usize, L: Law<D>>(&mut self, problem: &FrictionGlobal<D, L>) {
         let Self { law, units, .. } = self;
         let (n, nc, p) = (problem.dofs(), problem.contacts(), problem.multipliers());
         let motion = nc + p;
@@ -259,9 +262,9 @@ impl GlobalGauge {
         }
     }
 
-    pub(crate) fn measure<const D: usize>(
+    pub(crate) fn measure<const D: usize, L: Law<D>>(
         &mut self,
-        problem: &FrictionGlobal<D>,
+        problem: &FrictionGlobal<D, L>,
         point: &GlobalPoint,
         precisely: bool,
     ) -> Measure {
@@ -353,6 +356,24 @@ impl GlobalGauge {
         measure
     }
 
+    /// The residuals in units of velocity, where rolling friction needs an arm for that.
+    pub(crate) fn measure_weighed<const D: usize, L: Law<D>>(
+        &mut self,
+        problem: &FrictionGlobal<D, L>,
+        point: &GlobalPoint,
+        precisely: bool,
+    ) -> Measure {
+        let Some(arms) = problem.arms() else { return self.measure(problem, point, precisely) };
+        let mut inner = point.clone();
+        impulses::<D>(&arms, &mut inner.r);
+        let mut measure = self.measure(&problem.weighed(&arms), &inner, precisely);
+        let (mut u, mut q) = (self.u.clone(), self.q.clone());
+        impulses::<D>(&arms, &mut u);
+        impulses::<D>(&arms, &mut q);
+        as_given(&mut measure, (&point.r, &u, norm(&q)), |c| problem.law(c));
+        measure
+    }
+
     /// The velocity of the last point measured.
     pub(super) fn velocity(&self) -> &[f64] {
         &self.u
@@ -360,15 +381,15 @@ impl GlobalGauge {
 }
 
 /// The velocity that a unit impulse of row j makes of itself, as if M were diagonal: a unit.
-fn of_impulse<const D: usize>(problem: &FrictionGlobal<D>, g: &Csc, j: usize) -> f64 {
+fn of_impulse<const D: usize, L: Law<D>>(problem: &FrictionGlobal<D, L>, g: &Csc, j: usize) -> f64 {
     let (rows, values) = g.column(j);
     rows.iter().zip(values).map(|(&i, g)| (g / unit(problem.M.get(i, i))).powi(2)).sum()
 }
 
 /// What the rounding of r to doubles alone makes of the residual, in the root mean square: by one response to
 /// impulses of the size of that rounding with signs in no order, since W itself is not known.
-fn floor<const D: usize>(
-    problem: &FrictionGlobal<D>,
+fn floor<const D: usize, L: Law<D>>(
+    problem: &FrictionGlobal<D, L>,
     r: &[f64],
     law: &LawGauge,
     dynamics: &mut Dynamics,
@@ -391,8 +412,8 @@ struct Imbalance {
 }
 
 /// `‖M v − H r − f − G λ‖` over `force = max(‖f‖, ‖H r‖)`; v may have a low part.
-fn imbalance<const D: usize>(
-    problem: &FrictionGlobal<D>,
+fn imbalance<const D: usize, L: Law<D>>(
+    problem: &FrictionGlobal<D, L>,
     (v, v_low): (&[f64], &[f64]),
     r: &[f64],
     lambda: &[f64],
@@ -412,17 +433,27 @@ fn imbalance<const D: usize>(
     }
 }
 
-impl<const D: usize> Judged for FrictionGlobal<D> {
+impl<const D: usize, L: Law<D>> Judged for FrictionGlobal<D, L> {
     type Status = ContactStatus;
     type Counts = StatusCounts;
 
     fn verdict(&self, point: &GlobalPoint, gauge: &mut Self::Gauge, tolerance: f64) -> Verdict {
         let measure = self.certify(point, gauge);
-        verdict::<_, D>(measure, &gauge.law, &point.r, gauge.velocity(), |c| self.law(c), tolerance)
+        let (arms, u) = (self.arms(), gauge.velocity());
+        let Some(arms) = arms else {
+            return verdict::<_, D>(measure, &gauge.law, &point.r, u, |c| self.law(c), tolerance);
+        };
+        let mut r = point.r.clone();
+        impulses::<D>(&arms, &mut r);
+        let weighed = self.weighed(&arms);
+        let mut found =
+            verdict::<_, D>(measure, &gauge.law, &r, u, |c| weighed.law(c), tolerance);
+        impulses::<D>(&arms, &mut found.velocity);
+        found
     }
 }
 
-impl<const D: usize> Kinematic<D> for FrictionGlobal<D> {
+impl<const D: usize, L: Law<D>> Kinematic<D> for FrictionGlobal<D, L> {
     fn kinematics(&self) -> Kinematics<D> {
         let m = self.w.len();
         let mut rows = vec![];
@@ -432,7 +463,7 @@ impl<const D: usize> Kinematic<D> for FrictionGlobal<D> {
             rows.extend(b.G.triplets().map(|(i, j, x)| (m + j, i, x)));
             constant.extend_from_slice(&b.b);
         }
-        Kinematics::new(&rows, self.dofs(), constant, self.mu.clone(), 0.0)
+        Kinematics::new(&rows, self.dofs(), constant, (&self.mu, self.mu_r.values()), 0.0)
     }
 
     fn motion(point: &GlobalPoint) -> Vec<f64> {
@@ -449,7 +480,7 @@ impl<const D: usize> Kinematic<D> for FrictionGlobal<D> {
 }
 
 /// `M v − H r − G λ = f`, `u − Hᵀ v = w`, `c − Gᵀ v = b`.
-impl<const D: usize> Exactly for FrictionGlobal<D> {
+impl<const D: usize, L: Law<D>> Exactly for FrictionGlobal<D, L> {
     fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
         let (n, m) = (self.dofs(), self.w.len());
         let mut rhs = exacts(&[&self.f[..], &self.w].concat());
@@ -470,7 +501,8 @@ impl<const D: usize> Exactly for FrictionGlobal<D> {
         let of_row = |(j, (c, bounds))| bounded(&mut system, n + m + j, c, bounds);
         let multipliers: Vec<_> = multipliers.map(of_row).collect();
         let impulses = opposite(&self.H, 0, &system);
-        let impulses = contacts::<D>(&mut system, n, impulses, &self.mu);
+        let laws: Vec<L> = (0..self.contacts()).map(|c| self.law(c)).collect();
+        let impulses = contacts::<L, D>(&mut system, n, impulses, &laws);
         system.unknowns = velocities.into_iter().map(just).collect();
         system.unknowns.extend(impulses);
         system.unknowns.extend(multipliers);
@@ -483,5 +515,37 @@ impl<const D: usize> Exactly for FrictionGlobal<D> {
 
     fn impulses_from(&self) -> Option<usize> {
         Some(self.dofs())
+    }
+}
+
+impl<const D: usize, L: Law<D>> Weighed for FrictionGlobal<D, L> {
+    /// With the diagonal of M for M: of free bodies in their own axes that is M.
+    fn arms(&self) -> Option<Vec<f64>> {
+        (L::DISKS > 1).then(|| {
+            let half = (D - 1) / 2;
+            let of = |i: usize| {
+                let (rows, values) = self.H.column(i);
+                let terms = rows.iter().zip(values);
+                terms.map(|(&j, h)| (h / unit(self.M.get(j, j))).powi(2)).sum::<f64>()
+            };
+            let trace = |rows: std::ops::Range<usize>| rows.map(of).sum::<f64>();
+            let of_contact = |c: usize| {
+                let first = D * c + 1;
+                arm(trace(first..first + half), trace(first + half..D * (c + 1)))
+            };
+            (0..self.contacts()).map(of_contact).collect()
+        })
+    }
+
+    fn weighed(&self, arms: &[f64]) -> Self {
+        let entries = self.H.triplets().map(|(i, j, x)| (i, j, weight::<D>(arms, j) * x));
+        let h = Csc::from_triplets(self.H.nrows(), self.H.ncols(), entries.collect::<Vec<_>>().into_iter());
+        let mut out = Self {
+            H: h.expect("in range"),
+            mu_r: self.mu_r.scaled(|c| 1.0 / arms[c]),
+            ..self.clone()
+        };
+        velocities::<D>(arms, &mut out.w);
+        out
     }
 }

@@ -7,8 +7,11 @@ pub use dynamics::Dynamics;
 pub use judge::GlobalGauge;
 
 use crate::check::{self, Certificate, ConeSystem, Evidence, Measure};
-use crate::error::{all_finite, friction_coefficients, vector};
-use crate::{Bounds, Coulomb, Kind, Problem, ProblemError};
+use crate::error::{all_finite, friction_coefficients, rolling_coefficients, vector};
+use crate::check::Law;
+use crate::kinds::contact::judge::Weighed;
+use crate::kinds::contact::law::RollingData;
+use crate::{Bounds, Coulomb, Kind, Problem, ProblemError, Rolling};
 use nonsmooth_linalg::Csc;
 
 /// **Find** `v`, `r` (and the impulses `lambda` of scalar rows) such that
@@ -26,6 +29,7 @@ use nonsmooth_linalg::Csc;
 /// | `f` | right-hand side | n | N·s |
 /// | `w` | given part of the relative velocity, impact terms included | D·nc | m/s |
 /// | `mu` | coefficients of friction, 0 allowed | nc | 1 |
+/// | `mu_r` | coefficients of rolling friction, of [`Rolling`] | nc | m |
 /// | `rows` | `G`, `b` of FCLIB, and bounds | n × p, p | |
 ///
 /// A problem with scalar rows may have no contacts.
@@ -33,7 +37,7 @@ use nonsmooth_linalg::Csc;
 /// Source: Acary, lecture, problems P_ML and P_ML_b; FCLIB `/fclib_global`.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(non_snake_case)]
-pub struct FrictionGlobal<const D: usize> {
+pub struct FrictionGlobal<const D: usize, L: Law<D> = Coulomb> {
     /// The mass matrix.
     pub M: Csc,
     /// The transposed contact Jacobian.
@@ -44,6 +48,8 @@ pub struct FrictionGlobal<const D: usize> {
     pub w: Vec<f64>,
     /// The coefficients of friction.
     pub mu: Vec<f64>,
+    /// The coefficients of rolling friction, nc, in m, of a law that has them.
+    pub mu_r: L::Rolling,
     /// Scalar rows, such as bilateral constraints, if the problem has any.
     pub rows: Option<RowsGlobal>,
 }
@@ -92,11 +98,36 @@ impl<const D: usize> FrictionGlobal<D> {
         w: Vec<f64>,
         mu: Vec<f64>,
     ) -> Result<Self, ProblemError> {
-        let problem = Self { M, H, f, w, mu, rows: None };
+        let problem = Self { M, H, f, w, mu, mu_r: (), rows: None };
         problem.validate()?;
         Ok(problem)
     }
+}
 
+/// A global problem with rolling friction: `[N, T1, T2, R1, R2]` at each contact.
+pub type RollingGlobal = FrictionGlobal<5, Rolling>;
+
+#[allow(non_snake_case)]
+impl RollingGlobal {
+    /// States a problem without scalar rows, validated; `mu_r` in m.
+    ///
+    /// Errors: as without rolling friction; `mu_r` of another length than `mu`, negative or not finite.
+    pub fn rolling(
+        M: Csc,
+        H: Csc,
+        f: Vec<f64>,
+        w: Vec<f64>,
+        mu: Vec<f64>,
+        mu_r: Vec<f64>,
+    ) -> Result<Self, ProblemError> {
+        let problem = Self { M, H, f, w, mu, mu_r, rows: None };
+        problem.validate()?;
+        Ok(problem)
+    }
+}
+
+#[allow(non_snake_case)]
+impl<const D: usize, L: Law<D>> FrictionGlobal<D, L> {
     /// nc.
     pub fn contacts(&self) -> usize {
         self.mu.len()
@@ -108,8 +139,8 @@ impl<const D: usize> FrictionGlobal<D> {
     }
 
     /// The law of contact c.
-    pub fn law(&self, c: usize) -> Coulomb {
-        Coulomb { mu: self.mu[c] }
+    pub fn law(&self, c: usize) -> L {
+        L::of(&self.mu, &self.mu_r, c)
     }
 
     /// The number of scalar rows p.
@@ -119,7 +150,7 @@ impl<const D: usize> FrictionGlobal<D> {
 
     /// Checks shapes and values; the fields are public, so call it after changing them.
     pub fn validate(&self) -> Result<(), ProblemError> {
-        const { assert!(D == 2 || D == 3, "contacts have 2 or 3 components") };
+        const { assert!(L::FITS, "contacts have 2 or 3 components, 5 with rolling friction") };
         let (n, nc) = (self.dofs(), self.contacts());
         if nc + self.multipliers() == 0 {
             return Err(ProblemError::Empty { place: "mu".into() });
@@ -133,7 +164,8 @@ impl<const D: usize> FrictionGlobal<D> {
         self.H.check_finite("H")?;
         all_finite("f", &self.f)?;
         vector("w", &self.w, D * nc, "components of the contacts")?;
-        friction_coefficients(&self.mu)?;
+        friction_coefficients("mu", &self.mu)?;
+        rolling_coefficients(self.mu_r.values(), nc, L::DISKS)?;
         if let Some(RowsGlobal { G, b, bounds }) = &self.rows {
             G.check_shape("G", n, b.len(), "entries of f × entries of b")?;
             G.check_finite("G")?;
@@ -150,12 +182,12 @@ impl<const D: usize> FrictionGlobal<D> {
     }
 }
 
-impl<const D: usize> Problem for FrictionGlobal<D> {
+impl<const D: usize, L: Law<D>> Problem for FrictionGlobal<D, L> {
     type Point = GlobalPoint;
     type Gauge = GlobalGauge;
 
     fn kind(&self) -> Kind {
-        if D == 2 { Kind::FrictionGlobal2d } else { Kind::FrictionGlobal3d }
+        L::GLOBAL
     }
 
     fn unknowns(&self) -> usize {
@@ -183,19 +215,25 @@ impl<const D: usize> Problem for FrictionGlobal<D> {
     }
 
     fn gauge(&self) -> Result<Self::Gauge, ProblemError> {
-        GlobalGauge::new(self)
+        match self.arms() {
+            None => GlobalGauge::new(self),
+            Some(arms) => GlobalGauge::new(&self.weighed(&arms)),
+        }
     }
 
     fn regauge(&self, gauge: &mut Self::Gauge) -> Result<(), ProblemError> {
-        gauge.refill(self)
+        match self.arms() {
+            None => gauge.refill(self),
+            Some(arms) => gauge.refill(&self.weighed(&arms)),
+        }
     }
 
     fn measure(&self, point: &GlobalPoint, gauge: &mut Self::Gauge) -> Measure {
-        gauge.measure(self, point, false)
+        gauge.measure_weighed(self, point, false)
     }
 
     fn certify(&self, point: &GlobalPoint, gauge: &mut Self::Gauge) -> Measure {
-        gauge.measure(self, point, true)
+        gauge.measure_weighed(self, point, true)
     }
 
     fn partner(&self, point: &GlobalPoint) -> Vec<f64> {

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::Coulomb;
+use crate::kinds::contact::law::RollingData;
+use crate::{Coulomb, Kind};
 use nonsmooth_linalg::{Real, norm, norm_of, power_of_two, small};
 
 /// What a contact does.
@@ -26,10 +27,13 @@ pub struct ContactStatus {
     pub at_limit: bool,
     /// The margin to another status is below the tolerance.
     pub degenerate: bool,
+    /// Pressed and rolling against rolling friction: `u_R ≠ 0`, the moment on the boundary of its disk. Never without rolling friction.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub rolls: bool,
 }
 
 /// `‖x_T‖` of `[x_N, x_T…]`.
-fn tangential<T: Real, const D: usize>(x: &[T; D]) -> T {
+pub(super) fn tangential<T: Real, const D: usize>(x: &[T; D]) -> T {
     match D {
         2 => x[1].modulus(),
         3 => x[1].hypot(x[2]),
@@ -43,14 +47,31 @@ pub(crate) fn length<T: Real, const D: usize>(x: &[T; D]) -> T {
 }
 
 /// `x − y`.
-fn difference<T: Real, const D: usize>(x: &[T; D], y: &[T; D]) -> [T; D] {
+pub(super) fn difference<T: Real, const D: usize>(x: &[T; D], y: &[T; D]) -> [T; D] {
     std::array::from_fn(|k| x[k] - y[k])
 }
 
 /// The law of a contact as the judge states it: `K* ∋ ũ ⟂ r ∈ K` with a closed convex cone K and a modified velocity ũ of u. Nothing of it is a solver's.
 ///
 /// `x = w r` is an impulse in units of velocity. What nearly cancels is done in T, the rest plainly.
-pub trait Law<const D: usize>: Copy {
+pub trait Law<const D: usize>: Copy + std::fmt::Debug + PartialEq + Send + Sync + 'static {
+    /// What a problem keeps of its coefficients beside mu.
+    type Rolling: RollingData;
+    /// Whether contacts of D components can obey it.
+    const FITS: bool;
+    /// How many disks K has, of `(D − 1)/DISKS` rows each: of friction, of rolling friction.
+    const DISKS: usize;
+    /// The kind of the local problem with this law.
+    const LOCAL: Kind;
+    /// The kind of the global problem with this law.
+    const GLOBAL: Kind;
+
+    /// The law of contact c.
+    fn of(mu: &[f64], mu_r: &Self::Rolling, c: usize) -> Self;
+
+    /// The coefficient of a disk, `‖r_disk‖ ≤ coefficient r_N`.
+    fn coefficient(self, disk: usize) -> f64;
+
     /// ũ.
     fn modified_velocity<T: Real>(self, u: &[T; D]) -> [T; D];
 
@@ -81,6 +102,21 @@ pub trait Law<const D: usize>: Copy {
 
 /// De Saxcé's `ũ = u + mu‖u_T‖ e_N`, `K = {‖x_T‖ ≤ mu x_N}`, `K* = {mu‖y_T‖ ≤ y_N}`.
 impl<const D: usize> Law<D> for Coulomb {
+    type Rolling = ();
+    const FITS: bool = D == 2 || D == 3;
+    const DISKS: usize = 1;
+    const LOCAL: Kind = if D == 2 { Kind::FrictionLocal2d } else { Kind::FrictionLocal3d };
+    const GLOBAL: Kind = if D == 2 { Kind::FrictionGlobal2d } else { Kind::FrictionGlobal3d };
+
+    fn of(mu: &[f64], (): &(), c: usize) -> Self {
+        Self { mu: mu[c] }
+    }
+
+    #[inline(always)]
+    fn coefficient(self, _: usize) -> f64 {
+        self.mu
+    }
+
     #[inline(always)]
     fn modified_velocity<T: Real>(self, u: &[T; D]) -> [T; D] {
         let mut modified = *u;
@@ -204,6 +240,7 @@ impl<const D: usize> Law<D> for Coulomb {
             status,
             at_limit: status == Motion::Stick && (near_boundary || into_cone < 0.0),
             degenerate: into_polar.abs() <= margin || near_boundary,
+            rolls: false,
         }
     }
 }
@@ -282,12 +319,12 @@ mod tests {
         let pressed = Coulomb { mu: 0.0 }.status(&[1.0, 0.0, 0.0], &[0.0, 0.0, 0.0], 1e-9);
         assert_eq!(
             pressed,
-            ContactStatus { status: Motion::Slip, at_limit: false, degenerate: false }
+            ContactStatus { status: Motion::Slip, at_limit: false, degenerate: false, rolls: false }
         );
         let open = Coulomb { mu: 0.0 }.status(&[0.0; 3], &[1.0, 5.0, 0.0], 1e-9);
         assert_eq!(
             open,
-            ContactStatus { status: Motion::Open, at_limit: false, degenerate: false }
+            ContactStatus { status: Motion::Open, at_limit: false, degenerate: false, rolls: false }
         );
     }
 

@@ -212,6 +212,7 @@ pub(crate) fn verdict<L: Law<D>, const D: usize>(
         }
         counts.at_limit += usize::from(s.at_limit);
         counts.degenerate += usize::from(s.degenerate);
+        counts.rolling += usize::from(s.rolls);
         statuses.push(s);
         let share = law.natural_map(&x, &modified).iter().map(|v| v * v).sum::<f64>().sqrt();
         worst.push((c, over(share, gauge.norm_q)));

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::FrictionGlobal;
-use crate::check::Kinematic;
+use crate::check::{Kinematic, Law};
 
 /// Impulses that every admissible motion would have to feed: proof that a problem has no solution.
 ///
@@ -50,7 +50,7 @@ impl Impulses {
 }
 
 /// Whether the impulses refute the problem, if only up to rounding.
-pub(crate) fn holds<const D: usize>(problem: &FrictionGlobal<D>, certificate: &Impulses) -> bool {
+pub(crate) fn holds<const D: usize, L: Law<D>>(problem: &FrictionGlobal<D, L>, certificate: &Impulses) -> bool {
     problem.kinematics().refutes(certificate)
 }
 

@@ -4,8 +4,11 @@ mod contact;
 pub(super) mod gauge;
 mod impulses;
 pub(super) mod loads;
+mod rolling;
 pub(super) mod statement;
+pub(super) mod weighed;
 
 pub use contact::{ContactStatus, Law, Motion};
 pub use impulses::Impulses;
 pub(super) use impulses::holds;
+pub(super) use weighed::Weighed;

@@ -1,30 +1,32 @@
 //! Contacts as parts of a [`ConeSystem`].
 
 use crate::check::proof::{exact, just};
-use crate::check::{Column, ConeSystem, Exact};
+use crate::check::{Column, ConeSystem, Exact, Law};
 use nonsmooth_linalg::Csc;
 
 /// The impulses and velocities of contacts: columns of r as given, in the rows that begin with `first` the velocities u.
 ///
 /// The law in the plane: `0 ≤ u_N ⟂ r_N ≥ 0`, `u_T = a − b`, `0 ≤ a ⟂ mu r_N + r_T ≥ 0`, `0 ≤ b ⟂ mu r_N − r_T ≥ 0`: r_T < mu r_N where it moves
-/// is excluded, and the pairs of a resting contact may have a = b. In space with friction only `0 ≤ u_N ⟂ r_N ≥ 0`, `|r_Tk| ≤ mu r_N` is said.
-pub(crate) fn contacts<const D: usize>(
+/// is excluded, and the pairs of a resting contact may have a = b. In space with friction only `0 ≤ u_N ⟂ r_N ≥ 0`, `|r_Tk| ≤ mu r_N` is said, of rolling `|r_Rk| ≤ mu_r r_N`.
+pub(crate) fn contacts<L: Law<D>, const D: usize>(
     system: &mut ConeSystem,
     first: usize,
     mut impulses: Vec<Column>,
-    mu: &[f64],
+    laws: &[L],
 ) -> Vec<(Exact, Vec<(usize, Exact)>)> {
     let mut unknowns = vec![];
-    for (c, &mu) in mu.iter().enumerate() {
+    let rows_of_disk = (D - 1) / L::DISKS;
+    for (c, law) in laws.iter().enumerate() {
         let row = |k: usize| first + D * c + k;
         let mut normal = std::mem::take(&mut impulses[D * c]);
-        let coefficient = exact(mu);
         let mut tangential = vec![];
         for k in 1..D {
+            let mu = law.coefficient((k - 1) / rows_of_disk);
+            let coefficient = exact(mu);
             if mu == 0.0 {
                 let u = system.unit(row(k), 1);
                 system.free.push(u);
-                tangential.push((Exact::ZERO, vec![]));
+                tangential.push((coefficient, (Exact::ZERO, vec![])));
                 continue;
             }
             // With σ± = mu r_N ± r_T ≥ 0: r_T = σ⁺ − mu r_N, and σ⁺ + σ⁻ = 2 mu r_N in a row of its own.
@@ -44,12 +46,12 @@ pub(crate) fn contacts<const D: usize>(
                 system.rays.extend([plus, minus]);
                 system.complete = false;
             }
-            tangential.push((Exact::ZERO, vec![(plus, Exact::ONE)]));
+            tangential.push((coefficient, (Exact::ZERO, vec![(plus, Exact::ONE)])));
         }
         let pair = [system.unit(row(0), 1), system.column(normal)];
         system.pairs.push(pair);
         unknowns.push(just(pair[1]));
-        for mut t in tangential {
+        for (coefficient, mut t) in tangential {
             if !t.1.is_empty() {
                 t.1.push((pair[1], -&coefficient));
             }

@@ -3,11 +3,14 @@
 use crate::check::proof::{Exactly, bounded, exacts, monotone};
 use crate::check::rows::{Rows, doubt};
 use crate::check::{
-    ConeSystem, ContactStatus, Judged, Kinematic, Kinematics, Measure, Monotone, StatusCounts,
-    Verdict,
+    ConeSystem, ContactStatus, Judged, Kinematic, Kinematics, Law, Measure, Monotone,
+    StatusCounts, Verdict,
 };
 use crate::kinds::contact::judge::gauge::{HALF_ULP, LawGauge, largest, unit, verdict, worst};
+use crate::kinds::contact::judge::Weighed;
 use crate::kinds::contact::judge::statement::{contacts, opposite, under};
+use crate::kinds::contact::judge::weighed::{arm, as_given, impulses, velocities, weight};
+use crate::kinds::contact::law::RollingData;
 use crate::{FrictionLocal, LocalPoint, Problem, RowsLocal};
 use nonsmooth_linalg::{Csc, Doubled, Real, norm, power_of_two, small};
 
@@ -25,7 +28,7 @@ pub struct LocalGauge {
 }
 
 impl LocalGauge {
-    pub(crate) fn new<const D: usize>(problem: &FrictionLocal<D>) -> Self {
+    pub(crate) fn new<const D: usize, L: Law<D>>(problem: &FrictionLocal<D, L>) -> Self {
         let mut gauge = Self {
             law: LawGauge::default(),
             u: Vec::new(),
@@ -38,7 +41,7 @@ impl LocalGauge {
         gauge
     }
 
-    pub(crate) fn refill<const D: usize>(&mut self, problem: &FrictionLocal<D>) {
+    pub(crate) fn refill<const D: usize, L: Law<D>>(&mut self, problem: &FrictionLocal<D, L>) {
         let contacts = problem.contacts();
         let diagonal = (0..contacts).map(|c| small::mean_diagonal(&problem.W.diagonal_block(c)));
         self.law.refill(diagonal, norm(&problem.q));
@@ -56,7 +59,7 @@ impl LocalGauge {
     }
 
     /// What stands for `w_c` of each contact by itself, and the loads that reach it through `[W, V; Vᵀ, R]`.
-    fn mark_loads<const D: usize>(&mut self, problem: &FrictionLocal<D>) {
+    fn mark_loads<const D: usize, L: Law<D>>(&mut self, problem: &FrictionLocal<D, L>) {
         let all = Saddle(problem);
         let LawGauge { strength, loads, amounts, impulses, .. } = &mut self.law;
         amounts.clear();
@@ -104,9 +107,9 @@ impl LocalGauge {
     }
 
     /// The residuals; `precisely` in doubled precision from the data to the last comparison.
-    pub(crate) fn measure<const D: usize>(
+    pub(crate) fn measure<const D: usize, L: Law<D>>(
         &mut self,
-        problem: &FrictionLocal<D>,
+        problem: &FrictionLocal<D, L>,
         point: &LocalPoint,
         precisely: bool,
     ) -> Measure {
@@ -128,11 +131,28 @@ impl LocalGauge {
         measure
     }
 
+    /// The residuals in units of velocity, where rolling friction needs an arm for that.
+    pub(crate) fn measure_weighed<const D: usize, L: Law<D>>(
+        &mut self,
+        problem: &FrictionLocal<D, L>,
+        point: &LocalPoint,
+        precisely: bool,
+    ) -> Measure {
+        let Some(arms) = problem.arms() else { return self.measure(problem, point, precisely) };
+        let mut inner = point.clone();
+        impulses::<D>(&arms, &mut inner.r);
+        let mut measure = self.measure(&problem.weighed(&arms), &inner, precisely);
+        let mut u = self.u.clone();
+        impulses::<D>(&arms, &mut u);
+        as_given(&mut measure, (&point.r, &u, norm(&problem.q)), |c| problem.law(c));
+        measure
+    }
+
     /// The largest `|c_j|`, `c = Vᵀ r + R λ + s`, or of a row with bounds what [`Bounds::residual`](crate::Bounds::residual) makes of it, over the size of its terms, beyond what the rounding of impulses and multipliers of a typical
     /// size makes in row j: of a constraint without load all terms are rounding. A row without coefficients has no such excuse.
-    fn violation<const D: usize>(
+    fn violation<const D: usize, L: Law<D>>(
         &mut self,
-        problem: &FrictionLocal<D>,
+        problem: &FrictionLocal<D, L>,
         point: &LocalPoint,
     ) -> Option<f64> {
         let RowsLocal { V, R, s, bounds } = problem.rows.as_ref()?;
@@ -176,7 +196,7 @@ impl LocalGauge {
     }
 
     /// `u = W r + q + V λ`, entry by entry, without the solvers' kernels.
-    fn update_velocity<const D: usize>(&mut self, problem: &FrictionLocal<D>, point: &LocalPoint) {
+    fn update_velocity<const D: usize, L: Law<D>>(&mut self, problem: &FrictionLocal<D, L>, point: &LocalPoint) {
         let u = &mut self.u;
         for i in 0..problem.contacts() {
             let (cols, blocks) = problem.W.row(i);
@@ -194,9 +214,9 @@ impl LocalGauge {
     }
 
     /// The same, each entry as one sum in doubled precision.
-    fn update_velocity_precisely<const D: usize>(
+    fn update_velocity_precisely<const D: usize, L: Law<D>>(
         &mut self,
-        problem: &FrictionLocal<D>,
+        problem: &FrictionLocal<D, L>,
         point: &LocalPoint,
     ) {
         let Self { u, exact, sizes, rows, .. } = self;
@@ -212,7 +232,7 @@ impl LocalGauge {
     }
 
     /// What the rounding of r and λ to doubles alone makes of the residual, in the root mean square.
-    fn floor<const D: usize>(&mut self, problem: &FrictionLocal<D>, point: &LocalPoint) -> f64 {
+    fn floor<const D: usize, L: Law<D>>(&mut self, problem: &FrictionLocal<D, L>, point: &LocalPoint) -> f64 {
         let unit = power_of_two(self.law.unit());
         let per = 1.0 / unit;
         let squares = &mut self.u;
@@ -247,9 +267,9 @@ fn each_term(a: Option<&Csc>, x: &[f64], mut term: impl FnMut(usize, f64, f64)) 
 }
 
 /// The matrix `[W, V; Vᵀ, R]` by contacts and constraints.
-struct Saddle<'a, const D: usize>(&'a FrictionLocal<D>);
+struct Saddle<'a, const D: usize, L: Law<D>>(&'a FrictionLocal<D, L>);
 
-impl<const D: usize> Saddle<'_, D> {
+impl<const D: usize, L: Law<D>> Saddle<'_, D, L> {
     /// The largest modulus in row i and column j.
     fn entry(&self, i: usize, j: usize) -> f64 {
         let nc = self.0.contacts();
@@ -291,17 +311,27 @@ impl<const D: usize> Saddle<'_, D> {
     }
 }
 
-impl<const D: usize> Judged for FrictionLocal<D> {
+impl<const D: usize, L: Law<D>> Judged for FrictionLocal<D, L> {
     type Status = ContactStatus;
     type Counts = StatusCounts;
 
     fn verdict(&self, point: &LocalPoint, gauge: &mut Self::Gauge, tolerance: f64) -> Verdict {
         let measure = self.certify(point, gauge);
-        verdict::<_, D>(measure, &gauge.law, &point.r, gauge.velocity(), |c| self.law(c), tolerance)
+        let (arms, u) = (self.arms(), gauge.velocity());
+        let Some(arms) = arms else {
+            return verdict::<_, D>(measure, &gauge.law, &point.r, u, |c| self.law(c), tolerance);
+        };
+        let mut r = point.r.clone();
+        impulses::<D>(&arms, &mut r);
+        let weighed = self.weighed(&arms);
+        let mut found =
+            verdict::<_, D>(measure, &gauge.law, &r, u, |c| weighed.law(c), tolerance);
+        impulses::<D>(&arms, &mut found.velocity);
+        found
     }
 }
 
-impl<const D: usize> FrictionLocal<D> {
+impl<const D: usize, L: Law<D>> FrictionLocal<D, L> {
     /// `[W, V; Vᵀ, R]` by entries.
     fn bordered(&self) -> Vec<(usize, usize, f64)> {
         let m = self.q.len();
@@ -314,7 +344,7 @@ impl<const D: usize> FrictionLocal<D> {
     }
 }
 
-impl<const D: usize> Kinematic<D> for FrictionLocal<D> {
+impl<const D: usize, L: Law<D>> Kinematic<D> for FrictionLocal<D, L> {
     fn kinematics(&self) -> Kinematics<D> {
         let mut constant = self.q.clone();
         if let Some(b) = &self.rows {
@@ -325,7 +355,7 @@ impl<const D: usize> Kinematic<D> for FrictionLocal<D> {
             a if a < NOISE => a,
             _ => 0.0,
         };
-        Kinematics::new(&self.bordered(), constant.len(), constant, self.mu.clone(), noise)
+        Kinematics::new(&self.bordered(), constant.len(), constant, (&self.mu, self.mu_r.values()), noise)
     }
 
     fn motion(point: &LocalPoint) -> Vec<f64> {
@@ -342,7 +372,7 @@ impl<const D: usize> Kinematic<D> for FrictionLocal<D> {
 const NOISE: f64 = 1e-8;
 
 /// `u − W r − V λ = q`, `c − Vᵀ r − R λ = s`.
-impl<const D: usize> Exactly for FrictionLocal<D> {
+impl<const D: usize, L: Law<D>> Exactly for FrictionLocal<D, L> {
     fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
         let m = self.q.len();
         let mut rhs = exacts(&self.q);
@@ -357,7 +387,8 @@ impl<const D: usize> Exactly for FrictionLocal<D> {
             multipliers =
                 all.map(|(j, c)| bounded(&mut system, m + j, c, b.bounds.of(j))).collect();
         }
-        system.unknowns = contacts::<D>(&mut system, 0, impulses, &self.mu);
+        let laws: Vec<L> = (0..self.contacts()).map(|c| self.law(c)).collect();
+        system.unknowns = contacts::<L, D>(&mut system, 0, impulses, &laws);
         system.unknowns.extend(multipliers);
         Some(system)
     }
@@ -368,5 +399,38 @@ impl<const D: usize> Exactly for FrictionLocal<D> {
 
     fn impulses_from(&self) -> Option<usize> {
         Some(0)
+    }
+}
+
+impl<const D: usize, L: Law<D>> Weighed for FrictionLocal<D, L> {
+    fn arms(&self) -> Option<Vec<f64>> {
+        (L::DISKS > 1).then(|| {
+            let half = (D - 1) / 2;
+            let of = |c: usize| {
+                let w = self.W.diagonal_block(c);
+                let trace = |rows: std::ops::Range<usize>| rows.map(|k| w[k][k]).sum::<f64>();
+                arm(trace(1..1 + half), trace(1 + half..D))
+            };
+            (0..self.contacts()).map(of).collect()
+        })
+    }
+
+    fn weighed(&self, arms: &[f64]) -> Self {
+        let mut out = self.clone();
+        out.W.change(|i, j, block| {
+            for (k, row) in block.iter_mut().enumerate() {
+                for (l, x) in row.iter_mut().enumerate() {
+                    *x *= weight::<D>(arms, D * i + k) * weight::<D>(arms, D * j + l);
+                }
+            }
+        });
+        velocities::<D>(arms, &mut out.q);
+        out.mu_r = self.mu_r.scaled(|c| 1.0 / arms[c]);
+        if let Some(rows) = &mut out.rows {
+            let entries = rows.V.triplets().map(|(i, j, x)| (i, j, weight::<D>(arms, i) * x));
+            rows.V = Csc::from_triplets(rows.V.nrows(), rows.V.ncols(), entries.collect::<Vec<_>>().into_iter())
+                .expect("in range");
+        }
+        out
     }
 }

@@ -5,8 +5,11 @@ mod judge;
 pub use judge::LocalGauge;
 
 use crate::check::{self, Certificate, ConeSystem, Evidence, Measure};
-use crate::error::{all_finite, friction_coefficients, vector};
-use crate::{Bounds, Coulomb, Kind, Problem, ProblemError};
+use crate::error::{all_finite, friction_coefficients, rolling_coefficients, vector};
+use crate::check::Law;
+use crate::kinds::contact::judge::Weighed;
+use crate::kinds::contact::law::RollingData;
+use crate::{Bounds, Coulomb, Kind, Problem, ProblemError, Rolling};
 use nonsmooth_linalg::{Bsr, Csc};
 
 /// **Find** `r` (and the impulses `lambda` of scalar rows) such that
@@ -22,19 +25,25 @@ use nonsmooth_linalg::{Bsr, Csc};
 /// | `W` | Delassus operator Hᵀ M⁻¹ H, by D×D blocks; need not be symmetric | D·nc × D·nc | 1/kg |
 /// | `q` | free relative velocity, impact terms included | D·nc | m/s |
 /// | `mu` | coefficients of friction, 0 allowed | nc | 1 |
+/// | `mu_r` | coefficients of rolling friction, of [`Rolling`] | nc | m |
 /// | `rows` | `V`, `R`, `s` of FCLIB, and bounds | D·nc × p, p × p, p | |
 ///
 /// Each contact's entries are `[N, T]` (D = 2) or `[N, T1, T2]` (D = 3). A problem with scalar rows may have no contacts.
+///
+/// Under the law L = [`Rolling`] they are `[N, T1, T2, R1, R2]`, of u in m/s and rad/s, of r in N·s and N·m·s, and
+/// `K = {‖r_T‖ ≤ mu r_N, ‖r_R‖ ≤ mu_r r_N}`, `ũ = u + (mu‖u_T‖ + mu_r‖u_R‖) e_N`.
 /// Source: Acary, lecture (3)(4), problem P_L; FCLIB `/fclib_local`.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(non_snake_case)]
-pub struct FrictionLocal<const D: usize> {
+pub struct FrictionLocal<const D: usize, L: Law<D> = Coulomb> {
     /// The Delassus operator.
     pub W: Bsr<D>,
     /// The free relative velocity.
     pub q: Vec<f64>,
     /// The coefficients of friction.
     pub mu: Vec<f64>,
+    /// The coefficients of rolling friction, nc, in m, of a law that has them.
+    pub mu_r: L::Rolling,
     /// Scalar rows, such as bilateral constraints, if the problem has any.
     pub rows: Option<RowsLocal>,
 }
@@ -76,7 +85,7 @@ impl<const D: usize> FrictionLocal<D> {
     ///
     /// Errors: neither contacts nor rows, a wrong shape, a value that is not finite, a negative `mu`; each names its entry.
     pub fn new(W: Bsr<D>, q: Vec<f64>, mu: Vec<f64>) -> Result<Self, ProblemError> {
-        let problem = Self { W, q, mu, rows: None };
+        let problem = Self { W, q, mu, mu_r: (), rows: None };
         problem.validate()?;
         Ok(problem)
     }
@@ -88,19 +97,42 @@ impl<const D: usize> FrictionLocal<D> {
         mu: Vec<f64>,
         rows: RowsLocal,
     ) -> Result<Self, ProblemError> {
-        let problem = Self { W, q, mu, rows: Some(rows) };
+        let problem = Self { W, q, mu, mu_r: (), rows: Some(rows) };
         problem.validate()?;
         Ok(problem)
     }
+}
 
+/// A local problem with rolling friction: `[N, T1, T2, R1, R2]` at each contact.
+pub type RollingLocal = FrictionLocal<5, Rolling>;
+
+#[allow(non_snake_case)]
+impl RollingLocal {
+    /// States a problem without scalar rows, validated; `mu_r` in m.
+    ///
+    /// Errors: as without rolling friction; `mu_r` of another length than `mu`, negative or not finite.
+    pub fn rolling(
+        W: Bsr<5>,
+        q: Vec<f64>,
+        mu: Vec<f64>,
+        mu_r: Vec<f64>,
+    ) -> Result<Self, ProblemError> {
+        let problem = Self { W, q, mu, mu_r, rows: None };
+        problem.validate()?;
+        Ok(problem)
+    }
+}
+
+#[allow(non_snake_case)]
+impl<const D: usize, L: Law<D>> FrictionLocal<D, L> {
     /// nc.
     pub fn contacts(&self) -> usize {
         self.mu.len()
     }
 
     /// The law of contact c.
-    pub fn law(&self, c: usize) -> Coulomb {
-        Coulomb { mu: self.mu[c] }
+    pub fn law(&self, c: usize) -> L {
+        L::of(&self.mu, &self.mu_r, c)
     }
 
     /// The number of scalar rows p.
@@ -110,7 +142,7 @@ impl<const D: usize> FrictionLocal<D> {
 
     /// Checks shapes and values; the fields are public, so call it after changing them.
     pub fn validate(&self) -> Result<(), ProblemError> {
-        const { assert!(D == 2 || D == 3, "contacts have 2 or 3 components") };
+        const { assert!(L::FITS, "contacts have 2 or 3 components, 5 with rolling friction") };
         let nc = self.contacts();
         if nc + self.multipliers() == 0 {
             return Err(ProblemError::Empty { place: "mu".into() });
@@ -136,7 +168,8 @@ impl<const D: usize> FrictionLocal<D> {
             }
         }
         vector("q", &self.q, D * nc, "components of the contacts")?;
-        friction_coefficients(&self.mu)?;
+        friction_coefficients("mu", &self.mu)?;
+        rolling_coefficients(self.mu_r.values(), nc, L::DISKS)?;
         if let Some(RowsLocal { V, R, s, bounds }) = &self.rows {
             V.check_shape("V", D * nc, s.len(), "contact components × entries of s")?;
             R.check_shape("R", s.len(), s.len(), "entries of s")?;
@@ -157,12 +190,12 @@ impl<const D: usize> FrictionLocal<D> {
     }
 }
 
-impl<const D: usize> Problem for FrictionLocal<D> {
+impl<const D: usize, L: Law<D>> Problem for FrictionLocal<D, L> {
     type Point = LocalPoint;
     type Gauge = LocalGauge;
 
     fn kind(&self) -> Kind {
-        if D == 2 { Kind::FrictionLocal2d } else { Kind::FrictionLocal3d }
+        L::LOCAL
     }
 
     fn unknowns(&self) -> usize {
@@ -184,20 +217,26 @@ impl<const D: usize> Problem for FrictionLocal<D> {
     }
 
     fn gauge(&self) -> Result<Self::Gauge, ProblemError> {
-        Ok(LocalGauge::new(self))
+        Ok(match self.arms() {
+            None => LocalGauge::new(self),
+            Some(arms) => LocalGauge::new(&self.weighed(&arms)),
+        })
     }
 
     fn regauge(&self, gauge: &mut Self::Gauge) -> Result<(), ProblemError> {
-        gauge.refill(self);
+        match self.arms() {
+            None => gauge.refill(self),
+            Some(arms) => gauge.refill(&self.weighed(&arms)),
+        }
         Ok(())
     }
 
     fn measure(&self, point: &LocalPoint, gauge: &mut Self::Gauge) -> Measure {
-        gauge.measure(self, point, false)
+        gauge.measure_weighed(self, point, false)
     }
 
     fn certify(&self, point: &LocalPoint, gauge: &mut Self::Gauge) -> Measure {
-        gauge.measure(self, point, true)
+        gauge.measure_weighed(self, point, true)
     }
 
     fn partner(&self, point: &LocalPoint) -> Vec<f64> {

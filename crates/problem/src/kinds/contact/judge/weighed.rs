@@ -1,0 +1,55 @@
+//! Rolling friction in units of velocity: a length for each contact turns its angular velocities and moments into velocities and impulses.
+//!
+//! With the arm ℓ_c and `D_c = diag(1, 1, 1, ℓ_c, ℓ_c)` the problem in `u' = D u`, `r = D r'` has `W' = D W D`, `q' = D q`, `mu_r' = mu_r/ℓ_c`, and
+//! is of the same form. The arm is `√(tr W_TT/tr W_RR)`, that of a ball √0.4 of its radius, rounded to a power of two: then nothing else is rounded, and the
+//! two problems are the same problem in other units. Residuals are those of the problem in u'.
+
+use super::contact::{Law, length};
+use crate::check::Measure;
+use nonsmooth_linalg::{norm, power_of_two, small};
+
+/// A contact problem that can be stated in units of velocity.
+pub(crate) trait Weighed: Sized {
+    /// ℓ_c, a power of two, of each contact; nothing without rolling friction.
+    fn arms(&self) -> Option<Vec<f64>>;
+
+    /// The problem in u'.
+    fn weighed(&self, arms: &[f64]) -> Self;
+}
+
+/// The arm from the traces of the blocks of the tangents and of rolling.
+pub(crate) fn arm(tangential: f64, rolling: f64) -> f64 {
+    let ratio = tangential / rolling;
+    if ratio > 0.0 && ratio.is_finite() { power_of_two(ratio.sqrt()) } else { 1.0 }
+}
+
+/// The weight of row i of contacts of D rows.
+pub(crate) fn weight<const D: usize>(arms: &[f64], i: usize) -> f64 {
+    if i % D > (D - 1) / 2 { arms[i / D] } else { 1.0 }
+}
+
+/// `x_i ← x_i · weight_i` for velocities, `x_i / weight_i` for impulses.
+pub(crate) fn velocities<const D: usize>(arms: &[f64], x: &mut [f64]) {
+    x.iter_mut().enumerate().for_each(|(i, x)| *x *= weight::<D>(arms, i));
+}
+
+/// See [`velocities`].
+pub(crate) fn impulses<const D: usize>(arms: &[f64], x: &mut [f64]) {
+    x.iter_mut().enumerate().for_each(|(i, x)| *x /= weight::<D>(arms, i));
+}
+
+/// The residuals that other codes report of the problem as it is given, in place of those in u'.
+pub(crate) fn as_given<L: Law<D>, const D: usize>(
+    measure: &mut Measure,
+    (r, u, q): (&[f64], &[f64], f64),
+    law: impl Fn(usize) -> L,
+) {
+    let map = (0..r.len() / D).map(|c| {
+        let (r, u) = (small::block::<D>(r, c), small::block::<D>(u, c));
+        length(&law(c).natural_map(&r, &law(c).modified_velocity(&u))).powi(2)
+    });
+    let map = map.sum::<f64>().sqrt();
+    let over = |size: f64| if size > 0.0 { map / size } else { map };
+    measure.literature = over(q);
+    measure.siconos = over(q.max(norm(r)).max(norm(u)));
+}
