@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use nonsmooth_linalg::{Csc, norm};
-use nonsmooth_problem::check::{ContactStatus, Motion};
+use nonsmooth_problem::check::{ContactStatus, Law, Motion};
 use nonsmooth_problem::{Bounds, Friction, FrictionGlobal, FrictionLocal};
 
 use crate::rank;
@@ -41,8 +41,10 @@ impl Indeterminacy {
         match problem {
             Friction::Local2(p) => local(p, r, lambda, statuses, dofs),
             Friction::Local3(p) => local(p, r, lambda, statuses, dofs),
+            Friction::RollingLocal(p) => local(p, r, lambda, statuses, dofs),
             Friction::Global2(p) => global(p, r, lambda, statuses),
             Friction::Global3(p) => global(p, r, lambda, statuses),
+            Friction::RollingGlobal(p) => global(p, r, lambda, statuses),
         }
     }
 
@@ -56,13 +58,13 @@ impl Indeterminacy {
     }
 }
 
-fn global<const D: usize>(
-    p: &FrictionGlobal<D>,
+fn global<const D: usize, L: Law<D>>(
+    p: &FrictionGlobal<D, L>,
     r: &[f64],
     lambda: &[f64],
     statuses: &[ContactStatus],
 ) -> Option<Indeterminacy> {
-    let directions = directions::<D>(r, statuses);
+    let directions = directions::<L, D>(r, statuses);
     let columns = directions.iter().map(|direction| direction.of(&p.H).collect());
     let rows = p.rows.iter().flat_map(|rows| {
         between(&rows.bounds, lambda).map(|j| entries(rows.G.column(j), 0).collect())
@@ -71,15 +73,15 @@ fn global<const D: usize>(
     counted(&all, None)
 }
 
-fn local<const D: usize>(
-    p: &FrictionLocal<D>,
+fn local<const D: usize, L: Law<D>>(
+    p: &FrictionLocal<D, L>,
     r: &[f64],
     lambda: &[f64],
     statuses: &[ContactStatus],
     dofs: Option<usize>,
 ) -> Option<Indeterminacy> {
     let (w, m) = (p.W.to_csc(), p.q.len());
-    let directions = directions::<D>(r, statuses);
+    let directions = directions::<L, D>(r, statuses);
     let across = p.rows.as_ref().map(|rows| rows.V.transpose());
     let columns = directions.iter().map(|direction| {
         let below = across.iter().flat_map(|v| direction.of(v));
@@ -141,17 +143,25 @@ fn entries<'a>(
 }
 
 /// The directions in which the impulses of contacts may change.
-fn directions<const D: usize>(r: &[f64], statuses: &[ContactStatus]) -> Vec<Direction<D>> {
+fn directions<L: Law<D>, const D: usize>(
+    r: &[f64],
+    statuses: &[ContactStatus],
+) -> Vec<Direction<D>> {
+    let rows = (D - 1) / L::DISKS;
     let mut all = vec![];
     for (contact, (status, r)) in statuses.iter().zip(r.chunks_exact(D)).enumerate() {
-        let size = norm(r);
-        let inside = status.status == Motion::Stick && !status.at_limit;
-        if inside {
-            let axis = |k| std::array::from_fn(|l| f64::from(u8::from(k == l)));
-            all.extend((0..D).map(|k| Direction { contact, along: axis(k) }));
-        } else if status.status != Motion::Open && size > 0.0 {
-            all.push(Direction { contact, along: std::array::from_fn(|k| r[k] / size) });
+        // Within a disk the impulse may go anywhere; on its boundary it grows with the pressure.
+        let inside = [status.status == Motion::Stick && !status.at_limit, !status.rolls];
+        let is_free = |k: usize| k > 0 && inside[(k - 1) / rows];
+        let mut along: [f64; D] = std::array::from_fn(|k| if is_free(k) { 0.0 } else { r[k] });
+        let size = norm(&along);
+        if status.status == Motion::Open || size <= 0.0 {
+            continue;
         }
+        along.iter_mut().for_each(|x| *x /= size);
+        all.push(Direction { contact, along });
+        let axis = |k| std::array::from_fn(|l| f64::from(u8::from(k == l)));
+        all.extend((0..D).filter(|&k| is_free(k)).map(|k| Direction { contact, along: axis(k) }));
     }
     all
 }

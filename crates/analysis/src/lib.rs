@@ -25,6 +25,7 @@ pub use regularity::Regularity;
 pub use spectrum::{Spectrum, SpectrumError, rank};
 
 use nonsmooth_linalg::Groups;
+use nonsmooth_problem::check::Law;
 use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, Kind, Problem};
 
 /// Sizes, density, friction and structure of a problem. Cost: O(nnz), and for W of global problems the pairs of
@@ -100,13 +101,18 @@ impl Traits {
         match problem {
             Friction::Local2(p) => Self::of_local(p, dofs),
             Friction::Local3(p) => Self::of_local(p, dofs),
+            Friction::RollingLocal(p) => Self::of_local(p, dofs),
             Friction::Global2(p) => Self::of_global(p),
             Friction::Global3(p) => Self::of_global(p),
+            Friction::RollingGlobal(p) => Self::of_global(p),
         }
     }
 
     /// The traits of a local problem, condensed from `dofs` degrees of freedom.
-    pub fn of_local<const D: usize>(p: &FrictionLocal<D>, dofs: Option<usize>) -> Self {
+    pub fn of_local<const D: usize, L: Law<D>>(
+        p: &FrictionLocal<D, L>,
+        dofs: Option<usize>,
+    ) -> Self {
         Self {
             kind: p.kind(),
             contacts: p.contacts(),
@@ -121,7 +127,7 @@ impl Traits {
     }
 
     /// The traits of a global problem.
-    pub fn of_global<const D: usize>(p: &FrictionGlobal<D>) -> Self {
+    pub fn of_global<const D: usize, L: Law<D>>(p: &FrictionGlobal<D, L>) -> Self {
         let mut bodies = Groups::new(p.dofs());
         p.M.triplets().filter(|e| e.2 != 0.0).for_each(|(i, j, _)| bodies.join(i, j));
         let components = by_frequency(bodies.sizes());

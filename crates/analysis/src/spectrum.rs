@@ -4,6 +4,7 @@ use faer::{Mat, Side};
 use serde::{Deserialize, Serialize};
 
 use nonsmooth_linalg::{Bsr, Csc, Delassus, Inverse, MatrixError, norm, norm_of};
+use nonsmooth_problem::check::Law;
 use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal};
 
 /// What the singular values `σ_1 ≥ … ≥ σ_m ≥ 0` of W say, bilateral constraints left aside (W is that of the free
@@ -59,14 +60,16 @@ impl Spectrum {
         match problem {
             Friction::Local2(p) => Self::of_local(p, limit),
             Friction::Local3(p) => Self::of_local(p, limit),
+            Friction::RollingLocal(p) => Self::of_local(p, limit),
             Friction::Global2(p) => Self::of_global(p, limit),
             Friction::Global3(p) => Self::of_global(p, limit),
+            Friction::RollingGlobal(p) => Self::of_global(p, limit),
         }
     }
 
     /// The spectrum of a local problem; see [`of`](Self::of).
-    pub fn of_local<const D: usize>(
-        p: &FrictionLocal<D>,
+    pub fn of_local<const D: usize, L: Law<D>>(
+        p: &FrictionLocal<D, L>,
         limit: usize,
     ) -> Result<Self, SpectrumError> {
         within(D * p.contacts(), limit)?;
@@ -74,8 +77,8 @@ impl Spectrum {
     }
 
     /// The spectrum of a global problem; see [`of`](Self::of).
-    pub fn of_global<const D: usize>(
-        p: &FrictionGlobal<D>,
+    pub fn of_global<const D: usize, L: Law<D>>(
+        p: &FrictionGlobal<D, L>,
         limit: usize,
     ) -> Result<Self, SpectrumError> {
         let (n, m) = (p.dofs(), D * p.contacts());

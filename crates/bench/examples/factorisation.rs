@@ -224,6 +224,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             Ok(Friction::Local3(p)) => report(&of_contacts(&p), "local ", name)?,
             Ok(Friction::Global2(p)) => report(&of_bodies(&p), "global", name)?,
             Ok(Friction::Global3(p)) => report(&of_bodies(&p), "global", name)?,
+            Ok(Friction::RollingLocal(p)) => report(&of_contacts(&p), "local ", name)?,
+            Ok(Friction::RollingGlobal(p)) => report(&of_bodies(&p), "global", name)?,
             Err(e) => eprintln!("{e}"),
         }
     }

@@ -28,6 +28,7 @@ fn local<const D: usize>(bilateral: bool) -> FrictionLocal<D> {
         W: Bsr::from_csc(&diagonal(D, D)),
         q: vec![-1.0; D],
         mu: vec![0.5],
+        mu_r: (),
         rows: bilateral,
     }
 }
@@ -35,7 +36,15 @@ fn local<const D: usize>(bilateral: bool) -> FrictionLocal<D> {
 fn global<const D: usize>(bilateral: bool) -> FrictionGlobal<D> {
     let bilateral = bilateral.then(|| RowsGlobal::bilateral(diagonal(4, 1), vec![0.25]));
     let (M, H) = (diagonal(4, 4), diagonal(4, D));
-    FrictionGlobal { M, H, f: vec![1.0; 4], w: vec![-1.0; D], mu: vec![0.5], rows: bilateral }
+    FrictionGlobal {
+        M,
+        H,
+        f: vec![1.0; 4],
+        w: vec![-1.0; D],
+        mu: vec![0.5],
+        mu_r: (),
+        rows: bilateral,
+    }
 }
 
 fn contact() -> Vec<ProblemFile> {

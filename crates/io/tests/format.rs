@@ -240,12 +240,12 @@ fn what_is_no_fclib_file_is_said() {
 }
 
 #[test]
-fn rolling_files_are_refused_by_name() {
-    let what = "rolling friction (spacedim 5) is not supported yet";
+fn rolling_files_have_five_rows_a_contact() {
+    let what = "/fclib_global_rolling/spacedim: expected 5";
     let tree = global_tree().renamed("fclib_global", "fclib_global_rolling");
-    refused(&tree, &format!("/fclib_global_rolling: {what}"));
+    refused(&tree, what);
     let tree = local_tree().renamed("fclib_local", "fclib_local_rolling");
-    refused(&tree, &format!("/fclib_local_rolling: {what}"));
+    refused(&tree, "/fclib_local_rolling/spacedim: expected 5");
 }
 
 #[test]

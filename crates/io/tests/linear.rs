@@ -842,7 +842,7 @@ fn siconos_problems_of_contacts() {
     for (text, all) in [
         (
             "5\n1\n0\n1\n1\n1 1\n2\n0\n1\n5\n1 5\n1 1 1 1 1\n1\n1 1 1 1 1\n0.3\n",
-            &["rolling friction", "not supported"][..],
+            &["mu_r[0]", "the end of the file"][..],
         ),
         ("3\n1\n0\n3\n3\n3 3\n1 0 0 0 1 0 0 0 1\n-1 0 0\n", &["mu[0]", "the end of the file"]),
         ("3\n1\n0\n3\n3\n3 3\n1 0 0 0 1 0 0 0 1\n-1 0 0\n-0.5\n", &["mu"]),

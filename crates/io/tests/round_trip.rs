@@ -62,6 +62,7 @@ fn local() -> FrictionLocal<2> {
         W: Bsr::from_csc(&csc(4, 4)),
         q: AWKWARD[..4].into(),
         mu: vec![0.0, 0.7],
+        mu_r: (),
         rows: Some(RowsLocal::bilateral(csc(4, 2), csc(2, 2), AWKWARD[4..6].into())),
     }
 }
@@ -73,6 +74,7 @@ fn global() -> FrictionGlobal<3> {
         f: AWKWARD[..5].into(),
         w: AWKWARD[5..].into(),
         mu: vec![0.3],
+        mu_r: (),
         rows: Some(RowsGlobal::bilateral(csc(5, 1), vec![-0.0])),
     }
 }

@@ -17,6 +17,51 @@ pub fn mean_diagonal<const D: usize>(a: &[[f64; D]; D]) -> f64 {
     (0..D).map(|i| a[i][i]).sum::<f64>() / D as f64
 }
 
+/// The eigenvalues of the symmetric part and, by rows, an orthonormal set of eigenvectors, by Jacobi's rotations (GolubVanLoan, section 8.5). An index without
+/// off-diagonal entries keeps its place and its unit vector.
+pub fn eigen<const D: usize>(w: &[[f64; D]; D]) -> ([f64; D], [[f64; D]; D]) {
+    let (mut a, mut v) = (*w, [[0.0; D]; D]);
+    for i in 0..D {
+        v[i][i] = 1.0;
+        for j in 0..D {
+            a[i][j] = 0.5 * (w[i][j] + w[j][i]);
+        }
+    }
+    for _ in 0..12 {
+        let mut turned = false;
+        for i in 0..D {
+            for j in i + 1..D {
+                let (p, q, off) = (a[i][i], a[j][j], a[i][j]);
+                if off.abs() <= f64::EPSILON * (p * q).abs().sqrt() {
+                    continue;
+                }
+                turned = true;
+                // The smaller of the two angles: small entries of a graded matrix keep their digits.
+                let theta = (q - p) / (2.0 * off);
+                let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
+                let c = 1.0 / t.hypot(1.0);
+                let s = t * c;
+                for k in 0..D {
+                    let (x, y) = (a[i][k], a[j][k]);
+                    (a[i][k], a[j][k]) = (c * x - s * y, s * x + c * y);
+                    let (x, y) = (v[i][k], v[j][k]);
+                    (v[i][k], v[j][k]) = (c * x - s * y, s * x + c * y);
+                }
+                for k in 0..D {
+                    let (x, y) = (a[k][i], a[k][j]);
+                    (a[k][i], a[k][j]) = (c * x - s * y, s * x + c * y);
+                }
+                (a[i][j], a[j][i]) = (0.0, 0.0);
+                (a[i][i], a[j][j]) = (p - t * off, q + t * off);
+            }
+        }
+        if !turned {
+            break;
+        }
+    }
+    (std::array::from_fn(|k| a[k][k]), v)
+}
+
 /// The inverse by Gauss–Jordan elimination with partial pivoting, or `None` where a pivot vanishes
 /// relative to the largest entry of the block.
 pub fn inverse<const D: usize>(a: &[[f64; D]; D]) -> Option<[[f64; D]; D]> {
@@ -89,5 +134,32 @@ mod tests {
     fn a_rank_one_block_has_no_inverse() {
         assert!(inverse(&[[1.0, 2.0], [2.0, 4.0]]).is_none());
         assert!(inverse(&[[0.0; 3]; 3]).is_none());
+    }
+
+    #[test]
+    fn eigenvectors_diagonalise() {
+        let mut w = [[0.0; 5]; 5];
+        for (i, row) in w.iter_mut().enumerate() {
+            for (j, x) in row.iter_mut().enumerate() {
+                *x = ((i * j) as f64).cos() * 10f64.powi(-(i as i32) - (j as i32));
+            }
+        }
+        (0..5).for_each(|i| w[i][i] += 2.0 * 10f64.powi(-2 * (i as i32)));
+        let (values, v) = eigen(&w);
+        for i in 0..5 {
+            let image = mul(&w, &v[i]);
+            for k in 0..5 {
+                assert!((image[k] - values[i] * v[i][k]).abs() < 1e-15, "{i} {k}");
+            }
+            for j in 0..5 {
+                let dot: f64 = (0..5).map(|k| v[i][k] * v[j][k]).sum();
+                assert!((dot - f64::from(u8::from(i == j))).abs() < 1e-14);
+            }
+            assert!(values[i] > 0.0);
+        }
+        let known = [[2.0, 1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 0.5]];
+        let (values, v) = eigen(&known);
+        assert!((values[0] + values[1] - 4.0).abs() < 1e-15 && values[2] == 0.5);
+        assert_eq!(v[2], [0.0, 0.0, 1.0]);
     }
 }

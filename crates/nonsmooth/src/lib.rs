@@ -113,7 +113,7 @@ pub use nonsmooth_problem::planted::{Planted, PlantedLcp};
 pub use nonsmooth_problem::{
     AnyCounts, AnyPoint, AnyProblem, AnyStatus, BoxLcp, Complementarity, Friction, FrictionGlobal,
     FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Kind, Lcp, LcpPoint, LocalPoint, Mcp, Mlcp,
-    Problem, ProblemError, RowsGlobal, RowsLocal, Set, Vi,
+    Problem, ProblemError, RollingGlobal, RollingLocal, RowsGlobal, RowsLocal, Set, Vi,
 };
 pub use nonsmooth_problem::{with_complementarity, with_friction, with_problem};
 pub use nonsmooth_scenes::{Scene, SceneError};

@@ -45,7 +45,7 @@ fn campaign(
     let (mut all, mut names) = (0, HashSet::new());
     for path in common::corpus_files(folders) {
         let Ok(problem) = fclib::read_problem(&path) else {
-            continue; // Rolling friction, refused by name: the io crate's tests see to it.
+            continue; // Other formats: the io crate's tests see to it.
         };
         if !wanted(&problem) {
             continue;

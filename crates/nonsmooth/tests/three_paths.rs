@@ -66,6 +66,7 @@ fn planted_problems() {
         let case = Planted { contacts: 15, dofs: 90, bilateral, seed, ..Planted::default() };
         assert_eq!(agree(&case.global::<3>().0, &format!("seed {seed} in space")), 2);
         assert_eq!(agree(&case.global::<2>().0, &format!("seed {seed} in the plane")), 2);
+        assert_eq!(agree(&case.rolling_global().0, &format!("seed {seed} rolling")), 2);
     }
 }
 
@@ -77,6 +78,7 @@ fn the_global_corpus() {
         agreed += match fclib::read_problem(&path) {
             Ok(Friction::Global3(problem)) => agree(&problem, &name),
             Ok(Friction::Global2(problem)) => agree(&problem, &name),
+            Ok(Friction::RollingGlobal(problem)) => agree(&problem, &name),
             _ => continue,
         };
         files += 1;

@@ -23,7 +23,7 @@ pub use kinds::complementarity::{
 };
 pub use kinds::contact::{
     Bounds, Coulomb, Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Rolling,
-    RollingData, RollingGlobal, RollingLocal, RowsGlobal, RowsLocal,
+    RollingData, RollingGlobal, RollingLocal, RowsGlobal, RowsLocal, Weighed,
 };
 pub use kinds::variational::{Set, Vi};
 pub use kinds::{Complementarity, Friction, Kind};

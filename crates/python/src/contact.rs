@@ -3,9 +3,10 @@
 use std::borrow::Cow;
 
 use nonsmooth_linalg::{Bsr, Csc};
+use nonsmooth_problem::check::Law;
 use nonsmooth_problem::{
-    AnyProblem, Bounds, Friction, FrictionGlobal, FrictionLocal, OfAny, Problem, RowsGlobal,
-    RowsLocal, with_friction,
+    AnyProblem, Bounds, Friction, FrictionGlobal, FrictionLocal, OfAny, Problem, RollingData,
+    RollingGlobal, RollingLocal, RowsGlobal, RowsLocal, with_friction,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -18,6 +19,10 @@ use crate::{expected, mistake};
 const LOCAL: &[&str] = &["W", "q", "mu", "V", "R", "s", "lower", "upper"];
 /// The letters of the global form.
 const GLOBAL: &[&str] = &["M", "H", "f", "w", "mu", "G", "b", "lower", "upper"];
+
+/// The same with rolling friction.
+const ROLLING_LOCAL: &[&str] = &["W", "q", "mu", "mu_r", "V", "R", "s", "lower", "upper"];
+const ROLLING_GLOBAL: &[&str] = &["M", "H", "f", "w", "mu", "mu_r", "G", "b", "lower", "upper"];
 
 /// The components of a contact where nothing says how many there are.
 const USUAL: usize = 3;
@@ -46,6 +51,13 @@ pub fn made(parts: &Bound<'_, PyDict>, dimension: Option<usize>) -> PyResult<Any
     let is_local = given.is_given("W") || given.is_given("q") || given.is_given("R");
     if is_local && given.is_given("M") {
         return Err(expected("Friction", "W, q and mu, or M, H, f, w and mu", "letters of both"));
+    }
+    if given.is_given("mu_r") {
+        // Five components a contact, whatever the arrays seem to be.
+        return match is_local {
+            true => stated::<RollingLocal>(parts),
+            false => stated::<RollingGlobal>(parts),
+        };
     }
     let free = given.get(if is_local { "q" } else { "w" })?;
     let (size, rows) = match &free {
@@ -102,14 +114,46 @@ pub fn shown(problem: &Friction) -> Vec<(&'static str, Shown<'_>)> {
 
 /// mu, one for each of so many contacts.
 fn mu(given: &mut Given<'_, '_>, contacts: usize) -> PyResult<Vec<f64>> {
-    match given.get("mu")? {
-        Some(mu) => Ok(match numbers::scalar_or_vector("mu", &mu)? {
+    coefficients("mu", given, contacts)
+}
+
+/// The coefficients of that name, one for each of so many contacts.
+fn coefficients(
+    name: &'static str,
+    given: &mut Given<'_, '_>,
+    contacts: usize,
+) -> PyResult<Vec<f64>> {
+    match given.get(name)? {
+        Some(mu) => Ok(match numbers::scalar_or_vector(name, &mu)? {
             Scalar::One(mu) => vec![mu; contacts],
             Scalar::Each(all) => all,
         }),
         None if contacts == 0 => Ok(vec![]),
-        None => Err(expected("mu", "this part", "nothing")),
+        None => Err(expected(name, "this part", "nothing")),
     }
+}
+
+/// Those of rolling friction, of a law that has them.
+fn mu_r<L: Law<D>, const D: usize>(
+    given: &mut Given<'_, '_>,
+    contacts: usize,
+) -> PyResult<L::Rolling> {
+    let values = match L::DISKS {
+        1 => vec![],
+        _ => coefficients("mu_r", given, contacts)?,
+    };
+    Ok(L::Rolling::of(values))
+}
+
+fn put_mu_r<L: Law<D>, const D: usize>(
+    given: &mut Given<'_, '_>,
+    contacts: usize,
+    into: &mut L::Rolling,
+) -> PyResult<()> {
+    if L::DISKS > 1 && given.is_given("mu_r") {
+        *into = mu_r::<L, D>(given, contacts)?;
+    }
+    Ok(())
 }
 
 fn bounds(given: &mut Given<'_, '_>, rows: usize) -> PyResult<Bounds> {
@@ -159,11 +203,11 @@ fn no_rows(given: &Given<'_, '_>, letters: &[&str]) -> PyResult<()> {
     }
 }
 
-impl<const D: usize> Contact for FrictionLocal<D>
+impl<const D: usize, L: Law<D>> Contact for FrictionLocal<D, L>
 where
     Self: OfAny + Problem,
 {
-    const LETTERS: &'static [&'static str] = LOCAL;
+    const LETTERS: &'static [&'static str] = if L::DISKS > 1 { ROLLING_LOCAL } else { LOCAL };
 
     fn of(given: &mut Given<'_, '_>) -> PyResult<Self> {
         let q = match given.get("q")? {
@@ -192,12 +236,14 @@ where
                 Some(RowsLocal { V: v, R: r, s, bounds })
             }
         };
-        Ok(Self { W: w, q, mu, rows })
+        let mu_r = mu_r::<L, D>(given, mu.len())?;
+        Ok(Self { W: w, q, mu, mu_r, rows })
     }
 
     fn change(&mut self, given: &mut Given<'_, '_>) -> PyResult<()> {
         put(given, "q", &mut self.q)?;
         put_mu(given, &mut self.mu)?;
+        put_mu_r::<L, D>(given, self.mu.len(), &mut self.mu_r)?;
         if let Some(w) = given.get("W")? {
             self.W = numbers::bsr::<D>("W", &w)?;
         }
@@ -220,6 +266,9 @@ where
             ("q", Shown::Vector(&self.q)),
             ("mu", Shown::Vector(&self.mu)),
         ];
+        if L::DISKS > 1 {
+            all.push(("mu_r", Shown::Vector(self.mu_r.values())));
+        }
         if let Some(rows) = &self.rows {
             all.push(("V", Shown::Sparse(Cow::Borrowed(&rows.V))));
             all.push(("R", Shown::Sparse(Cow::Borrowed(&rows.R))));
@@ -239,11 +288,11 @@ fn shown_bounds(bounds: &Bounds) -> impl Iterator<Item = (&'static str, Shown<'_
     both.into_iter().filter(|(_, x)| !x.is_empty()).map(|(name, x)| (name, Shown::Vector(x)))
 }
 
-impl<const D: usize> Contact for FrictionGlobal<D>
+impl<const D: usize, L: Law<D>> Contact for FrictionGlobal<D, L>
 where
     Self: OfAny + Problem,
 {
-    const LETTERS: &'static [&'static str] = GLOBAL;
+    const LETTERS: &'static [&'static str] = if L::DISKS > 1 { ROLLING_GLOBAL } else { GLOBAL };
 
     fn of(given: &mut Given<'_, '_>) -> PyResult<Self> {
         let m = numbers::csc("M", &given.need("M")?)?;
@@ -269,13 +318,15 @@ where
                 Some(RowsGlobal { G: g, b, bounds })
             }
         };
-        Ok(Self { M: m, H: h, f, w, mu, rows })
+        let mu_r = mu_r::<L, D>(given, mu.len())?;
+        Ok(Self { M: m, H: h, f, w, mu, mu_r, rows })
     }
 
     fn change(&mut self, given: &mut Given<'_, '_>) -> PyResult<()> {
         put(given, "f", &mut self.f)?;
         put(given, "w", &mut self.w)?;
         put_mu(given, &mut self.mu)?;
+        put_mu_r::<L, D>(given, self.mu.len(), &mut self.mu_r)?;
         if let Some(m) = given.get("M")? {
             self.M = numbers::csc("M", &m)?;
         }
@@ -301,6 +352,9 @@ where
             ("w", Shown::Vector(&self.w)),
             ("mu", Shown::Vector(&self.mu)),
         ];
+        if L::DISKS > 1 {
+            all.push(("mu_r", Shown::Vector(self.mu_r.values())));
+        }
         if let Some(rows) = &self.rows {
             all.push(("G", sparse(&rows.G)));
             all.push(("b", Shown::Vector(&rows.b)));

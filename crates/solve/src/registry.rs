@@ -2,13 +2,16 @@
 //!
 //! The list of the complementarity wing's kinds is in that wing; contact problems are listed here, where the bridges are known.
 
-use nonsmooth_problem::{FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint};
+use nonsmooth_problem::{
+    FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RollingGlobal, RollingLocal,
+};
 
 use crate::bridges::{AsNcp, FacetInner, FacetOuter, First, Glocker};
+use crate::contact::Weighed;
 use crate::contact::condense::Condense;
 use crate::contact::form::Regularised;
 use crate::contact::proximal::Proximal;
-use crate::contact::solvers::{inner_solvers, solvers};
+use crate::contact::solvers::{inner_rolling_solvers, inner_solvers, rolling_solvers, solvers};
 
 pub use crate::core::register::{
     About, Composed, DEFAULT, Described, Edge, Entry, Prefix, Registered, Solves, about, abouts,
@@ -52,6 +55,26 @@ impl Registered for FrictionGlobal<3> {
 
     fn edges() -> Vec<Edge<Self>> {
         of_global()
+    }
+}
+
+impl Registered for RollingLocal {
+    fn solvers() -> Vec<Entry<Self>> {
+        rolling_solvers()
+    }
+
+    fn edges() -> Vec<Edge<Self>> {
+        vec![Edge::new::<Weighed<Proximal<5>>>()]
+    }
+}
+
+impl Registered for RollingGlobal {
+    fn solvers() -> Vec<Entry<Self>> {
+        rolling_solvers()
+    }
+
+    fn edges() -> Vec<Edge<Self>> {
+        vec![Edge::new::<Condense>(), Edge::new::<Weighed<Proximal<5>>>()]
     }
 }
 
@@ -99,6 +122,18 @@ impl Registered for Regularised<FrictionGlobal<2>> {
 impl Registered for Regularised<FrictionGlobal<3>> {
     fn solvers() -> Vec<Entry<Self>> {
         inner_solvers::<_, 3>()
+    }
+}
+
+impl Registered for Regularised<RollingLocal> {
+    fn solvers() -> Vec<Entry<Self>> {
+        inner_rolling_solvers()
+    }
+}
+
+impl Registered for Regularised<RollingGlobal> {
+    fn solvers() -> Vec<Entry<Self>> {
+        inner_rolling_solvers()
     }
 }
 

@@ -125,7 +125,7 @@ mod tests {
     #[test]
     fn labels_carry_settings_and_know_their_problems() {
         assert_eq!(kinds("nsgs:omega=0.9, local=quartic").unwrap().len(), 4);
-        let global = [Kind::FrictionGlobal3d, Kind::FrictionGlobal2d];
+        let global = [Kind::FrictionGlobal3d, Kind::FrictionGlobal2d, Kind::RollingGlobal3d];
         assert_eq!(kinds("condense/nsgs").unwrap(), global);
         assert!(kinds("magic").unwrap_err().contains("unknown solver `magic`"));
         assert!(kinds("nsgs:omga=1").unwrap_err().contains("unknown key `omga`"));

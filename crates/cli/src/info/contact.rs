@@ -30,7 +30,7 @@ const FEW_CONTACTS: usize = 2000;
 /// Unknowns of a rigid body or a small elastic one.
 const SMALL_BODY: usize = 48;
 
-fn singular<const D: usize>(p: &FrictionGlobal<D>) -> Option<ProblemError> {
+fn singular<const D: usize, L: Law<D>>(p: &FrictionGlobal<D, L>) -> Option<ProblemError> {
     // Bilateral constraints may make up for a singular M in the dynamics, but M⁻¹ is needed all the same.
     Inverse::new(&p.M, "M").err().map(ProblemError::from).or_else(|| {
         p.rows.as_ref()?;
@@ -42,9 +42,10 @@ impl Facts {
     /// Everything about a problem but its spectrum and the existence of a solution.
     pub(super) fn of(problem: &Friction, dofs: Option<usize>) -> Self {
         let singular = match problem {
-            Friction::Local2(_) | Friction::Local3(_) => None,
+            Friction::Local2(_) | Friction::Local3(_) | Friction::RollingLocal(_) => None,
             Friction::Global2(p) => singular(p),
             Friction::Global3(p) => singular(p),
+            Friction::RollingGlobal(p) => singular(p),
         };
         Self { traits: Traits::of(problem, dofs), singular, existence: None, spectrum: None }
     }

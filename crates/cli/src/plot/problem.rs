@@ -128,8 +128,12 @@ fn spies(problem: &AnyProblem) -> Vec<Spy> {
     match problem {
         AnyProblem::Friction(Friction::Local2(p)) => vec![blocks(&p.W)],
         AnyProblem::Friction(Friction::Local3(p)) => vec![blocks(&p.W)],
+        AnyProblem::Friction(Friction::RollingLocal(p)) => vec![blocks(&p.W)],
         AnyProblem::Friction(Friction::Global2(p)) => vec![sparse("M", &p.M), sparse("H", &p.H)],
         AnyProblem::Friction(Friction::Global3(p)) => vec![sparse("M", &p.M), sparse("H", &p.H)],
+        AnyProblem::Friction(Friction::RollingGlobal(p)) => {
+            vec![sparse("M", &p.M), sparse("H", &p.H)]
+        }
         AnyProblem::Complementarity(p) => {
             let (matrices, function) = with_complementarity!(p, p => (p.matrices(), p.function()));
             let matrices = matrices.into_iter().map(|(name, m)| any(name, m));

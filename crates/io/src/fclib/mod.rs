@@ -16,6 +16,9 @@
 //! /nonsmooth   drawing
 //! ```
 //!
+//! `/fclib_global_rolling` is `/fclib_global` with spacedim 5, rolling friction, and `vectors/mu_r` (nc). FCLIB has no local form of it; `/fclib_local_rolling`, which converted files have,
+//! is `/fclib_local` likewise.
+//!
 //! with m = spacedim · nc; V, R, s and G, b come together or not at all. Scalar rows that are no bilateral constraints have `vectors/lower` and `vectors/upper` (p each,
 //! infinities allowed) beside s or b: an addition of ours, which other readers of FCLIB do not see. So is the group `/nonsmooth`, whose text `drawing` says what
 //! the bodies look like ([`ProblemFile::drawing`]). A matrix is a group of `m`, `n`,
@@ -33,6 +36,7 @@ mod write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
+use nonsmooth_problem::check::Law;
 use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, Kind, ProblemError};
 
 use crate::folder::check_finite;
@@ -43,12 +47,18 @@ use crate::{Format, IoError, ProblemFile, StoredPoint};
 const SOLUTION: &str = "/solution";
 /// The group of our own and the text in it.
 const DRAWING: (&str, &str) = ("nonsmooth", "drawing");
-const KINDS: &[Kind] =
-    &[Kind::FrictionLocal2d, Kind::FrictionLocal3d, Kind::FrictionGlobal2d, Kind::FrictionGlobal3d];
+const KINDS: &[Kind] = &[
+    Kind::FrictionLocal2d,
+    Kind::FrictionLocal3d,
+    Kind::FrictionGlobal2d,
+    Kind::FrictionGlobal3d,
+    Kind::RollingLocal3d,
+    Kind::RollingGlobal3d,
+];
 
 /// The format.
 ///
-/// Reading: a `/solution` needs `u` and `r`, `v` if the problem is global, `l` if it has bilateral constraints; rolling friction is refused, by its group.
+/// Reading: a `/solution` needs `u` and `r`, `v` if the problem is global, `l` if it has bilateral constraints.
 /// Not read: `nzmax`, matrix info (`conditioning`, ...), guesses beyond `number_of_guesses`, other groups. Soft links are followed, up to 16 in a
 /// row; one that leads nowhere is an error that says where to. External links are refused. The cost is proportional to the size of the file in time and
 /// memory, whatever the file says of itself; a dataset that the file has no room for is refused before anything is allocated by its size.
@@ -125,19 +135,21 @@ struct Sizes {
 
 impl Sizes {
     fn of(problem: &Friction) -> Self {
-        fn local<const D: usize>(p: &FrictionLocal<D>) -> Sizes {
+        fn local<const D: usize, L: Law<D>>(p: &FrictionLocal<D, L>) -> Sizes {
             let lambda = p.rows.as_ref().map(|b| b.s.len());
             Sizes { v: None, contacts: D * p.contacts(), lambda }
         }
-        fn global<const D: usize>(p: &FrictionGlobal<D>) -> Sizes {
+        fn global<const D: usize, L: Law<D>>(p: &FrictionGlobal<D, L>) -> Sizes {
             let lambda = p.rows.as_ref().map(|b| b.b.len());
             Sizes { v: Some(p.dofs()), contacts: D * p.contacts(), lambda }
         }
         match problem {
             Friction::Local2(p) => local(p),
             Friction::Local3(p) => local(p),
+            Friction::RollingLocal(p) => local(p),
             Friction::Global2(p) => global(p),
             Friction::Global3(p) => global(p),
+            Friction::RollingGlobal(p) => global(p),
         }
     }
 
@@ -168,6 +180,8 @@ fn group(problem: &Friction) -> &'static str {
     match problem {
         Friction::Local2(_) | Friction::Local3(_) => "/fclib_local",
         Friction::Global2(_) | Friction::Global3(_) => "/fclib_global",
+        Friction::RollingLocal(_) => "/fclib_local_rolling",
+        Friction::RollingGlobal(_) => "/fclib_global_rolling",
     }
 }
 

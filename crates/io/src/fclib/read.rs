@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use nonsmooth_linalg::{Bsr, Csc};
+use nonsmooth_problem::check::Law;
 use nonsmooth_problem::{
     Bounds, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, ProblemError,
-    RowsGlobal, RowsLocal,
+    RollingData, RowsGlobal, RowsLocal,
 };
 
 use super::{DRAWING, Sizes, check_vector, group, invalid};
@@ -52,31 +53,38 @@ fn valid(root: &Folder) -> Result<Friction, IoError> {
 
 /// As [`valid`], not validated as a whole.
 fn stated(root: &Folder) -> Result<Friction, IoError> {
-    const LOCAL: &str = "fclib_local";
-    const GLOBAL: &str = "fclib_global";
-    for rolling in ["fclib_global_rolling", "fclib_local_rolling"] {
-        if matches!(root.find(rolling)?, Some(Object::Group(_))) {
-            return Err(IoError::Unsupported {
-                file: root.file.into(),
-                place: format!("/{rolling}"),
-                what: "rolling friction (spacedim 5)",
-            });
-        }
+    const NAMES: [&str; 4] =
+        ["fclib_local", "fclib_global", "fclib_local_rolling", "fclib_global_rolling"];
+    let mut groups = vec![];
+    for name in NAMES {
+        groups.extend(root.folder(name)?.map(|group| (name, group)));
     }
-    match (root.folder(LOCAL)?, root.folder(GLOBAL)?) {
-        (Some(g), None) => Ok(match g.spacedim()? {
-            2 => Friction::Local2(local(&g)?),
-            _ => Friction::Local3(local(&g)?),
+    match &groups[..] {
+        [("fclib_local", g)] => Ok(match g.spacedim(&[2, 3])? {
+            2 => Friction::Local2(local(g)?),
+            _ => Friction::Local3(local(g)?),
         }),
-        (None, Some(g)) => Ok(match g.spacedim()? {
-            2 => Friction::Global2(global(&g)?),
-            _ => Friction::Global3(global(&g)?),
+        [("fclib_global", g)] => Ok(match g.spacedim(&[2, 3])? {
+            2 => Friction::Global2(global(g)?),
+            _ => Friction::Global3(global(g)?),
         }),
-        (both, _) => {
-            let found = match (both, root.groups()) {
-                (Some(_), _) => format!("both /{LOCAL} and /{GLOBAL}"),
-                (None, others) if others.is_empty() => "no group".into(),
-                (None, others) => format!("only /{}", others.join(", /")),
+        [("fclib_local_rolling", g)] => {
+            g.spacedim(&[5])?;
+            Ok(Friction::RollingLocal(local(g)?))
+        }
+        [(_, g)] => {
+            g.spacedim(&[5])?;
+            Ok(Friction::RollingGlobal(global(g)?))
+        }
+        [(one, _), (other, _), ..] => {
+            let found = format!("both /{one} and /{other}");
+            Err(IoError::Root { file: root.file.into(), found: one_line(found) })
+        }
+        [] => {
+            let others = root.groups();
+            let found = match others.is_empty() {
+                true => "no group".into(),
+                false => format!("only /{}", others.join(", /")),
             };
             Err(IoError::Root { file: root.file.into(), found: one_line(found) })
         }
@@ -84,7 +92,7 @@ fn stated(root: &Folder) -> Result<Friction, IoError> {
 }
 
 #[allow(non_snake_case)]
-fn local<const D: usize>(g: &Folder) -> Result<FrictionLocal<D>, IoError> {
+fn local<const D: usize, L: Law<D>>(g: &Folder) -> Result<FrictionLocal<D, L>, IoError> {
     let vectors = g.need("vectors")?;
     let mu = g.mu(&vectors)?;
     let m = D * mu.len();
@@ -105,11 +113,12 @@ fn local<const D: usize>(g: &Folder) -> Result<FrictionLocal<D>, IoError> {
             return Err(g.incomplete(&parts));
         }
     };
-    Ok(FrictionLocal { W: Bsr::from_csc(&W), q, mu, rows: bilateral })
+    let mu_r = L::Rolling::of(vectors.rolling(L::DISKS)?);
+    Ok(FrictionLocal { W: Bsr::from_csc(&W), q, mu, mu_r, rows: bilateral })
 }
 
 #[allow(non_snake_case)]
-fn global<const D: usize>(g: &Folder) -> Result<FrictionGlobal<D>, IoError> {
+fn global<const D: usize, L: Law<D>>(g: &Folder) -> Result<FrictionGlobal<D, L>, IoError> {
     let vectors = g.need("vectors")?;
     let mu = g.mu(&vectors)?;
     let m = D * mu.len();
@@ -129,7 +138,8 @@ fn global<const D: usize>(g: &Folder) -> Result<FrictionGlobal<D>, IoError> {
         }
         (G, b) => return Err(g.incomplete(&[("G", G.is_some()), ("vectors/b", b)])),
     };
-    Ok(FrictionGlobal { M, H, f, w, mu, rows: bilateral })
+    let mu_r = L::Rolling::of(vectors.rolling(L::DISKS)?);
+    Ok(FrictionGlobal { M, H, f, w, mu, mu_r, rows: bilateral })
 }
 
 fn info(problem: &Folder) -> Result<Info, IoError> {
@@ -210,11 +220,21 @@ impl Folder<'_, '_> {
         }
     }
 
-    fn spacedim(&self) -> Result<i64, IoError> {
+    fn spacedim(&self, known: &[i64]) -> Result<i64, IoError> {
         match self.int("spacedim")? {
-            d @ (2 | 3) => Ok(d),
-            d => Err(self.error("spacedim", "2 or 3", d)),
+            d if known.contains(&d) => Ok(d),
+            // Planar rolling friction has a normal, a tangent and an angle.
+            3 => Err(self.error("spacedim", "5 (rolling friction in the plane is not known)", 3)),
+            d => {
+                let names: Vec<_> = known.iter().map(i64::to_string).collect();
+                Err(self.error("spacedim", names.join(" or "), d))
+            }
         }
+    }
+
+    /// The coefficients of rolling friction, of a law that has any; their number the problem looks at itself.
+    fn rolling(&self, disks: usize) -> Result<Vec<f64>, IoError> {
+        if disks > 1 { self.reals("mu_r", None) } else { Ok(vec![]) }
     }
 
     /// `mu`, checked first: all other sizes follow from its length.

@@ -7,8 +7,9 @@ use std::path::Path;
 
 use hdf5_pure::{AttrValue, Error, File, FileBuilder, FormatError, LibVer};
 use nonsmooth_linalg::Csc;
+use nonsmooth_problem::check::Law;
 use nonsmooth_problem::{
-    AnyPoint, AnyProblem, Bounds, Friction, FrictionGlobal, FrictionLocal, Problem,
+    AnyPoint, AnyProblem, Bounds, Friction, FrictionGlobal, FrictionLocal, Problem, RollingData,
 };
 
 use super::{DRAWING, SOLUTION, Sizes, check_vector, group, guarded, invalid, read};
@@ -45,8 +46,10 @@ fn build(path: &Path, content: &ProblemFile) -> Result<FileBuilder, IoError> {
         match problem {
             Friction::Local2(p) => local(g, p)?,
             Friction::Local3(p) => local(g, p)?,
+            Friction::RollingLocal(p) => local(g, p)?,
             Friction::Global2(p) => global(g, p)?,
             Friction::Global3(p) => global(g, p)?,
+            Friction::RollingGlobal(p) => global(g, p)?,
         }
         g.child("info", |g| info(g, &content.info))
     })?;
@@ -191,7 +194,10 @@ fn lookup(file: &Path, place: &str, e: Error) -> IoError {
 }
 
 /// A failure of the HDF5 writer: nearly always the system's.
-fn local<const D: usize>(g: &mut Out, problem: &FrictionLocal<D>) -> Result<(), IoError> {
+fn local<const D: usize, L: Law<D>>(
+    g: &mut Out,
+    problem: &FrictionLocal<D, L>,
+) -> Result<(), IoError> {
     g.int("spacedim", D)?;
     g.matrix("W", &problem.W.to_csc())?;
     if let Some(b) = &problem.rows {
@@ -201,6 +207,9 @@ fn local<const D: usize>(g: &mut Out, problem: &FrictionLocal<D>) -> Result<(), 
     g.child("vectors", |g| {
         g.reals("q", &problem.q);
         g.reals("mu", &problem.mu);
+        if L::DISKS > 1 {
+            g.reals("mu_r", problem.mu_r.values());
+        }
         if let Some(b) = &problem.rows {
             g.reals("s", &b.s);
             g.bounds(&b.bounds);
@@ -209,7 +218,10 @@ fn local<const D: usize>(g: &mut Out, problem: &FrictionLocal<D>) -> Result<(), 
     })
 }
 
-fn global<const D: usize>(g: &mut Out, problem: &FrictionGlobal<D>) -> Result<(), IoError> {
+fn global<const D: usize, L: Law<D>>(
+    g: &mut Out,
+    problem: &FrictionGlobal<D, L>,
+) -> Result<(), IoError> {
     g.int("spacedim", D)?;
     g.matrix("M", &problem.M)?;
     g.matrix("H", &problem.H)?;
@@ -220,6 +232,9 @@ fn global<const D: usize>(g: &mut Out, problem: &FrictionGlobal<D>) -> Result<()
         g.reals("f", &problem.f);
         g.reals("w", &problem.w);
         g.reals("mu", &problem.mu);
+        if L::DISKS > 1 {
+            g.reals("mu_r", problem.mu_r.values());
+        }
         if let Some(b) = &problem.rows {
             g.reals("b", &b.b);
             g.bounds(&b.bounds);

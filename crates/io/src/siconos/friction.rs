@@ -56,7 +56,10 @@ fn whole(t: &mut Tokens, d: usize, nc: usize, path: &Path) -> Result<Friction, I
     let made = match d {
         2 => FrictionGlobal::new(M, H, f, w, mu).map(Friction::Global2),
         3 => FrictionGlobal::new(M, H, f, w, mu).map(Friction::Global3),
-        _ => return Err(rolling(path)),
+        _ => {
+            let mu_r = t.reals("mu_r", nc)?;
+            FrictionGlobal::rolling(M, H, f, w, mu, mu_r).map(Friction::RollingGlobal)
+        }
     };
     made.map_err(IoError::problem(path))
 }
@@ -69,7 +72,10 @@ fn reduced(t: &mut Tokens, d: usize, nc: usize, path: &Path) -> Result<Friction,
     let made = match d {
         2 => FrictionLocal::new(Bsr::from_csc(&W), q, mu).map(Friction::Local2),
         3 => FrictionLocal::new(Bsr::from_csc(&W), q, mu).map(Friction::Local3),
-        _ => return Err(rolling(path)),
+        _ => {
+            let mu_r = t.reals("mu_r", nc)?;
+            FrictionLocal::rolling(Bsr::from_csc(&W), q, mu, mu_r).map(Friction::RollingLocal)
+        }
     };
     made.map_err(IoError::problem(path))
 }
@@ -84,9 +90,4 @@ fn size(t: &Tokens, name: &str) -> Result<usize, IoError> {
 fn compressed(matrix: Matrix) -> Csc {
     // A matrix that was read from numbers has entries.
     matrix.to_csc().unwrap_or_else(|| Csc::zeros(matrix.nrows(), matrix.ncols()))
-}
-
-fn rolling(path: &Path) -> IoError {
-    let what = "rolling friction (dimension 5)";
-    IoError::Unsupported { file: path.into(), place: "line 1".into(), what }
 }

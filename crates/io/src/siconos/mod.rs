@@ -59,6 +59,8 @@ impl Format for Siconos {
                 Kind::FrictionLocal3d,
                 Kind::FrictionGlobal2d,
                 Kind::FrictionGlobal3d,
+                Kind::RollingLocal3d,
+                Kind::RollingGlobal3d,
                 Kind::Lcp,
                 Kind::Mlcp,
                 Kind::BoxLcp,

@@ -47,7 +47,7 @@ fn local<const D: usize>() -> impl Strategy<Value = FrictionLocal<D>> {
         let bilateral = (csc(m, p), csc(p, p), vec(real(), p));
         (csc(m, m), vec(real(), m), mu(nc), option::of(bilateral)).prop_map(|(w, q, mu, b)| {
             let bilateral = b.map(|(V, R, s)| RowsLocal::bilateral(V, R, s));
-            FrictionLocal { W: Bsr::from_csc(&w), q, mu, rows: bilateral }
+            FrictionLocal { W: Bsr::from_csc(&w), q, mu, mu_r: (), rows: bilateral }
         })
     })
 }
@@ -59,7 +59,7 @@ fn global<const D: usize>() -> impl Strategy<Value = FrictionGlobal<D>> {
         (csc(n, n), csc(n, m), vec(real(), n), vec(real(), m), mu(nc), bilateral).prop_map(
             |(M, H, f, w, mu, b)| {
                 let bilateral = b.map(|(G, b)| RowsGlobal::bilateral(G, b));
-                FrictionGlobal { M, H, f, w, mu, rows: bilateral }
+                FrictionGlobal { M, H, f, w, mu, mu_r: (), rows: bilateral }
             },
         )
     })
@@ -124,8 +124,10 @@ pub fn sizes(problem: &AnyProblem) -> (Option<usize>, usize, usize) {
     match problem {
         Friction::Local2(p) => (None, p.q.len(), p.multipliers()),
         Friction::Local3(p) => (None, p.q.len(), p.multipliers()),
+        Friction::RollingLocal(p) => (None, p.q.len(), p.multipliers()),
         Friction::Global2(p) => (Some(p.dofs()), p.w.len(), p.multipliers()),
         Friction::Global3(p) => (Some(p.dofs()), p.w.len(), p.multipliers()),
+        Friction::RollingGlobal(p) => (Some(p.dofs()), p.w.len(), p.multipliers()),
     }
 }
 

@@ -83,7 +83,8 @@ fn constrained(g: &[(usize, usize, f64)], b: Vec<f64>) -> FrictionGlobal<3> {
     let g = csc(6, b.len(), g);
     let bilateral = Some(RowsGlobal::bilateral(g, b));
     let m = Csc::diagonal(&[1.0, 1.0, 1.0, 0.2, 0.2, 0.3]);
-    let problem = FrictionGlobal { M: m, H: h, f, w: vec![0.0; 3], mu: vec![0.4], rows: bilateral };
+    let problem =
+        FrictionGlobal { M: m, H: h, f, w: vec![0.0; 3], mu: vec![0.4], mu_r: (), rows: bilateral };
     problem.validate().unwrap();
     problem
 }

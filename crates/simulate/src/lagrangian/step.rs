@@ -534,7 +534,7 @@ fn sticks(mut r: impl Iterator<Item = f64>, mu: f64) -> bool {
 /// A problem without contacts, to be filled.
 pub(super) fn empty<const D: usize>() -> FrictionLocal<D> {
     let rows: Option<RowsLocal> = None;
-    FrictionLocal { W: Bsr::from_rows(0, &[]), q: vec![], mu: vec![], rows }
+    FrictionLocal { W: Bsr::from_rows(0, &[]), q: vec![], mu: vec![], mu_r: (), rows }
 }
 
 fn budget_of(limits: &Limits, begun: Instant) -> Budget {

@@ -14,8 +14,9 @@ use nonsmooth_problem::{
 };
 
 use crate::SolveError;
+use crate::contact::law::DiskLaw;
 use crate::core::reformulation::Reformulation;
-use crate::core::register::{Composed, Over};
+use crate::core::register::{Composed, Over, Registered};
 use crate::core::settings::NoSettings;
 use crate::{Boxed, Via, ViaSession};
 use nonsmooth_problem::Kind;
@@ -24,22 +25,23 @@ use nonsmooth_problem::Kind;
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Condense;
 
-impl<const D: usize> Composed<FrictionGlobal<D>> for Condense
+impl<const D: usize, L: DiskLaw<D>> Composed<FrictionGlobal<D, L>> for Condense
 where
-    FrictionLocal<D>: crate::core::register::Registered,
+    FrictionLocal<D, L>: Registered,
 {
-    type To = FrictionLocal<D>;
+    type To = FrictionLocal<D, L>;
     type Settings = NoSettings;
     const NAME: &'static str = "condense";
     const SUMMARY: &'static str =
         "global to local: forms W = H' M^-1 H and q, bilateral constraints eliminated";
-    const FROM: &'static [Kind] = &[Kind::FrictionGlobal2d, Kind::FrictionGlobal3d];
+    const FROM: &'static [Kind] =
+        &[Kind::FrictionGlobal2d, Kind::FrictionGlobal3d, Kind::RollingGlobal3d];
     const CITES: &'static [&'static str] = &["Acary2018"];
 
-    const SESSION: Option<Over<NoSettings, FrictionLocal<D>, FrictionGlobal<D>>> =
+    const SESSION: Option<Over<NoSettings, FrictionLocal<D, L>, FrictionGlobal<D, L>>> =
         Some(|_, session| Box::new(ViaSession::new(Self, session)));
 
-    fn compose(_: NoSettings, solver: Boxed<Self::To>) -> Boxed<FrictionGlobal<D>> {
+    fn compose(_: NoSettings, solver: Boxed<Self::To>) -> Boxed<FrictionGlobal<D, L>> {
         Boxed::new(Via { reformulation: Condense, solver })
     }
 
@@ -56,14 +58,14 @@ pub struct CondenseMemo {
     contradiction: Option<Impulses>,
 }
 
-impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
-    type To = FrictionLocal<D>;
+impl<const D: usize, L: DiskLaw<D>> Reformulation<FrictionGlobal<D, L>> for Condense {
+    type To = FrictionLocal<D, L>;
     type Memo = CondenseMemo;
 
     fn reduce(
         &self,
-        problem: &FrictionGlobal<D>,
-    ) -> Result<(FrictionLocal<D>, CondenseMemo), SolveError> {
+        problem: &FrictionGlobal<D, L>,
+    ) -> Result<(FrictionLocal<D, L>, CondenseMemo), SolveError> {
         let mut dynamics = Dynamics::new(problem)?;
         let mut q = vec![0.0; problem.w.len()];
         let contradiction = dynamics.free_velocity(problem, &mut q); //                                  q = Hᵀ M⁻¹ f + w
@@ -71,20 +73,22 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
         budget::admit("the condensed W", bytes)?;
         let w = Delassus::condense(&problem.H, &dynamics.inverse); //                W = Hᵀ M⁻¹ H
         let rows = rows(problem, &mut dynamics);
-        let local = FrictionLocal { W: w, q, mu: problem.mu.clone(), rows };
+        let (mu, mu_r) = (problem.mu.clone(), problem.mu_r.clone());
+        let local = FrictionLocal { W: w, q, mu, mu_r, rows };
         checked(&local)?;
         Ok((local, CondenseMemo { dynamics, h: problem.H.clone(), contradiction }))
     }
 
     fn reduce_again(
         &self,
-        problem: &FrictionGlobal<D>,
-        reduced: &mut FrictionLocal<D>,
+        problem: &FrictionGlobal<D, L>,
+        reduced: &mut FrictionLocal<D, L>,
         memo: &mut CondenseMemo,
     ) -> Result<(), SolveError> {
         if memo.dynamics.serves(problem) && memo.h == problem.H {
             memo.contradiction = memo.dynamics.free_velocity(problem, &mut reduced.q);
             reduced.mu.clone_from(&problem.mu);
+            reduced.mu_r.clone_from(&problem.mu_r);
             reduced.rows = rows(problem, &mut memo.dynamics);
             checked(reduced)?;
         } else {
@@ -99,7 +103,7 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
 
     fn lower(
         &self,
-        problem: &FrictionGlobal<D>,
+        problem: &FrictionGlobal<D, L>,
         point: &GlobalPoint,
         _: &CondenseMemo,
         reduced: &mut LocalPoint,
@@ -111,7 +115,7 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
 
     fn lift(
         &self,
-        problem: &FrictionGlobal<D>,
+        problem: &FrictionGlobal<D, L>,
         reduced: &LocalPoint,
         memo: &mut CondenseMemo,
         point: &mut GlobalPoint,
@@ -123,7 +127,7 @@ impl<const D: usize> Reformulation<FrictionGlobal<D>> for Condense {
 }
 
 /// Bilateral constraints that nothing touches leave an empty problem, which is solved.
-fn checked<const D: usize>(reduced: &FrictionLocal<D>) -> Result<(), SolveError> {
+fn checked<const D: usize, L: DiskLaw<D>>(reduced: &FrictionLocal<D, L>) -> Result<(), SolveError> {
     if reduced.contacts() + reduced.multipliers() > 0 {
         reduced.validate()?;
     }
@@ -131,13 +135,18 @@ fn checked<const D: usize>(reduced: &FrictionLocal<D>) -> Result<(), SolveError>
 }
 
 /// The rows with bounds.
-fn bounded<const D: usize>(problem: &FrictionGlobal<D>) -> impl Iterator<Item = usize> + '_ {
+fn bounded<const D: usize, L: DiskLaw<D>>(
+    problem: &FrictionGlobal<D, L>,
+) -> impl Iterator<Item = usize> + '_ {
     problem.rows.iter().flat_map(|b| b.bounds.bounded())
 }
 
 /// The rows with bounds as the local problem states them, if there are any.
 #[allow(non_snake_case)]
-fn rows<const D: usize>(problem: &FrictionGlobal<D>, dynamics: &mut Dynamics) -> Option<RowsLocal> {
+fn rows<const D: usize, L: DiskLaw<D>>(
+    problem: &FrictionGlobal<D, L>,
+    dynamics: &mut Dynamics,
+) -> Option<RowsLocal> {
     let b = problem.rows.as_ref().filter(|b| !b.bounds.are_free())?;
     let which: Vec<usize> = bounded(problem).collect();
     let (mut v, mut r) = (vec![], vec![]);

@@ -2,11 +2,13 @@
 
 use nonsmooth_problem::check::Kinematic;
 
+use crate::contact::Weigh;
 use crate::contact::auto::Auto;
 use crate::contact::form::{
-    Concurrent, Explicit, Frictional, Linear, Linearised, OnContacts, Regularised,
+    Concurrent, Disked, Explicit, Frictional, Linear, Linearised, OnContacts, Regularised,
 };
 use crate::contact::interior::{ConvexRelaxation, Interior};
+use crate::contact::law::Rolling;
 use crate::contact::law::cfun::{
     AlartCurnier, ChenMangasarian, FischerBurmeister, HueberStadlerWohlmuth, JeanMoreau,
     NaturalMap, ParkKwak, SmoothedFischerBurmeister, XuewenSohWanji,
@@ -18,13 +20,14 @@ use crate::contact::projection::{
 };
 use crate::contact::proximal::Admm;
 use crate::contact::splitting::{Colored, Nsgs, Psor};
+use crate::core::reformulation::Reformulation;
 use crate::core::register::{Described, Entry};
 use crate::{Boxed, Solver};
 
 /// A method that is its hyperparameters.
 fn on<P, S, const D: usize>() -> Entry<P>
 where
-    P: Linear<D> + Frictional<D> + 'static,
+    P: Linear<D> + Disked<D> + 'static,
     S: Described + 'static,
     OnContacts<S, D>: Solver<P, Work: 'static>,
 {
@@ -33,7 +36,7 @@ where
 
 fn projected<P, M, const D: usize>() -> Entry<P>
 where
-    P: Linear<D> + Frictional<D> + 'static,
+    P: Linear<D> + Disked<D> + 'static,
     M: Method + Described + 'static,
 {
     Entry::new(|method: M| Boxed::new(Projected::<M, D>(method)))
@@ -71,11 +74,47 @@ where
     ]
 }
 
+/// The solvers of problems with rolling friction: those whose method is any cone's, or any of disks. They see the problem in units of velocity ([`Weigh`]).
+pub fn rolling_solvers<P>() -> Vec<Entry<P>>
+where
+    P: Concurrent<5> + Disked<5, Law = Rolling> + Linearised<5> + Kinematic<5> + 'static,
+    Weigh: Reformulation<P, To = P>,
+{
+    let solvers = vec![
+        on::<P, Auto, 5>(),
+        Entry::new(Nsgs::rolling::<P, 5>),
+        Entry::new(Colored::rolling::<P, 5>),
+        Entry::new(|s: Psor| Boxed::new(s.sweeps::<5>())),
+        projected::<P, DeSaxce, 5>(),
+        projected::<P, FixedPoint, 5>(),
+        projected::<P, Extragradient, 5>(),
+        projected::<P, Hyperplane, 5>(),
+        on::<P, Newton<AlartCurnier>, 5>(),
+        on::<P, Newton<JeanMoreau>, 5>(),
+        on::<P, Newton<NaturalMap>, 5>(),
+        on::<P, Interior, 5>(),
+    ];
+    solvers.into_iter().map(|entry| entry.behind(Weigh)).collect()
+}
+
+/// Those of them that the proximal point method may have inside.
+pub fn inner_rolling_solvers<P>() -> Vec<Entry<Regularised<P>>>
+where
+    P: Concurrent<5> + Disked<5, Law = Rolling> + Linearised<5> + 'static,
+{
+    vec![
+        Entry::new(Nsgs::rolling::<Regularised<P>, 5>),
+        projected::<_, Extragradient, 5>(),
+        on::<_, Newton<AlartCurnier>, 5>(),
+        on::<_, Newton<NaturalMap>, 5>(),
+    ]
+}
+
 /// The solvers that the proximal point method may have inside: those that gain from a regular W.
 pub fn inner_solvers<P, const D: usize>() -> Vec<Entry<Regularised<P>>>
 where
     P: Concurrent<D> + Frictional<D> + Linearised<D> + 'static,
-    Regularised<P>: Concurrent<D> + Linearised<D>,
+    Regularised<P>: Concurrent<D> + Frictional<D> + Linearised<D>,
 {
     vec![
         Entry::new(Nsgs::boxed::<Regularised<P>, D>),

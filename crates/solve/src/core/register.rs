@@ -12,9 +12,11 @@ use crate::core::boxed::Boxed;
 use crate::core::drive::{Driver, Session};
 use crate::core::error::SolveError;
 use crate::core::guarded::Guarded;
+use crate::core::reformulation::Reformulation;
 use crate::core::settings::{Setting, Settings, SettingsMap, described, parse};
 use crate::core::solver::Solver;
 use crate::core::spelling::meant;
+use crate::core::via::Via;
 
 /// The solver that is used when none is named.
 pub const DEFAULT: &str = "auto";
@@ -150,6 +152,22 @@ impl<P: Problem + 'static> Entry<P> {
         let make =
             move |settings: &SettingsMap| Ok(Box::new(make(parse(settings)?)) as AnySession<P>);
         Self { about: S::ABOUT, make: Maker::Session(Box::new(make)) }
+    }
+
+    /// The same solver behind a reformulation of the kind to itself that its name does not show.
+    pub(crate) fn behind<R>(self, reformulation: R) -> Self
+    where
+        R: Reformulation<P, To = P, Memo: 'static> + Copy + 'static,
+        P::Point: 'static,
+    {
+        let Self { about, make } = self;
+        let make = match make {
+            Maker::Solver(make) => Maker::Solver(Box::new(move |settings: &SettingsMap| {
+                Ok(Boxed::new(Via { reformulation, solver: make(settings)? }))
+            }) as Make<Boxed<P>>),
+            session => session,
+        };
+        Self { about, make }
     }
 
     fn has_steps(&self) -> bool {

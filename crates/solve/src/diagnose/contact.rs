@@ -4,12 +4,13 @@ use std::borrow::Cow;
 use std::time::Instant;
 
 use nonsmooth_analysis::{Spectrum, Traits, rank};
-use nonsmooth_linalg::{Bsr, Csc, Delassus, Inverse, norm, small};
+use nonsmooth_linalg::{Bsr, Csc, Delassus, Inverse, norm};
 use nonsmooth_problem::check::{Existence, Impulses};
 use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, with_friction};
 
 use super::{Finding, easy, hard};
 use crate::contact::form::{Access, Linear, Rows};
+use crate::contact::law::DiskLaw;
 use crate::core::guard;
 use crate::core::register::Registered;
 use crate::registry;
@@ -70,7 +71,7 @@ trait Seen<const D: usize>: Linear<D> + Rows<D> {
 const SMALL_BODY: usize = 48;
 const BLOCKS: usize = 300_000;
 
-impl<const D: usize> Seen<D> for FrictionLocal<D> {
+impl<const D: usize, L: DiskLaw<D>> Seen<D> for FrictionLocal<D, L> {
     fn delassus(&self, _: &Traits) -> Option<Cow<'_, Bsr<D>>> {
         Some(Cow::Borrowed(&self.W))
     }
@@ -85,7 +86,7 @@ impl<const D: usize> Seen<D> for FrictionLocal<D> {
     }
 }
 
-impl<const D: usize> Seen<D> for FrictionGlobal<D> {
+impl<const D: usize, L: DiskLaw<D>> Seen<D> for FrictionGlobal<D, L> {
     fn delassus(&self, traits: &Traits) -> Option<Cow<'_, Bsr<D>>> {
         let components = &traits.mass.as_ref()?.components;
         let small = components.iter().all(|c| c.size <= SMALL_BODY);
@@ -170,7 +171,8 @@ impl<P: Seen<D> + Registered, const D: usize> Patient<'_, P, D> {
 
     fn size(&self) -> Finding {
         let (nc, m) = (self.traits.contacts, self.traits.impulses());
-        let says = format!("{} contacts in {D}D, {m} components of impulses", nc);
+        let space = if D == 5 { "3D with rolling friction".into() } else { format!("{D}D") };
+        let says = format!("{nc} contacts in {space}, {m} components of impulses");
         match nc {
             0..=100 => easy("size", says, "Small: every solver's step is cheap."),
             101..=2000 => {
@@ -259,7 +261,11 @@ impl<P: Seen<D> + Registered, const D: usize> Patient<'_, P, D> {
 
     fn mass_ratio(&self, state: &P::State) -> Finding {
         let w: Vec<f64> = (0..self.traits.contacts)
-            .map(|c| small::mean_diagonal(&self.problem.diagonal_block(state, c)))
+            .map(|c| {
+                // Of velocities: of rolling the unit is another.
+                let w = self.problem.diagonal_block(state, c);
+                (0..D.min(3)).map(|k| w[k][k]).sum::<f64>() / D.min(3) as f64
+            })
             .collect();
         let dead = w.iter().filter(|&&w| w <= 0.0).count();
         if dead > 0 {

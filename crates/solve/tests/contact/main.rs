@@ -1,4 +1,4 @@
-//! Contact problems: whether a solution exists, friction through facets, the methods through convex optimisation, scalar rows with bounds, a law of one's own.
+//! Contact problems: whether a solution exists, friction through facets, the methods through convex optimisation, scalar rows with bounds, rolling friction, a law of one's own.
 
 mod another_law;
 mod existence;
@@ -6,4 +6,5 @@ mod facets;
 mod ncp;
 mod optimisation;
 mod plain_lemke;
+mod rolling;
 mod scalar_rows;

@@ -331,7 +331,8 @@ fn local<const D: usize>(data: &Local) -> FrictionLocal<D> {
         .bilateral
         .as_ref()
         .map(|(v, r, s)| RowsLocal::bilateral(csc(v, s.len()), csc(r, s.len()), s.clone()));
-    let problem = FrictionLocal { W: w, q: data.q.clone(), mu: data.mu.clone(), rows: bilateral };
+    let problem =
+        FrictionLocal { W: w, q: data.q.clone(), mu: data.mu.clone(), mu_r: (), rows: bilateral };
     problem.validate().expect("valid");
     problem
 }
@@ -587,6 +588,7 @@ fn global<const D: usize>(data: &Global) -> FrictionGlobal<D> {
         f: data.f.clone(),
         w: data.w.clone(),
         mu: data.mu.clone(),
+        mu_r: (),
         rows: data
             .bilateral
             .as_ref()

@@ -7,10 +7,8 @@ mod local;
 pub mod planted;
 mod rows;
 
-pub use global::{
-    Dynamics, FrictionGlobal, GlobalGauge, GlobalPoint, RollingGlobal, RowsGlobal,
-};
-pub use judge::{ContactStatus, Impulses, Law, Motion};
+pub use global::{Dynamics, FrictionGlobal, GlobalGauge, GlobalPoint, RollingGlobal, RowsGlobal};
+pub use judge::{ContactStatus, Impulses, Law, Motion, Weighed};
 pub use law::{Coulomb, Rolling, RollingData};
 pub use local::{FrictionLocal, LocalGauge, LocalPoint, RollingLocal, RowsLocal};
 pub use rows::Bounds;

@@ -8,12 +8,12 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use crate::{
-    Bounds, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RollingGlobal,
-    RollingLocal, RowsGlobal, RowsLocal,
-};
 use crate::check::Law;
 use crate::kinds::contact::law::RollingData;
+use crate::{
+    Bounds, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RollingGlobal, RollingLocal,
+    RowsGlobal, RowsLocal,
+};
 use nonsmooth_linalg::{Csc, Delassus, Inverse};
 
 /// The sizes and the state of a contact problem with a known solution.
@@ -135,7 +135,8 @@ impl Planted {
                 mu_r.push(rng.random_range(self.mu_r.0..=self.mu_r.1));
             }
             let range = D * c..D * c + D;
-            let coefficients: Vec<f64> = mu.last().into_iter().chain(mu_r.last()).copied().collect();
+            let coefficients: Vec<f64> =
+                mu.last().into_iter().chain(mu_r.last()).copied().collect();
             self.plant(&coefficients, &mut rng, &mut u[range.clone()], &mut r[range]);
         }
         let (bounds, mut b) = self.bounds(&mut rng, &mut lambda);

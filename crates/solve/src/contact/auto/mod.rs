@@ -36,7 +36,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::auto::proximal_newton::ProximalNewton;
 use crate::contact::existence;
-use crate::contact::form::{Access, Costs, Frictional, Linearised, OnContacts, has_bounds};
+use crate::contact::form::{Access, Costs, Disked, Linearised, OnContacts, has_bounds};
 use crate::contact::parts::{Central, Sweep, put_within_bounds, sweep_rows};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
@@ -103,13 +103,13 @@ const RUNAWAY: f64 = 1e7;
 const INVESTIGATION: f64 = 2.0;
 
 /// The workspace. The later stages' parts are made when they are first needed.
-pub struct HybridWork<P: Linearised<D> + Frictional<D>, const D: usize> {
+pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     state: P::State,
     /// The problem has rows with bounds.
     bounded: bool,
-    sweep: Sweep<D>,
-    central: Option<Box<Central<D>>>,
-    newton: Option<Box<ProximalNewton<D>>>,
+    sweep: Sweep<P::Law, D>,
+    central: Option<Box<Central<P::Law, D>>>,
+    newton: Option<Box<ProximalNewton<P::Law, D>>>,
     controller: Controller,
     costs: Option<Costs>,
     scale: f64,
@@ -163,7 +163,7 @@ struct Done {
     strategies: usize,
 }
 
-impl<P: Linearised<D> + Frictional<D> + Kinematic<D>, const D: usize> Solver<P>
+impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
     for OnContacts<Auto, D>
 {
     type Work = HybridWork<P, D>;
@@ -285,7 +285,7 @@ const FIRST: Stage = Stage::Sweeps { last: f64::NAN, claims: 0 };
 
 impl<const D: usize> OnContacts<Auto, D> {
     /// Puts zero in place of impulses that solve the problem no better than zero does: a bad guess must not cost anything.
-    fn choose_start<P: Linearised<D> + Frictional<D>>(
+    fn choose_start<P: Linearised<D> + Disked<D>>(
         &self,
         problem: &P,
         r: &mut [f64],
@@ -311,7 +311,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     }
 
     /// Stage 1. `last`: the estimate of the step before; `claims`: how often the sweeps thought that they had arrived.
-    fn sweep<P: Linearised<D> + Frictional<D> + Kinematic<D>>(
+    fn sweep<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
@@ -365,7 +365,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     }
 
     /// The parts of the later stages, and whichever comes first.
-    fn leave_sweeps<P: Linearised<D> + Frictional<D> + Kinematic<D>>(
+    fn leave_sweeps<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
@@ -392,7 +392,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     }
 
     /// Stage 2: one iteration of the interior point; at its end the better of its best iterate and the swept point goes on.
-    fn interior<P: Linearised<D> + Frictional<D> + Kinematic<D>>(
+    fn interior<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
@@ -429,7 +429,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     }
 
     /// Begins a proximal subproblem about the present impulses, from which their velocities have yet to be computed.
-    fn subproblem_here<P: Linearised<D> + Frictional<D> + Kinematic<D>>(
+    fn subproblem_here<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
@@ -442,7 +442,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     }
 
     /// Begins a proximal subproblem about the present impulses, whose velocities and error are known.
-    fn subproblem<P: Linearised<D> + Frictional<D> + Kinematic<D>>(
+    fn subproblem<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
@@ -461,7 +461,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     }
 
     /// Stage 3: one Newton iteration; at the end of the subproblem what comes next.
-    fn newton<P: Linearised<D> + Frictional<D> + Kinematic<D>>(
+    fn newton<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
@@ -531,7 +531,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     }
 
     /// Stage 4: sweeps on the problem itself; taken back where they spoil more than they mend.
-    fn between<P: Linearised<D> + Frictional<D> + Kinematic<D>>(
+    fn between<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
@@ -567,7 +567,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     }
 
     /// What follows from what is known of the existence of a solution, if something does.
-    fn decided<P: Linearised<D> + Frictional<D> + Kinematic<D>>(
+    fn decided<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
@@ -592,7 +592,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     }
 
     /// Stage 5. The first time it is asked whether there is a solution at all.
-    fn other_strategy<P: Linearised<D> + Frictional<D> + Kinematic<D>>(
+    fn other_strategy<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
@@ -646,7 +646,7 @@ impl<const D: usize> OnContacts<Auto, D> {
 }
 
 /// Begins stage 2.
-fn begin_interior<P: Linearised<D> + Frictional<D>, const D: usize>(
+fn begin_interior<P: Linearised<D> + Disked<D>, const D: usize>(
     problem: &P,
     work: &mut HybridWork<P, D>,
 ) {

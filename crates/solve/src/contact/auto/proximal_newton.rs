@@ -17,7 +17,8 @@
 
 use nonsmooth_linalg::{Block, small};
 
-use crate::contact::form::{Frictional, Linearised};
+use crate::contact::form::{Disked, Linearised};
+use crate::contact::law::DiskLaw;
 use crate::contact::law::cfun::{Disk, Radii, alart_curnier, natural_residual};
 
 /// Trials of the line search.
@@ -28,8 +29,8 @@ const ARMIJO: f64 = 1e-3;
 const LEAST_MU: f64 = 1e-6;
 
 /// The state of the method.
-pub struct ProximalNewton<const D: usize> {
-    contacts: Vec<Contact>,
+pub struct ProximalNewton<L, const D: usize> {
+    contacts: Vec<Contact<L>>,
     /// `‖q‖`.
     scale: f64,
     epsilon: f64,
@@ -56,13 +57,24 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 const NEAR: f64 = 1e4;
 
 #[derive(Debug, Clone, Copy)]
-struct Contact {
-    mu: f64,
+struct Contact<L> {
+    law: L,
     /// `tr(W_cc)/D`.
     unit: f64,
-    /// `w_c` of the self-dual metric along the normal and the tangents: `w mu²` and `w`.
+    /// `w_c` of the self-dual metric along the normal and in each disk: of Coulomb's law `w mu²` and `w`, in general `w` and `w/mu_k²` times the same.
     normal: f64,
-    tangential: f64,
+    disks: [f64; 2],
+}
+
+impl<L> Contact<L> {
+    /// E of row k.
+    #[inline(always)]
+    fn weight<const D: usize>(&self, k: usize) -> f64
+    where
+        L: DiskLaw<D>,
+    {
+        if k == 0 { self.normal } else { self.disks[(k - 1) * L::DISKS / (D - 1)] }
+    }
 }
 
 /// What an iteration came to.
@@ -74,9 +86,9 @@ pub struct Inner {
     pub step: f64,
 }
 
-impl<const D: usize> ProximalNewton<D> {
+impl<L: DiskLaw<D>, const D: usize> ProximalNewton<L, D> {
     /// For `problem`.
-    pub fn new<P: Linearised<D> + Frictional<D>>(problem: &P, state: &P::State) -> Self {
+    pub fn new<P: Linearised<D> + Disked<D, Law = L>>(problem: &P, state: &P::State) -> Self {
         let mut out = Self {
             contacts: vec![],
             scale: 1.0,
@@ -99,19 +111,28 @@ impl<const D: usize> ProximalNewton<D> {
     }
 
     /// Takes another problem; allocates nothing where the number of contacts is the same.
-    pub fn fill<P: Linearised<D> + Frictional<D>>(&mut self, problem: &P, state: &P::State) {
-        let nc = problem.mu().len();
+    pub fn fill<P: Linearised<D> + Disked<D, Law = L>>(&mut self, problem: &P, state: &P::State) {
+        let nc = problem.contacts();
         self.scale = problem.velocity_scale(state);
         self.precise = false;
         self.contacts.clear();
-        for (c, &mu) in problem.mu().iter().enumerate() {
-            let w = problem.diagonal_block(state, c);
+        for c in 0..nc {
+            let (w, law) = (problem.diagonal_block(state, c), problem.law(c));
             let unit = small::mean_diagonal(&w).abs();
-            let m = if mu > 0.0 { mu.max(LEAST_MU) } else { 1.0 };
-            let trace: f64 = (1..D).map(|k| w[k][k]).sum();
-            let self_dual = (w[0][0] / (m * m) + trace) / D as f64;
+            // In units of the first disk, r_N mu and r_k mu/mu_k: Coulomb's D = diag(mu, 1, 1).
+            let m = [0, L::DISKS - 1].map(|disk| match law.coefficient(disk) {
+                mu if mu > 0.0 => mu.max(LEAST_MU),
+                _ => 1.0,
+            });
+            let ratio = [1.0, (m[1] / m[0]).powi(2)];
+            let mut trace = 0.0;
+            for disk in 0..L::DISKS {
+                trace += ratio[disk] * L::rows(disk).map(|k| w[k][k]).sum::<f64>();
+            }
+            let self_dual = (w[0][0] / (m[0] * m[0]) + trace) / D as f64;
             let w = if self_dual > 0.0 { self_dual } else { 1.0 };
-            self.contacts.push(Contact { mu, unit, normal: w * m * m, tangential: w });
+            let disks = ratio.map(|ratio| w / ratio);
+            self.contacts.push(Contact { law, unit, normal: w * m[0] * m[0], disks });
         }
         for x in [
             &mut self.center,
@@ -130,7 +151,7 @@ impl<const D: usize> ProximalNewton<D> {
 
     /// Takes `r` as the present impulses: computes their velocities, on which [`error`](Self::error) and [`residual`](Self::residual)
     /// rest, and returns the error.
-    pub fn look<P: Linearised<D> + Frictional<D>>(
+    pub fn look<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -140,7 +161,7 @@ impl<const D: usize> ProximalNewton<D> {
         self.error(r)
     }
 
-    fn update<P: Linearised<D> + Frictional<D>>(
+    fn update<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -186,8 +207,8 @@ impl<const D: usize> ProximalNewton<D> {
         let mut sum = 0.0;
         for (c, contact) in self.contacts.iter().enumerate() {
             let (ue, rc) = (self.shifted(u, r, c, epsilon), small::block::<D>(r, c));
-            let w = contact.unit + epsilon * contact.tangential;
-            sum += natural_residual(w, &rc, &ue, contact.mu);
+            let w = contact.unit + epsilon * contact.disks[0];
+            sum += natural_residual(w, &rc, &ue, contact.law);
         }
         sum.sqrt() / self.scale
     }
@@ -198,19 +219,19 @@ impl<const D: usize> ProximalNewton<D> {
         let contact = &self.contacts[c];
         let mut ue: [f64; D] = small::block(u, c);
         if epsilon > 0.0 {
-            ue[0] += epsilon * contact.normal * (r[D * c] - self.center[D * c]);
-            for k in 1..D {
+            for k in 0..D {
                 let i = D * c + k;
-                ue[k] += epsilon * contact.tangential * (r[i] - self.center[i]);
+                ue[k] += epsilon * contact.weight::<D>(k) * (r[i] - self.center[i]);
             }
         }
         ue
     }
 
     #[inline(always)]
-    fn radii(&self, contact: &Contact) -> Radii {
+    fn radii(&self, contact: &Contact<L>) -> Radii {
         let kappa = self.kappa / (1.0 + self.epsilon);
-        Radii { normal: kappa / contact.normal, tangential: kappa / contact.tangential }
+        let [tangential, rolling] = contact.disks.map(|w| kappa / w);
+        Radii { normal: kappa / contact.normal, tangential, rolling }
     }
 
     /// `‖Φ/ρ‖² / ‖q‖²` at `(u, r)`.
@@ -219,15 +240,18 @@ impl<const D: usize> ProximalNewton<D> {
         for (c, contact) in self.contacts.iter().enumerate() {
             let ue = self.shifted(u, r, c, self.epsilon);
             let rho = self.radii(contact);
-            let phi = value(&ue, &small::block(r, c), contact.mu, rho);
+            let phi = value(&ue, &small::block(r, c), contact.law, rho);
             sum += (phi[0] / rho.normal).powi(2);
-            sum += phi[1..].iter().map(|x| (x / rho.tangential).powi(2)).sum::<f64>();
+            for disk in 0..L::DISKS {
+                let rho = rho.of_disk(disk);
+                sum += phi[L::rows(disk)].iter().map(|x| (x / rho).powi(2)).sum::<f64>();
+            }
         }
         sum / (self.scale * self.scale)
     }
 
     /// One Newton iteration on `r` and `u`.
-    pub fn iterate<P: Linearised<D> + Frictional<D>>(
+    pub fn iterate<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -238,13 +262,12 @@ impl<const D: usize> ProximalNewton<D> {
             let ue = self.shifted(&self.u, r, c, self.epsilon);
             let rho = self.radii(&contact);
             let piece =
-                alart_curnier(Disk::AlartCurnier, &ue, &small::block(r, c), contact.mu, rho);
+                alart_curnier(Disk::AlartCurnier, &ue, &small::block(r, c), contact.law, rho);
             let (mut q, epsilon) = (piece.b, self.epsilon);
             for row in 0..D {
                 self.phi[D * c + row] = -piece.phi[row];
                 for k in 0..D {
-                    let e = if k == 0 { contact.normal } else { contact.tangential };
-                    q[row][k] += epsilon * e * piece.a[row][k];
+                    q[row][k] += epsilon * contact.weight::<D>(k) * piece.a[row][k];
                 }
             }
             self.p[c] = piece.a;
@@ -295,28 +318,35 @@ impl<const D: usize> ProximalNewton<D> {
 
 /// The value of the Alart–Curnier function alone.
 #[inline(always)]
-fn value<const D: usize>(u: &[f64; D], r: &[f64; D], mu: f64, rho: Radii) -> [f64; D] {
+fn value<L: DiskLaw<D>, const D: usize>(
+    u: &[f64; D],
+    r: &[f64; D],
+    law: L,
+    rho: Radii,
+) -> [f64; D] {
     let x_n = r[0] - rho.normal * u[0];
     let mut phi = *r;
     if x_n <= 0.0 {
         return phi;
     }
     phi[0] = rho.normal * u[0];
-    let radius = mu * x_n;
-    let mut x = [0.0; D];
-    let mut square = 0.0;
-    for k in 1..D {
-        x[k] = r[k] - rho.tangential * u[k];
-        square += x[k] * x[k];
-    }
-    if square <= radius * radius {
-        for k in 1..D {
-            phi[k] = rho.tangential * u[k];
+    for disk in 0..L::DISKS {
+        let (radius, rho) = (law.coefficient(disk) * x_n, rho.of_disk(disk));
+        let mut x = [0.0; D];
+        let mut square = 0.0;
+        for k in L::rows(disk) {
+            x[k] = r[k] - rho * u[k];
+            square += x[k] * x[k];
         }
-    } else {
-        let factor = radius / square.sqrt();
-        for k in 1..D {
-            phi[k] = r[k] - factor * x[k];
+        if square <= radius * radius {
+            for k in L::rows(disk) {
+                phi[k] = rho * u[k];
+            }
+        } else {
+            let factor = radius / square.sqrt();
+            for k in L::rows(disk) {
+                phi[k] = r[k] - factor * x[k];
+            }
         }
     }
     phi

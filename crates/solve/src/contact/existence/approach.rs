@@ -1,12 +1,13 @@
 //! Motions into the dual cone by Gauss–Seidel: the relaxation `K* ∋ u − τ e_N ⟂ r ∈ K` is convex, and its velocities come
 //! within τ of K* + τ e_N, that is into K*, after a few sweeps.
 
-use nonsmooth_linalg::small::{block, tangential_norm};
+use nonsmooth_linalg::small::block;
 use nonsmooth_problem::check::{Kinematic, Kinematics};
 
 use super::{Clock, Found};
-use crate::contact::form::{Access, Blockwise, Frictional};
-use crate::contact::law::cone;
+use crate::contact::form::{Access, Blockwise, Disked};
+use crate::contact::law::ContactLaw;
+use crate::contact::law::cone::ConvexSet;
 
 /// The margins τ that are tried, in units of the largest free velocity.
 const MARGINS: [f64; 3] = [1.0, 1e-2, 1e-4];
@@ -14,7 +15,7 @@ const MARGINS: [f64; 3] = [1.0, 1e-2, 1e-4];
 const LOOK: usize = 5;
 
 /// A verified motion, or a verified contradiction of bilateral constraints, if found within `sweeps` for each margin.
-pub(super) fn approach<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: usize>(
+pub(super) fn approach<P: Blockwise<D> + Disked<D> + Kinematic<D>, const D: usize>(
     problem: &P,
     kinematics: &Kinematics<D>,
     sweeps: usize,
@@ -35,7 +36,7 @@ pub(super) fn approach<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: 
     }
     let mut point = problem.origin();
     problem.enter(&mut state, &point);
-    let nc = problem.mu().len();
+    let nc = problem.contacts();
     let mut largest = 0.0_f64;
     for c in 0..nc {
         let u = problem.velocity(&state, P::impulses(&mut point), c);
@@ -49,7 +50,7 @@ pub(super) fn approach<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: 
                 let r = P::impulses(&mut point);
                 let inside = |c: usize| {
                     let u: [f64; D] = problem.velocity(&state, r, c);
-                    u[0] - problem.mu()[c] * tangential_norm(&u) > 0.0
+                    u[0] - problem.law(c).shift(&u) > 0.0
                 };
                 if (0..nc).all(inside) {
                     problem.complete(&mut state, &mut point);
@@ -63,7 +64,7 @@ pub(super) fn approach<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: 
                 }
             }
             for c in 0..nc {
-                let (mu, bound) = (problem.mu()[c], bounds[c]);
+                let (law, bound) = (problem.law(c), bounds[c]);
                 if bound <= 0.0 {
                     continue;
                 }
@@ -72,7 +73,7 @@ pub(super) fn approach<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: 
                 u[0] -= margin * unit;
                 let old: [f64; D] = block(r, c);
                 let step: [f64; D] = std::array::from_fn(|k| old[k] - u[k] / bound);
-                let new = cone::project(&step, mu);
+                let new = law.project(&step);
                 let moved: [f64; D] = std::array::from_fn(|k| new[k] - old[k]);
                 if moved.iter().any(|&d| d != 0.0) {
                     r[D * c..D * c + D].copy_from_slice(&new);

@@ -28,7 +28,7 @@ use nonsmooth_problem::check::{
 };
 use nonsmooth_problem::with_friction;
 
-use crate::contact::form::{Blockwise, Frictional, Rows, has_bounds};
+use crate::contact::form::{Blockwise, Disked, Rows, has_bounds};
 use crate::core::exact_cones::{ExactCones, Found as ExactlyFound, is_representable};
 use crate::core::guard;
 use crate::{Limit, Limits};
@@ -85,7 +85,7 @@ pub fn glance(problem: &Friction) -> Existence {
 }
 
 /// As [`of`], for a problem of a known kind.
-pub fn decide<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: usize>(
+pub fn decide<P: Blockwise<D> + Disked<D> + Kinematic<D>, const D: usize>(
     problem: &P,
     limits: &Limits,
 ) -> Existence {
@@ -176,7 +176,8 @@ fn by_cases<P: Rows<D> + Kinematic<D>, const D: usize>(
 /// The normal impulses and multipliers of a separating vector, whose rows of contacts and constraints come before those that define bounds.
 fn normal<const D: usize>(kinematics: &Kinematics<D>, vector: &ExactVector) -> Option<Impulses> {
     let m = kinematics.contact_rows();
-    let bounds = (D - 1) * kinematics.mu.iter().filter(|mu| **mu > 0.0).count();
+    let binds = |c: usize| (1..D).filter(move |&k| kinematics.coefficient(c, k) > 0.0).count();
+    let bounds: usize = (0..kinematics.mu.len()).map(binds).sum();
     let first = vector.0.len().checked_sub(bounds + kinematics.constant.len())?;
     let mut r: Vec<f64> = vector.0[first..first + m].iter().map(rounded).collect();
     r.iter_mut().enumerate().filter(|(i, _)| i % D != 0).for_each(|(_, r)| *r = 0.0);
@@ -185,7 +186,7 @@ fn normal<const D: usize>(kinematics: &Kinematics<D>, vector: &ExactVector) -> O
 }
 
 /// As [`glance`], for a problem of a known kind.
-pub fn glance_at<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: usize>(
+pub fn glance_at<P: Blockwise<D> + Disked<D> + Kinematic<D>, const D: usize>(
     problem: &P,
 ) -> Existence {
     let limits = Limits::default();
@@ -248,7 +249,9 @@ fn by_program<P: Kinematic<D>, const D: usize>(
     if clock.over() {
         return clock.late();
     }
-    let Some(widest) = Program::new(kinematics, &kinematics.mu).solve(clock) else {
+    // With rolling friction a cone inside K*, which is none of second order: mu‖u_T‖ + mu_r‖u_R‖ ≤ √2‖(mu u_T, mu_r u_R)‖.
+    let inner = if kinematics.mu_r.is_empty() { 1.0 } else { std::f64::consts::SQRT_2 };
+    let Some(widest) = Program::new(kinematics, inner).solve(clock) else {
         return unknown("the cone program could not be stated");
     };
     if let Some(margin) = kinematics.margin(&widest.motion) {
@@ -258,8 +261,7 @@ fn by_program<P: Kinematic<D>, const D: usize>(
         return clock.late();
     }
     // Can the normal velocities alone be made nonnegative?
-    let without = vec![0.0; kinematics.mu.len()];
-    if let Some(w) = Program::new(kinematics, &without).solve(clock) {
+    if let Some(w) = Program::new(kinematics, 0.0).solve(clock) {
         let mut nearly = None;
         for ray in w.rays(clock).filter(|ray| kinematics.refutes(ray)) {
             match refuted(problem, ray) {
@@ -274,8 +276,7 @@ fn by_program<P: Kinematic<D>, const D: usize>(
     }
     // The multipliers lie on the boundary of K, where polishing would push some of them out: those of a slightly
     // narrower cone lie inside.
-    let narrower: Vec<f64> = kinematics.mu.iter().map(|mu| mu * (1.0 - NARROWER)).collect();
-    let again = || Program::new(kinematics, &narrower).solve(clock);
+    let again = || Program::new(kinematics, 1.0 - NARROWER).solve(clock);
     let mut weak = None;
     for answer in std::iter::once_with(|| Some(widest)).chain(std::iter::once_with(again)) {
         for ray in answer.iter().flat_map(|w: &Widest<D>| w.rays(clock)) {

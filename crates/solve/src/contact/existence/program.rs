@@ -41,14 +41,17 @@ const WEIGHT: f64 = 1e-8;
 const TOLERANCE: f64 = 1e-9;
 
 impl<'a, const D: usize> Program<'a, D> {
-    /// States the program with the coefficients `mu`.
-    pub(super) fn new(kinematics: &'a Kinematics<D>, mu: &[f64]) -> Self {
+    /// States the program with `factor` times the coefficients of friction, of rolling friction in the same cone.
+    pub(super) fn new(kinematics: &'a Kinematics<D>, factor: f64) -> Self {
         let m = kinematics.contact_rows();
-        let plain = mu.iter().enumerate().filter(|(_, mu)| **mu == 0.0);
-        let mut rows: Vec<(usize, f64)> = plain.map(|(c, _)| (D * c, 1.0)).collect();
+        let contacts = 0..kinematics.mu.len();
+        let is_plain = |c: usize| kinematics.coefficients(c).all(|mu| factor * mu == 0.0);
+        let plain = contacts.clone().filter(|&c| is_plain(c));
+        let mut rows: Vec<(usize, f64)> = plain.map(|c| (D * c, 1.0)).collect();
         let nonnegative = rows.len();
-        for (c, &mu) in mu.iter().enumerate().filter(|(_, mu)| **mu > 0.0) {
-            rows.extend((0..D).map(|k| (D * c + k, if k == 0 { 1.0 } else { mu })));
+        for c in contacts.filter(|&c| !is_plain(c)) {
+            let of = |k: usize| if k == 0 { 1.0 } else { factor * kinematics.coefficient(c, k) };
+            rows.extend((0..D).map(|k| (D * c + k, of(k))));
         }
         let cones = (rows.len() - nonnegative) / D;
         for i in m..kinematics.constant.len() {

@@ -4,6 +4,7 @@ use nonsmooth_linalg::Csc;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal};
 
 use super::Linear;
+use crate::contact::law::DiskLaw;
 
 /// The symmetric part of W as data. With unknowns `x = (r, z)`, r first:
 ///
@@ -38,7 +39,7 @@ fn symmetric_part(a: &Csc) -> (Csc, bool) {
     (part, a.asymmetry() <= ROUNDING)
 }
 
-impl<const D: usize> Explicit<D> for FrictionLocal<D> {
+impl<const D: usize, L: DiskLaw<D>> Explicit<D> for FrictionLocal<D, L> {
     fn model(&self, state: &Self::State) -> Model {
         let (quadratic, symmetric) = symmetric_part(&state.operator(self).0.to_csc());
         let linear = Csc::zeros(0, quadratic.ncols());
@@ -46,7 +47,7 @@ impl<const D: usize> Explicit<D> for FrictionLocal<D> {
     }
 }
 
-impl<const D: usize> Explicit<D> for FrictionGlobal<D> {
+impl<const D: usize, L: DiskLaw<D>> Explicit<D> for FrictionGlobal<D, L> {
     /// `x = (r, v, λ)`, `½ vᵀ M_s v`, `M_s v = H r + G λ`: the multipliers of the equalities are −v, so that
     /// `W_s r = Hᵀ v` and `Gᵀ v = 0`.
     fn model(&self, _: &Self::State) -> Model {

@@ -15,7 +15,7 @@ use nonsmooth_problem::{Bounds, Dynamics, FrictionGlobal, GlobalPoint};
 use super::linearised::{BodyForm, ContactForm, Form, NEVER, Once, System, made, there};
 use super::{Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Linear, Linearised, Rows};
 use crate::SolveError;
-use crate::contact::law::Coulomb;
+use crate::contact::law::DiskLaw;
 
 /// What the view keeps.
 pub struct GlobalState<const D: usize> {
@@ -62,8 +62,8 @@ enum Operator<const D: usize> {
 }
 
 impl<const D: usize> GlobalSystem<D> {
-    fn new(
-        problem: &FrictionGlobal<D>,
+    fn new<L: DiskLaw<D>>(
+        problem: &FrictionGlobal<D, L>,
         operator: &Operator<D>,
         dynamics: &Dynamics,
     ) -> Result<Self, TooLarge> {
@@ -89,14 +89,14 @@ impl<const D: usize> Operator<D> {
 }
 
 impl<const D: usize> GlobalState<D> {
-    fn update_free_velocity(&mut self, problem: &FrictionGlobal<D>) {
+    fn update_free_velocity<L: DiskLaw<D>>(&mut self, problem: &FrictionGlobal<D, L>) {
         self.contradiction = self.dynamics.free_velocity(problem, &mut self.q);
         self.scale = norm_or_one(&self.q);
     }
 }
 
-impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
-    type Law = Coulomb;
+impl<const D: usize, L: DiskLaw<D>> Contacts<D> for FrictionGlobal<D, L> {
+    type Law = L;
     type State = GlobalState<D>;
 
     fn state(&self, access: Access) -> Result<Self::State, SolveError> {
@@ -168,8 +168,8 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
     }
 
     #[inline(always)]
-    fn law(&self, c: usize) -> Coulomb {
-        Coulomb { mu: self.mu[c] }
+    fn law(&self, c: usize) -> L {
+        L::of(&self.mu, &self.mu_r, c)
     }
 
     fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D] {
@@ -197,8 +197,8 @@ impl<const D: usize> Contacts<D> for FrictionGlobal<D> {
 }
 
 /// Of a problem with rows that have bounds, what their impulses do; of another, nothing.
-fn row_responses<const D: usize>(
-    problem: &FrictionGlobal<D>,
+fn row_responses<const D: usize, L: DiskLaw<D>>(
+    problem: &FrictionGlobal<D, L>,
     dynamics: &mut Dynamics,
 ) -> Vec<Option<RowResponse>> {
     let Some(b) = problem.rows.as_ref().filter(|b| !b.bounds.are_free()) else { return vec![] };
@@ -219,7 +219,7 @@ impl<const D: usize> Frictional<D> for FrictionGlobal<D> {
     }
 }
 
-impl<const D: usize> Rows<D> for FrictionGlobal<D> {
+impl<const D: usize, L: DiskLaw<D>> Rows<D> for FrictionGlobal<D, L> {
     fn bounds(&self) -> Option<&Bounds> {
         self.rows.as_ref().map(|b| &b.bounds)
     }
@@ -242,7 +242,7 @@ impl<const D: usize> Rows<D> for FrictionGlobal<D> {
     }
 }
 
-impl<const D: usize> Blockwise<D> for FrictionGlobal<D> {
+impl<const D: usize, L: DiskLaw<D>> Blockwise<D> for FrictionGlobal<D, L> {
     #[inline(always)]
     fn velocity(&self, state: &Self::State, r: &[f64], c: usize) -> [f64; D] {
         let (mut u, given) = match &state.operator {
@@ -265,7 +265,7 @@ impl<const D: usize> Blockwise<D> for FrictionGlobal<D> {
     }
 }
 
-impl<const D: usize> Concurrent<D> for FrictionGlobal<D> {
+impl<const D: usize, L: DiskLaw<D>> Concurrent<D> for FrictionGlobal<D, L> {
     /// Places are the components of M (with bilateral constraints: of the bordered matrix): `M⁻¹ H_c` reaches all of a component.
     fn places(&self, state: &Self::State, c: usize, reads: &mut Vec<u32>, writes: &mut Vec<u32>) {
         let first = reads.len();
@@ -281,7 +281,7 @@ impl<const D: usize> Concurrent<D> for FrictionGlobal<D> {
     }
 }
 
-impl<const D: usize> Linear<D> for FrictionGlobal<D> {
+impl<const D: usize, L: DiskLaw<D>> Linear<D> for FrictionGlobal<D, L> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
         let (v, _) = state.dynamics.solve(self, r, Refine::Once);
         self.velocity_into(v, u);
@@ -306,7 +306,7 @@ impl<const D: usize> Linear<D> for FrictionGlobal<D> {
     }
 }
 
-impl<const D: usize> Linearised<D> for FrictionGlobal<D> {
+impl<const D: usize, L: DiskLaw<D>> Linearised<D> for FrictionGlobal<D, L> {
     fn linearise(
         &self,
         state: &mut Self::State,

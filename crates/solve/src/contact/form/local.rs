@@ -13,7 +13,7 @@ use super::linearised::{ContactForm, Form, NEVER, Once, System, made, there};
 use super::rows::Bounded;
 use super::{Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Linear, Linearised, Rows};
 use crate::SolveError;
-use crate::contact::law::Coulomb;
+use crate::contact::law::DiskLaw;
 
 /// What the view keeps: the norm of q, the problem without its bilateral rows where it has any, and the linear system.
 pub struct LocalState<const D: usize> {
@@ -46,7 +46,10 @@ struct Eliminated<const D: usize> {
 }
 
 impl<const D: usize> Eliminated<D> {
-    fn new(problem: &FrictionLocal<D>, b: &RowsLocal) -> Result<Self, SolveError> {
+    fn new<L: DiskLaw<D>>(
+        problem: &FrictionLocal<D, L>,
+        b: &RowsLocal,
+    ) -> Result<Self, SolveError> {
         let free = b.bounds.free(b.s.len());
         let (v, r) = match free.len() == b.s.len() {
             true => (b.V.clone(), b.R.clone()),
@@ -82,7 +85,7 @@ impl<const D: usize> Eliminated<D> {
     }
 
     /// Takes another problem with the same V and R and the same pattern of W; false where it is not so, or rows have bounds.
-    fn refill(&mut self, problem: &FrictionLocal<D>, b: &RowsLocal) -> bool {
+    fn refill<L: DiskLaw<D>>(&mut self, problem: &FrictionLocal<D, L>, b: &RowsLocal) -> bool {
         let same = self.v == b.V
             && self.r == b.R
             && b.bounds.are_free()
@@ -93,7 +96,11 @@ impl<const D: usize> Eliminated<D> {
         same
     }
 
-    fn update_free_velocity(&mut self, problem: &FrictionLocal<D>, b: &RowsLocal) {
+    fn update_free_velocity<L: DiskLaw<D>>(
+        &mut self,
+        problem: &FrictionLocal<D, L>,
+        b: &RowsLocal,
+    ) {
         let s = || self.free.iter().map(|&j| b.s[j]);
         self.lambda.iter_mut().zip(s()).for_each(|(x, s)| *x = s);
         self.r_inverse.solve_with(&mut self.lambda, &mut self.scratch, Refine::Fully);
@@ -124,7 +131,10 @@ impl<const D: usize> Eliminated<D> {
 impl<const D: usize> LocalState<D> {
     /// W and q, without the bilateral constraints where the problem has any.
     #[inline(always)]
-    pub fn operator<'a>(&'a self, problem: &'a FrictionLocal<D>) -> (&'a Bsr<D>, &'a [f64]) {
+    pub fn operator<'a, L: DiskLaw<D>>(
+        &'a self,
+        problem: &'a FrictionLocal<D, L>,
+    ) -> (&'a Bsr<D>, &'a [f64]) {
         match &self.eliminated {
             None => (&problem.W, &problem.q),
             Some(e) => (&e.w, &e.q),
@@ -146,8 +156,8 @@ impl<const D: usize> LocalState<D> {
     }
 }
 
-impl<const D: usize> Contacts<D> for FrictionLocal<D> {
-    type Law = Coulomb;
+impl<const D: usize, L: DiskLaw<D>> Contacts<D> for FrictionLocal<D, L> {
+    type Law = L;
     type State = LocalState<D>;
 
     fn state(&self, access: Access) -> Result<Self::State, SolveError> {
@@ -184,8 +194,8 @@ impl<const D: usize> Contacts<D> for FrictionLocal<D> {
     }
 
     #[inline(always)]
-    fn law(&self, c: usize) -> Coulomb {
-        Coulomb { mu: self.mu[c] }
+    fn law(&self, c: usize) -> L {
+        L::of(&self.mu, &self.mu_r, c)
     }
 
     fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D] {
@@ -230,7 +240,7 @@ impl<const D: usize> Frictional<D> for FrictionLocal<D> {
     }
 }
 
-impl<const D: usize> Rows<D> for FrictionLocal<D> {
+impl<const D: usize, L: DiskLaw<D>> Rows<D> for FrictionLocal<D, L> {
     fn bounds(&self) -> Option<&Bounds> {
         self.rows.as_ref().map(|b| &b.bounds)
     }
@@ -254,7 +264,7 @@ impl<const D: usize> Rows<D> for FrictionLocal<D> {
     }
 }
 
-impl<const D: usize> Blockwise<D> for FrictionLocal<D> {
+impl<const D: usize, L: DiskLaw<D>> Blockwise<D> for FrictionLocal<D, L> {
     #[inline(always)]
     fn velocity(&self, state: &Self::State, r: &[f64], c: usize) -> [f64; D] {
         let (w, q) = state.operator(self);
@@ -270,7 +280,7 @@ impl<const D: usize> Blockwise<D> for FrictionLocal<D> {
     fn moved(&self, _: &mut Self::State, _: usize, _: &[f64; D]) {}
 }
 
-impl<const D: usize> Concurrent<D> for FrictionLocal<D> {
+impl<const D: usize, L: DiskLaw<D>> Concurrent<D> for FrictionLocal<D, L> {
     /// Places are impulses.
     fn places(&self, state: &Self::State, c: usize, reads: &mut Vec<u32>, writes: &mut Vec<u32>) {
         reads.extend_from_slice(state.operator(self).0.row(c).0);
@@ -278,7 +288,7 @@ impl<const D: usize> Concurrent<D> for FrictionLocal<D> {
     }
 }
 
-impl<const D: usize> Linear<D> for FrictionLocal<D> {
+impl<const D: usize, L: DiskLaw<D>> Linear<D> for FrictionLocal<D, L> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
         let (w, q) = state.operator(self);
         w.mul_plus(r, q, u);
@@ -321,7 +331,7 @@ impl<const D: usize> Linear<D> for FrictionLocal<D> {
     }
 }
 
-impl<const D: usize> Linearised<D> for FrictionLocal<D> {
+impl<const D: usize, L: DiskLaw<D>> Linearised<D> for FrictionLocal<D, L> {
     fn linearise(
         &self,
         state: &mut Self::State,

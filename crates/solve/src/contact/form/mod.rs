@@ -2,7 +2,8 @@
 //!
 //! | capability | what a family may ask | offered by |
 //! | --- | --- | --- |
-//! | [`Frictional`] | that the law is Coulomb's, and its coefficients | local, global |
+//! | [`Disked`] | that the cone is made of disks, and their coefficients | local, global |
+//! | [`Frictional`] | that the law is Coulomb's, and its coefficients | local, global without rolling friction |
 //! | [`Contacts`] | the law, the diagonal blocks of W, ‖q‖, the impulses of a point | local, global |
 //! | [`Rows`] | one scalar row's velocity, and to be told that its impulse moved | local, global |
 //! | [`Blockwise`] | in addition, one contact's velocity, and to be told that one contact's impulse moved | local (rows of W), global (velocity space) |
@@ -29,7 +30,7 @@ pub use local::LocalState;
 pub use regularised::{Overwrite, Regularised, RegularisedState};
 
 use crate::SolveError;
-use crate::contact::law::{ContactLaw, Coulomb};
+use crate::contact::law::{ContactLaw, Coulomb, DiskLaw};
 
 /// How a family uses W.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,6 +103,11 @@ pub trait Frictional<const D: usize>: Contacts<D, Law = Coulomb> {
     /// mu, nc, each ≥ 0.
     fn mu(&self) -> &[f64];
 }
+
+/// Contacts under a law whose cone is made of disks, with rolling friction or without.
+pub trait Disked<const D: usize>: Contacts<D, Law: DiskLaw<D>> {}
+
+impl<P: Contacts<D, Law: DiskLaw<D>>, const D: usize> Disked<D> for P {}
 
 /// Access to the scalar rows that have bounds, row by row. Those without are no concern of a visitor: the view keeps `c = 0` there.
 ///

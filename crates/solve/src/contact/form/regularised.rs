@@ -9,6 +9,7 @@ use nonsmooth_problem::{Bounds, FrictionGlobal, FrictionLocal, Kind, Problem, Pr
 
 use super::{Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Linear, Linearised, Rows};
 use crate::SolveError;
+use crate::contact::law::DiskLaw;
 
 /// `P` with a proximal term.
 #[derive(Debug, Clone)]
@@ -27,18 +28,19 @@ pub trait Overwrite: Clone {
     fn overwrite(&mut self, other: &Self);
 }
 
-impl<const D: usize> Overwrite for FrictionLocal<D> {
+impl<const D: usize, L: DiskLaw<D>> Overwrite for FrictionLocal<D, L> {
     fn overwrite(&mut self, other: &Self) {
         self.W.clone_from(&other.W);
         self.q.clone_from(&other.q);
         self.mu.clone_from(&other.mu);
+        self.mu_r.clone_from(&other.mu_r);
         if self.rows != other.rows {
             self.rows.clone_from(&other.rows);
         }
     }
 }
 
-impl<const D: usize> Overwrite for FrictionGlobal<D> {
+impl<const D: usize, L: DiskLaw<D>> Overwrite for FrictionGlobal<D, L> {
     fn overwrite(&mut self, other: &Self) {
         if self.M != other.M || self.H != other.H {
             self.M.clone_from(&other.M);
@@ -47,6 +49,7 @@ impl<const D: usize> Overwrite for FrictionGlobal<D> {
         self.f.clone_from(&other.f);
         self.w.clone_from(&other.w);
         self.mu.clone_from(&other.mu);
+        self.mu_r.clone_from(&other.mu_r);
         match (&mut self.rows, &other.rows) {
             (Some(mine), Some(others)) if mine.G == others.G && mine.bounds == others.bounds => {
                 mine.b.clone_from(&others.b);

@@ -16,7 +16,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::form::{Access, Frictional, Linearised, OnContacts};
+use crate::contact::form::{Access, Disked, Linearised, OnContacts};
 use crate::contact::interior::pursuit::Pursuit;
 use crate::contact::parts::{Central, CentralIterate};
 use crate::core::ranges::{at_least, nonnegative};
@@ -82,15 +82,15 @@ const SHORT: f64 = 1e-6;
 const MANY_SHORT: usize = 6;
 
 /// The iterate with its factors, and the arc along which it moves.
-pub struct PursuedWork<P: Linearised<D> + Frictional<D>, const D: usize> {
+pub struct PursuedWork<P: Linearised<D> + Disked<D>, const D: usize> {
     state: P::State,
-    core: Central<D>,
-    pursuit: Pursuit<D>,
+    core: Central<P::Law, D>,
+    pursuit: Pursuit<P::Law, D>,
     short: usize,
     since_best: usize,
 }
 
-impl<P: Linearised<D> + Frictional<D>, const D: usize> Solver<P> for OnContacts<Interior, D> {
+impl<P: Linearised<D> + Disked<D>, const D: usize> Solver<P> for OnContacts<Interior, D> {
     type Work = PursuedWork<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {

@@ -20,14 +20,15 @@
 
 use nonsmooth_linalg::Singular;
 
-use crate::contact::form::{Frictional, Linearised};
+use crate::contact::form::{Disked, Linearised};
+use crate::contact::law::DiskLaw;
 use crate::contact::parts::nt::Pair;
 use crate::contact::parts::{Central, CentralIterate};
 
 /// The path's present point and the workspace.
-#[derive(Debug, Clone, Default)]
-pub struct Pursuit<const D: usize> {
-    core: Central<D>,
+#[derive(Debug, Clone)]
+pub struct Pursuit<L, const D: usize> {
+    core: Central<L, D>,
     theta: f64,
     /// The unit tangent of the last point, with the sign of travel.
     tangent: Direction<D>,
@@ -76,9 +77,25 @@ const SHORT: f64 = 1e-2;
 /// Steps shorter than this are no progress.
 const SHORTEST: f64 = 1e-12;
 
-impl<const D: usize> Pursuit<D> {
+impl<L, const D: usize> Default for Pursuit<L, D> {
+    fn default() -> Self {
+        Self {
+            core: Central::default(),
+            theta: 0.0,
+            tangent: Direction::default(),
+            slope: Direction::default(),
+            first: vec![],
+            kept: vec![],
+            length: 0.0,
+            refused: 0,
+            end: End::default(),
+        }
+    }
+}
+
+impl<L: DiskLaw<D>, const D: usize> Pursuit<L, D> {
     /// Begins at `x = z = e`, with `smoothing` κ ≥ 0 and `start` as in [`Central::begin`].
-    pub fn begin<P: Linearised<D> + Frictional<D>>(
+    pub fn begin<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -105,13 +122,13 @@ impl<const D: usize> Pursuit<D> {
         now
     }
 
-    pub fn core(&self) -> &Central<D> {
+    pub fn core(&self) -> &Central<L, D> {
         &self.core
     }
 
     /// One step along the path: a predictor and its correctors. `alpha` of the answer is the step's length, zero
     /// where the step was refused.
-    pub fn iterate<P: Linearised<D> + Frictional<D>>(
+    pub fn iterate<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -187,7 +204,7 @@ impl<const D: usize> Pursuit<D> {
     }
 
     /// `slope`: the derivative of (x, z) by −θ along the path.
-    fn differentiate<P: Linearised<D> + Frictional<D>>(
+    fn differentiate<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -240,7 +257,7 @@ impl<const D: usize> Pursuit<D> {
     }
 
     /// One Newton step on the path's equations, orthogonal to the tangent.
-    fn correct<P: Linearised<D> + Frictional<D>>(
+    fn correct<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -255,8 +272,10 @@ impl<const D: usize> Pursuit<D> {
             let toward = scaling.divide(&g);
             for k in 0..D {
                 core.d[c][k] = toward[k] - scaling.lambda[k];
-                core.rho[c][k] -= *theta * first[c][k];
             }
+        }
+        for (rho, first) in core.rho.iter_mut().zip(&*first) {
+            rho.iter_mut().zip(first).for_each(|(rho, first)| *rho -= *theta * first);
         }
         core.newton(problem, state, 1.0);
         let across = core.product(tangent, slope, *theta);
@@ -282,7 +301,7 @@ impl<const D: usize> Pursuit<D> {
     }
 }
 
-impl<const D: usize> Central<D> {
+impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
     /// The scalar product of two directions in the local metric, in which the path towards a small θ looks the same as
     /// towards a large one: `(aₓᵀS²bₓ + a_zᵀS⁻²b_z)/θ + nc a_θ b_θ/θ²`.
     fn product(&self, a: &Direction<D>, b: &Direction<D>, theta: f64) -> f64 {

@@ -28,8 +28,8 @@ use nonsmooth_linalg::{Block, budget, small};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::form::{Access, Frictional, Linearised, OnContacts};
-use crate::contact::law::cfun::{ContactFunction, Law, Linearisation, NewtonFunction};
+use crate::contact::form::{Access, Disked, Linearised, OnContacts};
+use crate::contact::law::cfun::{ContactFunction, Linearisation, NewtonFunction, OneContact};
 use crate::contact::parts::Sweep;
 use crate::core::line_search::{LineSearch, Search};
 use crate::core::ranges::{at_most, nonnegative, positive};
@@ -100,10 +100,10 @@ const DOUBLINGS: usize = 6;
 pub const PATIENCE: usize = 25;
 
 /// The workspace: the problem's view, the scaling of each contact, and the vectors of a step.
-pub struct Work<P: Linearised<D> + Frictional<D>, const D: usize> {
+pub struct Work<P: Linearised<D> + Disked<D>, const D: usize> {
     state: P::State,
-    sweep: Sweep<D>,
-    laws: Vec<Law>,
+    sweep: Sweep<P::Law, D>,
+    laws: Vec<OneContact<P::Law>>,
     /// `w_c`, positive.
     unit: Vec<f64>,
     /// `‖q‖/√nc`.
@@ -162,8 +162,8 @@ impl Phase {
 
 impl<P, F, const D: usize> Solver<P> for OnContacts<Newton<F>, D>
 where
-    P: Linearised<D> + Frictional<D>,
-    F: ContactFunction<D>,
+    P: Linearised<D> + Disked<D>,
+    F: ContactFunction<D, P::Law>,
 {
     type Work = Work<P, D>;
 
@@ -276,8 +276,8 @@ where
 }
 
 impl<F, const D: usize> OnContacts<Newton<F>, D> {
-    fn fill<P: Linearised<D> + Frictional<D>>(&self, problem: &P, work: &mut Work<P, D>) {
-        let n = problem.mu().len();
+    fn fill<P: Linearised<D> + Disked<D>>(&self, problem: &P, work: &mut Work<P, D>) {
+        let n = problem.contacts();
         work.scale = problem.velocity_scale(&work.state) / (n as f64).sqrt();
         work.unit.clear();
         let state = &work.state;
@@ -304,14 +304,14 @@ impl<F, const D: usize> OnContacts<Newton<F>, D> {
     }
 
     /// ρ of every contact for the present rung.
-    fn scale_contacts<P: Linearised<D> + Frictional<D>>(&self, problem: &P, work: &mut Work<P, D>) {
+    fn scale_contacts<P: Linearised<D> + Disked<D>>(&self, problem: &P, work: &mut Work<P, D>) {
         let Newton { rho_rule, rho, .. } = self.0;
         let factor = scaling::LADDER[work.phase.rung % scaling::LADDER.len()];
         work.laws.clear();
-        for (c, (&mu, &unit)) in problem.mu().iter().zip(&work.unit).enumerate() {
+        for (c, &unit) in work.unit.iter().enumerate() {
             let w = problem.diagonal_block(&work.state, c);
-            let (parts, whole) = scaling::radii(rho_rule, rho * factor, &w, unit);
-            work.laws.push(Law { mu, rho: parts, rho_cone: whole, smoothing: 0.0 });
+            let (rho, rho_cone) = scaling::radii::<P::Law, D>(rho_rule, rho * factor, &w, unit);
+            work.laws.push(OneContact { law: problem.law(c), rho, rho_cone, smoothing: 0.0 });
         }
     }
 
@@ -324,7 +324,7 @@ impl<F, const D: usize> OnContacts<Newton<F>, D> {
         count: usize,
     ) -> Step
     where
-        P: Linearised<D> + Frictional<D>,
+        P: Linearised<D> + Disked<D>,
     {
         problem.enter(&mut work.state, point);
         let r = P::impulses(point);
@@ -348,7 +348,7 @@ impl<F, const D: usize> OnContacts<Newton<F>, D> {
         why: &'static str,
     ) -> Step
     where
-        P: Linearised<D> + Frictional<D>,
+        P: Linearised<D> + Disked<D>,
     {
         if self.0.rescue == 0 || work.phase.rescues >= RESCUES {
             return Step::Stuck(why.into());
@@ -367,9 +367,13 @@ impl<F, const D: usize> OnContacts<Newton<F>, D> {
     }
 }
 
-impl<F: ContactFunction<D>, const D: usize> OnContacts<Newton<F>, D> {
+impl<F, const D: usize> OnContacts<Newton<F>, D> {
     /// Φ, P, Q at the present point into `b = −Φ`, `p`, `q`, in the problem's units; the merit.
-    fn linearise<P: Linearised<D> + Frictional<D>>(&self, r: &[f64], work: &mut Work<P, D>) -> f64 {
+    fn linearise<P>(&self, r: &[f64], work: &mut Work<P, D>) -> f64
+    where
+        P: Linearised<D> + Disked<D>,
+        F: ContactFunction<D, P::Law>,
+    {
         let Work { laws, unit, scale, u, b, p, q, .. } = work;
         let mut merit = 0.0;
         for (c, (law, &w)) in laws.iter().zip(&*unit).enumerate() {
@@ -385,7 +389,11 @@ impl<F: ContactFunction<D>, const D: usize> OnContacts<Newton<F>, D> {
     }
 
     /// ε: at most a fraction of the residual without smoothing and, near the solution, of its square; never larger than before.
-    fn reduce_smoothing<P: Linearised<D> + Frictional<D>>(&self, r: &[f64], work: &mut Work<P, D>) {
+    fn reduce_smoothing<P>(&self, r: &[f64], work: &mut Work<P, D>)
+    where
+        P: Linearised<D> + Disked<D>,
+        F: ContactFunction<D, P::Law>,
+    {
         let phase = &mut work.phase;
         work.laws.iter_mut().for_each(|law| law.smoothing = 0.0);
         let merit = merit_at(&self.0.function, &work.laws, &work.unit, work.scale, &work.u, r);
@@ -403,9 +411,9 @@ impl<F: ContactFunction<D>, const D: usize> OnContacts<Newton<F>, D> {
 
 /// The function of contact c at `(u, r)`, in pure numbers.
 #[inline(always)]
-fn contact<F: ContactFunction<D>, const D: usize>(
+fn contact<F: ContactFunction<D, L>, L, const D: usize>(
     function: &F,
-    law: &Law,
+    law: &OneContact<L>,
     w: f64,
     scale: f64,
     u: &[f64],
@@ -418,9 +426,9 @@ fn contact<F: ContactFunction<D>, const D: usize>(
 }
 
 /// `½ Σ‖Φ_c‖²`.
-fn merit_at<F: ContactFunction<D>, const D: usize>(
+fn merit_at<F: ContactFunction<D, L>, L, const D: usize>(
     function: &F,
-    laws: &[Law],
+    laws: &[OneContact<L>],
     unit: &[f64],
     scale: f64,
     u: &[f64],

@@ -1,9 +1,10 @@
 //! ρ of each contact, from its block of W.
 
-use nonsmooth_linalg::Block;
+use nonsmooth_linalg::{Block, small};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::contact::law::DiskLaw;
 use crate::contact::law::cfun::Radii;
 
 /// The rules for ρ.
@@ -26,14 +27,14 @@ pub enum RhoRule {
 pub(super) const LADDER: [f64; 4] = [1.0, 10.0, 0.1, 100.0];
 
 /// `ρ w_c` for the parts and for the whole: pure numbers.
-pub(super) fn radii<const D: usize>(
+pub(super) fn radii<L: DiskLaw<D>, const D: usize>(
     rule: RhoRule,
     rho: f64,
     w: &Block<D>,
     unit: f64,
 ) -> (Radii, f64) {
     let over = |size: f64| if size > 0.0 && size.is_finite() { rho * unit / size } else { rho };
-    let uniform = |size: f64| (Radii { normal: over(size), tangential: over(size) }, over(size));
+    let uniform = |size: f64| (Radii::uniform(over(size)), over(size));
     match rule {
         RhoRule::Fixed => uniform(unit),
         RhoRule::Norm => {
@@ -42,49 +43,22 @@ pub(super) fn radii<const D: usize>(
             uniform((squares / D as f64).sqrt())
         }
         RhoRule::Spectral | RhoRule::Adaptive => {
-            let mut tangential = *w;
-            tangential[0] = [0.0; D];
-            tangential.iter_mut().for_each(|row| row[0] = 0.0);
-            let parts =
-                Radii { normal: over(w[0][0]), tangential: over(largest_eigenvalue(&tangential)) };
+            let of_disk = |part: &Block<D>| over(largest_eigenvalue(part));
+            let parts = Radii::of::<L, D>(w, |w| over(w[0][0]), of_disk);
             (parts, over(largest_eigenvalue(w)))
         }
     }
 }
 
-/// The largest eigenvalue of the symmetric part, by Jacobi rotations.
+/// The largest eigenvalue of the symmetric part.
 fn largest_eigenvalue<const D: usize>(w: &Block<D>) -> f64 {
-    let mut a = *w;
-    for i in 0..D {
-        for j in 0..D {
-            a[i][j] = 0.5 * (w[i][j] + w[j][i]);
-        }
-    }
-    for _ in 0..8 {
-        for i in 0..D {
-            for j in i + 1..D {
-                if a[i][j] == 0.0 {
-                    continue;
-                }
-                let theta = 0.5 * (2.0 * a[i][j]).atan2(a[i][i] - a[j][j]);
-                let (s, c) = theta.sin_cos();
-                for k in 0..D {
-                    let (x, y) = (a[i][k], a[j][k]);
-                    (a[i][k], a[j][k]) = (c * x + s * y, c * y - s * x);
-                }
-                for k in 0..D {
-                    let (x, y) = (a[k][i], a[k][j]);
-                    (a[k][i], a[k][j]) = (c * x + s * y, c * y - s * x);
-                }
-            }
-        }
-    }
-    (0..D).map(|k| a[k][k]).fold(f64::NEG_INFINITY, f64::max)
+    small::eigen(w).0.into_iter().fold(f64::NEG_INFINITY, f64::max)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::law::Coulomb;
 
     #[test]
     fn eigenvalues_of_known_blocks() {
@@ -101,14 +75,14 @@ mod tests {
     fn rho_is_a_pure_number() {
         let w = [[2.0, 1.0, 0.0], [1.0, 2.0, 0.0], [0.0, 0.0, 0.5]];
         for rule in [RhoRule::Fixed, RhoRule::Norm, RhoRule::Spectral] {
-            let one = radii(rule, 1.0, &w, 1.5);
-            let other = radii(rule, 1.0, &w.map(|row| row.map(|x| 1e6 * x)), 1.5e6);
+            let one = radii::<Coulomb, 3>(rule, 1.0, &w, 1.5);
+            let other = radii::<Coulomb, 3>(rule, 1.0, &w.map(|row| row.map(|x| 1e6 * x)), 1.5e6);
             assert!((one.0.normal / other.0.normal - 1.0).abs() < 1e-12);
             assert!((one.1 / other.1 - 1.0).abs() < 1e-12);
         }
-        let (parts, whole) = radii(RhoRule::Spectral, 2.0, &w, 1.5);
+        let (parts, whole) = radii::<Coulomb, 3>(RhoRule::Spectral, 2.0, &w, 1.5);
         assert!((parts.normal - 1.5).abs() < 1e-14 && (parts.tangential - 1.5).abs() < 1e-14);
         assert!((whole - 1.0).abs() < 1e-14);
-        assert_eq!(radii(RhoRule::Fixed, 3.0, &w, 1.5).1, 3.0);
+        assert_eq!(radii::<Coulomb, 3>(RhoRule::Fixed, 3.0, &w, 1.5).1, 3.0);
     }
 }

@@ -16,6 +16,7 @@ use nonsmooth_linalg::{Block, budget, small};
 use super::sets::Set;
 use crate::SolveError;
 use crate::contact::form::{Access, Frictional, Linear, Linearised};
+use crate::contact::law::Coulomb;
 use crate::contact::law::cfun::natural_residual;
 use crate::contact::law::cone;
 use crate::contact::law::cone::ConvexSet;
@@ -149,7 +150,8 @@ impl<P: Linear<D> + Frictional<D>, const D: usize> Convex<P, D> {
     pub(super) fn coulomb(&self, mu: &[f64], r: &[f64], u: &[f64]) -> f64 {
         let mut sum = 0.0;
         for (c, (&mu, &w)) in mu.iter().zip(&self.unit).enumerate() {
-            sum += natural_residual(w, &small::block::<D>(r, c), &small::block(u, c), mu);
+            sum +=
+                natural_residual(w, &small::block::<D>(r, c), &small::block(u, c), Coulomb { mu });
         }
         sum.sqrt() / self.scale
     }

@@ -25,18 +25,21 @@
 //!
 //! A contact with mu = 0 has the half line in its normal component and `r_T = 0`.
 //!
+//! With rolling friction a contact has two cones that share r_N: `x_k = A_k x̂`, `A_k = diag(mu_k in N, 1 in disk k)`, `x̂ = w_c r/υ`, and the normal velocity is split
+//! between them, `ẑ = Σ A_k z_k`. Complementarity eliminates the split: `(T w_c/υ + G W/υ) dr = Σ A_k S_k d_k + G ρ` with `T = Σ A_k S_k² A_k`,
+//! whose eigenvectors take the place of those of S.
+//!
 //! References: NesterovTodd1998; Mehrotra1992; TutuncuTohTodd2003 (formulas for the second-order cone). G and the exact law: the
 //! derivation above.
 //! Cost of an iteration: one factorisation, two solves, one product. Storage: 20 vectors and five D×D blocks a contact.
 //! Fails: the exact law is not monotone; its central path can turn back, and then the steps shrink. With a given s the
 //! method fails where the problem has no solution.
 
-use nonsmooth_linalg::{Block, Singular, norm_of, small};
+use nonsmooth_linalg::{Block, Singular, norm, norm_of, small};
 
 use super::nt::{Inner, Pair, Scaling, Shape};
-use crate::contact::form::{Frictional, Linearised};
-use crate::contact::law::cfun::natural_map;
-use crate::contact::law::cone::tangential_norm;
+use crate::contact::form::{Disked, Linearised};
+use crate::contact::law::{DiskLaw, cone};
 
 /// Where s comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,8 +65,8 @@ pub struct Iterate {
 
 /// The iterate and the workspace, for contacts of dimension D. Allocates in [`begin`](Central::begin) only, and there only
 /// where there are more contacts than before.
-#[derive(Debug, Clone, Default)]
-pub struct Central<const D: usize> {
+#[derive(Debug, Clone)]
+pub struct Central<L, const D: usize> {
     law: Option<Law>,
     /// `‖q‖`, or 1.
     scale: f64,
@@ -72,12 +75,16 @@ pub struct Central<const D: usize> {
     delta: f64,
     /// X/mu and Z mu, one number each per contact: `w_c/υ` and mu; `1/υ` is shared.
     weight: Vec<f64>,
-    mu: Vec<f64>,
+    laws: Vec<L>,
     inverse_speed: f64,
     s: Vec<f64>,
+    /// Of each disk of each contact, in the rows N and those of the disk; and all that is a pair's.
     pub(in crate::contact) pairs: Vec<Pair<D>>,
     pub(in crate::contact) scalings: Vec<Scaling<D>>,
+    /// Of each contact, as p, q and what follows.
     pub(in crate::contact) rho: Vec<[f64; D]>,
+    /// Eigenvalues and eigenvectors, by rows, of T, of contacts with two cones.
+    turned: Vec<([f64; D], Block<D>)>,
     /// d of the Newton step.
     pub(in crate::contact) d: Vec<[f64; D]>,
     pub(in crate::contact) dx: Vec<[f64; D]>,
@@ -94,11 +101,43 @@ pub struct Central<const D: usize> {
     now: Option<Iterate>,
 }
 
-impl<const D: usize> Central<D> {
+impl<L, const D: usize> Default for Central<L, D> {
+    fn default() -> Self {
+        Self {
+            law: None,
+            scale: 1.0,
+            smoothing: 0.0,
+            delta: 0.0,
+            weight: vec![],
+            laws: vec![],
+            inverse_speed: 1.0,
+            s: vec![],
+            pairs: vec![],
+            scalings: vec![],
+            rho: vec![],
+            turned: vec![],
+            d: vec![],
+            dx: vec![],
+            dz: vec![],
+            p: vec![],
+            q: vec![],
+            b: vec![],
+            dr: vec![],
+            wdr: vec![],
+            r: vec![],
+            u: vec![],
+            best: vec![],
+            best_error: f64::INFINITY,
+            now: None,
+        }
+    }
+}
+
+impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
     /// Begins with Coulomb's law. `smoothing` κ ≥ 0 makes `s = √(‖z_T‖² + (κτ)²)`.
     ///
     /// `start`: impulses to begin near, kept `margin` inside the cones; else `x = z = e`.
-    pub fn begin<P: Linearised<D> + Frictional<D>>(
+    pub fn begin<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -108,12 +147,12 @@ impl<const D: usize> Central<D> {
         self.law = Some(Law::Coulomb);
         self.smoothing = smoothing;
         self.s.clear();
-        self.s.resize(problem.mu().len(), 0.0);
+        self.s.resize(L::DISKS * problem.contacts(), 0.0);
         self.enter(problem, state, start)
     }
 
-    /// Begins with the convex problem for the given `s` (a velocity for each contact); `start` as above.
-    pub fn begin_convex<P: Linearised<D> + Frictional<D>>(
+    /// Begins with the convex problem for the given `s` (a velocity for each disk of each contact); `start` as above.
+    pub fn begin_convex<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -127,17 +166,17 @@ impl<const D: usize> Central<D> {
         self.enter(problem, state, start)
     }
 
-    fn enter<P: Linearised<D> + Frictional<D>>(
+    fn enter<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
         start: Option<(&[f64], f64)>,
     ) -> Iterate {
-        let n = problem.mu().len();
+        let n = problem.contacts();
         self.scale = problem.velocity_scale(state);
         self.inverse_speed = (n as f64).sqrt() / self.scale;
-        self.mu.clear();
-        self.mu.extend_from_slice(problem.mu());
+        self.laws.clear();
+        self.laws.extend((0..n).map(|c| problem.law(c)));
         self.weight.clear();
         let unit = |c| small::mean_diagonal(&problem.diagonal_block(state, c));
         self.weight.extend((0..n).map(unit));
@@ -147,10 +186,14 @@ impl<const D: usize> Central<D> {
             *w = self.inverse_speed * if *w > 0.0 { *w } else { mean };
         }
         let zero = [0.0; D];
-        for list in [&mut self.rho, &mut self.d, &mut self.dx, &mut self.dz] {
+        self.rho.clear();
+        self.rho.resize(n, zero);
+        for list in [&mut self.d, &mut self.dx, &mut self.dz] {
             list.clear();
-            list.resize(n, zero);
+            list.resize(L::DISKS * n, zero);
         }
+        self.turned.clear();
+        self.turned.resize(if L::DISKS > 1 { n } else { 0 }, (zero, [zero; D]));
         for list in [&mut self.p, &mut self.q] {
             list.clear();
             list.resize(n, [zero; D]);
@@ -161,25 +204,36 @@ impl<const D: usize> Central<D> {
             list.clear();
             list.resize(D * n, 0.0);
         }
-        let shape = |mu: f64| if mu > 0.0 { Shape::SecondOrder } else { Shape::Line };
         self.pairs.clear();
-        self.pairs.extend(self.mu.iter().map(|&mu| Pair {
-            shape: shape(mu),
-            x: Inner::unit(1.0),
-            z: Inner::unit(1.0),
-        }));
+        for i in 0..L::DISKS * n {
+            let shape = if self.mu(i) > 0.0 { Shape::SecondOrder } else { Shape::Line };
+            // One cone begins at x = z = e, two at the same r_N.
+            let a = self.normal(i) / self.mean_normal(i / L::DISKS);
+            self.pairs.push(Pair { shape, x: Inner::unit(a), z: Inner::unit(1.0 / a) });
+        }
         if let Some((r, margin)) = start {
             self.r.copy_from_slice(r);
             problem.velocities(state, &self.r, &mut self.u);
             for c in 0..n {
-                let x = self.scaled_impulse(c, &small::block(r, c));
-                let mut z = self.scaled_velocity(c, &small::block(&self.u, c));
-                z[0] += self.slide(c, tangential_norm(&z)).0;
-                self.pairs[c].x = Inner::shifted(&x, margin);
-                self.pairs[c].z = Inner::shifted(&z, margin);
-                if self.mu[c] == 0.0 {
-                    self.pairs[c].x = Inner::unit(x[0].max(margin));
-                    self.pairs[c].z = Inner::unit(z[0].max(margin));
+                let (mut r, u) = (small::block(r, c), small::block(&self.u, c));
+                if L::DISKS > 1 {
+                    // Both cones must hold the same r_N.
+                    let inside = |k: usize| norm(&r[L::rows(k)]) / self.laws[c].coefficient(k);
+                    let least = (0..L::DISKS).map(inside).filter(|x| x.is_finite());
+                    r[0] = least.fold(r[0], f64::max) + margin / self.weight[c];
+                }
+                for i in L::DISKS * c..L::DISKS * (c + 1) {
+                    let margin = if L::DISKS > 1 { LEAST_MARGIN * margin } else { margin };
+                    let x = self.scaled_impulse(i, &r);
+                    let mut z = self.scaled_velocity(i, &u);
+                    z[0] /= L::DISKS as f64;
+                    z[0] += self.slide(i, cone::tangential_norm(&z)).0;
+                    self.pairs[i].x = Inner::shifted(&x, margin);
+                    self.pairs[i].z = Inner::shifted(&z, margin);
+                    if self.mu(i) == 0.0 {
+                        self.pairs[i].x = Inner::unit(x[0].max(margin));
+                        self.pairs[i].z = Inner::unit(z[0].max(margin));
+                    }
                 }
             }
         }
@@ -205,7 +259,11 @@ impl<const D: usize> Central<D> {
     }
 
     /// Makes r and u those of the best iterate. To go on, begin again.
-    pub fn restore<P: Linearised<D> + Frictional<D>>(&mut self, problem: &P, state: &mut P::State) {
+    pub fn restore<P: Linearised<D> + Disked<D, Law = L>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+    ) {
         self.r.copy_from_slice(&self.best);
         problem.velocities(state, &self.r, &mut self.u);
     }
@@ -216,7 +274,7 @@ impl<const D: usize> Central<D> {
     }
 
     /// One predictor–corrector iteration. `Err`: the matrix is numerically singular; the iterate has not moved.
-    pub fn iterate<P: Linearised<D> + Frictional<D>>(
+    pub fn iterate<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -275,78 +333,194 @@ impl<const D: usize> Central<D> {
     }
 
     /// Factorises the matrix of the Newton step at the present iterate.
-    pub(in crate::contact) fn factorise<P: Linearised<D> + Frictional<D>>(
+    pub(in crate::contact) fn factorise<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
     ) -> Result<(), Singular> {
-        for c in 0..self.pairs.len() {
-            let scaling = Scaling::new(&self.pairs[c]);
-            self.scalings[c] = scaling;
-            let (x, z) = (self.impulse_scale(c), self.velocity_scale(c));
-            let n = self.slide_direction(c);
-            let (mut p, mut q) = ([[0.0; D]; D], [[0.0; D]; D]);
-            let rows = if scaling.shape == Shape::Line { 1 } else { D };
-            for i in 0..rows {
-                let v = &scaling.vectors[i];
-                let square = scaling.values[i] * scaling.values[i];
-                let (a, b) = (1.0 / (1.0 + square), square / (1.0 + square));
-                for k in 0..D {
-                    p[i][k] = a * (v[k] + v[0] * n[k]) * z[k]; //  vᵀ G Z
-                    q[i][k] = b * v[k] * x[k];
-                }
-            }
-            for i in rows..D {
-                q[i][i] = x[i]; //                                  r_T = 0
-            }
-            (self.p[c], self.q[c]) = (p, q);
+        for (scaling, pair) in self.scalings.iter_mut().zip(&self.pairs) {
+            *scaling = Scaling::new(pair);
+        }
+        for c in 0..self.laws.len() {
+            (self.p[c], self.q[c]) =
+                if L::DISKS == 1 { self.blocks_of_one(c) } else { self.blocks_of_two(c) };
         }
         problem.linearise(state, &self.p, &self.q)
     }
 
+    /// P and Q of a contact with one cone.
+    fn blocks_of_one(&self, c: usize) -> (Block<D>, Block<D>) {
+        let scaling = &self.scalings[c];
+        let (x, z) = (self.impulse_scale(c), self.velocity_scale(c));
+        let n = self.slide_direction(c);
+        let (mut p, mut q) = ([[0.0; D]; D], [[0.0; D]; D]);
+        let rows = if scaling.shape == Shape::Line { 1 } else { D };
+        for i in 0..rows {
+            let v = &scaling.vectors[i];
+            let square = scaling.values[i] * scaling.values[i];
+            let (a, b) = (1.0 / (1.0 + square), square / (1.0 + square));
+            for k in 0..D {
+                p[i][k] = a * (v[k] + v[0] * n[k]) * z[k]; //  vᵀ G Z
+                q[i][k] = b * v[k] * x[k];
+            }
+        }
+        for i in rows..D {
+            q[i][i] = x[i]; //                                  r_T = 0
+        }
+        (p, q)
+    }
+
+    /// P and Q of a contact with two cones, in the eigenvectors of T, which are kept.
+    fn blocks_of_two(&mut self, c: usize) -> (Block<D>, Block<D>) {
+        let mut t = [[0.0; D]; D];
+        for k in 0..L::DISKS {
+            let i = L::DISKS * c + k;
+            let scaling = &self.scalings[i];
+            let rows = if scaling.shape == Shape::Line { 1 } else { D };
+            for (v, s) in scaling.vectors.iter().zip(scaling.values).take(rows) {
+                let v = self.of_disk(i, v); //                      T = Σ A S² A
+                for a in 0..D {
+                    (0..D).for_each(|b| t[a][b] += s * s * v[a] * v[b]);
+                }
+            }
+        }
+        let (values, vectors) = small::eigen(&t);
+        self.turned[c] = (values, vectors);
+        let n = self.whole_slide_direction(c);
+        let (mut p, mut q) = ([[0.0; D]; D], [[0.0; D]; D]);
+        for i in 0..D {
+            if self.is_still(c, i) {
+                q[i][i] = self.weight[c]; //                        r_T = 0
+                continue;
+            }
+            let (v, scale) = (&vectors[i], 1.0 / (1.0 + values[i]));
+            for k in 0..D {
+                p[i][k] = scale * (v[k] + v[0] * n[k]) * self.inverse_speed;
+                q[i][k] = scale * values[i] * v[k] * self.weight[c];
+            }
+        }
+        (p, q)
+    }
+
     /// `dx` and `dz` for the present d, with ρ weighted.
-    pub(in crate::contact) fn newton<P: Linearised<D> + Frictional<D>>(
+    pub(in crate::contact) fn newton<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
         weight: f64,
     ) {
-        for c in 0..self.pairs.len() {
-            let scaling = &self.scalings[c];
-            let n = self.slide_direction(c);
-            let mut rho = self.rho[c].map(|v| weight * v);
-            rho[0] += (1..D).map(|k| n[k] * rho[k]).sum::<f64>(); // G ρ
-            let (d, rho) = (scaling.coordinates(&self.d[c]), scaling.coordinates(&rho));
-            for i in 0..D {
-                let value = scaling.values[i];
-                self.b[D * c + i] = (value * d[i] + rho[i]) / (1.0 + value * value);
-            }
-            if scaling.shape == Shape::Line {
-                (1..D).for_each(|i| self.b[D * c + i] = 0.0);
-            }
+        for c in 0..self.laws.len() {
+            let b = if L::DISKS == 1 {
+                self.side_of_one(c, weight)
+            } else {
+                self.side_of_two(c, weight)
+            };
+            self.b[D * c..D * c + D].copy_from_slice(&b);
         }
         problem.solve_linearised(state, &self.b, &mut self.dr, &mut self.wdr);
-        for c in 0..self.pairs.len() {
-            let dx = self.scaled_impulse(c, &small::block(&self.dr, c));
-            let mut dz = self.scaled_velocity(c, &small::block(&self.wdr, c));
-            (0..D).for_each(|k| dz[k] -= weight * self.rho[c][k]);
-            let n = self.slide_direction(c);
-            dz[0] += (1..D).map(|k| n[k] * dz[k]).sum::<f64>(); //      G (Z W dr − ρ)
-            let scaling = &self.scalings[c];
-            let d = scaling.coordinates(&self.d[c]);
-            let (mut x, mut z) = (scaling.coordinates(&dx), scaling.coordinates(&dz));
-            for i in 0..D {
-                // Complementarity gives the one that is small from the other; the other way round it would magnify what
-                // the solve left.
-                let s = scaling.values[i];
-                if s > 1.0 {
-                    x[i] = (d[i] - z[i] / s) / s;
-                } else {
-                    z[i] = s * (d[i] - s * x[i]);
-                }
+        for c in 0..self.laws.len() {
+            if L::DISKS == 1 {
+                self.step_of_one(c, weight);
+            } else {
+                self.step_of_two(c, weight);
             }
-            (self.dx[c], self.dz[c]) = (scaling.back(&x), scaling.back(&z));
         }
+    }
+
+    /// The right-hand side of a contact with one cone.
+    fn side_of_one(&self, c: usize, weight: f64) -> [f64; D] {
+        let scaling = &self.scalings[c];
+        let n = self.slide_direction(c);
+        let mut rho = self.rho[c].map(|v| weight * v);
+        rho[0] += (1..D).map(|k| n[k] * rho[k]).sum::<f64>(); // G ρ
+        let (d, rho) = (scaling.coordinates(&self.d[c]), scaling.coordinates(&rho));
+        let mut b = [0.0; D];
+        for i in 0..D {
+            let value = scaling.values[i];
+            b[i] = (value * d[i] + rho[i]) / (1.0 + value * value);
+        }
+        if scaling.shape == Shape::Line {
+            (1..D).for_each(|i| b[i] = 0.0);
+        }
+        b
+    }
+
+    /// dx and dz of a contact with one cone.
+    fn step_of_one(&mut self, c: usize, weight: f64) {
+        let dx = self.scaled_impulse(c, &small::block(&self.dr, c));
+        let mut dz = self.scaled_velocity(c, &small::block(&self.wdr, c));
+        (0..D).for_each(|k| dz[k] -= weight * self.rho[c][k]);
+        let n = self.slide_direction(c);
+        dz[0] += (1..D).map(|k| n[k] * dz[k]).sum::<f64>(); //      G (Z W dr − ρ)
+        (self.dx[c], self.dz[c]) = self.completed(c, &dx, &dz);
+    }
+
+    /// dx and dz of a pair, whichever is small from the other: complementarity the other way round would magnify what the solve left.
+    fn completed(&self, i: usize, dx: &[f64; D], dz: &[f64; D]) -> ([f64; D], [f64; D]) {
+        let scaling = &self.scalings[i];
+        let d = scaling.coordinates(&self.d[i]);
+        let (mut x, mut z) = (scaling.coordinates(dx), scaling.coordinates(dz));
+        for k in 0..D {
+            let s = scaling.values[k];
+            if s > 1.0 {
+                x[k] = (d[k] - z[k] / s) / s;
+            } else {
+                z[k] = s * (d[k] - s * x[k]);
+            }
+        }
+        (scaling.back(&x), scaling.back(&z))
+    }
+
+    /// The right-hand side of a contact with two cones, `Vᵀ(Σ A S d + G ρ)/(1 + t)`.
+    fn side_of_two(&self, c: usize, weight: f64) -> [f64; D] {
+        let n = self.whole_slide_direction(c);
+        let mut side = self.rho[c].map(|v| weight * v);
+        side[0] += (1..D).map(|k| n[k] * side[k]).sum::<f64>();
+        for i in L::DISKS * c..L::DISKS * (c + 1) {
+            let of_d = self.of_disk(i, &self.scalings[i].apply(&self.d[i]));
+            (0..D).for_each(|k| side[k] += of_d[k]);
+        }
+        let (values, vectors) = &self.turned[c];
+        let turned = small::mul(vectors, &side);
+        std::array::from_fn(
+            |i| {
+                if self.is_still(c, i) { 0.0 } else { turned[i] / (1.0 + values[i]) }
+            },
+        )
+    }
+
+    /// dx and dz of a contact with two cones. What of the normal velocity goes to which follows from complementarity where that is least sensitive, and from the sum where it is not.
+    fn step_of_two(&mut self, c: usize, weight: f64) {
+        let dr: [f64; D] = small::block(&self.dr, c);
+        let wdr: [f64; D] = small::block(&self.wdr, c);
+        let n = self.whole_slide_direction(c);
+        let mut sum: [f64; D] =
+            std::array::from_fn(|k| self.inverse_speed * wdr[k] - weight * self.rho[c][k]);
+        sum[0] += (1..D).map(|k| n[k] * sum[k]).sum::<f64>(); //    dẑ = G (W dr/υ − ρ)
+        let pairs = [L::DISKS * c, L::DISKS * c + L::DISKS - 1];
+        let dx = pairs.map(|i| self.of_disk(i, &dr.map(|r| self.weight[c] * r)));
+        let mut dz = [0, 1].map(|k| self.of_disk(pairs[k], &sum));
+        let sensitivity = pairs.map(|i| {
+            let scaling = &self.scalings[i];
+            let mut unit = [0.0; D];
+            unit[0] = self.normal(i);
+            norm(&scaling.apply(&unit))
+        });
+        let (sure, other) = if sensitivity[0] <= sensitivity[1] { (0, 1) } else { (1, 0) };
+        let scaling = &self.scalings[pairs[sure]];
+        let x = scaling.apply(&dx[sure]);
+        let d = &self.d[pairs[sure]];
+        let from: [f64; D] = std::array::from_fn(|k| d[k] - x[k]);
+        dz[sure][0] = scaling.apply(&from)[0];
+        let [of_sure, of_other] = [sure, other].map(|k| self.normal(pairs[k]));
+        dz[other][0] = (sum[0] - of_sure * dz[sure][0]) / of_other;
+        for k in 0..2 {
+            let i = pairs[k];
+            (self.dx[i], self.dz[i]) = self.completed(i, &dx[k], &dz[k]);
+        }
+        // Both hold the same r_N.
+        let r_n = self.dx[pairs[sure]][0] / of_sure;
+        self.dx[pairs[other]][0] = of_other * r_n;
     }
 
     /// `S dx` and `S⁻¹ dz`.
@@ -377,47 +551,45 @@ impl<const D: usize> Central<D> {
     }
 
     /// Everything that follows from x and z.
-    pub(in crate::contact) fn look<P: Linearised<D> + Frictional<D>>(
+    pub(in crate::contact) fn look<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
         alpha: f64,
     ) -> Iterate {
-        let n = self.pairs.len();
+        let n = self.laws.len();
         for c in 0..n {
-            let (x, scale) = (self.pairs[c].x.vector(), self.impulse_scale(c));
-            for k in 0..D {
-                self.r[D * c + k] = x[k] / scale[k];
-            }
-            if self.mu[c] == 0.0 {
-                (1..D).for_each(|k| self.r[D * c + k] = 0.0);
+            for k in 0..L::DISKS {
+                let i = L::DISKS * c + k;
+                let (x, scale) = (self.pairs[i].x.vector(), self.impulse_scale(i));
+                if k == 0 {
+                    self.r[D * c] = x[0] / scale[0];
+                }
+                for row in L::rows(k) {
+                    self.r[D * c + row] = if self.mu(i) > 0.0 { x[row] / scale[row] } else { 0.0 };
+                }
             }
         }
         problem.velocities(state, &self.r, &mut self.u);
-        let tau = self.pairs.iter().map(Pair::dot).sum::<f64>() / n as f64;
+        let tau = self.pairs.iter().map(Pair::dot).sum::<f64>() / self.pairs.len() as f64;
         self.delta = self.smoothing * tau;
         let mut errors = 0.0;
         for c in 0..n {
             let u: [f64; D] = small::block(&self.u, c);
-            let (free, z) = (self.scaled_velocity(c, &u), self.pairs[c].z.vector());
-            let slide = self.slide(c, self.pairs[c].z.tangential()).0;
-            let mut rho = [0.0; D];
-            rho[0] = z[0] - slide - free[0];
-            if self.mu[c] > 0.0 {
-                (1..D).for_each(|k| rho[k] = z[k] - free[k]);
-            } else {
-                rho[0] = z[0] - free[0];
-            }
-            self.rho[c] = rho;
+            self.rho[c] =
+                if L::DISKS == 1 { self.gap_of_one(c, &u) } else { self.gap_of_two(c, &u) };
+            let law = self.laws[c];
             let mut modified = u;
-            modified[0] += self.mu[c]
-                * match self.law {
-                    Some(Law::Given) => self.s[c],
-                    _ => tangential_norm(&u),
-                };
+            modified[0] += match self.law {
+                Some(Law::Given) => {
+                    let of = |k: usize| law.coefficient(k) * self.s[L::DISKS * c + k];
+                    (0..L::DISKS).map(of).sum()
+                }
+                _ => law.shift(&u),
+            };
             let w = self.weight[c] / self.inverse_speed;
             let x = small::block::<D>(&self.r, c).map(|r| w * r);
-            errors += natural_map(&x, &modified, self.mu[c]).iter().map(|v| v * v).sum::<f64>();
+            errors += law.natural(&x, &modified).iter().map(|v| v * v).sum::<f64>();
         }
         let residual = norm_of(self.rho.iter().flatten().copied()) / (n as f64).sqrt();
         let error = errors.sqrt() / self.scale;
@@ -430,22 +602,84 @@ impl<const D: usize> Central<D> {
         now
     }
 
-    /// The diagonal of X; 1 in the tangential components of a contact without friction.
-    fn impulse_scale(&self, c: usize) -> [f64; D] {
-        let mut x = [self.weight[c]; D];
-        if self.mu[c] > 0.0 {
-            x[0] *= self.mu[c];
+    /// ρ of a contact with one cone.
+    fn gap_of_one(&self, c: usize, u: &[f64; D]) -> [f64; D] {
+        let (free, z) = (self.scaled_velocity(c, u), self.pairs[c].z.vector());
+        let slide = self.slide(c, self.pairs[c].z.tangential()).0;
+        let mut rho = [0.0; D];
+        rho[0] = z[0] - slide - free[0];
+        if self.mu(c) > 0.0 {
+            (1..D).for_each(|k| rho[k] = z[k] - free[k]);
+        } else {
+            rho[0] = z[0] - free[0];
         }
+        rho
+    }
+
+    /// ρ of a contact with two cones, `Σ A_k (z_k − s_k e) − u/υ`.
+    fn gap_of_two(&self, c: usize, u: &[f64; D]) -> [f64; D] {
+        let mut rho = u.map(|u| -self.inverse_speed * u);
+        for k in 0..L::DISKS {
+            let i = L::DISKS * c + k;
+            let mut z = self.pairs[i].z.vector();
+            z[0] -= self.slide(i, self.pairs[i].z.tangential()).0;
+            let z = self.of_disk(i, &z);
+            (0..D).for_each(|k| rho[k] += z[k]);
+        }
+        (1..D).filter(|&k| self.is_still(c, k)).for_each(|k| rho[k] = 0.0);
+        rho
+    }
+
+    /// The coefficient of pair i.
+    fn mu(&self, i: usize) -> f64 {
+        self.laws[i / L::DISKS].coefficient(i % L::DISKS)
+    }
+
+    /// A of pair i in the normal direction: its coefficient, 1 of a half line.
+    fn normal(&self, i: usize) -> f64 {
+        if self.mu(i) > 0.0 { self.mu(i) } else { 1.0 }
+    }
+
+    /// The geometric mean of A in the normal direction.
+    fn mean_normal(&self, c: usize) -> f64 {
+        let product: f64 = (0..L::DISKS).map(|k| self.normal(L::DISKS * c + k)).product();
+        if L::DISKS == 1 { product } else { product.sqrt() }
+    }
+
+    /// `A_k y`.
+    fn of_disk(&self, i: usize, y: &[f64; D]) -> [f64; D] {
+        let mut out = [0.0; D];
+        out[0] = self.normal(i) * y[0];
+        if self.mu(i) > 0.0 {
+            L::rows(i % L::DISKS).for_each(|k| out[k] = y[k]);
+        }
+        out
+    }
+
+    /// Whether row k of contact c is of a disk that is a point.
+    fn is_still(&self, c: usize, k: usize) -> bool {
+        k > 0 && self.laws[c].coefficient((k - 1) * L::DISKS / (D - 1)) <= 0.0
+    }
+
+    /// The diagonal of X; of one cone 1 in the tangential components of a contact without friction, of two zero beside the disk.
+    fn impulse_scale(&self, i: usize) -> [f64; D] {
+        let weight = self.weight[i / L::DISKS];
+        let mut x = self.in_disk(i, weight);
+        x[0] = weight * self.normal(i);
         x
     }
 
     /// The diagonal of Z.
-    fn velocity_scale(&self, c: usize) -> [f64; D] {
-        let mut z = [self.inverse_speed; D];
-        if self.mu[c] > 0.0 {
-            z[0] /= self.mu[c];
-        }
+    fn velocity_scale(&self, i: usize) -> [f64; D] {
+        let mut z = self.in_disk(i, self.inverse_speed);
+        z[0] = self.inverse_speed / self.normal(i);
         z
+    }
+
+    fn in_disk(&self, i: usize, value: f64) -> [f64; D] {
+        let mut out = [0.0; D];
+        L::rows(i % L::DISKS).for_each(|k| out[k] = value);
+        out
     }
 
     fn scaled_impulse(&self, c: usize, r: &[f64; D]) -> [f64; D] {
@@ -460,11 +694,11 @@ impl<const D: usize> Central<D> {
         z
     }
 
-    /// s of contact c in scaled velocity, and its derivative by ‖z_T‖.
-    fn slide(&self, c: usize, size: f64) -> (f64, f64) {
+    /// s of pair i in scaled velocity, and its derivative by ‖z_T‖.
+    fn slide(&self, i: usize, size: f64) -> (f64, f64) {
         match self.law {
-            _ if self.mu[c] == 0.0 => (0.0, 0.0),
-            Some(Law::Given) => (self.inverse_speed * self.s[c], 0.0),
+            _ if self.mu(i) == 0.0 => (0.0, 0.0),
+            Some(Law::Given) => (self.inverse_speed * self.s[i], 0.0),
             _ if self.delta == 0.0 => (size, 1.0),
             _ => {
                 let s = size.hypot(self.delta);
@@ -474,10 +708,21 @@ impl<const D: usize> Central<D> {
     }
 
     /// `n = ∂s/∂z_T`, with a zero in front.
-    fn slide_direction(&self, c: usize) -> [f64; D] {
-        let z = &self.pairs[c].z;
-        let slope = self.slide(c, z.tangential()).1;
+    fn slide_direction(&self, i: usize) -> [f64; D] {
+        let z = &self.pairs[i].z;
+        let slope = self.slide(i, z.tangential()).1;
         z.direction().map(|t| slope * t)
+    }
+
+    /// `∂(Σ mu_k s_k)/∂ẑ`, with a zero in front.
+    fn whole_slide_direction(&self, c: usize) -> [f64; D] {
+        let mut n = [0.0; D];
+        for k in 0..L::DISKS {
+            let i = L::DISKS * c + k;
+            let of_disk = self.slide_direction(i);
+            L::rows(k).for_each(|row| n[row] = self.mu(i) * of_disk[row]);
+        }
+        n
     }
 }
 
@@ -486,3 +731,6 @@ const BEHIND: f64 = 0.9;
 
 /// Steps below this are cut short.
 const CUT: f64 = 0.1;
+
+/// Of a start with two cones, which its r_N has already put inside: what is left to keep either off its boundary.
+const LEAST_MARGIN: f64 = 1e-3;

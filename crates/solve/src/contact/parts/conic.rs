@@ -11,6 +11,7 @@ use nonsmooth_linalg::Singular;
 
 use super::central::{Central, Iterate};
 use crate::contact::form::{Frictional, Linearised};
+use crate::contact::law::Coulomb;
 
 /// A solver of convex problems, with its workspace; a second problem of the same shape allocates nothing.
 ///
@@ -19,7 +20,7 @@ use crate::contact::form::{Frictional, Linearised};
 /// ```
 #[derive(Debug, Clone, Default)]
 pub struct ConvexIp<const D: usize> {
-    core: Central<D>,
+    core: Central<Coulomb, D>,
 }
 
 /// How [`ConvexIp::solve`] ended. Its answer is the best iterate whatever ended it.

@@ -162,6 +162,18 @@ impl<const D: usize> Inner<D> {
     }
 }
 
+/// Fills the rows from the third on with an orthonormal basis of what is across the unit vector t: the reflection that takes the first tangent to ±t takes the others there.
+fn across<const D: usize>(t: &[f64; D], vectors: &mut Block<D>) {
+    let mut v = *t;
+    v[1] += if t[1] < 0.0 { -1.0 } else { 1.0 };
+    let square = tangential_dot(&v, &v);
+    for i in 2..D {
+        for k in 1..D {
+            vectors[i][k] = f64::from(u8::from(i == k)) - 2.0 * v[i] * v[k] / square;
+        }
+    }
+}
+
 /// A pair (x, z) inside the cone, and inside its dual.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair<const D: usize> {
@@ -275,14 +287,16 @@ impl<const D: usize> Scaling<D> {
         }
         if D == 3 {
             (vectors[2][1], vectors[2][2]) = (-t[2], t[1]);
+        } else if D > 3 {
+            across(&t, &mut vectors);
         }
         // The coordinates of x and z by margins: plain products would lose the small ones.
         let coordinates = |p: &Inner<D>| {
             let mut y = [0.0; D];
             y[0] = half * p.along(&t);
             y[1] = half * p.along(&t.map(|v| -v));
-            if D == 3 {
-                y[2] = p.tangential() * (0..D).map(|k| vectors[2][k] * p.t[k]).sum::<f64>();
+            for i in 2..D {
+                y[i] = p.tangential() * (0..D).map(|k| vectors[i][k] * p.t[k]).sum::<f64>();
             }
             y
         };

@@ -8,46 +8,47 @@
 
 use nonsmooth_linalg::{norm, small};
 
-use crate::contact::form::{Blockwise, Contacts, Frictional};
-use crate::contact::law::Coulomb;
+use crate::contact::form::{Blockwise, Disked};
+use crate::contact::law::DiskLaw;
 use crate::contact::law::cfun::natural_residual;
-use crate::contact::law::local::{Exact, LocalSolver, frictionless};
+use crate::contact::law::local::{LocalSolver, frictionless};
 
 /// What sweeps keep for each contact.
-#[derive(Debug, Clone, Default)]
-pub struct Sweep<const D: usize> {
-    contacts: Vec<Visited<D>>,
+#[derive(Debug, Clone)]
+pub struct Sweep<L: DiskLaw<D>, const D: usize> {
+    contacts: Vec<Visited<L, D>>,
 }
 
 #[derive(Debug, Clone)]
-struct Visited<const D: usize> {
+struct Visited<L: DiskLaw<D>, const D: usize> {
     w: [[f64; D]; D],
-    mu: f64,
+    law: L,
     /// `tr(W_cc)/D`.
     unit: f64,
-    memo: <Exact as LocalSolver<D>>::Memo,
+    memo: <L::Local as LocalSolver<D, L>>::Memo,
 }
 
-impl<const D: usize> Sweep<D> {
+impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
     /// Sweeps over `problem`'s contacts.
-    pub fn new<P: Contacts<D> + Frictional<D>>(problem: &P, state: &P::State) -> Self {
-        let mut sweep = Self { contacts: Vec::with_capacity(problem.mu().len()) };
+    pub fn new<P: Disked<D, Law = L>>(problem: &P, state: &P::State) -> Self {
+        let mut sweep = Self { contacts: Vec::with_capacity(problem.contacts()) };
         sweep.fill(problem, state);
         sweep
     }
 
     /// Takes another problem; allocates nothing where the number of contacts is the same.
-    pub fn fill<P: Contacts<D> + Frictional<D>>(&mut self, problem: &P, state: &P::State) {
+    pub fn fill<P: Disked<D, Law = L>>(&mut self, problem: &P, state: &P::State) {
         self.contacts.clear();
-        for (c, &mu) in problem.mu().iter().enumerate() {
-            let w = problem.diagonal_block(state, c);
+        for c in 0..problem.contacts() {
+            let (w, law) = (problem.diagonal_block(state, c), problem.law(c));
             let unit = small::mean_diagonal(&w).abs();
-            self.contacts.push(Visited { w, mu, unit, memo: Exact.prepare(&w, Coulomb { mu }) });
+            let memo = L::Local::default().prepare(&w, law);
+            self.contacts.push(Visited { w, law, unit, memo });
         }
     }
 
     /// One sweep on `r`, which `state` must know already (`enter`); returns `Σ (w_c‖Δr_c‖)²`, `w_c = tr(W_cc)/D`.
-    pub fn sweep<P: Blockwise<D> + Frictional<D>>(
+    pub fn sweep<P: Blockwise<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -61,10 +62,11 @@ impl<const D: usize> Sweep<D> {
             for k in 0..D {
                 q[k] -= own[k];
             }
-            let new = if contact.mu > 0.0 {
-                Exact.solve(&mut contact.memo, &contact.w, &q, Coulomb { mu: contact.mu }, &old)
-            } else {
+            let new = if contact.law.is_frictionless() {
                 frictionless(&contact.w, &q, &old)
+            } else {
+                let local = L::Local::default();
+                local.solve(&mut contact.memo, &contact.w, &q, contact.law, &old)
             };
             let mut dr = new;
             for k in 0..D {
@@ -81,7 +83,8 @@ impl<const D: usize> Sweep<D> {
 
     /// `max_c w_c‖r_c‖`, a velocity.
     pub fn largest(&self, r: &[f64]) -> f64 {
-        let of = |(c, contact): (usize, &Visited<D>)| contact.unit * norm(&small::block::<D>(r, c));
+        let of =
+            |(c, contact): (usize, &Visited<L, D>)| contact.unit * norm(&small::block::<D>(r, c));
         self.contacts.iter().enumerate().map(of).fold(0.0, f64::max)
     }
 
@@ -90,7 +93,7 @@ impl<const D: usize> Sweep<D> {
         let mut sum = 0.0;
         for (c, contact) in self.contacts.iter().enumerate() {
             let (u, r) = (small::block::<D>(u, c), small::block(r, c));
-            sum += natural_residual(contact.unit, &r, &u, contact.mu);
+            sum += natural_residual(contact.unit, &r, &u, contact.law);
         }
         sum.sqrt()
     }
@@ -107,7 +110,7 @@ mod tests {
     /// Sweeps until they no longer move; the distance to the planted solution.
     fn distance<const D: usize, P>(problem: &P, known: &[f64]) -> f64
     where
-        P: Blockwise<D> + Frictional<D> + Problem,
+        P: Blockwise<D> + Disked<D> + Problem,
     {
         let mut point = problem.origin();
         let mut state = problem.state(Access::Visits).unwrap();

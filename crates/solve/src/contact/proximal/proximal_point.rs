@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Boxed;
-use crate::contact::form::{Access, Frictional, Linear, Overwrite, Regularised};
+use crate::contact::form::{Access, Disked, Linear, Overwrite, Regularised};
 use crate::contact::law::cfun::natural_residual;
 use crate::core::ranges::{at_least, below, positive};
 use crate::core::register::{Composed, Registered};
@@ -88,7 +88,7 @@ pub struct Proximal<const D: usize>;
 
 impl<P, const D: usize> Composed<P> for Proximal<D>
 where
-    P: Linear<D> + Frictional<D> + Overwrite + Send + 'static,
+    P: Linear<D> + Disked<D> + Overwrite + Send + 'static,
     Regularised<P>: Registered<Point = P::Point> + Linear<D>,
 {
     type To = Regularised<P>;
@@ -101,6 +101,8 @@ where
         Kind::FrictionLocal3d,
         Kind::FrictionGlobal2d,
         Kind::FrictionGlobal3d,
+        Kind::RollingLocal3d,
+        Kind::RollingGlobal3d,
     ];
     const CITES: &'static [&'static str] = &["Rockafellar1976", "AcaryBremondHuber2018"];
     const KEYS: &'static str = "prox_";
@@ -127,7 +129,7 @@ pub struct Outer<S, const D: usize> {
 }
 
 /// The inner problem with its workspace and point, and what the outer loop measures with.
-pub struct OuterWork<P: Linear<D> + Frictional<D>, S: Solver<Regularised<P>>, const D: usize> {
+pub struct OuterWork<P: Linear<D> + Disked<D>, S: Solver<Regularised<P>>, const D: usize> {
     problem: Regularised<P>,
     work: S::Work,
     point: P::Point,
@@ -152,14 +154,14 @@ const FAILURES_MOST: usize = 20;
 
 impl<P, S, const D: usize> Solver<P> for Outer<S, D>
 where
-    P: Linear<D> + Frictional<D> + Overwrite + Send,
+    P: Linear<D> + Disked<D> + Overwrite + Send,
     S: Solver<Regularised<P>>,
 {
     type Work = OuterWork<P, S, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
         let state = problem.state(Access::Products)?;
-        let (mut unit, m) = (vec![], D * problem.mu().len());
+        let (mut unit, m) = (vec![], D * problem.contacts());
         units(problem, &state, &mut unit);
         let alpha = self.settings.prox_alpha;
         let weight = unit.iter().map(|w| alpha * w).collect();
@@ -184,7 +186,7 @@ where
     fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
         problem.refill(&mut work.state)?;
         units(problem, &work.state, &mut work.unit);
-        let m = D * problem.mu().len();
+        let m = D * problem.contacts();
         work.u.resize(m, 0.0);
         work.problem.center.resize(m, 0.0);
         work.problem.base.overwrite(problem);
@@ -259,7 +261,7 @@ impl<S, const D: usize> Outer<S, D> {
     /// Begins an inner problem around the present point: another problem, which the inner solver must be told of.
     fn begin<P>(&self, work: &mut OuterWork<P, S, D>) -> Result<(), SolveError>
     where
-        P: Linear<D> + Frictional<D>,
+        P: Linear<D> + Disked<D>,
         S: Solver<Regularised<P>>,
     {
         (work.steps, work.since) = (0, 0);
@@ -282,7 +284,7 @@ impl<S, const D: usize> Outer<S, D> {
     }
 }
 
-impl<P: Linear<D> + Frictional<D>, S: Solver<Regularised<P>>, const D: usize> OuterWork<P, S, D> {
+impl<P: Linear<D> + Disked<D>, S: Solver<Regularised<P>>, const D: usize> OuterWork<P, S, D> {
     fn weigh(&mut self, alpha: f64) {
         self.alpha = alpha;
         self.problem.weight.clear();
@@ -295,15 +297,16 @@ impl<P: Linear<D> + Frictional<D>, S: Solver<Regularised<P>>, const D: usize> Ou
         let r = P::impulses(point);
         problem.base.velocities(state, r, u);
         let (mut own, mut inner) = (0.0, 0.0);
-        for (c, (&mu, &w)) in problem.base.mu().iter().zip(&*unit).enumerate() {
+        for (c, &w) in unit.iter().enumerate() {
+            let law = problem.base.law(c);
             let r_c: [f64; D] = small::block(r, c);
             let mut u_c: [f64; D] = small::block(u, c);
-            own += natural_residual(w, &r_c, &u_c, mu);
+            own += natural_residual(w, &r_c, &u_c, law);
             let weight = problem.weight[c];
             for k in 0..D {
                 u_c[k] += weight * (r_c[k] - problem.center[D * c + k]);
             }
-            inner += natural_residual(w + weight, &r_c, &u_c, mu);
+            inner += natural_residual(w + weight, &r_c, &u_c, law);
         }
         let scale = problem.base.velocity_scale(state);
         (own.sqrt() / scale, inner.sqrt() / scale)
@@ -311,12 +314,12 @@ impl<P: Linear<D> + Frictional<D>, S: Solver<Regularised<P>>, const D: usize> Ou
 }
 
 /// `w_c`, positive.
-fn units<P: Linear<D> + Frictional<D>, const D: usize>(
+fn units<P: Linear<D> + Disked<D>, const D: usize>(
     problem: &P,
     state: &P::State,
     unit: &mut Vec<f64>,
 ) {
-    let n = problem.mu().len();
+    let n = problem.contacts();
     unit.clear();
     unit.extend((0..n).map(|c| small::mean_diagonal(&problem.diagonal_block(state, c))));
     let mean = unit.iter().sum::<f64>() / n as f64;

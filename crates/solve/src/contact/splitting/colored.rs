@@ -23,8 +23,9 @@ use serde::{Deserialize, Serialize};
 
 use super::circles::Circles;
 use super::contact::{Answer, Contact, ContactOf, NEGLIGIBLE};
-use super::nsgs::{LocalChoice, with_local};
-use crate::contact::form::{Access, Concurrent, Frictional};
+use super::nsgs::{LocalChoice, with_local, with_rolling_local};
+use crate::contact::form::{Access, Concurrent, Disked, Frictional};
+use crate::contact::law::Rolling;
 use crate::contact::law::local::LocalSolver;
 use crate::contact::splitting::coloring::Coloring;
 use crate::contact::splitting::team::Team;
@@ -103,6 +104,13 @@ impl Colored {
         self,
     ) -> Boxed<P> {
         with_local!(self.local, local => Boxed::new(ColoredSweeps { settings: self, local }))
+    }
+
+    /// The same with rolling friction.
+    pub(crate) fn rolling<P: Concurrent<D> + Disked<D, Law = Rolling> + 'static, const D: usize>(
+        self,
+    ) -> Boxed<P> {
+        with_rolling_local!(self.local, local => Boxed::new(ColoredSweeps { settings: self, local }))
     }
 }
 

@@ -23,7 +23,8 @@ use nonsmooth_linalg::small;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::form::{Access, Blockwise, Frictional};
+use crate::contact::form::{Access, Blockwise, Disked, Frictional};
+use crate::contact::law::Rolling;
 use crate::contact::law::cone::ConvexSet;
 use crate::contact::law::local::LocalSolver;
 use crate::contact::parts::{Accelerator, put_within_bounds, sweep_rows};
@@ -87,10 +88,10 @@ const ANDERSON_MOST: usize = 50;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum LocalChoice {
-    /// Cases, and a bracketed one-parameter root for sliding.
+    /// Cases, and a bracketed one-parameter root for sliding; with rolling friction Newton with safeguards.
     #[default]
     Exact,
-    /// Cases, and all roots of the quartic for sliding.
+    /// Cases, and all roots of the quartic for sliding; with rolling friction there is no quartic, and this is `exact`.
     Quartic,
     /// Safeguarded Newton on the Alart-Curnier function.
     NewtonAc,
@@ -209,12 +210,50 @@ macro_rules! with_local {
 }
 pub(super) use with_local;
 
+/// The same with rolling friction, whose contact has one solution by cases and Newton whatever is meant by exact.
+macro_rules! with_rolling_local {
+    ($choice:expr, $local:ident => $body:expr) => {{
+        use $crate::contact::law::cfun::Disk;
+        use $crate::contact::law::local::{Newton, Projection, ProjectionIterated, RollingExact};
+        match $choice {
+            LocalChoice::Exact | LocalChoice::Quartic => {
+                let $local = RollingExact;
+                $body
+            }
+            LocalChoice::NewtonAc => {
+                let $local = Newton::new(Disk::AlartCurnier);
+                $body
+            }
+            LocalChoice::NewtonJm => {
+                let $local = Newton::new(Disk::JeanMoreau);
+                $body
+            }
+            LocalChoice::Projection => {
+                let $local = Projection::default();
+                $body
+            }
+            LocalChoice::ProjectionIterated => {
+                let $local = ProjectionIterated::default();
+                $body
+            }
+        }
+    }};
+}
+pub(super) use with_rolling_local;
+
 impl Nsgs {
     /// The method with its local solver known by type.
     pub(crate) fn boxed<P: Blockwise<D> + Frictional<D> + 'static, const D: usize>(
         self,
     ) -> Boxed<P> {
         with_local!(self.local, local => Boxed::new(Sweeps { settings: self, local }))
+    }
+
+    /// The same with rolling friction.
+    pub(crate) fn rolling<P: Blockwise<D> + Disked<D, Law = Rolling> + 'static, const D: usize>(
+        self,
+    ) -> Boxed<P> {
+        with_rolling_local!(self.local, local => Boxed::new(Sweeps { settings: self, local }))
     }
 }
 

@@ -40,7 +40,9 @@ impl Held {
 
 impl Dynamics {
     /// Factorises. Errors: a singular M, by the component at fault.
-    pub fn new<const D: usize, L: Law<D>>(problem: &FrictionGlobal<D, L>) -> Result<Self, ProblemError> {
+    pub fn new<const D: usize, L: Law<D>>(
+        problem: &FrictionGlobal<D, L>,
+    ) -> Result<Self, ProblemError> {
         let held = problem.rows.as_ref().and_then(Held::new);
         let inverse = match (&problem.rows, &held) {
             (None, _) => Inverse::new(&problem.M, "M")?,

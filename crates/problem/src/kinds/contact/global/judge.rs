@@ -3,14 +3,14 @@
 use crate::check::proof::{Exactly, bounded, exacts, just, monotone};
 use crate::check::rows::{Rows, doubt};
 use crate::check::{
-    ConeSystem, ContactStatus, Judged, Kinematic, Kinematics, Law, Measure, Monotone,
-    StatusCounts, Verdict, over,
+    ConeSystem, ContactStatus, Judged, Kinematic, Kinematics, Law, Measure, Monotone, StatusCounts,
+    Verdict, over,
 };
+use crate::kinds::contact::judge::Weighed;
 use crate::kinds::contact::judge::gauge::{HALF_ULP, LawGauge, largest, unit, verdict, worst};
 use crate::kinds::contact::judge::loads::ROUNDING;
-use crate::kinds::contact::judge::Weighed;
 use crate::kinds::contact::judge::statement::{contacts, opposite, under};
-use crate::kinds::contact::judge::weighed::{arm, as_given, impulses, velocities, weight};
+use crate::kinds::contact::judge::weighed::{arm, as_given, divide, multiply, weight};
 use crate::kinds::contact::law::RollingData;
 use crate::{Dynamics, FrictionGlobal, GlobalPoint, Problem, ProblemError};
 use nonsmooth_linalg::{Csc, Delassus, Doubled, Inverse, Refine, norm, norm_of, small};
@@ -143,7 +143,9 @@ impl Reach {
 }
 
 impl GlobalGauge {
-    pub(crate) fn new<const D: usize, L: Law<D>>(problem: &FrictionGlobal<D, L>) -> Result<Self, ProblemError> {
+    pub(crate) fn new<const D: usize, L: Law<D>>(
+        problem: &FrictionGlobal<D, L>,
+    ) -> Result<Self, ProblemError> {
         let dynamics = Dynamics::new(problem)?;
         // W = Hᵀ M⁻¹ H and q = Hᵀ M⁻¹ f + w are those of the free dynamics, with bilateral rows apart.
         let free = match problem.rows {
@@ -365,11 +367,11 @@ impl GlobalGauge {
     ) -> Measure {
         let Some(arms) = problem.arms() else { return self.measure(problem, point, precisely) };
         let mut inner = point.clone();
-        impulses::<D>(&arms, &mut inner.r);
+        divide::<D>(&arms, &mut inner.r);
         let mut measure = self.measure(&problem.weighed(&arms), &inner, precisely);
         let (mut u, mut q) = (self.u.clone(), self.q.clone());
-        impulses::<D>(&arms, &mut u);
-        impulses::<D>(&arms, &mut q);
+        divide::<D>(&arms, &mut u);
+        divide::<D>(&arms, &mut q);
         as_given(&mut measure, (&point.r, &u, norm(&q)), |c| problem.law(c));
         measure
     }
@@ -444,11 +446,10 @@ impl<const D: usize, L: Law<D>> Judged for FrictionGlobal<D, L> {
             return verdict::<_, D>(measure, &gauge.law, &point.r, u, |c| self.law(c), tolerance);
         };
         let mut r = point.r.clone();
-        impulses::<D>(&arms, &mut r);
+        divide::<D>(&arms, &mut r);
         let weighed = self.weighed(&arms);
-        let mut found =
-            verdict::<_, D>(measure, &gauge.law, &r, u, |c| weighed.law(c), tolerance);
-        impulses::<D>(&arms, &mut found.velocity);
+        let mut found = verdict::<_, D>(measure, &gauge.law, &r, u, |c| weighed.law(c), tolerance);
+        divide::<D>(&arms, &mut found.velocity);
         found
     }
 }
@@ -539,13 +540,25 @@ impl<const D: usize, L: Law<D>> Weighed for FrictionGlobal<D, L> {
 
     fn weighed(&self, arms: &[f64]) -> Self {
         let entries = self.H.triplets().map(|(i, j, x)| (i, j, weight::<D>(arms, j) * x));
-        let h = Csc::from_triplets(self.H.nrows(), self.H.ncols(), entries.collect::<Vec<_>>().into_iter());
+        let h = Csc::from_triplets(
+            self.H.nrows(),
+            self.H.ncols(),
+            entries.collect::<Vec<_>>().into_iter(),
+        );
         let mut out = Self {
             H: h.expect("in range"),
             mu_r: self.mu_r.scaled(|c| 1.0 / arms[c]),
             ..self.clone()
         };
-        velocities::<D>(arms, &mut out.w);
+        multiply::<D>(arms, &mut out.w);
         out
+    }
+
+    fn weigh(arms: &[f64], r: &mut [f64]) {
+        divide::<D>(arms, r);
+    }
+
+    fn unweigh(arms: &[f64], r: &mut [f64]) {
+        multiply::<D>(arms, r);
     }
 }

@@ -319,12 +319,22 @@ mod tests {
         let pressed = Coulomb { mu: 0.0 }.status(&[1.0, 0.0, 0.0], &[0.0, 0.0, 0.0], 1e-9);
         assert_eq!(
             pressed,
-            ContactStatus { status: Motion::Slip, at_limit: false, degenerate: false, rolls: false }
+            ContactStatus {
+                status: Motion::Slip,
+                at_limit: false,
+                degenerate: false,
+                rolls: false
+            }
         );
         let open = Coulomb { mu: 0.0 }.status(&[0.0; 3], &[1.0, 5.0, 0.0], 1e-9);
         assert_eq!(
             open,
-            ContactStatus { status: Motion::Open, at_limit: false, degenerate: false, rolls: false }
+            ContactStatus {
+                status: Motion::Open,
+                at_limit: false,
+                degenerate: false,
+                rolls: false
+            }
         );
     }
 

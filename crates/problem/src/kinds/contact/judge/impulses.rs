@@ -50,7 +50,10 @@ impl Impulses {
 }
 
 /// Whether the impulses refute the problem, if only up to rounding.
-pub(crate) fn holds<const D: usize, L: Law<D>>(problem: &FrictionGlobal<D, L>, certificate: &Impulses) -> bool {
+pub(crate) fn holds<const D: usize, L: Law<D>>(
+    problem: &FrictionGlobal<D, L>,
+    certificate: &Impulses,
+) -> bool {
     problem.kinematics().refutes(certificate)
 }
 

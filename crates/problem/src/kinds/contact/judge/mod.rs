@@ -11,4 +11,4 @@ pub(super) mod weighed;
 pub use contact::{ContactStatus, Law, Motion};
 pub use impulses::Impulses;
 pub(super) use impulses::holds;
-pub(super) use weighed::Weighed;
+pub use weighed::Weighed;

@@ -77,8 +77,7 @@ impl<const D: usize> Law<D> for Rolling {
 
     fn modified_velocity<T: Real>(self, u: &[T; D]) -> [T; D] {
         let mut modified = *u;
-        modified[0] =
-            modified[0] + T::from(self.mu) * size(u, 0) + T::from(self.mu_r) * size(u, 1);
+        modified[0] = modified[0] + T::from(self.mu) * size(u, 0) + T::from(self.mu_r) * size(u, 1);
         modified
     }
 
@@ -157,8 +156,7 @@ impl<const D: usize> Law<D> for Rolling {
         let y = difference(x, modified);
         let (a, b) = (size(&y, 0), size(&y, 1));
         let margin = (1.0 + mu + mu_r) * error;
-        (a - mu * y[0] < -margin && b - mu_r * y[0] < -margin)
-            || y[0] + mu * a + mu_r * b < -margin
+        (a - mu * y[0] < -margin && b - mu_r * y[0] < -margin) || y[0] + mu * a + mu_r * b < -margin
     }
 
     /// As of Coulomb's law, each disk by itself: the angular velocity is compared with its moment.
@@ -180,13 +178,11 @@ impl<const D: usize> Law<D> for Rolling {
     /// Open, or by what slides; and whether it rolls.
     fn status(self, x: &[f64; D], modified: &[f64; D], margin: f64) -> ContactStatus {
         let y = difference(x, modified);
-        let into_polar =
-            (-y[0] - self.mu * size(&y, 0) - self.mu_r * size(&y, 1)) / self.secant();
-        let into =
-            [0, 1].map(|disk| {
-                let coefficient = Law::<D>::coefficient(self, disk);
-                (coefficient * y[0] - size(&y, disk)) / 1.0.hypot(coefficient)
-            });
+        let into_polar = (-y[0] - self.mu * size(&y, 0) - self.mu_r * size(&y, 1)) / self.secant();
+        let into = [0, 1].map(|disk| {
+            let coefficient = Law::<D>::coefficient(self, disk);
+            (coefficient * y[0] - size(&y, disk)) / 1.0.hypot(coefficient)
+        });
         let rests = |disk: usize| into[disk] >= 0.0 || size(modified, disk) <= margin;
         let rough = self.mu > 0.0;
         let status = if into_polar >= 0.0 {
@@ -196,9 +192,8 @@ impl<const D: usize> Law<D> for Rolling {
         } else {
             Motion::Slip
         };
-        let near = |disk: usize| {
-            Law::<D>::coefficient(self, disk) > 0.0 && into[disk].abs() <= margin
-        };
+        let near =
+            |disk: usize| Law::<D>::coefficient(self, disk) > 0.0 && into[disk].abs() <= margin;
         ContactStatus {
             status,
             at_limit: status == Motion::Stick && (near(0) || into[0] < 0.0),

@@ -8,13 +8,19 @@ use super::contact::{Law, length};
 use crate::check::Measure;
 use nonsmooth_linalg::{norm, power_of_two, small};
 
-/// A contact problem that can be stated in units of velocity.
-pub(crate) trait Weighed: Sized {
+/// A contact problem that can be stated in units of velocity: `u' = D u`, `r = D r'` with `D_c = diag(1, 1, 1, ℓ_c, ℓ_c)`, a change of units without any rounding.
+pub trait Weighed: Sized {
     /// ℓ_c, a power of two, of each contact; nothing without rolling friction.
     fn arms(&self) -> Option<Vec<f64>>;
 
-    /// The problem in u'.
+    /// The problem in u'. Cost: a copy.
     fn weighed(&self, arms: &[f64]) -> Self;
+
+    /// `r' = D⁻¹ r` in place of r; of velocities `u = D⁻¹ u'`.
+    fn weigh(arms: &[f64], r: &mut [f64]);
+
+    /// `r = D r'` in place of r'; of velocities `u' = D u`.
+    fn unweigh(arms: &[f64], r: &mut [f64]);
 }
 
 /// The arm from the traces of the blocks of the tangents and of rolling.
@@ -28,13 +34,13 @@ pub(crate) fn weight<const D: usize>(arms: &[f64], i: usize) -> f64 {
     if i % D > (D - 1) / 2 { arms[i / D] } else { 1.0 }
 }
 
-/// `x_i ← x_i · weight_i` for velocities, `x_i / weight_i` for impulses.
-pub(crate) fn velocities<const D: usize>(arms: &[f64], x: &mut [f64]) {
+/// `x_i ← x_i weight_i`.
+pub(crate) fn multiply<const D: usize>(arms: &[f64], x: &mut [f64]) {
     x.iter_mut().enumerate().for_each(|(i, x)| *x *= weight::<D>(arms, i));
 }
 
-/// See [`velocities`].
-pub(crate) fn impulses<const D: usize>(arms: &[f64], x: &mut [f64]) {
+/// `x_i ← x_i/weight_i`.
+pub(crate) fn divide<const D: usize>(arms: &[f64], x: &mut [f64]) {
     x.iter_mut().enumerate().for_each(|(i, x)| *x /= weight::<D>(arms, i));
 }
 

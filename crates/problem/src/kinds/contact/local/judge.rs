@@ -3,13 +3,13 @@
 use crate::check::proof::{Exactly, bounded, exacts, monotone};
 use crate::check::rows::{Rows, doubt};
 use crate::check::{
-    ConeSystem, ContactStatus, Judged, Kinematic, Kinematics, Law, Measure, Monotone,
-    StatusCounts, Verdict,
+    ConeSystem, ContactStatus, Judged, Kinematic, Kinematics, Law, Measure, Monotone, StatusCounts,
+    Verdict,
 };
-use crate::kinds::contact::judge::gauge::{HALF_ULP, LawGauge, largest, unit, verdict, worst};
 use crate::kinds::contact::judge::Weighed;
+use crate::kinds::contact::judge::gauge::{HALF_ULP, LawGauge, largest, unit, verdict, worst};
 use crate::kinds::contact::judge::statement::{contacts, opposite, under};
-use crate::kinds::contact::judge::weighed::{arm, as_given, impulses, velocities, weight};
+use crate::kinds::contact::judge::weighed::{arm, as_given, divide, multiply, weight};
 use crate::kinds::contact::law::RollingData;
 use crate::{FrictionLocal, LocalPoint, Problem, RowsLocal};
 use nonsmooth_linalg::{Csc, Doubled, Real, norm, power_of_two, small};
@@ -140,10 +140,10 @@ impl LocalGauge {
     ) -> Measure {
         let Some(arms) = problem.arms() else { return self.measure(problem, point, precisely) };
         let mut inner = point.clone();
-        impulses::<D>(&arms, &mut inner.r);
+        divide::<D>(&arms, &mut inner.r);
         let mut measure = self.measure(&problem.weighed(&arms), &inner, precisely);
         let mut u = self.u.clone();
-        impulses::<D>(&arms, &mut u);
+        divide::<D>(&arms, &mut u);
         as_given(&mut measure, (&point.r, &u, norm(&problem.q)), |c| problem.law(c));
         measure
     }
@@ -196,7 +196,11 @@ impl LocalGauge {
     }
 
     /// `u = W r + q + V λ`, entry by entry, without the solvers' kernels.
-    fn update_velocity<const D: usize, L: Law<D>>(&mut self, problem: &FrictionLocal<D, L>, point: &LocalPoint) {
+    fn update_velocity<const D: usize, L: Law<D>>(
+        &mut self,
+        problem: &FrictionLocal<D, L>,
+        point: &LocalPoint,
+    ) {
         let u = &mut self.u;
         for i in 0..problem.contacts() {
             let (cols, blocks) = problem.W.row(i);
@@ -232,7 +236,11 @@ impl LocalGauge {
     }
 
     /// What the rounding of r and λ to doubles alone makes of the residual, in the root mean square.
-    fn floor<const D: usize, L: Law<D>>(&mut self, problem: &FrictionLocal<D, L>, point: &LocalPoint) -> f64 {
+    fn floor<const D: usize, L: Law<D>>(
+        &mut self,
+        problem: &FrictionLocal<D, L>,
+        point: &LocalPoint,
+    ) -> f64 {
         let unit = power_of_two(self.law.unit());
         let per = 1.0 / unit;
         let squares = &mut self.u;
@@ -322,11 +330,10 @@ impl<const D: usize, L: Law<D>> Judged for FrictionLocal<D, L> {
             return verdict::<_, D>(measure, &gauge.law, &point.r, u, |c| self.law(c), tolerance);
         };
         let mut r = point.r.clone();
-        impulses::<D>(&arms, &mut r);
+        divide::<D>(&arms, &mut r);
         let weighed = self.weighed(&arms);
-        let mut found =
-            verdict::<_, D>(measure, &gauge.law, &r, u, |c| weighed.law(c), tolerance);
-        impulses::<D>(&arms, &mut found.velocity);
+        let mut found = verdict::<_, D>(measure, &gauge.law, &r, u, |c| weighed.law(c), tolerance);
+        divide::<D>(&arms, &mut found.velocity);
         found
     }
 }
@@ -355,7 +362,13 @@ impl<const D: usize, L: Law<D>> Kinematic<D> for FrictionLocal<D, L> {
             a if a < NOISE => a,
             _ => 0.0,
         };
-        Kinematics::new(&self.bordered(), constant.len(), constant, (&self.mu, self.mu_r.values()), noise)
+        Kinematics::new(
+            &self.bordered(),
+            constant.len(),
+            constant,
+            (&self.mu, self.mu_r.values()),
+            noise,
+        )
     }
 
     fn motion(point: &LocalPoint) -> Vec<f64> {
@@ -424,13 +437,25 @@ impl<const D: usize, L: Law<D>> Weighed for FrictionLocal<D, L> {
                 }
             }
         });
-        velocities::<D>(arms, &mut out.q);
+        multiply::<D>(arms, &mut out.q);
         out.mu_r = self.mu_r.scaled(|c| 1.0 / arms[c]);
         if let Some(rows) = &mut out.rows {
             let entries = rows.V.triplets().map(|(i, j, x)| (i, j, weight::<D>(arms, i) * x));
-            rows.V = Csc::from_triplets(rows.V.nrows(), rows.V.ncols(), entries.collect::<Vec<_>>().into_iter())
-                .expect("in range");
+            rows.V = Csc::from_triplets(
+                rows.V.nrows(),
+                rows.V.ncols(),
+                entries.collect::<Vec<_>>().into_iter(),
+            )
+            .expect("in range");
         }
         out
+    }
+
+    fn weigh(arms: &[f64], r: &mut [f64]) {
+        divide::<D>(arms, r);
+    }
+
+    fn unweigh(arms: &[f64], r: &mut [f64]) {
+        multiply::<D>(arms, r);
     }
 }

@@ -4,9 +4,9 @@ mod judge;
 
 pub use judge::LocalGauge;
 
+use crate::check::Law;
 use crate::check::{self, Certificate, ConeSystem, Evidence, Measure};
 use crate::error::{all_finite, friction_coefficients, rolling_coefficients, vector};
-use crate::check::Law;
 use crate::kinds::contact::judge::Weighed;
 use crate::kinds::contact::law::RollingData;
 use crate::{Bounds, Coulomb, Kind, Problem, ProblemError, Rolling};

@@ -8,13 +8,16 @@
 //!                             R = mu max(0, r_N)  (Jean–Moreau)
 //! ```
 //!
+//! With rolling friction there is a second disk, `Φ_R = r_R − P_{D(mu_r max(0, x_N))}(r_R − ρ_R u_R)`.
+//!
 //! Vanishes exactly at the solutions of `K* ∋ u + mu‖u_T‖e_N ⟂ r ∈ K`, for any ρ > 0.
 //! Source: AlartCurnier1991; Jean1999; Acary, lecture (88)–(94) with the Jacobian as corrected in docs/notation.md.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation, NewtonFunction, Radii};
+use super::{ContactFunction, Linearisation, NewtonFunction, OneContact, Radii};
+use crate::contact::law::DiskLaw;
 use crate::core::register::Named;
 use crate::core::settings::Settings;
 
@@ -65,9 +68,9 @@ impl NewtonFunction for AlartCurnier {
     };
 }
 
-impl<const D: usize> ContactFunction<D> for AlartCurnier {
-    fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
-        alart_curnier(Disk::AlartCurnier, u, r, law.mu, law.rho)
+impl<L: DiskLaw<D>, const D: usize> ContactFunction<D, L> for AlartCurnier {
+    fn linearise(&self, contact: &OneContact<L>, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
+        alart_curnier(Disk::AlartCurnier, u, r, contact.law, contact.rho)
     }
 }
 
@@ -82,9 +85,9 @@ impl NewtonFunction for JeanMoreau {
     };
 }
 
-impl<const D: usize> ContactFunction<D> for JeanMoreau {
-    fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
-        alart_curnier(Disk::JeanMoreau, u, r, law.mu, law.rho)
+impl<L: DiskLaw<D>, const D: usize> ContactFunction<D, L> for JeanMoreau {
+    fn linearise(&self, contact: &OneContact<L>, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
+        alart_curnier(Disk::JeanMoreau, u, r, contact.law, contact.rho)
     }
 }
 
@@ -100,11 +103,11 @@ enum Piece {
 }
 
 /// Evaluates the function and one element of its B-subdifferential.
-pub fn alart_curnier<const D: usize>(
+pub fn alart_curnier<L: DiskLaw<D>, const D: usize>(
     disk: Disk,
     u: &[f64; D],
     r: &[f64; D],
-    mu: f64,
+    law: L,
     rho: Radii,
 ) -> Linearisation<D> {
     let mut out = Linearisation::zero();
@@ -116,52 +119,54 @@ pub fn alart_curnier<const D: usize>(
         out.phi[0] = r[0];
         out.b[0][0] = 1.0;
     }
-
-    let mut x = [0.0; D];
-    for k in 1..D {
-        x[k] = r[k] - rho.tangential * u[k];
-    }
-    let size = x[1..].iter().map(|v| v * v).sum::<f64>().sqrt();
     let pressure = match disk {
         Disk::AlartCurnier => x_n,
         Disk::JeanMoreau => r[0],
     };
-    let radius = mu * pressure.max(0.0);
-    let piece = if radius <= 0.0 {
-        Piece::Open
-    } else if size <= radius {
-        Piece::Stick
-    } else {
-        Piece::Slip
-    };
-    match piece {
-        Piece::Stick => {
-            for k in 1..D {
-                out.phi[k] = rho.tangential * u[k];
-                out.a[k][k] = rho.tangential;
-            }
+    for which in 0..L::DISKS {
+        let (mu, rho_t) = (law.coefficient(which), rho.of_disk(which));
+        let mut x = [0.0; D];
+        for k in L::rows(which) {
+            x[k] = r[k] - rho_t * u[k];
         }
-        Piece::Open => {
-            for k in 1..D {
-                out.phi[k] = r[k];
-                out.b[k][k] = 1.0;
-            }
-        }
-        Piece::Slip => {
-            for k in 1..D {
-                let t_k = x[k] / size;
-                out.phi[k] = r[k] - radius * t_k;
-                // ∂R/∂r_N = mu in both variants; ∂R/∂u_N = −mu ρ_N with the Alart–Curnier disk.
-                out.b[k][0] = -mu * t_k;
-                if disk == Disk::AlartCurnier {
-                    out.a[k][0] = mu * rho.normal * t_k;
+        let size = x[L::rows(which)].iter().map(|v| v * v).sum::<f64>().sqrt();
+        let radius = mu * pressure.max(0.0);
+        let piece = if radius <= 0.0 {
+            Piece::Open
+        } else if size <= radius {
+            Piece::Stick
+        } else {
+            Piece::Slip
+        };
+        match piece {
+            Piece::Stick => {
+                for k in L::rows(which) {
+                    out.phi[k] = rho_t * u[k];
+                    out.a[k][k] = rho_t;
                 }
-                for l in 1..D {
-                    // R Γ(x_T), Γ = (I − t tᵀ)/‖x_T‖.
-                    let identity = f64::from(u8::from(k == l));
-                    let gamma = radius * (identity - t_k * x[l] / size) / size;
-                    out.a[k][l] = rho.tangential * gamma;
-                    out.b[k][l] = identity - gamma;
+            }
+            Piece::Open => {
+                for k in L::rows(which) {
+                    out.phi[k] = r[k];
+                    out.b[k][k] = 1.0;
+                }
+            }
+            Piece::Slip => {
+                for k in L::rows(which) {
+                    let t_k = x[k] / size;
+                    out.phi[k] = r[k] - radius * t_k;
+                    // ∂R/∂r_N = mu in both variants; ∂R/∂u_N = −mu ρ_N with the Alart–Curnier disk.
+                    out.b[k][0] = -mu * t_k;
+                    if disk == Disk::AlartCurnier {
+                        out.a[k][0] = mu * rho.normal * t_k;
+                    }
+                    for l in L::rows(which) {
+                        // R Γ(x_T), Γ = (I − t tᵀ)/‖x_T‖.
+                        let identity = f64::from(u8::from(k == l));
+                        let gamma = radius * (identity - t_k * x[l] / size) / size;
+                        out.a[k][l] = rho_t * gamma;
+                        out.b[k][l] = identity - gamma;
+                    }
                 }
             }
         }
@@ -172,6 +177,7 @@ pub fn alart_curnier<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::law::Coulomb;
 
     /// One point for each combination of pieces, away from kinks.
     const POINTS: [([f64; 3], [f64; 3], &str); 5] = [
@@ -184,10 +190,10 @@ mod tests {
 
     #[test]
     fn the_jacobian_agrees_with_finite_differences_on_every_piece() {
-        let rho = Radii { normal: 0.7, tangential: 1.3 };
+        let rho = Radii { normal: 0.7, tangential: 1.3, rolling: 1.3 };
         for disk in [Disk::AlartCurnier, Disk::JeanMoreau] {
             for (u, r, name) in POINTS {
-                let at = alart_curnier(disk, &u, &r, 0.6, rho);
+                let at = alart_curnier(disk, &u, &r, Coulomb { mu: 0.6 }, rho);
                 let h = 1e-6;
                 for l in 0..3 {
                     let step = |x: &[f64; 3], s: f64| {
@@ -195,7 +201,9 @@ mod tests {
                         y[l] += s;
                         y
                     };
-                    let phi = |u: &[f64; 3], r: &[f64; 3]| alart_curnier(disk, u, r, 0.6, rho).phi;
+                    let phi = |u: &[f64; 3], r: &[f64; 3]| {
+                        alart_curnier(disk, u, r, Coulomb { mu: 0.6 }, rho).phi
+                    };
                     let (up, um) = (phi(&step(&u, h), &r), phi(&step(&u, -h), &r));
                     let (rp, rm) = (phi(&u, &step(&r, h)), phi(&u, &step(&r, -h)));
                     for k in 0..3 {
@@ -211,7 +219,7 @@ mod tests {
     #[test]
     fn at_a_kink_the_jacobian_is_that_of_a_neighbouring_piece() {
         // ‖x_T‖ = R exactly: stick and slip meet.
-        let (rho, mu) = (Radii { normal: 1.0, tangential: 1.0 }, 0.5);
+        let (rho, mu) = (Radii::uniform(1.0), Coulomb { mu: 0.5 });
         let (u, r) = ([0.0; 3], [2.0, 0.6, 0.8]);
         for disk in [Disk::AlartCurnier, Disk::JeanMoreau] {
             let kink = alart_curnier(disk, &u, &r, mu, rho);
@@ -230,8 +238,8 @@ mod tests {
 
     #[test]
     fn vanishes_at_the_law_and_only_there() {
-        let rho = Radii { normal: 0.7, tangential: 1.3 };
-        let mu = 0.5;
+        let rho = Radii { normal: 0.7, tangential: 1.3, rolling: 1.3 };
+        let mu = Coulomb { mu: 0.5 };
         let law = [
             ([0.0; 3], [2.0, 0.3, 0.1]),
             ([0.0, 3.0, 4.0], [2.0, -0.6, -0.8]),

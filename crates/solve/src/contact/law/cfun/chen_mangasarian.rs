@@ -16,7 +16,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation, NewtonFunction, SelfDual};
+use super::{ContactFunction, Linearisation, NewtonFunction, OneContact, SelfDual};
 use crate::contact::law::cone::jordan;
 use crate::core::register::Named;
 use crate::core::settings::Settings;
@@ -58,7 +58,7 @@ impl Kernel {
     }
 }
 
-/// The smoothed natural map with the kernel given; ε is [`Law::smoothing`].
+/// The smoothed natural map with the kernel given; ε is [`OneContact::smoothing`].
 ///
 /// Newton's method on it is `newton_cm`: ChenMangasarian1996; FukushimaLuoTseng2001, section 4. Fails: as `newton_fb`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -89,19 +89,19 @@ impl NewtonFunction for ChenMangasarian {
 impl<const D: usize> ContactFunction<D> for ChenMangasarian {
     const SMOOTHED: bool = true;
 
-    fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
-        let part = |lambda: f64| self.kernel.positive_part(lambda, law.smoothing);
-        if law.mu <= 0.0 {
-            let y = law.rho_cone * u[0];
+    fn linearise(&self, contact: &OneContact, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
+        let part = |lambda: f64| self.kernel.positive_part(lambda, contact.smoothing);
+        if contact.law.mu <= 0.0 {
+            let y = contact.rho_cone * u[0];
             let mut out = Linearisation::zero();
             let (value, slope) = part(r[0] - y);
             out.phi[0] = if r[0] > y { y - part(y - r[0]).0 } else { r[0] - value };
-            out.a[0][0] = law.rho_cone * slope;
+            out.a[0][0] = contact.rho_cone * slope;
             out.b[0][0] = 1.0 - slope;
             out.set_no_friction(r);
             return out;
         }
-        let pair = SelfDual::new(law, u, r);
+        let pair = SelfDual::new(contact, u, r);
         let SelfDual { x, y, .. } = &pair;
         let mut z = *x;
         for k in 0..D {
@@ -134,6 +134,6 @@ impl<const D: usize> ContactFunction<D> for ChenMangasarian {
         for k in 0..D {
             rest[k][k] += 1.0;
         }
-        pair.pull_back(law.mu, phi, &rest, &slope)
+        pair.pull_back(contact.law.mu, phi, &rest, &slope)
     }
 }

@@ -15,7 +15,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation, NewtonFunction, SelfDual};
+use super::{ContactFunction, Linearisation, NewtonFunction, OneContact, SelfDual};
 use crate::contact::law::cone::jordan::{self, Spectral};
 use crate::core::register::Named;
 use crate::core::settings::Settings;
@@ -27,7 +27,7 @@ use crate::core::settings::Settings;
 #[serde(default)]
 pub struct FischerBurmeister {}
 
-/// Its smoothing, with ε from [`Law::smoothing`].
+/// Its smoothing, with ε from [`OneContact::smoothing`].
 ///
 /// Newton's method on it is `newton_fb_smooth`: FukushimaLuoTseng2001; Acary, lecture (117). Fails: as `newton_fb`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -46,8 +46,8 @@ impl NewtonFunction for FischerBurmeister {
 }
 
 impl<const D: usize> ContactFunction<D> for FischerBurmeister {
-    fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
-        function(&Law { smoothing: 0.0, ..*law }, u, r)
+    fn linearise(&self, contact: &OneContact, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
+        function(&OneContact { smoothing: 0.0, ..*contact }, u, r)
     }
 }
 
@@ -65,8 +65,8 @@ impl NewtonFunction for SmoothedFischerBurmeister {
 impl<const D: usize> ContactFunction<D> for SmoothedFischerBurmeister {
     const SMOOTHED: bool = true;
 
-    fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
-        function(law, u, r)
+    fn linearise(&self, contact: &OneContact, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
+        function(contact, u, r)
     }
 }
 
@@ -81,12 +81,12 @@ enum Formula<const D: usize> {
 /// The quotient is used where `L(x + y + z)` is conditioned better than this.
 const WELL_INSIDE: f64 = 0.01;
 
-fn function<const D: usize>(law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
-    let epsilon = law.smoothing;
-    if law.mu <= 0.0 {
-        return frictionless(law, u, r);
+fn function<const D: usize>(contact: &OneContact, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
+    let epsilon = contact.smoothing;
+    if contact.law.mu <= 0.0 {
+        return frictionless(contact, u, r);
     }
-    let pair = SelfDual::new(law, u, r);
+    let pair = SelfDual::new(contact, u, r);
     let SelfDual { x, y, .. } = &pair;
     let root = jordan::root_of_squares(x, y, epsilon);
     let z = root.point();
@@ -118,7 +118,7 @@ fn function<const D: usize>(law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisat
             phi
         }
     };
-    pair.pull_back(law.mu, phi, &one_minus(&root, x), &one_minus(&root, y))
+    pair.pull_back(contact.law.mu, phi, &one_minus(&root, x), &one_minus(&root, y))
 }
 
 /// `I − L(z)⁻¹ L(x)`.
@@ -136,14 +136,18 @@ fn one_minus<const D: usize>(z: &Spectral<D>, x: &[f64; D]) -> [[f64; D]; D] {
 }
 
 /// `x + y − √(x² + y² + 2ε²)` with `x = r_N`, `y = ρ u_N`; `Φ_T = r_T`.
-fn frictionless<const D: usize>(law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
-    let (x, y, epsilon) = (r[0], law.rho_cone * u[0], law.smoothing);
+fn frictionless<const D: usize>(
+    contact: &OneContact,
+    u: &[f64; D],
+    r: &[f64; D],
+) -> Linearisation<D> {
+    let (x, y, epsilon) = (r[0], contact.rho_cone * u[0], contact.smoothing);
     let z = (x * x + y * y + 2.0 * epsilon * epsilon).sqrt();
     let mut out = Linearisation::zero();
     let (cx, cy) = if z > 0.0 { (x / z, y / z) } else { (0.0, 0.0) };
     out.phi[0] =
         if x + y > 0.0 { 2.0 * (x * y - epsilon * epsilon) / (x + y + z) } else { x + y - z };
-    out.a[0][0] = law.rho_cone * (1.0 - cy);
+    out.a[0][0] = contact.rho_cone * (1.0 - cy);
     out.b[0][0] = 1.0 - cx;
     out.set_no_friction(r);
     out

@@ -17,7 +17,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation, NewtonFunction};
+use super::{ContactFunction, Linearisation, NewtonFunction, OneContact};
 use crate::contact::law::cone::tangential_norm;
 use crate::core::register::Named;
 use crate::core::settings::Settings;
@@ -62,8 +62,8 @@ impl NewtonFunction for HueberStadlerWohlmuth {
 }
 
 impl<const D: usize> ContactFunction<D> for HueberStadlerWohlmuth {
-    fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
-        let Law { mu, rho, .. } = *law;
+    fn linearise(&self, contact: &OneContact, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
+        let (mu, rho) = (contact.law.mu, contact.rho);
         let mut out = Linearisation::zero();
         let x_n = r[0] - rho.normal * u[0];
         if x_n > 0.0 {
@@ -132,22 +132,23 @@ impl<const D: usize> ContactFunction<D> for HueberStadlerWohlmuth {
 mod tests {
     use super::super::Radii;
     use super::*;
+    use crate::contact::law::Coulomb;
 
     /// `(r_N − max(0, x_N), C)`, from the definition.
-    fn raw(law: &Law, u: &[f64; 3], r: &[f64; 3]) -> [f64; 3] {
+    fn raw(law: &OneContact, u: &[f64; 3], r: &[f64; 3]) -> [f64; 3] {
         let x: [f64; 3] = std::array::from_fn(|k| {
             r[k] - if k == 0 { law.rho.normal } else { law.rho.tangential } * u[k]
         });
-        let (radius, size) = (law.mu * x[0].max(0.0), x[1].hypot(x[2]));
+        let (radius, size) = (law.law.mu * x[0].max(0.0), x[1].hypot(x[2]));
         let m = radius.max(size);
         [r[0] - x[0].max(0.0), m * r[1] - radius * x[1], m * r[2] - radius * x[2]]
     }
 
     #[test]
     fn the_exact_block_is_the_derivative_of_the_product_form() {
-        let law = Law {
-            mu: 0.6,
-            rho: Radii { normal: 0.7, tangential: 1.3 },
+        let law = OneContact {
+            law: Coulomb { mu: 0.6 },
+            rho: Radii { normal: 0.7, tangential: 1.3, rolling: 1.3 },
             rho_cone: 1.0,
             smoothing: 0.0,
         };
@@ -182,9 +183,9 @@ mod tests {
 
     #[test]
     fn the_modified_block_is_exact_at_a_sliding_solution() {
-        let law = Law {
-            mu: 0.5,
-            rho: Radii { normal: 0.7, tangential: 1.3 },
+        let law = OneContact {
+            law: Coulomb { mu: 0.5 },
+            rho: Radii { normal: 0.7, tangential: 1.3, rolling: 1.3 },
             rho_cone: 1.0,
             smoothing: 0.0,
         };

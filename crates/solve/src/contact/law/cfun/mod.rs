@@ -9,7 +9,7 @@ mod natural_map;
 mod park_kwak;
 mod xuewen_soh_wanji;
 
-use crate::contact::law::cone;
+use crate::contact::law::{Coulomb, DiskLaw, cone};
 use crate::core::register::Named;
 use crate::core::settings::Settings;
 
@@ -28,13 +28,53 @@ pub struct Radii {
     pub normal: f64,
     /// ρ_T.
     pub tangential: f64,
+    /// ρ_R; no law without rolling friction looks at it.
+    pub rolling: f64,
+}
+
+impl Radii {
+    /// One for all parts.
+    pub fn uniform(rho: f64) -> Self {
+        Self { normal: rho, tangential: rho, rolling: rho }
+    }
+
+    /// From the block of W: of the normal part, and of each disk's block with all else zero.
+    pub fn of<L: DiskLaw<D>, const D: usize>(
+        w: &[[f64; D]; D],
+        normal: impl Fn(&[[f64; D]; D]) -> f64,
+        disk: impl Fn(&[[f64; D]; D]) -> f64,
+    ) -> Self {
+        let of = |which: usize| {
+            let mut part = [[0.0; D]; D];
+            for k in L::rows(which) {
+                for l in L::rows(which) {
+                    part[k][l] = w[k][l];
+                }
+            }
+            disk(&part)
+        };
+        let tangential = of(0);
+        let rolling = if L::DISKS > 1 { of(1) } else { tangential };
+        Self { normal: normal(w), tangential, rolling }
+    }
+
+    /// ρ of a disk.
+    #[inline(always)]
+    pub fn of_disk(&self, disk: usize) -> f64 {
+        if disk == 0 { self.tangential } else { self.rolling }
+    }
+
+    /// Whether all are positive numbers.
+    pub fn are_positive(&self) -> bool {
+        [self.normal, self.tangential, self.rolling].iter().all(|r| *r > 0.0 && r.is_finite())
+    }
 }
 
 /// One contact as a complementarity function sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Law {
-    /// mu of this contact; 0: no friction.
-    pub mu: f64,
+pub struct OneContact<L = Coulomb> {
+    /// The law with its coefficients.
+    pub law: L,
     /// What multiplies the velocity where its parts are treated apart.
     pub rho: Radii,
     /// What multiplies the velocity where it is treated as one vector.
@@ -70,14 +110,14 @@ impl<const D: usize> Linearisation<D> {
     }
 }
 
-/// A complementarity function of one contact: `Φ(u, r) = 0` exactly where `K* ∋ u + mu‖u_T‖e_N ⟂ r ∈ K`
-/// (for `smoothing = 0`).
-pub trait ContactFunction<const D: usize>: Send + Sync {
+/// A complementarity function of one contact under the law L: `Φ(u, r) = 0` exactly where `K* ∋ ũ ⟂ r ∈ K`, Coulomb's
+/// `ũ = u + mu‖u_T‖e_N` (for `smoothing = 0`).
+pub trait ContactFunction<const D: usize, L = Coulomb>: Send + Sync {
     /// Whether the function has a smoothing parameter.
     const SMOOTHED: bool = false;
 
     /// Φ with an element of its generalised Jacobian (or what the method puts in its place).
-    fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D>;
+    fn linearise(&self, contact: &OneContact<L>, u: &[f64; D], r: &[f64; D]) -> Linearisation<D>;
 }
 
 /// A function that has a Newton method. The struct is its hyperparameters.
@@ -114,9 +154,9 @@ struct SelfDual<const D: usize> {
 
 impl<const D: usize> SelfDual<D> {
     #[inline(always)]
-    fn new(law: &Law, u: &[f64; D], r: &[f64; D]) -> Self {
-        let (mu, rho) = (law.mu, law.rho_cone);
-        let (modified, t) = modified_velocity(u, mu, law.smoothing);
+    fn new(contact: &OneContact, u: &[f64; D], r: &[f64; D]) -> Self {
+        let (mu, rho) = (contact.law.mu, contact.rho_cone);
+        let (modified, t) = modified_velocity(u, mu, contact.smoothing);
         let (mut x, mut y, mut dy) = (*r, modified.map(|v| rho * v), [[0.0; D]; D]);
         x[0] *= mu;
         y[0] /= mu;

@@ -12,8 +12,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation, NewtonFunction, modified_velocity};
+use super::{ContactFunction, Linearisation, NewtonFunction, OneContact};
 use crate::contact::law::cone::{self, Region};
+use crate::contact::law::{ContactLaw, DiskLaw};
 use crate::core::register::Named;
 use crate::core::settings::Settings;
 
@@ -41,12 +42,17 @@ pub fn natural_map<const D: usize>(x: &[f64; D], modified: &[f64; D], mu: f64) -
     }
 }
 
-/// One contact's part of the natural residual, `‖w r − P_K(w r − ũ)‖²`, `ũ = u + mu‖u_T‖ e_N`.
+/// One contact's part of the natural residual, `‖w r − P_K(w r − ũ)‖²`.
 #[inline(always)]
-pub fn natural_residual<const D: usize>(w: f64, r: &[f64; D], u: &[f64; D], mu: f64) -> f64 {
+pub fn natural_residual<L: ContactLaw<D>, const D: usize>(
+    w: f64,
+    r: &[f64; D],
+    u: &[f64; D],
+    law: L,
+) -> f64 {
     let mut modified = *u;
-    modified[0] += mu * cone::tangential_norm(u);
-    natural_map(&r.map(|r| w * r), &modified, mu).iter().map(|v| v * v).sum()
+    modified[0] += law.shift(u);
+    law.natural(&r.map(|r| w * r), &modified).iter().map(|v| v * v).sum()
 }
 
 /// The natural map.
@@ -67,23 +73,25 @@ impl NewtonFunction for NaturalMap {
     };
 }
 
-impl<const D: usize> ContactFunction<D> for NaturalMap {
-    fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
-        let (mu, rho) = (law.mu, law.rho_cone);
-        let (modified, t) = modified_velocity(u, mu, 0.0);
+impl<L: DiskLaw<D>, const D: usize> ContactFunction<D, L> for NaturalMap {
+    fn linearise(&self, contact: &OneContact<L>, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
+        let (law, rho) = (contact.law, contact.rho_cone);
+        let mut modified = *u;
+        modified[0] += law.shift(u);
+        let t = law.slope(u);
         let scaled = modified.map(|v| rho * v);
         let mut out = Linearisation::zero();
-        out.phi = natural_map(r, &scaled, mu);
+        out.phi = law.natural(r, &scaled);
         let mut x = *r;
         for k in 0..D {
             x[k] -= scaled[k];
         }
-        // ∂Φ/∂r = I − P', ∂Φ/∂u = ρ P' ∂ũ/∂u, ∂ũ/∂u = I + mu e_N tᵀ.
-        let slope = cone::projection_jacobian(&x, mu);
+        // ∂Φ/∂r = I − P', ∂Φ/∂u = ρ P' ∂ũ/∂u, ∂ũ/∂u = I + e_N tᵀ, t = ∂shift/∂u.
+        let slope = law.jacobian(&x);
         for k in 0..D {
             for l in 0..D {
                 out.b[k][l] = f64::from(u8::from(k == l)) - slope[k][l];
-                out.a[k][l] = rho * (slope[k][l] + mu * slope[k][0] * t[l]);
+                out.a[k][l] = rho * (slope[k][l] + slope[k][0] * t[l]);
             }
         }
         out

@@ -23,7 +23,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation, NewtonFunction};
+use super::{ContactFunction, Linearisation, NewtonFunction, OneContact};
 use crate::contact::law::cone::tangential_norm;
 use crate::core::register::Named;
 use crate::core::settings::Settings;
@@ -58,8 +58,8 @@ impl NewtonFunction for ParkKwak {
 }
 
 impl<const D: usize> ContactFunction<D> for ParkKwak {
-    fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
-        let Law { mu, rho, .. } = *law;
+    fn linearise(&self, contact: &OneContact, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
+        let (mu, rho) = (contact.law.mu, contact.rho);
         let mut out = Linearisation::zero();
         let x_n = r[0] - rho.normal * u[0];
         if x_n > 0.0 {

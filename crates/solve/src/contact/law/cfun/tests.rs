@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 
 use super::*;
 
-type Function<const D: usize> = Box<dyn Fn(&Law, &[f64; D], &[f64; D]) -> Linearisation<D>>;
+type Function<const D: usize> = Box<dyn Fn(&OneContact, &[f64; D], &[f64; D]) -> Linearisation<D>>;
 
 fn boxed<F: ContactFunction<D> + 'static, const D: usize>(f: F) -> Function<D> {
     Box::new(move |law, u, r| f.linearise(law, u, r))
@@ -35,8 +35,13 @@ fn all<const D: usize>() -> Vec<(&'static str, Function<D>)> {
     all
 }
 
-fn law(mu: f64, smoothing: f64) -> Law {
-    Law { mu, rho: Radii { normal: 0.7, tangential: 1.3 }, rho_cone: 0.9, smoothing }
+fn law(mu: f64, smoothing: f64) -> OneContact {
+    OneContact {
+        law: Coulomb { mu },
+        rho: Radii { normal: 0.7, tangential: 1.3, rolling: 1.3 },
+        rho_cone: 0.9,
+        smoothing,
+    }
 }
 
 fn vector<const D: usize>(rng: &mut Pcg64) -> [f64; D] {
@@ -194,7 +199,7 @@ fn lawful<const D: usize>(mu: f64, rng: &mut Pcg64) -> Vec<([f64; D], [f64; D])>
 }
 
 /// The distance by which the law is missed: the natural map.
-fn missed<const D: usize>(law: &Law, u: &[f64; D], r: &[f64; D]) -> f64 {
+fn missed<const D: usize>(law: &OneContact, u: &[f64; D], r: &[f64; D]) -> f64 {
     size(&NaturalMap {}.linearise(law, u, r).phi)
 }
 
@@ -251,9 +256,10 @@ fn smoothed_functions_tend_to_what_they_smooth() {
     let mut rng = Pcg64::seed_from_u64(4);
     for _ in 0..500 {
         let (u, r) = (vector::<3>(&mut rng), vector::<3>(&mut rng));
-        let of = |f: &dyn Fn(&Law) -> [f64; 3], e: f64| f(&law(0.6, e));
-        let fb = |law: &Law| SmoothedFischerBurmeister {}.linearise(law, &u, &r).phi;
-        let cm = |kernel| move |law: &Law| ChenMangasarian { kernel }.linearise(law, &u, &r).phi;
+        let of = |f: &dyn Fn(&OneContact) -> [f64; 3], e: f64| f(&law(0.6, e));
+        let fb = |law: &OneContact| SmoothedFischerBurmeister {}.linearise(law, &u, &r).phi;
+        let cm =
+            |kernel| move |law: &OneContact| ChenMangasarian { kernel }.linearise(law, &u, &r).phi;
         let limit = FischerBurmeister {}.linearise(&law(0.6, 0.0), &u, &r).phi;
         for e in [1e-1, 1e-3, 1e-6, 1e-300] {
             assert!(gap(&of(&fb, e), &limit) <= 5.0 * e + 1e-14);

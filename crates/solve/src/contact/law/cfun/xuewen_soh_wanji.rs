@@ -17,7 +17,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Law, Linearisation, NewtonFunction, direction};
+use super::{ContactFunction, Linearisation, NewtonFunction, OneContact, direction};
 use crate::contact::law::cone::tangential_norm;
 use crate::core::register::Named;
 use crate::core::settings::Settings;
@@ -54,23 +54,23 @@ impl NewtonFunction for XuewenSohWanji {
 }
 
 impl<const D: usize> ContactFunction<D> for XuewenSohWanji {
-    fn linearise(&self, law: &Law, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
+    fn linearise(&self, contact: &OneContact, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
         let mut out = Linearisation::zero();
-        match Smaller::of(law.rho.normal * u[0], r[0]) {
+        match Smaller::of(contact.rho.normal * u[0], r[0]) {
             Smaller::Velocity => {
-                out.phi[0] = law.rho.normal * u[0];
-                out.a[0][0] = law.rho.normal;
+                out.phi[0] = contact.rho.normal * u[0];
+                out.a[0][0] = contact.rho.normal;
             }
             Smaller::Impulse => {
                 out.phi[0] = r[0];
                 out.b[0][0] = 1.0;
             }
         }
-        if law.mu <= 0.0 {
+        if contact.law.mu <= 0.0 {
             out.set_no_friction(r);
             return out;
         }
-        let rho = law.rho.tangential;
+        let rho = contact.rho.tangential;
         let (speed, size) = (tangential_norm(u), tangential_norm(r));
         // At a norm's kink, a direction that keeps the rows independent: u_T and r_T against each other. Each is an element of
         // the subdifferential.
@@ -79,7 +79,7 @@ impl<const D: usize> ContactFunction<D> for XuewenSohWanji {
         first[1] = 1.0;
         let along_r = direction(r).or_else(|| against(u)).unwrap_or(first);
         let along_u = direction(u).unwrap_or(along_r.map(|v| -v));
-        match Smaller::of(rho * speed, law.mu * r[0] - size) {
+        match Smaller::of(rho * speed, contact.law.mu * r[0] - size) {
             Smaller::Velocity => {
                 out.phi[1] = rho * speed;
                 for l in 1..D {
@@ -87,8 +87,8 @@ impl<const D: usize> ContactFunction<D> for XuewenSohWanji {
                 }
             }
             Smaller::Impulse => {
-                out.phi[1] = law.mu * r[0] - size;
-                out.b[1][0] = law.mu;
+                out.phi[1] = contact.law.mu * r[0] - size;
+                out.b[1][0] = contact.law.mu;
                 for l in 1..D {
                     out.b[1][l] = -along_r[l];
                 }

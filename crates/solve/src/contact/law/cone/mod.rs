@@ -4,11 +4,13 @@ mod coulomb;
 mod disk;
 pub mod jordan;
 mod product;
+mod rolling;
 mod tresca;
 
 pub use coulomb::{Dual, Region, project, projection_jacobian, region, tangential_norm};
 pub use disk::Disk;
 pub use product::Product;
+pub use rolling::rolling_natural_map;
 pub use tresca::Cylinder;
 
 /// A closed convex set of D-vectors with its Euclidean projection.

@@ -7,6 +7,7 @@ mod exact;
 mod newton;
 mod projection;
 mod quartic;
+mod rolling;
 
 use nonsmooth_linalg::small;
 
@@ -16,6 +17,7 @@ pub use exact::Exact;
 pub use newton::Newton;
 pub use projection::{Projection, ProjectionIterated};
 pub use quartic::Quartic;
+pub use rolling::RollingExact;
 
 /// A solver of one contact with the law L.
 pub trait LocalSolver<const D: usize, L = Coulomb>: Send + Sync {

@@ -8,8 +8,8 @@
 
 use nonsmooth_linalg::small::{self, mul};
 
-use super::{Exact, LocalSolver, norm_bound, velocity};
-use crate::contact::law::Coulomb;
+use super::{LocalSolver, norm_bound, velocity};
+use crate::contact::law::DiskLaw;
 use crate::contact::law::cfun::{Disk, Radii, alart_curnier};
 
 /// The function, by its disk, and how exactly its root is found.
@@ -30,57 +30,57 @@ impl Newton {
 
 /// The scaling parameters and the exact solver's memo.
 #[derive(Debug, Clone)]
-pub struct NewtonMemo<const D: usize> {
+pub struct NewtonMemo<L: DiskLaw<D>, const D: usize> {
     rho: Option<Radii>,
-    exact: <Exact as LocalSolver<D>>::Memo,
+    exact: <L::Local as LocalSolver<D, L>>::Memo,
 }
 
 const STEPS: usize = 20;
 const HALVINGS: usize = 6;
 
-impl<const D: usize> LocalSolver<D> for Newton {
-    type Memo = NewtonMemo<D>;
+impl<L: DiskLaw<D>, const D: usize> LocalSolver<D, L> for Newton {
+    type Memo = NewtonMemo<L, D>;
 
     fn tolerate(&mut self, velocity: f64) {
         self.tolerance = velocity;
     }
 
-    fn prepare(&self, w: &[[f64; D]; D], law: Coulomb) -> NewtonMemo<D> {
-        let mut tangential = *w;
-        tangential[0] = [0.0; D];
-        tangential.iter_mut().for_each(|row| row[0] = 0.0);
-        let rho = Radii { normal: 1.0 / w[0][0], tangential: 1.0 / norm_bound(&tangential) };
-        let usable = [rho.normal, rho.tangential].iter().all(|r| *r > 0.0 && r.is_finite());
-        NewtonMemo { rho: usable.then_some(rho), exact: Exact.prepare(w, law) }
+    fn prepare(&self, w: &[[f64; D]; D], law: L) -> NewtonMemo<L, D> {
+        NewtonMemo { rho: radii::<L, D>(w), exact: L::Local::default().prepare(w, law) }
     }
 
     fn solve(
         &self,
-        memo: &mut NewtonMemo<D>,
+        memo: &mut NewtonMemo<L, D>,
         w: &[[f64; D]; D],
         q: &[f64; D],
-        law: Coulomb,
+        law: L,
         r: &[f64; D],
     ) -> [f64; D] {
-        let Coulomb { mu } = law;
         memo.rho
-            .and_then(|rho| newton(self, w, q, mu, rho, r))
-            .unwrap_or_else(|| Exact.solve(&mut memo.exact, w, q, law, r))
+            .and_then(|rho| newton(self, w, q, law, rho, r))
+            .unwrap_or_else(|| L::Local::default().solve(&mut memo.exact, w, q, law, r))
     }
 }
 
-fn newton<const D: usize>(
+/// `ρ_N = 1/W_NN` and `ρ = 1/λ_max` (bounded) of each disk's block, where they are numbers.
+pub(super) fn radii<L: DiskLaw<D>, const D: usize>(w: &[[f64; D]; D]) -> Option<Radii> {
+    let rho = Radii::of::<L, D>(w, |w| 1.0 / w[0][0], |part| 1.0 / norm_bound(part));
+    rho.are_positive().then_some(rho)
+}
+
+pub(super) fn newton<L: DiskLaw<D>, const D: usize>(
     solver: &Newton,
     w: &[[f64; D]; D],
     q: &[f64; D],
-    mu: f64,
+    law: L,
     rho: Radii,
     start: &[f64; D],
 ) -> Option<[f64; D]> {
-    let linearise = |r: &[f64; D]| alart_curnier(solver.disk, &velocity(w, q, r), r, mu, rho);
+    let linearise = |r: &[f64; D]| alart_curnier(solver.disk, &velocity(w, q, r), r, law, rho);
     let size = |x: &[f64; D]| x.iter().map(|v| v * v).sum::<f64>().sqrt();
     // Rounding in Φ is that of ρ q and of r.
-    let impulse = rho.normal.max(rho.tangential);
+    let impulse = rho.normal.max(rho.tangential).max(rho.rolling);
     let floor = impulse * (4.0 * f64::EPSILON * size(q)).max(solver.tolerance);
     let mut r = *start;
     let mut at = linearise(&r);
