@@ -16,6 +16,7 @@ use std::time::Instant;
 use nonsmooth_io::fclib;
 use nonsmooth_linalg::{BlockLu, Csc, Groups};
 use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal};
+use nonsmooth_solve::contact::law::DiskLaw;
 
 /// A matrix by blocks: sizes of nodes, blocks by rows.
 struct Blocks {
@@ -23,7 +24,7 @@ struct Blocks {
     blocks: BTreeMap<(u32, u32), Vec<f64>>,
 }
 
-fn of_contacts<const D: usize>(problem: &FrictionLocal<D>) -> Blocks {
+fn of_contacts<const D: usize, L: DiskLaw<D>>(problem: &FrictionLocal<D, L>) -> Blocks {
     let nc = problem.contacts();
     let mut blocks = BTreeMap::new();
     for i in 0..nc {
@@ -39,7 +40,7 @@ fn of_contacts<const D: usize>(problem: &FrictionLocal<D>) -> Blocks {
     Blocks { sizes: vec![D; nc], blocks }
 }
 
-fn of_bodies<const D: usize>(problem: &FrictionGlobal<D>) -> Blocks {
+fn of_bodies<const D: usize, L: DiskLaw<D>>(problem: &FrictionGlobal<D, L>) -> Blocks {
     let n = problem.M.nrows();
     let mut groups = Groups::new(n);
     problem.M.triplets().filter(|e| e.2 != 0.0).for_each(|(i, j, _)| groups.join(i, j));

@@ -10,16 +10,20 @@ use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{Friction, FrictionGlobal, GlobalPoint, Problem};
 use nonsmooth_solve::contact::Condense;
 use nonsmooth_solve::contact::form::{Access, Contacts, Linear};
+use nonsmooth_solve::contact::law::DiskLaw;
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limits, Reformulation, Status};
 
 /// The velocity u at the end of a run and whether the run reached 1e-12; and that run's impulses.
-fn run<const D: usize>(problem: &FrictionGlobal<D>, path: &str) -> (Vec<f64>, bool, Vec<f64>)
+fn run<const D: usize, L: DiskLaw<D>>(
+    problem: &FrictionGlobal<D, L>,
+    path: &str,
+) -> (Vec<f64>, bool, Vec<f64>)
 where
-    FrictionGlobal<D>: Problem<Point = GlobalPoint> + Registered,
+    FrictionGlobal<D, L>: Problem<Point = GlobalPoint> + Registered,
 {
     let limits = Limits { tolerance: 1e-12, max_iterations: 5_000, ..Limits::default() };
-    let mut session = registry::session::<FrictionGlobal<D>>(path, &Default::default()).unwrap();
+    let mut session = registry::session::<FrictionGlobal<D, L>>(path, &Default::default()).unwrap();
     let mut point = problem.origin();
     let outcome = session.solve(problem, &mut point, &limits, &mut |_| {}).unwrap();
     let verdict = problem.judge(&point, limits.tolerance).unwrap();
@@ -27,9 +31,9 @@ where
 }
 
 /// Returns how many paths beside the condensed one reached the solution.
-fn agree<const D: usize>(problem: &FrictionGlobal<D>, name: &str) -> usize
+fn agree<const D: usize, L: DiskLaw<D>>(problem: &FrictionGlobal<D, L>, name: &str) -> usize
 where
-    FrictionGlobal<D>: Problem<Point = GlobalPoint> + Registered,
+    FrictionGlobal<D, L>: Problem<Point = GlobalPoint> + Registered,
 {
     let (condensed, _) = Condense.reduce(problem).unwrap();
     let scale = norm(&condensed.q).max(f64::MIN_POSITIVE);

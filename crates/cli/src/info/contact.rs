@@ -2,7 +2,7 @@
 
 use nonsmooth_analysis::{Components, Mass, MuRange, Spectrum, Traits};
 use nonsmooth_linalg::Inverse;
-use nonsmooth_problem::check::Existence;
+use nonsmooth_problem::check::{Existence, Law};
 use nonsmooth_problem::{Dynamics, Friction, FrictionGlobal, ProblemError};
 use nonsmooth_solve::diagnose::spectrum;
 use nonsmooth_solve::{Limits, existence};
