@@ -26,7 +26,7 @@ pub use spectrum::{Spectrum, SpectrumError, rank};
 
 use nonsmooth_linalg::Groups;
 use nonsmooth_problem::check::Law;
-use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, Kind, Problem};
+use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, Kind, Problem, RollingData};
 
 /// Sizes, density, friction and structure of a problem. Cost: O(nnz), and for W of global problems the pairs of
 /// contacts that share a body.
@@ -46,6 +46,9 @@ pub struct Traits {
     pub bilateral_rows: usize,
     /// The coefficients of friction.
     pub mu: MuRange,
+    /// The coefficients of rolling friction, of problems that have any, m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mu_r: Option<MuRange>,
     /// 0: symmetric. `‖W − Wᵀ‖_F / ‖W‖_F` of a local problem, `max |M_ij − M_ji| / max |M_ij|` of a global one.
     pub asymmetry: f64,
     /// The block structure of W: stored, or as it would be if condensed.
@@ -120,6 +123,7 @@ impl Traits {
             dofs,
             bilateral_rows: p.multipliers(),
             mu: MuRange::of(&p.mu),
+            mu_r: MuRange::of_rolling(p.mu_r.values()),
             asymmetry: p.W.asymmetry(),
             W: Pattern::of(&p.W),
             mass: None,
@@ -143,6 +147,7 @@ impl Traits {
             dofs: Some(p.dofs()),
             bilateral_rows: p.multipliers(),
             mu: MuRange::of(&p.mu),
+            mu_r: MuRange::of_rolling(p.mu_r.values()),
             asymmetry: p.M.asymmetry(),
             W: Pattern::condensed::<D>(&p.H, &mut bodies),
             mass: Some(Mass { entries: Entries { M: p.M.nnz(), H: p.H.nnz() }, components }),
@@ -165,6 +170,10 @@ impl Traits {
 }
 
 impl MuRange {
+    fn of_rolling(mu_r: &[f64]) -> Option<Self> {
+        (!mu_r.is_empty()).then(|| Self::of(mu_r))
+    }
+
     fn of(mu: &[f64]) -> Self {
         Self {
             min: mu.iter().copied().fold(f64::INFINITY, f64::min),

@@ -52,7 +52,11 @@ pub fn sizes(problem: &AnyProblem) -> Object {
 pub fn alike(problem: &AnyProblem) -> String {
     match problem {
         AnyProblem::Friction(p) => {
-            format!("{} in {}D", count(p.contacts(), "contact"), p.kind().dimension())
+            let space = match p.kind().dimension() {
+                5 => "3D with rolling friction".into(),
+                d => format!("{d}D"),
+            };
+            format!("{} in {space}", count(p.contacts(), "contact"))
         }
         AnyProblem::Complementarity(_) => format!("{}, {}", problem.kind().name(), size(problem)),
     }
@@ -92,6 +96,8 @@ pub struct Counted {
     pub at_limit: usize,
     /// Those near another status.
     pub degenerate: usize,
+    /// Those that roll against rolling friction, whatever else they do.
+    pub rolling: usize,
 }
 
 /// The names of the rows that the judge speaks of: those of the variables, where each has a row of F.
@@ -113,13 +119,15 @@ pub fn counted(counts: &AnyCounts) -> Counted {
             all: vec![(c.open, "open"), (c.stick, "stick"), (c.slip, "slip")],
             at_limit: c.at_limit,
             degenerate: c.degenerate,
+            rolling: c.rolling,
         },
         AnyCounts::Rows(c) => {
             let mut all = vec![(c.inside, "inside"), (c.lower, "at the lower bound")];
             let others = [(c.upper, "at the upper bound"), (c.equalities, "equalities")];
             all.extend(others.into_iter().filter(|c| c.0 > 0));
             let degenerate = c.degenerate;
-            Counted { what: "row", judged: "row", unit: "", all, at_limit: 0, degenerate }
+            let (at_limit, rolling) = (0, 0);
+            Counted { what: "row", judged: "row", unit: "", all, at_limit, degenerate, rolling }
         }
         AnyCounts::Sets(c) => Counted {
             what: "constraint",
@@ -128,6 +136,7 @@ pub fn counted(counts: &AnyCounts) -> Counted {
             all: vec![(c.inside, "inside"), (c.border, "on the border")],
             at_limit: 0,
             degenerate: 0,
+            rolling: 0,
         },
     }
 }

@@ -193,7 +193,8 @@ pub fn verdict_text(
     tolerance: f64,
     worst: usize,
 ) {
-    let Counted { what, judged, unit, all, at_limit, degenerate } = counted(&verdict.counts);
+    let Counted { what, judged, unit, all, at_limit, degenerate, rolling } =
+        counted(&verdict.counts);
     let names = kinds::names_of_rows(content);
     let called = |i: usize| match names.get(i) {
         Some(name) => format!("{i} `{name}`"),
@@ -224,7 +225,11 @@ pub fn verdict_text(
         _ => String::new(),
     };
     let all: Vec<_> = all.iter().map(|(n, what)| format!("{n} {what}{}", limit(what))).collect();
-    row(text, &what, all.join(", ") + &degenerate);
+    let rolls = match rolling {
+        0 => String::new(),
+        n => format!("; {n} roll"),
+    };
+    row(text, &what, all.join(", ") + &rolls + &degenerate);
     let worst = if relative || others.is_empty() { worst } else { 0 };
     let worst: Vec<_> = worst_of(verdict, worst)
         .map(|(which, residual)| format!("{} ({})", called(which), number(residual)))

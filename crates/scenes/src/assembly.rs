@@ -11,7 +11,8 @@
 //!
 //! Each body has six degrees of freedom `[linear, angular]`, both in the world frame, and the block
 //! `diag(m I, R J Rᵀ)` of M. A contact at p with frame `[N, T1, T2]` has the columns `(d, (p − x_b) × d)` for b
-//! and minus `(d, (p − x_a) × d)` for a, with d each of N, T1, T2; where an image of a touches, x_a is the place of the image.
+//! and minus `(d, (p − x_a) × d)` for a, with d each of N, T1, T2; where an image of a touches, x_a is the place of the image. With rolling friction two more,
+//! `(0, d)` for b and minus that for a with d each of T1, T2: the angular velocity of b seen from a. The points of an elastic solid have none.
 //!
 //! With [`Gyroscopic::Implicit`] the torque `g(ω) = ω × J ω` is linearised about `ω_k`: the block of M becomes
 //! `J + h G` with `G = ∂g/∂ω = [ω_k]× J − [J ω_k]×`, and f is stated with that M, so that
@@ -34,7 +35,7 @@
 use std::array::from_fn;
 
 use nonsmooth_linalg::Csc;
-use nonsmooth_problem::{FrictionGlobal, FrictionLocal};
+use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal, RollingGlobal};
 use nonsmooth_solve::Reformulation;
 use nonsmooth_solve::contact::Condense;
 
@@ -78,6 +79,44 @@ impl Scene {
         }
         let mu = self.contacts.iter().map(|c| c.mu).collect();
         Ok(FrictionGlobal::new(M, H, f, w, mu)?)
+    }
+
+    /// The time step with rolling friction as a global problem.
+    ///
+    /// Errors: those of [`Scene::problem`].
+    pub fn rolling(&self) -> Result<RollingGlobal, SceneError> {
+        let FrictionGlobal { M, H, f, w, mu, .. } = self.problem()?;
+        let nc = self.contacts.len();
+        let mut jacobian: Vec<_> =
+            H.triplets().map(|(i, j, x)| (i, 5 * (j / 3) + j % 3, x)).collect();
+        for (c, contact) in self.contacts.iter().enumerate() {
+            let [_, tangents @ ..] = contact.frame();
+            for (sign, k, _) in contact.sides().filter(|side| side.1 < self.bodies.len()) {
+                for (column, d) in tangents.iter().enumerate() {
+                    let rows = (0..3).filter(|&i| d[i] != 0.0);
+                    let at = 5 * c + 3 + column;
+                    jacobian.extend(rows.map(|i| (6 * k + 3 + i, at, sign * d[i])));
+                }
+            }
+        }
+        let H = Csc::from_triplets(f.len(), 5 * nc, jacobian.into_iter())?;
+        let mut all = vec![0.0; 5 * nc];
+        w.iter().enumerate().for_each(|(i, w)| all[5 * (i / 3) + i % 3] = *w);
+        let mu_r = self.contacts.iter().map(|c| c.mu_r).collect();
+        Ok(RollingGlobal::rolling(M, H, f, all, mu, mu_r)?)
+    }
+
+    /// The time step as a problem with rolling friction where a contact has any, global or condensed.
+    ///
+    /// Errors: those of [`Scene::problem`].
+    pub fn stated(&self, condensed: bool) -> Result<Friction, SceneError> {
+        let rolls = self.contacts.iter().any(|c| c.mu_r > 0.0);
+        Ok(match (rolls, condensed) {
+            (false, false) => Friction::Global3(self.problem()?),
+            (false, true) => Friction::Local3(self.condensed()?),
+            (true, false) => Friction::RollingGlobal(self.rolling()?),
+            (true, true) => Friction::RollingLocal(Condense.reduce(&self.rolling()?)?.0),
+        })
     }
 
     /// The time step as a local problem, by [`Condense`].

@@ -22,6 +22,8 @@ pub struct Contact {
     pub tangent: Vec3,
     /// Coefficient of friction.
     pub mu: f64,
+    /// Coefficient of rolling friction, m; 0: none.
+    pub mu_r: f64,
     /// Newton's coefficient of restitution, from 0 to 1.
     pub e: f64,
     /// What touches b in place of a itself: a periodic image of it, or ground that moves.
@@ -42,7 +44,7 @@ impl Contact {
     /// A contact with T1 along the world's x axis, or its y axis where the normal is nearly along x.
     pub fn new(a: Option<usize>, b: usize, point: Vec3, normal: Vec3, mu: f64, e: f64) -> Self {
         let tangent = if normal[0].abs() > 0.9 * norm(normal) { Y } else { X };
-        Self { a, b, point, normal, tangent, mu, e, image: Image::default() }
+        Self { a, b, point, normal, tangent, mu, mu_r: 0.0, e, image: Image::default() }
     }
 
     /// The local frame `[N, T1, T2]`: orthonormal, with T1 × T2 = N.
@@ -61,7 +63,7 @@ impl Contact {
 
     /// Checks every value against a scene of `bodies` bodies; `key` names the contact in messages.
     pub(crate) fn validate(&self, key: &str, bodies: usize) -> Result<(), SceneError> {
-        let Self { a, b, point, mu, e, image, .. } = *self;
+        let Self { a, b, point, mu, mu_r, e, image, .. } = *self;
         // A body may touch an image of itself.
         if b >= bodies || a.is_some_and(|a| a >= bodies || (a == b && image.offset == [0.0; 3])) {
             let expected = format!("two different bodies of the {bodies}");
@@ -76,6 +78,7 @@ impl Contact {
             return Err(SceneError::value(format!("{key}.normal"), expected, found));
         }
         require(&format!("{key}.mu"), mu, mu >= 0.0, "a coefficient of at least 0")?;
+        require(&format!("{key}.mu_r"), mu_r, mu_r >= 0.0, "a length of at least 0")?;
         require(&format!("{key}.e"), e, (0.0..=1.0).contains(&e), "a coefficient from 0 to 1")
     }
 }

@@ -319,3 +319,33 @@ fn impossible_scenes_name_what_is_wrong() {
         assert!(message.starts_with(start), "{message}");
     }
 }
+
+/// Five rows a contact: the first three are those without rolling friction, the others the angular velocity of b seen from a; and rolling balls end as the
+/// law says.
+#[test]
+fn rolling_friction_adds_the_angular_velocities_of_the_bodies() {
+    use nonsmooth_problem::{Friction, Problem};
+    use nonsmooth_scenes::scenes::SpherePile;
+    let pile = SpherePile { count: 30, spin: 2.0, ..SpherePile::default() };
+    let plain = pile.build().unwrap();
+    assert!(matches!(plain.stated(false).unwrap(), Friction::Global3(_)));
+    let scene = SpherePile { mu_r: 0.01, ..pile }.build().unwrap();
+    let Friction::RollingGlobal(problem) = scene.stated(false).unwrap() else { panic!() };
+    let other = plain.problem().unwrap();
+    let (v, nc) = (scene.velocities(), problem.contacts());
+    let (mut u, mut without) = (vec![0.0; 5 * nc], vec![0.0; 3 * nc]);
+    problem.velocity_into(&v, &mut u);
+    other.velocity_into(&v, &mut without);
+    for (c, contact) in scene.contacts.iter().enumerate() {
+        assert_eq!(u[5 * c..5 * c + 3], without[3 * c..3 * c + 3]);
+        let spin = |k: usize| scene.bodies[k].angular_velocity;
+        let [_, tangents @ ..] = contact.frame();
+        for (k, d) in tangents.iter().enumerate() {
+            let dot = |x: [f64; 3]| (0..3).map(|i| d[i] * x[i]).sum::<f64>();
+            let seen = dot(spin(contact.b)) - contact.a.map_or(0.0, |a| dot(spin(a)));
+            assert!((u[5 * c + 3 + k] - seen).abs() < 1e-12);
+        }
+    }
+    assert!(matches!(scene.stated(true).unwrap(), Friction::RollingLocal(_)));
+    assert_eq!(problem.kind().dimension(), 5);
+}

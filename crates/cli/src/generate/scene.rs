@@ -26,10 +26,7 @@ pub fn make(
     form: Form,
 ) -> Result<(Scene, ProblemFile), SceneError> {
     let scene = entry.make(settings)?;
-    let mut content = match form {
-        Form::Global => ProblemFile::new(scene.problem()?),
-        Form::Local => ProblemFile::new(scene.condensed()?),
-    };
+    let mut content = ProblemFile::new(scene.stated(form == Form::Local)?);
     let by = |all: &str| {
         format!(
             "One Moreau-Jean time step of the scene `{}` ({}), by nonsmooth {}: {all}. SI units.",

@@ -84,6 +84,9 @@ impl Facts {
             "mu": traits.mu,
             "bilateral_rows": traits.bilateral_rows,
         }));
+        if let Some(mu_r) = traits.mu_r {
+            all.insert("mu_r".into(), json!(mu_r));
+        }
         if let Some(Mass { entries, components }) = &traits.mass {
             let singular = self.singular.as_ref().map(ProblemError::to_string);
             all.extend(report::fields(json!({
@@ -129,6 +132,10 @@ impl Facts {
             format!("mu from {min} to {max}, {} without friction", count(frictionless, "contact"))
         };
         row(text, "friction", mu);
+        if let Some(MuRange { min, max, .. }) = traits.mu_r {
+            let m = if min == max { format!("{min} m") } else { format!("from {min} to {max} m") };
+            row(text, "rolling", format!("mu_r = {m}"));
+        }
         let pattern = &traits.W;
         let blocks = format!(
             "{} of {d} x {d}, by row {} to {}, {:.1} on average; {}",

@@ -175,8 +175,10 @@ fn impulses(problem: &Friction, solution: &Solution) -> Vec<Impulse> {
             AnyStatus::Row(_) | AnyStatus::Set(_) => Motion::Open,
         };
         // What rounding leaves at an open contact is no impulse.
+        // Moments are drawn nowhere.
+        let tangential = &r[1..r.len().min(3)];
         let part = (reach > 0.0 && motion != Motion::Open)
-            .then(|| r[1..].iter().map(|t| t / reach).collect());
+            .then(|| tangential.iter().map(|t| t / reach).collect());
         Impulse { normal, part, motion }
     })
     .collect()

@@ -27,6 +27,9 @@ macro_rules! with_common {
                 mass_ratio: f64 = 1.0,
                 /// Coefficient of friction of every contact.
                 mu: f64 = 0.6,
+                /// Coefficient of rolling friction of every contact, m; 0 for none, above it the problem has five rows a
+                /// contact.
+                mu_r: f64 = 0.0,
                 /// Newton's coefficient of restitution of every contact, from 0 to 1.
                 e: f64 = 0.0,
                 /// Time step, s.
@@ -269,6 +272,7 @@ impl Common {
         positive("density", self.density)?;
         positive("mass_ratio", self.mass_ratio)?;
         require("mu", self.mu, self.mu >= 0.0, "a number of at least 0")?;
+        require("mu_r", self.mu_r, self.mu_r >= 0.0, "a length of at least 0")?;
         require("e", self.e, (0.0..=1.0).contains(&self.e), "a number from 0 to 1")?;
         positive("h", self.h)?;
         for (key, x) in [
@@ -295,7 +299,7 @@ impl Common {
 
     /// A contact with the common coefficients.
     fn contact(&self, a: Option<usize>, b: usize, point: Vec3, normal: Vec3) -> Contact {
-        Contact::new(a, b, point, normal, self.mu, self.e)
+        Contact { mu_r: self.mu_r, ..Contact::new(a, b, point, normal, self.mu, self.e) }
     }
 
     /// Random radii within ± the share `spread` of `radius`.
