@@ -85,6 +85,8 @@ fn heading(kind: &str) -> String {
         "friction_local_3d" => "Local problems, u = W r + q".into(),
         "friction_global_2d" => "Global problems in the plane, M v = H r + f".into(),
         "friction_global_3d" => "Global problems, M v = H r + f".into(),
+        "rolling_friction_local_3d" => "Local problems with rolling friction".into(),
+        "rolling_friction_global_3d" => "Global problems with rolling friction".into(),
         "" => "Problems of unknown kind".into(),
         other => format!("Problems of kind {}", markdown_text(other)),
     }

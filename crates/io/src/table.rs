@@ -1,7 +1,7 @@
 //! A solution as a table, and the files of such tables: comma-separated values.
 //!
 //! ```text
-//! friction            contact,status,r_n,r_t,u_n,u_t             in space r_t1,r_t2 and u_t1,u_t2
+//! friction            contact,status,r_n,r_t,u_n,u_t             in space r_t1,r_t2 and u_t1,u_t2, with rolling friction also r_r1,r_r2 and u_r1,u_r2
 //! LCP, box LCP        variable,status,z,w
 //! MLCP                variable,status,value,w                    u[0], ... then v[0], ...; only v has a w
 //! horizontal LCP      pair,status,x,s
@@ -159,7 +159,13 @@ fn contacts(kind: Kind, r: &[f64], u: &[f64]) -> Vec<(&'static str, Column)> {
     const PLANE: [&[&str]; 2] = [&["r_n", "r_t"], &["u_n", "u_t"]];
     const SPACE: [&[&str]; 2] = [&["r_n", "r_t1", "r_t2"], &["u_n", "u_t1", "u_t2"]];
     let d = kind.dimension();
-    let names = if d == 2 { PLANE } else { SPACE };
+    const ROLLING: [&[&str]; 2] =
+        [&["r_n", "r_t1", "r_t2", "r_r1", "r_r2"], &["u_n", "u_t1", "u_t2", "u_r1", "u_r2"]];
+    let names = match d {
+        2 => PLANE,
+        5 => ROLLING,
+        _ => SPACE,
+    };
     let mut columns = vec![counted("contact", r.len() / d)];
     for (names, x) in names.into_iter().zip([r, u]) {
         for (k, name) in names.iter().enumerate() {
@@ -202,6 +208,8 @@ fn word(status: &AnyStatus) -> &'static str {
     match status {
         AnyStatus::Contact(contact) => match contact.status {
             Motion::Open => "open",
+            Motion::Slip if contact.rolls => "slip and roll",
+            Motion::Stick if contact.rolls => "roll",
             Motion::Stick if contact.at_limit => "stick at limit",
             Motion::Stick => "stick",
             Motion::Slip => "slip",

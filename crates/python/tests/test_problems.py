@@ -205,3 +205,28 @@ def test_plots(box):
     assert len(ns.solve(box).plot().axes) == 3
     assert len(ns.solve(ns.LCP(np.eye(2), [-1.0, 1.0])).plot().axes) == 1
     assert "W, 3 × 3" in box.spy().get_title()
+
+
+def test_rolling_friction_has_five_rows_a_contact() -> None:
+    """A ball that rolls slows down by (5/7) mu_r g/R."""
+    mass, radius, g, h, mu_r = 2.0, 0.1, 9.81, 1e-3, 0.004
+    inertia = 0.4 * mass * radius**2
+    start = np.array([1.0, 0, 0, 0, 1.0 / radius, 0])
+    M = np.diag([mass] * 3 + [inertia] * 3)
+    H = np.zeros((6, 5))
+    H[2, 0] = H[0, 1] = H[1, 2] = H[3, 3] = H[4, 4] = 1.0
+    H[4, 1], H[3, 2] = -radius, radius
+    f = M @ start + h * np.array([0, 0, -mass * g, 0, 0, 0])
+    problem = ns.Friction(M=M, H=H, f=f, w=np.zeros(5), mu=0.5, mu_r=mu_r)
+    assert problem.dimension == 5 and problem.contacts == 1
+    answer = ns.solve(problem, tol=1e-12).raise_if_unsolved()
+    assert abs((start[0] - answer.v[0]) / h / (5 / 7 * mu_r * g / radius) - 1) < 1e-8
+    row = answer.contacts[0]
+    assert row["status"] == "roll" and abs(row["r_r2"]) > 0 and row["r_r1"] == 0
+    problem.update(mu_r=0.0)
+    free = ns.solve(problem, tol=1e-12).raise_if_unsolved()
+    assert abs(free.v[0] - start[0]) < 1e-12
+    with pytest.raises(ns.Error, match="mu_r"):
+        ns.Friction(M=M, H=H, f=f, w=np.zeros(5), mu=0.5, mu_r=-1.0)
+    with pytest.raises(ns.Error, match="5 for each"):
+        ns.Friction(W=np.eye(3), q=np.zeros(3), mu=0.5, mu_r=0.1)

@@ -28,9 +28,9 @@ macro_rules! list_of_kinds {
                 /// `M v = H r + f`, `u = Hᵀ v + w`, three-dimensional contacts.
                 FrictionGlobal3d, "friction_global_3d", Global3, $crate::FrictionGlobal<3>, 3;
                 /// `u = W r + q`, three-dimensional contacts with rolling friction.
-                RollingLocal3d, "rolling_local_3d", RollingLocal, $crate::RollingLocal, 5;
+                RollingLocal3d, "rolling_friction_local_3d", RollingLocal, $crate::RollingLocal, 5;
                 /// `M v = H r + f`, `u = Hᵀ v + w`, three-dimensional contacts with rolling friction.
-                RollingGlobal3d, "rolling_global_3d", RollingGlobal, $crate::RollingGlobal, 5;
+                RollingGlobal3d, "rolling_friction_global_3d", RollingGlobal, $crate::RollingGlobal, 5;
             }
             /// Any of the complementarity problems, and the variational inequality that they are cases of.
             Complementarity {

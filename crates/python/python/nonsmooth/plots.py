@@ -57,7 +57,13 @@ def _tangential(table: Any, letter: str) -> Any:
     return np.sqrt(sum(np.asarray(table[name]) ** 2 for name in names))
 
 
-COLOURS = {"open": "tab:gray", "stick": "tab:blue", "slip": "tab:red"}
+COLOURS = {
+    "open": "tab:gray",
+    "stick": "tab:blue",
+    "slip": "tab:red",
+    "roll": "tab:green",
+    "slip and roll": "tab:orange",
+}
 """What contacts do, by colours."""
 
 

@@ -168,7 +168,10 @@ class Friction(Problem):
     *Global form*, ``M v = H r + f``, ``u = Hᵀ v + w``: ``Friction(M=, H=, f=, w=, mu=)``. M is n × n in kg, H is n × D·nc,
     f in N·s, w in m/s. Scalar rows ``c = Gᵀ v + b``: G, b, lower, upper.
 
-    ``mu`` is one number for all contacts or one for each. q and w may be given as nc × D. ``dimension`` is 2 or 3 where it does not
+    *Rolling friction*: with ``mu_r=``, a length in m, contacts have five rows, ``[N, T1, T2, R1, R2]``, u_R in rad/s and r_R in N·m·s, and
+    ``K = {‖r_T‖ ≤ mu r_N, ‖r_R‖ ≤ mu_r r_N}``.
+
+    ``mu`` and ``mu_r`` are one number for all contacts or one for each. q and w may be given as nc × D. ``dimension`` is 2 or 3 where it does not
     follow from the shapes (a single mu: 3). Rows without bounds are bilateral constraints, ``c = 0``.
     """
 
@@ -178,6 +181,7 @@ class Friction(Problem):
         self,
         *,
         mu: Optional[Numbers] = None,
+        mu_r: Optional[Numbers] = None,
         W: Optional[Matrix] = None,
         q: Optional[Numbers] = None,
         V: Optional[Matrix] = None,
@@ -194,7 +198,7 @@ class Friction(Problem):
         dimension: Optional[int] = None,
     ) -> None:
         parts = dict(
-            mu=mu, W=W, q=q, V=V, R=R, s=s, M=M, H=H, f=f, w=w, G=G, b=b, lower=lower, upper=upper
+            mu=mu, mu_r=mu_r, W=W, q=q, V=V, R=R, s=s, M=M, H=H, f=f, w=w, G=G, b=b, lower=lower, upper=upper
         )
         self._native = _nonsmooth.Problem.friction(parts, dimension)
 
@@ -205,7 +209,7 @@ class Friction(Problem):
 
     @property
     def dimension(self) -> int:
-        """The components of each contact, 2 or 3."""
+        """The components of each contact: 2, 3, or 5 with rolling friction."""
         return self._native.dimension
 
 
