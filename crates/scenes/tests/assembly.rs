@@ -325,7 +325,7 @@ fn impossible_scenes_name_what_is_wrong() {
 #[test]
 fn rolling_friction_adds_the_angular_velocities_of_the_bodies() {
     use nonsmooth_problem::{Friction, Problem};
-    use nonsmooth_scenes::scenes::SpherePile;
+    use nonsmooth_scenes::scenes::{Family, SpherePile};
     let pile = SpherePile { count: 30, spin: 2.0, ..SpherePile::default() };
     let plain = pile.build().unwrap();
     assert!(matches!(plain.stated(false).unwrap(), Friction::Global3(_)));

@@ -9,7 +9,7 @@
 use std::cmp::Reverse;
 
 use nonsmooth_linalg::{Bsr, budget};
-use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem};
+use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem, RollingLocal};
 use nonsmooth_solve::settings::SettingsMap;
 use nonsmooth_solve::{Limits, Outcome, Session, SolveError, Status, registry};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -40,6 +40,8 @@ pub(crate) struct Asked {
 /// One contact problem, its start and its solution.
 pub(crate) struct Slot {
     pub problem: FrictionLocal<3>,
+    /// The same with rolling friction, where a contact has any: then the point is of this one.
+    pub rolling: Option<RollingLocal>,
     pub point: LocalPoint,
     pub asked: Asked,
     /// What came of it; nothing where the problem is not finite.
@@ -53,7 +55,8 @@ impl Slot {
         let w = Bsr::from_rows(1, &[vec![(0, identity)]]);
         let problem = FrictionLocal::new(w, vec![0.0; 3], vec![0.0]).map_err(SolveError::from)?;
         let point = problem.origin();
-        Ok(Self { problem, point, asked: Asked::default(), outcome: None, own: None })
+        let asked = Asked::default();
+        Ok(Self { problem, rolling: None, point, asked, outcome: None, own: None })
     }
 
     fn is_large(&self) -> bool {
@@ -76,23 +79,33 @@ impl Slot {
 /// The sessions that solve one problem after the other.
 struct Sessions {
     law: Box<dyn Session<FrictionLocal<3>>>,
+    /// Made where it is first needed.
+    rolling: Option<Box<dyn Session<RollingLocal>>>,
     /// Made where it is first asked.
     relaxation: Option<Box<dyn Session<FrictionLocal<3>>>>,
 }
 
 impl Sessions {
     fn new(inner: &Inner) -> Result<Self, SolveError> {
-        Ok(Self { law: registry::session(inner.solver, inner.settings)?, relaxation: None })
+        let law = registry::session(inner.solver, inner.settings)?;
+        Ok(Self { law, rolling: None, relaxation: None })
     }
 
     fn solve(&mut self, slot: &mut Slot, inner: &Inner) -> Result<Option<Outcome>, SolveError> {
-        let Slot { problem, point, asked, .. } = slot;
+        let Slot { problem, rolling, point, asked, .. } = slot;
         let limits = |most: usize| Limits {
             max_iterations: inner.limits.max_iterations.min(most),
             ..inner.limits.clone()
         };
         if !asked.finite {
             return Ok(None);
+        }
+        if let Some(problem) = rolling {
+            let session = match &mut self.rolling {
+                Some(session) => session,
+                None => self.rolling.insert(registry::session(inner.solver, inner.settings)?),
+            };
+            return session.solve(problem, point, &limits(asked.most), &mut |_| {}).map(Some);
         }
         if asked.may_rest && problem.mu.len() > SMALL {
             let relaxation = match &mut self.relaxation {

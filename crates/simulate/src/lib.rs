@@ -8,7 +8,7 @@
 //! ```
 //! use nonsmooth_simulate::{Body, Law, MoreauJean, Shape, Simulation, World};
 //!
-//! let mut world = World::new([0.0, 0.0, -9.81]).with_law(Law { mu: 0.3, e: 0.8, e_t: 0.0 });
+//! let mut world = World::new([0.0, 0.0, -9.81]).with_law(Law { mu: 0.3, e: 0.8, ..Law::default() });
 //! world.add(Body::floor());
 //! let ball = Body::solid(Shape::Sphere { radius: 0.1 }, 1000.0)?;
 //! let ball = world.add(ball.at([0.0, 0.0, 1.1]).moving([1.0, 0.0, 0.0], [0.0; 3]));
@@ -37,6 +37,7 @@ mod moreau_jean;
 mod moving;
 mod projection;
 mod report;
+mod rolling;
 pub mod rotation;
 pub mod scene_file;
 mod shape;

@@ -112,6 +112,8 @@ pub struct Counts {
     pub stick: usize,
     /// Of these, those that slide.
     pub slip: usize,
+    /// Of those that are not open, those that roll against rolling friction.
+    pub roll: usize,
     /// Contacts that began with the impulse of the last step.
     pub warm: usize,
     /// Points where bodies overlap by more than a tenth of the smaller one. No normal is right there: that of the step before is kept while the features are the same.
@@ -133,6 +135,7 @@ impl Counts {
         self.open = of(Motion::Open);
         self.stick = of(Motion::Stick);
         self.slip = of(Motion::Slip);
+        self.roll = contacts.iter().filter(|c| c.rolls()).count();
     }
 }
 
@@ -237,6 +240,12 @@ pub struct ContactReport {
     pub before: [f64; 3],
     /// The same after it.
     pub after: [f64; 3],
+    /// Coefficient of rolling friction, m.
+    pub mu_r: f64,
+    /// Moments about the tangents, `[r_R1, r_R2]`, N·m·s, of rolling friction.
+    pub moment: [f64; 2],
+    /// The angular velocity of b seen from a about the tangents after the step, `[u_R1, u_R2]`, rad/s.
+    pub rolling: [f64; 2],
 }
 
 impl ContactReport {
@@ -248,6 +257,18 @@ impl ContactReport {
             _ if tangential(&self.after) > SLIP * (1.0 + tangential(&self.before)) => Motion::Slip,
             _ => Motion::Stick,
         })
+    }
+
+    /// The moment on b in the world frame, N·m·s.
+    pub fn world_moment(&self) -> Vec3 {
+        let [_, s, t] = self.frame;
+        std::array::from_fn(|k| s[k] * self.moment[0] + t[k] * self.moment[1])
+    }
+
+    /// Whether it rolls against rolling friction.
+    pub fn rolls(&self) -> bool {
+        let [s, t] = self.rolling;
+        self.active && self.mu_r > 0.0 && self.impulse[0] > 0.0 && s.hypot(t) > SLIP
     }
 
     /// The impulse on b in the world frame, N·s.

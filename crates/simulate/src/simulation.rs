@@ -1,6 +1,6 @@
 //! A world in motion.
 
-use nonsmooth_problem::FrictionLocal;
+use nonsmooth_problem::{Friction, FrictionLocal};
 use nonsmooth_scenes::vec3::{Vec3, add, cross, norm, sub};
 use nonsmooth_solve::Limits;
 use nonsmooth_solve::settings::SettingsMap;
@@ -284,11 +284,11 @@ impl Simulation {
         drive::run(self, until, h, observer)
     }
 
-    /// The contact problem of the next step, were it of length h, as it is solved in the first pass, all islands together; none without contacts. The state
+    /// The contact problem of the next step, were it of length h, as it is solved in the first pass, all islands together; with rolling friction where a contact has any; none without contacts. The state
     /// stays as it is.
     ///
     /// Errors: those of [`step`](Self::step).
-    pub fn problem(&mut self, h: f64) -> Result<Option<FrictionLocal<3>>, SimulateError> {
+    pub fn problem(&mut self, h: f64) -> Result<Option<Friction>, SimulateError> {
         require(|| "h".into(), h, h > 0.0, "a positive number")?;
         let Self { world, scheme, state, forces, tools, .. } = self;
         let axes = state.memory.axes.clone();

@@ -101,6 +101,9 @@ pub(crate) struct Remembered {
     pub key: Key,
     /// In the world frame, N·s, on b.
     pub impulse: Vec3,
+    /// Of rolling friction, N·m·s, on b.
+    #[serde(default)]
+    pub moment: Vec3,
     pub normal: Vec3,
     pub point: Vec3,
     /// The axis of the world that the first tangent is nearest to.

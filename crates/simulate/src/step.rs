@@ -27,7 +27,7 @@
 use std::time::Instant;
 
 use nonsmooth_linalg::Csc;
-use nonsmooth_problem::{Bounds, FrictionLocal, RowsLocal};
+use nonsmooth_problem::{Bounds, Friction, RowsLocal};
 use nonsmooth_scenes::Rotation;
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, cross, dot, norm, scale, sub};
 use nonsmooth_solve::{Limits, Outcome, Status, settings::SettingsMap};
@@ -38,6 +38,7 @@ use crate::islands::Islands;
 use crate::joints::Joints;
 use crate::moving::Moving;
 use crate::report::{ContactReport, EnergyBalance, StepReport, StepStatus, Timings, worst_share};
+use crate::rolling::{self, Roller, Turning};
 use crate::rotation::{Pose, apply_transposed, cayley, inverse, unit};
 use crate::state::{Remembered, State};
 use crate::world::oscillation;
@@ -91,6 +92,11 @@ struct Row {
     /// What the law adds to u⁺.
     shift: [f64; 3],
     r: [f64; 3],
+    /// Of rolling friction: the coefficient, the moments, and the given angular velocity of what is moved, in the law and in the energy.
+    mu_r: f64,
+    moment: [f64; 2],
+    turned: [f64; 2],
+    turned_mean: [f64; 2],
     warm: bool,
 }
 
@@ -309,6 +315,7 @@ impl Tools {
         for (near, &row) in self.near.iter().zip(&self.row_of) {
             let row = &mut self.rows[row as usize];
             (row.mu, row.shift, row.r) = (0.0, [near.place.gap / H, 0.0, 0.0], [0.0; 3]);
+            (row.mu_r, row.moment) = (0.0, [0.0; 2]);
         }
         let solved = self.solve((&scheme, world), inner, H)?.status == StepStatus::Solved;
         self.commit(&scheme, world, &mut rest, H, &mut StepReport::begun(state.t, H));
@@ -368,7 +375,7 @@ impl Tools {
         (world, state): (&World, &mut State),
         forces: &mut [Box<dyn Force>],
         h: f64,
-    ) -> Result<Option<FrictionLocal<3>>, SimulateError> {
+    ) -> Result<Option<Friction>, SimulateError> {
         if !self.start(scheme, world, state, forces, h) {
             return Ok(None);
         }
@@ -390,7 +397,11 @@ impl Tools {
         self.gather(all);
         self.columns(scheme, all);
         self.assemble(all, 0);
-        Ok(Some(self.slots[0].problem.clone()))
+        let slot = &self.slots[0];
+        Ok(Some(match &slot.rolling {
+            Some(problem) => Friction::RollingLocal(problem.clone()),
+            None => Friction::Local3(slot.problem.clone()),
+        }))
     }
 
     /// Bodies at the beginning of a step, with forces and margins; false where something is no finite number.
@@ -606,6 +617,7 @@ impl Tools {
                 arms.iter_mut().for_each(|a| a.moment_end = a.moment);
             }
             let [mut given, mut given_mean, mut given_middle, mut before] = [[0.0; 3]; 4];
+            let [mut turned, mut turned_mean] = [[0.0; 2]; 2];
             let theta = scheme.theta;
             for Arm { body, sign, moment, .. } in &arms {
                 let m = &self.bodies[*body as usize];
@@ -624,6 +636,10 @@ impl Tools {
                         given[i] += sign * dot(frame_end[i], add(last, end));
                         given_middle[i] += of(last);
                         given_mean[i] += theta * of(last) + (1.0 - theta) * of(first);
+                    }
+                    for k in 0..2 {
+                        turned[k] += sign * dot(frame_end[1 + k], m.angular);
+                        turned_mean[k] += sign * dot(frame[1 + k], m.angular);
                     }
                 }
             }
@@ -650,7 +666,18 @@ impl Tools {
                 Some(m) => clipped(frame.map(|d| scaled * dot(d, m.impulse)), law.mu),
                 None => [0.0; 3],
             };
+            let moment = match known.filter(|_| law.mu_r > 0.0) {
+                Some(m) => {
+                    let of = |t: Vec3| scaled * dot(t, m.moment);
+                    rolling::clipped([of(frame[1]), of(frame[2])], law.mu_r, r[0])
+                }
+                None => [0.0; 2],
+            };
             self.rows.push(Row {
+                mu_r: law.mu_r,
+                moment,
+                turned,
+                turned_mean,
                 mu: law.mu,
                 compliance,
                 place,
@@ -854,7 +881,12 @@ impl Tools {
         let point = &self.slots[k].point;
         for c in span.0..span.1 {
             let row = &mut self.rows[self.islands.order[c] as usize];
-            row.r.copy_from_slice(&point.r[3 * (c - span.0)..][..3]);
+            let rolls = self.slots[k].rolling.is_some();
+            let r = &point.r[if rolls { 5 } else { 3 } * (c - span.0)..];
+            row.r.copy_from_slice(&r[..3]);
+            if rolls {
+                row.moment.copy_from_slice(&r[3..5]);
+            }
         }
         for (&k, lambda) in self.scalars.iter().zip(&point.lambda) {
             self.joints.rows[k as usize].lambda = *lambda;
@@ -1039,7 +1071,62 @@ impl Tools {
             }
             problem.W.end_row();
         }
-        check == 0.0 && self.state_rows(span, k)
+        check == 0.0 && self.state_rows(span, k) && self.state_rolling(span, k)
+    }
+
+    /// The problem of an island with rolling friction, where a contact has any, in slot k beside that without.
+    fn state_rolling(&mut self, span: Span, k: usize) -> bool {
+        let Self { islands, rows, sides, bodies, joints, scalars, slots, .. } = self;
+        let Slot { problem, rolling, point, .. } = &mut slots[k];
+        let order = &islands.order[span.0..span.1];
+        *rolling = None;
+        if order.iter().all(|&c| rows[c as usize].mu_r == 0.0) {
+            return true;
+        }
+        let roller = |&c: &u32| {
+            let (row, side) = (&rows[c as usize], &sides[c as usize]);
+            let turning = row.arms.each_ref().map(|arm| {
+                if !arm.free {
+                    return Turning::default();
+                }
+                let b = &bodies[arm.body as usize];
+                let of = |k: usize| {
+                    let later = if row.later { &b.frame_end } else { &b.frame };
+                    let moved = scale(arm.sign, apply(later, row.frame_end[1 + k]));
+                    let pushed = scale(arm.sign, apply(&b.frame, row.frame[1 + k]));
+                    (moved, apply(&b.inverse, pushed))
+                };
+                let [one, two] = [of(0), of(1)];
+                Turning { rows: [one.0, two.0], solved: [one.1, two.1] }
+            });
+            let angular = |columns: &Columns| {
+                std::array::from_fn(|i| std::array::from_fn(|k| columns[3 + k][i]))
+            };
+            let spin = |k: usize| {
+                let free = row.arms.iter().zip(&turning).filter(|a| a.0.free);
+                free.map(|(a, t)| dot(t.rows[k], bodies[a.body as usize].spin_free)).sum::<f64>()
+            };
+            Roller {
+                mu_r: row.mu_r,
+                bodies: row.arms.each_ref().map(|a| a.free.then_some(a.body)),
+                rows: side.each_ref().map(|s| angular(&s.rows)),
+                solved: side.each_ref().map(|s| angular(&s.solved)),
+                free: [0, 1].map(|k| row.turned[k] + spin(k)),
+                start: row.moment,
+                sides: turning,
+            }
+        };
+        let rollers: Vec<Roller> = order.iter().map(roller).collect();
+        let levers = scalars.iter().enumerate().flat_map(|(j, &k)| {
+            let each = joints.levers(k as usize).iter();
+            each.map(move |l| (l.body, j, [l.solved[3], l.solved[4], l.solved[5]]))
+        });
+        let levers: Vec<_> = levers.collect();
+        let (stated, start) = rolling::problem(problem, &rollers, &levers, &point.r);
+        let finite = stated.q.iter().map(|x| 0.0 * x).sum::<f64>() == 0.0
+            && stated.W.blocks().iter().flatten().flatten().map(|x| 0.0 * x).sum::<f64>() == 0.0;
+        (*rolling, point.r) = (Some(stated), start);
+        finite
     }
 
     /// The scalar rows of an island, in slot k, after its contacts: `V`, `R`, `s` and the bounds.
@@ -1131,6 +1218,9 @@ impl Tools {
                     b.impulse = add(b.impulse, scale(x, row.frame[i]));
                     b.moment = add(b.moment, scale(x, arm.moment[i]));
                 }
+                for k in 0..2 {
+                    b.moment = add(b.moment, scale(arm.sign * row.moment[k], row.frame[1 + k]));
+                }
             }
         }
         for &k in scalars.iter() {
@@ -1198,6 +1288,17 @@ impl Tools {
                 let drive = row.given_mean[i] * row.r[i];
                 e.drives -= drive;
                 e.scale += work.abs() + drive.abs();
+            }
+            for k in 0..2 {
+                let sides = row.arms.iter().zip(motion).filter(|a| a.0.free);
+                let turn = |(arm, (_, omega)): (&Arm, (Vec3, Vec3))| {
+                    arm.sign * dot(row.frame[1 + k], omega)
+                };
+                let given = row.turned_mean[k] * row.moment[k];
+                let work = given + row.moment[k] * sides.map(turn).sum::<f64>();
+                e.tangential += work;
+                e.drives -= given;
+                e.scale += work.abs() + given.abs();
             }
         }
         for (k, row) in self.joints.rows.iter().enumerate() {
@@ -1305,6 +1406,9 @@ impl Tools {
                 impulse: [0.0; 3],
                 before: [0.0; 3],
                 after: [0.0; 3],
+                mu_r: near.law.mu_r,
+                moment: [0.0; 2],
+                rolling: [0.0; 2],
             };
             if let Some(row) = row {
                 (report.impulse, report.before) = (row.r, row.before);
@@ -1316,10 +1420,20 @@ impl Tools {
                         report.after[i] += side.velocity(i, b.v_new, b.spin_new);
                     }
                 }
+                report.moment = row.moment;
+                report.rolling = row.turned;
+                for arm in row.arms.iter().filter(|a| a.free) {
+                    let b = &self.bodies[arm.body as usize];
+                    let omega = b.omega(b.spin_new);
+                    for k in 0..2 {
+                        report.rolling[k] += arm.sign * dot(row.frame_end[1 + k], omega);
+                    }
+                }
             }
             memory.contacts.push(Remembered {
                 key: near.key,
                 impulse: report.world_impulse(),
+                moment: report.world_moment(),
                 normal: near.place.normal,
                 point: near.place.point,
                 axis,

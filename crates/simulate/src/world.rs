@@ -191,6 +191,8 @@ pub struct Law {
     pub e: f64,
     /// Tangential coefficient of restitution, in (−1, 1]; with Newton's law energy may grow where it is not 0.
     pub e_t: f64,
+    /// Coefficient of rolling friction, m, at least 0: how far off the point of contact the normal force may act.
+    pub mu_r: f64,
 }
 
 impl Law {
@@ -200,7 +202,8 @@ impl Law {
     }
 
     pub(crate) fn validate(&self, key: &str) -> Result<(), SimulateError> {
-        let Self { mu, e, e_t } = *self;
+        let Self { mu, e, e_t, mu_r } = *self;
+        require(|| format!("{key}.mu_r"), mu_r, mu_r >= 0.0, "a length of at least 0")?;
         require(|| format!("{key}.mu"), mu, mu >= 0.0, "a coefficient of at least 0")?;
         require(|| format!("{key}.e"), e, (0.0..=1.0).contains(&e), "a coefficient from 0 to 1")?;
         let allowed = -1.0 < e_t && e_t <= 1.0;
@@ -540,12 +543,18 @@ impl TryFrom<&Scene> for World {
         if !scene.solids.is_empty() {
             return Err(SimulateError::value("solids", "rigid bodies alone", scene.solids.len()));
         }
-        let law =
-            scene.contacts.first().map_or(Law::default(), |c| Law { mu: c.mu, e: c.e, e_t: 0.0 });
+        let law = scene.contacts.first().map_or(Law::default(), |c| Law {
+            mu: c.mu,
+            e: c.e,
+            e_t: 0.0,
+            mu_r: c.mu_r,
+        });
         for (k, c) in scene.contacts.iter().enumerate() {
-            if (c.mu, c.e) != (law.mu, law.e) {
-                let expected = format!("mu = {} and e = {} as of contacts[0]", law.mu, law.e);
-                let found = format!("mu = {} and e = {}", c.mu, c.e);
+            if (c.mu, c.e, c.mu_r) != (law.mu, law.e, law.mu_r) {
+                let told =
+                    |mu: f64, e: f64, mu_r: f64| format!("mu = {mu}, e = {e} and mu_r = {mu_r}");
+                let expected = told(law.mu, law.e, law.mu_r) + " as of contacts[0]";
+                let found = told(c.mu, c.e, c.mu_r);
                 return Err(SimulateError::value(format!("contacts[{k}]"), expected, found));
             }
             if c.a.is_some() && c.image != scenes::Image::default() {

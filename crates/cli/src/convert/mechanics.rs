@@ -382,10 +382,10 @@ impl<'a> Contacts<'a> {
         for law in &file.laws {
             let place = format!("/data/nslaws/{}", law.name);
             match law.kind.as_str() {
-                "NewtonImpactFrictionNSL" | "NewtonImpactNSL" | "FremondImpactFrictionNSL" => {}
-                "NewtonImpactRollingFrictionNSL" => {
-                    said.push(format!("{place}: rolling friction (`mu_r`) is left out"));
-                }
+                "NewtonImpactFrictionNSL"
+                | "NewtonImpactNSL"
+                | "FremondImpactFrictionNSL"
+                | "NewtonImpactRollingFrictionNSL" => {}
                 // Of joints, which name it.
                 "RelayNSL" => continue,
                 other => {
@@ -396,7 +396,9 @@ impl<'a> Contacts<'a> {
             kinds.insert(law.kind == "FremondImpactFrictionNSL");
             let [a, b] = law.groups;
             let old = out.laws.insert((a.min(b), a.max(b)), law);
-            if let Some(old) = old.filter(|old| (old.mu, old.e) != (law.mu, law.e)) {
+            if let Some(old) =
+                old.filter(|old| (old.mu, old.e, old.mu_rolling) != (law.mu, law.e, law.mu_rolling))
+            {
                 said.push(format!("{place}: it stands in place of `{}`", old.name));
             }
         }
@@ -441,7 +443,12 @@ impl<'a> Contacts<'a> {
         let laws = self.laws.iter().filter(|((a, b), _)| known(a) && known(b));
         let pairs: Vec<Value> = laws
             .map(|((a, b), law)| {
-                json!({"between": [material(*a), material(*b)], "mu": law.mu, "e": law.e})
+                let mut pair =
+                    json!({"between": [material(*a), material(*b)], "mu": law.mu, "e": law.e});
+                if law.mu_rolling > 0.0 {
+                    pair["mu_rolling"] = json!(law.mu_rolling);
+                }
+                pair
             })
             .collect();
         if !pairs.is_empty() {

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use nonsmooth_io::trajectory::{Checkpoint, Trajectory, Writer};
 use nonsmooth_io::{Info, IoError, ProblemFile, vtk};
-use nonsmooth_problem::{AnyProblem, Friction, FrictionLocal, Problem};
+use nonsmooth_problem::{AnyProblem, Friction, Problem};
 use nonsmooth_scenes::SceneError;
 use nonsmooth_scenes::draw::{self, Drawing};
 use nonsmooth_simulate::{Control, Observer, SceneFile, Simulation, StepReport, World};
@@ -187,7 +187,7 @@ pub struct Dump<'a> {
     pub every: Option<u64>,
     pub title: &'a str,
     /// The problem of the step that is being done.
-    pub problem: Option<FrictionLocal<3>>,
+    pub problem: Option<Friction>,
     /// What went wrong.
     pub mistake: Option<String>,
     pub watch: &'a mut dyn FnMut(&Simulation, &StepReport) -> Control,
@@ -215,8 +215,8 @@ impl Observer for Dump<'_> {
     }
 }
 
-fn fclib(path: &Path, problem: FrictionLocal<3>, title: &str) -> Result<(), String> {
-    let problem = AnyProblem::Friction(Friction::Local3(problem));
+fn fclib(path: &Path, problem: Friction, title: &str) -> Result<(), String> {
+    let problem = AnyProblem::Friction(problem);
     let format = files::target_format("--dump-fclib", path, None, problem.kind(), None)?;
     let info = Info { title: Some(title.into()), ..Info::default() };
     files::write(path, format, &ProblemFile { info, ..ProblemFile::new(problem) })

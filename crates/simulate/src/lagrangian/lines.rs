@@ -169,6 +169,10 @@ impl<const D: usize> Lines<D> {
             if law.validate("").is_err() {
                 law.validate(&format!("law({c})"))?;
             }
+            if law.mu_r != 0.0 {
+                let expected = "0 (only bodies of a world have rolling friction)";
+                return Err(SimulateError::value(format!("law({c}).mu_r"), expected, law.mu_r));
+            }
             let (gap, given) = (self.gaps[c], self.given[0][D * c]);
             let (active, persists, impact) = unilateral(c, D * c, gap, given, law.e);
             if !active {

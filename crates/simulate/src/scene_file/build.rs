@@ -20,8 +20,8 @@ use crate::{
 const GROUPS: usize = 32;
 
 impl From<LawTable> for Law {
-    fn from(LawTable { mu, e, e_t }: LawTable) -> Self {
-        Self { mu, e, e_t }
+    fn from(LawTable { mu, e, e_t, mu_rolling: mu_r }: LawTable) -> Self {
+        Self { mu, e, e_t, mu_r }
     }
 }
 
@@ -429,7 +429,8 @@ impl<'a> Builder<'a> {
                 let names = format!("{} and {}", pair.between[0], pair.between[1]);
                 return Err(twice(&format!("pairs[{k}].between"), &names));
             }
-            self.world.pair(a, b, Law { mu: pair.mu, e: pair.e, e_t: pair.e_t });
+            let super::PairTable { mu, e, e_t, mu_rolling: mu_r, .. } = *pair;
+            self.world.pair(a, b, Law { mu, e, e_t, mu_r });
             if let Some(ComplianceTable { stiffness, damping }) = pair.compliance {
                 self.world.comply(a, b, Compliance { stiffness, damping });
             }

@@ -145,6 +145,14 @@ pub struct LawTable {
     pub e: f64,
     /// Tangential coefficient of restitution, above −1 and at most 1.
     pub e_t: f64,
+    /// Coefficient of rolling friction, m.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub mu_rolling: f64,
+}
+
+/// What a scene need not say.
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
 }
 
 /// The law of contact of two materials.
@@ -162,6 +170,9 @@ pub struct PairTable {
     /// Tangential coefficient of restitution, above −1 and at most 1.
     #[serde(default)]
     pub e_t: f64,
+    /// Coefficient of rolling friction, m.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub mu_rolling: f64,
     /// How contacts give way, if they do; then without restitution.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub compliance: Option<ComplianceTable>,

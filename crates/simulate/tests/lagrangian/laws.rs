@@ -32,7 +32,7 @@ fn impact(law: Law, scheme: LagrangianScheme) -> [f64; 2] {
 
 #[test]
 fn the_laws_of_impact_are_those_of_newton_and_fremond() {
-    let law = Law { mu: 10.0, e: 0.5, e_t: 0.0 };
+    let law = Law { mu: 10.0, e: 0.5, e_t: 0.0, mu_r: 0.0 };
     let newton = LagrangianScheme::default();
     let fremond = LagrangianScheme { impact: Impact::Fremond, ..newton };
     for (law, scheme, expected) in [
@@ -341,7 +341,7 @@ fn consistent_velocities_obey_the_relations() {
 
 #[test]
 fn a_checkpoint_goes_on_as_if_nothing_had_happened() {
-    let law = Law { mu: 0.3, e: 0.7, e_t: 0.0 };
+    let law = Law { mu: 0.3, e: 0.7, e_t: 0.0, mu_r: 0.0 };
     let new =
         || LagrangianSimulation::new(point(law), theta(0.5), &[0.0, 0.1], &[1.0, 0.0]).unwrap();
     let mut whole = new();
@@ -475,8 +475,11 @@ fn mistakes_are_named() {
     assert!(said(step(right, 1.0, 0.0)).starts_with("h: expected a positive number"));
     let text = said(step(Wrong { rows: Some([1.0, -1.0]), ..right }, 1.0, 0.1));
     assert!(text.starts_with("row_law(0): expected a lower bound"), "{text}");
-    let text =
-        said(step(Wrong { law: Some(Law { mu: 0.0, e: 2.0, e_t: 0.0 }), ..right }, 1.0, 0.1));
+    let text = said(step(
+        Wrong { law: Some(Law { mu: 0.0, e: 2.0, e_t: 0.0, mu_r: 0.0 }), ..right },
+        1.0,
+        0.1,
+    ));
     assert!(text.starts_with("law(0).e: expected a coefficient from 0 to 1"), "{text}");
     let text = said(step(Wrong { mass: -1.0, ..right }, 100.0, 0.1));
     assert!(text.starts_with(mass), "{text}");

@@ -66,7 +66,7 @@ impl Lagrangian<2> for SliderCrank {
         true
     }
     fn law(&self, _: usize, _: f64, _: &[f64], _: &[f64]) -> Law {
-        Law { mu: 0.01, e: 0.4, e_t: 0.0 }
+        Law { mu: 0.01, e: 0.4, e_t: 0.0, mu_r: 0.0 }
     }
     fn relations(&self, _: f64, q: &[f64], phi: &mut [f64]) {
         if self.clearance.is_none() {

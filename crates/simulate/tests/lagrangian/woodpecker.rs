@@ -53,7 +53,7 @@ impl Lagrangian<2> for Woodpecker {
         true
     }
     fn law(&self, contact: usize, _: f64, _: &[f64], _: &[f64]) -> Law {
-        Law { mu: 0.3, e: if contact == 0 { 0.5 } else { 0.0 }, e_t: 0.0 }
+        Law { mu: 0.3, e: if contact == 0 { 0.5 } else { 0.0 }, e_t: 0.0, mu_r: 0.0 }
     }
 }
 

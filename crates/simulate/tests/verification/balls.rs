@@ -308,7 +308,7 @@ fn a_ball_that_rolls_around_a_sphere_stays_on_it_to_second_order() {
 
 #[test]
 fn tangential_restitution_turns_the_slip_about() {
-    let mut world = weightless(1.0, 0.5).with_law(Law { mu: 1.0, e: 0.5, e_t: 0.5 });
+    let mut world = weightless(1.0, 0.5).with_law(Law { mu: 1.0, e: 0.5, e_t: 0.5, mu_r: 0.0 });
     world.add(Body::floor());
     let b = world.add(ball(R).at([0.0, 0.0, R]).moving([1.0, 0.0, -2.0], [0.0; 3]));
     let mut simulation = simulation(world);

@@ -211,7 +211,9 @@ fn mistakes_are_named_by_their_place() {
             .contains("triangle inequality")
     );
     assert!(message(|w| w.bodies[1].parts[0].material = 4).contains("parts[0].material"));
-    assert!(message(|w| w.law = Law { mu: 0.1, e: 1.1, e_t: 0.0 }).starts_with("law.e:"));
+    assert!(
+        message(|w| w.law = Law { mu: 0.1, e: 1.1, e_t: 0.0, mu_r: 0.0 }).starts_with("law.e:")
+    );
     assert!(
         message(|w| w.bodies[1].motion =
             nonsmooth_simulate::Motion::Surface { linear: [f64::NAN; 3], angular: [0.0; 3] })

@@ -11,6 +11,7 @@ mod mechanisms;
 mod overlap;
 mod piles;
 mod projection;
+mod rolling;
 mod solids;
 mod tops;
 
@@ -22,12 +23,12 @@ const G: f64 = 9.81;
 
 /// A world with gravity downwards and one law.
 fn world(mu: f64, e: f64) -> World {
-    World::new([0.0, 0.0, -G]).with_law(Law { mu, e, e_t: 0.0 })
+    World::new([0.0, 0.0, -G]).with_law(Law { mu, e, ..Law::default() })
 }
 
 /// The same, without gravity.
 fn weightless(mu: f64, e: f64) -> World {
-    World::new([0.0; 3]).with_law(Law { mu, e, e_t: 0.0 })
+    World::new([0.0; 3]).with_law(Law { mu, e, ..Law::default() })
 }
 
 /// A solid ball of 1 kg.

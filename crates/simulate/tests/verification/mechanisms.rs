@@ -176,7 +176,8 @@ fn bricards_loop_moves_though_it_has_an_equation_too_many() {
 #[test]
 fn a_double_pendulum_that_hits_a_wall_keeps_its_energy_to_second_order() {
     let off = |h: f64| {
-        let mut world = World::new([0.0, 0.0, -G]).with_law(Law { mu: 0.0, e: 1.0, e_t: 0.0 });
+        let mut world =
+            World::new([0.0, 0.0, -G]).with_law(Law { mu: 0.0, e: 1.0, e_t: 0.0, mu_r: 0.0 });
         let wall = Body::floor().turned(Rotation::about(Y, -std::f64::consts::FRAC_PI_2));
         world.add(wall.at([0.4, 0.0, 0.0]));
         let tip = Part { position: [0.5, 0.0, 0.0], ..Part::new(Shape::Sphere { radius: 0.05 }) };

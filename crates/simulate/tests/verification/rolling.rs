@@ -1,0 +1,111 @@
+//! Rolling friction in motion: a ball that comes to rest, slopes, energy, steeper piles.
+
+use nonsmooth_simulate::{Body, Law, Motion, Simulation, World};
+
+use super::{G, ball, simulation};
+
+const RADIUS: f64 = 0.1;
+
+/// A ball on a slope, which is the plane z = 0 under a gravity that is turned, rolling down at a speed.
+fn rolling(law: Law, slope: f64, speed: f64) -> (Simulation, usize) {
+    let (s, c) = f64::atan(slope).sin_cos();
+    let mut world = World::new([G * s, 0.0, -G * c]).with_law(law);
+    world.add(Body::floor());
+    let body = ball(RADIUS).at([0.0, 0.0, RADIUS]);
+    let id = world.add(body.moving([speed, 0.0, 0.0], [0.0, speed / RADIUS, 0.0]));
+    (simulation(world), id.index())
+}
+
+fn law(mu_r: f64) -> Law {
+    Law { mu: 0.5, mu_r, ..Law::default() }
+}
+
+/// `dv/dt = −(5/7) mu_r g/R` until it rests, and then it rests.
+#[test]
+fn a_rolling_ball_comes_to_rest() {
+    let (mu_r, v, h) = (0.002, 0.5, 1e-3);
+    let (mut simulation, ball) = rolling(law(mu_r), 0.0, v);
+    let slower = 5.0 / 7.0 * mu_r * G / RADIUS;
+    let end = v / slower;
+    let mut rolled = 0;
+    let mut worst: f64 = 0.0;
+    let steps = (1.2 * end / h) as usize;
+    for k in 1..=steps {
+        let report = simulation.step(h).unwrap();
+        assert!(report.status.is_solved(), "{report:?}");
+        worst = worst.max(report.energy.relative_imbalance());
+        let t = k as f64 * h;
+        let expected = (v - slower * t).max(0.0);
+        let now = simulation.state().velocity[ball][0];
+        if (t - end).abs() > 2.0 * h {
+            assert!((now - expected).abs() < 1e-8, "t = {t}: {now} {expected}");
+        }
+        rolled += usize::from(report.counts.roll > 0);
+    }
+    assert!(worst <= 1e-12, "{worst:e}");
+    assert!((rolled as f64 * h - end).abs() < 3.0 * h, "{rolled} steps");
+    // v²/2a.
+    let far = simulation.state().position[ball][0];
+    assert!((far - v * v / (2.0 * slower)).abs() < 2.0 * v * h, "{far}");
+    let spin = simulation.state().spin[ball];
+    assert!(spin.iter().all(|x| x.abs() < 1e-10), "{spin:?}");
+}
+
+#[test]
+fn a_ball_rests_on_a_slope_up_to_mu_r_over_radius() {
+    let mu_r = 0.002;
+    for (share, rests) in [(0.5, true), (0.99, true), (1.01, false), (3.0, false)] {
+        let slope = share * mu_r / RADIUS;
+        let (mut simulation, ball) = rolling(law(mu_r), slope, 0.0);
+        let (h, steps) = (1e-3, 200);
+        for _ in 0..steps {
+            assert!(simulation.step(h).unwrap().status.is_solved());
+        }
+        let v = simulation.state().velocity[ball][0];
+        assert_eq!(v.abs() < 1e-12, rests, "{share}: {v}");
+        if !rests {
+            let (s, c) = f64::atan(slope).sin_cos();
+            let expected = 5.0 / 7.0 * G * (s - mu_r / RADIUS * c) * h * f64::from(steps);
+            assert!((v / expected - 1.0).abs() < 1e-8, "{v} {expected}");
+        }
+    }
+}
+
+/// A ball that cannot roll stands on a table that turns, and goes in a circle with it.
+#[test]
+fn what_turns_takes_part() {
+    let mut world = World::new([0.0, 0.0, -G]).with_law(law(1.0));
+    let table = Motion::Surface { linear: [0.0; 3], angular: [0.0, 0.0, 2.0] };
+    world.add(Body { motion: table, ..Body::floor() });
+    let body = ball(RADIUS).at([0.5, 0.0, RADIUS]).moving([0.0, 1.0, 0.0], [0.0, 0.0, 2.0]);
+    let id = world.add(body);
+    let mut simulation = simulation(world);
+    for _ in 0..200 {
+        let report = simulation.step(1e-3).unwrap();
+        assert!(report.status.is_solved() && report.energy.relative_imbalance() <= 1e-12);
+    }
+    let [x, y, _] = simulation.state().position[id.index()];
+    assert!((x.hypot(y) - 0.5).abs() < 2e-3, "{x} {y}");
+    assert!((y.atan2(x) - 0.4).abs() < 2e-3, "{x} {y}");
+}
+
+/// Three balls on a plane with a fourth upon them stand where they do not roll, and fall apart where they do.
+#[test]
+fn a_heap_stands_with_rolling_friction() {
+    let height = |mu_r: f64| {
+        let mut world = World::new([0.0, 0.0, -G]).with_law(Law { mu: 0.6, ..law(mu_r) });
+        world.add(Body::floor());
+        for angle in [0.0_f64, 2.0944, 4.18879] {
+            let place = [0.1156 * angle.cos(), 0.1156 * angle.sin(), RADIUS];
+            world.add(ball(RADIUS).at(place));
+        }
+        let top = world.add(ball(RADIUS).at([0.0, 0.0, RADIUS + 0.1634]));
+        let mut simulation = simulation(world);
+        for _ in 0..400 {
+            assert!(simulation.step(2e-3).unwrap().status.is_solved());
+        }
+        simulation.state().position[top.index()][2]
+    };
+    let (free, held) = (height(0.0), height(0.03));
+    assert!(free < 0.15 && held > 0.25, "{free} {held}");
+}
