@@ -237,3 +237,25 @@ fn an_arm_pushes_a_box() {
     // All its torque goes through the joint: friction, damper and push together.
     assert!(shoulder.violation < 1e-12 && shoulder.angle > 1.0, "{shoulder:?}");
 }
+
+/// Rolling friction slows each ball down by (5/7) mu_r g/R, until it rests.
+#[test]
+fn balls_roll_out() {
+    let mut rolled = [0; 2];
+    let (simulation, _) = run("rolling_resistance", |simulation, report| {
+        let resting = simulation.state().velocity.iter().filter(|v| v[0].abs() < 1e-12).count();
+        rolled[0] += usize::from(report.counts.roll == 2);
+        // The floor rests too.
+        rolled[1] += usize::from(resting == 3);
+    });
+    for (name, mu_r) in [("steel", 0.002), ("wood", 0.004)] {
+        let [x, _, _] = simulation.state().position[place(&simulation, name)];
+        let slower = 5.0 / 7.0 * mu_r * 9.81 / 0.1;
+        let far = 0.25 / (2.0 * slower);
+        assert!((x - far).abs() < 1e-3, "{name}: {x}, {far} expected");
+    }
+    let [x, _, _] = simulation.state().position[place(&simulation, "glass")];
+    assert!((x - 0.5 * 3.75).abs() < 1e-8, "{x}");
+    // Steps of 1 ms: both roll for 1.784 s, both rest after 3.568 s.
+    assert!((rolled[0] as f64 - 1784.0).abs() < 4.0 && (rolled[1] as f64 - 182.0).abs() < 4.0, "{rolled:?}");
+}

@@ -110,13 +110,16 @@ impl Touch {
 /// What a solution says of the contacts, in their order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Answer<'a> {
-    /// Impulses r, `[N, T1, T2]` each, N·s.
+    /// Impulses r, `[N, T1, T2]` each, N·s; of rolling friction five, whose moments are not drawn.
     pub r: &'a [f64],
     /// Relative velocities u, `[N, T1, T2]` each, m/s.
     pub u: Option<&'a [f64]>,
     /// What each contact does.
     pub motions: Option<&'a [Motion]>,
 }
+
+/// The components of a contact with rolling friction.
+const ROLLING: usize = 5;
 
 impl Picture {
     /// The scene before the step, its one frame.
@@ -167,7 +170,7 @@ impl Picture {
         let nc = contacts.len();
         for (key, values) in [("impulses", Some(answer.r)), ("velocities", answer.u)] {
             let Some(values) = values else { continue };
-            if values.len() != 3 * nc {
+            if ![3 * nc, ROLLING * nc].contains(&values.len()) {
                 let expected = format!("{} entries, 3 for each contact", 3 * nc);
                 return Err(SceneError::value(key, expected, values.len()));
             }
@@ -177,7 +180,7 @@ impl Picture {
             let expected = format!("{nc} entries, one for each contact");
             return Err(SceneError::value("motions", expected, m.len()));
         }
-        let three = |x: &[f64], c: usize| from_fn(|k| x[3 * c + k]);
+        let three = |x: &[f64], c: usize| from_fn(|k| x[x.len() / nc * c + k]);
         for (c, contact) in contacts.iter_mut().enumerate() {
             contact.r = Some(three(answer.r, c));
             contact.u = answer.u.map(|u| three(u, c));
