@@ -257,5 +257,8 @@ fn balls_roll_out() {
     let [x, _, _] = simulation.state().position[place(&simulation, "glass")];
     assert!((x - 0.5 * 3.75).abs() < 1e-8, "{x}");
     // Steps of 1 ms: both roll for 1.784 s, both rest after 3.568 s.
-    assert!((rolled[0] as f64 - 1784.0).abs() < 4.0 && (rolled[1] as f64 - 182.0).abs() < 4.0, "{rolled:?}");
+    assert!(
+        (rolled[0] as f64 - 1784.0).abs() < 4.0 && (rolled[1] as f64 - 182.0).abs() < 4.0,
+        "{rolled:?}"
+    );
 }

@@ -1,6 +1,6 @@
-//! Rolling friction in motion: a ball that comes to rest, slopes, energy, steeper piles.
+//! Rolling friction in motion: a ball that comes to rest, slopes, what turns, a ball upon another one; and the energy of each step.
 
-use nonsmooth_simulate::{Body, Law, Motion, Simulation, World};
+use nonsmooth_simulate::{Body, Law, Motion, Shape, Simulation, World};
 
 use super::{G, ball, simulation};
 
@@ -89,23 +89,23 @@ fn what_turns_takes_part() {
     assert!((y.atan2(x) - 0.4).abs() < 2e-3, "{x} {y}");
 }
 
-/// Three balls on a plane with a fourth upon them stand where they do not roll, and fall apart where they do.
+/// A ball stands off the top of another one where `tan β ≤ mu_r/R`, and rolls down where it is not held.
 #[test]
-fn a_heap_stands_with_rolling_friction() {
-    let height = |mu_r: f64| {
-        let mut world = World::new([0.0, 0.0, -G]).with_law(Law { mu: 0.6, ..law(mu_r) });
-        world.add(Body::floor());
-        for angle in [0.0_f64, 2.0944, 4.18879] {
-            let place = [0.1156 * angle.cos(), 0.1156 * angle.sin(), RADIUS];
-            world.add(ball(RADIUS).at(place));
-        }
-        let top = world.add(ball(RADIUS).at([0.0, 0.0, RADIUS + 0.1634]));
+fn a_ball_stands_upon_another_one() {
+    for (share, stands) in [(0.0, false), (0.9, false), (1.1, true), (3.0, true)] {
+        let beta: f64 = 0.2;
+        let mu_r = share * RADIUS * beta.tan();
+        let mut world = World::new([0.0, 0.0, -G]).with_law(law(mu_r));
+        let below = nonsmooth_simulate::Part::new(Shape::Sphere { radius: RADIUS });
+        world.add(Body::fixed(vec![below]));
+        let place = [2.0 * RADIUS * beta.sin(), 0.0, 2.0 * RADIUS * beta.cos()];
+        let id = world.add(ball(RADIUS).at(place));
         let mut simulation = simulation(world);
-        for _ in 0..400 {
-            assert!(simulation.step(2e-3).unwrap().status.is_solved());
+        for _ in 0..500 {
+            assert!(simulation.step(1e-3).unwrap().status.is_solved());
         }
-        simulation.state().position[top.index()][2]
-    };
-    let (free, held) = (height(0.0), height(0.03));
-    assert!(free < 0.15 && held > 0.25, "{free} {held}");
+        let [x, _, z] = simulation.state().position[id.index()];
+        let far = (x - place[0]).hypot(z - place[2]);
+        assert_eq!(far < 1e-6, stands, "{share}: {far}");
+    }
 }
