@@ -83,6 +83,7 @@ const SOLVE: Floors = Floors {
         &[
             "contact/parts",
             "contact/condense",
+            "contact/weigh",
             "contact/existence",
             "complementarity/parts",
             "complementarity/guarantees",

@@ -7,11 +7,11 @@ use nonsmooth_problem::{
 };
 
 use crate::bridges::{AsNcp, FacetInner, FacetOuter, First, Glocker};
-use crate::contact::Weighed;
 use crate::contact::condense::Condense;
 use crate::contact::form::Regularised;
 use crate::contact::proximal::Proximal;
 use crate::contact::solvers::{inner_rolling_solvers, inner_solvers, rolling_solvers, solvers};
+use crate::contact::weigh::Weighed;
 
 pub use crate::core::register::{
     About, Composed, DEFAULT, Described, Edge, Entry, Prefix, Registered, Solves, about, abouts,

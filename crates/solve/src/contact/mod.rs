@@ -3,7 +3,7 @@
 //! | floor | rooms |
 //! | --- | --- |
 //! | families | [`splitting`], [`projection`], [`newton`], [`interior`], [`proximal`], [`optimisation`], [`auto`] |
-//! | what families share | [`parts`], [`existence`], [`condense`], [`Weigh`] |
+//! | what families share | [`parts`], [`existence`], [`condense`], [`weigh`] |
 //! | [`form`] | what a family may ask of a problem |
 //! | [`law`] | one contact: cones, complementarity functions, one-contact solvers |
 
@@ -20,7 +20,6 @@ pub mod projection;
 pub mod proximal;
 pub mod solvers;
 pub mod splitting;
-mod weigh;
+pub mod weigh;
 
 pub use condense::Condense;
-pub use weigh::{Weigh, Weighed};

@@ -2,7 +2,6 @@
 
 use nonsmooth_problem::check::Kinematic;
 
-use crate::contact::Weigh;
 use crate::contact::auto::Auto;
 use crate::contact::form::{
     Concurrent, Disked, Explicit, Frictional, Linear, Linearised, OnContacts, Regularised,
@@ -20,6 +19,7 @@ use crate::contact::projection::{
 };
 use crate::contact::proximal::Admm;
 use crate::contact::splitting::{Colored, Nsgs, Psor};
+use crate::contact::weigh::Weigh;
 use crate::core::reformulation::Reformulation;
 use crate::core::register::{Described, Entry};
 use crate::{Boxed, Solver};
