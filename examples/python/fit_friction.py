@@ -27,9 +27,9 @@ def motion(mu: float) -> tuple[Vector, Vector]:
     for _ in range(STEPS):
         problem.update(q=v - [H * GRAVITY, 0.0, 0.0])
         answer = ns.solve(problem, tol=1e-12)
-        _, by_velocity = ns.derivative(problem, answer, "q").jvp(dv)
-        _, by_friction = ns.derivative(problem, answer, "mu").jvp([1.0])
-        v, dv = answer.u, by_velocity + by_friction
+        by_velocity = ns.derivative(problem, answer, "q").jvp(dv)
+        by_friction = ns.derivative(problem, answer, "mu").jvp([1.0])
+        v, dv = answer.u, by_velocity["u"] + by_friction["u"]
         x, dx = x + H * v[1:], dx + H * dv[1:]
         places.append(x)
         changes.append(dx)

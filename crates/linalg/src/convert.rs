@@ -18,45 +18,7 @@ impl Csc {
         row_idx: &[usize],
         values: &[f64],
     ) -> Result<Self, MatrixError> {
-        let fits = |name: &str, expected: usize, found: usize| match expected == found {
-            true => Ok(()),
-            false => Err(MatrixError::shape(
-                name,
-                format!("{expected} entries"),
-                format!("{found} entries"),
-            )),
-        };
-        fits("col_ptr", ncols + 1, col_ptr.len())?;
-        fits("values", row_idx.len(), values.len())?;
-        if col_ptr[0] != 0 || col_ptr[ncols] != row_idx.len() {
-            return Err(MatrixError::value(
-                "col_ptr",
-                format!("0 first and {} last", row_idx.len()),
-                format!("{} first and {} last", col_ptr[0], col_ptr[ncols]),
-            ));
-        }
-        for j in 0..ncols {
-            let (begin, end) = (col_ptr[j], col_ptr[j + 1]);
-            if begin > end || end > row_idx.len() {
-                return Err(MatrixError::value(
-                    format!("col_ptr[{}]", j + 1),
-                    format!("from {begin} to {}", row_idx.len()),
-                    end,
-                ));
-            }
-            for k in begin..end {
-                let least = if k > begin { row_idx[k - 1] + 1 } else { 0 };
-                if row_idx[k] < least || row_idx[k] >= nrows {
-                    return Err(MatrixError::value(
-                        format!("row_idx[{k}]"),
-                        format!("from {least} to {}", nrows.saturating_sub(1)),
-                        row_idx[k],
-                    ));
-                }
-            }
-        }
-        let columns = (0..ncols).flat_map(|j| (col_ptr[j]..col_ptr[j + 1]).map(move |k| (j, k)));
-        Self::from_triplets(nrows, ncols, columns.map(|(j, k)| (row_idx[k], j, values[k])))
+        Self::from_vecs(nrows, ncols, col_ptr.to_vec(), row_idx.to_vec(), values.to_vec())
     }
 }
 

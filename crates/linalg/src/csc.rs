@@ -31,6 +31,61 @@ impl Csc {
         }
     }
 
+    /// A matrix that takes the three arrays of compressed columns: column j has the rows `row_idx[col_ptr[j]..col_ptr[j + 1]]`, in increasing order. Nothing is copied.
+    ///
+    /// Errors: arrays whose lengths do not fit each other, pointers that decrease, rows out of range or out of order; each names its entry.
+    pub fn from_vecs(
+        nrows: usize,
+        ncols: usize,
+        col_ptr: Vec<usize>,
+        row_idx: Vec<usize>,
+        values: Vec<f64>,
+    ) -> Result<Self, MatrixError> {
+        let fits = |name: &str, expected: usize, found: usize| match expected == found {
+            true => Ok(()),
+            false => Err(MatrixError::shape(
+                name,
+                format!("{expected} entries"),
+                format!("{found} entries"),
+            )),
+        };
+        fits("col_ptr", ncols + 1, col_ptr.len())?;
+        fits("values", row_idx.len(), values.len())?;
+        if col_ptr[0] != 0 || col_ptr[ncols] != row_idx.len() {
+            return Err(MatrixError::value(
+                "col_ptr",
+                format!("0 first and {} last", row_idx.len()),
+                format!("{} first and {} last", col_ptr[0], col_ptr[ncols]),
+            ));
+        }
+        for j in 0..ncols {
+            let (begin, end) = (col_ptr[j], col_ptr[j + 1]);
+            if begin > end || end > row_idx.len() {
+                return Err(MatrixError::value(
+                    format!("col_ptr[{}]", j + 1),
+                    format!("from {begin} to {}", row_idx.len()),
+                    end,
+                ));
+            }
+            for k in begin..end {
+                let least = if k > begin { row_idx[k - 1] + 1 } else { 0 };
+                if row_idx[k] < least || row_idx[k] >= nrows {
+                    return Err(MatrixError::value(
+                        format!("row_idx[{k}]"),
+                        format!("from {least} to {}", nrows.saturating_sub(1)),
+                        row_idx[k],
+                    ));
+                }
+            }
+        }
+        Ok(Self { nrows, ncols, col_ptr, row_idx, values })
+    }
+
+    /// Column pointers, row indices and values, as [`from_vecs`](Self::from_vecs) takes them.
+    pub fn into_vecs(self) -> (Vec<usize>, Vec<usize>, Vec<f64>) {
+        (self.col_ptr, self.row_idx, self.values)
+    }
+
     /// Assembles `(row, column, value)` entries; duplicates are added in the order in which they come.
     ///
     /// Explicit zeros are kept: they belong to the structure that the caller stated.

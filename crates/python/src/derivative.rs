@@ -1,11 +1,18 @@
 //! Derivatives of solutions.
 
 use nonsmooth_analysis::derivative::{Change, Derivative as Inner};
-use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, Friction, Problem as _};
+use nonsmooth_linalg::Matrix;
+use nonsmooth_linalg::budget::Budget;
+use nonsmooth_problem::Problem as _;
+use nonsmooth_solve::guard;
 use numpy::PyArray1;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::Arc;
 
+use crate::function::Watcher;
 use crate::problem::{Problem, point};
+use crate::wait::{ask, elsewhere};
 use crate::{expected, mistake, numbers};
 
 /// The derivative of a solution with respect to the data; `nonsmooth.derivative` has the words.
@@ -13,6 +20,12 @@ use crate::{expected, mistake, numbers};
 pub struct Derivative(Inner);
 
 type Array<'py> = Bound<'py, PyArray1<f64>>;
+
+/// A change of a part, as it is given.
+enum Given {
+    Vector(Vec<f64>),
+    Matrix(Matrix),
+}
 
 #[pymethods]
 impl Derivative {
@@ -24,28 +37,32 @@ impl Derivative {
         answer: &Bound<'_, PyAny>,
         tolerance: f64,
     ) -> PyResult<Self> {
-        let file = problem.get().file();
+        if !(tolerance > 0.0 && tolerance <= 1.0) {
+            return Err(expected("tol", "a number in (0, 1]", tolerance));
+        }
+        let problem = problem.get();
+        let file = problem.file();
         let point = point(&file.problem, answer)?;
         file.problem.validate_point(&point).map_err(mistake)?;
-        let made = py.detach(|| match (&file.problem, &point) {
-            (AnyProblem::Complementarity(Complementarity::Lcp(p)), AnyPoint::Lcp(point)) => {
-                Some(Inner::of_lcp(p, point, tolerance))
-            }
-            (AnyProblem::Friction(Friction::Local2(p)), AnyPoint::Local(point)) => {
-                Some(Inner::of_local(p, point, tolerance))
-            }
-            (AnyProblem::Friction(Friction::Local3(p)), AnyPoint::Local(point)) => {
-                Some(Inner::of_local(p, point, tolerance))
-            }
-            _ => None,
+        // F may be a function of Python, and a factorisation may take long.
+        let watcher = Arc::new(Watcher::default());
+        let watching = problem.faults.watch(&watcher);
+        let budget = Budget { cancel: Some(watcher.stop.clone()), ..Budget::default() };
+        let hear = |_: Option<()>| ask(&watcher, |_| Ok(false));
+        let small = file.problem.unknowns() <= guard::SMALL;
+        let make = move || {
+            let _scope = budget.enter();
+            Inner::of(&file.problem, &point, tolerance)
+        };
+        let made = py.detach(|| match small {
+            true => make(),
+            false => elsewhere(hear, move |_| make()),
         });
-        match made {
-            Some(made) => made.map(Self).map_err(mistake),
-            None => {
-                let what = "a linear complementarity problem or a local one of contacts";
-                Err(expected("derivative", what, file.problem.kind().name()))
-            }
+        drop(watching);
+        if let Some(fault) = watcher.fault() {
+            return Err(fault);
         }
+        made.map(Self).map_err(mistake)
     }
 
     /// Pairs or contacts at the border of two pieces.
@@ -54,51 +71,69 @@ impl Derivative {
         self.0.degenerate
     }
 
-    /// x: z or r.
-    fn point<'py>(&self, py: Python<'py>) -> Array<'py> {
-        PyArray1::from_slice(py, self.0.point())
+    /// The parts of the solution with their lengths.
+    #[getter]
+    fn solution(&self) -> Vec<(&'static str, usize)> {
+        self.0.solution().collect()
     }
 
-    /// dx and dy of a change of q, of the matrix, of mu.
-    #[pyo3(signature = (vector=None, matrix=None, mu=None))]
+    /// The letters of the data with their shapes.
+    #[getter]
+    fn data(&self) -> Vec<(&'static str, Vec<usize>)> {
+        let vectors = self.0.vectors().map(|(letter, n)| (letter, vec![n]));
+        vectors.chain(self.0.matrices().map(|(letter, shape)| (letter, shape.to_vec()))).collect()
+    }
+
+    /// How the parts of the solution change with one part of the data.
     fn forward<'py>(
         &self,
         py: Python<'py>,
-        vector: Option<&Bound<'py, PyAny>>,
-        matrix: Option<&Bound<'py, PyAny>>,
-        mu: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<(Array<'py>, Array<'py>)> {
-        let n = self.0.point().len();
-        let vector = vector.map(|v| of_length("dq", v, n)).transpose()?;
-        let matrix = matrix.map(|m| numbers::matrix("dM", m)).transpose()?;
-        if let Some(m) = matrix.as_ref().filter(|m| (m.nrows(), m.ncols()) != (n, n)) {
-            let found = format!("{} × {}", m.nrows(), m.ncols());
-            return Err(expected("dM", &format!("{n} × {n}"), found));
+        letter: &str,
+        direction: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let place = format!("d{letter}");
+        let given = match self.0.matrices().any(|m| m.0 == letter) {
+            true => Given::Matrix(numbers::matrix(&place, direction)?),
+            false => Given::Vector(numbers::by_contact(&place, direction)?.0),
+        };
+        let change = match &given {
+            Given::Vector(d) => Change::Vector(d),
+            Given::Matrix(d) => Change::Matrix(d),
+        };
+        let moved = py.detach(|| self.0.forward(&[(letter, change)])).map_err(mistake)?;
+        let all = PyDict::new(py);
+        for (name, change) in moved.parts {
+            all.set_item(name, PyArray1::from_vec(py, change))?;
         }
-        let mu = mu.map(|mu| of_length("dmu", mu, self.0.contacts())).transpose()?;
-        let change =
-            Change { vector: vector.as_deref(), matrix: matrix.as_ref(), mu: mu.as_deref() };
-        let (dx, dy) = self.0.forward(&change);
-        Ok((PyArray1::from_vec(py, dx), PyArray1::from_vec(py, dy)))
+        Ok(all)
     }
 
-    /// The gradients with respect to q and mu of a function with these gradients with respect to x and y.
+    /// The gradients with respect to the vectors, and the pairs (a, b) of `Σ a bᵀ` with respect to the matrices, of a function whose gradients with respect to parts of
+    /// the solution are given.
     fn backward<'py>(
         &self,
         py: Python<'py>,
-        x: &Bound<'py, PyAny>,
-        y: &Bound<'py, PyAny>,
-    ) -> PyResult<(Array<'py>, Array<'py>)> {
-        let n = self.0.point().len();
-        let gradient = self.0.backward(&of_length("x", x, n)?, &of_length("y", y, n)?);
-        Ok((PyArray1::from_vec(py, gradient.vector), PyArray1::from_vec(py, gradient.mu)))
-    }
-}
-
-fn of_length(place: &str, given: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<f64>> {
-    let all = numbers::vector(place, given)?;
-    match all.len() == n {
-        true => Ok(all),
-        false => Err(expected(place, &format!("{n} entries"), all.len())),
+        gradients: &Bound<'py, PyDict>,
+    ) -> PyResult<(Bound<'py, PyDict>, Bound<'py, PyDict>)> {
+        let mut given: Vec<(String, Vec<f64>)> = vec![];
+        for (name, gradient) in gradients {
+            let name: String = name.extract()?;
+            let gradient = numbers::by_contact(&name, &gradient)?.0;
+            given.push((name, gradient));
+        }
+        let given: Vec<_> = given.iter().map(|(name, g)| (&name[..], &g[..])).collect();
+        let gradient = py.detach(|| self.0.backward(&given)).map_err(mistake)?;
+        let (vectors, matrices) = (PyDict::new(py), PyDict::new(py));
+        for (letter, gradient) in gradient.vectors {
+            vectors.set_item(letter, PyArray1::from_vec(py, gradient))?;
+        }
+        for (letter, pairs) in gradient.matrices {
+            let pairs: Vec<(Array<'py>, Array<'py>)> = pairs
+                .into_iter()
+                .map(|[a, b]| (PyArray1::from_vec(py, a), PyArray1::from_vec(py, b)))
+                .collect();
+            matrices.set_item(letter, pairs)?;
+        }
+        Ok((vectors, matrices))
     }
 }

@@ -1,10 +1,13 @@
 //! Numbers of Python as vectors and matrices: numpy's arrays, what numpy makes arrays of, and the sparse matrices of scipy.
 //!
-//! The library owns its data, so values are copied once, straight from the buffers that they are in; only other types than float64 and arrays that are not
-//! contiguous are converted before. Cost: one pass over what is given.
+//! The library owns its data, so values are copied once, straight from the buffers that they are in: columns and blocks in order as they are, rows into columns or blocks in one
+//! pass. Only other types than float64 and arrays that are not contiguous are converted before; entries by places, in disorder or twice, and columns for a matrix by blocks, are sorted
+//! in between.
 
-use nonsmooth_linalg::{Bsr, Csc, Dense, Matrix};
-use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use nonsmooth_linalg::{Bsr, Csc, Dense, Matrix, MatrixError};
+use numpy::{
+    Element, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 
@@ -108,21 +111,33 @@ pub fn scalar_or_vector(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Scala
     }
 }
 
-/// Indices: numbers from 0 on.
+/// Indices: numbers from 0 on. Those of scipy, of 32 or 64 bits, are converted in one pass.
 fn indices(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
-    let array = array::<i64>(place, given, "iu", "an array of indices")?;
-    let all = copied(&array)?;
-    let index =
-        |i: i64| usize::try_from(i).map_err(|_| expected(place, "indices of at least 0", i));
-    all.into_iter().map(index).collect()
+    fn whole<T: Element + Copy + Into<i64>>(
+        place: &str,
+        array: &Bound<'_, PyArrayDyn<T>>,
+    ) -> PyResult<Vec<usize>> {
+        let index = |i: &T| {
+            let i: i64 = (*i).into();
+            usize::try_from(i).map_err(|_| expected(place, "indices of at least 0", i))
+        };
+        let array = array.try_readonly().map_err(mistake)?;
+        array.as_slice().map_err(mistake)?.iter().map(index).collect()
+    }
+    if let Ok(short) = given.cast::<PyArrayDyn<i32>>()
+        && short.is_c_contiguous()
+    {
+        return whole(place, short);
+    }
+    whole(place, &array::<i64>(place, given, "iu", "an array of indices")?)
 }
 
-/// A sparse matrix of scipy by its arrays.
-pub struct Sparse {
+/// A sparse matrix of scipy by its arrays, whose values are still Python's.
+pub struct Sparse<'py> {
     rows: usize,
     columns: usize,
     by: By,
-    values: Vec<f64>,
+    values: PyReadonlyArrayDyn<'py, f64>,
 }
 
 /// How entries are stored.
@@ -143,9 +158,17 @@ enum By {
     },
 }
 
-impl Sparse {
+/// Whether the indices of each line ascend, below a limit.
+fn ascends(starts: &[usize], indices: &[usize], limit: usize) -> bool {
+    starts.windows(2).all(|w| {
+        let line = &indices[w[0]..w[1]];
+        line.windows(2).all(|w| w[0] < w[1]) && line.last().is_none_or(|&i| i < limit)
+    })
+}
+
+impl<'py> Sparse<'py> {
     /// The matrix, if it is a sparse one.
-    pub fn of(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Option<Self>> {
+    pub fn of(place: &str, given: &Bound<'py, PyAny>) -> PyResult<Option<Self>> {
         let Ok(format) = given.getattr("format").and_then(|f| f.extract::<String>()) else {
             return Ok(None);
         };
@@ -168,20 +191,26 @@ impl Sparse {
             "coo" => By::Places { rows: numbers("row")?, columns: numbers("col")? },
             _ => return Self::of(place, &given.call_method0("tocsc")?),
         };
-        let values = copied(&reals(place, &part("data")?)?)?;
+        let values = reals(place, &part("data")?)?.try_readonly().map_err(mistake)?;
         let sparse = Self { rows, columns, by, values };
         sparse.validate(place)?;
         Ok(Some(sparse))
     }
 
+    /// The values, line after line.
+    fn values(&self) -> PyResult<&[f64]> {
+        self.values.as_slice().map_err(mistake)
+    }
+
     /// The arrays fit each other; that indices are inside the matrix is checked where it is made.
     fn validate(&self, place: &str) -> PyResult<()> {
+        let found = self.values()?.len();
         let (starts, lines, entries, size) = match &self.by {
             By::Places { rows, columns } => {
-                return match rows.len() == columns.len() && rows.len() == self.values.len() {
+                return match rows.len() == columns.len() && rows.len() == found {
                     true => Ok(()),
                     false => Err(expected(place, "as many rows and columns as values", {
-                        format!("{}, {} and {}", rows.len(), columns.len(), self.values.len())
+                        format!("{}, {} and {found}", rows.len(), columns.len())
                     })),
                 };
             }
@@ -194,23 +223,37 @@ impl Sparse {
             By::Columns { starts, rows } => (starts, self.columns, rows.len(), 1),
         };
         let ascend = starts.windows(2).all(|w| w[0] <= w[1]);
-        if starts.len() != lines + 1 || !ascend || starts[lines] > entries {
+        if starts.len() != lines + 1 || starts[0] != 0 || !ascend || starts[lines] > entries {
             let what = "pointers that ascend from 0 to the number of entries";
             return Err(expected(&format!("{place}.indptr"), what, "others"));
         }
-        match entries * size == self.values.len() {
+        match entries * size == found {
             true => Ok(()),
-            false => Err(expected(
-                &format!("{place}.data"),
-                &format!("{} values", entries * size),
-                self.values.len(),
-            )),
+            false => {
+                let what = format!("{} values", entries * size);
+                Err(expected(&format!("{place}.data"), &what, found))
+            }
         }
     }
 
-    /// By compressed columns; what stands at one place is added.
-    pub fn csc(&self, place: &str) -> PyResult<Csc> {
-        let (m, n, values) = (self.rows, self.columns, &self.values);
+    /// By compressed columns; what stands at one place is added. Columns in order are copied as they are, rows in order are put into columns in one pass.
+    pub fn csc(self, place: &str) -> PyResult<Csc> {
+        let (m, n) = (self.rows, self.columns);
+        let wrong = |e: MatrixError| mistake(format!("{place}: {e}"));
+        if let By::Columns { starts, rows } = &self.by
+            && ascends(starts, rows, m)
+        {
+            let values = self.values()?[..starts[n]].to_vec();
+            let By::Columns { starts, mut rows } = self.by else { unreachable!("as was seen") };
+            rows.truncate(starts[n]);
+            return Csc::from_vecs(m, n, starts, rows, values).map_err(wrong);
+        }
+        if let By::Rows { starts, columns, block: [1, 1] } = &self.by
+            && ascends(starts, columns, n)
+        {
+            return by_columns(m, n, starts, columns, self.values()?).map_err(wrong);
+        }
+        let values = self.values()?;
         let made = match &self.by {
             By::Places { rows, columns } => Csc::from_triplets(
                 m,
@@ -235,41 +278,119 @@ impl Sparse {
                 }),
             ),
         };
-        made.map_err(|e| mistake(format!("{place}: {e}")))
+        made.map_err(wrong)
     }
 
-    /// By D×D blocks, where that is how it is stored, in order.
-    fn blocks<const D: usize>(&self) -> Option<Bsr<D>> {
-        let By::Rows { starts, columns, block } = &self.by else { return None };
-        let (nr, nc) = (starts.len() - 1, self.columns / D);
-        let ascends = |i: usize| {
-            let row = &columns[starts[i]..starts[i + 1]];
-            row.windows(2).all(|w| w[0] < w[1]) && row.last().is_none_or(|&j| j < nc)
-        };
-        if *block != [D, D] || !self.columns.is_multiple_of(D) || !(0..nr).all(ascends) {
-            return None;
+    /// By D×D blocks, of blocks in order or of rows, in one pass; `None` of what is stored otherwise.
+    fn blocks<const D: usize>(&self, place: &str) -> PyResult<Option<Bsr<D>>> {
+        let By::Rows { starts, columns, block } = &self.by else { return Ok(None) };
+        let (n, values) = (self.columns / D, self.values()?);
+        if *block == [1, 1] {
+            return by_blocks(self.columns, starts, columns, values, place).map(Some);
         }
-        let mut out = Bsr::from_rows(nc, &[]);
-        for i in 0..nr {
-            for k in starts[i]..starts[i + 1] {
-                let at = k * D * D;
-                out.push(
-                    columns[k],
-                    std::array::from_fn(|a| std::array::from_fn(|b| self.values[at + a * D + b])),
-                );
-            }
+        if *block != [D, D] || !ascends(starts, columns, n) {
+            return Ok(None);
+        }
+        let (blocks, _) = values.as_chunks::<D>().0.as_chunks::<D>();
+        let mut out = Bsr::from_rows(n, &[]);
+        for line in starts.windows(2) {
+            (line[0]..line[1]).for_each(|k| out.push(columns[k], blocks[k]));
             out.end_row();
         }
-        Some(out)
+        Ok(Some(out))
+    }
+}
+
+/// A matrix by rows, in order and inside, by columns.
+fn by_columns(
+    m: usize,
+    n: usize,
+    starts: &[usize],
+    columns: &[usize],
+    values: &[f64],
+) -> Result<Csc, MatrixError> {
+    let mut pointers = vec![0; n + 1];
+    columns[..starts[m]].iter().for_each(|j| pointers[j + 1] += 1);
+    (0..n).for_each(|j| pointers[j + 1] += pointers[j]);
+    let (mut rows, mut all) = (vec![0; starts[m]], vec![0.0; starts[m]]);
+    let mut next = pointers.clone();
+    for i in 0..m {
+        for k in starts[i]..starts[i + 1] {
+            let to = &mut next[columns[k]];
+            (rows[*to], all[*to]) = (i, values[k]);
+            *to += 1;
+        }
+    }
+    Csc::from_vecs(m, n, pointers, rows, all)
+}
+
+/// A matrix by rows, in any order, by blocks. Its shape is one of whole blocks.
+fn by_blocks<const D: usize>(
+    n: usize,
+    starts: &[usize],
+    columns: &[usize],
+    values: &[f64],
+    place: &str,
+) -> PyResult<Bsr<D>> {
+    let mut out = Bsr::from_rows(n / D, &[]);
+    let mut line: Vec<(usize, [[f64; D]; D])> = vec![];
+    // Where the block of a column is in the line that is gathered.
+    let mut places = vec![usize::MAX; n / D];
+    for first in (0..starts.len() - 1).step_by(D) {
+        for a in 0..D {
+            for k in starts[first + a]..starts[first + a + 1] {
+                let j = columns[k];
+                let Some(at) = places.get_mut(j / D) else {
+                    let what = format!("columns below {n}");
+                    return Err(expected(&format!("{place}.indices[{k}]"), &what, j));
+                };
+                if *at == usize::MAX {
+                    *at = line.len();
+                    line.push((j / D, [[0.0; D]; D]));
+                }
+                line[*at].1[a][j % D] += values[k];
+            }
+        }
+        line.iter().for_each(|(j, _)| places[*j] = usize::MAX);
+        line.sort_unstable_by_key(|(j, _)| *j);
+        line.drain(..).for_each(|(j, block)| out.push(j, block));
+        out.end_row();
+    }
+    Ok(out)
+}
+
+/// All entries of a matrix by blocks; those of zeros are left out.
+fn dense_blocks<const D: usize>(n: usize, values: &[f64]) -> Bsr<D> {
+    let mut out = Bsr::from_rows(n / D, &[]);
+    for line in values.chunks_exact(D * n.max(1)) {
+        for j in 0..n / D {
+            let block: [[f64; D]; D] =
+                std::array::from_fn(|a| std::array::from_fn(|b| line[a * n + j * D + b]));
+            if block.iter().flatten().any(|x| *x != 0.0) {
+                out.push(j, block);
+            }
+        }
+        out.end_row();
+    }
+    out
+}
+
+/// An array of two dimensions.
+fn matrix_array<'py>(
+    place: &str,
+    given: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let array = reals(place, given)?;
+    match array.ndim() {
+        2 => Ok(array),
+        _ => Err(expected(place, "a matrix", shape(array.shape()))),
     }
 }
 
 /// All entries of a matrix.
 fn dense(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Dense> {
-    let array = reals(place, given)?;
-    let &[m, n] = array.shape() else {
-        return Err(expected(place, "a matrix", shape(array.shape())));
-    };
+    let array = matrix_array(place, given)?;
+    let &[m, n] = array.shape() else { unreachable!("two dimensions") };
     let array = array.try_readonly().map_err(mistake)?;
     let mut out = Dense::zeros(m, n);
     out.values_mut().copy_from_slice(array.as_slice().map_err(mistake)?);
@@ -294,17 +415,23 @@ pub fn csc(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Csc> {
 
 /// A matrix by blocks.
 pub fn bsr<const D: usize>(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Bsr<D>> {
-    let sparse = Sparse::of(place, given)?;
-    if let Some(blocks) = sparse.as_ref().and_then(Sparse::blocks) {
-        return Ok(blocks);
-    }
-    let csc = match sparse {
-        Some(sparse) => sparse.csc(place)?,
-        None => dense(place, given)?.to_csc(),
+    let whole = |m: usize, n: usize| match m.is_multiple_of(D) && n.is_multiple_of(D) {
+        true => Ok(()),
+        false => {
+            let what = format!("rows and columns by {D} for each contact");
+            Err(expected(place, &what, format!("{m} × {n}")))
+        }
     };
-    if !csc.nrows().is_multiple_of(D) || !csc.ncols().is_multiple_of(D) {
-        let what = format!("rows and columns by {D} for each contact");
-        return Err(expected(place, &what, format!("{} × {}", csc.nrows(), csc.ncols())));
+    if let Some(sparse) = Sparse::of(place, given)? {
+        whole(sparse.rows, sparse.columns)?;
+        return match sparse.blocks(place)? {
+            Some(blocks) => Ok(blocks),
+            None => Ok(Bsr::from_csc(&sparse.csc(place)?)),
+        };
     }
-    Ok(Bsr::from_csc(&csc))
+    let array = matrix_array(place, given)?;
+    let &[m, n] = array.shape() else { unreachable!("two dimensions") };
+    whole(m, n)?;
+    let array = array.try_readonly().map_err(mistake)?;
+    Ok(dense_blocks(n, array.as_slice().map_err(mistake)?))
 }

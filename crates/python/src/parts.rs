@@ -253,8 +253,8 @@ impl<'a> Shown<'a> {
         Self::Sparse(Cow::Owned(blocks.to_csc()))
     }
 
-    /// An array; of a sparse matrix a dictionary of the arguments of `scipy.sparse.csc_array`.
-    pub fn to_python<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    /// An array; what is made for this is moved. Of a sparse matrix a dictionary of the arguments of `scipy.sparse.csc_array`.
+    pub fn into_python<'py>(self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(match self {
             Self::Dense(dense) => {
                 let all = dense.values().to_pyarray(py);
@@ -264,12 +264,16 @@ impl<'a> Shown<'a> {
             Self::Count(count) => count.into_pyobject(py)?.into_any(),
             Self::Texts(texts) => PyList::new(py, texts)?.into_any(),
             Self::Sparse(csc) => {
-                let whole = |all: &[usize]| PyArray1::from_iter(py, all.iter().map(|&i| i as i64));
                 let parts = PyDict::new(py);
-                parts.set_item("data", PyArray1::from_slice(py, csc.values()))?;
-                parts.set_item("indices", whole(csc.row_idx()))?;
-                parts.set_item("indptr", whole(csc.col_ptr()))?;
                 parts.set_item("shape", (csc.nrows(), csc.ncols()))?;
+                // Collected in the memory that they are in.
+                let whole = |all: Vec<usize>| {
+                    PyArray1::from_vec(py, all.into_iter().map(|i| i as i64).collect())
+                };
+                let (pointers, rows, values) = csc.into_owned().into_vecs();
+                parts.set_item("data", PyArray1::from_vec(py, values))?;
+                parts.set_item("indices", whole(rows))?;
+                parts.set_item("indptr", whole(pointers))?;
                 parts.into_any()
             }
         })

@@ -326,7 +326,7 @@ impl Problem {
     fn part<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
         let file = self.file();
         let part = shown(&file.problem).into_iter().find(|(letter, _)| *letter == name);
-        part.map(|(_, part)| part.to_python(py)).transpose()
+        part.map(|(_, part)| part.into_python(py)).transpose()
     }
 
     /// The parts of the solution that the file has.

@@ -9,8 +9,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use nonsmooth_io::ProblemFile;
 use nonsmooth_io::trajectory::{Checkpoint, Contact, Frame, Step as Stepped, Trajectory};
 use nonsmooth_problem::check::Motion;
+use nonsmooth_record::Origin;
 use nonsmooth_scenes::draw::{Drawing, svg};
-use nonsmooth_simulate::{Control, RunReport, SceneFile, SimulateError, import};
+use nonsmooth_simulate::{Control, RunReport, SceneFile, SimulateError};
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -22,18 +23,23 @@ use crate::{expected, mistake};
 /// Iterations that a step's solve may take, as the command line has it.
 const ITERATIONS: usize = 100_000;
 
-/// A scene as a JSON document, from a file of TOML or JSON, with its meshes, or from a robot's URDF or a model of MuJoCo; and what is to be said of it.
+/// A scene as a JSON document, from a file of TOML or JSON, with its meshes, or from a robot's URDF, a model of MuJoCo or a scene of Siconos; and what is to be said of it.
 #[pyfunction]
 pub fn read_scene(py: Python<'_>, path: PathBuf) -> PyResult<(String, Vec<String>)> {
     py.detach(|| {
         let name = path.display();
-        let text = std::fs::read_to_string(&path)
-            .map_err(|e| mistake(format!("{name}: expected a readable file, found: {e}")))?;
         let wrong = |e: SimulateError| mistake(format!("{name}: {e}"));
         let folder = path.parent().unwrap_or(Path::new(""));
-        let made = import::format(&path).map(|format| (format.read)(&text, folder));
-        let made = made.transpose().map_err(wrong)?;
-        let (text, warnings) = made.map_or((text, vec![]), |made| (made.scene, made.warnings));
+        let (text, warnings) = match Origin::of(&path) {
+            Some(origin) => origin.read(&path).map(|made| (made.scene, made.warnings)),
+            None => {
+                let text = std::fs::read_to_string(&path).map_err(|e| {
+                    mistake(format!("{name}: expected a readable file, found: {e}"))
+                })?;
+                Ok((text, vec![]))
+            }
+        }
+        .map_err(mistake)?;
         let mut scene = SceneFile::parse(&text, &[]).map_err(wrong)?;
         scene.load_meshes(folder).map_err(wrong)?;
         let document = serde_json::to_string(&scene).map_err(mistake)?;

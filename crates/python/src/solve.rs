@@ -236,7 +236,13 @@ impl Answer {
     /// The parts of the point by name.
     fn parts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let nonsmooth_solve::Answer { point, verdict, .. } = &self.answer;
-        arrays(py, self.file.problem.point_parts(point, &verdict.velocity))
+        let (problem, whole) = (&self.file.problem, &verdict.velocity);
+        // Equalities have no w.
+        let kept = match problem {
+            AnyProblem::Friction(_) => None,
+            _ => StoredPoint::new(problem, point.clone(), whole.clone()).partner,
+        };
+        arrays(py, problem.point_parts(point, kept.as_deref().unwrap_or(whole)))
     }
 
     /// All residuals by name.

@@ -33,6 +33,7 @@ def test_profiles_are_those_of_the_library(runs):
     fastest = np.mean([rows[p, "nsgs"] == best[p] for p in best])
     assert profile.at("nsgs", 1.0) == pytest.approx(fastest)
     assert profile.at("nsgs", 1e9) == 1.0
+    assert repr(profile).startswith("<Profile by iterations, the best on: ") and "nsgs" in repr(profile)
     pytest.importorskip("matplotlib").use("Agg")
     assert profile.plot().get_ylabel() == "share of problems solved"
     with pytest.raises(ns.Error, match="cost: expected one of seconds, iterations, factorisations"):

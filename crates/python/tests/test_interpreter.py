@@ -216,6 +216,35 @@ def test_the_interpreter_ends_while_threads_solve():
     assert done.returncode == 0 and done.stdout == "end\n", done.stderr
 
 
+def test_objects_go_from_thread_to_thread():
+    made = []
+    run([threading.Thread(target=lambda: made.append(local(6)))])
+    run([threading.Thread(target=lambda: made.append(ns.solve(made[0])))])
+    run([threading.Thread(target=lambda: made[0].update(q=-made[0].q))])
+    problem, answer = made
+    assert answer.solved and answer.r.size == 18 and ns.solve(problem, warm_start=answer).solved
+
+
+def test_a_problem_may_be_changed_while_others_solve_it():
+    problem, wrong = local(10), []
+    one, two = problem.q, 2 * problem.q
+    expected = ns.solve(problem, tol=1e-12).r
+
+    def change():
+        for k in range(200):
+            problem.update(q=two if k % 2 else one)
+
+    def solve():
+        for _ in range(50):
+            # Each solve has the problem that was there when it began: impulses grow as q does.
+            r = ns.solve(problem, tol=1e-12).r
+            if not any(np.allclose(r, k * expected, atol=1e-8) for k in (1, 2)):
+                wrong.append(r)
+
+    run([threading.Thread(target=change), *(threading.Thread(target=solve) for _ in range(3))])
+    assert not wrong
+
+
 def test_what_is_deleted_in_another_thread_is_gone():
     answers = [ns.solve(local(3)) for _ in range(10)]
     thread = threading.Thread(target=answers.clear)

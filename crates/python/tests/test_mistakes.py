@@ -48,12 +48,77 @@ EYE = np.eye(3)
         (lambda: ns.VI(["x1"], ns.Ball([0.0], -1.0)), "radius"),
         (lambda: ns.MCP(["x1 +"], [1.0]), "F"),
         (lambda: ns.MCP([1.0], [1.0]), "F: expected a function, or a list of expressions"),
+        (lambda: ns.Friction(W=sp.csr_matrix([[np.nan, 0], [0, 1]]), q=[1, 2], mu=[0.1]), r"W\[0, 0\]: expected a finite number"),
+        (lambda: ns.Friction(W=EYE, q=[1, 2, np.inf], mu=0.1), r"q\[2\]: expected a finite number"),
+        (lambda: ns.Friction(W=EYE, q=[1, 2, 3], mu=np.nan), r"mu\[0\]"),
+        (lambda: ns.BoxLCP(EYE, [1.0] * 3, [np.nan] * 3, [0] * 3), r"\[0\]"),
+        (lambda: ns.HLCP(EYE, np.eye(2), [1.0] * 3), "R: expected 3 × 3 .as Q., found 2 × 2"),
+        (lambda: ns.Friction(M=EYE, H=np.eye(2), f=[1.0] * 3, w=[1.0] * 3, mu=0.1), "H: expected 3 × 3"),
+        (lambda: ns.Friction(M=EYE, H=EYE, f=[1.0] * 3, w=[1.0] * 3, mu=0.1, b=[0.0]), "G: expected this part"),
+        (lambda: ns.LCP(sp.csr_matrix((0, 0)), []), "M: expected at least one row, found none"),
+        (lambda: ns.LCP(sp.csr_matrix(EYE * 1j), [1.0] * 3), "M: expected an array of real numbers, found complex128"),
+        (lambda: ns.LCP(np.array([[1.0, object()], [0, 1]]), [1.0] * 2), "M: expected an array of real numbers"),
+        (lambda: ns.LCP(np.array(["2020-01-01"], dtype="M8[D]"), [1.0]), "M: expected an array of real numbers"),
     ],
 )
 def test_mistakes_are_one_sentence(make, said):
     with pytest.raises(ns.Error, match=said) as caught:
         make()
     assert "\n" not in str(caught.value) and isinstance(caught.value, ValueError)
+
+
+@pytest.mark.parametrize(
+    "layout", ["readonly", "strided", "reversed", "transposed", "swapped", "readonly csr", "strided csr"]
+)
+def test_layouts_of_arrays_are_taken(layout):
+    m, q = np.arange(9.0).reshape(3, 3) + 9 * EYE, np.array([-1.0, 2.0, -3.0])
+    if layout == "strided":
+        m_given, q_given = np.repeat(np.repeat(m, 2, 0), 3, 1)[::2, ::3], np.repeat(q, 4)[::4]
+    elif layout == "reversed":
+        m_given, q_given = m[::-1, ::-1].copy()[::-1, ::-1], q[::-1].copy()[::-1]
+    elif layout == "transposed":
+        m_given, q_given = m.T.copy().T, q
+    elif layout == "swapped":
+        m_given, q_given = m.astype(">f8"), q.astype(">f4")
+    elif layout == "strided csr":
+        m_given, q_given = sp.csr_matrix(m), q
+        m_given.data = np.repeat(m_given.data, 2)[::2]
+        m_given.indices = np.repeat(m_given.indices, 2)[::2]
+    else:
+        m_given, q_given = (sp.csr_matrix(m) if "csr" in layout else m.copy()), q.copy()
+        arrays = (m_given.data, m_given.indices, m_given.indptr) if "csr" in layout else (m_given,)
+        for array in (*arrays, q_given):
+            array.flags.writeable = False
+    problem = ns.LCP(m_given, q_given)
+    M = problem.M.toarray() if sp.issparse(problem.M) else problem.M
+    np.testing.assert_array_equal(M, m)
+    np.testing.assert_array_equal(problem.q, q)
+    again = ns.Friction(W=m_given, q=q_given, mu=0.5)
+    np.testing.assert_array_equal(again.W.toarray(), m)
+
+
+@pytest.mark.parametrize(
+    ("start", "said"),
+    [
+        ([1.0], "warm_start"),
+        ([[1.0, 2.0, 3.0]], "warm_start"),
+        ([np.nan, 0.0, 0.0], "finite"),
+        (dict(w=[1.0, 2.0, 3.0]), "z: expected this part"),
+        ("here", "warm_start: expected an array of real numbers"),
+    ],
+)
+def test_warm_starts_that_are_none_are_refused(start, said):
+    with pytest.raises(ns.Error, match=said):
+        ns.solve(ns.LCP(EYE, -np.ones(3)), warm_start=start)
+
+
+def test_updates_that_do_not_fit_change_nothing():
+    problem = ns.LCP(EYE, -np.ones(3))
+    for parts in (dict(q=[1.0]), dict(q=[np.nan] * 3), dict(M=np.eye(2)), dict(r=[1.0] * 3)):
+        with pytest.raises(ns.Error, match="expected"):
+            problem.update(**parts)
+    np.testing.assert_array_equal(problem.q, -np.ones(3))
+    assert ns.solve(problem).z == pytest.approx(np.ones(3))
 
 
 def test_damaged_sparse_matrices_are_refused():
@@ -109,6 +174,30 @@ def test_any_arrays_give_contacts_or_an_error(w, q, mu):
         assert "expected" in str(error) and "\n" not in str(error)
         return
     assert problem.unknowns == q.size and (problem.mu >= 0).all()
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    n=st.integers(1, 4),
+    found=arrays | st.none() | st.text(max_size=3) | st.lists(st.floats(), max_size=4),
+    from_jac=st.booleans(),
+)
+def test_a_function_may_give_anything(n, found, from_jac):
+    calls = [0]
+
+    def late(good):
+        calls[0] += 1
+        return good if calls[0] == 1 else found
+
+    F = (lambda x: x - 1) if from_jac else (lambda x: late(x - 1))
+    jac = (lambda x: late(np.eye(n))) if from_jac else (lambda x: np.eye(n))
+    problem_of = lambda: ns.MCP(F, np.full(n, 3.0), jac=jac, lower=-np.inf)  # noqa: E731
+    try:
+        answer = ns.solve(problem_of(), max_iter=20)
+    except ns.Error as error:
+        assert ("F(x)" in str(error) or "jac(x)" in str(error)) and "\n" not in str(error)
+        return
+    assert isinstance(answer.status, ns.Status)
 
 
 # Entries of 1e-300 beside others of 1 are solved, but nothing says that all solvers do.

@@ -44,6 +44,52 @@ def test_the_sparse_arrays_of_scipy_and_long_indices_are_taken():
     np.testing.assert_array_equal(ns.LCP(csr, Q).M.toarray(), W)
 
 
+def disordered(matrix, rng):
+    """The same matrix with the entries of each line in disorder, some of them in two halves."""
+    indptr, indices, data = [0], [], []
+    for start, end in zip(matrix.indptr[:-1], matrix.indptr[1:]):
+        which = rng.permutation(np.repeat(np.arange(start, end), 2))
+        indices.extend(matrix.indices[which])
+        data.extend(0.5 * matrix.data[which])
+        indptr.append(len(indices))
+    made = type(matrix)((np.array(data), np.array(indices), np.array(indptr)), shape=matrix.shape)
+    made.has_sorted_indices = made.has_canonical_format = False
+    return made
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("seed", range(5))
+def test_every_way_into_blocks_and_columns_gives_the_same(seed, dimension):
+    rng = np.random.default_rng(seed)
+    n = 5 * dimension
+    dense = np.where(rng.random((n, n)) < 0.2, rng.integers(1, 9, (n, n)), 0) + 4.0 * np.eye(n)
+    csr, block = sp.csr_matrix(dense), (dimension, dimension)
+    ways = [csr, csr.tocsc(), csr.tocoo(), csr.tobsr(block), csr.tobsr((1, 1)), csr.tobsr((n, 1))]
+    ways += [disordered(csr, rng), disordered(csr.tocsc(), rng), disordered(csr.tobsr(block), rng)]
+    long = csr.copy()
+    long.indices, long.indptr = long.indices.astype(np.int64), long.indptr.astype(np.int64)
+    # Room behind the last entry, as scipy leaves it.
+    roomy = csr.tocsc()
+    roomy.indices = np.append(roomy.indices, [0, 0]).astype(np.int32)
+    roomy.data = np.append(roomy.data, [7.0, 7.0])
+    for matrix in (*ways, long, roomy, dense, np.asfortranarray(dense)):
+        W = ns.Friction(W=matrix, q=-np.ones(n), mu=0.3, dimension=dimension).W
+        np.testing.assert_array_equal(W.toarray(), dense)
+        M = ns.LCP(matrix, -np.ones(n)).M
+        np.testing.assert_array_equal(M.toarray() if sp.issparse(M) else M, dense)
+
+
+def test_what_is_given_stays_the_callers():
+    csr, q = sp.csr_matrix(W), Q.copy()
+    problem = ns.Friction(W=csr, q=q, mu=0.4)
+    csr.data[:] = 0.0
+    q[:] = 0.0
+    np.testing.assert_array_equal(problem.W.toarray(), W)
+    np.testing.assert_array_equal(problem.q, Q)
+    problem.q[:] = 0.0
+    np.testing.assert_array_equal(problem.q, Q)
+
+
 def test_duplicate_and_unsorted_entries_are_added():
     coo = sp.coo_matrix(([1.0, 2.0, 3.0], ([1, 0, 1], [1, 0, 1])), shape=(2, 2))
     np.testing.assert_array_equal(ns.LCP(coo, [-1, -1]).M.toarray(), np.diag([2.0, 4.0]))

@@ -106,6 +106,54 @@ def test_scenes_of_files_and_robots(tmp_path):
         assert run.solved and run.bodies == ["body0", "ball"]
 
 
+def test_scenes_of_siconos(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "falling.hdf5"
+    with h5py.File(path, "w") as file:
+        file.attrs["dimension"] = 3
+        data = file.create_group("data")
+        ref, objects, laws, _ = (data.create_group(n) for n in ("ref", "input", "nslaws", "joints"))
+        shape = ref.create_dataset("Ball", (1, 1), dtype=float)
+        shape.attrs.update(id=1, type="primitive", primitive="Sphere")
+        shape[:] = 0.5
+        body = objects.create_group("ball")
+        body.attrs.update(mass=1.0, type="dynamic", id=1, translation=[0.0, 0.0, 3.0])
+        body.attrs.update(orientation=[1.0, 0, 0, 0], velocity=np.zeros(6))
+        part = body.create_dataset("Ball-0", (0, 0), maxshape=(None, 0), dtype=float)
+        part.attrs.update(instance_name="Ball-0", shape_name="Ball", group=0)
+        part.attrs.update(translation=np.zeros(3), orientation=[1.0, 0, 0, 0])
+        law = laws.create_dataset("law", (0,), dtype=float)
+        law.attrs.update(type="NewtonImpactFrictionNSL", mu=0.3, e=0.5, gid1=0, gid2=0)
+    world = ns.load(path)
+    assert any("h = 0.0005" in warning for warning in world.warnings)
+    run = ns.simulate(world, until=0.1)
+    assert run.solved and run.bodies == ["ball"]
+    assert run.velocity[-1, 0, 2] == pytest.approx(-0.980665)
+    # Another file of HDF5 is no scene, and says so.
+    problem = tmp_path / "problem.hdf5"
+    ns.Friction(W=np.eye(3), q=[-1.0, 0, 0], mu=0.3).save(problem)
+    with pytest.raises(ns.Error, match="problem.hdf5: expected"):
+        ns.load(problem)
+
+
+def test_a_simulation_runs_once_at_a_time():
+    simulation, said = ns.Simulation(ball(), h=1e-3), []
+
+    def meanwhile(_):
+        thread = threading.Thread(target=lambda: said.append(refused(simulation)))
+        thread.start()
+        thread.join()
+        return True
+
+    def refused(simulation):
+        with pytest.raises(ns.Error) as caught:
+            simulation.run(0.1)
+        return str(caught.value)
+
+    simulation.run(0.1, on_step=meanwhile)
+    assert said == ["simulation: expected one that is not running, found one in a run"]
+
+
 def test_families(tmp_path):
     world = ns.World()
     world.generate("wall", rows=2, columns=2)

@@ -1,6 +1,11 @@
 //! What is kept of a run: from a simulation to a trajectory, and from that to what plays it.
 //!
-//! `io` knows no scene and `simulate` no file; this is what stands between them, for the command line and for Python.
+//! `io` knows no scene and `simulate` no file; this is what stands between them, for the command line and for Python: also the [scenes](Origin) of other programs' files.
+
+mod mechanics;
+mod origin;
+
+pub use origin::{Origin, OriginError};
 
 use nonsmooth_io::Mesh;
 use nonsmooth_io::trajectory::{Contact, Energy, Frame, Joint, Named, State, Step, Trajectory};

@@ -77,5 +77,5 @@ assert none.status is ns.Status.INFEASIBLE
 
 # %%
 equilibrium = ns.solve(lcp, tol=1e-12)
-print(ns.derivative(lcp, equilibrium, "q").matrix)
-assert np.allclose(ns.derivative(lcp, equilibrium, "q").matrix, -np.linalg.inv([[2, 1], [1, 2]]))
+print(ns.derivative(lcp, equilibrium, "q").matrix())
+assert np.allclose(ns.derivative(lcp, equilibrium, "q").matrix(), -np.linalg.inv([[2, 1], [1, 2]]))

@@ -1,12 +1,12 @@
 //! `nonsmooth convert`.
 
-mod mechanics;
 mod scene;
 
 use std::path::{Path, PathBuf};
 
 use nonsmooth_io::{Format, Info, ProblemFile};
 use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, GlobalPoint, LocalPoint, Problem};
+use nonsmooth_record::Origin;
 use nonsmooth_solve::Reformulation;
 use nonsmooth_solve::variational::reform::Multipliers;
 
@@ -49,7 +49,7 @@ Exit codes: 0 written; 2 a mistake in a file or an option.";
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
     let Args { from, to, format, as_mcp } = args;
-    if let Some(origin) = scene::origin(from) {
+    if let Some(origin) = Origin::of(from) {
         return scene::write(args, &origin);
     }
     if files::same(from, to) {

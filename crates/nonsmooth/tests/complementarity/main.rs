@@ -6,11 +6,12 @@ mod common;
 
 use std::path::{Path, PathBuf};
 
+use nonsmooth_linalg::Dense;
 use nonsmooth_problem::check::Judged;
 use nonsmooth_problem::planted::classics::{self, Classic, Known};
 use nonsmooth_problem::planted::{PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp};
 use nonsmooth_problem::{
-    AnyProblem, BoxLcp, Complementarity, Hlcp, Lcp, Mlcp, with_complementarity,
+    AnyProblem, BoxLcp, Complementarity, Hlcp, Lcp, LcpPoint, Mlcp, with_complementarity,
 };
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limits, Outcome, SolveError, Status};
@@ -267,4 +268,28 @@ fn every_solver_is_honest_on_the_corpus() {
         let solved = with_complementarity!(&problem, p => honest(p, &limits));
         eprintln!("{}: solved by {solved} solvers", file.display());
     }
+}
+
+/// The first row is a sum of 4e-275, whose rounding no double holds: the exact solution passes by exact arithmetic, what is only near it does not.
+#[test]
+fn rows_of_hardly_anything_are_judged_exactly() {
+    let rows = [[4.0, 1.75e-274], [1.75e-274, 4.0]];
+    let m = Dense::from_rows(&rows).unwrap();
+    let lcp = Lcp::new(m.clone(), vec![0.0, -1.0]).unwrap();
+    let answer = nonsmooth::solve(&lcp).unwrap();
+    assert!(answer.is_solved(), "{}", answer.status);
+    assert_eq!(answer.point.z, [0.0, 0.25]);
+    let judged = |z: [f64; 2]| lcp.judge(&LcpPoint { z: z.to_vec() }, 1e-8).unwrap().solved;
+    assert!(judged([0.0, 0.25]));
+    assert!(!judged([1.6e-16, 0.25]) && !judged([0.0, 0.2500001]) && !judged([0.0, 0.0]));
+    let minus = Dense::from_rows(&[[-1.0, 0.0], [0.0, -1.0]]).unwrap();
+    let hlcp = Hlcp::new(m, minus, vec![0.0, 1.0]).unwrap();
+    // s = M z, of which the first entry is exact: a power of two times it.
+    let at = |x: [f64; 2], s: [f64; 2]| {
+        let point = nonsmooth_problem::HlcpPoint { x: x.to_vec(), s: s.to_vec() };
+        hlcp.judge(&point, 1e-8).unwrap().solved
+    };
+    let s = 0.25 * rows[0][1];
+    assert!(at([0.0, 0.25], [s, 0.0]));
+    assert!(!at([0.0, 0.25], [2.0 * s, 0.0]) && !at([0.0, 0.25], [0.0, 0.0]));
 }

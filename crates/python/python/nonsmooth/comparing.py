@@ -39,6 +39,10 @@ class Profile:
 
         return profiles(self, ax)
 
+    def __repr__(self) -> str:
+        best = ", ".join(f"{name} {self.at(name, 1.0):.0%}" for name in self.curves)
+        return f"<Profile by {self.cost}, the best on: {best}>"
+
 
 class Runs:
     """Runs of solvers on problems, as the files of ``nonsmooth bench`` hold them."""

@@ -9,18 +9,22 @@ import numpy.typing as npt
 
 from . import _nonsmooth
 from .answers import Answer
-from .problems import Problem, Vector
+from .problems import Matrix, Problem, Vector
 
 
 class Derivative:
-    """The derivative of a solution x (z; of contacts r) and of y (w; u) with respect to one part of the data.
+    """The derivative of a solution with respect to one part of the data; of its parts by their names, as the answer has them.
 
-    It comes from implicit differentiation on the active set. Where ``degenerate`` is not 0, so many pairs are zero on both sides or contacts at the border of two motions,
-    and it is the derivative of one of the pieces that meet there.
+    It comes from implicit differentiation on the active set: unknowns at a bound move with it, the equations of all others are linearised,
+    ``(A + B S) dx = −B (dS x + dp) − c dmu``, ``dy = S dx + dS x + dp``. Where ``degenerate`` is not 0, so many pairs are zero on both sides or contacts at the border of two motions,
+    and it is the derivative of one of the pieces that meet there: at best one element of the subdifferential.
     """
 
-    def __init__(self, native: _nonsmooth.Derivative, letter: str) -> None:
+    def __init__(
+        self, native: _nonsmooth.Derivative, letter: str, parameters: Optional[Matrix] = None
+    ) -> None:
         self._native = native
+        self._parameters = parameters
         self.with_respect_to = letter
 
     @property
@@ -28,48 +32,105 @@ class Derivative:
         """The pairs or contacts at the border of two pieces."""
         return self._native.degenerate
 
-    def jvp(self, direction: npt.ArrayLike) -> tuple[Vector, Vector]:
-        """dx and dy of a change of the data in a direction, an array (or a sparse matrix) like the part."""
-        key = {"q": "vector", "mu": "mu"}.get(self.with_respect_to, "matrix")
-        return self._native.forward(**{key: direction})
-
-    def vjp(self, x: Optional[npt.ArrayLike] = None, y: Optional[npt.ArrayLike] = None) -> Vector:
-        """The gradient with respect to the part of a function whose gradients with respect to x and y are given (0 where nothing is): one solve, whatever the size of the part.
-
-        For W and M it has all n × n entries, the outer product of the gradient with respect to q and of x.
-        """
-        point = self._native.point()
-        zero = np.zeros_like(point)
-        q, mu = self._native.backward(zero if x is None else x, zero if y is None else y)
-        if self.with_respect_to == "q":
-            return q
-        return mu if self.with_respect_to == "mu" else np.outer(q, point)
-
     @property
-    def matrix(self) -> Vector:
-        """All derivatives of x: n × n for q, n × nc for mu; for W and M n × n × n, ``matrix[k, i, j]`` that of x_k with respect to the entry i, j."""
-        point = self._native.point()
-        rows = [self._native.backward(e, np.zeros_like(point)) for e in np.eye(point.size)]
-        which = 1 if self.with_respect_to == "mu" else 0
-        by = np.array([row[which] for row in rows])
-        return by if self.with_respect_to in ("q", "mu") else np.einsum("ki,j->kij", by, point)
+    def parts(self) -> dict[str, int]:
+        """The parts of the solution with their lengths: ``z, w``; ``x, F``; ``r, u`` (of global problems ``v`` too), ``l, c`` of scalar rows; ..."""
+        return dict(self._native.solution)
+
+    def jvp(self, direction: npt.ArrayLike) -> dict[str, Vector]:
+        """How the parts of the solution change with the data in a direction, an array (or a sparse matrix) like the part: two triangular solves."""
+        if self._parameters is not None:
+            return self._native.forward("F", self._parameters @ np.asarray(direction, dtype=float))
+        return self._native.forward(self.with_respect_to, direction)
+
+    def vjp(self, **gradients: npt.ArrayLike) -> Vector:
+        """The gradient with respect to the part of the data of a function of the solution, whose gradients with respect to parts of it are given: ``vjp(r=g)``.
+
+        Two triangular solves, whatever the size of the part. Of a matrix it has all entries; see :meth:`factors` for large ones.
+        """
+        vectors, matrices = self._native.backward(gradients)
+        if self._parameters is not None:
+            pulled: Vector = self._parameters.T @ vectors["F"]
+            return pulled
+        if self.with_respect_to in vectors:
+            return vectors[self.with_respect_to]
+        first, *others = matrices[self.with_respect_to]
+        whole: Vector = np.outer(*first)
+        for a, b in others:
+            whole += np.outer(a, b)
+        return whole
+
+    def factors(self, **gradients: npt.ArrayLike) -> list[tuple[Vector, Vector]]:
+        """As :meth:`vjp` with respect to a matrix, which is ``Σ a bᵀ``: the pairs (a, b), of which an entry is ``Σ a[i] b[j]``."""
+        _, matrices = self._native.backward(gradients)
+        if self.with_respect_to not in matrices:
+            raise _nonsmooth.Error(
+                f"factors: expected a derivative with respect to a matrix, found {self.with_respect_to}"
+            )
+        return matrices[self.with_respect_to]
+
+    def matrix(self, part: Optional[str] = None) -> Vector:
+        """All derivatives of a part of the solution (of the first one: z, x, r or v), ``matrix[k, ...]`` with respect to the part of the data, which has the shape of that part.
+
+        As many solves as the part has entries.
+        """
+        sizes = self.parts
+        name = next(iter(sizes)) if part is None else part
+        if name not in sizes:
+            raise _nonsmooth.Error(f"part: expected one of {', '.join(sizes)}, found {name}")
+        return np.array([self.vjp(**{name: e}) for e in np.eye(sizes[name])])
+
+    def __repr__(self) -> str:
+        parts = ", ".join(self.parts)
+        flag = f", {self.degenerate} degenerate" if self.degenerate else ""
+        return f"<Derivative of {parts} with respect to {self.with_respect_to}{flag}>"
 
 
 def derivative(
     problem: Problem,
     answer: Answer,
-    with_respect_to: str = "q",
+    with_respect_to: Optional[str] = None,
     *,
+    parameters: Optional[Matrix] = None,
     tol: float = 1e-6,
 ) -> Derivative:
-    """The derivative of the answer with respect to ``"q"``, ``"mu"``, or the matrix, ``"W"`` or ``"M"``.
+    """The derivative of the answer with respect to a part of the data, by its letter.
 
-    For linear complementarity problems and local problems of contacts without scalar rows. The judge has to accept the answer at ``tol`` (1e-6; the
-    derivative has the accuracy of the answer, so solve with a small one). Raises :class:`Error` where there is no derivative: impulses that are not unique.
+    ========================== ======================= ==============================================================
+    problem                    parts of the solution   ``with_respect_to``
+    ========================== ======================= ==============================================================
+    LCP                        z, w                    q, M
+    BoxLCP                     z, w                    q, lower, upper, M
+    MLCP                       u, v, w                 q, M (of all rows and variables)
+    HLCP                       x, s                    q, Q, R
+    MCP, VI over a box         x, F                    F (a constant added to F), lower, upper, or ``parameters``
+    Friction, local form       r, u; l, c of rows      q, mu, W; s, lower, upper, V, R
+    Friction, global form      v, r, u; l, c of rows   f, w, mu, M, H; b, lower, upper, G
+    ========================== ======================= ==============================================================
+
+    Where nothing is said: q; of nonlinear problems F, of the global form f. Where F depends on parameters p of your own, ``parameters`` is ∂F/∂p at the solution, n × k,
+    and the derivative is one with respect to p. Entries of matrices are data each by itself: a change of a symmetric matrix has both of a pair.
+
+    The judge has to accept the answer at ``tol`` (1e-6; the derivative has the accuracy of the answer, so solve with a small one). Cost: a sparse factorisation. Raises :class:`Error`
+    where there is no derivative: impulses that are not unique, sets that are no boxes.
     """
-    letters = problem._native.letters()
-    if with_respect_to not in ("q", "mu", "W", "M") or with_respect_to not in letters:
-        known = ", ".join(letter for letter in ("q", "mu", "W", "M") if letter in letters)
-        raise _nonsmooth.Error(f"with_respect_to: expected one of {known}, found {with_respect_to}")
     native = _nonsmooth.Derivative(problem._native, answer._native, tol)
-    return Derivative(native, with_respect_to)
+    shapes = dict(native.data)
+    if parameters is not None:
+        if "F" not in shapes:
+            raise _nonsmooth.Error(f"parameters: expected a problem with a function F, found {problem.kind}")
+        if with_respect_to not in (None, "p"):
+            raise _nonsmooth.Error(
+                f"with_respect_to: expected nothing beside parameters, found {with_respect_to}"
+            )
+        given = parameters if hasattr(parameters, "tocsc") else np.asarray(parameters)
+        (n,) = shapes["F"]
+        if given.ndim != 2 or given.shape[0] != n:
+            raise _nonsmooth.Error(
+                f"parameters: expected {n} rows (entries of F), found an array of {given.shape}"
+            )
+        return Derivative(native, "p", given)
+    letter = next(iter(shapes)) if with_respect_to is None else with_respect_to
+    if letter not in shapes:
+        raise _nonsmooth.Error(f"with_respect_to: expected one of {', '.join(shapes)}, found {letter}")
+    return Derivative(native, letter)

@@ -212,7 +212,7 @@ def draw(scene: Union[World, Run], frame: int = -1) -> Picture:
 
 
 def load(path: Path) -> World:
-    """The world of a scene file (TOML or JSON), with its meshes, or of a robot (URDF, or a model of MuJoCo). What was left out of a robot is in ``warnings``."""
+    """The world of a scene file (TOML or JSON), with its meshes, of a robot (URDF, or a model of MuJoCo), or of a scene of Siconos (its mechanics HDF5). What was left out is in ``warnings``."""
     text, warnings = _nonsmooth.read_scene(path)
     world = World()
     world.document, world.warnings = json.loads(text), warnings

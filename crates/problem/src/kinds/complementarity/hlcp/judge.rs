@@ -4,8 +4,8 @@ use crate::check::proof::{Exactly, FEW, columns, exactly_near, exacts, just};
 use crate::check::rows::Rows;
 use crate::check::{ConeSystem, Judged, Measure, Verdict};
 use crate::kinds::complementarity::judge::{
-    NEVER, Pair, ROUNDING, RowCounts, RowStatus, Sum, distance, find_effects, find_units, finite,
-    floor, matters, put, rounding, share, verdict,
+    Pair, ROUNDING, RowCounts, RowStatus, Sum, distance, find_effects, find_units, finite, floor,
+    matters, put, rounding, share, unseen, verdict,
 };
 use crate::{Hlcp, HlcpPoint, Problem};
 use nonsmooth_linalg::{Matrix, norm};
@@ -104,8 +104,9 @@ impl HlcpGauge {
             sum.pair(n + i, &Pair { w: d * pair.w, ..pair }, self.c[i]);
         }
         let measure = Measure { floor: precisely.then(|| self.floor()), ..sum.measure() };
-        let measure = if visible { measure } else { Measure { relative: NEVER, ..measure } };
-        rounding(measure, 2 * n + 1, || is_rounded_pair(problem, point))
+        let exactly = || is_rounded_pair(problem, point);
+        let measure = if visible { measure } else { unseen(measure, precisely, exactly) };
+        rounding(measure, 2 * n + 1, exactly)
     }
 
     fn floor(&self) -> f64 {

@@ -1,8 +1,8 @@
 //! The judge of problems in z with `w = M z + q`: LCP, MLCP and box LCP.
 
 use super::{
-    NEVER, Pair, RowCounts, RowStatus, Sum, find_effects, find_units, finite, floor, put, rounding,
-    share, verdict,
+    Pair, RowCounts, RowStatus, Sum, find_effects, find_units, finite, floor, put, rounding, share,
+    unseen, verdict,
 };
 use crate::check::proof::{Exact, FEW, exact, exactly_near};
 use crate::check::rows::Rows;
@@ -160,8 +160,9 @@ impl LinearGauge {
             }
         }
         let measure = Measure { floor: precisely.then(|| self.floor()), ..sum.measure() };
-        let measure = if visible { measure } else { Measure { relative: NEVER, ..measure } };
-        rounding(measure, point.z.len() + 1, || is_rounded(&data, &point.z))
+        let exactly = || is_rounded(&data, &point.z);
+        let measure = if visible { measure } else { unseen(measure, precisely, exactly) };
+        rounding(measure, point.z.len() + 1, exactly)
     }
 
     /// The pair of row i at the point last measured, if it is no equality.

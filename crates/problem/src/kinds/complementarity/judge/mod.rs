@@ -297,6 +297,19 @@ pub(crate) fn finite(x: &[f64]) -> bool {
     x.iter().all(|x| x.is_finite())
 }
 
+/// The measure of a point with a row whose terms are so small that their rounding cannot be told: only exact arithmetic accepts it. Plain arithmetic lets it pass, so
+/// that the question comes up.
+pub(crate) fn unseen(
+    measure: Measure,
+    precisely: bool,
+    is_rounded: impl FnOnce() -> bool,
+) -> Measure {
+    match !precisely || is_rounded() {
+        true => measure,
+        false => Measure { relative: NEVER, ..measure },
+    }
+}
+
 /// The measure of a point whose errors may be those of its rounding alone: where that is so, they count as one bit. What doubled precision leaves in
 /// doubt of sums of `terms` terms is added: of terms 1e30 times larger than the row's unit nobody can tell that they vanish.
 pub(crate) fn rounding(

@@ -24,7 +24,7 @@ const GRAVITY: f64 = 9.80665;
 const TIMES: [f64; 2] = [5e-4, 10.0];
 
 /// The scene of a file.
-pub fn read(from: &Path) -> Result<Imported, String> {
+pub(crate) fn read(from: &Path) -> Result<Imported, String> {
     let file = MechanicsScene::read(from).map_err(|e| e.to_string())?;
     scene(&file).map_err(|e| format!("{}: {e}", from.display()))
 }
