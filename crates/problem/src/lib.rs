@@ -25,6 +25,6 @@ pub use kinds::contact::{
     Bounds, Coulomb, Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RowsGlobal,
     RowsLocal,
 };
-pub use kinds::variational::{Set, Vi};
+pub use kinds::variational::{Constraints, Set, Vi};
 pub use kinds::{Complementarity, Friction, Kind};
 pub use problem::Problem;

@@ -15,7 +15,9 @@ use dashu_int::ops::{BitTest, Gcd, UnsignedAbs};
 use dashu_int::{IBig, UBig};
 use nonsmooth_linalg::budget;
 use nonsmooth_problem::Problem;
-use nonsmooth_problem::check::{ConeSystem, Exact, ExactVector, rounded};
+use nonsmooth_problem::check::{
+    Certificate, ConeSystem, Evidence, Exact, ExactVector, Proof, rounded,
+};
 
 use crate::Limits;
 
@@ -198,6 +200,31 @@ impl ExactCones {
         }
         t
     }
+}
+
+/// Rows and columns beyond which a problem in exact numbers is not searched: the tableau alone would take seconds.
+const LARGE: [usize; 2] = [250, 1500];
+
+/// The proof that a problem has no solution, where a search of this cost, see [`ExactCones::within`], finds one. Of nonlinear problems, and of contact in space, a relaxation is searched.
+pub fn refuted<P: Problem>(problem: &P, allowed: u64) -> Option<Proof> {
+    let system = problem.cones()?;
+    if system.rhs.len() > LARGE[0] || system.columns.len() > LARGE[1] {
+        return None;
+    }
+    let mut search = ExactCones::within(allowed, system);
+    while !search.is_cut_short() {
+        match search.advance() {
+            None => {}
+            Some(Found::Solution(_)) => return None,
+            Some(Found::Nothing(vectors)) => {
+                return match problem.evidence(&Certificate::Separating { vectors }) {
+                    Evidence::Proved(proof) => Some(proof),
+                    _ => None,
+                };
+            }
+        }
+    }
+    None
 }
 
 /// Whether the solution of a problem with these coefficients passes the check when it is rounded to doubles, at the default tolerance.
@@ -383,7 +410,6 @@ impl Case {
 #[cfg(test)]
 mod tests {
     use nonsmooth_linalg::{Bsr, Csc, Dense};
-    use nonsmooth_problem::check::{Certificate, Evidence};
     use nonsmooth_problem::{BoxLcp, FrictionLocal, Hlcp, Lcp, Mlcp, Problem};
 
     use super::*;
