@@ -11,6 +11,8 @@
 //!
 //! Cost: at most 2ᵐ cases for m pairs; a pivot is rows · columns products of integers of rows · 53 bits at most. Storage: a tableau for each open case.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use dashu_int::ops::{BitTest, Gcd, UnsignedAbs};
 use dashu_int::{IBig, UBig};
 use nonsmooth_linalg::budget;
@@ -225,6 +227,25 @@ pub fn refuted<P: Problem>(problem: &P, allowed: u64) -> Option<Proof> {
         }
     }
     None
+}
+
+/// What a plan of solvers has come upon by [`refuted`], for the session that follows it.
+#[derive(Debug, Clone, Default)]
+pub struct Refutation(Arc<Mutex<Option<Proof>>>);
+
+impl Refutation {
+    /// Looks for a proof, and keeps it; whether there is one.
+    pub fn search<P: Problem>(&self, problem: &P, allowed: u64) -> bool {
+        let found = refuted(problem, allowed);
+        let is = found.is_some();
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = found;
+        is
+    }
+
+    /// The proof that was found since it was last taken.
+    pub fn take(&self) -> Option<Proof> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
 }
 
 /// Whether the solution of a problem with these coefficients passes the check when it is rounded to doubles, at the default tolerance.

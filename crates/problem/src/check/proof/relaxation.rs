@@ -53,8 +53,7 @@ impl Relaxed<'_> {
     pub(crate) fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
         let n = self.lower.len();
         let small = n <= CONTRACTED;
-        let chosen: Vec<usize> =
-            (0..n).filter(|&i| small || wanted.is_none_or(|w| w[i])).collect();
+        let chosen: Vec<usize> = (0..n).filter(|&i| small || wanted.is_none_or(|w| w[i])).collect();
         let mut rows = vec![Combination::default(); n];
         for (&i, row) in chosen.iter().zip(self.field.combinations(&chosen)?) {
             rows[i] = row;
@@ -147,7 +146,8 @@ impl Relaxed<'_> {
     fn contract(&self, rows: &[Combination], l: &mut [f64], u: &mut [f64]) -> Option<()> {
         let mut conditions: Vec<(Option<usize>, Combination, Sign)> = vec![];
         for (i, (row, sign)) in rows.iter().zip(self.signs()).enumerate() {
-            let own = !self.silent[i] && !self.constraints.iter().any(|c| c.terms.iter().any(|t| t.0 == i));
+            let own = !self.silent[i]
+                && !self.constraints.iter().any(|c| c.terms.iter().any(|t| t.0 == i));
             conditions.push((own.then_some(i), row.clone(), sign));
         }
         for c in self.constraints {
@@ -163,7 +163,8 @@ impl Relaxed<'_> {
                     Term::Variable(j) => Range::new(l[*j], u[*j]),
                     Term::Node(node) => ranges[node.index()],
                 };
-                let parts: Vec<(&Term, Range)> = row.terms.iter().map(|(t, c)| (t, around(c))).collect();
+                let parts: Vec<(&Term, Range)> =
+                    row.terms.iter().map(|(t, c)| (t, around(c))).collect();
                 let part = |k: usize, l: &[f64], u: &[f64]| parts[k].1.mul(value(parts[k].0, l, u));
                 // Sums of the parts after each.
                 let mut after = vec![around(&row.constant)];

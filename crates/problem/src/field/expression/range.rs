@@ -81,7 +81,8 @@ impl Range {
 
     /// `x y`
     pub fn mul(self, y: Self) -> Self {
-        let corners = [(self.low, y.low), (self.low, y.high), (self.high, y.low), (self.high, y.high)];
+        let corners =
+            [(self.low, y.low), (self.low, y.high), (self.high, y.low), (self.high, y.high)];
         let low = corners.map(|(a, b)| product(a, b, Side::Low));
         let high = corners.map(|(a, b)| product(a, b, Side::High));
         Self {
@@ -121,7 +122,11 @@ impl Range {
                 if exact || x == 0.0 || x.is_infinite() { q } else { side.beyond(q) }
             };
             let (a, b) = if y.low > 0.0 { (self.low, self.high) } else { (self.high, self.low) };
-            return Self { low: at(a, Side::Low), high: at(b, Side::High), total: self.total && y.total };
+            return Self {
+                low: at(a, Side::Low),
+                high: at(b, Side::High),
+                total: self.total && y.total,
+            };
         }
         self.mul(y.inverse())
     }
@@ -153,7 +158,8 @@ impl Range {
     /// `x^k`
     fn whole_power(self, k: i64) -> Self {
         let at = |x: f64| {
-            let (mut power, mut square, mut k) = (Self::point(1.0), Self::point(x), k.unsigned_abs());
+            let (mut power, mut square, mut k) =
+                (Self::point(1.0), Self::point(x), k.unsigned_abs());
             while k > 0 {
                 if k & 1 == 1 {
                     power = power.mul(square);
@@ -179,14 +185,19 @@ impl Range {
         let total = self.total && y.total;
         if self.low > 0.0 || (self.low == 0.0 && y.low > 0.0) {
             // The logarithm is bilinear in y and log x.
-            let corners = [(self.low, y.low), (self.low, y.high), (self.high, y.low), (self.high, y.high)];
+            let corners =
+                [(self.low, y.low), (self.low, y.high), (self.high, y.low), (self.high, y.high)];
             let values = corners.map(|(a, b)| a.powf(b));
             if values.iter().any(|v| v.is_nan()) {
                 return Self::unknown();
             }
             let low = values.into_iter().fold(f64::INFINITY, f64::min);
             let high = values.into_iter().fold(f64::NEG_INFINITY, f64::max);
-            return Self { low: widened(low, Side::Low).max(0.0), high: widened(high, Side::High), total };
+            return Self {
+                low: widened(low, Side::Low).max(0.0),
+                high: widened(high, Side::High),
+                total,
+            };
         }
         match constant {
             // A base below zero has a value for whole exponents only.
@@ -241,7 +252,11 @@ impl Range {
         if !apart {
             return Self::unknown();
         }
-        Self { low: widened(self.low.tan(), Side::Low), high: widened(self.high.tan(), Side::High), ..self }
+        Self {
+            low: widened(self.low.tan(), Side::Low),
+            high: widened(self.high.tan(), Side::High),
+            ..self
+        }
     }
 
     /// `{0, 1}`, or one of them.
@@ -312,9 +327,11 @@ impl Range {
                 Self { low, high: if self.high > 0.0 { most } else { 0.0 }, total: false }
             }
             Binary::Atan2 => Self { low: -4.0, high: 4.0, total },
-            Binary::SignPow | Binary::IntDiv | Binary::Precision | Binary::Round | Binary::Trunc => {
-                Self::unknown()
-            }
+            Binary::SignPow
+            | Binary::IntDiv
+            | Binary::Precision
+            | Binary::Round
+            | Binary::Trunc => Self::unknown(),
             Binary::Lt | Binary::Le | Binary::Eq | Binary::Ge | Binary::Gt | Binary::Ne => {
                 Self::truth(None)
             }
@@ -540,7 +557,8 @@ mod tests {
                         defined += 1;
                         // The value itself is rounded.
                         let slack = 1e-12 * values[0].abs().max(1.0);
-                        let inside = range.low - slack <= values[0] && values[0] <= range.high + slack;
+                        let inside =
+                            range.low - slack <= values[0] && values[0] <= range.high + slack;
                         assert!(inside, "{text} at {x:?}: {} {range:?}", values[0]);
                     } else {
                         assert!(!range.total, "{text} at {x:?} {range:?}");

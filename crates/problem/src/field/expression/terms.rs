@@ -85,7 +85,11 @@ fn firsts(graph: &Graph) -> Vec<u32> {
 /// The chosen rows, taken apart along sums, and products with numbers. `None` where the time is over before.
 ///
 /// Cost: the nodes, and of each row its own, a shared one as often as rows use it; an operation on rational numbers for each.
-pub(crate) fn combinations(graph: &Graph, rows: &[Id], chosen: &[usize]) -> Option<Vec<Combination>> {
+pub(crate) fn combinations(
+    graph: &Graph,
+    rows: &[Id],
+    chosen: &[usize],
+) -> Option<Vec<Combination>> {
     let constants = constants(graph);
     let firsts = firsts(graph);
     let number = |a: &Id| constants[a.index()];
@@ -188,8 +192,8 @@ pub(crate) fn twins(graph: &Graph, rows: &[Combination], pairs: &[(usize, usize)
             return Some(0.0);
         }
         let c = a[0].1 / b[0].1;
-        let same = a.len() == b.len()
-            && a.iter().zip(b).all(|(x, y)| x.0 == y.0 && *x.1 == &c * y.1);
+        let same =
+            a.len() == b.len() && a.iter().zip(b).all(|(x, y)| x.0 == y.0 && *x.1 == &c * y.1);
         same.then(|| crate::check::rounded(&c))
     };
     let twin = |&(row, of): &(usize, usize)| {

@@ -7,10 +7,8 @@
 //! References: Munson2002; Billups1995; the solvers' own files. Cost: that of the solvers tried. Fails: where all of them do.
 
 use std::borrow::Cow;
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use nonsmooth_problem::check::Proof;
 use nonsmooth_problem::{BoxLcp, LcpPoint, Mcp, Problem};
 
 use super::plan::Plan;
@@ -19,7 +17,7 @@ use crate::complementarity::parts::nonlinear::by_a_row;
 use crate::complementarity::reform::Presolve;
 use crate::complementarity::reform::presolve::reduces;
 use crate::core::drive::Meter;
-use crate::core::exact_cones::refuted;
+use crate::core::exact_cones::Refutation;
 use crate::core::register::Composed;
 use crate::core::trace::Trace;
 use crate::{Limits, Observer, Outcome, Progress, Sample, Session, SolveError, Status};
@@ -37,16 +35,11 @@ const WORK: u64 = 20_000_000;
 impl Auto {
     /// A session for nonlinear problems, without history.
     pub fn nonlinear(self) -> AutoSession {
-        let proof = Arc::new(Mutex::new(None));
+        let proof = Refutation::default();
         let found = proof.clone();
         let plan = move |problem: &Mcp, stage| {
-            if stage == 1 {
-                let search = refuted(problem, WORK);
-                let none = search.is_some();
-                *found.lock().unwrap_or_else(PoisonError::into_inner) = search;
-                if none {
-                    return vec![];
-                }
+            if stage == 1 && found.search(problem, WORK) {
+                return vec![];
             }
             self.plan_of(problem, stage)
         };
@@ -55,6 +48,7 @@ impl Auto {
             nonlinear: Portfolio::new(plan),
             proof,
             refuted: None,
+            searched: false,
             polish: Portfolio::new(|_: &Mcp, stage| polish(stage)),
             affine: None,
         }
@@ -119,9 +113,10 @@ pub struct AutoSession {
     linear: Portfolio<BoxLcp>,
     nonlinear: Portfolio<Mcp>,
     /// What the plan has come upon.
-    proof: Arc<Mutex<Option<Proof>>>,
-    /// Why there is no solution, if a row says so.
+    proof: Refutation,
+    /// Why there is no solution, where that was found; and whether solvers were tried.
     refuted: Option<String>,
+    searched: bool,
     /// Of what solves an affine problem in units of its rows, but not yet to the tolerance in those of F.
     polish: Portfolio<Mcp>,
     /// The account of the linear solve, if there was one, and whether its word was the last.
@@ -138,20 +133,23 @@ impl AutoSession {
         observer: &mut dyn Observer<Mcp>,
     ) -> Result<Outcome, SolveError> {
         let begun = Instant::now();
-        self.refuted = None;
+        (self.refuted, self.searched) = (None, false);
         let scope = limits.budget(begun).enter();
         if let Some(proof) = by_a_row(problem) {
             let measure = problem.certify(point, &mut problem.gauge()?);
-            let outcome = Meter::start(begun, limits).outcome(Status::Infeasible(proof), measure, 0);
+            let outcome =
+                Meter::start(begun, limits).outcome(Status::Infeasible(proof), measure, 0);
             self.refuted = Some("a row has one sign on the whole box: there is no solution".into());
             return Ok(outcome);
         }
         drop(scope);
-        let take = || self.proof.lock().unwrap_or_else(PoisonError::into_inner).take();
-        take();
+        self.proof.take();
+        self.searched = true;
         let outcome = self.nonlinear.observe(problem, point, &limits.left(begun), observer)?;
-        match take() {
+        match self.proof.take() {
             Some(proof) if !matches!(outcome.status, Status::Solved) => {
+                let why = "the bounds of the terms that are not linear leave no solution, in exact arithmetic";
+                self.refuted = Some(why.into());
                 Ok(Outcome { status: Status::Infeasible(proof), ..outcome })
             }
             _ => Ok(outcome),
@@ -160,10 +158,8 @@ impl AutoSession {
 
     /// What was done for a problem that is not affine.
     fn nonlinear_account(&self) -> Vec<String> {
-        match &self.refuted {
-            Some(why) => vec![why.clone()],
-            None => self.nonlinear_account(),
-        }
+        let before = if self.searched { self.nonlinear.account() } else { vec![] };
+        before.into_iter().chain(self.refuted.clone()).collect()
     }
 }
 
@@ -194,7 +190,8 @@ impl Session<Mcp> for AutoSession {
     ) -> Result<Outcome, SolveError> {
         limits.validate()?;
         problem.validate_point(point)?;
-        (self.affine, self.refuted) = (None, None);
+        self.affine = None;
+        (self.refuted, self.searched) = (None, false);
         let Some((linear, _)) = problem.affine() else {
             return self.observe_nonlinear(problem, point, limits, observer);
         };
@@ -252,7 +249,7 @@ impl Session<Mcp> for AutoSession {
     fn history(&self) -> &[Sample] {
         match self.affine {
             Some((_, true)) => self.linear.history(),
-            _ if self.refuted.is_some() => &[],
+            _ if !self.searched => &[],
             _ => self.nonlinear.history(),
         }
     }
@@ -260,7 +257,7 @@ impl Session<Mcp> for AutoSession {
     fn trace(&self) -> Trace {
         match self.affine {
             Some((_, true)) => self.linear.trace(),
-            _ if self.refuted.is_some() => Trace::None,
+            _ if !self.searched => Trace::None,
             _ => self.nonlinear.trace(),
         }
     }

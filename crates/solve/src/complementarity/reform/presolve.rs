@@ -71,11 +71,30 @@ pub struct Memo {
     f: Vec<f64>,
 }
 
+/// How many variables go, with a row each, and why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Bounds that are equal.
+    pub fixed: usize,
+    /// A row's sign on the box.
+    pub held: usize,
+    /// A twin.
+    pub twins: usize,
+    /// An equation.
+    pub defined: usize,
+}
+
+/// What the presolve takes away from a problem: nothing where F is not known by expressions.
+pub fn counts(problem: &Mcp) -> Counts {
+    problem.F.expressions().map(|f| Plan::of(problem, f).counts).unwrap_or_default()
+}
+
 /// What a presolve finds.
 struct Plan {
     /// Variables that are numbers, ascending.
     known: Vec<(usize, f64)>,
     defined: Vec<Defined>,
+    counts: Counts,
 }
 
 impl Plan {
@@ -83,11 +102,16 @@ impl Plan {
         let mut value: Vec<Option<f64>> = (0..problem.dim())
             .map(|i| (problem.lower[i] == problem.upper[i]).then_some(problem.lower[i]))
             .collect();
+        let known = |value: &[Option<f64>]| value.iter().flatten().count();
+        let fixed = known(&value);
         held(problem, f, &mut value);
+        let held = known(&value) - fixed;
         twins(problem, f, &mut value);
+        let twins = known(&value) - fixed - held;
         let defined = defined(problem, f, &value);
+        let counts = Counts { fixed, held, twins, defined: defined.len() };
         let known = value.into_iter().enumerate().filter_map(|(i, x)| Some((i, x?))).collect();
-        Self { known, defined }
+        Self { known, defined, counts }
     }
 
     fn len(&self) -> usize {
@@ -184,9 +208,8 @@ fn twins(problem: &Mcp, f: &Expressions, value: &mut [Option<f64>]) {
 fn defined(problem: &Mcp, f: &Expressions, value: &[Option<f64>]) -> Vec<Defined> {
     let n = problem.dim();
     let open = |i: usize| value[i].is_none();
-    let free = |i: usize| {
-        open(i) && problem.lower[i].is_infinite() && problem.upper[i].is_infinite()
-    };
+    let free =
+        |i: usize| open(i) && problem.lower[i].is_infinite() && problem.upper[i].is_infinite();
     let pattern = f.pattern();
     let mut users = vec![vec![]; n];
     for (i, j) in pattern.places().filter(|&(i, j)| open(i) && open(j)) {
@@ -405,7 +428,7 @@ impl Reformulation<Mcp> for Presolve {
             return Err(SolveError::needs("F by expressions", problem.F.source()));
         };
         let n = problem.dim();
-        let Plan { mut known, mut defined } = Plan::of(problem, f);
+        let Plan { mut known, mut defined, .. } = Plan::of(problem, f);
         if known.len() + defined.len() == n && defined.pop().is_none() {
             // Something has to be left to be solved.
             let Some(k) = known.iter().rposition(|&(i, _)| problem.lower[i] < problem.upper[i])

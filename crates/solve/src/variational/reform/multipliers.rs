@@ -9,8 +9,8 @@
 
 use std::sync::Arc;
 
-use nonsmooth_problem::field::{Binary, Evaluator, Expressions, Field, Graph, Node, Pattern};
 use nonsmooth_problem::check::Constraint;
+use nonsmooth_problem::field::{Binary, Evaluator, Expressions, Field, Graph, Node, Pattern};
 use nonsmooth_problem::{Constraints, Kind, LcpPoint, Mcp, Set, Vi};
 
 use crate::core::reformulation::Reformulation;
@@ -192,7 +192,8 @@ impl Evaluator for Running {
             let forces = self.field.columns[i].iter().map(|term| term.1);
             self.slopes[inner.range(i)].iter().copied().chain(forces)
         });
-        let of_multipliers = self.field.constraints.iter().flat_map(|c| &c.terms).map(|term| -term.1);
+        let of_multipliers =
+            self.field.constraints.iter().flat_map(|c| &c.terms).map(|term| -term.1);
         jacobian.iter_mut().zip(of_x.chain(of_multipliers)).for_each(|(to, from)| *to = from);
         defined
     }

@@ -5,8 +5,8 @@
 //!              min_u ‖[Gᵀ; hᵀ] u − e_{n+1}‖,  u_k ≥ 0 of inequalities;  s along the residual: the rows with u_k > 0 hold with equality
 //! ```
 //!
-//! There is no such y where the residual vanishes: the polyhedron is empty. Source: LawsonHanson1974, ch. 23. Cost: for k active rows `n k²` operations a step, and about as many
-//! steps as the active rows change: those of the last projection are tried first.
+//! There is no such y where the residual vanishes: the polyhedron is empty. Source: LawsonHanson1974, ch. 23. Cost: for k active rows `n k` operations for one that comes, `n k²` for
+//! one that goes. Those of the last projection are tried first, at the first time those that p violates, and what is not positive with all the others goes at once.
 
 use nonsmooth_linalg::budget;
 
@@ -83,9 +83,7 @@ impl Projection {
         let Self { rows, norms, equalities, passive } = self;
         let (n, m, bounds) = (p.len(), rows.len(), rows.len() - *equalities);
         let rhs = b.iter().map(|b| -b).chain(d.iter().copied());
-        let h = |(k, rhs): (usize, f64)| {
-            rhs / norms[k] - rows[k].iter().zip(p).map(|(g, p)| g * p).sum::<f64>()
-        };
+        let h = |(k, rhs): (usize, f64)| rhs / norms[k] - dot(&rows[k], p);
         let mut h: Vec<f64> = rhs.enumerate().map(h).collect();
         y.copy_from_slice(p);
         let size = largest(&h);
@@ -96,10 +94,12 @@ impl Projection {
         h.iter_mut().for_each(|h| *h /= size);
         let column = |k: usize| rows[k].iter().copied().chain([h[k]]);
         passive.retain(|&k| k < bounds);
+        if passive.is_empty() {
+            passive.extend((0..bounds).filter(|&k| h[k] > 0.0));
+        }
         passive.extend(bounds..m);
         let mut u = vec![0.0; m];
-        let span = |passive: &[usize]| Span::of(passive.iter().map(|&k| column(k)));
-        let mut known = span(passive);
+        let mut known = Span::of(passive.iter().map(|&k| column(k)));
         // Of the last time, what is positive with all the others.
         loop {
             if budget::over() {
@@ -111,11 +111,13 @@ impl Projection {
             if passive.iter().zip(&next).all(|(&k, &z)| keeps(k, z)) {
                 break;
             }
+            let first = passive.iter().position(|&k| !keeps(k, u[k])).unwrap_or(0);
             passive.retain(|&k| keeps(k, u[k]));
-            known = span(passive);
+            known.renew(first, passive[first..].iter().map(|&k| column(k)));
         }
         // Columns that are combinations of the passive ones.
         let mut blocked = vec![false; m];
+        let mut is_passive = vec![false; m];
         for _ in 0..3 * m + 10 {
             if budget::over() {
                 return false;
@@ -135,8 +137,10 @@ impl Projection {
                 passive.iter().zip(&next).for_each(|(&k, &z)| u[k] += alpha * (z - u[k]));
                 let Some(least) = least else { break };
                 u[least] = 0.0;
-                passive.retain(|&k| k >= bounds || u[k] > 0.0);
-                known = span(passive);
+                let stays = |k: usize| k >= bounds || u[k] > 0.0;
+                let first = passive.iter().position(|&k| !stays(k)).unwrap_or(0);
+                passive.retain(|&k| stays(k));
+                known.renew(first, passive[first..].iter().map(|&k| column(k)));
                 blocked.fill(false);
                 if budget::over() {
                     return false;
@@ -150,9 +154,11 @@ impl Projection {
             if norm(&residual) < DEPENDENT {
                 return false;
             }
-            let slope = |k: usize| column(k).zip(&residual).map(|(e, r)| e * r).sum::<f64>();
-            let open = (0..bounds).filter(|k| !blocked[*k] && !passive.contains(k));
+            let slope = |k: usize| dot(&rows[k], &residual[..n]) + h[k] * residual[n];
+            passive.iter().for_each(|&k| is_passive[k] = true);
+            let open = (0..bounds).filter(|&k| !blocked[k] && !is_passive[k]);
             let steepest = open.map(|k| (k, slope(k))).max_by(|a, b| a.1.total_cmp(&b.1));
+            is_passive.fill(false);
             match steepest {
                 Some((k, slope)) if slope > DEPENDENT * norm(&residual) => {
                     passive.push(k);
@@ -177,6 +183,19 @@ impl Projection {
     }
 }
 
+/// In eight sums, which one instruction adds up.
+fn dot(x: &[f64], y: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a, b) = (x.chunks_exact(8), y.chunks_exact(8));
+    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in a.zip(b) {
+        for k in 0..8 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
 /// Columns one after the other: orthonormal ones with the same span as far as they are independent, and R by columns; of dependent ones none.
 struct Span {
     q: Vec<Vec<f64>>,
@@ -190,6 +209,18 @@ impl Span {
         out
     }
 
+    /// These columns in place of those from the one at `first` on.
+    fn renew<C: Iterator<Item = f64>>(&mut self, first: usize, columns: impl Iterator<Item = C>) {
+        self.r.truncate(first);
+        self.q.truncate(self.r.iter().flatten().count());
+        for column in columns {
+            if budget::over() {
+                return;
+            }
+            self.push(column);
+        }
+    }
+
     /// One column more. Cost: its entries times the columns that are there.
     fn push(&mut self, column: impl Iterator<Item = f64>) {
         let Self { q, r } = self;
@@ -199,7 +230,7 @@ impl Span {
         // Twice is enough.
         for _ in 0..2 {
             for (q, along) in q.iter().zip(&mut along) {
-                let c: f64 = q.iter().zip(&x).map(|(q, x)| q * x).sum();
+                let c = dot(q, &x);
                 x.iter_mut().zip(q).for_each(|(x, q)| *x -= c * q);
                 *along += c;
             }
