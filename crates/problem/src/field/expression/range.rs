@@ -69,18 +69,18 @@ impl Range {
     }
 
     /// `−x`
-    pub fn neg(self) -> Self {
+    pub(crate) fn neg(self) -> Self {
         Self { low: -self.high, high: -self.low, ..self }
     }
 
     /// `x + y`
-    pub fn add(self, y: Self) -> Self {
+    pub(crate) fn add(self, y: Self) -> Self {
         let low = sum(self.low, y.low, Side::Low);
         Self { low, high: sum(self.high, y.high, Side::High), total: self.total && y.total }
     }
 
     /// `x y`
-    pub fn mul(self, y: Self) -> Self {
+    pub(crate) fn mul(self, y: Self) -> Self {
         let corners =
             [(self.low, y.low), (self.low, y.high), (self.high, y.low), (self.high, y.high)];
         let low = corners.map(|(a, b)| product(a, b, Side::Low));
@@ -114,7 +114,7 @@ impl Range {
     }
 
     /// `x / y`
-    pub fn div(self, y: Self) -> Self {
+    pub(crate) fn div(self, y: Self) -> Self {
         if y.low == y.high && y.low != 0.0 && y.low.is_finite() {
             let at = |x: f64, side: Side| {
                 let q = x / y.low;

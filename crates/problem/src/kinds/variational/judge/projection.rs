@@ -5,8 +5,7 @@
 //!              min_u ‖[Gᵀ; hᵀ] u − e_{n+1}‖,  u_k ≥ 0 of inequalities;  s along the residual: the rows with u_k > 0 hold with equality
 //! ```
 //!
-//! There is no such y where the residual vanishes: the polyhedron is empty. Source: LawsonHanson1974, ch. 23. Cost: for k active rows `n k` operations for one that comes, `n k²` for
-//! one that goes. Those of the last projection are tried first, at the first time those that p violates, and what is not positive with all the others goes at once.
+//! There is no such y where the residual vanishes: the polyhedron is empty. Source: LawsonHanson1974, ch. 23. Cost: for k active rows `n k` operations for one that comes or goes. Those of the last projection are tried first, at the first time those that p violates, and what is not positive with all the others goes at once.
 
 use nonsmooth_linalg::budget;
 
@@ -111,9 +110,8 @@ impl Projection {
             if passive.iter().zip(&next).all(|(&k, &z)| keeps(k, z)) {
                 break;
             }
-            let first = passive.iter().position(|&k| !keeps(k, u[k])).unwrap_or(0);
-            passive.retain(|&k| keeps(k, u[k]));
-            known.renew(first, passive[first..].iter().map(|&k| column(k)));
+            let gone = known.without(passive, |k| keeps(k, u[k]));
+            known.complete(gone, passive, column);
         }
         // Columns that are combinations of the passive ones.
         let mut blocked = vec![false; m];
@@ -138,9 +136,8 @@ impl Projection {
                 let Some(least) = least else { break };
                 u[least] = 0.0;
                 let stays = |k: usize| k >= bounds || u[k] > 0.0;
-                let first = passive.iter().position(|&k| !stays(k)).unwrap_or(0);
-                passive.retain(|&k| stays(k));
-                known.renew(first, passive[first..].iter().map(|&k| column(k)));
+                let gone = known.without(passive, stays);
+                known.complete(gone, passive, column);
                 blocked.fill(false);
                 if budget::over() {
                     return false;
@@ -209,16 +206,60 @@ impl Span {
         out
     }
 
-    /// These columns in place of those from the one at `first` on.
-    fn renew<C: Iterator<Item = f64>>(&mut self, first: usize, columns: impl Iterator<Item = C>) {
+    /// Takes away the columns that do not stay, and these from the list of their names; what is left may lack columns at its end, see [`complete`](Self::complete).
+    ///
+    /// Cost: the entries of those that are left, for each; of many as much as making them again.
+    fn without(&mut self, names: &mut Vec<usize>, stays: impl Fn(usize) -> bool) -> usize {
+        let gone: Vec<usize> = (0..names.len()).filter(|&at| !stays(names[at])).collect();
+        names.retain(|&k| stays(k));
+        let first = gone.first().copied().unwrap_or(names.len());
+        // What depends on others may not do so without them.
+        let turns = self.r[first..].iter().all(Option::is_some) && 4 * gone.len() < self.r.len();
+        if turns {
+            gone.iter().rev().for_each(|&at| self.remove(at));
+            return names.len();
+        }
         self.r.truncate(first);
         self.q.truncate(self.r.iter().flatten().count());
-        for column in columns {
+        first
+    }
+
+    /// The columns of these names from the first on that is not there.
+    fn complete<C: Iterator<Item = f64>>(
+        &mut self,
+        first: usize,
+        names: &[usize],
+        column: impl Fn(usize) -> C,
+    ) {
+        for &k in &names[first..] {
             if budget::over() {
                 return;
             }
-            self.push(column);
+            self.push(column(k));
         }
+    }
+
+    /// Without the column at this place, where none after it depends on others: turns in the planes of neighbours make R triangular again.
+    fn remove(&mut self, at: usize) {
+        self.r.remove(at);
+        let place = self.r[..at].iter().flatten().count();
+        for i in place..self.q.len() - 1 {
+            let mut columns = self.r[at..].iter_mut().flatten().skip(i - place);
+            let Some(first) = columns.next() else { break };
+            let (a, b) = (first[i], first[i + 1]);
+            let size = a.hypot(b);
+            let (c, s) = if size > 0.0 { (a / size, b / size) } else { (1.0, 0.0) };
+            first[i] = size;
+            first.truncate(i + 1);
+            for r in columns {
+                (r[i], r[i + 1]) = (c * r[i] + s * r[i + 1], c * r[i + 1] - s * r[i]);
+            }
+            let (left, right) = self.q.split_at_mut(i + 1);
+            for (x, y) in left[i].iter_mut().zip(&mut right[0]) {
+                (*x, *y) = (c * *x + s * *y, c * *y - s * *x);
+            }
+        }
+        self.q.pop();
     }
 
     /// One column more. Cost: its entries times the columns that are there.
@@ -282,4 +323,37 @@ fn nearest(which: &[usize], rows: &[Vec<f64>], h: &[f64], n: usize) -> Vec<f64> 
         along.push(z);
     }
     s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_that_go_leave_the_least_squares_of_the_others() {
+        let (n, k) = (12, 9);
+        let entry = |i: usize, j: usize| ((i * 37 + j * 91) as f64 * 0.618).sin();
+        let column = |j: usize| (0..=n).map(move |i| entry(i, j));
+        for gone in [vec![0], vec![8], vec![3, 4], vec![0, 8], vec![1, 2, 3, 5, 7]] {
+            let mut names: Vec<usize> = (0..k).collect();
+            let mut span = Span::of(names.iter().map(|&j| column(j)));
+            let first = span.without(&mut names, |j| !gone.contains(&j));
+            span.complete(first, &names, column);
+            assert_eq!(names.len(), k - gone.len());
+            let plain = Span::of(names.iter().map(|&j| column(j))).least_squares(n);
+            for (a, b) in span.least_squares(n).iter().zip(&plain) {
+                assert!((a - b).abs() < 1e-12, "{gone:?}: {a} {b}");
+            }
+        }
+        // A column that was a multiple of one that goes is there afterwards.
+        let twice =
+            |j: usize| (0..=n).map(move |i| if j == 2 { 2.0 * entry(i, 0) } else { entry(i, j) });
+        let mut names = vec![0, 1, 2, 3, 4, 5];
+        let mut span = Span::of(names.iter().map(|&j| twice(j)));
+        assert!(span.r[2].is_none());
+        let first = span.without(&mut names, |j| j != 0);
+        span.complete(first, &names, twice);
+        let plain = Span::of(names.iter().map(|&j| twice(j))).least_squares(n);
+        assert!(span.least_squares(n).iter().zip(&plain).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
 }
