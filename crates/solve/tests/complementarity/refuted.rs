@@ -74,7 +74,7 @@ fn planted_directions_are_found() {
         let mut rows: Vec<String> = (1..n)
             .map(|_| {
                 let each = (0..3).map(|_| {
-                    let (k, i, j) = (whole(0, 4), whole(1, n as i32), whole(1, n as i32));
+                    let (k, i, j) = (whole(0, 4), whole(1, n), whole(1, n));
                     format!("({})*{}", whole(-3, 3), term(k, i as usize, j as usize))
                 });
                 format!("{} + ({})", each.collect::<Vec<_>>().join(" + "), whole(-3, 3))
