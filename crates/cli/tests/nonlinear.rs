@@ -157,7 +157,7 @@ fn rows_are_told_by_their_names() {
 }
 
 fn text_of_no_solution() -> String {
-    "kind = 'mcp'\nnames = ['q', 'p']\nF = ['1', 'exp(p) + 1']\nlower = [0, -inf]\n".into()
+    "kind = 'mcp'\nnames = ['q', 'p']\nF = ['1', 'exp(p) - (p)']\nlower = [0, -inf]\n".into()
 }
 
 #[test]

@@ -25,6 +25,6 @@ pub use kinds::contact::{
     Bounds, Coulomb, Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Rolling,
     RollingData, RollingGlobal, RollingLocal, RowsGlobal, RowsLocal, Weighed,
 };
-pub use kinds::variational::{Set, Vi};
+pub use kinds::variational::{Constraints, Set, Vi};
 pub use kinds::{Complementarity, Friction, Kind};
 pub use problem::Problem;

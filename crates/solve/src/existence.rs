@@ -161,7 +161,7 @@ fn exactly(problem: &AnyProblem, point: Option<&[f64]>) -> Option<Existence> {
         match search.advance() {
             None => {}
             Some(Found::Solution(t)) => {
-                return system.solved_by(&t).then(|| Existence::Solved {
+                return (system.complete && system.solved_by(&t)).then(|| Existence::Solved {
                     representable: is_representable(problem, &system, &t),
                     coefficients: ExactVector(t),
                 });

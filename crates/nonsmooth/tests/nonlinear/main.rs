@@ -10,7 +10,9 @@ use nonsmooth_io::ProblemFile;
 use nonsmooth_problem::field::Expressions;
 use nonsmooth_problem::planted::{Bratu, ClassicName, HarkerPang, NashCournot, NonlinearClassic};
 use nonsmooth_problem::{AnyProblem, Complementarity, Mcp, Problem};
-use nonsmooth_solve::{Limits, Status, registry};
+use nonsmooth_solve::complementarity::reform::Presolve;
+use nonsmooth_solve::complementarity::reform::presolve::{self, Counts};
+use nonsmooth_solve::{Limits, Reformulation, Status, registry};
 
 /// The eight of the lecture's comparison.
 const EIGHT: [&str; 8] =
@@ -112,8 +114,13 @@ fn problems_without_solution_are_never_solved() {
             assert_ne!(run.outcome.status, Status::Solved, "{name}: {:?}", run.point);
         }
     }
-    let affine = run(&without[4], "auto", &[], &limits(1e-8)).outcome.status;
-    assert!(matches!(affine, Status::Infeasible(_)), "proved, as it is affine: {affine:?}");
+    for problem in &without {
+        let status = run(problem, "auto", &[], &limits(1e-8)).outcome.status;
+        assert!(
+            matches!(status, Status::Infeasible(_)),
+            "bounds of its terms prove it: {status:?}"
+        );
+    }
 }
 
 #[test]
@@ -247,6 +254,28 @@ fn auto_solves_the_corpus() {
         }
     }
     assert!(failures.is_empty(), "{failures:#?}");
+}
+
+/// What the presolve takes away.
+#[test]
+fn the_presolve_on_the_corpus() {
+    let (mut models, mut some) = (0, 0);
+    let mut sum = [0; 4];
+    for (name, problem) in corpus() {
+        let Counts { fixed, held, twins, defined } = presolve::counts(&problem);
+        models += 1;
+        if [fixed, held, twins, defined] != [0; 4] {
+            some += 1;
+            sum = [sum[0] + fixed, sum[1] + held, sum[2] + twins, sum[3] + defined];
+            println!(
+                "{name}: of {}, {fixed} fixed, {held} held, {twins} twins, {defined} defined",
+                problem.dim()
+            );
+        }
+        let left = Presolve.reduce(&problem).unwrap().0.dim();
+        assert!(left + fixed + held + twins + defined <= problem.dim() + 1, "{name}: {left}");
+    }
+    println!("{some} of {models}: {sum:?}");
 }
 
 #[test]

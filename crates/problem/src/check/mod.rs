@@ -15,8 +15,10 @@ pub use crate::kinds::contact::{ContactStatus, GlobalGauge, Impulses, Law, Local
 pub use crate::kinds::variational::{SetCounts, SetStatus, ViGauge};
 pub use certificate::Certificate;
 pub use existence::{Existence, Kinematic, Kinematics};
-pub use proof::{Column, ConeSystem, Evidence, Exact, ExactVector, Monotone, NEAR, Proof, rounded};
-pub(crate) use proof::{Exactly, weigh};
+pub use proof::{
+    Column, ConeSystem, Constraint, Evidence, Exact, ExactVector, Monotone, NEAR, Proof, rounded,
+};
+pub(crate) use proof::{Exactly, Relaxed, weigh};
 pub use verdict::{Judged, StatusCounts, Verdict, VerdictOf};
 
 use serde::Serialize;

@@ -30,7 +30,10 @@ pub use closures::Closures;
 pub use differences::Differences;
 #[cfg(feature = "duals")]
 pub use duals::{Duals, Function, Number};
-pub use expression::{Affine, Binary, Expressions, Graph, Id, Nary, Node, Piecewise, Unary};
+pub use expression::{
+    Affine, Binary, Expressions, Graph, Id, Nary, Node, Piecewise, Range, Twins, Unary,
+};
+pub(crate) use expression::{Combination, Term};
 
 /// The places where a Jacobian may not be zero: columns of each row, ascending.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

@@ -1464,7 +1464,7 @@ class Pgs(Settings):
     ) -> None: ...
 
 class Presolve(Prefixed):
-    """presolve: MCP to MCP: fixed variables and those that an equation defines are put where they are used
+    """presolve: MCP to MCP: variables that are known or that an equation defines are put where they are used, rows that say nothing go
 
     For problems mcp.
 

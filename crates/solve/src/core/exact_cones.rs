@@ -11,11 +11,15 @@
 //!
 //! Cost: at most 2ᵐ cases for m pairs; a pivot is rows · columns products of integers of rows · 53 bits at most. Storage: a tableau for each open case.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use dashu_int::ops::{BitTest, Gcd, UnsignedAbs};
 use dashu_int::{IBig, UBig};
 use nonsmooth_linalg::budget;
 use nonsmooth_problem::Problem;
-use nonsmooth_problem::check::{ConeSystem, Exact, ExactVector, rounded};
+use nonsmooth_problem::check::{
+    Certificate, ConeSystem, Evidence, Exact, ExactVector, Proof, rounded,
+};
 
 use crate::Limits;
 
@@ -197,6 +201,50 @@ impl ExactCones {
             t[j] = value / &denominator * &self.kappa[j] / &self.beta;
         }
         t
+    }
+}
+
+/// Rows and columns beyond which a problem in exact numbers is not searched: the tableau alone would take seconds.
+const LARGE: [usize; 2] = [250, 1500];
+
+/// The proof that a problem has no solution, where a search of this cost, see [`ExactCones::within`], finds one. Of nonlinear problems, and of contact in space, a relaxation is searched.
+pub fn refuted<P: Problem>(problem: &P, allowed: u64) -> Option<Proof> {
+    let system = problem.cones()?;
+    if system.rhs.len() > LARGE[0] || system.columns.len() > LARGE[1] {
+        return None;
+    }
+    let mut search = ExactCones::within(allowed, system);
+    while !search.is_cut_short() {
+        match search.advance() {
+            None => {}
+            Some(Found::Solution(_)) => return None,
+            Some(Found::Nothing(vectors)) => {
+                return match problem.evidence(&Certificate::Separating { vectors }) {
+                    Evidence::Proved(proof) => Some(proof),
+                    _ => None,
+                };
+            }
+        }
+    }
+    None
+}
+
+/// What a plan of solvers has come upon by [`refuted`], for the session that follows it.
+#[derive(Debug, Clone, Default)]
+pub struct Refutation(Arc<Mutex<Option<Proof>>>);
+
+impl Refutation {
+    /// Looks for a proof, and keeps it; whether there is one.
+    pub fn search<P: Problem>(&self, problem: &P, allowed: u64) -> bool {
+        let found = refuted(problem, allowed);
+        let is = found.is_some();
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = found;
+        is
+    }
+
+    /// The proof that was found since it was last taken.
+    pub fn take(&self) -> Option<Proof> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }
 
@@ -383,7 +431,6 @@ impl Case {
 #[cfg(test)]
 mod tests {
     use nonsmooth_linalg::{Bsr, Csc, Dense};
-    use nonsmooth_problem::check::{Certificate, Evidence};
     use nonsmooth_problem::{BoxLcp, FrictionLocal, Hlcp, Lcp, Mlcp, Problem};
 
     use super::*;

@@ -8,6 +8,8 @@ mod interior;
 mod lemke;
 mod newton;
 mod pivoting;
+mod presolve;
 mod reform;
+mod refuted;
 mod splitting;
 mod truth;

@@ -6,7 +6,7 @@ use nonsmooth_problem::field::{Closures, Differences, Expressions, Field, Patter
 use nonsmooth_problem::{LcpPoint, Problem, Set, Vi};
 use nonsmooth_solve::variational::Projector;
 use nonsmooth_solve::variational::reform::Multipliers;
-use nonsmooth_solve::{Answer, Limit, Reformulation, Solve, SolveError, Status};
+use nonsmooth_solve::{Answer, Limit, Limits, Reformulation, Solve, SolveError, Status};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -244,7 +244,9 @@ fn what_has_no_answer_ends_with_a_reason() {
     let rows = Csc::from_triplets(2, 1, [(0, 0, 1.0), (1, 0, -1.0)].into_iter()).unwrap();
     let set = Set::inequalities(rows, vec![-1.0, 0.0]);
     let empty = Vi::new(expressions(["x1".to_owned()]), set, vec![0.0]).unwrap();
-    for name in ["auto", "fixed_point", "extragradient", "hyperplane"] {
+    let answer = solve("auto", &empty, 1e-8);
+    assert!(matches!(answer.status, Status::Infeasible(_)), "{}", answer.status);
+    for name in ["fixed_point", "extragradient", "hyperplane"] {
         let answer = solve(name, &empty, 1e-8);
         let Status::Stalled(why) = &answer.status else { panic!("{name}: {}", answer.status) };
         assert!(why.contains("empty"), "{name}: {why}");
@@ -262,4 +264,81 @@ fn what_has_no_answer_ends_with_a_reason() {
     let problem = Vi::new(log(), Set::Ball { centre: vec![0.0], radius: 9.0 }, vec![5.0]).unwrap();
     let answer = solve("extragradient", &problem, 1e-10);
     assert!(answer.is_solved(), "{}", answer.status);
+}
+
+/// X without a point, or a direction d that leads to infinity in it with `F(x)ᵀd < 0` on the whole of it: proved, by multipliers in fractions where F is affine, by bounds of its terms else.
+#[test]
+fn what_has_no_solution_is_proved_to_have_none() {
+    let rows = |rows: &[&[f64]], rhs: &[f64]| {
+        let entries = rows.iter().enumerate();
+        let entries =
+            entries.flat_map(|(i, row)| row.iter().enumerate().map(move |(j, a)| (i, j, *a)));
+        let a = Csc::from_triplets(rows.len(), rows[0].len(), entries.filter(|e| e.2 != 0.0));
+        Set::inequalities(a.unwrap(), rhs.to_vec())
+    };
+    let strip = || rows(&[&[0.1, -0.1], &[-0.3, 0.3], &[-1.0, -0.7]], &[1.0, 1.0, 5.0]);
+    let empty = || rows(&[&[1.0, 1.0], &[-3.0, -3.0]], &[-1.0, 2.0]);
+    let cone = || Set::SecondOrderCone { dimension: 3 };
+    let product = || Set::Product(vec![cone(), Set::orthant(1)]);
+    let cases: Vec<(&[&str], Set)> = vec![
+        (&["-1", "0.3"], strip()),
+        (&["x1 - x2 - 30", "x2 - x1 - 1"], strip()),
+        (&["x1 - x2 - 30 - exp(x1)", "x2 - x1 + exp(x1)"], strip()),
+        (&["x1 - 7", "x2"], empty()),
+        (&["x1^3 - 7 - exp(x2)", "x2"], empty()),
+        (&["-0.5 - x2^2", "x2", "x3"], cone()),
+        (&["x1 + x2^2", "-2 - x1 - x2^2", "x3"], cone()),
+        (&["-0.5 - x2^2 - x4", "x2", "x3", "x4 - 5"], product()),
+    ];
+    for (f, set) in cases {
+        let start = vec![0.5; set.dim()];
+        let problem = Vi::new(expressions(f.iter().map(ToString::to_string)), set, start).unwrap();
+        let answer = Solve::new().time_limit(20.0).run(&problem).unwrap();
+        let Status::Infeasible(proof) = &answer.status else {
+            panic!("{f:?}: {} {:?}", answer.status, answer.account)
+        };
+        assert!(problem.verify(proof.certificate()), "{f:?}");
+        let all = nonsmooth_problem::AnyProblem::from(problem);
+        let known = nonsmooth_solve::existence::of(&all, &Limits::default());
+        assert_eq!(known.name(), "no_solution", "{f:?}: {known}");
+    }
+}
+
+/// Whole numbers, so that the planted solution is one exactly: nothing may refute it.
+#[test]
+fn what_has_a_solution_is_not_refuted() {
+    let mut random = Pcg64::seed_from_u64(11);
+    for trial in 0..60 {
+        let n = 3;
+        let mut whole = |from: i32, to: i32| random.random_range(from..=to);
+        let x: Vec<i32> = (0..n).map(|_| whole(0, 2)).collect();
+        let a: Vec<Vec<i32>> = (0..2).map(|_| (0..n).map(|_| whole(-2, 2)).collect()).collect();
+        let tight = [whole(0, 1), whole(0, 1)];
+        let lambda = [tight[0] * whole(0, 3), tight[1] * whole(0, 3)];
+        let dot = |row: &[i32]| row.iter().zip(&x).map(|(a, x)| a * x).sum::<i32>();
+        let b: Vec<f64> = (0..2).map(|k| f64::from(dot(&a[k]) + 1 - tight[k])).collect();
+        // F(x) = −Aᵀλ there, in terms that are not linear: products, squares and cubes.
+        let f: Vec<String> = (0..n)
+            .map(|i| {
+                let (p, q, r, s) = (whole(-2, 2), whole(-2, 2), whole(-1, 1), whole(-2, 2));
+                let (j, k) = (whole(0, 2) as usize, whole(0, 2) as usize);
+                let there = p * x[j] * x[k] + q * x[i] + r * x[i].pow(3) + s * x[j] * x[j];
+                let force: i32 = (0..2).map(|k| lambda[k] * a[k][i]).sum();
+                let terms = [(p, format!("x{}*x{}", j + 1, k + 1)), (q, format!("x{}", i + 1))];
+                let more = [(r, format!("x{}^3", i + 1)), (s, format!("x{}^2", j + 1))];
+                let sum: Vec<_> =
+                    terms.iter().chain(&more).map(|(c, t)| format!("({c})*{t}")).collect();
+                format!("{} + ({})", sum.join(" + "), -there - force)
+            })
+            .collect();
+        let entries = (0..2).flat_map(|k| (0..n).map(move |j| (k, j)));
+        let entries = entries.map(|(k, j)| (k, j, f64::from(a[k][j]))).filter(|e| e.2 != 0.0);
+        let set = Set::inequalities(Csc::from_triplets(2, n, entries).unwrap(), b);
+        let problem = Vi::new(expressions(f), set, vec![0.0; n]).unwrap();
+        let point = LcpPoint { z: x.iter().map(|x| f64::from(*x)).collect() };
+        assert!(problem.judge(&point, 1e-12).unwrap().solved, "{trial}");
+        let limits = Limits { time_limit: Some(2.0), ..Limits::default() };
+        let known = nonsmooth_solve::existence::of(&problem.into(), &limits);
+        assert!(!known.name().contains("no_solution"), "{trial}: {known}");
+    }
 }

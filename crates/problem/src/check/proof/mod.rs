@@ -8,6 +8,7 @@ mod cones;
 mod evidence;
 mod exact;
 mod monotone;
+mod relaxation;
 mod rounding;
 mod statement;
 
@@ -15,9 +16,11 @@ pub use cones::{Column, ConeSystem, NEAR};
 pub use evidence::{Evidence, ExactVector, Proof};
 pub use exact::{Exact, rounded};
 pub use monotone::Monotone;
+pub use relaxation::Constraint;
 
 pub(crate) use evidence::{Claim, weigh};
 pub(crate) use exact::{Equation, exact, negative, satisfying};
 pub(crate) use monotone::monotone;
+pub(crate) use relaxation::Relaxed;
 pub(crate) use rounding::{FEW, exactly_near};
 pub(crate) use statement::{Exactly, bounded, columns, exacts, just};

@@ -115,6 +115,14 @@ fn degrees(graph: &Graph) -> Vec<Node0> {
     out
 }
 
+/// Of each node its number, where it is one that no operation has rounded.
+pub(super) fn constants(graph: &Graph) -> Vec<Option<f64>> {
+    let number = |d: &Node0| {
+        (d.degree == 0 && d.at_zero.exact && d.at_zero.value.is_finite()).then_some(d.at_zero.value)
+    };
+    degrees(graph).iter().map(number).collect()
+}
+
 /// Which rows are affine.
 pub(crate) fn affine_rows(graph: &Graph, rows: &[Id]) -> Vec<bool> {
     let degrees = degrees(graph);

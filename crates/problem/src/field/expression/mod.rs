@@ -3,7 +3,9 @@
 mod affine;
 mod graph;
 mod operator;
+mod range;
 mod tape;
+mod terms;
 mod text;
 
 use std::sync::Arc;
@@ -13,6 +15,9 @@ use nonsmooth_linalg::Doubled;
 pub use affine::Affine;
 pub use graph::{Graph, Id, Node, Piecewise};
 pub use operator::{Binary, Nary, Unary};
+pub use range::Range;
+pub use terms::Twins;
+pub(crate) use terms::{Combination, Term};
 
 use super::{Evaluator, Field, Pattern};
 use crate::ProblemError;
@@ -69,6 +74,29 @@ impl Expressions {
     /// F as `A x + b`, where it is affine.
     pub fn affine(&self) -> Option<Affine> {
         affine::affine(&self.graph, &self.rows)
+    }
+
+    /// Bounds of each row's values over the box `[lower, upper]`, rounded outwards, where the row is defined; `None` where the limit of time that is in force for the thread
+    /// comes first. Cost: a dozen operations a node.
+    ///
+    /// # Panics
+    ///
+    /// Where there are fewer bounds than variables.
+    pub fn ranges(&self, lower: &[f64], upper: &[f64]) -> Option<Vec<Range>> {
+        let nodes = self.graph.ranges(lower, upper)?;
+        Some(self.rows.iter().map(|row| nodes[row.index()]).collect())
+    }
+
+    /// The chosen rows, taken apart; see [`terms::combinations`].
+    pub(crate) fn combinations(&self, chosen: &[usize]) -> Option<Vec<Combination>> {
+        terms::combinations(&self.graph, &self.rows, chosen)
+    }
+
+    /// Which of these pairs of rows and variables are twins, see [`Twins`], as their terms show in exact arithmetic; those that are, in their order. `None` where the limit of time that is in
+    /// force for the thread comes first. Cost: the nodes of all rows, an operation on rational numbers for each.
+    pub fn twins(&self, pairs: &[(usize, usize)]) -> Option<Vec<Twins>> {
+        let all: Vec<usize> = (0..self.rows.len()).collect();
+        Some(terms::twins(&self.graph, &self.combinations(&all)?, pairs))
     }
 
     /// The number of operations of one evaluation.

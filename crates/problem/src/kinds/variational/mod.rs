@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | [`Vi`] | `−F(x) ∈ N_X(x)`, X a box, a polyhedron, a ball, a second-order cone or a product of these |
 
+mod constraints;
 mod judge;
 pub mod planted;
 mod set;
@@ -12,12 +13,13 @@ mod tests;
 
 use std::sync::Arc;
 
+pub use constraints::Constraints;
 pub use judge::{SetCounts, SetStatus, ViGauge};
 pub use set::Set;
 
 use super::complementarity::stated::{Part, Parts, Shape, Stated, of_jacobian, plural, x_and_f};
 use crate::check::proof::Exactly;
-use crate::check::{Certificate, ConeSystem, Evidence, Judged, Measure, VerdictOf, weigh};
+use crate::check::{Certificate, ConeSystem, Evidence, Judged, Measure, Relaxed, VerdictOf, weigh};
 use crate::error::vector;
 use crate::field::{Expressions, Field, same};
 use crate::{Kind, LcpPoint, Mcp, OfAny, Problem, ProblemError};
@@ -179,14 +181,37 @@ impl Judged for Vi {
     }
 }
 
-/// Over a box that of the complementarity problem: nothing is proved of others.
+/// Over a box that of the complementarity problem. Else, of F by expressions, that of the problem with multipliers of the constraints that are no bounds, whose rows come after F's; balls and cones are
+/// relaxed: of a ball its box, of a cone `x_1 ≥ |x_j|`, `F_1 ≥ |F_j|`.
 impl Exactly for Vi {
     fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
-        self.mcp()?.system(wanted)
+        if let Some(mcp) = self.mcp() {
+            return mcp.system(wanted);
+        }
+        let Constraints { lower, upper, others } = self.set.constraints();
+        let mut silent = vec![false; self.dim()];
+        let mut cones = vec![];
+        for (first, set) in self.set.parts() {
+            let all = first..first + set.dim();
+            match set {
+                Set::Ball { .. } => silent[all].fill(true),
+                Set::SecondOrderCone { dimension } if *dimension > 1 => {
+                    silent[all.clone()].fill(true);
+                    cones.push(all);
+                }
+                _ => {}
+            }
+        }
+        let (field, constraints) = (self.F.expressions()?, &others[..]);
+        Relaxed { field, lower: &lower, upper: &upper, silent, constraints, cones }.system(wanted)
     }
 
     fn rows(&self) -> usize {
-        self.dim()
+        // A polyhedron of n variables may have one bound a row: only counting tells.
+        match self.set.bounds() {
+            Some(_) => self.dim(),
+            None => self.dim() + self.set.constraints().others.len(),
+        }
     }
 }
 

@@ -1,18 +1,23 @@
 //! **auto** for nonlinear complementarity problems: quick methods first, then those that leave stationary points, then other starts.
 //!
 //! Problem: `l ≤ x ≤ u ⟂ F(x)`. Method: an affine F, known by its expressions, is the linear `auto`'s, with its certificates. Others go through a plan of solvers, each from the
-//! start of the solve; what is left of time and iterations goes to perturbed starts. The first that solves the problem ends the solve.
+//! start of the solve; what is left of time and iterations goes to perturbed starts. The first that solves the problem ends the solve. Before them a row is looked for whose sign over the whole box
+//! leaves no solution, and after the first ones have failed a proof in exact arithmetic, of the relaxation in which each nonlinear term lies between its bounds.
 //!
 //! References: Munson2002; Billups1995; the solvers' own files. Cost: that of the solvers tried. Fails: where all of them do.
 
 use std::borrow::Cow;
+use std::time::Instant;
 
 use nonsmooth_problem::{BoxLcp, LcpPoint, Mcp, Problem};
 
 use super::plan::Plan;
 use super::{Auto, Candidate, Portfolio};
+use crate::complementarity::parts::nonlinear::by_a_row;
 use crate::complementarity::reform::Presolve;
 use crate::complementarity::reform::presolve::reduces;
+use crate::core::drive::Meter;
+use crate::core::exact_cones::Refutation;
 use crate::core::register::Composed;
 use crate::core::trace::Trace;
 use crate::{Limits, Observer, Outcome, Progress, Sample, Session, SolveError, Status};
@@ -24,12 +29,26 @@ const FEW: usize = 500;
 const SHORT: usize = 40;
 const LONG: usize = 300;
 
+/// What the search for a proof may cost after the first stage, see `ExactCones::within`: some tenths of a second.
+const WORK: u64 = 20_000_000;
+
 impl Auto {
     /// A session for nonlinear problems, without history.
     pub fn nonlinear(self) -> AutoSession {
+        let proof = Refutation::default();
+        let found = proof.clone();
+        let plan = move |problem: &Mcp, stage| {
+            if stage == 1 && found.search(problem, WORK) {
+                return vec![];
+            }
+            self.plan_of(problem, stage)
+        };
         AutoSession {
             linear: self.session::<BoxLcp>(),
-            nonlinear: Portfolio::new(move |problem: &Mcp, stage| self.plan_of(problem, stage)),
+            nonlinear: Portfolio::new(plan),
+            proof,
+            refuted: None,
+            searched: false,
             polish: Portfolio::new(|_: &Mcp, stage| polish(stage)),
             affine: None,
         }
@@ -93,10 +112,55 @@ fn polish(stage: usize) -> Vec<Candidate> {
 pub struct AutoSession {
     linear: Portfolio<BoxLcp>,
     nonlinear: Portfolio<Mcp>,
+    /// What the plan has come upon.
+    proof: Refutation,
+    /// Why there is no solution, where that was found; and whether solvers were tried.
+    refuted: Option<String>,
+    searched: bool,
     /// Of what solves an affine problem in units of its rows, but not yet to the tolerance in those of F.
     polish: Portfolio<Mcp>,
     /// The account of the linear solve, if there was one, and whether its word was the last.
     affine: Option<(Vec<String>, bool)>,
+}
+
+impl AutoSession {
+    /// The solve of a problem that is not affine.
+    fn observe_nonlinear(
+        &mut self,
+        problem: &Mcp,
+        point: &mut LcpPoint,
+        limits: &Limits,
+        observer: &mut dyn Observer<Mcp>,
+    ) -> Result<Outcome, SolveError> {
+        let begun = Instant::now();
+        (self.refuted, self.searched) = (None, false);
+        let scope = limits.budget(begun).enter();
+        if let Some(proof) = by_a_row(problem) {
+            let measure = problem.certify(point, &mut problem.gauge()?);
+            let outcome =
+                Meter::start(begun, limits).outcome(Status::Infeasible(proof), measure, 0);
+            self.refuted = Some("a row has one sign on the whole box: there is no solution".into());
+            return Ok(outcome);
+        }
+        drop(scope);
+        self.proof.take();
+        self.searched = true;
+        let outcome = self.nonlinear.observe(problem, point, &limits.left(begun), observer)?;
+        match self.proof.take() {
+            Some(proof) if !matches!(outcome.status, Status::Solved) => {
+                let why = "the bounds of the terms that are not linear leave no solution, in exact arithmetic";
+                self.refuted = Some(why.into());
+                Ok(Outcome { status: Status::Infeasible(proof), ..outcome })
+            }
+            _ => Ok(outcome),
+        }
+    }
+
+    /// What was done for a problem that is not affine.
+    fn nonlinear_account(&self) -> Vec<String> {
+        let before = if self.searched { self.nonlinear.account() } else { vec![] };
+        before.into_iter().chain(self.refuted.clone()).collect()
+    }
 }
 
 /// Sees the linear problem's solve as one of the nonlinear problem: the points are the same.
@@ -127,8 +191,9 @@ impl Session<Mcp> for AutoSession {
         limits.validate()?;
         problem.validate_point(point)?;
         self.affine = None;
+        (self.refuted, self.searched) = (None, false);
         let Some((linear, _)) = problem.affine() else {
-            return self.nonlinear.observe(problem, point, limits, observer);
+            return self.observe_nonlinear(problem, point, limits, observer);
         };
         let begun = std::time::Instant::now();
         let mut trial = point.clone();
@@ -165,7 +230,7 @@ impl Session<Mcp> for AutoSession {
         }
         let max_iterations = limits.max_iterations.saturating_sub(outcome.iterations);
         let left = Limits { max_iterations, ..limits.left(begun) };
-        let then = self.nonlinear.observe(problem, point, &left, observer)?;
+        let then = self.observe_nonlinear(problem, point, &left, observer)?;
         let mut status = then.status;
         if !matches!(status, Status::Solved) {
             // What is known of the linear problem is more than that nothing solved it.
@@ -184,6 +249,7 @@ impl Session<Mcp> for AutoSession {
     fn history(&self) -> &[Sample] {
         match self.affine {
             Some((_, true)) => self.linear.history(),
+            _ if !self.searched => &[],
             _ => self.nonlinear.history(),
         }
     }
@@ -191,6 +257,7 @@ impl Session<Mcp> for AutoSession {
     fn trace(&self) -> Trace {
         match self.affine {
             Some((_, true)) => self.linear.trace(),
+            _ if !self.searched => Trace::None,
             _ => self.nonlinear.trace(),
         }
     }
@@ -198,8 +265,8 @@ impl Session<Mcp> for AutoSession {
     fn account(&self) -> Vec<String> {
         match &self.affine {
             Some((account, true)) => account.clone(),
-            Some((account, false)) => [account.clone(), self.nonlinear.account()].concat(),
-            None => self.nonlinear.account(),
+            Some((account, false)) => [account.clone(), self.nonlinear_account()].concat(),
+            None => self.nonlinear_account(),
         }
     }
 }

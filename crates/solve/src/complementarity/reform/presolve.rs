@@ -1,18 +1,31 @@
-//! MCP → MCP: variables that are known, or that an equation defines, are put where they are used.
+//! MCP → MCP: variables that are known, or that an equation defines, are put where they are used; rows that say nothing go.
 //!
 //! | what | becomes |
 //! | --- | --- |
 //! | `l_i = u_i` | the number; F_i is free and goes |
-//! | a free variable b with an equation `c b + G(x) = 0`, c a number, that one other row at most uses | `−G(x)/c` there; b and the equation go |
+//! | `F_i > 0` on the whole box, `l_i` finite | `x_i = l_i`; F_i goes. Likewise `F_i < 0` and u_i. A variable that is known makes the box smaller |
+//! | twins i and k: `F_i = a F_k`, `a ≠ 0`, and F depends on x_i and x_k through `x_k + c x_i` only | x_i is a number, and F_i goes, in the cases below |
+//! | a free variable b with an equation `c b + G(x) = 0`, c a number, that one other row at most uses, or others use linearly and without the Jacobian getting more entries | `−G(x)/c` there; b and the equation go |
 //!
-//! An equation is the row of a free variable, and any equation may define any free variable. So files that state `b = F(x)`, `0 ≤ x ⟂ b ≥ 0` (Pyomo's) become
+//! **Theorem.** Every solution of what is left, with the numbers and values put in, solves the problem; and the problem has a solution where what is left has one. *Sign*: a solution with `x_i > l_i` has `F_i ≤ 0`, and there is
+//! none. `F_i` is asked to be defined on the whole box, for nobody looks at it any more. *Twins*: with (x_i, x_k) a solution has `(v, x_k + c (x_i − v))`, at which F is the same, and which solves the problem where
+//!
+//! - x_k is free: then `F_k = F_i = 0`, and v may be any number in `[l_i, u_i]`;
+//! - l_i and l_k are the only bounds, `a > 0`, `c ≥ 0`: `v = l_i`. The new x_k is above l_k only where one of the two was above its bound, and then `F_k = 0`. Likewise with u_i and u_k.
+//!
+//! Without the condition on the variables this would be wrong: of `x_1 + x_2 = 1`, `2 x_1 + 2 x_2 = 2`, `x_2 = 5`, all of three free variables, no number for x_1 is the right one beforehand.
+//! *Equation*: b is free, so its row and the equation may change places, and the equation has one solution b for each of the rest.
+//!
+//! The sign is proved by interval arithmetic, twins in rational arithmetic. An equation is the row of a free variable, and any equation may define any free variable. So files that state `b = F(x)`, `0 ≤ x ⟂ b ≥ 0` (Pyomo's) become
 //! `0 ≤ x ⟂ F(x) ≥ 0`. The way back is exact but for the rounding of `−G(x)/c`.
 //!
-//! Needs F by expressions. References: FerrisMunson2001 (preprocessing of complementarity problems). Cost: O(operations of F) for each variable that goes.
+//! Needs F by expressions. References: FerrisMunson2001 (preprocessing of complementarity problems). Cost: O(operations of F) for each variable that goes, and a few evaluations of F.
 
 use std::collections::{HashMap, HashSet};
 
-use nonsmooth_problem::field::{Binary, Evaluator, Expressions, Graph, Id, Nary, Node, Unary};
+use nonsmooth_problem::field::{
+    Binary, Evaluator, Expressions, Field, Graph, Id, Nary, Node, Twins, Unary,
+};
 use nonsmooth_problem::{Kind, LcpPoint, Mcp};
 
 use crate::core::reformulation::Reformulation;
@@ -28,7 +41,7 @@ impl Composed<Mcp> for Presolve {
     type To = Mcp;
     type Settings = NoSettings;
     const NAME: &'static str = "presolve";
-    const SUMMARY: &'static str = "MCP to MCP: fixed variables and those that an equation defines are put where they are used";
+    const SUMMARY: &'static str = "MCP to MCP: variables that are known or that an equation defines are put where they are used, rows that say nothing go";
     const FROM: &'static [Kind] = &[Kind::Mcp];
     const CITES: &'static [&'static str] = &["FerrisMunson2001"];
 
@@ -51,44 +64,181 @@ struct Defined {
 pub struct Memo {
     /// The variables that are left, in their order.
     kept: Vec<usize>,
-    fixed: Vec<(usize, f64)>,
+    known: Vec<(usize, f64)>,
     defined: Vec<Defined>,
     /// Of the first problem, with room for x and F.
     field: Box<dyn Evaluator>,
     f: Vec<f64>,
 }
 
-/// Whether there is anything to do.
-pub fn reduces(problem: &Mcp) -> bool {
-    let fixed = problem.lower.iter().zip(&problem.upper).any(|(l, u)| l == u);
-    problem.F.expressions().is_some_and(|f| fixed || !defined(problem, f).is_empty())
+/// How many variables go, with a row each, and why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counts {
+    /// Bounds that are equal.
+    pub fixed: usize,
+    /// A row's sign on the box.
+    pub held: usize,
+    /// A twin.
+    pub twins: usize,
+    /// An equation.
+    pub defined: usize,
 }
 
-/// The free variables that go with the equations that define them.
-fn defined(problem: &Mcp, f: &Expressions) -> Vec<Defined> {
-    let n = problem.dim();
-    let free = |i: usize| problem.lower[i].is_infinite() && problem.upper[i].is_infinite();
-    let pattern = nonsmooth_problem::field::Field::pattern(f);
-    let mut users = vec![vec![]; n];
-    for (i, j) in pattern.places() {
-        // More than two need not be known.
-        if users[j].len() < 3 {
-            users[j].push(i);
+/// What the presolve takes away from a problem: nothing where F is not known by expressions.
+pub fn counts(problem: &Mcp) -> Counts {
+    problem.F.expressions().map(|f| Plan::of(problem, f).counts).unwrap_or_default()
+}
+
+/// What a presolve finds.
+struct Plan {
+    /// Variables that are numbers, ascending.
+    known: Vec<(usize, f64)>,
+    defined: Vec<Defined>,
+    counts: Counts,
+}
+
+impl Plan {
+    fn of(problem: &Mcp, f: &Expressions) -> Self {
+        let mut value: Vec<Option<f64>> = (0..problem.dim())
+            .map(|i| (problem.lower[i] == problem.upper[i]).then_some(problem.lower[i]))
+            .collect();
+        let known = |value: &[Option<f64>]| value.iter().flatten().count();
+        let fixed = known(&value);
+        held(problem, f, &mut value);
+        let held = known(&value) - fixed;
+        twins(problem, f, &mut value);
+        let twins = known(&value) - fixed - held;
+        let defined = defined(problem, f, &value);
+        let counts = Counts { fixed, held, twins, defined: defined.len() };
+        let known = value.into_iter().enumerate().filter_map(|(i, x)| Some((i, x?))).collect();
+        Self { known, defined, counts }
+    }
+
+    fn len(&self) -> usize {
+        self.known.len() + self.defined.len()
+    }
+}
+
+/// Whether there is anything to do.
+pub fn reduces(problem: &Mcp) -> bool {
+    problem.F.expressions().is_some_and(|f| Plan::of(problem, f).len() > 0)
+}
+
+/// Rounds of bounds.
+const ROUNDS: usize = 10;
+
+/// Variables that a row's sign on the box holds at a bound.
+fn held(problem: &Mcp, f: &Expressions, value: &mut [Option<f64>]) {
+    let (mut lower, mut upper) = (problem.lower.clone(), problem.upper.clone());
+    for _ in 0..ROUNDS {
+        let Some(ranges) = f.ranges(&lower, &upper) else { return };
+        let mut found = false;
+        for (i, range) in ranges.iter().enumerate().filter(|(_, r)| r.total) {
+            let bound = match () {
+                () if value[i].is_some() => continue,
+                () if range.low > 0.0 => problem.lower[i],
+                () if range.high < 0.0 => problem.upper[i],
+                () => continue,
+            };
+            if bound.is_finite() {
+                (value[i], lower[i], upper[i], found) = (Some(bound), bound, bound, true);
+            }
+        }
+        if !found {
+            return;
         }
     }
+}
+
+/// Rows whose Jacobians at the start are multiples of each other to this relative rounding may be so.
+const ALIKE: f64 = 1e-9;
+
+/// Variables that their twins make needless.
+fn twins(problem: &Mcp, f: &Expressions, value: &mut [Option<f64>]) {
+    let n = problem.dim();
+    let start: Vec<f64> = (0..n).map(|i| problem.project(i, problem.start[i])).collect();
+    let pattern = f.pattern();
+    let (mut values, mut jacobian) = (vec![0.0; n], vec![0.0; pattern.len()]);
+    if !f.evaluator().jacobian(&start, &mut values, &mut jacobian) {
+        return;
+    }
+    // Two sums with weights without any pattern: their quotient is the same of rows that are multiples.
+    let weight = |j: usize, turn: f64| 1.0 + ((j as f64 + 1.0) * turn).fract();
+    let mut alike: Vec<(f64, usize)> = vec![];
+    for i in (0..n).filter(|&i| value[i].is_none()) {
+        let sum = |turn: f64| {
+            let terms = pattern.row(i).iter().zip(&jacobian[pattern.range(i)]);
+            terms.map(|(&j, a)| weight(j, turn) * a).sum::<f64>()
+        };
+        let quotient = sum(0.618_033_988_749_894_9) / sum(0.414_213_562_373_095_1);
+        if quotient.is_finite() {
+            alike.push((quotient, i));
+        }
+    }
+    alike.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let near = |a: f64, b: f64| (a - b).abs() <= ALIKE * a.abs();
+    let pairs: Vec<(usize, usize)> = alike
+        .windows(2)
+        .filter(|w| near(w[0].0, w[1].0) && pattern.row(w[0].1) == pattern.row(w[1].1))
+        .flat_map(|w| [(w[0].1, w[1].1), (w[1].1, w[0].1)])
+        .collect();
+    if pairs.is_empty() {
+        return;
+    }
+    // Who stays because of another.
+    let mut stays = vec![false; n];
+    for Twins { row: i, of: k, rows, columns } in f.twins(&pairs).unwrap_or_default() {
+        if stays[i] || value[i].is_some() || value[k].is_some() {
+            continue;
+        }
+        let bounds = |i: usize| [problem.lower[i], problem.upper[i]];
+        let finite = |i: usize| bounds(i).map(f64::is_finite);
+        let agree = rows > 0.0 && columns >= 0.0 && finite(i) == finite(k);
+        let at = match finite(k) {
+            [false, false] => start[i],
+            [true, false] if agree => problem.lower[i],
+            [false, true] if agree => problem.upper[i],
+            _ => continue,
+        };
+        (value[i], stays[k]) = (Some(at), true);
+    }
+}
+
+/// The free variables that go with the equations that define them; `value`: those that are known, whose rows are gone.
+fn defined(problem: &Mcp, f: &Expressions, value: &[Option<f64>]) -> Vec<Defined> {
+    let n = problem.dim();
+    let open = |i: usize| value[i].is_none();
+    let free =
+        |i: usize| open(i) && problem.lower[i].is_infinite() && problem.upper[i].is_infinite();
+    let pattern = f.pattern();
+    let mut users = vec![vec![]; n];
+    for (i, j) in pattern.places().filter(|&(i, j)| open(i) && open(j)) {
+        users[j].push(i);
+    }
+    let entries: Vec<usize> =
+        (0..n).map(|i| pattern.row(i).iter().filter(|j| open(**j)).count()).collect();
     // Rows that define something, and rows and variables that a definition uses: these stay.
     let (mut gone, mut used) = (HashSet::new(), HashSet::new());
     let mut out = vec![];
-    for b in (0..n).filter(|&b| free(b) && users[b].len() <= 2) {
+    for b in (0..n).filter(|&b| free(b)) {
         if used.contains(&b) {
             continue;
         }
-        let apt = |&r: &usize| free(r) && !gone.contains(&r) && !out_of_order(pattern.row(r), &out);
-        let found = users[b].iter().copied().filter(apt).find_map(|r| {
+        let all = &users[b];
+        let linear = |i: &usize| coefficient(f.graph(), f.rows()[*i], b).is_some();
+        // The entries that come, and those that go.
+        let sparse = |r: usize| (all.len() - 1) * (entries[r] - 1) < all.len() + entries[r];
+        let apt = |&r: &usize| {
+            free(r)
+                && !gone.contains(&r)
+                && !out_of_order(pattern.row(r), &out)
+                && (all.len() <= 2 || sparse(r))
+        };
+        let found = all.iter().copied().filter(apt).find_map(|r| {
             let coefficient = coefficient(f.graph(), f.rows()[r], b)?;
             Some(Defined { variable: b, row: r, coefficient })
         });
-        if let Some(one) = found {
+        if let Some(one) = found.filter(|_| all.len() <= 2 || all.iter().all(linear)) {
             gone.insert(one.row);
             used.extend(pattern.row(one.row).iter().copied().filter(|&j| j != b));
             out.push(one);
@@ -278,27 +428,24 @@ impl Reformulation<Mcp> for Presolve {
             return Err(SolveError::needs("F by expressions", problem.F.source()));
         };
         let n = problem.dim();
-        let mut defined = defined(problem, f);
-        let fixed: Vec<_> = (0..n)
-            .filter(|&i| problem.lower[i] == problem.upper[i])
-            .map(|i| (i, problem.lower[i]))
-            .collect();
-        if fixed.len() + defined.len() == n {
+        let Plan { mut known, mut defined, .. } = Plan::of(problem, f);
+        if known.len() + defined.len() == n && defined.pop().is_none() {
             // Something has to be left to be solved.
-            match defined.pop() {
-                Some(_) => {}
-                None => return Ok(whole(problem)),
-            }
+            let Some(k) = known.iter().rposition(|&(i, _)| problem.lower[i] < problem.upper[i])
+            else {
+                return Ok(whole(problem));
+            };
+            known.remove(k);
         }
-        // Which row each variable has: where an equation goes that is not the row of the variable that goes with it, the two change places.
+        // Which row each variable has, and which variable each row: where an equation goes that is not the row of the variable that goes with it, the two change places.
         let mut rows: Vec<usize> = (0..n).collect();
+        let mut holders = rows.clone();
         let mut goes = vec![false; n];
-        for &(i, _) in &fixed {
-            goes[i] = true;
-        }
+        known.iter().for_each(|&(i, _)| goes[i] = true);
         for one in &defined {
-            let holder = rows.iter().position(|&r| r == one.row).unwrap_or(one.variable);
+            let (holder, other) = (holders[one.row], rows[one.variable]);
             rows.swap(holder, one.variable);
+            (holders[one.row], holders[other]) = (one.variable, holder);
             goes[one.variable] = true;
         }
         let kept: Vec<usize> = (0..n).filter(|&i| !goes[i]).collect();
@@ -313,7 +460,7 @@ impl Reformulation<Mcp> for Presolve {
         for (k, &i) in kept.iter().enumerate() {
             copier.stands[i] = Stands::Variable(k);
         }
-        for &(i, x) in &fixed {
+        for &(i, x) in &known {
             copier.stands[i] = Stands::Node(copier.to.constant(x));
         }
         let zero = copier.to.constant(0.0);
@@ -340,7 +487,7 @@ impl Reformulation<Mcp> for Presolve {
             of(&problem.start),
         )?;
         let field = problem.F.evaluator();
-        Ok((reduced, Memo { kept, fixed, defined, field, f: vec![0.0; n] }))
+        Ok((reduced, Memo { kept, known, defined, field, f: vec![0.0; n] }))
     }
 
     fn lower(&self, _: &Mcp, point: &LcpPoint, memo: &Memo, reduced: &mut LcpPoint) {
@@ -350,7 +497,7 @@ impl Reformulation<Mcp> for Presolve {
 
     fn lift(&self, _: &Mcp, reduced: &LcpPoint, memo: &mut Memo, point: &mut LcpPoint) {
         memo.kept.iter().zip(&reduced.z).for_each(|(&i, x)| point.z[i] = *x);
-        memo.fixed.iter().for_each(|&(i, x)| point.z[i] = x);
+        memo.known.iter().for_each(|&(i, x)| point.z[i] = x);
         if memo.defined.is_empty() {
             return;
         }
@@ -368,6 +515,6 @@ impl Reformulation<Mcp> for Presolve {
 fn whole(problem: &Mcp) -> (Mcp, Memo) {
     let n = problem.dim();
     let field = problem.F.evaluator();
-    let (kept, fixed, defined) = ((0..n).collect(), vec![], vec![]);
-    (problem.clone(), Memo { kept, fixed, defined, field, f: vec![0.0; n] })
+    let (kept, known, defined) = ((0..n).collect(), vec![], vec![]);
+    (problem.clone(), Memo { kept, known, defined, field, f: vec![0.0; n] })
 }

@@ -2,7 +2,7 @@
 //!
 //! Problem: find x ∈ X with `F(x)ᵀ(y − x) ≥ 0` for all y ∈ X. Method: over boxes and polyhedra the `auto` of mixed complementarity problems, on the problem itself or with multipliers as variables; then, and over
 //! other sets at once, the hyperplane projection and the extragradient method by turns, each from the best point so far. The turns come again with budgets that grow, of iterations, never of seconds, so that a run repeats itself; all share
-//! the limits of the solve, and the natural residual of the inequality judges them all.
+//! the limits of the solve, and the natural residual of the inequality judges them all. After the first turns a proof is looked for that there is no solution, in exact arithmetic: multipliers do it for boxes and polyhedra, a relaxation for cones.
 //!
 //! References: the solvers' own files; FacchineiPang2003. Cost: that of the solvers tried. Fails: where F is not monotone and the set is a ball or a cone: projections need monotone F.
 
@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::parts::Projector;
 use super::projection::NO_PROJECTION;
 use super::reform::Multipliers;
+use crate::core::exact_cones::Refutation;
 use crate::core::portfolio::{Candidate, Portfolio};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, SettingsMap, described};
@@ -55,11 +56,23 @@ impl Described for VariationalAuto {
 const TURNS: usize = 10;
 /// Entries of the rows of polyhedra, zeros included, above which projections are too dear: they are stored dense.
 const DENSE: usize = 10_000_000;
+/// What the search for a proof that there is no solution may cost over balls and cones, see `ExactCones::within`: some tenths of a second.
+const WORK: u64 = 20_000_000;
 
 impl VariationalAuto {
     /// A session without history.
     pub fn session(self) -> AutoSession {
-        AutoSession(Portfolio::new(move |problem: &Vi, stage| self.plan(problem, stage)))
+        let proof = Refutation::default();
+        let found = proof.clone();
+        let plan = move |problem: &Vi, stage| {
+            // Multipliers have looked for it themselves.
+            let unseen = stage == 1 && !Multipliers::applies(&problem.set);
+            if unseen && found.search(problem, WORK) {
+                return vec![];
+            }
+            self.plan(problem, stage)
+        };
+        AutoSession { portfolio: Portfolio::new(plan), proof }
     }
 
     fn plan(&self, problem: &Vi, stage: usize) -> Vec<Candidate> {
@@ -113,7 +126,11 @@ fn projects(problem: &Vi) -> bool {
 }
 
 /// The session: the solvers of the plan, and what is said where none of them can succeed.
-pub struct AutoSession(Portfolio<Vi>);
+pub struct AutoSession {
+    portfolio: Portfolio<Vi>,
+    /// What the plan has come upon.
+    proof: Refutation,
+}
 
 impl Session<Vi> for AutoSession {
     fn observe(
@@ -124,7 +141,11 @@ impl Session<Vi> for AutoSession {
         observer: &mut dyn Observer<Vi>,
     ) -> Result<Outcome, SolveError> {
         let begun = std::time::Instant::now();
-        let mut outcome = self.0.observe(problem, point, limits, observer)?;
+        self.proof.take();
+        let mut outcome = self.portfolio.observe(problem, point, limits, observer)?;
+        if let (Some(proof), false) = (self.proof.take(), outcome.status == Status::Solved) {
+            outcome.status = Status::Infeasible(proof);
+        }
         if matches!(outcome.status, Status::Stalled(_)) {
             let _scope = limits.budget(begun).enter();
             if is_empty(problem) {
@@ -135,18 +156,18 @@ impl Session<Vi> for AutoSession {
     }
 
     fn history(&self) -> &[Sample] {
-        self.0.history()
+        self.portfolio.history()
     }
 
     fn trace(&self) -> Trace {
-        self.0.trace()
+        self.portfolio.trace()
     }
 
     fn account(&self) -> Vec<String> {
-        self.0.account()
+        self.portfolio.account()
     }
 
     fn gauge(&mut self) -> Option<&mut <Vi as nonsmooth_problem::Problem>::Gauge> {
-        self.0.gauge()
+        self.portfolio.gauge()
     }
 }

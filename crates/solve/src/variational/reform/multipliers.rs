@@ -4,13 +4,14 @@
 //! l ≤ x ≤ u  ⟂  F(x) + Aᵀλ + Cᵀμ,     0 ≤ λ  ⟂  b − A x,     μ free,  d − C x = 0
 //! ```
 //!
-//! An inequality of one variable is a bound and needs no multiplier. Equivalent, since the constraints are affine (FacchineiPang2003, prop. 1.2.1); monotone where F is. F by expressions stays so: the result keeps its doubled precision, and where F is
-//! affine it is a linear problem. Cost: a copy of the constraints, and of the graph. Fails: balls and cones, whose multipliers belong to functions that are not affine.
+//! An inequality of one variable whose quotient b/a is a double is a bound and needs no multiplier. Equivalent, since the constraints are affine (FacchineiPang2003, prop. 1.2.1); monotone where F is. F by expressions stays so: the result keeps its doubled precision, and where F is
+//! affine it is a linear problem. A certificate of the result is one of the inequality as it stands: both judges state the same system. Cost: a copy of the constraints, and of the graph. Fails: balls and cones, whose multipliers belong to functions that are not affine.
 
 use std::sync::Arc;
 
+use nonsmooth_problem::check::Constraint;
 use nonsmooth_problem::field::{Binary, Evaluator, Expressions, Field, Graph, Node, Pattern};
-use nonsmooth_problem::{Kind, LcpPoint, Mcp, Set, Vi};
+use nonsmooth_problem::{Constraints, Kind, LcpPoint, Mcp, Set, Vi};
 
 use crate::core::reformulation::Reformulation;
 use crate::core::register::{Composed, Over};
@@ -46,68 +47,13 @@ impl Composed<Vi> for Multipliers {
     }
 }
 
-/// `M x + q` with the multipliers' rows of M, −A and −C, each by its entries.
-#[derive(Debug, Clone, Default)]
-struct Constraints {
-    rows: Vec<Vec<(usize, f64)>>,
-    rhs: Vec<f64>,
-    /// Whether the multiplier is free.
-    free: Vec<bool>,
-}
-
-impl Constraints {
-    /// The constraints that are no bounds, and the bounds of x.
-    fn of(set: &Set) -> (Self, [Vec<f64>; 2]) {
-        let mut out = Self::default();
-        let [mut lower, mut upper] = [f64::NEG_INFINITY, f64::INFINITY].map(|x| vec![x; set.dim()]);
-        for (first, set) in set.parts() {
-            match set {
-                Set::Box { lower: l, upper: u } => {
-                    lower[first..first + l.len()].copy_from_slice(l);
-                    upper[first..first + u.len()].copy_from_slice(u);
-                }
-                Set::Polyhedron { A, b, C, d } => {
-                    for (m, rhs, free) in [(A, b, false), (C, d, true)] {
-                        let mut rows = vec![vec![]; m.nrows()];
-                        m.triplets().for_each(|(i, j, x)| rows[i].push((first + j, -x)));
-                        for (row, &rhs) in rows.into_iter().zip(rhs) {
-                            match row[..] {
-                                [(j, x)]
-                                    if !free && bound(-x, rhs, &mut lower[j], &mut upper[j]) => {}
-                                _ => {
-                                    out.rows.push(row);
-                                    out.rhs.push(rhs);
-                                    out.free.push(free);
-                                }
-                            }
-                        }
-                    }
-                }
-                Set::Ball { .. } | Set::SecondOrderCone { .. } | Set::Product(_) => {}
-            }
-        }
-        (out, [lower, upper])
+/// The constraints of each of n variables, by the variables that are their multipliers.
+fn forces(constraints: &[Constraint], n: usize) -> Vec<Vec<(usize, f64)>> {
+    let mut columns = vec![vec![]; n];
+    for (k, constraint) in constraints.iter().enumerate() {
+        constraint.terms.iter().for_each(|&(j, a)| columns[j].push((n + k, a)));
     }
-
-    /// The constraints of each of n variables, with minus their coefficients.
-    fn transposed(&self, n: usize) -> Vec<Vec<(usize, f64)>> {
-        let mut columns = vec![vec![]; n];
-        for (k, row) in self.rows.iter().enumerate() {
-            row.iter().for_each(|&(j, x)| columns[j].push((n + k, -x)));
-        }
-        columns
-    }
-}
-
-/// Tightens l and u by `a x ≤ b`. False where that is no bound between which there is a number.
-fn bound(a: f64, b: f64, l: &mut f64, u: &mut f64) -> bool {
-    let x = b / a;
-    let (low, high) = if a > 0.0 { (*l, u.min(x)) } else { (l.max(x), *u) };
-    let is = a != 0.0 && x.is_finite() && low <= high;
-    if is {
-        (*l, *u) = (low, high);
-    }
-    is
+    columns
 }
 
 impl Reformulation<Vi> for Multipliers {
@@ -118,17 +64,16 @@ impl Reformulation<Vi> for Multipliers {
         if !Self::applies(&problem.set) {
             return Err(SolveError::needs("a set of boxes and polyhedra", "a ball or a cone"));
         }
-        let (constraints, [mut lower, mut upper]) = Constraints::of(&problem.set);
-        lower.extend(
-            constraints.free.iter().map(|free| if *free { f64::NEG_INFINITY } else { 0.0 }),
-        );
+        let Constraints { mut lower, mut upper, others } = problem.set.constraints();
+        let least = |c: &Constraint| if c.equation { f64::NEG_INFINITY } else { 0.0 };
+        lower.extend(others.iter().map(least));
         upper.resize(lower.len(), f64::INFINITY);
         let mut start = problem.start.clone();
         start.resize(lower.len(), 0.0);
         let field: Arc<dyn Field> = match problem.F.expressions() {
-            _ if constraints.rows.is_empty() => problem.F.clone(),
-            Some(f) => Arc::new(expressions(f, &constraints)?),
-            None => Arc::new(Multiplied::new(problem.F.clone(), constraints)),
+            _ if others.is_empty() => problem.F.clone(),
+            Some(f) => Arc::new(expressions(f, &others)?),
+            None => Arc::new(Multiplied::new(problem.F.clone(), others)),
         };
         Ok((Mcp::of(field, lower, upper, start)?, ()))
     }
@@ -144,22 +89,23 @@ impl Reformulation<Vi> for Multipliers {
 }
 
 /// The rows as expressions of x and the multipliers.
-fn expressions(f: &Expressions, constraints: &Constraints) -> Result<Expressions, SolveError> {
+fn expressions(f: &Expressions, constraints: &[Constraint]) -> Result<Expressions, SolveError> {
     let n = f.dim();
-    let mut graph = Graph::new(n + constraints.rows.len());
+    let mut graph = Graph::new(n + constraints.len());
     for node in f.graph().nodes() {
         graph.add(node.clone());
     }
     let mut rows = f.rows().to_vec();
-    for (row, terms) in rows.iter_mut().zip(constraints.transposed(n)) {
+    for (row, terms) in rows.iter_mut().zip(forces(constraints, n)) {
         if !terms.is_empty() {
             let forces = graph.add(Node::Linear(terms));
             *row = graph.binary(Binary::Add, *row, forces);
         }
     }
-    for (terms, rhs) in constraints.rows.iter().zip(&constraints.rhs) {
-        let linear = graph.add(Node::Linear(terms.clone()));
-        let rhs = graph.constant(*rhs);
+    for constraint in constraints {
+        let opposite = constraint.terms.iter().map(|&(j, a)| (j, -a)).collect();
+        let linear = graph.add(Node::Linear(opposite));
+        let rhs = graph.constant(constraint.rhs);
         rows.push(graph.binary(Binary::Add, linear, rhs));
     }
     Ok(Expressions::new(graph, rows)?)
@@ -169,24 +115,24 @@ fn expressions(f: &Expressions, constraints: &Constraints) -> Result<Expressions
 #[derive(Debug, Clone)]
 struct Multiplied {
     inner: Arc<dyn Field>,
-    constraints: Arc<Constraints>,
+    constraints: Arc<[Constraint]>,
     columns: Arc<Vec<Vec<(usize, f64)>>>,
     pattern: Pattern,
 }
 
 impl Multiplied {
-    fn new(inner: Arc<dyn Field>, constraints: Constraints) -> Self {
+    fn new(inner: Arc<dyn Field>, constraints: Vec<Constraint>) -> Self {
         let n = inner.dim();
-        let columns = constraints.transposed(n);
+        let columns = forces(&constraints, n);
         let of_x = (0..n).map(|i| {
             let forces = columns[i].iter().map(|term| term.0);
             inner.pattern().row(i).iter().copied().chain(forces).collect::<Vec<_>>()
         });
         let of_multipliers =
-            constraints.rows.iter().map(|row| row.iter().map(|term| term.0).collect());
+            constraints.iter().map(|c| c.terms.iter().map(|term| term.0).collect());
         let rows = of_x.chain(of_multipliers).map(Vec::into_iter);
         let pattern = Pattern::new(rows);
-        let (constraints, columns) = (Arc::new(constraints), Arc::new(columns));
+        let (constraints, columns) = (constraints.into(), Arc::new(columns));
         Self { inner, constraints, columns, pattern }
     }
 }
@@ -223,10 +169,8 @@ impl Running {
         let product = |terms: &[(usize, f64)]| terms.iter().map(|&(j, a)| a * x[j]).sum::<f64>();
         let (of_x, of_multipliers) = f.split_at_mut(columns.len());
         of_x.iter_mut().zip(&**columns).for_each(|(f, terms)| *f += product(terms));
-        for ((f, terms), rhs) in
-            of_multipliers.iter_mut().zip(&constraints.rows).zip(&constraints.rhs)
-        {
-            *f = product(terms) + rhs;
+        for (f, constraint) in of_multipliers.iter_mut().zip(&**constraints) {
+            *f = constraint.rhs - product(&constraint.terms);
         }
     }
 }
@@ -248,7 +192,8 @@ impl Evaluator for Running {
             let forces = self.field.columns[i].iter().map(|term| term.1);
             self.slopes[inner.range(i)].iter().copied().chain(forces)
         });
-        let of_multipliers = self.field.constraints.rows.iter().flatten().map(|term| term.1);
+        let of_multipliers =
+            self.field.constraints.iter().flat_map(|c| &c.terms).map(|term| -term.1);
         jacobian.iter_mut().zip(of_x.chain(of_multipliers)).for_each(|(to, from)| *to = from);
         defined
     }

@@ -12,7 +12,8 @@ use super::stated::{Part, Parts, Shape, Stated, of_jacobian, plural, x_and_f};
 use super::{BoxLcp, LcpPoint};
 use crate::check::proof::Exactly;
 use crate::check::{
-    Certificate, ConeSystem, Evidence, Judged, Measure, RowCounts, RowStatus, VerdictOf, weigh,
+    Certificate, ConeSystem, Evidence, Judged, Measure, Relaxed, RowCounts, RowStatus, VerdictOf,
+    weigh,
 };
 use crate::error::{bounds, vector};
 use crate::field::{Expressions, Field, linear, same};
@@ -185,13 +186,21 @@ impl Judged for Mcp {
     }
 }
 
-/// That of the affine problem, where its coefficients are exact: nothing is proved of others.
+/// That of the affine problem, where its coefficients are exact; else, of F by expressions, a relaxation in which each term that is not linear lies between its bounds.
 impl Exactly for Mcp {
     fn system(&self, wanted: Option<&[bool]>) -> Option<ConeSystem> {
-        match self.affine()? {
-            (linear, true) => linear.system(wanted),
-            _ => None,
+        if let Some((linear, true)) = self.affine() {
+            return linear.system(wanted);
         }
+        let relaxed = Relaxed {
+            field: self.F.expressions()?,
+            lower: &self.lower,
+            upper: &self.upper,
+            silent: vec![false; self.dim()],
+            constraints: &[],
+            cones: vec![],
+        };
+        relaxed.system(wanted)
     }
 
     fn rows(&self) -> usize {

@@ -55,7 +55,8 @@ pub struct ViGauge {
     /// `x − γ F`, and its projection.
     from: Vec<f64>,
     y: Vec<f64>,
-    projections: Vec<Projection>,
+    /// For γ = 1 and for the other γ: the points to be projected are far from each other, the active rows too.
+    projections: [Vec<Projection>; 2],
     /// Of the start and the set.
     size: f64,
     /// φ at the start.
@@ -77,7 +78,8 @@ impl ViGauge {
             sizes: zeros(),
             from: zeros(),
             y: zeros(),
-            projections: problem.set.parts().iter().map(|(_, set)| Projection::new(set)).collect(),
+            projections: [0, 1]
+                .map(|_| problem.set.parts().iter().map(|(_, set)| Projection::new(set)).collect()),
             size: largest(&problem.start).max(problem.set.size()),
         };
         gauge.unit = gauge.look(problem, &problem.start, false).unwrap_or(0.0);
@@ -110,10 +112,11 @@ impl ViGauge {
     }
 
     /// `‖x − P_X(x − γ F)‖_∞` with what the projection violates, for F as it was looked at; the projection is left in y.
-    fn natural(&mut self, problem: &Vi, x: &[f64], gamma: f64) -> f64 {
+    fn natural(&mut self, problem: &Vi, x: &[f64], gamma: f64, which: usize) -> f64 {
         let Self { f, from, y, projections, .. } = self;
         from.iter_mut().zip(x).zip(f).for_each(|((from, x), f)| *from = x - gamma * *f);
         let mut missed = 0.0_f64;
+        let projections = &mut projections[which];
         for ((first, set), projection) in problem.set.parts().into_iter().zip(projections) {
             let range = first..first + set.dim();
             if !projection.onto(set, &from[range.clone()], &mut y[range.clone()]) {
@@ -132,7 +135,7 @@ impl ViGauge {
         }
         let Some(phi) = self.look(problem, x, precisely) else { return Measure::never() };
         let phi = phi.max(VANISHING * self.unit);
-        let absolute = self.natural(problem, x, 1.0);
+        let absolute = self.natural(problem, x, 1.0, 0);
         let size = largest(x).max(self.size);
         let (xi, gamma) = match (size > 0.0, phi > 0.0) {
             (true, true) => (size, size / phi),
@@ -141,7 +144,7 @@ impl ViGauge {
             // x = 0 and F = 0
             (false, false) => (1.0, 0.0),
         };
-        let relative = self.natural(problem, x, gamma) / xi;
+        let relative = self.natural(problem, x, gamma, 1) / xi;
         if !(absolute.is_finite() && relative.is_finite()) {
             // Nothing projects onto an empty set.
             return Measure::never();

@@ -5,8 +5,7 @@
 //!              min_u ‖[Gᵀ; hᵀ] u − e_{n+1}‖,  u_k ≥ 0 of inequalities;  s along the residual: the rows with u_k > 0 hold with equality
 //! ```
 //!
-//! There is no such y where the residual vanishes: the polyhedron is empty. Source: LawsonHanson1974, ch. 23. Cost: for k active rows `n k²` operations a step, and about as many
-//! steps as the active rows change: those of the last projection are tried first.
+//! There is no such y where the residual vanishes: the polyhedron is empty. Source: LawsonHanson1974, ch. 23. Cost: for k active rows `n k` operations for one that comes or goes. Those of the last projection are tried first, at the first time those that p violates, and what is not positive with all the others goes at once.
 
 use nonsmooth_linalg::budget;
 
@@ -83,9 +82,7 @@ impl Projection {
         let Self { rows, norms, equalities, passive } = self;
         let (n, m, bounds) = (p.len(), rows.len(), rows.len() - *equalities);
         let rhs = b.iter().map(|b| -b).chain(d.iter().copied());
-        let h = |(k, rhs): (usize, f64)| {
-            rhs / norms[k] - rows[k].iter().zip(p).map(|(g, p)| g * p).sum::<f64>()
-        };
+        let h = |(k, rhs): (usize, f64)| rhs / norms[k] - dot(&rows[k], p);
         let mut h: Vec<f64> = rhs.enumerate().map(h).collect();
         y.copy_from_slice(p);
         let size = largest(&h);
@@ -96,10 +93,12 @@ impl Projection {
         h.iter_mut().for_each(|h| *h /= size);
         let column = |k: usize| rows[k].iter().copied().chain([h[k]]);
         passive.retain(|&k| k < bounds);
+        if passive.is_empty() {
+            passive.extend((0..bounds).filter(|&k| h[k] > 0.0));
+        }
         passive.extend(bounds..m);
         let mut u = vec![0.0; m];
-        let span = |passive: &[usize]| Span::of(passive.iter().map(|&k| column(k)));
-        let mut known = span(passive);
+        let mut known = Span::of(passive.iter().map(|&k| column(k)));
         // Of the last time, what is positive with all the others.
         loop {
             if budget::over() {
@@ -111,11 +110,12 @@ impl Projection {
             if passive.iter().zip(&next).all(|(&k, &z)| keeps(k, z)) {
                 break;
             }
-            passive.retain(|&k| keeps(k, u[k]));
-            known = span(passive);
+            let gone = known.without(passive, |k| keeps(k, u[k]));
+            known.complete(gone, passive, column);
         }
         // Columns that are combinations of the passive ones.
         let mut blocked = vec![false; m];
+        let mut is_passive = vec![false; m];
         for _ in 0..3 * m + 10 {
             if budget::over() {
                 return false;
@@ -135,8 +135,9 @@ impl Projection {
                 passive.iter().zip(&next).for_each(|(&k, &z)| u[k] += alpha * (z - u[k]));
                 let Some(least) = least else { break };
                 u[least] = 0.0;
-                passive.retain(|&k| k >= bounds || u[k] > 0.0);
-                known = span(passive);
+                let stays = |k: usize| k >= bounds || u[k] > 0.0;
+                let gone = known.without(passive, stays);
+                known.complete(gone, passive, column);
                 blocked.fill(false);
                 if budget::over() {
                     return false;
@@ -150,9 +151,11 @@ impl Projection {
             if norm(&residual) < DEPENDENT {
                 return false;
             }
-            let slope = |k: usize| column(k).zip(&residual).map(|(e, r)| e * r).sum::<f64>();
-            let open = (0..bounds).filter(|k| !blocked[*k] && !passive.contains(k));
+            let slope = |k: usize| dot(&rows[k], &residual[..n]) + h[k] * residual[n];
+            passive.iter().for_each(|&k| is_passive[k] = true);
+            let open = (0..bounds).filter(|&k| !blocked[k] && !is_passive[k]);
             let steepest = open.map(|k| (k, slope(k))).max_by(|a, b| a.1.total_cmp(&b.1));
+            is_passive.fill(false);
             match steepest {
                 Some((k, slope)) if slope > DEPENDENT * norm(&residual) => {
                     passive.push(k);
@@ -177,6 +180,19 @@ impl Projection {
     }
 }
 
+/// In eight sums, which one instruction adds up.
+fn dot(x: &[f64], y: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a, b) = (x.chunks_exact(8), y.chunks_exact(8));
+    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in a.zip(b) {
+        for k in 0..8 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
 /// Columns one after the other: orthonormal ones with the same span as far as they are independent, and R by columns; of dependent ones none.
 struct Span {
     q: Vec<Vec<f64>>,
@@ -190,6 +206,62 @@ impl Span {
         out
     }
 
+    /// Takes away the columns that do not stay, and these from the list of their names; what is left may lack columns at its end, see [`complete`](Self::complete).
+    ///
+    /// Cost: the entries of those that are left, for each; of many as much as making them again.
+    fn without(&mut self, names: &mut Vec<usize>, stays: impl Fn(usize) -> bool) -> usize {
+        let gone: Vec<usize> = (0..names.len()).filter(|&at| !stays(names[at])).collect();
+        names.retain(|&k| stays(k));
+        let first = gone.first().copied().unwrap_or(names.len());
+        // What depends on others may not do so without them.
+        let turns = self.r[first..].iter().all(Option::is_some) && 4 * gone.len() < self.r.len();
+        if turns {
+            gone.iter().rev().for_each(|&at| self.remove(at));
+            return names.len();
+        }
+        self.r.truncate(first);
+        self.q.truncate(self.r.iter().flatten().count());
+        first
+    }
+
+    /// The columns of these names from the first on that is not there.
+    fn complete<C: Iterator<Item = f64>>(
+        &mut self,
+        first: usize,
+        names: &[usize],
+        column: impl Fn(usize) -> C,
+    ) {
+        for &k in &names[first..] {
+            if budget::over() {
+                return;
+            }
+            self.push(column(k));
+        }
+    }
+
+    /// Without the column at this place, where none after it depends on others: turns in the planes of neighbours make R triangular again.
+    fn remove(&mut self, at: usize) {
+        self.r.remove(at);
+        let place = self.r[..at].iter().flatten().count();
+        for i in place..self.q.len() - 1 {
+            let mut columns = self.r[at..].iter_mut().flatten().skip(i - place);
+            let Some(first) = columns.next() else { break };
+            let (a, b) = (first[i], first[i + 1]);
+            let size = a.hypot(b);
+            let (c, s) = if size > 0.0 { (a / size, b / size) } else { (1.0, 0.0) };
+            first[i] = size;
+            first.truncate(i + 1);
+            for r in columns {
+                (r[i], r[i + 1]) = (c * r[i] + s * r[i + 1], c * r[i + 1] - s * r[i]);
+            }
+            let (left, right) = self.q.split_at_mut(i + 1);
+            for (x, y) in left[i].iter_mut().zip(&mut right[0]) {
+                (*x, *y) = (c * *x + s * *y, c * *y - s * *x);
+            }
+        }
+        self.q.pop();
+    }
+
     /// One column more. Cost: its entries times the columns that are there.
     fn push(&mut self, column: impl Iterator<Item = f64>) {
         let Self { q, r } = self;
@@ -199,7 +271,7 @@ impl Span {
         // Twice is enough.
         for _ in 0..2 {
             for (q, along) in q.iter().zip(&mut along) {
-                let c: f64 = q.iter().zip(&x).map(|(q, x)| q * x).sum();
+                let c = dot(q, &x);
                 x.iter_mut().zip(q).for_each(|(x, q)| *x -= c * q);
                 *along += c;
             }
@@ -251,4 +323,37 @@ fn nearest(which: &[usize], rows: &[Vec<f64>], h: &[f64], n: usize) -> Vec<f64> 
         along.push(z);
     }
     s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_that_go_leave_the_least_squares_of_the_others() {
+        let (n, k) = (12, 9);
+        let entry = |i: usize, j: usize| ((i * 37 + j * 91) as f64 * 0.618).sin();
+        let column = |j: usize| (0..=n).map(move |i| entry(i, j));
+        for gone in [vec![0], vec![8], vec![3, 4], vec![0, 8], vec![1, 2, 3, 5, 7]] {
+            let mut names: Vec<usize> = (0..k).collect();
+            let mut span = Span::of(names.iter().map(|&j| column(j)));
+            let first = span.without(&mut names, |j| !gone.contains(&j));
+            span.complete(first, &names, column);
+            assert_eq!(names.len(), k - gone.len());
+            let plain = Span::of(names.iter().map(|&j| column(j))).least_squares(n);
+            for (a, b) in span.least_squares(n).iter().zip(&plain) {
+                assert!((a - b).abs() < 1e-12, "{gone:?}: {a} {b}");
+            }
+        }
+        // A column that was a multiple of one that goes is there afterwards.
+        let twice =
+            |j: usize| (0..=n).map(move |i| if j == 2 { 2.0 * entry(i, 0) } else { entry(i, j) });
+        let mut names = vec![0, 1, 2, 3, 4, 5];
+        let mut span = Span::of(names.iter().map(|&j| twice(j)));
+        assert!(span.r[2].is_none());
+        let first = span.without(&mut names, |j| j != 0);
+        span.complete(first, &names, twice);
+        let plain = Span::of(names.iter().map(|&j| twice(j))).least_squares(n);
+        assert!(span.least_squares(n).iter().zip(&plain).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
 }

@@ -1,10 +1,11 @@
-//! What methods for nonlinear problems share: where a solve is, one step of damped Newton methods, ways out of where these stall.
+//! What methods for nonlinear problems share: where a solve is, one step of damped Newton methods, ways out of where these stall, proofs that there is nothing to find.
 
 mod crash;
 mod descent;
 mod escape;
 mod idle;
 mod iterate;
+mod refute;
 mod solve;
 mod squares;
 
@@ -13,6 +14,7 @@ pub use descent::{Descent, Options, Residual};
 pub use escape::{Escape, Inner};
 pub use idle::Idle;
 pub use iterate::Iterate;
+pub use refute::by_a_row;
 pub use solve::{CHECK_EVERY, STATIONARY, Solve, UNDEFINED};
 pub use squares::Squares;
 
