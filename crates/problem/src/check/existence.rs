@@ -451,15 +451,16 @@ impl<const D: usize> Kinematics<D> {
         if !shaped || !scale.is_finite() || !norm(lambda).is_finite() {
             return None;
         }
-        let outside = |c: usize| {
+        let inside = |c: usize| {
             let r = small::block::<D>(r, c);
-            match (friction, self.mu_r.get(c)) {
+            let outside = match (friction, self.mu_r.get(c)) {
                 (false, _) => Coulomb { mu: 0.0 }.distance_to_cone(&r),
                 (true, None) => Coulomb { mu: self.mu[c] }.distance_to_cone(&r),
                 (true, Some(&mu_r)) => Rolling { mu: self.mu[c], mu_r }.distance_to_cone(&r),
-            }
+            };
+            outside <= INSIDE * scale
         };
-        if (0..self.mu.len()).any(|c| !(outside(c) <= INSIDE * scale)) {
+        if !(0..self.mu.len()).all(inside) {
             return None;
         }
         // Contacts are all in m/s; each equation is in units of its own largest entry.

@@ -38,7 +38,7 @@ impl Friction {
 
     /// The coefficients of rolling friction, nc, or empty.
     pub fn mu_r(&self) -> &[f64] {
-        with_friction!(self, p => p.mu_r.values())
+        with_friction!(self, p => p.rolling_coefficients())
     }
 
     /// Checks shapes and values.

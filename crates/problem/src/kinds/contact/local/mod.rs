@@ -130,6 +130,11 @@ impl<const D: usize, L: Law<D>> FrictionLocal<D, L> {
         self.mu.len()
     }
 
+    /// The coefficients of rolling friction, nc, or empty.
+    pub fn rolling_coefficients(&self) -> &[f64] {
+        self.mu_r.values()
+    }
+
     /// The law of contact c.
     pub fn law(&self, c: usize) -> L {
         L::of(&self.mu, &self.mu_r, c)
