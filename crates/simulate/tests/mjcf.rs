@@ -177,6 +177,27 @@ fn a_box_slides_on_a_plane_with_the_larger_friction_and_filters_hold() {
     assert!(v("left")[2].abs() < 1e-9 && (v("left")[0] - v("right")[0]).abs() < 1e-9);
 }
 
+/// With `condim` 6 of one of two geoms the third number of `friction`, the larger one, is the coefficient of rolling friction: a = (5/7) g (sin α − mu_r/R cos α).
+#[test]
+fn balls_of_six_dimensions_resist_rolling() {
+    let made = import(
+        r#"<mujoco><option timestep="0.001" gravity="0.5 0 -10"/><worldbody>
+          <geom type="plane" size="1 1 1" friction="0.5 0.005 0.002"/>
+          <body name="held" pos="0 0 0.1"><freejoint/><geom size="0.1" condim="6" friction="0.5 0.005 0.006"/></body>
+          <body name="slow" pos="0 1 0.1"><freejoint/><geom size="0.1" condim="6" friction="0.5 0.005 0.001"/></body>
+          <body name="free" pos="0 2 0.1"><freejoint/><geom size="0.1" friction="0.5 0.005 0.006"/></body>
+        </worldbody></mujoco>"#,
+    );
+    let mut simulation = simulation(&made);
+    let run = simulation.run(0.5, 1e-3, &mut ()).unwrap();
+    assert!(run.is_solved(), "{run}");
+    let v = |k: usize| simulation.state().velocity[k][0];
+    for (k, mu_r) in [(1, 0.006), (2, 0.002), (3, 0.0)] {
+        let expected = 5.0 / 7.0 * (0.5_f64 - 10.0 * mu_r / 0.1).max(0.0) * 0.5;
+        assert!((v(k) - expected).abs() < 1e-9, "{k}: {} {expected}", v(k));
+    }
+}
+
 #[test]
 fn equalities_are_joints_and_couplings() {
     let made = import(

@@ -106,11 +106,14 @@ impl Contacts {
     }
 
     fn name(&self, k: usize) -> String {
-        let Touch { friction, rough, priority, .. } = self.materials[k];
+        let Touch { friction, rough, rolling, rolls, priority, .. } = self.materials[k];
         let mut name = match rough {
             true => format!("friction {friction}"),
             false => format!("friction {friction} of condim 1"),
         };
+        if rolls {
+            name += &format!(", rolling {rolling}");
+        }
         if priority != 0 {
             name += &format!(", priority {priority}");
         }
@@ -120,32 +123,44 @@ impl Contacts {
     /// The laws of contact of all pairs of materials.
     pub fn laws(&self, scene: &mut Value) {
         if let [] | [_] = self.materials[..] {
-            let mu = self.materials.first().map_or(0.0, |m| law(m, m));
-            scene["pairs_default"] = json!({"mu": mu});
+            let law = self.materials.first().map_or(json!({"mu": 0.0}), |m| law(m, m));
+            scene["pairs_default"] = law;
             return;
         }
         let mut pairs = vec![];
         for (k, a) in self.materials.iter().enumerate() {
             scene["materials"][self.name(k)] = json!({});
             for (l, b) in self.materials.iter().enumerate().skip(k) {
-                pairs.push(json!({"between": [self.name(k), self.name(l)], "mu": law(a, b)}));
+                let mut pair = law(a, b);
+                pair["between"] = json!([self.name(k), self.name(l)]);
+                pairs.push(pair);
             }
         }
         scene["pairs"] = json!(pairs);
     }
 }
 
-/// Whether two geoms have the same law with all others.
+/// Whether two geoms have the same law with all others. Of rolling friction only those that have any.
 fn alike(a: &Touch, b: &Touch) -> bool {
-    (a.friction, a.rough, a.priority) == (b.friction, b.rough, b.priority)
+    let rolling = |t: &Touch| t.rolls.then_some(t.rolling);
+    (a.friction, a.rough, a.priority, rolling(a)) == (b.friction, b.rough, b.priority, rolling(b))
 }
 
-/// The coefficient of friction of two: that of higher priority, else the larger one; none where both have normal forces only.
-fn law(a: &Touch, b: &Touch) -> f64 {
-    let (friction, rough) = match a.priority.cmp(&b.priority) {
-        std::cmp::Ordering::Greater => (a.friction, a.rough),
-        std::cmp::Ordering::Less => (b.friction, b.rough),
-        std::cmp::Ordering::Equal => (a.friction.max(b.friction), a.rough || b.rough),
+/// The law of two: of higher priority, else with the larger coefficients; without friction where both have normal forces only, with rolling friction where one has
+/// `condim` 6.
+fn law(a: &Touch, b: &Touch) -> Value {
+    let one = |t: &Touch| (t.friction, t.rough, t.rolling, t.rolls);
+    let (friction, rough, rolling, rolls) = match a.priority.cmp(&b.priority) {
+        std::cmp::Ordering::Greater => one(a),
+        std::cmp::Ordering::Less => one(b),
+        std::cmp::Ordering::Equal => {
+            let rolling = a.rolling.max(b.rolling);
+            (a.friction.max(b.friction), a.rough || b.rough, rolling, a.rolls || b.rolls)
+        }
     };
-    if rough { friction } else { 0.0 }
+    let mut law = json!({"mu": if rough { friction } else { 0.0 }});
+    if rolls && rolling > 0.0 {
+        law["mu_rolling"] = json!(rolling);
+    }
+    law
 }

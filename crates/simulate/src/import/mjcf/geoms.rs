@@ -69,6 +69,9 @@ pub(super) struct Touch {
     /// `contype` and `conaffinity`.
     pub bits: [u32; 2],
     pub friction: f64,
+    /// The coefficient of rolling friction, m, and whether it has any.
+    pub rolling: f64,
+    pub rolls: bool,
     /// Whether it has friction at all.
     pub rough: bool,
     pub priority: i64,
@@ -333,9 +336,17 @@ fn path(compiler: &Compiler, file: &str) -> String {
     }
 }
 
+/// MuJoCo's coefficient of rolling friction where none is given, m.
+const ROLLING: f64 = 1e-4;
+
 fn touch(item: &Item) -> Result<Touch, SimulateError> {
     let bits = |name: &str| item.whole(name, 1).map(|x| x as u32);
-    let friction = item.first("friction")?.unwrap_or(1.0);
+    let given = item.numbers("friction")?.unwrap_or_default();
+    let friction = given.first().copied().unwrap_or(1.0);
+    let rolling = given.get(2).copied().unwrap_or(ROLLING);
+    if rolling < 0.0 {
+        return Err(item.wrong("a third `friction` of at least 0", rolling));
+    }
     if friction < 0.0 {
         return Err(item.wrong("a `friction` of at least 0", friction));
     }
@@ -343,6 +354,8 @@ fn touch(item: &Item) -> Result<Touch, SimulateError> {
         bits: [bits("contype")?, bits("conaffinity")?],
         friction,
         rough: item.whole("condim", 3)? != 1,
+        rolling,
+        rolls: item.whole("condim", 3)? == 6,
         priority: item.whole("priority", 0)?,
     })
 }

@@ -36,7 +36,7 @@ pub fn mjcf(text: &str, folder: &Path) -> Result<Imported, SimulateError> {
     let root = document::read(text, folder)?;
     let defaults = Defaults::read(&root)?;
     let mut said = vec![
-        "contacts are rigid, with Coulomb's law and e = 0: solref, solimp and impratio, torsional and rolling friction are not of our law and left out".to_owned(),
+        "contacts are rigid, with Coulomb's law and e = 0: solref, solimp, impratio and torsional friction are not of our law and left out".to_owned(),
     ];
     known(&root, &mut said)?;
     let compiler = Compiler::read(&root, &defaults, folder.into(), &mut said)?;
