@@ -79,14 +79,15 @@ class Admm(Settings):
 
 class Auto(Settings):
     """auto: needs no setting: sweeps, interior point, proximal semismooth Newton, each while it promises
-    more than the next (friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d)
+    more than the next (friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d)
     auto: needs no setting: a plan of solvers by size, class and structure, until one solves the problem
     or proves that there is no solution (lcp, mlcp, hlcp, box_lcp, mcp)
     auto: needs no setting: over boxes and polyhedra the auto of mcp behind multipliers, then
     projections (vi)
 
-    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d, lcp,
-    mlcp, hlcp, box_lcp, mcp, vi.
+    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d, lcp, mlcp, hlcp, box_lcp, mcp, vi.
 
     Settings
     --------
@@ -215,7 +216,7 @@ class Cadoux(Settings):
 class Condense(Prefixed):
     """condense: global to local: forms W = H' M^-1 H and q, bilateral constraints eliminated
 
-    For problems friction_global_2d, friction_global_3d.
+    For problems friction_global_2d, friction_global_3d, rolling_friction_global_3d.
 
     References: Acary2018.
     """
@@ -274,7 +275,8 @@ class CrissCross(Settings):
 class DeSaxce(Settings):
     """de_saxce: De Saxce-Feng fixed point (Uzawa) with a fixed step
 
-    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d.
+    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d.
 
     Settings
     --------
@@ -346,7 +348,8 @@ class EnumerationExact(Settings):
 class Extragradient(Settings):
     """extragradient: extragradient projection with a self-adaptive step
 
-    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d, vi.
+    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d, vi.
 
     Settings
     --------
@@ -432,7 +435,8 @@ class FacetOuter(Prefixed):
 class FixedPoint(Settings):
     """fixed_point: fixed-point projection with a self-adaptive step
 
-    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d, vi.
+    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d, vi.
 
     Settings
     --------
@@ -478,7 +482,8 @@ class Glocker(Prefixed):
 class Hyperplane(Settings):
     """hyperplane: hyperplane projection with a self-adaptive prediction
 
-    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d, vi.
+    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d, vi.
 
     Settings
     --------
@@ -518,7 +523,8 @@ class Ip(Settings):
     """ip: nonsmooth interior point: Mehrotra's predictor-corrector with Nesterov-Todd scaling on Coulomb's
     law itself
 
-    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d.
+    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d.
 
     Settings
     --------
@@ -828,7 +834,8 @@ class NeSqp(Settings):
 class NewtonAc(Settings):
     """newton_ac: semismooth Newton on the Alart-Curnier function
 
-    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d.
+    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d.
 
     Settings
     --------
@@ -1048,7 +1055,8 @@ class NewtonHsw(Settings):
 class NewtonJm(Settings):
     """newton_jm: semismooth Newton on the Jean-Moreau function
 
-    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d.
+    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d.
 
     Settings
     --------
@@ -1141,7 +1149,8 @@ class NewtonMinRho(Settings):
 class NewtonNm(Settings):
     """newton_nm: semismooth Newton on the natural map of the cone
 
-    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d.
+    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d.
 
     Settings
     --------
@@ -1278,7 +1287,8 @@ class Nsgs(Settings):
     """nsgs: nonsmooth block Gauss-Seidel over contacts and scalar rows with bounds, with a choice of local
     solvers
 
-    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d.
+    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d.
 
     Settings
     --------
@@ -1334,7 +1344,8 @@ class NsgsColored(Settings):
     """nsgs_colored: nonsmooth block Gauss-Seidel on several threads, contacts by colour; the same bits for
     any number of threads
 
-    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d.
+    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d.
 
     Settings
     --------
@@ -1464,7 +1475,8 @@ class Pgs(Settings):
     ) -> None: ...
 
 class Presolve(Prefixed):
-    """presolve: MCP to MCP: variables that are known or that an equation defines are put where they are used, rows that say nothing go
+    """presolve: MCP to MCP: variables that are known or that an equation defines are put where they are
+    used, rows that say nothing go
 
     For problems mcp.
 
@@ -1524,7 +1536,8 @@ class Proxi(Settings):
 class Proximal(Prefixed):
     """proximal: proximal point: the solver works on problems with W + alpha w in place of W
 
-    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d.
+    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d.
 
     Settings
     --------
@@ -1563,12 +1576,13 @@ class Proximal(Prefixed):
 
 class Psor(Settings):
     """psor: projected successive over-relaxation: Gauss-Seidel sweeps with one projection a contact
-    (friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d)
+    (friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d)
     psor: projected Gauss-Seidel with over-relaxation, whose factor may follow the observed rate (lcp,
     mlcp, box_lcp)
 
-    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d, lcp,
-    mlcp, box_lcp.
+    For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
+    rolling_friction_local_3d, rolling_friction_global_3d, lcp, mlcp, box_lcp.
 
     Needs the entries of M; a positive diagonal of M.
 
