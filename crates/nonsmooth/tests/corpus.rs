@@ -67,7 +67,7 @@ fn local_problems_at_a_loose_tolerance() {
     assert!(solved.len() as f64 >= 0.95 * all as f64, "{} of {all} solved", solved.len());
 }
 
-/// Siconos' own solvers leave the chute's error at 0.5 and end most of the others above 1e-4.
+/// Siconos' interior point calls one of the chutes solved at an error of 0.5.
 #[test]
 fn rolling_friction_to_twelve_digits() {
     let rolling =

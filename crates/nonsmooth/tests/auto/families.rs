@@ -126,7 +126,7 @@ fn agreements<P: Registered + Judged>(problem: &P, what: &str, sweeps: usize) ->
     let mut agreed = 0;
     // Rolling friction has fewer of them.
     let known = nonsmooth_solve::registry::solver_names::<P>();
-    for solver in OTHERS.iter().filter(|name| known.iter().any(|k| k == *name)) {
+    for solver in OTHERS.iter().filter(|name| known.iter().any(|k| k == *name)).copied() {
         let Some((u, _)) = solve(solver) else { continue };
         let apart: Vec<_> = u.iter().zip(&reference).map(|(a, b)| a - b).collect();
         let d = norm(&apart) / scale;
