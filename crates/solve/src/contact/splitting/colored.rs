@@ -23,10 +23,10 @@ use serde::{Deserialize, Serialize};
 
 use super::circles::Circles;
 use super::contact::{Answer, Contact, ContactOf, NEGLIGIBLE};
-use super::nsgs::{LocalChoice, with_local, with_rolling_local};
+use super::nsgs::{LocalChoice, with_local};
 use crate::contact::form::{Access, Concurrent, Disked, Frictional};
 use crate::contact::law::Rolling;
-use crate::contact::law::local::LocalSolver;
+use crate::contact::law::local::{Exact, LocalSolver, Quartic, RollingExact};
 use crate::contact::splitting::coloring::Coloring;
 use crate::contact::splitting::team::Team;
 use crate::core::ranges::{at_least, at_most, below};
@@ -103,14 +103,14 @@ impl Colored {
     pub(crate) fn boxed<P: Concurrent<D> + Frictional<D> + 'static, const D: usize>(
         self,
     ) -> Boxed<P> {
-        with_local!(self.local, local => Boxed::new(ColoredSweeps { settings: self, local }))
+        with_local!(self.local, [Exact, Quartic], local => Boxed::new(ColoredSweeps { settings: self, local }))
     }
 
     /// The same with rolling friction.
     pub(crate) fn rolling<P: Concurrent<D> + Disked<D, Law = Rolling> + 'static, const D: usize>(
         self,
     ) -> Boxed<P> {
-        with_rolling_local!(self.local, local => Boxed::new(ColoredSweeps { settings: self, local }))
+        with_local!(self.local, [RollingExact, RollingExact], local => Boxed::new(ColoredSweeps { settings: self, local }))
     }
 }
 

@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use crate::contact::form::{Access, Blockwise, Disked, Frictional};
 use crate::contact::law::Rolling;
 use crate::contact::law::cone::ConvexSet;
-use crate::contact::law::local::LocalSolver;
+use crate::contact::law::local::{Exact, LocalSolver, Quartic, RollingExact};
 use crate::contact::parts::{Accelerator, put_within_bounds, sweep_rows};
 use crate::contact::splitting::ordering::{Order, Ordering};
 use crate::core::ranges::{at_least, at_most, below};
@@ -175,18 +175,18 @@ pub struct Sweeps<L, const D: usize> {
     pub local: L,
 }
 
-/// Evaluates an expression with the local solver of a [`LocalChoice`], known by type: the one list of them.
+/// Evaluates an expression with the local solver of a [`LocalChoice`], known by type: the one list of them. What is exact, and what the quartic is, goes by the law.
 macro_rules! with_local {
-    ($choice:expr, $local:ident => $body:expr) => {{
+    ($choice:expr, [$exact:expr, $quartic:expr], $local:ident => $body:expr) => {{
         use $crate::contact::law::cfun::Disk;
-        use $crate::contact::law::local::{Exact, Newton, Projection, ProjectionIterated, Quartic};
+        use $crate::contact::law::local::{Newton, Projection, ProjectionIterated};
         match $choice {
             LocalChoice::Exact => {
-                let $local = Exact;
+                let $local = $exact;
                 $body
             }
             LocalChoice::Quartic => {
-                let $local = Quartic;
+                let $local = $quartic;
                 $body
             }
             LocalChoice::NewtonAc => {
@@ -210,50 +210,21 @@ macro_rules! with_local {
 }
 pub(super) use with_local;
 
-/// The same with rolling friction, whose contact has one solution by cases and Newton whatever is meant by exact.
-macro_rules! with_rolling_local {
-    ($choice:expr, $local:ident => $body:expr) => {{
-        use $crate::contact::law::cfun::Disk;
-        use $crate::contact::law::local::{Newton, Projection, ProjectionIterated, RollingExact};
-        match $choice {
-            LocalChoice::Exact | LocalChoice::Quartic => {
-                let $local = RollingExact;
-                $body
-            }
-            LocalChoice::NewtonAc => {
-                let $local = Newton::new(Disk::AlartCurnier);
-                $body
-            }
-            LocalChoice::NewtonJm => {
-                let $local = Newton::new(Disk::JeanMoreau);
-                $body
-            }
-            LocalChoice::Projection => {
-                let $local = Projection::default();
-                $body
-            }
-            LocalChoice::ProjectionIterated => {
-                let $local = ProjectionIterated::default();
-                $body
-            }
-        }
-    }};
-}
-pub(super) use with_rolling_local;
-
 impl Nsgs {
     /// The method with its local solver known by type.
     pub(crate) fn boxed<P: Blockwise<D> + Frictional<D> + 'static, const D: usize>(
         self,
     ) -> Boxed<P> {
-        with_local!(self.local, local => Boxed::new(Sweeps { settings: self, local }))
+        with_local!(self.local, [Exact, Quartic], local => Boxed::new(Sweeps { settings: self, local }))
     }
 
     /// The same with rolling friction.
     pub(crate) fn rolling<P: Blockwise<D> + Disked<D, Law = Rolling> + 'static, const D: usize>(
         self,
     ) -> Boxed<P> {
-        with_rolling_local!(self.local, local => Boxed::new(Sweeps { settings: self, local }))
+        with_local!(self.local, [RollingExact, RollingExact], local => {
+            Boxed::new(Sweeps { settings: self, local })
+        })
     }
 }
 

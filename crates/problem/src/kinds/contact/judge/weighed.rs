@@ -5,7 +5,8 @@
 //! two problems are the same problem in other units. Residuals are those of the problem in u'.
 
 use super::contact::{Law, length};
-use crate::check::Measure;
+use super::gauge::{LawGauge, verdict};
+use crate::check::{Measure, Verdict};
 use nonsmooth_linalg::{norm, power_of_two, small};
 
 /// A contact problem that can be stated in units of velocity: `u' = D u`, `r = D r'` with `D_c = diag(1, 1, 1, ℓ_c, ℓ_c)`, a change of units without any rounding.
@@ -58,4 +59,24 @@ pub(crate) fn as_given<L: Law<D>, const D: usize>(
     let over = |size: f64| if size > 0.0 { map / size } else { map };
     measure.literature = over(q);
     measure.siconos = over(q.max(norm(r)).max(norm(u)));
+}
+
+/// The verdict on impulses r and velocities u' that have been measured, in units of velocity; with the velocities as the problem is given.
+pub(crate) fn verdict_weighed<P: Weighed, L: Law<D>, const D: usize>(
+    problem: &P,
+    law: impl Fn(&P, usize) -> L,
+    measure: Measure,
+    gauge: &LawGauge,
+    (r, u): (&[f64], &[f64]),
+    tolerance: f64,
+) -> Verdict {
+    let Some(arms) = problem.arms() else {
+        return verdict::<L, D>(measure, gauge, r, u, |c| law(problem, c), tolerance);
+    };
+    let weighed = problem.weighed(&arms);
+    let mut r = r.to_vec();
+    divide::<D>(&arms, &mut r);
+    let mut found = verdict::<L, D>(measure, gauge, &r, u, |c| law(&weighed, c), tolerance);
+    divide::<D>(&arms, &mut found.velocity);
+    found
 }

@@ -7,9 +7,11 @@ use crate::check::{
     Verdict,
 };
 use crate::kinds::contact::judge::Weighed;
-use crate::kinds::contact::judge::gauge::{HALF_ULP, LawGauge, largest, unit, verdict, worst};
+use crate::kinds::contact::judge::gauge::{HALF_ULP, LawGauge, largest, unit, worst};
 use crate::kinds::contact::judge::statement::{contacts, opposite, under};
-use crate::kinds::contact::judge::weighed::{arm, as_given, divide, multiply, weight};
+use crate::kinds::contact::judge::weighed::{
+    arm, as_given, divide, multiply, verdict_weighed, weight,
+};
 use crate::kinds::contact::law::RollingData;
 use crate::{FrictionLocal, LocalPoint, Problem, RowsLocal};
 use nonsmooth_linalg::{Csc, Doubled, Real, norm, power_of_two, small};
@@ -325,16 +327,8 @@ impl<const D: usize, L: Law<D>> Judged for FrictionLocal<D, L> {
 
     fn verdict(&self, point: &LocalPoint, gauge: &mut Self::Gauge, tolerance: f64) -> Verdict {
         let measure = self.certify(point, gauge);
-        let (arms, u) = (self.arms(), gauge.velocity());
-        let Some(arms) = arms else {
-            return verdict::<_, D>(measure, &gauge.law, &point.r, u, |c| self.law(c), tolerance);
-        };
-        let mut r = point.r.clone();
-        divide::<D>(&arms, &mut r);
-        let weighed = self.weighed(&arms);
-        let mut found = verdict::<_, D>(measure, &gauge.law, &r, u, |c| weighed.law(c), tolerance);
-        divide::<D>(&arms, &mut found.velocity);
-        found
+        let (law, u) = (&gauge.law, gauge.velocity());
+        verdict_weighed(self, Self::law, measure, law, (&point.r, u), tolerance)
     }
 }
 
