@@ -144,7 +144,7 @@ mod tests {
                 *x = ((i * j) as f64).cos() * 10f64.powi(-(i as i32) - (j as i32));
             }
         }
-        (0..5).for_each(|i| w[i][i] += 2.0 * 10f64.powi(-2 * (i as i32)));
+        (0..5).for_each(|i| w[i][i] += 6.0 * 10f64.powi(-2 * (i as i32)));
         let (values, v) = eigen(&w);
         for i in 0..5 {
             let image = mul(&w, &v[i]);

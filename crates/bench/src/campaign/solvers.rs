@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn labels_carry_settings_and_know_their_problems() {
-        assert_eq!(kinds("nsgs:omega=0.9, local=quartic").unwrap().len(), 4);
+        assert_eq!(kinds("nsgs:omega=0.9, local=quartic").unwrap().len(), 6);
         let global = [Kind::FrictionGlobal3d, Kind::FrictionGlobal2d, Kind::RollingGlobal3d];
         assert_eq!(kinds("condense/nsgs").unwrap(), global);
         assert!(kinds("magic").unwrap_err().contains("unknown solver `magic`"));

@@ -45,13 +45,15 @@ impl Piece {
         if free == [true; 2] && x[0] >= 0.0 {
             return piece;
         }
-        // Each disk that binds alone leaves the other inside, or both bind.
-        let alone = [[true, false], [false, true]].into_iter().find(|&binds| {
-            let (bound, other) = if binds[0] { (0, 1) } else { (1, 0) };
-            let n = with(binds);
-            n > 0.0 && sizes[bound] > mu[bound] * n && sizes[other] <= mu[other] * n
-        });
-        piece.binds = alone.unwrap_or([true; 2]);
+        // n is no smaller than x_N, so a disk that is free at x_N stays so. Of two that are not, one binds alone where it leaves the other inside.
+        piece.binds = match free {
+            [false, false] => {
+                let leaves =
+                    |bound: [bool; 2], other: usize| sizes[other] <= mu[other] * with(bound);
+                [!leaves([false, true], 0), !leaves([true, false], 1)]
+            }
+            [first, second] => [!first, !second],
+        };
         piece.normal = with(piece.binds).max(0.0);
         piece
     }
