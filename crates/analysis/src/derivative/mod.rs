@@ -145,7 +145,7 @@ pub struct Derivative {
 impl Derivative {
     /// That of a solution of a problem of any kind.
     ///
-    /// Errors, besides: variational inequalities over other sets than boxes.
+    /// Errors, besides: variational inequalities over other sets than boxes; rolling friction.
     pub fn of(
         problem: &AnyProblem,
         point: &AnyPoint,
@@ -182,6 +182,14 @@ impl Derivative {
             }
             (AnyProblem::Friction(Friction::Global3(p)), AnyPoint::Global(r)) => {
                 Self::of_global(p, r, tolerance)
+            }
+            (AnyProblem::Friction(Friction::RollingLocal(_) | Friction::RollingGlobal(_)), _) => {
+                Err(ProblemError::Shape {
+                    place: "the law".into(),
+                    expected: "Coulomb's (with rolling friction no derivative is known)".into(),
+                    found: problem.kind().name().into(),
+                }
+                .into())
             }
             _ => Err(ProblemError::Shape {
                 place: "the point".into(),
