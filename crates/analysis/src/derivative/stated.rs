@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use nonsmooth_linalg::{Csc, Matrix};
-use nonsmooth_problem::check::{ContactStatus, Judged, Motion, RowStatus};
+use nonsmooth_problem::check::{ContactStatus, Judged, Motion, RowStatus, VerdictOf};
 use nonsmooth_problem::field::Field;
 use nonsmooth_problem::{
     Bounds, BoxLcp, FrictionGlobal, FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Lcp, LcpPoint,
@@ -135,11 +135,15 @@ impl Matrices {
     }
 }
 
-fn solved(solved: bool, found: f64, tolerance: f64) -> Result<(), DerivativeError> {
-    match solved {
-        true => Ok(()),
-        false => Err(DerivativeError::NotSolved { tolerance, found }),
-    }
+/// The verdict on a point that is a solution.
+fn solved<P: Judged>(
+    problem: &P,
+    point: &P::Point,
+    tolerance: f64,
+) -> Result<VerdictOf<P>, DerivativeError> {
+    let verdict = problem.judge(point, tolerance)?;
+    let found = verdict.measure.relative;
+    if verdict.solved { Ok(verdict) } else { Err(DerivativeError::NotSolved { tolerance, found }) }
 }
 
 fn entries(name: &str, matrix: &Matrix) -> Result<Csc, ProblemError> {
@@ -182,15 +186,7 @@ pub(super) fn lcp(
     point: &LcpPoint,
     tolerance: f64,
 ) -> Result<Pieces, DerivativeError> {
-    let verdict = problem.judge(point, tolerance)?;
-    solved(verdict.solved, verdict.measure.relative, tolerance)?;
-    let n = point.z.len();
-    let (mut statement, matrix) = in_z(&problem.M)?;
-    statement.part("z", Side::X, 0..n);
-    statement.part("w", Side::Y, 0..n);
-    let (columns, pieces) = pairs(&verdict.statuses, false);
-    let (point, degenerate) = (point.z.clone(), verdict.counts.degenerate);
-    Ok(Pieces { statement, matrix, point, columns, pieces, degenerate })
+    Ok(in_pairs(&problem.M, false, &solved(problem, point, tolerance)?, point)?)
 }
 
 pub(super) fn boxed(
@@ -198,14 +194,22 @@ pub(super) fn boxed(
     point: &LcpPoint,
     tolerance: f64,
 ) -> Result<Pieces, DerivativeError> {
-    let verdict = problem.judge(point, tolerance)?;
-    solved(verdict.solved, verdict.measure.relative, tolerance)?;
+    Ok(in_pairs(&problem.M, true, &solved(problem, point, tolerance)?, point)?)
+}
+
+/// Of a problem in z and `w = M z + q` alone, with its bounds among the data or without.
+fn in_pairs(
+    matrix: &Matrix,
+    bounded: bool,
+    verdict: &VerdictOf<BoxLcp>,
+    point: &LcpPoint,
+) -> Result<Pieces, ProblemError> {
     let n = point.z.len();
-    let (mut statement, matrix) = in_z(&problem.M)?;
-    statement.bounds = n;
+    let (mut statement, matrix) = in_z(matrix)?;
+    statement.bounds = if bounded { n } else { 0 };
     statement.part("z", Side::X, 0..n);
     statement.part("w", Side::Y, 0..n);
-    let (columns, pieces) = pairs(&verdict.statuses, true);
+    let (columns, pieces) = pairs(&verdict.statuses, bounded);
     let (point, degenerate) = (point.z.clone(), verdict.counts.degenerate);
     Ok(Pieces { statement, matrix, point, columns, pieces, degenerate })
 }
@@ -215,8 +219,7 @@ pub(super) fn mlcp(
     point: &LcpPoint,
     tolerance: f64,
 ) -> Result<Pieces, DerivativeError> {
-    let verdict = problem.judge(point, tolerance)?;
-    solved(verdict.solved, verdict.measure.relative, tolerance)?;
+    let verdict = solved(problem, point, tolerance)?;
     let (e, free, n) = (problem.equalities, problem.free, point.z.len());
     let (mut statement, matrix) = in_z(&problem.M)?;
     statement.part("u", Side::X, 0..free);
@@ -243,8 +246,7 @@ pub(super) fn hlcp(
     point: &HlcpPoint,
     tolerance: f64,
 ) -> Result<Pieces, DerivativeError> {
-    let verdict = problem.judge(point, tolerance)?;
-    solved(verdict.solved, verdict.measure.relative, tolerance)?;
+    let verdict = solved(problem, point, tolerance)?;
     let n = problem.dim();
     let (mut statement, mut matrices) = (Statement::default(), Matrices::default());
     matrices.add("Q", &entries("Q", &problem.Q)?, [0, 0], 1.0);
@@ -273,8 +275,7 @@ pub(super) fn mcp(
     point: &LcpPoint,
     tolerance: f64,
 ) -> Result<Pieces, DerivativeError> {
-    let verdict = problem.judge(point, tolerance)?;
-    solved(verdict.solved, verdict.measure.relative, tolerance)?;
+    let verdict = solved(problem, point, tolerance)?;
     let n = problem.dim();
     let matrix = jacobian(&*problem.F, &point.z)?;
     let mut statement = Statement { bounds: n, ..Statement::default() };
@@ -422,8 +423,7 @@ pub(super) fn local<const D: usize>(
 where
     FrictionLocal<D>: Judged<Point = LocalPoint, Status = ContactStatus>,
 {
-    let verdict = problem.judge(point, tolerance)?;
-    solved(verdict.solved, verdict.measure.relative, tolerance)?;
+    let verdict = solved(problem, point, tolerance)?;
     let (m, p) = (point.r.len(), point.lambda.len());
     let (mut statement, mut matrices) = (Statement::default(), Matrices::default());
     if m > 0 {
@@ -472,8 +472,7 @@ pub(super) fn global<const D: usize>(
 where
     FrictionGlobal<D>: Judged<Point = GlobalPoint, Status = ContactStatus>,
 {
-    let verdict = problem.judge(point, tolerance)?;
-    solved(verdict.solved, verdict.measure.relative, tolerance)?;
+    let verdict = solved(problem, point, tolerance)?;
     let (n, m, p) = (point.v.len(), point.r.len(), point.lambda.len());
     let (mut statement, mut matrices) = (Statement::default(), Matrices::default());
     matrices.add("M", &problem.M, [0, 0], 1.0);
