@@ -21,7 +21,7 @@ use nonsmooth_problem::check::{
     Certificate, ConeSystem, Evidence, Exact, ExactVector, Proof, rounded,
 };
 
-use crate::Limits;
+use crate::{Limits, Outcome, Status};
 
 /// How the enumeration ended.
 #[derive(Debug, Clone, PartialEq)]
@@ -242,8 +242,23 @@ impl Refutation {
         is
     }
 
-    /// The proof that was found since it was last taken.
-    pub fn take(&self) -> Option<Proof> {
+    /// Forgets what an earlier solve has found.
+    pub fn clear(&self) {
+        self.take();
+    }
+
+    /// Makes the proof that was found, if any, the status of an outcome that is no solution; whether it did.
+    pub fn settle(&self, outcome: &mut Outcome) -> bool {
+        match self.take() {
+            Some(proof) if outcome.status != Status::Solved => {
+                outcome.status = Status::Infeasible(proof);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    fn take(&self) -> Option<Proof> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }

@@ -133,7 +133,6 @@ impl AutoSession {
         observer: &mut dyn Observer<Mcp>,
     ) -> Result<Outcome, SolveError> {
         let begun = Instant::now();
-        (self.refuted, self.searched) = (None, false);
         let scope = limits.budget(begun).enter();
         if let Some(proof) = by_a_row(problem) {
             let measure = problem.certify(point, &mut problem.gauge()?);
@@ -143,17 +142,14 @@ impl AutoSession {
             return Ok(outcome);
         }
         drop(scope);
-        self.proof.take();
+        self.proof.clear();
         self.searched = true;
-        let outcome = self.nonlinear.observe(problem, point, &limits.left(begun), observer)?;
-        match self.proof.take() {
-            Some(proof) if !matches!(outcome.status, Status::Solved) => {
-                let why = "the bounds of the terms that are not linear leave no solution, in exact arithmetic";
-                self.refuted = Some(why.into());
-                Ok(Outcome { status: Status::Infeasible(proof), ..outcome })
-            }
-            _ => Ok(outcome),
+        let mut outcome = self.nonlinear.observe(problem, point, &limits.left(begun), observer)?;
+        if self.proof.settle(&mut outcome) {
+            let why = "the bounds of the terms that are not linear leave no solution, in exact arithmetic";
+            self.refuted = Some(why.into());
         }
+        Ok(outcome)
     }
 
     /// What was done for a problem that is not affine.

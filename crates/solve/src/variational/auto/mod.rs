@@ -141,11 +141,9 @@ impl Session<Vi> for AutoSession {
         observer: &mut dyn Observer<Vi>,
     ) -> Result<Outcome, SolveError> {
         let begun = std::time::Instant::now();
-        self.proof.take();
+        self.proof.clear();
         let mut outcome = self.portfolio.observe(problem, point, limits, observer)?;
-        if let (Some(proof), false) = (self.proof.take(), outcome.status == Status::Solved) {
-            outcome.status = Status::Infeasible(proof);
-        }
+        self.proof.settle(&mut outcome);
         if matches!(outcome.status, Status::Stalled(_)) {
             let _scope = limits.budget(begun).enter();
             if is_empty(problem) {

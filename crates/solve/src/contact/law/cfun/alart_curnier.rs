@@ -16,7 +16,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Linearisation, NewtonFunction, OneContact, Radii};
+use super::{ContactFunction, Linearisation, NewtonFunction, OneContact, Piece, Radii};
 use crate::contact::law::DiskLaw;
 use crate::core::register::Named;
 use crate::core::settings::Settings;
@@ -91,17 +91,6 @@ impl<L: DiskLaw<D>, const D: usize> ContactFunction<D, L> for JeanMoreau {
     }
 }
 
-/// The piece of the friction law on which the tangential part is smooth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Piece {
-    /// `‖x_T‖ ≤ R`.
-    Stick,
-    /// `‖x_T‖ > R > 0`.
-    Slip,
-    /// `R = 0`.
-    Open,
-}
-
 /// Evaluates the function and one element of its B-subdifferential.
 pub fn alart_curnier<L: DiskLaw<D>, const D: usize>(
     disk: Disk,
@@ -110,15 +99,7 @@ pub fn alart_curnier<L: DiskLaw<D>, const D: usize>(
     law: L,
     rho: Radii,
 ) -> Linearisation<D> {
-    let mut out = Linearisation::zero();
-    let x_n = r[0] - rho.normal * u[0];
-    if x_n > 0.0 {
-        out.phi[0] = rho.normal * u[0];
-        out.a[0][0] = rho.normal;
-    } else {
-        out.phi[0] = r[0];
-        out.b[0][0] = 1.0;
-    }
+    let (mut out, x_n) = Linearisation::with_normal_part(u, r, &rho);
     let pressure = match disk {
         Disk::AlartCurnier => x_n,
         Disk::JeanMoreau => r[0],
@@ -131,14 +112,7 @@ pub fn alart_curnier<L: DiskLaw<D>, const D: usize>(
         }
         let size = x[L::rows(which)].iter().map(|v| v * v).sum::<f64>().sqrt();
         let radius = mu * pressure.max(0.0);
-        let piece = if radius <= 0.0 {
-            Piece::Open
-        } else if size <= radius {
-            Piece::Stick
-        } else {
-            Piece::Slip
-        };
-        match piece {
+        match Piece::of(size, radius) {
             Piece::Stick => {
                 for k in L::rows(which) {
                     out.phi[k] = rho_t * u[k];

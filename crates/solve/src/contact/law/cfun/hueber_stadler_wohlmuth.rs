@@ -17,7 +17,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Linearisation, NewtonFunction, OneContact};
+use super::{ContactFunction, Linearisation, NewtonFunction, OneContact, Piece};
 use crate::contact::law::cone::tangential_norm;
 use crate::core::register::Named;
 use crate::core::settings::Settings;
@@ -43,13 +43,6 @@ pub struct HueberStadlerWohlmuth {
     pub slip: SlipBlock,
 }
 
-/// The pieces of the tangential part.
-enum Piece {
-    Stick,
-    Slip,
-    Open,
-}
-
 impl Settings for HueberStadlerWohlmuth {}
 
 impl NewtonFunction for HueberStadlerWohlmuth {
@@ -64,28 +57,13 @@ impl NewtonFunction for HueberStadlerWohlmuth {
 impl<const D: usize> ContactFunction<D> for HueberStadlerWohlmuth {
     fn linearise(&self, contact: &OneContact, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
         let (mu, rho) = (contact.law.mu, contact.rho);
-        let mut out = Linearisation::zero();
-        let x_n = r[0] - rho.normal * u[0];
-        if x_n > 0.0 {
-            out.phi[0] = rho.normal * u[0];
-            out.a[0][0] = rho.normal;
-        } else {
-            out.phi[0] = r[0];
-            out.b[0][0] = 1.0;
-        }
+        let (mut out, x_n) = Linearisation::with_normal_part(u, r, &rho);
         let mut x = *r;
         for k in 1..D {
             x[k] -= rho.tangential * u[k];
         }
         let (size, radius) = (tangential_norm(&x), mu * x_n.max(0.0));
-        let piece = if radius <= 0.0 {
-            Piece::Open
-        } else if size <= radius {
-            Piece::Stick
-        } else {
-            Piece::Slip
-        };
-        match piece {
+        match Piece::of(size, radius) {
             Piece::Open => out.set_no_friction(r),
             Piece::Stick => {
                 // d(R ρ u_T)/R = ρ du_T + (ρ u_T/R) dR, dR = mu (dr_N − ρ_N du_N).

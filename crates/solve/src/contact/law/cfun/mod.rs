@@ -99,6 +99,21 @@ impl<const D: usize> Linearisation<D> {
         Self { phi: [0.0; D], a: [[0.0; D]; D], b: [[0.0; D]; D] }
     }
 
+    /// `Φ_N = r_N − max(0, x_N)` with its derivatives and nothing else, and `x_N = r_N − ρ_N u_N`.
+    #[inline(always)]
+    fn with_normal_part(u: &[f64; D], r: &[f64; D], rho: &Radii) -> (Self, f64) {
+        let mut out = Self::zero();
+        let x_n = r[0] - rho.normal * u[0];
+        if x_n > 0.0 {
+            out.phi[0] = rho.normal * u[0];
+            out.a[0][0] = rho.normal;
+        } else {
+            out.phi[0] = r[0];
+            out.b[0][0] = 1.0;
+        }
+        (out, x_n)
+    }
+
     /// `Φ_T = r_T` in place of what is there: the tangential part without friction.
     fn set_no_friction(&mut self, r: &[f64; D]) {
         for k in 1..D {
@@ -106,6 +121,31 @@ impl<const D: usize> Linearisation<D> {
             self.a[k] = [0.0; D];
             self.b[k] = [0.0; D];
             self.b[k][k] = 1.0;
+        }
+    }
+}
+
+/// The piece of the friction law, with a disk of radius R, on which the tangential part is smooth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Piece {
+    /// `‖x_T‖ ≤ R`, `R > 0`.
+    Stick,
+    /// `‖x_T‖ > R > 0`.
+    Slip,
+    /// `R = 0`.
+    Open,
+}
+
+impl Piece {
+    /// That of `size = ‖x_T‖`.
+    #[inline(always)]
+    fn of(size: f64, radius: f64) -> Self {
+        if radius <= 0.0 {
+            Self::Open
+        } else if size <= radius {
+            Self::Stick
+        } else {
+            Self::Slip
         }
     }
 }

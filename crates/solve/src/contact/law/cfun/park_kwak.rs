@@ -23,7 +23,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{ContactFunction, Linearisation, NewtonFunction, OneContact};
+use super::{ContactFunction, Linearisation, NewtonFunction, OneContact, Piece};
 use crate::contact::law::cone::tangential_norm;
 use crate::core::register::Named;
 use crate::core::settings::Settings;
@@ -34,17 +34,6 @@ use crate::core::settings::Settings;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct ParkKwak {}
-
-/// The pieces of the tangential part.
-#[derive(Clone, Copy)]
-enum Piece {
-    /// `‖x_T‖ ≤ R`, `R > 0`.
-    Stick,
-    /// `‖x_T‖ > R > 0`.
-    Slip,
-    /// `R = 0`.
-    Open,
-}
 
 impl Settings for ParkKwak {}
 
@@ -60,28 +49,14 @@ impl NewtonFunction for ParkKwak {
 impl<const D: usize> ContactFunction<D> for ParkKwak {
     fn linearise(&self, contact: &OneContact, u: &[f64; D], r: &[f64; D]) -> Linearisation<D> {
         let (mu, rho) = (contact.law.mu, contact.rho);
-        let mut out = Linearisation::zero();
-        let x_n = r[0] - rho.normal * u[0];
-        if x_n > 0.0 {
-            out.phi[0] = rho.normal * u[0];
-            out.a[0][0] = rho.normal;
-        } else {
-            out.phi[0] = r[0];
-            out.b[0][0] = 1.0;
-        }
+        let (mut out, x_n) = Linearisation::with_normal_part(u, r, &rho);
         let mut x = *r;
         for k in 1..D {
             x[k] -= rho.tangential * u[k];
         }
         let size = tangential_norm(&x);
         let radius = mu * x_n.max(0.0);
-        let piece = if radius <= 0.0 {
-            Piece::Open
-        } else if size <= radius {
-            Piece::Stick
-        } else {
-            Piece::Slip
-        };
+        let piece = Piece::of(size, radius);
         if mu <= 0.0 {
             out.set_no_friction(r);
             return out;
@@ -126,10 +101,8 @@ impl<const D: usize> ContactFunction<D> for ParkKwak {
             out.b[D - 1][1..D].copy_from_slice(&s[1..D]);
             if size > 0.0 {
                 // The frame turns by dθ = s·dx/‖x_T‖: dt = s dθ, ds = −t dθ.
-                let turn_t = match piece {
-                    // d(ρ u·t) = ρ t·du + ρ u·s dθ;  d(r·t) = t·dr + r·s dθ; and ρ u·s = r·s.
-                    Piece::Stick | Piece::Slip | Piece::Open => out.phi[D - 1] / size,
-                };
+                // d(ρ u·t) = ρ t·du + ρ u·s dθ;  d(r·t) = t·dr + r·s dθ; and ρ u·s = r·s.
+                let turn_t = out.phi[D - 1] / size;
                 let turn_s = -along_r / size;
                 for k in 1..D {
                     out.a[1][k] -= rho.tangential * turn_t * s[k];
