@@ -28,6 +28,7 @@
 
 mod controller;
 mod proximal_newton;
+mod rest;
 
 use nonsmooth_linalg::budget;
 use nonsmooth_problem::check::{Existence, Kinematic};
@@ -42,6 +43,7 @@ use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{Limits, SolveError, Solver, Step};
 use controller::{Controller, Verdict};
+use rest::Rest;
 
 /// The hyperparameters of `auto`; none needs to be set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -82,6 +84,8 @@ const SWEEPS_A_STEP: usize = 10;
 const NEWTON: f64 = 10.0;
 /// Sweeps may cost this many times as much as they were compared with, before their promise is no longer believed.
 const BELIEF: f64 = 3.0;
+/// The search for rest has this many iterations at least.
+const REST_FIRST: usize = 3;
 /// The interior point ends after this many iterations, or below this error, or after so many iterations that did not halve the
 /// error, or so many short steps in a row.
 const INTERIOR: usize = 60;
@@ -108,6 +112,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     /// The problem has rows with bounds.
     bounded: bool,
     sweep: Sweep<P::Law, D>,
+    rest: Option<Box<Rest<D>>>,
     central: Option<Box<Central<P::Law, D>>>,
     newton: Option<Box<ProximalNewton<P::Law, D>>>,
     controller: Controller,
@@ -132,6 +137,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
     Sweeps { last: f64, claims: usize },
+    Rest { last: f64, spent: usize },
     Interior { idle: usize, short: usize, least: f64 },
     Newton,
     Between { left: usize },
@@ -154,6 +160,7 @@ enum Start {
 struct Done {
     start: Start,
     sweeps: usize,
+    rest: usize,
     interior: usize,
     interior_error: f64,
     subproblems: usize,
@@ -174,6 +181,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         Ok(HybridWork {
             bounded,
             sweep: Sweep::new(problem, &state),
+            rest: None,
             central: None,
             newton: None,
             controller: Controller::default(),
@@ -233,6 +241,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         work.exact = None;
         match work.stage {
             Stage::Sweeps { last, claims } => self.sweep(problem, point, work, last, claims),
+            Stage::Rest { last, spent } => self.rest(problem, point, work, last, spent),
             Stage::Interior { .. } => self.interior(problem, point, work),
             Stage::Newton => self.newton(problem, point, work),
             Stage::Between { left } => self.between(problem, point, work, left),
@@ -248,7 +257,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
     }
 
     fn account(&self, work: &Self::Work) -> Vec<String> {
-        let Done { start, sweeps, interior, interior_error, .. } = work.done;
+        let Done { start, sweeps, rest, interior, interior_error, .. } = work.done;
         let Done { subproblems, failed, newton, between, .. } = work.done;
         let mut lines = vec![];
         match start {
@@ -259,6 +268,9 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             }
         }
         lines.push(format!("{sweeps} Gauss-Seidel sweeps"));
+        if rest > 0 {
+            lines.push(format!("{rest} iterations of the search for rest"));
+        }
         if interior > 0 {
             lines.push(format!(
                 "{interior} interior-point iterations on the exact law, to {interior_error:.1e}"
@@ -387,11 +399,68 @@ impl<const D: usize> OnContacts<Auto, D> {
         if work.passed_by || !self.0.interior {
             self.subproblem(point, work, error);
         } else {
-            begin_interior(problem, work);
+            self.begin_rest(problem, point, work);
         }
     }
 
-    /// Stage 2: one iteration of the interior point; at its end the better of its best iterate and the swept point goes on.
+    /// Begins stage 2.
+    fn begin_rest<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        _point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) {
+        let HybridWork { rest, state, stage, .. } = work;
+        match rest.get_or_insert_default().begin(problem, state) {
+            Ok(()) => *stage = Stage::Rest { last: f64::INFINITY, spent: 0 },
+            Err(_) => begin_interior(problem, work),
+        }
+    }
+
+    /// Stage 2: one iteration of the search for rest, for as long as its rate promises the tolerance for less than Newton's method would cost.
+    fn rest<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        last: f64,
+        spent: usize,
+    ) -> Step {
+        let HybridWork { rest, state, newton, controller, costs, done, tolerance, .. } = work;
+        let (Some(rest), Some(newton)) = (rest, newton) else {
+            return Step::Stuck("auto has lost its place".into());
+        };
+        let estimate = rest.iterate(problem, state);
+        if std::env::var("REST").is_ok() { eprintln!("rest {spent} {estimate:e}"); }
+        done.rest += 1;
+        if estimate <= 0.3 * *tolerance && spent < 100 {
+            let r = P::impulses(point);
+            r.copy_from_slice(rest.impulses());
+            work.stage = Stage::Rest { last: estimate, spent: spent + 1 };
+            return Step::Continue { estimate };
+        }
+        let costs = *costs.get_or_insert_with(|| problem.costs(state));
+        let left = (*tolerance / estimate).ln() / (estimate / last).ln();
+        let newtons = NEWTON * costs.factorisation;
+        let promising = spent < REST_FIRST
+            || estimate < last
+                && left * costs.solve < newtons
+                && spent as f64 * costs.solve < BELIEF * newtons;
+        if promising {
+            work.stage = Stage::Rest { last: estimate, spent: spent + 1 };
+            return Step::Continue { estimate };
+        }
+        let r = P::impulses(point);
+        let error = newton.look(problem, state, rest.impulses());
+        if std::env::var("REST").is_ok() { eprintln!("rest offers {error:e}"); }
+        if controller.offer(error) {
+            r.copy_from_slice(rest.impulses());
+        }
+        begin_interior(problem, work);
+        Step::Continue { estimate: error }
+    }
+
+    /// Stage 3: one iteration of the interior point; at its end the better of its best iterate and the swept point goes on.
     fn interior<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,

@@ -55,8 +55,8 @@ pub(super) trait Form<const D: usize> {
     fn factorise(&mut self, p: &[Block<D>], q: &[Block<D>]) -> Result<(), Singular>;
     /// `b ← (Q + P W)⁻¹ b`.
     fn solve(&mut self, p: &[Block<D>], b: &mut [f64]);
-    /// What `factorise` costs, in nanoseconds or so: assembly and elimination.
-    fn cost(&self) -> f64;
+    /// What `factorise` costs, in nanoseconds or so: assembly and elimination; and what `solve` costs, once refined.
+    fn costs(&self) -> [f64; 2];
 }
 
 impl<F, const D: usize> System<F, D> {
@@ -217,8 +217,9 @@ impl<const D: usize> Form<D> for ContactForm<D> {
         self.lu.solve(b);
     }
 
-    fn cost(&self) -> f64 {
-        self.lu.flops() / 3.0 + 20.0 * self.blocks.len() as f64
+    fn costs(&self) -> [f64; 2] {
+        let (blocks, entries) = (self.blocks.len() as f64, self.lu.factor_len() as f64);
+        [self.lu.flops() / 3.0 + 20.0 * blocks, 2.0 * entries + 10.0 * blocks]
     }
 }
 
@@ -227,24 +228,96 @@ pub(super) struct BodyForm<const D: usize> {
     lu: BlockLu,
     /// M by blocks.
     mass: Vec<(Slot, Vec<f64>)>,
-    contacts: Vec<Touch<D>>,
+    touches: Touches<D>,
+    /// Places of the products of each pair of parts of a contact, row by row, contact after contact.
+    slots: Vec<Slot>,
     /// `Q⁻¹` of the contacts.
     q_inverse: Vec<Block<D>>,
     y: Vec<f64>,
     scratch: Vec<f64>,
 }
 
-/// The bodies that a contact touches, with its rows of H there.
-struct Touch<const D: usize> {
-    /// Node, first position, rows of H.
-    parts: Vec<(usize, Vec<[f64; D]>)>,
-    /// Places of the products of each pair of parts, row by row.
-    slots: Vec<Slot>,
+/// The rows of H by contact and body, one after the other.
+struct Touches<const D: usize> {
+    /// The parts of contact c: `parts[first[c]..first[c + 1]]`.
+    first: Vec<usize>,
+    parts: Vec<Part>,
+    /// Of each part, the entries of H of each of its unknowns.
+    rows: Vec<[f64; D]>,
+}
+
+/// A body that a contact touches.
+#[derive(Clone, Copy)]
+struct Part {
+    node: u32,
+    /// How many unknowns the node has.
+    size: u32,
+    /// The first of them, of the factor's unknowns.
+    start: usize,
+    /// Its first row of H.
+    rows: usize,
+}
+
+impl Part {
+    /// Its rows of H.
+    #[inline(always)]
+    fn of<'a, const D: usize>(&self, rows: &'a [[f64; D]]) -> &'a [[f64; D]] {
+        &rows[self.rows..self.rows + self.size as usize]
+    }
+}
+
+impl<const D: usize> Touches<D> {
+    fn contacts(&self) -> usize {
+        self.first.len() - 1
+    }
+
+    /// The parts of contact c.
+    #[inline(always)]
+    fn of(&self, c: usize) -> &[Part] {
+        &self.parts[self.first[c]..self.first[c + 1]]
+    }
+
+    fn new(h: &Csc, nodes: &Nodes) -> Self {
+        let contacts = h.ncols() / D;
+        let mut out = Self { first: vec![0], parts: vec![], rows: vec![] };
+        let mut list: Vec<u32> = vec![];
+        for c in 0..contacts {
+            let entries = |k: usize| {
+                let (rows, values) = h.column(D * c + k);
+                rows.iter().zip(values).filter(|e| *e.1 != 0.0)
+            };
+            list.clear();
+            list.extend((0..D).flat_map(|k| entries(k).map(|(&i, _)| nodes.of[i])));
+            list.sort_unstable();
+            list.dedup();
+            let begin = out.parts.len();
+            for &node in &list {
+                let (size, start) = (nodes.sizes[node as usize], nodes.start[node as usize]);
+                out.parts.push(Part { node, size: size as u32, start, rows: out.rows.len() });
+                out.rows.resize(out.rows.len() + size, [0.0; D]);
+            }
+            for k in 0..D {
+                for (&i, &value) in entries(k) {
+                    let part = list.binary_search(&nodes.of[i]).expect("listed");
+                    out.rows[out.parts[begin + part].rows + nodes.within[i]][k] = value;
+                }
+            }
+            out.first.push(out.parts.len());
+        }
+        out
+    }
+
+    /// The pairs of nodes that a contact couples, each node with itself too.
+    fn pairs(&self) -> impl Iterator<Item = (u32, u32)> + Clone {
+        (0..self.contacts()).flat_map(|c| {
+            let parts = self.of(c);
+            parts.iter().flat_map(move |a| parts.iter().map(move |b| (a.node, b.node)))
+        })
+    }
 }
 
 impl<const D: usize> BodyForm<D> {
-    /// `matrix` is M, or M bordered by bilateral constraints (its rows after those of H). Nodes are the connected components of
-    /// M; a multiplier belongs to the first component that it acts on.
+    /// `matrix` is M, or M bordered by bilateral constraints (its rows after those of H).
     pub(super) fn new(matrix: &Csc, h: &Csc) -> Result<Self, TooLarge> {
         Self::after(None, matrix, h)
     }
@@ -252,69 +325,32 @@ impl<const D: usize> BodyForm<D> {
     /// As [`new`](Self::new), with the analysis of an earlier form where that serves: the bodies are the same, and no two of them touch that
     /// did not touch before.
     pub(super) fn after(earlier: Option<Self>, matrix: &Csc, h: &Csc) -> Result<Self, TooLarge> {
-        let n = h.nrows();
-        let node_of = nodes(matrix, n);
-        let count = node_of.iter().max().map_or(0, |m| m + 1);
-        let mut members = vec![Vec::new(); count];
-        node_of.iter().enumerate().for_each(|(i, &k)| members[k].push(i));
-        let sizes: Vec<usize> = members.iter().map(Vec::len).collect();
-        // Each unknown's place in its node, each node's first place among all.
-        let (mut within, mut start) = (vec![0; node_of.len()], vec![0; count]);
-        let mut next = 0;
-        for (k, members) in members.iter().enumerate() {
-            start[k] = next;
-            members.iter().enumerate().for_each(|(l, &i)| within[i] = l);
-            next += members.len();
-        }
-        // The rows of H by contact and node.
-        let mut contacts: Vec<Touch<D>> = Vec::with_capacity(h.ncols() / D);
-        let mut touched: Vec<Vec<usize>> = Vec::with_capacity(h.ncols() / D);
-        for c in 0..h.ncols() / D {
-            let entries = |k: usize| {
-                let (rows, values) = h.column(D * c + k);
-                rows.iter().zip(values).filter(|e| *e.1 != 0.0)
-            };
-            let mut list: Vec<usize> =
-                (0..D).flat_map(|k| entries(k).map(|(&i, _)| node_of[i])).collect();
-            list.sort_unstable();
-            list.dedup();
-            let mut parts: Vec<_> =
-                list.iter().map(|&k| (start[k], vec![[0.0; D]; sizes[k]])).collect();
-            for k in 0..D {
-                for (&i, &value) in entries(k) {
-                    let part = list.binary_search(&node_of[i]).expect("listed");
-                    parts[part].1[within[i]][k] = value;
-                }
+        let nodes = Nodes::new::<D>(matrix, h);
+        let touches = Touches::new(h, &nodes);
+        let lu = {
+            let couplings = matrix.triplets().map(|(i, j, _)| (nodes.of[i], nodes.of[j]));
+            let edges = couplings.chain(touches.pairs()).filter(|(i, j)| i != j);
+            match earlier {
+                Some(Self { lu, .. }) if lu.serves(&nodes.sizes, edges.clone()) => lu,
+                _ => BlockLu::new(&nodes.sizes, edges)?,
             }
-            contacts.push(Touch { parts, slots: vec![] });
-            touched.push(list);
-        }
-        let couplings = matrix.triplets().map(|(i, j, _)| (node_of[i] as u32, node_of[j] as u32));
-        let by_contact = touched.iter().flat_map(|list| {
-            list.iter().flat_map(move |&a| list.iter().map(move |&b| (a as u32, b as u32)))
-        });
-        let edges = couplings.chain(by_contact).filter(|(i, j)| i != j);
-        let lu = match earlier {
-            Some(Self { lu, .. }) if lu.serves(&sizes, edges.clone()) => lu,
-            _ => BlockLu::new(&sizes, edges)?,
         };
-        for (touch, list) in contacts.iter_mut().zip(&touched) {
-            let pairs = list.iter().flat_map(|&a| list.iter().map(move |&b| (a, b)));
-            touch.slots = pairs.map(|(a, b)| lu.slot(a, b)).collect();
-        }
+        let slots = touches.pairs().map(|(a, b)| lu.slot(a as usize, b as usize)).collect();
         // M by blocks.
         let mut blocks = std::collections::BTreeMap::new();
         for (i, j, value) in matrix.triplets() {
-            let (a, b) = (node_of[i], node_of[j]);
-            let block = blocks.entry((a, b)).or_insert_with(|| vec![0.0; sizes[a] * sizes[b]]);
-            block[within[i] * sizes[b] + within[j]] += value;
+            let (a, b) = (nodes.of[i] as usize, nodes.of[j] as usize);
+            let width = nodes.sizes[b];
+            let block = blocks.entry((a, b)).or_insert_with(|| vec![0.0; nodes.sizes[a] * width]);
+            block[nodes.within[i] * width + nodes.within[j]] += value;
         }
         let mass = blocks.into_iter().map(|((a, b), v)| (lu.slot(a, b), v)).collect();
-        let largest = sizes.iter().max().copied().unwrap_or(0);
+        let largest = nodes.sizes.iter().max().copied().unwrap_or(0);
         Ok(Self {
             mass,
-            q_inverse: vec![[[0.0; D]; D]; contacts.len()],
-            contacts,
+            slots,
+            q_inverse: vec![[[0.0; D]; D]; touches.contacts()],
+            touches,
             y: vec![0.0; lu.dim()],
             scratch: vec![0.0; largest * largest],
             lu,
@@ -324,28 +360,31 @@ impl<const D: usize> BodyForm<D> {
 
 impl<const D: usize> Form<D> for BodyForm<D> {
     fn factorise(&mut self, p: &[Block<D>], q: &[Block<D>]) -> Result<(), Singular> {
-        let Self { lu, mass, contacts, q_inverse, scratch, .. } = self;
+        let Self { lu, mass, touches, slots, q_inverse, scratch, .. } = self;
         lu.clear();
         for (slot, block) in mass {
             lu.add_at(*slot, block);
         }
-        for (c, touch) in contacts.iter().enumerate() {
+        let mut slots = &slots[..];
+        for c in 0..touches.contacts() {
+            let parts = touches.of(c);
+            let (own, others) = slots.split_at(parts.len() * parts.len());
+            slots = others;
             q_inverse[c] = small::inverse(&q[c]).ok_or(Singular)?;
             if p[c] == [[0.0; D]; D] {
                 continue;
             }
             let weight = multiply(&q_inverse[c], &p[c]); //                Q⁻¹P
-            let mut slots = touch.slots.iter();
-            for (_, a) in &touch.parts {
-                for ((_, b), slot) in touch.parts.iter().zip(&mut slots) {
+            for (a, slots) in parts.iter().zip(own.chunks(parts.len())) {
+                let a = a.of(&touches.rows);
+                for (b, slot) in parts.iter().zip(slots) {
+                    let b = b.of(&touches.rows);
                     let block = &mut scratch[..a.len() * b.len()];
-                    for (row, a) in block.chunks_mut(b.len()).zip(a) {
-                        let left: [f64; D] = std::array::from_fn(|l| {
-                            (0..D).map(|k| a[k] * weight[k][l]).sum::<f64>()
-                        });
-                        for (out, b) in row.iter_mut().zip(b) {
-                            *out = (0..D).map(|l| left[l] * b[l]).sum();
-                        }
+                    match (a.len(), b.len()) {
+                        // Of bodies in space, and in the plane.
+                        (6, 6) => outer::<6, D>(a, &weight, b, block),
+                        (3, 3) => outer::<3, D>(a, &weight, b, block),
+                        _ => outer_of_any(a, &weight, b, block),
                     }
                     lu.add_at(*slot, block); //                            H Q⁻¹P Hᵀ
                 }
@@ -355,22 +394,22 @@ impl<const D: usize> Form<D> for BodyForm<D> {
     }
 
     fn solve(&mut self, p: &[Block<D>], b: &mut [f64]) {
-        let Self { lu, contacts, q_inverse, y, .. } = self;
+        let Self { lu, touches, q_inverse, y, .. } = self;
         y.fill(0.0);
-        for (c, touch) in contacts.iter().enumerate() {
+        for c in 0..touches.contacts() {
             let x = small::mul(&q_inverse[c], &small::block(b, c)); //     Q⁻¹ b
             b[D * c..D * c + D].copy_from_slice(&x);
-            for (start, rows) in &touch.parts {
-                for (y, h) in y[*start..].iter_mut().zip(rows) {
+            for part in touches.of(c) {
+                for (y, h) in y[part.start..].iter_mut().zip(part.of(&touches.rows)) {
                     *y += (0..D).map(|k| h[k] * x[k]).sum::<f64>(); //     H Q⁻¹ b
                 }
             }
         }
         lu.solve(y);
-        for (c, touch) in contacts.iter().enumerate() {
+        for c in 0..touches.contacts() {
             let mut u = [0.0; D];
-            for (start, rows) in &touch.parts {
-                for (y, h) in y[*start..].iter().zip(rows) {
+            for part in touches.of(c) {
+                for (y, h) in y[part.start..].iter().zip(part.of(&touches.rows)) {
                     (0..D).for_each(|k| u[k] += h[k] * y); //              Hᵀ y
                 }
             }
@@ -379,33 +418,125 @@ impl<const D: usize> Form<D> for BodyForm<D> {
         }
     }
 
-    fn cost(&self) -> f64 {
-        self.lu.flops() / 3.0 + 400.0 * self.contacts.len() as f64
+    fn costs(&self) -> [f64; 2] {
+        let (contacts, entries) = (self.touches.contacts() as f64, self.lu.factor_len() as f64);
+        [self.lu.flops() / 3.0 + 200.0 * contacts, 2.0 * entries + 200.0 * contacts]
     }
 }
 
-/// The node of each unknown of `matrix`: components of its leading n × n part; rows beyond join the first they act on.
-fn nodes(matrix: &Csc, n: usize) -> Vec<usize> {
-    let mut groups = Groups::new(n);
-    let coupled = |e: &(usize, usize, f64)| e.0 < n && e.1 < n && e.2 != 0.0;
-    matrix.triplets().filter(coupled).for_each(|(i, j, _)| groups.join(i, j));
-    let mut number = vec![usize::MAX; n];
-    let mut next = 0;
-    let mut node = Vec::with_capacity(matrix.nrows());
-    for i in 0..n {
-        let root = groups.root(i);
-        if number[root] == usize::MAX {
-            number[root] = next;
-            next += 1;
+/// `block = A weight Bᵀ` by rows, A and B of any number of rows.
+#[inline(always)]
+fn outer_of_any<const D: usize>(
+    a: &[[f64; D]],
+    weight: &Block<D>,
+    b: &[[f64; D]],
+    block: &mut [f64],
+) {
+    for (row, a) in block.chunks_exact_mut(b.len()).zip(a) {
+        let left: [f64; D] =
+            std::array::from_fn(|l| (0..D).map(|k| a[k] * weight[k][l]).sum::<f64>());
+        for (out, b) in row.iter_mut().zip(b) {
+            *out = (0..D).map(|l| left[l] * b[l]).sum();
         }
-        node.push(number[root]);
     }
-    for j in n..matrix.ncols() {
-        let (rows, values) = matrix.column(j);
-        let first = rows.iter().zip(values).find(|(i, v)| **i < n && **v != 0.0);
-        node.push(first.map_or(0, |(&i, _)| node[i]));
+}
+
+/// [`outer_of_any`] of N rows each, known when it is compiled.
+fn outer<const N: usize, const D: usize>(
+    a: &[[f64; D]],
+    weight: &Block<D>,
+    b: &[[f64; D]],
+    block: &mut [f64],
+) {
+    outer_of_any(&a[..N], weight, &b[..N], &mut block[..N * N]);
+}
+
+/// The nodes of the graph that is factorised: what M couples, and unknowns that the same contacts touch, so that the six of a rigid body
+/// whose M is diagonal are one node.
+struct Nodes {
+    /// Of each unknown: its node, and its place there.
+    of: Vec<u32>,
+    within: Vec<usize>,
+    /// Of each node: its number of unknowns, and those of the nodes before it.
+    sizes: Vec<usize>,
+    start: Vec<usize>,
+}
+
+/// Unknowns of a node that are together because of contacts; what M couples may be more.
+const MOST_JOINED: usize = 12;
+
+impl Nodes {
+    /// Rows of `matrix` beyond those of H, multipliers of constraints, join the first unknown that they act on.
+    fn new<const D: usize>(matrix: &Csc, h: &Csc) -> Self {
+        let n = h.nrows();
+        let mut groups = Groups::new(n);
+        let coupled = |e: &(usize, usize, f64)| e.0 < n && e.1 < n && e.2 != 0.0;
+        matrix.triplets().filter(coupled).for_each(|(i, j, _)| groups.join(i, j));
+        join_touched_alike::<D>(h, &mut groups);
+        let mut number = vec![u32::MAX; n];
+        let (mut of, mut sizes): (Vec<u32>, Vec<usize>) =
+            (Vec::with_capacity(matrix.nrows()), vec![]);
+        for i in 0..n {
+            let root = groups.root(i);
+            if number[root] == u32::MAX {
+                number[root] = sizes.len() as u32;
+                sizes.push(0);
+            }
+            of.push(number[root]);
+        }
+        for j in n..matrix.ncols() {
+            let (rows, values) = matrix.column(j);
+            let first = rows.iter().zip(values).find(|(i, v)| **i < n && **v != 0.0);
+            of.push(first.map_or(0, |(&i, _)| of[i]));
+        }
+        let mut within = Vec::with_capacity(of.len());
+        for &node in &of {
+            within.push(sizes[node as usize]);
+            sizes[node as usize] += 1;
+        }
+        let before = |next: &mut usize, size: &usize| {
+            let start = *next;
+            *next += size;
+            Some(start)
+        };
+        let start = sizes.iter().scan(0, before).collect();
+        Self { of, within, sizes, start }
     }
-    node
+}
+
+/// Joins unknowns that the same contacts touch.
+fn join_touched_alike<const D: usize>(h: &Csc, groups: &mut Groups) {
+    let n = h.nrows();
+    // The contacts of each unknown, in order: a counting sort of the entries of H.
+    let touching = || {
+        (0..h.ncols()).flat_map(move |j| {
+            let (rows, values) = h.column(j);
+            let there = rows.iter().zip(values).filter(|e| *e.1 != 0.0);
+            there.map(move |(&i, _)| (i, (j / D) as u32))
+        })
+    };
+    let mut end = vec![0; n + 1];
+    touching().for_each(|(i, _)| end[i + 1] += 1);
+    (0..n).for_each(|i| end[i + 1] += end[i]);
+    let (first, mut contacts) = (end.clone(), vec![0; end[n]]);
+    for (i, c) in touching() {
+        if end[i] == first[i] || contacts[end[i] - 1] != c {
+            contacts[end[i]] = c;
+            end[i] += 1;
+        }
+    }
+    let mut size = vec![0; n];
+    (0..n).for_each(|i| size[groups.root(i)] += 1);
+    let mut alike = std::collections::HashMap::new();
+    for i in (0..n).filter(|&i| end[i] > first[i]) {
+        let other = *alike.entry(&contacts[first[i]..end[i]]).or_insert(i);
+        let (a, b) = (groups.root(i), groups.root(other));
+        if a != b && size[a] + size[b] <= MOST_JOINED {
+            let together = size[a] + size[b];
+            groups.join(a, b);
+            size[groups.root(a)] = together;
+        }
+    }
 }
 
 /// `A B`.

@@ -366,9 +366,8 @@ impl<const D: usize, L: DiskLaw<D>> Linearised<D> for FrictionLocal<D, L> {
         let LocalState { eliminated, system, .. } = state;
         let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
         let system = made(system, || Ok(System::new(ContactForm::new(w)?, w.nrows())));
-        Costs {
-            sweep: 30.0 * w.nrows() as f64 + 2.0 * w.nblocks() as f64,
-            factorisation: system.map_or(NEVER, |system| system.form().cost()),
-        }
+        let [factorisation, solve] = system.map_or([NEVER; 2], |system| system.form().costs());
+        let sweep = 30.0 * w.nrows() as f64 + 2.0 * w.nblocks() as f64;
+        Costs { sweep, factorisation, solve }
     }
 }

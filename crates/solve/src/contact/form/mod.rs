@@ -167,6 +167,8 @@ pub struct Costs {
     pub sweep: f64,
     /// One [`linearise`](Linearised::linearise) and one solve.
     pub factorisation: f64,
+    /// One [`solve_linearised`](Linearised::solve_linearised) alone.
+    pub solve: f64,
 }
 
 /// Linear systems with a block-diagonal modification of W, as Newton, interior-point and proximal methods have them.
