@@ -1,16 +1,23 @@
 //! LU of block matrices with a symmetric pattern and any values: analysed once, factorised many times.
 //!
-//! `R A C = Pᵀ L U` with R, C powers of two and P exchanging rows inside fronts only. Nodes are ordered by approximate minimum
-//! degree; neighbours in the tree of elimination with (nearly) equal structure are eliminated together in dense fronts; each
-//! front takes over the remainders of its children (multifrontal method). The order never depends on values: rows are exchanged
-//! within a front's own pivots, and a pivot that vanishes against the scaled matrix is replaced, so the caller refines.
+//! `R A C = Pᵀ L U` with R, C powers of two and P exchanging rows inside fronts only. Nodes are ordered (below); neighbours in the tree of
+//! elimination with (nearly) equal structure are eliminated together in dense fronts; each front takes over the remainders of its children (multifrontal
+//! method). The order never depends on values: rows are exchanged within a front's own pivots, and a pivot that vanishes against the scaled matrix is
+//! replaced, so the caller refines.
 //!
-//! References: DuffReid1983 (fronts), Liu1992 (tree, supernodes, stack), AmestoyDavisDuff1996 (order), LiDemmel2003 (static
-//! pivots), AshcraftGrimes1989 (merging). Storage: 8 bytes an entry of L, U and A, and a stack of remainders.
+//! Two orders are known: approximate minimum degree, the best on chains, towers, walls and all that is small, and nested dissection, the best on large graphs
+//! in space: half of the operations for piles of 4000 bodies, a quarter for 30 000, less than a fifth for 100 000. Minimum degree comes first. Where its
+//! factorisation would take longer than a dissection does, by the operations that its tree of elimination says, the graph is dissected too, and
+//! the order with fewer operations taken. Counts decide and no clock, so that equal patterns are ordered alike everywhere.
+//!
+//! References: DuffReid1983 (fronts), Liu1992 (tree, supernodes, stack), AmestoyDavisDuff1996 (minimum degree), George1973, LiptonRoseTarjan1979,
+//! KarypisKumar1998, FiducciaMattheyses1982 (dissection), GilbertNgPeyton1994 (counts), LiDemmel2003 (static pivots), AshcraftGrimes1989 (merging).
+//! Storage: 8 bytes an entry of L, U and A, and a stack of remainders.
 //! Cost of a factorisation: [`BlockLu::flops`]; of a solve: one pass over L and U.
 //!
 //! Fails where elimination in a fixed order grows beyond double precision: the residual that the caller measures then says so.
 
+mod dissection;
 mod kernel;
 mod symbolic;
 
@@ -80,7 +87,10 @@ impl BlockLu {
     /// linear in the blocks of L.
     /// Errors: factors that take more memory than there is (see [`budget::admit`]).
     pub fn new(sizes: &[usize], edges: impl Iterator<Item = (u32, u32)>) -> Result<Self, TooLarge> {
-        let symbolic = Symbolic::new(sizes, edges);
+        Self::of(Symbolic::new(sizes, edges))
+    }
+
+    fn of(symbolic: Symbolic) -> Result<Self, TooLarge> {
         let s = &symbolic;
         let entries = [s.values_len, s.lower_len, s.upper_len, s.stack_len, s.triangles_len];
         budget::admit("the factorisation", 8.0 * entries.iter().map(|&n| n as f64).sum::<f64>())?;
