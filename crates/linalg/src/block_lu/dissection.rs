@@ -196,6 +196,7 @@ struct Components {
     large: usize,
 }
 
+/// By breadth-first search.
 fn components(graph: &Graph) -> Components {
     let n = graph.len();
     let (mut of, mut reached) = (vec![NONE; n], Vec::with_capacity(n));
@@ -537,6 +538,9 @@ impl<'a> Split<'a> {
     }
 
     /// Passes to either side in turn, the lighter one first, until one to each has been in vain.
+    ///
+    /// A pass to one side carries the whole separator over a hill. With moves to both sides in one pass it wavers on the spot: factorisations took 1.2 times
+    /// the operations in piles, 1.6 times in walls.
     fn refine(&mut self) {
         let lighter = u8::from(self.weights[1] < self.weights[0]);
         (self.to, self.from) = (lighter, 1 - lighter);
