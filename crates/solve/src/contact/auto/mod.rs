@@ -6,29 +6,35 @@
 //!
 //! 1. **Sweeps**: exact Gauss–Seidel for as long as its rate of convergence promises the tolerance sooner than a few
 //!    factorisations would. Many problems end here.
-//! 2. **Interior point** on the exact law ([`Central`]), a starter: some 8 to 20 iterations lead near the solution of a problem
+//! 2. **Rest** (`alternating.rs`): impulses within the cones that leave nothing moving, where the sweeps show nothing that flies apart. One factorisation and
+//!    a few solves end structures at rest, whatever their height; one solve tells whether it is one.
+//! 3. **Trial**: Newton's iterations of stage 5 without its proximal term, where the sweeps came near, for as long as each halves the error.
+//! 4. **Interior point** on the exact law ([`Central`]), a starter: some 8 to 20 iterations lead near the solution of a problem
 //!    at rest; where the central path turns back it is left again.
-//! 3. **Proximal point, semismooth Newton inside** (`proximal_newton.rs`): ε falls as fast as the subproblems are solved
+//! 5. **Proximal point, semismooth Newton inside** (`proximal_newton.rs`): ε falls as fast as the subproblems are solved
 //!    easily, and rises where they are not. It keeps full accuracy on hyperstatic problems.
-//! 4. **Sweeps between the proximal steps**, while they help: they move the impulses within the null space of W, which Newton leaves
+//! 6. **Sweeps between the proximal steps**, while they help: they move the impulses within the null space of W, which Newton leaves
 //!    where they are.
-//! 5. **Another strategy** (other ρ, more sweeps, a cold start) where the error has not halved for long; at the first time
+//! 7. **Alternating directions** (`alternating.rs`) after many proximal steps, for as long as they promise more.
+//! 8. **Another strategy** (other ρ, more sweeps, a cold start) where the error has not halved for long; at the first time
 //!    the existence of a solution is investigated, and a problem without one is given up with its certificate.
 //!
 //! A problem with scalar rows that have bounds stays with the sweeps, which visit them too: the later stages know no bounds.
 //!
-//! A starting point is taken where its residual is below that of zero impulses; near a solution it makes stage 2 needless.
+//! A starting point is taken where its residual is below that of zero impulses; near a solution it makes stages 2 to 4 needless.
 //!
 //! References: AcaryBremondHuber2018 for the evidence that proximal Newton methods solve hyperstatic problems; AlartCurnier1991; the
 //! parts' own files.
 //!
-//! Cost: a sweep is one pass over W; an iteration of 2 and 3 one factorisation of a matrix over the bodies (global) or the contacts
+//! Cost: a sweep is one pass over W; an iteration of 3 to 5 one factorisation of a matrix over the bodies (global) or the contacts
 //! (local). The choice goes by counted operations, never by the clock, so a run repeats itself bit by bit.
 //! Fails: impacts on thousands of hyperstatic contacts may need more factorisations than patience allows.
 
+mod alternating;
 mod controller;
 mod proximal_newton;
-mod rest;
+mod rate;
+mod starts;
 
 use nonsmooth_linalg::budget;
 use nonsmooth_problem::check::{Existence, Kinematic};
@@ -42,8 +48,9 @@ use crate::contact::parts::{Central, Sweep, put_within_bounds, sweep_rows};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{Limits, SolveError, Solver, Step};
+use alternating::Alternating;
 use controller::{Controller, Verdict};
-use rest::Rest;
+use rate::Rate;
 
 /// The hyperparameters of `auto`; none needs to be set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -68,7 +75,7 @@ impl Described for Auto {
         name: "auto",
         family: "auto",
         solves: Solves::Law,
-        summary: "needs no setting: sweeps, interior point, proximal semismooth Newton, each while it promises more than the next",
+        summary: "needs no setting: sweeps, a search for rest, interior point, proximal semismooth Newton, ADMM, each while it promises more than the next",
         needs: &[],
         cites: &["AcaryBremondHuber2018", "AlartCurnier1991", "Acary2018"],
         variants: &["interior=false"],
@@ -82,16 +89,6 @@ const FIRST_SWEEPS: usize = 30;
 const SWEEPS_A_STEP: usize = 10;
 /// A solve by Newton's method is taken to cost this many factorisations.
 const NEWTON: f64 = 10.0;
-/// Sweeps may cost this many times as much as they were compared with, before their promise is no longer believed.
-const BELIEF: f64 = 3.0;
-/// The search for rest has this many iterations at least.
-const REST_FIRST: usize = 3;
-/// The interior point ends after this many iterations, or below this error, or after so many iterations that did not halve the
-/// error, or so many short steps in a row.
-const INTERIOR: usize = 60;
-const INTERIOR_ERROR: f64 = 1e-8;
-const INTERIOR_IDLE: usize = 10;
-const INTERIOR_SHORT: (f64, usize) = (1e-6, 6);
 /// The interior point begins far from any point given; below this error one is better off without it.
 const NEAR: f64 = 1e-4;
 /// Above this error between two proximal steps, sweeps.
@@ -112,7 +109,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     /// The problem has rows with bounds.
     bounded: bool,
     sweep: Sweep<P::Law, D>,
-    rest: Option<Box<Rest<D>>>,
+    alternating: Option<Box<Alternating<D>>>,
     central: Option<Box<Central<P::Law, D>>>,
     newton: Option<Box<ProximalNewton<P::Law, D>>>,
     controller: Controller,
@@ -120,6 +117,8 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     scale: f64,
     tolerance: f64,
     stage: Stage,
+    /// Of the sweeps, of the alternating directions.
+    rate: Rate,
     /// The impulses of the best iterate of the present subproblem; those before the sweeps between; those of the best point.
     inner_best: Vec<f64>,
     before: Vec<f64>,
@@ -130,17 +129,21 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     asked: bool,
     /// The interior point was left out.
     passed_by: bool,
+    /// Alternating directions last began at the point, not at no impulses.
+    from_here: bool,
     done: Done,
 }
 
 /// Where the method stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
-    Sweeps { last: f64, claims: usize },
-    Rest { last: f64, spent: usize },
+    Sweeps { claims: usize },
+    Rest,
+    Trial { idle: usize, least: f64 },
     Interior { idle: usize, short: usize, least: f64 },
     Newton,
     Between { left: usize },
+    Alternating,
 }
 
 /// Where the solve began.
@@ -161,12 +164,16 @@ struct Done {
     start: Start,
     sweeps: usize,
     rest: usize,
+    trial: usize,
     interior: usize,
     interior_error: f64,
     subproblems: usize,
     failed: usize,
     newton: usize,
     between: usize,
+    /// How often, and how many iterations in all.
+    alternations: usize,
+    alternating: usize,
     strategies: usize,
 }
 
@@ -181,7 +188,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         Ok(HybridWork {
             bounded,
             sweep: Sweep::new(problem, &state),
-            rest: None,
+            alternating: None,
             central: None,
             newton: None,
             controller: Controller::default(),
@@ -189,6 +196,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             scale: problem.velocity_scale(&state),
             tolerance: 0.0,
             stage: FIRST,
+            rate: Rate::default(),
             inner_best: vec![],
             before: vec![],
             best: vec![],
@@ -196,6 +204,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             exact: None,
             asked: false,
             passed_by: false,
+            from_here: false,
             done: Done::default(),
             state,
         })
@@ -229,6 +238,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         }
         problem.enter(&mut work.state, point);
         work.stage = FIRST;
+        work.rate.begin();
         (work.existence, work.exact, work.asked) = (None, None, false);
         work.passed_by = false;
     }
@@ -240,11 +250,13 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         // The judge has seen it, and goes on asking.
         work.exact = None;
         match work.stage {
-            Stage::Sweeps { last, claims } => self.sweep(problem, point, work, last, claims),
-            Stage::Rest { last, spent } => self.rest(problem, point, work, last, spent),
+            Stage::Sweeps { claims } => self.sweep(problem, point, work, claims),
+            Stage::Rest => self.rest(problem, point, work),
+            Stage::Trial { idle, least } => self.trial(problem, point, work, idle, least),
             Stage::Interior { .. } => self.interior(problem, point, work),
             Stage::Newton => self.newton(problem, point, work),
             Stage::Between { left } => self.between(problem, point, work, left),
+            Stage::Alternating => self.alternate(problem, point, work),
         }
     }
 
@@ -257,8 +269,8 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
     }
 
     fn account(&self, work: &Self::Work) -> Vec<String> {
-        let Done { start, sweeps, rest, interior, interior_error, .. } = work.done;
-        let Done { subproblems, failed, newton, between, .. } = work.done;
+        let Done { start, sweeps, rest, trial, interior, interior_error, .. } = work.done;
+        let Done { subproblems, failed, newton, between, alternating, .. } = work.done;
         let mut lines = vec![];
         match start {
             Start::Zero => {}
@@ -270,6 +282,9 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         lines.push(format!("{sweeps} Gauss-Seidel sweeps"));
         if rest > 0 {
             lines.push(format!("{rest} iterations of the search for rest"));
+        }
+        if trial > 0 {
+            lines.push(format!("{trial} Newton iterations on trial"));
         }
         if interior > 0 {
             lines.push(format!(
@@ -283,6 +298,9 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
                  {epsilon:.0e}) in {newton} Newton iterations, {between} sweeps between them"
             ));
         }
+        if alternating > 0 {
+            lines.push(format!("{alternating} iterations of alternating directions"));
+        }
         if work.done.strategies > 0 {
             lines.push(format!("{} changes of strategy", work.done.strategies));
         }
@@ -293,7 +311,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
     }
 }
 
-const FIRST: Stage = Stage::Sweeps { last: f64::NAN, claims: 0 };
+const FIRST: Stage = Stage::Sweeps { claims: 0 };
 
 impl<const D: usize> OnContacts<Auto, D> {
     /// Puts zero in place of impulses that solve the problem no better than zero does: a bad guess must not cost anything.
@@ -322,13 +340,12 @@ impl<const D: usize> OnContacts<Auto, D> {
         }
     }
 
-    /// Stage 1. `last`: the estimate of the step before; `claims`: how often the sweeps thought that they had arrived.
+    /// Stage 1. `claims`: how often the sweeps thought that they had arrived.
     fn sweep<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
-        last: f64,
         claims: usize,
     ) -> Step {
         let mut estimate = f64::NAN;
@@ -342,11 +359,11 @@ impl<const D: usize> OnContacts<Auto, D> {
             }
             estimate = moves.sqrt() / work.scale;
             if estimate <= 0.3 * work.tolerance && claims < SWEEPS_A_STEP {
-                work.stage = Stage::Sweeps { last, claims: claims + 1 };
+                work.stage = Stage::Sweeps { claims: claims + 1 };
                 return Step::Continue { estimate };
             }
         }
-        work.stage = Stage::Sweeps { last: estimate, claims };
+        work.rate.note(estimate);
         if work.bounded {
             return match estimate.is_finite() || budget::over() {
                 true => Step::Continue { estimate },
@@ -364,12 +381,11 @@ impl<const D: usize> OnContacts<Auto, D> {
             return Step::Continue { estimate };
         }
         let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
-        let rate = (estimate / last).powf(1.0 / SWEEPS_A_STEP as f64);
-        let left = (work.tolerance / estimate).ln() / rate.ln();
         let newton = NEWTON * costs.factorisation;
-        let promising = rate < 1.0
-            && left * costs.sweep < newton
-            && work.done.sweeps as f64 * costs.sweep < BELIEF * newton;
+        let cost = SWEEPS_A_STEP as f64 * costs.sweep;
+        // Sweeps that cost less than one factorisation so far have time to find their pace.
+        let promising = work.done.sweeps as f64 * costs.sweep < costs.factorisation
+            || work.rate.promises(work.tolerance, cost, newton);
         if !promising {
             self.leave_sweeps(problem, point, work);
         }
@@ -399,102 +415,8 @@ impl<const D: usize> OnContacts<Auto, D> {
         if work.passed_by || !self.0.interior {
             self.subproblem(point, work, error);
         } else {
-            self.begin_rest(problem, point, work);
+            self.begin_starts(problem, point, work, error);
         }
-    }
-
-    /// Begins stage 2.
-    fn begin_rest<P: Linearised<D> + Disked<D> + Kinematic<D>>(
-        &self,
-        problem: &P,
-        _point: &mut P::Point,
-        work: &mut HybridWork<P, D>,
-    ) {
-        let HybridWork { rest, state, stage, .. } = work;
-        match rest.get_or_insert_default().begin(problem, state) {
-            Ok(()) => *stage = Stage::Rest { last: f64::INFINITY, spent: 0 },
-            Err(_) => begin_interior(problem, work),
-        }
-    }
-
-    /// Stage 2: one iteration of the search for rest, for as long as its rate promises the tolerance for less than Newton's method would cost.
-    fn rest<P: Linearised<D> + Disked<D> + Kinematic<D>>(
-        &self,
-        problem: &P,
-        point: &mut P::Point,
-        work: &mut HybridWork<P, D>,
-        last: f64,
-        spent: usize,
-    ) -> Step {
-        let HybridWork { rest, state, newton, controller, costs, done, tolerance, .. } = work;
-        let (Some(rest), Some(newton)) = (rest, newton) else {
-            return Step::Stuck("auto has lost its place".into());
-        };
-        let estimate = rest.iterate(problem, state);
-        if std::env::var("REST").is_ok() { eprintln!("rest {spent} {estimate:e}"); }
-        done.rest += 1;
-        if estimate <= 0.3 * *tolerance && spent < 100 {
-            let r = P::impulses(point);
-            r.copy_from_slice(rest.impulses());
-            work.stage = Stage::Rest { last: estimate, spent: spent + 1 };
-            return Step::Continue { estimate };
-        }
-        let costs = *costs.get_or_insert_with(|| problem.costs(state));
-        let left = (*tolerance / estimate).ln() / (estimate / last).ln();
-        let newtons = NEWTON * costs.factorisation;
-        let promising = spent < REST_FIRST
-            || estimate < last
-                && left * costs.solve < newtons
-                && spent as f64 * costs.solve < BELIEF * newtons;
-        if promising {
-            work.stage = Stage::Rest { last: estimate, spent: spent + 1 };
-            return Step::Continue { estimate };
-        }
-        let r = P::impulses(point);
-        let error = newton.look(problem, state, rest.impulses());
-        if std::env::var("REST").is_ok() { eprintln!("rest offers {error:e}"); }
-        if controller.offer(error) {
-            r.copy_from_slice(rest.impulses());
-        }
-        begin_interior(problem, work);
-        Step::Continue { estimate: error }
-    }
-
-    /// Stage 3: one iteration of the interior point; at its end the better of its best iterate and the swept point goes on.
-    fn interior<P: Linearised<D> + Disked<D> + Kinematic<D>>(
-        &self,
-        problem: &P,
-        point: &mut P::Point,
-        work: &mut HybridWork<P, D>,
-    ) -> Step {
-        let HybridWork { central, state, stage, done, tolerance, controller, .. } = work;
-        let (Some(central), Stage::Interior { idle, short, least }) = (central, stage) else {
-            return Step::Stuck("auto has lost its place".into());
-        };
-        let ended = match central.iterate(problem, state) {
-            Err(_) => true,
-            Ok(now) => {
-                done.interior += 1;
-                *idle += 1;
-                if now.error < 0.5 * *least {
-                    (*idle, *least) = (0, now.error);
-                }
-                *short = if now.alpha < INTERIOR_SHORT.0 { *short + 1 } else { 0 };
-                now.error <= tolerance.max(INTERIOR_ERROR)
-                    || *idle >= INTERIOR_IDLE
-                    || *short >= INTERIOR_SHORT.1
-                    || done.interior >= INTERIOR
-            }
-        };
-        let (r, error) = central.best();
-        done.interior_error = error;
-        if ended {
-            if controller.offer(error) {
-                P::impulses(point).copy_from_slice(r);
-            }
-            self.subproblem_here(problem, point, work);
-        }
-        Step::Continue { estimate: error }
     }
 
     /// Begins a proximal subproblem about the present impulses, from which their velocities have yet to be computed.
@@ -529,7 +451,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         work.stage = Stage::Newton;
     }
 
-    /// Stage 3: one Newton iteration; at the end of the subproblem what comes next.
+    /// Stage 5: one Newton iteration; at the end of the subproblem what comes next.
     fn newton<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
@@ -565,7 +487,10 @@ impl<const D: usize> OnContacts<Auto, D> {
         if controller.end(verdict, error) {
             best.copy_from_slice(r);
         }
-        if controller.is_stuck() {
+        if self.alternation_is_due(work) {
+            return self.begin_alternating(problem, point, work, error);
+        }
+        if work.controller.is_stuck() {
             return self.other_strategy(problem, point, work);
         }
         if !work.asked && work.done.newton >= EARLY && problem.unknowns() <= TINY {
@@ -599,7 +524,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         Step::Continue { estimate: error }
     }
 
-    /// Stage 4: sweeps on the problem itself; taken back where they spoil more than they mend.
+    /// Stage 6: sweeps on the problem itself; taken back where they spoil more than they mend.
     fn between<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
@@ -660,7 +585,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         }
     }
 
-    /// Stage 5. The first time it is asked whether there is a solution at all.
+    /// Stage 8. The first time it is asked whether there is a solution at all.
     fn other_strategy<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
@@ -699,7 +624,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             r.copy_from_slice(&work.best);
         }
         if std::mem::take(&mut work.passed_by) {
-            begin_interior(problem, work);
+            starts::begin_interior(problem, work);
         } else if cold {
             // Some problems want nothing but sweeps, tens of thousands: as many as the strategy before took time for.
             problem.enter(&mut work.state, point);
@@ -712,16 +637,6 @@ impl<const D: usize> OnContacts<Auto, D> {
         }
         Step::Continue { estimate: f64::NAN }
     }
-}
-
-/// Begins stage 2.
-fn begin_interior<P: Linearised<D> + Disked<D>, const D: usize>(
-    problem: &P,
-    work: &mut HybridWork<P, D>,
-) {
-    let HybridWork { central, state, stage, .. } = work;
-    let now = central.get_or_insert_default().begin(problem, state, 0.0, None);
-    *stage = Stage::Interior { idle: 0, short: 0, least: now.error };
 }
 
 #[cfg(test)]

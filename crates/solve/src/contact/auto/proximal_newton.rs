@@ -202,6 +202,13 @@ impl<L: DiskLaw<D>, const D: usize> ProximalNewton<L, D> {
         self.natural(&self.u, r, 0.0)
     }
 
+    /// How fast contacts without impulse open at r, relative to ‖q‖.
+    pub fn opening(&self, r: &[f64]) -> f64 {
+        let contacts = r.chunks(D).zip(self.u.chunks(D));
+        let opening = contacts.filter(|(r, u)| r[0] == 0.0 && u[0] > 0.0);
+        opening.map(|(_, u)| u[0] * u[0]).sum::<f64>().sqrt() / self.scale
+    }
+
     /// The relative natural residual with ε: `‖( w r − P_K(w r − ũ_ε) )_c‖ / ‖q‖`, `w = w_c + ε E`.
     fn natural(&self, u: &[f64], r: &[f64], epsilon: f64) -> f64 {
         let mut sum = 0.0;

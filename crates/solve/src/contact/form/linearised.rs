@@ -620,6 +620,27 @@ mod tests {
     }
 
     #[test]
+    fn unknowns_that_the_same_contacts_touch_are_one_node() {
+        // Two bodies of six with a diagonal M, on the ground and on each other; a third that nothing touches.
+        let entries = |contact: usize, bodies: &'static [usize]| {
+            let of = move |b: &usize| {
+                let b = *b;
+                (0..18).map(move |k| (6 * b + k / 3, 3 * contact + k % 3, 1.0 + k as f64))
+            };
+            bodies.iter().flat_map(of)
+        };
+        let h = entries(0, &[0]).chain(entries(1, &[0, 1]));
+        let h = Csc::from_triplets(18, 6, h).unwrap();
+        let nodes = Nodes::new::<3>(&Csc::diagonal(&[1.0; 18]), &h);
+        assert_eq!(nodes.sizes, [6, 6, 1, 1, 1, 1, 1, 1]);
+        assert_eq!(nodes.of[..12], [0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1]);
+        // A multiplier joins the first unknown that it acts on.
+        let bordered = (0..19).map(|i| (i, i, 1.0)).chain([(7, 18, 1.0), (18, 7, 1.0)]);
+        let bordered = Csc::from_triplets(19, 19, bordered).unwrap();
+        assert_eq!(Nodes::new::<3>(&bordered, &h).sizes, [6, 7, 1, 1, 1, 1, 1, 1]);
+    }
+
+    #[test]
     fn fewer_contacts_between_the_same_bodies_need_no_new_analysis() {
         let (problem, _) = Planted { contacts: 12, dofs: 60, ..Planted::default() }.global::<3>();
         let fewer = Csc::from_triplets(60, 27, problem.H.triplets().filter(|e| e.1 < 27)).unwrap();

@@ -1,0 +1,61 @@
+//! Whether an iteration promises to reach the tolerance for less than what comes after it would cost.
+
+/// Iterations may cost this many times as much as they were compared with, before their promise is no longer believed.
+const BELIEF: f64 = 3.0;
+
+/// The estimates of an iteration that converges linearly, more or less, one a step.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Rate {
+    estimates: Vec<f64>,
+}
+
+impl Rate {
+    /// Forgets everything.
+    pub(super) fn begin(&mut self) {
+        self.estimates.clear();
+    }
+
+    /// Notes the estimate of a step.
+    pub(super) fn note(&mut self, estimate: f64) {
+        self.estimates.push(estimate);
+    }
+
+    /// How many more steps it takes to `tolerance` at the mean rate of the second half of the steps so far, which a single step that raises the
+    /// estimate does not upset; infinite where the estimates do not fall.
+    pub(super) fn left(&self, tolerance: f64) -> f64 {
+        let Some(last) = self.estimates.len().checked_sub(1).filter(|last| *last > 0) else {
+            return f64::INFINITY;
+        };
+        let (now, middle) = (self.estimates[last], self.estimates[last / 2]);
+        let fall = (middle / now).ln() / (last - last / 2) as f64;
+        if fall > 0.0 { (now / tolerance).ln() / fall } else { f64::INFINITY }
+    }
+
+    /// Whether the steps left, each of which costs `cost`, cost less than `limit`, and those done were not several times as dear.
+    pub(super) fn promises(&self, tolerance: f64, cost: f64, limit: f64) -> bool {
+        self.left(tolerance) * cost < limit && self.estimates.len() as f64 * cost < BELIEF * limit
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_geometric_sequence_is_foreseen_and_a_flat_one_is_not_believed() {
+        let mut rate = Rate::default();
+        assert_eq!(rate.left(1e-8), f64::INFINITY);
+        (0..5).for_each(|k| rate.note(0.1_f64.powi(k)));
+        assert!((rate.left(1e-8) - 4.0).abs() < 1e-9);
+        assert!(rate.promises(1e-8, 1.0, 4.5) && !rate.promises(1e-8, 1.0, 3.5));
+        // Too dear already.
+        assert!(!rate.promises(1e-4, 1.0, 1.5));
+        rate.begin();
+        (0..5).for_each(|_| rate.note(1.0));
+        assert!(!rate.promises(1e-8, 1.0, 1e300));
+        // One step up on the way down.
+        rate.begin();
+        [1.0, 0.1, 1e-2, 1e-3, 2e-3].iter().for_each(|&e| rate.note(e));
+        assert!(rate.left(1e-8).is_finite());
+    }
+}
