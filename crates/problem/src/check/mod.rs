@@ -72,7 +72,7 @@ pub struct Measure {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bilateral: Option<f64>,
     /// Contacts, certified measurements only: the largest residual of one contact in units of its own, `max_c ‖φ_c‖ / min(‖(|q| + |W||r| + |V||λ|)_c‖, ω_c)` with its part
-    /// φ_c of the natural map (or `max(0, −u_N)`, if larger: under much friction a velocity into the obstacle is near K*): a contact that nothing
+    /// φ_c of the natural map (or `max(0, −u_N − ε‖u_c‖)` over its normal terms alone, if larger: under much friction a velocity into the obstacle is near K*): a contact that nothing
     /// solves does not hide behind larger ones, whatever its scale. ω_c is the largest load that reaches the contact, in its unit: impulses that run away excuse
     /// nothing (docs/notation.md). The limit is the root of the tolerance: half of the digits, because a contact with a small load gets no more than
     /// its share of the work. Islands of contacts without load are left out: r = 0 solves them, and what is there is noise. For global

@@ -375,6 +375,19 @@ fn no_contact_hides_behind_a_larger_one() {
 }
 
 #[test]
+fn no_sliding_excuses_sinking_but_that_of_its_own_rounding() {
+    // One contact that slides at 1 m/s, without impulses: it sinks by δ, all there is along its normal.
+    let own = |delta: f64| {
+        let w = Bsr::from_csc(&Csc::diagonal(&[1.0; 3]));
+        let problem = FrictionLocal::<3>::new(w, vec![-delta, 1.0, 0.0], vec![0.5]).unwrap();
+        let point = LocalPoint { r: vec![0.0; 3], ..problem.origin() };
+        problem.judge(&point, 1e-8).unwrap().measure.own.unwrap()
+    };
+    assert!((own(1e-10) - 1.0).abs() < 1e-5 && (own(1e-14) - 1.0).abs() < 0.1);
+    assert!(own(1e-16) < 1e-8 && own(1e-157) < 1e-8);
+}
+
+#[test]
 fn own_does_not_depend_on_the_scale_of_a_contact() {
     let (problem, point) = Planted { contacts: 8, dofs: 30, ..Planted::default() }.local::<3>();
     let mut wrong = point.clone();

@@ -13,4 +13,4 @@ pub use central::{Central, Iterate as CentralIterate};
 pub use clarabel::{Clarabel, Ended, Shape};
 pub use conic::{ConvexEnd, ConvexIp};
 pub use rows::{put_within_bounds, sweep_rows};
-pub use sweep::Sweep;
+pub use sweep::{NEGLIGIBLE, Sweep};

@@ -13,10 +13,15 @@ use crate::contact::law::DiskLaw;
 use crate::contact::law::cfun::natural_residual;
 use crate::contact::law::local::{LocalSolver, frictionless};
 
+/// The square of a relative move that is far below any rounding and is not made: impulses that die away would end as subnormal numbers, which are slow.
+pub const NEGLIGIBLE: f64 = 1e-80;
+
 /// What sweeps keep for each contact.
 #[derive(Debug, Clone)]
 pub struct Sweep<L: DiskLaw<D>, const D: usize> {
     contacts: Vec<Visited<L, D>>,
+    /// The square of a velocity that is negligible.
+    negligible: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -31,7 +36,8 @@ struct Visited<L: DiskLaw<D>, const D: usize> {
 impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
     /// Sweeps over `problem`'s contacts.
     pub fn new<P: Disked<D, Law = L>>(problem: &P, state: &P::State) -> Self {
-        let mut sweep = Self { contacts: Vec::with_capacity(problem.contacts()) };
+        let contacts = Vec::with_capacity(problem.contacts());
+        let mut sweep = Self { contacts, negligible: 0.0 };
         sweep.fill(problem, state);
         sweep
     }
@@ -39,6 +45,7 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
     /// Takes another problem; allocates nothing where the number of contacts is the same.
     pub fn fill<P: Disked<D, Law = L>>(&mut self, problem: &P, state: &P::State) {
         self.contacts.clear();
+        self.negligible = NEGLIGIBLE * problem.velocity_scale(state).powi(2);
         for c in 0..problem.contacts() {
             let (w, law) = (problem.diagonal_block(state, c), problem.law(c));
             let unit = small::mean_diagonal(&w).abs();
@@ -72,10 +79,13 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
             for k in 0..D {
                 dr[k] -= old[k];
             }
-            if dr.iter().any(|x| *x != 0.0) {
+            let moved = dr.iter().map(|x| (contact.unit * x).powi(2)).sum::<f64>();
+            // Of an empty block a move has no velocity; one that is not finite is made too, and seen.
+            let unfelt = contact.unit == 0.0 && dr != [0.0; D];
+            if moved > self.negligible || moved.is_nan() || unfelt {
                 r[D * c..D * c + D].copy_from_slice(&new);
                 problem.moved(state, c, &dr);
-                moves += dr.iter().map(|x| (contact.unit * x).powi(2)).sum::<f64>();
+                moves += moved;
             }
         }
         moves

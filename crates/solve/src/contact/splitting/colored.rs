@@ -22,11 +22,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::circles::Circles;
-use super::contact::{Answer, Contact, ContactOf, NEGLIGIBLE};
+use super::contact::{Answer, Contact, ContactOf};
 use super::nsgs::{LocalChoice, with_local};
 use crate::contact::form::{Access, Concurrent, Disked, Frictional};
 use crate::contact::law::Rolling;
 use crate::contact::law::local::{Exact, LocalSolver, Quartic, RollingExact};
+use crate::contact::parts::NEGLIGIBLE;
 use crate::contact::splitting::coloring::Coloring;
 use crate::contact::splitting::team::Team;
 use crate::core::ranges::{at_least, at_most, below};

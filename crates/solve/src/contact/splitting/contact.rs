@@ -29,10 +29,6 @@ pub(super) struct Answer<const D: usize> {
     pub(super) moved: f64,
 }
 
-/// The square of a relative move that is far below any rounding: impulses that die away end as zeros instead of
-/// as subnormal numbers, which are slow.
-pub(super) const NEGLIGIBLE: f64 = 1e-80;
-
 impl<Memo, Law: ContactLaw<D>, const D: usize> Contact<Memo, Law, D> {
     pub(super) fn new<L>(local: &L, w: [[f64; D]; D], law: Law, scale: f64) -> Self
     where

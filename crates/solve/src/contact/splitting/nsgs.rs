@@ -27,7 +27,7 @@ use crate::contact::form::{Access, Blockwise, Disked, Frictional};
 use crate::contact::law::Rolling;
 use crate::contact::law::cone::ConvexSet;
 use crate::contact::law::local::{Exact, LocalSolver, Quartic, RollingExact};
-use crate::contact::parts::{Accelerator, put_within_bounds, sweep_rows};
+use crate::contact::parts::{Accelerator, NEGLIGIBLE, put_within_bounds, sweep_rows};
 use crate::contact::splitting::ordering::{Order, Ordering};
 use crate::core::ranges::{at_least, at_most, below};
 use crate::core::register::{About, Described, Solves};
@@ -35,7 +35,7 @@ use crate::core::settings::{Settings, described};
 use crate::{Boxed, SolveError, Solver, Step};
 
 use super::circles::Circles;
-use super::contact::{Answer, Contact, ContactOf, NEGLIGIBLE};
+use super::contact::{Answer, Contact, ContactOf};
 
 /// The local solver, the order of the visits, relaxation, and what saves visits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
