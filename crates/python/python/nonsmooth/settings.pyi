@@ -78,9 +78,9 @@ class Admm(Settings):
     ) -> None: ...
 
 class Auto(Settings):
-    """auto: needs no setting: sweeps, interior point, proximal semismooth Newton, each while it promises
-    more than the next (friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d,
-    rolling_friction_local_3d, rolling_friction_global_3d)
+    """auto: needs no setting: sweeps, a search for rest, interior point, proximal semismooth Newton, ADMM,
+    each while it promises more than the next (friction_local_2d, friction_local_3d, friction_global_2d,
+    friction_global_3d, rolling_friction_local_3d, rolling_friction_global_3d)
     auto: needs no setting: a plan of solvers by size, class and structure, until one solves the problem
     or proves that there is no solution (lcp, mlcp, hlcp, box_lcp, mcp)
     auto: needs no setting: over boxes and polyhedra the auto of mcp behind multipliers, then

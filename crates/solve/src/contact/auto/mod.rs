@@ -281,7 +281,10 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         }
         lines.push(format!("{sweeps} Gauss-Seidel sweeps"));
         if rest > 0 {
-            lines.push(format!("{rest} iterations of the search for rest"));
+            lines.push(match work.stage {
+                Stage::Rest => format!("impulses at rest, found in {rest} iterations"),
+                _ => "impulses at rest, sought in vain".into(),
+            });
         }
         if trial > 0 {
             lines.push(format!("{trial} Newton iterations on trial"));
