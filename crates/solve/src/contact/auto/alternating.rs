@@ -66,6 +66,17 @@ pub(super) struct Alternating<const D: usize> {
 }
 
 impl<const D: usize> Alternating<D> {
+    /// Allocates for so many contacts, where that has not been done.
+    pub(super) fn make_room(&mut self, contacts: usize) {
+        for x in [&mut self.q, &mut self.r, &mut self.z, &mut self.y, &mut self.right, &mut self.wr]
+        {
+            x.resize(D * contacts, 0.0);
+        }
+        self.unit.resize(contacts, 0.0);
+        self.identity.resize(contacts, [[0.0; D]; D]);
+        self.penalty.resize(contacts, [[0.0; D]; D]);
+    }
+
     /// Factorises, and begins at the impulses `start`, or at none. Errors: a matrix that cannot be factorised.
     pub(super) fn begin<P: Linearised<D> + Disked<D>>(
         &mut self,
@@ -74,19 +85,16 @@ impl<const D: usize> Alternating<D> {
         way: Way,
         start: Option<&[f64]>,
     ) -> Result<(), Singular> {
-        let nc = problem.contacts();
+        self.make_room(problem.contacts());
         (self.way, self.rho, self.steps) = (way, way.parameters().0, 0);
         self.scale = problem.velocity_scale(state);
         self.unit.clear();
-        self.unit.extend((0..nc).map(|c| {
+        self.unit.extend((0..problem.contacts()).map(|c| {
             let w = small::mean_diagonal(&problem.diagonal_block(state, c));
             if w > 0.0 { w } else { 1.0 }
         }));
-        for x in [&mut self.q, &mut self.r, &mut self.z, &mut self.y, &mut self.right, &mut self.wr]
-        {
-            x.clear();
-            x.resize(D * nc, 0.0);
-        }
+        self.z.fill(0.0);
+        self.y.fill(0.0);
         problem.velocities(state, &self.z, &mut self.q);
         if let Some(start) = start {
             self.start_at(problem, state, start);

@@ -404,6 +404,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     ) {
         let HybridWork { newton, state, controller, .. } = work;
         let newton = newton.get_or_insert_with(|| Box::new(ProximalNewton::new(problem, state)));
+        work.alternating.get_or_insert_default().make_room(problem.contacts());
         let r = P::impulses(point);
         for buffer in [&mut work.inner_best, &mut work.before, &mut work.best] {
             buffer.resize(r.len(), 0.0);
