@@ -5,7 +5,7 @@
 //! Method, each stage only where the one before it would take longer:
 //!
 //! 1. **Sweeps**: exact Gauss–Seidel for as long as its rate of convergence promises the tolerance sooner than a few
-//!    factorisations would. Many problems end here.
+//!    factorisations would, and after stage 2 until they have cost one. Many problems end here.
 //! 2. **Rest** (`alternating.rs`): impulses within the cones that leave nothing moving, where the sweeps show nothing that flies apart. One factorisation and
 //!    a few solves end structures at rest, whatever their height; one solve tells whether it is one.
 //! 3. **Trial**: Newton's iterations of stage 5 without its proximal term, where the sweeps came near, for as long as each halves the error.
@@ -127,6 +127,8 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     /// An exact solution, rounded, that the judge has yet to see.
     exact: Option<P::Point>,
     asked: bool,
+    /// Stage 2 has been, or was not worth a factorisation.
+    rest_sought: bool,
     /// The interior point was left out.
     passed_by: bool,
     /// Alternating directions last began at the point, not at no impulses.
@@ -203,6 +205,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             existence: None,
             exact: None,
             asked: false,
+            rest_sought: false,
             passed_by: false,
             from_here: false,
             done: Done::default(),
@@ -240,7 +243,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         work.stage = FIRST;
         work.rate.begin();
         (work.existence, work.exact, work.asked) = (None, None, false);
-        work.passed_by = false;
+        (work.passed_by, work.rest_sought) = (false, false);
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
@@ -384,15 +387,22 @@ impl<const D: usize> OnContacts<Auto, D> {
             return Step::Continue { estimate };
         }
         let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
-        let newton = NEWTON * costs.factorisation;
         let cost = SWEEPS_A_STEP as f64 * costs.sweep;
-        // Sweeps that cost less than one factorisation so far have time to find their pace.
-        let promising = work.done.sweeps as f64 * costs.sweep < costs.factorisation
-            || work.rate.promises(work.tolerance, cost, newton);
+        let promising = work.rate.promises(work.tolerance, cost, NEWTON * costs.factorisation)
+            || work.rest_sought && self.sweeps_are_cheap(work, costs);
         if !promising {
             self.leave_sweeps(problem, point, work);
         }
         Step::Continue { estimate }
+    }
+
+    /// Whether the sweeps so far cost less than one factorisation: then they have time to find their pace.
+    fn sweeps_are_cheap<P: Linearised<D> + Disked<D>>(
+        &self,
+        work: &HybridWork<P, D>,
+        costs: Costs,
+    ) -> bool {
+        (work.done.sweeps as f64) * costs.sweep < costs.factorisation
     }
 
     /// The parts of the later stages, and whichever comes first.

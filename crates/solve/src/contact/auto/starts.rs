@@ -4,7 +4,7 @@
 use nonsmooth_problem::check::Kinematic;
 
 use super::alternating::Way;
-use super::{Auto, HybridWork, NEWTON, Stage};
+use super::{Auto, FIRST, HybridWork, NEWTON, Stage};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
 
@@ -41,6 +41,10 @@ impl<const D: usize> OnContacts<Auto, D> {
         work: &mut HybridWork<P, D>,
         error: f64,
     ) {
+        if work.rest_sought {
+            return self.begin_trial(problem, point, work, error);
+        }
+        work.rest_sought = true;
         let HybridWork { alternating, state, stage, newton, .. } = work;
         let quiet = newton.as_ref().is_some_and(|n| n.opening(P::impulses(point)) < OPENING);
         if quiet
@@ -49,7 +53,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             work.rate.begin();
             *stage = Stage::Rest;
         } else {
-            self.begin_trial(problem, point, work, error);
+            self.without_rest(problem, point, work, error);
         }
     }
 
@@ -68,9 +72,27 @@ impl<const D: usize> OnContacts<Auto, D> {
         let young = estimate < REST_NEAR && steps < REST_FIRST;
         if !young && !self.promises(problem, work, NEWTON) || estimate.is_nan() {
             let error = self.end_alternating(problem, point, work);
-            self.begin_trial(problem, point, work, error);
+            self.without_rest(problem, point, work, error);
         }
         Step::Continue { estimate }
+    }
+
+    /// Back to the sweeps where they were left for stage 2 before they had time, else on to stage 3.
+    fn without_rest<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        error: f64,
+    ) {
+        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        if self.sweeps_are_cheap(work, costs) {
+            problem.enter(&mut work.state, point);
+            work.rate.begin();
+            work.stage = FIRST;
+        } else {
+            self.begin_trial(problem, point, work, error);
+        }
     }
 
     /// Begins stage 3 where the error is small, else stage 4.

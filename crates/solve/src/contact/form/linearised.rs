@@ -375,7 +375,7 @@ impl<const D: usize> Form<D> for BodyForm<D> {
                 continue;
             }
             let weight = multiply(&q_inverse[c], &p[c]); //                Q⁻¹P
-            for (a, slots) in parts.iter().zip(own.chunks(parts.len())) {
+            for (a, slots) in parts.iter().zip(own.chunks(parts.len().max(1))) {
                 let a = a.of(&touches.rows);
                 for (b, slot) in parts.iter().zip(slots) {
                     let b = b.of(&touches.rows);
