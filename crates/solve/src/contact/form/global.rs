@@ -115,6 +115,8 @@ impl<const D: usize, L: DiskLaw<D>> Contacts<D> for FrictionGlobal<D, L> {
             }
             Access::Products => {}
         }
+        // Newton's methods ask for doubled precision near their end.
+        let precise = if access == Access::Newton { inverse.dim() } else { 0 };
         let mut state = GlobalState {
             operator: match access {
                 Access::Newton if inverse.has_sparse_factor() => {
@@ -130,7 +132,7 @@ impl<const D: usize, L: DiskLaw<D>> Contacts<D> for FrictionGlobal<D, L> {
             q: vec![0.0; self.w.len()],
             scale: 1.0,
             v: vec![0.0; self.dofs()],
-            precise: Default::default(),
+            precise: [0; 3].map(|_| vec![0.0; precise]),
             contradiction: None,
             rows,
             system: None,

@@ -164,7 +164,10 @@ impl<const D: usize, L: DiskLaw<D>> Contacts<D> for FrictionLocal<D, L> {
         access.admit(self.bounds())?;
         let eliminated = self.rows.as_ref().map(|b| Eliminated::new(self, b)).transpose()?;
         let scale = norm_or_one(&self.q);
-        Ok(LocalState { access, scale, eliminated, system: None, sums: vec![] })
+        // Newton's methods ask for doubled precision near their end.
+        let precise = if access == Access::Newton { self.q.len() } else { 0 };
+        let sums = Vec::with_capacity(precise);
+        Ok(LocalState { access, scale, eliminated, system: None, sums })
     }
 
     fn refill(&self, state: &mut Self::State) -> Result<(), SolveError> {
