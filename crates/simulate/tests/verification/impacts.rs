@@ -36,17 +36,19 @@ fn landing(b: f64, c: f64, mu: f64) -> (Simulation, nonsmooth_simulate::BodyId) 
 
 #[test]
 fn a_rocking_block_loses_what_housner_says() {
-    for (b, c, mu, eta) in [
-        (0.1, 0.4, 0.3, 0.911764705882),
-        (0.1, 0.4, 0.8, 0.911764705882),
-        (0.2, 0.4, 0.8, 0.7),
-        (0.2, 0.4, 0.3, 0.612903225806),
-        (0.4, 0.4, 0.6, 0.25),
-        (0.4, 0.4, 0.3, 0.0),
-        (0.6, 0.4, 0.9, 0.0),
+    for (b, c, mu, eta, within) in [
+        (0.1, 0.4, 0.3, 0.911764705882, 1e-11),
+        (0.1, 0.4, 0.8, 0.911764705882, 1e-11),
+        (0.2, 0.4, 0.8, 0.7, 1e-11),
+        (0.2, 0.4, 0.3, 0.612903225806, 1e-11),
+        (0.4, 0.4, 0.7, 0.25, 1e-11),
+        // The impulse at the new edge is at the limit of friction and nothing slides: a residual of 1e-12 leaves a velocity of its root.
+        (0.4, 0.4, 0.6, 0.25, 1e-6),
+        (0.4, 0.4, 0.3, 0.0, 1e-11),
+        (0.6, 0.4, 0.9, 0.0, 1e-11),
     ] {
         let (simulation, body) = landing(b, c, mu);
-        near(omega(&simulation, body)[1], eta, 1e-11);
+        near(omega(&simulation, body)[1], eta, within);
     }
     // The impulse at the new edge.
     let (simulation, _) = landing(0.1, 0.4, 0.5);
