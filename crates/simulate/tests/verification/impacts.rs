@@ -41,7 +41,7 @@ fn a_rocking_block_loses_what_housner_says() {
         (0.1, 0.4, 0.8, 0.911764705882, 1e-11),
         (0.2, 0.4, 0.8, 0.7, 1e-11),
         (0.2, 0.4, 0.3, 0.612903225806, 1e-11),
-        (0.4, 0.4, 0.7, 0.25, 1e-11),
+        (0.4, 0.4, 0.7, 0.25, 1e-10),
         // The impulse at the new edge is at the limit of friction and nothing slides: a residual of 1e-12 leaves a velocity of its root.
         (0.4, 0.4, 0.6, 0.25, 1e-6),
         (0.4, 0.4, 0.3, 0.0, 1e-11),
