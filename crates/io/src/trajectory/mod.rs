@@ -271,9 +271,14 @@ impl Trajectory {
     /// Errors: a file that is none, or damaged, or whose parts do not fit each other, by the part; a scene that its SHA-256 does not belong to.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let path = path.as_ref();
-        let mut run = Self::parse(path, &crate::format::bytes(path)?)?;
-        parts::join(path, &mut run)?;
-        Ok(run)
+        let mut gap = None;
+        loop {
+            let mut run = Self::parse(path, &crate::format::bytes(path)?)?;
+            gap = parts::join(path, &mut run, gap)?;
+            if gap.is_none() {
+                return Ok(run);
+            }
+        }
     }
 
     /// Reads the bytes of a file; `name` is for messages. Errors: as of [`read`](Self::read).

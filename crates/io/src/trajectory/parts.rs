@@ -149,8 +149,20 @@ pub(super) fn remove(path: &Path) {
     let _ = std::fs::remove_dir(folder(path));
 }
 
-/// Adds what stands in parts beside a file, also while these are written.
-pub(super) fn join(path: &Path, run: &mut Trajectory) -> Result<(), IoError> {
+/// Between the steps of a run and those of its next part: the last before it and the first after it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Gap {
+    done: u64,
+    first: u64,
+}
+
+/// Adds what stands in parts beside a file, also while these are written. Where file and folder changed in between there may be a gap, and both have to be read
+/// anew; `known` is the gap of the time before, and where it is there again no writer has made it.
+pub(super) fn join(
+    path: &Path,
+    run: &mut Trajectory,
+    known: Option<Gap>,
+) -> Result<Option<Gap>, IoError> {
     let scene = reference(&digest(&run.scene));
     let last = |steps: &[Step]| steps.last().map_or(0, |step| step.number);
     let mut files = beside(path).into_iter();
@@ -170,7 +182,11 @@ pub(super) fn join(path: &Path, run: &mut Trajectory) -> Result<(), IoError> {
         if part.scene != scene || part.program != run.program || last(&part.steps) <= done {
             continue;
         }
-        if first > done + 1 || part.bodies != run.bodies || part.joints != run.joints {
+        let gap = (first > done + 1).then_some(Gap { done, first });
+        if gap.is_some() && gap != known {
+            return Ok(gap);
+        }
+        if gap.is_some() || part.bodies != run.bodies || part.joints != run.joints {
             let expected = format!("a part of the same run that goes on after step {done}");
             return Err(IoError::data(&file, "/steps/number", expected, first));
         }
@@ -180,5 +196,5 @@ pub(super) fn join(path: &Path, run: &mut Trajectory) -> Result<(), IoError> {
         run.steps.extend(part.steps.into_iter().filter(|step| step.number > done));
         run.checkpoint = part.checkpoint;
     }
-    Ok(())
+    Ok(None)
 }
