@@ -2,34 +2,97 @@
 //! contact by contact.
 
 use super::budget::Pace;
+use super::roots::Roots;
+use super::row::prefetch;
 use super::{Block, BlockRow, Bsr, Csc, Inverse};
 
-/// `W = Hᵀ M⁻¹ H` without W: for each contact c the rows of `H_c` (n × D) that are not zero and those of
-/// `Z_c = M⁻¹ H_c`.
+/// `W = Hᵀ M⁻¹ H` without W, for the movements of Gauss–Seidel in velocity space: `u_c = H_cᵀ v + w_c` and `v += M⁻¹ H_c Δr_c` cost O(rows touched).
 ///
-/// `u_c = H_cᵀ v + w_c` and `v += Z_c Δr_c` cost O(rows touched): the movements of Gauss–Seidel in velocity space. With
-/// bilateral constraints `M⁻¹` stands for the velocity part of `[M, −G; Gᵀ, 0]⁻¹`.
+/// Where M falls into small symmetric blocks, `M = L Lᵀ` (rigid bodies), the velocities are kept as `y = Lᵀ v`, and with `A = L⁻¹ H` one matrix serves both ways:
+/// `u_c = A_cᵀ y + w_c`, `y += A_c Δr_c`. Else y = v, and `Z = M⁻¹ H` is kept beside H. With bilateral constraints `M⁻¹` stands for the velocity
+/// part of `[M, −G; Gᵀ, 0]⁻¹`.
 ///
-/// Storage: `8 D + 4` bytes for each touched row, twice: 12 rows a contact between two rigid bodies, but all
-/// degrees of freedom of a finite element body in Z (condense those instead).
+/// Storage: `8 D` bytes for each touched row: 12 rows a contact between two rigid bodies, but all degrees of freedom of a finite element body in Z
+/// (condense those instead).
 #[derive(Debug, Clone)]
 pub struct Delassus<const D: usize> {
-    h: Columns<D>,
-    z: Columns<D>,
+    /// A, or H.
+    seen: Columns<D>,
+    response: Response<D>,
     diagonal: Vec<Block<D>>,
 }
 
+/// What an impulse does to y.
+#[derive(Debug, Clone)]
+enum Response<const D: usize> {
+    /// A, by the roots of M.
+    Rooted(Roots),
+    /// Z.
+    Direct(Columns<D>),
+}
+
 impl<const D: usize> Delassus<D> {
-    /// Keeps H (n × D·nc) and `Z = M⁻¹ H`. `inverse` may carry bilateral rows after n.
+    /// Keeps A where M has roots, else H (n × D·nc) and `Z = M⁻¹ H`. `inverse` may carry bilateral rows after n.
     ///
-    /// Cost: D solves for each contact and component of M that it touches.
+    /// Cost: with roots O(rows touched), else D solves for each contact and component of M that it touches.
     pub fn new(h: &Csc, inverse: &Inverse) -> Self {
-        let (mut h_rows, mut z_rows) = (Columns::new(), Columns::new());
+        match Roots::of(inverse) {
+            Some(roots) => Self::rooted(h, inverse, roots),
+            None => Self::direct(h, inverse),
+        }
+    }
+
+    /// Keeps H and Z whatever M is: y = v.
+    pub fn direct(h: &Csc, inverse: &Inverse) -> Self {
+        let (mut seen, mut z_rows) = (Columns::new(), Columns::new());
         let diagonal = with_diagonal::<D>(h, inverse, |h, z| {
-            h_rows.push(h);
+            seen.push(h);
             z_rows.push(z);
         });
-        Self { h: h_rows, z: z_rows, diagonal }
+        Self { seen, response: Response::Direct(z_rows), diagonal }
+    }
+
+    fn rooted(h: &Csc, inverse: &Inverse, roots: Roots) -> Self {
+        let nc = h.ncols() / D;
+        let mut seen = Columns::new();
+        let mut diagonal = Vec::with_capacity(nc);
+        let (mut touched, mut local, mut rows) = (vec![], vec![], vec![]);
+        let mut pace = Pace::default();
+        let mut late = false;
+        for c in 0..nc {
+            let of_h = block_column::<D>(h, c);
+            late = late || pace.over(100.0 * of_h.len() as f64);
+            if late {
+                // Nobody will use it: the shape alone.
+                seen.push(&of_h);
+                diagonal.push([[0.0; D]; D]);
+                continue;
+            }
+            touched.clear();
+            touched.extend(of_h.iter().map(|(i, _)| inverse.component_of(*i as usize)));
+            touched.sort_unstable();
+            touched.dedup();
+            rows.clear();
+            for &k in &touched {
+                let index = inverse.component(k);
+                local.clear();
+                local.resize(index.len(), [0.0; D]);
+                for (i, row) in &of_h {
+                    if inverse.component_of(*i as usize) == k {
+                        local[inverse.place_in_component(*i as usize)] = *row;
+                    }
+                }
+                roots.solve(k, &mut local);
+                rows.extend(index.iter().zip(&local).map(|(&i, &row)| (i as u32, row)));
+            }
+            rows.retain(|(_, row): &(u32, [f64; D])| row.iter().any(|&x| x != 0.0));
+            rows.sort_unstable_by_key(|row| row.0);
+            let mut w = [[0.0; D]; D];
+            rows.iter().for_each(|(_, row)| add_outer(&mut w, row, row));
+            seen.push(&rows);
+            diagonal.push(w);
+        }
+        Self { seen, response: Response::Rooted(roots), diagonal }
     }
 
     /// The diagonal blocks `W_cc = H_cᵀ M⁻¹ H_c`. Cost as [`new`](Self::new); keeps nothing else.
@@ -89,49 +152,87 @@ impl<const D: usize> Delassus<D> {
         (8 * D + 8) as f64 * sum_over_components::<D>(h, inverse, rows)
     }
 
-    /// `H_cᵀ v`.
-    #[inline(always)]
-    pub fn local_velocity(&self, c: usize, v: &[f64]) -> [f64; D] {
-        let mut u = [0.0; D];
-        for (i, h) in self.h.column(c) {
-            for k in 0..D {
-                u[k] += h[k] * v[*i as usize];
-            }
+    /// `y` of the velocities v. `inverse` is the one that this was made from.
+    pub fn enter(&self, inverse: &Inverse, v: &[f64], y: &mut [f64]) {
+        match &self.response {
+            Response::Rooted(roots) => roots.transposed(inverse, v, y),
+            Response::Direct(_) => y.copy_from_slice(v),
         }
+    }
+
+    /// `H_cᵀ v`, of y.
+    #[inline(always)]
+    pub fn local_velocity(&self, c: usize, y: &[f64]) -> [f64; D] {
+        let mut u = [0.0; D];
+        self.seen.each_run(c, |first, rows| {
+            for (row, y) in rows.iter().zip(&y[first..first + rows.len()]) {
+                for k in 0..D {
+                    u[k] += row[k] * y;
+                }
+            }
+        });
         u
     }
 
-    /// `v += M⁻¹ H_c dr`.
+    /// Fetches what a visit of contact c reads and writes of y into the cache: bodies that meet are far apart in memory.
     #[inline(always)]
-    pub fn apply_impulse(&self, c: usize, dr: &[f64; D], v: &mut [f64]) {
-        for (i, z) in self.z.column(c) {
-            for k in 0..D {
-                v[*i as usize] += z[k] * dr[k];
+    pub fn foresee(&self, c: usize, y: &[f64]) {
+        self.seen.each_run(c, |first, rows| {
+            let y = &y[first..first + rows.len()];
+            y.first().into_iter().chain(y.last()).for_each(prefetch);
+        });
+    }
+
+    /// `v += M⁻¹ H_c dr`, on y.
+    #[inline(always)]
+    pub fn apply_impulse(&self, c: usize, dr: &[f64; D], y: &mut [f64]) {
+        let response = match &self.response {
+            Response::Rooted(_) => &self.seen,
+            Response::Direct(z) => z,
+        };
+        response.each_run(c, |first, rows| {
+            for (row, y) in rows.iter().zip(&mut y[first..first + rows.len()]) {
+                for k in 0..D {
+                    *y += row[k] * dr[k];
+                }
             }
-        }
+        });
     }
 }
 
-/// A sparse n × (D·nc) matrix by block columns: for each contact, `(row, its D entries)`.
+/// A sparse n × (D·nc) matrix by block columns, each a few runs of rows that follow each other, with D entries a row.
 #[derive(Debug, Clone)]
 struct Columns<const D: usize> {
-    ptr: Vec<usize>,
-    rows: Vec<(u32, [f64; D])>,
+    /// Where the runs and the rows of each contact begin.
+    ptr: Vec<(usize, usize)>,
+    /// First row and number of rows.
+    runs: Vec<(u32, u32)>,
+    rows: Vec<[f64; D]>,
 }
 
 impl<const D: usize> Columns<D> {
     fn new() -> Self {
-        Self { ptr: vec![0], rows: vec![] }
+        Self { ptr: vec![(0, 0)], runs: vec![], rows: vec![] }
     }
 
     fn push(&mut self, rows: &[(u32, [f64; D])]) {
-        self.rows.extend_from_slice(rows);
-        self.ptr.push(self.rows.len());
+        for run in rows.chunk_by(|a, b| a.0 + 1 == b.0) {
+            self.runs.push((run[0].0, run.len() as u32));
+        }
+        self.rows.extend(rows.iter().map(|row| row.1));
+        self.ptr.push((self.runs.len(), self.rows.len()));
     }
 
+    /// Calls `visit` with the first row and the rows of each run of contact c.
     #[inline(always)]
-    fn column(&self, c: usize) -> &[(u32, [f64; D])] {
-        &self.rows[self.ptr[c]..self.ptr[c + 1]]
+    fn each_run(&self, c: usize, mut visit: impl FnMut(usize, &[[f64; D]])) {
+        let ((run, row), (run_end, row_end)) = (self.ptr[c], self.ptr[c + 1]);
+        let mut rows = &self.rows[row..row_end];
+        for &(first, len) in &self.runs[run..run_end] {
+            let (now, rest) = rows.split_at(len as usize);
+            visit(first as usize, now);
+            rows = rest;
+        }
     }
 }
 

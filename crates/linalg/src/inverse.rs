@@ -221,6 +221,11 @@ impl Inverse {
         &self.matrix
     }
 
+    /// Whether the factor is that of A with a small diagonal added.
+    pub(crate) fn is_regularised(&self) -> bool {
+        self.regularised
+    }
+
     /// The sizes of the connected components, in the order of their first unknown.
     pub fn component_sizes(&self) -> impl ExactSizeIterator<Item = usize> + '_ {
         self.components.iter().map(|c| c.index.len())

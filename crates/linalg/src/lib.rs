@@ -26,6 +26,7 @@ mod groups;
 mod inverse;
 mod matrix;
 mod rank_lu;
+mod roots;
 mod row;
 pub mod small;
 mod square_cholesky;

@@ -1,13 +1,13 @@
 //! The global problem by its contacts: velocity space, W never formed.
 //!
-//! Contact by contact, the state keeps `v` (so that `u_c = H_cᵀ v + w_c` costs the rows that contact c touches) and
-//! `Z_c = M⁻¹ H_c` (so that an impulse moves v at the same cost). Products with W are one solve,
-//! `Hᵀ M⁻¹ (H r + f) + w`, and need no Z. `complete` recomputes v exactly, so the rounding that the increments
+//! Contact by contact, the state keeps the velocities (so that `u_c = H_cᵀ v + w_c` costs the rows that contact c touches) and
+//! what impulses do to them at the same cost ([`Delassus`]). Products with W are one solve,
+//! `Hᵀ M⁻¹ (H r + f) + w`, and need nothing of it. `complete` recomputes v exactly, so the rounding that the increments
 //! gather never reaches a judged point.
 
 use nonsmooth_linalg::budget::{self, TooLarge};
 use nonsmooth_linalg::{
-    Block, Bsr, Compensated, Csc, Delassus, Refine, Singular, norm_or_one, small,
+    Block, Bsr, Compensated, Csc, Delassus, Inverse, Refine, Singular, norm_or_one, small,
 };
 use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::{Bounds, Dynamics, FrictionGlobal, GlobalPoint};
@@ -26,7 +26,8 @@ pub struct GlobalState<const D: usize> {
     h: Csc,
     q: Vec<f64>,
     scale: f64,
-    v: Vec<f64>,
+    /// v, as the operator keeps it.
+    y: Vec<f64>,
     /// v in doubled precision, where it was asked for: high, low, the last correction.
     precise: [Vec<f64>; 3],
     contradiction: Option<Impulses>,
@@ -52,7 +53,7 @@ enum GlobalSystem<const D: usize> {
 
 /// What a family's access to W needs beside the dynamics.
 enum Operator<const D: usize> {
-    /// Visits contact by contact: Z.
+    /// Visits contact by contact.
     Visits(Delassus<D>),
     /// Products with all of W: the diagonal blocks alone.
     Products(Vec<Block<D>>),
@@ -79,6 +80,14 @@ impl<const D: usize> GlobalSystem<D> {
 }
 
 impl<const D: usize> Operator<D> {
+    /// Takes the velocities v.
+    fn enter(&self, inverse: &Inverse, v: &[f64], y: &mut [f64]) {
+        match self {
+            Operator::Visits(delassus) => delassus.enter(inverse, v, y),
+            Operator::Products(_) | Operator::Condensed(_) => y.copy_from_slice(v),
+        }
+    }
+
     fn diagonal_block(&self, c: usize) -> Block<D> {
         match self {
             Operator::Visits(delassus) => *delassus.diagonal_block(c),
@@ -123,7 +132,11 @@ impl<const D: usize, L: DiskLaw<D>> Contacts<D> for FrictionGlobal<D, L> {
                     Operator::Condensed(Delassus::condense(&self.H, inverse))
                 }
                 Access::Visits | Access::Rows | Access::Newton => {
-                    Operator::Visits(Delassus::new(&self.H, inverse))
+                    // Rows with bounds speak of v itself.
+                    Operator::Visits(match rows.is_empty() {
+                        true => Delassus::new(&self.H, inverse),
+                        false => Delassus::direct(&self.H, inverse),
+                    })
                 }
                 Access::Products => Operator::Products(Delassus::diagonal(&self.H, inverse)),
             },
@@ -131,7 +144,7 @@ impl<const D: usize, L: DiskLaw<D>> Contacts<D> for FrictionGlobal<D, L> {
             h: self.H.clone(),
             q: vec![0.0; self.w.len()],
             scale: 1.0,
-            v: vec![0.0; self.dofs()],
+            y: vec![0.0; self.dofs()],
             precise: [0; 3].map(|_| vec![0.0; precise]),
             contradiction: None,
             rows,
@@ -188,13 +201,15 @@ impl<const D: usize, L: DiskLaw<D>> Contacts<D> for FrictionGlobal<D, L> {
 
     fn enter(&self, state: &mut Self::State, point: &GlobalPoint) {
         state.dynamics.hold(&point.lambda);
-        let (v, _) = state.dynamics.solve(self, &point.r, Refine::Once);
-        state.v.copy_from_slice(v);
+        let GlobalState { dynamics, operator, y, .. } = state;
+        dynamics.solve(self, &point.r, Refine::Once);
+        operator.enter(&dynamics.inverse, dynamics.velocities(self), y);
     }
 
     fn complete(&self, state: &mut Self::State, point: &mut GlobalPoint) {
         state.dynamics.complete(self, point);
-        state.v.copy_from_slice(&point.v);
+        let GlobalState { dynamics, operator, y, .. } = state;
+        operator.enter(&dynamics.inverse, &point.v, y);
     }
 }
 
@@ -235,12 +250,12 @@ impl<const D: usize, L: DiskLaw<D>> Rows<D> for FrictionGlobal<D, L> {
     }
 
     fn row_velocity(&self, state: &Self::State, _: &[f64], _: &[f64], j: usize) -> f64 {
-        self.rows.as_ref().map_or(0.0, |b| b.G.column_dot(j, &state.v) + b.b[j])
+        self.rows.as_ref().map_or(0.0, |b| b.G.column_dot(j, &state.y) + b.b[j])
     }
 
     fn row_moved(&self, state: &mut Self::State, j: usize, by: f64) {
-        let GlobalState { rows, v, .. } = state;
-        rows[j].iter().flat_map(|row| &row.velocities).for_each(|&(i, x)| v[i] += by * x);
+        let GlobalState { rows, y, .. } = state;
+        rows[j].iter().flat_map(|row| &row.velocities).for_each(|&(i, x)| y[i] += by * x);
     }
 }
 
@@ -248,7 +263,7 @@ impl<const D: usize, L: DiskLaw<D>> Blockwise<D> for FrictionGlobal<D, L> {
     #[inline(always)]
     fn velocity(&self, state: &Self::State, r: &[f64], c: usize) -> [f64; D] {
         let (mut u, given) = match &state.operator {
-            Operator::Visits(delassus) => (delassus.local_velocity(c, &state.v), &self.w),
+            Operator::Visits(delassus) => (delassus.local_velocity(c, &state.y), &self.w),
             Operator::Condensed(w) => (w.row_product(c, r), &state.q),
             Operator::Products(_) => unreachable!("a state for products is not visited"),
         };
@@ -262,7 +277,14 @@ impl<const D: usize, L: DiskLaw<D>> Blockwise<D> for FrictionGlobal<D, L> {
     #[inline(always)]
     fn moved(&self, state: &mut Self::State, c: usize, dr: &[f64; D]) {
         if let Operator::Visits(delassus) = &state.operator {
-            delassus.apply_impulse(c, dr, &mut state.v);
+            delassus.apply_impulse(c, dr, &mut state.y);
+        }
+    }
+
+    #[inline(always)]
+    fn foresee(&self, state: &Self::State, c: usize) {
+        if let Operator::Visits(delassus) = &state.operator {
+            delassus.foresee(c, &state.y);
         }
     }
 }

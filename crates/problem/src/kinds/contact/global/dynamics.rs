@@ -204,6 +204,11 @@ impl Dynamics {
         point.lambda.copy_from_slice(lambda);
     }
 
+    /// The velocities v of the last solve.
+    pub fn velocities<const D: usize, L: Law<D>>(&self, problem: &FrictionGlobal<D, L>) -> &[f64] {
+        &self.state[..problem.dofs()]
+    }
+
     /// `q = Hᵀ v_free + w`, the relative velocity without impulses (rows with bounds none either); and a certificate if the bilateral constraints
     /// contradict each other, so that no v satisfies `Gᵀ v + b = 0`.
     pub fn free_velocity<const D: usize, L: Law<D>>(
