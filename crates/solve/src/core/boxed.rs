@@ -26,7 +26,6 @@ impl<P: Problem> Boxed<P> {
 trait Erased<P: Problem>: Send + Sync {
     fn work(self: Arc<Self>, problem: &P) -> Result<Box<dyn AtWork<P>>, SolveError>;
     fn latest(&self) -> bool;
-    fn check_every(&self) -> usize;
 }
 
 /// A solver with its workspace. One object, so that a step need not ask whose workspace it was given.
@@ -39,6 +38,7 @@ trait AtWork<P: Problem>: Send {
     fn record(&mut self, on: bool);
     fn trace(&self) -> Trace;
     fn account(&self) -> Vec<String>;
+    fn check_every(&self) -> usize;
 }
 
 /// What [`AtWork`] is of a solver S.
@@ -55,10 +55,6 @@ impl<P: Problem, S: Solver<P, Work: 'static> + 'static> Erased<P> for S {
 
     fn latest(&self) -> bool {
         Solver::latest(self)
-    }
-
-    fn check_every(&self) -> usize {
-        Solver::check_every(self)
     }
 }
 
@@ -93,6 +89,10 @@ impl<P: Problem, S: Solver<P>> AtWork<P> for Working<S, S::Work> {
 
     fn account(&self) -> Vec<String> {
         self.solver.account(&self.work)
+    }
+
+    fn check_every(&self) -> usize {
+        self.solver.check_every(&self.work)
     }
 }
 
@@ -142,7 +142,7 @@ impl<P: Problem> Solver<P> for Boxed<P> {
         self.0.latest()
     }
 
-    fn check_every(&self) -> usize {
-        self.0.check_every()
+    fn check_every(&self, work: &Self::Work) -> usize {
+        work.0.check_every()
     }
 }

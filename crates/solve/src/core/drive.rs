@@ -577,7 +577,6 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         self.judge(point, 0, false);
         let mut estimate = f64::NAN;
         let mut since_judged = 0;
-        let check_every = self.solver.check_every();
         let mut claim = None;
         let status = loop {
             if self.judge.last.passes(self.limits.tolerance) {
@@ -605,7 +604,7 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 Step::Stuck(_) | Step::Done if self.scope.raised() => {}
                 ended => claim = Some(self.conclusion(ended)),
             }
-            let due = since_judged >= check_every
+            let due = since_judged >= self.solver.check_every(self.work)
                 || self.judge.calibration.promises(estimate, self.limits.tolerance);
             if due || claim.is_some() {
                 self.judge(point, iterations, claim.is_some());

@@ -65,8 +65,8 @@ pub trait Solver<P: Problem>: Send + Sync {
     }
 
     /// The number of steps between two visits of the judge, unless the estimate calls it earlier.
-    /// A judgement costs about one product with W.
-    fn check_every(&self) -> usize {
+    /// A judgement costs about one product with W. It is asked after each step.
+    fn check_every(&self, _: &Self::Work) -> usize {
         1
     }
 }

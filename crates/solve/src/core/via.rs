@@ -60,7 +60,7 @@ impl<R, S> Via<R, S> {
             _ => f64::NAN,
         };
         let going = matches!(step, Step::Continue { .. });
-        let due = work.unjudged >= self.solver.check_every()
+        let due = work.unjudged >= self.solver.check_every(&work.work)
             || work.calibration.promises(estimate, work.tolerance);
         if going && !due {
             return step;
@@ -164,7 +164,7 @@ where
         self.reformulation.approximates().is_some() || self.solver.latest()
     }
 
-    fn check_every(&self) -> usize {
-        self.solver.check_every()
+    fn check_every(&self, work: &Self::Work) -> usize {
+        self.solver.check_every(&work.work)
     }
 }

@@ -198,7 +198,7 @@ impl Solver<Mcp> for Miles {
         work.solve.account(vec![said])
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         CHECK_EVERY
     }
 }

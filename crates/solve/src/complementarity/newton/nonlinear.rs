@@ -80,7 +80,7 @@ impl<F: NewtonFunction> Solver<Mcp> for Newton<F> {
         work.solve.account(vec![])
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         CHECK_EVERY
     }
 }

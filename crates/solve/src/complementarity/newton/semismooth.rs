@@ -161,7 +161,7 @@ impl Solver<Mcp> for Semismooth {
         work.solve.account(vec![format!("crash steps {}", work.crash.steps())])
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         CHECK_EVERY
     }
 }

@@ -175,7 +175,7 @@ impl Solver<Mcp> for Smooth {
         work.solve.account(vec![format!("crash steps {crash}, last beta {beta:.1e}")])
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         CHECK_EVERY
     }
 }

@@ -496,7 +496,7 @@ impl Solver<Mcp> for PathSearch {
         )])
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         CHECK_EVERY
     }
 }

@@ -126,7 +126,7 @@ impl<P: Complementary> Solver<P> for Bard {
         said
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         super::CHECK_EVERY
     }
 }

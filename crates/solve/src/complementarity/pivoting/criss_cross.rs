@@ -120,7 +120,7 @@ impl<P: Complementary> Solver<P> for CrissCross {
         vec![work.tableau.summary()]
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         super::CHECK_EVERY
     }
 }

@@ -273,7 +273,7 @@ impl<P: Complementary> Solver<P> for Keller {
         vec![work.tableau.summary()]
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         super::CHECK_EVERY
     }
 }

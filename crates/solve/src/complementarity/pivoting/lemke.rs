@@ -341,7 +341,7 @@ impl<P: Complementary> Solver<P> for Lemke {
     }
 
     /// Bases between are no approximations: the judge need not look.
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         usize::MAX
     }
 }

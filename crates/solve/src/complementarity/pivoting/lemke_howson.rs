@@ -267,7 +267,7 @@ impl<P: Complementary> Solver<P> for LemkeHowson {
         )]
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         super::CHECK_EVERY
     }
 }

@@ -72,7 +72,7 @@ impl<M: Escaping> Solver<Mcp> for M {
         )])
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         CHECK_EVERY
     }
 }

@@ -169,7 +169,7 @@ impl<P: Bounded> Solver<P> for Mprgp {
         Step::Continue { estimate: work.at.residual / work.scale }
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         self.check_every
     }
 }

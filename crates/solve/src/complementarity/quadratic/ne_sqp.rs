@@ -70,7 +70,7 @@ impl Solver<Mcp> for NeSqp {
         work.solve.account(vec![])
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         CHECK_EVERY
     }
 }

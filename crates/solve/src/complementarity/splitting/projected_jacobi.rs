@@ -112,7 +112,7 @@ impl<P: Bounded> Solver<P> for ProjectedJacobi {
         Step::Continue { estimate: moved.sqrt() / (work.scale * self.omega) }
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         self.check_every
     }
 }

@@ -184,7 +184,7 @@ impl<P: Bounded> Solver<P> for Psor {
         Step::Continue { estimate }
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         self.check_every
     }
 }

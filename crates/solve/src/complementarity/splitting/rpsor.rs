@@ -175,7 +175,7 @@ impl<P: Bounded> Solver<P> for Rpsor {
         Step::Continue { estimate }
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         self.check_every
     }
 }

@@ -145,7 +145,7 @@ impl<P: Bounded> Solver<P> for SplittingLs {
         Step::Continue { estimate: sum.sqrt() / (*scale * self.omega) }
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         self.check_every
     }
 }

@@ -154,7 +154,7 @@ impl<P: Bounded> Solver<P> for Tnnmg {
         vec![format!("{levels} levels, {steps} steps of conjugate gradients")]
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         10
     }
 }

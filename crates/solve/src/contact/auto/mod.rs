@@ -87,6 +87,8 @@ impl Described for Auto {
 const FIRST_SWEEPS: usize = 30;
 /// Sweeps of a step.
 const SWEEPS_A_STEP: usize = 10;
+/// Steps of sweeps between two looks of the judge, each of which costs some three sweeps; other steps are judged one by one.
+const SWEEPS_JUDGED: usize = 5;
 /// A solve by Newton's method is taken to cost this many factorisations.
 const NEWTON: f64 = 10.0;
 /// The interior point begins far from any point given; below this error one is better off without it.
@@ -269,6 +271,10 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             Some(exact) => P::copy_point(exact, point),
             None => problem.complete(&mut work.state, point),
         }
+    }
+
+    fn check_every(&self, work: &Self::Work) -> usize {
+        if matches!(work.stage, Stage::Sweeps { .. }) { SWEEPS_JUDGED } else { 1 }
     }
 
     fn account(&self, work: &Self::Work) -> Vec<String> {

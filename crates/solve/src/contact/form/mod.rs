@@ -141,7 +141,14 @@ pub trait Blockwise<const D: usize>: Rows<D> {
 
     /// The impulse of contact `c` moved by `dr` (and `r` holds it already).
     fn moved(&self, state: &mut Self::State, c: usize, dr: &[f64; D]);
+
+    /// Contact `c` will be visited after [`AHEAD`] others: what the visit reads from afar may be fetched into the cache.
+    #[inline(always)]
+    fn foresee(&self, _state: &Self::State, _c: usize) {}
 }
+
+/// So many visits take as long as memory takes to answer.
+pub const AHEAD: usize = 4;
 
 /// Access contact by contact from several threads: velocities may be asked for at the same time.
 pub trait Concurrent<const D: usize>: Blockwise<D> + Contacts<D, State: Sync> + Sync {

@@ -217,6 +217,11 @@ impl<P: Blockwise<D>, const D: usize> Blockwise<D> for Regularised<P> {
     fn moved(&self, state: &mut Self::State, c: usize, dr: &[f64; D]) {
         self.base.moved(&mut state.base, c, dr);
     }
+
+    #[inline(always)]
+    fn foresee(&self, state: &Self::State, c: usize) {
+        self.base.foresee(&state.base, c);
+    }
 }
 
 impl<P: Concurrent<D>, const D: usize> Concurrent<D> for Regularised<P> {

@@ -8,7 +8,7 @@
 
 use nonsmooth_linalg::{norm, small};
 
-use crate::contact::form::{Blockwise, Disked};
+use crate::contact::form::{AHEAD, Blockwise, Disked};
 use crate::contact::law::DiskLaw;
 use crate::contact::law::cfun::natural_residual;
 use crate::contact::law::local::{LocalSolver, frictionless};
@@ -62,7 +62,11 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
         r: &mut [f64],
     ) -> f64 {
         let mut moves = 0.0;
+        let contacts = self.contacts.len();
         for (c, contact) in self.contacts.iter_mut().enumerate() {
+            if c + AHEAD < contacts {
+                problem.foresee(state, c + AHEAD);
+            }
             let old: [f64; D] = small::block(r, c);
             let mut q = problem.velocity(state, r, c);
             let own = small::mul(&contact.w, &old);

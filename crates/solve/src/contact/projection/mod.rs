@@ -68,7 +68,7 @@ impl<M: Method, P: Linear<D>, const D: usize> Solver<P> for Projected<M, D> {
         problem.complete(&mut field.state, point);
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         self.0.check_every()
     }
 }

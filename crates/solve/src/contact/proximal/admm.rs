@@ -251,7 +251,7 @@ impl<P: Linearised<D> + Frictional<D>, const D: usize> Solver<P> for OnContacts<
         problem.complete(&mut work.state, point);
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         self.0.check_every
     }
 }

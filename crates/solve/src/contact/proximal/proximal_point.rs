@@ -219,7 +219,7 @@ where
             Step::NoSolution(ray) if problem.verify(&ray) => return Step::NoSolution(ray),
             Step::NoSolution(_) => (true, false),
         };
-        if !ended && work.since < self.inner.check_every() {
+        if !ended && work.since < self.inner.check_every(&work.work) {
             return Step::Continue { estimate: f64::NAN };
         }
         work.since = 0;
@@ -252,8 +252,8 @@ where
         P::copy_point(&work.point, point);
     }
 
-    fn check_every(&self) -> usize {
-        self.inner.check_every()
+    fn check_every(&self, work: &Self::Work) -> usize {
+        self.inner.check_every(&work.work)
     }
 }
 

@@ -231,7 +231,7 @@ where
         problem.complete(&mut work.state, point);
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         self.settings.check_every
     }
 }

@@ -23,7 +23,7 @@ use nonsmooth_linalg::small;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::form::{Access, Blockwise, Disked, Frictional};
+use crate::contact::form::{AHEAD, Access, Blockwise, Disked, Frictional};
 use crate::contact::law::Rolling;
 use crate::contact::law::cone::ConvexSet;
 use crate::contact::law::local::{Exact, LocalSolver, Quartic, RollingExact};
@@ -303,8 +303,12 @@ where
         let mut moves = 0.0;
         let mut still = true;
         let settled_below = 1e-6 * *mean_move;
-        for &c in order.next_sweep() {
+        let visits = order.next_sweep();
+        for (i, &c) in visits.iter().enumerate() {
             let c = c as usize;
+            if let Some(&later) = visits.get(i + AHEAD) {
+                problem.foresee(state, later as usize);
+            }
             let contact = &mut contacts[c];
             if freeze_after > 0 && contact.settled >= freeze_after {
                 contact.settled += 1;
@@ -355,7 +359,7 @@ where
         problem.complete(&mut work.state, point);
     }
 
-    fn check_every(&self) -> usize {
+    fn check_every(&self, _: &Self::Work) -> usize {
         self.settings.check_every
     }
 }

@@ -142,7 +142,7 @@ macro_rules! solver {
                 }
             }
 
-            fn check_every(&self) -> usize {
+            fn check_every(&self, _: &Self::Work) -> usize {
                 Method::check_every(self)
             }
         }
