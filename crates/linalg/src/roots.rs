@@ -100,7 +100,7 @@ mod tests {
             (4, 4, 1.0),
             (2, 2, 9.0),
         ];
-        let a = Csc::from_triplets(5, 5, entries).unwrap();
+        let a = Csc::from_triplets(5, 5, entries.into_iter()).unwrap();
         let inverse = Inverse::new(&a, "A").unwrap();
         let roots = Roots::of(&inverse).unwrap();
         let x = [1.0, -2.0, 3.0, 0.5, -1.5];
