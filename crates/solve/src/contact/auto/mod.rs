@@ -325,6 +325,11 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
 
 const FIRST: Stage = Stage::Sweeps { claims: 0 };
 
+/// Whether sweeps that move so much, relative to ‖q‖, are on their way to infinity: before the judge sees numbers that are none.
+fn runs_away(estimate: f64) -> bool {
+    estimate.is_nan() || estimate > RUNAWAY
+}
+
 impl<const D: usize> OnContacts<Auto, D> {
     /// Puts zero in place of impulses that solve the problem no better than zero does: a bad guess must not cost anything.
     fn choose_start<P: Linearised<D> + Disked<D>>(
@@ -370,6 +375,9 @@ impl<const D: usize> OnContacts<Auto, D> {
                 break;
             }
             estimate = moves.sqrt() / work.scale;
+            if runs_away(estimate) {
+                break;
+            }
             if estimate <= 0.3 * work.tolerance && claims < SWEEPS_A_STEP {
                 work.stage = Stage::Sweeps { claims: claims + 1 };
                 return Step::Continue { estimate };
@@ -382,7 +390,7 @@ impl<const D: usize> OnContacts<Auto, D> {
                 false => Step::Stuck("sweeps send the impulses to infinity".into()),
             };
         }
-        if !estimate.is_finite() && !budget::over() {
+        if runs_away(estimate) && !budget::over() {
             // Where W is not positive semidefinite a sweep may send the impulses to infinity.
             P::impulses(point).fill(0.0);
             problem.enter(&mut work.state, point);
@@ -553,17 +561,18 @@ impl<const D: usize> OnContacts<Auto, D> {
         left: usize,
     ) -> Step {
         let count = left.min(2 * SWEEPS_A_STEP);
-        let mut moves = 0.0;
+        let mut estimate = 0.0;
         for _ in 0..count {
-            moves = work.sweep.sweep(problem, &mut work.state, P::impulses(point));
-            if budget::over() {
+            let moves = work.sweep.sweep(problem, &mut work.state, P::impulses(point));
+            estimate = moves.sqrt() / work.scale;
+            if runs_away(estimate) || budget::over() {
                 break;
             }
         }
         work.done.between += count;
-        if left > count {
+        if left > count && !runs_away(estimate) {
             work.stage = Stage::Between { left: left - count };
-            return Step::Continue { estimate: moves.sqrt() / work.scale };
+            return Step::Continue { estimate };
         }
         let Some(newton) = &mut work.newton else {
             return Step::Stuck("auto has lost its place".into());
@@ -715,6 +724,21 @@ mod tests {
         starts::<FrictionLocal<2>>(&bilateral.local().0, |p| &mut p.r);
         starts::<FrictionGlobal<3>>(&bilateral.global().0, |p| &mut p.r);
         starts::<FrictionGlobal<2>>(&planted.global().0, |p| &mut p.r);
+    }
+
+    #[test]
+    fn sweeps_that_run_away_end_no_solve() {
+        // With this much friction Gauss–Seidel diverges, and a few dozen sweeps leave the range of numbers.
+        for dofs in [100, 200] {
+            let case =
+                Planted { contacts: 200, dofs, mu: (2.0, 2.0), seed: 11, ..Planted::default() };
+            let (problem, _) = case.local::<3>();
+            let limits = Limits { max_iterations: 300, ..Limits::default() };
+            let mut auto = session("auto", &SettingsMap::new()).unwrap();
+            let outcome =
+                auto.solve(&problem, &mut problem.origin(), &limits, &mut |_| {}).unwrap();
+            assert!(matches!(outcome.status, Status::Limit(_) | Status::Solved), "{outcome:?}");
+        }
     }
 
     #[test]
