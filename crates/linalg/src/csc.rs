@@ -1,34 +1,55 @@
 //! General sparse matrices by compressed columns.
 
+use std::sync::Arc;
+
 use crate::MatrixError;
 
 /// A sparse matrix by compressed columns, row indices sorted and unique within each column.
 ///
-/// Storage: `8·nnz` bytes of values, `8·nnz` of row indices, `8·(ncols+1)` of pointers.
-#[derive(Debug, Clone, PartialEq)]
+/// Storage: `8·nnz` bytes of values, `8·nnz` of row indices, `8·(ncols+1)` of pointers. Clones share it until one of them is changed, and compare equal at no cost.
+#[derive(Debug, Clone)]
 pub struct Csc {
     nrows: usize,
     ncols: usize,
-    col_ptr: Vec<usize>,
-    row_idx: Vec<usize>,
-    values: Vec<f64>,
+    col_ptr: Arc<Vec<usize>>,
+    row_idx: Arc<Vec<usize>>,
+    values: Arc<Vec<f64>>,
+}
+
+impl PartialEq for Csc {
+    fn eq(&self, other: &Self) -> bool {
+        fn same<T: PartialEq>(a: &Arc<Vec<T>>, b: &Arc<Vec<T>>) -> bool {
+            Arc::ptr_eq(a, b) || a == b
+        }
+        (self.nrows, self.ncols) == (other.nrows, other.ncols)
+            && same(&self.col_ptr, &other.col_ptr)
+            && same(&self.row_idx, &other.row_idx)
+            && same(&self.values, &other.values)
+    }
 }
 
 impl Csc {
     /// The `nrows × ncols` zero matrix.
     pub fn zeros(nrows: usize, ncols: usize) -> Self {
-        Self { nrows, ncols, col_ptr: vec![0; ncols + 1], row_idx: vec![], values: vec![] }
+        Self::of(nrows, ncols, vec![0; ncols + 1], vec![], vec![])
+    }
+
+    /// Of arrays that fit each other.
+    fn of(
+        nrows: usize,
+        ncols: usize,
+        col_ptr: Vec<usize>,
+        row_idx: Vec<usize>,
+        values: Vec<f64>,
+    ) -> Self {
+        let (col_ptr, row_idx, values) = (col_ptr.into(), row_idx.into(), values.into());
+        Self { nrows, ncols, col_ptr, row_idx, values }
     }
 
     /// The diagonal matrix with the given diagonal.
     pub fn diagonal(d: &[f64]) -> Self {
-        Self {
-            nrows: d.len(),
-            ncols: d.len(),
-            col_ptr: (0..=d.len()).collect(),
-            row_idx: (0..d.len()).collect(),
-            values: d.to_vec(),
-        }
+        let n = d.len();
+        Self::of(n, n, (0..=n).collect(), (0..n).collect(), d.to_vec())
     }
 
     /// A matrix that takes the three arrays of compressed columns: column j has the rows `row_idx[col_ptr[j]..col_ptr[j + 1]]`, in increasing order. Nothing is copied.
@@ -78,12 +99,14 @@ impl Csc {
                 }
             }
         }
-        Ok(Self { nrows, ncols, col_ptr, row_idx, values })
+        Ok(Self::of(nrows, ncols, col_ptr, row_idx, values))
     }
 
-    /// Column pointers, row indices and values, as [`from_vecs`](Self::from_vecs) takes them.
+    /// Column pointers, row indices and values, as [`from_vecs`](Self::from_vecs) takes them. Copies what a clone shares.
     pub fn into_vecs(self) -> (Vec<usize>, Vec<usize>, Vec<f64>) {
-        (self.col_ptr, self.row_idx, self.values)
+        let (col_ptr, row_idx) =
+            (Arc::unwrap_or_clone(self.col_ptr), Arc::unwrap_or_clone(self.row_idx));
+        (col_ptr, row_idx, Arc::unwrap_or_clone(self.values))
     }
 
     /// Assembles `(row, column, value)` entries; duplicates are added in the order in which they come.
@@ -116,24 +139,24 @@ impl Csc {
             bucket[next[j]] = (i, x);
             next[j] += 1;
         }
-        let mut out = Self::zeros(nrows, ncols);
-        out.row_idx.reserve(bucket.len());
-        out.values.reserve(bucket.len());
+        let (mut row_idx, mut values) =
+            (Vec::with_capacity(bucket.len()), Vec::<f64>::with_capacity(bucket.len()));
+        let mut col_ptr = vec![0; ncols + 1];
         for j in 0..ncols {
             let column = &mut bucket[count[j]..count[j + 1]];
             column.sort_by_key(|e| e.0);
-            let start = out.row_idx.len();
+            let start = row_idx.len();
             for &(i, x) in column.iter() {
-                if out.row_idx.len() > start && *out.row_idx.last().expect("not empty") == i {
-                    *out.values.last_mut().expect("not empty") += x;
+                if row_idx.len() > start && *row_idx.last().expect("not empty") == i {
+                    *values.last_mut().expect("not empty") += x;
                 } else {
-                    out.row_idx.push(i);
-                    out.values.push(x);
+                    row_idx.push(i);
+                    values.push(x);
                 }
             }
-            out.col_ptr[j + 1] = out.row_idx.len();
+            col_ptr[j + 1] = row_idx.len();
         }
-        Ok(out)
+        Ok(Self::of(nrows, ncols, col_ptr, row_idx, values))
     }
 
     /// The same matrix without stored zeros. Cost: O(nnz); nothing is copied where there are none.
@@ -142,16 +165,16 @@ impl Csc {
         if self.values.iter().all(|x| *x != 0.0) {
             return self;
         }
-        let mut kept = Self::zeros(self.nrows, self.ncols);
+        let (mut col_ptr, mut row_idx, mut kept) = (vec![0; self.ncols + 1], vec![], vec![]);
         for j in 0..self.ncols {
             let (rows, values) = self.column(j);
             for (&i, &x) in rows.iter().zip(values).filter(|e| *e.1 != 0.0) {
-                kept.row_idx.push(i);
-                kept.values.push(x);
+                row_idx.push(i);
+                kept.push(x);
             }
-            kept.col_ptr[j + 1] = kept.values.len();
+            col_ptr[j + 1] = kept.len();
         }
-        kept
+        Self::of(self.nrows, self.ncols, col_ptr, row_idx, kept)
     }
 
     /// The number of rows.
@@ -184,14 +207,14 @@ impl Csc {
         &self.values
     }
 
-    /// Values, to be changed; the pattern stays.
+    /// Values, to be changed; the pattern stays. Copies them first where a clone shares them.
     pub fn values_mut(&mut self) -> &mut [f64] {
-        &mut self.values
+        Arc::make_mut(&mut self.values).as_mut_slice()
     }
 
     /// Column pointers, row indices, and the values to be changed: the structure stays.
     pub fn parts_mut(&mut self) -> (&[usize], &[usize], &mut [f64]) {
-        (&self.col_ptr, &self.row_idx, &mut self.values)
+        (&self.col_ptr, &self.row_idx, Arc::make_mut(&mut self.values).as_mut_slice())
     }
 
     /// Row indices and values of column `j`.
@@ -226,22 +249,21 @@ impl Csc {
 
     /// The transpose. Cost: O(nnz).
     pub fn transpose(&self) -> Self {
-        let mut out = Self::zeros(self.ncols, self.nrows);
-        for &i in &self.row_idx {
-            out.col_ptr[i + 1] += 1;
+        let mut col_ptr = vec![0; self.nrows + 1];
+        for &i in &*self.row_idx {
+            col_ptr[i + 1] += 1;
         }
         for i in 0..self.nrows {
-            out.col_ptr[i + 1] += out.col_ptr[i];
+            col_ptr[i + 1] += col_ptr[i];
         }
-        out.row_idx = vec![0; self.nnz()];
-        out.values = vec![0.0; self.nnz()];
-        let mut next = out.col_ptr.clone();
+        let (mut row_idx, mut values) = (vec![0; self.nnz()], vec![0.0; self.nnz()]);
+        let mut next = col_ptr.clone();
         for (i, j, x) in self.triplets() {
-            out.row_idx[next[i]] = j;
-            out.values[next[i]] = x;
+            row_idx[next[i]] = j;
+            values[next[i]] = x;
             next[i] += 1;
         }
-        out
+        Self::of(self.ncols, self.nrows, col_ptr, row_idx, values)
     }
 
     /// `y += a · A x`.
@@ -317,6 +339,18 @@ impl Csc {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn clones_share_until_one_is_changed() {
+        let a = Csc::from_triplets(2, 2, [(0, 0, 1.0), (1, 1, 2.0)].into_iter()).unwrap();
+        let mut b = a.clone();
+        assert!(std::ptr::eq(a.values(), b.values()) && a == b);
+        b.values_mut()[0] = 3.0;
+        assert!(a.values() == [1.0, 2.0] && b.values() == [3.0, 2.0] && a != b);
+        b.values_mut()[0] = 1.0;
+        assert_eq!(a, b);
+        assert_eq!(b.into_vecs().2, a.values());
+    }
 
     #[test]
     fn duplicates_are_added_and_zeros_kept() {
