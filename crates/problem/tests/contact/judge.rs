@@ -388,6 +388,25 @@ fn no_sliding_excuses_sinking_but_that_of_its_own_rounding() {
 }
 
 #[test]
+fn what_rounding_makes_of_the_loads_along_a_wall_is_no_sinking() {
+    // A ball at rest in a corner: what carries it at one contact holds the other's tangent still, and what is left along the normal of the wall
+    // is δ alone.
+    let own = |delta: f64| {
+        let mut w = [[0.0; 6]; 6];
+        (0..6).for_each(|i| w[i][i] = 1.0);
+        (w[1][3], w[3][1]) = (1.0, 1.0);
+        let entries = (0..36).map(|k| (k / 6, k % 6, w[k / 6][k % 6]));
+        let w = Bsr::from_csc(&Csc::from_triplets(6, 6, entries.filter(|e| e.2 != 0.0)).unwrap());
+        let q = vec![-delta, -0.1, 0.0, -0.1, 0.0, 0.0];
+        let problem = FrictionLocal::<3>::new(w, q, vec![0.5; 2]).unwrap();
+        let point = LocalPoint { r: vec![0.0, 0.0, 0.0, 0.1, 0.0, 0.0], ..problem.origin() };
+        problem.judge(&point, 1e-8).unwrap().measure.own.unwrap()
+    };
+    assert!((own(1e-10) - 1.0).abs() < 1e-5 && (own(1e-14) - 1.0).abs() < 0.1);
+    assert!(own(1e-18) < 1e-8 && own(1e-53) < 1e-8);
+}
+
+#[test]
 fn own_does_not_depend_on_the_scale_of_a_contact() {
     let (problem, point) = Planted { contacts: 8, dofs: 30, ..Planted::default() }.local::<3>();
     let mut wrong = point.clone();

@@ -436,11 +436,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         work.best.copy_from_slice(r);
         let error = newton.look(problem, state, r);
         controller.begin(error);
-        work.passed_by = self.0.interior && work.done.start == Start::Given && error < NEAR;
-        if work.passed_by {
-            controller.resume();
-        }
-        if work.passed_by || !self.0.interior {
+        if self.0.interior && work.done.start == Start::Given && error < NEAR {
+            self.pass_by(problem, point, work);
+        } else if !self.0.interior {
             self.subproblem(point, work, error);
         } else {
             self.begin_starts(problem, point, work, error);

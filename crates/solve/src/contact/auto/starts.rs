@@ -4,7 +4,7 @@
 use nonsmooth_problem::check::Kinematic;
 
 use super::alternating::Way;
-use super::{Auto, FIRST, HybridWork, NEWTON, Stage};
+use super::{Auto, FIRST, HybridWork, NEAR, NEWTON, Stage};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
 
@@ -139,9 +139,25 @@ impl<const D: usize> OnContacts<Auto, D> {
         } else {
             r.copy_from_slice(inner_best);
             controller.offer(least);
-            begin_interior(problem, work);
+            if least < NEAR {
+                self.pass_by(problem, point, work);
+            } else {
+                begin_interior(problem, work);
+            }
         }
         Step::Continue { estimate: error }
+    }
+
+    /// On to stage 5 without stage 4.
+    pub(super) fn pass_by<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) {
+        work.passed_by = true;
+        work.controller.resume();
+        self.subproblem_here(problem, point, work);
     }
 
     /// Stage 4: one iteration of the interior point; at its end the better of its best iterate and the swept point goes on.

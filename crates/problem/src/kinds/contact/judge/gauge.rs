@@ -153,8 +153,9 @@ impl LawGauge {
                 let normal = (sizes[D * c] * per).min(load);
                 // Below the range of double precision there are no digits to be right.
                 let error = share.residual.sqrt().max(apart) + left;
-                // No sliding, however fast, excuses a velocity into the obstacle, but for the rounding of the contact's own velocity.
-                let rounding = f64::EPSILON * norm(&plain_u.map(|u| u * per));
+                // No sliding, however fast, excuses a velocity into the obstacle, but for what a frame turned by its rounding makes of the
+                // contact's terms.
+                let rounding = f64::EPSILON * terms.max(norm(&plain_u.map(|u| u * per)));
                 let sinking = over((-plain_u[0] * per - rounding).max(0.0), normal.max(LEAST));
                 let of_own = over(error, terms.max(LEAST)).max(sinking);
                 if load > 0.0 && (of_own > own || of_own.is_nan()) {
