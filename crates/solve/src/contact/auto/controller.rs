@@ -103,6 +103,11 @@ impl Controller {
         self.epsilon = self.error.clamp(1e-5, 1.0);
     }
 
+    /// The error of the present point.
+    pub(super) fn error(&self) -> f64 {
+        self.error
+    }
+
     pub(super) fn epsilon(&self) -> f64 {
         self.epsilon
     }

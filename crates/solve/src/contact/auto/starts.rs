@@ -21,6 +21,8 @@ const TRIAL: usize = 30;
 /// The interior point ends after this many iterations, or below this error, or after so many iterations that did not halve the
 /// error, or so many short steps in a row.
 const INTERIOR: usize = 60;
+/// Where Newton's iterations promise to take longer than this, the interior point is worth a trial.
+const INTERIOR_COST: f64 = 20.0;
 const INTERIOR_ERROR: f64 = 1e-8;
 const INTERIOR_IDLE: usize = 10;
 const INTERIOR_SHORT: (f64, usize) = (1e-6, 6);
@@ -148,16 +150,29 @@ impl<const D: usize> OnContacts<Auto, D> {
         Step::Continue { estimate: error }
     }
 
-    /// On to stage 5 without stage 4.
+    /// On to stage 5 without stage 4, for as long as that promises more.
     pub(super) fn pass_by<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) {
-        work.passed_by = true;
         work.controller.resume();
+        work.passed_by = Some((work.done.newton, work.controller.error()));
         self.subproblem_here(problem, point, work);
+    }
+
+    /// Whether stage 4 was passed by in vain: Newton's iterations since have been too slow for what is left from this error.
+    pub(super) fn passed_by_in_vain<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        work: &HybridWork<P, D>,
+        error: f64,
+    ) -> bool {
+        work.passed_by.is_some_and(|(before, from)| {
+            let fall = (from / error).ln() / (work.done.newton - before) as f64;
+            let left = (error / work.tolerance).ln();
+            error > work.tolerance && (fall <= 0.0 || left / fall > INTERIOR_COST)
+        })
     }
 
     /// Stage 4: one iteration of the interior point; at its end the better of its best iterate and the swept point goes on.
@@ -309,6 +324,7 @@ pub(super) fn begin_interior<P: Linearised<D> + Disked<D>, const D: usize>(
     problem: &P,
     work: &mut HybridWork<P, D>,
 ) {
+    work.passed_by = None;
     let HybridWork { central, state, stage, .. } = work;
     let now = central.get_or_insert_default().begin(problem, state, 0.0, None);
     *stage = Stage::Interior { idle: 0, short: 0, least: now.error };
