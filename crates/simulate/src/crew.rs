@@ -15,7 +15,6 @@ use nonsmooth_solve::{Limits, Outcome, Session, SolveError, Status, registry};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::SimulateError;
-use crate::step::Inner;
 
 /// Islands of more contacts have a session of their own, which keeps what it knows of their pattern.
 const SMALL: usize = 32;
@@ -25,6 +24,20 @@ const ITERATIONS: usize = 30;
 /// It is solved so much better than asked for, an iteration or two, that the steps after it find the impulses good enough as they are; but no better than this.
 const FINER: f64 = 1e-3;
 const FINEST: f64 = 1e-12;
+
+/// The solver of contact problems and its limits.
+pub(crate) struct Inner<'a> {
+    pub solver: &'a str,
+    pub settings: &'a SettingsMap,
+    pub limits: &'a Limits,
+}
+
+impl Inner<'_> {
+    /// Whether the solver is the one that chooses for itself.
+    pub fn is_auto(&self) -> bool {
+        self.solver == "auto" && self.settings.is_empty()
+    }
+}
 
 /// What is asked of the solver of an island.
 #[derive(Debug, Clone, Copy, Default)]

@@ -1,12 +1,13 @@
 //! The settings of the scheme, and of the solver inside.
 
+use nonsmooth_scenes::vec3::{Vec3, add, scale};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::SimulateError;
 use crate::error::require;
 
-/// Moreau–Jean's θ-scheme for rigid bodies; the mathematics stands at the head of `step.rs`.
+/// Moreau–Jean's θ-scheme for rigid bodies; the mathematics stands at the head of `step/mod.rs`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MoreauJean {
@@ -129,6 +130,11 @@ impl Stabilisation {
 }
 
 impl MoreauJean {
+    /// `θ new + (1 − θ) old`.
+    pub(crate) fn mean(&self, old: Vec3, new: Vec3) -> Vec3 {
+        add(scale(self.theta, new), scale(1.0 - self.theta, old))
+    }
+
     /// Checks every value.
     pub(crate) fn validate(&self) -> Result<(), SimulateError> {
         let key = |name: &'static str| move || format!("integrator.{name}");
@@ -144,8 +150,16 @@ impl MoreauJean {
 }
 
 impl Activation {
+    /// γ and the slack of the forecast, where it is one.
+    pub(crate) fn forecast(self) -> Option<(f64, f64)> {
+        match self {
+            Self::Forecast { gamma, slack } => Some((gamma, slack)),
+            Self::Gap => None,
+        }
+    }
+
     pub(crate) fn validate(&self, of: &str) -> Result<(), SimulateError> {
-        let Self::Forecast { gamma, slack } = *self else { return Ok(()) };
+        let Some((gamma, slack)) = self.forecast() else { return Ok(()) };
         let key = |name: &'static str| move || format!("{of}.activation.{name}");
         require(key("gamma"), gamma, (0.0..=1.0).contains(&gamma), "a number from 0 to 1")?;
         require(key("slack"), slack, slack >= 0.0, "a number of at least 0")

@@ -1,6 +1,6 @@
 //! A body during a step: its poses, its velocities before and after, and what acts on it.
 
-use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, cross, norm, scale, sub};
+use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, cross, dot, norm, scale, sub};
 
 use crate::rotation::{Pose, apply_transposed, cayley, hat, inverse, product};
 use crate::{Gyroscopic, MoreauJean};
@@ -57,15 +57,18 @@ impl Moving {
         add(v, cross(omega, sub(p, self.start.x)))
     }
 
+    /// Its kinetic energy with these velocities.
+    pub fn kinetic(&self, v: Vec3, spin: Vec3) -> f64 {
+        0.5 * (self.mass * dot(v, v) + dot(spin, apply(&self.inertia, spin)))
+    }
+
     /// The mean of its poses before and after the step, as the last pass has it; that of rotations is no rotation.
     pub fn mean_pose(&self, scheme: &MoreauJean, h: f64) -> Pose {
         if !self.free {
             return self.middle;
         }
-        let theta = scheme.theta;
-        let mean = |old: Vec3, new: Vec3| add(scale(theta, new), scale(1.0 - theta, old));
-        let x = add(self.start.x, scale(0.5 * h, mean(self.v, self.v_new)));
-        let turn = cayley(scale(h, mean(self.spin, self.spin_new))).matrix();
+        let x = add(self.start.x, scale(0.5 * h, scheme.mean(self.v, self.v_new)));
+        let turn = cayley(scale(h, scheme.mean(self.spin, self.spin_new))).matrix();
         let end = match self.isotropic {
             true => product(&turn, &self.start.r),
             false => product(&self.start.r, &turn),
@@ -88,8 +91,7 @@ impl Moving {
             self.spin_free = add(self.spin, apply(&self.inverse, self.twist));
             return;
         }
-        let theta = scheme.theta;
-        let mean = add(scale(theta, self.spin_new), scale(1.0 - theta, self.spin));
+        let mean = scheme.mean(self.spin, self.spin_new);
         let r = self.start.r;
         let back: Mat3 = std::array::from_fn(|i| std::array::from_fn(|j| r[j][i]));
         let mut turn = hat(scale(-0.5 * h, mean));
@@ -118,7 +120,7 @@ impl Moving {
         let gyroscopic = f64::from(u8::from(scheme.gyroscopic == Gyroscopic::Split));
         let mut x = self.spin_new;
         for _ in 0..30 {
-            let mean = add(scale(theta, x), scale(1.0 - theta, self.spin));
+            let mean = scheme.mean(self.spin, x);
             let momentum = apply(j, mean);
             let inertial = apply(j, sub(x, self.spin));
             let turning = scale(gyroscopic * h, cross(mean, momentum));

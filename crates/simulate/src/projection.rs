@@ -13,9 +13,10 @@
 //! Reference: Acary2013. Cost: a detection and a frictionless problem an iteration, two as a rule; the combined one also a step for each time the index set grows.
 //! Fails (a status) where contacts and joints contradict each other, or where normals change so much that iterates do not contract.
 
+use crate::crew::Inner;
 use crate::detect::Key;
 use crate::state::State;
-use crate::step::{Inner, Tools};
+use crate::step::Tools;
 use crate::{SimulateError, World};
 
 /// Contacts that penetrate by less than this share of the smaller body, and limits violated by less, are closed.
@@ -64,7 +65,7 @@ impl Projection {
                 break;
             }
             found.moved = true;
-            if !self.tools.part((&self.rest, state), depth, inner)? {
+            if !self.tools.part(&self.rest, state, depth, inner)? {
                 break;
             }
             let pushing = self.tools.contacts.iter().filter(|c| c.impulse[0] > 0.0);

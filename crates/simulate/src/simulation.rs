@@ -5,12 +5,13 @@ use nonsmooth_scenes::vec3::{Vec3, add, cross, norm, sub};
 use nonsmooth_solve::Limits;
 use nonsmooth_solve::settings::SettingsMap;
 
+use crate::crew::Inner;
 use crate::drive::{self, Driven, Observer};
 use crate::error::{Overlap, require};
 use crate::projection::Projection;
 use crate::report::{ContactReport, RunReport, Settled, StepReport, StepStatus};
 use crate::state::State;
-use crate::step::{Inner, Tools};
+use crate::step::{Stride, Tools};
 use crate::world::oscillation;
 use crate::{BodyId, JointReport, MoreauJean, Motion, SimulateError, Stabilisation, World};
 
@@ -116,7 +117,7 @@ impl Simulation {
             }
             settled.rounds += 1;
             let Self { state, solver, settings, limits, .. } = &mut simulation;
-            tools.part((&rest, state), depth, &Inner { solver, settings, limits })?;
+            tools.part(&rest, state, depth, &Inner { solver, settings, limits })?;
         }
         let far = |(p, q): (&Vec3, &Vec3)| norm(sub(*q, *p));
         settled.moved = before.iter().zip(&simulation.state.position).map(far).fold(0.0, f64::max);
@@ -293,7 +294,7 @@ impl Simulation {
         let Self { world, scheme, state, forces, tools, .. } = self;
         let axes = state.memory.axes.clone();
         tools.insisted.clear();
-        let problem = tools.problem(scheme, (world, state), forces, h);
+        let problem = tools.problem(Stride { world, scheme, h }, state, forces);
         state.memory.axes = axes;
         problem
     }
@@ -343,8 +344,9 @@ impl Driven for Simulation {
         self.projecting()?;
         let Self { world, scheme, state, forces, tools, projection, .. } = self;
         let inner = Inner { solver: &self.solver, settings: &self.settings, limits: &self.limits };
+        let stride = Stride { world, scheme, h };
         tools.insisted.clear();
-        let mut report = tools.attempt(scheme, (world, state), forces, &inner, h)?;
+        let mut report = tools.attempt(stride, state, forces, &inner)?;
         let Some(projection) = projection
             .as_mut()
             .filter(|_| scheme.stabilisation == Stabilisation::CombinedProjection)
@@ -353,19 +355,19 @@ impl Driven for Simulation {
         };
         while report.status == StepStatus::Solved {
             let mut trial = state.clone();
-            tools.commit(scheme, world, &mut trial, h, &mut report.clone());
+            tools.commit(stride, &mut trial, &mut report.clone());
             let pushed = projection.project(world, &mut trial, &inner)?.pushed;
             if !tools.insist(&pushed) {
                 break;
             }
-            report = tools.attempt(scheme, (world, state), forces, &inner, h)?;
+            report = tools.attempt(stride, state, forces, &inner)?;
         }
         Ok(report)
     }
 
     fn take(&mut self, report: &mut StepReport, h: f64) -> Result<(), SimulateError> {
         let Self { world, scheme, state, tools, projection, .. } = self;
-        tools.commit(scheme, world, state, h, report);
+        tools.commit(Stride { world, scheme, h }, state, report);
         if let Some(projection) = projection {
             let inner =
                 Inner { solver: &self.solver, settings: &self.settings, limits: &self.limits };

@@ -1,0 +1,207 @@
+//! Bodies at the beginning of a step: what acts on them, where they are extrapolated to, how far others are looked for.
+
+use nonsmooth_scenes::Rotation;
+use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, norm, scale};
+
+use super::{Stride, Tools, are_finite};
+use crate::detect::Detector;
+use crate::joints::Joints;
+use crate::moving::Moving;
+use crate::rotation::{Pose, cayley, inverse};
+use crate::state::State;
+use crate::world::oscillation;
+use crate::{Body, Force, Geometry, Motion, World, Wrenches};
+
+/// What is the same at the beginning of every step, and the memory of forces.
+pub(super) struct Start {
+    built: Vec<Built>,
+    wrenches: Wrenches,
+    /// The state at the middle of the step, extrapolated.
+    middle: State,
+}
+
+/// What of a body never changes.
+struct Built {
+    size: f64,
+    /// The ball about the mass centre that holds what is finite of it, m.
+    reach: f64,
+    /// J⁻¹, and whether J is the same about all axes.
+    inverse: Mat3,
+    isotropic: bool,
+}
+
+impl Built {
+    fn new(body: &Body, size: f64) -> Self {
+        let finite = body.parts.iter().filter(|p| p.shape.radius().is_finite());
+        let j = &body.inertia;
+        Self {
+            size,
+            reach: finite.map(|p| norm(p.position) + p.shape.radius()).fold(0.0, f64::max),
+            inverse: if body.is_free() { inverse(j) } else { [[0.0; 3]; 3] },
+            isotropic: j[0][0] == j[1][1]
+                && j[1][1] == j[2][2]
+                && [j[0][1], j[0][2], j[1][2]] == [0.0; 3],
+        }
+    }
+}
+
+impl Start {
+    pub fn new(world: &World, state: &State, detector: &Detector) -> Self {
+        let sizes = detector.sizes(world.bodies.len());
+        let built = world.bodies.iter().zip(sizes).map(|(body, size)| Built::new(body, size));
+        Self {
+            built: built.collect(),
+            wrenches: Wrenches::default(),
+            middle: State { memory: Default::default(), ..state.clone() },
+        }
+    }
+
+    /// Asks the forces, at the middle of the step.
+    fn ask(&mut self, state: &State, forces: &mut [Box<dyn Force>], h: f64) {
+        let Self { built, wrenches, middle } = self;
+        wrenches.clear(built.len());
+        if forces.is_empty() {
+            return;
+        }
+        middle.t = state.t + 0.5 * h;
+        middle.steps = state.steps;
+        for k in 0..built.len() {
+            let to = advanced(state, k, 0.5 * h);
+            middle.position[k] = to.0;
+            middle.rotation[k] = to.1.0;
+        }
+        middle.velocity.clone_from(&state.velocity);
+        middle.spin.clone_from(&state.spin);
+        for force in forces {
+            force.add(middle, wrenches);
+        }
+    }
+
+    /// Body k, and a bound on the speed of its points.
+    fn body(&self, k: usize, stride: Stride, state: &State) -> (Moving, f64) {
+        let Stride { world, scheme, h } = stride;
+        let (body, built) = (&world.bodies[k], &self.built[k]);
+        let start = state.pose(k);
+        let free = body.is_free();
+        let weight = if free { scale(body.mass, world.gravity) } else { [0.0; 3] };
+        let push = add(weight, add(body.force, self.wrenches.force[k]));
+        let twist = add(body.torque, self.wrenches.torque[k]);
+        let omega = apply(&start.r, state.spin[k]);
+        let spin = if built.isotropic { omega } else { state.spin[k] };
+        let mut b = Moving {
+            free,
+            isotropic: built.isotropic,
+            mass: body.mass,
+            inertia: body.inertia,
+            inverse: built.inverse,
+            radius: built.reach.max(built.size),
+            start,
+            v: state.velocity[k],
+            spin,
+            push: scale(h, push),
+            twist: scale(h, twist),
+            weight,
+            middle: start,
+            end: start,
+            linear: [[0.0; 3]; 2],
+            angular: [0.0; 3],
+            frame: [[0.0; 3]; 3],
+            frame_end: [[0.0; 3]; 3],
+            v_new: state.velocity[k],
+            spin_new: spin,
+            v_free: [0.0; 3],
+            spin_free: [0.0; 3],
+            impulse: [0.0; 3],
+            moment: [0.0; 3],
+        };
+        let turns = scheme.geometry != Geometry::Frozen;
+        let mut speed = 0.0;
+        match body.motion {
+            Motion::Fixed => {}
+            Motion::Surface { linear, angular } => (b.linear, b.angular) = ([linear; 2], angular),
+            Motion::Free => {
+                speed = norm(b.v) + norm(omega) * built.reach;
+                for (pose, part) in [(&mut b.middle, 0.5), (&mut b.end, 1.0)] {
+                    if turns {
+                        let (x, q) = advanced(state, k, part * h);
+                        *pose = Pose { x, r: q.matrix() };
+                    }
+                }
+            }
+            Motion::Oscillating { amplitude, frequency, phase } => {
+                speed = norm(amplitude) * frequency.abs();
+                let at = |t: f64| oscillation(amplitude, frequency, phase, t);
+                b.linear = [at(state.t).1, at(state.t + h).1];
+                if turns {
+                    b.middle.x = add(body.position, at(state.t + 0.5 * h).0);
+                    b.end.x = add(body.position, at(state.t + h).0);
+                }
+            }
+        }
+        (b, speed)
+    }
+
+    /// Puts the extrapolated middle of the step on the joints: elsewhere equations that follow from the others where a loop is closed contradict them, and the
+    /// loop would be locked.
+    fn close_middle(
+        &mut self,
+        bodies: &mut [Moving],
+        joints: &Joints,
+        (world, state): (&World, &State),
+        h: f64,
+    ) {
+        let middle = &mut self.middle;
+        middle.t = state.t + 0.5 * h;
+        middle.memory.angles.clone_from(&state.memory.angles);
+        for (k, body) in bodies.iter().enumerate() {
+            middle.position[k] = body.middle.x;
+            middle.rotation[k] = match body.free {
+                true => advanced(state, k, 0.5 * h).1.0,
+                false => state.rotation[k],
+            };
+        }
+        joints.project(world, middle);
+        for (k, body) in bodies.iter_mut().enumerate().filter(|b| b.1.free) {
+            body.middle = middle.pose(k);
+        }
+    }
+}
+
+impl Tools {
+    /// Bodies at the beginning of a step, with forces and margins; false where something is no finite number.
+    pub(super) fn begin(
+        &mut self,
+        stride: Stride,
+        state: &State,
+        forces: &mut [Box<dyn Force>],
+    ) -> bool {
+        let Stride { world, scheme, h } = stride;
+        self.start.ask(state, forces, h);
+        let gravity = norm(world.gravity);
+        let (gamma, slack) = scheme.activation.forecast().unwrap_or((1.0, 0.0));
+        self.bodies.clear();
+        self.margins.clear();
+        let mut finite = true;
+        for k in 0..world.bodies.len() {
+            let (mut body, speed) = self.start.body(k, stride, state);
+            let fall = if body.free { h * h * gravity } else { 0.0 };
+            let least = (1e-6_f64).max(slack) * self.start.built[k].size;
+            self.margins.push((gamma + 1.0) * h * speed + fall + least);
+            finite &= are_finite(body.push.into_iter().chain(body.twist));
+            if body.free {
+                body.rotate(scheme, h);
+            }
+            self.bodies.push(body);
+        }
+        if self.joints.redundant.is_some() && scheme.geometry != Geometry::Frozen {
+            self.start.close_middle(&mut self.bodies, &self.joints, (world, state), h);
+        }
+        finite
+    }
+}
+
+/// Position and rotation of a body after it has moved for a time with its velocities.
+fn advanced(state: &State, k: usize, time: f64) -> (Vec3, Rotation) {
+    let x = add(state.position[k], scale(time, state.velocity[k]));
+    (x, Rotation(state.rotation[k]).after(cayley(scale(time, state.spin[k]))))
+}

@@ -1,0 +1,319 @@
+//! From points where bodies are near to contacts of the index set: which take part, along which directions, with which law.
+
+use nonsmooth_scenes::vec3::{Vec3, add, cross, dot, norm, scale, sub};
+
+use super::frame::{apart, frame, tangent_axis, transported};
+use super::{NONE, Stride, Tools};
+use crate::detect::{Key, Near, Place};
+use crate::moving::Moving;
+use crate::state::{Remembered, State};
+use crate::{Activation, Compliance, Geometry, Impact};
+
+/// Directions that differ by less are the same, relative.
+const SAME: f64 = 1e-13;
+
+/// One side of a contact.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Arm {
+    pub body: u32,
+    pub sign: f64,
+    pub free: bool,
+    /// `(p − x) × d` in the world frame, for impulses and for velocities.
+    pub moment: [Vec3; 3],
+    pub moment_end: [Vec3; 3],
+}
+
+/// A contact of the index set.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row {
+    pub mu: f64,
+    /// What a normal impulse gives way by, over it.
+    pub compliance: f64,
+    pub place: Place,
+    /// Directions of impulses and of velocities.
+    pub frame: [Vec3; 3],
+    pub frame_end: [Vec3; 3],
+    /// Whether velocities are taken elsewhere than impulses.
+    pub later: bool,
+    pub arms: [Arm; 2],
+    /// Velocity of what is moved, along the directions: at the end of the step (in the law), and weighted by θ (in the energy).
+    pub given: [f64; 3],
+    pub given_mean: [f64; 3],
+    /// The same at the end of the step, along the directions of impulses.
+    given_middle: [f64; 3],
+    /// Relative velocity at the beginning.
+    pub before: [f64; 3],
+    /// What the law adds to u⁺.
+    pub shift: [f64; 3],
+    pub r: [f64; 3],
+    /// Of rolling friction: the coefficient, the moments, and the given angular velocity of what is moved, in the law and in the energy.
+    pub mu_r: f64,
+    pub moment: [f64; 2],
+    pub turned: [f64; 2],
+    pub turned_mean: [f64; 2],
+    pub warm: bool,
+}
+
+impl Row {
+    /// The arms on bodies that move freely.
+    pub fn free_arms(&self) -> impl Iterator<Item = &Arm> {
+        self.arms.iter().filter(|a| a.free)
+    }
+
+    /// Its bodies, with [`NONE`] for one that does not move freely.
+    pub fn free_bodies(&self) -> [u32; 2] {
+        self.arms.each_ref().map(|a| if a.free { a.body } else { NONE })
+    }
+
+    /// What velocities v and ω of an arm's body make along direction i of the impulses.
+    pub fn rate(&self, arm: &Arm, i: usize, v: Vec3, omega: Vec3) -> f64 {
+        arm.sign * (dot(self.frame[i], v) + dot(arm.moment[i], omega))
+    }
+
+    /// Takes velocities where impulses are.
+    fn at_the_middle(&mut self) {
+        self.later = false;
+        self.frame_end = self.frame;
+        self.given = self.given_middle;
+        self.arms.iter_mut().for_each(|a| a.moment_end = a.moment);
+    }
+}
+
+/// A point where two bodies are near, at the beginning of a step.
+struct Meeting<'a> {
+    stride: Stride<'a>,
+    near: &'a Near,
+    known: Option<Remembered>,
+    bodies: [&'a Moving; 2],
+    /// The velocity of the gap.
+    approach: f64,
+}
+
+impl<'a> Meeting<'a> {
+    fn new(
+        stride: Stride<'a>,
+        near: &'a Near,
+        known: Option<Remembered>,
+        bodies: &'a [Moving],
+    ) -> Self {
+        let sides @ [a, b] = [near.a, near.b].map(|i| &bodies[i as usize]);
+        let Place { normal, point, .. } = near.place;
+        let approach = dot(normal, sub(b.velocity_at(point), a.velocity_at(point)));
+        Self { stride, near, known, bodies: sides, approach }
+    }
+
+    /// Whether it took part in the last step.
+    fn persists(&self) -> bool {
+        self.known.is_some_and(|m| m.active)
+    }
+
+    fn is_extrapolated(&self) -> bool {
+        self.stride.scheme.geometry != Geometry::Frozen
+    }
+
+    /// The index set.
+    fn takes_part(&self) -> bool {
+        let (gap, h, n) = (self.near.place.gap, self.stride.h, self.near.place.normal);
+        // A spring acts where it is compressed at the end of the step.
+        if self.near.compliance.is_some() {
+            return gap + h * self.approach.min(0.0) <= 0.0;
+        }
+        let Activation::Forecast { gamma, slack } = self.stride.scheme.activation else {
+            return true;
+        };
+        let beyond = gap + gamma * h * self.approach - slack * self.near.size;
+        // What runs along a curved surface leaves it by as much as a step is curved: that is no separation.
+        let curved = || {
+            let [a, b] = self.bodies;
+            let end = self.near.witness.place(&a.end, &b.end, n);
+            beyond <= norm(sub(end.normal, n)) * norm(sub(end.point, self.near.place.point))
+        };
+        beyond <= 0.0 || (self.persists() && self.is_extrapolated() && curved())
+    }
+
+    /// A body that nothing moves has no momentum to keep: the arm ends on the surface of the other one. Else both arms end midway.
+    fn on_surface(&self, place: Place) -> Place {
+        let [a, b] = self.bodies.map(|b| f64::from(u8::from(b.free)));
+        let half = 0.5 * (b - a);
+        Place { point: add(place.point, scale(half * place.gap, place.normal)), ..place }
+    }
+
+    /// The contact, with tangents after an axis of the world and impulses of the last step `scaled`.
+    fn row(&self, axis: u8, scaled: f64) -> Row {
+        let Self { near, bodies: [a, b], .. } = self;
+        let n = near.place.normal;
+        let middle = near.witness.place(&a.middle, &b.middle, n);
+        let middle = Place { normal: if near.deep { n } else { middle.normal }, ..middle };
+        let place = self.on_surface(middle);
+        let frame = frame(place.normal, axis);
+        // An impact has one direction; what persists has its velocity where it comes to.
+        let lasting =
+            self.persists() && (near.law.e == 0.0 || self.approach >= -self.stride.rest());
+        let later = lasting && self.is_extrapolated() && !near.deep;
+        let (place_end, mut frame_end) = match later {
+            true => {
+                let end = self.on_surface(near.witness.place(&a.end, &b.end, place.normal));
+                (end, transported(&frame, end.normal))
+            }
+            false => (place, frame),
+        };
+        let arm = |k: usize| {
+            let b = self.bodies[k];
+            let x_end = if later { b.end.x } else { b.middle.x };
+            Arm {
+                body: [near.a, near.b][k],
+                sign: [-1.0, 1.0][k],
+                free: b.free,
+                moment: frame.map(|d| cross(sub(place.point, b.middle.x), d)),
+                moment_end: frame_end.map(|d| cross(sub(place_end.point, x_end), d)),
+            }
+        };
+        let mut arms = [arm(0), arm(1)];
+        // Where nothing moves the two ends are the same up to rounding; then W is symmetric to the last bit.
+        let turned = arms.iter().map(|a| apart(&a.moment, &a.moment_end)).fold(0.0, f64::max);
+        let later = later && (apart(&frame, &frame_end) > SAME || turned > SAME * near.size);
+        if !later {
+            frame_end = frame;
+            arms.iter_mut().for_each(|a| a.moment_end = a.moment);
+        }
+        let mut row = Row {
+            mu: near.law.mu,
+            compliance: 0.0,
+            place,
+            frame,
+            frame_end,
+            later,
+            arms,
+            given: [0.0; 3],
+            given_mean: [0.0; 3],
+            given_middle: [0.0; 3],
+            before: [0.0; 3],
+            shift: [0.0; 3],
+            r: [0.0; 3],
+            mu_r: near.law.mu_r,
+            moment: [0.0; 2],
+            turned: [0.0; 2],
+            turned_mean: [0.0; 2],
+            warm: self.known.is_some_and(|m| m.impulse != [0.0; 3]),
+        };
+        self.take_velocities(&mut row, place_end.point);
+        self.take_law(&mut row, lasting);
+        if let Some(m) = self.known {
+            row.r = m.impulse_along(&frame, scaled, row.mu);
+            if row.mu_r > 0.0 {
+                row.moment = m.moment_along(&frame, scaled, (row.mu_r, row.r[0]));
+            }
+        }
+        row
+    }
+
+    /// The relative velocity at the beginning, and those of what is moved, which at the end of the step is taken at a point of its own.
+    fn take_velocities(&self, row: &mut Row, point_end: Vec3) {
+        let theta = self.stride.scheme.theta;
+        for (arm, m) in row.arms.iter().zip(self.bodies) {
+            if m.free {
+                let omega = m.omega(m.spin);
+                for i in 0..3 {
+                    row.before[i] += row.rate(arm, i, m.v, omega);
+                }
+                continue;
+            }
+            let [first, last] = m.linear;
+            let turn = |p: Vec3| cross(m.angular, sub(p, m.start.x));
+            let (mid, end) = (turn(row.place.point), turn(point_end));
+            for i in 0..3 {
+                let of = |v: Vec3| arm.sign * dot(row.frame[i], add(v, mid));
+                row.before[i] += of(first);
+                row.given[i] += arm.sign * dot(row.frame_end[i], add(last, end));
+                row.given_middle[i] += of(last);
+                row.given_mean[i] += theta * of(last) + (1.0 - theta) * of(first);
+            }
+            for k in 0..2 {
+                row.turned[k] += arm.sign * dot(row.frame_end[1 + k], m.angular);
+                row.turned_mean[k] += arm.sign * dot(row.frame[1 + k], m.angular);
+            }
+        }
+    }
+
+    /// What the law adds to u⁺, and what it lets give way.
+    fn take_law(&self, row: &mut Row, lasting: bool) {
+        let Self { near, stride: Stride { scheme, h, .. }, .. } = self;
+        let (law, gap, before) = (near.law, near.place.gap, row.before);
+        let share = match scheme.impact {
+            Impact::Fremond if !(lasting && self.known.is_some_and(|m| m.stuck)) => {
+                (1.0 - scheme.theta) / scheme.theta
+            }
+            _ => law.e_t,
+        };
+        row.shift = [0.0, share * before[1], share * before[2]];
+        // Restitution on approach only, and in the gap's form only where it is closed.
+        let closed = scheme.activation != Activation::Gap || gap <= 0.0;
+        if closed && before[0] < -scheme.restitution_threshold {
+            row.shift[0] = law.e * before[0];
+        }
+        if let Some(Compliance { stiffness, damping }) = near.compliance {
+            let resistance = damping + h * stiffness;
+            row.shift[0] = stiffness * gap / resistance;
+            row.compliance = 1.0 / (h * resistance);
+        } else if scheme.activation == Activation::Gap {
+            row.shift[0] += gap.max(0.0) / h;
+        }
+    }
+}
+
+impl Tools {
+    /// Index set, frames, warm starts; rows of joints; islands.
+    pub(super) fn meet(&mut self, stride: Stride, state: &State) {
+        let Self { near, recalled, axes, row_of, rows, bodies, .. } = self;
+        recalled.recall(&state.memory.contacts, near);
+        rows.clear();
+        row_of.clear();
+        axes.clear();
+        let scaled = state.memory.scaled(stride.h);
+        for (near, &known) in near.iter().zip(&recalled.known) {
+            let axis = tangent_axis(near.place.normal, known.map(|m| m.axis));
+            axes.push(axis);
+            let meeting = Meeting::new(stride, near, known, bodies);
+            if meeting.takes_part() || self.insisted.binary_search(&near.key).is_ok() {
+                row_of.push(rows.len() as u32);
+                rows.push(meeting.row(axis, scaled));
+            } else {
+                row_of.push(NONE);
+            }
+        }
+        self.joints.begin(stride.scheme, stride.world, state, bodies, stride.h);
+        self.join();
+    }
+
+    /// Islands of contacts and rows.
+    fn join(&mut self) {
+        let Self { rows, joints, islands, bodies, .. } = self;
+        let contacts = rows.iter().map(Row::free_arms);
+        let scalars = (0..joints.rows.len()).map(|k| joints.levers(k));
+        islands.find(bodies.len(), |join| {
+            contacts.for_each(|arms| join(&mut arms.map(|a| a.body)));
+            scalars.for_each(|levers| join(&mut levers.iter().map(|l| l.body)));
+        });
+        // Where rows of joints act on a body its contacts have one direction for impulses and velocities: a problem has one V for both.
+        if !joints.rows.is_empty() {
+            let mut jointed = vec![false; bodies.len()];
+            for k in 0..joints.rows.len() {
+                joints.levers(k).iter().for_each(|l| jointed[l.body as usize] = true);
+            }
+            let touched = |row: &Row| row.free_arms().any(|a| jointed[a.body as usize]);
+            rows.iter_mut().filter(|row| row.later && touched(row)).for_each(Row::at_the_middle);
+        }
+    }
+
+    /// Takes contacts of the last attempt that were open into the index set of the next ones; whether there was one.
+    pub fn insist(&mut self, pushed: &[Key]) -> bool {
+        let before = self.insisted.len();
+        for (near, &row) in self.near.iter().zip(&self.row_of) {
+            if row == NONE && pushed.contains(&near.key) {
+                self.insisted.push(near.key);
+            }
+        }
+        self.insisted.sort_unstable();
+        self.insisted.len() > before
+    }
+}

@@ -1,0 +1,98 @@
+//! Two contacts feel each other through the bodies that they share: columns of the bodies, and blocks of W as their products.
+
+use nonsmooth_scenes::vec3::{Vec3, apply};
+
+use super::NONE;
+use super::contact::{Arm, Row};
+use crate::moving::Moving;
+
+/// Six components of a body for each direction of a contact; the fourth place is for the processor.
+pub(super) type Columns = [[f64; 4]; 6];
+
+/// What one side of a contact is in the problem, in the frames of a pass. Apart from the contact, for it is written later, and large.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Side {
+    /// Velocities of the body to relative velocities, and impulses to velocities of the body.
+    pub rows: Columns,
+    pub solved: Columns,
+}
+
+impl Side {
+    /// Writes the side of a contact with a body that moves freely.
+    pub fn write(&mut self, row: &Row, arm: &Arm, b: &Moving) {
+        for i in 0..3 {
+            let column = apply(&b.frame, arm.moment[i]);
+            let turned = match row.later {
+                true => apply(&b.frame_end, arm.moment_end[i]),
+                false => column,
+            };
+            let solved = apply(&b.inverse, column);
+            for k in 0..3 {
+                self.rows[k][i] = arm.sign * row.frame_end[i][k];
+                self.rows[3 + k][i] = arm.sign * turned[k];
+                self.solved[k][i] = arm.sign * row.frame[i][k] / b.mass;
+                self.solved[3 + k][i] = arm.sign * solved[k];
+            }
+        }
+    }
+
+    /// Component i of the relative velocity that the body makes with these velocities.
+    pub fn velocity(&self, i: usize, (v, spin): (Vec3, Vec3)) -> f64 {
+        (0..3).map(|k| self.rows[k][i] * v[k] + self.rows[3 + k][i] * spin[k]).sum()
+    }
+}
+
+/// The block of W of two contacts, with their free bodies, a sum over those that they share. With AVX2 (found at run time) four numbers at once and the same bits: nothing is fused.
+#[inline]
+pub(super) fn coupling(
+    row: ([u32; 2], &[Side; 2]),
+    other: ([u32; 2], &[Side; 2]),
+) -> [[f64; 3]; 3] {
+    let mut sum = [[0.0; 4]; 3];
+    for (p, left) in row.0.iter().zip(row.1).filter(|p| *p.0 != NONE) {
+        for (_, right) in other.0.iter().zip(other.1).filter(|q| q.0 == p) {
+            #[cfg(target_arch = "x86_64")]
+            if std::arch::is_x86_feature_detected!("avx2") {
+                // SAFETY: the processor has what the function is compiled for.
+                unsafe { add_product_avx2(&mut sum, &left.rows, &right.solved) };
+                continue;
+            }
+            add_product(&mut sum, &left.rows, &right.solved);
+        }
+    }
+    sum.map(|[x, y, z, _]| [x, y, z])
+}
+
+/// `sum += leftᵀ right`.
+#[inline]
+fn add_product(sum: &mut [[f64; 4]; 3], left: &Columns, right: &Columns) {
+    for (left, right) in left.iter().zip(right) {
+        for i in 0..3 {
+            for j in 0..4 {
+                sum[i][j] += left[i] * right[j];
+            }
+        }
+    }
+}
+
+/// The same.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn add_product_avx2(sum: &mut [[f64; 4]; 3], left: &Columns, right: &Columns) {
+    use std::arch::x86_64::{
+        _mm256_add_pd, _mm256_loadu_pd, _mm256_mul_pd, _mm256_set1_pd, _mm256_storeu_pd,
+    };
+    // SAFETY: each pointer is to an array of four numbers.
+    let mut rows = [0, 1, 2].map(|i: usize| unsafe { _mm256_loadu_pd(sum[i].as_ptr()) });
+    for (left, right) in left.iter().zip(right) {
+        // SAFETY: as above.
+        let right = unsafe { _mm256_loadu_pd(right.as_ptr()) };
+        for i in 0..3 {
+            rows[i] = _mm256_add_pd(rows[i], _mm256_mul_pd(_mm256_set1_pd(left[i]), right));
+        }
+    }
+    for (sum, row) in sum.iter_mut().zip(rows) {
+        // SAFETY: as above.
+        unsafe { _mm256_storeu_pd(sum.as_mut_ptr(), row) };
+    }
+}

@@ -1,0 +1,36 @@
+//! Frames `[N, T1, T2]` of contacts that turn with them and with nothing else.
+
+use nonsmooth_scenes::vec3::{Vec3, add, cross, dot, norm, scale, sub};
+
+/// The axis of the world whose part across the normal makes the first tangent: that of the last step unless it has come near the normal.
+pub(super) fn tangent_axis(n: Vec3, last: Option<u8>) -> u8 {
+    const NEAR: f64 = 0.9;
+    if let Some(axis) = last
+        && n[axis as usize].abs() <= NEAR
+    {
+        return axis;
+    }
+    let least = |a: u8, b: u8| if n[b as usize].abs() < n[a as usize].abs() { b } else { a };
+    least(least(0, 1), 2)
+}
+
+/// `[N, T1, T2]`, right-handed.
+pub(super) fn frame(n: Vec3, axis: u8) -> [Vec3; 3] {
+    let mut e = [0.0; 3];
+    e[axis as usize] = 1.0;
+    let t = sub(e, scale(n[axis as usize], n));
+    let t = scale(1.0 / norm(t), t);
+    [n, t, cross(n, t)]
+}
+
+/// The frame turned so that its normal becomes n, on the shortest way: what a frame built anew would turn about the normal would turn friction with it.
+pub(super) fn transported(frame: &[Vec3; 3], n: Vec3) -> [Vec3; 3] {
+    let sum = add(frame[0], n);
+    let tangent = |t: Vec3| sub(t, scale(dot(n, t) / (1.0 + dot(frame[0], n)), sum));
+    [n, tangent(frame[1]), tangent(frame[2])]
+}
+
+/// The largest distance between vectors of two frames, or of arms along them.
+pub(super) fn apart(p: &[Vec3; 3], q: &[Vec3; 3]) -> f64 {
+    (0..3).map(|i| norm(sub(p[i], q[i]))).fold(0.0, f64::max)
+}

@@ -1,0 +1,209 @@
+//! One step of Moreau–Jean's θ-scheme for rigid bodies.
+//!
+//! With Ω in the body frame, `v_θ = θ v⁺ + (1 − θ) v_k`, impulses r over the whole step and d each of the three directions of a contact,
+//!
+//! ```text
+//! m (v⁺ − v_k) = h (m g + F) + Σ ± d r,                                        x⁺ = x_k + h v_θ
+//! J (Ω⁺ − Ω_k) + h Ω_θ × J Ω_θ = (I − ½ h Ω̂_θ) R_kᵀ (h τ + Σ ± (p − x) × d r),   R⁺ = R_k cay(h Ω_θ)
+//! K* ∋ u⁺ + w + mu‖u_T⁺ + w_T‖ e_N  ⟂  r ∈ K,   w_N = e min(u_{N,k}, 0),   w_T = e_T u_{T,k}   for the contacts of the index set, r = 0 elsewhere.
+//! ```
+//!
+//! `(I − ½ h Ω̂_θ) R_kᵀ` is the inverse of the mean of R_k and R⁺ at θ = ½: a torque that is fixed in space changes the momentum in space by just that, and
+//! `Ω_θ · (…) = (R_k Ω_θ) · L`, so momentum and energy are exact at any h. Bodies whose inertia is isotropic have
+//! no gyroscopic torque; their velocities are taken in the world frame, where nothing has to be solved.
+//!
+//! Method: bodies move freely, contacts of the index set (`g + γ h u_N ≤ 0`) get their directions at the extrapolated midpoint, islands are solved as
+//! local problems in r by sessions of the project's solvers ([`crate::crew`]), judged by the problem's own judge. Gyroscopic torque and the frames of torques are those of the last
+//! pass; with the impulses found each body's rotation is solved exactly, and where that moves no velocity by more than the tolerance, the step is done.
+//! A large island that is slow and whose contacts are new is first asked whether it may stay at rest ([`crate::crew`]): a pile that can stand stands.
+//! A persistent contact has the velocity in its law at the extrapolated end of the step. Frémond's law has `w_T = (1 − θ)/θ u_{T,k}`: u_θ in place of u⁺.
+//!
+//! References: Moreau1988 and Jean1999 for the scheme, Acary2016 for its energy, SimoWong1991 for the rotation, Acary2018 for the index set.
+//!
+//! Energy: `T⁺ − T_k = Σ u_θ · r − s_θ · r + h v_θ · (m g + F) + h ω_θ · τ − (θ − ½) ‖v⁺ − v_k‖²_M`, s the velocity of surfaces that are moved; what is left is rounding.
+//! Cost: W has a block for each pair of contacts that share a body. Fails (a status, never silence) where a contact problem is not solved, or where h ‖Ω‖ is so
+//! large that passes do not contract.
+
+mod apart;
+mod begin;
+mod contact;
+mod couple;
+mod energy;
+mod frame;
+mod memory;
+mod problem;
+mod solve;
+mod take;
+
+use std::time::Instant;
+
+use nonsmooth_problem::Friction;
+use nonsmooth_scenes::vec3::norm;
+
+use crate::crew::{Crew, Inner, Slot};
+use crate::detect::{Detector, Key, Near};
+use crate::islands::Islands;
+use crate::joints::Joints;
+use crate::moving::Moving;
+use crate::report::{ContactReport, StepReport, StepStatus, Timings};
+use crate::state::State;
+use crate::{Force, MoreauJean, SimulateError, World};
+
+use begin::Start;
+use contact::Row;
+use memory::Recalled;
+use problem::{Island, Statement};
+
+/// No body, no row.
+const NONE: u32 = u32::MAX;
+
+/// A step of a world by a scheme, of length h in s.
+#[derive(Clone, Copy)]
+pub(crate) struct Stride<'a> {
+    pub world: &'a World,
+    pub scheme: &'a MoreauJean,
+    pub h: f64,
+}
+
+impl Stride<'_> {
+    /// What is slower than this, m/s, is at rest but for the weight of a step or two.
+    fn rest(&self) -> f64 {
+        2.0 * self.h * norm(self.world.gravity)
+    }
+}
+
+/// All memory of a simulation that is not its state.
+pub(crate) struct Tools {
+    detector: Detector,
+    start: Start,
+    bodies: Vec<Moving>,
+    /// How far from each body others are looked for, m.
+    margins: Vec<f64>,
+    /// The points where bodies are near each other; for each what is remembered of it, the axis of its tangents, and its row if it has one.
+    near: Vec<Near>,
+    recalled: Recalled,
+    axes: Vec<u8>,
+    row_of: Vec<u32>,
+    /// The index set.
+    rows: Vec<Row>,
+    /// Contacts that take part whatever the forecast says, sorted.
+    pub insisted: Vec<Key>,
+    pub joints: Joints,
+    islands: Islands,
+    island: Island,
+    statement: Statement,
+    /// The problems of the islands, and which are not solved yet.
+    slots: Vec<Slot>,
+    open: Vec<u32>,
+    crew: Crew,
+    pub contacts: Vec<ContactReport>,
+}
+
+impl Tools {
+    pub fn new(world: &World, state: &State) -> Result<Self, SimulateError> {
+        let detector = Detector::new(world)?;
+        let mut joints = Joints::new(world);
+        joints.redundant = joints.redundant(world, state);
+        Ok(Self {
+            start: Start::new(world, state, &detector),
+            detector,
+            bodies: vec![],
+            margins: vec![],
+            near: vec![],
+            recalled: Recalled::default(),
+            axes: vec![],
+            row_of: vec![],
+            rows: vec![],
+            insisted: vec![],
+            joints,
+            islands: Islands::default(),
+            island: Island::of(world.bodies.len()),
+            statement: Statement::default(),
+            slots: vec![],
+            open: vec![],
+            crew: Crew::new(1),
+            contacts: vec![],
+        })
+    }
+
+    /// Lets so many threads solve islands and look for contacts, 0 for one a core.
+    pub fn set_threads(&mut self, threads: usize) {
+        self.crew = Crew::new(threads);
+    }
+
+    /// How many threads were asked for.
+    pub fn threads(&self) -> usize {
+        self.crew.threads
+    }
+
+    /// Everything up to the velocities after the step; the state is as before but for the axes of its memory.
+    pub fn attempt(
+        &mut self,
+        stride: Stride,
+        state: &mut State,
+        forces: &mut [Box<dyn Force>],
+        inner: &Inner,
+    ) -> Result<StepReport, SimulateError> {
+        let begun = Instant::now();
+        let mut timings = Timings::default();
+        let mut report = StepReport::begun(state.t, stride.h);
+        if !self.begin(stride, state, forces) {
+            report.status = StepStatus::NotFinite;
+            report.timings.total = begun.elapsed().as_secs_f64();
+            return Ok(report);
+        }
+        let detecting = Instant::now();
+        self.detect(stride.world, state);
+        timings.detection = detecting.elapsed().as_secs_f64();
+        self.meet(stride, state);
+        let mut solved = self.solve(stride, inner)?;
+        let new = self.bodies.iter().flat_map(|b| [b.v_new, b.spin_new]).flatten();
+        if !are_finite(new) {
+            solved.status = StepStatus::NotFinite;
+        }
+        report.energy = self.energy(stride, state);
+        self.count(&mut report);
+        timings.solve = solved.seconds;
+        timings.total = begun.elapsed().as_secs_f64();
+        timings.assembly = timings.total - timings.solve - timings.detection;
+        report.timings = timings;
+        solved.tell(&mut report);
+        Ok(report)
+    }
+
+    /// The contact problem of a step in the first pass, all islands together; none without contacts and rows of joints.
+    pub fn problem(
+        &mut self,
+        stride: Stride,
+        state: &mut State,
+        forces: &mut [Box<dyn Force>],
+    ) -> Result<Option<Friction>, SimulateError> {
+        if !self.begin(stride, state, forces) {
+            return Ok(None);
+        }
+        self.detect(stride.world, state);
+        self.meet(stride, state);
+        if self.rows.is_empty() && self.joints.rows.is_empty() {
+            return Ok(None);
+        }
+        self.provide(1)?;
+        self.gather_all();
+        self.state(stride, 0);
+        let slot = &self.slots[0];
+        Ok(Some(match &slot.rolling {
+            Some(problem) => Friction::RollingLocal(problem.clone()),
+            None => Friction::Local3(slot.problem.clone()),
+        }))
+    }
+
+    /// The points where bodies are near each other.
+    fn detect(&mut self, world: &World, state: &mut State) {
+        let Self { detector, margins, crew, near, .. } = self;
+        detector.detect(world, state, margins, crew.pool(), near);
+    }
+}
+
+/// Whether no number is infinite or none: of those 0 x is none.
+fn are_finite(numbers: impl Iterator<Item = f64>) -> bool {
+    numbers.map(|x| 0.0 * x).sum::<f64>() == 0.0
+}
