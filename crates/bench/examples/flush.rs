@@ -50,6 +50,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             bodies: (0..bodies).map(state).collect(),
             contacts: (0..4).map(contact).collect(),
             joints: vec![],
+            elastic: vec![],
         });
         run.steps.push(Step { number: k, time: t, status: "solved".into(), ..Step::default() });
         if !k.is_multiple_of(500) {

@@ -124,6 +124,35 @@ fn trajectories_keep_joints() {
 }
 
 #[test]
+fn elastic_boxes_move_in_all_files() {
+    let folder = Folder::new();
+    let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let scene = scene.join("../../examples/scenes/rubber_block.toml").display().to_string();
+    let files = "--out run.h5 --html run.html --vtk run.pvd --svg run.svg";
+    let ran = folder.run(&format!("simulate {scene} --every 10 --end 0.1 {files}")).exits(0);
+    assert!(ran.stdout.contains("1 elastic solid"), "{}", ran.stdout);
+    let read = || nonsmooth_io::trajectory::Trajectory::read(folder.path("run.h5")).unwrap();
+    let run = read();
+    assert_eq!((&run.elastic[..], run.bodies.len()), (&["block".to_string()][..], 2));
+    let last = run.frames.last().unwrap();
+    let nodes = &last.elastic[0];
+    assert_eq!(nodes.len(), 7 * 5 * 7);
+    let mean = nodes.iter().map(|x| x[0]).sum::<f64>() / nodes.len() as f64;
+    assert!((mean - last.bodies[1].position[0]).abs() < 1e-12 && mean > 0.1, "{mean}");
+    assert!(last.contacts.iter().all(|c| (c.a, c.b) == (0, 1)) && !last.contacts.is_empty());
+    // What is gone on from is what would have been.
+    folder.run(&format!("simulate {scene} --every 10 --end 0.2 --out whole.h5")).exits(0);
+    folder.run(&format!("simulate {scene} --every 10 --end 0.2 --resume run.h5")).exits(0);
+    let whole = nonsmooth_io::trajectory::Trajectory::read(folder.path("whole.h5")).unwrap();
+    assert_eq!(read().frames, whole.frames);
+    folder.run("play run.h5 --html again.html --vtk again.pvd --glb again.glb").exits(0);
+    let settle = folder.run(&format!("simulate {scene} --settle"));
+    settle.refused(&["elastic", "rigid bodies alone"]);
+    let typo = folder.run(&format!("simulate {scene} --set elastic[0].yung=1"));
+    typo.refused(&["elastic[0].yung", "young"]);
+}
+
+#[test]
 fn families_of_gen_move() {
     let folder = Folder::new();
     let run = folder.run("simulate stack --set count=3 --end 0.05").exits(0);

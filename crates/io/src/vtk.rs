@@ -67,11 +67,17 @@ fn escape(text: &str) -> String {
 fn bodies(trajectory: &Trajectory, frame: &Frame, meshes: &[Vec<Mesh>]) -> String {
     let (mut points, mut velocities): (Vec<f32>, Vec<f32>) = (vec![], vec![]);
     let (mut corners, mut ends, mut body, mut fixed) = (vec![], vec![], vec![], vec![]);
+    let rigid = frame.bodies.len() - frame.elastic.len();
     for (k, (state, meshes)) in frame.bodies.iter().zip(meshes).enumerate() {
+        // Of an elastic solid the vertices are its nodes.
+        let nodes = k.checked_sub(rigid).map(|e| &frame.elastic[e]);
         for mesh in meshes {
             let first = (points.len() / 3) as i32;
-            for &vertex in &mesh.vertices {
-                let arm = state.turned(vertex);
+            for (v, &vertex) in mesh.vertices.iter().enumerate() {
+                let arm = match nodes.and_then(|nodes| nodes.get(v)) {
+                    Some(node) => std::array::from_fn(|d| node[d] - state.position[d]),
+                    None => state.turned(vertex),
+                };
                 let spin = cross(state.angular_velocity, arm);
                 points.extend((0..3).map(|d| (state.position[d] + arm[d]) as f32));
                 velocities.extend((0..3).map(|d| (state.velocity[d] + spin[d]) as f32));

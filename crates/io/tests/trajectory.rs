@@ -10,7 +10,7 @@ use motion::run;
 use nonsmooth_io::Format;
 use nonsmooth_io::IoError;
 use nonsmooth_io::fclib::Fclib;
-use nonsmooth_io::trajectory::{Trajectory, Writer, holds};
+use nonsmooth_io::trajectory::{Named, Trajectory, Writer, holds};
 
 const NAME: &str = "run.h5";
 
@@ -43,6 +43,32 @@ fn what_is_written_is_read_bit_for_bit() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     // The same run is the same file.
     assert_eq!(bytes(&whole), bytes(&run(40)));
+}
+
+/// The run with an elastic solid of two nodes.
+fn with_elastic(frames: usize) -> Trajectory {
+    let mut run = run(frames);
+    run.elastic = vec!["Gummi".into()];
+    run.bodies.push(Named { name: "Gummi".into(), fixed: false });
+    for frame in &mut run.frames {
+        frame.bodies.push(frame.bodies[1]);
+        frame.elastic = vec![vec![[frame.time, 0.0, -0.0], [1.0, f64::NAN, frame.time]]];
+    }
+    run
+}
+
+#[test]
+fn nodes_of_elastic_solids_are_read_bit_for_bit() {
+    for content in [with_elastic(40), with_elastic(0)] {
+        assert_same(&parse(&bytes(&content)).unwrap(), &content);
+    }
+    let mut other = with_elastic(3);
+    other.frames[2].elastic[0].pop();
+    let error = other.to_bytes(Path::new(NAME)).unwrap_err().to_string();
+    assert!(error.contains("/frames[2]"), "{error}");
+    let unnamed = Trajectory { elastic: vec!["other".into()], ..with_elastic(1) };
+    let error = unnamed.to_bytes(Path::new(NAME)).unwrap_err().to_string();
+    assert!(error.contains("/elastic"), "{error}");
 }
 
 #[test]

@@ -45,6 +45,21 @@ fn every_scene_has_a_test() {
     assert!(count >= 10);
 }
 
+/// Its centre goes v²/(2 mu g), and it leans by millimetres on the way, and sways a little at the end.
+#[test]
+fn a_rubber_block_slides_to_a_stop() {
+    let mut lean: f64 = 0.0;
+    let (simulation, _) = run("rubber_block", |simulation, _| {
+        let x = &simulation.state().elastic[0].displacement;
+        lean = lean.max(x[x.len() - 1][0] - x[0][0]);
+    });
+    let state = &simulation.state().elastic[0];
+    let mean = |x: &[[f64; 3]]| x.iter().map(|x| x[0]).sum::<f64>() / x.len() as f64;
+    let way = 1.5 * 1.5 / (2.0 * 0.5 * 9.81);
+    assert!((mean(&state.displacement) / way - 1.0).abs() < 0.02, "{}", mean(&state.displacement));
+    assert!(mean(&state.velocity).abs() < 1e-2 && lean > 1e-3, "{lean}");
+}
+
 /// The centre rests, the inclination stays, the point of contact runs round with Ω² = 4 g / (a sin α).
 #[test]
 fn a_disc_rolls_on_its_rim() {

@@ -9,21 +9,25 @@ pub use origin::{Origin, OriginError};
 
 use nonsmooth_io::Mesh;
 use nonsmooth_io::trajectory::{Contact, Energy, Frame, Joint, Named, State, Step, Trajectory};
-use nonsmooth_scenes::SceneError;
 use nonsmooth_scenes::draw::playback::{self, Drawn, Form, Moment, Placed, Playback};
 use nonsmooth_scenes::draw::{Pose, Touch};
+use nonsmooth_scenes::vec3::{Vec3, mean, sub};
+use nonsmooth_scenes::{Rotation, SceneError};
 use nonsmooth_simulate::{
-    ContactReport, JointReport, SceneFile, Shape, Simulation, StepReport, World,
+    ContactReport, Elastic, JointReport, SceneFile, Shape, Simulation, StepReport, World,
 };
 
 /// The trajectory of a run that has not begun: the scene, bodies and joints by their names.
 pub fn begun(scene: &SceneFile, simulation: &Simulation) -> Trajectory {
-    let bodies = simulation.world().bodies.iter();
-    let named = bodies.map(|b| Named { name: b.name.clone(), fixed: !b.is_free() });
+    let world = simulation.world();
+    let rigid = world.bodies.iter().map(|b| Named { name: b.name.clone(), fixed: !b.is_free() });
+    let names = elastic_names(world);
+    let named = rigid.chain(names.iter().map(|name| Named { name: name.clone(), fixed: false }));
     Trajectory {
         scene: scene.to_toml(),
         program: concat!("nonsmooth ", env!("CARGO_PKG_VERSION")).into(),
         bodies: named.collect(),
+        elastic: names.clone(),
         joints: simulation.world().joints.iter().map(|j| j.name.clone()).collect(),
         ..Trajectory::default()
     }
@@ -32,19 +36,38 @@ pub fn begun(scene: &SceneFile, simulation: &Simulation) -> Trajectory {
 /// The motion as it is now.
 pub fn frame(simulation: &Simulation) -> Frame {
     let state = simulation.state();
-    let bodies = (0..state.position.len()).map(|k| State {
+    let rigid = (0..state.position.len()).map(|k| State {
         position: state.position[k],
         rotation: state.rotation[k],
         velocity: state.velocity[k],
         angular_velocity: state.angular_velocity(nonsmooth_simulate::BodyId(k as u32)),
     });
+    let solids = || simulation.world().elastic.iter().zip(&state.elastic);
+    let nodes: Vec<Vec<Vec3>> = solids().map(|(e, s)| e.positions(s).collect()).collect();
+    let whole = nodes.iter().zip(&state.elastic).map(|(places, solid)| State {
+        position: mean(places),
+        rotation: [1.0, 0.0, 0.0, 0.0],
+        velocity: mean(&solid.velocity),
+        angular_velocity: [0.0; 3],
+    });
+    let bodies = rigid.chain(whole);
     Frame {
         step: state.steps,
         time: state.t,
         bodies: bodies.collect(),
         contacts: simulation.contacts().iter().map(contact).collect(),
         joints: simulation.joints().iter().map(joint).collect(),
+        elastic: nodes.clone(),
     }
+}
+
+/// What elastic solids are called in a file, where those without a name have a number.
+fn elastic_names(world: &World) -> Vec<String> {
+    let own = |(k, e): (usize, &Elastic)| match e.name.as_str() {
+        "" => format!("elastic {k}"),
+        name => name.into(),
+    };
+    world.elastic.iter().enumerate().map(own).collect()
 }
 
 /// What a step with this number came to.
@@ -177,7 +200,16 @@ fn drawn(world: &World) -> Vec<Drawn> {
         fixed: !body.is_free(),
         parts: body.parts.iter().map(placed).collect(),
     });
-    bodies.collect()
+    let solids = world.elastic.iter().zip(elastic_names(world)).map(|(elastic, name)| {
+        let (nodes, faces) = elastic.solid.skin();
+        let places: Vec<Vec3> = elastic.solid.places().collect();
+        let vertices = nodes.iter().map(|&node| sub(places[node], elastic.solid.position));
+        let faces = faces.iter().map(|face| face.to_vec()).collect();
+        let form = Form::Mesh { vertices: vertices.collect(), faces };
+        let part = Placed { form, position: [0.0; 3], rotation: Rotation::IDENTITY };
+        Drawn { name, fixed: false, parts: vec![part] }
+    });
+    bodies.chain(solids).collect()
 }
 
 /// What plays a trajectory of a world; its title is the scene's.
@@ -195,10 +227,15 @@ pub fn playback(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Pl
         u: Some(c.u),
         status: c.status,
     };
+    let skins: Vec<Vec<usize>> = world.elastic.iter().map(|e| e.solid.skin().0).collect();
+    let shape = |(nodes, skin): (&Vec<Vec3>, &Vec<usize>)| {
+        skin.iter().filter_map(|&node| nodes.get(node).copied()).collect()
+    };
     let frames = trajectory.frames.iter().map(|f| Moment {
         time: f.time,
         poses: f.bodies.iter().map(pose).collect(),
         contacts: f.contacts.iter().map(touch).collect(),
+        shapes: f.elastic.iter().zip(&skins).map(shape).collect(),
     });
     let energy = trajectory.steps.iter().map(|s| playback::Energy {
         time: s.time,
@@ -231,5 +268,17 @@ pub fn meshes(trajectory: &Trajectory, world: &World) -> Vec<Vec<Mesh>> {
     let surfaces = playback(trajectory, &nameless, world).surfaces();
     let mesh =
         |s: playback::Surface| Mesh { vertices: s.vertices, faces: s.faces, smooth: s.smooth };
-    surfaces.into_iter().map(|all| all.into_iter().map(mesh).collect()).collect()
+    let mut meshes: Vec<Vec<Mesh>> =
+        surfaces.into_iter().map(|all| all.into_iter().map(mesh).collect()).collect();
+    // Vertices of elastic solids are all their nodes, as the frames have them.
+    for (meshes, elastic) in meshes[world.bodies.len()..].iter_mut().zip(&world.elastic) {
+        let (nodes, faces) = elastic.solid.skin();
+        let centre = elastic.solid.position;
+        *meshes = vec![Mesh {
+            vertices: elastic.solid.places().map(|x| sub(x, centre)).collect(),
+            faces: faces.iter().map(|face| face.map(|k| nodes[k]).to_vec()).collect(),
+            smooth: false,
+        }];
+    }
+    meshes
 }

@@ -64,7 +64,7 @@ pub fn congruence(a: &Mat3, b: &Mat3) -> Mat3 {
 }
 
 /// The mean of some points, which must not be empty.
-pub(crate) fn mean(points: &[Vec3]) -> Vec3 {
+pub fn mean(points: &[Vec3]) -> Vec3 {
     scale(1.0 / points.len() as f64, points.iter().fold([0.0; 3], |s, &p| add(s, p)))
 }
 

@@ -8,7 +8,8 @@ mod motion;
 
 use browser::Browser;
 use motion::playback;
-use nonsmooth_scenes::draw::playback::{Form, LIMIT, Playback};
+use nonsmooth_scenes::Rotation;
+use nonsmooth_scenes::draw::playback::{Drawn, Form, LIMIT, Placed, Playback};
 use nonsmooth_scenes::draw::{Drawing, svg};
 use serde_json::{Value, json};
 
@@ -163,4 +164,47 @@ fn frames_are_pictures_too() {
     let drawn = svg(&picture, &Drawing::default()).unwrap();
     assert!(drawn.starts_with("<svg"), "{}", &drawn[..100]);
     assert!(played.picture(120).unwrap_err().to_string().starts_with("frame"));
+}
+
+/// A sheet that is bent from frame to frame beside what the others do.
+fn bending(frames: usize) -> Playback {
+    let mut played = playback(frames);
+    let vertices = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    let form = Form::Mesh { vertices: vertices.clone(), faces: vec![vec![0, 1, 2, 3]] };
+    let part = Placed { form, position: [0.0; 3], rotation: Rotation::IDENTITY };
+    played.bodies.push(Drawn { name: "sheet".into(), fixed: false, parts: vec![part] });
+    for (k, frame) in played.frames.iter_mut().enumerate() {
+        let mut shape = vertices.clone();
+        shape[2][2] = 0.1 * k as f64;
+        frame.poses.push(frame.poses[1].clone());
+        frame.shapes = vec![shape];
+    }
+    played
+}
+
+#[test]
+fn what_deforms_is_drawn_where_its_vertices_are() {
+    let played = bending(4);
+    let bodies = played.picture(3).unwrap().bodies;
+    let corners = format!("{:?}", bodies.last().unwrap().parts);
+    let height = 0.1 * 3.0 - played.frames[3].poses[1].position[2];
+    assert!(corners.contains(&format!("{height:?}")), "{height} in {corners}");
+    type Spoil = fn(&mut Playback);
+    let cases: [(Spoil, &str); 3] = [
+        (|p| p.frames[2].shapes.clear(), "frames[2].shapes"),
+        (|p| p.frames[1].shapes[0].truncate(3), "frames[1].shapes[0]"),
+        (|p| p.frames[1].shapes[0][0][0] = f64::NAN, "frames[1].shapes[0]"),
+    ];
+    for (spoil, place) in cases {
+        let mut spoiled = bending(4);
+        spoil(&mut spoiled);
+        let message = spoiled.html(LIMIT).unwrap_err().to_string();
+        assert!(message.starts_with(place), "{message}");
+    }
+    let Some(mut browser) = Browser::start() else { return };
+    browser.open(&played.html(LIMIT).unwrap());
+    let drawn = |browser: &mut Browser| browser.value("window.view.drawn()").as_u64().unwrap();
+    assert!(drawn(&mut browser) > 0);
+    browser.value("window.view.seek(0.015)");
+    assert_eq!(browser.complaints(), [""; 0]);
 }

@@ -27,6 +27,7 @@
 mod crew;
 mod detect;
 mod drive;
+mod elastic;
 mod error;
 pub mod import;
 mod islands;
@@ -48,6 +49,7 @@ mod world;
 
 pub use detect::Key;
 pub use drive::{Control, Observer};
+pub use elastic::Elastic;
 pub use error::{Overlap, SimulateError};
 pub use joints::{
     Coordinate, Coupling, Drive, Driver, Joint, JointId, JointKind, JointLimits, JointReport,
@@ -66,5 +68,5 @@ pub use report::{
 pub use scene_file::SceneFile;
 pub use shape::{Part, Shape, plane};
 pub use simulation::{Force, Simulation, Wrenches};
-pub use state::{ContactMemory, State};
+pub use state::{ContactMemory, ElasticState, State};
 pub use world::{Body, BodyId, Compliance, Law, Motion, World};

@@ -8,6 +8,8 @@ use crate::{Gyroscopic, MoreauJean};
 /// A body during a step. `spin` is Ω in the body frame, or ω in the world frame where the inertia is isotropic.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Moving {
+    /// Its number among bodies and elastic solids: of a node that of its solid.
+    pub owner: u32,
     pub free: bool,
     pub isotropic: bool,
     pub mass: f64,

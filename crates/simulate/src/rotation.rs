@@ -50,6 +50,11 @@ pub(crate) struct Pose {
 }
 
 impl Pose {
+    /// Unturned, at x.
+    pub fn at(x: Vec3) -> Self {
+        Self { x, r: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] }
+    }
+
     #[inline]
     pub fn point(&self, p: Vec3) -> Vec3 {
         let q = self.direction(p);

@@ -10,7 +10,7 @@ use crate::drive::{self, Driven, Observer};
 use crate::error::{Overlap, require};
 use crate::projection::Projection;
 use crate::report::{ContactReport, RunReport, Settled, StepReport, StepStatus};
-use crate::state::State;
+use crate::state::{ElasticState, State};
 use crate::step::{Stride, Tools};
 use crate::world::oscillation;
 use crate::{BodyId, JointReport, MoreauJean, Motion, SimulateError, Stabilisation, World};
@@ -65,6 +65,33 @@ impl<F: FnMut(&State, &mut Wrenches) + Send> Force for F {
     }
 }
 
+/// Errors: elastic solids, where this is done.
+fn rigid(world: &World, where_: &str) -> Result<(), SimulateError> {
+    match world.elastic.len() {
+        0 => Ok(()),
+        n => Err(SimulateError::value("elastic", format!("rigid bodies alone where {where_}"), n)),
+    }
+}
+
+/// In words, bodies that may slip between the nodes of an elastic solid.
+fn small(world: &World) -> Vec<String> {
+    let mut said = vec![];
+    for (k, elastic) in world.elastic.iter().enumerate() {
+        let cell = norm(elastic.solid.cell());
+        for (i, body) in world.bodies.iter().enumerate() {
+            let radii = body.parts.iter().map(|p| p.shape.radius());
+            if radii.fold(f64::INFINITY, f64::min) < cell {
+                said.push(format!(
+                    "{} is not much larger than the elements of {}: only nodes touch, and it may pass between them",
+                    world.label(i),
+                    world.label(world.bodies.len() + k)
+                ));
+            }
+        }
+    }
+    said
+}
+
 /// A world, the scheme, the solver, and the state that they move.
 pub struct Simulation {
     world: World,
@@ -98,6 +125,7 @@ impl Simulation {
     ///
     /// Errors: those of [`new`](Self::new), with the overlaps that are left.
     pub fn settled(world: World, scheme: MoreauJean) -> Result<(Self, Settled), SimulateError> {
+        rigid(&world, "bodies that overlap are moved apart")?;
         let mut simulation = Self::placed(world, scheme)?;
         let mut settled = Settled::default();
         let before = simulation.state.position.clone();
@@ -131,8 +159,12 @@ impl Simulation {
 
     /// A world at its start, wherever its bodies are.
     fn placed(mut world: World, scheme: MoreauJean) -> Result<Self, SimulateError> {
-        let warnings = world.validate()?;
+        let mut warnings = world.validate()?;
         scheme.validate()?;
+        if scheme.stabilisation.has_contacts() {
+            rigid(&world, "the stabilisation projects contacts")?;
+        }
+        warnings.extend(small(&world));
         let mut state = State::of(&world);
         for (k, body) in world.bodies.iter().enumerate() {
             if let Motion::Oscillating { amplitude, frequency, phase } = body.motion {
@@ -315,6 +347,13 @@ impl Simulation {
             [state.position.len(), state.rotation.len(), state.velocity.len(), state.spin.len()];
         if lengths != [bodies; 4] {
             return Err(wrong(format!("one of {lengths:?} positions, rotations and velocities")));
+        }
+        let nodes = |solids: &[ElasticState]| {
+            solids.iter().map(|s| [s.displacement.len(), s.velocity.len()]).collect::<Vec<_>>()
+        };
+        let [own, theirs] = [&self.state.elastic, &state.elastic].map(|s| nodes(s));
+        if own != theirs {
+            return Err(wrong(format!("one of elastic solids with {theirs:?} nodes")));
         }
         self.state = state;
         Ok(())

@@ -25,6 +25,18 @@ pub struct State {
     pub spin: Vec<Vec3>,
     /// What is remembered of contacts.
     pub memory: ContactMemory,
+    /// The elastic solids.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub elastic: Vec<ElasticState>,
+}
+
+/// An elastic solid at a time, node by node.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct ElasticState {
+    /// From the places without strain, m.
+    pub displacement: Vec<Vec3>,
+    /// m/s.
+    pub velocity: Vec<Vec3>,
 }
 
 impl State {
@@ -42,6 +54,7 @@ impl State {
                 .map(|b| apply_transposed(&b.rotation.matrix(), b.angular_velocity))
                 .collect(),
             memory: ContactMemory::default(),
+            elastic: world.elastic.iter().map(|e| e.start()).collect(),
         }
     }
 

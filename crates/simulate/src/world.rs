@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, dot, norm, scale, sub};
 use nonsmooth_scenes::{self as scenes, MassProperties, Polyhedron, Rotation, Scene};
 
+use crate::elastic::Elastic;
 use crate::error::{finite, require};
 use crate::rotation::unit;
 use crate::shape::plane;
@@ -239,6 +240,8 @@ pub struct World {
     pairs: BTreeMap<(usize, usize), Law>,
     compliances: BTreeMap<(usize, usize), Compliance>,
     apart: BTreeSet<(BodyId, BodyId)>,
+    /// Elastic solids, whose [`BodyId`]s go on where those of the bodies end.
+    pub elastic: Vec<Elastic>,
     /// All joints; a [`JointId`] is a place here.
     pub joints: Vec<Joint>,
     /// Couplings of their coordinates.
@@ -262,6 +265,7 @@ impl World {
             pairs: BTreeMap::new(),
             compliances: BTreeMap::new(),
             apart: BTreeSet::new(),
+            elastic: vec![],
             joints: vec![],
             couplings: vec![],
         }
@@ -277,6 +281,11 @@ impl World {
     pub fn add(&mut self, body: Body) -> BodyId {
         self.bodies.push(body);
         BodyId(self.bodies.len() as u32 - 1)
+    }
+
+    /// Adds an elastic solid.
+    pub fn add_elastic(&mut self, solid: Elastic) {
+        self.elastic.push(solid);
     }
 
     /// Adds a joint; its partners do not touch each other unless it says so.
@@ -360,8 +369,12 @@ impl World {
 
     /// What messages call a body.
     pub fn label(&self, body: usize) -> String {
-        match self.bodies[body].name.as_str() {
-            "" => format!("bodies[{body}]"),
+        let (list, place, name) = match body.checked_sub(self.bodies.len()) {
+            None => ("bodies", body, &self.bodies[body].name),
+            Some(k) => ("elastic", k, &self.elastic[k].name),
+        };
+        match name.as_str() {
+            "" => format!("{list}[{place}]"),
             name => format!("`{name}`"),
         }
     }
@@ -405,6 +418,9 @@ impl World {
             "" => format!("{list}[{k}]"),
             name => format!("{list}[{k}] ({name})"),
         };
+        for (k, solid) in self.elastic.iter().enumerate() {
+            solid.validate(&key("elastic", k, &solid.name), self)?;
+        }
         for (k, joint) in self.joints.iter().enumerate() {
             joint.validate(&key("joints", k, &joint.name), self)?;
         }
@@ -541,7 +557,11 @@ impl TryFrom<&Scene> for World {
     fn try_from(scene: &Scene) -> Result<Self, SimulateError> {
         scene.validate()?;
         if !scene.solids.is_empty() {
-            return Err(SimulateError::value("solids", "rigid bodies alone", scene.solids.len()));
+            return Err(SimulateError::value(
+                "solids",
+                "rigid bodies alone (elastic boxes are stated by [[elastic]] of a scene file)",
+                scene.solids.len(),
+            ));
         }
         let law = scene.contacts.first().map_or(Law::default(), |c| Law {
             mu: c.mu,

@@ -29,10 +29,15 @@ impl Run<'_> {
         let world = simulation.world();
         let free = world.bodies.iter().filter(|b| b.is_free()).count();
         let name = if scene.name.is_empty() { String::new() } else { format!("{}, ", scene.name) };
+        let elastic = match world.elastic.len() {
+            0 => String::new(),
+            1 => ", 1 elastic solid".into(),
+            n => format!(", {n} elastic solids"),
+        };
         row(
             &mut text,
             "scene",
-            format!("{name}{} bodies, {free} of them free", world.bodies.len()),
+            format!("{name}{} bodies, {free} of them free{elastic}", world.bodies.len()),
         );
         let scheme = format!(
             "h = {} s, theta = {}, contacts by {} to {:e}",

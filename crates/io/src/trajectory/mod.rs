@@ -3,7 +3,8 @@
 //! ```text
 //! /trajectory_version          2
 //! /scene/                      text, sha256, program
-//! /bodies/                     name (b), fixed (b); position, velocity, angular_velocity (n, b, 3), rotation (n, b, 4)
+//! /bodies/                     name (b), fixed (b), elastic (b) where one is; position, velocity, angular_velocity (n, b, 3), rotation (n, b, 4)
+//! /elastic/NAME/               position (n, nodes, 3): of each elastic solid, which is also one of the last bodies, with its mean motion
 //! /frames/                     step (n), time (n)
 //! /contacts/                   offset (n + 1): those of frame k are offset[k] .. offset[k + 1]
 //!                              key (c, 4), a, b (c), point (c, 3), frame (c, 3, 3), gap, mu (c)
@@ -51,6 +52,8 @@ pub struct Trajectory {
     pub program: String,
     /// The bodies, in the order of their numbers.
     pub bodies: Vec<Named>,
+    /// The names of the elastic solids, none empty or twice there; the last of the bodies are these.
+    pub elastic: Vec<String>,
     /// The names of the joints, in the order of their numbers; they may be empty.
     pub joints: Vec<String>,
     /// What was recorded of the motion, in the order of time.
@@ -83,6 +86,8 @@ pub struct Frame {
     pub contacts: Vec<Contact>,
     /// What each joint did.
     pub joints: Vec<Joint>,
+    /// Where the nodes of each elastic solid are, m.
+    pub elastic: Vec<Vec<[f64; 3]>>,
 }
 
 /// What a joint did in a step.

@@ -186,7 +186,11 @@ pub(super) fn join(
         if gap.is_some() && gap != known {
             return Ok(gap);
         }
-        if gap.is_some() || part.bodies != run.bodies || part.joints != run.joints {
+        if gap.is_some()
+            || part.bodies != run.bodies
+            || part.joints != run.joints
+            || part.elastic != run.elastic
+        {
             let expected = format!("a part of the same run that goes on after step {done}");
             return Err(IoError::data(&file, "/steps/number", expected, first));
         }

@@ -22,10 +22,12 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Trajectory, IoError> {
     let scene = root.need("scene")?;
     let text = |name| Ok(scene.text(name)?.unwrap_or_default());
     let frames = frames(&root)?;
+    let bodies = named(&root.need("bodies")?)?;
     let mut run = Trajectory {
         scene: text("text")?,
         program: text("program")?,
-        bodies: named(&root.need("bodies")?)?,
+        elastic: elastic(&root.need("bodies")?, &bodies)?,
+        bodies,
         joints: root.need("joints")?.texts("name")?,
         frames: vec![],
         steps: steps(&root)?,
@@ -46,6 +48,20 @@ fn named(g: &Folder) -> Result<Vec<Named>, IoError> {
     let fixed = g.numbers("fixed", &[names.len()])?;
     let of = |(name, fixed)| Named { name, fixed: fixed != 0 };
     Ok(names.into_iter().zip(fixed).map(of).collect())
+}
+
+/// The names of the elastic solids, which are the last of the bodies.
+fn elastic(g: &Folder, bodies: &[Named]) -> Result<Vec<String>, IoError> {
+    if !g.has("elastic")? {
+        return Ok(vec![]);
+    }
+    let flags = g.numbers("elastic", &[bodies.len()])?;
+    let first = flags.iter().position(|&flag| flag != 0).unwrap_or(bodies.len());
+    if let Some(k) = flags[first..].iter().position(|&flag| flag == 0) {
+        let place = format!("elastic[{}]", first + k);
+        return Err(g.error(place, "1, for a body before it is elastic", 0));
+    }
+    Ok(bodies[first..].iter().map(|b| b.name.clone()).collect())
 }
 
 /// The frames, still without what is in them.
@@ -73,6 +89,15 @@ fn fill(root: &Folder, run: &mut Trajectory) -> Result<(), IoError> {
     };
     for (f, frame) in run.frames.iter_mut().enumerate() {
         frame.bodies = (f * b..(f + 1) * b).map(state).collect();
+    }
+
+    for name in &run.elastic {
+        let g = root.need("elastic")?.need(name)?;
+        let nodes = g.dataset("position")?.shape.get(1).copied().unwrap_or(0) as usize;
+        let places = g.vectors::<3>("position", &[n, nodes, 3])?;
+        for (f, frame) in run.frames.iter_mut().enumerate() {
+            frame.elastic.push(places[f * nodes..(f + 1) * nodes].to_vec());
+        }
     }
 
     let (g, j) = (root.need("joints")?, run.joints.len());

@@ -19,6 +19,7 @@ pub(super) struct View<'a> {
     pub program: &'a str,
     pub bodies: &'a [Named],
     pub joints: &'a [String],
+    pub elastic: &'a [String],
     pub frames: &'a [Frame],
     pub steps: &'a [Step],
     pub checkpoint: Option<&'a Checkpoint>,
@@ -31,6 +32,7 @@ impl<'a> From<&'a Trajectory> for View<'a> {
             program: &run.program,
             bodies: &run.bodies,
             joints: &run.joints,
+            elastic: &run.elastic,
             frames: &run.frames,
             steps: &run.steps,
             checkpoint: run.checkpoint.as_ref(),
@@ -57,6 +59,9 @@ pub(super) fn to_bytes(path: &Path, run: &View) -> Result<Vec<u8>, IoError> {
         g.text("program", run.program)
     })?;
     top("bodies", &|g| bodies(g, run))?;
+    if !run.elastic.is_empty() {
+        top("elastic", &|g| elastic(g, run))?;
+    }
     top("frames", &|g| {
         g.longs("step", run.frames.iter().map(|f| f.step));
         g.table("time", &[run.frames.len()], run.frames.iter().map(|f| f.time));
@@ -94,6 +99,11 @@ impl View<'_> {
     /// What no layout of a run can hold.
     fn check(&self, path: &Path) -> Result<(), IoError> {
         let bodies = self.bodies.len();
+        let last = &self.bodies[bodies.saturating_sub(self.elastic.len())..];
+        if !last.iter().map(|b| &b.name).eq(self.elastic) {
+            let expected = "elastic solids to be the last of the bodies, by their names";
+            return Err(IoError::data(path, "/elastic", expected, self.elastic.join(", ")));
+        }
         for (k, frame) in self.frames.iter().enumerate() {
             if frame.bodies.len() != bodies {
                 let expected = format!("{bodies} bodies, as in /bodies/name");
@@ -108,6 +118,12 @@ impl View<'_> {
                 let expected = format!("{} joints, as in /joints/name", self.joints.len());
                 let (place, found) = (format!("/frames[{k}]"), frame.joints.len());
                 return Err(IoError::data(path, place, expected, found));
+            }
+            let nodes = |f: &Frame| f.elastic.iter().map(Vec::len).collect::<Vec<_>>();
+            if frame.elastic.len() != self.elastic.len() || nodes(frame) != nodes(&self.frames[0]) {
+                let expected = "as many nodes of each elastic solid as in the first frame";
+                let found = format!("{:?}", nodes(frame));
+                return Err(IoError::data(path, format!("/frames[{k}]"), expected, found));
             }
             for (c, contact) in frame.contacts.iter().enumerate() {
                 if let Some(body) =
@@ -138,6 +154,9 @@ fn bodies(g: &mut Out, run: &View) -> Result<(), IoError> {
     g.texts("name", run.bodies.iter().map(|b| &b.name[..]))?;
     g.bytes("fixed", run.bodies.iter().map(|b| u8::from(b.fixed)));
     let (n, b) = (run.frames.len(), run.bodies.len());
+    if !run.elastic.is_empty() {
+        g.bytes("elastic", (0..b).map(|k| u8::from(k + run.elastic.len() >= b)));
+    }
     let all = || run.frames.iter().flat_map(|f| &f.bodies);
     let vectors: [Vector<State>; 3] = [
         ("position", |s| s.position),
@@ -148,6 +167,18 @@ fn bodies(g: &mut Out, run: &View) -> Result<(), IoError> {
         g.table(name, &[n, b, 3], all().flat_map(of));
     }
     g.table("rotation", &[n, b, 4], all().flat_map(|s| s.rotation));
+    Ok(())
+}
+
+fn elastic(g: &mut Out, run: &View) -> Result<(), IoError> {
+    for (e, name) in run.elastic.iter().enumerate() {
+        let nodes = run.frames.first().map_or(0, |f| f.elastic[e].len());
+        let all = run.frames.iter().flat_map(|f| f.elastic[e].iter().flatten().copied());
+        g.child(name, |g| {
+            g.table("position", &[run.frames.len(), nodes, 3], all);
+            Ok(())
+        })?;
+    }
     Ok(())
 }
 

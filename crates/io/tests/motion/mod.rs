@@ -41,6 +41,7 @@ pub fn run(frames: usize) -> Trajectory {
                 moment: [0.0, 0.5, t],
                 violation: 1e-16,
             }],
+            elastic: vec![],
         }
     };
     let step = |k: usize| Step {
@@ -70,6 +71,7 @@ pub fn run(frames: usize) -> Trajectory {
         scene: "title = \"Käfer\"\n[[body]]\n".into(),
         program: "nonsmooth 0.1.0".into(),
         bodies: vec![named("floor", true), named("Kugel ⌀ 0.4", false), named("", false)],
+        elastic: vec![],
         joints: vec!["Gelenk".into()],
         frames: (0..frames).map(frame).collect(),
         steps: (0..2 * frames).map(step).collect(),

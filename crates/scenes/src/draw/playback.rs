@@ -15,7 +15,7 @@ use super::picture::{Body, Frame, Part, Picture, Pose, Touch, short_json};
 pub use super::surface::Surface;
 use crate::body::Rotation;
 use crate::error::{positive, require};
-use crate::vec3::{Vec3, add, apply, norm, scale};
+use crate::vec3::{Vec3, add, apply, norm, scale, sub};
 use crate::{Ground, SceneError};
 
 const PAGE: &str = include_str!("page/play.html");
@@ -132,6 +132,8 @@ pub struct Moment {
     pub poses: Vec<Pose>,
     /// The contacts. Other than in a [`Picture`], either body may be a fixed one.
     pub contacts: Vec<Touch>,
+    /// Where the vertices of those are that deform, m: the last so many of the bodies, each one mesh.
+    pub shapes: Vec<Vec<Vec3>>,
 }
 
 /// The energy at a time, J.
@@ -193,6 +195,16 @@ impl Drawn {
         self.parts.iter().map(of).fold(0.0, f64::max)
     }
 
+    /// With the vertices of its mesh elsewhere, about its origin.
+    fn deformed(mut self, shape: &[Vec3], origin: Vec3) -> Self {
+        for part in &mut self.parts {
+            if let Form::Mesh { vertices, .. } = &mut part.form {
+                *vertices = shape.iter().map(|&x| sub(x, origin)).collect();
+            }
+        }
+        self
+    }
+
     /// Whether it is one ball about its origin.
     fn is_ball(&self) -> bool {
         matches!(
@@ -235,6 +247,7 @@ impl Playback {
                     (format!("frames[{f}].poses"), format!("{n}, one for each body"));
                 return Err(SceneError::value(key, expected, frame.poses.len()));
             }
+            self.validate_shapes(f)?;
             for (k, p) in frame.poses.iter().enumerate() {
                 let all = [&p.position[..], &p.rotation, &p.velocity].concat();
                 finite(&|| format!("frames[{f}].poses[{k}]"), &all)?;
@@ -253,6 +266,36 @@ impl Playback {
             }
         }
         Ok(())
+    }
+
+    /// The shapes of a frame: as many as in the first one, of bodies that are one mesh, a place for each vertex.
+    fn validate_shapes(&self, f: usize) -> Result<(), SceneError> {
+        let shapes = &self.frames[f].shapes;
+        let all = self.frames[0].shapes.len();
+        if shapes.len() != all || all > self.bodies.len() {
+            let key = format!("frames[{f}].shapes");
+            return Err(SceneError::value(key, format!("{all} of bodies"), shapes.len()));
+        }
+        for (k, (shape, body)) in shapes.iter().zip(self.deforming()).enumerate() {
+            let key = format!("frames[{f}].shapes[{k}]");
+            let vertices = match &body.parts[..] {
+                [Placed { form: Form::Mesh { vertices, .. }, .. }] => vertices.len(),
+                _ => return Err(SceneError::value(key, "the shape of one mesh", "of others")),
+            };
+            if shape.len() != vertices {
+                return Err(SceneError::value(key, format!("{vertices} vertices"), shape.len()));
+            }
+            if !shape.iter().flatten().all(|x| x.is_finite()) {
+                return Err(SceneError::value(key, "finite numbers", "others"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The bodies that deform.
+    fn deforming(&self) -> &[Drawn] {
+        let shapes = self.frames.first().map_or(0, |f| f.shapes.len());
+        &self.bodies[self.bodies.len() - shapes..]
     }
 
     /// The motion as a page of HTML that holds it whole, with three.js. Of the frames so many are left out, evenly, that what moves takes no more than
@@ -299,6 +342,10 @@ impl Playback {
                 thinned(&self.energy, |e| e.kinetic).flat_map(|e| [e.time, e.kinetic, e.potential]),
             ),
             residual: floats(thinned(&self.residual, |r| r[1]).flatten()),
+            deforming: self.deforming().len(),
+            shapes: floats(
+                shown.iter().flat_map(|f| &f.shapes).flatten().flat_map(|x| x.iter().copied()),
+            ),
             view: View::default(),
             colours: Colours::default(),
         };
@@ -308,7 +355,9 @@ impl Playback {
 
     /// Every so many frames fit the limit.
     fn stride(&self, limit: usize) -> usize {
-        let bytes = |f: &Moment| (20 * f.poses.len() + 33 * f.contacts.len()) * 4 / 3;
+        let vertices = |f: &Moment| f.shapes.iter().map(Vec::len).sum::<usize>();
+        let bytes =
+            |f: &Moment| (20 * f.poses.len() + 33 * f.contacts.len() + 12 * vertices(f)) * 4 / 3;
         let fits = |every: &usize| self.shown(*every).map(bytes).sum::<usize>() <= limit;
         let most = self.frames.len().max(2) - 1;
         (1..most).find(fits).unwrap_or(most)
@@ -360,7 +409,9 @@ impl Playback {
         };
         let mut ground = None;
         let (mut bodies, mut poses, mut numbers) = (vec![], vec![], vec![]);
-        for (body, pose) in self.bodies.iter().zip(&moment.poses) {
+        let first = self.bodies.len() - moment.shapes.len();
+        for (k, (body, pose)) in self.bodies.iter().zip(&moment.poses).enumerate() {
+            let deformed = k.checked_sub(first).map(|e| &moment.shapes[e]);
             let planes = body.parts.iter().filter(|p| body.fixed && p.form == Form::Plane);
             for plane in planes {
                 ground.get_or_insert_with(|| {
@@ -373,6 +424,10 @@ impl Playback {
             let solid = Drawn {
                 parts: body.parts.iter().filter(|p| p.form != Form::Plane).cloned().collect(),
                 ..body.clone()
+            };
+            let solid = match deformed {
+                Some(shape) => solid.deformed(shape, pose.position),
+                None => solid,
             };
             let parts: Vec<Part> = match &solid.parts[..] {
                 [Placed { form: Form::Sphere { radius }, .. }] if solid.is_ball() => {
@@ -455,6 +510,9 @@ struct Data<'a> {
     energy: String,
     /// f32: time, residual.
     residual: String,
+    /// How many of the bodies deform, the last ones; f32, frames × their vertices × 3.
+    deforming: usize,
+    shapes: String,
     view: View,
     colours: Colours,
 }

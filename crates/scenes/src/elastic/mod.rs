@@ -231,6 +231,34 @@ impl ElasticBox {
         Some(weights.filter(|&(_, weight)| weight != 0.0).collect())
     }
 
+    /// The nodes on its surface, and the faces of elements there as places among them, counterclockwise from outside.
+    pub fn skin(&self) -> (Vec<usize>, Vec<[usize; 4]>) {
+        let outside = |&node: &usize| {
+            let at = self.grid(node);
+            (0..3).any(|k| at[k] == 0 || at[k] == self.elements[k])
+        };
+        let nodes: Vec<usize> = (0..self.nodes()).filter(outside).collect();
+        let mut places = vec![usize::MAX; self.nodes()];
+        nodes.iter().enumerate().for_each(|(place, &node)| places[node] = place);
+        let [x, y, _] = self.elements.map(|n| n + 1);
+        let mut faces = vec![];
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            for end in [0, self.elements[axis]] {
+                for (j, i) in grid([self.elements[v], self.elements[u]]) {
+                    let corner = |(p, q): (usize, usize)| {
+                        let mut at = [end; 3];
+                        (at[u], at[v]) = (i + p, j + q);
+                        places[at[0] + x * (at[1] + y * at[2])]
+                    };
+                    let face = [(0, 0), (1, 0), (1, 1), (0, 1)].map(corner);
+                    faces.push(if end == 0 { [face[3], face[2], face[1], face[0]] } else { face });
+                }
+            }
+        }
+        (nodes, faces)
+    }
+
     /// The surface, one face for each face of an element on it, without strain.
     pub(crate) fn surface(&self) -> Result<Polyhedron, SceneError> {
         let (mut vertices, mut faces) = (Vec::new(), Vec::new());
@@ -255,7 +283,9 @@ impl ElasticBox {
     }
 
     /// Checks every value; `key` names the solid in messages.
-    pub(crate) fn validate(&self, key: &str) -> Result<(), SceneError> {
+    ///
+    /// Errors: the first value that is not possible, by its place.
+    pub fn validate(&self, key: &str) -> Result<(), SceneError> {
         let place = |name: &str| {
             if key.is_empty() { name.to_string() } else { format!("{key}.{name}") }
         };
@@ -294,7 +324,7 @@ impl ElasticBox {
     }
 
     /// The sides of an element, m.
-    fn cell(&self) -> Vec3 {
+    pub fn cell(&self) -> Vec3 {
         std::array::from_fn(|k| self.sides[k] / self.elements[k] as f64)
     }
 

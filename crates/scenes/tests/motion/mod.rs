@@ -109,7 +109,7 @@ pub fn playback(frames: usize) -> Playback {
         } else {
             contacts.push(touch(Some(0), 1, [poses[1].position[0], 0.0, 0.0], [0.0; 3], None));
         }
-        Moment { time: t, poses, contacts }
+        Moment { time: t, poses, contacts, shapes: vec![] }
     };
     let energy = |k: usize| {
         let time = 0.01 * k as f64;

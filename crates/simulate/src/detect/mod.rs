@@ -29,6 +29,7 @@ use nonsmooth_scenes::Polyhedron;
 use nonsmooth_scenes::vec3::{Vec3, add, scale, sub};
 use rayon::ThreadPool;
 
+use crate::elastic::Nodes;
 use crate::rotation::Pose;
 use crate::state::{Axis, State};
 use crate::{BodyId, Compliance, Law, Shape, SimulateError, World};
@@ -88,6 +89,9 @@ const ALIKE: f64 = 0.9999;
 /// Broad and narrow phase, with the memory that they use.
 #[derive(Debug, Clone)]
 pub(crate) struct Detector {
+    /// Bodies, and the nodes of elastic solids, which are points.
+    bodies: usize,
+    nodes: Nodes,
     solids: Vec<Solids>,
     moves: Vec<bool>,
     planes: Vec<u32>,
@@ -160,6 +164,11 @@ impl Detector {
                 names.push((k, s, part.shape.name()));
             }
         }
+        let nodes = Nodes::of(world);
+        for (k, node) in (world.bodies.len()..).zip(&nodes.list) {
+            let solid = Solid::Rounded(Segment::point([0.0; 3]), 0.0);
+            solids.push(Solids { body: k as u32, material: node.material, solid, size: node.size });
+        }
         // Surfaces do not meet each other.
         let surfaces: Vec<usize> =
             (0..solids.len()).filter(|&k| matches!(solids[k].solid, Solid::Surface(_))).collect();
@@ -174,7 +183,8 @@ impl Detector {
                 return Err(SimulateError::Pair { a: place(i), b: place(j), first, second });
             }
         }
-        let moves: Vec<bool> = world.bodies.iter().map(super::world::Body::is_free).collect();
+        let free = world.bodies.iter().map(super::world::Body::is_free);
+        let moves: Vec<bool> = free.chain(nodes.list.iter().map(|_| true)).collect();
         let is_plane = |k: &u32| matches!(solids[*k as usize].solid, Solid::Plane(_));
         let (planes, finite): (Vec<u32>, Vec<u32>) =
             (0..solids.len() as u32).partition(|k| is_plane(k));
@@ -194,13 +204,15 @@ impl Detector {
             axes: vec![],
             finders: vec![Finder::default()],
             box_of,
+            bodies: world.bodies.len(),
+            nodes,
             solids,
         })
     }
 
-    /// The size of each body: the radius of its largest finite shape.
-    pub fn sizes(&self, bodies: usize) -> Vec<f64> {
-        let mut out = vec![0.0; bodies];
+    /// The size of each body and node: the radius of its largest finite shape.
+    pub fn sizes(&self) -> Vec<f64> {
+        let mut out = vec![0.0; self.bodies + self.nodes.list.len()];
         for s in self.solids.iter().filter(|s| s.size.is_finite()) {
             let size = &mut out[s.body as usize];
             *size = f64::max(*size, s.size);
@@ -276,7 +288,7 @@ impl Detector {
             let (p, q) = (self.solids[i as usize].body, self.solids[j as usize].body);
             if (p, q) != body_pair {
                 body_pair = (p, q);
-                may = p != q && world.may_touch(BodyId(p), BodyId(q));
+                may = p != q && self.may_touch(world, p, q);
             }
             if !may {
                 continue;
@@ -297,13 +309,21 @@ impl Detector {
         }
     }
 
+    /// Nodes touch bodies alone.
+    fn may_touch(&self, world: &World, p: u32, q: u32) -> bool {
+        let [p_is_node, q_is_node] = [p, q].map(|k| k as usize >= self.bodies);
+        match p_is_node || q_is_node {
+            true => p_is_node != q_is_node,
+            false => world.may_touch(BodyId(p), BodyId(q)),
+        }
+    }
+
     /// Poses of bodies, vertices of polyhedra and boxes of finite shapes.
     fn place(&mut self, world: &World, state: &State, margins: &[f64]) {
         let anew = self.poses.is_empty();
-        self.poses.resize(world.bodies.len(), Pose { x: [0.0; 3], r: [[0.0; 3]; 3] });
-        for (k, pose) in self.poses.iter_mut().enumerate() {
-            *pose = state.pose(k);
-        }
+        self.poses.clear();
+        self.poses.extend((0..self.bodies).map(|k| state.pose(k)));
+        self.poses.extend(self.nodes.list.iter().map(|n| Pose::at(n.position(&state.elastic))));
         self.boxes.clear();
         for &k in &self.finite {
             let Solids { body, solid, .. } = &self.solids[k as usize];

@@ -6,8 +6,8 @@ use nonsmooth_scenes::vec3::{Mat3, Vec3, add, norm};
 use nonsmooth_scenes::{Polyhedron, Rotation, SceneEntry};
 
 use super::{
-    BodyTable, ComplianceTable, ForceTable, GenerateTable, LawTable, MotionTable, PartTable,
-    RotationTable, SceneFile, ShapeOrName, ShapeTable,
+    BodyTable, ComplianceTable, ElasticTable, ForceTable, GenerateTable, LawTable, MotionTable,
+    PartTable, RotationTable, SceneFile, ShapeOrName, ShapeTable,
 };
 use crate::error::{finite, require};
 use crate::shape::plane;
@@ -39,6 +39,13 @@ impl SceneFile {
             };
             let body = builder.body(table, &key)?;
             builder.add(body, &key)?;
+        }
+        for (k, table) in self.elastic.iter().enumerate() {
+            let key = match table.name.as_str() {
+                "" => format!("elastic[{k}]"),
+                name => format!("elastic[{k}] ({name})"),
+            };
+            builder.elastic(table, &key)?;
         }
         for (k, table) in self.generate.iter().enumerate() {
             builder.family(table, &format!("generate[{k}]"))?;
@@ -366,6 +373,21 @@ impl<'a> Builder<'a> {
         })
     }
 
+    /// Adds an elastic box.
+    fn elastic(&mut self, table: &'a ElasticTable, key: &str) -> Result<(), SimulateError> {
+        if !table.name.is_empty() && !self.names.insert(table.name.clone()) {
+            return Err(twice(&format!("{key}.name"), &table.name));
+        }
+        let material = self.material(table.material.as_deref(), &format!("{key}.material"))?;
+        let of_material = || self.file.materials.get(table.material.as_ref()?)?.density;
+        let Some(density) = table.density.or_else(of_material) else {
+            let expected = "a density, or a material with one";
+            return Err(SimulateError::value(format!("{key}.density"), expected, "none"));
+        };
+        self.world.add_elastic(super::elastic::solid(table, (material, density), key)?);
+        Ok(())
+    }
+
     /// The bits of groups, which are numbered as they are met.
     fn bits(&mut self, names: &'a [String], key: &str) -> Result<u32, SimulateError> {
         let mut bits = 0;
@@ -454,24 +476,39 @@ impl<'a> Builder<'a> {
                 }
             }
         }
+        for (k, elastic) in self.world.elastic.iter().enumerate() {
+            let solid = elastic.material;
+            for (i, body) in self.world.bodies.iter().enumerate() {
+                for m in body.parts.iter().map(|part| part.material) {
+                    if !self.stated.contains(&(m.min(solid), m.max(solid))) {
+                        return Err(self.lawless((solid, self.world.bodies.len() + k), (m, i)));
+                    }
+                }
+            }
+        }
         let all: Vec<_> = kinds.iter().map(|(((material, ..), _), &k)| (*material, k)).collect();
         for (i, &(m, a)) in all.iter().enumerate() {
             for &(n, b) in &all[i + 1..] {
                 let meet = a != b && self.world.may_touch(BodyId(a as u32), BodyId(b as u32));
                 if meet && !self.stated.contains(&(m.min(n), m.max(n))) {
-                    let name = |k: usize| &self.world.materials()[k];
-                    let expected = format!(
-                        "a law between the materials `{}` and `{}`, for {} and {} may meet, or [pairs_default]",
-                        name(m),
-                        name(n),
-                        self.world.label(a),
-                        self.world.label(b)
-                    );
-                    return Err(SimulateError::value("pairs", expected, "none"));
+                    return Err(self.lawless((m, a), (n, b)));
                 }
             }
         }
         Ok(())
+    }
+
+    /// Two of these materials may meet, and nothing is said of them.
+    fn lawless(&self, (m, a): (usize, usize), (n, b): (usize, usize)) -> SimulateError {
+        let name = |k: usize| &self.world.materials()[k];
+        let expected = format!(
+            "a law between the materials `{}` and `{}`, for {} and {} may meet, or [pairs_default]",
+            name(m),
+            name(n),
+            self.world.label(a),
+            self.world.label(b)
+        );
+        SimulateError::value("pairs", expected, "none")
     }
 }
 

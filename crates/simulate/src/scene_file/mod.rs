@@ -24,6 +24,7 @@
 //! ```
 
 mod build;
+mod elastic;
 mod joints;
 mod meshes;
 mod read;
@@ -80,6 +81,9 @@ pub struct SceneFile {
     /// Bodies, one by one.
     #[serde(default)]
     pub bodies: Vec<BodyTable>,
+    /// Elastic boxes, one by one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub elastic: Vec<ElasticTable>,
     /// Bodies of the families of `nonsmooth gen`: walls, piles, arches.
     #[serde(default)]
     pub generate: Vec<GenerateTable>,
@@ -370,6 +374,81 @@ pub struct BodyTable {
     pub groups: Vec<String>,
     /// The groups that it may touch; all, where none is named.
     pub collides_with: Vec<String>,
+}
+
+/// An elastic box along the axes of the world, of equal trilinear hexahedra: small strains, small turns. The nodes of its surface touch bodies.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ElasticTable {
+    /// The name, an id where it is given; of its positions in trajectories too.
+    #[serde(default)]
+    pub name: String,
+    /// Half sides, m.
+    pub half: [f64; 3],
+    /// Elements along each axis.
+    pub divisions: [usize; 3],
+    /// Young's modulus, Pa.
+    pub young: f64,
+    /// Poisson's ratio, above −1 and below ½.
+    #[serde(default)]
+    pub poisson: f64,
+    /// kg/m³, in place of the material's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub density: Option<f64>,
+    /// One of `materials`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<String>,
+    /// Rayleigh's damping.
+    #[serde(default)]
+    pub damping: RayleighTable,
+    /// Whether masses are at the nodes, in place of the consistent mass matrix: contact forces then oscillate less.
+    #[serde(default = "yes")]
+    pub lumped: bool,
+    /// Faces whose nodes stay where they are.
+    #[serde(default)]
+    pub held: Vec<FaceName>,
+    /// Where its centre is, m.
+    #[serde(default)]
+    pub position: [f64; 3],
+    /// Of the centre, m/s.
+    #[serde(default)]
+    pub velocity: [f64; 3],
+    /// About the centre, rad/s.
+    #[serde(default)]
+    pub angular_velocity: [f64; 3],
+}
+
+/// Damping `C = mass · M + stiffness · K`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RayleighTable {
+    /// 1/s.
+    pub mass: f64,
+    /// s.
+    pub stiffness: f64,
+}
+
+/// A face of a box by its outward normal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum FaceName {
+    /// Towards negative x.
+    #[serde(rename = "-x")]
+    Left,
+    /// Towards positive x.
+    #[serde(rename = "+x")]
+    Right,
+    /// Towards negative y.
+    #[serde(rename = "-y")]
+    Front,
+    /// Towards positive y.
+    #[serde(rename = "+y")]
+    Back,
+    /// Towards negative z.
+    #[serde(rename = "-z")]
+    Bottom,
+    /// Towards positive z.
+    #[serde(rename = "+z")]
+    Top,
 }
 
 /// How a driven body moves.
@@ -664,6 +743,10 @@ impl Default for OutputTable {
 
 fn earth() -> [f64; 3] {
     [0.0, 0.0, -9.81]
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn upwards() -> [f64; 3] {

@@ -64,6 +64,7 @@ impl SceneFile {
             pairs_default: Some(LawTable::default()),
             shapes: vec![],
             bodies: vec![],
+            elastic: vec![],
             generate: vec![GenerateTable {
                 scene: family.into(),
                 set,

@@ -16,14 +16,20 @@ impl Tools {
         share: f64,
     ) -> Vec<(u32, u32, f64)> {
         self.margins.clear();
-        self.margins.resize(world.bodies.len(), 0.0);
+        self.margins.resize(world.bodies.len() + self.solids.nodes.list.len(), 0.0);
         self.detect(world, state);
         let mut found: Vec<(u32, u32, f64)> = vec![];
         let hard = self.near.iter().filter(|n| n.compliance.is_none());
+        let bodies = world.bodies.len();
+        let owner = |k: u32| match (k as usize).checked_sub(bodies) {
+            None => k,
+            Some(place) => bodies as u32 + self.solids.nodes.list[place].solid,
+        };
         for n in hard.filter(|n| n.place.gap < -share * n.size) {
+            let (a, b) = (owner(n.a), owner(n.b));
             match found.last_mut() {
-                Some(last) if (last.0, last.1) == (n.a, n.b) => last.2 = last.2.max(-n.place.gap),
-                _ => found.push((n.a, n.b, -n.place.gap)),
+                Some(last) if (last.0, last.1) == (a, b) => last.2 = last.2.max(-n.place.gap),
+                _ => found.push((a, b, -n.place.gap)),
             }
         }
         found

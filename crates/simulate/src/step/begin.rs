@@ -15,6 +15,8 @@ use crate::{Body, Force, Geometry, Motion, World, Wrenches};
 /// What is the same at the beginning of every step, and the memory of forces.
 pub(super) struct Start {
     built: Vec<Built>,
+    /// Of each node of elastic solids half the least side of an element, m.
+    node_sizes: Vec<f64>,
     wrenches: Wrenches,
     /// The state at the middle of the step, extrapolated.
     middle: State,
@@ -47,18 +49,25 @@ impl Built {
 
 impl Start {
     pub fn new(world: &World, state: &State, detector: &Detector) -> Self {
-        let sizes = detector.sizes(world.bodies.len());
+        let mut sizes = detector.sizes();
+        let node_sizes = sizes.split_off(world.bodies.len());
         let built = world.bodies.iter().zip(sizes).map(|(body, size)| Built::new(body, size));
         Self {
             built: built.collect(),
+            node_sizes,
             wrenches: Wrenches::default(),
             middle: State { memory: Default::default(), ..state.clone() },
         }
     }
 
+    /// The number of bodies of the world.
+    pub fn bodies(&self) -> usize {
+        self.built.len()
+    }
+
     /// Asks the forces, at the middle of the step.
     fn ask(&mut self, state: &State, forces: &mut [Box<dyn Force>], h: f64) {
-        let Self { built, wrenches, middle } = self;
+        let Self { built, wrenches, middle, .. } = self;
         wrenches.clear(built.len());
         if forces.is_empty() {
             return;
@@ -72,6 +81,7 @@ impl Start {
         }
         middle.velocity.clone_from(&state.velocity);
         middle.spin.clone_from(&state.spin);
+        middle.elastic.clone_from(&state.elastic);
         for force in forces {
             force.add(middle, wrenches);
         }
@@ -89,6 +99,7 @@ impl Start {
         let omega = apply(&start.r, state.spin[k]);
         let spin = if built.isotropic { omega } else { state.spin[k] };
         let mut b = Moving {
+            owner: k as u32,
             free,
             isotropic: built.isotropic,
             mass: body.mass,
@@ -139,6 +150,39 @@ impl Start {
             }
         }
         (b, speed)
+    }
+
+    /// A node of an elastic solid that moves with this velocity, and with the free one where nothing touches it.
+    fn node(place: Vec3, owner: u32, (v, v_free): (Vec3, Vec3), h: f64) -> Moving {
+        let zero = [[0.0; 3]; 3];
+        let at = |part: f64| Pose::at(add(place, scale(part * h, v)));
+        Moving {
+            owner,
+            free: true,
+            isotropic: true,
+            mass: f64::INFINITY,
+            inertia: zero,
+            inverse: zero,
+            radius: 0.0,
+            start: at(0.0),
+            v,
+            spin: [0.0; 3],
+            push: [0.0; 3],
+            twist: [0.0; 3],
+            weight: [0.0; 3],
+            middle: at(0.5),
+            end: at(1.0),
+            linear: [[0.0; 3]; 2],
+            angular: [0.0; 3],
+            frame: zero,
+            frame_end: zero,
+            v_new: v_free,
+            spin_new: [0.0; 3],
+            v_free,
+            spin_free: [0.0; 3],
+            impulse: [0.0; 3],
+            moment: [0.0; 3],
+        }
     }
 
     /// Puts the extrapolated middle of the step on the joints: elsewhere equations that follow from the others where a loop is closed contradict them, and the
@@ -192,6 +236,17 @@ impl Tools {
                 body.rotate(scheme, h);
             }
             self.bodies.push(body);
+        }
+        finite &= self.solids.begin(stride, state);
+        for (k, node) in self.solids.nodes.list.iter().enumerate() {
+            let place = node.position(&state.elastic);
+            let v = state.elastic[node.solid as usize].velocity[node.node as usize];
+            let owner = world.bodies.len() as u32 + node.solid;
+            let least = (1e-6_f64).max(slack) * self.start.node_sizes[k];
+            self.margins.push((gamma + 1.0) * h * norm(v) + h * h * gravity + least);
+            let stands = scheme.geometry == Geometry::Frozen;
+            let free = self.solids.free(k);
+            self.bodies.push(Start::node(place, owner, (v, free), if stands { 0.0 } else { h }));
         }
         if self.joints.redundant.is_some() && scheme.geometry != Geometry::Frozen {
             self.start.close_middle(&mut self.bodies, &self.joints, (world, state), h);

@@ -16,6 +16,8 @@ const SAME: f64 = 1e-13;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Arm {
     pub body: u32,
+    /// The body or elastic solid that it belongs to.
+    pub owner: u32,
     pub sign: f64,
     pub free: bool,
     /// `(p − x) × d` in the world frame, for impulses and for velocities.
@@ -60,9 +62,9 @@ impl Row {
         self.arms.iter().filter(|a| a.free)
     }
 
-    /// Its bodies, with [`NONE`] for one that does not move freely.
-    pub fn free_bodies(&self) -> [u32; 2] {
-        self.arms.each_ref().map(|a| if a.free { a.body } else { NONE })
+    /// The bodies and elastic solids that it acts on, with [`NONE`] for one that does not move freely.
+    pub fn free_owners(&self) -> [u32; 2] {
+        self.arms.each_ref().map(|a| if a.free { a.owner } else { NONE })
     }
 
     /// What velocities v and ω of an arm's body make along direction i of the impulses.
@@ -162,6 +164,7 @@ impl<'a> Meeting<'a> {
             let x_end = if later { b.end.x } else { b.middle.x };
             Arm {
                 body: [near.a, near.b][k],
+                owner: b.owner,
                 sign: [-1.0, 1.0][k],
                 free: b.free,
                 moment: frame.map(|d| cross(sub(place.point, b.middle.x), d)),
@@ -287,20 +290,21 @@ impl Tools {
 
     /// Islands of contacts and rows.
     fn join(&mut self) {
-        let Self { rows, joints, islands, bodies, .. } = self;
+        let Self { rows, joints, islands, start, solids, .. } = self;
+        let owners = start.bodies() + solids.len();
         let contacts = rows.iter().map(Row::free_arms);
         let scalars = (0..joints.rows.len()).map(|k| joints.levers(k));
-        islands.find(bodies.len(), |join| {
-            contacts.for_each(|arms| join(&mut arms.map(|a| a.body)));
+        islands.find(owners, |join| {
+            contacts.for_each(|arms| join(&mut arms.map(|a| a.owner)));
             scalars.for_each(|levers| join(&mut levers.iter().map(|l| l.body)));
         });
         // Where rows of joints act on a body its contacts have one direction for impulses and velocities: a problem has one V for both.
         if !joints.rows.is_empty() {
-            let mut jointed = vec![false; bodies.len()];
+            let mut jointed = vec![false; owners];
             for k in 0..joints.rows.len() {
                 joints.levers(k).iter().for_each(|l| jointed[l.body as usize] = true);
             }
-            let touched = |row: &Row| row.free_arms().any(|a| jointed[a.body as usize]);
+            let touched = |row: &Row| row.free_arms().any(|a| jointed[a.owner as usize]);
             rows.iter_mut().filter(|row| row.later && touched(row)).for_each(Row::at_the_middle);
         }
     }

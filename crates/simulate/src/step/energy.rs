@@ -9,12 +9,13 @@ use crate::report::{EnergyBalance, StepReport};
 use crate::state::State;
 
 impl Tools {
-    pub(super) fn energy(&self, stride: Stride, state: &State) -> EnergyBalance {
+    pub(super) fn energy(&mut self, stride: Stride, state: &State) -> EnergyBalance {
         let scheme = stride.scheme;
         let mut e = EnergyBalance::default();
-        for (k, b) in self.bodies.iter().enumerate().filter(|b| b.1.free) {
-            e.add_body(b, state.position[k], stride);
+        for (b, &x) in self.bodies.iter().zip(&state.position).filter(|b| b.0.free) {
+            e.add_body(b, x, stride);
         }
+        self.solids.energy(stride, state, &mut e);
         // v_θ and ω_θ.
         let mean = |body: u32| {
             let b = &self.bodies[body as usize];

@@ -28,6 +28,7 @@ mod apart;
 mod begin;
 mod contact;
 mod couple;
+mod elastic;
 mod energy;
 mod frame;
 mod memory;
@@ -51,6 +52,7 @@ use crate::{Force, MoreauJean, SimulateError, World};
 
 use begin::Start;
 use contact::Row;
+use elastic::Solids;
 use memory::Recalled;
 use problem::{Island, Statement};
 
@@ -76,7 +78,9 @@ impl Stride<'_> {
 pub(crate) struct Tools {
     detector: Detector,
     start: Start,
+    /// The bodies of the world, and after them the nodes of elastic solids that may touch them.
     bodies: Vec<Moving>,
+    solids: Solids,
     /// How far from each body others are looked for, m.
     margins: Vec<f64>,
     /// The points where bodies are near each other; for each what is remembered of it, the axis of its tangents, and its row if it has one.
@@ -108,6 +112,7 @@ impl Tools {
             start: Start::new(world, state, &detector),
             detector,
             bodies: vec![],
+            solids: Solids::new(world)?,
             margins: vec![],
             near: vec![],
             recalled: Recalled::default(),
@@ -117,7 +122,7 @@ impl Tools {
             insisted: vec![],
             joints,
             islands: Islands::default(),
-            island: Island::of(world.bodies.len()),
+            island: Island::of(world.bodies.len(), world.elastic.len()),
             statement: Statement::default(),
             slots: vec![],
             open: vec![],
@@ -147,6 +152,7 @@ impl Tools {
         let begun = Instant::now();
         let mut timings = Timings::default();
         let mut report = StepReport::begun(state.t, stride.h);
+        self.refuse_meeting(stride.world, state)?;
         if !self.begin(stride, state, forces) {
             report.status = StepStatus::NotFinite;
             report.timings.total = begun.elapsed().as_secs_f64();
@@ -158,7 +164,7 @@ impl Tools {
         self.meet(stride, state);
         let mut solved = self.solve(stride, inner)?;
         let new = self.bodies.iter().flat_map(|b| [b.v_new, b.spin_new]).flatten();
-        if !are_finite(new) {
+        if !are_finite(new) || !self.solids.is_finite() {
             solved.status = StepStatus::NotFinite;
         }
         report.energy = self.energy(stride, state);
@@ -194,6 +200,19 @@ impl Tools {
             Some(problem) => Friction::RollingLocal(problem.clone()),
             None => Friction::Local3(slot.problem.clone()),
         }))
+    }
+
+    /// Errors: two elastic solids that meet.
+    fn refuse_meeting(&self, world: &World, state: &State) -> Result<(), SimulateError> {
+        match self.solids.meeting(world, state) {
+            None => Ok(()),
+            Some((i, j)) => {
+                let name = |k: usize| world.label(world.bodies.len() + k);
+                let expected = "elastic solids apart from each other, for contact between two is not simulated";
+                let found = format!("{} where {} is, at t = {}", name(j), name(i), state.t);
+                Err(SimulateError::value("elastic", expected, found))
+            }
+        }
     }
 
     /// The points where bodies are near each other.

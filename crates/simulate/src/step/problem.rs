@@ -13,40 +13,53 @@ use crate::joints::Joints;
 use crate::moving::Moving;
 use crate::rolling::{self, Roller, Turning};
 
-/// The island that is being stated or taken up: its contacts and scalar rows, by their places among those of the step, and its free bodies.
+/// The island that is being stated or taken up: its contacts and scalar rows, by their places among those of the step, its free bodies and its elastic solids.
 pub(super) struct Island {
     pub contacts: Vec<u32>,
     pub scalars: Vec<u32>,
     pub members: Vec<u32>,
-    /// For each body the last island that it was gathered for, counted through all steps.
+    pub solids: Vec<u32>,
+    bodies: u32,
+    /// For each body and solid the last island that it was gathered for, counted through all steps.
     gathered: Vec<u64>,
     gatherings: u64,
 }
 
 impl Island {
-    pub fn of(bodies: usize) -> Self {
-        let gathered = vec![0; bodies];
-        Self { contacts: vec![], scalars: vec![], members: vec![], gathered, gatherings: 0 }
+    pub fn of(bodies: usize, solids: usize) -> Self {
+        Self {
+            contacts: vec![],
+            scalars: vec![],
+            members: vec![],
+            solids: vec![],
+            bodies: bodies as u32,
+            gathered: vec![0; bodies + solids],
+            gatherings: 0,
+        }
     }
 
     /// Of these contacts and rows, which are numbered on after all contacts.
     fn gather(&mut self, items: impl Iterator<Item = u32>, rows: &[Row], joints: &Joints) {
-        let Self { contacts, scalars, members, gathered, gatherings } = self;
+        let Self { contacts, scalars, members, solids, bodies, gathered, gatherings } = self;
         *gatherings += 1;
         contacts.clear();
         scalars.clear();
         members.clear();
-        let mut meet = |body: u32| {
-            let last = std::mem::replace(&mut gathered[body as usize], *gatherings);
+        solids.clear();
+        let mut meet = |owner: u32| {
+            let last = std::mem::replace(&mut gathered[owner as usize], *gatherings);
             if last != *gatherings {
-                members.push(body);
+                match owner.checked_sub(*bodies) {
+                    None => members.push(owner),
+                    Some(solid) => solids.push(solid),
+                }
             }
         };
         for item in items {
             match item.checked_sub(rows.len() as u32) {
                 None => {
                     contacts.push(item);
-                    rows[item as usize].free_arms().for_each(|a| meet(a.body));
+                    rows[item as usize].free_arms().for_each(|a| meet(a.owner));
                 }
                 Some(k) => {
                     scalars.push(k);
@@ -54,6 +67,16 @@ impl Island {
                 }
             }
         }
+    }
+
+    /// From this number on what contacts act on are solids.
+    pub fn bodies(&self) -> u32 {
+        self.bodies
+    }
+
+    /// How many bodies and solids there are in all.
+    fn owners(&self) -> usize {
+        self.gathered.len()
     }
 }
 
@@ -80,9 +103,12 @@ struct Chains {
 }
 
 impl Chains {
-    fn link(&mut self, bodies: usize, members: &[u32], pairs: impl Iterator<Item = [u32; 2]>) {
-        self.heads.resize(bodies, NONE);
-        members.iter().for_each(|&b| self.heads[b as usize] = NONE);
+    fn link(&mut self, island: &Island, pairs: impl Iterator<Item = [u32; 2]>) {
+        self.heads.resize(island.owners(), NONE);
+        let solids = island.solids.iter().map(|k| island.bodies + k);
+        for owner in island.members.iter().copied().chain(solids) {
+            self.heads[owner as usize] = NONE;
+        }
         self.pairs.clear();
         self.pairs.extend(pairs);
         self.next.clear();
@@ -178,12 +204,14 @@ impl Tools {
     }
 
     fn state_contacts(&mut self, k: usize) -> bool {
-        let Self { island, rows, bodies, statement, slots, .. } = self;
+        let Self { island, rows, bodies, solids, statement, slots, .. } = self;
         let Statement { sides, chains, mirrored, .. } = statement;
         let Slot { problem, point, .. } = &mut slots[k];
         let order = &island.contacts;
-        let pairs = order.iter().map(|&c| rows[c as usize].free_bodies());
-        chains.link(bodies.len(), &island.members, pairs);
+        chains.link(island, order.iter().map(|&c| rows[c as usize].free_owners()));
+        if !solids.is_empty() {
+            order.iter().for_each(|&c| solids.reach(&rows[c as usize]));
+        }
         problem.W.clear(order.len());
         problem.q.clear();
         problem.mu.clear();
@@ -211,6 +239,9 @@ impl Tools {
                 } else {
                     let other = &sides[order[j] as usize];
                     let mut block = coupling((chains.pairs[c], own), (chains.pairs[j], other));
+                    if !solids.is_empty() {
+                        solids.couple(&mut block, row, &rows[order[j] as usize]);
+                    }
                     if j == c {
                         mirrored[c] = width as u32;
                         block[0][0] += row.compliance;
@@ -351,7 +382,7 @@ impl Row {
         };
         Roller {
             mu_r: self.mu_r,
-            bodies: self.arms.each_ref().map(|a| a.free.then_some(a.body)),
+            bodies: self.arms.each_ref().map(|a| a.free.then_some(a.owner)),
             rows: sides.each_ref().map(|s| angular(&s.rows)),
             solved: sides.each_ref().map(|s| angular(&s.solved)),
             free: [0, 1].map(|k| self.turned[k] + spin(k)),

@@ -95,6 +95,7 @@ impl Tools {
         let order = &self.island.contacts;
         let warm = order.iter().filter(|&&c| self.rows[c as usize].warm).count();
         self.island.scalars.is_empty()
+            && self.island.solids.is_empty()
             && 2 * warm < order.len()
             && self.island.members.iter().all(slow)
     }
@@ -155,7 +156,8 @@ impl Tools {
 
     /// Velocities after the step with the impulses of the island; how much solving the rotations exactly has changed them, relative.
     fn respond(&mut self, Stride { scheme, h, .. }: Stride) -> f64 {
-        let Self { island, rows, bodies, joints, .. } = self;
+        let Self { island, rows, bodies, solids, joints, .. } = self;
+        island.solids.iter().for_each(|&k| solids.clear(k));
         for &b in &island.members {
             let b = &mut bodies[b as usize];
             (b.impulse, b.moment) = ([0.0; 3], [0.0; 3]);
@@ -163,6 +165,11 @@ impl Tools {
         for &c in &island.contacts {
             let row = &rows[c as usize];
             for arm in row.free_arms() {
+                if arm.owner >= island.bodies() {
+                    (0..3)
+                        .for_each(|i| solids.receive(arm.body, arm.sign * row.r[i], row.frame[i]));
+                    continue;
+                }
                 let b = &mut bodies[arm.body as usize];
                 for i in 0..3 {
                     b.receive(arm.sign * row.r[i], row.frame[i], arm.moment[i]);
@@ -177,6 +184,9 @@ impl Tools {
             for lever in joints.levers(k as usize) {
                 bodies[lever.body as usize].receive(lambda, lever.force, lever.moment);
             }
+        }
+        for &k in &island.solids {
+            solids.respond(k, |node, v| bodies[node].v_new = v);
         }
         let mut change = Share::default();
         for &b in &island.members {

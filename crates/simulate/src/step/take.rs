@@ -22,6 +22,7 @@ impl Tools {
     ) {
         let Stride { world, scheme, h } = stride;
         drift.quaternion = self.move_bodies(stride, state);
+        self.solids.take(scheme, h, state);
         state.t += h;
         state.steps += 1;
         self.remember(state, h);
@@ -45,7 +46,7 @@ impl Tools {
     /// How far quaternions were from length one.
     fn move_bodies(&self, Stride { world, scheme, h }: Stride, state: &mut State) -> f64 {
         let mut off: f64 = 0.0;
-        for (k, b) in self.bodies.iter().enumerate() {
+        for (k, b) in self.bodies[..world.bodies.len()].iter().enumerate() {
             if let Motion::Oscillating { amplitude, frequency, phase } = world.bodies[k].motion {
                 let (x, v) = oscillation(amplitude, frequency, phase, state.t + h);
                 state.position[k] = add(world.bodies[k].position, x);
@@ -91,8 +92,8 @@ impl Tools {
         let place = self.row_of[k] as usize;
         let mut report = ContactReport {
             key: near.key,
-            a: BodyId(near.a),
-            b: BodyId(near.b),
+            a: BodyId(self.bodies[near.a as usize].owner),
+            b: BodyId(self.bodies[near.b as usize].owner),
             point: near.place.point,
             frame: [[0.0; 3]; 3],
             gap: near.place.gap,

@@ -2,6 +2,7 @@
 
 mod balls;
 mod blocks;
+mod elastic;
 mod free_body;
 mod impacts;
 mod invariance;

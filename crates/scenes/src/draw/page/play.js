@@ -25,6 +25,7 @@ const numbers = new Float32Array(bytes(data.forces));
 const statuses = new Uint8Array(bytes(data.statuses));
 const energy = new Float32Array(bytes(data.energy));
 const residual = new Float32Array(bytes(data.residual));
+const shapes = new Float32Array(bytes(data.shapes));
 const [first, last] = [times[0], times[times.length - 1]];
 
 const NAMES = ['near', 'open', 'stick', 'slip'];
@@ -137,7 +138,7 @@ const rotationOf = ([w, x, y, z]) => new THREE.Quaternion(x, y, z, w);
 const solids = new THREE.Group();
 const kinds = new Map();
 const sheets = [];
-bodies.forEach((body, k) => body.parts.forEach(({ form, position, rotation }) => {
+bodies.slice(0, bodies.length - data.deforming).forEach((body, k) => body.parts.forEach(({ form, position, rotation }) => {
   const local = new THREE.Matrix4().compose(vector(position), rotationOf(rotation), new THREE.Vector3(1, 1, 1));
   if (form === 'plane') {
     sheets.push({ body: k, local });
@@ -164,6 +165,41 @@ if (edgePoints > 0 && edgePoints <= MOST_EDGES) {
   edges = new THREE.LineSegments(new THREE.BufferGeometry().setAttribute('position', new THREE.BufferAttribute(new Float32Array(3 * edgePoints), 3)), edgeMaterial);
   edges.frustumCulled = false;
   solids.add(edges);
+}
+/** Bodies that deform: triangles and lines between vertices that each frame has anew, `width` numbers a frame. */
+const soft = { width: 0, all: [] };
+bodies.slice(bodies.length - data.deforming).forEach((body, k) => {
+  const { vertices, faces } = body.parts[0].form.mesh;
+  const corners = faces.flatMap(face => face.slice(2).flatMap((_, i) => [face[0], face[i + 1], face[i + 2]]));
+  const sides = faces.flatMap(face => face.flatMap((from, i) => [from, face[(i + 1) % face.length]]));
+  const empty = count => new THREE.BufferGeometry().setAttribute('position', new THREE.BufferAttribute(new Float32Array(3 * count), 3));
+  const number = bodies.length - data.deforming + k;
+  const material = solidMaterial.clone();
+  material.color.set(colours.bodies[number % colours.bodies.length]);
+  const mesh = new THREE.Mesh(plain(empty(corners.length)), material);
+  const lines = new THREE.LineSegments(empty(sides.length), edgeMaterial);
+  mesh.frustumCulled = lines.frustumCulled = false;
+  mesh.userData.bodies = [number];
+  solids.add(mesh, lines);
+  soft.all.push({ first: soft.width, mesh, parts: [[mesh, corners], [lines, sides]] });
+  soft.width += 3 * vertices.length;
+});
+/** Puts them where they are, a share of the way from a frame to the next. */
+function deform(frame, share) {
+  for (const { first, mesh, parts } of soft.all) {
+    for (const [{ geometry }, ends] of parts) {
+      const to = geometry.getAttribute('position');
+      ends.forEach((vertex, i) => {
+        for (const d of [0, 1, 2]) {
+          const k = frame * soft.width + first + 3 * vertex + d;
+          to.array[3 * i + d] = share > 0 ? (1 - share) * shapes[k] + share * shapes[k + soft.width] : shapes[k];
+        }
+      });
+      to.needsUpdate = true;
+    }
+    mesh.geometry.computeVertexNormals();
+    mesh.geometry.boundingSphere = null;
+  }
 }
 scene.add(solids);
 
@@ -243,6 +279,7 @@ function show() {
     // Computed anew when somebody points at it.
     mesh.boundingSphere = null;
   }
+  deform(frame, share);
   if (edges) {
     const to = edges.geometry.getAttribute('position');
     let at = 0;
@@ -466,11 +503,11 @@ function under(x, y) {
   const solid = solids.visible && Number(element('opacity').value) === 1;
   const targets = [rods, heads, chains, dots].filter(mesh => mesh.count > 0 && (mesh.parent === scene ? mesh : mesh.parent).visible);
   // Through a transparent body one points at what is inside.
-  if (solid) targets.push(...[...kinds.values()].map(kind => kind.mesh));
+  if (solid) targets.push(...[...kinds.values()].map(kind => kind.mesh), ...soft.all.map(({ mesh }) => mesh));
   const hit = eye.hit(x, y, targets);
   if (!hit) return {};
   const { contacts: touched, bodies: owners } = hit.object.userData;
-  return touched ? { contact: touched[hit.instanceId] } : { body: owners[hit.instanceId] };
+  return touched ? { contact: touched[hit.instanceId] } : { body: owners[hit.instanceId ?? 0] };
 }
 tips(canvas, (x, y) => {
   const { contact, body } = under(x, y);
