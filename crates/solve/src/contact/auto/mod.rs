@@ -21,7 +21,7 @@
 //!
 //! A problem with scalar rows that have bounds stays with the sweeps, which visit them too: the later stages know no bounds.
 //!
-//! A starting point is taken where a sweep leads nearer from it than from zero impulses; near a solution it makes stages 2 and 4 needless.
+//! A starting point is taken where a sweep from it ends no farther off than one from zero impulses; near a solution it makes stages 2 and 4 needless.
 //!
 //! References: AcaryBremondHuber2018 for the evidence that proximal Newton methods solve hyperstatic problems; AlartCurnier1991; the
 //! parts' own files.
@@ -331,8 +331,8 @@ fn runs_away(estimate: f64) -> bool {
 }
 
 impl<const D: usize> OnContacts<Auto, D> {
-    /// Puts zero in place of impulses from which a sweep leads no nearer than from zero: a bad guess costs a sweep, and contacts that came
-    /// or went are no reason to refuse the rest of a good one.
+    /// Puts zero in place of impulses from which a sweep ends farther off than from zero: a bad guess costs a sweep, contacts that came or
+    /// went are no reason to refuse the rest of a good one, and of several solutions the one given stays.
     fn choose_start<P: Linearised<D> + Disked<D>>(
         &self,
         problem: &P,
@@ -356,7 +356,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         let theirs = after_a_sweep(point);
         P::impulses(point).fill(0.0);
         let ours = after_a_sweep(point);
-        if theirs < ours {
+        if theirs <= ours {
             P::impulses(point).copy_from_slice(given);
             Start::Given
         } else {
@@ -682,6 +682,7 @@ impl<const D: usize> OnContacts<Auto, D> {
 
 #[cfg(test)]
 mod tests {
+    use nonsmooth_linalg::{Bsr, Csc};
     use nonsmooth_problem::planted::Planted;
     use nonsmooth_problem::{FrictionGlobal, FrictionLocal, LocalPoint, Problem};
 
@@ -754,6 +755,19 @@ mod tests {
             assert!(account.contains("started from the point given"), "{seed}: {account}");
             assert!(warm.iterations <= cold.iterations + 20, "{seed}: {account}");
         }
+    }
+
+    #[test]
+    fn of_several_solutions_the_one_given_stays() {
+        // Two contacts of one body at one place share their load as they like; a sweep from zero gives the first all of it.
+        let entries = (0..4).flat_map(|i| [(i, i % 2, 1.0), (i, i % 2 + 2, 1.0)]);
+        let w = Bsr::from_csc(&Csc::from_triplets(4, 4, entries).unwrap());
+        let problem =
+            FrictionLocal::<2>::new(w, vec![-1.0, 0.0, -1.0, 0.0], vec![0.5, 0.5]).unwrap();
+        let mut point = problem.origin();
+        point.r.copy_from_slice(&[0.5, 0.0, 0.5, 0.0]);
+        solve(&problem, &mut point);
+        assert_eq!(point.r, [0.5, 0.0, 0.5, 0.0]);
     }
 
     #[test]
