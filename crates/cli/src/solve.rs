@@ -49,6 +49,9 @@ pub struct Args {
     /// machine has free]
     #[arg(long, value_name = "SIZE", value_parser = files::size)]
     memory_limit: Option<u64>,
+    /// Factorise large matrices on so many threads, 0 for one a core; the results are the same, bit for bit
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    threads: usize,
     /// Start from the file's /guesses/1 (complementarity: its [solution]) in place of zero; with =FILE from the
     /// solution of another file (or its /guesses/1) of the same size, with =DIRECTORY from the file of the same name there
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
@@ -135,6 +138,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let settings = settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))?;
     let mut limits = limits(args.tol, args.max_iter, args.time_limit)?;
     limits.memory_limit = args.memory_limit;
+    limits.threads = args.threads;
     limits.trace = args.trace.is_some() || args.plot.is_some();
     let targets = Targets::new(args)?;
     let cancel = limits.cancel.clone().unwrap_or_default();
@@ -233,9 +237,7 @@ pub fn limits(tol: f64, iterations: Option<usize>, seconds: Option<f64>) -> Resu
         },
         time_limit,
         cancel: Some(interrupt::flag()),
-        memory_limit: None,
-        trace: false,
-        cpu_time: false,
+        ..Limits::default()
     })
 }
 

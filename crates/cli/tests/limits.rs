@@ -68,6 +68,24 @@ fn one_ctrl_c_ends_a_solve_with_its_best_point() {
 }
 
 #[test]
+fn threads_change_no_bit_of_an_answer() {
+    let folder = Folder::new();
+    // A factorisation of it is large enough to be shared.
+    folder.run("gen sphere_pile --set count=600 --out p.hdf5").exits(0);
+    let solved = |threads: usize| {
+        let command = format!("solve p.hdf5 --solver ip --threads {threads} --solution --json");
+        let report = folder.run(&command).json().remove(0);
+        assert_eq!(report["status"], "solved");
+        (report["iterations"].clone(), report["solution"].clone())
+    };
+    let alone = solved(1);
+    assert!(alone.1.is_object());
+    assert_eq!(solved(2), alone);
+    assert_eq!(solved(0), alone);
+    folder.run("solve p.hdf5 --threads 5000").refused(&["threads", "1024", "5000"]);
+}
+
+#[test]
 fn memory_limits_are_sizes_and_name_what_they_refuse() {
     let folder = Folder::new();
     folder.run("gen lcp --set n=60 --out p.toml").exits(0);

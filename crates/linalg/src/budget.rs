@@ -1,13 +1,15 @@
-//! What the computation of this thread may still use: time, and memory for one factorisation.
+//! What the computation of this thread may still use: time, memory for one factorisation, and threads for large ones.
 //!
 //! A loop that looks at its limits between two steps is late by the length of a step, which may be a factorisation of a minute. So whoever
 //! has limits installs them for a scope ([`Budget::enter`]), and kernels ask ([`over`]) wherever some milliseconds of work have passed. They then
 //! return early with the error that they have for a matrix that cannot be factorised; who installed the budget knows better what that means.
 
 use std::cell::{Cell, RefCell};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Limits of a computation; each may be absent.
 #[derive(Debug, Clone, Default)]
@@ -18,11 +20,13 @@ pub struct Budget {
     pub cancel: Option<Arc<AtomicBool>>,
     /// The bytes that one factorisation may take; without a number, what the machine has free when it begins.
     pub memory: Option<u64>,
+    /// Threads that one large kernel may use; its results are the same bits for any number. 0 and 1: the present thread alone.
+    pub threads: usize,
 }
 
 thread_local! {
     static CURRENT: RefCell<Budget> = const {
-        RefCell::new(Budget { deadline: None, cancel: None, memory: None })
+        RefCell::new(Budget { deadline: None, cancel: None, memory: None, threads: 0 })
     };
     /// Whether there is a deadline or a flag to look at.
     static ARMED: Cell<bool> = const { Cell::new(false) };
@@ -58,6 +62,7 @@ impl Budget {
                 (Some(a), Some(b)) => Some(a.min(b)),
                 (a, b) => a.or(b),
             },
+            threads: self.threads.max(before.threads),
         };
         ARMED.set(now.deadline.is_some() || now.cancel.is_some());
         CURRENT.set(now);
@@ -108,6 +113,27 @@ impl Drop for Scope {
 /// The budget in force, to be entered by a thread that works for this one.
 pub fn current() -> Budget {
     CURRENT.with_borrow(Budget::clone)
+}
+
+/// Pools of threads by the process that made them: a fork has none of its parent's threads.
+static TEAMS: Mutex<Vec<(u32, Arc<ThreadPool>)>> = Mutex::new(vec![]);
+
+/// The threads that the budget in force allows, where these are several, as a pool: made at first use, and kept. `None` on a thread of a pool, whose
+/// neighbours have work of their own.
+pub(crate) fn team() -> Option<Arc<ThreadPool>> {
+    let threads = CURRENT.with_borrow(|budget| budget.threads);
+    if threads < 2 || rayon::current_thread_index().is_some() {
+        return None;
+    }
+    let process = std::process::id();
+    let mut teams = TEAMS.lock().unwrap_or_else(PoisonError::into_inner);
+    let found = teams.iter().find(|(p, t)| *p == process && t.current_num_threads() == threads);
+    if let Some((_, team)) = found {
+        return Some(team.clone());
+    }
+    let team = Arc::new(ThreadPoolBuilder::new().num_threads(threads).build().ok()?);
+    teams.push((process, team.clone()));
+    Some(team)
 }
 
 /// Whether the computation is to end now. Costs some 30 ns where there is a limit, 1 ns where there is none.

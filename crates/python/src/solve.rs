@@ -101,7 +101,7 @@ fn there(
 
 /// Solves a problem. The arguments are those of `nonsmooth.solve`, which has the words.
 #[pyfunction]
-#[pyo3(signature = (problem, solver, settings, tol, time_limit, max_iter, warm_start, callback))]
+#[pyo3(signature = (problem, solver, settings, tol, time_limit, max_iter, threads, warm_start, callback))]
 #[allow(clippy::too_many_arguments)]
 pub fn solve(
     py: Python<'_>,
@@ -111,6 +111,7 @@ pub fn solve(
     tol: f64,
     time_limit: Option<f64>,
     max_iter: Option<usize>,
+    threads: usize,
     warm_start: Option<&Bound<'_, PyAny>>,
     callback: Option<Py<PyAny>>,
 ) -> PyResult<Answer> {
@@ -123,6 +124,7 @@ pub fn solve(
         tolerance: tol,
         time_limit,
         max_iterations: max_iter.unwrap_or(most),
+        threads,
         cancel: Some(watcher.stop.clone()),
         ..Limits::default()
     };

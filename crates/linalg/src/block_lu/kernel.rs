@@ -66,6 +66,14 @@ pub(super) struct Pivots {
     pub broken: bool,
 }
 
+impl Pivots {
+    /// Those of other fronts, too.
+    pub(super) fn add(&mut self, other: Self) {
+        self.perturbed += other.perturbed;
+        self.broken |= other.broken;
+    }
+}
+
 /// A usable pivot in place of `pivot`.
 #[inline(always)]
 fn mended(pivot: f64, outcome: &mut Pivots) -> f64 {

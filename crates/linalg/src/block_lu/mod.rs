@@ -10,6 +10,10 @@
 //! factorisation would take longer than a dissection does, by the operations that its tree of elimination says, the graph is dissected too, and
 //! the order with fewer operations taken. Counts decide and no clock, so that equal patterns are ordered alike everywhere.
 //!
+//! Threads share it in two ways: subtrees of the tree of elimination that are alike in cost go side by side, each with a stack of its own, and the few
+//! large fronts above them cut their products into strips of columns. Each entry is made of the same sums in the same order
+//! whoever makes it, so the factors are the same bits for every number of threads.
+//!
 //! References: DuffReid1983 (fronts), Liu1992 (tree, supernodes, stack), AmestoyDavisDuff1996 (minimum degree), George1973, LiptonRoseTarjan1979,
 //! KarypisKumar1998, FiducciaMattheyses1982 (dissection), GilbertNgPeyton1994 (counts), LiDemmel2003 (static pivots), AshcraftGrimes1989 (merging).
 //! Storage: 8 bytes an entry of L, U and A, and a stack of remainders.
@@ -18,14 +22,19 @@
 //! Fails where elimination in a fixed order grows beyond double precision: the residual that the caller measures then says so.
 
 mod dissection;
+mod factor;
 mod kernel;
+mod plan;
 mod symbolic;
 
-use kernel::{At, Pivots, Simd, WIDTH};
-use symbolic::{Front, Run, Symbolic};
+use kernel::{At, Simd, WIDTH};
+use symbolic::{Front, Symbolic};
 
-use super::budget::{self, Pace, TooLarge};
+use super::budget::{self, TooLarge};
 use super::inverse::count_factorisation;
+
+/// A factorisation of more operations than this, some milliseconds, is shared among the threads that the budget allows.
+const SHARED: f64 = 5e7;
 
 /// A matrix that cannot be factorised: without a non-zero entry, with one that is not finite, or with factors that overflow; or one for which there is
 /// not time or memory enough (see [`budget`]).
@@ -226,18 +235,28 @@ impl BlockLu {
     /// Factorises the values added so far, which stay.
     ///
     /// Rows and columns are scaled by powers of two to a largest entry of about one; a pivot below ε^(3/4) of that becomes
-    /// ε^(1/2). Errors: see [`Singular`]; the factors are then of no use.
+    /// ε^(1/2). Large matrices are factorised on as many threads as the budget in force allows, with the same bits for any number.
+    /// Errors: see [`Singular`]; the factors are then of no use.
     pub fn factorise(&mut self) -> Result<(), Singular> {
         count_factorisation();
+        let team = if self.flops() < SHARED { None } else { budget::team() };
+        if let Some(team) = &team {
+            self.symbolic.share(team.current_num_threads());
+        }
         self.make_room();
         self.scale()?;
-        let mut outcome = Pivots::default();
-        let mut pace = Pace::default();
-        for f in 0..self.symbolic.fronts.len() {
-            let found = self.front(f, &mut pace).ok_or(Singular)?;
-            outcome.perturbed += found.perturbed;
-            outcome.broken |= found.broken;
-        }
+        let outcome = match team {
+            Some(team) => {
+                let limits = budget::current();
+                team.install(|| self.eliminate_shared(&limits))
+            }
+            None => self.eliminate(),
+        };
+        // What a thread of the team was told, the present one is told too.
+        let outcome = outcome.ok_or_else(|| {
+            budget::over();
+            Singular
+        })?;
         self.perturbed = outcome.perturbed;
         if outcome.broken { Err(Singular) } else { Ok(()) }
     }
@@ -252,7 +271,7 @@ impl BlockLu {
             (remainders, s.stack_len),
             (triangles, s.triangles_len),
         ] {
-            if entries.is_empty() {
+            if entries.len() < count {
                 *entries = vec![0.0; count];
             }
         }
@@ -310,130 +329,6 @@ impl BlockLu {
         }
         columns.iter_mut().for_each(|c| *c = inverse_power(*c));
         Ok(())
-    }
-
-    /// Assembles and eliminates front f; `None` where the time is over.
-    fn front(&mut self, f: usize, pace: &mut Pace) -> Option<Pivots> {
-        let (k, m) = (self.symbolic.fronts[f].pivots, self.symbolic.fronts[f].rest);
-        let (ld, simd) = (k + m, self.simd);
-        if pace.over((ld * ld) as f64) {
-            return None;
-        }
-        self.assemble(f);
-        let s = &self.symbolic;
-        let front = &s.fronts[f];
-        let lower = &mut self.lower[front.lower..front.lower + k * ld];
-        let upper = &mut self.upper[front.upper..front.upper + k * m];
-        let mut elimination = Elimination {
-            simd,
-            k,
-            ld,
-            lower,
-            triangles: &mut self.triangles[front.triangles..],
-            inverses: &mut self.inverses[front.start..front.start + k],
-            swaps: &mut self.swaps[front.start..front.start + k],
-            outcome: Pivots::default(),
-            pace,
-        };
-        elimination.columns(0, k)?;
-        let outcome = elimination.outcome;
-        if m == 0 {
-            return Some(outcome);
-        }
-        let whole = At { at: 0, ld: k };
-        exchange(upper, whole, m, &self.swaps[front.start..front.start + k], 0);
-        let triangles = &self.triangles[front.triangles..];
-        // The remainder; the children's follow on top of it.
-        let (begin, end) = (front.remainder, front.remainder + m * m);
-        let below = At { at: k, ld };
-        let each = (k * (k + 2 * m)) as f64;
-        for (j, n) in strips(m, each) {
-            let part = At { at: j * k, ld: k };
-            left_solve(simd, (0, k), (lower, ld), triangles, (upper, part), n);
-            let remainder = (&mut self.remainders[begin..end], At { at: j * m, ld: m });
-            kernel::product(simd, (m, n, k), (lower, below), (upper, part), remainder, true);
-            if pace.over(each * n as f64) {
-                return None;
-            }
-        }
-        self.add_remainders(f);
-        Some(outcome)
-    }
-
-    /// Fills the pivots' rows and columns of front f: the entries of A, and what the children leave there.
-    fn assemble(&mut self, f: usize) {
-        let s = &self.symbolic;
-        let front = &s.fronts[f];
-        let (k, m) = (front.pivots, front.rest);
-        let ld = k + m;
-        let lower = &mut self.lower[front.lower..front.lower + k * ld];
-        let upper = &mut self.upper[front.upper..front.upper + k * m];
-        lower.fill(0.0);
-        upper.fill(0.0);
-        for p in &s.places[front.blocks.clone()] {
-            let (rows, columns) = (p.rows as usize, p.columns as usize);
-            let block = &self.values[p.values..p.values + rows * columns];
-            let row_scale = &self.row_scale[p.row as usize..p.row as usize + rows];
-            let column_scale = &self.column_scale[p.column as usize..p.column as usize + columns];
-            let (to, ld) = if p.upper {
-                (&mut upper[p.to - front.upper..], k)
-            } else {
-                (&mut lower[p.to - front.lower..], ld)
-            };
-            match rows {
-                3 => scatter(block, 3, row_scale, column_scale, to, ld),
-                6 => scatter(block, 6, row_scale, column_scale, to, ld),
-                12 => scatter(block, 12, row_scale, column_scale, to, ld),
-                _ => scatter(block, rows, row_scale, column_scale, to, ld),
-            }
-        }
-        for &c in &s.children[front.children.clone()] {
-            let child = &s.fronts[c as usize];
-            let from = &self.remainders[child.remainder..child.remainder + child.rest * child.rest];
-            let (near, far) = (child.runs.start..child.beyond, child.beyond..child.runs.end);
-            for column in &s.runs[near.clone()] {
-                for l in 0..column.len as usize {
-                    let from = &from[(column.from as usize + l) * child.rest..][..child.rest];
-                    let to = &mut lower[(column.to as usize + l) * ld..][..ld];
-                    add_runs(&s.runs[child.runs.clone()], from, to, 0);
-                }
-            }
-            for column in &s.runs[far] {
-                for l in 0..column.len as usize {
-                    let from = &from[(column.from as usize + l) * child.rest..][..child.rest];
-                    let to = &mut upper[(column.to as usize + l - k) * k..][..k];
-                    add_runs(&s.runs[near.clone()], from, to, 0);
-                }
-            }
-        }
-    }
-
-    /// Adds what the children leave beyond the pivots of front f to its remainder.
-    fn add_remainders(&mut self, f: usize) {
-        let s = &self.symbolic;
-        let front = &s.fronts[f];
-        let (k, m) = (front.pivots, front.rest);
-        let (begin, end) = (front.remainder, front.remainder + m * m);
-        for &c in &s.children[front.children.clone()] {
-            let child = &s.fronts[c as usize];
-            let from = child.remainder..child.remainder + child.rest * child.rest;
-            // The two lie apart in the stack.
-            let (from, to) = if from.start < begin {
-                let (low, high) = self.remainders.split_at_mut(begin);
-                (&low[from], &mut high[..m * m])
-            } else {
-                let (low, high) = self.remainders.split_at_mut(end);
-                (&high[from.start - end..from.end - end], &mut low[begin..])
-            };
-            let runs = &s.runs[child.beyond..child.runs.end];
-            for column in runs {
-                for l in 0..column.len as usize {
-                    let from = &from[(column.from as usize + l) * child.rest..][..child.rest];
-                    let to = &mut to[(column.to as usize + l - k) * m..][..m];
-                    add_runs(runs, from, to, k);
-                }
-            }
-        }
     }
 
     /// `x ← L⁻¹ P x`, front by front.
@@ -560,25 +455,6 @@ fn column_maxima(block: &[f64], height: usize, scale: &[f64], largest: &mut [f64
     }
 }
 
-/// A block, scaled, into columns of a front.
-#[inline(always)]
-fn scatter(
-    block: &[f64],
-    height: usize,
-    row_scale: &[f64],
-    column_scale: &[f64],
-    to: &mut [f64],
-    ld: usize,
-) {
-    let row_scale = &row_scale[..height];
-    for (c, (column, scale)) in block.chunks_exact(height).zip(column_scale).enumerate() {
-        let to = &mut to[c * ld..c * ld + height];
-        for i in 0..height {
-            to[i] = column[i] * row_scale[i] * scale;
-        }
-    }
-}
-
 /// Adds a D×D block by rows to columns.
 #[inline(always)]
 fn add_transposed<const D: usize>(block: &[f64], to: &mut [f64], stride: usize) {
@@ -587,140 +463,6 @@ fn add_transposed<const D: usize>(block: &[f64], to: &mut [f64], stride: usize) 
         let column = &mut to[c * stride..c * stride + D];
         for r in 0..D {
             column[r] += block[r * D + c];
-        }
-    }
-}
-
-/// Adds the rows of a child's column to its parent's column, which begins at row `first` of the front.
-#[inline(always)]
-fn add_runs(runs: &[Run], from: &[f64], to: &mut [f64], first: usize) {
-    for run in runs {
-        let (f, t, len) = (run.from as usize, run.to as usize - first, run.len as usize);
-        to[t..t + len].iter_mut().zip(&from[f..f + len]).for_each(|(to, from)| *to += from);
-    }
-}
-
-/// Exchanges rows in `columns` columns as `swaps` says, rows counted from `first`.
-fn exchange(x: &mut [f64], part: At, columns: usize, swaps: &[u32], first: usize) {
-    if swaps.iter().enumerate().all(|(j, &p)| j + first == p as usize) {
-        return;
-    }
-    for c in 0..columns {
-        let column = &mut x[part.at + c * part.ld..];
-        for (j, &p) in swaps.iter().enumerate() {
-            column.swap(first + j, p as usize);
-        }
-    }
-}
-
-/// `X ← L⁻¹ X` with the unit lower triangle of pivots `a..b`, for `n` columns of X whose row 0 is that of pivot 0.
-fn left_solve(
-    simd: Simd,
-    (a, b): (usize, usize),
-    (lower, ld): (&[f64], usize),
-    triangles: &[f64],
-    (x, part): (&mut [f64], At),
-    n: usize,
-) {
-    if b - a <= WIDTH {
-        let negative = &triangles[a * WIDTH..a * WIDTH + WIDTH * WIDTH];
-        let rows = At { at: part.at + a, ld: part.ld };
-        kernel::replace(simd, (b - a, n), negative, (x, rows));
-        return;
-    }
-    let mid = middle(a, b);
-    left_solve(simd, (a, mid), (lower, ld), triangles, (x, part), n);
-    let beside = At { at: a * ld + mid, ld };
-    let (done, open) = (At { at: part.at + a, ld: part.ld }, At { at: part.at + mid, ld: part.ld });
-    kernel::product_below(simd, (b - mid, n, mid - a), (lower, beside), (x, done, open));
-    left_solve(simd, (mid, b), (lower, ld), triangles, (x, part), n);
-}
-
-/// Operations of a product that is made in one go: some 20 ms.
-const STRIP: f64 = 2e8;
-/// The least columns of a strip, so that the rest of the product's operands are not read too often.
-const NARROW: usize = 48;
-
-/// Cuts `columns` columns of `each` operations into strips (first column, number) of some milliseconds; all but the largest fronts are one strip.
-fn strips(columns: usize, each: f64) -> impl Iterator<Item = (usize, usize)> {
-    let whole = each * columns as f64 <= 2.0 * STRIP;
-    let width = if whole { columns.max(1) } else { ((STRIP / each) as usize).max(NARROW) };
-    (0..columns).step_by(width).map(move |j| (j, width.min(columns - j)))
-}
-
-/// Where a range of pivots is halved: at a multiple of the panel width from its start.
-fn middle(a: usize, b: usize) -> usize {
-    a + ((b - a) / 2).next_multiple_of(WIDTH)
-}
-
-/// The elimination of a front's pivots by halves: the left half, its effect on the right half, the right half.
-struct Elimination<'a> {
-    simd: Simd,
-    k: usize,
-    ld: usize,
-    lower: &'a mut [f64],
-    triangles: &'a mut [f64],
-    inverses: &'a mut [f64],
-    swaps: &'a mut [u32],
-    outcome: Pivots,
-    pace: &'a mut Pace,
-}
-
-impl Elimination<'_> {
-    /// `None` where the time is over.
-    fn columns(&mut self, a: usize, b: usize) -> Option<()> {
-        let (simd, k, ld) = (self.simd, self.k, self.ld);
-        if b - a <= WIDTH {
-            self.panel(a, b);
-            return Some(());
-        }
-        let mid = middle(a, b);
-        self.columns(a, mid)?;
-        let (left, right) = self.lower.split_at_mut(mid * ld);
-        let columns = At { at: 0, ld };
-        exchange(right, columns, b - mid, &self.swaps[a..mid], a);
-        let below = At { at: a * ld + mid, ld };
-        let each = ((mid - a) * (mid - a + 2 * (ld - mid))) as f64;
-        for (j, n) in strips(b - mid, each) {
-            let part = At { at: j * ld, ld };
-            left_solve(simd, (a, mid), (left, ld), self.triangles, (right, part), n);
-            let (done, open) = (At { at: j * ld + a, ld }, At { at: j * ld + mid, ld });
-            kernel::product_below(simd, (ld - mid, n, mid - a), (left, below), (right, done, open));
-            if self.pace.over(each * n as f64) {
-                return None;
-            }
-        }
-        self.columns(mid, b)?;
-        let columns = At { at: a * self.ld, ld: self.ld };
-        exchange(self.lower, columns, mid - a, &self.swaps[mid..b], mid);
-        debug_assert!(b <= k);
-        Some(())
-    }
-
-    /// Eliminates pivots `a..b`, at most [`WIDTH`], in their own columns.
-    fn panel(&mut self, a: usize, b: usize) {
-        let (simd, k, ld) = (self.simd, self.k, self.ld);
-        let diagonal = At { at: a * ld + a, ld };
-        let (swaps, inverses) = (&mut self.swaps[a..b], &mut self.inverses[a..b]);
-        let found = kernel::factor_panel(simd, k - a, (self.lower, diagonal), swaps, inverses);
-        self.outcome.perturbed += found.perturbed;
-        self.outcome.broken |= found.broken;
-        swaps.iter_mut().for_each(|p| *p += a as u32);
-        let rest = At { at: a * ld + k, ld };
-        kernel::right_solve(simd, ld - k, (self.lower, diagonal, rest), inverses);
-        // −L⁻¹ of the unit triangle, column by column; entries of L are at most one.
-        let w = b - a;
-        let triangle = &mut self.triangles[a * WIDTH..a * WIDTH + WIDTH * WIDTH];
-        for j in 0..w {
-            let column = &mut triangle[j * WIDTH..j * WIDTH + WIDTH];
-            column.fill(0.0);
-            column[j] = -1.0;
-            for p in j..w {
-                let y = column[p];
-                for i in p + 1..w {
-                    column[i] -= self.lower[diagonal.at + p * ld + i] * y;
-                }
-            }
         }
     }
 }

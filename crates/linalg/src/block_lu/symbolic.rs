@@ -6,6 +6,8 @@ use faer::sparse::linalg::amd;
 
 use super::dissection::nested_dissection;
 use super::kernel::WIDTH;
+use super::plan::Plan;
+use crate::budget;
 
 /// `(from, to, length)`: consecutive rows of a front's remainder that are consecutive in its parent too.
 #[derive(Debug, Clone, Copy)]
@@ -77,6 +79,7 @@ pub(super) struct Symbolic {
     pub lower_len: usize,
     pub upper_len: usize,
     pub stack_len: usize,
+    pub plan: Plan,
     pub triangles_len: usize,
     pub widest: usize,
     pub flops: f64,
@@ -97,7 +100,7 @@ struct Super {
 }
 
 /// Estimated nanoseconds for a front, its share of assembly included; what merging is decided by.
-fn cost(k: usize, m: usize) -> f64 {
+pub(super) fn cost(k: usize, m: usize) -> f64 {
     let (k, m) = (k as f64, m as f64);
     400.0 + 25.0 * k + flops(k, m) / 30.0 + 0.5 * (k + m) * (k + m)
 }
@@ -152,6 +155,7 @@ impl Symbolic {
             lower_len: 0,
             upper_len: 0,
             stack_len: 0,
+            plan: Plan::default(),
             triangles_len: 0,
             widest: 0,
             flops: 0.0,
@@ -322,54 +326,124 @@ impl Symbolic {
         found.ok().map(|at| range.start + at)
     }
 
-    /// Gives each remainder room in the stack: the first gap that is large enough among those that live at the same time.
-    fn place_remainders(&mut self) {
-        let mut gaps: Vec<(usize, usize)> = vec![]; // (begin, end), sorted
-        for f in 0..self.fronts.len() {
-            let need = self.fronts[f].rest * self.fronts[f].rest;
-            if need > 0 {
-                let at = match gaps.iter().position(|g| g.1 - g.0 >= need) {
-                    Some(g) => {
-                        let begin = gaps[g].0;
-                        gaps[g].0 += need;
-                        if gaps[g].0 == gaps[g].1 {
-                            gaps.remove(g);
-                        }
-                        begin
-                    }
-                    None => {
-                        // A gap at the very end grows.
-                        let begin = match gaps.last() {
-                            Some(g) if g.1 == self.stack_len => g.0,
-                            _ => self.stack_len,
-                        };
-                        if begin < self.stack_len {
-                            gaps.pop();
-                        }
-                        self.stack_len = begin + need;
-                        begin
-                    }
-                };
-                self.fronts[f].remainder = at;
+    /// Prepares a factorisation on so many threads, where the memory for their stacks is there; keeps another plan where not.
+    pub(super) fn share(&mut self, threads: usize) {
+        if self.plan.threads == threads {
+            return;
+        }
+        let before = self.stack_len;
+        self.plan = Plan::new(threads, &self.fronts, &self.children);
+        self.place_remainders();
+        if self.stack_len > before && !budget::fits(8.0 * self.stack_len as f64) {
+            self.plan = Plan { threads, regions: vec![0], ..Plan::default() };
+            self.place_remainders();
+        }
+    }
+
+    /// Where front f begins in all arrays, or where they end.
+    pub(super) fn bounds(&self, f: usize) -> Bounds {
+        match self.fronts.get(f) {
+            Some(&Front { start, lower, upper, triangles, .. }) => {
+                Bounds { start, lower, upper, triangles }
             }
-            for c in self.fronts[f].children.clone() {
-                let child = &self.fronts[self.children[c] as usize];
-                let (begin, end) = (child.remainder, child.remainder + child.rest * child.rest);
-                if begin == end {
-                    continue;
+            None => Bounds {
+                start: self.dim,
+                lower: self.lower_len,
+                upper: self.upper_len,
+                triangles: self.triangles_len,
+            },
+        }
+    }
+
+    /// Gives each remainder room in the stack. Tasks of the plan have a region each; the fronts above take what these leave free.
+    fn place_remainders(&mut self) {
+        let mut plan = std::mem::take(&mut self.plan);
+        plan.regions = vec![0];
+        let mut free = Room::default();
+        for task in &plan.tasks {
+            let mut room = Room { gaps: vec![], end: free.end };
+            task.clone().for_each(|f| self.place_remainder(f, &mut room));
+            free.gaps.append(&mut room.gaps);
+            free.end = room.end;
+            plan.regions.push(room.end);
+        }
+        plan.others(self.fronts.len()).for_each(|f| self.place_remainder(f, &mut free));
+        self.stack_len = free.end;
+        self.plan = plan;
+    }
+
+    /// The remainder of front f takes the first gap that is large enough; then its children's become gaps.
+    fn place_remainder(&mut self, f: usize, room: &mut Room) {
+        let need = self.fronts[f].rest * self.fronts[f].rest;
+        if need > 0 {
+            self.fronts[f].remainder = room.take(need);
+        }
+        for c in self.fronts[f].children.clone() {
+            let child = &self.fronts[self.children[c] as usize];
+            room.give_back(child.remainder, child.remainder + child.rest * child.rest);
+        }
+    }
+}
+
+/// The places of a front, or of what follows the last one, in the arrays of the factors.
+pub(super) struct Bounds {
+    pub start: usize,
+    pub lower: usize,
+    pub upper: usize,
+    pub triangles: usize,
+}
+
+/// A stack with gaps (begin, end), sorted.
+#[derive(Default)]
+struct Room {
+    gaps: Vec<(usize, usize)>,
+    end: usize,
+}
+
+impl Room {
+    /// The begin of the first gap that is large enough.
+    fn take(&mut self, need: usize) -> usize {
+        let Self { gaps, end } = self;
+        match gaps.iter().position(|g| g.1 - g.0 >= need) {
+            Some(g) => {
+                let begin = gaps[g].0;
+                gaps[g].0 += need;
+                if gaps[g].0 == gaps[g].1 {
+                    gaps.remove(g);
                 }
-                let mut g = gaps.partition_point(|g| g.0 < begin);
-                gaps.insert(g, (begin, end));
-                if g + 1 < gaps.len() && gaps[g].1 == gaps[g + 1].0 {
-                    gaps[g].1 = gaps.remove(g + 1).1;
+                begin
+            }
+            None => {
+                // A gap at the very end grows.
+                let begin = match gaps.last() {
+                    Some(g) if g.1 == *end => g.0,
+                    _ => *end,
+                };
+                if begin < *end {
+                    gaps.pop();
                 }
-                if g > 0 && gaps[g - 1].1 == gaps[g].0 {
-                    gaps[g - 1].1 = gaps.remove(g).1;
-                    g -= 1;
-                }
-                debug_assert!(gaps[g].0 < gaps[g].1);
+                *end = begin + need;
+                begin
             }
         }
+    }
+
+    /// Entries from `begin` to `end` are free.
+    fn give_back(&mut self, begin: usize, end: usize) {
+        let gaps = &mut self.gaps;
+        if begin == end {
+            return;
+        }
+        let mut g = gaps.partition_point(|g| g.0 < begin);
+        gaps.insert(g, (begin, end));
+        if g + 1 < gaps.len() && gaps[g].1 == gaps[g + 1].0 {
+            gaps[g].1 = gaps.remove(g + 1).1;
+        }
+        if g > 0 && gaps[g - 1].1 == gaps[g].0 {
+            gaps[g - 1].1 = gaps.remove(g).1;
+            g -= 1;
+        }
+        debug_assert!(gaps[g].0 < gaps[g].1);
     }
 }
 

@@ -1,4 +1,5 @@
 use super::*;
+use crate::budget::Budget;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -369,4 +370,64 @@ fn no_unknowns_are_solved_at_once() {
     assert_eq!(lu.dim(), 0);
     assert_eq!(lu.factorise(), Ok(()));
     lu.solve(&mut []);
+}
+
+/// A cube of nodes of `size`, with fronts that are worth sharing.
+fn cube(n: u32, size: usize) -> (Vec<usize>, Vec<(u32, u32)>) {
+    let step = |k: u32, by: u32| ((k / by) % n + 1 < n).then_some((k, k + by));
+    let edges =
+        (0..n * n * n).flat_map(|k| [1, n, n * n].into_iter().filter_map(move |s| step(k, s)));
+    (vec![size; (n * n * n) as usize], edges.collect())
+}
+
+#[test]
+fn the_bits_do_not_depend_on_the_number_of_threads() {
+    let mut rng = Pcg64::seed_from_u64(5);
+    let (sizes, edges) = cube(13, 6);
+    let mut lu = BlockLu::new(&sizes, edges.iter().copied()).unwrap();
+    for (i, j) in (0..sizes.len() as u32).map(|i| (i, i)).chain(edges.iter().copied()) {
+        let mut block = [0.0; 36];
+        block.iter_mut().for_each(|x| *x = rng.random_range(-1.0..1.0));
+        if i == j {
+            (0..6).for_each(|k| block[7 * k] += 8.0);
+        } else {
+            lu.add(j as usize, i as usize, &block);
+        }
+        lu.add(i as usize, j as usize, &block);
+    }
+    assert!(lu.flops() > 2.0 * SHARED);
+    let bits = |x: &[f64]| x.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+    for simd in Simd::all() {
+        lu.simd = simd;
+        let mut alone = lu.clone();
+        alone.factorise().unwrap();
+        for threads in [2, 3] {
+            let mut shared = lu.clone();
+            let budget = Budget { threads, ..Budget::default() }.enter();
+            shared.factorise().unwrap();
+            assert!(shared.symbolic.plan.tasks.len() > 3, "{:?}", shared.symbolic.plan.tasks);
+            assert!(shared.symbolic.plan.others(shared.fronts()).count() < shared.fronts() / 10);
+            // The plan stays, and a thread alone can follow it.
+            drop(budget);
+            for _ in 0..2 {
+                assert_eq!(bits(&shared.lower), bits(&alone.lower));
+                assert_eq!(bits(&shared.upper), bits(&alone.upper));
+                assert_eq!(bits(&shared.inverses), bits(&alone.inverses));
+                assert_eq!((&shared.swaps, shared.perturbed), (&alone.swaps, alone.perturbed));
+                shared.factorise().unwrap();
+            }
+        }
+    }
+}
+
+#[test]
+fn threads_stop_at_limits_and_say_so() {
+    let (sizes, edges) = cube(13, 6);
+    let mut lu = BlockLu::new(&sizes, edges.into_iter()).unwrap();
+    let unit: Vec<f64> = (0..36).map(|k| if k % 7 == 0 { 1.0 } else { 0.0 }).collect();
+    (0..sizes.len()).for_each(|i| lu.add(i, i, &unit));
+    let over = Some(std::time::Instant::now());
+    let scope = Budget { deadline: over, threads: 2, ..Budget::default() }.enter();
+    assert_eq!(lu.factorise(), Err(Singular));
+    assert!(scope.raised());
 }

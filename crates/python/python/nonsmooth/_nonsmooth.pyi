@@ -218,6 +218,7 @@ def solve(
     tol: float,
     time_limit: Optional[float],
     max_iter: Optional[int],
+    threads: int,
     warm_start: object,
     callback: Optional[Callable[[Progress], object]],
 ) -> Answer: ...

@@ -27,7 +27,7 @@
 use std::time::Instant;
 
 use nonsmooth_linalg::Bsr;
-use nonsmooth_linalg::budget::{self, Budget};
+use nonsmooth_linalg::budget;
 use nonsmooth_problem::{FrictionLocal, LocalPoint, RowsLocal};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limit, Limits, Session, Status, settings::SettingsMap};
@@ -130,7 +130,7 @@ impl<const D: usize> Tools<D> {
         h: f64,
     ) -> Result<StepReport, SimulateError> {
         let begun = Instant::now();
-        let _scope = budget_of(limits, begun).enter();
+        let _scope = limits.budget(begun).enter();
         let mut report = StepReport {
             status: StepStatus::Solved,
             t: state.t,
@@ -535,15 +535,6 @@ fn sticks(mut r: impl Iterator<Item = f64>, mu: f64) -> bool {
 pub(super) fn empty<const D: usize>() -> FrictionLocal<D> {
     let rows: Option<RowsLocal> = None;
     FrictionLocal { W: Bsr::from_rows(0, &[]), q: vec![], mu: vec![], mu_r: (), rows }
-}
-
-fn budget_of(limits: &Limits, begun: Instant) -> Budget {
-    let deadline = |t: f64| begun.checked_add(std::time::Duration::try_from_secs_f64(t).ok()?);
-    Budget {
-        deadline: limits.time_limit.and_then(deadline),
-        cancel: limits.cancel.clone(),
-        memory: limits.memory_limit,
-    }
 }
 
 /// The status of a step whose budget is over.

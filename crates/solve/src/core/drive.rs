@@ -30,11 +30,16 @@ pub struct Limits {
     pub cancel: Option<Arc<AtomicBool>>,
     /// The bytes of memory that one factorisation may take: a larger one is refused before it begins. Without a number, what the machine has free.
     pub memory_limit: Option<u64>,
+    /// Threads that large factorisations may use, 0 for one a core. They change the time, not one bit of the result.
+    pub threads: usize,
     /// Whether to keep the method's own record of its iterations ([`Session::trace`]); it grows with their number.
     pub trace: bool,
     /// Whether to read the processor's clock too ([`Outcome::cpu_seconds`]), which costs two system calls: as much as a small contact problem.
     pub cpu_time: bool,
 }
+
+/// More threads than any machine has use for.
+const THREADS_MOST: usize = 1024;
 
 impl Default for Limits {
     fn default() -> Self {
@@ -44,6 +49,7 @@ impl Default for Limits {
             time_limit: None,
             cancel: None,
             memory_limit: None,
+            threads: 1,
             trace: false,
             cpu_time: false,
         }
@@ -52,13 +58,17 @@ impl Default for Limits {
 
 impl Limits {
     /// What kernels look at, if the clock runs from `begun`.
-    pub(crate) fn budget(&self, begun: Instant) -> Budget {
+    pub fn budget(&self, begun: Instant) -> Budget {
         // A limit beyond the reach of the clock is none.
         let deadline = |t: f64| begun.checked_add(Duration::try_from_secs_f64(t).ok()?);
         Budget {
             deadline: self.time_limit.and_then(deadline),
             cancel: self.cancel.clone(),
             memory: self.memory_limit,
+            threads: match self.threads {
+                0 => std::thread::available_parallelism().map_or(1, usize::from),
+                n => n,
+            },
         }
     }
 
@@ -87,6 +97,13 @@ impl Limits {
                 name: "tolerance",
                 expected: "a positive number of at most 1",
                 found: self.tolerance.to_string(),
+            });
+        }
+        if self.threads > THREADS_MOST {
+            return Err(SolveError::Limits {
+                name: "threads",
+                expected: "at most 1024, 0 for one a core",
+                found: self.threads.to_string(),
             });
         }
         match self.time_limit {
