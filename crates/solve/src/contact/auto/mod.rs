@@ -14,7 +14,7 @@
 //! 5. **Proximal point, semismooth Newton inside** (`proximal_newton.rs`): ε falls as fast as the subproblems are solved
 //!    easily, and rises where they are not. It keeps full accuracy on hyperstatic problems.
 //! 6. **Sweeps between the proximal steps**, while they help: they move the impulses within the null space of W, which Newton leaves
-//!    where they are.
+//!    where they are. After a trial in vain from near a solution they come first.
 //! 7. **Alternating directions** (`alternating.rs`) after many proximal steps, for as long as they promise more.
 //! 8. **Another strategy** (other ρ, more sweeps, a cold start) where the error has not halved for long; at the first time
 //!    the existence of a solution is investigated, and a problem without one is given up with its certificate.
@@ -297,6 +297,9 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         }
         if trial > 0 {
             lines.push(format!("{trial} Newton iterations on trial"));
+        }
+        if between > 0 && subproblems == 0 {
+            lines.push(format!("{between} sweeps after them"));
         }
         if interior > 0 {
             lines.push(format!(

@@ -4,7 +4,7 @@
 use nonsmooth_problem::check::Kinematic;
 
 use super::alternating::Way;
-use super::{Auto, FIRST, HybridWork, NEAR, NEWTON, Stage};
+use super::{Auto, FIRST, FIRST_SWEEPS, HybridWork, NEAR, NEWTON, Stage};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
 
@@ -18,6 +18,9 @@ const TRIAL_BELOW: f64 = 1e-2;
 const TRIAL_EPSILON: f64 = 1e-9;
 const TRIAL_IDLE: usize = 2;
 const TRIAL: usize = 30;
+/// After a trial in vain near a solution sweeps go on where they promised for as long as this, and at most while so many factorisations take.
+const SWEPT_LONG: usize = 10 * FIRST_SWEEPS;
+const SWEEP_AGAIN: f64 = 3.0;
 /// The interior point ends after this many iterations, or below this error, or after so many iterations that did not halve the
 /// error, or so many short steps in a row.
 const INTERIOR: usize = 60;
@@ -150,8 +153,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         Step::Continue { estimate: error }
     }
 
-    /// On to stage 5 without stage 4, for as long as that promises more.
-    pub(super) fn pass_by<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+    /// On to stage 5 without stage 4, for as long as that promises more; by way of stage 6 where the sweeps promised for long: an error that lay still may
+    /// fall again once a few contacts have changed sides. As many sweeps as there were, and no dearer than a few factorisations.
+    fn pass_by<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
@@ -159,7 +163,14 @@ impl<const D: usize> OnContacts<Auto, D> {
     ) {
         work.controller.resume();
         work.passed_by = Some((work.done.newton, work.controller.error()));
-        self.subproblem_here(problem, point, work);
+        if work.done.sweeps < SWEPT_LONG {
+            return self.subproblem_here(problem, point, work);
+        }
+        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        let most = SWEEP_AGAIN * costs.factorisation / costs.sweep;
+        work.before.copy_from_slice(P::impulses(point));
+        problem.enter(&mut work.state, point);
+        work.stage = Stage::Between { left: work.done.sweeps.min(most as usize).max(1) };
     }
 
     /// Whether stage 4 was passed by in vain: Newton's iterations since have been too slow for what is left from this error.
