@@ -146,7 +146,7 @@ pub trait Real:
     + Mul<Output = Self>
     + Div<Output = Self>
 {
-    /// A bound on the relative error of a dozen operations, which a verdict has to allow for; 0 of plain arithmetic, which decides nothing.
+    /// A bound on the relative error of a dozen operations, which a verdict has to allow for.
     const DOUBT: f64;
     /// The square root of a number that is not negative.
     fn sqrt(self) -> Self;
@@ -166,7 +166,8 @@ pub trait Real:
 }
 
 impl Real for f64 {
-    const DOUBT: f64 = 0.0;
+    // 32 units of 2⁻⁵².
+    const DOUBT: f64 = 32.0 * f64::EPSILON;
     #[inline]
     fn sqrt(self) -> Self {
         f64::sqrt(self)

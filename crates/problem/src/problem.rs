@@ -9,7 +9,7 @@ use crate::{Kind, ProblemError};
 /// what depends on the problem alone (norms, diagonal blocks, buffers) and [`measure`](Problem::measure) uses it.
 pub trait Problem {
     /// The unknown of the problem.
-    type Point: std::fmt::Debug + Clone + Send;
+    type Point: std::fmt::Debug + Clone + PartialEq + Send;
     /// The judge's constants and buffers for one problem.
     type Gauge: Send;
 
@@ -43,6 +43,17 @@ pub trait Problem {
 
     /// The residuals of `point` with all products in doubled precision: to decide by. Allocates nothing.
     fn certify(&self, point: &Self::Point, gauge: &mut Self::Gauge) -> Measure;
+
+    /// The residuals of `point`, none below what [`certify`](Self::certify) finds but for what decides nothing, where plain arithmetic with a bound of its rounding is enough to see that it
+    /// passes at `tolerance`: much cheaper, and for most points of well scaled problems enough. `None` says nothing of the point. Allocates nothing.
+    fn accept(
+        &self,
+        _point: &Self::Point,
+        _gauge: &mut Self::Gauge,
+        _tolerance: f64,
+    ) -> Option<Measure> {
+        None
+    }
 
     /// Puts `point`, the one last measured with `gauge`, exactly where it is but for rounding: variables on the bounds that they are nearer to, in the judge's
     /// units, than their partners are to zero; `boldly`, also what is below rounding in units of the whole problem. Says whether that changed it; by default nothing

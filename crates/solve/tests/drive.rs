@@ -48,6 +48,35 @@ fn planted() -> (P, LocalPoint) {
 const GO_ON: Step = Step::Continue { estimate: f64::NAN };
 
 #[test]
+fn a_solution_needs_no_solver() {
+    let (problem, _) = planted();
+    let (other, known) = Planted { contacts: 7, dofs: 30, ..Planted::default() }.local::<3>();
+    let limits = Limits { tolerance: 1e-10, ..Limits::default() };
+    for name in ["auto", "nsgs", "newton_ac", "ip"] {
+        let mut session = registry::session::<P>(name, &SettingsMap::new()).unwrap();
+        let mut solve = |problem: &P, point: &mut LocalPoint| {
+            let outcome = session.solve(problem, point, &limits, &mut |_| {}).unwrap();
+            assert_eq!(outcome.status, Status::Solved, "{name}");
+            (outcome.iterations, session.account(), session.history().len())
+        };
+        let mut cold = problem.origin();
+        let first = solve(&problem, &mut cold);
+        assert!(first.0 > 0, "{name}");
+        let mut again = cold.clone();
+        let (iterations, account, visits) = solve(&problem, &mut again);
+        assert_eq!((iterations, visits, &again), (0, 1, &cold), "{name}");
+        assert!(account[0].contains("which is a solution"), "{name}: {account:?}");
+        // Neither its own point nor that of another shape is touched, nor what the session does afterwards.
+        let mut of_other = known.clone();
+        assert_eq!(solve(&other, &mut of_other).0, 0, "{name}");
+        assert_eq!(of_other, known);
+        let mut once_more = problem.origin();
+        assert_eq!(solve(&problem, &mut once_more), first, "{name}");
+        assert_eq!(once_more, cold, "{name}");
+    }
+}
+
+#[test]
 fn a_solver_that_lies_is_not_believed() {
     let (problem, _) = planted();
     let (outcome, _) = run(&problem, &Limits::default(), |_, _| Step::Done);

@@ -141,16 +141,26 @@ pub(crate) fn doubt(n: usize) -> f64 {
     gamma * gamma
 }
 
-/// The kernels in doubled precision, each compiled twice: the error of a product costs one operation on a machine with fused
-/// multiplication and addition (found at run time), else seventeen. Both make the same bits.
+/// Adds `W x` plainly to the sums, and the sizes of its terms to theirs.
+pub(crate) fn add_blocks_plainly<const D: usize>(
+    sums: &mut [f64],
+    sizes: &mut [f64],
+    w: &Bsr<D>,
+    x: &[f64],
+) {
+    fused::add_blocks_plainly(sums, sizes, (w, x));
+}
+
+/// The kernels, each compiled twice: the error of a product costs one operation on a machine with fused
+/// multiplication and addition (found at run time), else seventeen. Both make the same bits, but of plain sums.
 mod fused {
     use nonsmooth_linalg::{Bsr, Compensated, Csc, small};
 
     /// Defines a kernel that calls the faster of the two bodies.
     macro_rules! kernel {
-        ($name:ident $([const $D:ident])?, $body:ident, $data:ty) => {
+        ($name:ident $([const $D:ident])?, $body:ident, $sum:ty, $data:ty) => {
             pub(crate) fn $name$(<const $D: usize>)?(
-                sums: &mut [Compensated],
+                sums: &mut [$sum],
                 sizes: &mut [f64],
                 data: $data,
             ) {
@@ -158,7 +168,7 @@ mod fused {
                 {
                     #[target_feature(enable = "avx2,fma")]
                     fn with_fma$(<const $D: usize>)?(
-                        sums: &mut [Compensated],
+                        sums: &mut [$sum],
                         sizes: &mut [f64],
                         data: $data,
                     ) {
@@ -175,9 +185,10 @@ mod fused {
             }
         };
     }
-    kernel!(add, add_by, (f64, &Csc, &[f64]));
-    kernel!(add_transposed, add_transposed_by, (&Csc, &[f64]));
-    kernel!(add_blocks[const D], add_blocks_by, (&Bsr<D>, &[f64]));
+    kernel!(add, add_by, Compensated, (f64, &Csc, &[f64]));
+    kernel!(add_transposed, add_transposed_by, Compensated, (&Csc, &[f64]));
+    kernel!(add_blocks[const D], add_blocks_by, Compensated, (&Bsr<D>, &[f64]));
+    kernel!(add_blocks_plainly[const D], add_blocks_plainly_by, f64, (&Bsr<D>, &[f64]));
 
     #[inline(always)]
     fn add_by<const FUSED: bool>(
@@ -226,6 +237,30 @@ mod fused {
                     for l in 0..D {
                         sum[k].add_product_by::<FUSED>(block[k][l], x[l]);
                         size[k] += (block[k][l] * x[l]).abs();
+                    }
+                }
+            }
+            (*of_sums, *of_sizes) = (sum, size);
+        }
+    }
+
+    #[inline(always)]
+    fn add_blocks_plainly_by<const FUSED: bool, const D: usize>(
+        sums: &mut [f64],
+        sizes: &mut [f64],
+        (w, x): (&Bsr<D>, &[f64]),
+    ) {
+        let (sums, sizes) = (sums.as_chunks_mut::<D>().0, sizes.as_chunks_mut::<D>().0);
+        for (i, (of_sums, of_sizes)) in sums.iter_mut().zip(sizes).enumerate() {
+            let (mut sum, mut size) = (*of_sums, *of_sizes);
+            let (cols, blocks) = w.row(i);
+            for (&j, block) in cols.iter().zip(blocks) {
+                let x: [f64; D] = small::block(x, j as usize);
+                for k in 0..D {
+                    for l in 0..D {
+                        let product = block[k][l] * x[l];
+                        sum[k] += product;
+                        size[k] += product.abs();
                     }
                 }
             }

@@ -2,7 +2,6 @@
 
 use nonsmooth_scenes::vec3::{Vec3, apply};
 
-use super::NONE;
 use super::contact::{Arm, Row};
 use crate::moving::Moving;
 
@@ -42,22 +41,34 @@ impl Side {
     }
 }
 
-/// The block of W of two contacts, with their free bodies, a sum over those that they share. With AVX2 (found at run time) four numbers at once and the same bits: nothing is fused.
+/// For each side of a contact the side of another one that has the same free body.
+pub(super) type Shared = [Option<usize>; 2];
+
+/// The block of W of two contacts, a sum over the free bodies that they share. With AVX2 (found at run time) four numbers at once and the same bits: nothing is fused.
 #[inline]
-pub(super) fn coupling(
-    row: ([u32; 2], &[Side; 2]),
-    other: ([u32; 2], &[Side; 2]),
-) -> [[f64; 3]; 3] {
+pub(super) fn coupling(own: &[Side; 2], other: &[Side; 2], shared: Shared) -> [[f64; 3]; 3] {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has what the function is compiled for.
+        return unsafe { coupling_avx2(own, other, shared) };
+    }
     let mut sum = [[0.0; 4]; 3];
-    for (p, left) in row.0.iter().zip(row.1).filter(|p| *p.0 != NONE) {
-        for (_, right) in other.0.iter().zip(other.1).filter(|q| q.0 == p) {
-            #[cfg(target_arch = "x86_64")]
-            if std::arch::is_x86_feature_detected!("avx2") {
-                // SAFETY: the processor has what the function is compiled for.
-                unsafe { add_product_avx2(&mut sum, &left.rows, &right.solved) };
-                continue;
-            }
-            add_product(&mut sum, &left.rows, &right.solved);
+    for (left, side) in own.iter().zip(shared) {
+        if let Some(side) = side {
+            add_product(&mut sum, &left.rows, &other[side].solved);
+        }
+    }
+    sum.map(|[x, y, z, _]| [x, y, z])
+}
+
+/// The same.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn coupling_avx2(own: &[Side; 2], other: &[Side; 2], shared: Shared) -> [[f64; 3]; 3] {
+    let mut sum = [[0.0; 4]; 3];
+    for (left, side) in own.iter().zip(shared) {
+        if let Some(side) = side {
+            add_product_avx2(&mut sum, &left.rows, &other[side].solved);
         }
     }
     sum.map(|[x, y, z, _]| [x, y, z])
@@ -78,6 +89,7 @@ fn add_product(sum: &mut [[f64; 4]; 3], left: &Columns, right: &Columns) {
 /// The same.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
+#[inline]
 fn add_product_avx2(sum: &mut [[f64; 4]; 3], left: &Columns, right: &Columns) {
     use std::arch::x86_64::{
         _mm256_add_pd, _mm256_loadu_pd, _mm256_mul_pd, _mm256_set1_pd, _mm256_storeu_pd,

@@ -5,7 +5,7 @@ use nonsmooth_problem::{Bounds, RowsLocal};
 use nonsmooth_scenes::vec3::{Vec3, apply, dot, scale};
 
 use super::contact::Row;
-use super::couple::{Columns, Side, coupling};
+use super::couple::{Columns, Shared, Side, coupling};
 use super::{NONE, Stride, Tools, are_finite};
 use crate::SimulateError;
 use crate::crew::Slot;
@@ -139,22 +139,24 @@ impl Chains {
         })
     }
 
-    /// The contacts of the two bodies of a contact, merged; a body that is not free has none.
-    fn neighbours(&self, c: usize) -> impl Iterator<Item = usize> {
+    /// The contacts of the two bodies of a contact, merged, each with the sides on which it touches the one and the other; a body that is not free has none.
+    fn neighbours(&self, c: usize) -> impl Iterator<Item = (usize, Shared)> {
         let own = self.pairs[c];
-        let [mut p, mut q] = own.map(|b| if b == NONE { NONE } else { self.heads[b as usize] });
+        let mut at = own.map(|b| if b == NONE { NONE } else { self.heads[b as usize] });
         std::iter::from_fn(move || {
-            let j = p.min(q);
+            let j = at[0].min(at[1]);
             if j == NONE {
                 return None;
             }
-            if p == j {
-                p = self.after(j, own[0]);
+            let mut shared = [None; 2];
+            for k in 0..2 {
+                if at[k] == j {
+                    let side = self.side(j, own[k]);
+                    shared[k] = Some(side);
+                    at[k] = self.next[j as usize][side];
+                }
             }
-            if q == j {
-                q = self.after(j, own[1]);
-            }
-            Some(j as usize)
+            Some((j as usize, shared))
         })
     }
 }
@@ -230,7 +232,7 @@ impl Tools {
                 problem.q.push(q);
                 check += 0.0 * q;
             }
-            for (width, j) in chains.neighbours(c).enumerate() {
+            for (width, (j, shared)) in chains.neighbours(c).enumerate() {
                 let block = if symmetric && j < c {
                     // Row j has met later contacts in the order in which they ask for it.
                     mirrored[j] += 1;
@@ -238,7 +240,7 @@ impl Tools {
                     std::array::from_fn(|p| std::array::from_fn(|q| there[q][p]))
                 } else {
                     let other = &sides[order[j] as usize];
-                    let mut block = coupling((chains.pairs[c], own), (chains.pairs[j], other));
+                    let mut block = coupling(own, other, shared);
                     if !solids.is_empty() {
                         solids.couple(&mut block, row, &rows[order[j] as usize]);
                     }

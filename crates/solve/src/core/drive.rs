@@ -450,6 +450,10 @@ pub struct Driver<P: Problem, S: Solver<P>> {
 
 struct Kept<P: Problem, S: Solver<P>> {
     work: S::Work,
+    /// Where a solve without a better idea starts.
+    origin: P::Point,
+    /// The last solve ended where it began, and the workspace is one of another problem.
+    untouched: bool,
     best: P::Point,
     tidied: P::Point,
     /// A limit was reached inside a kernel, which left something unfinished.
@@ -503,9 +507,29 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
             measure
         });
         let ready = match earlier {
-            Some(mut k) => solver.refill(problem, &mut k.work).map(|()| k),
+            Some(mut k) => {
+                // A solution, as the impulses of the step before often are, needs no solver nor its preparation.
+                k.untouched = false;
+                if *point != k.origin {
+                    let Kept { best, tidied, .. } = &mut *k;
+                    P::copy_point(point, best);
+                    let mut visit = Judge::new(judge, best, tidied, history, meter, false);
+                    visit.judge(problem, point, 0, limits.tolerance, false);
+                    let measure = visit.last;
+                    if measure.passes(limits.tolerance) {
+                        P::copy_point(best, point);
+                        (k.untouched, k.torn) = (true, scope.raised());
+                        *kept = Some(k);
+                        return Ok(meter.outcome(Status::Solved, measure, 0));
+                    }
+                    history.clear();
+                }
+                solver.refill(problem, &mut k.work).map(|()| k)
+            }
             None => solver.work(problem).map(|work| {
-                Box::new(Kept { work, best: point.clone(), tidied: point.clone(), torn: false })
+                let (best, tidied) = (point.clone(), point.clone());
+                let (origin, untouched, torn) = (problem.origin(), false, false);
+                Box::new(Kept { work, origin, untouched, best, tidied, torn })
             }),
         };
         let mut now = match ready {
@@ -543,11 +567,18 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
     }
 
     fn trace(&self) -> Trace {
-        self.kept.as_ref().map_or(Trace::None, |kept| self.solver.trace(&kept.work))
+        let touched = self.kept.as_ref().filter(|kept| !kept.untouched);
+        touched.map_or(Trace::None, |kept| self.solver.trace(&kept.work))
     }
 
     fn account(&self) -> Vec<String> {
-        self.kept.as_ref().map_or(vec![], |kept| self.solver.account(&kept.work))
+        match &self.kept {
+            Some(kept) if kept.untouched => {
+                vec!["started from the point given, which is a solution".into()]
+            }
+            Some(kept) => self.solver.account(&kept.work),
+            None => vec![],
+        }
     }
 
     fn gauge(&mut self) -> Option<&mut P::Gauge> {
@@ -881,6 +912,9 @@ impl<'a, P: Problem> Judge<'a, P> {
 
     /// The certified residuals of the point last measured, or of the same with its variables exactly on their bounds if those are better; which.
     fn certify(&mut self, problem: &P, point: &P::Point, tolerance: f64) -> (Measure, bool) {
+        if let Some(bounds) = problem.accept(point, self.gauge, tolerance) {
+            return (bounds, false);
+        }
         let mut plain = None;
         for boldly in [true, false] {
             P::copy_point(point, self.tidied);

@@ -8,7 +8,8 @@
 //!    factorisations would, and after stage 2 until they have cost one. Many problems end here.
 //! 2. **Rest** (`alternating.rs`): impulses within the cones that leave nothing moving, where the sweeps show nothing that flies apart. One factorisation and
 //!    a few solves end structures at rest, whatever their height; one solve tells whether it is one.
-//! 3. **Trial**: Newton's iterations of stage 5 without its proximal term, where the sweeps came near, for as long as each halves the error.
+//! 3. **Trial**: Newton's iterations of stage 5 without its proximal term, where the sweeps came near or the structure is not hyperstatic, for as long as each halves the error; there sweeps come to
+//!    its rescue a few times.
 //! 4. **Interior point** on the exact law ([`Central`]), a starter: some 8 to 20 iterations lead near the solution of a problem
 //!    at rest; where the central path turns back it is left again.
 //! 5. **Proximal point, semismooth Newton inside** (`proximal_newton.rs`): ε falls as fast as the subproblems are solved
@@ -91,7 +92,7 @@ const SWEEPS_A_STEP: usize = 10;
 const SWEEPS_JUDGED: usize = 5;
 /// A solve by Newton's method is taken to cost this many factorisations.
 const NEWTON: f64 = 10.0;
-/// The interior point begins far from any point given; below this error one is better off without it.
+/// The interior point begins far from any point given; below this error one is better off without it, and no sweep from zero comes as near but where sweeps end at once.
 const NEAR: f64 = 1e-4;
 /// Above this error between two proximal steps, sweeps.
 const SWEEP_ABOVE: f64 = 1e-9;
@@ -121,6 +122,9 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     stage: Stage,
     /// Of the sweeps, of the alternating directions.
     rate: Rate,
+    /// Whether sweeps may come to the rescue of stage 3, and room for finding that out.
+    spread: bool,
+    units: Vec<f64>,
     /// The impulses of the best iterate of the present subproblem; those before the sweeps between; those of the best point.
     inner_best: Vec<f64>,
     before: Vec<f64>,
@@ -143,7 +147,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
 enum Stage {
     Sweeps { claims: usize },
     Rest,
-    Trial { idle: usize, least: f64 },
+    Trial { idle: usize, least: f64, rescues: usize },
     Interior { idle: usize, short: usize, least: f64 },
     Newton,
     Between { left: usize },
@@ -201,6 +205,8 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             tolerance: 0.0,
             stage: FIRST,
             rate: Rate::default(),
+            spread: false,
+            units: vec![],
             inner_best: vec![],
             before: vec![],
             best: vec![],
@@ -257,7 +263,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         match work.stage {
             Stage::Sweeps { claims } => self.sweep(problem, point, work, claims),
             Stage::Rest => self.rest(problem, point, work),
-            Stage::Trial { idle, least } => self.trial(problem, point, work, idle, least),
+            Stage::Trial { .. } => self.trial(problem, point, work),
             Stage::Interior { .. } => self.interior(problem, point, work),
             Stage::Newton => self.newton(problem, point, work),
             Stage::Between { left } => self.between(problem, point, work, left),
@@ -345,10 +351,16 @@ impl<const D: usize> OnContacts<Auto, D> {
         if P::impulses(point).iter().all(|x| *x == 0.0) {
             return Start::Zero;
         }
-        let HybridWork { state, sweep, before: given, inner_best: u, .. } = work;
+        let HybridWork { state, sweep, before: given, inner_best: u, scale, .. } = work;
         given.clear();
         given.extend_from_slice(P::impulses(point));
         u.resize(given.len(), 0.0);
+        // What is near already needs no comparison.
+        problem.enter(state, point);
+        problem.velocities(state, given, u);
+        if sweep.residual(u, given) < NEAR * *scale {
+            return Start::Given;
+        }
         let mut after_a_sweep = |point: &mut P::Point| {
             problem.enter(state, point);
             let r = P::impulses(point);

@@ -192,6 +192,13 @@ impl<L: DiskLaw<D>, const D: usize> ProximalNewton<L, D> {
         self.failures = 0;
     }
 
+    /// How far the last Newton direction leads, as a velocity over ‖q‖: `‖(w_c Δr_c)_c‖/‖q‖`. Of impulses that no load asks for it is large: the matrix is nearly singular.
+    pub fn reach(&self) -> f64 {
+        let of =
+            |(dr, c): (&[f64], &Contact<L>)| dr.iter().map(|x| (c.unit * x).powi(2)).sum::<f64>();
+        self.dr.chunks(D).zip(&self.contacts).map(of).sum::<f64>().sqrt() / self.scale
+    }
+
     /// `r_k`.
     pub fn centre(&self) -> &[f64] {
         &self.center

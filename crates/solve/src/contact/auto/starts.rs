@@ -1,10 +1,11 @@
 //! The stages between the sweeps and the proximal steps, each of which ends many problems and makes a start for the others; and alternating directions, for
 //! those that the proximal steps take long for.
 
+use nonsmooth_linalg::budget;
 use nonsmooth_problem::check::Kinematic;
 
 use super::alternating::Way;
-use super::{Auto, FIRST, FIRST_SWEEPS, HybridWork, NEAR, NEWTON, Stage};
+use super::{Auto, FIRST, FIRST_SWEEPS, HybridWork, NEAR, NEWTON, Stage, runs_away};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
 
@@ -13,11 +14,19 @@ use crate::contact::form::{Disked, Linearised, OnContacts};
 const OPENING: f64 = 5e-3;
 const REST_NEAR: f64 = 0.1;
 const REST_FIRST: usize = 6;
-/// Newton's method is tried below this error (most of its successes begin below 6e-3), with this ε, until so many iterations in a row have not halved the error.
+/// Newton's method is tried with this ε, until so many iterations in a row have not halved the error, or its first direction leads this far; where W has little spread, below this error.
 const TRIAL_BELOW: f64 = 1e-2;
 const TRIAL_EPSILON: f64 = 1e-9;
 const TRIAL_IDLE: usize = 2;
+const TRIAL_REACH: f64 = 10.0;
 const TRIAL: usize = 30;
+/// Where W has at least this spread (of 0.17 to 0.3 in walls, columns and arches, 0.33 to 0.7 in piles and flows) sweeps come to its rescue so many times, so many at first, then twice as many each
+/// time, at most while two factorisations take; they are taken back where they raise the error by more than a factor.
+const RESCUE_SPREAD: f64 = 0.33;
+const RESCUES: usize = 3;
+const RESCUE: usize = 20;
+const RESCUE_COST: f64 = 2.0;
+const RESCUE_TAKE_BACK: f64 = 5.0;
 /// After a trial in vain near a solution sweeps go on where they promised for as long as this, and at most while so many factorisations take.
 const SWEPT_LONG: usize = 10 * FIRST_SWEEPS;
 const SWEEP_AGAIN: f64 = 3.0;
@@ -100,7 +109,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         }
     }
 
-    /// Begins stage 3 where the error is small, else stage 4.
+    /// Begins stage 3 where that promises something at a point with this error, else stage 4.
     fn begin_trial<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
@@ -108,15 +117,16 @@ impl<const D: usize> OnContacts<Auto, D> {
         work: &mut HybridWork<P, D>,
         error: f64,
     ) {
-        let HybridWork { newton, inner_best, controller, .. } = work;
-        let (true, Some(newton)) = (error < TRIAL_BELOW, newton) else {
+        let HybridWork { newton, state, inner_best, controller, spread, units, .. } = work;
+        *spread = problem.spread(state, units) >= RESCUE_SPREAD;
+        let (true, Some(newton)) = (error < TRIAL_BELOW || *spread, newton) else {
             return begin_interior(problem, work);
         };
         let r = P::impulses(point);
         newton.focus(r, error, work.tolerance);
         newton.center(r, TRIAL_EPSILON, controller.kappa());
         inner_best.copy_from_slice(r);
-        work.stage = Stage::Trial { idle: 0, least: error };
+        work.stage = Stage::Trial { idle: 0, least: error, rescues: 0 };
     }
 
     /// Stage 3: one Newton iteration, nearly without a proximal term; at its end the best point goes on.
@@ -125,11 +135,12 @@ impl<const D: usize> OnContacts<Auto, D> {
         problem: &P,
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
-        idle: usize,
-        least: f64,
     ) -> Step {
-        let HybridWork { newton, state, controller, inner_best, done, .. } = work;
-        let Some(newton) = newton else { return lost() };
+        let HybridWork { newton, state, controller, inner_best, done, stage, .. } = work;
+        let (Some(newton), &mut Stage::Trial { idle, least, rescues }) = (newton, &mut *stage)
+        else {
+            return lost();
+        };
         let r = P::impulses(point);
         let iterate = newton.iterate(problem, state, r);
         done.trial += 1;
@@ -139,17 +150,55 @@ impl<const D: usize> OnContacts<Auto, D> {
             inner_best.copy_from_slice(r);
         }
         let least = error.min(least);
-        if iterate.step > 0.0 && idle < TRIAL_IDLE && done.trial < TRIAL {
-            work.stage = Stage::Trial { idle, least };
+        let astray = iterate.step == 0.0 || done.trial == 1 && newton.reach() > TRIAL_REACH;
+        let over = astray || done.trial >= TRIAL;
+        if !over && idle < TRIAL_IDLE {
+            *stage = Stage::Trial { idle, least, rescues };
+            return Step::Continue { estimate: error };
+        }
+        r.copy_from_slice(inner_best);
+        if !over && least >= NEAR && rescues < RESCUES && work.spread {
+            return self.rescue(problem, point, work, least, rescues);
+        }
+        controller.offer(least);
+        if least < NEAR {
+            self.pass_by(problem, point, work);
         } else {
-            r.copy_from_slice(inner_best);
-            controller.offer(least);
-            if least < NEAR {
-                self.pass_by(problem, point, work);
-            } else {
-                begin_interior(problem, work);
+            begin_interior(problem, work);
+        }
+        Step::Continue { estimate: least }
+    }
+
+    /// Sweeps where Newton's iterations lie still at an error, for stage 3 to go on from: they change the sides of contacts that Newton's directions do not.
+    fn rescue<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        least: f64,
+        rescues: usize,
+    ) -> Step {
+        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        let most = RESCUE_COST * costs.factorisation / costs.sweep;
+        problem.enter(&mut work.state, point);
+        let HybridWork { newton, state, inner_best, done, sweep, stage, scale, .. } = work;
+        let Some(newton) = newton else { return lost() };
+        let r = P::impulses(point);
+        for _ in 0..(RESCUE << rescues).min(most as usize).max(1) {
+            let moves = sweep.sweep(problem, state, r);
+            done.between += 1;
+            if runs_away(moves.sqrt() / *scale) || budget::over() {
+                break;
             }
         }
+        let mut error = newton.look(problem, state, r);
+        if error > RESCUE_TAKE_BACK * least || error.is_nan() {
+            r.copy_from_slice(inner_best);
+            error = newton.look(problem, state, r);
+        }
+        newton.center(r, TRIAL_EPSILON, work.controller.kappa());
+        inner_best.copy_from_slice(r);
+        *stage = Stage::Trial { idle: 0, least: error, rescues: rescues + 1 };
         Step::Continue { estimate: error }
     }
 

@@ -373,4 +373,21 @@ impl<const D: usize, L: DiskLaw<D>> Linearised<D> for FrictionLocal<D, L> {
         let sweep = 30.0 * w.nrows() as f64 + 2.0 * w.nblocks() as f64;
         Costs { sweep, factorisation, solve }
     }
+
+    /// By the entries of W, in one pass.
+    fn spread(&self, state: &mut Self::State, unit: &mut Vec<f64>) -> f64 {
+        let w = state.eliminated.as_ref().map_or(&self.W, |e| &e.w);
+        unit.clear();
+        unit.extend((0..w.nrows()).map(|c| small::mean_diagonal(&w.diagonal_block(c))));
+        let (mut rows, mut squares) = (0, 0.0);
+        for (i, &of_row) in unit.iter().enumerate().filter(|u| *u.1 > 0.0) {
+            rows += D;
+            let (cols, blocks) = w.row(i);
+            for (&j, block) in cols.iter().zip(blocks).filter(|e| unit[*e.0 as usize] > 0.0) {
+                let size: f64 = block.iter().flatten().map(|x| x * x).sum();
+                squares += size / (of_row * unit[j as usize]);
+            }
+        }
+        rows as f64 / squares
+    }
 }

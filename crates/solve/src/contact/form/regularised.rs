@@ -99,6 +99,10 @@ impl<P: Problem> Problem for Regularised<P> {
         self.base.certify(point, gauge)
     }
 
+    fn accept(&self, point: &P::Point, gauge: &mut P::Gauge, tolerance: f64) -> Option<Measure> {
+        self.base.accept(point, gauge, tolerance)
+    }
+
     /// Of the problem without the regularisation.
     fn partner(&self, point: &Self::Point) -> Vec<f64> {
         self.base.partner(point)

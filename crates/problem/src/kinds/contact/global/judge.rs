@@ -7,7 +7,9 @@ use crate::check::{
     Verdict, over,
 };
 use crate::kinds::contact::judge::Weighed;
-use crate::kinds::contact::judge::gauge::{HALF_ULP, LawGauge, largest, unit, worst};
+use crate::kinds::contact::judge::gauge::{
+    Care, HALF_ULP, LawGauge, STEERING, largest, unit, worst,
+};
 use crate::kinds::contact::judge::loads::ROUNDING;
 use crate::kinds::contact::judge::statement::{contacts, opposite, under};
 use crate::kinds::contact::judge::weighed::{
@@ -314,10 +316,12 @@ impl GlobalGauge {
                 let of_v: f64 = at.iter().zip(values).map(|(&j, h)| (h * last[j]).abs()).sum();
                 of_v + all * (sums[i] + sizes[i])
             };
-            law.measure::<_, _, D>(&point.r, exact, sizes, doubt, |c| problem.law(c))
+            law.measure::<_, _, D>((&point.r, exact), Some(Care { sizes, doubt }), |c| {
+                problem.law(c)
+            })
         } else {
             u.iter_mut().zip(rows.values()).for_each(|(u, x)| *u = x);
-            law.measure::<_, _, D>(&point.r, u, &[], |_| 0.0, |c| problem.law(c))
+            law.measure::<_, _, D>((&point.r, u), STEERING, |c| problem.law(c))
         };
 
         let worse = |a: f64, b: f64| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) };

@@ -37,6 +37,17 @@ pub(crate) fn largest<const D: usize>(block: &[[f64; D]; D]) -> f64 {
     block.iter().flatten().fold(0.0, |l, x| l.max(x.abs()))
 }
 
+/// What a measurement that decides knows of the velocities that it is given.
+pub(crate) struct Care<'a, F> {
+    /// The sizes of the terms of each entry.
+    pub(crate) sizes: &'a [f64],
+    /// By how much entry i may be wrong.
+    pub(crate) doubt: F,
+}
+
+/// A measurement to steer by.
+pub(crate) const STEERING: Option<Care<'static, fn(usize) -> f64>> = None;
+
 /// What the contact law's residual needs of a problem: `w_c` and `‖q‖`, and what stands for both where a contact is measured by itself.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LawGauge {
@@ -83,18 +94,15 @@ impl LawGauge {
         if self.norm_q > 0.0 { self.norm_q } else { 1.0 }
     }
 
-    /// The residuals of the impulses `r` with the velocities `u`, whose terms have the `sizes` and whose entries may be wrong by
-    /// `doubt(i)`. What the arithmetic T leaves in doubt is added to the residuals that decide, so that they never
-    /// promise too much.
+    /// The residuals of the impulses `r` with the velocities `u`, to steer by or, with `care`, to decide by. There what the arithmetic T leaves in doubt is added to the
+    /// residuals that decide, so that they never promise too much.
     ///
     /// All is done in units of a power of two near its scale, so that no square leaves the range of double precision
     /// before the data do.
     pub(crate) fn measure<T: Real, L: Law<D>, const D: usize>(
         &self,
-        r: &[f64],
-        u: &[T],
-        sizes: &[f64],
-        doubt: impl Fn(usize) -> f64,
+        (r, u): (&[f64], &[T]),
+        care: Option<Care<impl Fn(usize) -> f64>>,
         law: impl Fn(usize) -> L,
     ) -> Measure {
         let unit = power_of_two(self.unit());
@@ -117,7 +125,7 @@ impl LawGauge {
             let plain_modified = law.modified_velocity(&plain_u);
             let near = (rc.map(|r| w * r * per), plain_modified.map(|u| u * per));
             let plainly = || Share::new(law, &near.0, &plain_u.map(|u| u * per), &near.1);
-            let (share, left) = if T::DOUBT == 0.0 {
+            let (share, left) = if care.is_none() {
                 (plainly(), 0.0)
             } else {
                 let size = length(&near.0) + length(&near.1);
@@ -138,7 +146,7 @@ impl LawGauge {
             }
             scaled += share.residual;
             // Plain arithmetic decides nothing: it leaves out what only decides.
-            if T::DOUBT > 0.0 {
+            if let Some(Care { sizes, doubt }) = &care {
                 let of_u = norm_of((D * c..D * c + D).map(|i| doubt(i) * per));
                 let left = left + law.growth() * of_u;
                 doubts += left * left;
@@ -146,7 +154,10 @@ impl LawGauge {
                 let load = self.loads.reaching(c) * per;
                 let strength = self.own_w(c);
                 let own_x = rc.map(|r| strength * r * per);
-                let apart = law.apart(&own_x, &plain_u.map(|u| u * per));
+                let own_u = plain_u.map(|u| u * per);
+                // A sliding direction is wrong by 2‖δu‖/‖u_T‖, and what lies across it by no more than the sliding itself.
+                let astray = (2.0 * law.growth() * norm(&own_x) * of_u).sqrt();
+                let apart = law.apart(&own_x, &own_u) + astray.min(small::tangential_norm(&own_u));
                 // Of an empty block the impulse is no term, but may be all there is.
                 let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] * per));
                 let terms = terms.max(norm(&own_x)).min(load);
@@ -155,8 +166,9 @@ impl LawGauge {
                 let error = share.residual.sqrt().max(apart) + left;
                 // No sliding, however fast, excuses a velocity into the obstacle, but for what a frame turned by its rounding makes of the
                 // contact's terms.
-                let rounding = f64::EPSILON * terms.max(norm(&plain_u.map(|u| u * per)));
-                let sinking = over((-plain_u[0] * per - rounding).max(0.0), normal.max(LEAST));
+                let rounding = f64::EPSILON * terms.max(norm(&own_u));
+                let sinking = (doubt(D * c) - plain_u[0]) * per - rounding;
+                let sinking = over(sinking.max(0.0), normal.max(LEAST));
                 let of_own = over(error, terms.max(LEAST)).max(sinking);
                 if load > 0.0 && (of_own > own || of_own.is_nan()) {
                     (own_contact, own) = (c, of_own);
@@ -180,8 +192,8 @@ impl LawGauge {
             primal: primal.sqrt() * q,
             dual: dual.sqrt() * q,
             complementarity: complementarity * q * q,
-            own: (T::DOUBT > 0.0).then_some(own),
-            own_contact: (T::DOUBT > 0.0).then_some(own_contact),
+            own: care.is_some().then_some(own),
+            own_contact: care.is_some().then_some(own_contact),
             worst_contact,
             worst: worst.sqrt() * q,
             ..Measure::unknown()

@@ -54,10 +54,15 @@ impl Loads {
         (root, total)
     }
 
+    /// Whether i and j hang below the same root at once, as most rows do that are coupled already.
+    #[inline(always)]
+    pub(crate) fn are_coupled(&self, i: usize, j: usize) -> bool {
+        self.parent[i] == self.parent[j]
+    }
+
     /// Rows i and j are coupled; `ratio` is that of their units, asked for where they were not coupled before.
     pub(crate) fn couple(&mut self, i: usize, j: usize, ratio: impl FnOnce() -> f64) {
-        // Most rows hang below their root at once.
-        if self.parent[i] == self.parent[j] {
+        if self.are_coupled(i, j) {
             return;
         }
         let ((a, of_i), (b, of_j)) = (self.root(i), self.root(j));

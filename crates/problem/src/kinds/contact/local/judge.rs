@@ -1,13 +1,15 @@
 //! The judge of the local problem.
 
 use crate::check::proof::{Exactly, bounded, exacts, monotone};
-use crate::check::rows::{Rows, doubt};
+use crate::check::rows::{Rows, add_blocks_plainly, doubt};
 use crate::check::{
     ConeSystem, ContactStatus, Judged, Kinematic, Kinematics, Law, Measure, Monotone, StatusCounts,
-    Verdict,
+    Verdict, over,
 };
 use crate::kinds::contact::judge::Weighed;
-use crate::kinds::contact::judge::gauge::{HALF_ULP, LawGauge, largest, unit, worst};
+use crate::kinds::contact::judge::gauge::{
+    Care, HALF_ULP, LawGauge, STEERING, largest, unit, worst,
+};
 use crate::kinds::contact::judge::statement::{contacts, opposite, under};
 use crate::kinds::contact::judge::weighed::{
     arm, as_given, divide, multiply, verdict_weighed, weight,
@@ -79,15 +81,18 @@ impl LocalGauge {
             let (known, missing) = (impulses, |x: f64| x == 0.0);
             known.clear();
             known.extend_from_slice(strength);
-            all.each(|i, j, a| {
+            all.each(|i, j, size| {
                 if missing(known[i]) && known[j] > 0.0 {
-                    strength[i] = strength[i].max(a * all.entry(j, i) / known[j]);
+                    strength[i] = strength[i].max(size() * all.entry(j, i) / known[j]);
                 }
                 true
             });
             known.fill(0.0);
-            all.each(|i, j, a| {
-                known[j] = known[j].max(amounts[i] / a);
+            all.each(|i, j, size| {
+                let a = size();
+                if a > 0.0 {
+                    known[j] = known[j].max(amounts[i] / a);
+                }
                 true
             });
             for i in 0..n {
@@ -97,12 +102,19 @@ impl LocalGauge {
             }
         }
         loads.start(n);
-        all.each(|i, j, a| {
-            loads.couple(i, j, || match (strength[i], strength[j], all.entry(j, i)) {
-                (_, s, 0.0) if s > 0.0 => a / s,
-                (r, s, back) if r > 0.0 && s > 0.0 => (r / s * (a / back)).sqrt(),
-                _ => amounts[i] / amounts[j],
-            });
+        all.each(|i, j, size| {
+            // Most of those that touch are coupled already.
+            if loads.are_coupled(i, j) {
+                return true;
+            }
+            let a = size();
+            if a > 0.0 {
+                loads.couple(i, j, || match (strength[i], strength[j], all.entry(j, i)) {
+                    (_, s, 0.0) if s > 0.0 => a / s,
+                    (r, s, back) if r > 0.0 && s > 0.0 => (r / s * (a / back)).sqrt(),
+                    _ => amounts[i] / amounts[j],
+                });
+            }
             !loads.are_joined()
         });
         loads.spread(amounts.iter().copied());
@@ -120,17 +132,44 @@ impl LocalGauge {
             self.update_velocity_precisely(problem, point);
             let Self { law, exact, sizes, terms, .. } = self;
             let doubt = doubt(*terms);
-            let of = |i: usize| doubt * sizes[i];
+            let care = Care { sizes, doubt: |i: usize| doubt * sizes[i] };
             let mut measure =
-                law.measure::<_, _, D>(&point.r, exact, sizes, of, |c| problem.law(c));
+                law.measure::<_, _, D>((&point.r, exact), Some(care), |c| problem.law(c));
             measure.floor = Some(self.floor(problem, point));
             measure
         } else {
             self.update_velocity(problem, point);
-            self.law.measure::<_, _, D>(&point.r, &self.u, &[], |_| 0.0, |c| problem.law(c))
+            self.law.measure::<_, _, D>((&point.r, &self.u), STEERING, |c| problem.law(c))
         };
         measure.bilateral = self.violation(problem, point);
         measure
+    }
+
+    /// See [`Problem::accept`]: one plain pass over W, which knows the size of what it adds up.
+    ///
+    /// `|û − u|_i ≤ (n + 2) ε (|q| + |W||r|)_i` for n terms, twice the classical bound of a sum of products in any order (Higham2002, section 3.1); the law is evaluated with the
+    /// relative error of plain arithmetic in place of the doubled one's. Where scalar rows or rolling friction take part nothing is said.
+    pub(crate) fn accept<const D: usize, L: Law<D>>(
+        &mut self,
+        problem: &FrictionLocal<D, L>,
+        point: &LocalPoint,
+        tolerance: f64,
+    ) -> Option<Measure> {
+        if problem.rows.is_some() || L::DISKS > 1 {
+            return None;
+        }
+        let Self { law, u, sizes, terms, .. } = self;
+        u.copy_from_slice(&problem.q);
+        sizes.iter_mut().zip(&problem.q).for_each(|(size, q)| *size = q.abs());
+        add_blocks_plainly(u, sizes, &problem.W, &point.r);
+        let doubt = f64::EPSILON * (*terms + 2) as f64;
+        let care = Care { sizes, doubt: |i: usize| doubt * sizes[i] };
+        let mut measure = law.measure::<_, _, D>((&point.r, u), Some(care), |c| problem.law(c));
+        // What is beside the relative residual at large mu must not profit from the rounding of u.
+        let steepest = (0..problem.contacts()).map(|c| problem.law(c));
+        let steepest = steepest.map(|law| law.opening().sqrt() * law.growth()).fold(0.0, f64::max);
+        measure.dual += over(steepest * doubt * norm(sizes), law.norm_q);
+        measure.passes(tolerance).then_some(measure)
     }
 
     /// The residuals in units of velocity, where rolling friction needs an arm for that.
@@ -295,26 +334,26 @@ impl<const D: usize, L: Law<D>> Saddle<'_, D, L> {
         }
     }
 
-    /// Calls with row, column and modulus for all that is not zero beside the diagonal, as long as the call wants more; entries of a block of V one by one.
-    fn each(&self, mut call: impl FnMut(usize, usize, f64) -> bool) {
+    /// Calls with row, column and what tells the modulus for all that is stored beside the diagonal, as long as the call wants more; entries of a block of V one by one.
+    fn each(&self, mut call: impl FnMut(usize, usize, &dyn Fn() -> f64) -> bool) {
         let nc = self.0.contacts();
         for i in 0..nc {
             let (cols, blocks) = self.0.W.row(i);
             for (&j, block) in cols.iter().zip(blocks).filter(|(j, _)| **j as usize != i) {
-                let a = largest(block);
-                if a > 0.0 && !call(i, j as usize, a) {
+                if !call(i, j as usize, &|| largest(block)) {
                     return;
                 }
             }
         }
         let Some(b) = &self.0.rows else { return };
-        for (i, j, v) in b.V.triplets().filter(|e| e.2 != 0.0) {
-            if !(call(i / D, nc + j, v.abs()) && call(nc + j, i / D, v.abs())) {
+        for (i, j, v) in b.V.triplets() {
+            let size = || v.abs();
+            if !(call(i / D, nc + j, &size) && call(nc + j, i / D, &size)) {
                 return;
             }
         }
-        for (i, j, x) in b.R.triplets().filter(|e| e.2 != 0.0 && e.0 != e.1) {
-            if !call(nc + i, nc + j, x.abs()) {
+        for (i, j, x) in b.R.triplets().filter(|e| e.0 != e.1) {
+            if !call(nc + i, nc + j, &|| x.abs()) {
                 return;
             }
         }

@@ -244,6 +244,15 @@ impl<const D: usize, L: Law<D>> Problem for FrictionLocal<D, L> {
         gauge.measure_weighed(self, point, true)
     }
 
+    fn accept(
+        &self,
+        point: &LocalPoint,
+        gauge: &mut Self::Gauge,
+        tolerance: f64,
+    ) -> Option<Measure> {
+        gauge.accept(self, point, tolerance)
+    }
+
     fn partner(&self, point: &LocalPoint) -> Vec<f64> {
         let mut u = self.q.clone();
         self.velocity_into(point, &mut u);
