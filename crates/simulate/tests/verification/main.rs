@@ -4,6 +4,7 @@ mod balls;
 mod blocks;
 mod elastic;
 mod free_body;
+mod governor;
 mod impacts;
 mod invariance;
 mod joints;
