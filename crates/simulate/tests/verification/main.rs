@@ -5,6 +5,7 @@ mod blocks;
 mod elastic;
 mod free_body;
 mod governor;
+mod hertz;
 mod impacts;
 mod invariance;
 mod joints;
