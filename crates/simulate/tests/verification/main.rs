@@ -3,6 +3,7 @@
 mod balls;
 mod blocks;
 mod elastic;
+mod elastic_pairs;
 mod free_body;
 mod governor;
 mod hertz;
