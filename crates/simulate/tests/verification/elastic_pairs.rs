@@ -2,7 +2,8 @@
 
 use nonsmooth_scenes::{ElasticBox, Material};
 use nonsmooth_simulate::{
-    Activation, BodyId, Control, Elastic, Law, MoreauJean, RunReport, Simulation, StepReport, World,
+    Activation, BodyId, Control, Elastic, Law, MoreauJean, RunReport, SceneFile, Simulation,
+    StepReport, World,
 };
 
 use crate::{G, near};
@@ -212,4 +213,44 @@ fn a_box_that_is_narrower_than_the_elements_of_another_is_a_warning() {
     let simulation = Simulation::new(world, MoreauJean::default()).unwrap();
     let warnings = simulation.warnings();
     assert!(warnings.iter().any(|w| w.contains("`beam` is narrower than the elements of `cube`")));
+}
+
+/// A family of elastic solids in motion: every step solved, no energy gained; the farthest that a node has moved.
+fn family(name: &str, set: &str) -> (Simulation, f64) {
+    let text = format!(
+        "format = 'nonsmooth-scene'\nversion = 1\ntime = {{ h = 5e-4, end = 0.02 }}\npairs_default = {{}}
+         [[generate]]\nscene = '{name}'\nset = {set}\nposition = [1, 0, 0]"
+    );
+    let scene = SceneFile::parse(&text, &[]).unwrap();
+    let mut simulation = scene.build().unwrap();
+    let mut start = None;
+    let mut watch = |_: &Simulation, r: &StepReport| {
+        let e = r.energy.kinetic + r.energy.potential;
+        let first = *start.get_or_insert(e);
+        assert!(e <= first + 1e-9 * r.energy.scale, "{e} of {first}");
+        Control::Continue
+    };
+    check(&simulation.run(scene.time.end, scene.time.h, &mut watch).unwrap());
+    let moved = simulation.state().elastic.iter().flat_map(|s| &s.displacement);
+    let far = moved.flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
+    (simulation, far)
+}
+
+#[test]
+fn families_of_elastic_solids_stand() {
+    for (name, set, count, high) in [
+        ("elastic_cubes", "{ count = 3, elements = 3, mu = 0.5 }", 3, 3.0),
+        ("elastic_wall", "{ rows = 3, columns = 3, mu = 0.6 }", 10, 0.6),
+    ] {
+        let (simulation, far) = family(name, set);
+        let elastic = &simulation.world().elastic;
+        assert_eq!(elastic.len(), count);
+        assert_eq!(elastic[1].name, format!("{name} 1"));
+        // What the weight suddenly put on shortens a column by: twice ρ g H²/(2 E).
+        let stone = elastic[0].solid.material;
+        let share = far / (stone.density * G * high * high / stone.young);
+        assert!((0.1..1.1).contains(&share), "{name}: {share}");
+        let open = simulation.contacts().iter().filter(|c| c.active && c.impulse[0] == 0.0).count();
+        println!("{name}: {share:.3} of it, {open} contacts open");
+    }
 }
