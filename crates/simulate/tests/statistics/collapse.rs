@@ -1,8 +1,7 @@
 //! Columns of discs whose wall is taken away.
 //!
-//! A column of width L and height H = a L collapses onto a rough floor; its front comes to rest at R. Experiments and simulations (Staron and Hinch, JFM 545, 2005;
-//! Lube et al. 2005) have `(R − L)/L ∝ a` for low columns and `∝ a^(2/3)`, up to `a^0.7`, for high ones, with prefactors that depend on friction and on how many grains there are: only
-//! exponents are tested.
+//! A column of width L and height H = a L collapses onto a rough floor; its front comes to rest at R. Experiments and simulations (StaronHinch2005, by contact dynamics as here) have
+//! `(R − L)/L ∝ a` for low columns and `∝ a^(2/3)` to `a^0.7` for high ones, with prefactors that depend on friction and on how many grains there are: only exponents are tested.
 
 use nonsmooth_scenes::vec3::Vec3;
 use nonsmooth_simulate::{Body, Compliance, Law, Part, Shape, Simulation, World, plane};

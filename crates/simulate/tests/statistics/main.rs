@@ -1,6 +1,6 @@
 //! Laws of granular matter that hold on average: many grains, tolerances of 10 to 20 %. Lengths in diameters of a grain, gravity 1.
 //!
-//! The steps are solved by sweeps to a residual that averages do not see; every one is judged, and its energy accounted for. The long versions take minutes:
+//! The steps are solved by sweeps to a residual that averages do not see; every one is judged, and its energy accounted for. The long versions take some twenty minutes on a core:
 //! `cargo test --release -p nonsmooth-simulate --test statistics -- --ignored --nocapture`.
 
 mod collapse;
