@@ -1,13 +1,13 @@
 //! Elastic solids of a world.
 
 use nonsmooth_scenes::ElasticBox;
-use nonsmooth_scenes::vec3::{Vec3, add};
+use nonsmooth_scenes::vec3::{Vec3, add, norm};
 
 use crate::state::ElasticState;
 use crate::{SimulateError, World};
 
 /// An elastic box in a world: linear elasticity of small strains and small turns, about the axes of the world. The nodes of its surface that are not held touch the shapes of
-/// bodies; what is smaller than an element passes between them. The scheme's θ is that of the world, whatever the box says.
+/// bodies, and the faces of other elastic boxes of coarser mesh, which of equal ones is the earlier; what is smaller than an element passes between them. The scheme's θ is that of the world, whatever the box says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Elastic {
     /// What messages and files call it; may be empty.
@@ -39,6 +39,12 @@ impl Elastic {
     /// The nodes that may touch bodies.
     pub fn touching(&self) -> impl Iterator<Item = usize> + '_ {
         self.solid.skin().0.into_iter().filter(|&node| !self.solid.held[node])
+    }
+
+    /// Whether its nodes touch the faces of the other, and not the other way round, were it the earlier of the two.
+    pub(crate) fn is_finer_than(&self, other: &Self) -> bool {
+        let [own, other] = [self, other].map(|e| norm(e.solid.cell()));
+        own < other * (1.0 - 1e-9)
     }
 
     /// Where its nodes are, m.
@@ -107,6 +113,24 @@ impl Nodes {
             }));
         }
         Self { list }
+    }
+}
+
+/// A point of a face of an elastic solid, which a node of another one is over.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Foot {
+    pub solid: u32,
+    /// Where it is, m.
+    pub place: Vec3,
+    /// The nodes of the face by their places among all that may touch, `u32::MAX` for one that is held, and their shares in the point.
+    pub parts: [(u32, f64); 4],
+}
+
+impl Foot {
+    /// The nodes that are not held, with their shares.
+    pub fn parts(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let free = self.parts.iter().filter(|p| p.0 != u32::MAX);
+        free.map(|&(place, share)| (place as usize, share))
     }
 }
 

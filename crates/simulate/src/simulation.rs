@@ -73,7 +73,7 @@ fn rigid(world: &World, where_: &str) -> Result<(), SimulateError> {
     }
 }
 
-/// In words, bodies that may slip between the nodes of an elastic solid.
+/// In words, bodies and elastic solids that may slip between the nodes of an elastic solid.
 fn small(world: &World) -> Vec<String> {
     let mut said = vec![];
     for (k, elastic) in world.elastic.iter().enumerate() {
@@ -85,6 +85,24 @@ fn small(world: &World) -> Vec<String> {
                     "{} is not much larger than the elements of {}: only nodes touch, and it may pass between them",
                     world.label(i),
                     world.label(world.bodies.len() + k)
+                ));
+            }
+        }
+    }
+    for (j, second) in world.elastic.iter().enumerate() {
+        for (i, first) in world.elastic[..j].iter().enumerate() {
+            let label = |k: usize| world.label(world.bodies.len() + k);
+            let (nodes, faces) = match first.is_finer_than(second) {
+                true => ((first, i), (second, j)),
+                false => ((second, j), (first, i)),
+            };
+            let cell = nodes.0.solid.cell().into_iter().fold(0.0, f64::max);
+            let narrow = faces.0.solid.sides.into_iter().fold(f64::INFINITY, f64::min);
+            if narrow < cell {
+                said.push(format!(
+                    "{} is narrower than the elements of {}, whose nodes touch it: it may pass between them",
+                    label(faces.1),
+                    label(nodes.1)
                 ));
             }
         }

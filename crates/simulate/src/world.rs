@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, dot, norm, scale, sub};
-use nonsmooth_scenes::{self as scenes, MassProperties, Polyhedron, Rotation, Scene};
+use nonsmooth_scenes::{self as scenes, ElasticBox, MassProperties, Polyhedron, Rotation, Scene};
 
 use crate::elastic::Elastic;
 use crate::error::{finite, require};
@@ -550,19 +550,12 @@ const SAME_PLANE: f64 = 1e-6;
 impl TryFrom<&Scene> for World {
     type Error = SimulateError;
 
-    /// The rigid bodies of a scene, its ground and obstacles fixed, gravity, and the law of its contacts. Contacts with the ground that neither the
+    /// The rigid bodies and elastic solids of a scene, its ground and obstacles fixed, gravity, and the law of its contacts. Contacts with the ground that neither the
     /// ground nor an obstacle explains are with walls, which become planes; a wall that moves keeps its velocity.
     ///
-    /// Errors: elastic solids, and images of bodies in a periodic domain, which are not simulated; contacts of different laws.
+    /// Errors: images of bodies in a periodic domain, which are not simulated; contacts of different laws; elastic solids with rolling friction, once the world is validated.
     fn try_from(scene: &Scene) -> Result<Self, SimulateError> {
         scene.validate()?;
-        if !scene.solids.is_empty() {
-            return Err(SimulateError::value(
-                "solids",
-                "rigid bodies alone (elastic boxes are stated by [[elastic]] of a scene file)",
-                scene.solids.len(),
-            ));
-        }
         let law = scene.contacts.first().map_or(Law::default(), |c| Law {
             mu: c.mu,
             e: c.e,
@@ -595,6 +588,9 @@ impl TryFrom<&Scene> for World {
                 ..Body::bare(Motion::Free, parts(&body.shape))
             });
         }
+        for solid in &scene.solids {
+            world.add_elastic(Elastic::new(solid.clone()));
+        }
         for (k, obstacle) in scene.obstacles.iter().enumerate() {
             let body = Body::fixed(parts(&obstacle.shape)).at(obstacle.position);
             world.add(body.named(format!("obstacle {k}")));
@@ -604,7 +600,9 @@ impl TryFrom<&Scene> for World {
             planes.push((ground.point, ground.normal, [0.0; 3]));
         }
         let grounds = planes.len();
-        let size = scene.bodies.iter().map(|b| b.shape.radius()).fold(0.0, f64::max);
+        let cells = scene.solids.iter().flat_map(ElasticBox::cell);
+        let sizes = scene.bodies.iter().map(|b| b.shape.radius()).chain(cells);
+        let size = sizes.fold(0.0, f64::max);
         for c in scene.contacts.iter().filter(|c| c.a.is_none()) {
             let n = c.frame()[0];
             let on_plane = |&(p, m, v): &(Vec3, Vec3, Vec3)| {
@@ -623,7 +621,14 @@ impl TryFrom<&Scene> for World {
                 planes.len() - 1
             });
             let (point, m, _) = &mut planes[known];
-            let behind = lowest(&scene.bodies[c.b], *m) - dot(*m, *point);
+            let low = match c.b.checked_sub(scene.bodies.len()) {
+                None => lowest(&scene.bodies[c.b], *m),
+                Some(solid) => {
+                    let heights = scene.solids[solid].places().map(|x| dot(*m, x));
+                    heights.fold(f64::INFINITY, f64::min)
+                }
+            };
+            let behind = low - dot(*m, *point);
             if known >= grounds && behind < 0.0 {
                 *point = add(*point, scale(behind, *m));
             }

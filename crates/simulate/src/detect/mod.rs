@@ -9,6 +9,7 @@
 //! | cylinder, cone with plane | the lowest point of each rim; flat ends stand on eight points of the body, too |
 //! | cylinder, cone with sphere | closed form in the half plane through the axis |
 //! | capsule with box, polyhedron; cylinder, cone with all that is convex | [`convex`]: distance, then features |
+//! | elastic box with elastic box | [`facing`]: nodes of the finer mesh at faces of the other |
 //! | mesh, heightfield with all that is convex; mesh with plane | [`surface`]: triangles in a tree of boxes, filtered at inner edges |
 //!
 //! What is drawn is what touches: no margin, no skin. A point is reported where the gap is at most the prediction of the pair, so that a step
@@ -17,6 +18,7 @@
 mod broad;
 mod clip;
 mod convex;
+mod facing;
 mod gjk;
 mod hull;
 mod rounds;
@@ -29,13 +31,14 @@ use nonsmooth_scenes::Polyhedron;
 use nonsmooth_scenes::vec3::{Vec3, add, scale, sub};
 use rayon::ThreadPool;
 
-use crate::elastic::Nodes;
+use crate::elastic::{Foot, Nodes};
 use crate::rotation::Pose;
 use crate::state::{Axis, State};
 use crate::{BodyId, Compliance, Law, Shape, SimulateError, World};
 use broad::{Aabb, Broad};
 use clip::Clip;
 use convex::{Extent, Flat, Side};
+use facing::Facing;
 use hull::{Hull, PosedHull};
 use segments::Segment;
 use surface::{Scratch, Surface};
@@ -92,6 +95,7 @@ pub(crate) struct Detector {
     /// Bodies, and the nodes of elastic solids, which are points.
     bodies: usize,
     nodes: Nodes,
+    facing: Facing,
     solids: Vec<Solids>,
     moves: Vec<bool>,
     planes: Vec<u32>,
@@ -205,6 +209,7 @@ impl Detector {
             finders: vec![Finder::default()],
             box_of,
             bodies: world.bodies.len(),
+            facing: Facing::new(world, &nodes, solids.len()),
             nodes,
             solids,
         })
@@ -221,14 +226,14 @@ impl Detector {
     }
 
     /// All points where two bodies that may touch are within the sum of their margins (m, one a body), by key. The axes that separate polyhedra are left in
-    /// the memory of the state. The pairs are cut into consecutive parts, one for each thread of the pool: what is found is the same for any number.
+    /// the memory of the state, the feet of nodes on faces of other elastic solids in `feet`: these are bodies that count on where nodes end. The pairs are cut into consecutive parts, one for each thread of the pool: what is found is the same for any number.
     pub fn detect(
         &mut self,
         world: &World,
         state: &mut State,
         margins: &[f64],
         pool: Option<&ThreadPool>,
-        out: &mut Vec<Near>,
+        (out, feet): (&mut Vec<Near>, &mut Vec<Foot>),
     ) {
         self.place(world, state, margins);
         self.pairs.clear();
@@ -268,6 +273,7 @@ impl Detector {
         }
         self.finders = finders;
         std::mem::swap(&mut state.memory.axes, &mut self.axes);
+        self.facing.find(world, state, (margins, &self.nodes), out, feet);
     }
 
     /// The narrow phase of consecutive pairs, with the separating axes `known`; all lists are sorted.
@@ -309,7 +315,7 @@ impl Detector {
         }
     }
 
-    /// Nodes touch bodies alone.
+    /// Nodes do not touch nodes.
     fn may_touch(&self, world: &World, p: u32, q: u32) -> bool {
         let [p_is_node, q_is_node] = [p, q].map(|k| k as usize >= self.bodies);
         match p_is_node || q_is_node {

@@ -12,7 +12,13 @@ const MARGIN: f64 = 0.05;
 fn contacts(world: &World) -> Vec<Near> {
     let (mut state, mut out) = (State::of(world), vec![]);
     let margins = vec![MARGIN; world.bodies.len()];
-    Detector::new(world).unwrap().detect(world, &mut state, &margins, None, &mut out);
+    Detector::new(world).unwrap().detect(
+        world,
+        &mut state,
+        &margins,
+        None,
+        (&mut out, &mut vec![]),
+    );
     out
 }
 
@@ -282,7 +288,7 @@ fn the_rate_of_the_gap_is_the_normal_velocity() {
         let (margins, mut found) = ([MARGIN; 2], vec![]);
         while far > 0.1 {
             start.position[1] = scale(far, direction);
-            detector.detect(&world, &mut start, &margins, None, &mut found);
+            detector.detect(&world, &mut start, &margins, None, (&mut found, &mut vec![]));
             if !found.is_empty() {
                 break;
             }
@@ -300,7 +306,7 @@ fn the_rate_of_the_gap_is_the_normal_velocity() {
                 state.rotation[k] = turned.after(Rotation(state.rotation[k])).0;
             }
             let mut out = vec![];
-            detector.detect(&world, &mut state, &margins, None, &mut out);
+            detector.detect(&world, &mut state, &margins, None, (&mut out, &mut vec![]));
             out
         };
         let t = 1e-5;
@@ -392,7 +398,7 @@ fn no_pose_makes_it_panic() {
             let q = if coarse { Rotation::IDENTITY } else { rotation(&mut rng) };
             state.rotation[k] = q.0;
         }
-        detector.detect(&world, &mut state, &margins, None, &mut out);
+        detector.detect(&world, &mut state, &margins, None, (&mut out, &mut vec![]));
         seen += out.len();
         let finite = |n: &Near| n.place.normal.iter().chain(&n.place.point).all(|x| x.is_finite());
         assert!(out.iter().all(finite));

@@ -16,7 +16,8 @@ pub struct LagrangianScheme {
     pub directions: Directions,
     /// Which velocity relations hold.
     pub relations: RelationsAt,
-    /// Which contacts and limits a step knows; the slack is a gap.
+    /// Which contacts and limits a step knows; the slack is a gap, in its unit. With θ = 1 a contact keeps the gap that it closed with, so where that is one of rounding only a slack above
+    /// rounding keeps it in the index set.
     pub activation: Activation,
     /// What u⁻, u⁺ and r have to do with each other at an impact.
     pub impact: Impact,

@@ -424,6 +424,14 @@ impl<'a> Builder<'a> {
             let position = add(body.position, table.position);
             self.add(body.named(own).at(position).of(material), key)?;
         }
+        for (k, mut elastic) in made.elastic.into_iter().enumerate() {
+            let own = format!("{name} {k}");
+            if !self.names.insert(own.clone()) {
+                return Err(twice(&format!("{key}.name"), &own));
+            }
+            elastic.solid.position = add(elastic.solid.position, table.position);
+            self.world.add_elastic(elastic.named(own).of(material));
+        }
         Ok(())
     }
 

@@ -17,13 +17,14 @@ impl Tools {
     ) -> Vec<(u32, u32, f64)> {
         self.margins.clear();
         self.margins.resize(world.bodies.len() + self.solids.nodes.list.len(), 0.0);
-        self.detect(world, state);
+        let Self { detector, margins, crew, near, solids, .. } = self;
+        detector.detect(world, state, margins, crew.pool(), (near, &mut solids.feet));
         let mut found: Vec<(u32, u32, f64)> = vec![];
         let hard = self.near.iter().filter(|n| n.compliance.is_none());
         let bodies = world.bodies.len();
         let owner = |k: u32| match (k as usize).checked_sub(bodies) {
             None => k,
-            Some(place) => bodies as u32 + self.solids.nodes.list[place].solid,
+            Some(place) => bodies as u32 + self.solids.owner(place),
         };
         for n in hard.filter(|n| n.place.gap < -share * n.size) {
             let (a, b) = (owner(n.a), owner(n.b));
@@ -58,7 +59,7 @@ impl Tools {
         let mut rest = State { velocity: zero.clone(), spin: zero, ..state.clone() };
         self.begin(stride, &rest, &mut []);
         self.margins.iter_mut().for_each(|m| *m += depth);
-        self.detect(world, &mut rest);
+        self.detect(stride, &mut rest);
         self.near.retain(|near| near.compliance.is_none());
         self.meet(stride, &rest);
         self.joints.close_limits(world, H);

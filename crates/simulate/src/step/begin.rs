@@ -153,7 +153,7 @@ impl Start {
     }
 
     /// A node of an elastic solid that moves with this velocity, and with the free one where nothing touches it.
-    fn node(place: Vec3, owner: u32, (v, v_free): (Vec3, Vec3), h: f64) -> Moving {
+    pub fn node(place: Vec3, owner: u32, (v, v_free): (Vec3, Vec3), h: f64) -> Moving {
         let zero = [[0.0; 3]; 3];
         let at = |part: f64| Pose::at(add(place, scale(part * h, v)));
         Moving {

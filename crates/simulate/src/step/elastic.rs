@@ -16,7 +16,7 @@ use nonsmooth_scenes::vec3::{Mat3, Vec3, add, scale};
 
 use super::Stride;
 use super::contact::Row;
-use crate::elastic::{Node, Nodes};
+use crate::elastic::{Foot, Node, Nodes};
 use crate::report::EnergyBalance;
 use crate::state::State;
 use crate::{LinearSystem, MoreauJean, SimulateError, World};
@@ -24,6 +24,8 @@ use crate::{LinearSystem, MoreauJean, SimulateError, World};
 /// The elastic solids of a world with the memory of their steps.
 pub(super) struct Solids {
     pub nodes: Nodes,
+    /// Points of faces that nodes of others are over, this step.
+    pub feet: Vec<Foot>,
     /// The number of bodies, from which on nodes and solids are counted.
     bodies: usize,
     solids: Vec<Solid>,
@@ -71,7 +73,7 @@ impl Solids {
             })
         });
         let solids = solids.collect::<Result<_, SimulateError>>()?;
-        Ok(Self { bodies: world.bodies.len(), nodes, solids })
+        Ok(Self { bodies: world.bodies.len(), nodes, feet: vec![], solids })
     }
 
     pub fn len(&self) -> usize {
@@ -97,12 +99,44 @@ impl Solids {
         at(&self.solids[solid as usize].free, node)
     }
 
+    /// The solid of a node, or of a foot, which count on.
+    pub fn owner(&self, place: usize) -> u32 {
+        match place.checked_sub(self.nodes.list.len()) {
+            None => self.nodes.list[place].solid,
+            Some(foot) => self.feet[foot].solid,
+        }
+    }
+
+    /// The nodes that make up a node, itself, or a foot, with their shares.
+    fn parts(&self, place: usize) -> ([(usize, f64); 4], usize) {
+        let mut parts = [(place, 1.0); 4];
+        let Some(foot) = place.checked_sub(self.nodes.list.len()) else { return (parts, 1) };
+        let mut count = 0;
+        for part in self.feet[foot].parts() {
+            parts[count] = part;
+            count += 1;
+        }
+        (parts, count)
+    }
+
+    /// The velocities of a foot at the beginning of the step, and without impulses.
+    pub fn foot_velocities(&self, foot: &Foot, state: &State) -> (Vec3, Vec3) {
+        let velocity = &state.elastic[foot.solid as usize].velocity;
+        foot.parts().fold(([0.0; 3], [0.0; 3]), |(v, free), (place, share)| {
+            let now = velocity[self.nodes.list[place].node as usize];
+            (add(v, scale(share, now)), add(free, scale(share, self.free(place))))
+        })
+    }
+
     /// Makes the columns of the nodes of a contact ready.
     pub fn reach(&mut self, row: &Row) {
         for arm in row.free_arms() {
             let Some(place) = (arm.body as usize).checked_sub(self.bodies) else { continue };
-            let solid = &mut self.solids[self.nodes.list[place].solid as usize];
-            solid.reach(place, &self.nodes.list);
+            let (parts, count) = self.parts(place);
+            for &(place, _) in &parts[..count] {
+                let solid = &mut self.solids[self.nodes.list[place].solid as usize];
+                solid.reach(place, &self.nodes.list);
+            }
         }
     }
 
@@ -111,9 +145,7 @@ impl Solids {
         for left in row.free_arms().filter(|a| a.body as usize >= self.bodies) {
             for right in other.free_arms().filter(|b| b.owner == left.owner) {
                 let [p, q] = [left, right].map(|arm| arm.body as usize - self.bodies);
-                let solid = &self.solids[self.nodes.list[p].solid as usize];
-                let columns = solid.columns[q - solid.nodes.start].as_ref().expect("reached");
-                let between = &columns[p - solid.nodes.start];
+                let between = self.between(p, q);
                 let sign = left.sign * right.sign;
                 for i in 0..3 {
                     let d = row.frame_end[i];
@@ -128,19 +160,45 @@ impl Solids {
         }
     }
 
+    /// `(M̂⁻¹)_{pq}` of nodes or feet of the same solid.
+    fn between(&self, p: usize, q: usize) -> Mat3 {
+        let block = |p: usize, q: usize| {
+            let solid = &self.solids[self.nodes.list[p].solid as usize];
+            let columns = solid.columns[q - solid.nodes.start].as_ref().expect("reached");
+            &columns[p - solid.nodes.start]
+        };
+        let nodes = self.nodes.list.len();
+        if p < nodes && q < nodes {
+            return *block(p, q);
+        }
+        let ((left, m), (right, n)) = (self.parts(p), self.parts(q));
+        let mut sum = [[0.0; 3]; 3];
+        for &(p, share) in &left[..m] {
+            for &(q, other) in &right[..n] {
+                for (sum, x) in sum.iter_mut().flatten().zip(block(p, q).iter().flatten()) {
+                    *sum += share * other * x;
+                }
+            }
+        }
+        sum
+    }
+
     /// Forgets the impulses on solid k.
     pub fn clear(&mut self, k: u32) {
         self.solids[k as usize].impulse.fill(0.0);
     }
 
-    /// Adds an impulse at a node.
+    /// Adds an impulse at a node or a foot.
     pub fn receive(&mut self, body: u32, x: f64, direction: Vec3) {
-        let Node { solid, node, .. } = self.nodes.list[body as usize - self.bodies];
-        let r = &mut self.solids[solid as usize].impulse[3 * node as usize..][..3];
-        r.iter_mut().zip(direction).for_each(|(r, d)| *r += x * d);
+        let (parts, count) = self.parts(body as usize - self.bodies);
+        for &(place, share) in &parts[..count] {
+            let Node { solid, node, .. } = self.nodes.list[place];
+            let r = &mut self.solids[solid as usize].impulse[3 * node as usize..][..3];
+            r.iter_mut().zip(direction).for_each(|(r, d)| *r += share * x * d);
+        }
     }
 
-    /// The velocities of solid k after the step, with the impulses that it has; `tell` hears of its nodes.
+    /// The velocities of solid k after the step, with the impulses that it has; `tell` hears of its nodes and feet.
     pub fn respond(&mut self, k: u32, mut tell: impl FnMut(usize, Vec3)) {
         let solid = &mut self.solids[k as usize];
         let Solid { hat, free, v, impulse, .. } = &mut *solid;
@@ -149,6 +207,13 @@ impl Solids {
         v.iter_mut().zip(free).for_each(|(v, free)| *v += *free);
         for place in solid.nodes.clone() {
             tell(self.bodies + place, at(&solid.v, self.nodes.list[place].node));
+        }
+        let (nodes, v) = (&self.nodes.list, &self.solids[k as usize].v);
+        for (number, foot) in self.feet.iter().enumerate().filter(|f| f.1.solid == k) {
+            let moves = foot.parts().fold([0.0; 3], |sum, (place, share)| {
+                add(sum, scale(share, at(v, nodes[place].node)))
+            });
+            tell(self.bodies + nodes.len() + number, moves);
         }
     }
 
@@ -173,25 +238,6 @@ impl Solids {
 
     pub fn is_finite(&self) -> bool {
         super::are_finite(self.solids.iter().flat_map(|s| &s.v).copied())
-    }
-
-    /// The first two solids whose boxes meet: contact between them is not simulated.
-    pub fn meeting(&self, world: &World, state: &State) -> Option<(usize, usize)> {
-        if self.solids.len() < 2 {
-            return None;
-        }
-        let bounds = world.elastic.iter().zip(&state.elastic).map(|(elastic, state)| {
-            let all = || elastic.positions(state);
-            let by = |start: f64, f: fn(f64, f64) -> f64| {
-                all().fold([start; 3], |s, x| std::array::from_fn(|k| f(s[k], x[k])))
-            };
-            [by(f64::INFINITY, f64::min), by(f64::NEG_INFINITY, f64::max)]
-        });
-        let bounds: Vec<[Vec3; 2]> = bounds.collect();
-        let meet =
-            |p: &[Vec3; 2], q: &[Vec3; 2]| (0..3).all(|k| p[0][k] <= q[1][k] && q[0][k] <= p[1][k]);
-        let pairs = (0..bounds.len()).flat_map(|i| (i + 1..bounds.len()).map(move |j| (i, j)));
-        pairs.into_iter().find(|&(i, j)| meet(&bounds[i], &bounds[j]))
     }
 }
 

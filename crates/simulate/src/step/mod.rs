@@ -48,7 +48,7 @@ use crate::joints::Joints;
 use crate::moving::Moving;
 use crate::report::{ContactReport, StepReport, StepStatus, Timings};
 use crate::state::State;
-use crate::{Force, MoreauJean, SimulateError, World};
+use crate::{Force, Geometry, MoreauJean, SimulateError, World};
 
 use begin::Start;
 use contact::Row;
@@ -78,7 +78,7 @@ impl Stride<'_> {
 pub(crate) struct Tools {
     detector: Detector,
     start: Start,
-    /// The bodies of the world, and after them the nodes of elastic solids that may touch them.
+    /// The bodies of the world, after them the nodes of elastic solids that may touch them, and after these the feet of nodes on faces of other solids.
     bodies: Vec<Moving>,
     solids: Solids,
     /// How far from each body others are looked for, m.
@@ -152,14 +152,13 @@ impl Tools {
         let begun = Instant::now();
         let mut timings = Timings::default();
         let mut report = StepReport::begun(state.t, stride.h);
-        self.refuse_meeting(stride.world, state)?;
         if !self.begin(stride, state, forces) {
             report.status = StepStatus::NotFinite;
             report.timings.total = begun.elapsed().as_secs_f64();
             return Ok(report);
         }
         let detecting = Instant::now();
-        self.detect(stride.world, state);
+        self.detect(stride, state);
         timings.detection = detecting.elapsed().as_secs_f64();
         self.meet(stride, state);
         let mut solved = self.solve(stride, inner)?;
@@ -187,7 +186,7 @@ impl Tools {
         if !self.begin(stride, state, forces) {
             return Ok(None);
         }
-        self.detect(stride.world, state);
+        self.detect(stride, state);
         self.meet(stride, state);
         if self.rows.is_empty() && self.joints.rows.is_empty() {
             return Ok(None);
@@ -202,23 +201,16 @@ impl Tools {
         }))
     }
 
-    /// Errors: two elastic solids that meet.
-    fn refuse_meeting(&self, world: &World, state: &State) -> Result<(), SimulateError> {
-        match self.solids.meeting(world, state) {
-            None => Ok(()),
-            Some((i, j)) => {
-                let name = |k: usize| world.label(world.bodies.len() + k);
-                let expected = "elastic solids apart from each other, for contact between two is not simulated";
-                let found = format!("{} where {} is, at t = {}", name(j), name(i), state.t);
-                Err(SimulateError::value("elastic", expected, found))
-            }
+    /// The points where bodies are near each other, and the bodies that feet are.
+    fn detect(&mut self, Stride { world, scheme, h }: Stride, state: &mut State) {
+        let Self { detector, margins, crew, near, solids, bodies, .. } = self;
+        detector.detect(world, state, margins, crew.pool(), (near, &mut solids.feet));
+        let h = if scheme.geometry == Geometry::Frozen { 0.0 } else { h };
+        for foot in &solids.feet {
+            let owner = world.bodies.len() as u32 + foot.solid;
+            let moves = solids.foot_velocities(foot, state);
+            bodies.push(Start::node(foot.place, owner, moves, h));
         }
-    }
-
-    /// The points where bodies are near each other.
-    fn detect(&mut self, world: &World, state: &mut State) {
-        let Self { detector, margins, crew, near, .. } = self;
-        detector.detect(world, state, margins, crew.pool(), near);
     }
 }
 

@@ -1,7 +1,9 @@
 //! An elastic bar that hits a rigid wall.
 
 use nonsmooth_scenes::{ElasticBox, Material};
-use nonsmooth_simulate::{Control, LagrangianSimulation, Law, LinearSystem, StepReport};
+use nonsmooth_simulate::{
+    Activation, Control, LagrangianScheme, LagrangianSimulation, Law, LinearSystem, StepReport,
+};
 
 use crate::{near, theta};
 
@@ -19,9 +21,15 @@ struct Rebound {
     energy: f64,
     impulse: f64,
     force: f64,
+    /// Steps with an impulse.
+    active: u32,
 }
 
 fn rebound(elements: usize, h: f64, t: f64, e: f64) -> Rebound {
+    rebound_by(theta(t), elements, h, e)
+}
+
+fn rebound_by(scheme: LagrangianScheme, elements: usize, h: f64, e: f64) -> Rebound {
     let l = LENGTH / elements as f64;
     let mut masses = vec![DENSITY * SECTION * l; elements + 1];
     masses[0] *= 0.5;
@@ -29,7 +37,7 @@ fn rebound(elements: usize, h: f64, t: f64, e: f64) -> Rebound {
     let springs = vec![YOUNG * SECTION / l; elements];
     let bar = LinearSystem::<2>::chain(&masses, &springs).unwrap().with_limit(GAP, &[(0, 1.0)], e);
     let (q, v) = (vec![0.0; elements + 1], vec![SPEED; elements + 1]);
-    let mut bar = LagrangianSimulation::new(bar, theta(t), &q, &v).unwrap();
+    let mut bar = LagrangianSimulation::new(bar, scheme, &q, &v).unwrap();
     let start = 0.5 * DENSITY * SECTION * LENGTH * SPEED * SPEED;
     let (mut impulse, mut first, mut last) = (0.0, 0.0, 0.0);
     let (mut energy, mut active) = (start, 0);
@@ -52,7 +60,7 @@ fn rebound(elements: usize, h: f64, t: f64, e: f64) -> Rebound {
     let speed = bar.state().v.iter().zip(&masses).map(|(v, m)| v * m).sum::<f64>()
         / (DENSITY * SECTION * LENGTH);
     let (contact, force) = (last - first, impulse / (h * f64::from(active)));
-    Rebound { contact, speed, energy: energy / start, impulse, force }
+    Rebound { contact, speed, energy: energy / start, impulse, force, active }
 }
 
 #[test]
@@ -66,9 +74,17 @@ fn the_bar_rebounds_by_its_own_waves() {
     near(fine.contact, 3.88e-4, 2e-6);
     near(fine.speed, 0.09844, 1e-5);
     near(fine.energy, 0.99437, 1e-5);
-    let damped = rebound(100, 1e-6, 1.0, 0.0);
-    // What is damped after the rebound depends on how long one waits.
-    near(damped.energy, 0.868, 0.01);
+}
+
+/// The bar closes the gap in 500 steps exactly, and at θ = 1 a contact keeps the gap that it closed with: here one of rounding, of either sign. Without slack the index set leaves the contact
+/// out in one of 385 steps; the end moves off, strikes again, and 0.860 of the energy is left. Where it stays 0.868 is: 0.7 ms after the contact has closed, for damping goes on.
+#[test]
+fn an_implicit_bar_needs_a_slack_of_rounding_where_it_closes_a_gap_exactly() {
+    let activation = Activation::Forecast { gamma: 0.5, slack: 1e-15 };
+    let damped = rebound_by(LagrangianScheme { activation, ..theta(1.0) }, 100, 1e-6, 0.0);
+    // Computed apart: 0.86758.
+    near(damped.energy, 0.8676, 1e-4);
+    assert_eq!(damped.active, 385);
 }
 
 #[test]
@@ -84,9 +100,20 @@ fn a_fine_bar_comes_near_the_solution_of_the_wave_equation() {
 
 #[test]
 fn with_restitution_the_energy_is_exact_and_the_force_a_comb() {
-    let comb = rebound(100, 1e-6, 0.5, 1.0);
-    near(comb.energy, 1.0, 1e-9);
-    assert!(comb.force > 2.5e3, "{}", comb.force);
+    // Each tooth is a node that comes back, with an impulse of some 2 ρ S L/(2 n) times its speed whatever h is, so the mean force while active is a matter of h and n. Computed
+    // apart, with ten elements: 3.209e4 N in 15 steps.
+    let coarse = rebound(10, 1e-6, 0.5, 1.0);
+    near(coarse.force, 3.209e4, 5.0);
+    assert_eq!(coarse.active, 15);
+    let fine = rebound(100, 1e-6, 0.5, 1.0);
+    near(fine.force, 3.774e3, 1.0);
+    assert_eq!(fine.active, 129);
+    // The product of h and n is that of the first.
+    let short = rebound(100, 1e-7, 0.5, 1.0);
+    near(short.force, 3.290e4, 5.0);
+    for comb in [coarse, fine, short] {
+        near(comb.energy, 1.0, 1e-9);
+    }
 }
 
 /// A slender box of ν = 0 hits a wall end on: the same bar in three dimensions.

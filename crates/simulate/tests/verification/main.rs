@@ -3,7 +3,10 @@
 mod balls;
 mod blocks;
 mod elastic;
+mod elastic_pairs;
 mod free_body;
+mod governor;
+mod hertz;
 mod impacts;
 mod invariance;
 mod joints;
