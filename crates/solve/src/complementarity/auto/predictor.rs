@@ -18,6 +18,8 @@ const LARGE: usize = 5000;
 const SPARSE: usize = 12;
 /// Linear problems.
 const ROUNDS: usize = 3;
+/// The part of the first residual from which Newton's methods take a step or two, and end with more digits.
+const NEAR: f64 = 1e-3;
 /// Steps of multigrid for each, and to what residual.
 const STEPS: usize = 40;
 const CLOSE: f64 = 1e-6;
@@ -61,7 +63,7 @@ impl Predictor {
         let (mut f, mut values) = (vec![0.0; n], vec![0.0; pattern.len()]);
         let mut x: Vec<f64> =
             start.iter().zip(bounds()).map(|(x, (l, u))| x.max(*l).min(*u)).collect();
-        let (mut best, mut last) = (None, f64::INFINITY);
+        let (mut best, mut first, mut last) = (None, 0.0, f64::INFINITY);
         for round in 0..=ROUNDS {
             let smooth = evaluator.jacobian(&x, &mut f, &mut values);
             if !smooth || f.iter().chain(&values).any(|x| !x.is_finite()) {
@@ -77,12 +79,14 @@ impl Predictor {
             if residual > 0.5 * last {
                 return best;
             }
-            if round > 0 {
+            if round == 0 {
+                first = residual;
+            } else {
                 best = Some(x.clone());
                 self.taken = round;
             }
             last = residual;
-            if round == ROUNDS || residual == 0.0 {
+            if round == ROUNDS || residual <= NEAR * first {
                 return best;
             }
             let entries = pattern.places().zip(&values).map(|((i, j), &a)| (i, j, a));
