@@ -113,7 +113,7 @@ fn auto_takes_multigrid_where_a_matrix_is_large_sparse_and_symmetric_and_sweeps_
     assert_eq!(tried.len(), 2, "{tried:?}");
 }
 
-/// With half of the points in contact, the factor that adapts itself and Newton's method from where it leaves fail.
+/// Under such a load the sweeps before, with the factor 1 and with one that adapts itself, promise no end.
 #[test]
 fn auto_relaxes_huge_problems_of_transport_by_factors_that_stay() {
     let mut problem = transport(230, 1e-2);
