@@ -88,7 +88,7 @@
 //! | state a problem | [`FrictionLocal`], [`FrictionGlobal`], [`Lcp`], [`Mlcp`], [`Hlcp`], [`BoxLcp`], [`Mcp`] with its [`field`], [`Vi`] over a [`Set`]; [`AnyProblem`] where the kind is known only from a file |
 //! | solve it | [`solve`], [`Solve`], [`Answer`]; [`session`] for many problems of one shape, step by step, without allocation |
 //! | judge a point | [`Judged::judge`], [`Verdict`]; [`exists`] asks whether there is a solution at all |
-//! | differentiate a solution | [`Derivative::of`], with respect to any of its data, forwards and backwards |
+//! | differentiate a solution | [`Derivative::of`], with respect to any of its data, forwards and backwards; [`derivative_within`] limits |
 //! | read and write files | [`read`] a problem; [`ProblemFile`] with all that a file holds, in any of the [`FORMATS`] |
 //! | make matrices | [`Csc`], [`Bsr`], [`Dense`]: from slices, from faer, and behind features from nalgebra and sprs |
 //! | make problems | [`Planted`], with a known solution; [`Scene`], of bodies |
@@ -105,6 +105,7 @@ pub use nonsmooth_analysis::derivative;
 pub use nonsmooth_analysis::derivative::Derivative;
 #[doc(inline)]
 pub use nonsmooth_io::read;
+pub use nonsmooth_solve::derivative_within;
 
 pub use nonsmooth_io::{FORMATS, Format, Info, IoError, ProblemFile, StoredPoint, fclib, linear};
 pub use nonsmooth_linalg::{Bsr, Csc, Dense, Matrix, Operator};

@@ -320,6 +320,304 @@ fn nonlinear_complementarity_and_inequalities_over_boxes() {
     });
 }
 
+/// F of a problem over this set along a direction in F, and along one in each part of the set's data.
+fn over(
+    set: Set,
+    random: &mut Random,
+    parts: &[(&'static str, Reach)],
+) -> (AnyProblem, Vec<Along>) {
+    let n = set.dim();
+    let (a, c) = (random.definite(n), random.vector(n));
+    let c: Vec<f64> = c.iter().map(|c| 3.0 * c).collect();
+    let made = move |c: &[f64], set: Set| -> AnyProblem {
+        Vi::new(cubic(&a, c), set, vec![0.0; n]).unwrap().into()
+    };
+    let d = random.vector(n);
+    let added = {
+        let (made, c, set, d) = (made.clone(), c.clone(), set.clone(), d.clone());
+        move |h: f64| made(&moved(&c, &d, h), set.clone())
+    };
+    let mut data =
+        vec![Along { letter: "F", direction: Direction::Vector(d), problem: Box::new(added) }];
+    for &(letter, reach) in parts {
+        let mut with = |direction: Direction, change: Changed| {
+            let (made, c, set) = (made.clone(), c.clone(), set.clone());
+            let problem = move |h: f64| {
+                let mut other = set.clone();
+                change(&mut other, h);
+                made(&c, other)
+            };
+            data.push(Along { letter, direction, problem: Box::new(problem) });
+        };
+        match reach {
+            Reach::Vector(part) => {
+                let all = |set: &mut Set| -> usize {
+                    sets(set).into_iter().filter_map(part).map(|x| x.len()).sum()
+                };
+                let d = random.vector(all(&mut set.clone()));
+                let direction = Direction::Vector(d.clone());
+                let change = move |set: &mut Set, h: f64| {
+                    let entries = sets(set).into_iter().filter_map(part).flatten();
+                    entries.zip(&d).for_each(|(x, d)| *x += h * d);
+                };
+                with(direction, Box::new(change));
+            }
+            Reach::Matrix(part) => {
+                let base = part(&mut set.clone()).clone();
+                let d = random.csc(base.nrows(), base.ncols());
+                let direction = Direction::Matrix(d.clone().into());
+                let change = move |set: &mut Set, h: f64| *part(set) = plus(&base, &d, h);
+                with(direction, Box::new(change));
+            }
+        }
+    }
+    (made(&c, set), data)
+}
+
+/// What moves a set along a direction.
+type Changed = Box<dyn Fn(&mut Set, f64)>;
+
+/// Where a part of a set's data is: in each set of a product, one after the other, or in the only one.
+#[derive(Clone, Copy)]
+enum Reach {
+    Vector(fn(&mut Set) -> Option<&mut [f64]>),
+    Matrix(fn(&mut Set) -> &mut Csc),
+}
+
+/// The sets of a product.
+fn sets(set: &mut Set) -> Vec<&mut Set> {
+    match set {
+        Set::Product(all) => all.iter_mut().collect(),
+        one => vec![one],
+    }
+}
+
+const OF_LOWER: (&str, Reach) = (
+    "lower",
+    Reach::Vector(|set| if let Set::Box { lower, .. } = set { Some(lower) } else { None }),
+);
+const OF_UPPER: (&str, Reach) = (
+    "upper",
+    Reach::Vector(|set| if let Set::Box { upper, .. } = set { Some(upper) } else { None }),
+);
+const OF_B: (&str, Reach) =
+    ("b", Reach::Vector(|set| if let Set::Polyhedron { b, .. } = set { Some(b) } else { None }));
+const OF_D: (&str, Reach) =
+    ("d", Reach::Vector(|set| if let Set::Polyhedron { d, .. } = set { Some(d) } else { None }));
+const OF_CENTRE: (&str, Reach) = (
+    "centre",
+    Reach::Vector(|set| if let Set::Ball { centre, .. } = set { Some(centre) } else { None }),
+);
+const OF_RADIUS: (&str, Reach) = (
+    "radius",
+    Reach::Vector(|set| match set {
+        Set::Ball { radius, .. } => Some(std::slice::from_mut(radius)),
+        _ => None,
+    }),
+);
+/// The matrices of the first polyhedron.
+const OF_A: (&str, Reach) = (
+    "A",
+    Reach::Matrix(|set| {
+        let mut all = sets(set).into_iter();
+        all.find_map(|set| if let Set::Polyhedron { A, .. } = set { Some(A) } else { None })
+            .unwrap()
+    }),
+);
+const OF_C: (&str, Reach) = (
+    "C",
+    Reach::Matrix(|set| {
+        let mut all = sets(set).into_iter();
+        all.find_map(|set| if let Set::Polyhedron { C, .. } = set { Some(C) } else { None })
+            .unwrap()
+    }),
+);
+
+/// Constraints that hold with some room at zero, of which F makes some bind, and an equation.
+fn polyhedron(random: &mut Random, n: usize, rows: usize) -> Set {
+    let b = (0..rows).map(|_| 0.05 + 0.05 * random.next()).collect();
+    Set::Polyhedron { A: random.csc(rows, n), b, C: random.csc(1, n), d: vec![0.1] }
+}
+
+#[test]
+fn inequalities_over_polyhedra() {
+    let binding = std::cell::Cell::new(0);
+    often(|random| {
+        let set = polyhedron(random, 6, 5);
+        let (problem, data) = over(set, random, &[OF_B, OF_D, OF_A, OF_C]);
+        let answer = Solve::new().tolerance(1e-12).run(&problem).unwrap();
+        let nonsmooth::AnyCounts::Sets(counts) = answer.verdict.counts else { unreachable!() };
+        binding.set(binding.get() + counts.border);
+        check(&problem, &data).is_some()
+    });
+    assert!(binding.get() >= 8, "{}", binding.get());
+}
+
+#[test]
+fn inequalities_over_balls_and_cones() {
+    let seen = std::cell::RefCell::new(std::collections::BTreeSet::new());
+    often(|random| {
+        // Near and far, so that some hold x and some do not.
+        let ball = |random: &mut Random, radius: f64| Set::Ball {
+            centre: random.vector(3).iter().map(|c| 0.1 * c).collect(),
+            radius,
+        };
+        let cone = |dimension| Set::SecondOrderCone { dimension };
+        let parts = vec![ball(random, 0.2), cone(3), ball(random, 5.0), cone(2), cone(1), cone(4)];
+        let (problem, data) = over(Set::Product(parts), random, &[OF_CENTRE, OF_RADIUS]);
+        let answer = Solve::new().tolerance(1e-12).run(&problem).unwrap();
+        seen.borrow_mut().extend(answer.verdict.statuses.iter().map(|s| format!("{s:?}")));
+        check(&problem, &data).is_some()
+    });
+    assert_eq!(seen.borrow().len(), 3, "{:?}", seen.borrow());
+}
+
+#[test]
+fn inequalities_over_products() {
+    often(|random| {
+        let parts = vec![
+            Set::Box { lower: vec![-0.1; 3], upper: vec![0.1; 3] },
+            polyhedron(random, 4, 3),
+            Set::Ball { centre: vec![0.1; 2], radius: 0.3 },
+            Set::Product(vec![]),
+            Set::SecondOrderCone { dimension: 3 },
+            Set::Box { lower: vec![0.0; 2], upper: vec![f64::INFINITY; 2] },
+        ];
+        let all = [OF_LOWER, OF_UPPER, OF_B, OF_D, OF_A, OF_C, OF_CENTRE, OF_RADIUS];
+        let (problem, data) = over(Set::Product(parts), random, &all);
+        check(&problem, &data).is_some()
+    });
+    // Of two polyhedra the matrices have no letter.
+    often(|random| {
+        let set = Set::Product(vec![polyhedron(random, 4, 3), polyhedron(random, 3, 2)]);
+        let (problem, data) = over(set, random, &[OF_B, OF_D]);
+        check(&problem, &data).is_some()
+    });
+}
+
+/// By hand, and where pieces meet.
+#[test]
+fn sets_at_their_borders() {
+    let nearest = |set: Set, to: [f64; 2]| -> AnyProblem {
+        let rows = [format!("x1 - {:?}", to[0]), format!("x2 - {:?}", to[1])];
+        Vi::new(Expressions::parse(&rows, &[]).unwrap(), set, vec![0.0; 2]).unwrap().into()
+    };
+    let at = |problem: &AnyProblem, z: [f64; 2]| {
+        let point = LcpPoint { z: z.to_vec() }.into();
+        Derivative::of(problem, &point, 1e-8).unwrap()
+    };
+    // The point of the disk that is nearest to (3, 4): a change of F by f moves it by −(I − t tᵀ) f/5, of the radius along t.
+    let ball = |radius: f64| Set::Ball { centre: vec![0.0; 2], radius };
+    let by = at(&nearest(ball(1.0), [3.0, 4.0]), [0.6, 0.8]);
+    assert_eq!(by.degenerate, 0);
+    let along = by.forward(&[("F", Change::Vector(&[1.0, 0.0]))]).unwrap();
+    let expected = [-(1.0 - 0.36) / 5.0, 0.48 / 5.0];
+    assert!(along.part("x").unwrap().iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14));
+    let along = by.forward(&[("radius", Change::Vector(&[1.0]))]).unwrap();
+    assert!(along.part("x").unwrap().iter().zip([0.6, 0.8]).all(|(a, b)| (a - b).abs() < 1e-14));
+    // F vanishes on the border; a ball of radius zero moves with its centre.
+    assert_eq!(at(&nearest(ball(1.0), [0.6, 0.8]), [0.6, 0.8]).degenerate, 1);
+    let by = at(&nearest(ball(0.0), [3.0, 4.0]), [0.0, 0.0]);
+    assert_eq!(by.degenerate, 1);
+    let along = by.forward(&[("centre", Change::Vector(&[1.0, 2.0]))]).unwrap();
+    assert_eq!(along.part("x").unwrap(), [1.0, 2.0]);
+    // F on the border of the dual cone, at the point of the cone and on its border.
+    let cone = || Set::SecondOrderCone { dimension: 2 };
+    let by = at(&nearest(cone(), [-2.0, 1.0]), [0.0, 0.0]);
+    assert_eq!(by.degenerate, 0);
+    let along = by.forward(&[("F", Change::Vector(&[1.0, 5.0]))]).unwrap();
+    assert_eq!(
+        (along.part("x").unwrap(), along.part("F").unwrap()),
+        (&[0.0, 0.0][..], &[1.0, 5.0][..])
+    );
+    assert_eq!(at(&nearest(cone(), [-1.0, 1.0]), [0.0, 0.0]).degenerate, 1);
+    assert_eq!(at(&nearest(cone(), [1.0, 1.0]), [1.0, 1.0]).degenerate, 1);
+    // A row that holds x with no force; rows and equations that repeat each other.
+    let rows = |a: &[[f64; 2]], b: &[f64], c: &[[f64; 2]], d: &[f64]| {
+        let csc = |rows: &[[f64; 2]]| {
+            let entries: Vec<_> =
+                rows.iter().enumerate().flat_map(|(i, r)| [(i, 0, r[0]), (i, 1, r[1])]).collect();
+            Csc::from_triplets(rows.len(), 2, entries.into_iter()).unwrap()
+        };
+        Set::Polyhedron { A: csc(a), b: b.to_vec(), C: csc(c), d: d.to_vec() }
+    };
+    let corner = rows(&[[1.0, 0.0], [0.0, 1.0]], &[1.0, 1.0], &[], &[]);
+    assert_eq!(at(&nearest(corner.clone(), [2.0, 2.0]), [1.0, 1.0]).degenerate, 0);
+    assert_eq!(at(&nearest(corner, [2.0, 1.0]), [1.0, 1.0]).degenerate, 1);
+    let twice =
+        rows(&[[1.0, 0.0], [2.0, 0.0]], &[1.0, 2.0], &[[1.0, 1.0], [2.0, 2.0]], &[1.0, 2.0]);
+    let by = at(&nearest(twice, [5.0, 0.0]), [1.0, 0.0]);
+    assert_eq!(by.degenerate, 2);
+    // With respect to F it is the derivative all the same.
+    let along = by.forward(&[("F", Change::Vector(&[1.0, 5.0]))]).unwrap();
+    assert!(along.part("x").unwrap().iter().all(|x| x.abs() < 1e-14));
+}
+
+/// Of traffic on a grid of streets, whose planted equilibrium has no flow on many streets: as many equations as crossings of each stream.
+#[test]
+fn an_equilibrium_of_traffic() {
+    let traffic = nonsmooth_problem::planted::Traffic { m: 3, streams: 2, gamma: 0.3, seed: 1 };
+    let (problem, known) = traffic.vi();
+    let by = Derivative::of_vi(&problem, &known, 1e-8).unwrap();
+    let Set::Polyhedron { C, .. } = &problem.set else { unreachable!() };
+    // More demand, with the flow: what leaves a crossing less what arrives there.
+    let d: Vec<f64> = (0..C.nrows()).map(|k| 0.1 * (k as f64).sin()).collect();
+    let moved = by.forward(&[("d", Change::Vector(&d))]).unwrap();
+    let mut left = d.iter().map(|d| -d).collect::<Vec<_>>();
+    C.mul_add(1.0, moved.part("x").unwrap(), &mut left);
+    assert!(left.iter().all(|x| x.abs() < 1e-12), "{left:?}");
+}
+
+/// One factorisation is a single call into a library: it is given up at a limit, and when the flag is set.
+#[test]
+fn a_long_factorisation_ends_at_a_limit() {
+    use nonsmooth::{Limits, derivative_within};
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    let m = 32;
+    let n = m * m * m;
+    let place = |i: usize, j: usize, k: usize| (i * m + j) * m + k;
+    let mut entries = vec![];
+    for (i, j, k) in (0..n).map(|at| (at / m / m, at / m % m, at % m)) {
+        let at = place(i, j, k);
+        entries.push((at, at, 7.0));
+        for (inside, next) in [
+            (i + 1 < m, place(i + 1, j, k)),
+            (j + 1 < m, place(i, j + 1, k)),
+            (k + 1 < m, place(i, j, k + 1)),
+        ] {
+            if inside {
+                entries.extend([(at, next, -1.0), (next, at, -1.0)]);
+            }
+        }
+    }
+    let matrix = Csc::from_triplets(n, n, entries.into_iter()).unwrap();
+    let mut q = vec![0.0; n];
+    matrix.mul_add(-1.0, &vec![1.0; n], &mut q);
+    let problem: AnyProblem = Lcp::new(matrix, q).unwrap().into();
+    let point: AnyPoint = LcpPoint { z: vec![1.0; n] }.into();
+    let slack: f64 =
+        std::env::var("NONSMOOTH_SLACK").ok().and_then(|s| s.parse().ok()).unwrap_or(1.0);
+    let begun = std::time::Instant::now();
+    let limits = Limits { tolerance: 1e-8, time_limit: Some(0.1), ..Limits::default() };
+    let found = derivative_within(&problem, &point, &limits, || {}).unwrap_err();
+    assert_eq!(found, DerivativeError::Interrupted);
+    let took = begun.elapsed().as_secs_f64();
+    assert!(took < 0.11 + 0.2 * slack, "{took} s");
+    let flag = Arc::new(AtomicBool::new(false));
+    let limits = Limits { time_limit: None, cancel: Some(flag.clone()), ..limits };
+    let begun = std::time::Instant::now();
+    let mut ticks = 0;
+    let tick = || {
+        ticks += 1;
+        flag.store(ticks > 10, Ordering::Relaxed);
+    };
+    let found = derivative_within(&problem, &point, &limits, tick).unwrap_err();
+    assert_eq!(found, DerivativeError::Interrupted);
+    let took = begun.elapsed().as_secs_f64();
+    assert!(took < 0.11 + 0.2 * slack, "{took} s");
+}
+
 /// Rows with no, one and two bounds.
 fn bounds() -> Bounds {
     let inf = f64::INFINITY;
@@ -503,12 +801,6 @@ fn the_local_and_the_global_form_agree() {
 
 #[test]
 fn what_has_no_derivative_says_so() {
-    // Over a ball.
-    let field = Expressions::parse(&["x1 - 3".into(), "x2 - 4".into()], &[]).unwrap();
-    let ball = Set::Ball { centre: vec![0.0; 2], radius: 1.0 };
-    let vi: AnyProblem = Vi::new(field, ball, vec![0.0; 2]).unwrap().into();
-    let found = Derivative::of(&vi, &solution(&vi).0, 1e-8).unwrap_err();
-    assert_eq!(found, DerivativeError::NoBox);
     // More equalities than free variables, which agree with each other.
     let m = Dense::from_rows(&[[1.0], [2.0]]).unwrap();
     let over = Mlcp::rectangular(m, vec![-1.0, -2.0], 2, 1).unwrap();

@@ -2,17 +2,17 @@
 
 use nonsmooth_analysis::derivative::{Change, Derivative as Inner};
 use nonsmooth_linalg::Matrix;
-use nonsmooth_linalg::budget::Budget;
 use nonsmooth_problem::Problem as _;
-use nonsmooth_solve::guard;
+use nonsmooth_solve::{Limits, derivative_within};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Arc;
+use std::time::Instant;
 
 use crate::function::Watcher;
 use crate::problem::{Problem, point};
-use crate::wait::{ask, elsewhere};
+use crate::wait::{TICK, ask};
 use crate::{expected, mistake, numbers};
 
 /// The derivative of a solution with respect to the data; `nonsmooth.derivative` has the words.
@@ -36,9 +36,13 @@ impl Derivative {
         problem: &Bound<'_, Problem>,
         answer: &Bound<'_, PyAny>,
         tolerance: f64,
+        time_limit: Option<f64>,
     ) -> PyResult<Self> {
         if !(tolerance > 0.0 && tolerance <= 1.0) {
             return Err(expected("tol", "a number in (0, 1]", tolerance));
+        }
+        if let Some(t) = time_limit.filter(|t| t.is_nan() || *t < 0.0) {
+            return Err(expected("time_limit", "a number of seconds of at least 0", t));
         }
         let problem = problem.get();
         let file = problem.file();
@@ -47,16 +51,17 @@ impl Derivative {
         // F may be a function of Python, and a factorisation may take long.
         let watcher = Arc::new(Watcher::default());
         let watching = problem.faults.watch(&watcher);
-        let budget = Budget { cancel: Some(watcher.stop.clone()), ..Budget::default() };
-        let hear = |_: Option<()>| ask(&watcher, |_| Ok(false));
-        let small = file.problem.unknowns() <= guard::SMALL;
-        let make = move || {
-            let _scope = budget.enter();
-            Inner::of(&file.problem, &point, tolerance)
-        };
-        let made = py.detach(|| match small {
-            true => make(),
-            false => elsewhere(hear, move |_| make()),
+        let cancel = Some(watcher.stop.clone());
+        let limits = Limits { tolerance, time_limit, cancel, ..Limits::default() };
+        let made = py.detach(|| {
+            let mut asked = Instant::now();
+            let tick = || {
+                if asked.elapsed() >= TICK {
+                    asked = Instant::now();
+                    ask(&watcher, |_| Ok(false));
+                }
+            };
+            derivative_within(&file.problem, &point, &limits, tick)
         });
         drop(watching);
         if let Some(fault) = watcher.fault() {

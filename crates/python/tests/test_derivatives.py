@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import threading
+import time
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -10,6 +15,7 @@ from conftest import local, spd
 import nonsmooth as ns
 
 TOL = 1e-13
+SLACK = float(os.environ.get("NONSMOOTH_SLACK", "1"))
 H = 1e-5
 
 
@@ -154,6 +160,37 @@ def test_nonlinear_problems(seed, kind):
         ns.derivative(problem, answer, parameters=np.eye(2))
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_inequalities_over_sets(seed):
+    rng = np.random.default_rng(seed)
+    n = 11
+    M, q = unsymmetric(n, seed), 3 * rng.normal(size=n)
+
+    def make(
+        lower=np.full(2, -0.1),
+        upper=np.full(2, 0.1),
+        A=rng.normal(size=(3, 4)),
+        b=rng.uniform(0.02, 0.1, size=3),
+        C=rng.normal(size=(1, 4)),
+        d=np.array([0.05]),
+        centre=0.1 * rng.normal(size=2),
+        radius=np.array([0.3]),
+        q=q,
+    ):
+        sets = [ns.Box(lower, upper), ns.Polyhedron(A, b, C, d), ns.Ball(centre, radius[0]), ns.SecondOrderCone(3)]
+        F = lambda x: M @ x + 0.5 * x**3 + q
+        return ns.VI(F, ns.Product(sets), np.zeros(n), jac=lambda x: M + np.diag(1.5 * x**2))
+
+    data = dict(zip(make.__code__.co_varnames, make.__defaults__))
+    del data["q"]
+    answer = check(make, data, seed)
+    assert answer.counts["border"] > 0
+    by = ns.derivative(make(), answer)
+    d = rng.normal(size=n)
+    ahead, behind = (point(make(q=q + s * H * d)) for s in (1, -1))
+    np.testing.assert_allclose(by.jvp(d)["x"], (ahead.x - behind.x) / (2 * H), atol=1e-6)
+
+
 def test_an_exception_in_a_jacobian_is_raised():
     failing = False
 
@@ -167,6 +204,35 @@ def test_an_exception_in_a_jacobian_is_raised():
     failing = True
     with pytest.raises(ZeroDivisionError, match="by nothing"):
         ns.derivative(problem, answer)
+
+
+@pytest.fixture(scope="module")
+def grid():
+    """A problem whose factorisation takes a second or more in one call, with its answer."""
+    m = 32
+    one = sp.diags([-np.ones(m - 1), 2 * np.ones(m), -np.ones(m - 1)], [-1, 0, 1])
+    M = sp.csr_matrix(sp.kronsum(sp.kronsum(one, one), one) + sp.identity(m**3))
+    problem = ns.LCP(M, -(M @ np.ones(m**3)))
+    return problem, ns.solve(problem, tol=1e-10)
+
+
+def test_a_derivative_has_a_time_limit(grid):
+    begun = time.perf_counter()
+    with pytest.raises(ns.Error, match="expected time for a factorisation, found its limit"):
+        ns.derivative(*grid, time_limit=0.1)
+    assert time.perf_counter() - begun < 0.11 + 0.2 * SLACK
+    with pytest.raises(ns.Error, match="time_limit: expected a number of seconds of at least 0"):
+        ns.derivative(*grid, time_limit=-1.0)
+
+
+def test_one_ctrl_c_ends_a_derivative(grid):
+    begun = time.perf_counter()
+    timer = threading.Timer(0.1, os.kill, [os.getpid(), signal.SIGINT])
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        ns.derivative(*grid)
+    assert time.perf_counter() - begun < 0.11 + 0.2 * SLACK
+    timer.join()
 
 
 def test_degenerate_solutions_are_flagged():
@@ -183,9 +249,6 @@ def test_what_has_no_derivative_says_so():
     problem = ns.Friction(W=W, q=[-1.0, 0.0] * 2, mu=0.5, dimension=2)
     with pytest.raises(ns.Error, match="others beside it"):
         ns.derivative(problem, ns.solve(problem, warm_start=[0.5, 0.0, 0.5, 0.0]))
-    ball = ns.VI(["x1 - 3", "x2 - 4"], ns.Ball([0.0, 0.0], 1.0), [0.0, 0.0])
-    with pytest.raises(ns.Error, match="set: expected a box"):
-        ns.derivative(ball, ns.solve(ball))
     with pytest.raises(ns.Error, match="the point: expected a solution"):
         ns.derivative(local(5), ns.solve(local(5), "nsgs", max_iter=1, tol=1e-12))
     lcp = ns.LCP(np.eye(2), [-1.0, -2.0])
@@ -208,19 +271,29 @@ def test_what_has_no_derivative_says_so():
 
 def test_gradients_through_torch():
     torch = pytest.importorskip("torch")
+    M, n = unsymmetric(8, 3), 8
 
     class Solve(torch.autograd.Function):
         @staticmethod
         def forward(context, q):
-            problem = ns.LCP(np.eye(2), q.detach().numpy())
-            answer = ns.solve(problem)
-            context.at = ns.derivative(problem, answer)
-            return torch.from_numpy(answer.z)
+            problem = ns.LCP(M, q.detach().numpy())
+            answer = ns.solve(problem, tol=TOL)
+            context.at = ns.derivative(problem, answer, "q")
+            return torch.from_numpy(answer.z), torch.from_numpy(answer.w)
 
         @staticmethod
-        def backward(context, g):
-            return torch.from_numpy(context.at.vjp(z=g.numpy()))
+        @torch.autograd.function.once_differentiable
+        def backward(context, of_z, of_w):
+            return torch.from_numpy(context.at.vjp(z=of_z.numpy(), w=of_w.numpy()))
 
-    q = torch.tensor([-1.0, 1.0], dtype=torch.float64, requires_grad=True)
-    Solve.apply(q).sum().backward()
-    assert q.grad.tolist() == [-1.0, 0.0]
+    q = torch.tensor(np.random.default_rng(3).normal(size=n), requires_grad=True)
+    assert 0 < int((Solve.apply(q)[0] > 0).sum()) < n
+    assert torch.autograd.gradcheck(Solve.apply, (q,), eps=1e-6, atol=1e-6)
+    # Through what torch has before and after it.
+    loss = (Solve.apply(2.0 * q)[0] ** 2).sum()
+    loss.backward()
+    h = 1e-6
+    d = torch.tensor(np.random.default_rng(4).normal(size=n))
+    with torch.no_grad():
+        ahead, behind = (((Solve.apply(2.0 * (q + s * h * d))[0]) ** 2).sum() for s in (1, -1))
+    assert float(q.grad @ d) == pytest.approx(float(ahead - behind) / (2 * h), abs=1e-6)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import pathlib
 import re
 import subprocess
@@ -17,21 +16,43 @@ EXAMPLES = sorted((ROOT / "examples" / "python").glob("*.py"))
 BLOCK = re.compile(r"(?:<!-- needs (\w+) -->\n)?```python\n(.*?)```", re.DOTALL)
 
 
+NEEDED = [
+    (page, package)
+    for page in PAGES
+    for package in sorted({needs for needs, _ in BLOCK.findall(page.read_text(encoding="utf-8"))} - {""})
+]
+
+
+def run_snippets(page, wanted):
+    """Runs the snippets of a page in one scope, those that need another package than the wanted ones left out; how many of them."""
+    text = page.read_text(encoding="utf-8")
+    scope: dict = {"__name__": page.stem}
+    ran = 0
+    for found in BLOCK.finditer(text):
+        needs, code = found.groups()
+        if needs is None or needs == wanted:
+            line = text[: found.start(2)].count("\n")
+            exec(compile("\n" * line + code, str(page), "exec"), scope)
+            ran += needs == wanted
+    return ran
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.stem)
 def test_snippets(page, monkeypatch):
     monkeypatch.chdir(ROOT)
-    text = page.read_text(encoding="utf-8")
-    scope: dict = {"__name__": page.stem}
-    for found in BLOCK.finditer(text):
-        needs, code = found.groups()
-        if needs and importlib.util.find_spec(needs) is None:
-            continue
-        line = text[: found.start(2)].count("\n")
-        exec(compile("\n" * line + code, str(page), "exec"), scope)
+    run_snippets(page, None)
+
+
+@pytest.mark.parametrize("page, package", NEEDED, ids=lambda x: getattr(x, "stem", x))
+def test_snippets_that_need_a_package(page, package, monkeypatch):
+    pytest.importorskip(package)
+    monkeypatch.chdir(ROOT)
+    assert run_snippets(page, package) > 0
 
 
 def test_there_are_pages():
     assert len(PAGES) > 5 and len(NOTEBOOKS) == 3 and len(EXAMPLES) >= 2
+    assert {package for _, package in NEEDED} == {"torch", "jax"}
     assert sum(len(BLOCK.findall(page.read_text(encoding="utf-8"))) for page in PAGES) > 15
 
 

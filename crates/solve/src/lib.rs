@@ -30,6 +30,7 @@ pub mod bridges;
 pub mod complementarity;
 pub mod contact;
 mod core;
+mod derivative;
 pub mod diagnose;
 mod door;
 pub mod existence;
@@ -38,6 +39,7 @@ pub mod registry;
 pub mod variational;
 
 pub use self::complementarity::guarantees;
+pub use derivative::derivative_within;
 pub use door::{Answer, Kept, Solvable, Solve, solve};
 pub use multistart::{Found, multistart};
 

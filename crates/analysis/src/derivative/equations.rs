@@ -183,6 +183,9 @@ impl Equations {
         }
         let (mut of_rows, mut of_columns) = (vec![0.0; n], vec![0.0; n]);
         for _ in 0..ROUNDS {
+            if budget::over() {
+                return Err(DerivativeError::Interrupted);
+            }
             of_rows.fill(0.0);
             logarithms.iter().for_each(|&(i, j, x)| of_rows[i] -= x + of_columns[j]);
             of_rows.iter_mut().zip(&counts[0]).for_each(|(x, count)| *x /= count);
@@ -216,17 +219,10 @@ impl Equations {
             false => Some(system.into()),
         };
         let system = system.expect("a matrix with entries");
-        let scope = Budget::default().enter();
-        let done = self.lu.factorise(&system);
-        if let Some(refused) = scope.refused() {
-            return Err(DerivativeError::TooLarge(refused));
-        }
-        if budget::over() {
-            return Err(DerivativeError::Interrupted);
-        }
-        match done {
-            Ok(()) if inverse_norm(&self.lu, n) <= REGULAR => Ok(()),
-            _ => Err(DerivativeError::Singular),
+        admitted(|| self.lu.factorise(&system))?;
+        match inverse_norm(&self.lu, n) <= REGULAR {
+            true => Ok(()),
+            false => Err(DerivativeError::Singular),
         }
     }
 
@@ -267,6 +263,21 @@ impl Equations {
             }
         }
     }
+}
+
+/// A factorisation, within the memory and the time that there are.
+pub(super) fn admitted<E>(
+    factorise: impl FnOnce() -> Result<(), E>,
+) -> Result<(), DerivativeError> {
+    let scope = Budget::default().enter();
+    let done = factorise();
+    if let Some(refused) = scope.refused() {
+        return Err(DerivativeError::TooLarge(refused));
+    }
+    if budget::over() {
+        return Err(DerivativeError::Interrupted);
+    }
+    done.map_err(|_| DerivativeError::Singular)
 }
 
 /// Rounds of balancing. Each halves, at least, what units of whole kinds of rows and columns are apart.

@@ -7,6 +7,7 @@
 //! | LCP, box LCP, MLCP | z | `w = M z + q` | M | q |
 //! | HLCP | (x, s) | `Q x + R s − q` | `[Q, R]` | −q |
 //! | MCP, VI over a box | x | F(x) | JF(x) | what is added to F |
+//! | VI over another set | (x, λ) | (F, F + normals, constraints) | their derivative, see below | what is added to F, and the set's data |
 //! | local contacts | (r, λ) | (u, c) | `[W, V; Vᵀ, R]` | (q, s) |
 //! | global contacts | (v, r, λ) | `(M v − H r − G λ − f, u, c)` | `[M, −H, −G; Hᵀ, 0, 0; Gᵀ, 0, 0]` | (−f, w, b) |
 //!
@@ -16,6 +17,13 @@
 //! | a variable between its bounds, a free one, an equality; a sticking contact | `y = 0` | 0 | I | 0 |
 //! | sliding contact, `t = u_T/‖u_T‖` | `u_N = 0` | 0 | `e_Nᵀ` | 0 |
 //! | | `r_T + mu r_N t = 0` | `[mu t, I]` | `[0, mu r_N (I − t tᵀ)/‖u_T‖]` | `r_N t` |
+//!
+//! | polyhedron: a row that holds x, an equation | `a_i x − b_i = 0` | 0 | I | 0 |
+//! | | a row that does not | `λ_i = 0` | | |
+//! | ball with x on its border; cone likewise, `J = diag(1, −1, …)` | `(‖x − c‖² − r²)/2 = 0`; `xᵀJ x/2 = 0` | 0 | I | 0 |
+//! | ball or cone with x inside, cone with x at its point | `λ = 0`; `x = 0` | | |
+//!
+//! The normals of a set are `Aᵀλ + Cᵀν`, `λ (x − c)` of a ball and `−λ J x` of a cone, with `F + normals = 0` where x is no bound's.
 //!
 //! Unknowns at a bound change with it, `dx_i = dl_i`; the others by
 //!
@@ -27,14 +35,17 @@
 //! `∂p = s`, `∂S = s xᵀ`, `∂mu = cᵀ λ` (contact by contact), `∂l_i = (g_x + Sᵀ s)_i`. A matrix that stands twice in S, as H, has both gradients.
 //!
 //! Where no pair is zero on both sides, no contact is at the border of two pieces and the matrix is regular, the solution is strongly regular and this is its
-//! derivative (Robinson1980; FacchineiPang2003, section 5.4; for contacts KlarbringPang1998). At a *degenerate* solution it is that of one of the pieces that meet there: one element of the
+//! derivative (Robinson1980; FacchineiPang2003, sections 4.1 and 5.4; for contacts KlarbringPang1998). At a *degenerate* solution it is that of one of the pieces that meet there: one element of the
 //! B-subdifferential if that piece is one of the solution map's, and a directional derivative in general in no direction.
+//!
+//! Rows of a polyhedron that x is on and that follow from others count as degenerate: what moves one of them alone changes the piece, a change of F does not, so that with respect to F it is the derivative all the same.
 //!
 //! Where impulses are not unique the matrix is singular, and there is no derivative of them.
 //! Entries of matrices are data each by itself: a change of a symmetric matrix has both of a pair.
 //! Cost: a sparse factorisation of the equations that are not `x = l`; then two triangular solves a direction.
 
 mod equations;
+mod set;
 mod stated;
 
 use nonsmooth_linalg::budget::TooLarge;
@@ -73,9 +84,6 @@ pub enum DerivativeError {
     /// F has no Jacobian at the solution.
     #[error("F: expected a Jacobian at the solution, found none")]
     Undefined,
-    /// A variational inequality over another set than a box.
-    #[error("set: expected a box, or a product of boxes, found another set")]
-    NoBox,
     /// The factorisation needs more memory than there is.
     #[error(transparent)]
     TooLarge(TooLarge),
@@ -145,7 +153,7 @@ pub struct Derivative {
 impl Derivative {
     /// That of a solution of a problem of any kind.
     ///
-    /// Errors, besides: variational inequalities over other sets than boxes; rolling friction.
+    /// Errors, besides: rolling friction.
     pub fn of(
         problem: &AnyProblem,
         point: &AnyPoint,
@@ -250,11 +258,15 @@ impl Derivative {
         Self::made(stated::mcp(problem, point, tolerance)?)
     }
 
-    /// That of a solution x of a variational inequality over a box, as [`of_mcp`](Self::of_mcp).
+    /// That of a solution x of a variational inequality: of x and F(x) with respect to a constant that is added to F and to the data of the set. These are `lower`, `upper`, `b`, `d`, `centre` and
+    /// `radius`, of a product those of its parts one after the other, and `A` and `C` where there is one polyhedron.
     ///
-    /// Errors, besides: another set.
+    /// Errors, besides: an F without a Jacobian at x.
     pub fn of_vi(problem: &Vi, point: &LcpPoint, tolerance: f64) -> Result<Self, DerivativeError> {
-        Self::of_mcp(&problem.mcp().ok_or(DerivativeError::NoBox)?, point, tolerance)
+        Self::made(match problem.mcp() {
+            Some(mcp) => stated::mcp(&mcp, point, tolerance)?,
+            None => set::over(problem, point, tolerance)?,
+        })
     }
 
     /// That of a solution of a local problem: of r, u and, of scalar rows, of their impulses l and velocities c, with respect to W, q, mu, V, R, s, lower and upper.
@@ -322,8 +334,7 @@ impl Derivative {
                     self.check_length(letter, d.len())?;
                     finite(&format!("d{letter}"), d)?;
                     for part in statement.loads.iter().filter(|part| part.letter == letter) {
-                        let into = &mut load[part.range.clone()];
-                        into.iter_mut().zip(d).for_each(|(l, d)| *l += part.sign * d);
+                        part.entries.iter().for_each(|&(row, k, a)| load[row] += a * d[k]);
                     }
                     equations.columns.at_bounds(letter, d, &mut dx);
                     mu = mu.or((letter == stated::MU).then_some(d));
@@ -383,7 +394,9 @@ impl Derivative {
             let gradient = if letter == stated::MU {
                 mu.clone()
             } else if let Some(part) = statement.loads.iter().find(|part| part.letter == letter) {
-                s[part.range.clone()].iter().map(|s| part.sign * s).collect()
+                let mut gradient = vec![0.0; part.len];
+                part.entries.iter().for_each(|&(row, k, a)| gradient[k] += a * s[row]);
+                gradient
             } else {
                 equations.columns.of_bounds(letter, range.len(), &at_bounds)
             };

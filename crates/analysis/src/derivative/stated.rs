@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nonsmooth_linalg::{Csc, Matrix};
+use nonsmooth_linalg::{Csc, Matrix, budget};
 use nonsmooth_problem::check::{ContactStatus, Judged, Motion, RowStatus, VerdictOf};
 use nonsmooth_problem::field::Field;
 use nonsmooth_problem::{
@@ -57,12 +57,12 @@ impl Block {
     }
 }
 
-/// A vector of the data in p.
+/// A vector of the data in p: entries (row, k, factor) of the matrix that takes it there.
 #[derive(Debug, Clone)]
 pub(super) struct Load {
     pub(super) letter: &'static str,
-    pub(super) range: Range<usize>,
-    pub(super) sign: f64,
+    pub(super) len: usize,
+    pub(super) entries: Vec<(usize, usize, f64)>,
 }
 
 /// Where the data stand in S and p, and the parts of the solution in x and y.
@@ -72,7 +72,7 @@ pub(super) struct Statement {
     pub(super) loads: Vec<Load>,
     pub(super) contacts: usize,
     /// The variables that have bounds.
-    bounds: usize,
+    pub(super) bounds: usize,
     pub(super) parts: Vec<Part>,
 }
 
@@ -82,15 +82,16 @@ impl Statement {
         let few = |letters: &'static [&'static str], n: usize| {
             letters.iter().filter(move |_| n > 0).map(move |letter| (*letter, 0..n))
         };
-        let loads = self.loads.iter().map(|load| (load.letter, 0..load.range.len()));
+        let loads = self.loads.iter().map(|load| (load.letter, 0..load.len));
         loads.chain(few(&[MU], self.contacts)).chain(few(&[LOWER, UPPER], self.bounds))
     }
 
     fn load(&mut self, letter: &'static str, range: Range<usize>, sign: f64) {
-        self.loads.push(Load { letter, range, sign });
+        let entries = range.clone().enumerate().map(|(k, row)| (row, k, sign)).collect();
+        self.loads.push(Load { letter, len: range.len(), entries });
     }
 
-    fn part(&mut self, name: &'static str, side: Side, range: Range<usize>) {
+    pub(super) fn part(&mut self, name: &'static str, side: Side, range: Range<usize>) {
         if !range.is_empty() {
             self.parts.push(Part { name, side, range });
         }
@@ -109,40 +110,48 @@ pub(super) struct Pieces {
 
 /// S in the making.
 #[derive(Default)]
-struct Matrices {
+pub(super) struct Matrices {
     blocks: Vec<Block>,
-    entries: Vec<(usize, usize, f64)>,
+    pub(super) entries: Vec<(usize, usize, f64)>,
 }
 
 impl Matrices {
-    fn add(&mut self, letter: &'static str, matrix: &Csc, at: [usize; 2], sign: f64) {
+    pub(super) fn add(&mut self, letter: &'static str, matrix: &Csc, at: [usize; 2], sign: f64) {
         let entries = matrix.triplets();
         self.entries.extend(entries.map(|(i, j, x)| (at[0] + i, at[1] + j, sign * x)));
         let shape = [matrix.nrows(), matrix.ncols()];
         self.blocks.push(Block { letter, shape, at, transposed: false, sign });
     }
 
-    fn add_transposed(&mut self, letter: &'static str, matrix: &Csc, at: [usize; 2]) {
+    pub(super) fn add_transposed(&mut self, letter: &'static str, matrix: &Csc, at: [usize; 2]) {
         let entries = matrix.triplets();
         self.entries.extend(entries.map(|(i, j, x)| (at[0] + j, at[1] + i, x)));
         let shape = [matrix.nrows(), matrix.ncols()];
         self.blocks.push(Block { letter, shape, at, transposed: true, sign: 1.0 });
     }
 
-    fn made(self, statement: &mut Statement, m: usize, n: usize) -> Result<Csc, ProblemError> {
+    pub(super) fn made(
+        self,
+        statement: &mut Statement,
+        m: usize,
+        n: usize,
+    ) -> Result<Csc, ProblemError> {
         statement.blocks = self.blocks;
         Ok(Csc::from_triplets(m, n, self.entries.into_iter())?)
     }
 }
 
 /// The verdict on a point that is a solution.
-fn solved<P: Judged>(
+pub(super) fn solved<P: Judged>(
     problem: &P,
     point: &P::Point,
     tolerance: f64,
 ) -> Result<VerdictOf<P>, DerivativeError> {
     let verdict = problem.judge(point, tolerance)?;
     let found = verdict.measure.relative;
+    if !verdict.solved && budget::over() {
+        return Err(DerivativeError::Interrupted);
+    }
     if verdict.solved { Ok(verdict) } else { Err(DerivativeError::NotSolved { tolerance, found }) }
 }
 
@@ -277,7 +286,7 @@ pub(super) fn mcp(
 ) -> Result<Pieces, DerivativeError> {
     let verdict = solved(problem, point, tolerance)?;
     let n = problem.dim();
-    let matrix = jacobian(&*problem.F, &point.z)?;
+    let (_, matrix) = jacobian(&*problem.F, &point.z)?;
     let mut statement = Statement { bounds: n, ..Statement::default() };
     statement.load("F", 0..n, 1.0);
     statement.part("x", Side::X, 0..n);
@@ -287,7 +296,8 @@ pub(super) fn mcp(
     Ok(Pieces { statement, matrix, point, columns, pieces, degenerate })
 }
 
-fn jacobian(field: &dyn Field, x: &[f64]) -> Result<Csc, DerivativeError> {
+/// F(x) and JF(x).
+pub(super) fn jacobian(field: &dyn Field, x: &[f64]) -> Result<(Vec<f64>, Csc), DerivativeError> {
     let (n, pattern) = (field.dim(), field.pattern());
     let (mut f, mut values) = (vec![0.0; n], vec![0.0; pattern.len()]);
     let defined = field.evaluator().jacobian(x, &mut f, &mut values);
@@ -295,7 +305,8 @@ fn jacobian(field: &dyn Field, x: &[f64]) -> Result<Csc, DerivativeError> {
         return Err(DerivativeError::Undefined);
     }
     let entries = pattern.places().zip(&values).map(|((i, j), &a)| (i, j, a));
-    Ok(Csc::from_triplets(n, n, entries).map_err(ProblemError::from)?)
+    let jacobian = Csc::from_triplets(n, n, entries).map_err(ProblemError::from)?;
+    Ok((f, jacobian))
 }
 
 /// Contacts with their places in x and y, both from `first` on.

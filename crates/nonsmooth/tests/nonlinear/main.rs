@@ -201,6 +201,50 @@ fn twenty_thousand_variables_take_few_factorisations() {
     assert!(run.outcome.factorisations <= 20, "{} {:?}", run.outcome.factorisations, run.account);
 }
 
+/// `h² Δ` on the points of a grid with a reaction of each, by expressions; between bounds.
+fn reaction(m: usize, of: impl Fn(&str, f64, f64) -> String, bounds: [f64; 2]) -> Mcp {
+    let h = 1.0 / (m + 1) as f64;
+    let rows = (0..m * m).map(|k| {
+        let (i, j) = (k / m, k % m);
+        let near = [
+            (i > 0).then(|| k - m),
+            (j > 0).then(|| k - 1),
+            (j + 1 < m).then_some(k + 1),
+            (i + 1 < m).then_some(k + m),
+        ];
+        let near: String = near.into_iter().flatten().map(|k| format!(" - x{}", k + 1)).collect();
+        let x = format!("x{}", k + 1);
+        let (at, along) = ((i + 1) as f64 * h, (j + 1) as f64 * h);
+        format!("4 * {x}{near} + {:?} * ({})", h * h, of(&x, at, along))
+    });
+    let field = Expressions::parse(&rows.collect::<Vec<_>>(), &[]).unwrap();
+    let [l, u] = bounds.map(|b| vec![b; m * m]);
+    Mcp::new(field, l, u, vec![0.0; m * m]).unwrap()
+}
+
+/// Faces that Newton's methods find row of points by row of points are found by multigrid before.
+#[test]
+fn grids_with_large_faces_take_few_factorisations() {
+    let m = 141;
+    let steep = |x: &str, s: f64, t: f64| {
+        format!("5 * (exp({x}) - {:?})", 20.0 * (7.0 * s).sin() * (5.0 * t).cos())
+    };
+    let saturated = |x: &str, s: f64, t: f64| {
+        format!("50 * ({x} / (1 + abs({x})) - {:?})", 2.0 * (3.0 * s + 11.0 * t).sin())
+    };
+    for (name, problem) in [
+        ("steep", reaction(m, steep, [0.0, 0.3])),
+        ("saturated", reaction(m, saturated, [0.0, f64::INFINITY])),
+    ] {
+        let run = run(&problem, "auto", &[], &limits(1e-8));
+        assert_eq!(run.outcome.status, Status::Solved, "{name}: {:?}", run.account);
+        assert!(run.account[0].starts_with("tnnmg"), "{name}: {:?}", run.account);
+        let found = run.outcome.factorisations;
+        println!("{name}: {found} factorisations, {:?}", run.account);
+        assert!(found <= 10, "{name}: {found} {:?}", run.account);
+    }
+}
+
 #[test]
 fn time_limits_stop_every_solver() {
     let problem = Bratu { m: 100, ..Bratu::default() }.mcp();

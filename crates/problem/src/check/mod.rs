@@ -12,7 +12,7 @@ mod verdict;
 
 pub use crate::kinds::complementarity::{HlcpGauge, LinearGauge, McpGauge, RowCounts, RowStatus};
 pub use crate::kinds::contact::{ContactStatus, GlobalGauge, Impulses, Law, LocalGauge, Motion};
-pub use crate::kinds::variational::{SetCounts, SetStatus, ViGauge};
+pub use crate::kinds::variational::{Held, SetCounts, SetStatus, ViGauge};
 pub use certificate::Certificate;
 pub use existence::{Existence, Kinematic, Kinematics};
 pub use proof::{

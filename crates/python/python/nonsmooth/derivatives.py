@@ -93,6 +93,7 @@ def derivative(
     *,
     parameters: Optional[Matrix] = None,
     tol: float = 1e-6,
+    time_limit: Optional[float] = None,
 ) -> Derivative:
     """The derivative of the answer with respect to a part of the data, by its letter.
 
@@ -104,6 +105,8 @@ def derivative(
     MLCP                       u, v, w                 q, M (of all rows and variables)
     HLCP                       x, s                    q, Q, R
     MCP, VI over a box         x, F                    F (a constant added to F), lower, upper, or ``parameters``
+    VI over another set        x, F                    F, ``parameters``; lower, upper, b, d, centre, radius (of a product those of
+                                                       its parts, one after the other); A, C of one polyhedron
     Friction, local form       r, u; l, c of rows      q, mu, W; s, lower, upper, V, R
     Friction, global form      v, r, u; l, c of rows   f, w, mu, M, H; b, lower, upper, G
     ========================== ======================= ==============================================================
@@ -112,9 +115,9 @@ def derivative(
     and the derivative is one with respect to p. Entries of matrices are data each by itself: a change of a symmetric matrix has both of a pair.
 
     The judge has to accept the answer at ``tol`` (1e-6; the derivative has the accuracy of the answer, so solve with a small one). Cost: a sparse factorisation. Raises :class:`Error`
-    where there is no derivative: impulses that are not unique, sets that are no boxes.
+    where there is no derivative, as with impulses that are not unique, and where ``time_limit`` seconds of wall clock have passed; Ctrl-C ends it too.
     """
-    native = _nonsmooth.Derivative(problem._native, answer._native, tol)
+    native = _nonsmooth.Derivative(problem._native, answer._native, tol, time_limit)
     shapes = dict(native.data)
     if parameters is not None:
         if "F" not in shapes:

@@ -14,7 +14,7 @@ mod tests;
 use std::sync::Arc;
 
 pub use constraints::Constraints;
-pub use judge::{SetCounts, SetStatus, ViGauge};
+pub use judge::{Held, SetCounts, SetStatus, ViGauge};
 pub use set::Set;
 
 use super::complementarity::stated::{Part, Parts, Shape, Stated, of_jacobian, plural, x_and_f};

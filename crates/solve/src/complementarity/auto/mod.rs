@@ -12,6 +12,7 @@
 
 mod nonlinear;
 mod plan;
+mod predictor;
 
 use nonsmooth_problem::{BoxLcp, Hlcp, Lcp, Mlcp};
 use schemars::JsonSchema;

@@ -2,7 +2,7 @@
 //!
 //! Problem: `l ≤ x ≤ u ⟂ F(x)`. Method: an affine F, known by its expressions, is the linear `auto`'s, with its certificates. Others go through a plan of solvers, each from the
 //! start of the solve; what is left of time and iterations goes to perturbed starts. The first that solves the problem ends the solve. Before them a row is looked for whose sign over the whole box
-//! leaves no solution, and after the first ones have failed a proof in exact arithmetic, of the relaxation in which each nonlinear term lies between its bounds.
+//! leaves no solution, on large grids a start by multigrid (`predictor.rs`), and after the first ones have failed a proof in exact arithmetic, of the relaxation in which each nonlinear term lies between its bounds.
 //!
 //! References: Munson2002; Billups1995; the solvers' own files. Cost: that of the solvers tried. Fails: where all of them do.
 
@@ -12,6 +12,7 @@ use std::time::Instant;
 use nonsmooth_problem::{BoxLcp, LcpPoint, Mcp, Problem};
 
 use super::plan::Plan;
+use super::predictor::Predictor;
 use super::{Auto, Candidate, Portfolio};
 use crate::complementarity::parts::nonlinear::by_a_row;
 use crate::complementarity::reform::Presolve;
@@ -49,6 +50,7 @@ impl Auto {
             proof,
             refuted: None,
             searched: false,
+            predictor: Predictor::new(),
             polish: Portfolio::new(|_: &Mcp, stage| polish(stage)),
             affine: None,
         }
@@ -117,6 +119,7 @@ pub struct AutoSession {
     /// Why there is no solution, where that was found; and whether solvers were tried.
     refuted: Option<String>,
     searched: bool,
+    predictor: Predictor,
     /// Of what solves an affine problem in units of its rows, but not yet to the tolerance in those of F.
     polish: Portfolio<Mcp>,
     /// The account of the linear solve, if there was one, and whether its word was the last.
@@ -144,7 +147,19 @@ impl AutoSession {
         drop(scope);
         self.proof.clear();
         self.searched = true;
+        let given = self.predictor.start(problem, point, &limits.left(begun));
         let mut outcome = self.nonlinear.observe(problem, point, &limits.left(begun), observer)?;
+        if let Some(mut trial) = given
+            && matches!(outcome.status, Status::Stalled(_))
+        {
+            // From where the caller wanted to begin.
+            let max_iterations = limits.max_iterations.saturating_sub(outcome.iterations);
+            let left = Limits { max_iterations, ..limits.left(begun) };
+            let other = self.nonlinear.observe(problem, &mut trial, &left, observer)?;
+            if other.status == Status::Solved || other.measure.is_better_than(&outcome.measure) {
+                (*point, outcome) = (trial, other);
+            }
+        }
         if self.proof.settle(&mut outcome) {
             let why = "the bounds of the terms that are not linear leave no solution, in exact arithmetic";
             self.refuted = Some(why.into());
@@ -155,7 +170,8 @@ impl AutoSession {
     /// What was done for a problem that is not affine.
     fn nonlinear_account(&self) -> Vec<String> {
         let before = if self.searched { self.nonlinear.account() } else { vec![] };
-        before.into_iter().chain(self.refuted.clone()).collect()
+        let start = self.predictor.account().filter(|_| self.searched);
+        start.into_iter().chain(before).chain(self.refuted.clone()).collect()
     }
 }
 

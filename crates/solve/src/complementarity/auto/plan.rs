@@ -194,6 +194,19 @@ const FEW_SWEEPS: usize = 40;
 /// Steps of multigrid: on grids a dozen or two is enough, and where it gets no further it ends by itself.
 const MULTIGRID: usize = 100;
 
+/// Over-relaxation of huge matrices without symmetry, by factors that stay: what adapts goes by a relation that convection does not obey, and on a grid the right factor takes a tenth of the sweeps of one
+/// that is a little off.
+fn relaxed(plan: Plan) -> Plan {
+    [1.8, 1.6].into_iter().fold(plan, |plan, omega| {
+        let why = "not symmetric, by a factor that stays";
+        let plan = plan.anew("psor", FIXED_SWEEPS, why).with("patience", FIXED_SWEEPS);
+        plan.with("omega", omega).with("adapt", false)
+    })
+}
+
+/// Sweeps that a factor that stays may promise.
+const FIXED_SWEEPS: usize = 1200;
+
 /// Whether pivots come before any look at the class, where `size` pairs and equations are pivoted on.
 fn is_small(m: &Matrix, size: usize) -> bool {
     match m {
@@ -290,10 +303,12 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &Auto, stage: usize) -> Vec<Candid
                 .anew("newton_pfb", 200, "with patience")
         })
         .when(facts.pivotal(), |p| p.then("lemke", pivots(n), facts.class()))
+        .when(n > HUGE && facts.positive_diagonal && !facts.symmetric, relaxed)
         .when(n > HUGE, |p| p.then("psor", 3000, "sweeps cost less than factorisations"))
         .when(!facts.pivotal(), |p| {
             p.then("newton_min", 30, "from the face that sweeps have found")
         })
+        .when(n > HUGE && !facts.symmetric, |p| p.anew("newton_fb", 150, "globalised"))
         .then("ip_mehrotra", if facts.monotone() || n > DENSE { 200 } else { 50 }, facts.class())
         .then("newton_min", 300, "superlinear where it converges")
         .then("newton_fb", 500, "globalised")

@@ -113,6 +113,22 @@ fn auto_takes_multigrid_where_a_matrix_is_large_sparse_and_symmetric_and_sweeps_
     assert_eq!(tried.len(), 2, "{tried:?}");
 }
 
+/// Under such a load the sweeps before, with the factor 1 and with one that adapts itself, promise no end.
+#[test]
+fn auto_relaxes_huge_problems_of_transport_by_factors_that_stay() {
+    let mut problem = transport(230, 1e-2);
+    let h = 1.0 / 231.0;
+    for (k, q) in problem.q.iter_mut().enumerate() {
+        let (x, y) = ((k / 230 + 1) as f64 * h, (k % 230 + 1) as f64 * h);
+        *q = -20.0 * (5.0 * x).cos() * (7.0 * y).sin();
+    }
+    let answer = Solve::new().solver("auto").tolerance(1e-8).run(&problem).unwrap();
+    assert!(answer.is_solved(), "{} {:?}", answer.status, answer.account);
+    let last = answer.account.iter().rfind(|line| !line.starts_with(' ')).unwrap();
+    assert!(last.starts_with("psor") && last.contains("solved"), "{:?}", answer.account);
+    assert!(answer.factorisations == 0, "{:?}", answer.account);
+}
+
 #[test]
 fn a_session_of_auto_goes_from_one_shape_to_another_and_back() {
     // The judge's gauge goes from solver to solver, and from solve to solve.

@@ -63,6 +63,20 @@ pub struct ViGauge {
     unit: f64,
 }
 
+/// What a solution is held by: where it is the projection of, and which rows of polyhedra hold it back.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Held {
+    /// `x − γ F(x)`, whose projection x is.
+    pub from: Vec<f64>,
+    /// γ
+    pub gamma: f64,
+    /// ξ, the size of x; both as the [`ViGauge`] has them.
+    pub size: f64,
+    /// Of each part of the set that is no product the rows of `[A; C]`, ascending, whose multipliers may be other than zero: equations, and inequalities that the projection meets with a force; of dependent ones some that are
+    /// not. Empty where the part is no polyhedron.
+    pub rows: Vec<Vec<usize>>,
+}
+
 /// The part of φ at the start that φ is at least: where F vanishes with all its terms, these give no unit.
 const VANISHING: f64 = 1e-4;
 
@@ -128,6 +142,32 @@ impl ViGauge {
         moved + missed
     }
 
+    /// ξ and γ at a point where the terms of F are φ.
+    fn units(&self, x: &[f64], phi: f64) -> (f64, f64) {
+        let size = largest(x).max(self.size);
+        match (size > 0.0, phi > 0.0) {
+            (true, true) => (size, size / phi),
+            (false, true) => (phi, 1.0),
+            (true, false) => (size, 0.0),
+            // x = 0 and F = 0
+            (false, false) => (1.0, 0.0),
+        }
+    }
+
+    /// What a point is held by. `None` where F is not defined there, or the projection is not found.
+    ///
+    /// Cost: a projection, and the orthogonalisation of the rows.
+    pub fn held(&mut self, problem: &Vi, point: &LcpPoint) -> Option<Held> {
+        let x = &point.z;
+        let phi = self.look(problem, x, true)?.max(VANISHING * self.unit);
+        let (size, gamma) = self.units(x, phi);
+        if !self.natural(problem, x, gamma, 1).is_finite() {
+            return None;
+        }
+        let rows = self.projections[1].iter().map(Projection::held).collect();
+        Some(Held { from: self.from.clone(), gamma, size, rows })
+    }
+
     pub(super) fn measure(&mut self, problem: &Vi, point: &LcpPoint, precisely: bool) -> Measure {
         let (x, n) = (&point.z, problem.dim() as f64);
         if x.iter().any(|x| !x.is_finite()) {
@@ -136,14 +176,7 @@ impl ViGauge {
         let Some(phi) = self.look(problem, x, precisely) else { return Measure::never() };
         let phi = phi.max(VANISHING * self.unit);
         let absolute = self.natural(problem, x, 1.0, 0);
-        let size = largest(x).max(self.size);
-        let (xi, gamma) = match (size > 0.0, phi > 0.0) {
-            (true, true) => (size, size / phi),
-            (false, true) => (phi, 1.0),
-            (true, false) => (size, 0.0),
-            // x = 0 and F = 0
-            (false, false) => (1.0, 0.0),
-        };
+        let (xi, gamma) = self.units(x, phi);
         let relative = self.natural(problem, x, gamma, 1) / xi;
         if !(absolute.is_finite() && relative.is_finite()) {
             // Nothing projects onto an empty set.

@@ -78,6 +78,18 @@ impl Projection {
         }
     }
 
+    /// The rows that the last projection met with a force, and the equations, ascending; of dependent ones some that are not.
+    pub(in super::super) fn held(&self) -> Vec<usize> {
+        let bounds = self.rows.len() - self.equalities;
+        let pushed = self.passive.iter().copied().filter(|&k| k < bounds);
+        let all: Vec<usize> = (bounds..self.rows.len()).chain(pushed).collect();
+        let span = Span::of(all.iter().map(|&k| self.rows[k].iter().copied()));
+        let mut held: Vec<usize> =
+            all.iter().zip(&span.r).filter(|(_, r)| r.is_some()).map(|(&k, _)| k).collect();
+        held.sort_unstable();
+        held
+    }
+
     fn onto_polyhedron(&mut self, b: &[f64], d: &[f64], p: &[f64], y: &mut [f64]) -> bool {
         let Self { rows, norms, equalities, passive } = self;
         let (n, m, bounds) = (p.len(), rows.len(), rows.len() - *equalities);
