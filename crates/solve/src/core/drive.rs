@@ -210,7 +210,8 @@ impl std::fmt::Display for Status {
 pub struct Outcome {
     /// Whether it is solved and, if not, why it stopped.
     pub status: Status,
-    /// The judge's residuals of the point returned.
+    /// The judge's residuals of the point returned. Where a bound of them was enough to see that it passes ([`Problem::accept`]), that bound, larger by about the rounding of plain
+    /// arithmetic; [`Judged::judge`](nonsmooth_problem::check::Judged::judge) tells the last digits.
     pub measure: Measure,
     /// Steps done.
     pub iterations: usize,
@@ -866,6 +867,8 @@ impl<'a, P: Problem> Judge<'a, P> {
     ) -> bool {
         self.last = problem.measure(point, self.gauge);
         let (mut certified, mut tidied) = (None, false);
+        // What a bound adds to it is no part of how the residual falls.
+        let mut steered = None;
         if !self.last.passes(tolerance) {
             // What is zero but for rounding may hide how good the rest is.
             P::copy_point(point, self.tidied);
@@ -885,7 +888,11 @@ impl<'a, P: Problem> Judge<'a, P> {
             self.last.own = Some(own);
         } else if closely || self.last.passes(tolerance) {
             // What looks solved is looked at again, in doubled precision.
-            (self.last, tidied) = self.certify(problem, point, tolerance);
+            let plain = self.last.merit();
+            match problem.accept(point, self.gauge, tolerance) {
+                Some(bounds) => (self.last, steered) = (bounds, Some(plain)),
+                None => (self.last, tidied) = self.certify(problem, point, tolerance),
+            }
             certified = Some(self.last);
             if self.last.fails_own_only(tolerance) {
                 self.own = self.last.own;
@@ -904,7 +911,8 @@ impl<'a, P: Problem> Judge<'a, P> {
             P::copy_point(if tidied { self.tidied } else { point }, self.best);
         }
         let merit = self.last.merit();
-        let sample = Sample { iteration, seconds: self.meter.seconds(), relative: merit };
+        let relative = steered.unwrap_or(merit);
+        let sample = Sample { iteration, seconds: self.meter.seconds(), relative };
         self.history.note(sample, merit <= self.best_measure.merit());
         self.visited = true;
         better
@@ -912,9 +920,6 @@ impl<'a, P: Problem> Judge<'a, P> {
 
     /// The certified residuals of the point last measured, or of the same with its variables exactly on their bounds if those are better; which.
     fn certify(&mut self, problem: &P, point: &P::Point, tolerance: f64) -> (Measure, bool) {
-        if let Some(bounds) = problem.accept(point, self.gauge, tolerance) {
-            return (bounds, false);
-        }
         let mut plain = None;
         for boldly in [true, false] {
             P::copy_point(point, self.tidied);

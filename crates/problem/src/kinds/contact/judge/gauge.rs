@@ -45,8 +45,11 @@ pub(crate) struct Care<'a, F> {
     pub(crate) doubt: F,
 }
 
+/// No care: of a measurement to steer by.
+type NoCare = Care<'static, fn(usize) -> f64>;
+
 /// A measurement to steer by.
-pub(crate) const STEERING: Option<Care<'static, fn(usize) -> f64>> = None;
+pub(crate) const STEERING: Option<NoCare> = None;
 
 /// What the contact law's residual needs of a problem: `w_c` and `‖q‖`, and what stands for both where a contact is measured by itself.
 #[derive(Debug, Clone, Default)]
