@@ -2,6 +2,7 @@
 
 use nonsmooth_scenes::vec3::{Vec3, apply};
 
+use super::NONE;
 use super::contact::{Arm, Row};
 use crate::moving::Moving;
 
@@ -41,66 +42,47 @@ impl Side {
     }
 }
 
-/// For each side of a contact the side of another one that has the same free body.
-pub(super) type Shared = [Option<usize>; 2];
+/// For each side of a contact the side of another one that has the same free body, or [`NONE`].
+pub(super) type Shared = [u32; 2];
 
 /// The block of W of two contacts, a sum over the free bodies that they share. With AVX2 (found at run time) four numbers at once and the same bits: nothing is fused.
 #[inline]
 pub(super) fn coupling(own: &[Side; 2], other: &[Side; 2], shared: Shared) -> [[f64; 3]; 3] {
+    let mut sum = [[0.0; 4]; 3];
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has what the function is compiled for.
-        return unsafe { coupling_avx2(own, other, shared) };
+        unsafe { couple_avx2(&mut sum, own, other, shared) };
+        return sum.map(|[x, y, z, _]| [x, y, z]);
     }
-    let mut sum = [[0.0; 4]; 3];
-    for (left, side) in own.iter().zip(shared) {
-        if let Some(side) = side {
-            add_product(&mut sum, &left.rows, &other[side].solved);
-        }
-    }
-    sum.map(|[x, y, z, _]| [x, y, z])
-}
-
-/// The same.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn coupling_avx2(own: &[Side; 2], other: &[Side; 2], shared: Shared) -> [[f64; 3]; 3] {
-    let mut sum = [[0.0; 4]; 3];
-    for (left, side) in own.iter().zip(shared) {
-        if let Some(side) = side {
-            add_product_avx2(&mut sum, &left.rows, &other[side].solved);
-        }
-    }
-    sum.map(|[x, y, z, _]| [x, y, z])
-}
-
-/// `sum += leftᵀ right`.
-#[inline]
-fn add_product(sum: &mut [[f64; 4]; 3], left: &Columns, right: &Columns) {
-    for (left, right) in left.iter().zip(right) {
-        for i in 0..3 {
-            for j in 0..4 {
-                sum[i][j] += left[i] * right[j];
+    for (left, side) in own.iter().zip(shared).filter(|s| s.1 != NONE) {
+        for (left, right) in left.rows.iter().zip(&other[side as usize].solved) {
+            for i in 0..3 {
+                for j in 0..4 {
+                    sum[i][j] += left[i] * right[j];
+                }
             }
         }
     }
+    sum.map(|[x, y, z, _]| [x, y, z])
 }
 
-/// The same.
+/// The same, with the sum in registers.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-#[inline]
-fn add_product_avx2(sum: &mut [[f64; 4]; 3], left: &Columns, right: &Columns) {
+fn couple_avx2(sum: &mut [[f64; 4]; 3], own: &[Side; 2], other: &[Side; 2], shared: Shared) {
     use std::arch::x86_64::{
-        _mm256_add_pd, _mm256_loadu_pd, _mm256_mul_pd, _mm256_set1_pd, _mm256_storeu_pd,
+        _mm256_add_pd, _mm256_loadu_pd, _mm256_mul_pd, _mm256_set1_pd, _mm256_setzero_pd,
+        _mm256_storeu_pd,
     };
-    // SAFETY: each pointer is to an array of four numbers.
-    let mut rows = [0, 1, 2].map(|i: usize| unsafe { _mm256_loadu_pd(sum[i].as_ptr()) });
-    for (left, right) in left.iter().zip(right) {
-        // SAFETY: as above.
-        let right = unsafe { _mm256_loadu_pd(right.as_ptr()) };
-        for i in 0..3 {
-            rows[i] = _mm256_add_pd(rows[i], _mm256_mul_pd(_mm256_set1_pd(left[i]), right));
+    let mut rows = [_mm256_setzero_pd(); 3];
+    for (left, side) in own.iter().zip(shared).filter(|s| s.1 != NONE) {
+        for (left, right) in left.rows.iter().zip(&other[side as usize & 1].solved) {
+            // SAFETY: the pointer is to an array of four numbers.
+            let right = unsafe { _mm256_loadu_pd(right.as_ptr()) };
+            for i in 0..3 {
+                rows[i] = _mm256_add_pd(rows[i], _mm256_mul_pd(_mm256_set1_pd(left[i]), right));
+            }
         }
     }
     for (sum, row) in sum.iter_mut().zip(rows) {

@@ -148,11 +148,11 @@ impl Chains {
             if j == NONE {
                 return None;
             }
-            let mut shared = [None; 2];
+            let mut shared = [NONE; 2];
             for k in 0..2 {
                 if at[k] == j {
                     let side = self.side(j, own[k]);
-                    shared[k] = Some(side);
+                    shared[k] = side as u32;
                     at[k] = self.next[j as usize][side];
                 }
             }

@@ -332,4 +332,23 @@ mod tests {
         assert!(explicit.solve_linearised(&mut b, &r, &mut y, &mut v) < 1e-10);
         assert!(near(&x, &y) && near(&u, &v));
     }
+
+    /// The spread by products, which the view has, against that by entries; never above the share of directions that the unknowns leave.
+    #[test]
+    fn the_spread_by_products_is_that_by_entries() {
+        let mut last = 0.0;
+        for dofs in [40, 120, 400] {
+            let (base, _) = Planted { contacts: 60, dofs, ..Planted::default() }.local::<3>();
+            let mut state = base.state(Access::Newton).unwrap();
+            let (mut units, mut room) = (vec![], vec![]);
+            let exact = base.spread(&mut state, &mut units);
+            let (weight, center) = (vec![0.0; 60], vec![0.0; 180]);
+            let view = Regularised { base, weight, center };
+            let mut state = view.state(Access::Newton).unwrap();
+            let probed = view.spread(&mut state, &mut room);
+            assert!((probed / exact - 1.0).abs() < 0.3, "{dofs}: {probed} {exact}");
+            assert!(exact > last && exact <= (dofs as f64 / 180.0).min(1.0) * (1.0 + 1e-9));
+            last = exact;
+        }
+    }
 }
