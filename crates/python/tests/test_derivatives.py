@@ -213,7 +213,19 @@ def grid():
     one = sp.diags([-np.ones(m - 1), 2 * np.ones(m), -np.ones(m - 1)], [-1, 0, 1])
     M = sp.csr_matrix(sp.kronsum(sp.kronsum(one, one), one) + sp.identity(m**3))
     problem = ns.LCP(M, -(M @ np.ones(m**3)))
-    return problem, ns.solve(problem, tol=1e-10)
+    answer = ns.solve(problem, tol=1e-10)
+    threads = native_threads()
+    yield problem, answer
+    # What was given up ends by itself, and takes memory until then: other tests measure that.
+    begun = time.perf_counter()
+    while native_threads() > threads and time.perf_counter() - begun < 120:
+        time.sleep(0.05)
+    assert native_threads() <= threads
+
+
+def native_threads():
+    tasks = "/proc/self/task"
+    return len(os.listdir(tasks)) if os.path.exists(tasks) else 0
 
 
 def test_a_derivative_has_a_time_limit(grid):
