@@ -148,7 +148,7 @@ impl LawGauge {
                 (worst_contact, worst) = (c, share.residual);
             }
             scaled += share.residual;
-            // Plain arithmetic decides nothing: it leaves out what only decides.
+            // A measurement to steer by leaves out what only decides.
             if let Some(Care { sizes, doubt }) = &care {
                 let of_u = norm_of((D * c..D * c + D).map(|i| doubt(i) * per));
                 let left = left + law.growth() * of_u;
