@@ -411,6 +411,13 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &Auto, stage: usize) -> Vec<Can
         .when(split <= SMALL || (facts.monotone() && facts.large()), |p| {
             p.then("split/ip_mehrotra", 100, facts.class())
         })
+        .when(facts.monotone() && !facts.large() && split > SMALL, |p| {
+            p.then("newton_min", FEW_STEPS, "as long as few steps do").then(
+                "split/ip_mehrotra",
+                100,
+                facts.class(),
+            )
+        })
         .then("newton_min", 100, facts.class())
         .then("newton_fb", 200, "globalised")
         .when(finite <= 2 * EXACT && n <= EXACT, exactly)
@@ -428,6 +435,9 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &Auto, stage: usize) -> Vec<Can
 const SWEPT_BOX: usize = 8;
 /// Steps of conjugate gradients that are cheap beside pivots, over a dense matrix; over a sparse one more of them are.
 const CONJUGATE: usize = 150;
+
+/// Newton's steps after which an interior point, which takes some twenty whatever the problem, has its turn.
+const FEW_STEPS: usize = 12;
 
 pub(super) fn of_hlcp(problem: &Hlcp, settings: &Auto, stage: usize) -> Vec<Candidate> {
     match stage {
