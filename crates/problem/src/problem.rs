@@ -19,6 +19,11 @@ pub trait Problem {
     /// The number of scalar unknowns that a solver works on.
     fn unknowns(&self) -> usize;
 
+    /// What the time of a judgement grows with: the unknowns, and whatever else there is more of.
+    fn burden(&self) -> usize {
+        self.unknowns()
+    }
+
     /// The point with all parts zero, of the lengths that the problem asks for.
     fn origin(&self) -> Self::Point;
 

@@ -91,7 +91,7 @@ impl<P: Registered> Session<P> for Guarded<P> {
             None => bare(&self.name, &self.settings)?,
         };
         let unlimited = limits.time_limit.is_none() && limits.cancel.is_none();
-        if unlimited || problem.unknowns() <= guard::SMALL {
+        if unlimited || problem.burden() <= guard::SMALL {
             let outcome = session.observe(problem, point, limits, observer);
             self.session = Some(session);
             return outcome;

@@ -307,7 +307,7 @@ impl<P: Registered> Session<P> for Portfolio<P> {
     }
 
     fn account(&self) -> Vec<String> {
-        self.account.clone()
+        shortened(&self.account)
     }
 
     fn gauge(&mut self) -> Option<&mut P::Gauge> {
@@ -330,6 +330,37 @@ fn later(p: &Progress, iterations: usize, seconds: f64) -> Progress {
     }
 }
 
+/// An account in which candidates one after the other that differ by their seed alone are told by the first and the last.
+fn shortened(account: &[String]) -> Vec<String> {
+    let heads = (0..account.len()).filter(|&i| !account[i].starts_with(' '));
+    let heads: Vec<usize> = heads.chain([account.len()]).collect();
+    // A head up to its seed, and why it was tried.
+    let told = |i: usize| {
+        let (before, after) = account[i].split_once(" seed=")?;
+        let (_, because) = after.split_once(' ')?;
+        Some((before, because.split_once("):").map(|b| b.0)))
+    };
+    let mut out = vec![];
+    let mut k = 0;
+    while k + 1 < heads.len() {
+        let same = |&j: &usize| {
+            j + 1 < heads.len() && told(heads[j]).is_some() && told(heads[j]) == told(heads[k])
+        };
+        let last = (k..).take_while(same).last().unwrap_or(k);
+        out.extend_from_slice(&account[heads[k]..heads[k + 1]]);
+        if last > k + 1 {
+            out.push(format!("... {} more such starts", last - k - 1));
+        }
+        if last > k {
+            out.extend_from_slice(&account[heads[last]..heads[last + 1]]);
+        }
+        k = last + 1;
+    }
+    // What stands before the first candidate.
+    let first = heads[0];
+    account[..first].iter().cloned().chain(out).collect()
+}
+
 /// What a candidate did, for the account.
 fn sentence(candidate: &Candidate, outcome: &Outcome) -> String {
     let Candidate { name, settings, because, .. } = candidate;
@@ -344,4 +375,30 @@ fn sentence(candidate: &Candidate, outcome: &Outcome) -> String {
         other => other.to_string(),
     };
     format!("{name}{settings} ({because}): {ended} after {} iterations", outcome.iterations)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shortened;
+
+    #[test]
+    fn starts_that_differ_by_their_seed_are_told_once() {
+        let start = |seed: usize| {
+            let head = format!(
+                "semismooth restarts=false seed={seed} (from another start): no after 1 iterations"
+            );
+            [head, format!("  steps {seed}")]
+        };
+        let mut account = vec!["path (first): no after 2 iterations".to_owned(), "  steps".into()];
+        account.extend((1..=20).flat_map(start));
+        account.push("proxi (then): no after 3 iterations".into());
+        let short = shortened(&account);
+        assert_eq!(short.len(), 2 + 2 + 1 + 2 + 1, "{short:#?}");
+        assert_eq!(short[4], "... 18 more such starts");
+        assert_eq!(short[5], start(20)[0]);
+        // Few are told one by one, and so is what has no seed.
+        assert_eq!(shortened(&account[..6]), account[..6]);
+        assert!(shortened(&[]).is_empty());
+        assert_eq!(shortened(&["F is affine".into()]), ["F is affine"]);
+    }
 }

@@ -49,6 +49,15 @@ fn what_bounds_refute_is_proved() {
         (&["x1*x2 - 1", "2*x2 + 3*x3 + x2^2", "x3 - 1"], vec![free, pair, [1.0, INF]]),
         // x1 is held at its bound, and then the other row has no solution.
         (&["1 + x2^2", "x1*x2 - 1"], vec![pair, free]),
+        // Terms that together have a sign which none has: squares completed, tangents, products of bounded variables.
+        (&["x1^2 - x1 + 1"], vec![free]),
+        (&["x1^2 + x2^2 - x1*x2 - x1 + 1", "x1 - x2"], vec![free, free]),
+        (&["-(2*x1 - 3)^2 + x1*x2 - x2^2 - 20", "x2"], vec![pair, pair]),
+        (&["exp(x1) - 2*x1 - 0.5"], vec![free]),
+        (&["log(x1) - 3*x1 + 2"], vec![pair]),
+        (&["sqrt(x1) - x1 - 0.26", "x2"], vec![pair, free]),
+        (&["x1 - x3", "x2 + x3", "x1*x2 - x1 - 0.01"], vec![[0.0, 1.0], [0.0, 1.0], free]),
+        (&["abs(x1 - x2) - x1 + x2 + 0.1", "x2"], vec![free, free]),
         // Two cases, each refuted by another vector: x1 = 0, or F_1 = 0.
         (&["x2", "x2 - 1 + 0.001*cos(x3)", "x1 - 1 + 0.1*sin(x3)"], vec![pair, free, free]),
     ];

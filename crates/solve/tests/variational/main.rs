@@ -342,3 +342,56 @@ fn what_has_a_solution_is_not_refuted() {
         assert!(!known.name().contains("no_solution"), "{trial}: {known}");
     }
 }
+
+/// Random half-spaces around the origin, far more than variables, and a strongly monotone F that is not affine where `cubic` is not zero.
+fn among_many_rows(n: usize, m: usize, cubic: f64, seed: u64) -> Vi {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut number = |from: f64, to: f64| random.random_range(from..to);
+    let entries: Vec<_> = (0..m * n).map(|k| (k / n, k % n, number(-1.0, 1.0))).collect();
+    let b = (0..m).map(|_| number(0.2, 1.5)).collect();
+    let f = (0..n).map(|i| {
+        let (d, c, j) = (number(0.5, 2.0), number(-3.0, 3.0), (i + 1) % n);
+        let turn = format!("0.3*x{} - 0.3*x{}", j + 1, (i + n - 1) % n + 1);
+        let i = i + 1;
+        format!("{d}*x{i} + {turn} + {cubic}*x{i}^3 + ({c})")
+    });
+    let f = expressions(f.collect::<Vec<_>>());
+    let a = Csc::from_triplets(m, n, entries.into_iter()).unwrap();
+    Vi::new(f, Set::inequalities(a, b), vec![0.0; n]).unwrap()
+}
+
+#[test]
+fn of_many_dense_rows_those_that_matter_are_taken() {
+    for (seed, cubic) in [(1, 0.0), (2, 0.0), (3, 0.1), (4, 1.0)] {
+        let problem = among_many_rows(24, 400, cubic, seed);
+        let answer = solve("auto", &problem, 1e-10);
+        assert!(answer.is_solved(), "{seed}: {} {:?}", answer.status, answer.account);
+        let said = &answer.account[0];
+        assert!(said.starts_with("rows as they are needed"), "{seed}: {:?}", answer.account);
+        let taken: usize = said.split(' ').find_map(|word| word.parse().ok()).unwrap();
+        assert!((1..300).contains(&taken), "{said}");
+        let all = solve("multipliers/auto", &problem, 1e-10);
+        assert!(all.is_solved(), "{seed}: {}", all.status);
+        close(&answer.point.z, &all.point.z, 1e-8, "rows");
+    }
+}
+
+#[test]
+fn rows_that_contradict_each_other_among_many_have_no_solution() {
+    let problem = among_many_rows(20, 300, 0.1, 5);
+    let Set::Polyhedron { A, b, C, d } = problem.set else { unreachable!() };
+    // Row 299 once more, on the other side and beyond.
+    let twice = A.triplets().map(|(i, j, a)| if i == 298 { (i, j, 0.0) } else { (i, j, a) });
+    let opposite = A.triplets().filter(|e| e.0 == 299).map(|(_, j, a)| (298, j, -a));
+    let rows = Csc::from_triplets(300, 20, twice.chain(opposite).filter(|e| e.2 != 0.0)).unwrap();
+    let mut rhs = b;
+    rhs[298] = -rhs[299] - 0.5;
+    let set = Set::Polyhedron { A: rows, b: rhs, C, d };
+    let empty = Vi { F: problem.F, set, start: problem.start };
+    // Whether it is proved depends on how soon both rows are among those that matter; it is never called solved, and a proof is one of the whole problem.
+    let answer = Solve::new().time_limit(3.0).run(&empty).unwrap();
+    assert!(!answer.is_solved(), "{:?}", answer.account);
+    if let Status::Infeasible(proof) = &answer.status {
+        assert!(empty.verify(proof.certificate()));
+    }
+}

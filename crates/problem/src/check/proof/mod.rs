@@ -5,6 +5,7 @@
 //! data nearby, and that is all that is said: [`Evidence::Nearly`].
 
 mod cones;
+mod cuts;
 mod evidence;
 mod exact;
 mod monotone;

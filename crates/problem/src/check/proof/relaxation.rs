@@ -7,11 +7,13 @@
 //! Every solution of the problem is one of the relaxation with `y_t = N_t(x)`, so what refutes the relaxation refutes the problem, for any F. Where the bounds `l ≤ x ≤ u` have directions d that
 //! lead to infinity, one vector `y = d` over the rows says that `F(x)ᵀd < 0` on the whole set, against `F(x)ᵀd ≥ 0` at a solution; several vectors close the cases of the
 //! pairs. Without terms that are not linear nothing is relaxed. The bounds α and β are rounded outwards ([`Range`]), over a box that was first made smaller by what rows with a known sign say of
-//! single variables.
+//! single variables. Inequalities between terms and variables that always hold are rows of their own
+//! ([`cuts`]).
 
 use std::collections::BTreeMap;
 
 use super::cones::{Column, ConeSystem};
+use super::cuts::cuts;
 use super::exact::{Exact, exact, negative, rounded};
 use super::statement::bounded;
 use crate::field::{Combination, Expressions, Range, Term};
@@ -44,6 +46,8 @@ pub struct Constraint {
 const CONTRACTED: usize = 500;
 /// Rounds of contraction.
 const ROUNDS: usize = 4;
+/// Rows beyond which no cut is added: what is searched has no more.
+const ROOM: usize = 240;
 
 /// What is known of a row's sign at a solution: at least zero, at most zero.
 type Sign = [bool; 2];
@@ -101,11 +105,31 @@ impl Relaxed<'_> {
             let least = if constraint.equation { f64::NEG_INFINITY } else { 0.0 };
             bounded(&mut system, n + k, column, [least, f64::INFINITY]);
         }
+        let mut values = BTreeMap::new();
         for (term, mut column) in terms {
             let Term::Node(node) = term else { continue };
             column.retain(|(i, _)| system.wants(*i));
             let range = ranges[node.index()];
-            between(&mut system, column, [range.low, range.high]);
+            values.insert(term, between(&mut system, column, [range.low, range.high]));
+        }
+        if small && !values.is_empty() {
+            let room = ROOM.saturating_sub(system.rhs.len());
+            for cut in cuts(self.field, &rows, &lower, &upper)?.into_iter().take(room) {
+                // Σ c_t t − slack = least
+                let row = system.row(cut.least);
+                for (term, c) in cut.terms {
+                    let (origin, parts) = match term {
+                        Term::Variable(j) => system.unknowns[j].clone(),
+                        Term::Node(_) => values[&term].clone(),
+                    };
+                    system.rhs[row] -= &c * origin;
+                    for (t, factor) in parts {
+                        system.columns[t].push((row, &c * factor));
+                    }
+                }
+                let slack = system.unit(row, -1);
+                system.rays.push(slack);
+            }
         }
         for cone in &self.cones {
             // x_1 ≥ |x_j|, and of its dual cone likewise.
@@ -212,7 +236,7 @@ fn gains(old: f64, new: f64) -> bool {
 }
 
 /// The double next to a number, or the two around it.
-fn around(x: &Exact) -> Range {
+pub(super) fn around(x: &Exact) -> Range {
     let near = rounded(x);
     match exact(near) == *x {
         _ if !near.is_finite() => Range::new(f64::NEG_INFINITY, f64::INFINITY),

@@ -92,6 +92,12 @@ impl Expressions {
         terms::combinations(&self.graph, &self.rows, chosen)
     }
 
+    /// Any nodes, likewise.
+    pub(crate) fn taken_apart(&self, nodes: &[Id]) -> Option<Vec<Combination>> {
+        let all: Vec<usize> = (0..nodes.len()).collect();
+        terms::combinations(&self.graph, nodes, &all)
+    }
+
     /// Which of these pairs of rows and variables are twins, see [`Twins`], as their terms show in exact arithmetic; those that are, in their order. `None` where the limit of time that is in
     /// force for the thread comes first. Cost: the nodes of all rows, an operation on rational numbers for each.
     pub fn twins(&self, pairs: &[(usize, usize)]) -> Option<Vec<Twins>> {

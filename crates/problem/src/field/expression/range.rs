@@ -92,6 +92,11 @@ impl Range {
         }
     }
 
+    /// The natural logarithm.
+    pub(crate) fn ln(self) -> Self {
+        self.unary(Unary::Log)
+    }
+
     /// `1/x`
     fn inverse(self) -> Self {
         let at = |x: f64, side: Side| {

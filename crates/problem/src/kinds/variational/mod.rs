@@ -114,6 +114,15 @@ impl Problem for Vi {
         self.dim()
     }
 
+    /// With the rows of polyhedra, on which the judge projects.
+    fn burden(&self) -> usize {
+        let rows = |set: &Set| match set {
+            Set::Polyhedron { A, C, .. } => A.nrows() + C.nrows(),
+            _ => 0,
+        };
+        self.dim() + self.set.parts().into_iter().map(|(_, set)| rows(set)).sum::<usize>()
+    }
+
     fn origin(&self) -> LcpPoint {
         LcpPoint { z: self.start.clone() }
     }

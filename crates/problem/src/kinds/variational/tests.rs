@@ -11,11 +11,37 @@ fn projected(set: &Set, p: &[f64]) -> Option<Vec<f64>> {
     let mut y = vec![0.0; p.len()];
     for (first, set) in set.parts() {
         let range = first..first + set.dim();
-        if !Projection::new(set).onto(set, &p[range.clone()], &mut y[range]) {
+        if !Projection::new(set).onto(set, &p[range.clone()], &p[range.clone()], &mut y[range]) {
             return None;
         }
     }
     Some(y)
+}
+
+#[test]
+fn a_projection_is_the_same_wherever_it_begins() {
+    let mut random = Pcg64::seed_from_u64(9);
+    for seed in 0..20 {
+        let n = 6;
+        let set = random_polyhedron(n, seed);
+        let mut point = |size: f64| -> Vec<f64> {
+            (0..n).map(|_| size * random.random_range(-1.0..1.0)).collect()
+        };
+        let p = point(20.0);
+        let Some(known) = projected(&set, &p) else { panic!("{seed}") };
+        // From the projection itself, from another point of the border, and from anywhere.
+        let other = projected(&set, &point(20.0)).unwrap();
+        let mut projection = Projection::new(&set);
+        for x in [known.clone(), other, point(3.0), vec![f64::MAX; n]] {
+            let mut y = vec![0.0; n];
+            let q: Vec<f64> = p.iter().map(|p| p * (1.0 + 1e-15)).collect();
+            for from in [&p, &q, &p] {
+                assert!(projection.onto(&set, from, &x, &mut y), "{seed}");
+                let off = y.iter().zip(&known).map(|(a, b)| (a - b).abs());
+                assert!(off.fold(0.0, f64::max) < 1e-11, "{seed}: {y:?} {known:?}");
+            }
+        }
+    }
 }
 
 fn random_polyhedron(n: usize, seed: u64) -> Set {

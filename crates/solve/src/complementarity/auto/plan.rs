@@ -173,7 +173,7 @@ const PATIENT: usize = 10;
 /// The stage before any look at the matrix, and that of the plan by class and structure; later ones spend what time is left.
 const AT_ONCE: usize = 0;
 const BY_CLASS: usize = 1;
-/// Up to this many variables a class costs as much as a solve by pivots, of dense and of sparse matrices.
+/// Up to this many variables of a dense matrix pivots begin at zero; up to [`DENSE`] and, of sparse matrices, up to the second a class costs as much as a solve by pivots.
 const SMALL: usize = 1000;
 const SMALL_SPARSE: usize = 500;
 /// From this many variables on a few sweeps over a dense matrix are cheap beside pivots.
@@ -210,7 +210,7 @@ const FIXED_SWEEPS: usize = 1200;
 /// Whether pivots come before any look at the class, where `size` pairs and equations are pivoted on.
 fn is_small(m: &Matrix, size: usize) -> bool {
     match m {
-        Matrix::Dense(_) => size <= SMALL,
+        Matrix::Dense(_) => size <= DENSE,
         Matrix::Sparse(_) => size <= SMALL_SPARSE,
         Matrix::Operator(_) => false,
     }
@@ -245,8 +245,13 @@ fn at_once(m: &Matrix, dense_from: usize, pivoting: &'static str, size: usize) -
             p.anew("tnnmg", MULTIGRID, "large and symmetric")
         })
         .when(sweepable && large, |p| relaxed(p, 1.3, true, most))
-        // From zero: the basis that sweeps without an end leave is far from the path.
-        .when(small, |p| p.anew(pivoting, short_path(size), "small").with("restarts", 0))
+        // From zero: the basis that sweeps without an end leave is far from the path. Of larger matrices it is often near, and pivots are dear.
+        .when(small && size <= SMALL, |p| {
+            p.anew(pivoting, short_path(size), "small").with("restarts", 0)
+        })
+        .when(small && size > SMALL, |p| {
+            p.then(pivoting, short_path(size), "dense").with("restarts", 0)
+        })
 }
 
 /// Pivots from other covering vectors, with more patience each time, and all cases of few pairs.
@@ -287,7 +292,7 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &Auto, stage: usize) -> Vec<Candid
     let Some(facts) = Facts::of(&problem.M) else {
         return of_operator();
     };
-    let (n, tried) = (facts.n, is_small(&problem.M, facts.n));
+    let (n, tried) = (facts.n, facts.n <= SMALL && is_small(&problem.M, facts.n));
     // Finite for P; and a Z-matrix with a positive diagonal may well be one.
     let blocks = facts.is(Class::P) || (facts.is(Class::Z) && facts.positive_diagonal);
     let transport = facts.large() && !facts.symmetric && facts.is_not(Class::Z);
@@ -406,6 +411,13 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &Auto, stage: usize) -> Vec<Can
         .when(split <= SMALL || (facts.monotone() && facts.large()), |p| {
             p.then("split/ip_mehrotra", 100, facts.class())
         })
+        .when(facts.monotone() && !facts.large() && split > SMALL, |p| {
+            p.then("newton_min", FEW_STEPS, "as long as few steps do").then(
+                "split/ip_mehrotra",
+                100,
+                facts.class(),
+            )
+        })
         .then("newton_min", 100, facts.class())
         .then("newton_fb", 200, "globalised")
         .when(finite <= 2 * EXACT && n <= EXACT, exactly)
@@ -423,6 +435,9 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &Auto, stage: usize) -> Vec<Can
 const SWEPT_BOX: usize = 8;
 /// Steps of conjugate gradients that are cheap beside pivots, over a dense matrix; over a sparse one more of them are.
 const CONJUGATE: usize = 150;
+
+/// Newton's steps after which an interior point, which takes some twenty whatever the problem, has its turn.
+const FEW_STEPS: usize = 12;
 
 pub(super) fn of_hlcp(problem: &Hlcp, settings: &Auto, stage: usize) -> Vec<Candidate> {
     match stage {

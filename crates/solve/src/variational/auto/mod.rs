@@ -1,13 +1,15 @@
 //! **auto** for variational inequalities: the multipliers' complementarity problem where there is one, projections else and after it.
 //!
-//! Problem: find x ∈ X with `F(x)ᵀ(y − x) ≥ 0` for all y ∈ X. Method: over boxes and polyhedra the `auto` of mixed complementarity problems, on the problem itself or with multipliers as variables; then, and over
+//! Problem: find x ∈ X with `F(x)ᵀ(y − x) ≥ 0` for all y ∈ X. Method: over polyhedra of many dense rows first those rows that matter (`rows.rs`); over boxes and polyhedra the `auto` of mixed complementarity problems, on the problem itself or with multipliers as variables; then, and over
 //! other sets at once, the hyperplane projection and the extragradient method by turns, each from the best point so far. The turns come again with budgets that grow, of iterations, never of seconds, so that a run repeats itself; all share
 //! the limits of the solve, and the natural residual of the inequality judges them all. After the first turns a proof is looked for that there is no solution, in exact arithmetic: multipliers do it for boxes and polyhedra, a relaxation for cones.
 //!
 //! References: the solvers' own files; FacchineiPang2003. Cost: that of the solvers tried. Fails: where F is not monotone and the set is a ball or a cone: projections need monotone F.
 
+mod rows;
+
 use nonsmooth_linalg::budget;
-use nonsmooth_problem::{LcpPoint, Set, Vi};
+use nonsmooth_problem::{LcpPoint, Problem, Set, Vi};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +22,7 @@ use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, SettingsMap, described};
 use crate::core::trace::Trace;
 use crate::{Limits, Observer, Outcome, Sample, Session, SolveError, Status};
+use rows::Rows;
 
 /// The hyperparameters of `auto` for variational inequalities; none needs to be set.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -72,7 +75,13 @@ impl VariationalAuto {
             }
             self.plan(problem, stage)
         };
-        AutoSession { portfolio: Portfolio::new(plan), proof }
+        AutoSession {
+            portfolio: Portfolio::new(plan),
+            proof,
+            rows: Rows::default(),
+            by_rows: false,
+            iterations: self.multipliers,
+        }
     }
 
     fn plan(&self, problem: &Vi, stage: usize) -> Vec<Candidate> {
@@ -130,6 +139,11 @@ pub struct AutoSession {
     portfolio: Portfolio<Vi>,
     /// What the plan has come upon.
     proof: Refutation,
+    /// Where rows are many, and whether it ended the solve.
+    rows: Rows,
+    by_rows: bool,
+    /// Of the complementarity problem's `auto`.
+    iterations: usize,
 }
 
 impl Session<Vi> for AutoSession {
@@ -142,7 +156,18 @@ impl Session<Vi> for AutoSession {
     ) -> Result<Outcome, SolveError> {
         let begun = std::time::Instant::now();
         self.proof.clear();
-        let mut outcome = self.portfolio.observe(problem, point, limits, observer)?;
+        limits.validate()?;
+        problem.validate_point(point)?;
+        self.by_rows = false;
+        if Rows::applies(problem) {
+            let found = self.rows.observe(problem, point, limits, self.iterations, observer)?;
+            self.by_rows = found.is_some();
+            if let Some(outcome) = found {
+                return Ok(outcome);
+            }
+        }
+        let left = limits.left(begun);
+        let mut outcome = self.portfolio.observe(problem, point, &left, observer)?;
         self.proof.settle(&mut outcome);
         if matches!(outcome.status, Status::Stalled(_)) {
             let _scope = limits.budget(begun).enter();
@@ -154,18 +179,18 @@ impl Session<Vi> for AutoSession {
     }
 
     fn history(&self) -> &[Sample] {
-        self.portfolio.history()
+        if self.by_rows { self.rows.history() } else { self.portfolio.history() }
     }
 
     fn trace(&self) -> Trace {
-        self.portfolio.trace()
+        if self.by_rows { Trace::None } else { self.portfolio.trace() }
     }
 
     fn account(&self) -> Vec<String> {
-        self.portfolio.account()
+        if self.by_rows { self.rows.account() } else { self.portfolio.account() }
     }
 
     fn gauge(&mut self) -> Option<&mut <Vi as nonsmooth_problem::Problem>::Gauge> {
-        self.portfolio.gauge()
+        if self.by_rows { self.rows.gauge() } else { self.portfolio.gauge() }
     }
 }

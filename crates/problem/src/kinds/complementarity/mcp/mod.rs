@@ -6,6 +6,8 @@ mod tests;
 
 use std::sync::Arc;
 
+use nonsmooth_linalg::Matrix;
+
 pub use judge::McpGauge;
 
 use super::stated::{Part, Parts, Shape, Stated, of_jacobian, plural, x_and_f};
@@ -108,11 +110,19 @@ impl Mcp {
     /// rounding.
     pub fn affine(&self) -> Option<(BoxLcp, bool)> {
         let (matrix, q, exact) = linear(&*self.F)?;
-        let problem =
-            BoxLcp { M: matrix.into(), q, lower: self.lower.clone(), upper: self.upper.clone() };
+        let n = self.dim();
+        let full = n > FEW && 4 * matrix.nnz() >= n * n;
+        let matrix = Matrix::from(matrix);
+        // What is nearly full is cheaper to factorise as such.
+        let dense = if full { matrix.to_dense().map(Matrix::from) } else { None };
+        let M = dense.unwrap_or(matrix);
+        let problem = BoxLcp { M, q, lower: self.lower.clone(), upper: self.upper.clone() };
         Some((problem, exact))
     }
 }
+
+/// Up to this many variables it makes no difference whether a matrix is stored dense.
+const FEW: usize = 200;
 
 impl Problem for Mcp {
     type Point = LcpPoint;

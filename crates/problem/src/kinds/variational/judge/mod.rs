@@ -133,7 +133,8 @@ impl ViGauge {
         let projections = &mut projections[which];
         for ((first, set), projection) in problem.set.parts().into_iter().zip(projections) {
             let range = first..first + set.dim();
-            if !projection.onto(set, &from[range.clone()], &mut y[range.clone()]) {
+            if !projection.onto(set, &from[range.clone()], &x[range.clone()], &mut y[range.clone()])
+            {
                 return f64::INFINITY;
             }
             missed = missed.max(violation(set, &y[range]));

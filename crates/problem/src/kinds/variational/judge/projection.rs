@@ -5,7 +5,8 @@
 //!              min_u ‖[Gᵀ; hᵀ] u − e_{n+1}‖,  u_k ≥ 0 of inequalities;  s along the residual: the rows with u_k > 0 hold with equality
 //! ```
 //!
-//! There is no such y where the residual vanishes: the polyhedron is empty. Source: LawsonHanson1974, ch. 23. Cost: for k active rows `n k` operations for one that comes or goes. Those of the last projection are tried first, at the first time those that p violates, and what is not positive with all the others goes at once.
+//! There is no such y where the residual vanishes: the polyhedron is empty. Source: LawsonHanson1974, ch. 23. Cost: for k active rows `n k` operations for one that comes or goes. The rows on which a point lies that is taken to be near y are tried first, else those of the last projection, at the first time those that p violates; what is not
+//! positive with all the others goes at once. Wherever it begins it ends at y.
 
 use nonsmooth_linalg::budget;
 
@@ -22,11 +23,17 @@ pub(in super::super) struct Projection {
     norms: Vec<f64>,
     equalities: usize,
     passive: Vec<usize>,
+    /// What was projected last, with b and d, and its projection.
+    last: Option<[Vec<f64>; 4]>,
 }
+
+/// Excesses smaller than this, in units of the row's terms, are those of a row on which a point lies.
+const ON: f64 = 1e-7;
 
 impl Projection {
     pub(in super::super) fn new(set: &Set) -> Self {
-        let mut out = Self { rows: vec![], norms: vec![], equalities: 0, passive: vec![] };
+        let mut out =
+            Self { rows: vec![], norms: vec![], equalities: 0, passive: vec![], last: None };
         if let Set::Polyhedron { A, C, .. } = set {
             out.rows = vec![vec![0.0; A.ncols()]; A.nrows() + C.nrows()];
             A.triplets().for_each(|(i, j, a)| out.rows[i][j] = -a);
@@ -42,8 +49,14 @@ impl Projection {
         out
     }
 
-    /// `y = P_X(p)`. False where the set is empty, or the projection was not found.
-    pub(in super::super) fn onto(&mut self, set: &Set, p: &[f64], y: &mut [f64]) -> bool {
+    /// `y = P_X(p)`, which may be near x. False where the set is empty, or the projection was not found.
+    pub(in super::super) fn onto(
+        &mut self,
+        set: &Set,
+        p: &[f64],
+        x: &[f64],
+        y: &mut [f64],
+    ) -> bool {
         match set {
             Set::Box { lower, upper } => {
                 for i in 0..p.len() {
@@ -51,7 +64,19 @@ impl Projection {
                 }
                 true
             }
-            Set::Polyhedron { b, d, .. } => self.onto_polyhedron(b, d, p, y),
+            Set::Polyhedron { b, d, .. } => {
+                if let Some([from, of_b, of_d, to]) = &self.last
+                    && from == p
+                    && of_b == b
+                    && of_d == d
+                {
+                    y.copy_from_slice(to);
+                    return true;
+                }
+                let found = self.onto_polyhedron(b, d, p, x, y);
+                self.last = found.then(|| [p.to_vec(), b.clone(), d.clone(), y.to_vec()]);
+                found
+            }
             Set::Ball { centre, radius } => {
                 let far = distance(p, centre);
                 let share = if far > *radius { radius / far } else { 1.0 };
@@ -90,8 +115,15 @@ impl Projection {
         held
     }
 
-    fn onto_polyhedron(&mut self, b: &[f64], d: &[f64], p: &[f64], y: &mut [f64]) -> bool {
-        let Self { rows, norms, equalities, passive } = self;
+    fn onto_polyhedron(
+        &mut self,
+        b: &[f64],
+        d: &[f64],
+        p: &[f64],
+        x: &[f64],
+        y: &mut [f64],
+    ) -> bool {
+        let Self { rows, norms, equalities, passive, .. } = self;
         let (n, m, bounds) = (p.len(), rows.len(), rows.len() - *equalities);
         let rhs = b.iter().map(|b| -b).chain(d.iter().copied());
         let h = |(k, rhs): (usize, f64)| rhs / norms[k] - dot(&rows[k], p);
@@ -104,9 +136,21 @@ impl Projection {
         }
         h.iter_mut().for_each(|h| *h /= size);
         let column = |k: usize| rows[k].iter().copied().chain([h[k]]);
+        let is_on = |&k: &usize| {
+            let at = b[k] / norms[k];
+            let size = at.abs() + dot_moduli(&rows[k], x);
+            (at + dot(&rows[k], x)).abs() <= ON * size
+        };
+        let on: Vec<usize> = (0..bounds).filter(is_on).collect();
         passive.retain(|&k| k < bounds);
+        if !on.is_empty() {
+            *passive = on;
+        }
         if passive.is_empty() {
+            // The worst of them, as many as can well be independent.
             passive.extend((0..bounds).filter(|&k| h[k] > 0.0));
+            passive.sort_by(|a, b| h[*b].total_cmp(&h[*a]));
+            passive.truncate(n.div_ceil(2));
         }
         passive.extend(bounds..m);
         let mut u = vec![0.0; m];
@@ -205,6 +249,19 @@ fn dot(x: &[f64], y: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
+/// `Σ |x_i y_i|`, likewise.
+fn dot_moduli(x: &[f64], y: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a, b) = (x.chunks_exact(8), y.chunks_exact(8));
+    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(x, y)| (x * y).abs()).sum();
+    for (x, y) in a.zip(b) {
+        for k in 0..8 {
+            sums[k] += (x[k] * y[k]).abs();
+        }
+    }
+    sums.iter().sum::<f64>() + rest
+}
+
 /// Columns one after the other: orthonormal ones with the same span as far as they are independent, and R by columns; of dependent ones none.
 struct Span {
     q: Vec<Vec<f64>>,
@@ -280,15 +337,20 @@ impl Span {
         let mut x: Vec<f64> = column.collect();
         let before = norm(&x);
         let mut along = vec![0.0; q.len()];
-        // Twice is enough.
+        // Twice is enough, and once where little cancels.
+        let mut left = before;
         for _ in 0..2 {
+            let size = left;
             for (q, along) in q.iter().zip(&mut along) {
                 let c = dot(q, &x);
                 x.iter_mut().zip(q).for_each(|(x, q)| *x -= c * q);
                 *along += c;
             }
+            left = norm(&x);
+            if left > 0.7 * size {
+                break;
+            }
         }
-        let left = norm(&x);
         if left <= DEPENDENT * before {
             r.push(None);
             return;
