@@ -71,6 +71,13 @@ fn turn(key: &str, [x, y, _]: Vec3) -> Result<(), SimulateError> {
     require(|| key.into(), x.abs() + y.abs(), x == 0.0 && y == 0.0, expected)
 }
 
+/// Of a force of a scene in the plane.
+pub(crate) fn force(key: &str, force: Vec3, torque: Vec3, at: Vec3) -> Result<(), SimulateError> {
+    flat(&format!("{key}.force"), force)?;
+    turn(&format!("{key}.torque"), torque)?;
+    flat(&format!("{key}.at"), at)
+}
+
 fn rotation(key: &str, [_, x, y, _]: [f64; 4]) -> Result<(), SimulateError> {
     let expected = "a rotation about the third axis, for the world is a plane";
     require(|| key.into(), x.abs() + y.abs(), x == 0.0 && y == 0.0, expected)

@@ -20,7 +20,7 @@ use crate::{
 /// Bodies that overlap by more than this share of the smaller one are refused at the start.
 const OVERLAP: f64 = 1e-6;
 
-/// Forces (N) and torques about the mass centre (N·m) on all bodies, in the world frame.
+/// Forces (N) and torques about the mass centre (N·m) on all bodies, in the world frame; in a plane what acts across it is without effect.
 #[derive(Debug, Clone, Default)]
 pub struct Wrenches {
     pub(crate) force: Vec<Vec3>,

@@ -528,6 +528,8 @@ fn what_a_scene_in_the_plane_cannot_have_is_named_by_its_place() {
         ("joints[0].axis=[1, 0]", "joints[0] (pin).axis: expected the third axis"),
         ("joints[0].kind=prismatic", "joints[0] (pin).axis: expected a direction in the plane"),
         ("generate=[{ scene = \"wall\" }]", "generate[0]: expected none in the plane"),
+        ("forces[0].force=[0, 0, 1]", "forces[0].force: expected 0"),
+        ("forces[0].torque=[1, 0, 0]", "forces[0].torque: expected 0"),
         ("pairs_default.mu_rolling=0.1", "law.mu_r: expected 0 in the plane"),
     ] {
         let said = said(change);

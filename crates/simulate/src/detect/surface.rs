@@ -67,6 +67,7 @@ pub(crate) struct Scratch {
     pub(super) other: Thin,
     near: Vec<u32>,
     pub(super) pairs: Vec<(u32, u32)>,
+    pub(super) stack: Vec<(u32, u32)>,
     pub(super) found: Vec<([Feature; 2], Witness)>,
 }
 

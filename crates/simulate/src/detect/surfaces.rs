@@ -25,6 +25,9 @@ const NEARER: [f64; 2] = [0.5, 0.05];
 /// Edges that are parallel up to this have no common normal.
 const PARALLEL: f64 = 1e-6;
 
+/// Pairs of triangles, or of nodes of two trees.
+type Pairs = Vec<(u32, u32)>;
+
 /// A surface with the pose of its body.
 type Placed<'a> = (&'a Surface, &'a Pose);
 
@@ -38,8 +41,8 @@ pub(crate) fn collide(
 ) {
     let back = std::array::from_fn(|i| std::array::from_fn(|j| a_pose.r[j][i]));
     let relative = Pose { x: a_pose.local_point(b_pose.x), r: product(&back, &b_pose.r) };
-    let Scratch { thin, other, pairs, found: list, .. } = scratch;
-    near(a, b, &relative, prediction, pairs);
+    let Scratch { thin, other, pairs, stack, found: list, .. } = scratch;
+    near(a, b, &relative, prediction, (pairs, stack));
     let thin_body = a.thickness.min(b.thickness);
     let mut last = u32::MAX;
     for &(t, u) in &*pairs {
@@ -76,7 +79,13 @@ pub(crate) fn collide(
 }
 
 /// The triangles whose boxes are within `margin` of each other, in order; `pose` is that of b in the frame of a.
-fn near(a: &Surface, b: &Surface, pose: &Pose, margin: f64, out: &mut Vec<(u32, u32)>) {
+fn near(
+    a: &Surface,
+    b: &Surface,
+    pose: &Pose,
+    margin: f64,
+    (out, stack): (&mut Pairs, &mut Pairs),
+) {
     let carried = |bounds: &Aabb| {
         let middle = pose.point(std::array::from_fn(|d| 0.5 * (bounds.low[d] + bounds.high[d])));
         let half: Vec3 = std::array::from_fn(|d| 0.5 * (bounds.high[d] - bounds.low[d]));
@@ -88,7 +97,8 @@ fn near(a: &Surface, b: &Surface, pose: &Pose, margin: f64, out: &mut Vec<(u32, 
         }
     };
     out.clear();
-    let mut stack = vec![(0_u32, 0_u32)];
+    stack.clear();
+    stack.push((0, 0));
     while let Some((i, j)) = stack.pop() {
         let (p, q) = (&a.tree[i as usize], &b.tree[j as usize]);
         if !p.bounds.meets(&carried(&q.bounds)) {

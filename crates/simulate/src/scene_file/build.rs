@@ -118,6 +118,9 @@ fn acting(
     for (name, vector) in [("force", force), ("torque", torque), ("at", at)] {
         finite(|| format!("{key}.{name}"), &vector)?;
     }
+    if world.dimension == Dimension::Two {
+        crate::planar::force(key, force, torque, at)?;
+    }
     let (from, until) =
         (table.from.unwrap_or(f64::NEG_INFINITY), table.until.unwrap_or(f64::INFINITY));
     if from.is_nan() || until.is_nan() || from >= until {

@@ -108,8 +108,12 @@ impl Start {
         let start = state.pose(k);
         let free = body.is_free();
         let weight = if free { scale(body.mass, world.gravity) } else { [0.0; 3] };
-        let push = add(weight, add(body.force, self.wrenches.force[k]));
-        let twist = add(body.torque, self.wrenches.torque[k]);
+        let mut push = add(weight, add(body.force, self.wrenches.force[k]));
+        let mut twist = add(body.torque, self.wrenches.torque[k]);
+        if world.dimension == Dimension::Two {
+            // What a force would do across the plane is taken by the plane.
+            (push[2], twist[0], twist[1]) = (0.0 * push[2], 0.0 * twist[0], 0.0 * twist[1]);
+        }
         let omega = apply(&start.r, state.spin[k]);
         let spin = if built.isotropic { omega } else { state.spin[k] };
         let mut b = Moving {

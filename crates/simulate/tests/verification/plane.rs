@@ -6,7 +6,7 @@ use nonsmooth_problem::Friction;
 use nonsmooth_scenes::Rotation;
 use nonsmooth_simulate::{
     Body, BodyId, Control, Coordinate, Drive, Joint, JointKind, JointLimits, Law, MoreauJean,
-    Motor, Part, Polygon, Shape, Simulation, StepReport, World, plane,
+    Motor, Part, Polygon, Shape, Simulation, State, StepReport, StepStatus, World, Wrenches, plane,
 };
 
 use crate::{G, frozen, near, omega, run, simulation, v, x};
@@ -86,6 +86,24 @@ fn a_rocking_block_loses_what_housner_says() {
         s.step(1e-6).unwrap();
         near(omega(&s, b)[2], spin * eta, 1e-6);
     }
+}
+
+#[test]
+fn a_force_across_the_plane_is_without_effect() {
+    let mut world = flat(0.5, 0.0);
+    world.add(Body::ground());
+    let b = world.add(block([0.2, 0.1]).at([0.0, 0.5, 0.0]));
+    let across = move |_: &State, w: &mut Wrenches| {
+        w.force(b, [0.0, 0.0, 3.0]);
+        w.torque(b, [1.0, 2.0, 0.0]);
+    };
+    let mut s = simulation(world).with_force(across);
+    run(&mut s, 0.5, 1e-3);
+    assert_eq!((x(&s, b)[2], v(&s, b)[2]), (0.0, 0.0));
+    assert_eq!(omega(&s, b)[..2], [0.0; 2]);
+    let nan = move |_: &State, w: &mut Wrenches| w.force(b, [0.0, 0.0, f64::NAN]);
+    let mut s = s.with_force(nan);
+    assert_eq!(s.step(1e-3).unwrap().status, StepStatus::NotFinite);
 }
 
 #[test]
@@ -322,7 +340,8 @@ fn what_the_plane_does_not_have_is_refused_by_its_place() {
         Simulation::new(world, MoreauJean::default()).err().expect("refused").to_string()
     };
     let solid = || Body::solid(Shape::Sphere { radius: 0.1 }, 1.0).unwrap();
-    let cases: [(&dyn Fn(&mut World), &str); 9] = [
+    type Change<'a> = &'a dyn Fn(&mut World);
+    let cases: [(Change, &str); 9] = [
         (
             &|w| {
                 w.add(solid().at([3.0, 1.0, 0.0]));
