@@ -45,6 +45,31 @@ fn every_scene_has_a_test() {
     assert!(count >= 10);
 }
 
+/// The threshold of friction between logs is tan 15°.
+#[test]
+fn a_log_pile_stands_just_above_its_friction_and_falls_just_below() {
+    let top = |simulation: &Simulation| simulation.state().position[place(simulation, "top")];
+    let (stands, _) = run("log_pile", |_, _| {});
+    let start = 0.2 + 0.2 * 3.0_f64.sqrt();
+    assert!((top(&stands)[1] - start).abs() < 1e-9, "{:?}", top(&stands));
+    assert!(stands.state().velocity.iter().flatten().all(|v| v.abs() < 1e-8));
+    let text = include_str!("../../../examples/scenes/log_pile.toml");
+    let scene = SceneFile::parse(text, &["pairs[0].mu=0.26785"]).unwrap();
+    let mut falls = scene.build().unwrap();
+    let report = falls.run(scene.time.end, scene.time.h, &mut ()).unwrap();
+    assert!(report.is_solved() && top(&falls)[1] < start - 1e-3, "{:?}", top(&falls));
+}
+
+#[test]
+fn dominoes_fall_on_each_other() {
+    let (simulation, _) = run("dominoes", |_, _| {});
+    for k in 1..=5 {
+        let [w, _, _, z] = simulation.state().rotation[place(&simulation, &format!("domino {k}"))];
+        let angle = 2.0 * z.atan2(w);
+        assert!(-2.0 < angle && angle < -0.5, "{k}: {angle}");
+    }
+}
+
 /// Its centre goes v²/(2 mu g), and it leans by millimetres on the way, and sways a little at the end.
 #[test]
 fn a_rubber_block_slides_to_a_stop() {

@@ -67,7 +67,7 @@ fn drawn(
 ) -> PyResult<String> {
     let playback = nonsmooth_record::playback(trajectory, scene, world);
     let picture = playback.picture(frame).map_err(mistake)?;
-    svg(&picture, &Drawing::default()).map_err(mistake)
+    svg(&picture, &Drawing { view: playback.view, ..Drawing::default() }).map_err(mistake)
 }
 
 /// A world in motion; `nonsmooth.Simulation` has the words.
@@ -499,7 +499,9 @@ impl Run {
                     nonsmooth_io::vtk::write(&path, &self.trajectory, &meshes()?).map_err(mistake)
                 }
                 "glb" => {
-                    nonsmooth_io::gltf::write(&path, &self.trajectory, &meshes()?).map_err(mistake)
+                    let world = self.scene.world().map_err(mistake)?;
+                    let upright = nonsmooth_record::upright(&self.trajectory, &world);
+                    nonsmooth_io::gltf::write(&path, &upright, &meshes()?).map_err(mistake)
                 }
                 _ => Err(expected(
                     &path.display().to_string(),

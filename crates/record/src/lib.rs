@@ -7,14 +7,16 @@ mod origin;
 
 pub use origin::{Origin, OriginError};
 
+use std::borrow::Cow;
+
 use nonsmooth_io::Mesh;
 use nonsmooth_io::trajectory::{Contact, Energy, Frame, Joint, Named, State, Step, Trajectory};
 use nonsmooth_scenes::draw::playback::{self, Drawn, Form, Moment, Placed, Playback};
-use nonsmooth_scenes::draw::{Pose, Touch};
+use nonsmooth_scenes::draw::{Pose, Touch, View};
 use nonsmooth_scenes::vec3::{Vec3, mean, sub};
 use nonsmooth_scenes::{Rotation, SceneError};
 use nonsmooth_simulate::{
-    ContactReport, Elastic, JointReport, SceneFile, Shape, Simulation, StepReport, World,
+    ContactReport, Dimension, Elastic, JointReport, SceneFile, Shape, Simulation, StepReport, World,
 };
 
 /// The trajectory of a run that has not begun: the scene, bodies and joints by their names.
@@ -167,8 +169,64 @@ pub fn csv(trajectory: &Trajectory) -> String {
     text
 }
 
+/// A run of a world in the plane as pictures show it: the plane stands, its second axis upwards. That of a world in space as it is.
+pub fn upright<'a>(trajectory: &'a Trajectory, world: &World) -> Cow<'a, Trajectory> {
+    if world.dimension == Dimension::Three {
+        return Cow::Borrowed(trajectory);
+    }
+    let stand = |x: &mut Vec3| *x = [x[0], -x[2], x[1]];
+    let quarter = Rotation::about([1.0, 0.0, 0.0], std::f64::consts::FRAC_PI_2);
+    let mut turned = trajectory.clone();
+    for frame in &mut turned.frames {
+        for State { position, rotation, velocity, angular_velocity } in &mut frame.bodies {
+            [position, velocity, angular_velocity].into_iter().for_each(stand);
+            *rotation = quarter.after(Rotation(*rotation)).0;
+        }
+        for contact in &mut frame.contacts {
+            stand(&mut contact.point);
+            contact.frame.iter_mut().for_each(stand);
+        }
+        for joint in &mut frame.joints {
+            [&mut joint.impulse, &mut joint.moment].into_iter().for_each(stand);
+        }
+    }
+    Cow::Owned(turned)
+}
+
+/// A prism on a polygon of the plane, `half` thick to both sides.
+fn slab(corners: &[[f64; 2]], half: f64) -> Form {
+    let n = corners.len();
+    let at = |z: f64| corners.iter().map(move |&[x, y]| [x, y, z]);
+    let side = |k: usize| vec![k, (k + 1) % n, n + (k + 1) % n, n + k];
+    let ends = [(0..n).rev().collect(), (n..2 * n).collect()];
+    Form::Polyhedron {
+        vertices: at(-half).chain(at(half)).collect(),
+        faces: ends.into_iter().chain((0..n).map(side)).collect(),
+    }
+}
+
+/// A rounded segment of the plane as a polygon.
+fn stadium(half_length: f64, radius: f64) -> Vec<[f64; 2]> {
+    const STEPS: usize = 16;
+    let around = |k: usize| {
+        let end = k / (STEPS + 1);
+        let angle = std::f64::consts::PI * ((k - end) as f64 / STEPS as f64 - 0.5);
+        let (s, c) = angle.sin_cos();
+        [radius * c + if end == 0 { half_length } else { -half_length }, radius * s]
+    };
+    (0..2 * (STEPS + 1)).map(around).collect()
+}
+
+/// How thick shapes of the plane are drawn to both sides, m.
+fn thickness(world: &World) -> f64 {
+    let radii = world.bodies.iter().flat_map(|b| &b.parts).map(|part| part.shape.radius());
+    let least = radii.filter(|r| r.is_finite()).fold(f64::INFINITY, f64::min);
+    if least.is_finite() { 0.3 * least } else { 1.0 }
+}
+
 /// The shapes of a world, as they are drawn.
 fn drawn(world: &World) -> Vec<Drawn> {
+    let thick = thickness(world);
     let form = |shape: &Shape| match shape {
         Shape::Sphere { radius } => Form::Sphere { radius: *radius },
         Shape::Box { half } => Form::Box { half: *half },
@@ -176,6 +234,9 @@ fn drawn(world: &World) -> Vec<Drawn> {
             Form::Capsule { half_length: *half_length, radius: *radius }
         }
         Shape::Plane => Form::Plane,
+        Shape::Disc { radius } => Form::Cylinder { half_length: thick, radius: *radius },
+        Shape::Polygon(p) => slab(p.vertices(), thick),
+        Shape::Stadium { half_length, radius } => slab(&stadium(*half_length, *radius), thick),
         Shape::Polyhedron(p) => {
             Form::Polyhedron { vertices: p.vertices().to_vec(), faces: p.faces().to_vec() }
         }
@@ -190,15 +251,28 @@ fn drawn(world: &World) -> Vec<Drawn> {
             Form::Mesh { vertices: mesh.vertices().to_vec(), faces }
         }
     };
-    let placed = |part: &nonsmooth_simulate::Part| Placed {
-        form: form(&part.shape),
+    let placed = |part: &nonsmooth_simulate::Part, form: Form| Placed {
+        form,
         position: part.position,
         rotation: part.rotation,
+    };
+    // A disc has a bar, so that one sees it turn.
+    let bar = |part: &nonsmooth_simulate::Part| match part.shape {
+        Shape::Disc { radius } => {
+            let half = [0.7 * radius, 0.08 * radius, 1.05 * thick];
+            Some(placed(part, Form::Box { half }))
+        }
+        _ => None,
     };
     let bodies = world.bodies.iter().map(|body| Drawn {
         name: body.name.clone(),
         fixed: !body.is_free(),
-        parts: body.parts.iter().map(placed).collect(),
+        parts: body
+            .parts
+            .iter()
+            .flat_map(|part| [Some(placed(part, form(&part.shape))), bar(part)])
+            .flatten()
+            .collect(),
     });
     let solids = world.elastic.iter().zip(elastic_names(world)).map(|(elastic, name)| {
         let (nodes, faces) = elastic.solid.skin();
@@ -214,6 +288,12 @@ fn drawn(world: &World) -> Vec<Drawn> {
 
 /// What plays a trajectory of a world; its title is the scene's.
 pub fn playback(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Playback {
+    let trajectory = &*upright(trajectory, world);
+    let view = match world.dimension {
+        Dimension::Three => View::default(),
+        // From the front, a little from above.
+        Dimension::Two => View { azimuth: -90.0, elevation: 8.0, distance: 8.0 },
+    };
     let pose =
         |s: &State| Pose { position: s.position, rotation: s.rotation, velocity: s.velocity };
     let touch = |c: &Contact| Touch {
@@ -244,6 +324,7 @@ pub fn playback(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Pl
     });
     Playback {
         title: scene.name.clone(),
+        view,
         bodies: drawn(world),
         frames: frames.collect(),
         energy: energy.collect(),

@@ -10,6 +10,7 @@ use std::cmp::Reverse;
 
 use nonsmooth_linalg::{Bsr, budget};
 use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem, RollingLocal};
+use nonsmooth_solve::registry::Registered;
 use nonsmooth_solve::settings::SettingsMap;
 use nonsmooth_solve::{Limits, Outcome, Session, SolveError, Status, registry};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -51,22 +52,26 @@ pub(crate) struct Asked {
 }
 
 /// One contact problem, its start and its solution.
-pub(crate) struct Slot {
-    pub problem: FrictionLocal<3>,
+pub(crate) struct Slot<const D: usize> {
+    pub problem: FrictionLocal<D>,
     /// The same with rolling friction, where a contact has any: then the point is of this one.
     pub rolling: Option<RollingLocal>,
     pub point: LocalPoint,
     pub asked: Asked,
     /// What came of it; nothing where the problem is not finite.
     pub outcome: Option<Result<Outcome, SolveError>>,
-    own: Option<Sessions>,
+    own: Option<Sessions<D>>,
 }
 
-impl Slot {
+impl<const D: usize> Slot<D>
+where
+    FrictionLocal<D>: Registered<Point = LocalPoint>,
+{
     pub fn new() -> Result<Self, SimulateError> {
-        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let one = |i: usize, j: usize| f64::from(u8::from(i == j));
+        let identity = std::array::from_fn(|i| std::array::from_fn(|j| one(i, j)));
         let w = Bsr::from_rows(1, &[vec![(0, identity)]]);
-        let problem = FrictionLocal::new(w, vec![0.0; 3], vec![0.0]).map_err(SolveError::from)?;
+        let problem = FrictionLocal::new(w, vec![0.0; D], vec![0.0]).map_err(SolveError::from)?;
         let point = problem.origin();
         let asked = Asked::default();
         Ok(Self { problem, rolling: None, point, asked, outcome: None, own: None })
@@ -76,7 +81,7 @@ impl Slot {
         self.problem.mu.len() > SMALL
     }
 
-    fn solve(&mut self, sessions: &mut Sessions, inner: &Inner) {
+    fn solve(&mut self, sessions: &mut Sessions<D>, inner: &Inner) {
         self.outcome = sessions.solve(self, inner).transpose();
     }
 
@@ -90,21 +95,24 @@ impl Slot {
 }
 
 /// The sessions that solve one problem after the other.
-struct Sessions {
-    law: Box<dyn Session<FrictionLocal<3>>>,
+pub(crate) struct Sessions<const D: usize> {
+    law: Box<dyn Session<FrictionLocal<D>>>,
     /// Made where it is first needed.
     rolling: Option<Box<dyn Session<RollingLocal>>>,
     /// Made where it is first asked.
-    relaxation: Option<Box<dyn Session<FrictionLocal<3>>>>,
+    relaxation: Option<Box<dyn Session<FrictionLocal<D>>>>,
 }
 
-impl Sessions {
+impl<const D: usize> Sessions<D>
+where
+    FrictionLocal<D>: Registered<Point = LocalPoint>,
+{
     fn new(inner: &Inner) -> Result<Self, SolveError> {
         let law = registry::session(inner.solver, inner.settings)?;
         Ok(Self { law, rolling: None, relaxation: None })
     }
 
-    fn solve(&mut self, slot: &mut Slot, inner: &Inner) -> Result<Option<Outcome>, SolveError> {
+    fn solve(&mut self, slot: &mut Slot<D>, inner: &Inner) -> Result<Option<Outcome>, SolveError> {
         let Slot { problem, rolling, point, asked, .. } = slot;
         let limits = |most: usize| Limits {
             max_iterations: inner.limits.max_iterations.min(most),
@@ -138,13 +146,12 @@ impl Sessions {
     }
 }
 
-/// Threads with their sessions.
+/// The threads.
 pub(crate) struct Crew {
     /// As asked for.
     pub threads: usize,
     /// None where the calling thread works alone.
     pool: Option<ThreadPool>,
-    sessions: Vec<Sessions>,
 }
 
 impl Crew {
@@ -153,7 +160,7 @@ impl Crew {
         let pool = || ThreadPoolBuilder::new().num_threads(threads).build().ok();
         let pool = if threads == 1 { None } else { pool() };
         let pool = pool.filter(|p| p.current_num_threads() > 1);
-        Self { threads, pool, sessions: vec![] }
+        Self { threads, pool }
     }
 
     /// The threads, where there are more than the calling one.
@@ -161,18 +168,22 @@ impl Crew {
         self.pool.as_ref()
     }
 
-    /// Solves the `open` ones of the slots, in ascending order. Each keeps its outcome, errors too.
+    /// Solves the `open` ones of the slots, in ascending order; small ones by the `sessions`, one a thread, which are made where they are needed. Each keeps its
+    /// outcome, errors too.
     ///
     /// Errors: a solver that does not exist.
-    pub fn solve(
-        &mut self,
-        slots: &mut [Slot],
+    pub fn solve<const D: usize>(
+        &self,
+        (slots, sessions): (&mut [Slot<D>], &mut Vec<Sessions<D>>),
         open: &[u32],
         inner: &Inner,
-    ) -> Result<(), SimulateError> {
+    ) -> Result<(), SimulateError>
+    where
+        FrictionLocal<D>: Registered<Point = LocalPoint>,
+    {
         let threads = self.pool.as_ref().map_or(1, ThreadPool::current_num_threads);
-        while self.sessions.len() < threads {
-            self.sessions.push(Sessions::new(inner)?);
+        while sessions.len() < threads {
+            sessions.push(Sessions::new(inner)?);
         }
         for &k in open {
             let slot = &mut slots[k as usize];
@@ -185,13 +196,14 @@ impl Crew {
                 let slot = &mut slots[k as usize];
                 match slot.is_large() {
                     true => slot.solve_alone(inner),
-                    false => slot.solve(&mut self.sessions[0], inner),
+                    false => slot.solve(&mut sessions[0], inner),
                 }
             }
             return Ok(());
         };
         let mut next = open.iter().peekable();
-        let is_open = |(k, _): &(usize, &mut Slot)| next.next_if(|&&o| o as usize == *k).is_some();
+        let is_open =
+            |(k, _): &(usize, &mut Slot<D>)| next.next_if(|&&o| o as usize == *k).is_some();
         let (mut large, mut small): (Vec<_>, Vec<_>) =
             slots.iter_mut().enumerate().filter(is_open).map(|s| s.1).partition(|s| s.is_large());
         // What takes longest begins first.
@@ -206,7 +218,7 @@ impl Crew {
                     slot.solve_alone(inner);
                 });
             }
-            for (part, sessions) in small.chunks_mut(share).zip(&mut self.sessions) {
+            for (part, sessions) in small.chunks_mut(share).zip(sessions) {
                 let budget = &budget;
                 scope.spawn(move |_| {
                     let _scope = budget.enter();

@@ -36,6 +36,8 @@ mod lagrangian;
 mod mesh;
 mod moreau_jean;
 mod moving;
+mod planar;
+mod polygon;
 mod projection;
 mod report;
 mod rolling;
@@ -61,6 +63,7 @@ pub use lagrangian::{
 };
 pub use mesh::Mesh;
 pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean, Stabilisation};
+pub use polygon::Polygon;
 pub use report::{
     ContactReport, Counts, Drift, EnergyBalance, RunReport, Settled, StepReport, StepStatus,
     Timings,
@@ -69,4 +72,4 @@ pub use scene_file::SceneFile;
 pub use shape::{Part, Shape, plane};
 pub use simulation::{Force, Simulation, Wrenches};
 pub use state::{ContactMemory, ElasticState, State};
-pub use world::{Body, BodyId, Compliance, Law, Motion, World};
+pub use world::{Body, BodyId, Compliance, Dimension, Law, Motion, World};

@@ -6,7 +6,8 @@ use nonsmooth_scenes::vec3::{Vec3, norm};
 use nonsmooth_scenes::{MassProperties, Polyhedron, Rotation, SceneError};
 
 use crate::error::require;
-use crate::{Mesh, SimulateError};
+use crate::polygon::lamina;
+use crate::{Mesh, Polygon, SimulateError};
 
 /// A solid in a frame of its own, or a surface; all but surfaces are convex.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,6 +49,20 @@ pub enum Shape {
     },
     /// A surface of triangles.
     Mesh(Arc<Mesh>),
+    /// All points within `radius` of the origin, of a world in the plane.
+    Disc {
+        /// Radius, m.
+        radius: f64,
+    },
+    /// A convex polygon, where its corners are, of a world in the plane.
+    Polygon(Polygon),
+    /// All points within `radius` of the segment from `−half_length` to `half_length` on the first axis, of a world in the plane.
+    Stadium {
+        /// Half the length of the segment, m.
+        half_length: f64,
+        /// Radius, m.
+        radius: f64,
+    },
 }
 
 impl Shape {
@@ -62,15 +77,21 @@ impl Shape {
             Shape::Cylinder { .. } => "cylinder",
             Shape::Cone { .. } => "cone",
             Shape::Mesh(_) => "mesh",
+            Shape::Disc { .. } => "disc",
+            Shape::Polygon(_) => "polygon",
+            Shape::Stadium { .. } => "capsule in the plane",
         }
     }
 
     /// The largest distance of its points from its origin, m; infinite for a plane.
     pub fn radius(&self) -> f64 {
         match self {
-            Shape::Sphere { radius } => *radius,
+            Shape::Sphere { radius } | Shape::Disc { radius } => *radius,
             Shape::Box { half } => norm(*half),
-            Shape::Capsule { half_length, radius } => half_length + radius,
+            Shape::Capsule { half_length, radius } | Shape::Stadium { half_length, radius } => {
+                half_length + radius
+            }
+            Shape::Polygon(p) => p.points().map(norm).fold(0.0, f64::max),
             Shape::Plane => f64::INFINITY,
             Shape::Polyhedron(p) => p.radius_about([0.0; 3]),
             Shape::Cylinder { half_length, radius } | Shape::Cone { half_length, radius } => {
@@ -80,7 +101,7 @@ impl Shape {
         }
     }
 
-    /// Mass, mass centre and inertia for a density in kg/m³.
+    /// Mass, mass centre and inertia for a density in kg/m³; of shapes of the plane in kg/m², as of thin sheets.
     ///
     /// Errors: a length or density that is not positive; a plane, which has no mass; those of [`Mesh::mass_properties`].
     pub fn mass_properties(&self, density: f64) -> Result<MassProperties, SimulateError> {
@@ -95,6 +116,30 @@ impl Shape {
                 return Err(SimulateError::value("shape", "a solid with a mass", "a plane"));
             }
             Shape::Mesh(mesh) => mesh.mass_properties(density)?,
+            Shape::Disc { radius: r } => {
+                for (key, x) in [("radius", *r), ("density", density)] {
+                    require(|| key.into(), x, x > 0.0, "a positive number")?;
+                }
+                let mass = density * std::f64::consts::PI * r * r;
+                let across = 0.25 * mass * r * r;
+                lamina(mass, [0.0; 2], [across, 0.0, across])
+            }
+            Shape::Polygon(p) => {
+                require(|| "density".into(), density, density > 0.0, "a positive number")?;
+                p.mass_properties(density)
+            }
+            Shape::Stadium { half_length: l, radius: r } => {
+                for (key, x) in [("half_length", *l), ("radius", *r), ("density", density)] {
+                    require(|| key.into(), x, x > 0.0, "a positive number")?;
+                }
+                // A rectangle and two half discs, whose mass centres lie 4r/(3π) beyond its ends.
+                let (middle, ends) =
+                    (density * 4.0 * l * r, density * std::f64::consts::PI * r * r);
+                let beyond = 4.0 * r / (3.0 * std::f64::consts::PI);
+                let along = middle * l * l / 3.0 + ends * (0.25 * r * r + l * l + 2.0 * l * beyond);
+                let across = middle * r * r / 3.0 + ends * 0.25 * r * r;
+                lamina(middle + ends, [0.0; 2], [along, 0.0, across])
+            }
             Shape::Cylinder { half_length: l, radius: r }
             | Shape::Cone { half_length: l, radius: r } => {
                 for (key, x) in [("half_length", *l), ("radius", *r), ("density", density)] {
@@ -131,14 +176,15 @@ impl Shape {
     /// Checks its lengths; `key` names it in messages.
     pub(crate) fn validate(&self, key: &str) -> Result<(), SimulateError> {
         let lengths: &[(&str, f64)] = match self {
-            Shape::Sphere { radius } => &[("radius", *radius)],
+            Shape::Sphere { radius } | Shape::Disc { radius } => &[("radius", *radius)],
             Shape::Box { half: [a, b, c] } => &[("half", *a), ("half", *b), ("half", *c)],
             Shape::Capsule { half_length, radius }
             | Shape::Cylinder { half_length, radius }
+            | Shape::Stadium { half_length, radius }
             | Shape::Cone { half_length, radius } => {
                 &[("half_length", *half_length), ("radius", *radius)]
             }
-            Shape::Plane | Shape::Polyhedron(_) | Shape::Mesh(_) => &[],
+            Shape::Plane | Shape::Polyhedron(_) | Shape::Polygon(_) | Shape::Mesh(_) => &[],
         };
         for (name, x) in lengths {
             require(|| format!("{key}.{name}"), *x, *x > 0.0, "a positive number")?;
@@ -150,6 +196,12 @@ impl Shape {
 impl From<Mesh> for Shape {
     fn from(mesh: Mesh) -> Self {
         Shape::Mesh(Arc::new(mesh))
+    }
+}
+
+impl From<Polygon> for Shape {
+    fn from(polygon: Polygon) -> Self {
+        Shape::Polygon(polygon)
     }
 }
 

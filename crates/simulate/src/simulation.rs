@@ -2,8 +2,8 @@
 
 use nonsmooth_problem::{Friction, FrictionLocal};
 use nonsmooth_scenes::vec3::{Vec3, add, cross, norm, sub};
-use nonsmooth_solve::Limits;
 use nonsmooth_solve::settings::SettingsMap;
+use nonsmooth_solve::{Limits, registry};
 
 use crate::crew::Inner;
 use crate::drive::{self, Driven, Observer};
@@ -13,12 +13,14 @@ use crate::report::{ContactReport, RunReport, Settled, StepReport, StepStatus};
 use crate::state::{ElasticState, State};
 use crate::step::{Stride, Tools};
 use crate::world::oscillation;
-use crate::{BodyId, JointReport, MoreauJean, Motion, SimulateError, Stabilisation, World};
+use crate::{
+    BodyId, Dimension, JointReport, MoreauJean, Motion, SimulateError, Stabilisation, World,
+};
 
 /// Bodies that overlap by more than this share of the smaller one are refused at the start.
 const OVERLAP: f64 = 1e-6;
 
-/// Forces (N) and torques about the mass centre (N·m) on all bodies, in the world frame.
+/// Forces (N) and torques about the mass centre (N·m) on all bodies, in the world frame; in a plane what acts across it is without effect.
 #[derive(Debug, Clone, Default)]
 pub struct Wrenches {
     pub(crate) force: Vec<Vec3>,
@@ -243,7 +245,10 @@ impl Simulation {
         solver: &str,
         settings: SettingsMap,
     ) -> Result<Self, SimulateError> {
-        nonsmooth_solve::registry::session::<FrictionLocal<3>>(solver, &settings)?;
+        match self.world.dimension {
+            Dimension::Two => drop(registry::session::<FrictionLocal<2>>(solver, &settings)?),
+            Dimension::Three => drop(registry::session::<FrictionLocal<3>>(solver, &settings)?),
+        }
         (self.solver, self.settings) = (solver.into(), settings);
         let threads = self.tools.threads();
         self.tools = Tools::new(&self.world, &self.state)?;

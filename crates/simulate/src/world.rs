@@ -7,6 +7,7 @@ use nonsmooth_scenes::{self as scenes, ElasticBox, MassProperties, Polyhedron, R
 
 use crate::elastic::Elastic;
 use crate::error::{finite, require};
+use crate::planar;
 use crate::rotation::unit;
 use crate::shape::plane;
 use crate::state::State;
@@ -136,6 +137,12 @@ impl Body {
         Self { mass, inertia, ..Self::bare(Motion::Free, parts) }
     }
 
+    /// A body of a world in the plane, of given mass and moment of inertia, kg and kg·m², about the origin of its parts.
+    pub fn in_plane(mass: f64, inertia: f64, parts: Vec<Part>) -> Self {
+        let j = 0.5 * inertia;
+        Self::with_mass(mass, [[j, 0.0, 0.0], [0.0, j, 0.0], [0.0, 0.0, inertia]], parts)
+    }
+
     /// A body that does not move.
     pub fn fixed(parts: Vec<Part>) -> Self {
         Self::bare(Motion::Fixed, parts)
@@ -150,6 +157,13 @@ impl Body {
     #[must_use]
     pub fn named(self, name: impl Into<String>) -> Self {
         Self { name: name.into(), ..self }
+    }
+
+    /// The half plane y ≤ 0 of a world in the plane.
+    pub fn ground() -> Self {
+        let turn = std::f64::consts::FRAC_1_SQRT_2;
+        let plane = Part::new(Shape::Plane).at([0.0; 3], Rotation([turn, -turn, 0.0, 0.0]));
+        Self::fixed(vec![plane])
     }
 
     /// With its mass centre at `position`.
@@ -227,9 +241,21 @@ pub struct Compliance {
     pub damping: f64,
 }
 
+/// How many directions there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Dimension {
+    /// Bodies move in the plane of the first two axes and turn about the third: three degrees of freedom each, contacts with one tangent.
+    Two,
+    /// Space.
+    #[default]
+    Three,
+}
+
 /// Bodies, materials and gravity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct World {
+    /// Space or a plane.
+    pub dimension: Dimension,
     /// All bodies; a [`BodyId`] is a place here.
     pub bodies: Vec<Body>,
     /// Acceleration of gravity, m/s².
@@ -258,6 +284,7 @@ impl World {
     /// An empty world, frictionless and without restitution.
     pub fn new(gravity: Vec3) -> Self {
         Self {
+            dimension: Dimension::Three,
             bodies: vec![],
             gravity,
             law: Law::default(),
@@ -269,6 +296,11 @@ impl World {
             joints: vec![],
             couplings: vec![],
         }
+    }
+
+    /// An empty world in the plane. Places and velocities have zero as their third component, axes of rotations and torques that alone.
+    pub fn in_plane([x, y]: [f64; 2]) -> Self {
+        Self { dimension: Dimension::Two, ..Self::new([x, y, 0.0]) }
     }
 
     /// With this law between all materials that have no other.
@@ -353,6 +385,14 @@ impl World {
         self.pairs.get(&(a.min(b), a.max(b))).copied().unwrap_or(self.law)
     }
 
+    /// All laws by their places in messages.
+    pub(crate) fn laws(&self) -> impl Iterator<Item = (String, Law)> + '_ {
+        let name = |k: usize| self.materials.get(k).map_or("?", String::as_str);
+        let own = self.pairs.iter();
+        let own = own.map(move |(&(a, b), law)| (format!("pairs[{}, {}]", name(a), name(b)), *law));
+        std::iter::once(("law".into(), self.law)).chain(own)
+    }
+
     /// Lets two bodies pass through each other: partners of a joint.
     pub fn keep_apart(&mut self, a: BodyId, b: BodyId) {
         self.apart.insert((a.min(b), a.max(b)));
@@ -427,6 +467,7 @@ impl World {
         for (k, coupling) in self.couplings.iter().enumerate() {
             coupling.validate(&key("couplings", k, &coupling.name), self)?;
         }
+        planar::validate(self)?;
         Ok(said)
     }
 }

@@ -3,7 +3,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use nonsmooth_simulate::{Body, Law, MoreauJean, Shape, Simulation, World};
+use nonsmooth_simulate::{Body, Law, MoreauJean, Polygon, Shape, Simulation, World};
 
 thread_local! {
     static CALLS: Cell<usize> = const { Cell::new(0) };
@@ -26,6 +26,29 @@ unsafe impl GlobalAlloc for Counting {
         // SAFETY: as above.
         unsafe { System.dealloc(at, layout) }
     }
+}
+
+#[test]
+fn a_resting_stack_in_the_plane_allocates_nothing() {
+    let mut world = World::in_plane([0.0, -9.81]).with_law(Law::friction(0.5));
+    world.add(Body::ground());
+    for k in 0..5 {
+        let block = Body::solid(Polygon::rectangle([0.5, 0.1]).unwrap(), 1000.0).unwrap();
+        world.add(block.at([0.0, 0.1 + 0.2 * f64::from(k), 0.0]));
+        let disc = Body::solid(Shape::Disc { radius: 0.2 }, 1000.0).unwrap();
+        world.add(disc.at([3.0 + f64::from(k), 0.2, 0.0]));
+    }
+    let mut simulation = Simulation::new(world, MoreauJean::default()).unwrap();
+    for _ in 0..20 {
+        simulation.step(5e-3).unwrap();
+    }
+    let before = CALLS.get();
+    for _ in 0..200 {
+        let report = simulation.step(5e-3).unwrap();
+        assert!(report.status.is_solved());
+        assert_eq!((report.counts.active, report.counts.islands), (15, 6));
+    }
+    assert_eq!(CALLS.get() - before, 0);
 }
 
 #[test]

@@ -383,9 +383,9 @@ fn mutated_scenes_do_not_panic() {
     use rand::{RngExt, SeedableRng};
     let mut random = rand_pcg::Pcg64::seed_from_u64(7);
     let words = ["-1", "0", "nan", "inf", "1e308", "\"\"", "[]", "{}", "true", "[1, 2]", "x"];
-    let lines: Vec<&str> = SCENE.lines().collect();
     let count = std::env::var("NONSMOOTH_MUTATIONS").ok().and_then(|n| n.parse().ok());
-    for _ in 0..count.unwrap_or(2000) {
+    for round in 0..count.unwrap_or(2000) {
+        let lines: Vec<&str> = if round % 4 == 0 { PLANE } else { SCENE }.lines().collect();
         let mut text: Vec<String> = lines.iter().map(|l| (*l).to_owned()).collect();
         for _ in 0..random.random_range(1..4) {
             let k = random.random_range(0..text.len());
@@ -419,6 +419,129 @@ fn mutated_scenes_do_not_panic() {
             assert!(!matches!(error, SimulateError::Checkpoint { .. }));
         }
     }
+}
+
+const PLANE: &str = r#"
+format = "nonsmooth-scene"
+version = 1
+dimension = 2
+time = { h = 1e-3, end = 0.05 }
+pairs_default = { mu = 0.4, e = 0.2 }
+
+[[shapes]]
+name = "brick"
+kind = "box"
+half = [0.2, 0.1]
+
+[[bodies]]
+name = "slope"
+shape = { kind = "plane", normal = [0.1, 1] }
+fixed = true
+[[bodies]]
+name = "brick"
+shape = "brick"
+density = 10
+position = [0, 0.5]
+rotation = 0.3
+velocity = [1, 0]
+angular_velocity = -2.0
+[[bodies]]
+name = "pair"
+mass = 2.0
+inertia = 0.1
+position = [1, 1]
+torque = 0.5
+force = [0, 1]
+[[bodies.shapes]]
+shape = { kind = "disc", radius = 0.1 }
+position = [0.2, 0]
+[[bodies.shapes]]
+shape = { kind = "capsule", half_length = 0.2, radius = 0.05 }
+rotation = 1.5
+[[bodies]]
+name = "three"
+shape = { kind = "polygon", vertices = [[0, 0], [0.3, 0], [0, 0.3]] }
+density = 5
+position = [-1, 1]
+[[joints]]
+name = "pin"
+kind = "revolute"
+a = "world"
+b = "three"
+anchor = [-1, 1.2]
+[[forces]]
+body = "brick"
+force = [0.1, 0]
+at = [0.1, 0.1]
+"#;
+
+#[test]
+fn a_scene_in_the_plane_has_vectors_of_two_and_turns_of_one() {
+    let scene = SceneFile::parse(PLANE, &["bodies[1].velocity=[2, 0]"]).unwrap();
+    assert_eq!((scene.dimension, scene.gravity), (2, [0.0, -9.81, 0.0]));
+    let again = SceneFile::parse(&scene.to_toml(), &[]).unwrap();
+    assert_eq!(again, scene);
+    let mut simulation = scene.build().unwrap();
+    let world = simulation.world();
+    assert_eq!(world.bodies[1].velocity, [2.0, 0.0, 0.0]);
+    assert_eq!(world.bodies[1].angular_velocity, [0.0, 0.0, -2.0]);
+    assert_eq!(world.bodies[2].inertia[2][2], 0.1);
+    assert!((world.bodies[1].mass - 10.0 * 0.08).abs() < 1e-15);
+    assert!((world.bodies[1].inertia[2][2] - 0.8 * (0.04 + 0.01) / 3.0).abs() < 1e-15);
+    let [w, x, y, z] = world.bodies[1].rotation.0;
+    assert_eq!((x, y), (0.0, 0.0));
+    assert!((2.0 * z.atan2(w) - 0.3).abs() < 1e-15);
+    let report = simulation.run(scene.time.end, scene.time.h, &mut ()).unwrap();
+    assert!(report.is_solved() && report.residual <= 1e-10 && report.imbalance <= 1e-12);
+}
+
+#[test]
+fn what_a_scene_in_the_plane_cannot_have_is_named_by_its_place() {
+    let said = |change: &str| {
+        let made = SceneFile::parse(PLANE, &[change]).and_then(|scene| scene.build().map(drop));
+        made.err().unwrap_or_else(|| panic!("{change}")).to_string()
+    };
+    for (change, expected) in [
+        ("dimension=4", "dimension: expected 2 or 3, found 4"),
+        (
+            "bodies[1].shape={ kind = \"sphere\", radius = 0.1 }",
+            "bodies[1] (brick).shape: expected a disc",
+        ),
+        (
+            "bodies[2].shapes[0].shape={ kind = \"cone\", half_length = 1, radius = 1 }",
+            "bodies[2] (pair).shapes[0].shape: expected a disc",
+        ),
+        ("bodies[1].position=[0, 0, 1]", "bodies[1] (brick).position: expected 0"),
+        ("bodies[1].position=[0]", "bodies[1].position: "),
+        ("bodies[1].angular_velocity=[1, 0, 0]", "bodies[1] (brick).angular_velocity: expected 0"),
+        (
+            "bodies[1].rotation={ axis = [1, 0, 0], angle = 1 }",
+            "bodies[1] (brick).rotation: expected",
+        ),
+        ("shapes[0].half=[0.1, 0.1, 0.1]", "bodies[1] (brick).shape.half: expected two half sides"),
+        ("shapes[0].half=[0.1, -0.1]", "bodies[1] (brick).shape: half: expected a positive"),
+        (
+            "bodies[3].shape.vertices=[[0, 0], [0, 1], [1, 0]]",
+            "bodies[3] (three).shape: vertices: expected the corners",
+        ),
+        ("joints[0].kind=spherical", "joints[0] (pin).kind: expected fixed"),
+        ("joints[0].axis=[1, 0]", "joints[0] (pin).axis: expected the third axis"),
+        ("joints[0].kind=prismatic", "joints[0] (pin).axis: expected a direction in the plane"),
+        ("generate=[{ scene = \"wall\" }]", "generate[0]: expected none in the plane"),
+        ("forces[0].force=[0, 0, 1]", "forces[0].force: expected 0"),
+        ("forces[0].torque=[1, 0, 0]", "forces[0].torque: expected 0"),
+        ("pairs_default.mu_rolling=0.1", "law.mu_r: expected 0 in the plane"),
+    ] {
+        let said = said(change);
+        assert!(said.starts_with(expected), "{change}: {said}");
+    }
+    let space = PLANE.replace("dimension = 2", "dimension = 3");
+    let said = SceneFile::parse(&space, &[]).unwrap_err().to_string();
+    assert!(said.ends_with("invalid length 2, expected an array of length 3"), "{said}");
+    let disc = "bodies[0].shape={ kind = \"disc\", radius = 0.1 }";
+    let made = SceneFile::parse(SCENE, &[disc]).and_then(|scene| scene.build().map(drop));
+    let said = made.unwrap_err().to_string();
+    assert!(said.starts_with("bodies[0] (belt).shape: expected a solid"), "{said}");
 }
 
 /// What is wrong with a joint is one line that begins with its place.

@@ -140,7 +140,8 @@ pub fn paraview(path: &Path, trajectory: &Trajectory, world: &World) -> Result<(
 /// A glTF file.
 pub fn gltf(path: &Path, trajectory: &Trajectory, world: &World) -> Result<(), String> {
     let meshes = nonsmooth_record::meshes(trajectory, world);
-    nonsmooth_io::gltf::write(path, trajectory, &meshes).map_err(|e| format!("--glb {e}"))
+    let upright = nonsmooth_record::upright(trajectory, world);
+    nonsmooth_io::gltf::write(path, &upright, &meshes).map_err(|e| format!("--glb {e}"))
 }
 
 /// Whether pictures go to a folder; else to one file.
@@ -171,7 +172,8 @@ pub fn drawings(
     let wrong = |e: SceneError| format!("--svg: {e}");
     let draw = |frame: usize, to: &Path| {
         let picture = playback.picture(frame).map_err(wrong)?;
-        let text = draw::svg(&picture, &Drawing::default()).map_err(wrong)?;
+        let drawing = Drawing { view: playback.view, ..Drawing::default() };
+        let text = draw::svg(&picture, &drawing).map_err(wrong)?;
         files::write_text("--svg", to, &text)
     };
     let frames = trajectory.frames.len();

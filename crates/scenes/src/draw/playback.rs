@@ -33,6 +33,8 @@ const POINTS: usize = 2000;
 pub struct Playback {
     /// What it is called.
     pub title: String,
+    /// Where it is seen from at the beginning.
+    pub view: View,
     /// The bodies, as contacts count them.
     pub bodies: Vec<Drawn>,
     /// One after the other in time, at least one.
@@ -219,6 +221,7 @@ impl Playback {
     ///
     /// Errors: the first value that is not possible, by its place, for example `frames[0].contacts[3].b`.
     pub fn validate(&self) -> Result<(), SceneError> {
+        self.view.validate()?;
         for (key, none) in [("bodies", self.bodies.is_empty()), ("frames", self.frames.is_empty())]
         {
             if none {
@@ -346,7 +349,7 @@ impl Playback {
             shapes: floats(
                 shown.iter().flat_map(|f| &f.shapes).flatten().flat_map(|x| x.iter().copied()),
             ),
-            view: View::default(),
+            view: self.view,
             colours: Colours::default(),
         };
         let style = [STYLE, OWN_STYLE].concat();

@@ -2,7 +2,7 @@
 
 use nonsmooth_problem::check::Motion;
 use nonsmooth_scenes::draw::playback::{Drawn, Energy, Form, Moment, Placed, Playback};
-use nonsmooth_scenes::draw::{Pose, Touch};
+use nonsmooth_scenes::draw::{Pose, Touch, View};
 use nonsmooth_scenes::{Polyhedron, Rotation};
 
 fn placed(form: Form) -> Placed {
@@ -124,6 +124,7 @@ pub fn playback(frames: usize) -> Playback {
     };
     Playback {
         title: "Everything that moves <b>".into(),
+        view: View::default(),
         bodies,
         frames: (0..frames).map(moment).collect(),
         energy: (0..frames).map(energy).collect(),

@@ -11,6 +11,8 @@
 //! | capsule with box, polyhedron; cylinder, cone with all that is convex | [`convex`]: distance, then features |
 //! | elastic box with elastic box | [`facing`]: nodes of the finer mesh at faces of the other |
 //! | mesh, heightfield with all that is convex; mesh with plane | [`surface`]: triangles in a tree of boxes, filtered at inner edges |
+//! | mesh with mesh, heightfield | [`surfaces`]: pairs of triangles in two trees, filtered at the edges of both |
+//! | polygon with polygon, disc, capsule | [`outline`]: separating sides with hysteresis, sides clipped by sides; nearest side or corner |
 //!
 //! What is drawn is what touches: no margin, no skin. A point is reported where the gap is at most the prediction of the pair, so that a step
 //! knows what it may run into. Every list is sorted by key: the same bodies give the same contacts in the same order.
@@ -21,9 +23,11 @@ mod convex;
 mod facing;
 mod gjk;
 mod hull;
+mod outline;
 mod rounds;
 mod segments;
 mod surface;
+mod surfaces;
 mod turned;
 mod witness;
 
@@ -34,12 +38,13 @@ use rayon::ThreadPool;
 use crate::elastic::{Foot, Nodes};
 use crate::rotation::Pose;
 use crate::state::{Axis, State};
-use crate::{BodyId, Compliance, Law, Shape, SimulateError, World};
+use crate::{BodyId, Compliance, Dimension, Law, Shape, SimulateError, World};
 use broad::{Aabb, Broad};
 use clip::Clip;
 use convex::{Extent, Flat, Side};
 use facing::Facing;
 use hull::{Hull, PosedHull};
+use outline::{Flat as Polygonal, Outline, Rod};
 use segments::Segment;
 use surface::{Scratch, Surface};
 use turned::Turned;
@@ -72,6 +77,7 @@ enum Solid {
     Rounded(Segment, f64),
     Plane(Pose),
     Hull(Box<Hull>),
+    Outline(Box<Outline>),
     Turned(Box<Turned>),
     Surface(Box<Surface>),
 }
@@ -146,7 +152,22 @@ impl Detector {
                             *radius,
                         )
                     }
-                    Shape::Plane => Solid::Plane(pose),
+                    Shape::Disc { radius } => Solid::Rounded(Segment::point(pose.x), *radius),
+                    Shape::Stadium { half_length, radius } => {
+                        let end = |x| pose.point([x, 0.0, 0.0]);
+                        Solid::Rounded(
+                            Segment::between(end(-half_length), end(*half_length)),
+                            *radius,
+                        )
+                    }
+                    Shape::Polygon(p) => {
+                        let corners = p.points().map(|v| pose.point(v)).collect();
+                        Solid::Outline(Box::new(Outline::new(corners)))
+                    }
+                    Shape::Plane => Solid::Plane(match world.dimension {
+                        Dimension::Three => pose,
+                        Dimension::Two => flat(&pose),
+                    }),
                     Shape::Box { half } => hull(&Polyhedron::cuboid(*half)?),
                     Shape::Polyhedron(p) => hull(p),
                     Shape::Cylinder { half_length, radius } => {
@@ -161,6 +182,7 @@ impl Detector {
                 };
                 let size = match &solid {
                     Solid::Hull(hull) => hull.size,
+                    Solid::Outline(outline) => outline.size,
                     Solid::Surface(surface) => surface.size,
                     _ => part.shape.radius(),
                 };
@@ -173,17 +195,20 @@ impl Detector {
             let solid = Solid::Rounded(Segment::point([0.0; 3]), 0.0);
             solids.push(Solids { body: k as u32, material: node.material, solid, size: node.size });
         }
-        // Surfaces do not meet each other.
+        // Surfaces meet each other where something is behind them: sheets have no side.
         let surfaces: Vec<usize> =
             (0..solids.len()).filter(|&k| matches!(solids[k].solid, Solid::Surface(_))).collect();
+        let is_sheet = |k: usize| matches!(&solids[k].solid, Solid::Surface(s) if !s.one_sided);
         for (n, &i) in surfaces.iter().enumerate() {
             let meets = |j: &usize| {
                 let (p, q) = (solids[i].body, solids[*j].body);
-                p != q && world.may_touch(BodyId(p), BodyId(q))
+                p != q && world.may_touch(BodyId(p), BodyId(q)) && (is_sheet(i) || is_sheet(*j))
             };
             if let Some(&j) = surfaces[n + 1..].iter().find(|j| meets(j)) {
                 let place = |k: usize| format!("{}.parts[{}]", world.label(names[k].0), names[k].1);
-                let (first, second) = (names[i].2, names[j].2);
+                let name =
+                    |k: usize| if is_sheet(k) { "mesh that is not closed" } else { names[k].2 };
+                let (first, second) = (name(i), name(j));
                 return Err(SimulateError::Pair { a: place(i), b: place(j), first, second });
             }
         }
@@ -341,11 +366,14 @@ impl Detector {
                     let by = |f: fn(f64, f64) -> f64| std::array::from_fn(|i| f(s.p[i], end[i]));
                     (by(f64::min), by(f64::max), margin + radius)
                 }
-                Solid::Hull(_) | Solid::Surface(_) => {
+                Solid::Hull(_) | Solid::Outline(_) | Solid::Surface(_) => {
                     let posed = &mut self.hulls[k as usize];
                     let still = matches!(world.bodies[*body as usize].motion, crate::Motion::Fixed);
                     match solid {
                         Solid::Hull(hull) if anew || !still => posed.set(hull, pose),
+                        Solid::Outline(outline) if anew || !still => {
+                            posed.set_outline(outline, pose);
+                        }
                         Solid::Surface(surface) if anew || !still => {
                             posed.vertices.clear();
                             posed.vertices.extend(surface.vertices.iter().map(|&v| pose.point(v)));
@@ -414,7 +442,11 @@ impl Detector {
             // Bodies that coincide leave no direction: from the one centre to the other, upwards if these do too.
             let d = sub(b.x, a.x);
             let length = nonsmooth_scenes::vec3::norm(d);
-            if length > 0.0 { scale(1.0 / length, d) } else { [0.0, 0.0, 1.0] }
+            let upwards = match world.dimension {
+                Dimension::Three => [0.0, 0.0, 1.0],
+                Dimension::Two => [0.0, 1.0, 0.0],
+            };
+            if length > 0.0 { scale(1.0 / length, d) } else { upwards }
         };
         let mut found = |[f, g]: [Feature; 2], witness: Witness| {
             let place = witness.place(a, b, fallback());
@@ -450,6 +482,37 @@ impl Detector {
                 let points = corners(hull, &hulls[i as usize]);
                 rounds::plane(false, &b.then(plane), b, points, 0.0, prediction, found);
                 None
+            }
+            (Solid::Plane(plane), Solid::Outline(p)) => {
+                let points = numbered(&p.vertices, &hulls[j as usize]);
+                rounds::plane(true, &a.then(plane), a, points, 0.0, prediction, found);
+                None
+            }
+            (Solid::Outline(p), Solid::Plane(plane)) => {
+                let points = numbered(&p.vertices, &hulls[i as usize]);
+                rounds::plane(false, &b.then(plane), b, points, 0.0, prediction, found);
+                None
+            }
+            (Solid::Outline(p), Solid::Outline(q)) => {
+                let first = Polygonal::of(p, &hulls[i as usize], a);
+                let second = Polygonal::of(q, &hulls[j as usize], b);
+                outline::collide(&first, &second, axis, prediction, found)
+            }
+            (Solid::Outline(p), Solid::Rounded(q, r)) => {
+                let flat = Polygonal::of(p, &hulls[i as usize], a);
+                if q.is_point() {
+                    outline::disc((q.p, center(q, b), *r), &flat, true, prediction, found);
+                    return None;
+                }
+                outline::collide(&flat, &Rod::new(q, *r, b).flat(), axis, prediction, found)
+            }
+            (Solid::Rounded(q, r), Solid::Outline(p)) => {
+                let flat = Polygonal::of(p, &hulls[j as usize], b);
+                if q.is_point() {
+                    outline::disc((q.p, center(q, a), *r), &flat, false, prediction, found);
+                    return None;
+                }
+                outline::collide(&Rod::new(q, *r, a).flat(), &flat, axis, prediction, found)
             }
             (Solid::Hull(hull), Solid::Rounded(q, r)) if q.is_point() => {
                 let side = (&**hull, &hulls[i as usize], a);
@@ -493,6 +556,10 @@ impl Detector {
             (Solid::Surface(surface), Solid::Plane(plane)) => {
                 let points = knots(surface, &hulls[i as usize]);
                 rounds::plane(false, &b.then(plane), b, points, 0.0, prediction, found);
+                None
+            }
+            (Solid::Surface(p), Solid::Surface(q)) => {
+                surfaces::collide((p, a), (q, b), prediction, (clip, scratch), found);
                 None
             }
             (Solid::Surface(surface), other) => {
@@ -546,6 +613,14 @@ fn merge(out: &mut Vec<Near>, first: usize) {
     out.truncate(kept);
 }
 
+/// The frame of a half plane with its normal in the plane to the last bit: what leaves it by rounding would take the bodies with it.
+fn flat(pose: &Pose) -> Pose {
+    let [x, y, _] = pose.direction([0.0, 0.0, 1.0]);
+    let length = x.hypot(y);
+    let (x, y) = (x / length, y / length);
+    Pose { x: pose.x, r: [[-y, 0.0, x], [x, 0.0, y], [0.0, 1.0, 0.0]] }
+}
+
 /// A convex solid that is neither a half space nor a surface, where it is.
 fn side<'a>(solid: &'a Solid, posed: &'a PosedHull, pose: &'a Pose) -> Option<Side<'a>> {
     match solid {
@@ -557,7 +632,7 @@ fn side<'a>(solid: &'a Solid, posed: &'a PosedHull, pose: &'a Pose) -> Option<Si
             let world = local.placed(pose);
             Some(Side::Rod { local: *local, world, radius: *radius, pose })
         }
-        Solid::Plane(_) | Solid::Surface(_) => None,
+        Solid::Plane(_) | Solid::Surface(_) | Solid::Outline(_) => None,
     }
 }
 
@@ -595,7 +670,14 @@ fn corners<'a>(
     hull: &'a Hull,
     posed: &'a PosedHull,
 ) -> impl Iterator<Item = (Feature, Vec3, Vec3)> + 'a {
-    let both = hull.vertices.iter().zip(&posed.vertices);
+    numbered(&hull.vertices, posed)
+}
+
+fn numbered<'a>(
+    local: &'a [Vec3],
+    posed: &'a PosedHull,
+) -> impl Iterator<Item = (Feature, Vec3, Vec3)> + 'a {
+    let both = local.iter().zip(&posed.vertices);
     both.enumerate().map(|(k, (&p, &q))| (Feature::Vertex(k as u32), p, q))
 }
 

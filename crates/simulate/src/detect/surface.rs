@@ -21,13 +21,13 @@ use crate::detect::witness::{Anchor, Feature, Witness};
 use crate::rotation::Pose;
 
 /// A normal that leaves its cone by less is one of the surface.
-const CONE: f64 = 1e-6;
+pub(super) const CONE: f64 = 1e-6;
 /// Triangles whose normals differ by less are coplanar.
 const COPLANAR: f64 = 1e-6;
 /// A normal that differs from that of a face by less than this is the face's.
-const FACING: f64 = 1e-2;
+pub(super) const FACING: f64 = 1e-2;
 /// A triangle is met with its own normal where it is not deeper than this share of the size of the other solid.
-const DEEP: f64 = 0.25;
+pub(super) const DEEP: f64 = 0.25;
 /// Triangles in a leaf of the tree.
 const LEAF: usize = 4;
 const NONE: u32 = u32::MAX;
@@ -36,38 +36,49 @@ const NONE: u32 = u32::MAX;
 #[derive(Debug, Clone)]
 pub(crate) struct Surface {
     pub vertices: Vec<Vec3>,
-    triangles: Vec<[u32; 3]>,
-    one_sided: bool,
-    normals: Vec<Vec3>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    pub(super) one_sided: bool,
+    pub(super) normals: Vec<Vec3>,
     /// Side k of a triangle, from its corner k to the next one.
-    sides: Vec<[u32; 3]>,
+    pub(super) sides: Vec<[u32; 3]>,
     /// The two triangles of each edge, the second one may be none, and whether they are coplanar.
-    edges: Vec<([u32; 2], bool)>,
+    pub(super) edges: Vec<([u32; 2], bool)>,
     /// For each vertex the vertices that it has an edge with, and whether all its triangles are coplanar.
     around: Vec<(Vec<u32>, bool)>,
-    tree: Vec<Node>,
-    order: Vec<u32>,
+    pub(super) tree: Vec<Node>,
+    pub(super) order: Vec<u32>,
     pub size: f64,
+    /// The least side of the box about it, m; of a heightfield no bound.
+    pub(super) thickness: f64,
 }
 
 /// A box and what is in it: two nodes from `first` on, or `count` triangles.
 #[derive(Debug, Clone, Copy)]
-struct Node {
-    bounds: Aabb,
-    first: u32,
-    count: u32,
+pub(super) struct Node {
+    pub bounds: Aabb,
+    pub first: u32,
+    pub count: u32,
 }
 
-/// Memory for one triangle at a time.
-#[derive(Debug, Clone)]
+/// Memory for one triangle, or a pair of them, at a time.
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Scratch {
-    hull: Hull,
-    posed: PosedHull,
+    pub(super) thin: Thin,
+    pub(super) other: Thin,
     near: Vec<u32>,
-    found: Vec<([Feature; 2], Witness)>,
+    pub(super) pairs: Vec<(u32, u32)>,
+    pub(super) stack: Vec<(u32, u32)>,
+    pub(super) found: Vec<([Feature; 2], Witness)>,
 }
 
-impl Default for Scratch {
+/// A triangle as a polyhedron without thickness.
+#[derive(Debug, Clone)]
+pub(super) struct Thin {
+    pub hull: Hull,
+    pub posed: PosedHull,
+}
+
+impl Default for Thin {
     fn default() -> Self {
         // Front, back and three sides without area; each edge is there twice, between a side and the front or the back.
         let faces = vec![vec![0, 1, 2], vec![0, 2, 1], vec![0, 1], vec![1, 2], vec![2, 0]];
@@ -83,7 +94,7 @@ impl Default for Scratch {
             centre: [0.0; 3],
             size: 1.0,
         };
-        Self { hull, posed: PosedHull::default(), near: vec![], found: vec![] }
+        Self { hull, posed: PosedHull::default() }
     }
 }
 
@@ -133,6 +144,14 @@ impl Surface {
             }),
         );
         let size = vertices.iter().map(|&v| norm(sub(v, middle))).fold(0.0, f64::max);
+        let extent = |d: usize| {
+            let x = || vertices.iter().map(|v| v[d]);
+            x().fold(f64::NEG_INFINITY, f64::max) - x().fold(f64::INFINITY, f64::min)
+        };
+        let thickness = match mesh.open_edges().is_empty() {
+            true => (0..3).map(extent).fold(f64::INFINITY, f64::min),
+            false => f64::INFINITY,
+        };
         let mut out = Self {
             vertices,
             triangles,
@@ -144,6 +163,7 @@ impl Surface {
             tree: vec![],
             order: vec![],
             size,
+            thickness,
         };
         out.grow();
         out
@@ -156,13 +176,7 @@ impl Surface {
 
     /// Makes the tree: boxes are cut in two at the median along their longest side.
     fn grow(&mut self) {
-        let bounds_of = |t: u32| {
-            let corners = self.triangles[t as usize].map(|v| self.vertices[v as usize]);
-            let by = |f: fn(f64, f64) -> f64| {
-                std::array::from_fn(|d| f(f(corners[0][d], corners[1][d]), corners[2][d]))
-            };
-            Aabb { low: by(f64::min), high: by(f64::max) }
-        };
+        let bounds_of = |t: u32| self.bounds(t);
         let mut order: Vec<u32> = (0..self.triangles.len() as u32).collect();
         let mut tree = vec![Node {
             bounds: Aabb { low: [0.0; 3], high: [0.0; 3] },
@@ -205,6 +219,15 @@ impl Surface {
         (self.tree, self.order) = (tree, order);
     }
 
+    /// The box of a triangle.
+    pub(super) fn bounds(&self, t: u32) -> Aabb {
+        let corners = self.triangles[t as usize].map(|v| self.vertices[v as usize]);
+        let by = |f: fn(f64, f64) -> f64| {
+            std::array::from_fn(|d| f(f(corners[0][d], corners[1][d]), corners[2][d]))
+        };
+        Aabb { low: by(f64::min), high: by(f64::max) }
+    }
+
     /// The triangles whose boxes meet a box of the world, in order.
     fn near(&self, pose: &Pose, bounds: &Aabb, out: &mut Vec<u32>) {
         let middle = std::array::from_fn(|d| 0.5 * (bounds.low[d] + bounds.high[d]));
@@ -240,7 +263,7 @@ impl Surface {
     }
 
     /// Whether n, in the frame of the body, is a normal of the surface at a feature: it goes into no triangle there.
-    fn has_normal(&self, feature: Feature, n: Vec3) -> bool {
+    pub(super) fn has_normal(&self, feature: Feature, n: Vec3) -> bool {
         let away = |d: Vec3| dot(n, d) <= CONE * norm(d);
         match feature {
             Feature::Edge(e) => {
@@ -258,7 +281,7 @@ impl Surface {
         }
     }
 
-    fn is_flat(&self, feature: Feature) -> bool {
+    pub(super) fn is_flat(&self, feature: Feature) -> bool {
         match feature {
             Feature::Edge(e) => self.edges[e as usize].1,
             Feature::Vertex(v) => self.around[v as usize].1,
@@ -267,7 +290,7 @@ impl Surface {
     }
 
     /// A feature of triangle t as one of the surface.
-    fn named(&self, t: u32, feature: Feature) -> Feature {
+    pub(super) fn named(&self, t: u32, feature: Feature) -> Feature {
         let sides = self.sides[t as usize];
         match feature {
             Feature::Vertex(k) => Feature::Vertex(self.triangles[t as usize][k as usize]),
@@ -298,8 +321,8 @@ impl Surface {
             return;
         }
         for &t in &near {
-            self.template(t, pose, scratch);
-            let Scratch { hull, posed, found: list, .. } = &mut *scratch;
+            self.template(t, pose, &mut scratch.thin);
+            let Scratch { thin: Thin { hull, posed }, found: list, .. } = &mut *scratch;
             list.clear();
             let triangle = Side::Hull { hull, posed, pose };
             if let Side::Hull { hull: h, posed: p, pose: q } = other {
@@ -356,8 +379,7 @@ impl Surface {
     }
 
     /// Makes the polyhedron without thickness that triangle t is.
-    fn template(&self, t: u32, pose: &Pose, scratch: &mut Scratch) {
-        let Scratch { hull, posed, .. } = scratch;
+    pub(super) fn template(&self, t: u32, pose: &Pose, Thin { hull, posed }: &mut Thin) {
         let corners = self.triangles[t as usize].map(|v| self.vertices[v as usize]);
         let n = self.normals[t as usize];
         hull.vertices.copy_from_slice(&corners);

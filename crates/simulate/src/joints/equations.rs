@@ -3,6 +3,7 @@
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, cross, dot, norm, scale, sub};
 
 use super::{Coordinate, Coupling, Joint, JointId, JointKind};
+use crate::Dimension;
 use crate::rotation::Pose;
 use crate::world::World;
 
@@ -13,6 +14,15 @@ pub(crate) struct Reach {
     pub body: u32,
     pub force: Vec3,
     pub moment: Vec3,
+}
+
+impl Reach {
+    /// Whether it moves anything in the plane of the first two axes: of unit forces and moments there is nothing else to tell apart.
+    fn is_in_plane(&self) -> bool {
+        let Self { force: [x, y, _], moment, .. } = self;
+        let turns = self.force == [0.0; 3] && moment[2].abs() > 0.5;
+        x.hypot(*y) > 0.5 || turns
+    }
 }
 
 /// An equation `φ = 0`.
@@ -41,6 +51,8 @@ pub(crate) struct Linkage {
     in_a: Pose,
     in_b: Pose,
     length: f64,
+    /// Of which equations there is something in the plane of a world that is one, a bit each.
+    kept: u32,
 }
 
 /// A joint at a configuration: the two frames, axes by rows, and the mass centres.
@@ -72,13 +84,23 @@ impl Linkage {
             Pose { x: pose.local_point(anchor), r: columns(&axes) }
         };
         let a = joint.a.map(|a| a.index());
-        Self {
+        let linkage = Self {
+            kept: u32::MAX,
             kind: joint.kind,
             a: a.map(|a| a as u32),
             b: joint.b.0,
             in_a: local(a, joint.anchors[0]),
             in_b: local(Some(joint.b.index()), joint.anchors[1]),
             length: norm(sub(joint.anchors[1], joint.anchors[0])),
+        };
+        match world.dimension {
+            Dimension::Three => linkage,
+            Dimension::Two => {
+                let all = linkage.equations(&linkage.place(|k| of(Some(k as usize))), 0.0);
+                let acts = |e: &Equation| e.gradient.iter().any(Reach::is_in_plane);
+                let bits = all.iter().enumerate().filter(|e| acts(e.1)).map(|e| 1 << e.0);
+                Self { kept: bits.sum(), ..linkage }
+            }
         }
     }
 
@@ -154,6 +176,11 @@ impl Linkage {
             }
             out.push(Equation::new(phi, reach));
         }
+        let mut number = 0;
+        out.retain(|_| {
+            number += 1;
+            self.kept & (1 << (number - 1)) != 0
+        });
         out
     }
 

@@ -12,8 +12,8 @@ use super::{
 use crate::error::{finite, require};
 use crate::shape::plane;
 use crate::{
-    Body, BodyId, Compliance, Law, Mesh, Motion, Part, Settled, Shape, SimulateError, Simulation,
-    State, World, Wrenches,
+    Body, BodyId, Compliance, Dimension, Law, Mesh, Motion, Part, Polygon, Settled, Shape,
+    SimulateError, Simulation, State, World, Wrenches,
 };
 
 /// Groups have a bit each.
@@ -48,6 +48,10 @@ impl SceneFile {
             builder.elastic(table, &key)?;
         }
         for (k, table) in self.generate.iter().enumerate() {
+            if builder.world.dimension == Dimension::Two {
+                let expected = "none in the plane: families are of space";
+                return Err(SimulateError::value(format!("generate[{k}]"), expected, "one"));
+            }
             builder.family(table, &format!("generate[{k}]"))?;
         }
         // Partners of a joint need no law of contact.
@@ -114,6 +118,9 @@ fn acting(
     for (name, vector) in [("force", force), ("torque", torque), ("at", at)] {
         finite(|| format!("{key}.{name}"), &vector)?;
     }
+    if world.dimension == Dimension::Two {
+        crate::planar::force(key, force, torque, at)?;
+    }
     let (from, until) =
         (table.from.unwrap_or(f64::NEG_INFINITY), table.until.unwrap_or(f64::INFINITY));
     if from.is_nan() || until.is_nan() || from >= until {
@@ -165,6 +172,7 @@ struct Builder<'a> {
 impl<'a> Builder<'a> {
     fn new(file: &'a SceneFile) -> Result<Self, SimulateError> {
         let mut world = World::new(file.gravity);
+        world.dimension = super::plane::dimension(file.dimension.into())?;
         if let Some(law) = file.pairs_default {
             world.law = law.into();
         }
@@ -333,7 +341,22 @@ impl<'a> Builder<'a> {
             made.map(|p| Part::new(Shape::Polyhedron(p)))
                 .map_err(|e| SimulateError::Schema { path: key.into(), problem: e.to_string() })
         };
-        Ok(match table {
+        let flat = self.world.dimension == Dimension::Two;
+        let part = match table {
+            ShapeTable::Disc { radius } => Part::new(Shape::Disc { radius: *radius }),
+            ShapeTable::Polygon { vertices } => {
+                Part::new(Polygon::new(vertices).map_err(|e| placed(e, key))?)
+            }
+            ShapeTable::Box { half: [a, b, c] } if flat => {
+                if *c != 0.0 {
+                    let expected = "two half sides, for the scene is in the plane";
+                    return Err(SimulateError::value(format!("{key}.half"), expected, "three"));
+                }
+                Part::new(Polygon::rectangle([*a, *b]).map_err(|e| placed(e, key))?)
+            }
+            ShapeTable::Capsule { half_length, radius } if flat => {
+                Part::new(Shape::Stadium { half_length: *half_length, radius: *radius })
+            }
             ShapeTable::Sphere { radius } => Part::new(Shape::Sphere { radius: *radius }),
             ShapeTable::Box { half } => Part::new(Shape::Box { half: *half }),
             ShapeTable::Capsule { half_length, radius } => {
@@ -370,7 +393,9 @@ impl<'a> Builder<'a> {
                 let base: Vec<Vec3> = base.iter().map(|[x, y]| [*x, *y, -h]).collect();
                 solid(Polyhedron::prism(&base, [0.0, 0.0, 2.0 * h]))?
             }
-        })
+        };
+        crate::planar::belongs(&part.shape, self.world.dimension, || key.into())?;
+        Ok(part)
     }
 
     /// Adds an elastic box.

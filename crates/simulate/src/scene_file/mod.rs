@@ -27,6 +27,7 @@ mod build;
 mod elastic;
 mod joints;
 mod meshes;
+mod plane;
 mod read;
 
 pub(crate) use meshes::load as load_mesh;
@@ -55,8 +56,13 @@ pub struct SceneFile {
     /// The title of pictures and files.
     #[serde(default)]
     pub name: String,
+    /// 3, or 2: then bodies move in the plane of the first two axes and turn about the third. Vectors have two components there, what turns one; densities are in kg/m².
+    #[serde(default = "space")]
+    #[schemars(range(min = 2, max = 3))]
+    pub dimension: u8,
     /// Acceleration of gravity, m/s².
     #[serde(default = "earth")]
+    #[schemars(schema_with = "plane::vector")]
     pub gravity: [f64; 3],
     /// How long, and in which steps.
     pub time: Time,
@@ -115,7 +121,7 @@ pub struct Time {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SolverTable {
-    /// A solver of `nonsmooth list` for local problems in 3D.
+    /// A solver of `nonsmooth list` for local problems of the scene's dimension.
     pub name: String,
     /// The relative residual at which the judge is content.
     pub tol: f64,
@@ -134,7 +140,7 @@ impl Default for SolverTable {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
-    /// kg/m³; for bodies that have no density or mass of their own.
+    /// kg/m³, in the plane kg/m²; for bodies that have no density or mass of their own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub density: Option<f64>,
 }
@@ -202,12 +208,13 @@ pub enum ShapeTable {
         /// m.
         radius: f64,
     },
-    /// A box about the origin, sides along the axes.
+    /// A box about the origin, sides along the axes; in the plane a rectangle.
     Box {
         /// Half sides, m.
+        #[schemars(schema_with = "plane::vector")]
         half: [f64; 3],
     },
-    /// All points within the radius of a segment on the third axis about the origin.
+    /// All points within the radius of a segment on the third axis about the origin, in the plane on the first.
     Capsule {
         /// Half the length of the segment, m.
         half_length: f64,
@@ -243,18 +250,29 @@ pub enum ShapeTable {
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         triangles: Vec<[usize; 3]>,
     },
-    /// The ground below heights at the knots of a grid about the origin, solid below; of bodies that do not meet others of their kind.
+    /// The ground below heights at the knots of a grid about the origin, solid below.
     Heightfield {
         /// m; a row for each place along the second axis.
         heights: Vec<Vec<f64>>,
         /// Its sides along the first two axes, m.
         size: [f64; 2],
     },
-    /// The half space below a plane through the origin; of bodies that are fixed.
+    /// The half space below a plane through the origin, in the plane the half plane below a line; of bodies that are fixed.
     Plane {
-        /// Its normal, of any length.
+        /// Its normal, of any length; upwards where none is given.
         #[serde(default = "upwards")]
+        #[schemars(schema_with = "plane::vector")]
         normal: [f64; 3],
+    },
+    /// All points of the plane within the radius of the origin.
+    Disc {
+        /// m.
+        radius: f64,
+    },
+    /// A convex polygon in the plane.
+    Polygon {
+        /// Corners (x, y), counterclockwise, m.
+        vertices: Vec<[f64; 2]>,
     },
     /// A convex polyhedron.
     Polyhedron {
@@ -318,9 +336,11 @@ pub struct PartTable {
     pub shape: ShapeOrName,
     /// The origin of the shape in the body, m.
     #[serde(default)]
+    #[schemars(schema_with = "plane::vector")]
     pub position: [f64; 3],
     /// The orientation of the shape in the body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "plane::rotation")]
     pub rotation: Option<RotationTable>,
     /// The material, in place of the body's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -343,7 +363,7 @@ pub struct BodyTable {
     /// One of `materials`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub material: Option<String>,
-    /// kg/m³, in place of the material's.
+    /// kg/m³, in the plane kg/m², in place of the material's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density: Option<f64>,
     /// kg.
@@ -351,15 +371,20 @@ pub struct BodyTable {
     pub mass: Option<f64>,
     /// kg·m²: `[xx, yy, zz]` or `[xx, yy, zz, xy, xz, yz]`, in the body frame.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "plane::inertia")]
     pub inertia: Option<Vec<f64>>,
     /// Where the origin of its frame is, m.
+    #[schemars(schema_with = "plane::vector")]
     pub position: [f64; 3],
     /// The orientation of its frame.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "plane::rotation")]
     pub rotation: Option<RotationTable>,
     /// Of the mass centre, m/s.
+    #[schemars(schema_with = "plane::vector")]
     pub velocity: [f64; 3],
     /// In the world frame, rad/s.
+    #[schemars(schema_with = "plane::turn")]
     pub angular_velocity: [f64; 3],
     /// Whether it stays where it is.
     pub fixed: bool,
@@ -367,8 +392,10 @@ pub struct BodyTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionTable>,
     /// Constant force at the mass centre besides the weight, N.
+    #[schemars(schema_with = "plane::vector")]
     pub force: [f64; 3],
     /// Constant torque in the world frame, N·m.
+    #[schemars(schema_with = "plane::turn")]
     pub torque: [f64; 3],
     /// The groups that it belongs to; of all, where none is named.
     pub groups: Vec<String>,
@@ -459,14 +486,17 @@ pub enum MotionTable {
     Surface {
         /// At the origin of the body, m/s.
         #[serde(default)]
+        #[schemars(schema_with = "plane::vector")]
         velocity: [f64; 3],
         /// rad/s.
         #[serde(default)]
+        #[schemars(schema_with = "plane::turn")]
         angular_velocity: [f64; 3],
     },
     /// About its position by `amplitude sin(frequency t + phase)`: a shaking table.
     Sine {
         /// m.
+        #[schemars(schema_with = "plane::vector")]
         amplitude: [f64; 3],
         /// rad/s.
         frequency: f64,
@@ -502,12 +532,15 @@ pub struct ForceTable {
     pub body: String,
     /// In the world frame, N.
     #[serde(default)]
+    #[schemars(schema_with = "plane::vector")]
     pub force: [f64; 3],
     /// In the world frame, N·m.
     #[serde(default)]
+    #[schemars(schema_with = "plane::turn")]
     pub torque: [f64; 3],
     /// Where the force acts, in the body frame, m.
     #[serde(default)]
+    #[schemars(schema_with = "plane::vector")]
     pub at: [f64; 3],
     /// It begins here, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -532,15 +565,19 @@ pub struct JointTable {
     pub b: String,
     /// Where it is, m.
     #[serde(default)]
+    #[schemars(schema_with = "plane::vector")]
     pub anchor: [f64; 3],
     /// The end on b of a `distance`, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "plane::vector")]
     pub anchor_b: Option<[f64; 3]>,
     /// Its axis, of any length.
     #[serde(default = "upwards")]
+    #[schemars(schema_with = "plane::vector")]
     pub axis: [f64; 3],
     /// Of a `universal` joint the axis on b, at a right angle to `axis`, which is that on a; of others a direction across the axis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "plane::vector")]
     pub reference: Option<[f64; 3]>,
     /// Of a `screw` the slide per angle, m/rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -741,8 +778,15 @@ impl Default for OutputTable {
     }
 }
 
+/// Gravity where none is given, m/s².
+const EARTH: f64 = 9.81;
+
 fn earth() -> [f64; 3] {
-    [0.0, 0.0, -9.81]
+    [0.0, 0.0, -EARTH]
+}
+
+fn space() -> u8 {
+    3
 }
 
 fn yes() -> bool {

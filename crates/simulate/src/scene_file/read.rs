@@ -28,6 +28,7 @@ impl SceneFile {
         for change in changes {
             apply(&mut document, change)?;
         }
+        super::plane::lift(&mut document)?;
         let scene: Self = serde_path_to_error::deserialize(document).map_err(|e| {
             let path = match e.path().to_string() {
                 root if root == "." => "the scene".to_owned(),
@@ -55,6 +56,7 @@ impl SceneFile {
             format: FORMAT.into(),
             version: VERSION,
             name: family.into(),
+            dimension: 3,
             gravity: super::earth(),
             time: Time { h, end },
             integrator: MoreauJean::default(),

@@ -10,7 +10,7 @@ use crate::moving::Moving;
 use crate::rotation::{Pose, cayley, inverse};
 use crate::state::State;
 use crate::world::oscillation;
-use crate::{Body, Force, Geometry, Motion, World, Wrenches};
+use crate::{Body, Dimension, Force, Geometry, Motion, World, Wrenches};
 
 /// What is the same at the beginning of every step, and the memory of forces.
 pub(super) struct Start {
@@ -27,19 +27,25 @@ struct Built {
     size: f64,
     /// The ball about the mass centre that holds what is finite of it, m.
     reach: f64,
-    /// J⁻¹, and whether J is the same about all axes.
+    /// J and J⁻¹, and whether J is the same about all axes.
+    inertia: Mat3,
     inverse: Mat3,
     isotropic: bool,
 }
 
 impl Built {
-    fn new(body: &Body, size: f64) -> Self {
+    fn new(body: &Body, dimension: Dimension, size: f64) -> Self {
         let finite = body.parts.iter().filter(|p| p.shape.radius().is_finite());
-        let j = &body.inertia;
+        // In the plane one moment of inertia is all there is.
+        let j = match dimension {
+            Dimension::Three => body.inertia,
+            Dimension::Two => diagonal(body.inertia[2][2]),
+        };
         Self {
+            inertia: j,
             size,
             reach: finite.map(|p| norm(p.position) + p.shape.radius()).fold(0.0, f64::max),
-            inverse: if body.is_free() { inverse(j) } else { [[0.0; 3]; 3] },
+            inverse: if body.is_free() { inverse(&j) } else { [[0.0; 3]; 3] },
             isotropic: j[0][0] == j[1][1]
                 && j[1][1] == j[2][2]
                 && [j[0][1], j[0][2], j[1][2]] == [0.0; 3],
@@ -47,11 +53,19 @@ impl Built {
     }
 }
 
+fn diagonal(x: f64) -> Mat3 {
+    [[x, 0.0, 0.0], [0.0, x, 0.0], [0.0, 0.0, x]]
+}
+
 impl Start {
     pub fn new(world: &World, state: &State, detector: &Detector) -> Self {
         let mut sizes = detector.sizes();
         let node_sizes = sizes.split_off(world.bodies.len());
-        let built = world.bodies.iter().zip(sizes).map(|(body, size)| Built::new(body, size));
+        let built = world
+            .bodies
+            .iter()
+            .zip(sizes)
+            .map(|(body, size)| Built::new(body, world.dimension, size));
         Self {
             built: built.collect(),
             node_sizes,
@@ -94,8 +108,12 @@ impl Start {
         let start = state.pose(k);
         let free = body.is_free();
         let weight = if free { scale(body.mass, world.gravity) } else { [0.0; 3] };
-        let push = add(weight, add(body.force, self.wrenches.force[k]));
-        let twist = add(body.torque, self.wrenches.torque[k]);
+        let mut push = add(weight, add(body.force, self.wrenches.force[k]));
+        let mut twist = add(body.torque, self.wrenches.torque[k]);
+        if world.dimension == Dimension::Two {
+            // What a force would do across the plane is taken by the plane.
+            (push[2], twist[0], twist[1]) = (0.0 * push[2], 0.0 * twist[0], 0.0 * twist[1]);
+        }
         let omega = apply(&start.r, state.spin[k]);
         let spin = if built.isotropic { omega } else { state.spin[k] };
         let mut b = Moving {
@@ -103,7 +121,7 @@ impl Start {
             free,
             isotropic: built.isotropic,
             mass: body.mass,
-            inertia: body.inertia,
+            inertia: built.inertia,
             inverse: built.inverse,
             radius: built.reach.max(built.size),
             start,

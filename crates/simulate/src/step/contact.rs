@@ -274,7 +274,8 @@ impl Tools {
         axes.clear();
         let scaled = state.memory.scaled(stride.h);
         for (near, &known) in near.iter().zip(&recalled.known) {
-            let axis = tangent_axis(near.place.normal, known.map(|m| m.axis));
+            let axis =
+                tangent_axis(near.place.normal, known.map(|m| m.axis), stride.world.dimension);
             axes.push(axis);
             let meeting = Meeting::new(stride, near, known, bodies);
             if meeting.takes_part() || self.insisted.binary_search(&near.key).is_ok() {

@@ -17,9 +17,23 @@ pub(super) struct Side {
     pub solved: Columns,
 }
 
-impl Side {
+/// What a side of a contact with D rows is in a problem.
+pub(super) trait Sided<const D: usize>: Copy + Default {
     /// Writes the side of a contact with a body that moves freely.
-    pub fn write(&mut self, row: &Row, arm: &Arm, b: &Moving) {
+    fn write(&mut self, row: &Row, arm: &Arm, b: &Moving);
+
+    /// Component i of the relative velocity that the body makes with these velocities.
+    fn velocity(&self, i: usize, of: (Vec3, Vec3)) -> f64;
+
+    /// The same with velocities as six numbers.
+    fn rate(&self, i: usize, velocities: &[f64; 6]) -> f64;
+
+    /// The block of W of two contacts, a sum over the free bodies that they share.
+    fn coupling(own: &[Self; 2], other: &[Self; 2], shared: Shared) -> [[f64; D]; D];
+}
+
+impl Sided<3> for Side {
+    fn write(&mut self, row: &Row, arm: &Arm, b: &Moving) {
         for i in 0..3 {
             let column = apply(&b.frame, arm.moment[i]);
             let turned = match row.later {
@@ -36,9 +50,62 @@ impl Side {
         }
     }
 
-    /// Component i of the relative velocity that the body makes with these velocities.
-    pub fn velocity(&self, i: usize, (v, spin): (Vec3, Vec3)) -> f64 {
+    fn velocity(&self, i: usize, (v, spin): (Vec3, Vec3)) -> f64 {
         (0..3).map(|k| self.rows[k][i] * v[k] + self.rows[3 + k][i] * spin[k]).sum()
+    }
+
+    fn rate(&self, i: usize, velocities: &[f64; 6]) -> f64 {
+        (0..6).map(|k| self.rows[k][i] * velocities[k]).sum()
+    }
+
+    #[inline]
+    fn coupling(own: &[Self; 2], other: &[Self; 2], shared: Shared) -> [[f64; 3]; 3] {
+        coupling(own, other, shared)
+    }
+}
+
+/// What one side of a contact is in a problem in the plane: for each of its two directions two components of velocity and the turn.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct FlatSide {
+    rows: [[f64; 2]; 3],
+    solved: [[f64; 2]; 3],
+}
+
+impl Sided<2> for FlatSide {
+    fn write(&mut self, row: &Row, arm: &Arm, b: &Moving) {
+        for i in 0..2 {
+            let (moment, later) = (arm.moment[i][2], arm.moment_end[i][2]);
+            for k in 0..2 {
+                self.rows[k][i] = arm.sign * row.frame_end[i][k];
+                self.solved[k][i] = arm.sign * row.frame[i][k] / b.mass;
+            }
+            self.rows[2][i] = arm.sign * if row.later { later } else { moment };
+            self.solved[2][i] = arm.sign * b.inverse[2][2] * moment;
+        }
+    }
+
+    fn velocity(&self, i: usize, (v, spin): (Vec3, Vec3)) -> f64 {
+        self.rows[0][i] * v[0] + self.rows[1][i] * v[1] + self.rows[2][i] * spin[2]
+    }
+
+    fn rate(&self, i: usize, velocities: &[f64; 6]) -> f64 {
+        let [x, y, .., turn] = velocities;
+        self.rows[0][i] * x + self.rows[1][i] * y + self.rows[2][i] * turn
+    }
+
+    #[inline]
+    fn coupling(own: &[Self; 2], other: &[Self; 2], shared: Shared) -> [[f64; 2]; 2] {
+        let mut sum = [[0.0; 2]; 2];
+        for (left, side) in own.iter().zip(shared).filter(|s| s.1 != NONE) {
+            for (left, right) in left.rows.iter().zip(&other[side as usize].solved) {
+                for i in 0..2 {
+                    for j in 0..2 {
+                        sum[i][j] += left[i] * right[j];
+                    }
+                }
+            }
+        }
+        sum
     }
 }
 
@@ -47,7 +114,7 @@ pub(super) type Shared = [u32; 2];
 
 /// The block of W of two contacts, a sum over the free bodies that they share. With AVX2 (found at run time) four numbers at once and the same bits: nothing is fused.
 #[inline]
-pub(super) fn coupling(own: &[Side; 2], other: &[Side; 2], shared: Shared) -> [[f64; 3]; 3] {
+fn coupling(own: &[Side; 2], other: &[Side; 2], shared: Shared) -> [[f64; 3]; 3] {
     let mut sum = [[0.0; 4]; 3];
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {

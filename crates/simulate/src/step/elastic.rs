@@ -141,17 +141,17 @@ impl Solids {
     }
 
     /// Adds what two contacts feel of each other through solids to their block of W.
-    pub fn couple(&self, block: &mut [[f64; 3]; 3], row: &Row, other: &Row) {
+    pub fn couple<const D: usize>(&self, block: &mut [[f64; D]; D], row: &Row, other: &Row) {
         for left in row.free_arms().filter(|a| a.body as usize >= self.bodies) {
             for right in other.free_arms().filter(|b| b.owner == left.owner) {
                 let [p, q] = [left, right].map(|arm| arm.body as usize - self.bodies);
                 let between = self.between(p, q);
                 let sign = left.sign * right.sign;
-                for i in 0..3 {
+                for i in 0..D {
                     let d = row.frame_end[i];
                     let along: Vec3 =
                         std::array::from_fn(|k| (0..3).map(|l| d[l] * between[l][k]).sum());
-                    for j in 0..3 {
+                    for j in 0..D {
                         let x: f64 = (0..3).map(|k| along[k] * other.frame[j][k]).sum();
                         block[i][j] += sign * x;
                     }

@@ -2,10 +2,18 @@
 
 use nonsmooth_scenes::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 
+use crate::Dimension;
+
+/// In place of an axis: the first tangent lies in the plane of a world that is one.
+pub(super) const IN_PLANE: u8 = 3;
+
 /// The axis of the world whose part across the normal makes the first tangent: that of the last step unless it has come near the normal.
-pub(super) fn tangent_axis(n: Vec3, last: Option<u8>) -> u8 {
+pub(super) fn tangent_axis(n: Vec3, last: Option<u8>, dimension: Dimension) -> u8 {
     const NEAR: f64 = 0.9;
-    if let Some(axis) = last
+    if dimension == Dimension::Two {
+        return IN_PLANE;
+    }
+    if let Some(axis) = last.filter(|&axis| axis < IN_PLANE)
         && n[axis as usize].abs() <= NEAR
     {
         return axis;
@@ -16,6 +24,9 @@ pub(super) fn tangent_axis(n: Vec3, last: Option<u8>) -> u8 {
 
 /// `[N, T1, T2]`, right-handed.
 pub(super) fn frame(n: Vec3, axis: u8) -> [Vec3; 3] {
+    if axis == IN_PLANE {
+        return [n, [-n[1], n[0], 0.0], [0.0, 0.0, 1.0]];
+    }
     let mut e = [0.0; 3];
     e[axis as usize] = 1.0;
     let t = sub(e, scale(n[axis as usize], n));

@@ -41,7 +41,7 @@ use std::time::Instant;
 use nonsmooth_problem::Friction;
 use nonsmooth_scenes::vec3::norm;
 
-use crate::crew::{Crew, Inner, Slot};
+use crate::crew::{Crew, Inner};
 use crate::detect::{Detector, Key, Near};
 use crate::islands::Islands;
 use crate::joints::Joints;
@@ -54,7 +54,7 @@ use begin::Start;
 use contact::Row;
 use elastic::Solids;
 use memory::Recalled;
-use problem::{Island, Statement};
+use problem::{Island, Stated};
 
 /// No body, no row.
 const NONE: u32 = u32::MAX;
@@ -95,9 +95,8 @@ pub(crate) struct Tools {
     pub joints: Joints,
     islands: Islands,
     island: Island,
-    statement: Statement,
     /// The problems of the islands, and which are not solved yet.
-    slots: Vec<Slot>,
+    stated: Stated,
     open: Vec<u32>,
     crew: Crew,
     pub contacts: Vec<ContactReport>,
@@ -123,8 +122,7 @@ impl Tools {
             joints,
             islands: Islands::default(),
             island: Island::of(world.bodies.len(), world.elastic.len()),
-            statement: Statement::default(),
-            slots: vec![],
+            stated: Stated::new(world.dimension),
             open: vec![],
             crew: Crew::new(1),
             contacts: vec![],
@@ -191,14 +189,10 @@ impl Tools {
         if self.rows.is_empty() && self.joints.rows.is_empty() {
             return Ok(None);
         }
-        self.provide(1)?;
+        self.stated.provide(1)?;
         self.gather_all();
         self.state(stride, 0);
-        let slot = &self.slots[0];
-        Ok(Some(match &slot.rolling {
-            Some(problem) => Friction::RollingLocal(problem.clone()),
-            None => Friction::Local3(slot.problem.clone()),
-        }))
+        Ok(Some(self.stated.problem(0)))
     }
 
     /// The points where bodies are near each other, and the bodies that feet are.

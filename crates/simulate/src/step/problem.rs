@@ -1,17 +1,23 @@
 //! The problem of an island in the frames of a pass: W, q, mu of its contacts, `V, R, s` and bounds of its scalar rows, and the same with rolling friction.
 
 use nonsmooth_linalg::Csc;
-use nonsmooth_problem::{Bounds, RowsLocal};
+use nonsmooth_problem::{Bounds, Friction, FrictionLocal, LocalPoint, RowsLocal};
 use nonsmooth_scenes::vec3::{Vec3, apply, dot, scale};
+use nonsmooth_solve::registry::Registered;
+use nonsmooth_solve::{Outcome, SolveError};
 
 use super::contact::Row;
-use super::couple::{Columns, Shared, Side, coupling};
+use super::couple::{Columns, FlatSide, Shared, Side, Sided};
+use super::elastic::Solids;
 use super::{NONE, Stride, Tools, are_finite};
-use crate::SimulateError;
-use crate::crew::Slot;
+use crate::crew::{Asked, Crew, Inner, Sessions, Slot};
 use crate::joints::Joints;
 use crate::moving::Moving;
 use crate::rolling::{self, Roller, Turning};
+use crate::{Dimension, SimulateError};
+
+/// The most iterations on a problem that is linear.
+const LINEAR: usize = 10;
 
 /// The island that is being stated or taken up: its contacts and scalar rows, by their places among those of the step, its free bodies and its elastic solids.
 pub(super) struct Island {
@@ -80,16 +86,47 @@ impl Island {
     }
 }
 
-/// The memory of a statement.
-#[derive(Default)]
-pub(super) struct Statement {
+/// The problems of the islands of a step, whose contacts have D rows, and what states and solves them.
+pub(super) struct Problems<const D: usize, S> {
     /// Of each contact of the step the sides.
-    pub sides: Vec<[Side; 2]>,
+    sides: Vec<[S; 2]>,
     chains: Chains,
     /// For each contact the place of the last block of its row of W that was mirrored, at first the diagonal one.
     mirrored: Vec<u32>,
     /// The scalar rows of each body, with the number of the lever.
     levers: Vec<(u32, u32, u32)>,
+    slots: Vec<Slot<D>>,
+    /// Those that solve small islands, one a thread.
+    sessions: Vec<Sessions<D>>,
+}
+
+impl<const D: usize, S> Default for Problems<D, S> {
+    fn default() -> Self {
+        Self {
+            sides: vec![],
+            chains: Chains::default(),
+            mirrored: vec![],
+            levers: vec![],
+            slots: vec![],
+            sessions: vec![],
+        }
+    }
+}
+
+/// Those of a world in space, or in the plane.
+pub(super) enum Stated {
+    Space(Problems<3, Side>),
+    Plane(Problems<2, FlatSide>),
+}
+
+/// Of either.
+macro_rules! either {
+    ($stated:expr, $problems:ident => $done:expr) => {
+        match $stated {
+            Stated::Space($problems) => $done,
+            Stated::Plane($problems) => $done,
+        }
+    };
 }
 
 /// The contacts of each body of an island as a list, in order.
@@ -161,15 +198,62 @@ impl Chains {
     }
 }
 
-impl Tools {
-    /// Makes so many slots ready.
-    pub(super) fn provide(&mut self, slots: usize) -> Result<(), SimulateError> {
-        while self.slots.len() < slots {
-            self.slots.push(Slot::new()?);
+impl Stated {
+    pub fn new(dimension: Dimension) -> Self {
+        match dimension {
+            Dimension::Three => Self::Space(Problems::default()),
+            Dimension::Two => Self::Plane(Problems::default()),
         }
-        Ok(())
     }
 
+    /// Makes so many slots ready.
+    pub fn provide(&mut self, slots: usize) -> Result<(), SimulateError> {
+        either!(self, problems => problems.provide(slots))
+    }
+
+    /// What is asked of the solver of slot k.
+    pub fn ask(&mut self, k: usize, asked: Asked) {
+        either!(self, problems => problems.ask(k, asked));
+    }
+
+    /// Solves the `open` ones of the first slots.
+    pub fn solve(
+        &mut self,
+        crew: &Crew,
+        (count, open): (usize, &[u32]),
+        inner: &Inner,
+    ) -> Result<(), SimulateError> {
+        either!(self, p => crew.solve((&mut p.slots[..count], &mut p.sessions), open, inner))
+    }
+
+    /// What came of slot k; nothing where its problem is not finite.
+    pub fn outcome(&mut self, k: usize) -> Option<Result<Outcome, SolveError>> {
+        either!(self, problems => problems.slots[k].outcome.take())
+    }
+
+    /// The impulses of slot k.
+    pub fn copy_impulses(&self, k: usize, island: &Island, rows: &mut [Row], joints: &mut Joints) {
+        either!(self, problems => problems.copy_impulses(k, island, rows, joints));
+    }
+
+    /// The problem of slot k.
+    pub fn problem(&self, k: usize) -> Friction {
+        match self {
+            Self::Plane(problems) => Friction::Local2(problems.slots[k].problem.clone()),
+            Self::Space(problems) => match &problems.slots[k] {
+                Slot { rolling: Some(problem), .. } => Friction::RollingLocal(problem.clone()),
+                slot => Friction::Local3(slot.problem.clone()),
+            },
+        }
+    }
+
+    /// The relative velocity of a contact after the step.
+    pub fn after(&self, place: usize, row: &Row, bodies: &[Moving]) -> [f64; 3] {
+        either!(self, problems => problems.after(place, row, bodies))
+    }
+}
+
+impl Tools {
     pub(super) fn gather(&mut self, k: usize) {
         let Self { islands, island, rows, joints, .. } = self;
         let first = if k == 0 { 0 } else { islands.ends[k - 1] };
@@ -189,25 +273,82 @@ impl Tools {
             self.bodies[b as usize].pass(scheme, h);
         }
         self.joints.columns(scheme, &self.island.scalars, &self.bodies);
-        self.write_sides();
-        self.state_contacts(k) && self.state_rows(k) && self.state_rolling(k)
+        let Self { island, rows, bodies, solids, joints, stated, .. } = self;
+        let parts = Parts { island, rows, bodies, joints };
+        match stated {
+            Stated::Space(p) => {
+                p.state(&parts, solids, k) && p.state_rows(&parts, k) && p.state_rolling(&parts, k)
+            }
+            Stated::Plane(p) => p.state(&parts, solids, k) && p.state_rows(&parts, k),
+        }
+    }
+}
+
+/// What the problem of an island is made of.
+struct Parts<'a> {
+    island: &'a Island,
+    rows: &'a [Row],
+    bodies: &'a [Moving],
+    joints: &'a Joints,
+}
+
+impl<const D: usize, S: Sided<D>> Problems<D, S>
+where
+    FrictionLocal<D>: Registered<Point = LocalPoint>,
+{
+    fn provide(&mut self, slots: usize) -> Result<(), SimulateError> {
+        while self.slots.len() < slots {
+            self.slots.push(Slot::new()?);
+        }
+        Ok(())
+    }
+
+    fn ask(&mut self, k: usize, asked: Asked) {
+        let slot = &mut self.slots[k];
+        // Equations alone are solved at once, or not at all.
+        let linear = slot.problem.rows.as_ref().is_some_and(|r| r.bounds.are_free());
+        let linear = linear && slot.problem.mu.is_empty();
+        slot.asked = Asked { most: if linear { LINEAR } else { usize::MAX }, ..asked };
+    }
+
+    fn copy_impulses(&self, k: usize, island: &Island, rows: &mut [Row], joints: &mut Joints) {
+        let Slot { point, rolling, .. } = &self.slots[k];
+        let width = if rolling.is_some() { 5 } else { D };
+        for (&c, r) in island.contacts.iter().zip(point.r.chunks_exact(width)) {
+            let row = &mut rows[c as usize];
+            row.r[..D].copy_from_slice(&r[..D]);
+            if rolling.is_some() {
+                row.moment.copy_from_slice(&r[3..]);
+            }
+        }
+        for (&k, &lambda) in island.scalars.iter().zip(&point.lambda) {
+            joints.rows[k as usize].lambda = lambda;
+        }
+    }
+
+    fn after(&self, place: usize, row: &Row, bodies: &[Moving]) -> [f64; 3] {
+        let sides = &self.sides[place];
+        let along = |i| row.velocity(sides, i, row.given[i], bodies, |b| (b.v_new, b.spin_new));
+        std::array::from_fn(|i| if i < D { along(i) } else { 0.0 })
     }
 
     /// The columns of H and the rows of the velocities.
-    fn write_sides(&mut self) {
-        let Self { island, rows, bodies, statement: Statement { sides, .. }, .. } = self;
-        sides.resize(rows.len(), [Side::default(); 2]);
+    fn write_sides(&mut self, Parts { island, rows, bodies, .. }: &Parts) {
+        self.sides.resize(rows.len(), [S::default(); 2]);
         for &c in &island.contacts {
             let row = &rows[c as usize];
-            for (arm, side) in row.arms.iter().zip(&mut sides[c as usize]).filter(|a| a.0.free) {
+            let sides = &mut self.sides[c as usize];
+            for (arm, side) in row.arms.iter().zip(sides).filter(|a| a.0.free) {
                 side.write(row, arm, &bodies[arm.body as usize]);
             }
         }
     }
 
-    fn state_contacts(&mut self, k: usize) -> bool {
-        let Self { island, rows, bodies, solids, statement, slots, .. } = self;
-        let Statement { sides, chains, mirrored, .. } = statement;
+    /// W, q and mu, and the impulses to begin with.
+    fn state(&mut self, parts: &Parts, solids: &mut Solids, k: usize) -> bool {
+        self.write_sides(parts);
+        let Parts { island, rows, bodies, .. } = *parts;
+        let Self { sides, chains, mirrored, slots, .. } = self;
         let Slot { problem, point, .. } = &mut slots[k];
         let order = &island.contacts;
         chains.link(island, order.iter().map(|&c| rows[c as usize].free_owners()));
@@ -225,8 +366,8 @@ impl Tools {
         for (c, &place) in order.iter().enumerate() {
             let (row, own) = (&rows[place as usize], &sides[place as usize]);
             problem.mu.push(row.mu);
-            point.r.extend_from_slice(&row.r);
-            for i in 0..3 {
+            point.r.extend_from_slice(&row.r[..D]);
+            for i in 0..D {
                 let given = row.given[i] + row.shift[i];
                 let q = row.velocity(own, i, given, bodies, |b| (b.v_free, b.spin_free));
                 problem.q.push(q);
@@ -240,7 +381,7 @@ impl Tools {
                     std::array::from_fn(|p| std::array::from_fn(|q| there[q][p]))
                 } else {
                     let other = &sides[order[j] as usize];
-                    let mut block = coupling(own, other, shared);
+                    let mut block = S::coupling(own, other, shared);
                     if !solids.is_empty() {
                         solids.couple(&mut block, row, &rows[order[j] as usize]);
                     }
@@ -250,7 +391,7 @@ impl Tools {
                     }
                     block
                 };
-                check += 0.0 * (block[0][0] + block[1][1] + block[2][2]);
+                check += 0.0 * (0..D).map(|i| block[i][i]).sum::<f64>();
                 problem.W.push(j, block);
             }
             problem.W.end_row();
@@ -260,16 +401,16 @@ impl Tools {
 
     /// The scalar rows, after the contacts: `V`, `R`, `s` and the bounds.
     #[allow(non_snake_case)]
-    fn state_rows(&mut self, k: usize) -> bool {
-        let Self { island, bodies, joints, statement, slots, .. } = self;
+    fn state_rows(&mut self, parts: &Parts, k: usize) -> bool {
+        let Parts { island, bodies, joints, .. } = *parts;
+        let Self { sides, chains, levers, slots, .. } = self;
         let Slot { problem, point, .. } = &mut slots[k];
-        let Island { contacts: order, scalars, .. } = &*island;
+        let Island { contacts: order, scalars, .. } = island;
         point.lambda.clear();
         if scalars.is_empty() {
             problem.rows = None;
             return true;
         }
-        let Statement { sides, chains, levers, .. } = statement;
         levers.clear();
         for (j, &k) in scalars.iter().enumerate() {
             let each = joints.levers(k as usize).iter().enumerate();
@@ -294,10 +435,9 @@ impl Tools {
                     }
                 }
                 for (c, side) in chains.of(body) {
-                    let arm = &sides[order[c] as usize][side].rows;
-                    for i in 0..3 {
-                        let entry: f64 = (0..6).map(|k| arm[k][i] * solved[k]).sum();
-                        v.push((3 * c + i, e.1 as usize, entry));
+                    let arm = &sides[order[c] as usize][side];
+                    for i in 0..D {
+                        v.push((D * c + i, e.1 as usize, arm.rate(i, solved)));
                     }
                 }
             }
@@ -317,22 +457,25 @@ impl Tools {
             r.push((j, j, row.compliance));
         }
         let finite = r.iter().chain(&v).all(|e| e.2.is_finite()) && s.iter().all(|x| x.is_finite());
-        let (n, p) = (3 * order.len(), scalars.len());
+        let (n, p) = (D * order.len(), scalars.len());
         let V = Csc::from_triplets(n, p, v.into_iter()).expect("in range");
         let R = Csc::from_triplets(p, p, r.into_iter()).expect("in range");
         problem.rows = Some(RowsLocal { V, R, s, bounds });
         finite
     }
+}
 
+impl Problems<3, Side> {
     /// The problem with rolling friction, where a contact has any, beside that without.
-    fn state_rolling(&mut self, k: usize) -> bool {
-        let Self { island, rows, bodies, joints, statement, slots, .. } = self;
+    fn state_rolling(&mut self, parts: &Parts, k: usize) -> bool {
+        let Parts { island, rows, bodies, joints } = *parts;
+        let Self { sides, slots, .. } = self;
         let Slot { problem, rolling, point, .. } = &mut slots[k];
         *rolling = None;
         if island.contacts.iter().all(|&c| rows[c as usize].mu_r == 0.0) {
             return true;
         }
-        let roller = |&c: &u32| rows[c as usize].roller(&statement.sides[c as usize], bodies);
+        let roller = |&c: &u32| rows[c as usize].roller(&sides[c as usize], bodies);
         let rollers: Vec<Roller> = island.contacts.iter().map(roller).collect();
         let levers = island.scalars.iter().enumerate().flat_map(|(j, &k)| {
             let each = joints.levers(k as usize).iter();
@@ -349,9 +492,9 @@ impl Tools {
 
 impl Row {
     /// Component i of a relative velocity: what is given and what free bodies make with these velocities.
-    pub(super) fn velocity(
+    fn velocity<const D: usize, S: Sided<D>>(
         &self,
-        sides: &[Side; 2],
+        sides: &[S; 2],
         i: usize,
         given: f64,
         bodies: &[Moving],

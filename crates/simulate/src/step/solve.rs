@@ -11,9 +11,6 @@ use crate::moving::Moving;
 use crate::report::{StepReport, StepStatus, worst_share};
 use crate::{Geometry, SimulateError};
 
-/// The most iterations on a problem that is linear.
-const LINEAR: usize = 10;
-
 /// What the islands of a step have come to.
 pub(super) struct Solved {
     /// That of the first island that is not solved.
@@ -47,7 +44,7 @@ impl Solved {
 impl Tools {
     pub(super) fn solve(&mut self, stride: Stride, inner: &Inner) -> Result<Solved, SimulateError> {
         let count = self.islands.ends.len();
-        self.provide(count)?;
+        self.stated.provide(count)?;
         self.open.clear();
         self.open.extend(0..count as u32);
         let mut solved = Solved::default();
@@ -59,7 +56,7 @@ impl Tools {
                 solved.largest = solved.largest.max(self.island.contacts.len());
             }
             let begun = Instant::now();
-            self.crew.solve(&mut self.slots[..count], &open, inner)?;
+            self.stated.solve(&self.crew, (count, &open), inner)?;
             solved.seconds += begun.elapsed().as_secs_f64();
             let mut taken = Ok(());
             open.retain(|&k| {
@@ -79,11 +76,7 @@ impl Tools {
         self.gather(k);
         let finite = self.state(stride, k);
         let may_rest = pass == 1 && inner.is_auto() && self.may_rest(stride.rest());
-        let slot = &mut self.slots[k];
-        // Equations alone are solved at once, or not at all.
-        let linear = slot.problem.rows.as_ref().is_some_and(|r| r.bounds.are_free());
-        let linear = linear && slot.problem.mu.is_empty();
-        slot.asked = Asked { finite, may_rest, most: if linear { LINEAR } else { usize::MAX } };
+        self.stated.ask(k, Asked { finite, may_rest, ..Asked::default() });
     }
 
     /// Whether the bodies of the island are slower than `rest` while most of its contacts are new, so that no impulses of the step before lead on.
@@ -107,14 +100,14 @@ impl Tools {
         k: usize,
         solved: &mut Solved,
     ) -> Result<bool, SimulateError> {
-        let Some(outcome) = self.slots[k].outcome.take() else {
+        let Some(outcome) = self.stated.outcome(k) else {
             solved.residual = f64::NAN;
             solved.status = StepStatus::NotFinite;
             return Ok(false);
         };
         let outcome = outcome?;
         self.gather(k);
-        self.copy_impulses(k);
+        self.stated.copy_impulses(k, &self.island, &mut self.rows, &mut self.joints);
         let mut change = self.respond(stride);
         if stride.scheme.geometry == Geometry::Midpoint && !self.island.scalars.is_empty() {
             change = change.max(self.recentre(stride));
@@ -135,23 +128,6 @@ impl Tools {
             solved.status = ended;
         }
         Ok(false)
-    }
-
-    /// The impulses of slot k.
-    fn copy_impulses(&mut self, k: usize) {
-        let Self { island, rows, joints, slots, .. } = self;
-        let (point, rolls) = (&slots[k].point, slots[k].rolling.is_some());
-        let width = if rolls { 5 } else { 3 };
-        for (&c, r) in island.contacts.iter().zip(point.r.chunks_exact(width)) {
-            let row = &mut rows[c as usize];
-            row.r.copy_from_slice(&r[..3]);
-            if rolls {
-                row.moment.copy_from_slice(&r[3..]);
-            }
-        }
-        for (&k, &lambda) in island.scalars.iter().zip(&point.lambda) {
-            joints.rows[k as usize].lambda = lambda;
-        }
     }
 
     /// Velocities after the step with the impulses of the island; how much solving the rotations exactly has changed them, relative.

@@ -113,9 +113,7 @@ impl Tools {
         report.active = true;
         (report.point, report.frame) = (row.place.point, row.frame);
         (report.impulse, report.before, report.moment) = (row.r, row.before, row.moment);
-        let sides = &self.statement.sides[place];
-        report.after = [0, 1, 2]
-            .map(|i| row.velocity(sides, i, row.given[i], &self.bodies, |b| (b.v_new, b.spin_new)));
+        report.after = self.stated.after(place, row, &self.bodies);
         report.rolling = row.turned;
         for arm in row.free_arms() {
             let b = &self.bodies[arm.body as usize];

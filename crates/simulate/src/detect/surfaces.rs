@@ -1,0 +1,277 @@
+//! Two surfaces with something solid behind them, at most one of which is a heightfield.
+//!
+//! Pairs of triangles that are near come from going down both trees together. A triangle is met by another one with the normal of the first, with that of the second unless the two
+//! lie on each other, and by pairs of edges with the normal across both. Each point is named by the features of both surfaces and taken where its normal is in the cones of normals of both
+//! features, so that nothing is met across an edge that is not there.
+//!
+//! A triangle does not say how deep a body is behind it. What is deeper than a share of the thinner body is no contact; and of two faces that a point is behind the nearer one is
+//! met: a corner that has sunk a little into the top of a box is not far behind its side.
+//!
+//! Cost: the pairs of triangles that are near each other, times the logarithm of all.
+
+use nonsmooth_scenes::vec3::{Vec3, add, cross, dot, norm, scale, sub};
+
+use crate::detect::broad::Aabb;
+use crate::detect::clip::Clip;
+use crate::detect::segments::{Segment, closest};
+use crate::detect::surface::{CONE, DEEP, FACING, Scratch, Surface, Thin};
+use crate::detect::witness::{Feature, Witness};
+use crate::rotation::{Pose, product};
+
+/// Penetrations below this share of the thinner body are not looked at twice.
+const SHALLOW: f64 = 1e-3;
+/// By which share of the depth of a point the surface must be away from it: of faces, and of edges, which are less deep than they separate.
+const NEARER: [f64; 2] = [0.5, 0.05];
+/// Edges that are parallel up to this have no common normal.
+const PARALLEL: f64 = 1e-6;
+
+/// Pairs of triangles, or of nodes of two trees.
+type Pairs = Vec<(u32, u32)>;
+
+/// A surface with the pose of its body.
+type Placed<'a> = (&'a Surface, &'a Pose);
+
+/// All points where the first surface is nearer to the second than `prediction`.
+pub(crate) fn collide(
+    (a, a_pose): Placed,
+    (b, b_pose): Placed,
+    prediction: f64,
+    (clip, scratch): (&mut Clip, &mut Scratch),
+    mut found: impl FnMut([Feature; 2], Witness),
+) {
+    let back = std::array::from_fn(|i| std::array::from_fn(|j| a_pose.r[j][i]));
+    let relative = Pose { x: a_pose.local_point(b_pose.x), r: product(&back, &b_pose.r) };
+    let Scratch { thin, other, pairs, stack, found: list, .. } = scratch;
+    near(a, b, &relative, prediction, (pairs, stack));
+    let thin_body = a.thickness.min(b.thickness);
+    let mut last = u32::MAX;
+    for &(t, u) in &*pairs {
+        if t != last {
+            a.template(t, a_pose, thin);
+            last = t;
+        }
+        b.template(u, b_pose, other);
+        let facing = dot(thin.posed.normals[0], other.posed.normals[0]);
+        if facing < CONE {
+            let both = facing < FACING * FACING - 1.0;
+            let (one, two) = ((a, t, &*thin, a_pose), (b, u, &*other, b_pose));
+            for (first, second, on_a) in [(one, two, true), (two, one, false)] {
+                list.clear();
+                on_face(first, second, clip, prediction, |f, w| list.push((f, w)));
+                if too_deep(list, (first.0, first.3), second.3, thin_body) {
+                    continue;
+                }
+                for &([f, g], w) in list.iter() {
+                    if on_a { found([f, g], w) } else { found([g, f], w.swapped()) }
+                }
+                // What lies on each other is met with the normal of the first.
+                if both {
+                    break;
+                }
+            }
+        }
+        for (e, f) in edges((a, t), (b, u)) {
+            if let Some(witness) = across((a, a_pose, e), (b, b_pose, f), prediction, thin_body) {
+                found([Feature::Edge(e), Feature::Edge(f)], witness);
+            }
+        }
+    }
+}
+
+/// The triangles whose boxes are within `margin` of each other, in order; `pose` is that of b in the frame of a.
+fn near(
+    a: &Surface,
+    b: &Surface,
+    pose: &Pose,
+    margin: f64,
+    (out, stack): (&mut Pairs, &mut Pairs),
+) {
+    let carried = |bounds: &Aabb| {
+        let middle = pose.point(std::array::from_fn(|d| 0.5 * (bounds.low[d] + bounds.high[d])));
+        let half: Vec3 = std::array::from_fn(|d| 0.5 * (bounds.high[d] - bounds.low[d]));
+        let reach: Vec3 =
+            pose.r.map(|row| margin + (0..3).map(|k| row[k].abs() * half[k]).sum::<f64>());
+        Aabb {
+            low: std::array::from_fn(|d| middle[d] - reach[d]),
+            high: std::array::from_fn(|d| middle[d] + reach[d]),
+        }
+    };
+    out.clear();
+    stack.clear();
+    stack.push((0, 0));
+    while let Some((i, j)) = stack.pop() {
+        let (p, q) = (&a.tree[i as usize], &b.tree[j as usize]);
+        if !p.bounds.meets(&carried(&q.bounds)) {
+            continue;
+        }
+        match (p.count, q.count) {
+            (0, 0) => {
+                for i in [p.first, p.first + 1] {
+                    stack.extend([(i, q.first), (i, q.first + 1)]);
+                }
+            }
+            (0, _) => stack.extend([(p.first, j), (p.first + 1, j)]),
+            (_, 0) => stack.extend([(i, q.first), (i, q.first + 1)]),
+            (m, n) => {
+                for &u in &b.order[q.first as usize..(q.first + n) as usize] {
+                    let own = carried(&b.bounds(u));
+                    let all = &a.order[p.first as usize..(p.first + m) as usize];
+                    let met = all.iter().filter(|t| a.bounds(**t).meets(&own));
+                    out.extend(met.map(|&t| (t, u)));
+                }
+            }
+        }
+    }
+    out.sort_unstable();
+}
+
+/// A triangle of a surface with its polyhedron and the pose of its body.
+type Triangle<'a> = (&'a Surface, u32, &'a Thin, &'a Pose);
+
+/// Where a triangle of the second surface is nearer than `prediction` in front of one of the first, along the normal of that.
+fn on_face(
+    (a, t, first, a_pose): Triangle,
+    (b, u, second, b_pose): Triangle,
+    clip: &mut Clip,
+    prediction: f64,
+    mut found: impl FnMut([Feature; 2], Witness),
+) {
+    let n = first.posed.normals[0];
+    let against = b_pose.local_direction(scale(-1.0, n));
+    let facing = dot(against, b.normals[u as usize]) > 1.0 - FACING * FACING;
+    let reference = (&first.hull, &first.posed, a_pose);
+    let incident = (&second.hull, &second.posed, b_pose);
+    clip.on_face(reference, incident, 0, prediction, |[f, g], witness| {
+        let (f, g) = (a.named(t, f), b.named(u, g));
+        // An edge that is inclined to the face is nearest to it at one of its ends, or where it crosses an edge.
+        let along = match g {
+            Feature::Edge(e) => {
+                let d = b.edge(e).d;
+                dot(against, d).abs() <= FACING * norm(d)
+            }
+            _ => true,
+        };
+        let met = facing || (along && b.has_normal(g, against));
+        if met && !a.is_flat(f) && !b.is_flat(g) {
+            found([f, g], witness);
+        }
+    });
+}
+
+/// Whether points that a face of the surface was met at are not behind that face, but behind another one, or behind nothing.
+fn too_deep(
+    list: &[([Feature; 2], Witness)],
+    (a, pose): Placed,
+    other: &Pose,
+    thickness: f64,
+) -> bool {
+    let (mut mean, mut depth) = ([0.0; 3], 0.0);
+    let share = 1.0 / list.len() as f64;
+    for (_, witness) in list {
+        let Witness::Face { other: point, .. } = witness else { continue };
+        mean = add(mean, scale(share, pose.local_point(other.point(*point))));
+        depth -= share * witness.place(pose, other, [0.0, 0.0, 1.0]).gap;
+    }
+    depth > DEEP * thickness
+        || (depth > SHALLOW * thickness && a.is_within(mean, NEARER[0] * depth))
+}
+
+/// The edges of two triangles, each of the pairs of a surface once.
+fn edges((a, t): (&Surface, u32), (b, u): (&Surface, u32)) -> impl Iterator<Item = (u32, u32)> {
+    // An edge belongs to the first of its triangles; where it is flat, or between triangles that look inwards, nothing is across it.
+    let own = |s: &Surface, t: u32| {
+        s.sides[t as usize].map(|e| {
+            let (of, flat) = s.edges[e as usize];
+            (of[0] == t && !flat).then_some(e)
+        })
+    };
+    let (first, second) = (own(a, t), own(b, u));
+    first.into_iter().flatten().flat_map(move |e| second.into_iter().flatten().map(move |f| (e, f)))
+}
+
+/// Two edges that cross, with their common normal.
+fn across(
+    (a, a_pose, e): (&Surface, &Pose, u32),
+    (b, b_pose, f): (&Surface, &Pose, u32),
+    prediction: f64,
+    thickness: f64,
+) -> Option<Witness> {
+    let (s, t) = (a.edge(e), b.edge(f));
+    let (p, q) = (s.placed(a_pose), t.placed(b_pose));
+    let (x, y) = closest(&p, &q);
+    let inside = |x: f64| x > 0.0 && x < 1.0;
+    if !inside(x) || !inside(y) {
+        return None;
+    }
+    let d = sub(q.at(y), p.at(x));
+    if norm(d) > f64::max(prediction, DEEP * thickness) {
+        return None;
+    }
+    let product = cross(p.d, q.d);
+    let length = norm(product);
+    if length <= PARALLEL * norm(p.d) * norm(q.d) {
+        return None;
+    }
+    let of_both = |sign: &f64| {
+        let n = scale(sign / length, product);
+        a.has_normal(Feature::Edge(e), a_pose.local_direction(n))
+            && b.has_normal(Feature::Edge(f), b_pose.local_direction(scale(-1.0, n)))
+    };
+    let sign = [1.0, -1.0].into_iter().find(of_both)?;
+    let gap = dot(scale(sign / length, product), d);
+    let deep = || {
+        -gap > SHALLOW * thickness
+            && (a.is_within(a_pose.local_point(q.at(y)), -NEARER[1] * gap)
+                || b.is_within(b_pose.local_point(p.at(x)), -NEARER[1] * gap))
+    };
+    (gap <= prediction && !deep()).then_some(Witness::Edges { s, t, sign })
+}
+
+impl Surface {
+    /// An edge, in the frame of the body.
+    fn edge(&self, e: u32) -> Segment {
+        let t = self.edges[e as usize].0[0] as usize;
+        let k = self.sides[t].iter().position(|&s| s == e).unwrap_or(0);
+        let [p, q] = [k, k + 1].map(|i| self.vertices[self.triangles[t][i % 3] as usize]);
+        Segment::between(p, q)
+    }
+
+    /// Whether some triangle is nearer to x, in the frame of the body, than `radius`.
+    fn is_within(&self, x: Vec3, radius: f64) -> bool {
+        let mut stack = vec![0_u32];
+        while let Some(k) = stack.pop() {
+            let node = &self.tree[k as usize];
+            let bounds = &node.bounds;
+            let beyond: Vec3 =
+                std::array::from_fn(|d| (bounds.low[d] - x[d]).max(x[d] - bounds.high[d]).max(0.0));
+            if norm(beyond) >= radius {
+                continue;
+            }
+            match node.count {
+                0 => stack.extend([node.first, node.first + 1]),
+                n => {
+                    let own = &self.order[node.first as usize..(node.first + n) as usize];
+                    if own.iter().any(|&t| self.distance(t, x) < radius) {
+                        return true;
+                    }
+                }
+            }
+        }
+        false
+    }
+
+    /// The distance of x from a triangle.
+    fn distance(&self, t: u32, x: Vec3) -> f64 {
+        let corners = self.triangles[t as usize].map(|v| self.vertices[v as usize]);
+        let n = self.normals[t as usize];
+        let sides = [0, 1, 2].map(|k| (corners[k], corners[(k + 1) % 3]));
+        if sides.iter().all(|&(p, q)| dot(cross(n, sub(q, p)), sub(x, p)) >= 0.0) {
+            return dot(n, sub(x, corners[0])).abs();
+        }
+        let to = |(p, q): (Vec3, Vec3)| {
+            let side = Segment::between(p, q);
+            norm(sub(x, side.at(side.nearest(x))))
+        };
+        sides.into_iter().map(to).fold(f64::INFINITY, f64::min)
+    }
+}
