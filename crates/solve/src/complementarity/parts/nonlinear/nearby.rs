@@ -82,7 +82,7 @@ mod tests {
         let x1 = 1000.0 / 3.0;
         let x2 = (3100.0 - 0.001 * x1) / 7.0;
         let mut x = [x1, x2, 1180.0 * x2 + 938.0 * x1 + 1_300_000.1];
-        x[2] = x[2].next_up();
+        x[2] = f64::next_up(x[2]);
         let residual = |x: &[f64]| {
             let mut f = [0.0; 3];
             problem.F.evaluator().precisely(x, &mut f);
