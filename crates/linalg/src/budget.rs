@@ -120,7 +120,7 @@ static TEAMS: Mutex<Vec<(u32, Arc<ThreadPool>)>> = Mutex::new(vec![]);
 
 /// The threads that the budget in force allows, where these are several, as a pool: made at first use, and kept. `None` on a thread of a pool, whose
 /// neighbours have work of their own.
-pub fn team() -> Option<Arc<ThreadPool>> {
+pub(crate) fn team() -> Option<Arc<ThreadPool>> {
     let threads = CURRENT.with_borrow(|budget| budget.threads);
     if threads < 2 || rayon::current_thread_index().is_some() {
         return None;

@@ -4,7 +4,7 @@
 use super::budget::Pace;
 use super::roots::Roots;
 use super::row::prefetch;
-use super::{Block, BlockRow, Bsr, Csc, Inverse, Shared};
+use super::{Block, BlockRow, Bsr, Csc, Inverse};
 
 /// `W = Hᵀ M⁻¹ H` without W, for the movements of Gauss–Seidel in velocity space: `u_c = H_cᵀ v + w_c` and `v += M⁻¹ H_c Δr_c` cost O(rows touched).
 ///
@@ -186,63 +186,17 @@ impl<const D: usize> Delassus<D> {
     /// `v += M⁻¹ H_c dr`, on y.
     #[inline(always)]
     pub fn apply_impulse(&self, c: usize, dr: &[f64; D], y: &mut [f64]) {
-        self.responds().each_run(c, |first, rows| {
+        let response = match &self.response {
+            Response::Rooted(_) => &self.seen,
+            Response::Direct(z) => z,
+        };
+        response.each_run(c, |first, rows| {
             for (row, y) in rows.iter().zip(&mut y[first..first + rows.len()]) {
                 for k in 0..D {
                     *y += row[k] * dr[k];
                 }
             }
         });
-    }
-
-    /// The same as [`local_velocity`](Self::local_velocity), bit by bit, of y that others write elsewhere.
-    #[inline(always)]
-    pub fn local_velocity_of_shared(&self, c: usize, y: Shared<'_>) -> [f64; D] {
-        let mut u = [0.0; D];
-        self.seen.each_run(c, |first, rows| {
-            for (i, row) in rows.iter().enumerate() {
-                let y = y.get(first + i);
-                for k in 0..D {
-                    u[k] += row[k] * y;
-                }
-            }
-        });
-        u
-    }
-
-    /// The same as [`apply_impulse`](Self::apply_impulse), bit by bit, on y of which others write other places.
-    #[inline(always)]
-    pub fn apply_impulse_to_shared(&self, c: usize, dr: &[f64; D], y: Shared<'_>) {
-        self.responds().each_run(c, |first, rows| {
-            for (i, row) in rows.iter().enumerate() {
-                let mut moved = y.get(first + i);
-                for k in 0..D {
-                    moved += row[k] * dr[k];
-                }
-                y.set(first + i, moved);
-            }
-        });
-    }
-
-    /// The same as [`foresee`](Self::foresee), of y that others write elsewhere.
-    #[inline(always)]
-    pub fn foresee_shared(&self, c: usize, y: Shared<'_>) {
-        self.seen.each_run(c, |first, rows| {
-            y.foresee(first);
-            y.foresee(first + rows.len() - 1);
-        });
-    }
-
-    /// The rows of y that contact c sees; it moves those of their components of M.
-    pub fn seen_rows(&self, c: usize, mut visit: impl FnMut(usize)) {
-        self.seen.each_run(c, |first, rows| (first..first + rows.len()).for_each(&mut visit));
-    }
-
-    fn responds(&self) -> &Columns<D> {
-        match &self.response {
-            Response::Rooted(_) => &self.seen,
-            Response::Direct(z) => z,
-        }
     }
 }
 

@@ -28,7 +28,6 @@ mod matrix;
 mod rank_lu;
 mod roots;
 mod row;
-mod shared;
 pub mod small;
 mod square_cholesky;
 mod square_lu;
@@ -46,7 +45,6 @@ pub use groups::Groups;
 pub use inverse::{Inverse, Refine, factorisations, is_positive_definite};
 pub use matrix::{Matrix, Operator};
 pub use rank_lu::RankLu;
-pub use shared::Shared;
 pub use square_cholesky::SquareCholesky;
 pub use square_lu::SquareLu;
 

@@ -101,9 +101,9 @@ mod avx2 {
 
 /// Asks for the line of the cache that x lies in.
 #[inline(always)]
-pub(crate) fn prefetch<T>(x: &T) {
+pub(crate) fn prefetch(x: &f64) {
     #[cfg(target_arch = "x86_64")]
-    // SAFETY: a prefetch changes nothing that a program can see, and the address is one of a value.
+    // SAFETY: a prefetch changes nothing that a program can see, and the address is one of a number.
     unsafe {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(x).cast());

@@ -88,8 +88,6 @@ impl Described for Auto {
 const FIRST_SWEEPS: usize = 30;
 /// Sweeps of a step.
 const SWEEPS_A_STEP: usize = 10;
-/// Sweeps think that they have arrived where they move by this part of the tolerance.
-const ARRIVED: f64 = 0.3;
 /// Steps of sweeps between two looks of the judge, each of which costs some three sweeps; other steps are judged one by one.
 const SWEEPS_JUDGED: usize = 5;
 /// A solve by Newton's method is taken to cost this many factorisations.
@@ -393,14 +391,11 @@ impl<const D: usize> OnContacts<Auto, D> {
         claims: usize,
     ) -> Step {
         let mut estimate = f64::NAN;
-        // Nobody looks between sweeps that will not have arrived.
-        let far = work.sweep.are_many() && work.rate.left(ARRIVED * work.tolerance) > 1.0;
-        let together = if far && !work.bounded { SWEEPS_A_STEP } else { 1 };
-        for _ in 0..SWEEPS_A_STEP / together {
+        for _ in 0..SWEEPS_A_STEP {
             let (r, lambda) = P::all_impulses(point);
-            let moves = work.sweep.sweeps(problem, &mut work.state, r, together)
+            let moves = work.sweep.sweep(problem, &mut work.state, r)
                 + sweep_rows(problem, &mut work.state, (r, lambda), 1.0);
-            work.done.sweeps += together;
+            work.done.sweeps += 1;
             if budget::over() {
                 break;
             }
@@ -408,7 +403,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             if runs_away(estimate) {
                 break;
             }
-            if estimate <= ARRIVED * work.tolerance && claims < SWEEPS_A_STEP {
+            if estimate <= 0.3 * work.tolerance && claims < SWEEPS_A_STEP {
                 work.stage = Stage::Sweeps { claims: claims + 1 };
                 return Step::Continue { estimate };
             }
@@ -593,11 +588,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         left: usize,
     ) -> Step {
         let count = left.min(2 * SWEEPS_A_STEP);
-        let together = if work.sweep.are_many() { count } else { 1 };
         let mut estimate = 0.0;
-        for _ in 0..count / together {
-            let r = P::impulses(point);
-            let moves = work.sweep.sweeps(problem, &mut work.state, r, together);
+        for _ in 0..count {
+            let moves = work.sweep.sweep(problem, &mut work.state, P::impulses(point));
             estimate = moves.sqrt() / work.scale;
             if runs_away(estimate) || budget::over() {
                 break;

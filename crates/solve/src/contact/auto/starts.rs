@@ -184,11 +184,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         let HybridWork { newton, state, inner_best, done, sweep, stage, scale, .. } = work;
         let Some(newton) = newton else { return lost() };
         let r = P::impulses(point);
-        let count = (RESCUE << rescues).min(most as usize).max(1);
-        let together = if sweep.are_many() { count } else { 1 };
-        for _ in 0..count / together {
-            let moves = sweep.sweeps(problem, state, r, together);
-            done.between += together;
+        for _ in 0..(RESCUE << rescues).min(most as usize).max(1) {
+            let moves = sweep.sweep(problem, state, r);
+            done.between += 1;
             if runs_away(moves.sqrt() / *scale) || budget::over() {
                 break;
             }

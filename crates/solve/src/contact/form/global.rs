@@ -7,15 +7,13 @@
 
 use nonsmooth_linalg::budget::{self, TooLarge};
 use nonsmooth_linalg::{
-    Block, Bsr, Compensated, Csc, Delassus, Inverse, Refine, Shared, Singular, norm_or_one, small,
+    Block, Bsr, Compensated, Csc, Delassus, Inverse, Refine, Singular, norm_or_one, small,
 };
 use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::{Bounds, Dynamics, FrictionGlobal, GlobalPoint};
 
 use super::linearised::{BodyForm, ContactForm, Form, NEVER, Once, System, made, there};
-use super::{
-    Access, Blockwise, Concurrent, Contacts, Costs, Frictional, InTurn, Linear, Linearised, Rows,
-};
+use super::{Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Linear, Linearised, Rows};
 use crate::SolveError;
 use crate::contact::law::DiskLaw;
 
@@ -281,14 +279,6 @@ impl<const D: usize, L: DiskLaw<D>> Blockwise<D> for FrictionGlobal<D, L> {
         if let Operator::Visits(delassus) = &state.operator {
             delassus.apply_impulse(c, dr, &mut state.y);
         }
-    }
-
-    fn in_turn<'a>(&'a self, state: &'a mut Self::State) -> Option<InTurn<'a, D>> {
-        let GlobalState { operator: Operator::Visits(delassus), dynamics, y, .. } = state else {
-            return None;
-        };
-        let y = Shared::new(y)?;
-        Some(InTurn { delassus, inverse: &dynamics.inverse, y, w: &self.w })
     }
 
     #[inline(always)]

@@ -21,7 +21,7 @@ mod local;
 mod regularised;
 mod rows;
 
-use nonsmooth_linalg::{Block, Delassus, Inverse, Shared, Singular, small};
+use nonsmooth_linalg::{Block, Singular, small};
 use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::{Bounds, Problem};
 
@@ -142,61 +142,9 @@ pub trait Blockwise<const D: usize>: Rows<D> {
     /// The impulse of contact `c` moved by `dr` (and `r` holds it already).
     fn moved(&self, state: &mut Self::State, c: usize, dr: &[f64; D]);
 
-    /// The same for visits from several threads, where the view has that.
-    fn in_turn<'a>(&'a self, _state: &'a mut Self::State) -> Option<InTurn<'a, D>> {
-        None
-    }
-
     /// Contact `c` will be visited after [`AHEAD`] others: what the visit reads from afar may be fetched into the cache.
     #[inline(always)]
     fn foresee(&self, _state: &Self::State, _c: usize) {}
-}
-
-/// The visits of a problem in velocity space from several threads, each of which sees to it that those of one component of M come in turn.
-#[derive(Debug, Clone, Copy)]
-pub struct InTurn<'a, const D: usize> {
-    delassus: &'a Delassus<D>,
-    inverse: &'a Inverse,
-    y: Shared<'a>,
-    w: &'a [f64],
-}
-
-impl<const D: usize> InTurn<'_, D> {
-    /// As [`Blockwise::velocity`].
-    #[inline(always)]
-    pub fn velocity(&self, c: usize) -> [f64; D] {
-        let mut u = self.delassus.local_velocity_of_shared(c, self.y);
-        let w: [f64; D] = small::block(self.w, c);
-        for k in 0..D {
-            u[k] += w[k];
-        }
-        u
-    }
-
-    /// As [`Blockwise::moved`].
-    #[inline(always)]
-    pub fn moved(&self, c: usize, dr: &[f64; D]) {
-        self.delassus.apply_impulse_to_shared(c, dr, self.y);
-    }
-
-    /// As [`Blockwise::foresee`].
-    #[inline(always)]
-    pub fn foresee(&self, c: usize) {
-        self.delassus.foresee_shared(c, self.y);
-    }
-
-    /// The components of M that a visit of contact c reads and writes, in place of what is in `places`.
-    pub fn places(&self, c: usize, places: &mut Vec<u32>) {
-        places.clear();
-        self.delassus.seen_rows(c, |i| places.push(self.inverse.component_of(i) as u32));
-        places.sort_unstable();
-        places.dedup();
-    }
-
-    /// The number of components of M.
-    pub fn components(&self) -> usize {
-        self.inverse.component_sizes().len()
-    }
 }
 
 /// So many visits take as long as memory takes to answer.

@@ -7,7 +7,6 @@ mod conic;
 pub mod nt;
 mod rows;
 mod sweep;
-mod turns;
 
 pub use anderson::{Accelerator, Anderson};
 pub use central::{Central, Iterate as CentralIterate};
