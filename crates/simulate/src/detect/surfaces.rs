@@ -5,7 +5,7 @@
 //! features, so that nothing is met across an edge that is not there.
 //!
 //! A triangle does not say how deep a body is behind it. What is deeper than a share of the thinner body is no contact; and of two faces that a point is behind the nearer one is
-//! met: a corner that has sunk a little into the top of a box is not far behind its side.
+//! met: a corner that has sunk a little into the top of a box is not far behind its side. Two edges that are near a face so are met all the same where nothing else is: the least deep.
 //!
 //! Cost: the pairs of triangles that are near each other, times the logarithm of all.
 
@@ -44,7 +44,8 @@ pub(crate) fn collide(
     let Scratch { thin, other, pairs, stack, found: list, .. } = scratch;
     near(a, b, &relative, prediction, (pairs, stack));
     let thin_body = a.thickness.min(b.thickness);
-    let mut last = u32::MAX;
+    let (mut last, mut none) = (u32::MAX, true);
+    let mut least: Option<(Across, [Feature; 2])> = None;
     for &(t, u) in &*pairs {
         if t != last {
             a.template(t, a_pose, thin);
@@ -61,6 +62,7 @@ pub(crate) fn collide(
                 if too_deep(list, (first.0, first.3), second.3, thin_body) {
                     continue;
                 }
+                none &= list.is_empty();
                 for &([f, g], w) in list.iter() {
                     if on_a { found([f, g], w) } else { found([g, f], w.swapped()) }
                 }
@@ -71,10 +73,20 @@ pub(crate) fn collide(
             }
         }
         for (e, f) in edges((a, t), (b, u)) {
-            if let Some(witness) = across((a, a_pose, e), (b, b_pose, f), prediction, thin_body) {
-                found([Feature::Edge(e), Feature::Edge(f)], witness);
+            let Some(met) = across((a, a_pose, e), (b, b_pose, f), prediction, thin_body) else {
+                continue;
+            };
+            let features = [Feature::Edge(e), Feature::Edge(f)];
+            if !met.near_a_face {
+                none = false;
+                found(features, met.witness);
+            } else if least.as_ref().is_none_or(|(least, _)| met.gap > least.gap) {
+                least = Some((met, features));
             }
         }
+    }
+    if none && let Some((met, features)) = least {
+        found(features, met.witness);
     }
 }
 
@@ -189,13 +201,21 @@ fn edges((a, t): (&Surface, u32), (b, u): (&Surface, u32)) -> impl Iterator<Item
     first.into_iter().flatten().flat_map(move |e| second.into_iter().flatten().map(move |f| (e, f)))
 }
 
+/// How two edges meet.
+struct Across {
+    witness: Witness,
+    gap: f64,
+    /// Each has sunk in behind the other, and a face of one is much nearer to the other than that.
+    near_a_face: bool,
+}
+
 /// Two edges that cross, with their common normal.
 fn across(
     (a, a_pose, e): (&Surface, &Pose, u32),
     (b, b_pose, f): (&Surface, &Pose, u32),
     prediction: f64,
     thickness: f64,
-) -> Option<Witness> {
+) -> Option<Across> {
     let (s, t) = (a.edge(e), b.edge(f));
     let (p, q) = (s.placed(a_pose), t.placed(b_pose));
     let (x, y) = closest(&p, &q);
@@ -219,12 +239,11 @@ fn across(
     };
     let sign = [1.0, -1.0].into_iter().find(of_both)?;
     let gap = dot(scale(sign / length, product), d);
-    let deep = || {
-        -gap > SHALLOW * thickness
-            && (a.is_within(a_pose.local_point(q.at(y)), -NEARER[1] * gap)
-                || b.is_within(b_pose.local_point(p.at(x)), -NEARER[1] * gap))
-    };
-    (gap <= prediction && !deep()).then_some(Witness::Edges { s, t, sign })
+    let near_a_face = -gap > SHALLOW * thickness
+        && (a.is_within(a_pose.local_point(q.at(y)), -NEARER[1] * gap)
+            || b.is_within(b_pose.local_point(p.at(x)), -NEARER[1] * gap));
+    let witness = Witness::Edges { s, t, sign };
+    (gap <= prediction).then_some(Across { witness, gap, near_a_face })
 }
 
 impl Surface {
