@@ -118,7 +118,8 @@ def test_python_goes_on_while_a_problem_is_solved(contacts):
         time.sleep(0.001)
         now = time.perf_counter()
         ticks, longest, last = ticks + 1, max(longest, now - last), now
-    assert ticks > 4 and longest < SLACK * 0.1
+    # The small problem takes some 5 ms; where Python stood still meanwhile, there would be one tick before it and one after.
+    assert ticks > 2 and longest < SLACK * 0.1
 
 
 def test_one_problem_in_many_threads():
