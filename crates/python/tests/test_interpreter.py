@@ -106,7 +106,8 @@ def test_two_threads_solve_at_once():
     assert best > 1.6 or SLACK > 1
 
 
-@pytest.mark.parametrize("contacts", [40, 400])
+# The small one takes some 10 ms: a few turns for Python.
+@pytest.mark.parametrize("contacts", [80, 400])
 def test_python_goes_on_while_a_problem_is_solved(contacts):
     problem = long(contacts)
     thread = threading.Thread(
@@ -118,8 +119,7 @@ def test_python_goes_on_while_a_problem_is_solved(contacts):
         time.sleep(0.001)
         now = time.perf_counter()
         ticks, longest, last = ticks + 1, max(longest, now - last), now
-    # The small problem takes some 5 ms; where Python stood still meanwhile, there would be one tick before it and one after.
-    assert ticks > 2 and longest < SLACK * 0.1
+    assert ticks > 4 and longest < SLACK * 0.1
 
 
 def test_one_problem_in_many_threads():

@@ -56,8 +56,6 @@ impl PosedHull {
         self.vertices.extend(outline.vertices.iter().map(|&v| pose.point(v)));
         self.normals.clear();
         self.normals.extend(outline.normals.iter().map(|&n| pose.direction(n)));
-        self.offsets.clear();
-        self.offsets.extend(self.normals.iter().zip(&self.vertices).map(|(n, v)| dot(*n, *v)));
     }
 }
 

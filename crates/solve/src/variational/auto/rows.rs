@@ -273,7 +273,7 @@ impl Rows {
             if taken.take(&x.z, join, 0.0) > join / 4 {
                 continue;
             }
-            // Few are violated, perhaps by rounding.
+            // Few were violated, perhaps by rounding, and all of them are taken.
             let measure = problem.certify(&x, gauge);
             self.history.push(Sample {
                 iteration: iterations,
@@ -292,16 +292,13 @@ impl Rows {
                 break Status::Solved;
             }
             if linearises {
-                taken.take(&x.z, join, 0.0);
                 idle = if best.merit() < 0.5 * before.merit() { 0 } else { idle + 1 };
                 linearises = idle < IDLE;
                 continue;
             }
-            if taken.is_full() || taken.take(&x.z, 1, 0.0) == 0 {
-                tolerance *= CLOSER;
-                if tolerance < f64::EPSILON {
-                    return Ok(None);
-                }
+            tolerance *= CLOSER;
+            if tolerance < f64::EPSILON {
+                return Ok(None);
             }
         };
         drop(scope);

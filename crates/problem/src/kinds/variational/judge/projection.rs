@@ -236,27 +236,25 @@ impl Projection {
     }
 }
 
-/// In eight sums, which one instruction adds up.
+/// `Σ x_i y_i`.
 fn dot(x: &[f64], y: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a, b) = (x.chunks_exact(8), y.chunks_exact(8));
-    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in a.zip(b) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
-        }
-    }
-    sums.iter().sum::<f64>() + rest
+    summed(x, y, |xy| xy)
 }
 
-/// `Σ |x_i y_i|`, likewise.
+/// `Σ |x_i y_i|`.
 fn dot_moduli(x: &[f64], y: &[f64]) -> f64 {
+    summed(x, y, f64::abs)
+}
+
+/// `Σ f(x_i y_i)`, in eight sums, which one instruction adds up.
+#[inline(always)]
+fn summed(x: &[f64], y: &[f64], f: impl Fn(f64) -> f64) -> f64 {
     let mut sums = [0.0; 8];
     let (a, b) = (x.chunks_exact(8), y.chunks_exact(8));
-    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(x, y)| (x * y).abs()).sum();
+    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(x, y)| f(x * y)).sum();
     for (x, y) in a.zip(b) {
         for k in 0..8 {
-            sums[k] += (x[k] * y[k]).abs();
+            sums[k] += f(x[k] * y[k]);
         }
     }
     sums.iter().sum::<f64>() + rest

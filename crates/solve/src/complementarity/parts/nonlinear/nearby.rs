@@ -35,11 +35,14 @@ pub fn nearby(problem: &Mcp, x: &mut [f64], target: f64) -> bool {
     let first = error;
     while error > target && !budget::over() {
         let own = entry(i, x[i], f[i]);
+        if own != f[i] {
+            break;
+        }
         let mut best: Option<(usize, f64, usize, f64)> = None;
         for (&j, &a) in pattern.row(i).iter().zip(&slopes[pattern.range(i)]) {
             let here = x[j];
             let aim = here - own / a;
-            if own != f[i] || a == 0.0 || here <= lower[j] || here >= upper[j] {
+            if a == 0.0 || here <= lower[j] || here >= upper[j] {
                 continue;
             }
             for there in [aim, aim.next_up(), aim.next_down()] {
