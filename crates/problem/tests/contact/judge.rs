@@ -446,6 +446,24 @@ fn what_rounding_makes_of_the_loads_along_a_wall_is_no_sinking() {
 }
 
 #[test]
+fn what_the_square_of_the_loads_rounding_drowns_is_not_heard() {
+    // The second contact ought to carry δ of the load that reaches it through their coupling, and carries nothing.
+    let own = |delta: f64| {
+        let mut w = [[0.0; 6]; 6];
+        (0..6).for_each(|i| w[i][i] = 1.0);
+        (w[0][3], w[3][0]) = (-delta, -delta);
+        let entries = (0..36).map(|k| (k / 6, k % 6, w[k / 6][k % 6]));
+        let w = Bsr::from_csc(&Csc::from_triplets(6, 6, entries.filter(|e| e.2 != 0.0)).unwrap());
+        let q = vec![-1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let problem = FrictionLocal::<3>::new(w, q, vec![0.5; 2]).unwrap();
+        let point = LocalPoint { r: vec![1.0, 0.0, 0.0, 0.0, 0.0, 0.0], ..problem.origin() };
+        problem.judge(&point, 1e-8).unwrap().measure.own.unwrap()
+    };
+    assert!((own(1e-12) - 1.0).abs() < 1e-3 && (own(1e-30) - 1.0).abs() < 1e-3);
+    assert!(own(1e-40) < 1e-8 && own(1e-133) < 1e-8);
+}
+
+#[test]
 fn own_does_not_depend_on_the_scale_of_a_contact() {
     let (problem, point) = Planted { contacts: 8, dofs: 30, ..Planted::default() }.local::<3>();
     let mut wrong = point.clone();

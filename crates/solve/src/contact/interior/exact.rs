@@ -3,12 +3,13 @@
 //! Problem: `K* ∋ W r + q + mu‖u_T‖ e_N ⟂ r ∈ K`; in scaled coordinates `L ∋ z ⟂ x ∈ L`, `z = Z (W r + q) + ‖z_T‖ e_N`.
 //!
 //! Method: Mehrotra's predictor–corrector with Nesterov–Todd scaling. ‖z_T‖ is differentiated like any other term
-//! (`G = I + e nᵀ`), which costs the symmetry of the matrix and the monotonicity of the problem, see `parts::central`. Optionally
+//! (`G = I + e nᵀ`), which costs the symmetry of the matrix and the monotonicity of the problem; where that cuts the steps short, by a part of its
+//! slope, see `parts::central`. Optionally
 //! the path from the start, where both the equations' residual and complementarity shrink with one parameter, is
 //! followed by its arc length, so that it may turn back (`path=continuation`).
 //!
 //! References: NesterovTodd1998; Mehrotra1992; the exact law: the derivation in `parts::central`; the arc length: Keller1977.
-//! Cost of a step: one factorisation of `Q + P W`, two solves and two products; with continuation up to six of each.
+//! Cost of a step: one factorisation of `Q + P W`, two solves and two products; up to four where steps are cut short, with continuation up to six of each.
 //! Storage: 20 vectors and five blocks a contact.
 //! Fails: the steps can shrink to nothing away from a solution, mostly near sticking contacts, where the kink of ‖u_T‖ lies on
 //! the cone's boundary; it then ends as stuck. A starter more than a solver where impacts are large.

@@ -23,6 +23,9 @@
 //! from τ to 1/τ, and in this form none of them swamps W. Mehrotra's predictor gives `d = −λ`, the corrector
 //! `d = −λ + λ \ (σ τ e − (S dx) ∘ (S⁻¹ dz))`.
 //!
+//! The exact law is not monotone, and its steps may shrink to nothing where those of the convex problem (n = 0 in G) do not: where the boundary cuts a step short,
+//! it is computed anew with `G = I + γ e nᵀ`, γ < 1, which damps what is not monotone; s itself stays exact, so that the iterates converge to the law, linearly as long as γ < 1.
+//!
 //! A contact with mu = 0 has the half line in its normal component and `r_T = 0`.
 //!
 //! With rolling friction a contact has two cones that share r_N: `x_k = A_k x̂`, `A_k = diag(mu_k in N, 1 in disk k)`, `x̂ = w_c r/υ`, and the normal velocity is split
@@ -31,7 +34,7 @@
 //!
 //! References: NesterovTodd1998; Mehrotra1992; TutuncuTohTodd2003 (formulas for the second-order cone). G and the exact law: the
 //! derivation above.
-//! Cost of an iteration: one factorisation, two solves, one product. Storage: 20 vectors and five D×D blocks a contact.
+//! Cost of an iteration: one factorisation, two solves, one product; up to three factorisations and six solves more where steps are cut short. Storage: 20 vectors and five D×D blocks a contact.
 //! Fails: the exact law is not monotone; its central path can turn back, and then the steps shrink. With a given s the
 //! method fails where the problem has no solution.
 
@@ -99,6 +102,8 @@ pub struct Central<L, const D: usize> {
     best: Vec<f64>,
     best_error: f64,
     now: Option<Iterate>,
+    /// The part of ∂s/∂z that the step knows, in (0, 1].
+    pub(in crate::contact) share: f64,
 }
 
 impl<L, const D: usize> Default for Central<L, D> {
@@ -129,6 +134,7 @@ impl<L, const D: usize> Default for Central<L, D> {
             best: vec![],
             best_error: f64::INFINITY,
             now: None,
+            share: 1.0,
         }
     }
 }
@@ -145,6 +151,7 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         start: Option<(&[f64], f64)>,
     ) -> Iterate {
         self.law = Some(Law::Coulomb);
+        self.share = 1.0;
         self.smoothing = smoothing;
         self.s.clear();
         self.s.resize(L::DISKS * problem.contacts(), 0.0);
@@ -279,39 +286,71 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         problem: &P,
         state: &mut P::State,
     ) -> Result<Iterate, Singular> {
-        let n = self.pairs.len();
         let before =
             self.now.unwrap_or(Iterate { error: 1.0, tau: 1.0, residual: 1.0, alpha: 0.0 });
-        self.factorise(problem, state)?;
-        for c in 0..n {
-            self.d[c] = self.scalings[c].lambda.map(|l| -l);
+        let mut reach = self.direction(problem, state, &before)?;
+        for _ in 0..RETRIES {
+            if reach >= CUT || !self.know_less() {
+                break;
+            }
+            reach = self.direction(problem, state, &before)?;
         }
-        self.newton(problem, state, 1.0);
-        let affine = self.reach().min(1.0);
-        let tau = self.tau_after(affine);
-        let ratio = (tau / before.tau).clamp(0.0, 1.0);
-        let mut sigma = ratio * ratio * ratio;
-        // Complementarity must not run ahead of the equations, and a step that the boundary cut short is followed by
-        // one that leads away from it.
-        let behind = before.residual > 10.0 * before.tau.max(0.1 * before.error);
-        let cut = self.now.is_some() && before.alpha > 0.0 && before.alpha < CUT;
-        if behind || cut {
-            sigma = sigma.max(BEHIND);
-        }
-        self.aim(sigma * before.tau, !(behind || cut));
-        self.newton(problem, state, 1.0);
-        let mut reach = self.reach();
-        if reach < CUT && !cut {
-            // The second-order term can point out of the cone: once more with the same factor, without it.
-            self.aim(sigma.max(BEHIND) * before.tau, false);
-            self.newton(problem, state, 1.0);
-            reach = self.reach();
+        if reach >= LONG {
+            self.share = (MORE * self.share).min(1.0);
+        } else if reach < CUT {
+            self.know_less();
         }
         // Nearer to the boundary as the path ends, so that the tail is fast.
         let fraction = 1.0 - (0.1 * before.tau).clamp(1e-3, 1e-2);
         let alpha = (fraction * reach).min(1.0);
         self.advance(alpha);
         Ok(self.look(problem, state, alpha))
+    }
+
+    /// dx and dz of the predictor and corrector at the present share; returns how far they reach.
+    fn direction<P: Linearised<D> + Disked<D, Law = L>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        before: &Iterate,
+    ) -> Result<f64, Singular> {
+        self.factorise(problem, state)?;
+        for (d, scaling) in self.d.iter_mut().zip(&self.scalings) {
+            *d = scaling.lambda.map(|l| -l);
+        }
+        self.newton(problem, state, 1.0);
+        let affine = self.reach().min(1.0);
+        let tau = self.tau_after(affine);
+        let ratio = (tau / before.tau).clamp(0.0, 1.0);
+        let mut sigma = ratio * ratio * ratio;
+        // Complementarity must not run ahead of the equations, which converge linearly where only a part of the slope is known, and a step that
+        // the boundary cut short is followed by one that leads away from it.
+        let lead = if self.share < 1.0 { LEAD_OF_PART } else { LEAD };
+        let behind = before.residual > lead * before.tau.max(0.1 * before.error);
+        let cut = self.now.is_some() && before.alpha > 0.0 && before.alpha < CUT;
+        if behind || cut {
+            sigma = sigma.max(BEHIND);
+        }
+        self.aim(sigma * before.tau, !(behind || cut));
+        self.newton(problem, state, 1.0);
+        let reach = self.reach();
+        if reach >= CUT || cut {
+            return Ok(reach);
+        }
+        // The second-order term can point out of the cone: once more with the same factor, without it.
+        self.aim(sigma.max(BEHIND) * before.tau, false);
+        self.newton(problem, state, 1.0);
+        Ok(self.reach())
+    }
+
+    /// A smaller share of the slope of the exact law; false where there is none to be had.
+    fn know_less(&mut self) -> bool {
+        let less = (LESS * self.share).max(LEAST_SHARE);
+        let changes = self.law == Some(Law::Coulomb) && less < self.share;
+        if changes {
+            self.share = less;
+        }
+        changes
     }
 
     /// d towards `x ∘ z = τ e`, with Mehrotra's term from the present dx and dz or without.
@@ -694,15 +733,15 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         z
     }
 
-    /// s of pair i in scaled velocity, and its derivative by ‖z_T‖.
+    /// s of pair i in scaled velocity, and what the step knows of its derivative by ‖z_T‖.
     fn slide(&self, i: usize, size: f64) -> (f64, f64) {
         match self.law {
             _ if self.mu(i) == 0.0 => (0.0, 0.0),
             Some(Law::Given) => (self.inverse_speed * self.s[i], 0.0),
-            _ if self.delta == 0.0 => (size, 1.0),
+            _ if self.delta == 0.0 => (size, self.share),
             _ => {
                 let s = size.hypot(self.delta);
-                (s, size / s)
+                (s, self.share * size / s)
             }
         }
     }
@@ -729,8 +768,18 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
 /// σ while the equations lag behind complementarity, and where the boundary cuts steps short.
 const BEHIND: f64 = 0.9;
 
-/// Steps below this are cut short.
+/// The equations lag behind above this many times complementarity, and above this where the step knows a part of the slope only.
+const LEAD: f64 = 10.0;
+const LEAD_OF_PART: f64 = 3.0;
+
+/// Steps below this are cut short,
 const CUT: f64 = 0.1;
+/// and above this long: the step may know more of the slope of s after a long one, by a factor, and knows less after one that is cut short, down to a least share; at once so many times.
+const LONG: f64 = 0.5;
+const MORE: f64 = 1.1;
+const LESS: f64 = 0.7;
+const LEAST_SHARE: f64 = 0.2;
+const RETRIES: usize = 3;
 
 /// Of a start with two cones, which its r_N has already put inside: what is left to keep either off its boundary.
 const LEAST_MARGIN: f64 = 1e-3;

@@ -12,6 +12,8 @@ pub(crate) const HALF_ULP: f64 = 0.3 * f64::EPSILON;
 const PLAIN: f64 = 16.0 * f64::EPSILON;
 /// Terms below this share of ‖q‖ have lost digits to underflow.
 const LEAST: f64 = 1e-280;
+/// Terms are no smaller than this part of the largest load that reaches a contact, the square of its rounding: what decays to 1e-130 on its way is not heard there.
+const UNHEARD: f64 = f64::EPSILON * f64::EPSILON;
 
 /// `√|d|` of a diagonal entry, the unit of what belongs to it; 1 where it vanishes.
 pub(crate) fn unit(d: f64) -> f64 {
@@ -163,16 +165,17 @@ impl LawGauge {
                 let apart = law.apart(&own_x, &own_u) + astray.min(small::tangential_norm(&own_u));
                 // Of an empty block the impulse is no term, but may be all there is.
                 let terms = norm_of((D * c..D * c + D).map(|i| sizes[i] * per));
-                let terms = terms.max(norm(&own_x)).min(load);
-                let normal = (sizes[D * c] * per).min(load);
+                let heard = (UNHEARD * load).max(LEAST);
+                let terms = terms.max(norm(&own_x)).min(load).max(heard);
+                let normal = (sizes[D * c] * per).min(load).max(heard);
                 // Below the range of double precision there are no digits to be right.
                 let error = share.residual.sqrt().max(apart) + left;
                 // No sliding, however fast, excuses a velocity into the obstacle, but for what a frame turned by its rounding makes of the
                 // contact's terms.
                 let rounding = f64::EPSILON * terms.max(norm(&own_u));
                 let sinking = (doubt(D * c) - plain_u[0]) * per - rounding;
-                let sinking = over(sinking.max(0.0), normal.max(LEAST));
-                let of_own = over(error, terms.max(LEAST)).max(sinking);
+                let sinking = over(sinking.max(0.0), normal);
+                let of_own = over(error, terms).max(sinking);
                 if load > 0.0 && (of_own > own || of_own.is_nan()) {
                     (own_contact, own) = (c, of_own);
                 }
