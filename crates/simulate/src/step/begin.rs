@@ -1,5 +1,7 @@
 //! Bodies at the beginning of a step: what acts on them, where they are extrapolated to, how far others are looked for.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use nonsmooth_scenes::Rotation;
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, norm, scale};
 
@@ -241,20 +243,28 @@ impl Tools {
         self.start.ask(state, forces, h);
         let gravity = norm(world.gravity);
         let (gamma, slack) = scheme.activation.forecast().unwrap_or((1.0, 0.0));
-        self.bodies.clear();
-        self.margins.clear();
-        let mut finite = true;
-        for k in 0..world.bodies.len() {
-            let (mut body, speed) = self.start.body(k, stride, state);
-            let fall = if body.free { h * h * gravity } else { 0.0 };
-            let least = (1e-6_f64).max(slack) * self.start.built[k].size;
-            self.margins.push((gamma + 1.0) * h * speed + fall + least);
-            finite &= are_finite(body.push.into_iter().chain(body.twist));
-            if body.free {
-                body.rotate(scheme, h);
+        let count = world.bodies.len();
+        self.bodies.resize(count, Start::node([0.0; 3], 0, ([0.0; 3], [0.0; 3]), 0.0));
+        self.margins.resize(count, 0.0);
+        let finite = AtomicBool::new(true);
+        let Self { start, bodies, margins, crew, .. } = self;
+        let start = &*start;
+        crew.spread((0..count, &mut bodies[..], &mut margins[..]), count, |(numbers, b, m)| {
+            for ((k, to), margin) in numbers.zip(b).zip(m) {
+                let (mut body, speed) = start.body(k, stride, state);
+                let fall = if body.free { h * h * gravity } else { 0.0 };
+                let least = (1e-6_f64).max(slack) * start.built[k].size;
+                *margin = (gamma + 1.0) * h * speed + fall + least;
+                if !are_finite(body.push.into_iter().chain(body.twist)) {
+                    finite.store(false, Ordering::Relaxed);
+                }
+                if body.free {
+                    body.rotate(scheme, h);
+                }
+                *to = body;
             }
-            self.bodies.push(body);
-        }
+        });
+        let mut finite = finite.into_inner();
         finite &= self.solids.begin(stride, state);
         for (k, node) in self.solids.nodes.list.iter().enumerate() {
             let place = node.position(&state.elastic);

@@ -3,7 +3,9 @@
 use nonsmooth_scenes::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 
 use super::frame::{apart, frame, tangent_axis, transported};
+use super::memory::{Met, recall};
 use super::{NONE, Stride, Tools};
+use crate::cut::Cut;
 use crate::detect::{Key, Near, Place};
 use crate::moving::Moving;
 use crate::state::{Remembered, State};
@@ -13,7 +15,7 @@ use crate::{Activation, Compliance, Geometry, Impact};
 const SAME: f64 = 1e-13;
 
 /// One side of a contact.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Arm {
     pub body: u32,
     /// The body or elastic solid that it belongs to.
@@ -26,7 +28,7 @@ pub(super) struct Arm {
 }
 
 /// A contact of the index set.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Row {
     pub mu: f64,
     /// What a normal impulse gives way by, over it.
@@ -97,10 +99,12 @@ impl<'a> Meeting<'a> {
         near: &'a Near,
         known: Option<Remembered>,
         bodies: &'a [Moving],
+        approach: Option<f64>,
     ) -> Self {
         let sides @ [a, b] = [near.a, near.b].map(|i| &bodies[i as usize]);
         let Place { normal, point, .. } = near.place;
-        let approach = dot(normal, sub(b.velocity_at(point), a.velocity_at(point)));
+        let velocity = || dot(normal, sub(b.velocity_at(point), a.velocity_at(point)));
+        let approach = approach.unwrap_or_else(velocity);
         Self { stride, near, known, bodies: sides, approach }
     }
 
@@ -264,41 +268,130 @@ impl<'a> Meeting<'a> {
     }
 }
 
+/// Points where bodies are near, with what is remembered of pairs of shapes that come in the same order, and what is found of them: the axis of the tangents, the
+/// velocity of the gap, and the row, at first 0 of each that takes part.
+struct Recalling<'a> {
+    near: &'a mut [Near],
+    memory: &'a [Remembered],
+    taken: &'a mut [bool],
+    known: &'a mut [Option<Remembered>],
+    found: (&'a mut [u8], (&'a mut [f64], &'a mut [u32])),
+}
+
+impl Cut for Recalling<'_> {
+    fn count(&self) -> usize {
+        self.near.len()
+    }
+
+    /// Between pairs of shapes, those of one of which are remembered together.
+    fn cut(self, mut at: usize) -> (Self, Self) {
+        let pair = |k: usize| self.near[k].key.pair();
+        while at > 0 && at < self.near.len() && pair(at) == pair(at - 1) {
+            at += 1;
+        }
+        let whole = self.memory.len();
+        let next = self.near.get(at).map(|n| n.key.pair());
+        let m = next.map_or(whole, |next| self.memory.partition_point(|m| m.key.pair() < next));
+        let (near, memory, taken) = (self.near.cut(at), self.memory.cut(m), self.taken.cut(m));
+        let (known, found) = (self.known.cut(at), self.found.cut(at));
+        (
+            Self { near: near.0, memory: memory.0, taken: taken.0, known: known.0, found: found.0 },
+            Self { near: near.1, memory: memory.1, taken: taken.1, known: known.1, found: found.1 },
+        )
+    }
+}
+
+/// The same points with the rows to be written of those that take part.
+struct Writing<'a> {
+    near: &'a [Near],
+    known: &'a [Option<Remembered>],
+    found: (&'a [u8], (&'a [f64], &'a [u32])),
+    rows: (&'a mut [Row], &'a mut [[u32; 2]]),
+}
+
+impl Cut for Writing<'_> {
+    fn count(&self) -> usize {
+        self.near.len()
+    }
+
+    fn cut(self, at: usize) -> (Self, Self) {
+        let row_of = self.found.1.1;
+        let of = |k: &[u32]| k.iter().copied().find(|&row| row != NONE);
+        let first = of(row_of).unwrap_or(0);
+        let r = of(&row_of[at..]).map_or(self.rows.0.len(), |row| (row - first) as usize);
+        let (near, known) = (self.near.cut(at), self.known.cut(at));
+        let (found, rows) = (self.found.cut(at), self.rows.cut(r));
+        (
+            Self { near: near.0, known: known.0, found: found.0, rows: rows.0 },
+            Self { near: near.1, known: known.1, found: found.1, rows: rows.1 },
+        )
+    }
+}
+
 impl Tools {
     /// Index set, frames, warm starts; rows of joints; islands.
     pub(super) fn meet(&mut self, stride: Stride, state: &State) {
-        let Self { near, recalled, axes, row_of, rows, bodies, .. } = self;
-        recalled.recall(&state.memory.contacts, near);
-        rows.clear();
-        row_of.clear();
-        axes.clear();
-        let scaled = state.memory.scaled(stride.h);
-        for (near, &known) in near.iter().zip(&recalled.known) {
-            let axis =
-                tangent_axis(near.place.normal, known.map(|m| m.axis), stride.world.dimension);
-            axes.push(axis);
-            let meeting = Meeting::new(stride, near, known, bodies);
-            if meeting.takes_part() || self.insisted.binary_search(&near.key).is_ok() {
-                row_of.push(rows.len() as u32);
-                rows.push(meeting.row(axis, scaled));
-            } else {
-                row_of.push(NONE);
+        let Self { near, met, row_of, rows, pairs, bodies, crew, insisted, .. } = self;
+        let (count, memory) = (near.len(), &state.memory.contacts[..]);
+        let Met { known, taken, axes, approach } = met;
+        known.resize(count, None);
+        taken.clear();
+        taken.resize(memory.len(), false);
+        axes.resize(count, 0);
+        approach.resize(count, 0.0);
+        row_of.resize(count, NONE);
+        let found = (&mut axes[..], (&mut approach[..], &mut row_of[..]));
+        let (bodies, insisted) = (&bodies[..], &insisted[..]);
+        let all = Recalling { near, memory, taken, known, found };
+        crew.spread(all, count, |Recalling { near, memory, taken, known, found }| {
+            recall(memory, near, known, taken);
+            let (axes, (approach, row_of)) = found;
+            for (k, near) in near.iter().enumerate() {
+                let last = known[k].map(|m| m.axis);
+                axes[k] = tangent_axis(near.place.normal, last, stride.world.dimension);
+                let meeting = Meeting::new(stride, near, known[k], bodies, None);
+                approach[k] = meeting.approach;
+                let takes_part = meeting.takes_part() || insisted.binary_search(&near.key).is_ok();
+                row_of[k] = if takes_part { 0 } else { NONE };
             }
+        });
+        let mut number = 0;
+        for row in row_of.iter_mut().filter(|row| **row != NONE) {
+            *row = number;
+            number += 1;
         }
-        self.joints.begin(stride.scheme, stride.world, state, bodies, stride.h);
+        rows.resize(number as usize, Row::default());
+        pairs.resize(number as usize, [NONE; 2]);
+        let scaled = state.memory.scaled(stride.h);
+        let all = Writing {
+            near,
+            known,
+            found: (axes, (approach, row_of)),
+            rows: (&mut rows[..], &mut pairs[..]),
+        };
+        crew.spread(all, count, |Writing { near, known, found, rows }| {
+            let (axes, (approach, row_of)) = found;
+            let taking_part = (0..near.len()).filter(|&k| row_of[k] != NONE);
+            for ((k, row), pair) in taking_part.zip(rows.0).zip(rows.1) {
+                let meeting = Meeting::new(stride, &near[k], known[k], bodies, Some(approach[k]));
+                *row = meeting.row(axes[k], scaled);
+                *pair = row.free_owners();
+            }
+        });
+        self.joints.begin(stride.scheme, stride.world, state, &self.bodies, stride.h);
         self.join();
     }
 
     /// Islands of contacts and rows.
     fn join(&mut self) {
-        let Self { rows, joints, islands, start, solids, .. } = self;
+        let Self { rows, pairs, joints, islands, touching, start, solids, .. } = self;
         let owners = start.bodies() + solids.len();
-        let contacts = rows.iter().map(Row::free_arms);
         let scalars = (0..joints.rows.len()).map(|k| joints.levers(k));
         islands.find(owners, |join| {
-            contacts.for_each(|arms| join(&mut arms.map(|a| a.owner)));
+            pairs.iter().for_each(|p| join(&mut p.iter().copied().filter(|&b| b != NONE)));
             scalars.for_each(|levers| join(&mut levers.iter().map(|l| l.body)));
         });
+        touching.arrange(owners, pairs, islands);
         // Where rows of joints act on a body its contacts have one direction for impulses and velocities: a problem has one V for both.
         if !joints.rows.is_empty() {
             let mut jointed = vec![false; owners];
