@@ -103,8 +103,8 @@ impl Start {
         }
     }
 
-    /// Body k, and a bound on the speed of its points.
-    fn body(&self, k: usize, stride: Stride, state: &State) -> (Moving, f64) {
+    /// Writes body k; a bound on the speed of its points.
+    fn body(&self, k: usize, stride: Stride, state: &State, b: &mut Moving) -> f64 {
         let Stride { world, scheme, h } = stride;
         let (body, built) = (&world.bodies[k], &self.built[k]);
         let start = state.pose(k);
@@ -118,7 +118,7 @@ impl Start {
         }
         let omega = apply(&start.r, state.spin[k]);
         let spin = if built.isotropic { omega } else { state.spin[k] };
-        let mut b = Moving {
+        *b = Moving {
             owner: k as u32,
             free,
             isotropic: built.isotropic,
@@ -169,7 +169,7 @@ impl Start {
                 }
             }
         }
-        (b, speed)
+        speed
     }
 
     /// A node of an elastic solid that moves with this velocity, and with the free one where nothing touches it.
@@ -250,8 +250,8 @@ impl Tools {
         let Self { start, bodies, margins, crew, .. } = self;
         let start = &*start;
         crew.spread((0..count, &mut bodies[..], &mut margins[..]), count, |(numbers, b, m)| {
-            for ((k, to), margin) in numbers.zip(b).zip(m) {
-                let (mut body, speed) = start.body(k, stride, state);
+            for ((k, body), margin) in numbers.zip(b).zip(m) {
+                let speed = start.body(k, stride, state, body);
                 let fall = if body.free { h * h * gravity } else { 0.0 };
                 let least = (1e-6_f64).max(slack) * start.built[k].size;
                 *margin = (gamma + 1.0) * h * speed + fall + least;
@@ -261,7 +261,6 @@ impl Tools {
                 if body.free {
                     body.rotate(scheme, h);
                 }
-                *to = body;
             }
         });
         let mut finite = finite.into_inner();

@@ -9,7 +9,7 @@ use crate::cut::Cut;
 use crate::detect::{Key, Near, Place};
 use crate::moving::Moving;
 use crate::state::{Remembered, State};
-use crate::{Activation, Compliance, Geometry, Impact};
+use crate::{Activation, Compliance, Dimension, Geometry, Impact};
 
 /// Directions that differ by less are the same, relative.
 const SAME: f64 = 1e-13;
@@ -87,7 +87,7 @@ impl Row {
 struct Meeting<'a> {
     stride: Stride<'a>,
     near: &'a Near,
-    known: Option<Remembered>,
+    known: Option<&'a Remembered>,
     bodies: [&'a Moving; 2],
     /// The velocity of the gap.
     approach: f64,
@@ -97,7 +97,7 @@ impl<'a> Meeting<'a> {
     fn new(
         stride: Stride<'a>,
         near: &'a Near,
-        known: Option<Remembered>,
+        known: Option<&'a Remembered>,
         bodies: &'a [Moving],
         approach: Option<f64>,
     ) -> Self {
@@ -144,8 +144,13 @@ impl<'a> Meeting<'a> {
         Place { point: add(place.point, scale(half * place.gap, place.normal)), ..place }
     }
 
-    /// The contact, with tangents after an axis of the world and impulses of the last step `scaled`.
-    fn row(&self, axis: u8, scaled: f64) -> Row {
+    /// How many directions a contact has: in the plane none across it.
+    fn directions(&self) -> usize {
+        if self.stride.world.dimension == Dimension::Two { 2 } else { 3 }
+    }
+
+    /// The contact, with tangents after an axis of the world and impulses of the last step `scaled`, written where it stays: it is large.
+    fn write(&self, axis: u8, scaled: f64, row: &mut Row) {
         let Self { near, bodies: [a, b], .. } = self;
         let n = near.place.normal;
         let middle = near.witness.place(&a.middle, &b.middle, n);
@@ -156,71 +161,58 @@ impl<'a> Meeting<'a> {
         let lasting =
             self.persists() && (near.law.e == 0.0 || self.approach >= -self.stride.rest());
         let later = lasting && self.is_extrapolated() && !near.deep;
-        let (place_end, mut frame_end) = match later {
-            true => {
-                let end = self.on_surface(near.witness.place(&a.end, &b.end, place.normal));
-                (end, transported(&frame, end.normal))
-            }
-            false => (place, frame),
-        };
-        let arm = |k: usize| {
-            let b = self.bodies[k];
-            let x_end = if later { b.end.x } else { b.middle.x };
-            Arm {
-                body: [near.a, near.b][k],
-                owner: b.owner,
-                sign: [-1.0, 1.0][k],
-                free: b.free,
-                moment: frame.map(|d| cross(sub(place.point, b.middle.x), d)),
-                moment_end: frame_end.map(|d| cross(sub(place_end.point, x_end), d)),
-            }
-        };
-        let mut arms = [arm(0), arm(1)];
-        // Where nothing moves the two ends are the same up to rounding; then W is symmetric to the last bit.
-        let turned = arms.iter().map(|a| apart(&a.moment, &a.moment_end)).fold(0.0, f64::max);
-        let later = later && (apart(&frame, &frame_end) > SAME || turned > SAME * near.size);
-        if !later {
-            frame_end = frame;
-            arms.iter_mut().for_each(|a| a.moment_end = a.moment);
-        }
-        let mut row = Row {
+        *row = Row {
             mu: near.law.mu,
-            compliance: 0.0,
             place,
             frame,
-            frame_end,
-            later,
-            arms,
-            given: [0.0; 3],
-            given_mean: [0.0; 3],
-            given_middle: [0.0; 3],
-            before: [0.0; 3],
-            shift: [0.0; 3],
-            r: [0.0; 3],
+            frame_end: frame,
             mu_r: near.law.mu_r,
-            moment: [0.0; 2],
-            turned: [0.0; 2],
-            turned_mean: [0.0; 2],
             warm: self.known.is_some_and(|m| m.impulse != [0.0; 3]),
+            ..Row::default()
         };
-        self.take_velocities(&mut row, place_end.point);
-        self.take_law(&mut row, lasting);
+        let count = self.directions();
+        for (k, (arm, b)) in row.arms.iter_mut().zip(self.bodies).enumerate() {
+            (arm.body, arm.owner, arm.free) = ([near.a, near.b][k], b.owner, b.free);
+            arm.sign = [-1.0, 1.0][k];
+            let to = sub(place.point, b.middle.x);
+            (0..count).for_each(|i| arm.moment[i] = cross(to, frame[i]));
+            arm.moment_end = arm.moment;
+        }
+        let mut point_end = place.point;
+        if later {
+            let end = self.on_surface(near.witness.place(&a.end, &b.end, place.normal));
+            let frame_end = transported(&frame, end.normal);
+            point_end = end.point;
+            let mut turned = 0.0;
+            for (arm, b) in row.arms.iter_mut().zip(self.bodies) {
+                let to = sub(end.point, b.end.x);
+                (0..count).for_each(|i| arm.moment_end[i] = cross(to, frame_end[i]));
+                turned = f64::max(turned, apart(&arm.moment, &arm.moment_end));
+            }
+            // Where nothing moves the two ends are the same up to rounding; then W is symmetric to the last bit.
+            row.later = apart(&frame, &frame_end) > SAME || turned > SAME * near.size;
+            match row.later {
+                true => row.frame_end = frame_end,
+                false => row.arms.iter_mut().for_each(|a| a.moment_end = a.moment),
+            }
+        }
+        self.take_velocities(row, point_end);
+        self.take_law(row, lasting);
         if let Some(m) = self.known {
             row.r = m.impulse_along(&frame, scaled, row.mu);
             if row.mu_r > 0.0 {
                 row.moment = m.moment_along(&frame, scaled, (row.mu_r, row.r[0]));
             }
         }
-        row
     }
 
     /// The relative velocity at the beginning, and those of what is moved, which at the end of the step is taken at a point of its own.
     fn take_velocities(&self, row: &mut Row, point_end: Vec3) {
-        let theta = self.stride.scheme.theta;
+        let (theta, count) = (self.stride.scheme.theta, self.directions());
         for (arm, m) in row.arms.iter().zip(self.bodies) {
             if m.free {
                 let omega = m.omega(m.spin);
-                for i in 0..3 {
+                for i in 0..count {
                     row.before[i] += row.rate(arm, i, m.v, omega);
                 }
                 continue;
@@ -228,7 +220,7 @@ impl<'a> Meeting<'a> {
             let [first, last] = m.linear;
             let turn = |p: Vec3| cross(m.angular, sub(p, m.start.x));
             let (mid, end) = (turn(row.place.point), turn(point_end));
-            for i in 0..3 {
+            for i in 0..count {
                 let of = |v: Vec3| arm.sign * dot(row.frame[i], add(v, mid));
                 row.before[i] += of(first);
                 row.given[i] += arm.sign * dot(row.frame_end[i], add(last, end));
@@ -347,9 +339,10 @@ impl Tools {
             recall(memory, near, known, taken);
             let (axes, (approach, row_of)) = found;
             for (k, near) in near.iter().enumerate() {
-                let last = known[k].map(|m| m.axis);
+                let known = known[k].as_ref();
+                let last = known.map(|m| m.axis);
                 axes[k] = tangent_axis(near.place.normal, last, stride.world.dimension);
-                let meeting = Meeting::new(stride, near, known[k], bodies, None);
+                let meeting = Meeting::new(stride, near, known, bodies, None);
                 approach[k] = meeting.approach;
                 let takes_part = meeting.takes_part() || insisted.binary_search(&near.key).is_ok();
                 row_of[k] = if takes_part { 0 } else { NONE };
@@ -373,8 +366,9 @@ impl Tools {
             let (axes, (approach, row_of)) = found;
             let taking_part = (0..near.len()).filter(|&k| row_of[k] != NONE);
             for ((k, row), pair) in taking_part.zip(rows.0).zip(rows.1) {
-                let meeting = Meeting::new(stride, &near[k], known[k], bodies, Some(approach[k]));
-                *row = meeting.row(axes[k], scaled);
+                let meeting =
+                    Meeting::new(stride, &near[k], known[k].as_ref(), bodies, Some(approach[k]));
+                meeting.write(axes[k], scaled, row);
                 *pair = row.free_owners();
             }
         });

@@ -118,6 +118,9 @@ impl EnergyBalance {
             }
             self.take_from_drives(given * row.r[i], work);
         }
+        if row.mu_r == 0.0 {
+            return;
+        }
         for k in 0..2 {
             let turn = free().map(|(arm, (_, omega))| arm.sign * dot(row.frame[1 + k], omega));
             let given = row.turned_mean[k] * row.moment[k];

@@ -187,7 +187,7 @@ impl Tools {
                     for i in 0..3 {
                         b.receive(arm.sign * row.r[i], row.frame[i], arm.moment[i]);
                     }
-                    for k in 0..2 {
+                    for k in (0..2).filter(|_| row.mu_r > 0.0) {
                         b.moment = add(b.moment, scale(arm.sign * row.moment[k], row.frame[1 + k]));
                     }
                 }

@@ -78,7 +78,7 @@ impl Tools {
         memory.h = h;
         let count = self.near.len();
         if let Some(near) = self.near.first() {
-            let blank = self.report(near, 0);
+            let blank = self.blank(near);
             memory.contacts.resize(count, Remembered::of(near, 0, None, &blank));
             contacts.resize(count, blank);
         } else {
@@ -91,17 +91,16 @@ impl Tools {
             for ((k, contact), remembered) in numbers.zip(contacts).zip(memory) {
                 let near = &this.near[k];
                 let row = this.rows.get(this.row_of[k] as usize);
-                *contact = this.report(near, k);
+                this.report(near, k, contact);
                 *remembered = Remembered::of(near, this.met.axes[k], row, contact);
             }
         });
         self.contacts = contacts;
     }
 
-    /// Of point k.
-    fn report(&self, near: &Near, k: usize) -> ContactReport {
-        let place = self.row_of[k] as usize;
-        let mut report = ContactReport {
+    /// Of a point that takes no part.
+    fn blank(&self, near: &Near) -> ContactReport {
+        ContactReport {
             key: near.key,
             a: BodyId(self.bodies[near.a as usize].owner),
             b: BodyId(self.bodies[near.b as usize].owner),
@@ -116,10 +115,16 @@ impl Tools {
             mu_r: near.law.mu_r,
             moment: [0.0; 2],
             rolling: [0.0; 2],
-        };
+        }
+    }
+
+    /// Writes that of point k.
+    fn report(&self, near: &Near, k: usize, report: &mut ContactReport) {
+        *report = self.blank(near);
+        let place = self.row_of[k] as usize;
         let Some(row) = self.rows.get(place) else {
             report.frame = frame(near.place.normal, self.met.axes[k]);
-            return report;
+            return;
         };
         report.active = true;
         (report.point, report.frame) = (row.place.point, row.frame);
@@ -134,7 +139,6 @@ impl Tools {
                 report.rolling[k] += arm.sign * dot(row.frame_end[1 + k], omega);
             }
         }
-        report
     }
 }
 
