@@ -114,6 +114,25 @@ impl<const D: usize> Bsr<D> {
         self.row_ptr.push(self.blocks.len());
     }
 
+    /// Rows with these numbers of blocks, keeping the memory: where they begin, their columns and blocks, which have old values until they are written, columns
+    /// ascending in each row.
+    pub fn lay_out(
+        &mut self,
+        ncols: usize,
+        lengths: impl Iterator<Item = usize>,
+    ) -> (&[usize], &mut [u32], &mut [Block<D>]) {
+        self.ncols = ncols;
+        self.row_ptr.truncate(1);
+        let mut end = 0;
+        self.row_ptr.extend(lengths.map(|n| {
+            end += n;
+            end
+        }));
+        self.col_idx.resize(end, 0);
+        self.blocks.resize(end, [[0.0; D]; D]);
+        (&self.row_ptr, &mut self.col_idx, &mut self.blocks)
+    }
+
     /// The number of block rows.
     pub fn nrows(&self) -> usize {
         self.row_ptr.len() - 1

@@ -1,24 +1,33 @@
-//! Who solves the islands of a step: one session for each large island, one for each thread for all small ones, on as many threads as are asked for.
+//! Who does the work of a step, on as many threads as are asked for: bodies, contacts and problems by their parts, islands by one session for each large one, and a
+//! few for each thread for all small ones.
 //!
-//! A session's answer depends on problem, start and limits alone, so neither the number of threads nor who takes which island changes a bit.
+//! What a part comes to does not depend on where it was cut, and a session's answer depends on problem, start and limits alone, so neither the number of threads nor who
+//! takes what changes a bit.
 //!
 //! `u = 0` solves Coulomb's law wherever `W r + q = 0` has a solution in K, which makes it one of the convex relaxation, `min ½ rᵀW r + qᵀr` in K: a few
 //! iterations of its interior point tell. The law itself may have other solutions, which move and take long to find. So the bodies of a large island that are slow,
 //! whose contacts are new, are first asked whether they may stay at rest.
 
 use std::cmp::Reverse;
+use std::sync::{Mutex, PoisonError};
 
 use nonsmooth_linalg::{Bsr, budget};
 use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem, RollingLocal};
 use nonsmooth_solve::registry::Registered;
 use nonsmooth_solve::settings::SettingsMap;
 use nonsmooth_solve::{Limits, Outcome, Session, SolveError, Status, registry};
+use rayon::slice::ParallelSliceMut;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::SimulateError;
+use crate::cut::Cut;
 
+/// Fewer bodies, contacts or pairs of shapes than this are not worth another thread, which has to be woken.
+const FEW: usize = 512;
+/// So many parts for each thread: one that is held up leaves the rest to others.
+const PARTS: usize = 4;
 /// Islands of more contacts have a session of their own, which keeps what it knows of their pattern.
-const SMALL: usize = 32;
+pub(crate) const SMALL: usize = 32;
 /// What is asked first of a large island, and for how many iterations at most. A small one is solved more sharply without.
 const RELAXATION: &str = "convex_relaxation";
 const ITERATIONS: usize = 30;
@@ -60,7 +69,10 @@ pub(crate) struct Slot<const D: usize> {
     pub asked: Asked,
     /// What came of it; nothing where the problem is not finite.
     pub outcome: Option<Result<Outcome, SolveError>>,
-    own: Option<Sessions<D>>,
+    /// A number for each contact, for who states the problem.
+    pub scratch: Vec<u32>,
+    /// Behind a lock that nobody waits for, so that threads may look at the rest.
+    own: Mutex<Option<Sessions<D>>>,
 }
 
 impl<const D: usize> Slot<D>
@@ -74,7 +86,16 @@ where
         let problem = FrictionLocal::new(w, vec![0.0; D], vec![0.0]).map_err(SolveError::from)?;
         let point = problem.origin();
         let asked = Asked::default();
-        Ok(Self { problem, rolling: None, point, asked, outcome: None, own: None })
+        let scratch = vec![];
+        Ok(Self {
+            problem,
+            rolling: None,
+            point,
+            asked,
+            outcome: None,
+            scratch,
+            own: Mutex::new(None),
+        })
     }
 
     fn is_large(&self) -> bool {
@@ -85,11 +106,15 @@ where
         self.outcome = sessions.solve(self, inner).transpose();
     }
 
+    fn own(&mut self) -> &mut Option<Sessions<D>> {
+        self.own.get_mut().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// By its own sessions.
     fn solve_alone(&mut self, inner: &Inner) {
-        if let Some(mut own) = self.own.take() {
+        if let Some(mut own) = self.own().take() {
             self.solve(&mut own, inner);
-            self.own = Some(own);
+            *self.own() = Some(own);
         }
     }
 }
@@ -163,12 +188,56 @@ impl Crew {
         Self { threads, pool }
     }
 
-    /// The threads, where there are more than the calling one.
-    pub fn pool(&self) -> Option<&ThreadPool> {
-        self.pool.as_ref()
+    /// The threads, where there are more than the calling one and so many bodies, contacts or pairs are worth them.
+    pub fn pool(&self, worth: usize) -> Option<&ThreadPool> {
+        self.pool.as_ref().filter(|_| worth >= FEW)
     }
 
-    /// Solves the `open` ones of the slots, in ascending order; small ones by the `sessions`, one a thread, which are made where they are needed. Each keeps its
+    /// Into how many parts so many items are to be cut.
+    pub fn parts(&self, worth: usize) -> usize {
+        self.pool(worth).map_or(1, |pool| PARTS * pool.current_num_threads())
+    }
+
+    /// Does `work` on consecutive parts of `all`, wherever they are cut, at the same time where so many items are worth it.
+    pub fn spread<C: Cut>(&self, all: C, worth: usize, work: impl Fn(C) + Sync) {
+        match self.pool(worth) {
+            None => work(all),
+            Some(pool) => {
+                let most = all.count().div_ceil(self.parts(worth)).max(1);
+                pool.install(|| halve(all, most, &work));
+            }
+        }
+    }
+
+    /// Sorts items that are all different.
+    pub fn sort<T: Ord + Send>(&self, items: &mut [T]) {
+        match self.pool(items.len()) {
+            None => items.sort_unstable(),
+            Some(pool) => pool.install(|| items.par_sort_unstable()),
+        }
+    }
+
+    /// All items of the parts in place of those in `out`.
+    pub fn join<'a, T: Copy + Send + Sync + 'a>(
+        &self,
+        parts: impl Iterator<Item = &'a [T]> + Clone,
+        out: &mut Vec<T>,
+    ) {
+        let count = parts.clone().map(<[T]>::len).sum();
+        let Some(&any) = parts.clone().flatten().next() else { return out.clear() };
+        out.resize(count, any);
+        let (mut rest, mut pairs) = (&mut out[..], vec![]);
+        for part in parts {
+            let (here, after) = rest.split_at_mut(part.len());
+            pairs.push((here, part));
+            rest = after;
+        }
+        self.spread(&mut pairs[..], count, |pairs| {
+            pairs.iter_mut().for_each(|(to, from)| to.copy_from_slice(from));
+        });
+    }
+
+    /// Solves the `open` ones of the slots, in ascending order; small ones by the `sessions`, one for each part of them, which are made where they are needed. Each keeps its
     /// outcome, errors too.
     ///
     /// Errors: a solver that does not exist.
@@ -181,14 +250,14 @@ impl Crew {
     where
         FrictionLocal<D>: Registered<Point = LocalPoint>,
     {
-        let threads = self.pool.as_ref().map_or(1, ThreadPool::current_num_threads);
-        while sessions.len() < threads {
+        let parts = self.pool.as_ref().map_or(1, |pool| PARTS * pool.current_num_threads());
+        while sessions.len() < parts.min(open.len()).max(1) {
             sessions.push(Sessions::new(inner)?);
         }
         for &k in open {
             let slot = &mut slots[k as usize];
-            if slot.is_large() && slot.own.is_none() {
-                slot.own = Some(Sessions::new(inner)?);
+            if slot.is_large() && slot.own().is_none() {
+                *slot.own() = Some(Sessions::new(inner)?);
             }
         }
         let Some(pool) = self.pool.as_ref().filter(|_| open.len() > 1) else {
@@ -209,7 +278,7 @@ impl Crew {
         // What takes longest begins first.
         large.sort_by_key(|slot| Reverse(slot.problem.mu.len()));
         let budget = budget::current();
-        let share = small.len().div_ceil(threads).max(1);
+        let share = small.len().div_ceil(parts).max(1);
         pool.scope(|scope| {
             for slot in large {
                 let budget = &budget;
@@ -228,4 +297,18 @@ impl Crew {
         });
         Ok(())
     }
+}
+
+/// Parts of at most so many items, each half for whoever is free.
+fn halve<C: Cut>(all: C, most: usize, work: &(impl Fn(C) + Sync)) {
+    let count = all.count();
+    if count <= most {
+        return work(all);
+    }
+    let (first, rest) = all.cut(count / 2);
+    // What belongs together may be all there is.
+    if rest.count() == 0 {
+        return work(first);
+    }
+    rayon::join(|| halve(first, most, work), || halve(rest, most, work));
 }

@@ -25,6 +25,7 @@
 //! Scenes of `nonsmooth-scenes` are worlds too: `World::try_from(&scene)`. Scenes in files are [`SceneFile`]s.
 
 mod crew;
+mod cut;
 mod detect;
 mod drive;
 mod elastic;

@@ -131,11 +131,16 @@ pub struct Counts {
 impl Counts {
     /// What the contacts of a step do.
     pub(crate) fn tell(&mut self, contacts: &[ContactReport]) {
-        let of = |motion| contacts.iter().filter(|c| c.motion() == Some(motion)).count();
-        self.open = of(Motion::Open);
-        self.stick = of(Motion::Stick);
-        self.slip = of(Motion::Slip);
-        self.roll = contacts.iter().filter(|c| c.rolls()).count();
+        (self.open, self.stick, self.slip, self.roll) = (0, 0, 0, 0);
+        for contact in contacts {
+            match contact.motion() {
+                Some(Motion::Open) => self.open += 1,
+                Some(Motion::Stick) => self.stick += 1,
+                Some(Motion::Slip) => self.slip += 1,
+                _ => {}
+            }
+            self.roll += usize::from(contact.rolls());
+        }
     }
 }
 

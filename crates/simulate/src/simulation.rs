@@ -271,7 +271,7 @@ impl Simulation {
         Self { limits, ..self }
     }
 
-    /// With islands solved and contacts looked for by so many threads, 0 for one a core. By default there is one; the bits are the same for every number.
+    /// With all of a step done by so many threads, 0 for one a core. By default there is one; the bits are the same for every number.
     #[must_use]
     pub fn with_threads(mut self, threads: usize) -> Self {
         self.tools.set_threads(threads);

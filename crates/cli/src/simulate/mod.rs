@@ -72,7 +72,7 @@ pub struct Args {
     /// Stop after this many seconds of the wall clock; the step that is being done then is not taken
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     time_limit: Option<f64>,
-    /// Solve islands and look for contacts on so many threads, 0 for one a core; the results are the same, bit for bit
+    /// Work on so many threads, 0 for one a core; the results are the same, bit for bit
     #[arg(long, value_name = "N", default_value_t = 1)]
     threads: usize,
     /// Say where the time went

@@ -1,9 +1,11 @@
-//! The broad phase: pairs of boxes along the axes that meet, sorted.
+//! The broad phase: pairs of boxes along the axes that meet.
 //!
 //! A grid whose cells are as large as the largest box where sizes are alike, a sweep along the first axis else; a few boxes that are much larger than the
 //! rest (floors, walls) are compared with all. Cost: O(n log n) and the pairs in neighbouring cells.
 
 use nonsmooth_scenes::vec3::Vec3;
+
+use crate::crew::Crew;
 
 /// A box along the axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,12 +37,20 @@ pub(crate) struct Broad {
     large: Vec<u32>,
     rest: Vec<u32>,
     cells: Vec<(u64, u32)>,
+    /// What is found in each part of the cells.
+    parts: Vec<Vec<(u32, u32)>>,
 }
 
 impl Broad {
-    /// Appends all pairs `(i, j)`, `i < j`, of boxes that meet, in order; `moves` says which can move: pairs of which neither does are left out.
-    pub fn pairs(&mut self, boxes: &[Aabb], moves: &[bool], out: &mut Vec<(u32, u32)>) {
-        let mut found = |i: u32, j: u32| {
+    /// Appends all pairs `(i, j)`, `i < j`, of boxes that meet, in any order; `moves` says which can move: pairs of which neither does are left out.
+    pub fn pairs(
+        &mut self,
+        boxes: &[Aabb],
+        moves: &[bool],
+        crew: &Crew,
+        out: &mut Vec<(u32, u32)>,
+    ) {
+        let note = |out: &mut Vec<(u32, u32)>, i: u32, j: u32| {
             let (p, q) = (i.min(j), i.max(j));
             if (moves[p as usize] || moves[q as usize])
                 && boxes[p as usize].meets(&boxes[q as usize])
@@ -48,6 +58,7 @@ impl Broad {
                 out.push((p, q));
             }
         };
+        let mut found = |i, j| note(out, i, j);
         let n = boxes.len();
         self.rest.clear();
         self.large.clear();
@@ -70,10 +81,22 @@ impl Broad {
                 for (k, &i) in self.large.iter().enumerate() {
                     self.large[k + 1..].iter().chain(&self.rest).for_each(|&j| found(i, j));
                 }
-                grid(boxes, &self.rest, &mut self.cells, &mut found);
+                let Self { rest, cells, parts, .. } = self;
+                sort_into_cells(boxes, rest, cells, crew);
+                let count = crew.parts(cells.len());
+                parts.resize_with(parts.len().max(count), Vec::new);
+                let share = cells.len().div_ceil(count).max(1);
+                crew.spread((0..count, &mut parts[..count]), cells.len(), |(numbers, parts)| {
+                    for (k, part) in numbers.zip(parts) {
+                        part.clear();
+                        let all = cells.len();
+                        let own = all.min(share * k)..all.min(share * (k + 1));
+                        neighbours(cells, own, &mut |i, j| note(part, i, j));
+                    }
+                });
+                parts[..count].iter().for_each(|part| out.extend_from_slice(part));
             }
         }
-        out.sort_unstable();
     }
 }
 
@@ -87,12 +110,7 @@ fn sweep(boxes: &[Aabb], order: &mut [u32], found: &mut impl FnMut(u32, u32)) {
 }
 
 /// Cells have three numbers of 20 bits, the first in the lowest; one is never the last, so neighbours do not wrap.
-fn grid(
-    boxes: &[Aabb],
-    which: &[u32],
-    cells: &mut Vec<(u64, u32)>,
-    found: &mut impl FnMut(u32, u32),
-) {
+fn sort_into_cells(boxes: &[Aabb], which: &[u32], cells: &mut Vec<(u64, u32)>, crew: &Crew) {
     const MOST: f64 = 1_000_000.0;
     let centre = |i: u32, k: usize| 0.5 * (boxes[i as usize].low[k] + boxes[i as usize].high[k]);
     let (mut low, mut high, mut side) = ([f64::MAX; 3], [f64::MIN; 3], 0.0_f64);
@@ -111,11 +129,17 @@ fn grid(
     };
     cells.clear();
     cells.extend(which.iter().map(|&i| (cell(i), i)));
-    cells.sort_unstable();
+    crew.sort(cells);
+}
+
+/// The pairs of the boxes at these places with those that come later in the same or a neighbouring cell.
+fn neighbours(cells: &[(u64, u32)], own: std::ops::Range<usize>, found: &mut impl FnMut(u32, u32)) {
     // Neighbouring rows that come later: (0, +1), (+1, −1), (+1, 0), (+1, +1) in the second and third direction.
     let rows = [1_u64 << 20, (1 << 40) - (1 << 20), 1 << 40, (1 << 40) + (1 << 20)];
-    let mut starts = [0; 4];
-    for (k, &(here, i)) in cells.iter().enumerate() {
+    let begin = cells.get(own.start).map_or(0, |c| c.0);
+    let mut starts = rows.map(|row| cells.partition_point(|c| c.0 < begin + row - 1));
+    for k in own {
+        let (here, i) = cells[k];
         cells[k + 1..].iter().take_while(|c| c.0 <= here + 1).for_each(|c| found(i, c.1));
         for (row, start) in rows.iter().zip(&mut starts) {
             // Cells are visited in order, so the beginning of a row only moves forwards.
@@ -145,8 +169,12 @@ mod tests {
                 boxes.push(Aabb { low, high: low.map(|x| x + size) });
             }
             let moves: Vec<bool> = (0..n).map(|k| k % 7 != 0).collect();
-            let mut found = vec![];
-            Broad::default().pairs(&boxes, &moves, &mut found);
+            let found_by = |threads: usize| {
+                let mut found = vec![];
+                Broad::default().pairs(&boxes, &moves, &Crew::new(threads), &mut found);
+                found.sort_unstable();
+                found
+            };
             let all = (0..n as u32).flat_map(|i| (i + 1..n as u32).map(move |j| (i, j)));
             let truth: Vec<_> = all
                 .filter(|&(i, j)| {
@@ -155,7 +183,7 @@ mod tests {
                 })
                 .collect();
             assert!(truth.len() > 10);
-            assert_eq!(found, truth);
+            assert!([1, 2, 3].iter().all(|&threads| found_by(threads) == truth));
         }
     }
 }

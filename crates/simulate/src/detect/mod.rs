@@ -33,12 +33,12 @@ mod witness;
 
 use nonsmooth_scenes::Polyhedron;
 use nonsmooth_scenes::vec3::{Vec3, add, scale, sub};
-use rayon::ThreadPool;
 
+use crate::crew::Crew;
 use crate::elastic::{Foot, Nodes};
 use crate::rotation::Pose;
 use crate::state::{Axis, State};
-use crate::{BodyId, Compliance, Dimension, Law, Shape, SimulateError, World};
+use crate::{BodyId, Compliance, Dimension, Law, Motion, Shape, SimulateError, World};
 use broad::{Aabb, Broad};
 use clip::Clip;
 use convex::{Extent, Flat, Side};
@@ -90,6 +90,56 @@ struct Solids {
     size: f64,
 }
 
+impl Solids {
+    /// Vertices, where the body `moves`, and the box of a shape that is finite, whose body has this pose and margin.
+    fn place(
+        &self,
+        pose: &Pose,
+        margin: f64,
+        (moves, posed): (bool, &mut PosedHull),
+        bounds: &mut Aabb,
+    ) {
+        let (low, high, margin) = match &self.solid {
+            Solid::Rounded(segment, radius) => {
+                let s = segment.placed(pose);
+                let end = add(s.p, s.d);
+                let by = |f: fn(f64, f64) -> f64| std::array::from_fn(|i| f(s.p[i], end[i]));
+                (by(f64::min), by(f64::max), margin + radius)
+            }
+            solid @ (Solid::Hull(_) | Solid::Outline(_) | Solid::Surface(_)) => {
+                match solid {
+                    Solid::Hull(hull) if moves => posed.set(hull, pose),
+                    Solid::Outline(outline) if moves => posed.set_outline(outline, pose),
+                    Solid::Surface(surface) if moves => {
+                        posed.vertices.clear();
+                        posed.vertices.extend(surface.vertices.iter().map(|&v| pose.point(v)));
+                    }
+                    _ => {}
+                }
+                let by = |start: f64, f: fn(f64, f64) -> f64| {
+                    posed
+                        .vertices
+                        .iter()
+                        .fold([start; 3], |s, v| std::array::from_fn(|i| f(s[i], v[i])))
+                };
+                (by(f64::INFINITY, f64::min), by(f64::NEG_INFINITY, f64::max), margin)
+            }
+            Solid::Turned(turned) => {
+                let placed = turned.placed(pose);
+                let reach = |i: usize, sign: f64| {
+                    let mut e = [0.0; 3];
+                    e[i] = sign;
+                    placed.support(e)[i]
+                };
+                let by = |sign: f64| std::array::from_fn(|i| reach(i, sign));
+                (by(-1.0), by(1.0), margin)
+            }
+            Solid::Plane(_) => return,
+        };
+        *bounds = Aabb { low: low.map(|x| x - margin), high: high.map(|x| x + margin) };
+    }
+}
+
 /// Points of a surface nearer to each other than this share of the size are one,
 const SAME: f64 = 1e-6;
 /// where the cosine between their normals is larger than this.
@@ -107,8 +157,9 @@ pub(crate) struct Detector {
     planes: Vec<u32>,
     finite: Vec<u32>,
     poses: Vec<Pose>,
-    /// Vertices and faces where they are.
+    /// Vertices and faces where they are, and boxes, those of planes without a meaning; for each shape.
     hulls: Vec<PosedHull>,
+    bounds: Vec<Aabb>,
     boxes: Vec<Aabb>,
     /// For each shape the place of its box.
     box_of: Vec<u32>,
@@ -128,9 +179,6 @@ struct Finder {
     found: Vec<Near>,
     axes: Vec<((u32, u32), Axis)>,
 }
-
-/// Fewer pairs than this are not worth another thread.
-const FEW_PAIRS: usize = 256;
 
 impl Detector {
     /// Of a valid world.
@@ -222,6 +270,7 @@ impl Detector {
         let box_moves = finite.iter().map(|&k| moves[solids[k as usize].body as usize]).collect();
         Ok(Self {
             hulls: vec![PosedHull::default(); solids.len()],
+            bounds: vec![Aabb { low: [0.0; 3], high: [0.0; 3] }; solids.len()],
             moves,
             planes,
             finite,
@@ -251,50 +300,45 @@ impl Detector {
     }
 
     /// All points where two bodies that may touch are within the sum of their margins (m, one a body), by key. The axes that separate polyhedra are left in
-    /// the memory of the state, the feet of nodes on faces of other elastic solids in `feet`: these are bodies that count on where nodes end. The pairs are cut into consecutive parts, one for each thread of the pool: what is found is the same for any number.
+    /// the memory of the state, the feet of nodes on faces of other elastic solids in `feet`: these are bodies that count on where nodes end.
+    /// Shapes and pairs are cut into consecutive parts for the threads of the crew: what is found is the same for any number.
     pub fn detect(
         &mut self,
         world: &World,
         state: &mut State,
         margins: &[f64],
-        pool: Option<&ThreadPool>,
+        crew: &Crew,
         (out, feet): (&mut Vec<Near>, &mut Vec<Foot>),
     ) {
-        self.place(world, state, margins);
+        self.place(world, state, margins, crew);
         self.pairs.clear();
-        self.broad.pairs(&self.boxes, &self.box_moves, &mut self.pairs);
+        self.broad.pairs(&self.boxes, &self.box_moves, crew, &mut self.pairs);
         for pair in &mut self.pairs {
             // Places among the finite shapes, which keep the order of all shapes.
             *pair = (self.finite[pair.0 as usize], self.finite[pair.1 as usize]);
         }
         self.pairs_with_planes(margins);
-        self.pairs.sort_unstable();
-        let threads = pool.map_or(1, ThreadPool::current_num_threads);
-        let parts = threads.min(self.pairs.len() / FEW_PAIRS).max(1);
+        crew.sort(&mut self.pairs);
+        let parts = crew.parts(self.pairs.len());
         let mut finders = std::mem::take(&mut self.finders);
         finders.resize_with(finders.len().max(parts), Finder::default);
         let (this, known) = (&*self, &state.memory.axes[..]);
         let share = this.pairs.len().div_ceil(parts).max(1);
-        let work = this.pairs.chunks(share).zip(&mut finders);
-        match pool.filter(|_| parts > 1) {
-            None => work.for_each(|(pairs, f)| this.find(world, margins, pairs, known, f)),
-            Some(pool) => pool.scope(|scope| {
-                for (pairs, f) in work {
-                    scope.spawn(move |_| this.find(world, margins, pairs, known, f));
-                }
-            }),
-        }
-        out.clear();
-        self.axes.clear();
-        let used = self.pairs.len().div_ceil(share);
+        let used = this.pairs.len().div_ceil(share);
+        crew.spread((0..used, &mut finders[..used]), this.pairs.len(), |(numbers, finders)| {
+            for (k, finder) in numbers.zip(finders) {
+                let end = this.pairs.len().min(share * (k + 1));
+                this.find(world, margins, &this.pairs[share * k..end], known, finder);
+            }
+        });
         if let [only] = &mut finders[..used] {
             std::mem::swap(out, &mut only.found);
             std::mem::swap(&mut self.axes, &mut only.axes);
         } else {
-            for finder in &finders[..used] {
-                out.extend_from_slice(&finder.found);
-                self.axes.extend_from_slice(&finder.axes);
-            }
+            let found = finders[..used].iter().map(|f| &f.found[..]);
+            crew.join(found, out);
+            self.axes.clear();
+            finders[..used].iter().for_each(|f| self.axes.extend_from_slice(&f.axes));
         }
         self.finders = finders;
         std::mem::swap(&mut state.memory.axes, &mut self.axes);
@@ -350,58 +394,24 @@ impl Detector {
     }
 
     /// Poses of bodies, vertices of polyhedra and boxes of finite shapes.
-    fn place(&mut self, world: &World, state: &State, margins: &[f64]) {
+    fn place(&mut self, world: &World, state: &State, margins: &[f64], crew: &Crew) {
         let anew = self.poses.is_empty();
-        self.poses.clear();
-        self.poses.extend((0..self.bodies).map(|k| state.pose(k)));
+        self.poses.resize(self.bodies, Pose::at([0.0; 3]));
+        crew.spread((0..self.bodies, &mut self.poses[..]), self.bodies, |(numbers, poses)| {
+            numbers.zip(poses).for_each(|(k, pose)| *pose = state.pose(k));
+        });
         self.poses.extend(self.nodes.list.iter().map(|n| Pose::at(n.position(&state.elastic))));
+        let Self { solids, hulls, bounds, poses, .. } = self;
+        let count = solids.len();
+        crew.spread((&solids[..], &mut hulls[..], &mut bounds[..]), count, |(solids, h, b)| {
+            for ((shape, posed), bounds) in solids.iter().zip(h).zip(b) {
+                let body = shape.body as usize;
+                let still = world.bodies.get(body).is_some_and(|b| b.motion == Motion::Fixed);
+                shape.place(&poses[body], margins[body], (anew || !still, posed), bounds);
+            }
+        });
         self.boxes.clear();
-        for &k in &self.finite {
-            let Solids { body, solid, .. } = &self.solids[k as usize];
-            let (pose, margin) = (&self.poses[*body as usize], margins[*body as usize]);
-            let (low, high, margin) = match solid {
-                Solid::Rounded(segment, radius) => {
-                    let s = segment.placed(pose);
-                    let end = add(s.p, s.d);
-                    let by = |f: fn(f64, f64) -> f64| std::array::from_fn(|i| f(s.p[i], end[i]));
-                    (by(f64::min), by(f64::max), margin + radius)
-                }
-                Solid::Hull(_) | Solid::Outline(_) | Solid::Surface(_) => {
-                    let posed = &mut self.hulls[k as usize];
-                    let still = matches!(world.bodies[*body as usize].motion, crate::Motion::Fixed);
-                    match solid {
-                        Solid::Hull(hull) if anew || !still => posed.set(hull, pose),
-                        Solid::Outline(outline) if anew || !still => {
-                            posed.set_outline(outline, pose);
-                        }
-                        Solid::Surface(surface) if anew || !still => {
-                            posed.vertices.clear();
-                            posed.vertices.extend(surface.vertices.iter().map(|&v| pose.point(v)));
-                        }
-                        _ => {}
-                    }
-                    let by = |start: f64, f: fn(f64, f64) -> f64| {
-                        posed
-                            .vertices
-                            .iter()
-                            .fold([start; 3], |s, v| std::array::from_fn(|i| f(s[i], v[i])))
-                    };
-                    (by(f64::INFINITY, f64::min), by(f64::NEG_INFINITY, f64::max), margin)
-                }
-                Solid::Turned(turned) => {
-                    let placed = turned.placed(pose);
-                    let reach = |i: usize, sign: f64| {
-                        let mut e = [0.0; 3];
-                        e[i] = sign;
-                        placed.support(e)[i]
-                    };
-                    let by = |sign: f64| std::array::from_fn(|i| reach(i, sign));
-                    (by(-1.0), by(1.0), margin)
-                }
-                Solid::Plane(_) => continue,
-            };
-            self.boxes.push(Aabb { low: low.map(|x| x - margin), high: high.map(|x| x + margin) });
-        }
+        self.boxes.extend(self.finite.iter().map(|&k| self.bounds[k as usize]));
     }
 
     /// A plane has no box: those shapes whose box reaches below it.

@@ -16,7 +16,7 @@ fn contacts(world: &World) -> Vec<Near> {
         world,
         &mut state,
         &margins,
-        None,
+        &Crew::new(1),
         (&mut out, &mut vec![]),
     );
     out
@@ -288,7 +288,7 @@ fn the_rate_of_the_gap_is_the_normal_velocity() {
         let (margins, mut found) = ([MARGIN; 2], vec![]);
         while far > 0.1 {
             start.position[1] = scale(far, direction);
-            detector.detect(&world, &mut start, &margins, None, (&mut found, &mut vec![]));
+            detector.detect(&world, &mut start, &margins, &Crew::new(1), (&mut found, &mut vec![]));
             if !found.is_empty() {
                 break;
             }
@@ -306,7 +306,7 @@ fn the_rate_of_the_gap_is_the_normal_velocity() {
                 state.rotation[k] = turned.after(Rotation(state.rotation[k])).0;
             }
             let mut out = vec![];
-            detector.detect(&world, &mut state, &margins, None, (&mut out, &mut vec![]));
+            detector.detect(&world, &mut state, &margins, &Crew::new(1), (&mut out, &mut vec![]));
             out
         };
         let t = 1e-5;
@@ -398,7 +398,7 @@ fn no_pose_makes_it_panic() {
             let q = if coarse { Rotation::IDENTITY } else { rotation(&mut rng) };
             state.rotation[k] = q.0;
         }
-        detector.detect(&world, &mut state, &margins, None, (&mut out, &mut vec![]));
+        detector.detect(&world, &mut state, &margins, &Crew::new(1), (&mut out, &mut vec![]));
         seen += out.len();
         let finite = |n: &Near| n.place.normal.iter().chain(&n.place.point).all(|x| x.is_finite());
         assert!(out.iter().all(finite));
@@ -979,4 +979,35 @@ fn sheets_do_not_meet_surfaces() {
     let error = Detector::new(&two(grid(3, |_, _| 0.0), sheet)).err().unwrap().to_string();
     let says = "bodies[0].parts[0] and bodies[1].parts[0]: contact between a mesh and a mesh that is not closed is not supported";
     assert_eq!(error, says);
+}
+
+#[test]
+fn any_number_of_threads_finds_the_same() {
+    let mut rng = Pcg64::seed_from_u64(11);
+    let mut world = World::default();
+    world.add(Body::floor());
+    for k in 0..500 {
+        let at = [k % 10, k / 10 % 10, k / 100].map(|i| 0.35 * f64::from(i) + 0.2);
+        let body = match k % 4 {
+            0 => solid(Shape::Sphere { radius: 0.2 }),
+            1 => cuboid([0.2, 0.15, 0.25]),
+            2 => solid(Shape::Capsule { half_length: 0.1, radius: 0.15 }),
+            _ => solid(Shape::Cylinder { half_length: 0.2, radius: 0.15 }),
+        };
+        world.add(body.at(at).turned(rotation(&mut rng)));
+    }
+    let margins = vec![MARGIN; world.bodies.len()];
+    let found = |threads: usize| {
+        let (crew, mut detector) = (Crew::new(threads), Detector::new(&world).unwrap());
+        let (mut state, mut out) = (State::of(&world), vec![]);
+        // The second time with the axes of the first, and another place for a body.
+        for _ in 0..2 {
+            detector.detect(&world, &mut state, &margins, &crew, (&mut out, &mut vec![]));
+            state.position[7][2] += 0.01;
+        }
+        assert!(out.is_sorted_by_key(|near| near.key) && out.len() > 2000, "{}", out.len());
+        (out, state)
+    };
+    let alone = found(1);
+    assert!(alone == found(2) && alone == found(3));
 }

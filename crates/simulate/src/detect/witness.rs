@@ -22,6 +22,13 @@ pub struct Key {
     pub feature_b: u32,
 }
 
+impl Key {
+    /// The two shapes.
+    pub(crate) fn pair(&self) -> (u32, u32) {
+        (self.shape_a, self.shape_b)
+    }
+}
+
 /// A feature as a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Feature {
@@ -89,7 +96,7 @@ pub(crate) enum Witness {
 }
 
 /// Where a contact is: `normal` from a to b, `point` midway between the two surfaces.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Place {
     pub normal: Vec3,
     pub point: Vec3,

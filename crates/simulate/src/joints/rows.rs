@@ -198,11 +198,11 @@ impl Joints {
         }
     }
 
-    /// The rows in the frames of this pass.
-    pub fn columns(&mut self, scheme: &MoreauJean, rows: &[u32], bodies: &[Moving]) {
+    /// The rows in the frames of this pass, which count on after so many contacts.
+    pub fn columns(&mut self, scheme: &MoreauJean, rows: &[u32], contacts: u32, bodies: &[Moving]) {
         let share = (1.0 - scheme.theta) / scheme.theta;
         for &k in rows {
-            let row = &mut self.rows[k as usize];
+            let row = &mut self.rows[(k - contacts) as usize];
             let mut before = 0.0;
             let (first, last) = row.levers;
             for lever in &mut self.levers[first as usize..last as usize] {

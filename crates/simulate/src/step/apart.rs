@@ -18,7 +18,7 @@ impl Tools {
         self.margins.clear();
         self.margins.resize(world.bodies.len() + self.solids.nodes.list.len(), 0.0);
         let Self { detector, margins, crew, near, solids, .. } = self;
-        detector.detect(world, state, margins, crew.pool(), (near, &mut solids.feet));
+        detector.detect(world, state, margins, crew, (near, &mut solids.feet));
         let mut found: Vec<(u32, u32, f64)> = vec![];
         let hard = self.near.iter().filter(|n| n.compliance.is_none());
         let bodies = world.bodies.len();

@@ -1,5 +1,7 @@
 //! Bodies at the beginning of a step: what acts on them, where they are extrapolated to, how far others are looked for.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use nonsmooth_scenes::Rotation;
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, norm, scale};
 
@@ -101,8 +103,8 @@ impl Start {
         }
     }
 
-    /// Body k, and a bound on the speed of its points.
-    fn body(&self, k: usize, stride: Stride, state: &State) -> (Moving, f64) {
+    /// Writes body k; a bound on the speed of its points.
+    fn body(&self, k: usize, stride: Stride, state: &State, b: &mut Moving) -> f64 {
         let Stride { world, scheme, h } = stride;
         let (body, built) = (&world.bodies[k], &self.built[k]);
         let start = state.pose(k);
@@ -116,7 +118,7 @@ impl Start {
         }
         let omega = apply(&start.r, state.spin[k]);
         let spin = if built.isotropic { omega } else { state.spin[k] };
-        let mut b = Moving {
+        *b = Moving {
             owner: k as u32,
             free,
             isotropic: built.isotropic,
@@ -167,7 +169,7 @@ impl Start {
                 }
             }
         }
-        (b, speed)
+        speed
     }
 
     /// A node of an elastic solid that moves with this velocity, and with the free one where nothing touches it.
@@ -241,20 +243,27 @@ impl Tools {
         self.start.ask(state, forces, h);
         let gravity = norm(world.gravity);
         let (gamma, slack) = scheme.activation.forecast().unwrap_or((1.0, 0.0));
-        self.bodies.clear();
-        self.margins.clear();
-        let mut finite = true;
-        for k in 0..world.bodies.len() {
-            let (mut body, speed) = self.start.body(k, stride, state);
-            let fall = if body.free { h * h * gravity } else { 0.0 };
-            let least = (1e-6_f64).max(slack) * self.start.built[k].size;
-            self.margins.push((gamma + 1.0) * h * speed + fall + least);
-            finite &= are_finite(body.push.into_iter().chain(body.twist));
-            if body.free {
-                body.rotate(scheme, h);
+        let count = world.bodies.len();
+        self.bodies.resize(count, Start::node([0.0; 3], 0, ([0.0; 3], [0.0; 3]), 0.0));
+        self.margins.resize(count, 0.0);
+        let finite = AtomicBool::new(true);
+        let Self { start, bodies, margins, crew, .. } = self;
+        let start = &*start;
+        crew.spread((0..count, &mut bodies[..], &mut margins[..]), count, |(numbers, b, m)| {
+            for ((k, body), margin) in numbers.zip(b).zip(m) {
+                let speed = start.body(k, stride, state, body);
+                let fall = if body.free { h * h * gravity } else { 0.0 };
+                let least = (1e-6_f64).max(slack) * start.built[k].size;
+                *margin = (gamma + 1.0) * h * speed + fall + least;
+                if !are_finite(body.push.into_iter().chain(body.twist)) {
+                    finite.store(false, Ordering::Relaxed);
+                }
+                if body.free {
+                    body.rotate(scheme, h);
+                }
             }
-            self.bodies.push(body);
-        }
+        });
+        let mut finite = finite.into_inner();
         finite &= self.solids.begin(stride, state);
         for (k, node) in self.solids.nodes.list.iter().enumerate() {
             let place = node.position(&state.elastic);

@@ -3,17 +3,19 @@
 use nonsmooth_scenes::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 
 use super::frame::{apart, frame, tangent_axis, transported};
+use super::memory::{Met, recall};
 use super::{NONE, Stride, Tools};
+use crate::cut::Cut;
 use crate::detect::{Key, Near, Place};
 use crate::moving::Moving;
 use crate::state::{Remembered, State};
-use crate::{Activation, Compliance, Geometry, Impact};
+use crate::{Activation, Compliance, Dimension, Geometry, Impact};
 
 /// Directions that differ by less are the same, relative.
 const SAME: f64 = 1e-13;
 
 /// One side of a contact.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Arm {
     pub body: u32,
     /// The body or elastic solid that it belongs to.
@@ -26,7 +28,7 @@ pub(super) struct Arm {
 }
 
 /// A contact of the index set.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Row {
     pub mu: f64,
     /// What a normal impulse gives way by, over it.
@@ -85,7 +87,7 @@ impl Row {
 struct Meeting<'a> {
     stride: Stride<'a>,
     near: &'a Near,
-    known: Option<Remembered>,
+    known: Option<&'a Remembered>,
     bodies: [&'a Moving; 2],
     /// The velocity of the gap.
     approach: f64,
@@ -95,12 +97,14 @@ impl<'a> Meeting<'a> {
     fn new(
         stride: Stride<'a>,
         near: &'a Near,
-        known: Option<Remembered>,
+        known: Option<&'a Remembered>,
         bodies: &'a [Moving],
+        approach: Option<f64>,
     ) -> Self {
         let sides @ [a, b] = [near.a, near.b].map(|i| &bodies[i as usize]);
         let Place { normal, point, .. } = near.place;
-        let approach = dot(normal, sub(b.velocity_at(point), a.velocity_at(point)));
+        let velocity = || dot(normal, sub(b.velocity_at(point), a.velocity_at(point)));
+        let approach = approach.unwrap_or_else(velocity);
         Self { stride, near, known, bodies: sides, approach }
     }
 
@@ -140,8 +144,13 @@ impl<'a> Meeting<'a> {
         Place { point: add(place.point, scale(half * place.gap, place.normal)), ..place }
     }
 
-    /// The contact, with tangents after an axis of the world and impulses of the last step `scaled`.
-    fn row(&self, axis: u8, scaled: f64) -> Row {
+    /// How many directions a contact has: in the plane none across it.
+    fn directions(&self) -> usize {
+        if self.stride.world.dimension == Dimension::Two { 2 } else { 3 }
+    }
+
+    /// The contact, with tangents after an axis of the world and impulses of the last step `scaled`, written where it stays: it is large.
+    fn write(&self, axis: u8, scaled: f64, row: &mut Row) {
         let Self { near, bodies: [a, b], .. } = self;
         let n = near.place.normal;
         let middle = near.witness.place(&a.middle, &b.middle, n);
@@ -152,71 +161,58 @@ impl<'a> Meeting<'a> {
         let lasting =
             self.persists() && (near.law.e == 0.0 || self.approach >= -self.stride.rest());
         let later = lasting && self.is_extrapolated() && !near.deep;
-        let (place_end, mut frame_end) = match later {
-            true => {
-                let end = self.on_surface(near.witness.place(&a.end, &b.end, place.normal));
-                (end, transported(&frame, end.normal))
-            }
-            false => (place, frame),
-        };
-        let arm = |k: usize| {
-            let b = self.bodies[k];
-            let x_end = if later { b.end.x } else { b.middle.x };
-            Arm {
-                body: [near.a, near.b][k],
-                owner: b.owner,
-                sign: [-1.0, 1.0][k],
-                free: b.free,
-                moment: frame.map(|d| cross(sub(place.point, b.middle.x), d)),
-                moment_end: frame_end.map(|d| cross(sub(place_end.point, x_end), d)),
-            }
-        };
-        let mut arms = [arm(0), arm(1)];
-        // Where nothing moves the two ends are the same up to rounding; then W is symmetric to the last bit.
-        let turned = arms.iter().map(|a| apart(&a.moment, &a.moment_end)).fold(0.0, f64::max);
-        let later = later && (apart(&frame, &frame_end) > SAME || turned > SAME * near.size);
-        if !later {
-            frame_end = frame;
-            arms.iter_mut().for_each(|a| a.moment_end = a.moment);
-        }
-        let mut row = Row {
+        *row = Row {
             mu: near.law.mu,
-            compliance: 0.0,
             place,
             frame,
-            frame_end,
-            later,
-            arms,
-            given: [0.0; 3],
-            given_mean: [0.0; 3],
-            given_middle: [0.0; 3],
-            before: [0.0; 3],
-            shift: [0.0; 3],
-            r: [0.0; 3],
+            frame_end: frame,
             mu_r: near.law.mu_r,
-            moment: [0.0; 2],
-            turned: [0.0; 2],
-            turned_mean: [0.0; 2],
             warm: self.known.is_some_and(|m| m.impulse != [0.0; 3]),
+            ..Row::default()
         };
-        self.take_velocities(&mut row, place_end.point);
-        self.take_law(&mut row, lasting);
+        let count = self.directions();
+        for (k, (arm, b)) in row.arms.iter_mut().zip(self.bodies).enumerate() {
+            (arm.body, arm.owner, arm.free) = ([near.a, near.b][k], b.owner, b.free);
+            arm.sign = [-1.0, 1.0][k];
+            let to = sub(place.point, b.middle.x);
+            (0..count).for_each(|i| arm.moment[i] = cross(to, frame[i]));
+            arm.moment_end = arm.moment;
+        }
+        let mut point_end = place.point;
+        if later {
+            let end = self.on_surface(near.witness.place(&a.end, &b.end, place.normal));
+            let frame_end = transported(&frame, end.normal);
+            point_end = end.point;
+            let mut turned = 0.0;
+            for (arm, b) in row.arms.iter_mut().zip(self.bodies) {
+                let to = sub(end.point, b.end.x);
+                (0..count).for_each(|i| arm.moment_end[i] = cross(to, frame_end[i]));
+                turned = f64::max(turned, apart(&arm.moment, &arm.moment_end));
+            }
+            // Where nothing moves the two ends are the same up to rounding; then W is symmetric to the last bit.
+            row.later = apart(&frame, &frame_end) > SAME || turned > SAME * near.size;
+            match row.later {
+                true => row.frame_end = frame_end,
+                false => row.arms.iter_mut().for_each(|a| a.moment_end = a.moment),
+            }
+        }
+        self.take_velocities(row, point_end);
+        self.take_law(row, lasting);
         if let Some(m) = self.known {
             row.r = m.impulse_along(&frame, scaled, row.mu);
             if row.mu_r > 0.0 {
                 row.moment = m.moment_along(&frame, scaled, (row.mu_r, row.r[0]));
             }
         }
-        row
     }
 
     /// The relative velocity at the beginning, and those of what is moved, which at the end of the step is taken at a point of its own.
     fn take_velocities(&self, row: &mut Row, point_end: Vec3) {
-        let theta = self.stride.scheme.theta;
+        let (theta, count) = (self.stride.scheme.theta, self.directions());
         for (arm, m) in row.arms.iter().zip(self.bodies) {
             if m.free {
                 let omega = m.omega(m.spin);
-                for i in 0..3 {
+                for i in 0..count {
                     row.before[i] += row.rate(arm, i, m.v, omega);
                 }
                 continue;
@@ -224,7 +220,7 @@ impl<'a> Meeting<'a> {
             let [first, last] = m.linear;
             let turn = |p: Vec3| cross(m.angular, sub(p, m.start.x));
             let (mid, end) = (turn(row.place.point), turn(point_end));
-            for i in 0..3 {
+            for i in 0..count {
                 let of = |v: Vec3| arm.sign * dot(row.frame[i], add(v, mid));
                 row.before[i] += of(first);
                 row.given[i] += arm.sign * dot(row.frame_end[i], add(last, end));
@@ -264,41 +260,132 @@ impl<'a> Meeting<'a> {
     }
 }
 
+/// Points where bodies are near, with what is remembered of pairs of shapes that come in the same order, and what is found of them: the axis of the tangents, the
+/// velocity of the gap, and the row, at first 0 of each that takes part.
+struct Recalling<'a> {
+    near: &'a mut [Near],
+    memory: &'a [Remembered],
+    taken: &'a mut [bool],
+    known: &'a mut [Option<Remembered>],
+    found: (&'a mut [u8], (&'a mut [f64], &'a mut [u32])),
+}
+
+impl Cut for Recalling<'_> {
+    fn count(&self) -> usize {
+        self.near.len()
+    }
+
+    /// Between pairs of shapes, those of one of which are remembered together.
+    fn cut(self, mut at: usize) -> (Self, Self) {
+        let pair = |k: usize| self.near[k].key.pair();
+        while at > 0 && at < self.near.len() && pair(at) == pair(at - 1) {
+            at += 1;
+        }
+        let whole = self.memory.len();
+        let next = self.near.get(at).map(|n| n.key.pair());
+        let m = next.map_or(whole, |next| self.memory.partition_point(|m| m.key.pair() < next));
+        let (near, memory, taken) = (self.near.cut(at), self.memory.cut(m), self.taken.cut(m));
+        let (known, found) = (self.known.cut(at), self.found.cut(at));
+        (
+            Self { near: near.0, memory: memory.0, taken: taken.0, known: known.0, found: found.0 },
+            Self { near: near.1, memory: memory.1, taken: taken.1, known: known.1, found: found.1 },
+        )
+    }
+}
+
+/// The same points with the rows to be written of those that take part.
+struct Writing<'a> {
+    near: &'a [Near],
+    known: &'a [Option<Remembered>],
+    found: (&'a [u8], (&'a [f64], &'a [u32])),
+    rows: (&'a mut [Row], &'a mut [[u32; 2]]),
+}
+
+impl Cut for Writing<'_> {
+    fn count(&self) -> usize {
+        self.near.len()
+    }
+
+    fn cut(self, at: usize) -> (Self, Self) {
+        let row_of = self.found.1.1;
+        let of = |k: &[u32]| k.iter().copied().find(|&row| row != NONE);
+        let first = of(row_of).unwrap_or(0);
+        let r = of(&row_of[at..]).map_or(self.rows.0.len(), |row| (row - first) as usize);
+        let (near, known) = (self.near.cut(at), self.known.cut(at));
+        let (found, rows) = (self.found.cut(at), self.rows.cut(r));
+        (
+            Self { near: near.0, known: known.0, found: found.0, rows: rows.0 },
+            Self { near: near.1, known: known.1, found: found.1, rows: rows.1 },
+        )
+    }
+}
+
 impl Tools {
     /// Index set, frames, warm starts; rows of joints; islands.
     pub(super) fn meet(&mut self, stride: Stride, state: &State) {
-        let Self { near, recalled, axes, row_of, rows, bodies, .. } = self;
-        recalled.recall(&state.memory.contacts, near);
-        rows.clear();
-        row_of.clear();
-        axes.clear();
-        let scaled = state.memory.scaled(stride.h);
-        for (near, &known) in near.iter().zip(&recalled.known) {
-            let axis =
-                tangent_axis(near.place.normal, known.map(|m| m.axis), stride.world.dimension);
-            axes.push(axis);
-            let meeting = Meeting::new(stride, near, known, bodies);
-            if meeting.takes_part() || self.insisted.binary_search(&near.key).is_ok() {
-                row_of.push(rows.len() as u32);
-                rows.push(meeting.row(axis, scaled));
-            } else {
-                row_of.push(NONE);
+        let Self { near, met, row_of, rows, pairs, bodies, crew, insisted, .. } = self;
+        let (count, memory) = (near.len(), &state.memory.contacts[..]);
+        let Met { known, taken, axes, approach } = met;
+        known.resize(count, None);
+        taken.clear();
+        taken.resize(memory.len(), false);
+        axes.resize(count, 0);
+        approach.resize(count, 0.0);
+        row_of.resize(count, NONE);
+        let found = (&mut axes[..], (&mut approach[..], &mut row_of[..]));
+        let (bodies, insisted) = (&bodies[..], &insisted[..]);
+        let all = Recalling { near, memory, taken, known, found };
+        crew.spread(all, count, |Recalling { near, memory, taken, known, found }| {
+            recall(memory, near, known, taken);
+            let (axes, (approach, row_of)) = found;
+            for (k, near) in near.iter().enumerate() {
+                let known = known[k].as_ref();
+                let last = known.map(|m| m.axis);
+                axes[k] = tangent_axis(near.place.normal, last, stride.world.dimension);
+                let meeting = Meeting::new(stride, near, known, bodies, None);
+                approach[k] = meeting.approach;
+                let takes_part = meeting.takes_part() || insisted.binary_search(&near.key).is_ok();
+                row_of[k] = if takes_part { 0 } else { NONE };
             }
+        });
+        let mut number = 0;
+        for row in row_of.iter_mut().filter(|row| **row != NONE) {
+            *row = number;
+            number += 1;
         }
-        self.joints.begin(stride.scheme, stride.world, state, bodies, stride.h);
+        rows.resize(number as usize, Row::default());
+        pairs.resize(number as usize, [NONE; 2]);
+        let scaled = state.memory.scaled(stride.h);
+        let all = Writing {
+            near,
+            known,
+            found: (axes, (approach, row_of)),
+            rows: (&mut rows[..], &mut pairs[..]),
+        };
+        crew.spread(all, count, |Writing { near, known, found, rows }| {
+            let (axes, (approach, row_of)) = found;
+            let taking_part = (0..near.len()).filter(|&k| row_of[k] != NONE);
+            for ((k, row), pair) in taking_part.zip(rows.0).zip(rows.1) {
+                let meeting =
+                    Meeting::new(stride, &near[k], known[k].as_ref(), bodies, Some(approach[k]));
+                meeting.write(axes[k], scaled, row);
+                *pair = row.free_owners();
+            }
+        });
+        self.joints.begin(stride.scheme, stride.world, state, &self.bodies, stride.h);
         self.join();
     }
 
     /// Islands of contacts and rows.
     fn join(&mut self) {
-        let Self { rows, joints, islands, start, solids, .. } = self;
+        let Self { rows, pairs, joints, islands, touching, start, solids, .. } = self;
         let owners = start.bodies() + solids.len();
-        let contacts = rows.iter().map(Row::free_arms);
         let scalars = (0..joints.rows.len()).map(|k| joints.levers(k));
         islands.find(owners, |join| {
-            contacts.for_each(|arms| join(&mut arms.map(|a| a.owner)));
+            pairs.iter().for_each(|p| join(&mut p.iter().copied().filter(|&b| b != NONE)));
             scalars.for_each(|levers| join(&mut levers.iter().map(|l| l.body)));
         });
+        touching.arrange(owners, pairs, islands);
         // Where rows of joints act on a body its contacts have one direction for impulses and velocities: a problem has one V for both.
         if !joints.rows.is_empty() {
             let mut jointed = vec![false; owners];

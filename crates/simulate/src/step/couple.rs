@@ -18,7 +18,7 @@ pub(super) struct Side {
 }
 
 /// What a side of a contact with D rows is in a problem.
-pub(super) trait Sided<const D: usize>: Copy + Default {
+pub(super) trait Sided<const D: usize>: Copy + Default + Send + Sync {
     /// Writes the side of a contact with a body that moves freely.
     fn write(&mut self, row: &Row, arm: &Arm, b: &Moving);
 

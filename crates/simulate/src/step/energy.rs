@@ -8,22 +8,36 @@ use crate::moving::Moving;
 use crate::report::{EnergyBalance, StepReport};
 use crate::state::State;
 
+/// Bodies and contacts are summed by so many, and then the sums: any number of threads rounds as one does.
+const SUMMED: usize = 256;
+
 impl Tools {
     pub(super) fn energy(&mut self, stride: Stride, state: &State) -> EnergyBalance {
         let scheme = stride.scheme;
-        let mut e = EnergyBalance::default();
-        for (b, &x) in self.bodies.iter().zip(&state.position).filter(|b| b.0.free) {
-            e.add_body(b, x, stride);
-        }
-        self.solids.energy(stride, state, &mut e);
+        let Self { bodies, rows, crew, sums, .. } = self;
+        let free = state.position.len();
+        let (bodies, rows) = (&bodies[..], &rows[..]);
         // v_θ and ω_θ.
         let mean = |body: u32| {
-            let b = &self.bodies[body as usize];
+            let b = &bodies[body as usize];
             (scheme.mean(b.v, b.v_new), b.omega(scheme.mean(b.spin, b.spin_new)))
         };
-        for row in &self.rows {
-            e.add_contact(row, row.arms.each_ref().map(|arm| mean(arm.body)));
-        }
+        let count = free.max(rows.len());
+        let parts = count.div_ceil(SUMMED);
+        sums.clear();
+        sums.resize(parts, EnergyBalance::default());
+        crew.spread((0..parts, &mut sums[..]), count, |(numbers, sums)| {
+            for (k, e) in numbers.zip(sums) {
+                let of = |all: usize| all.min(SUMMED * k)..all.min(SUMMED * (k + 1));
+                let own = bodies[of(free)].iter().zip(&state.position[of(free)]);
+                own.filter(|b| b.0.free).for_each(|(b, &x)| e.add_body(b, x, stride));
+                for row in &rows[of(rows.len())] {
+                    e.add_contact(row, row.arms.each_ref().map(|arm| mean(arm.body)));
+                }
+            }
+        });
+        let mut e = sums.iter().fold(EnergyBalance::default(), |e, part| e.and(part));
+        self.solids.energy(stride, state, &mut e);
         for (k, row) in self.joints.rows.iter().enumerate() {
             for lever in self.joints.levers(k) {
                 let (v, omega) = mean(lever.body);
@@ -40,18 +54,40 @@ impl Tools {
 
     pub(super) fn count(&self, report: &mut StepReport) {
         let counts = &mut report.counts;
+        let (mut deep, mut deepest) = (0, 0.0_f64);
+        for near in &self.near {
+            deep += usize::from(near.deep);
+            deepest = deepest.max(-near.place.gap);
+        }
         counts.near = self.near.len();
-        counts.deep = self.near.iter().filter(|n| n.deep).count();
+        counts.deep = deep;
         counts.active = self.rows.len();
         counts.islands = self.islands.ends.len();
         counts.rows = self.joints.rows.len();
         counts.warm = self.rows.iter().filter(|row| row.warm).count();
-        let gaps = self.near.iter().map(|n| -n.place.gap);
-        report.drift.penetration = gaps.fold(0.0, f64::max);
+        report.drift.penetration = deepest;
     }
 }
 
 impl EnergyBalance {
+    /// The sum with that of other bodies and contacts.
+    fn and(self, other: &Self) -> Self {
+        Self {
+            kinetic_before: self.kinetic_before + other.kinetic_before,
+            kinetic: self.kinetic + other.kinetic,
+            potential: self.potential + other.potential,
+            gravity: self.gravity + other.gravity,
+            forces: self.forces + other.forces,
+            normal: self.normal + other.normal,
+            tangential: self.tangential + other.tangential,
+            drives: self.drives + other.drives,
+            joints: self.joints + other.joints,
+            numerical: self.numerical + other.numerical,
+            imbalance: self.imbalance + other.imbalance,
+            scale: self.scale + other.scale,
+        }
+    }
+
     /// A free body at x: its kinetic and potential energy, and the work of what is given.
     fn add_body(&mut self, b: &Moving, x: Vec3, Stride { world, scheme, h }: Stride) {
         let (v, spin) = (scheme.mean(b.v, b.v_new), scheme.mean(b.spin, b.spin_new));
@@ -81,6 +117,9 @@ impl EnergyBalance {
                 _ => self.tangential += work,
             }
             self.take_from_drives(given * row.r[i], work);
+        }
+        if row.mu_r == 0.0 {
+            return;
         }
         for k in 0..2 {
             let turn = free().map(|(arm, (_, omega))| arm.sign * dot(row.frame[1 + k], omega));

@@ -43,5 +43,9 @@ pub(super) fn transported(frame: &[Vec3; 3], n: Vec3) -> [Vec3; 3] {
 
 /// The largest distance between vectors of two frames, or of arms along them.
 pub(super) fn apart(p: &[Vec3; 3], q: &[Vec3; 3]) -> f64 {
-    (0..3).map(|i| norm(sub(p[i], q[i]))).fold(0.0, f64::max)
+    let square = |i: usize| {
+        let d = sub(p[i], q[i]);
+        dot(d, d)
+    };
+    (0..3).map(square).fold(0.0, f64::max).sqrt()
 }

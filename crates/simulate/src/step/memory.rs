@@ -3,55 +3,56 @@
 use nonsmooth_scenes::vec3::{Vec3, dot, norm, sub};
 
 use super::contact::Row;
-use crate::detect::{Key, Near};
+use crate::detect::Near;
 use crate::report::ContactReport;
 use crate::rolling;
 use crate::state::Remembered;
 
-/// For each contact near what is remembered of it.
+/// For each point near what is remembered of it, the axis of the tangents, and the velocity of the gap; for each contact remembered whether it was recalled.
 #[derive(Default)]
-pub(super) struct Recalled {
+pub(super) struct Met {
     pub known: Vec<Option<Remembered>>,
-    taken: Vec<bool>,
+    pub taken: Vec<bool>,
+    pub axes: Vec<u8>,
+    pub approach: Vec<f64>,
 }
 
-impl Recalled {
-    /// By its key, else the nearest of the same two shapes with nearly the same normal. Where bodies are deep inside each other the normal is that remembered.
-    pub fn recall(&mut self, memory: &[Remembered], near: &mut [Near]) {
-        let Self { known, taken } = self;
-        known.clear();
-        taken.clear();
-        taken.resize(memory.len(), false);
-        let mut m = 0;
-        for near in near.iter() {
-            while m < memory.len() && memory[m].key < near.key {
-                m += 1;
-            }
-            let same = m < memory.len() && memory[m].key == near.key;
-            if same {
-                taken[m] = true;
-            }
-            known.push(same.then(|| memory[m]));
+/// For each contact near what is remembered of it: by its key, else the nearest of the same two shapes with nearly the same normal. Where bodies are deep inside each
+/// other the normal is that remembered. `taken` is for each that is remembered, at first false.
+pub(super) fn recall(
+    memory: &[Remembered],
+    near: &mut [Near],
+    known: &mut [Option<Remembered>],
+    taken: &mut [bool],
+) {
+    let mut m = 0;
+    for (near, known) in near.iter().zip(&mut *known) {
+        while m < memory.len() && memory[m].key < near.key {
+            m += 1;
         }
-        for (near, known) in near.iter().zip(known.iter_mut()).filter(|n| n.1.is_none()) {
-            if let Some(k) = nearest(near, memory, taken) {
-                taken[k] = true;
-                *known = Some(memory[k]);
-            }
+        let same = m < memory.len() && memory[m].key == near.key;
+        if same {
+            taken[m] = true;
         }
-        for (near, known) in near.iter_mut().zip(known.iter()).filter(|n| n.0.deep) {
-            if let Some(m) = known.filter(|m| m.key == near.key) {
-                near.place.normal = m.normal;
-            }
+        *known = same.then(|| memory[m]);
+    }
+    for (near, known) in near.iter().zip(&mut *known).filter(|n| n.1.is_none()) {
+        if let Some(k) = nearest(near, memory, taken) {
+            taken[k] = true;
+            *known = Some(memory[k]);
+        }
+    }
+    for (near, known) in near.iter_mut().zip(known).filter(|n| n.0.deep) {
+        if let Some(m) = known.filter(|m| m.key == near.key) {
+            near.place.normal = m.normal;
         }
     }
 }
 
 /// The contact of the same two shapes that is nearest, of those not taken.
 fn nearest(near: &Near, memory: &[Remembered], taken: &[bool]) -> Option<usize> {
-    let pair = |key: Key| (key.shape_a, key.shape_b);
-    let first = memory.partition_point(|m| pair(m.key) < pair(near.key));
-    let same = memory[first..].iter().take_while(|m| pair(m.key) == pair(near.key));
+    let first = memory.partition_point(|m| m.key.pair() < near.key.pair());
+    let same = memory[first..].iter().take_while(|m| m.key.pair() == near.key.pair());
     let mut best = (0.05 * near.size, None);
     for (k, m) in (first..).zip(same) {
         let far = norm(sub(m.point, near.place.point));

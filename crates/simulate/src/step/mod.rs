@@ -35,7 +35,9 @@ mod memory;
 mod problem;
 mod solve;
 mod take;
+mod touching;
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use nonsmooth_problem::Friction;
@@ -46,15 +48,17 @@ use crate::detect::{Detector, Key, Near};
 use crate::islands::Islands;
 use crate::joints::Joints;
 use crate::moving::Moving;
-use crate::report::{ContactReport, StepReport, StepStatus, Timings};
+use crate::report::{ContactReport, EnergyBalance, StepReport, StepStatus, Timings};
 use crate::state::State;
 use crate::{Force, Geometry, MoreauJean, SimulateError, World};
 
 use begin::Start;
 use contact::Row;
 use elastic::Solids;
-use memory::Recalled;
+use memory::Met;
 use problem::{Island, Stated};
+use solve::Open;
+use touching::Touching;
 
 /// No body, no row.
 const NONE: u32 = u32::MAX;
@@ -83,22 +87,26 @@ pub(crate) struct Tools {
     solids: Solids,
     /// How far from each body others are looked for, m.
     margins: Vec<f64>,
-    /// The points where bodies are near each other; for each what is remembered of it, the axis of its tangents, and its row if it has one.
+    /// The points where bodies are near each other; for each what is found of it first, and its row if it has one.
     near: Vec<Near>,
-    recalled: Recalled,
-    axes: Vec<u8>,
+    met: Met,
     row_of: Vec<u32>,
-    /// The index set.
+    /// The index set, with the free bodies and elastic solids of each contact.
     rows: Vec<Row>,
+    pairs: Vec<[u32; 2]>,
     /// Contacts that take part whatever the forecast says, sorted.
     pub insisted: Vec<Key>,
     pub joints: Joints,
     islands: Islands,
+    touching: Touching,
     island: Island,
     /// The problems of the islands, and which are not solved yet.
     stated: Stated,
-    open: Vec<u32>,
+    open: Open,
     crew: Crew,
+    /// Sums of energies, and how far quaternions were from length one.
+    sums: Vec<EnergyBalance>,
+    off: Vec<f64>,
     pub contacts: Vec<ContactReport>,
 }
 
@@ -114,22 +122,25 @@ impl Tools {
             solids: Solids::new(world)?,
             margins: vec![],
             near: vec![],
-            recalled: Recalled::default(),
-            axes: vec![],
+            met: Met::default(),
             row_of: vec![],
             rows: vec![],
+            pairs: vec![],
             insisted: vec![],
             joints,
             islands: Islands::default(),
+            touching: Touching::default(),
             island: Island::of(world.bodies.len(), world.elastic.len()),
             stated: Stated::new(world.dimension),
-            open: vec![],
+            open: Open::default(),
             crew: Crew::new(1),
+            sums: vec![],
+            off: vec![],
             contacts: vec![],
         })
     }
 
-    /// Lets so many threads solve islands and look for contacts, 0 for one a core.
+    /// Lets so many threads work, 0 for one a core.
     pub fn set_threads(&mut self, threads: usize) {
         self.crew = Crew::new(threads);
     }
@@ -160,8 +171,7 @@ impl Tools {
         timings.detection = detecting.elapsed().as_secs_f64();
         self.meet(stride, state);
         let mut solved = self.solve(stride, inner)?;
-        let new = self.bodies.iter().flat_map(|b| [b.v_new, b.spin_new]).flatten();
-        if !are_finite(new) || !self.solids.is_finite() {
+        if !self.moves_are_finite() || !self.solids.is_finite() {
             solved.status = StepStatus::NotFinite;
         }
         report.energy = self.energy(stride, state);
@@ -190,15 +200,28 @@ impl Tools {
             return Ok(None);
         }
         self.stated.provide(1)?;
-        self.gather_all();
-        self.state(stride, 0);
+        self.islands.unite();
+        self.touching.arrange(self.islands.of_body.len(), &self.pairs, &self.islands);
+        self.open.begin(1);
+        self.state(stride);
         Ok(Some(self.stated.problem(0)))
+    }
+
+    /// Whether all velocities after the step are finite.
+    fn moves_are_finite(&self) -> bool {
+        let finite = AtomicBool::new(true);
+        self.crew.spread(&self.bodies[..], self.bodies.len(), |bodies| {
+            if !are_finite(bodies.iter().flat_map(|b| [b.v_new, b.spin_new]).flatten()) {
+                finite.store(false, Ordering::Relaxed);
+            }
+        });
+        finite.into_inner()
     }
 
     /// The points where bodies are near each other, and the bodies that feet are.
     fn detect(&mut self, Stride { world, scheme, h }: Stride, state: &mut State) {
         let Self { detector, margins, crew, near, solids, bodies, .. } = self;
-        detector.detect(world, state, margins, crew.pool(), (near, &mut solids.feet));
+        detector.detect(world, state, margins, crew, (near, &mut solids.feet));
         let h = if scheme.geometry == Geometry::Frozen { 0.0 } else { h };
         for foot in &solids.feet {
             let owner = world.bodies.len() as u32 + foot.solid;

@@ -1,6 +1,11 @@
-//! The problem of an island in the frames of a pass: W, q, mu of its contacts, `V, R, s` and bounds of its scalar rows, and the same with rolling friction.
+//! The problems of the islands in the frames of a pass: W, q, mu of their contacts, `V, R, s` and bounds of their scalar rows, and the same with rolling friction.
+//!
+//! Islands are stated at the same time, and the contacts of a large one too. W of a symmetric problem is one half and its mirror image, to the last bit.
 
-use nonsmooth_linalg::Csc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use nonsmooth_linalg::{Block, Csc};
 use nonsmooth_problem::{Bounds, Friction, FrictionLocal, LocalPoint, RowsLocal};
 use nonsmooth_scenes::vec3::{Vec3, apply, dot, scale};
 use nonsmooth_solve::registry::Registered;
@@ -9,8 +14,11 @@ use nonsmooth_solve::{Outcome, SolveError};
 use super::contact::Row;
 use super::couple::{Columns, FlatSide, Shared, Side, Sided};
 use super::elastic::Solids;
+use super::touching::Touching;
 use super::{NONE, Stride, Tools, are_finite};
 use crate::crew::{Asked, Crew, Inner, Sessions, Slot};
+use crate::cut::Cut;
+use crate::islands::Islands;
 use crate::joints::Joints;
 use crate::moving::Moving;
 use crate::rolling::{self, Roller, Turning};
@@ -19,7 +27,7 @@ use crate::{Dimension, SimulateError};
 /// The most iterations on a problem that is linear.
 const LINEAR: usize = 10;
 
-/// The island that is being stated or taken up: its contacts and scalar rows, by their places among those of the step, its free bodies and its elastic solids.
+/// The island that is being looked at: its contacts and scalar rows, by their places among those of the step, its free bodies and its elastic solids.
 pub(super) struct Island {
     pub contacts: Vec<u32>,
     pub scalars: Vec<u32>,
@@ -74,42 +82,20 @@ impl Island {
             }
         }
     }
-
-    /// From this number on what contacts act on are solids.
-    pub fn bodies(&self) -> u32 {
-        self.bodies
-    }
-
-    /// How many bodies and solids there are in all.
-    fn owners(&self) -> usize {
-        self.gathered.len()
-    }
 }
 
 /// The problems of the islands of a step, whose contacts have D rows, and what states and solves them.
 pub(super) struct Problems<const D: usize, S> {
-    /// Of each contact of the step the sides.
+    /// Of each contact the sides, by place.
     sides: Vec<[S; 2]>,
-    chains: Chains,
-    /// For each contact the place of the last block of its row of W that was mirrored, at first the diagonal one.
-    mirrored: Vec<u32>,
-    /// The scalar rows of each body, with the number of the lever.
-    levers: Vec<(u32, u32, u32)>,
     slots: Vec<Slot<D>>,
-    /// Those that solve small islands, one a thread.
-    sessions: Vec<Sessions<D>>,
+    /// Those that solve small islands, behind a lock that nobody waits for, so that threads may look at the rest.
+    sessions: Mutex<Vec<Sessions<D>>>,
 }
 
 impl<const D: usize, S> Default for Problems<D, S> {
     fn default() -> Self {
-        Self {
-            sides: vec![],
-            chains: Chains::default(),
-            mirrored: vec![],
-            levers: vec![],
-            slots: vec![],
-            sessions: vec![],
-        }
+        Self { sides: vec![], slots: vec![], sessions: Mutex::default() }
     }
 }
 
@@ -129,75 +115,6 @@ macro_rules! either {
     };
 }
 
-/// The contacts of each body of an island as a list, in order.
-#[derive(Default)]
-struct Chains {
-    /// The first contact of each body, and for each contact the next one of its two bodies.
-    heads: Vec<u32>,
-    next: Vec<[u32; 2]>,
-    /// The free bodies of each contact.
-    pairs: Vec<[u32; 2]>,
-}
-
-impl Chains {
-    fn link(&mut self, island: &Island, pairs: impl Iterator<Item = [u32; 2]>) {
-        self.heads.resize(island.owners(), NONE);
-        let solids = island.solids.iter().map(|k| island.bodies + k);
-        for owner in island.members.iter().copied().chain(solids) {
-            self.heads[owner as usize] = NONE;
-        }
-        self.pairs.clear();
-        self.pairs.extend(pairs);
-        self.next.clear();
-        self.next.resize(self.pairs.len(), [NONE; 2]);
-        // Made from the back.
-        for c in (0..self.pairs.len()).rev() {
-            for (side, &body) in self.pairs[c].iter().enumerate().filter(|b| *b.1 != NONE) {
-                self.next[c][side] = std::mem::replace(&mut self.heads[body as usize], c as u32);
-            }
-        }
-    }
-
-    fn side(&self, c: u32, body: u32) -> usize {
-        usize::from(self.pairs[c as usize][0] != body)
-    }
-
-    fn after(&self, c: u32, body: u32) -> u32 {
-        self.next[c as usize][self.side(c, body)]
-    }
-
-    /// The contacts of a body, with its side of each.
-    fn of(&self, body: u32) -> impl Iterator<Item = (usize, usize)> {
-        let mut c = self.heads[body as usize];
-        std::iter::from_fn(move || {
-            let found = (c != NONE).then(|| (c as usize, self.side(c, body)))?;
-            c = self.after(c, body);
-            Some(found)
-        })
-    }
-
-    /// The contacts of the two bodies of a contact, merged, each with the sides on which it touches the one and the other; a body that is not free has none.
-    fn neighbours(&self, c: usize) -> impl Iterator<Item = (usize, Shared)> {
-        let own = self.pairs[c];
-        let mut at = own.map(|b| if b == NONE { NONE } else { self.heads[b as usize] });
-        std::iter::from_fn(move || {
-            let j = at[0].min(at[1]);
-            if j == NONE {
-                return None;
-            }
-            let mut shared = [NONE; 2];
-            for k in 0..2 {
-                if at[k] == j {
-                    let side = self.side(j, own[k]);
-                    shared[k] = side as u32;
-                    at[k] = self.next[j as usize][side];
-                }
-            }
-            Some((j as usize, shared))
-        })
-    }
-}
-
 impl Stated {
     pub fn new(dimension: Dimension) -> Self {
         match dimension {
@@ -211,9 +128,9 @@ impl Stated {
         either!(self, problems => problems.provide(slots))
     }
 
-    /// What is asked of the solver of slot k.
-    pub fn ask(&mut self, k: usize, asked: Asked) {
-        either!(self, problems => problems.ask(k, asked));
+    /// What is asked of the solver of slot k, beyond that its numbers are to be finite.
+    pub fn ask(&mut self, k: usize, may_rest: bool) {
+        either!(self, problems => problems.ask(k, may_rest));
     }
 
     /// Solves the `open` ones of the first slots.
@@ -223,7 +140,10 @@ impl Stated {
         (count, open): (usize, &[u32]),
         inner: &Inner,
     ) -> Result<(), SimulateError> {
-        either!(self, p => crew.solve((&mut p.slots[..count], &mut p.sessions), open, inner))
+        either!(self, p => {
+            let sessions = p.sessions.get_mut().unwrap_or_else(PoisonError::into_inner);
+            crew.solve((&mut p.slots[..count], sessions), open, inner)
+        })
     }
 
     /// What came of slot k; nothing where its problem is not finite.
@@ -231,9 +151,14 @@ impl Stated {
         either!(self, problems => problems.slots[k].outcome.take())
     }
 
-    /// The impulses of slot k.
-    pub fn copy_impulses(&self, k: usize, island: &Island, rows: &mut [Row], joints: &mut Joints) {
-        either!(self, problems => problems.copy_impulses(k, island, rows, joints));
+    /// The impulses of contact c of slot k, and the moments of rolling friction.
+    pub fn impulse(&self, k: usize, c: usize, row: &mut Row) {
+        either!(self, problems => problems.impulse(k, c, row));
+    }
+
+    /// Those of its scalar rows.
+    pub fn scalar_impulses(&self, k: usize) -> &[f64] {
+        either!(self, problems => &problems.slots[k].point.lambda)
     }
 
     /// The problem of slot k.
@@ -256,170 +181,274 @@ impl Stated {
 impl Tools {
     pub(super) fn gather(&mut self, k: usize) {
         let Self { islands, island, rows, joints, .. } = self;
-        let first = if k == 0 { 0 } else { islands.ends[k - 1] };
-        let items = &islands.order[first..islands.ends[k]];
+        let items = &islands.order[islands.range(k)];
         island.gather(items.iter().copied(), rows, joints);
     }
 
-    /// All contacts and rows as if they were one island.
-    pub(super) fn gather_all(&mut self) {
-        let Self { island, rows, joints, .. } = self;
-        island.gather(0..(rows.len() + joints.rows.len()) as u32, rows, joints);
-    }
-
-    /// States the problem of the island that was gathered in slot k; false where it has a number that is not finite.
-    pub(super) fn state(&mut self, Stride { scheme, h, .. }: Stride, k: usize) -> bool {
-        for &b in &self.island.members {
-            self.bodies[b as usize].pass(scheme, h);
-        }
-        self.joints.columns(scheme, &self.island.scalars, &self.bodies);
-        let Self { island, rows, bodies, solids, joints, stated, .. } = self;
-        let parts = Parts { island, rows, bodies, joints };
-        match stated {
-            Stated::Space(p) => {
-                p.state(&parts, solids, k) && p.state_rows(&parts, k) && p.state_rolling(&parts, k)
+    /// States the problems of the open islands in their slots.
+    pub(super) fn state(&mut self, Stride { scheme, h, world }: Stride) {
+        let Self { crew, islands, touching, open, solids, joints, rows, bodies, stated, .. } = self;
+        let (due, count) = (&open.due[..], world.bodies.len());
+        let is_due = |k: u32| k != NONE && due[k as usize];
+        let all = (&islands.of_body[..count], &mut bodies[..count]);
+        crew.spread(all, rows.len(), |(islands, bodies)| {
+            let moved = islands.iter().zip(bodies).filter(|b| is_due(*b.0));
+            moved.for_each(|(_, body)| body.pass(scheme, h));
+        });
+        if !joints.rows.is_empty() {
+            for &k in &open.list {
+                let scalars = scalars(islands, rows.len(), k as usize);
+                joints.columns(scheme, scalars, rows.len() as u32, bodies);
             }
-            Stated::Plane(p) => p.state(&parts, solids, k) && p.state_rows(&parts, k),
+        }
+        if !solids.is_empty() {
+            let touched = rows.iter().zip(&islands.of_item).filter(|row| is_due(*row.1));
+            touched.for_each(|(row, _)| solids.reach(row));
+        }
+        let parts = Parts { crew, islands, touching, due, rows, bodies, joints, solids };
+        match stated {
+            Stated::Space(p) => p.state_all(&parts, |p, k, slot, sides| {
+                p.state(k, slot, sides)
+                    && p.state_rows(k, slot, sides)
+                    && p.state_rolling(k, slot, sides)
+            }),
+            Stated::Plane(p) => p.state_all(&parts, |p, k, slot, sides| {
+                p.state(k, slot, sides) && p.state_rows(k, slot, sides)
+            }),
         }
     }
 }
 
-/// What the problem of an island is made of.
+/// The scalar rows of island k, numbered on after all `contacts`.
+pub(super) fn scalars(islands: &Islands, contacts: usize, k: usize) -> &[u32] {
+    let items = &islands.order[islands.range(k)];
+    &items[items.partition_point(|&item| (item as usize) < contacts)..]
+}
+
+/// What problems are made of.
 struct Parts<'a> {
-    island: &'a Island,
+    crew: &'a Crew,
+    islands: &'a Islands,
+    touching: &'a Touching,
+    due: &'a [bool],
     rows: &'a [Row],
     bodies: &'a [Moving],
     joints: &'a Joints,
+    solids: &'a Solids,
 }
 
-impl<const D: usize, S: Sided<D>> Problems<D, S>
-where
-    FrictionLocal<D>: Registered<Point = LocalPoint>,
-{
-    fn provide(&mut self, slots: usize) -> Result<(), SimulateError> {
-        while self.slots.len() < slots {
-            self.slots.push(Slot::new()?);
-        }
-        Ok(())
+/// Consecutive slots, the first of which has this number, with the sides of their contacts.
+struct Slots<'a, const D: usize, S> {
+    first: usize,
+    slots: &'a mut [Slot<D>],
+    sides: &'a mut [[S; 2]],
+    touching: &'a Touching,
+}
+
+impl<const D: usize, S: Send> Cut for Slots<'_, D, S> {
+    fn count(&self) -> usize {
+        self.slots.len()
     }
 
-    fn ask(&mut self, k: usize, asked: Asked) {
-        let slot = &mut self.slots[k];
-        // Equations alone are solved at once, or not at all.
-        let linear = slot.problem.rows.as_ref().is_some_and(|r| r.bounds.are_free());
-        let linear = linear && slot.problem.mu.is_empty();
-        slot.asked = Asked { most: if linear { LINEAR } else { usize::MAX }, ..asked };
+    fn cut(self, at: usize) -> (Self, Self) {
+        let Self { first, slots, sides, touching } = self;
+        let middle = first + at;
+        let (slots, sides) =
+            (slots.cut(at), sides.cut(touching.firsts[middle] - touching.firsts[first]));
+        (
+            Self { first, slots: slots.0, sides: sides.0, touching },
+            Self { first: middle, slots: slots.1, sides: sides.1, touching },
+        )
+    }
+}
+
+/// Consecutive rows of W of an island, from contact `first` on, q, mu and the impulses to begin with; `begins` has where in all blocks each row begins, and the last
+/// one ends. `next` is for each contact the place of the last block of its row that was mirrored, at first the diagonal one.
+struct Filling<'a, const D: usize> {
+    first: usize,
+    begins: &'a [usize],
+    columns: &'a mut [u32],
+    blocks: &'a mut [Block<D>],
+    next: &'a mut [u32],
+    mu: &'a mut [f64],
+    q: &'a mut [[f64; D]],
+    r: &'a mut [[f64; D]],
+}
+
+impl<const D: usize> Cut for Filling<'_, D> {
+    fn count(&self) -> usize {
+        self.mu.len()
     }
 
-    fn copy_impulses(&self, k: usize, island: &Island, rows: &mut [Row], joints: &mut Joints) {
-        let Slot { point, rolling, .. } = &self.slots[k];
-        let width = if rolling.is_some() { 5 } else { D };
-        for (&c, r) in island.contacts.iter().zip(point.r.chunks_exact(width)) {
-            let row = &mut rows[c as usize];
-            row.r[..D].copy_from_slice(&r[..D]);
-            if rolling.is_some() {
-                row.moment.copy_from_slice(&r[3..]);
+    fn cut(self, at: usize) -> (Self, Self) {
+        let Self { first, begins, columns, blocks, next, mu, q, r } = self;
+        let middle = begins[at] - begins[0];
+        let (columns, blocks, next) = (columns.cut(middle), blocks.cut(middle), next.cut(at));
+        let (mu, q, r) = (mu.cut(at), q.cut(at), r.cut(at));
+        (
+            Self {
+                first,
+                begins: &begins[..=at],
+                columns: columns.0,
+                blocks: blocks.0,
+                next: next.0,
+                mu: mu.0,
+                q: q.0,
+                r: r.0,
+            },
+            Self {
+                first: first + at,
+                begins: &begins[at..],
+                columns: columns.1,
+                blocks: blocks.1,
+                next: next.1,
+                mu: mu.1,
+                q: q.1,
+                r: r.1,
+            },
+        )
+    }
+}
+
+impl Parts<'_> {
+    /// The columns of H and the rows of the velocities, W, q and mu, and the impulses to begin with; whether all is finite.
+    fn state<const D: usize, S: Sided<D>>(
+        &self,
+        k: usize,
+        Slot { problem, point, scratch, .. }: &mut Slot<D>,
+        sides: &mut [[S; 2]],
+    ) -> bool {
+        let Self { crew, touching, rows, bodies, .. } = *self;
+        let places = touching.island(k);
+        let (count, first) = (places.len(), places.start);
+        let order = &touching.order[places.clone()];
+        crew.spread((order, &mut *sides), count, |(order, sides)| {
+            for (&c, sides) in order.iter().zip(sides) {
+                let row = &rows[c as usize];
+                for (arm, side) in row.arms.iter().zip(sides).filter(|a| a.0.free) {
+                    side.write(row, arm, &bodies[arm.body as usize]);
+                }
             }
-        }
-        for (&k, &lambda) in island.scalars.iter().zip(&point.lambda) {
-            joints.rows[k as usize].lambda = lambda;
-        }
-    }
-
-    fn after(&self, place: usize, row: &Row, bodies: &[Moving]) -> [f64; 3] {
-        let sides = &self.sides[place];
-        let along = |i| row.velocity(sides, i, row.given[i], bodies, |b| (b.v_new, b.spin_new));
-        std::array::from_fn(|i| if i < D { along(i) } else { 0.0 })
-    }
-
-    /// The columns of H and the rows of the velocities.
-    fn write_sides(&mut self, Parts { island, rows, bodies, .. }: &Parts) {
-        self.sides.resize(rows.len(), [S::default(); 2]);
-        for &c in &island.contacts {
-            let row = &rows[c as usize];
-            let sides = &mut self.sides[c as usize];
-            for (arm, side) in row.arms.iter().zip(sides).filter(|a| a.0.free) {
-                side.write(row, arm, &bodies[arm.body as usize]);
+        });
+        scratch.resize(count, 0);
+        crew.spread((places, &mut scratch[..]), count, |(places, lengths)| {
+            for (place, length) in places.zip(lengths) {
+                *length = touching.neighbours(place).count() as u32;
             }
-        }
-    }
-
-    /// W, q and mu, and the impulses to begin with.
-    fn state(&mut self, parts: &Parts, solids: &mut Solids, k: usize) -> bool {
-        self.write_sides(parts);
-        let Parts { island, rows, bodies, .. } = *parts;
-        let Self { sides, chains, mirrored, slots, .. } = self;
-        let Slot { problem, point, .. } = &mut slots[k];
-        let order = &island.contacts;
-        chains.link(island, order.iter().map(|&c| rows[c as usize].free_owners()));
-        if !solids.is_empty() {
-            order.iter().for_each(|&c| solids.reach(&rows[c as usize]));
-        }
-        problem.W.clear(order.len());
-        problem.q.clear();
-        problem.mu.clear();
-        point.r.clear();
-        let mut check = 0.0;
+        });
+        let lengths = scratch.iter().map(|&n| n as usize);
+        let (begins, columns, blocks) = problem.W.lay_out(count, lengths);
+        problem.q.resize(D * count, 0.0);
+        problem.mu.resize(count, 0.0);
+        point.r.resize(D * count, 0.0);
         let symmetric = order.iter().all(|&c| !rows[c as usize].later);
-        mirrored.clear();
-        mirrored.resize(order.len(), 0_u32);
-        for (c, &place) in order.iter().enumerate() {
-            let (row, own) = (&rows[place as usize], &sides[place as usize]);
-            problem.mu.push(row.mu);
-            point.r.extend_from_slice(&row.r[..D]);
+        let finite = AtomicBool::new(true);
+        let filling = Filling {
+            first,
+            begins,
+            columns,
+            blocks,
+            next: scratch,
+            mu: &mut problem.mu,
+            q: problem.q.as_chunks_mut().0,
+            r: point.r.as_chunks_mut().0,
+        };
+        crew.spread(filling, count, |part| {
+            if !self.fill(part, (first, sides), symmetric) {
+                finite.store(false, Ordering::Relaxed);
+            }
+        });
+        finite.into_inner()
+    }
+
+    fn fill<const D: usize, S: Sided<D>>(
+        &self,
+        part: Filling<D>,
+        (origin, sides): (usize, &[[S; 2]]),
+        symmetric: bool,
+    ) -> bool {
+        let Self { touching, rows, bodies, solids, .. } = *self;
+        let mut check = 0.0;
+        let offset = part.begins[0];
+        for at in 0..part.mu.len() {
+            let place = part.first + at;
+            let (row, own) = (&rows[touching.order[place] as usize], &sides[place - origin]);
+            part.mu[at] = row.mu;
+            part.r[at].copy_from_slice(&row.r[..D]);
             for i in 0..D {
                 let given = row.given[i] + row.shift[i];
                 let q = row.velocity(own, i, given, bodies, |b| (b.v_free, b.spin_free));
-                problem.q.push(q);
+                part.q[at][i] = q;
                 check += 0.0 * q;
             }
-            for (width, (j, shared)) in chains.neighbours(c).enumerate() {
-                let block = if symmetric && j < c {
-                    // Row j has met later contacts in the order in which they ask for it.
-                    mirrored[j] += 1;
-                    let there = &problem.W.row(j).1[mirrored[j] as usize];
-                    std::array::from_fn(|p| std::array::from_fn(|q| there[q][p]))
+            let begin = part.begins[at] - offset;
+            let (before, from) = part.blocks.split_at_mut(begin);
+            let through_solids = |block: &mut Block<D>, of: usize, with: usize| {
+                let [row, other] = [of, with].map(|p| &rows[touching.order[p] as usize]);
+                solids.couple(block, row, other);
+            };
+            // Blocks are written where they stay: on their way through a variable they would wait for it.
+            for (width, (j, shared)) in touching.neighbours(place).enumerate() {
+                let to = &mut from[width];
+                let other = &sides[j - origin];
+                part.columns[begin + width] = (j - origin) as u32;
+                if symmetric && j < place {
+                    // The mirror image of a block above the diagonal, made anew where another part has it.
+                    if let Some(j) = j.checked_sub(part.first) {
+                        // Row j has met later contacts in the order in which they ask for it.
+                        part.next[j] += 1;
+                        transpose(to, &before[part.begins[j] - offset + part.next[j] as usize]);
+                    } else {
+                        let mut there = S::coupling(other, own, seen_from_the_other(shared));
+                        if !solids.is_empty() {
+                            through_solids(&mut there, j, place);
+                        }
+                        transpose(to, &there);
+                    }
                 } else {
-                    let other = &sides[order[j] as usize];
-                    let mut block = S::coupling(own, other, shared);
+                    *to = S::coupling(own, other, shared);
                     if !solids.is_empty() {
-                        solids.couple(&mut block, row, &rows[order[j] as usize]);
+                        through_solids(to, place, j);
                     }
-                    if j == c {
-                        mirrored[c] = width as u32;
-                        block[0][0] += row.compliance;
+                    if j == place {
+                        part.next[at] = width as u32;
+                        to[0][0] += row.compliance;
                     }
-                    block
-                };
-                check += 0.0 * (0..D).map(|i| block[i][i]).sum::<f64>();
-                problem.W.push(j, block);
+                }
+                check += 0.0 * (0..D).map(|i| to[i][i]).sum::<f64>();
             }
-            problem.W.end_row();
         }
         check == 0.0
     }
 
     /// The scalar rows, after the contacts: `V`, `R`, `s` and the bounds.
     #[allow(non_snake_case)]
-    fn state_rows(&mut self, parts: &Parts, k: usize) -> bool {
-        let Parts { island, bodies, joints, .. } = *parts;
-        let Self { sides, chains, levers, slots, .. } = self;
-        let Slot { problem, point, .. } = &mut slots[k];
-        let Island { contacts: order, scalars, .. } = island;
+    fn state_rows<const D: usize, S: Sided<D>>(
+        &self,
+        k: usize,
+        Slot { problem, point, .. }: &mut Slot<D>,
+        sides: &[[S; 2]],
+    ) -> bool {
+        let Self { islands, touching, rows, bodies, joints, .. } = *self;
+        let contacts = rows.len() as u32;
+        let scalars = scalars(islands, rows.len(), k);
+        let origin = touching.firsts[k];
         point.lambda.clear();
         if scalars.is_empty() {
             problem.rows = None;
             return true;
         }
-        levers.clear();
+        // Those of each body, with the number of the lever.
+        let mut levers = vec![];
         for (j, &k) in scalars.iter().enumerate() {
-            let each = joints.levers(k as usize).iter().enumerate();
+            let each = joints.levers((k - contacts) as usize).iter().enumerate();
             levers.extend(each.map(|(l, lever)| (lever.body, j as u32, l as u32)));
         }
         levers.sort_unstable();
         let (mut v, mut r) = (vec![], vec![]);
-        let lever =
-            |(_, j, l): (u32, u32, u32)| &joints.levers(scalars[j as usize] as usize)[l as usize];
+        let lever = |(_, j, l): (u32, u32, u32)| {
+            &joints.levers((scalars[j as usize] - contacts) as usize)[l as usize]
+        };
         for same in levers.chunk_by(|a, b| a.0 == b.0) {
             let body = same[0].0;
             for &e in same {
@@ -434,19 +463,19 @@ where
                         r.push((j, i, entry));
                     }
                 }
-                for (c, side) in chains.of(body) {
-                    let arm = &sides[order[c] as usize][side];
+                for (place, side) in touching.of(body) {
+                    let c = place - origin;
                     for i in 0..D {
-                        v.push((D * c + i, e.1 as usize, arm.rate(i, solved)));
+                        v.push((D * c + i, e.1 as usize, sides[c][side].rate(i, solved)));
                     }
                 }
             }
         }
         let (mut bounds, mut s) = (Bounds { lower: vec![], upper: vec![] }, vec![]);
-        for (j, &k) in scalars.iter().enumerate() {
-            let row = &joints.rows[k as usize];
+        for (j, k) in scalars.iter().map(|k| (k - contacts) as usize).enumerate() {
+            let row = &joints.rows[k];
             let mut free = row.shift;
-            for lever in joints.levers(k as usize) {
+            for lever in joints.levers(k) {
                 let b = &bodies[lever.body as usize];
                 free += lever.rate(b.v_free, b.spin_free);
             }
@@ -457,28 +486,30 @@ where
             r.push((j, j, row.compliance));
         }
         let finite = r.iter().chain(&v).all(|e| e.2.is_finite()) && s.iter().all(|x| x.is_finite());
-        let (n, p) = (D * order.len(), scalars.len());
+        let (n, p) = (D * sides.len(), scalars.len());
         let V = Csc::from_triplets(n, p, v.into_iter()).expect("in range");
         let R = Csc::from_triplets(p, p, r.into_iter()).expect("in range");
         problem.rows = Some(RowsLocal { V, R, s, bounds });
         finite
     }
-}
 
-impl Problems<3, Side> {
     /// The problem with rolling friction, where a contact has any, beside that without.
-    fn state_rolling(&mut self, parts: &Parts, k: usize) -> bool {
-        let Parts { island, rows, bodies, joints } = *parts;
-        let Self { sides, slots, .. } = self;
-        let Slot { problem, rolling, point, .. } = &mut slots[k];
+    fn state_rolling(
+        &self,
+        k: usize,
+        Slot { problem, rolling, point, .. }: &mut Slot<3>,
+        sides: &[[Side; 2]],
+    ) -> bool {
+        let Self { islands, touching, rows, bodies, joints, .. } = *self;
         *rolling = None;
-        if island.contacts.iter().all(|&c| rows[c as usize].mu_r == 0.0) {
+        let order = &touching.order[touching.island(k)];
+        if order.iter().all(|&c| rows[c as usize].mu_r == 0.0) {
             return true;
         }
-        let roller = |&c: &u32| rows[c as usize].roller(&sides[c as usize], bodies);
-        let rollers: Vec<Roller> = island.contacts.iter().map(roller).collect();
-        let levers = island.scalars.iter().enumerate().flat_map(|(j, &k)| {
-            let each = joints.levers(k as usize).iter();
+        let roller = |(&c, sides): (&u32, &[Side; 2])| rows[c as usize].roller(sides, bodies);
+        let rollers: Vec<Roller> = order.iter().zip(sides).map(roller).collect();
+        let levers = scalars(islands, rows.len(), k).iter().enumerate().flat_map(|(j, &k)| {
+            let each = joints.levers(k as usize - rows.len()).iter();
             each.map(move |l| (l.body, j, [l.solved[3], l.solved[4], l.solved[5]]))
         });
         let levers: Vec<_> = levers.collect();
@@ -488,6 +519,82 @@ impl Problems<3, Side> {
         (*rolling, point.r) = (Some(stated), start);
         finite
     }
+}
+
+impl<const D: usize, S: Sided<D>> Problems<D, S>
+where
+    FrictionLocal<D>: Registered<Point = LocalPoint>,
+{
+    fn provide(&mut self, slots: usize) -> Result<(), SimulateError> {
+        while self.slots.len() < slots {
+            self.slots.push(Slot::new()?);
+        }
+        Ok(())
+    }
+
+    fn state_all(
+        &mut self,
+        parts: &Parts,
+        state: impl Fn(&Parts, usize, &mut Slot<D>, &mut [[S; 2]]) -> bool + Sync,
+    ) {
+        let touching = parts.touching;
+        self.sides.resize(touching.order.len(), [S::default(); 2]);
+        let slots = &mut self.slots[..parts.due.len()];
+        let all = Slots { first: 0, slots, sides: &mut self.sides, touching };
+        parts.crew.spread(all, touching.order.len(), |Slots { first, slots, sides, .. }| {
+            let mut rest = sides;
+            for (k, slot) in (first..).zip(slots) {
+                let own;
+                (own, rest) = rest.split_at_mut(touching.island(k).len());
+                if parts.due[k] {
+                    slot.asked.finite = state(parts, k, slot, own);
+                }
+            }
+        });
+    }
+
+    fn ask(&mut self, k: usize, may_rest: bool) {
+        let slot = &mut self.slots[k];
+        // Equations alone are solved at once, or not at all.
+        let linear = slot.problem.rows.as_ref().is_some_and(|r| r.bounds.are_free());
+        let linear = linear && slot.problem.mu.is_empty();
+        let most = if linear { LINEAR } else { usize::MAX };
+        slot.asked = Asked { most, may_rest, ..slot.asked };
+    }
+
+    fn impulse(&self, k: usize, c: usize, row: &mut Row) {
+        let Slot { point, rolling, .. } = &self.slots[k];
+        let width = if rolling.is_some() { 5 } else { D };
+        let r = &point.r[width * c..width * (c + 1)];
+        row.r[..D].copy_from_slice(&r[..D]);
+        if rolling.is_some() {
+            row.moment.copy_from_slice(&r[3..]);
+        }
+    }
+
+    fn after(&self, place: usize, row: &Row, bodies: &[Moving]) -> [f64; 3] {
+        let sides = &self.sides[place];
+        let along = |i| row.velocity(sides, i, row.given[i], bodies, |b| (b.v_new, b.spin_new));
+        std::array::from_fn(|i| if i < D { along(i) } else { 0.0 })
+    }
+}
+
+#[inline]
+fn transpose<const D: usize>(to: &mut Block<D>, from: &Block<D>) {
+    for i in 0..D {
+        for j in 0..D {
+            to[i][j] = from[j][i];
+        }
+    }
+}
+
+/// What contact c shares with contact j, from what j shares with c.
+fn seen_from_the_other(shared: Shared) -> Shared {
+    let mut out = [NONE; 2];
+    for (own, &other) in shared.iter().enumerate().filter(|s| *s.1 != NONE) {
+        out[other as usize] = own as u32;
+    }
+    out
 }
 
 impl Row {

@@ -1,12 +1,13 @@
-//! The islands are solved: in each pass all that are not done are stated, solved by the crew, and looked at, in their order.
+//! The islands are solved: in each pass all that are not done are stated, solved by the crew, and taken up; bodies respond to the impulses of all their contacts, each by itself.
 
 use std::time::Instant;
 
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, norm, scale, sub};
-use nonsmooth_solve::Status;
+use nonsmooth_solve::{Outcome, Status};
 
-use super::{Stride, Tools};
-use crate::crew::{Asked, Inner};
+use super::problem::{Island, scalars};
+use super::{NONE, Stride, Tools};
+use crate::crew::{Inner, SMALL};
 use crate::moving::Moving;
 use crate::report::{StepReport, StepStatus, worst_share};
 use crate::{Geometry, SimulateError};
@@ -41,140 +42,197 @@ impl Solved {
     }
 }
 
+/// The islands that are not done, and what each of them has come to in this pass.
+#[derive(Default)]
+pub(super) struct Open {
+    /// Their numbers, ascending, and whether an island is one of them.
+    pub list: Vec<u32>,
+    pub due: Vec<bool>,
+    outcomes: Vec<Option<Outcome>>,
+    /// Of each body, and of each island, how much solving the rotations exactly has changed their velocities.
+    moved: Vec<Share>,
+    changes: Vec<Share>,
+}
+
+impl Open {
+    /// All of so many islands are.
+    pub fn begin(&mut self, count: usize) {
+        self.list.clear();
+        self.list.extend(0..count as u32);
+        self.due.clear();
+        self.due.resize(count, true);
+        self.outcomes.resize_with(count, || None);
+    }
+}
+
 impl Tools {
     pub(super) fn solve(&mut self, stride: Stride, inner: &Inner) -> Result<Solved, SimulateError> {
         let count = self.islands.ends.len();
         self.stated.provide(count)?;
-        self.open.clear();
-        self.open.extend(0..count as u32);
-        let mut solved = Solved::default();
-        while !self.open.is_empty() {
+        self.open.begin(count);
+        let sizes = (0..count).map(|k| self.touching.island(k).len());
+        let mut solved = Solved { largest: sizes.max().unwrap_or(0), ..Solved::default() };
+        while !self.open.list.is_empty() {
             solved.passes += 1;
-            let mut open = std::mem::take(&mut self.open);
-            for &k in &open {
-                self.ask(stride, k as usize, (solved.passes, inner));
-                solved.largest = solved.largest.max(self.island.contacts.len());
+            self.state(stride);
+            for at in 0..self.open.list.len() {
+                let k = self.open.list[at] as usize;
+                let may_rest = solved.passes == 1
+                    && inner.is_auto()
+                    && self.touching.island(k).len() > SMALL
+                    && self.may_rest(k, stride.rest());
+                self.stated.ask(k, may_rest);
             }
             let begun = Instant::now();
-            self.stated.solve(&self.crew, (count, &open), inner)?;
+            self.stated.solve(&self.crew, (count, &self.open.list), inner)?;
             solved.seconds += begun.elapsed().as_secs_f64();
-            let mut taken = Ok(());
-            open.retain(|&k| {
-                self.take_up(stride, k as usize, &mut solved).unwrap_or_else(|e| {
-                    taken = Err(e);
-                    false
-                })
-            });
-            self.open = open;
-            taken?;
+            self.take_up(stride, &mut solved)?;
         }
         Ok(solved)
     }
 
-    /// States the problem of island k and says what is asked of its solver.
-    fn ask(&mut self, stride: Stride, k: usize, (pass, inner): (u32, &Inner)) {
+    /// Whether the bodies of island k are slower than `rest` while most of its contacts are new, so that no impulses of the step before lead on.
+    fn may_rest(&mut self, k: usize, rest: f64) -> bool {
+        let order = &self.touching.order[self.touching.island(k)];
+        let warm = order.iter().filter(|&&c| self.rows[c as usize].warm).count();
+        if 2 * warm >= order.len() {
+            return false;
+        }
         self.gather(k);
-        let finite = self.state(stride, k);
-        let may_rest = pass == 1 && inner.is_auto() && self.may_rest(stride.rest());
-        self.stated.ask(k, Asked { finite, may_rest, ..Asked::default() });
-    }
-
-    /// Whether the bodies of the island are slower than `rest` while most of its contacts are new, so that no impulses of the step before lead on.
-    fn may_rest(&self, rest: f64) -> bool {
         let slow = |&b: &u32| {
             let b = &self.bodies[b as usize];
             norm(b.v) + norm(b.spin) * b.radius <= rest
         };
-        let order = &self.island.contacts;
-        let warm = order.iter().filter(|&&c| self.rows[c as usize].warm).count();
-        self.island.scalars.is_empty()
-            && self.island.solids.is_empty()
-            && 2 * warm < order.len()
-            && self.island.members.iter().all(slow)
+        let Island { scalars, solids, members, .. } = &self.island;
+        scalars.is_empty() && solids.is_empty() && members.iter().all(slow)
     }
 
-    /// Takes the impulses that the solver found for island k; whether another pass is due.
-    fn take_up(
-        &mut self,
-        stride: Stride,
-        k: usize,
-        solved: &mut Solved,
-    ) -> Result<bool, SimulateError> {
-        let Some(outcome) = self.stated.outcome(k) else {
-            solved.residual = f64::NAN;
-            solved.status = StepStatus::NotFinite;
-            return Ok(false);
-        };
-        let outcome = outcome?;
-        self.gather(k);
-        self.stated.copy_impulses(k, &self.island, &mut self.rows, &mut self.joints);
-        let mut change = self.respond(stride);
-        if stride.scheme.geometry == Geometry::Midpoint && !self.island.scalars.is_empty() {
-            change = change.max(self.recentre(stride));
+    /// Takes the impulses that the solver found for the open islands, and leaves open those for which another pass is due.
+    fn take_up(&mut self, stride: Stride, solved: &mut Solved) -> Result<(), SimulateError> {
+        let Self { stated, open, islands, touching, rows, joints, crew, .. } = self;
+        for &k in &open.list {
+            let outcome = stated.outcome(k as usize).transpose()?;
+            if outcome.is_none() {
+                (solved.residual, solved.status) = (f64::NAN, StepStatus::NotFinite);
+                open.due[k as usize] = false;
+            }
+            open.outcomes[k as usize] = outcome;
         }
-        solved.iterations += outcome.iterations;
-        let again = change > stride.scheme.tolerance || change.is_nan();
-        let ended = if outcome.status != Status::Solved {
-            StepStatus::Solver(outcome.status)
-        } else if !again {
-            StepStatus::Solved
-        } else if solved.passes >= stride.scheme.passes || !change.is_finite() {
-            StepStatus::NewtonLimit
-        } else {
-            return Ok(true);
-        };
-        solved.residual = f64::max(solved.residual, worst_share(&outcome.measure));
-        if solved.status == StepStatus::Solved {
-            solved.status = ended;
+        open.list.retain(|&k| open.due[k as usize]);
+        let count = rows.len();
+        let all = (&islands.of_item[..count], &touching.place_of[..], &mut rows[..]);
+        let (stated, due) = (&*stated, &open.due[..]);
+        crew.spread(all, count, |(islands, places, rows)| {
+            for ((&k, &place), row) in islands.iter().zip(places).zip(rows) {
+                if due[k as usize] {
+                    let c = place as usize - touching.firsts[k as usize];
+                    stated.impulse(k as usize, c, row);
+                }
+            }
+        });
+        for &k in &open.list {
+            let scalars = scalars(islands, count, k as usize).iter();
+            for (&item, &lambda) in scalars.zip(stated.scalar_impulses(k as usize)) {
+                joints.rows[item as usize - count].lambda = lambda;
+            }
         }
-        Ok(false)
+        self.respond(stride);
+        for at in 0..self.open.list.len() {
+            let k = self.open.list[at] as usize;
+            let mut change = self.open.changes[k].value();
+            if stride.scheme.geometry == Geometry::Midpoint
+                && !scalars(&self.islands, count, k).is_empty()
+            {
+                self.gather(k);
+                change = change.max(self.recentre(stride));
+            }
+            let Some(outcome) = self.open.outcomes[k].take() else { continue };
+            solved.iterations += outcome.iterations;
+            let again = change > stride.scheme.tolerance || change.is_nan();
+            let ended = if outcome.status != Status::Solved {
+                StepStatus::Solver(outcome.status)
+            } else if !again {
+                StepStatus::Solved
+            } else if solved.passes >= stride.scheme.passes || !change.is_finite() {
+                StepStatus::NewtonLimit
+            } else {
+                continue;
+            };
+            self.open.due[k] = false;
+            solved.residual = f64::max(solved.residual, worst_share(&outcome.measure));
+            if solved.status == StepStatus::Solved {
+                solved.status = ended;
+            }
+        }
+        let Open { list, due, .. } = &mut self.open;
+        list.retain(|&k| due[k as usize]);
+        Ok(())
     }
 
-    /// Velocities after the step with the impulses of the island; how much solving the rotations exactly has changed them, relative.
-    fn respond(&mut self, Stride { scheme, h, .. }: Stride) -> f64 {
-        let Self { island, rows, bodies, solids, joints, .. } = self;
-        island.solids.iter().for_each(|&k| solids.clear(k));
-        for &b in &island.members {
-            let b = &mut bodies[b as usize];
-            (b.impulse, b.moment) = ([0.0; 3], [0.0; 3]);
+    /// Velocities after the step with the impulses of the open islands; how much solving the rotations exactly has changed them, relative.
+    fn respond(&mut self, Stride { scheme, h, world }: Stride) {
+        let Self { islands, touching, rows, bodies, solids, joints, open, crew, .. } = self;
+        let Open { list, due, moved, changes, .. } = open;
+        let (rows, contacts, free) = (&rows[..], rows.len(), world.bodies.len());
+        let is_due = |k: u32| k != NONE && due[k as usize];
+        let (of_body, of_solid) = islands.of_body.split_at(free);
+        let all = (0..free, of_body, &mut bodies[..free]);
+        crew.spread(all, contacts, |(numbers, islands, bodies)| {
+            let due = numbers.zip(islands).zip(bodies).filter(|((_, k), _)| is_due(**k));
+            for ((number, _), b) in due {
+                (b.impulse, b.moment) = ([0.0; 3], [0.0; 3]);
+                for (place, side) in touching.of(number as u32) {
+                    let row = &rows[touching.order[place] as usize];
+                    let arm = &row.arms[side];
+                    for i in 0..3 {
+                        b.receive(arm.sign * row.r[i], row.frame[i], arm.moment[i]);
+                    }
+                    for k in (0..2).filter(|_| row.mu_r > 0.0) {
+                        b.moment = add(b.moment, scale(arm.sign * row.moment[k], row.frame[1 + k]));
+                    }
+                }
+            }
+        });
+        for (solid, _) in of_solid.iter().enumerate().filter(|k| is_due(*k.1)) {
+            let solid = solid as u32;
+            solids.clear(solid);
+            for (place, side) in touching.of(free as u32 + solid) {
+                let row = &rows[touching.order[place] as usize];
+                let arm = &row.arms[side];
+                (0..3).for_each(|i| solids.receive(arm.body, arm.sign * row.r[i], row.frame[i]));
+            }
+            solids.respond(solid, |node, v| bodies[node].v_new = v);
         }
-        for &c in &island.contacts {
-            let row = &rows[c as usize];
-            for arm in row.free_arms() {
-                if arm.owner >= island.bodies() {
-                    (0..3)
-                        .for_each(|i| solids.receive(arm.body, arm.sign * row.r[i], row.frame[i]));
-                    continue;
-                }
-                let b = &mut bodies[arm.body as usize];
-                for i in 0..3 {
-                    b.receive(arm.sign * row.r[i], row.frame[i], arm.moment[i]);
-                }
-                for k in 0..2 {
-                    b.moment = add(b.moment, scale(arm.sign * row.moment[k], row.frame[1 + k]));
+        for &k in &*list {
+            for &item in scalars(islands, contacts, k as usize) {
+                let k = item as usize - contacts;
+                for lever in joints.levers(k) {
+                    let lambda = joints.rows[k].lambda;
+                    bodies[lever.body as usize].receive(lambda, lever.force, lever.moment);
                 }
             }
         }
-        for &k in &island.scalars {
-            let lambda = joints.rows[k as usize].lambda;
-            for lever in joints.levers(k as usize) {
-                bodies[lever.body as usize].receive(lambda, lever.force, lever.moment);
+        moved.resize(free, Share::default());
+        let all = (of_body, &mut bodies[..free], &mut moved[..]);
+        crew.spread(all, contacts, |(islands, bodies, moved)| {
+            let due = islands.iter().zip(bodies).zip(moved).filter(|((k, _), _)| is_due(**k));
+            for ((_, b), moved) in due {
+                let linear = add(b.spin_free, apply(&b.inverse, apply(&b.frame, b.moment)));
+                b.rotate(scheme, h);
+                let spin = norm(b.spin).max(norm(b.spin_new)) * b.radius;
+                let size = norm(b.v).max(norm(b.v_new)).max(spin);
+                *moved = Share {
+                    change: norm(sub(b.spin_new, linear)) * b.radius,
+                    size: size.max(norm(b.push) / b.mass),
+                };
             }
+        });
+        changes.clear();
+        changes.resize(due.len(), Share::default());
+        for (&k, moved) in of_body.iter().zip(moved).filter(|m| is_due(*m.0)) {
+            changes[k as usize].of(moved.change);
+            changes[k as usize].against(moved.size);
         }
-        for &k in &island.solids {
-            solids.respond(k, |node, v| bodies[node].v_new = v);
-        }
-        let mut change = Share::default();
-        for &b in &island.members {
-            let b = &mut bodies[b as usize];
-            let linear = add(b.spin_free, apply(&b.inverse, apply(&b.frame, b.moment)));
-            b.rotate(scheme, h);
-            change.of(norm(sub(b.spin_new, linear)) * b.radius);
-            let spin = norm(b.spin).max(norm(b.spin_new)) * b.radius;
-            let size = norm(b.v).max(norm(b.v_new)).max(spin);
-            change.against(size.max(norm(b.push) / b.mass));
-        }
-        change.value()
     }
 
     /// Takes the joints of the island at the middle that this pass has come to; how far that has moved the bodies since the last one, relative.
@@ -206,6 +264,7 @@ impl Moving {
 }
 
 /// The largest of changes as a share of the largest of sizes; of changes one that is no number, if there is one.
+#[derive(Clone, Copy)]
 struct Share {
     change: f64,
     size: f64,

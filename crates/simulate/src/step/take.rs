@@ -1,11 +1,12 @@
 //! The step is taken: velocities and configuration, what is remembered, the reports of contacts and joints.
 
 use nonsmooth_scenes::Rotation;
-use nonsmooth_scenes::vec3::{add, dot, scale};
+use nonsmooth_scenes::vec3::{Vec3, add, dot, scale};
 
 use super::frame::frame;
 use super::{Stride, Tools};
 use crate::detect::Near;
+use crate::moving::Moving;
 use crate::report::{ContactReport, StepReport};
 use crate::rotation::{apply_transposed, cayley, unit};
 use crate::state::{Remembered, State};
@@ -44,53 +45,62 @@ impl Tools {
     }
 
     /// How far quaternions were from length one.
-    fn move_bodies(&self, Stride { world, scheme, h }: Stride, state: &mut State) -> f64 {
-        let mut off: f64 = 0.0;
-        for (k, b) in self.bodies[..world.bodies.len()].iter().enumerate() {
-            if let Motion::Oscillating { amplitude, frequency, phase } = world.bodies[k].motion {
-                let (x, v) = oscillation(amplitude, frequency, phase, state.t + h);
-                state.position[k] = add(world.bodies[k].position, x);
-                state.velocity[k] = v;
+    fn move_bodies(&mut self, stride: Stride, state: &mut State) -> f64 {
+        let Self { bodies, off, crew, .. } = self;
+        let (count, t) = (stride.world.bodies.len(), state.t);
+        off.resize(count, 0.0);
+        let turns = (&mut state.rotation[..], (&mut state.spin[..], &mut off[..]));
+        let all = (
+            (&bodies[..count], &stride.world.bodies[..]),
+            (&mut state.position[..], &mut state.velocity[..]),
+            turns,
+        );
+        crew.spread(all, count, |((moving, bodies), (x, v), (rotation, (spin, off)))| {
+            for (k, b) in moving.iter().enumerate() {
+                off[k] = 0.0;
+                if let Motion::Oscillating { amplitude, frequency, phase } = bodies[k].motion {
+                    let moves = oscillation(amplitude, frequency, phase, t + stride.h);
+                    (x[k], v[k]) = (add(bodies[k].position, moves.0), moves.1);
+                }
+                if b.free {
+                    x[k] = add(x[k], scale(stride.h, stride.scheme.mean(b.v, b.v_new)));
+                    v[k] = b.v_new;
+                    off[k] = b.turn(stride, &mut rotation[k], &mut spin[k]);
+                }
             }
-            if !b.free {
-                continue;
-            }
-            state.position[k] = add(state.position[k], scale(h, scheme.mean(b.v, b.v_new)));
-            state.velocity[k] = b.v_new;
-            let old = Rotation(state.rotation[k]);
-            let turn = cayley(scale(h, scheme.mean(b.spin, b.spin_new)));
-            let new = if b.isotropic { turn.after(old) } else { old.after(turn) };
-            let length = new.0.iter().map(|x| x * x).sum::<f64>().sqrt();
-            off = off.max((length - 1.0).abs());
-            let new = unit(new);
-            state.rotation[k] = new.0;
-            state.spin[k] = match b.isotropic {
-                true => apply_transposed(&new.matrix(), b.spin_new),
-                false => b.spin_new,
-            };
-        }
-        off
+        });
+        off.iter().copied().fold(0.0, f64::max)
     }
 
     fn remember(&mut self, state: &mut State, h: f64) {
         let mut contacts = std::mem::take(&mut self.contacts);
         let memory = &mut state.memory;
         memory.h = h;
-        memory.contacts.clear();
-        contacts.clear();
-        for (k, near) in self.near.iter().enumerate() {
-            let row = self.rows.get(self.row_of[k] as usize);
-            let report = self.report(near, k);
-            memory.contacts.push(Remembered::of(near, self.axes[k], row, &report));
-            contacts.push(report);
+        let count = self.near.len();
+        if let Some(near) = self.near.first() {
+            let blank = self.blank(near);
+            memory.contacts.resize(count, Remembered::of(near, 0, None, &blank));
+            contacts.resize(count, blank);
+        } else {
+            memory.contacts.clear();
+            contacts.clear();
         }
+        let this = &*self;
+        let written = (&mut contacts[..], &mut memory.contacts[..]);
+        self.crew.spread((0..count, written), count, |(numbers, (contacts, memory))| {
+            for ((k, contact), remembered) in numbers.zip(contacts).zip(memory) {
+                let near = &this.near[k];
+                let row = this.rows.get(this.row_of[k] as usize);
+                this.report(near, k, contact);
+                *remembered = Remembered::of(near, this.met.axes[k], row, contact);
+            }
+        });
         self.contacts = contacts;
     }
 
-    /// Of point k.
-    fn report(&self, near: &Near, k: usize) -> ContactReport {
-        let place = self.row_of[k] as usize;
-        let mut report = ContactReport {
+    /// Of a point that takes no part.
+    fn blank(&self, near: &Near) -> ContactReport {
+        ContactReport {
             key: near.key,
             a: BodyId(self.bodies[near.a as usize].owner),
             b: BodyId(self.bodies[near.b as usize].owner),
@@ -105,15 +115,22 @@ impl Tools {
             mu_r: near.law.mu_r,
             moment: [0.0; 2],
             rolling: [0.0; 2],
-        };
+        }
+    }
+
+    /// Writes that of point k.
+    fn report(&self, near: &Near, k: usize, report: &mut ContactReport) {
+        *report = self.blank(near);
+        let place = self.row_of[k] as usize;
         let Some(row) = self.rows.get(place) else {
-            report.frame = frame(near.place.normal, self.axes[k]);
-            return report;
+            report.frame = frame(near.place.normal, self.met.axes[k]);
+            return;
         };
         report.active = true;
         (report.point, report.frame) = (row.place.point, row.frame);
         (report.impulse, report.before, report.moment) = (row.r, row.before, row.moment);
-        report.after = self.stated.after(place, row, &self.bodies);
+        let at = self.touching.place_of[place] as usize;
+        report.after = self.stated.after(at, row, &self.bodies);
         report.rolling = row.turned;
         for arm in row.free_arms() {
             let b = &self.bodies[arm.body as usize];
@@ -122,6 +139,27 @@ impl Tools {
                 report.rolling[k] += arm.sign * dot(row.frame_end[1 + k], omega);
             }
         }
-        report
+    }
+}
+
+impl Moving {
+    /// Turns a body, and writes its angular velocity; how far the quaternion was from length one.
+    fn turn(
+        &self,
+        Stride { scheme, h, .. }: Stride,
+        rotation: &mut [f64; 4],
+        spin: &mut Vec3,
+    ) -> f64 {
+        let old = Rotation(*rotation);
+        let turn = cayley(scale(h, scheme.mean(self.spin, self.spin_new)));
+        let new = if self.isotropic { turn.after(old) } else { old.after(turn) };
+        let length = new.0.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let new = unit(new);
+        *rotation = new.0;
+        *spin = match self.isotropic {
+            true => apply_transposed(&new.matrix(), self.spin_new),
+            false => self.spin_new,
+        };
+        (length - 1.0).abs()
     }
 }

@@ -2,7 +2,11 @@
 
 use nonsmooth_scenes::Rotation;
 use nonsmooth_scenes::vec3::{Vec3, add, apply, cross, scale, sub};
-use nonsmooth_simulate::{Body, Law, MoreauJean, Simulation, World, plane};
+use nonsmooth_simulate::{
+    Body, Joint, Law, MoreauJean, Polygon, SceneFile, Shape, Simulation, StepReport, Timings,
+    World, plane,
+};
+use nonsmooth_solve::settings::SettingsMap;
 
 use crate::{G, ball, block, near, run, simulation, weightless, world};
 
@@ -296,4 +300,87 @@ fn the_number_of_threads_changes_no_bit() {
     };
     let alone = moved(1);
     assert!(alone == moved(2) && alone == moved(3));
+}
+
+/// Steps by one, two and three threads: reports, contacts and states are the same to the last bit. At least so many contacts.
+fn same_for_any_number_of_threads(world: &World, contacts: usize) {
+    let moved = |threads: usize| {
+        let simulation = Simulation::new(world.clone(), MoreauJean::default()).unwrap();
+        let simulation = simulation.with_solver("nsgs", SettingsMap::new()).unwrap();
+        let mut simulation = simulation.with_tolerance(1e-3).with_threads(threads);
+        let mut told = vec![];
+        for _ in 0..6 {
+            let report = simulation.step(5e-3).unwrap();
+            assert!(report.status.is_solved() && report.counts.active >= contacts, "{report:?}");
+            let report = StepReport { timings: Timings::default(), ..report };
+            told.push((report, simulation.contacts().to_vec(), simulation.joints().to_vec()));
+        }
+        (told, simulation.checkpoint())
+    };
+    let alone = moved(1);
+    assert!(alone == moved(2) && alone == moved(3));
+}
+
+/// Balls side by side and upon each other, which jostle: one island of many contacts.
+fn slab(mut world: World) -> World {
+    world.add(Body::floor());
+    for k in 0..14 * 14 * 3 {
+        let (i, j, level) = (k % 14, k / 14 % 14, k / 196);
+        let at = [i, j, level].map(|x| 0.2 * f64::from(x) + 0.1);
+        let push = [0.3 * f64::from(k % 3) - 0.3, 0.2 * f64::from(k % 5) - 0.4, -0.1];
+        world.add(ball(0.1).at(at).moving(push, [f64::from(k % 7) - 3.0, 1.0, 0.0]));
+    }
+    world
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit_of_an_island() {
+    same_for_any_number_of_threads(&slab(world(0.4, 0.0)), 600);
+    let law = Law { mu: 0.4, mu_r: 0.01, ..Law::default() };
+    same_for_any_number_of_threads(&slab(World::new([0.0, 0.0, -G]).with_law(law)), 600);
+}
+
+#[test]
+fn nor_where_joints_and_elastic_solids_take_part() {
+    let mut world = slab(world(0.4, 0.0));
+    let mut last = None;
+    for k in 0..8 {
+        let at = [0.15 + 0.25 * f64::from(k), 0.5, 0.71];
+        let link = world.add(block([0.1, 0.05, 0.05]).at(at));
+        if let Some(last) = last {
+            world.join(Joint::spherical(Some(last), link, [at[0] - 0.125, 0.5, 0.71]));
+        }
+        last = Some(link);
+    }
+    let scene = "format = 'nonsmooth-scene'
+        version = 1
+        time = { h = 0.005, end = 1 }
+        [[elastic]]
+        name = 'plate'
+        half = [0.7, 0.7, 0.1]
+        divisions = [7, 7, 1]
+        young = 1e6
+        density = 500
+        position = [1.4, 1.9, 0.705]
+        velocity = [0.1, 0, -0.2]";
+    let plate = SceneFile::parse(scene, &[]).unwrap().build().unwrap();
+    world.elastic.clone_from(&plate.world().elastic);
+    same_for_any_number_of_threads(&world, 600);
+}
+
+#[test]
+fn nor_in_the_plane() {
+    let mut world = World::in_plane([0.0, -G]).with_law(Law::friction(0.3));
+    world.add(Body::ground());
+    for k in 0..30 * 10 {
+        let (i, j) = (f64::from(k % 30), f64::from(k / 30));
+        let body = match k % 2 {
+            0 => Body::solid(Shape::Disc { radius: 0.1 }, 1000.0).unwrap(),
+            _ => Body::solid(Polygon::rectangle([0.1; 2]).unwrap(), 1000.0).unwrap(),
+        };
+        world.add(
+            body.at([0.2 * i, 0.1 + 0.2 * j, 0.0]).moving([0.01 * (15.0 - i), -0.2, 0.0], [0.0; 3]),
+        );
+    }
+    same_for_any_number_of_threads(&world, 520);
 }
