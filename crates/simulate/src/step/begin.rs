@@ -1,7 +1,7 @@
 //! Bodies at the beginning of a step: what acts on them, where they are extrapolated to, how far others are looked for.
 
 use nonsmooth_scenes::Rotation;
-use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, norm, scale};
+use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, norm, scale, sub};
 
 use super::{Stride, Tools, are_finite};
 use crate::detect::Detector;
@@ -101,8 +101,8 @@ impl Start {
         }
     }
 
-    /// Body k, and a bound on the speed of its points.
-    fn body(&self, k: usize, stride: Stride, state: &State) -> (Moving, f64) {
+    /// Body k, and a bound on the speed of its points in a cell that moves with this velocity.
+    fn body(&self, k: usize, stride: Stride, state: &State, cell: Vec3) -> (Moving, f64) {
         let Stride { world, scheme, h } = stride;
         let (body, built) = (&world.bodies[k], &self.built[k]);
         let start = state.pose(k);
@@ -149,11 +149,20 @@ impl Start {
             Motion::Fixed => {}
             Motion::Surface { linear, angular } => (b.linear, b.angular) = ([linear; 2], angular),
             Motion::Free => {
-                speed = norm(b.v) + norm(omega) * built.reach;
+                speed = norm(sub(b.v, cell)) + norm(omega) * built.reach;
                 for (pose, part) in [(&mut b.middle, 0.5), (&mut b.end, 1.0)] {
                     if turns {
                         let (x, q) = advanced(state, k, part * h);
                         *pose = Pose { x, r: q.matrix() };
+                    }
+                }
+            }
+            Motion::Uniform { velocity } => {
+                speed = norm(velocity);
+                b.linear = [velocity; 2];
+                for (pose, part) in [(&mut b.middle, 0.5), (&mut b.end, 1.0)] {
+                    if turns {
+                        pose.x = add(start.x, scale(part * h, velocity));
                     }
                 }
             }
@@ -241,11 +250,18 @@ impl Tools {
         self.start.ask(state, forces, h);
         let gravity = norm(world.gravity);
         let (gamma, slack) = scheme.activation.forecast().unwrap_or((1.0, 0.0));
+        // Bodies come together as fast as they move in their cells, and as these do.
+        let lattice = world.periodic.moves().then(|| world.periodic.lattice(state.t));
+        let closing = lattice.as_ref().map_or(0.0, |l| 0.5 * world.periodic.closing(l));
         self.bodies.clear();
         self.margins.clear();
         let mut finite = true;
         for k in 0..world.bodies.len() {
-            let (mut body, speed) = self.start.body(k, stride, state);
+            let cell = lattice
+                .as_ref()
+                .map_or([0.0; 3], |l| world.periodic.velocity_at(l, state.position[k]));
+            let (mut body, speed) = self.start.body(k, stride, state, cell);
+            let speed = speed + closing;
             let fall = if body.free { h * h * gravity } else { 0.0 };
             let least = (1e-6_f64).max(slack) * self.start.built[k].size;
             self.margins.push((gamma + 1.0) * h * speed + fall + least);

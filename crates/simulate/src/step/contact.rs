@@ -6,6 +6,7 @@ use super::frame::{apart, frame, tangent_axis, transported};
 use super::{NONE, Stride, Tools};
 use crate::detect::{Key, Near, Place};
 use crate::moving::Moving;
+use crate::rotation::Pose;
 use crate::state::{Remembered, State};
 use crate::{Activation, Compliance, Geometry, Impact};
 
@@ -32,6 +33,8 @@ pub(super) struct Row {
     /// What a normal impulse gives way by, over it.
     pub compliance: f64,
     pub place: Place,
+    /// From the first body to the image of it that touches, where impulses act, m.
+    pub offset: Vec3,
     /// Directions of impulses and of velocities.
     pub frame: [Vec3; 3],
     pub frame_end: [Vec3; 3],
@@ -100,8 +103,25 @@ impl<'a> Meeting<'a> {
     ) -> Self {
         let sides @ [a, b] = [near.a, near.b].map(|i| &bodies[i as usize]);
         let Place { normal, point, .. } = near.place;
-        let approach = dot(normal, sub(b.velocity_at(point), a.velocity_at(point)));
+        let image = near.image;
+        let of_a = add(a.velocity_at(sub(point, image.offset)), image.velocity);
+        let approach = dot(normal, sub(b.velocity_at(point), of_a));
         Self { stride, near, known, bodies: sides, approach }
+    }
+
+    /// From the first body to the image of it that touches after a share of the step.
+    fn offset(&self, part: f64) -> Vec3 {
+        let part = if self.is_extrapolated() { part } else { 0.0 };
+        self.near.image.after(part * self.stride.h)
+    }
+
+    /// Where the contact is with its bodies at these poses after a share of the step; of a it is the image that touches.
+    fn place(&self, [a, b]: [&Pose; 2], part: f64, normal: Vec3) -> Place {
+        if self.near.image.is_itself() {
+            return self.near.witness.place(a, b, normal);
+        }
+        let a = Pose { x: add(a.x, self.offset(part)), r: a.r };
+        self.near.witness.place(&a, b, normal)
     }
 
     /// Whether it took part in the last step.
@@ -127,7 +147,7 @@ impl<'a> Meeting<'a> {
         // What runs along a curved surface leaves it by as much as a step is curved: that is no separation.
         let curved = || {
             let [a, b] = self.bodies;
-            let end = self.near.witness.place(&a.end, &b.end, n);
+            let end = self.place([&a.end, &b.end], 1.0, n);
             beyond <= norm(sub(end.normal, n)) * norm(sub(end.point, self.near.place.point))
         };
         beyond <= 0.0 || (self.persists() && self.is_extrapolated() && curved())
@@ -144,7 +164,7 @@ impl<'a> Meeting<'a> {
     fn row(&self, axis: u8, scaled: f64) -> Row {
         let Self { near, bodies: [a, b], .. } = self;
         let n = near.place.normal;
-        let middle = near.witness.place(&a.middle, &b.middle, n);
+        let middle = self.place([&a.middle, &b.middle], 0.5, n);
         let middle = Place { normal: if near.deep { n } else { middle.normal }, ..middle };
         let place = self.on_surface(middle);
         let frame = frame(place.normal, axis);
@@ -154,20 +174,27 @@ impl<'a> Meeting<'a> {
         let later = lasting && self.is_extrapolated() && !near.deep;
         let (place_end, mut frame_end) = match later {
             true => {
-                let end = self.on_surface(near.witness.place(&a.end, &b.end, place.normal));
+                let end = self.on_surface(self.place([&a.end, &b.end], 1.0, place.normal));
                 (end, transported(&frame, end.normal))
             }
             false => (place, frame),
         };
         let arm = |k: usize| {
             let b = self.bodies[k];
-            let x_end = if later { b.end.x } else { b.middle.x };
+            let (x, x_end) = (b.middle.x, if later { b.end.x } else { b.middle.x });
+            let (x, x_end) = match k {
+                0 => (
+                    add(x, self.offset(0.5)),
+                    add(x_end, self.offset(if later { 1.0 } else { 0.5 })),
+                ),
+                _ => (x, x_end),
+            };
             Arm {
                 body: [near.a, near.b][k],
                 owner: b.owner,
                 sign: [-1.0, 1.0][k],
                 free: b.free,
-                moment: frame.map(|d| cross(sub(place.point, b.middle.x), d)),
+                moment: frame.map(|d| cross(sub(place.point, x), d)),
                 moment_end: frame_end.map(|d| cross(sub(place_end.point, x_end), d)),
             }
         };
@@ -183,6 +210,7 @@ impl<'a> Meeting<'a> {
             mu: near.law.mu,
             compliance: 0.0,
             place,
+            offset: self.offset(0.5),
             frame,
             frame_end,
             later,
@@ -213,6 +241,7 @@ impl<'a> Meeting<'a> {
     /// The relative velocity at the beginning, and those of what is moved, which at the end of the step is taken at a point of its own.
     fn take_velocities(&self, row: &mut Row, point_end: Vec3) {
         let theta = self.stride.scheme.theta;
+        let image = self.near.image;
         for (arm, m) in row.arms.iter().zip(self.bodies) {
             if m.free {
                 let omega = m.omega(m.spin);
@@ -222,7 +251,8 @@ impl<'a> Meeting<'a> {
                 continue;
             }
             let [first, last] = m.linear;
-            let turn = |p: Vec3| cross(m.angular, sub(p, m.start.x));
+            let beside = if arm.sign < 0.0 { image.offset } else { [0.0; 3] };
+            let turn = |p: Vec3| cross(m.angular, sub(p, add(m.start.x, beside)));
             let (mid, end) = (turn(row.place.point), turn(point_end));
             for i in 0..3 {
                 let of = |v: Vec3| arm.sign * dot(row.frame[i], add(v, mid));
@@ -234,6 +264,15 @@ impl<'a> Meeting<'a> {
             for k in 0..2 {
                 row.turned[k] += arm.sign * dot(row.frame_end[1 + k], m.angular);
                 row.turned_mean[k] += arm.sign * dot(row.frame[1 + k], m.angular);
+            }
+        }
+        if !image.is_itself() {
+            for i in 0..3 {
+                let given = dot(row.frame[i], image.velocity);
+                row.before[i] -= given;
+                row.given_middle[i] -= given;
+                row.given_mean[i] -= given;
+                row.given[i] -= dot(row.frame_end[i], image.velocity);
             }
         }
     }

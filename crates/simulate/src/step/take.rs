@@ -52,6 +52,10 @@ impl Tools {
                 state.position[k] = add(world.bodies[k].position, x);
                 state.velocity[k] = v;
             }
+            if let Motion::Uniform { velocity } = world.bodies[k].motion {
+                state.position[k] = add(world.bodies[k].position, scale(state.t + h, velocity));
+                state.velocity[k] = velocity;
+            }
             if !b.free {
                 continue;
             }
@@ -95,6 +99,7 @@ impl Tools {
             a: BodyId(self.bodies[near.a as usize].owner),
             b: BodyId(self.bodies[near.b as usize].owner),
             point: near.place.point,
+            offset: near.image.offset,
             frame: [[0.0; 3]; 3],
             gap: near.place.gap,
             mu: near.law.mu,
@@ -112,6 +117,7 @@ impl Tools {
         };
         report.active = true;
         (report.point, report.frame) = (row.place.point, row.frame);
+        report.offset = row.offset;
         (report.impulse, report.before, report.moment) = (row.r, row.before, row.moment);
         report.after = self.stated.after(place, row, &self.bodies);
         report.rolling = row.turned;
