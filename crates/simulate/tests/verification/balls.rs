@@ -94,6 +94,35 @@ fn after_infinitely_many_impacts_the_ball_rests() {
     }
 }
 
+/// The impacts accumulate at `t₁ (1 + e)/(1 − e)`, after a path of `z₀ (1 + e²)/(1 − e²)`.
+#[test]
+fn impacts_accumulate_in_time_and_after_a_way_that_are_known() {
+    let h = 1e-4;
+    for (e, time, way) in [
+        (0.5, 1.35457092295719, 1.666667),
+        (0.8, 4.06371276887158, 4.555556),
+        (0.9, 8.57894917872889, 9.526316),
+    ] {
+        near((2.0 / G).sqrt() * (1.0 + e) / (1.0 - e), time, 1e-13 * time);
+        let mut simulation = dropped(e, MoreauJean::default());
+        let (mut path, mut last, mut height) = (0.0, 0.0, 1.0);
+        let mut watch = |s: &Simulation, _: &StepReport| {
+            let (z, u) = (s.state().position[1][2] - R, s.state().velocity[1][2]);
+            path += (z - height).abs();
+            height = z;
+            // Rebounds; what rests is known to rounding.
+            if u > 1e-9 {
+                last = s.state().t;
+            }
+            Control::Continue
+        };
+        check(&simulation.run(1.1 * time, h, &mut watch).unwrap());
+        // Each of the impacts comes too early or late by up to half a step, some 0.5 h v deep.
+        near(last, time, 100.0 * h);
+        near(path, way, 100.0 * h);
+    }
+}
+
 #[test]
 fn a_ball_on_a_shaking_table_bounces_once_a_period() {
     let (e, frequency, gamma) = (0.8, 10.0, 0.7);
