@@ -116,7 +116,7 @@ fn the_default_is_of_second_order() {
 /// From horizontal to horizontal and back: `4 K(½)/√g`, 2.3678 s.
 #[test]
 fn the_period_from_horizontal_is_that_of_elliptic_functions() {
-    let period = 2.367841947576;
+    let period: f64 = 2.367841947576;
     let errors: Vec<_> = [4e-3, 2e-3, 1e-3]
         .map(|steps| {
             let h = period / (period / steps).round();

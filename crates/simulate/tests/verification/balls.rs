@@ -123,29 +123,55 @@ fn impacts_accumulate_in_time_and_after_a_way_that_are_known() {
     }
 }
 
-#[test]
-fn a_ball_on_a_shaking_table_bounces_once_a_period() {
-    let (e, frequency, gamma) = (0.8, 10.0, 0.7);
-    let phase: f64 = 1.048738; // cos φ = π (1 − e)/((1 + e) Γ)
+/// The phases at which a ball bounces on a table that shakes with `Γ = A ω²/g`, from a start `off` the orbit of one bounce a period; and the phase of that orbit.
+fn bounces(gamma: f64, off: f64, periods: f64) -> (Vec<f64>, f64) {
+    let (e, frequency) = (0.8, 10.0);
+    // cos φ = π (1 − e)/((1 + e) Γ)
+    let phase = (std::f64::consts::PI * (1.0 - e) / ((1.0 + e) * gamma)).acos();
     let amplitude = gamma * G / (frequency * frequency);
     let mut world = world(0.0, e);
-    let motion = Motion::Oscillating { amplitude: [0.0, 0.0, amplitude], frequency, phase };
+    let start = phase + off;
+    let motion = Motion::Oscillating { amplitude: [0.0, 0.0, amplitude], frequency, phase: start };
     world.add(Body { motion, ..Body::floor() });
     let up = G * std::f64::consts::PI / frequency;
-    let start = [0.0, 0.0, R + amplitude * phase.sin()];
-    world.add(ball(R).at(start).moving([0.0, 0.0, up], [0.0; 3]));
+    let at = [0.0, 0.0, R + amplitude * start.sin()];
+    world.add(ball(R).at(at).moving([0.0, 0.0, up], [0.0; 3]));
     let mut simulation = simulation(world);
     let mut phases = vec![];
     let mut watch = |s: &Simulation, _: &StepReport| {
         if s.contacts().iter().any(|c| c.impulse[0] > 1e-3) {
-            phases.push((frequency * s.state().t + phase) % std::f64::consts::TAU);
+            phases.push((frequency * s.state().t + start) % std::f64::consts::TAU);
         }
         Control::Continue
     };
     let period = std::f64::consts::TAU / frequency;
-    check(&simulation.run(40.5 * period, 1e-4, &mut watch).unwrap());
+    check(&simulation.run((periods + 0.5) * period, 1e-4, &mut watch).unwrap());
+    (phases, phase)
+}
+
+#[test]
+fn a_ball_on_a_shaking_table_bounces_once_a_period() {
+    let (phases, phase) = bounces(0.7, 0.0, 40.0);
+    near(phase, 1.048738, 1e-6);
     assert_eq!(phases.len(), 40);
     phases.iter().for_each(|p| near(*p, phase, 0.01));
+}
+
+/// One bounce a period is stable up to `Γ = √((π (1 − e)/(1 + e))² + (2 (1 + e²)/(1 + e)²)²)`, 1.070836 for e = 0.8; beyond it two periods make one.
+#[test]
+fn a_table_that_shakes_harder_makes_the_ball_bounce_in_twos() {
+    let e: f64 = 0.8;
+    let bound = (std::f64::consts::PI * (1.0 - e) / (1.0 + e))
+        .hypot(2.0 * (1.0 + e * e) / (1.0 + e).powi(2));
+    near(bound, 1.070836, 1e-6);
+    for (gamma, twos) in [(1.0, false), (1.05, false), (1.09, true), (1.12, true)] {
+        let (phases, phase) = bounces(gamma, 0.02, 200.0);
+        let last = &phases[phases.len() - 20..];
+        let apart: Vec<f64> = last.windows(2).map(|p| (p[1] - p[0]).abs()).collect();
+        let alternate = apart.iter().all(|d| *d > 0.05);
+        let once = last.iter().all(|p| (p - phase).abs() < 0.02);
+        assert_eq!((alternate, once), (twos, !twos), "{gamma}: {last:?}, {phase}");
+    }
 }
 
 #[test]
