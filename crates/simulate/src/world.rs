@@ -679,7 +679,7 @@ impl TryFrom<&Scene> for World {
                     && v == c.image.velocity
             };
             let on_obstacle =
-                scene.obstacles.iter().any(|o| touches(o, c.point, SAME_PLANE * size));
+                scene.obstacles.iter().any(|o| touches(o, (c.point, n), SAME_PLANE * size));
             if on_obstacle {
                 continue;
             }
@@ -742,8 +742,11 @@ fn parts(shape: &scenes::Shape) -> Vec<Part> {
     }
 }
 
-/// Whether a point lies on, or within `slack` of, an obstacle.
-fn touches(obstacle: &scenes::Obstacle, point: Vec3, slack: f64) -> bool {
+/// A contact with a ball may be this share of its radius away from it.
+const BESIDE: f64 = 0.1;
+
+/// Whether a contact of this point and normal is on, or within `slack` of, an obstacle; or beside a ball, along its radius.
+fn touches(obstacle: &scenes::Obstacle, (point, normal): (Vec3, Vec3), slack: f64) -> bool {
     let p = sub(point, obstacle.position);
     let inside = |q: &scenes::Polyhedron| {
         (0..q.faces().len()).all(|k| {
@@ -753,7 +756,11 @@ fn touches(obstacle: &scenes::Obstacle, point: Vec3, slack: f64) -> bool {
     };
     match &obstacle.shape {
         scenes::Shape::Box { half } => (0..3).all(|k| p[k].abs() <= half[k] + slack),
-        scenes::Shape::Sphere { radius } => norm(p) <= radius + slack,
+        scenes::Shape::Sphere { radius } => {
+            let far = norm(p);
+            let radial = dot(normal, p) >= (1.0 - SAME_PLANE) * far;
+            far <= radius + slack || (radial && far <= (1.0 + BESIDE) * radius)
+        }
         scenes::Shape::Polyhedron(q) => inside(q),
         scenes::Shape::Compound(parts) => parts.iter().any(inside),
     }

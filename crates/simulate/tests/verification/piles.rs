@@ -1,7 +1,8 @@
 //! Scenes of `gen` in motion: what should stand stands.
 
-use nonsmooth_scenes::scenes::{Arch, Family, SpherePile, Stack};
-use nonsmooth_simulate::{Body, Control, MoreauJean, Simulation, StepReport, World};
+use nonsmooth_scenes::scenes::{Arch, Family, SCENES, SpherePile, Stack};
+use nonsmooth_simulate::{Body, Control, MoreauJean, SceneFile, Simulation, StepReport, World};
+use nonsmooth_solve::settings::SettingsMap;
 
 use crate::{ball, check, simulation, world};
 
@@ -20,6 +21,28 @@ fn moved(scene: &nonsmooth_scenes::Scene, until: f64, h: f64) -> f64 {
     };
     check(&simulation.run(until, h, &mut watch).unwrap());
     far
+}
+
+#[test]
+fn every_family_of_scenes_moves() {
+    for entry in SCENES {
+        let mut set = SettingsMap::new();
+        if ["chute", "sphere_pile", "polyhedra"].contains(&entry.name) {
+            set.insert("count".into(), 60.into());
+        }
+        let made = entry.make(&set).unwrap();
+        let scene = SceneFile::of_family(entry.name, set, 2e-3, 0.02);
+        let scene = SceneFile { gravity: made.gravity, ..scene };
+        let built = scene.build();
+        let mut simulation = built.unwrap_or_else(|e| panic!("{}: {e}", entry.name));
+        // Walls, floor and ground: what else is fixed is an obstacle.
+        let plane = |b: &&Body| b.parts.iter().any(|p| p.shape == nonsmooth_simulate::Shape::Plane);
+        let planes = simulation.world().bodies.iter().filter(plane).count();
+        assert!(planes <= 6, "{}: {planes} planes", entry.name);
+        let report = simulation.run(4e-3, 2e-3, &mut ()).unwrap();
+        assert!(report.is_solved(), "{}: {report}", entry.name);
+        assert!(report.imbalance <= 1e-9, "{}: {report}", entry.name);
+    }
 }
 
 #[test]
