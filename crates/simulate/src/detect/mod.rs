@@ -302,7 +302,8 @@ impl Detector {
         self.pairs.clear();
         self.meet(world, state.t);
         self.pairs_with_planes(world, state.t, margins);
-        self.pairs.sort_unstable();
+        self.pairs
+            .sort_unstable_by_key(|p| (u64::from(p.first) << 32 | u64::from(p.second), p.image));
         let threads = pool.map_or(1, ThreadPool::current_num_threads);
         let parts = threads.min(self.pairs.len() / FEW_PAIRS).max(1);
         let mut finders = std::mem::take(&mut self.finders);
@@ -494,10 +495,17 @@ impl Detector {
         let (s, t) = (&solids[i as usize], &solids[j as usize]);
         let (a, b) = (&poses[s.body as usize], &poses[t.body as usize]);
         let (hull_a, hull_b) = (&hulls[i as usize], &hulls[j as usize]);
-        let (offset, velocity) = world.periodic.offset(image, time);
-        let beside = Beside { offset, velocity };
+        let here = image == [0; 3];
+        let beside = match here {
+            true => Beside::default(),
+            false => {
+                let (offset, velocity) = world.periodic.offset(image, time);
+                Beside { offset, velocity }
+            }
+        };
+        let offset = beside.offset;
         let posed;
-        let (a, hull_a) = match beside.is_itself() {
+        let (a, hull_a) = match here {
             true => (a, hull_a),
             false => {
                 posed = beside.pose(a, 0.0);
