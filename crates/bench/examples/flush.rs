@@ -37,6 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             a: 0,
             b: 1,
             point: [wave(7); 3],
+            offset: [0.0; 3],
             frame: [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             gap: 0.0,
             mu: 0.5,

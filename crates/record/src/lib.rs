@@ -13,7 +13,7 @@ use nonsmooth_io::Mesh;
 use nonsmooth_io::trajectory::{Contact, Energy, Frame, Joint, Named, State, Step, Trajectory};
 use nonsmooth_scenes::draw::playback::{self, Drawn, Form, Moment, Placed, Playback};
 use nonsmooth_scenes::draw::{Pose, Touch, View};
-use nonsmooth_scenes::vec3::{Vec3, mean, sub};
+use nonsmooth_scenes::vec3::{Vec3, add, mean, norm, sub};
 use nonsmooth_scenes::{Rotation, SceneError};
 use nonsmooth_simulate::{
     ContactReport, Dimension, Elastic, JointReport, SceneFile, Shape, Simulation, StepReport, World,
@@ -121,6 +121,7 @@ fn contact(c: &ContactReport) -> Contact {
         a: c.a.0,
         b: c.b.0,
         point: c.point,
+        offset: c.offset,
         frame: c.frame,
         gap: c.gap,
         mu: c.mu,
@@ -169,6 +170,37 @@ pub fn csv(trajectory: &Trajectory) -> String {
     text
 }
 
+/// A run of a world that repeats itself as pictures show it: bodies in its cell, contacts where these are. That of another world as it is.
+pub fn in_cell<'a>(trajectory: &'a Trajectory, world: &World) -> Cow<'a, Trajectory> {
+    if world.periodic.periods.is_empty() {
+        return Cow::Borrowed(trajectory);
+    }
+    let mut shown = trajectory.clone();
+    for frame in &mut shown.frames {
+        let mut ways = vec![[0.0; 3]; frame.bodies.len()];
+        let free = world.bodies.iter().map(|b| b.is_free());
+        for ((state, way), _) in frame.bodies.iter_mut().zip(&mut ways).zip(free).filter(|b| b.1) {
+            let (x, v) = world.in_cell(state.position, state.velocity, frame.time);
+            *way = sub(x, state.position);
+            (state.position, state.velocity) = (x, v);
+        }
+        for c in &mut frame.contacts {
+            let [a, b] = [c.a, c.b].map(|k| k as usize);
+            let own = sub(c.point, c.offset);
+            match [a, b].map(|k| world.bodies[k].is_free()) {
+                [true, true] => {
+                    c.point = add(c.point, ways[b]);
+                    c.offset = sub(c.point, add(own, ways[a]));
+                }
+                // What is fixed is drawn once: the contact belongs to what is free.
+                [true, false] => (c.point, c.offset) = (add(own, ways[a]), [0.0; 3]),
+                [false, _] => (c.point, c.offset) = (add(c.point, ways[b]), [0.0; 3]),
+            }
+        }
+    }
+    Cow::Owned(shown)
+}
+
 /// A run of a world in the plane as pictures show it: the plane stands, its second axis upwards. That of a world in space as it is.
 pub fn upright<'a>(trajectory: &'a Trajectory, world: &World) -> Cow<'a, Trajectory> {
     if world.dimension == Dimension::Three {
@@ -184,6 +216,7 @@ pub fn upright<'a>(trajectory: &'a Trajectory, world: &World) -> Cow<'a, Traject
         }
         for contact in &mut frame.contacts {
             stand(&mut contact.point);
+            stand(&mut contact.offset);
             contact.frame.iter_mut().for_each(stand);
         }
         for joint in &mut frame.joints {
@@ -288,6 +321,7 @@ fn drawn(world: &World) -> Vec<Drawn> {
 
 /// What plays a trajectory of a world; its title is the scene's.
 pub fn playback(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Playback {
+    let trajectory = &*in_cell(trajectory, world);
     let trajectory = &*upright(trajectory, world);
     let view = match world.dimension {
         Dimension::Three => View::default(),
@@ -300,7 +334,7 @@ pub fn playback(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Pl
         a: Some(c.a as usize),
         b: c.b as usize,
         point: c.point,
-        offset: [0.0; 3],
+        offset: c.offset,
         frame: c.frame,
         mu: c.mu,
         r: Some(c.r),
@@ -322,6 +356,8 @@ pub fn playback(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Pl
         kinetic: s.energy.kinetic,
         potential: s.energy.potential,
     });
+    let periods = world.periods_at(0.0);
+    let shortest = periods.into_iter().map(norm).fold(f64::INFINITY, f64::min);
     Playback {
         title: scene.name.clone(),
         view,
@@ -329,6 +365,7 @@ pub fn playback(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Pl
         frames: frames.collect(),
         energy: energy.collect(),
         residual: trajectory.steps.iter().map(|s| [s.time, s.residual]).collect(),
+        jump: shortest.is_finite().then_some(0.5 * shortest),
     }
 }
 

@@ -1,7 +1,7 @@
 //! A mechanics file of Siconos as a scene of `simulate`.
 //!
 //! Contact laws are between groups of contactors: groups become materials, and bodies whose groups have no law do not meet. Cylinders, cones and capsules stand about the
-//! second axis there, and about the third one here.
+//! second axis there, and about the third one here. Files of dimension 2 are scenes in the plane, where gravity is along the second axis.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -12,10 +12,10 @@ use nonsmooth_io::siconos::{
 };
 use nonsmooth_scenes::vec3::{Vec3, add, apply, congruence};
 use nonsmooth_scenes::{MassProperties, Polyhedron, Rotation};
-use nonsmooth_simulate::Shape;
 use nonsmooth_simulate::import::Imported;
 use nonsmooth_simulate::rotation::unit;
 use nonsmooth_simulate::scene_file::{FORMAT, VERSION};
+use nonsmooth_simulate::{Polygon, Shape};
 use serde_json::{Value, json};
 
 /// Gravity of Siconos' runs, m/s².
@@ -30,10 +30,11 @@ pub(crate) fn read(from: &Path) -> Result<Imported, String> {
 }
 
 fn scene(file: &MechanicsScene) -> Result<Imported, String> {
-    if file.dimension != 3 {
-        return Err(format!("dimension: expected 3, found {}", file.dimension));
+    if !matches!(file.dimension, 2 | 3) {
+        return Err(format!("dimension: expected 2 or 3, found {}", file.dimension));
     }
-    let mut import = Import { file, shapes: BTreeMap::new(), said: vec![] };
+    let flat = file.dimension == 2;
+    let mut import = Import { file, flat, shapes: BTreeMap::new(), said: vec![] };
     let [h, end] = file.times.unwrap_or(TIMES);
     let from = if file.times.is_some() { "of its history" } else { "the defaults of Siconos" };
     import.said.push(format!("h = {h} and end = {end} are {from}, gravity that of its runs"));
@@ -55,6 +56,13 @@ fn scene(file: &MechanicsScene) -> Result<Imported, String> {
     if forces {
         import.said.push("`fext` of bodies acts besides their weight".into());
     }
+    if let (true, Some(joint)) = (flat, file.joints.first()) {
+        let expected = "none in dimension 2: joints of Siconos are of space";
+        return Err(format!(
+            "/data/joints/{}: expected {expected}, found {}",
+            joint.name, joint.kind
+        ));
+    }
     let joints: Vec<Value> =
         file.joints.iter().map(|joint| import.joint(joint)).collect::<Result<_, _>>()?;
     let mut scene = json!({
@@ -63,6 +71,10 @@ fn scene(file: &MechanicsScene) -> Result<Imported, String> {
         "time": {"h": h, "end": end},
         "bodies": bodies,
     });
+    if flat {
+        scene["dimension"] = json!(2);
+        scene["gravity"] = json!([0.0, -GRAVITY]);
+    }
     contacts.laws(&mut scene);
     let (couplings, joints): (Vec<Value>, Vec<Value>) = joints
         .into_iter()
@@ -91,6 +103,8 @@ struct Made {
 
 struct Import<'a> {
     file: &'a MechanicsScene,
+    /// Whether it is of dimension 2.
+    flat: bool,
     shapes: BTreeMap<&'a str, Made>,
     said: Vec<String>,
 }
@@ -107,17 +121,31 @@ impl<'a> Import<'a> {
                 self.said.push(format!("{place}: `outsideMargin`: shapes have no skin here"));
             }
             let made = match &shape.form {
-                MechanicsForm::Primitive { kind, size } => primitive(kind, size)
+                MechanicsForm::Primitive { kind, size } => primitive(kind, size, self.flat)
                     .ok_or_else(|| {
-                        let expected = "a Sphere, Box, Cylinder, Cone, Capsule or Plane with its positive numbers";
+                        let expected = match self.flat {
+                            true => "in dimension 2 a Disk or Box2d with its positive numbers",
+                            false => "a Sphere, Box, Cylinder, Cone, Capsule or Plane with its positive numbers",
+                        };
                         format!("{place}: expected {expected}, found {kind} {size:?}")
                     })?,
+                MechanicsForm::Heights { .. } | MechanicsForm::Other(_) | MechanicsForm::Convex(_)
+                    if self.flat =>
+                {
+                    let expected = "in dimension 2 a primitive or a convex of rows of 2 numbers";
+                    return Err(format!("{place}: expected {expected}, found another shape"));
+                }
                 MechanicsForm::Convex(points) => {
                     let hull = Polyhedron::hull(points).map_err(|e| format!("{place}: {e}"))?;
                     let table = json!({
                         "kind": "polyhedron", "vertices": hull.vertices(), "faces": hull.faces(),
                     });
                     Made { table, solid: Some(hull.into()), turned: Rotation::IDENTITY }
+                }
+                MechanicsForm::Flat(points) => {
+                    let hull = Polygon::hull(points).map_err(|e| format!("{place}: {e}"))?;
+                    let table = json!({"kind": "polygon", "vertices": hull.vertices()});
+                    Made { table, solid: Some(Shape::Polygon(hull)), turned: Rotation::IDENTITY }
                 }
                 MechanicsForm::Heights { heights, size } => {
                     let columns = heights.first().map_or(0, Vec::len);
@@ -142,13 +170,13 @@ impl<'a> Import<'a> {
 
     fn body(&mut self, object: &MechanicsObject) -> Result<Value, String> {
         let place = place(object);
-        let mut table = json!({"name": object.name, "position": object.position});
+        let mut table = json!({"name": object.name, "position": self.vector(object.position)});
         let q = Rotation(object.rotation);
         if object.rotation.iter().all(|x| *x == 0.0) {
             return Err(format!("{place}: expected a quaternion as `orientation`, found zero"));
         }
         let q = unit(q);
-        table["rotation"] = json!({"quaternion": q.0});
+        table["rotation"] = self.turn(q);
         self.said.extend(object.others.iter().map(|name| format!("{place}: `{name}` is left out")));
         if object.death.is_some() {
             self.said.push(format!("{place}: `time_of_death` is left out: it stays"));
@@ -162,12 +190,42 @@ impl<'a> Import<'a> {
             let own = unit(unit(Rotation(contactor.rotation)).after(made.turned));
             solids.push(made.solid.as_ref().map(|solid| (solid, contactor.position, own)));
             parts.push(json!({
-                "shape": made.table, "position": contactor.position,
-                "rotation": {"quaternion": own.0}, "material": material(contactor.group),
+                "shape": made.table, "position": self.vector(contactor.position),
+                "rotation": self.turn(own), "material": material(contactor.group),
             }));
         }
         match object.mass {
             None => table["fixed"] = json!(true),
+            Some(mass) if self.flat => {
+                let inertia = match object.inertia.as_deref() {
+                    Some(&[j] | &[0.0, 0.0, j]) => j,
+                    Some(other) => {
+                        let found = format!("{other:?}");
+                        return Err(format!("{place}: expected one number as `inertia` in dimension 2, found {found}"));
+                    }
+                    None => *inertia(mass, &solids).and_then(|j| j.get(2).copied()).as_ref().ok_or_else(|| {
+                        format!("{place}: expected `inertia`, or shapes that it follows from, found neither")
+                    })?,
+                };
+                let [x, y, .., turn] = object.velocity;
+                table["mass"] = json!(mass);
+                table["inertia"] = json!(inertia);
+                table["velocity"] = json!([x, y]);
+                table["angular_velocity"] = json!(turn);
+                match object.force.as_deref() {
+                    Some(&[x, y]) => table["force"] = json!([x, y]),
+                    Some(&[x, y, torque]) => {
+                        (table["force"], table["torque"]) = (json!([x, y]), json!(torque));
+                    }
+                    Some(other) => {
+                        let found = format!("{} numbers", other.len());
+                        return Err(format!(
+                            "{place}: expected 2 or 3 numbers as `fext`, found {found}"
+                        ));
+                    }
+                    None => {}
+                }
+            }
             Some(mass) => {
                 let inertia = match object.inertia.as_deref() {
                     Some(&[x, y, z]) => vec![x, y, z],
@@ -207,6 +265,19 @@ impl<'a> Import<'a> {
             table["shapes"] = json!(parts);
         }
         Ok(table)
+    }
+
+    /// A vector as the scene has it.
+    fn vector(&self, x: Vec3) -> Value {
+        if self.flat { json!([x[0], x[1]]) } else { json!(x) }
+    }
+
+    /// An orientation as the scene has it.
+    fn turn(&self, q: Rotation) -> Value {
+        match self.flat {
+            true => json!(2.0 * q.0[3].atan2(q.0[0])),
+            false => json!({"quaternion": q.0}),
+        }
     }
 
     /// A joint, and the couplings of its own coordinates.
@@ -315,9 +386,23 @@ impl<'a> Import<'a> {
 }
 
 /// A primitive with all its numbers positive.
-fn primitive(kind: &str, size: &[f64]) -> Option<Made> {
+fn primitive(kind: &str, size: &[f64], flat: bool) -> Option<Made> {
     if size.iter().any(|x| *x <= 0.0) && kind != "Plane" {
         return None;
+    }
+    if flat {
+        let (solid, table) = match (kind, size) {
+            ("Disk", &[radius]) => {
+                (Shape::Disc { radius }, json!({"kind": "disc", "radius": radius}))
+            }
+            ("Box2d", &[x, y]) => {
+                let half = [0.5 * x, 0.5 * y];
+                let table = json!({"kind": "box", "half": half});
+                (Shape::Polygon(Polygon::rectangle(half).ok()?), table)
+            }
+            _ => return None,
+        };
+        return Some(Made { table, solid: Some(solid), turned: Rotation::IDENTITY });
     }
     let (solid, table) = match (kind, size) {
         ("Sphere", &[radius]) => {
@@ -392,6 +477,13 @@ impl<'a> Contacts<'a> {
                     let expected = "NewtonImpactFrictionNSL, NewtonImpactRollingFrictionNSL, FremondImpactFrictionNSL, NewtonImpactNSL or RelayNSL";
                     return Err(format!("{place}: expected {expected}, found {other}"));
                 }
+            }
+            if file.dimension == 2 && law.mu_rolling > 0.0 {
+                let expected = "no rolling friction in dimension 2, where there is none here";
+                return Err(format!(
+                    "{place}: expected {expected}, found mu_r = {}",
+                    law.mu_rolling
+                ));
             }
             kinds.insert(law.kind == "FremondImpactFrictionNSL");
             let [a, b] = law.groups;

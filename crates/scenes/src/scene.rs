@@ -8,7 +8,7 @@ use rand_pcg::Pcg64;
 use crate::error::{positive, require};
 use crate::polyhedron::Polyhedron;
 use crate::vec3::{Vec3, X, add, cross, norm};
-use crate::{Contact, ElasticBox, RigidBody, SceneError, Shape};
+use crate::{Contact, ElasticBox, Image, RigidBody, SceneError, Shape};
 
 /// Bodies, the contacts between them, and what drives them during one time step.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,6 +31,9 @@ pub struct Scene {
     pub ground: Option<Ground>,
     /// Fixed solids, drawn only; contacts with them are contacts with the ground.
     pub obstacles: Vec<Obstacle>,
+    /// The periods of a scene that repeats itself: a period and the velocity that the image of a body there has relative to the body. Assembly
+    /// does not ask for them, for contacts state their own images.
+    pub periods: Vec<Image>,
 }
 
 /// How the gyroscopic torque `g(ω) = ω × J ω` enters the step.

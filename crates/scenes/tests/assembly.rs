@@ -38,6 +38,7 @@ fn tumbling() -> Scene {
         gyroscopic: Gyroscopic::Explicit,
         ground: None,
         obstacles: vec![],
+        periods: vec![],
     }
 }
 

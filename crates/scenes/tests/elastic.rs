@@ -28,6 +28,7 @@ fn scene(solids: Vec<ElasticBox>, contacts: Vec<Contact>) -> Scene {
         gyroscopic: Gyroscopic::Explicit,
         ground: Some(Ground::FLAT),
         obstacles: vec![],
+        periods: vec![],
     }
 }
 

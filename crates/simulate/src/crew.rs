@@ -209,11 +209,15 @@ impl Crew {
         }
     }
 
-    /// Sorts items that are all different.
-    pub fn sort<T: Ord + Send>(&self, items: &mut [T]) {
+    /// Sorts items whose keys are all different.
+    pub fn sort_by_key<T: Send, K: Ord + Send>(
+        &self,
+        items: &mut [T],
+        key: impl Fn(&T) -> K + Sync,
+    ) {
         match self.pool(items.len()) {
-            None => items.sort_unstable(),
-            Some(pool) => pool.install(|| items.par_sort_unstable()),
+            None => items.sort_unstable_by_key(key),
+            Some(pool) => pool.install(|| items.par_sort_unstable_by_key(&key)),
         }
     }
 

@@ -37,6 +37,7 @@ mod lagrangian;
 mod mesh;
 mod moreau_jean;
 mod moving;
+mod periodic;
 mod planar;
 mod polygon;
 mod projection;
@@ -64,6 +65,7 @@ pub use lagrangian::{
 };
 pub use mesh::Mesh;
 pub use moreau_jean::{Activation, Geometry, Gyroscopic, Impact, MoreauJean, Stabilisation};
+pub use periodic::{Period, Periodic};
 pub use polygon::Polygon;
 pub use report::{
     ContactReport, Counts, Drift, EnergyBalance, RunReport, Settled, StepReport, StepStatus,

@@ -103,6 +103,7 @@ fn body(body: &Body, key: &str) -> Result<(), SimulateError> {
             flat(&at("motion.velocity"), linear)?;
             turn(&at("motion.angular_velocity"), angular)?;
         }
+        Motion::Uniform { velocity } => flat(&at("motion.velocity"), velocity)?,
         Motion::Oscillating { amplitude, .. } => flat(&at("motion.amplitude"), amplitude)?,
     }
     for (s, part) in body.parts.iter().enumerate() {

@@ -55,6 +55,35 @@ impl Polygon {
         Ok(Self { vertices })
     }
 
+    /// The convex hull of points, m, by Andrew's chain. Cost: O(n log n), and the square of the number of corners.
+    ///
+    /// Errors: those of [`new`](Self::new).
+    pub fn hull(points: &[[f64; 2]]) -> Result<Self, SimulateError> {
+        for (k, point) in points.iter().enumerate() {
+            finite(|| format!("vertices[{k}]"), point)?;
+        }
+        let mut sorted = points.to_vec();
+        sorted.sort_by(|p, q| p[0].total_cmp(&q[0]).then(p[1].total_cmp(&q[1])));
+        sorted.dedup();
+        let mut corners: Vec<[f64; 2]> = vec![];
+        // Below from left to right, then above back; each chain ends where the other begins.
+        let backwards: Vec<_> = sorted.iter().rev().copied().collect();
+        for chain in [sorted, backwards] {
+            let first = corners.len();
+            for p in chain {
+                while let [.., a, b] = corners[first..] {
+                    if turn(a, b, p) > 0.0 {
+                        break;
+                    }
+                    corners.pop();
+                }
+                corners.push(p);
+            }
+            corners.pop();
+        }
+        Self::new(&corners)
+    }
+
     /// A rectangle about the origin with these half sides, m.
     ///
     /// Errors: a half side that is not positive.

@@ -231,6 +231,8 @@ pub struct ContactReport {
     pub b: BodyId,
     /// Where, m.
     pub point: Vec3,
+    /// From the first body to the image of it that touches, m: it is itself touched at `point − offset`. Zero unless the world is [periodic](crate::Periodic).
+    pub offset: Vec3,
     /// `[N, T1, T2]`, N from a to b.
     pub frame: [Vec3; 3],
     /// The gap at the beginning of the step, m; negative where they penetrate.

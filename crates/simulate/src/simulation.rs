@@ -191,6 +191,9 @@ impl Simulation {
                 let (x, v) = oscillation(amplitude, frequency, phase, 0.0);
                 (state.position[k], state.velocity[k]) = (add(body.position, x), v);
             }
+            if let Motion::Uniform { velocity } = body.motion {
+                state.velocity[k] = velocity;
+            }
         }
         let tools = Tools::new(&world, &state)?;
         let mut simulation = Self {

@@ -5,6 +5,7 @@ use nonsmooth_scenes::vec3::{Vec3, apply};
 use serde::{Deserialize, Serialize};
 
 use crate::detect::Key;
+use crate::periodic::Pair;
 use crate::rotation::{Pose, apply_transposed};
 use crate::{BodyId, World};
 
@@ -84,7 +85,7 @@ pub struct ContactMemory {
     /// The contacts of the last step, by key.
     pub(crate) contacts: Vec<Remembered>,
     /// The separating axis of each pair of polyhedra that was near, by pair of shapes.
-    pub(crate) axes: Vec<((u32, u32), Axis)>,
+    pub(crate) axes: Vec<(Pair, Axis)>,
     /// The step that the impulses are of, s.
     pub(crate) h: f64,
     /// The angle of each joint, which goes on beyond a full turn.

@@ -11,7 +11,9 @@ use crate::planar;
 use crate::rotation::unit;
 use crate::shape::plane;
 use crate::state::State;
-use crate::{Coupling, Drive, Driver, Joint, JointId, Part, Shape, SimulateError};
+use crate::{
+    Coupling, Drive, Driver, Joint, JointId, Part, Period, Periodic, Shape, SimulateError,
+};
 
 /// The number of a body; never used again for another one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -37,6 +39,11 @@ pub enum Motion {
         linear: Vec3,
         /// rad/s.
         angular: Vec3,
+    },
+    /// With a constant velocity, shapes and all: a piston, a plate that closes.
+    Uniform {
+        /// m/s.
+        velocity: Vec3,
     },
     /// About its position by `amplitude sin(frequency t + phase)`: a shaking table.
     Oscillating {
@@ -272,6 +279,8 @@ pub struct World {
     pub joints: Vec<Joint>,
     /// Couplings of their coordinates.
     pub couplings: Vec<Coupling>,
+    /// How the world repeats itself, if it does.
+    pub periodic: Periodic,
 }
 
 impl Default for World {
@@ -295,6 +304,7 @@ impl World {
             elastic: vec![],
             joints: vec![],
             couplings: vec![],
+            periodic: Periodic::default(),
         }
     }
 
@@ -307,6 +317,12 @@ impl World {
     #[must_use]
     pub fn with_law(self, law: Law) -> Self {
         Self { law, ..self }
+    }
+
+    /// Repeating itself.
+    #[must_use]
+    pub fn repeating(self, periodic: Periodic) -> Self {
+        Self { periodic, ..self }
     }
 
     /// Adds a body.
@@ -353,8 +369,9 @@ impl World {
         let mut rest = Self { gravity: [0.0; 3], ..self.clone() };
         for body in &mut rest.bodies {
             (body.force, body.torque) = ([0.0; 3], [0.0; 3]);
-            if !body.is_free() {
-                body.motion = Motion::Fixed;
+            // Not fixed: the state moves it, and what is fixed is put in its place once.
+            if !matches!(body.motion, Motion::Free | Motion::Fixed) {
+                body.motion = Motion::Surface { linear: [0.0; 3], angular: [0.0; 3] };
             }
         }
         for drive in rest.joints.iter_mut().flat_map(|joint| &mut joint.drives) {
@@ -393,18 +410,22 @@ impl World {
         std::iter::once(("law".into(), self.law)).chain(own)
     }
 
-    /// Lets two bodies pass through each other: partners of a joint.
+    /// Lets two bodies pass through each other: partners of a joint. In a [periodic](Periodic) world images of them still touch.
     pub fn keep_apart(&mut self, a: BodyId, b: BodyId) {
         self.apart.insert((a.min(b), a.max(b)));
     }
 
     /// Whether two bodies may touch.
     pub fn may_touch(&self, a: BodyId, b: BodyId) -> bool {
+        self.may_meet(a, b) && !self.apart.contains(&(a.min(b), a.max(b)))
+    }
+
+    /// Whether they may by their groups.
+    pub(crate) fn may_meet(&self, a: BodyId, b: BodyId) -> bool {
         let (p, q) = (&self.bodies[a.index()], &self.bodies[b.index()]);
         (p.is_free() || q.is_free())
             && p.membership & q.collides_with != 0
             && q.membership & p.collides_with != 0
-            && !self.apart.contains(&(a.min(b), a.max(b)))
     }
 
     /// What messages call a body.
@@ -468,6 +489,7 @@ impl World {
             coupling.validate(&key("couplings", k, &coupling.name), self)?;
         }
         planar::validate(self)?;
+        Periodic::validate(self)?;
         Ok(said)
     }
 }
@@ -499,6 +521,9 @@ impl Body {
             Motion::Surface { linear, angular } => {
                 finite(|| format!("{key}.motion.linear"), &linear)?;
                 finite(|| format!("{key}.motion.angular"), &angular)?;
+            }
+            Motion::Uniform { velocity } => {
+                finite(|| format!("{key}.motion.velocity"), &velocity)?;
             }
             Motion::Oscillating { amplitude, frequency, phase } => {
                 finite(|| format!("{key}.motion.amplitude"), &amplitude)?;
@@ -592,9 +617,9 @@ impl TryFrom<&Scene> for World {
     type Error = SimulateError;
 
     /// The rigid bodies and elastic solids of a scene, its ground and obstacles fixed, gravity, and the law of its contacts. Contacts with the ground that neither the
-    /// ground nor an obstacle explains are with walls, which become planes; a wall that moves keeps its velocity.
+    /// ground nor an obstacle explains are with walls, which become planes; a wall that moves keeps its velocity. Periods stay.
     ///
-    /// Errors: images of bodies in a periodic domain, which are not simulated; contacts of different laws; elastic solids with rolling friction, once the world is validated.
+    /// Errors: images of bodies where the scene has no periods; contacts of different laws; elastic solids with rolling friction, once the world is validated.
     fn try_from(scene: &Scene) -> Result<Self, SimulateError> {
         scene.validate()?;
         let law = scene.contacts.first().map_or(Law::default(), |c| Law {
@@ -611,12 +636,14 @@ impl TryFrom<&Scene> for World {
                 let found = told(c.mu, c.e, c.mu_r);
                 return Err(SimulateError::value(format!("contacts[{k}]"), expected, found));
             }
-            if c.a.is_some() && c.image != scenes::Image::default() {
-                let expected = "no periodic images";
+            if c.a.is_some() && c.image != scenes::Image::default() && scene.periods.is_empty() {
+                let expected = "no images, for the scene has no periods";
                 return Err(SimulateError::value(format!("contacts[{k}].image"), expected, "one"));
             }
         }
         let mut world = World::new(scene.gravity).with_law(law);
+        let period = |p: &scenes::Image| Period { vector: p.offset, velocity: p.velocity };
+        world.periodic.periods = scene.periods.iter().map(period).collect();
         for body in &scene.bodies {
             world.add(Body {
                 mass: body.mass,
@@ -652,7 +679,7 @@ impl TryFrom<&Scene> for World {
                     && v == c.image.velocity
             };
             let on_obstacle =
-                scene.obstacles.iter().any(|o| touches(o, c.point, SAME_PLANE * size));
+                scene.obstacles.iter().any(|o| touches(o, (c.point, n), SAME_PLANE * size));
             if on_obstacle {
                 continue;
             }
@@ -676,9 +703,10 @@ impl TryFrom<&Scene> for World {
         }
         for (k, (point, normal, velocity)) in planes.into_iter().enumerate() {
             let body = Body::fixed(vec![plane(point, normal)?]).named(format!("plane {k}"));
-            let motion = match velocity == [0.0; 3] {
-                true => Motion::Fixed,
-                false => Motion::Surface { linear: velocity, angular: [0.0; 3] },
+            let motion = match (velocity == [0.0; 3], dot(velocity, normal) == 0.0) {
+                (true, _) => Motion::Fixed,
+                (_, true) => Motion::Surface { linear: velocity, angular: [0.0; 3] },
+                (_, false) => Motion::Uniform { velocity },
             };
             world.add(Body { motion, ..body });
         }
@@ -714,8 +742,11 @@ fn parts(shape: &scenes::Shape) -> Vec<Part> {
     }
 }
 
-/// Whether a point lies on, or within `slack` of, an obstacle.
-fn touches(obstacle: &scenes::Obstacle, point: Vec3, slack: f64) -> bool {
+/// A contact with a ball may be this share of its radius away from it.
+const BESIDE: f64 = 0.1;
+
+/// Whether a contact of this point and normal is on, or within `slack` of, an obstacle; or beside a ball, along its radius.
+fn touches(obstacle: &scenes::Obstacle, (point, normal): (Vec3, Vec3), slack: f64) -> bool {
     let p = sub(point, obstacle.position);
     let inside = |q: &scenes::Polyhedron| {
         (0..q.faces().len()).all(|k| {
@@ -725,7 +756,11 @@ fn touches(obstacle: &scenes::Obstacle, point: Vec3, slack: f64) -> bool {
     };
     match &obstacle.shape {
         scenes::Shape::Box { half } => (0..3).all(|k| p[k].abs() <= half[k] + slack),
-        scenes::Shape::Sphere { radius } => norm(p) <= radius + slack,
+        scenes::Shape::Sphere { radius } => {
+            let far = norm(p);
+            let radial = dot(normal, p) >= (1.0 - SAME_PLANE) * far;
+            far <= radius + slack || (radial && far <= (1.0 + BESIDE) * radius)
+        }
         scenes::Shape::Polyhedron(q) => inside(q),
         scenes::Shape::Compound(parts) => parts.iter().any(inside),
     }

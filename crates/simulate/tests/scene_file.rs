@@ -616,3 +616,78 @@ fn a_joint_to_the_world_may_be_told_either_way() {
     assert!((angle("world", "arm", 1.0) - 0.1).abs() < 1e-6);
     assert!((angle("arm", "world", -1.0) - 0.1).abs() < 1e-6);
 }
+
+/// A ball in a world that repeats itself, with `more` in its table.
+fn repeating(dimension: u8, more: &str) -> Result<nonsmooth_simulate::World, String> {
+    let shape = if dimension == 2 { "disc" } else { "sphere" };
+    let text = format!(
+        r#"
+        format = "nonsmooth-scene"
+        version = 1
+        dimension = {dimension}
+        time = {{ h = 1e-3, end = 0.1 }}
+        pairs_default = {{}}
+        periodic = {{ {more} }}
+        bodies = [{{ shape = {{ kind = "{shape}", radius = 0.1 }}, density = 1000 }}]
+        "#
+    );
+    let scene = SceneFile::parse(&text, &[]).map_err(|e| e.to_string())?;
+    let again = SceneFile::parse(&scene.to_toml(), &[]).map_err(|e| e.to_string())?;
+    assert_eq!(scene.to_toml(), again.to_toml());
+    scene.build().map(|s| s.world().clone()).map_err(|e| e.to_string())
+}
+
+#[test]
+fn a_scene_may_repeat_itself() {
+    let table = "lengths = [1, 0, 2], gradient = [[0, 0, 0.5], [0, 0, 0], [0, 0, 0.1]]";
+    let periodic = repeating(3, table).unwrap().periodic;
+    assert_eq!(periodic.periods.len(), 2);
+    assert_eq!(periodic.periods[0].vector, [1.0, 0.0, 0.0]);
+    assert_eq!(periodic.periods[1].vector, [0.0, 0.0, 2.0]);
+    assert_eq!(periodic.periods[1].velocity, [1.0, 0.0, 0.2]);
+    let table = "lengths = [1, 2], corner = [-0.5, 0], gradient = [[0, 0.5], [0, 0]]";
+    let periodic = repeating(2, table).unwrap().periodic;
+    assert_eq!(periodic.periods[1].vector, [0.0, 2.0, 0.0]);
+    assert_eq!(periodic.periods[1].velocity, [1.0, 0.0, 0.0]);
+    assert_eq!(periodic.corner, [-0.5, 0.0, 0.0]);
+    for (dimension, table, says) in [
+        (3, "lengths = [0, 0, 0]", "periodic.lengths: expected one that is not 0, found none"),
+        (3, "lengths = [1, -1, 0]", "periodic.lengths: expected lengths of at least 0, found -1"),
+        (3, "lengths = [1, nan, 0]", "periodic.lengths: expected lengths of at least 0"),
+        (3, "lenghts = [1, 1, 0]", "unknown field `lenghts`"),
+        (
+            3,
+            "lengths = [1, 1, 0], gradient = [[0, inf, 0], [0, 0, 0], [0, 0, 0]]",
+            "periodic.gradient",
+        ),
+        (3, "lengths = [1, 1, 0], corner = [0, nan, 0]", "periodic.corner: expected finite"),
+        (
+            3,
+            "lengths = [0.2, 1, 0]",
+            "periodic: expected periods longer than 0.2, twice the reach of bodies[0]",
+        ),
+        (2, "lengths = [1, 0, 1]", "periodic.periods[1].vector: expected 0 as the third component"),
+    ] {
+        let error = repeating(dimension, table).unwrap_err();
+        assert!(error.contains(says), "{table}: {error}");
+    }
+    let piston = r#"
+        format = "nonsmooth-scene"
+        version = 1
+        gravity = [0, 0, 0]
+        time = { h = 1e-3, end = 0.5 }
+        pairs_default = {}
+        bodies = [
+            { name = "ball", shape = { kind = "sphere", radius = 0.1 }, density = 1000, position = [0, 0, 0.2] },
+            { name = "piston", shape = { kind = "plane" }, motion = { kind = "uniform", velocity = [0, 0, 1] } },
+        ]
+    "#;
+    let mut simulation = SceneFile::parse(piston, &[]).unwrap().build().unwrap();
+    let report = simulation.run(0.5, 1e-3, &mut ()).unwrap();
+    assert!(report.is_solved() && report.imbalance < 1e-12, "{report}");
+    // It is met at t = 0.1 within half a step, and pushed from then on.
+    let state = simulation.state();
+    assert!((state.position[1][2] - 0.5).abs() < 1e-12);
+    assert!((state.velocity[0][2] - 1.0).abs() < 1e-10);
+    assert!((state.position[0][2] - 0.6).abs() < 1e-3);
+}

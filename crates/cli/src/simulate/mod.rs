@@ -133,7 +133,10 @@ fn scene(args: &Args) -> Result<SceneFile, String> {
         Ok(family) if !path.exists() => {
             let set = settings::from_texts(&changes).map_err(|e| format!("--set: {e}"))?;
             let made = family.make(&set).map_err(|e| format!("{name}: {e}"))?;
-            SceneFile::of_family(&name, set, made.h, FAMILY_END)
+            SceneFile {
+                gravity: made.gravity,
+                ..SceneFile::of_family(&name, set, made.h, FAMILY_END)
+            }
         }
         Err(e) if !path.exists() && !is_file => {
             return Err(format!("{name}: expected a file or a family of scenes, and {e}"));

@@ -134,7 +134,8 @@ pub fn page(trajectory: &Trajectory, scene: &SceneFile, world: &World) -> Result
 /// Files for ParaView.
 pub fn paraview(path: &Path, trajectory: &Trajectory, world: &World) -> Result<(), String> {
     let meshes = nonsmooth_record::meshes(trajectory, world);
-    vtk::write(path, trajectory, &meshes).map_err(|e| format!("--vtk {e}"))
+    let shown = nonsmooth_record::in_cell(trajectory, world);
+    vtk::write(path, &shown, &meshes).map_err(|e| format!("--vtk {e}"))
 }
 
 /// A glTF file.

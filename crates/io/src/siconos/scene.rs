@@ -9,6 +9,8 @@
 //! /data/joints/JOINT        type, object1, object2, points, axes, absolute, stops, friction, ...
 //! ```
 //!
+//! In dimension 2 places have two numbers, orientations the angle, velocities three, inertias one; a convex shape has rows of two. They are read as what they are in space.
+//!
 //! Almost all stands in attributes. Pickled parameters are never looked into. What is not here (permanent interactions, boundary conditions, plugins) is named.
 //!
 //! Reference: Siconos' source, `io/python/mechanics_hdf5.py`.
@@ -61,6 +63,8 @@ pub enum MechanicsForm {
     },
     /// The convex hull of points.
     Convex(Vec<[f64; 3]>),
+    /// The convex hull of points of the plane.
+    Flat(Vec<[f64; 2]>),
     /// The ground below heights, a row for each place along the first axis.
     Heights {
         /// m.
@@ -79,7 +83,7 @@ pub struct MechanicsObject {
     pub name: String,
     /// kg; none of one that does not move.
     pub mass: Option<f64>,
-    /// 3 or 9 numbers, kg·m²; none where it follows from the shapes.
+    /// 3 or 9 numbers, in dimension 2 one, kg·m²; none where it follows from the shapes.
     pub inertia: Option<Vec<f64>>,
     /// The mass centre, m.
     pub position: [f64; 3],
@@ -87,7 +91,7 @@ pub struct MechanicsObject {
     pub rotation: [f64; 4],
     /// Of the mass centre, m/s, and angular in the frame of the body, rad/s.
     pub velocity: [f64; 6],
-    /// A constant force, N, and moment, N·m, in the world frame.
+    /// A constant force, N, and moment, N·m, in the world frame: 3 or 6 numbers, in dimension 2 two or three.
     pub force: Option<Vec<f64>>,
     /// The time at which it appears, s, if it is not there from the start.
     pub birth: Option<f64>,
@@ -169,18 +173,17 @@ impl MechanicsScene {
         let file = open(name, bytes)?;
         let root = Folder::root(name, &file)?;
         let data = root.need("data")?;
-        let top = Attributes { folder: &root, name: "", address: root.group.address };
-        let mut out = Self {
-            dimension: top.int("dimension")?.unwrap_or(3),
-            times: times(&data)?,
-            ..Self::default()
-        };
-        each(&data, "ref", |at, object| {
+        let address = root.group.address;
+        let top = Attributes { folder: &root, name: "", address, flat: false };
+        let dimension = top.int("dimension")?.unwrap_or(3);
+        let flat = dimension == 2;
+        let mut out = Self { dimension, times: times(&data)?, ..Self::default() };
+        each(&data, flat, "ref", |at, object| {
             out.shapes.push(shape(at, object)?);
             Ok(())
         })?;
         let mut numbered = vec![];
-        each(&data, "input", |at, object| {
+        each(&data, flat, "input", |at, object| {
             let number = at.int("id")?.unwrap_or_default();
             let objects = objects(at, object)?;
             numbered.extend(objects.into_iter().map(|o| (number > 0, number.abs(), o)));
@@ -188,7 +191,7 @@ impl MechanicsScene {
         })?;
         numbered.sort_by_key(|(moves, number, _)| (*moves, *number));
         out.objects = numbered.into_iter().map(|(.., object)| object).collect();
-        each(&data, "nslaws", |at, _| {
+        each(&data, flat, "nslaws", |at, _| {
             let number = |name: &str| Ok::<_, IoError>(at.real(name)?.unwrap_or_default());
             out.laws.push(MechanicsLaw {
                 name: at.name.into(),
@@ -201,14 +204,14 @@ impl MechanicsScene {
             });
             Ok(())
         })?;
-        each(&data, "joints", |at, _| {
+        each(&data, flat, "joints", |at, _| {
             out.joints.push(joint(at)?);
             Ok(())
         })?;
         for group in
             ["permanent_interactions", "boundary_conditions", "external_functions", "plugins"]
         {
-            each(&data, group, |at, _| {
+            each(&data, flat, group, |at, _| {
                 out.others.push(at.place());
                 Ok(())
             })?;
@@ -247,6 +250,7 @@ fn times(data: &Folder) -> Result<Option<[f64; 2]>, IoError> {
 /// Calls `f` with all members of a group, if there is one.
 fn each<'a>(
     data: &Folder<'_, 'a>,
+    flat: bool,
     group: &str,
     mut f: impl FnMut(&Attributes<'_, '_, 'a>, Object<'a>) -> Result<(), IoError>,
 ) -> Result<(), IoError> {
@@ -256,7 +260,7 @@ fn each<'a>(
     for name in &names {
         let address = folder.data.address(&folder.group, name).map_err(folder.fault(name))?;
         let (Some(address), Some(object)) = (address, folder.find(name)?) else { continue };
-        f(&Attributes { folder: &folder, name, address }, object)?;
+        f(&Attributes { folder: &folder, name, address, flat }, object)?;
     }
     Ok(())
 }
@@ -277,7 +281,8 @@ fn shape<'a>(at: &Attributes<'_, '_, 'a>, object: Object<'a>) -> Result<Mechanic
         "convex" => {
             let (numbers, shape) = table()?;
             match shape[..] {
-                [_, 3] => MechanicsForm::Convex(numbers.as_chunks::<3>().0.to_vec()),
+                [_, 2] if at.flat => MechanicsForm::Flat(numbers.as_chunks::<2>().0.to_vec()),
+                [_, 3] if !at.flat => MechanicsForm::Convex(numbers.as_chunks::<3>().0.to_vec()),
                 _ => MechanicsForm::Other(format!("convex of shape {shape:?}")),
             }
         }
@@ -326,9 +331,18 @@ fn objects<'a>(
             position: [0.0; 3],
             rotation: [1.0, 0.0, 0.0, 0.0],
         });
-        let places = rows::<3>(&inner, "translations")?;
-        let turns = rows::<4>(&inner, "orientations")?;
-        let velocities = rows::<6>(&inner, "velocities")?;
+        let (places, turns, velocities) = match at.flat {
+            false => (
+                rows::<3>(&inner, "translations")?,
+                rows::<4>(&inner, "orientations")?,
+                rows::<6>(&inner, "velocities")?,
+            ),
+            true => (
+                rows::<2>(&inner, "translations")?.into_iter().map(|[x, y]| [x, y, 0.0]).collect(),
+                rows::<1>(&inner, "orientations")?.into_iter().map(|[a]| about_third(a)).collect(),
+                rows::<3>(&inner, "velocities")?.into_iter().map(in_plane).collect(),
+            ),
+        };
         if [turns.len(), velocities.len()] != [places.len(); 2] {
             let found = format!("{} and {}", turns.len(), velocities.len());
             let expected = format!("{} orientations and velocities", places.len());
@@ -343,18 +357,21 @@ fn objects<'a>(
         };
         return Ok((0..places.len()).map(of).collect());
     }
-    like.position = at.fixed("translation")?.unwrap_or_default();
-    like.rotation = at.fixed("orientation")?.unwrap_or(like.rotation);
-    like.velocity = at.fixed("velocity")?.unwrap_or_default();
-    let centre = at.fixed::<3>("center_of_mass")?.unwrap_or_default();
+    like.position = at.point("translation")?;
+    like.rotation = at.turn("orientation")?;
+    like.velocity = match at.flat {
+        true => at.fixed("velocity")?.map(in_plane).unwrap_or_default(),
+        false => at.fixed("velocity")?.unwrap_or_default(),
+    };
+    let centre = at.point("center_of_mass")?;
     let names: Vec<String> =
         inner.group.links.keys().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
     for name in &names {
         let address = inner.data.address(&inner.group, name).map_err(inner.fault(name))?;
         let Some(address) = address else { continue };
-        let part = Attributes { folder: &inner, name, address };
+        let part = Attributes { folder: &inner, name, address, flat: at.flat };
         // Contactors are placed about the origin of the shape; the body is where its mass centre is.
-        let place = part.fixed::<3>("translation")?.unwrap_or_default();
+        let place = part.point("translation")?;
         if part.find("parameters")?.is_some() {
             like.others.push(format!("parameters of {name}"));
         }
@@ -362,10 +379,21 @@ fn objects<'a>(
             shape: part.needed_text("shape_name")?,
             group: part.int("group")?.unwrap_or_default(),
             position: std::array::from_fn(|k| place[k] - centre[k]),
-            rotation: part.fixed("orientation")?.unwrap_or([1.0, 0.0, 0.0, 0.0]),
+            rotation: part.turn("orientation")?,
         });
     }
     Ok(vec![like])
+}
+
+/// A turn about the third axis.
+fn about_third(angle: f64) -> [f64; 4] {
+    let (s, c) = (0.5 * angle).sin_cos();
+    [c, 0.0, 0.0, s]
+}
+
+/// A velocity in the plane, and the rate of turning there.
+fn in_plane([x, y, turn]: [f64; 3]) -> [f64; 6] {
+    [x, y, 0.0, 0.0, 0.0, turn]
 }
 
 fn rows<const N: usize>(folder: &Folder, name: &str) -> Result<Vec<[f64; N]>, IoError> {
@@ -397,6 +425,8 @@ struct Attributes<'g, 'f, 'a> {
     folder: &'g Folder<'f, 'a>,
     name: &'g str,
     address: u64,
+    /// Whether the file is of dimension 2.
+    flat: bool,
 }
 
 impl<'a> Attributes<'_, '_, 'a> {
@@ -428,6 +458,37 @@ impl<'a> Attributes<'_, '_, 'a> {
         let count = found.len();
         let array = found.try_into().map(Some);
         array.map_err(|_| self.error(format!("{N} numbers as `{name}`"), count))
+    }
+
+    /// A point; the origin where there is none.
+    fn point(&self, name: &str) -> Result<[f64; 3], IoError> {
+        match (self.flat, self.numbers(name)?.as_deref()) {
+            (_, None) => Ok([0.0; 3]),
+            (false, Some(&[x, y, z])) => Ok([x, y, z]),
+            (true, Some(&[x, y] | &[x, y, 0.0])) => Ok([x, y, 0.0]),
+            (flat, Some(found)) => {
+                let expected =
+                    if flat { "2 numbers, or 3 with 0 as the third," } else { "3 numbers" };
+                Err(self.error(format!("{expected} as `{name}`"), format!("{found:?}")))
+            }
+        }
+    }
+
+    /// An orientation; none where nothing is said.
+    fn turn(&self, name: &str) -> Result<[f64; 4], IoError> {
+        match (self.flat, self.numbers(name)?.as_deref()) {
+            (_, None) => Ok([1.0, 0.0, 0.0, 0.0]),
+            (false, Some(&[w, x, y, z])) => Ok([w, x, y, z]),
+            (true, Some(&[angle])) => Ok(about_third(angle)),
+            (true, Some(&[w, 0.0, 0.0, z])) => Ok([w, 0.0, 0.0, z]),
+            (flat, Some(found)) => {
+                let expected = match flat {
+                    true => "the angle, or a quaternion about the third axis,",
+                    false => "4 numbers",
+                };
+                Err(self.error(format!("{expected} as `{name}`"), format!("{found:?}")))
+            }
+        }
     }
 
     fn real(&self, name: &str) -> Result<Option<f64>, IoError> {

@@ -8,6 +8,7 @@
 //! /frames/                     step (n), time (n)
 //! /contacts/                   offset (n + 1): those of frame k are offset[k] .. offset[k + 1]
 //!                              key (c, 4), a, b (c), point (c, 3), frame (c, 3, 3), gap, mu (c)
+//!                              offset_a (c, 3), from a to the image of it that touches, where one does;
 //!                              r, r_local, u (c, 3), status (c): 0 took no part, 1 open, 2 stick, 3 slip
 //! /joints/                     name (j); angle, slide, violation (n, j), impulse, moment (n, j, 3)
 //! /steps/                      number, time, h, status, residual, iterations, newton, near, active, open, stick, slip,
@@ -129,6 +130,8 @@ pub struct Contact {
     pub b: u32,
     /// m.
     pub point: [f64; 3],
+    /// From a to the image of it that touches, m: zero unless the world repeats itself.
+    pub offset: [f64; 3],
     /// The local frame `[N, T1, T2]`, N from a to b.
     pub frame: [[f64; 3]; 3],
     /// The gap at the beginning of the step, m; negative where they penetrate.

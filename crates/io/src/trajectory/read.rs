@@ -136,6 +136,10 @@ fn fill(root: &Folder, run: &mut Trajectory) -> Result<(), IoError> {
     let key = g.numbers("key", &[c, 4])?;
     let vectors = |name| g.vectors::<3>(name, &[c, 3]);
     let (point, r, u) = (vectors("point")?, vectors("r_local")?, vectors("u")?);
+    let beside = match g.has("offset_a")? {
+        true => vectors("offset_a")?,
+        false => vec![[0.0; 3]; c],
+    };
     let axes = g.vectors::<3>("frame", &[c, 3, 3])?;
     let (gap, mu) = (g.table("gap", &[c])?, g.table("mu", &[c])?);
     let status = g.naturals("status", Some(STATUSES.len()))?;
@@ -148,6 +152,7 @@ fn fill(root: &Folder, run: &mut Trajectory) -> Result<(), IoError> {
         a: a[k] as u32,
         b: bodies[k],
         point: point[k],
+        offset: beside[k],
         frame: [axes[3 * k], axes[3 * k + 1], axes[3 * k + 2]],
         gap: gap[k],
         mu: mu[k],

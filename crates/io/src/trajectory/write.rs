@@ -215,6 +215,9 @@ fn contacts(g: &mut Out, run: &View) {
     for (name, of) in vectors {
         g.table(name, &[c, 3], all().flat_map(of));
     }
+    if all().any(|t| t.offset != [0.0; 3]) {
+        g.table("offset_a", &[c, 3], all().flat_map(|t| t.offset));
+    }
     g.table("frame", &[c, 3, 3], all().flat_map(|t| t.frame.into_iter().flatten()));
     g.table("gap", &[c], all().map(|t| t.gap));
     g.table("mu", &[c], all().map(|t| t.mu));

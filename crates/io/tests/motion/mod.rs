@@ -21,6 +21,7 @@ pub fn run(frames: usize) -> Trajectory {
             a: 0,
             b: 1 + (c % 2) as u32,
             point: [t, c as f64, 0.0],
+            offset: [0.0, 0.0, if c == 3 { 2.0 } else { 0.0 }],
             frame: [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             gap: -1e-9,
             mu: 0.3,

@@ -43,6 +43,8 @@ pub struct Playback {
     pub energy: Vec<Energy>,
     /// Time (s) and residual of steps; may be empty.
     pub residual: Vec<[f64; 2]>,
+    /// What moves farther than this between two frames has been brought to the other side of a cell: the page shows it on either side and nowhere between, m.
+    pub jump: Option<f64>,
 }
 
 /// A body's shape.
@@ -333,6 +335,11 @@ impl Playback {
                 let [p, q, r] = c.point;
                 [p, q, r, x, y, z]
             })),
+            offsets: match contacts().any(|c| c.offset != [0.0; 3]) {
+                true => floats(contacts().flat_map(|c| c.offset)),
+                false => String::new(),
+            },
+            jump: self.jump,
             statuses: packed(contacts().map(|c| {
                 [match c.status {
                     None => 0,
@@ -507,6 +514,9 @@ struct Data<'a> {
     pairs: String,
     /// f32, contacts × 6: point, impulse on the second body.
     forces: String,
+    /// f32, contacts × 3: from where the first body is touched to the point; empty where no image touches.
+    offsets: String,
+    jump: Option<f64>,
     /// u8, contacts.
     statuses: String,
     /// f32: time, kinetic, potential.

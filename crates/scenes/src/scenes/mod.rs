@@ -294,6 +294,7 @@ impl Common {
             gyroscopic: self.gyroscopic,
             ground: Some(crate::Ground::FLAT),
             obstacles: vec![],
+            periods: vec![],
         })
     }
 

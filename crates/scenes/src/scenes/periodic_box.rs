@@ -110,6 +110,12 @@ impl PeriodicBox {
         Image { offset, velocity: apply(&self.gradient(), offset) }
     }
 
+    /// The periods of the domain.
+    fn periods(&self, domain: &Domain) -> Vec<Image> {
+        let along = |k: usize| std::array::from_fn(|i| if i == k { domain.size[k] } else { 0.0 });
+        (0..3).filter(|&k| domain.periodic(k)).map(|k| self.image(along(k))).collect()
+    }
+
     fn plate(&self, wall: Wall) -> Image {
         Image { offset: [0.0; 3], velocity: apply(&self.gradient(), wall.point()) }
     }
@@ -127,6 +133,7 @@ impl PeriodicBox {
         let centres = radii.iter().map(|_| domain.point(&mut rng)).collect();
         let mut packing = Packing { domain, centres, radii, fixed: 0 };
         packing.relax(false);
+        scene.periods = self.periods(&packing.domain);
         for (&centre, &radius) in packing.centres.iter().zip(&packing.radii) {
             scene.push(RigidBody::solid(Shape::Sphere { radius }, self.density)?.at(centre));
         }
@@ -149,6 +156,7 @@ impl PeriodicBox {
     ) -> Result<(), SceneError> {
         length("radius", self.radius)?;
         let domain = domain(2.0 * self.radius * (self.count as f64).cbrt());
+        scene.periods = self.periods(&domain);
         let cells = tessellation(common, &domain, self.count, 2);
         for cell in &cells {
             scene.push(RigidBody::solid(Shape::Polyhedron(cell.polyhedron()), self.density)?);

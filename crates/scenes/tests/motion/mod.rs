@@ -129,5 +129,6 @@ pub fn playback(frames: usize) -> Playback {
         frames: (0..frames).map(moment).collect(),
         energy: (0..frames).map(energy).collect(),
         residual: (1..frames).map(residual).collect(),
+        jump: None,
     }
 }

@@ -129,7 +129,7 @@ fn sort_into_cells(boxes: &[Aabb], which: &[u32], cells: &mut Vec<(u64, u32)>, c
     };
     cells.clear();
     cells.extend(which.iter().map(|&i| (cell(i), i)));
-    crew.sort(cells);
+    crew.sort_by_key(cells, |c| *c);
 }
 
 /// The pairs of the boxes at these places with those that come later in the same or a neighbouring cell.

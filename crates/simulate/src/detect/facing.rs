@@ -133,6 +133,7 @@ impl Facing {
                 let key = Key {
                     shape_a: *place + *shapes - nodes.list.len() as u32,
                     shape_b: shapes + 6 * master + side as u32,
+                    image: [0; 3],
                     feature_a: 0,
                     feature_b: Feature::Face(side as u32).code(),
                 };
@@ -142,8 +143,18 @@ impl Facing {
                 let witness = Witness::Points { s: [0.0; 3], t: [0.0; 3], normal, on_a: true };
                 let at = witness.place(&Pose::at(x), &Pose::at(over.point), normal);
                 let size = nodes.list[*place as usize].size;
-                let near =
-                    Near { key, a, b, law, compliance, size, place: at, witness, deep: false };
+                let near = Near {
+                    key,
+                    a,
+                    b,
+                    law,
+                    compliance,
+                    size,
+                    place: at,
+                    witness,
+                    image: super::Beside::default(),
+                    deep: false,
+                };
                 out.push(near);
                 feet.push(foot);
             }

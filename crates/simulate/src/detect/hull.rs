@@ -196,6 +196,17 @@ impl PosedHull {
         best.1
     }
 
+    /// The same elsewhere.
+    pub fn set_moved(&mut self, other: &Self, by: Vec3) {
+        self.vertices.clear();
+        self.vertices.extend(other.vertices.iter().map(|&v| add(v, by)));
+        self.normals.clone_from(&other.normals);
+        self.offsets.clear();
+        let far = |(&d, &n): (&f64, &Vec3)| d + dot(n, by);
+        self.offsets.extend(other.offsets.iter().zip(&other.normals).map(far));
+        self.centre = add(other.centre, by);
+    }
+
     pub fn set(&mut self, hull: &Hull, pose: &Pose) {
         self.vertices.clear();
         self.vertices.extend(hull.vertices.iter().map(|&v| pose.point(v)));

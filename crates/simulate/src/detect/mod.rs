@@ -12,6 +12,7 @@
 //! | elastic box with elastic box | [`facing`]: nodes of the finer mesh at faces of the other |
 //! | mesh, heightfield with all that is convex; mesh with plane | [`surface`]: triangles in a tree of boxes, filtered at inner edges |
 //! | mesh with mesh, heightfield | [`surfaces`]: pairs of triangles in two trees, filtered at the edges of both |
+//! | an image of either in a world that repeats itself | [`images`] finds the pair, then as above |
 //! | polygon with polygon, disc, capsule | [`outline`]: separating sides with hysteresis, sides clipped by sides; nearest side or corner |
 //!
 //! What is drawn is what touches: no margin, no skin. A point is reported where the gap is at most the prediction of the pair, so that a step
@@ -23,6 +24,7 @@ mod convex;
 mod facing;
 mod gjk;
 mod hull;
+mod images;
 mod outline;
 mod rounds;
 mod segments;
@@ -36,6 +38,7 @@ use nonsmooth_scenes::vec3::{Vec3, add, scale, sub};
 
 use crate::crew::Crew;
 use crate::elastic::{Foot, Nodes};
+use crate::periodic::{Image, Pair};
 use crate::rotation::Pose;
 use crate::state::{Axis, State};
 use crate::{BodyId, Compliance, Dimension, Law, Motion, Shape, SimulateError, World};
@@ -44,6 +47,7 @@ use clip::Clip;
 use convex::{Extent, Flat, Side};
 use facing::Facing;
 use hull::{Hull, PosedHull};
+use images::Images;
 use outline::{Flat as Polygonal, Outline, Rod};
 use segments::Segment;
 use surface::{Scratch, Surface};
@@ -64,8 +68,36 @@ pub(crate) struct Near {
     pub size: f64,
     pub place: Place,
     pub witness: Witness,
+    /// What of a touches: an image of it.
+    pub image: Beside,
     /// Whether the bodies overlap so far that the normal is that of the step before, if there was one.
     pub deep: bool,
+}
+
+/// An image of a body in a world that repeats itself, zero of the body itself.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Beside {
+    /// From the body to the image at the beginning of the step, m.
+    pub offset: Vec3,
+    /// Of the image relative to the body, m/s.
+    pub velocity: Vec3,
+}
+
+impl Beside {
+    /// From the body to the image a time later.
+    pub fn after(&self, time: f64) -> Vec3 {
+        add(self.offset, scale(time, self.velocity))
+    }
+
+    /// The pose of the image where that of the body is this one.
+    pub fn pose(&self, body: &Pose, time: f64) -> Pose {
+        Pose { x: add(body.x, self.after(time)), r: body.r }
+    }
+
+    /// Whether it is the body itself.
+    pub fn is_itself(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// Bodies that overlap by more than this share of the smaller one leave no normal of their own.
@@ -165,8 +197,10 @@ pub(crate) struct Detector {
     box_of: Vec<u32>,
     box_moves: Vec<bool>,
     broad: Broad,
-    pairs: Vec<(u32, u32)>,
-    axes: Vec<((u32, u32), Axis)>,
+    met: Vec<(u32, u32)>,
+    images: Images,
+    pairs: Vec<Pair>,
+    axes: Vec<(Pair, Axis)>,
     /// One for each part of the pairs.
     finders: Vec<Finder>,
 }
@@ -177,7 +211,9 @@ struct Finder {
     clip: Clip,
     scratch: Scratch,
     found: Vec<Near>,
-    axes: Vec<((u32, u32), Axis)>,
+    axes: Vec<(Pair, Axis)>,
+    /// Vertices and faces of an image.
+    image: PosedHull,
 }
 
 impl Detector {
@@ -278,6 +314,8 @@ impl Detector {
             boxes: vec![],
             box_moves,
             broad: Broad::default(),
+            met: vec![],
+            images: Images::default(),
             pairs: vec![],
             axes: vec![],
             finders: vec![Finder::default()],
@@ -312,23 +350,21 @@ impl Detector {
     ) {
         self.place(world, state, margins, crew);
         self.pairs.clear();
-        self.broad.pairs(&self.boxes, &self.box_moves, crew, &mut self.pairs);
-        for pair in &mut self.pairs {
-            // Places among the finite shapes, which keep the order of all shapes.
-            *pair = (self.finite[pair.0 as usize], self.finite[pair.1 as usize]);
-        }
-        self.pairs_with_planes(margins);
-        crew.sort(&mut self.pairs);
+        self.meet(world, state.t, crew);
+        self.pairs_with_planes(world, state.t, margins);
+        crew.sort_by_key(&mut self.pairs, |p| {
+            (u64::from(p.first) << 32 | u64::from(p.second), p.image)
+        });
         let parts = crew.parts(self.pairs.len());
         let mut finders = std::mem::take(&mut self.finders);
         finders.resize_with(finders.len().max(parts), Finder::default);
-        let (this, known) = (&*self, &state.memory.axes[..]);
+        let (this, known, t) = (&*self, &state.memory.axes[..], state.t);
         let share = this.pairs.len().div_ceil(parts).max(1);
         let used = this.pairs.len().div_ceil(share);
         crew.spread((0..used, &mut finders[..used]), this.pairs.len(), |(numbers, finders)| {
             for (k, finder) in numbers.zip(finders) {
                 let end = this.pairs.len().min(share * (k + 1));
-                this.find(world, margins, &this.pairs[share * k..end], known, finder);
+                this.find((world, t), margins, &this.pairs[share * k..end], known, finder);
             }
         });
         if let [only] = &mut finders[..used] {
@@ -348,34 +384,35 @@ impl Detector {
     /// The narrow phase of consecutive pairs, with the separating axes `known`; all lists are sorted.
     fn find(
         &self,
-        world: &World,
+        (world, t): (&World, f64),
         margins: &[f64],
-        pairs: &[(u32, u32)],
-        known: &[((u32, u32), Axis)],
+        pairs: &[Pair],
+        known: &[(Pair, Axis)],
         finder: &mut Finder,
     ) {
         finder.found.clear();
         finder.axes.clear();
         let Some(&start) = pairs.first() else { return };
         let mut last = known.partition_point(|k| k.0 < start);
-        let (mut body_pair, mut may) = ((u32::MAX, u32::MAX), false);
-        for &(i, j) in pairs {
+        let (mut bodies, mut may) = ((u32::MAX, u32::MAX, [0; 3]), false);
+        for &pair in pairs {
+            let Pair { first: i, second: j, image } = pair;
             let (p, q) = (self.solids[i as usize].body, self.solids[j as usize].body);
-            if (p, q) != body_pair {
-                body_pair = (p, q);
-                may = p != q && self.may_touch(world, p, q);
+            if (p, q, image) != bodies {
+                bodies = (p, q, image);
+                may = p != q && self.may_touch(world, p, q, image);
             }
             if !may {
                 continue;
             }
-            while last < known.len() && known[last].0 < (i, j) {
+            while last < known.len() && known[last].0 < pair {
                 last += 1;
             }
-            let axis = known.get(last).filter(|k| k.0 == (i, j)).map(|k| k.1);
+            let axis = known.get(last).filter(|k| k.0 == pair).map(|k| k.1);
             let prediction = margins[p as usize] + margins[q as usize];
             let first = finder.found.len();
-            let now = self.narrow(world, i, j, axis, prediction, finder);
-            finder.axes.extend(now.map(|now| ((i, j), now)));
+            let now = self.narrow((world, t), pair, axis, prediction, finder);
+            finder.axes.extend(now.map(|now| (pair, now)));
             finder.found[first..].sort_unstable_by_key(|n| n.key);
             let surface = |k: u32| matches!(self.solids[k as usize].solid, Solid::Surface(_));
             if surface(i) || surface(j) {
@@ -384,12 +421,13 @@ impl Detector {
         }
     }
 
-    /// Nodes do not touch nodes.
-    fn may_touch(&self, world: &World, p: u32, q: u32) -> bool {
+    /// Nodes do not touch nodes. Bodies that are kept apart may touch images of each other.
+    fn may_touch(&self, world: &World, p: u32, q: u32, image: Image) -> bool {
         let [p_is_node, q_is_node] = [p, q].map(|k| k as usize >= self.bodies);
         match p_is_node || q_is_node {
             true => p_is_node != q_is_node,
-            false => world.may_touch(BodyId(p), BodyId(q)),
+            false if image == [0; 3] => world.may_touch(BodyId(p), BodyId(q)),
+            false => world.may_meet(BodyId(p), BodyId(q)),
         }
     }
 
@@ -414,8 +452,28 @@ impl Detector {
         self.boxes.extend(self.finite.iter().map(|&k| self.bounds[k as usize]));
     }
 
-    /// A plane has no box: those shapes whose box reaches below it.
-    fn pairs_with_planes(&mut self, margins: &[f64]) {
+    /// The pairs of boxes that meet.
+    fn meet(&mut self, world: &World, t: f64, crew: &Crew) {
+        let Self { solids, finite, poses, boxes, box_moves, broad, met, images, pairs, .. } = self;
+        if world.periodic.periods.is_empty() {
+            met.clear();
+            broad.pairs(boxes, box_moves, crew, met);
+            pairs.extend(met.iter().map(|&(i, j)| Pair::of(i, j)));
+        } else {
+            let centre = |k: usize| poses[solids[finite[k] as usize].body as usize].x;
+            images.pairs(&world.periodic.lattice(t), (boxes, box_moves), centre, crew, pairs);
+        }
+        for pair in pairs {
+            // Places among the finite shapes, which keep the order of all shapes.
+            pair.first = finite[pair.first as usize];
+            pair.second = finite[pair.second as usize];
+        }
+    }
+
+    /// A plane has no box: those shapes whose box reaches below it. Where images move it has the velocity of its image in the cell of the body.
+    fn pairs_with_planes(&mut self, world: &World, t: f64, margins: &[f64]) {
+        let lattice = world.periodic.moves().then(|| world.periodic.lattice(t));
+        let cell = |x: Vec3| lattice.as_ref().map_or([0; 3], |l| l.image(l.cell(x)));
         for &k in &self.planes {
             let Solids { body, solid: Solid::Plane(pose), .. } = &self.solids[k as usize] else {
                 continue;
@@ -426,8 +484,11 @@ impl Detector {
             for (b, &j) in self.boxes.iter().zip(&self.finite) {
                 let least: f64 =
                     (0..3).map(|i| n[i] * if n[i] > 0.0 { b.low[i] } else { b.high[i] }).sum();
-                if least <= offset && self.moves[self.solids[j as usize].body as usize] {
-                    self.pairs.push((k.min(j), k.max(j)));
+                let body = self.solids[j as usize].body as usize;
+                if least <= offset && self.moves[body] {
+                    let cell = cell(self.poses[body].x);
+                    let image = if k < j { cell } else { cell.map(|n| -n) };
+                    self.pairs.push(Pair { image, ..Pair::of(k, j) });
                 }
             }
         }
@@ -435,16 +496,34 @@ impl Detector {
 
     fn narrow(
         &self,
-        world: &World,
-        i: u32,
-        j: u32,
+        (world, time): (&World, f64),
+        Pair { first: i, second: j, image }: Pair,
         axis: Option<Axis>,
         prediction: f64,
-        Finder { clip, scratch, found: out, .. }: &mut Finder,
+        Finder { clip, scratch, found: out, image: moved, .. }: &mut Finder,
     ) -> Option<Axis> {
         let Self { solids, poses, hulls, boxes, box_of, .. } = self;
         let (s, t) = (&solids[i as usize], &solids[j as usize]);
         let (a, b) = (&poses[s.body as usize], &poses[t.body as usize]);
+        let (hull_a, hull_b) = (&hulls[i as usize], &hulls[j as usize]);
+        let here = image == [0; 3];
+        let beside = match here {
+            true => Beside::default(),
+            false => {
+                let (offset, velocity) = world.periodic.offset(image, time);
+                Beside { offset, velocity }
+            }
+        };
+        let offset = beside.offset;
+        let posed;
+        let (a, hull_a) = match here {
+            true => (a, hull_a),
+            false => {
+                posed = beside.pose(a, 0.0);
+                moved.set_moved(hull_a, offset);
+                (&posed, &*moved)
+            }
+        };
         let law = world.law_between(s.material, t.material);
         let compliance = world.compliance_between(s.material, t.material);
         let size = s.size.min(t.size);
@@ -461,10 +540,19 @@ impl Detector {
         let mut found = |[f, g]: [Feature; 2], witness: Witness| {
             let place = witness.place(a, b, fallback());
             if place.gap <= prediction {
-                let key = Key { shape_a: i, shape_b: j, feature_a: f.code(), feature_b: g.code() };
+                let features = (f.code(), g.code());
+                let key = Key {
+                    shape_a: i,
+                    shape_b: j,
+                    image,
+                    feature_a: features.0,
+                    feature_b: features.1,
+                };
                 let deep = place.gap < -DEEP * size;
                 let (a, b) = (s.body, t.body);
-                out.push(Near { key, a, b, law, compliance, size, place, witness, deep });
+                let near =
+                    Near { key, a, b, law, compliance, size, place, witness, image: beside, deep };
+                out.push(near);
             }
         };
         let center = |segment: &Segment, pose: &Pose| pose.point(segment.p);
@@ -484,32 +572,32 @@ impl Detector {
                 None
             }
             (Solid::Plane(plane), Solid::Hull(hull)) => {
-                let points = corners(hull, &hulls[j as usize]);
+                let points = corners(hull, hull_b);
                 rounds::plane(true, &a.then(plane), a, points, 0.0, prediction, found);
                 None
             }
             (Solid::Hull(hull), Solid::Plane(plane)) => {
-                let points = corners(hull, &hulls[i as usize]);
+                let points = corners(hull, hull_a);
                 rounds::plane(false, &b.then(plane), b, points, 0.0, prediction, found);
                 None
             }
             (Solid::Plane(plane), Solid::Outline(p)) => {
-                let points = numbered(&p.vertices, &hulls[j as usize]);
+                let points = numbered(&p.vertices, hull_b);
                 rounds::plane(true, &a.then(plane), a, points, 0.0, prediction, found);
                 None
             }
             (Solid::Outline(p), Solid::Plane(plane)) => {
-                let points = numbered(&p.vertices, &hulls[i as usize]);
+                let points = numbered(&p.vertices, hull_a);
                 rounds::plane(false, &b.then(plane), b, points, 0.0, prediction, found);
                 None
             }
             (Solid::Outline(p), Solid::Outline(q)) => {
-                let first = Polygonal::of(p, &hulls[i as usize], a);
-                let second = Polygonal::of(q, &hulls[j as usize], b);
+                let first = Polygonal::of(p, hull_a, a);
+                let second = Polygonal::of(q, hull_b, b);
                 outline::collide(&first, &second, axis, prediction, found)
             }
             (Solid::Outline(p), Solid::Rounded(q, r)) => {
-                let flat = Polygonal::of(p, &hulls[i as usize], a);
+                let flat = Polygonal::of(p, hull_a, a);
                 if q.is_point() {
                     outline::disc((q.p, center(q, b), *r), &flat, true, prediction, found);
                     return None;
@@ -517,7 +605,7 @@ impl Detector {
                 outline::collide(&flat, &Rod::new(q, *r, b).flat(), axis, prediction, found)
             }
             (Solid::Rounded(q, r), Solid::Outline(p)) => {
-                let flat = Polygonal::of(p, &hulls[j as usize], b);
+                let flat = Polygonal::of(p, hull_b, b);
                 if q.is_point() {
                     outline::disc((q.p, center(q, a), *r), &flat, false, prediction, found);
                     return None;
@@ -525,13 +613,13 @@ impl Detector {
                 outline::collide(&Rod::new(q, *r, a).flat(), &flat, axis, prediction, found)
             }
             (Solid::Hull(hull), Solid::Rounded(q, r)) if q.is_point() => {
-                let side = (&**hull, &hulls[i as usize], a);
+                let side = (&**hull, hull_a, a);
                 let ball = (q.p, center(q, b), *r);
                 rounds::ball_and_hull(ball, side, true, prediction, found);
                 None
             }
             (Solid::Rounded(q, r), Solid::Hull(hull)) if q.is_point() => {
-                let side = (&**hull, &hulls[j as usize], b);
+                let side = (&**hull, hull_b, b);
                 let ball = (q.p, center(q, a), *r);
                 rounds::ball_and_hull(ball, side, false, prediction, found);
                 None
@@ -547,24 +635,24 @@ impl Detector {
                 None
             }
             (Solid::Plane(plane), Solid::Turned(_)) => {
-                let side = side(&t.solid, &hulls[j as usize], b);
+                let side = side(&t.solid, hull_b, b);
                 let flat = half_space(a.then(plane), a);
                 side.iter().for_each(|s| convex::on_flat(&flat, true, s, prediction, &mut found));
                 None
             }
             (Solid::Turned(_), Solid::Plane(plane)) => {
-                let side = side(&s.solid, &hulls[i as usize], a);
+                let side = side(&s.solid, hull_a, a);
                 let flat = half_space(b.then(plane), b);
                 side.iter().for_each(|s| convex::on_flat(&flat, false, s, prediction, &mut found));
                 None
             }
             (Solid::Plane(plane), Solid::Surface(surface)) => {
-                let points = knots(surface, &hulls[j as usize]);
+                let points = knots(surface, hull_b);
                 rounds::plane(true, &a.then(plane), a, points, 0.0, prediction, found);
                 None
             }
             (Solid::Surface(surface), Solid::Plane(plane)) => {
-                let points = knots(surface, &hulls[i as usize]);
+                let points = knots(surface, hull_a);
                 rounds::plane(false, &b.then(plane), b, points, 0.0, prediction, found);
                 None
             }
@@ -573,28 +661,28 @@ impl Detector {
                 None
             }
             (Solid::Surface(surface), other) => {
-                if let Some(other) = side(other, &hulls[j as usize], b) {
+                if let Some(other) = side(other, hull_b, b) {
                     let bounds = &boxes[box_of[j as usize] as usize];
                     surface.collide((a, &other, bounds), prediction, (clip, scratch), found);
                 }
                 None
             }
             (other, Solid::Surface(surface)) => {
-                if let Some(other) = side(other, &hulls[i as usize], a) {
-                    let bounds = &boxes[box_of[i as usize] as usize];
+                if let Some(other) = side(other, hull_a, a) {
+                    let bounds = &boxes[box_of[i as usize] as usize].moved(offset);
                     let swapped = |[f, g]: [Feature; 2], w: Witness| found([g, f], w.swapped());
                     surface.collide((b, &other, bounds), prediction, (clip, scratch), swapped);
                 }
                 None
             }
             (Solid::Hull(p), Solid::Hull(q)) => {
-                let first = (&**p, &hulls[i as usize], a);
-                let second = (&**q, &hulls[j as usize], b);
+                let first = (&**p, hull_a, a);
+                let second = (&**q, hull_b, b);
                 clip.collide(first, second, axis, prediction, &mut found)
             }
             (Solid::Plane(_), Solid::Plane(_)) => None,
             (p, q) => {
-                let both = (side(p, &hulls[i as usize], a), side(q, &hulls[j as usize], b));
+                let both = (side(p, hull_a, a), side(q, hull_b, b));
                 if let (Some(p), Some(q)) = both {
                     convex::collide(&p, &q, prediction, found);
                 }

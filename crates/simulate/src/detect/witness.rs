@@ -16,6 +16,9 @@ pub struct Key {
     pub shape_a: u32,
     /// The second shape, a later one.
     pub shape_b: u32,
+    /// In a [periodic](crate::Periodic) world which image of the first shape touches, in numbers of the periods.
+    #[serde(default)]
+    pub image: [i32; 3],
     /// The feature of the first shape: a vertex, an edge or a face with its number, or 0 where it is curved.
     pub feature_a: u32,
     /// The feature of the second shape.

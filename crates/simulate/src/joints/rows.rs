@@ -523,6 +523,7 @@ impl Step<'_> {
     /// The mean velocity in the step and that at its end of a body that is moved.
     fn moved(&self, k: usize) -> (Vec3, Vec3) {
         match self.world.bodies[k].motion {
+            Motion::Uniform { velocity } => (velocity, velocity),
             Motion::Oscillating { amplitude, frequency, phase } => {
                 let at = |t: f64| oscillation(amplitude, frequency, phase, t);
                 let (first, last) = (at(self.state.t), at(self.state.t + self.h));

@@ -7,13 +7,13 @@ use nonsmooth_scenes::{Polyhedron, Rotation, SceneEntry};
 
 use super::{
     BodyTable, ComplianceTable, ElasticTable, ForceTable, GenerateTable, LawTable, MotionTable,
-    PartTable, RotationTable, SceneFile, ShapeOrName, ShapeTable,
+    PartTable, PeriodicTable, RotationTable, SceneFile, ShapeOrName, ShapeTable,
 };
 use crate::error::{finite, require};
 use crate::shape::plane;
 use crate::{
-    Body, BodyId, Compliance, Dimension, Law, Mesh, Motion, Part, Polygon, Settled, Shape,
-    SimulateError, Simulation, State, World, Wrenches,
+    Body, BodyId, Compliance, Dimension, Law, Mesh, Motion, Part, Periodic, Polygon, Settled,
+    Shape, SimulateError, Simulation, State, World, Wrenches,
 };
 
 /// Groups have a bit each.
@@ -32,6 +32,9 @@ impl SceneFile {
     pub fn world(&self) -> Result<World, SimulateError> {
         finite(|| "gravity".into(), &self.gravity)?;
         let mut builder = Builder::new(self)?;
+        if let Some(table) = &self.periodic {
+            builder.world.periodic = repeating(table)?;
+        }
         for (k, table) in self.bodies.iter().enumerate() {
             let key = match table.name.as_str() {
                 "" => format!("bodies[{k}]"),
@@ -106,6 +109,20 @@ impl SceneFile {
         }
         Ok((simulation, said))
     }
+}
+
+/// How a world repeats itself by the table.
+fn repeating(table: &PeriodicTable) -> Result<Periodic, SimulateError> {
+    let PeriodicTable { lengths, gradient, corner } = *table;
+    let at = |name: &str| format!("periodic.{name}");
+    finite(|| at("gradient"), &gradient.concat())?;
+    for length in lengths {
+        require(|| at("lengths"), length, length >= 0.0, "lengths of at least 0")?;
+    }
+    if lengths == [0.0; 3] {
+        return Err(SimulateError::value(at("lengths"), "one that is not 0", "none"));
+    }
+    Ok(Periodic { corner, ..Periodic::sheared(lengths, gradient) })
 }
 
 /// A force of the file, as the simulation asks for it.
@@ -268,6 +285,7 @@ impl<'a> Builder<'a> {
             (false, Some(MotionTable::Surface { velocity, angular_velocity })) => {
                 Motion::Surface { linear: velocity, angular: angular_velocity }
             }
+            (false, Some(MotionTable::Uniform { velocity })) => Motion::Uniform { velocity },
             (false, Some(MotionTable::Sine { amplitude, frequency, phase })) => {
                 Motion::Oscillating { amplitude, frequency, phase }
             }
@@ -437,6 +455,14 @@ impl<'a> Builder<'a> {
         let scene = SceneEntry::find(&table.scene).and_then(|entry| entry.make(&table.set));
         let scene = scene.map_err(|e| wrong(e.to_string()))?;
         let made = World::try_from(&scene).map_err(|e| wrong(e.to_string()))?;
+        if !made.periodic.periods.is_empty() {
+            if !self.world.periodic.periods.is_empty() {
+                let expected = "no periods besides those of `periodic` or of a family before";
+                let found = format!("`{}` with its own", table.scene);
+                return Err(SimulateError::value(key, expected, found));
+            }
+            self.world.periodic = Periodic { corner: table.position, ..made.periodic.clone() };
+        }
         let name = table.name.as_deref().unwrap_or(&table.scene);
         let material = self.world.material(name);
         self.world.pair(material, material, made.law);

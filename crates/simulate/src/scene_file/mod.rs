@@ -64,6 +64,9 @@ pub struct SceneFile {
     #[serde(default = "earth")]
     #[schemars(schema_with = "plane::vector")]
     pub gravity: [f64; 3],
+    /// How the world repeats itself, if it does: what moves out on one side comes in on the other.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub periodic: Option<PeriodicTable>,
     /// How long, and in which steps.
     pub time: Time,
     /// The scheme.
@@ -105,6 +108,23 @@ pub struct SceneFile {
     /// What is kept of a run.
     #[serde(default)]
     pub output: OutputTable,
+}
+
+/// A world that repeats itself along axes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PeriodicTable {
+    /// After which length along each axis, m; 0: not along this one.
+    #[schemars(schema_with = "plane::vector")]
+    pub lengths: [f64; 3],
+    /// L, 1/s, by rows: the image a period p away moves with `L p` relative to the body, where p is that of the start. Shears and stretches what fills the world.
+    #[serde(default)]
+    #[schemars(schema_with = "plane::matrix")]
+    pub gradient: [[f64; 3]; 3],
+    /// The lower corner of the cell in which pictures show the bodies, m; motion does not depend on it.
+    #[serde(default)]
+    #[schemars(schema_with = "plane::vector")]
+    pub corner: [f64; 3],
 }
 
 /// How long, and in which steps.
@@ -492,6 +512,12 @@ pub enum MotionTable {
         #[serde(default)]
         #[schemars(schema_with = "plane::turn")]
         angular_velocity: [f64; 3],
+    },
+    /// With a constant velocity, shapes and all: a piston, a plate that closes.
+    Uniform {
+        /// m/s.
+        #[schemars(schema_with = "plane::vector")]
+        velocity: [f64; 3],
     },
     /// About its position by `amplitude sin(frequency t + phase)`: a shaking table.
     Sine {

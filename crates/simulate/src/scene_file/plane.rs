@@ -5,6 +5,7 @@
 //! | a vector `[x, y]` | `[x, y, 0]` |
 //! | a rate of turning or a torque `c` | `[0, 0, c]` |
 //! | an orientation `φ` | `{ axis = [0, 0, 1], angle = φ }` |
+//! | a velocity gradient `[[a, b], [c, d]]` | `[[a, b, 0], [c, d, 0], [0, 0, 0]]` |
 //! | a moment of inertia `J` | `[J/2, J/2, J]`, that of a thin sheet |
 //! | gravity, the normal of a plane, where none is given | `[0, −9.81, 0]`, `[0, 1, 0]` |
 
@@ -15,7 +16,7 @@ use super::EARTH;
 use crate::{Dimension, SimulateError};
 
 /// Vectors that have two components in the plane.
-const VECTORS: [&str; 12] = [
+const VECTORS: [&str; 14] = [
     "gravity",
     "position",
     "velocity",
@@ -28,6 +29,8 @@ const VECTORS: [&str; 12] = [
     "amplitude",
     "half",
     "normal",
+    "lengths",
+    "corner",
 ];
 /// What turns about the third axis.
 const TURNS: [&str; 2] = ["angular_velocity", "torque"];
@@ -85,6 +88,12 @@ fn lifted(key: &str, value: &mut Value) {
     let number = |v: &Value| v.as_float().or(v.as_integer().map(|x| x as f64));
     let list = |numbers: &[f64]| Value::Array(numbers.iter().map(|x| Value::Float(*x)).collect());
     if let Value::Array(parts) = value {
+        if key == "gradient" && parts.len() == 2 {
+            for row in parts.iter_mut().filter_map(Value::as_array_mut).filter(|r| r.len() == 2) {
+                row.push(Value::Float(0.0));
+            }
+            parts.push(list(&[0.0; 3]));
+        }
         if VECTORS.contains(&key) && parts.len() == 2 && parts.iter().all(|p| number(p).is_some()) {
             parts.push(Value::Float(0.0));
         }
@@ -107,6 +116,13 @@ fn lifted(key: &str, value: &mut Value) {
 /// The schema of a vector: three numbers, or two in the plane.
 pub(super) fn vector(_: &mut SchemaGenerator) -> Schema {
     json_schema!({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3})
+}
+
+/// Of a matrix: three rows of three numbers, or two of two in the plane.
+pub(super) fn matrix(_: &mut SchemaGenerator) -> Schema {
+    let row =
+        json_schema!({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3});
+    json_schema!({"type": "array", "items": row, "minItems": 2, "maxItems": 3})
 }
 
 /// Of what turns: three numbers, or one in the plane.

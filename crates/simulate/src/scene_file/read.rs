@@ -58,6 +58,7 @@ impl SceneFile {
             name: family.into(),
             dimension: 3,
             gravity: super::earth(),
+            periodic: None,
             time: Time { h, end },
             integrator: MoreauJean::default(),
             solver: Default::default(),

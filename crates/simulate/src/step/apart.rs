@@ -61,6 +61,7 @@ impl Tools {
         self.margins.iter_mut().for_each(|m| *m += depth);
         self.detect(stride, &mut rest);
         self.near.retain(|near| near.compliance.is_none());
+        self.near.iter_mut().for_each(|near| near.image.velocity = [0.0; 3]);
         self.meet(stride, &rest);
         self.joints.close_limits(world, H);
         for (near, &row) in self.near.iter().zip(&self.row_of) {

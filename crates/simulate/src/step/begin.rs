@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use nonsmooth_scenes::Rotation;
-use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, norm, scale};
+use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, norm, scale, sub};
 
 use super::{Stride, Tools, are_finite};
 use crate::detect::Detector;
@@ -103,8 +103,8 @@ impl Start {
         }
     }
 
-    /// Writes body k; a bound on the speed of its points.
-    fn body(&self, k: usize, stride: Stride, state: &State, b: &mut Moving) -> f64 {
+    /// Writes body k; a bound on the speed of its points in a cell that moves with this velocity.
+    fn body(&self, k: usize, stride: Stride, state: &State, cell: Vec3, b: &mut Moving) -> f64 {
         let Stride { world, scheme, h } = stride;
         let (body, built) = (&world.bodies[k], &self.built[k]);
         let start = state.pose(k);
@@ -151,11 +151,20 @@ impl Start {
             Motion::Fixed => {}
             Motion::Surface { linear, angular } => (b.linear, b.angular) = ([linear; 2], angular),
             Motion::Free => {
-                speed = norm(b.v) + norm(omega) * built.reach;
+                speed = norm(sub(b.v, cell)) + norm(omega) * built.reach;
                 for (pose, part) in [(&mut b.middle, 0.5), (&mut b.end, 1.0)] {
                     if turns {
                         let (x, q) = advanced(state, k, part * h);
                         *pose = Pose { x, r: q.matrix() };
+                    }
+                }
+            }
+            Motion::Uniform { velocity } => {
+                speed = norm(velocity);
+                b.linear = [velocity; 2];
+                for (pose, part) in [(&mut b.middle, 0.5), (&mut b.end, 1.0)] {
+                    if turns {
+                        pose.x = add(start.x, scale(part * h, velocity));
                     }
                 }
             }
@@ -243,6 +252,9 @@ impl Tools {
         self.start.ask(state, forces, h);
         let gravity = norm(world.gravity);
         let (gamma, slack) = scheme.activation.forecast().unwrap_or((1.0, 0.0));
+        // Bodies come together as fast as they move in their cells, and as these do.
+        let lattice = world.periodic.moves().then(|| world.periodic.lattice(state.t));
+        let closing = lattice.as_ref().map_or(0.0, |l| 0.5 * world.periodic.closing(l));
         let count = world.bodies.len();
         self.bodies.resize(count, Start::node([0.0; 3], 0, ([0.0; 3], [0.0; 3]), 0.0));
         self.margins.resize(count, 0.0);
@@ -251,7 +263,10 @@ impl Tools {
         let start = &*start;
         crew.spread((0..count, &mut bodies[..], &mut margins[..]), count, |(numbers, b, m)| {
             for ((k, body), margin) in numbers.zip(b).zip(m) {
-                let speed = start.body(k, stride, state, body);
+                let cell = lattice
+                    .as_ref()
+                    .map_or([0.0; 3], |l| world.periodic.velocity_at(l, state.position[k]));
+                let speed = start.body(k, stride, state, cell, body) + closing;
                 let fall = if body.free { h * h * gravity } else { 0.0 };
                 let least = (1e-6_f64).max(slack) * start.built[k].size;
                 *margin = (gamma + 1.0) * h * speed + fall + least;

@@ -8,6 +8,7 @@ use super::{NONE, Stride, Tools};
 use crate::cut::Cut;
 use crate::detect::{Key, Near, Place};
 use crate::moving::Moving;
+use crate::rotation::Pose;
 use crate::state::{Remembered, State};
 use crate::{Activation, Compliance, Dimension, Geometry, Impact};
 
@@ -34,6 +35,8 @@ pub(super) struct Row {
     /// What a normal impulse gives way by, over it.
     pub compliance: f64,
     pub place: Place,
+    /// From the first body to the image of it that touches, where impulses act, m.
+    pub offset: Vec3,
     /// Directions of impulses and of velocities.
     pub frame: [Vec3; 3],
     pub frame_end: [Vec3; 3],
@@ -103,9 +106,28 @@ impl<'a> Meeting<'a> {
     ) -> Self {
         let sides @ [a, b] = [near.a, near.b].map(|i| &bodies[i as usize]);
         let Place { normal, point, .. } = near.place;
-        let velocity = || dot(normal, sub(b.velocity_at(point), a.velocity_at(point)));
+        let image = near.image;
+        let velocity = || {
+            let of_a = add(a.velocity_at(sub(point, image.offset)), image.velocity);
+            dot(normal, sub(b.velocity_at(point), of_a))
+        };
         let approach = approach.unwrap_or_else(velocity);
         Self { stride, near, known, bodies: sides, approach }
+    }
+
+    /// From the first body to the image of it that touches after a share of the step.
+    fn offset(&self, part: f64) -> Vec3 {
+        let part = if self.is_extrapolated() { part } else { 0.0 };
+        self.near.image.after(part * self.stride.h)
+    }
+
+    /// Where the contact is with its bodies at these poses after a share of the step; of a it is the image that touches.
+    fn place(&self, [a, b]: [&Pose; 2], part: f64, normal: Vec3) -> Place {
+        if self.near.image.is_itself() {
+            return self.near.witness.place(a, b, normal);
+        }
+        let a = Pose { x: add(a.x, self.offset(part)), r: a.r };
+        self.near.witness.place(&a, b, normal)
     }
 
     /// Whether it took part in the last step.
@@ -131,7 +153,7 @@ impl<'a> Meeting<'a> {
         // What runs along a curved surface leaves it by as much as a step is curved: that is no separation.
         let curved = || {
             let [a, b] = self.bodies;
-            let end = self.near.witness.place(&a.end, &b.end, n);
+            let end = self.place([&a.end, &b.end], 1.0, n);
             beyond <= norm(sub(end.normal, n)) * norm(sub(end.point, self.near.place.point))
         };
         beyond <= 0.0 || (self.persists() && self.is_extrapolated() && curved())
@@ -153,7 +175,7 @@ impl<'a> Meeting<'a> {
     fn write(&self, axis: u8, scaled: f64, row: &mut Row) {
         let Self { near, bodies: [a, b], .. } = self;
         let n = near.place.normal;
-        let middle = near.witness.place(&a.middle, &b.middle, n);
+        let middle = self.place([&a.middle, &b.middle], 0.5, n);
         let middle = Place { normal: if near.deep { n } else { middle.normal }, ..middle };
         let place = self.on_surface(middle);
         let frame = frame(place.normal, axis);
@@ -164,6 +186,7 @@ impl<'a> Meeting<'a> {
         *row = Row {
             mu: near.law.mu,
             place,
+            offset: self.offset(0.5),
             frame,
             frame_end: frame,
             mu_r: near.law.mu_r,
@@ -171,21 +194,23 @@ impl<'a> Meeting<'a> {
             ..Row::default()
         };
         let count = self.directions();
+        // Of the image that touches.
+        let offsets = [0.5, 1.0].map(|part| [self.offset(part), [0.0; 3]]);
         for (k, (arm, b)) in row.arms.iter_mut().zip(self.bodies).enumerate() {
             (arm.body, arm.owner, arm.free) = ([near.a, near.b][k], b.owner, b.free);
             arm.sign = [-1.0, 1.0][k];
-            let to = sub(place.point, b.middle.x);
+            let to = sub(place.point, add(b.middle.x, offsets[0][k]));
             (0..count).for_each(|i| arm.moment[i] = cross(to, frame[i]));
             arm.moment_end = arm.moment;
         }
         let mut point_end = place.point;
         if later {
-            let end = self.on_surface(near.witness.place(&a.end, &b.end, place.normal));
+            let end = self.on_surface(self.place([&a.end, &b.end], 1.0, place.normal));
             let frame_end = transported(&frame, end.normal);
             point_end = end.point;
             let mut turned = 0.0;
-            for (arm, b) in row.arms.iter_mut().zip(self.bodies) {
-                let to = sub(end.point, b.end.x);
+            for (k, (arm, b)) in row.arms.iter_mut().zip(self.bodies).enumerate() {
+                let to = sub(end.point, add(b.end.x, offsets[1][k]));
                 (0..count).for_each(|i| arm.moment_end[i] = cross(to, frame_end[i]));
                 turned = f64::max(turned, apart(&arm.moment, &arm.moment_end));
             }
@@ -209,6 +234,7 @@ impl<'a> Meeting<'a> {
     /// The relative velocity at the beginning, and those of what is moved, which at the end of the step is taken at a point of its own.
     fn take_velocities(&self, row: &mut Row, point_end: Vec3) {
         let (theta, count) = (self.stride.scheme.theta, self.directions());
+        let image = self.near.image;
         for (arm, m) in row.arms.iter().zip(self.bodies) {
             if m.free {
                 let omega = m.omega(m.spin);
@@ -218,7 +244,8 @@ impl<'a> Meeting<'a> {
                 continue;
             }
             let [first, last] = m.linear;
-            let turn = |p: Vec3| cross(m.angular, sub(p, m.start.x));
+            let beside = if arm.sign < 0.0 { image.offset } else { [0.0; 3] };
+            let turn = |p: Vec3| cross(m.angular, sub(p, add(m.start.x, beside)));
             let (mid, end) = (turn(row.place.point), turn(point_end));
             for i in 0..count {
                 let of = |v: Vec3| arm.sign * dot(row.frame[i], add(v, mid));
@@ -230,6 +257,15 @@ impl<'a> Meeting<'a> {
             for k in 0..2 {
                 row.turned[k] += arm.sign * dot(row.frame_end[1 + k], m.angular);
                 row.turned_mean[k] += arm.sign * dot(row.frame[1 + k], m.angular);
+            }
+        }
+        if !image.is_itself() {
+            for i in 0..count {
+                let given = dot(row.frame[i], image.velocity);
+                row.before[i] -= given;
+                row.given_middle[i] -= given;
+                row.given_mean[i] -= given;
+                row.given[i] -= dot(row.frame_end[i], image.velocity);
             }
         }
     }

@@ -158,6 +158,7 @@ impl Tools {
         forces: &mut [Box<dyn Force>],
         inner: &Inner,
     ) -> Result<StepReport, SimulateError> {
+        stride.world.periods_hold(state.t + stride.h)?;
         let begun = Instant::now();
         let mut timings = Timings::default();
         let mut report = StepReport::begun(state.t, stride.h);
@@ -191,6 +192,7 @@ impl Tools {
         state: &mut State,
         forces: &mut [Box<dyn Force>],
     ) -> Result<Option<Friction>, SimulateError> {
+        stride.world.periods_hold(state.t + stride.h)?;
         if !self.begin(stride, state, forces) {
             return Ok(None);
         }

@@ -62,6 +62,10 @@ impl Tools {
                     let moves = oscillation(amplitude, frequency, phase, t + stride.h);
                     (x[k], v[k]) = (add(bodies[k].position, moves.0), moves.1);
                 }
+                if let Motion::Uniform { velocity } = bodies[k].motion {
+                    x[k] = add(bodies[k].position, scale(t + stride.h, velocity));
+                    v[k] = velocity;
+                }
                 if b.free {
                     x[k] = add(x[k], scale(stride.h, stride.scheme.mean(b.v, b.v_new)));
                     v[k] = b.v_new;
@@ -105,6 +109,7 @@ impl Tools {
             a: BodyId(self.bodies[near.a as usize].owner),
             b: BodyId(self.bodies[near.b as usize].owner),
             point: near.place.point,
+            offset: near.image.offset,
             frame: [[0.0; 3]; 3],
             gap: near.place.gap,
             mu: near.law.mu,
@@ -128,6 +133,7 @@ impl Tools {
         };
         report.active = true;
         (report.point, report.frame) = (row.place.point, row.frame);
+        report.offset = row.offset;
         (report.impulse, report.before, report.moment) = (row.r, row.before, row.moment);
         let at = self.touching.place_of[place] as usize;
         report.after = self.stated.after(at, row, &self.bodies);

@@ -115,9 +115,11 @@ fn singular_positions_are_passed() {
 }
 
 #[test]
-fn one_window_turns_in_time() {
-    let (_, angle) = turned(1, 1.923711817339, 1e-3);
-    near(angle, 2.0 * std::f64::consts::PI, 1e-4);
+fn windows_turn_in_time() {
+    for (windows, time) in [(1, 1.923711817339), (2, 1.942514922607), (40, 1.965601928705)] {
+        let (_, angle) = turned(windows, time, 1e-3);
+        near(angle, 2.0 * std::f64::consts::PI, 1e-4);
+    }
 }
 
 #[test]

@@ -39,11 +39,16 @@ fn the_dry_friction_oscillator_stops_where_it_should() {
             let mut oscillator =
                 LagrangianSimulation::new(DryFriction, theta(t), &[12.0], &[6.0]).unwrap();
             oscillator = oscillator.with_tolerance(1e-14);
-            let (mut turns, mut last) = (vec![], 6.0);
+            let (mut turns, mut times, mut last) = (vec![], vec![], 6.0);
+            let mut moving = 0.0;
             let mut watch = |s: &LagrangianSimulation<DryFriction, 2>, _: &StepReport| {
                 let (q, v) = (s.state().q[0], s.state().v[0]);
                 if v * last < 0.0 {
                     turns.push(q);
+                    times.push(s.state().t);
+                }
+                if v != 0.0 {
+                    moving = s.state().t;
                 }
                 last = if v == 0.0 { last } else { v };
                 assert!(s.row_impulses()[0].abs() <= h * (1.0 + 1e-12));
@@ -56,7 +61,10 @@ fn the_dry_friction_oscillator_stops_where_it_should() {
             if t == 0.5 && h == 0.001 {
                 let exact =
                     [13.317821063276, 11.317821, 9.317821, 7.317821, 5.317821, 3.317821, 1.317821];
+                // The last turn is where it comes to rest.
                 assert_eq!(turns.len(), 7);
+                near(times[0], 0.432407775571, 2.0 * h);
+                near(moving, 22.423556350699, 2.0 * h);
                 for (turn, exact) in turns.into_iter().zip(exact) {
                     near(turn.abs(), exact, 1e-4);
                 }

@@ -112,3 +112,28 @@ fn the_default_is_of_second_order() {
         .into();
     near(order(&errors), 2.0, 0.1);
 }
+
+/// From horizontal to horizontal and back: `4 K(½)/√g`, 2.3678 s.
+#[test]
+fn the_period_from_horizontal_is_that_of_elliptic_functions() {
+    let period: f64 = 2.367841947576;
+    let errors: Vec<_> = [4e-3, 2e-3, 1e-3]
+        .map(|steps| {
+            let h = period / (period / steps).round();
+            let start = LagrangianSimulation::new(
+                Pendulum { bowl: false },
+                LagrangianScheme::default(),
+                &[-1.0, 0.0],
+                &[0.0; 2],
+            );
+            let mut pendulum = start.unwrap();
+            assert!(pendulum.run(period, h, &mut ()).unwrap().is_solved());
+            // It stands still there: the velocity tells the time.
+            let late = pendulum.state().v[1] / G;
+            near(pendulum.state().q[0], -1.0, 1e-4);
+            (h, late.abs())
+        })
+        .into();
+    assert!(errors[2].1 < 1e-5, "{errors:?}");
+    assert!(order(&errors) > 1.8, "{errors:?}");
+}

@@ -21,13 +21,17 @@ fn a_block_slides_to_its_stop_and_never_lifts() {
         let b = world.add(b);
         let scheme = MoreauJean { theta, ..MoreauJean::default() };
         let mut simulation = Simulation::new(world, scheme).unwrap();
-        let mut lift: f64 = 0.0;
+        let (mut lift, mut moving): (f64, f64) = (0.0, 0.0);
         let mut watch = |s: &Simulation, _: &StepReport| {
+            if v(s, b)[0] > 1e-9 {
+                moving = s.state().t;
+            }
             lift = lift.max((s.state().position[b.index()][2] - HALF[2]).abs());
             Control::Continue
         };
         crate::check(&simulation.run(1.0, h, &mut watch).unwrap());
         near(x(&simulation, b)[0], 0.764525993884, error);
+        near(moving, 0.509683995923, h);
         assert!(lift < 1e-10, "{lift:e}");
         assert!(v(&simulation, b)[0].abs() < 1e-11);
     }

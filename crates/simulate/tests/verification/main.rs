@@ -14,6 +14,7 @@ mod laws;
 mod mechanisms;
 mod meshes;
 mod overlap;
+mod periodic;
 mod piles;
 mod plane;
 mod projection;

@@ -22,6 +22,7 @@ const rotations = new Int16Array(bytes(data.rotations));
 const ends = new Uint32Array(bytes(data.ends));
 const pairs = new Int32Array(bytes(data.pairs));
 const numbers = new Float32Array(bytes(data.forces));
+const offsets = new Float32Array(bytes(data.offsets));
 const statuses = new Uint8Array(bytes(data.statuses));
 const energy = new Float32Array(bytes(data.energy));
 const residual = new Float32Array(bytes(data.residual));
@@ -40,7 +41,7 @@ function contactsOf(frame) {
   for (let k = frame === 0 ? 0 : ends[frame - 1]; k < ends[frame]; k++) {
     all.push({
       number: k, a: pairs[2 * k], b: pairs[2 * k + 1], status: NAMES[statuses[k]],
-      point: vector(numbers.subarray(6 * k, 6 * k + 3)), impulse: vector(numbers.subarray(6 * k + 3, 6 * k + 6)),
+      point: vector(numbers.subarray(6 * k, 6 * k + 3)), offset: offsets.length > 0 ? vector(offsets.subarray(3 * k, 3 * k + 3)) : null, impulse: vector(numbers.subarray(6 * k + 3, 6 * k + 6)),
     });
   }
   return all;
@@ -236,6 +237,8 @@ function poseOf(frame, share, body, matrix) {
   read(frame, here, turn);
   if (share > 0) {
     read(frame + 1, there, next);
+    // What has come in on the other side of a cell was not between.
+    if (data.jump && here.distanceTo(there) > data.jump) share = share < 0.5 ? 0 : 1;
     here.lerp(there, share);
     turn.slerp(next, share);
   }
@@ -323,8 +326,10 @@ function forces() {
     place(heads, tips);
   }
   if (chains.visible) {
+    // An image of the first body touches where that itself is not.
+    const touched = (c, k) => k === c.a && c.offset ? c.point.clone().sub(c.offset) : c.point;
     const halves = pressed.flatMap(c => [c.a, c.b].filter(k => k >= 0 && !bodies[k].fixed).map(k => ({
-      from: c.point, to: chainEnd(c.point, centre(k), c.impulse, bodies[k].ball), contact: c,
+      from: touched(c, k), to: chainEnd(touched(c, k), centre(k), c.impulse, bodies[k].ball), contact: c,
       radius: width * Math.min(c.impulse.length() / strong, 2.5), colour: statusColour(c),
     })));
     place(chains, halves.filter(half => half.from.distanceTo(half.to) > 0));
