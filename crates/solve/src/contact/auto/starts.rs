@@ -8,6 +8,7 @@ use super::alternating::Way;
 use super::{Auto, FIRST, FIRST_SWEEPS, HybridWork, NEAR, NEWTON, Stage, runs_away};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
+use crate::contact::parts::Central;
 
 /// Rest is sought where contacts without impulse open no faster than this part of ‖q‖ after the sweeps (at rest at most 2e-3, in motion 1e-2 and more); it is
 /// given up where its first iteration leaves more than this (at rest at most 5e-2, else .2 and more), and is not judged by its rate before so many.
@@ -31,12 +32,13 @@ const RESCUE_TAKE_BACK: f64 = 5.0;
 const SWEPT_LONG: usize = 10 * FIRST_SWEEPS;
 const SWEEP_AGAIN: f64 = 3.0;
 /// The interior point ends after this many iterations, or below this error, or after so many iterations that did not halve the
-/// error, or so many short steps in a row.
+/// error, or so many short steps in a row; such steps know at least this part of the slope of ‖u_T‖.
 const INTERIOR: usize = 60;
 /// Where Newton's iterations promise to take longer than this, the interior point is worth a trial.
 const INTERIOR_COST: f64 = 20.0;
 const INTERIOR_ERROR: f64 = 1e-8;
 const INTERIOR_IDLE: usize = 10;
+const INTERIOR_SLOPE: f64 = 0.2;
 const INTERIOR_SHORT: (f64, usize) = (1e-6, 6);
 /// Alternating directions are tried after so many Newton iterations, and, from the other start, again after so many.
 const ALTERNATE_AFTER: [usize; 2] = [40, 160];
@@ -386,6 +388,7 @@ pub(super) fn begin_interior<P: Linearised<D> + Disked<D>, const D: usize>(
 ) {
     work.passed_by = None;
     let HybridWork { central, state, stage, .. } = work;
-    let now = central.get_or_insert_default().begin(problem, state, 0.0, None);
+    let part = || Box::new(Central::default().know_at_least(INTERIOR_SLOPE));
+    let now = central.get_or_insert_with(part).begin(problem, state, 0.0, None);
     *stage = Stage::Interior { idle: 0, short: 0, least: now.error };
 }

@@ -3,13 +3,13 @@
 //! Problem: `K* ∋ W r + q + mu‖u_T‖ e_N ⟂ r ∈ K`; in scaled coordinates `L ∋ z ⟂ x ∈ L`, `z = Z (W r + q) + ‖z_T‖ e_N`.
 //!
 //! Method: Mehrotra's predictor–corrector with Nesterov–Todd scaling. ‖z_T‖ is differentiated like any other term
-//! (`G = I + e nᵀ`), which costs the symmetry of the matrix and the monotonicity of the problem; where that cuts the steps short, by a part of its
-//! slope, see `parts::central`. Optionally
+//! (`G = I + e nᵀ`), which costs the symmetry of the matrix and the monotonicity of the problem; where that cuts the steps short, a part of its
+//! slope may do (`least_slope`). Optionally
 //! the path from the start, where both the equations' residual and complementarity shrink with one parameter, is
 //! followed by its arc length, so that it may turn back (`path=continuation`).
 //!
 //! References: NesterovTodd1998; Mehrotra1992; the exact law: the derivation in `parts::central`; the arc length: Keller1977.
-//! Cost of a step: one factorisation of `Q + P W`, two solves and two products; up to four where steps are cut short, with continuation up to six of each.
+//! Cost of a step: one factorisation of `Q + P W`, two solves and two products; up to four with `least_slope`, with continuation up to six of each.
 //! Storage: 20 vectors and five blocks a contact.
 //! Fails: the steps can shrink to nothing away from a solution, mostly near sticking contacts, where the kink of ‖u_T‖ lies on
 //! the cone's boundary; it then ends as stuck. A starter more than a solver where impacts are large.
@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::contact::form::{Access, Disked, Linearised, OnContacts};
 use crate::contact::interior::pursuit::Pursuit;
 use crate::contact::parts::{Central, CentralIterate};
-use crate::core::ranges::{at_least, nonnegative};
+use crate::core::ranges::{at_least, nonnegative, up_to};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -46,13 +46,21 @@ pub struct Interior {
     pub smoothing: f64,
     /// Begin near the starting point, this far inside the cones in units of the free velocity; 0 for a cold start.
     pub warm_margin: f64,
+    /// Where the boundary cuts a step short, it is computed anew with a part of the slope of ‖u_T‖, at least this, in (0, 1]; 1: always all. Not with continuation.
+    pub least_slope: f64,
     /// Steps without a smaller residual after which it gives up.
     pub patience: usize,
 }
 
 impl Default for Interior {
     fn default() -> Self {
-        Self { path: Path::Mehrotra, smoothing: 0.0, warm_margin: 0.0, patience: 30 }
+        Self {
+            path: Path::Mehrotra,
+            smoothing: 0.0,
+            warm_margin: 0.0,
+            least_slope: 1.0,
+            patience: 30,
+        }
     }
 }
 
@@ -60,6 +68,7 @@ impl Settings for Interior {
     fn validate(&self) -> Result<(), String> {
         nonnegative("smoothing", self.smoothing)?;
         nonnegative("warm_margin", self.warm_margin)?;
+        up_to("least_slope", self.least_slope, 1.0)?;
         at_least("patience", self.patience, 1)
     }
 }
@@ -72,7 +81,7 @@ impl Described for Interior {
         summary: "nonsmooth interior point: Mehrotra's predictor-corrector with Nesterov-Todd scaling on Coulomb's law itself",
         needs: &[],
         cites: &["NesterovTodd1998", "Mehrotra1992", "TutuncuTohTodd2003", "Keller1977"],
-        variants: &["smoothing=0.1", "warm_margin=0.1", "path=continuation"],
+        variants: &["smoothing=0.1", "warm_margin=0.1", "least_slope=0.2", "path=continuation"],
         settings: described::<Self>,
     };
 }
@@ -96,7 +105,8 @@ impl<P: Linearised<D> + Disked<D>, const D: usize> Solver<P> for OnContacts<Inte
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
         let state = problem.state(Access::Newton)?;
-        let (core, pursuit) = (Central::default(), Pursuit::default());
+        let core = Central::default().know_at_least(self.0.least_slope);
+        let pursuit = Pursuit::default();
         Ok(PursuedWork { state, core, pursuit, short: 0, since_best: 0 })
     }
 

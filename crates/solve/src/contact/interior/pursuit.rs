@@ -144,8 +144,6 @@ impl<L: DiskLaw<D>, const D: usize> Pursuit<L, D> {
             if short == MANY_SHORT {
                 self.end = End::Failed;
                 self.core.pairs.copy_from_slice(&self.kept);
-                // The path's tangents need the whole slope.
-                self.core.share = 1.0;
                 return Ok(self.core.look(problem, state, 1.0));
             }
             return Ok(now);

@@ -23,8 +23,8 @@
 //! from τ to 1/τ, and in this form none of them swamps W. Mehrotra's predictor gives `d = −λ`, the corrector
 //! `d = −λ + λ \ (σ τ e − (S dx) ∘ (S⁻¹ dz))`.
 //!
-//! The exact law is not monotone, and its steps may shrink to nothing where those of the convex problem (n = 0 in G) do not: where the boundary cuts a step short,
-//! it is computed anew with `G = I + γ e nᵀ`, γ < 1, which damps what is not monotone; s itself stays exact, so that the iterates converge to the law, linearly as long as γ < 1.
+//! The exact law is not monotone, and its steps may shrink to nothing where those of the convex problem (n = 0 in G) do not: where asked for, a step that the boundary cuts short
+//! is computed anew with `G = I + γ e nᵀ`, γ < 1, which damps what is not monotone; s itself stays exact, so that the iterates converge to the law, linearly as long as γ < 1.
 //!
 //! A contact with mu = 0 has the half line in its normal component and `r_T = 0`.
 //!
@@ -102,8 +102,9 @@ pub struct Central<L, const D: usize> {
     best: Vec<f64>,
     best_error: f64,
     now: Option<Iterate>,
-    /// The part of ∂s/∂z that the step knows, in (0, 1].
-    pub(in crate::contact) share: f64,
+    /// The part of ∂s/∂z that the step knows, in (0, 1], and the least.
+    share: f64,
+    least_share: f64,
 }
 
 impl<L, const D: usize> Default for Central<L, D> {
@@ -135,11 +136,18 @@ impl<L, const D: usize> Default for Central<L, D> {
             best_error: f64::INFINITY,
             now: None,
             share: 1.0,
+            least_share: 1.0,
         }
     }
 }
 
 impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
+    /// Steps that the boundary cuts short know a part of the slope of s only, at least this, in (0, 1]; 1, the default: always all of it.
+    pub fn know_at_least(mut self, share: f64) -> Self {
+        self.least_share = share;
+        self
+    }
+
     /// Begins with Coulomb's law. `smoothing` κ ≥ 0 makes `s = √(‖z_T‖² + (κτ)²)`.
     ///
     /// `start`: impulses to begin near, kept `margin` inside the cones; else `x = z = e`.
@@ -290,7 +298,7 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
             self.now.unwrap_or(Iterate { error: 1.0, tau: 1.0, residual: 1.0, alpha: 0.0 });
         let mut reach = self.direction(problem, state, &before)?;
         for _ in 0..RETRIES {
-            if reach >= CUT || !self.know_less() {
+            if reach >= CUT || !self.know_less(&before) {
                 break;
             }
             reach = self.direction(problem, state, &before)?;
@@ -298,7 +306,7 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         if reach >= LONG {
             self.share = (MORE * self.share).min(1.0);
         } else if reach < CUT {
-            self.know_less();
+            self.know_less(&before);
         }
         // Nearer to the boundary as the path ends, so that the tail is fast.
         let fraction = 1.0 - (0.1 * before.tau).clamp(1e-3, 1e-2);
@@ -343,10 +351,11 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         Ok(self.reach())
     }
 
-    /// A smaller share of the slope of the exact law; false where there is none to be had.
-    fn know_less(&mut self) -> bool {
-        let less = (LESS * self.share).max(LEAST_SHARE);
-        let changes = self.law == Some(Law::Coulomb) && less < self.share;
+    /// A smaller share of the slope of the exact law; false where there is none to be had, or where it would only slow down the end.
+    fn know_less(&mut self, before: &Iterate) -> bool {
+        let less = (LESS * self.share).max(self.least_share);
+        let far = before.error > AT_THE_END;
+        let changes = far && self.law == Some(Law::Coulomb) && less < self.share;
         if changes {
             self.share = less;
         }
@@ -774,12 +783,13 @@ const LEAD_OF_PART: f64 = 3.0;
 
 /// Steps below this are cut short,
 const CUT: f64 = 0.1;
-/// and above this long: the step may know more of the slope of s after a long one, by a factor, and knows less after one that is cut short, down to a least share; at once so many times.
+/// and above this long: the step may know more of the slope of s after a long one, by a factor, and knows less after one that is cut short; at once so many times.
 const LONG: f64 = 0.5;
 const MORE: f64 = 1.1;
 const LESS: f64 = 0.7;
-const LEAST_SHARE: f64 = 0.2;
 const RETRIES: usize = 3;
+/// Steps that are cut short at errors below this are so by rounding.
+const AT_THE_END: f64 = 1e-7;
 
 /// Of a start with two cones, which its r_N has already put inside: what is left to keep either off its boundary.
 const LEAST_MARGIN: f64 = 1e-3;
