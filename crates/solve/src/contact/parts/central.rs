@@ -298,7 +298,7 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
             self.now.unwrap_or(Iterate { error: 1.0, tau: 1.0, residual: 1.0, alpha: 0.0 });
         let mut reach = self.direction(problem, state, &before)?;
         for _ in 0..RETRIES {
-            if reach >= CUT || !self.know_less(&before) {
+            if reach >= CUT || !self.know_less() {
                 break;
             }
             reach = self.direction(problem, state, &before)?;
@@ -306,7 +306,7 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         if reach >= LONG {
             self.share = (MORE * self.share).min(1.0);
         } else if reach < CUT {
-            self.know_less(&before);
+            self.know_less();
         }
         // Nearer to the boundary as the path ends, so that the tail is fast.
         let fraction = 1.0 - (0.1 * before.tau).clamp(1e-3, 1e-2);
@@ -351,11 +351,10 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         Ok(self.reach())
     }
 
-    /// A smaller share of the slope of the exact law; false where there is none to be had, or where it would only slow down the end.
-    fn know_less(&mut self, before: &Iterate) -> bool {
+    /// A smaller share of the slope of the exact law; false where there is none to be had.
+    fn know_less(&mut self) -> bool {
         let less = (LESS * self.share).max(self.least_share);
-        let far = before.error > AT_THE_END;
-        let changes = far && self.law == Some(Law::Coulomb) && less < self.share;
+        let changes = self.law == Some(Law::Coulomb) && less < self.share;
         if changes {
             self.share = less;
         }
@@ -788,8 +787,6 @@ const LONG: f64 = 0.5;
 const MORE: f64 = 1.1;
 const LESS: f64 = 0.7;
 const RETRIES: usize = 3;
-/// Steps that are cut short at errors below this are so by rounding.
-const AT_THE_END: f64 = 1e-7;
 
 /// Of a start with two cones, which its r_N has already put inside: what is left to keep either off its boundary.
 const LEAST_MARGIN: f64 = 1e-3;
