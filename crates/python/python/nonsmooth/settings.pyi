@@ -536,6 +536,9 @@ class Ip(Settings):
     warm_margin : float, default 0.0
         Begin near the starting point, this far inside the cones in units of the free velocity; 0
         for a cold start.
+    least_slope : float, default 1.0
+        Where the boundary cuts a step short, it is computed anew with a part of the slope of ‖u_T‖,
+        at least this, in (0, 1]; 1: always all. Not with continuation.
     patience : int, default 30
         Steps without a smaller residual after which it gives up.
 
@@ -548,6 +551,7 @@ class Ip(Settings):
         path: Literal['mehrotra', 'continuation'] = ...,
         smoothing: float = ...,
         warm_margin: float = ...,
+        least_slope: float = ...,
         patience: int = ...,
     ) -> None: ...
 
