@@ -218,3 +218,63 @@ fn closed_without_a_limit_nothing_holds() {
     let angle = 1e4 * 2.0 * (0.5e-3_f64).atan();
     near(oscillator.state().q[0], angle.cos(), 1e-9);
 }
+
+/// The rocking block for small angles, after its symmetry: `θ'' = −p² (α − θ)`, and from θ = 0 it rises on the other edge with η times the speed.
+struct Rocking {
+    p: f64,
+    alpha: f64,
+    eta: f64,
+}
+
+impl Lagrangian<2> for Rocking {
+    fn size(&self) -> Size {
+        Size::new(1).rows(1)
+    }
+    fn mass(&self, _: &[f64], mass: &mut Dense) {
+        mass[(0, 0)] = 1.0;
+    }
+    fn force(&self, _: f64, q: &[f64], _: &[f64], force: &mut [f64]) {
+        force[0] = -self.p * self.p * (self.alpha - q[0]);
+    }
+    fn potential(&self, _: f64, q: &[f64]) -> f64 {
+        self.p * self.p * (self.alpha * q[0] - 0.5 * q[0] * q[0])
+    }
+    fn rows(&self, _: f64, q: &[f64], gap: &mut [f64]) {
+        gap[0] = q[0];
+    }
+    fn row_law(&self, _: usize, _: f64, _: &[f64], _: &[f64]) -> RowLaw {
+        RowLaw::Limit { e: self.eta }
+    }
+}
+
+/// Housner's period `(4/p) acosh(1/(1 − θ₀/α))`, and the amplitude after each impact, `1 − θₙ₊₁/α = √(1 − η² (1 − (1 − θₙ/α)²))`.
+#[test]
+fn a_block_rocks_with_housners_linear_period() {
+    let (b, c, h) = (0.1_f64, 0.4_f64, 2e-5);
+    let alpha = (b / c).atan();
+    let p = (0.75 * 9.81 / (b * b + c * c).sqrt()).sqrt();
+    near(p, 4.224282023261, 1e-12);
+    near(alpha, 0.244978663127, 1e-12);
+    let eta = 1.0 - 1.5 * alpha.sin().powi(2);
+    let to_fall = |left: f64| (1.0 / left).acosh() / p;
+    for (part, period) in [(0.5, 1.247035959884), (0.25, 0.753136705214)] {
+        near(4.0 * to_fall(1.0 - part), period, 1e-11);
+        let block = Rocking { p, alpha, eta };
+        let mut block =
+            LagrangianSimulation::new(block, theta(0.5), &[part * alpha], &[0.0]).unwrap();
+        let mut impacts = vec![];
+        let mut watch = |s: &LagrangianSimulation<Rocking, 2>, _: &StepReport| {
+            if s.row_impulses()[0] > 0.0 {
+                impacts.push(s.state().t);
+            }
+            if impacts.len() < 4 { Control::Continue } else { Control::Stop }
+        };
+        check(&block.run(4.0, h, &mut watch).unwrap());
+        near(4.0 * impacts[0], period, 10.0 * h);
+        let mut left: f64 = 1.0 - part;
+        for pair in impacts.windows(2) {
+            left = (1.0 - eta * eta * (1.0 - left * left)).sqrt();
+            near(pair[1] - pair[0], 2.0 * to_fall(left), 10.0 * h);
+        }
+    }
+}

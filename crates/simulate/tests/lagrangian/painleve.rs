@@ -71,3 +71,28 @@ fn a_rod_in_painleves_region_steps_on() {
     }
     assert!(jumps >= 4, "{jumps}");
 }
+
+/// `A(θ) = e_Nᵀ H M⁻¹ Hᵀ (e_N − mu e_T)` reaches zero for mu ≥ 4/3 only, first where tan θ = 2.
+#[test]
+fn the_region_opens_at_four_thirds_and_63_degrees() {
+    let ease = |mu: f64, angle: f64| {
+        let (mut h, mut mass) = (Dense::zeros(2, 3), Dense::zeros(3, 3));
+        let rod = Rod { mu };
+        let q = [0.0, angle.sin(), angle];
+        rod.mass(&q, &mut mass);
+        assert!(rod.directions(0.0, &q, &mut h));
+        let through = |k: usize| h[(0, k)] * (h[(0, k)] + mu * h[(1, k)]) / mass[(k, k)];
+        (0..3).map(through).sum::<f64>()
+    };
+    let least = |mu: f64| {
+        let angles = (0..=90_000).map(|k| (f64::from(k) * 1e-3).to_radians());
+        angles
+            .map(|angle| (ease(mu, angle), angle))
+            .fold((f64::MAX, 0.0), |a, b| if b.0 < a.0 { b } else { a })
+    };
+    let (value, angle) = least(4.0 / 3.0);
+    crate::near(value, 0.0, 1e-9);
+    crate::near(angle.to_degrees(), 63.434949, 1e-3);
+    crate::near(ease(4.0 / 3.0, 63.434949_f64.to_radians()), 0.0, 1e-12);
+    assert!(least(4.0 / 3.0 - 1e-6).0 > 0.0 && least(4.0 / 3.0 + 1e-6).0 < 0.0);
+}

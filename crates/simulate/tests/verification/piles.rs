@@ -1,8 +1,10 @@
 //! Scenes of `gen` in motion: what should stand stands.
 
+use nonsmooth_problem::Friction;
 use nonsmooth_scenes::scenes::{Arch, Family, SCENES, SpherePile, Stack};
 use nonsmooth_simulate::{Body, Control, MoreauJean, SceneFile, Simulation, StepReport, World};
 use nonsmooth_solve::settings::SettingsMap;
+use nonsmooth_solve::{Limits, existence, solve};
 
 use crate::{ball, check, simulation, world};
 
@@ -63,7 +65,15 @@ fn arch(blocks: usize, share: f64, mu: f64) -> nonsmooth_scenes::Scene {
 /// matters where they are few: of sectors of a ring 7 stand from 0.0962 on, 9 from 0.1021.
 #[test]
 fn arches_of_any_number_of_voussoirs_stand_or_fall_as_limit_analysis_says() {
-    let least = [(7, 0.095703), (9, 0.101525), (11, 0.104589), (21, 0.106695), (31, 0.107130)];
+    let least = [
+        (7, 0.095703),
+        (9, 0.101525),
+        (11, 0.104589),
+        (21, 0.106695),
+        (31, 0.107130),
+        (64, 0.107394),
+        (128, 0.107468),
+    ];
     let thick =
         least.map(|(n, share)| [(n, share * 1.005, 1.0, true), (n, share * 0.995, 1.0, false)]);
     let rough = [(15, 0.12, 0.37804), (15, 0.20, 0.30899), (31, 0.15, 0.35021)];
@@ -88,6 +98,21 @@ fn an_arch_stands_or_falls_by_its_thickness_and_friction() {
         let far = moved(&arch(15, share, mu), 3.0, 1e-2);
         assert_eq!(far < 1e-6, stands, "{share} {mu}: {far:e}");
         assert!(stands || far > 1e-3, "{share} {mu}: {far:e}");
+    }
+}
+
+/// Nothing pushes from outside, so that both problems have solutions, and `exists` says so; with `v = 0`, equilibrium, only that of the arch which stands.
+#[test]
+fn a_solution_at_rest_is_an_equilibrium_of_an_arch() {
+    for (share, stands) in [(0.106266 * 1.005, true), (0.106266 * 0.995, false)] {
+        let problem = arch(15, share, 1.0).problem().unwrap();
+        let existence =
+            existence::of_contacts(&Friction::Global3(problem.clone()), &Limits::default());
+        assert!(existence.is_proved(), "{existence:?}");
+        let answer = solve(&problem).unwrap();
+        assert!(answer.is_solved());
+        let fastest = answer.point.v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        assert_eq!(fastest < 1e-6, stands, "{share}: {fastest:e}");
     }
 }
 

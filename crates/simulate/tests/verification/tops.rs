@@ -1,7 +1,9 @@
 //! Tops: steady precession of a heavy one, and what the tippe top keeps.
 
 use nonsmooth_scenes::Rotation;
-use nonsmooth_simulate::{Body, BodyId, Joint, Part, Shape, Simulation, World};
+use nonsmooth_simulate::{
+    Body, BodyId, Joint, MoreauJean, Part, Shape, SimulateError, Simulation, World,
+};
 
 use crate::{G, near, run, simulation};
 
@@ -44,6 +46,42 @@ fn a_heavy_top_precesses_steadily() {
         assert!(fine < 1e-4, "{omega}: {fine:e}");
         assert!(fine < 0.2 * coarse || coarse < 1e-9, "{omega}: {coarse:e} {fine:e}");
     }
+}
+
+/// Over the sphere of radius R₁, centre a₁ up the axis, the stem's end of radius R₂, centre a₂, hangs until `cos θ = −(R₁ − R₂)/(a₂ − a₁)`.
+#[test]
+fn the_stem_of_a_tippe_top_touches_at_140_degrees() {
+    let (r1, a1, r2, a2) = (0.015, 0.003, 0.005, 0.016);
+    let touches: f64 = -0.769231;
+    let turned = |cosine: f64| {
+        let mut world = World::new([0.0; 3]);
+        world.add(Body::floor());
+        let ball = |radius: f64, z: f64| Part {
+            position: [0.0, 0.0, z],
+            ..Part::new(Shape::Sphere { radius })
+        };
+        let top = symmetric(6e-3, 8e-7, 7e-7, vec![ball(r1, a1), ball(r2, a2)])
+            .at([0.0, 0.0, r1 - a1 * cosine])
+            .turned(Rotation::about(Y, cosine.acos()));
+        world.add(top);
+        Simulation::new(world, MoreauJean::default())
+    };
+    let gaps = |cosine: f64| {
+        let mut simulation = turned(cosine).unwrap();
+        assert!(simulation.step(1e-3).unwrap().status.is_solved());
+        let mut gaps: Vec<f64> = simulation.contacts().iter().map(|c| c.gap).collect();
+        gaps.sort_by(f64::total_cmp);
+        gaps
+    };
+    let at = gaps(touches);
+    assert!(at.len() == 2 && at.iter().all(|g| g.abs() < 1e-8), "{at:?}");
+    // As much less turned it touches nothing, and turned further it would be deep, which is no start.
+    assert_eq!(gaps(touches + 1e-4).len(), 1);
+    match turned(touches - 1e-4) {
+        Err(SimulateError::Overlap(pairs)) => near(pairs[0].depth, 1.3e-6, 1e-8),
+        other => panic!("{:?}", other.map(|_| "no overlap")),
+    }
+    near(touches.acos().to_degrees(), 140.28, 5e-3);
 }
 
 /// Jellett's integral `L · (R₁ e_z − a₁ e₃)` is kept by every force at the contact of a sphere of radius R₁ about a point of the axis a₁ above the mass centre.
