@@ -62,6 +62,30 @@ pub fn eigen<const D: usize>(w: &[[f64; D]; D]) -> ([f64; D], [[f64; D]; D]) {
     (std::array::from_fn(|k| a[k][k]), v)
 }
 
+/// The determinant, by elimination with partial pivoting.
+pub fn determinant<const D: usize>(a: &[[f64; D]; D]) -> f64 {
+    let mut m = *a;
+    let mut product = 1.0;
+    for k in 0..D {
+        let p = (k..D).fold(k, |p, i| if m[i][k].abs() > m[p][k].abs() { i } else { p });
+        if p != k {
+            m.swap(k, p);
+            product = -product;
+        }
+        product *= m[k][k];
+        if product == 0.0 {
+            return 0.0;
+        }
+        for i in k + 1..D {
+            let f = m[i][k] / m[k][k];
+            for j in k..D {
+                m[i][j] -= f * m[k][j];
+            }
+        }
+    }
+    product
+}
+
 /// The inverse by Gauss–Jordan elimination with partial pivoting, or `None` where a pivot vanishes
 /// relative to the largest entry of the block.
 pub fn inverse<const D: usize>(a: &[[f64; D]; D]) -> Option<[[f64; D]; D]> {
@@ -128,6 +152,18 @@ mod tests {
                 assert!((column[j] - f64::from(u8::from(i == j))).abs() < 1e-14);
             }
         }
+    }
+
+    #[test]
+    fn determinants_are_those_of_the_rule_of_sarrus() {
+        let a = [[0.0, 2.0, 1.0], [1.0, -3.0, 0.5], [4.0, 0.1, 2.0]];
+        let triple = |i: usize, j: usize, k: usize| a[0][i] * a[1][j] * a[2][k];
+        let even = triple(0, 1, 2) + triple(1, 2, 0) + triple(2, 0, 1);
+        let odd = triple(2, 1, 0) + triple(1, 0, 2) + triple(0, 2, 1);
+        assert!((determinant(&a) - (even - odd)).abs() < 1e-14);
+        assert_eq!(determinant(&[[1.0, 2.0], [2.0, 4.0]]), 0.0);
+        assert_eq!(determinant(&[[0.0, 1.0], [1.0, 0.0]]), -1.0);
+        assert_eq!(determinant::<0>(&[]), 1.0);
     }
 
     #[test]

@@ -2,9 +2,11 @@
 
 mod common;
 
+use common::{run, within};
 use nonsmooth_io::fclib;
 use nonsmooth_problem::{Friction, Problem};
-use nonsmooth_solve::{Limits, registry};
+use nonsmooth_scenes::scenes::{Family, State, Wall};
+use nonsmooth_solve::{Limits, Status, registry};
 
 /// The names of the problems among Siconos' that `ip` solves to 1e-12, and how many there are.
 fn solved(setting: &str) -> (Vec<String>, usize) {
@@ -22,6 +24,21 @@ fn solved(setting: &str) -> (Vec<String>, usize) {
         }
     }
     (names, all)
+}
+
+/// Where contacts stick and slip in turn the path turns back, and has kinks that δ makes smooth.
+#[test]
+fn the_arc_length_goes_through_shaken_walls() {
+    let wall = Wall { rows: 24, columns: 24, state: State::Perturbed, ..Wall::default() };
+    let problem = wall.build().unwrap().problem().unwrap();
+    let solved = |settings: &[&str]| {
+        let limits = Limits { max_iterations: 200, ..within(1e-8, 60.0) };
+        run(&problem, "ip", settings, &limits).outcome
+    };
+    let pursued = solved(&["path=continuation", "smoothing=0.5", "patience=60"]);
+    assert_eq!(pursued.status, Status::Solved, "{}", pursued.measure.relative);
+    let monotone = solved(&["path=mehrotra", "patience=60"]);
+    assert!(monotone.measure.relative > 1e-5, "{}", monotone.measure.relative);
 }
 
 #[test]

@@ -64,6 +64,8 @@ impl At {
 pub(super) struct Pivots {
     pub perturbed: usize,
     pub broken: bool,
+    /// Whether their determinant is negative.
+    pub negative: bool,
 }
 
 impl Pivots {
@@ -71,6 +73,7 @@ impl Pivots {
     pub(super) fn add(&mut self, other: Self) {
         self.perturbed += other.perturbed;
         self.broken |= other.broken;
+        self.negative ^= other.negative;
     }
 }
 

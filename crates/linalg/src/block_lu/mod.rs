@@ -87,6 +87,7 @@ pub struct BlockLu {
     x: Vec<f64>,
     z: Vec<f64>,
     perturbed: usize,
+    negative: bool,
 }
 
 impl BlockLu {
@@ -118,6 +119,7 @@ impl BlockLu {
             x: vec![0.0; n],
             z: vec![0.0; symbolic.widest],
             perturbed: 0,
+            negative: false,
             symbolic,
         })
     }
@@ -232,6 +234,11 @@ impl BlockLu {
         self.perturbed
     }
 
+    /// The sign of the determinant of what was last factorised, 1 or −1; of a matrix with replaced pivots that of the one in its place.
+    pub fn sign(&self) -> f64 {
+        if self.negative { -1.0 } else { 1.0 }
+    }
+
     /// Factorises the values added so far, which stay.
     ///
     /// Rows and columns are scaled by powers of two to a largest entry of about one; a pivot below ε^(3/4) of that becomes
@@ -258,6 +265,7 @@ impl BlockLu {
             Singular
         })?;
         self.perturbed = outcome.perturbed;
+        self.negative = outcome.negative;
         if outcome.broken { Err(Singular) } else { Ok(()) }
     }
 

@@ -51,14 +51,16 @@ impl Sample {
         self.dense.chunks(self.n).map(|row| row.iter().zip(x).map(|(a, x)| a * x).sum()).collect()
     }
 
-    /// The solution for a right-hand side, by dense elimination with partial pivoting.
-    fn dense_solution(&self, b: &[f64]) -> Vec<f64> {
+    /// The solution for a right-hand side, by dense elimination with partial pivoting; and the sign of the determinant.
+    fn dense_solution(&self, b: &[f64]) -> (Vec<f64>, f64) {
         let n = self.n;
         let (mut a, mut x) = (self.dense.clone(), b.to_vec());
+        let mut sign = 1.0;
         for k in 0..n {
             let p = (k..n)
                 .max_by(|&i, &j| a[i * n + k].abs().total_cmp(&a[j * n + k].abs()))
                 .expect("not empty");
+            sign *= if p == k { 1.0 } else { -1.0 } * a[p * n + k].signum();
             for j in 0..n {
                 a.swap(k * n + j, p * n + j);
             }
@@ -75,7 +77,7 @@ impl Sample {
             let tail: f64 = (i + 1..n).map(|j| a[i * n + j] * x[j]).sum();
             x[i] = (x[i] - tail) / a[i * n + i];
         }
-        x
+        (x, sign)
     }
 
     /// ‖b − A x‖ / ‖b‖ after a solve, with `steps` of refinement.
@@ -149,11 +151,12 @@ fn every_pattern_agrees_with_dense_elimination_on_every_instruction_set() {
             if (i, r) == (j, c) { x + 4.0 } else { x }
         });
         let b: Vec<f64> = (0..s.n).map(|_| rng.random_range(-1.0..1.0)).collect();
-        let expected = s.dense_solution(&b);
+        let (expected, sign) = s.dense_solution(&b);
         for simd in Simd::all() {
             s.lu.simd = simd;
             s.lu.factorise().unwrap();
             assert_eq!(s.lu.perturbed(), 0, "{name}");
+            assert_eq!(s.lu.sign(), sign, "{name}, {simd:?}");
             let (x, residual) = s.residual(&b, 0);
             assert!(residual < 1e-11, "{name}, {simd:?}: {residual:e}");
             let (_, refined) = s.residual(&b, 1);
@@ -193,6 +196,31 @@ proptest::proptest! {
         proptest::prop_assert!(residual < 1e-10, "{:e}", residual);
         proptest::prop_assert_eq!(s.lu.perturbed(), 0);
     }
+}
+
+/// Rows that change places change the sign, one pair after the other; so does one that is turned round.
+#[test]
+fn the_sign_of_the_determinant_is_that_of_dense_elimination() {
+    let mut rng = Pcg64::seed_from_u64(6);
+    let mut of_each = [0; 2];
+    for (name, sizes, edges) in patterns(&mut rng) {
+        for k in 0..4 {
+            // Pivots of either sign, to be sought within their block.
+            let mut s = sample(&sizes, &edges, |i, r, j, c| {
+                let x: f64 = rng.random_range(-1.0..1.0);
+                let pivot = i == j && (r + 1 + k) % sizes[i] == c;
+                if pivot { x + if (i + c) % 3 == 0 { -4.0 } else { 4.0 } } else { x }
+            });
+            s.lu.factorise().unwrap();
+            if s.lu.perturbed() > 0 {
+                continue;
+            }
+            let (_, sign) = s.dense_solution(&vec![1.0; s.n]);
+            assert_eq!(s.lu.sign(), sign, "{name}, {k}");
+            of_each[usize::from(sign > 0.0)] += 1;
+        }
+    }
+    assert!(of_each[0] >= 20 && of_each[1] >= 20, "{of_each:?}");
 }
 
 #[test]
@@ -414,6 +442,7 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
                 assert_eq!(bits(&shared.upper), bits(&alone.upper));
                 assert_eq!(bits(&shared.inverses), bits(&alone.inverses));
                 assert_eq!((&shared.swaps, shared.perturbed), (&alone.swaps, alone.perturbed));
+                assert_eq!(shared.sign(), alone.sign());
                 shared.factorise().unwrap();
             }
         }

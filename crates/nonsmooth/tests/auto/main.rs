@@ -173,6 +173,18 @@ fn hyperstatic_up_to_seven() {
     none(failed);
 }
 
+/// Newton's iterations and the interior point come to rest above 1e-4.
+#[test]
+fn a_shaken_wall_is_solved_along_its_central_path() {
+    let wall = Wall { rows: 24, columns: 24, state: State::Perturbed, ..Wall::default() };
+    let problem = wall.build().unwrap().problem().unwrap();
+    let end = run(&problem, "auto", &[], &within(1e-8, 60.0));
+    assert_eq!(end.outcome.status, Status::Solved, "{}", end.outcome.measure.relative);
+    assert!(end.outcome.factorisations < 1000, "{}", end.outcome.factorisations);
+    let along = end.account.iter().any(|line| line.contains("along the central path"));
+    assert!(along, "{:?}", end.account);
+}
+
 /// The same planted solution with `W + K`: entries of `W` moved by `size`, relatively; antisymmetrically where `skew`.
 fn nonsymmetric(case: &Planted, size: f64, skew: bool) -> FrictionLocal<3> {
     let (mut problem, point) = case.local::<3>();

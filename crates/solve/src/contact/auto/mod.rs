@@ -16,8 +16,10 @@
 //!    easily, and rises where they are not. It keeps full accuracy on hyperstatic problems.
 //! 6. **Sweeps between the proximal steps**, while they help: they move the impulses within the null space of W, which Newton leaves
 //!    where they are. After a trial in vain from near a solution they come first.
-//! 7. **Alternating directions** (`alternating.rs`) after many proximal steps, for as long as they promise more.
-//! 8. **Another strategy** (other ρ, more sweeps, a cold start) where the error has not halved for long; at the first time
+//! 7. **The central path by its arc length** ([`Pursuit`]), where Newton's iterations promise to be many: it turns back with the
+//!    path where stage 4 is stuck. Up to three times, each time smoothed by less and for longer. Walls that are shaken end here.
+//! 8. **Alternating directions** (`alternating.rs`) after many proximal steps, for as long as they promise more.
+//! 9. **Another strategy** (other ρ, more sweeps, a cold start) where the error has not halved for long; at the first time
 //!    the existence of a solution is investigated, and a problem without one is given up with its certificate.
 //!
 //! A problem with scalar rows that have bounds stays with the sweeps, which visit them too: the later stages know no bounds.
@@ -28,7 +30,7 @@
 //! parts' own files.
 //!
 //! Cost: a sweep is one pass over W; an iteration of 3 to 5 one factorisation of a matrix over the bodies (global) or the contacts
-//! (local). The choice goes by counted operations, never by the clock, so a run repeats itself bit by bit.
+//! (local), a step of 7 two or three. The choice goes by counted operations, never by the clock, so a run repeats itself bit by bit.
 //! Fails: impacts on thousands of hyperstatic contacts may need more factorisations than patience allows.
 
 mod alternating;
@@ -45,13 +47,14 @@ use serde::{Deserialize, Serialize};
 use crate::contact::auto::proximal_newton::ProximalNewton;
 use crate::contact::existence;
 use crate::contact::form::{Access, Costs, Disked, Linearised, OnContacts, has_bounds};
-use crate::contact::parts::{Central, Sweep, put_within_bounds, sweep_rows};
+use crate::contact::parts::{Central, Pursuit, Sweep, put_within_bounds, sweep_rows};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{Limits, SolveError, Solver, Step};
 use alternating::Alternating;
 use controller::{Controller, Verdict};
 use rate::Rate;
+use starts::Halvings;
 
 /// The hyperparameters of `auto`; none needs to be set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -114,6 +117,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     sweep: Sweep<P::Law, D>,
     alternating: Option<Box<Alternating<D>>>,
     central: Option<Box<Central<P::Law, D>>>,
+    pursuit: Option<Box<Pursuit<P::Law, D>>>,
     newton: Option<Box<ProximalNewton<P::Law, D>>>,
     controller: Controller,
     costs: Option<Costs>,
@@ -148,9 +152,10 @@ enum Stage {
     Sweeps { claims: usize },
     Rest,
     Trial { idle: usize, least: f64, rescues: usize },
-    Interior { idle: usize, short: usize, least: f64 },
+    Interior { halvings: Halvings, short: usize },
     Newton,
     Between { left: usize },
+    Pursuit { halvings: Halvings, most: usize },
     Alternating,
 }
 
@@ -179,6 +184,10 @@ struct Done {
     failed: usize,
     newton: usize,
     between: usize,
+    /// How often, the steps of all, and the error of the last.
+    pursuits: usize,
+    pursued: usize,
+    pursued_error: f64,
     /// How often, and how many iterations in all.
     alternations: usize,
     alternating: usize,
@@ -198,6 +207,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             sweep: Sweep::new(problem, &state),
             alternating: None,
             central: None,
+            pursuit: None,
             newton: None,
             controller: Controller::default(),
             costs: None,
@@ -267,6 +277,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             Stage::Interior { .. } => self.interior(problem, point, work),
             Stage::Newton => self.newton(problem, point, work),
             Stage::Between { left } => self.between(problem, point, work, left),
+            Stage::Pursuit { .. } => self.pursue(problem, point, work),
             Stage::Alternating => self.alternate(problem, point, work),
         }
     }
@@ -286,6 +297,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
     fn account(&self, work: &Self::Work) -> Vec<String> {
         let Done { start, sweeps, rest, trial, interior, interior_error, .. } = work.done;
         let Done { subproblems, failed, newton, between, alternating, .. } = work.done;
+        let Done { pursued, pursued_error, .. } = work.done;
         let mut lines = vec![];
         match start {
             Start::Zero => {}
@@ -318,6 +330,9 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
                 "{subproblems} proximal subproblems ({failed} not solved, last epsilon \
                  {epsilon:.0e}) in {newton} Newton iterations, {between} sweeps between them"
             ));
+        }
+        if pursued > 0 {
+            lines.push(format!("{pursued} steps along the central path, to {pursued_error:.1e}"));
         }
         if alternating > 0 {
             lines.push(format!("{alternating} iterations of alternating directions"));
@@ -542,6 +557,9 @@ impl<const D: usize> OnContacts<Auto, D> {
             starts::begin_interior(problem, work);
             return Step::Continue { estimate: error };
         }
+        if self.pursuit_is_due(work, error) {
+            return self.begin_pursuit(problem, work, error);
+        }
         if self.alternation_is_due(work) {
             return self.begin_alternating(problem, point, work, error);
         }
@@ -641,7 +659,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         }
     }
 
-    /// Stage 8. The first time it is asked whether there is a solution at all.
+    /// Stage 9. The first time it is asked whether there is a solution at all.
     fn other_strategy<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,

@@ -5,7 +5,8 @@ use nonsmooth_linalg::budget;
 use nonsmooth_problem::check::Kinematic;
 
 use super::alternating::Way;
-use super::{Auto, FIRST, FIRST_SWEEPS, HybridWork, NEAR, NEWTON, Stage, runs_away};
+use super::controller::Controller;
+use super::{Auto, Done, FIRST, FIRST_SWEEPS, HybridWork, NEAR, NEWTON, Stage, runs_away};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
 use crate::contact::parts::Central;
@@ -40,6 +41,24 @@ const INTERIOR_ERROR: f64 = 1e-8;
 const INTERIOR_IDLE: usize = 10;
 const INTERIOR_SLOPE: f64 = 0.2;
 const INTERIOR_SHORT: (f64, usize) = (1e-6, 6);
+/// The central path is followed by its arc length after so many Newton iterations that promise to take so many more since the
+/// interior point, with `δ = κθ`, where W has little spread: in piles and flows the path turns too often. It ends below the error
+/// of the interior point, or after so many steps that did not halve its own. Another κ has another path, and which of them leads
+/// to the end cannot be foreseen; where one came no nearer than this, the others are not tried.
+const PURSUITS: [Chase; 3] = [
+    Chase { after: 30, smoothing: 0.5, idle: 40 },
+    Chase { after: 90, smoothing: 0.25, idle: 160 },
+    Chase { after: 200, smoothing: 0.1, idle: 320 },
+];
+const PURSUE_COST: f64 = 60.0;
+const PURSUE_AGAIN: f64 = 1e-3;
+
+struct Chase {
+    after: usize,
+    smoothing: f64,
+    idle: usize,
+}
+
 /// Alternating directions are tried after so many Newton iterations, and, from the other start, again after so many.
 const ALTERNATE_AFTER: [usize; 2] = [40, 160];
 /// They start from the present impulses below this error, else from none: once, and once the other way.
@@ -245,36 +264,95 @@ impl<const D: usize> OnContacts<Auto, D> {
         work: &mut HybridWork<P, D>,
     ) -> Step {
         let HybridWork { central, state, stage, done, tolerance, controller, .. } = work;
-        let (Some(central), Stage::Interior { idle, short, least }) = (central, stage) else {
+        let (Some(central), Stage::Interior { halvings, short }) = (central, stage) else {
             return lost();
         };
         let ended = match central.iterate(problem, state) {
             Err(_) => true,
             Ok(now) => {
                 done.interior += 1;
-                *idle += 1;
-                if now.error < 0.5 * *least {
-                    (*idle, *least) = (0, now.error);
-                }
+                let idle = halvings.idle_at(now.error);
                 *short = if now.alpha < INTERIOR_SHORT.0 { *short + 1 } else { 0 };
                 now.error <= tolerance.max(INTERIOR_ERROR)
-                    || *idle >= INTERIOR_IDLE
+                    || idle >= INTERIOR_IDLE
                     || *short >= INTERIOR_SHORT.1
                     || done.interior >= INTERIOR
             }
         };
-        let (r, error) = central.best();
-        done.interior_error = error;
+        let best = central.best();
+        done.interior_error = best.1;
+        let estimate = best.1;
         if ended {
-            if controller.offer(error) {
-                P::impulses(point).copy_from_slice(r);
-            }
+            take(best, controller, P::impulses(point));
             self.subproblem_here(problem, point, work);
         }
+        Step::Continue { estimate }
+    }
+
+    /// Whether stage 7 comes now: Newton's iterations since stage 4 promise to be many.
+    pub(super) fn pursuit_is_due<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        work: &HybridWork<P, D>,
+        error: f64,
+    ) -> bool {
+        let Done { interior, interior_error, newton, pursuits, pursued_error, .. } = work.done;
+        let far = pursuits > 0 && pursued_error > PURSUE_AGAIN;
+        let may = interior > 0 && !work.spread && !far && error > work.tolerance;
+        let next = PURSUITS.get(pursuits);
+        if !may || next.is_none_or(|next| newton < next.after) {
+            return false;
+        }
+        let fall = (interior_error / error).ln() / newton as f64;
+        fall <= 0.0 || (error / work.tolerance).ln() / fall > PURSUE_COST
+    }
+
+    /// Begins stage 7.
+    pub(super) fn begin_pursuit<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        work: &mut HybridWork<P, D>,
+        error: f64,
+    ) -> Step {
+        let HybridWork { pursuit, state, stage, done, .. } = work;
+        let Some(&Chase { smoothing, idle, .. }) = PURSUITS.get(done.pursuits) else {
+            return lost();
+        };
+        done.pursuits += 1;
+        let now = pursuit.get_or_insert_default().begin(problem, state, smoothing, None);
+        *stage = Stage::Pursuit { halvings: Halvings::from(now.error), most: idle };
         Step::Continue { estimate: error }
     }
 
-    /// Whether stage 7 comes now.
+    /// Stage 7: one step along the path; at its end the better of its best iterate and the present point goes on.
+    pub(super) fn pursue<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) -> Step {
+        let HybridWork { pursuit, state, stage, done, tolerance, controller, .. } = work;
+        let (Some(path), Stage::Pursuit { halvings, most }) = (pursuit, stage) else {
+            return lost();
+        };
+        done.pursued += 1;
+        let ended = match path.iterate(problem, state) {
+            Err(_) => true,
+            Ok(now) => {
+                let idle = halvings.idle_at(now.error);
+                now.error <= tolerance.max(INTERIOR_ERROR) || idle >= *most || path.stuck()
+            }
+        };
+        let best = path.core().best();
+        done.pursued_error = best.1;
+        let estimate = best.1;
+        if ended {
+            take(best, controller, P::impulses(point));
+            self.subproblem_here(problem, point, work);
+        }
+        Step::Continue { estimate }
+    }
+
+    /// Whether stage 8 comes now.
     pub(super) fn alternation_is_due<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         work: &HybridWork<P, D>,
@@ -283,7 +361,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         after.is_some_and(|&after| work.done.newton >= after)
     }
 
-    /// Begins stage 7 from a point with this error, or from none.
+    /// Begins stage 8 from a point with this error, or from none.
     pub(super) fn begin_alternating<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
@@ -304,7 +382,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         Step::Continue { estimate: error }
     }
 
-    /// Stage 7: one iteration of alternating directions.
+    /// Stage 8: one iteration of alternating directions.
     pub(super) fn alternate<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
@@ -376,6 +454,33 @@ impl<const D: usize> OnContacts<Auto, D> {
     }
 }
 
+/// The impulses of an iterate with its error become the point's where they are better.
+fn take((theirs, error): (&[f64], f64), controller: &mut Controller, ours: &mut [f64]) {
+    if controller.offer(error) {
+        ours.copy_from_slice(theirs);
+    }
+}
+
+/// How an error falls by halves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Halvings {
+    least: f64,
+    idle: usize,
+}
+
+impl Halvings {
+    fn from(error: f64) -> Self {
+        Self { least: error, idle: 0 }
+    }
+
+    /// How many errors up to this one there have been since the last halving.
+    fn idle_at(&mut self, error: f64) -> usize {
+        let halved = error < 0.5 * self.least;
+        *self = if halved { Self::from(error) } else { Self { idle: self.idle + 1, ..*self } };
+        self.idle
+    }
+}
+
 /// A stage without its part, which cannot be.
 fn lost() -> Step {
     Step::Stuck("auto has lost its place".into())
@@ -390,5 +495,5 @@ pub(super) fn begin_interior<P: Linearised<D> + Disked<D>, const D: usize>(
     let HybridWork { central, state, stage, .. } = work;
     let part = || Box::new(Central::default().know_at_least(INTERIOR_SLOPE));
     let now = central.get_or_insert_with(part).begin(problem, state, 0.0, None);
-    *stage = Stage::Interior { idle: 0, short: 0, least: now.error };
+    *stage = Stage::Interior { halvings: Halvings::from(now.error), short: 0 };
 }

@@ -346,6 +346,14 @@ impl<const D: usize, L: DiskLaw<D>> Linearised<D> for FrictionGlobal<D, L> {
         }
     }
 
+    fn orientation(&self, state: &mut Self::State) -> f64 {
+        match there(&mut state.system) {
+            Some(GlobalSystem::Bodies(system)) => system.sign(),
+            Some(GlobalSystem::Contacts(system)) => system.sign(),
+            None => f64::NAN,
+        }
+    }
+
     fn solve_linearised(
         &self,
         state: &mut Self::State,

@@ -53,6 +53,8 @@ pub(super) struct System<F, const D: usize> {
 pub(super) trait Form<const D: usize> {
     /// Factorises `Q + P W`.
     fn factorise(&mut self, p: &[Block<D>], q: &[Block<D>]) -> Result<(), Singular>;
+    /// The sign of the determinant of what was factorised, up to one that is always the same.
+    fn sign(&self) -> f64;
     /// `b ← (Q + P W)⁻¹ b`.
     fn solve(&mut self, p: &[Block<D>], b: &mut [f64]);
     /// What `factorise` costs, in nanoseconds or so: assembly and elimination; and what `solve` costs, once refined.
@@ -106,6 +108,11 @@ impl<F: Form<D>, const D: usize> System<F, D> {
         let factorised = self.form.factorise(p, &self.q);
         self.q.copy_from_slice(q);
         factorised
+    }
+
+    /// See [`Form::sign`].
+    pub(super) fn sign(&self) -> f64 {
+        self.form.sign()
     }
 
     /// Solves, with `apply(x, wx)` giving `wx = W x`. Returns the relative residual.
@@ -211,6 +218,10 @@ impl<const D: usize> Form<D> for ContactForm<D> {
             }
         }
         self.lu.factorise()
+    }
+
+    fn sign(&self) -> f64 {
+        self.lu.sign()
     }
 
     fn solve(&mut self, _: &[Block<D>], b: &mut [f64]) {
@@ -391,6 +402,12 @@ impl<const D: usize> Form<D> for BodyForm<D> {
             }
         }
         lu.factorise()
+    }
+
+    /// `det (Q + P W) = det Q det(M + H Q⁻¹P Hᵀ)/det M`.
+    fn sign(&self) -> f64 {
+        let blocks = self.q_inverse.iter().map(|q| small::determinant(q).signum());
+        self.lu.sign() * blocks.product::<f64>()
     }
 
     fn solve(&mut self, p: &[Block<D>], b: &mut [f64]) {

@@ -348,6 +348,10 @@ impl<const D: usize, L: DiskLaw<D>> Linearised<D> for FrictionLocal<D, L> {
         made(system, make).ok_or(Singular)?.factorise(unit, p, q)
     }
 
+    fn orientation(&self, state: &mut Self::State) -> f64 {
+        there(&mut state.system).map_or(f64::NAN, |system| system.sign())
+    }
+
     fn solve_linearised(
         &self,
         state: &mut Self::State,

@@ -194,6 +194,9 @@ pub trait Linearised<const D: usize>: Linear<D> + Blockwise<D> {
         q: &[Block<D>],
     ) -> Result<(), Singular>;
 
+    /// The sign of `det(Q + P W)` for the P and Q last given, times one that is the same for all of them; NaN where nothing was factorised.
+    fn orientation(&self, state: &mut Self::State) -> f64;
+
     /// The solution of `(Q + P W) x = b` for the P and Q last given, refined against that matrix, and `wx = W x`.
     ///
     /// Returns `‖b − Q x − P W x‖ / ‖b‖`: where `Q + P W` is singular it need not be small.

@@ -272,6 +272,10 @@ impl<P: Linearised<D>, const D: usize> Linearised<D> for Regularised<P> {
         self.base.linearise(base, p, shifted)
     }
 
+    fn orientation(&self, state: &mut Self::State) -> f64 {
+        self.base.orientation(&mut state.base)
+    }
+
     fn solve_linearised(
         &self,
         state: &mut Self::State,

@@ -18,8 +18,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::form::{Access, Disked, Linearised, OnContacts};
-use crate::contact::interior::pursuit::Pursuit;
-use crate::contact::parts::{Central, CentralIterate};
+use crate::contact::parts::{Central, CentralIterate, Pursuit};
 use crate::core::ranges::{at_least, nonnegative, up_to};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};

@@ -75,6 +75,8 @@ pub struct Central<L, const D: usize> {
     scale: f64,
     /// δ of `s = √(‖z_T‖² + δ²)`, as a multiple of τ.
     smoothing: f64,
+    /// What δ is that multiple of in place of τ, where a path is followed.
+    pub(in crate::contact) theta: Option<f64>,
     delta: f64,
     /// X/mu and Z mu, one number each per contact: `w_c/υ` and mu; `1/υ` is shared.
     weight: Vec<f64>,
@@ -113,6 +115,7 @@ impl<L, const D: usize> Default for Central<L, D> {
             law: None,
             scale: 1.0,
             smoothing: 0.0,
+            theta: None,
             delta: 0.0,
             weight: vec![],
             laws: vec![],
@@ -160,6 +163,7 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
     ) -> Iterate {
         self.law = Some(Law::Coulomb);
         self.share = 1.0;
+        self.theta = None;
         self.smoothing = smoothing;
         self.s.clear();
         self.s.resize(L::DISKS * problem.contacts(), 0.0);
@@ -449,6 +453,25 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         (p, q)
     }
 
+    /// The sign of `det(S² X + G Z W)` of the last factorisation, times one that is the same for all of them: that of the matrix
+    /// solved, whose rows are turned, by eigenvectors that need not be right-handed.
+    pub(in crate::contact) fn orientation<P: Linearised<D> + Disked<D, Law = L>>(
+        &self,
+        problem: &P,
+        state: &mut P::State,
+    ) -> f64 {
+        let handed = |c: usize| {
+            let mut rows = if L::DISKS == 1 { self.scalings[c].vectors } else { self.turned[c].1 };
+            for k in 1..D {
+                if self.is_still(c, k) {
+                    rows[k] = std::array::from_fn(|l| f64::from(u8::from(k == l)));
+                }
+            }
+            small::determinant(&rows).signum()
+        };
+        problem.orientation(state) * (0..self.laws.len()).map(handed).product::<f64>()
+    }
+
     /// `dx` and `dz` for the present d, with ρ weighted.
     pub(in crate::contact) fn newton<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
@@ -619,7 +642,7 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         }
         problem.velocities(state, &self.r, &mut self.u);
         let tau = self.pairs.iter().map(Pair::dot).sum::<f64>() / self.pairs.len() as f64;
-        self.delta = self.smoothing * tau;
+        self.delta = self.smoothing * self.theta.unwrap_or(tau);
         let mut errors = 0.0;
         for c in 0..n {
             let u: [f64; D] = small::block(&self.u, c);
@@ -752,6 +775,19 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
                 (s, self.share * size / s)
             }
         }
+    }
+
+    /// How the normal equation of a contact falls with θ where `δ = κθ`: `∂(Σ A s)/∂θ`, in units of speed.
+    pub(in crate::contact) fn slide_by_theta(&self, c: usize) -> f64 {
+        if self.delta == 0.0 {
+            return 0.0;
+        }
+        let of_disk = |i: usize| {
+            let s = self.slide(i, self.pairs[i].z.tangential()).0;
+            let weight = if L::DISKS == 1 { 1.0 } else { self.normal(i) };
+            if s > 0.0 { weight * self.smoothing * self.delta / s } else { 0.0 }
+        };
+        (L::DISKS * c..L::DISKS * (c + 1)).map(of_disk).sum()
     }
 
     /// `n = ∂s/∂z_T`, with a zero in front.

@@ -5,6 +5,7 @@ mod central;
 mod clarabel;
 mod conic;
 pub mod nt;
+mod pursuit;
 mod rows;
 mod sweep;
 
@@ -12,5 +13,6 @@ pub use anderson::{Accelerator, Anderson};
 pub use central::{Central, Iterate as CentralIterate};
 pub use clarabel::{Clarabel, Ended, Shape};
 pub use conic::{ConvexEnd, ConvexIp};
+pub use pursuit::Pursuit;
 pub use rows::{put_within_bounds, sweep_rows};
 pub use sweep::{NEGLIGIBLE, Sweep};

@@ -7,38 +7,48 @@
 //! ```
 //!
 //! With Coulomb's law θ need not decrease along it: at a turning point the matrix of the Newton step is singular, and a
-//! method that asks for a smaller θ stops. Here θ is an unknown like x and z. Predictor: along the unit tangent `(ẋ, ż, θ̇)`, by
-//! a length h that ends well inside the cones and at a positive θ. Corrector: Newton on the path's
-//! equations with the step orthogonal to the tangent. Each corrector needs two solutions with one factor, one for the equations'
-//! residual and one for their derivative by θ. h is doubled after easy steps and quartered after refused ones. Lengths and
-//! angles are measured in the local metric `‖S dx‖² + ‖S⁻¹ dz‖²`, in which a step from θ to θ/2 is as long near the end as at the
+//! method that asks for a smaller θ stops. Here θ is an unknown like x and z. Where z_T of a sticking contact passes through
+//! zero the path has a kink, at which Newton's method goes to and fro; with `s = √(‖z_T‖² + δ²)`, `δ = κθ`, it is smooth, and
+//! its derivative by θ has the term `κδ/s`.
+//!
+//! Predictor: along the unit tangent `(ẋ, ż, θ̇)`, by a length h that ends well inside the cones and at a positive θ.
+//! Corrector: Newton on the path's equations with the step orthogonal to the tangent, two solutions with one factor each, for
+//! the equations' residual and their derivative by θ. Each point is brought so near to the path that Newton's method
+//! converges from it. The predictor's distance from the path grows as h²: h follows from a distance to aim at, which rises
+//! after easy steps and falls after refused ones. Lengths and angles are measured in the local metric `‖S dx‖² + ‖S⁻¹ dz‖²`, in which a step from θ to θ/2 is as long near the end as at the
 //! start (in the Euclidean one it solved 6 of Siconos' 37 problems instead of 36). Near the end Mehrotra's steps take over, which are faster there.
 //!
 //! References: Keller1977 (pseudo-arclength).
 //! Cost of a step: at most `1 + CORRECTORS` factorisations. Storage: [`Central`]'s and eight vectors.
 //! Fails: the path may end on the boundary, or run away to infinity.
 
-use nonsmooth_linalg::Singular;
+use nonsmooth_linalg::{Singular, budget};
 
+use super::nt::{Pair, Scaling};
+use super::{Central, CentralIterate};
 use crate::contact::form::{Disked, Linearised};
 use crate::contact::law::DiskLaw;
-use crate::contact::parts::nt::Pair;
-use crate::contact::parts::{Central, CentralIterate};
 
 /// The path's present point and the workspace.
 #[derive(Debug, Clone)]
 pub struct Pursuit<L, const D: usize> {
+    /// Holds θ too, while the path is followed.
     core: Central<L, D>,
-    theta: f64,
     /// The unit tangent of the last point, with the sign of travel.
     tangent: Direction<D>,
     /// The derivative by −θ at the present point, as it is last known.
     slope: Direction<D>,
     /// ρ₀.
     first: Vec<[f64; D]>,
+    /// How ρ falls with θ: ρ₀, and the derivative of s.
+    fall: Vec<[f64; D]>,
     /// The point to go back to.
     kept: Vec<Pair<D>>,
+    /// The sign of the determinant at the start, until then zero.
+    orientation: f64,
     length: f64,
+    /// The distance from the path that a predictor aims at.
+    target: f64,
     /// Steps that were refused in a row.
     refused: usize,
     end: End,
@@ -51,6 +61,8 @@ enum End {
     NotYet,
     Now {
         short: usize,
+        /// θ to go back to.
+        theta: f64,
     },
     Failed,
 }
@@ -64,8 +76,19 @@ struct Direction<const D: usize> {
 
 /// Newton corrections of one step.
 const CORRECTORS: usize = 5;
-/// The largest relative distance from the path, after the correctors.
-const NEAR: f64 = 0.3;
+/// The largest relative distance from the path, after the correctors. With 0.3 walls were lost: the next correctors did not
+/// converge from there.
+const NEAR: f64 = 0.03;
+/// The distance that a predictor aims at is at most and at least this; it grows by a factor after a step with so few
+/// corrections, and shrinks to a part of what was too far.
+const FARTHEST: f64 = 0.9;
+const NEAREST: f64 = 0.02;
+const EASY: usize = 2;
+const FARTHER: f64 = 1.25;
+const NEARER: f64 = 0.7;
+/// The length changes by these factors at most, from one step to the next and after a refusal.
+const CHANGE: (f64, f64) = (0.5, 2.0);
+const CHANGE_BACK: (f64, f64) = (0.1, 0.7);
 /// ρ cannot follow θ below this.
 const ROUNDING: f64 = 1e-11;
 /// Below this θ the path is left for Mehrotra's steps, which end superlinearly,
@@ -74,19 +97,22 @@ const END: f64 = 1e-8;
 const MANY_SHORT: usize = 3;
 /// were shorter than this: then the path is taken up again where it was left.
 const SHORT: f64 = 1e-2;
-/// Steps shorter than this are no progress.
+/// So many steps refused in a row, or steps shorter than this, are no progress.
+const MANY_REFUSED: usize = 20;
 const SHORTEST: f64 = 1e-12;
 
 impl<L, const D: usize> Default for Pursuit<L, D> {
     fn default() -> Self {
         Self {
             core: Central::default(),
-            theta: 0.0,
             tangent: Direction::default(),
             slope: Direction::default(),
             first: vec![],
+            fall: vec![],
             kept: vec![],
+            orientation: 0.0,
             length: 0.0,
+            target: FARTHEST,
             refused: 0,
             end: End::default(),
         }
@@ -109,19 +135,29 @@ impl<L: DiskLaw<D>, const D: usize> Pursuit<L, D> {
                 list.clear();
                 list.resize(n, [0.0; D]);
             }
-            direction.theta = -1.0;
         }
+        self.slope.theta = -1.0;
         self.first.clear();
         self.first.extend_from_slice(&self.core.rho);
         self.kept.clear();
         self.kept.extend_from_slice(&self.core.pairs);
-        (self.theta, self.length, self.refused) = (now.tau, f64::INFINITY, 0);
+        self.core.theta = Some(now.tau);
+        (self.length, self.refused) = (f64::INFINITY, 0);
+        (self.target, self.orientation) = (FARTHEST, 0.0);
         self.end = End::NotYet;
         // ρ = θ ρ₀ at the start.
         self.first.iter_mut().flatten().for_each(|rho| *rho /= now.tau);
+        self.fall.clear();
+        self.fall.resize(self.first.len(), [0.0; D]);
         now
     }
 
+    /// Zero once the path is left for Mehrotra's steps.
+    fn theta(&self) -> f64 {
+        self.core.theta.unwrap_or(0.0)
+    }
+
+    /// The iterate, and the best one so far.
     pub fn core(&self) -> &Central<L, D> {
         &self.core
     }
@@ -133,28 +169,28 @@ impl<L: DiskLaw<D>, const D: usize> Pursuit<L, D> {
         problem: &P,
         state: &mut P::State,
     ) -> Result<CentralIterate, Singular> {
-        if self.end == End::NotYet && self.theta < END && self.refused == 0 {
+        let theta = self.theta();
+        if self.end == End::NotYet && theta < END && self.refused == 0 {
             self.kept.copy_from_slice(&self.core.pairs);
-            self.end = End::Now { short: 0 };
+            self.core.theta = None;
+            self.end = End::Now { short: 0, theta };
         }
-        if let End::Now { short } = self.end {
+        if let End::Now { short, theta } = self.end {
             let now = self.core.iterate(problem, state)?;
             let short = if now.alpha < SHORT { short + 1 } else { 0 };
-            self.end = End::Now { short };
+            self.end = End::Now { short, theta };
             if short == MANY_SHORT {
                 self.end = End::Failed;
-                self.core.pairs.copy_from_slice(&self.kept);
-                return Ok(self.core.look(problem, state, 1.0));
+                return Ok(self.go_back(problem, state, theta));
             }
             return Ok(now);
         }
         if self.refused == 0 {
             self.core.factorise(problem, state)?;
             self.differentiate(problem, state);
-            self.turn();
+            self.turn(problem, state);
         }
         self.kept.copy_from_slice(&self.core.pairs);
-        let theta = self.theta;
         // The predictor.
         self.core.dx.copy_from_slice(&self.tangent.x);
         self.core.dz.copy_from_slice(&self.tangent.z);
@@ -164,17 +200,18 @@ impl<L: DiskLaw<D>, const D: usize> Pursuit<L, D> {
         }
         let length = self.length.min(longest).min(1e6);
         self.core.advance(length);
-        self.theta = theta + length * self.tangent.theta;
+        self.core.theta = Some(theta + length * self.tangent.theta);
         self.core.look(problem, state, length);
-        let mut near = false;
         let mut corrections = 0;
         let mut distance = self.distance();
+        let predicted = distance.max(NEAREST);
         while corrections < CORRECTORS && distance.is_finite() {
-            if distance <= NEAR {
-                near = true;
+            // One correction at least: a point that is taken over as far from the path as it was allowed to be would look like a
+            // predictor's, and be followed by the shortest of steps.
+            if distance <= NEAR && corrections > 0 {
                 break;
             }
-            if self.correct(problem, state).is_err() {
+            if budget::over() || self.correct(problem, state).is_err() {
                 break;
             }
             corrections += 1;
@@ -185,22 +222,37 @@ impl<L: DiskLaw<D>, const D: usize> Pursuit<L, D> {
             }
             distance = now;
         }
-        near = near || distance <= NEAR;
-        if !near {
-            self.core.pairs.copy_from_slice(&self.kept);
-            self.theta = theta;
-            self.length = 0.25 * length;
+        if distance > NEAR || distance.is_nan() {
+            self.target = (NEARER * self.target.min(predicted)).max(NEAREST);
+            let (least, most) = CHANGE_BACK;
+            self.length = length * (self.target / predicted).sqrt().clamp(least, most);
             self.refused += 1;
-            return Ok(self.core.look(problem, state, 0.0));
+            return Ok(self.go_back(problem, state, theta));
         }
         self.refused = 0;
-        self.length = if corrections <= 2 { 2.0 * length } else { length };
+        if corrections <= EASY {
+            self.target = (FARTHER * self.target).min(FARTHEST);
+        }
+        let (least, most) = CHANGE;
+        self.length = length * (self.target / predicted).sqrt().clamp(least, most);
         Ok(self.core.look(problem, state, length))
     }
 
-    /// The path has come to an end: steps of no length.
+    /// To the point that was kept, at its θ.
+    fn go_back<P: Linearised<D> + Disked<D, Law = L>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        theta: f64,
+    ) -> CentralIterate {
+        self.core.pairs.copy_from_slice(&self.kept);
+        self.core.theta = Some(theta);
+        self.core.look(problem, state, 0.0)
+    }
+
+    /// The path has come to an end: steps of no length, or none that is accepted.
     pub fn stuck(&self) -> bool {
-        self.length < SHORTEST * self.theta.max(1e-6)
+        self.refused == MANY_REFUSED || self.length < SHORTEST * self.theta().max(1e-6)
     }
 
     /// `slope`: the derivative of (x, z) by −θ along the path.
@@ -215,20 +267,29 @@ impl<L: DiskLaw<D>, const D: usize> Pursuit<L, D> {
             minus_e[0] = -1.0;
             core.d[c] = core.scalings[c].divide(&minus_e);
         }
-        // ρ must fall by ρ₀.
-        std::mem::swap(&mut core.rho, &mut self.first);
+        for (c, (fall, first)) in self.fall.iter_mut().zip(&self.first).enumerate() {
+            *fall = *first;
+            fall[0] += core.slide_by_theta(c);
+        }
+        std::mem::swap(&mut core.rho, &mut self.fall);
         core.newton(problem, state, 1.0);
-        std::mem::swap(&mut core.rho, &mut self.first);
+        std::mem::swap(&mut core.rho, &mut self.fall);
         self.slope.x.copy_from_slice(&core.dx);
         self.slope.z.copy_from_slice(&core.dz);
     }
 
-    /// The unit tangent, on from the last one.
-    fn turn(&mut self) {
-        let Self { core, slope, tangent, theta, .. } = self;
-        let size = (core.product(slope, slope, *theta)).sqrt();
-        let along = core.product(slope, tangent, *theta);
-        let sign = if along < 0.0 { -1.0 } else { 1.0 };
+    /// The unit tangent. θ falls along it where the determinant of the equations in (x, z) has the sign that it had at the
+    /// start, and rises where it has the other. The scalar product with the last tangent says the same on a smooth path; at
+    /// bends of ‖z_T‖ it was wrong, and the path was followed back to where it came from.
+    fn turn<P: Linearised<D> + Disked<D, Law = L>>(&mut self, problem: &P, state: &mut P::State) {
+        let theta = self.theta();
+        let Self { core, slope, tangent, orientation, .. } = self;
+        let size = core.product(slope, slope, theta).sqrt();
+        let now = core.orientation(problem, state);
+        if *orientation == 0.0 {
+            *orientation = now;
+        }
+        let sign = now * *orientation;
         for (to, from) in [(&mut tangent.x, &slope.x), (&mut tangent.z, &slope.z)] {
             to.iter_mut().zip(from).for_each(|(t, s)| *t = s.map(|v| sign * v / size));
         }
@@ -237,23 +298,24 @@ impl<L: DiskLaw<D>, const D: usize> Pursuit<L, D> {
 
     /// The largest relative distance of the present point from the path.
     fn distance(&self) -> f64 {
+        let theta = self.theta();
         let mut largest = 0.0_f64;
         for pair in &self.core.pairs {
-            let scaling = crate::contact::parts::nt::Scaling::new(pair);
+            let scaling = Scaling::new(pair);
             let mut off = scaling.product(&scaling.lambda, &scaling.lambda);
-            off[0] -= self.theta;
+            off[0] -= theta;
             let size = off.iter().map(|v| v * v).sum::<f64>().sqrt();
-            largest = largest.max(size / self.theta);
+            largest = largest.max(size / theta);
         }
         let (mut off, mut size) = (0.0, 1.0);
         for (rho, first) in self.core.rho.iter().zip(&self.first) {
             for k in 0..D {
-                off += (rho[k] - self.theta * first[k]).powi(2);
+                off += (rho[k] - theta * first[k]).powi(2);
                 size += first[k] * first[k];
             }
         }
         // Below the rounding of the equations there is no path to be near to.
-        largest.max((off / size).sqrt() / self.theta.max(ROUNDING))
+        largest.max((off / size).sqrt() / theta.max(ROUNDING))
     }
 
     /// One Newton step on the path's equations, orthogonal to the tangent.
@@ -264,22 +326,23 @@ impl<L: DiskLaw<D>, const D: usize> Pursuit<L, D> {
     ) -> Result<(), Singular> {
         self.core.factorise(problem, state)?;
         self.differentiate(problem, state);
-        let Self { core, tangent, slope, first, theta, .. } = self;
+        let theta = self.theta();
+        let Self { core, tangent, slope, first, .. } = self;
         for c in 0..core.pairs.len() {
             let scaling = &core.scalings[c];
             let mut g = [0.0; D];
-            g[0] = *theta;
+            g[0] = theta;
             let toward = scaling.divide(&g);
             for k in 0..D {
                 core.d[c][k] = toward[k] - scaling.lambda[k];
             }
         }
         for (rho, first) in core.rho.iter_mut().zip(&*first) {
-            rho.iter_mut().zip(first).for_each(|(rho, first)| *rho -= *theta * first);
+            rho.iter_mut().zip(first).for_each(|(rho, first)| *rho -= theta * first);
         }
         core.newton(problem, state, 1.0);
-        let across = core.product(tangent, slope, *theta);
-        let missing = core.inner((&tangent.x, &tangent.z), (&core.dx, &core.dz)) / *theta;
+        let across = core.product(tangent, slope, theta);
+        let missing = core.inner((&tangent.x, &tangent.z), (&core.dx, &core.dz)) / theta;
         let change = missing / across;
         if !change.is_finite() {
             return Err(Singular);
@@ -292,10 +355,10 @@ impl<L: DiskLaw<D>, const D: usize> Pursuit<L, D> {
         }
         let mut alpha = (0.95 * core.reach()).min(1.0);
         if change < 0.0 {
-            alpha = alpha.min(0.95 * *theta / -change);
+            alpha = alpha.min(0.95 * theta / -change);
         }
         core.advance(alpha);
-        *theta += alpha * change;
+        core.theta = Some(theta + alpha * change);
         core.look(problem, state, alpha);
         Ok(())
     }
