@@ -411,6 +411,26 @@ fn where_the_criterion_of_existence_fails_a_solution_is_found() {
     }
 }
 
+/// Of contacts at random with a friction of 2 and a W of low rank the criterion of existence holds for some.
+#[test]
+fn planted_problems_of_low_rank_with_a_friction_of_two() {
+    let (mut all, mut failed) = (0, vec![]);
+    for (contacts, dofs) in [(40, 100), (100, 240)] {
+        for seed in 0..14 {
+            let mu = (2.0, 2.0);
+            let case = Planted { contacts, dofs, mix: MIXED, mu, seed, ..Planted::default() };
+            let (problem, _) = case.local::<3>();
+            let known = existence::decide(&problem, &Limits::default());
+            if matches!(known, Existence::Proved { .. } | Existence::NearlyProved { .. }) {
+                let what = format!("{contacts} contacts, {dofs} dofs, seed {seed}");
+                all += 1;
+                failed.extend(solved_to(1e-8, &problem, "auto", &what));
+            }
+        }
+    }
+    assert!(all >= 21 && failed.len() <= all / 20, "{} of {all} not: {failed:?}", failed.len());
+}
+
 /// The same problem with mass, length and time in other units: the first three unknowns of each body are velocities, the other
 /// three angular ones.
 fn in_units(p: &FrictionGlobal<3>, [mass, length, time]: [f64; 3]) -> FrictionGlobal<3> {
