@@ -5,7 +5,7 @@ use nonsmooth_simulate::{
     Control, Lagrangian, LagrangianScheme, LagrangianSimulation, Size, StepReport,
 };
 
-use crate::{check, near, order};
+use crate::{check, extrapolated, near, order};
 
 const G: f64 = 9.81;
 
@@ -103,15 +103,19 @@ fn turned(windows: usize, until: f64, h: f64) -> ([f64; 2], f64) {
 
 #[test]
 fn singular_positions_are_passed() {
-    let errors: Vec<_> = [4e-3, 2e-3, 1e-3]
-        .map(|h| {
-            let ([x, y], angle) = turned(2, 10.0, h);
-            near(angle, 31.750597186657, 1e5 * h * h);
-            near(x.hypot(y), 1.0, 1e-10);
-            (h, (angle - 31.750597186657).abs())
-        })
-        .into();
-    near(order(&errors), 2.0, 0.2);
+    let exact = 31.750597186657;
+    let runs = [4e-3, 2e-3, 1e-3].map(|h| {
+        let ([x, y], angle) = turned(2, 10.0, h);
+        near(x.hypot(y), 1.0, 1e-10);
+        (h, [angle, x, y])
+    });
+    let errors = runs.map(|(h, [angle, ..])| (h, (angle - exact).abs()));
+    assert!(errors[2].1 < 1.2e-5, "{errors:?}");
+    near(order(&errors), 2.0, 2e-3);
+    let end = extrapolated(&runs[1].1, &runs[2].1);
+    for (found, exact) in end.into_iter().zip([exact, 0.328458111230, 0.944518538287]) {
+        near(found, exact, 5e-10);
+    }
 }
 
 #[test]
@@ -124,7 +128,8 @@ fn windows_turn_in_time() {
 
 #[test]
 fn forty_windows_turn_as_one() {
-    let ([x, y], _) = turned(40, 10.0, 1e-2);
-    near(x, 0.180512226451, 1e-2);
-    near(y, 0.983572740625, 1e-2);
+    let [coarse, fine] = [4e-2, 2e-2].map(|h| turned(40, 10.0, h).0);
+    let end = extrapolated(&coarse, &fine);
+    near(end[0], 0.180512226451, 5e-5);
+    near(end[1], 0.983572740625, 5e-5);
 }

@@ -111,8 +111,8 @@ impl Lagrangian<3> for Rattleback {
     }
 }
 
-/// The least spin in the sense of the start during 3 s.
-fn spun(spin: f64) -> f64 {
+/// The least spin in the sense of the start during 3 s, and the most energy gained over its start.
+fn spun(spin: f64, h: f64) -> [f64; 2] {
     let mut q = [0.0, 0.0, 0.0, 0.0, 0.5_f64.to_radians(), 0.0];
     let up = axes(&q)[2];
     q[2] = -dot(up, lowest(up));
@@ -128,21 +128,23 @@ fn spun(spin: f64) -> f64 {
     let start = [world[0], world[1], world[2], 0.0, 0.0, spin];
     let mut simulation =
         LagrangianSimulation::new(Rattleback, LagrangianScheme::default(), &q, &start).unwrap();
-    let (mut first, mut least) = (None, f64::INFINITY);
+    let (mut first, mut least, mut gain) = (None, f64::INFINITY, 0.0_f64);
     let mut watch = |s: &LagrangianSimulation<Rattleback, 3>, step: &StepReport| {
         let energy = step.energy.kinetic + step.energy.potential;
-        let first = *first.get_or_insert(energy);
-        assert!(energy <= first * (1.0 + 1e-3), "at t = {}: {energy} after {first}", step.t);
+        gain = gain.max(energy - *first.get_or_insert(energy));
         least = least.min(s.state().v[5] * spin.signum());
         Control::Continue
     };
-    check(&simulation.run(3.0, 5e-4, &mut watch).unwrap());
-    least
+    check(&simulation.run(3.0, h, &mut watch).unwrap());
+    [least, gain]
 }
 
+/// What energy there is above that of the start, 0.12 J, goes to zero with h²: it rocks most where it reverses.
 #[test]
 fn a_rattleback_reverses_in_one_sense_only() {
-    let senses = [spun(5.0), spun(-5.0)];
-    let (reverses, goes_on) = (senses[0].min(senses[1]), senses[0].max(senses[1]));
-    assert!(reverses < -0.5 && goes_on > 2.0, "{senses:?}");
+    for h in [1e-3, 5e-4] {
+        let [[goes_on, smooth], [reverses, rocks]] = [5.0, -5.0].map(|spin| spun(spin, h));
+        assert!(reverses < -0.6 && goes_on > 4.9, "{reverses} {goes_on}");
+        assert!(smooth <= 3.0 * h * h && rocks <= 170.0 * h * h, "{smooth} {rocks}");
+    }
 }

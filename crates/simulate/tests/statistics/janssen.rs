@@ -26,6 +26,16 @@ const ROUGH: f64 = 0.1;
 const SOFT: Compliance = Compliance { stiffness: 1e3, damping: 0.0 };
 const SLICES: usize = 40;
 
+/// λ of Janssen's law.
+fn depth(side: f64, mu: f64, k: f64) -> f64 {
+    side / (4.0 * mu * k)
+}
+
+/// The height of a column as heavy as what is carried at depth s.
+fn carried(lambda: f64, s: f64) -> f64 {
+    -lambda * (-s / lambda).exp_m1()
+}
+
 /// Means over time of what walls and floor carry, as shares of the weight, by height.
 struct Silo {
     side: f64,
@@ -145,8 +155,7 @@ impl Silo {
 
     /// Janssen's force through the section at depth s, as a share of the weight, with friction `mu`.
     fn janssen(&self, mu: f64, s: f64) -> f64 {
-        let lambda = self.side / (4.0 * mu * self.k());
-        -lambda / self.height * (-s / lambda).exp_m1()
+        carried(depth(self.side, mu, self.k()), s) / self.height
     }
 
     /// That forces balance, that the floor carries what Janssen's law has it carry within a share, and each section too, within a share of what is carried at depth.
@@ -179,6 +188,21 @@ impl Silo {
         assert!((self.floor / law - 1.0).abs() < floor && off < section, "{figures}");
         // Most of the weight is with the walls.
         assert!(self.floor < 0.4, "{figures}");
+    }
+}
+
+/// With ρ = 1500 kg/m³, D = 1 m, mu = 0.4, K = 0.5; and the law is the balance of slices.
+#[test]
+fn a_silo_of_a_metre_carries_no_more_than_18394_pa() {
+    let (weight, lambda) = (1500.0 * 9.81, depth(1.0, 0.4, 0.5));
+    assert!((lambda - 1.25).abs() < 1e-15);
+    let stress = |s: f64| weight * carried(lambda, s);
+    assert!((stress(40.0 * lambda) - 18394.0).abs() < 0.5);
+    let ds = 1e-4;
+    for s in [0.1, 1.25, 5.0] {
+        let slope = (stress(s + ds) - stress(s - ds)) / (2.0 * ds);
+        let balance = weight - 4.0 * 0.4 * 0.5 * stress(s);
+        assert!((slope - balance).abs() < 1e-8 * weight, "{slope} {balance}");
     }
 }
 
