@@ -462,9 +462,6 @@ impl Elimination<'_> {
         let (swaps, inverses) = (&mut self.swaps[a..b], &mut self.inverses[a..b]);
         let found = kernel::factor_panel(simd, k - a, (self.lower, diagonal), swaps, inverses);
         self.outcome.add(found);
-        let exchanges = swaps.iter().enumerate().filter(|(j, p)| *j != **p as usize).count();
-        let below = inverses.iter().filter(|inverse| **inverse < 0.0).count();
-        self.outcome.negative ^= (exchanges + below) % 2 == 1;
         swaps.iter_mut().for_each(|p| *p += a as u32);
         let rest = At { at: a * ld + k, ld };
         kernel::right_solve(simd, ld - k, (self.lower, diagonal, rest), inverses);

@@ -171,7 +171,7 @@ pub(super) fn factor_panel(
     assert!(w <= WIDTH && w <= rows && inverses.len() == w && px.end(rows, w) <= x.len());
     let x = x.as_mut_ptr().wrapping_add(px.at);
     // SAFETY: inside the slice, as asserted.
-    unsafe {
+    let found = unsafe {
         match simd.0 {
             #[cfg(target_arch = "x86_64")]
             Level::Avx512 => avx512::factor_panel(rows, x, px.ld, swaps, inverses),
@@ -179,7 +179,10 @@ pub(super) fn factor_panel(
             Level::Avx2 => avx2::factor_panel(rows, x, px.ld, swaps, inverses),
             Level::Plain => plain::factor_panel(rows, x, px.ld, swaps, inverses),
         }
-    }
+    };
+    let exchanges = swaps.iter().enumerate().filter(|(j, p)| *j != **p as usize).count();
+    let below = inverses.iter().filter(|inverse| **inverse < 0.0).count();
+    Pivots { negative: (exchanges + below) % 2 == 1, ..found }
 }
 
 /// `X ← X U⁻¹` for `rows` rows below a panel that [`factor_panel`] has factorised; `pu`: its diagonal block.

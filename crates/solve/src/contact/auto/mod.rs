@@ -526,7 +526,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     ) -> Step {
         let HybridWork { newton, state, controller, inner_best, best, done, .. } = work;
         let Some(newton) = newton else {
-            return Step::Stuck("auto has lost its place".into());
+            return starts::lost();
         };
         let r = P::impulses(point);
         let iterate = newton.iterate(problem, state, r);
@@ -557,8 +557,8 @@ impl<const D: usize> OnContacts<Auto, D> {
             starts::begin_interior(problem, work);
             return Step::Continue { estimate: error };
         }
-        if self.pursuit_is_due(work, error) {
-            return self.begin_pursuit(problem, work, error);
+        if let Some(chase) = self.chase_due(work, error) {
+            return self.begin_pursuit(problem, work, error, chase);
         }
         if self.alternation_is_due(work) {
             return self.begin_alternating(problem, point, work, error);

@@ -53,7 +53,7 @@ const PURSUITS: [Chase; 3] = [
 const PURSUE_COST: f64 = 60.0;
 const PURSUE_AGAIN: f64 = 1e-3;
 
-struct Chase {
+pub(super) struct Chase {
     after: usize,
     smoothing: f64,
     idle: usize,
@@ -250,9 +250,8 @@ impl<const D: usize> OnContacts<Auto, D> {
         error: f64,
     ) -> bool {
         work.passed_by.is_some_and(|(before, from)| {
-            let fall = (from / error).ln() / (work.done.newton - before) as f64;
-            let left = (error / work.tolerance).ln();
-            error > work.tolerance && (fall <= 0.0 || left / fall > INTERIOR_COST)
+            let iterations = work.done.newton - before;
+            takes_longer([from, error], iterations, work.tolerance, INTERIOR_COST)
         })
     }
 
@@ -281,29 +280,24 @@ impl<const D: usize> OnContacts<Auto, D> {
         };
         let best = central.best();
         done.interior_error = best.1;
-        let estimate = best.1;
         if ended {
             take(best, controller, P::impulses(point));
             self.subproblem_here(problem, point, work);
         }
-        Step::Continue { estimate }
+        Step::Continue { estimate: work.done.interior_error }
     }
 
-    /// Whether stage 7 comes now: Newton's iterations since stage 4 promise to be many.
-    pub(super) fn pursuit_is_due<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+    /// How stage 7 goes if it comes now: Newton's iterations since stage 4 promise to be many.
+    pub(super) fn chase_due<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         work: &HybridWork<P, D>,
         error: f64,
-    ) -> bool {
+    ) -> Option<&'static Chase> {
         let Done { interior, interior_error, newton, pursuits, pursued_error, .. } = work.done;
         let far = pursuits > 0 && pursued_error > PURSUE_AGAIN;
-        let may = interior > 0 && !work.spread && !far && error > work.tolerance;
-        let next = PURSUITS.get(pursuits);
-        if !may || next.is_none_or(|next| newton < next.after) {
-            return false;
-        }
-        let fall = (interior_error / error).ln() / newton as f64;
-        fall <= 0.0 || (error / work.tolerance).ln() / fall > PURSUE_COST
+        let may = interior > 0 && !work.spread && !far;
+        let slow = takes_longer([interior_error, error], newton, work.tolerance, PURSUE_COST);
+        PURSUITS.get(pursuits).filter(|chase| may && newton >= chase.after && slow)
     }
 
     /// Begins stage 7.
@@ -312,14 +306,12 @@ impl<const D: usize> OnContacts<Auto, D> {
         problem: &P,
         work: &mut HybridWork<P, D>,
         error: f64,
+        chase: &Chase,
     ) -> Step {
         let HybridWork { pursuit, state, stage, done, .. } = work;
-        let Some(&Chase { smoothing, idle, .. }) = PURSUITS.get(done.pursuits) else {
-            return lost();
-        };
         done.pursuits += 1;
-        let now = pursuit.get_or_insert_default().begin(problem, state, smoothing, None);
-        *stage = Stage::Pursuit { halvings: Halvings::from(now.error), most: idle };
+        let now = pursuit.get_or_insert_default().begin(problem, state, chase.smoothing, None);
+        *stage = Stage::Pursuit { halvings: Halvings::from(now.error), most: chase.idle };
         Step::Continue { estimate: error }
     }
 
@@ -344,12 +336,11 @@ impl<const D: usize> OnContacts<Auto, D> {
         };
         let best = path.core().best();
         done.pursued_error = best.1;
-        let estimate = best.1;
         if ended {
             take(best, controller, P::impulses(point));
             self.subproblem_here(problem, point, work);
         }
-        Step::Continue { estimate }
+        Step::Continue { estimate: work.done.pursued_error }
     }
 
     /// Whether stage 8 comes now.
@@ -454,6 +445,12 @@ impl<const D: usize> OnContacts<Auto, D> {
     }
 }
 
+/// Whether an error that fell so in so many iterations takes more than `most` others to the tolerance.
+fn takes_longer([from, to]: [f64; 2], iterations: usize, tolerance: f64, most: f64) -> bool {
+    let fall = (from / to).ln() / iterations as f64;
+    to > tolerance && (fall <= 0.0 || (to / tolerance).ln() / fall > most)
+}
+
 /// The impulses of an iterate with its error become the point's where they are better.
 fn take((theirs, error): (&[f64], f64), controller: &mut Controller, ours: &mut [f64]) {
     if controller.offer(error) {
@@ -482,7 +479,7 @@ impl Halvings {
 }
 
 /// A stage without its part, which cannot be.
-fn lost() -> Step {
+pub(super) fn lost() -> Step {
     Step::Stuck("auto has lost its place".into())
 }
 

@@ -366,7 +366,7 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
     }
 
     /// d towards `x ∘ z = τ e`, with Mehrotra's term from the present dx and dz or without.
-    fn aim(&mut self, tau: f64, second_order: bool) {
+    pub(in crate::contact) fn aim(&mut self, tau: f64, second_order: bool) {
         for c in 0..self.pairs.len() {
             let scaling = &self.scalings[c];
             let mut g = [0.0; D];
@@ -779,9 +779,6 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
 
     /// How the normal equation of a contact falls with θ where `δ = κθ`: `∂(Σ A s)/∂θ`, in units of speed.
     pub(in crate::contact) fn slide_by_theta(&self, c: usize) -> f64 {
-        if self.delta == 0.0 {
-            return 0.0;
-        }
         let of_disk = |i: usize| {
             let s = self.slide(i, self.pairs[i].z.tangential()).0;
             let weight = if L::DISKS == 1 { 1.0 } else { self.normal(i) };

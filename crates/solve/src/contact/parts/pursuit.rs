@@ -15,8 +15,9 @@
 //! Corrector: Newton on the path's equations with the step orthogonal to the tangent, two solutions with one factor each, for
 //! the equations' residual and their derivative by θ. Each point is brought so near to the path that Newton's method
 //! converges from it. The predictor's distance from the path grows as h²: h follows from a distance to aim at, which rises
-//! after easy steps and falls after refused ones. Lengths and angles are measured in the local metric `‖S dx‖² + ‖S⁻¹ dz‖²`, in which a step from θ to θ/2 is as long near the end as at the
-//! start (in the Euclidean one it solved 6 of Siconos' 37 problems instead of 36). Near the end Mehrotra's steps take over, which are faster there.
+//! after easy steps and falls after refused ones. Lengths and angles are measured in the local metric
+//! `‖S dx‖² + ‖S⁻¹ dz‖²`, in which a step from θ to θ/2 is as long near the end as at the start (in the Euclidean one it solved
+//! 6 of Siconos' 37 problems instead of 36). Near the end Mehrotra's steps take over, which are faster there.
 //!
 //! References: Keller1977 (pseudo-arclength).
 //! Cost of a step: at most `1 + CORRECTORS` factorisations. Storage: [`Central`]'s and eight vectors.
@@ -328,15 +329,7 @@ impl<L: DiskLaw<D>, const D: usize> Pursuit<L, D> {
         self.differentiate(problem, state);
         let theta = self.theta();
         let Self { core, tangent, slope, first, .. } = self;
-        for c in 0..core.pairs.len() {
-            let scaling = &core.scalings[c];
-            let mut g = [0.0; D];
-            g[0] = theta;
-            let toward = scaling.divide(&g);
-            for k in 0..D {
-                core.d[c][k] = toward[k] - scaling.lambda[k];
-            }
-        }
+        core.aim(theta, false);
         for (rho, first) in core.rho.iter_mut().zip(&*first) {
             rho.iter_mut().zip(first).for_each(|(rho, first)| *rho -= theta * first);
         }
