@@ -142,7 +142,11 @@ fn every_interface_of_a_stack_carries_what_is_above_it() {
         }
         let start = world.clone();
         // Beyond that rounding decides.
-        let tolerance = if ratio > 1.0 { 1e-9 } else { 1e-10 };
+        let tolerance = match ratio {
+            1.0 => 1e-12,
+            r if r > 1.0 => 1e-9,
+            _ => 1e-10,
+        };
         let total: f64 = masses.iter().sum();
         let mut simulation = simulation(world).with_tolerance(tolerance);
         let h = 5e-3;

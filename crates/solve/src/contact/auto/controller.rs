@@ -211,13 +211,13 @@ impl Controller {
         self.record(error)
     }
 
-    /// How many sweeps come next, if a factorisation costs `ratio` of them.
+    /// How many sweeps come next, if a factorisation is worth `ratio` of them.
     pub(super) fn sweeps(&self, ratio: f64) -> usize {
         let iterations = (self.inner.iterations - self.inner.idle).max(1) as f64;
         ((self.share * iterations * ratio) as usize).clamp(1, MOST_SWEEPS)
     }
 
-    /// How many sweeps a cold start has, if a factorisation costs `ratio` of them.
+    /// How many sweeps a cold start has, if a factorisation is worth `ratio` of them.
     pub(super) fn long_sweeps(&self, ratio: f64) -> usize {
         ((self.budget * ratio) as usize).clamp(LONG.0, LONG.1)
     }

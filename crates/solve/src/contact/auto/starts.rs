@@ -6,7 +6,7 @@ use nonsmooth_problem::check::Kinematic;
 
 use super::alternating::Way;
 use super::controller::Controller;
-use super::{Auto, Done, FIRST, FIRST_SWEEPS, HybridWork, NEAR, NEWTON, Stage, runs_away};
+use super::{Auto, Done, FIRST, FIRST_SWEEPS, HybridWork, NEAR, REST, Stage, runs_away};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
 use crate::contact::parts::Central;
@@ -19,15 +19,16 @@ const REST_FIRST: usize = 6;
 /// Newton's method is tried with this ε, until so many iterations in a row have not halved the error, or its first direction leads this far; where W has little spread, below this error.
 const TRIAL_BELOW: f64 = 1e-2;
 const TRIAL_EPSILON: f64 = 1e-9;
-const TRIAL_IDLE: usize = 2;
-const TRIAL_REACH: f64 = 10.0;
+const TRIAL_IDLE: usize = 3;
+const TRIAL_REACH: f64 = 20.0;
 const TRIAL: usize = 30;
-/// Where W has at least this spread (of 0.17 to 0.3 in walls, columns and arches, 0.33 to 0.7 in piles and flows) sweeps come to its rescue so many times, so many at first, then twice as many each
-/// time, at most while two factorisations take; they are taken back where they raise the error by more than a factor.
-const RESCUE_SPREAD: f64 = 0.33;
+/// W has spread from here on: 0.17 to 0.3 in walls, columns and arches, 0.33 to 0.7 in piles and flows.
+const SPREAD: f64 = 0.33;
+/// Where it has, sweeps come to the trial's rescue so many times, so many at first, then twice as many each time, at most while four factorisations take; they are taken back where they raise the
+/// error by more than a factor.
 const RESCUES: usize = 3;
 const RESCUE: usize = 20;
-const RESCUE_COST: f64 = 2.0;
+const RESCUE_COST: f64 = 4.0;
 const RESCUE_TAKE_BACK: f64 = 5.0;
 /// After a trial in vain near a solution sweeps go on where they promised for as long as this, and at most while so many factorisations take.
 const SWEPT_LONG: usize = 10 * FIRST_SWEEPS;
@@ -105,7 +106,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             None => return lost(),
         };
         let young = estimate < REST_NEAR && steps < REST_FIRST;
-        if !young && !self.promises(problem, work, NEWTON) || estimate.is_nan() {
+        if !young && !self.promises(problem, work, REST) || estimate.is_nan() {
             let error = self.end_alternating(problem, point, work);
             self.without_rest(problem, point, work, error);
         }
@@ -138,9 +139,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         work: &mut HybridWork<P, D>,
         error: f64,
     ) {
-        let HybridWork { newton, state, inner_best, controller, spread, units, .. } = work;
-        *spread = problem.spread(state, units) >= RESCUE_SPREAD;
-        let (true, Some(newton)) = (error < TRIAL_BELOW || *spread, newton) else {
+        let spread = has_spread(problem, work);
+        let HybridWork { newton, inner_best, controller, .. } = work;
+        let (true, Some(newton)) = (error < TRIAL_BELOW || spread, newton) else {
             return begin_interior(problem, work);
         };
         let r = P::impulses(point);
@@ -178,7 +179,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             return Step::Continue { estimate: error };
         }
         r.copy_from_slice(inner_best);
-        if !over && least >= NEAR && rescues < RESCUES && work.spread {
+        if !over && least >= NEAR && rescues < RESCUES && work.spread == Some(true) {
             return self.rescue(problem, point, work, least, rescues);
         }
         controller.offer(least);
@@ -237,7 +238,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             return self.subproblem_here(problem, point, work);
         }
         let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
-        let most = SWEEP_AGAIN * costs.factorisation / costs.sweep;
+        let most = SWEEP_AGAIN * costs.worth / costs.sweep;
         work.before.copy_from_slice(P::impulses(point));
         problem.enter(&mut work.state, point);
         work.stage = Stage::Between { left: work.done.sweeps.min(most as usize).max(1) };
@@ -295,7 +296,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     ) -> Option<&'static Chase> {
         let Done { interior, interior_error, newton, pursuits, pursued_error, .. } = work.done;
         let far = pursuits > 0 && pursued_error > PURSUE_AGAIN;
-        let may = interior > 0 && !work.spread && !far;
+        let may = interior > 0 && work.spread == Some(false) && !far;
         let slow = takes_longer([interior_error, error], newton, work.tolerance, PURSUE_COST);
         PURSUITS.get(pursuits).filter(|chase| may && newton >= chase.after && slow)
     }
@@ -481,6 +482,15 @@ impl Halvings {
 /// A stage without its part, which cannot be.
 pub(super) fn lost() -> Step {
     Step::Stuck("auto has lost its place".into())
+}
+
+/// Whether W has spread; found out once.
+pub(super) fn has_spread<P: Linearised<D> + Disked<D>, const D: usize>(
+    problem: &P,
+    work: &mut HybridWork<P, D>,
+) -> bool {
+    let HybridWork { spread, state, units, .. } = work;
+    *spread.get_or_insert_with(|| problem.spread(state, units) >= SPREAD)
 }
 
 /// Begins stage 4.

@@ -388,12 +388,12 @@ impl<const D: usize, L: DiskLaw<D>> Linearised<D> for FrictionGlobal<D, L> {
             Operator::Condensed(w) => 2.0 * w.nblocks() as f64,
             _ => 1.5 * self.H.nnz() as f64,
         };
-        let [factorisation, solve] =
+        let [factorisation, solve, worth] =
             match made(system, || GlobalSystem::new(self, operator, dynamics)) {
                 Some(GlobalSystem::Bodies(system)) => system.form().costs(),
                 Some(GlobalSystem::Contacts(system)) => system.form().costs(),
-                None => [NEVER; 2],
+                None => [NEVER; 3],
             };
-        Costs { sweep: 30.0 * contacts + visits, factorisation, solve }
+        Costs { sweep: 30.0 * contacts + visits, factorisation, solve, worth }
     }
 }

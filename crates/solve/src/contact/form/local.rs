@@ -373,9 +373,10 @@ impl<const D: usize, L: DiskLaw<D>> Linearised<D> for FrictionLocal<D, L> {
         let LocalState { eliminated, system, .. } = state;
         let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
         let system = made(system, || Ok(System::new(ContactForm::new(w)?, w.nrows())));
-        let [factorisation, solve] = system.map_or([NEVER; 2], |system| system.form().costs());
+        let costs = system.map_or([NEVER; 3], |system| system.form().costs());
+        let [factorisation, solve, worth] = costs;
         let sweep = 30.0 * w.nrows() as f64 + 2.0 * w.nblocks() as f64;
-        Costs { sweep, factorisation, solve }
+        Costs { sweep, factorisation, solve, worth }
     }
 
     /// By the entries of W, in one pass.

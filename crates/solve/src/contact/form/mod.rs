@@ -172,10 +172,12 @@ pub trait Linear<const D: usize>: Contacts<D> {
 pub struct Costs {
     /// One Gauss–Seidel sweep over all contacts.
     pub sweep: f64,
-    /// One [`linearise`](Linearised::linearise) and one solve.
+    /// An iteration with one [`linearise`](Linearised::linearise).
     pub factorisation: f64,
-    /// One [`solve_linearised`](Linearised::solve_linearised) alone.
+    /// An iteration with one [`solve_linearised`](Linearised::solve_linearised) alone.
     pub solve: f64,
+    /// What may be spent in place of a factorisation where many of them are to come: as if elimination were ten times as slow as it is. The more a graph fills, the more iterations its problems take.
+    pub worth: f64,
 }
 
 /// Linear systems with a block-diagonal modification of W, as Newton, interior-point and proximal methods have them.
