@@ -142,11 +142,7 @@ fn every_interface_of_a_stack_carries_what_is_above_it() {
         }
         let start = world.clone();
         // Beyond that rounding decides.
-        let tolerance = match ratio {
-            1.0 => 1e-12,
-            r if r > 1.0 => 1e-9,
-            _ => 1e-10,
-        };
+        let tolerance = if ratio > 1.0 { 1e-9 } else { 1e-10 };
         let total: f64 = masses.iter().sum();
         let mut simulation = simulation(world).with_tolerance(tolerance);
         let h = 5e-3;
@@ -162,8 +158,10 @@ fn every_interface_of_a_stack_carries_what_is_above_it() {
                 near(force / (total * G), above / total, within);
             }
         }
+        // What a velocity within the tolerance of that of a step's load comes to in all steps.
+        let drift = (tolerance * G * h * 60.0 * h).max(1e-12);
         for (k, body) in start.bodies.iter().enumerate() {
-            (0..3).for_each(|i| near(simulation.state().position[k][i], body.position[i], 1e-12));
+            (0..3).for_each(|i| near(simulation.state().position[k][i], body.position[i], drift));
         }
     }
 }
