@@ -629,7 +629,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             return Step::Continue { estimate };
         }
         let Some(newton) = &mut work.newton else {
-            return Step::Stuck("auto has lost its place".into());
+            return starts::lost();
         };
         let r = P::impulses(point);
         let error = newton.look(problem, &mut work.state, r);
