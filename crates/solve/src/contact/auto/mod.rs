@@ -181,6 +181,8 @@ enum Start {
 struct Done {
     start: Start,
     sweeps: usize,
+    /// Passes over the contacts that moved most, between any sweeps.
+    followed: usize,
     rest: usize,
     trial: usize,
     interior: usize,
@@ -302,7 +304,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
     fn account(&self, work: &Self::Work) -> Vec<String> {
         let Done { start, sweeps, rest, trial, interior, interior_error, .. } = work.done;
         let Done { subproblems, failed, newton, between, alternating, .. } = work.done;
-        let Done { pursued, pursued_error, .. } = work.done;
+        let Done { followed, pursued, pursued_error, .. } = work.done;
         let mut lines = vec![];
         match start {
             Start::Zero => {}
@@ -312,6 +314,9 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             }
         }
         lines.push(format!("{sweeps} Gauss-Seidel sweeps"));
+        if followed > 0 {
+            lines.push(format!("{followed} passes over the contacts that moved most in a sweep"));
+        }
         if rest > 0 {
             lines.push(match work.stage {
                 Stage::Rest => format!("impulses at rest, found in {rest} iterations"),
@@ -429,6 +434,10 @@ impl<const D: usize> OnContacts<Auto, D> {
             }
         }
         work.rate.note(estimate);
+        if !runs_away(estimate) {
+            let r = P::impulses(point);
+            work.done.followed += work.sweep.follow(problem, &mut work.state, r);
+        }
         if work.bounded {
             return match estimate.is_finite() || budget::over() {
                 true => Step::Continue { estimate },
@@ -624,6 +633,10 @@ impl<const D: usize> OnContacts<Auto, D> {
             }
         }
         work.done.between += count;
+        if !runs_away(estimate) {
+            let r = P::impulses(point);
+            work.done.followed += work.sweep.follow(problem, &mut work.state, r);
+        }
         if left > count && !runs_away(estimate) {
             work.stage = Stage::Between { left: left - count };
             return Step::Continue { estimate };

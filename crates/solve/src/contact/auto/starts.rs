@@ -36,8 +36,9 @@ const SWEEP_AGAIN: f64 = 3.0;
 /// The interior point ends after this many iterations, or below this error, or after so many iterations that did not halve the
 /// error, or so many short steps in a row; such steps know at least this part of the slope of ‖u_T‖.
 const INTERIOR: usize = 60;
-/// Where Newton's iterations promise to take longer than this, the interior point is worth a trial.
+/// Where Newton's iterations promise to take longer than this, the interior point is worth a trial; not before so many, which is what one subproblem in vain takes.
 const INTERIOR_COST: f64 = 20.0;
+const IN_VAIN: usize = 12;
 const INTERIOR_ERROR: f64 = 1e-8;
 const INTERIOR_IDLE: usize = 10;
 const INTERIOR_SLOPE: f64 = 0.2;
@@ -252,7 +253,8 @@ impl<const D: usize> OnContacts<Auto, D> {
     ) -> bool {
         work.passed_by.is_some_and(|(before, from)| {
             let iterations = work.done.newton - before;
-            takes_longer([from, error], iterations, work.tolerance, INTERIOR_COST)
+            iterations >= IN_VAIN
+                && takes_longer([from, error], iterations, work.tolerance, INTERIOR_COST)
         })
     }
 
