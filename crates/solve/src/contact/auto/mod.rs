@@ -5,7 +5,8 @@
 //! Method, each stage only where the one before it would take longer:
 //!
 //! 1. **Sweeps**: exact Gauss–Seidel for as long as its rate of convergence promises the tolerance sooner than a few
-//!    factorisations would, and after stage 2 until they have cost one. Many problems end here.
+//!    factorisations would, and after stage 2 until they have cost one. Many problems end here. Between them, here and in stage 6, the contacts that
+//!    still move are followed where they are few ([`Sweep::follow`]).
 //! 2. **Rest** (`alternating.rs`): impulses within the cones that leave nothing moving, where the sweeps show nothing that flies apart. One factorisation and
 //!    a few solves end structures at rest, whatever their height; one solve tells whether it is one.
 //! 3. **Trial**: Newton's iterations of stage 5 without its proximal term, where the sweeps came near or the structure is not hyperstatic, for as long as each halves the error; there sweeps come to

@@ -58,6 +58,8 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
     /// Takes another problem; allocates nothing where the number of contacts is the same.
     pub fn fill<P: Disked<D, Law = L>>(&mut self, problem: &P, state: &P::State) {
         self.contacts.clear();
+        self.followed.clear();
+        self.followed.reserve(problem.contacts() / FEW + 1);
         self.moves = 0.0;
         self.negligible = NEGLIGIBLE * problem.velocity_scale(state).powi(2);
         for c in 0..problem.contacts() {
@@ -175,11 +177,12 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
 
 #[cfg(test)]
 mod tests {
-    use nonsmooth_problem::Problem;
+    use nonsmooth_linalg::{Bsr, Csc};
     use nonsmooth_problem::planted::Planted;
+    use nonsmooth_problem::{FrictionLocal, Problem};
 
     use super::*;
-    use crate::contact::form::Access;
+    use crate::contact::form::{Access, Contacts};
 
     /// Sweeps until they no longer move; the distance to the planted solution.
     fn distance<const D: usize, P>(problem: &P, known: &[f64]) -> f64
@@ -198,6 +201,38 @@ mod tests {
         assert!(last < 1e-20 * first, "{first:e} {last:e}");
         let r = P::impulses(&mut point);
         r.iter().zip(known).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    /// Blocks that feel nothing of each other, of which the last two contacts converge slowly.
+    fn one_slow_pair(contacts: usize) -> FrictionLocal<2> {
+        let n = 2 * contacts;
+        let slow = [(n - 4, n - 2, 0.99), (n - 2, n - 4, 0.99)];
+        let entries = (0..n).map(|i| (i, i, 1.0)).chain(slow);
+        let w = Bsr::from_csc(&Csc::from_triplets(n, n, entries).unwrap());
+        let q = (0..n).map(|i| if i % 2 == 0 { -1.0 } else { 0.0 }).collect();
+        FrictionLocal::new(w, q, vec![0.5; contacts]).unwrap()
+    }
+
+    #[test]
+    fn contacts_that_still_move_are_followed_where_they_are_few() {
+        for (contacts, few) in [(40, true), (6, false)] {
+            let problem = one_slow_pair(contacts);
+            let mut point = problem.origin();
+            let mut state = problem.state(Access::Visits).unwrap();
+            let mut sweep = Sweep::new(&problem, &state);
+            problem.enter(&mut state, &point);
+            assert_eq!(sweep.follow(&problem, &mut state, &mut point.r), 0, "nothing has moved");
+            // In the first sweep all move.
+            sweep.sweep(&problem, &mut state, &mut point.r);
+            assert_eq!(sweep.follow(&problem, &mut state, &mut point.r), 0);
+            let second = sweep.sweep(&problem, &mut state, &mut point.r);
+            let passes = sweep.follow(&problem, &mut state, &mut point.r);
+            // Two sweeps' time for two contacts.
+            assert_eq!(passes, if few { contacts } else { 0 });
+            let third = sweep.sweep(&problem, &mut state, &mut point.r);
+            let fall = 0.99_f64.powi(4 * (1 + passes as i32));
+            assert!((third / second - fall).abs() < 1e-9, "{third:e} {second:e} {fall:e}");
+        }
     }
 
     #[test]
