@@ -201,9 +201,9 @@ fn growing<P: Registered>(kind: &str, problem: &P) -> Found {
             });
             (count, iterations[k])
         };
-        // Some end by themselves after a few steps; some factorise for the first time after more than ten.
+        // Some end by themselves after a few steps; some factorise for the first time after more than ten, and `auto` may make its interior point after thirty.
         let (many, most) = count(&mut long, 1, 200);
-        let (few, _) = count(&mut short, 0, 25.min(most / 2));
+        let (few, _) = count(&mut short, 0, 50.min(most / 2));
         assert!(iterations[0] < iterations[1], "{kind}, {name}: too easy");
         if few.calls != many.calls && !excepted(kind, &name) {
             found.push((
