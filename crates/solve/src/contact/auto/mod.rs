@@ -435,10 +435,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             }
         }
         work.rate.note(estimate);
-        if !runs_away(estimate) {
-            let r = P::impulses(point);
-            work.done.followed += work.sweep.follow(problem, &mut work.state, r);
-        }
+        self.follow(problem, point, work, estimate);
         if work.bounded {
             return match estimate.is_finite() || budget::over() {
                 true => Step::Continue { estimate },
@@ -467,6 +464,20 @@ impl<const D: usize> OnContacts<Auto, D> {
             self.leave_sweeps(problem, point, work);
         }
         Step::Continue { estimate }
+    }
+
+    /// After sweeps whose last one moved so much: the contacts that still move, where they are few.
+    fn follow<P: Linearised<D> + Disked<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        estimate: f64,
+    ) {
+        if !runs_away(estimate) {
+            let r = P::impulses(point);
+            work.done.followed += work.sweep.follow(problem, &mut work.state, r);
+        }
     }
 
     /// Whether the sweeps so far are worth less than one factorisation: then they have time to find their pace.
@@ -634,10 +645,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             }
         }
         work.done.between += count;
-        if !runs_away(estimate) {
-            let r = P::impulses(point);
-            work.done.followed += work.sweep.follow(problem, &mut work.state, r);
-        }
+        self.follow(problem, point, work, estimate);
         if left > count && !runs_away(estimate) {
             work.stage = Stage::Between { left: left - count };
             return Step::Continue { estimate };

@@ -12,7 +12,7 @@ use nonsmooth_linalg::{
 use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::{Bounds, Dynamics, FrictionGlobal, GlobalPoint};
 
-use super::linearised::{BodyForm, ContactForm, Form, NEVER, Once, System, made, there};
+use super::linearised::{BodyForm, ContactForm, Form, Once, System, made, there, unaffordable};
 use super::{Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Linear, Linearised, Rows};
 use crate::SolveError;
 use crate::contact::law::DiskLaw;
@@ -388,12 +388,11 @@ impl<const D: usize, L: DiskLaw<D>> Linearised<D> for FrictionGlobal<D, L> {
             Operator::Condensed(w) => 2.0 * w.nblocks() as f64,
             _ => 1.5 * self.H.nnz() as f64,
         };
-        let [factorisation, solve, worth] =
-            match made(system, || GlobalSystem::new(self, operator, dynamics)) {
-                Some(GlobalSystem::Bodies(system)) => system.form().costs(),
-                Some(GlobalSystem::Contacts(system)) => system.form().costs(),
-                None => [NEVER; 3],
-            };
-        Costs { sweep: 30.0 * contacts + visits, factorisation, solve, worth }
+        let sweep = 30.0 * contacts + visits;
+        match made(system, || GlobalSystem::new(self, operator, dynamics)) {
+            Some(GlobalSystem::Bodies(system)) => system.form().costs(sweep),
+            Some(GlobalSystem::Contacts(system)) => system.form().costs(sweep),
+            None => unaffordable(sweep),
+        }
     }
 }

@@ -15,6 +15,8 @@
 use nonsmooth_linalg::budget::TooLarge;
 use nonsmooth_linalg::{Block, BlockLu, Bsr, Csc, Groups, Singular, Slot, norm, small};
 
+use super::Costs;
+
 /// The relative size of the regularisation.
 const DELTA: f64 = 1e-10;
 /// Refinement ends here at the latest; what it does not reach, the residual tells.
@@ -25,6 +27,8 @@ const ENOUGH: f64 = 1e-12;
 /// Operations of an elimination in a nanosecond. This and the other figures of [`Form::costs`] are fits to the time of Newton and interior-point iterations on 150
 /// problems of 4 to 5000 contacts, of which nine in ten are within a third.
 const RATE: f64 = 30.0;
+/// The same for [`Costs::worth`].
+const RATE_WORTH: f64 = 3.0;
 
 /// What is made at its first use; or the memory that it would take, found out once.
 pub(super) type Once<T> = Option<Result<T, TooLarge>>;
@@ -41,8 +45,11 @@ pub(super) fn there<T>(slot: &mut Once<T>) -> Option<&mut T> {
     slot.as_mut().and_then(|made| made.as_mut().ok())
 }
 
-/// The cost of a factorisation that there is not the memory for.
-pub(super) const NEVER: f64 = 1e18;
+/// The costs where there is not the memory for a factorisation.
+pub(super) fn unaffordable(sweep: f64) -> Costs {
+    const NEVER: f64 = 1e18;
+    Costs { sweep, factorisation: NEVER, solve: NEVER, worth: NEVER }
+}
 
 /// A factorised system, with the blocks that it belongs to.
 pub(super) struct System<F, const D: usize> {
@@ -61,8 +68,8 @@ pub(super) trait Form<const D: usize> {
     fn sign(&self) -> f64;
     /// `b ← (Q + P W)⁻¹ b`.
     fn solve(&mut self, p: &[Block<D>], b: &mut [f64]);
-    /// What an iteration that factorises costs, in nanoseconds or so, with all its solves and whatever else a contact has done to it; one that only solves; and the [`worth`](super::Costs::worth).
-    fn costs(&self) -> [f64; 3];
+    /// What iterations cost, with all that a contact has done to it in them, where a sweep costs so much.
+    fn costs(&self, sweep: f64) -> Costs;
 }
 
 impl<F, const D: usize> System<F, D> {
@@ -232,11 +239,15 @@ impl<const D: usize> Form<D> for ContactForm<D> {
         self.lu.solve(b);
     }
 
-    fn costs(&self) -> [f64; 3] {
+    fn costs(&self, sweep: f64) -> Costs {
         let contacts = self.diagonal.len() as f64;
         let (blocks, entries) = (self.blocks.len() as f64, self.lu.factor_len() as f64);
-        let factorisation = self.lu.flops() / RATE + 5.0 * (entries + blocks) + 400.0 * contacts;
-        [factorisation, 0.6 * entries + 150.0 * contacts, self.lu.flops() / 3.0 + 20.0 * blocks]
+        Costs {
+            sweep,
+            factorisation: self.lu.flops() / RATE + 5.0 * (entries + blocks) + 400.0 * contacts,
+            solve: 0.6 * entries + 150.0 * contacts,
+            worth: self.lu.flops() / RATE_WORTH + 20.0 * blocks,
+        }
     }
 }
 
@@ -441,10 +452,14 @@ impl<const D: usize> Form<D> for BodyForm<D> {
         }
     }
 
-    fn costs(&self) -> [f64; 3] {
+    fn costs(&self, sweep: f64) -> Costs {
         let (contacts, entries) = (self.touches.contacts() as f64, self.lu.factor_len() as f64);
-        let factorisation = self.lu.flops() / RATE + 5.0 * entries + 900.0 * contacts;
-        [factorisation, 0.6 * entries + 200.0 * contacts, self.lu.flops() / 3.0 + 200.0 * contacts]
+        Costs {
+            sweep,
+            factorisation: self.lu.flops() / RATE + 5.0 * entries + 900.0 * contacts,
+            solve: 0.6 * entries + 200.0 * contacts,
+            worth: self.lu.flops() / RATE_WORTH + 200.0 * contacts,
+        }
     }
 }
 

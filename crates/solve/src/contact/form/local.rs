@@ -9,7 +9,7 @@ use nonsmooth_linalg::{
 use nonsmooth_problem::check::{Impulses, Kinematic};
 use nonsmooth_problem::{Bounds, FrictionLocal, LocalPoint, RowsLocal};
 
-use super::linearised::{ContactForm, Form, NEVER, Once, System, made, there};
+use super::linearised::{ContactForm, Form, Once, System, made, there, unaffordable};
 use super::rows::Bounded;
 use super::{Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Linear, Linearised, Rows};
 use crate::SolveError;
@@ -373,10 +373,8 @@ impl<const D: usize, L: DiskLaw<D>> Linearised<D> for FrictionLocal<D, L> {
         let LocalState { eliminated, system, .. } = state;
         let w = eliminated.as_ref().map_or(&self.W, |e| &e.w);
         let system = made(system, || Ok(System::new(ContactForm::new(w)?, w.nrows())));
-        let costs = system.map_or([NEVER; 3], |system| system.form().costs());
-        let [factorisation, solve, worth] = costs;
         let sweep = 30.0 * w.nrows() as f64 + 2.0 * w.nblocks() as f64;
-        Costs { sweep, factorisation, solve, worth }
+        system.map_or_else(|| unaffordable(sweep), |system| system.form().costs(sweep))
     }
 
     /// By the entries of W, in one pass.

@@ -79,16 +79,16 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
     ) -> f64 {
         let contacts = self.contacts.len();
         self.moves = 0.0;
-        for c in 0..contacts {
+        for (c, contact) in self.contacts.iter_mut().enumerate() {
             if c + AHEAD < contacts {
                 problem.foresee(state, c + AHEAD);
             }
-            self.moves += self.visit(problem, state, r, c);
+            self.moves += contact.visit(problem, state, r, c, self.negligible);
         }
         self.moves
     }
 
-    /// After a sweep: visits the contacts again that moved most in it, if these are few, in the same order, until together they move less than
+    /// After a sweep: visits the contacts again that moved most in it, if these are few, in the same order, until together they move no more than
     /// all others did, or as much time has passed as a few sweeps take. Returns the number of passes over them.
     pub fn follow<P: Blockwise<D> + Disked<D, Law = L>>(
         &mut self,
@@ -96,65 +96,28 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
         state: &mut P::State,
         r: &mut [f64],
     ) -> usize {
-        let contacts = self.contacts.len();
-        let least = FOLLOWED * self.moves / contacts as f64;
-        let mut followed = std::mem::take(&mut self.followed);
+        let Self { contacts, followed, negligible, moves, .. } = self;
+        let (all, few) = (contacts.len(), contacts.len() / FEW);
+        let least = FOLLOWED * *moves / all as f64;
         followed.clear();
-        let moving = self.contacts.iter().enumerate().filter(|(_, contact)| contact.moved > least);
-        followed.extend(moving.map(|(c, _)| c).take(contacts / FEW + 1));
+        let moving = contacts.iter().enumerate().filter(|(_, contact)| contact.moved > least);
+        followed.extend(moving.map(|(c, _)| c).take(few + 1));
+        if followed.is_empty() || followed.len() > few {
+            return 0;
+        }
+        let others = *moves - followed.iter().map(|&c| contacts[c].moved).sum::<f64>();
         let mut passes = 0;
-        if (1..=contacts / FEW).contains(&followed.len()) {
-            let theirs: f64 = followed.iter().map(|&c| self.contacts[c].moved).sum();
-            let others = self.moves - theirs;
-            while passes * followed.len() < FOLLOW * contacts && !budget::over() {
-                passes += 1;
-                let moves: f64 = followed.iter().map(|&c| self.visit(problem, state, r, c)).sum();
-                // Neither may it go on where moves are not finite.
-                if !(moves > others && moves.is_finite()) {
-                    break;
-                }
+        while passes * followed.len() < FOLLOW * all && !budget::over() {
+            passes += 1;
+            let visits =
+                followed.iter().map(|&c| contacts[c].visit(problem, state, r, c, *negligible));
+            let moves: f64 = visits.sum();
+            // Neither may it go on where moves are not finite.
+            if !(moves > others && moves.is_finite()) {
+                break;
             }
         }
-        self.followed = followed;
         passes
-    }
-
-    /// Solves the problem of contact c; returns `(w_c‖Δr_c‖)²`.
-    #[inline]
-    fn visit<P: Blockwise<D> + Disked<D, Law = L>>(
-        &mut self,
-        problem: &P,
-        state: &mut P::State,
-        r: &mut [f64],
-        c: usize,
-    ) -> f64 {
-        let contact = &mut self.contacts[c];
-        let old: [f64; D] = small::block(r, c);
-        let mut q = problem.velocity(state, r, c);
-        let own = small::mul(&contact.w, &old);
-        for k in 0..D {
-            q[k] -= own[k];
-        }
-        let new = if contact.law.is_frictionless() {
-            frictionless(&contact.w, &q, &old)
-        } else {
-            let local = L::Local::default();
-            local.solve(&mut contact.memo, &contact.w, &q, contact.law, &old)
-        };
-        let mut dr = new;
-        for k in 0..D {
-            dr[k] -= old[k];
-        }
-        let moved = dr.iter().map(|x| (contact.unit * x).powi(2)).sum::<f64>();
-        // Of an empty block a move has no velocity; one that is not finite is made too, and seen.
-        let unfelt = contact.unit == 0.0 && dr != [0.0; D];
-        let made = moved > self.negligible || moved.is_nan() || unfelt;
-        contact.moved = if made { moved } else { 0.0 };
-        if made {
-            r[D * c..D * c + D].copy_from_slice(&new);
-            problem.moved(state, c, &dr);
-        }
-        contact.moved
     }
 
     /// `max_c w_c‖r_c‖`, a velocity.
@@ -172,6 +135,45 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
             sum += natural_residual(contact.unit, &r, &u, contact.law);
         }
         sum.sqrt()
+    }
+}
+
+impl<L: DiskLaw<D>, const D: usize> Visited<L, D> {
+    /// Solves the problem of this contact, the c-th; returns `(w_c‖Δr_c‖)²`, 0 where that is negligible and the move not made.
+    #[inline]
+    fn visit<P: Blockwise<D> + Disked<D, Law = L>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        r: &mut [f64],
+        c: usize,
+        negligible: f64,
+    ) -> f64 {
+        let old: [f64; D] = small::block(r, c);
+        let mut q = problem.velocity(state, r, c);
+        let own = small::mul(&self.w, &old);
+        for k in 0..D {
+            q[k] -= own[k];
+        }
+        let new = if self.law.is_frictionless() {
+            frictionless(&self.w, &q, &old)
+        } else {
+            L::Local::default().solve(&mut self.memo, &self.w, &q, self.law, &old)
+        };
+        let mut dr = new;
+        for k in 0..D {
+            dr[k] -= old[k];
+        }
+        let moved = dr.iter().map(|x| (self.unit * x).powi(2)).sum::<f64>();
+        // Of an empty block a move has no velocity; one that is not finite is made too, and seen.
+        let unfelt = self.unit == 0.0 && dr != [0.0; D];
+        let made = moved > negligible || moved.is_nan() || unfelt;
+        self.moved = if made { moved } else { 0.0 };
+        if made {
+            r[D * c..D * c + D].copy_from_slice(&new);
+            problem.moved(state, c, &dr);
+        }
+        self.moved
     }
 }
 
