@@ -1,7 +1,7 @@
 //! What threads save: `cargo run --release -p nonsmooth-simulate --example threads -- [SCENE] [THREADS] [steps] [skipped]`.
 //!
 //! `stacks`: 2000 stacks of five boxes that slide and come to rest, so many small islands. `pyramid`: 5050 boxes, one large island that stands. `spheres`: 10 000 soft spheres
-//! that fall together, by sweeps to 1e-3. `columns`: 100 000 spheres in columns of ten. Seconds by the wall's clock over all steps but those skipped, and of processor time; detection,
+//! that fall together, by sweeps to 1e-3. `columns`: 100 000 spheres in columns of ten. `beds`: 100 160 spheres, ten layers in each of 64 pits, every sphere in the pocket of four. Seconds by the wall's clock over all steps but those skipped, and of processor time; detection,
 //! statement and solution by the wall's clock, and the rest: bodies moved, contacts remembered.
 
 use std::error::Error;
@@ -10,7 +10,7 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 use nonsmooth_scenes::scenes::{Family, SpherePile};
 use nonsmooth_simulate::{
-    Body, Compliance, Law, MoreauJean, Shape, SimulateError, Simulation, World,
+    Body, Compliance, Law, MoreauJean, Part, Shape, SimulateError, Simulation, World,
 };
 use nonsmooth_solve::settings::SettingsMap;
 
@@ -70,6 +70,38 @@ fn columns() -> Result<World, SimulateError> {
     Ok(world)
 }
 
+fn beds() -> Result<World, SimulateError> {
+    const SPACING: f64 = 1.05;
+    let mut world = World::default().with_law(Law::friction(0.5));
+    world.add(Body::floor());
+    // Layers of 13 × 13 and 12 × 12 spheres by turns; the deepest touch the walls.
+    let (side, rise) = (12.0 * SPACING + 1.0, (1.0 - SPACING * SPACING / 2.0).sqrt());
+    let (half, pit) = (0.5 * side, side + 1.0);
+    for k in 0..64 {
+        let origin = [pit * f64::from(k / 8), pit * f64::from(k % 8)];
+        for (axis, sign) in [(0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0)] {
+            let (mut at, mut size) = ([origin[0], origin[1], 5.0], [half, half, 5.0]);
+            at[axis] += sign * (half + 0.2);
+            size[axis] = 0.2;
+            let wall = Part::new(Shape::Box { half: size });
+            world.add(Body::fixed(vec![wall]).at(at));
+        }
+        for layer in 0..10 {
+            let count = 13 - layer % 2;
+            let first = -0.5 * SPACING * f64::from(count - 1);
+            for ball in 0..count * count {
+                let (row, column) = (f64::from(ball / count), f64::from(ball % count));
+                world.add(Body::solid(Shape::Sphere { radius: 0.5 }, 1000.0)?.at([
+                    origin[0] + first + SPACING * row,
+                    origin[1] + first + SPACING * column,
+                    0.5 + rise * f64::from(layer),
+                ]));
+            }
+        }
+    }
+    Ok(world)
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let scene = arguments.next().unwrap_or("stacks".into());
@@ -81,12 +113,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         "stacks" => rigid(stacks()?)?,
         "pyramid" => rigid(pyramid()?)?,
         "columns" => rigid(columns()?)?,
+        "beds" => rigid(beds()?)?,
         "spheres" => {
             let scheme = MoreauJean { theta: 1.0, ..MoreauJean::default() };
             let simulation = Simulation::new(spheres(10_000)?, scheme)?;
             simulation.with_solver("nsgs", SettingsMap::new())?
         }
-        other => return Err(format!("{other} is none of stacks, pyramid, spheres, columns").into()),
+        other => return Err(format!("{other} is none of stacks, pyramid, spheres, columns, beds").into()),
     }
     .with_tolerance(if scene == "spheres" { 1e-3 } else { 1e-8 })
     .with_threads(threads);
