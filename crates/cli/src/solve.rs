@@ -49,7 +49,7 @@ pub struct Args {
     /// machine has free]
     #[arg(long, value_name = "SIZE", value_parser = files::size)]
     memory_limit: Option<u64>,
-    /// Factorise large matrices on so many threads, 0 for one a core; the results are the same, bit for bit
+    /// Factorise large matrices and sweep over large piles on so many threads, 0 for one a core; the results are the same, bit for bit
     #[arg(long, value_name = "N", default_value_t = 1)]
     threads: usize,
     /// Start from the file's /guesses/1 (complementarity: its [solution]) in place of zero; with =FILE from the

@@ -2,8 +2,9 @@
 //! contact by contact.
 
 use super::budget::Pace;
+use super::passes::{Parts, Passes};
 use super::roots::Roots;
-use super::row::prefetch;
+use super::row::foresee;
 use super::{Block, BlockRow, Bsr, Csc, Inverse};
 
 /// `W = Hᵀ M⁻¹ H` without W, for the movements of Gauss–Seidel in velocity space: `u_c = H_cᵀ v + w_c` and `v += M⁻¹ H_c Δr_c` cost O(rows touched).
@@ -16,10 +17,18 @@ use super::{Block, BlockRow, Bsr, Csc, Inverse};
 /// (condense those instead).
 #[derive(Debug, Clone)]
 pub struct Delassus<const D: usize> {
-    /// A, or H.
+    /// A, or H; of many contacts in the order of the passes.
     seen: Columns<D>,
     response: Response<D>,
     diagonal: Vec<Block<D>>,
+    passes: Option<Passes>,
+}
+
+/// The velocities of a [`Delassus`] while several threads visit contacts.
+#[derive(Debug)]
+pub struct Moving<'a, const D: usize> {
+    delassus: &'a Delassus<D>,
+    y: Parts<'a, f64>,
 }
 
 /// What an impulse does to y.
@@ -37,8 +46,18 @@ impl<const D: usize> Delassus<D> {
     /// Cost: with roots O(rows touched), else D solves for each contact and component of M that it touches.
     pub fn new(h: &Csc, inverse: &Inverse) -> Self {
         match Roots::of(inverse) {
-            Some(roots) => Self::rooted(h, inverse, roots),
+            Some(roots) => Self::rooted(h, inverse, roots, None),
             None => Self::direct(h, inverse),
+        }
+    }
+
+    /// The same; at least so many contacts are kept in an order in which sweeps can follow each other closely, where M has roots.
+    pub fn arranged(h: &Csc, inverse: &Inverse, many: usize) -> Self {
+        match Roots::of(inverse) {
+            Some(roots) if h.ncols() / D >= many => {
+                Self::rooted(h, inverse, roots, Some(passes::<D>(h, inverse)))
+            }
+            _ => Self::new(h, inverse),
         }
     }
 
@@ -49,23 +68,22 @@ impl<const D: usize> Delassus<D> {
             seen.push(h);
             z_rows.push(z);
         });
-        Self { seen, response: Response::Direct(z_rows), diagonal }
+        Self { seen, response: Response::Direct(z_rows), diagonal, passes: None }
     }
 
-    fn rooted(h: &Csc, inverse: &Inverse, roots: Roots) -> Self {
+    fn rooted(h: &Csc, inverse: &Inverse, roots: Roots, passes: Option<Passes>) -> Self {
         let nc = h.ncols() / D;
         let mut seen = Columns::new();
-        let mut diagonal = Vec::with_capacity(nc);
+        let mut diagonal = vec![[[0.0; D]; D]; nc];
         let (mut touched, mut local, mut rows) = (vec![], vec![], vec![]);
         let mut pace = Pace::default();
         let mut late = false;
-        for c in 0..nc {
+        for c in (0..nc).map(|at| passes.as_ref().map_or(at, |passes| passes.item(at))) {
             let of_h = block_column::<D>(h, c);
             late = late || pace.over(100.0 * of_h.len() as f64);
             if late {
                 // Nobody will use it: the shape alone.
                 seen.push(&of_h);
-                diagonal.push([[0.0; D]; D]);
                 continue;
             }
             touched.clear();
@@ -87,12 +105,10 @@ impl<const D: usize> Delassus<D> {
             }
             rows.retain(|(_, row): &(u32, [f64; D])| row.iter().any(|&x| x != 0.0));
             rows.sort_unstable_by_key(|row| row.0);
-            let mut w = [[0.0; D]; D];
-            rows.iter().for_each(|(_, row)| add_outer(&mut w, row, row));
+            rows.iter().for_each(|(_, row)| add_outer(&mut diagonal[c], row, row));
             seen.push(&rows);
-            diagonal.push(w);
         }
-        Self { seen, response: Response::Rooted(roots), diagonal }
+        Self { seen, response: Response::Rooted(roots), diagonal, passes }
     }
 
     /// The diagonal blocks `W_cc = H_cᵀ M⁻¹ H_c`. Cost as [`new`](Self::new); keeps nothing else.
@@ -160,16 +176,28 @@ impl<const D: usize> Delassus<D> {
         }
     }
 
+    /// How sweeps may follow each other, of contacts that were [`arranged`](Self::arranged).
+    pub fn passes(&self) -> Option<&Passes> {
+        self.passes.as_ref()
+    }
+
+    /// Where there are passes, for visits from several threads.
+    pub fn moving<'a>(&'a self, y: &'a mut [f64]) -> Option<(&'a Passes, Moving<'a, D>)> {
+        Some((self.passes.as_ref()?, Moving { delassus: self, y: Parts::of(y) }))
+    }
+
+    /// The column of contact c.
+    #[inline(always)]
+    fn at(&self, c: usize) -> usize {
+        self.passes.as_ref().map_or(c, |passes| passes.position(c))
+    }
+
     /// `H_cᵀ v`, of y.
     #[inline(always)]
     pub fn local_velocity(&self, c: usize, y: &[f64]) -> [f64; D] {
         let mut u = [0.0; D];
-        self.seen.each_run(c, |first, rows| {
-            for (row, y) in rows.iter().zip(&y[first..first + rows.len()]) {
-                for k in 0..D {
-                    u[k] += row[k] * y;
-                }
-            }
+        self.seen.each_run(self.at(c), |first, rows| {
+            add_product(&mut u, rows, &y[first..first + rows.len()]);
         });
         u
     }
@@ -177,27 +205,103 @@ impl<const D: usize> Delassus<D> {
     /// Fetches what a visit of contact c reads and writes of y into the cache: bodies that meet are far apart in memory.
     #[inline(always)]
     pub fn foresee(&self, c: usize, y: &[f64]) {
-        self.seen.each_run(c, |first, rows| {
+        self.seen.each_run(self.at(c), |first, rows| {
             let y = &y[first..first + rows.len()];
-            y.first().into_iter().chain(y.last()).for_each(prefetch);
+            y.first().into_iter().chain(y.last()).for_each(foresee);
         });
     }
 
     /// `v += M⁻¹ H_c dr`, on y.
     #[inline(always)]
     pub fn apply_impulse(&self, c: usize, dr: &[f64; D], y: &mut [f64]) {
-        let response = match &self.response {
-            Response::Rooted(_) => &self.seen,
-            Response::Direct(z) => z,
-        };
-        response.each_run(c, |first, rows| {
-            for (row, y) in rows.iter().zip(&mut y[first..first + rows.len()]) {
-                for k in 0..D {
-                    *y += row[k] * dr[k];
-                }
-            }
+        self.response().each_run(self.at(c), |first, rows| {
+            add_transposed_product(&mut y[first..first + rows.len()], rows, dr);
         });
     }
+
+    #[inline(always)]
+    fn response(&self) -> &Columns<D> {
+        match &self.response {
+            Response::Rooted(_) => &self.seen,
+            Response::Direct(z) => z,
+        }
+    }
+}
+
+/// Contacts by their position in the passes.
+impl<const D: usize> Moving<'_, D> {
+    /// [`Delassus::foresee`], of what others may be writing.
+    #[inline(always)]
+    pub fn foresee(&self, at: usize) {
+        self.delassus.seen.each_run(at, |first, rows| {
+            self.y.prefetch(first, rows.len());
+        });
+    }
+
+    /// [`Delassus::local_velocity`].
+    ///
+    /// # Safety
+    ///
+    /// Nobody else visits a contact meanwhile that touches a component of M in common with this one.
+    #[inline(always)]
+    pub unsafe fn local_velocity(&self, at: usize) -> [f64; D] {
+        let mut u = [0.0; D];
+        self.delassus.seen.each_run(at, |first, rows| {
+            // SAFETY: the rows of a contact's own components, which are the caller's.
+            add_product(&mut u, rows, unsafe { self.y.part(first, rows.len()) });
+        });
+        u
+    }
+
+    /// [`Delassus::apply_impulse`].
+    ///
+    /// # Safety
+    ///
+    /// As of [`local_velocity`](Self::local_velocity).
+    #[inline(always)]
+    pub unsafe fn apply_impulse(&self, at: usize, dr: &[f64; D]) {
+        // Passes are arranged with roots alone: what is seen is what responds.
+        self.delassus.seen.each_run(at, |first, rows| {
+            // SAFETY: as above.
+            add_transposed_product(unsafe { self.y.part(first, rows.len()) }, rows, dr);
+        });
+    }
+}
+
+/// `u += Aᵀ y`.
+#[inline(always)]
+fn add_product<const D: usize>(u: &mut [f64; D], a: &[[f64; D]], y: &[f64]) {
+    for (row, y) in a.iter().zip(y) {
+        for k in 0..D {
+            u[k] += row[k] * y;
+        }
+    }
+}
+
+/// `y += A dr`.
+#[inline(always)]
+fn add_transposed_product<const D: usize>(y: &mut [f64], a: &[[f64; D]], dr: &[f64; D]) {
+    for (row, y) in a.iter().zip(y) {
+        for k in 0..D {
+            *y += row[k] * dr[k];
+        }
+    }
+}
+
+/// The passes over contacts that touch the components of M.
+fn passes<const D: usize>(h: &Csc, inverse: &Inverse) -> Passes {
+    let (mut ptr, mut places) = (vec![0], vec![]);
+    for c in 0..h.ncols() / D {
+        let first = places.len();
+        for &i in (D * c..D * c + D).flat_map(|j| h.column(j).0) {
+            let component = inverse.component_of(i) as u32;
+            if !places[first..].contains(&component) {
+                places.push(component);
+            }
+        }
+        ptr.push(places.len() as u32);
+    }
+    Passes::new(&ptr, &places, inverse.component_sizes().count())
 }
 
 /// A sparse n × (D·nc) matrix by block columns, each a few runs of rows that follow each other, with D entries a row.

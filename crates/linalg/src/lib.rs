@@ -9,6 +9,7 @@
 //! [`Compensated`], [`Doubled`]: sums and numbers in doubled precision.
 //! [`Delassus`]: W = Hᵀ M⁻¹ H as an operator, never formed, or condensed into a [`Bsr`].
 //! All of them are made from slices, and from and to matrices of faer, and with the features `nalgebra` and `sprs` of those crates.
+//! [`Passes`]: sweeps of several threads one behind the other, with the bits of one.
 //! [`budget`]: the time and memory that all of these may use.
 
 mod block_lu;
@@ -25,6 +26,7 @@ mod fill;
 mod groups;
 mod inverse;
 mod matrix;
+mod passes;
 mod rank_lu;
 mod roots;
 mod row;
@@ -36,7 +38,7 @@ pub use block_lu::{BlockLu, Singular, Slot};
 pub use bsr::{Block, BlockRow, Bsr};
 pub use compensated::Compensated;
 pub use csc::Csc;
-pub use delassus::Delassus;
+pub use delassus::{Delassus, Moving};
 pub use dense::Dense;
 pub use doubled::{Doubled, Real, power_of_two};
 pub use error::MatrixError;
@@ -44,6 +46,7 @@ pub use fill::admit_sparse;
 pub use groups::Groups;
 pub use inverse::{Inverse, Refine, factorisations, is_positive_definite};
 pub use matrix::{Matrix, Operator};
+pub use passes::{Parts, Passes};
 pub use rank_lu::RankLu;
 pub use square_cholesky::SquareCholesky;
 pub use square_lu::SquareLu;

@@ -101,12 +101,18 @@ mod avx2 {
 
 /// Asks for the line of the cache that x lies in.
 #[inline(always)]
-pub(crate) fn prefetch(x: &f64) {
+pub(crate) fn foresee(x: &f64) {
+    prefetch_at(std::ptr::from_ref(x));
+}
+
+/// Asks for the line of the cache at an address.
+#[inline(always)]
+pub(crate) fn prefetch_at<T>(x: *const T) {
     #[cfg(target_arch = "x86_64")]
-    // SAFETY: a prefetch changes nothing that a program can see, and the address is one of a number.
+    // SAFETY: a prefetch changes nothing that a program can see, and faults at no address.
     unsafe {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(x).cast());
+        _mm_prefetch::<_MM_HINT_T0>(x.cast());
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = x;

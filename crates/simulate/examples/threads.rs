@@ -119,7 +119,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             let simulation = Simulation::new(spheres(10_000)?, scheme)?;
             simulation.with_solver("nsgs", SettingsMap::new())?
         }
-        other => return Err(format!("{other} is none of stacks, pyramid, spheres, columns, beds").into()),
+        other => {
+            return Err(
+                format!("{other} is none of stacks, pyramid, spheres, columns, beds").into()
+            );
+        }
     }
     .with_tolerance(if scene == "spheres" { 1e-3 } else { 1e-8 })
     .with_threads(threads);

@@ -12,7 +12,7 @@ use nonsmooth_problem::planted::{Planted, PlantedMix};
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, GlobalPoint, RowsGlobal};
 use nonsmooth_scenes::Scene;
 use nonsmooth_scenes::scenes::{
-    Arch, Chain, Family, Kapla, SlidingBox, Spheres, Stack, State, Wall,
+    Arch, Chain, Family, Kapla, SlidingBox, SpherePile, Spheres, Stack, State, Wall,
 };
 use nonsmooth_solve::contact::Condense;
 use nonsmooth_solve::registry::{self, Registered};
@@ -583,4 +583,24 @@ fn a_session_that_is_used_again_gives_the_same_bits() {
     }
     let wall = |state| Wall { state, ..Wall::default() }.build().unwrap().problem().unwrap();
     same_bits(&wall(State::Impact), &wall(State::Perturbed), |p| &p.r, "wall");
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    // More than 20 000 contacts: sweeps are shared, of the wall in its own order and of the pile in one that lets them follow each other.
+    let wall = Wall { rows: 54, columns: 52, state: State::Perturbed, ..Wall::default() };
+    let pile = SpherePile { count: 7000, ..SpherePile::default() };
+    let problems = [("wall", wall.build().unwrap()), ("pile", pile.build().unwrap())];
+    for (what, problem) in problems.map(|(what, scene)| (what, scene.problem().unwrap())) {
+        assert!(problem.mu.len() > 20_000, "{what}: {}", problem.mu.len());
+        let [alone, two, three] = [1, 2, 3].map(|threads| {
+            let limits = Limits { threads, max_iterations: 12, ..Limits::default() };
+            let mut auto = registry::session("auto", &<_>::default()).unwrap();
+            let mut point = problem.origin();
+            let outcome = auto.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+            (point.r, point.v, outcome.iterations)
+        });
+        assert!(alone == two && alone == three, "{what}");
+        assert!(alone.0.iter().any(|r| *r != 0.0), "{what}");
+    }
 }

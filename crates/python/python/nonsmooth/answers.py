@@ -228,7 +228,7 @@ def solve(
     ``solver`` is a name of ``nonsmooth.solvers(problem)``, perhaps behind prefixes (``"condense/nsgs"``), with its settings as further
     keywords, or an object of settings: ``nonsmooth.Nsgs(omega=0.9)``. ``tol`` is the relative residual to reach, in (0, 1].
     ``time_limit`` is in seconds of wall clock; ``max_iter`` is 1 000 000, or none where there is a limit of time.
-    ``threads`` is how many may factorise a large matrix, 0 for one a core; the results are the same, bit for bit.
+    ``threads`` is how many may factorise a large matrix or sweep over a large pile, 0 for one a core; the results are the same, bit for bit.
     ``warm_start`` is an answer, a dictionary of parts, or the array z (x; of contacts the impulses r).
     ``callback`` is called after each step (of a large problem now and then) with a :class:`Progress`; if it returns something true, the solve
     ends with the best point so far; what it raises is raised here.

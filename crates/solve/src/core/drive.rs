@@ -30,7 +30,7 @@ pub struct Limits {
     pub cancel: Option<Arc<AtomicBool>>,
     /// The bytes of memory that one factorisation may take: a larger one is refused before it begins. Without a number, what the machine has free.
     pub memory_limit: Option<u64>,
-    /// Threads that large factorisations may use, 0 for one a core. They change the time, not one bit of the result.
+    /// Threads that large factorisations and sweeps over many contacts may use, 0 for one a core. They change the time, not one bit of the result.
     pub threads: usize,
     /// Whether to keep the method's own record of its iterations ([`Session::trace`]); it grows with their number.
     pub trace: bool,

@@ -94,6 +94,8 @@ const FIRST_SWEEPS: usize = 30;
 const SWEEPS_A_STEP: usize = 10;
 /// Steps of sweeps between two looks of the judge, each of which costs some three sweeps; other steps are judged one by one.
 const SWEEPS_JUDGED: usize = 5;
+/// So many times as many where threads share the sweeps.
+const SWEEPS_JUDGED_SHARED: usize = 4;
 /// Sweeps go on while what is left of them promises to cost less than this many factorisations. What comes after them costs 1 to 50; by hindsight, on 340 problems, leaving them at 2 to 3.5
 /// costs 1.08 of the better way in the geometric mean, at 0 1.12, at 6 1.2 and at 10 1.4. Where W has spread, so many times what a factorisation is worth where many are to come: in piles and flows
 /// they often are.
@@ -299,7 +301,11 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
     }
 
     fn check_every(&self, work: &Self::Work) -> usize {
-        if matches!(work.stage, Stage::Sweeps { .. }) { SWEEPS_JUDGED } else { 1 }
+        match work.stage {
+            // One thread judges.
+            Stage::Sweeps { .. } => SWEEPS_JUDGED * work.sweep.together(SWEEPS_JUDGED_SHARED),
+            _ => 1,
+        }
     }
 
     fn account(&self, work: &Self::Work) -> Vec<String> {
@@ -417,11 +423,12 @@ impl<const D: usize> OnContacts<Auto, D> {
         claims: usize,
     ) -> Step {
         let mut estimate = f64::NAN;
-        for _ in 0..SWEEPS_A_STEP {
+        let together = work.sweep.together(SWEEPS_A_STEP);
+        for _ in 0..SWEEPS_A_STEP / together {
             let (r, lambda) = P::all_impulses(point);
-            let moves = work.sweep.sweep(problem, &mut work.state, r)
+            let moves = work.sweep.sweeps(problem, &mut work.state, r, together)
                 + sweep_rows(problem, &mut work.state, (r, lambda), 1.0);
-            work.done.sweeps += 1;
+            work.done.sweeps += together;
             if budget::over() {
                 break;
             }
@@ -637,8 +644,10 @@ impl<const D: usize> OnContacts<Auto, D> {
     ) -> Step {
         let count = left.min(2 * SWEEPS_A_STEP);
         let mut estimate = 0.0;
-        for _ in 0..count {
-            let moves = work.sweep.sweep(problem, &mut work.state, P::impulses(point));
+        let together = work.sweep.together(count);
+        for _ in 0..count / together {
+            let r = P::impulses(point);
+            let moves = work.sweep.sweeps(problem, &mut work.state, r, together);
             estimate = moves.sqrt() / work.scale;
             if runs_away(estimate) || budget::over() {
                 break;

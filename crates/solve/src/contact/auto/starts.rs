@@ -207,9 +207,11 @@ impl<const D: usize> OnContacts<Auto, D> {
         let HybridWork { newton, state, inner_best, done, sweep, stage, scale, .. } = work;
         let Some(newton) = newton else { return lost() };
         let r = P::impulses(point);
-        for _ in 0..(RESCUE << rescues).min(most as usize).max(1) {
-            let moves = sweep.sweep(problem, state, r);
-            done.between += 1;
+        let count = (RESCUE << rescues).min(most as usize).max(1);
+        let together = sweep.together(count);
+        for _ in 0..count / together {
+            let moves = sweep.sweeps(problem, state, r, together);
+            done.between += together;
             if runs_away(moves.sqrt() / *scale) || budget::over() {
                 break;
             }

@@ -7,13 +7,16 @@
 
 use nonsmooth_linalg::budget::{self, TooLarge};
 use nonsmooth_linalg::{
-    Block, Bsr, Compensated, Csc, Delassus, Inverse, Refine, Singular, norm_or_one, small,
+    Block, Bsr, Compensated, Csc, Delassus, Inverse, Passes, Refine, Singular, norm_or_one, small,
 };
 use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::{Bounds, Dynamics, FrictionGlobal, GlobalPoint};
 
 use super::linearised::{BodyForm, ContactForm, Form, Once, System, made, there, unaffordable};
-use super::{Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Linear, Linearised, Rows};
+use super::{
+    Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Linear, Linearised, MANY, Rows,
+    Visits,
+};
 use crate::SolveError;
 use crate::contact::law::DiskLaw;
 
@@ -132,8 +135,11 @@ impl<const D: usize, L: DiskLaw<D>> Contacts<D> for FrictionGlobal<D, L> {
                     Operator::Condensed(Delassus::condense(&self.H, inverse))
                 }
                 Access::Visits | Access::Rows | Access::Newton => {
-                    // Rows with bounds speak of v itself.
+                    // Rows with bounds speak of v itself; those who sweep in an order of their own keep it.
                     Operator::Visits(match rows.is_empty() {
+                        true if access == Access::Newton => {
+                            Delassus::arranged(&self.H, inverse, MANY)
+                        }
                         true => Delassus::new(&self.H, inverse),
                         false => Delassus::direct(&self.H, inverse),
                     })
@@ -286,6 +292,21 @@ impl<const D: usize, L: DiskLaw<D>> Blockwise<D> for FrictionGlobal<D, L> {
         if let Operator::Visits(delassus) = &state.operator {
             delassus.foresee(c, &state.y);
         }
+    }
+
+    fn passes<'a>(&self, state: &'a Self::State) -> Option<&'a Passes> {
+        match &state.operator {
+            Operator::Visits(delassus) => delassus.passes(),
+            _ => None,
+        }
+    }
+
+    fn moving<'a>(&'a self, state: &'a mut Self::State) -> Option<Visits<'a, D>> {
+        let GlobalState { operator: Operator::Visits(delassus), y, .. } = state else {
+            return None;
+        };
+        let (passes, moving) = delassus.moving(y)?;
+        Some(Visits { passes, moving, given: &self.w })
     }
 }
 

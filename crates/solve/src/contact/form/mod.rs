@@ -21,7 +21,7 @@ mod local;
 mod regularised;
 mod rows;
 
-use nonsmooth_linalg::{Block, Singular, small};
+use nonsmooth_linalg::{Block, Moving, Passes, Singular, small};
 use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::{Bounds, Problem};
 
@@ -145,6 +145,29 @@ pub trait Blockwise<const D: usize>: Rows<D> {
     /// Contact `c` will be visited after [`AHEAD`] others: what the visit reads from afar may be fetched into the cache.
     #[inline(always)]
     fn foresee(&self, _state: &Self::State, _c: usize) {}
+
+    /// How sweeps may follow each other on several threads, where there are [`MANY`] contacts: each comes to the contacts in this order.
+    fn passes<'a>(&self, _state: &'a Self::State) -> Option<&'a Passes> {
+        None
+    }
+
+    /// The same view for visits from several threads, where it has passes.
+    fn moving<'a>(&'a self, _state: &'a mut Self::State) -> Option<Visits<'a, D>> {
+        None
+    }
+}
+
+/// So many contacts are worth an order of their own: a sweep takes a millisecond.
+const MANY: usize = 20_000;
+
+/// What a view that has passes lets several threads see and move at the same time: `u_c − given_c`, by the contact's position in the passes.
+pub struct Visits<'a, const D: usize> {
+    /// The passes.
+    pub passes: &'a Passes,
+    /// `H_cᵀ v`.
+    pub moving: Moving<'a, D>,
+    /// The part of the velocities that no impulse changes, by contact.
+    pub given: &'a [f64],
 }
 
 /// So many visits take as long as memory takes to answer.

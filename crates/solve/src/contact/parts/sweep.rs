@@ -9,9 +9,9 @@
 //! Cost of a sweep: one pass over the blocks of W (or over the rows of H and M⁻¹H) plus nc local solves. Storage: the
 //! diagonal block and the local solver's memo of each contact.
 
-use nonsmooth_linalg::{budget, norm, small};
+use nonsmooth_linalg::{Parts, budget, norm, small};
 
-use crate::contact::form::{AHEAD, Blockwise, Disked};
+use crate::contact::form::{AHEAD, Blockwise, Disked, Visits};
 use crate::contact::law::DiskLaw;
 use crate::contact::law::cfun::natural_residual;
 use crate::contact::law::local::{LocalSolver, frictionless};
@@ -27,46 +27,63 @@ const FOLLOW: usize = 2;
 /// What sweeps keep for each contact.
 #[derive(Debug, Clone)]
 pub struct Sweep<L: DiskLaw<D>, const D: usize> {
+    /// In the order of the visits.
     contacts: Vec<Visited<L, D>>,
+    /// Several threads may make them.
+    shared: bool,
     /// The square of a velocity that is negligible.
     negligible: f64,
-    /// What the last sweep returned, and the contacts last followed.
+    /// `(w_c‖Δr_c‖)²` of each contact's last visit, what the last sweep returned, and the contacts last followed.
+    moved: Vec<f64>,
     moves: f64,
     followed: Vec<usize>,
+    /// Impulses, and what of the velocities does not depend on them, in the order of the visits.
+    gathered: Vec<([f64; D], [f64; D])>,
 }
 
 #[derive(Debug, Clone)]
 struct Visited<L: DiskLaw<D>, const D: usize> {
+    place: usize,
     w: [[f64; D]; D],
     law: L,
     /// `tr(W_cc)/D`.
     unit: f64,
     memo: <L::Local as LocalSolver<D, L>>::Memo,
-    /// `(w_c‖Δr_c‖)²` of the last visit.
-    moved: f64,
 }
 
 impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
     /// Sweeps over `problem`'s contacts.
-    pub fn new<P: Disked<D, Law = L>>(problem: &P, state: &P::State) -> Self {
+    pub fn new<P: Blockwise<D> + Disked<D, Law = L>>(problem: &P, state: &P::State) -> Self {
         let contacts = Vec::with_capacity(problem.contacts());
-        let mut sweep = Self { contacts, negligible: 0.0, moves: 0.0, followed: vec![] };
+        let mut sweep = Self {
+            contacts,
+            shared: false,
+            negligible: 0.0,
+            moved: vec![],
+            moves: 0.0,
+            followed: vec![],
+            gathered: vec![],
+        };
         sweep.fill(problem, state);
         sweep
     }
 
     /// Takes another problem; allocates nothing where the number of contacts is the same.
-    pub fn fill<P: Disked<D, Law = L>>(&mut self, problem: &P, state: &P::State) {
+    pub fn fill<P: Blockwise<D> + Disked<D, Law = L>>(&mut self, problem: &P, state: &P::State) {
         self.contacts.clear();
+        self.moved.clear();
+        self.moved.resize(problem.contacts(), 0.0);
         self.followed.clear();
         self.followed.reserve(problem.contacts() / FEW + 1);
         self.moves = 0.0;
         self.negligible = NEGLIGIBLE * problem.velocity_scale(state).powi(2);
-        for c in 0..problem.contacts() {
+        let passes = problem.passes(state);
+        self.shared = passes.is_some();
+        for c in (0..problem.contacts()).map(|at| passes.map_or(at, |passes| passes.item(at))) {
             let (w, law) = (problem.diagonal_block(state, c), problem.law(c));
             let unit = small::mean_diagonal(&w).abs();
             let memo = L::Local::default().prepare(&w, law);
-            self.contacts.push(Visited { w, law, unit, memo, moved: 0.0 });
+            self.contacts.push(Visited { place: c, w, law, unit, memo });
         }
     }
 
@@ -77,13 +94,74 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
         state: &mut P::State,
         r: &mut [f64],
     ) -> f64 {
-        let contacts = self.contacts.len();
+        let Self { contacts, negligible, moved, .. } = self;
         self.moves = 0.0;
-        for (c, contact) in self.contacts.iter_mut().enumerate() {
-            if c + AHEAD < contacts {
-                problem.foresee(state, c + AHEAD);
+        for at in 0..contacts.len() {
+            if let Some(ahead) = contacts.get(at + AHEAD) {
+                problem.foresee(state, ahead.place);
             }
-            self.moves += contact.visit(problem, state, r, c, self.negligible);
+            moved[at] = contacts[at].visit(problem, state, r, *negligible);
+            self.moves += moved[at];
+        }
+        self.moves
+    }
+
+    /// How many sweeps to ask [`sweeps`](Self::sweeps) for where so many are due: all where threads may share them, so that their number changes nothing, else one.
+    pub fn together(&self, due: usize) -> usize {
+        if self.shared { due } else { 1 }
+    }
+
+    /// As many sweeps, on all threads that the budget allows, one behind the other ([`Passes`](nonsmooth_linalg::Passes)): the same bits for any number of threads. Returns what
+    /// the last one moved. It ends early where the budget is over.
+    pub fn sweeps<P: Blockwise<D> + Disked<D, Law = L>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        r: &mut [f64],
+        count: usize,
+    ) -> f64 {
+        let Some(Visits { passes, moving, given }) = problem.moving(state) else {
+            for _ in 0..count {
+                self.sweep(problem, state, r);
+            }
+            return self.moves;
+        };
+        // In the order of the visits: memory is read from one end to the other.
+        let Self { contacts, negligible, gathered, moved, .. } = self;
+        let negligible = *negligible;
+        gathered.clear();
+        let places = contacts.iter().map(|contact| contact.place);
+        gathered.extend(places.map(|c| (small::block(r, c), small::block(given, c))));
+        let (contacts, impulses) = (Parts::of(contacts), Parts::of(gathered));
+        let moved = Parts::of(moved);
+        self.moves = passes.run(count, |block| {
+            // SAFETY: two passes are never at the same block, ...
+            let (contacts, impulses, moved) = unsafe {
+                let at = (block.start, block.len());
+                (contacts.part(at.0, at.1), impulses.part(at.0, at.1), moved.part(at.0, at.1))
+            };
+            let of_block = contacts.iter_mut().zip(impulses).zip(&mut *moved);
+            for (at, ((contact, (old, given)), moved)) in block.clone().zip(of_block) {
+                if at + AHEAD < block.end {
+                    moving.foresee(at + AHEAD);
+                }
+                // SAFETY: ... nor at contacts that feel each other.
+                let mut u = unsafe { moving.local_velocity(at) };
+                for k in 0..D {
+                    u[k] += given[k];
+                }
+                let answer = contact.answer(old, u, negligible);
+                *moved = answer.moved;
+                if let Some(dr) = answer.dr {
+                    *old = answer.new;
+                    // SAFETY: as before.
+                    unsafe { moving.apply_impulse(at, &dr) };
+                }
+            }
+            moved.iter().sum()
+        });
+        for (contact, (new, _)) in self.contacts.iter().zip(&self.gathered) {
+            r[D * contact.place..D * contact.place + D].copy_from_slice(new);
         }
         self.moves
     }
@@ -96,21 +174,21 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
         state: &mut P::State,
         r: &mut [f64],
     ) -> usize {
-        let Self { contacts, followed, negligible, moves, .. } = self;
+        let Self { contacts, followed, negligible, moved, moves, .. } = self;
         let (all, few) = (contacts.len(), contacts.len() / FEW);
         let least = FOLLOWED * *moves / all as f64;
         followed.clear();
-        let moving = contacts.iter().enumerate().filter(|(_, contact)| contact.moved > least);
-        followed.extend(moving.map(|(c, _)| c).take(few + 1));
+        let moving = moved.iter().enumerate().filter(|(_, moved)| **moved > least);
+        followed.extend(moving.map(|(at, _)| at).take(few + 1));
         if followed.is_empty() || followed.len() > few {
             return 0;
         }
-        let others = *moves - followed.iter().map(|&c| contacts[c].moved).sum::<f64>();
+        let others = *moves - followed.iter().map(|&at| moved[at]).sum::<f64>();
         let mut passes = 0;
         while passes * followed.len() < FOLLOW * all && !budget::over() {
             passes += 1;
             let visits =
-                followed.iter().map(|&c| contacts[c].visit(problem, state, r, c, *negligible));
+                followed.iter().map(|&at| contacts[at].visit(problem, state, r, *negligible));
             let moves: f64 = visits.sum();
             // Neither may it go on where moves are not finite.
             if !(moves > others && moves.is_finite()) {
@@ -123,42 +201,62 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
     /// `max_c w_c‖r_c‖`, a velocity.
     pub fn largest(&self, r: &[f64]) -> f64 {
         let of =
-            |(c, contact): (usize, &Visited<L, D>)| contact.unit * norm(&small::block::<D>(r, c));
-        self.contacts.iter().enumerate().map(of).fold(0.0, f64::max)
+            |contact: &Visited<L, D>| contact.unit * norm(&small::block::<D>(r, contact.place));
+        self.contacts.iter().map(of).fold(0.0, f64::max)
     }
 
     /// The natural residual `‖( w_c r_c − P_K(w_c r_c − ũ_c) )_c‖` at r, whose velocities are u.
     pub fn residual(&self, u: &[f64], r: &[f64]) -> f64 {
         let mut sum = 0.0;
-        for (c, contact) in self.contacts.iter().enumerate() {
-            let (u, r) = (small::block::<D>(u, c), small::block(r, c));
+        for contact in &self.contacts {
+            let (u, r) = (small::block::<D>(u, contact.place), small::block(r, contact.place));
             sum += natural_residual(contact.unit, &r, &u, contact.law);
         }
         sum.sqrt()
     }
 }
 
+/// What a visit finds.
+struct Answer<const D: usize> {
+    new: [f64; D],
+    /// By how much it differs from the old impulse, if that is not negligible.
+    dr: Option<[f64; D]>,
+    /// `(w_c‖Δr_c‖)²`, 0 where that is negligible.
+    moved: f64,
+}
+
 impl<L: DiskLaw<D>, const D: usize> Visited<L, D> {
-    /// Solves the problem of this contact, the c-th; returns `(w_c‖Δr_c‖)²`, 0 where that is negligible and the move not made.
+    /// Solves the problem of this contact; returns `(w_c‖Δr_c‖)²`, 0 where that is negligible and the move not made.
     #[inline]
     fn visit<P: Blockwise<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
         r: &mut [f64],
-        c: usize,
         negligible: f64,
     ) -> f64 {
-        let old: [f64; D] = small::block(r, c);
-        let mut q = problem.velocity(state, r, c);
-        let own = small::mul(&self.w, &old);
+        let c = self.place;
+        let u = problem.velocity(state, r, c);
+        let answer = self.answer(&small::block(r, c), u, negligible);
+        if let Some(dr) = answer.dr {
+            r[D * c..D * c + D].copy_from_slice(&answer.new);
+            problem.moved(state, c, &dr);
+        }
+        answer.moved
+    }
+
+    /// Solves the contact's own problem, where `old` has the velocity u.
+    #[inline(always)]
+    fn answer(&mut self, old: &[f64; D], u: [f64; D], negligible: f64) -> Answer<D> {
+        let mut q = u;
+        let own = small::mul(&self.w, old);
         for k in 0..D {
             q[k] -= own[k];
         }
         let new = if self.law.is_frictionless() {
-            frictionless(&self.w, &q, &old)
+            frictionless(&self.w, &q, old)
         } else {
-            L::Local::default().solve(&mut self.memo, &self.w, &q, self.law, &old)
+            L::Local::default().solve(&mut self.memo, &self.w, &q, self.law, old)
         };
         let mut dr = new;
         for k in 0..D {
@@ -167,13 +265,10 @@ impl<L: DiskLaw<D>, const D: usize> Visited<L, D> {
         let moved = dr.iter().map(|x| (self.unit * x).powi(2)).sum::<f64>();
         // Of an empty block a move has no velocity; one that is not finite is made too, and seen.
         let unfelt = self.unit == 0.0 && dr != [0.0; D];
-        let made = moved > negligible || moved.is_nan() || unfelt;
-        self.moved = if made { moved } else { 0.0 };
-        if made {
-            r[D * c..D * c + D].copy_from_slice(&new);
-            problem.moved(state, c, &dr);
+        match moved > negligible || moved.is_nan() || unfelt {
+            true => Answer { new, dr: Some(dr), moved },
+            false => Answer { new, dr: None, moved: 0.0 },
         }
-        self.moved
     }
 }
 
