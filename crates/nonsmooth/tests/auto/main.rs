@@ -9,7 +9,7 @@ use common::{run, within};
 use nonsmooth_linalg::{Bsr, Csc, norm};
 use nonsmooth_problem::check::{Existence, Judged};
 use nonsmooth_problem::planted::{Planted, PlantedMix};
-use nonsmooth_problem::{FrictionGlobal, FrictionLocal, GlobalPoint, RowsGlobal};
+use nonsmooth_problem::{FrictionGlobal, FrictionLocal, GlobalPoint, Problem, RowsGlobal};
 use nonsmooth_scenes::Scene;
 use nonsmooth_scenes::scenes::{
     Arch, Chain, Family, Kapla, SlidingBox, SpherePile, Spheres, Stack, State, Wall,
