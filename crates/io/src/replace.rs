@@ -102,8 +102,8 @@ fn machine() -> u64 {
     })
 }
 
-/// Removes what was left in a folder. That it cannot be is no mistake of who writes there.
-fn clean(folder: &Path) {
+/// Removes what killed processes left in a folder. That it cannot be is no mistake of who writes there.
+pub(crate) fn clean(folder: &Path) {
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let Some((process, machine)) = writer(&entry.file_name()) else { continue };
         let Ok(file) = entry.metadata() else { continue };

@@ -126,6 +126,13 @@ fn a_run_that_grows_is_written_by_parts_and_read_as_one() {
     // Nothing new is nothing written; the end is one file.
     writer.flush(&all).unwrap();
     assert_eq!(files(&parts), before);
+    // What a writer had begun that was killed goes with the parts: no process has this number.
+    let begun = nonsmooth_io::beside(&parts.join("000000000007.h5")).unwrap();
+    let name = begun.file_name().unwrap().to_str().unwrap();
+    let own = format!(".{}-", std::process::id());
+    let left = name.replace(&own, &format!(".{}-", u32::MAX));
+    assert_ne!(left, name);
+    std::fs::write(parts.join(left), "half of a part").unwrap();
     writer.finish(&all).unwrap();
     assert!(!parts.exists());
     assert_same(&Trajectory::parse(&path, &std::fs::read(&path).unwrap()).unwrap(), &all);

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use super::write::View;
 use super::{Frame, Step, Trajectory, digest, write};
 use crate::IoError;
-use crate::replace::WRITABLE;
+use crate::replace::{WRITABLE, clean};
 
 /// So many parts of like size are joined.
 const LIKE: usize = 8;
@@ -145,8 +145,10 @@ pub(super) fn remove(path: &Path) {
     for file in beside(path) {
         let _ = std::fs::remove_file(file);
     }
-    // Whatever else stands there stays.
-    let _ = std::fs::remove_dir(folder(path));
+    let folder = folder(path);
+    // A part that a killed writer had begun; whatever else stands there stays.
+    clean(&folder);
+    let _ = std::fs::remove_dir(folder);
 }
 
 /// Between the steps of a run and those of its next part: the last before it and the first after it.
