@@ -146,7 +146,7 @@ pub trait Blockwise<const D: usize>: Rows<D> {
     #[inline(always)]
     fn foresee(&self, _state: &Self::State, _c: usize) {}
 
-    /// How sweeps may follow each other on several threads, where there are [`MANY`] contacts: each comes to the contacts in this order.
+    /// How sweeps may follow each other on several threads, where there are 20 000 contacts or more: each comes to the contacts in this order.
     fn passes<'a>(&self, _state: &'a Self::State) -> Option<&'a Passes> {
         None
     }
