@@ -4,7 +4,7 @@
 use super::budget::Pace;
 use super::passes::{Parts, Passes};
 use super::roots::Roots;
-use super::row::foresee;
+use super::row::prefetch;
 use super::{Block, BlockRow, Bsr, Csc, Inverse};
 
 /// `W = Hᵀ M⁻¹ H` without W, for the movements of Gauss–Seidel in velocity space: `u_c = H_cᵀ v + w_c` and `v += M⁻¹ H_c Δr_c` cost O(rows touched).
@@ -45,20 +45,16 @@ impl<const D: usize> Delassus<D> {
     ///
     /// Cost: with roots O(rows touched), else D solves for each contact and component of M that it touches.
     pub fn new(h: &Csc, inverse: &Inverse) -> Self {
-        match Roots::of(inverse) {
-            Some(roots) => Self::rooted(h, inverse, roots, None),
-            None => Self::direct(h, inverse),
-        }
+        Self::arranged(h, inverse, usize::MAX)
     }
 
     /// The same; at least so many contacts are kept in an order in which sweeps can follow each other closely, where M has roots.
     pub fn arranged(h: &Csc, inverse: &Inverse, many: usize) -> Self {
-        match Roots::of(inverse) {
-            Some(roots) if h.ncols() / D >= many => {
-                Self::rooted(h, inverse, roots, Some(passes::<D>(h, inverse)))
-            }
-            _ => Self::new(h, inverse),
-        }
+        let Some(roots) = Roots::of(inverse) else {
+            return Self::direct(h, inverse);
+        };
+        let passes = (h.ncols() / D >= many).then(|| passes::<D>(h, inverse));
+        Self::rooted(h, inverse, roots, passes)
     }
 
     /// Keeps H and Z whatever M is: y = v.
@@ -207,7 +203,7 @@ impl<const D: usize> Delassus<D> {
     pub fn foresee(&self, c: usize, y: &[f64]) {
         self.seen.each_run(self.at(c), |first, rows| {
             let y = &y[first..first + rows.len()];
-            y.first().into_iter().chain(y.last()).for_each(foresee);
+            y.first().into_iter().chain(y.last()).for_each(|y| prefetch(y));
         });
     }
 

@@ -12,10 +12,10 @@
 
 use std::marker::PhantomData;
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
 use crate::budget;
-use crate::row::prefetch_at;
+use crate::row::prefetch;
 
 /// Items between two looks at how far the pass before has come.
 const BLOCK: usize = 256;
@@ -98,7 +98,7 @@ impl Passes {
     pub fn run(&self, count: usize, work: impl Fn(Range<usize>) -> f64 + Sync) -> f64 {
         let board = Board {
             done: (0..count).map(|_| AtomicUsize::new(0)).collect(),
-            sum: (0..count).map(|_| AtomicUsize::new(0)).collect(),
+            sum: AtomicU64::new(0.0_f64.to_bits()),
             taken: AtomicUsize::new(0),
             ended: AtomicBool::new(false),
         };
@@ -112,7 +112,7 @@ impl Passes {
                 self.lane(board, true, work);
             }),
         }
-        board.sum.last().map_or(0.0, |sum| f64::from_bits(sum.load(Ordering::Acquire) as u64))
+        f64::from_bits(board.sum.load(Ordering::Acquire))
     }
 
     /// Passes that nobody has taken, one after the other. Who takes one is at work, so nobody waits for a thread that the system has not given a core
@@ -135,16 +135,18 @@ impl Passes {
                 sum += work(block * BLOCK..((block + 1) * BLOCK).min(self.items));
                 board.done[pass].store(block + 1, Ordering::Release);
             }
-            board.sum[pass].store(f64::to_bits(sum) as usize, Ordering::Release);
+            if pass + 1 == board.done.len() {
+                board.sum.store(sum.to_bits(), Ordering::Release);
+            }
         }
     }
 }
 
 /// How far the passes are.
 struct Board {
-    /// Blocks done, and the bits of the sums of those that are through.
+    /// Blocks done of each, and the bits of the sum of the last once it is through.
     done: Vec<AtomicUsize>,
-    sum: Vec<AtomicUsize>,
+    sum: AtomicU64,
     taken: AtomicUsize,
     /// The budget is over, or somebody has panicked.
     ended: AtomicBool,
@@ -283,8 +285,8 @@ impl<'a, T> Parts<'a, T> {
     pub fn prefetch(&self, begin: usize, len: usize) {
         let end = (begin + len).min(self.len);
         if begin < end {
-            prefetch_at(self.first.wrapping_add(begin));
-            prefetch_at(self.first.wrapping_add(end - 1));
+            prefetch(self.first.wrapping_add(begin));
+            prefetch(self.first.wrapping_add(end - 1));
         }
     }
 

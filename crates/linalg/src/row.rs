@@ -99,15 +99,9 @@ mod avx2 {
     }
 }
 
-/// Asks for the line of the cache that x lies in.
-#[inline(always)]
-pub(crate) fn foresee(x: &f64) {
-    prefetch_at(std::ptr::from_ref(x));
-}
-
 /// Asks for the line of the cache at an address.
 #[inline(always)]
-pub(crate) fn prefetch_at<T>(x: *const T) {
+pub(crate) fn prefetch<T>(x: *const T) {
     #[cfg(target_arch = "x86_64")]
     // SAFETY: a prefetch changes nothing that a program can see, and faults at no address.
     unsafe {
