@@ -102,22 +102,30 @@ impl Passes {
             taken: AtomicUsize::new(0),
             ended: AtomicBool::new(false),
         };
+        let budget = budget::current();
         match budget::team().filter(|_| count > 1) {
-            None => self.lane(&board, true, &work),
+            None => self.lane(&board, &work),
             Some(team) => team.in_place_scope(|scope| {
-                let (work, board) = (&work, &board);
+                let (work, board, budget) = (&work, &board, &budget);
                 for _ in 1..team.current_num_threads() {
-                    scope.spawn(move |_| self.lane(board, false, work));
+                    scope.spawn(move |_| {
+                        let _scope = budget.enter();
+                        self.lane(board, work);
+                    });
                 }
-                self.lane(board, true, work);
+                self.lane(board, work);
             }),
+        }
+        if board.ended.load(Ordering::Acquire) {
+            // Whoever saw it first: the thread that asked knows that its budget is over.
+            budget::over();
         }
         f64::from_bits(board.sum.load(Ordering::Acquire))
     }
 
     /// Passes that nobody has taken, one after the other. Who takes one is at work, so nobody waits for a thread that the system has not given a core
     /// for longer than that lasts.
-    fn lane(&self, board: &Board, leads: bool, work: &(impl Fn(Range<usize>) -> f64 + Sync)) {
+    fn lane(&self, board: &Board, work: &(impl Fn(Range<usize>) -> f64 + Sync)) {
         let _leaving = Leaving(board);
         loop {
             let pass = board.taken.fetch_add(1, Ordering::AcqRel);
@@ -126,7 +134,7 @@ impl Passes {
             }
             let mut sum = 0.0;
             for (block, &ahead) in self.ahead.iter().enumerate() {
-                if leads && budget::over() {
+                if budget::over() {
                     board.ended.store(true, Ordering::Release);
                 }
                 if !board.wait(pass, ahead as usize) {
@@ -393,16 +401,20 @@ mod tests {
     fn passes_end_when_the_budget_is_over() {
         let (ptr, places, count) = shuffled_band(6000, 40);
         let passes = Passes::new(&ptr, &places, count);
-        let flag = std::sync::Arc::new(AtomicBool::new(true));
-        for threads in [1, 2] {
+        for threads in [1, 2, 5] {
+            let flag = std::sync::Arc::new(AtomicBool::new(false));
             let budget = Budget { threads, cancel: Some(flag.clone()), ..Budget::default() };
-            let _scope = budget.enter();
+            let scope = budget.enter();
             let visited = AtomicUsize::new(0);
+            // Whichever thread comes so far first, each makes the block that it has begun and no other.
             passes.run(1000, |block| {
-                visited.fetch_add(block.len(), Ordering::Relaxed);
+                let before = visited.fetch_add(block.len(), Ordering::AcqRel);
+                flag.fetch_or(before >= 6000 * 7, Ordering::AcqRel);
                 0.0
             });
-            assert!(visited.into_inner() < 6000 * 1000);
+            let visited = visited.into_inner();
+            assert!(scope.raised());
+            assert!(visited < 6000 * 7 + (threads + 1) * BLOCK, "{visited}");
         }
     }
 }
