@@ -21,6 +21,7 @@ pub use error::ProblemError;
 pub use kinds::complementarity::{
     BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mcp, Mlcp, Part, Parts, Shape, Stated, plural,
 };
+pub use kinds::contact::factors;
 pub use kinds::contact::{
     Bounds, Coulomb, Dynamics, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Rolling,
     RollingData, RollingGlobal, RollingLocal, RowsGlobal, RowsLocal, Weighed,

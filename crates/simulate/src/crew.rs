@@ -12,6 +12,7 @@ use std::cmp::Reverse;
 use std::sync::{Mutex, PoisonError};
 
 use nonsmooth_linalg::{Bsr, budget};
+use nonsmooth_problem::factors::FactorsGauge;
 use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem, RollingLocal};
 use nonsmooth_solve::registry::Registered;
 use nonsmooth_solve::settings::SettingsMap;
@@ -67,7 +68,9 @@ pub(crate) struct Slot<const D: usize> {
     pub rolling: Option<RollingLocal>,
     pub point: LocalPoint,
     pub asked: Asked,
-    /// What came of it; nothing where the problem is not finite.
+    /// Tells whether the impulses of the step before are good enough before W is formed.
+    pub gauge: FactorsGauge,
+    /// What came of it, before the solver is asked where it need not be; nothing where the problem is not finite.
     pub outcome: Option<Result<Outcome, SolveError>>,
     /// A number for each contact, for who states the problem.
     pub scratch: Vec<u32>,
@@ -92,6 +95,7 @@ where
             rolling: None,
             point,
             asked,
+            gauge: FactorsGauge::default(),
             outcome: None,
             scratch,
             own: Mutex::new(None),
@@ -103,7 +107,9 @@ where
     }
 
     fn solve(&mut self, sessions: &mut Sessions<D>, inner: &Inner) {
-        self.outcome = sessions.solve(self, inner).transpose();
+        if self.outcome.is_none() {
+            self.outcome = sessions.solve(self, inner).transpose();
+        }
     }
 
     fn own(&mut self) -> &mut Option<Sessions<D>> {
@@ -241,7 +247,7 @@ impl Crew {
         });
     }
 
-    /// Solves the `open` ones of the slots, in ascending order; small ones by the `sessions`, one for each part of them, which are made where they are needed. Each keeps its
+    /// Solves the `open` ones of the slots that have no outcome yet, in ascending order; small ones by the `sessions`, one for each part of them, which are made where they are needed. Each keeps its
     /// outcome, errors too.
     ///
     /// Errors: a solver that does not exist.
@@ -260,7 +266,7 @@ impl Crew {
         }
         for &k in open {
             let slot = &mut slots[k as usize];
-            if slot.is_large() && slot.own().is_none() {
+            if slot.outcome.is_none() && slot.is_large() && slot.own().is_none() {
                 *slot.own() = Some(Sessions::new(inner)?);
             }
         }

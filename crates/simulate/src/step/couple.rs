@@ -28,6 +28,9 @@ pub(super) trait Sided<const D: usize>: Copy + Default + Send + Sync {
     /// The same with velocities as six numbers.
     fn rate(&self, i: usize, velocities: &[f64; 6]) -> f64;
 
+    /// For each component of the body's velocity what it makes of the relative velocity, and what the impulse makes of it.
+    fn columns(&self) -> impl Iterator<Item = ([f64; D], [f64; D])>;
+
     /// The block of W of two contacts, a sum over the free bodies that they share.
     fn coupling(own: &[Self; 2], other: &[Self; 2], shared: Shared) -> [[f64; D]; D];
 }
@@ -56,6 +59,12 @@ impl Sided<3> for Side {
 
     fn rate(&self, i: usize, velocities: &[f64; 6]) -> f64 {
         (0..6).map(|k| self.rows[k][i] * velocities[k]).sum()
+    }
+
+    #[inline]
+    fn columns(&self) -> impl Iterator<Item = ([f64; 3], [f64; 3])> {
+        let three = |[x, y, z, _]: [f64; 4]| [x, y, z];
+        self.rows.iter().zip(&self.solved).map(move |(row, solved)| (three(*row), three(*solved)))
     }
 
     #[inline]
@@ -91,6 +100,11 @@ impl Sided<2> for FlatSide {
     fn rate(&self, i: usize, velocities: &[f64; 6]) -> f64 {
         let [x, y, .., turn] = velocities;
         self.rows[0][i] * x + self.rows[1][i] * y + self.rows[2][i] * turn
+    }
+
+    #[inline]
+    fn columns(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2])> {
+        self.rows.iter().copied().zip(self.solved)
     }
 
     #[inline]

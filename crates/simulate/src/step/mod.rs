@@ -205,7 +205,7 @@ impl Tools {
         self.islands.unite();
         self.touching.arrange(self.islands.of_body.len(), &self.pairs, &self.islands);
         self.open.begin(1);
-        self.state(stride);
+        self.state(stride, None);
         Ok(Some(self.stated.problem(0)))
     }
 

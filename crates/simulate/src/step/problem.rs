@@ -1,15 +1,18 @@
 //! The problems of the islands in the frames of a pass: W, q, mu of their contacts, `V, R, s` and bounds of their scalar rows, and the same with rolling friction.
 //!
-//! Islands are stated at the same time, and the contacts of a large one too. W of a symmetric problem is one half and its mirror image, to the last bit.
+//! Islands are stated at the same time, and the contacts of a large one too. W of a symmetric problem is one half and its mirror image, to the last bit. It is most of the work, and
+//! whether the impulses of the step before are good enough can be told from its factors: so of an island at rest it is never formed.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
 use nonsmooth_linalg::{Block, Csc};
+use nonsmooth_problem::factors::Factors;
 use nonsmooth_problem::{Bounds, Friction, FrictionLocal, LocalPoint, RowsLocal};
 use nonsmooth_scenes::vec3::{Vec3, apply, dot, scale};
 use nonsmooth_solve::registry::Registered;
-use nonsmooth_solve::{Outcome, SolveError};
+use nonsmooth_solve::{Outcome, SolveError, Status};
 
 use super::contact::Row;
 use super::couple::{Columns, FlatSide, Shared, Side, Sided};
@@ -185,8 +188,13 @@ impl Tools {
         island.gather(items.iter().copied(), rows, joints);
     }
 
-    /// States the problems of the open islands in their slots.
-    pub(super) fn state(&mut self, Stride { scheme, h, world }: Stride) {
+    /// States the problems of the open islands in their slots; with a tolerance, those whose impulses to begin with the judge accepts get their outcome and no W. Returns the seconds
+    /// that judging took.
+    pub(super) fn state(
+        &mut self,
+        Stride { scheme, h, world }: Stride,
+        tolerance: Option<f64>,
+    ) -> f64 {
         let Self { crew, islands, touching, open, solids, joints, rows, bodies, stated, .. } = self;
         let (due, count) = (&open.due[..], world.bodies.len());
         let is_due = |k: u32| k != NONE && due[k as usize];
@@ -207,14 +215,10 @@ impl Tools {
         }
         let parts = Parts { crew, islands, touching, due, rows, bodies, joints, solids };
         match stated {
-            Stated::Space(p) => p.state_all(&parts, |p, k, slot, sides| {
-                p.state(k, slot, sides)
-                    && p.state_rows(k, slot, sides)
-                    && p.state_rolling(k, slot, sides)
-            }),
-            Stated::Plane(p) => p.state_all(&parts, |p, k, slot, sides| {
-                p.state(k, slot, sides) && p.state_rows(k, slot, sides)
-            }),
+            Stated::Space(p) => {
+                p.state_all(&parts, tolerance, |k, slot, sides| parts.state_rolling(k, slot, sides))
+            }
+            Stated::Plane(p) => p.state_all(&parts, tolerance, |_, _, _| true),
         }
     }
 }
@@ -262,7 +266,7 @@ impl<const D: usize, S: Send> Cut for Slots<'_, D, S> {
     }
 }
 
-/// Consecutive rows of W of an island, from contact `first` on, q, mu and the impulses to begin with; `begins` has where in all blocks each row begins, and the last
+/// Consecutive rows of W of an island, from contact `first` on; `begins` has where in all blocks each row begins, and the last
 /// one ends. `next` is for each contact the place of the last block of its row that was mirrored, at first the diagonal one.
 struct Filling<'a, const D: usize> {
     first: usize,
@@ -270,21 +274,17 @@ struct Filling<'a, const D: usize> {
     columns: &'a mut [u32],
     blocks: &'a mut [Block<D>],
     next: &'a mut [u32],
-    mu: &'a mut [f64],
-    q: &'a mut [[f64; D]],
-    r: &'a mut [[f64; D]],
 }
 
 impl<const D: usize> Cut for Filling<'_, D> {
     fn count(&self) -> usize {
-        self.mu.len()
+        self.next.len()
     }
 
     fn cut(self, at: usize) -> (Self, Self) {
-        let Self { first, begins, columns, blocks, next, mu, q, r } = self;
+        let Self { first, begins, columns, blocks, next } = self;
         let middle = begins[at] - begins[0];
         let (columns, blocks, next) = (columns.cut(middle), blocks.cut(middle), next.cut(at));
-        let (mu, q, r) = (mu.cut(at), q.cut(at), r.cut(at));
         (
             Self {
                 first,
@@ -292,9 +292,6 @@ impl<const D: usize> Cut for Filling<'_, D> {
                 columns: columns.0,
                 blocks: blocks.0,
                 next: next.0,
-                mu: mu.0,
-                q: q.0,
-                r: r.0,
             },
             Self {
                 first: first + at,
@@ -302,34 +299,132 @@ impl<const D: usize> Cut for Filling<'_, D> {
                 columns: columns.1,
                 blocks: blocks.1,
                 next: next.1,
-                mu: mu.1,
-                q: q.1,
-                r: r.1,
             },
         )
     }
 }
 
+/// W of an island by its factors: each side of a contact moves its body, and the body both sides.
+struct ByBodies<'a, S> {
+    touching: &'a Touching,
+    island: usize,
+    sides: &'a [[S; 2]],
+    symmetric: bool,
+}
+
+impl<const D: usize, S: Sided<D>> Factors<D> for ByBodies<'_, S> {
+    fn contacts(&self) -> usize {
+        self.sides.len()
+    }
+
+    fn is_symmetric(&self) -> bool {
+        self.symmetric
+    }
+
+    fn bodies(&self) -> usize {
+        self.touching.members(self.island)
+    }
+
+    fn of(&self, contact: usize) -> [Option<usize>; 2] {
+        self.touching.members_at(self.touching.firsts[self.island] + contact)
+    }
+
+    #[inline]
+    fn side(&self, contact: usize, side: usize) -> impl Iterator<Item = ([f64; D], [f64; D])> {
+        self.sides[contact][side].columns()
+    }
+}
+
 impl Parts<'_> {
-    /// The columns of H and the rows of the velocities, W, q and mu, and the impulses to begin with; whether all is finite.
+    /// The columns of H and the rows of the velocities, q and mu, and the impulses to begin with; whether all is finite.
     fn state<const D: usize, S: Sided<D>>(
         &self,
         k: usize,
-        Slot { problem, point, scratch, .. }: &mut Slot<D>,
+        Slot { problem, point, .. }: &mut Slot<D>,
         sides: &mut [[S; 2]],
     ) -> bool {
         let Self { crew, touching, rows, bodies, .. } = *self;
-        let places = touching.island(k);
-        let (count, first) = (places.len(), places.start);
-        let order = &touching.order[places.clone()];
-        crew.spread((order, &mut *sides), count, |(order, sides)| {
-            for (&c, sides) in order.iter().zip(sides) {
+        let order = &touching.order[touching.island(k)];
+        let count = order.len();
+        problem.q.resize(D * count, 0.0);
+        problem.mu.resize(count, 0.0);
+        point.r.resize(D * count, 0.0);
+        let finite = AtomicBool::new(true);
+        let impulses = (&mut problem.mu[..], point.r.as_chunks_mut::<D>().0);
+        let velocities = problem.q.as_chunks_mut::<D>().0;
+        let all = ((order, sides), (velocities, impulses));
+        crew.spread(all, count, |((order, sides), (q, (mu, r)))| {
+            let mut check = 0.0;
+            let each = order.iter().zip(sides).zip(q).zip(mu).zip(r);
+            for ((((&c, sides), q), mu), r) in each {
                 let row = &rows[c as usize];
-                for (arm, side) in row.arms.iter().zip(sides).filter(|a| a.0.free) {
+                for (arm, side) in row.arms.iter().zip(&mut *sides).filter(|a| a.0.free) {
                     side.write(row, arm, &bodies[arm.body as usize]);
                 }
+                *mu = row.mu;
+                r.copy_from_slice(&row.r[..D]);
+                for i in 0..D {
+                    let given = row.given[i] + row.shift[i];
+                    q[i] = row.velocity(sides, i, given, bodies, |b| (b.v_free, b.spin_free));
+                    check += 0.0 * q[i];
+                }
+            }
+            if check != 0.0 {
+                finite.store(false, Ordering::Relaxed);
             }
         });
+        finite.into_inner()
+    }
+
+    /// Whether velocities are taken where impulses are, at all contacts of island k.
+    fn is_symmetric(&self, k: usize) -> bool {
+        let order = &self.touching.order[self.touching.island(k)];
+        order.iter().all(|&c| !self.rows[c as usize].later)
+    }
+
+    /// What the judge says of the impulses to begin with, from the factors of W, where it accepts them and contacts alone make the problem.
+    fn accept<const D: usize, S: Sided<D>>(
+        &self,
+        k: usize,
+        Slot { problem, point, rolling, gauge, .. }: &mut Slot<D>,
+        sides: &[[S; 2]],
+        tolerance: f64,
+    ) -> Option<Outcome> {
+        let Self { islands, touching, rows, solids, .. } = *self;
+        let alone = |&c: &u32| rows[c as usize].mu_r == 0.0 && rows[c as usize].compliance == 0.0;
+        let order = &touching.order[touching.island(k)];
+        if !(solids.is_empty()
+            && scalars(islands, rows.len(), k).is_empty()
+            && order.iter().all(alone))
+        {
+            return None;
+        }
+        let begun = Instant::now();
+        let factors = ByBodies { touching, island: k, sides, symmetric: self.is_symmetric(k) };
+        let measure = gauge.accept(&factors, (&problem.q, &problem.mu), &point.r, tolerance)?;
+        (problem.rows, *rolling) = (None, None);
+        point.lambda.clear();
+        Some(Outcome {
+            status: Status::Solved,
+            measure,
+            iterations: 0,
+            factorisations: 0,
+            seconds: begun.elapsed().as_secs_f64(),
+            cpu_seconds: None,
+        })
+    }
+
+    /// W; whether it is finite.
+    fn form<const D: usize, S: Sided<D>>(
+        &self,
+        k: usize,
+        Slot { problem, scratch, .. }: &mut Slot<D>,
+        sides: &[[S; 2]],
+    ) -> bool {
+        let Self { crew, touching, .. } = *self;
+        let places = touching.island(k);
+        let (count, first) = (places.len(), places.start);
+        let symmetric = self.is_symmetric(k);
         scratch.resize(count, 0);
         crew.spread((places, &mut scratch[..]), count, |(places, lengths)| {
             for (place, length) in places.zip(lengths) {
@@ -338,21 +433,8 @@ impl Parts<'_> {
         });
         let lengths = scratch.iter().map(|&n| n as usize);
         let (begins, columns, blocks) = problem.W.lay_out(count, lengths);
-        problem.q.resize(D * count, 0.0);
-        problem.mu.resize(count, 0.0);
-        point.r.resize(D * count, 0.0);
-        let symmetric = order.iter().all(|&c| !rows[c as usize].later);
         let finite = AtomicBool::new(true);
-        let filling = Filling {
-            first,
-            begins,
-            columns,
-            blocks,
-            next: scratch,
-            mu: &mut problem.mu,
-            q: problem.q.as_chunks_mut().0,
-            r: point.r.as_chunks_mut().0,
-        };
+        let filling = Filling { first, begins, columns, blocks, next: scratch };
         crew.spread(filling, count, |part| {
             if !self.fill(part, (first, sides), symmetric) {
                 finite.store(false, Ordering::Relaxed);
@@ -367,20 +449,12 @@ impl Parts<'_> {
         (origin, sides): (usize, &[[S; 2]]),
         symmetric: bool,
     ) -> bool {
-        let Self { touching, rows, bodies, solids, .. } = *self;
+        let Self { touching, rows, solids, .. } = *self;
         let mut check = 0.0;
         let offset = part.begins[0];
-        for at in 0..part.mu.len() {
+        for at in 0..part.next.len() {
             let place = part.first + at;
             let (row, own) = (&rows[touching.order[place] as usize], &sides[place - origin]);
-            part.mu[at] = row.mu;
-            part.r[at].copy_from_slice(&row.r[..D]);
-            for i in 0..D {
-                let given = row.given[i] + row.shift[i];
-                let q = row.velocity(own, i, given, bodies, |b| (b.v_free, b.spin_free));
-                part.q[at][i] = q;
-                check += 0.0 * q;
-            }
             let begin = part.begins[at] - offset;
             let (before, from) = part.blocks.split_at_mut(begin);
             let through_solids = |block: &mut Block<D>, of: usize, with: usize| {
@@ -532,13 +606,38 @@ where
         Ok(())
     }
 
+    /// See [`Tools::state`]; `beyond` states what is beyond contacts and rows.
     fn state_all(
         &mut self,
         parts: &Parts,
-        state: impl Fn(&Parts, usize, &mut Slot<D>, &mut [[S; 2]]) -> bool + Sync,
-    ) {
+        tolerance: Option<f64>,
+        beyond: impl Fn(usize, &mut Slot<D>, &[[S; 2]]) -> bool + Sync,
+    ) -> f64 {
+        self.sides.resize(parts.touching.order.len(), [S::default(); 2]);
+        self.each(parts, |k, slot, sides| {
+            slot.outcome = None;
+            slot.asked.finite = parts.state(k, slot, sides);
+        });
+        let begun = Instant::now();
+        if let Some(tolerance) = tolerance {
+            self.each(parts, |k, slot, sides| {
+                slot.outcome = parts.accept(k, slot, sides, tolerance).map(Ok);
+            });
+        }
+        let seconds = begun.elapsed().as_secs_f64();
+        self.each(parts, |k, slot, sides| {
+            if slot.asked.finite && slot.outcome.is_none() {
+                slot.asked.finite = parts.form(k, slot, sides)
+                    && parts.state_rows(k, slot, sides)
+                    && beyond(k, slot, sides);
+            }
+        });
+        seconds
+    }
+
+    /// Calls with each island that is due, its slot and the sides of its contacts.
+    fn each(&mut self, parts: &Parts, call: impl Fn(usize, &mut Slot<D>, &mut [[S; 2]]) + Sync) {
         let touching = parts.touching;
-        self.sides.resize(touching.order.len(), [S::default(); 2]);
         let slots = &mut self.slots[..parts.due.len()];
         let all = Slots { first: 0, slots, sides: &mut self.sides, touching };
         parts.crew.spread(all, touching.order.len(), |Slots { first, slots, sides, .. }| {
@@ -547,7 +646,7 @@ where
                 let own;
                 (own, rest) = rest.split_at_mut(touching.island(k).len());
                 if parts.due[k] {
-                    slot.asked.finite = state(parts, k, slot, own);
+                    call(k, slot, own);
                 }
             }
         });

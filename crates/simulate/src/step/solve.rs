@@ -74,7 +74,7 @@ impl Tools {
         let mut solved = Solved { largest: sizes.max().unwrap_or(0), ..Solved::default() };
         while !self.open.list.is_empty() {
             solved.passes += 1;
-            self.state(stride);
+            solved.seconds += self.state(stride, Some(inner.limits.tolerance));
             for at in 0..self.open.list.len() {
                 let k = self.open.list[at] as usize;
                 let may_rest = solved.passes == 1

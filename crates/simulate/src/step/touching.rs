@@ -16,6 +16,9 @@ pub(super) struct Touching {
     pub firsts: Vec<usize>,
     /// The free bodies and elastic solids of each contact, by place.
     pairs: Vec<[u32; 2]>,
+    /// Of each body and solid that an island has its number there, and how many each island has.
+    numbers: Vec<u32>,
+    counts: Vec<u32>,
     /// Where in the list those of each body and solid end; twice the place of each of its contacts, and its side there.
     ends: Vec<u32>,
     list: Vec<u32>,
@@ -33,6 +36,14 @@ impl Touching {
             self.order.extend(items.take_while(|&&item| (item as usize) < contacts));
         }
         self.firsts.push(self.order.len());
+        self.counts.clear();
+        self.counts.resize(islands.ends.len(), 0);
+        self.numbers.resize(owners, NONE);
+        for (number, &k) in self.numbers.iter_mut().zip(&islands.of_body).filter(|o| *o.1 != NONE) {
+            let count = &mut self.counts[k as usize];
+            *number = *count;
+            *count += 1;
+        }
         self.place_of.resize(contacts, 0);
         self.pairs.clear();
         self.ends.clear();
@@ -60,6 +71,16 @@ impl Touching {
     /// The places of island k.
     pub fn island(&self, k: usize) -> Range<usize> {
         self.firsts[k]..self.firsts[k + 1]
+    }
+
+    /// How many bodies and solids island k has.
+    pub fn members(&self, k: usize) -> usize {
+        self.counts[k] as usize
+    }
+
+    /// The bodies and solids of the contact at a place, by their numbers in its island.
+    pub fn members_at(&self, place: usize) -> [Option<usize>; 2] {
+        self.pairs[place].map(|b| (b != NONE).then(|| self.numbers[b as usize] as usize))
     }
 
     fn listed(&self, owner: u32) -> &[u32] {

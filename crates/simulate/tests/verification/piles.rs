@@ -1,13 +1,16 @@
 //! Scenes of `gen` in motion: what should stand stands.
 
-use nonsmooth_problem::Friction;
+use nonsmooth_problem::check::Judged;
+use nonsmooth_problem::{Friction, LocalPoint};
 use nonsmooth_scenes::scenes::{Arch, Family, SCENES, SpherePile, Stack};
 use nonsmooth_scenes::vec3::sub;
-use nonsmooth_simulate::{Body, Control, MoreauJean, SceneFile, Simulation, StepReport, World};
+use nonsmooth_simulate::{
+    Body, Control, Law, MoreauJean, Polygon, SceneFile, Simulation, StepReport, World,
+};
 use nonsmooth_solve::settings::SettingsMap;
 use nonsmooth_solve::{Limits, existence, solve};
 
-use crate::{ball, check, near, simulation, world};
+use crate::{ball, block, check, near, simulation, world};
 
 /// Runs a world and returns how far its bodies have moved.
 fn moved(world: World, until: f64, h: f64) -> f64 {
@@ -233,5 +236,74 @@ fn a_pyramid_of_balls_that_can_stand_stands() {
             "{:e}",
             report.energy.kinetic
         );
+    }
+}
+
+/// Rows of 6, 5, … 1 boxes, or squares.
+fn pyramid(plane: bool) -> World {
+    let mut world = if plane {
+        World::in_plane([0.0, -9.81]).with_law(Law::friction(0.5))
+    } else {
+        world(0.5, 0.0)
+    };
+    world.add(if plane { Body::ground() } else { Body::floor() });
+    for row in 0..6 {
+        for k in 0..6 - row {
+            let x = 1.05 * (f64::from(k) + 0.5 * f64::from(row));
+            let z = 0.5 + f64::from(row);
+            world.add(match plane {
+                true => {
+                    let square = Polygon::rectangle([0.5; 2]).unwrap();
+                    Body::solid(square, 1.0).unwrap().at([x, z, 0.0])
+                }
+                false => block([0.5; 3]).at([x, 0.0, z]),
+            });
+        }
+    }
+    world
+}
+
+/// Of steps whose impulses those before have led to nobody has formed W: what was said of them is held against W, which the judge reads anew.
+#[test]
+fn what_is_told_without_w_holds_with_it() {
+    let mut rolling = world(0.5, 0.0);
+    rolling.add(Body::floor());
+    for k in 0..3 {
+        let ball = ball(0.1).at([f64::from(k), 0.0, 0.1]);
+        rolling.add(ball.moving([1.0, 0.0, 0.0], [0.0, 10.0, 0.0]));
+    }
+    let tolerance = 1e-8;
+    for (world, islands) in [(pyramid(false), 1), (pyramid(true), 1), (rolling, 3)] {
+        let mut simulation = simulation(world).with_tolerance(tolerance);
+        let mut unasked = 0;
+        for _ in 0..300 {
+            let stated = simulation.problem(5e-3).unwrap().unwrap();
+            let report = simulation.step(5e-3).unwrap();
+            assert!(report.status.is_solved());
+            if report.counts.iterations > 0 || report.newton > 1 {
+                continue;
+            }
+            unasked += 1;
+            let active = simulation.contacts().iter().filter(|c| c.active);
+            let (relative, solved) = match stated {
+                Friction::Local3(problem) => {
+                    let r = active.flat_map(|c| c.impulse).collect();
+                    let verdict = problem.judge(&LocalPoint { r, lambda: vec![] }, tolerance);
+                    verdict.map(|v| (v.measure.relative, v.solved)).unwrap()
+                }
+                Friction::Local2(problem) => {
+                    let r = active.flat_map(|c| [c.impulse[0], c.impulse[1]]).collect();
+                    let verdict = problem.judge(&LocalPoint { r, lambda: vec![] }, tolerance);
+                    verdict.map(|v| (v.measure.relative, v.solved)).unwrap()
+                }
+                other => panic!("{:?}", other.kind()),
+            };
+            assert!(solved, "{relative:e}");
+            // Of one island the two are the same number, the step's with a bound of its rounding.
+            if islands == 1 {
+                assert!(relative <= report.residual && report.residual <= relative + 1e-11);
+            }
+        }
+        assert!(unasked > 100, "{unasked}");
     }
 }

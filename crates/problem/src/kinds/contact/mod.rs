@@ -1,5 +1,6 @@
 //! Frictional contact problems as plain validated data, their judges and planted instances.
 
+pub mod factors;
 mod global;
 mod judge;
 pub(crate) mod law;

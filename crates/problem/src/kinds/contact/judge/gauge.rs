@@ -99,6 +99,33 @@ impl LawGauge {
         if self.norm_q > 0.0 { self.norm_q } else { 1.0 }
     }
 
+    /// Whether the sum of the natural map's squares in plain arithmetic, the first that decides, lets the impulses pass at `tolerance`.
+    pub(crate) fn may_pass<L: Law<D>, const D: usize>(
+        &self,
+        (r, u): (&[f64], &[f64]),
+        law: impl Fn(usize) -> L,
+        tolerance: f64,
+    ) -> bool {
+        let squares = self.w.iter().enumerate().map(|(c, &w)| {
+            let modified = law(c).modified_velocity(&small::block(u, c));
+            let map = law(c).natural_map(&small::block(r, c).map(|r: f64| w * r), &modified);
+            map.iter().map(|x| x * x).sum::<f64>()
+        });
+        // Where squares leave the range of double precision, the measurement tells.
+        squares.sum::<f64>() <= (1.01 * tolerance * self.unit()).powi(2).max(f64::MIN_POSITIVE)
+    }
+
+    /// What is beside the relative residual at large mu must not profit from the rounding of u, `doubt` times the `sizes` of its terms.
+    pub(crate) fn rounding_of_dual<L: Law<D>, const D: usize>(
+        &self,
+        laws: impl Iterator<Item = L>,
+        doubt: f64,
+        sizes: &[f64],
+    ) -> f64 {
+        let steepest = laws.map(|law| law.opening().sqrt() * law.growth()).fold(0.0, f64::max);
+        over(steepest * doubt * norm(sizes), self.norm_q)
+    }
+
     /// The residuals of the impulses `r` with the velocities `u`, to steer by or, with `care`, to decide by. There what the arithmetic T leaves in doubt is added to the
     /// residuals that decide, so that they never promise too much.
     ///

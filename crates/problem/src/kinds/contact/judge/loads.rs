@@ -60,6 +60,11 @@ impl Loads {
         self.parent[i] == self.parent[j]
     }
 
+    /// Whether i and j are coupled by now, however far.
+    pub(crate) fn are_in_one_group(&mut self, i: usize, j: usize) -> bool {
+        self.are_coupled(i, j) || self.root(i).0 == self.root(j).0
+    }
+
     /// Rows i and j are coupled; `ratio` is that of their units, asked for where they were not coupled before.
     pub(crate) fn couple(&mut self, i: usize, j: usize, ratio: impl FnOnce() -> f64) {
         if self.are_coupled(i, j) {

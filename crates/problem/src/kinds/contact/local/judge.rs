@@ -4,7 +4,7 @@ use crate::check::proof::{Exactly, bounded, exacts, monotone};
 use crate::check::rows::{Rows, add_blocks_plainly, doubt};
 use crate::check::{
     ConeSystem, ContactStatus, Judged, Kinematic, Kinematics, Law, Measure, Monotone, StatusCounts,
-    Verdict, over,
+    Verdict,
 };
 use crate::kinds::contact::judge::Weighed;
 use crate::kinds::contact::judge::gauge::{
@@ -165,10 +165,8 @@ impl LocalGauge {
         let doubt = f64::EPSILON * (*terms + 2) as f64;
         let care = Care { sizes, doubt: |i: usize| doubt * sizes[i] };
         let mut measure = law.measure::<_, _, D>((&point.r, u), Some(care), |c| problem.law(c));
-        // What is beside the relative residual at large mu must not profit from the rounding of u.
-        let steepest = (0..problem.contacts()).map(|c| problem.law(c));
-        let steepest = steepest.map(|law| law.opening().sqrt() * law.growth()).fold(0.0, f64::max);
-        measure.dual += over(steepest * doubt * norm(sizes), law.norm_q);
+        let laws = (0..problem.contacts()).map(|c| problem.law(c));
+        measure.dual += law.rounding_of_dual(laws, doubt, sizes);
         measure.passes(tolerance).then_some(measure)
     }
 
