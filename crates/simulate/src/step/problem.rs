@@ -1,7 +1,7 @@
 //! The problems of the islands in the frames of a pass: W, q, mu of their contacts, `V, R, s` and bounds of their scalar rows, and the same with rolling friction.
 //!
 //! Islands are stated at the same time, and the contacts of a large one too. W of a symmetric problem is one half and its mirror image, to the last bit. It is most of the work, and
-//! whether the impulses of the step before are good enough can be told from its factors: so of an island at rest it is never formed.
+//! whether the impulses of the step before are good enough can be told from its factors: so of a large island at rest it is never formed.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -19,7 +19,7 @@ use super::couple::{Columns, FlatSide, Shared, Side, Sided};
 use super::elastic::Solids;
 use super::touching::Touching;
 use super::{NONE, Stride, Tools, are_finite};
-use crate::crew::{Asked, Crew, Inner, Sessions, Slot};
+use crate::crew::{Asked, Crew, Inner, SMALL, Sessions, Slot};
 use crate::cut::Cut;
 use crate::islands::Islands;
 use crate::joints::Joints;
@@ -382,7 +382,7 @@ impl Parts<'_> {
         order.iter().all(|&c| !self.rows[c as usize].later)
     }
 
-    /// What the judge says of the impulses to begin with, from the factors of W, where it accepts them and contacts alone make the problem.
+    /// What the judge says of the impulses to begin with, from the factors of W, where it accepts them and many contacts alone make the problem.
     fn accept<const D: usize, S: Sided<D>>(
         &self,
         k: usize,
@@ -393,7 +393,9 @@ impl Parts<'_> {
         let Self { islands, touching, rows, solids, .. } = *self;
         let alone = |&c: &u32| rows[c as usize].mu_r == 0.0 && rows[c as usize].compliance == 0.0;
         let order = &touching.order[touching.island(k)];
-        if !(solids.is_empty()
+        // W of a small one is formed as soon, by memory that is at hand.
+        if !(order.len() > SMALL
+            && solids.is_empty()
             && scalars(islands, rows.len(), k).is_empty()
             && order.iter().all(alone))
         {
