@@ -5,7 +5,7 @@ use crate::check::Measure;
 use crate::kinds::contact::judge::gauge::{Care, LawGauge, largest};
 use nonsmooth_linalg::{norm, small};
 
-/// `W = Σ_b A_b B_b` of contacts between bodies of K = 6 or 3 components of velocity, each contact with at most two of them.
+/// `W = Σ_b A_b B_b` of contacts between bodies of K = 6 or 3 components of velocity, each contact with at most two of them, which differ.
 ///
 /// With impulses r the bodies move by `v_b = Σ_c B_bc r_c`, and the contacts by `u_c = q_c + Σ_b A_cb v_b`. No scalar
 /// rows, no compliance.
