@@ -68,6 +68,9 @@ pub(crate) struct Slot<const D: usize> {
     pub rolling: Option<RollingLocal>,
     pub point: LocalPoint,
     pub asked: Asked,
+    /// Whether velocities are taken where impulses are, and whether no contact has compliance or rolling friction.
+    pub symmetric: bool,
+    pub rigid: bool,
     /// Tells whether the impulses of the step before are good enough before W is formed.
     pub gauge: FactorsGauge,
     /// What came of it, before the solver is asked where it need not be; nothing where the problem is not finite.
@@ -95,6 +98,8 @@ where
             rolling: None,
             point,
             asked,
+            symmetric: true,
+            rigid: true,
             gauge: FactorsGauge::default(),
             outcome: None,
             scratch,

@@ -340,7 +340,7 @@ impl Parts<'_> {
     fn state<const D: usize, S: Sided<D>>(
         &self,
         k: usize,
-        Slot { problem, point, .. }: &mut Slot<D>,
+        Slot { problem, point, symmetric, rigid, .. }: &mut Slot<D>,
         sides: &mut [[S; 2]],
     ) -> bool {
         let Self { crew, touching, rows, bodies, .. } = *self;
@@ -349,18 +349,20 @@ impl Parts<'_> {
         problem.q.resize(D * count, 0.0);
         problem.mu.resize(count, 0.0);
         point.r.resize(D * count, 0.0);
-        let finite = AtomicBool::new(true);
+        let holds: [_; 3] = std::array::from_fn(|_| AtomicBool::new(true));
         let impulses = (&mut problem.mu[..], point.r.as_chunks_mut::<D>().0);
         let velocities = problem.q.as_chunks_mut::<D>().0;
         let all = ((order, sides), (velocities, impulses));
         crew.spread(all, count, |((order, sides), (q, (mu, r)))| {
-            let mut check = 0.0;
+            let (mut check, mut symmetric, mut rigid) = (0.0, true, true);
             let each = order.iter().zip(sides).zip(q).zip(mu).zip(r);
             for ((((&c, sides), q), mu), r) in each {
                 let row = &rows[c as usize];
                 for (arm, side) in row.arms.iter().zip(&mut *sides).filter(|a| a.0.free) {
                     side.write(row, arm, &bodies[arm.body as usize]);
                 }
+                symmetric &= !row.later;
+                rigid &= row.compliance == 0.0 && row.mu_r == 0.0;
                 *mu = row.mu;
                 r.copy_from_slice(&row.r[..D]);
                 for i in 0..D {
@@ -369,40 +371,34 @@ impl Parts<'_> {
                     check += 0.0 * q[i];
                 }
             }
-            if check != 0.0 {
-                finite.store(false, Ordering::Relaxed);
+            for (all, holds) in holds.iter().zip([check == 0.0, symmetric, rigid]) {
+                all.fetch_and(holds, Ordering::Relaxed);
             }
         });
-        finite.into_inner()
-    }
-
-    /// Whether velocities are taken where impulses are, at all contacts of island k.
-    fn is_symmetric(&self, k: usize) -> bool {
-        let order = &self.touching.order[self.touching.island(k)];
-        order.iter().all(|&c| !self.rows[c as usize].later)
+        let [finite, all_symmetric, all_rigid] = holds.map(AtomicBool::into_inner);
+        (*symmetric, *rigid) = (all_symmetric, all_rigid);
+        finite
     }
 
     /// What the judge says of the impulses to begin with, from the factors of W, where it accepts them and many contacts alone make the problem.
     fn accept<const D: usize, S: Sided<D>>(
         &self,
         k: usize,
-        Slot { problem, point, rolling, gauge, .. }: &mut Slot<D>,
+        Slot { problem, point, rolling, gauge, symmetric, rigid, .. }: &mut Slot<D>,
         sides: &[[S; 2]],
         tolerance: f64,
     ) -> Option<Outcome> {
         let Self { islands, touching, rows, solids, .. } = *self;
-        let alone = |&c: &u32| rows[c as usize].mu_r == 0.0 && rows[c as usize].compliance == 0.0;
-        let order = &touching.order[touching.island(k)];
         // W of a small one is formed as soon, by memory that is at hand.
-        if !(order.len() > SMALL
+        if !(sides.len() > SMALL
+            && *rigid
             && solids.is_empty()
-            && scalars(islands, rows.len(), k).is_empty()
-            && order.iter().all(alone))
+            && scalars(islands, rows.len(), k).is_empty())
         {
             return None;
         }
         let begun = Instant::now();
-        let factors = ByBodies { touching, island: k, sides, symmetric: self.is_symmetric(k) };
+        let factors = ByBodies { touching, island: k, sides, symmetric: *symmetric };
         let measure = gauge.accept(&factors, (&problem.q, &problem.mu), &point.r, tolerance)?;
         (problem.rows, *rolling) = (None, None);
         point.lambda.clear();
@@ -420,13 +416,12 @@ impl Parts<'_> {
     fn form<const D: usize, S: Sided<D>>(
         &self,
         k: usize,
-        Slot { problem, scratch, .. }: &mut Slot<D>,
+        Slot { problem, scratch, symmetric, .. }: &mut Slot<D>,
         sides: &[[S; 2]],
     ) -> bool {
         let Self { crew, touching, .. } = *self;
         let places = touching.island(k);
         let (count, first) = (places.len(), places.start);
-        let symmetric = self.is_symmetric(k);
         scratch.resize(count, 0);
         crew.spread((places, &mut scratch[..]), count, |(places, lengths)| {
             for (place, length) in places.zip(lengths) {
@@ -438,7 +433,7 @@ impl Parts<'_> {
         let finite = AtomicBool::new(true);
         let filling = Filling { first, begins, columns, blocks, next: scratch };
         crew.spread(filling, count, |part| {
-            if !self.fill(part, (first, sides), symmetric) {
+            if !self.fill(part, (first, sides), *symmetric) {
                 finite.store(false, Ordering::Relaxed);
             }
         });

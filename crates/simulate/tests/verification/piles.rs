@@ -1,7 +1,7 @@
 //! Scenes of `gen` in motion: what should stand stands.
 
 use nonsmooth_problem::check::Judged;
-use nonsmooth_problem::{Friction, LocalPoint};
+use nonsmooth_problem::{Friction, FrictionLocal, LocalPoint};
 use nonsmooth_scenes::scenes::{Arch, Family, SCENES, SpherePile, Stack};
 use nonsmooth_scenes::vec3::sub;
 use nonsmooth_simulate::{
@@ -263,6 +263,18 @@ fn pyramid(plane: bool) -> World {
     world
 }
 
+/// The relative residual of the last step's impulses, and whether they solve the problem.
+fn judged<const D: usize>(
+    problem: &FrictionLocal<D>,
+    simulation: &Simulation,
+    tolerance: f64,
+) -> (f64, bool) {
+    let active = simulation.contacts().iter().filter(|c| c.active);
+    let r = active.flat_map(|c| c.impulse.into_iter().take(D)).collect();
+    let verdict = problem.judge(&LocalPoint { r, lambda: vec![] }, tolerance).unwrap();
+    (verdict.measure.relative, verdict.solved)
+}
+
 /// Of steps whose impulses those before have led to nobody has formed W: what was said of them is held against W, which the judge reads anew.
 #[test]
 fn what_is_told_without_w_holds_with_it() {
@@ -285,19 +297,12 @@ fn what_is_told_without_w_holds_with_it() {
                 continue;
             }
             unasked += 1;
-            let active = simulation.contacts().iter().filter(|c| c.active);
             let (relative, solved) = match stated {
                 Friction::Local3(problem) => {
                     assert!(symmetric || problem.W.asymmetry() > 0.0);
-                    let r = active.flat_map(|c| c.impulse).collect();
-                    let verdict = problem.judge(&LocalPoint { r, lambda: vec![] }, tolerance);
-                    verdict.map(|v| (v.measure.relative, v.solved)).unwrap()
+                    judged(&problem, &simulation, tolerance)
                 }
-                Friction::Local2(problem) => {
-                    let r = active.flat_map(|c| [c.impulse[0], c.impulse[1]]).collect();
-                    let verdict = problem.judge(&LocalPoint { r, lambda: vec![] }, tolerance);
-                    verdict.map(|v| (v.measure.relative, v.solved)).unwrap()
-                }
+                Friction::Local2(problem) => judged(&problem, &simulation, tolerance),
                 other => panic!("{:?}", other.kind()),
             };
             assert!(solved, "{relative:e}");
