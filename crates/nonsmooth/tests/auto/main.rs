@@ -185,6 +185,17 @@ fn a_shaken_wall_is_solved_along_its_central_path() {
     assert!(along, "{:?}", end.account);
 }
 
+/// Exact sweeps circle at 2e-3, and all that comes before another strategy stays there too.
+#[test]
+fn a_pyramid_of_spheres_is_solved_by_damped_sweeps() {
+    let pyramid = Spheres { base: 8, ..Spheres::default() };
+    let problem = pyramid.build().unwrap().problem().unwrap();
+    let end = run(&problem, "auto", &[], &within(1e-8, 60.0));
+    assert_eq!(end.outcome.status, Status::Solved, "{}", end.outcome.measure.relative);
+    let damped = end.account.iter().any(|line| line.contains("one projection a contact"));
+    assert!(damped, "{:?}", end.account);
+}
+
 /// The same planted solution with `W + K`: entries of `W` moved by `size`, relatively; antisymmetrically where `skew`.
 fn nonsymmetric(case: &Planted, size: f64, skew: bool) -> FrictionLocal<3> {
     let (mut problem, point) = case.local::<3>();

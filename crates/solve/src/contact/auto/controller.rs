@@ -24,17 +24,34 @@ const FLOOR: f64 = 2.0;
 const SINK: (f64, usize) = (0.3, 3);
 /// Sweeps between two subproblems.
 const MOST_SWEEPS: usize = 300;
-/// Sweeps of a cold start.
+/// Sweeps from zero.
 const LONG: (usize, usize) = (50, 30_000);
+/// Most damped sweeps from zero: on chutes and pyramids of spheres most of what they bring they have brought by then.
+const MOST_DAMPED: usize = 8000;
 /// The least share of the time that sweeps have.
 const LEAST_SHARE: f64 = 0.02;
 /// A strategy is left after this many factorisations that did not halve the error, and each later one half as late again.
 const PATIENT: f64 = 200.0;
 const MORE_PATIENT: f64 = 1.5;
 
-/// κ of ρ = κ/w_c, the share of the time for sweeps, and whether it starts cold.
-const STRATEGIES: [(f64, f64, bool); 4] =
-    [(30.0, 0.3, false), (100.0, 1.0, false), (10.0, 1.0, true), (30.0, 3.0, false)];
+/// κ of ρ = κ/w_c, the share of the time for sweeps, and where it goes on from.
+const STRATEGIES: [(f64, f64, From); 4] = [
+    (30.0, 0.3, From::Best),
+    (100.0, 1.0, From::Damped),
+    (10.0, 1.0, From::Swept),
+    (30.0, 3.0, From::Best),
+];
+
+/// Where a strategy goes on from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum From {
+    /// The best point so far.
+    Best,
+    /// What long sweeps from zero come to, good or bad.
+    Swept,
+    /// What long damped sweeps from zero come to, if that is better than the best point so far; once, for they come to the same each time.
+    Damped,
+}
 
 /// How a subproblem ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,6 +79,8 @@ pub(super) struct Controller {
     /// The share of the time for sweeps, now.
     share: f64,
     strategy: usize,
+    /// Damped sweeps have been.
+    damped: bool,
     /// Strategies in a row without success.
     idle: usize,
     /// The error to reach and the factorisations since it was set.
@@ -101,6 +120,11 @@ impl Controller {
     /// The present point is a good start: ε by its error.
     pub(super) fn resume(&mut self) {
         self.epsilon = self.error.clamp(1e-5, 1.0);
+    }
+
+    /// The error of the best point so far.
+    pub(super) fn least(&self) -> f64 {
+        self.least
     }
 
     /// The error of the present point.
@@ -217,9 +241,14 @@ impl Controller {
         ((self.share * iterations * ratio) as usize).clamp(1, MOST_SWEEPS)
     }
 
-    /// How many sweeps a cold start has, if a factorisation is worth `ratio` of them.
+    /// How many sweeps from zero there are, if a factorisation is worth `ratio` of them.
     pub(super) fn long_sweeps(&self, ratio: f64) -> usize {
         ((self.budget * ratio) as usize).clamp(LONG.0, LONG.1)
+    }
+
+    /// How many damped sweeps from zero there are.
+    pub(super) fn damped_sweeps(&self, ratio: f64) -> usize {
+        self.long_sweeps(ratio).min(MOST_DAMPED)
     }
 
     /// The sweeps have ended with this error; returns by which factor it grew, and gives sweeps that help more time.
@@ -235,21 +264,24 @@ impl Controller {
         self.spent > self.budget
     }
 
-    /// Goes over to another strategy; true: from a cold start.
-    pub(super) fn change(&mut self) -> bool {
+    /// Goes over to another strategy; returns where it goes on from.
+    pub(super) fn change(&mut self) -> From {
         self.strategy = (self.strategy + 1) % STRATEGIES.len();
         self.idle += 1;
         self.spent = 0.0;
         self.budget *= MORE_PATIENT;
         self.floor = 0.0;
         self.failures = 0;
-        let (_, share, cold) = STRATEGIES[self.strategy];
+        let (_, share, mut from) = STRATEGIES[self.strategy];
+        if from == From::Damped && std::mem::replace(&mut self.damped, true) {
+            from = From::Best;
+        }
         self.share = share;
-        if cold {
-            // What sweeps from zero come to is not compared with what there was.
+        self.epsilon = if from == From::Best { self.least.clamp(1e-4, 1.0) } else { 1.0 };
+        if from != From::Best {
+            // What sweeps from zero come to is not compared with what there was just now.
             self.error = f64::INFINITY;
         }
-        self.epsilon = if cold { 1.0 } else { self.least.clamp(1e-4, 1.0) };
-        cold
+        from
     }
 }

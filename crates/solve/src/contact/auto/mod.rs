@@ -20,8 +20,9 @@
 //! 7. **The central path by its arc length** ([`Pursuit`]), where Newton's iterations promise to be many: it turns back with the
 //!    path where stage 4 is stuck. Up to three times, each time smoothed by less and for longer. Walls that are shaken end here.
 //! 8. **Alternating directions** (`alternating.rs`) after many proximal steps, for as long as they promise more.
-//! 9. **Another strategy** (other ρ, more sweeps, a cold start) where the error has not halved for long; at the first time
-//!    the existence of a solution is investigated, and a problem without one is given up with its certificate.
+//! 9. **Another strategy** (other ρ, more sweeps, a start from zero) where the error has not halved for long; at the first time
+//!    the existence of a solution is investigated, and a problem without one is given up with its certificate. That first time sweeps with
+//!    one projection a contact ([`Projection`]) are tried from zero: where exact ones circle, these may come near or end.
 //!
 //! A problem with scalar rows that have bounds stays with the sweeps, which visit them too: the later stages know no bounds.
 //!
@@ -47,13 +48,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::auto::proximal_newton::ProximalNewton;
 use crate::contact::existence;
-use crate::contact::form::{Access, Costs, Disked, Linearised, OnContacts, has_bounds};
+use crate::contact::form::{Access, Blockwise, Costs, Disked, Linearised, OnContacts, has_bounds};
+use crate::contact::law::local::{LocalSolver, Projection};
 use crate::contact::parts::{Central, Pursuit, Sweep, put_within_bounds, sweep_rows};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{Limits, SolveError, Solver, Step};
 use alternating::Alternating;
-use controller::{Controller, Verdict};
+use controller::{Controller, From, Verdict};
 use rate::Rate;
 use starts::Halvings;
 
@@ -107,6 +109,8 @@ const REST: f64 = 10.0;
 const NEAR: f64 = 1e-4;
 /// Above this error between two proximal steps, sweeps.
 const SWEEP_ABOVE: f64 = 1e-9;
+/// ω of damped sweeps, `1/‖W_cc‖` times which their projections move an impulse.
+const DAMPED: f64 = 1.3;
 /// Sweeps that raise the error by more than this factor are taken back.
 const TAKE_BACK: f64 = 5.0;
 /// Problems of so few unknowns are enumerated after so many Newton iterations: milliseconds, and a last word.
@@ -123,6 +127,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     /// The problem has rows with bounds.
     bounded: bool,
     sweep: Sweep<P::Law, D>,
+    damped: Option<Box<Sweep<P::Law, D, Projection>>>,
     alternating: Option<Box<Alternating<D>>>,
     central: Option<Box<Central<P::Law, D>>>,
     pursuit: Option<Box<Pursuit<P::Law, D>>>,
@@ -163,6 +168,7 @@ enum Stage {
     Interior { halvings: Halvings, short: usize },
     Newton,
     Between { left: usize },
+    Damped { left: usize },
     Pursuit { halvings: Halvings, most: usize },
     Alternating,
 }
@@ -194,6 +200,7 @@ struct Done {
     failed: usize,
     newton: usize,
     between: usize,
+    damped: usize,
     /// How often, the steps of all, and the error of the last.
     pursuits: usize,
     pursued: usize,
@@ -215,6 +222,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         Ok(HybridWork {
             bounded,
             sweep: Sweep::new(problem, &state),
+            damped: None,
             alternating: None,
             central: None,
             pursuit: None,
@@ -248,6 +256,9 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         }
         problem.refill(&mut work.state)?;
         work.sweep.fill(problem, &work.state);
+        if let Some(damped) = &mut work.damped {
+            damped.fill(problem, &work.state);
+        }
         work.scale = problem.velocity_scale(&work.state);
         work.costs = None;
         if let Some(newton) = &mut work.newton {
@@ -287,6 +298,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             Stage::Interior { .. } => self.interior(problem, point, work),
             Stage::Newton => self.newton(problem, point, work),
             Stage::Between { left } => self.between(problem, point, work, left),
+            Stage::Damped { left } => self.damped(problem, point, work, left),
             Stage::Pursuit { .. } => self.pursue(problem, point, work),
             Stage::Alternating => self.alternate(problem, point, work),
         }
@@ -311,7 +323,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
     fn account(&self, work: &Self::Work) -> Vec<String> {
         let Done { start, sweeps, rest, trial, interior, interior_error, .. } = work.done;
         let Done { subproblems, failed, newton, between, alternating, .. } = work.done;
-        let Done { followed, pursued, pursued_error, .. } = work.done;
+        let Done { followed, damped, pursued, pursued_error, .. } = work.done;
         let mut lines = vec![];
         match start {
             Start::Zero => {}
@@ -354,6 +366,9 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         if alternating > 0 {
             lines.push(format!("{alternating} iterations of alternating directions"));
         }
+        if damped > 0 {
+            lines.push(format!("{damped} sweeps with one projection a contact, from zero"));
+        }
         if work.done.strategies > 0 {
             lines.push(format!("{} changes of strategy", work.done.strategies));
         }
@@ -369,6 +384,25 @@ const FIRST: Stage = Stage::Sweeps { claims: 0 };
 /// Whether sweeps that move so much, relative to ‖q‖, are on their way to infinity: before the judge sees numbers that are none.
 fn runs_away(estimate: f64) -> bool {
     estimate.is_nan() || estimate > RUNAWAY
+}
+
+/// So many sweeps and the velocity that is 1, fewer where they run away or the budget is over; returns what the last one moved.
+fn swept<P: Blockwise<D> + Disked<D>, S: LocalSolver<D, P::Law>, const D: usize>(
+    sweep: &mut Sweep<P::Law, D, S>,
+    problem: &P,
+    state: &mut P::State,
+    r: &mut [f64],
+    (count, scale): (usize, f64),
+) -> f64 {
+    let together = sweep.together(count);
+    let mut moves = 0.0;
+    for _ in 0..count / together {
+        moves = sweep.sweeps(problem, state, r, together).sqrt() / scale;
+        if runs_away(moves) || budget::over() {
+            break;
+        }
+    }
+    moves
 }
 
 impl<const D: usize> OnContacts<Auto, D> {
@@ -643,16 +677,8 @@ impl<const D: usize> OnContacts<Auto, D> {
         left: usize,
     ) -> Step {
         let count = left.min(2 * SWEEPS_A_STEP);
-        let mut estimate = 0.0;
-        let together = work.sweep.together(count);
-        for _ in 0..count / together {
-            let r = P::impulses(point);
-            let moves = work.sweep.sweeps(problem, &mut work.state, r, together);
-            estimate = moves.sqrt() / work.scale;
-            if runs_away(estimate) || budget::over() {
-                break;
-            }
-        }
+        let HybridWork { sweep, state, scale, .. } = work;
+        let estimate = swept(sweep, problem, state, P::impulses(point), (count, *scale));
         work.done.between += count;
         self.follow(problem, point, work, estimate);
         if left > count && !runs_away(estimate) {
@@ -671,6 +697,34 @@ impl<const D: usize> OnContacts<Auto, D> {
         } else {
             self.subproblem(point, work, error);
         }
+        Step::Continue { estimate: error }
+    }
+
+    /// Damped sweeps of stage 9 from zero; the better of what they come to and the best point goes on.
+    fn damped<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        left: usize,
+    ) -> Step {
+        let count = left.min(2 * SWEEPS_A_STEP);
+        let HybridWork { damped, newton, state, scale, best, controller, .. } = work;
+        let (Some(damped), Some(newton)) = (damped, newton) else {
+            return starts::lost();
+        };
+        let r = P::impulses(point);
+        let estimate = swept(damped, problem, state, r, (count, *scale));
+        work.done.damped += count;
+        if left > count && !runs_away(estimate) {
+            work.stage = Stage::Damped { left: left - count };
+            return Step::Continue { estimate };
+        }
+        let error = newton.look(problem, state, r);
+        if error >= controller.least() || error.is_nan() {
+            r.copy_from_slice(best);
+        }
+        self.subproblem_here(problem, point, work);
         Step::Continue { estimate: error }
     }
 
@@ -730,24 +784,31 @@ impl<const D: usize> OnContacts<Auto, D> {
             );
             return Step::Stuck(why.into());
         }
-        let cold = work.controller.change();
+        let from = work.controller.change();
         let r = P::impulses(point);
-        if cold {
-            r.fill(0.0);
-        } else {
-            r.copy_from_slice(&work.best);
+        match from {
+            From::Best => r.copy_from_slice(&work.best),
+            From::Swept | From::Damped => r.fill(0.0),
         }
-        if work.passed_by.is_some() {
-            starts::begin_interior(problem, work);
-        } else if cold {
-            // Some problems want nothing but sweeps, tens of thousands: as many as the strategy before took time for.
-            problem.enter(&mut work.state, point);
-            let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
-            let left = work.controller.long_sweeps(costs.worth / costs.sweep);
-            work.before.copy_from_slice(P::impulses(point));
-            work.stage = Stage::Between { left };
-        } else {
-            self.subproblem_here(problem, point, work);
+        if from == From::Damped {
+            let HybridWork { damped, state, .. } = work;
+            let sweep = || Box::new(Sweep::with(Projection { step: DAMPED }, problem, state));
+            damped.get_or_insert_with(sweep);
+        }
+        // Some problems want nothing but sweeps, tens of thousands: as many as the strategy before took time for.
+        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        let ratio = costs.worth / costs.sweep;
+        problem.enter(&mut work.state, point);
+        match from {
+            From::Damped => {
+                work.stage = Stage::Damped { left: work.controller.damped_sweeps(ratio) };
+            }
+            _ if work.passed_by.is_some() => starts::begin_interior(problem, work),
+            From::Swept => {
+                work.before.copy_from_slice(P::impulses(point));
+                work.stage = Stage::Between { left: work.controller.long_sweeps(ratio) };
+            }
+            From::Best => self.subproblem_here(problem, point, work),
         }
         Step::Continue { estimate: f64::NAN }
     }

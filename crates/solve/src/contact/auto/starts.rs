@@ -1,12 +1,11 @@
 //! The stages between the sweeps and the proximal steps, each of which ends many problems and makes a start for the others; and alternating directions, for
 //! those that the proximal steps take long for.
 
-use nonsmooth_linalg::budget;
 use nonsmooth_problem::check::Kinematic;
 
 use super::alternating::Way;
 use super::controller::Controller;
-use super::{Auto, Done, FIRST, FIRST_SWEEPS, HybridWork, NEAR, REST, Stage, runs_away};
+use super::{Auto, Done, FIRST, FIRST_SWEEPS, HybridWork, NEAR, REST, Stage, swept};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
 use crate::contact::parts::Central;
@@ -208,14 +207,8 @@ impl<const D: usize> OnContacts<Auto, D> {
         let Some(newton) = newton else { return lost() };
         let r = P::impulses(point);
         let count = (RESCUE << rescues).min(most as usize).max(1);
-        let together = sweep.together(count);
-        for _ in 0..count / together {
-            let moves = sweep.sweeps(problem, state, r, together);
-            done.between += together;
-            if runs_away(moves.sqrt() / *scale) || budget::over() {
-                break;
-            }
-        }
+        swept(sweep, problem, state, r, (count, *scale));
+        done.between += count;
         let mut error = newton.look(problem, state, r);
         if error > RESCUE_TAKE_BACK * least || error.is_nan() {
             r.copy_from_slice(inner_best);

@@ -1,4 +1,4 @@
-//! A plain Gauss–Seidel sweep with the exact local solver, for methods that start from a few sweeps or mix them in.
+//! A plain Gauss–Seidel sweep, with the exact local solver or another, for methods that start from a few sweeps or mix them in.
 //!
 //! Visits the contacts in the order given; each gets the solution of its own problem with all other impulses frozen. It is
 //! NSGS (JourdanAlartJean1998; Acary, lecture (107)) without its options: no relaxation, no freezing, no shuffling.
@@ -24,11 +24,12 @@ const FOLLOWED: f64 = 1e-3;
 const FEW: usize = 4;
 const FOLLOW: usize = 2;
 
-/// What sweeps keep for each contact.
+/// What sweeps keep for each contact; S solves one.
 #[derive(Debug, Clone)]
-pub struct Sweep<L: DiskLaw<D>, const D: usize> {
+pub struct Sweep<L: DiskLaw<D>, const D: usize, S: LocalSolver<D, L> = <L as DiskLaw<D>>::Local> {
+    local: S,
     /// In the order of the visits.
-    contacts: Vec<Visited<L, D>>,
+    contacts: Vec<Visited<L, D, S::Memo>>,
     /// Several threads may make them.
     shared: bool,
     /// The square of a velocity that is negligible.
@@ -42,20 +43,32 @@ pub struct Sweep<L: DiskLaw<D>, const D: usize> {
 }
 
 #[derive(Debug, Clone)]
-struct Visited<L: DiskLaw<D>, const D: usize> {
+struct Visited<L, const D: usize, M> {
     place: usize,
     w: [[f64; D]; D],
     law: L,
     /// `tr(W_cc)/D`.
     unit: f64,
-    memo: <L::Local as LocalSolver<D, L>>::Memo,
+    memo: M,
 }
 
 impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
-    /// Sweeps over `problem`'s contacts.
+    /// Sweeps over `problem`'s contacts, each solved exactly.
     pub fn new<P: Blockwise<D> + Disked<D, Law = L>>(problem: &P, state: &P::State) -> Self {
+        Self::with(L::Local::default(), problem, state)
+    }
+}
+
+impl<L: DiskLaw<D>, const D: usize, S: LocalSolver<D, L>> Sweep<L, D, S> {
+    /// Sweeps over `problem`'s contacts, each visited by `local`.
+    pub fn with<P: Blockwise<D> + Disked<D, Law = L>>(
+        local: S,
+        problem: &P,
+        state: &P::State,
+    ) -> Self {
         let contacts = Vec::with_capacity(problem.contacts());
         let mut sweep = Self {
+            local,
             contacts,
             shared: false,
             negligible: 0.0,
@@ -82,7 +95,7 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
         for c in (0..problem.contacts()).map(|at| passes.map_or(at, |passes| passes.item(at))) {
             let (w, law) = (problem.diagonal_block(state, c), problem.law(c));
             let unit = small::mean_diagonal(&w).abs();
-            let memo = L::Local::default().prepare(&w, law);
+            let memo = self.local.prepare(&w, law);
             self.contacts.push(Visited { place: c, w, law, unit, memo });
         }
     }
@@ -94,13 +107,13 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
         state: &mut P::State,
         r: &mut [f64],
     ) -> f64 {
-        let Self { contacts, negligible, moved, .. } = self;
+        let Self { local, contacts, negligible, moved, .. } = self;
         self.moves = 0.0;
         for at in 0..contacts.len() {
             if let Some(ahead) = contacts.get(at + AHEAD) {
                 problem.foresee(state, ahead.place);
             }
-            moved[at] = contacts[at].visit(problem, state, r, *negligible);
+            moved[at] = contacts[at].visit(local, problem, state, r, *negligible);
             self.moves += moved[at];
         }
         self.moves
@@ -127,8 +140,8 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
             return self.moves;
         };
         // In the order of the visits: memory is read from one end to the other.
-        let Self { contacts, negligible, gathered, moved, .. } = self;
-        let negligible = *negligible;
+        let Self { local, contacts, negligible, gathered, moved, .. } = self;
+        let (local, negligible) = (&*local, *negligible);
         gathered.clear();
         let places = contacts.iter().map(|contact| contact.place);
         gathered.extend(places.map(|c| (small::block(r, c), small::block(given, c))));
@@ -150,7 +163,7 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
                 for k in 0..D {
                     u[k] += given[k];
                 }
-                let answer = contact.answer(old, u, negligible);
+                let answer = contact.answer(local, old, u, negligible);
                 *moved = answer.moved;
                 if let Some(dr) = answer.dr {
                     *old = answer.new;
@@ -174,7 +187,7 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
         state: &mut P::State,
         r: &mut [f64],
     ) -> usize {
-        let Self { contacts, followed, negligible, moved, moves, .. } = self;
+        let Self { local, contacts, followed, negligible, moved, moves, .. } = self;
         let (all, few) = (contacts.len(), contacts.len() / FEW);
         let least = FOLLOWED * *moves / all as f64;
         followed.clear();
@@ -187,8 +200,9 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
         let mut passes = 0;
         while passes * followed.len() < FOLLOW * all && !budget::over() {
             passes += 1;
-            let visits =
-                followed.iter().map(|&at| contacts[at].visit(problem, state, r, *negligible));
+            let visits = followed
+                .iter()
+                .map(|&at| contacts[at].visit(local, problem, state, r, *negligible));
             let moves: f64 = visits.sum();
             // Neither may it go on where moves are not finite.
             if !(moves > others && moves.is_finite()) {
@@ -200,8 +214,9 @@ impl<L: DiskLaw<D>, const D: usize> Sweep<L, D> {
 
     /// `max_c w_c‖r_c‖`, a velocity.
     pub fn largest(&self, r: &[f64]) -> f64 {
-        let of =
-            |contact: &Visited<L, D>| contact.unit * norm(&small::block::<D>(r, contact.place));
+        let of = |contact: &Visited<L, D, S::Memo>| {
+            contact.unit * norm(&small::block::<D>(r, contact.place))
+        };
         self.contacts.iter().map(of).fold(0.0, f64::max)
     }
 
@@ -225,11 +240,12 @@ struct Answer<const D: usize> {
     moved: f64,
 }
 
-impl<L: DiskLaw<D>, const D: usize> Visited<L, D> {
+impl<L: DiskLaw<D>, const D: usize, M> Visited<L, D, M> {
     /// Solves the problem of this contact; returns `(w_c‖Δr_c‖)²`, 0 where that is negligible and the move not made.
     #[inline]
     fn visit<P: Blockwise<D> + Disked<D, Law = L>>(
         &mut self,
+        local: &impl LocalSolver<D, L, Memo = M>,
         problem: &P,
         state: &mut P::State,
         r: &mut [f64],
@@ -237,7 +253,7 @@ impl<L: DiskLaw<D>, const D: usize> Visited<L, D> {
     ) -> f64 {
         let c = self.place;
         let u = problem.velocity(state, r, c);
-        let answer = self.answer(&small::block(r, c), u, negligible);
+        let answer = self.answer(local, &small::block(r, c), u, negligible);
         if let Some(dr) = answer.dr {
             r[D * c..D * c + D].copy_from_slice(&answer.new);
             problem.moved(state, c, &dr);
@@ -247,7 +263,13 @@ impl<L: DiskLaw<D>, const D: usize> Visited<L, D> {
 
     /// Solves the contact's own problem, where `old` has the velocity u.
     #[inline(always)]
-    fn answer(&mut self, old: &[f64; D], u: [f64; D], negligible: f64) -> Answer<D> {
+    fn answer(
+        &mut self,
+        local: &impl LocalSolver<D, L, Memo = M>,
+        old: &[f64; D],
+        u: [f64; D],
+        negligible: f64,
+    ) -> Answer<D> {
         let mut q = u;
         let own = small::mul(&self.w, old);
         for k in 0..D {
@@ -256,7 +278,7 @@ impl<L: DiskLaw<D>, const D: usize> Visited<L, D> {
         let new = if self.law.is_frictionless() {
             frictionless(&self.w, &q, old)
         } else {
-            L::Local::default().solve(&mut self.memo, &self.w, &q, self.law, old)
+            local.solve(&mut self.memo, &self.w, &q, self.law, old)
         };
         let mut dr = new;
         for k in 0..D {
@@ -279,7 +301,10 @@ mod tests {
     use nonsmooth_problem::{FrictionLocal, Problem};
 
     use super::*;
+    use crate::Solver;
     use crate::contact::form::{Access, Contacts};
+    use crate::contact::law::local::Projection;
+    use crate::contact::splitting::Psor;
 
     /// Sweeps until they no longer move; the distance to the planted solution.
     fn distance<const D: usize, P>(problem: &P, known: &[f64]) -> f64
@@ -329,6 +354,25 @@ mod tests {
             let third = sweep.sweep(&problem, &mut state, &mut point.r);
             let fall = 0.99_f64.powi(4 * (1 + passes as i32));
             assert!((third / second - fall).abs() < 1e-9, "{third:e} {second:e} {fall:e}");
+        }
+    }
+
+    /// The sweeps of the solver `psor` are these, to the last bit.
+    #[test]
+    fn with_one_projection_a_contact_they_are_those_of_psor() {
+        let case = Planted { contacts: 20, dofs: 90, seed: 6, ..Planted::default() };
+        let (problem, _) = case.local::<3>();
+        let solver = Psor { omega: 0.7, ..Psor::default() }.sweeps::<3>();
+        let (mut work, mut theirs) = (solver.work(&problem).unwrap(), problem.origin());
+        solver.start(&problem, &mut theirs, &mut work);
+        let mut state = problem.state(Access::Visits).unwrap();
+        let mut sweep = Sweep::with(Projection { step: 0.7 }, &problem, &state);
+        let mut ours = problem.origin();
+        problem.enter(&mut state, &ours);
+        for _ in 0..30 {
+            solver.step(&problem, &mut theirs, &mut work);
+            let moved = sweep.sweep(&problem, &mut state, &mut ours.r);
+            assert!(moved > 0.0 && ours.r == theirs.r);
         }
     }
 
