@@ -35,16 +35,16 @@ const PATIENT: f64 = 200.0;
 const MORE_PATIENT: f64 = 1.5;
 
 /// κ of ρ = κ/w_c, the share of the time for sweeps, and where it goes on from.
-const STRATEGIES: [(f64, f64, From); 4] = [
-    (30.0, 0.3, From::Best),
-    (100.0, 1.0, From::Damped),
-    (10.0, 1.0, From::Swept),
-    (30.0, 3.0, From::Best),
+const STRATEGIES: [(f64, f64, Origin); 4] = [
+    (30.0, 0.3, Origin::Best),
+    (100.0, 1.0, Origin::Damped),
+    (10.0, 1.0, Origin::Swept),
+    (30.0, 3.0, Origin::Best),
 ];
 
 /// Where a strategy goes on from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum From {
+pub(super) enum Origin {
     /// The best point so far.
     Best,
     /// What long sweeps from zero come to, good or bad.
@@ -265,7 +265,7 @@ impl Controller {
     }
 
     /// Goes over to another strategy; returns where it goes on from.
-    pub(super) fn change(&mut self) -> From {
+    pub(super) fn change(&mut self) -> Origin {
         self.strategy = (self.strategy + 1) % STRATEGIES.len();
         self.idle += 1;
         self.spent = 0.0;
@@ -273,12 +273,12 @@ impl Controller {
         self.floor = 0.0;
         self.failures = 0;
         let (_, share, mut from) = STRATEGIES[self.strategy];
-        if from == From::Damped && std::mem::replace(&mut self.damped, true) {
-            from = From::Best;
+        if from == Origin::Damped && std::mem::replace(&mut self.damped, true) {
+            from = Origin::Best;
         }
         self.share = share;
-        self.epsilon = if from == From::Best { self.least.clamp(1e-4, 1.0) } else { 1.0 };
-        if from != From::Best {
+        self.epsilon = if from == Origin::Best { self.least.clamp(1e-4, 1.0) } else { 1.0 };
+        if from != Origin::Best {
             // What sweeps from zero come to is not compared with what there was just now.
             self.error = f64::INFINITY;
         }

@@ -55,7 +55,7 @@ use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{Limits, SolveError, Solver, Step};
 use alternating::Alternating;
-use controller::{Controller, From, Verdict};
+use controller::{Controller, Origin, Verdict};
 use rate::Rate;
 use starts::Halvings;
 
@@ -787,10 +787,10 @@ impl<const D: usize> OnContacts<Auto, D> {
         let from = work.controller.change();
         let r = P::impulses(point);
         match from {
-            From::Best => r.copy_from_slice(&work.best),
-            From::Swept | From::Damped => r.fill(0.0),
+            Origin::Best => r.copy_from_slice(&work.best),
+            Origin::Swept | Origin::Damped => r.fill(0.0),
         }
-        if from == From::Damped {
+        if from == Origin::Damped {
             let HybridWork { damped, state, .. } = work;
             let sweep = || Box::new(Sweep::with(Projection { step: DAMPED }, problem, state));
             damped.get_or_insert_with(sweep);
@@ -800,15 +800,15 @@ impl<const D: usize> OnContacts<Auto, D> {
         let ratio = costs.worth / costs.sweep;
         problem.enter(&mut work.state, point);
         match from {
-            From::Damped => {
+            Origin::Damped => {
                 work.stage = Stage::Damped { left: work.controller.damped_sweeps(ratio) };
             }
             _ if work.passed_by.is_some() => starts::begin_interior(problem, work),
-            From::Swept => {
+            Origin::Swept => {
                 work.before.copy_from_slice(P::impulses(point));
                 work.stage = Stage::Between { left: work.controller.long_sweeps(ratio) };
             }
-            From::Best => self.subproblem_here(problem, point, work),
+            Origin::Best => self.subproblem_here(problem, point, work),
         }
         Step::Continue { estimate: f64::NAN }
     }
