@@ -187,13 +187,13 @@ fn a_shaken_wall_is_solved_along_its_central_path() {
 
 /// Exact sweeps circle at 2e-3, and all that comes before another strategy stays there too.
 #[test]
-fn a_pyramid_of_spheres_is_solved_by_damped_sweeps() {
+fn a_pyramid_of_spheres_is_solved_by_projected_sweeps() {
     let pyramid = Spheres { base: 8, ..Spheres::default() };
     let problem = pyramid.build().unwrap().problem().unwrap();
     let end = run(&problem, "auto", &[], &within(1e-8, 60.0));
     assert_eq!(end.outcome.status, Status::Solved, "{}", end.outcome.measure.relative);
-    let damped = end.account.iter().any(|line| line.contains("one projection a contact"));
-    assert!(damped, "{:?}", end.account);
+    let projected = end.account.iter().any(|line| line.contains("one projection a contact"));
+    assert!(projected, "{:?}", end.account);
 }
 
 /// The same planted solution with `W + K`: entries of `W` moved by `size`, relatively; antisymmetrically where `skew`.

@@ -26,8 +26,8 @@ const SINK: (f64, usize) = (0.3, 3);
 const MOST_SWEEPS: usize = 300;
 /// Sweeps from zero.
 const LONG: (usize, usize) = (50, 30_000);
-/// Most damped sweeps from zero: on chutes and pyramids of spheres most of what they bring they have brought by then.
-const MOST_DAMPED: usize = 8000;
+/// Most of them with one projection a contact: on chutes and pyramids of spheres most of what they bring they have brought by then.
+const MOST_PROJECTED: usize = 8000;
 /// The least share of the time that sweeps have.
 const LEAST_SHARE: f64 = 0.02;
 /// A strategy is left after this many factorisations that did not halve the error, and each later one half as late again.
@@ -37,7 +37,7 @@ const MORE_PATIENT: f64 = 1.5;
 /// κ of ρ = κ/w_c, the share of the time for sweeps, and where it goes on from.
 const STRATEGIES: [(f64, f64, Origin); 4] = [
     (30.0, 0.3, Origin::Best),
-    (100.0, 1.0, Origin::Damped),
+    (100.0, 1.0, Origin::Projected),
     (10.0, 1.0, Origin::Swept),
     (30.0, 3.0, Origin::Best),
 ];
@@ -49,8 +49,8 @@ pub(super) enum Origin {
     Best,
     /// What long sweeps from zero come to, good or bad.
     Swept,
-    /// What long damped sweeps from zero come to, if that is better than the best point so far; once, for they come to the same each time.
-    Damped,
+    /// What long sweeps with one projection a contact come to from zero, if that is better than the best point so far; once, for they come to the same each time.
+    Projected,
 }
 
 /// How a subproblem ended.
@@ -79,8 +79,8 @@ pub(super) struct Controller {
     /// The share of the time for sweeps, now.
     share: f64,
     strategy: usize,
-    /// Damped sweeps have been.
-    damped: bool,
+    /// [`Origin::Projected`] has been.
+    projected: bool,
     /// Strategies in a row without success.
     idle: usize,
     /// The error to reach and the factorisations since it was set.
@@ -242,13 +242,9 @@ impl Controller {
     }
 
     /// How many sweeps from zero there are, if a factorisation is worth `ratio` of them.
-    pub(super) fn long_sweeps(&self, ratio: f64) -> usize {
-        ((self.budget * ratio) as usize).clamp(LONG.0, LONG.1)
-    }
-
-    /// How many damped sweeps from zero there are.
-    pub(super) fn damped_sweeps(&self, ratio: f64) -> usize {
-        self.long_sweeps(ratio).min(MOST_DAMPED)
+    pub(super) fn long_sweeps(&self, from: Origin, ratio: f64) -> usize {
+        let most = if from == Origin::Projected { MOST_PROJECTED } else { LONG.1 };
+        ((self.budget * ratio) as usize).clamp(LONG.0, most)
     }
 
     /// The sweeps have ended with this error; returns by which factor it grew, and gives sweeps that help more time.
@@ -273,7 +269,7 @@ impl Controller {
         self.floor = 0.0;
         self.failures = 0;
         let (_, share, mut from) = STRATEGIES[self.strategy];
-        if from == Origin::Damped && std::mem::replace(&mut self.damped, true) {
+        if from == Origin::Projected && std::mem::replace(&mut self.projected, true) {
             from = Origin::Best;
         }
         self.share = share;

@@ -109,8 +109,8 @@ const REST: f64 = 10.0;
 const NEAR: f64 = 1e-4;
 /// Above this error between two proximal steps, sweeps.
 const SWEEP_ABOVE: f64 = 1e-9;
-/// ω of damped sweeps, `1/‖W_cc‖` times which their projections move an impulse.
-const DAMPED: f64 = 1.3;
+/// ω of the sweeps with one projection a contact, as that of `psor`.
+const OMEGA: f64 = 1.3;
 /// Sweeps that raise the error by more than this factor are taken back.
 const TAKE_BACK: f64 = 5.0;
 /// Problems of so few unknowns are enumerated after so many Newton iterations: milliseconds, and a last word.
@@ -127,7 +127,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     /// The problem has rows with bounds.
     bounded: bool,
     sweep: Sweep<P::Law, D>,
-    damped: Option<Box<Sweep<P::Law, D, Projection>>>,
+    projected: Option<Box<Sweep<P::Law, D, Projection>>>,
     alternating: Option<Box<Alternating<D>>>,
     central: Option<Box<Central<P::Law, D>>>,
     pursuit: Option<Box<Pursuit<P::Law, D>>>,
@@ -168,7 +168,7 @@ enum Stage {
     Interior { halvings: Halvings, short: usize },
     Newton,
     Between { left: usize },
-    Damped { left: usize },
+    Projected { left: usize },
     Pursuit { halvings: Halvings, most: usize },
     Alternating,
 }
@@ -200,7 +200,7 @@ struct Done {
     failed: usize,
     newton: usize,
     between: usize,
-    damped: usize,
+    projected: usize,
     /// How often, the steps of all, and the error of the last.
     pursuits: usize,
     pursued: usize,
@@ -222,7 +222,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         Ok(HybridWork {
             bounded,
             sweep: Sweep::new(problem, &state),
-            damped: None,
+            projected: None,
             alternating: None,
             central: None,
             pursuit: None,
@@ -256,8 +256,8 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         }
         problem.refill(&mut work.state)?;
         work.sweep.fill(problem, &work.state);
-        if let Some(damped) = &mut work.damped {
-            damped.fill(problem, &work.state);
+        if let Some(projected) = &mut work.projected {
+            projected.fill(problem, &work.state);
         }
         work.scale = problem.velocity_scale(&work.state);
         work.costs = None;
@@ -298,7 +298,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             Stage::Interior { .. } => self.interior(problem, point, work),
             Stage::Newton => self.newton(problem, point, work),
             Stage::Between { left } => self.between(problem, point, work, left),
-            Stage::Damped { left } => self.damped(problem, point, work, left),
+            Stage::Projected { left } => self.projected(problem, point, work, left),
             Stage::Pursuit { .. } => self.pursue(problem, point, work),
             Stage::Alternating => self.alternate(problem, point, work),
         }
@@ -323,7 +323,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
     fn account(&self, work: &Self::Work) -> Vec<String> {
         let Done { start, sweeps, rest, trial, interior, interior_error, .. } = work.done;
         let Done { subproblems, failed, newton, between, alternating, .. } = work.done;
-        let Done { followed, damped, pursued, pursued_error, .. } = work.done;
+        let Done { followed, projected, pursued, pursued_error, .. } = work.done;
         let mut lines = vec![];
         match start {
             Start::Zero => {}
@@ -366,8 +366,8 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         if alternating > 0 {
             lines.push(format!("{alternating} iterations of alternating directions"));
         }
-        if damped > 0 {
-            lines.push(format!("{damped} sweeps with one projection a contact, from zero"));
+        if projected > 0 {
+            lines.push(format!("{projected} sweeps with one projection a contact, from zero"));
         }
         if work.done.strategies > 0 {
             lines.push(format!("{} changes of strategy", work.done.strategies));
@@ -386,7 +386,7 @@ fn runs_away(estimate: f64) -> bool {
     estimate.is_nan() || estimate > RUNAWAY
 }
 
-/// So many sweeps and the velocity that is 1, fewer where they run away or the budget is over; returns what the last one moved.
+/// `count` sweeps, fewer where they run away or the budget is over; returns what the last one moved, in units of `scale`.
 fn swept<P: Blockwise<D> + Disked<D>, S: LocalSolver<D, P::Law>, const D: usize>(
     sweep: &mut Sweep<P::Law, D, S>,
     problem: &P,
@@ -700,8 +700,8 @@ impl<const D: usize> OnContacts<Auto, D> {
         Step::Continue { estimate: error }
     }
 
-    /// Damped sweeps of stage 9 from zero; the better of what they come to and the best point goes on.
-    fn damped<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+    /// Sweeps of stage 9 with one projection a contact, from zero; the better of what they come to and the best point goes on.
+    fn projected<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
@@ -709,15 +709,15 @@ impl<const D: usize> OnContacts<Auto, D> {
         left: usize,
     ) -> Step {
         let count = left.min(2 * SWEEPS_A_STEP);
-        let HybridWork { damped, newton, state, scale, best, controller, .. } = work;
-        let (Some(damped), Some(newton)) = (damped, newton) else {
+        let HybridWork { projected, newton, state, scale, best, controller, .. } = work;
+        let (Some(projected), Some(newton)) = (projected, newton) else {
             return starts::lost();
         };
         let r = P::impulses(point);
-        let estimate = swept(damped, problem, state, r, (count, *scale));
-        work.done.damped += count;
+        let estimate = swept(projected, problem, state, r, (count, *scale));
+        work.done.projected += count;
         if left > count && !runs_away(estimate) {
-            work.stage = Stage::Damped { left: left - count };
+            work.stage = Stage::Projected { left: left - count };
             return Step::Continue { estimate };
         }
         let error = newton.look(problem, state, r);
@@ -788,27 +788,26 @@ impl<const D: usize> OnContacts<Auto, D> {
         let r = P::impulses(point);
         match from {
             Origin::Best => r.copy_from_slice(&work.best),
-            Origin::Swept | Origin::Damped => r.fill(0.0),
+            Origin::Swept | Origin::Projected => r.fill(0.0),
         }
-        if from == Origin::Damped {
-            let HybridWork { damped, state, .. } = work;
-            let sweep = || Box::new(Sweep::with(Projection { step: DAMPED }, problem, state));
-            damped.get_or_insert_with(sweep);
-        }
-        // Some problems want nothing but sweeps, tens of thousands: as many as the strategy before took time for.
-        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
-        let ratio = costs.worth / costs.sweep;
-        problem.enter(&mut work.state, point);
-        match from {
-            Origin::Damped => {
-                work.stage = Stage::Damped { left: work.controller.damped_sweeps(ratio) };
-            }
-            _ if work.passed_by.is_some() => starts::begin_interior(problem, work),
-            Origin::Swept => {
-                work.before.copy_from_slice(P::impulses(point));
-                work.stage = Stage::Between { left: work.controller.long_sweeps(ratio) };
-            }
-            Origin::Best => self.subproblem_here(problem, point, work),
+        if work.passed_by.is_some() && from != Origin::Projected {
+            starts::begin_interior(problem, work);
+        } else if from == Origin::Best {
+            self.subproblem_here(problem, point, work);
+        } else {
+            // Some problems want nothing but sweeps, tens of thousands: as many as the strategy before took time for.
+            problem.enter(&mut work.state, point);
+            let HybridWork { projected, state, controller, costs, before, stage, .. } = work;
+            let costs = *costs.get_or_insert_with(|| problem.costs(state));
+            let left = controller.long_sweeps(from, costs.worth / costs.sweep);
+            *stage = if from == Origin::Projected {
+                let sweep = || Box::new(Sweep::with(Projection { step: OMEGA }, problem, state));
+                projected.get_or_insert_with(sweep);
+                Stage::Projected { left }
+            } else {
+                before.copy_from_slice(P::impulses(point));
+                Stage::Between { left }
+            };
         }
         Step::Continue { estimate: f64::NAN }
     }
