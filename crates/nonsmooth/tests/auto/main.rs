@@ -196,6 +196,17 @@ fn a_pyramid_of_spheres_is_solved_by_projected_sweeps() {
     assert!(projected, "{:?}", end.account);
 }
 
+/// No method came nearer than 4e-4 in 20 s before: two thirds of the spheres rest, which the sweeps and the interior point on the whole do not find out.
+#[test]
+fn a_larger_pyramid_of_spheres_is_solved_by_motion_and_impulses_in_turn() {
+    let pyramid = Spheres { base: 10, ..Spheres::default() };
+    let problem = pyramid.build().unwrap().problem().unwrap();
+    let end = run(&problem, "auto", &[], &within(1e-8, 120.0));
+    assert_eq!(end.outcome.status, Status::Solved, "{}", end.outcome.measure.relative);
+    let turns = end.account.iter().any(|line| line.contains("in turn"));
+    assert!(turns, "{:?}", end.account);
+}
+
 /// The same planted solution with `W + K`: entries of `W` moved by `size`, relatively; antisymmetrically where `skew`.
 fn nonsymmetric(case: &Planted, size: f64, skew: bool) -> FrictionLocal<3> {
     let (mut problem, point) = case.local::<3>();

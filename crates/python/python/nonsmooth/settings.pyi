@@ -94,6 +94,9 @@ class Auto(Settings):
     interior : bool, default True
         Whether an interior point may make the start; false goes from the sweeps to the proximal
         point method at once.
+    in_turn : bool, default True
+        Whether, where no strategy helps, the motion of what moves and the impulses of all are
+        sought in turn; false goes on with other strategies.
     strategies : int, default 12
         Give up after this many strategies in a row that have not halved the error; 0 goes on until
         a limit ends the solve.
@@ -117,6 +120,7 @@ class Auto(Settings):
         self,
         *,
         interior: bool = ...,
+        in_turn: bool = ...,
         strategies: int = ...,
         enumerate_below: int = ...,
         restarts: int = ...,

@@ -20,9 +20,11 @@
 //! 7. **The central path by its arc length** ([`Pursuit`]), where Newton's iterations promise to be many: it turns back with the
 //!    path where stage 4 is stuck. Up to three times, each time smoothed by less and for longer. Walls that are shaken end here.
 //! 8. **Alternating directions** (`alternating.rs`) after many proximal steps, for as long as they promise more.
-//! 9. **Another strategy** (other ρ, more sweeps, a start from zero) where the error has not halved for long; at the first time
-//!    the existence of a solution is investigated, and a problem without one is given up with its certificate. That first time sweeps with
-//!    one projection a contact ([`Projection`]) are tried from zero: where exact ones circle, these may come near or end.
+//! 9. **Motion and impulses in turn** (`in_turn.rs`), where a problem is stated by its bodies, once, after many proximal steps that are still far off or at the first change of strategy:
+//!    what moves with what rests as its support, then the impulses of all from that motion.
+//! 10. **Another strategy** (other ρ, more sweeps, a start from zero) where the error has not halved for long; at the first time
+//!     the existence of a solution is investigated, and a problem without one is given up with its certificate. That first time sweeps with
+//!     one projection a contact ([`Projection`]) are tried from zero: where exact ones circle, these may come near or end.
 //!
 //! A problem with scalar rows that have bounds stays with the sweeps, which visit them too: the later stages know no bounds.
 //!
@@ -37,6 +39,7 @@
 
 mod alternating;
 mod controller;
+mod in_turn;
 mod proximal_newton;
 mod rate;
 mod starts;
@@ -56,6 +59,7 @@ use crate::core::settings::{Settings, described};
 use crate::{Limits, SolveError, Solver, Step};
 use alternating::Alternating;
 use controller::{Controller, Origin, Verdict};
+use in_turn::{Came, InTurn};
 use rate::Rate;
 use starts::Halvings;
 
@@ -65,13 +69,15 @@ use starts::Halvings;
 pub struct Auto {
     /// Whether an interior point may make the start; false goes from the sweeps to the proximal point method at once.
     pub interior: bool,
+    /// Whether, where no strategy helps, the motion of what moves and the impulses of all are sought in turn; false goes on with other strategies.
+    pub in_turn: bool,
     /// Give up after this many strategies in a row that have not halved the error; 0 goes on until a limit ends the solve.
     pub strategies: usize,
 }
 
 impl Default for Auto {
     fn default() -> Self {
-        Self { interior: true, strategies: 12 }
+        Self { interior: true, in_turn: true, strategies: 12 }
     }
 }
 
@@ -111,6 +117,9 @@ const NEAR: f64 = 1e-4;
 const SWEEP_ABOVE: f64 = 1e-9;
 /// ω of the sweeps with one projection a contact, as that of `psor`.
 const OMEGA: f64 = 1.3;
+/// Motion and impulses in turn have come near enough for Newton's iterations; where the impulses of rest come no nearer than this, nearly all moves.
+const TURNED: f64 = 1e-6;
+const NOT_AT_REST: f64 = 1.5e-2;
 /// Sweeps that raise the error by more than this factor are taken back.
 const TAKE_BACK: f64 = 5.0;
 /// Problems of so few unknowns are enumerated after so many Newton iterations: milliseconds, and a last word.
@@ -128,6 +137,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     bounded: bool,
     sweep: Sweep<P::Law, D>,
     projected: Option<Box<Sweep<P::Law, D, Projection>>>,
+    in_turn: Option<Box<InTurn<P::Law, D>>>,
     alternating: Option<Box<Alternating<D>>>,
     central: Option<Box<Central<P::Law, D>>>,
     pursuit: Option<Box<Pursuit<P::Law, D>>>,
@@ -152,6 +162,8 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     asked: bool,
     /// Stage 2 has been, or was not worth a factorisation.
     rest_sought: bool,
+    /// Motion and impulses have been sought in turn, or cannot be.
+    turned: bool,
     /// The interior point was left out: after so many Newton iterations, at this error.
     passed_by: Option<(usize, f64)>,
     /// Alternating directions last began at the point, not at no impulses.
@@ -169,6 +181,7 @@ enum Stage {
     Newton,
     Between { left: usize },
     Projected { left: usize },
+    InTurn,
     Pursuit { halvings: Halvings, most: usize },
     Alternating,
 }
@@ -201,6 +214,9 @@ struct Done {
     newton: usize,
     between: usize,
     projected: usize,
+    /// Rounds of motion and impulses, bodies that moved in the last one, and all; and the least error.
+    turns: [usize; 3],
+    turned_error: f64,
     /// How often, the steps of all, and the error of the last.
     pursuits: usize,
     pursued: usize,
@@ -223,6 +239,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             bounded,
             sweep: Sweep::new(problem, &state),
             projected: None,
+            in_turn: None,
             alternating: None,
             central: None,
             pursuit: None,
@@ -242,6 +259,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             exact: None,
             asked: false,
             rest_sought: false,
+            turned: false,
             passed_by: None,
             from_here: false,
             done: Done::default(),
@@ -283,6 +301,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         work.rate.begin();
         (work.existence, work.exact, work.asked) = (None, None, false);
         (work.passed_by, work.rest_sought, work.spread) = (None, false, None);
+        (work.turned, work.in_turn) = (false, None);
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
@@ -299,6 +318,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             Stage::Newton => self.newton(problem, point, work),
             Stage::Between { left } => self.between(problem, point, work, left),
             Stage::Projected { left } => self.projected(problem, point, work, left),
+            Stage::InTurn => self.take_turns(problem, point, work),
             Stage::Pursuit { .. } => self.pursue(problem, point, work),
             Stage::Alternating => self.alternate(problem, point, work),
         }
@@ -368,6 +388,13 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         }
         if projected > 0 {
             lines.push(format!("{projected} sweeps with one projection a contact, from zero"));
+        }
+        let [rounds, moving, bodies] = work.done.turns;
+        if rounds > 0 {
+            lines.push(format!(
+                "motion and impulses in turn, {rounds} times, at last with {moving} of {bodies} bodies moving, to {:.1e}",
+                work.done.turned_error
+            ));
         }
         if work.done.strategies > 0 {
             lines.push(format!("{} changes of strategy", work.done.strategies));
@@ -631,6 +658,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         if let Some(chase) = self.chase_due(work, error) {
             return self.begin_pursuit(problem, work, error, chase);
         }
+        if self.turns_are_due(work, error) && self.begin_turns(problem, work) {
+            return Step::Continue { estimate: error };
+        }
         if self.alternation_is_due(work) {
             return self.begin_alternating(problem, point, work, error);
         }
@@ -700,7 +730,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         Step::Continue { estimate: error }
     }
 
-    /// Sweeps of stage 9 with one projection a contact, from zero; the better of what they come to and the best point goes on.
+    /// Sweeps of stage 10 with one projection a contact, from zero; the better of what they come to and the best point goes on.
     fn projected<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
@@ -724,8 +754,65 @@ impl<const D: usize> OnContacts<Auto, D> {
         if error >= controller.least() || error.is_nan() {
             r.copy_from_slice(best);
         }
-        self.subproblem_here(problem, point, work);
+        let far = error.min(controller.least()) >= NEAR;
+        if !(far && self.begin_turns(problem, work)) {
+            self.subproblem_here(problem, point, work);
+        }
         Step::Continue { estimate: error }
+    }
+
+    /// Begins stage 9, once, where the problem is stated by its bodies.
+    fn begin_turns<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        work: &mut HybridWork<P, D>,
+    ) -> bool {
+        let HybridWork { in_turn, stage, turned, scale, tolerance, .. } = work;
+        if std::mem::replace(turned, true) || !self.0.in_turn {
+            return false;
+        }
+        let begun = problem.bodies().and_then(|bodies| InTurn::begin(bodies, *scale, *tolerance));
+        *in_turn = begun.map(Box::new);
+        if in_turn.is_some() {
+            *stage = Stage::InTurn;
+        }
+        in_turn.is_some()
+    }
+
+    /// Stage 9: a step of motion and impulses in turn; at its end the best of their rounds goes on where it is better than the point.
+    fn take_turns<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) -> Step {
+        let HybridWork { in_turn, newton, state, done, inner_best, controller, .. } = work;
+        let (Some(turns), Some(bodies), Some(newton)) = (in_turn, problem.bodies(), newton) else {
+            return starts::lost();
+        };
+        let mut ended = false;
+        match turns.step(bodies) {
+            Came::Further => {}
+            Came::Round => {
+                done.turns = turns.counts();
+                let error = newton.look(problem, state, turns.impulses());
+                if done.turns[0] == 1 || error < done.turned_error {
+                    done.turned_error = error;
+                    inner_best.copy_from_slice(turns.impulses());
+                }
+                ended = error < TURNED || done.turns[0] == 1 && error > NOT_AT_REST;
+            }
+            Came::End => ended = true,
+        }
+        if ended {
+            let r = P::impulses(point);
+            if done.turns[0] > 0 && done.turned_error < controller.least() {
+                r.copy_from_slice(inner_best);
+            }
+            work.in_turn = None;
+            self.subproblem_here(problem, point, work);
+        }
+        Step::Continue { estimate: f64::NAN }
     }
 
     /// What follows from what is known of the existence of a solution, if something does.
@@ -753,7 +840,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         }
     }
 
-    /// Stage 9. The first time it is asked whether there is a solution at all.
+    /// Stage 10. The first time it is asked whether there is a solution at all.
     fn other_strategy<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,

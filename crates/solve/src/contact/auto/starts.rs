@@ -60,6 +60,10 @@ pub(super) struct Chase {
     idle: usize,
 }
 
+/// Motion and impulses are sought in turn after so many Newton iterations that are still farther off than this and promise as many more as for stage 7.
+const TURN_AFTER: usize = 100;
+const TURN_ABOVE: f64 = 1e-3;
+
 /// Alternating directions are tried after so many Newton iterations, and, from the other start, again after so many.
 const ALTERNATE_AFTER: [usize; 2] = [40, 160];
 /// They start from the present impulses below this error, else from none: once, and once the other way.
@@ -341,6 +345,17 @@ impl<const D: usize> OnContacts<Auto, D> {
         Step::Continue { estimate: work.done.pursued_error }
     }
 
+    /// Whether stage 9 comes now: far from a solution, where Newton's iterations promise to be many.
+    pub(super) fn turns_are_due<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        work: &HybridWork<P, D>,
+        error: f64,
+    ) -> bool {
+        let Done { interior_error, newton, .. } = work.done;
+        let slow = takes_longer([interior_error, error], newton, work.tolerance, PURSUE_COST);
+        newton >= TURN_AFTER && error > TURN_ABOVE && slow
+    }
+
     /// Whether stage 8 comes now.
     pub(super) fn alternation_is_due<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
@@ -464,12 +479,12 @@ pub(super) struct Halvings {
 }
 
 impl Halvings {
-    fn from(error: f64) -> Self {
+    pub(super) fn from(error: f64) -> Self {
         Self { least: error, idle: 0 }
     }
 
     /// How many errors up to this one there have been since the last halving.
-    fn idle_at(&mut self, error: f64) -> usize {
+    pub(super) fn idle_at(&mut self, error: f64) -> usize {
         let halved = error < 0.5 * self.least;
         *self = if halved { Self::from(error) } else { Self { idle: self.idle + 1, ..*self } };
         self.idle

@@ -217,6 +217,10 @@ impl<const D: usize, L: DiskLaw<D>> Contacts<D> for FrictionGlobal<D, L> {
         let GlobalState { dynamics, operator, y, .. } = state;
         operator.enter(&dynamics.inverse, &point.v, y);
     }
+
+    fn bodies(&self) -> Option<&FrictionGlobal<D, L>> {
+        self.rows.is_none().then_some(self)
+    }
 }
 
 /// Of a problem with rows that have bounds, what their impulses do; of another, nothing.

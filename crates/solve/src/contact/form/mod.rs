@@ -23,7 +23,7 @@ mod rows;
 
 use nonsmooth_linalg::{Block, Moving, Passes, Singular, small};
 use nonsmooth_problem::check::Impulses;
-use nonsmooth_problem::{Bounds, Problem};
+use nonsmooth_problem::{Bounds, FrictionGlobal, Problem};
 
 pub use explicit::{Explicit, Model};
 pub use local::LocalState;
@@ -96,6 +96,14 @@ pub trait Contacts<const D: usize>: Problem {
 
     /// Completes `point` (velocities, multipliers) from its impulses, exactly.
     fn complete(&self, state: &mut Self::State, point: &mut Self::Point);
+
+    /// The problem by its bodies, where it is stated so and no scalar rows join them.
+    fn bodies(&self) -> Option<&FrictionGlobal<D, Self::Law>>
+    where
+        Self::Law: DiskLaw<D>,
+    {
+        None
+    }
 }
 
 /// Contacts with Coulomb's law, for methods whose formulas are those of that law.
