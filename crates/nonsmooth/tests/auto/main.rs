@@ -196,7 +196,7 @@ fn a_pyramid_of_spheres_is_solved_by_projected_sweeps() {
     assert!(projected, "{:?}", end.account);
 }
 
-/// No method came nearer than 4e-4 in 20 s before: two thirds of the spheres rest, which the sweeps and the interior point on the whole do not find out.
+/// No method came nearer than 4e-4 in 20 s before: more than half of the spheres rest, which the sweeps and the interior point on the whole do not find out.
 #[test]
 fn a_larger_pyramid_of_spheres_is_solved_by_motion_and_impulses_in_turn() {
     let pyramid = Spheres { base: 10, ..Spheres::default() };
