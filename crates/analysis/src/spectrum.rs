@@ -3,6 +3,7 @@
 use faer::{Mat, Side};
 use serde::{Deserialize, Serialize};
 
+use nonsmooth_linalg::budget::{self, TooLarge};
 use nonsmooth_linalg::{Bsr, Csc, Delassus, Inverse, MatrixError, norm, norm_of};
 use nonsmooth_problem::check::Law;
 use nonsmooth_problem::{Friction, FrictionGlobal, FrictionLocal};
@@ -40,6 +41,9 @@ pub enum SpectrumError {
         /// What the caller allows.
         limit: usize,
     },
+    /// It would not fit in memory.
+    #[error(transparent)]
+    Memory(#[from] TooLarge),
     /// M is singular, so there is no W.
     #[error(transparent)]
     Singular(#[from] MatrixError),
@@ -51,11 +55,11 @@ pub enum SpectrumError {
 impl Spectrum {
     /// The spectrum of a problem.
     ///
-    /// Cost: `8/3 m³` operations and `8 m²` bytes. A global problem with n < m and symmetric positive definite
+    /// Cost: `8/3 m³` operations and some `24 m²` bytes. A global problem with n < m and symmetric positive definite
     /// `M = L Lᵀ` has `W = Aᵀ A`, `A = L⁻¹ H`, and the squares of the singular values of A (n × m) are those of W that
     /// need not vanish: O(n² m).
     ///
-    /// Errors: more than `limit` rows (of A where A serves, else of W); a singular M; no convergence.
+    /// Errors: more than `limit` rows (of A where A serves, else of W), or of entries than the [`budget`] in force has memory for; a singular M; no convergence.
     pub fn of(problem: &Friction, limit: usize) -> Result<Self, SpectrumError> {
         match problem {
             Friction::Local2(p) => Self::of_local(p, limit),
@@ -84,6 +88,7 @@ impl Spectrum {
         let (n, m) = (p.dofs(), D * p.contacts());
         if n < m && p.M.asymmetry() == 0.0 {
             within(n, limit)?;
+            admit(n as f64 * (n as f64 + COPIES * m as f64))?;
             if let Ok(cholesky) = dense(&p.M).llt(Side::Lower) {
                 let mut a = dense(&p.H);
                 cholesky.L().solve_lower_triangular_in_place(&mut a);
@@ -97,6 +102,7 @@ impl Spectrum {
     }
 
     fn of_delassus<const D: usize>(w: &Bsr<D>) -> Result<Self, SpectrumError> {
+        admit(COPIES * ((D * w.nrows()) as f64).powi(2))?;
         let values = singular_values(&dense(&w.to_csc()))?;
         let norm = norm_of(w.blocks().iter().flatten().flatten().copied());
         Ok(Self::cut(D * w.nrows(), &values, w.asymmetry() * norm))
@@ -159,6 +165,14 @@ fn within(rows: usize, limit: usize) -> Result<(), SpectrumError> {
     if rows <= limit { Ok(()) } else { Err(SpectrumError::TooLarge { rows, limit }) }
 }
 
+/// A dense matrix, what the iteration reduces it to, and its reflections.
+const COPIES: f64 = 3.0;
+
+/// Memory for so many entries.
+fn admit(entries: f64) -> Result<(), TooLarge> {
+    budget::admit("the spectrum", 8.0 * entries)
+}
+
 fn dense(a: &Csc) -> Mat<f64> {
     let mut out = Mat::zeros(a.nrows(), a.ncols());
     a.triplets().for_each(|(i, j, x)| out[(i, j)] = x);
@@ -208,6 +222,18 @@ mod tests {
         let skew: f64 =
             (0..81).map(|k| entry(k / 9, k % 9) - entry(k % 9, k / 9)).map(|x| x * x).sum();
         assert!((found.skew - skew.sqrt()).abs() < 1e-13);
+    }
+
+    #[test]
+    fn memory_is_asked_for_before_it_is_taken() {
+        let (global, _) = Planted { contacts: 20, dofs: 30, ..Planted::default() }.global::<3>();
+        let budget = |memory| budget::Budget { memory: Some(memory), ..Default::default() };
+        let found = |memory| {
+            let _scope = budget(memory).enter();
+            [Spectrum::of_global(&global, 60), Spectrum::of_local(&local(&[], 20), 60)]
+        };
+        assert!(found(10_000).iter().all(|s| matches!(s, Err(SpectrumError::Memory(_)))));
+        assert!(found(1 << 20).iter().all(Result::is_ok));
     }
 
     #[test]

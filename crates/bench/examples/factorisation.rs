@@ -44,15 +44,9 @@ fn of_bodies<const D: usize, L: DiskLaw<D>>(problem: &FrictionGlobal<D, L>) -> B
     let n = problem.M.nrows();
     let mut groups = Groups::new(n);
     problem.M.triplets().filter(|e| e.2 != 0.0).for_each(|(i, j, _)| groups.join(i, j));
-    let (mut node_of, mut place, mut sizes) = (vec![0; n], vec![0; n], vec![]);
-    let mut number = BTreeMap::new();
-    for i in 0..n {
-        let node = *number.entry(groups.root(i)).or_insert_with(|| {
-            sizes.push(0);
-            sizes.len() - 1
-        });
-        (node_of[i], place[i]) = (node, sizes[node]);
-        sizes[node] += 1;
+    let (node_of, sizes, mut place) = (groups.numbers(), groups.sizes(), vec![0; n]);
+    for members in groups.members() {
+        members.iter().enumerate().for_each(|(p, &i)| place[i] = p);
     }
     let mut blocks = BTreeMap::new();
     let mut add = |i: usize, j: usize, x: f64| {

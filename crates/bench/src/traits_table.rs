@@ -232,7 +232,7 @@ pub fn describe(file: &Path, limit: usize) -> Result<Described, DescribeError> {
     let traits = Traits::of(problem, content.info.dofs);
     let spectrum = match Spectrum::of(problem, limit) {
         Ok(spectrum) => Some(spectrum),
-        Err(SpectrumError::TooLarge { .. }) => None,
+        Err(SpectrumError::TooLarge { .. } | SpectrumError::Memory(_)) => None,
         Err(source) => return Err(DescribeError::Spectrum { file: file.into(), source }),
     };
     Ok((file.into(), traits, spectrum))

@@ -545,18 +545,11 @@ fn connected_components(a: &Csc) -> (Vec<Vec<usize>>, Vec<(u32, u32)>) {
     let n = a.nrows();
     let mut groups = Groups::new(n);
     a.triplets().filter(|e| e.2 != 0.0).for_each(|(i, j, _)| groups.join(i, j));
-    let mut of_root = vec![u32::MAX; n];
-    let mut components: Vec<Vec<usize>> = Vec::new();
-    let mut place = Vec::with_capacity(n);
-    for i in 0..n {
-        let r = groups.root(i);
-        if of_root[r] == u32::MAX {
-            of_root[r] = u32::try_from(components.len()).expect("fewer than 2³² components");
-            components.push(Vec::new());
-        }
-        let members = &mut components[of_root[r] as usize];
-        place.push((of_root[r], u32::try_from(members.len()).expect("fewer than 2³² unknowns")));
-        members.push(i);
+    let components = groups.members();
+    let mut place = vec![(0, 0); n];
+    let narrow = |i: usize| u32::try_from(i).expect("fewer than 2³² unknowns");
+    for (k, members) in components.iter().enumerate() {
+        members.iter().enumerate().for_each(|(p, &i)| place[i] = (narrow(k), narrow(p)));
     }
     (components, place)
 }

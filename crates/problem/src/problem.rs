@@ -67,6 +67,12 @@ pub trait Problem {
         false
     }
 
+    /// Puts in `point`, the one last measured with `gauge`, what follows from its impulses as the judge has it: velocities and multipliers of a global problem. Says whether there is such a
+    /// part, and it is finite. Allocates nothing.
+    fn follow_impulses(&self, _point: &mut Self::Point, _gauge: &mut Self::Gauge) -> bool {
+        false
+    }
+
     /// What is complementary to the unknown, at a valid point and in plain arithmetic: the relative velocity u, or `w = M z + q`; of an hLCP its s. What the judge
     /// computes of it is in its verdict.
     fn partner(&self, point: &Self::Point) -> Vec<f64>;

@@ -45,7 +45,7 @@ pub use multistart::{Found, multistart};
 
 pub use self::core::boxed::Boxed;
 pub use self::core::drive::{
-    Driver, Limit, Limits, Observer, Outcome, Progress, Sample, Session, Status,
+    Driver, Limit, Limits, Observer, Outcome, Progress, Sample, Session, Status, THREADS_MOST,
 };
 pub use self::core::error::SolveError;
 pub use self::core::reformulation::Reformulation;

@@ -4,12 +4,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use nonsmooth_linalg::{Bsr, Csc};
-use nonsmooth_problem::check::Impulses;
+use nonsmooth_problem::check::{Impulses, Measure};
 use nonsmooth_problem::planted::Planted;
-use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem};
+use nonsmooth_problem::{FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem};
 use nonsmooth_solve::registry;
 use nonsmooth_solve::settings::{self, SettingsMap};
-use nonsmooth_solve::{Driver, Limit, Limits, Outcome, Session, SolveError, Solver, Status, Step};
+use nonsmooth_solve::{
+    Driver, Limit, Limits, Observer, Outcome, Progress, Session, SolveError, Solver, Status, Step,
+};
 
 type P = FrictionLocal<3>;
 
@@ -234,4 +236,65 @@ fn the_history_stays_bounded_and_keeps_its_ends() {
     assert_eq!(history[0].iteration, 0);
     assert!(history.windows(2).all(|w| w[0].iteration < w[1].iteration));
     assert!(history.last().unwrap().iteration > 90_000);
+}
+
+#[test]
+fn an_impulse_that_nothing_feels_is_not_the_best_where_it_is_infinite() {
+    // W = 0: the residual of an infinite impulse is that of none.
+    let w = Bsr::from_rows(1, &[vec![(0, [[0.0; 3]; 3])]]);
+    let problem = P::new(w, vec![-1.0, 0.0, 0.0], vec![0.5]).unwrap();
+    let limits = Limits { max_iterations: 400, ..Limits::default() };
+    let (outcome, point) = run(&problem, &limits, |k, point| {
+        point.r[0] = if k < 200 { 10.0_f64.powi(k as i32) } else { f64::INFINITY };
+        GO_ON
+    });
+    assert!(outcome.status != Status::Solved);
+    assert!(point.r.iter().all(|r| r.is_finite()), "{:?}", point.r);
+    for solver in ["fixed_point", "extragradient", "hyperplane"] {
+        let mut session = registry::session::<P>(solver, &SettingsMap::new()).unwrap();
+        let mut point = problem.origin();
+        let limits = Limits { max_iterations: 5000, ..Limits::default() };
+        session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+        assert!(point.r.iter().all(|r| r.is_finite()), "{solver}: {:?}", point.r);
+    }
+}
+
+/// The first point that an observer is told of.
+struct First(Option<(GlobalPoint, Measure)>);
+
+impl Observer<FrictionGlobal<3>> for First {
+    fn step(&mut self, _: &Progress) {}
+    fn keeps_best(&self) -> bool {
+        true
+    }
+    fn best(&mut self, point: &GlobalPoint, measure: &Measure) {
+        self.0.get_or_insert((point.clone(), *measure));
+    }
+}
+
+#[test]
+fn the_first_point_has_the_velocities_of_its_impulses() {
+    let case = Planted { contacts: 5, dofs: 30, ..Planted::default() };
+    let (problem, _) = case.global::<3>();
+    let mut session = registry::session("nsgs", &SettingsMap::new()).unwrap();
+    let (mut point, mut first) = (problem.origin(), First(None));
+    session.observe(&problem, &mut point, &Limits::default(), &mut first).unwrap();
+    let (first, measure) = first.0.unwrap();
+    assert!(first.r.iter().all(|r| *r == 0.0) && first.v.iter().any(|v| *v != 0.0));
+    assert!(measure.dynamics.unwrap() < 1e-12 && measure.velocity_gap.unwrap() < 1e-12);
+}
+
+/// A target of a proximal subproblem is no tighter than the tolerance, however loose that is.
+#[test]
+fn auto_takes_every_tolerance() {
+    for tolerance in [1e-2, 0.1, 1.0] {
+        let limits = Limits { tolerance, max_iterations: 2000, ..Limits::default() };
+        let w = Bsr::from_rows(1, &[vec![(0, [[1.0, 0.0, 0.0], [0.0; 3], [0.0; 3]])]]);
+        let stiff = P::new(w, vec![-1.0, 1.0, 0.0], vec![0.5]).unwrap();
+        for problem in [stiff, planted().0] {
+            let mut session = registry::session::<P>("auto", &SettingsMap::new()).unwrap();
+            let mut point = problem.origin();
+            session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+        }
+    }
 }

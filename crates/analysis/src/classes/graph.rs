@@ -73,24 +73,13 @@ pub(super) fn components(
     m: &Matrix,
     mut joined: impl FnMut(usize, usize, f64) -> bool,
 ) -> Vec<Vec<usize>> {
-    let n = m.nrows();
-    let mut groups = Groups::new(n);
+    let mut groups = Groups::new(m.nrows());
     m.for_each(|i, j, x| {
         if i != j && x != 0.0 && joined(i, j, x) {
             groups.join(i, j);
         }
     });
-    let mut found: Vec<Vec<usize>> = vec![];
-    let mut of_root = vec![usize::MAX; n];
-    for i in 0..n {
-        let root = groups.root(i);
-        if of_root[root] == usize::MAX {
-            of_root[root] = found.len();
-            found.push(vec![]);
-        }
-        found[of_root[root]].push(i);
-    }
-    found
+    groups.members()
 }
 
 /// Takes principal submatrices, each at the cost of its own columns.

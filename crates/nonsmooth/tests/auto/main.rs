@@ -185,26 +185,25 @@ fn a_shaken_wall_is_solved_along_its_central_path() {
     assert!(along, "{:?}", end.account);
 }
 
+/// `auto` solves the pyramid of spheres with this base, and says that it did so by `means`.
+fn solves_pyramid(base: usize, means: &str) {
+    let pyramid = Spheres { base, ..Spheres::default() };
+    let problem = pyramid.build().unwrap().problem().unwrap();
+    let end = run(&problem, "auto", &[], &within(1e-8, 120.0));
+    assert_eq!(end.outcome.status, Status::Solved, "{}", end.outcome.measure.relative);
+    assert!(end.account.iter().any(|line| line.contains(means)), "{:?}", end.account);
+}
+
 /// Exact sweeps circle at 2e-3, and all that comes before another strategy stays there too.
 #[test]
 fn a_pyramid_of_spheres_is_solved_by_projected_sweeps() {
-    let pyramid = Spheres { base: 8, ..Spheres::default() };
-    let problem = pyramid.build().unwrap().problem().unwrap();
-    let end = run(&problem, "auto", &[], &within(1e-8, 60.0));
-    assert_eq!(end.outcome.status, Status::Solved, "{}", end.outcome.measure.relative);
-    let projected = end.account.iter().any(|line| line.contains("one projection a contact"));
-    assert!(projected, "{:?}", end.account);
+    solves_pyramid(8, "one projection a contact");
 }
 
 /// No method came nearer than 4e-4 in 20 s before: more than half of the spheres rest, which the sweeps and the interior point on the whole do not find out.
 #[test]
 fn a_larger_pyramid_of_spheres_is_solved_by_motion_and_impulses_in_turn() {
-    let pyramid = Spheres { base: 10, ..Spheres::default() };
-    let problem = pyramid.build().unwrap().problem().unwrap();
-    let end = run(&problem, "auto", &[], &within(1e-8, 120.0));
-    assert_eq!(end.outcome.status, Status::Solved, "{}", end.outcome.measure.relative);
-    let turns = end.account.iter().any(|line| line.contains("in turn"));
-    assert!(turns, "{:?}", end.account);
+    solves_pyramid(10, "in turn");
 }
 
 /// The same planted solution with `W + K`: entries of `W` moved by `size`, relatively; antisymmetrically where `skew`.

@@ -213,3 +213,31 @@ fn a_pair_that_turns_out_singular_is_no_panic() {
         }
     }
 }
+
+/// A weight on a table that a joint holds: both fall alike, so that q without the joint is rounding, or as large as one likes.
+fn on_a_jointed_table(q: f64, s: f64) -> FrictionLocal<3> {
+    let w = Bsr::from_rows(1, &[vec![(0, [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]])]]);
+    let rows = RowsLocal::bilateral(csc(3, 1, &[(0, 0, -1.0)]), csc(1, 1, &[(0, 0, 1.0)]), vec![s]);
+    FrictionLocal::with_rows(w, vec![q, 0.3 * 0.00981, 0.0], vec![0.3], rows).unwrap()
+}
+
+#[test]
+fn what_a_joint_takes_up_is_no_measure_of_the_contacts() {
+    for q in [0.0, 1e-18, -1e-18] {
+        let problem = on_a_jointed_table(q, -0.00981);
+        for solver in ["auto", "nsgs"] {
+            let mut session =
+                registry::session::<FrictionLocal<3>>(solver, &Default::default()).unwrap();
+            let mut point = problem.origin();
+            let outcome =
+                session.solve(&problem, &mut point, &Limits::default(), &mut |_| {}).unwrap();
+            assert_eq!(outcome.status, Status::Solved, "{solver}, q = {q:e}");
+            // u_N = 2 r_N + q_N − λ and λ = r_N − s.
+            assert!((point.r[0] - 0.00981).abs() < 1e-9, "{:?}", point.r);
+        }
+    }
+    // The same velocity of the contact beside a million that the joint takes up: no impulse is no answer.
+    let problem = on_a_jointed_table(-1e6 - 0.00981, 1e6);
+    let point = LocalPoint { r: vec![0.0; 3], lambda: vec![-1e6] };
+    assert!(!problem.judge(&point, 1e-8).unwrap().solved);
+}

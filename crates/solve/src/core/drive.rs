@@ -39,7 +39,7 @@ pub struct Limits {
 }
 
 /// More threads than any machine has use for.
-const THREADS_MOST: usize = 1024;
+pub const THREADS_MOST: usize = 1024;
 
 impl Default for Limits {
     fn default() -> Self {
@@ -69,6 +69,18 @@ impl Limits {
                 0 => std::thread::available_parallelism().map_or(1, usize::from),
                 n => n,
             },
+        }
+    }
+
+    /// What is left of a budget, for a solve within what it bounds.
+    pub(crate) fn of(budget: &Budget) -> Self {
+        let left = |end: Instant| end.saturating_duration_since(Instant::now()).as_secs_f64();
+        Self {
+            time_limit: budget.deadline.map(left),
+            cancel: budget.cancel.clone(),
+            memory_limit: budget.memory,
+            threads: budget.threads.max(1),
+            ..Self::default()
         }
     }
 
@@ -503,9 +515,14 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
         };
         // Whatever happens in the preparation, there is a judged point.
         let start = observer.keeps_best().then(|| {
-            let measure = problem.measure(point, judge);
-            observer.best(point, &measure);
-            measure
+            let mut first = point.clone();
+            let mut measure = problem.measure(&first, judge);
+            // A start is given by its impulses alone.
+            if problem.follow_impulses(&mut first, judge) {
+                measure = problem.measure(&first, judge);
+            }
+            observer.best(&first, &measure);
+            (first, measure)
         });
         let ready = match earlier {
             Some(mut k) => {
@@ -537,7 +554,10 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
             Ok(now) => now,
             Err(e) => {
                 let measure = match start {
-                    Some(measure) => measure,
+                    Some((first, measure)) => {
+                        P::copy_point(&first, point);
+                        measure
+                    }
                     None if scope.raised() => problem.measure(point, judge),
                     None => Measure::unknown(),
                 };
@@ -901,10 +921,14 @@ impl<'a, P: Problem> Judge<'a, P> {
             }
         }
         // What passes counts as the best, though its merit may be that of a point with a contact that is not done.
-        let better = !self.visited
+        let mut better = !self.visited
             || self.latest
             || self.last.is_better_than(&self.best_measure)
             || self.last.passes(tolerance);
+        // Residuals may be finite where an impulse that nothing feels is not.
+        if better && self.visited && problem.validate_point(point).is_err() {
+            (self.last, better) = (Measure::unknown(), false);
+        }
         if better {
             self.best_measure = self.last;
             self.certified = certified;

@@ -22,6 +22,8 @@ const TICK: Duration = Duration::from_millis(5);
 /// Seconds that a task has after a limit to come back by itself, and the share of the time limit that it has in addition.
 const GRACE: f64 = 0.04;
 const SHARE: f64 = 0.04;
+/// The same after Ctrl-C, when somebody waits.
+const CANCELLED: f64 = 0.1;
 /// The same where there is no time from the start: what can be had at once.
 const AT_ONCE: f64 = 0.02;
 /// Of the thread: as much as a main thread has.
@@ -67,10 +69,15 @@ pub fn run<T: Send + 'static>(
             return Ok(task(limits));
         }
     };
-    let grace = Duration::from_secs_f64(match (limits.reached(begun), limits.time_limit) {
-        (Some(_), _) => AT_ONCE,
-        (None, t) => GRACE + SHARE * t.unwrap_or(0.0).min(20.0),
-    });
+    let at_once = limits.reached(begun).is_some();
+    let time = limits.time_limit.unwrap_or(0.0);
+    let grace = |limit| {
+        Duration::from_secs_f64(match limit {
+            _ if at_once => AT_ONCE,
+            Limit::Cancelled => CANCELLED,
+            Limit::Time | Limit::Iterations => GRACE + SHARE * time.min(20.0),
+        })
+    };
     // The limit that is reached, and when it was noticed.
     let mut late: Option<(Limit, Instant)> = None;
     loop {
@@ -90,7 +97,7 @@ pub fn run<T: Send + 'static>(
                     leash.0.store(true, Ordering::Relaxed);
                 }
             }
-            Some((limit, since)) if since.elapsed() >= grace => return Err(limit),
+            Some((limit, since)) if since.elapsed() >= grace(limit) => return Err(limit),
             Some(_) => {}
         }
     }

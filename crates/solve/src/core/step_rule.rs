@@ -63,6 +63,9 @@ impl Settings for StepRule {
     }
 }
 
+/// Steps are no longer than this, whatever the ratios say.
+const LONGEST: f64 = 1e300;
+
 impl StepRule {
     /// Shortens ρ until the ratio that the prediction has with it is acceptable; the ratio. NaN, where nothing moves, is; infinite, where F is not defined, is not, whatever ρ.
     pub(crate) fn shorten(&self, rho: &mut f64, mut predict: impl FnMut(f64) -> f64) -> f64 {
@@ -78,7 +81,22 @@ impl StepRule {
     /// Lengthens the next step where the last was timid.
     pub(crate) fn adapt(&self, ratio: f64, rho: &mut f64) {
         if ratio < self.grow_below {
-            *rho /= self.shrink;
+            // An infinite step could not be shortened again.
+            *rho = (*rho / self.shrink).min(LONGEST);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_that_has_grown_for_ever_is_shortened_in_the_end() {
+        let (rule, mut rho) = (StepRule::default(), 1.0);
+        (0..10_000).for_each(|_| rule.adapt(0.0, &mut rho));
+        assert!(rho.is_finite());
+        let ratio = rule.shorten(&mut rho, |rho| rho);
+        assert!(ratio <= rule.accept && rho == ratio);
     }
 }

@@ -426,6 +426,22 @@ fn eliminated(
     Some(forms.iter().map(|f| f[width..].iter().map(value).collect()).collect())
 }
 
+/// A row of so many zeros and a constant.
+fn with_constant(width: usize, constant: f64) -> Vec<Dyadic> {
+    let mut row = vec![Dyadic::zero(); width];
+    row.push(Dyadic::from(constant));
+    row
+}
+
+/// What a residual is relative to: q or, where the constraints determine it, q with them in force. The judge takes the second where its own factors tell, else the first, and never more than the larger.
+fn larger(q: Vec<Dyadic>, enforced: Option<Vec<Dyadic>>) -> Vec<Dyadic> {
+    let square = |v: &[Dyadic]| v.iter().fold(Dyadic::zero(), |s, x| &s + &(x * x));
+    match enforced {
+        Some(other) if (&square(&other) - &square(&q)).sign() > 0 => other,
+        _ => q,
+    }
+}
+
 /// The largest violation of an equation in units of its terms; an equation whose terms are all the rounding of `typical` ones counts with the others.
 fn violation(sums: &[Sum], typical: impl Fn(usize) -> f64) -> f64 {
     let share = |(j, s): (usize, &Sum)| {
@@ -480,6 +496,19 @@ impl<const D: usize> Judge for FrictionLocal<D> {
             .collect();
         let u: Vec<_> = sums.into_iter().map(|s| s.value).collect();
         let q: Vec<_> = (0..m).map(|i| Dyadic::from(self.q[i])).collect();
+        let enforced = self.rows.as_ref().and_then(|b| {
+            // R λ + s = 0, and q + V λ.
+            let p = b.s.len();
+            let mut equations: Vec<_> = b.s.iter().map(|&s| with_constant(p, s)).collect();
+            let mut forms: Vec<_> = self.q.iter().map(|&q| with_constant(p, q)).collect();
+            let add = |rows: &mut [Vec<Dyadic>], i: usize, j: usize, x: f64| {
+                rows[i][j] = &rows[i][j] + &Dyadic::from(x);
+            };
+            b.R.triplets().for_each(|(i, j, x)| add(&mut equations, i, j, x));
+            b.V.triplets().for_each(|(i, j, x)| add(&mut forms, i, j, x));
+            eliminated(equations, forms, p)
+        });
+        let q = larger(q, enforced.map(|rows| rows.into_iter().flatten().collect()));
         law::<D>(&w, &point.r, &u, &self.mu, &q).max(bilateral)
     }
 }
@@ -512,7 +541,8 @@ impl<const D: usize> Judge for FrictionGlobal<D> {
         };
         let w: Vec<_> = (0..self.contacts()).map(mean).collect();
         // The velocities that follow from r, the constraints kept.
-        let (mut equations, mut forms) = (zeros(n + p, n + p + 1), zeros(m, n + p + 1));
+        // Without impulses beside.
+        let (mut equations, mut forms) = (zeros(n + p, n + p + 2), zeros(m, n + p + 2));
         self.M.triplets().for_each(|(i, j, x)| entry(&mut equations, i, j, x));
         let mut load: Vec<Sum> = self.f.iter().map(|&f| Sum::of(f)).collect();
         self.H.triplets().for_each(|(i, j, x)| {
@@ -521,11 +551,12 @@ impl<const D: usize> Judge for FrictionGlobal<D> {
         });
         for (i, load) in load.iter().enumerate() {
             equations[i][n + p] = -&load.value;
+            equations[i][n + p + 1] = Dyadic::from(-self.f[i]);
         }
         let mut given: Vec<Sum> = self.w.iter().map(|&w| Sum::of(w)).collect();
         self.H.triplets().for_each(|(i, j, x)| given[j].add(x, point.v[i]));
         for j in 0..m {
-            entry(&mut forms, j, n + p, self.w[j]);
+            (0..2).for_each(|k| entry(&mut forms, j, n + p + k, self.w[j]));
         }
         let mut bilateral = 0.0;
         if let Some(b) = &self.rows {
@@ -538,13 +569,19 @@ impl<const D: usize> Judge for FrictionGlobal<D> {
                 weights[j] += x.abs() / unit(self.M.get(i, i));
             });
             for j in 0..p {
-                entry(&mut equations, n + j, n + p, b.b[j]);
+                (0..2).for_each(|k| entry(&mut equations, n + j, n + p + k, b.b[j]));
             }
             let kinetic = |(i, v): (usize, &f64)| v.abs() * unit(self.M.get(i, i));
             let typical = point.v.iter().enumerate().map(kinetic).fold(0.0, f64::max);
             bilateral = violation(&rows, |j| weights[j] * typical);
         }
         let given: Vec<_> = given.into_iter().map(|s| s.value).collect();
+        let followed = eliminated(equations, forms, n + p);
+        let of = |k: usize| {
+            let column = |rows: &Vec<Vec<Dyadic>>| rows.iter().map(|row| row[k].clone()).collect();
+            followed.as_ref().map(column)
+        };
+        let q = larger(q, of(1));
         if as_given {
             for (j, &v) in point.v.iter().enumerate() {
                 let (at, values) = self.M.column(j);
@@ -557,10 +594,9 @@ impl<const D: usize> Judge for FrictionGlobal<D> {
             return law::<D>(&w, &point.r, &given, &self.mu, &q).max(bilateral).max(dynamics);
         }
         // Where r does not determine the velocities, those given count.
-        let Some(u) = eliminated(equations, forms, n + p) else {
+        let Some(u): Option<Vec<Dyadic>> = of(0) else {
             return self.exactly(point, true);
         };
-        let u: Vec<_> = u.into_iter().flatten().collect();
         let square = |s: Dyadic, x: &Dyadic| &s + &(x * x);
         let size = q.iter().fold(Dyadic::zero(), square).sqrt();
         // The last bits of v are no gap.

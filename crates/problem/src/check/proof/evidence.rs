@@ -66,6 +66,10 @@ impl<'de> Deserialize<'de> for Number {
         if text.len() > 1_000_000 {
             return Err(serde::de::Error::custom("a fraction of more than a million digits"));
         }
+        let nothing = |q: &str| q.trim_matches(['+', '-', '_', '0']).is_empty();
+        if text.split_once('/').is_some_and(|(_, q)| nothing(q)) {
+            return Err(wrong());
+        }
         text.parse().map(Self).map_err(|_| wrong())
     }
 }

@@ -34,11 +34,8 @@ const NOISE: f64 = 1e-8;
 pub(crate) fn monotone(a: &Csc) -> Monotone {
     let mut groups = Groups::new(a.nrows());
     a.triplets().filter(|e| e.2 != 0.0).for_each(|(i, j, _)| groups.join(i, j));
-    let mut members: Vec<Vec<usize>> = vec![vec![]; a.nrows()];
-    (0..a.nrows()).for_each(|i| members[groups.root(i)].push(i));
     let small = |m: &Vec<usize>| m.len() <= EXACT;
-    let (small, large): (Vec<_>, Vec<_>) =
-        members.into_iter().filter(|m| !m.is_empty()).partition(small);
+    let (small, large): (Vec<_>, Vec<_>) = groups.members().into_iter().partition(small);
     let mut definite = true;
     let mut all_proved = is_surely_definite(&principal(a, &large.concat()));
     if !is_surely_definite(&principal(a, &small.concat())) {

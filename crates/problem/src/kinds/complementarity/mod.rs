@@ -107,7 +107,7 @@ macro_rules! problem_in_z {
 
 mod boxed;
 mod hlcp;
-mod judge;
+pub(crate) mod judge;
 mod lcp;
 mod mcp;
 mod mlcp;

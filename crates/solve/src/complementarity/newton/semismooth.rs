@@ -20,9 +20,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::complementarity::functions::Penalised;
 use crate::complementarity::parts::nonlinear::{
-    CHECK_EVERY, Crash, Descent, Idle, Inner, Options, Solve,
+    CHECK_EVERY, Crash, Descent, Idle, Inner, MEMORY_MOST, Options, Solve,
 };
-use crate::core::ranges::{at_least, up_to};
+use crate::core::ranges::{at_least, at_most, up_to};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
@@ -52,7 +52,8 @@ impl Default for Semismooth {
 impl Settings for Semismooth {
     fn validate(&self) -> Result<(), String> {
         up_to("lambda", self.lambda, 1.0)?;
-        at_least("memory", self.memory, 1)
+        at_least("memory", self.memory, 1)?;
+        at_most("memory", self.memory, MEMORY_MOST)
     }
 }
 

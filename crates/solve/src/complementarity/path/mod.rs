@@ -37,7 +37,7 @@ use serde::{Deserialize, Serialize};
 use crate::complementarity::functions::{Min, Penalised};
 use crate::complementarity::parts::arc::{Cell, End, Linearised, Start};
 use crate::complementarity::parts::nonlinear::{
-    CHECK_EVERY, Crash, Descent, Idle, Moved, Options, STATIONARY, Solve, UNDEFINED,
+    CHECK_EVERY, Crash, Descent, Idle, MEMORY_MOST, Moved, Options, STATIONARY, Solve, UNDEFINED,
 };
 use crate::core::ranges::{at_least, at_most, nonnegative, positive};
 use crate::core::register::{About, Described, Solves};
@@ -137,6 +137,7 @@ impl Default for PathSearch {
 impl Settings for PathSearch {
     fn validate(&self) -> Result<(), String> {
         at_least("memory", self.memory, 1)?;
+        at_most("memory", self.memory, MEMORY_MOST)?;
         positive("kappa", self.kappa)?;
         nonnegative("proximal", self.proximal)?;
         at_most("restarts", self.restarts, 5)?;

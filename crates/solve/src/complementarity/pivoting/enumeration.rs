@@ -233,6 +233,8 @@ fn maximal(faces: Vec<Face>) -> Vec<Face> {
     faces
 }
 
+/// Below this part of the largest number of a family, one is zero but for rounding.
+const DUST: f64 = 1e-14;
 /// What of an entry is zero, in units of the largest of its row.
 const ZERO: f64 = 1e-11;
 /// What of a value is zero, in units of its terms.
@@ -613,8 +615,13 @@ impl Case {
             }
             ends.push(case.values(data));
         }
-        let scale =
-            ends.iter().flatten().fold(0.0_f64, |l, x| l.max(x.abs())).max(f64::MIN_POSITIVE);
+        let scale = ends.iter().flatten().fold(0.0_f64, |l, x| l.max(x.abs()));
+        // Where nothing but zero ends it, rays have any length.
+        let scale = if scale > 0.0 { scale } else { 1.0 };
+        // What rounding leaves of a zero is none.
+        for x in ends.iter_mut().flatten().filter(|x| x.abs() <= DUST * scale) {
+            *x = 0.0;
+        }
         let mean = |j: usize| {
             let points: f64 = ends.iter().map(|x| x[j]).sum::<f64>() / ends.len() as f64;
             points + rays.iter().map(|x: &Vec<f64>| x[j] * scale).sum::<f64>()

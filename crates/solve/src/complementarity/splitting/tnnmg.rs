@@ -170,7 +170,7 @@ impl Tnnmg {
         face: &mut Face,
     ) -> f64 {
         let n = z.len();
-        for k in 0..self.sweeps {
+        for k in (0..self.sweeps).take_while(|_| !budget::over()) {
             relax(&levels[0], q, bounds, z, k % 2 == 1);
         }
         let at_bound = |i: usize| z[i] <= bounds.lower(i) || z[i] >= bounds.upper(i);

@@ -150,7 +150,7 @@ impl Controller {
         self.inner = Subproblem {
             initial: residual,
             best: residual,
-            target: (1e-3 * error).clamp(0.1 * tolerance, 1e-4),
+            target: (1e-3 * error).min(1e-4).max(0.1 * tolerance),
             ..Subproblem::default()
         };
         self.error = error;

@@ -106,17 +106,7 @@ impl<L: DiskLaw<D>, const D: usize> InTurn<L, D> {
         }
         let n = problem.dofs();
         let mut groups = unknowns_of_bodies(problem);
-        let (mut dofs, mut body) = (Vec::<Vec<usize>>::new(), vec![0; n]);
-        for i in 0..n {
-            let root = groups.root(i);
-            // Roots are the least of their group.
-            if root == i {
-                body[i] = dofs.len();
-                dofs.push(vec![]);
-            }
-            body[i] = body[root];
-            dofs[body[i]].push(i);
-        }
+        let (dofs, body) = (groups.members(), groups.numbers());
         if dofs.len() < BODIES {
             return None;
         }
@@ -250,16 +240,10 @@ impl<L: DiskLaw<D>, const D: usize> InTurn<L, D> {
     /// The motion of B while all others rest; false where it is not found.
     fn move_free(&mut self, problem: &FrictionGlobal<D, L>) -> bool {
         let (part, dofs) = self.part(problem);
-        let outer = budget::current();
-        let left = |end: std::time::Instant| {
-            end.saturating_duration_since(std::time::Instant::now()).as_secs_f64()
-        };
         let limits = Limits {
             tolerance: (0.01 * self.tolerance).max(1e-12),
             max_iterations: NESTED,
-            time_limit: outer.deadline.map(left),
-            cancel: outer.cancel,
-            ..Limits::default()
+            ..Limits::of(&budget::current())
         };
         let mut point = part.origin();
         let mut driver =

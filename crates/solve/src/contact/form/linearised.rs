@@ -512,17 +512,8 @@ impl Nodes {
         let coupled = |e: &(usize, usize, f64)| e.0 < n && e.1 < n && e.2 != 0.0;
         matrix.triplets().filter(coupled).for_each(|(i, j, _)| groups.join(i, j));
         join_touched_alike::<D>(h, &mut groups);
-        let mut number = vec![u32::MAX; n];
-        let (mut of, mut sizes): (Vec<u32>, Vec<usize>) =
-            (Vec::with_capacity(matrix.nrows()), vec![]);
-        for i in 0..n {
-            let root = groups.root(i);
-            if number[root] == u32::MAX {
-                number[root] = sizes.len() as u32;
-                sizes.push(0);
-            }
-            of.push(number[root]);
-        }
+        let mut of: Vec<u32> = groups.numbers().into_iter().map(|node| node as u32).collect();
+        let mut sizes = vec![0; of.iter().max().map_or(0, |last| *last as usize + 1)];
         for j in n..matrix.ncols() {
             let (rows, values) = matrix.column(j);
             let first = rows.iter().zip(values).find(|(i, v)| **i < n && **v != 0.0);

@@ -278,7 +278,7 @@ impl<S, const D: usize> Outer<S, D> {
             (_, false) => FAILURE * alpha,
             (AlphaRule::Success, true) => (SUCCESS * alpha).max(prox_alpha_min),
             (AlphaRule::Residual, true) => {
-                (prox_sigma * error.powf(prox_nu)).clamp(prox_alpha_min, ALPHA_MOST)
+                (prox_sigma * error.powf(prox_nu)).min(ALPHA_MOST).max(prox_alpha_min)
             }
         }
     }

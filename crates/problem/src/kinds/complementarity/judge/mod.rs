@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::check::rows::doubt;
 use crate::check::{Measure, Verdict};
+use crate::field::Pattern;
 use nonsmooth_linalg::Matrix;
 
 /// What an error is that nothing can be compared with: never accepted, and still finite.
@@ -222,6 +223,32 @@ impl Sum {
             worst_contact: self.worst.0,
             worst: worse(self.worst.1, 0.0),
             ..Measure::unknown()
+        }
+    }
+}
+
+/// Units of rows that have none, from their neighbours: `ω_i = max_j |J_ij| ζ_j`, `ζ_j = max_k ω_k / |J_kj|`.
+pub(crate) fn hand_on(units: &mut Vec<f64>, pattern: &Pattern, jacobian: &[f64]) {
+    let mut columns = vec![0.0_f64; units.len()];
+    for _ in 0..GENERATIONS {
+        if units.iter().all(|u| *u > 0.0) {
+            return;
+        }
+        let places = || pattern.places().zip(jacobian).filter(|(_, a)| **a != 0.0);
+        for ((k, j), a) in places().filter(|((k, _), _)| units[*k] > 0.0) {
+            columns[j] = columns[j].max(units[k] / a.abs());
+        }
+        let mut grown = false;
+        let mut next = units.clone();
+        for ((i, j), a) in places().filter(|((i, _), _)| units[*i] == 0.0) {
+            let unit = a.abs() * columns[j];
+            if unit > next[i] && unit.is_finite() {
+                (next[i], grown) = (unit, true);
+            }
+        }
+        *units = next;
+        if !grown {
+            return;
         }
     }
 }

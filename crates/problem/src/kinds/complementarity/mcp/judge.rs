@@ -1,6 +1,6 @@
 //! The judge of nonlinear problems.
 
-use super::super::judge::{GENERATIONS, Pair, finite, natural, put, share, verdict, worse};
+use super::super::judge::{Pair, finite, hand_on, natural, put, share, verdict, worse};
 use super::Mcp;
 use crate::LcpPoint;
 use crate::Problem;
@@ -11,7 +11,8 @@ use crate::field::Evaluator;
 ///
 /// The error of row i is `|F_i| / D_i` (0/0 = 0), where D_i is the size of the row's terms at x: of a polynomial the sum of the moduli of its monomials, of
 /// other expressions the same to first order, of functions without expressions `|F_i − Σ_j J_ij x_j| + Σ_j |J_ij x_j|`; of rows that vanish with all their terms at least
-/// a ten-thousandth of ω_i, the size at the start, or, where that is zero, what a change of the other rows by their own ω makes of the row through the variables that they share. That a variable is d away from a bound
+/// a ten-thousandth of ω_i, the size at the start or, where that is zero, what a change of the other rows by their own ω makes of the row through the variables that they share; of expressions
+/// the size at the point nearest to zero that the bounds allow, if that is smaller: a start far off makes nothing small. That a variable is d away from a bound
 /// counts as much as what it does to the rows, `max_k |J_kj| d / D_k`; where the Jacobian does not see it, d over the largest of `|x_j|`, `|start_j|` and the
 /// finite bounds. Therefore neither changes when rows or variables are multiplied by numbers.
 ///
@@ -21,7 +22,7 @@ use crate::field::Evaluator;
 /// | `dual` | the largest error of an F whose sign no bound allows |
 /// | `complementarity` | the largest error of a pair: the smaller of that of F and that of the distance from the bound that the sign of F asks for |
 /// | `relative` | the largest of the three; **decides** |
-/// | `own` | the largest `|F_i|` of those errors in units of ω_i: x that runs away excuses nothing |
+/// | `own` | the largest `|F_i|` of those errors in units of ω_i (near zero beyond what the last bits of x make of it): x that runs away excuses nothing |
 /// | `absolute`, `literature`, `siconos` | the natural residual `‖x − mid(l, u, x − F(x))‖_∞` |
 ///
 /// [`certify`](Problem::certify) evaluates sums, products, quotients and roots of expressions in doubled precision.
@@ -31,8 +32,9 @@ pub struct McpGauge {
     jacobian: Vec<f64>,
     /// D at the point last measured.
     scales: Vec<f64>,
-    /// ω
+    /// ω, and what it is at the point nearest to zero that the bounds allow; zero where that is not known.
     units: Vec<f64>,
+    near: Vec<f64>,
     /// The unit of each variable, but for its own value.
     lengths: Vec<f64>,
     /// What a distance counts at the point last measured.
@@ -52,47 +54,35 @@ impl McpGauge {
             jacobian: vec![0.0; problem.F.pattern().len()],
             scales: vec![0.0; n],
             units: vec![],
+            near: vec![0.0; n],
             lengths: (0..n).map(length).collect(),
             effects: vec![0.0; n],
         };
         gauge.units = vec![0.0; n];
         gauge.look(problem, &start, false);
-        gauge.units = gauge.scales.clone();
-        gauge.hand_on(problem);
-        gauge
-    }
-
-    /// Units of rows that have none, from their neighbours: `ω_i = max_j |J_ij| ζ_j`, `ζ_j = max_k ω_k / |J_kj|`.
-    fn hand_on(&mut self, problem: &Mcp) {
-        let Self { units, jacobian, .. } = self;
-        let mut columns = vec![0.0_f64; units.len()];
-        for _ in 0..GENERATIONS {
-            if units.iter().all(|u| *u > 0.0) {
-                return;
+        let own = gauge.scales.clone();
+        gauge.units = own.clone();
+        hand_on(&mut gauge.units, problem.F.pattern(), &gauge.jacobian);
+        // Where no function of a caller's is asked: it may know the neighbourhood of the start alone.
+        let near = problem.lower.iter().zip(&problem.upper).map(|(l, u)| 0.0_f64.max(*l).min(*u));
+        let near: Vec<f64> = near.collect();
+        if problem.F.expressions().is_some() && near != start {
+            let units = std::mem::replace(&mut gauge.units, vec![0.0; n]);
+            if gauge.look(problem, &near, false) {
+                gauge.near = gauge.scales.clone();
+                hand_on(&mut gauge.near, problem.F.pattern(), &gauge.jacobian);
+                // What neighbours hand on depends on the Jacobian there: it replaces no unit of the same kind.
+                let handed = gauge.near.iter_mut().zip(&own).filter(|(_, own)| **own == 0.0);
+                handed.for_each(|(near, _)| *near = 0.0);
             }
-            let places =
-                || problem.F.pattern().places().zip(&*jacobian).filter(|(_, a)| **a != 0.0);
-            for ((k, j), a) in places().filter(|((k, _), _)| units[*k] > 0.0) {
-                columns[j] = columns[j].max(units[k] / a.abs());
-            }
-            let mut grown = false;
-            let mut next = units.clone();
-            for ((i, j), a) in places().filter(|((i, _), _)| units[*i] == 0.0) {
-                let unit = a.abs() * columns[j];
-                if unit > next[i] && unit.is_finite() {
-                    (next[i], grown) = (unit, true);
-                }
-            }
-            *units = next;
-            if !grown {
-                return;
-            }
+            gauge.units = units;
         }
+        gauge
     }
 
     /// F, D and what distances count at x. False where F is not defined.
     fn look(&mut self, problem: &Mcp, x: &[f64], precisely: bool) -> bool {
-        let Self { field, f, jacobian, scales, units, lengths, effects } = self;
+        let Self { field, f, jacobian, scales, units, near, lengths, effects } = self;
         let pattern = problem.F.pattern();
         let smooth = field.jacobian(x, f, jacobian);
         let defined = match (precisely, smooth) {
@@ -113,9 +103,9 @@ impl McpGauge {
             }
         }
         // A size that is none, or less than the sum itself, is that of the sum.
-        for ((d, f), unit) in scales.iter_mut().zip(&*f).zip(&*units) {
+        for (i, (d, f)) in scales.iter_mut().zip(&*f).enumerate() {
             let own = if d.is_finite() { d.max(f.abs()) } else { f.abs() };
-            *d = own.max(VANISHING * unit);
+            *d = own.max(VANISHING * lesser(units[i], near[i]));
         }
         effects.fill(0.0);
         if smooth {
@@ -166,9 +156,14 @@ impl McpGauge {
             let of_f = pair.dual().max(pair.complementarity());
             let unit = self.units[i];
             if of_f >= pair.error && unit > 0.0 {
-                let share = share(self.f[i], unit);
-                if share > own {
-                    (own, measure.own_contact) = (share, Some(i));
+                let mut share_of_own = share(self.f[i], unit);
+                if (0.0..unit).contains(&self.near[i]) && self.near[i] > 0.0 {
+                    // What no double near x does better is no error.
+                    let beyond = (self.f[i].abs() - 4.0 * self.rounding(problem, x, i)).max(0.0);
+                    share_of_own = share_of_own.max(share(beyond, self.near[i]));
+                }
+                if share_of_own > own {
+                    (own, measure.own_contact) = (share_of_own, Some(i));
                 }
             }
         }
@@ -188,14 +183,15 @@ impl McpGauge {
 
     /// The largest error that a change of all variables by half their last bit makes.
     fn floor(&self, problem: &Mcp, x: &[f64]) -> f64 {
+        let scaled = self.scales.iter().enumerate().filter(|(_, d)| **d > 0.0);
+        scaled.fold(0.0, |most, (i, d)| most.max(self.rounding(problem, x, i) / d))
+    }
+
+    /// What such a change makes of `F_i`.
+    fn rounding(&self, problem: &Mcp, x: &[f64], i: usize) -> f64 {
         let pattern = problem.F.pattern();
-        let mut most: f64 = 0.0;
-        for (i, d) in self.scales.iter().enumerate().filter(|(_, d)| **d > 0.0) {
-            let terms = self.jacobian[pattern.range(i)].iter().zip(pattern.row(i));
-            let sum: f64 = terms.map(|(a, &j)| (a * x[j]).abs()).sum();
-            most = most.max(sum / d);
-        }
-        0.5 * f64::EPSILON * most
+        let terms = self.jacobian[pattern.range(i)].iter().zip(pattern.row(i));
+        0.5 * f64::EPSILON * terms.map(|(a, &j)| (a * x[j]).abs()).sum::<f64>()
     }
 
     pub(super) fn tidy(&self, problem: &Mcp, point: &mut LcpPoint, boldly: bool) -> bool {
@@ -233,3 +229,8 @@ impl McpGauge {
 
 /// The part of ω that a row's terms count at least.
 const VANISHING: f64 = 1e-4;
+
+/// The smaller of two units, of which the second may not be known.
+fn lesser(unit: f64, near: f64) -> f64 {
+    if near > 0.0 { unit.min(near) } else { unit }
+}

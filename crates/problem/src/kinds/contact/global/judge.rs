@@ -240,6 +240,16 @@ impl GlobalGauge {
         });
         let forces = problem.f.iter().zip(&units[motion..]).map(|(f, unit)| f.abs() * unit * unit);
         law.loads.spread(q.chunks(D).map(norm).chain(violations).chain(forces));
+        if let Some(b) = &problem.rows {
+            law.amounts.clear();
+            law.amounts.extend((0..b.b.len()).map(|j| b.bounds.least(j)));
+            dynamics.hold(&law.amounts);
+            dynamics.solve_doubled(problem, &[], [high, low, last]);
+            rows.start(&problem.w);
+            rows.add_transposed(&problem.H, &high[..n]);
+            rows.add_transposed(&problem.H, &low[..n]);
+            law.measure_by(Some(rows.norm()));
+        }
     }
 
     /// Velocities of bodies carry the loads from contact to contact. The unit of a velocity is 1/√M_ii, that of a row of Hᵀ or Gᵀ the most that it
@@ -380,6 +390,11 @@ impl GlobalGauge {
         divide::<D>(&arms, &mut q);
         as_given(&mut measure, (&point.r, &u, norm(&q)), |c| problem.law(c));
         measure
+    }
+
+    /// The velocities of the n degrees of freedom and the multipliers that follow from the impulses of the last point measured.
+    pub(super) fn motion(&self, n: usize) -> (&[f64], &[f64]) {
+        self.own.high.split_at(n)
     }
 
     /// The velocity of the last point measured.

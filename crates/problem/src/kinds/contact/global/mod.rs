@@ -241,6 +241,16 @@ impl<const D: usize, L: Law<D>> Problem for FrictionGlobal<D, L> {
         gauge.measure_weighed(self, point, true)
     }
 
+    fn follow_impulses(&self, point: &mut GlobalPoint, gauge: &mut Self::Gauge) -> bool {
+        let (v, lambda) = gauge.motion(self.dofs());
+        if v.iter().chain(lambda).any(|x| !x.is_finite()) {
+            return false;
+        }
+        point.v.copy_from_slice(v);
+        point.lambda.copy_from_slice(lambda);
+        true
+    }
+
     fn partner(&self, point: &GlobalPoint) -> Vec<f64> {
         let mut u = vec![0.0; self.w.len()];
         self.velocity_into(&point.v, &mut u);

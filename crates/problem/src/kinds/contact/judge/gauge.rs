@@ -66,6 +66,9 @@ pub(crate) struct LawGauge {
     pub(crate) norm_q: f64,
 }
 
+/// The part of the loads that q counts at least where scalar rows take up some of them.
+const OF_LOADS: f64 = 1e-6;
+
 impl LawGauge {
     pub(crate) fn new(diagonal: impl Iterator<Item = f64>) -> Self {
         let mut gauge = Self::default();
@@ -83,6 +86,17 @@ impl LawGauge {
             if *w <= 0.0 {
                 *w = stand_in;
             }
+        }
+    }
+
+    /// What residuals are relative to where scalar rows take part: the size of q with the free rows in force, as far as it is known. Without them it may be rounding, as of what rests on a table that
+    /// a joint holds and that would fall with it, or so large that contacts hide behind it. No less than a millionth of the loads that reach the contacts, of which the rest may be rounding, and no more than they are.
+    pub(crate) fn measure_by(&mut self, enforced: Option<f64>) {
+        let reaching = norm_of((0..self.w.len()).map(|c| self.loads.reaching(c)));
+        let loads = self.norm_q.max(reaching);
+        if loads > 0.0 && loads.is_finite() {
+            let known = enforced.filter(|q| q.is_finite()).unwrap_or(self.norm_q);
+            self.norm_q = known.max(OF_LOADS * loads).min(loads);
         }
     }
 

@@ -16,7 +16,7 @@ use crate::kinds::contact::judge::weighed::{
 };
 use crate::kinds::contact::law::RollingData;
 use crate::{FrictionLocal, LocalPoint, Problem, RowsLocal};
-use nonsmooth_linalg::{Csc, Doubled, Real, norm, power_of_two, small};
+use nonsmooth_linalg::{Csc, Doubled, Inverse, Real, Refine, norm, power_of_two, small};
 
 /// The judge's constants and buffers for a [`FrictionLocal`].
 #[derive(Debug, Clone)]
@@ -50,6 +50,9 @@ impl LocalGauge {
         let diagonal = (0..contacts).map(|c| small::mean_diagonal(&problem.W.diagonal_block(c)));
         self.law.refill(diagonal, norm(&problem.q));
         self.mark_loads(problem);
+        if let Some(rows) = &problem.rows {
+            self.law.measure_by(enforced(&problem.q, rows));
+        }
         let blocks = (0..contacts).map(|c| problem.W.row(c).0.len()).max().unwrap_or(0);
         self.terms = 1 + D * blocks + problem.multipliers();
         let m = problem.q.len();
@@ -302,6 +305,25 @@ impl LocalGauge {
         squares.iter_mut().zip(&self.exact).for_each(|(u, x)| *u = x.value());
         HALF_ULP * spread
     }
+}
+
+/// The size of q with the free rows in force, and the others at their least impulses: `q + V λ`, `R λ + s = 0`. `None` where R does not say.
+fn enforced(q: &[f64], RowsLocal { V, R, s, bounds }: &RowsLocal) -> Option<f64> {
+    let mut lambda: Vec<f64> = (0..s.len()).map(|j| bounds.least(j)).collect();
+    let free = bounds.free(s.len());
+    if !free.is_empty() {
+        let mut c = s.clone();
+        R.mul_add(1.0, &lambda, &mut c);
+        let inverse = Inverse::new(&R.columns(&free).transpose().columns(&free).transpose(), "R");
+        let inverse = inverse.ok()?;
+        let mut x: Vec<f64> = free.iter().map(|&j| -c[j]).collect();
+        let mut scratch = vec![0.0; inverse.scratch_len()];
+        inverse.solve_with(&mut x, &mut scratch, Refine::Fully);
+        free.iter().zip(&x).for_each(|(&j, x)| lambda[j] = *x);
+    }
+    let mut all = q.to_vec();
+    V.mul_add(1.0, &lambda, &mut all);
+    Some(norm(&all))
 }
 
 /// Calls `term(i, A_ij, x_j)` for the entries of A.

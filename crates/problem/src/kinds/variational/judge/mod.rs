@@ -9,6 +9,7 @@ use crate::LcpPoint;
 use crate::Problem;
 use crate::check::{Measure, Verdict};
 use crate::field::Evaluator;
+use crate::kinds::complementarity::judge::{hand_on, natural};
 pub(super) use projection::Projection;
 
 /// Where x is with respect to a constraint of the set: a bounded variable of a box, an inequality of a polyhedron, a ball, a cone.
@@ -43,6 +44,7 @@ pub struct SetCounts {
 /// | `primal` | how far x violates a constraint: of a bound, a half-space, a ball the distance from it, of a cone `(‖x̄‖ − x_1)/√2`; the largest over ξ |
 /// | `dual`, `relative` | `‖r‖_∞ / ξ`, and what the projection violates added; **decides** |
 /// | `complementarity` | `|F(x)ᵀ r| / (n φ ξ)` |
+/// | `own` | the same residual of each part of the set (each variable of a box) by itself, with the φ of its rows at the start or, of expressions, at zero, the smaller: x that runs away, or larger rows, excuse nothing |
 /// | `absolute`, `literature`, `siconos` | `‖x − P_X(x − F(x))‖_∞` |
 ///
 /// The projections are the judge's own: of cones in the half-plane of the axis and the norm of the rest, of polyhedra by nonnegative least squares
@@ -55,12 +57,19 @@ pub struct ViGauge {
     /// `x − γ F`, and its projection.
     from: Vec<f64>,
     y: Vec<f64>,
-    /// For γ = 1 and for the other γ: the points to be projected are far from each other, the active rows too.
-    projections: [Vec<Projection>; 2],
+    /// x less the projection, of boxes to the last digit.
+    moved: Vec<f64>,
+    kept: Vec<f64>,
+    /// For γ = 1 and for the two others: the points to be projected are far from each other, the active rows too.
+    projections: [Vec<Projection>; 3],
     /// Of the start and the set.
     size: f64,
-    /// φ at the start.
+    /// φ that is known beforehand: that at the start or, of expressions, that at zero, if it is smaller.
     unit: f64,
+    /// The same of each row; zero where it is not known.
+    units: Vec<f64>,
+    /// γ of each variable.
+    gammas: Vec<f64>,
 }
 
 /// What a solution is held by: where it is the projection of, and which rows of polyhedra hold it back.
@@ -77,6 +86,12 @@ pub struct Held {
     pub rows: Vec<Vec<usize>>,
 }
 
+/// A residual below which each part is looked at by itself.
+const LOOKED_AT: f64 = 1e-3;
+
+/// The part of the size of the start and the set that each part of x has at least.
+const OF_OTHERS: f64 = 1e-4;
+
 /// The part of φ at the start that φ is at least: where F vanishes with all its terms, these give no unit.
 const VANISHING: f64 = 1e-4;
 
@@ -92,12 +107,39 @@ impl ViGauge {
             sizes: zeros(),
             from: zeros(),
             y: zeros(),
-            projections: [0, 1]
+            moved: zeros(),
+            kept: zeros(),
+            projections: [0, 1, 2]
                 .map(|_| problem.set.parts().iter().map(|(_, set)| Projection::new(set)).collect()),
             size: largest(&problem.start).max(problem.set.size()),
+            units: zeros(),
+            gammas: zeros(),
         };
-        gauge.unit = gauge.look(problem, &problem.start, false).unwrap_or(0.0);
+        let own;
+        (gauge.unit, own, gauge.units) = gauge.units_at(problem, &problem.start);
+        // Where no function of a caller's is asked: it may know the neighbourhood of the start alone.
+        if problem.F.expressions().is_some() && largest(&problem.start) > 0.0 {
+            let lesser = |a: f64, b: f64| if a > 0.0 && b > 0.0 { a.min(b) } else { a.max(b) };
+            let (unit, _, units) = gauge.units_at(problem, &zeros());
+            gauge.unit = lesser(gauge.unit, unit);
+            // What neighbours hand on depends on the Jacobian there: it replaces no unit of the same kind.
+            let known = (0..n).filter(|&i| own[i] > 0.0);
+            known.for_each(|i| gauge.units[i] = lesser(gauge.units[i], units[i]));
+        }
         gauge
+    }
+
+    /// φ at x, the size of each row's terms there, and its unit: that size, else what its neighbours hand on.
+    fn units_at(&mut self, problem: &Vi, x: &[f64]) -> (f64, Vec<f64>, Vec<f64>) {
+        let Some(phi) = self.look(problem, x, false) else {
+            return (0.0, vec![0.0; x.len()], vec![0.0; x.len()]);
+        };
+        let sizes = self.sizes.iter().zip(&self.f);
+        let own: Vec<f64> =
+            sizes.map(|(d, f)| if d.is_finite() { d.max(f.abs()) } else { f.abs() }).collect();
+        let mut units = own.clone();
+        hand_on(&mut units, problem.F.pattern(), &self.jacobian);
+        (phi, own, units)
     }
 
     /// F at x, and φ. False where F is not defined.
@@ -125,10 +167,12 @@ impl ViGauge {
         Some(sizes.fold(largest(f), |size, d| size.max(*d)))
     }
 
-    /// `‖x − P_X(x − γ F)‖_∞` with what the projection violates, for F as it was looked at; the projection is left in y.
-    fn natural(&mut self, problem: &Vi, x: &[f64], gamma: f64, which: usize) -> f64 {
-        let Self { f, from, y, projections, .. } = self;
-        from.iter_mut().zip(x).zip(f).for_each(|((from, x), f)| *from = x - gamma * *f);
+    /// `‖x − P_X(x − γ F)‖_∞` with what the projection violates, for F as it was looked at and the γ of each variable; the projection is left in y, the difference in `moved`.
+    fn natural(&mut self, problem: &Vi, x: &[f64], which: usize) -> f64 {
+        let Self { f, from, y, moved, gammas, projections, .. } = self;
+        for (i, from) in from.iter_mut().enumerate() {
+            *from = x[i] - gammas[i] * f[i];
+        }
         let mut missed = 0.0_f64;
         let projections = &mut projections[which];
         for ((first, set), projection) in problem.set.parts().into_iter().zip(projections) {
@@ -137,10 +181,49 @@ impl ViGauge {
             {
                 return f64::INFINITY;
             }
-            missed = missed.max(violation(set, &y[range]));
+            missed = missed.max(violation(set, &y[range.clone()]));
+            for i in range {
+                moved[i] = match set {
+                    // However large x is, nothing cancels.
+                    Set::Box { lower, upper } => {
+                        natural(x[i], gammas[i] * f[i], lower[i - first], upper[i - first])
+                    }
+                    _ => x[i] - y[i],
+                };
+            }
         }
-        let moved = x.iter().zip(&*y).fold(0.0_f64, |size, (x, y)| size.max((x - y).abs()));
-        moved + missed
+        largest(moved) + missed
+    }
+
+    /// What F makes of x in the units of its rows that are known beforehand: `max ‖x − P_X(x − γ F)‖_∞ / ξ` over the parts of the set, with `γ = ξ/φ` of each part (of a box, each variable)
+    /// by its own φ, and ξ the size of the part's x, start and set; of parts without a unit nothing.
+    fn own(&mut self, problem: &Vi, x: &[f64]) -> f64 {
+        let mut sizes = vec![0.0; x.len()];
+        // What has no size of its own, as a cone that begins at its point, has a part of the others'.
+        let least = if self.size > 0.0 { OF_OTHERS * self.size } else { largest(x) };
+        for (first, set) in problem.set.parts() {
+            let whole = first..first + set.dim();
+            let Set::Box { lower, upper } = set else {
+                let of = |x: &[f64]| largest(&x[whole.clone()]);
+                let known = of(&problem.start).max(set.size());
+                let (size, phi) = (known.max(of(x)).max(least), of(&self.units));
+                for i in whole {
+                    (sizes[i], self.gammas[i]) = scaled(size, phi);
+                }
+                continue;
+            };
+            for i in whole {
+                let bounds = [lower[i - first], upper[i - first]].into_iter();
+                let known = bounds.filter(|b| b.is_finite()).chain([problem.start[i], x[i]]);
+                let size = known.fold(least, |size: f64, x| size.max(x.abs()));
+                (sizes[i], self.gammas[i]) = scaled(size, self.units[i]);
+            }
+        }
+        if !self.natural(problem, x, 2).is_finite() {
+            return f64::INFINITY;
+        }
+        let shares = self.moved.iter().zip(&sizes).zip(&self.gammas);
+        shares.filter(|(_, g)| **g > 0.0).fold(0.0, |own, ((r, xi), _)| own.max(r.abs() / xi))
     }
 
     /// ξ and γ at a point where the terms of F are φ.
@@ -162,7 +245,8 @@ impl ViGauge {
         let x = &point.z;
         let phi = self.look(problem, x, true)?.max(VANISHING * self.unit);
         let (size, gamma) = self.units(x, phi);
-        if !self.natural(problem, x, gamma, 1).is_finite() {
+        self.gammas.fill(gamma);
+        if !self.natural(problem, x, 1).is_finite() {
             return None;
         }
         let rows = self.projections[1].iter().map(Projection::held).collect();
@@ -176,17 +260,24 @@ impl ViGauge {
         }
         let Some(phi) = self.look(problem, x, precisely) else { return Measure::never() };
         let phi = phi.max(VANISHING * self.unit);
-        let absolute = self.natural(problem, x, 1.0, 0);
         let (xi, gamma) = self.units(x, phi);
-        let relative = self.natural(problem, x, gamma, 1) / xi;
+        self.gammas.fill(gamma);
+        let relative = self.natural(problem, x, 1) / xi;
+        self.kept.copy_from_slice(&self.moved);
+        // Of a point that is far from a solution it says nothing new.
+        let own = (relative < LOOKED_AT).then(|| self.own(problem, x));
+        self.gammas.fill(1.0);
+        let absolute = self.natural(problem, x, 0);
+        std::mem::swap(&mut self.moved, &mut self.kept);
         if !(absolute.is_finite() && relative.is_finite()) {
             // Nothing projects onto an empty set.
             return Measure::never();
         }
-        let moved = || x.iter().zip(&self.y).map(|(x, y)| x - y);
-        let gap: f64 = moved().zip(&self.f).map(|(r, f)| r * f).sum();
-        let worst = moved()
-            .map(f64::abs)
+        let gap: f64 = self.moved.iter().zip(&self.f).map(|(r, f)| r * f).sum();
+        let worst = self
+            .moved
+            .iter()
+            .map(|r| r.abs())
             .enumerate()
             .fold((0, 0.0), |worst, (i, r)| if r > worst.1 { (i, r) } else { worst });
         let outside = problem.set.parts().into_iter().fold(0.0_f64, |outside, (first, set)| {
@@ -200,6 +291,7 @@ impl ViGauge {
             primal: outside / xi,
             dual: relative,
             complementarity: if phi > 0.0 { gap.abs() / (n * phi * xi) } else { 0.0 },
+            own,
             worst_contact: worst.0,
             worst: worst.1 / xi,
             ..Measure::unknown()
@@ -221,7 +313,7 @@ impl ViGauge {
         let inside = statuses.iter().filter(|s| **s == SetStatus::Inside).count();
         let counts = SetCounts { inside, border: statuses.len() - inside };
         // Of the last projection, in the unit of the worst.
-        let moved = point.z.iter().zip(&self.y).map(|(x, y)| (x - y).abs());
+        let moved = self.moved.iter().map(|r| r.abs());
         let most = moved.clone().fold(0.0, f64::max);
         let mut worst: Vec<_> = moved.enumerate().filter(|(_, r)| *r > 0.0).collect();
         worst.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -236,6 +328,12 @@ impl ViGauge {
             worst,
         }
     }
+}
+
+/// ξ and `γ = ξ/φ` of a part of this size.
+fn scaled(size: f64, phi: f64) -> (f64, f64) {
+    let size = if size > 0.0 { size } else { phi };
+    (size, if phi > 0.0 { size / phi } else { 0.0 })
 }
 
 fn largest(x: &[f64]) -> f64 {

@@ -30,6 +30,9 @@ impl<F: ScalarFunction> Residual for F {
     }
 }
 
+/// More merits than this are no memory but the whole history.
+pub const MEMORY_MOST: usize = 10_000;
+
 /// How a step is chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {

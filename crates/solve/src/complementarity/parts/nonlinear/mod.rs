@@ -11,7 +11,7 @@ mod solve;
 mod squares;
 
 pub use crash::Crash;
-pub use descent::{Descent, Options, Residual};
+pub use descent::{Descent, MEMORY_MOST, Options, Residual};
 pub use escape::{Escape, Inner};
 pub use idle::Idle;
 pub use iterate::Iterate;
