@@ -169,9 +169,10 @@ fn picture(
 fn place(args: &Args) -> Result<PathBuf, String> {
     if let Some(out) = &args.out {
         if !files::is_stream(out) {
-            files::picture("--out", out, scene_plot::EXTENSIONS)?;
+            files::ends_in("--out", out, scene_plot::EXTENSIONS)?;
         }
-        files::writable("--out", out)?;
+        files::writable_or_stream("--out", out)?;
+        files::apart([args.file.as_path()], [("--out", out.as_path())])?;
         return Ok(out.clone());
     }
     if files::is_stream(&args.file) {

@@ -58,6 +58,8 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         }
         None => None,
     };
+    let written = targets.iter().flatten().map(|path| ("--certificate", path.as_path()));
+    files::apart(args.files.iter().map(PathBuf::as_path), written)?;
     let limits = Limits {
         time_limit,
         cancel: Some(interrupt::flag()),
@@ -83,7 +85,18 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         } else {
             text(file, &report::problem_text(problem), &existence, contacts, seconds)
         });
-        if let Some(path) = targets.as_ref().map(|t| &t[k]) {
+        let bare = matches!(existence, Existence::EveryQ { .. } | Existence::Unknown { .. });
+        if bare && targets.is_some() {
+            // A file without one would be none that `check` takes.
+            output::remark(&format!(
+                "{}: no certificate is written: {}\n",
+                file.display(),
+                match existence {
+                    Existence::Unknown { .. } => "nothing is decided",
+                    _ => "a theorem and the entries of the problem are all that decides",
+                }
+            ));
+        } else if let Some(path) = targets.as_ref().map(|t| &t[k]) {
             let mut all = sizes;
             all.extend(report::fields(json!(existence)));
             files::write_text("--certificate", path, &format!("{}\n", json!(all)))?;

@@ -1,6 +1,6 @@
 //! Input files one by one, and output files that are sure to be writable before any work is done.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fs::{self, OpenOptions};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -211,8 +211,8 @@ pub fn late(file: &Path, json: bool, limit: Limit, meanwhile: &str) -> Exit {
     Exit::NotSolved
 }
 
-/// A picture's name says what the picture is: it ends in one of `extensions`.
-pub fn picture(option: &str, path: &Path, extensions: &[&str]) -> Result<(), String> {
+/// A name says what the file is: it ends in one of `extensions`.
+pub fn ends_in(option: &str, path: &Path, extensions: &[&str]) -> Result<(), String> {
     let is = |end: &&str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(end));
     if extensions.iter().any(is) {
         return Ok(());
@@ -235,14 +235,15 @@ pub fn tolerance(tol: f64) -> Result<f64, String> {
 }
 
 /// Where the results of `files` go: `to` itself for one file, else a file of the same name in the directory
-/// `to`, with `extension` in place of its own where one is given. Each place is checked to be writable.
+/// `to`, with `extension` in place of its own where one is given. Each place is checked to be writable; problems alone, which keep their extension, may go to
+/// the standard output.
 pub fn targets(
     option: &str,
     to: &Path,
     files: &[PathBuf],
     extension: Option<&str>,
 ) -> Result<Vec<PathBuf>, String> {
-    if is_stream(to) && files.len() == 1 {
+    if is_stream(to) && files.len() == 1 && extension.is_none() {
         return Ok(vec![to.into()]);
     }
     let is_folder = to.is_dir() || to.to_string_lossy().ends_with(std::path::is_separator);
@@ -283,14 +284,28 @@ pub fn targets(
 
 /// Makes the directory `path` unless it exists.
 pub fn folder(option: &str, path: &Path) -> Result<(), String> {
+    no_stream(option, path)?;
     fs::create_dir_all(path).map_err(|e| refusal(option, path, "a directory", e))
+}
+
+/// What cannot be written to the standard output is not taken for a file of that name.
+pub fn no_stream(option: &str, path: &Path) -> Result<(), String> {
+    match is_stream(path) {
+        true => Err(format!(
+            "{option} {STREAM}: expected a name, found that of the standard output, where only problems, scenes and pictures of `draw` go"
+        )),
+        false => Ok(()),
+    }
+}
+
+/// As [`writable`], or the standard output.
+pub fn writable_or_stream(option: &str, path: &Path) -> Result<(), String> {
+    if is_stream(path) { Ok(()) } else { writable(option, path) }
 }
 
 /// A file can be put at `path`: found out before hours of work, not after.
 pub fn writable(option: &str, path: &Path) -> Result<(), String> {
-    if is_stream(path) {
-        return Ok(());
-    }
+    no_stream(option, path)?;
     let refused = |e| refusal(option, path, "a file that can be written", e);
     match fs::metadata(path) {
         Ok(there) if !there.is_file() => {
@@ -339,19 +354,41 @@ fn refusal(option: &str, path: &Path, expected: &str, cause: std::io::Error) -> 
     format!("{option} {path}: expected {expected}, found: {cause}")
 }
 
+/// The place that a path leads to, where there need not be a file. Standard streams have none.
+fn resolved(path: &Path) -> Option<PathBuf> {
+    if is_stream(path) {
+        return None;
+    }
+    path.canonicalize().ok().or_else(|| {
+        let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
+        let parent = parent.unwrap_or(Path::new(".")).canonicalize().ok()?;
+        Some(parent.join(path.file_name().unwrap_or_default()))
+    })
+}
+
 /// Whether two paths lead to the same file, which need not exist. Standard streams are none.
 pub fn same(a: &Path, b: &Path) -> bool {
-    if is_stream(a) || is_stream(b) {
-        return false;
+    resolved(a).is_some_and(|a| resolved(b) == Some(a))
+}
+
+/// What is written leads to files of their own: to none that is read, and no two options to the same.
+pub fn apart<'a, 'b>(
+    read: impl IntoIterator<Item = &'a Path>,
+    written: impl IntoIterator<Item = (&'b str, &'b Path)>,
+) -> Result<(), String> {
+    let mut taken: HashMap<PathBuf, String> = read
+        .into_iter()
+        .filter_map(resolved)
+        .map(|path| (path, "one that is read".into()))
+        .collect();
+    for (option, path) in written {
+        let Some(place) = resolved(path) else { continue };
+        if let Some(other) = taken.insert(place, format!("that of {option}")) {
+            let path = path.display();
+            return Err(format!("{option} {path}: expected a file of its own, found {other}"));
+        }
     }
-    let resolved = |path: &Path| {
-        path.canonicalize().or_else(|_| {
-            let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
-            let parent = parent.unwrap_or(Path::new(".")).canonicalize()?;
-            Ok::<_, std::io::Error>(parent.join(path.file_name().unwrap_or_default()))
-        })
-    };
-    matches!((resolved(a), resolved(b)), (Ok(a), Ok(b)) if a == b)
+    Ok(())
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use nonsmooth_io::{Format, ProblemFile, StoredPoint, keeper};
+use nonsmooth_io::{About, Format, ProblemFile, StoredPoint, keeper};
 use nonsmooth_problem::{AnyProblem, Problem, with_problem};
 use nonsmooth_solve::diagnose;
 use nonsmooth_solve::registry;
@@ -172,8 +172,14 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             return multistart::run(file, &content, &starts, &limits, args.json);
         }
         let kind = content.problem.kind();
-        let format = |path| files::target_format("--out", path, args.format, kind, Some(file));
-        let out = targets.out.map(|path| Ok::<_, String>((path, format(path)?))).transpose()?;
+        let out = targets.out.map(|path| {
+            let format = files::target_format("--out", path, args.format, kind, Some(file))?;
+            if files::same(file, path) {
+                same_format(path, format.about(), files::about(file)?)?;
+            }
+            Ok::<_, String>((path, format))
+        });
+        let out = out.transpose()?;
         let guess = match &args.warm_start {
             None => None,
             Some(from) => Some(guess(from.as_deref(), file, &content)?),
@@ -184,6 +190,19 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         Done::new(file, &content, &plan, &solved, args).keep(file, content, solved, out, targets)
     };
     Ok(files::each(&args.files, args.json, one_file))
+}
+
+/// Of the input itself only the solution changes, not the format.
+fn same_format(path: &Path, asked: &About, own: &About) -> Result<(), String> {
+    match asked.name == own.name {
+        true => Ok(()),
+        false => Err(format!(
+            "--out {}: expected the format of the file that is read, {}, or another file, found {}",
+            path.display(),
+            own.name,
+            asked.name
+        )),
+    }
 }
 
 /// The point to start from that a file proposes itself, or that another one, or that of the same name in a directory, holds for its problem.
@@ -342,7 +361,9 @@ fn keep(
 /// What a file holds after a solve.
 pub fn with_solution(content: ProblemFile, solved: &Solved) -> ProblemFile {
     let (point, velocity) = (solved.point.clone(), solved.verdict.velocity.clone());
-    let stored = StoredPoint::new(&content.problem, point, velocity);
+    let mut stored = StoredPoint::new(&content.problem, point, velocity);
+    // What overflows has no place in a file.
+    stored.partner = stored.partner.filter(|u| u.iter().all(|u| u.is_finite()));
     let statuses = solved.verdict.statuses.clone();
     ProblemFile { solution: Some(StoredPoint { statuses, ..stored }), ..content }
 }
@@ -578,29 +599,24 @@ impl Targets {
         let plot = place("--plot", &args.plot, Some("svg"))?;
         let trace = place("--trace", &args.trace, Some("trace.json"))?;
         let certificate = place("--certificate", &args.certificate, Some("certificate.json"))?;
-        for (option, all) in
-            [("--plot", &plot), ("--trace", &trace), ("--certificate", &certificate)]
-        {
-            for path in all.iter().flatten() {
-                if option == "--plot" {
-                    files::picture(option, path, &["svg"])?;
-                }
-                let mut taken = args.files.iter().chain(out.iter().flatten());
-                if taken.any(|other| files::same(path, other)) {
-                    return Err(format!(
-                        "{option} {}: expected a file of its own, found the file of a problem",
-                        path.display()
-                    ));
-                }
-            }
+        plot.iter().flatten().try_for_each(|path| files::ends_in("--plot", path, &["svg"]))?;
+        fn written<'a>(
+            option: &'a str,
+            all: &'a Option<Vec<PathBuf>>,
+        ) -> impl Iterator<Item = (&'a str, &'a Path)> {
+            all.iter().flatten().map(move |path| (option, path.as_path()))
         }
-        let both = plot.iter().flatten().zip(trace.iter().flatten());
-        if let Some((path, _)) = both.into_iter().find(|(a, b)| files::same(a, b)) {
-            let path = path.display();
-            return Err(format!(
-                "--trace {path}: expected a file of its own, found that of --plot"
-            ));
-        }
+        // A file may be written with its own solution.
+        let back =
+            |k: usize, file: &Path| out.as_ref().is_some_and(|out| files::same(&out[k], file));
+        let read = args.files.iter().enumerate().filter(|(k, file)| !back(*k, file));
+        files::apart(
+            read.map(|(_, file)| file.as_path()),
+            written("--out", &out)
+                .chain(written("--plot", &plot))
+                .chain(written("--trace", &trace))
+                .chain(written("--certificate", &certificate)),
+        )?;
         Ok(Self { out, plot, trace, certificate })
     }
 

@@ -148,7 +148,7 @@ fn conversion_keeps_what_it_can_and_says_what_is_lost() {
     for (arguments, parts) in [
         ("convert wall.hdf5 wall.toml", ["TO wall.toml", ".hdf5, .h5 or .csv"]),
         ("convert rectifier.toml rectifier.mtx", ["rectifier.mtx", "mlcp"]),
-        ("convert wall.hdf5 wall.hdf5", ["another file", "the same"]),
+        ("convert wall.hdf5 wall.hdf5", ["a file of its own", "one that is read"]),
         ("convert wall.hdf5 none.csv", ["the solution", "none"]),
         ("convert three.toml nowhere/three.mtx", ["TO", "nowhere"]),
     ] {
@@ -275,4 +275,43 @@ fn impulses_that_are_not_unique_are_said_to_be_so() {
     folder.run("gen sliding_box --set contact_density=1.5 --form local --out box.hdf5").exits(0);
     let line = folder.run("solve box.hdf5 --json").exits(0).json().remove(0);
     assert_eq!(line["impulses_unique"], true, "{line}");
+}
+
+#[test]
+fn families_of_solutions_pass_where_zero_is_all_that_ends_them() {
+    let folder = Folder::new();
+    for text in [
+        "M = [[5, -6, 5], [-6, 8, -8], [5, -8, 10]]\nq = [0, 0, 0]\n",
+        "M = [[-2, 2, -3, 0], [2, -2, -2, 1], [-3, -2, -2, 3], [0, 1, 3, 0]]\nq = [3, 0, 0, 0]\n",
+        "M = [[-3, 0, -2, -1], [0, 0, 3, 0], [-2, 3, 3, -1], [-1, 0, -1, 1]]\nq = [3, 0, -1, 0]\n",
+    ] {
+        std::fs::write(folder.path("lcp.toml"), format!("kind = \"lcp\"\n{text}")).unwrap();
+        let said = folder.run("solve lcp.toml --all-solutions").exits(0).stdout;
+        assert!(!said.contains("does not pass"), "{said}");
+    }
+}
+
+#[test]
+fn a_fraction_over_nothing_is_no_proof() {
+    let folder = Folder::new();
+    std::fs::write(folder.path("lcp.toml"), "kind = \"lcp\"\nM = [[1, 0], [0, 1]]\nq = [-1, -1]\n")
+        .unwrap();
+    for fraction in ["1/0", "1/00", "-1/-0", "0/0"] {
+        let proof = format!(
+            "{{\"proof\": {{\"proof\": \"farkas\", \"y\": [0, 1], \"exact\": [[[0, \"{fraction}\"]]]}}}}"
+        );
+        std::fs::write(folder.path("proof.json"), proof).unwrap();
+        folder.run("check lcp.toml --certificate proof.json").refused(&["expected a fraction"]);
+    }
+}
+
+#[test]
+fn what_a_limit_cut_short_is_drawn_all_the_same() {
+    let folder = Folder::new();
+    folder
+        .run("gen wall --set rows=40 --set columns=40 --set disturbance=0.3 --out wall.hdf5")
+        .exits(0);
+    let run = folder.run("draw wall.hdf5 --out wall.svg --time-limit 0.02");
+    assert_eq!(run.code, Some(1), "{}{}", run.stdout, run.stderr);
+    assert!(folder.path("wall.svg").exists());
 }

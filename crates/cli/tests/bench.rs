@@ -58,8 +58,9 @@ fn import_joins_problems_of_a_folder() {
 #[test]
 fn figures_and_tables_are_written() {
     let folder = imported();
-    let run =
-        folder.run("bench figures t.jsonl --out out --solver FAST").refused(&["selected", "1e-8"]);
+    let run = folder
+        .run("bench figures t.jsonl --out out --solver FAST")
+        .refused(&["--solver", "found FAST"]);
     assert_eq!(run.stdout, "");
     let run = folder.run("bench figures t.jsonl --out out").exits(0);
     for file in run.stdout.lines() {
@@ -124,7 +125,10 @@ fn mistakes_are_refused() {
         ("compare t.jsonl other.jsonl", &["other.jsonl", "t.jsonl", "none"]),
         ("compare t.jsonl t.jsonl --slower 0.5", &["--slower", "at least 1", "0.5"]),
         ("import none.csv --program P --machine m --out o.jsonl", &["none.csv"]),
-        ("import t.csv --program P --machine m --out t.csv", &["--out", "t.csv", "same"]),
+        (
+            "import t.csv --program P --machine m --out t.csv",
+            &["--out", "t.csv", "a file of its own"],
+        ),
         ("import t.csv --program P --machine m --out no/o.jsonl", &["--out", "no/o.jsonl"]),
         ("import t.jsonl --program P --machine m --out o.jsonl", &["t.jsonl", "problem"]),
         ("import t.csv --program P --machine m --out o.jsonl --problems no", &["--problems", "no"]),
@@ -143,7 +147,7 @@ fn a_page_never_replaces_its_runs_and_has_a_folder_of_its_own() {
     let folder = imported();
     let before = fs::read(folder.path("t.jsonl")).unwrap();
     let own = folder.run("bench page t.jsonl --out t.jsonl");
-    own.refused(&["--out t.jsonl", "found one of the files of runs"]);
+    own.refused(&["--out t.jsonl", "a file of its own"]);
     assert_eq!(fs::read(folder.path("t.jsonl")).unwrap(), before);
     folder.run("bench page t.jsonl --out t").refused(&["--out t: expected a name such as"]);
     folder.run("bench page t.jsonl --out page.md").exits(0);

@@ -57,7 +57,7 @@ fn mistakes_are_refused_before_anything_is_written() {
     folder.run("bench report one.jsonl --out one.jsonl").refused(&[
         "--out",
         "one.jsonl",
-        "expected a file to write",
+        "expected a file of its own",
         "found",
     ]);
     folder.run("bench report one.jsonl --out folder").refused(&[

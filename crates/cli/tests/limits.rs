@@ -48,7 +48,15 @@ fn commands_end_soon_after_their_time_limit() {
 fn one_ctrl_c_ends_a_solve_with_its_best_point() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = pile();
-    for command in ["solve pile.hdf5 --tol 1e-15 --solver tresca", "exists pile.hdf5"] {
+    folder
+        .run("gen wall --set rows=25 --set columns=20 --set disturbance=0.3 --form local --out wall.hdf5")
+        .exits(0);
+    for command in [
+        "solve pile.hdf5 --tol 1e-15 --solver tresca",
+        "exists pile.hdf5",
+        "exists wall.hdf5",
+        "diagnose wall.hdf5",
+    ] {
         let mut process = folder.command();
         process.args(command.split_whitespace()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let process = process.spawn().unwrap();

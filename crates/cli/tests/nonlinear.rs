@@ -236,3 +236,75 @@ fn a_variational_inequality_over_boxes_and_polyhedra_is_an_mcp() {
     folder.run("convert cones.toml mcp.toml --as-mcp").refused(&["--as-mcp", "found vi"]);
     folder.run("convert boxed.nl mcp.toml --as-mcp").refused(&["--as-mcp", "found mcp"]);
 }
+
+/// Whatever start a problem has, and however far x runs, a point is solved only where it is a solution.
+#[test]
+fn neither_a_start_far_off_nor_a_large_x_makes_a_point_a_solution() {
+    let folder = Folder::new();
+    let put = |name: &str, text: &str| std::fs::write(folder.path(name), text).unwrap();
+    let mcps = [
+        // ln 2, from where F is 1e21.
+        ("exp", "F = ['exp(x1) - 2']\nstart = [50]\n", Some(std::f64::consts::LN_2)),
+        ("square", "F = ['(x1 - 1)^2 - 1.01']\nstart = [1e9]\n", Some(2.004_987_562_112_089)),
+        (
+            "none",
+            "F = ['exp(x1) - 2*x2 - 1', 'x2 - x1 + 0.5']\nlower = [-inf, -inf]\nstart = [30, 0]\n",
+            None,
+        ),
+        ("sum", "F = ['exp(x1) - exp(x2) - 1', 'exp(x2) - exp(x1) - 1']\nstart = [30, 30]\n", None),
+    ];
+    for (name, text, solution) in mcps {
+        put("mcp.toml", &format!("kind = 'mcp'\n{text}"));
+        for solver in ["auto", "path", "semismooth", "newton_fb"] {
+            let command =
+                format!("solve mcp.toml --solver {solver} --time-limit 5 --json --solution");
+            let line = folder.run(&command).json().remove(0);
+            match (line["status"] == "solved", solution) {
+                (true, Some(x)) => {
+                    let found = line["solution"]["x"][0].as_f64().unwrap();
+                    assert!((found - x).abs() < 1e-6, "{name} by {solver}: {found}");
+                }
+                (true, None) => panic!("{name} by {solver}: {line}"),
+                (false, _) => {}
+            }
+        }
+    }
+    let affine = "kind = 'mcp'\nF = ['x1 - 3', 'x2 - x1']\nlower = [-inf, -inf]\nstart = [1e13, 0]\nsolution = { x = [0, 0] }\n";
+    put("affine.toml", affine);
+    folder.run("check affine.toml").exits(1);
+    for (name, text) in [
+        (
+            "cone",
+            "F = ['x1 - x1 - 3', '2']\n[[set]]\nfrom = 'x1'\nto = 'x1'\nsecond_order_cone = {}\n[[set]]\nfrom = 'x2'\nto = 'x2'\nbox = {}\n",
+        ),
+        (
+            "ball",
+            "F = ['x1 - x2 - 1', '-x1']\n[[set]]\nfrom = 'x1'\nto = 'x1'\nball = { centre = [2.5], radius = 1.5 }\n[[set]]\nfrom = 'x2'\nto = 'x2'\nbox = {}\n",
+        ),
+        (
+            "box",
+            "F = ['x1 - x2 - 1', '-x1']\nset = { box = { lower = [1, -inf], upper = [4, inf] } }\n",
+        ),
+        (
+            "scale",
+            "F = ['1e10*x1 - 1e10', '0*x1 - 3']\nstart = [1, 0]\n[[set]]\nfrom = 'x1'\nto = 'x1'\nball = { centre = [0], radius = 5 }\n[[set]]\nfrom = 'x2'\nto = 'x2'\nbox = {}\n",
+        ),
+    ] {
+        put("vi.toml", &format!("kind = 'vi'\n{text}"));
+        for solver in ["auto", "hyperplane", "extragradient", "fixed_point"] {
+            let command =
+                format!("solve vi.toml --solver {solver} --time-limit 3 --json --solution");
+            let line = folder.run(&command).json().remove(0);
+            assert!(line["status"] != "solved", "{name} by {solver}: {line}");
+        }
+    }
+}
+
+/// Steps that grow without a bound could not be shortened again: neither limit was ever looked at.
+#[test]
+fn a_projection_method_that_runs_away_ends_at_its_limit() {
+    let folder = Folder::new();
+    let text = "kind = 'vi'\nF = ['11 - 3*x3^2', '-2*(x3 + 2)^2 - x1 + 1', '1 - x1']\nstart = [-3, 1, 0]\nset = { box = { lower = [-1, -inf, -4], upper = [1, inf, inf] } }\n";
+    std::fs::write(folder.path("vi.toml"), text).unwrap();
+    folder.run("solve vi.toml --solver hyperplane --time-limit 0.5").exits(1);
+}

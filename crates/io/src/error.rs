@@ -42,7 +42,7 @@ pub enum IoError {
         found: String,
     },
     /// The file holds no problem, or more than one.
-    #[error("{}: /: expected one group /fclib_local or /fclib_global, found {found}", file.display())]
+    #[error("{}: /: expected one group of a problem (/fclib_local, /fclib_global, or the same of rolling friction), found {found}", file.display())]
     Root {
         /// The file.
         file: PathBuf,

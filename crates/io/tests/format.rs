@@ -230,7 +230,7 @@ fn what_is_no_fclib_file_is_said() {
     let cut = file("cut", &bytes[..bytes.len() - 9]);
     assert!(cut.starts_with("/: expected intact HDF5 data, found: "), "{cut}");
 
-    let root = "/: expected one group /fclib_local or /fclib_global, found ";
+    let root = "/: expected one group of a problem (/fclib_local, /fclib_global, or the same of rolling friction), found ";
     let tree = global_tree().without("fclib_global").without("guesses");
     refused(&tree, &format!("{root}only /solution"));
     let both = Tree(local_tree().0.into_iter().chain(global_tree().0).collect());

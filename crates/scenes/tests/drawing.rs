@@ -160,6 +160,9 @@ fn a_picture_of_a_picture_is_drawn_and_a_wrong_one_refused() {
     assert!(
         wrong(&|p| p.frames[0].contacts[0].point[1] = f64::NAN).contains("contacts[0]: expected")
     );
+    // Its square has no double.
+    let far = wrong(&|p| p.frames[0].poses[0].position[0] = 1e300);
+    assert!(far.starts_with("frames[0].poses[0]: expected numbers up to"), "{far}");
     assert!(wrong(&|p| p.bodies[0].parts.clear()).starts_with("bodies[0].parts: expected"));
     assert!(Picture::from_json("{}").unwrap_err().to_string().starts_with("drawing: expected"));
 }

@@ -102,8 +102,9 @@ pub(crate) fn run<S: Driven>(
     require(|| "h".into(), h, h > 0.0, "a positive number")?;
     require(|| "until".into(), until, true, "a finite time")?;
     let mut run = RunReport { t: simulation.time(), ..RunReport::default() };
-    // What is left of the last step up to rounding is no step.
-    while simulation.time() < until - 1e-9 * h {
+    // What is left of the last step up to the rounding of the sum that time is is no step: t/h terms, each rounded by ε t.
+    let rounding = (f64::EPSILON * until * until / h).clamp(1e-9 * h, 1e-3 * h);
+    while simulation.time() < until - rounding {
         if is_cancelled(simulation.limits()) {
             run.stopped = true;
             break;

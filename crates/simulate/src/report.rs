@@ -357,11 +357,13 @@ impl std::fmt::Display for RunReport {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let statuses: Vec<_> = self.statuses.iter().map(|(n, k)| format!("{k} {n}")).collect();
         let ended = if self.stopped { ", stopped" } else { "" };
+        write!(f, "{} steps to t = {:.6} s{ended}", self.steps, self.t)?;
+        if self.steps == 0 {
+            return Ok(());
+        }
         write!(
             f,
-            "{} steps to t = {:.6} s{ended}: {}; residual at most {:.1e}, energy imbalance at most {:.1e}",
-            self.steps,
-            self.t,
+            ": {}; residual at most {:.1e}, energy imbalance at most {:.1e}",
             statuses.join(", "),
             self.residual,
             self.imbalance

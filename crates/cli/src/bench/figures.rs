@@ -1,5 +1,6 @@
 //! `nonsmooth bench figures`.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use nonsmooth_bench::figures::figures;
@@ -68,6 +69,10 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let Some(tolerance) = tol.or_else(|| runs.common_tolerance()) else {
         return Err("expected runs, found none in any file".into());
     };
+    let kinds: Vec<&str> = runs.kinds().into_iter().map(|(kind, _)| kind).collect();
+    known("--kind", &args.kind, kinds.iter().copied())?;
+    known("--solver", &args.solver, runs.runs.iter().map(|run| run.solver.as_str()))?;
+    known("--family", &args.family, runs.runs.iter().map(|run| run.family.as_str()))?;
     let of = |kind: &str| Selection {
         families: args.family.clone(),
         sizes: sizes.clone(),
@@ -75,8 +80,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         ..Selection::at(kind, tolerance)
     };
     let asked = |kind: &str| args.kind.is_empty() || args.kind.iter().any(|k| k == kind);
-    let kinds = runs.kinds().into_iter().map(|(kind, _)| kind).filter(|kind| asked(kind));
-    let chosen = kinds.map(of).filter(|selection| {
+    let chosen = kinds.into_iter().filter(|kind| asked(kind)).map(of).filter(|selection| {
         runs.runs.iter().any(|r| r.tolerance == tolerance && selection.takes(r))
     });
     let chosen: Vec<Selection> = chosen.collect();
@@ -99,6 +103,23 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     }
     write_text(&args.out, "runs.csv", &tables::runs_table(&runs).csv())?;
     Ok(exit)
+}
+
+/// Refuses a name that no run has.
+fn known<'a>(
+    option: &str,
+    asked: &[String],
+    there: impl Iterator<Item = &'a str>,
+) -> Result<(), String> {
+    let there: BTreeSet<&str> = there.collect();
+    match asked.iter().find(|name| !there.contains(name.as_str())) {
+        None => Ok(()),
+        Some(name) => {
+            let there: Vec<&str> = there.into_iter().collect();
+            let there = there.join(", ");
+            Err(format!("{option}: expected one that the runs have, {there}; found {name}"))
+        }
+    }
 }
 
 /// Writes the figures and the tables of a selection into a folder.

@@ -62,14 +62,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         }
     }
     files::writable("--out", &args.out)?;
-    for input in [Some(&args.file), args.problems.as_ref()].into_iter().flatten() {
-        if files::same(input, &args.out) {
-            let out = args.out.display();
-            return Err(format!(
-                "--out {out}: expected another file than the input, found the same"
-            ));
-        }
-    }
+    super::apart(std::iter::once(&args.file).chain(&args.problems), &args.out)?;
     let measure = args.error.map(|e| match e {
         Error::Siconos => Measure::Siconos,
         Error::Literature => Measure::Literature,

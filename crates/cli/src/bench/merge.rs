@@ -29,12 +29,7 @@ Exit codes: 0 joined; 1 joined, but parts are missing or plans differ; 2 some fi
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
-    for file in &args.files {
-        if files::same(file, &args.out) {
-            let out = args.out.display();
-            return Err(format!("--out {out}: expected a file of its own, found one of the parts"));
-        }
-    }
+    super::apart(&args.files, &args.out)?;
     files::writable("--out", &args.out)?;
     let Joined { runs, twice, mut exit } = super::read(&args.files)?;
     let mut text = format!(

@@ -9,12 +9,12 @@ mod report;
 mod run;
 mod traits;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use nonsmooth_bench::campaign;
 use nonsmooth_bench::runs::Runs;
 
-use crate::{Exit, output};
+use crate::{Exit, files, output};
 
 /// Compare solvers: run campaigns, and make profiles, tables and reports of them.
 #[derive(Debug, clap::Args)]
@@ -71,6 +71,11 @@ struct Joined {
     twice: usize,
     /// What the mistakes come to.
     exit: Exit,
+}
+
+/// `--out` names a file of its own.
+fn apart<'a>(read: impl IntoIterator<Item = &'a PathBuf>, out: &Path) -> Result<(), String> {
+    files::apart(read.into_iter().map(PathBuf::as_path), [("--out", out)])
 }
 
 /// Reads files of runs; those that cannot be used are left out with a message.

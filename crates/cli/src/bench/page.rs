@@ -47,11 +47,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             "--out {out}: expected a name such as comparison.md, whose figures go into `comparison`, found none to part"
         ));
     }
-    if args.runs.iter().any(|f| files::same(f, &args.out)) {
-        return Err(format!(
-            "--out {out}: expected a file to write, found one of the files of runs"
-        ));
-    }
+    super::apart(&args.runs, &args.out)?;
     files::writable("--out", &args.out)?;
     let Joined { runs, mut exit, .. } = super::read(&args.runs)?;
     let described = match args.problems.as_slice() {

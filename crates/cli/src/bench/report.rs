@@ -35,12 +35,7 @@ Exit codes: 0 all files are in the report; 2 a file at fault (the report is of t
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
-    if let Some(file) = args.files.iter().find(|f| files::same(f, &args.out)) {
-        let file = file.display();
-        return Err(format!(
-            "--out {file}: expected a file to write, found one of the files of runs"
-        ));
-    }
+    super::apart(&args.files, &args.out)?;
     files::writable("--out", &args.out)?;
     let Joined { runs: all, twice, exit } = super::read(&args.files)?;
     let options = args.title.clone().map_or_else(Options::default, |title| Options { title });

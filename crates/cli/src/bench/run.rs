@@ -24,8 +24,7 @@ use crate::{Exit, files, interrupt, output};
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Folders with problems (*.hdf5, *.h5, *.toml, *.mtx, *.dat), or files. A problem's family is the folder that holds it
-    #[arg(required = true, value_name = "FOLDER")]
+    #[arg(required = true, value_name = "FOLDER", help = files::help("Folders with problems, or files; a problem's family is the folder that holds it. Read are", |_| true))]
     problems: Vec<PathBuf>,
     /// A solver of `nonsmooth list`, perhaps with settings, as auto or nsgs:omega=0.9,local=quartic; may be given
     /// several times [default: the solvers that take the kind of each problem, without prefixes]
@@ -113,6 +112,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         machine: machine(),
         plan: Some(plan.clone()),
     };
+    files::no_stream("--out", &args.out)?;
     let (mut journal, there) = if args.resume {
         Journal::resume(&args.out, &header)?
     } else {

@@ -52,13 +52,8 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     if let Some(origin) = Origin::of(from) {
         return scene::write(args, &origin);
     }
-    if files::same(from, to) {
-        let to = to.display();
-        return Err(format!(
-            "{to}: expected another file than the one that is read, found the same"
-        ));
-    }
-    files::writable("TO", to)?;
+    files::apart([from.as_path()], [("TO", to.as_path())])?;
+    files::writable_or_stream("TO", to)?;
     let read = files::read(from)?;
     let format_of = |content: &ProblemFile| {
         files::target_format("TO", to, *format, content.problem.kind(), None)

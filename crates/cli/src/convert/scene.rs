@@ -16,7 +16,8 @@ pub fn write(Args { from, to, format, as_mcp }: &Args, origin: &Origin) -> Resul
     if !stream && to.extension().is_none_or(|e| e != "toml") {
         return Err(format!("{target}: expected a name that ends in .toml, for a scene"));
     }
-    files::writable("TO", to)?;
+    files::apart([from.as_path()], [("TO", to.as_path())])?;
+    files::writable_or_stream("TO", to)?;
     let made = origin.read(from).map_err(|e| e.to_string())?;
     made.warnings.iter().for_each(|w| output::remark(&format!("warning: {w}\n")));
     if stream {

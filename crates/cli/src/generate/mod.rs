@@ -111,25 +111,18 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         };
         return Err(format!("gen {name}: expected {expected}, found {found}"));
     };
-    for (option, path) in [("--out", &args.out), ("--draw", &args.draw)] {
-        path.as_deref().map_or(Ok(()), |path| files::writable(option, path))?;
-    }
+    args.out.as_deref().map_or(Ok(()), |path| files::writable_or_stream("--out", path))?;
+    args.draw.as_deref().map_or(Ok(()), |path| files::writable("--draw", path))?;
     args.draw
         .as_deref()
-        .map_or(Ok(()), |path| files::picture("--draw", path, scene_plot::EXTENSIONS))?;
-    if let (Some(out), Some(draw)) = (&args.out, &args.draw)
-        && files::same(out, draw)
-    {
-        return Err(format!(
-            "--draw {}: expected a file of its own, found that of --out",
-            draw.display()
-        ));
-    }
+        .map_or(Ok(()), |path| files::ends_in("--draw", path, scene_plot::EXTENSIONS))?;
+    let written = [("--out", args.out.as_deref()), ("--draw", args.draw.as_deref())];
+    files::apart([], written.into_iter().filter_map(|(option, path)| Some((option, path?))))?;
 
-    let limits = match args.solve {
-        true => Some(limits(args.tol, None, args.time_limit)?),
-        false => None,
-    };
+    if args.solve {
+        files::tolerance(args.tol)?;
+        files::time_limit(args.time_limit)?;
+    }
     let (scene, mut content) = made.make(&settings, args.form)?;
     let drawn = |e: SceneError| format!("scene {name}: {e}");
     let picture = scene.as_ref().map(Picture::new).transpose().map_err(drawn)?;
@@ -137,8 +130,14 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let kind = content.problem.kind();
     let format = |path| files::target_format("--out", path, None, kind, None);
     let out = args.out.as_deref().map(|path| Ok::<_, String>((path, format(path)?))).transpose()?;
-    let solved =
-        limits.map(|limits| solve_by_default(label, &content.problem, limits)).transpose()?;
+    let solved = match args.solve {
+        // Ctrl-C ends the program at once until here: nothing is made yet.
+        true => {
+            let limits = limits(args.tol, None, args.time_limit)?;
+            Some(solve_by_default(label, &content.problem, limits)?)
+        }
+        false => None,
+    };
     if let Some(solved) = &solved {
         content = with_solution(content, solved);
     }

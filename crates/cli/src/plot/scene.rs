@@ -33,12 +33,14 @@ pub fn solved(
         AnyStatus::Row(_) | AnyStatus::Set(_) => None,
     };
     let motions: Vec<_> = verdict.statuses.iter().filter_map(motion).collect();
+    // Where a limit had passed, nobody has counted.
+    let motions = Some(&motions[..]).filter(|motions| !motions.is_empty());
     let r = match point {
         AnyPoint::Local(point) => &point.r,
         AnyPoint::Global(point) => &point.r,
         _ => return Ok(picture),
     };
-    picture.with(&Answer { r, u: Some(&verdict.velocity), motions: Some(&motions) })
+    picture.with(&Answer { r, u: Some(&verdict.velocity), motions })
 }
 
 /// The text of the picture: a page where the file's name ends in .html, else an SVG.

@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 use nonsmooth_io::trajectory::Trajectory;
 use nonsmooth_scenes::SceneEntry;
 use nonsmooth_simulate::{Control, RunReport, SceneFile, Simulation, StepReport};
-use nonsmooth_solve::Limits;
 use nonsmooth_solve::settings;
+use nonsmooth_solve::{Limits, THREADS_MOST};
 
 use self::record::Recorder;
 use crate::progress::RunBar;
@@ -120,6 +120,9 @@ pub struct PlayArgs {
     svg: Option<PathBuf>,
 }
 
+/// How the names of trajectories end.
+const TRAJECTORY: &[&str] = &["h5", "hdf5"];
+
 /// The end of a family's run, s, where nobody says another.
 const FAMILY_END: f64 = 1.0;
 
@@ -165,6 +168,21 @@ fn target(option: &Option<PathBuf>, named: &Option<String>, scene: &Path) -> Opt
     option.clone().or_else(|| named.as_ref().map(beside))
 }
 
+/// Checks that all outputs can be written, each to a file of its own.
+fn writable<'a, const N: usize>(
+    read: impl IntoIterator<Item = &'a Path>,
+    written: [(&str, &Option<PathBuf>); N],
+) -> Result<(), String> {
+    let there = || written.iter().filter_map(|(option, path)| Some((*option, path.as_deref()?)));
+    for (option, path) in there() {
+        match option {
+            "--svg" => record::drawable(path)?,
+            option => files::writable(option, path)?,
+        }
+    }
+    files::apart(read, there())
+}
+
 /// Runs `simulate`.
 pub fn run(args: &Args) -> Result<Exit, String> {
     if args.schema {
@@ -178,20 +196,35 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         return Ok(Exit::Solved);
     }
     let limit = files::time_limit(args.time_limit)?;
+    if args.threads > THREADS_MOST {
+        let found = args.threads;
+        return Err(format!(
+            "--threads: expected at most {THREADS_MOST}, 0 for one a core, found {found}"
+        ));
+    }
     let out = target(&args.out, &scene.output.trajectory, &path).or_else(|| args.resume.clone());
     let html = target(&args.html, &scene.output.html, &path);
     let csv = target(&args.csv, &scene.output.csv, &path);
     let vtk = target(&args.vtk, &scene.output.vtk, &path);
-    for (option, path) in [("--out", &out), ("--html", &html), ("--csv", &csv), ("--vtk", &vtk)] {
-        if let Some(path) = path {
-            files::writable(option, path)?;
-        }
+    if let Some(out) = &out {
+        files::ends_in("--out", out, TRAJECTORY)?;
     }
+    // A trajectory that is resumed goes on in its own file.
+    let resumed =
+        args.resume.as_deref().filter(|file| !out.iter().any(|out| files::same(out, file)));
+    let read = [args.scene.as_deref(), resumed];
+    writable(
+        read.into_iter().flatten(),
+        [
+            ("--out", &out),
+            ("--html", &html),
+            ("--csv", &csv),
+            ("--vtk", &vtk),
+            ("--svg", &args.svg),
+        ],
+    )?;
     if let Some(folder) = &args.dump_fclib {
         files::folder("--dump-fclib", folder)?;
-    }
-    if let Some(svg) = &args.svg {
-        record::drawable(svg)?;
     }
     let wrong = |e| format!("{}: {e}", path.display());
     let cancel = interrupt::flag();
@@ -318,14 +351,10 @@ pub fn play(args: &PlayArgs) -> Result<Exit, String> {
     let others = [&args.vtk, &args.glb, &args.svg];
     let page = args.html.is_some() || others.iter().all(|path| path.is_none());
     let html = page.then(|| args.html.clone().unwrap_or_else(|| file.with_extension("html")));
-    for (option, path) in [("--html", &html), ("--vtk", &args.vtk), ("--glb", &args.glb)] {
-        if let Some(path) = path {
-            files::writable(option, path)?;
-        }
-    }
-    if let Some(svg) = &args.svg {
-        record::drawable(svg)?;
-    }
+    writable(
+        [file.as_path()],
+        [("--html", &html), ("--vtk", &args.vtk), ("--glb", &args.glb), ("--svg", &args.svg)],
+    )?;
     let trajectory = Trajectory::read(file).map_err(|e| e.to_string())?;
     let wrong = |e| format!("{}: /scene: {e}", file.display());
     let scene = SceneFile::parse(&trajectory.scene, &[]).map_err(wrong)?;

@@ -151,7 +151,7 @@ impl Paper {
             return;
         }
         let along = [dx / length, dy / length];
-        let head = (0.35 * length).clamp((0.15 * size).clamp(1.2, 3.0), 15.0).min(length);
+        let head = (0.35 * length).max((0.15 * size).clamp(1.2, 3.0)).min(15.0).min(length);
         let width = 0.24 * head;
         let rim = if width < 1.2 || size < 30.0 {
             ""

@@ -13,6 +13,9 @@ use crate::polyhedron::Polyhedron;
 use crate::vec3::{Vec3, add, apply, dot, mean, norm, scale, sub};
 use crate::{Ground, Scene, SceneError, Shape};
 
+/// Lengths and velocities beyond this are not drawn: their squares and products would overflow.
+const FAR: f64 = 1e30;
+
 /// A scene as it is drawn. It serialises, so that a file or a page can carry it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Picture {
@@ -200,6 +203,12 @@ impl Picture {
             true => Ok(()),
             false => Err(SceneError::value(key(), "finite numbers", format!("{x:?}"))),
         };
+        let near = |key: &dyn Fn() -> String, x: &[f64]| match x.iter().all(|x| x.abs() <= FAR) {
+            true => Ok(()),
+            false => {
+                Err(SceneError::value(key(), format!("numbers up to {FAR:e}"), format!("{x:?}")))
+            }
+        };
         if let Some(ground) = &self.ground {
             ground.validate()?;
         }
@@ -223,7 +232,7 @@ impl Picture {
             }
             for (k, p) in frame.poses.iter().enumerate() {
                 let all = [&p.position[..], &p.rotation, &p.velocity].concat();
-                finite(&|| format!("frames[{f}].poses[{k}]"), &all)?;
+                near(&|| format!("frames[{f}].poses[{k}]"), &all)?;
             }
             for (c, touch) in frame.contacts.iter().enumerate() {
                 let key = |what: &str| format!("frames[{f}].contacts[{c}]{what}");
@@ -234,10 +243,10 @@ impl Picture {
                         return Err(SceneError::value(key(what), expected, k));
                     }
                 }
-                let all = [&touch.point[..], &touch.offset, &[touch.mu]].concat();
+                near(&|| key(""), &[touch.point, touch.offset].concat())?;
                 let known = [touch.r, touch.u].into_iter().flatten().flatten();
-                let all: Vec<f64> =
-                    touch.frame.iter().flatten().copied().chain(all).chain(known).collect();
+                let frame = touch.frame.iter().flatten().copied();
+                let all: Vec<f64> = frame.chain([touch.mu]).chain(known).collect();
                 finite(&|| key(""), &all)?;
             }
         }
@@ -334,10 +343,24 @@ impl Body {
 impl Part {
     pub(super) fn validate(&self, key: &str) -> Result<(), SceneError> {
         match self {
-            Part::Ball { radius } => positive(&format!("{key}.radius"), *radius),
+            Part::Ball { radius } => {
+                positive(&format!("{key}.radius"), *radius)?;
+                require(
+                    &format!("{key}.radius"),
+                    *radius,
+                    *radius <= FAR,
+                    "a size that can be drawn",
+                )
+            }
             Part::Convex { vertices, faces } => {
-                let sum = vertices.iter().flatten().sum();
-                require(&format!("{key}.vertices"), sum, true, "finite coordinates")?;
+                let far = vertices.iter().flatten().fold(0.0, |far: f64, x| far.max(x.abs()));
+                let sum: f64 = vertices.iter().flatten().sum();
+                require(
+                    &format!("{key}.vertices"),
+                    sum,
+                    far <= FAR,
+                    "coordinates that can be drawn",
+                )?;
                 let bad = |f: &&Vec<usize>| f.len() < 3 || f.iter().any(|&k| k >= vertices.len());
                 match faces.iter().find(bad) {
                     Some(face) => {
