@@ -11,7 +11,7 @@ use nonsmooth_problem::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::numbers::{self, Scalar, by_contact};
+use crate::numbers::{self, Scalar, by_contact, of_contacts};
 use crate::parts::{Given, Shown};
 use crate::{expected, mistake};
 
@@ -169,7 +169,19 @@ fn bounds(given: &mut Given<'_, '_>, rows: usize) -> PyResult<Bounds> {
 /// Puts a vector that is given in the place of another.
 fn put(given: &mut Given<'_, '_>, name: &'static str, into: &mut Vec<f64>) -> PyResult<()> {
     if let Some(other) = given.get(name)? {
-        *into = by_contact(name, &other)?.0;
+        *into = numbers::vector(name, &other)?;
+    }
+    Ok(())
+}
+
+/// As [`put`], of a vector by contacts with D components each.
+fn put_by_contact<const D: usize>(
+    given: &mut Given<'_, '_>,
+    name: &'static str,
+    into: &mut Vec<f64>,
+) -> PyResult<()> {
+    if let Some(other) = given.get(name)? {
+        *into = of_contacts(name, &other, D)?;
     }
     Ok(())
 }
@@ -211,7 +223,7 @@ where
 
     fn of(given: &mut Given<'_, '_>) -> PyResult<Self> {
         let q = match given.get("q")? {
-            Some(q) => by_contact("q", &q)?.0,
+            Some(q) => of_contacts("q", &q, D)?,
             None if given.is_given("W") => return Err(expected("q", "this part", "nothing")),
             None => vec![],
         };
@@ -241,7 +253,7 @@ where
     }
 
     fn change(&mut self, given: &mut Given<'_, '_>) -> PyResult<()> {
-        put(given, "q", &mut self.q)?;
+        put_by_contact::<D>(given, "q", &mut self.q)?;
         put_mu(given, &mut self.mu)?;
         put_mu_r::<L, D>(given, self.mu.len(), &mut self.mu_r)?;
         if let Some(w) = given.get("W")? {
@@ -298,7 +310,7 @@ where
         let m = numbers::csc("M", &given.need("M")?)?;
         let f = given.need_vector("f")?;
         let w = match given.get("w")? {
-            Some(w) => by_contact("w", &w)?.0,
+            Some(w) => of_contacts("w", &w, D)?,
             None => vec![],
         };
         let mu = mu(given, w.len() / D)?;
@@ -324,7 +336,7 @@ where
 
     fn change(&mut self, given: &mut Given<'_, '_>) -> PyResult<()> {
         put(given, "f", &mut self.f)?;
-        put(given, "w", &mut self.w)?;
+        put_by_contact::<D>(given, "w", &mut self.w)?;
         put_mu(given, &mut self.mu)?;
         put_mu_r::<L, D>(given, self.mu.len(), &mut self.mu_r)?;
         if let Some(m) = given.get("M")? {

@@ -4,7 +4,7 @@
 //! pass. Only other types than float64 and arrays that are not contiguous are converted before; entries by places, in disorder or twice, and columns for a matrix by blocks, are sorted
 //! in between.
 
-use nonsmooth_linalg::{Bsr, Csc, Dense, Matrix, MatrixError};
+use nonsmooth_linalg::{Bsr, Csc, Dense, Matrix, MatrixError, budget};
 use numpy::{
     Element, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
 };
@@ -26,12 +26,19 @@ fn array<'py, T: Element>(
     kinds: &str,
     what: &str,
 ) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
-    if let Ok(array) = given.cast::<PyArrayDyn<T>>()
+    if let Ok(array) = given.cast_exact::<PyArrayDyn<T>>()
         && array.is_c_contiguous()
     {
         return Ok(array.clone());
     }
     let py = given.py();
+    if given.get_type().name()?.to_cow()? == "MaskedArray" {
+        return Err(expected(
+            place,
+            what,
+            "a masked array (filled() says what stands for what is masked)",
+        ));
+    }
     let refused = |e: PyErr| expected(place, what, first_line(&e.value(py).to_string()));
     let any = numpy(py, "asarray")?.call1((given,)).map_err(refused)?;
     let any = any.cast_into::<PyUntypedArray>()?;
@@ -90,6 +97,17 @@ pub fn by_contact(place: &str, given: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, 
             let what = "an array of one dimension, or with a row for each contact";
             Err(expected(place, what, shape(other)))
         }
+    }
+}
+
+/// As [`by_contact`], of contacts with d components each.
+pub fn of_contacts(place: &str, given: &Bound<'_, PyAny>, d: usize) -> PyResult<Vec<f64>> {
+    match by_contact(place, given)? {
+        (_, Some(columns)) if columns != d => {
+            let what = format!("a row of {d} components for each contact");
+            Err(expected(place, &what, format!("rows of {columns}")))
+        }
+        (all, _) => Ok(all),
     }
 }
 
@@ -158,6 +176,9 @@ enum By {
     },
 }
 
+/// Bytes that are asked about before they are taken.
+const LARGE: f64 = 1e8;
+
 /// Whether the indices of each line ascend, below a limit.
 fn ascends(starts: &[usize], indices: &[usize], limit: usize) -> bool {
     starts.windows(2).all(|w| {
@@ -176,6 +197,15 @@ impl<'py> Sparse<'py> {
         let Ok((rows, columns)) = part("shape").and_then(|s| s.extract::<(usize, usize)>()) else {
             return Err(expected(place, "a matrix", "a sparse array of another dimension"));
         };
+        // Pointers to so many columns are made before anything else is seen of it.
+        let pointers = 16.0 * (rows as f64 + columns as f64);
+        if pointers > LARGE && !budget::fits(pointers) {
+            return Err(expected(
+                place,
+                "a matrix that fits in memory",
+                format!("{rows} × {columns}"),
+            ));
+        }
         let place_of = |name: &str| format!("{place}.{name}");
         let numbers = |name: &str| indices(&place_of(name), &part(name)?);
         let by = match format.as_str() {

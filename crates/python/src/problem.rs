@@ -363,6 +363,8 @@ pub fn point(problem: &AnyProblem, given: &Bound<'_, PyAny>) -> PyResult<AnyPoin
         Ok(point.into())
     }
     const PLACE: &str = "warm_start";
+    /// Those of a point of contacts; u follows from r.
+    const PARTS: [&str; 4] = ["r", "u", "v", "l"];
     if let Ok(answer) = given.cast::<crate::solve::Answer>() {
         return Ok(answer.get().answer.point.clone());
     }
@@ -374,10 +376,23 @@ pub fn point(problem: &AnyProblem, given: &Bound<'_, PyAny>) -> PyResult<AnyPoin
             None => Some(given.clone()).filter(|_| name == "r"),
         };
         if let Some(found) = found {
-            *into = numbers::by_contact(if parts.is_some() { name } else { PLACE }, &found)?.0;
+            let place = if parts.is_some() { name } else { PLACE };
+            *into = match name {
+                "r" => numbers::of_contacts(place, &found, problem.kind().dimension())?,
+                _ => numbers::vector(place, &found)?,
+            };
         }
         Ok(())
     };
+    if let (AnyProblem::Friction(_), Some(parts)) = (problem, parts) {
+        for key in parts.keys() {
+            let key = key.str()?.to_string();
+            if !PARTS.contains(&key.as_str()) {
+                let what = format!("the parts {} of a point of contacts", PARTS.join(", "));
+                return Err(expected(PLACE, &what, key));
+            }
+        }
+    }
     match (problem, &mut origin) {
         (_, AnyPoint::Local(point)) => {
             part("r", &mut point.r)?;

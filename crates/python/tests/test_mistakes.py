@@ -226,3 +226,52 @@ def test_layouts_do_not_matter(n, data, layout):
     assert answer.solved and reference.solved
     # M is strictly diagonally dominant: one solution.
     np.testing.assert_allclose(answer.z, reference.z, atol=1e-6)
+
+
+def test_points_have_the_shape_and_the_parts_of_the_problem():
+    problem = ns.Friction(W=np.eye(12), q=np.arange(-12.0, 0.0), mu=0.3)
+    for wrong in (
+        lambda: problem.update(q=np.zeros((3, 4))),
+        lambda: problem.judge(np.zeros((3, 4))),
+        lambda: ns.solve(problem, warm_start=np.zeros((3, 4))),
+        lambda: ns.Friction(W=np.eye(15), q=np.ones((5, 3)), mu=0.5, mu_r=0.1),
+    ):
+        with pytest.raises(ns.Error, match="components for each contact, found rows of"):
+            wrong()
+    for point in ({"R": np.zeros(12)}, {"r": np.zeros(12), "rr": np.zeros(12)}):
+        with pytest.raises(ns.Error, match="expected the parts r, u, v, l"):
+            problem.judge(point)
+    answer = ns.solve(problem)
+    assert ns.solve(problem, warm_start=answer.parts).solved
+    assert problem.judge({"r": answer.r.reshape(4, 3)})["solved"]
+
+
+def test_what_does_not_fit_in_memory_is_refused():
+    for n in (2**40, 2**60):
+        huge = sp.coo_array(([1.0], ([0], [0])), shape=(n, n))
+        with pytest.raises(ns.Error, match="fits in memory"):
+            ns.LCP(huge, [1.0, 2.0])
+
+
+def test_a_mask_is_not_passed_over():
+    with pytest.raises(ns.Error, match="q: expected .* masked"):
+        ns.LCP(np.eye(2), np.ma.masked_array([-1.0, -5.0], [0, 1]))
+
+
+def test_settings_are_checked_where_they_are_set():
+    solver = ns.Nsgs()
+    solver.omega = 0.5
+    assert solver.settings == {"omega": 0.5} and solver.omega == 0.5
+    with pytest.raises(ns.Error, match="omega"):
+        solver.omega = -1.0
+    with pytest.raises(AttributeError, match="no setting omeag"):
+        solver.omeag = 0.5
+    assert solver.omega == 0.5
+
+
+def test_tolerances_of_a_comparison_are_those_of_a_solve():
+    problem = ns.LCP(np.eye(2), [-1.0, 1.0])
+    for wrong in ({"tol": 2.0}, {"tol": 0.0}, {"tol": [1e-8, -1.0]}, {"time_limit": -1.0}):
+        with pytest.raises(ns.Error, match="tol: expected|time_limit: expected"):
+            ns.bench({"one": problem}, **wrong)
+    assert ns.bench({"one": problem}, tol=np.float32(1e-4), repeats=1)

@@ -208,3 +208,53 @@ def test_steps_that_are_none_are_refused():
         ns.Simulation(ball(), h=-1.0).run(1.0)
     with pytest.raises(ns.Error, match="until"):
         simulation.run(float("inf"))
+
+
+@pytest.mark.parametrize("kind", ["fixed", "revolute", "prismatic", "spherical"])
+def test_a_box_rests_on_a_table_that_a_joint_holds(kind):
+    world = ns.World()
+    world.pair("default", mu=0.3)
+    world.box([0.5, 0.5, 0.05], name="table", density=500)
+    world.box([0.1] * 3, density=500, position=[0, 0, 0.15], name="box")
+    more = {"revolute": {"anchor": [0, 0, 0], "axis": [0, 0, 1]}, "prismatic": {"axis": [1, 0, 0]}}
+    world.joint(kind, "world", "table", **more.get(kind, {"anchor": [0, 0, 0]} if kind == "spherical" else {}))
+    run = ns.Simulation(world).run(0.05)
+    assert run.solved and run.residual.max() < 1e-8, (kind, set(run.status), run.residual.max())
+    assert abs(run.velocity[-1, 1]).max() < 1e-8
+
+
+def test_a_world_keeps_what_was_said():
+    velocity, world = np.zeros(3), ns.World(gravity=[0, 0, 0])
+    for k in range(3):
+        velocity[0] = k
+        world.sphere(0.1, density=1, position=[0, k, 0], velocity=velocity)
+    assert ns.Simulation(world).velocity[:, 0].tolist() == [0, 1, 2]
+
+
+def test_limits_are_a_pair_that_may_be_open():
+    world = ball()
+    world.joint("prismatic", "world", "ball", axis=[0, 0, 1], limits=(-np.inf, 1.0))
+    assert world.document["joints"][-1]["limits"] == {"upper": 1.0}
+    for limits in [(-0.5, 0.5, 1.0), np.array([-0.5, 0.5, 1.0]), [0.5]]:
+        with pytest.raises(ns.Error, match="limits: expected a pair"):
+            world.joint("prismatic", "world", "ball", axis=[0, 0, 1], limits=limits)
+
+
+def test_numbers_that_are_not_finite_are_named():
+    world = ball()
+    world.sphere(0.1, density=np.nan)
+    with pytest.raises(ns.Error, match=r"scene.bodies\[2\].density: expected a finite number, found nan"):
+        ns.Simulation(world)
+    assert "density" in world._repr_html_()
+
+
+def test_a_run_ends_where_it_is_told_to():
+    run = ns.Simulation(ball(height=0.1), h=1e-2).run(60.0, every=1000)
+    assert len(run.steps["time"]) == 6000 and "60 s" in repr(run)
+
+
+def test_contacts_of_a_frame_as_a_frame_of_pandas():
+    pandas = pytest.importorskip("pandas")
+    run = ns.Simulation(ball(height=0.1), h=1e-2).run(0.1)
+    table = run.contacts(-1).to_pandas()
+    assert isinstance(table, pandas.DataFrame) and {"r_0", "r_1", "r_2", "status"} <= set(table)

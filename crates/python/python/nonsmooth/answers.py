@@ -56,10 +56,17 @@ class Table(np.ndarray[Any, np.dtype[np.void]]):
     """A structured array: a row for each contact or variable, columns by name."""
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The same as a DataFrame."""
+        """The same as a DataFrame; of a column with several components a column for each: ``r_0``, ``r_1``, ``r_2``."""
         import pandas
 
-        return pandas.DataFrame({name: np.asarray(self[name]) for name in self.dtype.names or ()})
+        columns: dict[str, npt.NDArray[Any]] = {}
+        for name in self.dtype.names or ():
+            column = np.asarray(self[name])
+            if column.ndim == 1:
+                columns[name] = column
+            else:
+                columns.update((f"{name}_{k}", column[:, k]) for k in range(column.shape[1]))
+        return pandas.DataFrame(columns)
 
 
 def _tabled(columns: Mapping[str, Any]) -> Table:

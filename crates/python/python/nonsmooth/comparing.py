@@ -9,6 +9,8 @@ import time
 import uuid
 from typing import TYPE_CHECKING, Any, Iterable, Mapping, Optional, Sequence, Union
 
+import numpy as np
+
 from . import _nonsmooth
 from .answers import _named, _plain, solve
 from .problems import Path, Problem, read
@@ -128,7 +130,13 @@ def bench(
     for solver in solvers:
         name, settings = _named(solver)
         _nonsmooth.check(name, _plain(settings) or {})
-    tolerances = [tol] if isinstance(tol, (int, float)) else list(tol)
+    tolerances = [float(one) for one in np.atleast_1d(tol)]
+    for one in tolerances:
+        if not 0 < one <= 1:
+            raise _nonsmooth.Error(f"tol: expected a positive number of at most 1, found {one:g}")
+    time_limit = float(time_limit)
+    if not 0 <= time_limit < float("inf"):
+        raise _nonsmooth.Error(f"time_limit: expected a number of seconds of at least 0, found {time_limit:g}")
     campaign = uuid.uuid4().hex[:12]
     plan = {
         "solvers": [_label(solver) for solver in solvers],

@@ -49,6 +49,17 @@ class Settings:
             return self.settings.get(key, type(self).known[key]["default"])
         raise AttributeError(f"{type(self).__name__} has no setting {name}")
 
+    def __setattr__(self, name: str, value: object) -> None:
+        key = next(iter(registered({name: None})))
+        if key in type(self).known:
+            changed = {**self.settings, key: value}
+            _nonsmooth.check(self.name, changed)
+            self.settings = changed
+        elif name in ("name", "settings"):
+            super().__setattr__(name, value)
+        else:
+            raise AttributeError(f"{type(self).__name__} has no setting {name}")
+
     def __eq__(self, other: object) -> bool:
         return (
             isinstance(other, Settings)

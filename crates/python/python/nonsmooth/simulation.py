@@ -6,9 +6,10 @@ import base64
 import copy
 import html
 import json
+import math
 import pathlib
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Callable, Mapping, Optional, Sequence, Union
+from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping, Optional, Sequence, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +36,24 @@ def _number(value: object) -> object:
     if isinstance(value, np.ndarray):
         return value.tolist()
     raise _nonsmooth.Error(f"scene: expected numbers, words and lists, found {type(value).__name__}")
+
+
+def _own(table: Mapping[str, object]) -> dict[str, Any]:
+    """What is said in a table, and stays so whatever the caller does with its arrays; nothing is said by None."""
+    return {key: copy.deepcopy(value) for key, value in table.items() if value is not None}
+
+
+def _infinite(value: object, place: str) -> Iterator[tuple[str, float]]:
+    """The numbers that are not finite, with their places."""
+    value = _number(value) if isinstance(value, (np.generic, np.ndarray)) else value
+    if isinstance(value, Mapping):
+        for key, part in value.items():
+            yield from _infinite(part, f"{place}.{key}")
+    elif isinstance(value, (list, tuple)):
+        for k, part in enumerate(value):
+            yield from _infinite(part, f"{place}[{k}]")
+    elif isinstance(value, float) and not math.isfinite(value):
+        yield place, value
 
 
 class World:
@@ -64,9 +83,9 @@ class World:
         """Adds a body with a shape (``{"kind": "sphere", "radius": 0.1}``), or ``shapes``; its name, made where none is given."""
         bodies = self._list("bodies")
         name = name or f"body{len(bodies)}"
-        entry: dict[str, object] = {"name": name, **table}
+        entry = {"name": name, **_own(table)}
         if shape is not None:
-            entry["shape"] = dict(shape)
+            entry["shape"] = _own(shape)
         bodies.append(entry)
         return name
 
@@ -113,7 +132,7 @@ class World:
 
     def generate(self, scene: str, *, name: Optional[str] = None, **settings: object) -> None:
         """Adds the bodies of a family of ``nonsmooth gen``: ``world.generate("wall", rows=4)``."""
-        entry: dict[str, object] = {"scene": scene, "set": settings}
+        entry: dict[str, object] = {"scene": scene, "set": _own(settings)}
         if name is not None:
             entry["name"] = name
         self._list("generate").append(entry)
@@ -129,9 +148,9 @@ class World:
     ) -> None:
         """The law of contact of two materials; of ``"default"`` that of all pairs that are not listed."""
         if a == "default" and b is None:
-            self.document["pairs_default"] = {"mu": mu, "e": e, **table}
+            self.document["pairs_default"] = {"mu": mu, "e": e, **_own(table)}
         else:
-            self._list("pairs").append({"between": [a, b or a], "mu": mu, "e": e, **table})
+            self._list("pairs").append({"between": [a, b or a], "mu": mu, "e": e, **_own(table)})
 
     def joint(self, kind: str, a: str, b: str, *, name: str = "", **table: object) -> str:
         """Adds a joint between two bodies, or a body and ``"world"``; its name.
@@ -141,10 +160,15 @@ class World:
         """
         joints = self._list("joints")
         name = name or f"joint{len(joints)}"
-        limits = table.get("limits")
-        if isinstance(limits, (tuple, list)):
-            table["limits"] = dict(zip(("lower", "upper"), limits))
-        joints.append({"kind": kind, "a": a, "b": b, "name": name, **table})
+        entry = _own(table)
+        limits = entry.get("limits")
+        if isinstance(limits, (tuple, list, np.ndarray)):
+            if len(limits) != 2:
+                raise _nonsmooth.Error(f"{name}: limits: expected a pair (lower, upper), found {len(limits)} entries")
+            # A limit at infinity is none.
+            pair = zip(("lower", "upper"), limits, (-math.inf, math.inf))
+            entry["limits"] = {key: limit for key, limit, none in pair if limit != none}
+        joints.append({"kind": kind, "a": a, "b": b, "name": name, **entry})
         return name
 
     def revolute(
@@ -163,14 +187,15 @@ class World:
 
     def force(self, body: str, force: Triple, **table: object) -> None:
         """A force (N) on a body, perhaps ``at`` a point of it, ``from`` a time ``until`` another."""
-        self._list("forces").append({"body": body, "force": list(force), **table})
+        self._list("forces").append({"body": body, "force": list(force), **_own(table)})
 
     def json(self) -> str:
         """The scene as a JSON document, which ``nonsmooth simulate`` takes."""
         try:
             return json.dumps(self.document, default=_number, allow_nan=False)
-        except ValueError as e:
-            raise _nonsmooth.Error(f"scene: expected finite numbers, found: {e}") from None
+        except ValueError:
+            place, found = next(_infinite(self.document, "scene"), ("scene", "one that is not"))
+            raise _nonsmooth.Error(f"{place}: expected a finite number, found {found}") from None
 
     def save(self, path: Path) -> None:
         """Writes the scene: with every default as TOML (.toml), else as JSON."""
@@ -187,7 +212,10 @@ class World:
         return f"<World: {', '.join(f'{n} {name}' for name, n in counted if n) or 'empty'}>"
 
     def _repr_html_(self) -> str:
-        return draw(self).text
+        try:
+            return draw(self).text
+        except _nonsmooth.Error as unfinished:
+            return f"<pre>{html.escape(f'{self!r}: {unfinished}')}</pre>"
 
 
 class Picture:
@@ -289,7 +317,7 @@ class Simulation:
         return self._native.state()["angular_velocity"]
 
     def problem(self) -> Optional[Friction]:
-        """The contact problem of the next step; None where nothing touches."""
+        """The contact problem of the next step; None where nothing touches and no joint holds."""
         native = self._native.problem(self.h)
         problem = None if native is None else Problem._of(native)
         assert problem is None or isinstance(problem, Friction)
@@ -427,7 +455,7 @@ class Run:
     def __repr__(self) -> str:
         word = "solved" if self.solved else "stopped" if self.stopped else "not solved"
         steps = len(self.steps["time"])
-        end = self.t[-1] if len(self.t) else self.simulation.t
+        end = self.steps["time"][-1] if steps else self.simulation.t
         return f"<Run: {len(self.bodies)} bodies, {steps} steps to t = {end:.6g} s, {word}>"
 
     def _repr_html_(self) -> str:
