@@ -185,7 +185,7 @@ def test_what_is_written_and_shown(tmp_path):
     [
         (lambda w: w.sphere(-1.0, density=1), r"bodies\[2\]"),
         (lambda w: w.sphere(1.0, densty=1), "did you mean `density`"),
-        (lambda w: w.sphere(float("nan"), density=1), "scene: expected finite numbers"),
+        (lambda w: w.sphere(float("nan"), density=1), "expected a finite number, found nan"),
         (lambda w: w.sphere(object(), density=1), "scene: expected numbers, words and lists"),
         (lambda w: w.sphere(0.1, density=1, position=[0, 0, 1.15]), "overlap|penetrate|apart"),
         (lambda w: w.joint("hinge", "world", "ball"), "revolute"),

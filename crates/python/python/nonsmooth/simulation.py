@@ -193,6 +193,8 @@ class World:
         """The scene as a JSON document, which ``nonsmooth simulate`` takes."""
         try:
             return json.dumps(self.document, default=_number, allow_nan=False)
+        except _nonsmooth.Error:
+            raise
         except ValueError:
             place, found = next(_infinite(self.document, "scene"), ("scene", "one that is not"))
             raise _nonsmooth.Error(f"{place}: expected a finite number, found {found}") from None
