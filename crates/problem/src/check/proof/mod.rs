@@ -21,7 +21,7 @@ pub use relaxation::Constraint;
 
 pub(crate) use evidence::{Claim, weigh};
 pub(crate) use exact::{Equation, exact, negative, satisfying};
-pub(crate) use monotone::monotone;
+pub(crate) use monotone::{monotone, principal};
 pub(crate) use relaxation::Relaxed;
 pub(crate) use rounding::{FEW, exactly_near};
 pub(crate) use statement::{Exactly, bounded, columns, exacts, just};

@@ -56,7 +56,7 @@ pub(crate) fn monotone(a: &Csc) -> Monotone {
 }
 
 /// The rows and columns given.
-fn principal(a: &Csc, members: &[usize]) -> Csc {
+pub(crate) fn principal(a: &Csc, members: &[usize]) -> Csc {
     if members.len() == a.nrows() && members.is_sorted() {
         return a.clone();
     }

@@ -227,6 +227,16 @@ impl Sum {
     }
 }
 
+/// The size of a row's terms; that of their sum where it is none, or less.
+pub(crate) fn size_of_row(terms: f64, sum: f64) -> f64 {
+    if terms.is_finite() { terms.max(sum.abs()) } else { sum.abs() }
+}
+
+/// The smaller of two units; the other where one is zero: not known.
+pub(crate) fn lesser(a: f64, b: f64) -> f64 {
+    if a > 0.0 && b > 0.0 { a.min(b) } else { a.max(b) }
+}
+
 /// Units of rows that have none, from their neighbours: `ω_i = max_j |J_ij| ζ_j`, `ζ_j = max_k ω_k / |J_kj|`.
 pub(crate) fn hand_on(units: &mut Vec<f64>, pattern: &Pattern, jacobian: &[f64]) {
     let mut columns = vec![0.0_f64; units.len()];

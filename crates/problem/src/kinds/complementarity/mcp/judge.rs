@@ -1,6 +1,8 @@
 //! The judge of nonlinear problems.
 
-use super::super::judge::{Pair, finite, hand_on, natural, put, share, verdict, worse};
+use super::super::judge::{
+    Pair, finite, hand_on, lesser, natural, put, share, size_of_row, verdict, worse,
+};
 use super::Mcp;
 use crate::LcpPoint;
 use crate::Problem;
@@ -102,10 +104,8 @@ impl McpGauge {
                 scales[i] = if smooth { (f[i] - linear).abs() + sizes } else { 0.0 };
             }
         }
-        // A size that is none, or less than the sum itself, is that of the sum.
         for (i, (d, f)) in scales.iter_mut().zip(&*f).enumerate() {
-            let own = if d.is_finite() { d.max(f.abs()) } else { f.abs() };
-            *d = own.max(VANISHING * lesser(units[i], near[i]));
+            *d = size_of_row(*d, *f).max(VANISHING * lesser(units[i], near[i]));
         }
         effects.fill(0.0);
         if smooth {
@@ -156,11 +156,11 @@ impl McpGauge {
             let of_f = pair.dual().max(pair.complementarity());
             let unit = self.units[i];
             if of_f >= pair.error && unit > 0.0 {
-                let mut share_of_own = share(self.f[i], unit);
-                if (0.0..unit).contains(&self.near[i]) && self.near[i] > 0.0 {
+                let (mut share_of_own, near) = (share(self.f[i], unit), self.near[i]);
+                if near > 0.0 && near < unit {
                     // What no double near x does better is no error.
                     let beyond = (self.f[i].abs() - 4.0 * self.rounding(problem, x, i)).max(0.0);
-                    share_of_own = share_of_own.max(share(beyond, self.near[i]));
+                    share_of_own = share_of_own.max(share(beyond, near));
                 }
                 if share_of_own > own {
                     (own, measure.own_contact) = (share_of_own, Some(i));
@@ -229,8 +229,3 @@ impl McpGauge {
 
 /// The part of ω that a row's terms count at least.
 const VANISHING: f64 = 1e-4;
-
-/// The smaller of two units, of which the second may not be known.
-fn lesser(unit: f64, near: f64) -> f64 {
-    if near > 0.0 { unit.min(near) } else { unit }
-}

@@ -1,6 +1,6 @@
 //! The judge of the local problem.
 
-use crate::check::proof::{Exactly, bounded, exacts, monotone};
+use crate::check::proof::{Exactly, bounded, exacts, monotone, principal};
 use crate::check::rows::{Rows, add_blocks_plainly, doubt};
 use crate::check::{
     ConeSystem, ContactStatus, Judged, Kinematic, Kinematics, Law, Measure, Monotone, StatusCounts,
@@ -314,7 +314,7 @@ fn enforced(q: &[f64], RowsLocal { V, R, s, bounds }: &RowsLocal) -> Option<f64>
     if !free.is_empty() {
         let mut c = s.clone();
         R.mul_add(1.0, &lambda, &mut c);
-        let inverse = Inverse::new(&R.columns(&free).transpose().columns(&free).transpose(), "R");
+        let inverse = Inverse::new(&principal(R, &free), "R");
         let inverse = inverse.ok()?;
         let mut x: Vec<f64> = free.iter().map(|&j| -c[j]).collect();
         let mut scratch = vec![0.0; inverse.scratch_len()];

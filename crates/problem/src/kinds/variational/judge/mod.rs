@@ -9,7 +9,7 @@ use crate::LcpPoint;
 use crate::Problem;
 use crate::check::{Measure, Verdict};
 use crate::field::Evaluator;
-use crate::kinds::complementarity::judge::{hand_on, natural};
+use crate::kinds::complementarity::judge::{hand_on, lesser, natural, size_of_row};
 pub(super) use projection::Projection;
 
 /// Where x is with respect to a constraint of the set: a bounded variable of a box, an inequality of a polyhedron, a ball, a cone.
@@ -119,7 +119,6 @@ impl ViGauge {
         (gauge.unit, own, gauge.units) = gauge.units_at(problem, &problem.start);
         // Where no function of a caller's is asked: it may know the neighbourhood of the start alone.
         if problem.F.expressions().is_some() && largest(&problem.start) > 0.0 {
-            let lesser = |a: f64, b: f64| if a > 0.0 && b > 0.0 { a.min(b) } else { a.max(b) };
             let (unit, _, units) = gauge.units_at(problem, &zeros());
             gauge.unit = lesser(gauge.unit, unit);
             // What neighbours hand on depends on the Jacobian there: it replaces no unit of the same kind.
@@ -135,8 +134,7 @@ impl ViGauge {
             return (0.0, vec![0.0; x.len()], vec![0.0; x.len()]);
         };
         let sizes = self.sizes.iter().zip(&self.f);
-        let own: Vec<f64> =
-            sizes.map(|(d, f)| if d.is_finite() { d.max(f.abs()) } else { f.abs() }).collect();
+        let own: Vec<f64> = sizes.map(|(d, f)| size_of_row(*d, *f)).collect();
         let mut units = own.clone();
         hand_on(&mut units, problem.F.pattern(), &self.jacobian);
         (phi, own, units)
