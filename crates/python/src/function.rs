@@ -7,8 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use nonsmooth_linalg::{Csc, Matrix};
-use nonsmooth_problem::field::{Closures, Differences, Field, Pattern};
+use nonsmooth_problem::field::{Closures, Differences, Field, Pattern, is_tentative};
 use numpy::PyArray1;
+use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
 use crate::{expected, mistake, numbers};
@@ -87,7 +88,13 @@ impl Call {
         let done = Python::try_attach(|py| {
             let found = self.function.bind(py).call1((PyArray1::from_slice(py, x),));
             let done = found.and_then(|found| read(&found, out));
-            done.map_err(|fault| self.faults.raise(py, &fault)).is_ok()
+            done.map_err(|fault| {
+                // Ctrl-C is no exception of the function's.
+                if !(is_tentative() && fault.is_instance_of::<PyException>(py)) {
+                    self.faults.raise(py, &fault);
+                }
+            })
+            .is_ok()
         });
         if done != Some(true) {
             out.fill(f64::NAN);

@@ -120,3 +120,28 @@ def test_a_function_may_solve_a_problem():
 
     # With a pattern nobody looks for one with NaN.
     assert ns.solve(ns.MCP(F, [1.0], pattern=[[1]])).x == pytest.approx([2.0])
+
+
+def test_no_jacobian_makes_errors_small():
+    # A billion times too large, all terms of the row are.
+    answer = ns.solve(ns.MCP(lambda x: x**3 - 1, [3.0, 3.0], jac=lambda x: 1e9 * np.eye(2)), max_iter=100)
+    assert not answer.solved
+    assert ns.solve(ns.MCP(lambda x: x**3 - 1, [3.0, 3.0], jac=lambda x: np.diag(3 * x**2))).solved
+    box = ns.Box([-10.0, -10.0], [10.0, 10.0])
+    assert not ns.solve(ns.VI(lambda x: x**3 - 1, box, [3.0, 3.0], jac=lambda x: 1e9 * np.eye(2)), max_iter=100).solved
+
+
+def test_no_start_makes_errors_small():
+    for jac in [None, lambda x: np.diag(np.exp(x))]:
+        problem = ns.MCP(lambda x: np.exp(x) - 2, [50.0], lower=-np.inf, jac=jac)
+        answer = ns.solve(problem)
+        assert answer.solved and answer.x == pytest.approx(np.log(2), abs=1e-6)
+        assert problem.judge([0.0])["solved"] is False
+
+
+def test_where_a_function_fails_the_judge_looks_in_vain():
+    import math
+
+    # Raises at zero and beyond, where the judge of a start far off asks.
+    answer = ns.solve(ns.MCP(lambda x: [math.exp(x[0]) - 2 if x[0] > 0.1 else 1 / 0], [50.0], lower=0.1, pattern=[[1]]))
+    assert answer.x == pytest.approx([math.log(2)], abs=1e-6)

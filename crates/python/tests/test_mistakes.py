@@ -275,3 +275,39 @@ def test_tolerances_of_a_comparison_are_those_of_a_solve():
         with pytest.raises(ns.Error, match="tol: expected|time_limit: expected"):
             ns.bench({"one": problem}, **wrong)
     assert ns.bench({"one": problem}, tol=np.float32(1e-4), repeats=1)
+
+
+ONE = ns.LCP(EYE, [-1.0, -1.0, -1.0])
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: ns.solve(ONE, max_iter=-1), "max_iter: expected a whole number of at least 0, found -1"),
+        (lambda: ns.solve(ONE, max_iter=1.5), "max_iter: expected a whole number of at least 0, found 1.5"),
+        (lambda: ns.solve(ONE, threads=-1), "threads: expected a whole number"),
+        (lambda: ns.solve(ONE, tol="a"), "tol: expected a number, found 'a'"),
+        (lambda: ns.solve(ONE, tol=None), "tol: expected a number, found None"),
+        (lambda: ns.solve(ONE, time_limit="1"), "time_limit: expected a number, found '1'"),
+        (lambda: ns.solve(ONE, None), "solver: expected a name or an object of settings"),
+        (lambda: ns.solve(ONE, ns.Nsgs), r"solver: expected an object, nonsmooth.Nsgs\(\)"),
+        (lambda: ns.solve(ONE, callback=3), "callback: expected a function"),
+        (lambda: ns.solve(3), "problem: expected a problem"),
+        (lambda: ns.solvers("foo"), "problem: expected a problem, or one of the kinds .*lcp.*, found 'foo'"),
+        (lambda: ns.solvers(3), "problem: expected a problem, or one of the kinds"),
+        (lambda: ns.bench([ONE], ["auto"], repeats=-1), "repeats: expected a whole number"),
+        (lambda: ns.bench([ONE], [None]), "solver: expected a name"),
+        (lambda: ns.bench([ONE], tol="a"), "tol: expected a number"),
+        (lambda: ns.Simulation(ns.World(), h="a"), "h: expected a number"),
+        (lambda: ns.Simulation(ns.World(), solver=3), "solver: expected a name"),
+        (lambda: ns.Simulation(ns.World(), tol="a"), "tol: expected a number"),
+    ],
+)
+def test_arguments_are_named(call, said):
+    with pytest.raises(ns.Error, match=said):
+        call()
+
+
+def test_whole_numbers_may_be_written_as_floats():
+    assert ns.solve(ONE, max_iter=1e3, threads=np.int64(1)).solved
+    assert ns.solve(ONE, max_iter=10**30, time_limit=np.float32(5.0)).solved

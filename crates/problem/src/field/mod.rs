@@ -19,6 +19,7 @@ mod probe;
 #[cfg(test)]
 mod tests;
 
+use std::cell::Cell;
 use std::fmt::Debug;
 use std::sync::Arc;
 
@@ -34,6 +35,28 @@ pub use expression::{
     Affine, Binary, Expressions, Graph, Id, Nary, Node, Piecewise, Range, Twins, Unary,
 };
 pub(crate) use expression::{Combination, Term};
+
+thread_local! {
+    static TENTATIVE: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Asks functions on this thread in vain where they fail: whoever calls those of a caller's takes a failure there for a point where F is not defined, and tells nobody
+/// ([`is_tentative`]).
+pub fn tentatively<T>(ask: impl FnOnce() -> T) -> T {
+    struct Before(bool);
+    impl Drop for Before {
+        fn drop(&mut self) {
+            TENTATIVE.set(self.0);
+        }
+    }
+    let _before = Before(TENTATIVE.replace(true));
+    ask()
+}
+
+/// Whether a function that fails now is to fail in silence.
+pub fn is_tentative() -> bool {
+    TENTATIVE.get()
+}
 
 /// The places where a Jacobian may not be zero: columns of each row, ascending.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Callable, Mapping, Optional, Union
 import numpy as np
 import numpy.typing as npt
 
-from . import _nonsmooth
+from . import _nonsmooth, arguments
 from ._nonsmooth import Progress
 from .problems import Problem, Vector, _table
 from .settings import Settings, registered
@@ -242,21 +242,19 @@ def solve(
 
     The GIL is released. Ctrl-C raises KeyboardInterrupt. Raises :class:`Error` for what is a mistake; that there is no solution, or that none was found, is a status.
     """
-    name, own = _named(solver)
+    name, own = arguments.named(solver)
     every = {**own, **registered(settings)} if settings else own
-    start = warm_start._native if isinstance(warm_start, Answer) else warm_start
+    if callback is not None and not callable(callback):
+        raise arguments.mistake("callback", "a function of nonsmooth.Progress", callback)
     native = _nonsmooth.solve(
-        problem._native, name, _plain(every), tol, time_limit, max_iter, threads, start, callback
+        arguments.problem(problem),
+        name,
+        arguments.plain(every),
+        arguments.real("tol", tol),
+        arguments.seconds("time_limit", time_limit),
+        None if max_iter is None else arguments.whole("max_iter", max_iter),
+        arguments.whole("threads", threads),
+        warm_start._native if isinstance(warm_start, Answer) else warm_start,
+        callback,
     )
     return Answer(native)
-
-
-def _named(solver: Union[str, Settings]) -> tuple[str, Mapping[str, object]]:
-    return (solver, {}) if isinstance(solver, str) else (solver.name, solver.settings)
-
-
-def _plain(settings: Mapping[str, object]) -> Optional[dict[str, object]]:
-    """Numbers of numpy as those of Python."""
-    if not settings:
-        return None
-    return {k: v.item() if isinstance(v, np.generic) else v for k, v in settings.items()}

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Iterable, Mapping, Optional, Sequence, Un
 
 import numpy as np
 
-from . import _nonsmooth
-from .answers import _named, _plain, solve
+from . import _nonsmooth, arguments
+from .answers import solve
 from .problems import Path, Problem, read
 from .settings import Settings
 
@@ -109,7 +109,7 @@ def _each(problems: Problems) -> Iterable[tuple[str, Problem]]:
 
 
 def _label(solver: Union[str, Settings]) -> str:
-    name, settings = _named(solver)
+    name, settings = arguments.named(solver)
     said = ",".join(f"{key}={value}" for key, value in settings.items())
     return f"{name}:{said}" if said else name
 
@@ -128,13 +128,14 @@ def bench(
     ``nonsmooth bench run``, which starts a process each; their files are the same.
     """
     for solver in solvers:
-        name, settings = _named(solver)
-        _nonsmooth.check(name, _plain(settings) or {})
-    tolerances = [float(one) for one in np.atleast_1d(tol)]
+        name, settings = arguments.named(solver)
+        _nonsmooth.check(name, arguments.plain(settings) or {})
+    tolerances = [arguments.real("tol", one) for one in np.atleast_1d(tol).tolist()]
     for one in tolerances:
         if not 0 < one <= 1:
             raise _nonsmooth.Error(f"tol: expected a positive number of at most 1, found {one:g}")
-    time_limit = float(time_limit)
+    time_limit = arguments.real("time_limit", time_limit)
+    repeats = arguments.whole("repeats", repeats)
     if not 0 <= time_limit < float("inf"):
         raise _nonsmooth.Error(f"time_limit: expected a number of seconds of at least 0, found {time_limit:g}")
     campaign = uuid.uuid4().hex[:12]

@@ -192,8 +192,12 @@ __all__ = ["CLASSES", "Prefixed", "Settings", *CLASSES]
 def solvers(problem: object = None) -> list[str]:
     """The names of the solvers that are listed for a problem, or for a kind by its name; of all kinds where nothing is said."""
     kind = problem if isinstance(problem, str) else getattr(problem, "kind", None)
+    offers = _nonsmooth.offers()
+    if problem is not None and kind not in [offer["kind"] for offer in offers]:
+        kinds = ", ".join(offer["kind"] for offer in offers)
+        raise _nonsmooth.Error(f"problem: expected a problem, or one of the kinds {kinds}, found {problem!r}")
     names: dict[str, None] = {}
-    for offer in _nonsmooth.offers():
+    for offer in offers:
         if kind is None or kind == offer["kind"]:
             names.update(dict.fromkeys(offer["names"]))
     return list(names)

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, Callable, Iterator, Mapping, Optional, Se
 import numpy as np
 import numpy.typing as npt
 
-from . import _nonsmooth
+from . import _nonsmooth, arguments
 from ._nonsmooth import Step
-from .answers import Table, _named, _plain
+from .answers import Table
 from .problems import Friction, Path, Problem, Vector
 from .settings import Settings
 
@@ -270,15 +270,15 @@ class Simulation:
         world = world.copy()
         document = world.document
         if h is not None:
-            document["time"]["h"] = h
+            document["time"]["h"] = arguments.real("h", h)
         if integrator:
             document["integrator"] = {**document.get("integrator", {}), **integrator}
         table = document.setdefault("solver", {})
         if solver is not None:
-            name, settings = _named(solver)
-            table["name"], table["settings"] = name, _plain(settings) or {}
+            name, settings = arguments.named(solver)
+            table["name"], table["settings"] = name, arguments.plain(settings) or {}
         if tol is not None:
-            table["tol"] = tol
+            table["tol"] = arguments.real("tol", tol)
         self.h = float(document["time"]["h"])
         self._world = world
         self._native = _nonsmooth.Simulation(world.json(), settle)
@@ -337,6 +337,7 @@ class Simulation:
         ``on_step`` is called with each :class:`Step`; if it returns something true the run ends there; what it raises is raised here. Ctrl-C raises
         KeyboardInterrupt. Either way the simulation is whole, and goes on from the last step.
         """
+        until, every = arguments.real("until", until), arguments.whole("every", every)
         return Run(self._native.run(until, self.h, every, on_step), self)
 
 

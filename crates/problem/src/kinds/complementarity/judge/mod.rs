@@ -1,9 +1,11 @@
 //! The judges of complementarity problems: what an error is, of a row and of a pair, and what it is measured in.
 
 mod linear;
+mod terms;
 
 pub use linear::LinearGauge;
 pub(super) use linear::{Data, InZ};
+pub(crate) use terms::{Terms, Units};
 
 use serde::Serialize;
 

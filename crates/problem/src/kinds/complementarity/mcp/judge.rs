@@ -1,19 +1,16 @@
 //! The judge of nonlinear problems.
 
-use super::super::judge::{
-    Pair, finite, hand_on, lesser, natural, put, share, size_of_row, verdict, worse,
-};
+use super::super::judge::{Pair, Terms, Units, finite, natural, put, share, verdict, worse};
 use super::Mcp;
 use crate::LcpPoint;
 use crate::Problem;
 use crate::check::{Measure, RowCounts, RowStatus, Verdict};
-use crate::field::Evaluator;
 
 /// The judge's constants and buffers for a nonlinear problem.
 ///
 /// The error of row i is `|F_i| / D_i` (0/0 = 0), where D_i is the size of the row's terms at x: of a polynomial the sum of the moduli of its monomials, of
-/// other expressions the same to first order, of functions without expressions `|F_i − Σ_j J_ij x_j| + Σ_j |J_ij x_j|`; of rows that vanish with all their terms at least
-/// a ten-thousandth of ω_i, the size at the start or, where that is zero, what a change of the other rows by their own ω makes of the row through the variables that they share; of expressions
+/// other expressions the same to first order, of functions without expressions `|F_i − Σ_j J_ij x_j| + Σ_j |J_ij x_j|` (where F does not change as J says, `|F_i|` and its change along a vector of the size of x, if that is smaller); of rows that vanish with all their terms at least
+/// a ten-thousandth of ω_i, the size at the start or, where that is zero, what a change of the other rows by their own ω makes of the row through the variables that they share; or
 /// the size at the point nearest to zero that the bounds allow, if that is smaller: a start far off makes nothing small. That a variable is d away from a bound
 /// counts as much as what it does to the rows, `max_k |J_kj| d / D_k`; where the Jacobian does not see it, d over the largest of `|x_j|`, `|start_j|` and the
 /// finite bounds. Therefore neither changes when rows or variables are multiplied by numbers.
@@ -29,14 +26,10 @@ use crate::field::Evaluator;
 ///
 /// [`certify`](Problem::certify) evaluates sums, products, quotients and roots of expressions in doubled precision.
 pub struct McpGauge {
-    field: Box<dyn Evaluator>,
-    f: Vec<f64>,
-    jacobian: Vec<f64>,
+    terms: Terms,
     /// D at the point last measured.
     scales: Vec<f64>,
-    /// ω, and what it is at the point nearest to zero that the bounds allow; zero where that is not known.
-    units: Vec<f64>,
-    near: Vec<f64>,
+    units: Units,
     /// The unit of each variable, but for its own value.
     lengths: Vec<f64>,
     /// What a distance counts at the point last measured.
@@ -50,67 +43,36 @@ impl McpGauge {
         let start = problem.origin().z;
         let length =
             |i: usize| finite(problem.lower[i]).max(finite(problem.upper[i])).max(start[i].abs());
-        let mut gauge = Self {
-            field: problem.F.evaluator(),
-            f: vec![0.0; n],
-            jacobian: vec![0.0; problem.F.pattern().len()],
+        let zero = problem.lower.iter().zip(&problem.upper).map(|(l, u)| 0.0_f64.max(*l).min(*u));
+        let mut terms = Terms::new(&*problem.F);
+        Self {
+            units: Units::new(&*problem.F, &mut terms, &start, zero.collect()),
+            terms,
             scales: vec![0.0; n],
-            units: vec![],
-            near: vec![0.0; n],
             lengths: (0..n).map(length).collect(),
             effects: vec![0.0; n],
-        };
-        gauge.units = vec![0.0; n];
-        gauge.look(problem, &start, false);
-        let own = gauge.scales.clone();
-        gauge.units = own.clone();
-        hand_on(&mut gauge.units, problem.F.pattern(), &gauge.jacobian);
-        // Where no function of a caller's is asked: it may know the neighbourhood of the start alone.
-        let near = problem.lower.iter().zip(&problem.upper).map(|(l, u)| 0.0_f64.max(*l).min(*u));
-        let near: Vec<f64> = near.collect();
-        if problem.F.expressions().is_some() && near != start {
-            let units = std::mem::replace(&mut gauge.units, vec![0.0; n]);
-            if gauge.look(problem, &near, false) {
-                gauge.near = gauge.scales.clone();
-                hand_on(&mut gauge.near, problem.F.pattern(), &gauge.jacobian);
-                // What neighbours hand on depends on the Jacobian there: it replaces no unit of the same kind.
-                let handed = gauge.near.iter_mut().zip(&own).filter(|(_, own)| **own == 0.0);
-                handed.for_each(|(near, _)| *near = 0.0);
-            }
-            gauge.units = units;
         }
-        gauge
     }
 
     /// F, D and what distances count at x. False where F is not defined.
     fn look(&mut self, problem: &Mcp, x: &[f64], precisely: bool) -> bool {
-        let Self { field, f, jacobian, scales, units, near, lengths, effects } = self;
+        let Self { terms, scales, units, lengths, effects } = self;
         let pattern = problem.F.pattern();
-        let smooth = field.jacobian(x, f, jacobian);
-        let defined = match (precisely, smooth) {
-            (true, _) => field.precisely(x, f),
-            (false, true) => true,
-            (false, false) => field.value(x, f),
-        };
+        let mut defined = terms.look(pattern, x, precisely);
+        if defined && units.asked(&*problem.F, terms) {
+            defined = terms.look(pattern, x, precisely);
+        }
         if !defined {
             scales.fill(0.0);
             return false;
         }
-        if !field.sizes(x, scales) {
-            for i in 0..f.len() {
-                let terms = || jacobian[pattern.range(i)].iter().zip(pattern.row(i));
-                let linear: f64 = terms().map(|(a, &j)| a * x[j]).sum();
-                let sizes: f64 = terms().map(|(a, &j)| (a * x[j]).abs()).sum();
-                scales[i] = if smooth { (f[i] - linear).abs() + sizes } else { 0.0 };
-            }
-        }
-        for (i, (d, f)) in scales.iter_mut().zip(&*f).enumerate() {
-            *d = size_of_row(*d, *f).max(VANISHING * lesser(units[i], near[i]));
+        for (i, (d, size)) in scales.iter_mut().zip(&terms.sizes).enumerate() {
+            *d = size.max(units.least(i));
         }
         effects.fill(0.0);
-        if smooth {
+        if terms.smooth {
             for (i, d) in scales.iter().enumerate().filter(|(_, d)| **d > 0.0) {
-                for (a, &j) in jacobian[pattern.range(i)].iter().zip(pattern.row(i)) {
+                for (a, &j) in terms.jacobian[pattern.range(i)].iter().zip(pattern.row(i)) {
                     effects[j] = effects[j].max(a.abs() / d);
                 }
             }
@@ -143,7 +105,7 @@ impl McpGauge {
         let mut own: f64 = 0.0;
         for i in 0..x.len() {
             let pair = self.pair(problem, x, i);
-            let residual = natural(x[i], self.f[i], pair.l, pair.u).abs();
+            let residual = natural(x[i], pair.w, pair.l, pair.u).abs();
             measure.absolute = worse(measure.absolute, residual);
             measure.primal = worse(measure.primal, pair.primal());
             measure.dual = worse(measure.dual, pair.dual());
@@ -154,12 +116,12 @@ impl McpGauge {
             }
             // The error of F, where that is the error of the pair.
             let of_f = pair.dual().max(pair.complementarity());
-            let unit = self.units[i];
+            let (unit, near) = self.units.at(i, self.terms.sizes[i]);
             if of_f >= pair.error && unit > 0.0 {
-                let (mut share_of_own, near) = (share(self.f[i], unit), self.near[i]);
+                let mut share_of_own = share(pair.w, unit);
                 if near > 0.0 && near < unit {
                     // What no double near x does better is no error.
-                    let beyond = (self.f[i].abs() - 4.0 * self.rounding(problem, x, i)).max(0.0);
+                    let beyond = (pair.w.abs() - 4.0 * self.rounding(problem, x, i)).max(0.0);
                     share_of_own = share_of_own.max(share(beyond, near));
                 }
                 if share_of_own > own {
@@ -176,7 +138,8 @@ impl McpGauge {
 
     /// Row i at the point last looked at.
     fn pair(&self, problem: &Mcp, x: &[f64], i: usize) -> Pair {
-        let (w, error) = (self.f[i], share(self.f[i], self.scales[i]));
+        let w = self.terms.f[i];
+        let error = share(w, self.scales[i]);
         let (l, u) = (problem.lower[i], problem.upper[i]);
         Pair { z: x[i], l, u, w, error, effect: self.effects[i] }
     }
@@ -190,7 +153,7 @@ impl McpGauge {
     /// What such a change makes of `F_i`.
     fn rounding(&self, problem: &Mcp, x: &[f64], i: usize) -> f64 {
         let pattern = problem.F.pattern();
-        let terms = self.jacobian[pattern.range(i)].iter().zip(pattern.row(i));
+        let terms = self.terms.jacobian[pattern.range(i)].iter().zip(pattern.row(i));
         0.5 * f64::EPSILON * terms.map(|(a, &j)| (a * x[j]).abs()).sum::<f64>()
     }
 
@@ -223,9 +186,6 @@ impl McpGauge {
             let bounded = pair.l.is_finite() || pair.u.is_finite();
             if bounded { Ok(pair) } else { Err(pair.worst()) }
         });
-        verdict(measure, rows, self.f.clone(), tolerance)
+        verdict(measure, rows, self.terms.f.clone(), tolerance)
     }
 }
-
-/// The part of ω that a row's terms count at least.
-const VANISHING: f64 = 1e-4;

@@ -126,3 +126,59 @@ fn rows_that_vanish_with_all_their_terms_have_units_of_their_neighbours() {
     assert!(at(4.4e-16).solved && at(0.0).solved);
     assert!(!at(1e-9).solved);
 }
+
+/// `(F, J)` of two like rows in the form that closures have.
+fn closures(f: fn(f64) -> f64, j: fn(f64) -> f64) -> crate::field::Closures {
+    let pattern = crate::field::Pattern::new([vec![0], vec![1]].into_iter().map(Vec::into_iter));
+    let all = |rule: fn(f64) -> f64| {
+        move |x: &[f64], out: &mut [f64]| {
+            out.iter_mut().zip(x).for_each(|(out, x)| *out = rule(*x));
+        }
+    };
+    crate::field::Closures::new(pattern, all(f), all(j)).unwrap()
+}
+
+#[test]
+fn a_jacobian_makes_no_error_small() {
+    let free = f64::INFINITY;
+    let solved = |j: fn(f64) -> f64, start: f64, x: f64| {
+        let field = closures(|x| x.powi(3) - 1.0, j);
+        let problem = Mcp::new(field, vec![-free; 2], vec![free; 2], vec![start; 2]).unwrap();
+        problem.judge(&LcpPoint { z: vec![x; 2] }, 1e-8).unwrap().solved
+    };
+    for wrong in [|_: f64| 1e9, |_: f64| -1e9, |x: f64| 1e20 * x] {
+        assert!(
+            !solved(wrong, 3.0, 3.0) && !solved(wrong, 3.0, 1.001) && !solved(wrong, 1.0, 1.001)
+        );
+        assert!(solved(wrong, 3.0, 1.0));
+    }
+    let right = |x: f64| 3.0 * x * x;
+    assert!(
+        solved(right, 3.0, 1.0)
+            && solved(right, 3.0, 1.0 + 1e-9)
+            && !solved(right, 3.0, 1.0 + 1e-7)
+    );
+    // That of a method with a matrix of its own is no worse than none.
+    assert!(solved(|_| 0.5, 3.0, 1.0));
+}
+
+#[test]
+fn a_start_makes_no_error_small() {
+    let free = f64::INFINITY;
+    for start in [50.0, 300.0, 700.0, -700.0, 0.0] {
+        let field = closures(|x| x.exp() - 2.0, f64::exp);
+        let problem = Mcp::new(field, vec![-free; 2], vec![free; 2], vec![start; 2]).unwrap();
+        let mut gauge = problem.gauge().unwrap();
+        let mut solved =
+            |x: f64| problem.certify(&LcpPoint { z: vec![x; 2] }, &mut gauge).passes(1e-8);
+        let ln2 = 2f64.ln();
+        for x in [0.0, start, -5.0, ln2 + 1e-3, ln2 - 1e-6] {
+            assert!(!solved(x), "from {start} at {x}");
+        }
+        assert!(solved(ln2));
+    }
+    // As for expressions: x² vanishes with all its terms, and has the unit of the start.
+    let field = closures(|x| x * x, |x| 2.0 * x);
+    let problem = Mcp::new(field, vec![-free; 2], vec![free; 2], vec![1.0; 2]).unwrap();
+    assert!(problem.judge(&LcpPoint { z: vec![1e-7; 2] }, 1e-8).unwrap().solved);
+}

@@ -8,8 +8,7 @@ use super::{Set, Vi};
 use crate::LcpPoint;
 use crate::Problem;
 use crate::check::{Measure, Verdict};
-use crate::field::Evaluator;
-use crate::kinds::complementarity::judge::{hand_on, lesser, natural, size_of_row};
+use crate::kinds::complementarity::judge::{Terms, Units, lesser, natural};
 pub(super) use projection::Projection;
 
 /// Where x is with respect to a constraint of the set: a bounded variable of a box, an inequality of a polyhedron, a ball, a cone.
@@ -44,16 +43,15 @@ pub struct SetCounts {
 /// | `primal` | how far x violates a constraint: of a bound, a half-space, a ball the distance from it, of a cone `(‖x̄‖ − x_1)/√2`; the largest over ξ |
 /// | `dual`, `relative` | `‖r‖_∞ / ξ`, and what the projection violates added; **decides** |
 /// | `complementarity` | `|F(x)ᵀ r| / (n φ ξ)` |
-/// | `own` | the same residual of each part of the set (each variable of a box) by itself, with the φ of its rows at the start or, of expressions, at zero, the smaller: x that runs away, or larger rows, excuse nothing |
+/// | `own` | the same residual of each part of the set (each variable of a box) by itself, with the φ of its rows at the start or at zero, the smaller: x that runs away, or larger rows, excuse nothing |
 /// | `absolute`, `literature`, `siconos` | `‖x − P_X(x − F(x))‖_∞` |
 ///
 /// The projections are the judge's own: of cones in the half-plane of the axis and the norm of the rest, of polyhedra by nonnegative least squares
 /// (LawsonHanson1974, ch. 23), exact but for rounding after finitely many steps. [`certify`](Problem::certify) evaluates expressions in doubled precision.
 pub struct ViGauge {
-    field: Box<dyn Evaluator>,
-    f: Vec<f64>,
-    jacobian: Vec<f64>,
-    sizes: Vec<f64>,
+    terms: Terms,
+    /// φ that is known beforehand, of each row and of all.
+    units: Units,
     /// `x − γ F`, and its projection.
     from: Vec<f64>,
     y: Vec<f64>,
@@ -64,10 +62,6 @@ pub struct ViGauge {
     projections: [Vec<Projection>; 3],
     /// Of the start and the set.
     size: f64,
-    /// φ that is known beforehand: that at the start or, of expressions, that at zero, if it is smaller.
-    unit: f64,
-    /// The same of each row; zero where it is not known.
-    units: Vec<f64>,
     /// γ of each variable.
     gammas: Vec<f64>,
 }
@@ -92,19 +86,14 @@ const LOOKED_AT: f64 = 1e-3;
 /// The part of the size of the start and the set that each part of x has at least.
 const OF_OTHERS: f64 = 1e-4;
 
-/// The part of φ at the start that φ is at least: where F vanishes with all its terms, these give no unit.
-const VANISHING: f64 = 1e-4;
-
 impl ViGauge {
     pub(super) fn new(problem: &Vi) -> Self {
         let n = problem.dim();
         let zeros = || vec![0.0; n];
-        let mut gauge = Self {
-            unit: 0.0,
-            field: problem.F.evaluator(),
-            f: zeros(),
-            jacobian: vec![0.0; problem.F.pattern().len()],
-            sizes: zeros(),
+        let mut terms = Terms::new(&*problem.F);
+        Self {
+            units: Units::new(&*problem.F, &mut terms, &problem.start, zeros()),
+            terms,
             from: zeros(),
             y: zeros(),
             moved: zeros(),
@@ -112,62 +101,25 @@ impl ViGauge {
             projections: [0, 1, 2]
                 .map(|_| problem.set.parts().iter().map(|(_, set)| Projection::new(set)).collect()),
             size: largest(&problem.start).max(problem.set.size()),
-            units: zeros(),
             gammas: zeros(),
-        };
-        let own;
-        (gauge.unit, own, gauge.units) = gauge.units_at(problem, &problem.start);
-        // Where no function of a caller's is asked: it may know the neighbourhood of the start alone.
-        if problem.F.expressions().is_some() && largest(&problem.start) > 0.0 {
-            let (unit, _, units) = gauge.units_at(problem, &zeros());
-            gauge.unit = lesser(gauge.unit, unit);
-            // What neighbours hand on depends on the Jacobian there: it replaces no unit of the same kind.
-            let known = (0..n).filter(|&i| own[i] > 0.0);
-            known.for_each(|i| gauge.units[i] = lesser(gauge.units[i], units[i]));
         }
-        gauge
     }
 
-    /// φ at x, the size of each row's terms there, and its unit: that size, else what its neighbours hand on.
-    fn units_at(&mut self, problem: &Vi, x: &[f64]) -> (f64, Vec<f64>, Vec<f64>) {
-        let Some(phi) = self.look(problem, x, false) else {
-            return (0.0, vec![0.0; x.len()], vec![0.0; x.len()]);
-        };
-        let sizes = self.sizes.iter().zip(&self.f);
-        let own: Vec<f64> = sizes.map(|(d, f)| size_of_row(*d, *f)).collect();
-        let mut units = own.clone();
-        hand_on(&mut units, problem.F.pattern(), &self.jacobian);
-        (phi, own, units)
-    }
-
-    /// F at x, and φ. False where F is not defined.
+    /// F at x, and φ. `None` where F is not defined.
     fn look(&mut self, problem: &Vi, x: &[f64], precisely: bool) -> Option<f64> {
-        let Self { field, f, jacobian, sizes, .. } = self;
-        let smooth = field.jacobian(x, f, jacobian);
-        let defined = match (precisely, smooth) {
-            (true, _) => field.precisely(x, f),
-            (false, true) => true,
-            (false, false) => field.value(x, f),
-        };
-        if !defined || f.iter().any(|f| !f.is_finite()) {
-            return None;
+        let Self { terms, units, .. } = self;
+        let pattern = problem.F.pattern();
+        let mut defined = terms.look(pattern, x, precisely);
+        if defined && units.asked(&*problem.F, terms) {
+            defined = terms.look(pattern, x, precisely);
         }
-        if !field.sizes(x, sizes) {
-            let pattern = problem.F.pattern();
-            for i in 0..f.len() {
-                let terms = || jacobian[pattern.range(i)].iter().zip(pattern.row(i));
-                let linear: f64 = terms().map(|(a, &j)| a * x[j]).sum();
-                let moduli: f64 = terms().map(|(a, &j)| (a * x[j]).abs()).sum();
-                sizes[i] = if smooth { (f[i] - linear).abs() + moduli } else { 0.0 };
-            }
-        }
-        let sizes = sizes.iter().filter(|d| d.is_finite());
-        Some(sizes.fold(largest(f), |size, d| size.max(*d)))
+        defined.then(|| largest(&terms.sizes).max(units.least_of_all()))
     }
 
     /// `‖x − P_X(x − γ F)‖_∞` with what the projection violates, for F as it was looked at and the γ of each variable; the projection is left in y, the difference in `moved`.
     fn natural(&mut self, problem: &Vi, x: &[f64], which: usize) -> f64 {
-        let Self { f, from, y, moved, gammas, projections, .. } = self;
+        let Self { terms, from, y, moved, gammas, projections, .. } = self;
+        let f = &terms.f;
         for (i, from) in from.iter_mut().enumerate() {
             *from = x[i] - gammas[i] * f[i];
         }
@@ -197,6 +149,9 @@ impl ViGauge {
     /// by its own φ, and ξ the size of the part's x, start and set; of parts without a unit nothing.
     fn own(&mut self, problem: &Vi, x: &[f64]) -> f64 {
         let mut sizes = vec![0.0; x.len()];
+        let unit = |i: usize| self.units.at(i, self.terms.sizes[i]);
+        let phis = (0..x.len()).map(unit).map(|(start, near)| lesser(start, near));
+        let phis: Vec<f64> = phis.collect();
         // What has no size of its own, as a cone that begins at its point, has a part of the others'.
         let least = if self.size > 0.0 { OF_OTHERS * self.size } else { largest(x) };
         for (first, set) in problem.set.parts() {
@@ -204,7 +159,7 @@ impl ViGauge {
             let Set::Box { lower, upper } = set else {
                 let of = |x: &[f64]| largest(&x[whole.clone()]);
                 let known = of(&problem.start).max(set.size());
-                let (size, phi) = (known.max(of(x)).max(least), of(&self.units));
+                let (size, phi) = (known.max(of(x)).max(least), of(&phis));
                 for i in whole {
                     (sizes[i], self.gammas[i]) = scaled(size, phi);
                 }
@@ -214,7 +169,7 @@ impl ViGauge {
                 let bounds = [lower[i - first], upper[i - first]].into_iter();
                 let known = bounds.filter(|b| b.is_finite()).chain([problem.start[i], x[i]]);
                 let size = known.fold(least, |size: f64, x| size.max(x.abs()));
-                (sizes[i], self.gammas[i]) = scaled(size, self.units[i]);
+                (sizes[i], self.gammas[i]) = scaled(size, phis[i]);
             }
         }
         if !self.natural(problem, x, 2).is_finite() {
@@ -241,7 +196,7 @@ impl ViGauge {
     /// Cost: a projection, and the orthogonalisation of the rows.
     pub fn held(&mut self, problem: &Vi, point: &LcpPoint) -> Option<Held> {
         let x = &point.z;
-        let phi = self.look(problem, x, true)?.max(VANISHING * self.unit);
+        let phi = self.look(problem, x, true)?;
         let (size, gamma) = self.units(x, phi);
         self.gammas.fill(gamma);
         if !self.natural(problem, x, 1).is_finite() {
@@ -257,7 +212,6 @@ impl ViGauge {
             return Measure::unknown();
         }
         let Some(phi) = self.look(problem, x, precisely) else { return Measure::never() };
-        let phi = phi.max(VANISHING * self.unit);
         let (xi, gamma) = self.units(x, phi);
         self.gammas.fill(gamma);
         let relative = self.natural(problem, x, 1) / xi;
@@ -271,7 +225,7 @@ impl ViGauge {
             // Nothing projects onto an empty set.
             return Measure::never();
         }
-        let gap: f64 = self.moved.iter().zip(&self.f).map(|(r, f)| r * f).sum();
+        let gap: f64 = self.moved.iter().zip(&self.terms.f).map(|(r, f)| r * f).sum();
         let worst = self
             .moved
             .iter()

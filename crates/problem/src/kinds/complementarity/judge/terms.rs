@@ -1,0 +1,194 @@
+//! F at a point and the sizes of its rows' terms, as the judges of nonlinear problems measure them.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::{hand_on, lesser, size_of_row};
+use crate::field::{Evaluator, Field, Pattern, tentatively};
+
+/// The part of a row's unit that its terms count at least: where F vanishes with all its terms, these give no unit.
+const VANISHING: f64 = 1e-4;
+/// How near to zero, in parts of the start, a function without expressions is asked: not at zero, where logarithms and quotients end. Of two points, since sizes that
+/// still become smaller from the one to the other vanish.
+const NEAR: [f64; 2] = [1.0 / (1_u64 << 30) as f64, 1.0 / (1_u64 << 40) as f64];
+/// Changes of the variables, in parts of their size, along which a Jacobian is held against F.
+const STEP: f64 = 1e-6;
+/// What a Jacobian may miss of F's change, in parts of its terms.
+const ALLOWED: f64 = 0.1;
+
+/// F, its Jacobian and D, the sizes of its rows' terms, at the point last looked at.
+pub(crate) struct Terms {
+    field: Box<dyn Evaluator>,
+    pub(crate) f: Vec<f64>,
+    pub(crate) jacobian: Vec<f64>,
+    /// At least `|F_i|`.
+    pub(crate) sizes: Vec<f64>,
+    /// Whether there is a Jacobian.
+    pub(crate) smooth: bool,
+    moved: [Vec<f64>; 3],
+}
+
+impl Terms {
+    pub(crate) fn new(field: &dyn Field) -> Self {
+        let zeros = || vec![0.0; field.dim()];
+        Self {
+            field: field.evaluator(),
+            f: zeros(),
+            jacobian: vec![0.0; field.pattern().len()],
+            sizes: zeros(),
+            smooth: false,
+            moved: [zeros(), zeros(), zeros()],
+        }
+    }
+
+    /// Looks at x; `precisely` F is evaluated as exactly as it can be, and a Jacobian that says the sizes is held against F. False where F is not defined.
+    pub(crate) fn look(&mut self, pattern: &Pattern, x: &[f64], precisely: bool) -> bool {
+        let Self { field, f, jacobian, sizes, smooth, .. } = self;
+        *smooth = field.jacobian(x, f, jacobian);
+        let defined = match (precisely, *smooth) {
+            (true, _) => field.precisely(x, f),
+            (false, true) => true,
+            (false, false) => field.value(x, f),
+        };
+        if !defined || f.iter().any(|f| !f.is_finite()) {
+            sizes.fill(0.0);
+            return false;
+        }
+        let known = field.sizes(x, sizes);
+        for (i, size) in sizes.iter_mut().enumerate() {
+            if !known {
+                let terms = || jacobian[pattern.range(i)].iter().zip(pattern.row(i));
+                let linear: f64 = terms().map(|(a, &j)| a * x[j]).sum();
+                let moduli: f64 = terms().map(|(a, &j)| (a * x[j]).abs()).sum();
+                *size = if *smooth { (f[i] - linear).abs() + moduli } else { 0.0 };
+            }
+            *size = size_of_row(*size, f[i]);
+        }
+        if precisely && *smooth && !known {
+            self.distrust(pattern, x);
+        }
+        true
+    }
+
+    /// The units of rows by the point last looked at: the sizes, or what neighbours hand on; and the largest size.
+    fn units(&self, pattern: &Pattern) -> (Vec<f64>, f64) {
+        let mut units = self.sizes.clone();
+        hand_on(&mut units, pattern, &self.jacobian);
+        (units, self.sizes.iter().fold(0.0, |most, d| most.max(*d)))
+    }
+
+    /// A Jacobian is a claim: a row of which F does not change as it says has the size `|F_i|` and that of its change, if that is smaller.
+    ///
+    /// `|F_i(x ± h d) − F_i(x) ∓ h Σ_j J_ij d_j| > h Σ_j |J_ij x_j| / 10` on both sides (at kinks one is enough), for d_j of random sign between `|x_j|/2` and `|x_j|`. Two values of F.
+    fn distrust(&mut self, pattern: &Pattern, x: &[f64]) {
+        let Self { field, f, jacobian, sizes, moved: [y, up, down], .. } = self;
+        let mut random = Pcg64::seed_from_u64(1);
+        let signed =
+            |x: &f64| x * random.random_range(0.5..1.0) * if random.random() { 1.0 } else { -1.0 };
+        let d: Vec<f64> = x.iter().map(signed).collect();
+        let mut side = |h: f64, there: &mut Vec<f64>| {
+            y.iter_mut().zip(x).zip(&d).for_each(|((y, x), d)| *y = x + h * d);
+            tentatively(|| field.value(y, there));
+        };
+        side(STEP, up);
+        side(-STEP, down);
+        for (i, size) in sizes.iter_mut().enumerate() {
+            let terms = || jacobian[pattern.range(i)].iter().zip(pattern.row(i));
+            let said: f64 = terms().map(|(a, &j)| a * d[j]).sum();
+            let moduli: f64 = terms().map(|(a, &j)| (a * x[j]).abs()).sum();
+            let changes = [(up[i] - f[i]) / STEP, (f[i] - down[i]) / STEP];
+            let seen = changes.into_iter().filter(|change| change.is_finite());
+            let agrees = |change: f64| (change - said).abs() <= ALLOWED * moduli;
+            if seen.clone().count() > 0 && !seen.clone().any(agrees) {
+                *size = size
+                    .min(f[i].abs() + seen.fold(0.0_f64, |most, change| most.max(change.abs())));
+            }
+        }
+    }
+}
+
+/// ω: the sizes of rows that are known beforehand.
+pub(crate) struct Units {
+    /// Those at the start or, where they vanish there, what a change of the other rows by their own makes of the row.
+    start: Vec<f64>,
+    /// The same at the point nearest to zero that is allowed; zero where they are not known.
+    near: Vec<f64>,
+    /// The largest sizes at the two points.
+    largest: (f64, f64),
+    /// Sizes at the start, and the points near zero until they are asked.
+    own: Vec<f64>,
+    unasked: Vec<Vec<f64>>,
+    expressions: bool,
+}
+
+impl Units {
+    /// Of a problem that begins at `start`; `zero` is what is nearest to zero of all that is allowed.
+    ///
+    /// Expressions are asked there at once; functions of a caller's, which may be slow or know their neighbourhood alone, only where it matters, and a bit beside it.
+    pub(crate) fn new(field: &dyn Field, terms: &mut Terms, start: &[f64], zero: Vec<f64>) -> Self {
+        let zeros = || vec![0.0; start.len()];
+        let mut units = Self {
+            start: zeros(),
+            near: zeros(),
+            largest: (0.0, 0.0),
+            own: vec![],
+            unasked: vec![],
+            expressions: field.expressions().is_some(),
+        };
+        terms.look(field.pattern(), start, !units.expressions);
+        (units.start, units.largest.0) = terms.units(field.pattern());
+        units.own.clone_from(&terms.sizes);
+        if zero != start {
+            let beside =
+                |part: f64| zero.iter().zip(start).map(|(z, s)| z + part * (s - z)).collect();
+            units.unasked = if units.expressions { vec![zero] } else { NEAR.map(beside).to_vec() };
+        }
+        if units.expressions {
+            units.ask(field, terms);
+        }
+        units
+    }
+
+    /// Whether sizes near zero have to be asked for, since these are so small beside those of the start; `terms` are then of another point.
+    pub(crate) fn asked(&mut self, field: &dyn Field, terms: &mut Terms) -> bool {
+        let mut rows = terms.sizes.iter().zip(&self.start);
+        let matters = !self.unasked.is_empty() && rows.any(|(d, unit)| *d < VANISHING * unit);
+        if matters {
+            self.ask(field, terms);
+        }
+        matters
+    }
+
+    fn ask(&mut self, field: &dyn Field, terms: &mut Terms) {
+        let mut before: Option<Vec<f64>> = None;
+        for point in std::mem::take(&mut self.unasked) {
+            if !tentatively(|| terms.look(field.pattern(), &point, !self.expressions)) {
+                return;
+            }
+            if let Some(before) = before.replace(terms.sizes.clone()) {
+                let sizes = terms.sizes.iter_mut().zip(before);
+                sizes.filter(|(d, before)| **d < 0.5 * before).for_each(|(d, _)| *d = 0.0);
+            }
+        }
+        (self.near, self.largest.1) = terms.units(field.pattern());
+        // What neighbours hand on depends on the Jacobian there: it replaces no unit of the same kind.
+        let handed = self.near.iter_mut().zip(&self.own).filter(|(_, own)| **own == 0.0);
+        handed.for_each(|(near, _)| *near = 0.0);
+    }
+
+    /// ω of row i, whose terms have this size; whichever points were measured before, it is the same.
+    pub(crate) fn at(&self, i: usize, size: f64) -> (f64, f64) {
+        let matters = self.expressions || size < VANISHING * self.start[i];
+        (self.start[i], if matters { self.near[i] } else { 0.0 })
+    }
+
+    /// The size that terms of row i count at least.
+    pub(crate) fn least(&self, i: usize) -> f64 {
+        VANISHING * lesser(self.start[i], self.near[i])
+    }
+
+    /// As [`least`](Self::least), of the largest row.
+    pub(crate) fn least_of_all(&self) -> f64 {
+        VANISHING * lesser(self.largest.0, self.largest.1)
+    }
+}
