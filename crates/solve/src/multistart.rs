@@ -89,34 +89,3 @@ fn around(problem: &Mcp, spread: f64, random: &mut Pcg64Mcg) -> LcpPoint {
     };
     LcpPoint { z: origin.z.iter().enumerate().map(at).collect() }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nonsmooth_problem::planted::{ClassicName, NonlinearClassic};
-
-    #[test]
-    fn both_solutions_of_kojima_and_shindo_are_found() {
-        let classic = NonlinearClassic { name: ClassicName::KojimaShindo };
-        let problem = classic.mcp();
-        let found = multistart(&problem, &Solve::new().tolerance(1e-10), 30, 1).unwrap();
-        assert_eq!(found.solutions.len(), 2, "{:?}", found.solutions);
-        for known in classic.solutions() {
-            assert!(found.solutions.iter().any(|(one, _)| is_same(&one.point, &known)));
-        }
-        let again = multistart(&problem, &Solve::new().tolerance(1e-10), 30, 1).unwrap();
-        let points = |found: &Found| {
-            found.solutions.iter().map(|(one, _)| one.point.clone()).collect::<Vec<_>>()
-        };
-        assert_eq!(points(&found), points(&again));
-        let times: usize = found.solutions.iter().map(|(_, times)| times).sum();
-        assert!(times <= found.starts && found.starts == 30 && found.limit.is_none());
-    }
-
-    #[test]
-    fn the_time_is_for_all_starts_together() {
-        let problem = NonlinearClassic { name: ClassicName::Josephy }.mcp();
-        let found = multistart(&problem, &Solve::new().time_limit(0.0), 100, 1).unwrap();
-        assert!(found.starts <= 1 && found.limit == Some(Limit::Time), "{found:?}");
-    }
-}

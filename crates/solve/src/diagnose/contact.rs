@@ -435,18 +435,3 @@ impl<P: Seen<D> + Registered, const D: usize> Patient<'_, P, D> {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_family_that_is_asked_for_or_its_stand_in_is_registered() {
-        let known = registry::solver_names::<FrictionLocal<3>>();
-        for families in [RANK_DEFICIENT, REGULAR, ANY, &["no such family"]] {
-            for name in of_families::<FrictionLocal<3>>(families) {
-                assert!(known.iter().any(|k| k == name), "{name}");
-            }
-        }
-    }
-}

@@ -6,6 +6,7 @@ mod functions;
 mod guarantees;
 mod interior;
 mod lemke;
+mod multistart;
 mod newton;
 mod pivoting;
 mod presolve;

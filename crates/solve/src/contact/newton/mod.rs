@@ -21,8 +21,6 @@
 //! neighbourhood of convergence tiny: use a proximal method around it.
 
 mod scaling;
-#[cfg(test)]
-mod tests;
 
 use nonsmooth_linalg::{Block, budget, small};
 use schemars::JsonSchema;

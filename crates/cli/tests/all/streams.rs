@@ -1,0 +1,59 @@
+//! Pipes and signals.
+#![cfg(unix)]
+
+use std::fs::File;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use crate::common::{Folder, Run};
+
+#[test]
+fn a_reader_that_goes_away_is_no_catastrophe() {
+    let folder = Folder::with_problems();
+    let program = env!("CARGO_BIN_EXE_nonsmooth");
+    for command in ["list", "list --markdown", "gen", "--help", "info wall.hdf5 wall.hdf5 --json"] {
+        let script = format!("(sleep 0.1; {program} {command}) | true");
+        let run: Run =
+            Command::new("sh").args(["-c", &script]).current_dir(&folder).output().unwrap().into();
+        assert_eq!(run.stderr, "", "{command}");
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_is_reported() {
+    let folder = Folder::new();
+    let full = File::options().write(true).open("/dev/full").unwrap();
+    let output = folder.command().arg("list").stdout(full).output().unwrap();
+    Run::from(output).refused(&["standard output"]);
+}
+
+#[test]
+fn ctrl_c_returns_the_best_iterate() {
+    let folder = Folder::with_problems();
+    folder.run("gen wall --set rows=25 --set columns=12 --out hard.hdf5").exits(0);
+    // Sweeps approach the solution of a wall slowly and never see that they cannot come as near as this.
+    let solve = "solve hard.hdf5 wall.hdf5 --solver nsgs --tol 1e-15 --max-iter 1000000000 --json --out best/";
+    let child = folder
+        .command()
+        .args(solve.split(' '))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Long enough to have read the file and begun.
+    std::thread::sleep(Duration::from_millis(1500));
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    let run = Run::from(child.wait_with_output().unwrap()).exits(1);
+
+    // The second file is skipped.
+    let lines = run.json();
+    assert_eq!((lines.len(), &lines[0]["status"]), (1, &"cancelled".into()));
+    assert!(lines[0]["iterations"].as_u64() > Some(0));
+    let relative = lines[0]["residual"]["relative"].as_f64().unwrap();
+    assert!(relative < 0.5, "{relative}");
+    let checked = folder.run("check best/hard.hdf5 --tol 0.5 --json").exits(0).json();
+    assert_eq!(checked[0]["residual"], lines[0]["residual"]);
+    assert!(!folder.path("best/wall.hdf5").exists());
+}

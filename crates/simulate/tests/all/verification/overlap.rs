@@ -1,0 +1,83 @@
+//! Bodies that overlap: at the start, where they are refused or moved apart, and in the course of a run.
+
+use nonsmooth_scenes::Rotation;
+use nonsmooth_simulate::{
+    Body, MoreauJean, Shape, SimulateError, Simulation, StepStatus, World, plane,
+};
+use rand::{RngExt, SeedableRng};
+
+use crate::verification::{G, ball, check, near, simulation, weightless, world, x};
+
+#[test]
+fn two_balls_are_moved_apart_by_their_masses() {
+    // The smallest displacement in the norm of the masses: 3 to 1, and nothing more than the overlap.
+    let mut world = weightless(0.0, 0.0);
+    let light = world.add(ball(0.1).at([0.0; 3]));
+    let heavy = world.add(Body { mass: 3.0, ..ball(0.1) }.at([0.16, 0.0, 0.0]));
+    let refused = Simulation::new(world.clone(), MoreauJean::default()).err().unwrap();
+    assert!(
+        matches!(&refused, SimulateError::Overlap(pairs) if (pairs[0].depth - 0.04).abs() < 1e-15)
+    );
+    let (simulation, settled) = Simulation::settled(world, MoreauJean::default()).unwrap();
+    near(x(&simulation, light)[0], -0.03, 1e-7);
+    near(x(&simulation, heavy)[0], 0.17, 1e-7);
+    assert_eq!((settled.pairs, settled.rounds), (1, 1));
+    near(settled.depth, 0.04, 1e-15);
+    near(settled.moved, 0.03, 1e-7);
+    assert_eq!(simulation.state().velocity, [[0.0; 3]; 2]);
+}
+
+#[test]
+fn a_heap_of_solids_thrown_together_is_sorted_out() {
+    let mut rng = rand_pcg::Pcg64::seed_from_u64(6);
+    let mut world = world(0.4, 0.0);
+    world.add(Body::floor());
+    for k in 0..60 {
+        let shape = match k % 4 {
+            0 => Shape::Sphere { radius: 0.15 },
+            1 => Shape::Box { half: [0.15, 0.1, 0.12] },
+            2 => Shape::Capsule { half_length: 0.15, radius: 0.08 },
+            _ => Shape::Cylinder { half_length: 0.12, radius: 0.12 },
+        };
+        let mut any = |most: f64| rng.random_range(-most..most);
+        let turn = Rotation::about([any(1.0), any(1.0), any(1.0)], any(3.0));
+        let at = [any(0.5), any(0.5), 0.6 + any(0.6)];
+        world.add(Body::solid(shape, 1000.0).unwrap().turned(turn).at(at));
+    }
+    let (mut simulation, settled) = Simulation::settled(world, MoreauJean::default()).unwrap();
+    assert!(settled.pairs > 50 && settled.rounds < 50, "{settled:?}");
+    let report = simulation.run(0.05, 1e-3, &mut ()).unwrap();
+    assert!(report.is_solved() && report.deep == 0, "{report:?}");
+}
+
+#[test]
+fn what_has_no_room_stays_an_error() {
+    let mut world = World::new([0.0, 0.0, -G]);
+    world.add(Body::floor());
+    world.add(Body::fixed(vec![plane([0.0, 0.0, 0.15], [0.0, 0.0, -1.0]).unwrap()]));
+    world.add(ball(0.1).at([0.0, 0.0, 0.08]).named("marble"));
+    let error = Simulation::settled(world, MoreauJean::default()).err().unwrap().to_string();
+    assert!(
+        error.starts_with("bodies overlap at the start: ") && error.contains("`marble`"),
+        "{error}"
+    );
+}
+
+#[test]
+fn what_is_deep_inside_keeps_the_normal_that_it_had() {
+    let mut world = weightless(0.0, 0.0);
+    world.add(Body::fixed(vec![nonsmooth_simulate::Part::new(Shape::Sphere { radius: 1.0 })]));
+    let b = world.add(ball(0.5).at([0.0, 0.0, 1.5]));
+    let mut simulation = simulation(world);
+    let first = simulation.step(1e-3).unwrap();
+    assert_eq!((first.status.clone(), first.counts.deep), (StepStatus::Solved, 0));
+    // Through the centre of the other: the nearest way out would be downwards.
+    simulation.state_mut().position[b.index()] = [0.0, 0.0, -0.2];
+    simulation.state_mut().velocity[b.index()] = [0.0, 0.0, -1.0];
+    let report = simulation.run(2e-3, 1e-3, &mut ()).unwrap();
+    check(&report);
+    assert_eq!((report.deep, report.first_deep), (1, Some(2e-3)));
+    let contact = simulation.contacts()[0];
+    near(contact.frame[0][2], 1.0, 1e-12);
+    near(contact.impulse[0], 1.0, 1e-9);
+}

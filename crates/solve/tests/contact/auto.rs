@@ -1,0 +1,104 @@
+//! `auto` on contact problems: whatever start it is given.
+
+use nonsmooth_linalg::{Bsr, Csc};
+use nonsmooth_problem::planted::Planted;
+use nonsmooth_problem::{FrictionGlobal, FrictionLocal, LocalPoint, Problem};
+use nonsmooth_solve::registry::{Registered, session};
+use nonsmooth_solve::settings::SettingsMap;
+use nonsmooth_solve::{Limits, Outcome, Status};
+
+/// A solve by `auto` from a point, which it overwrites; and its account.
+fn solve<P: Registered>(problem: &P, point: &mut P::Point) -> (Outcome, String) {
+    let mut auto = session::<P>("auto", &SettingsMap::new()).unwrap();
+    let outcome = auto.solve(problem, point, &Limits::default(), &mut |_| {}).unwrap();
+    assert_eq!(outcome.status, Status::Solved);
+    (outcome, auto.account().join("; "))
+}
+
+/// From zero, from the solution, from near it, and from far away. `impulses` gives those of a point.
+fn starts<P: Registered>(problem: &P, impulses: fn(&mut P::Point) -> &mut Vec<f64>) {
+    let mut solution = problem.origin();
+    let (cold, account) = solve(problem, &mut solution);
+    assert!(cold.iterations > 0 && !account.contains("started"), "{account}");
+
+    let mut point = solution.clone();
+    let (outcome, account) = solve(problem, &mut point);
+    assert!(outcome.iterations <= 1 && account.contains("from the point given"), "{account}");
+
+    let mut near = solution.clone();
+    impulses(&mut near).iter_mut().for_each(|r| *r *= 1.0 + 1e-6);
+    let (outcome, account) = solve(problem, &mut near);
+    assert!(outcome.iterations <= cold.iterations && account.contains("point given"));
+
+    // Whatever comes is no worse than nothing: the same steps as from zero.
+    for far in [1e3, -1e3, 1e200] {
+        let mut point = solution.clone();
+        impulses(&mut point).iter_mut().enumerate().for_each(|(i, r)| *r += far * (i + 1) as f64);
+        let (outcome, account) = solve(problem, &mut point);
+        assert_eq!(outcome.iterations, cold.iterations, "{far:e}");
+        assert!(account.contains("started from zero"), "{account}");
+        assert_eq!(impulses(&mut point), impulses(&mut solution), "{far:e}");
+    }
+}
+
+#[test]
+fn a_start_is_taken_where_it_is_better_than_zero() {
+    let planted = Planted { contacts: 30, dofs: 100, seed: 4, ..Planted::default() };
+    let bilateral = Planted { bilateral: 2, ..planted };
+    starts::<FrictionLocal<3>>(&planted.local().0, |p| &mut p.r);
+    starts::<FrictionLocal<2>>(&bilateral.local().0, |p| &mut p.r);
+    starts::<FrictionGlobal<3>>(&bilateral.global().0, |p| &mut p.r);
+    starts::<FrictionGlobal<2>>(&planted.global().0, |p| &mut p.r);
+}
+
+#[test]
+fn contacts_that_came_and_went_are_no_reason_to_refuse_a_neighbours_impulses() {
+    for seed in 0..6 {
+        let case = Planted { contacts: 200, dofs: 700, seed, ..Planted::default() };
+        let (mut problem, _) = case.local::<3>();
+        let mut near = problem.origin();
+        solve(&problem, &mut near);
+        // The next step: loads that differ by a hundredth, and every twentieth contact is new.
+        problem.q.iter_mut().enumerate().for_each(|(i, q)| *q *= 1.0 + 0.01 * (i as f64).sin());
+        (0..200).step_by(20).for_each(|c| near.r[3 * c..3 * c + 3].fill(0.0));
+        let mut cold = problem.origin();
+        let (cold, _) = solve(&problem, &mut cold);
+        let (warm, account) = solve(&problem, &mut near);
+        assert!(account.contains("started from the point given"), "{seed}: {account}");
+        assert!(warm.iterations <= cold.iterations + 20, "{seed}: {account}");
+    }
+}
+
+#[test]
+fn of_several_solutions_the_one_given_stays() {
+    // Two contacts of one body at one place share their load as they like; a sweep from zero gives the first all of it.
+    let entries = (0..4).flat_map(|i| [(i, i % 2, 1.0), (i, i % 2 + 2, 1.0)]);
+    let w = Bsr::from_csc(&Csc::from_triplets(4, 4, entries).unwrap());
+    let problem = FrictionLocal::<2>::new(w, vec![-1.0, 0.0, -1.0, 0.0], vec![0.5, 0.5]).unwrap();
+    let mut point = problem.origin();
+    point.r.copy_from_slice(&[0.5, 0.0, 0.5, 0.0]);
+    solve(&problem, &mut point);
+    assert_eq!(point.r, [0.5, 0.0, 0.5, 0.0]);
+}
+
+#[test]
+fn sweeps_that_run_away_end_no_solve() {
+    // With this much friction Gauss–Seidel diverges, and a few dozen sweeps leave the range of numbers.
+    for dofs in [100, 200] {
+        let case = Planted { contacts: 200, dofs, mu: (2.0, 2.0), seed: 11, ..Planted::default() };
+        let (problem, _) = case.local::<3>();
+        let limits = Limits { max_iterations: 300, ..Limits::default() };
+        let mut auto = session("auto", &SettingsMap::new()).unwrap();
+        let outcome = auto.solve(&problem, &mut problem.origin(), &limits, &mut |_| {}).unwrap();
+        assert!(matches!(outcome.status, Status::Limit(_) | Status::Solved), "{outcome:?}");
+    }
+}
+
+#[test]
+fn a_problem_at_rest_without_impulses_refuses_every_start() {
+    let (mut problem, _) = Planted::default().local::<3>();
+    problem.q.fill(0.0);
+    let mut point = LocalPoint { r: vec![1.0; problem.q.len()], ..problem.origin() };
+    let (_, account) = solve(&problem, &mut point);
+    assert!(account.contains("started from zero") && point.r.iter().all(|r| *r == 0.0));
+}
