@@ -4,7 +4,7 @@ use nonsmooth_problem::check::Kinematic;
 
 use crate::contact::auto::Auto;
 use crate::contact::form::{
-    Concurrent, Disked, Explicit, Frictional, Linear, Linearised, OnContacts, Regularised,
+    Concurrent, Disked, Explicit, Frictional, Holding, Linear, Linearised, OnContacts, Regularised,
 };
 use crate::contact::interior::{ConvexRelaxation, Interior};
 use crate::contact::law::Rolling;
@@ -45,7 +45,14 @@ where
 /// The solvers of problems that can be seen by their contacts.
 pub fn solvers<P, const D: usize>() -> Vec<Entry<P>>
 where
-    P: Concurrent<D> + Frictional<D> + Linearised<D> + Explicit<D> + Kinematic<D> + 'static,
+    P: Concurrent<D>
+        + Frictional<D>
+        + Linearised<D>
+        + Explicit<D>
+        + Kinematic<D>
+        + Holding<D>
+        + Send
+        + 'static,
 {
     vec![
         on::<P, Auto, D>(),
@@ -77,7 +84,13 @@ where
 /// The solvers of problems with rolling friction: those whose method is any cone's, or any of disks. They see the problem in units of velocity ([`Weigh`]).
 pub fn rolling_solvers<P>() -> Vec<Entry<P>>
 where
-    P: Concurrent<5> + Disked<5, Law = Rolling> + Linearised<5> + Kinematic<5> + 'static,
+    P: Concurrent<5>
+        + Disked<5, Law = Rolling>
+        + Linearised<5>
+        + Kinematic<5>
+        + Holding<5>
+        + Send
+        + 'static,
     Weigh: Reformulation<P, To = P>,
 {
     let solvers = vec![

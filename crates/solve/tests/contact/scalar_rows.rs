@@ -233,3 +233,58 @@ fn a_single_constraint_is_solved() {
         assert!((point.lambda[0] + s / r).abs() <= 1e-15 * s.abs());
     }
 }
+
+/// Where sweeps are slow `auto` seeks the rows at their bounds as a set: as many rows as contacts, and impulses that are not unique.
+#[test]
+fn auto_seeks_the_rows_at_their_bounds() {
+    let mut searches = 0;
+    for seed in 0..12 {
+        let case = Planted {
+            contacts: [40, 10, 25][seed as usize % 3],
+            dofs: [60, 90][seed as usize % 2],
+            bilateral: [0, 4][seed as usize % 2],
+            bounded: [12, 20, 5][seed as usize % 3],
+            seed,
+            ..Planted::default()
+        };
+        let (global, _) = case.global::<3>();
+        let (local, _) = case.local::<2>();
+        for answer in [
+            Solve::new()
+                .tolerance(1e-10)
+                .max_iterations(2000)
+                .run(&global)
+                .map(|a| (a.status, a.account)),
+            Solve::new()
+                .tolerance(1e-10)
+                .max_iterations(2000)
+                .run(&local)
+                .map(|a| (a.status, a.account)),
+        ] {
+            let (status, account) = answer.unwrap();
+            assert_eq!(status, Status::Solved, "{case:?} {account:?}");
+            searches +=
+                usize::from(account.iter().any(|line| line.contains("rows at their bounds")));
+        }
+    }
+    assert!(searches > 4, "{searches}");
+}
+
+/// A row that its own impulse does not move, rows that say the same twice, and rows whose bounds are one number.
+#[test]
+fn rows_that_contradict_or_repeat_each_other_end_no_search() {
+    for seed in 0..6 {
+        let case = Planted { contacts: 20, dofs: 60, bounded: 6, seed, ..Planted::default() };
+        let (mut global, _) = case.global::<3>();
+        let rows = global.rows.as_mut().unwrap();
+        let twice = rows.G.triplets().flat_map(|(i, j, x)| [(i, j, x), (i, j + 6, x)]);
+        rows.G = Csc::from_triplets(rows.G.nrows(), 12, twice).unwrap();
+        rows.b.extend_from_within(..);
+        // Each of the pair may do half as much.
+        rows.bounds.lower.iter_mut().chain(&mut rows.bounds.upper).for_each(|x| *x *= 0.5);
+        rows.bounds.lower.extend_from_within(..);
+        rows.bounds.upper.extend_from_within(..);
+        let answer = Solve::new().tolerance(1e-9).max_iterations(20_000).run(&global).unwrap();
+        assert_eq!(answer.status, Status::Solved, "{seed} {:?}", answer.account);
+    }
+}

@@ -26,7 +26,8 @@
 //!     the existence of a solution is investigated, and a problem without one is given up with its certificate. That first time sweeps with
 //!     one projection a contact ([`Projection`]) are tried from zero: where exact ones circle, these may come near or end.
 //!
-//! A problem with scalar rows that have bounds stays with the sweeps, which visit them too: the later stages know no bounds.
+//! A problem with scalar rows that have bounds begins with sweeps, which visit them too. The later stages know no bounds; where sweeps promise little, those
+//! of the rows that are at their bounds are sought as a set ([`held`]), each time with all stages on the problem of the rest.
 //!
 //! A starting point is taken where a sweep from it ends no farther off than one from zero impulses; near a solution it makes stages 2 and 4 needless.
 //!
@@ -39,6 +40,7 @@
 
 mod alternating;
 mod controller;
+mod held;
 mod in_turn;
 mod proximal_newton;
 mod rate;
@@ -51,7 +53,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::auto::proximal_newton::ProximalNewton;
 use crate::contact::existence;
-use crate::contact::form::{Access, Blockwise, Costs, Disked, Linearised, OnContacts, has_bounds};
+use crate::contact::form::{
+    Access, Blockwise, Costs, Disked, Holding, Linearised, OnContacts, has_bounds,
+};
 use crate::contact::law::local::{LocalSolver, Projection};
 use crate::contact::parts::{Central, Pursuit, Sweep, put_within_bounds, sweep_rows};
 use crate::core::register::{About, Described, Solves};
@@ -59,6 +63,7 @@ use crate::core::settings::{Settings, described};
 use crate::{Limits, SolveError, Solver, Step};
 use alternating::Alternating;
 use controller::{Controller, Origin, Verdict};
+use held::Held;
 use in_turn::{Came, InTurn};
 use rate::Rate;
 use starts::Halvings;
@@ -90,7 +95,12 @@ impl Described for Auto {
         solves: Solves::Law,
         summary: "needs no setting: sweeps, a search for rest, interior point, proximal semismooth Newton, ADMM, each while it promises more than the next",
         needs: &[],
-        cites: &["AcaryBremondHuber2018", "AlartCurnier1991", "Acary2018"],
+        cites: &[
+            "AcaryBremondHuber2018",
+            "AlartCurnier1991",
+            "Acary2018",
+            "HintermullerItoKunisch2002",
+        ],
         variants: &["interior=false"],
         settings: described::<Self>,
     };
@@ -127,6 +137,9 @@ const TINY: usize = 24;
 const EARLY: usize = 20;
 /// Impulses that make velocities so many times those of the loads run away: it is time to ask for existence.
 const RUNAWAY: f64 = 1e7;
+/// With rows that have bounds sweeps go on while so few are left, and after a search for those at their bounds in vain until they are so many times as many.
+const SWEEPS_WITH_ROWS: f64 = 100.0;
+const AGAIN: usize = 10;
 /// An investigation of existence may take this long, in seconds.
 const INVESTIGATION: f64 = 2.0;
 
@@ -138,6 +151,9 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     sweep: Sweep<P::Law, D>,
     projected: Option<Box<Sweep<P::Law, D, Projection>>>,
     in_turn: Option<Box<InTurn<P::Law, D>>>,
+    held: Option<Box<Held<P, D>>>,
+    /// So many sweeps come before the next search for the rows at their bounds.
+    hold_after: usize,
     alternating: Option<Box<Alternating<D>>>,
     central: Option<Box<Central<P::Law, D>>>,
     pursuit: Option<Box<Pursuit<P::Law, D>>>,
@@ -184,6 +200,7 @@ enum Stage {
     InTurn,
     Pursuit { halvings: Halvings, most: usize },
     Alternating,
+    Held,
 }
 
 /// Where the solve began.
@@ -224,10 +241,12 @@ struct Done {
     /// How often, and how many iterations in all.
     alternations: usize,
     alternating: usize,
+    /// Searches for the rows at their bounds.
+    searches: usize,
     strategies: usize,
 }
 
-impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
+impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: usize> Solver<P>
     for OnContacts<Auto, D>
 {
     type Work = HybridWork<P, D>;
@@ -240,6 +259,8 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             sweep: Sweep::new(problem, &state),
             projected: None,
             in_turn: None,
+            held: None,
+            hold_after: FIRST_SWEEPS,
             alternating: None,
             central: None,
             pursuit: None,
@@ -302,6 +323,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
         (work.existence, work.exact, work.asked) = (None, None, false);
         (work.passed_by, work.rest_sought, work.spread) = (None, false, None);
         (work.turned, work.in_turn) = (false, None);
+        (work.held, work.hold_after) = (None, FIRST_SWEEPS);
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
@@ -321,6 +343,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
             Stage::InTurn => self.take_turns(problem, point, work),
             Stage::Pursuit { .. } => self.pursue(problem, point, work),
             Stage::Alternating => self.alternate(problem, point, work),
+            Stage::Held => self.hold(problem, point, work),
         }
     }
 
@@ -395,6 +418,15 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D>, const D: usize> Solver<P>
                 "motion and impulses in turn, {rounds} times, at last with {moving} of {bodies} bodies moving, to {:.1e}",
                 work.done.turned_error
             ));
+        }
+        if let Some(held) = &work.held {
+            let [sets, rows] = held.counts();
+            let inside = held.account(self);
+            lines.push(format!(
+                "{sets} sets of rows at their bounds, {rows} in the last; the rest: {inside}"
+            ));
+        } else if work.done.searches > 0 {
+            lines.push("rows at their bounds, sought in vain".into());
         }
         if work.done.strategies > 0 {
             lines.push(format!("{} changes of strategy", work.done.strategies));
@@ -476,7 +508,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     }
 
     /// Stage 1. `claims`: how often the sweeps thought that they had arrived.
-    fn sweep<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+    fn sweep<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send>(
         &self,
         problem: &P,
         point: &mut P::Point,
@@ -505,10 +537,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         work.rate.note(estimate);
         self.follow(problem, point, work, estimate);
         if work.bounded {
-            return match estimate.is_finite() || budget::over() {
-                true => Step::Continue { estimate },
-                false => Step::Stuck("sweeps send the impulses to infinity".into()),
-            };
+            return self.sweep_with_rows(problem, point, work, estimate);
         }
         if runs_away(estimate) && !budget::over() {
             // Where W is not positive semidefinite a sweep may send the impulses to infinity.
@@ -532,6 +561,67 @@ impl<const D: usize> OnContacts<Auto, D> {
             self.leave_sweeps(problem, point, work);
         }
         Step::Continue { estimate }
+    }
+
+    /// After sweeps over contacts and rows with bounds, whose last one moved so much.
+    fn sweep_with_rows<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        estimate: f64,
+    ) -> Step {
+        let lost = runs_away(estimate) && !budget::over();
+        let few = work.rate.left(work.tolerance) * (SWEEPS_A_STEP as f64) < SWEEPS_WITH_ROWS;
+        if lost {
+            if work.done.searches > 0 {
+                return Step::Stuck("sweeps send the impulses to infinity".into());
+            }
+            let (r, lambda) = P::all_impulses(point);
+            r.fill(0.0);
+            lambda.fill(0.0);
+            put_within_bounds(problem, point);
+        } else if work.done.sweeps < work.hold_after || few || estimate == 0.0 {
+            return Step::Continue { estimate };
+        }
+        work.done.searches += 1;
+        work.hold_after = AGAIN * work.done.sweeps;
+        problem.enter(&mut work.state, point);
+        if let Ok(held) = Held::begin(self, problem, &work.state, point, work.tolerance) {
+            work.held = Some(Box::new(held));
+            work.stage = Stage::Held;
+        }
+        Step::Continue { estimate }
+    }
+
+    /// Stage 11: a step on the problem without the rows at their bounds.
+    fn hold<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) -> Step {
+        let HybridWork { held, sweep, state, units: u, scale, tolerance, .. } = work;
+        let Some(held) = held else {
+            return starts::lost();
+        };
+        let residual = |state: &mut P::State, point: &mut P::Point| {
+            let r = P::impulses(point);
+            u.resize(r.len(), 0.0);
+            problem.velocities(state, r, u);
+            sweep.residual(u, r) / *scale
+        };
+        match held.step(self, problem, (state, point), (*tolerance, *scale), residual) {
+            held::Came::Further(estimate) => Step::Continue { estimate },
+            held::Came::End => {
+                work.held = None;
+                put_within_bounds(problem, point);
+                problem.enter(&mut work.state, point);
+                work.stage = FIRST;
+                work.rate.begin();
+                Step::Continue { estimate: f64::NAN }
+            }
+        }
     }
 
     /// After sweeps whose last one moved so much: the contacts that still move, where they are few.

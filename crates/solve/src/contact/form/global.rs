@@ -10,12 +10,12 @@ use nonsmooth_linalg::{
     Block, Bsr, Compensated, Csc, Delassus, Inverse, Passes, Refine, Singular, norm_or_one, small,
 };
 use nonsmooth_problem::check::Impulses;
-use nonsmooth_problem::{Bounds, Dynamics, FrictionGlobal, GlobalPoint};
+use nonsmooth_problem::{Bounds, Dynamics, FrictionGlobal, GlobalPoint, RowsGlobal};
 
 use super::linearised::{BodyForm, ContactForm, Form, Once, System, made, there, unaffordable};
 use super::{
-    Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Linear, Linearised, MANY, Rows,
-    Visits,
+    Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Holding, Linear, Linearised, MANY,
+    Rows, Visits, held_and_left,
 };
 use crate::SolveError;
 use crate::contact::law::DiskLaw;
@@ -266,6 +266,18 @@ impl<const D: usize, L: DiskLaw<D>> Rows<D> for FrictionGlobal<D, L> {
     fn row_moved(&self, state: &mut Self::State, j: usize, by: f64) {
         let GlobalState { rows, y, .. } = state;
         rows[j].iter().flat_map(|row| &row.velocities).for_each(|&(i, x)| y[i] += by * x);
+    }
+}
+
+impl<const D: usize, L: DiskLaw<D>> Holding<D> for FrictionGlobal<D, L> {
+    fn holding(&self, held: &[Option<f64>]) -> Self {
+        let Some(b) = &self.rows else { return self.clone() };
+        let (loads, left) = held_and_left(held);
+        let mut f = self.f.clone();
+        b.G.mul_add(1.0, &loads, &mut f);
+        let given = left.iter().map(|&j| b.b[j]).collect();
+        let rows = RowsGlobal::bilateral(b.G.columns(&left), given);
+        Self { f, rows: (!left.is_empty()).then_some(rows), ..self.clone() }
     }
 }
 

@@ -9,9 +9,12 @@ use nonsmooth_linalg::{
 use nonsmooth_problem::check::{Impulses, Kinematic};
 use nonsmooth_problem::{Bounds, FrictionLocal, LocalPoint, RowsLocal};
 
+use super::held_and_left;
 use super::linearised::{ContactForm, Form, Once, System, made, there, unaffordable};
 use super::rows::Bounded;
-use super::{Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Linear, Linearised, Rows};
+use super::{
+    Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Holding, Linear, Linearised, Rows,
+};
 use crate::SolveError;
 use crate::contact::law::DiskLaw;
 
@@ -264,6 +267,20 @@ impl<const D: usize, L: DiskLaw<D>> Rows<D> for FrictionLocal<D, L> {
         let Some(Eliminated { q, bounded: Some(rows), .. }) = &mut state.eliminated else { return };
         let (at, values) = rows.effect.column(j);
         at.iter().zip(values).for_each(|(&i, v)| q[i] += by * v);
+    }
+}
+
+impl<const D: usize, L: DiskLaw<D>> Holding<D> for FrictionLocal<D, L> {
+    fn holding(&self, held: &[Option<f64>]) -> Self {
+        let Some(b) = &self.rows else { return self.clone() };
+        let (loads, left) = held_and_left(held);
+        let (mut q, mut s) = (self.q.clone(), b.s.clone());
+        b.V.mul_add(1.0, &loads, &mut q);
+        b.R.mul_add(1.0, &loads, &mut s);
+        let own = b.R.columns(&left).transpose().columns(&left).transpose();
+        let s = left.iter().map(|&j| s[j]).collect();
+        let rows = RowsLocal::bilateral(b.V.columns(&left), own, s);
+        Self { q, rows: (!left.is_empty()).then_some(rows), ..self.clone() }
     }
 }
 

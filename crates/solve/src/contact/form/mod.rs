@@ -137,6 +137,18 @@ pub trait Rows<const D: usize>: Contacts<D> {
     fn row_moved(&self, state: &mut Self::State, j: usize, by: f64);
 }
 
+/// Rows whose impulses are held.
+pub trait Holding<const D: usize>: Rows<D> + Sized {
+    /// The problem without the rows that are `held`, whose impulses are loads of it; the others, in their order, have no bounds there.
+    fn holding(&self, held: &[Option<f64>]) -> Self;
+}
+
+/// The impulses of the rows that are held, zero of the others, and the places of the latter.
+fn held_and_left(held: &[Option<f64>]) -> (Vec<f64>, Vec<usize>) {
+    let loads = held.iter().map(|x| x.unwrap_or(0.0)).collect();
+    (loads, (0..held.len()).filter(|&j| held[j].is_none()).collect())
+}
+
 /// Whether the problem has rows with bounds.
 pub fn has_bounds<P: Rows<D>, const D: usize>(problem: &P) -> bool {
     problem.bounds().is_some_and(|bounds| !bounds.are_free())
