@@ -112,8 +112,8 @@ class Auto(Settings):
         The iterations of a projection method in its first turn; four times as many in each that
         follows.
 
-    References: AcaryBremondHuber2018, AlartCurnier1991, Acary2018, CottlePangStone2009,
-    FacchineiPang2003, Munson2002.
+    References: AcaryBremondHuber2018, AlartCurnier1991, Acary2018, HintermullerItoKunisch2002,
+    CottlePangStone2009, FacchineiPang2003, Munson2002.
     """
 
     def __init__(

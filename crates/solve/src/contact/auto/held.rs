@@ -17,6 +17,8 @@ use nonsmooth_problem::check::Kinematic;
 
 /// Rows are asked where the contacts are so near to their law, relative to the loads, or at the tolerance.
 const SETTLED: f64 = 1e-6;
+/// After so many steps rows are asked wherever the contacts are: with the wrong rows let go there may be no solution.
+const PATIENCE: usize = 40;
 /// A row asks for another place where it misses the law by more than this part of the tolerance.
 const MISSED: f64 = 0.1;
 /// So many sets are tried; each is remembered.
@@ -30,8 +32,9 @@ pub(super) struct Held<P: Linearised<D> + Disked<D>, const D: usize> {
     /// The impulse of each row that is held.
     held: Vec<Option<f64>>,
     tried: Vec<Vec<Option<f64>>>,
-    /// Steps since the rest was looked at.
+    /// Steps since the rest was looked at, and since it was begun.
     since: usize,
+    steps: usize,
 }
 
 /// What a step came to.
@@ -59,7 +62,8 @@ where
         let mut work = method.work(&inner)?;
         method.aim(tolerance, &mut work);
         let origin = inner.origin();
-        let mut this = Self { problem: inner, point: origin, work, held, tried: vec![], since: 0 };
+        let mut this =
+            Self { problem: inner, point: origin, work, held, tried: vec![], since: 0, steps: 0 };
         this.start(method, point);
         Ok(this)
     }
@@ -67,7 +71,7 @@ where
     /// Begins to solve the rest, from the impulses of a point of the whole.
     fn start(&mut self, method: &OnContacts<Auto, D>, whole: &mut P::Point) {
         self.tried.push(self.held.clone());
-        self.since = 0;
+        (self.since, self.steps) = (0, 0);
         self.point = self.problem.origin();
         let (r, lambda) = P::all_impulses(whole);
         let (own, multipliers) = P::all_impulses(&mut self.point);
@@ -88,6 +92,7 @@ where
     ) -> Came {
         let step = method.step(&self.problem, &mut self.point, &mut self.work);
         self.since += 1;
+        self.steps += 1;
         match step {
             Step::Continue { .. } if self.since < method.check_every(&self.work) => {
                 return Came::Further(f64::NAN);
@@ -100,7 +105,8 @@ where
         self.lift(problem, whole);
         problem.enter(state, whole);
         let error = residual(state, whole);
-        if error.is_nan() || error > SETTLED.max(tolerance) {
+        let settled = error <= SETTLED.max(tolerance);
+        if !settled && self.steps < PATIENCE {
             return Came::Further(error);
         }
         let slack = MISSED * tolerance * scale;
@@ -154,7 +160,7 @@ where
     }
 }
 
-/// The impulse at which each row is to be held, by its impulse and velocity at a point; a row stays as it is `held` where it misses the law by no more than `slack`, a velocity.
+/// The impulse at which each row is to be held, by its impulse and velocity at a point; a row stays as it is `held` where it misses the law, or moves where it is let go, by no more than `slack`, a velocity.
 fn places<P: Linearised<D> + Disked<D>, const D: usize>(
     problem: &P,
     state: &P::State,
@@ -172,8 +178,10 @@ fn places<P: Linearised<D> + Disked<D>, const D: usize>(
         places[j] = if w <= 0.0 {
             // Nothing that it does moves it.
             Some(lambda[j])
-        } else if held.is_some() && bounds.residual(j, lambda[j], c, w).abs() <= slack {
-            held.and_then(|held| held[j])
+        } else if let Some(held) = held
+            && held[j].map_or(c, |_| bounds.residual(j, lambda[j], c, w)).abs() <= slack
+        {
+            held[j]
         } else {
             let aim = lambda[j] - c / w;
             if aim <= l {
