@@ -34,6 +34,9 @@ pub fn run(
         let (file, kind) = (file.display(), content.problem.kind().name());
         return Err(format!("{file}: --multistart: expected a problem mcp, found {kind}"));
     };
+    if starts.number == 0 {
+        return Err("--multistart: expected at least 1 start, found 0".into());
+    }
     let how =
         Solve::new().solver(starts.solver).settings(starts.settings.clone()).limits(limits.clone());
     let found = multistart(problem, &how, starts.number, starts.seed)

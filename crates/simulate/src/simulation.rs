@@ -209,6 +209,8 @@ impl Simulation {
             warnings,
         };
         simulation.remember_joints();
+        let Self { world, state, tools, warnings, .. } = &mut simulation;
+        warnings.extend(tools.joints.violated(world, state));
         if let Some((found, all)) = simulation.tools.joints.redundant {
             simulation.warnings.push(format!(
                 "{found} of {all} equations of joints are redundant: the motion is unique, the impulses of these joints are not"
@@ -308,7 +310,7 @@ impl Simulation {
         &mut self.state
     }
 
-    /// What was changed in the world to make it valid, in words.
+    /// What is to be said of the world: what was changed to make it valid, and what may surprise.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }

@@ -469,28 +469,28 @@ impl World {
             require(|| format!("{key}.e"), e, e == 0.0, "0 where contacts have a compliance")?;
         }
         for (k, body) in self.bodies.iter_mut().enumerate() {
-            let key = match body.name.as_str() {
-                "" => format!("bodies[{k}]"),
-                name => format!("bodies[{k}] ({name})"),
-            };
-            body.validate(&key, count, &mut said)?;
+            body.validate(&entry("bodies", k, &body.name), count, &mut said)?;
         }
-        let key = |list: &str, k: usize, name: &str| match name {
-            "" => format!("{list}[{k}]"),
-            name => format!("{list}[{k}] ({name})"),
-        };
         for (k, solid) in self.elastic.iter().enumerate() {
-            solid.validate(&key("elastic", k, &solid.name), self)?;
+            solid.validate(&entry("elastic", k, &solid.name), self)?;
         }
         for (k, joint) in self.joints.iter().enumerate() {
-            joint.validate(&key("joints", k, &joint.name), self)?;
+            joint.validate(&entry("joints", k, &joint.name), self)?;
         }
         for (k, coupling) in self.couplings.iter().enumerate() {
-            coupling.validate(&key("couplings", k, &coupling.name), self)?;
+            coupling.validate(&entry("couplings", k, &coupling.name), self)?;
         }
         planar::validate(self)?;
         Periodic::validate(self)?;
         Ok(said)
+    }
+}
+
+/// The place of an entry in messages, with its name if it has one.
+pub(crate) fn entry(list: &str, k: usize, name: &str) -> String {
+    match name {
+        "" => format!("{list}[{k}]"),
+        name => format!("{list}[{k}] ({name})"),
     }
 }
 

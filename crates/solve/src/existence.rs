@@ -16,7 +16,7 @@ use nonsmooth_problem::{AnyPoint, AnyProblem, Complementarity, Friction, Problem
 use crate::contact::existence as criterion;
 use crate::core::exact_cones::{ExactCones, Found, is_representable};
 use crate::core::guard;
-use crate::{Limits, Solve, Status};
+use crate::{Limit, Limits, Solve, Status};
 
 pub use crate::contact::existence::{decide, glance, glance_at};
 
@@ -79,10 +79,18 @@ fn decided(linear: &Complementarity, known: Option<Classes>, limits: &Limits) ->
         Limits { time_limit, tolerance: ENOUGH, trace: false, ..limits.clone() }
     };
     let mut nearly = None;
-    if let Ok(answer) = Solve::new().limits(left(0.5)).run(&problem) {
-        match answer.status {
-            Status::Infeasible(proof) => return Existence::NoSolution { proof },
+    let mut start = None;
+    // Half of the time is for what follows; where nothing follows, the rest is for the solver too.
+    for share in [0.5, 1.0] {
+        let how = Solve::new().limits(left(share));
+        let how = start.iter().fold(how, |how, point| how.warm::<AnyPoint>(point));
+        let Ok(answer) = how.run(&problem) else { break };
+        match &answer.status {
+            Status::Infeasible(proof) => {
+                return Existence::NoSolution { proof: proof.clone() };
+            }
             Status::NearlyInfeasible { certificate, change } => {
+                let (certificate, change) = (certificate.clone(), *change);
                 nearly = Some(Existence::NearlyNoSolution { certificate, change });
             }
             _ if answer.verdict.measure.passes(ENOUGH) => {
@@ -92,9 +100,14 @@ fn decided(linear: &Complementarity, known: Option<Classes>, limits: &Limits) ->
             _ => {}
         }
         let near = || exactly(&problem, Some(&unknowns(&answer.point)));
-        if let Some(decided) = near().or_else(|| exactly(&problem, None)) {
+        let cases = || if start.is_none() { exactly(&problem, None) } else { None };
+        if let Some(decided) = near().or_else(cases) {
             return decided;
         }
+        if answer.status != Status::Limit(Limit::Time) {
+            break;
+        }
+        start = Some(answer.point);
     }
     match (nearly, limits.reached(begun)) {
         (Some(nearly), _) => nearly,

@@ -203,6 +203,10 @@ fn variational_inequalities_go_through_all_commands() {
         );
     }
     folder.run("solve made.toml --multistart 3").refused(&["--multistart", "found vi"]);
+    folder.run("gen ncp_classic --set name=josephy --out josephy.toml").exits(0);
+    folder
+        .run("solve josephy.toml --multistart 0")
+        .refused(&["--multistart: expected at least 1 start, found 0"]);
 }
 
 #[test]

@@ -12,11 +12,11 @@
 use nonsmooth_scenes::vec3::{Vec3, apply, cross, dot, norm, scale, sub};
 
 use super::equations::{Equation, Linkage, Placed, Reach, coupled};
-use super::{Coordinate, Drive, JointId, JointReport, Motor, Spring};
+use super::{Coordinate, Drive, JointId, JointLimits, JointReport, Motor, Spring};
 use crate::moving::Moving;
 use crate::rotation::Pose;
 use crate::state::State;
-use crate::world::oscillation;
+use crate::world::{entry, oscillation};
 use crate::{Activation, MoreauJean, Motion, World};
 
 /// What a row does to a free body, and the rates that its velocities make.
@@ -162,25 +162,50 @@ impl Joints {
         }
     }
 
+    /// Each drive with limits: its joint, where it stands, and the unit in which that is measured, one radian or the size of the joint.
+    fn limited<'a>(
+        &'a self,
+        world: &'a World,
+        state: &State,
+    ) -> impl Iterator<Item = (usize, &'a Drive, JointLimits, f64, f64)> + 'a {
+        let any = world.joints.iter().flat_map(|j| &j.drives).any(|d| d.limits.is_some());
+        let coordinates = match any {
+            true => self.coordinates(state, |k| state.pose(k as usize)),
+            false => vec![],
+        };
+        coordinates.into_iter().enumerate().flat_map(move |(j, [angle, slide])| {
+            let limited = world.joints[j].drives.iter().filter_map(|d| Some((d, d.limits?)));
+            limited.map(move |(drive, limits)| match drive.coordinate {
+                Coordinate::Angle => (j, drive, limits, angle, 1.0),
+                Coordinate::Slide => {
+                    (j, drive, limits, slide, self.linkages[j].size().max(f64::MIN_POSITIVE))
+                }
+            })
+        })
+    }
+
     /// The most by which a limit is violated, as a share of one radian or of the size of its joint.
     pub fn overshoot(&self, world: &World, state: &State) -> f64 {
-        let limited = |j: &crate::Joint| j.drives.iter().any(|d| d.limits.is_some());
-        if !world.joints.iter().any(limited) {
-            return 0.0;
-        }
-        let coordinates = self.coordinates(state, |k| state.pose(k as usize));
-        let mut worst: f64 = 0.0;
-        for (j, joint) in world.joints.iter().enumerate() {
-            let [angle, slide] = coordinates[j];
-            for (drive, limits) in joint.drives.iter().filter_map(|d| Some((d, d.limits?))) {
-                let (s, unit) = match drive.coordinate {
-                    Coordinate::Angle => (angle, 1.0),
-                    Coordinate::Slide => (slide, self.linkages[j].size().max(f64::MIN_POSITIVE)),
-                };
-                worst = worst.max((limits.lower - s).max(s - limits.upper) / unit);
-            }
-        }
-        worst
+        self.limited(world, state).fold(0.0, |worst, (_, _, limits, s, unit)| {
+            f64::max(worst, (limits.lower - s).max(s - limits.upper) / unit)
+        })
+    }
+
+    /// What is to be said of limits that are violated before the first step, by more than rounding.
+    pub fn violated(&self, world: &World, state: &State) -> Vec<String> {
+        let beyond = self.limited(world, state).filter(|(_, _, limits, s, unit)| {
+            (limits.lower - s).max(s - limits.upper) > 1e-9 * unit
+        });
+        let said = beyond.map(|(j, drive, limits, s, _)| {
+            let place = entry("joints", j, &world.joints[j].name);
+            let JointLimits { lower, upper, .. } = limits;
+            let (what, unit) = match drive.coordinate {
+                Coordinate::Angle => ("angle", "rad"),
+                Coordinate::Slide => ("slide", "m"),
+            };
+            format!("{place}: begins beyond its limits: {what} {s:.4} {unit}, limits [{lower}, {upper}]: it will not go farther")
+        });
+        said.collect()
     }
 
     /// Makes rows of limits close what a limit is violated by in a step of length h.

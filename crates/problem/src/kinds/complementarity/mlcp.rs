@@ -83,8 +83,9 @@ impl Mlcp {
                 .then_some(())
                 .ok_or_else(|| ProblemError::value(name, expected(), value))
         };
-        most("equalities", "rows", *equalities, M.nrows())?;
+        // Where one number stands for both, of a square matrix, it is that of the free variables.
         most("free", "columns", *free, M.ncols())?;
+        most("equalities", "rows", *equalities, M.nrows())?;
         let pairs = M.nrows() - equalities;
         if (M.nrows(), M.ncols()) != (equalities + pairs, free + pairs) {
             let meaning = format!("{equalities} equalities, {free} free variables, {pairs} pairs");

@@ -187,6 +187,28 @@ fn redundant_equations_are_said() {
 }
 
 #[test]
+fn limits_that_are_violated_at_the_start_are_said() {
+    let begun = |lower: f64, upper: f64| {
+        let mut world = World::new([0.0, 0.0, -G]);
+        let flap = world.add(crate::verification::block([0.5, 0.2, 0.05]).at([0.5, 0.0, 0.3]));
+        let limits = Some(JointLimits { lower, upper, e: 0.0 });
+        let drive = Drive { limits, ..Drive::along(Coordinate::Angle) };
+        let hinge = Joint::revolute(None, flap, [0.0, 0.0, 0.3], Y);
+        world.join(Joint { name: "hinge".into(), drives: vec![drive], ..hinge });
+        simulation(world).warnings().join("\n")
+    };
+    let said = begun(0.25, 1.0);
+    assert!(
+        said.contains(
+            "joints[0] (hinge): begins beyond its limits: angle 0.0000 rad, limits [0.25, 1]"
+        ),
+        "{said}"
+    );
+    assert_eq!(begun(0.0, 1.0), "");
+    assert_eq!(begun(-1.0, 0.0), "");
+}
+
+#[test]
 fn a_nut_runs_down_a_screw() {
     let (m, j, pitch) = (2.0, 0.03, 0.05);
     let mut world = World::new([0.0, 0.0, -G]);
