@@ -20,7 +20,7 @@ use nonsmooth_solve::settings::{SettingsMap, from_texts};
 use nonsmooth_solve::{Limit, Limits, Status, existence};
 
 /// Seconds that a solve may take, and after which it is cancelled.
-const LIMIT: f64 = 0.4;
+const LIMIT: f64 = 0.25;
 const CANCEL: f64 = 0.2;
 
 /// One test at a time.
