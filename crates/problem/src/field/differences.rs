@@ -154,7 +154,7 @@ impl Evaluator for Running {
     }
 
     fn jacobian(&mut self, x: &[f64], f: &mut [f64], jacobian: &mut [f64]) -> bool {
-        if !self.value(x, f) {
+        if budget::over() || !self.value(x, f) {
             return false;
         }
         let Self { field, y, sides } = self;

@@ -1,5 +1,6 @@
 //! F at a point and the sizes of its rows' terms, as the judges of nonlinear problems measure them.
 
+use nonsmooth_linalg::budget;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
@@ -25,6 +26,9 @@ pub(crate) struct Terms {
     pub(crate) sizes: Vec<f64>,
     /// Whether there is a Jacobian.
     pub(crate) smooth: bool,
+    /// The point last looked at, and whether precisely: it is not asked twice, for a caller's F may take its time. Empty where F was not defined, or the time was over.
+    at: Vec<f64>,
+    exactly: bool,
     moved: [Vec<f64>; 3],
 }
 
@@ -37,24 +41,31 @@ impl Terms {
             jacobian: vec![0.0; field.pattern().len()],
             sizes: zeros(),
             smooth: false,
+            at: vec![],
+            exactly: false,
             moved: [zeros(), zeros(), zeros()],
         }
     }
 
     /// Looks at x; `precisely` F is evaluated as exactly as it can be, and a Jacobian that says the sizes is held against F. False where F is not defined.
     pub(crate) fn look(&mut self, pattern: &Pattern, x: &[f64], precisely: bool) -> bool {
+        if self.at == x && (self.exactly || !precisely) {
+            return true;
+        }
+        self.at.clear();
         let Self { field, f, jacobian, sizes, smooth, .. } = self;
         *smooth = field.jacobian(x, f, jacobian);
-        let defined = match (precisely, *smooth) {
-            (true, _) => field.precisely(x, f),
-            (false, true) => true,
+        let known = field.sizes(x, sizes);
+        // Who does not know the terms has no better value of F either.
+        let defined = match (*smooth, precisely && known) {
+            (_, true) => field.precisely(x, f),
+            (true, false) => true,
             (false, false) => field.value(x, f),
         };
         if !defined || f.iter().any(|f| !f.is_finite()) {
             sizes.fill(0.0);
             return false;
         }
-        let known = field.sizes(x, sizes);
         for (i, size) in sizes.iter_mut().enumerate() {
             if !known {
                 let terms = || jacobian[pattern.range(i)].iter().zip(pattern.row(i));
@@ -66,6 +77,10 @@ impl Terms {
         }
         if precisely && *smooth && !known {
             self.distrust(pattern, x);
+        }
+        if !budget::over() {
+            self.at.extend_from_slice(x);
+            self.exactly = precisely;
         }
         true
     }
@@ -81,6 +96,9 @@ impl Terms {
     ///
     /// `|F_i(x ± h d) − F_i(x) ∓ h Σ_j J_ij d_j| > h Σ_j |J_ij x_j| / 10` on both sides (at kinks one is enough), for d_j of random sign between `|x_j|/2` and `|x_j|`. Two values of F.
     fn distrust(&mut self, pattern: &Pattern, x: &[f64]) {
+        if budget::over() {
+            return;
+        }
         let Self { field, f, jacobian, sizes, moved: [y, up, down], .. } = self;
         let mut random = Pcg64::seed_from_u64(1);
         let signed =

@@ -182,3 +182,26 @@ fn a_start_makes_no_error_small() {
     let problem = Mcp::new(field, vec![-free; 2], vec![free; 2], vec![1.0; 2]).unwrap();
     assert!(problem.judge(&LcpPoint { z: vec![1e-7; 2] }, 1e-8).unwrap().solved);
 }
+
+#[test]
+fn a_point_is_asked_once() {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    let asked = Arc::new(AtomicUsize::new(0));
+    let counter = asked.clone();
+    let value = move |x: &[f64], f: &mut [f64]| {
+        counter.fetch_add(1, Ordering::Relaxed);
+        f.copy_from_slice(&[x[0] * x[0] - 2.0 + x[1], x[1] + x[0]]);
+    };
+    let field = crate::field::Differences::new(crate::field::Pattern::dense(2), value).unwrap();
+    let problem = Mcp::ncp(field, vec![1.0; 2]).unwrap();
+    let mut gauge = problem.gauge().unwrap();
+    let point = LcpPoint { z: vec![2.0, 0.5] };
+    let before = asked.load(Ordering::Relaxed);
+    let certified = problem.certify(&point, &mut gauge);
+    // F, two sides of two columns, and two values that the Jacobian is held against.
+    assert_eq!(asked.load(Ordering::Relaxed) - before, 7);
+    assert_eq!(problem.measure(&point, &mut gauge).relative, certified.relative);
+    assert_eq!(problem.certify(&point, &mut gauge).relative, certified.relative);
+    assert_eq!(asked.load(Ordering::Relaxed) - before, 7);
+}
