@@ -423,7 +423,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             let [sets, rows] = held.counts();
             let inside = held.account(self);
             lines.push(format!(
-                "{sets} sets of rows at their bounds, {rows} in the last; the rest: {inside}"
+                "rows at their bounds: {rows}, in set {sets} that was tried; the rest: {inside}"
             ));
         } else if work.done.searches > 0 {
             lines.push("rows at their bounds, sought in vain".into());
