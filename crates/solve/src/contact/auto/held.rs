@@ -1,4 +1,4 @@
-//! The rows at their bounds, sought as a set: stage 11 of `auto`.
+//! The rows at their bounds, sought as a set.
 //!
 //! Problem: contacts, and rows `c_j` with `−c_j ∈ N_[l_j, u_j](λ_j)`.
 //!

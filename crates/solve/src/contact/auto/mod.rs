@@ -594,7 +594,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         Step::Continue { estimate }
     }
 
-    /// Stage 11: a step on the problem without the rows at their bounds.
+    /// A step on the problem without the rows at their bounds.
     fn hold<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send>(
         &self,
         problem: &P,

@@ -29,7 +29,7 @@ pub(crate) struct Terms {
     /// The point last looked at, and whether precisely: it is not asked twice, for a caller's F may take its time. Empty where F was not defined, or the time was over.
     at: Vec<f64>,
     exactly: bool,
-    moved: [Vec<f64>; 3],
+    moved: [Vec<f64>; 4],
 }
 
 impl Terms {
@@ -43,7 +43,7 @@ impl Terms {
             smooth: false,
             at: vec![],
             exactly: false,
-            moved: [zeros(), zeros(), zeros()],
+            moved: [zeros(), zeros(), zeros(), zeros()],
         }
     }
 
@@ -99,13 +99,13 @@ impl Terms {
         if budget::over() {
             return;
         }
-        let Self { field, f, jacobian, sizes, moved: [y, up, down], .. } = self;
+        let Self { field, f, jacobian, sizes, moved: [y, up, down, d], .. } = self;
         let mut random = Pcg64::seed_from_u64(1);
-        let signed =
-            |x: &f64| x * random.random_range(0.5..1.0) * if random.random() { 1.0 } else { -1.0 };
-        let d: Vec<f64> = x.iter().map(signed).collect();
+        for (d, x) in d.iter_mut().zip(x) {
+            *d = x * random.random_range(0.5..1.0) * if random.random() { 1.0 } else { -1.0 };
+        }
         let mut side = |h: f64, there: &mut Vec<f64>| {
-            y.iter_mut().zip(x).zip(&d).for_each(|((y, x), d)| *y = x + h * d);
+            y.iter_mut().zip(x).zip(&*d).for_each(|((y, x), d)| *y = x + h * d);
             tentatively(|| field.value(y, there));
         };
         side(STEP, up);
@@ -189,6 +189,8 @@ impl Units {
             }
         }
         (self.near, self.largest.1) = terms.units(field.pattern());
+        // These are no sizes of that point any more.
+        terms.at.clear();
         // What neighbours hand on depends on the Jacobian there: it replaces no unit of the same kind.
         let handed = self.near.iter_mut().zip(&self.own).filter(|(_, own)| **own == 0.0);
         handed.for_each(|(near, _)| *near = 0.0);
