@@ -342,16 +342,32 @@ where
     P: Registered + Judged,
 {
     let tolerance = limits.tolerance;
+    let alone = || Verdict {
+        measure: outcome.measure,
+        solved: outcome.measure.passes(tolerance),
+        counts: P::Counts::default(),
+        statuses: vec![],
+        velocity: problem.partner(point),
+        worst: vec![],
+    };
     let small = problem.unknowns() <= guard::SMALL;
     let unlimited = limits.time_limit.is_none() && limits.cancel.is_none();
+    let over = || limits.reached(begun).is_some();
+    // Nobody knows how long a caller's functions take.
+    let scope = (problem.asks_functions() && !unlimited).then(|| limits.budget(begun).enter());
+    if scope.is_some() && over() {
+        return Ok(alone());
+    }
     // Where a limit has passed, nobody waits for a verdict on a large problem.
-    if (small || limits.reached(begun).is_none())
+    if (small || !over())
         && let Some(gauge) = session.gauge()
     {
-        return Ok(problem.verdict(point, gauge, tolerance));
+        let whole = problem.verdict(point, gauge, tolerance);
+        return Ok(if scope.is_some_and(|scope| scope.raised()) { alone() } else { whole });
     }
     if small || unlimited {
-        return Ok(problem.judge(point, tolerance)?);
+        let whole = problem.judge(point, tolerance)?;
+        return Ok(if scope.is_some_and(|scope| scope.raised()) { alone() } else { whole });
     }
     let spent = begun.elapsed().as_secs_f64();
     let left = limits.time_limit.map(|t| (t - spent).max(0.0));
@@ -359,13 +375,6 @@ where
     let copy = (problem.clone(), point.clone());
     match guard::run(&left, || {}, move |_| copy.0.judge(&copy.1, tolerance)) {
         Ok(verdict) => Ok(verdict?),
-        Err(Limit::Time | Limit::Cancelled | Limit::Iterations) => Ok(Verdict {
-            measure: outcome.measure,
-            solved: outcome.measure.passes(tolerance),
-            counts: P::Counts::default(),
-            statuses: vec![],
-            velocity: problem.partner(point),
-            worst: vec![],
-        }),
+        Err(Limit::Time | Limit::Cancelled | Limit::Iterations) => Ok(alone()),
     }
 }
