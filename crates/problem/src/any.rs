@@ -206,10 +206,6 @@ impl Problem for AnyProblem {
         with_problem!(self, p => p.unknowns())
     }
 
-    fn asks_functions(&self) -> bool {
-        with_problem!(self, p => p.asks_functions())
-    }
-
     fn origin(&self) -> AnyPoint {
         with_problem!(self, p => p.origin().into())
     }

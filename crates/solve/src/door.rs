@@ -342,32 +342,16 @@ where
     P: Registered + Judged,
 {
     let tolerance = limits.tolerance;
-    let alone = || Verdict {
-        measure: outcome.measure,
-        solved: outcome.measure.passes(tolerance),
-        counts: P::Counts::default(),
-        statuses: vec![],
-        velocity: problem.partner(point),
-        worst: vec![],
-    };
     let small = problem.unknowns() <= guard::SMALL;
     let unlimited = limits.time_limit.is_none() && limits.cancel.is_none();
-    let over = || limits.reached(begun).is_some();
-    // Nobody knows how long a caller's functions take.
-    let scope = (problem.asks_functions() && !unlimited).then(|| limits.budget(begun).enter());
-    if scope.is_some() && over() {
-        return Ok(alone());
-    }
     // Where a limit has passed, nobody waits for a verdict on a large problem.
-    if (small || !over())
+    if (small || limits.reached(begun).is_none())
         && let Some(gauge) = session.gauge()
     {
-        let whole = problem.verdict(point, gauge, tolerance);
-        return Ok(if scope.is_some_and(|scope| scope.raised()) { alone() } else { whole });
+        return Ok(problem.verdict(point, gauge, tolerance));
     }
     if small || unlimited {
-        let whole = problem.judge(point, tolerance)?;
-        return Ok(if scope.is_some_and(|scope| scope.raised()) { alone() } else { whole });
+        return Ok(problem.judge(point, tolerance)?);
     }
     let spent = begun.elapsed().as_secs_f64();
     let left = limits.time_limit.map(|t| (t - spent).max(0.0));
@@ -375,6 +359,13 @@ where
     let copy = (problem.clone(), point.clone());
     match guard::run(&left, || {}, move |_| copy.0.judge(&copy.1, tolerance)) {
         Ok(verdict) => Ok(verdict?),
-        Err(Limit::Time | Limit::Cancelled | Limit::Iterations) => Ok(alone()),
+        Err(Limit::Time | Limit::Cancelled | Limit::Iterations) => Ok(Verdict {
+            measure: outcome.measure,
+            solved: outcome.measure.passes(tolerance),
+            counts: P::Counts::default(),
+            statuses: vec![],
+            velocity: problem.partner(point),
+            worst: vec![],
+        }),
     }
 }

@@ -154,12 +154,7 @@ where
             let outcome = session.observe(reduced, &mut there, &limits_there, &mut seen)?;
             iterations += outcome.iterations;
             seen.iterations = iterations;
-            let measure = {
-                // Nobody knows how long a caller's functions take.
-                let asks = problem.asks_functions();
-                let _scope = asks.then(|| limits.budget(begun).enter());
-                seen.see(&there, true)
-            };
+            let measure = seen.see(&there, true);
             if measure.passes(limits.tolerance) {
                 break Status::Solved;
             }
