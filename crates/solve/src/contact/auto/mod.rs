@@ -27,7 +27,7 @@
 //!     one projection a contact ([`Projection`]) are tried from zero: where exact ones circle, these may come near or end.
 //!
 //! A problem with scalar rows that have bounds begins with sweeps, which visit them too. The later stages know no bounds; where sweeps promise little, those
-//! of the rows that are at their bounds are sought as a set ([`held`]), each time with all stages on the problem of the rest.
+//! of the rows that are at their bounds are sought as a set (`held.rs`), each time with all stages on the problem of the rest.
 //!
 //! A starting point is taken where a sweep from it ends no farther off than one from zero impulses; near a solution it makes stages 2 and 4 needless.
 //!
