@@ -82,8 +82,10 @@ fn decided(linear: &Complementarity, known: Option<Classes>, limits: &Limits) ->
     let mut start = None;
     // Half of the time is for what follows; where nothing follows, the rest is for the solver too.
     for share in [0.5, 1.0] {
-        let how = Solve::new().limits(left(share));
-        let how = start.iter().fold(how, |how, point| how.warm::<AnyPoint>(point));
+        let mut how = Solve::new().limits(left(share));
+        if let Some(point) = &start {
+            how = how.warm::<AnyPoint>(point);
+        }
         let Ok(answer) = how.run(&problem) else { break };
         match &answer.status {
             Status::Infeasible(proof) => {

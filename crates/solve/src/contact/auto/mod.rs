@@ -614,9 +614,8 @@ impl<const D: usize> OnContacts<Auto, D> {
         match held.step(self, problem, (state, point), (*tolerance, *scale), residual) {
             held::Came::Further(estimate) => Step::Continue { estimate },
             held::Came::End => {
+                // The state has entered the point that it left.
                 work.held = None;
-                put_within_bounds(problem, point);
-                problem.enter(&mut work.state, point);
                 work.stage = FIRST;
                 work.rate.begin();
                 Step::Continue { estimate: f64::NAN }

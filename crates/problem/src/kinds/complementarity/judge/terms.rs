@@ -68,9 +68,8 @@ impl Terms {
         }
         for (i, size) in sizes.iter_mut().enumerate() {
             if !known {
-                let terms = || jacobian[pattern.range(i)].iter().zip(pattern.row(i));
-                let linear: f64 = terms().map(|(a, &j)| a * x[j]).sum();
-                let moduli: f64 = terms().map(|(a, &j)| (a * x[j]).abs()).sum();
+                let linear = along(pattern, jacobian, i, x, |ax| ax);
+                let moduli = along(pattern, jacobian, i, x, f64::abs);
                 *size = if *smooth { (f[i] - linear).abs() + moduli } else { 0.0 };
             }
             *size = size_of_row(*size, f[i]);
@@ -111,9 +110,8 @@ impl Terms {
         side(STEP, up);
         side(-STEP, down);
         for (i, size) in sizes.iter_mut().enumerate() {
-            let terms = || jacobian[pattern.range(i)].iter().zip(pattern.row(i));
-            let said: f64 = terms().map(|(a, &j)| a * d[j]).sum();
-            let moduli: f64 = terms().map(|(a, &j)| (a * x[j]).abs()).sum();
+            let said = along(pattern, jacobian, i, d, |ad| ad);
+            let moduli = along(pattern, jacobian, i, x, f64::abs);
             let changes = [(up[i] - f[i]) / STEP, (f[i] - down[i]) / STEP];
             let seen = changes.into_iter().filter(|change| change.is_finite());
             let agrees = |change: f64| (change - said).abs() <= ALLOWED * moduli;
@@ -123,6 +121,12 @@ impl Terms {
             }
         }
     }
+}
+
+/// `Σ_j of(J_ij d_j)`
+fn along(pattern: &Pattern, jacobian: &[f64], i: usize, d: &[f64], of: impl Fn(f64) -> f64) -> f64 {
+    let terms = jacobian[pattern.range(i)].iter().zip(pattern.row(i));
+    terms.map(|(a, &j)| of(a * d[j])).sum()
 }
 
 /// ω: the sizes of rows that are known beforehand.
@@ -167,14 +171,22 @@ impl Units {
         units
     }
 
-    /// Whether sizes near zero have to be asked for, since these are so small beside those of the start; `terms` are then of another point.
-    pub(crate) fn asked(&mut self, field: &dyn Field, terms: &mut Terms) -> bool {
+    /// [`Terms::look`]; where sizes there are so small beside those of the start that those near zero matter, they are asked for before.
+    pub(crate) fn look(
+        &mut self,
+        field: &dyn Field,
+        terms: &mut Terms,
+        x: &[f64],
+        precisely: bool,
+    ) -> bool {
+        let defined = terms.look(field.pattern(), x, precisely);
         let mut rows = terms.sizes.iter().zip(&self.start);
         let matters = !self.unasked.is_empty() && rows.any(|(d, unit)| *d < VANISHING * unit);
-        if matters {
-            self.ask(field, terms);
+        if !(defined && matters) {
+            return defined;
         }
-        matters
+        self.ask(field, terms);
+        terms.look(field.pattern(), x, precisely)
     }
 
     fn ask(&mut self, field: &dyn Field, terms: &mut Terms) {

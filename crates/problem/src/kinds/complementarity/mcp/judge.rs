@@ -58,11 +58,7 @@ impl McpGauge {
     fn look(&mut self, problem: &Mcp, x: &[f64], precisely: bool) -> bool {
         let Self { terms, scales, units, lengths, effects } = self;
         let pattern = problem.F.pattern();
-        let mut defined = terms.look(pattern, x, precisely);
-        if defined && units.asked(&*problem.F, terms) {
-            defined = terms.look(pattern, x, precisely);
-        }
-        if !defined {
+        if !units.look(&*problem.F, terms, x, precisely) {
             scales.fill(0.0);
             return false;
         }

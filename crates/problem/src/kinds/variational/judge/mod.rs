@@ -108,11 +108,7 @@ impl ViGauge {
     /// F at x, and φ. `None` where F is not defined.
     fn look(&mut self, problem: &Vi, x: &[f64], precisely: bool) -> Option<f64> {
         let Self { terms, units, .. } = self;
-        let pattern = problem.F.pattern();
-        let mut defined = terms.look(pattern, x, precisely);
-        if defined && units.asked(&*problem.F, terms) {
-            defined = terms.look(pattern, x, precisely);
-        }
+        let defined = units.look(&*problem.F, terms, x, precisely);
         defined.then(|| largest(&terms.sizes).max(units.least_of_all()))
     }
 
@@ -149,9 +145,11 @@ impl ViGauge {
     /// by its own φ, and ξ the size of the part's x, start and set; of parts without a unit nothing.
     fn own(&mut self, problem: &Vi, x: &[f64]) -> f64 {
         let mut sizes = vec![0.0; x.len()];
-        let unit = |i: usize| self.units.at(i, self.terms.sizes[i]);
-        let phis = (0..x.len()).map(unit).map(|(start, near)| lesser(start, near));
-        let phis: Vec<f64> = phis.collect();
+        let (units, terms) = (&self.units, &self.terms);
+        let phi = |i: usize| {
+            let (start, near) = units.at(i, terms.sizes[i]);
+            lesser(start, near)
+        };
         // What has no size of its own, as a cone that begins at its point, has a part of the others'.
         let least = if self.size > 0.0 { OF_OTHERS * self.size } else { largest(x) };
         for (first, set) in problem.set.parts() {
@@ -159,7 +157,8 @@ impl ViGauge {
             let Set::Box { lower, upper } = set else {
                 let of = |x: &[f64]| largest(&x[whole.clone()]);
                 let known = of(&problem.start).max(set.size());
-                let (size, phi) = (known.max(of(x)).max(least), of(&phis));
+                let size = known.max(of(x)).max(least);
+                let phi = whole.clone().map(phi).fold(0.0, f64::max);
                 for i in whole {
                     (sizes[i], self.gammas[i]) = scaled(size, phi);
                 }
@@ -169,7 +168,7 @@ impl ViGauge {
                 let bounds = [lower[i - first], upper[i - first]].into_iter();
                 let known = bounds.filter(|b| b.is_finite()).chain([problem.start[i], x[i]]);
                 let size = known.fold(least, |size: f64, x| size.max(x.abs()));
-                (sizes[i], self.gammas[i]) = scaled(size, phis[i]);
+                (sizes[i], self.gammas[i]) = scaled(size, phi(i));
             }
         }
         if !self.natural(problem, x, 2).is_finite() {
