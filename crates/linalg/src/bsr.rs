@@ -1,5 +1,7 @@
 //! Block-sparse rows: the hot storage of W.
 
+use std::sync::Arc;
+
 use super::{Csc, row};
 
 /// A D×D block, by rows.
@@ -10,28 +12,23 @@ pub type BlockRow<const D: usize> = Vec<(u32, Block<D>)>;
 
 /// A block-sparse matrix by compressed block rows with D×D blocks, column indices sorted in each row.
 ///
-/// Storage: `8·D²` bytes a block plus 4 of index. One product streams that once.
-#[derive(Debug, PartialEq)]
+/// Storage: `8·D²` bytes a block plus 4 of index. One product streams that once. Clones share it until one of them is changed.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Bsr<const D: usize> {
+    of: Arc<Rows<D>>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Rows<const D: usize> {
     ncols: usize,
     row_ptr: Vec<usize>,
     col_idx: Vec<u32>,
     blocks: Vec<Block<D>>,
 }
 
-impl<const D: usize> Clone for Bsr<D> {
-    fn clone(&self) -> Self {
-        let Self { ncols, row_ptr, col_idx, blocks } = self;
-        let (row_ptr, col_idx, blocks) = (row_ptr.clone(), col_idx.clone(), blocks.clone());
-        Self { ncols: *ncols, row_ptr, col_idx, blocks }
-    }
-
-    /// Into the memory that is there.
-    fn clone_from(&mut self, other: &Self) {
-        self.ncols = other.ncols;
-        self.row_ptr.clone_from(&other.row_ptr);
-        self.col_idx.clone_from(&other.col_idx);
-        self.blocks.clone_from(&other.blocks);
+impl<const D: usize> Rows<D> {
+    fn empty(ncols: usize) -> Self {
+        Self { ncols, row_ptr: vec![0], col_idx: vec![], blocks: vec![] }
     }
 }
 
@@ -77,41 +74,62 @@ impl<const D: usize> Bsr<D> {
                 }
             }
         }
-        Self { ncols: nc, row_ptr, col_idx, blocks }
+        Self { of: Arc::new(Rows { ncols: nc, row_ptr, col_idx, blocks }) }
     }
 
     /// Assembles a matrix from block rows.
     pub fn from_rows(ncols: usize, rows: &[BlockRow<D>]) -> Self {
-        let mut out = Self { ncols, row_ptr: vec![0], col_idx: vec![], blocks: vec![] };
+        let mut out = Rows::empty(ncols);
         for row in rows {
             debug_assert!(row.windows(2).all(|w| w[0].0 < w[1].0));
             out.col_idx.extend(row.iter().map(|e| e.0));
             out.blocks.extend(row.iter().map(|e| e.1));
             out.row_ptr.push(out.blocks.len());
         }
-        out
+        Self { of: Arc::new(out) }
+    }
+
+    /// This matrix's own memory, whose values are no longer needed.
+    fn anew(&mut self) -> &mut Rows<D> {
+        if Arc::get_mut(&mut self.of).is_none() {
+            self.of = Arc::new(Rows::empty(0));
+        }
+        Arc::get_mut(&mut self.of).expect("no clone shares it")
+    }
+
+    /// Makes this matrix equal to another one with memory of its own, that which it has if no clone shares it: what is changed afterwards is copied once, here.
+    pub fn copy_from(&mut self, other: &Self) {
+        let Rows { ncols, row_ptr, col_idx, blocks } = &*other.of;
+        let own = self.anew();
+        own.ncols = *ncols;
+        own.row_ptr.clone_from(row_ptr);
+        own.col_idx.clone_from(col_idx);
+        own.blocks.clone_from(blocks);
     }
 
     /// Empties the matrix, keeping its memory, to be filled again by [`push`](Self::push) and [`end_row`](Self::end_row).
     pub fn clear(&mut self, ncols: usize) {
-        self.ncols = ncols;
-        self.row_ptr.truncate(1);
-        self.col_idx.clear();
-        self.blocks.clear();
+        let own = self.anew();
+        own.ncols = ncols;
+        own.row_ptr.truncate(1);
+        own.col_idx.clear();
+        own.blocks.clear();
     }
 
     /// Appends a block to the row that is being filled; its column lies after those that the row has.
     #[inline]
     pub fn push(&mut self, column: usize, block: Block<D>) {
-        debug_assert!(column < self.ncols);
-        self.col_idx.push(column as u32);
-        self.blocks.push(block);
+        let own = Arc::make_mut(&mut self.of);
+        debug_assert!(column < own.ncols);
+        own.col_idx.push(column as u32);
+        own.blocks.push(block);
     }
 
     /// Ends the row that is being filled.
     #[inline]
     pub fn end_row(&mut self) {
-        self.row_ptr.push(self.blocks.len());
+        let own = Arc::make_mut(&mut self.of);
+        own.row_ptr.push(own.blocks.len());
     }
 
     /// Rows with these numbers of blocks, keeping the memory: where they begin, their columns and blocks, which have old values until they are written, columns
@@ -121,43 +139,44 @@ impl<const D: usize> Bsr<D> {
         ncols: usize,
         lengths: impl Iterator<Item = usize>,
     ) -> (&[usize], &mut [u32], &mut [Block<D>]) {
-        self.ncols = ncols;
-        self.row_ptr.truncate(1);
+        let own = self.anew();
+        own.ncols = ncols;
+        own.row_ptr.truncate(1);
         let mut end = 0;
-        self.row_ptr.extend(lengths.map(|n| {
+        own.row_ptr.extend(lengths.map(|n| {
             end += n;
             end
         }));
-        self.col_idx.resize(end, 0);
-        self.blocks.resize(end, [[0.0; D]; D]);
-        (&self.row_ptr, &mut self.col_idx, &mut self.blocks)
+        own.col_idx.resize(end, 0);
+        own.blocks.resize(end, [[0.0; D]; D]);
+        (&own.row_ptr, &mut own.col_idx, &mut own.blocks)
     }
 
     /// The number of block rows.
     pub fn nrows(&self) -> usize {
-        self.row_ptr.len() - 1
+        self.of.row_ptr.len() - 1
     }
 
     /// The number of block columns.
     pub fn ncols(&self) -> usize {
-        self.ncols
+        self.of.ncols
     }
 
     /// The number of stored blocks.
     pub fn nblocks(&self) -> usize {
-        self.blocks.len()
+        self.of.blocks.len()
     }
 
     /// Block column indices and blocks of block row `i`.
     #[inline(always)]
     pub fn row(&self, i: usize) -> (&[u32], &[Block<D>]) {
-        let range = self.row_ptr[i]..self.row_ptr[i + 1];
-        (&self.col_idx[range.clone()], &self.blocks[range])
+        let range = self.of.row_ptr[i]..self.of.row_ptr[i + 1];
+        (&self.of.col_idx[range.clone()], &self.of.blocks[range])
     }
 
     /// All blocks, row by row.
     pub fn blocks(&self) -> &[Block<D>] {
-        &self.blocks
+        &self.of.blocks
     }
 
     /// The block at `(i, j)`, or `None` where nothing is stored.
@@ -173,9 +192,10 @@ impl<const D: usize> Bsr<D> {
 
     /// Changes the block of each row and column in place.
     pub fn change(&mut self, mut change: impl FnMut(usize, usize, &mut Block<D>)) {
-        for i in 0..self.nrows() {
-            for k in self.row_ptr[i]..self.row_ptr[i + 1] {
-                change(i, self.col_idx[k] as usize, &mut self.blocks[k]);
+        let Rows { row_ptr, col_idx, blocks, .. } = Arc::make_mut(&mut self.of);
+        for i in 0..row_ptr.len() - 1 {
+            for k in row_ptr[i]..row_ptr[i + 1] {
+                change(i, col_idx[k] as usize, &mut blocks[k]);
             }
         }
     }
@@ -183,7 +203,7 @@ impl<const D: usize> Bsr<D> {
     /// `(A x)_i`, the product of block row `i`.
     #[inline(always)]
     pub fn row_product(&self, i: usize, x: &[f64]) -> [f64; D] {
-        assert_eq!(x.len(), D * self.ncols);
+        assert_eq!(x.len(), D * self.of.ncols);
         let (cols, blocks) = self.row(i);
         row::times(cols, blocks, x)
     }
@@ -209,7 +229,7 @@ impl<const D: usize> Bsr<D> {
                 cols.into_iter().map(|j| (j, [[0.0; D]; D])).collect()
             })
             .collect();
-        let mut out = Self::from_rows(self.ncols, &rows);
+        let mut out = Self::from_rows(self.of.ncols, &rows);
         let fits = out.set_difference(self, other);
         debug_assert!(fits);
         out
@@ -217,19 +237,20 @@ impl<const D: usize> Bsr<D> {
 
     /// Overwrites this matrix with `a − b` without allocating; false where its pattern does not hold theirs.
     pub fn set_difference(&mut self, a: &Self, b: &Self) -> bool {
-        if (self.nrows(), self.ncols) != (a.nrows(), a.ncols) || a.nrows() != b.nrows() {
+        if (self.nrows(), self.ncols()) != (a.nrows(), a.ncols()) || a.nrows() != b.nrows() {
             return false;
         }
-        self.blocks.fill([[0.0; D]; D]);
+        let Rows { row_ptr, col_idx, blocks, .. } = Arc::make_mut(&mut self.of);
+        blocks.fill([[0.0; D]; D]);
         for (sign, term) in [(1.0, a), (-1.0, b)] {
             for i in 0..term.nrows() {
-                let (cols, blocks) = term.row(i);
-                for (j, block) in cols.iter().zip(blocks) {
-                    let range = self.row_ptr[i]..self.row_ptr[i + 1];
-                    let Ok(at) = self.col_idx[range.clone()].binary_search(j) else {
+                let (cols, theirs) = term.row(i);
+                for (j, block) in cols.iter().zip(theirs) {
+                    let range = row_ptr[i]..row_ptr[i + 1];
+                    let Ok(at) = col_idx[range.clone()].binary_search(j) else {
                         return false;
                     };
-                    let entries = self.blocks[range.start + at].iter_mut().flatten();
+                    let entries = blocks[range.start + at].iter_mut().flatten();
                     entries.zip(block.iter().flatten()).for_each(|(x, y)| *x += sign * y);
                 }
             }
@@ -245,7 +266,7 @@ impl<const D: usize> Bsr<D> {
                 (0..D * D).map(move |k| (D * i + k / D, D * j as usize + k % D, b[k / D][k % D]))
             })
         });
-        Csc::from_triplets(D * self.nrows(), D * self.ncols, entries).expect("indices in range")
+        Csc::from_triplets(D * self.nrows(), D * self.of.ncols, entries).expect("indices in range")
     }
 
     /// `‖A − Aᵀ‖_F / ‖A‖_F`, zero for a zero matrix.
@@ -303,6 +324,31 @@ mod tests {
             again.end_row();
         }
         assert_eq!(again, Bsr::from_rows(3, &rows));
+    }
+
+    #[test]
+    fn clones_share_until_one_is_changed() {
+        let original = Bsr::<2>::from_csc(&example());
+        let is_shared = |a: &Bsr<2>, b: &Bsr<2>| std::ptr::eq(a.blocks(), b.blocks());
+        let mut changed = original.clone();
+        assert!(is_shared(&original, &changed));
+        changed.change(|_, _, block| block[0][0] += 1.0);
+        let mut refilled = original.clone();
+        let lengths = (0..2).map(|i| original.row(i).0.len());
+        let (_, columns, blocks) = refilled.lay_out(2, lengths);
+        columns.iter_mut().zip(0..).for_each(|(c, k)| *c = k % 2);
+        blocks.fill([[7.0; 2]; 2]);
+        let mut cleared = original.clone();
+        cleared.clear(1);
+        let mut copied = refilled.clone();
+        copied.copy_from(&original);
+        assert!(copied == original && !is_shared(&copied, &original));
+        assert_eq!(original, Bsr::<2>::from_csc(&example()));
+        assert_ne!(changed, original);
+        // What is copied into has memory of its own already.
+        let place = copied.blocks().as_ptr();
+        copied.copy_from(&changed);
+        assert!(copied == changed && copied.blocks().as_ptr() == place);
     }
 
     #[test]

@@ -206,6 +206,10 @@ impl Problem for AnyProblem {
         with_problem!(self, p => p.unknowns())
     }
 
+    fn asks_functions(&self) -> bool {
+        with_problem!(self, p => p.asks_functions())
+    }
+
     fn origin(&self) -> AnyPoint {
         with_problem!(self, p => p.origin().into())
     }

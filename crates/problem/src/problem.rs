@@ -24,6 +24,11 @@ pub trait Problem {
         self.unknowns()
     }
 
+    /// Whether a judgement asks functions of a caller's, which take whatever time they take.
+    fn asks_functions(&self) -> bool {
+        false
+    }
+
     /// The point with all parts zero, of the lengths that the problem asks for.
     fn origin(&self) -> Self::Point;
 

@@ -255,11 +255,8 @@ impl Simulation {
             Dimension::Three => drop(registry::session::<FrictionLocal<3>>(solver, &settings)?),
         }
         (self.solver, self.settings) = (solver.into(), settings);
-        let threads = self.tools.threads();
-        self.tools = Tools::new(&self.world, &self.state)?;
+        self.tools.forget_solver(self.world.dimension);
         self.projection = None;
-        self.tools.set_threads(threads);
-        self.remember_joints();
         Ok(self)
     }
 

@@ -273,6 +273,8 @@ impl<P: Registered + Judged<Point: OfAnyPoint>> Solvable for P {
         watch: &mut dyn FnMut(&Progress),
     ) -> Result<Answer<P>, SolveError> {
         let begun = Instant::now();
+        // Nobody knows how long a caller's functions take: whoever asks them here does so within the limits, the judge as well.
+        let scope = self.asks_functions().then(|| how.limits.budget(begun).enter());
         let mut session = kept.take::<P>(how)?;
         let mut point = match &how.start {
             None => self.origin(),
@@ -284,6 +286,7 @@ impl<P: Registered + Judged<Point: OfAnyPoint>> Solvable for P {
         };
         let outcome = session.solve(self, &mut point, &how.limits, watch)?;
         let verdict = verdict(self, &point, &outcome, &mut *session, &how.limits, begun)?;
+        drop(scope);
         let (account, history) = (session.account(), session.history().to_vec());
         let trace = session.trace();
         kept.put(how, session);
@@ -342,16 +345,30 @@ where
     P: Registered + Judged,
 {
     let tolerance = limits.tolerance;
+    let alone = || Verdict {
+        measure: outcome.measure,
+        solved: outcome.measure.passes(tolerance),
+        counts: P::Counts::default(),
+        statuses: vec![],
+        velocity: problem.partner(point),
+        worst: vec![],
+    };
     let small = problem.unknowns() <= guard::SMALL;
     let unlimited = limits.time_limit.is_none() && limits.cancel.is_none();
-    // Where a limit has passed, nobody waits for a verdict on a large problem.
-    if (small || limits.reached(begun).is_none())
+    // Where a limit has passed, nobody waits for a verdict on a large problem, nor for a caller's functions.
+    let late = limits.reached(begun).is_some();
+    let asks = problem.asks_functions();
+    if late && asks {
+        return Ok(alone());
+    }
+    let cut = |whole| if asks && limits.reached(begun).is_some() { alone() } else { whole };
+    if (small || !late)
         && let Some(gauge) = session.gauge()
     {
-        return Ok(problem.verdict(point, gauge, tolerance));
+        return Ok(cut(problem.verdict(point, gauge, tolerance)));
     }
     if small || unlimited {
-        return Ok(problem.judge(point, tolerance)?);
+        return Ok(cut(problem.judge(point, tolerance)?));
     }
     let spent = begun.elapsed().as_secs_f64();
     let left = limits.time_limit.map(|t| (t - spent).max(0.0));
@@ -359,13 +376,6 @@ where
     let copy = (problem.clone(), point.clone());
     match guard::run(&left, || {}, move |_| copy.0.judge(&copy.1, tolerance)) {
         Ok(verdict) => Ok(verdict?),
-        Err(Limit::Time | Limit::Cancelled | Limit::Iterations) => Ok(Verdict {
-            measure: outcome.measure,
-            solved: outcome.measure.passes(tolerance),
-            counts: P::Counts::default(),
-            statuses: vec![],
-            velocity: problem.partner(point),
-            worst: vec![],
-        }),
+        Err(Limit::Time | Limit::Cancelled | Limit::Iterations) => Ok(alone()),
     }
 }

@@ -2,9 +2,11 @@
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
 
+use nonsmooth_problem::field::{Differences, Pattern};
 use nonsmooth_problem::planted::{Planted, PlantedLcp, PlantedMlcp};
-use nonsmooth_problem::{AnyProblem, OfAny, Problem};
+use nonsmooth_problem::{AnyProblem, Mcp, OfAny, Problem};
 use nonsmooth_solve::contact::splitting::Nsgs;
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limit, Solvable, Solve, SolveError, Status, solve};
@@ -101,4 +103,31 @@ fn mistakes_are_named() {
     );
     let said = Solve::new().warm(&problem.origin()).run(&lcp).unwrap_err().to_string();
     assert!(said.contains("of a problem lcp"), "{said}");
+}
+
+/// A caller's function that takes its time is asked no more than a few times after the limit, whoever solves.
+#[test]
+fn the_time_limit_holds_for_slow_functions() {
+    let n = 40;
+    let value = |x: &[f64], f: &mut [f64]| {
+        std::thread::sleep(Duration::from_millis(10));
+        let sum: f64 = x.iter().sum();
+        f.iter_mut().zip(x).for_each(|(f, x)| *f = x.powi(3) - 2.0 + 0.01 * sum);
+    };
+    let slack: f64 =
+        std::env::var("NONSMOOTH_SLACK").ok().and_then(|s| s.parse().ok()).unwrap_or(1.0);
+    let field = Differences::new(Pattern::dense(n), value).unwrap();
+    let free = f64::INFINITY;
+    let problem = Mcp::new(field, vec![-free; n], vec![free; n], vec![3.0; n]).unwrap();
+    // A Jacobian takes .8 s.
+    let solvers = registry::solver_names::<Mcp>();
+    let cases = solvers.iter().map(|name| (name.as_str(), 0.1)).chain([("auto", 1.2)]);
+    for (name, limit) in cases {
+        let begun = Instant::now();
+        let answer = Solve::new().solver(name).time_limit(limit).run(&problem).unwrap();
+        let spent = begun.elapsed().as_secs_f64();
+        assert_eq!(answer.status, Status::Limit(Limit::Time), "{name}");
+        assert!(spent < limit + 0.35 * slack, "{name} to {limit} s: {spent}");
+        assert!(answer.point.z.iter().all(|x| x.is_finite()), "{name}");
+    }
 }

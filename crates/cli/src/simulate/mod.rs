@@ -228,10 +228,13 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     }
     let wrong = |e| format!("{}: {e}", path.display());
     let cancel = interrupt::flag();
+    if let Some(seconds) = limit {
+        end_after(seconds, cancel.clone());
+    }
     let limits = Limits {
         tolerance: scene.solver.tol,
         max_iterations: 100_000,
-        cancel: Some(cancel.clone()),
+        cancel: Some(cancel),
         ..Limits::default()
     };
     let (simulation, settled) = match args.settle {
@@ -250,9 +253,6 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         recorder.write_to(out, resumed, pause(args.flush)?);
     }
     let begun = Instant::now();
-    if let Some(seconds) = limit {
-        end_after(seconds, cancel);
-    }
     let mut bar = RunBar::new(&path.to_string_lossy(), scene.time.end, !args.json);
     let mut mistake = None;
     let mut watch = |simulation: &Simulation, report: &StepReport| {

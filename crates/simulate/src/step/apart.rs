@@ -69,7 +69,8 @@ impl Tools {
             (row.mu, row.shift, row.r) = (0.0, [near.place.gap / H, 0.0, 0.0], [0.0; 3]);
             (row.mu_r, row.moment) = (0.0, [0.0; 2]);
         }
-        let solved = self.solve(stride, inner)?.status == StepStatus::Solved;
+        let Some(solved) = self.solve(stride, inner)? else { return Ok(false) };
+        let solved = solved.status == StepStatus::Solved;
         self.commit(stride, &mut rest, &mut StepReport::begun(state.t, H));
         if are_finite(rest.position.iter().flatten().chain(rest.rotation.iter().flatten()).copied())
         {

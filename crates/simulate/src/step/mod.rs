@@ -40,17 +40,19 @@ mod touching;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use nonsmooth_linalg::budget::{self, Budget};
 use nonsmooth_problem::Friction;
 use nonsmooth_scenes::vec3::norm;
 
 use crate::crew::{Crew, Inner};
 use crate::detect::{Detector, Key, Near};
+use crate::drive::CANCELLED;
 use crate::islands::Islands;
 use crate::joints::Joints;
 use crate::moving::Moving;
 use crate::report::{ContactReport, EnergyBalance, StepReport, StepStatus, Timings};
 use crate::state::State;
-use crate::{Force, Geometry, MoreauJean, SimulateError, World};
+use crate::{Dimension, Force, Geometry, MoreauJean, SimulateError, World};
 
 use begin::Start;
 use contact::Row;
@@ -140,6 +142,11 @@ impl Tools {
         })
     }
 
+    /// Forgets the sessions of the solver.
+    pub fn forget_solver(&mut self, dimension: Dimension) {
+        self.stated = Stated::new(dimension);
+    }
+
     /// Lets so many threads work, 0 for one a core.
     pub fn set_threads(&mut self, threads: usize) {
         self.crew = Crew::new(threads);
@@ -160,18 +167,33 @@ impl Tools {
     ) -> Result<StepReport, SimulateError> {
         stride.world.periods_hold(state.t + stride.h)?;
         let begun = Instant::now();
+        // What ends the run also ends a step, between its parts.
+        let flag = Budget { cancel: inner.limits.cancel.clone(), ..Budget::default() };
+        let _scope = flag.enter();
         let mut timings = Timings::default();
-        let mut report = StepReport::begun(state.t, stride.h);
-        if !self.begin(stride, state, forces) {
-            report.status = StepStatus::NotFinite;
+        let report = StepReport::begun(state.t, stride.h);
+        let ended = |mut report: StepReport, status| {
+            report.status = status;
             report.timings.total = begun.elapsed().as_secs_f64();
-            return Ok(report);
+            Ok(report)
+        };
+        if !self.begin(stride, state, forces) {
+            return ended(report, StepStatus::NotFinite);
+        }
+        if budget::over() {
+            return ended(report, CANCELLED);
         }
         let detecting = Instant::now();
         self.detect(stride, state);
         timings.detection = detecting.elapsed().as_secs_f64();
+        if budget::over() {
+            return ended(report, CANCELLED);
+        }
         self.meet(stride, state);
-        let mut solved = self.solve(stride, inner)?;
+        let Some(mut solved) = self.solve(stride, inner)? else {
+            return ended(report, CANCELLED);
+        };
+        let mut report = report;
         if !self.moves_are_finite() || !self.solids.is_finite() {
             solved.status = StepStatus::NotFinite;
         }

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use nonsmooth_linalg::budget;
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, apply, norm, scale, sub};
 use nonsmooth_solve::{Outcome, Status};
 
@@ -66,7 +67,12 @@ impl Open {
 }
 
 impl Tools {
-    pub(super) fn solve(&mut self, stride: Stride, inner: &Inner) -> Result<Solved, SimulateError> {
+    /// Solves all islands; nothing where the time was over before what is to be solved was stated.
+    pub(super) fn solve(
+        &mut self,
+        stride: Stride,
+        inner: &Inner,
+    ) -> Result<Option<Solved>, SimulateError> {
         let count = self.islands.ends.len();
         self.stated.provide(count)?;
         self.open.begin(count);
@@ -75,6 +81,9 @@ impl Tools {
         while !self.open.list.is_empty() {
             solved.passes += 1;
             solved.seconds += self.state(stride, Some(inner.limits.tolerance));
+            if budget::over() {
+                return Ok(None);
+            }
             for at in 0..self.open.list.len() {
                 let k = self.open.list[at] as usize;
                 let may_rest = solved.passes == 1
@@ -88,7 +97,7 @@ impl Tools {
             solved.seconds += begun.elapsed().as_secs_f64();
             self.take_up(stride, &mut solved)?;
         }
-        Ok(solved)
+        Ok(Some(solved))
     }
 
     /// Whether the bodies of island k are slower than `rest` while most of its contacts are new, so that no impulses of the step before lead on.

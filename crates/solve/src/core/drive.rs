@@ -689,8 +689,9 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         };
         P::copy_point(self.judge.best, point);
         let late = matches!(status, Status::Limit(Limit::Time | Limit::Cancelled));
-        let hopeless = self.problem.burden() > guard::SMALL
-            && self.judge.best_measure.merit() > DOUBTFUL * self.limits.tolerance;
+        let hopeless = self.problem.asks_functions()
+            || self.problem.burden() > guard::SMALL
+                && self.judge.best_measure.merit() > DOUBTFUL * self.limits.tolerance;
         let measure = match self.judge.certified {
             Some(measure) => measure,
             None if late && hopeless => self.judge.best_measure,

@@ -13,6 +13,8 @@ use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use nonsmooth_linalg::budget::Budget;
+
 use crate::{Limit, Limits};
 
 /// Up to this many unknowns, no single operation takes more than some milliseconds.
@@ -50,6 +52,9 @@ pub fn run<T: Send + 'static>(
     let begun = Instant::now();
     let leash = Leash(Arc::new(AtomicBool::new(false)));
     let own = Limits { cancel: Some(leash.0.clone()), ..limits.clone() };
+    // Nobody hears of what kernels cut short for this one.
+    let given_up = Leash(Arc::new(AtomicBool::new(false)));
+    let alone = Budget { cancel: Some(given_up.0.clone()), ..Budget::default() };
     let (give, take) = sync_channel(1);
     // Where no thread is to be had, the task runs here.
     let task = Arc::new(Mutex::new(Some(task)));
@@ -57,6 +62,7 @@ pub fn run<T: Send + 'static>(
     let thread = std::thread::Builder::new().stack_size(STACK).spawn(move || {
         let (task, own) = theirs;
         let task = locked(&task).take();
+        let _scope = alone.enter();
         if let Some(task) = task {
             // A caller who has given up listens no more.
             let _ = give.send(task(&own));

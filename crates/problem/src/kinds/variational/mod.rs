@@ -123,6 +123,10 @@ impl Problem for Vi {
         self.dim() + self.set.parts().into_iter().map(|(_, set)| rows(set)).sum::<usize>()
     }
 
+    fn asks_functions(&self) -> bool {
+        self.F.expressions().is_none()
+    }
+
     fn origin(&self) -> LcpPoint {
         LcpPoint { z: self.start.clone() }
     }

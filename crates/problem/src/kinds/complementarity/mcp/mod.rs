@@ -136,6 +136,10 @@ impl Problem for Mcp {
         self.dim()
     }
 
+    fn asks_functions(&self) -> bool {
+        self.F.expressions().is_none()
+    }
+
     fn origin(&self) -> LcpPoint {
         let projected = self.start.iter().enumerate().map(|(i, &x)| self.project(i, x));
         LcpPoint { z: projected.collect() }

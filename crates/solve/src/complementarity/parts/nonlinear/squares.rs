@@ -10,6 +10,7 @@
 //!
 //! References: PangGabriel1993; Bertsekas1982. Cost: a few LU factorisations of the pattern of JFᵀJF.
 
+use nonsmooth_linalg::budget::{self, Pace};
 use nonsmooth_linalg::{Csc, Matrix};
 
 use super::{Inner, Iterate, Moved};
@@ -79,38 +80,55 @@ impl Squares {
         model.matrix().mul_transpose_add(1.0, &self.product, &mut self.gradient);
     }
 
-    /// `AᵀA` with the regularisation.
-    fn normal(&self, model: &Model) -> Option<Matrix> {
+    /// `AᵀA` with the regularisation, a column at a time; none where the time is over.
+    fn normal(&self, model: &Model) -> Option<Csc> {
         let n = self.d.len();
-        // Rows of the Jacobian.
-        let rows = model.matrix().transpose();
-        let mut entries = vec![];
-        for i in 0..n {
-            if self.bound[i] {
-                entries.push((i, i, 1.0));
-                continue;
-            }
-            let (columns, values) = rows.column(i);
-            for (&j, &a) in columns.iter().zip(values) {
-                for (&k, &b) in columns.iter().zip(values) {
-                    entries.push((j, k, a * b));
+        let a = model.matrix();
+        let rows = a.transpose();
+        let (mut pointers, mut all, mut values) = (vec![0], vec![], vec![]);
+        let mut sums = vec![0.0; n];
+        let mut places = vec![];
+        // The column that last had an entry in each row.
+        let mut latest = vec![n; n];
+        let mut pace = Pace::default();
+        for k in 0..n {
+            places.clear();
+            let mut add = |j: usize, x: f64| {
+                if latest[j] != k {
+                    (latest[j], sums[j]) = (k, 0.0);
+                    places.push(j);
                 }
+                sums[j] += x;
+            };
+            let (of_function, entries) = a.column(k);
+            for (&i, &b) in of_function.iter().zip(entries).filter(|(i, _)| !self.bound[**i]) {
+                let (columns, others) = rows.column(i);
+                if pace.over(columns.len() as f64) {
+                    return None;
+                }
+                columns.iter().zip(others).for_each(|(&j, &a)| add(j, a * b));
             }
+            add(k, if self.bound[k] { 1.0 } else { 0.0 } + REGULARISED);
+            places.sort_unstable();
+            values.extend(places.iter().map(|&j| sums[j]));
+            all.append(&mut places);
+            pointers.push(all.len());
         }
-        entries.extend((0..n).map(|i| (i, i, REGULARISED)));
-        Csc::from_triplets(n, n, entries.iter().copied()).ok().map(Matrix::from)
+        Csc::from_vecs(n, n, pointers, all, values).ok()
     }
 
     /// The solution d of the program; false where the normal equations are singular or not finite.
     fn direct(&mut self, model: &Model, at: &Iterate) -> bool {
         let n = self.d.len();
         self.d.fill(0.0);
-        let Some(normal) = self.normal(model) else { return false };
-        let Matrix::Sparse(all) = &normal else { unreachable!("made sparse") };
-        let mut matrix = normal.clone();
+        let Some(all) = self.normal(model) else { return false };
+        let mut matrix = Matrix::from(all.clone());
         let mut factor = Factor::new(&matrix);
         let mut first = None;
         for _ in 0..STEPS {
+            if budget::over() {
+                return false;
+            }
             // Aᵀ(r + A d) + εd
             let d = std::mem::take(&mut self.d);
             self.multiply(model, &d);
