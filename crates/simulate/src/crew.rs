@@ -13,7 +13,9 @@ use std::sync::{Mutex, PoisonError};
 
 use nonsmooth_linalg::{Bsr, budget};
 use nonsmooth_problem::factors::FactorsGauge;
-use nonsmooth_problem::{FrictionLocal, LocalPoint, Problem, RollingLocal};
+use nonsmooth_problem::{
+    FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem, RollingLocal,
+};
 use nonsmooth_solve::registry::Registered;
 use nonsmooth_solve::settings::SettingsMap;
 use nonsmooth_solve::{Limits, Outcome, Session, SolveError, Status, registry};
@@ -31,7 +33,7 @@ const PARTS: usize = 4;
 pub(crate) const SMALL: usize = 32;
 /// What is asked first of a large island, and for how many iterations at most. A small one is solved more sharply without.
 const RELAXATION: &str = "convex_relaxation";
-const ITERATIONS: usize = 30;
+const ITERATIONS: usize = 40;
 /// It is solved so much better than asked for, an iteration or two, that the steps after it find the impulses good enough as they are; but no better than this.
 const FINER: f64 = 1e-3;
 const FINEST: f64 = 1e-12;
@@ -67,6 +69,8 @@ pub(crate) struct Slot<const D: usize> {
     /// The same with rolling friction, where a contact has any: then the point is of this one.
     pub rolling: Option<RollingLocal>,
     pub point: LocalPoint,
+    /// The same with the bodies, where that is sooner solved: then the other two are not stated.
+    pub global: Option<FrictionGlobal<D>>,
     pub asked: Asked,
     /// Whether velocities are taken where impulses are, and whether no contact has compliance or rolling friction.
     pub symmetric: bool,
@@ -84,6 +88,7 @@ pub(crate) struct Slot<const D: usize> {
 impl<const D: usize> Slot<D>
 where
     FrictionLocal<D>: Registered<Point = LocalPoint>,
+    FrictionGlobal<D>: Registered<Point = GlobalPoint>,
 {
     pub fn new() -> Result<Self, SimulateError> {
         let one = |i: usize, j: usize| f64::from(u8::from(i == j));
@@ -97,6 +102,7 @@ where
             problem,
             rolling: None,
             point,
+            global: None,
             asked,
             symmetric: true,
             rigid: true,
@@ -132,39 +138,81 @@ where
 
 /// The sessions that solve one problem after the other.
 pub(crate) struct Sessions<const D: usize> {
-    law: Box<dyn Session<FrictionLocal<D>>>,
-    /// Made where it is first needed.
-    rolling: Option<Box<dyn Session<RollingLocal>>>,
-    /// Made where it is first asked.
-    relaxation: Option<Box<dyn Session<FrictionLocal<D>>>>,
+    local: Asking<FrictionLocal<D>>,
+    rolling: Asking<RollingLocal>,
+    global: Asking<FrictionGlobal<D>>,
+    /// Of a problem with its bodies, which begins with the impulses.
+    moved: GlobalPoint,
 }
 
 impl<const D: usize> Sessions<D>
 where
     FrictionLocal<D>: Registered<Point = LocalPoint>,
+    FrictionGlobal<D>: Registered<Point = GlobalPoint>,
 {
+    /// Errors: a solver that does not exist.
     fn new(inner: &Inner) -> Result<Self, SolveError> {
-        let law = registry::session(inner.solver, inner.settings)?;
-        Ok(Self { law, rolling: None, relaxation: None })
+        let mut local = Asking::default();
+        local.law(inner)?;
+        let moved = GlobalPoint { v: vec![], r: vec![], lambda: vec![] };
+        Ok(Self { local, rolling: Asking::default(), global: Asking::default(), moved })
     }
 
     fn solve(&mut self, slot: &mut Slot<D>, inner: &Inner) -> Result<Option<Outcome>, SolveError> {
-        let Slot { problem, rolling, point, asked, .. } = slot;
-        let limits = |most: usize| Limits {
-            max_iterations: inner.limits.max_iterations.min(most),
-            ..inner.limits.clone()
-        };
+        let Slot { problem, rolling, global, point, asked, .. } = slot;
         if !asked.finite {
             return Ok(None);
         }
         if let Some(problem) = rolling {
-            let session = match &mut self.rolling {
-                Some(session) => session,
-                None => self.rolling.insert(registry::session(inner.solver, inner.settings)?),
-            };
-            return session.solve(problem, point, &limits(asked.most), &mut |_| {}).map(Some);
+            let asked = Asked { may_rest: false, ..*asked };
+            return self.rolling.solve(problem, point, asked, inner).map(Some);
         }
-        if asked.may_rest && problem.mu.len() > SMALL {
+        if let Some(problem) = global {
+            let moved = &mut self.moved;
+            moved.v.clear();
+            moved.v.resize(problem.f.len(), 0.0);
+            moved.r.clone_from(&point.r);
+            let outcome = self.global.solve(problem, moved, *asked, inner)?;
+            point.r.copy_from_slice(&moved.r);
+            return Ok(Some(outcome));
+        }
+        self.local.solve(problem, point, *asked, inner).map(Some)
+    }
+}
+
+/// What is asked of problems of one kind; each session is made where it is first needed.
+struct Asking<P: Problem> {
+    law: Option<Box<dyn Session<P>>>,
+    relaxation: Option<Box<dyn Session<P>>>,
+}
+
+impl<P: Problem> Default for Asking<P> {
+    fn default() -> Self {
+        Self { law: None, relaxation: None }
+    }
+}
+
+impl<P: Registered<Point: Clone>> Asking<P> {
+    fn law(&mut self, inner: &Inner) -> Result<&mut dyn Session<P>, SolveError> {
+        let made = match self.law.take() {
+            Some(session) => session,
+            None => registry::session(inner.solver, inner.settings)?,
+        };
+        Ok(&mut **self.law.insert(made))
+    }
+
+    fn solve(
+        &mut self,
+        problem: &P,
+        point: &mut P::Point,
+        asked: Asked,
+        inner: &Inner,
+    ) -> Result<Outcome, SolveError> {
+        let limits = |most: usize| Limits {
+            max_iterations: inner.limits.max_iterations.min(most),
+            ..inner.limits.clone()
+        };
+        if asked.may_rest {
             let relaxation = match &mut self.relaxation {
                 Some(relaxation) => relaxation,
                 None => self.relaxation.insert(registry::session(RELAXATION, &SettingsMap::new())?),
@@ -174,11 +222,11 @@ where
             let finer = Limits { tolerance, ..limits(ITERATIONS) };
             let outcome = relaxation.solve(problem, point, &finer, &mut |_| {})?;
             if outcome.measure.passes(inner.limits.tolerance) {
-                return Ok(Some(Outcome { status: Status::Solved, ..outcome }));
+                return Ok(Outcome { status: Status::Solved, ..outcome });
             }
             *point = start;
         }
-        self.law.solve(problem, point, &limits(asked.most), &mut |_| {}).map(Some)
+        self.law(inner)?.solve(problem, point, &limits(asked.most), &mut |_| {})
     }
 }
 
@@ -264,6 +312,7 @@ impl Crew {
     ) -> Result<(), SimulateError>
     where
         FrictionLocal<D>: Registered<Point = LocalPoint>,
+        FrictionGlobal<D>: Registered<Point = GlobalPoint>,
     {
         let parts = self.pool.as_ref().map_or(1, |pool| PARTS * pool.current_num_threads());
         while sessions.len() < parts.min(open.len()).max(1) {

@@ -241,7 +241,7 @@ class ConvexRelaxation(Settings):
     --------
     convex_tolerance : float, default 1e-13
         The relative residual of the convex problem at which it has finished, positive.
-    patience : int, default 12
+    patience : int, default 30
         Steps without a smaller residual of the convex problem after which it gives up.
 
     References: NesterovTodd1998, Mehrotra1992, Acary2018.

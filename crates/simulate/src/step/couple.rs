@@ -19,6 +19,12 @@ pub(super) struct Side {
 
 /// What a side of a contact with D rows is in a problem.
 pub(super) trait Sided<const D: usize>: Copy + Default + Send + Sync {
+    /// Of a body's velocity.
+    const COMPONENTS: usize;
+
+    /// The entries of a body's matrix of masses.
+    fn masses(b: &Moving) -> impl Iterator<Item = (usize, usize, f64)> + Clone + use<'_, D, Self>;
+
     /// Writes the side of a contact with a body that moves freely.
     fn write(&mut self, row: &Row, arm: &Arm, b: &Moving);
 
@@ -36,6 +42,13 @@ pub(super) trait Sided<const D: usize>: Copy + Default + Send + Sync {
 }
 
 impl Sided<3> for Side {
+    const COMPONENTS: usize = 6;
+
+    fn masses(b: &Moving) -> impl Iterator<Item = (usize, usize, f64)> + Clone + use<'_> {
+        let turning = (0..9).map(|e| (3 + e / 3, 3 + e % 3, b.inertia[e / 3][e % 3]));
+        (0..3).map(|k| (k, k, b.mass)).chain(turning)
+    }
+
     fn write(&mut self, row: &Row, arm: &Arm, b: &Moving) {
         for i in 0..3 {
             let column = apply(&b.frame, arm.moment[i]);
@@ -81,6 +94,12 @@ pub(super) struct FlatSide {
 }
 
 impl Sided<2> for FlatSide {
+    const COMPONENTS: usize = 3;
+
+    fn masses(b: &Moving) -> impl Iterator<Item = (usize, usize, f64)> + Clone + use<'_> {
+        [b.mass, b.mass, b.inertia[2][2]].into_iter().enumerate().map(|(k, m)| (k, k, m))
+    }
+
     fn write(&mut self, row: &Row, arm: &Arm, b: &Moving) {
         for i in 0..2 {
             let (moment, later) = (arm.moment[i][2], arm.moment_end[i][2]);

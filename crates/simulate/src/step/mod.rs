@@ -31,6 +31,7 @@ mod couple;
 mod elastic;
 mod energy;
 mod frame;
+mod global;
 mod memory;
 mod problem;
 mod solve;

@@ -9,7 +9,9 @@ use std::time::Instant;
 
 use nonsmooth_linalg::{Block, Csc};
 use nonsmooth_problem::factors::Factors;
-use nonsmooth_problem::{Bounds, Friction, FrictionLocal, LocalPoint, RowsLocal};
+use nonsmooth_problem::{
+    Bounds, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RowsLocal,
+};
 use nonsmooth_scenes::vec3::{Vec3, apply, dot, scale};
 use nonsmooth_solve::registry::Registered;
 use nonsmooth_solve::{Outcome, SolveError, Status};
@@ -188,12 +190,12 @@ impl Tools {
         island.gather(items.iter().copied(), rows, joints);
     }
 
-    /// States the problems of the open islands in their slots; with a tolerance, those whose impulses to begin with the judge accepts get their outcome and no W. Returns the seconds
-    /// that judging took.
+    /// States the problems of the open islands in their slots; for a solver, those whose impulses to begin with the judge accepts get their outcome and no W, and for `auto` those that are solved
+    /// sooner with their bodies are stated so. Returns the seconds that judging took.
     pub(super) fn state(
         &mut self,
         Stride { scheme, h, world }: Stride,
-        tolerance: Option<f64>,
+        inner: Option<&Inner>,
     ) -> f64 {
         let Self { crew, islands, touching, open, solids, joints, rows, bodies, stated, .. } = self;
         let (due, count) = (&open.due[..], world.bodies.len());
@@ -216,9 +218,9 @@ impl Tools {
         let parts = Parts { crew, islands, touching, due, rows, bodies, joints, solids };
         match stated {
             Stated::Space(p) => {
-                p.state_all(&parts, tolerance, |k, slot, sides| parts.state_rolling(k, slot, sides))
+                p.state_all(&parts, inner, |k, slot, sides| parts.state_rolling(k, slot, sides))
             }
-            Stated::Plane(p) => p.state_all(&parts, tolerance, |_, _, _| true),
+            Stated::Plane(p) => p.state_all(&parts, inner, |_, _, _| true),
         }
     }
 }
@@ -230,15 +232,15 @@ pub(super) fn scalars(islands: &Islands, contacts: usize, k: usize) -> &[u32] {
 }
 
 /// What problems are made of.
-struct Parts<'a> {
+pub(super) struct Parts<'a> {
     crew: &'a Crew,
-    islands: &'a Islands,
-    touching: &'a Touching,
+    pub islands: &'a Islands,
+    pub touching: &'a Touching,
     due: &'a [bool],
-    rows: &'a [Row],
-    bodies: &'a [Moving],
+    pub rows: &'a [Row],
+    pub bodies: &'a [Moving],
     joints: &'a Joints,
-    solids: &'a Solids,
+    pub solids: &'a Solids,
 }
 
 /// Consecutive slots, the first of which has this number, with the sides of their contacts.
@@ -595,6 +597,7 @@ impl Parts<'_> {
 impl<const D: usize, S: Sided<D>> Problems<D, S>
 where
     FrictionLocal<D>: Registered<Point = LocalPoint>,
+    FrictionGlobal<D>: Registered<Point = GlobalPoint>,
 {
     fn provide(&mut self, slots: usize) -> Result<(), SimulateError> {
         while self.slots.len() < slots {
@@ -607,7 +610,7 @@ where
     fn state_all(
         &mut self,
         parts: &Parts,
-        tolerance: Option<f64>,
+        inner: Option<&Inner>,
         beyond: impl Fn(usize, &mut Slot<D>, &[[S; 2]]) -> bool + Sync,
     ) -> f64 {
         self.sides.resize(parts.touching.order.len(), [S::default(); 2]);
@@ -616,14 +619,21 @@ where
             slot.asked.finite = parts.state(k, slot, sides);
         });
         let begun = Instant::now();
-        if let Some(tolerance) = tolerance {
+        if let Some(Inner { limits, .. }) = inner {
             self.each(parts, |k, slot, sides| {
-                slot.outcome = parts.accept(k, slot, sides, tolerance).map(Ok);
+                slot.outcome = parts.accept(k, slot, sides, limits.tolerance).map(Ok);
             });
         }
         let seconds = begun.elapsed().as_secs_f64();
+        let may_be_global = inner.is_some_and(Inner::is_auto);
         self.each(parts, |k, slot, sides| {
-            if slot.asked.finite && slot.outcome.is_none() {
+            slot.global = None;
+            if !slot.asked.finite || slot.outcome.is_some() {
+                return;
+            }
+            if may_be_global && parts.is_global::<D, S>(k, slot) {
+                slot.asked.finite = parts.state_global(k, slot, sides);
+            } else {
                 slot.asked.finite = parts.form(k, slot, sides)
                     && parts.state_rows(k, slot, sides)
                     && beyond(k, slot, sides);

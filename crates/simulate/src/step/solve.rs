@@ -80,7 +80,7 @@ impl Tools {
         let mut solved = Solved { largest: sizes.max().unwrap_or(0), ..Solved::default() };
         while !self.open.list.is_empty() {
             solved.passes += 1;
-            solved.seconds += self.state(stride, Some(inner.limits.tolerance));
+            solved.seconds += self.state(stride, Some(inner));
             if budget::over() {
                 return Ok(None);
             }

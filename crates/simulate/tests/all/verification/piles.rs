@@ -239,16 +239,16 @@ fn a_pyramid_of_balls_that_can_stand_stands() {
     }
 }
 
-/// Rows of 6, 5, … 1 boxes, or squares.
-fn pyramid(plane: bool) -> World {
+/// Rows of so many boxes, one less, … 1, or of squares.
+fn pyramid(plane: bool, base: u32) -> World {
     let mut world = if plane {
         World::in_plane([0.0, -9.81]).with_law(Law::friction(0.5))
     } else {
         world(0.5, 0.0)
     };
     world.add(if plane { Body::ground() } else { Body::floor() });
-    for row in 0..6 {
-        for k in 0..6 - row {
+    for row in 0..base {
+        for k in 0..base - row {
             let x = 1.05 * (f64::from(k) + 0.5 * f64::from(row));
             let z = 0.5 + f64::from(row);
             world.add(match plane {
@@ -286,7 +286,9 @@ fn what_is_told_without_w_holds_with_it() {
         turning.add(plate.moving([0.0; 3], [0.0, 0.0, 1.0]));
     }
     let tolerance = 1e-8;
-    for (world, symmetric) in [(pyramid(false), true), (pyramid(true), true), (turning, false)] {
+    for (world, symmetric) in
+        [(pyramid(false, 6), true), (pyramid(true, 6), true), (turning, false)]
+    {
         let mut simulation = simulation(world).with_tolerance(tolerance);
         let mut unasked = 0;
         for _ in 0..300 {
@@ -310,5 +312,32 @@ fn what_is_told_without_w_holds_with_it() {
             assert!(relative <= report.residual && report.residual <= relative + 1e-11);
         }
         assert!(unasked > 100, "{unasked}");
+    }
+}
+
+/// A shaken pyramid, whose island `auto` solves with its bodies; with a setting, as any solver but `auto`, it is solved by W.
+#[test]
+fn islands_with_their_bodies_move_as_by_w() {
+    for (plane, base) in [(false, 6), (true, 10)] {
+        let run = |settings: &[&str]| {
+            let mut world = pyramid(plane, base);
+            for (k, body) in world.bodies.iter_mut().enumerate().skip(1) {
+                let (sin, cos) = (7.0 * k as f64).sin_cos();
+                body.velocity = if plane { [sin, 0.3 * cos, 0.0] } else { [sin, cos, 0.3 * sin] };
+            }
+            let settings = nonsmooth_solve::settings::from_texts(settings).unwrap();
+            let simulation = simulation(world).with_tolerance(1e-12);
+            let mut simulation = simulation.with_solver("auto", settings).unwrap();
+            for _ in 0..10 {
+                let report = simulation.step(1e-3).unwrap();
+                assert!(report.status.is_solved() && report.counts.largest >= 128, "{report:?}");
+            }
+            simulation
+        };
+        let [bodies, w] = [run(&[]), run(&["in_turn=true"])];
+        assert_ne!(bodies.state(), w.state(), "two ways");
+        for (v, other) in bodies.state().velocity.iter().zip(&w.state().velocity) {
+            v.iter().zip(other).for_each(|(v, other)| near(*v, *other, 1e-7));
+        }
     }
 }

@@ -33,13 +33,15 @@ const RESCUE_TAKE_BACK: f64 = 5.0;
 const SWEPT_LONG: usize = 10 * FIRST_SWEEPS;
 const SWEEP_AGAIN: f64 = 3.0;
 /// The interior point ends after this many iterations, or below this error, or after so many iterations that did not halve the
-/// error, or so many short steps in a row; such steps know at least this part of the slope of ‖u_T‖.
+/// error, or so many short steps in a row; such steps know at least this part of the slope of ‖u_T‖. Before its first halving it has longer where W has not spread: in walls of thousands
+/// of bodies it takes some 20 iterations to come into sight of the solution, and ten to reach it.
 const INTERIOR: usize = 60;
 /// Where Newton's iterations promise to take longer than this, the interior point is worth a trial; not before so many, which is what one subproblem in vain takes.
 const INTERIOR_COST: f64 = 20.0;
 const IN_VAIN: usize = 12;
 const INTERIOR_ERROR: f64 = 1e-8;
 const INTERIOR_IDLE: usize = 10;
+const INTERIOR_FIRST: usize = 30;
 const INTERIOR_SLOPE: f64 = 0.2;
 const INTERIOR_SHORT: (f64, usize) = (1e-6, 6);
 /// The central path is followed by its arc length after so many Newton iterations that promise to take so many more since the
@@ -264,26 +266,28 @@ impl<const D: usize> OnContacts<Auto, D> {
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) -> Step {
-        let HybridWork { central, state, stage, done, tolerance, controller, .. } = work;
+        let HybridWork { central, state, stage, done, tolerance, .. } = work;
         let (Some(central), Stage::Interior { halvings, short }) = (central, stage) else {
             return lost();
         };
-        let ended = match central.iterate(problem, state) {
-            Err(_) => true,
+        let (ended, may_wait) = match central.iterate(problem, state) {
+            Err(_) => (true, false),
             Ok(now) => {
                 done.interior += 1;
                 let idle = halvings.idle_at(now.error);
                 *short = if now.alpha < INTERIOR_SHORT.0 { *short + 1 } else { 0 };
-                now.error <= tolerance.max(INTERIOR_ERROR)
-                    || idle >= INTERIOR_IDLE
+                let over = now.error <= tolerance.max(INTERIOR_ERROR)
                     || *short >= INTERIOR_SHORT.1
-                    || done.interior >= INTERIOR
+                    || done.interior >= INTERIOR;
+                let first = idle == done.interior && idle < INTERIOR_FIRST;
+                (over || idle >= INTERIOR_IDLE, first && !over)
             }
         };
-        let best = central.best();
-        done.interior_error = best.1;
-        if ended {
-            take(best, controller, P::impulses(point));
+        done.interior_error = central.best().1;
+        if ended && (!may_wait || has_spread(problem, work)) {
+            if let HybridWork { central: Some(central), controller, .. } = work {
+                take(central.best(), controller, P::impulses(point));
+            }
             self.subproblem_here(problem, point, work);
         }
         Step::Continue { estimate: work.done.interior_error }

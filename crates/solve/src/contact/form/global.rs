@@ -57,7 +57,7 @@ enum GlobalSystem<const D: usize> {
 /// What a family's access to W needs beside the dynamics.
 enum Operator<const D: usize> {
     /// Visits contact by contact.
-    Visits(Delassus<D>),
+    Visits(Box<Delassus<D>>),
     /// Products with all of W: the diagonal blocks alone.
     Products(Vec<Block<D>>),
     /// W itself: for Newton methods where M is factorised sparsely (finite elements, mechanisms), so that Z would be dense
@@ -136,13 +136,13 @@ impl<const D: usize, L: DiskLaw<D>> Contacts<D> for FrictionGlobal<D, L> {
                 }
                 Access::Visits | Access::Rows | Access::Newton => {
                     // Rows with bounds speak of v itself; those who sweep in an order of their own keep it.
-                    Operator::Visits(match rows.is_empty() {
+                    Operator::Visits(Box::new(match rows.is_empty() {
                         true if access == Access::Newton => {
                             Delassus::arranged(&self.H, inverse, MANY)
                         }
                         true => Delassus::new(&self.H, inverse),
                         false => Delassus::direct(&self.H, inverse),
-                    })
+                    }))
                 }
                 Access::Products => Operator::Products(Delassus::diagonal(&self.H, inverse)),
             },

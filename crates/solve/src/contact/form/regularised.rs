@@ -30,7 +30,7 @@ pub trait Overwrite: Clone {
 
 impl<const D: usize, L: DiskLaw<D>> Overwrite for FrictionLocal<D, L> {
     fn overwrite(&mut self, other: &Self) {
-        self.W.copy_from(&other.W);
+        self.W = other.W.clone();
         self.q.clone_from(&other.q);
         self.mu.clone_from(&other.mu);
         self.mu_r.clone_from(&other.mu_r);

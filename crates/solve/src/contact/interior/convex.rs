@@ -33,7 +33,7 @@ pub struct ConvexRelaxation {
 
 impl Default for ConvexRelaxation {
     fn default() -> Self {
-        Self { convex_tolerance: 1e-13, patience: 12 }
+        Self { convex_tolerance: 1e-13, patience: 30 }
     }
 }
 
