@@ -12,6 +12,8 @@ use crate::folder::{Out, failed};
 
 /// Bytes of a chunk, about: small enough for one body's path to be read alone, large enough to compress.
 const CHUNK: u64 = 1 << 17;
+/// Rows and columns of a chunk at most: longer ones take three bytes where the library that writes takes four, and libhdf5 2.0 refuses to open such datasets.
+const LONGEST: u64 = 0xffff;
 
 /// What a file holds of a run: all of it, or what came after a step.
 pub(super) struct View<'a> {
@@ -308,5 +310,6 @@ fn pack(set: &mut DatasetBuilder, shape: &[usize], width: usize) {
     }
     let row = shape[1..].iter().product::<u64>() * width as u64;
     shape[0] = (CHUNK / row).clamp(1, shape[0]);
+    shape.iter_mut().for_each(|n| *n = (*n).min(LONGEST));
     set.with_chunks(&shape).with_shuffle().with_deflate(1).with_fletcher32();
 }
