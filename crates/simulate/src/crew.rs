@@ -85,6 +85,14 @@ pub(crate) struct Slot<const D: usize> {
     own: Mutex<Option<Sessions<D>>>,
 }
 
+impl<const D: usize> Slot<D> {
+    /// The problem is one of contacts alone, without scalar rows and rolling friction.
+    pub fn leave_rows_out(&mut self) {
+        (self.problem.rows, self.rolling) = (None, None);
+        self.point.lambda.clear();
+    }
+}
+
 impl<const D: usize> Slot<D>
 where
     FrictionLocal<D>: Registered<Point = LocalPoint>,

@@ -8,7 +8,7 @@ use nonsmooth_problem::FrictionGlobal;
 
 use super::are_finite;
 use super::couple::Sided;
-use super::problem::{Parts, scalars};
+use super::problem::Parts;
 use crate::crew::Slot;
 
 /// Fewer contacts are solved as soon by W.
@@ -24,9 +24,7 @@ impl Parts<'_> {
         contacts >= LEAST
             && (D * contacts) as f64 > ROWS * components as f64
             && slot.symmetric
-            && slot.rigid
-            && self.solids.is_empty()
-            && scalars(self.islands, self.rows.len(), k).is_empty()
+            && self.has_contacts_alone(k, slot)
     }
 
     /// States it so; whether all is finite.
@@ -70,8 +68,7 @@ impl Parts<'_> {
         let (f, w) = (vec![0.0; n], slot.problem.q.clone());
         let mu = slot.problem.mu.clone();
         slot.global = Some(FrictionGlobal { M, H, f, w, mu, mu_r: (), rows: None });
-        (slot.problem.rows, slot.rolling) = (None, None);
-        slot.point.lambda.clear();
+        slot.leave_rows_out();
         finite
     }
 }

@@ -172,7 +172,7 @@ impl Tools {
         let flag = Budget { cancel: inner.limits.cancel.clone(), ..Budget::default() };
         let _scope = flag.enter();
         let mut timings = Timings::default();
-        let report = StepReport::begun(state.t, stride.h);
+        let mut report = StepReport::begun(state.t, stride.h);
         let ended = |mut report: StepReport, status| {
             report.status = status;
             report.timings.total = begun.elapsed().as_secs_f64();
@@ -194,7 +194,6 @@ impl Tools {
         let Some(mut solved) = self.solve(stride, inner)? else {
             return ended(report, CANCELLED);
         };
-        let mut report = report;
         if !self.moves_are_finite() || !self.solids.is_finite() {
             solved.status = StepStatus::NotFinite;
         }

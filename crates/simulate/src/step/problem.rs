@@ -234,13 +234,13 @@ pub(super) fn scalars(islands: &Islands, contacts: usize, k: usize) -> &[u32] {
 /// What problems are made of.
 pub(super) struct Parts<'a> {
     crew: &'a Crew,
-    pub islands: &'a Islands,
+    islands: &'a Islands,
     pub touching: &'a Touching,
     due: &'a [bool],
     pub rows: &'a [Row],
     pub bodies: &'a [Moving],
     joints: &'a Joints,
-    pub solids: &'a Solids,
+    solids: &'a Solids,
 }
 
 /// Consecutive slots, the first of which has this number, with the sides of their contacts.
@@ -382,28 +382,29 @@ impl Parts<'_> {
         finite
     }
 
+    /// Whether rigid contacts between rigid bodies, without rolling friction, are all there is of island k.
+    pub(super) fn has_contacts_alone<const D: usize>(&self, k: usize, slot: &Slot<D>) -> bool {
+        slot.rigid && self.solids.is_empty() && scalars(self.islands, self.rows.len(), k).is_empty()
+    }
+
     /// What the judge says of the impulses to begin with, from the factors of W, where it accepts them and many contacts alone make the problem.
     fn accept<const D: usize, S: Sided<D>>(
         &self,
         k: usize,
-        Slot { problem, point, rolling, gauge, symmetric, rigid, .. }: &mut Slot<D>,
+        slot: &mut Slot<D>,
         sides: &[[S; 2]],
         tolerance: f64,
     ) -> Option<Outcome> {
-        let Self { islands, touching, rows, solids, .. } = *self;
         // W of a small one is formed as soon, by memory that is at hand.
-        if !(sides.len() > SMALL
-            && *rigid
-            && solids.is_empty()
-            && scalars(islands, rows.len(), k).is_empty())
-        {
+        if !(sides.len() > SMALL && self.has_contacts_alone(k, slot)) {
             return None;
         }
         let begun = Instant::now();
+        let Slot { problem, point, gauge, symmetric, .. } = slot;
+        let touching = self.touching;
         let factors = ByBodies { touching, island: k, sides, symmetric: *symmetric };
         let measure = gauge.accept(&factors, (&problem.q, &problem.mu), &point.r, tolerance)?;
-        (problem.rows, *rolling) = (None, None);
-        point.lambda.clear();
+        slot.leave_rows_out();
         Some(Outcome {
             status: Status::Solved,
             measure,

@@ -92,7 +92,6 @@ impl Squares {
         let mut latest = vec![n; n];
         let mut pace = Pace::default();
         for k in 0..n {
-            places.clear();
             let mut add = |j: usize, x: f64| {
                 if latest[j] != k {
                     (latest[j], sums[j]) = (k, 0.0);
@@ -108,7 +107,8 @@ impl Squares {
                 }
                 columns.iter().zip(others).for_each(|(&j, &a)| add(j, a * b));
             }
-            add(k, if self.bound[k] { 1.0 } else { 0.0 } + REGULARISED);
+            let of_bound = if self.bound[k] { 1.0 } else { 0.0 };
+            add(k, of_bound + REGULARISED);
             places.sort_unstable();
             values.extend(places.iter().map(|&j| sums[j]));
             all.append(&mut places);
