@@ -139,11 +139,17 @@ impl Csc {
             bucket[next[j]] = (i, x);
             next[j] += 1;
         }
+        Ok(Self::of_columns(nrows, &count, bucket))
+    }
+
+    /// Column j of `(row, value)` pairs `begins[j]..begins[j + 1]`: sorted here, with equal rows added.
+    fn of_columns(nrows: usize, begins: &[usize], mut entries: Vec<(usize, f64)>) -> Self {
+        let ncols = begins.len() - 1;
         let (mut row_idx, mut values) =
-            (Vec::with_capacity(bucket.len()), Vec::<f64>::with_capacity(bucket.len()));
+            (Vec::with_capacity(entries.len()), Vec::<f64>::with_capacity(entries.len()));
         let mut col_ptr = vec![0; ncols + 1];
         for j in 0..ncols {
-            let column = &mut bucket[count[j]..count[j + 1]];
+            let column = &mut entries[begins[j]..begins[j + 1]];
             column.sort_by_key(|e| e.0);
             let start = row_idx.len();
             for &(i, x) in column.iter() {
@@ -156,7 +162,7 @@ impl Csc {
             }
             col_ptr[j + 1] = row_idx.len();
         }
-        Ok(Self::of(nrows, ncols, col_ptr, row_idx, values))
+        Self::of(nrows, ncols, col_ptr, row_idx, values)
     }
 
     /// The same matrix without stored zeros. Cost: O(nnz); nothing is copied where there are none.

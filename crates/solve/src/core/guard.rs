@@ -49,6 +49,21 @@ pub fn run<T: Send + 'static>(
     if limits.time_limit.is_none() && limits.cancel.is_none() {
         return Ok(task(limits));
     }
+    let result = Arc::new(Mutex::new(None));
+    let theirs = result.clone();
+    let task = move |limits: &Limits| {
+        let result = task(limits);
+        *locked(&theirs) = Some(result);
+    };
+    watched(limits, &mut tick, Box::new(task))?;
+    let result = locked(&result).take();
+    Ok(result.expect("a task that came back has left its result"))
+}
+
+type Task = Box<dyn FnOnce(&Limits) + Send>;
+
+/// [`run`], of tasks that say nothing, so that it is compiled once.
+fn watched(limits: &Limits, tick: &mut dyn FnMut(), task: Task) -> Result<(), Limit> {
     let begun = Instant::now();
     let leash = Leash(Arc::new(AtomicBool::new(false)));
     let own = Limits { cancel: Some(leash.0.clone()), ..limits.clone() };
@@ -64,15 +79,17 @@ pub fn run<T: Send + 'static>(
         let task = locked(&task).take();
         let _scope = alone.enter();
         if let Some(task) = task {
+            task(&own);
             // A caller who has given up listens no more.
-            let _ = give.send(task(&own));
+            let _ = give.send(());
         }
     });
     let thread = match thread {
         Ok(thread) => thread,
         Err(_) => {
             let task = locked(&task).take().expect("not taken by a thread that was not made");
-            return Ok(task(limits));
+            task(limits);
+            return Ok(());
         }
     };
     let at_once = limits.reached(begun).is_some();
@@ -88,10 +105,10 @@ pub fn run<T: Send + 'static>(
     let mut late: Option<(Limit, Instant)> = None;
     loop {
         match take.recv_timeout(TICK) {
-            Ok(result) => return Ok(result),
+            Ok(()) => return Ok(()),
             Err(RecvTimeoutError::Disconnected) => match thread.join() {
                 Err(panic) => std::panic::resume_unwind(panic),
-                Ok(()) => unreachable!("a task sends before it ends"),
+                Ok(()) => unreachable!("a thread sends before it ends"),
             },
             Err(RecvTimeoutError::Timeout) => {}
         }

@@ -67,15 +67,32 @@ pub fn parse<S: Settings>(map: &SettingsMap) -> Result<S, String> {
     if map.is_empty() {
         return Ok(S::default());
     }
+    let read = |map: &SettingsMap| serde_json::from_value::<S>(Value::Object(map.clone()));
     // The schema is made where there is something to correct or to explain: it costs as much as a small solve.
-    if let Ok(settings) = serde_json::from_value::<S>(Value::Object(map.clone()))
-        && let Ok(Value::Object(all)) = serde_json::to_value(&settings)
-        && map.keys().all(|key| all.contains_key(key))
-    {
-        settings.validate()?;
-        return Ok(settings);
-    }
-    let known = described::<S>();
+    let settings = match read(map) {
+        Ok(settings) if are_all_of(map, serde_json::to_value(&settings)) => settings,
+        _ => {
+            let corrected = corrected(map, &described::<S>(), &|map| read(map).is_ok())?;
+            read(&corrected).map_err(|e| e.to_string())?
+        }
+    };
+    settings.validate()?;
+    Ok(settings)
+}
+
+/// Whether all keys of a map are among those of some settings.
+fn are_all_of(map: &SettingsMap, settings: serde_json::Result<Value>) -> bool {
+    matches!(settings, Ok(Value::Object(all)) if map.keys().all(|key| all.contains_key(key)))
+}
+
+/// The map with whole numbers where these are due; `reads` says whether a map can be read.
+///
+/// Errors: the first key that is unknown or cannot be read.
+fn corrected(
+    map: &SettingsMap,
+    known: &[Setting],
+    reads: &dyn Fn(&SettingsMap) -> bool,
+) -> Result<SettingsMap, String> {
     let mut map = map.clone();
     // One key at a time, so that the message can name the key at fault.
     for (key, value) in &mut map {
@@ -91,14 +108,11 @@ pub fn parse<S: Settings>(map: &SettingsMap) -> Result<S, String> {
         {
             *value = (x as u64).into();
         }
-        let alone = SettingsMap::from_iter([(key.clone(), value.clone())]);
-        if serde_json::from_value::<S>(Value::Object(alone)).is_err() {
+        if !reads(&SettingsMap::from_iter([(key.clone(), value.clone())])) {
             return Err(format!("{key}: expected {}, found {value}", setting.expected()));
         }
     }
-    let settings: S = serde_json::from_value(Value::Object(map)).map_err(|e| e.to_string())?;
-    settings.validate()?;
-    Ok(settings)
+    Ok(map)
 }
 
 impl Setting {
@@ -116,8 +130,12 @@ impl Setting {
 
 /// The settings of `S` as its type documents them.
 pub fn described<S: Settings>() -> Vec<Setting> {
-    let schema = schemars::schema_for!(S);
     let defaults = serde_json::to_value(S::default()).unwrap_or_default();
+    of_schema(&schemars::schema_for!(S), &defaults)
+}
+
+/// The properties of a schema, with their defaults.
+fn of_schema(schema: &schemars::Schema, defaults: &Value) -> Vec<Setting> {
     let Some(properties) = schema.get("properties").and_then(Value::as_object) else {
         return vec![];
     };
@@ -127,7 +145,7 @@ pub fn described<S: Settings>() -> Vec<Setting> {
         .map(|(key, property)| Setting {
             key: key.clone(),
             default: defaults.get(key).cloned().unwrap_or_default(),
-            choices: choices(&schema, property),
+            choices: choices(schema, property),
             help: text(property.get("description")),
         })
         .collect()

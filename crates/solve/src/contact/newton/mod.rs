@@ -166,6 +166,52 @@ where
     type Work = Work<P, D>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
+        Skeleton::of(&self.0).work(problem)
+    }
+
+    fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
+        problem.refill(&mut work.state)?;
+        work.sweep.fill(problem, &work.state);
+        Skeleton::of(&self.0).fill(problem, work);
+        Ok(())
+    }
+
+    fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        Skeleton::of(&self.0).start(problem, point, work);
+    }
+
+    fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
+        Skeleton::of(&self.0).step(problem, point, work)
+    }
+
+    fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        problem.complete(&mut work.state, point);
+    }
+}
+
+/// The method without its function, so that it is compiled once for each kind of problem.
+struct Skeleton<'a, P: Disked<D>, const D: usize> {
+    function: &'a dyn OnAll<P::Law, D>,
+    smoothed: bool,
+    settings: Newton<()>,
+}
+
+impl<'a, P: Linearised<D> + Disked<D>, const D: usize> Skeleton<'a, P, D> {
+    fn of<F: ContactFunction<D, P::Law>>(newton: &'a Newton<F>) -> Self {
+        let Newton { function, line_search, rho_rule, rho, warm_up, rescue, smoothing } = newton;
+        let settings = Newton {
+            function: (),
+            line_search: *line_search,
+            rho_rule: *rho_rule,
+            rho: *rho,
+            warm_up: *warm_up,
+            rescue: *rescue,
+            smoothing: *smoothing,
+        };
+        Self { function, smoothed: F::SMOOTHED, settings }
+    }
+
+    fn work(&self, problem: &P) -> Result<Work<P, D>, SolveError> {
         let state = problem.state(Access::Newton)?;
         let mut work = Work {
             sweep: Sweep::new(problem, &state),
@@ -181,21 +227,14 @@ where
             b: vec![],
             p: vec![],
             q: vec![],
-            search: Search::new(self.0.line_search),
+            search: Search::new(self.settings.line_search),
             phase: Phase::new(),
         };
         self.fill(problem, &mut work);
         Ok(work)
     }
 
-    fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
-        problem.refill(&mut work.state)?;
-        work.sweep.fill(problem, &work.state);
-        self.fill(problem, work);
-        Ok(())
-    }
-
-    fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+    fn start(&self, problem: &P, point: &mut P::Point, work: &mut Work<P, D>) {
         work.search.restart();
         if work.phase.rung > 0 {
             work.phase.rung = 0;
@@ -205,19 +244,21 @@ where
         problem.velocities(&mut work.state, P::impulses(point), &mut work.u);
     }
 
-    fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
+    fn step(&self, problem: &P, point: &mut P::Point, work: &mut Work<P, D>) -> Step {
         if let Some(ray) = problem.contradiction(&work.state) {
             return Step::NoSolution(ray.clone().into());
         }
-        if std::mem::take(&mut work.phase.fresh) && self.0.warm_up > 0 {
-            return self.sweeps(problem, point, work, self.0.warm_up);
+        if std::mem::take(&mut work.phase.fresh) && self.settings.warm_up > 0 {
+            return self.sweeps(problem, point, work, self.settings.warm_up);
         }
-        if F::SMOOTHED {
+        if self.smoothed {
             self.reduce_smoothing(P::impulses(point), work);
         }
         let r = P::impulses(point);
-        let merit = self.linearise(r, work); //                          Φ, P, Q
-        if !F::SMOOTHED {
+        let Work { laws, unit, scale, u, b, p, q, .. } = &mut *work;
+        let at = At { laws, unit, scale: *scale, u, r };
+        let merit = self.function.linearise(at, b, p, q); //             Φ, P, Q
+        if !self.smoothed {
             work.phase.note(merit);
         }
         if work.phase.since_low > PATIENCE {
@@ -253,7 +294,7 @@ where
             }
             // Recomputed, not u + t W Δr: rounding does not gather.
             problem.velocities(state, trial, trial_u);
-            merit_at(&self.0.function, laws, unit, *scale, trial_u, trial)
+            self.function.merit(At { laws, unit, scale: *scale, u: trial_u, r: trial })
         });
         if !(found.accepted || found.merit < merit) {
             return self.rescue(
@@ -268,13 +309,7 @@ where
         Step::Continue { estimate: (2.0 * found.merit / laws.len() as f64).sqrt() }
     }
 
-    fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
-        problem.complete(&mut work.state, point);
-    }
-}
-
-impl<F, const D: usize> OnContacts<Newton<F>, D> {
-    fn fill<P: Linearised<D> + Disked<D>>(&self, problem: &P, work: &mut Work<P, D>) {
+    fn fill(&self, problem: &P, work: &mut Work<P, D>) {
         let n = problem.contacts();
         work.scale = problem.velocity_scale(&work.state) / (n as f64).sqrt();
         work.unit.clear();
@@ -302,8 +337,8 @@ impl<F, const D: usize> OnContacts<Newton<F>, D> {
     }
 
     /// ρ of every contact for the present rung.
-    fn scale_contacts<P: Linearised<D> + Disked<D>>(&self, problem: &P, work: &mut Work<P, D>) {
-        let Newton { rho_rule, rho, .. } = self.0;
+    fn scale_contacts(&self, problem: &P, work: &mut Work<P, D>) {
+        let Newton { rho_rule, rho, .. } = self.settings;
         let factor = scaling::LADDER[work.phase.rung % scaling::LADDER.len()];
         work.laws.clear();
         for (c, &unit) in work.unit.iter().enumerate() {
@@ -314,16 +349,13 @@ impl<F, const D: usize> OnContacts<Newton<F>, D> {
     }
 
     /// `count` sweeps on the point; the velocities after them.
-    fn sweeps<P>(
+    fn sweeps(
         &self,
         problem: &P,
         point: &mut P::Point,
         work: &mut Work<P, D>,
         count: usize,
-    ) -> Step
-    where
-        P: Linearised<D> + Disked<D>,
-    {
+    ) -> Step {
         problem.enter(&mut work.state, point);
         let r = P::impulses(point);
         let mut moves = 0.0;
@@ -338,104 +370,95 @@ impl<F, const D: usize> OnContacts<Newton<F>, D> {
     }
 
     /// Sweeps in place of a Newton step that failed, and another ρ where that is asked for; stuck after too many of them.
-    fn rescue<P>(
+    fn rescue(
         &self,
         problem: &P,
         point: &mut P::Point,
         work: &mut Work<P, D>,
         why: &'static str,
-    ) -> Step
-    where
-        P: Linearised<D> + Disked<D>,
-    {
-        if self.0.rescue == 0 || work.phase.rescues >= RESCUES {
+    ) -> Step {
+        if self.settings.rescue == 0 || work.phase.rescues >= RESCUES {
             return Step::Stuck(why.into());
         }
         // Longer each time in a row: where W is rank deficient, Newton needs a start that few sweeps do not give.
-        let count = self.0.rescue << work.phase.rescues.min(DOUBLINGS);
+        let count = self.settings.rescue << work.phase.rescues.min(DOUBLINGS);
         work.phase.rescues += 1;
         work.phase.since_low = 0;
         work.search.restart();
-        if self.0.rho_rule == RhoRule::Adaptive {
+        if self.settings.rho_rule == RhoRule::Adaptive {
             work.phase.rung += 1;
             work.phase.low = f64::INFINITY;
             self.scale_contacts(problem, work);
         }
         self.sweeps(problem, point, work, count)
     }
+
+    /// ε: at most a fraction of the residual without smoothing and, near the solution, of its square; never larger than before.
+    fn reduce_smoothing(&self, r: &[f64], work: &mut Work<P, D>) {
+        work.laws.iter_mut().for_each(|law| law.smoothing = 0.0);
+        let Work { laws, unit, scale, u, phase, search, .. } = work;
+        let merit = self.function.merit(At { laws, unit, scale: *scale, u, r });
+        phase.note(merit);
+        let rms = (2.0 * merit / laws.len() as f64).sqrt();
+        let bound = self.settings.smoothing * rms * rms.min(1.0);
+        if bound < phase.smoothing {
+            phase.smoothing = bound;
+            search.restart();
+        }
+        let epsilon = phase.smoothing;
+        laws.iter_mut().for_each(|law| law.smoothing = epsilon);
+    }
 }
 
-impl<F, const D: usize> OnContacts<Newton<F>, D> {
-    /// Φ, P, Q at the present point into `b = −Φ`, `p`, `q`, in the problem's units; the merit.
-    fn linearise<P>(&self, r: &[f64], work: &mut Work<P, D>) -> f64
-    where
-        P: Linearised<D> + Disked<D>,
-        F: ContactFunction<D, P::Law>,
-    {
-        let Work { laws, unit, scale, u, b, p, q, .. } = work;
+/// A function on all contacts.
+trait OnAll<L, const D: usize> {
+    /// Φ, P, Q into `b = −Φ`, `p`, `q`, in the problem's units; the merit.
+    fn linearise(&self, at: At<L>, b: &mut [f64], p: &mut [Block<D>], q: &mut [Block<D>]) -> f64;
+
+    /// `½ Σ‖Φ_c‖²`.
+    fn merit(&self, at: At<L>) -> f64;
+}
+
+/// Velocities and impulses, and what makes pure numbers of them.
+struct At<'a, L> {
+    laws: &'a [OneContact<L>],
+    unit: &'a [f64],
+    scale: f64,
+    u: &'a [f64],
+    r: &'a [f64],
+}
+
+impl<F: ContactFunction<D, L>, L, const D: usize> OnAll<L, D> for F {
+    fn linearise(&self, at: At<L>, b: &mut [f64], p: &mut [Block<D>], q: &mut [Block<D>]) -> f64 {
         let mut merit = 0.0;
-        for (c, (law, &w)) in laws.iter().zip(&*unit).enumerate() {
-            let at = contact(&self.0.function, law, w, *scale, u, r, c);
+        for (c, &w) in at.unit.iter().enumerate() {
+            let of = at.contact(self, c);
             for k in 0..D {
-                merit += 0.5 * at.phi[k] * at.phi[k];
-                b[D * c + k] = -*scale * at.phi[k];
+                merit += 0.5 * of.phi[k] * of.phi[k];
+                b[D * c + k] = -at.scale * of.phi[k];
             }
-            p[c] = at.a;
-            q[c] = at.b.map(|row| row.map(|x| w * x));
+            p[c] = of.a;
+            q[c] = of.b.map(|row| row.map(|x| w * x));
         }
         merit
     }
 
-    /// ε: at most a fraction of the residual without smoothing and, near the solution, of its square; never larger than before.
-    fn reduce_smoothing<P>(&self, r: &[f64], work: &mut Work<P, D>)
+    fn merit(&self, at: At<L>) -> f64 {
+        let square = |c| at.contact(self, c).phi.iter().map(|x| x * x).sum::<f64>();
+        (0..at.unit.len()).fold(0.0, |merit, c| merit + 0.5 * square(c))
+    }
+}
+
+impl<L> At<'_, L> {
+    /// The function of contact c, in pure numbers.
+    #[inline(always)]
+    fn contact<F, const D: usize>(&self, function: &F, c: usize) -> Linearisation<D>
     where
-        P: Linearised<D> + Disked<D>,
-        F: ContactFunction<D, P::Law>,
+        F: ContactFunction<D, L>,
     {
-        let phase = &mut work.phase;
-        work.laws.iter_mut().for_each(|law| law.smoothing = 0.0);
-        let merit = merit_at(&self.0.function, &work.laws, &work.unit, work.scale, &work.u, r);
-        phase.note(merit);
-        let rms = (2.0 * merit / work.laws.len() as f64).sqrt();
-        let bound = self.0.smoothing * rms * rms.min(1.0);
-        if bound < phase.smoothing {
-            phase.smoothing = bound;
-            work.search.restart();
-        }
-        let epsilon = phase.smoothing;
-        work.laws.iter_mut().for_each(|law| law.smoothing = epsilon);
+        let (w, scale) = (self.unit[c], self.scale);
+        let u: [f64; D] = small::block(self.u, c);
+        let r: [f64; D] = small::block(self.r, c);
+        function.linearise(&self.laws[c], &u.map(|x| x / scale), &r.map(|x| x * (w / scale)))
     }
-}
-
-/// The function of contact c at `(u, r)`, in pure numbers.
-#[inline(always)]
-fn contact<F: ContactFunction<D, L>, L, const D: usize>(
-    function: &F,
-    law: &OneContact<L>,
-    w: f64,
-    scale: f64,
-    u: &[f64],
-    r: &[f64],
-    c: usize,
-) -> Linearisation<D> {
-    let u: [f64; D] = small::block(u, c);
-    let r: [f64; D] = small::block(r, c);
-    function.linearise(law, &u.map(|x| x / scale), &r.map(|x| x * (w / scale)))
-}
-
-/// `½ Σ‖Φ_c‖²`.
-fn merit_at<F: ContactFunction<D, L>, L, const D: usize>(
-    function: &F,
-    laws: &[OneContact<L>],
-    unit: &[f64],
-    scale: f64,
-    u: &[f64],
-    r: &[f64],
-) -> f64 {
-    let mut merit = 0.0;
-    for (c, (law, &w)) in laws.iter().zip(unit).enumerate() {
-        let phi = contact(function, law, w, scale, u, r, c).phi;
-        merit += 0.5 * phi.iter().map(|x| x * x).sum::<f64>();
-    }
-    merit
 }

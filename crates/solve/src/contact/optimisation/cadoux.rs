@@ -316,7 +316,7 @@ impl<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> CadouxWork<
         self.newton.wait = self.newton.wait.saturating_sub(1);
         if self.accelerator.is_on() {
             self.accelerator.begin(&self.s);
-            self.accelerator.advance(&mut self.image, |c| f64::from(problem.mu()[c] > 0.0));
+            self.accelerator.advance(&mut self.image, &|c| f64::from(problem.mu()[c] > 0.0));
             for (s, image) in self.s.iter_mut().zip(&self.image) {
                 *s = image.max(0.0);
             }

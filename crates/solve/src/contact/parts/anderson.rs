@@ -234,7 +234,7 @@ impl Accelerator {
     }
 
     /// Turns `g(x)` into the next x; the norm is that of `weight(i) f_i`.
-    pub fn advance(&mut self, g: &mut [f64], weight: impl Fn(usize) -> f64) {
+    pub fn advance(&mut self, g: &mut [f64], weight: &dyn Fn(usize) -> f64) {
         for (i, f) in self.f.iter_mut().enumerate() {
             *f = weight(i) * (g[i] - self.start[i]);
         }
@@ -342,7 +342,7 @@ mod tests {
         for _ in 0..5 {
             accelerator.begin(&x);
             x = g(&x);
-            accelerator.advance(&mut x, |_| 1.0);
+            accelerator.advance(&mut x, &|_| 1.0);
         }
         let gx = g(&x);
         assert!(x.iter().zip(&gx).all(|(a, b)| (a - b).abs() < 1e-12), "{x:?} {gx:?}");
@@ -353,14 +353,14 @@ mod tests {
         let mut a = Accelerator::new(1, 1);
         a.begin(&[0.0]);
         let mut x = [1.0];
-        a.advance(&mut x, |_| 1.0); // f = 1, nothing to compare with: x = 1
+        a.advance(&mut x, &|_| 1.0); // f = 1, nothing to compare with: x = 1
         a.begin(&x);
         x = [1.5];
-        a.advance(&mut x, |_| 1.0); // f = 0.5; the secant step: x = 2
+        a.advance(&mut x, &|_| 1.0); // f = 0.5; the secant step: x = 2
         assert!((x[0] - 2.0).abs() < 1e-14);
         a.begin(&x);
         x = [12.0];
-        a.advance(&mut x, |_| 1.0); // f = 10 > 2 · 0.5: back to the plain 1.5
+        a.advance(&mut x, &|_| 1.0); // f = 10 > 2 · 0.5: back to the plain 1.5
         assert_eq!(x, [1.5]);
     }
 }

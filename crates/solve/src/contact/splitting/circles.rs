@@ -58,7 +58,7 @@ impl Circles {
     pub(super) fn observe<P: Contacts<D>, const D: usize>(
         &mut self,
         problem: &P,
-        unit: impl Fn(usize) -> f64,
+        unit: &dyn Fn(usize) -> f64,
         r: &[f64],
         estimate: f64,
     ) -> Option<Certificate> {
@@ -87,7 +87,7 @@ impl Circles {
 
 /// The cosine of the angle between two successive sweeps' moves, in units of velocity; 0 where nothing moved.
 fn alignment<const D: usize>(
-    unit: impl Fn(usize) -> f64,
+    unit: &dyn Fn(usize) -> f64,
     first: &[f64],
     second: &[f64],
     r: &[f64],

@@ -221,7 +221,7 @@ where
         }
         let estimate = moves.sum.sqrt();
         let unit = |c: usize| work.units[c];
-        match work.circles.observe(problem, unit, r, estimate) {
+        match work.circles.observe(problem, &unit, r, estimate) {
             Some(ray) => Step::NoSolution(ray),
             None => Step::Continue { estimate },
         }

@@ -339,13 +339,13 @@ where
         }
         let estimate = moves.sqrt();
         let unit = |c: usize| contacts[c].unit;
-        if let Some(ray) = circles.observe(problem, unit, r, estimate) {
+        if let Some(ray) = circles.observe(problem, &unit, r, estimate) {
             return Step::NoSolution(ray);
         }
         work.since += 1;
         if accelerated && work.since >= self.settings.anderson_every {
             work.since = 0;
-            work.accelerator.advance(r, |i| unit(i / D));
+            work.accelerator.advance(r, &|i| unit(i / D));
             for c in 0..problem.contacts() {
                 let inside = problem.law(c).project(&small::block::<D>(r, c));
                 r[D * c..D * c + D].copy_from_slice(&inside);
