@@ -198,16 +198,10 @@ struct Skeleton<'a, P: Disked<D>, const D: usize> {
 
 impl<'a, P: Linearised<D> + Disked<D>, const D: usize> Skeleton<'a, P, D> {
     fn of<F: ContactFunction<D, P::Law>>(newton: &'a Newton<F>) -> Self {
-        let Newton { function, line_search, rho_rule, rho, warm_up, rescue, smoothing } = newton;
-        let settings = Newton {
-            function: (),
-            line_search: *line_search,
-            rho_rule: *rho_rule,
-            rho: *rho,
-            warm_up: *warm_up,
-            rescue: *rescue,
-            smoothing: *smoothing,
-        };
+        let Newton { ref function, line_search, rho_rule, rho, warm_up, rescue, smoothing } =
+            *newton;
+        let settings =
+            Newton { function: (), line_search, rho_rule, rho, warm_up, rescue, smoothing };
         Self { function, smoothed: F::SMOOTHED, settings }
     }
 
