@@ -5,7 +5,7 @@
 //! takes what changes a bit.
 //!
 //! `u = 0` solves Coulomb's law wherever `W r + q = 0` has a solution in K, which makes it one of the convex relaxation, `min ½ rᵀW r + qᵀr` in K: a few
-//! iterations of its interior point tell. The law itself may have other solutions, which move and take long to find. So the bodies of a large island that are slow,
+//! solves with one factor, or iterations of its interior point, tell. The law itself may have other solutions, which move and take long to find. So the bodies of a large island that are slow,
 //! whose contacts are new, are first asked whether they may stay at rest.
 
 use std::cmp::Reverse;

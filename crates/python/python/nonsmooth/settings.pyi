@@ -232,8 +232,8 @@ class Condense(Prefixed):
     ) -> None: ...
 
 class ConvexRelaxation(Settings):
-    """convex_relaxation: interior point on the convex relaxation (s = 0), which is Coulomb's law only
-    where nothing slides
+    """convex_relaxation: search for rest and interior point on the convex relaxation (s = 0), which is
+    Coulomb's law only where nothing slides
 
     For problems friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d.
 
@@ -244,7 +244,7 @@ class ConvexRelaxation(Settings):
     patience : int, default 30
         Steps without a smaller residual of the convex problem after which it gives up.
 
-    References: NesterovTodd1998, Mehrotra1992, Acary2018.
+    References: EcksteinBertsekas1992, NesterovTodd1998, Mehrotra1992, Acary2018.
     """
 
     def __init__(

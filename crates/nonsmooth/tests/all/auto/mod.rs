@@ -183,6 +183,21 @@ fn a_shaken_wall_is_solved_along_its_central_path() {
     assert!(along, "{:?}", end.account);
 }
 
+/// After the sweeps the weight of the upper rows has yet to come down to the lower ones, and contacts open.
+#[test]
+fn a_wall_with_head_joints_rests() {
+    for mu in [0.3, 0.8] {
+        let wall = Wall { rows: 24, columns: 24, head_joints: true, mu, ..Wall::default() };
+        let problem = wall.build().unwrap().problem().unwrap();
+        for solver in ["auto", "convex_relaxation"] {
+            let end = run(&problem, solver, &[], &within(1e-10, 60.0));
+            let Outcome { status, factorisations, .. } = end.outcome;
+            assert_eq!(status, Status::Solved, "{solver}, {mu}");
+            assert!(factorisations <= 3, "{solver}, {mu}: {factorisations}, {:?}", end.account);
+        }
+    }
+}
+
 /// `auto` solves the pyramid of spheres with this base, and says that it did so by `means`.
 fn solves_pyramid(base: usize, means: &str) {
     let pyramid = Spheres { base, ..Spheres::default() };

@@ -7,8 +7,9 @@
 //! 1. **Sweeps**: exact Gauss–Seidel for as long as its rate of convergence promises the tolerance sooner than a few
 //!    factorisations would, and after stage 2 until they have cost one. Many problems end here. Between them, here and in stage 6, the contacts that
 //!    still move are followed where they are few ([`Sweep::follow`]).
-//! 2. **Rest** (`alternating.rs`): impulses within the cones that leave nothing moving, where the sweeps show nothing that flies apart. One factorisation and
-//!    a few solves end structures at rest, whatever their height; one solve tells whether it is one.
+//! 2. **Rest** (`parts/alternating.rs`): impulses within the cones that leave nothing moving, where the sweeps show nothing that flies apart. One factorisation and
+//!    a few solves end structures at rest, whatever their height; one solve tells whether it is one. Where contacts open because weights have yet to come down to them, as in walls
+//!    with head joints, it comes when the sweeps have cost a factorisation, and has some solves more.
 //! 3. **Trial**: Newton's iterations of stage 5 without its proximal term, where the sweeps came near or the structure is not hyperstatic, for as long as each halves the error; there sweeps come to
 //!    its rescue a few times.
 //! 4. **Interior point** on the exact law ([`Central`]), a starter: some 8 to 20 iterations lead near the solution of a problem
@@ -19,7 +20,7 @@
 //!    where they are. After a trial in vain from near a solution they come first.
 //! 7. **The central path by its arc length** ([`Pursuit`]), where Newton's iterations promise to be many: it turns back with the
 //!    path where stage 4 is stuck. Up to three times, each time smoothed by less and for longer. Walls that are shaken end here.
-//! 8. **Alternating directions** (`alternating.rs`) after many proximal steps, for as long as they promise more.
+//! 8. **Alternating directions** (`parts/alternating.rs`) after many proximal steps, for as long as they promise more.
 //! 9. **Motion and impulses in turn** (`in_turn.rs`), where a problem is stated by its bodies, once, after many proximal steps that are still far off or at the first change of strategy:
 //!    what moves with what rests as its support, then the impulses of all from that motion.
 //! 10. **Another strategy** (other ρ, more sweeps, a start from zero) where the error has not halved for long; at the first time
@@ -38,12 +39,10 @@
 //! (local), a step of 7 two or three. The choice goes by counted operations, never by the clock, so a run repeats itself bit by bit.
 //! Fails: impacts on thousands of hyperstatic contacts may need more factorisations than patience allows.
 
-mod alternating;
 mod controller;
 mod held;
 mod in_turn;
 mod proximal_newton;
-mod rate;
 mod starts;
 
 use nonsmooth_linalg::budget;
@@ -57,15 +56,15 @@ use crate::contact::form::{
     Access, Blockwise, Costs, Disked, Holding, Linearised, OnContacts, has_bounds,
 };
 use crate::contact::law::local::{LocalSolver, Projection};
-use crate::contact::parts::{Central, Pursuit, Sweep, put_within_bounds, sweep_rows};
+use crate::contact::parts::{
+    Alternating, Central, Pursuit, Rate, Sweep, put_within_bounds, sweep_rows,
+};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{Limits, SolveError, Solver, Step};
-use alternating::Alternating;
 use controller::{Controller, Origin, Verdict};
 use held::Held;
 use in_turn::{Came, InTurn};
-use rate::Rate;
 use starts::Halvings;
 
 /// The hyperparameters of `auto`; none needs to be set.
@@ -176,8 +175,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     /// An exact solution, rounded, that the judge has yet to see.
     exact: Option<P::Point>,
     asked: bool,
-    /// Stage 2 has been, or was not worth a factorisation.
-    rest_sought: bool,
+    rest: RestSearch,
     /// Motion and impulses have been sought in turn, or cannot be.
     turned: bool,
     /// The interior point was left out: after so many Newton iterations, at this error.
@@ -187,11 +185,11 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     done: Done,
 }
 
-/// Where the method stands.
+/// Where the method stands. A search for rest may have been put off.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
     Sweeps { claims: usize },
-    Rest,
+    Rest { later: bool },
     Trial { idle: usize, least: f64, rescues: usize },
     Interior { halvings: Halvings, short: usize },
     Newton,
@@ -201,6 +199,18 @@ enum Stage {
     Pursuit { halvings: Halvings, most: usize },
     Alternating,
     Held,
+}
+
+/// Whether stage 2 is still to come.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum RestSearch {
+    /// Nobody has looked.
+    #[default]
+    Open,
+    /// Something flies apart: not before the sweeps have cost a factorisation.
+    PutOff,
+    /// It has been, or there is no use for it.
+    Done,
 }
 
 /// Where the solve began.
@@ -279,7 +289,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             existence: None,
             exact: None,
             asked: false,
-            rest_sought: false,
+            rest: RestSearch::default(),
             turned: false,
             passed_by: None,
             from_here: false,
@@ -321,7 +331,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
         work.stage = FIRST;
         work.rate.begin();
         (work.existence, work.exact, work.asked) = (None, None, false);
-        (work.passed_by, work.rest_sought, work.spread) = (None, false, None);
+        (work.passed_by, work.rest, work.spread) = (None, RestSearch::default(), None);
         (work.turned, work.in_turn) = (false, None);
         (work.held, work.hold_after) = (None, FIRST_SWEEPS);
     }
@@ -334,7 +344,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
         work.exact = None;
         match work.stage {
             Stage::Sweeps { claims } => self.sweep(problem, point, work, claims),
-            Stage::Rest => self.rest(problem, point, work),
+            Stage::Rest { .. } => self.rest(problem, point, work),
             Stage::Trial { .. } => self.trial(problem, point, work),
             Stage::Interior { .. } => self.interior(problem, point, work),
             Stage::Newton => self.newton(problem, point, work),
@@ -381,7 +391,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
         }
         if rest > 0 {
             lines.push(match work.stage {
-                Stage::Rest => format!("impulses at rest, found in {rest} iterations"),
+                Stage::Rest { .. } => format!("impulses at rest, found in {rest} iterations"),
                 _ => "impulses at rest, sought in vain".into(),
             });
         }
@@ -556,7 +566,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         // Whether W has spread costs a pass over it, and is asked only where it matters.
         let promising =
             if with != without && starts::has_spread(problem, work) { with } else { without }
-                || work.rest_sought && self.sweeps_are_cheap(work, costs);
+                || work.rest != RestSearch::Open && self.sweeps_are_cheap(work, costs);
         if !promising {
             self.leave_sweeps(problem, point, work);
         }
@@ -664,7 +674,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         let error = newton.look(problem, state, r);
         controller.begin(error);
         // The search for rest begins at no impulses: not from a point that came near.
-        work.rest_sought |= work.done.start == Start::Given && error < NEAR;
+        if work.done.start == Start::Given && error < NEAR {
+            work.rest = RestSearch::Done;
+        }
         if !self.0.interior {
             self.subproblem(point, work, error);
         } else {

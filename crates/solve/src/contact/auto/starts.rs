@@ -3,16 +3,18 @@
 
 use nonsmooth_problem::check::Kinematic;
 
-use super::alternating::Way;
 use super::controller::Controller;
-use super::{Auto, Done, FIRST, FIRST_SWEEPS, HybridWork, NEAR, REST, Stage, swept};
+use super::{Auto, Done, FIRST, FIRST_SWEEPS, HybridWork, NEAR, REST, RestSearch, Stage, swept};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
-use crate::contact::parts::Central;
+use crate::contact::parts::{Central, Way};
 
-/// Rest is sought where contacts without impulse open no faster than this part of ‖q‖ after the sweeps (at rest at most 2e-3, in motion 1e-2 and more); it is
-/// given up where its first iteration leaves more than this (at rest at most 5e-2, else .2 and more), and is not judged by its rate before so many.
+/// Rest is sought at once where contacts without impulse open no faster than this part of ‖q‖ after the sweeps (at rest at most 2e-3, in motion 1e-2 and more); or, once they have cost a
+/// factorisation and W has not spread, where the weight of what stands above has yet to come down to them: they open no faster than this part of the error (in walls with head joints at rest .2 to .6,
+/// in motion mostly above 1).
 const OPENING: f64 = 5e-3;
+const FALLING: f64 = 0.6;
+/// Where it was sought at once it is given up where its first iteration leaves more than this (at rest at most 5e-2, else .2 and more), and is not judged by its rate before so many.
 const REST_NEAR: f64 = 0.1;
 const REST_FIRST: usize = 6;
 /// Newton's method is tried with this ε, until so many iterations in a row have not halved the error, or its first direction leads this far; where W has little spread, below this error.
@@ -83,17 +85,24 @@ impl<const D: usize> OnContacts<Auto, D> {
         work: &mut HybridWork<P, D>,
         error: f64,
     ) {
-        if work.rest_sought {
+        if work.rest == RestSearch::Done {
             return self.begin_trial(problem, point, work, error);
         }
-        work.rest_sought = true;
-        let HybridWork { alternating, state, stage, newton, .. } = work;
-        let quiet = newton.as_ref().is_some_and(|n| n.opening(P::impulses(point)) < OPENING);
-        if quiet
-            && alternating.get_or_insert_default().begin(problem, state, Way::Rest, None).is_ok()
-        {
+        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        let opening = work.newton.as_ref().map_or(f64::NAN, |n| n.opening(P::impulses(point)));
+        let later = opening.is_nan() || opening >= OPENING;
+        if later && work.rest == RestSearch::Open && self.sweeps_are_cheap(work, costs) {
+            work.rest = RestSearch::PutOff;
+            return self.without_rest(problem, point, work, error);
+        }
+        work.rest = RestSearch::Done;
+        if later && (opening.is_nan() || opening >= FALLING * error || has_spread(problem, work)) {
+            return self.begin_trial(problem, point, work, error);
+        }
+        let HybridWork { alternating, state, stage, .. } = work;
+        if alternating.get_or_insert_default().begin(problem, state, Way::Rest, None).is_ok() {
             work.rate.begin();
-            *stage = Stage::Rest;
+            *stage = Stage::Rest { later };
         } else {
             self.without_rest(problem, point, work, error);
         }
@@ -111,8 +120,15 @@ impl<const D: usize> OnContacts<Auto, D> {
             Some(iterate) => iterate,
             None => return lost(),
         };
-        let young = estimate < REST_NEAR && steps < REST_FIRST;
-        if !young && !self.promises(problem, work, REST) || estimate.is_nan() {
+        let (Stage::Rest { later }, Some(alternating)) = (work.stage, &work.alternating) else {
+            return lost();
+        };
+        let (young, hopeless) = if later {
+            (alternating.is_young(), alternating.is_hopeless(estimate))
+        } else {
+            (estimate < REST_NEAR && steps < REST_FIRST, estimate.is_nan())
+        };
+        if hopeless || !young && !self.promises(problem, work, REST) {
             let error = self.end_alternating(problem, point, work);
             self.without_rest(problem, point, work, error);
         }

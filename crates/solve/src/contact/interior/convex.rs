@@ -3,23 +3,29 @@
 //! Problem: `min ½ rᵀW r + qᵀr` over `r ∈ K`, or `K* ∋ W r + q ⟂ r ∈ K`: Coulomb's law without De Saxcé's term `mu‖u_T‖`, as if
 //! a contact that slides with u_T had to open with `u_N = mu‖u_T‖`. Where nothing slides its solutions are Coulomb's.
 //!
-//! Method: Mehrotra's predictor–corrector with Nesterov–Todd scaling and an infeasible start, see `parts::central`. It ends
+//! Method: first impulses in K with `W r + q = 0`, a minimum of zero, by alternating directions with a penalty that vanishes (`parts::alternating`), for as long as they promise to end for
+//! less than ten factorisations. Then Mehrotra's predictor–corrector with Nesterov–Todd scaling and an infeasible start, see `parts::central`. It ends
 //! when the convex problem is solved to rounding; the judge measures the residual of Coulomb's law, so that a problem whose
 //! contacts slide ends as not solved.
 //!
-//! References: Acary, lecture (123)(124) with s = 0; NesterovTodd1998; Mehrotra1992.
-//! Cost of a step: one factorisation of `Q + P W`, two solves, two products. Storage: 20 vectors and five blocks a contact.
+//! References: Acary, lecture (123)(124) with s = 0; EcksteinBertsekas1992; NesterovTodd1998; Mehrotra1992.
+//! Cost of a step: one solve and one projection a contact, all with one factorisation; of the interior point one factorisation of `Q + P W`, two solves, two products. Storage: 26 vectors and seven blocks a contact.
 //! Fails: where the relaxation has no solution (r grows without bound).
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::form::{Access, Frictional, Linearised, OnContacts};
-use crate::contact::parts::ConvexIp;
+use crate::contact::parts::{Alternating, ConvexIp, Rate, Way};
 use crate::core::ranges::{at_least, positive};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
+
+/// The search for rest may cost this many factorisations.
+const REST: f64 = 10.0;
+/// What that promises is compared with this residual, below any that is asked for.
+const RESTS: f64 = 1e-13;
 
 /// When the convex problem counts as solved, and when as hopeless.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -49,22 +55,54 @@ impl Described for ConvexRelaxation {
         name: "convex_relaxation",
         family: "interior",
         solves: Solves::Relaxation,
-        summary: "interior point on the convex relaxation (s = 0), which is Coulomb's law only where nothing slides",
+        summary: "search for rest and interior point on the convex relaxation (s = 0), which is Coulomb's law only where nothing slides",
         needs: &[],
-        cites: &["NesterovTodd1998", "Mehrotra1992", "Acary2018"],
+        cites: &["EcksteinBertsekas1992", "NesterovTodd1998", "Mehrotra1992", "Acary2018"],
         variants: &[],
         settings: described::<Self>,
     };
 }
 
+/// What a step does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    Rest,
+    Interior,
+}
+
 /// The iterate on the cones with its factors.
 pub struct RelaxedWork<P: Linearised<D> + Frictional<D>, const D: usize> {
     state: P::State,
+    rest: Alternating<D>,
+    rate: Rate,
+    stage: Stage,
     ip: ConvexIp<D>,
     /// s = 0.
     s: Vec<f64>,
     error: f64,
     since_best: usize,
+}
+
+impl<P: Linearised<D> + Frictional<D>, const D: usize> RelaxedWork<P, D> {
+    /// One iteration of the search for rest, whose impulses become r.
+    fn seek_rest(&mut self, problem: &P, r: &mut [f64]) {
+        let Self { rest, rate, state, .. } = self;
+        let estimate = rest.iterate(problem, state);
+        rate.note(estimate);
+        r.copy_from_slice(rest.impulses());
+        let costs = problem.costs(state);
+        let promises = |limit| rate.promises(RESTS, costs.solve, limit);
+        let goes_on = rest.is_young() || promises(REST * costs.factorisation);
+        if rest.is_hopeless(estimate) || !goes_on {
+            self.begin_interior(problem);
+        }
+    }
+
+    fn begin_interior(&mut self, problem: &P) {
+        self.stage = Stage::Interior;
+        self.error = self.ip.begin(problem, &mut self.state, &self.s, None).error;
+        self.since_best = 0;
+    }
 }
 
 impl<P: Linearised<D> + Frictional<D>, const D: usize> Solver<P>
@@ -75,7 +113,16 @@ impl<P: Linearised<D> + Frictional<D>, const D: usize> Solver<P>
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
         let state = problem.state(Access::Newton)?;
         let s = vec![0.0; problem.mu().len()];
-        Ok(RelaxedWork { state, ip: ConvexIp::new(), s, error: f64::INFINITY, since_best: 0 })
+        Ok(RelaxedWork {
+            state,
+            rest: Alternating::default(),
+            rate: Rate::default(),
+            stage: Stage::Rest,
+            ip: ConvexIp::new(),
+            s,
+            error: f64::INFINITY,
+            since_best: 0,
+        })
     }
 
     fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
@@ -84,13 +131,20 @@ impl<P: Linearised<D> + Frictional<D>, const D: usize> Solver<P>
     }
 
     fn start(&self, problem: &P, _: &mut P::Point, work: &mut Self::Work) {
-        work.error = work.ip.begin(problem, &mut work.state, &work.s, None).error;
-        work.since_best = 0;
+        work.rate.begin();
+        work.stage = Stage::Rest;
+        if work.rest.begin(problem, &mut work.state, Way::Relaxed, None).is_err() {
+            work.begin_interior(problem);
+        }
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
         if let Some(ray) = problem.contradiction(&work.state) {
             return Step::NoSolution(ray.clone().into());
+        }
+        if work.stage == Stage::Rest {
+            work.seek_rest(problem, P::impulses(point));
+            return Step::Continue { estimate: f64::NAN };
         }
         let Ok(now) = work.ip.iterate(problem, &mut work.state) else {
             return Step::Stuck("the matrix of the interior-point step is singular".into());

@@ -1,18 +1,22 @@
 //! What two families of the wing share.
 
+mod alternating;
 mod anderson;
 mod central;
 mod clarabel;
 mod conic;
 pub mod nt;
 mod pursuit;
+mod rate;
 mod rows;
 mod sweep;
 
+pub use alternating::{Alternating, Way};
 pub use anderson::{Accelerator, Anderson};
 pub use central::{Central, Iterate as CentralIterate};
 pub use clarabel::{Clarabel, Ended, Shape};
 pub use conic::{ConvexEnd, ConvexIp};
 pub use pursuit::Pursuit;
+pub use rate::Rate;
 pub use rows::{put_within_bounds, sweep_rows};
 pub use sweep::{NEGLIGIBLE, Sweep};

@@ -8,7 +8,7 @@ const KEPT: usize = 64;
 
 /// The estimates of an iteration that converges linearly, more or less, one a step.
 #[derive(Debug, Clone)]
-pub(super) struct Rate {
+pub struct Rate {
     /// Those of the steps 0, `stride`, 2 `stride`, ...
     estimates: [f64; KEPT],
     stride: usize,
@@ -25,12 +25,12 @@ impl Default for Rate {
 
 impl Rate {
     /// Forgets everything.
-    pub(super) fn begin(&mut self) {
+    pub fn begin(&mut self) {
         *self = Self::default();
     }
 
     /// Notes the estimate of a step.
-    pub(super) fn note(&mut self, estimate: f64) {
+    pub fn note(&mut self, estimate: f64) {
         if self.steps == KEPT * self.stride {
             (0..KEPT / 2).for_each(|k| self.estimates[k] = self.estimates[2 * k]);
             self.stride *= 2;
@@ -44,7 +44,7 @@ impl Rate {
 
     /// How many more steps it takes to `tolerance` at the mean rate of the second half of the steps so far, which a single step that raises the
     /// estimate does not upset; infinite where the estimates do not fall.
-    pub(super) fn left(&self, tolerance: f64) -> f64 {
+    pub fn left(&self, tolerance: f64) -> f64 {
         if self.steps < 2 {
             return f64::INFINITY;
         }
@@ -55,7 +55,7 @@ impl Rate {
     }
 
     /// Whether the steps left, each of which costs `cost`, cost less than `limit`, and those done were not several times as dear.
-    pub(super) fn promises(&self, tolerance: f64, cost: f64, limit: f64) -> bool {
+    pub fn promises(&self, tolerance: f64, cost: f64, limit: f64) -> bool {
         self.left(tolerance) * cost < limit && self.steps as f64 * cost < BELIEF * limit
     }
 }

@@ -9,10 +9,10 @@
 //! t = α r + (1 − α) z + y,    z = P_K(t),    y = t − z.
 //! ```
 //!
-//! `auto` runs it in two ways. *Rest*: ρ = 1e-6, α = 1, from nothing. As ρ vanishes it is the Douglas–Rachford iteration between the impulses that leave
+//! It is run in three ways. *Rest*: ρ = 1e-6, α = 1, from nothing. As ρ vanishes it is the Douglas–Rachford iteration between the impulses that leave
 //! nothing moving (`W r + q = 0`) and the cones: the static problem of limit analysis. Where the impulses of least norm lie well within the cones the first few
 //! iterations end it, however tall the structure; the fixed points obey the law whatever ρ, so that contacts that do move cost iterations, not
-//! correctness. *General*: ρ about 0.1, balanced between the two residuals at a few steps, α = 1.6.
+//! correctness. *Relaxed*: the same with s = 0, the convex relaxation, which has the same solutions at rest. *General*: ρ about 0.1, balanced between the two residuals at a few steps, α = 1.6.
 //!
 //! References: EcksteinBertsekas1992 (Douglas–Rachford and ADMM); Carpentier2024 (the exact law); BoydParikhChuPeleatoEckstein2011 (α, balancing).
 //! Cost: one factorisation of `W + ρ w` for each ρ; an iteration one solve with it, refined with products with W, and nc projections.
@@ -28,11 +28,18 @@ use crate::contact::law::cone::ConvexSet;
 const BALANCE_AFTER: [usize; 5] = [20, 60, 150, 400, 1000];
 const BALANCED: f64 = 5.0;
 
-/// The two ways of running it.
+/// Rest where it is not to be expected: given up where the first iteration leaves more than this (at rest .3 to 2), the second more than a part of that (at rest .35 to .4), or the tenth more than is near.
+const FAR: f64 = 2.5;
+const FALL: f64 = 0.5;
+const FIRST: usize = 10;
+const NEAR: f64 = 0.1;
+
+/// The ways of running it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Way {
+pub enum Way {
     #[default]
     Rest,
+    Relaxed,
     General,
 }
 
@@ -40,7 +47,7 @@ impl Way {
     /// ρ, and α. Walls and towers of up to 540 layers at rest take the same few iterations with ρ from 1e-4 to 1e-7.
     fn parameters(self) -> (f64, f64) {
         match self {
-            Way::Rest => (1e-6, 1.0),
+            Way::Rest | Way::Relaxed => (1e-6, 1.0),
             Way::General => (0.1, 1.6),
         }
     }
@@ -48,10 +55,12 @@ impl Way {
 
 /// The iterate.
 #[derive(Debug, Default)]
-pub(super) struct Alternating<const D: usize> {
+pub struct Alternating<const D: usize> {
     way: Way,
     rho: f64,
     steps: usize,
+    /// What the first iteration left.
+    first: f64,
     /// `w_c`, positive, and ‖q‖.
     unit: Vec<f64>,
     scale: f64,
@@ -67,7 +76,7 @@ pub(super) struct Alternating<const D: usize> {
 
 impl<const D: usize> Alternating<D> {
     /// Allocates for so many contacts, where that has not been done.
-    pub(super) fn make_room(&mut self, contacts: usize) {
+    pub fn make_room(&mut self, contacts: usize) {
         for x in [&mut self.q, &mut self.r, &mut self.z, &mut self.y, &mut self.right, &mut self.wr]
         {
             x.resize(D * contacts, 0.0);
@@ -78,7 +87,7 @@ impl<const D: usize> Alternating<D> {
     }
 
     /// Factorises, and begins at the impulses `start`, or at none. Errors: a matrix that cannot be factorised.
-    pub(super) fn begin<P: Linearised<D> + Disked<D>>(
+    pub fn begin<P: Linearised<D> + Disked<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -142,19 +151,22 @@ impl<const D: usize> Alternating<D> {
     }
 
     /// One iteration; returns the larger of the residuals of the splitting, relative to ‖q‖: infinite where a matrix cannot be factorised.
-    pub(super) fn iterate<P: Linearised<D> + Disked<D>>(
+    pub fn iterate<P: Linearised<D> + Disked<D>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
     ) -> f64 {
         let alpha = self.way.parameters().1;
+        let shifted = self.way != Way::Relaxed;
         let Self { unit, scale, rho, q, r, z, y, right, wr, .. } = self;
         for (c, w) in unit.iter().enumerate() {
             let dual: [f64; D] = small::block::<D>(y, c).map(|y| -*rho * w * y);
             for i in D * c..D * c + D {
                 right[i] = *rho * w * (z[i] - y[i]) - q[i];
             }
-            right[D * c] -= problem.law(c).shift(&dual);
+            if shifted {
+                right[D * c] -= problem.law(c).shift(&dual);
+            }
         }
         problem.solve_linearised(state, right, r, wr);
         let (mut primal, mut dual) = (0.0, 0.0);
@@ -172,8 +184,12 @@ impl<const D: usize> Alternating<D> {
         }
         let (primal, dual) = (primal.sqrt() / *scale, dual.sqrt() / *scale);
         self.steps += 1;
+        let estimate = primal.max(dual);
+        if self.steps == 1 {
+            self.first = estimate;
+        }
         match self.balance(problem, state, primal / dual) {
-            Ok(()) => primal.max(dual),
+            Ok(()) => estimate,
             Err(Singular) => f64::INFINITY,
         }
     }
@@ -198,13 +214,29 @@ impl<const D: usize> Alternating<D> {
         self.factorise(problem, state)
     }
 
+    /// Whether so few iterations are no reason to give up.
+    pub fn is_young(&self) -> bool {
+        self.steps < FIRST
+    }
+
+    /// Whether what the last iteration left says that there is no rest, or a slow way to it.
+    pub fn is_hopeless(&self, estimate: f64) -> bool {
+        let most = match self.steps {
+            1 => FAR,
+            2 => FALL * self.first,
+            FIRST => NEAR,
+            _ => f64::INFINITY,
+        };
+        estimate > most || estimate.is_nan()
+    }
+
     /// The steps done since it began.
-    pub(super) fn steps(&self) -> usize {
+    pub fn steps(&self) -> usize {
         self.steps
     }
 
     /// The impulses, within the cones.
-    pub(super) fn impulses(&self) -> &[f64] {
+    pub fn impulses(&self) -> &[f64] {
         &self.z
     }
 }
