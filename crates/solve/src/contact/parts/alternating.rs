@@ -37,9 +37,12 @@ const NEAR: f64 = 0.1;
 /// The ways of running it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Way {
+    /// With a penalty that vanishes.
     #[default]
     Rest,
+    /// So, with s = 0.
     Relaxed,
+    /// With a penalty that is balanced.
     General,
 }
 
