@@ -77,7 +77,7 @@ impl Finite for nonsmooth_problem::GlobalPoint {
 /// All solvers of a kind, each within the time limit and after a cancellation.
 fn all_end<P: Registered<Point: Finite>>(problem: &P, what: &str) {
     let _alone = alone();
-    let (mut late, mut unjudged) = (vec![], vec![]);
+    let mut late = vec![];
     let begun = Instant::now();
     drop(problem.gauge().unwrap());
     // Where the judge is not even prepared in time, nothing is judged.
@@ -121,9 +121,7 @@ fn all_end<P: Registered<Point: Finite>>(problem: &P, what: &str) {
                         assert_eq!(limit, expected, "{name} on {what}");
                     }
                     let known = outcome.measure != Measure::unknown();
-                    if judged && !known {
-                        unjudged.push(format!("{name} (cancelled: {cancelled})"));
-                    }
+                    assert!(known || !judged, "{name} on {what}");
                 }
                 Err(e) => assert!(e.is_inapplicable(), "{name} on {what}: {e}"),
             }
@@ -134,9 +132,6 @@ fn all_end<P: Registered<Point: Finite>>(problem: &P, what: &str) {
         }
     }
     assert!(late.is_empty(), "{what}:\n{}", late.join("\n"));
-    // Where other work goes on beside, one of hundreds may be held up in the middle of what has a tenth of a second.
-    let chance = usize::from(slack() > 1.0);
-    assert!(unjudged.len() <= chance, "{what}, not judged:\n{}", unjudged.join("\n"));
 }
 
 /// A sparse random M with a heavy diagonal: sweeps do not converge, and its LU fills up.

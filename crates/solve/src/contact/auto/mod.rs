@@ -118,8 +118,6 @@ const SWEEPS_JUDGED_SHARED: usize = 4;
 /// they often are.
 const SWEEPS_WORTH: f64 = 3.0;
 const SWEEPS_WORTH_SPREAD: f64 = 10.0;
-/// A search for rest may cost this many factorisations.
-const REST: f64 = 10.0;
 /// The interior point begins far from any point given; below this error one is better off without it, and no sweep from zero comes as near but where sweeps end at once.
 const NEAR: f64 = 1e-4;
 /// Above this error between two proximal steps, sweeps.

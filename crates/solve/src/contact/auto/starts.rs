@@ -4,10 +4,10 @@
 use nonsmooth_problem::check::Kinematic;
 
 use super::controller::Controller;
-use super::{Auto, Done, FIRST, FIRST_SWEEPS, HybridWork, NEAR, REST, RestSearch, Stage, swept};
+use super::{Auto, Done, FIRST, FIRST_SWEEPS, HybridWork, NEAR, RestSearch, Stage, swept};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
-use crate::contact::parts::{Central, Way};
+use crate::contact::parts::{Central, REST, Way};
 
 /// Rest is sought at once where contacts without impulse open no faster than this part of ‖q‖ after the sweeps (at rest at most 2e-3, in motion 1e-2 and more); or, once they have cost a
 /// factorisation and W has not spread, where the weight of what stands above has yet to come down to them: they open no faster than this part of the error (in walls with head joints at rest .2 to .6,
@@ -90,19 +90,20 @@ impl<const D: usize> OnContacts<Auto, D> {
         }
         let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
         let opening = work.newton.as_ref().map_or(f64::NAN, |n| n.opening(P::impulses(point)));
-        let later = opening.is_nan() || opening >= OPENING;
-        if later && work.rest == RestSearch::Open && self.sweeps_are_cheap(work, costs) {
+        let quiet = opening < OPENING;
+        if !quiet && work.rest == RestSearch::Open && self.sweeps_are_cheap(work, costs) {
             work.rest = RestSearch::PutOff;
             return self.without_rest(problem, point, work, error);
         }
         work.rest = RestSearch::Done;
-        if later && (opening.is_nan() || opening >= FALLING * error || has_spread(problem, work)) {
+        let falls = opening < FALLING * error;
+        if !quiet && (!falls || has_spread(problem, work)) {
             return self.begin_trial(problem, point, work, error);
         }
         let HybridWork { alternating, state, stage, .. } = work;
         if alternating.get_or_insert_default().begin(problem, state, Way::Rest, None).is_ok() {
             work.rate.begin();
-            *stage = Stage::Rest { later };
+            *stage = Stage::Rest { later: !quiet };
         } else {
             self.without_rest(problem, point, work, error);
         }

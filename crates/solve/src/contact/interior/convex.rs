@@ -16,15 +16,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::form::{Access, Frictional, Linearised, OnContacts};
-use crate::contact::parts::{Alternating, ConvexIp, Rate, Way};
+use crate::contact::parts::{Alternating, ConvexIp, REST, Rate, Way};
 use crate::core::ranges::{at_least, positive};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{SolveError, Solver, Step};
 
-/// The search for rest may cost this many factorisations.
-const REST: f64 = 10.0;
-/// What that promises is compared with this residual, below any that is asked for.
+/// What the search for rest promises is compared with this residual, below any that is asked for.
 const RESTS: f64 = 1e-13;
 
 /// When the convex problem counts as solved, and when as hopeless.

@@ -28,6 +28,8 @@ use crate::contact::law::cone::ConvexSet;
 const BALANCE_AFTER: [usize; 5] = [20, 60, 150, 400, 1000];
 const BALANCED: f64 = 5.0;
 
+/// A search for rest may cost this many factorisations.
+pub const REST: f64 = 10.0;
 /// Rest where it is not to be expected: given up where the first iteration leaves more than this (at rest .3 to 2), the second more than a part of that (at rest .35 to .4), or the tenth more than is near.
 const FAR: f64 = 2.5;
 const FALL: f64 = 0.5;

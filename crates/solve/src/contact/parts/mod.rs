@@ -11,7 +11,7 @@ mod rate;
 mod rows;
 mod sweep;
 
-pub use alternating::{Alternating, Way};
+pub use alternating::{Alternating, REST, Way};
 pub use anderson::{Accelerator, Anderson};
 pub use central::{Central, Iterate as CentralIterate};
 pub use clarabel::{Clarabel, Ended, Shape};
