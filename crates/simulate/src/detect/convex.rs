@@ -74,15 +74,15 @@ struct Meeting {
     on: [Vec3; 2],
 }
 
-/// All points where a and b are nearer to each other than `prediction`.
+/// All points where a and b are nearer to each other than `prediction`; whether they are, wherever.
 pub(crate) fn collide(
     a: &Side,
     b: &Side,
     prediction: f64,
     mut found: impl FnMut([Feature; 2], Witness),
-) {
+) -> bool {
     let reach = prediction + a.radius() + b.radius();
-    let Some(meeting) = meeting(a, b, reach) else { return };
+    let Some(meeting) = meeting(a, b, reach) else { return false };
     let n = meeting.normal;
     let (on_a, on_b) = (a.flat(n), b.flat(scale(-1.0, n)));
     match (&on_a, &on_b) {
@@ -93,6 +93,7 @@ pub(crate) fn collide(
         (_, Some(flat)) => on_flat(flat, false, a, prediction, &mut found),
         (None, None) => beside(a, b, &meeting, &mut found),
     }
+    true
 }
 
 /// Where `incident` is nearer than `prediction` to a face of the first body (`on_a`) or the second one.

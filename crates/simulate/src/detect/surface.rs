@@ -2,8 +2,11 @@
 //!
 //! Triangles near a solid are found in a tree of boxes. Each is a polyhedron without thickness for the narrow phase of polyhedra and round solids; for balls there is a
 //! closed form. The surface is more than its triangles: a normal is one of the surface where it lies in the cone of normals of the feature that touches, so that what slides over the edge
-//! between two triangles does not stumble. A triangle that is touched with another normal is met with its own. Points on edges between coplanar triangles are left out: they are there
-//! because of the triangulation, not of the surface. A feature that two triangles share touches once.
+//! between two triangles does not stumble. Points on edges between coplanar triangles are left out: they are there because of the triangulation, not of the surface. A feature that
+//! two triangles share touches once.
+//!
+//! What separates a triangle most from a solid need not be anything of the surface: an edge between coplanar triangles that an edge of the solid crosses, or a face of the solid that is larger
+//! than the triangle and nearly parallel to it. A triangle that is near and is met by nothing that the surface has is met with its own normal, so that a flat field has the contacts of a plane.
 //!
 //! What is behind a closed mesh or below a heightfield is solid: there the outward normals alone are possible.
 
@@ -19,6 +22,7 @@ use crate::detect::hull::{Edge, Hull, PosedHull};
 use crate::detect::segments::Segment;
 use crate::detect::witness::{Anchor, Feature, Witness};
 use crate::rotation::Pose;
+use crate::state::Axis;
 
 /// A normal that leaves its cone by less is one of the surface.
 pub(super) const CONE: f64 = 1e-6;
@@ -28,6 +32,10 @@ const COPLANAR: f64 = 1e-6;
 pub(super) const FACING: f64 = 1e-2;
 /// A triangle is met with its own normal where it is not deeper than this share of the size of the other solid.
 pub(super) const DEEP: f64 = 0.25;
+/// The same where nothing says that another triangle is nearer.
+const SHALLOW: f64 = 0.01;
+/// A vertex touches a face although the surface goes on beyond it, if it does so at this slope or less: corners of a body that leans a little are there before they are lowest.
+const SLOPE: f64 = 0.05;
 /// Triangles in a leaf of the tree.
 const LEAF: usize = 4;
 const NONE: u32 = u32::MAX;
@@ -43,6 +51,8 @@ pub(crate) struct Surface {
     pub(super) sides: Vec<[u32; 3]>,
     /// The two triangles of each edge, the second one may be none, and whether they are coplanar.
     pub(super) edges: Vec<([u32; 2], bool)>,
+    /// For each triangle the first of those that make a plane face with it, after which that is named: what moves over the edges between them stays the same contact.
+    faces: Vec<u32>,
     /// For each vertex the vertices that it has an edge with, and whether all its triangles are coplanar.
     around: Vec<(Vec<u32>, bool)>,
     pub(super) tree: Vec<Node>,
@@ -98,6 +108,14 @@ impl Default for Thin {
     }
 }
 
+/// Whether the face that a contact is at is of the first solid; none where it is at no face.
+fn reference(witness: &Witness) -> Option<bool> {
+    match witness {
+        Witness::Face { on_a, .. } | Witness::Rim { on_a, .. } => Some(*on_a),
+        _ => None,
+    }
+}
+
 impl Surface {
     /// Of a mesh that stands at `pose` in the frame of its body.
     pub fn new(mesh: &Mesh, pose: &Pose) -> Self {
@@ -136,6 +154,18 @@ impl Surface {
                 *flat &= edges[e as usize].1;
             }
         }
+        let mut faces = vec![NONE; triangles.len()];
+        for first in 0..triangles.len() as u32 {
+            let mut stack = vec![first];
+            while let Some(t) = stack.pop() {
+                if faces[t as usize] != NONE {
+                    continue;
+                }
+                faces[t as usize] = first;
+                let flat = sides[t as usize].map(|e: u32| edges[e as usize]);
+                stack.extend(flat.into_iter().filter(|e| e.1).flat_map(|e| e.0));
+            }
+        }
         let middle = scale(
             0.5,
             [0, 1, 2].map(|d| {
@@ -159,6 +189,7 @@ impl Surface {
             normals,
             sides,
             edges,
+            faces,
             around,
             tree: vec![],
             order: vec![],
@@ -273,12 +304,16 @@ impl Surface {
                         && (!self.one_sided || dot(n, self.normals[t as usize]) >= -CONE)
                 })
             }
-            Feature::Vertex(v) => {
-                let at = |v: u32| self.vertices[v as usize];
-                self.around[v as usize].0.iter().all(|&w| away(sub(at(w), at(v))))
-            }
+            Feature::Vertex(v) => self.is_top(v, n, CONE),
             Feature::Face(_) | Feature::Curved(_) => false,
         }
+    }
+
+    /// Whether no edge at a vertex goes along n, in the frame of the body, by more than a slope.
+    pub(super) fn is_top(&self, v: u32, n: Vec3, slope: f64) -> bool {
+        let at = |v: u32| self.vertices[v as usize];
+        let away = |d: Vec3| dot(n, d) <= slope * norm(d);
+        self.around[v as usize].0.iter().all(|&w| away(sub(at(w), at(v))))
     }
 
     pub(super) fn is_flat(&self, feature: Feature) -> bool {
@@ -295,7 +330,7 @@ impl Surface {
         match feature {
             Feature::Vertex(k) => Feature::Vertex(self.triangles[t as usize][k as usize]),
             Feature::Edge(e) => Feature::Edge(sides[e as usize % 3]),
-            Feature::Face(f) if f < 2 => Feature::Face(2 * t + f),
+            Feature::Face(f) if f < 2 => Feature::Face(2 * self.faces[t as usize] + f),
             Feature::Face(f) => Feature::Edge(sides[f as usize - 2]),
             curved @ Feature::Curved(_) => curved,
         }
@@ -325,13 +360,27 @@ impl Surface {
             let Scratch { thin: Thin { hull, posed }, found: list, .. } = &mut *scratch;
             list.clear();
             let triangle = Side::Hull { hull, posed, pose };
-            if let Side::Hull { hull: h, posed: p, pose: q } = other {
-                let (first, second) = ((&*hull, &*posed, pose), (*h, *p, *q));
-                clip.collide(first, second, None, prediction, |f, w| list.push((f, w)));
-            } else {
-                convex::collide(&triangle, other, prediction, |f, w| list.push((f, w)));
-            }
-            let (mut met, mut foreign) = (false, false);
+            // The side of the triangle that separates, if one does.
+            let (is_near, across) = match other {
+                Side::Hull { hull: h, posed: p, pose: q } => {
+                    let (first, second) = ((&*hull, &*posed, pose), (*h, *p, *q));
+                    let push = |f, w| list.push((f, w));
+                    let axis = clip.collide(first, second, None, prediction, push);
+                    let across = match axis {
+                        Some(Axis::FaceA(f)) => Some(self.named(t, Feature::Face(f))),
+                        Some(Axis::Edges(e, _)) => Some(self.named(t, Feature::Edge(e))),
+                        _ => None,
+                    };
+                    (axis.is_some(), across)
+                }
+                _ => {
+                    let push = |f, w| list.push((f, w));
+                    (convex::collide(&triangle, other, prediction, push), None)
+                }
+            };
+            // Whether the surface is met here, with a normal of another triangle or solid that it does not have, or at a point of a plane.
+            let (mut met, mut foreign, mut inner) = (false, false, false);
+            let count = list.len();
             for ([feature, own], witness) in list.drain(..) {
                 let n = witness.place(pose, other.pose(), [0.0, 0.0, 1.0]).normal;
                 let n = pose.local_direction(n);
@@ -339,28 +388,39 @@ impl Surface {
                 let facing =
                     if self.one_sided { front } else { front.abs() } > 1.0 - FACING * FACING;
                 let feature = self.named(t, feature);
+                let by = reference(&witness);
                 let surface = match feature {
                     // A triangle that lies on a face of the other solid, or is its reference.
                     _ if facing => true,
+                    Feature::Vertex(v) if by == Some(false) && !self.is_flat(feature) => {
+                        self.is_top(v, n, SLOPE)
+                    }
                     _ => self.has_normal(feature, n),
                 };
+                // The normal of a plane is its own rather than that of a face that nearly lies on it.
+                let on_it = by == Some(false) && matches!(feature, Feature::Face(_));
                 if !surface {
                     foreign = true;
+                } else if facing && (self.is_flat(feature) || on_it) {
+                    // All that touches the triangle is in the list if that is the reference; else such points stand for what is above it.
+                    *(if by == Some(true) { &mut met } else { &mut inner }) = true;
                 } else {
                     met = true;
-                    if !(facing && self.is_flat(feature)) {
-                        found([feature, own], witness);
-                    }
+                    found([feature, own], witness);
                 }
             }
-            if met || !foreign {
-                continue;
-            }
+            let deepest = match (count, across) {
+                _ if inner || (foreign && !met) => DEEP,
+                // Edges that pass beside each other: of an edge that is none of the surface it says nothing.
+                (0, Some(edge)) if is_near && self.is_flat(edge) => DEEP,
+                (0, _) if is_near => SHALLOW,
+                _ => continue,
+            };
+            let deepest = -deepest * other.size();
             // Another triangle is nearer there; with its own normal this one may touch elsewhere.
             let middle = other.middle();
             let behind = dot(posed.normals[0], middle) < posed.offsets[0];
             let face = usize::from(behind && !self.one_sided);
-            let deepest = -DEEP * other.size();
             let mut keep = |[feature, own]: [Feature; 2], witness: Witness| {
                 let feature = self.named(t, feature);
                 let gap = witness.place(pose, other.pose(), [0.0, 0.0, 1.0]).gap;
@@ -416,7 +476,8 @@ impl Surface {
             let foot = sub(at, scale(height, n));
             let anchor = Anchor::Other;
             let witness = Witness::Face { on_a: true, normal, other: centre, foot, radius, anchor };
-            return found([Feature::Face(2 * t + u32::from(back)), own], witness);
+            let face = Feature::Face(2 * self.faces[t as usize] + u32::from(back));
+            return found([face, own], witness);
         }
         let mut best = (f64::INFINITY, 0, 0.0);
         for (k, (p, q)) in [(a, b), (b, c), (c, a)].into_iter().enumerate() {

@@ -20,8 +20,12 @@ use crate::rotation::{Pose, product};
 
 /// Penetrations below this share of the thinner body are not looked at twice.
 const SHALLOW: f64 = 1e-3;
+/// Triangles that have sunk in by no more than this share of the thinner body are looked for: a triangle that lies behind another one has no box in common with it.
+const SUNK: f64 = 0.02;
 /// By which share of the depth of a point the surface must be away from it: of faces, and of edges, which are less deep than they separate.
 const NEARER: [f64; 2] = [0.5, 0.05];
+/// The slope at which edges may go on beyond a corner that meets a face.
+const STEEP: f64 = 0.5;
 /// Edges that are parallel up to this have no common normal.
 const PARALLEL: f64 = 1e-6;
 
@@ -42,8 +46,9 @@ pub(crate) fn collide(
     let back = std::array::from_fn(|i| std::array::from_fn(|j| a_pose.r[j][i]));
     let relative = Pose { x: a_pose.local_point(b_pose.x), r: product(&back, &b_pose.r) };
     let Scratch { thin, other, pairs, stack, found: list, .. } = scratch;
-    near(a, b, &relative, prediction, (pairs, stack));
     let thin_body = a.thickness.min(b.thickness);
+    let margin = f64::max(prediction, SUNK * thin_body);
+    near(a, b, &relative, margin, (pairs, stack));
     let (mut last, mut none) = (u32::MAX, true);
     let mut least: Option<(Across, [Feature; 2])> = None;
     for &(t, u) in &*pairs {
@@ -163,7 +168,12 @@ fn on_face(
             }
             _ => true,
         };
-        let met = facing || (along && b.has_normal(g, against));
+        let normal = || match g {
+            // The normal is that of the face: a corner that leans over it is at it before it is the lowest.
+            Feature::Vertex(v) => b.is_top(v, against, STEEP),
+            _ => along && b.has_normal(g, against),
+        };
+        let met = facing || normal();
         if met && !a.is_flat(f) && !b.is_flat(g) {
             found([f, g], witness);
         }

@@ -503,6 +503,63 @@ fn balls_on_cylinders_and_cones() {
     }
 }
 
+/// The signed distance of x = (ρ, z) from the profile of a solid with its base of radius r at −h and its top of radius s at h, by all sides of the polygon.
+fn from_profile([r, s, h]: [f64; 3], x: [f64; 2]) -> f64 {
+    let corners = [[0.0, -h], [r, -h], [s, h], [0.0, h]].map(|[rho, z]| [rho, z, 0.0]);
+    let at = [x[0], x[1], 0.0];
+    let far = corners.windows(2).map(|side| {
+        let line = Segment::between(side[0], side[1]);
+        norm(sub(at, line.at(line.nearest(at))))
+    });
+    let wide = r + 0.5 * (s - r) * (x[1] / h + 1.0);
+    let sign = if x[1].abs() < h && x[0] < wide { -1.0 } else { 1.0 };
+    sign * far.fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn balls_are_as_far_from_cylinders_and_cones_as_from_their_profiles() {
+    let mut rng = Pcg64::seed_from_u64(31);
+    let (mut outside, mut inside, mut behind) = (0, 0, 0);
+    for round in 0..4000 {
+        // From needles to discs; a cone has an acute rim, behind whose plane a ball may be.
+        let [r, h] = [0.0, 0.0].map(|_: f64| 10_f64.powf(rng.random_range(-1.3..0.0)));
+        let is_cone = round % 3 > 0;
+        let shape = match is_cone {
+            true => Shape::Cone { half_length: h, radius: r },
+            false => Shape::Cylinder { half_length: h, radius: r },
+        };
+        let s = if is_cone { 0.0 } else { r };
+        let radius = rng.random_range(0.05..0.5);
+        let reach = radius + MARGIN;
+        let rho = rng.random_range(0.0..r + reach);
+        let z = rng.random_range(-h - reach..h + reach);
+        let truth = from_profile([r, s, h], [rho, z]) - radius;
+        if truth > MARGIN {
+            continue;
+        }
+        let (turn, place) = (rotation(&mut rng), vector(&mut rng, 1.0));
+        let around = rng.random_range(0.0..std::f64::consts::TAU);
+        let local = |rho: f64, z: f64| [rho * around.cos(), rho * around.sin(), z];
+        let pose = Pose { x: place, r: turn.matrix() };
+        let fixed = Body::fixed(vec![Part::new(shape)]).turned(turn).at(place);
+        let ball = solid(Shape::Sphere { radius }).at(pose.point(local(rho, z)));
+        let found = contacts(&two(fixed, ball));
+        assert_eq!(found.len(), 1, "{r} {h} {rho} {z} {truth}");
+        let Place { normal, gap, .. } = found[0].place;
+        assert!((gap - truth).abs() < 1e-12, "{r} {h} {is_cone} {rho} {z} {gap} {truth}");
+        // Along the normal it goes out.
+        let n = pose.local_direction(normal);
+        let (out, step) = (n[0] * around.cos() + n[1] * around.sin(), 1e-6);
+        let moved = from_profile([r, s, h], [(rho + step * out).abs(), z + step * n[2]]) - radius;
+        assert!((moved - truth - step).abs() < 1e-3 * step, "{r} {h} {is_cone} {rho} {z} {n:?}");
+        let is_inside = truth + radius < 0.0;
+        *(if is_inside { &mut inside } else { &mut outside }) += 1;
+        let at_rim = (rho - r).hypot(z + h) - radius - truth < 1e-12;
+        behind += usize::from(!is_inside && at_rim && z > -h);
+    }
+    assert!(outside > 1000 && inside > 300 && behind > 50, "{outside} {inside} {behind}");
+}
+
 #[test]
 fn flat_ends_and_lines_touch_as_wholes() {
     let plate = |half: Vec3| Body::fixed(vec![Part::new(Shape::Box { half })]);
@@ -735,6 +792,76 @@ fn crate_mesh(half: Vec3) -> crate::Mesh {
     let fan = |f: &Vec<usize>| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]];
     let triangles: Vec<[usize; 3]> = p.faces().iter().flat_map(fan).collect();
     crate::Mesh::new(p.vertices(), &triangles).unwrap()
+}
+
+/// Triangulations of the ground z = 0: a sheet of two, a crate of twelve, fields with edges of 2 and 0.2 m.
+fn flat_grounds() -> Vec<Body> {
+    let sheet = [[-2.0, -2.0, 0.0], [2.0, -2.0, 0.0], [2.0, 2.0, 0.0], [-2.0, 2.0, 0.0]];
+    let sheet = crate::Mesh::new(&sheet, &[[0, 1, 2], [0, 2, 3]]).unwrap();
+    let block = crate_mesh([2.0, 2.0, 0.5]);
+    let fixed = |mesh| Body::fixed(vec![Part::new(mesh)]);
+    let mut out = vec![fixed(block).at([0.0, 0.0, -0.5]), fixed(sheet)];
+    out.extend([3, 21].map(|n| grid(n, |_, _| 0.0)));
+    out
+}
+
+#[test]
+fn flat_meshes_and_fields_lose_no_contact_of_a_plane() {
+    let mut rng = Pcg64::seed_from_u64(29);
+    let heptagon = |k: i32| {
+        let (s, c) = (f64::from(k) * std::f64::consts::TAU / 7.0).sin_cos();
+        [0.4 * c, 0.4 * s, 0.0]
+    };
+    let heptagon: Vec<Vec3> = (0..7).map(heptagon).collect();
+    let prism = Polyhedron::prism(&heptagon, [0.1, 0.0, 0.5]).unwrap();
+    let (mut seen, grounds) = ([0; 8], flat_grounds());
+    for round in 0..640 {
+        let kind = round % 8;
+        let shape = match kind {
+            0 => solid(Shape::Sphere { radius: 0.3 }),
+            1 => cuboid([0.3, 0.4, 0.2]),
+            2 => solid(prism.clone()),
+            3 => solid(Shape::Capsule { half_length: 0.3, radius: 0.1 }),
+            4 => cylinder(0.3, 0.3),
+            5 => cylinder(0.03, 0.4),
+            6 => cone(0.3, 0.3),
+            _ => solid(crate_mesh([0.3, 0.4, 0.2])),
+        };
+        // Flat, leaning a little, or anyhow; lying on its side every other time.
+        let angle = [0.0, 1e-4, 1e-3, 0.01, 0.1, 3.0][rng.random_range(0..6)];
+        let start = if round / 8 % 2 == 0 { Rotation::IDENTITY } else { lying() };
+        let axis = normalise(vector(&mut rng, 1.0));
+        let spun = Rotation::about([0.0, 0.0, 1.0], rng.random_range(-3.0..3.0)).after(start);
+        let turn = Rotation::about(axis, angle * rng.random_range(-1.0..1.0)).after(spun);
+        let [x, y, _] = vector(&mut rng, 1.0);
+        // At a random gap, as the plane sees it from afar.
+        let there = |z: f64| shape.clone().turned(turn).at([x, y, z]);
+        let lowest = |z: f64| gaps(&two(Body::floor(), there(z))).first().copied();
+        let z = (0..40).map(|k| 0.8 - 0.02 * f64::from(k)).find(|&z| lowest(z).is_some());
+        let z = z.map(|z| z - lowest(z).unwrap() + rng.random_range(-0.01..0.03)).unwrap();
+        let on_plane = contacts(&two(Body::floor(), there(z)));
+        for (k, ground) in grounds.iter().enumerate() {
+            if kind == 7 && k == 1 {
+                continue; // A sheet does not meet surfaces.
+            }
+            let found = contacts(&two(ground.clone(), there(z)));
+            for near in &found {
+                let n = near.place.normal;
+                assert!(norm(sub(n, [0.0, 0.0, 1.0])) < 2e-2, "{round} {k} {near:?}");
+            }
+            // The corners of the face that looks downwards, if not all; rounds at points a little aside.
+            for near in on_plane.iter().filter(|n| n.place.gap < 0.02) {
+                let p = near.place;
+                let same = |n: &&Near| norm(sub(n.place.point, p.point)) < 1e-3;
+                let same =
+                    found.iter().filter(same).min_by(|a, b| a.place.gap.total_cmp(&b.place.gap));
+                let Some(same) = same else { panic!("{round} {k} {near:#?} {found:#?}") };
+                assert!((same.place.gap - p.gap).abs() < 1e-4, "{round} {k} {same:?} {p:?}");
+                seen[kind] += 1;
+            }
+        }
+    }
+    assert!(seen.iter().all(|&n| n > 100), "{seen:?}");
 }
 
 #[test]

@@ -96,6 +96,18 @@ impl Turned {
         let ([r, s], h) = (self.radii, self.half);
         [[[0.0, -h], [r, -h]], [[r, -h], [s, h]], [[s, h], [0.0, h]]]
     }
+
+    /// The line of the profile that is nearest to a point (ρ, z). The profile is convex: a point is outside if it is before one of its lines, and then one of these is
+    /// nearest; else it is inside, and least deep behind the nearest line. Two lines that meet at an end are equally near there, but the point is before one of them perhaps.
+    fn nearest(&self, x: [f64; 2]) -> usize {
+        let profile = self.profile();
+        // An end without radius is no surface.
+        let lines = || profile.iter().enumerate().filter(|(_, line)| line[0] != line[1]);
+        let outside = lines().filter(|(_, line)| height(line, x) > 0.0);
+        let before = outside.min_by(|(_, l), (_, m)| beside(l, x).0.total_cmp(&beside(m, x).0));
+        let inside = || lines().max_by(|(_, l), (_, m)| height(l, x).total_cmp(&height(m, x)));
+        before.or_else(inside).map_or(0, |(k, _)| k)
+    }
 }
 
 /// A ball, its centre in the frame of its body and where it is: the line of the profile that is nearest, from inside the one that is least deep.
@@ -108,39 +120,29 @@ pub(crate) fn ball(
     let d = sub(at, world.centre);
     let z = dot(d, world.axis);
     let rho = norm(sub(d, scale(z, world.axis)));
-    let mut best = (f64::INFINITY, 0);
-    for (k, line) in world.profile().into_iter().enumerate() {
-        // An end without radius is no surface.
-        if line[0] == line[1] {
-            continue;
-        }
-        let (gap, _) = beside(&line, [rho, z]);
-        if gap.abs() < best.0 {
-            best = (gap.abs(), k);
-        }
-    }
+    let line = world.nearest([rho, z]);
     let witness = Witness::Revolved {
         on_a,
         centre: local.centre,
         axis: local.axis,
         side: local.side,
-        line: local.profile()[best.1],
+        line: local.profile()[line],
         ball: centre,
         radius,
     };
-    let pair = [Feature::Curved(best.1 as u32), Feature::Curved(0)];
+    let pair = [Feature::Curved(line as u32), Feature::Curved(0)];
     found(if on_a { pair } else { [pair[1], pair[0]] }, witness);
 }
 
-/// The signed distance of a point of the half plane from a line of a profile whose outside is on its right, and its gradient.
+/// The signed distance of a point of the half plane from a line of a profile whose outside is on its right, and its gradient. The line is one that [`Turned::nearest`]
+/// gives: what is nearest to an end of that is outside, also behind the line, as at the rim of a cone, where the profile turns by more than a right angle.
 pub(crate) fn beside([p, q]: &[[f64; 2]; 2], x: [f64; 2]) -> (f64, [f64; 2]) {
     let (u, v) = ([q[0] - p[0], q[1] - p[1]], [x[0] - p[0], x[1] - p[1]]);
     let length = u[0].hypot(u[1]);
     let outwards = [u[1] / length, -u[0] / length];
-    let height = outwards[0] * v[0] + outwards[1] * v[1];
     let t = (u[0] * v[0] + u[1] * v[1]) / (length * length);
     if (0.0..=1.0).contains(&t) {
-        return (height, outwards);
+        return (outwards[0] * v[0] + outwards[1] * v[1], outwards);
     }
     let end = if t < 0.0 { p } else { q };
     let w = [x[0] - end[0], x[1] - end[1]];
@@ -148,6 +150,11 @@ pub(crate) fn beside([p, q]: &[[f64; 2]; 2], x: [f64; 2]) -> (f64, [f64; 2]) {
     if distance == 0.0 {
         return (0.0, outwards);
     }
-    let sign = if height >= 0.0 { 1.0 } else { -1.0 };
-    (sign * distance, w.map(|x| sign * x / distance))
+    (distance, w.map(|x| x / distance))
+}
+
+/// How far a point of the half plane is on the right of a line of a profile.
+fn height([p, q]: &[[f64; 2]; 2], x: [f64; 2]) -> f64 {
+    let (u, v) = ([q[0] - p[0], q[1] - p[1]], [x[0] - p[0], x[1] - p[1]]);
+    (u[1] * v[0] - u[0] * v[1]) / u[0].hypot(u[1])
 }

@@ -106,6 +106,9 @@ pub(crate) struct Place {
     pub gap: f64,
 }
 
+/// The lowest point of a rim runs along it in a step by angles with larger cosines.
+const FOLLOWED: f64 = 0.7;
+
 /// What a direction turns with must be larger than this share of its parts; else the contact has no direction of its own.
 const DEGENERATE: f64 = 1e-12;
 
@@ -141,6 +144,18 @@ impl Witness {
 
     /// Where the contact is with the bodies at these poses; `normal` is that to fall back on where the bodies leave none.
     pub fn place(&self, a: &Pose, b: &Pose, normal: Vec3) -> Place {
+        self.within(None, a, b, normal)
+    }
+
+    /// The same in the course of a step that began with the bodies at `start`, where the contact was found.
+    ///
+    /// The lowest point of a rim runs round it while a body rolls or wobbles. Where an end turns past level it jumps across: an impulse on one side, and the law
+    /// for velocities on the other, make energy of nothing. So where it does not run but jumps, the rim touches where it did, in space.
+    pub fn moved(&self, start: [&Pose; 2], a: &Pose, b: &Pose, normal: Vec3) -> Place {
+        self.within(Some(start), a, b, normal)
+    }
+
+    fn within(&self, start: Option<[&Pose; 2]>, a: &Pose, b: &Pose, normal: Vec3) -> Place {
         match self {
             Witness::Face { on_a, normal, other, foot, radius, anchor } => {
                 let (face, rest, sign) = if *on_a { (a, b, 1.0) } else { (b, a, -1.0) };
@@ -172,12 +187,13 @@ impl Witness {
                 let (face, rest, sign) = if *on_a { (a, b, 1.0) } else { (b, a, -1.0) };
                 let n = face.direction(*normal);
                 let axis = rest.direction(*axis);
-                let down = sub(scale(dot(n, axis), axis), n);
-                let sine = norm(down);
-                let out = match sine > DEGENERATE {
-                    true => scale(1.0 / sine, down),
-                    false => rest.direction(*side),
-                };
+                let across = |d: Vec3| sub(d, scale(dot(d, axis), axis));
+                let down = across(scale(-1.0, n));
+                let held = start.map_or(rest, |s| s[usize::from(*on_a)]).direction(*side);
+                let held = across(held);
+                let jumps = start.is_some() && dot(down, held) < FOLLOWED * norm(down) * norm(held);
+                let out = if norm(down) > DEGENERATE && !jumps { down } else { held };
+                let out = scale(1.0 / norm(out), out);
                 let p = add(rest.point(*centre), scale(*radius, out));
                 let gap = dot(n, sub(p, face.point(*foot)));
                 Place { normal: scale(sign, n), point: sub(p, scale(0.5 * gap, n)), gap }

@@ -84,7 +84,7 @@ impl Start {
     /// Asks the forces, at the middle of the step.
     fn ask(&mut self, state: &State, forces: &mut [Box<dyn Force>], h: f64) {
         let Self { built, wrenches, middle, .. } = self;
-        wrenches.clear(built.len());
+        wrenches.clear(built.len(), [state.t, state.t + h]);
         if forces.is_empty() {
             return;
         }

@@ -14,6 +14,8 @@ use crate::{Activation, Compliance, Dimension, Geometry, Impact};
 
 /// Directions that differ by less are the same, relative.
 const SAME: f64 = 1e-13;
+/// A point that runs farther over its body from the middle of a step to the end, as a share of the smaller body, is at the middle for velocities too.
+const RUNS: f64 = 0.05;
 
 /// One side of a contact.
 #[derive(Debug, Clone, Copy, Default)]
@@ -52,6 +54,8 @@ pub(super) struct Row {
     pub before: [f64; 3],
     /// What the law adds to u⁺.
     pub shift: [f64; 3],
+    /// Its restitution in an impact, and as it opens.
+    e: [f64; 2],
     pub r: [f64; 3],
     /// Of rolling friction: the coefficient, the moments, and the given angular velocity of what is moved, in the law and in the energy.
     pub mu_r: f64,
@@ -86,6 +90,12 @@ impl Row {
     }
 }
 
+/// The velocity of the second body relative to the first one at the beginning of a step, where they are near.
+fn sliding([a, b]: [&Moving; 2], Near { place, image, .. }: &Near) -> Vec3 {
+    let of_a = add(a.velocity_at(sub(place.point, image.offset)), image.velocity);
+    sub(b.velocity_at(place.point), of_a)
+}
+
 /// A point where two bodies are near, at the beginning of a step.
 struct Meeting<'a> {
     stride: Stride<'a>,
@@ -105,13 +115,7 @@ impl<'a> Meeting<'a> {
         approach: Option<f64>,
     ) -> Self {
         let sides @ [a, b] = [near.a, near.b].map(|i| &bodies[i as usize]);
-        let Place { normal, point, .. } = near.place;
-        let image = near.image;
-        let velocity = || {
-            let of_a = add(a.velocity_at(sub(point, image.offset)), image.velocity);
-            dot(normal, sub(b.velocity_at(point), of_a))
-        };
-        let approach = approach.unwrap_or_else(velocity);
+        let approach = approach.unwrap_or_else(|| dot(near.place.normal, sliding([a, b], near)));
         Self { stride, near, known, bodies: sides, approach }
     }
 
@@ -123,11 +127,12 @@ impl<'a> Meeting<'a> {
 
     /// Where the contact is with its bodies at these poses after a share of the step; of a it is the image that touches.
     fn place(&self, [a, b]: [&Pose; 2], part: f64, normal: Vec3) -> Place {
+        let start = self.bodies.map(|b| &b.start);
         if self.near.image.is_itself() {
-            return self.near.witness.place(a, b, normal);
+            return self.near.witness.moved(start, a, b, normal);
         }
         let a = Pose { x: add(a.x, self.offset(part)), r: a.r };
-        self.near.witness.place(&a, b, normal)
+        self.near.witness.moved(start, &a, b, normal)
     }
 
     /// Whether it took part in the last step.
@@ -179,9 +184,9 @@ impl<'a> Meeting<'a> {
         let middle = Place { normal: if near.deep { n } else { middle.normal }, ..middle };
         let place = self.on_surface(middle);
         let frame = frame(place.normal, axis);
-        // An impact has one direction; what persists has its velocity where it comes to.
+        // An impact and the rebound from it have one direction; what persists has its velocity where it comes to.
         let lasting =
-            self.persists() && (near.law.e == 0.0 || self.approach >= -self.stride.rest());
+            self.persists() && (near.law.e == 0.0 || self.approach.abs() <= self.stride.rest());
         let later = lasting && self.is_extrapolated() && !near.deep;
         *row = Row {
             mu: near.law.mu,
@@ -203,7 +208,7 @@ impl<'a> Meeting<'a> {
             (0..count).for_each(|i| arm.moment[i] = cross(to, frame[i]));
             arm.moment_end = arm.moment;
         }
-        let mut point_end = place.point;
+        let (mut point_end, mut runs) = (place.point, false);
         if later {
             let end = self.on_surface(self.place([&a.end, &b.end], 1.0, place.normal));
             let frame_end = transported(&frame, end.normal);
@@ -215,14 +220,21 @@ impl<'a> Meeting<'a> {
                 turned = f64::max(turned, apart(&arm.moment, &arm.moment_end));
             }
             // Where nothing moves the two ends are the same up to rounding; then W is symmetric to the last bit.
-            row.later = apart(&frame, &frame_end) > SAME || turned > SAME * near.size;
+            runs = turned > RUNS * near.size;
+            row.later = !runs && (apart(&frame, &frame_end) > SAME || turned > SAME * near.size);
             match row.later {
                 true => row.frame_end = frame_end,
-                false => row.arms.iter_mut().for_each(|a| a.moment_end = a.moment),
+                false => {
+                    row.arms.iter_mut().for_each(|a| a.moment_end = a.moment);
+                    point_end = place.point;
+                }
             }
         }
         self.take_velocities(row, point_end);
         self.take_law(row, lasting);
+        if runs {
+            self.run(row, lasting);
+        }
         if let Some(m) = self.known {
             row.r = m.impulse_along(&frame, scaled, row.mu);
             if row.mu_r > 0.0 {
@@ -270,21 +282,49 @@ impl<'a> Meeting<'a> {
         }
     }
 
+    /// The law of a point that runs far over its body within a step, as that of a coin which wobbles fast: an impulse at one place and the law for velocities at the other
+    /// would make energy. So both are at the middle, and what u_k has there beyond the beginning, which is no approach and no slip, is in the law with its mean over
+    /// the step: the gap is kept to second order, and the work is that of the velocities at the beginning.
+    fn run(&self, row: &mut Row, lasting: bool) {
+        let (theta, law) = (self.stride.scheme.theta, self.near.law);
+        if row.compliance > 0.0 || law.e > 0.0 {
+            return;
+        }
+        let mean = (1.0 - theta) / theta;
+        row.shift[0] += mean * (row.before[0] - self.approach.min(0.0));
+        if self.takes_mean(lasting) {
+            return;
+        }
+        let slip = sliding(self.bodies, self.near);
+        for i in 1..self.directions() {
+            row.shift[i] += (mean - law.e_t) * (row.before[i] - dot(row.frame[i], slip));
+        }
+    }
+
+    /// Whether Coulomb's law is that of u_θ.
+    fn takes_mean(&self, lasting: bool) -> bool {
+        let stuck = self.known.is_some_and(|m| m.stuck);
+        self.stride.scheme.impact == Impact::Fremond && !(lasting && stuck)
+    }
+
     /// What the law adds to u⁺, and what it lets give way.
     fn take_law(&self, row: &mut Row, lasting: bool) {
         let Self { near, stride: Stride { scheme, h, .. }, .. } = self;
         let (law, gap, before) = (near.law, near.place.gap, row.before);
-        let share = match scheme.impact {
-            Impact::Fremond if !(lasting && self.known.is_some_and(|m| m.stuck)) => {
-                (1.0 - scheme.theta) / scheme.theta
-            }
-            _ => law.e_t,
+        let share = match self.takes_mean(lasting) {
+            true => (1.0 - scheme.theta) / scheme.theta,
+            false => law.e_t,
         };
         row.shift = [0.0, share * before[1], share * before[2]];
         // Restitution on approach only, and in the gap's form only where it is closed.
         let closed = scheme.activation != Activation::Gap || gap <= 0.0;
         if closed && before[0] < -scheme.restitution_threshold {
             row.shift[0] = law.e * before[0];
+        }
+        if near.compliance.is_none() {
+            // What lasts opens by as much as a surface is curved.
+            let opens = !lasting && before[0] > scheme.restitution_threshold;
+            row.e = [law.e, if opens { law.e } else { 0.0 }];
         }
         if let Some(Compliance { stiffness, damping }) = near.compliance {
             let resistance = damping + h * stiffness;
@@ -410,6 +450,36 @@ impl Tools {
         });
         self.joints.begin(stride.scheme, stride.world, state, &self.bodies, stride.h);
         self.join();
+        self.give_way(stride);
+    }
+
+    /// Lets contacts that open give way to what presses them: `u⁺ ≥ −c u_k` where `u_k > 0`.
+    ///
+    /// What has rebounded is still in the index set, for positions lag behind velocities by half a step, and another body may hit it there. Did the law ask for
+    /// u⁺ ≥ 0, the impulse would act on what opens, with a work of ½ (u⁺ + u_k) r that nothing takes back. With s what the law adds to u⁺ and without friction
+    /// `2 (T⁺ − T) = Σ (u_k − s) r` and `Σ (u_k + s) r = −rᵀ W r`, so energy cannot grow where `s = c u_k` of all that open and `|s| ≤ c |u_k|` of all that
+    /// approach: c is the largest e among the impacts of the island, and at least the contact's own unless it lasts. So what rests or rolls keeps `u⁺ ≥ 0`
+    /// until something hits it, and as c ≤ 1 no gap closes at θ = ½. Frémond's law, by which each contact dissipates by itself, then asks for u_θ ≥ 0.
+    fn give_way(&mut self, stride: Stride) {
+        let Self { rows, islands, impacts, .. } = self;
+        let scheme = stride.scheme;
+        let impact = -stride.rest().max(scheme.restitution_threshold);
+        let least = match scheme.impact {
+            Impact::Newton => 0.0,
+            Impact::Fremond => (1.0 - scheme.theta) / scheme.theta,
+        };
+        impacts.clear();
+        impacts.resize(islands.ends.len(), 0.0);
+        for (row, &k) in rows.iter().zip(&islands.of_item).filter(|r| r.0.before[0] < impact) {
+            let most = &mut impacts[k as usize];
+            *most = most.max(row.e[0]);
+        }
+        for (row, &k) in rows.iter_mut().zip(&islands.of_item) {
+            let c = impacts[k as usize].max(row.e[1]);
+            if row.before[0] > 0.0 && row.compliance == 0.0 && c > 0.0 {
+                row.shift[0] += c.max(least) * row.before[0];
+            }
+        }
     }
 
     /// Islands of contacts and rows.

@@ -5,7 +5,7 @@
 //! ```text
 //! m (v⁺ − v_k) = h (m g + F) + Σ ± d r,                                        x⁺ = x_k + h v_θ
 //! J (Ω⁺ − Ω_k) + h Ω_θ × J Ω_θ = (I − ½ h Ω̂_θ) R_kᵀ (h τ + Σ ± (p − x) × d r),   R⁺ = R_k cay(h Ω_θ)
-//! K* ∋ u⁺ + w + mu‖u_T⁺ + w_T‖ e_N  ⟂  r ∈ K,   w_N = e min(u_{N,k}, 0),   w_T = e_T u_{T,k}   for the contacts of the index set, r = 0 elsewhere.
+//! K* ∋ u⁺ + w + mu‖u_T⁺ + w_T‖ e_N  ⟂  r ∈ K,   w_N = e u_{N,k},   w_T = e_T u_{T,k}   for the contacts of the index set, r = 0 elsewhere.
 //! ```
 //!
 //! `(I − ½ h Ω̂_θ) R_kᵀ` is the inverse of the mean of R_k and R⁺ at θ = ½: a torque that is fixed in space changes the momentum in space by just that, and
@@ -16,6 +16,7 @@
 //! local problems in r by sessions of the project's solvers ([`crate::crew`]), judged by the problem's own judge. Gyroscopic torque and the frames of torques are those of the last
 //! pass; with the impulses found each body's rotation is solved exactly, and where that moves no velocity by more than the tolerance, the step is done.
 //! A large island that is slow and whose contacts are new is first asked whether it may stay at rest ([`crate::crew`]): a pile that can stand stands.
+//! What rests or rolls has w_N = 0 while it opens, until an impact in its island gives it e (`Tools::give_way`).
 //! A persistent contact has the velocity in its law at the extrapolated end of the step. Frémond's law has `w_T = (1 − θ)/θ u_{T,k}`: u_θ in place of u⁺.
 //!
 //! References: Moreau1988 and Jean1999 for the scheme, Acary2016 for its energy, SimoWong1991 for the rotation, Acary2018 for the index set.
@@ -102,6 +103,8 @@ pub(crate) struct Tools {
     pub joints: Joints,
     islands: Islands,
     touching: Touching,
+    /// Of each island the largest restitution of an impact.
+    impacts: Vec<f64>,
     island: Island,
     /// The problems of the islands, and which are not solved yet.
     stated: Stated,
@@ -133,6 +136,7 @@ impl Tools {
             joints,
             islands: Islands::default(),
             touching: Touching::default(),
+            impacts: vec![],
             island: Island::of(world.bodies.len(), world.elastic.len()),
             stated: Stated::new(world.dimension),
             open: Open::default(),
