@@ -1,5 +1,6 @@
 //! A box with walls or periodic sides, and the grid of cells by which points find their neighbours in it.
 
+use nonsmooth_linalg::budget;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 
@@ -85,6 +86,9 @@ impl Domain {
     }
 }
 
+/// Points between two looks at the limits.
+const CHUNK: usize = 1024;
+
 /// Points sorted into cells, by index.
 pub(crate) struct Grid {
     domain: Domain,
@@ -163,11 +167,14 @@ impl Grid {
         (k * self.count[1] + j) * self.count[0] + i
     }
 
-    /// All pairs closer than `reach`, as `(i, j, offset)` with j's image at its point plus the offset; each once.
+    /// All pairs closer than `reach`, as `(i, j, offset)` with j's image at its point plus the offset; each once. Some of them where the limits in force are over.
     pub fn pairs(&self, points: &[Vec3], reach: f64) -> Vec<(u32, u32, Vec3)> {
         let m: [isize; 3] = self.cell.map(|x| (reach / x).ceil().max(1.0) as isize);
         let mut out = vec![];
         for (i, &p) in points.iter().enumerate() {
+            if i % CHUNK == 0 && budget::over() {
+                break;
+            }
             let at = self.cell_of(p);
             for dz in -m[2]..=m[2] {
                 for dy in -m[1]..=m[1] {

@@ -1,6 +1,6 @@
 //! A caller's mistake in a scene or its settings.
 
-use nonsmooth_linalg::MatrixError;
+use nonsmooth_linalg::{MatrixError, budget};
 use nonsmooth_problem::ProblemError;
 use nonsmooth_solve::SolveError;
 
@@ -34,6 +34,9 @@ pub enum SceneError {
     /// The problem cannot be reformulated.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// The limits of the computation ([`nonsmooth_linalg::budget`]) ended it.
+    #[error("stopped before the scene was made")]
+    Stopped,
 }
 
 impl SceneError {
@@ -44,6 +47,11 @@ impl SceneError {
     ) -> Self {
         Self::Value { key: key.into(), expected: expected.into(), found: found.to_string() }
     }
+}
+
+/// Whether the limits in force let the making of a scene go on.
+pub(crate) fn within_limits() -> Result<(), SceneError> {
+    if budget::over() { Err(SceneError::Stopped) } else { Ok(()) }
 }
 
 /// `x` is finite and `ok`, or an error that says what was `expected` of `key`.

@@ -3,6 +3,10 @@
 //! The energy is `Σ k δ²/2 + Σ w_i z_i`, δ each overlap of two spheres or of a sphere and a wall, and w_i the weight in
 //! proportion to the volume. It is minimised by the inertial relaxation FIRE (Bitzek2006). What overlap is left is taken away
 //! exactly: the packing is blown up until nothing overlaps, while the spheres keep their radii.
+//!
+//! Where the limits in force ([`budget`]) are over, all of it ends early with what it has: whoever makes a scene of it looks at them, too.
+
+use nonsmooth_linalg::budget;
 
 use crate::domain::{Domain, Grid, Wall};
 use crate::vec3::{Vec3, add, dot, norm, scale, sub};
@@ -41,6 +45,8 @@ const STEPS: usize = 500;
 const OVERLAP: f64 = 1e-3;
 /// How often a box may grow.
 const GROWTHS: usize = 50;
+/// Pairs between two looks at the limits.
+const CHUNK: usize = 1 << 16;
 /// The room around a sphere in which neighbours are kept on the list, in mean radii.
 const SKIN: f64 = 0.4;
 
@@ -67,7 +73,7 @@ impl Packing {
         // Without weight overlaps vanish where there is room; a box too full grows a little until there is.
         let mut overlap = self.minimise(0.0);
         for _ in 0..GROWTHS {
-            if overlap <= OVERLAP {
+            if overlap <= OVERLAP || budget::over() {
                 break;
             }
             self.grow(1.0 + 0.25 * overlap);
@@ -159,6 +165,9 @@ impl Packing {
         let mut listed: Vec<Vec3> = vec![];
         let (mut pairs, mut overlap) = (vec![], f64::INFINITY);
         for _ in 0..STEPS {
+            if budget::over() {
+                break;
+            }
             let moved = |(a, b): (&Vec3, &Vec3)| norm(sub(*a, *b));
             if listed.is_empty()
                 || self.centres.iter().zip(&listed).map(moved).fold(0.0, f64::max) > 0.5 * SKIN
@@ -214,18 +223,20 @@ impl Packing {
                 }
             }
         }
-        for &(i, j, offset) in pairs {
-            let (i, j) = (i as usize, j as usize);
-            let d = sub(add(self.centres[j], offset), self.centres[i]);
-            let (reach, square) = (self.radii[i] + self.radii[j], dot(d, d));
-            if square < reach * reach {
-                let length = square.sqrt().max(1e-9);
-                let overlap = reach - length;
-                largest = largest.max(overlap);
-                let push = scale(overlap / length, d);
-                force[j] = add(force[j], push);
-                if i >= self.fixed {
-                    force[i] = sub(force[i], push);
+        for pairs in pairs.chunks(CHUNK).take_while(|_| !budget::over()) {
+            for &(i, j, offset) in pairs {
+                let (i, j) = (i as usize, j as usize);
+                let d = sub(add(self.centres[j], offset), self.centres[i]);
+                let (reach, square) = (self.radii[i] + self.radii[j], dot(d, d));
+                if square < reach * reach {
+                    let length = square.sqrt().max(1e-9);
+                    let overlap = reach - length;
+                    largest = largest.max(overlap);
+                    let push = scale(overlap / length, d);
+                    force[j] = add(force[j], push);
+                    if i >= self.fixed {
+                        force[i] = sub(force[i], push);
+                    }
                 }
             }
         }

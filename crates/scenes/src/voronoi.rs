@@ -2,6 +2,10 @@
 //!
 //! The cell of a seed is the box cut by the planes midway to the other seeds, from the nearest outwards, until the rest is too
 //! far to reach it: a seed farther than twice the farthest vertex cuts nothing.
+//!
+//! Where the limits in force ([`budget`]) are over, the cells end early: whoever makes a scene of them looks at them, too.
+
+use nonsmooth_linalg::budget;
 
 use crate::domain::{Domain, Grid, Wall};
 use crate::polyhedron::Polyhedron;
@@ -24,7 +28,7 @@ pub(crate) struct Cell {
     faces: Vec<(Vec<usize>, Beyond)>,
 }
 
-/// The cells of the seeds, which must lie inside the domain (a floor counts as two walls).
+/// The cells of the seeds, which must lie inside the domain (a floor counts as two walls); of the first ones alone where the limits in force are over.
 pub(crate) fn cells(domain: &Domain, seeds: &[Vec3]) -> Vec<Cell> {
     let volume: f64 = domain.size.iter().product();
     let grid = Grid::new(domain, seeds, (volume / seeds.len() as f64).cbrt());
@@ -60,7 +64,7 @@ pub(crate) fn cells(domain: &Domain, seeds: &[Vec3]) -> Vec<Cell> {
         }
         cell
     };
-    seeds.iter().enumerate().map(cell).collect()
+    seeds.iter().enumerate().take_while(|_| !budget::over()).map(cell).collect()
 }
 
 /// The steps to the cells of a cubic shell.
@@ -192,6 +196,9 @@ impl Cell {
 pub(crate) fn relax(domain: &Domain, seeds: &mut [Vec3], sweeps: usize) {
     for _ in 0..sweeps {
         let all = cells(domain, seeds);
+        if budget::over() {
+            break;
+        }
         for (seed, cell) in seeds.iter_mut().zip(&all) {
             *seed = domain.wrap(cell.polyhedron().mass_properties(1.0).centre);
         }

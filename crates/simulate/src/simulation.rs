@@ -1,6 +1,7 @@
 //! A world in motion.
 
 use nonsmooth_problem::{Friction, FrictionLocal};
+use nonsmooth_scenes::SceneError;
 use nonsmooth_scenes::vec3::{Vec3, add, cross, norm, sub};
 use nonsmooth_solve::settings::SettingsMap;
 use nonsmooth_solve::{Limits, registry};
@@ -25,13 +26,25 @@ const OVERLAP: f64 = 1e-6;
 pub struct Wrenches {
     pub(crate) force: Vec<Vec3>,
     pub(crate) torque: Vec<Vec3>,
+    /// When the step begins and ends, s.
+    span: [f64; 2],
 }
 
 impl Wrenches {
-    pub(crate) fn clear(&mut self, bodies: usize) {
+    pub(crate) fn clear(&mut self, bodies: usize, span: [f64; 2]) {
+        self.span = span;
         for list in [&mut self.force, &mut self.torque] {
             list.clear();
             list.resize(bodies, [0.0; 3]);
+        }
+    }
+
+    /// The share of the step that lies between two times, s: what acts from one to the other, times its share, has the right impulse in any steps.
+    pub fn share(&self, from: f64, until: f64) -> f64 {
+        let [begin, end] = self.span;
+        match from <= begin && end <= until {
+            true => 1.0,
+            false => ((until.min(end) - from.max(begin)) / (end - begin)).max(0.0),
         }
     }
 
@@ -57,7 +70,7 @@ impl Wrenches {
 /// A force that depends on time and state: springs, fields, controllers.
 pub trait Force: Send {
     /// Adds to what acts during a step. `state` is that in the middle of the step, extrapolated, with the velocities of its beginning: forces that are
-    /// smooth are taken to second order. A number that is not finite ends the step with [`StepStatus::NotFinite`](crate::StepStatus::NotFinite).
+    /// smooth are taken to second order; one that begins or ends within a step is told its share of it by [`Wrenches::share`]. A number that is not finite ends the step with [`StepStatus::NotFinite`](crate::StepStatus::NotFinite).
     fn add(&mut self, state: &State, wrenches: &mut Wrenches);
 }
 
@@ -162,6 +175,10 @@ impl Simulation {
             }
             if settled.rounds == Self::SETTLING {
                 return Err(SimulateError::Overlap(pairs));
+            }
+            // Who stops the making of a world does not want a hundred rounds that are cut short.
+            if nonsmooth_linalg::budget::over() {
+                return Err(SceneError::Stopped.into());
             }
             settled.rounds += 1;
             let Self { state, solver, settings, limits, .. } = &mut simulation;

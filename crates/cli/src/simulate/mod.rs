@@ -9,10 +9,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use nonsmooth_io::trajectory::Trajectory;
-use nonsmooth_scenes::SceneEntry;
-use nonsmooth_simulate::{Control, RunReport, SceneFile, Simulation, StepReport};
+use nonsmooth_scenes::{SceneEntry, SceneError};
+use nonsmooth_simulate::{Control, RunReport, SceneFile, SimulateError, Simulation, StepReport};
 use nonsmooth_solve::settings;
 use nonsmooth_solve::{Limits, THREADS_MOST};
+use serde_json::json;
 
 use self::record::Recorder;
 use crate::progress::RunBar;
@@ -69,7 +70,7 @@ pub struct Args {
     /// Go on from the end of a trajectory of the same scene, and append to it unless --out names another file
     #[arg(long, value_name = "FILE.h5")]
     resume: Option<PathBuf>,
-    /// Stop after this many seconds of the wall clock; the step that is being done then is not taken
+    /// Stop after this many seconds of the wall clock, also while the scene is made; the step that is being done then is not taken
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     time_limit: Option<f64>,
     /// Work on so many threads, 0 for one a core; the results are the same, bit for bit
@@ -126,8 +127,8 @@ const TRAJECTORY: &[&str] = &["h5", "hdf5"];
 /// The end of a family's run, s, where nobody says another.
 const FAMILY_END: f64 = 1.0;
 
-/// A scene from a file or a family.
-fn scene(args: &Args) -> Result<SceneFile, String> {
+/// A scene from a file or a family; none where the limits in force ended its making.
+fn scene(args: &Args) -> Result<Option<SceneFile>, String> {
     let Some(path) = &args.scene else { return Err("expected a scene, found none".into()) };
     let changes: Vec<&str> = args.settings.iter().map(String::as_str).collect();
     let name = path.to_string_lossy();
@@ -135,10 +136,10 @@ fn scene(args: &Args) -> Result<SceneFile, String> {
     let mut scene = match SceneEntry::find(&name) {
         Ok(family) if !path.exists() => {
             let set = settings::from_texts(&changes).map_err(|e| format!("--set: {e}"))?;
-            let made = family.make(&set).map_err(|e| format!("{name}: {e}"))?;
-            SceneFile {
-                gravity: made.gravity,
-                ..SceneFile::of_family(&name, set, made.h, FAMILY_END)
+            match family.make(&set) {
+                Err(SceneError::Stopped) => return Ok(None),
+                Err(e) => return Err(format!("{name}: {e}")),
+                Ok(made) => SceneFile::of_made(&name, set, made, FAMILY_END),
             }
         }
         Err(e) if !path.exists() && !is_file => {
@@ -159,7 +160,22 @@ fn scene(args: &Args) -> Result<SceneFile, String> {
     if let Some(every) = args.every {
         scene.output.every = every;
     }
-    Ok(scene)
+    Ok(Some(scene))
+}
+
+/// Says that the run ended before it began.
+fn stopped(path: &Path, as_json: bool) -> Exit {
+    let why = SceneError::Stopped.to_string();
+    output::print(&match as_json {
+        true => {
+            let run = json!({
+                "scene": path, "status": "not_solved", "message": why, "steps": 0, "stopped": true,
+            });
+            format!("{run}\n")
+        }
+        false => format!("{}: {why}\n", path.display()),
+    });
+    Exit::NotSolved
 }
 
 /// Where an output goes: to what the option says, or to a file beside the scene that the scene names.
@@ -189,13 +205,21 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         output::print(&format!("{:#}\n", SceneFile::schema()));
         return Ok(Exit::Solved);
     }
-    let scene = scene(args)?;
+    let limit = files::time_limit(args.time_limit)?;
+    let cancel = interrupt::flag();
+    if let Some(seconds) = limit {
+        end_after(seconds, cancel.clone());
+    }
+    let mut limits = Limits { max_iterations: 100_000, cancel: Some(cancel), ..Limits::default() };
+    // A large scene takes as long to make as many steps of it; in the steps the limits are the simulation's.
+    let making = limits.budget(Instant::now()).enter();
     let path = args.scene.clone().unwrap_or_default();
+    let Some(scene) = scene(args)? else { return Ok(stopped(&path, args.json)) };
+    limits.tolerance = scene.solver.tol;
     if args.explain {
         output::print(&scene.to_toml());
         return Ok(Exit::Solved);
     }
-    let limit = files::time_limit(args.time_limit)?;
     if args.threads > THREADS_MOST {
         let found = args.threads;
         return Err(format!(
@@ -227,21 +251,15 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         files::folder("--dump-fclib", folder)?;
     }
     let wrong = |e| format!("{}: {e}", path.display());
-    let cancel = interrupt::flag();
-    if let Some(seconds) = limit {
-        end_after(seconds, cancel.clone());
-    }
-    let limits = Limits {
-        tolerance: scene.solver.tol,
-        max_iterations: 100_000,
-        cancel: Some(cancel),
-        ..Limits::default()
-    };
-    let (simulation, settled) = match args.settle {
+    let built = match args.settle {
         true => scene.build_settled().map(|(made, settled)| (made, Some(settled))),
         false => scene.build().map(|made| (made, None)),
+    };
+    drop(making);
+    if let Err(SimulateError::Scene(SceneError::Stopped)) = built {
+        return Ok(stopped(&path, args.json));
     }
-    .map_err(wrong)?;
+    let (simulation, settled) = built.map_err(wrong)?;
     let mut simulation = simulation.with_limits(limits).with_threads(args.threads);
     let frames = out.is_some() || html.is_some() || vtk.is_some() || args.svg.is_some();
     let mut recorder = Recorder::new(&scene, &simulation, frames);

@@ -186,6 +186,20 @@ fn time_limits_hold_within_a_step() {
     assert!(json["residual"].as_f64().unwrap() <= 1e-10, "no step that is not solved: {json}");
 }
 
+/// A scene that takes longer to make than there is time is not made.
+#[test]
+fn time_limits_hold_while_a_scene_is_made() {
+    let folder = Folder::new();
+    let begun = std::time::Instant::now();
+    let run = folder.run("simulate sphere_pile --set count=200000 --time-limit 0.5").exits(1);
+    let slack = std::env::var("NONSMOOTH_SLACK").ok().and_then(|s| s.parse().ok()).unwrap_or(1.0);
+    assert!(begun.elapsed().as_secs_f64() < 0.6 + slack);
+    assert_eq!(run.stdout, "sphere_pile: stopped before the scene was made\n");
+    let run =
+        folder.run("simulate sphere_pile --set count=200000 --time-limit 0.1 --json").exits(1);
+    assert_eq!((&run.json()[0]["stopped"], &run.json()[0]["steps"]), (&true.into(), &0.into()));
+}
+
 #[test]
 fn scenes_are_explained() {
     let folder = folder();

@@ -4,7 +4,7 @@ use rand::RngExt;
 
 use super::{Family, Purpose, Spread, count, gap};
 use crate::domain::{Domain, Sides};
-use crate::error::require;
+use crate::error::{require, within_limits};
 use crate::packing::{Neighbour, Packing, volume};
 use crate::vec3::{Vec3, Y, Z, add, apply, scale, sub};
 use crate::{Ground, Obstacle, RigidBody, Rotation, Scene, SceneError, Shape};
@@ -80,6 +80,7 @@ impl Family for Chute {
         let radii = [vec![self.radius; fixed], flowing].concat();
         let mut packing = Packing { domain, centres, radii, fixed };
         packing.relax(true);
+        within_limits()?;
 
         let rotation = Rotation::about(Y, slope.to_radians());
         let turned = rotation.matrix();

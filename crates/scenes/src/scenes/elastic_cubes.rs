@@ -2,7 +2,7 @@
 
 use super::elastic::elastic_settings;
 use super::{Family, Spread, count};
-use crate::error::{positive, require};
+use crate::error::{positive, require, within_limits};
 use crate::vec3::Z;
 use crate::{Scene, SceneError};
 
@@ -56,6 +56,7 @@ impl Family for ElasticCubes {
         }
 
         for k in 0..self.count {
+            within_limits()?;
             let shift = if k % 2 == 1 { offset * self.side } else { 0.0 };
             let position = [shift, shift, self.side * (k as f64 + 0.5)];
             let mut solid = self.solid([self.side; 3], [self.elements; 3], position)?;

@@ -2,6 +2,7 @@
 
 use super::elastic::elastic_settings;
 use super::{Family, Spread, Wall, count};
+use crate::error::within_limits;
 use crate::vec3::scale;
 use crate::{Scene, SceneError, Shape};
 
@@ -40,6 +41,7 @@ impl Family for ElasticWall {
             Wall { rows, columns, length, depth, height, head_joints, ..Wall::with(common) };
         let mut scene = Scene { name: Self::NAME.into(), ..rigid.laid()? };
         for body in std::mem::take(&mut scene.bodies) {
+            within_limits()?;
             let Shape::Box { half } = body.shape else { unreachable!("a wall is of bricks") };
             let sides = scale(2.0, half);
             let part = (sides[0] / length * self.elements as f64).round().max(1.0);

@@ -11,7 +11,7 @@ use nonsmooth_solve::settings::{self, Setting, Settings, SettingsMap};
 use rand::RngExt;
 use rand_pcg::Pcg64;
 
-use crate::error::{positive, require};
+use crate::error::{positive, require, within_limits};
 use crate::{Contact, ElasticBox, Scene, SceneError, Vec3};
 
 /// Hands the settings that all families share, `[documentation, name: type = default, ...]`, and whatever else it
@@ -242,7 +242,7 @@ impl SceneEntry {
     /// Builds the scene with `settings` in place of the defaults that they name.
     ///
     /// Errors: an unknown key, listing those that exist; a value of the wrong type or one that makes no scene,
-    /// by its key.
+    /// by its key; [`SceneError::Stopped`] where the limits in force ([`nonsmooth_linalg::budget`]) ended it.
     pub fn make(&self, settings: &SettingsMap) -> Result<Scene, SceneError> {
         (self.make)(settings)
     }
@@ -316,11 +316,15 @@ impl Common {
     }
 
     /// The finished scene: masses spread, set in motion, contacts thinned, validated.
+    ///
+    /// Errors: those of validation; limits that are over, which may have cut short what was made.
     fn finish(&self, mut scene: Scene, spread: Spread) -> Result<Scene, SceneError> {
+        within_limits()?;
         self.spread_masses(&mut scene, spread);
         self.set_in_motion(&mut scene);
         self.thin(&mut scene)?;
         scene.validate()?;
+        within_limits()?;
         Ok(scene)
     }
 

@@ -3,7 +3,7 @@
 use super::polyhedra::{Faces, tessellation};
 use super::{Common, Family, Purpose, Spread, count, gap, length};
 use crate::domain::{Domain, Sides, Wall};
-use crate::error::require;
+use crate::error::{require, within_limits};
 use crate::packing::{Neighbour, Packing, volume};
 use crate::vec3::{Mat3, Vec3, apply};
 use crate::voronoi::Beyond;
@@ -133,6 +133,7 @@ impl PeriodicBox {
         let centres = radii.iter().map(|_| domain.point(&mut rng)).collect();
         let mut packing = Packing { domain, centres, radii, fixed: 0 };
         packing.relax(false);
+        within_limits()?;
         scene.periods = self.periods(&packing.domain);
         for (&centre, &radius) in packing.centres.iter().zip(&packing.radii) {
             scene.push(RigidBody::solid(Shape::Sphere { radius }, self.density)?.at(centre));
@@ -157,8 +158,9 @@ impl PeriodicBox {
         length("radius", self.radius)?;
         let domain = domain(2.0 * self.radius * (self.count as f64).cbrt());
         scene.periods = self.periods(&domain);
-        let cells = tessellation(common, &domain, self.count, 2);
+        let cells = tessellation(common, &domain, self.count, 2)?;
         for cell in &cells {
+            within_limits()?;
             scene.push(RigidBody::solid(Shape::Polyhedron(cell.polyhedron()), self.density)?);
         }
         let faces = Faces { points: self.points, open: self.open };

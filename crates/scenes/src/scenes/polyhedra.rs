@@ -5,7 +5,7 @@ use rand_pcg::Pcg64;
 
 use super::{Common, Family, Purpose, Spread, count, length};
 use crate::domain::{Domain, Sides};
-use crate::error::require;
+use crate::error::{require, within_limits};
 use crate::vec3::{Vec3, add, cross, norm, scale, sub};
 use crate::voronoi::{self, Beyond, Cell};
 use crate::{RigidBody, Scene, SceneError, Shape};
@@ -45,9 +45,10 @@ impl Family for Polyhedra {
 
         let side = self.size * (self.count as f64 / aspect).cbrt();
         let domain = Domain { size: [side, side, aspect * side], sides: [Sides::Walls; 3] };
-        let cells = tessellation(&common, &domain, self.count, self.relaxation);
+        let cells = tessellation(&common, &domain, self.count, self.relaxation)?;
         let middle = [0.5 * side, 0.5 * side, 0.0];
         for cell in &cells {
+            within_limits()?;
             let solid = cell.polyhedron().mapped(|v| sub(v, middle));
             scene.push(RigidBody::solid(Shape::Polyhedron(solid), self.density)?);
         }
@@ -66,16 +67,19 @@ impl Family for Polyhedra {
 }
 
 /// The cells of random seeds.
+///
+/// Errors: limits that are over.
 pub(super) fn tessellation(
     common: &Common,
     domain: &Domain,
     count: usize,
     relaxation: usize,
-) -> Vec<Cell> {
+) -> Result<Vec<Cell>, SceneError> {
     let mut rng = common.random(Purpose::Places);
     let mut seeds: Vec<Vec3> = (0..count).map(|_| domain.point(&mut rng)).collect();
     voronoi::relax(domain, &mut seeds, relaxation);
-    voronoi::cells(domain, &seeds)
+    let cells = voronoi::cells(domain, &seeds);
+    within_limits().map(|()| cells)
 }
 
 /// Which faces of cells touch, and where.
@@ -87,7 +91,7 @@ pub(super) struct Faces {
 impl Faces {
     /// Calls `contact` with b, what lies beyond its face, a point of the face and the normal into b.
     ///
-    /// Errors: settings that cannot be, by the keys `points` and `open`.
+    /// Errors: settings that cannot be, by the keys `points` and `open`; limits that are over.
     pub fn touch(
         &self,
         common: &Common,
@@ -99,6 +103,7 @@ impl Faces {
         require("open", open, (0.0..=1.0).contains(&open), "a number from 0 to 1")?;
         let mut rng: Pcg64 = common.random(Purpose::Faces);
         for (b, cell) in cells.iter().enumerate() {
+            within_limits()?;
             for (corners, beyond) in cell.faces() {
                 if let Beyond::Cell(a, offset) = beyond {
                     // Each face once, from the later of its two cells; a share of them stays open.

@@ -2,7 +2,7 @@
 
 use super::{Family, Purpose, Spread, count, gap};
 use crate::domain::{Domain, Sides};
-use crate::error::require;
+use crate::error::{require, within_limits};
 use crate::packing::{Neighbour, Packing, volume};
 use crate::vec3::sub;
 use crate::{RigidBody, Scene, SceneError, Shape};
@@ -48,6 +48,7 @@ impl Family for SpherePile {
         let centres = radii.iter().map(|_| domain.point(&mut rng)).collect();
         let mut packing = Packing { domain, centres, radii, fixed: 0 };
         packing.relax(true);
+        within_limits()?;
 
         let middle = [0.5 * packing.domain.size[0], 0.5 * packing.domain.size[1], 0.0];
         for (&centre, &radius) in packing.centres.iter().zip(&packing.radii) {

@@ -1,5 +1,10 @@
 //! Every family of scenes: builds, assembles, and refuses what is impossible.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+use nonsmooth_linalg::budget::Budget;
 use nonsmooth_problem::FrictionGlobal;
 use nonsmooth_scenes::scenes::{Arch, Family, Layout, SlidingBox, Spheres, Stack, Wall};
 use nonsmooth_scenes::{SCENES, Scene, SceneEntry, SceneError, Shape};
@@ -357,4 +362,35 @@ fn a_scene_without_contacts_is_no_problem() {
     let mut scene = Stack::default().build().unwrap();
     scene.contacts.clear();
     assert!(matches!(scene.problem(), Err(SceneError::Problem(_))));
+}
+
+/// Limits that are over end the making of every family, and of large ones soon.
+#[test]
+fn limits_end_the_making_of_scenes() {
+    let slack = std::env::var("NONSMOOTH_SLACK").ok().and_then(|s| s.parse().ok()).unwrap_or(1.0);
+    {
+        let flag = Arc::new(AtomicBool::new(true));
+        let _scope = Budget { cancel: Some(flag), ..Budget::default() }.enter();
+        for entry in SCENES {
+            assert_eq!(entry.make(&Map::new()), Err(SceneError::Stopped), "{}", entry.name);
+        }
+        // A mistake is told all the same.
+        let wrong = SCENES[0].make(&settings(json!({"mu": -1})));
+        assert!(matches!(wrong, Err(SceneError::Value { .. })));
+    }
+    for (name, values) in [
+        ("sphere_pile", json!({"count": 200_000})),
+        ("chute", json!({"count": 200_000})),
+        ("periodic_box", json!({"count": 200_000})),
+        ("periodic_box", json!({"count": 50_000, "grains": "polyhedra"})),
+        ("polyhedra", json!({"count": 50_000})),
+    ] {
+        let begun = Instant::now();
+        let deadline = Some(begun + Duration::from_millis(500));
+        let _scope = Budget { deadline, ..Budget::default() }.enter();
+        let made = SceneEntry::find(name).unwrap().make(&settings(values));
+        assert_eq!(made, Err(SceneError::Stopped), "{name}");
+        let seconds = begun.elapsed().as_secs_f64();
+        assert!(seconds < 0.6 + slack, "{name}: {seconds} s");
+    }
 }

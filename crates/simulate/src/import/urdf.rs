@@ -127,7 +127,7 @@ struct Robot<'a> {
     warnings: Vec<String>,
 }
 
-impl Robot<'_> {
+impl<'a> Robot<'a> {
     fn frame(&self, link: usize) -> Frame {
         self.links[link].frame.unwrap_or(Frame::HERE)
     }
@@ -160,7 +160,7 @@ impl Robot<'_> {
         for joint in self.joints.iter().filter(|j| j.kind != "fixed" && j.kind != "floating") {
             let of = |link: usize| match world[groups[link]] {
                 true => "world",
-                false => self.links[groups[link]].name,
+                false => self.called(groups[link]),
             };
             let (mut table, mimic) = self.joint(joint)?;
             (table["a"], table["b"]) = (json!(of(joint.parent)), json!(of(joint.child)));
@@ -196,6 +196,15 @@ impl Robot<'_> {
         Ok(scene)
     }
 
+    /// The name of a link's body: joints of scenes call what is no body `world`.
+    fn called(&self, link: usize) -> &'a str {
+        let taken = |name: &str| self.links.iter().any(|l| l.name == name);
+        match self.links[link].name {
+            "world" if !taken("world_link") => "world_link",
+            name => name,
+        }
+    }
+
     /// A body of links that do not move against each other, in the axes of the first; none of a root with neither mass nor shape.
     fn body(&mut self, root: usize, members: &[usize]) -> Result<Option<Value>, SimulateError> {
         let frame = self.frame(root);
@@ -216,7 +225,7 @@ impl Robot<'_> {
         }
         let name = self.links[root].name;
         let moved = self.links[root].parent.map(|j| &self.joints[j]);
-        let mut body = json!({"name": name});
+        let mut body = json!({"name": self.called(root)});
         let centre = match masses.is_empty() {
             false => {
                 let MassProperties { mass, centre, inertia } = MassProperties::joined(&masses);

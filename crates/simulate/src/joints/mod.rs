@@ -123,7 +123,7 @@ impl Coordinate {
 pub struct JointLimits {
     /// rad or m; −∞ for none.
     pub lower: f64,
-    /// rad or m; ∞ for none.
+    /// rad or m, at least the lower one; ∞ for none.
     pub upper: f64,
     /// Coefficient of restitution.
     pub e: f64,
@@ -369,7 +369,29 @@ impl Joint {
             }
             drive.validate(&format!("{key}.{name}"))?;
         }
-        Ok(())
+        self.is_driven_once(key)
+    }
+
+    /// Whether no coordinate is forced to two velocities at once, which no impulse can do. A screw has one coordinate under two names.
+    fn is_driven_once(&self, key: &str) -> Result<(), SimulateError> {
+        let mut motions = self.drives.iter().filter(|drive| drive.driver.is_some());
+        let motors = self.drives.iter().filter_map(|drive| match drive.motor {
+            Some(Motor::Velocity { max, .. }) if max == f64::INFINITY => Some(drive.coordinate),
+            _ => None,
+        });
+        let screw = matches!(self.kind, JointKind::Screw { .. });
+        let clash = motions.find_map(|motion| {
+            let same = |c: &Coordinate| screw || *c == motion.coordinate;
+            motors.clone().find(same)
+        });
+        match clash {
+            None => Ok(()),
+            Some(coordinate) => {
+                let key = format!("{key}.{}.motor.max", coordinate.name());
+                let expected = "a bound, for the coordinate has a motion that is given";
+                Err(SimulateError::value(key, expected, f64::INFINITY))
+            }
+        }
     }
 }
 
@@ -378,8 +400,17 @@ impl Drive {
         let some = "a number of at least 0";
         let at = |name: &'static str| move || format!("{key}.{name}");
         if let Some(JointLimits { lower, upper, e }) = self.limits {
-            let expected = "a number of at least the lower limit";
-            require(at("limits.upper"), upper, lower <= upper, expected)?;
+            // A limit at infinity is none, on its own side.
+            let wrong = |name, expected, x: f64| Err(SimulateError::value(at(name)(), expected, x));
+            if lower.is_nan() || lower == f64::INFINITY {
+                return wrong("limits.lower", "a number, or -inf for none", lower);
+            }
+            if upper.is_nan() || upper == f64::NEG_INFINITY {
+                return wrong("limits.upper", "a number, or inf for none", upper);
+            }
+            if lower > upper {
+                return wrong("limits.upper", "a number of at least the lower limit", upper);
+            }
             let unit = (0.0..=1.0).contains(&e);
             require(at("limits.e"), e, unit, "a coefficient from 0 to 1")?;
         }

@@ -2,9 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nonsmooth_scenes::vec3::{Mat3, Vec3, add, norm};
-use nonsmooth_scenes::{Polyhedron, Rotation, SceneEntry};
+use nonsmooth_scenes::vec3::{Mat3, Vec3, add, norm, scale};
+use nonsmooth_scenes::{Polyhedron, Rotation, SceneEntry, SceneError};
 
+use super::joints::WORLD;
 use super::{
     BodyTable, ComplianceTable, ElasticTable, ForceTable, GenerateTable, LawTable, MotionTable,
     PartTable, PeriodicTable, RotationTable, SceneFile, ShapeOrName, ShapeTable,
@@ -18,6 +19,8 @@ use crate::{
 
 /// Groups have a bit each.
 const GROUPS: usize = 32;
+/// The group of nobody, for what touches nothing.
+const NOBODY: &str = "nothing";
 
 impl From<LawTable> for Law {
     fn from(LawTable { mu, e, e_t, mu_rolling: mu_r }: LawTable) -> Self {
@@ -57,10 +60,42 @@ impl SceneFile {
             }
             builder.family(table, &format!("generate[{k}]"))?;
         }
+        self.world_is_nobody()?;
         // Partners of a joint need no law of contact.
         super::joints::join(&mut builder.world, &self.joints, &self.couplings)?;
         builder.laws()?;
         Ok(builder.world)
+    }
+
+    /// Whether no body has the name by which joints call the world, where they do: they would not mean the body.
+    fn world_is_nobody(&self) -> Result<(), SimulateError> {
+        let named = self.bodies.iter().position(|body| body.name == WORLD);
+        let mut ends = self.joints.iter().flat_map(|joint| [&joint.a, &joint.b]);
+        match named {
+            Some(k) if ends.any(|end| end == WORLD) => {
+                let expected = "another name, for joints mean by `world` what is no body";
+                Err(SimulateError::value(format!("bodies[{k}].name"), expected, "`world`"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// An error of a law of contact, which the world knows by its materials, at the place in the file that states it.
+    fn in_file(&self, error: SimulateError) -> SimulateError {
+        let SimulateError::Value { key, expected, found } = error else { return error };
+        let of_pair = self.pairs.iter().enumerate().find_map(|(k, pair)| {
+            let [a, b] = &pair.between;
+            let ways = [format!("pairs[{a}, {b}]."), format!("pairs[{b}, {a}].")];
+            let field = ways.iter().find_map(|way| key.strip_prefix(way))?;
+            Some((format!("pairs[{k}]"), field))
+        });
+        let default = || Some(("pairs_default".to_owned(), key.strip_prefix("law.")?));
+        let key = match of_pair.or_else(default) {
+            Some((place, "mu_r")) => format!("{place}.mu_rolling"),
+            Some((place, field)) => format!("{place}.{field}"),
+            None => key,
+        };
+        SimulateError::Value { key, expected, found }
     }
 
     /// The scene, ready to move.
@@ -100,7 +135,7 @@ impl SceneFile {
         let forces: Vec<_> = forces
             .map(|(k, table)| acting(table, &world, &format!("forces[{k}]")))
             .collect::<Result<_, _>>()?;
-        let (simulation, said) = start(world)?;
+        let (simulation, said) = start(world).map_err(|e| self.in_file(e))?;
         let mut simulation = simulation
             .with_solver(&solver.name, solver.settings.clone())?
             .with_tolerance(solver.tol);
@@ -153,14 +188,21 @@ fn acting(
         let names = world.bodies.iter().map(|b| b.name.as_str()).filter(|n| !n.is_empty());
         return Err(unknown(&format!("{key}.body"), "body", &table.body, names));
     };
+    if !world.bodies[place].is_free() {
+        let found = format!("`{}`, which nothing pushes", table.body);
+        let expected = "the name of a body that moves freely";
+        return Err(SimulateError::value(format!("{key}.body"), expected, found));
+    }
     let body = BodyId(place as u32);
     Ok(move |state: &State, wrenches: &mut Wrenches| {
-        // `state` is that of the middle of the step.
-        if from <= state.t && state.t < until {
+        // A step has one force from its beginning to its end: what acts for a part of it is as much smaller.
+        let share = wrenches.share(from, until);
+        if share > 0.0 {
             let [w, x, y, z] = state.rotation[place];
             let arm = nonsmooth_scenes::vec3::apply(&Rotation([w, x, y, z]).matrix(), at);
-            wrenches.force_at(state, body, force, add(state.position[place], arm));
-            wrenches.torque(body, torque);
+            let point = add(state.position[place], arm);
+            wrenches.force_at(state, body, scale(share, force), point);
+            wrenches.torque(body, scale(share, torque));
         }
     })
 }
@@ -181,6 +223,8 @@ struct Builder<'a> {
     world: World,
     shapes: BTreeMap<&'a str, &'a ShapeTable>,
     groups: Vec<&'a str>,
+    /// The groups that bodies are in.
+    inhabited: BTreeSet<&'a str>,
     names: BTreeSet<String>,
     /// Pairs of materials with a law.
     stated: BTreeSet<(usize, usize)>,
@@ -213,6 +257,7 @@ impl<'a> Builder<'a> {
             world,
             shapes,
             groups: vec![],
+            inhabited: file.bodies.iter().flat_map(|b| &b.groups).map(String::as_str).collect(),
             names: BTreeSet::new(),
             stated: BTreeSet::new(),
         })
@@ -236,6 +281,9 @@ impl<'a> Builder<'a> {
             (None, None) => None,
         };
         let rotation = rotation(table.rotation.as_ref(), &at("rotation"))?;
+        if driven {
+            unmoved(table, key)?;
+        }
         let mut body = match (driven, table.mass, density) {
             (true, Some(_), _) => {
                 return Err(SimulateError::value(
@@ -292,10 +340,15 @@ impl<'a> Builder<'a> {
             (false, None) => Motion::Free,
         };
         (body.force, body.torque) = (table.force, table.torque);
+        if table.groups.iter().any(|group| group == NOBODY) {
+            let expected = "another name, for a group of nobody is meant by `nothing`";
+            return Err(SimulateError::value(at("groups"), expected, "`nothing`"));
+        }
         if !table.groups.is_empty() {
             body.membership = self.bits(&table.groups, &at("groups"))?;
         }
         if !table.collides_with.is_empty() {
+            self.known_groups(&table.collides_with, &at("collides_with"))?;
             body.collides_with = self.bits(&table.collides_with, &at("collides_with"))?;
         }
         Ok(body.named(&table.name).turned(rotation).moving(table.velocity, table.angular_velocity))
@@ -431,6 +484,15 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
+    /// Whether there is somebody in each of these groups.
+    fn known_groups(&self, names: &[String], key: &str) -> Result<(), SimulateError> {
+        let known = &self.inhabited;
+        match names.iter().find(|name| *name != NOBODY && !known.contains(name.as_str())) {
+            None => Ok(()),
+            Some(name) => Err(unknown(key, "group that a body is in", name, known.iter().copied())),
+        }
+    }
+
     /// The bits of groups, which are numbered as they are met.
     fn bits(&mut self, names: &'a [String], key: &str) -> Result<u32, SimulateError> {
         let mut bits = 0;
@@ -452,9 +514,19 @@ impl<'a> Builder<'a> {
     fn family(&mut self, table: &GenerateTable, key: &str) -> Result<(), SimulateError> {
         finite(|| format!("{key}.position"), &table.position)?;
         let wrong = |problem: String| SimulateError::Schema { path: key.into(), problem };
-        let scene = SceneEntry::find(&table.scene).and_then(|entry| entry.make(&table.set));
-        let scene = scene.map_err(|e| wrong(e.to_string()))?;
-        let made = World::try_from(&scene).map_err(|e| wrong(e.to_string()))?;
+        let fresh;
+        let scene = match table.made.scene(&table.scene, &table.set) {
+            Some(scene) => scene,
+            None => {
+                let made = SceneEntry::find(&table.scene).and_then(|entry| entry.make(&table.set));
+                fresh = made.map_err(|e| match e {
+                    SceneError::Stopped => e.into(),
+                    e => wrong(e.to_string()),
+                })?;
+                &fresh
+            }
+        };
+        let made = World::try_from(scene).map_err(|e| wrong(e.to_string()))?;
         if !made.periodic.periods.is_empty() {
             if !self.world.periodic.periods.is_empty() {
                 let expected = "no periods besides those of `periodic` or of a family before";
@@ -568,6 +640,26 @@ impl<'a> Builder<'a> {
             self.world.label(b)
         );
         SimulateError::value("pairs", expected, "none")
+    }
+}
+
+/// Whether nothing is said of a body that does not move freely which it would not do.
+fn unmoved(table: &BodyTable, key: &str) -> Result<(), SimulateError> {
+    let expected = match table.fixed {
+        true => "none of a fixed body",
+        false => "none of a body whose motion is given",
+    };
+    let said = [
+        ("velocity", table.velocity),
+        ("angular_velocity", table.angular_velocity),
+        ("force", table.force),
+        ("torque", table.torque),
+    ];
+    match said.into_iter().find(|(_, x)| *x != [0.0; 3]) {
+        None => Ok(()),
+        Some((name, x)) => {
+            Err(SimulateError::value(format!("{key}.{name}"), expected, format!("{x:?}")))
+        }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// The name of what is no body.
-const WORLD: &str = "world";
+pub(super) const WORLD: &str = "world";
 
 /// Adds the joints and couplings of a file to a world that has its bodies.
 pub(super) fn join(
@@ -62,6 +62,9 @@ fn joint(table: &JointTable, world: &World, key: &str) -> Result<Joint, Simulate
     };
     if table.anchor_b.is_some() && table.kind != JointName::Distance {
         return Err(SimulateError::value(at("anchor_b"), "one of a `distance` only", "one"));
+    }
+    if table.anchor_b.is_none() && table.kind == JointName::Distance {
+        return Err(SimulateError::value(at("anchor_b"), "the end on b of a `distance`", "none"));
     }
     let pitch = match (table.kind, table.pitch) {
         (JointName::Screw, Some(pitch)) => pitch,
@@ -136,20 +139,26 @@ fn drive(coordinate: Coordinate, table: &DriveTable, key: &str) -> Result<Drive,
 fn motor(table: &MotorTable, key: &str) -> Result<Motor, SimulateError> {
     let MotorTable { velocity, position, stiffness, damping, max } = *table;
     let max = max.unwrap_or(f64::INFINITY);
-    match (velocity, position) {
+    let found = match (velocity, position) {
         (Some(velocity), None) if stiffness.is_none() && damping.is_none() => {
-            Ok(Motor::Velocity { velocity, max })
+            return Ok(Motor::Velocity { velocity, max });
+        }
+        (None, Some(_)) if stiffness.is_none() && damping.is_none() => {
+            // Without either it would do nothing.
+            let expected = "the stiffness with which it pulls to the position";
+            return Err(SimulateError::value(format!("{key}.motor.stiffness"), expected, "none"));
         }
         (None, Some(rest)) => {
             let [stiffness, damping] = [stiffness, damping].map(|x| x.unwrap_or(0.0));
-            Ok(Motor::Position { spring: Spring { stiffness, damping, rest }, max })
+            return Ok(Motor::Position { spring: Spring { stiffness, damping, rest }, max });
         }
-        _ => Err(SimulateError::value(
-            format!("{key}.motor"),
-            "a velocity, or a position with stiffness and damping",
-            format!("velocity {velocity:?}, position {position:?}"),
-        )),
-    }
+        (Some(_), Some(_)) => "both a velocity and a position",
+        (Some(_), None) if stiffness.is_some() => "a velocity with a stiffness",
+        (Some(_), None) => "a velocity with a damping",
+        (None, None) => "neither",
+    };
+    let expected = "a velocity alone, or a position with stiffness and damping";
+    Err(SimulateError::value(format!("{key}.motor"), expected, found))
 }
 
 fn coupling(table: &CouplingTable, world: &World, key: &str) -> Result<Coupling, SimulateError> {

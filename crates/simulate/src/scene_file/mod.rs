@@ -26,10 +26,12 @@
 mod build;
 mod elastic;
 mod joints;
+mod made;
 mod meshes;
 mod plane;
 mod read;
 
+pub use made::Made;
 pub(crate) use meshes::load as load_mesh;
 
 use std::collections::BTreeMap;
@@ -400,10 +402,10 @@ pub struct BodyTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(schema_with = "plane::rotation")]
     pub rotation: Option<RotationTable>,
-    /// Of the mass centre, m/s.
+    /// Of the mass centre at the beginning, m/s; of bodies that move freely.
     #[schemars(schema_with = "plane::vector")]
     pub velocity: [f64; 3],
-    /// In the world frame, rad/s.
+    /// In the world frame, at the beginning, rad/s; of bodies that move freely.
     #[schemars(schema_with = "plane::turn")]
     pub angular_velocity: [f64; 3],
     /// Whether it stays where it is.
@@ -419,7 +421,7 @@ pub struct BodyTable {
     pub torque: [f64; 3],
     /// The groups that it belongs to; of all, where none is named.
     pub groups: Vec<String>,
-    /// The groups that it may touch; all, where none is named.
+    /// The groups that it may touch; all, where none is named. Of `nothing` is nobody.
     pub collides_with: Vec<String>,
 }
 
@@ -548,9 +550,13 @@ pub struct GenerateTable {
     /// By how much all is moved, m.
     #[serde(default)]
     pub position: [f64; 3],
+    /// The scene, if it was made before.
+    #[serde(skip)]
+    #[schemars(skip)]
+    pub made: Made,
 }
 
-/// A force on a body.
+/// A force on a body that moves freely. Of a step in which it begins or ends it has its share, so that its impulse is the same in steps of any length.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ForceTable {
@@ -593,7 +599,7 @@ pub struct JointTable {
     #[serde(default)]
     #[schemars(schema_with = "plane::vector")]
     pub anchor: [f64; 3],
-    /// The end on b of a `distance`, m.
+    /// The end on b of a `distance`, which needs it, m.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(schema_with = "plane::vector")]
     pub anchor_b: Option<[f64; 3]>,
@@ -719,7 +725,7 @@ pub struct MotorTable {
     /// m or rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position: Option<f64>,
-    /// N/m or N·m/rad, of a motor to a position.
+    /// N/m or N·m/rad, of a motor to a position, which needs it or a damping.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stiffness: Option<f64>,
     /// N·s/m or N·m·s/rad, of a motor to a position.

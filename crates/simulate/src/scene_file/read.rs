@@ -1,13 +1,16 @@
 //! From text to a [`SceneFile`], and back.
 
+use nonsmooth_scenes::Scene;
 use nonsmooth_solve::settings::SettingsMap;
 use nonsmooth_solve::spelling::meant;
 use serde::Deserialize;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, Visitor};
 
-use super::{FORMAT, GenerateTable, LawTable, SceneFile, ShapeOrName, ShapeTable, Time, VERSION};
-use crate::{MoreauJean, SimulateError};
+use super::{
+    FORMAT, GenerateTable, LawTable, Made, SceneFile, ShapeOrName, ShapeTable, Time, VERSION,
+};
+use crate::{Activation, MoreauJean, SimulateError};
 
 impl SceneFile {
     /// Reads a scene from TOML, or from JSON where the text begins with `{`; `changes` are `key=value` with a path like `time.h` or `bodies[0].mass` and a TOML value (a word stands for itself).
@@ -29,6 +32,7 @@ impl SceneFile {
             apply(&mut document, change)?;
         }
         super::plane::lift(&mut document)?;
+        spell_out(&mut document);
         let scene: Self = serde_path_to_error::deserialize(document).map_err(|e| {
             let path = match e.path().to_string() {
                 root if root == "." => "the scene".to_owned(),
@@ -73,12 +77,22 @@ impl SceneFile {
                 set,
                 name: None,
                 position: [0.0; 3],
+                made: Made::default(),
             }],
             joints: vec![],
             couplings: vec![],
             forces: vec![],
             output: Default::default(),
         }
+    }
+
+    /// The same of a family that was made already with these settings, under the scene's gravity and in its steps: [`build`](Self::build) makes it no second time.
+    pub fn of_made(family: &str, set: SettingsMap, made: Scene, end: f64) -> Self {
+        let (gravity, h) = (made.gravity, made.h);
+        let made = Made::of(family, &set, made);
+        let mut scene = Self { gravity, ..Self::of_family(family, set, h, end) };
+        scene.generate[0].made = made;
+        scene
     }
 
     /// The document, with all defaults written out, as TOML.
@@ -89,6 +103,14 @@ impl SceneFile {
     /// The JSON Schema of the format.
     pub fn schema() -> serde_json::Value {
         schemars::schema_for!(SceneFile).to_value()
+    }
+}
+
+/// Writes the forecast of contacts out where a word asks for it, with its default numbers.
+fn spell_out(document: &mut toml::Value) {
+    let activation = document.get_mut("integrator").and_then(|table| table.get_mut("activation"));
+    if let Some(activation) = activation.filter(|value| value.as_str() == Some("forecast")) {
+        *activation = toml::Value::try_from(Activation::default()).expect("a table of numbers");
     }
 }
 

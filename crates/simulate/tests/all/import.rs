@@ -82,6 +82,16 @@ fn a_robot_swings_as_its_joints_let_it() {
     assert!(shoulder.violation < 1e-8 && axle.violation < 1e-8);
 }
 
+/// Joints of scenes mean by `world` what is no body.
+#[test]
+fn a_link_that_is_called_world_is_a_body_of_another_name() {
+    let text = ROBOT.replace("\"base\"", "\"world\"");
+    let simulation = SceneFile::parse(&urdf(&text).unwrap().scene, &[]).unwrap().build().unwrap();
+    let world = simulation.world();
+    assert_eq!(world.bodies[0].name, "world_link");
+    assert_eq!(world.joints[0].a.map(|a| a.index()), Some(0));
+}
+
 #[test]
 fn a_robot_of_one_body_falls() {
     let cut = |text: &str, from: &str, to: &str| {

@@ -1,7 +1,9 @@
 //! Scenes as files: what they mean, and what is said of mistakes.
 
+use nonsmooth_scenes::SceneEntry;
 use nonsmooth_simulate::scene_file::ShapeOrName;
 use nonsmooth_simulate::{SceneFile, SimulateError};
+use nonsmooth_solve::settings;
 
 /// A ball, a box on a belt, a composed body, and a wall of `gen`.
 const SCENE: &str = r#"
@@ -202,7 +204,7 @@ fn mistakes_are_named_by_their_place() {
             "[\"stone\", \"ruber\"]",
             "pairs[0].between: expected the name of a material, found `ruber` (did you mean `rubber`?)",
         ),
-        ("mu = 0.6", "mu = -0.6", "pairs[stone, stone].mu: expected a coefficient of at least 0"),
+        ("mu = 0.6", "mu = -0.6", "pairs[1].mu: expected a coefficient of at least 0"),
         (
             "shape = \"brick\"",
             "shape = \"bric\"",
@@ -530,7 +532,7 @@ fn what_a_scene_in_the_plane_cannot_have_is_named_by_its_place() {
         ("generate=[{ scene = \"wall\" }]", "generate[0]: expected none in the plane"),
         ("forces[0].force=[0, 0, 1]", "forces[0].force: expected 0"),
         ("forces[0].torque=[1, 0, 0]", "forces[0].torque: expected 0"),
-        ("pairs_default.mu_rolling=0.1", "law.mu_r: expected 0 in the plane"),
+        ("pairs_default.mu_rolling=0.1", "pairs_default.mu_rolling: expected 0 in the plane"),
     ] {
         let said = said(change);
         assert!(said.starts_with(expected), "{change}: {said}");
@@ -582,7 +584,38 @@ fn mistakes_in_joints_are_named_by_their_place() {
             r#"joints = [{ kind = "revolute", a = "world", b = "arm", axis = [0, 0, 0] }]"#,
             "joints[0].axis",
         ),
-        (r#"joints = [{ kind = "distance", a = "world", b = "arm" }]"#, "joints[0].anchor_b"),
+        (
+            r#"joints = [{ kind = "distance", a = "world", b = "arm" }]"#,
+            "joints[0].anchor_b: expected the end on b of a `distance`, found none",
+        ),
+        (
+            r#"joints = [{ kind = "revolute", a = "world", b = "arm", motor = { velocity = 1, position = 1 } }]"#,
+            "joints[0].motor: expected a velocity alone, or a position with stiffness and damping, found both a velocity and a position",
+        ),
+        (
+            r#"joints = [{ kind = "revolute", a = "world", b = "arm", motor = { velocity = 1, damping = 1 } }]"#,
+            "joints[0].motor: expected a velocity alone, or a position with stiffness and damping, found a velocity with a damping",
+        ),
+        (
+            r#"joints = [{ kind = "revolute", a = "world", b = "arm", motor = { position = 1 } }]"#,
+            "joints[0].motor.stiffness: expected the stiffness with which it pulls to the position, found none",
+        ),
+        (
+            r#"joints = [{ kind = "revolute", a = "world", b = "arm", motor = { velocity = 1 }, motion = { velocity = 1 } }]"#,
+            "joints[0].angle.motor.max: expected a bound, for the coordinate has a motion that is given, found inf",
+        ),
+        (
+            r#"joints = [{ kind = "screw", pitch = 1, a = "world", b = "arm", motion = { velocity = 1 }, slide = { motor = { velocity = 1 } } }]"#,
+            "joints[0].slide.motor.max: expected a bound",
+        ),
+        (
+            r#"joints = [{ kind = "revolute", a = "world", b = "arm", limits = { lower = inf } }]"#,
+            "joints[0].angle.limits.lower: expected a number, or -inf for none, found inf",
+        ),
+        (
+            r#"joints = [{ kind = "revolute", a = "world", b = "arm", limits = { lower = 1, upper = 0 } }]"#,
+            "joints[0].angle.limits.upper: expected a number of at least the lower limit, found 0",
+        ),
         (
             r#"couplings = [{ terms = [{ joint = "x", weight = 1 }] }]"#,
             "couplings[0].terms[0].joint",
@@ -690,4 +723,215 @@ fn a_scene_may_repeat_itself() {
     assert!((state.position[1][2] - 0.5).abs() < 1e-12);
     assert!((state.velocity[0][2] - 1.0).abs() < 1e-10);
     assert!((state.position[0][2] - 0.6).abs() < 1e-3);
+}
+
+/// An arm of 1 kg in space without weight, and `more` of the file.
+fn arm(h: f64, end: f64, more: &str) -> Result<SceneFile, SimulateError> {
+    let text = format!(
+        r#"
+        format = "nonsmooth-scene"
+        version = 1
+        gravity = [0, 0, 0]
+        time = {{ h = {h}, end = {end} }}
+        pairs_default = {{}}
+        [[bodies]]
+        name = "arm"
+        mass = 1
+        inertia = [1, 1, 1]
+        {more}
+        "#
+    );
+    SceneFile::parse(&text, &[])
+}
+
+/// A limit that is not given, or at infinity, is none.
+#[test]
+fn limits_may_be_open_on_either_side() {
+    for kind in ["revolute", "prismatic", "cylindrical", "screw", "point_on_line"] {
+        for (limits, ends) in [
+            ("{ lower = -0.2 }", [-0.2, f64::INFINITY]),
+            ("{ upper = 0.2 }", [f64::NEG_INFINITY, 0.2]),
+            ("{ lower = -0.2, upper = inf }", [-0.2, f64::INFINITY]),
+            ("{}", [f64::NEG_INFINITY, f64::INFINITY]),
+        ] {
+            for (direction, end) in [(-1.0, ends[0]), (1.0, ends[1])] {
+                let pitch = if kind == "screw" { "pitch = 1.0" } else { "" };
+                let more = format!(
+                    r#"
+                    velocity = [0, 0, {direction}]
+                    angular_velocity = [0, 0, {direction}]
+                    [[joints]]
+                    kind = "{kind}"
+                    a = "world"
+                    b = "arm"
+                    limits = {limits}
+                    {pitch}
+                    "#
+                );
+                let mut simulation = arm(1e-3, 0.5, &more).unwrap().build().unwrap();
+                assert!(simulation.run(0.5, 1e-3, &mut ()).unwrap().is_solved());
+                let report = simulation.joints()[0];
+                let slides = ["prismatic", "point_on_line"].contains(&kind);
+                let at = if slides { report.slide } else { report.angle };
+                // It goes on for 0.5, or stays at its limit, which is met within a step.
+                let goes = if end.is_finite() { 0.2 } else { 0.5 } * direction;
+                assert!((at - goes).abs() < 2e-3, "{kind} {limits} {direction}: {at}");
+            }
+        }
+    }
+}
+
+/// A force that acts from one time to another has the impulse of that time, however steps lie to it.
+#[test]
+fn forces_have_their_impulse_in_any_steps() {
+    for (h, from, until) in [
+        (1e-3, 0.2001, 0.2004),
+        (1e-3, 0.2003, 0.2007),
+        (1e-3, 0.2, 0.2006),
+        (1e-3, 0.2004, 0.2016),
+        (1e-3, 0.1, 0.25),
+        (0.07, 0.2, 0.5),
+    ] {
+        let more = format!(
+            r#"
+            [[forces]]
+            body = "arm"
+            force = [1000, 0, 0]
+            torque = [0, 0, 100]
+            from = {from}
+            until = {until}
+            "#
+        );
+        let mut simulation = arm(h, 0.7, &more).unwrap().build().unwrap();
+        assert!(simulation.run(0.7, h, &mut ()).unwrap().is_solved());
+        let state = simulation.state();
+        let impulse = 1000.0 * (until - from);
+        let pushed = state.velocity[0][0];
+        assert!((pushed - impulse).abs() < 1e-11 * impulse, "{h} {from} {until}: {pushed}");
+        let turned = state.spin[0][2];
+        assert!((turned - 0.1 * impulse).abs() < 1e-11 * impulse, "{h} {from} {until}: {turned}");
+    }
+}
+
+/// What a scene says and nothing would come of is a mistake, too.
+#[test]
+fn what_would_be_ignored_is_refused() {
+    let named = r#"
+        [[bodies]]
+        name = "world"
+        fixed = true
+        [[joints]]
+        kind = "revolute"
+        a = "world"
+        b = "arm"
+    "#;
+    for (more, says) in [
+        (
+            "[[bodies]]\nfixed = true\nvelocity = [1, 0, 0]",
+            "bodies[1].velocity: expected none of a fixed body, found [1.0, 0.0, 0.0]",
+        ),
+        (
+            "[[bodies]]\nname = \"post\"\nfixed = true\nangular_velocity = [0, 2, 0]",
+            "bodies[1] (post).angular_velocity: expected none of a fixed body",
+        ),
+        (
+            "[[bodies]]\nfixed = true\nforce = [0, 0, 1]",
+            "bodies[1].force: expected none of a fixed body",
+        ),
+        (
+            "[[bodies]]\nmotion = { kind = \"uniform\", velocity = [1, 0, 0] }\nvelocity = [1, 0, 0]",
+            "bodies[1].velocity: expected none of a body whose motion is given",
+        ),
+        (
+            "[[bodies]]\nname = \"post\"\nfixed = true\n[[forces]]\nbody = \"post\"\nforce = [1, 0, 0]",
+            "forces[0].body: expected the name of a body that moves freely, found `post`",
+        ),
+        (
+            "collides_with = [\"bals\"]\ngroups = [\"balls\"]",
+            "bodies[0] (arm).collides_with: expected the name of a group that a body is in, found `bals` (did you mean `balls`?)",
+        ),
+        (
+            "groups = [\"nothing\"]",
+            "bodies[0] (arm).groups: expected another name, for a group of nobody is meant",
+        ),
+        (
+            named,
+            "bodies[1].name: expected another name, for joints mean by `world` what is no body",
+        ),
+    ] {
+        let said = arm(1e-3, 1.0, more).and_then(|s| s.build().map(drop)).unwrap_err().to_string();
+        assert!(said.starts_with(says), "{more}: {said}");
+    }
+    // Of `nothing` is nobody; a body called `world` is one like others where no joint means the world.
+    for more in ["collides_with = [\"nothing\"]", "[[bodies]]\nname = \"world\"\nfixed = true"] {
+        arm(1e-3, 1.0, more).unwrap().build().unwrap();
+    }
+}
+
+/// Laws are named by the place and the key in the file.
+#[test]
+fn laws_that_are_wrong_are_named_as_the_file_has_them() {
+    let pair = |fields: &str| {
+        format!("[materials.a]\n[materials.b]\n[[pairs]]\nbetween = [\"b\", \"a\"]\n{fields}")
+    };
+    let said = |more: &str, change: &[&str]| {
+        let scene = arm(1e-3, 1.0, more).unwrap();
+        let made = SceneFile::parse(&scene.to_toml(), change).and_then(|s| s.build().map(drop));
+        made.unwrap_err().to_string()
+    };
+    for (change, says) in [
+        ("pairs_default.mu=-1", "pairs_default.mu: expected a coefficient of at least 0, found -1"),
+        ("pairs_default.e=2", "pairs_default.e: expected a coefficient from 0 to 1, found 2"),
+        (
+            "pairs_default.mu_rolling=-1",
+            "pairs_default.mu_rolling: expected a length of at least 0, found -1",
+        ),
+    ] {
+        assert_eq!(said("", &[change]), says);
+    }
+    for (fields, says) in [
+        ("mu_rolling = -1", "pairs[0].mu_rolling: expected a length of at least 0, found -1"),
+        ("e = -1", "pairs[0].e: expected a coefficient from 0 to 1, found -1"),
+        ("compliance = { stiffness = -1 }", "pairs[0].compliance.stiffness: expected a positive"),
+        (
+            "e = 0.1\ncompliance = { stiffness = 1 }",
+            "pairs[0].e: expected 0 where contacts have a compliance",
+        ),
+    ] {
+        let said = said(&pair(fields), &[]);
+        assert!(said.starts_with(says), "{fields}: {said}");
+    }
+}
+
+#[test]
+fn the_forecast_may_be_asked_for_by_its_name() {
+    let scene = SceneFile::parse(SCENE, &["integrator.activation=forecast"]).unwrap();
+    assert_eq!(scene, SceneFile::parse(SCENE, &[]).unwrap());
+    let said =
+        SceneFile::parse(SCENE, &["integrator.activation=forecats"]).unwrap_err().to_string();
+    assert!(said.contains("(did you mean `forecast`?)"), "{said}");
+}
+
+/// What a family was made into is used for as long as it is that of the table, and is no part of the document.
+#[test]
+fn a_family_that_was_made_is_not_made_again() {
+    let set = settings::from_texts(&["rows=2", "columns=2", "gravity=3"]).unwrap();
+    let mut made = SceneEntry::find("wall").unwrap().make(&set).unwrap();
+    let fresh = SceneFile {
+        gravity: made.gravity,
+        ..SceneFile::of_family("wall", set.clone(), made.h, 1.0)
+    };
+    // By this it is known again.
+    made.bodies[0].position[2] += 5.0;
+    let mut scene = SceneFile::of_made("wall", set, made, 1.0);
+    assert_eq!(scene, fresh);
+    assert_eq!(scene.to_toml(), fresh.to_toml());
+    let top = |scene: &SceneFile| {
+        let world = scene.world().unwrap();
+        world.bodies.iter().map(|b| b.position[2]).fold(0.0, f64::max)
+    };
+    assert!(top(&scene) > 5.0 && top(&fresh) < 5.0);
+    assert!(top(&scene.clone()) > 5.0);
+    scene.generate[0].set.insert("rows".into(), 3.into());
+    assert!(top(&scene) < 5.0);
 }
