@@ -6,8 +6,11 @@ use nonsmooth_linalg::{Csc, norm};
 use nonsmooth_problem::check::{ContactStatus, Law, Motion};
 use nonsmooth_problem::{Bounds, Friction, FrictionGlobal, FrictionLocal};
 
-use crate::rank;
-use crate::spectrum::DENSE;
+use crate::spectrum::{DENSE, rank_of_units};
+
+/// Singular values below this share of the largest, and below so many relative residuals, are those of the rounding and the inaccuracy of r.
+const ACCURACY: f64 = 1e-10;
+const INACCURACY: f64 = 10.0;
 
 /// How many of the directions in which the impulses of a solution may change the motion feels.
 ///
@@ -15,6 +18,8 @@ use crate::spectrum::DENSE;
 /// slips, or sticks at the limit of friction, along `r_c` itself; a scalar row between its bounds, in one. What `[H, G] A` maps to zero changes no velocity, so
 /// that with `rank < of` the problem has other solutions with the same motion; `of − rank` is the degree of static indeterminacy. With W in place of H the same
 /// holds of `[W, V; Vᵀ, R] A`.
+///
+/// The directions r_c are as accurate as the point, so that singular values count where they are above 1e-10, and above `10 ρ`, times the largest, ρ the relative residual.
 ///
 /// Of matrices of more than 10⁵ entries the rank is not computed; it is then at most the number of degrees of freedom that the directions touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -28,7 +33,7 @@ pub struct Indeterminacy {
 }
 
 impl Indeterminacy {
-    /// That of a solution with impulses r (D nc), λ (p) and these statuses (nc). `dofs`: the degrees of freedom that a local problem was condensed from, where
+    /// That of a solution with impulses r (D nc), λ (p), these statuses (nc) and this relative residual. `dofs`: the degrees of freedom that a local problem was condensed from, where
     /// they are known. `None` where no impulse acts, or nothing is known.
     ///
     /// Cost: O(nnz), and the singular values of a matrix of at most 10⁵ entries.
@@ -37,14 +42,16 @@ impl Indeterminacy {
         (r, lambda): (&[f64], &[f64]),
         statuses: &[ContactStatus],
         dofs: Option<usize>,
+        residual: f64,
     ) -> Option<Self> {
+        let relative = ACCURACY.max(INACCURACY * residual);
         match problem {
-            Friction::Local2(p) => local(p, r, lambda, statuses, dofs),
-            Friction::Local3(p) => local(p, r, lambda, statuses, dofs),
-            Friction::RollingLocal(p) => local(p, r, lambda, statuses, dofs),
-            Friction::Global2(p) => global(p, r, lambda, statuses),
-            Friction::Global3(p) => global(p, r, lambda, statuses),
-            Friction::RollingGlobal(p) => global(p, r, lambda, statuses),
+            Friction::Local2(p) => local(p, (r, lambda), statuses, dofs, relative),
+            Friction::Local3(p) => local(p, (r, lambda), statuses, dofs, relative),
+            Friction::RollingLocal(p) => local(p, (r, lambda), statuses, dofs, relative),
+            Friction::Global2(p) => global(p, (r, lambda), statuses, relative),
+            Friction::Global3(p) => global(p, (r, lambda), statuses, relative),
+            Friction::RollingGlobal(p) => global(p, (r, lambda), statuses, relative),
         }
     }
 
@@ -60,9 +67,9 @@ impl Indeterminacy {
 
 fn global<const D: usize, L: Law<D>>(
     p: &FrictionGlobal<D, L>,
-    r: &[f64],
-    lambda: &[f64],
+    (r, lambda): (&[f64], &[f64]),
     statuses: &[ContactStatus],
+    relative: f64,
 ) -> Option<Indeterminacy> {
     let directions = directions::<L, D>(r, statuses);
     let columns = directions.iter().map(|direction| direction.of(&p.H).collect());
@@ -70,15 +77,15 @@ fn global<const D: usize, L: Law<D>>(
         between(&rows.bounds, lambda).map(|j| entries(rows.G.column(j), 0).collect())
     });
     let all: Vec<Vec<_>> = columns.chain(rows).collect();
-    counted(&all, None)
+    counted(&all, None, relative)
 }
 
 fn local<const D: usize, L: Law<D>>(
     p: &FrictionLocal<D, L>,
-    r: &[f64],
-    lambda: &[f64],
+    (r, lambda): (&[f64], &[f64]),
     statuses: &[ContactStatus],
     dofs: Option<usize>,
+    relative: f64,
 ) -> Option<Indeterminacy> {
     let (w, m) = (p.W.to_csc(), p.q.len());
     let directions = directions::<L, D>(r, statuses);
@@ -92,11 +99,15 @@ fn local<const D: usize, L: Law<D>>(
             .map(|j| entries(rows.V.column(j), 0).chain(entries(rows.R.column(j), m)).collect())
     });
     let all: Vec<Vec<_>> = columns.chain(rows).collect();
-    counted(&all, dofs)
+    counted(&all, dofs, relative)
 }
 
 /// From the columns by their entries; the rank is at most `most`.
-fn counted(columns: &[Vec<(usize, f64)>], most: Option<usize>) -> Option<Indeterminacy> {
+fn counted(
+    columns: &[Vec<(usize, f64)>],
+    most: Option<usize>,
+    relative: f64,
+) -> Option<Indeterminacy> {
     let of = columns.len();
     if of == 0 {
         return None;
@@ -113,7 +124,7 @@ fn counted(columns: &[Vec<(usize, f64)>], most: Option<usize>) -> Option<Indeter
         .flat_map(|(j, column)| column.iter().filter_map(move |&(i, x)| Some((place(i)?, j, x))));
     let a = Csc::from_triplets(touched.len(), of, triplets.collect::<Vec<_>>().into_iter()).ok()?;
     let bound = most.map_or(touched.len(), |n| n.min(touched.len()));
-    match rank(&a, DENSE) {
+    match rank_of_units(&a, DENSE, relative) {
         Some(rank) => Some(Indeterminacy { rank, of, counted: false }),
         None => (bound < of).then_some(Indeterminacy { rank: bound, of, counted: true }),
     }
@@ -203,7 +214,7 @@ mod tests {
         let point = GlobalPoint { v, r: r.to_vec(), lambda: vec![] };
         let verdict = p.judge(&point, 1e-10).unwrap();
         assert!(verdict.solved, "{:?}", verdict.measure);
-        global(p, r, &[], &verdict.statuses)
+        global(p, (r, &[]), &verdict.statuses, ACCURACY)
     }
 
     #[test]
@@ -227,6 +238,33 @@ mod tests {
         assert_eq!(found(&still, &[0.0; 4]), None);
     }
 
+    /// A body in the plane that slides along on four supports, which fix its normal impulse and its moment: the directions of friction are those of the solver's last bits.
+    #[test]
+    fn what_slides_one_way_is_counted_once_whatever_the_rounding() {
+        let supports = [-1.0, -0.4, 0.3, 1.0];
+        let mut h = vec![];
+        for (c, &x) in supports.iter().enumerate() {
+            h.extend([(0, 2 * c, 1.0), (1, 2 * c + 1, 1.0), (2, 2 * c, x), (2, 2 * c + 1, 0.5)]);
+        }
+        let h = Csc::from_triplets(3, 8, h.into_iter()).unwrap();
+        let p = FrictionGlobal::<2>::new(
+            Csc::diagonal(&[1.0; 3]),
+            h,
+            vec![-1.0, 10.0, 0.125],
+            vec![0.0; 8],
+            vec![0.2; 4],
+        )
+        .unwrap();
+        let r: Vec<f64> = (0..4)
+            .flat_map(|c| {
+                let noise = 1.0 + 1e-13 * [1.0, -2.0, 0.5, 3.0][c];
+                [0.25, -0.2 * 0.25 * noise]
+            })
+            .collect();
+        let found = found(&p, &r).unwrap();
+        assert_eq!((found.rank, found.of, found.is_unique()), (2, 4, Some(false)));
+    }
+
     /// In the local form the degrees of freedom are gone, and the rank is the same.
     #[test]
     fn both_forms_agree_scalar_rows_included() {
@@ -235,9 +273,9 @@ mod tests {
             let case = Planted { contacts, dofs, bilateral, mix, ..Planted::default() };
             let (p, point) = case.global::<3>();
             let statuses = p.judge(&point, 1e-8).unwrap().statuses;
-            let of_global = global(&p, &point.r, &point.lambda, &statuses).unwrap();
+            let of_global = global(&p, (&point.r, &point.lambda), &statuses, ACCURACY).unwrap();
             let (q, point) = case.local::<3>();
-            let of_local = local(&q, &point.r, &point.lambda, &statuses, None).unwrap();
+            let of_local = local(&q, (&point.r, &point.lambda), &statuses, None, ACCURACY).unwrap();
             assert_eq!(of_global, of_local);
             let (stick, slip) = (Motion::Stick, Motion::Slip);
             let count = |m: Motion| statuses.iter().filter(|s| s.status == m).count();
@@ -253,9 +291,9 @@ mod tests {
         let (p, point) = case.global::<3>();
         let statuses = p.judge(&point, 1e-8).unwrap().statuses;
         let counted = Indeterminacy { rank: 240, of: 600, counted: true };
-        assert_eq!(global(&p, &point.r, &[], &statuses), Some(counted));
+        assert_eq!(global(&p, (&point.r, &[]), &statuses, ACCURACY), Some(counted));
         let (q, point) = case.local::<3>();
-        assert_eq!(local(&q, &point.r, &[], &statuses, Some(240)), Some(counted));
-        assert_eq!(local(&q, &point.r, &[], &statuses, None), None);
+        assert_eq!(local(&q, (&point.r, &[]), &statuses, Some(240), ACCURACY), Some(counted));
+        assert_eq!(local(&q, (&point.r, &[]), &statuses, None, ACCURACY), None);
     }
 }

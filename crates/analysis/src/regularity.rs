@@ -10,7 +10,7 @@ use crate::spectrum::{DENSE, rank_above};
 /// The rank of the Jacobian `JF_αα` of the variables α whose rows are equations at a point: those strictly between their bounds, and free ones.
 ///
 /// At a solution without degenerate pairs (`x_i` on a bound and `F_i = 0`) a nonsingular JF_αα makes the solution isolated, and strongly regular: it moves
-/// smoothly with the data (Robinson1980). Rows are taken in units of their terms, columns in units of `max(|x_j|, 1)`, and singular values count where they are above `4 √ρ` times
+/// smoothly with the data (Robinson1980). Rows are taken in units of their terms or, where those are less, of their largest entry, columns in units of `max(|x_j|, 1)`, and singular values count where they are above `4 √ρ` times
 /// the largest, ρ the relative residual: at a double root a point is that far off, and so is the derivative from zero. The rank holds up to rounding and to the accuracy of the point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Regularity {
@@ -50,9 +50,10 @@ impl Regularity {
         for (i, row) in place.iter().enumerate().filter_map(|(i, p)| Some((i, (*p)?))) {
             let scaled =
                 pattern.range(i).zip(pattern.row(i)).map(|(at, &j)| (j, jacobian[at] * column(j)));
-            let most = |sum: f64, (_, a): (usize, f64)| sum.max(a.abs());
-            let unit = [sizes[i], scaled.clone().fold(0.0, most)];
-            let unit = unit.into_iter().find(|&d| d > 0.0 && d.is_finite()).unwrap_or(1.0);
+            // Of a row whose terms all vanish the derivatives tell the unit.
+            let terms = if sizes[i].is_finite() { sizes[i] } else { 0.0 };
+            let unit = scaled.clone().fold(terms, |most, (_, a)| most.max(a.abs()));
+            let unit = if unit > 0.0 { unit } else { 1.0 };
             entries.extend(scaled.filter_map(|(j, a)| Some((row, place[j]?, a / unit))));
         }
         let a = Csc::from_triplets(of, of, entries.into_iter()).ok()?;
@@ -97,6 +98,13 @@ mod tests {
             assert_eq!(at([&rows[0], &rows[1]], [1.0 + 1e-6; 2], 1e-12).rank, 1);
             let rows = [format!("{scale}*(x^2 - 3*x + 2)"), "y - x".into()];
             assert_eq!(at([&rows[0], &rows[1]], [1.0 + 1e-12; 2], 1e-12).rank, 2);
+        }
+    }
+
+    #[test]
+    fn a_row_whose_terms_vanish_hides_no_other() {
+        for b in [0.0, 4e-16, -2e-12] {
+            assert_eq!(at(["y", "y - x^2 + 2"], [2.0_f64.sqrt(), b], 1e-12).rank, 2, "{b}");
         }
     }
 

@@ -135,6 +135,11 @@ pub(crate) const DENSE: usize = 100_000;
 /// The rank of a sparse matrix whose columns count the same whatever their size: singular values above ε times the larger
 /// dimension times the largest. `None` where the dense matrix would have more than `limit` entries, or an entry is not finite.
 pub fn rank(a: &Csc, limit: usize) -> Option<usize> {
+    rank_of_units(a, limit, 0.0)
+}
+
+/// The same with singular values above `relative` times the largest.
+pub(crate) fn rank_of_units(a: &Csc, limit: usize, relative: f64) -> Option<usize> {
     if a.nrows().checked_mul(a.ncols())? > limit {
         return None;
     }
@@ -145,7 +150,7 @@ pub fn rank(a: &Csc, limit: usize) -> Option<usize> {
             (0..a.nrows()).for_each(|i| unit[(i, j)] /= size);
         }
     }
-    above(&unit, 0.0)
+    above(&unit, relative)
 }
 
 /// The number of singular values above `relative` times the largest, and above rounding. `None` where an entry is not finite.

@@ -78,7 +78,8 @@ fn indeterminacy(
         AnyStatus::Row(_) | AnyStatus::Set(_) => None,
     };
     let statuses: Vec<_> = verdict.statuses.iter().filter_map(contact).collect();
-    let found = || Indeterminacy::of(problem, (r, lambda), &statuses, dofs);
+    let residual = verdict.measure.relative;
+    let found = || Indeterminacy::of(problem, (r, lambda), &statuses, dofs, residual);
     verdict.solved.then(found).flatten()
 }
 

@@ -4,12 +4,16 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use nonsmooth_problem::check::Measure;
 use nonsmooth_problem::field::{Differences, Pattern};
 use nonsmooth_problem::planted::{Planted, PlantedLcp, PlantedMlcp};
-use nonsmooth_problem::{AnyProblem, Mcp, OfAny, Problem};
+use nonsmooth_problem::{AnyProblem, FrictionGlobal, GlobalPoint, Mcp, OfAny, Problem};
 use nonsmooth_solve::contact::splitting::Nsgs;
 use nonsmooth_solve::registry::{self, Registered};
-use nonsmooth_solve::{Limit, Solvable, Solve, SolveError, Status, solve};
+use nonsmooth_solve::settings::SettingsMap;
+use nonsmooth_solve::{
+    Limit, Limits, Observer, Progress, Solvable, Solve, SolveError, Status, solve,
+};
 
 /// A problem solved by the door, as itself and without its kind: the same bits, judged alike.
 fn goes_through<P: Registered + OfAny + Solvable>(problem: &P) {
@@ -73,6 +77,31 @@ fn a_limit_leaves_an_answer_with_a_verdict() {
         assert!(matches!(answer.status, Status::Limit(Limit::Cancelled | Limit::Time)));
         assert!(!answer.verdict.solved);
         assert_eq!(answer.verdict.velocity.len(), problem.w.len());
+    }
+}
+
+/// Who is given up in the middle of a preparation has the start, judged: W of a large problem, or its other form, may take all the time there is.
+#[test]
+fn what_observes_has_a_point_before_any_preparation() {
+    struct First(Option<Measure>);
+    impl Observer<FrictionGlobal<3>> for First {
+        fn step(&mut self, _: &Progress) {}
+        fn keeps_best(&self) -> bool {
+            true
+        }
+        fn best(&mut self, _: &GlobalPoint, measure: &Measure) {
+            self.0.get_or_insert(*measure);
+        }
+    }
+    let (problem, _) = Planted { contacts: 6, dofs: 36, ..Planted::default() }.global::<3>();
+    let limits = Limits { time_limit: Some(0.0), ..Limits::default() };
+    for name in registry::solver_names::<FrictionGlobal<3>>() {
+        let mut session = registry::session(&name, &SettingsMap::new()).unwrap();
+        let mut first = First(None);
+        let outcome = session.observe(&problem, &mut problem.origin(), &limits, &mut first);
+        let inapplicable = outcome.is_err_and(|e| e.is_inapplicable());
+        let judged = first.0.is_some_and(|measure| measure != Measure::unknown());
+        assert!(judged || inapplicable, "{name}");
     }
 }
 

@@ -186,6 +186,27 @@ fn an_empty_column_excuses_nothing() {
     assert!(!problem.judge(&LcpPoint { z: vec![-1e-9, 1.0] }, 0.9).unwrap().solved);
 }
 
+/// What is zero of its own and may have both signs: a row of which nothing is left but its rounding refuses no point.
+#[test]
+fn free_variables_that_are_zero_but_for_rounding_are_put_there() {
+    // x₀ = x₁, x₀ + 2 x₁ = 0, 0 ≤ x₂ ⟂ x₀ + x₂ − 1 ≥ 0.
+    let m = [[1.0, -1.0, 0.0], [1.0, 2.0, 0.0], [1.0, 0.0, 1.0]];
+    let q = vec![0.0, 0.0, -1.0];
+    let problem = Mlcp::new(Dense::from_rows(&m).unwrap(), q, 2).unwrap();
+    let mut gauge = problem.gauge().unwrap();
+    for noise in [7e-33, 1e-15, 3e-280] {
+        let mut point = LcpPoint { z: vec![noise, -0.5 * noise, 1.0] };
+        assert!(!problem.certify(&point, &mut gauge).passes(0.5), "{noise}");
+        assert!(problem.tidy(&mut point, &mut gauge, true) && point.z == [0.0, 0.0, 1.0]);
+        assert!(problem.certify(&point, &mut gauge).passes(1e-15));
+    }
+    // Not so what is an error.
+    let mut point = LcpPoint { z: vec![1e-9, 1e-9, 1.0] };
+    let _ = problem.certify(&point, &mut gauge);
+    problem.tidy(&mut point, &mut gauge, true);
+    assert!(point.z[0] == 1e-9 && !problem.certify(&point, &mut gauge).passes(1e-8));
+}
+
 #[test]
 fn products_beyond_the_range_of_doubles_are_not_trusted() {
     let m = Dense::from_rows(&[[1e-200]]).unwrap();

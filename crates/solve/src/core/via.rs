@@ -3,7 +3,7 @@
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Measure;
 
-use crate::core::drive::Calibration;
+use crate::core::drive::{Calibration, closely};
 use crate::core::trace::Trace;
 use crate::{Reformulation, SolveError, Solver, Step};
 
@@ -30,6 +30,8 @@ where
     reduced: R::To,
     memo: R::Memo,
     point: <R::To as Problem>::Point,
+    /// As the other problem's judge would have it.
+    tidied: <R::To as Problem>::Point,
     work: S::Work,
     /// Of the other problem.
     gauge: Option<<R::To as Problem>::Gauge>,
@@ -66,7 +68,9 @@ impl<R, S> Via<R, S> {
             return step;
         }
         self.solver.publish(&work.reduced, &mut work.point, &mut work.work);
-        work.measure = work.reduced.certify(&work.point, gauge);
+        let _ = work.reduced.measure(&work.point, gauge);
+        let ViaWork { reduced, point, tidied, tolerance, .. } = work;
+        (work.measure, _) = closely(reduced, point, gauge, tidied, *tolerance);
         work.unjudged = 0;
         work.calibration.learn(work.measure.merit(), estimate);
         match step {
@@ -88,13 +92,14 @@ where
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
         let (reduced, memo) = self.reformulation.reduce(problem)?;
         let work = self.solver.work(&reduced)?;
-        let point = reduced.origin();
+        let (point, tidied) = (reduced.origin(), reduced.origin());
         let gauge = self.reformulation.approximates().map(|_| reduced.gauge()).transpose()?;
         let (measure, tolerance) = (Measure::unknown(), 0.0);
         Ok(ViaWork {
             reduced,
             memo,
             point,
+            tidied,
             work,
             gauge,
             measure,

@@ -107,6 +107,10 @@ where
             Err(e) => return meter.ended(Measure::unknown(), limits, &scope, e.into()),
         };
         let start = problem.certify(point, gauge);
+        // To make the other problem may take all the time there is.
+        if observer.keeps_best() {
+            observer.best(point, &start);
+        }
         let reduced = match kept.take() {
             Some((mut to, mut memo)) => {
                 reformulation.reduce_again(problem, &mut to, &mut memo).map(|()| (to, memo))

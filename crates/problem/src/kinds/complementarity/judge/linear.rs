@@ -2,7 +2,7 @@
 
 use super::{
     Pair, RowCounts, RowStatus, Sum, find_effects, find_units, finite, floor, put, rounding, share,
-    unseen, verdict,
+    unseen, verdict, without_noise,
 };
 use crate::check::proof::{Exact, FEW, exact, exactly_near};
 use crate::check::rows::Rows;
@@ -173,7 +173,7 @@ impl LinearGauge {
         Some(Pair { z: point.z[j], l, u, w, error, effect: self.effects[j] })
     }
 
-    /// Puts variables on their bounds that are there but for rounding: `point` is the one last measured. Says whether anything changed.
+    /// Puts variables on their bounds that are there but for rounding, boldly also those to zero that may have both signs: `point` is the one last measured. Says whether anything changed.
     pub(crate) fn tidy(&self, problem: &impl InZ, point: &mut LcpPoint, boldly: bool) -> bool {
         let data = problem.data();
         let mut changed = false;
@@ -190,6 +190,13 @@ impl LinearGauge {
                 pair.z
             };
             changed |= put(z, &mut point.z[j]);
+        }
+        for (j, z) in point.z.iter_mut().enumerate().filter(|_| boldly) {
+            let (l, u) = data.column_bounds(j);
+            let reached = self.columns[j] > 0.0 || self.closed;
+            if reached && l < 0.0 && u > 0.0 {
+                changed |= put(without_noise(*z, self.columns[j]), z);
+            }
         }
         changed
     }

@@ -164,6 +164,12 @@ impl Pair {
     }
 }
 
+/// A variable that may have both signs; zero where it is so but for rounding in the units of the problem, in which a unit of it counts `distance`. A row whose terms all vanish at a
+/// solution would make an error of 1 of that rounding.
+pub(crate) fn without_noise(z: f64, distance: f64) -> f64 {
+    if matters(z.abs(), distance) <= ROUNDING { 0.0 } else { z }
+}
+
 /// What the judge adds up, row by row.
 pub(crate) struct Sum {
     pub(crate) unit: f64,

@@ -12,8 +12,11 @@ const VANISHING: f64 = 1e-4;
 /// How near to zero, in parts of the start, a function without expressions is asked: not at zero, where logarithms and quotients end. Of two points, since sizes that
 /// still become smaller from the one to the other vanish.
 const NEAR: [f64; 2] = [1.0 / (1_u64 << 30) as f64, 1.0 / (1_u64 << 40) as f64];
-/// Changes of the variables, in parts of their size, along which a Jacobian is held against F.
-const STEP: f64 = 1e-6;
+/// How far from zero, in parts of the start: for rows that are large near a pole, where a start may lie.
+const FAR: [f64; 2] = [(1_u64 << 40) as f64, (1_u64 << 50) as f64];
+/// Changes of the variables, in parts of their size, along which a Jacobian is held against F. So far at least is a point from a solution that its own distance from a pole makes seem near:
+/// of `3 − 1/(x − 1)` close to 1, a change of x by as little as that distance changes F by all that it is.
+const STEP: f64 = 1.0 / 1024.0;
 /// What a Jacobian may miss of F's change, in parts of its terms.
 const ALLOWED: f64 = 0.1;
 
@@ -75,7 +78,7 @@ impl Terms {
             }
             *size = size_of_row(*size, f[i]);
         }
-        if precisely && *smooth && !known {
+        if precisely && *smooth {
             self.distrust(pattern, x);
         }
         if !budget::over() {
@@ -92,7 +95,7 @@ impl Terms {
         (units, self.sizes.iter().fold(0.0, |most, d| most.max(*d)))
     }
 
-    /// A Jacobian is a claim: a row of which F does not change as it says has the size `|F_i|` and that of its change, if that is smaller.
+    /// A Jacobian is a claim, and of this point alone: of a row of which F does not change as it says, `|F_i|` and the change count in place of its terms, if they are smaller.
     ///
     /// `|F_i(x ± h d) − F_i(x) ∓ h Σ_j J_ij d_j| > h Σ_j |J_ij x_j| / 10` on both sides (at kinks one is enough), for d_j of random sign between `|x_j|/2` and `|x_j|`. Two values of F.
     fn distrust(&mut self, pattern: &Pattern, x: &[f64]) {
@@ -134,13 +137,13 @@ fn along(pattern: &Pattern, jacobian: &[f64], i: usize, d: &[f64], of: impl Fn(f
 pub(crate) struct Units {
     /// Those at the start or, where they vanish there, what a change of the other rows by their own makes of the row.
     start: Vec<f64>,
-    /// The same at the point nearest to zero that is allowed; zero where they are not known.
-    near: Vec<f64>,
-    /// The largest sizes at the two points.
+    /// The smaller of the same at the point nearest to zero that is allowed, and far beyond the start; zero where they are not known.
+    elsewhere: Vec<f64>,
+    /// The largest sizes at the start, and elsewhere.
     largest: (f64, f64),
-    /// Sizes at the start, and the points near zero until they are asked.
+    /// Sizes at the start, and the points near zero and far from it until they are asked: sizes that become smaller from one to the next vanish there.
     own: Vec<f64>,
-    unasked: Vec<Vec<f64>>,
+    unasked: Vec<Vec<Vec<f64>>>,
     expressions: bool,
 }
 
@@ -152,7 +155,7 @@ impl Units {
         let zeros = || vec![0.0; start.len()];
         let mut units = Self {
             start: zeros(),
-            near: zeros(),
+            elsewhere: zeros(),
             largest: (0.0, 0.0),
             own: vec![],
             unasked: vec![],
@@ -164,7 +167,9 @@ impl Units {
         if zero != start {
             let beside =
                 |part: f64| zero.iter().zip(start).map(|(z, s)| z + part * (s - z)).collect();
-            units.unasked = if units.expressions { vec![zero] } else { NEAR.map(beside).to_vec() };
+            let near =
+                if units.expressions { vec![zero.clone()] } else { NEAR.map(beside).to_vec() };
+            units.unasked = vec![near, FAR.map(beside).to_vec()];
         }
         if units.expressions {
             units.ask(field, terms);
@@ -191,8 +196,17 @@ impl Units {
     }
 
     fn ask(&mut self, field: &dyn Field, terms: &mut Terms) {
+        for points in std::mem::take(&mut self.unasked) {
+            self.ask_at(points, field, terms);
+        }
+        // These are no sizes of the point last looked at any more.
+        terms.at.clear();
+    }
+
+    /// Takes the units at these points, where F is defined at all of them.
+    fn ask_at(&mut self, points: Vec<Vec<f64>>, field: &dyn Field, terms: &mut Terms) {
         let mut before: Option<Vec<f64>> = None;
-        for point in std::mem::take(&mut self.unasked) {
+        for point in points {
             if !tentatively(|| terms.look(field.pattern(), &point, !self.expressions)) {
                 return;
             }
@@ -201,23 +215,24 @@ impl Units {
                 sizes.filter(|(d, before)| **d < 0.5 * before).for_each(|(d, _)| *d = 0.0);
             }
         }
-        (self.near, self.largest.1) = terms.units(field.pattern());
-        // These are no sizes of that point any more.
-        terms.at.clear();
+        let (units, largest) = terms.units(field.pattern());
+        self.largest.1 = lesser(self.largest.1, largest);
         // What neighbours hand on depends on the Jacobian there: it replaces no unit of the same kind.
-        let handed = self.near.iter_mut().zip(&self.own).filter(|(_, own)| **own == 0.0);
-        handed.for_each(|(near, _)| *near = 0.0);
+        let rows = self.elsewhere.iter_mut().zip(units).zip(&self.own);
+        for ((unit, there), _) in rows.filter(|(_, own)| **own > 0.0) {
+            *unit = lesser(*unit, there);
+        }
     }
 
     /// ω of row i, whose terms have this size; whichever points were measured before, it is the same.
     pub(crate) fn at(&self, i: usize, size: f64) -> (f64, f64) {
         let matters = self.expressions || size < VANISHING * self.start[i];
-        (self.start[i], if matters { self.near[i] } else { 0.0 })
+        (self.start[i], if matters { self.elsewhere[i] } else { 0.0 })
     }
 
     /// The size that terms of row i count at least.
     pub(crate) fn least(&self, i: usize) -> f64 {
-        VANISHING * lesser(self.start[i], self.near[i])
+        VANISHING * lesser(self.start[i], self.elsewhere[i])
     }
 
     /// As [`least`](Self::least), of the largest row.

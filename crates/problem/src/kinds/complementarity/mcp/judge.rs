@@ -11,7 +11,8 @@ use crate::check::{Measure, RowCounts, RowStatus, Verdict};
 /// The error of row i is `|F_i| / D_i` (0/0 = 0), where D_i is the size of the row's terms at x: of a polynomial the sum of the moduli of its monomials, of
 /// other expressions the same to first order, of functions without expressions `|F_i − Σ_j J_ij x_j| + Σ_j |J_ij x_j|` (where F does not change as J says, `|F_i|` and its change along a vector of the size of x, if that is smaller); of rows that vanish with all their terms at least
 /// a ten-thousandth of ω_i, the size at the start or, where that is zero, what a change of the other rows by their own ω makes of the row through the variables that they share; or
-/// the size at the point nearest to zero that the bounds allow, if that is smaller: a start far off makes nothing small. That a variable is d away from a bound
+/// the size at the point nearest to zero that the bounds allow, or far beyond the start, if that is smaller: a start far off, or near a pole, makes nothing small. Of a row that along a change of x by a
+/// thousandth does not change as J says, that change counts in place of the terms that it should have had. That a variable is d away from a bound
 /// counts as much as what it does to the rows, `max_k |J_kj| d / D_k`; where the Jacobian does not see it, d over the largest of `|x_j|`, `|start_j|` and the
 /// finite bounds. Therefore neither changes when rows or variables are multiplied by numbers.
 ///
@@ -21,7 +22,7 @@ use crate::check::{Measure, RowCounts, RowStatus, Verdict};
 /// | `dual` | the largest error of an F whose sign no bound allows |
 /// | `complementarity` | the largest error of a pair: the smaller of that of F and that of the distance from the bound that the sign of F asks for |
 /// | `relative` | the largest of the three; **decides** |
-/// | `own` | the largest `|F_i|` of those errors in units of ω_i (near zero beyond what the last bits of x make of it): x that runs away excuses nothing |
+/// | `own` | the largest `|F_i|` of those errors in units of ω_i (near zero beyond what the last bits of x make of it): x that runs away excuses nothing; where the error is that of a distance, the smaller of that of F and the distance over the largest of `|start_j|` and the finite bounds |
 /// | `absolute`, `literature`, `siconos` | the natural residual `‖x − mid(l, u, x − F(x))‖_∞` |
 ///
 /// [`certify`](Problem::certify) evaluates sums, products, quotients and roots of expressions in doubled precision.
@@ -120,6 +121,13 @@ impl McpGauge {
                     let beyond = (pair.w.abs() - 4.0 * self.rounding(problem, x, i)).max(0.0);
                     share_of_own = share_of_own.max(share(beyond, near));
                 }
+                if share_of_own > own {
+                    (own, measure.own_contact) = (share_of_own, Some(i));
+                }
+            } else if unit > 0.0 && self.lengths[i] > 0.0 {
+                // Nor is a distance none for a derivative that hardly feels it, where F is as large as it was: on the bound F may be another.
+                let way = (pair.z - pair.towards()).abs() / self.lengths[i];
+                let share_of_own = share(pair.w, unit).min(way);
                 if share_of_own > own {
                     (own, measure.own_contact) = (share_of_own, Some(i));
                 }

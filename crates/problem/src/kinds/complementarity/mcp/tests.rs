@@ -183,6 +183,34 @@ fn a_start_makes_no_error_small() {
     assert!(problem.judge(&LcpPoint { z: vec![1e-7; 2] }, 1e-8).unwrap().solved);
 }
 
+/// Near a pole, and where a derivative hardly feels a variable, F is small beside its terms, or a distance beside F, at points that solve nothing.
+#[test]
+fn a_pole_makes_no_error_small() {
+    /// F, bounds, start, points that are none, the solution.
+    type Case = (&'static str, [f64; 2], f64, &'static [f64], f64);
+    let inf = f64::INFINITY;
+    let all: [Case; 9] = [
+        ("3 - 1/(x - 1)", [1.0, inf], 1.0, &[1.0 + 5.8e-11, 1.0 + 1e-13], 4.0 / 3.0),
+        ("3 - 1/(x - 1)^2", [1.0, inf], 1.0, &[1.0 + 1e-11, 3.0], 1.577_350_269_189_625_8),
+        ("1/(1 - x) - 3", [-inf, 1.0], 1.0, &[1.0 - 1e-12, 0.0], 2.0 / 3.0),
+        ("-log(1 - x) - 3", [-inf, 1.0], 1.0, &[1.0 - 1e-12], 1.0 - (-3f64).exp()),
+        ("1/(1 - x) - 1e8", [-inf, 1.0], 0.0, &[0.0, 0.5], 1.0 - 1e-8),
+        ("1 - 1e-9/x", [0.0, inf], 1.0, &[1.0, 0.5], 1e-9),
+        ("1 - 1e-20/x^2", [0.0, inf], 1.0, &[1.0, 1e-2], 1e-10),
+        ("1e9 - 1/x", [0.0, inf], 1000.0, &[1000.0], 1e-9),
+        ("1/x^2 - 3", [-inf, inf], 1e-12, &[0.0656, 1e-12], 3f64.sqrt().recip()),
+    ];
+    for (f, [lower, upper], start, none, solution) in all {
+        let f = Expressions::parse(&[f.into()], &["x".into()]).unwrap();
+        let problem = Mcp::new(f.clone(), vec![lower], vec![upper], vec![start]).unwrap();
+        let solved = |x: f64| problem.judge(&LcpPoint { z: vec![x] }, 1e-8).unwrap().solved;
+        for &x in none {
+            assert!(!solved(x), "{f:?} at {x}");
+        }
+        assert!(solved(solution), "{f:?}");
+    }
+}
+
 #[test]
 fn a_point_is_asked_once() {
     use std::sync::Arc;
