@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use nonsmooth_linalg::Csc;
+use nonsmooth_linalg::{Csc, Dense};
 use nonsmooth_problem::check::{Existence, Measure};
 use nonsmooth_problem::planted::{PlantedClass, PlantedLcp, PlantedMlcp};
 use nonsmooth_problem::{
@@ -17,7 +17,7 @@ use nonsmooth_problem::{
 use nonsmooth_scenes::SceneEntry;
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::settings::{SettingsMap, from_texts};
-use nonsmooth_solve::{Limit, Limits, Status, existence};
+use nonsmooth_solve::{Limit, Limits, Solve, Status, existence};
 
 /// Seconds that a solve may take, and after which it is cancelled.
 const LIMIT: f64 = 0.25;
@@ -179,6 +179,24 @@ fn solvers_of_a_small_lcp_that_has_no_answer() {
     // No thread: the limits are looked at by the kernels alone.
     let (m, q) = filling(250);
     all_end(&Lcp::new(m, q).unwrap(), "a small LCP");
+}
+
+#[test]
+fn certificates_that_hold_nearly_are_weighed_within_the_limits() {
+    let _alone = alone();
+    // M = B Bᵀ of low rank: rays of Lemke's method are Farkas vectors but for rounding. Up to 300 unknowns there is no thread that gives up what is late.
+    for (n, rank) in [(120, 30), (200, 50), (300, 75)] {
+        let entry = |i: usize, k: usize| ((i * 37 + k * 91 + 1) as f64 * 0.618).sin();
+        let gram = |i: usize, j: usize| (0..rank).map(|k| entry(i, k) * entry(j, k)).sum::<f64>();
+        let problem = Lcp::new(Dense::from_fn(n, n, gram), vec![-1.0; n]).unwrap();
+        for solver in ["auto", "lemke", "ip_mehrotra"] {
+            let begun = Instant::now();
+            let answer = Solve::new().solver(solver).time_limit(LIMIT).run(&problem).unwrap();
+            let wall = begun.elapsed().as_secs_f64();
+            assert!(wall <= slack() * (1.1 * LIMIT + 0.2), "{solver} on {n}: {wall:.2} s");
+            assert!(answer.point.is_finite(), "{solver} on {n}");
+        }
+    }
 }
 
 #[test]

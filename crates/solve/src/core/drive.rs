@@ -671,7 +671,12 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 Step::Continue { estimate: e } => estimate = e,
                 // What ends because a kernel was cut short has not failed.
                 Step::Stuck(_) | Step::Done if self.scope.raised() => {}
-                ended => claim = Some(self.conclusion(ended)),
+                ended => {
+                    let conclusion = self.conclusion(ended);
+                    // A certificate whose verification was cut short is not refuted.
+                    let cut = self.scope.raised() && !matches!(conclusion, Status::Infeasible(_));
+                    claim = (!cut).then_some(conclusion);
+                }
             }
             let due = since_judged >= self.solver.check_every(self.work)
                 || self.judge.calibration.promises(estimate, self.limits.tolerance);
@@ -808,6 +813,29 @@ const NEAR_FLOOR: f64 = 1000.0;
 /// The most steps between two looks at a point of which a single contact is not done: a look costs several steps.
 const MOST_WAIT: usize = 16;
 
+/// The certified residuals of the point last measured, or those of the same with its variables exactly on their bounds, then in `tidied`, where they are better; which.
+pub(crate) fn closely<P: Problem>(
+    problem: &P,
+    point: &P::Point,
+    gauge: &mut P::Gauge,
+    tidied: &mut P::Point,
+    tolerance: f64,
+) -> (Measure, bool) {
+    let mut plain = None;
+    for boldly in [true, false] {
+        P::copy_point(point, tidied);
+        if !problem.tidy(tidied, gauge, boldly) {
+            continue;
+        }
+        let measure = problem.certify(tidied, gauge);
+        let plain = plain.insert(problem.certify(point, gauge));
+        if measure.passes(tolerance) || measure.is_better_than(plain) {
+            return (measure, true);
+        }
+    }
+    (plain.unwrap_or_else(|| problem.certify(point, gauge)), false)
+}
+
 /// Since when a solve gets no further.
 #[derive(Debug, Clone, Copy)]
 struct Halved {
@@ -943,21 +971,9 @@ impl<'a, P: Problem> Judge<'a, P> {
         better
     }
 
-    /// The certified residuals of the point last measured, or of the same with its variables exactly on their bounds if those are better; which.
+    /// [`closely`] of the point last measured.
     fn certify(&mut self, problem: &P, point: &P::Point, tolerance: f64) -> (Measure, bool) {
-        let mut plain = None;
-        for boldly in [true, false] {
-            P::copy_point(point, self.tidied);
-            if !problem.tidy(self.tidied, self.gauge, boldly) {
-                continue;
-            }
-            let tidied = problem.certify(self.tidied, self.gauge);
-            let plain = plain.insert(problem.certify(point, self.gauge));
-            if tidied.passes(tolerance) || tidied.is_better_than(plain) {
-                return (tidied, true);
-            }
-        }
-        (plain.unwrap_or_else(|| problem.certify(point, self.gauge)), false)
+        closely(problem, point, self.gauge, self.tidied, tolerance)
     }
 
     /// The work since the best merit was last halved, where it is time to look at the floor.

@@ -1,6 +1,10 @@
 //! A problem as a union of polyhedral cones, in exact numbers, and the vectors that separate its right-hand side from them.
 
-use super::exact::{Equation, Exact, exact, negative, rounded, satisfying};
+use std::cmp::Ordering;
+
+use nonsmooth_linalg::{Compensated, budget};
+
+use super::exact::{Equation, Exact, double, exact, negative, rounded, satisfying};
 
 /// A column of a [`ConeSystem`]: its entries by row.
 pub type Column = Vec<(usize, Exact)>;
@@ -80,9 +84,36 @@ impl ConeSystem {
         terms.fold(Exact::ZERO, |sum, (i, x)| sum + x * &y[*i])
     }
 
-    /// `Σ |y_i A_ij|`, nearly.
-    fn size(&self, y: &[Exact], j: usize) -> f64 {
-        self.columns[j].iter().map(|(i, x)| (rounded(x) * rounded(&y[*i])).abs()).sum()
+    /// `yᵀ A_j` in doubled precision.
+    fn about(&self, entries: &Entries, y: &[[f64; 2]], j: usize) -> About {
+        let (mut sum, mut size) = (Compensated::default(), 0.0);
+        for ((i, _), &x) in self.columns[j].iter().zip(&entries.0[j]) {
+            let [high, low] = y[*i];
+            if high != 0.0 {
+                sum.add_product(x, high);
+                sum.add_product(x, low);
+                size += (x * high).abs();
+            }
+        }
+        // Of 2 k terms (2 k u)² at most (OgitaRumpOishi2005), and u² of each y: four times as much.
+        let unit = (2 * self.columns[j].len() + 4) as f64 * f64::EPSILON;
+        About { value: sum.value(), size, error: unit * unit * size }
+    }
+
+    /// The sign of `yᵀ A_j`: exact, and in rational numbers only where doubled precision does not tell.
+    fn sign(&self, entries: &Entries, y: &Vector, j: usize) -> Ordering {
+        let known = self.about(entries, &y.doubled, j).sign();
+        known.unwrap_or_else(|| self.slope(y.exact, j).cmp(&Exact::ZERO))
+    }
+
+    /// `yᵀ A_j` and `Σ |y_i A_ij|`; of the former its rounding at most is lost.
+    fn measured(&self, entries: &Entries, y: &Vector, j: usize) -> (f64, f64) {
+        let about = self.about(entries, &y.doubled, j);
+        if about.is_in_range() {
+            return (about.value, about.size);
+        }
+        let sizes = self.columns[j].iter().map(|(i, x)| (rounded(x) * y.doubled[*i][0]).abs());
+        (rounded(&self.slope(y.exact, j)), sizes.sum())
     }
 
     /// Completes y in the rows that define bounds, where the best value follows from the other rows.
@@ -90,6 +121,9 @@ impl ConeSystem {
         y.resize(self.rhs.len(), Exact::ZERO);
         for &(row, columns) in &self.slack_rows {
             y[row] = Exact::ZERO;
+            if budget::over() {
+                return;
+            }
             let sign = self.columns[columns[0]].iter().find(|(i, _)| *i == row);
             let Some((_, sign)) = sign else { continue };
             let least = columns.map(|j| -self.slope(y, j)).into_iter().max().unwrap_or_default();
@@ -98,24 +132,45 @@ impl ConeSystem {
     }
 
     /// What y separates from b exactly: for each pair whether it does so with the first and with the second column. `None` where it separates
-    /// nothing: `yᵀ b ≥ 0`, or a free column or a ray on the wrong side.
-    fn separates(&self, y: &[Exact]) -> Option<Vec<[bool; 2]>> {
+    /// nothing: `yᵀ b ≥ 0`, or a free column or a ray on the wrong side. And where the computation of this thread is over.
+    fn separates(&self, entries: &Entries, y: &[Exact]) -> Option<Vec<[bool; 2]>> {
         let power = y.iter().zip(&self.rhs).fold(Exact::ZERO, |sum, (y, b)| sum + y * b);
-        let fine = negative(&power)
-            && self.free.iter().all(|&j| self.slope(y, j).is_zero())
-            && self.rays.iter().all(|&j| !negative(&self.slope(y, j)));
-        let side = |j: usize| !negative(&self.slope(y, j));
-        fine.then(|| self.pairs.iter().map(|p| p.map(side)).collect())
+        if !negative(&power) {
+            return None;
+        }
+        let y = &Vector::new(y);
+        let sign = |j: usize| (!budget::over()).then(|| self.sign(entries, y, j));
+        for &j in &self.free {
+            sign(j).filter(|sign| sign.is_eq())?;
+        }
+        for &j in &self.rays {
+            sign(j).filter(|sign| sign.is_ge())?;
+        }
+        let side = |j: usize| Some(sign(j)?.is_ge());
+        self.pairs.iter().map(|&[a, b]| Some([side(a)?, side(b)?])).collect()
     }
 
-    /// Whether the vectors together separate b from every choice of one column a pair, **in exact arithmetic**: the system then has no solution.
+    /// Whether the vectors together separate b from every choice of one column a pair, **in exact arithmetic**: the system then has no solution. False where the
+    /// computation of this thread is [over](nonsmooth_linalg::budget::over).
     pub fn refuted_by(&self, vectors: &[Vec<Exact>]) -> bool {
+        self.is_refuted(&self.entries(), vectors)
+    }
+
+    /// [`refuted_by`](Self::refuted_by), with the entries in doubles.
+    pub(crate) fn is_refuted(&self, entries: &Entries, vectors: &[Vec<Exact>]) -> bool {
         if self.wanted.is_some() && !vectors.iter().all(|y| self.is_supported(y)) {
             return false;
         }
         let shaped = vectors.iter().all(|y| y.len() == self.rhs.len());
-        let sides = || vectors.iter().map(|y| self.separates(y)).collect::<Option<Vec<_>>>();
+        let sides =
+            || vectors.iter().map(|y| self.separates(entries, y)).collect::<Option<Vec<_>>>();
         shaped && sides().is_some_and(|sides| all_closed(&sides, self.pairs.len()))
+    }
+
+    /// The entries in doubles, for as long as the columns stay.
+    pub(crate) fn entries(&self) -> Entries {
+        let doubles = |c: &Column| c.iter().map(|(_, x)| double(x).unwrap_or(f64::NAN)).collect();
+        Entries(self.columns.iter().map(doubles).collect())
     }
 
     /// Whether the coefficients solve the system, **in exact arithmetic**.
@@ -170,25 +225,36 @@ impl ConeSystem {
     /// The vectors, exact, changed by no more than rounding so that they separate what they nearly separate; each as it is where that fails.
     ///
     /// What is nearly zero is made zero by elimination within the vector's support.
-    pub(crate) fn mended(&self, vectors: &[Vec<Exact>]) -> Vec<Vec<Exact>> {
-        vectors.iter().map(|y| self.mend(y)).collect()
+    pub(crate) fn mended(&self, entries: &Entries, vectors: &[Vec<Exact>]) -> Vec<Vec<Exact>> {
+        vectors.iter().map(|y| self.mend(entries, y).unwrap_or_else(|| y.clone())).collect()
     }
 
-    fn mend(&self, y: &[Exact]) -> Vec<Exact> {
+    /// `None` where it fails, and where the computation of this thread is over.
+    fn mend(&self, entries: &Entries, y: &[Exact]) -> Option<Vec<Exact>> {
         let bounding: Vec<usize> = self.slack_rows.iter().map(|s| s.0).collect();
-        let unbounded = |y: &[Exact]| {
-            let mut y = y.to_vec();
-            bounding.iter().for_each(|&i| y[i] = Exact::ZERO);
-            y
-        };
+        let mut start = y.to_vec();
+        bounding.iter().for_each(|&i| start[i] = Exact::ZERO);
+        // What is zero stays zero: the support does not grow.
+        let weights: Vec<f64> = start.iter().map(|y| rounded(y).abs()).collect();
+        let vector = Vector::new(y);
+        let mut before = 0;
         for near in [1e-13, 1e-10] {
-            let start = unbounded(y);
             let mut equations = vec![];
             for j in 0..self.columns.len() {
-                let slope = self.slope(y, j);
-                let tight = !slope.is_zero() && rounded(&slope).abs() <= near * self.size(y, j);
-                let zero = slope.is_zero() && self.columns[j].len() > 1;
-                if tight || zero {
+                if budget::over() {
+                    return None;
+                }
+                let about = self.about(entries, &vector.doubled, j);
+                let vanishes = match about.sign() {
+                    Some(_) => about.value.abs() <= near * about.size,
+                    None => {
+                        let slope = self.slope(y, j);
+                        let (value, size) = self.measured(entries, &vector, j);
+                        let tight = !slope.is_zero() && value.abs() <= near * size;
+                        tight || (slope.is_zero() && self.columns[j].len() > 1)
+                    }
+                };
+                if vanishes {
                     let terms = self.columns[j].iter().filter(|(i, _)| !bounding.contains(i));
                     let terms: Vec<_> = terms.filter(|(i, _)| !y[*i].is_zero()).cloned().collect();
                     // A column that meets a bound's row is closed by that row.
@@ -198,31 +264,30 @@ impl ConeSystem {
                     }
                 }
             }
-            if equations.is_empty() {
+            // More equations than before, or the same ones.
+            if equations.len() == before {
                 continue;
             }
-            // What is zero stays zero: the support does not grow.
-            let weights: Vec<f64> = start.iter().map(|y| rounded(y).abs()).collect();
-            let Some(mut found) = satisfying(equations, &start, &weights, BUDGET) else {
-                continue;
-            };
+            before = equations.len();
+            // What contradicts itself, or costs too much, does so with more equations as well.
+            let mut found = satisfying(equations, &start, &weights, BUDGET)?;
             self.complete(&mut found);
-            if self.separates(&found).is_some() {
-                return found;
+            if self.separates(entries, &found).is_some() {
+                return Some(found);
             }
         }
-        y.to_vec()
+        None
     }
 
     /// The smallest relative change of the entries of A and b (those that are no units) for which the vectors would refute the system, up to a
     /// factor of two; `None` where that is more than [`NEAR`].
-    pub(crate) fn nearness(&self, vectors: &[Vec<Exact>]) -> Option<f64> {
+    pub(crate) fn nearness(&self, entries: &Entries, vectors: &[Vec<Exact>]) -> Option<f64> {
         if vectors.iter().any(|y| y.len() != self.rhs.len()) {
             return None;
         }
         // Of each vector: its own violation, and that of each side of each pair.
         let violations: Vec<(f64, Vec<[f64; 2]>)> =
-            vectors.iter().map(|y| self.violations(y)).collect();
+            vectors.iter().map(|y| self.violations(entries, y)).collect::<Option<_>>()?;
         let closed = |change: f64| {
             let sides = violations.iter().filter(|(own, _)| *own <= change).map(|(_, sides)| {
                 sides.iter().map(|s| s.map(|v| v <= change)).collect::<Vec<[bool; 2]>>()
@@ -239,7 +304,8 @@ impl ConeSystem {
         None
     }
 
-    fn violations(&self, y: &[Exact]) -> (f64, Vec<[f64; 2]>) {
+    /// `None` where the computation of this thread is over.
+    fn violations(&self, entries: &Entries, y: &[Exact]) -> Option<(f64, Vec<[f64; 2]>)> {
         let power = y.iter().zip(&self.rhs).fold(Exact::ZERO, |sum, (y, b)| sum + y * b);
         let size: f64 = y.iter().zip(&self.rhs).map(|(y, b)| (rounded(y) * rounded(b)).abs()).sum();
         let share = |x: f64, size: f64| if x == 0.0 { 0.0 } else { x.abs() / size };
@@ -248,14 +314,18 @@ impl ConeSystem {
             power if size > 0.0 => (power / size).max(f64::EPSILON / 16.0),
             _ => f64::INFINITY,
         };
-        let below = |j: usize| share(rounded(&self.slope(y, j)).min(0.0), self.size(y, j));
+        let y = &Vector::new(y);
+        let measured = |j: usize| (!budget::over()).then(|| self.measured(entries, y, j));
+        let below = |j: usize| measured(j).map(|(slope, size)| share(slope.min(0.0), size));
         for &j in &self.free {
-            own = own.max(share(rounded(&self.slope(y, j)), self.size(y, j)));
+            let (slope, size) = measured(j)?;
+            own = own.max(share(slope, size));
         }
         for &j in &self.rays {
-            own = own.max(below(j));
+            own = own.max(below(j)?);
         }
-        (own, self.pairs.iter().map(|p| p.map(below)).collect())
+        let sides = self.pairs.iter().map(|&[a, b]| Some([below(a)?, below(b)?]));
+        Some((own, sides.collect::<Option<_>>()?))
     }
 
     /// The vectors of doubles as exact ones over the rows of the system, with the rows that define bounds completed.
@@ -266,17 +336,68 @@ impl ConeSystem {
     }
 }
 
+/// The entries of a system in doubles, by columns; NaN where one is none.
+pub(crate) struct Entries(Vec<Vec<f64>>);
+
+/// A vector in exact numbers and in doubles.
+struct Vector<'a> {
+    exact: &'a [Exact],
+    /// The nearest double and the nearest to what that leaves; NaN where these are no two doubles' precision.
+    doubled: Vec<[f64; 2]>,
+}
+
+impl<'a> Vector<'a> {
+    fn new(exact: &'a [Exact]) -> Self {
+        Self { exact, doubled: exact.iter().map(doubled).collect() }
+    }
+}
+
+fn doubled(x: &Exact) -> [f64; 2] {
+    /// Below this what is left may be below all doubles.
+    const LEAST: f64 = 1e-250;
+    if let Some(x) = double(x) {
+        return [x, 0.0];
+    }
+    match rounded(x) {
+        high if high.abs() > LEAST && high.is_finite() => [high, rounded(&(x - exact(high)))],
+        _ => [f64::NAN; 2],
+    }
+}
+
+/// A sum known up to an error, with the size of its terms.
+struct About {
+    value: f64,
+    size: f64,
+    error: f64,
+}
+
+impl About {
+    /// Whether nothing that matters is below or beyond all doubles.
+    fn is_in_range(&self) -> bool {
+        self.value.is_finite() && self.size > 1e-200 && self.size < 1e200
+    }
+
+    /// The sign where it is sure: of a sum that is zero it never is.
+    fn sign(&self) -> Option<Ordering> {
+        let sure = self.is_in_range() && self.value.abs() > self.error;
+        sure.then(|| self.value.total_cmp(&0.0))
+    }
+}
+
 /// The largest relative change of the data that still counts as rounding.
 pub const NEAR: f64 = 1e-9;
 /// Rational operations that mending a vector may cost.
 const BUDGET: usize = 200_000;
 
-/// Whether every choice of a side for each pair is closed by some vector, given which sides each vector closes.
+/// Whether every choice of a side for each pair is closed by some vector, given which sides each vector closes; false where the computation of this thread is over.
 fn all_closed(sides: &[Vec<[bool; 2]>], pairs: usize) -> bool {
     fn closed(sides: &[Vec<[bool; 2]>], left: &[usize], depth: usize, pairs: usize) -> bool {
         // Pairs that no vector cares about are no choice.
         let matters = |d: &usize| left.iter().any(|&k| sides[k][*d] != [true, true]);
         let Some(depth) = (depth..pairs).find(matters) else { return !left.is_empty() };
+        if budget::over() {
+            return false;
+        }
         [0, 1].into_iter().all(|side| {
             let still: Vec<_> = left.iter().copied().filter(|&k| sides[k][depth][side]).collect();
             // One that closes all that is left decides at once.
@@ -290,6 +411,44 @@ fn all_closed(sides: &[Vec<[bool; 2]>], pairs: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// `A_0 = (1, −1)ᵀ`, its second entry off by what is given, and a pair of units.
+    fn nearly(off: f64) -> ConeSystem {
+        let mut system = ConeSystem::new(vec![exact(-1.0), exact(0.0)], None);
+        let second = exact(-1.0) + exact(off);
+        let column = system.column(vec![(0, exact(1.0)), (1, second)]);
+        let unit = system.unit(1, 1);
+        system.pairs.push([column, unit]);
+        system
+    }
+
+    #[test]
+    fn signs_that_doubles_do_not_tell_are_exact() {
+        let y = vec![vec![Exact::ONE, Exact::ONE]];
+        // The sum is off, whose sign no doubles tell below their precision squared, and which is no double beside one.
+        for off in [1e-30, 1e-60, 1e-300, 0.0] {
+            assert!(nearly(off).refuted_by(&y), "{off}");
+            assert!(off == 0.0 || !nearly(-off).refuted_by(&y), "{off}");
+        }
+        let thirds = vec![vec![Exact::from(1u8) / Exact::from(3u8); 2]];
+        assert!(nearly(0.0).refuted_by(&thirds) && !nearly(-1e-40).refuted_by(&thirds));
+        let tiny = vec![vec![exact(1e-308); 2]];
+        assert!(nearly(1e-40).refuted_by(&tiny) && !nearly(-1e-40).refuted_by(&tiny));
+    }
+
+    #[test]
+    fn nothing_is_concluded_when_the_time_is_over() {
+        let (system, y) = (nearly(0.0), vec![vec![Exact::ONE, Exact::ONE]]);
+        let entries = system.entries();
+        let over =
+            budget::Budget { deadline: Some(std::time::Instant::now()), ..Default::default() };
+        let scope = over.enter();
+        assert!(!system.refuted_by(&y) && system.nearness(&entries, &y).is_none());
+        assert_eq!(system.mended(&entries, &y), y);
+        assert!(scope.raised());
+        drop(scope);
+        assert!(system.refuted_by(&y) && system.nearness(&entries, &y).is_some());
+    }
 
     #[test]
     fn vectors_close_all_choices_together_or_not() {

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use nonsmooth_linalg::budget;
+
 use super::cones::ConeSystem;
 use super::exact::Exact;
 use super::statement::Exactly;
@@ -120,7 +122,8 @@ impl std::fmt::Display for Proof {
 
 /// What the certificate is worth for the problem.
 ///
-/// Cost: the rows of the certificate's support, a rational operation an entry, and where it holds only nearly an elimination among them.
+/// Cost: the rows of the certificate's support, a look at each entry and a rational operation at those of columns that doubled precision does not decide, and where it
+/// holds only nearly an elimination among them. Where the computation of this thread is [over](nonsmooth_linalg::budget::over) it is worth nothing.
 pub(crate) fn weigh(problem: &impl Exactly, certificate: &Certificate) -> Evidence {
     let rows = problem.rows();
     let Some(claims) = claims(certificate, rows, problem.impulses_from()) else {
@@ -132,7 +135,8 @@ pub(crate) fn weigh(problem: &impl Exactly, certificate: &Certificate) -> Eviden
     let wanted: Vec<bool> = (0..rows).map(|i| claims.iter().any(|y| y.touches(i))).collect();
     let Some(system) = problem.system(Some(&wanted)) else { return Evidence::Nothing };
     let vectors: Vec<Vec<Exact>> = claims.into_iter().map(|y| y.over(&system)).collect();
-    if system.refuted_by(&vectors) {
+    let seen = system.entries();
+    if system.is_refuted(&seen, &vectors) {
         return Evidence::Proved(Proof::new(certificate.clone(), &vectors));
     }
     // First as they are, then without the entries that may be noise.
@@ -140,15 +144,25 @@ pub(crate) fn weigh(problem: &impl Exactly, certificate: &Certificate) -> Eviden
     let entries: usize = system.columns.iter().map(Vec::len).sum();
     let tries: &[f64] =
         if entries * vectors.len() <= MANY { &[0.0, 1e-13, 1e-10, 1e-7, 1e-4] } else { &[0.0] };
+    let mut last: Option<Vec<Vec<Exact>>> = None;
     for &noise in tries {
+        if budget::over() {
+            return Evidence::Nothing;
+        }
         let given = system.without(&vectors, noise);
-        for candidate in [system.mended(&given), given] {
-            if system.refuted_by(&candidate) {
-                return Evidence::Proved(Proof::new(certificate.clone(), &candidate));
+        // The same entries come to the same.
+        if last.as_ref() == Some(&given) {
+            continue;
+        }
+        let mended = Some(system.mended(&seen, &given)).filter(|mended| *mended != given);
+        for candidate in mended.iter().chain([&given]) {
+            if system.is_refuted(&seen, candidate) {
+                return Evidence::Proved(Proof::new(certificate.clone(), candidate));
             }
-            let change = system.nearness(&candidate);
+            let change = system.nearness(&seen, candidate);
             nearly = change.into_iter().chain(nearly).reduce(f64::min);
         }
+        last = Some(given);
     }
     nearly.map_or(Evidence::Nothing, |change| Evidence::Nearly { change })
 }

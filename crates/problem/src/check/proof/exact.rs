@@ -1,6 +1,7 @@
 //! Exact rational arithmetic on stored doubles.
 
 use dashu_ratio::RBig;
+use nonsmooth_linalg::budget::Pace;
 
 /// A rational number of any size.
 pub type Exact = RBig;
@@ -8,6 +9,12 @@ pub type Exact = RBig;
 /// A finite double as the rational number that it is; zero in place of an infinity or a NaN, which no problem holds.
 pub(crate) fn exact(x: f64) -> Exact {
     Exact::try_from(x).unwrap_or(Exact::ZERO)
+}
+
+/// The double that it is, if it is one.
+pub(crate) fn double(x: &Exact) -> Option<f64> {
+    let nearest = x.to_f64();
+    nearest.error_ref().is_none().then(|| nearest.value())
 }
 
 /// The nearest double.
@@ -29,7 +36,8 @@ pub(crate) struct Equation {
 /// Values that satisfy all equations exactly and differ from those given only in one unknown for each independent equation,
 /// the one whose coefficient times weight is largest: with the unknown's own size as its weight, the one which that moves least relative to itself.
 /// Unknowns without weight stay as they are. `None` where the equations contradict each other, or would cost more than `budget`
-/// operations on rational numbers as short as doubles are: a longer one counts as many as its words take the greatest common divisor.
+/// operations on rational numbers as short as doubles are: a longer one counts as many as its words take the greatest common divisor. `None`, too, where the
+/// computation of this thread is [over](nonsmooth_linalg::budget::over).
 ///
 /// Cost: one elimination, rows · unknowns · rank operations at most, on numbers whose length grows with the rank.
 pub(crate) fn satisfying(
@@ -39,6 +47,7 @@ pub(crate) fn satisfying(
     budget: usize,
 ) -> Option<Vec<Exact>> {
     let mut spent = 0;
+    let mut pace = Pace::default();
     // Reduced rows: (pivot, terms without the pivot, constant), the pivot's coefficient being 1.
     let mut reduced: Vec<(usize, Row, Exact)> = vec![];
     let mut place = vec![usize::MAX; values.len()];
@@ -55,8 +64,9 @@ pub(crate) fn satisfying(
         while let Some((k, a)) = row.first_with(|j| place[j]) {
             row.remove(reduced[k].0);
             for (j, b) in &reduced[k].1.0 {
-                spent += cost(&a, b);
-                if spent > budget {
+                let cost = cost(&a, b);
+                spent += cost;
+                if spent > budget || pace.over(cost as f64 * OPERATION) {
                     return None;
                 }
                 row.add(*j, -(&a * b));
@@ -72,7 +82,12 @@ pub(crate) fn satisfying(
             return None;
         };
         row.remove(pivot);
-        row.0.iter_mut().for_each(|(_, b)| *b = &*b / &a);
+        for (_, b) in &mut row.0 {
+            if pace.over(cost(&a, b) as f64 * OPERATION) {
+                return None;
+            }
+            *b = &*b / &a;
+        }
         place[pivot] = reduced.len();
         reduced.push((pivot, row, constant / a));
     }
@@ -81,12 +96,18 @@ pub(crate) fn satisfying(
     for (pivot, row, constant) in reduced.iter().rev() {
         let mut sum = -constant;
         for (j, b) in &row.0 {
+            if pace.over(cost(b, &out[*j]) as f64 * OPERATION) {
+                return None;
+            }
             sum -= b * &out[*j];
         }
         out[*pivot] = sum;
     }
     Some(out)
 }
+
+/// An operation on rational numbers as short as doubles are, in units of one on doubles.
+const OPERATION: f64 = 1e3;
 
 /// What a product takes, in units of that of two doubles.
 fn cost(a: &Exact, b: &Exact) -> usize {

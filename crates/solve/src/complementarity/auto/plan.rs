@@ -145,6 +145,17 @@ fn short_path(n: usize) -> usize {
 /// Single changes of block pivoting, each at the price of a factorisation, after which others have their turn.
 const SINGLES: usize = 20;
 
+/// Where Lemke's method is sure to end in a solution, and Newton's and interior points are not, it has so many times the usual pivots.
+const SURE: usize = 2;
+const SURE_AGAIN: usize = 4;
+
+/// No entry is negative, and the diagonal is positive: strictly copositive, so that Lemke's path ends in a solution.
+fn is_plainly_copositive(m: &Matrix) -> bool {
+    let mut negative = false;
+    let known = m.for_each(|_, _, x| negative |= x < 0.0);
+    known && !negative && m.diagonal().is_some_and(|d| d.iter().all(|d| *d > 0.0))
+}
+
 /// Bases to enumerate: all of them.
 pub(super) const ALL: usize = usize::MAX;
 
@@ -285,7 +296,14 @@ const MOST_PAIRS: usize = 40;
 pub(super) fn of_lcp(problem: &Lcp, settings: &Auto, stage: usize) -> Vec<Candidate> {
     match stage {
         AT_ONCE if is_game(problem) => return games(problem.dim()).0,
-        AT_ONCE => return at_once(&problem.M, SWEPT, "lemke", problem.dim()).0,
+        AT_ONCE => {
+            let Plan(mut plan) = at_once(&problem.M, SWEPT, "lemke", problem.dim());
+            if problem.dim() <= SMALL && is_plainly_copositive(&problem.M) {
+                let lemke = plan.iter_mut().filter(|c| c.name == "lemke");
+                lemke.for_each(|c| c.iterations = SURE * pivots(problem.dim()));
+            }
+            return plan;
+        }
         BY_CLASS => {}
         _ => return patiently(["lemke", "enumeration"], &problem.M, problem.dim(), stage),
     }
@@ -303,10 +321,17 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &Auto, stage: usize) -> Vec<Candid
         })
         .when(facts.monotone() && facts.large(), |p| p.then("ip_mehrotra", 200, facts.class()))
         .when(tried && !facts.monotone(), |p| {
-            p.anew("newton_pfb", 12, "globalised, superlinear where it converges")
-                .anew("ip_mehrotra", 60, "as long as it goes well")
-                .anew("newton_pfb", 200, "with patience")
+            p.anew("newton_pfb", 12, "globalised, superlinear where it converges").anew(
+                "ip_mehrotra",
+                60,
+                "as long as it goes well",
+            )
         })
+        // A long path ends all the same.
+        .when(tried && !facts.monotone() && facts.is(Class::CopositivePlus), |p| {
+            p.anew("lemke", SURE_AGAIN * pivots(n), facts.class())
+        })
+        .when(tried && !facts.monotone(), |p| p.anew("newton_pfb", 200, "with patience"))
         .when(facts.pivotal(), |p| p.then("lemke", pivots(n), facts.class()))
         .when(n > HUGE && facts.positive_diagonal && !facts.symmetric, relaxed)
         .when(n > HUGE, |p| p.then("psor", 3000, "sweeps cost less than factorisations"))
@@ -357,10 +382,13 @@ pub(super) fn of_mlcp(problem: &Mlcp, settings: &Auto, stage: usize) -> Vec<Cand
     let Some(facts) = Facts::of(&problem.M) else {
         return of_operator();
     };
+    let tried = is_small(&problem.M, n);
     Plan::new()
         .when(facts.monotone() && facts.large(), |p| p.then("ip_mehrotra", 200, facts.class()))
+        // Pivots have had their turn: where free variables are not determined, an interior point that takes some nearby loses nothing by it.
+        .when(facts.monotone() && tried, |p| p.then("ip_mehrotra", 200, facts.class()))
         .when(facts.pivotal(), |p| p.then("lemke", pivots(n), facts.class()))
-        .when(facts.monotone(), |p| p.then("ip_mehrotra", 200, facts.class()))
+        .when(facts.monotone() && !tried, |p| p.then("ip_mehrotra", 200, facts.class()))
         .then("newton_min", 300, "superlinear where it converges")
         .then("newton_fb", 500, "globalised")
         .when(few, exactly)

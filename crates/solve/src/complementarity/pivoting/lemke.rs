@@ -167,6 +167,8 @@ const EVEN: f64 = 1e3;
 const REGULAR: f64 = 1e-6;
 /// A last basis that misses the problem by more is mended: it becomes the first basis of another path.
 const MENDED: f64 = 1e-12;
+/// An equality without a free variable that misses its right-hand side by less than this fraction of its terms repeats others, but for rounding.
+const CONTRADICTS: f64 = 1e-12;
 /// What counts as solved in the end, in the measure of `Path::violation`.
 const SOLVED: f64 = 1e-9;
 /// How often a path is tried again for reasons of rounding.
@@ -566,6 +568,10 @@ impl LemkeWork {
         let x = path.x[worst];
         let mut y = vec![0.0; path.data.n];
         path.row(worst, &mut y);
+        let terms: f64 = y.iter().zip(&path.data.q).map(|(y, q)| (y * q).abs()).sum();
+        if x.abs() <= CONTRADICTS * terms {
+            return None;
+        }
         let largest = y.iter().fold(0.0_f64, |l, y| l.max(y.abs()));
         for (i, (y, r)) in y.iter_mut().zip(&path.data.row).enumerate() {
             let rounding = y.abs() <= 1e-12 * largest;
@@ -574,7 +580,7 @@ impl LemkeWork {
                 *y = y.max(0.0);
             }
         }
-        (x != 0.0).then_some(Certificate::Farkas { y })
+        Some(Certificate::Farkas { y })
     }
 
     /// z of the basis where it stands, in the problem's units.

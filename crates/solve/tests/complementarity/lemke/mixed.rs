@@ -3,8 +3,8 @@
 use nonsmooth_linalg::{Dense, Matrix, norm};
 use nonsmooth_problem::Mlcp;
 use nonsmooth_problem::check::Certificate;
-use nonsmooth_solve::Status;
 use nonsmooth_solve::complementarity::pivoting::Lemke;
+use nonsmooth_solve::{Solve, Status};
 use rand::RngExt;
 
 use super::{BASES, plain, rng, run};
@@ -87,4 +87,21 @@ fn equalities_that_cannot_be_met_are_refuted_or_named() {
             "{basis:?}: {found:?}"
         );
     }
+}
+
+#[test]
+fn equalities_that_repeat_each_other_but_for_rounding_contradict_nothing() {
+    // M = B Bᵀ of a rank below the number of free variables: most of these are not determined, and their equations follow from the others.
+    let (free, pairs, rank) = (40, 40, 13);
+    let mut rng = rng(3);
+    let b = Dense::from_fn(free + pairs, rank, |_, _| rng.random_range(-1.0..1.0_f64));
+    let gram = |i: usize, j: usize| b.row(i).iter().zip(b.row(j)).map(|(x, y)| x * y).sum::<f64>();
+    let (problem, _) = planted_mixed(free, pairs, gram, 4);
+    let found = run(&problem, plain());
+    assert!(!found.outcome.status.refutes(), "{:?}", found.outcome.status);
+    let answer = Solve::new().time_limit(10.0).run(&problem).unwrap();
+    assert_eq!(answer.status, Status::Solved, "{:#?}", answer.account);
+    let names = ["lemke", "ip_mehrotra", " "];
+    let cheap = |line: &String| names.iter().any(|name| line.starts_with(name));
+    assert!(answer.account.iter().all(cheap), "{:#?}", answer.account);
 }

@@ -3,7 +3,7 @@
 use nonsmooth_linalg::{Csc, Dense, Matrix, norm};
 use nonsmooth_problem::{Lcp, Problem};
 use nonsmooth_solve::complementarity::pivoting::{Covering, Lemke, Ties};
-use nonsmooth_solve::{Driver, Limits, Session, Status};
+use nonsmooth_solve::{Driver, Limits, Session, Solve, Status};
 use rand::RngExt;
 
 use super::{BASES, assert_close, from_fn, plain, rng, run, run_with, same_pivots};
@@ -304,5 +304,30 @@ fn a_session_solves_one_problem_after_another() {
         let off: Vec<f64> = z.iter().zip(&point.z).map(|(a, b)| a - b).collect();
         assert!(norm(&off) <= 1e-8 * norm(&z));
         assert_eq!(driver.account().len(), 1, "{:?}", driver.account());
+    }
+}
+
+#[test]
+fn auto_leaves_long_paths_of_positive_matrices_to_this_method() {
+    // Strictly copositive, neither monotone nor P: the path ends in a solution, and is longer than 5 n.
+    for seed in 0..3 {
+        let n = 120;
+        let mut rng = rng(seed);
+        let m = Dense::from_fn(n, n, |_, _| rng.random_range(0.01..1.0));
+        let mut z = vec![0.0; n];
+        let mut slack = vec![0.0; n];
+        for (z, w) in z.iter_mut().zip(&mut slack) {
+            let x: f64 = rng.random_range(-1.0..1.0);
+            (*z, *w) = (x.max(0.0), (-x).max(0.0));
+        }
+        let m = Matrix::from(m);
+        let mut q = vec![0.0; n];
+        m.mul(&z, &mut q);
+        q.iter_mut().zip(&slack).for_each(|(q, w)| *q = w - *q);
+        let answer = Solve::new().run(&Lcp::new(m, q).unwrap()).unwrap();
+        assert_eq!(answer.status, Status::Solved, "{seed}");
+        let others = ["newton", "ip_"];
+        let other = |line: &String| others.iter().any(|name| line.starts_with(name));
+        assert!(!answer.account.iter().any(other), "{seed}: {:#?}", answer.account);
     }
 }

@@ -172,6 +172,9 @@ fn cleaned(matrices: &[&Matrix], direction: f64, sides: &[Side], y: &[f64]) -> O
         };
         // Entries that a projection makes negative are zero in the next.
         for _ in 0..ROUNDS {
+            if budget::over() {
+                return None;
+            }
             let Some(mut out) = project(matrices, &support, zero, y) else { break };
             let size = largest(&out);
             let rounding = |y: &f64| y.abs() <= 1e-14 * size;
