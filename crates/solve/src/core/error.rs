@@ -11,7 +11,9 @@ pub enum SolveError {
     #[error(transparent)]
     Problem(#[from] ProblemError),
     /// No solver of that name exists for this kind of problem.
-    #[error("unknown solver `{name}` for this kind of problem{meant}; there are: {known}")]
+    #[error(
+        "unknown solver `{name}` for this kind of problem{meant}; there are, and others behind the same prefixes: {known}"
+    )]
     UnknownSolver {
         /// The name asked for.
         name: String,

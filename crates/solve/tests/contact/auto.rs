@@ -102,3 +102,56 @@ fn a_problem_at_rest_without_impulses_refuses_every_start() {
     let (_, account) = solve(&problem, &mut point);
     assert!(account.contains("started from zero") && point.r.iter().all(|r| *r == 0.0));
 }
+
+/// `W = B Bᵀ` and `q = u − W r`, of which r and u, which obey the law, are a solution.
+fn planted_at<const D: usize, const N: usize, const RANK: usize>(
+    b: [[f64; RANK]; N],
+    mu: f64,
+    [r, u]: [[f64; N]; 2],
+) -> FrictionLocal<D> {
+    let w = |i: usize, j: usize| (0..RANK).map(|k| b[i][k] * b[j][k]).sum::<f64>();
+    let entries = (0..N * N).map(|k| (k / N, k % N, w(k / N, k % N)));
+    let q = (0..N).map(|i| u[i] - (0..N).map(|j| w(i, j) * r[j]).sum::<f64>()).collect();
+    let w = Bsr::from_csc(&Csc::from_triplets(N, N, entries).unwrap());
+    FrictionLocal::new(w, q, vec![mu; N / D]).unwrap()
+}
+
+/// A solve that ends by convex problems with given sliding speeds, twice the same.
+fn ends_by_speeds<P: Registered>(problem: &P, impulses: fn(&P::Point) -> &[f64]) {
+    let mut point = problem.origin();
+    let (outcome, account) = solve(problem, &mut point);
+    assert!(account.contains("convex problems with given sliding speeds"), "{account}");
+    // It needs no change of strategy, each of which takes hundreds of factorisations.
+    assert!(outcome.iterations < 300 && !account.contains("strategy"), "{account}");
+    let mut again = problem.origin();
+    let (other, _) = solve(problem, &mut again);
+    assert_eq!(other.iterations, outcome.iterations);
+    assert_eq!(impulses(&again), impulses(&point));
+}
+
+#[test]
+fn much_friction_on_few_degrees_of_freedom_ends_by_given_speeds() {
+    // Sweeps diverge and Newton's iterations go round, for thousands of iterations of all other stages.
+    let b =
+        [[0.14, -0.26], [-0.59, -0.19], [0.07, 1.09], [0.06, -0.55], [0.07, 0.45], [0.28, -0.53]];
+    let [x, y]: [f64; 2] = [-0.51, 0.53];
+    let slide = 2.0 * 0.14 / x.hypot(y);
+    let r = [0.56, 1.07, -0.15, 0.14, -slide * x, -slide * y];
+    let u = [0.0, 0.0, 0.0, 0.0, x, y];
+    ends_by_speeds::<FrictionLocal<3>>(&planted_at(b, 2.0, [r, u]), |p| p.r.as_slice());
+    let b = [
+        [0.311, 0.107, -0.138, -0.538, -0.07, -1.138],
+        [0.183, 0.009, 0.072, 0.099, -0.209, -0.379],
+        [-0.209, 0.037, 0.298, 0.122, 0.696, -0.534],
+        [0.206, 0.363, 0.548, 0.34, 0.262, 0.691],
+        [-0.014, -0.764, 0.005, 0.05, -0.026, 0.313],
+        [-0.358, 0.177, 0.265, -0.836, -0.737, 0.211],
+        [0.144, -0.266, 0.662, -0.098, -0.309, -0.538],
+        [-0.21, 0.066, -0.085, -0.122, 0.921, -0.481],
+        [0.206, 0.138, -0.289, -0.253, -0.117, 0.567],
+        [-0.174, 0.15, -0.115, 0.879, -0.856, -0.629],
+    ];
+    let r = [0.648, 3.055, 1.145, 0.247, 0.006, 0.03, 0.266, 0.014, 0.123, -0.141];
+    let u = [0.0, 0.0, 0.0, 0.0, 0.0, -0.601, 0.0, 0.0, 0.0, 0.0];
+    ends_by_speeds::<FrictionLocal<2>>(&planted_at(b, 5.0, [r, u]), |p| p.r.as_slice());
+}

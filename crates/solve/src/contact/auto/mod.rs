@@ -9,7 +9,7 @@
 //!    still move are followed where they are few ([`Sweep::follow`]).
 //! 2. **Rest** (`parts/alternating.rs`): impulses within the cones that leave nothing moving, where the sweeps show nothing that flies apart. One factorisation and
 //!    a few solves end structures at rest, whatever their height; one solve tells whether it is one. Where contacts open because weights have yet to come down to them, as in walls
-//!    with head joints, it comes when the sweeps have cost a factorisation, and has some solves more.
+//!    with head joints, it has some solves more, and comes when the sweeps have cost a factorisation where they open fast.
 //! 3. **Trial**: Newton's iterations of stage 5 without its proximal term, where the sweeps came near or the structure is not hyperstatic, for as long as each halves the error; there sweeps come to
 //!    its rescue a few times.
 //! 4. **Interior point** on the exact law ([`Central`]), a starter: some 8 to 20 iterations lead near the solution of a problem
@@ -23,7 +23,9 @@
 //! 8. **Alternating directions** (`parts/alternating.rs`) after many proximal steps, for as long as they promise more.
 //! 9. **Motion and impulses in turn** (`in_turn.rs`), where a problem is stated by its bodies, once, after many proximal steps that are still far off or at the first change of strategy:
 //!    what moves with what rests as its support, then the impulses of all from that motion.
-//! 10. **Another strategy** (other ρ, more sweeps, a start from zero) where the error has not halved for long; at the first time
+//! 10. **Cadoux' fixed point** (`cadoux.rs`): the sliding speeds held, a convex problem solved, the speeds renewed by Newton's method. Before each change of strategy, for as many factorisations as
+//!     a strategy takes; where a problem is small already after a few Newton iterations in vain. Few degrees of freedom under friction of 1 and more, on which sweeps diverge and Newton's iterations go round, end here.
+//! 11. **Another strategy** (other ρ, more sweeps, a start from zero) where the error has not halved for long; at the first time
 //!     the existence of a solution is investigated, and a problem without one is given up with its certificate. That first time sweeps with
 //!     one projection a contact ([`Projection`]) are tried from zero: where exact ones circle, these may come near or end.
 //!
@@ -36,9 +38,10 @@
 //! parts' own files.
 //!
 //! Cost: a sweep is one pass over W; an iteration of 3 to 5 one factorisation of a matrix over the bodies (global) or the contacts
-//! (local), a step of 7 two or three. The choice goes by counted operations, never by the clock, so a run repeats itself bit by bit.
+//! (local), a step of 7 two or three, one of 10 some 10 to 20. The choice goes by counted operations, never by the clock, so a run repeats itself bit by bit.
 //! Fails: impacts on thousands of hyperstatic contacts may need more factorisations than patience allows.
 
+mod cadoux;
 mod controller;
 mod held;
 mod in_turn;
@@ -62,6 +65,7 @@ use crate::contact::parts::{
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{Limits, SolveError, Solver, Step};
+use cadoux::Cadoux;
 use controller::{Controller, Origin, Verdict};
 use held::Held;
 use in_turn::{Came, InTurn};
@@ -99,6 +103,7 @@ impl Described for Auto {
             "AlartCurnier1991",
             "Acary2018",
             "HintermullerItoKunisch2002",
+            "Cadoux2009",
         ],
         variants: &["interior=false"],
         settings: described::<Self>,
@@ -148,6 +153,10 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     sweep: Sweep<P::Law, D>,
     projected: Option<Box<Sweep<P::Law, D, Projection>>>,
     in_turn: Option<Box<InTurn<P::Law, D>>>,
+    cadoux: Option<Box<Cadoux<P::Law, D>>>,
+    /// It has begun in this solve, and comes again at a change of strategy after so many of them.
+    cadoux_begun: bool,
+    cadoux_after: usize,
     held: Option<Box<Held<P, D>>>,
     /// So many sweeps come before the next search for the rows at their bounds.
     hold_after: usize,
@@ -194,6 +203,7 @@ enum Stage {
     Between { left: usize },
     Projected { left: usize },
     InTurn,
+    Cadoux,
     Pursuit { halvings: Halvings, most: usize },
     Alternating,
     Held,
@@ -242,6 +252,9 @@ struct Done {
     /// Rounds of motion and impulses, bodies that moved in the last one, and all; and the least error.
     turns: [usize; 3],
     turned_error: f64,
+    /// Convex problems of given sliding speeds, and the least error of their solutions.
+    convex: usize,
+    convex_error: f64,
     /// How often, the steps of all, and the error of the last.
     pursuits: usize,
     pursued: usize,
@@ -267,6 +280,9 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             sweep: Sweep::new(problem, &state),
             projected: None,
             in_turn: None,
+            cadoux: None,
+            cadoux_begun: false,
+            cadoux_after: 0,
             held: None,
             hold_after: FIRST_SWEEPS,
             alternating: None,
@@ -331,6 +347,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
         (work.existence, work.exact, work.asked) = (None, None, false);
         (work.passed_by, work.rest, work.spread) = (None, RestSearch::default(), None);
         (work.turned, work.in_turn) = (false, None);
+        (work.cadoux_begun, work.cadoux_after) = (false, 0);
         (work.held, work.hold_after) = (None, FIRST_SWEEPS);
     }
 
@@ -349,6 +366,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             Stage::Between { left } => self.between(problem, point, work, left),
             Stage::Projected { left } => self.projected(problem, point, work, left),
             Stage::InTurn => self.take_turns(problem, point, work),
+            Stage::Cadoux => self.cadoux(problem, point, work),
             Stage::Pursuit { .. } => self.pursue(problem, point, work),
             Stage::Alternating => self.alternate(problem, point, work),
             Stage::Held => self.hold(problem, point, work),
@@ -425,6 +443,12 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             lines.push(format!(
                 "motion and impulses in turn, {rounds} times, at last with {moving} of {bodies} bodies moving, to {:.1e}",
                 work.done.turned_error
+            ));
+        }
+        if work.done.convex > 0 {
+            lines.push(format!(
+                "{} convex problems with given sliding speeds, to {:.1e}",
+                work.done.convex, work.done.convex_error
             ));
         }
         if let Some(held) = &work.held {
@@ -661,6 +685,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) {
+        self.make_room_for_cadoux(problem, work);
         let HybridWork { newton, state, controller, .. } = work;
         let newton = newton.get_or_insert_with(|| Box::new(ProximalNewton::new(problem, state)));
         work.alternating.get_or_insert_default().make_room(problem.contacts());
@@ -750,6 +775,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         if controller.end(verdict, error) {
             best.copy_from_slice(r);
         }
+        if self.cadoux_is_due(problem, work) {
+            return self.begin_cadoux(problem, work);
+        }
         if self.passed_by_in_vain(work, error) {
             starts::begin_interior(problem, work);
             return Step::Continue { estimate: error };
@@ -829,7 +857,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         Step::Continue { estimate: error }
     }
 
-    /// Sweeps of stage 10 with one projection a contact, from zero; the better of what they come to and the best point goes on.
+    /// Sweeps of stage 11 with one projection a contact, from zero; the better of what they come to and the best point goes on.
     fn projected<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
@@ -939,13 +967,17 @@ impl<const D: usize> OnContacts<Auto, D> {
         }
     }
 
-    /// Stage 10. The first time it is asked whether there is a solution at all.
+    /// Stage 11, and stage 10 before it. The first time it is asked whether there is a solution at all.
     fn other_strategy<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) -> Step {
+        if work.cadoux_after <= work.done.strategies {
+            work.cadoux_after = work.done.strategies + 1;
+            return self.begin_cadoux(problem, work);
+        }
         let limits = Limits { time_limit: Some(INVESTIGATION), ..Limits::default() };
         let existence = work
             .existence

@@ -9,10 +9,11 @@ use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
 use crate::contact::parts::{Central, REST, Way};
 
-/// Rest is sought at once where contacts without impulse open no faster than this part of ‖q‖ after the sweeps (at rest at most 2e-3, in motion 1e-2 and more); or, once they have cost a
-/// factorisation and W has not spread, where the weight of what stands above has yet to come down to them: they open no faster than this part of the error (in walls with head joints at rest .2 to .6,
-/// in motion mostly above 1).
+/// Rest is sought at once where contacts without impulse open no faster than this part of ‖q‖ after the sweeps (at rest at most 2e-3, in motion 1e-2 and more); or, where W has not
+/// spread, no faster than this part of the error: the weight of what stands above has yet to come down to them (in walls with head joints at rest .1 to .6, in motion mostly above 1; polyhedra in a box
+/// .4 to .5, in vain), and up to the last figure once the sweeps have cost a factorisation.
 const OPENING: f64 = 5e-3;
+const FALLING_AT_ONCE: f64 = 0.35;
 const FALLING: f64 = 0.6;
 /// Where it was sought at once it is given up where its first iteration leaves more than this (at rest at most 5e-2, else .2 and more), and is not judged by its rate before so many.
 const REST_NEAR: f64 = 0.1;
@@ -91,7 +92,8 @@ impl<const D: usize> OnContacts<Auto, D> {
         let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
         let opening = work.newton.as_ref().map_or(f64::NAN, |n| n.opening(P::impulses(point)));
         let quiet = opening < OPENING;
-        if !quiet && work.rest == RestSearch::Open && self.sweeps_are_cheap(work, costs) {
+        let at_once = quiet || opening < FALLING_AT_ONCE * error && !has_spread(problem, work);
+        if !at_once && work.rest == RestSearch::Open && self.sweeps_are_cheap(work, costs) {
             work.rest = RestSearch::PutOff;
             return self.without_rest(problem, point, work, error);
         }

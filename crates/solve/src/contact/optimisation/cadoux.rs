@@ -6,11 +6,7 @@
 //! `min ½ rᵀWr + (q + mu s e_N)ᵀ r` over K. Its solution has unique velocities u(s); Coulomb's law is `F(s) = ‖u_T(s)‖ = s`.
 //! Three updates: the fixed point `s ← F(s)`, Newton on `F(s) − s`, Anderson's combination of past steps.
 //!
-//! Newton needs F'(s), which is not available column by column at a reasonable price, but is not needed either: implicit
-//! differentiation of the natural map `r = P_K(r − ρ(u + mu s e_N))` gives `(I − J) dr + ρJ (W dr + mu ds e_N) = 0`, and Newton asks
-//! for `ds = F(s) − s + nᵀ du_T`, `n = u_T/‖u_T‖`. With ds eliminated the two are one sparse system,
-//! `[I − J + ρJ (I + mu e_N nᵀ) W] dr = −ρJ mu (F(s) − s) e_N`: one factorisation, no Krylov method.
-//! A step that does not lower ‖F(s) − s‖ is taken back and replaced by fixed-point steps.
+//! Newton costs one factorisation and is taken back where it does not help: [`Speeds`] has the derivation.
 //!
 //! References: Cadoux2009; AcaryCadouxLemarechalMalick2011; Acary, lecture (123)(124).
 //!
@@ -28,8 +24,8 @@ use super::convex::Convex;
 use super::inner::{Conic, Effort};
 use super::sets::Set;
 use crate::contact::form::{Access, Explicit, Frictional, Linearised, OnContacts};
-use crate::contact::law::cone;
-use crate::contact::parts::{Accelerator, ConvexIp, Shape};
+use crate::contact::law::Coulomb;
+use crate::contact::parts::{Accelerator, ConvexIp, Shape, Speeds};
 use crate::core::ranges::{at_least, at_most, below, up_to};
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
@@ -137,30 +133,13 @@ pub struct CadouxWork<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: u
     interior: ConvexIp<D>,
     accelerator: Accelerator,
     u: Vec<f64>,
-    /// s, F(s), F(s) − s and the Newton step.
-    s: Vec<f64>,
-    image: Vec<f64>,
-    gap: Vec<f64>,
-    ds: Vec<f64>,
-    /// F(s) where the last Newton step began.
-    held: Vec<f64>,
+    /// s and F(s).
+    speeds: Speeds<Coulomb, D>,
     error: f64,
-    newton: Trial,
 }
 
 /// Newton steps after an interior point that did not reach its tolerance.
 const POLISH: usize = 5;
-
-/// Whether the present s came from a Newton step, and what to do if it is no better.
-#[derive(Debug, Clone, Copy, Default)]
-struct Trial {
-    /// ‖F(s) − s‖ before the Newton step that led here.
-    before: Option<f64>,
-    /// Newton steps taken back so far.
-    refused: usize,
-    /// Fixed-point steps to go before the next Newton step.
-    wait: usize,
-}
 
 impl<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> Solver<P>
     for OnContacts<Cadoux, D>
@@ -176,19 +155,15 @@ impl<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> Solver<P>
             .then(|| Conic::new(problem, &convex, Shape::Coulomb))
             .transpose()?;
         let n = problem.mu().len();
+        let speeds = Speeds::new(problem, &convex.state);
         Ok(CadouxWork {
             convex,
             conic,
             interior: ConvexIp::new(),
             accelerator: Accelerator::new(self.0.depth(), n),
             u: vec![0.0; D * n],
-            s: vec![0.0; n],
-            image: vec![0.0; n],
-            gap: vec![0.0; n],
-            ds: vec![0.0; n],
-            held: vec![0.0; n],
+            speeds,
             error: 1.0,
-            newton: Trial::default(),
         })
     }
 
@@ -198,10 +173,7 @@ impl<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> Solver<P>
             conic.refill(problem, &work.convex)?;
         }
         let n = problem.mu().len();
-        let speeds = [&mut work.s, &mut work.image, &mut work.gap, &mut work.ds, &mut work.held];
-        for x in speeds {
-            x.resize(n, 0.0);
-        }
+        work.speeds.fill(problem, &work.convex.state);
         work.u.resize(D * n, 0.0);
         work.accelerator.resize(n);
         Ok(())
@@ -212,10 +184,11 @@ impl<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> Solver<P>
         work.evaluate(problem, r);
         // Without impulses to begin with, the convex relaxation.
         let warm = r.iter().any(|r| *r != 0.0);
-        for (s, image) in work.s.iter_mut().zip(&work.image) {
-            *s = if warm { *image } else { 0.0 };
+        if warm {
+            work.speeds.begin_at_image();
+        } else {
+            work.speeds.begin();
         }
-        work.newton = Trial::default();
         work.accelerator.forget();
     }
 
@@ -242,7 +215,7 @@ impl<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> CadouxWork<
     fn solve(&mut self, problem: &P, r: &mut [f64], settings: &Cadoux) -> Result<(), &'static str> {
         let convex = &mut self.convex;
         for (c, &mu) in problem.mu().iter().enumerate() {
-            convex.shift[c] = mu * self.s[c]; //                              q + mu s e_N
+            convex.shift[c] = mu * self.speeds.s[c]; //                              q + mu s e_N
             convex.sets[c] = Set::Cone(mu);
         }
         let effort = Effort {
@@ -256,7 +229,7 @@ impl<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> CadouxWork<
             }
             (ConeSolver::Interior, _) => {
                 let state = &mut convex.state;
-                self.interior.begin(problem, state, &self.s, None);
+                self.interior.begin(problem, state, &self.speeds.s, None);
                 self.interior.solve(problem, state, effort.tolerance, effort.most);
                 r.copy_from_slice(self.interior.r());
                 convex.evaluate(problem, r);
@@ -277,53 +250,24 @@ impl<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> CadouxWork<
     /// u, F(s) = ‖u_T‖ and the error at `r`.
     fn evaluate(&mut self, problem: &P, r: &[f64]) {
         problem.velocities(&mut self.convex.state, r, &mut self.u);
-        for (c, image) in self.image.iter_mut().enumerate() {
-            let u: [f64; D] = nonsmooth_linalg::small::block(&self.u, c);
-            *image = cone::tangential_norm(&u);
-        }
+        self.speeds.see(&self.u);
         self.error = self.convex.coulomb(problem.mu(), r, &self.u);
     }
 
     /// The next speeds.
     fn update(&mut self, problem: &P, r: &[f64], settings: &Cadoux) {
-        let mut square = 0.0;
-        for (c, gap) in self.gap.iter_mut().enumerate() {
-            *gap = self.image[c] - self.s[c];
-            // The speed of a contact without friction does not matter.
-            square += if problem.mu()[c] > 0.0 { *gap * *gap } else { 0.0 };
-        }
-        let merit = square.sqrt();
-        let refused =
-            self.newton.before.take().is_some_and(|before| merit.is_nan() || merit >= before);
-        if refused {
-            // Back to where it began, and on by the fixed point.
-            self.newton.refused += 1;
-            self.newton.wait = self.newton.refused.min(10);
-            self.s.copy_from_slice(&self.held);
+        let Self { convex, speeds, accelerator, u, .. } = self;
+        let newton = settings.update == Update::Newton;
+        if speeds.newton(problem, &mut convex.state, (r, u), newton) {
             return;
         }
-        if settings.update == Update::Newton && self.newton.wait == 0 {
-            let Self { convex, u, gap, ds, .. } = self;
-            if convex.speeds(problem, r, u, gap, ds) {
-                self.newton.before = Some(merit);
-                self.held.copy_from_slice(&self.image);
-                for (s, ds) in self.s.iter_mut().zip(&self.ds) {
-                    *s = (*s + ds).max(0.0);
-                }
-                return;
-            }
-        }
-        self.newton.wait = self.newton.wait.saturating_sub(1);
-        if self.accelerator.is_on() {
-            self.accelerator.begin(&self.s);
-            self.accelerator.advance(&mut self.image, &|c| f64::from(problem.mu()[c] > 0.0));
-            for (s, image) in self.s.iter_mut().zip(&self.image) {
-                *s = image.max(0.0);
-            }
+        if accelerator.is_on() {
+            let Speeds { s, image, .. } = speeds;
+            accelerator.begin(s);
+            accelerator.advance(image, &|c| f64::from(problem.mu()[c] > 0.0));
+            s.iter_mut().zip(image).for_each(|(s, image)| *s = image.max(0.0));
             return;
         }
-        for (s, gap) in self.s.iter_mut().zip(&self.gap) {
-            *s += settings.relaxation * gap; //                               s ← F(s)
-        }
+        speeds.advance(settings.relaxation); //                           s ← F(s)
     }
 }

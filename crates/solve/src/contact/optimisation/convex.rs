@@ -18,7 +18,6 @@ use crate::SolveError;
 use crate::contact::form::{Access, Frictional, Linear, Linearised};
 use crate::contact::law::Coulomb;
 use crate::contact::law::cfun::natural_residual;
-use crate::contact::law::cone;
 use crate::contact::law::cone::ConvexSet;
 
 /// Gradient steps between two evaluations of the true gradient.
@@ -299,50 +298,6 @@ impl<P: Linearised<D> + Frictional<D>, const D: usize> Convex<P, D> {
         }
         false
     }
-
-    /// The change of the sliding speeds that Newton's method on `‖u_T(s)‖ = s` asks for, given `gap = ‖u_T‖ − s` at the solution
-    /// `r` of the convex problem with `shift = mu s`: `ds = gap + nᵀ du_T`, where `(I − J) dr + ρJ (W dr + mu ds e_N) = 0`. With ds
-    /// eliminated it is one system of the same kind, `Q + P W` with `P = ρ J (I + mu e_N nᵀ)`. False where it is singular.
-    pub(super) fn speeds(
-        &mut self,
-        problem: &P,
-        r: &[f64],
-        u: &[f64],
-        gap: &[f64],
-        ds: &mut [f64],
-    ) -> bool {
-        let Newton { p, q, phi } = &mut self.newton;
-        for (c, (set, &w)) in self.sets.iter().zip(&self.unit).enumerate() {
-            let (rho, mu) = (RHO / w, problem.mu()[c]);
-            let x: [f64; D] = std::array::from_fn(|k| r[D * c + k] - rho * self.y[D * c + k]);
-            let jacobian = set.jacobian(&x);
-            let n = direction::<D>(u, c, self.scale);
-            for k in 0..D {
-                phi[D * c + k] = -rho * jacobian[k][0] * mu * gap[c];
-                for l in 0..D {
-                    p[c][k][l] = rho * (jacobian[k][l] + jacobian[k][0] * mu * n[l]);
-                    q[c][k][l] = f64::from(u8::from(k == l)) - jacobian[k][l];
-                }
-            }
-        }
-        if problem.linearise(&mut self.state, p, q).is_err() {
-            return false;
-        }
-        let left = problem.solve_linearised(&mut self.state, phi, &mut self.d, &mut self.wd);
-        for (c, ds) in ds.iter_mut().enumerate() {
-            let n = direction::<D>(u, c, self.scale);
-            *ds = gap[c] + (1..D).map(|k| n[k] * self.wd[D * c + k]).sum::<f64>();
-        }
-        left <= 1e-2 && ds.iter().all(|x| x.is_finite())
-    }
-}
-
-/// `u_T/‖u_T‖`, zero where nothing slides.
-fn direction<const D: usize>(u: &[f64], c: usize, scale: f64) -> [f64; D] {
-    let mut n: [f64; D] = small::block(u, c);
-    let size = cone::tangential_norm(&n);
-    n[0] = 0.0;
-    if size > 1e-14 * scale { n.map(|v| v / size) } else { [0.0; D] }
 }
 
 fn add_shift<const D: usize>(shift: &[f64], y: &mut [f64]) {
@@ -381,7 +336,6 @@ mod tests {
     use nonsmooth_problem::planted::Planted;
 
     use super::*;
-    use crate::contact::form::Explicit;
     use crate::contact::optimisation::inner::{CylinderSolver, Cylinders, Effort};
 
     fn problem(dofs: usize, seed: u64) -> FrictionLocal<3> {
@@ -421,52 +375,6 @@ mod tests {
                 let gaps = other.iter().zip(&velocities[0]).map(|(a, b)| (a - b).abs());
                 let off = gaps.fold(0.0_f64, f64::max);
                 assert!(off < 1e-9, "dofs {dofs}: {off:.1e}");
-            }
-        }
-    }
-
-    /// The speeds that the convex problem with the speeds `s` answers with, and its solution.
-    fn answer<P: Linearised<3> + Frictional<3> + Explicit<3>>(
-        problem: &P,
-        convex: &mut Convex<P, 3>,
-        s: &[f64],
-        r: &mut [f64],
-    ) -> (Vec<f64>, Vec<f64>) {
-        for (c, mu) in problem.mu().iter().enumerate() {
-            convex.shift[c] = mu * s[c];
-            convex.sets[c] = Set::Cone(*mu);
-        }
-        convex.evaluate(problem, r);
-        let reached = convex.newton(problem, r, 1e-14, 200);
-        assert!(reached <= 1e-13, "{reached:.1e}");
-        let mut u = convex.y.clone();
-        (0..s.len()).for_each(|c| u[3 * c] -= convex.shift[c]);
-        let image = u.chunks(3).map(|u| cone::tangential_norm::<3>(u.try_into().unwrap()));
-        (image.collect(), u)
-    }
-
-    #[test]
-    fn the_newton_step_solves_the_linearised_fixed_point() {
-        for seed in 1..5 {
-            let problem = problem(60, seed);
-            let mut convex = Convex::<_, 3>::new(&problem, Access::Newton).unwrap();
-            let s: Vec<f64> = (0..12).map(|c| 0.3 + 0.1 * c as f64).collect();
-            let mut r = vec![0.0; 36];
-            let (image, u) = answer(&problem, &mut convex, &s, &mut r);
-            let gap: Vec<f64> = image.iter().zip(&s).map(|(f, s)| f - s).collect();
-            let mut ds = vec![0.0; 12];
-            assert!(convex.speeds(&problem, &r, &u, &gap, &mut ds));
-            // F(s) + F'(s) ds = s + ds.
-            let h = 1e-6;
-            let moved: Vec<f64> = s.iter().zip(&ds).map(|(s, d)| s + h * d).collect();
-            let (there, _) = answer(&problem, &mut convex, &moved, &mut r);
-            for c in 0..12 {
-                // Where nothing slides, F is zero and not differentiable.
-                if image[c] > 1e-9 {
-                    let slope = (there[c] - image[c]) / h;
-                    let expected = ds[c] - gap[c];
-                    assert!((slope - expected).abs() < 1e-4, "{seed} {c}: {slope} {expected}");
-                }
             }
         }
     }

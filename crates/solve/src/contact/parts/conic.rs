@@ -7,20 +7,20 @@
 //! (the second where W is not symmetric: it is solved with W as it is). s = 0 is the convex relaxation of Coulomb's law;
 //! `s = ‖u_T‖` at the solution is the law itself. r is not unique where W is rank deficient: u is.
 
-use nonsmooth_linalg::Singular;
+use nonsmooth_linalg::{Singular, budget};
 
 use super::central::{Central, Iterate};
-use crate::contact::form::{Frictional, Linearised};
-use crate::contact::law::Coulomb;
+use crate::contact::form::{Disked, Linearised};
+use crate::contact::law::{Coulomb, DiskLaw};
 
 /// A solver of convex problems, with its workspace; a second problem of the same shape allocates nothing.
 ///
 /// ```text
 /// begin ── iterate … iterate ── r(), u()        or at once:   solve
 /// ```
-#[derive(Debug, Clone, Default)]
-pub struct ConvexIp<const D: usize> {
-    core: Central<Coulomb, D>,
+#[derive(Debug, Clone)]
+pub struct ConvexIp<const D: usize, L = Coulomb> {
+    core: Central<L, D>,
 }
 
 /// How [`ConvexIp::solve`] ended. Its answer is the best iterate whatever ended it.
@@ -32,17 +32,23 @@ pub struct ConvexEnd {
     pub iterations: usize,
 }
 
-impl<const D: usize> ConvexIp<D> {
+impl<L, const D: usize> Default for ConvexIp<D, L> {
+    fn default() -> Self {
+        Self { core: Central::default() }
+    }
+}
+
+impl<L: DiskLaw<D>, const D: usize> ConvexIp<D, L> {
     /// A solver without a workspace yet.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Begins the problem with the given s, a velocity for each contact. `state` must be made with `Access::Newton`.
+    /// Begins the problem with the given s, a velocity for each disk of each contact. `state` must be made with `Access::Newton`.
     ///
     /// `start`: impulses to begin near, and by how much (in units of the free velocity, say 1e-2) to stay inside the
     /// cones at first; else the start is cold. A good start saves some iterations, not most of them.
-    pub fn begin<P: Linearised<D> + Frictional<D>>(
+    pub fn begin<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -53,7 +59,7 @@ impl<const D: usize> ConvexIp<D> {
     }
 
     /// One iteration. `Err`: the matrix is numerically singular, the iterate has not moved.
-    pub fn iterate<P: Linearised<D> + Frictional<D>>(
+    pub fn iterate<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -62,7 +68,7 @@ impl<const D: usize> ConvexIp<D> {
     }
 
     /// Iterates until the error is at most `tolerance`, at most `most` times, and not on where it has stalled.
-    pub fn solve<P: Linearised<D> + Frictional<D>>(
+    pub fn solve<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -70,7 +76,8 @@ impl<const D: usize> ConvexIp<D> {
         most: usize,
     ) -> ConvexEnd {
         let (mut iterations, mut since_best) = (0, 0);
-        while self.core.best().1 > tolerance && iterations < most && since_best < PATIENCE {
+        let goes_on = |since_best| since_best < PATIENCE && !budget::over();
+        while self.core.best().1 > tolerance && iterations < most && goes_on(since_best) {
             let before = self.core.best().1;
             match self.core.iterate(problem, state) {
                 Ok(now) if now.alpha > 0.0 => {}
@@ -104,7 +111,7 @@ mod tests {
     use nonsmooth_problem::{FrictionLocal, Problem};
 
     use super::*;
-    use crate::contact::form::{Access, Contacts, Linear};
+    use crate::contact::form::{Access, Contacts, Frictional, Linear};
     use crate::contact::law::cone;
 
     fn mixes() -> Vec<Planted> {

@@ -9,6 +9,7 @@ pub mod nt;
 mod pursuit;
 mod rate;
 mod rows;
+mod speeds;
 mod sweep;
 
 pub use alternating::{Alternating, REST, Way};
@@ -19,4 +20,5 @@ pub use conic::{ConvexEnd, ConvexIp};
 pub use pursuit::Pursuit;
 pub use rate::Rate;
 pub use rows::{put_within_bounds, sweep_rows};
+pub use speeds::Speeds;
 pub use sweep::{NEGLIGIBLE, Sweep};

@@ -1,0 +1,175 @@
+//! Cadoux' fixed point where Newton's iterations stay in vain: with the sliding speeds held the problem is convex, and the interior point finds its solution whatever the friction; then the
+//! speeds are brought up to date ([`Speeds`]). Problems with mu of 1 and more and few degrees of freedom, on which sweeps diverge and Newton's iterations go round, end here.
+
+use nonsmooth_problem::check::Kinematic;
+
+use super::starts::lost;
+use super::{Auto, EARLY, HybridWork, Stage};
+use crate::Step;
+use crate::contact::form::{Disked, Linearised, OnContacts};
+use crate::contact::law::DiskLaw;
+use crate::contact::parts::{ConvexIp, Speeds};
+
+/// Problems of so few impulses come here after [`EARLY`] Newton iterations, others at a change of strategy: there a factorisation costs microseconds.
+const SMALL: usize = 64;
+/// Factorisations of the first time; and a later one has so many times those of the one before.
+const FIRST: f64 = 200.0;
+const MORE: f64 = 1.5;
+/// A convex problem is solved to this share of the error of the last one (.1 and .01 solve as many: 1240 and 1238 of 1263 planted problems), in at most so many iterations.
+const SHARE: f64 = 0.1;
+const ITERATIONS: usize = 60;
+
+/// The convex problem, its speeds, and the best of its solutions.
+pub(super) struct Cadoux<L, const D: usize> {
+    speeds: Speeds<L, D>,
+    convex: ConvexIp<D, L>,
+    /// Its solution, polished, and the velocities; the best one.
+    r: Vec<f64>,
+    u: Vec<f64>,
+    best: Vec<f64>,
+    /// The error of the law at the last solution, and the least.
+    error: f64,
+    least: f64,
+    /// Factorisations that are left.
+    left: f64,
+    budget: f64,
+}
+
+impl<L: DiskLaw<D>, const D: usize> Cadoux<L, D> {
+    /// With all the room that it takes.
+    fn new<P: Linearised<D> + Disked<D, Law = L>>(problem: &P, state: &mut P::State) -> Self {
+        let mut new = Self {
+            speeds: Speeds::new(problem, state),
+            convex: ConvexIp::new(),
+            r: vec![],
+            u: vec![],
+            best: vec![],
+            error: 1.0,
+            least: f64::INFINITY,
+            left: 0.0,
+            budget: FIRST,
+        };
+        new.begin(problem, state);
+        new.convex.begin(problem, state, &new.speeds.s, None);
+        new
+    }
+
+    /// The first time of a solve; allocates nothing where there are no more contacts than before.
+    fn begin<P: Linearised<D> + Disked<D, Law = L>>(&mut self, problem: &P, state: &P::State) {
+        self.speeds.fill(problem, state);
+        for x in [&mut self.r, &mut self.u, &mut self.best] {
+            x.resize(D * problem.contacts(), 0.0);
+        }
+        (self.error, self.least, self.budget) = (1.0, f64::INFINITY, FIRST);
+    }
+
+    /// The solution of the convex problem.
+    fn solve<P: Linearised<D> + Disked<D, Law = L>>(&mut self, problem: &P, state: &mut P::State) {
+        let tolerance = (SHARE * self.error).clamp(1e-15, 0.1);
+        self.convex.begin(problem, state, &self.speeds.s, None);
+        let end = self.convex.solve(problem, state, tolerance, ITERATIONS);
+        self.r.copy_from_slice(self.convex.r());
+        self.u.copy_from_slice(self.convex.u());
+        let steps = self.speeds.polish(problem, state, (&mut self.r, &mut self.u), tolerance);
+        self.left -= (end.iterations + steps).max(1) as f64;
+    }
+
+    /// Takes note of the error at that solution.
+    fn note(&mut self, error: f64) {
+        self.error = error;
+        if error < self.least {
+            self.least = error;
+            self.best.copy_from_slice(&self.r);
+        }
+    }
+
+    /// The next speeds.
+    fn renew<P: Linearised<D> + Disked<D, Law = L>>(&mut self, problem: &P, state: &mut P::State) {
+        let Self { speeds, r, u, left, .. } = self;
+        speeds.see(u);
+        *left -= 1.0;
+        if !speeds.newton(problem, state, (r, u), true) {
+            speeds.advance(1.0);
+        }
+    }
+}
+
+fn is_small<P: Linearised<D>, const D: usize>(problem: &P) -> bool {
+    D * problem.contacts() <= SMALL
+}
+
+impl<const D: usize> OnContacts<Auto, D> {
+    /// Whether the stage comes before a change of strategy.
+    pub(super) fn cadoux_is_due<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        work: &HybridWork<P, D>,
+    ) -> bool {
+        !work.cadoux_begun && work.done.newton >= EARLY && is_small::<P, D>(problem)
+    }
+
+    /// Makes room for the stage where it may come soon.
+    pub(super) fn make_room_for_cadoux<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        work: &mut HybridWork<P, D>,
+    ) {
+        if is_small::<P, D>(problem) {
+            let HybridWork { cadoux, state, .. } = work;
+            cadoux.get_or_insert_with(|| Box::new(Cadoux::new(problem, state)));
+        }
+    }
+
+    /// Begins the stage, the first time from s = 0, then from the speeds of the best point: where the fixed point goes round, another start leads elsewhere.
+    pub(super) fn begin_cadoux<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        work: &mut HybridWork<P, D>,
+    ) -> Step {
+        let HybridWork { cadoux, cadoux_begun, state, stage, best, .. } = work;
+        let cadoux = cadoux.get_or_insert_with(|| Box::new(Cadoux::new(problem, state)));
+        if !std::mem::replace(cadoux_begun, true) {
+            cadoux.begin(problem, state);
+        } else if cadoux.least.is_finite() {
+            problem.velocities(state, best, &mut cadoux.u);
+            cadoux.speeds.see(&cadoux.u);
+            cadoux.speeds.begin_at_image();
+        }
+        cadoux.left = cadoux.budget;
+        cadoux.budget *= MORE;
+        *stage = Stage::Cadoux;
+        Step::Continue { estimate: f64::NAN }
+    }
+
+    /// One convex problem and the next speeds; at the end the best of the solutions goes on where it is better than the best point.
+    pub(super) fn cadoux<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) -> Step {
+        let HybridWork { cadoux, newton, state, done, tolerance, controller, best, .. } = work;
+        let (Some(cadoux), Some(newton)) = (cadoux, newton) else {
+            return lost();
+        };
+        let r = P::impulses(point);
+        cadoux.solve(problem, state);
+        let error = newton.look(problem, state, &cadoux.r);
+        cadoux.note(error);
+        (done.convex, done.convex_error) = (done.convex + 1, cadoux.least);
+        cadoux.renew(problem, state);
+        // Where the judge is not content with it, the next one may be better in what it asks for.
+        let claims = error <= *tolerance;
+        if claims {
+            r.copy_from_slice(&cadoux.r);
+        }
+        if cadoux.left <= 0.0 {
+            if !claims {
+                let better = cadoux.least < controller.least();
+                r.copy_from_slice(if better { &cadoux.best } else { best });
+            }
+            self.subproblem_here(problem, point, work);
+        }
+        Step::Continue { estimate: error }
+    }
+}
