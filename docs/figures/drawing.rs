@@ -47,6 +47,8 @@ const FINE: u32 = 2;
 const SIDE: u32 = 400 * FINE;
 const TOP: u32 = 56 * FINE;
 const BOTTOM: u32 = 34 * FINE;
+/// The width of a character of the legend, a little more than the mean.
+const CHARACTER: f64 = 5.6 * FINE as f64;
 
 /// The picture as SVG.
 ///
@@ -81,7 +83,7 @@ fn sheet(
         )?;
         draw(&part, panel)?;
     }
-    // One line of legend, its entries evenly spaced.
+    // One line of legend: its entries evenly spaced where each has room, else one after another with equal gaps.
     let mut entries: Vec<&Curve> = vec![];
     for curve in panels.iter().flat_map(|p| &p.curves) {
         if entries.iter().all(|e| e.label != curve.label) {
@@ -89,13 +91,19 @@ fn sheet(
         }
     }
     let y = (TOP + SIDE) as i32 + 14 * FINE as i32;
-    let step = wide / entries.len().max(1) as i32;
-    for (k, curve) in entries.iter().enumerate() {
-        let x = step * k as i32 + 14 * FINE as i32;
+    let need =
+        |curve: &&Curve| 32 * FINE as i32 + (CHARACTER * curve.label.chars().count() as f64) as i32;
+    let (margin, all) = (14 * FINE as i32, entries.len().max(1) as i32);
+    let step = wide / all;
+    let even = entries.iter().all(|curve| margin + need(curve) <= step);
+    let gap = (wide - entries.iter().map(need).sum::<i32>()) / all;
+    let mut x = if even { margin } else { gap / 2 };
+    for curve in &entries {
         let line = vec![(x, y), (x + 26 * FINE as i32, y)];
         stroke(curve, line, |e| area.draw(&e), |e| area.draw(&e))?;
         let left = Pos::new(HPos::Left, VPos::Center);
         area.draw_text(&curve.label, &font(13 * FINE).pos(left), (x + 32 * FINE as i32, y))?;
+        x += if even { step } else { need(curve) + gap };
     }
     area.present()?;
     Ok(())

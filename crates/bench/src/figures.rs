@@ -8,6 +8,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::draw::{Axis, GRID, INK, LOOKS, Mark, Style, decades, font, tick, ticks};
+use crate::plural;
 use crate::profile::{
     Cost, Costs, Curve, DECADES, Progress, Selection, VIRTUAL_BEST, performance,
     performance_of_best,
@@ -325,14 +326,15 @@ impl<'a> Scene<'a> {
         }
         let x = Axis { range: 2.7..14.3, ticks: vec![4.0, 6.0, 8.0, 10.0, 12.0, 14.0] };
         let depths = DECADES.map(|e| -e.log10());
+        let counted = self.selection.counted();
         let mut panels = vec![];
         let mut rows = vec![];
         for group in &all {
-            let class = group.size.map_or("all sizes".into(), |s| format!("{} contacts", s.name));
+            let class = group.size.map_or("all sizes".into(), |s| format!("{} {counted}", s.name));
             // The virtual best goes below the others.
             let shares_of = group.shares.iter().rev();
             panels.push(Panel {
-                title: format!("{class} ({} problems)", group.problems),
+                title: format!("{class} ({})", plural(group.problems, "problem")),
                 x: x.clone(),
                 y: shares(),
                 x_label: "tolerance",

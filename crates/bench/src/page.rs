@@ -21,7 +21,8 @@ pub struct Page {
     pub figures: Vec<Figure>,
 }
 
-/// Makes the page. Figures are referred to as `folder/NAME.svg`; `command` is what makes the page again.
+/// Makes the page. Figures are referred to as `folder/NAME.svg`; `command` is what makes the page again; `beside`: whether the [`DOCUMENTS`] stand beside it, and
+/// links lead to them.
 ///
 /// Errors: a figure that cannot be drawn.
 pub fn page(
@@ -29,6 +30,7 @@ pub fn page(
     traits: Option<&traits_table::Table>,
     folder: &str,
     command: &str,
+    beside: bool,
 ) -> Result<Page, String> {
     let kinds = runs.kinds();
     let mut short = String::from("\n## In short\n\n");
@@ -62,8 +64,12 @@ pub fn page(
         body += TRAITS;
         body += &traits.markdown();
     }
-    Ok(Page { markdown: introduction(runs, &kinds, command) + &short + &body, figures: shown })
+    let introduction = introduction(runs, &kinds, command, beside);
+    Ok(Page { markdown: introduction + &short + &body, figures: shown })
 }
+
+/// The documents that the page refers to, without `.md`.
+pub const DOCUMENTS: [&str; 2] = ["benchmarking", "notation"];
 
 const COMPETITIVE: &str = "
 Solved within 4/3 and within twice the least time T_min, *very competitive* and *competitive* (BillupsDirkseFerris1997):
@@ -92,7 +98,7 @@ fn heading(kind: &str) -> String {
     }
 }
 
-fn introduction(runs: &Runs, kinds: &[(&str, usize)], command: &str) -> String {
+fn introduction(runs: &Runs, kinds: &[(&str, usize)], command: &str, beside: bool) -> String {
     let families: BTreeSet<_> = runs.runs.iter().map(|r| &r.family).collect();
     let problems: usize = kinds.iter().map(|k| k.1).sum();
     let solvers = runs.solvers();
@@ -113,10 +119,16 @@ fn introduction(runs: &Runs, kinds: &[(&str, usize)], command: &str) -> String {
     for campaign in &runs.campaigns {
         text += &format!("\n- {}", markdown_text(&measured(campaign)));
     }
-    text += "\n\nWhat a run is and how it is timed: [benchmarking](benchmarking.md). *Solved* is the judge's word on the relative residual \
-             ([notation](notation.md)), or on a proof that there is no solution. Problems that a solver *refuses* do not count in its shares. *Fastest* is the share of problems on which the solver needs the least time, and the *ratios* are its \
+    let [benchmarking, notation] = DOCUMENTS.map(|name| match beside {
+        true => format!("[{name}]({name}.md)"),
+        false => format!("docs/{name}.md of nonsmooth"),
+    });
+    text += &format!(
+        "\n\nWhat a run is and how it is timed: {benchmarking}. *Solved* is the judge's word on the relative residual \
+             ({notation}), or on a proof that there is no solution. Problems that a solver *refuses* do not count in its shares. *Fastest* is the share of problems on which the solver needs the least time, and the *ratios* are its \
              time over that least time where it solves the problem; *seconds* are all its runs, failed ones included. The *virtual best* takes on each problem the \
-             fastest solver. A profile shows the distance from the best; with more than two solvers it does not rank them (GouldScott2016).\n";
+             fastest solver. A profile shows the distance from the best; with more than two solvers it does not rank them (GouldScott2016).\n"
+    );
     text
 }
 
@@ -262,7 +274,7 @@ fn nobody(runs: &Runs, selection: &Selection) -> String {
         });
         vec![u.problem.clone(), u.contacts.to_string(), closest]
     });
-    let head = ["unsolved", "contacts", "closest"].map(String::from).into();
+    let head = ["unsolved", selection.counted(), "closest"].map(String::from).into();
     format!("\n{}", Table { head, rows: rows.collect() }.markdown())
 }
 
@@ -326,7 +338,7 @@ mod tests {
         let runs = all.map(|(k, kind)| run(&format!("f/{k}"), kind, "a`<b>|", Solved, 1.0));
         let mut all = Runs { runs: runs.collect(), ..example() };
         all.campaigns[0].program = "<img src=x>\n# P".into();
-        let page = page(&all, None, "my (page)", "make --> <b>").unwrap();
+        let page = page(&all, None, "my (page)", "make --> <b>", false).unwrap();
         let names: BTreeSet<_> = page.figures.iter().map(|f| &f.name).collect();
         assert_eq!((names.len(), page.figures.len()), (10, 10), "{names:?}");
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
@@ -344,7 +356,7 @@ mod tests {
 
     #[test]
     fn the_page_says_who_solves_most_who_is_fastest_and_what_nobody_solves() {
-        let page = page(&example(), None, "figures", "make it").unwrap();
+        let page = page(&example(), None, "figures", "make it", true).unwrap();
         let has = |text: &str| assert!(page.markdown.contains(text), "{text}\n{}", page.markdown);
         has("4 problems of 3 families, 3 solvers, 9 runs. Made by `make it`");
         has("- nonsmooth 9, on a processor");
@@ -369,5 +381,17 @@ mod tests {
         }
         let names: BTreeSet<_> = page.figures.iter().map(|f| &f.name).collect();
         assert_eq!((names.len(), page.figures.len()), (4, 4));
+    }
+
+    #[test]
+    fn what_is_not_beside_the_page_is_named_without_a_link() {
+        let page = |beside| super::page(&example(), None, "figures", "make it", beside).unwrap();
+        for name in DOCUMENTS {
+            let (link, text) =
+                (format!("[{name}]({name}.md)"), format!("docs/{name}.md of nonsmooth"));
+            let [with, without] = [true, false].map(|beside| page(beside).markdown);
+            assert!(with.contains(&link) && !with.contains(&text), "{with}");
+            assert!(without.contains(&text) && !without.contains(".md)"), "{without}");
+        }
     }
 }

@@ -13,6 +13,8 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
+use nonsmooth_problem::Kind;
+
 use crate::record::{Ending, Run, SIZES, Size};
 use crate::runs::Runs;
 
@@ -82,6 +84,15 @@ impl Selection {
     /// All problems of a kind and all solvers at one tolerance.
     pub fn at(kind: &str, tolerance: f64) -> Self {
         Self { kind: kind.into(), tolerance, families: vec![], sizes: vec![], solvers: vec![] }
+    }
+
+    /// What the size of a problem of the kind counts.
+    pub fn counted(&self) -> &'static str {
+        match Kind::ALL.iter().find(|kind| kind.name() == self.kind) {
+            Some(Kind::Vi) => "variables",
+            Some(kind) if kind.is_complementarity() => "pairs",
+            _ => "contacts",
+        }
     }
 
     /// Whether a run belongs to it, whatever its tolerance.

@@ -282,7 +282,11 @@ fn markdown(catalogue: &Catalogue) -> String {
     }
     if !catalogue.composed.is_empty() {
         let names: Vec<_> = catalogue.composed.iter().map(|n| format!("`{n}`")).collect();
-        let _ = write!(page, "\nThe composed names: {}.\n", names.join(", "));
+        let _ = write!(
+            page,
+            "\nComposed names, among others (a prefix takes any method of the problem that it leads to): {}.\n",
+            names.join(", ")
+        );
     }
     page
 }

@@ -4,13 +4,14 @@
 //! friction            contact,status,r_n,r_t,u_n,u_t             in space r_t1,r_t2 and u_t1,u_t2, with rolling friction also r_r1,r_r2 and u_r1,u_r2
 //! LCP, box LCP        variable,status,z,w
 //! MLCP                variable,status,value,w                    u[0], ... then v[0], ...; only v has a w
-//! horizontal LCP      pair,status,x,s
+//! horizontal LCP      pair,x,s
 //! MCP                 variable,status,x,F
 //! VI                  variable,x,F
 //! ```
 //!
-//! `name` follows the first column where the file of the problem names its variables; `status` is there where the judge was asked. Rows are counted from
-//! 0. Numbers have as many digits as tell them from all others. Velocities of bodies and multipliers of scalar rows are in no such table.
+//! `name` follows the first column where the file of the problem names its variables; `status` is there where the judge was asked; of horizontal LCP and VI
+//! it speaks of equations and sets besides, so they have none. Rows are counted from 0. Numbers have as many digits as tell them from all
+//! others. Velocities of bodies and multipliers of scalar rows are in no such table.
 
 use std::borrow::Cow;
 use std::path::Path;

@@ -505,7 +505,7 @@ impl Run {
                 }
                 _ => Err(expected(
                     &path.display().to_string(),
-                    "a name that ends in .h5, .pvd or .glb",
+                    "a name that ends in .h5, .csv, .html, .pvd or .glb",
                     "another ending",
                 )),
             }

@@ -176,7 +176,7 @@ def test_what_is_written_and_shown(tmp_path):
     assert "<iframe" in run._repr_html_() and "<svg" in ball()._repr_html_()
     pytest.importorskip("matplotlib").use("Agg")
     assert run.plot().get_xlabel() == "t (s)"
-    with pytest.raises(ns.Error, match="ends in .h5, .pvd or .glb"):
+    with pytest.raises(ns.Error, match="ends in .h5, .csv, .html, .pvd or .glb"):
         run.save(tmp_path / "r.doc")
 
 
@@ -235,6 +235,10 @@ def test_limits_are_a_pair_that_may_be_open():
     world = ball()
     world.joint("prismatic", "world", "ball", axis=[0, 0, 1], limits=(-np.inf, 1.0))
     assert world.document["joints"][-1]["limits"] == {"upper": 1.0}
+    below = ball()
+    below.joint("prismatic", "world", "ball", axis=[0, 0, 1], limits=(-0.1, np.inf))
+    assert below.document["joints"][-1]["limits"] == {"lower": -0.1}
+    assert ns.Simulation(below).run(1e-3).solved
     for limits in [(-0.5, 0.5, 1.0), np.array([-0.5, 0.5, 1.0]), [0.5]]:
         with pytest.raises(ns.Error, match="limits: expected a pair"):
             world.joint("prismatic", "world", "ball", axis=[0, 0, 1], limits=limits)

@@ -56,9 +56,11 @@ pub enum Event<'a> {
     Planned {
         /// Problems that can be used.
         problems: usize,
-        /// Runs to make.
+        /// Runs that the file lacks.
         runs: usize,
-        /// How long these take at most: all to their time limits.
+        /// Of them, those that are not made: their solvers refuse the kind of problem.
+        refused: usize,
+        /// How long the others take at most: all to their time limits.
         at_most: Duration,
     },
     /// A run has ended.
@@ -159,7 +161,8 @@ pub fn run(
     let limit = setup.plan.time_limit * jobs.len() as f64 / lanes.len().max(1) as f64;
     watch(Event::Planned {
         problems: described.len() - unreadable,
-        runs: jobs.len(),
+        runs: jobs.len() + refused.len(),
+        refused: refused.len(),
         at_most: Duration::try_from_secs_f64(limit).unwrap_or(Duration::MAX),
     });
     let mut clock = Clock::new(jobs.iter().map(|((run, ..), _)| run), lanes.len());

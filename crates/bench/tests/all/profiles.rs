@@ -468,6 +468,26 @@ fn figures_are_drawn_and_carry_their_data() {
 }
 
 #[test]
+fn sizes_are_of_contacts_or_of_pairs() {
+    for (kind, counted) in [(KIND, "contacts"), ("mcp", "pairs"), ("vi", "variables")] {
+        let sized = |problem: &str, contacts: usize| Run {
+            kind: kind.into(),
+            contacts,
+            ..run(problem, "A", 1.0)
+        };
+        let mut runs = campaign("a");
+        runs.runs = vec![sized("f/p", 5), sized("f/q", 2000), sized("f/r", 3000)];
+        let drawn = nonsmooth_bench::figures::success(&runs, &Selection::at(kind, 1e-8));
+        let svg = drawn.unwrap().unwrap().svg;
+        for title in
+            [format!("1-10 {counted} (1 problem)"), format!("over 1000 {counted} (2 problems)")]
+        {
+            assert!(svg.contains(&title), "{title}");
+        }
+    }
+}
+
+#[test]
 fn figures_of_little_or_nothing() {
     let selection = Selection::at(KIND, 1e-8);
     assert_eq!(figures(&campaign("a"), &selection).unwrap(), []);

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use nonsmooth_bench::page::page;
+use nonsmooth_bench::page::{DOCUMENTS, page};
 use nonsmooth_bench::traits_table::{published, table};
 
 use super::{Joined, traits};
@@ -59,7 +59,10 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         }
     };
     let name = args.out.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let made = page(&runs, described.as_ref(), &name, &args.command)?;
+    // The pages of this project stand beside the documents that they refer to.
+    let there = |name: &str| args.out.with_file_name(format!("{name}.md")).is_file();
+    let beside = DOCUMENTS.into_iter().all(there);
+    let made = page(&runs, described.as_ref(), &name, &args.command, beside)?;
     let folder = args.out.with_file_name(&name);
     files::folder("--out", &folder)?;
     for figure in &made.figures {

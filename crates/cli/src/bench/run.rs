@@ -308,8 +308,8 @@ impl Progress {
                 }
                 ("problems", done, all, problem.name.clone())
             }
-            Event::Planned { problems, runs, at_most } => {
-                self.plan(problems, runs, at_most);
+            Event::Planned { problems, runs, refused, at_most } => {
+                self.plan(problems, runs, refused, at_most);
                 return;
             }
             Event::Ended { done, all, run, left } => {
@@ -339,15 +339,19 @@ impl Progress {
     }
 
     /// Says what is about to begin; how long it is likely to take, the bar says as soon as there are runs to go by.
-    fn plan(&self, problems: usize, runs: usize, at_most: Duration) {
+    fn plan(&self, problems: usize, runs: usize, refused: usize, at_most: Duration) {
         if self.bar.is_none() && !self.lines {
             return;
         }
         let (problems, runs) = (count(problems, "problem"), count(runs, "run"));
+        let (refused, every) = match refused {
+            0 => (String::new(), "every one"),
+            n => (format!(" ({n} refused by kind)"), "each of the others"),
+        };
         let at_most = clock(at_most);
         self.aside(&|| {
-            let limit = format!("at most {at_most} if every one goes to its time limit");
-            output::print(&format!("{problems}, {runs}, {limit}\n"));
+            let limit = format!("at most {at_most} if {every} goes to its time limit");
+            output::print(&format!("{problems}, {runs}{refused}, {limit}\n"));
         });
     }
 

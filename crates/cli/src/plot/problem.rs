@@ -15,8 +15,11 @@ use crate::kinds::start_of;
 
 /// The width and height of a panel, px.
 const PANEL: (u32, u32) = (420, 420);
-/// The height of the title, px.
+/// The height of a title of one line, px, and what each further line adds.
 const TITLE: u32 = 56;
+const LINE: u32 = 20;
+/// The width of a character of the title, px, a little more than the mean.
+const CHARACTER: u32 = 7;
 /// Cells of a panel's side in which the entries of a larger matrix are gathered.
 const CELLS: usize = 150;
 const OPEN: RGBColor = RGBColor(139, 148, 158);
@@ -76,14 +79,19 @@ fn draw(
     let panels = spies.len() + if impulses.is_empty() { 0 } else { 2 };
     let columns = panels.min(if panels == 4 { 2 } else { 3 });
     let rows = panels.div_ceil(columns);
-    let size = (PANEL.0 * columns as u32, TITLE + PANEL.1 * rows as u32);
+    let width = PANEL.0 * columns as u32;
+    let title = lines(title, ((width - 2 * 24) / CHARACTER) as usize);
+    let more = LINE * (title.len() as u32).saturating_sub(1);
+    let size = (width, TITLE + more + PANEL.1 * rows as u32);
     let whole = SVGBackend::with_string(text, size).into_drawing_area();
     whole.fill(&WHITE)?;
-    let (head, body) = whole.split_vertically(TITLE);
+    let (head, body) = whole.split_vertically(TITLE + more);
     let left = Pos::new(HPos::Left, VPos::Center);
-    head.draw_text(title, &font(16).pos(left), (24, 22))?;
+    for (k, line) in (0..).zip(&title) {
+        head.draw_text(line, &font(16).pos(left), (24, 22 + LINE as i32 * k))?;
+    }
     if let Some(solution) = solution {
-        head.draw_text(solution.says, &font(13).pos(left), (24, 44))?;
+        head.draw_text(solution.says, &font(13).pos(left), (24, 44 + more as i32))?;
     }
     let areas = body.split_evenly((rows, columns));
     let mut areas = areas.iter();
@@ -99,6 +107,21 @@ fn draw(
     }
     whole.present()?;
     Ok(())
+}
+
+/// A text in lines of at most so many characters, broken between words.
+fn lines(text: &str, most: usize) -> Vec<String> {
+    let mut lines: Vec<String> = vec![];
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= most => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.into()),
+        }
+    }
+    lines
 }
 
 fn spies(problem: &AnyProblem) -> Vec<Spy> {
@@ -305,7 +328,7 @@ where
         impulses.iter().filter(|i| i.normal > 0.0 && i.motion != Motion::Open).collect();
     let mean = closed.iter().map(|i| i.normal).sum::<f64>() / closed.len().max(1) as f64;
     let names = [(Motion::Stick, "stick"), (Motion::Slip, "slip"), (Motion::Open, "open")];
-    legend(area, &format!("Normal impulses, mean {mean:.3e}"), impulses, &names)?;
+    legend(area, &format!("Normal impulses, mean {mean:.3e} N s"), impulses, &names)?;
     let (_, body) = area.split_vertically(54);
     let end = closed.iter().map(|i| i.normal / mean).fold(1.0, f64::max) * 1.0001;
     let mut counts = [[0_usize; 2]; BARS];
@@ -451,6 +474,17 @@ mod tests {
             let svg = picture(&problem.into(), None);
             assert!(svg.contains(said), "{svg}");
         }
+    }
+
+    #[test]
+    fn a_long_title_is_broken_between_words() {
+        assert_eq!(lines("one two three", 7), ["one two", "three"]);
+        assert_eq!(lines("one  twentytwo a b", 6), ["one", "twentytwo", "a b"]);
+        assert!(lines("", 6).is_empty());
+        let problem = AnyProblem::from(PlantedLcp::default().lcp().0);
+        let svg = svg(&"word ".repeat(30), &problem, None).unwrap();
+        let longest = svg.lines().filter(|l| l.starts_with("word")).map(str::len).max();
+        assert!(longest.is_some_and(|n| n <= 53), "{svg}");
     }
 
     #[test]

@@ -438,9 +438,9 @@ class Run:
     def save(self, path: Path) -> None:
         """Writes the run: a trajectory (.h5), a table of the steps (.csv), a page (.html), for ParaView (.pvd) or Blender (.glb)."""
         target = pathlib.Path(path)
-        if target.suffix == ".csv":
+        if target.suffix.lower() == ".csv":
             target.write_text(self._native.csv(), encoding="utf-8")
-        elif target.suffix == ".html":
+        elif target.suffix.lower() == ".html":
             self.html(target)
         else:
             self._native.save(target)
