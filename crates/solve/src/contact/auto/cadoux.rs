@@ -3,7 +3,7 @@
 
 use nonsmooth_problem::check::Kinematic;
 
-use super::starts::lost;
+use super::starts::{interior_point, lost};
 use super::{Auto, EARLY, HybridWork, Stage};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
@@ -108,15 +108,16 @@ impl<const D: usize> OnContacts<Auto, D> {
         !work.cadoux_begun && work.done.newton >= EARLY && is_small::<P, D>(problem)
     }
 
-    /// Makes room for the stage where it may come soon.
+    /// Makes room for the stage, and for the interior point that it puts off, where it may come soon.
     pub(super) fn make_room_for_cadoux<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         work: &mut HybridWork<P, D>,
     ) {
-        if is_small::<P, D>(problem) {
-            let HybridWork { cadoux, state, .. } = work;
-            cadoux.get_or_insert_with(|| Box::new(Cadoux::new(problem, state)));
+        let HybridWork { cadoux, central, state, .. } = work;
+        if is_small::<P, D>(problem) && cadoux.is_none() {
+            *cadoux = Some(Box::new(Cadoux::new(problem, state)));
+            central.get_or_insert_with(interior_point).begin(problem, state, 0.0, None);
         }
     }
 

@@ -7,6 +7,7 @@ use super::controller::Controller;
 use super::{Auto, Done, FIRST, FIRST_SWEEPS, HybridWork, NEAR, RestSearch, Stage, swept};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
+use crate::contact::law::DiskLaw;
 use crate::contact::parts::{Central, REST, Way};
 
 /// Rest is sought at once where contacts without impulse open no faster than this part of ‖q‖ after the sweeps (at rest at most 2e-3, in motion 1e-2 and more); or, where W has not
@@ -535,7 +536,11 @@ pub(super) fn begin_interior<P: Linearised<D> + Disked<D>, const D: usize>(
 ) {
     work.passed_by = None;
     let HybridWork { central, state, stage, .. } = work;
-    let part = || Box::new(Central::default().know_at_least(INTERIOR_SLOPE));
-    let now = central.get_or_insert_with(part).begin(problem, state, 0.0, None);
+    let now = central.get_or_insert_with(interior_point).begin(problem, state, 0.0, None);
     *stage = Stage::Interior { halvings: Halvings::from(now.error), short: 0 };
+}
+
+/// That of stage 4, without a workspace yet.
+pub(super) fn interior_point<L: DiskLaw<D>, const D: usize>() -> Box<Central<L, D>> {
+    Box::new(Central::default().know_at_least(INTERIOR_SLOPE))
 }
