@@ -105,7 +105,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         problem: &P,
         work: &HybridWork<P, D>,
     ) -> bool {
-        !work.cadoux_begun && work.done.newton >= EARLY && is_small::<P, D>(problem)
+        work.done.convex == 0 && work.done.newton >= EARLY && is_small::<P, D>(problem)
     }
 
     /// Makes room for the stage, and for the interior point that it puts off, where it may come soon.
@@ -127,9 +127,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         problem: &P,
         work: &mut HybridWork<P, D>,
     ) -> Step {
-        let HybridWork { cadoux, cadoux_begun, state, stage, best, .. } = work;
+        let HybridWork { cadoux, state, stage, best, done, .. } = work;
         let cadoux = cadoux.get_or_insert_with(|| Box::new(Cadoux::new(problem, state)));
-        if !std::mem::replace(cadoux_begun, true) {
+        if done.convex == 0 {
             cadoux.begin(problem, state);
         } else if cadoux.least.is_finite() {
             problem.velocities(state, best, &mut cadoux.u);

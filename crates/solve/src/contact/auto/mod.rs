@@ -154,8 +154,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     projected: Option<Box<Sweep<P::Law, D, Projection>>>,
     in_turn: Option<Box<InTurn<P::Law, D>>>,
     cadoux: Option<Box<Cadoux<P::Law, D>>>,
-    /// It has begun in this solve, and comes again at a change of strategy after so many of them.
-    cadoux_begun: bool,
+    /// It comes at a change of strategy after so many of them.
     cadoux_after: usize,
     held: Option<Box<Held<P, D>>>,
     /// So many sweeps come before the next search for the rows at their bounds.
@@ -281,7 +280,6 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             projected: None,
             in_turn: None,
             cadoux: None,
-            cadoux_begun: false,
             cadoux_after: 0,
             held: None,
             hold_after: FIRST_SWEEPS,
@@ -347,7 +345,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
         (work.existence, work.exact, work.asked) = (None, None, false);
         (work.passed_by, work.rest, work.spread) = (None, RestSearch::default(), None);
         (work.turned, work.in_turn) = (false, None);
-        (work.cadoux_begun, work.cadoux_after) = (false, 0);
+        work.cadoux_after = 0;
         (work.held, work.hold_after) = (None, FIRST_SWEEPS);
     }
 

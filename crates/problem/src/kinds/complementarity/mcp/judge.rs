@@ -114,23 +114,22 @@ impl McpGauge {
             // The error of F, where that is the error of the pair.
             let of_f = pair.dual().max(pair.complementarity());
             let (unit, near) = self.units.at(i, self.terms.sizes[i]);
-            if of_f >= pair.error && unit > 0.0 {
-                let mut share_of_own = share(pair.w, unit);
-                if near > 0.0 && near < unit {
-                    // What no double near x does better is no error.
-                    let beyond = (pair.w.abs() - 4.0 * self.rounding(problem, x, i)).max(0.0);
-                    share_of_own = share_of_own.max(share(beyond, near));
-                }
-                if share_of_own > own {
-                    (own, measure.own_contact) = (share_of_own, Some(i));
-                }
-            } else if unit > 0.0 && self.lengths[i] > 0.0 {
+            if unit.is_nan() || unit <= 0.0 {
+                continue;
+            }
+            let mut share_of_own = share(pair.w, unit);
+            if of_f < pair.error {
                 // Nor is a distance none for a derivative that hardly feels it, where F is as large as it was: on the bound F may be another.
-                let way = (pair.z - pair.towards()).abs() / self.lengths[i];
-                let share_of_own = share(pair.w, unit).min(way);
-                if share_of_own > own {
-                    (own, measure.own_contact) = (share_of_own, Some(i));
-                }
+                let length = self.lengths[i];
+                let way = (pair.z - pair.towards()).abs() / length;
+                share_of_own = if length > 0.0 { share_of_own.min(way) } else { 0.0 };
+            } else if near > 0.0 && near < unit {
+                // What no double near x does better is no error.
+                let beyond = (pair.w.abs() - 4.0 * self.rounding(problem, x, i)).max(0.0);
+                share_of_own = share_of_own.max(share(beyond, near));
+            }
+            if share_of_own > own {
+                (own, measure.own_contact) = (share_of_own, Some(i));
             }
         }
         measure.own = Some(own);
