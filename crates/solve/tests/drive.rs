@@ -170,6 +170,66 @@ fn certificates_are_verified() {
     assert_eq!(outcome.status, Status::NoConclusion(ray(1.0, 2.0).into()));
 }
 
+/// Claims that there is no solution, and goes on or not; then has the point, if it is given one.
+struct Doubted {
+    goes_on: bool,
+    point: Option<LocalPoint>,
+}
+
+impl Solver<P> for Doubted {
+    type Work = usize;
+    fn work(&self, _: &P) -> Result<usize, SolveError> {
+        Ok(0)
+    }
+    fn start(&self, _: &P, _: &mut LocalPoint, steps: &mut usize) {
+        *steps = 0;
+    }
+    fn step(&self, _: &P, point: &mut LocalPoint, steps: &mut usize) -> Step {
+        *steps += 1;
+        if *steps == 1 {
+            let r = vec![1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+            return Step::NoSolution(Impulses { r, lambda: vec![] }.into());
+        }
+        if let (Some(known), 10..) = (&self.point, *steps) {
+            point.clone_from(known);
+        }
+        GO_ON
+    }
+    fn go_on(&self, _: &P, _: &mut LocalPoint, _: &mut usize) -> bool {
+        self.goes_on
+    }
+}
+
+#[test]
+fn a_point_that_passes_is_preferred_to_a_proof_by_rounding() {
+    // The walls of `certificates_are_verified`, one fleeing the other but for so much, and a contact that is hit.
+    let walls = |by: f64| {
+        let w = [(0, 0, 1.0), (0, 3, -1.0), (3, 0, -1.0), (3, 3, 1.0), (6, 6, 1.0)].into_iter();
+        let w = Bsr::from_csc(&Csc::from_triplets(9, 9, w).unwrap());
+        P::new(w, vec![-1.0, 0.0, 0.0, 1.0 - by, 0.0, 0.0, -1.0, 0.0, 0.0], vec![0.0; 3]).unwrap()
+    };
+    let mut hit = walls(1.0).origin();
+    (hit.r[0], hit.r[6]) = (1.0, 1.0);
+    const LAST: f64 = f64::EPSILON / 2.0;
+    let ends = |by: f64, goes_on: bool, point: Option<&LocalPoint>| {
+        let problem = walls(by);
+        let mut driver = Driver::new(Doubted { goes_on, point: point.cloned() });
+        let mut point = problem.origin();
+        let outcome = driver.solve(&problem, &mut point, &Limits::default(), &mut |_| {}).unwrap();
+        if let Status::Infeasible(proof) = &outcome.status {
+            assert!((proof.margin() / (by / 2.0) - 1.0).abs() < 1e-9, "{}", proof.margin());
+        }
+        (outcome.status.name(), outcome.iterations)
+    };
+    assert_eq!(ends(LAST, true, Some(&hit)), ("solved", 10));
+    // Without a point the proof stands, after a modest search or none.
+    let (name, iterations) = ends(LAST, true, None);
+    assert!(name == "infeasible" && (100..10_000).contains(&iterations), "{name} {iterations}");
+    assert_eq!(ends(LAST, false, Some(&hit)), ("infeasible", 1));
+    // What no point that passes can miss ends the solve at once.
+    assert_eq!(ends(1e-3, true, Some(&hit)), ("infeasible", 1));
+}
+
 #[test]
 fn mistakes_of_the_caller_are_errors() {
     let (problem, _) = planted();

@@ -39,6 +39,7 @@ trait AtWork<P: Problem>: Send {
     fn trace(&self) -> Trace;
     fn account(&self) -> Vec<String>;
     fn check_every(&self) -> usize;
+    fn go_on(&mut self, problem: &P, point: &mut P::Point) -> bool;
 }
 
 /// What [`AtWork`] is of a solver S.
@@ -94,6 +95,10 @@ impl<P: Problem, S: Solver<P>> AtWork<P> for Working<S, S::Work> {
     fn check_every(&self) -> usize {
         self.solver.check_every(&self.work)
     }
+
+    fn go_on(&mut self, problem: &P, point: &mut P::Point) -> bool {
+        self.solver.go_on(problem, point, &mut self.work)
+    }
 }
 
 /// The workspace of a [`Boxed`] solver.
@@ -136,6 +141,10 @@ impl<P: Problem> Solver<P> for Boxed<P> {
 
     fn account(&self, work: &Self::Work) -> Vec<String> {
         work.0.account()
+    }
+
+    fn go_on(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> bool {
+        work.0.go_on(problem, point)
     }
 
     fn latest(&self) -> bool {

@@ -200,7 +200,14 @@ impl std::fmt::Display for Status {
         match self {
             Status::Solved => f.write_str("solved"),
             Status::Infeasible(proof) => {
-                write!(f, "infeasible: {proof}; proved in exact arithmetic")
+                write!(f, "infeasible: {proof}; proved in exact arithmetic")?;
+                // The default tolerance: what is meant contradicts itself by more.
+                match proof.margin() {
+                    margin if margin < 1e-8 => {
+                        write!(f, ", if only by {margin:.0e} of the largest right-hand side")
+                    }
+                    _ => Ok(()),
+                }
             }
             Status::NearlyInfeasible { certificate, change } => write!(
                 f,
@@ -647,12 +654,17 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         let mut estimate = f64::NAN;
         let mut since_judged = 0;
         let mut claim = None;
+        let mut proof = None;
+        let mut patience = usize::MAX;
         let status = loop {
             if self.judge.last.passes(self.limits.tolerance) {
                 break Status::Solved;
             }
             if let Some(claim) = claim.take() {
                 break claim;
+            }
+            if iterations >= patience {
+                break NOTHING_PASSES;
             }
             if let Some(limit) = self.limit(iterations) {
                 if since_judged > 0 {
@@ -671,12 +683,20 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 Step::Continue { estimate: e } => estimate = e,
                 // What ends because a kernel was cut short has not failed.
                 Step::Stuck(_) | Step::Done if self.scope.raised() => {}
-                ended => {
-                    let conclusion = self.conclusion(ended);
+                ended => match self.conclusion(ended) {
+                    Status::Infeasible(found)
+                        if proof.is_none()
+                            && !is_final(&found, self.limits.tolerance)
+                            && self.solver.go_on(self.problem, point, self.work) =>
+                    {
+                        proof = Some(found);
+                        let small = self.problem.burden() <= guard::SMALL;
+                        patience = iterations + iterations.max(if small { MODEST } else { 0 });
+                    }
                     // A certificate whose verification was cut short is not refuted.
-                    let cut = self.scope.raised() && !matches!(conclusion, Status::Infeasible(_));
-                    claim = (!cut).then_some(conclusion);
-                }
+                    Status::Infeasible(proof) => claim = Some(Status::Infeasible(proof)),
+                    other => claim = (!self.scope.raised()).then_some(other),
+                },
             }
             let due = since_judged >= self.solver.check_every(self.work)
                 || self.judge.calibration.promises(estimate, self.limits.tolerance);
@@ -686,7 +706,7 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 since_judged = 0;
                 if !self.judge.last.merit().is_finite() {
                     claim = Some(Status::Stalled("the iterates are no longer finite".into()));
-                } else if claim.is_none() {
+                } else if claim.is_none() && proof.is_none() {
                     claim = self.floor(iterations);
                 }
             }
@@ -724,6 +744,10 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 None => status,
             },
             other => other,
+        };
+        let status = match proof {
+            Some(proof) if status != Status::Solved => Status::Infeasible(proof),
+            _ => status,
         };
         self.judge.meter.outcome(status, measure, iterations)
     }
@@ -776,6 +800,19 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         }
     }
 }
+
+/// Whether a proof that there is no solution ends the search for one. A point that passes the check at the tolerance is what a user asked for, whatever the last digits of the data say; so a
+/// proof that leaves room for such a point is kept, and is the last word only when as much work as it took, or [`MODEST`] work on a small problem, has found none.
+pub(crate) fn is_final(proof: &Proof, tolerance: f64) -> bool {
+    proof.margin() > ROOM * tolerance
+}
+
+/// Points that pass may miss a row by so many tolerances: one error is taken over all rows.
+const ROOM: f64 = 100.0;
+/// Iterations in the face of a proof, on a small problem.
+pub(crate) const MODEST: usize = 3000;
+/// What such a search ends with, before the proof takes its place.
+const NOTHING_PASSES: Status = Status::Stalled(Cow::Borrowed("no point was found that passes"));
 
 /// The judge's word on a certificate that a solver has found.
 pub(crate) fn concluded<P: Problem>(problem: &P, certificate: Certificate) -> Status {

@@ -21,6 +21,7 @@ use nonsmooth_problem::check::{
     Certificate, ConeSystem, Evidence, Exact, ExactVector, Proof, rounded,
 };
 
+use crate::core::drive::is_final;
 use crate::{Limits, Outcome, Status};
 
 /// How the enumeration ended.
@@ -234,10 +235,10 @@ pub fn refuted<P: Problem>(problem: &P, allowed: u64) -> Option<Proof> {
 pub struct Refutation(Arc<Mutex<Option<Proof>>>);
 
 impl Refutation {
-    /// Looks for a proof, and keeps it; whether there is one.
+    /// Looks for a proof, and keeps it; whether there is one that ends the search for a point at the default tolerance.
     pub fn search<P: Problem>(&self, problem: &P, allowed: u64) -> bool {
         let found = refuted(problem, allowed);
-        let is = found.is_some();
+        let is = found.as_ref().is_some_and(|proof| is_final(proof, Limits::default().tolerance));
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = found;
         is
     }

@@ -7,7 +7,7 @@ use std::time::Instant;
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Measure;
 
-use crate::core::drive::{History, Meter};
+use crate::core::drive::{History, MODEST, Meter, is_final};
 use crate::core::register::{self, Registered};
 use crate::core::settings::SettingsMap;
 use crate::core::trace::Trace;
@@ -82,6 +82,8 @@ impl<P: Registered> Portfolio<P> {
 }
 
 const UNTIMED: usize = 4;
+/// Stages in the face of a proof: what needs no look at the problem, and the plan by its class and structure.
+const CLOSING: usize = 2;
 
 /// The candidates of a plan one by one; the next stage is planned when those of one have failed.
 ///
@@ -93,14 +95,25 @@ struct Stages {
     tried: Vec<Candidate>,
     /// Stages since the last new candidate.
     barren: usize,
+    /// Nothing beyond the plan by class and structure.
+    closing: bool,
 }
 
 /// Stages without a new candidate after which a plan is over.
 const BARREN: usize = 3;
 
 impl Stages {
+    /// In the face of a proof: what is open, and the plan by class and structure, are the last.
+    fn close(&mut self) {
+        self.closing = true;
+    }
+
     fn next<P>(&mut self, problem: &P, plan: &Planner<P>, limits: &Limits) -> Option<Candidate> {
-        let most = if limits.time_limit.is_some() { usize::MAX } else { UNTIMED };
+        let most = match limits.time_limit {
+            _ if self.closing => CLOSING,
+            Some(_) => usize::MAX,
+            None => UNTIMED,
+        };
         loop {
             while let Some(candidate) = self.open.pop_front() {
                 // What was tried with as much patience would do the same again.
@@ -223,7 +236,7 @@ impl<P: Registered> Session<P> for Portfolio<P> {
         }
         self.gauge = Some(gauge);
         let mut status = Status::Stalled("no method applies to this problem".into());
-        let mut nearly = None;
+        let (mut nearly, mut proof) = (None, None);
         let mut stages = Stages::default();
         while let Some(candidate) = stages.next(problem, &self.plan, limits) {
             if let Some(limit) = limits.reached(tally.meter.begun) {
@@ -234,7 +247,12 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             let best = tally.best.as_ref().filter(|_| !candidate.anew);
             let mut trial = best.map_or_else(|| point.clone(), |b| b.0.clone());
             let (before, begun) = (tally.iterations, tally.meter.seconds());
-            let left = tally.left(limits, candidate.iterations);
+            let most = if proof.is_none() {
+                candidate.iterations
+            } else {
+                candidate.iterations.min(MODEST)
+            };
+            let left = tally.left(limits, most);
             let session = &mut self.sessions[k].2;
             let merit = tally.best.as_ref().map_or(f64::INFINITY, |b| b.1.merit());
             let mut part = Part { observer, iterations: before, seconds: begun, merit };
@@ -259,6 +277,14 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             self.account.push(sentence(&candidate, &outcome));
             self.account.extend(session.account().into_iter().map(|line| format!("  {line}")));
             tally.take(trial, &outcome);
+            if let Status::Infeasible(found) = &outcome.status
+                && !is_final(found, limits.tolerance)
+            {
+                proof.get_or_insert_with(|| found.clone());
+                stages.close();
+                status = NONE;
+                continue;
+            }
             let decided = matches!(outcome.status, Status::Solved | Status::Infeasible(_));
             if decided || tally.is_over(limits, &outcome.status) {
                 status = outcome.status;
@@ -283,6 +309,9 @@ impl<P: Registered> Session<P> for Portfolio<P> {
         let open = status == NONE || matches!(status, Status::NoConclusion(_));
         if let (Some(near), true) = (nearly, open) {
             status = near;
+        }
+        if let (Some(proof), true) = (proof, status != Status::Solved) {
+            status = Status::Infeasible(proof);
         }
         let measure = match tally.best {
             Some((best, measure)) => {

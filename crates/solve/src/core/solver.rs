@@ -58,6 +58,12 @@ pub trait Solver<P: Problem>: Send + Sync {
         vec![]
     }
 
+    /// What the last step claimed is proved, but by so little that a point may pass the check all the same. Whether the method goes on to look for one, and
+    /// claims no such thing again.
+    fn go_on(&self, _problem: &P, _point: &mut P::Point, _work: &mut Self::Work) -> bool {
+        false
+    }
+
     /// Whether the latest point is the answer even where an earlier one has the smaller residual: of methods that solve another problem than the judge's,
     /// whose answer must not be mixed with the start.
     fn latest(&self) -> bool {

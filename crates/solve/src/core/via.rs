@@ -165,6 +165,10 @@ where
         account
     }
 
+    fn go_on(&self, _problem: &P, _point: &mut P::Point, work: &mut Self::Work) -> bool {
+        self.solver.go_on(&work.reduced, &mut work.point, &mut work.work)
+    }
+
     fn latest(&self) -> bool {
         self.reformulation.approximates().is_some() || self.solver.latest()
     }

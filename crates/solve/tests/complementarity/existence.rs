@@ -3,9 +3,9 @@
 use nonsmooth_linalg::Dense;
 use nonsmooth_problem::check::{Existence, Judged};
 use nonsmooth_problem::planted::{PlantedClass, PlantedLcp};
-use nonsmooth_problem::{AnyProblem, BoxLcp, Hlcp, Lcp, Problem};
-use nonsmooth_solve::Limits;
+use nonsmooth_problem::{AnyProblem, BoxLcp, Hlcp, Lcp, Mlcp, Problem};
 use nonsmooth_solve::existence::of;
+use nonsmooth_solve::{Limits, Solve, Status};
 
 fn decided(problem: impl Into<AnyProblem>) -> Existence {
     of(&problem.into(), &Limits { time_limit: Some(60.0), ..Limits::default() })
@@ -95,4 +95,32 @@ fn small_problems_are_decided_by_their_theorem_or_in_fractions() {
     let pair = |r: f64| Hlcp::new(dense([[1.0]]), dense([[r]]), vec![-1.0]).unwrap();
     assert_eq!(name(pair(1.0).into()).0, "no_solution");
     assert_eq!(name(pair(-1.0).into()).0, "proved");
+}
+
+/// Two equations that are the same, with a right-hand side that rounding has left: exactly there is no solution.
+#[test]
+fn a_point_that_passes_is_preferred_to_a_proof_by_rounding() {
+    let row = [-0.2, 0.3, -0.6, 0.7, -1.2, 0.2, 1.2];
+    let equations = (0..2).flat_map(|i| (0..7).map(move |j| (i, 2 + j, row[j])));
+    let turned = (0..2).flat_map(|i| (0..7).map(move |j| (2 + j, i, -row[j])));
+    let mut m = Dense::zeros(9, 9);
+    equations.chain(turned).for_each(|(i, j, x)| m[(i, j)] = x);
+    let rounding = 5.773159728050814e-17;
+    let q = vec![
+        rounding,
+        rounding,
+        0.30405750482311816,
+        -0.4560862572346772,
+        0.9121725144693544,
+        -0.9118038344488234,
+        1.8243450289387089,
+        -0.30405750482311816,
+        -1.8243450289387089,
+    ];
+    let problem = Mlcp::new(m, q, 2).unwrap();
+    let lemke = Solve::new().solver("lemke").run(&problem).unwrap();
+    let Status::Infeasible(proof) = &lemke.status else { panic!("{}", lemke.status) };
+    assert!(proof.margin() < 1e-16, "{}", proof.margin());
+    let answer = Solve::new().run(&problem).unwrap();
+    assert_eq!(answer.status, Status::Solved, "{:?}", answer.account);
 }

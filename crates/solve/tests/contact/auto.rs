@@ -3,6 +3,7 @@
 use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, LocalPoint, Problem};
+use nonsmooth_solve::existence::decide;
 use nonsmooth_solve::registry::{Registered, session};
 use nonsmooth_solve::settings::SettingsMap;
 use nonsmooth_solve::{Limits, Outcome, Status};
@@ -154,4 +155,91 @@ fn much_friction_on_few_degrees_of_freedom_ends_by_given_speeds() {
     let r = [0.648, 3.055, 1.145, 0.247, 0.006, 0.03, 0.266, 0.014, 0.123, -0.141];
     let u = [0.0, 0.0, 0.0, 0.0, 0.0, -0.601, 0.0, 0.0, 0.0, 0.0];
     ends_by_speeds::<FrictionLocal<2>>(&planted_at(b, 5.0, [r, u]), |p| p.r.as_slice());
+}
+
+/// W of rank one and q = u − W r of planted u and r, rounded: exactly there is no solution, by the last digit.
+#[test]
+fn what_rounding_made_inconsistent_is_solved() {
+    let planar = |w: &[f64], q: &[f64], mu: f64| {
+        let n = q.len();
+        let entries = w.iter().enumerate().map(|(k, x)| (k / n, k % n, *x));
+        let w = Bsr::from_csc(&Csc::from_triplets(n, n, entries).unwrap());
+        FrictionLocal::<2>::new(w, q.to_vec(), vec![mu; n / 2]).unwrap()
+    };
+    let two = planar(
+        &[
+            0.10064162747049198,
+            0.5778420547602496,
+            -0.34126951572995845,
+            -0.03500529473975491,
+            0.5778420547602496,
+            3.3177269549565547,
+            -1.9594265628728362,
+            -0.2009857347133901,
+            -0.34126951572995845,
+            -1.9594265628728362,
+            1.1572237581383285,
+            0.11870078300674584,
+            -0.03500529473975491,
+            -0.2009857347133901,
+            0.11870078300674584,
+            0.012175584702029884,
+        ],
+        &[0.3770723195021314, 3.11118015237501, -1.278628844802757, -0.9675141639705952],
+        0.3,
+    );
+    let three = planar(
+        &[
+            1293485.675042144,
+            384121.79550660576,
+            252181.3847213012,
+            -514309.0883638353,
+            -113516.00357592764,
+            608599.9559970534,
+            384121.79550660576,
+            114071.27008067655,
+            74889.40013914897,
+            -152732.52288723274,
+            -33710.43990177851,
+            180733.74321305304,
+            252181.3847213012,
+            74889.40013914897,
+            49165.94905303523,
+            -100271.05872209696,
+            -22131.379977496006,
+            118654.25540152144,
+            -514309.0883638353,
+            -152732.52288723274,
+            -100271.05872209696,
+            204496.92136329305,
+            45135.646602301196,
+            -241988.36878260478,
+            -113516.00357592764,
+            -33710.43990177851,
+            -22131.379977496006,
+            45135.646602301196,
+            9962.138210328592,
+            -53410.59133029825,
+            608599.9559970534,
+            180733.74321305304,
+            118654.25540152144,
+            -241988.36878260478,
+            -53410.59133029825,
+            286353.31151042494,
+        ],
+        &[
+            -413200.42641820107,
+            -122706.64666980805,
+            -80558.64685024749,
+            164294.61780917592,
+            36262.37382283734,
+            -194415.8604055121,
+        ],
+        0.3,
+    );
+    for problem in [two, three] {
+        let existence = decide(&problem, &Limits::default());
+        assert_eq!(existence.name(), "no_solution", "{existence}");
+        solve(&problem, &mut problem.origin());
+    }
 }

@@ -5,6 +5,7 @@ use std::cmp::Ordering;
 use nonsmooth_linalg::{Compensated, budget};
 
 use super::exact::{Equation, Exact, double, exact, negative, rounded, satisfying};
+use super::statement::exacts;
 
 /// A column of a [`ConeSystem`]: its entries by row.
 pub type Column = Vec<(usize, Exact)>;
@@ -153,18 +154,57 @@ impl ConeSystem {
     /// Whether the vectors together separate b from every choice of one column a pair, **in exact arithmetic**: the system then has no solution. False where the
     /// computation of this thread is [over](nonsmooth_linalg::budget::over).
     pub fn refuted_by(&self, vectors: &[Vec<Exact>]) -> bool {
-        self.is_refuted(&self.entries(), vectors)
+        self.refutation(&self.entries(), vectors, &[]).is_some()
     }
 
-    /// [`refuted_by`](Self::refuted_by), with the entries in doubles.
-    pub(crate) fn is_refuted(&self, entries: &Entries, vectors: &[Vec<Exact>]) -> bool {
+    /// As [`refuted_by`](Self::refuted_by), with the entries in doubles: by how much, see [`Proof::margin`](super::Proof::margin), where the rows of the problem have these weights.
+    pub(crate) fn refutation(
+        &self,
+        entries: &Entries,
+        vectors: &[Vec<Exact>],
+        weights: &[f64],
+    ) -> Option<f64> {
         if self.wanted.is_some() && !vectors.iter().all(|y| self.is_supported(y)) {
-            return false;
+            return None;
         }
-        let shaped = vectors.iter().all(|y| y.len() == self.rhs.len());
-        let sides =
-            || vectors.iter().map(|y| self.separates(entries, y)).collect::<Option<Vec<_>>>();
-        shaped && sides().is_some_and(|sides| all_closed(&sides, self.pairs.len()))
+        if !vectors.iter().all(|y| y.len() == self.rhs.len()) {
+            return None;
+        }
+        let sides: Vec<_> =
+            vectors.iter().map(|y| self.separates(entries, y)).collect::<Option<_>>()?;
+        if !all_closed(&sides, self.pairs.len()) {
+            return None;
+        }
+        let weights = exacts(weights);
+        // What the vectors that miss by most close already is missed by as much; fewer vectors close no more.
+        let excess: Vec<f64> = vectors.iter().map(|y| self.excess(y, &weights)).collect();
+        let mut order: Vec<usize> = (0..excess.len()).collect();
+        order.sort_by(|&a, &b| excess[b].total_cmp(&excess[a]));
+        let closed = |count: usize| {
+            let some: Vec<_> = order[..count].iter().map(|&k| sides[k].clone()).collect();
+            all_closed(&some, self.pairs.len())
+        };
+        let (mut open, mut enough) = (0, order.len());
+        while enough - open > 1 {
+            let middle = open.midpoint(enough);
+            if closed(middle) { enough = middle } else { open = middle }
+        }
+        Some(excess[order[enough - 1]])
+    }
+
+    /// For a y that separates: the least error in some row that has a weight, over that weight and as a part of the largest such right-hand side, of whatever it separates b from:
+    /// `|yᵀ(A t − b)| ≥ −yᵀ b`.
+    fn excess(&self, y: &[Exact], weights: &[Exact]) -> f64 {
+        let size = |x: &Exact| if negative(x) { -x } else { x.clone() };
+        let shares = self.rhs.iter().zip(weights).map(|(b, weight)| size(b) / weight);
+        let largest = shares.max().unwrap_or(Exact::ZERO);
+        let terms = y.iter().zip(weights).map(|(y, weight)| size(y) * weight);
+        let room = terms.fold(Exact::ZERO, |sum, term| sum + term) * largest;
+        if room.is_zero() {
+            return f64::INFINITY;
+        }
+        let power = y.iter().zip(&self.rhs).fold(Exact::ZERO, |sum, (y, b)| sum + y * b);
+        rounded(&(-power / room))
     }
 
     /// The entries in doubles, for as long as the columns stay.

@@ -39,6 +39,8 @@ pub struct Proof {
     certificate: Certificate,
     /// What was verified: of each vector the entries that are not zero.
     exact: Vec<Sparse>,
+    #[serde(skip)]
+    margin: f64,
 }
 
 /// The entries of a vector that are not zero, by row.
@@ -77,17 +79,23 @@ impl<'de> Deserialize<'de> for Number {
 }
 
 impl Proof {
-    fn new(certificate: Certificate, vectors: &[Vec<Exact>]) -> Self {
+    fn new(certificate: Certificate, vectors: &[Vec<Exact>], margin: f64) -> Self {
         let sparse = |y: &Vec<Exact>| {
             let entries = y.iter().enumerate().filter(|(_, y)| !y.is_zero());
             Sparse(entries.map(|(i, y)| (i, Number(y.clone()))).collect())
         };
-        Self { certificate, exact: vectors.iter().map(sparse).collect() }
+        Self { certificate, exact: vectors.iter().map(sparse).collect(), margin }
     }
 
     /// What was claimed.
     pub fn certificate(&self) -> &Certificate {
         &self.certificate
+    }
+
+    /// By how much there is no solution: whatever the unknowns, some row is missed by at least this part of the largest right-hand side; rows that balance impulses count over their masses. Where it is of the size of
+    /// rounding, a problem that was meant to have a solution may have lost it to the digits with which it was stored.
+    pub fn margin(&self) -> f64 {
+        self.margin
     }
 
     /// The vectors that a written proof holds, for a system of so many rows, as a claim that the judge has yet to verify. `None` where an entry is
@@ -136,8 +144,9 @@ pub(crate) fn weigh(problem: &impl Exactly, certificate: &Certificate) -> Eviden
     let Some(system) = problem.system(Some(&wanted)) else { return Evidence::Nothing };
     let vectors: Vec<Vec<Exact>> = claims.into_iter().map(|y| y.over(&system)).collect();
     let seen = system.entries();
-    if system.is_refuted(&seen, &vectors) {
-        return Evidence::Proved(Proof::new(certificate.clone(), &vectors));
+    let weights: Vec<f64> = (0..rows).map(|i| problem.weight(i)).collect();
+    if let Some(margin) = system.refutation(&seen, &vectors, &weights) {
+        return Evidence::Proved(Proof::new(certificate.clone(), &vectors, margin));
     }
     // First as they are, then without the entries that may be noise.
     let mut nearly: Option<f64> = None;
@@ -156,8 +165,8 @@ pub(crate) fn weigh(problem: &impl Exactly, certificate: &Certificate) -> Eviden
         }
         let mended = Some(system.mended(&seen, &given)).filter(|mended| *mended != given);
         for candidate in mended.iter().chain([&given]) {
-            if system.is_refuted(&seen, candidate) {
-                return Evidence::Proved(Proof::new(certificate.clone(), candidate));
+            if let Some(margin) = system.refutation(&seen, candidate, &weights) {
+                return Evidence::Proved(Proof::new(certificate.clone(), candidate, margin));
             }
             let change = system.nearness(&seen, candidate);
             nearly = change.into_iter().chain(nearly).reduce(f64::min);

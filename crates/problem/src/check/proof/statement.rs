@@ -35,6 +35,11 @@ pub(crate) trait Exactly {
     /// The rows of the system, but for those that define bounds.
     fn rows(&self) -> usize;
 
+    /// What the unit of a row is worth, where those of the problem's rows differ: of a row that balances impulses, the mass that makes velocities of them.
+    fn weight(&self, _row: usize) -> f64 {
+        1.0
+    }
+
     /// Of a contact problem: the row where the velocities of its contacts begin; those of bilateral constraints follow.
     fn impulses_from(&self) -> Option<usize> {
         None

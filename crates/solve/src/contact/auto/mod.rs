@@ -26,7 +26,8 @@
 //! 10. **Cadoux' fixed point** (`cadoux.rs`): the sliding speeds held, a convex problem solved, the speeds renewed by Newton's method. Before each change of strategy, for as many factorisations as
 //!     a strategy takes; where a problem is small already after a few Newton iterations in vain. Few degrees of freedom under friction of 1 and more, on which sweeps diverge and Newton's iterations go round, end here.
 //! 11. **Another strategy** (other ρ, more sweeps, a start from zero) where the error has not halved for long; at the first time
-//!     the existence of a solution is investigated, and a problem without one is given up with its certificate. That first time sweeps with
+//!     the existence of a solution is investigated, and a problem without one is given up with its certificate; where that is one by the last digits only, the loop asks for more
+//!     ([`Solver::go_on`]), and Cadoux' fixed point of a small problem begins anew. That first time sweeps with
 //!     one projection a contact ([`Projection`]) are tried from zero: where exact ones circle, these may come near or end.
 //!
 //! A problem with scalar rows that have bounds begins with sweeps, which visit them too. The later stages know no bounds; where sweeps promise little, those
@@ -181,6 +182,8 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     /// An exact solution, rounded, that the judge has yet to see.
     exact: Option<P::Point>,
     asked: bool,
+    /// There is none by so little that a point may pass: no such word any more.
+    doubted: bool,
     rest: RestSearch,
     /// Motion and impulses have been sought in turn, or cannot be.
     turned: bool,
@@ -301,6 +304,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             existence: None,
             exact: None,
             asked: false,
+            doubted: false,
             rest: RestSearch::default(),
             turned: false,
             passed_by: None,
@@ -343,6 +347,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
         work.stage = FIRST;
         work.rate.begin();
         (work.existence, work.exact, work.asked) = (None, None, false);
+        work.doubted = false;
         (work.passed_by, work.rest, work.spread) = (None, RestSearch::default(), None);
         (work.turned, work.in_turn) = (false, None);
         work.cadoux_after = 0;
@@ -350,7 +355,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
-        if let Some(ray) = problem.contradiction(&work.state) {
+        if let Some(ray) = problem.contradiction(&work.state).filter(|_| !work.doubted) {
             return Step::NoSolution(ray.clone().into());
         }
         // The judge has seen it, and goes on asking.
@@ -385,6 +390,15 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             Stage::Sweeps { .. } => SWEEPS_JUDGED * work.sweep.together(SWEEPS_JUDGED_SHARED),
             _ => 1,
         }
+    }
+
+    fn go_on(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> bool {
+        work.doubted = true;
+        problem.enter(&mut work.state, point);
+        if !self.insist_on_cadoux(problem, work) {
+            self.subproblem_here(problem, point, work);
+        }
+        true
     }
 
     fn account(&self, work: &Self::Work) -> Vec<String> {
@@ -949,7 +963,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         existence: &Existence,
     ) -> Option<Step> {
         match existence {
-            Existence::NoSolution { proof } => Some(Step::NoSolution(proof.certificate().clone())),
+            Existence::NoSolution { proof } => {
+                (!work.doubted).then(|| Step::NoSolution(proof.certificate().clone()))
+            }
             // An exact solution, found on the way: the judge has the last word on its rounding.
             Existence::Solved { coefficients, .. } => {
                 let x = problem.cones()?.unknowns_at(&coefficients.0);
@@ -986,7 +1002,9 @@ impl<const D: usize> OnContacts<Auto, D> {
                 work.done.strategies += 1;
                 return step;
             }
-        } else if let Existence::NoSolution { proof } = existence {
+        } else if let Existence::NoSolution { proof } = &existence
+            && !work.doubted
+        {
             return Step::NoSolution(proof.certificate().clone());
         }
         work.done.strategies += 1;

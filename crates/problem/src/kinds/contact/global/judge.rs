@@ -527,6 +527,11 @@ impl<const D: usize, L: Law<D>> Exactly for FrictionGlobal<D, L> {
         self.dofs() + self.w.len() + self.multipliers()
     }
 
+    fn weight(&self, row: usize) -> f64 {
+        let mass = if row < self.dofs() { self.M.get(row, row) } else { 1.0 };
+        if mass > 0.0 { mass } else { 1.0 }
+    }
+
     fn impulses_from(&self) -> Option<usize> {
         Some(self.dofs())
     }
