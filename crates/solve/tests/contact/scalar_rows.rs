@@ -1,6 +1,6 @@
 //! Scalar rows with bounds: the methods that know them, held against planted points, a second method and a closed form; the others refuse them by name.
 
-use nonsmooth_linalg::{Csc, norm};
+use nonsmooth_linalg::{Bsr, Csc, norm};
 use nonsmooth_problem::check::{Existence, Judged};
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{
@@ -286,5 +286,48 @@ fn rows_that_contradict_or_repeat_each_other_end_no_search() {
         rows.bounds.upper.extend_from_within(..);
         let answer = Solve::new().tolerance(1e-9).max_iterations(20_000).run(&global).unwrap();
         assert_eq!(answer.status, Status::Solved, "{seed} {:?}", answer.account);
+    }
+}
+
+/// A body whose motion is prescribed, against dry friction on the same coordinate, and a motor of limited strength: the bilateral row determines the velocities of both, so that their impulses are at
+/// bounds.
+#[test]
+fn rows_that_bilateral_rows_determine_are_at_their_bounds() {
+    for (mass, scale) in [(1.0, 1.0), (3.0, 0.7), (0.1, 1e3)] {
+        // Prescribed: 1; friction: resists; the motor wants 2, so it drives as it can.
+        let g = [1.0, scale, -0.3];
+        let b = vec![-1.0, 0.0, 0.6];
+        let bounds = Bounds {
+            lower: vec![f64::NEG_INFINITY, -3.0, -0.5],
+            upper: vec![f64::INFINITY, 3.0, 0.5],
+        };
+        let load = 0.2;
+        // A contact holds the body up along the other coordinate, and slides.
+        let entries = (0..3).map(|j| (0, j, g[j]));
+        let rows = RowsGlobal {
+            G: Csc::from_triplets(2, 3, entries).unwrap(),
+            b: b.clone(),
+            bounds: bounds.clone(),
+        };
+        let h = Csc::from_triplets(2, 2, [(0, 1, 1.0), (1, 0, 1.0)].into_iter()).unwrap();
+        let m = Csc::diagonal(&[mass, mass]);
+        let global = FrictionGlobal::<2> {
+            rows: Some(rows),
+            ..FrictionGlobal::new(m, h, vec![load, -mass], vec![0.0; 2], vec![0.4]).unwrap()
+        };
+        let w = Bsr::from_csc(&Csc::diagonal(&[1.0 / mass, 1.0 / mass]));
+        let v = Csc::from_triplets(2, 3, (0..3).map(|j| (1, j, g[j] / mass))).unwrap();
+        let products = (0..9).map(|k| (k / 3, k % 3, g[k / 3] * g[k % 3] / mass));
+        let r = Csc::from_triplets(3, 3, products).unwrap();
+        let s = g.iter().zip(&b).map(|(g, b)| g * load / mass + b).collect();
+        let local = FrictionLocal::<2> {
+            rows: Some(RowsLocal { V: v, R: r, s, bounds }),
+            ..FrictionLocal::new(w, vec![-1.0, load / mass], vec![0.4]).unwrap()
+        };
+        for solver in ["nsgs", "auto"] {
+            for lambda in [solved(&global, solver).lambda, solved(&local, solver).lambda] {
+                assert_eq!(lambda[1..], [-3.0, -0.5], "{solver} {mass} {scale}");
+            }
+        }
     }
 }

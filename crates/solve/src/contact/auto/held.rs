@@ -12,6 +12,7 @@
 
 use crate::contact::auto::{Auto, HybridWork};
 use crate::contact::form::{Disked, Holding, Linearised, OnContacts};
+use crate::contact::parts::asked;
 use crate::{SolveError, Solver, Step};
 use nonsmooth_problem::check::Kinematic;
 
@@ -177,7 +178,7 @@ fn places<P: Linearised<D> + Disked<D>, const D: usize>(
         let c = problem.row_velocity(state, r, lambda, j);
         places[j] = if w <= 0.0 {
             // Nothing that it does moves it.
-            Some(lambda[j])
+            Some(if c.abs() <= slack { lambda[j] } else { asked([l, u], lambda[j], c, w, 1.0) })
         } else if let Some(held) = held
             && held[j].map_or(c, |_| bounds.residual(j, lambda[j], c, w)).abs() <= slack
         {

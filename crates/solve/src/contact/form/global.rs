@@ -14,8 +14,8 @@ use nonsmooth_problem::{Bounds, Dynamics, FrictionGlobal, GlobalPoint, RowsGloba
 
 use super::linearised::{BodyForm, ContactForm, Form, Once, System, made, there, unaffordable};
 use super::{
-    Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Holding, Linear, Linearised, MANY,
-    Rows, Visits, held_and_left,
+    Access, Blockwise, Concurrent, Contacts, Costs, DETERMINED, Frictional, Holding, Linear,
+    Linearised, MANY, Rows, Visits, held_and_left,
 };
 use crate::SolveError;
 use crate::contact::law::DiskLaw;
@@ -231,11 +231,15 @@ fn row_responses<const D: usize, L: DiskLaw<D>>(
     let Some(b) = problem.rows.as_ref().filter(|b| !b.bounds.are_free()) else { return vec![] };
     let mut of = |j: usize| {
         let v = dynamics.respond_to_row(problem, j);
-        let moving = v.iter().enumerate().filter(|(_, v)| **v != 0.0);
-        RowResponse {
-            own: b.G.column_dot(j, v),
-            velocities: moving.map(|(i, &v)| (i, v)).collect(),
+        let own = b.G.column_dot(j, v);
+        // About what it is without the bilateral rows.
+        let (rows, values) = b.G.column(j);
+        let alone: f64 = rows.iter().zip(values).map(|(&i, g)| g * g / problem.M.get(i, i)).sum();
+        if own <= DETERMINED * alone {
+            return RowResponse { velocities: vec![], own: 0.0 };
         }
+        let moving = v.iter().enumerate().filter(|(_, v)| **v != 0.0);
+        RowResponse { own, velocities: moving.map(|(i, &v)| (i, v)).collect() }
     };
     (0..b.b.len()).map(|j| (!b.bounds.is_free(j)).then(|| of(j))).collect()
 }

@@ -127,7 +127,7 @@ pub trait Rows<const D: usize>: Contacts<D> {
     /// The impulses of the contacts of a point, and those of all rows.
     fn all_impulses(point: &mut Self::Point) -> (&mut [f64], &mut [f64]);
 
-    /// `∂c_j/∂λ_j`.
+    /// `∂c_j/∂λ_j`; zero where bilateral rows determine c_j, see [`DETERMINED`].
     fn row_response(&self, state: &Self::State, j: usize) -> f64;
 
     /// The velocity `c_j` of row j for the current impulses.
@@ -136,6 +136,9 @@ pub trait Rows<const D: usize>: Contacts<D> {
     /// The impulse of row j moved by `by` (and λ holds it already).
     fn row_moved(&self, state: &mut Self::State, j: usize, by: f64);
 }
+
+/// What bilateral rows leave of the response of a row is rounding where it is at most this part of the response without them.
+const DETERMINED: f64 = 1e-12;
 
 /// Rows whose impulses are held.
 pub trait Holding<const D: usize>: Rows<D> + Sized {

@@ -3,6 +3,8 @@
 use nonsmooth_linalg::{Csc, Inverse, MatrixError, Refine};
 use nonsmooth_problem::RowsLocal;
 
+use super::DETERMINED;
+
 /// The rows B that have bounds, where the free ones F hold exactly, `λ_F = −R_FF⁻¹ (V_Fᵀ r + R_FB λ_B + s_F)`:
 ///
 /// ```text
@@ -10,7 +12,7 @@ use nonsmooth_problem::RowsLocal;
 /// c_B = (V_Bᵀ − R_BF R_FF⁻¹ V_Fᵀ) r + (R_BB − R_BF R_FF⁻¹ R_FB) λ_B + s_B − R_BF R_FF⁻¹ s_F.
 /// ```
 ///
-/// All rows are kept in their places, of free ones nothing. Cost: two solves with R_FF a row.
+/// All rows are kept in their places, of free ones and of what these determine nothing but the velocity. Cost: two solves with R_FF a row.
 pub(super) struct Bounded {
     /// What λ_B does to u, by columns.
     pub(super) effect: Csc,
@@ -59,9 +61,7 @@ impl Bounded {
                 let all = column.into_iter().enumerate().filter(|(_, x)| *x != 0.0);
                 all.map(move |(i, x)| (i, j, x))
             };
-            effect.extend(kept(without(j, &solved(inverse, b.R.column(j)))));
             let y = solved(&transposed, rows_of.column(j));
-            reads.extend(kept(without(j, &y)));
             let mut row = vec![0.0; p];
             for k in b.bounds.bounded() {
                 let (rows, values) = b.R.column(k);
@@ -73,9 +73,14 @@ impl Bounded {
                     };
                 }
             }
-            own.extend(kept(row));
             let through: f64 = free.iter().zip(&y).map(|(&i, y)| y * b.s[i]).sum();
             free_velocity[j] = b.s[j] - through;
+            if row[j] <= DETERMINED * b.R.get(j, j) && b.R.get(j, j) > 0.0 {
+                continue;
+            }
+            effect.extend(kept(without(j, &solved(inverse, b.R.column(j)))));
+            reads.extend(kept(without(j, &y)));
+            own.extend(kept(row));
         }
         let (m, n) = (b.V.nrows(), p);
         Ok(Self {

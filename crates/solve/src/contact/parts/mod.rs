@@ -19,6 +19,6 @@ pub use clarabel::{Clarabel, Ended, Shape};
 pub use conic::{ConvexEnd, ConvexIp};
 pub use pursuit::Pursuit;
 pub use rate::Rate;
-pub use rows::{put_within_bounds, sweep_rows};
+pub use rows::{asked, put_within_bounds, sweep_rows};
 pub use speeds::Speeds;
 pub use sweep::{NEGLIGIBLE, Sweep};
