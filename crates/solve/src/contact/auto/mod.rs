@@ -160,6 +160,8 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     held: Option<Box<Held<P, D>>>,
     /// So many sweeps come before the next search for the rows at their bounds.
     hold_after: usize,
+    /// The impulses from which that search began, contacts and rows: where it ends without a set it may have sent them anywhere.
+    searched_from: Option<[Vec<f64>; 2]>,
     alternating: Option<Box<Alternating<D>>>,
     central: Option<Box<Central<P::Law, D>>>,
     pursuit: Option<Box<Pursuit<P::Law, D>>>,
@@ -286,6 +288,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             cadoux_after: 0,
             held: None,
             hold_after: FIRST_SWEEPS,
+            searched_from: None,
             alternating: None,
             central: None,
             pursuit: None,
@@ -352,6 +355,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
         (work.turned, work.in_turn) = (false, None);
         work.cadoux_after = 0;
         (work.held, work.hold_after) = (None, FIRST_SWEEPS);
+        work.searched_from = None;
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
@@ -617,10 +621,18 @@ impl<const D: usize> OnContacts<Auto, D> {
     ) -> Step {
         let lost = runs_away(estimate) && !budget::over();
         let few = work.rate.left(work.tolerance) * (SWEEPS_A_STEP as f64) < SWEEPS_WITH_ROWS;
-        if lost {
-            if work.done.searches > 0 {
+        if lost && work.done.searches > 0 {
+            let Some([r, lambda]) = work.searched_from.take() else {
                 return Step::Stuck("sweeps send the impulses to infinity".into());
-            }
+            };
+            let to = P::all_impulses(point);
+            to.0.copy_from_slice(&r);
+            to.1.copy_from_slice(&lambda);
+            problem.enter(&mut work.state, point);
+            work.rate.begin();
+            return Step::Continue { estimate: f64::NAN };
+        }
+        if lost {
             let (r, lambda) = P::all_impulses(point);
             r.fill(0.0);
             lambda.fill(0.0);
@@ -630,6 +642,8 @@ impl<const D: usize> OnContacts<Auto, D> {
         }
         work.done.searches += 1;
         work.hold_after = AGAIN * work.done.sweeps;
+        let (r, lambda) = P::all_impulses(point);
+        work.searched_from = Some([r.to_vec(), lambda.to_vec()]);
         problem.enter(&mut work.state, point);
         if let Ok(held) = Held::begin(self, problem, &work.state, point, work.tolerance) {
             work.held = Some(Box::new(held));
