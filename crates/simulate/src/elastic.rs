@@ -70,9 +70,8 @@ impl Elastic {
         }
         let rolls = |&m: &usize| world.law_between(self.material, m).mu_r != 0.0;
         if let Some(other) = (0..count).find(rolls) {
-            let names = world.materials();
             return Err(SimulateError::value(
-                format!("pairs[{}, {}].mu_rolling", names[self.material], names[other]),
+                format!("{}.mu_r", world.law_place(self.material, other)),
                 format!("0, for {key} is elastic: its nodes do not roll"),
                 world.law_between(self.material, other).mu_r,
             ));

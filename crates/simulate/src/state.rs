@@ -137,3 +137,16 @@ pub(crate) enum Axis {
     /// Across two edges.
     Edges(u32, u32),
 }
+
+/// Velocities that are all below this, m/s or rad/s, are rest. Squares of what is off in them by rounding, of which errors are made, would be no normal numbers.
+const STILL: f64 = 1e-100;
+
+/// Whether these velocities are rest.
+pub(crate) fn is_rest(v: &[f64]) -> bool {
+    v.iter().all(|x| x.abs() < STILL)
+}
+
+/// A velocity, or rest.
+pub(crate) fn or_rest(v: Vec3) -> Vec3 {
+    if is_rest(&v) { [0.0; 3] } else { v }
+}

@@ -404,10 +404,21 @@ impl World {
 
     /// All laws by their places in messages.
     pub(crate) fn laws(&self) -> impl Iterator<Item = (String, Law)> + '_ {
-        let name = |k: usize| self.materials.get(k).map_or("?", String::as_str);
-        let own = self.pairs.iter();
-        let own = own.map(move |(&(a, b), law)| (format!("pairs[{}, {}]", name(a), name(b)), *law));
+        let own = self.pairs.iter().map(|(&(a, b), law)| (self.pair_place(a, b), *law));
         std::iter::once(("law".into(), self.law)).chain(own)
+    }
+
+    /// Where messages find the law between two materials.
+    pub(crate) fn law_place(&self, a: usize, b: usize) -> String {
+        match self.pairs.contains_key(&(a.min(b), a.max(b))) {
+            true => self.pair_place(a, b),
+            false => "law".into(),
+        }
+    }
+
+    fn pair_place(&self, a: usize, b: usize) -> String {
+        let name = |k: usize| self.materials.get(k).map_or("?", String::as_str);
+        format!("pairs[{}, {}]", name(a.min(b)), name(a.max(b)))
     }
 
     /// Lets two bodies pass through each other: partners of a joint. In a [periodic](Periodic) world images of them still touch.
@@ -450,8 +461,7 @@ impl World {
         self.law.validate("law")?;
         let count = self.materials.len();
         for (&(a, b), law) in &self.pairs {
-            let name = |k: usize| self.materials.get(k).map_or("?", String::as_str);
-            let key = format!("pairs[{}, {}]", name(a), name(b));
+            let key = self.pair_place(a, b);
             if b >= count {
                 let expected = format!("two of the {count} materials");
                 return Err(SimulateError::value(key, expected, format!("{a} and {b}")));
@@ -459,8 +469,7 @@ impl World {
             law.validate(&key)?;
         }
         for (&(a, b), compliance) in &self.compliances {
-            let name = |k: usize| self.materials.get(k).map_or("?", String::as_str);
-            let key = format!("pairs[{}, {}]", name(a), name(b));
+            let key = self.pair_place(a, b);
             let Compliance { stiffness, damping } = *compliance;
             let place = |field: &str| format!("{key}.compliance.{field}");
             require(|| place("stiffness"), stiffness, stiffness > 0.0, "a positive number")?;

@@ -43,6 +43,12 @@ impl<const D: usize> Lines<D> {
             rows.bounds.lower.clone_from(&self.bounds.lower);
             rows.bounds.upper.clone_from(&self.bounds.upper);
         }
+        // Without a load nothing pushes, and what was left of the last impulses would be the measure of what is off.
+        let rates = problem.q.iter().chain(problem.rows.iter().flat_map(|r| &r.s));
+        if rates.into_iter().all(|c| *c == 0.0) {
+            point.r.fill(0.0);
+            point.lambda.fill(0.0);
+        }
         for (lambda, j) in point.lambda.iter_mut().zip(0..) {
             *lambda = lambda.clamp(self.bounds.lower[j], self.bounds.upper[j]);
         }

@@ -39,6 +39,7 @@ use super::state::LagrangianState;
 use super::{Lagrangian, LagrangianContact, LagrangianScheme};
 use crate::drive::CANCELLED;
 use crate::report::{Counts, Drift, EnergyBalance, StepReport, StepStatus, Timings, worst_share};
+use crate::state::is_rest;
 use crate::{Directions, SimulateError};
 
 /// All memory of a simulation that is not its state.
@@ -426,7 +427,10 @@ impl<const D: usize> Tools<D> {
     ) {
         let size = system.size();
         state.q.clone_from(&self.motion.end);
-        state.v.clone_from(&self.motion.v);
+        match is_rest(&self.motion.v) {
+            true => state.v.fill(0.0),
+            false => state.v.clone_from(&self.motion.v),
+        }
         state.t += h;
         state.steps += 1;
         let memory = &mut state.memory;

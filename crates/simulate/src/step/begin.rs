@@ -10,7 +10,7 @@ use crate::detect::Detector;
 use crate::joints::Joints;
 use crate::moving::Moving;
 use crate::rotation::{Pose, cayley, inverse};
-use crate::state::State;
+use crate::state::{State, or_rest};
 use crate::world::oscillation;
 use crate::{Body, Dimension, Force, Geometry, Motion, World, Wrenches};
 
@@ -116,8 +116,8 @@ impl Start {
             // What a force would do across the plane is taken by the plane.
             (push[2], twist[0], twist[1]) = (0.0 * push[2], 0.0 * twist[0], 0.0 * twist[1]);
         }
-        let omega = apply(&start.r, state.spin[k]);
-        let spin = if built.isotropic { omega } else { state.spin[k] };
+        let (v, spin) = (or_rest(state.velocity[k]), or_rest(state.spin[k]));
+        let spin = if built.isotropic { apply(&start.r, spin) } else { spin };
         *b = Moving {
             owner: k as u32,
             free,
@@ -127,7 +127,7 @@ impl Start {
             inverse: built.inverse,
             radius: built.reach.max(built.size),
             start,
-            v: state.velocity[k],
+            v,
             spin,
             push: scale(h, push),
             twist: scale(h, twist),
@@ -138,7 +138,7 @@ impl Start {
             angular: [0.0; 3],
             frame: [[0.0; 3]; 3],
             frame_end: [[0.0; 3]; 3],
-            v_new: state.velocity[k],
+            v_new: v,
             spin_new: spin,
             v_free: [0.0; 3],
             spin_free: [0.0; 3],
@@ -151,7 +151,7 @@ impl Start {
             Motion::Fixed => {}
             Motion::Surface { linear, angular } => (b.linear, b.angular) = ([linear; 2], angular),
             Motion::Free => {
-                speed = norm(sub(b.v, cell)) + norm(omega) * built.reach;
+                speed = norm(sub(b.v, cell)) + norm(spin) * built.reach;
                 for (pose, part) in [(&mut b.middle, 0.5), (&mut b.end, 1.0)] {
                     if turns {
                         let (x, q) = advanced(state, k, part * h);

@@ -174,5 +174,8 @@ fn what_elastic_boxes_do_not_do_is_an_error_by_name() {
     assert!(error.contains("`floor` and `block`"), "{error}");
     let rolling = FLOOR.replace("mu = 0.5", "mu = 0.5\nmu_rolling = 0.1");
     let error = scene(&[time, &rolling, BLOCK].concat()).build().map(drop).unwrap_err().to_string();
-    assert!(error.contains("mu_rolling"), "{error}");
+    assert!(error.starts_with("pairs[0].mu_rolling: expected 0, for elastic[0]"), "{error}");
+    let all = [time, "\n[pairs_default]\nmu_rolling = 0.1", FLOOR, BLOCK].concat();
+    let error = scene(&all).build().map(drop).unwrap_err().to_string();
+    assert!(error.starts_with("pairs_default.mu_rolling: expected 0"), "{error}");
 }

@@ -159,3 +159,15 @@ fn a_stack_with_restitution_stays_at_rest() {
         }
     }
 }
+
+/// What moves so slowly that the squares of its velocity are no normal numbers is at rest.
+#[test]
+fn balls_slower_than_their_energy_can_say_rest() {
+    for speed in [1e-60, 1e-90, 1e-140, 1e-160, 1e-191, 1e-300, f64::MIN_POSITIVE, 5e-324] {
+        let world = chain(weightless(0.3, 0.5), &[1.0, 2.0], [0.0, 0.0], speed);
+        let mut simulation = Simulation::new(world, MoreauJean::default()).unwrap();
+        let report = simulation.run(0.01, 1e-3, &mut ()).unwrap();
+        assert!(report.is_solved(), "{speed:e}: {report}");
+        assert!(v(&simulation, BodyId(1))[2].abs() <= speed);
+    }
+}
