@@ -63,8 +63,10 @@ impl Hull {
             if corners.len() < 3 {
                 continue;
             }
-            let area = area(&corners, at);
-            if norm(area) > (WELD * size) * size {
+            let (area, first) = (area(&corners, at), at(corners[0]));
+            let length = corners.iter().map(|&k| norm(sub(at(k), first))).fold(0.0, f64::max);
+            // A small face that is no sliver may be all that separates two bodies.
+            if norm(area) > WELD * size * length {
                 loops.push((corners, area));
             }
         }

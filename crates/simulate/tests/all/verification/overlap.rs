@@ -1,6 +1,6 @@
 //! Bodies that overlap: at the start, where they are refused or moved apart, and in the course of a run.
 
-use nonsmooth_scenes::Rotation;
+use nonsmooth_scenes::{Polyhedron, Rotation};
 use nonsmooth_simulate::{
     Body, MoreauJean, Shape, SimulateError, Simulation, StepStatus, World, plane,
 };
@@ -80,4 +80,42 @@ fn what_is_deep_inside_keeps_the_normal_that_it_had() {
     let contact = simulation.contacts()[0];
     near(contact.frame[0][2], 1.0, 1e-12);
     near(contact.impulse[0], 1.0, 1e-9);
+}
+
+/// Two pyramids cut off near their tips, on each other with the small faces that are left: nothing else separates them.
+#[test]
+fn bodies_that_touch_with_a_small_face_do_not_overlap() {
+    let mut rng = rand_pcg::Pcg64::seed_from_u64(3);
+    for cut in [1e-2, 1e-4, 5e-6, 3e-6, 1e-7] {
+        for _ in 0..20 {
+            let mut world = weightless(0.3, 0.0);
+            for side in [-1.0, 1.0] {
+                let first = rng.random_range(0.0..6.28);
+                let radius = rng.random_range(0.5..3.0);
+                let mut vertices: Vec<[f64; 3]> = vec![];
+                for k in 0..3 {
+                    let turn = first + 2.094 * f64::from(k) + rng.random_range(-0.4..0.4);
+                    vertices.push([radius * f64::cos(turn), radius * f64::sin(turn), side]);
+                }
+                let share = cut / (1.0 + cut);
+                for k in 0..3 {
+                    vertices.push([share * vertices[k][0], share * vertices[k][1], 0.0]);
+                }
+                let mut faces = vec![
+                    vec![2, 1, 0],
+                    vec![3, 4, 5],
+                    vec![0, 1, 4, 3],
+                    vec![1, 2, 5, 4],
+                    vec![2, 0, 3, 5],
+                ];
+                if side > 0.0 {
+                    faces.iter_mut().for_each(|f| f.reverse());
+                }
+                let solid = Polyhedron::new(vertices, faces).unwrap();
+                world.add(Body::solid(solid, 1.0).unwrap());
+            }
+            let made = Simulation::new(world, MoreauJean::default());
+            assert!(made.is_ok(), "{cut:e}: {}", made.err().unwrap());
+        }
+    }
 }
