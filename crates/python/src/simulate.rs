@@ -5,6 +5,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use nonsmooth_io::ProblemFile;
 use nonsmooth_io::trajectory::{Checkpoint, Contact, Frame, Step as Stepped, Trajectory};
@@ -50,13 +51,39 @@ pub fn read_scene(py: Python<'_>, path: PathBuf) -> PyResult<(String, Vec<String
 /// A picture of a scene as it begins, SVG.
 #[pyfunction]
 pub fn draw(py: Python<'_>, scene: &str) -> PyResult<String> {
-    let scene = SceneFile::parse(scene, &[]).map_err(mistake)?;
-    py.detach(|| {
-        let simulation = scene.build().map_err(mistake)?;
+    let scene = Arc::new(SceneFile::parse(scene, &[]).map_err(mistake)?);
+    let simulation = built(py, &scene, false)?;
+    py.detach(move || {
         let mut trajectory = nonsmooth_record::begun(&scene, &simulation);
         trajectory.frames.push(nonsmooth_record::frame(&simulation));
         drawn(&trajectory, &scene, simulation.world(), 0)
     })
+}
+
+/// The simulation of a scene, made on another thread: Ctrl-C ends that.
+fn built(
+    py: Python<'_>,
+    scene: &Arc<SceneFile>,
+    settle: bool,
+) -> PyResult<nonsmooth_simulate::Simulation> {
+    let watcher = Arc::new(Watcher::default());
+    let limits =
+        nonsmooth_solve::Limits { cancel: Some(watcher.stop.clone()), ..Default::default() };
+    let scene = scene.clone();
+    let hear = |_: Option<()>| ask(&watcher, |_| Ok(false));
+    let made = py.detach(|| {
+        elsewhere(hear, move |_| {
+            let _scope = limits.budget(Instant::now()).enter();
+            match settle {
+                true => scene.build_settled().map(|(made, _)| made),
+                false => scene.build(),
+            }
+        })
+    });
+    match watcher.fault() {
+        Some(fault) => Err(fault),
+        None => made.map_err(mistake),
+    }
 }
 
 fn drawn(
@@ -101,13 +128,9 @@ impl Simulation {
     /// The simulation of a scene, a JSON document; `settle` moves bodies apart that overlap.
     #[new]
     fn new(py: Python<'_>, scene: &str, settle: bool) -> PyResult<Self> {
-        let scene = SceneFile::parse(scene, &[]).map_err(mistake)?;
-        let made = py.detach(|| match settle {
-            true => scene.build_settled().map(|(made, _)| made),
-            false => scene.build(),
-        });
-        let inner = Mutex::new(Some(made.map_err(mistake)?));
-        Ok(Self { inner, scene: Arc::new(scene) })
+        let scene = Arc::new(SceneFile::parse(scene, &[]).map_err(mistake)?);
+        let inner = Mutex::new(Some(built(py, &scene, settle)?));
+        Ok(Self { inner, scene })
     }
 
     /// The time, s.

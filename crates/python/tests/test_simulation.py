@@ -80,6 +80,15 @@ def test_ctrl_c_ends_a_run():
     assert simulation.t > 0
 
 
+def test_ctrl_c_ends_the_making_of_a_world():
+    world = ns.World()
+    world.pair("default", mu=0.3)
+    world.generate("polyhedra", count=50_000)
+    threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        ns.Simulation(world, h=1e-3)
+
+
 def test_a_pendulum_has_its_period():
     world = ns.World()
     bob = world.sphere(0.01, mass=1.0, inertia=[1e-6, 1e-6, 1e-6], position=[0.01, 0, -1.0])

@@ -1,5 +1,6 @@
 //! A caller's mistake in a world or in how it is to be stepped.
 
+use nonsmooth_linalg::budget;
 use nonsmooth_scenes::SceneError;
 use nonsmooth_solve::SolveError;
 
@@ -53,6 +54,11 @@ pub enum SimulateError {
         /// What was found.
         found: String,
     },
+}
+
+/// Whether the limits in force let the making of a simulation go on.
+pub(crate) fn within_limits() -> Result<(), SimulateError> {
+    if budget::over() { Err(SceneError::Stopped.into()) } else { Ok(()) }
 }
 
 /// Two bodies that overlap.

@@ -1,14 +1,13 @@
 //! A world in motion.
 
 use nonsmooth_problem::{Friction, FrictionLocal};
-use nonsmooth_scenes::SceneError;
 use nonsmooth_scenes::vec3::{Vec3, add, cross, norm, sub};
 use nonsmooth_solve::settings::SettingsMap;
 use nonsmooth_solve::{Limits, registry};
 
 use crate::crew::Inner;
 use crate::drive::{self, Driven, Observer};
-use crate::error::{Overlap, require};
+use crate::error::{Overlap, require, within_limits};
 use crate::projection::Projection;
 use crate::report::{ContactReport, RunReport, Settled, StepReport, StepStatus};
 use crate::state::{ElasticState, State};
@@ -143,10 +142,11 @@ impl Simulation {
     /// Sets a world in motion, its contact problems solved by `auto` to 1e-10.
     ///
     /// Errors: those of [`World::validate`]; settings of the scheme that are not possible; pairs of shapes that may meet and are not
-    /// supported; bodies that overlap by more than 1e-6 of their size, all of them listed.
+    /// supported; bodies that overlap by more than 1e-6 of their size, all of them listed; [`SceneError::Stopped`](nonsmooth_scenes::SceneError::Stopped) where the
+    /// limits in force ([`nonsmooth_linalg::budget`]) ended it.
     pub fn new(world: World, scheme: MoreauJean) -> Result<Self, SimulateError> {
         let mut simulation = Self::placed(world, scheme)?;
-        match simulation.overlaps() {
+        match simulation.overlaps()? {
             pairs if pairs.is_empty() => Ok(simulation),
             pairs => Err(SimulateError::Overlap(pairs)),
         }
@@ -165,7 +165,7 @@ impl Simulation {
         let rest = simulation.world.at_rest();
         let mut tools = Tools::new(&rest, &simulation.state)?;
         loop {
-            let pairs = simulation.overlaps();
+            let pairs = simulation.overlaps()?;
             let depth = pairs.iter().map(|p| p.depth).fold(0.0, f64::max);
             if settled.rounds == 0 {
                 (settled.pairs, settled.depth) = (pairs.len(), depth);
@@ -175,10 +175,6 @@ impl Simulation {
             }
             if settled.rounds == Self::SETTLING {
                 return Err(SimulateError::Overlap(pairs));
-            }
-            // Who stops the making of a world does not want a hundred rounds that are cut short.
-            if nonsmooth_linalg::budget::over() {
-                return Err(SceneError::Stopped.into());
             }
             settled.rounds += 1;
             let Self { state, solver, settings, limits, .. } = &mut simulation;
@@ -252,11 +248,14 @@ impl Simulation {
     }
 
     /// Pairs of bodies that overlap by more than they may at the start.
-    fn overlaps(&mut self) -> Vec<Overlap> {
+    ///
+    /// Errors: limits that are over, which cut detection short.
+    fn overlaps(&mut self) -> Result<Vec<Overlap>, SimulateError> {
         let Self { world, state, tools, .. } = self;
         let found = tools.overlaps(world, state, OVERLAP);
         let name = |k: u32| world.label(k as usize);
-        found.iter().map(|&(a, b, depth)| Overlap { a: name(a), b: name(b), depth }).collect()
+        within_limits()?;
+        Ok(found.iter().map(|&(a, b, depth)| Overlap { a: name(a), b: name(b), depth }).collect())
     }
 
     /// With contact problems solved by the solver of this name, with these settings.

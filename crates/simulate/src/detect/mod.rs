@@ -33,11 +33,13 @@ mod surfaces;
 mod turned;
 mod witness;
 
+use nonsmooth_linalg::budget;
 use nonsmooth_scenes::Polyhedron;
 use nonsmooth_scenes::vec3::{Vec3, add, scale, sub};
 
 use crate::crew::Crew;
 use crate::elastic::{Foot, Nodes};
+use crate::error::within_limits;
 use crate::periodic::{Image, Pair};
 use crate::rotation::Pose;
 use crate::state::{Axis, State};
@@ -224,6 +226,7 @@ impl Detector {
         let mut solids = vec![];
         let mut names = vec![];
         for (k, body) in world.bodies.iter().enumerate() {
+            within_limits()?;
             for (s, part) in body.parts.iter().enumerate() {
                 let pose = Pose { x: part.position, r: part.rotation.matrix() };
                 let hull = |p: &Polyhedron| Solid::Hull(Box::new(Hull::new(p, &pose)));
@@ -339,7 +342,8 @@ impl Detector {
 
     /// All points where two bodies that may touch are within the sum of their margins (m, one a body), by key. The axes that separate polyhedra are left in
     /// the memory of the state, the feet of nodes on faces of other elastic solids in `feet`: these are bodies that count on where nodes end.
-    /// Shapes and pairs are cut into consecutive parts for the threads of the crew: what is found is the same for any number.
+    /// Shapes and pairs are cut into consecutive parts for the threads of the crew: what is found is the same for any number. Where the limits in force
+    /// ([`budget`]) are over nothing is found and the state stays: whoever asked looks at them, too.
     pub fn detect(
         &mut self,
         world: &World,
@@ -367,6 +371,11 @@ impl Detector {
                 this.find((world, t), margins, &this.pairs[share * k..end], known, finder);
             }
         });
+        if budget::over() {
+            out.clear();
+            self.finders = finders;
+            return;
+        }
         if let [only] = &mut finders[..used] {
             std::mem::swap(out, &mut only.found);
             std::mem::swap(&mut self.axes, &mut only.axes);
@@ -396,6 +405,9 @@ impl Detector {
         let mut last = known.partition_point(|k| k.0 < start);
         let (mut bodies, mut may) = ((u32::MAX, u32::MAX, [0; 3]), false);
         for &pair in pairs {
+            if budget::over() {
+                return;
+            }
             let Pair { first: i, second: j, image } = pair;
             let (p, q) = (self.solids[i as usize].body, self.solids[j as usize].body);
             if (p, q, image) != bodies {

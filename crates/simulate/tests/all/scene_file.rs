@@ -935,3 +935,20 @@ fn a_family_that_was_made_is_not_made_again() {
     scene.generate[0].set.insert("rows".into(), 3.into());
     assert!(top(&scene) < 5.0);
 }
+
+/// Limits that are over end the making of a simulation: shapes, and the search for overlaps.
+#[test]
+fn limits_end_the_making_of_a_simulation() {
+    use nonsmooth_linalg::budget::Budget;
+    use nonsmooth_scenes::SceneError;
+    use nonsmooth_simulate::SimulateError;
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
+
+    let scene = SceneFile::parse(SCENE, &[]).unwrap();
+    let flag = Arc::new(AtomicBool::new(true));
+    let _scope = Budget { cancel: Some(flag), ..Budget::default() }.enter();
+    let stopped = SimulateError::Scene(SceneError::Stopped);
+    assert_eq!(scene.build().map(drop).unwrap_err(), stopped);
+    assert_eq!(scene.build_settled().map(drop).unwrap_err(), stopped);
+}
