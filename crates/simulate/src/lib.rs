@@ -42,6 +42,7 @@ mod planar;
 mod polygon;
 mod projection;
 mod report;
+mod restitution;
 mod rolling;
 pub mod rotation;
 pub mod scene_file;

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::SimulateError;
 use crate::error::require;
+use crate::restitution::Rule;
 
 /// Moreau–Jean's θ-scheme for rigid bodies; the mathematics stands at the head of `step/mod.rs`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -134,6 +135,11 @@ impl MoreauJean {
     /// `θ new + (1 − θ) old`.
     pub(crate) fn mean(&self, old: Vec3, new: Vec3) -> Vec3 {
         add(scale(self.theta, new), scale(1.0 - self.theta, old))
+    }
+
+    /// What contacts do at an impact, and limits of joints, which know no threshold.
+    pub(crate) fn restitution(&self) -> [Rule; 2] {
+        [self.restitution_threshold, 0.0].map(|u| Rule::new(self.impact, self.theta, u))
     }
 
     /// Checks every value.

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! equations, springs, drivers:   c = Gᵀ v_θ + b,   0 = c + κ λ        on the mean velocity, with G at the extrapolated midpoint: second order, exact in energy
-//! limits:                        c = Gᵀ (v⁺ + e v_k),   0 ≤ λ ⟂ c ≥ 0     where the forecast closes them
+//! limits:                        c = Gᵀ (v⁺ + e v_k),   0 ≤ λ ⟂ c ≥ 0     where the forecast closes them, e as in `restitution.rs`
 //! motors, dry friction:          c = Gᵀ v⁺ − target,   −c ∈ N_[−h F, h F](λ)
 //! spring k, damper d:            κ = 1/(h (d + h θ k)),   b = k (s_k − rest)/(d + h θ k):    λ = −h (k (s_k + h θ s'_θ − rest) + d s'_θ)
 //! ```
@@ -14,6 +14,7 @@ use nonsmooth_scenes::vec3::{Vec3, apply, cross, dot, norm, scale, sub};
 use super::equations::{Equation, Linkage, Placed, Reach, coupled};
 use super::{Coordinate, Drive, JointId, JointLimits, JointReport, Motor, Spring};
 use crate::moving::Moving;
+use crate::restitution::{Restitution, Rule};
 use crate::rotation::Pose;
 use crate::state::State;
 use crate::world::{entry, oscillation};
@@ -40,13 +41,25 @@ pub(crate) struct ScalarRow {
     levers: (u32, u32),
     pub bounds: [f64; 2],
     pub compliance: f64,
-    /// Whether the velocity is the mean one.
-    mean: bool,
+    /// The share of the velocity before the step that c has besides that after it.
+    share: f64,
     /// What bodies that are moved, targets and springs add to c.
     given: f64,
+    limit: Option<Limit>,
     /// What c has besides the velocities of free bodies after the step.
     pub shift: f64,
     pub lambda: f64,
+}
+
+/// What a limit has besides.
+#[derive(Debug, Clone, Copy)]
+struct Limit {
+    restitution: Restitution,
+    /// Its velocity before the step, and the part that bodies have which are moved.
+    before: f64,
+    moved: f64,
+    /// What a velocity of one of its bodies, m/s, makes of its own at most.
+    ease: f64,
 }
 
 /// The joints of a world, and the rows of a step.
@@ -219,13 +232,12 @@ impl Joints {
             let [angle, slide] = self.coordinates[j];
             let s = if drive.coordinate == Coordinate::Angle { angle } else { slide };
             let gap = if what == LOWER { s - limits.lower } else { limits.upper - s };
-            row.given = gap / h;
+            (row.given, row.share) = (gap / h, 0.0);
         }
     }
 
     /// The rows in the frames of this pass, which count on after so many contacts.
-    pub fn columns(&mut self, scheme: &MoreauJean, rows: &[u32], contacts: u32, bodies: &[Moving]) {
-        let share = (1.0 - scheme.theta) / scheme.theta;
+    pub fn columns(&mut self, rows: &[u32], contacts: u32, bodies: &[Moving]) {
         for &k in rows {
             let row = &mut self.rows[(k - contacts) as usize];
             let mut before = 0.0;
@@ -242,7 +254,7 @@ impl Joints {
                 }
                 before += lever.rate(b.v, b.spin);
             }
-            row.shift = row.given + if row.mean { share * before } else { 0.0 };
+            row.shift = row.given + row.share * before;
         }
     }
 
@@ -344,6 +356,20 @@ impl Joints {
     }
 }
 
+impl ScalarRow {
+    /// The coefficient with which a limit hits its island; what is slower than `rest`, m/s, does not.
+    pub fn hit(&self, rest: f64, rule: Rule) -> f64 {
+        self.limit.map_or(0.0, |l| l.restitution.hit(l.before, rest * l.ease, rule))
+    }
+
+    /// Takes the restitution of a limit into its law; `hit` is the largest coefficient of an impact in its island.
+    pub fn rebound(&mut self, hit: f64, rule: Rule) {
+        let Some(limit) = self.limit else { return };
+        self.share = limit.restitution.share(limit.before, hit, rule);
+        self.given += self.share * limit.moved;
+    }
+}
+
 impl Lever {
     fn of(r: &Reach) -> Self {
         let (row, solved) = ([0.0; 6], [0.0; 6]);
@@ -420,17 +446,19 @@ struct Wanted {
     compliance: f64,
     mean: bool,
     given: f64,
+    /// Of a limit e.
+    limit: Option<f64>,
 }
 
 impl Wanted {
     fn bilateral() -> Self {
         let bounds = [f64::NEG_INFINITY, f64::INFINITY];
-        Self { bounds, compliance: 0.0, mean: true, given: 0.0 }
+        Self { bounds, compliance: 0.0, mean: true, given: 0.0, limit: None }
     }
 
     /// On the velocity after the step.
     fn end(bounds: [f64; 2], given: f64) -> Self {
-        Self { bounds, compliance: 0.0, mean: false, given }
+        Self { bounds, compliance: 0.0, mean: false, given, limit: None }
     }
 }
 
@@ -460,8 +488,8 @@ impl Step<'_> {
             let sides = [(LOWER, s - limits.lower, 1.0), (UPPER, limits.upper - s, -1.0)];
             for (what, gap, sign) in sides {
                 if gap + gamma * h * sign * rate <= 0.0 {
-                    let given = limits.e * (sign * rate).min(0.0);
-                    all.push((what, Wanted::end([0.0, f64::INFINITY], given)));
+                    let wanted = Wanted::end([0.0, f64::INFINITY], 0.0);
+                    all.push((what, Wanted { limit: Some(limits.e), ..wanted }));
                 }
             }
         }
@@ -473,6 +501,7 @@ impl Step<'_> {
                 compliance: 1.0 / (h * resistance),
                 mean: true,
                 given: stiffness * (s - rest) / resistance,
+                limit: None,
             })
         };
         let spring = drive.spring.as_ref().and_then(|s| pull(s, f64::INFINITY));
@@ -505,14 +534,16 @@ impl Step<'_> {
         levers: (u32, u32),
         wanted: Wanted,
     ) -> ScalarRow {
-        let Wanted { bounds, compliance, mean, given } = wanted;
+        let Wanted { bounds, compliance, mean, given, limit } = wanted;
         let (mut before, mut moved, mut moved_end, mut size) = (0.0, 0.0, 0.0, given.abs());
+        let mut ease = 0.0;
         for r in reach {
             let b = &self.bodies[r.body as usize];
             if b.free {
                 let (v, omega) = (b.v, b.omega(b.spin));
                 before += dot(r.force, v) + dot(r.moment, omega);
                 size += norm(r.force) * norm(v) + norm(r.moment) * norm(omega);
+                ease = f64::max(ease, norm(r.force) + norm(r.moment) / b.radius);
             } else {
                 let (mean, end) = self.moved(r.body as usize);
                 moved += dot(r.force, mean);
@@ -523,14 +554,21 @@ impl Step<'_> {
         let fits = compliance > 0.0 || (before + moved + given).abs() <= UNFIT * size;
         let mean = mean && fits;
         let theta = self.scheme.theta;
-        let (given, compliance) = match mean {
-            true => ((moved + given) / theta, compliance / theta),
-            false => (moved_end + given, compliance),
+        let (given, share, compliance) = match mean {
+            true => ((moved + given) / theta, (1.0 - theta) / theta, compliance / theta),
+            false => (moved_end + given, 0.0, compliance),
         };
+        let limit = limit.map(|e| Limit {
+            // Impulses and velocities have one direction, so nothing opens but what something moves.
+            restitution: Restitution::new(e, false, false),
+            before: before + moved,
+            moved,
+            ease,
+        });
         let [l, u] = bounds;
         let memory = &self.state.memory;
         let lambda = (memory.scaled(self.h) * memory.impulse(key)).clamp(l, u);
-        ScalarRow { key, levers, bounds, compliance, mean, given, shift: given, lambda }
+        ScalarRow { key, levers, bounds, compliance, share, given, limit, shift: given, lambda }
     }
 
     /// The rate of a row at the beginning.

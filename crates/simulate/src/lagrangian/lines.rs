@@ -7,6 +7,7 @@ use super::gradients::{Gradients, dot, given};
 use super::state::LagrangianState;
 use super::{Lagrangian, LagrangianScheme, RelationsAt, RowLaw};
 use crate::error::require;
+use crate::restitution::Restitution;
 use crate::{Activation, Directions, Impact, Law, SimulateError};
 
 /// A line that takes part in the step: its impulse acts along the gradient a at the middle of the step, and the velocity in its law is stated as `s·v⁺ + offset`, where s is
@@ -21,6 +22,8 @@ pub(super) struct Line {
     pub steep: bool,
     /// A relation on the mean velocity of the step.
     pub mean: bool,
+    /// Of the normal of a contact, and of a limit.
+    restitution: Option<Restitution>,
     /// The part of its velocity that does not come from v: at the end of the step, and weighted by θ.
     pub given: f64,
     pub given_mean: f64,
@@ -57,9 +60,9 @@ pub(super) struct Lines<const D: usize> {
     given: [Vec<f64>; 2],
     pub touching: Vec<Touching>,
     pub lines: Vec<Line>,
-    /// Of each scalar line that is a limit its restitution.
-    limits: Vec<Option<f64>>,
     pub bounds: Bounds,
+    /// The largest restitution of an impact.
+    hit: f64,
     /// Whether a gap closes with more than what forces make in a step.
     pub impact: bool,
     /// M̂⁻¹ of the gradients `now`, line by line, whether that is so, and the gradients that they were made of.
@@ -139,11 +142,11 @@ impl<const D: usize> Lines<D> {
         let turning = scheme.directions != Directions::Frozen;
         self.touching.clear();
         self.lines.clear();
-        self.limits.clear();
         self.bounds.lower.clear();
         self.bounds.upper.clear();
-        (self.impact, self.warm) = (false, 0);
-        // Whether a gap takes part, whether it did in the last step and still rests there, and whether it closes with an impact.
+        (self.impact, self.warm, self.hit) = (false, 0, 0.0);
+        let rule = scheme.restitution();
+        // Whether a gap takes part, whether it did in the last step and still rests there, whether it closes with an impact, its restitution, and that as an impact.
         let unilateral = |place: usize, line: usize, gap: f64, given: f64, e: f64| {
             let rate = dot(self.start.line(line), v) + given;
             let known = memory.active.get(place).copied().unwrap_or(false);
@@ -162,7 +165,11 @@ impl<const D: usize> Lines<D> {
                 }
             };
             let closes = rate < -rest && gap + h * rate <= 0.0;
-            (active, known && (e == 0.0 || rate >= -rest), closes)
+            let persists = known && (e == 0.0 || rate >= -rest);
+            let lasts = persists && (e == 0.0 || rate <= rest);
+            let waits = scheme.activation == Activation::Gap && gap > 0.0;
+            let restitution = Restitution::new(e, lasts, waits);
+            (active, persists, closes, restitution, restitution.hit(rate, rest, rule))
         };
         for c in 0..size.contacts {
             let law = system.law(c, t, q, v);
@@ -174,11 +181,13 @@ impl<const D: usize> Lines<D> {
                 return Err(SimulateError::value(format!("law({c}).mu_r"), expected, law.mu_r));
             }
             let (gap, given) = (self.gaps[c], self.given[0][D * c]);
-            let (active, persists, impact) = unilateral(c, D * c, gap, given, law.e);
+            let (active, persists, impact, restitution, hit) =
+                unilateral(c, D * c, gap, given, law.e);
             if !active {
                 continue;
             }
             self.impact |= impact;
+            self.hit = self.hit.max(hit);
             let stuck = persists && memory.stuck.get(c).copied().unwrap_or(false);
             self.touching.push(Touching { contact: c, law, stuck });
             let old = memory.contacts.get(D * c..D * (c + 1)).unwrap_or(&[]);
@@ -187,6 +196,7 @@ impl<const D: usize> Lines<D> {
                 let impulse = scaled * old.get(i).copied().unwrap_or(0.0);
                 self.lines.push(Line {
                     later: turning && persists,
+                    restitution: (i == 0).then_some(restitution),
                     impulse,
                     ..Line::of(D * c + i)
                 });
@@ -197,7 +207,6 @@ impl<const D: usize> Lines<D> {
         let old = |k: usize| scaled * memory.scalars.get(k).copied().unwrap_or(0.0);
         for k in 0..size.relations {
             self.lines.push(Line { impulse: old(k), ..Line::of(first + k) });
-            self.limits.push(None);
             self.bounds.lower.push(f64::NEG_INFINITY);
             self.bounds.upper.push(f64::INFINITY);
         }
@@ -209,12 +218,16 @@ impl<const D: usize> Lines<D> {
                     let ok = (0.0..=1.0).contains(&e);
                     require(|| format!("row_law({k}).e"), e, ok, "a coefficient from 0 to 1")?;
                     let (gap, given) = (self.coordinates[k], self.given[0][first + k]);
-                    let (active, persists, impact) =
+                    let (active, persists, impact, restitution, hit) =
                         unilateral(size.contacts + k, index, gap, given, e);
                     if active {
                         self.impact |= impact;
-                        self.lines.push(Line { later: turning && persists, ..line });
-                        self.limits.push(Some(e));
+                        self.hit = self.hit.max(hit);
+                        self.lines.push(Line {
+                            later: turning && persists,
+                            restitution: Some(restitution),
+                            ..line
+                        });
                         self.bounds.lower.push(0.0);
                         self.bounds.upper.push(f64::INFINITY);
                     }
@@ -228,7 +241,6 @@ impl<const D: usize> Lines<D> {
                         ));
                     }
                     self.lines.push(Line { later: turning, ..line });
-                    self.limits.push(None);
                     self.bounds.lower.push(h * lower);
                     self.bounds.upper.push(h * upper);
                 }
@@ -261,7 +273,7 @@ impl<const D: usize> Lines<D> {
             system.relations(t, place, phi);
         }
         let span = times[1] - times[0];
-        let Self { now, end, given, phi, lines, touching, limits, gaps, coordinates, .. } = self;
+        let Self { now, end, given, phi, lines, touching, gaps, coordinates, hit, .. } = self;
         for line in lines.iter_mut() {
             let a = now.line(line.index);
             line.before = dot(a, &state.v);
@@ -277,28 +289,25 @@ impl<const D: usize> Lines<D> {
             line.given = given[1][k];
             line.given_mean = theta * given[1][k] + (1.0 - theta) * given[0][k];
         }
-        let normal = |gap: f64, e: f64, before: f64| {
-            let waiting = scheme.activation == Activation::Gap;
-            let bounces = (!waiting || gap <= 0.0) && before < -scheme.restitution_threshold;
+        let rule = scheme.restitution();
+        let waiting = scheme.activation == Activation::Gap;
+        for line in lines.iter_mut() {
+            let Some(restitution) = line.restitution else { continue };
+            let gap = match line.index.checked_sub(first + size.relations) {
+                Some(row) => coordinates[row],
+                None => gaps[line.index / D],
+            };
             let wait = if waiting { gap.max(0.0) / h } else { 0.0 };
-            wait + if bounces { e * before } else { 0.0 }
-        };
+            line.shift = wait + restitution.share(line.before, *hit, rule) * line.before;
+        }
         for (touch, lines) in touching.iter().zip(lines.chunks_exact_mut(D)) {
             let tangential = match scheme.impact {
                 Impact::Fremond if touch.stuck => 0.0,
                 Impact::Fremond => (1.0 - theta) / theta,
                 Impact::Newton => touch.law.e_t,
             };
-            lines[0].shift = normal(gaps[touch.contact], touch.law.e, lines[0].before);
             for line in &mut lines[1..] {
                 line.shift = tangential * line.before;
-            }
-        }
-        let scalars = lines[D * touching.len()..].iter_mut().zip(limits.iter());
-        for (line, limit) in scalars {
-            if let Some(e) = limit {
-                let gap = coordinates[line.index - first - size.relations];
-                line.shift = normal(gap, *e, line.before);
             }
         }
         let alone = lines.len() == size.relations && scheme.directions != Directions::Frozen;
@@ -347,10 +356,7 @@ impl<const D: usize> Lines<D> {
 
     /// The normals of the contacts and the limits that take part, among all lines.
     pub fn unilateral(&self) -> impl Iterator<Item = usize> + '_ {
-        let nc = self.touching.len();
-        let normals = self.touching.iter().map(|t| D * t.contact);
-        let scalars = self.lines[D * nc..].iter().zip(&self.limits);
-        normals.chain(scalars.filter(|(_, limit)| limit.is_some()).map(|(line, _)| line.index))
+        self.lines.iter().filter(|line| line.restitution.is_some()).map(|line| line.index)
     }
 
     /// The velocity of a line after the step, without what its law adds.
@@ -367,6 +373,7 @@ impl Line {
             later: false,
             steep: false,
             mean: false,
+            restitution: None,
             given: 0.0,
             given_mean: 0.0,
             before: 0.0,

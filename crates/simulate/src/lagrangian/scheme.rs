@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::require;
+use crate::restitution::Rule;
 use crate::{Activation, Impact, SimulateError};
 
 /// Moreau–Jean's θ-scheme for Lagrangian systems; the mathematics stands at the head of `lagrangian/step.rs`.
@@ -75,6 +76,11 @@ pub enum RelationsAt {
 }
 
 impl LagrangianScheme {
+    /// What gaps do at an impact.
+    pub(super) fn restitution(&self) -> Rule {
+        Rule::new(self.impact, self.theta, self.restitution_threshold)
+    }
+
     /// Checks every value.
     pub(super) fn validate(&self) -> Result<(), SimulateError> {
         let key = |name: &'static str| move || format!("scheme.{name}");

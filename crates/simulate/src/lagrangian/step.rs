@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! R(v⁺) = M(q_*) (v⁺ − v_k) − h F_θ = H(q_*) r + G(q_*) λ,
-//! K* ∋ u⁺ + w + mu‖u_T⁺ + w_T‖ e_N  ⟂  r ∈ K,   w_N = e min(u_{N,k}, 0),   w_T = e_T u_{T,k}    for contacts with g_k + γ h u_{N,k} ≤ 0, r = 0 elsewhere,
+//! K* ∋ u⁺ + w + mu‖u_T⁺ + w_T‖ e_N  ⟂  r ∈ K,   w_N = e min(u_{N,k}, 0) ([`crate::restitution`]),   w_T = e_T u_{T,k}    for contacts with g_k + γ h u_{N,k} ≤ 0, r = 0 elsewhere,
 //! Gᵀ(q_*) v_θ + ∂φ/∂t = 0  (or Gᵀ(q⁺) v⁺ + ∂φ/∂t = 0)   for relations,       −c_j ∈ N_[h l_j, h u_j](λ_j)   for scalar rows.
 //! ```
 //!

@@ -8,6 +8,7 @@ use super::{NONE, Stride, Tools};
 use crate::cut::Cut;
 use crate::detect::{Key, Near, Place};
 use crate::moving::Moving;
+use crate::restitution::Restitution;
 use crate::rotation::Pose;
 use crate::state::{Remembered, State};
 use crate::{Activation, Compliance, Dimension, Geometry, Impact};
@@ -54,8 +55,7 @@ pub(super) struct Row {
     pub before: [f64; 3],
     /// What the law adds to u⁺.
     pub shift: [f64; 3],
-    /// Its restitution in an impact, and as it opens.
-    e: [f64; 2],
+    restitution: Restitution,
     pub r: [f64; 3],
     /// Of rolling friction: the coefficient, the moments, and the given angular velocity of what is moved, in the law and in the energy.
     pub mu_r: f64,
@@ -316,23 +316,18 @@ impl<'a> Meeting<'a> {
             false => law.e_t,
         };
         row.shift = [0.0, share * before[1], share * before[2]];
-        // Restitution on approach only, and in the gap's form only where it is closed.
-        let closed = scheme.activation != Activation::Gap || gap <= 0.0;
-        if closed && before[0] < -scheme.restitution_threshold {
-            row.shift[0] = law.e * before[0];
-        }
-        if near.compliance.is_none() {
-            // What lasts opens by as much as a surface is curved.
-            let opens = !lasting && before[0] > scheme.restitution_threshold;
-            row.e = [law.e, if opens { law.e } else { 0.0 }];
-        }
         if let Some(Compliance { stiffness, damping }) = near.compliance {
             let resistance = damping + h * stiffness;
             row.shift[0] = stiffness * gap / resistance;
             row.compliance = 1.0 / (h * resistance);
-        } else if scheme.activation == Activation::Gap {
-            row.shift[0] += gap.max(0.0) / h;
+            return;
         }
+        let waits = scheme.activation == Activation::Gap && gap > 0.0;
+        if waits {
+            row.shift[0] = gap / h;
+        }
+        // What lasts opens by as much as a surface is curved.
+        row.restitution = Restitution::new(law.e, lasting, waits);
     }
 }
 
@@ -450,35 +445,30 @@ impl Tools {
         });
         self.joints.begin(stride.scheme, stride.world, state, &self.bodies, stride.h);
         self.join();
-        self.give_way(stride);
+        self.rebound(stride);
     }
 
-    /// Lets contacts that open give way to what presses them: `u⁺ ≥ −c u_k` where `u_k > 0`.
-    ///
-    /// What has rebounded is still in the index set, for positions lag behind velocities by half a step, and another body may hit it there. Did the law ask for
-    /// u⁺ ≥ 0, the impulse would act on what opens, with a work of ½ (u⁺ + u_k) r that nothing takes back. With s what the law adds to u⁺ and without friction
-    /// `2 (T⁺ − T) = Σ (u_k − s) r` and `Σ (u_k + s) r = −rᵀ W r`, so energy cannot grow where `s = c u_k` of all that open and `|s| ≤ c |u_k|` of all that
-    /// approach: c is the largest e among the impacts of the island, and at least the contact's own unless it lasts. So what rests or rolls keeps `u⁺ ≥ 0`
-    /// until something hits it, and as c ≤ 1 no gap closes at θ = ½. Frémond's law, by which each contact dissipates by itself, then asks for u_θ ≥ 0.
-    fn give_way(&mut self, stride: Stride) {
-        let Self { rows, islands, impacts, .. } = self;
-        let scheme = stride.scheme;
-        let impact = -stride.rest().max(scheme.restitution_threshold);
-        let least = match scheme.impact {
-            Impact::Newton => 0.0,
-            Impact::Fremond => (1.0 - scheme.theta) / scheme.theta,
-        };
+    /// Adds restitution to the laws of contacts and limits, with the largest e among the impacts of each island.
+    fn rebound(&mut self, stride: Stride) {
+        let Self { rows, joints, islands, impacts, .. } = self;
+        let ([rule, of_limits], rest) = (stride.scheme.restitution(), stride.rest());
         impacts.clear();
         impacts.resize(islands.ends.len(), 0.0);
-        for (row, &k) in rows.iter().zip(&islands.of_item).filter(|r| r.0.before[0] < impact) {
+        let (of_rows, of_joints) = islands.of_item.split_at(rows.len());
+        for (row, &k) in rows.iter().zip(of_rows) {
             let most = &mut impacts[k as usize];
-            *most = most.max(row.e[0]);
+            *most = most.max(row.restitution.hit(row.before[0], rest, rule));
         }
-        for (row, &k) in rows.iter_mut().zip(&islands.of_item) {
-            let c = impacts[k as usize].max(row.e[1]);
-            if row.before[0] > 0.0 && row.compliance == 0.0 && c > 0.0 {
-                row.shift[0] += c.max(least) * row.before[0];
-            }
+        for (row, &k) in joints.rows.iter().zip(of_joints) {
+            let most = &mut impacts[k as usize];
+            *most = most.max(row.hit(rest, of_limits));
+        }
+        for (row, &k) in rows.iter_mut().zip(of_rows).filter(|r| r.0.compliance == 0.0) {
+            let u = row.before[0];
+            row.shift[0] += row.restitution.share(u, impacts[k as usize], rule) * u;
+        }
+        for (row, &k) in joints.rows.iter_mut().zip(of_joints) {
+            row.rebound(impacts[k as usize], of_limits);
         }
     }
 

@@ -16,7 +16,7 @@
 //! local problems in r by sessions of the project's solvers ([`crate::crew`]), judged by the problem's own judge. Gyroscopic torque and the frames of torques are those of the last
 //! pass; with the impulses found each body's rotation is solved exactly, and where that moves no velocity by more than the tolerance, the step is done.
 //! A large island that is slow and whose contacts are new is first asked whether it may stay at rest ([`crate::crew`]): a pile that can stand stands.
-//! What rests or rolls has w_N = 0 while it opens, until an impact in its island gives it e (`Tools::give_way`).
+//! What rests or rolls has w_N = 0 while it opens, until an impact in its island gives it e ([`crate::restitution`]).
 //! A persistent contact has the velocity in its law at the extrapolated end of the step. Frémond's law has `w_T = (1 − θ)/θ u_{T,k}`: u_θ in place of u⁺.
 //!
 //! References: Moreau1988 and Jean1999 for the scheme, Acary2016 for its energy, SimoWong1991 for the rotation, Acary2018 for the index set.

@@ -208,7 +208,7 @@ impl Tools {
         if !joints.rows.is_empty() {
             for &k in &open.list {
                 let scalars = scalars(islands, rows.len(), k as usize);
-                joints.columns(scheme, scalars, rows.len() as u32, bodies);
+                joints.columns(scalars, rows.len() as u32, bodies);
             }
         }
         if !solids.is_empty() {

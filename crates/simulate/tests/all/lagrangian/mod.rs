@@ -10,6 +10,7 @@ mod patch;
 mod pendulum;
 mod rattleback;
 mod slider_crank;
+mod stops;
 mod woodpecker;
 
 use nonsmooth_linalg::Dense;

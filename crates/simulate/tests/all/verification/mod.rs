@@ -23,6 +23,7 @@ mod projection;
 mod rims;
 mod rolling;
 mod solids;
+mod stops;
 mod tops;
 
 use nonsmooth_simulate::{
