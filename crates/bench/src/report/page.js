@@ -208,11 +208,11 @@ function successFigure() {
     ...c, curves: c.shares.filter(([s]) => shows(state.view, s)).map(([solver, y]) => ({ solver, x: data.decades, y })),
   }));
   return {
-    title: "Success against tolerance, by number of contacts",
+    title: `Success against tolerance, by number of ${counted()}`,
     x: { label: "residual ε", name: "epsilon", log: true, min: 1e-3, max: 1e-14 },
     y: shareAxis("share of problems", "share"),
     stepped: false,
-    panels: classes.map(c => ({ title: `${c.size === "all" ? "all" : `${c.size} contacts`} (${c.problems})`, name: c.size, curves: c.curves })),
+    panels: classes.map(c => ({ title: `${c.size === "all" ? "all" : `${c.size} ${counted()}`} (${c.problems})`, name: c.size, curves: c.curves })),
     solvers: solversOf(classes.flatMap(c => c.curves)),
     at: x => `ε = ${toleranceText(data.decades.reduce((a, b) => (Math.abs(Math.log(b / x)) < Math.abs(Math.log(a / x)) ? b : a)))}`,
     format: share,
@@ -394,7 +394,7 @@ function buildFilters() {
       change(v => { v.kind = k; v.group = 0; });
     }) : null,
     choice("filter-tolerance", "Tolerance", tolerances.map(k => option(k, toleranceText(data.tolerances[k]))), k => change(v => { v.tolerance = k; })),
-    choice("filter-group", "Problems", [option(0, `all (${groups[0].problems})`), part("Family", familyOfGroup), part("Contacts", sizeOfGroup)]
+    choice("filter-group", "Problems", [option(0, `all (${groups[0].problems})`), part("Family", familyOfGroup), part(capital(counted()), sizeOfGroup)]
       .filter(o => o !== null), k => change(v => { v.group = k; })),
     h("fieldset", { id: "filter-solvers" }, solverList().flat()),
     h("p", { class: "line" },
@@ -420,7 +420,7 @@ function showFilters() {
   const on = solvers.filter(s => view.solvers[s]).length;
   byId("filters-state").textContent = [
     data.kinds.length > 1 ? clean(name) : "", `tolerance ${toleranceText(data.tolerances[view.tolerance])}`,
-    family === null ? "" : clean(family), size === null ? "" : `${size} contacts`,
+    family === null ? "" : clean(family), size === null ? "" : `${size} ${counted()}`,
     on < solvers.length ? `${on} of ${plural(solvers.length, "solver")} shown` : plural(on, "solver"), plural(atOf(view).problems, "problem"),
   ].filter(Boolean).join(" · ");
 }
@@ -524,7 +524,7 @@ function renderUnsolved() {
       found.length > most ? ` The first ${most} are shown; the CSV has all.` : ""}`
     : "None: every problem is solved by at least one of the solvers.";
   fill(byId("unsolved-place"), found.length ? h("table", { id: "unsolved" },
-    h("thead", {}, h("tr", {}, h("th", {}, "problem"), h("th", {}, "family"), h("th", { class: "n" }, "contacts"),
+    h("thead", {}, h("tr", {}, h("th", {}, "problem"), h("th", {}, "family"), h("th", { class: "n" }, counted()),
       h("th", { class: "n" }, "least residual"), h("th", {}, "by"))),
     h("tbody", {}, found.slice(0, most).map(([p, closest]) => h("tr", {},
       h("td", {}, problemLink(p)), cell(familyOf(p)), number(data.problems.contacts[p]),
@@ -540,13 +540,14 @@ function renderUnreadable() {
 
 // ------------------------------------------------------------------------------------------------ the table of runs
 
-// Each column: heading, the value that sorts, the text that shows; its name and value in files where they differ.
+// Each column: its name, and its heading where that depends on the kind; the value that sorts, the text that shows; its name and value in files where they differ.
+const titleOf = c => c.title?.() ?? c.name;
 const messageOf = r => (runs.message && runs.message[r] !== null ? data.messages[runs.message[r]] : "");
 const COLUMNS = [
   { name: "problem", sort: r => data.problems.name[runs.problem[r]] },
   // As a rule the family stands in the problem's name.
   { name: "family", sort: r => familyOf(runs.problem[r]), hidden: data.problems.name.every((name, p) => name.startsWith(`${familyOf(p)}/`)) },
-  { name: "contacts", n: true, sort: r => data.problems.contacts[runs.problem[r]] },
+  { name: "contacts", title: counted, n: true, sort: r => data.problems.contacts[runs.problem[r]] },
   { name: "solver", sort: r => data.solvers[runs.solver[r]].label, show: r => labelOf(runs.solver[r]) },
   { name: "tolerance", n: true, sort: r => data.tolerances[runs.tolerance[r]], show: r => toleranceText(data.tolerances[runs.tolerance[r]]) },
   { name: "ending", sort: r => runs.ending[r], show: r => endingText(data.endings[runs.ending[r]]), plain: r => data.endings[runs.ending[r]] },
@@ -604,7 +605,7 @@ function renderRuns() {
           renderRuns();
           byId("runs").querySelectorAll("thead button")[k].focus();
         },
-      }, c.name, h("span", { class: "arrow" }, mine ? (state.runs.down ? " ▼" : " ▲") : "")));
+      }, titleOf(c), h("span", { class: "arrow" }, mine ? (state.runs.down ? " ▼" : " ▲") : "")));
   });
   fill(byId("runs-place"), h("table", { id: "runs" }, h("thead", {}, h("tr", {}, heads)), h("tbody", {}, rows.map(r => h("tr", {},
     SHOWN.map((c, k) => {
@@ -629,7 +630,7 @@ function renderRuns() {
 }
 
 const runRows = found => [
-  COLUMNS.map(c => c.file ?? c.name), ...found.map(r => COLUMNS.map(c => (c.plain ?? c.sort)(r))),
+  COLUMNS.map(c => c.file ?? titleOf(c)), ...found.map(r => COLUMNS.map(c => (c.plain ?? c.sort)(r))),
 ];
 
 // ------------------------------------------------------------------------------------------------ one problem
@@ -653,7 +654,7 @@ function traceFigure(p) {
 function openProblem(p) {
   const { problems } = data;
   const facts = [
-    ["family", data.families[problems.family[p]]], ["kind", data.kinds[problems.kind[p]].name], ["contacts", problems.contacts[p]],
+    ["family", data.families[problems.family[p]]], ["kind", data.kinds[problems.kind[p]].name], [data.kinds[problems.kind[p]].counted, problems.contacts[p]],
     ["unknowns", problems.unknowns[p]], ["degrees of freedom", problems.dofs?.[p]], ["contact density", short(problems.density?.[p])],
     ["asymmetry", short(problems.asymmetry?.[p])],
     ["friction", problems.mu_min?.[p] === undefined || problems.mu_min[p] === null ? "" : problems.mu_min[p] === problems.mu_max?.[p]
@@ -672,7 +673,7 @@ function openProblem(p) {
     h("dl", {}, facts.map(([name, v]) => h("div", {}, h("dt", {}, name), h("dd", {}, clean(v))))),
     traced ? place("trace", () => traceFigure(p)) : null,
     h("div", { class: "scroll" }, h("table", {},
-      h("thead", {}, h("tr", {}, columns.map(c => h("th", { class: c.n ? "n" : null }, c.name)))),
+      h("thead", {}, h("tr", {}, columns.map(c => h("th", { class: c.n ? "n" : null }, titleOf(c))))),
       h("tbody", {}, mine.map(r => h("tr", {}, columns.map(c => cell((c.show ?? c.sort)(r), {
         class: classOf(c, r),
       }))))))));
@@ -711,7 +712,7 @@ function build() {
   fill(byId("figures"), others);
   byId("summary-buttons").replaceWith(csvButton("summary", summaryRows));
   byId("heat-buttons").replaceWith(csvButton("families", heatRows));
-  byId("unsolved-buttons").replaceWith(csvButton("unsolved", () => [["problem", "family", "contacts", "residual", "solver"],
+  byId("unsolved-buttons").replaceWith(csvButton("unsolved", () => [["problem", "family", counted(), "residual", "solver"],
     ...atOf(state.view).unsolved.map(([p, closest]) => [data.problems.name[p], familyOf(p), data.problems.contacts[p],
       closest ? closest[1] : "", closest ? labelled(closest[0]) : ""])]));
   byId("runs-buttons").replaceWith(csvButton("runs", () => runRows(listedRuns())));

@@ -29,6 +29,9 @@ const indices = flags => flags.flatMap((on, k) => (on ? [k] : []));
 // holds a truth value for each of data.solvers.
 
 const kindOf = view => data.kinds[view.kind];
+/** What the size of a problem of the kind that is shown counts: contacts, pairs, variables. */
+const counted = () => kindOf(state.view).counted;
+const capital = text => text.charAt(0).toUpperCase() + text.slice(1);
 const groupOf = view => kindOf(view).groups[view.group];
 const atOf = view => groupOf(view).at[kindOf(view).tolerances.indexOf(view.tolerance)];
 const shows = (view, s) => s === BEST || view.solvers[s];

@@ -48,6 +48,8 @@ impl Names<'_> {
 #[derive(Debug, Serialize)]
 pub struct Kind<'a> {
     name: &'a str,
+    /// What the size of a problem counts: contacts, pairs or variables.
+    counted: &'static str,
     /// Those that take a problem of the kind.
     solvers: Vec<isize>,
     /// Those that were asked to and refuse all.
@@ -180,6 +182,7 @@ fn of_kind<'a>(runs: &'a Runs, names: &Names, kind: &'a str) -> Kind<'a> {
     let all = runs.tolerances();
     Kind {
         name: kind,
+        counted: whole.counted(),
         solvers: names.all(&whole.solvers(&mine)),
         refusing: names.all(&whole.refusing(&mine)),
         epsilons: epsilons(&mine),

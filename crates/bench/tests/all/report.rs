@@ -464,6 +464,10 @@ fn kinds_stay_apart_refusals_cost_nothing_and_proofs_count() {
         ])
     );
     assert_eq!(column(&mut browser, "unsolved", 0), json!([]));
+    // Sizes are called what they are of this kind.
+    let words = "[document.querySelector('#runs thead').textContent, report.svg('success'), \
+                 document.querySelector('#filter-group').textContent].map(t => [/contacts/i.test(t), /pairs/.test(t)])";
+    assert_eq!(browser.value(words), json!([[false, true], [false, true], [false, false]]));
     // A proof is an answer at any tolerance, from its end on.
     let data = shown(&mut browser, &json!({"kind": "lcp", "epsilon": 1e-14}), "data-profile");
     assert_near(&curve(&data, "lemke")["x"], &[2.0], "a proof");
