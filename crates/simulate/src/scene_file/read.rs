@@ -102,14 +102,26 @@ impl SceneFile {
 
     /// The JSON Schema of the format.
     pub fn schema() -> serde_json::Value {
-        schemars::schema_for!(SceneFile).to_value()
+        let mut schema = schemars::schema_for!(SceneFile).to_value();
+        let ways = schema.pointer_mut("/$defs/Activation/oneOf").and_then(|all| all.as_array_mut());
+        // The word that `spell_out` takes.
+        ways.into_iter().for_each(|all| {
+            all.push(serde_json::json!({
+                "const": FORECAST,
+                "description": "The forecast index set, with its default numbers.",
+            }));
+        });
+        schema
     }
 }
+
+/// The word for the forecast of contacts with its default numbers.
+const FORECAST: &str = "forecast";
 
 /// Writes the forecast of contacts out where a word asks for it, with its default numbers.
 fn spell_out(document: &mut toml::Value) {
     let activation = document.get_mut("integrator").and_then(|table| table.get_mut("activation"));
-    if let Some(activation) = activation.filter(|value| value.as_str() == Some("forecast")) {
+    if let Some(activation) = activation.filter(|value| value.as_str() == Some(FORECAST)) {
         *activation = toml::Value::try_from(Activation::default()).expect("a table of numbers");
     }
 }

@@ -329,6 +329,12 @@ fn the_schema_lists_what_is_read() {
     for key in ["bodies", "pairs_default", "half_length", "restitution_threshold"] {
         assert!(text.contains(&format!("\"{key}\"")), "{key}");
     }
+    // What may stand for a table of its own.
+    let ways = schema["$defs"]["Activation"]["oneOf"].as_array().expect("ways to say it");
+    for word in ["forecast", "gap"] {
+        assert!(ways.iter().any(|way| way["const"] == word), "{word}");
+        assert!(SceneFile::parse(SCENE, &[&format!("integrator.activation=\"{word}\"")]).is_ok());
+    }
     let shape: ShapeOrName = serde_json::from_str("\"brick\"").unwrap();
     assert_eq!(shape, ShapeOrName::Name("brick".into()));
 }
