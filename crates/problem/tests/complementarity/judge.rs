@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use dashu_int::IBig;
 use nonsmooth_linalg::{Csc, Dense, Matrix, Operator};
 use nonsmooth_problem::check::{Certificate, Judged, Measure, RowStatus};
 use nonsmooth_problem::planted::{PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp};
@@ -298,6 +299,60 @@ fn operators_are_judged_by_their_products() {
     assert!(!operator.verify(&Certificate::Row { row: 0 }));
 }
 
+/// `M = I + L`, `q = −1` with whole numbers below the diagonal, none of them positive (a K-matrix), and its solution, rounded: all variables are
+/// positive, and grow exponentially, so that their rounding alone is many units of q.
+fn growing(n: usize, below: impl Fn(usize, usize) -> i64) -> (Lcp, LcpPoint) {
+    let mut exact: Vec<IBig> = vec![];
+    for i in 0..n {
+        let terms = exact.iter().enumerate().map(|(j, z)| IBig::from(-below(i, j)) * z);
+        exact.push(terms.fold(IBig::ONE, |sum, term| sum + term));
+    }
+    let entry = |i: usize, j: usize| match j.cmp(&i) {
+        std::cmp::Ordering::Less => below(i, j) as f64,
+        std::cmp::Ordering::Equal => 1.0,
+        std::cmp::Ordering::Greater => 0.0,
+    };
+    let problem = Lcp::new(Dense::from_fn(n, n, entry), vec![-1.0; n]).unwrap();
+    (problem, LcpPoint { z: exact.iter().map(|z| z.to_f64().value()).collect() })
+}
+
+#[test]
+fn the_rounding_of_an_exact_solution_is_no_error_however_large_it_is() {
+    for n in [48, 49, 60, 150, 300] {
+        let (problem, known) = growing(n, |_, _| -2);
+        assert_eq!(known.z[n - 1], (IBig::from(3).pow(n - 1)).to_f64().value());
+        let found = measure(&problem, &known);
+        assert!(found.passes(1e-13) && found.floor.unwrap() > 1e5, "{n}: {found:?}");
+        // A few last bits, a variable too few, and one that is negative in the end.
+        for (at, factor) in [(n - 1, 1.0 + 4e-15), (n - 5, 1.0 - 4e-15), (n - 1, 0.0), (0, -1.0)] {
+            let mut wrong = known.clone();
+            wrong.z[at] *= factor;
+            assert!(!problem.judge(&wrong, 1e-3).unwrap().solved, "{n}: z_{at} times {factor}");
+        }
+    }
+    // Beyond, exact arithmetic is too dear.
+    let (problem, known) = growing(301, |_, _| -2);
+    assert!(!measure(&problem, &known).passes(1e-3));
+}
+
+#[test]
+fn exact_arithmetic_ends_with_the_budget_in_force() {
+    // Dense, so that the numbers of its elimination grow, and with terms far above q.
+    let n = 200;
+    let entry = |i: usize, j: usize| ((i * 37 + j * 91) as f64 * 0.618).sin() + 1.5;
+    let z: Vec<f64> = (0..n).map(|j| 1e20 * (1.1 + (j as f64).cos())).collect();
+    let problem = Lcp::new(Dense::from_fn(n, n, entry), vec![-1.0; n]).unwrap();
+    let ended = nonsmooth_linalg::budget::Budget {
+        deadline: Some(std::time::Instant::now()),
+        ..Default::default()
+    };
+    let scope = ended.enter();
+    let begun = std::time::Instant::now();
+    assert!(!measure(&problem, &LcpPoint { z }).passes(1e-8));
+    assert!(begun.elapsed().as_secs_f64() < 0.5, "{:?}", begun.elapsed());
+    drop(scope);
+}
+
 // ---------------------------------------------------------------------------------------------- properties
 
 fn cases() -> impl Strategy<Value = PlantedLcp> {
@@ -334,6 +389,21 @@ proptest! {
             wrong.z[i] = 0.01;
             let found = measure(&problem, &wrong);
             prop_assert!(!found.passes(1e-8), "{:?} {:?}", case, found);
+        }
+    }
+
+    #[test]
+    fn points_beside_a_rounded_solution_are_none(n in 49_usize..120, seed in any::<u64>(), at in any::<prop::sample::Index>(), bits in 3..200_i64, up in prop::bool::ANY) {
+        let digits = |i: usize, j: usize| -(((seed ^ (i * 131 + j) as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as i64 % 3);
+        let (problem, known) = growing(n, digits);
+        prop_assert!(problem.judge(&known, 1e-9).unwrap().solved);
+        let at = at.index(n);
+        let mut wrong = known.clone();
+        let step = f64::EPSILON * bits as f64;
+        wrong.z[at] *= if up { 1.0 + step } else { 1.0 - step };
+        // Where its own row feels it by more than the tolerance.
+        if (wrong.z[at] - known.z[at]).abs() > 1e-3 {
+            prop_assert!(!problem.judge(&wrong, 1e-8).unwrap().solved, "{n} {seed} {at}");
         }
     }
 

@@ -63,6 +63,10 @@ pub(crate) fn satisfying(
         // Pivots of earlier rows are replaced, in the order of these rows.
         while let Some((k, a)) = row.first_with(|j| place[j]) {
             row.remove(reduced[k].0);
+            // The search for the pivot and what follows for the constant.
+            if pace.over(row.0.len() as f64 + cost(&a, &reduced[k].2) as f64 * OPERATION) {
+                return None;
+            }
             for (j, b) in &reduced[k].1.0 {
                 let cost = cost(&a, b);
                 spent += cost;
@@ -104,6 +108,24 @@ pub(crate) fn satisfying(
         out[*pivot] = sum;
     }
     Some(out)
+}
+
+/// `constant + Σ a_j x_j`; `None` where the computation of this thread is over.
+pub(crate) fn sum_of_products(
+    constant: f64,
+    terms: &[(usize, f64)],
+    x: &[Exact],
+    pace: &mut Pace,
+) -> Option<Exact> {
+    let mut sum = exact(constant);
+    for &(j, a) in terms {
+        let a = exact(a);
+        if pace.over(cost(&a, &x[j]) as f64 * OPERATION) {
+            return None;
+        }
+        sum += a * &x[j];
+    }
+    Some(sum)
 }
 
 /// An operation on rational numbers as short as doubles are, in units of one on doubles.

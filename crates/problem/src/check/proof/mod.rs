@@ -20,8 +20,8 @@ pub use monotone::Monotone;
 pub use relaxation::Constraint;
 
 pub(crate) use evidence::{Claim, weigh};
-pub(crate) use exact::{Equation, exact, negative, satisfying};
+pub(crate) use exact::{Equation, exact, negative, satisfying, sum_of_products};
 pub(crate) use monotone::{monotone, principal};
 pub(crate) use relaxation::Relaxed;
-pub(crate) use rounding::{FEW, exactly_near};
+pub(crate) use rounding::{exactly_near, worth_a_look};
 pub(crate) use statement::{Exactly, bounded, columns, exacts, just};

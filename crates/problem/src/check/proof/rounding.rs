@@ -2,15 +2,23 @@
 
 use super::exact::{Equation, Exact, exact, rounded, satisfying};
 
-/// Points of more unknowns are not looked at.
-pub(crate) const FEW: usize = 48;
+/// Points of so few unknowns are looked at whatever their error,
+const FEW: usize = 48;
+/// and of so many where it is one that usual tolerances refuse: the rounding of a triangular M with 60 unknowns may be 1e13 units.
+const MANY: usize = 300;
+const REFUSED: f64 = 1e-10;
 /// How far a rounded number may be from what it was, in units of itself.
 const BIT: f64 = 2.0 * f64::EPSILON;
+
+/// Whether exact arithmetic is not too dear for a point of so many unknowns with this error.
+pub(crate) fn worth_a_look(unknowns: usize, error: f64) -> bool {
+    unknowns <= if error > REFUSED { MANY } else { FEW }
+}
 
 /// The exact numbers next to `values` that satisfy all equations `Σ a_j x_j + constant = 0`; those that are not `movable` stay. `None` where a number would move
 /// by more than its last bit, or the equations contradict each other.
 ///
-/// Cost: an elimination in rational numbers, some milliseconds.
+/// Cost: an elimination in rational numbers, some milliseconds, .1 s at most; less where the computation of this thread is over before.
 pub(crate) fn exactly_near(
     equations: Vec<(Vec<(usize, f64)>, f64)>,
     values: &[f64],

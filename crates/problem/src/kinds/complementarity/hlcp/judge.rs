@@ -1,6 +1,6 @@
 //! The judge of horizontal problems.
 
-use crate::check::proof::{Exactly, FEW, columns, exactly_near, exacts, just};
+use crate::check::proof::{Exactly, columns, exactly_near, exacts, just, worth_a_look};
 use crate::check::rows::Rows;
 use crate::check::{ConeSystem, Judged, Measure, Verdict};
 use crate::kinds::complementarity::judge::{
@@ -104,7 +104,7 @@ impl HlcpGauge {
             sum.pair(n + i, &Pair { w: d * pair.w, ..pair }, self.c[i]);
         }
         let measure = Measure { floor: precisely.then(|| self.floor()), ..sum.measure() };
-        let exactly = || is_rounded_pair(problem, point);
+        let exactly = |error| is_rounded_pair(problem, point, error);
         let measure = if visible { measure } else { unseen(measure, precisely, exactly) };
         rounding(measure, 2 * n + 1, exactly)
     }
@@ -141,10 +141,10 @@ impl HlcpGauge {
 }
 
 /// The same of a horizontal problem.
-fn is_rounded_pair(problem: &Hlcp, HlcpPoint { x, s }: &HlcpPoint) -> bool {
+fn is_rounded_pair(problem: &Hlcp, HlcpPoint { x, s }: &HlcpPoint, error: f64) -> bool {
     let n = x.len();
     let mut rows = vec![vec![]; n];
-    let known = 2 * n <= FEW
+    let known = worth_a_look(2 * n, error)
         && problem.Q.for_each(|i, j, a| rows[i].push((j, a)))
         && problem.R.for_each(|i, j, a| rows[i].push((n + j, a)));
     let complementary = x.iter().zip(s).all(|(x, s)| x.min(*s) == 0.0);

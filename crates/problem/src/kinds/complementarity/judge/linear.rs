@@ -4,10 +4,11 @@ use super::{
     Pair, RowCounts, RowStatus, Sum, find_effects, find_units, finite, floor, put, rounding, share,
     unseen, verdict, without_noise,
 };
-use crate::check::proof::{Exact, FEW, exact, exactly_near};
+use crate::check::proof::{Exact, exactly_near, sum_of_products, worth_a_look};
 use crate::check::rows::Rows;
 use crate::check::{Measure, Verdict};
 use crate::{LcpPoint, Problem};
+use nonsmooth_linalg::budget::Pace;
 use nonsmooth_linalg::{Matrix, norm};
 
 /// The data of a problem in z with `w = M z + q`: row i belongs to an equality, or to the variable `free + i − equalities`.
@@ -160,7 +161,7 @@ impl LinearGauge {
             }
         }
         let measure = Measure { floor: precisely.then(|| self.floor()), ..sum.measure() };
-        let exactly = || is_rounded(&data, &point.z);
+        let exactly = |error| is_rounded(&data, &point.z, error);
         let measure = if visible { measure } else { unseen(measure, precisely, exactly) };
         rounding(measure, point.z.len() + 1, exactly)
     }
@@ -238,9 +239,9 @@ fn reach(l: f64, u: f64) -> f64 {
 }
 
 /// Whether z is an exact solution, rounded: with what is on a bound there, the equations of the others have a solution within its last bits, and all
-/// signs are right there, in exact arithmetic. Of few variables only.
-fn is_rounded(data: &Data, z: &[f64]) -> bool {
-    if z.len() > FEW || data.q.len() > FEW {
+/// signs are right there, in exact arithmetic. Where that is not too dear for a point with this error.
+fn is_rounded(data: &Data, z: &[f64], error: f64) -> bool {
+    if !worth_a_look(z.len().max(data.q.len()), error) {
         return false;
     }
     let mut rows = vec![vec![]; data.q.len()];
@@ -258,9 +259,9 @@ fn is_rounded(data: &Data, z: &[f64]) -> bool {
     let is_zero = |i: usize| data.variable(i).is_none_or(|j| movable[j]);
     let equations = (0..rows.len()).filter(|&i| is_zero(i)).map(|i| (rows[i].clone(), data.q[i]));
     let Some(x) = exactly_near(equations.collect(), z, &movable) else { return false };
+    let mut pace = Pace::default();
     rows.iter().enumerate().filter(|(i, _)| !is_zero(*i)).all(|(i, row)| {
-        let terms = row.iter().map(|&(j, a)| exact(a) * &x[j]);
-        let w = terms.fold(exact(data.q[i]), |sum, term| sum + term);
+        let Some(w) = sum_of_products(data.q[i], row, &x, &mut pace) else { return false };
         let (l, u) = data.bounds(i);
         let at = data.variable(i).map_or(0.0, |j| z[j]);
         (at == l || w <= Exact::ZERO) && (at == u || w >= Exact::ZERO)

@@ -347,20 +347,20 @@ pub(crate) fn finite(x: &[f64]) -> bool {
 pub(crate) fn unseen(
     measure: Measure,
     precisely: bool,
-    is_rounded: impl FnOnce() -> bool,
+    is_rounded: impl FnOnce(f64) -> bool,
 ) -> Measure {
-    match !precisely || is_rounded() {
+    match !precisely || is_rounded(NEVER) {
         true => measure,
         false => Measure { relative: NEVER, ..measure },
     }
 }
 
-/// The measure of a point whose errors may be those of its rounding alone: where that is so, they count as one bit. What doubled precision leaves in
+/// The measure of a point whose errors may be those of its rounding alone: where that is so, which `is_rounded` is asked with the error, they count as one bit. What doubled precision leaves in
 /// doubt of sums of `terms` terms is added: of terms 1e30 times larger than the row's unit nobody can tell that they vanish.
 pub(crate) fn rounding(
     measure: Measure,
     terms: usize,
-    is_rounded: impl FnOnce() -> bool,
+    is_rounded: impl FnOnce(f64) -> bool,
 ) -> Measure {
     /// Beyond so many floors nothing is explained by rounding.
     const REACH: f64 = 100.0;
@@ -372,7 +372,7 @@ pub(crate) fn rounding(
         Some(floor) if measure.relative > 1e-14 && measure.relative <= REACH * floor => {}
         _ => return measure,
     }
-    if !is_rounded() {
+    if !is_rounded(measure.relative) {
         return measure;
     }
     let least = |x: f64| x.min(bit);
