@@ -149,11 +149,21 @@ const SINGLES: usize = 20;
 const SURE: usize = 2;
 const SURE_AGAIN: usize = 4;
 
-/// No entry is negative, and the diagonal is positive: strictly copositive, so that Lemke's path ends in a solution.
+/// No entry of M + Mᵀ is negative, and the diagonal is positive: strictly copositive, so that Lemke's path ends in a solution.
 fn is_plainly_copositive(m: &Matrix) -> bool {
-    let mut negative = false;
-    let known = m.for_each(|_, _, x| negative |= x < 0.0);
-    known && !negative && m.diagonal().is_some_and(|d| d.iter().all(|d| *d > 0.0))
+    let n = m.nrows();
+    let nonnegative = match m {
+        Matrix::Dense(a) => (0..n).all(|i| (0..i).all(|j| a.row(i)[j] + a.row(j)[i] >= 0.0)),
+        Matrix::Sparse(a) => (0..n).all(|j| {
+            let (rows, values) = a.column(j);
+            rows.iter().zip(values).all(|(&i, &x)| {
+                let (across, opposite) = a.column(i);
+                x >= 0.0 || across.binary_search(&j).is_ok_and(|k| x + opposite[k] >= 0.0)
+            })
+        }),
+        Matrix::Operator(_) => false,
+    };
+    nonnegative && m.diagonal().is_some_and(|d| d.iter().all(|d| *d > 0.0))
 }
 
 /// Bases to enumerate: all of them.
@@ -320,16 +330,16 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &Auto, stage: usize) -> Vec<Candid
             p.then("block_pivoting", 300, facts.class()).with("most_singles", SINGLES)
         })
         .when(facts.monotone() && facts.large(), |p| p.then("ip_mehrotra", 200, facts.class()))
+        // A long path ends all the same.
+        .when(tried && !facts.monotone() && facts.is(Class::CopositivePlus), |p| {
+            p.anew("lemke", SURE_AGAIN * pivots(n), facts.class())
+        })
         .when(tried && !facts.monotone(), |p| {
             p.anew("newton_pfb", 12, "globalised, superlinear where it converges").anew(
                 "ip_mehrotra",
                 60,
                 "as long as it goes well",
             )
-        })
-        // A long path ends all the same.
-        .when(tried && !facts.monotone() && facts.is(Class::CopositivePlus), |p| {
-            p.anew("lemke", SURE_AGAIN * pivots(n), facts.class())
         })
         .when(tried && !facts.monotone(), |p| p.anew("newton_pfb", 200, "with patience"))
         .when(facts.pivotal(), |p| p.then("lemke", pivots(n), facts.class()))
