@@ -18,11 +18,18 @@ pub struct Model {
     beside: [Vec<f64>; 2],
     lower: Vec<f64>,
     upper: Vec<f64>,
+    /// What the rows of F and JF are multiplied by, if they are: powers of two, so that nothing is rounded.
+    weights: Vec<f64>,
+    weighed: bool,
     lambda: f64,
     centre: Vec<f64>,
     /// How often F, and JF, were evaluated.
     pub evaluations: [u64; 2],
 }
+
+/// Rows whose values and slopes at the start are smaller or larger are solved in other units: residuals are absolute there, and squares of merits have an end.
+const LEAST: f64 = 1e-12;
+const MOST: f64 = 1e100;
 
 /// How far a variable is moved, in units of its size, at which a derivative is infinite: that of a root or a power at a bound, say. The steep slope beside it
 /// keeps the variable where it is, or lets it go.
@@ -50,6 +57,8 @@ impl Model {
             pattern,
             lower: problem.lower.clone(),
             upper: problem.upper.clone(),
+            weights: vec![1.0; n],
+            weighed: false,
             lambda: 0.0,
             centre: vec![0.0; n],
             evaluations: [0; 2],
@@ -99,6 +108,32 @@ impl Model {
         self.lambda
     }
 
+    /// From now on the rows of F have their own units.
+    pub fn unweigh(&mut self) {
+        self.weighed = false;
+    }
+
+    /// From now on rows that are very small or very large at x, where the model was linearised last, to `f`, are multiplied by powers of two.
+    pub fn weigh(&mut self, x: &[f64], f: &[f64]) {
+        self.weights.iter_mut().zip(f).for_each(|(size, f)| *size = f.abs());
+        for ((i, j), v) in self.pattern.places().zip(&self.values) {
+            self.weights[i] = self.weights[i].max(v.abs() * x[j].abs().max(1.0));
+        }
+        self.weighed = false;
+        for size in &mut self.weights {
+            let ordinary = *size == 0.0 || !size.is_finite() || (LEAST..MOST).contains(size);
+            self.weighed |= !ordinary;
+            *size =
+                if ordinary { 1.0 } else { (-size.log2().round()).clamp(-1000.0, 1000.0).exp2() };
+        }
+    }
+
+    fn apply_weights(&self, f: &mut [f64]) {
+        if self.weighed {
+            f.iter_mut().zip(&self.weights).for_each(|(f, w)| *f *= w);
+        }
+    }
+
     fn add_term(&self, x: &[f64], f: &mut [f64]) {
         if self.lambda != 0.0 {
             for ((f, x), c) in f.iter_mut().zip(x).zip(&self.centre) {
@@ -111,6 +146,7 @@ impl Model {
     pub fn value(&mut self, x: &[f64], f: &mut [f64]) -> bool {
         self.evaluations[0] += 1;
         let defined = self.field.value(x, f);
+        self.apply_weights(f);
         self.add_term(x, f);
         defined
     }
@@ -119,12 +155,17 @@ impl Model {
     pub fn linearise(&mut self, x: &[f64], f: &mut [f64]) -> bool {
         self.evaluations[1] += 1;
         let defined = self.field.jacobian(x, f, &mut self.values) || self.beside(x, f);
+        self.apply_weights(f);
         self.add_term(x, f);
         let Matrix::Sparse(matrix) = &mut self.matrix else { unreachable!("made sparse") };
         let values = matrix.values_mut();
         values.fill(0.0);
         // Places are all different.
         self.places.iter().zip(&self.values).for_each(|(&k, v)| values[k] = *v);
+        if self.weighed {
+            let rows = self.pattern.places().map(|(i, _)| self.weights[i]);
+            self.places.iter().zip(rows).for_each(|(&k, w)| values[k] *= w);
+        }
         if self.lambda != 0.0 {
             self.diagonal.iter().for_each(|&k| values[k] += self.lambda);
         }

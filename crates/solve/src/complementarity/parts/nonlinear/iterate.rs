@@ -42,12 +42,14 @@ impl Iterate {
     /// Begins at the point of the box nearest to x, or as near as F and its Jacobian are defined: further inside. The model is left without proximal term.
     pub fn begin(&mut self, model: &mut Model, x: &[f64]) {
         model.release();
+        model.unweigh();
         for (i, x) in x.iter().enumerate() {
             self.x[i] = model.project(i, *x);
         }
         self.start.copy_from_slice(&self.x);
         for distance in INSIDE {
             if model.linearise(&self.x, &mut self.f) {
+                model.weigh(&self.x, &self.f);
                 break;
             }
             for i in 0..self.x.len() {
