@@ -361,14 +361,26 @@ where
     if late && asks {
         return Ok(alone());
     }
-    let cut = |whole| if asks && limits.reached(begun).is_some() { alone() } else { whole };
+    // Exact arithmetic is part of a verdict and ends with the limits; what it could not say again the solve has said.
+    let within = |gauge: &mut P::Gauge| {
+        let scope = limits.budget(begun).enter();
+        let whole = problem.verdict(point, gauge, tolerance);
+        if asks && limits.reached(begun).is_some() {
+            alone()
+        } else if scope.raised() {
+            let Verdict { measure, solved, .. } = alone();
+            Verdict { measure, solved, ..whole }
+        } else {
+            whole
+        }
+    };
     if (small || !late)
         && let Some(gauge) = session.gauge()
     {
-        return Ok(cut(problem.verdict(point, gauge, tolerance)));
+        return Ok(within(gauge));
     }
     if small || unlimited {
-        return Ok(cut(problem.judge(point, tolerance)?));
+        return Ok(within(&mut problem.gauge()?));
     }
     let spent = begun.elapsed().as_secs_f64();
     let left = limits.time_limit.map(|t| (t - spent).max(0.0));
