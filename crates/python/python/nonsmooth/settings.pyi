@@ -929,6 +929,9 @@ class NewtonEp(Settings):
         full step and knows no other directions.
     restarts : int, default 4
         How often the method starts again elsewhere after it got stuck.
+    seed : int, default 0
+        Where it begins: 0 at the start given, other numbers elsewhere, and all their restarts are
+        others.
 
     References: Acary2018, EvtushenkoPurtov1984.
     """
@@ -938,6 +941,7 @@ class NewtonEp(Settings):
         *,
         line_search: Literal['none', 'armijo', 'goldstein_price', 'nonmonotone'] = ...,
         restarts: int = ...,
+        seed: int = ...,
     ) -> None: ...
 
 class NewtonFb(Settings):
@@ -969,6 +973,9 @@ class NewtonFb(Settings):
         least 0. The others do not look at it.
     restarts : int, default 4
         How often the method starts again elsewhere after it got stuck.
+    seed : int, default 0
+        Where it begins: 0 at the start given, other numbers elsewhere, and all their restarts are
+        others.
 
     References: FukushimaLuoTseng2001, Acary2018, Fischer1992, DeLucaFacchineiKanzow1996.
     """
@@ -983,6 +990,7 @@ class NewtonFb(Settings):
         rescue: int = ...,
         smoothing: float = ...,
         restarts: int = ...,
+        seed: int = ...,
     ) -> None: ...
 
 class NewtonFbSmooth(Settings):
@@ -1111,6 +1119,9 @@ class NewtonMin(Settings):
         full step and knows no other directions.
     restarts : int, default 4
         How often the method starts again elsewhere after it got stuck.
+    seed : int, default 0
+        Where it begins: 0 at the start given, other numbers elsewhere, and all their restarts are
+        others.
 
     References: Acary2018, BenGharbiaGilbert2012, DeLucaFacchineiKanzow1996.
     """
@@ -1120,6 +1131,7 @@ class NewtonMin(Settings):
         *,
         line_search: Literal['none', 'armijo', 'goldstein_price', 'nonmonotone'] = ...,
         restarts: int = ...,
+        seed: int = ...,
     ) -> None: ...
 
 class NewtonMinRho(Settings):
@@ -1141,6 +1153,9 @@ class NewtonMinRho(Settings):
         full step and knows no other directions.
     restarts : int, default 4
         How often the method starts again elsewhere after it got stuck.
+    seed : int, default 0
+        Where it begins: 0 at the start given, other numbers elsewhere, and all their restarts are
+        others.
 
     References: Acary2018, DeLucaFacchineiKanzow1996.
     """
@@ -1152,6 +1167,7 @@ class NewtonMinRho(Settings):
         side: Literal['z', 'w'] = ...,
         line_search: Literal['none', 'armijo', 'goldstein_price', 'nonmonotone'] = ...,
         restarts: int = ...,
+        seed: int = ...,
     ) -> None: ...
 
 class NewtonNm(Settings):
@@ -1207,6 +1223,9 @@ class NewtonPfb(Settings):
         full step and knows no other directions.
     restarts : int, default 4
         How often the method starts again elsewhere after it got stuck.
+    seed : int, default 0
+        Where it begins: 0 at the start given, other numbers elsewhere, and all their restarts are
+        others.
 
     References: Acary2018, ChenChenKanzow2000.
     """
@@ -1217,6 +1236,7 @@ class NewtonPfb(Settings):
         lambda_: float = ...,
         line_search: Literal['none', 'armijo', 'goldstein_price', 'nonmonotone'] = ...,
         restarts: int = ...,
+        seed: int = ...,
     ) -> None: ...
 
 class NewtonPk(Settings):

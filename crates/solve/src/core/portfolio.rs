@@ -85,6 +85,9 @@ const UNTIMED: usize = 4;
 /// Stages in the face of a proof: what needs no look at the problem, and the plan by its class and structure.
 const CLOSING: usize = 2;
 
+/// The setting that tells starts of one method apart.
+pub(crate) const SEED: &str = "seed";
+
 /// The candidates of a plan one by one; the next stage is planned when those of one have failed.
 ///
 /// Without a limit on time nobody says how much patience there is: no more than [`UNTIMED`] stages.
@@ -92,11 +95,20 @@ const CLOSING: usize = 2;
 struct Stages {
     stage: usize,
     open: VecDeque<Candidate>,
-    tried: Vec<Candidate>,
+    tried: Vec<Tried>,
     /// Stages since the last new candidate.
     barren: usize,
     /// Nothing beyond the plan by class and structure.
     closing: bool,
+}
+
+/// A candidate that has had its turn.
+struct Tried {
+    candidate: Candidate,
+    /// From which of the best points it began, counted as [`Tally::bests`] does.
+    from: usize,
+    /// It ended by itself, not at its limit: more iterations from there would change nothing.
+    ended: bool,
 }
 
 /// Stages without a new candidate after which a plan is over.
@@ -108,7 +120,14 @@ impl Stages {
         self.closing = true;
     }
 
-    fn next<P>(&mut self, problem: &P, plan: &Planner<P>, limits: &Limits) -> Option<Candidate> {
+    /// `bests`: how many best points there were so far.
+    fn next<P>(
+        &mut self,
+        problem: &P,
+        plan: &Planner<P>,
+        limits: &Limits,
+        bests: usize,
+    ) -> Option<Candidate> {
         let most = match limits.time_limit {
             _ if self.closing => CLOSING,
             Some(_) => usize::MAX,
@@ -116,13 +135,14 @@ impl Stages {
         };
         loop {
             while let Some(candidate) = self.open.pop_front() {
-                // What was tried with as much patience would do the same again.
-                let again = |t: &Candidate| {
+                let from = if candidate.anew { 0 } else { bests };
+                // What was tried with as much patience, or from the same point to its end, would do the same again.
+                let again = |Tried { candidate: t, from: before, ended }: &Tried| {
                     (&t.name, &t.settings) == (&candidate.name, &candidate.settings)
-                        && t.iterations >= candidate.iterations
+                        && (t.iterations >= candidate.iterations || *ended && *before == from)
                 };
                 if !self.tried.iter().any(again) {
-                    self.tried.push(candidate.clone());
+                    self.tried.push(Tried { candidate: candidate.clone(), from, ended: false });
                     self.barren = 0;
                     return Some(candidate);
                 }
@@ -139,6 +159,13 @@ impl Stages {
             self.stage += 1;
         }
     }
+
+    /// Takes note of how the candidate that had its turn last has ended.
+    fn ended(&mut self, status: &Status) {
+        if let Some(last) = self.tried.last_mut() {
+            last.ended = !matches!(status, Status::Limit(_));
+        }
+    }
 }
 
 /// What has been done, and found, so far.
@@ -147,6 +174,8 @@ struct Tally<P: Problem> {
     iterations: usize,
     factorisations: u64,
     best: Option<(P::Point, Measure)>,
+    /// Points that were the best one for a time.
+    bests: usize,
 }
 
 impl<P: Problem> Tally<P> {
@@ -156,6 +185,7 @@ impl<P: Problem> Tally<P> {
         let better = |(_, best): &(P::Point, Measure)| outcome.measure.is_better_than(best);
         if self.best.as_ref().is_none_or(better) {
             self.best = Some((point, outcome.measure));
+            self.bests += 1;
         }
     }
 
@@ -229,7 +259,8 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             None => Box::new(problem.gauge()?),
         };
         let meter = Meter::start(begun, limits);
-        let mut tally = Tally::<P> { meter, iterations: 0, factorisations: 0, best: None };
+        let mut tally =
+            Tally::<P> { meter, iterations: 0, factorisations: 0, best: None, bests: 0 };
         if observer.keeps_best() {
             // The plan asks for the classes of the matrix, which may take all the time there is.
             observer.best(point, &problem.measure(point, &mut gauge));
@@ -238,7 +269,7 @@ impl<P: Registered> Session<P> for Portfolio<P> {
         let mut status = Status::Stalled("no method applies to this problem".into());
         let (mut nearly, mut proof) = (None, None);
         let mut stages = Stages::default();
-        while let Some(candidate) = stages.next(problem, &self.plan, limits) {
+        while let Some(candidate) = stages.next(problem, &self.plan, limits, tally.bests) {
             if let Some(limit) = limits.reached(tally.meter.begun) {
                 status = Status::Limit(limit);
                 break;
@@ -265,6 +296,7 @@ impl<P: Registered> Session<P> for Portfolio<P> {
                 Ok(outcome) => outcome,
                 Err(e) if e.is_inapplicable() => {
                     self.account.push(format!("{} does not apply: {e}", candidate.name));
+                    stages.ended(&NONE);
                     continue;
                 }
                 Err(e) => return Err(e),
@@ -276,7 +308,12 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             self.trace = session.trace();
             self.account.push(sentence(&candidate, &outcome));
             self.account.extend(session.account().into_iter().map(|line| format!("  {line}")));
+            // No other problem asks for the same start once more.
+            if candidate.settings.contains_key(SEED) {
+                self.sessions.swap_remove(k);
+            }
             tally.take(trial, &outcome);
+            stages.ended(&outcome.status);
             if let Status::Infeasible(found) = &outcome.status
                 && !is_final(found, limits.tolerance)
             {

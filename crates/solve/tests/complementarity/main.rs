@@ -8,6 +8,7 @@ mod interior;
 mod lemke;
 mod multistart;
 mod newton;
+mod patience;
 mod pivoting;
 mod presolve;
 mod reform;

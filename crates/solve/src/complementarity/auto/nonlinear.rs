@@ -17,7 +17,7 @@ use nonsmooth_problem::{BoxLcp, LcpPoint, Mcp, Problem};
 
 use super::plan::Plan;
 use super::predictor::Predictor;
-use super::{Auto, Candidate, Portfolio};
+use super::{Auto, Candidate, Planned, Portfolio};
 use crate::complementarity::parts::nonlinear::{by_a_row, nearby};
 use crate::complementarity::reform::Presolve;
 use crate::complementarity::reform::presolve::reduces;
@@ -34,6 +34,9 @@ const FEW: usize = 500;
 const SHORT: usize = 40;
 const LONG: usize = 300;
 
+/// Stages of the linear `auto` of an affine F; then arcs have their turn, for which the rest of the time is.
+const LINEAR: usize = 4;
+
 /// What the search for a proof may cost after the first stage, see `ExactCones::within`: some tenths of a second.
 const WORK: u64 = 20_000_000;
 
@@ -49,7 +52,10 @@ impl Auto {
             self.plan_of(problem, stage)
         };
         AutoSession {
-            linear: self.session::<BoxLcp>(),
+            linear: Portfolio::new(move |problem: &BoxLcp, stage| match stage {
+                0..LINEAR => problem.plan(&self, stage),
+                _ => vec![],
+            }),
             nonlinear: Portfolio::new(plan),
             proof,
             refuted: None,

@@ -275,33 +275,55 @@ fn at_once(m: &Matrix, dense_from: usize, pivoting: &'static str, size: usize) -
         })
 }
 
-/// Pivots from other covering vectors, with more patience each time, and all cases of few pairs.
-fn patiently(
-    [pivoting, all]: [&'static str; 2],
-    m: &Matrix,
-    pairs: usize,
-    stage: usize,
-) -> Vec<Candidate> {
-    let (n, turn) = (m.nrows(), stage - BY_CLASS);
-    if turn > TURNS || n > DENSE || matches!(m, Matrix::Operator(_)) {
-        return vec![];
-    }
-    let more = pivots(n).saturating_mul(1 << turn.min(20));
-    Plan::new()
-        .then(pivoting, more, "with patience")
-        .then(pivoting, more, "another covering vector")
-        .with("covering", "random")
-        .with("seed", turn + 1)
-        .when(turn == LAST && pairs <= MOST_PAIRS, |p| {
-            p.then(all, ALL, "decides, if it ends").with("max_pairs", MOST_PAIRS)
-        })
-        .0
+/// The names by which the methods of [`patiently`] solve a kind of problem.
+struct Patient {
+    pivoting: Option<&'static str>,
+    newton: [&'static str; 2],
+    enumeration: &'static str,
 }
 
-/// Turns of [`patiently`]; after this one few pairs are enumerated, which may take any time.
-const TURNS: usize = 12;
-const LAST: usize = 4;
+/// As long as the limits allow: pivots from other covering vectors, Newton's method from other starts, with more patience each time, and all cases of few pairs.
+fn patiently(by: Patient, m: &Matrix, pairs: usize, stage: usize) -> Vec<Candidate> {
+    let (n, turn) = (m.nrows(), stage - BY_CLASS);
+    let pivotal = match m {
+        Matrix::Dense(_) => n <= DENSE,
+        Matrix::Sparse(_) => n <= SPARSE,
+        Matrix::Operator(_) => return vec![],
+    };
+    let times = 1 << turn.min(MOST_PATIENT);
+    let mut plan = Plan::new();
+    // Few pairs have few cases that are not closed early, and their number has no bound but 2ⁿ: as many more each turn, until it ends.
+    if pairs <= MOST_PAIRS {
+        plan = plan.then(by.enumeration, CASES << turn.min(MOST_PAIRS / 2), "decides, if it ends");
+        plan = plan.with("max_pairs", MOST_PAIRS);
+    }
+    if let Some(lemke) = by.pivoting.filter(|_| pivotal) {
+        let more = pivots(n).saturating_mul(times);
+        plan = plan.then(lemke, more, "with patience").then(lemke, more, "other covering vectors");
+        plan = plan.with("covering", "random").with("seed", turn + 1).with("restarts", RESTARTS);
+    }
+    for newton in by.newton {
+        plan = plan.then(newton, NEWTON * times, "from other starts");
+        plan = plan.with("seed", turn).with("restarts", RESTARTS);
+    }
+    plan.0
+}
+
+/// Budgets double with each turn up to this one.
+const MOST_PATIENT: usize = 10;
+/// Starts that a method may use up in a turn, more than it comes to.
+const RESTARTS: usize = 1000;
+/// Newton's steps of a turn, which take about as long as the pivots.
+const NEWTON: usize = 15;
+/// Batches of 64 cases.
+const CASES: usize = 4;
 const MOST_PAIRS: usize = 40;
+
+const OF_PAIRS: Patient = Patient {
+    pivoting: Some("lemke"),
+    newton: ["newton_pfb", "newton_min"],
+    enumeration: "enumeration",
+};
 
 pub(super) fn of_lcp(problem: &Lcp, settings: &Auto, stage: usize) -> Vec<Candidate> {
     match stage {
@@ -315,7 +337,7 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &Auto, stage: usize) -> Vec<Candid
             return plan;
         }
         BY_CLASS => {}
-        _ => return patiently(["lemke", "enumeration"], &problem.M, problem.dim(), stage),
+        _ => return patiently(OF_PAIRS, &problem.M, problem.dim(), stage),
     }
     let Some(facts) = Facts::of(&problem.M) else {
         return of_operator();
@@ -375,8 +397,10 @@ pub(super) fn of_mlcp(problem: &Mlcp, settings: &Auto, stage: usize) -> Vec<Cand
         }
         AT_ONCE => return vec![],
         BY_CLASS => {}
-        _ if square => return patiently(["lemke", "enumeration"], &problem.M, pairs, stage),
-        _ => return vec![],
+        _ => {
+            let pivoting = OF_PAIRS.pivoting.filter(|_| square);
+            return patiently(Patient { pivoting, ..OF_PAIRS }, &problem.M, pairs, stage);
+        }
     }
     let enumeration = |p: Plan| p.then("enumeration", ALL, "decides, whatever the class");
     let few = pairs <= EXACT && problem.q.len() + problem.free <= 4 * EXACT;
@@ -437,8 +461,12 @@ pub(super) fn of_box(problem: &BoxLcp, settings: &Auto, stage: usize) -> Vec<Can
         }
         BY_CLASS => {}
         _ => {
-            let solvers = ["split/lemke", "split/enumeration"];
-            return patiently(solvers, &problem.M, problem.dim(), stage);
+            let by = Patient {
+                pivoting: Some("split/lemke"),
+                enumeration: "split/enumeration",
+                ..OF_PAIRS
+            };
+            return patiently(by, &problem.M, problem.dim(), stage);
         }
     }
     let Some(facts) = Facts::of(&problem.M) else {
@@ -482,8 +510,12 @@ pub(super) fn of_hlcp(problem: &Hlcp, settings: &Auto, stage: usize) -> Vec<Cand
         AT_ONCE => return vec![],
         BY_CLASS => {}
         _ => {
-            let solvers = ["mixed/lemke", "mixed/enumeration"];
-            return patiently(solvers, &problem.Q, problem.dim(), stage);
+            let by = Patient {
+                pivoting: Some("mixed/lemke"),
+                newton: ["mixed/newton_pfb", "mixed/newton_min"],
+                enumeration: "mixed/enumeration",
+            };
+            return patiently(by, &problem.Q, problem.dim(), stage);
         }
     }
     let n = problem.dim();

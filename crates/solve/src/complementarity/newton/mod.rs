@@ -72,11 +72,20 @@ pub struct Newton<F> {
     pub line_search: LineSearch,
     /// How often the method starts again elsewhere after it got stuck.
     pub restarts: usize,
+    /// Where it begins: 0 at the start given, other numbers elsewhere, and all their restarts are others.
+    pub seed: u64,
 }
 
 impl<F: Default> Default for Newton<F> {
     fn default() -> Self {
-        Self { function: F::default(), line_search: LineSearch::Nonmonotone, restarts: 4 }
+        Self { function: F::default(), line_search: LineSearch::Nonmonotone, restarts: 4, seed: 0 }
+    }
+}
+
+impl<F> Newton<F> {
+    /// The number of the start after so many restarts: those of a seed follow those of the one before.
+    fn start_number(&self, restarts: usize) -> u64 {
+        restarts as u64 + self.seed % SEEDS * (self.restarts as u64 + 1)
     }
 }
 
@@ -119,6 +128,8 @@ const LONG: f64 = 30.0;
 const SMALL: f64 = 1e-9;
 /// Up to this order Levenberg–Marquardt's dense matrices are factorised.
 const MARQUARDT: usize = 4000;
+/// Seeds with starts of their own; later ones begin with them again.
+const SEEDS: u64 = 1 << 32;
 /// ‖Φ‖∞ at which a standstill counts as the end, not as a failure.
 const ROUNDING: f64 = 1e-11;
 
@@ -268,6 +279,9 @@ impl<P: Rowwise, F: NewtonFunction> Solver<P> for Newton<F> {
         let Work { problem, x, w, .. } = work;
         problem.enter(&point.z, x);
         problem.multiply(x, w, false);
+        if self.seed > 0 {
+            self.elsewhere(work);
+        }
     }
 
     fn step(&self, problem: &P, _: &mut LcpPoint, work: &mut Work) -> Step {
@@ -670,8 +684,14 @@ impl<F: NewtonFunction> Newton<F> {
             (rule, _) => rule,
         };
         work.search = Search::new(other);
+        self.elsewhere(work);
+        Step::Continue { estimate: f64::NAN }
+    }
+
+    /// To the start of this restart.
+    fn elsewhere(&self, work: &mut Work) {
         let Work { problem, x, w, phase, .. } = work;
-        let k = phase.restarts;
+        let k = self.start_number(phase.restarts);
         for (j, x) in x.iter_mut().enumerate() {
             // The bounds, then points that have nothing in common, near and far.
             let noise = ((j + 1) as f64 * 0.618_033_988_75 + k as f64 * 0.414_213_562_37).fract();
@@ -680,13 +700,12 @@ impl<F: NewtonFunction> Newton<F> {
                 1 => 0.0,
                 2 => 10.0,
                 3 => 1.0,
-                k => [1.0, 10.0, 0.1, 100.0][k % 4] * noise,
+                k => [1.0, 10.0, 0.1, 100.0][(k % 4) as usize] * noise,
             };
             let from = if problem.lower[j].is_finite() { problem.lower[j] } else { 0.0 };
             *x = if free { 0.0 } else { (from + far).max(problem.lower[j]).min(problem.upper[j]) };
         }
         problem.multiply(x, w, false);
-        Step::Continue { estimate: f64::NAN }
     }
 }
 

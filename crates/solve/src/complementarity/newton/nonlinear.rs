@@ -50,6 +50,9 @@ impl<F: NewtonFunction> Solver<Mcp> for Newton<F> {
 
     fn start(&self, _: &Mcp, point: &mut LcpPoint, work: &mut Work<F>) {
         work.solve.begin(point);
+        if self.seed > 0 {
+            work.solve.at.perturbed(&mut work.solve.model, self.start_number(0));
+        }
         work.descent.restart(self.function, self.function.merit(), options(self.line_search));
         work.idle = Idle::default();
     }
@@ -66,7 +69,7 @@ impl<F: NewtonFunction> Solver<Mcp> for Newton<F> {
             return solve.ends(moved.why());
         }
         solve.restarts += 1;
-        solve.at.perturbed(&mut solve.model, solve.restarts as u64);
+        solve.at.perturbed(&mut solve.model, self.start_number(solve.restarts));
         descent.restart(self.function, self.function.merit(), options(self.line_search));
         *idle = Idle::default();
         solve.goes_on()

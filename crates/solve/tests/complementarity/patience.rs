@@ -1,0 +1,101 @@
+//! `auto` as long as the limits allow, and verdicts within them.
+
+use nonsmooth_linalg::{Dense, Matrix};
+use nonsmooth_problem::field::Expressions;
+use nonsmooth_problem::{AnyProblem, BoxLcp, Lcp, LcpPoint, Mcp, Mlcp, Problem};
+use nonsmooth_solve::{Limit, Solve, Status};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+
+/// M of independent entries, of no class at all, and z, w that solve the problem.
+fn planted(n: usize, seed: u64) -> [AnyProblem; 3] {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let dense = Dense::from_fn(n, n, |_, _| (0..6).map(|_| rng.random_range(-1.0..1.0)).sum());
+    let m = Matrix::from(dense);
+    let q = |z: &[f64], w: &[f64]| {
+        let mut product = vec![0.0; n];
+        m.mul(z, &mut product);
+        w.iter().zip(product).map(|(w, p)| w - p).collect::<Vec<f64>>()
+    };
+    let (mut z, mut w) = (vec![0.0; n], vec![0.0; n]);
+    for i in 0..n {
+        *if rng.random_bool(0.5) { &mut z[i] } else { &mut w[i] } = rng.random_range(0.1..2.0);
+    }
+    let lcp = Lcp::new(m.clone(), q(&z, &w)).unwrap();
+    let free = n / 3;
+    w[..free].fill(0.0);
+    let mlcp = Mlcp::new(m.clone(), q(&z, &w), free).unwrap();
+    let (lower, upper) = (vec![-1.0; n], vec![1.0; n]);
+    for i in 0..n {
+        let x: f64 = rng.random_range(-2.0..2.0);
+        (z[i], w[i]) = (x.clamp(-1.0, 1.0), x.clamp(-1.0, 1.0) - x);
+    }
+    let boxed = BoxLcp::new(m.clone(), q(&z, &w), lower, upper).unwrap();
+    [lcp.into(), mlcp.into(), boxed.into()]
+}
+
+#[test]
+fn auto_goes_on_with_other_starts_until_its_time_is_over() {
+    let mut longest = 0;
+    for seed in 0..4 {
+        for problem in planted(70, seed) {
+            let answer = Solve::new().time_limit(0.7).run(&problem).unwrap();
+            let kind = problem.kind().name();
+            let ended = matches!(answer.status, Status::Solved | Status::Limit(Limit::Time));
+            assert!(ended, "{kind} {seed}: {} {:#?}", answer.status, answer.account);
+            assert!(answer.verdict.measure.relative.is_finite());
+            longest = longest.max(answer.account.len());
+        }
+    }
+    assert!(longest > 10, "{longest}");
+}
+
+#[test]
+fn what_has_ended_by_itself_is_not_tried_again_from_the_same_point() {
+    let [problem, ..] = planted(70, 1);
+    let answer = Solve::new().time_limit(0.7).run(&problem).unwrap();
+    let heads: Vec<&String> = answer.account.iter().filter(|l| !l.starts_with(' ')).collect();
+    let patient = heads.iter().filter(|l| l.starts_with("lemke (with patience)")).count();
+    assert!(patient <= 3, "{heads:#?}");
+}
+
+#[test]
+fn a_plan_is_the_same_each_time() {
+    // Within its iterations, which no clock decides.
+    let [problem, ..] = planted(25, 3);
+    let run = || Solve::new().max_iterations(3000).run(&problem).unwrap();
+    let (a, b) = (run(), run());
+    assert_eq!((a.status, a.iterations, a.account), (b.status, b.iterations, b.account));
+}
+
+#[test]
+fn units_of_rows_do_not_matter_to_methods_of_nonlinear_problems() {
+    for (first, second) in [(-500, -500), (-60, 0), (0, -400), (510, 490), (-300, 300)] {
+        let [a, b] = [first, second].map(|k| 2_f64.powi(k));
+        let rows =
+            [format!("{a:e}*x1^2 - {a:e}"), format!("{b:e}*x2^3 + {b:e}*x1 - {:e}", 3.0 * b)];
+        let f = Expressions::parse(&rows, &[]).unwrap();
+        let problem = Mcp::new(f, vec![0.0; 2], vec![f64::INFINITY; 2], vec![0.0; 2]).unwrap();
+        let answer = Solve::new().time_limit(10.0).run(&problem).unwrap();
+        assert!(answer.is_solved(), "{first} {second}: {} {:#?}", answer.status, answer.account);
+    }
+}
+
+#[test]
+fn a_verdict_does_not_contradict_a_solve_that_its_limit_has_ended() {
+    // The rounding of the solution is 1e140 units of q, and only exact arithmetic, which is over by then, tells that there is nothing else.
+    let n = 300;
+    let entry = |i: usize, j: usize| match j.cmp(&i) {
+        std::cmp::Ordering::Less => -2.0,
+        std::cmp::Ordering::Equal => 1.0,
+        std::cmp::Ordering::Greater => 0.0,
+    };
+    let problem = Lcp::new(Dense::from_fn(n, n, entry), vec![-1.0; n]).unwrap();
+    let solved = Solve::new().run(&problem).unwrap();
+    assert!(solved.is_solved() && solved.verdict.solved, "{:#?}", solved.account);
+    let again = Solve::new().solver("lemke").warm(&solved.point).time_limit(0.0);
+    let late = again.run(&problem).unwrap();
+    assert_eq!(late.is_solved(), late.verdict.solved, "{}", late.status);
+    let zero = LcpPoint { z: vec![0.0; n] };
+    assert!(!Solve::new().warm(&zero).time_limit(0.0).run(&problem).unwrap().verdict.solved);
+}
