@@ -3,7 +3,7 @@
 //! Problem: LCP, MLCP, horizontal and box LCP; of nonlinear problems see `nonlinear.rs`.
 //!
 //! Method: on problems so small that a look at the matrix costs as much as a solve, pivots at once; then a plan of solvers in the order of their promise on the problem at hand
-//! (`plan.rs`); then, while time and iterations last, pivots from other covering vectors with ever larger budgets. Each starts from the best point before it and has a budget of
+//! (`plan.rs`); then, while time and iterations last, cases of few pairs, other covering vectors and other starts of Newton's method in turn, with ever larger budgets. Each starts from the best point before it and has a budget of
 //! iterations, never of seconds, so that a run repeats itself. The first that solves the problem, or proves that there is no solution, ends the solve.
 //!
 //! References: CottlePangStone2009; FacchineiPang2003; Acary2018 (how to choose); the solvers' own files.
