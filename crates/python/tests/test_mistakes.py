@@ -287,6 +287,8 @@ ONE = ns.LCP(EYE, [-1.0, -1.0, -1.0])
         (lambda: ns.solve(ONE, tol="a"), "tol: expected a number, found 'a'"),
         (lambda: ns.solve(ONE, tol=None), "tol: expected a number, found None"),
         (lambda: ns.solve(ONE, time_limit="1"), "time_limit: expected a number, found '1'"),
+        (lambda: ns.solve(ONE, tolerance=1e-6), "unknown key `tolerance`.*; solve has the argument `tol`"),
+        (lambda: ns.solve(ONE, timeout=1.0), "unknown key `timeout`.*; solve has the argument `time_limit`"),
         (lambda: ns.solve(ONE, None), "solver: expected a name or an object of settings"),
         (lambda: ns.solve(ONE, ns.Nsgs), r"solver: expected an object, nonsmooth.Nsgs\(\)"),
         (lambda: ns.solve(ONE, callback=3), "callback: expected a function"),

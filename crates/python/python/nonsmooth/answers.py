@@ -246,15 +246,18 @@ def solve(
     every = {**own, **registered(settings)} if settings else own
     if callback is not None and not callable(callback):
         raise arguments.mistake("callback", "a function of nonsmooth.Progress", callback)
-    native = _nonsmooth.solve(
-        arguments.problem(problem),
-        name,
-        arguments.plain(every),
-        arguments.real("tol", tol),
-        arguments.seconds("time_limit", time_limit),
-        None if max_iter is None else arguments.whole("max_iter", max_iter),
-        arguments.whole("threads", threads),
-        warm_start._native if isinstance(warm_start, Answer) else warm_start,
-        callback,
-    )
+    try:
+        native = _nonsmooth.solve(
+            arguments.problem(problem),
+            name,
+            arguments.plain(every),
+            arguments.real("tol", tol),
+            arguments.seconds("time_limit", time_limit),
+            None if max_iter is None else arguments.whole("max_iter", max_iter),
+            arguments.whole("threads", threads),
+            warm_start._native if isinstance(warm_start, Answer) else warm_start,
+            callback,
+        )
+    except _nonsmooth.Error as error:
+        raise arguments.meant(error, settings) from None
     return Answer(native)

@@ -62,6 +62,27 @@ def named(solver: object) -> tuple[str, Mapping[str, object]]:
     raise mistake("solver", "a name or an object of settings (nonsmooth.Nsgs(omega=0.9))", solver)
 
 
+# What other libraries call the arguments of solve.
+_ELSEWHERE = {
+    "tol": ("tolerance", "eps", "rtol", "atol"),
+    "time_limit": ("timeout", "time", "max_time"),
+    "max_iter": ("max_iterations", "maxiter", "iterations"),
+    "warm_start": ("x0", "z0", "r0", "start", "initial"),
+    "solver": ("method", "algorithm"),
+    "threads": ("n_threads", "num_threads", "n_jobs"),
+}
+
+
+def meant(error: _nonsmooth.Error, settings: Mapping[str, object]) -> _nonsmooth.Error:
+    """The error, with the argument of solve that was meant where it says that a setting is unknown."""
+    for key in settings:
+        if f"unknown key `{key}`" in str(error):
+            for name, others in _ELSEWHERE.items():
+                if key in others:
+                    return _nonsmooth.Error(f"{error}; solve has the argument `{name}`")
+    return error
+
+
 def plain(settings: Mapping[str, object]) -> Optional[dict[str, object]]:
     """Settings, numbers of numpy as those of Python."""
     if not settings:
