@@ -82,8 +82,8 @@ impl<P: Registered> Portfolio<P> {
 }
 
 const UNTIMED: usize = 4;
-/// Stages in the face of a proof: what needs no look at the problem, and the plan by its class and structure.
-const CLOSING: usize = 2;
+/// Stages in the face of a proof: what needs no look at the problem, and the plan by its class and structure. Where it holds up to rounding only there are as many as without a limit on time.
+const PROVED: usize = 2;
 
 /// The setting that tells starts of one method apart.
 pub(crate) const SEED: &str = "seed";
@@ -98,8 +98,8 @@ struct Stages {
     tried: Vec<Tried>,
     /// Stages since the last new candidate.
     barren: usize,
-    /// Nothing beyond the plan by class and structure.
-    closing: bool,
+    /// Stages at most, where something says that there is no solution.
+    last: Option<usize>,
 }
 
 /// A candidate that has had its turn.
@@ -115,9 +115,9 @@ struct Tried {
 const BARREN: usize = 3;
 
 impl Stages {
-    /// In the face of a proof: what is open, and the plan by class and structure, are the last.
-    fn close(&mut self) {
-        self.closing = true;
+    /// No more than so many stages from now on.
+    fn close(&mut self, last: usize) {
+        self.last = Some(self.last.map_or(last, |before| before.min(last)));
     }
 
     /// `bests`: how many best points there were so far.
@@ -128,11 +128,8 @@ impl Stages {
         limits: &Limits,
         bests: usize,
     ) -> Option<Candidate> {
-        let most = match limits.time_limit {
-            _ if self.closing => CLOSING,
-            Some(_) => usize::MAX,
-            None => UNTIMED,
-        };
+        let untimed = if limits.time_limit.is_some() { usize::MAX } else { UNTIMED };
+        let most = self.last.unwrap_or(untimed);
         loop {
             while let Some(candidate) = self.open.pop_front() {
                 let from = if candidate.anew { 0 } else { bests };
@@ -318,7 +315,7 @@ impl<P: Registered> Session<P> for Portfolio<P> {
                 && !is_final(found, limits.tolerance)
             {
                 proof.get_or_insert_with(|| found.clone());
-                stages.close();
+                stages.close(PROVED);
                 status = NONE;
                 continue;
             }
@@ -336,6 +333,7 @@ impl<P: Registered> Session<P> for Portfolio<P> {
                 ray @ Status::NoConclusion(_) => ray,
                 near @ Status::NearlyInfeasible { .. } => {
                     nearly = Some(near);
+                    stages.close(UNTIMED);
                     NONE
                 }
                 _ => NONE,

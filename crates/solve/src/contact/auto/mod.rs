@@ -391,16 +391,21 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
     fn check_every(&self, work: &Self::Work) -> usize {
         match work.stage {
             // One thread judges.
-            Stage::Sweeps { .. } => SWEEPS_JUDGED * work.sweep.together(SWEEPS_JUDGED_SHARED),
+            Stage::Sweeps { .. } | Stage::Between { .. } | Stage::Projected { .. } => {
+                SWEEPS_JUDGED * work.sweep.together(SWEEPS_JUDGED_SHARED)
+            }
             _ => 1,
         }
     }
 
     fn go_on(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> bool {
         work.doubted = true;
-        problem.enter(&mut work.state, point);
-        if !self.insist_on_cadoux(problem, work) {
-            self.subproblem_here(problem, point, work);
+        // The first stage has yet to make the parts of the later ones, or fit them to this problem.
+        if !matches!(work.stage, Stage::Sweeps { .. } | Stage::Held) {
+            problem.enter(&mut work.state, point);
+            if !self.insist_on_cadoux(problem, work) {
+                self.subproblem_here(problem, point, work);
+            }
         }
         true
     }
