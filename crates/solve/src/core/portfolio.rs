@@ -82,8 +82,9 @@ impl<P: Registered> Portfolio<P> {
 }
 
 const UNTIMED: usize = 4;
-/// Stages in the face of a proof: what needs no look at the problem, and the plan by its class and structure. Where it holds up to rounding only there are as many as without a limit on time.
+/// Stages in the face of a proof: what needs no look at the problem, and the plan by its class and structure; and where it holds up to rounding only.
 const PROVED: usize = 2;
+const NEARLY: usize = 3;
 
 /// The setting that tells starts of one method apart.
 pub(crate) const SEED: &str = "seed";
@@ -333,15 +334,18 @@ impl<P: Registered> Session<P> for Portfolio<P> {
                 ray @ Status::NoConclusion(_) => ray,
                 near @ Status::NearlyInfeasible { .. } => {
                     nearly = Some(near);
-                    stages.close(UNTIMED);
+                    stages.close(NEARLY);
                     NONE
                 }
                 _ => NONE,
             };
         }
         drop(scope);
-        // What is nearly so is more than a ray without a conclusion; what is decided stays.
-        let open = status == NONE || matches!(status, Status::NoConclusion(_));
+        // What is nearly so is more than a limit, or a ray without a conclusion; what is decided stays.
+        let open = match status {
+            Status::Limit(limit) => limit != Limit::Cancelled,
+            _ => status == NONE || matches!(status, Status::NoConclusion(_)),
+        };
         if let (Some(near), true) = (nearly, open) {
             status = near;
         }
