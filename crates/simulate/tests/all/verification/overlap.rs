@@ -90,7 +90,7 @@ fn bodies_that_touch_with_a_small_face_do_not_overlap() {
         for _ in 0..20 {
             let mut world = weightless(0.3, 0.0);
             for side in [-1.0, 1.0] {
-                let first = rng.random_range(0.0..6.28);
+                let first = rng.random_range(0.0..std::f64::consts::TAU);
                 let radius = rng.random_range(0.5..3.0);
                 let mut vertices: Vec<[f64; 3]> = vec![];
                 for k in 0..3 {

@@ -127,7 +127,7 @@ pub trait Rows<const D: usize>: Contacts<D> {
     /// The impulses of the contacts of a point, and those of all rows.
     fn all_impulses(point: &mut Self::Point) -> (&mut [f64], &mut [f64]);
 
-    /// `∂c_j/∂λ_j`; zero where bilateral rows determine c_j, see [`DETERMINED`].
+    /// `∂c_j/∂λ_j`; zero where bilateral rows determine c_j, see `DETERMINED`.
     fn row_response(&self, state: &Self::State, j: usize) -> f64;
 
     /// The velocity `c_j` of row j for the current impulses.
