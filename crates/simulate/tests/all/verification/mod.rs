@@ -27,10 +27,27 @@ mod stops;
 mod tops;
 
 use nonsmooth_simulate::{
-    Body, BodyId, Geometry, Law, MoreauJean, RunReport, Shape, Simulation, World,
+    Activation, Body, BodyId, Control, Geometry, Law, MoreauJean, RunReport, Shape, Simulation,
+    StepReport, World,
 };
 
 const G: f64 = 9.81;
+
+/// Rules by which contacts and limits take part.
+const ACTIVATIONS: [Activation; 4] = [
+    Activation::Forecast { gamma: 0.5, slack: 1e-9 },
+    Activation::Forecast { gamma: 0.0, slack: 1e-9 },
+    Activation::Forecast { gamma: 1.0, slack: 1e-9 },
+    Activation::Gap,
+];
+
+/// Numbers between −1 and 1.
+fn numbers(mut seed: u64) -> impl FnMut() -> f64 {
+    move || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+}
 
 /// A world with gravity downwards and one law.
 fn world(mu: f64, e: f64) -> World {
@@ -73,6 +90,23 @@ fn frozen(world: World) -> Simulation {
 fn run(simulation: &mut Simulation, until: f64, h: f64) -> RunReport {
     let report = simulation.run(until, h, &mut ()).unwrap();
     check(&report);
+    report
+}
+
+/// Runs a world in steps of 1 ms, each of which is seen; every step must be judged solved.
+fn watched(
+    world: World,
+    scheme: MoreauJean,
+    until: f64,
+    mut see: impl FnMut(&StepReport),
+) -> RunReport {
+    let mut simulation = Simulation::new(world, scheme).unwrap();
+    let mut watch = |_: &Simulation, step: &StepReport| {
+        see(step);
+        Control::Continue
+    };
+    let report = simulation.run(until, 1e-3, &mut watch).unwrap();
+    assert!(report.is_solved(), "{report}");
     report
 }
 

@@ -1,10 +1,10 @@
 //! Contacts that open after an impact, and are pressed by another one before they are out of the index set.
 
-use nonsmooth_simulate::{
-    Activation, Body, BodyId, Control, Impact, MoreauJean, Shape, Simulation, StepReport, World,
-};
+use nonsmooth_simulate::{Body, BodyId, Impact, MoreauJean, Shape, Simulation, World};
 
-use crate::verification::{ball_with, check, near, v, weightless, world, x};
+use crate::verification::{
+    ACTIVATIONS, ball_with, check, near, numbers, v, watched, weightless, world, x,
+};
 
 const R: f64 = 0.1;
 
@@ -27,26 +27,15 @@ fn chain(mut world: World, masses: &[f64], gaps: [f64; 2], speed: f64) -> World 
 
 /// Runs for a time; the largest gain of energy by contacts in a step, as a share of the energy at the beginning, and the deepest penetration.
 fn most_gained(world: World, scheme: MoreauJean, until: f64) -> (f64, f64) {
-    let mut simulation = Simulation::new(world, scheme).unwrap();
     let (mut most, mut deepest, mut whole) = (f64::MIN, 0.0_f64, 0.0_f64);
-    let mut watch = |_: &Simulation, r: &StepReport| {
+    watched(world, scheme, until, |r| {
         let e = r.energy;
         whole = whole.max(e.kinetic_before);
         most = most.max(e.kinetic - e.kinetic_before - e.gravity - e.forces);
         deepest = deepest.max(r.drift.penetration);
-        Control::Continue
-    };
-    let report = simulation.run(until, 1e-3, &mut watch).unwrap();
-    assert!(report.is_solved(), "{report}");
+    });
     (most / whole, deepest)
 }
-
-const ACTIVATIONS: [Activation; 4] = [
-    Activation::Forecast { gamma: 0.5, slack: 1e-9 },
-    Activation::Forecast { gamma: 0.0, slack: 1e-9 },
-    Activation::Forecast { gamma: 1.0, slack: 1e-9 },
-    Activation::Gap,
-];
 
 /// A heavy ball hits a light one that comes back from the floor, while this is still in its contact: what pressed it must not win energy.
 #[test]
@@ -119,25 +108,15 @@ fn an_elastic_gas_keeps_its_energy() {
             world.add(Body::fixed(vec![part]).at(at));
         }
     }
-    let mut seed = 1_u64;
-    let mut random = || {
-        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    };
+    let mut random = numbers(1);
     for k in 0..27 {
         let at = [k % 3, k / 3 % 3, k / 9].map(|k| 0.21 * (f64::from(k) - 1.0));
         let velocity = [4.0 * random(), 4.0 * random(), 4.0 * random()];
         let mass = if k % 2 == 0 { 1.0 } else { 10.0 };
         world.add(heavy(mass).at(at).moving(velocity, [0.0; 3]));
     }
-    let mut simulation = Simulation::new(world, MoreauJean::default()).unwrap();
     let mut energies = vec![];
-    let mut watch = |_: &Simulation, r: &StepReport| {
-        energies.push(r.energy.kinetic);
-        Control::Continue
-    };
-    let report = simulation.run(0.5, 1e-3, &mut watch).unwrap();
-    check(&report);
+    check(&watched(world, MoreauJean::default(), 0.5, |r| energies.push(r.energy.kinetic)));
     energies.iter().for_each(|&e| near(e / energies[0], 1.0, 1e-9));
 }
 

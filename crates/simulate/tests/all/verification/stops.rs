@@ -1,19 +1,11 @@
 //! Limits of joints with restitution that are hit at the same time, or one after the other within a step: what is coupled through the masses must win no energy.
 
 use nonsmooth_simulate::{
-    Activation, Body, Control, Coordinate, Dimension, Drive, Geometry, Impact, Joint, JointLimits,
-    MoreauJean, Shape, Simulation, StepReport, World,
+    Body, Coordinate, Dimension, Drive, Geometry, Impact, Joint, JointLimits, MoreauJean, Shape,
+    World,
 };
 
-use crate::verification::{near, weightless};
-
-/// Numbers between −1 and 1.
-fn numbers(mut seed: u64) -> impl FnMut() -> f64 {
-    move || {
-        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-}
+use crate::verification::{ACTIVATIONS, near, numbers, watched, weightless};
 
 fn body(mass: f64) -> Body {
     let j = 0.02 * mass;
@@ -72,26 +64,15 @@ fn linkage(rods: usize, dimension: Dimension, e: impl Fn(usize) -> f64, seed: u6
 
 /// Kinetic energies after the steps, and the largest work of joints in one, as shares of the energy at the beginning.
 fn energies(world: World, scheme: MoreauJean, until: f64) -> (Vec<f64>, f64) {
-    let mut simulation = Simulation::new(world, scheme).unwrap();
     let (mut all, mut most) = (vec![], f64::MIN);
-    let mut watch = |_: &Simulation, r: &StepReport| {
+    watched(world, scheme, until, |r| {
         all.push(r.energy.kinetic);
         most = most.max(r.energy.joints);
-        Control::Continue
-    };
-    let report = simulation.run(until, 1e-3, &mut watch).unwrap();
-    assert!(report.is_solved(), "{report}");
+    });
     let whole = all[0];
     all.iter_mut().for_each(|e| *e /= whole);
     (all, most / whole)
 }
-
-const ACTIVATIONS: [Activation; 4] = [
-    Activation::Forecast { gamma: 0.5, slack: 1e-9 },
-    Activation::Forecast { gamma: 0.0, slack: 1e-9 },
-    Activation::Forecast { gamma: 1.0, slack: 1e-9 },
-    Activation::Gap,
-];
 
 /// The scene in which 4666 J came of 385: the second cart runs into its stop while the first one, in its own, comes back.
 #[test]
@@ -153,16 +134,12 @@ fn a_ball_on_a_lid_that_comes_back_from_its_stop_wins_no_energy() {
             let mut ball = crate::verification::ball_with(0.1, 0.004 * mass);
             ball.mass = mass;
             world.add(ball.at([0.4, 0.0, 0.12 + gap]).moving([0.0, 0.0, -3.2], [0.0; 3]));
-            let mut simulation = Simulation::new(world, MoreauJean::default()).unwrap();
             let (mut most, mut whole) = (f64::MIN, 0.0_f64);
-            let mut watch = |_: &Simulation, r: &StepReport| {
+            watched(world, MoreauJean::default(), 0.1, |r| {
                 let e = r.energy;
                 whole = whole.max(e.kinetic_before);
                 most = most.max(e.normal + e.tangential + e.joints);
-                Control::Continue
-            };
-            let report = simulation.run(0.1, 1e-3, &mut watch).unwrap();
-            assert!(report.is_solved(), "{report}");
+            });
             assert!(most < 1e-12 * whole, "{e} {gap} {mass}: {most:e} of {whole}");
         }
     }
