@@ -3,9 +3,8 @@
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, cross, dot, norm, scale, sub};
 
 use super::{Coordinate, Coupling, Joint, JointId, JointKind};
-use crate::Dimension;
 use crate::rotation::Pose;
-use crate::world::World;
+use crate::{Body, Dimension, World};
 
 /// What a unit impulse along a row does to a body, in the world frame: force and moment about its mass centre. Read the other way round: the rate of the row
 /// is `Σ force · v + moment · ω` over its levers.
@@ -51,6 +50,8 @@ pub(crate) struct Linkage {
     in_a: Pose,
     in_b: Pose,
     length: f64,
+    /// The largest radius of gyration of its bodies, m.
+    gyration: f64,
     /// Of which equations there is something in the plane of a world that is one, a bit each.
     kept: u32,
 }
@@ -92,6 +93,12 @@ impl Linkage {
             in_a: local(a, joint.anchors[0]),
             in_b: local(Some(joint.b.index()), joint.anchors[1]),
             length: norm(sub(joint.anchors[1], joint.anchors[0])),
+            gyration: a.into_iter().chain([joint.b.index()]).fold(0.0, |most, k| {
+                let Body { mass, inertia: j, .. } = &world.bodies[k];
+                let moved = world.bodies[k].is_free();
+                let square = if moved { (j[0][0] + j[1][1] + j[2][2]) / (3.0 * mass) } else { 0.0 };
+                f64::max(most, square.sqrt())
+            }),
         };
         match world.dimension {
             Dimension::Three => linkage,
@@ -201,9 +208,10 @@ impl Linkage {
         [raw + turns * std::f64::consts::TAU, dot(a3, at.d)]
     }
 
-    /// The distance of the anchors from the mass centres: what turns an angle into a length.
+    /// What turns an angle into a length: the distance of the anchors from the mass centres, or the radius of gyration `√(tr J / (3 m))` of a body, where that is
+    /// larger. So a joint whose anchor is a mass centre has a size too, against which its slides and violations are measured.
     pub fn size(&self) -> f64 {
-        norm(self.in_a.x).max(norm(self.in_b.x)).max(self.length)
+        norm(self.in_a.x).max(norm(self.in_b.x)).max(self.length).max(self.gyration)
     }
 }
 

@@ -84,8 +84,7 @@ impl Joints {
             self.equations(world, state, |k| state.pose(k as usize))
         {
             let is_turn = reach.iter().all(|r| r.force == [0.0; 3]);
-            let size = self.linkages[j].size();
-            let unit = if is_turn { 1.0 } else { size.max(f64::MIN_POSITIVE) };
+            let unit = if is_turn { 1.0 } else { self.linkages[j].size() };
             each[j] = each[j].max(phi.abs());
             worst = worst.max(phi.abs() / (ROUNDING * unit));
         }

@@ -190,9 +190,7 @@ impl Joints {
             let limited = world.joints[j].drives.iter().filter_map(|d| Some((d, d.limits?)));
             limited.map(move |(drive, limits)| match drive.coordinate {
                 Coordinate::Angle => (j, drive, limits, angle, 1.0),
-                Coordinate::Slide => {
-                    (j, drive, limits, slide, self.linkages[j].size().max(f64::MIN_POSITIVE))
-                }
+                Coordinate::Slide => (j, drive, limits, slide, self.linkages[j].size()),
             })
         })
     }
