@@ -592,7 +592,10 @@ fn inertia(key: &str, j: &mut Mat3) -> Result<(), SimulateError> {
     let trace = j[0][0] + j[1][1] + j[2][2];
     let tiny = 1e-9 * trace.abs();
     let skew = (0..3).map(|k| (j[k][(k + 1) % 3] - j[(k + 1) % 3][k]).abs()).fold(0.0, f64::max);
-    if !trace.is_finite() || skew.is_nan() || skew > tiny {
+    if !j.iter().flatten().all(|x| x.is_finite()) {
+        return bad("finite components", j);
+    }
+    if skew > tiny {
         return bad("a symmetric matrix", j);
     }
     for k in 0..3 {

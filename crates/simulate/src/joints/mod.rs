@@ -110,7 +110,7 @@ pub enum Coordinate {
 }
 
 impl Coordinate {
-    fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Angle => "angle",
             Self::Slide => "slide",
@@ -350,7 +350,10 @@ impl Joint {
                 JointKind::Universal => "two directions at right angles, axis and reference",
                 _ => "a direction, and a reference across it",
             };
-            let found = format!("{:?} and {:?}", self.axis, self.reference);
+            let found = match self.reference {
+                Some(reference) => format!("{:?} and {reference:?}", self.axis),
+                None => format!("{:?}", self.axis),
+            };
             return Err(SimulateError::value(format!("{key}.axis"), expected, found));
         }
         if let JointKind::Screw { pitch } = self.kind {

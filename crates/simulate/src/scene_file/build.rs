@@ -80,9 +80,13 @@ impl SceneFile {
         }
     }
 
-    /// An error of a law of contact, which the world knows by its materials, at the place in the file that states it.
+    /// An error of the world at the place in the file that states it: laws of contact, which the world knows by their materials, what acts along coordinates of joints,
+    /// motions that are given.
     fn in_file(&self, error: SimulateError) -> SimulateError {
         let SimulateError::Value { key, expected, found } = error else { return error };
+        let key = super::joints::in_file(&self.joints, key);
+        let key = key.replace(".motion.linear", ".motion.velocity");
+        let key = key.replace(".motion.angular", ".motion.angular_velocity");
         let of_pair = self.pairs.iter().enumerate().find_map(|(k, pair)| {
             let [a, b] = &pair.between;
             let ways = [format!("pairs[{a}, {b}]."), format!("pairs[{b}, {a}].")];
@@ -136,8 +140,15 @@ impl SceneFile {
             .map(|(k, table)| acting(table, &world, &format!("forces[{k}]")))
             .collect::<Result<_, _>>()?;
         let (simulation, said) = start(world).map_err(|e| self.in_file(e))?;
+        let known = |e: SimulateError| match e {
+            SimulateError::Solve(e) => {
+                SimulateError::Schema { path: "solver".into(), problem: e.to_string() }
+            }
+            e => e,
+        };
         let mut simulation = simulation
-            .with_solver(&solver.name, solver.settings.clone())?
+            .with_solver(&solver.name, solver.settings.clone())
+            .map_err(known)?
             .with_tolerance(solver.tol);
         for force in forces {
             simulation = simulation.with_force(force);
@@ -310,6 +321,10 @@ impl<'a> Builder<'a> {
                     return Err(SimulateError::value(at("inertia"), expected, "one"));
                 }
                 require(|| at("density"), density, density > 0.0, "a positive number")?;
+                if parts.is_empty() {
+                    let expected = "one, for its mass is to follow from a density";
+                    return Err(SimulateError::value(at("shape"), expected, "none"));
+                }
                 let dense = parts.into_iter().map(|part| (part, density)).collect();
                 let body = Body::composed(dense).map_err(|e| placed(e, key))?;
                 let offset = nonsmooth_scenes::vec3::apply(&rotation.matrix(), body.position);
@@ -466,6 +481,7 @@ impl<'a> Builder<'a> {
             }
         };
         crate::planar::belongs(&part.shape, self.world.dimension, || key.into())?;
+        part.shape.validate(key)?;
         Ok(part)
     }
 

@@ -1,9 +1,9 @@
 //! Elastic boxes of a scene.
 
-use nonsmooth_scenes::{ElasticBox, Material};
+use nonsmooth_scenes::{ElasticBox, Material, SceneError};
 
 use super::{ElasticTable, FaceName, RayleighTable};
-use crate::error::finite;
+use crate::error::{finite, require};
 use crate::{Elastic, SimulateError};
 
 /// The box of a table, of this material and density.
@@ -21,13 +21,24 @@ pub(super) fn solid(
     ] {
         finite(|| format!("{key}.{name}"), &x)?;
     }
+    for half in table.half {
+        require(|| format!("{key}.half"), half, half > 0.0, "positive numbers")?;
+    }
     let RayleighTable { mass: alpha, stiffness: beta } = table.damping;
     let (young, poisson) = (table.young, table.poisson);
     let made_of = Material { density, young, poisson, alpha, beta };
     let solid = ElasticBox::new(table.half.map(|x| 2.0 * x), table.divisions, made_of);
-    let wrong = |e: nonsmooth_scenes::SceneError| SimulateError::Schema {
-        path: key.into(),
-        problem: e.to_string(),
+    let wrong = |e: SceneError| match e {
+        SceneError::Value { key: field, expected, found } => {
+            let field = match field.as_str() {
+                "elements" => "divisions",
+                "alpha" => "damping.mass",
+                "beta" => "damping.stiffness",
+                field => field,
+            };
+            SimulateError::value(format!("{key}.{field}"), expected, found)
+        }
+        e => SimulateError::Schema { path: key.into(), problem: e.to_string() },
     };
     let mut solid = solid.map_err(wrong)?.at(table.position);
     solid.lumped = table.lumped;

@@ -5,6 +5,7 @@ use super::{
     CoordinateName, CouplingTable, DriveTable, DriverTable, JointName, JointTable, LimitsTable,
     MotorTable, SpringTable,
 };
+use crate::world::entry;
 use crate::{
     BodyId, Coordinate, Coupling, Drive, Driver, Joint, JointId, JointKind, JointLimits, Motor,
     SimulateError, Spring, World,
@@ -20,10 +21,7 @@ pub(super) fn join(
     couplings: &[CouplingTable],
 ) -> Result<(), SimulateError> {
     for (k, table) in joints.iter().enumerate() {
-        let key = match table.name.as_str() {
-            "" => format!("joints[{k}]"),
-            name => format!("joints[{k}] ({name})"),
-        };
+        let key = entry("joints", k, &table.name);
         if !table.name.is_empty() && world.joints.iter().any(|j| j.name == table.name) {
             return Err(twice(&format!("{key}.name"), &table.name));
         }
@@ -35,6 +33,26 @@ pub(super) fn join(
         world.couplings.push(coupling);
     }
     Ok(())
+}
+
+/// The key of the file where the world has that of a coordinate: what acts along the main one of a joint stands in the joint itself.
+pub(super) fn in_file(joints: &[JointTable], key: String) -> String {
+    for (k, table) in joints.iter().enumerate() {
+        let entry = entry("joints", k, &table.name);
+        let main = format!("{entry}.{}.", main(table.kind).name());
+        if let Some(field) = key.strip_prefix(&main) {
+            return format!("{entry}.{field}");
+        }
+    }
+    key
+}
+
+/// The coordinate along which acts what stands in the joint itself.
+fn main(kind: JointName) -> Coordinate {
+    match kind {
+        JointName::Prismatic | JointName::PointOnLine => Coordinate::Slide,
+        _ => Coordinate::Angle,
+    }
 }
 
 fn body(name: &str, world: &World, key: String) -> Result<Option<BodyId>, SimulateError> {
@@ -89,12 +107,20 @@ fn joint(table: &JointTable, world: &World, key: &str) -> Result<Joint, Simulate
         JointName::PointOnPlane => JointKind::PointOnPlane,
         JointName::Distance => JointKind::Distance,
     };
-    let main = match kind {
-        JointKind::Prismatic | JointKind::PointOnLine => Coordinate::Slide,
-        _ => Coordinate::Angle,
-    };
+    let main = main(table.kind);
     let JointTable { limits, spring, friction, motor, motion, .. } = *table;
     let own = DriveTable { limits, spring, friction, motor, motion };
+    let said = [
+        ("limits", limits.is_some()),
+        ("spring", spring.is_some()),
+        ("friction", friction != 0.0),
+        ("motor", motor.is_some()),
+        ("motion", motion.is_some()),
+    ];
+    if let Some((name, _)) = said.iter().find(|(_, is)| *is && !kind.has(main)) {
+        let expected = format!("none, for a {} joint has no coordinate", kind.name());
+        return Err(SimulateError::value(at(name), expected, "one"));
+    }
     let mut drives = vec![];
     if own != DriveTable::default() {
         drives.push(drive(main, &own, key)?);

@@ -197,6 +197,7 @@ fn mistakes_are_named_by_their_place() {
         ("version = 1", "version = 7", "version: expected 1, found 7"),
         ("\"nonsmooth-scene\"", "\"sdf\"", "format: expected \"nonsmooth-scene\""),
         ("name = \"nsgs\"", "name = \"ngs\"", "did you mean `nsgs`?"),
+        ("name = \"nsgs\"", "name = \"ngs\"", "solver: unknown solver `ngs`"),
         ("local = \"quartic\"", "locl = \"quartic\"", "locl"),
         ("density = 2400", "density = -1", "materials.stone.density: expected a positive number"),
         (
@@ -215,7 +216,11 @@ fn mistakes_are_named_by_their_place() {
             "kind = \"ball\", radius = 0.1 }\nmass",
             "bodies[2].shape.kind: unknown variant `ball`",
         ),
-        ("radius = 0.1 }\nmass", "radius = -0.1 }\nmass", "bodies[2] (ball)"),
+        (
+            "radius = 0.1 }\nmass",
+            "radius = -0.1 }\nmass",
+            "bodies[2] (ball).shape.radius: expected a positive number, found -0.1",
+        ),
         ("mass = 2.0", "mas = 2.0", "bodies[2].mas: unknown field `mas`"),
         ("mass = 2.0", "mass = -2.0", "bodies[2] (ball).mass"),
         (
@@ -230,8 +235,23 @@ fn mistakes_are_named_by_their_place() {
         ),
         (
             "inertia = [0.008, 0.008, 0.008]",
+            "inertia = [inf, 0.008, 0.008]",
+            "bodies[2] (ball).inertia: expected finite components",
+        ),
+        (
+            "inertia = [0.008, 0.008, 0.008]",
             "",
             "bodies[2] (ball).inertia: expected 3 or 6 numbers",
+        ),
+        (
+            "shape = { kind = \"sphere\", radius = 0.1 }\nmass = 2.0\ninertia = [0.008, 0.008, 0.008]",
+            "density = 1",
+            "bodies[2] (ball).shape: expected one, for its mass is to follow from a density, found none",
+        ),
+        (
+            "velocity = [1, 0, 0] }",
+            "velocity = [nan, 0, 0] }",
+            "bodies[0] (belt).motion.velocity: expected finite components",
         ),
         (
             "axis = [0, 0, 2], angle_deg = 90",
@@ -270,12 +290,12 @@ fn mistakes_are_named_by_their_place() {
         (
             "half_length = 0.2, radius = 0.3",
             "half_length = 0.2, radius = 0",
-            "bodies[4] (reel): radius: expected a positive number, found 0",
+            "bodies[4] (reel).shapes[0].shape.radius: expected a positive number, found 0",
         ),
         (
             "half_length = 0.1, radius",
             "half_length = nan, radius",
-            "bodies[4] (reel): half_length: expected a positive number",
+            "bodies[4] (reel).shapes[1].shape.half_length: expected a positive number",
         ),
         (
             ", [1, 2, 3]] }",
@@ -580,7 +600,7 @@ fn mistakes_in_joints_are_named_by_their_place() {
         ),
         (
             r#"joints = [{ kind = "fixed", a = "world", b = "arm", friction = 1 }]"#,
-            "joints[0].angle: expected no angle of a fixed joint",
+            "joints[0].friction: expected none, for a fixed joint has no coordinate, found one",
         ),
         (
             r#"joints = [{ kind = "revolute", a = "world", b = "arm", motor = { max = 1 } }]"#,
@@ -588,7 +608,15 @@ fn mistakes_in_joints_are_named_by_their_place() {
         ),
         (
             r#"joints = [{ kind = "revolute", a = "world", b = "arm", axis = [0, 0, 0] }]"#,
-            "joints[0].axis",
+            "joints[0].axis: expected a direction, and a reference across it, found [0.0, 0.0, 0.0]",
+        ),
+        (
+            r#"joints = [{ kind = "prismatic", a = "world", b = "arm", friction = -1 }]"#,
+            "joints[0].friction: expected a number of at least 0, found -1",
+        ),
+        (
+            r#"joints = [{ kind = "cylindrical", a = "world", b = "arm", slide = { friction = -1 } }]"#,
+            "joints[0].slide.friction: expected a number of at least 0, found -1",
         ),
         (
             r#"joints = [{ kind = "distance", a = "world", b = "arm" }]"#,
@@ -608,7 +636,7 @@ fn mistakes_in_joints_are_named_by_their_place() {
         ),
         (
             r#"joints = [{ kind = "revolute", a = "world", b = "arm", motor = { velocity = 1 }, motion = { velocity = 1 } }]"#,
-            "joints[0].angle.motor.max: expected a bound, for the coordinate has a motion that is given, found inf",
+            "joints[0].motor.max: expected a bound, for the coordinate has a motion that is given, found inf",
         ),
         (
             r#"joints = [{ kind = "screw", pitch = 1, a = "world", b = "arm", motion = { velocity = 1 }, slide = { motor = { velocity = 1 } } }]"#,
@@ -616,11 +644,11 @@ fn mistakes_in_joints_are_named_by_their_place() {
         ),
         (
             r#"joints = [{ kind = "revolute", a = "world", b = "arm", limits = { lower = inf } }]"#,
-            "joints[0].angle.limits.lower: expected a number, or -inf for none, found inf",
+            "joints[0].limits.lower: expected a number, or -inf for none, found inf",
         ),
         (
             r#"joints = [{ kind = "revolute", a = "world", b = "arm", limits = { lower = 1, upper = 0 } }]"#,
-            "joints[0].angle.limits.upper: expected a number of at least the lower limit, found 0",
+            "joints[0].limits.upper: expected a number of at least the lower limit, found 0",
         ),
         (
             r#"couplings = [{ terms = [{ joint = "x", weight = 1 }] }]"#,
@@ -906,6 +934,24 @@ fn laws_that_are_wrong_are_named_as_the_file_has_them() {
     ] {
         let said = said(&pair(fields), &[]);
         assert!(said.starts_with(says), "{fields}: {said}");
+    }
+}
+
+/// Elastic boxes are refused by the keys of the file.
+#[test]
+fn mistakes_in_elastic_boxes_are_named() {
+    let table = "[[elastic]]\nhalf = [1, 1, 1]\ndivisions = [1, 1, 1]\nyoung = 1e6\ndensity = 1";
+    for (change, says) in [
+        ("half=[1, -1, 1]", "half: expected positive numbers, found -1"),
+        ("divisions=[0, 1, 1]", "divisions: expected at least 1 along each axis"),
+        ("young=-1", "young: expected a positive number, found -1"),
+        ("damping.mass=-1", "damping.mass: expected a number of at least 0, found -1"),
+        ("damping.stiffness=-1", "damping.stiffness: expected a number of at least 0, found -1"),
+    ] {
+        let text = arm(1e-3, 1.0, table).unwrap().to_toml();
+        let made = SceneFile::parse(&text, &[&format!("elastic[0].{change}")]);
+        let said = made.and_then(|s| s.build().map(drop)).unwrap_err().to_string();
+        assert!(said.starts_with(&format!("elastic[0].{says}")), "{change}: {said}");
     }
 }
 
