@@ -82,8 +82,10 @@ pub enum Activation {
     /// Those with `g + γ h u_N ≤ slack`: the forecast index set.
     Forecast {
         /// γ.
+        #[serde(default = "half")]
         gamma: f64,
         /// What counts as touching, as a share of the smaller body: above rounding, below everything else.
+        #[serde(default = "touching")]
         slack: f64,
     },
     /// Those that could close during the step, with the law `0 ≤ u_N + max(g, 0)/h ⟂ r_N ≥ 0`: no penetration to first order and no restitution before
@@ -93,8 +95,16 @@ pub enum Activation {
 
 impl Default for Activation {
     fn default() -> Self {
-        Self::Forecast { gamma: 0.5, slack: 1e-9 }
+        Self::Forecast { gamma: half(), slack: touching() }
     }
+}
+
+fn half() -> f64 {
+    0.5
+}
+
+fn touching() -> f64 {
+    1e-9
 }
 
 /// The law of impact.
@@ -167,7 +177,7 @@ impl Activation {
 
     pub(crate) fn validate(&self, of: &str) -> Result<(), SimulateError> {
         let Some((gamma, slack)) = self.forecast() else { return Ok(()) };
-        let key = |name: &'static str| move || format!("{of}.activation.{name}");
+        let key = |name: &'static str| move || format!("{of}.activation.forecast.{name}");
         require(key("gamma"), gamma, (0.0..=1.0).contains(&gamma), "a number from 0 to 1")?;
         require(key("slack"), slack, slack >= 0.0, "a number of at least 0")
     }

@@ -14,7 +14,8 @@ use crate::state::{ElasticState, State};
 use crate::step::{Stride, Tools};
 use crate::world::oscillation;
 use crate::{
-    BodyId, Dimension, JointReport, MoreauJean, Motion, SimulateError, Stabilisation, World,
+    Activation, BodyId, Dimension, JointReport, MoreauJean, Motion, SimulateError, Stabilisation,
+    World,
 };
 
 /// Bodies that overlap by more than this share of the smaller one are refused at the start.
@@ -198,6 +199,10 @@ impl Simulation {
             rigid(&world, "the stabilisation projects contacts")?;
         }
         warnings.extend(small(&world));
+        if scheme.activation == Activation::Gap && world.laws().any(|(_, law)| law.e > 0.0) {
+            let said = "integrator.activation: `gap` spends the approach in the step that closes a gap: what hits something keeps less than e of its speed";
+            warnings.push(said.into());
+        }
         let mut state = State::of(&world);
         for (k, body) in world.bodies.iter().enumerate() {
             if let Motion::Oscillating { amplitude, frequency, phase } = body.motion {

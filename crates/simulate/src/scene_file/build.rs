@@ -23,7 +23,7 @@ const GROUPS: usize = 32;
 const NOBODY: &str = "nothing";
 
 impl From<LawTable> for Law {
-    fn from(LawTable { mu, e, e_t, mu_rolling: mu_r }: LawTable) -> Self {
+    fn from(LawTable { mu, e, e_t, mu_rolling: mu_r, .. }: LawTable) -> Self {
         Self { mu, e, e_t, mu_r }
     }
 }
@@ -605,9 +605,25 @@ impl<'a> Builder<'a> {
             }
         }
         match self.file.pairs_default {
-            Some(_) => Ok(()),
+            Some(law) => law.compliance.map_or(Ok(()), |c| self.all_comply(c, law.e)),
             None => self.all_stated(),
         }
+    }
+
+    /// Lets all pairs without a law of their own give way.
+    fn all_comply(&mut self, table: ComplianceTable, e: f64) -> Result<(), SimulateError> {
+        let ComplianceTable { stiffness, damping } = table;
+        let at = |field: &str| format!("pairs_default.{field}");
+        require(|| at("compliance.stiffness"), stiffness, stiffness > 0.0, "a positive number")?;
+        require(|| at("compliance.damping"), damping, damping >= 0.0, "a number of at least 0")?;
+        require(|| at("e"), e, e == 0.0, "0 where contacts have a compliance")?;
+        let count = self.world.materials().len();
+        for (a, b) in (0..count).flat_map(|b| (0..=b).map(move |a| (a, b))) {
+            if !self.stated.contains(&(a, b)) {
+                self.world.comply(a, b, Compliance { stiffness, damping });
+            }
+        }
+        Ok(())
     }
 
     fn all_stated(&self) -> Result<(), SimulateError> {

@@ -180,6 +180,9 @@ pub struct LawTable {
     /// Coefficient of rolling friction, m.
     #[serde(skip_serializing_if = "is_zero")]
     pub mu_rolling: f64,
+    /// How contacts give way, if they do; then without restitution.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub compliance: Option<ComplianceTable>,
 }
 
 /// What a scene need not say.

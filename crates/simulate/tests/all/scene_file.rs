@@ -920,6 +920,10 @@ fn laws_that_are_wrong_are_named_as_the_file_has_them() {
             "pairs_default.mu_rolling=-1",
             "pairs_default.mu_rolling: expected a length of at least 0, found -1",
         ),
+        (
+            "pairs_default.compliance.stiffness=0",
+            "pairs_default.compliance.stiffness: expected a positive number, found 0",
+        ),
     ] {
         assert_eq!(said("", &[change]), says);
     }
@@ -934,6 +938,21 @@ fn laws_that_are_wrong_are_named_as_the_file_has_them() {
     ] {
         let said = said(&pair(fields), &[]);
         assert!(said.starts_with(says), "{fields}: {said}");
+    }
+}
+
+/// The default law may have a compliance; pairs with a law of their own have that alone.
+#[test]
+fn pairs_that_are_not_listed_may_give_way() {
+    let scene = SceneFile::parse(SCENE, &["pairs_default.compliance.stiffness=1e5"]).unwrap();
+    let world = scene.world().unwrap();
+    let number = |name: &str| world.materials().iter().position(|m| m == name).unwrap();
+    let [stone, rubber, wall] = ["stone", "rubber", "wall"].map(number);
+    for (a, b) in [(0, 0), (rubber, 0), (rubber, rubber), (wall, stone)] {
+        assert_eq!(world.compliance_between(a, b).map(|c| c.stiffness), Some(1e5), "{a} {b}");
+    }
+    for (a, b) in [(stone, rubber), (stone, stone), (wall, wall)] {
+        assert_eq!(world.compliance_between(a, b), None, "{a} {b}");
     }
 }
 
@@ -959,6 +978,12 @@ fn mistakes_in_elastic_boxes_are_named() {
 fn the_forecast_may_be_asked_for_by_its_name() {
     let scene = SceneFile::parse(SCENE, &["integrator.activation=forecast"]).unwrap();
     assert_eq!(scene, SceneFile::parse(SCENE, &[]).unwrap());
+    // Of its two numbers one may be left to its default.
+    let half = SceneFile::parse(SCENE, &["integrator.activation.forecast.gamma=0.5"]).unwrap();
+    assert_eq!(scene, half);
+    let wrong = SceneFile::parse(SCENE, &["integrator.activation.forecast.gamma=-1"]).unwrap();
+    let said = wrong.build().map(drop).unwrap_err().to_string();
+    assert!(said.starts_with("integrator.activation.forecast.gamma: expected"), "{said}");
     let said =
         SceneFile::parse(SCENE, &["integrator.activation=forecats"]).unwrap_err().to_string();
     assert!(said.contains("(did you mean `forecast`?)"), "{said}");

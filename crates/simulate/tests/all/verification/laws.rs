@@ -70,6 +70,19 @@ fn fremonds_law_never_gains_energy_where_newtons_does() {
 }
 
 #[test]
+fn restitution_that_gaps_would_spend_is_a_warning() {
+    let said = |e: f64, activation: Activation| {
+        let mut world = world(0.4, e);
+        world.add(ball(0.15));
+        let scheme = MoreauJean { activation, ..MoreauJean::default() };
+        Simulation::new(world, scheme).unwrap().warnings().join("\n")
+    };
+    let gap = said(0.5, Activation::Gap);
+    assert!(gap.starts_with("integrator.activation: `gap` spends the approach"), "{gap}");
+    assert_eq!(said(0.0, Activation::Gap) + &said(0.5, Activation::default()), "");
+}
+
+#[test]
 fn the_energy_of_every_step_is_accounted_for() {
     // Bodies of all shapes fall into a trough, with restitution and without, by all schemes.
     for (theta, e, impact, activation) in [
