@@ -3,6 +3,7 @@
 mod record;
 mod said;
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -38,13 +39,13 @@ pub struct Args {
     #[arg(long, value_name = "T", allow_hyphen_values = true)]
     end: Option<f64>,
     /// Steps between two frames of the files written [default: the scene's output.every]
-    #[arg(long, value_name = "STEPS")]
+    #[arg(long, value_name = "STEPS", allow_hyphen_values = true)]
     every: Option<u64>,
     /// Write the trajectory (HDF5), while the run goes on into parts beside it: what is written stays readable whatever happens
     #[arg(long, value_name = "FILE.h5")]
     out: Option<PathBuf>,
     /// Seconds after which what is new of the trajectory is written
-    #[arg(long, value_name = "S", default_value_t = 5.0)]
+    #[arg(long, value_name = "S", default_value_t = 5.0, allow_hyphen_values = true)]
     flush: f64,
     /// Write a page that plays the motion in a browser, without a network
     #[arg(long, value_name = "FILE.html")]
@@ -62,7 +63,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     dump_fclib: Option<PathBuf>,
     /// Write the contact problem of every so many steps, too
-    #[arg(long, value_name = "STEPS", requires = "dump_fclib")]
+    #[arg(long, value_name = "STEPS", requires = "dump_fclib", allow_hyphen_values = true)]
     dump_every: Option<u64>,
     /// Move bodies apart that overlap at the start, by displacements that are small in the norm of the masses, in place of refusing them
     #[arg(long)]
@@ -74,7 +75,7 @@ pub struct Args {
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     time_limit: Option<f64>,
     /// Work on so many threads, 0 for one a core; the results are the same, bit for bit
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_hyphen_values = true)]
     threads: usize,
     /// Say where the time went
     #[arg(long)]
@@ -146,8 +147,14 @@ fn scene(args: &Args) -> Result<Option<SceneFile>, String> {
             return Err(format!("{name}: expected a file or a family of scenes, and {e}"));
         }
         _ => {
-            let text = std::fs::read_to_string(path)
-                .map_err(|e| format!("{name}: expected a readable file, found: {e}"))?;
+            let text = std::fs::read_to_string(path).map_err(|e| match e.kind() {
+                ErrorKind::InvalidData => {
+                    format!(
+                        "{name}: expected a scene as TOML or JSON, found a file that is no text"
+                    )
+                }
+                _ => format!("{name}: expected a readable file, found: {e}"),
+            })?;
             let wrong = |e| format!("{name}: {e}");
             let mut scene = SceneFile::parse(&text, &changes).map_err(wrong)?;
             scene.load_meshes(path.parent().unwrap_or(Path::new(""))).map_err(wrong)?;
@@ -352,6 +359,8 @@ fn pause(seconds: f64) -> Result<Duration, String> {
 fn end_after(seconds: f64, flag: Arc<AtomicBool>) {
     // A limit beyond the reach of the clock is none.
     if let Ok(limit) = Duration::try_from_secs_f64(seconds) {
+        // A thread would come too late where there is no time at all.
+        flag.fetch_or(limit.is_zero(), Ordering::Relaxed);
         std::thread::spawn(move || {
             std::thread::sleep(limit);
             flag.store(true, Ordering::Relaxed);

@@ -198,6 +198,9 @@ fn time_limits_hold_while_a_scene_is_made() {
     let run =
         folder.run("simulate sphere_pile --set count=200000 --time-limit 0.1 --json").exits(1);
     assert_eq!((&run.json()[0]["stopped"], &run.json()[0]["steps"]), (&true.into(), &0.into()));
+    // No time is no step, not a race against the clock.
+    let run = folder.run("simulate stack --time-limit 0").exits(1);
+    assert_eq!(run.stdout, "stack: stopped before the scene was made\n");
 }
 
 #[test]
@@ -217,6 +220,7 @@ fn scenes_are_explained() {
 fn mistakes_are_one_line() {
     let folder = folder();
     std::fs::write(folder.path("broken.toml"), "bodies = [").unwrap();
+    std::fs::write(folder.path("bytes.h5"), b"\x89HDF\r\n").unwrap();
     for (command, says) in [
         ("simulate", "SCENE"),
         ("simulate nowhere.toml", "nowhere.toml: expected a readable file"),
@@ -231,6 +235,13 @@ fn mistakes_are_one_line() {
         ("simulate box.toml --set solver.name=atuo", "did you mean `auto`?"),
         ("simulate box.toml --out nowhere/run.h5", "--out nowhere/run.h5"),
         ("simulate box.toml --time-limit -1", "--time-limit: expected a number of seconds"),
+        ("simulate box.toml --out box.h5 --flush -1", "--flush: expected a number of seconds"),
+        ("simulate box.toml --threads -1", "invalid value '-1' for '--threads <N>'"),
+        ("simulate box.toml --every -1", "invalid value '-1' for '--every <STEPS>'"),
+        (
+            "simulate bytes.h5",
+            "bytes.h5: expected a scene as TOML or JSON, found a file that is no",
+        ),
         ("simulate stack --set cuont=3", "cuont"),
         ("play box.toml", "box.toml"),
         ("solve box.toml", "found a scene, which `nonsmooth simulate` moves"),
