@@ -3,12 +3,13 @@
 //! A world of Python is the document that a scene file is, so it is read, completed and refused by what reads files. A run is computed on another thread; the thread
 //! that asks waits, sees Ctrl-C, and runs the callback of each step.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use nonsmooth_io::ProblemFile;
-use nonsmooth_io::trajectory::{Checkpoint, Contact, Frame, Step as Stepped, Trajectory};
+use nonsmooth_io::trajectory::{Checkpoint, Contact, Frame, Joint, Step as Stepped, Trajectory};
 use nonsmooth_problem::check::Motion;
 use nonsmooth_record::Origin;
 use nonsmooth_scenes::draw::{Drawing, svg};
@@ -34,8 +35,13 @@ pub fn read_scene(py: Python<'_>, path: PathBuf) -> PyResult<(String, Vec<String
         let (text, warnings) = match Origin::of(&path) {
             Some(origin) => origin.read(&path).map(|made| (made.scene, made.warnings)),
             None => {
-                let text = std::fs::read_to_string(&path).map_err(|e| {
-                    mistake(format!("{name}: expected a readable file, found: {e}"))
+                let text = std::fs::read_to_string(&path).map_err(|e| match e.kind() {
+                    ErrorKind::InvalidData => expected(
+                        &name.to_string(),
+                        "a scene as TOML or JSON",
+                        "a file that is no text",
+                    ),
+                    _ => mistake(format!("{name}: expected a readable file, found: {e}")),
                 })?;
                 Ok((text, vec![]))
             }
@@ -452,6 +458,32 @@ impl Run {
                 PyArray1::from_vec(py, numbers).reshape(shape)?;
             all.set_item(name, array)?;
         }
+        Ok(all)
+    }
+
+    /// The names of the joints.
+    #[getter]
+    fn joints(&self) -> Vec<String> {
+        self.trajectory.joints.clone()
+    }
+
+    /// What a joint, given by its number, did in the step before each frame: numbers by name, and vectors frames × 3.
+    fn joint<'py>(&self, py: Python<'py>, number: usize) -> PyResult<Bound<'py, PyDict>> {
+        let frames = &self.trajectory.frames;
+        // Before the first step a joint has done nothing.
+        let blank = Joint::default();
+        let states =
+            || frames.iter().map(|frame| frame.joints.get(number).copied().unwrap_or(blank));
+        let all = PyDict::new(py);
+        let column = |of: fn(Joint) -> f64| PyArray1::from_iter(py, states().map(of));
+        let triple = |of: fn(Joint) -> [f64; 3]| {
+            PyArray1::from_iter(py, states().flat_map(of)).reshape([frames.len(), 3])
+        };
+        all.set_item("angle", column(|j| j.angle))?;
+        all.set_item("slide", column(|j| j.slide))?;
+        all.set_item("impulse", triple(|j| j.impulse)?)?;
+        all.set_item("moment", triple(|j| j.moment)?)?;
+        all.set_item("violation", column(|j| j.violation))?;
         Ok(all)
     }
 

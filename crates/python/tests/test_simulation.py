@@ -271,3 +271,52 @@ def test_contacts_of_a_frame_as_a_frame_of_pandas():
     run = ns.Simulation(ball(height=0.1), h=1e-2).run(0.1)
     table = run.contacts(-1).to_pandas()
     assert isinstance(table, pandas.DataFrame) and {"r_0", "r_1", "r_2", "status"} <= set(table)
+
+
+def test_a_run_knows_its_joints():
+    # A weld carries the weight and its moment; a spindle turns into a rack, which is coupled to it.
+    world = ns.World()
+    world.box([0.5, 0.1, 0.1], mass=2, inertia=[1, 1, 1], position=[0.5, 0, 0], name="beam")
+    world.joint("fixed", "world", "beam", anchor=[0, 0, 0], name="wall")
+    world.body(mass=1, inertia=[1, 1, 1], position=[0, 5, 0], torque=[0, 0, 3], name="spindle")
+    world.body(mass=2, inertia=[1, 1, 1], position=[0, 9, 0], name="rack")
+    world.revolute("world", "spindle", anchor=[0, 5, 0], axis=[0, 0, 1], name="turn")
+    world.prismatic("world", "rack", axis=[1, 0, 0], name="slide")
+    world.couple({"turn": 1, "slide": -2})
+    run = ns.Simulation(world, h=1e-2).run(1.0)
+    assert run.solved and run.joints == ["wall", "turn", "slide"]
+    wall, slide = run.joint("wall"), run.joint(2)
+    assert wall["impulse"].shape == (101, 3) and np.abs(wall["violation"]).max() < 1e-12
+    np.testing.assert_allclose(wall["impulse"][1:, 2], 2 * 9.81 * 1e-2)
+    np.testing.assert_allclose(wall["moment"][1:, 1], -0.5 * 2 * 9.81 * 1e-2)
+    # angle = 2 slide: (1 + 2/4) angle'' = 3, to the O(h²) of a step's turn.
+    angle = run.joint("turn")["angle"]
+    np.testing.assert_allclose(angle, run.t**2, atol=2e-5)
+    np.testing.assert_allclose(slide["slide"], angle / 2, atol=1e-12)
+    for unknown in ("door", 3, -1):
+        with pytest.raises(ns.Error, match="joint: expected one of"):
+            run.joint(unknown)
+
+
+def test_worlds_in_the_plane_and_elastic_boxes_have_words():
+    world = ns.World(dimension=2)
+    world.plane()
+    world.pair("default", mu=0.3)
+    world.disc(0.1, density=100, position=[0, 0.1], velocity=[1, 0], name="disc")
+    world.polygon([[0, 0], [0.2, 0], [0, 0.2]], density=100, position=[5, 0])
+    run = ns.Simulation(world).run(0.5)
+    # A disc that slides rolls with 2/3 of its velocity.
+    assert run.solved and run.velocity[-1, 1, 0] == pytest.approx(2 / 3)
+    solid = ns.World()
+    solid.plane(motion={"kind": "surface", "velocity": [1, 0, 0]})
+    solid.elastic([0.1, 0.1, 0.1], [1, 1, 1], 1e6, density=1000, position=[0, 0, 0.1])
+    assert ns.Simulation(solid).run(0.01).bodies == ["body0", "elastic0"]
+
+
+def test_contacts_without_a_law_of_their_own_may_give_way():
+    world = ns.World()
+    world.plane()
+    world.pair("default", mu=0.3, compliance={"stiffness": 1e4, "damping": 100})
+    world.sphere(0.1, mass=2, inertia=[0.01] * 3, position=[0, 0, 0.1])
+    run = ns.Simulation(world).run(3.0)
+    assert run.position[-1, 1, 2] == pytest.approx(0.1 - 2 * 9.81 / 1e4, abs=1e-9)

@@ -62,17 +62,23 @@ class World:
     The methods add to it and give back the names by which joints and forces speak of bodies. What they take beyond what is named here is what tables
     of scene files have (docs/simulation): ``density`` or ``mass`` and ``inertia``, ``position``, ``rotation``, ``velocity``, ``angular_velocity``, ``material``,
     ``fixed``, ``motion``, ``force``, ``torque``, ``groups``, ``collides_with`` of bodies. SI units. ``document`` is all of it.
+
+    With ``dimension=2`` a world of the plane of the first two axes: vectors have two components, what turns has one. Where no gravity is given it is 9.81 m/s²
+    against the last axis.
     """
 
-    def __init__(self, gravity: Triple = (0.0, 0.0, -9.81), name: str = "") -> None:
+    def __init__(self, gravity: Optional[Triple] = None, name: str = "", *, dimension: int = 3) -> None:
         self.document: dict[str, Any] = {
             "format": "nonsmooth-scene",
             "version": 1,
             "name": name,
-            "gravity": [float(x) for x in gravity],
             "time": {"h": 1e-3, "end": 1.0},
             "pairs_default": {"mu": 0.0, "e": 0.0},
         }
+        if dimension != 3:
+            self.document["dimension"] = arguments.whole("dimension", dimension)
+        down = [-9.81 * x for x in self._upwards()]
+        self.document["gravity"] = down if gravity is None else [float(x) for x in gravity]
         self.warnings: list[str] = []
 
     def _list(self, name: str) -> list[Any]:
@@ -89,9 +95,14 @@ class World:
         bodies.append(entry)
         return name
 
-    def plane(self, normal: Triple = (0.0, 0.0, 1.0), *, name: str = "", **table: object) -> str:
-        """A fixed half space below a plane through ``position``."""
-        return self.body({"kind": "plane", "normal": list(normal)}, name=name, **{"fixed": True, **table})
+    def _upwards(self) -> list[float]:
+        return [0.0, 1.0] if self.document.get("dimension", 3) == 2 else [0.0, 0.0, 1.0]
+
+    def plane(self, normal: Optional[Triple] = None, *, name: str = "", **table: object) -> str:
+        """A half space below a plane through ``position``, whose normal points upwards where none is given; fixed unless it has a ``motion``."""
+        shape = {"kind": "plane", "normal": self._upwards() if normal is None else list(normal)}
+        fixed = {} if table.get("motion") is not None else {"fixed": True}
+        return self.body(shape, name=name, **{**fixed, **table})
 
     def sphere(self, radius: float, *, name: str = "", **table: object) -> str:
         """A ball, radius in m."""
@@ -129,6 +140,24 @@ class World:
         """A surface of triangles: vertices (m), and three of them by number, counterclockwise from outside."""
         shape = {"kind": "mesh", "vertices": np.asarray(vertices), "triangles": np.asarray(triangles)}
         return self.body(shape, name=name, **table)
+
+    def disc(self, radius: float, *, name: str = "", **table: object) -> str:
+        """A disc of a world in the plane, radius in m."""
+        return self.body({"kind": "disc", "radius": radius}, name=name, **table)
+
+    def polygon(self, vertices: npt.ArrayLike, *, name: str = "", **table: object) -> str:
+        """A convex polygon of a world in the plane: vertices (m), counterclockwise."""
+        return self.body({"kind": "polygon", "vertices": np.asarray(vertices)}, name=name, **table)
+
+    def elastic(
+        self, half: Triple, divisions: Sequence[int], young: float, *, name: str = "", **table: object
+    ) -> str:
+        """An elastic box by its half sides (m), its elements along each axis and Young's modulus (Pa); further ``poisson``, ``density`` or ``material``, ``damping``, ``held``, ..."""
+        solids = self._list("elastic")
+        name = name or f"elastic{len(solids)}"
+        entry = {"name": name, "half": list(half), "divisions": list(divisions), "young": young}
+        solids.append({**entry, **_own(table)})
+        return name
 
     def generate(self, scene: str, *, name: Optional[str] = None, **settings: object) -> None:
         """Adds the bodies of a family of ``nonsmooth gen``: ``world.generate("wall", rows=4)``."""
@@ -184,6 +213,11 @@ class World:
     def spherical(self, a: str, b: str, *, anchor: Triple, name: str = "", **table: object) -> str:
         """A ball in a socket at an anchor."""
         return self.joint("spherical", a, b, name=name, anchor=list(anchor), **table)
+
+    def couple(self, weights: Mapping[str, float], *, name: str = "") -> None:
+        """Keeps a weighted sum of coordinates of joints constant, by the names of the joints: gears, racks, pulleys."""
+        terms = [{"joint": joint, "weight": weight} for joint, weight in weights.items()]
+        self._list("couplings").append({"name": name, "terms": terms})
 
     def force(self, body: str, force: Triple, **table: object) -> None:
         """A force (N) on a body, perhaps ``at`` a point of it, ``from`` a time ``until`` another."""
@@ -413,6 +447,20 @@ class Run:
         """The judge's relative residual of each step."""
         residual: Vector = self.steps["residual"]
         return residual
+
+    @property
+    def joints(self) -> list[str]:
+        """The names of the joints."""
+        return self._native.joints
+
+    def joint(self, name: Union[str, int]) -> dict[str, Vector]:
+        """What a joint, by its name or number, did in the step before each frame: ``angle`` (rad) and ``slide`` (m), ``impulse`` (N s) and ``moment`` (N m s) about the anchor on its second body, frames × 3 in the frame of the world, ``violation``."""
+        joints = self.joints
+        if isinstance(name, str) and name in joints:
+            return self._native.joint(joints.index(name))
+        if isinstance(name, str) or name not in range(len(joints)):
+            raise _nonsmooth.Error(f"joint: expected one of {joints}, or its number, found {name!r}")
+        return self._native.joint(name)
 
     def contacts(self, frame: int = -1) -> Table:
         """The contacts of a frame: bodies a and b, status, gap, mu, point, normal, r and u as [N, T1, T2], and the impulse on b in the frame of the world."""
