@@ -7,9 +7,9 @@
 //! 1. **Sweeps**: exact Gauss–Seidel for as long as its rate of convergence promises the tolerance sooner than a few
 //!    factorisations would, and after stage 2 until they have cost one. Many problems end here. Between them, here and in stage 6, the contacts that
 //!    still move are followed where they are few ([`Sweep::follow`]).
-//! 2. **Rest** (`parts/alternating.rs`): impulses within the cones that leave nothing moving, where the sweeps show nothing that flies apart. One factorisation and
-//!    a few solves end structures at rest, whatever their height; one solve tells whether it is one. Where contacts open because weights have yet to come down to them, as in walls
-//!    with head joints, it has some solves more, and comes when the sweeps have cost a factorisation where they open fast.
+//! 2. **Rest** (`parts/alternating.rs`): impulses within the cones that leave nothing moving, where the sweeps show nothing that flies apart: after five of them where they
+//!    still move much, else after the others. One factorisation and a few solves end structures at rest, whatever their height; two solves tell where nothing comes of it. Where contacts
+//!    open because weights have yet to come down to them, as in walls with head joints, it comes when the sweeps have cost a factorisation where they open fast.
 //! 3. **Trial**: Newton's iterations of stage 5 without its proximal term, where the sweeps came near or the structure is not hyperstatic, for as long as each halves the error; there sweeps come to
 //!    its rescue a few times.
 //! 4. **Interior point** on the exact law ([`Central`]), a starter: some 8 to 20 iterations lead near the solution of a problem
@@ -113,6 +113,8 @@ impl Described for Auto {
 
 /// A first stage of sweeps is at least this long, unless it ends at the tolerance.
 const FIRST_SWEEPS: usize = 30;
+/// After so many of them rest is looked for once, which costs about as much as the others.
+const GLANCE: usize = 5;
 /// Sweeps of a step.
 const SWEEPS_A_STEP: usize = 10;
 /// Steps of sweeps between two looks of the judge, each of which costs some three sweeps; other steps are judged one by one.
@@ -196,11 +198,11 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     done: Done,
 }
 
-/// Where the method stands. A search for rest may have been put off.
+/// Where the method stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
     Sweeps { claims: usize },
-    Rest { later: bool },
+    Rest,
     Trial { idle: usize, least: f64, rescues: usize },
     Interior { halvings: Halvings, short: usize },
     Newton,
@@ -366,7 +368,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
         work.exact = None;
         match work.stage {
             Stage::Sweeps { claims } => self.sweep(problem, point, work, claims),
-            Stage::Rest { .. } => self.rest(problem, point, work),
+            Stage::Rest => self.rest(problem, point, work),
             Stage::Trial { .. } => self.trial(problem, point, work),
             Stage::Interior { .. } => self.interior(problem, point, work),
             Stage::Newton => self.newton(problem, point, work),
@@ -428,7 +430,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
         }
         if rest > 0 {
             lines.push(match work.stage {
-                Stage::Rest { .. } => format!("impulses at rest, found in {rest} iterations"),
+                Stage::Rest => format!("impulses at rest, found in {rest} iterations"),
                 _ => "impulses at rest, sought in vain".into(),
             });
         }
@@ -582,6 +584,12 @@ impl<const D: usize> OnContacts<Auto, D> {
             if runs_away(estimate) {
                 break;
             }
+            let swept = work.done.sweeps;
+            if (GLANCE..GLANCE + together).contains(&swept)
+                && self.rests_at_a_glance(problem, point, work, estimate)
+            {
+                return Step::Continue { estimate };
+            }
             if estimate <= 0.3 * work.tolerance && claims < SWEEPS_A_STEP {
                 work.stage = Stage::Sweeps { claims: claims + 1 };
                 return Step::Continue { estimate };
@@ -709,13 +717,13 @@ impl<const D: usize> OnContacts<Auto, D> {
         (work.done.sweeps as f64) * costs.sweep < costs.worth
     }
 
-    /// The parts of the later stages, and whichever comes first.
-    fn leave_sweeps<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+    /// The parts of the later stages, and the error of the point.
+    fn look_round<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
-    ) {
+    ) -> f64 {
         self.make_room_for_cadoux(problem, work);
         let HybridWork { newton, state, controller, .. } = work;
         let newton = newton.get_or_insert_with(|| Box::new(ProximalNewton::new(problem, state)));
@@ -731,6 +739,17 @@ impl<const D: usize> OnContacts<Auto, D> {
         if work.done.start == Start::Given && error < NEAR {
             work.rest = RestSearch::Done;
         }
+        error
+    }
+
+    /// Whichever stage comes first after the sweeps.
+    fn leave_sweeps<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) {
+        let error = self.look_round(problem, point, work);
         if !self.0.interior {
             self.subproblem(point, work, error);
         } else {

@@ -16,9 +16,11 @@ use crate::contact::parts::{Central, REST, Way};
 const OPENING: f64 = 5e-3;
 const FALLING_AT_ONCE: f64 = 0.35;
 const FALLING: f64 = 0.6;
-/// Where it was sought at once it is given up where its first iteration leaves more than this (at rest at most 5e-2, else .2 and more), and is not judged by its rate before so many.
-const REST_NEAR: f64 = 0.1;
-const REST_FIRST: usize = 6;
+/// At a glance where there are so many contacts and a sweep still moves so much of ‖q‖: others are nearly at the end of their sweeps.
+const GLANCE_CONTACTS: usize = 10;
+const GLANCE_ABOVE: f64 = 1e-2;
+/// It is given up where an iteration has claimed so much less than the tolerance: its impulses have been judged, in vain.
+const CLAIMED: f64 = 1e-2;
 /// Newton's method is tried with this ε, until so many iterations in a row have not halved the error, or its first direction leads this far; where W has little spread, below this error.
 const TRIAL_BELOW: f64 = 1e-2;
 const TRIAL_EPSILON: f64 = 1e-9;
@@ -91,7 +93,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             return self.begin_trial(problem, point, work, error);
         }
         let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
-        let opening = work.newton.as_ref().map_or(f64::NAN, |n| n.opening(P::impulses(point)));
+        let opening = self.opening(point, work);
         let quiet = opening < OPENING;
         let at_once = quiet || opening < FALLING_AT_ONCE * error && !has_spread(problem, work);
         if !at_once && work.rest == RestSearch::Open && self.sweeps_are_cheap(work, costs) {
@@ -103,13 +105,54 @@ impl<const D: usize> OnContacts<Auto, D> {
         if !quiet && (!falls || has_spread(problem, work)) {
             return self.begin_trial(problem, point, work, error);
         }
-        let HybridWork { alternating, state, stage, .. } = work;
-        if alternating.get_or_insert_default().begin(problem, state, Way::Rest, None).is_ok() {
-            work.rate.begin();
-            *stage = Stage::Rest { later: !quiet };
-        } else {
+        if !self.seek_rest(problem, work) {
             self.without_rest(problem, point, work, error);
         }
+    }
+
+    /// Begins stage 2 after a few sweeps, whose last one moved so much, where nothing flies apart.
+    pub(super) fn rests_at_a_glance<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        moves: f64,
+    ) -> bool {
+        let ends_soon = problem.contacts() < GLANCE_CONTACTS || moves < GLANCE_ABOVE;
+        if ends_soon || work.bounded || !self.0.interior {
+            return false;
+        }
+        self.look_round(problem, point, work);
+        if work.rest == RestSearch::Open && self.opening(point, work) < OPENING {
+            work.rest = RestSearch::Done;
+            return self.seek_rest(problem, work);
+        }
+        problem.enter(&mut work.state, point);
+        false
+    }
+
+    /// How fast the contacts without impulse open, in units of ‖q‖.
+    fn opening<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        point: &mut P::Point,
+        work: &HybridWork<P, D>,
+    ) -> f64 {
+        work.newton.as_ref().map_or(f64::NAN, |newton| newton.opening(P::impulses(point)))
+    }
+
+    /// Begins stage 2 if the matrix can be factorised.
+    fn seek_rest<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        work: &mut HybridWork<P, D>,
+    ) -> bool {
+        let HybridWork { alternating, state, stage, rate, .. } = work;
+        let begun = alternating.get_or_insert_default().begin(problem, state, Way::Rest, None);
+        if begun.is_ok() {
+            rate.begin();
+            *stage = Stage::Rest;
+        }
+        begun.is_ok()
     }
 
     /// Stage 2: one iteration of the search for rest.
@@ -119,19 +162,20 @@ impl<const D: usize> OnContacts<Auto, D> {
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) -> Step {
+        // It has claimed the tolerance, and the judge did not agree.
+        if work.rate.left(CLAIMED * work.tolerance) < 0.0 {
+            let error = self.end_alternating(problem, point, work);
+            self.without_rest(problem, point, work, error);
+            return Step::Continue { estimate: error };
+        }
         work.done.rest += 1;
-        let (estimate, steps) = match self.alternated(problem, point, work) {
-            Some(iterate) => iterate,
-            None => return lost(),
-        };
-        let (Stage::Rest { later }, Some(alternating)) = (work.stage, &work.alternating) else {
+        let Some((estimate, _)) = self.alternated(problem, point, work) else {
             return lost();
         };
-        let (young, hopeless) = if later {
-            (alternating.is_young(), alternating.is_hopeless(estimate))
-        } else {
-            (estimate < REST_NEAR && steps < REST_FIRST, estimate.is_nan())
+        let Some(alternating) = &work.alternating else {
+            return lost();
         };
+        let (young, hopeless) = (alternating.is_young(), alternating.is_hopeless(estimate));
         if hopeless || !young && !self.promises(problem, work, REST) {
             let error = self.end_alternating(problem, point, work);
             self.without_rest(problem, point, work, error);
@@ -148,7 +192,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         error: f64,
     ) {
         let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
-        if self.sweeps_are_cheap(work, costs) {
+        if work.done.sweeps < FIRST_SWEEPS || self.sweeps_are_cheap(work, costs) {
             problem.enter(&mut work.state, point);
             work.rate.begin();
             work.stage = FIRST;

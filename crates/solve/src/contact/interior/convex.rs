@@ -131,7 +131,7 @@ impl<P: Linearised<D> + Frictional<D>, const D: usize> Solver<P>
     fn start(&self, problem: &P, _: &mut P::Point, work: &mut Self::Work) {
         work.rate.begin();
         work.stage = Stage::Rest;
-        if work.rest.begin(problem, &mut work.state, Way::Relaxed, None).is_err() {
+        if work.rest.begin(problem, &mut work.state, Way::Rest, None).is_err() {
             work.begin_interior(problem);
         }
     }
