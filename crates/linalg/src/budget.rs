@@ -5,7 +5,7 @@
 //! return early with the error that they have for a matrix that cannot be factorised; who installed the budget knows better what that means.
 
 use std::cell::{Cell, RefCell};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -34,12 +34,25 @@ thread_local! {
     static RAISED: Cell<bool> = const { Cell::new(false) };
     /// The last factorisation that was refused in the present scope.
     static REFUSED: Cell<Option<TooLarge>> = const { Cell::new(None) };
+    /// The number of the outermost scope, 0 outside of all.
+    static COMPUTATION: Cell<u64> = const { Cell::new(0) };
+}
+
+/// Outermost scopes so far, of all threads.
+static COMPUTATIONS: AtomicU64 = AtomicU64::new(0);
+
+/// The number of the computation that the present thread is in, that is of its outermost scope: what a function has said is remembered for as long as it stays the same, since between two
+/// computations the caller may have changed what the function goes by. `None` outside of all scopes.
+pub fn computation() -> Option<std::num::NonZeroU64> {
+    std::num::NonZeroU64::new(COMPUTATION.get())
 }
 
 /// A budget in force; what was in force before returns when it is dropped.
 #[derive(Debug)]
 pub struct Scope {
     before: Budget,
+    /// The number of the computation outside.
+    outside: u64,
     raised: bool,
     refused: Option<TooLarge>,
     /// The scope belongs to the thread that entered it.
@@ -66,8 +79,13 @@ impl Budget {
         };
         ARMED.set(now.deadline.is_some() || now.cancel.is_some());
         CURRENT.set(now);
+        let outside = COMPUTATION.get();
+        if outside == 0 {
+            COMPUTATION.set(1 + COMPUTATIONS.fetch_add(1, Ordering::Relaxed));
+        }
         Scope {
             before,
+            outside,
             raised: RAISED.replace(false),
             refused: REFUSED.replace(None),
             here: std::marker::PhantomData,
@@ -106,6 +124,7 @@ impl Drop for Scope {
         // What an outer limit cut short inside was cut short outside too; what the inner scope gave itself is its own matter.
         RAISED.set(self.raised || (RAISED.get() && before.is_over()));
         CURRENT.set(before);
+        COMPUTATION.set(self.outside);
         REFUSED.set(REFUSED.get().or(self.refused));
     }
 }

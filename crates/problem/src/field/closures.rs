@@ -3,13 +3,15 @@
 use std::fmt;
 use std::sync::Arc;
 
+use super::memory::{JACOBIANS, Memory, VALUES};
 use super::{Evaluator, Field, Pattern};
 use crate::ProblemError;
 
 /// `f = F(x)`, or JF along a pattern.
 pub(super) type Closure = Arc<dyn Fn(&[f64], &mut [f64]) + Send + Sync>;
 
-/// `F: ℝⁿ → ℝⁿ` by a closure, with its Jacobian by another. Numbers that are not finite say that F is not defined there.
+/// `F: ℝⁿ → ℝⁿ` by a closure, with its Jacobian by another. Numbers that are not finite say that F is not defined there. Both are functions of x
+/// for as long as a solve lasts: what they said is remembered for so long.
 ///
 /// ```
 /// use nonsmooth_problem::field::{Closures, Evaluator, Field, Pattern};
@@ -32,6 +34,9 @@ pub struct Closures {
     pattern: Arc<Pattern>,
     value: Closure,
     jacobian: Closure,
+    /// What they said.
+    values: Arc<Memory>,
+    jacobians: Arc<Memory>,
 }
 
 impl Closures {
@@ -48,6 +53,8 @@ impl Closures {
             pattern: Arc::new(pattern),
             value: Arc::new(value),
             jacobian: Arc::new(jacobian),
+            values: Arc::default(),
+            jacobians: Arc::default(),
         })
     }
 }
@@ -78,15 +85,10 @@ impl Field for Closures {
 
 impl Evaluator for Closures {
     fn value(&mut self, x: &[f64], f: &mut [f64]) -> bool {
-        (self.value)(x, f);
-        f.iter().all(|f| f.is_finite())
+        self.values.recall(VALUES, x, f, &*self.value)
     }
 
     fn jacobian(&mut self, x: &[f64], f: &mut [f64], jacobian: &mut [f64]) -> bool {
-        if !self.value(x, f) {
-            return false;
-        }
-        (self.jacobian)(x, jacobian);
-        jacobian.iter().all(|j| j.is_finite())
+        self.value(x, f) && self.jacobians.recall(JACOBIANS, x, jacobian, &*self.jacobian)
     }
 }

@@ -15,6 +15,7 @@ use nonsmooth_linalg::budget;
 
 use super::closures::Closure;
 use super::groups::Groups;
+use super::memory::{JACOBIANS, Memory, VALUES};
 use super::probe::{Seen, points, probed};
 use super::{Evaluator, Field, Pattern};
 use crate::ProblemError;
@@ -42,6 +43,9 @@ const SMALL: f64 = 1e-3;
 pub struct Differences {
     value: Closure,
     shape: Arc<Shape>,
+    /// What was said of F, and what came of it.
+    values: Arc<Memory>,
+    jacobians: Arc<Memory>,
 }
 
 /// Where the Jacobian may not be zero.
@@ -110,7 +114,8 @@ impl Differences {
 
     fn of(value: Closure, pattern: Pattern, probed: bool) -> Self {
         let groups = Groups::of(&pattern, pattern.rows());
-        Self { value, shape: Arc::new(Shape { pattern, groups, probed }) }
+        let shape = Arc::new(Shape { pattern, groups, probed });
+        Self { value, shape, values: Arc::default(), jacobians: Arc::default() }
     }
 }
 
@@ -149,21 +154,28 @@ struct Running {
 
 impl Evaluator for Running {
     fn value(&mut self, x: &[f64], f: &mut [f64]) -> bool {
-        (self.field.value)(x, f);
-        f.iter().all(|f| f.is_finite())
+        self.field.values.recall(VALUES, x, f, &*self.field.value)
     }
 
     fn jacobian(&mut self, x: &[f64], f: &mut [f64], jacobian: &mut [f64]) -> bool {
         if budget::over() || !self.value(x, f) {
             return false;
         }
+        let memory = self.field.jacobians.clone();
+        memory.recall(JACOBIANS, x, jacobian, |x, jacobian| self.differences(x, f, jacobian))
+    }
+}
+
+impl Running {
+    /// The entries of the Jacobian at x, where F is f. NaN where F is not defined about x, or the time is over.
+    fn differences(&mut self, x: &[f64], f: &[f64], jacobian: &mut [f64]) {
         let Self { field, y, sides } = self;
         let Shape { pattern, groups, .. } = &*field.shape;
         y.clear();
         y.extend_from_slice(x);
         for (colour, columns) in groups.columns.iter().enumerate() {
             if budget::over() {
-                return false;
+                return jacobian.fill(f64::NAN);
             }
             let mut look = |side: &mut Vec<f64>, times: f64| {
                 columns.iter().for_each(|&j| y[j] = x[j] + times * step(x[j]));
@@ -192,7 +204,6 @@ impl Evaluator for Running {
                 };
             }
         }
-        jacobian.iter().all(|j| j.is_finite())
     }
 }
 

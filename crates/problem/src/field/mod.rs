@@ -7,7 +7,7 @@
 //! | [`Closures`] | a closure | another closure |
 //! | [`Differences`] | a closure | central differences, several columns at once |
 //!
-//! The last three do not know the terms of a row: the judge takes them from the Jacobian, and has F in plain arithmetic only.
+//! The last three do not know the terms of a row: the judge takes them from the Jacobian, and has F in plain arithmetic only. Within a solve closures are not asked twice at the last points.
 
 mod closures;
 mod differences;
@@ -15,6 +15,7 @@ mod differences;
 mod duals;
 mod expression;
 mod groups;
+mod memory;
 mod probe;
 #[cfg(test)]
 mod tests;

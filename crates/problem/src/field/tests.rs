@@ -228,3 +228,67 @@ fn a_pattern_that_is_none_is_refused() {
     assert!(refused(&[&[1, 0], &[0]]).starts_with("pattern[0][1]:"));
     assert!(Differences::probed(&[f64::NAN], |_, _| ()).is_err());
 }
+
+/// F and JF by closures that count how often they are asked; J by differences without the second.
+#[test]
+fn within_a_computation_closures_are_not_asked_twice_at_a_point() {
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use nonsmooth_linalg::budget::Budget;
+
+    let asked = Arc::new([AtomicUsize::new(0), AtomicUsize::new(0)]);
+    let counted = |which: usize| {
+        let asked = asked.clone();
+        move || asked[which].fetch_add(1, Ordering::Relaxed)
+    };
+    let so_far = || [0, 1].map(|which: usize| asked[which].swap(0, Ordering::Relaxed));
+    let pattern = || Pattern::dense(2);
+    let (value, slope, alone) = (counted(0), counted(1), counted(0));
+    let f = |x: &[f64], f: &mut [f64]| (f[0], f[1]) = (x[0].ln(), x[0] * x[1]);
+    let closures = Closures::new(
+        pattern(),
+        move |x, out| {
+            value();
+            f(x, out);
+        },
+        move |x, j| {
+            slope();
+            j.copy_from_slice(&[1.0 / x[0], 0.0, x[1], x[0]]);
+        },
+    );
+    let differences = Differences::new(pattern(), move |x, out| {
+        alone();
+        f(x, out);
+    });
+    let fields: [(Arc<dyn Field>, _); 2] =
+        [(Arc::new(closures.unwrap()), [1, 1]), (Arc::new(differences.unwrap()), [5, 0])];
+    for (field, once) in fields {
+        let look = |at: &[f64]| {
+            // Of judge and solver.
+            let (mut f, mut j) = ([0.0; 2], [0.0; 4]);
+            for mut evaluator in [field.evaluator(), field.evaluator()] {
+                evaluator.value(at, &mut f);
+                evaluator.jacobian(at, &mut f, &mut j);
+            }
+            (f, j)
+        };
+        for _ in 0..2 {
+            let _scope = Budget::default().enter();
+            let first = look(&[2.0, 3.0]);
+            assert_eq!(so_far(), once);
+            assert_eq!((look(&[2.0, 3.0]), so_far()), (first, [0, 0]));
+            // Another point, but for a bit of its sign, and back.
+            look(&[2.0, 0.0]);
+            look(&[2.0, -0.0]);
+            assert_eq!(so_far(), once.map(|count| 2 * count));
+            assert_eq!((look(&[2.0, 3.0]).0, so_far()[0] <= once[0]), (first.0, true));
+            so_far();
+            // What is not defined is asked again.
+            look(&[-1.0, 3.0]);
+            assert!(so_far()[0] >= 2);
+        }
+        look(&[2.0, 3.0]);
+        assert!(so_far()[0] >= 2 * once[0]);
+    }
+}

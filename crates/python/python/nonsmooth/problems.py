@@ -280,7 +280,7 @@ class MCP(Problem):
     all entries or sparse; without it differences are taken, along ``pattern`` (a matrix, zero where JF is) where that is given; else F is called with NaN in some
     places to find out what depends on what. Where ``jac`` gives a sparse matrix and there is no pattern, the entries stored at ``x0`` are the pattern. ``x0`` is where solvers begin. Bounds are 0 and ∞ where nothing is said.
 
-    An exception in F or jac ends the solve and is raised from it.
+    An exception in F or jac ends the solve and is raised from it. Within a solve they are not called twice at the points last seen.
     """
 
     __slots__ = ()
