@@ -610,3 +610,18 @@ fn certificates_of_mixed_boxed_and_horizontal_problems() {
     let row = Certificate::Row { row: 0 };
     assert!(horizontal(1.0).verify(&row) && !horizontal(-1.0).verify(&row));
 }
+
+/// The terms of a row and its unit may be beyond the doubles where the row is not.
+#[test]
+fn numbers_near_the_largest_double_are_judged_as_others_are() {
+    let third = 1e308 / 3.0;
+    for exponent in [0, -900, -1000] {
+        let scale = 2_f64.powi(exponent);
+        let problem = lcp([[2.0, 1.0], [1.0, 2.0]], [-1e308 * scale; 2]);
+        let found = measure(&problem, &point(&[third * scale; 2]));
+        assert!(found.passes(1e-15), "{exponent}: {found:?}");
+        let off = measure(&problem, &point(&[third * scale * (1.0 + 1e-6); 2]));
+        assert!(!off.passes(1e-7) && off.passes(1e-5), "{exponent}: {off:?}");
+        assert!(!measure(&problem, &point(&[0.0; 2])).passes(0.1));
+    }
+}

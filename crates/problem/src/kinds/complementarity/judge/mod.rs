@@ -274,7 +274,8 @@ pub(crate) fn hand_on(units: &mut Vec<f64>, pattern: &Pattern, jacobian: &[f64])
 /// ω from the moduli of q in `units`, infinite where nothing is known; from those of bounds in `columns`, one for each matrix, what a distance counts in them.
 /// Whether the rest is known to have no connection. `next` is room.
 ///
-/// Products, quotients and maxima only: whatever powers of two the rows and columns are multiplied by, the units go with them to the last bit.
+/// Products, quotients and maxima only: whatever powers of two the rows and columns are multiplied by, the units go with them to the last bit. What is beyond the doubles is the
+/// largest of them, since infinity means that nothing is known.
 pub(crate) fn find_units(
     matrices: &[&Matrix],
     units: &mut [f64],
@@ -291,7 +292,7 @@ pub(crate) fn find_units(
             next.resize(columns.len(), 0.0);
             m.for_each(|i, j, x| {
                 if x != 0.0 && open(columns[j]) {
-                    next[j] = next[j].max(units[i] / x.abs());
+                    next[j] = next[j].max(capped(units[i] / x.abs()));
                 }
             });
             for (to, &from) in columns.iter_mut().zip(next.iter()) {
@@ -304,7 +305,7 @@ pub(crate) fn find_units(
         for (m, columns) in matrices.iter().zip(columns.iter()) {
             m.for_each(|i, j, x| {
                 if open(units[i]) {
-                    next[i] = next[i].max(x.abs() * columns[j]);
+                    next[i] = next[i].max(capped(x.abs() * columns[j]));
                 }
             });
         }
@@ -388,7 +389,7 @@ pub(crate) fn rounding(
 /// The largest error that a change of all variables by half their last bit makes.
 pub(crate) fn floor(terms: &[f64], scales: &[f64]) -> f64 {
     let rows = terms.iter().zip(scales).filter(|(_, d)| **d > 0.0);
-    0.5 * f64::EPSILON * rows.fold(0.0_f64, |most, (terms, d)| most.max(terms / d))
+    0.5 * f64::EPSILON * rows.fold(0.0_f64, |most, (terms, d)| most.max(capped(*terms) / d))
 }
 
 /// Overwrites `to`; whether that changed it.
