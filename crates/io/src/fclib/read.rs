@@ -94,7 +94,7 @@ fn stated(root: &Folder) -> Result<Friction, IoError> {
 #[allow(non_snake_case)]
 fn local<const D: usize, L: Law<D>>(g: &Folder) -> Result<FrictionLocal<D, L>, IoError> {
     let vectors = g.need("vectors")?;
-    let mu = g.mu(&vectors)?;
+    let mu = g.mu(&vectors, "s")?;
     let m = D * mu.len();
     let contacts = format!("{D} for each entry of vectors/mu");
     let W = g.matrix("W", (m, m), &contacts)?;
@@ -120,7 +120,7 @@ fn local<const D: usize, L: Law<D>>(g: &Folder) -> Result<FrictionLocal<D, L>, I
 #[allow(non_snake_case)]
 fn global<const D: usize, L: Law<D>>(g: &Folder) -> Result<FrictionGlobal<D, L>, IoError> {
     let vectors = g.need("vectors")?;
-    let mu = g.mu(&vectors)?;
+    let mu = g.mu(&vectors, "b")?;
     let m = D * mu.len();
     let f = vectors.reals("f", None)?;
     let n = f.len();
@@ -237,10 +237,10 @@ impl Folder<'_, '_> {
         if disks > 1 { self.reals("mu_r", None) } else { Ok(vec![]) }
     }
 
-    /// `mu`, checked first: all other sizes follow from its length.
-    fn mu(&self, vectors: &Folder) -> Result<Vec<f64>, IoError> {
+    /// `mu`, checked first: all other sizes follow from its length. Scalar rows, which the vector `rows` is of, are a problem without contacts too: that of a mechanism whose joints alone act.
+    fn mu(&self, vectors: &Folder, rows: &str) -> Result<Vec<f64>, IoError> {
         let mu = vectors.reals("mu", None)?;
-        if mu.is_empty() {
+        if mu.is_empty() && !vectors.has(rows)? {
             let problem = ProblemError::Empty { place: "mu".into() };
             return Err(invalid(self.file, &self.path)(problem));
         }

@@ -449,6 +449,27 @@ fn empty_multipliers_are_written_where_fclib_expects_them() {
     assert_same(&Fclib.read(&path).unwrap(), &content);
 }
 
+/// Those of a mechanism whose joints alone act.
+#[test]
+fn problems_without_contacts_are_read_back() {
+    let empty = |rows, columns| Csc::zeros(rows, columns);
+    let local = FrictionLocal::<3> {
+        W: Bsr::from_csc(&empty(0, 0)),
+        q: vec![],
+        mu: vec![],
+        mu_r: (),
+        rows: Some(RowsLocal::bilateral(empty(0, 2), csc(2, 2), vec![0.5, -0.0])),
+    };
+    let global = FrictionGlobal::<3> { H: empty(5, 0), w: vec![], mu: vec![], ..self::global() };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("file.hdf5");
+    for problem in [Friction::Local3(local), Friction::Global3(global)] {
+        let content = ProblemFile::new(problem);
+        Fclib.write(&path, &content).unwrap();
+        assert_same(&Fclib.read(&path).unwrap(), &content);
+    }
+}
+
 #[test]
 fn soft_links_are_followed() {
     // Moves what stands at `name` to `to`, if anything, and puts a link to `target` in its place.
