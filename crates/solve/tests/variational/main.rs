@@ -251,12 +251,17 @@ fn what_has_no_answer_ends_with_a_reason() {
         let Status::Stalled(why) = &answer.status else { panic!("{name}: {}", answer.status) };
         assert!(why.contains("empty"), "{name}: {why}");
     }
-    // Not defined at the start: Newton's methods begin inside.
+    // Not defined at the start: methods begin inside.
     let log = || expressions(["log(x1)".to_owned()]);
     let problem = Vi::new(log(), Set::orthant(1), vec![0.0]).unwrap();
-    let answer = solve("auto", &problem, 1e-10);
-    assert!(answer.is_solved(), "{}", answer.status);
-    close(&answer.point.z, &[1.0], 1e-8, "log");
+    for name in ["auto", "extragradient"] {
+        let answer = solve(name, &problem, 1e-10);
+        assert!(answer.is_solved(), "{name}: {}", answer.status);
+        close(&answer.point.z, &[1.0], 1e-8, "log");
+    }
+    // Nor anywhere.
+    let nowhere = expressions(["sqrt(-1 - x1^2)".to_owned()]);
+    let problem = Vi::new(nowhere, Set::orthant(1), vec![0.0]).unwrap();
     let answer = solve("extragradient", &problem, 1e-10);
     assert!(matches!(&answer.status, Status::Stalled(why) if why.contains("not defined")));
     assert_eq!(answer.point, problem.origin());
@@ -393,5 +398,19 @@ fn rows_that_contradict_each_other_among_many_have_no_solution() {
     assert!(!answer.is_solved(), "{:?}", answer.account);
     if let Status::Infeasible(proof) = &answer.status {
         assert!(empty.verify(proof.certificate()));
+    }
+}
+
+/// A start whose projection is the apex of a cone, where the logarithm is not defined, is moved inside.
+#[test]
+fn projections_begin_where_f_is_defined() {
+    let f = || expressions(["log(x1) - 1", "x2 - 2", "x3 - 2"].map(String::from));
+    for start in [[-1.0, 0.0, 0.0], [0.0; 3], [-100.0, 3.0, -4.0]] {
+        let set = Set::SecondOrderCone { dimension: 3 };
+        let problem = Vi::new(f(), set, start.to_vec()).unwrap();
+        for name in ["auto", "extragradient", "hyperplane"] {
+            let answer = solve(name, &problem, 1e-8);
+            assert!(answer.is_solved(), "{name} {start:?}: {}", answer.status);
+        }
     }
 }

@@ -1,14 +1,16 @@
 //! Projection methods: find x ∈ X with `F(x)ᵀ(y − x) ≥ 0` for all y ∈ X.
 //!
 //! They need values of F and projections on X only. All predict `x̄ = P_X(x − ρ F(x))` with a self-adaptive ρ (Khobotov1987, SolodovTseng1996); what they do with it tells them apart.
-//! Where F is not defined at a prediction, ρ is shortened.
+//! Where F is not defined at a prediction, ρ is shortened; where it is not at the start, the start is moved inside X.
 
 mod extragradient;
 mod fixed_point;
 mod hyperplane;
 
-use nonsmooth_problem::field::Evaluator;
+use nonsmooth_problem::field::{Evaluator, tentatively};
 use nonsmooth_problem::{LcpPoint, Vi};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 pub use crate::core::step_rule::{Ratio, StepRule};
 pub use extragradient::Extragradient;
@@ -64,6 +66,32 @@ impl State {
     fn evaluate(&mut self, x: &[f64]) -> bool {
         self.known = self.known || self.field.value(x, &mut self.f);
         self.known
+    }
+
+    /// Moves x ∈ X, where F is not defined, to the nearest of some points inside X where it is: means of projections of points about x, which are in X since it is convex, and off its border unless all of X is.
+    fn enter(&mut self, x: &mut [f64]) {
+        let size = x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let size = if size > 0.0 { size } else { 1.0 };
+        let mut random = Pcg64::seed_from_u64(1);
+        let mut mean = vec![0.0; x.len()];
+        for distance in INSIDE {
+            mean.fill(0.0);
+            for _ in 0..PAIRS {
+                self.trial_f.fill_with(|| random.random_range(-1.0..1.0));
+                for side in [size * distance, -size * distance] {
+                    if !self.project(x, side, |state| &state.trial_f) {
+                        return;
+                    }
+                    let part = 0.5 / PAIRS as f64;
+                    mean.iter_mut().zip(&self.trial).for_each(|(mean, y)| *mean += part * y);
+                }
+            }
+            if tentatively(|| self.field.value(&mean, &mut self.f)) {
+                x.copy_from_slice(&mean);
+                self.known = true;
+                return;
+            }
+        }
     }
 
     /// From F(x): `x̄ = P_X(x − ρ F(x))` and F(x̄) with a ρ that the rule accepts; the ratio. `None` where there is none.
@@ -125,6 +153,10 @@ macro_rules! solver {
                 // On the set.
                 if state.project(&point.z, 0.0, |state| &state.f) {
                     point.z.copy_from_slice(&state.trial);
+                    state.known = tentatively(|| state.field.value(&point.z, &mut state.f));
+                    if !state.known {
+                        state.enter(&mut point.z);
+                    }
                 }
             }
 
@@ -154,5 +186,10 @@ solver!(Extragradient);
 solver!(Hyperplane);
 
 pub(super) const NO_PROJECTION: &str = "there is no projection on the set: a polyhedron is empty";
+
+/// Distances to which a start is moved, in units of its size.
+const INSIDE: [f64; 8] = [1e-6, 1e-4, 1e-2, 0.1, 0.5, 1.0, 10.0, 100.0];
+/// Points on both sides of it whose projections make a mean.
+const PAIRS: usize = 4;
 
 const UNDEFINED: &str = "F is not defined at the iterate, nor near it along a step";
