@@ -1,6 +1,6 @@
 //! `auto` as long as the limits allow, and verdicts within them.
 
-use nonsmooth_linalg::{Dense, Matrix};
+use nonsmooth_linalg::{Csc, Dense, Matrix};
 use nonsmooth_problem::field::Expressions;
 use nonsmooth_problem::{AnyProblem, BoxLcp, Lcp, LcpPoint, Mcp, Mlcp, Problem};
 use nonsmooth_solve::{Limit, Solve, Status};
@@ -98,4 +98,61 @@ fn a_verdict_does_not_contradict_a_solve_that_its_limit_has_ended() {
     assert_eq!(late.is_solved(), late.verdict.solved, "{}", late.status);
     let zero = LcpPoint { z: vec![0.0; n] };
     assert!(!Solve::new().warm(&zero).time_limit(0.0).run(&problem).unwrap().verdict.solved);
+}
+
+/// `−Δu = λ eᵘ` on m × m points with `0 ≤ u ≤ bound`.
+fn bratu(m: usize, lambda: f64, bound: f64) -> Mcp {
+    let h = ((m + 1) * (m + 1)) as f64;
+    let rows = (0..m * m).map(|k| {
+        let (i, j) = (k / m, k % m);
+        let sides = [(i > 0, k.wrapping_sub(m)), (i + 1 < m, k + m)];
+        let sides = sides.into_iter().chain([(j > 0, k.wrapping_sub(1)), (j + 1 < m, k + 1)]);
+        let sides = sides.filter(|side| side.0).map(|(_, k)| format!(" - {h}*x{}", k + 1));
+        format!("{}*x{1} - {lambda}*exp(x{1}){2}", 4.0 * h, k + 1, sides.collect::<String>())
+    });
+    let f = Expressions::parse(&rows.collect::<Vec<_>>(), &[]).unwrap();
+    Mcp::new(f, vec![0.0; m * m], vec![bound; m * m], vec![0.0; m * m]).unwrap()
+}
+
+/// A crash finds the face row of points by row of points, and leaves no iterations for the rest.
+#[test]
+fn auto_takes_few_steps_on_grids_whose_face_moves() {
+    let answer = Solve::new().run(&bratu(32, 6.8, 4.0)).unwrap();
+    assert!(answer.is_solved(), "{}", answer.status);
+    assert!(answer.iterations < 50, "{} {:#?}", answer.iterations, answer.account);
+}
+
+/// A linear program with its dual, some of whose variables cost nothing: the prices of what they yield are zero, and no point has all of z and w positive.
+#[test]
+fn auto_leaves_interior_points_in_time_where_there_is_no_interior() {
+    let (n, m) = (800, 400);
+    let mut rng = Pcg64::seed_from_u64(1);
+    let mut entries = vec![];
+    for j in 0..n {
+        for _ in 0..4 {
+            let (i, a) = (rng.random_range(0..m), rng.random_range(0.1..1.0));
+            entries.extend([(n + i, j, a), (j, n + i, -a)]);
+        }
+    }
+    const FREE: usize = 40;
+    let unpriced: Vec<usize> = entries.iter().filter(|e| e.1 < FREE).map(|e| e.0).collect();
+    let matrix = Csc::from_triplets(n + m, n + m, entries.into_iter()).unwrap();
+    let pair = |_| match rng.random_range(0..4) {
+        0 => (0.0, 0.0),
+        1 => (0.0, rng.random_range(0.0..1.0)),
+        _ => (rng.random_range(0.0..1.0), 0.0),
+    };
+    let (mut z, mut w): (Vec<f64>, Vec<f64>) = (0..n + m).map(pair).unzip();
+    (z[..FREE].fill(0.5), w[..FREE].fill(0.0));
+    unpriced.iter().for_each(|&i| z[i] = 0.0);
+    let mut q = vec![0.0; n + m];
+    matrix.mul_add(1.0, &z, &mut q);
+    q.iter_mut().zip(&w).for_each(|(q, w)| *q = w - *q);
+    let answer = Solve::new().run(&Lcp::new(matrix, q).unwrap()).unwrap();
+    assert!(answer.is_solved(), "{} {:#?}", answer.status, answer.account);
+    // Its own end comes after some hundred and twenty.
+    let left = |line: &String| {
+        line.starts_with("ip_mehrotra") && line.contains("limit reached after 60 iterations")
+    };
+    assert!(answer.account.iter().any(left), "{:#?}", answer.account);
 }

@@ -30,6 +30,9 @@ use crate::{Limits, Observer, Outcome, Progress, Sample, Session, SolveError, St
 /// Up to this many variables arcs come before Newton's steps.
 const FEW: usize = 500;
 
+/// From so many on arcs come last.
+const MANY: usize = 2000;
+
 /// Iterations of arcs before another method is asked, where they are few: most problems need less. And after it has failed.
 const SHORT: usize = 40;
 const LONG: usize = 300;
@@ -82,10 +85,18 @@ impl Auto {
                     plan.anew(named("semismooth"), 60, "fast where the start is good")
                         .with("restarts", false)
                 };
-                // Pivots are the cheaper the fewer variables there are.
-                let plan = match problem.dim() <= FEW {
-                    true => arcs(newton(arcs(plan, SHORT)), LONG),
-                    false => arcs(newton(plan), LONG),
+                // Pivots are the cheaper the fewer variables there are. On grids a crash finds the face row of points by row of points, up to its end, and arcs cross a cell for each point that changes sides:
+                // from some thousand variables on other steps of Newton's come before them.
+                let plan = match problem.dim() {
+                    ..=FEW => arcs(newton(arcs(plan, SHORT)), LONG),
+                    n => {
+                        let plan = newton(plan).with("crash", false);
+                        let plan = match n >= MANY {
+                            true => plan.anew(named("newton_pfb"), 300, "before many pivots"),
+                            false => plan,
+                        };
+                        arcs(plan, LONG)
+                    }
                 };
                 plan.anew(named("proxi"), 150, "leaves stationary points").anew(
                     named("smooth"),

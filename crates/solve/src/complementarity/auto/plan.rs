@@ -149,6 +149,9 @@ const SINGLES: usize = 20;
 const SURE: usize = 2;
 const SURE_AGAIN: usize = 4;
 
+/// Iterations of an interior point, which takes some thirty where all goes well, before pivots.
+const INTERIOR: usize = 60;
+
 /// No entry of M + Mᵀ is negative, and the diagonal is positive: strictly copositive, so that Lemke's path ends in a solution.
 fn is_plainly_copositive(m: &Matrix) -> bool {
     let n = m.nrows();
@@ -351,7 +354,10 @@ pub(super) fn of_lcp(problem: &Lcp, settings: &Auto, stage: usize) -> Vec<Candid
         .when(blocks, |p| {
             p.then("block_pivoting", 300, facts.class()).with("most_singles", SINGLES)
         })
-        .when(facts.monotone() && facts.large(), |p| p.then("ip_mehrotra", 200, facts.class()))
+        // Where there is no point with all of z and w positive, as of linear programs with variables that cost nothing, it does not end; pivots do.
+        .when(facts.monotone() && facts.large(), |p| {
+            p.then("ip_mehrotra", if facts.pivotal() { INTERIOR } else { 200 }, facts.class())
+        })
         // A long path ends all the same.
         .when(tried && !facts.monotone() && facts.is(Class::CopositivePlus), |p| {
             p.anew("lemke", SURE_AGAIN * pivots(n), facts.class())
