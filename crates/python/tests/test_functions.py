@@ -90,6 +90,36 @@ def test_what_a_function_raises_is_raised(n):
     assert ns.solve(problem).solved
 
 
+def test_what_is_raised_while_a_pattern_is_looked_for_ends_it():
+    calls = 0
+
+    def F(x):
+        nonlocal calls
+        calls += 1
+        # As Ctrl-C does: once.
+        if calls == 4:
+            raise KeyboardInterrupt
+        return x**2 - 2
+
+    with pytest.raises(KeyboardInterrupt):
+        ns.MCP(F, np.ones(30))
+    assert calls == 4
+
+
+def test_a_solve_hardly_asks_at_a_point_again():
+    seen = []
+
+    def F(x):
+        seen.append(tuple(x))
+        return x**2 - 2
+
+    problem = ns.MCP(F, np.ones(3), jac=lambda x: np.diag(2 * x))
+    for _ in range(2):
+        seen.clear()
+        assert ns.solve(problem).solved
+        assert seen[0] == (1.0, 1.0, 1.0) and len(seen) <= 1.5 * len(set(seen))
+
+
 def test_functions_of_no_use_are_refused_at_once():
     with pytest.raises(ns.Error, match=r"F\(x\): expected 2 values, found 1"):
         ns.MCP(lambda x: [1.0], [1.0, 1.0])
