@@ -42,6 +42,7 @@
 //! (local), a step of 7 two or three, one of 10 some 10 to 20. The choice goes by counted operations, never by the clock, so a run repeats itself bit by bit.
 //! Fails: impacts on thousands of hyperstatic contacts may need more factorisations than patience allows.
 
+mod account;
 mod cadoux;
 mod controller;
 mod held;
@@ -66,6 +67,7 @@ use crate::contact::parts::{
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{Limits, SolveError, Solver, Step};
+use account::{Done, Start};
 use cadoux::Cadoux;
 use controller::{Controller, Origin, Verdict};
 use held::Held;
@@ -227,52 +229,6 @@ enum RestSearch {
     Done,
 }
 
-/// Where the solve began.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-enum Start {
-    /// The caller gave no other point.
-    #[default]
-    Zero,
-    /// The caller's point.
-    Given,
-    /// Zero, though the caller gave a point.
-    Refused,
-}
-
-/// What has been done, for the account.
-#[derive(Debug, Clone, Copy, Default)]
-struct Done {
-    start: Start,
-    sweeps: usize,
-    /// Passes over the contacts that moved most, between any sweeps.
-    followed: usize,
-    rest: usize,
-    trial: usize,
-    interior: usize,
-    interior_error: f64,
-    subproblems: usize,
-    failed: usize,
-    newton: usize,
-    between: usize,
-    projected: usize,
-    /// Rounds of motion and impulses, bodies that moved in the last one, and all; and the least error.
-    turns: [usize; 3],
-    turned_error: f64,
-    /// Convex problems of given sliding speeds, and the least error of their solutions.
-    convex: usize,
-    convex_error: f64,
-    /// How often, the steps of all, and the error of the last.
-    pursuits: usize,
-    pursued: usize,
-    pursued_error: f64,
-    /// How often, and how many iterations in all.
-    alternations: usize,
-    alternating: usize,
-    /// Searches for the rows at their bounds.
-    searches: usize,
-    strategies: usize,
-}
-
 impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: usize> Solver<P>
     for OnContacts<Auto, D>
 {
@@ -413,83 +369,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
     }
 
     fn account(&self, work: &Self::Work) -> Vec<String> {
-        let Done { start, sweeps, rest, trial, interior, interior_error, .. } = work.done;
-        let Done { subproblems, failed, newton, between, alternating, .. } = work.done;
-        let Done { followed, projected, pursued, pursued_error, .. } = work.done;
-        let mut lines = vec![];
-        match start {
-            Start::Zero => {}
-            Start::Given => lines.push("started from the point given".into()),
-            Start::Refused => {
-                lines.push("started from zero: the point given is farther off".into())
-            }
-        }
-        lines.push(format!("{sweeps} Gauss-Seidel sweeps"));
-        if followed > 0 {
-            lines.push(format!("{followed} passes over the contacts that moved most in a sweep"));
-        }
-        if rest > 0 {
-            lines.push(match work.stage {
-                Stage::Rest => format!("impulses at rest, found in {rest} iterations"),
-                _ => "impulses at rest, sought in vain".into(),
-            });
-        }
-        if trial > 0 {
-            lines.push(format!("{trial} Newton iterations on trial"));
-        }
-        if between > 0 && subproblems == 0 {
-            lines.push(format!("{between} sweeps after them"));
-        }
-        if interior > 0 {
-            lines.push(format!(
-                "{interior} interior-point iterations on the exact law, to {interior_error:.1e}"
-            ));
-        }
-        if subproblems > 0 {
-            let epsilon = work.controller.epsilon();
-            lines.push(format!(
-                "{subproblems} proximal subproblems ({failed} not solved, last epsilon \
-                 {epsilon:.0e}) in {newton} Newton iterations, {between} sweeps between them"
-            ));
-        }
-        if pursued > 0 {
-            lines.push(format!("{pursued} steps along the central path, to {pursued_error:.1e}"));
-        }
-        if alternating > 0 {
-            lines.push(format!("{alternating} iterations of alternating directions"));
-        }
-        if projected > 0 {
-            lines.push(format!("{projected} sweeps with one projection a contact, from zero"));
-        }
-        let [rounds, moving, bodies] = work.done.turns;
-        if rounds > 0 {
-            lines.push(format!(
-                "motion and impulses in turn, {rounds} times, at last with {moving} of {bodies} bodies moving, to {:.1e}",
-                work.done.turned_error
-            ));
-        }
-        if work.done.convex > 0 {
-            lines.push(format!(
-                "{} convex problems with given sliding speeds, to {:.1e}",
-                work.done.convex, work.done.convex_error
-            ));
-        }
-        if let Some(held) = &work.held {
-            let [sets, rows] = held.counts();
-            let inside = held.account(self);
-            lines.push(format!(
-                "rows at their bounds: {rows}, in set {sets} that was tried; the rest: {inside}"
-            ));
-        } else if work.done.searches > 0 {
-            lines.push("rows at their bounds, sought in vain".into());
-        }
-        if work.done.strategies > 0 {
-            lines.push(format!("{} changes of strategy", work.done.strategies));
-        }
-        if let Some(existence) = &work.existence {
-            lines.push(format!("existence of a solution: {}", existence.name()));
-        }
-        lines
+        account::of(self, work)
     }
 }
 
