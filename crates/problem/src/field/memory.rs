@@ -61,7 +61,8 @@ impl Memory {
             // Its room is of use.
             (at, values) = said.last.pop_front().unwrap_or_default();
         }
-        (at.clear(), values.clear());
+        at.clear();
+        values.clear();
         at.extend_from_slice(x);
         values.extend_from_slice(out);
         said.last.push_back((at, values));

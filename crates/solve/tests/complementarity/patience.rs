@@ -143,7 +143,8 @@ fn auto_leaves_interior_points_in_time_where_there_is_no_interior() {
         _ => (rng.random_range(0.0..1.0), 0.0),
     };
     let (mut z, mut w): (Vec<f64>, Vec<f64>) = (0..n + m).map(pair).unzip();
-    (z[..FREE].fill(0.5), w[..FREE].fill(0.0));
+    z[..FREE].fill(0.5);
+    w[..FREE].fill(0.0);
     unpriced.iter().for_each(|&i| z[i] = 0.0);
     let mut q = vec![0.0; n + m];
     matrix.mul_add(1.0, &z, &mut q);
