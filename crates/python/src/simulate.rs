@@ -3,7 +3,6 @@
 //! A world of Python is the document that a scene file is, so it is read, completed and refused by what reads files. A run is computed on another thread; the thread
 //! that asks waits, sees Ctrl-C, and runs the callback of each step.
 
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -34,17 +33,7 @@ pub fn read_scene(py: Python<'_>, path: PathBuf) -> PyResult<(String, Vec<String
         let folder = path.parent().unwrap_or(Path::new(""));
         let (text, warnings) = match Origin::of(&path) {
             Some(origin) => origin.read(&path).map(|made| (made.scene, made.warnings)),
-            None => {
-                let text = std::fs::read_to_string(&path).map_err(|e| match e.kind() {
-                    ErrorKind::InvalidData => expected(
-                        &name.to_string(),
-                        "a scene as TOML or JSON",
-                        "a file that is no text",
-                    ),
-                    _ => mistake(format!("{name}: expected a readable file, found: {e}")),
-                })?;
-                Ok((text, vec![]))
-            }
+            None => Ok((SceneFile::text(&path).map_err(mistake)?, vec![])),
         }
         .map_err(mistake)?;
         let mut scene = SceneFile::parse(&text, &[]).map_err(wrong)?;

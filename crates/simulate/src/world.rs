@@ -248,6 +248,17 @@ pub struct Compliance {
     pub damping: f64,
 }
 
+impl Compliance {
+    /// Errors: a stiffness, a damping or a restitution that contacts which give way cannot have, of the law at `key`.
+    pub(crate) fn validate(self, key: &str, e: f64) -> Result<(), SimulateError> {
+        let Self { stiffness, damping } = self;
+        let at = |field: &str| format!("{key}.{field}");
+        require(|| at("compliance.stiffness"), stiffness, stiffness > 0.0, "a positive number")?;
+        require(|| at("compliance.damping"), damping, damping >= 0.0, "a number of at least 0")?;
+        require(|| at("e"), e, e == 0.0, "0 where contacts have a compliance")
+    }
+}
+
 /// How many directions there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Dimension {
@@ -470,12 +481,7 @@ impl World {
         }
         for (&(a, b), compliance) in &self.compliances {
             let key = self.pair_place(a, b);
-            let Compliance { stiffness, damping } = *compliance;
-            let place = |field: &str| format!("{key}.compliance.{field}");
-            require(|| place("stiffness"), stiffness, stiffness > 0.0, "a positive number")?;
-            require(|| place("damping"), damping, damping >= 0.0, "a number of at least 0")?;
-            let e = self.law_between(a, b).e;
-            require(|| format!("{key}.e"), e, e == 0.0, "0 where contacts have a compliance")?;
+            compliance.validate(&key, self.law_between(a, b).e)?;
         }
         for (k, body) in self.bodies.iter_mut().enumerate() {
             body.validate(&entry("bodies", k, &body.name), count, &mut said)?;

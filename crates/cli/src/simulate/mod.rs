@@ -3,7 +3,6 @@
 mod record;
 mod said;
 
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -147,14 +146,7 @@ fn scene(args: &Args) -> Result<Option<SceneFile>, String> {
             return Err(format!("{name}: expected a file or a family of scenes, and {e}"));
         }
         _ => {
-            let text = std::fs::read_to_string(path).map_err(|e| match e.kind() {
-                ErrorKind::InvalidData => {
-                    format!(
-                        "{name}: expected a scene as TOML or JSON, found a file that is no text"
-                    )
-                }
-                _ => format!("{name}: expected a readable file, found: {e}"),
-            })?;
+            let text = SceneFile::text(path)?;
             let wrong = |e| format!("{name}: {e}");
             let mut scene = SceneFile::parse(&text, &changes).map_err(wrong)?;
             scene.load_meshes(path.parent().unwrap_or(Path::new(""))).map_err(wrong)?;

@@ -613,14 +613,12 @@ impl<'a> Builder<'a> {
     /// Lets all pairs without a law of their own give way.
     fn all_comply(&mut self, table: ComplianceTable, e: f64) -> Result<(), SimulateError> {
         let ComplianceTable { stiffness, damping } = table;
-        let at = |field: &str| format!("pairs_default.{field}");
-        require(|| at("compliance.stiffness"), stiffness, stiffness > 0.0, "a positive number")?;
-        require(|| at("compliance.damping"), damping, damping >= 0.0, "a number of at least 0")?;
-        require(|| at("e"), e, e == 0.0, "0 where contacts have a compliance")?;
+        let compliance = Compliance { stiffness, damping };
+        compliance.validate("pairs_default", e)?;
         let count = self.world.materials().len();
         for (a, b) in (0..count).flat_map(|b| (0..=b).map(move |a| (a, b))) {
             if !self.stated.contains(&(a, b)) {
-                self.world.comply(a, b, Compliance { stiffness, damping });
+                self.world.comply(a, b, compliance);
             }
         }
         Ok(())

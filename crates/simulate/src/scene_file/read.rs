@@ -1,5 +1,8 @@
 //! From text to a [`SceneFile`], and back.
 
+use std::io::ErrorKind;
+use std::path::Path;
+
 use nonsmooth_scenes::Scene;
 use nonsmooth_solve::settings::SettingsMap;
 use nonsmooth_solve::spelling::meant;
@@ -13,6 +16,21 @@ use super::{
 use crate::{Activation, MoreauJean, SimulateError};
 
 impl SceneFile {
+    /// The text of a scene in a file, for [`parse`](Self::parse).
+    ///
+    /// Errors: one line that begins with the file, which cannot be read or is no text.
+    pub fn text(file: &Path) -> Result<String, String> {
+        std::fs::read_to_string(file).map_err(|e| {
+            let name = file.display();
+            match e.kind() {
+                ErrorKind::InvalidData => format!(
+                    "{name}: expected a scene as TOML or JSON, found a file that is no text"
+                ),
+                _ => format!("{name}: expected a readable file, found: {e}"),
+            }
+        })
+    }
+
     /// Reads a scene from TOML, or from JSON where the text begins with `{`; `changes` are `key=value` with a path like `time.h` or `bodies[0].mass` and a TOML value (a word stands for itself).
     ///
     /// Errors: one line that begins with the place.
