@@ -89,7 +89,7 @@ impl Browser {
         let downloads = browser.folder.path().display().to_string();
         browser.call(
             "Browser.setDownloadBehavior",
-            json!({"behavior": "allow", "downloadPath": downloads}),
+            json!({"behavior": "allow", "downloadPath": downloads, "eventsEnabled": true}),
         );
         let page = browser.call("Target.createTarget", json!({"url": "about:blank"}));
         let attach = json!({"targetId": page["targetId"], "flatten": true});
@@ -180,16 +180,28 @@ impl Browser {
         self.events.iter().filter_map(told).collect()
     }
 
-    /// The content of a file that the page has saved, once it is whole.
+    /// The content of a file that the page has saved, once the browser says that it is whole: a file of that name may
+    /// stand, empty, before.
     pub fn saved(&mut self, name: &str) -> Vec<u8> {
-        let file = self.folder.path().join(name);
         let began = Instant::now();
-        // A download has another name until it is whole.
-        while !file.exists() {
-            assert!(began.elapsed() < PATIENCE, "never saved: {name}; {:?}", self.complaints());
-            std::thread::sleep(Duration::from_millis(20));
+        while !self.is_saved(name) {
+            let left = PATIENCE.saturating_sub(began.elapsed());
+            let Ok(event) = self.from.recv_timeout(left) else {
+                panic!("never saved: {name}; {:?}", self.complaints());
+            };
+            self.events.push(event);
         }
-        std::fs::read(file).expect("a saved file")
+        std::fs::read(self.folder.path().join(name)).expect("a saved file")
+    }
+
+    fn is_saved(&self, name: &str) -> bool {
+        let of = |method| self.events.iter().filter(move |e| e["method"] == method);
+        of("Browser.downloadWillBegin").any(|begun| {
+            let guid = &begun["params"]["guid"];
+            begun["params"]["suggestedFilename"] == name
+                && of("Browser.downloadProgress")
+                    .any(|e| e["params"]["guid"] == *guid && e["params"]["state"] == "completed")
+        })
     }
 }
 
