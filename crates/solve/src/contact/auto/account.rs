@@ -22,6 +22,8 @@ pub(super) enum Start {
 pub(super) struct Done {
     pub(super) start: Start,
     pub(super) sweeps: usize,
+    /// Accelerated sweeps after which all went back to where they began.
+    pub(super) taken_back: usize,
     /// Passes over the contacts that moved most, between any sweeps.
     pub(super) followed: usize,
     pub(super) rest: usize,
@@ -68,7 +70,10 @@ pub(super) fn of<
         Start::Given => lines.push("started from the point given".into()),
         Start::Refused => lines.push("started from zero: the point given is farther off".into()),
     }
-    lines.push(format!("{sweeps} Gauss-Seidel sweeps"));
+    lines.push(match work.done.taken_back {
+        0 => format!("{sweeps} Gauss-Seidel sweeps"),
+        back => format!("{sweeps} Gauss-Seidel sweeps, and {back} accelerated ones in vain"),
+    });
     if followed > 0 {
         lines.push(format!("{followed} passes over the contacts that moved most in a sweep"));
     }

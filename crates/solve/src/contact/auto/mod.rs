@@ -6,7 +6,7 @@
 //!
 //! 1. **Sweeps**: exact Gauss–Seidel for as long as its rate of convergence promises the tolerance sooner than a few
 //!    factorisations would, and after stage 2 until they have cost one. Many problems end here. Between them, here and in stage 6, the contacts that
-//!    still move are followed where they are few ([`Sweep::follow`]).
+//!    still move are followed where they are few ([`Sweep::follow`]), or the sweeps are accelerated, where a trial shows that it helps ([`Acceleration`]).
 //! 2. **Rest** (`parts/alternating.rs`): impulses within the cones that leave nothing moving, where the sweeps show nothing that flies apart: after five of them where they
 //!    still move much, else after the others. One factorisation and a few solves end structures at rest, whatever their height; two solves tell where nothing comes of it. Where contacts
 //!    open because weights have yet to come down to them, as in walls with head joints, it comes when the sweeps have cost a factorisation where they open fast.
@@ -42,6 +42,7 @@
 //! (local), a step of 7 two or three, one of 10 some 10 to 20. The choice goes by counted operations, never by the clock, so a run repeats itself bit by bit.
 //! Fails: impacts on thousands of hyperstatic contacts may need more factorisations than patience allows.
 
+mod accelerated;
 mod account;
 mod cadoux;
 mod controller;
@@ -62,7 +63,7 @@ use crate::contact::form::{
 };
 use crate::contact::law::local::{LocalSolver, Projection};
 use crate::contact::parts::{
-    Alternating, Central, Pursuit, Rate, Sweep, put_within_bounds, sweep_rows,
+    Acceleration, Alternating, Central, Pursuit, Rate, Sweep, put_within_bounds, sweep_rows,
 };
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
@@ -107,6 +108,7 @@ impl Described for Auto {
             "Acary2018",
             "HintermullerItoKunisch2002",
             "Cadoux2009",
+            "Anderson1965",
         ],
         variants: &["interior=false"],
         settings: described::<Self>,
@@ -177,6 +179,9 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     stage: Stage,
     /// Of the sweeps, of the alternating directions.
     rate: Rate,
+    acceleration: Acceleration,
+    /// The rate and the sweeps where its trial began.
+    mark: (Rate, usize),
     /// Whether W has spread, where that was asked, and room for finding it out.
     spread: Option<bool>,
     units: Vec<f64>,
@@ -257,6 +262,8 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             tolerance: 0.0,
             stage: FIRST,
             rate: Rate::default(),
+            acceleration: Acceleration::default(),
+            mark: (Rate::default(), 0),
             spread: None,
             units: vec![],
             inner_best: vec![],
@@ -307,6 +314,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
         problem.enter(&mut work.state, point);
         work.stage = FIRST;
         work.rate.begin();
+        work.acceleration.begin();
         (work.existence, work.exact, work.asked) = (None, None, false);
         work.doubted = false;
         (work.passed_by, work.rest, work.spread) = (None, RestSearch::default(), None);
@@ -451,6 +459,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         claims: usize,
     ) -> Step {
         let mut estimate = f64::NAN;
+        if !work.bounded {
+            self.accelerate(problem, point, work);
+        }
         let together = work.sweep.together(SWEEPS_A_STEP);
         for _ in 0..SWEEPS_A_STEP / together {
             let (r, lambda) = P::all_impulses(point);
@@ -498,7 +509,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         let promising =
             if with != without && starts::has_spread(problem, work) { with } else { without }
                 || work.rest != RestSearch::Open && self.sweeps_are_cheap(work, costs);
-        if !promising {
+        if !promising && !self.goes_back(problem, point, work) {
             self.leave_sweeps(problem, point, work);
         }
         Step::Continue { estimate }
@@ -582,7 +593,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         work: &mut HybridWork<P, D>,
         estimate: f64,
     ) {
-        if !runs_away(estimate) {
+        if !runs_away(estimate) && !work.acceleration.is_on() {
             let r = P::impulses(point);
             work.done.followed += work.sweep.follow(problem, &mut work.state, r);
         }
@@ -748,6 +759,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
             let left = work.controller.sweeps(costs.worth / costs.sweep);
             work.before.copy_from_slice(P::impulses(point));
+            work.acceleration.begin_again();
             work.stage = Stage::Between { left };
         } else {
             self.subproblem(point, work, error);
@@ -764,7 +776,10 @@ impl<const D: usize> OnContacts<Auto, D> {
         left: usize,
     ) -> Step {
         let count = left.min(2 * SWEEPS_A_STEP);
-        let HybridWork { sweep, state, scale, .. } = work;
+        let HybridWork { sweep, state, scale, acceleration, .. } = work;
+        if acceleration.is_trusted() {
+            acceleration.move_on(problem, state, point);
+        }
         let estimate = swept(sweep, problem, state, P::impulses(point), (count, *scale));
         work.done.between += count;
         self.follow(problem, point, work, estimate);
@@ -949,7 +964,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         } else {
             // Some problems want nothing but sweeps, tens of thousands: as many as the strategy before took time for.
             problem.enter(&mut work.state, point);
-            let HybridWork { projected, state, controller, costs, before, stage, .. } = work;
+            let HybridWork {
+                projected, state, controller, costs, before, stage, acceleration, ..
+            } = work;
             let costs = *costs.get_or_insert_with(|| problem.costs(state));
             let left = controller.long_sweeps(from, costs.worth / costs.sweep);
             *stage = if from == Origin::Projected {
@@ -958,6 +975,7 @@ impl<const D: usize> OnContacts<Auto, D> {
                 Stage::Projected { left }
             } else {
                 before.copy_from_slice(P::impulses(point));
+                acceleration.begin_again();
                 Stage::Between { left }
             };
         }

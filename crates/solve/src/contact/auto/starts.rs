@@ -195,6 +195,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         if work.done.sweeps < FIRST_SWEEPS || self.sweeps_are_cheap(work, costs) {
             problem.enter(&mut work.state, point);
             work.rate.begin();
+            work.acceleration.begin_again();
             work.stage = FIRST;
         } else {
             self.begin_trial(problem, point, work, error);
@@ -307,6 +308,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         let most = SWEEP_AGAIN * costs.worth / costs.sweep;
         work.before.copy_from_slice(P::impulses(point));
         problem.enter(&mut work.state, point);
+        work.acceleration.begin_again();
         work.stage = Stage::Between { left: work.done.sweeps.min(most as usize).max(1) };
     }
 

@@ -8,6 +8,8 @@
 //! References: Anderson1965; WalkerNi2011 for the QR form and the control of the condition number.
 //! Cost of a proposal: about 8 m products of length n. Storage: 2 m + 4 vectors. A nonsmooth g has no theory: hence the safeguard.
 
+use nonsmooth_linalg::budget;
+
 /// The largest condition number (1-norm) of R.
 const CONDITION: f64 = 1e8;
 
@@ -67,7 +69,7 @@ impl Anderson {
     }
 
     /// Takes `f(x)` and `g(x)` and turns g into the next x; returns the number of differences used. f may be any invertible linear
-    /// image of `g(x) − x`: it only sets the norm of the least squares problem.
+    /// image of `g(x) − x`: it only sets the norm of the least squares problem. It proposes nothing where the budget is over.
     pub fn propose(&mut self, f: &[f64], g: &mut [f64]) -> usize {
         if self.depth == 0 {
             return 0;
@@ -81,6 +83,9 @@ impl Anderson {
         self.f_last.copy_from_slice(f);
         self.g_last.copy_from_slice(g);
         self.has_last = true;
+        if budget::over() {
+            return 0;
+        }
         let (k, n) = (self.slots.len(), self.n);
         for j in 0..k {
             self.gamma[j] = dot(&self.q[j * n..(j + 1) * n], f);
@@ -113,6 +118,9 @@ impl Anderson {
         r.fill(0.0);
         for _ in 0..2 {
             for (j, q) in done.chunks_exact(n).enumerate() {
+                if budget::over() {
+                    return;
+                }
                 let along = dot(q, column);
                 r[j] += along;
                 add(column, -along, q);
@@ -233,8 +241,8 @@ impl Accelerator {
         self.start.copy_from_slice(x);
     }
 
-    /// Turns `g(x)` into the next x; the norm is that of `weight(i) f_i`.
-    pub fn advance(&mut self, g: &mut [f64], weight: &dyn Fn(usize) -> f64) {
+    /// Turns `g(x)` into the next x; returns `‖( weight(i) f_i )_i‖`, `f = g(x) − x`.
+    pub fn advance(&mut self, g: &mut [f64], weight: &dyn Fn(usize) -> f64) -> f64 {
         for (i, f) in self.f.iter_mut().enumerate() {
             *f = weight(i) * (g[i] - self.start[i]);
         }
@@ -243,11 +251,20 @@ impl Accelerator {
             self.anderson.clear();
             self.proposed = false;
             g.copy_from_slice(&self.plain);
-            return;
+            return size;
         }
         self.size = size;
         self.plain.copy_from_slice(g);
         self.proposed = self.anderson.propose(&self.f, g) > 0;
+        size
+    }
+
+    /// Puts the last `g(x)` back in place of what was proposed for it, and forgets the history.
+    pub fn take_back(&mut self, x: &mut [f64]) {
+        if self.proposed {
+            x.copy_from_slice(&self.plain);
+        }
+        self.forget();
     }
 }
 

@@ -1,5 +1,6 @@
 //! What two families of the wing share.
 
+mod acceleration;
 mod alternating;
 mod anderson;
 mod central;
@@ -12,6 +13,7 @@ mod rows;
 mod speeds;
 mod sweep;
 
+pub use acceleration::Acceleration;
 pub use alternating::{Alternating, REST, Way};
 pub use anderson::{Accelerator, Anderson};
 pub use central::{Central, Iterate as CentralIterate};

@@ -1,0 +1,48 @@
+//! The sweeps of stage 1, accelerated on trial: what the trial has cost counts for nothing where it is taken back.
+
+use super::{Auto, HybridWork};
+use crate::contact::form::{Disked, Linearised, OnContacts};
+
+/// A trial of so many steps has left its mark on the point: where the sweeps no longer promise anything it is taken back before they are left.
+const MARKED: usize = 4;
+
+impl<const D: usize> OnContacts<Auto, D> {
+    /// Before a step of sweeps: where it begins.
+    pub(super) fn accelerate<P: Linearised<D> + Disked<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) {
+        let before = work.acceleration.is_on();
+        if !work.acceleration.move_on(problem, &mut work.state, point) {
+            work.forget_the_trial();
+        } else if !before && work.acceleration.on_trial().is_some() {
+            work.mark = (work.rate.clone(), work.done.sweeps);
+        }
+    }
+
+    /// Where the sweeps no longer promise anything: back to where a trial began, if one is under way and has left its mark.
+    pub(super) fn goes_back<P: Linearised<D> + Disked<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) -> bool {
+        let marked = work.acceleration.on_trial().is_some_and(|steps| steps >= MARKED);
+        if marked {
+            work.acceleration.go_back(problem, &mut work.state, point);
+            work.forget_the_trial();
+        }
+        marked
+    }
+}
+
+impl<P: Linearised<D> + Disked<D>, const D: usize> HybridWork<P, D> {
+    /// The point is the one where the trial began.
+    fn forget_the_trial(&mut self) {
+        let (rate, sweeps) = &self.mark;
+        self.done.taken_back += self.done.sweeps - sweeps;
+        (self.rate, self.done.sweeps) = (rate.clone(), *sweeps);
+    }
+}
