@@ -1,5 +1,7 @@
 //! The sweeps of stage 1, accelerated on trial: what the trial has cost counts for nothing where it is taken back.
 
+use nonsmooth_linalg::budget;
+
 use super::{Auto, HybridWork};
 use crate::contact::form::{Disked, Linearised, OnContacts};
 
@@ -29,12 +31,14 @@ impl<const D: usize> OnContacts<Auto, D> {
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) -> bool {
+        // Out of time, what the trial came to is the best there is.
         let marked = work.acceleration.on_trial().is_some_and(|steps| steps >= MARKED);
-        if marked {
+        let goes_back = marked && !budget::over();
+        if goes_back {
             work.acceleration.go_back(problem, &mut work.state, point);
             work.forget_the_trial();
         }
-        marked
+        goes_back
     }
 }
 
