@@ -16,10 +16,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) {
-        let before = work.acceleration.is_on();
         if !work.acceleration.move_on(problem, &mut work.state, point) {
             work.forget_the_trial();
-        } else if !before && work.acceleration.on_trial().is_some() {
+        } else if work.acceleration.on_trial() == Some(0) {
             work.mark = (work.rate.clone(), work.done.sweeps);
         }
     }
@@ -31,14 +30,14 @@ impl<const D: usize> OnContacts<Auto, D> {
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) -> bool {
-        // Out of time, what the trial came to is the best there is.
         let marked = work.acceleration.on_trial().is_some_and(|steps| steps >= MARKED);
-        let goes_back = marked && !budget::over();
-        if goes_back {
-            work.acceleration.go_back(problem, &mut work.state, point);
-            work.forget_the_trial();
+        // Out of time, what the trial came to is the best there is.
+        if !marked || budget::over() {
+            return false;
         }
-        goes_back
+        work.acceleration.go_back(problem, &mut work.state, point);
+        work.forget_the_trial();
+        true
     }
 }
 

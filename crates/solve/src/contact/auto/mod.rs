@@ -205,6 +205,15 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     done: Done,
 }
 
+impl<P: Linearised<D> + Disked<D>, const D: usize> HybridWork<P, D> {
+    /// Begins so many sweeps of stage 6 at the point, whose impulses the state knows.
+    fn begin_between(&mut self, point: &mut P::Point, left: usize) {
+        self.before.copy_from_slice(P::impulses(point));
+        self.acceleration.begin_again();
+        self.stage = Stage::Between { left };
+    }
+}
+
 /// Where the method stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stage {
@@ -758,9 +767,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         if error > SWEEP_ABOVE {
             let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
             let left = work.controller.sweeps(costs.worth / costs.sweep);
-            work.before.copy_from_slice(P::impulses(point));
-            work.acceleration.begin_again();
-            work.stage = Stage::Between { left };
+            work.begin_between(point, left);
         } else {
             self.subproblem(point, work, error);
         }
@@ -964,20 +971,16 @@ impl<const D: usize> OnContacts<Auto, D> {
         } else {
             // Some problems want nothing but sweeps, tens of thousands: as many as the strategy before took time for.
             problem.enter(&mut work.state, point);
-            let HybridWork {
-                projected, state, controller, costs, before, stage, acceleration, ..
-            } = work;
-            let costs = *costs.get_or_insert_with(|| problem.costs(state));
-            let left = controller.long_sweeps(from, costs.worth / costs.sweep);
-            *stage = if from == Origin::Projected {
+            let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+            let left = work.controller.long_sweeps(from, costs.worth / costs.sweep);
+            if from == Origin::Projected {
+                let HybridWork { projected, state, stage, .. } = work;
                 let sweep = || Box::new(Sweep::with(Projection { step: OMEGA }, problem, state));
                 projected.get_or_insert_with(sweep);
-                Stage::Projected { left }
+                *stage = Stage::Projected { left };
             } else {
-                before.copy_from_slice(P::impulses(point));
-                acceleration.begin_again();
-                Stage::Between { left }
-            };
+                work.begin_between(point, left);
+            }
         }
         Step::Continue { estimate: f64::NAN }
     }

@@ -306,10 +306,8 @@ impl<const D: usize> OnContacts<Auto, D> {
         }
         let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
         let most = SWEEP_AGAIN * costs.worth / costs.sweep;
-        work.before.copy_from_slice(P::impulses(point));
         problem.enter(&mut work.state, point);
-        work.acceleration.begin_again();
-        work.stage = Stage::Between { left: work.done.sweeps.min(most as usize).max(1) };
+        work.begin_between(point, work.done.sweeps.min(most as usize).max(1));
     }
 
     /// Whether stage 4 was passed by in vain: Newton's iterations since have been too slow for what is left from this error.

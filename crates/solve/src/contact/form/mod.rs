@@ -30,6 +30,7 @@ pub use local::LocalState;
 pub use regularised::{Overwrite, Regularised, RegularisedState};
 
 use crate::SolveError;
+use crate::contact::law::cone::ConvexSet;
 use crate::contact::law::{ContactLaw, Coulomb, DiskLaw};
 
 /// How a family uses W.
@@ -155,6 +156,14 @@ fn held_and_left(held: &[Option<f64>]) -> (Vec<f64>, Vec<usize>) {
 /// Whether the problem has rows with bounds.
 pub fn has_bounds<P: Rows<D>, const D: usize>(problem: &P) -> bool {
     problem.bounds().is_some_and(|bounds| !bounds.are_free())
+}
+
+/// Puts impulses within the cones, each at the nearest point of its own.
+pub fn put_within_cones<P: Contacts<D>, const D: usize>(problem: &P, r: &mut [f64]) {
+    for c in 0..problem.contacts() {
+        let inside = problem.law(c).project(&small::block::<D>(r, c));
+        r[D * c..D * c + D].copy_from_slice(&inside);
+    }
 }
 
 /// Access contact by contact, as block Gauss–Seidel needs it.

@@ -12,8 +12,7 @@
 use nonsmooth_linalg::small;
 
 use super::anderson::Accelerator;
-use crate::contact::form::{Blockwise, Disked};
-use crate::contact::law::cone::ConvexSet;
+use crate::contact::form::{Blockwise, Disked, put_within_cones};
 
 /// Differences: three and eight do about as well.
 const DEPTH: usize = 5;
@@ -141,10 +140,7 @@ impl Acceleration {
             accelerator.take_back(r);
             (self.plain, self.on) = (PAUSE, false);
         } else {
-            for c in 0..problem.contacts() {
-                let inside = problem.law(c).project(&small::block::<D>(r, c));
-                r[D * c..D * c + D].copy_from_slice(&inside);
-            }
+            put_within_cones(problem, r);
             accelerator.begin(r);
         }
         problem.enter(state, point);

@@ -23,9 +23,8 @@ use nonsmooth_linalg::small;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::form::{AHEAD, Access, Blockwise, Disked, Frictional};
+use crate::contact::form::{AHEAD, Access, Blockwise, Disked, Frictional, put_within_cones};
 use crate::contact::law::Rolling;
-use crate::contact::law::cone::ConvexSet;
 use crate::contact::law::local::{Exact, LocalSolver, Quartic, RollingExact};
 use crate::contact::parts::{Accelerator, NEGLIGIBLE, put_within_bounds, sweep_rows};
 use crate::contact::splitting::ordering::{Order, Ordering};
@@ -346,10 +345,7 @@ where
         if accelerated && work.since >= self.settings.anderson_every {
             work.since = 0;
             work.accelerator.advance(r, &|i| unit(i / D));
-            for c in 0..problem.contacts() {
-                let inside = problem.law(c).project(&small::block::<D>(r, c));
-                r[D * c..D * c + D].copy_from_slice(&inside);
-            }
+            put_within_cones(problem, r);
             problem.enter(state, point);
         }
         Step::Continue { estimate }
