@@ -113,7 +113,7 @@ class Auto(Settings):
         follows.
 
     References: AcaryBremondHuber2018, AlartCurnier1991, Acary2018, HintermullerItoKunisch2002,
-    Cadoux2009, CottlePangStone2009, FacchineiPang2003, Munson2002.
+    Cadoux2009, Anderson1965, CottlePangStone2009, FacchineiPang2003, Munson2002.
     """
 
     def __init__(
