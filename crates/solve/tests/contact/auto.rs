@@ -243,3 +243,78 @@ fn what_rounding_made_inconsistent_is_solved() {
         solve(&problem, &mut problem.origin());
     }
 }
+
+/// Masses on the nodes of a grid of side `n`, coupled by springs to their neighbours, implicit in time: all of M is one component, so that W is condensed. The lowest layer is
+/// on the ground, and all is pushed down and, more and more along one axis, to the side.
+fn springs(n: usize) -> FrictionGlobal<3> {
+    let node = |i: usize, j: usize, k: usize| i + n * (j + n * k);
+    let all = || (0..n).flat_map(move |k| (0..n).flat_map(move |j| (0..n).map(move |i| (i, j, k))));
+    let mut entries = vec![];
+    for (i, j, k) in all() {
+        let a = node(i, j, k);
+        entries.extend((0..3).map(|d| (3 * a + d, 3 * a + d, 1.0)));
+        let next = [(i + 1, j, k), (i, j + 1, k), (i, j, k + 1)];
+        for (i, j, k) in next.into_iter().filter(|&(i, j, k)| i.max(j).max(k) < n) {
+            let b = node(i, j, k);
+            for d in 0..3 {
+                let (a, b, stiffness) = (3 * a + d, 3 * b + d, 300.0);
+                let ends = [(a, a, 1.0), (b, b, 1.0), (a, b, -1.0), (b, a, -1.0)];
+                entries.extend(ends.map(|(i, j, x)| (i, j, stiffness * x)));
+            }
+        }
+    }
+    let (dofs, contacts) = (3 * n * n * n, n * n);
+    let mass = Csc::from_triplets(dofs, dofs, entries.into_iter()).unwrap();
+    // N, T1, T2 are z, x, y of a node of the lowest layer, whose places come first.
+    let axes = |c: usize| [(3 * c + 2, 3 * c), (3 * c, 3 * c + 1), (3 * c + 1, 3 * c + 2)];
+    let h = Csc::from_triplets(
+        dofs,
+        3 * contacts,
+        (0..contacts).flat_map(|c| axes(c).map(|(row, column)| (row, column, 1.0))),
+    )
+    .unwrap();
+    let f = all().flat_map(|(i, _, _)| [0.12 * i as f64, 0.02, -0.5]).collect();
+    FrictionGlobal::new(mass, h, f, vec![0.0; 3 * contacts], vec![0.4; contacts]).unwrap()
+}
+
+#[test]
+fn what_costs_more_than_a_step_is_not_looked_at_after_each() {
+    let problem = springs(7);
+    let mut auto = session("auto", &SettingsMap::new()).unwrap();
+    let mut point = problem.origin();
+    let outcome = auto.solve(&problem, &mut point, &Limits::default(), &mut |_| {}).unwrap();
+    let (looks, account) = (auto.history().len(), auto.account().join("; "));
+    assert_eq!(outcome.status, Status::Solved);
+    assert!(
+        outcome.iterations >= 15 && 3 * looks < outcome.iterations,
+        "{looks} of {}: {account}",
+        outcome.iterations
+    );
+    // By another method, and in other coordinates.
+    let mut other = problem.origin();
+    let nsgs = session("condense/nsgs", &SettingsMap::new());
+    let limits = Limits { tolerance: 1e-10, ..Limits::default() };
+    nsgs.unwrap().solve(&problem, &mut other, &limits, &mut |_| {}).unwrap();
+    let apart = point.v.iter().zip(&other.v).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(apart < 1e-5, "{apart:e}");
+}
+
+#[test]
+fn what_an_interior_point_leaves_where_it_is_is_looked_at_once() {
+    let mu = (0.9, 0.9);
+    let case = Planted { contacts: 40, dofs: 30, mu, seed: 2, ..Planted::default() };
+    let (problem, _) = case.local::<3>();
+    let mut auto = session("auto", &SettingsMap::new()).unwrap();
+    let mut point = problem.origin();
+    let outcome = auto.solve(&problem, &mut point, &Limits::default(), &mut |_| {}).unwrap();
+    let (looks, account) = (auto.history().len(), auto.account());
+    let interior = account.iter().find(|line| line.contains("interior-point")).unwrap();
+    let iterations: usize = interior.split(' ').next().unwrap().parse().unwrap();
+    assert_eq!(outcome.status, Status::Solved);
+    // One at the start, one as the sweeps end, one as the interior point ends.
+    assert!(
+        iterations >= 10 && looks + iterations <= outcome.iterations + 2,
+        "{looks} of {}: {account:?}",
+        outcome.iterations
+    );
+}

@@ -10,11 +10,14 @@
 //! Cost: a solve of the rest for each set, of which a handful are tried. Storage: the problem of the rest and its workspace.
 //! Fails: where the rows that are let go contradict each other, or nothing solves the rest; sweeps then go on.
 
-use crate::contact::auto::{Auto, HybridWork};
-use crate::contact::form::{Disked, Holding, Linearised, OnContacts};
-use crate::contact::parts::asked;
-use crate::{SolveError, Solver, Step};
+use nonsmooth_linalg::budget;
 use nonsmooth_problem::check::Kinematic;
+
+use super::starts::lost;
+use super::{Auto, FIRST, HybridWork, SWEEPS_A_STEP, Stage, runs_away};
+use crate::contact::form::{Disked, Holding, Linearised, OnContacts};
+use crate::contact::parts::{asked, put_within_bounds};
+use crate::{SolveError, Solver, Step};
 
 /// Rows are asked where the contacts are so near to their law, relative to the loads, or at the tolerance.
 const SETTLED: f64 = 1e-6;
@@ -24,6 +27,83 @@ const PATIENCE: usize = 40;
 const MISSED: f64 = 0.1;
 /// So many sets are tried; each is remembered.
 const SETS_MOST: usize = 200;
+/// Sweeps go on while so few are left, and after a search for those at their bounds in vain until they are so many times as many.
+const SWEEPS_WITH_ROWS: f64 = 100.0;
+const AGAIN: usize = 10;
+
+impl<const D: usize> OnContacts<Auto, D> {
+    /// After sweeps over contacts and rows with bounds, whose last one moved so much.
+    pub(super) fn sweep_with_rows<
+        P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send,
+    >(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+        estimate: f64,
+    ) -> Step {
+        let lost = runs_away(estimate) && !budget::over();
+        let few = work.rate.left(work.tolerance) * (SWEEPS_A_STEP as f64) < SWEEPS_WITH_ROWS;
+        if lost && work.done.searches > 0 {
+            let Some([r, lambda]) = work.searched_from.take() else {
+                return Step::Stuck("sweeps send the impulses to infinity".into());
+            };
+            let to = P::all_impulses(point);
+            to.0.copy_from_slice(&r);
+            to.1.copy_from_slice(&lambda);
+            problem.enter(&mut work.state, point);
+            work.rate.begin();
+            return Step::Continue { estimate: f64::NAN };
+        }
+        if lost {
+            let (r, lambda) = P::all_impulses(point);
+            r.fill(0.0);
+            lambda.fill(0.0);
+            put_within_bounds(problem, point);
+        } else if work.done.sweeps < work.hold_after || few || estimate == 0.0 {
+            return Step::Continue { estimate };
+        }
+        work.done.searches += 1;
+        work.hold_after = AGAIN * work.done.sweeps;
+        let (r, lambda) = P::all_impulses(point);
+        work.searched_from = Some([r.to_vec(), lambda.to_vec()]);
+        problem.enter(&mut work.state, point);
+        if let Ok(held) = Held::begin(self, problem, &work.state, point, work.tolerance) {
+            work.held = Some(Box::new(held));
+            work.stage = Stage::Held;
+        }
+        Step::Continue { estimate }
+    }
+
+    /// A step on the problem without the rows at their bounds.
+    pub(super) fn hold<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) -> Step {
+        let HybridWork { held, sweep, state, units: u, scale, tolerance, .. } = work;
+        let Some(held) = held else {
+            return lost();
+        };
+        let residual = |state: &mut P::State, point: &mut P::Point| {
+            let r = P::impulses(point);
+            u.resize(r.len(), 0.0);
+            problem.velocities(state, r, u);
+            sweep.residual(u, r) / *scale
+        };
+        match held.step(self, problem, (state, point), (*tolerance, *scale), residual) {
+            Came::Further(estimate) => Step::Continue { estimate },
+            Came::End => {
+                // The state has entered the point that it left.
+                work.held = None;
+                work.stage = FIRST;
+                work.rate.begin();
+                Step::Continue { estimate: f64::NAN }
+            }
+        }
+    }
+}
 
 /// The present set, and the problem of the rest.
 pub(super) struct Held<P: Linearised<D> + Disked<D>, const D: usize> {

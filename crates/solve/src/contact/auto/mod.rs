@@ -12,7 +12,7 @@
 //!    open because weights have yet to come down to them, as in walls with head joints, it comes when the sweeps have cost a factorisation where they open fast.
 //! 3. **Trial**: Newton's iterations of stage 5 without its proximal term, where the sweeps came near or the structure is not hyperstatic, for as long as each halves the error; there sweeps come to
 //!    its rescue a few times.
-//! 4. **Interior point** on the exact law ([`Central`]), a starter: some 8 to 20 iterations lead near the solution of a problem
+//! 4. **Interior point** on the exact law ([`Central`]), a starter, from well inside the cones about the impulses so far: some 8 to 20 iterations lead near the solution of a problem
 //!    at rest; where the central path turns back it is left again.
 //! 5. **Proximal point, semismooth Newton inside** (`proximal_newton.rs`): ε falls as fast as the subproblems are solved
 //!    easily, and rises where they are not. It keeps full accuracy on hyperstatic problems.
@@ -125,6 +125,8 @@ const SWEEPS_A_STEP: usize = 10;
 const SWEEPS_JUDGED: usize = 5;
 /// So many times as many where threads share the sweeps.
 const SWEEPS_JUDGED_SHARED: usize = 4;
+/// Where a look costs more than a step, so many steps at most go between two of them.
+const LOOKED_LATE: f64 = 20.0;
 /// Sweeps go on while what is left of them promises to cost less than this many factorisations. What comes after them costs 1 to 50; by hindsight, on 340 problems, leaving them at 2 to 3.5
 /// costs 1.08 of the better way in the geometric mean, at 0 1.12, at 6 1.2 and at 10 1.4. Where W has spread, so many times what a factorisation is worth where many are to come: in piles and flows
 /// they often are.
@@ -146,9 +148,6 @@ const TINY: usize = 24;
 const EARLY: usize = 20;
 /// Impulses that make velocities so many times those of the loads run away: it is time to ask for existence.
 const RUNAWAY: f64 = 1e7;
-/// With rows that have bounds sweeps go on while so few are left, and after a search for those at their bounds in vain until they are so many times as many.
-const SWEEPS_WITH_ROWS: f64 = 100.0;
-const AGAIN: usize = 10;
 /// An investigation of existence may take this long, in seconds.
 const INVESTIGATION: f64 = 2.0;
 
@@ -177,6 +176,8 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     scale: f64,
     tolerance: f64,
     stage: Stage,
+    /// The last step was one of a stage that leaves the point where it is.
+    still: bool,
     /// Of the sweeps, of the alternating directions.
     rate: Rate,
     acceleration: Acceleration,
@@ -231,6 +232,14 @@ enum Stage {
     Held,
 }
 
+impl Stage {
+    /// Whether its steps leave the point where it is, all but the last and those that claim the tolerance.
+    fn stands_still(self) -> bool {
+        use Stage::*;
+        matches!(self, Rest | Interior { .. } | InTurn | Cadoux | Pursuit { .. } | Alternating)
+    }
+}
+
 /// Whether stage 2 is still to come.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 enum RestSearch {
@@ -270,6 +279,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             scale: problem.velocity_scale(&state),
             tolerance: 0.0,
             stage: FIRST,
+            still: false,
             rate: Rate::default(),
             acceleration: Acceleration::default(),
             mark: (Rate::default(), 0),
@@ -339,6 +349,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
         }
         // The judge has seen it, and goes on asking.
         work.exact = None;
+        work.still = work.stage.stands_still();
         match work.stage {
             Stage::Sweeps { claims } => self.sweep(problem, point, work, claims),
             Stage::Rest => self.rest(problem, point, work),
@@ -364,11 +375,21 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
     }
 
     fn check_every(&self, work: &Self::Work) -> usize {
+        let costs = work.costs.as_ref();
+        let affordable = |step: fn(&Costs) -> f64| {
+            costs.map_or(1, |costs| (costs.look / step(costs)).clamp(1.0, LOOKED_LATE) as usize)
+        };
         match work.stage {
+            // What has been judged already; but impulses that claim the tolerance are the point's.
+            stage if work.still && stage.stands_still() => {
+                if work.rate.has_arrived(work.tolerance) { 1 } else { usize::MAX }
+            }
             // One thread judges.
             Stage::Sweeps { .. } | Stage::Between { .. } | Stage::Projected { .. } => {
-                SWEEPS_JUDGED * work.sweep.together(SWEEPS_JUDGED_SHARED)
+                let judged = SWEEPS_JUDGED * work.sweep.together(SWEEPS_JUDGED_SHARED);
+                judged.max(affordable(|costs| SWEEPS_A_STEP as f64 * costs.sweep))
             }
+            Stage::Trial { .. } | Stage::Newton => affordable(|costs| costs.factorisation),
             _ => 1,
         }
     }
@@ -524,76 +545,6 @@ impl<const D: usize> OnContacts<Auto, D> {
         Step::Continue { estimate }
     }
 
-    /// After sweeps over contacts and rows with bounds, whose last one moved so much.
-    fn sweep_with_rows<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send>(
-        &self,
-        problem: &P,
-        point: &mut P::Point,
-        work: &mut HybridWork<P, D>,
-        estimate: f64,
-    ) -> Step {
-        let lost = runs_away(estimate) && !budget::over();
-        let few = work.rate.left(work.tolerance) * (SWEEPS_A_STEP as f64) < SWEEPS_WITH_ROWS;
-        if lost && work.done.searches > 0 {
-            let Some([r, lambda]) = work.searched_from.take() else {
-                return Step::Stuck("sweeps send the impulses to infinity".into());
-            };
-            let to = P::all_impulses(point);
-            to.0.copy_from_slice(&r);
-            to.1.copy_from_slice(&lambda);
-            problem.enter(&mut work.state, point);
-            work.rate.begin();
-            return Step::Continue { estimate: f64::NAN };
-        }
-        if lost {
-            let (r, lambda) = P::all_impulses(point);
-            r.fill(0.0);
-            lambda.fill(0.0);
-            put_within_bounds(problem, point);
-        } else if work.done.sweeps < work.hold_after || few || estimate == 0.0 {
-            return Step::Continue { estimate };
-        }
-        work.done.searches += 1;
-        work.hold_after = AGAIN * work.done.sweeps;
-        let (r, lambda) = P::all_impulses(point);
-        work.searched_from = Some([r.to_vec(), lambda.to_vec()]);
-        problem.enter(&mut work.state, point);
-        if let Ok(held) = Held::begin(self, problem, &work.state, point, work.tolerance) {
-            work.held = Some(Box::new(held));
-            work.stage = Stage::Held;
-        }
-        Step::Continue { estimate }
-    }
-
-    /// A step on the problem without the rows at their bounds.
-    fn hold<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send>(
-        &self,
-        problem: &P,
-        point: &mut P::Point,
-        work: &mut HybridWork<P, D>,
-    ) -> Step {
-        let HybridWork { held, sweep, state, units: u, scale, tolerance, .. } = work;
-        let Some(held) = held else {
-            return starts::lost();
-        };
-        let residual = |state: &mut P::State, point: &mut P::Point| {
-            let r = P::impulses(point);
-            u.resize(r.len(), 0.0);
-            problem.velocities(state, r, u);
-            sweep.residual(u, r) / *scale
-        };
-        match held.step(self, problem, (state, point), (*tolerance, *scale), residual) {
-            held::Came::Further(estimate) => Step::Continue { estimate },
-            held::Came::End => {
-                // The state has entered the point that it left.
-                work.held = None;
-                work.stage = FIRST;
-                work.rate.begin();
-                Step::Continue { estimate: f64::NAN }
-            }
-        }
-    }
-
     /// After sweeps whose last one moved so much: the contacts that still move, where they are few.
     fn follow<P: Linearised<D> + Disked<D>>(
         &self,
@@ -729,7 +680,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             return self.begin_cadoux(problem, work);
         }
         if self.passed_by_in_vain(work, error) {
-            starts::begin_interior(problem, work);
+            starts::begin_interior(problem, work, None);
             return Step::Continue { estimate: error };
         }
         if let Some(chase) = self.chase_due(work, error) {
@@ -965,7 +916,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             Origin::Swept | Origin::Projected => r.fill(0.0),
         }
         if work.passed_by.is_some() && from != Origin::Projected {
-            starts::begin_interior(problem, work);
+            starts::begin_interior(problem, work, None);
         } else if from == Origin::Best {
             self.subproblem_here(problem, point, work);
         } else {

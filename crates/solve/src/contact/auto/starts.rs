@@ -42,6 +42,8 @@ const SWEEP_AGAIN: f64 = 3.0;
 /// error, or so many short steps in a row; such steps know at least this part of the slope of ‖u_T‖. Before its first halving it has longer where W has not spread: in walls of thousands
 /// of bodies it takes some 20 iterations to come into sight of the solution, and ten to reach it.
 const INTERIOR: usize = 60;
+/// It begins at the point's impulses and their velocities, so far inside the cones, in units of the mean load a contact: nearer to the boundary its steps are cut short.
+const INTERIOR_MARGIN: f64 = 0.7;
 /// Where Newton's iterations promise to take longer than this, the interior point is worth a trial; not before so many, which is what one subproblem in vain takes.
 const INTERIOR_COST: f64 = 20.0;
 const IN_VAIN: usize = 12;
@@ -213,7 +215,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         let spread = has_spread(problem, work);
         let HybridWork { newton, inner_best, controller, .. } = work;
         let (true, Some(newton)) = (error < TRIAL_BELOW || spread, newton) else {
-            return begin_interior(problem, work);
+            return begin_interior(problem, work, Some(P::impulses(point)));
         };
         let r = P::impulses(point);
         newton.focus(r, error, work.tolerance);
@@ -257,7 +259,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         if least < NEAR {
             self.pass_by(problem, point, work);
         } else {
-            begin_interior(problem, work);
+            begin_interior(problem, work, Some(P::impulses(point)));
         }
         Step::Continue { estimate: least }
     }
@@ -573,14 +575,17 @@ pub(super) fn has_spread<P: Linearised<D> + Disked<D>, const D: usize>(
     *spread.get_or_insert_with(|| problem.spread(state, units) >= SPREAD)
 }
 
-/// Begins stage 4.
+/// Begins stage 4, near impulses or at the cones' units.
 pub(super) fn begin_interior<P: Linearised<D> + Disked<D>, const D: usize>(
     problem: &P,
     work: &mut HybridWork<P, D>,
+    near: Option<&mut [f64]>,
 ) {
     work.passed_by = None;
     let HybridWork { central, state, stage, .. } = work;
-    let now = central.get_or_insert_with(interior_point).begin(problem, state, 0.0, None);
+    let central = central.get_or_insert_with(interior_point);
+    let start = near.map(|r| (&*r, INTERIOR_MARGIN));
+    let now = central.begin(problem, state, 0.0, start);
     *stage = Stage::Interior { halvings: Halvings::from(now.error), short: 0 };
 }
 

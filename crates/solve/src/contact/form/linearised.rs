@@ -48,8 +48,11 @@ pub(super) fn there<T>(slot: &mut Once<T>) -> Option<&mut T> {
 /// The costs where there is not the memory for a factorisation.
 pub(super) fn unaffordable(sweep: f64) -> Costs {
     const NEVER: f64 = 1e18;
-    Costs { sweep, factorisation: NEVER, solve: NEVER, worth: NEVER }
+    Costs { sweep, factorisation: NEVER, solve: NEVER, worth: NEVER, look: LOOK_SWEEPS * sweep }
 }
+
+/// The sweeps that it takes to complete and judge a point.
+const LOOK_SWEEPS: f64 = 3.0;
 
 /// A factorised system, with the blocks that it belongs to.
 pub(super) struct System<F, const D: usize> {
@@ -247,6 +250,7 @@ impl<const D: usize> Form<D> for ContactForm<D> {
             factorisation: self.lu.flops() / RATE + 5.0 * (entries + blocks) + 400.0 * contacts,
             solve: 0.6 * entries + 150.0 * contacts,
             worth: self.lu.flops() / RATE_WORTH + 20.0 * blocks,
+            look: LOOK_SWEEPS * sweep,
         }
     }
 }
@@ -459,6 +463,7 @@ impl<const D: usize> Form<D> for BodyForm<D> {
             factorisation: self.lu.flops() / RATE + 5.0 * entries + 900.0 * contacts,
             solve: 0.6 * entries + 200.0 * contacts,
             worth: self.lu.flops() / RATE_WORTH + 200.0 * contacts,
+            look: LOOK_SWEEPS * sweep,
         }
     }
 }

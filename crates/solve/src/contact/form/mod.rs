@@ -233,6 +233,8 @@ pub struct Costs {
     pub solve: f64,
     /// What may be spent in place of a factorisation where many of them are to come: as if elimination were ten times as slow as it is. The more a graph fills, the more iterations its problems take.
     pub worth: f64,
+    /// A point completed and judged.
+    pub look: f64,
 }
 
 /// Linear systems with a block-diagonal modification of W, as Newton, interior-point and proximal methods have them.
