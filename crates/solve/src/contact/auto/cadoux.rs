@@ -174,7 +174,8 @@ impl<const D: usize> OnContacts<Auto, D> {
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) -> Step {
-        let HybridWork { cadoux, newton, state, done, tolerance, controller, best, .. } = work;
+        let HybridWork { cadoux, newton, state, done, tolerance, controller, best, still, .. } =
+            work;
         let (Some(cadoux), Some(newton)) = (cadoux, newton) else {
             return lost();
         };
@@ -187,6 +188,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         // Where the judge is not content with it, the next one may be better in what it asks for.
         let claims = error <= *tolerance;
         if claims {
+            *still = false;
             r.copy_from_slice(&cadoux.r);
         }
         if cadoux.left <= 0.0 {

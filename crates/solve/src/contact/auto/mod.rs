@@ -176,7 +176,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     scale: f64,
     tolerance: f64,
     stage: Stage,
-    /// The last step was one of a stage that leaves the point where it is.
+    /// The last step left the point where it was.
     still: bool,
     /// Of the sweeps, of the alternating directions.
     rate: Rate,
@@ -233,7 +233,7 @@ enum Stage {
 }
 
 impl Stage {
-    /// Whether its steps leave the point where it is, all but the last and those that claim the tolerance.
+    /// Whether its steps leave the point where it is, all but the last and those that claim the tolerance, which say so.
     fn stands_still(self) -> bool {
         use Stage::*;
         matches!(self, Rest | Interior { .. } | InTurn | Cadoux | Pursuit { .. } | Alternating)
@@ -380,10 +380,8 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             costs.map_or(1, |costs| (costs.look / step(costs)).clamp(1.0, LOOKED_LATE) as usize)
         };
         match work.stage {
-            // What has been judged already; but impulses that claim the tolerance are the point's.
-            stage if work.still && stage.stands_still() => {
-                if work.rate.has_arrived(work.tolerance) { 1 } else { usize::MAX }
-            }
+            // What has been judged already.
+            stage if work.still && stage.stands_still() => usize::MAX,
             // One thread judges.
             Stage::Sweeps { .. } | Stage::Between { .. } | Stage::Projected { .. } => {
                 let judged = SWEEPS_JUDGED * work.sweep.together(SWEEPS_JUDGED_SHARED);

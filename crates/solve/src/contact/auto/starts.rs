@@ -483,11 +483,12 @@ impl<const D: usize> OnContacts<Auto, D> {
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) -> Option<(f64, usize)> {
-        let HybridWork { alternating, state, rate, tolerance, .. } = work;
+        let HybridWork { alternating, state, rate, tolerance, still, .. } = work;
         let alternating = alternating.as_mut()?;
         let estimate = alternating.iterate(problem, state);
         rate.note(estimate);
         if estimate <= *tolerance {
+            *still = false;
             P::impulses(point).copy_from_slice(alternating.impulses());
         }
         Some((estimate, alternating.steps()))
@@ -512,7 +513,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) -> f64 {
-        let HybridWork { alternating, state, newton, controller, .. } = work;
+        let HybridWork { alternating, state, newton, controller, still, .. } = work;
         let (Some(alternating), Some(newton)) = (alternating, newton) else {
             return f64::INFINITY;
         };
@@ -523,6 +524,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             return ours;
         }
         controller.offer(theirs);
+        *still = false;
         r.copy_from_slice(alternating.impulses());
         newton.look(problem, state, r)
     }

@@ -27,9 +27,10 @@ pub struct GlobalState<const D: usize> {
     access: Access,
     /// The operator belongs to this H.
     h: Csc,
+    /// The velocity without impulses; with the condensed W, what that makes of the velocity at the point last completed.
     q: Vec<f64>,
     scale: f64,
-    /// v, as the operator keeps it.
+    /// v, as an operator that is visited keeps it.
     y: Vec<f64>,
     /// v in doubled precision, where it was asked for: high, low, the last correction.
     precise: [Vec<f64>; 3],
@@ -83,14 +84,6 @@ impl<const D: usize> GlobalSystem<D> {
 }
 
 impl<const D: usize> Operator<D> {
-    /// Takes the velocities v.
-    fn enter(&self, inverse: &Inverse, v: &[f64], y: &mut [f64]) {
-        match self {
-            Operator::Visits(delassus) => delassus.enter(inverse, v, y),
-            Operator::Products(_) | Operator::Condensed(_) => y.copy_from_slice(v),
-        }
-    }
-
     fn diagonal_block(&self, c: usize) -> Block<D> {
         match self {
             Operator::Visits(delassus) => *delassus.diagonal_block(c),
@@ -208,18 +201,27 @@ impl<const D: usize, L: DiskLaw<D>> Contacts<D> for FrictionGlobal<D, L> {
     fn enter(&self, state: &mut Self::State, point: &GlobalPoint) {
         state.dynamics.hold(&point.lambda);
         let GlobalState { dynamics, operator, y, .. } = state;
-        if let Operator::Condensed(_) = operator {
-            // Velocities of contacts are W r + q; nobody asks for v.
-            return;
+        if let Operator::Visits(delassus) = operator {
+            dynamics.solve(self, &point.r, Refine::Once);
+            delassus.enter(&dynamics.inverse, dynamics.velocities(self), y);
         }
-        dynamics.solve(self, &point.r, Refine::Once);
-        operator.enter(&dynamics.inverse, dynamics.velocities(self), y);
     }
 
     fn complete(&self, state: &mut Self::State, point: &mut GlobalPoint) {
         state.dynamics.complete(self, point);
-        let GlobalState { dynamics, operator, y, .. } = state;
-        operator.enter(&dynamics.inverse, &point.v, y);
+        let GlobalState { dynamics, operator, y, q, .. } = state;
+        match operator {
+            Operator::Visits(delassus) => delassus.enter(&dynamics.inverse, &point.v, y),
+            // From here on W r + q is exact at r, and as wrong as W is in what r moves by: one step of refinement a look.
+            Operator::Condensed(w) => {
+                self.velocity_into(&point.v, q);
+                for (c, q) in q.chunks_mut(D).enumerate() {
+                    let wr = w.row_product(c, &point.r);
+                    q.iter_mut().zip(wr).for_each(|(q, wr)| *q -= wr);
+                }
+            }
+            Operator::Products(_) => {}
+        }
     }
 
     fn bodies(&self) -> Option<&FrictionGlobal<D, L>> {

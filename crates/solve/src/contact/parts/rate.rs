@@ -54,11 +54,6 @@ impl Rate {
         if fall > 0.0 { (self.now / tolerance).ln() / fall } else { f64::INFINITY }
     }
 
-    /// Whether the last estimate is no more than the tolerance.
-    pub fn has_arrived(&self, tolerance: f64) -> bool {
-        self.now <= tolerance
-    }
-
     /// Whether the steps left, each of which costs `cost`, cost less than `limit`, and those done were not several times as dear.
     pub fn promises(&self, tolerance: f64, cost: f64, limit: f64) -> bool {
         self.left(tolerance) * cost < limit && self.steps as f64 * cost < BELIEF * limit
