@@ -7,7 +7,7 @@
 
 use nonsmooth_linalg::budget::{self, TooLarge};
 use nonsmooth_linalg::{
-    Block, Bsr, Compensated, Csc, Delassus, Inverse, Passes, Refine, Singular, norm_or_one, small,
+    Block, Bsr, Compensated, Csc, Delassus, Passes, Refine, Singular, norm_or_one, small,
 };
 use nonsmooth_problem::check::Impulses;
 use nonsmooth_problem::{Bounds, Dynamics, FrictionGlobal, GlobalPoint, RowsGlobal};
