@@ -581,12 +581,12 @@ pub(super) fn has_spread<P: Linearised<D> + Disked<D>, const D: usize>(
 pub(super) fn begin_interior<P: Linearised<D> + Disked<D>, const D: usize>(
     problem: &P,
     work: &mut HybridWork<P, D>,
-    near: Option<&mut [f64]>,
+    near: Option<&[f64]>,
 ) {
     work.passed_by = None;
     let HybridWork { central, state, stage, .. } = work;
     let central = central.get_or_insert_with(interior_point);
-    let start = near.map(|r| (&*r, INTERIOR_MARGIN));
+    let start = near.map(|r| (r, INTERIOR_MARGIN));
     let now = central.begin(problem, state, 0.0, start);
     *stage = Stage::Interior { halvings: Halvings::from(now.error), short: 0 };
 }

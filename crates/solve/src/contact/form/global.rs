@@ -357,20 +357,11 @@ fn solved(mass: &Csc) -> f64 {
     20.0 * mass.nnz() as f64
 }
 
-/// `y = W x`.
-fn product<const D: usize>(w: &Bsr<D>, x: &[f64], y: &mut [f64]) {
-    for (c, y) in y.chunks_mut(D).enumerate() {
-        y.copy_from_slice(&w.row_product(c, x));
-    }
-}
-
 impl<const D: usize, L: DiskLaw<D>> Linear<D> for FrictionGlobal<D, L> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
         let GlobalState { dynamics, operator, q, .. } = state;
         if let Operator::Condensed(w) = operator {
-            product(w, r, u);
-            u.iter_mut().zip(q).for_each(|(u, q)| *u += *q);
-            return;
+            return w.mul_plus(r, q, u);
         }
         let (v, _) = dynamics.solve(self, r, Refine::Once);
         self.velocity_into(v, u);
@@ -428,7 +419,11 @@ impl<const D: usize, L: DiskLaw<D>> Linearised<D> for FrictionGlobal<D, L> {
     ) -> f64 {
         let GlobalState { operator, system, dynamics, .. } = state;
         let apply = |x: &[f64], wx: &mut [f64]| match &*operator {
-            Operator::Condensed(w) => product(w, x, wx),
+            Operator::Condensed(w) => {
+                for (c, wx) in wx.chunks_mut(D).enumerate() {
+                    wx.copy_from_slice(&w.row_product(c, x));
+                }
+            }
             _ => {
                 let v = dynamics.respond(self, x, Refine::Once);
                 wx.fill(0.0);
