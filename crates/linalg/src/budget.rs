@@ -134,14 +134,21 @@ pub fn current() -> Budget {
     CURRENT.with_borrow(Budget::clone)
 }
 
+/// The threads that a kernel of the present thread may use: one on a thread of a pool, whose neighbours have work of their own.
+pub fn threads() -> usize {
+    match rayon::current_thread_index() {
+        Some(_) => 1,
+        None => CURRENT.with_borrow(|budget| budget.threads).max(1),
+    }
+}
+
 /// Pools of threads by the process that made them: a fork has none of its parent's threads.
 static TEAMS: Mutex<Vec<(u32, Arc<ThreadPool>)>> = Mutex::new(vec![]);
 
-/// The threads that the budget in force allows, where these are several, as a pool: made at first use, and kept. `None` on a thread of a pool, whose
-/// neighbours have work of their own.
+/// These [`threads`], where they are several, as a pool: made at first use, and kept.
 pub(crate) fn team() -> Option<Arc<ThreadPool>> {
-    let threads = CURRENT.with_borrow(|budget| budget.threads);
-    if threads < 2 || rayon::current_thread_index().is_some() {
+    let threads = threads();
+    if threads < 2 {
         return None;
     }
     let process = std::process::id();

@@ -3,9 +3,10 @@
 
 use super::budget::Pace;
 use super::passes::{Parts, Passes};
+use super::pieces;
 use super::roots::Roots;
 use super::row::prefetch;
-use super::{Block, BlockRow, Bsr, Csc, Inverse};
+use super::{Block, BlockRow, Bsr, Csc, Inverse, small};
 
 /// `W = Hᵀ M⁻¹ H` without W, for the movements of Gauss–Seidel in velocity space: `u_c = H_cᵀ v + w_c` and `v += M⁻¹ H_c Δr_c` cost O(rows touched).
 ///
@@ -23,6 +24,12 @@ pub struct Delassus<const D: usize> {
     diagonal: Vec<Block<D>>,
     passes: Option<Passes>,
 }
+
+/// Parts of the contacts whose impulses are added by themselves before all are.
+const SLABS: usize = 8;
+/// The fewest contacts that are worth a piece of their own, and unknowns.
+const PIECE: usize = 64;
+const UNKNOWNS: usize = 2048;
 
 /// The velocities of a [`Delassus`] while several threads visit contacts.
 #[derive(Debug)]
@@ -172,6 +179,58 @@ impl<const D: usize> Delassus<D> {
         }
     }
 
+    /// `y` of the velocities `v + M⁻¹ H r` on all threads that the budget allows, where `base` is the y of v, or of zero where it is not given; false, and nothing done, of
+    /// contacts that were not [`arranged`](Self::arranged). `room` is memory.
+    pub fn receive(
+        &self,
+        base: Option<&[f64]>,
+        r: &[f64],
+        y: &mut [f64],
+        room: &mut Vec<f64>,
+    ) -> bool {
+        let (Some(passes), n) = (&self.passes, y.len()) else { return false };
+        let contacts = r.len() / D;
+        let slab = contacts.div_ceil(SLABS);
+        room.resize(SLABS * n, 0.0);
+        // Each part of the contacts, in the order in which they lie in memory, has a y of its own.
+        pieces::writing(SLABS, 1, [&mut room[..]], |piece, [own]| {
+            for (own, k) in own.chunks_exact_mut(n.max(1)).zip(piece) {
+                own.fill(0.0);
+                for at in (k * slab).min(contacts)..((k + 1) * slab).min(contacts) {
+                    let impulse: [f64; D] = small::block(r, passes.item(at));
+                    self.seen.each_run(at, |first, rows| {
+                        add_transposed_product(&mut own[first..][..rows.len()], rows, &impulse);
+                    });
+                }
+            }
+            []
+        });
+        pieces::writing(n, UNKNOWNS, [y], |piece, [y]| {
+            match base {
+                Some(base) => y.copy_from_slice(&base[piece.clone()]),
+                None => y.fill(0.0),
+            }
+            for own in room.chunks_exact(n) {
+                y.iter_mut().zip(&own[piece.clone()]).for_each(|(y, own)| *y += own);
+            }
+            []
+        });
+        true
+    }
+
+    /// `u_c = H_cᵀ v` of all contacts, of y, on all threads that the budget allows.
+    pub fn local_velocities(&self, y: &[f64], u: &mut [f64]) {
+        let (contacts, u) = (u.len() / D, Parts::of(u));
+        pieces::each(contacts, PIECE, |piece| {
+            for at in piece {
+                let c = self.passes.as_ref().map_or(at, |passes| passes.item(at));
+                // SAFETY: each contact has one position.
+                let u = unsafe { u.part(D * c, D) };
+                u.copy_from_slice(&self.velocity_at(at, y));
+            }
+        });
+    }
+
     /// How sweeps may follow each other, of contacts that were [`arranged`](Self::arranged).
     pub fn passes(&self) -> Option<&Passes> {
         self.passes.as_ref()
@@ -191,8 +250,14 @@ impl<const D: usize> Delassus<D> {
     /// `H_cᵀ v`, of y.
     #[inline(always)]
     pub fn local_velocity(&self, c: usize, y: &[f64]) -> [f64; D] {
+        self.velocity_at(self.at(c), y)
+    }
+
+    /// The same of the contact in a column.
+    #[inline(always)]
+    fn velocity_at(&self, at: usize, y: &[f64]) -> [f64; D] {
         let mut u = [0.0; D];
-        self.seen.each_run(self.at(c), |first, rows| {
+        self.seen.each_run(at, |first, rows| {
             add_product(&mut u, rows, &y[first..first + rows.len()]);
         });
         u
@@ -472,5 +537,73 @@ fn solve_columns<const D: usize>(
             });
             visit(group[g], rows, &z);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::budget::Budget;
+
+    /// Bodies of three unknowns with full masses in a row, each contact between two that may be far apart, in an order that jumps.
+    fn row(bodies: usize, contacts: usize) -> (Csc, Inverse) {
+        let wave = |k: usize| (k as f64 * 0.7).sin();
+        let mass = (0..bodies).flat_map(|b| {
+            (0..9).map(move |k| {
+                let (i, j) = (k / 3, k % 3);
+                let own = if i == j { 2.0 + (b % 4) as f64 } else { 0.3 };
+                (3 * b + i, 3 * b + j, own)
+            })
+        });
+        let mass = Csc::from_triplets(3 * bodies, 3 * bodies, mass).unwrap();
+        let h = (0..contacts).flat_map(|k| {
+            let first = k * 7919 % contacts * (bodies - 1) / contacts;
+            // Neighbours, whose unknowns follow each other, or not.
+            let other = (first + 1 + 2 * (k % 3)).min(bodies - 1);
+            (0..18).map(move |e| {
+                let (body, row, column) = ([first, other][e / 9], e % 9 / 3, e % 3);
+                (3 * body + row, 3 * k + column, wave(18 * k + e))
+            })
+        });
+        let h = Csc::from_triplets(3 * bodies, 3 * contacts, h).unwrap();
+        (h, Inverse::new(&mass, "M").unwrap())
+    }
+
+    /// And the same bits on several threads.
+    #[test]
+    fn impulses_are_received_as_by_the_mass_matrix() {
+        let (h, inverse) = row(900, 3000);
+        let (n, m) = (h.nrows(), h.ncols());
+        let delassus = Delassus::<3>::arranged(&h, &inverse, 0);
+        assert!(delassus.passes().is_some());
+        let r: Vec<f64> = (0..m).map(|i| (i as f64 * 1.3).cos()).collect();
+        let f: Vec<f64> = (0..n).map(|i| (i as f64 * 0.9).sin()).collect();
+        for loads in [Some(f), None] {
+            let mut v = loads.clone().unwrap_or(vec![0.0; n]);
+            let base = loads.map(|mut free| {
+                inverse.solve(&mut free);
+                let mut base = vec![0.0; n];
+                delassus.enter(&inverse, &free, &mut base);
+                base
+            });
+            h.mul_add(1.0, &r, &mut v);
+            inverse.solve(&mut v);
+            let mut expected = vec![0.0; n];
+            delassus.enter(&inverse, &v, &mut expected);
+            let mut u = vec![0.0; m];
+            h.mul_transpose_add(1.0, &v, &mut u);
+            let found = [1, 3].map(|threads| {
+                let _scope = Budget { threads, ..Budget::default() }.enter();
+                let (mut y, mut of_contacts) = (vec![f64::NAN; n], vec![f64::NAN; m]);
+                assert!(delassus.receive(base.as_deref(), &r, &mut y, &mut vec![]));
+                delassus.local_velocities(&y, &mut of_contacts);
+                (y, of_contacts)
+            });
+            assert_eq!(found[0], found[1]);
+            let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
+            assert!(near(&found[0].0, &expected) && near(&found[0].1, &u));
+        }
+        let plain = Delassus::<3>::new(&h, &inverse);
+        assert!(!plain.receive(None, &r, &mut vec![0.0; n], &mut vec![]));
     }
 }

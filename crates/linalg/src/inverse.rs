@@ -49,6 +49,14 @@ pub fn factorisations() -> u64 {
     FACTORISATIONS.get()
 }
 
+/// Does work whose factorisations are nobody's: [`factorisations`] stays as it was.
+pub fn uncounted<T>(work: impl FnOnce() -> T) -> T {
+    let before = factorisations();
+    let done = work();
+    FACTORISATIONS.set(before);
+    done
+}
+
 /// Matrices up to this order are factorised without a look at the clock.
 pub(super) const QUICK: usize = 100;
 

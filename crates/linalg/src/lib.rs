@@ -10,6 +10,7 @@
 //! [`Delassus`]: W = Hᵀ M⁻¹ H as an operator, never formed, or condensed into a [`Bsr`].
 //! All of them are made from slices, and from and to matrices of faer, and with the features `nalgebra` and `sprs` of those crates.
 //! [`Passes`]: sweeps of several threads one behind the other, with the bits of one.
+//! [`pieces`]: work over long vectors on several threads, with the bits of one.
 //! [`budget`]: the time and memory that all of these may use.
 
 mod block_lu;
@@ -27,6 +28,7 @@ mod groups;
 mod inverse;
 mod matrix;
 mod passes;
+pub mod pieces;
 mod rank_lu;
 mod roots;
 mod row;
@@ -44,7 +46,7 @@ pub use doubled::{Doubled, Real, power_of_two};
 pub use error::MatrixError;
 pub use fill::admit_sparse;
 pub use groups::Groups;
-pub use inverse::{Inverse, Refine, factorisations, is_positive_definite};
+pub use inverse::{Inverse, Refine, factorisations, is_positive_definite, uncounted};
 pub use matrix::{Matrix, Operator};
 pub use passes::{Parts, Passes};
 pub use rank_lu::RankLu;

@@ -269,6 +269,37 @@ fn the_same_input_gives_the_same_bits_and_a_warm_start_is_used() {
     }
 }
 
+/// Of a problem with so many unknowns judge and workspace are prepared side by side.
+#[test]
+fn several_threads_change_neither_a_bit_nor_an_error() {
+    let case = Planted { contacts: 500, dofs: 900, seed: 4, ..Planted::default() };
+    let (problem, _) = case.global::<3>();
+    let solve = |limits: Limits| {
+        let mut session =
+            registry::session::<FrictionGlobal<3>>("auto", &SettingsMap::new()).unwrap();
+        let mut point = problem.origin();
+        let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {});
+        (point, outcome)
+    };
+    let with = |threads| Limits { threads, ..Limits::default() };
+    let (point, outcome) = solve(with(1));
+    let outcome = outcome.unwrap();
+    assert_eq!(outcome.status, Status::Solved);
+    let refused =
+        solve(Limits { memory_limit: Some(100_000), ..with(1) }).1.unwrap_err().to_string();
+    assert!(refused.contains("memory limit"), "{refused}");
+    for threads in [2, 3] {
+        let (other_point, other) = solve(with(threads));
+        let seconds = outcome.seconds;
+        assert_eq!(Outcome { seconds, ..other.unwrap() }, outcome, "{threads} threads");
+        assert_eq!(other_point, point);
+        let other = solve(Limits { memory_limit: Some(100_000), ..with(threads) }).1;
+        assert_eq!(other.unwrap_err().to_string(), refused);
+        let late = solve(Limits { time_limit: Some(1e-9), ..with(threads) }).1.unwrap();
+        assert_eq!(late.status, Status::Limit(Limit::Time));
+    }
+}
+
 #[test]
 fn it_stops_at_the_tolerance_and_not_far_below() {
     let (problem, _) =

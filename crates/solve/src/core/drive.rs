@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use cpu_time::ProcessTime;
-use nonsmooth_linalg::budget::{Budget, Scope};
-use nonsmooth_linalg::factorisations;
+use nonsmooth_linalg::budget::{self, Budget, Scope};
+use nonsmooth_linalg::{factorisations, pieces, uncounted};
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::{Certificate, Evidence, Measure, Proof};
 
@@ -457,6 +457,9 @@ impl History {
     }
 }
 
+/// On several threads judge and workspace of a problem with so much to judge are prepared side by side.
+const BESIDE: usize = 2000;
+
 /// Drives a solver. Keeps its workspace, so that a second solve of the same shape allocates nothing.
 pub struct Driver<P: Problem, S: Solver<P>> {
     solver: S,
@@ -492,7 +495,7 @@ impl<P: Problem, S: Solver<P>> Driver<P, S> {
     }
 }
 
-impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
+impl<P: Problem + Sync, S: Solver<P>> Session<P> for Driver<P, S> {
     fn observe(
         &mut self,
         problem: &P,
@@ -508,14 +511,29 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
         history.clear();
         let lent = std::mem::take(lent);
         // What was cut short in a kernel is begun anew.
-        let (earlier, gauge_before) = (kept.take().filter(|k| !k.torn), gauge.take());
-        // The judge's own preparation is not part of the solve's time.
-        let judge = match gauge_before.filter(|_| lent || earlier.is_some()) {
-            Some(gauge) if lent => Ok(gauge),
-            Some(mut gauge) => problem.regauge(&mut gauge).map(|()| gauge),
-            None => problem.gauge().map(Box::new),
+        let earlier = kept.take().filter(|k| !k.torn);
+        let gauge_before = gauge.take().filter(|_| lent || earlier.is_some());
+        let beside = budget::threads() > 1
+            && problem.burden() >= BESIDE
+            && !problem.asks_functions()
+            && earlier.is_none()
+            && gauge_before.is_none();
+        let mut meter = Meter::start(begun, limits);
+        let gauge_anew = || uncounted(|| problem.gauge()).map(Box::new);
+        let (judge, made) = match gauge_before {
+            Some(gauge) if lent => (Ok(gauge), None),
+            Some(mut gauge) => (uncounted(|| problem.regauge(&mut gauge)).map(|()| gauge), None),
+            None if beside => {
+                let (judge, made) = pieces::both(gauge_anew, || solver.work(problem));
+                // Only this thread hears of what was refused.
+                (judge.or_else(|_| gauge_anew()), Some(made))
+            }
+            None => (gauge_anew(), None),
         };
-        let meter = Meter::start(begun, limits);
+        if made.is_none() {
+            // The judge's own preparation is not part of the solve's time.
+            meter = Meter::start(begun, limits);
+        }
         let judge: &mut P::Gauge = match judge {
             Ok(judge) => gauge.insert(judge),
             Err(e) => return meter.ended(Measure::unknown(), limits, &scope, e.into()),
@@ -551,7 +569,7 @@ impl<P: Problem, S: Solver<P>> Session<P> for Driver<P, S> {
                 }
                 solver.refill(problem, &mut k.work).map(|()| k)
             }
-            None => solver.work(problem).map(|work| {
+            None => made.unwrap_or_else(|| solver.work(problem)).map(|work| {
                 let (best, tidied) = (point.clone(), point.clone());
                 let (origin, untouched, torn) = (problem.origin(), false, false);
                 Box::new(Kept { work, origin, untouched, best, tidied, torn })

@@ -395,6 +395,6 @@ pub(crate) fn bare<P: Registered>(
         .map_err(|problem| SolveError::Settings { solver: name.into(), problem })
 }
 
-fn driven<P: Problem + 'static>(solver: Boxed<P>) -> AnySession<P> {
+fn driven<P: Problem + Sync + 'static>(solver: Boxed<P>) -> AnySession<P> {
     Box::new(Driver::new(solver))
 }

@@ -32,6 +32,10 @@ pub struct GlobalState<const D: usize> {
     scale: f64,
     /// v, as an operator that is visited keeps it.
     y: Vec<f64>,
+    /// Where contacts are arranged for several threads: such a v without impulses, another one, and room.
+    free: Vec<f64>,
+    other: Vec<f64>,
+    room: Vec<f64>,
     /// v in doubled precision, where it was asked for: high, low, the last correction.
     precise: [Vec<f64>; 3],
     contradiction: Option<Impulses>,
@@ -91,12 +95,27 @@ impl<const D: usize> Operator<D> {
             Operator::Condensed(w) => w.diagonal_block(c),
         }
     }
+
+    fn passes(&self) -> Option<&Passes> {
+        match self {
+            Operator::Visits(delassus) => delassus.passes(),
+            _ => None,
+        }
+    }
 }
 
 impl<const D: usize> GlobalState<D> {
     fn update_free_velocity<L: DiskLaw<D>>(&mut self, problem: &FrictionGlobal<D, L>) {
         self.contradiction = self.dynamics.free_velocity(problem, &mut self.q);
         self.scale = norm_or_one(&self.q);
+        if let Operator::Visits(delassus) = &self.operator
+            && delassus.passes().is_some()
+        {
+            let v = self.dynamics.velocities(problem);
+            self.free.resize(v.len(), 0.0);
+            self.other.resize(v.len(), 0.0);
+            delassus.enter(&self.dynamics.inverse, v, &mut self.free);
+        }
     }
 }
 
@@ -144,6 +163,9 @@ impl<const D: usize, L: DiskLaw<D>> Contacts<D> for FrictionGlobal<D, L> {
             q: vec![0.0; self.w.len()],
             scale: 1.0,
             y: vec![0.0; self.dofs()],
+            free: vec![],
+            other: vec![],
+            room: vec![],
             precise: [0; 3].map(|_| vec![0.0; precise]),
             contradiction: None,
             rows,
@@ -200,8 +222,10 @@ impl<const D: usize, L: DiskLaw<D>> Contacts<D> for FrictionGlobal<D, L> {
 
     fn enter(&self, state: &mut Self::State, point: &GlobalPoint) {
         state.dynamics.hold(&point.lambda);
-        let GlobalState { dynamics, operator, y, .. } = state;
-        if let Operator::Visits(delassus) = operator {
+        let GlobalState { dynamics, operator, y, free, room, .. } = state;
+        if let Operator::Visits(delassus) = operator
+            && !delassus.receive(Some(free), &point.r, y, room)
+        {
             dynamics.solve(self, &point.r, Refine::Once);
             delassus.enter(&dynamics.inverse, dynamics.velocities(self), y);
         }
@@ -321,10 +345,7 @@ impl<const D: usize, L: DiskLaw<D>> Blockwise<D> for FrictionGlobal<D, L> {
     }
 
     fn passes<'a>(&self, state: &'a Self::State) -> Option<&'a Passes> {
-        match &state.operator {
-            Operator::Visits(delassus) => delassus.passes(),
-            _ => None,
-        }
+        state.operator.passes()
     }
 
     fn moving<'a>(&'a self, state: &'a mut Self::State) -> Option<Visits<'a, D>> {
@@ -359,9 +380,14 @@ fn solved(mass: &Csc) -> f64 {
 
 impl<const D: usize, L: DiskLaw<D>> Linear<D> for FrictionGlobal<D, L> {
     fn velocities(&self, state: &mut Self::State, r: &[f64], u: &mut [f64]) {
-        let GlobalState { dynamics, operator, q, .. } = state;
-        if let Operator::Condensed(w) = operator {
-            return w.mul_plus(r, q, u);
+        let GlobalState { dynamics, operator, q, free, other, room, .. } = state;
+        match operator {
+            Operator::Condensed(w) => return w.mul_plus(r, q, u),
+            Operator::Visits(delassus) if delassus.receive(Some(free), r, other, room) => {
+                delassus.local_velocities(other, u);
+                return u.iter_mut().zip(&self.w).for_each(|(u, w)| *u += w);
+            }
+            _ => {}
         }
         let (v, _) = dynamics.solve(self, r, Refine::Once);
         self.velocity_into(v, u);
@@ -417,8 +443,11 @@ impl<const D: usize, L: DiskLaw<D>> Linearised<D> for FrictionGlobal<D, L> {
         x: &mut [f64],
         wx: &mut [f64],
     ) -> f64 {
-        let GlobalState { operator, system, dynamics, .. } = state;
+        let GlobalState { operator, system, dynamics, other, room, .. } = state;
         let apply = |x: &[f64], wx: &mut [f64]| match &*operator {
+            Operator::Visits(delassus) if delassus.receive(None, x, other, room) => {
+                delassus.local_velocities(other, wx);
+            }
             Operator::Condensed(w) => {
                 for (c, wx) in wx.chunks_mut(D).enumerate() {
                     wx.copy_from_slice(&w.row_product(c, x));

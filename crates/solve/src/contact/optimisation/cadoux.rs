@@ -262,9 +262,9 @@ impl<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> CadouxWork<
             return;
         }
         if accelerator.is_on() {
-            let Speeds { s, image, .. } = speeds;
+            let (Speeds { s, image, .. }, mu) = (speeds, problem.mu());
             accelerator.begin(s);
-            accelerator.advance(image, &|c| f64::from(problem.mu()[c] > 0.0));
+            accelerator.advance(image, |c| f64::from(mu[c] > 0.0));
             s.iter_mut().zip(image).for_each(|(s, image)| *s = image.max(0.0));
             return;
         }

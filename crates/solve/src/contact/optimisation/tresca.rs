@@ -144,7 +144,7 @@ impl<P: Linearised<D> + Frictional<D> + Explicit<D>, const D: usize> Solver<P>
         if accelerator.is_on() {
             let unit = &inner.convex.unit;
             accelerator.begin(theta);
-            accelerator.advance(image, &|c| unit[c]);
+            accelerator.advance(image, |c| unit[c]);
         }
         for (theta, image) in theta.iter_mut().zip(&*image) {
             *theta = image.max(0.0);

@@ -117,7 +117,7 @@ impl Acceleration {
             return true;
         }
         let Self { accelerator: Some(accelerator), unit, .. } = self else { return true };
-        let moved = accelerator.advance(r, &|i| unit[i / D]);
+        let moved = accelerator.advance(r, |i| unit[i / D]);
         let on_trial = self.verdict == Verdict::OnTrial;
         if on_trial {
             self.first = if self.steps == 0 { moved } else { self.first };

@@ -8,10 +8,15 @@
 //! References: Anderson1965; WalkerNi2011 for the QR form and the control of the condition number.
 //! Cost of a proposal: about 8 m products of length n. Storage: 2 m + 4 vectors. A nonsmooth g has no theory: hence the safeguard.
 
-use nonsmooth_linalg::budget;
+use nonsmooth_linalg::{budget, pieces};
 
 /// The largest condition number (1-norm) of R.
 const CONDITION: f64 = 1e8;
+
+/// A piece of a vector that one thread works on; with those of the other vectors it stays in the cache.
+const PIECE: usize = 2048;
+/// Columns whose products are taken at once.
+const GROUP: usize = 6;
 
 /// Differences of f and g, and the QR factorisation of the former.
 #[derive(Debug, Clone)]
@@ -80,26 +85,30 @@ impl Anderson {
                 self.drop_oldest();
             }
         }
-        self.f_last.copy_from_slice(f);
-        self.g_last.copy_from_slice(g);
-        self.has_last = true;
-        if budget::over() {
-            return 0;
-        }
         let (k, n) = (self.slots.len(), self.n);
-        for j in 0..k {
-            self.gamma[j] = dot(&self.q[j * n..(j + 1) * n], f);
-        }
-        for j in (0..k).rev() {
-            for i in j + 1..k {
-                self.gamma[j] -= self.r[i * self.depth + j] * self.gamma[i];
+        let late = budget::over();
+        if !late {
+            dots(&self.q[..k * n], f, &mut self.gamma);
+            for j in (0..k).rev() {
+                for i in j + 1..k {
+                    self.gamma[j] -= self.r[i * self.depth + j] * self.gamma[i];
+                }
+                self.gamma[j] /= self.r[j * self.depth + j];
             }
-            self.gamma[j] /= self.r[j * self.depth + j];
         }
-        for (j, &slot) in self.slots.iter().enumerate() {
-            add(g, -self.gamma[j], &self.dg[slot * n..(slot + 1) * n]);
-        }
-        k
+        // The last pair, and the proposal.
+        let Self { slots, gamma, dg, f_last, g_last, has_last, .. } = self;
+        *has_last = true;
+        let used = if late { 0 } else { k };
+        pieces::writing(n, PIECE, [g, f_last, g_last], |piece, [x, f_last, g_last]| {
+            f_last.copy_from_slice(&f[piece.clone()]);
+            g_last.copy_from_slice(x);
+            for (&slot, gamma) in slots[..used].iter().zip(&*gamma) {
+                add(x, -gamma, &dg[slot * n..][piece.clone()]);
+            }
+            []
+        });
+        used
     }
 
     /// Appends the difference to the last pair as a column.
@@ -110,34 +119,36 @@ impl Anderson {
         let (k, n, depth) = (self.slots.len(), self.n, self.depth);
         let (done, rest) = self.q.split_at_mut(k * n);
         let column = &mut rest[..n];
-        for i in 0..n {
-            column[i] = f[i] - self.f_last[i];
-        }
-        let size = dot(column, column).sqrt();
+        let f_last = &self.f_last;
+        let [square] = pieces::writing(n, PIECE, [&mut *column], |piece, [column]| {
+            difference(column, &f[piece.clone()], &f_last[piece]);
+            [pieces::dot(column, column)]
+        });
+        let size = square.sqrt();
         let r = &mut self.r[k * depth..(k + 1) * depth];
         r.fill(0.0);
+        let mut left = size;
         for _ in 0..2 {
-            for (j, q) in done.chunks_exact(n).enumerate() {
-                if budget::over() {
-                    return;
-                }
-                let along = dot(q, column);
-                r[j] += along;
-                add(column, -along, q);
+            if budget::over() {
+                return;
             }
+            let along = &mut self.gamma[..k];
+            dots(done, column, along);
+            r.iter_mut().zip(&*along).for_each(|(r, along)| *r += along);
+            left = take_out(column, along, done);
         }
-        let left = dot(column, column).sqrt();
         // A column that the others span, or that is not finite, adds nothing.
         if !(left > size / CONDITION && left.is_finite()) {
             return;
         }
         r[k] = left;
-        column.iter_mut().for_each(|x| *x /= left);
         let slot = (0..depth).find(|s| !self.slots.contains(s)).unwrap_or(0);
-        let dg = &mut self.dg[slot * n..(slot + 1) * n];
-        for i in 0..n {
-            dg[i] = g[i] - self.g_last[i];
-        }
+        let (dg, g_last) = (&mut self.dg[slot * n..(slot + 1) * n], &self.g_last);
+        pieces::writing(n, PIECE, [column, dg], |piece, [column, dg]| {
+            column.iter_mut().for_each(|x| *x /= left);
+            difference(dg, &g[piece.clone()], &g_last[piece]);
+            []
+        });
         self.slots.push(slot);
     }
 
@@ -156,9 +167,12 @@ impl Anderson {
                 self.r[j * depth + i + 1] = c * y - s * x;
             }
             let (left, right) = self.q.split_at_mut((i + 1) * n);
-            for (x, y) in left[i * n..].iter_mut().zip(&mut right[..n]) {
-                (*x, *y) = (c * *x + s * *y, c * *y - s * *x);
-            }
+            pieces::writing(n, PIECE, [&mut left[i * n..], &mut right[..n]], |_, [x, y]| {
+                for (x, y) in x.iter_mut().zip(y) {
+                    (*x, *y) = (c * *x + s * *y, c * *y - s * *x);
+                }
+                []
+            });
         }
     }
 
@@ -242,11 +256,15 @@ impl Accelerator {
     }
 
     /// Turns `g(x)` into the next x; returns `‖( weight(i) f_i )_i‖`, `f = g(x) − x`.
-    pub fn advance(&mut self, g: &mut [f64], weight: &dyn Fn(usize) -> f64) -> f64 {
-        for (i, f) in self.f.iter_mut().enumerate() {
-            *f = weight(i) * (g[i] - self.start[i]);
-        }
-        let size = dot(&self.f, &self.f).sqrt();
+    pub fn advance(&mut self, g: &mut [f64], weight: impl Fn(usize) -> f64 + Sync) -> f64 {
+        let Self { f, start, .. } = self;
+        let [square] = pieces::writing(g.len(), PIECE, [&mut *f], |piece, [f]| {
+            for (f, i) in f.iter_mut().zip(piece) {
+                *f = weight(i) * (g[i] - start[i]);
+            }
+            [pieces::dot(f, f)]
+        });
+        let size = square.sqrt();
         if self.proposed && (size.is_nan() || size > GROWTH * self.size) {
             self.anderson.clear();
             self.proposed = false;
@@ -268,8 +286,36 @@ impl Accelerator {
     }
 }
 
-fn dot(x: &[f64], y: &[f64]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
+/// The products of x with columns of its length.
+fn dots(columns: &[f64], x: &[f64], products: &mut [f64]) {
+    let n = x.len();
+    for (columns, products) in columns.chunks((GROUP * n).max(1)).zip(products.chunks_mut(GROUP)) {
+        let sums: [f64; GROUP] = pieces::sums(n, PIECE, |piece| {
+            let mut sums = [0.0; GROUP];
+            for (sum, column) in sums.iter_mut().zip(columns.chunks_exact(n)) {
+                *sum = pieces::dot(&column[piece.clone()], &x[piece.clone()]);
+            }
+            sums
+        });
+        products.iter_mut().zip(sums).for_each(|(product, sum)| *product = sum);
+    }
+}
+
+/// `x ← x − Σ along_j column_j`; returns its norm.
+fn take_out(x: &mut [f64], along: &[f64], columns: &[f64]) -> f64 {
+    let n = x.len();
+    let [square] = pieces::writing(n, PIECE, [x], |piece, [x]| {
+        for (along, column) in along.iter().zip(columns.chunks_exact(n)) {
+            add(x, -along, &column[piece.clone()]);
+        }
+        [pieces::dot(x, x)]
+    });
+    square.sqrt()
+}
+
+/// `z = x − y`.
+fn difference(z: &mut [f64], x: &[f64], y: &[f64]) {
+    z.iter_mut().zip(x).zip(y).for_each(|((z, x), y)| *z = x - y);
 }
 
 fn add(y: &mut [f64], a: f64, x: &[f64]) {
@@ -299,8 +345,8 @@ mod tests {
         // Gaussian elimination with the matrix of scalar products, well conditioned here.
         let mut a: Vec<Vec<f64>> = (0..k)
             .map(|i| {
-                let mut row: Vec<f64> = (0..k).map(|j| dot(&df[i], &df[j])).collect();
-                row.push(dot(&df[i], &fs[last]));
+                let mut row: Vec<f64> = (0..k).map(|j| pieces::dot(&df[i], &df[j])).collect();
+                row.push(pieces::dot(&df[i], &fs[last]));
                 row
             })
             .collect();
@@ -359,7 +405,7 @@ mod tests {
         for _ in 0..5 {
             accelerator.begin(&x);
             x = g(&x);
-            accelerator.advance(&mut x, &|_| 1.0);
+            accelerator.advance(&mut x, |_| 1.0);
         }
         let gx = g(&x);
         assert!(x.iter().zip(&gx).all(|(a, b)| (a - b).abs() < 1e-12), "{x:?} {gx:?}");
@@ -370,14 +416,14 @@ mod tests {
         let mut a = Accelerator::new(1, 1);
         a.begin(&[0.0]);
         let mut x = [1.0];
-        a.advance(&mut x, &|_| 1.0); // f = 1, nothing to compare with: x = 1
+        a.advance(&mut x, |_| 1.0); // f = 1, nothing to compare with: x = 1
         a.begin(&x);
         x = [1.5];
-        a.advance(&mut x, &|_| 1.0); // f = 0.5; the secant step: x = 2
+        a.advance(&mut x, |_| 1.0); // f = 0.5; the secant step: x = 2
         assert!((x[0] - 2.0).abs() < 1e-14);
         a.begin(&x);
         x = [12.0];
-        a.advance(&mut x, &|_| 1.0); // f = 10 > 2 · 0.5: back to the plain 1.5
+        a.advance(&mut x, |_| 1.0); // f = 10 > 2 · 0.5: back to the plain 1.5
         assert_eq!(x, [1.5]);
     }
 }

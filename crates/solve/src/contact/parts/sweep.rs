@@ -9,7 +9,7 @@
 //! Cost of a sweep: one pass over the blocks of W (or over the rows of H and M⁻¹H) plus nc local solves. Storage: the
 //! diagonal block and the local solver's memo of each contact.
 
-use nonsmooth_linalg::{Parts, budget, norm, small};
+use nonsmooth_linalg::{Parts, budget, norm, pieces, small};
 
 use crate::contact::form::{AHEAD, Blockwise, Disked, Visits};
 use crate::contact::law::DiskLaw;
@@ -23,6 +23,9 @@ pub const NEGLIGIBLE: f64 = 1e-80;
 const FOLLOWED: f64 = 1e-3;
 const FEW: usize = 4;
 const FOLLOW: usize = 2;
+
+/// The fewest contacts whose impulses a thread gathers.
+const PIECE: usize = 1024;
 
 /// What sweeps keep for each contact; S solves one.
 #[derive(Debug, Clone)]
@@ -142,9 +145,13 @@ impl<L: DiskLaw<D>, const D: usize, S: LocalSolver<D, L>> Sweep<L, D, S> {
         // In the order of the visits: memory is read from one end to the other.
         let Self { local, contacts, negligible, gathered, moved, .. } = self;
         let (local, negligible) = (&*local, *negligible);
-        gathered.clear();
-        let places = contacts.iter().map(|contact| contact.place);
-        gathered.extend(places.map(|c| (small::block(r, c), small::block(given, c))));
+        gathered.resize(contacts.len(), ([0.0; D], [0.0; D]));
+        pieces::writing(contacts.len(), PIECE, [&mut gathered[..]], |piece, [gathered]| {
+            for (gathered, contact) in gathered.iter_mut().zip(&contacts[piece]) {
+                *gathered = (small::block(r, contact.place), small::block(given, contact.place));
+            }
+            []
+        });
         let (contacts, impulses) = (Parts::of(contacts), Parts::of(gathered));
         let moved = Parts::of(moved);
         self.moves = passes.run(count, |block| {
@@ -173,9 +180,13 @@ impl<L: DiskLaw<D>, const D: usize, S: LocalSolver<D, L>> Sweep<L, D, S> {
             }
             moved.iter().sum()
         });
-        for (contact, (new, _)) in self.contacts.iter().zip(&self.gathered) {
-            r[D * contact.place..D * contact.place + D].copy_from_slice(new);
-        }
+        let (contacts, gathered, r) = (&self.contacts, &self.gathered, Parts::of(r));
+        pieces::each(contacts.len(), PIECE, |piece| {
+            for (contact, (new, _)) in contacts[piece.clone()].iter().zip(&gathered[piece]) {
+                // SAFETY: each contact is visited at one place.
+                unsafe { r.part(D * contact.place, D) }.copy_from_slice(new);
+            }
+        });
         self.moves
     }
 

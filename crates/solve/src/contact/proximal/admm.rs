@@ -225,7 +225,7 @@ impl<P: Linearised<D> + Frictional<D>, const D: usize> Solver<P> for OnContacts<
             t[i] = alpha * r[i] + (1.0 - alpha) * z[i] + y[i];
         }
         if accelerator.is_on() {
-            accelerator.advance(t, &|i| unit[i / D]);
+            accelerator.advance(t, |i| unit[i / D]);
         }
         let (mut primal, mut dual) = (0.0, 0.0);
         for (c, (&mu, &w)) in problem.mu().iter().zip(&*unit).enumerate() {

@@ -344,7 +344,7 @@ where
         work.since += 1;
         if accelerated && work.since >= self.settings.anderson_every {
             work.since = 0;
-            work.accelerator.advance(r, &|i| unit(i / D));
+            work.accelerator.advance(r, |i| unit(i / D));
             put_within_cones(problem, r);
             problem.enter(state, point);
         }

@@ -28,7 +28,7 @@ struct Run {
 
 fn run_with<P>(problem: &P, solver: Lemke, start: &[f64], tolerance: f64) -> Run
 where
-    P: Problem<Point = LcpPoint> + nonsmooth_solve::complementarity::form::Complementary,
+    P: Problem<Point = LcpPoint> + nonsmooth_solve::complementarity::form::Complementary + Sync,
 {
     let mut driver = Driver::new(solver);
     let mut point = problem.origin();
@@ -43,7 +43,7 @@ where
 
 fn run<P>(problem: &P, settings: Lemke) -> Run
 where
-    P: Problem<Point = LcpPoint> + nonsmooth_solve::complementarity::form::Complementary,
+    P: Problem<Point = LcpPoint> + nonsmooth_solve::complementarity::form::Complementary + Sync,
 {
     run_with(problem, settings, &[], 1e-11)
 }

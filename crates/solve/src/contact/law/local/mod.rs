@@ -22,7 +22,7 @@ pub use rolling::RollingExact;
 /// A solver of one contact with the law L.
 pub trait LocalSolver<const D: usize, L = Coulomb>: Send + Sync {
     /// What it keeps for one contact between visits.
-    type Memo: Send;
+    type Memo: Send + Sync;
 
     /// From now on a contact need not be solved more exactly than this, in units of velocity; 0 asks for all that rounding
     /// allows. Ignored by solvers that have nothing to save.
