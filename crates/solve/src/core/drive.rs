@@ -237,7 +237,8 @@ pub struct Outcome {
     /// Matrices factorised for the solve, as far as they grow with the problem: M, a Newton matrix, but not the
     /// blocks of single contacts, nor what the judge factorises for itself.
     pub factorisations: u64,
-    /// Wall clock of the solve: set-up of the workspace, steps and judgements, but no file and no final report.
+    /// Wall clock of the solve: set-up of the workspace, steps and judgements, but no file and no final report. The judge's own preparation is left out, but where on several threads
+    /// it runs beside that set-up and is waited for.
     pub seconds: f64,
     /// Processor time of the whole process meanwhile, all threads, if [`Limits::cpu_time`] asked for it: below `seconds` where the process had to wait.
     pub cpu_seconds: Option<f64>,
