@@ -25,8 +25,8 @@ pub struct Delassus<const D: usize> {
     passes: Option<Passes>,
 }
 
-/// Parts of the contacts whose impulses are added by themselves before all are.
-const SLABS: usize = 8;
+/// Parts of the contacts whose impulses are added by themselves before all are: no more than several threads come for, since each has memory of its own.
+const SLABS: usize = pieces::SHARED;
 /// The fewest contacts that are worth a piece of their own, and unknowns.
 const PIECE: usize = 64;
 const UNKNOWNS: usize = 2048;

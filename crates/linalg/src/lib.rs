@@ -53,6 +53,20 @@ pub use rank_lu::RankLu;
 pub use square_cholesky::SquareCholesky;
 pub use square_lu::SquareLu;
 
+/// `xᵀ y`, as eight sums side by side, which are vectorised.
+#[inline]
+pub fn dot(x: &[f64], y: &[f64]) -> f64 {
+    let ((x8, x), (y8, y)) = (x.as_chunks::<8>(), y.as_chunks::<8>());
+    let mut sums = [0.0; 8];
+    for (x, y) in x8.iter().zip(y8) {
+        for k in 0..8 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    let rest: f64 = x.iter().zip(y).map(|(x, y)| x * y).sum();
+    sums.iter().sum::<f64>() + rest
+}
+
 /// The Euclidean norm, scaled so that neither overflow nor underflow of the squares spoils it.
 pub fn norm(x: &[f64]) -> f64 {
     norm_of(x.iter().copied())

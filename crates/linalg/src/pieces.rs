@@ -11,7 +11,7 @@ use crate::passes::Parts;
 /// The most pieces.
 const MOST: usize = 64;
 /// Fewer pieces are not worth a second thread, which takes some 20 µs to come.
-const SHARED: usize = 8;
+pub(crate) const SHARED: usize = 8;
 
 /// Lets `work` do the pieces of `0..n`, each at least `least` long but the last, and returns `Σ work(piece)`, K sums.
 ///
@@ -101,23 +101,11 @@ pub fn both<A: Send, B>(there: impl FnOnce() -> A + Send, here: impl FnOnce() ->
     (a.expect("a scope ends with its work done"), b)
 }
 
-/// `xᵀ y`, as eight sums side by side.
-pub fn dot(x: &[f64], y: &[f64]) -> f64 {
-    let ((x8, x), (y8, y)) = (x.as_chunks::<8>(), y.as_chunks::<8>());
-    let mut sums = [0.0; 8];
-    for (x, y) in x8.iter().zip(y8) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
-        }
-    }
-    let rest: f64 = x.iter().zip(y).map(|(x, y)| x * y).sum();
-    sums.iter().sum::<f64>() + rest
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::budget::Budget;
+    use crate::dot;
 
     #[test]
     fn two_things_are_done_under_the_same_limits() {

@@ -517,8 +517,7 @@ impl<P: Problem + Sync, S: Solver<P>> Session<P> for Driver<P, S> {
         let beside = budget::threads() > 1
             && problem.burden() >= BESIDE
             && !problem.asks_functions()
-            && earlier.is_none()
-            && gauge_before.is_none();
+            && earlier.is_none();
         let mut meter = Meter::start(begun, limits);
         let gauge_anew = || uncounted(|| problem.gauge()).map(Box::new);
         let (judge, made) = match gauge_before {

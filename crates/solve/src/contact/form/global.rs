@@ -95,13 +95,6 @@ impl<const D: usize> Operator<D> {
             Operator::Condensed(w) => w.diagonal_block(c),
         }
     }
-
-    fn passes(&self) -> Option<&Passes> {
-        match self {
-            Operator::Visits(delassus) => delassus.passes(),
-            _ => None,
-        }
-    }
 }
 
 impl<const D: usize> GlobalState<D> {
@@ -345,7 +338,10 @@ impl<const D: usize, L: DiskLaw<D>> Blockwise<D> for FrictionGlobal<D, L> {
     }
 
     fn passes<'a>(&self, state: &'a Self::State) -> Option<&'a Passes> {
-        state.operator.passes()
+        match &state.operator {
+            Operator::Visits(delassus) => delassus.passes(),
+            _ => None,
+        }
     }
 
     fn moving<'a>(&'a self, state: &'a mut Self::State) -> Option<Visits<'a, D>> {

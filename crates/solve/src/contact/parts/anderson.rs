@@ -8,7 +8,7 @@
 //! References: Anderson1965; WalkerNi2011 for the QR form and the control of the condition number.
 //! Cost of a proposal: about 8 m products of length n. Storage: 2 m + 4 vectors. A nonsmooth g has no theory: hence the safeguard.
 
-use nonsmooth_linalg::{budget, pieces};
+use nonsmooth_linalg::{budget, dot, pieces};
 
 /// The largest condition number (1-norm) of R.
 const CONDITION: f64 = 1e8;
@@ -85,30 +85,26 @@ impl Anderson {
                 self.drop_oldest();
             }
         }
-        let (k, n) = (self.slots.len(), self.n);
-        let late = budget::over();
-        if !late {
-            dots(&self.q[..k * n], f, &mut self.gamma);
-            for j in (0..k).rev() {
-                for i in j + 1..k {
-                    self.gamma[j] -= self.r[i * self.depth + j] * self.gamma[i];
-                }
-                self.gamma[j] /= self.r[j * self.depth + j];
+        let (k, n) = (if budget::over() { 0 } else { self.slots.len() }, self.n);
+        dots(&self.q[..k * n], f, &mut self.gamma);
+        for j in (0..k).rev() {
+            for i in j + 1..k {
+                self.gamma[j] -= self.r[i * self.depth + j] * self.gamma[i];
             }
+            self.gamma[j] /= self.r[j * self.depth + j];
         }
         // The last pair, and the proposal.
         let Self { slots, gamma, dg, f_last, g_last, has_last, .. } = self;
         *has_last = true;
-        let used = if late { 0 } else { k };
         pieces::writing(n, PIECE, [g, f_last, g_last], |piece, [x, f_last, g_last]| {
             f_last.copy_from_slice(&f[piece.clone()]);
             g_last.copy_from_slice(x);
-            for (&slot, gamma) in slots[..used].iter().zip(&*gamma) {
+            for (&slot, gamma) in slots[..k].iter().zip(&*gamma) {
                 add(x, -gamma, &dg[slot * n..][piece.clone()]);
             }
             []
         });
-        used
+        k
     }
 
     /// Appends the difference to the last pair as a column.
@@ -122,7 +118,7 @@ impl Anderson {
         let f_last = &self.f_last;
         let [square] = pieces::writing(n, PIECE, [&mut *column], |piece, [column]| {
             difference(column, &f[piece.clone()], &f_last[piece]);
-            [pieces::dot(column, column)]
+            [dot(column, column)]
         });
         let size = square.sqrt();
         let r = &mut self.r[k * depth..(k + 1) * depth];
@@ -262,7 +258,7 @@ impl Accelerator {
             for (f, i) in f.iter_mut().zip(piece) {
                 *f = weight(i) * (g[i] - start[i]);
             }
-            [pieces::dot(f, f)]
+            [dot(f, f)]
         });
         let size = square.sqrt();
         if self.proposed && (size.is_nan() || size > GROWTH * self.size) {
@@ -293,7 +289,7 @@ fn dots(columns: &[f64], x: &[f64], products: &mut [f64]) {
         let sums: [f64; GROUP] = pieces::sums(n, PIECE, |piece| {
             let mut sums = [0.0; GROUP];
             for (sum, column) in sums.iter_mut().zip(columns.chunks_exact(n)) {
-                *sum = pieces::dot(&column[piece.clone()], &x[piece.clone()]);
+                *sum = dot(&column[piece.clone()], &x[piece.clone()]);
             }
             sums
         });
@@ -308,7 +304,7 @@ fn take_out(x: &mut [f64], along: &[f64], columns: &[f64]) -> f64 {
         for (along, column) in along.iter().zip(columns.chunks_exact(n)) {
             add(x, -along, &column[piece.clone()]);
         }
-        [pieces::dot(x, x)]
+        [dot(x, x)]
     });
     square.sqrt()
 }
@@ -345,8 +341,8 @@ mod tests {
         // Gaussian elimination with the matrix of scalar products, well conditioned here.
         let mut a: Vec<Vec<f64>> = (0..k)
             .map(|i| {
-                let mut row: Vec<f64> = (0..k).map(|j| pieces::dot(&df[i], &df[j])).collect();
-                row.push(pieces::dot(&df[i], &fs[last]));
+                let mut row: Vec<f64> = (0..k).map(|j| dot(&df[i], &df[j])).collect();
+                row.push(dot(&df[i], &fs[last]));
                 row
             })
             .collect();

@@ -11,7 +11,7 @@ mod tableau;
 pub(super) use factored::Factored;
 pub(super) use tableau::Tableau;
 
-use nonsmooth_linalg::{Compensated, Matrix, Singular, power_of_two};
+use nonsmooth_linalg::{Compensated, Matrix, Singular, dot, power_of_two};
 
 use crate::complementarity::form::System;
 use crate::core::trace::Variable;
@@ -266,18 +266,4 @@ pub(super) trait Basis: Send {
 
     /// `v` takes `slot`; `y` is its column.
     fn exchange(&mut self, slot: usize, v: Variable, y: &[f64]);
-}
-
-/// `xᵀ y` with enough partial sums to be vectorised.
-#[inline]
-pub(super) fn dot(x: &[f64], y: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (xs, ys) = (x.chunks_exact(8), y.chunks_exact(8));
-    let rest: f64 = xs.remainder().iter().zip(ys.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in xs.zip(ys) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
-        }
-    }
-    sums.iter().sum::<f64>() + rest
 }
