@@ -162,6 +162,22 @@ pub(crate) fn team() -> Option<Arc<ThreadPool>> {
     Some(team)
 }
 
+/// Lets all [`threads`] do `lane`, this one among them, each under the same limits; this one alone where more are not `worth` it. What
+/// another thread was told of a limit this one has yet to ask for.
+pub(crate) fn on_all(worth: bool, lane: impl Fn() + Sync) {
+    let Some(team) = worth.then(team).flatten() else { return lane() };
+    let budget = current();
+    team.in_place_scope(|scope| {
+        for _ in 1..team.current_num_threads() {
+            scope.spawn(|_| {
+                let _scope = budget.enter();
+                lane();
+            });
+        }
+        lane();
+    });
+}
+
 /// Whether the computation is to end now. Costs some 30 ns where there is a limit, 1 ns where there is none.
 #[inline]
 pub fn over() -> bool {

@@ -102,20 +102,7 @@ impl Passes {
             taken: AtomicUsize::new(0),
             ended: AtomicBool::new(false),
         };
-        let budget = budget::current();
-        match budget::team().filter(|_| count > 1) {
-            None => self.lane(&board, &work),
-            Some(team) => team.in_place_scope(|scope| {
-                let (work, board, budget) = (&work, &board, &budget);
-                for _ in 1..team.current_num_threads() {
-                    scope.spawn(move |_| {
-                        let _scope = budget.enter();
-                        self.lane(board, work);
-                    });
-                }
-                self.lane(board, work);
-            }),
-        }
+        budget::on_all(count > 1, || self.lane(&board, &work));
         if board.ended.load(Ordering::Acquire) {
             // Whoever saw it first: the thread that asked knows that its budget is over.
             budget::over();

@@ -23,30 +23,22 @@ pub fn sums<const K: usize>(
 ) -> [f64; K] {
     let length = least.max(n.div_ceil(MOST)).max(1);
     let count = n.div_ceil(length);
+    if count == 1 {
+        return work(0..n);
+    }
     let piece = |k: usize| work(k * length..((k + 1) * length).min(n));
     let mut of_pieces = [[0.0; K]; MOST];
-    match budget::team().filter(|_| count >= SHARED) {
-        None => of_pieces[..count].iter_mut().enumerate().for_each(|(k, sums)| *sums = piece(k)),
-        Some(team) => {
-            let (taken, results) = (AtomicUsize::new(0), Parts::of(&mut of_pieces[..count]));
-            let lane = || {
-                loop {
-                    let k = taken.fetch_add(1, Ordering::Relaxed);
-                    if k >= count {
-                        return;
-                    }
-                    // SAFETY: nobody else has taken piece k.
-                    unsafe { results.part(k, 1)[0] = piece(k) };
-                }
-            };
-            team.in_place_scope(|scope| {
-                for _ in 1..team.current_num_threads() {
-                    scope.spawn(|_| lane());
-                }
-                lane();
-            });
+    let (taken, results) = (AtomicUsize::new(0), Parts::of(&mut of_pieces[..count]));
+    budget::on_all(count >= SHARED, || {
+        loop {
+            let k = taken.fetch_add(1, Ordering::Relaxed);
+            if k >= count {
+                return;
+            }
+            // SAFETY: nobody else has taken piece k.
+            unsafe { results.part(k, 1)[0] = piece(k) };
         }
-    }
+    });
     let mut total = [0.0; K];
     for sums in &of_pieces[..count] {
         total.iter_mut().zip(sums).for_each(|(total, sum)| *total += sum);

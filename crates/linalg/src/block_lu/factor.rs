@@ -282,18 +282,18 @@ impl Part<'_> {
 }
 
 /// What is left of an array from which ranges are cut in order.
-struct Cut<'a, T> {
+pub(super) struct Cut<'a, T> {
     rest: &'a mut [T],
     at: usize,
 }
 
 impl<'a, T> Cut<'a, T> {
-    fn new(rest: &'a mut [T]) -> Self {
+    pub(super) fn new(rest: &'a mut [T]) -> Self {
         Self { rest, at: 0 }
     }
 
     /// Entries `begin..end` of the whole array.
-    fn range(&mut self, begin: usize, end: usize) -> &'a mut [T] {
+    pub(super) fn range(&mut self, begin: usize, end: usize) -> &'a mut [T] {
         let (_, from) = std::mem::take(&mut self.rest).split_at_mut(begin - self.at);
         let (range, rest) = from.split_at_mut(end - begin);
         (self.rest, self.at) = (rest, end);

@@ -12,7 +12,7 @@
 //!
 //! Threads share it in two ways: subtrees of the tree of elimination that are alike in cost go side by side, each with a stack of its own, and the few
 //! large fronts above them cut their products into strips of columns. Each entry is made of the same sums in the same order
-//! whoever makes it, so the factors are the same bits for every number of threads.
+//! whoever makes it, so the factors are the same bits for every number of threads. Solves go through the same subtrees side by side.
 //!
 //! References: DuffReid1983 (fronts), Liu1992 (tree, supernodes, stack), AmestoyDavisDuff1996 (minimum degree), George1973, LiptonRoseTarjan1979,
 //! KarypisKumar1998, FiducciaMattheyses1982 (dissection), GilbertNgPeyton1994 (counts), LiDemmel2003 (static pivots), AshcraftGrimes1989 (merging).
@@ -25,10 +25,11 @@ mod dissection;
 mod factor;
 mod kernel;
 mod plan;
+mod substitute;
 mod symbolic;
 
-use kernel::{At, Simd, WIDTH};
-use symbolic::{Front, Symbolic};
+use kernel::Simd;
+use symbolic::Symbolic;
 
 use super::budget::{self, TooLarge};
 use super::inverse::count_factorisation;
@@ -285,22 +286,6 @@ impl BlockLu {
         }
     }
 
-    /// `x ← A⁻¹ x` with the last factors, nodes concatenated in the caller's order. One pass, not refined.
-    pub fn solve(&mut self, x: &mut [f64]) {
-        assert_eq!(x.len(), self.dim());
-        let Self { symbolic, row_scale, x: work, .. } = self;
-        for ((w, &i), scale) in work.iter_mut().zip(&symbolic.order).zip(row_scale.iter()) {
-            *w = x[i as usize] * scale;
-        }
-        self.forward();
-        self.backward();
-        for ((w, &i), scale) in
-            self.x.iter().zip(&self.symbolic.order).zip(self.column_scale.iter())
-        {
-            x[i as usize] = w * scale;
-        }
-    }
-
     /// Powers of two such that first each row, then each column has a largest entry between one and two.
     fn scale(&mut self) -> Result<(), Singular> {
         let (rows, columns) = (&mut self.row_scale, &mut self.column_scale);
@@ -338,93 +323,6 @@ impl BlockLu {
         columns.iter_mut().for_each(|c| *c = inverse_power(*c));
         Ok(())
     }
-
-    /// `x ← L⁻¹ P x`, front by front.
-    fn forward(&mut self) {
-        let simd = self.simd;
-        for front in &self.symbolic.fronts {
-            let Front { pivots: k, rest: m, start, .. } = *front;
-            let ld = k + m;
-            let lower = &self.lower[front.lower..front.lower + k * ld];
-            let z = &mut self.z[..ld];
-            let own = &mut self.x[start..start + k];
-            for (j, &p) in self.swaps[start..start + k].iter().enumerate() {
-                own.swap(j, p as usize);
-            }
-            z[..k].copy_from_slice(own);
-            z[k..].fill(0.0);
-            for b in (0..k).step_by(WIDTH) {
-                let e = (b + WIDTH).min(k);
-                let y: [f64; WIDTH] =
-                    std::array::from_fn(|i| if b + i < e { z[b + i] } else { 0.0 });
-                z[b..e].fill(0.0);
-                let triangle = At { at: front.triangles + b * WIDTH, ld: WIDTH };
-                let own = (&self.triangles[..], triangle);
-                kernel::product_vector(simd, own, &y[..e - b], &mut z[b..e]);
-                let (done, open) = z.split_at_mut(e);
-                kernel::product_vector(simd, (lower, At { at: b * ld + e, ld }), &done[b..], open);
-            }
-            own.copy_from_slice(&z[..k]);
-            for (&r, z) in self.symbolic.rows[front.rows..front.rows + m].iter().zip(&z[k..]) {
-                self.x[r as usize] += z;
-            }
-        }
-    }
-
-    /// `x ← U⁻¹ x`, front by front from the last.
-    fn backward(&mut self) {
-        let simd = self.simd;
-        for front in self.symbolic.fronts.iter().rev() {
-            let Front { pivots: k, rest: m, start, .. } = *front;
-            let ld = k + m;
-            let lower = &self.lower[front.lower..front.lower + k * ld];
-            let upper = &self.upper[front.upper..front.upper + k * m];
-            let inverses = &self.inverses[start..start + k];
-            let z = &mut self.z[..m];
-            for (&r, z) in self.symbolic.rows[front.rows..front.rows + m].iter().zip(&mut *z) {
-                *z = self.x[r as usize];
-            }
-            let own = &mut self.x[start..start + k];
-            kernel::product_vector(simd, (upper, At { at: 0, ld: k }), z, own);
-            let mut e = k;
-            while e > 0 {
-                let b = (e - 1) / WIDTH * WIDTH;
-                upper_solve(&lower[b * ld + b..], ld, &inverses[b..e], &mut own[b..e]);
-                let (open, done) = own.split_at_mut(b);
-                kernel::product_vector(simd, (lower, At { at: b * ld, ld }), &done[..e - b], open);
-                e = b;
-            }
-        }
-    }
-}
-
-/// `x ← U⁻¹ x` for a diagonal block of at most [`WIDTH`] rows.
-fn upper_solve(block: &[f64], ld: usize, inverses: &[f64], x: &mut [f64]) {
-    let w = x.len();
-    if w < WIDTH {
-        for j in (0..w).rev() {
-            x[j] *= inverses[j];
-            let y = x[j];
-            for i in 0..j {
-                x[i] -= block[j * ld + i] * y;
-            }
-        }
-        return;
-    }
-    // Whole columns, masked, in a register.
-    let mut z: [f64; WIDTH] = std::array::from_fn(|i| x[i]);
-    for j in (0..WIDTH).rev() {
-        let y = z[j] * inverses[j];
-        let column = &block[j * ld..j * ld + WIDTH];
-        for i in 0..WIDTH {
-            z[i] = match i.cmp(&j) {
-                std::cmp::Ordering::Less => z[i] - column[i] * y,
-                std::cmp::Ordering::Equal => y,
-                std::cmp::Ordering::Greater => z[i],
-            };
-        }
-    }
-    x.copy_from_slice(&z);
 }
 
 /// The power of two by which x comes to lie between one and two; one for zero.

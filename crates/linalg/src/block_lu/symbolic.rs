@@ -44,6 +44,13 @@ pub(super) struct Front {
     pub blocks: std::ops::Range<usize>,
 }
 
+impl Front {
+    /// The positions of its unknowns that are no pivots, among those of all fronts.
+    pub(super) fn rest_of<'a>(&self, rows: &'a [u32]) -> &'a [u32] {
+        &rows[self.rows..self.rows + self.rest]
+    }
+}
+
 /// Where a block of A (of two groups of nodes) lies among the values, and in its front.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
@@ -227,7 +234,7 @@ impl Symbolic {
             for k in 0..front.pivots {
                 local[front.start + k] = k as u32;
             }
-            let rows = &self.rows[front.rows..front.rows + front.rest];
+            let rows = front.rest_of(&self.rows);
             for (k, &r) in rows.iter().enumerate() {
                 local[r as usize] = (front.pivots + k) as u32;
             }
@@ -248,7 +255,7 @@ impl Symbolic {
             let child = &self.fronts[c as usize];
             let begin = self.runs.len();
             let mut beyond = None;
-            for (k, &r) in self.rows[child.rows..child.rows + child.rest].iter().enumerate() {
+            for (k, &r) in child.rest_of(&self.rows).iter().enumerate() {
                 let to = local[r as usize];
                 let crossing = beyond.is_none() && to as usize >= pivots;
                 match self.runs[begin..].last_mut() {

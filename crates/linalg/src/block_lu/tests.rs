@@ -429,14 +429,24 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
         lu.simd = simd;
         let mut alone = lu.clone();
         alone.factorise().unwrap();
+        assert!(alone.factor_len() > substitute::SHARED, "{}", alone.factor_len());
+        let b: Vec<f64> = (0..alone.dim()).map(|_| rng.random_range(-1.0..1.0)).collect();
+        let solution = |lu: &mut BlockLu| {
+            let mut x = b.clone();
+            lu.solve(&mut x);
+            bits(&x)
+        };
+        let x = solution(&mut alone);
         for threads in [2, 3] {
             let mut shared = lu.clone();
             let budget = Budget { threads, ..Budget::default() }.enter();
             shared.factorise().unwrap();
             assert!(shared.symbolic.plan.tasks.len() > 3, "{:?}", shared.symbolic.plan.tasks);
             assert!(shared.symbolic.plan.others(shared.fronts()).count() < shared.fronts() / 10);
+            assert!(solution(&mut shared) == x);
             // The plan stays, and a thread alone can follow it.
             drop(budget);
+            assert!(solution(&mut shared) == x);
             for _ in 0..2 {
                 assert_eq!(bits(&shared.lower), bits(&alone.lower));
                 assert_eq!(bits(&shared.upper), bits(&alone.upper));
