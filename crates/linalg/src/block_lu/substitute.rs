@@ -8,7 +8,7 @@ use super::factor::Cut;
 use super::kernel::{self, At, Simd, WIDTH};
 use super::symbolic::{Front, Symbolic};
 
-/// Factors of more entries than this, read in some milliseconds, are shared among the threads that the budget allows.
+/// Factors of more entries than this, read in half a millisecond, are shared among the threads that the budget allows.
 pub(super) const SHARED: usize = 1 << 20;
 
 /// What all fronts read.
