@@ -15,6 +15,8 @@ const SMALL: usize = 64;
 /// Factorisations of the first time; and a later one has so many times those of the one before.
 const FIRST: f64 = 200.0;
 const MORE: f64 = 1.5;
+/// After two times, the second from the best point, none that came no nearer than this multiple of its error.
+const IN_VAIN: (usize, f64) = (2, 10.0);
 /// Factorisations in the face of a proof that there is no solution by rounding only, and the share of the error there: a convex problem has a solution all the same, but a closer one is needed. Of 114 such
 /// problems some 100 are solved with it or without, one to three more with it.
 const INSIST: f64 = 2000.0;
@@ -37,6 +39,8 @@ pub(super) struct Cadoux<L, const D: usize> {
     /// Factorisations that are left.
     left: f64,
     budget: f64,
+    /// How often it has begun.
+    begun: usize,
     /// See [`SHARE`].
     share: f64,
 }
@@ -54,6 +58,7 @@ impl<L: DiskLaw<D>, const D: usize> Cadoux<L, D> {
             least: f64::INFINITY,
             left: 0.0,
             budget: FIRST,
+            begun: 0,
             share: SHARE,
         };
         new.begin(problem, state);
@@ -68,7 +73,7 @@ impl<L: DiskLaw<D>, const D: usize> Cadoux<L, D> {
             x.resize(D * problem.contacts(), 0.0);
         }
         (self.error, self.least, self.budget) = (1.0, f64::INFINITY, FIRST);
-        self.share = SHARE;
+        (self.begun, self.share) = (0, SHARE);
     }
 
     /// The solution of the convex problem.
@@ -116,6 +121,17 @@ impl<const D: usize> OnContacts<Auto, D> {
         work.done.convex == 0 && work.done.newton >= EARLY && is_small::<P, D>(problem)
     }
 
+    /// Whether the stage has come far less near than the best point, and would again.
+    pub(super) fn cadoux_is_in_vain<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        work: &HybridWork<P, D>,
+    ) -> bool {
+        let in_vain = |cadoux: &Cadoux<P::Law, D>| {
+            cadoux.begun >= IN_VAIN.0 && cadoux.least > IN_VAIN.1 * work.controller.least()
+        };
+        work.done.convex > 0 && work.cadoux.as_deref().is_some_and(in_vain)
+    }
+
     /// Makes room for the stage, and for the interior point that it puts off, where it may come soon.
     pub(super) fn make_room_for_cadoux<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
@@ -146,6 +162,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         }
         cadoux.left = cadoux.budget;
         cadoux.budget *= MORE;
+        cadoux.begun += 1;
         *stage = Stage::Cadoux;
         Step::Continue { estimate: f64::NAN }
     }

@@ -30,6 +30,11 @@ const LONG: (usize, usize) = (50, 30_000);
 const MOST_PROJECTED: usize = 8000;
 /// The least share of the time that sweeps have.
 const LEAST_SHARE: f64 = 0.02;
+/// Of two points whose errors differ by no more than this factor the newer is as good: a strategy goes on from it. Where W is nearly singular, proximal steps lead along a curve on which the error
+/// stays what it is, or rises a little, for hundreds of steps before it falls; going back to the least error undid them.
+const AS_GOOD: f64 = 2.0;
+/// From below this error no strategy begins anew at zero.
+const NEAR: f64 = 1e-6;
 /// A strategy is left after this many factorisations that did not halve the error, and each later one half as late again.
 const PATIENT: f64 = 200.0;
 const MORE_PATIENT: f64 = 1.5;
@@ -45,7 +50,7 @@ const STRATEGIES: [(f64, f64, Origin); 4] = [
 /// Where a strategy goes on from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Origin {
-    /// The best point so far.
+    /// The best point so far, the newest of those that are as good.
     Best,
     /// What long sweeps from zero come to, good or bad.
     Swept,
@@ -145,7 +150,7 @@ impl Controller {
         self.idle
     }
 
-    /// A subproblem begins: the error of the problem and its own residual there. True: the best point so far.
+    /// A subproblem begins: the error of the problem and its own residual there. True: the point to go on from.
     pub(super) fn start(&mut self, error: f64, residual: f64, tolerance: f64) -> bool {
         self.inner = Subproblem {
             initial: residual,
@@ -157,16 +162,15 @@ impl Controller {
         self.record(error)
     }
 
+    /// Takes note of an error; true: the point to go on from ([`AS_GOOD`]).
     fn record(&mut self, error: f64) -> bool {
-        let best = error < self.least;
-        if best {
-            self.least = error;
-        }
+        let as_good = error <= AS_GOOD * self.least;
+        self.least = error.min(self.least);
         if error <= self.halved {
             (self.halved, self.spent, self.idle) = (0.5 * error, 0.0, 0);
             self.budget = PATIENT;
         }
-        best
+        as_good
     }
 
     /// Notes an iteration; true: the best of this subproblem.
@@ -207,7 +211,7 @@ impl Controller {
         })
     }
 
-    /// The subproblem has ended at a point with this error: the next ε. True: the best point so far.
+    /// The subproblem has ended at a point with this error: the next ε. True: the point to go on from.
     pub(super) fn end(&mut self, verdict: Verdict, error: f64) -> bool {
         let epsilon = self.epsilon;
         if verdict == Verdict::Solved {
@@ -269,6 +273,9 @@ impl Controller {
         self.floor = 0.0;
         self.failures = 0;
         let (_, share, mut from) = STRATEGIES[self.strategy];
+        if self.least < NEAR {
+            from = Origin::Best;
+        }
         if from == Origin::Projected && std::mem::replace(&mut self.projected, true) {
             from = Origin::Best;
         }
@@ -279,5 +286,35 @@ impl Controller {
             self.error = f64::INFINITY;
         }
         from
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_points_as_good_the_newest_goes_on() {
+        let mut controller = Controller::default();
+        controller.begin(1e-3);
+        assert!(controller.end(Verdict::Solved, 1e-4));
+        assert!(controller.end(Verdict::Solved, 1.5e-4));
+        assert_eq!(controller.least(), 1e-4);
+        // Measured by the least of all, not by the last: it cannot creep upwards.
+        assert!(!controller.end(Verdict::Solved, 2.5e-4));
+        assert!(!controller.end(Verdict::Failed, f64::NAN));
+        assert_eq!(controller.least(), 1e-4);
+    }
+
+    #[test]
+    fn near_a_solution_no_strategy_begins_at_zero() {
+        for (error, expected) in [
+            (1e-4, [Origin::Projected, Origin::Swept, Origin::Best, Origin::Best]),
+            (1e-8, [Origin::Best; 4]),
+        ] {
+            let mut controller = Controller::default();
+            controller.begin(error);
+            assert_eq!([(); 4].map(|()| controller.change()), expected, "{error:e}");
+        }
     }
 }

@@ -23,9 +23,9 @@
 //! 8. **Alternating directions** (`parts/alternating.rs`) after many proximal steps, for as long as they promise more.
 //! 9. **Motion and impulses in turn** (`in_turn.rs`), where a problem is stated by its bodies, once, after many proximal steps that are still far off or at the first change of strategy:
 //!    what moves with what rests as its support, then the impulses of all from that motion.
-//! 10. **Cadoux' fixed point** (`cadoux.rs`): the sliding speeds held, a convex problem solved, the speeds renewed by Newton's method. Before each change of strategy, for as many factorisations as
+//! 10. **Cadoux' fixed point** (`cadoux.rs`): the sliding speeds held, a convex problem solved, the speeds renewed by Newton's method. Before each change of strategy, while it comes as near, for as many factorisations as
 //!     a strategy takes; where a problem is small already after a few Newton iterations in vain. Few degrees of freedom under friction of 1 and more, on which sweeps diverge and Newton's iterations go round, end here.
-//! 11. **Another strategy** (other ρ, more sweeps, a start from zero) where the error has not halved for long; at the first time
+//! 11. **Another strategy** (other ρ, more sweeps, a start from zero but near a solution) where the error has not halved for long; at the first time
 //!     the existence of a solution is investigated, and a problem without one is given up with its certificate; where that is one by the last digits only, the loop asks for more
 //!     ([`Solver::go_on`]), and Cadoux' fixed point of a small problem begins anew. That first time sweeps with
 //!     one projection a contact ([`Projection`]) are tried from zero: where exact ones circle, these may come near or end.
@@ -877,7 +877,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) -> Step {
-        if work.cadoux_after <= work.done.strategies {
+        if work.cadoux_after <= work.done.strategies && !self.cadoux_is_in_vain(work) {
             work.cadoux_after = work.done.strategies + 1;
             return self.begin_cadoux(problem, work);
         }
