@@ -186,7 +186,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     /// Whether W has spread, where that was asked, and room for finding it out.
     spread: Option<bool>,
     units: Vec<f64>,
-    /// The impulses of the best iterate of the present subproblem; those before the sweeps between; those of the best point.
+    /// The impulses of the best iterate of the present subproblem; those before the sweeps between; those of the best point, or a newer one that is as good.
     inner_best: Vec<f64>,
     before: Vec<f64>,
     best: Vec<f64>,
