@@ -1,5 +1,7 @@
 //! Kernels on D×D blocks, stored by rows as `[[f64; D]; D]`.
 
+use crate::Real;
+
 /// `y = A x`.
 #[inline(always)]
 pub fn mul<const D: usize>(a: &[[f64; D]; D], x: &[f64; D]) -> [f64; D] {
@@ -38,8 +40,8 @@ pub fn eigen<const D: usize>(w: &[[f64; D]; D]) -> ([f64; D], [[f64; D]; D]) {
                 turned = true;
                 // The smaller of the two angles: small entries of a graded matrix keep their digits.
                 let theta = (q - p) / (2.0 * off);
-                let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
-                let c = 1.0 / t.hypot(1.0);
+                let t = theta.signum() / (theta.abs() + Real::hypot(theta, 1.0));
+                let c = 1.0 / Real::hypot(t, 1.0);
                 let s = t * c;
                 for k in 0..D {
                     let (x, y) = (a[i][k], a[j][k]);
@@ -133,7 +135,7 @@ pub fn block<const D: usize>(x: &[f64], c: usize) -> [f64; D] {
 pub fn tangential_norm<const D: usize>(x: &[f64; D]) -> f64 {
     match D {
         2 => x[1].abs(),
-        3 => x[1].hypot(x[2]),
+        3 => Real::hypot(x[1], x[2]),
         _ => x[1..].iter().map(|v| v * v).sum::<f64>().sqrt(),
     }
 }

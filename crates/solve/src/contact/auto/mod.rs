@@ -6,7 +6,8 @@
 //!
 //! 1. **Sweeps**: exact Gauss–Seidel for as long as its rate of convergence promises the tolerance sooner than a few
 //!    factorisations would, and after stage 2 until they have cost one. Many problems end here. Between them, here and in stage 6, the contacts that
-//!    still move are followed where they are few ([`Sweep::follow`]), or the sweeps are accelerated, where a trial shows that it helps ([`Acceleration`]).
+//!    still move are followed where they are few ([`Sweep::follow`]), or the sweeps are accelerated, where a trial shows that it helps: one by one from the fifth on
+//!    ([`EarlyAcceleration`]), else ten at a time after thirty ([`Acceleration`]).
 //! 2. **Rest** (`parts/alternating.rs`): impulses within the cones that leave nothing moving, where the sweeps show nothing that flies apart: after five of them where they
 //!    still move much, else after the others. One factorisation and a few solves end structures at rest, whatever their height; two solves tell where nothing comes of it. Where contacts
 //!    open because weights have yet to come down to them, as in walls with head joints, it comes when the sweeps have cost a factorisation where they open fast.
@@ -63,7 +64,8 @@ use crate::contact::form::{
 };
 use crate::contact::law::local::{LocalSolver, Projection};
 use crate::contact::parts::{
-    Acceleration, Alternating, Central, Pursuit, Rate, Sweep, put_within_bounds, sweep_rows,
+    Acceleration, Alternating, Central, EarlyAcceleration, Pursuit, Rate, Sweep, put_within_bounds,
+    sweep_rows,
 };
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
@@ -180,6 +182,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     still: bool,
     /// Of the sweeps, of the alternating directions.
     rate: Rate,
+    early: EarlyAcceleration,
     acceleration: Acceleration,
     /// The rate and the sweeps where its trial began.
     mark: (Rate, usize),
@@ -281,6 +284,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             stage: FIRST,
             still: false,
             rate: Rate::default(),
+            early: EarlyAcceleration::default(),
             acceleration: Acceleration::default(),
             mark: (Rate::default(), 0),
             spread: None,
@@ -333,6 +337,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
         problem.enter(&mut work.state, point);
         work.stage = FIRST;
         work.rate.begin();
+        work.early.begin();
         work.acceleration.begin();
         (work.existence, work.exact, work.asked) = (None, None, false);
         work.doubted = false;
@@ -487,11 +492,16 @@ impl<const D: usize> OnContacts<Auto, D> {
         claims: usize,
     ) -> Step {
         let mut estimate = f64::NAN;
-        if !work.bounded {
+        if !work.bounded && !work.early.is_on() {
             self.accelerate(problem, point, work);
         }
         let together = work.sweep.together(SWEEPS_A_STEP);
-        for _ in 0..SWEEPS_A_STEP / together {
+        let mut left = SWEEPS_A_STEP;
+        while left > 0 {
+            if self.accelerate_early(problem, point, work) {
+                left = SWEEPS_A_STEP - GLANCE;
+            }
+            left -= together;
             let (r, lambda) = P::all_impulses(point);
             let moves = work.sweep.sweeps(problem, &mut work.state, r, together)
                 + sweep_rows(problem, &mut work.state, (r, lambda), 1.0);
@@ -520,6 +530,9 @@ impl<const D: usize> OnContacts<Auto, D> {
             return self.sweep_with_rows(problem, point, work, estimate);
         }
         if runs_away(estimate) && !budget::over() {
+            if self.goes_back_early(problem, point, work) {
+                return Step::Continue { estimate: f64::NAN };
+            }
             // Where W is not positive semidefinite a sweep may send the impulses to infinity.
             P::impulses(point).fill(0.0);
             problem.enter(&mut work.state, point);
@@ -551,7 +564,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         work: &mut HybridWork<P, D>,
         estimate: f64,
     ) {
-        if !runs_away(estimate) && !work.acceleration.is_on() {
+        if !runs_away(estimate) && !work.acceleration.is_on() && !work.early.is_on() {
             let r = P::impulses(point);
             work.done.followed += work.sweep.follow(problem, &mut work.state, r);
         }

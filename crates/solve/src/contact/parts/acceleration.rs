@@ -157,9 +157,7 @@ impl Acceleration {
         let accelerator = self.accelerator.get_or_insert_with(|| Accelerator::new(DEPTH, r.len()));
         accelerator.resize(r.len());
         accelerator.begin(r);
-        let of = |c| small::mean_diagonal(&problem.diagonal_block(state, c)).abs();
-        self.unit.clear();
-        self.unit.extend((0..problem.contacts()).map(of));
+        velocity_units(problem, state, &mut self.unit);
         (self.on, self.low, self.idle) = (true, f64::INFINITY, 0);
         if self.verdict == Verdict::OnTrial {
             self.steps = 0;
@@ -169,8 +167,19 @@ impl Acceleration {
     }
 }
 
+/// `w_c = tr(W_cc)/D` of all contacts, with which impulses become velocities.
+pub(super) fn velocity_units<P: Blockwise<D> + Disked<D>, const D: usize>(
+    problem: &P,
+    state: &P::State,
+    unit: &mut Vec<f64>,
+) {
+    let of = |c| small::mean_diagonal(&problem.diagonal_block(state, c)).abs();
+    unit.clear();
+    unit.extend((0..problem.contacts()).map(of));
+}
+
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use nonsmooth_linalg::{Bsr, Csc};
     use nonsmooth_problem::planted::Planted;
     use nonsmooth_problem::{FrictionLocal, Problem};
@@ -204,19 +213,22 @@ mod tests {
         panic!("not in 20 000 sweeps");
     }
 
-    /// A row of contacts that press, each of which feels its neighbours by almost half of what it feels itself.
-    fn row(contacts: usize) -> FrictionLocal<2> {
+    /// A row of contacts that press, each of which feels its neighbours by a part of what it feels itself.
+    pub(in crate::contact::parts) fn row(contacts: usize, part: f64) -> FrictionLocal<2> {
         let n = 2 * contacts;
         let own = (0..n).map(|i| (i, i, 1.0));
-        let coupled = (2..n).flat_map(|i| [(i, i - 2, -0.4999), (i - 2, i, -0.4999)]);
+        let coupled = (2..n).flat_map(|i| [(i, i - 2, -part), (i - 2, i, -part)]);
         let w = Bsr::from_csc(&Csc::from_triplets(n, n, own.chain(coupled)).unwrap());
         let q = (0..n).map(|i| if i % 2 == 0 { -1.0 } else { 0.01 * i as f64 }).collect();
         FrictionLocal::new(w, q, vec![0.7; contacts]).unwrap()
     }
 
+    /// Nearly half.
+    const SLOW: f64 = 0.4999;
+
     #[test]
     fn what_converges_slowly_takes_a_fraction_of_the_sweeps_and_ends_at_the_same_impulses() {
-        let problem = row(40);
+        let problem = row(40, SLOW);
         let (plain, r) = run::<_, 2>(&problem, 1e-12, false);
         let (steps, accelerated) = run::<_, 2>(&problem, 1e-12, true);
         assert!(3 * steps < plain, "{steps} of {plain}");
@@ -239,7 +251,7 @@ mod tests {
 
     /// Steps that move so much, one after the other, from where the trial begins.
     fn steps_of(moves: &[f64]) -> (Acceleration, Vec<bool>, f64) {
-        let problem = row(2);
+        let problem = row(2, SLOW);
         let mut state = problem.state(Access::Visits).unwrap();
         let mut point = problem.origin();
         let mut acceleration = Acceleration::default();

@@ -167,7 +167,7 @@ impl<const D: usize> Law<D> for Coulomb {
         } else if x[0] + T::from(mu) * t <= T::from(0.0) {
             length(&x.map(|v| v.value()))
         } else {
-            outside.value() / 1.0.hypot(mu)
+            outside.value() / Real::hypot(1.0, mu)
         }
     }
 
@@ -181,7 +181,7 @@ impl<const D: usize> Law<D> for Coulomb {
         } else if tangential(u) + mu * modified[0] <= 0.0 {
             length(&modified)
         } else {
-            -u[0] / 1.0.hypot(mu)
+            -u[0] / Real::hypot(1.0, mu)
         }
     }
 
