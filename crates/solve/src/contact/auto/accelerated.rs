@@ -16,17 +16,18 @@ impl<const D: usize> OnContacts<Auto, D> {
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) -> bool {
-        let HybridWork { early, state, sweep, done, bounded, .. } = work;
+        let HybridWork { early, state, sweep, rate, done, mark, bounded, .. } = work;
         if early.is_on() {
             if early.move_on(problem, state, point) {
                 return false;
             }
-            work.forget_the_early_ones();
+            work.forget_the_trial();
             return true;
         }
         // Sweeps that threads share come many at a time.
         if done.sweeps == GLANCE && early.is_due() && !*bounded && sweep.together(GLANCE) == 1 {
             early.turn_on(problem, state, P::impulses(point));
+            *mark = (rate.clone(), done.sweeps);
         }
         false
     }
@@ -41,7 +42,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         let on = work.early.is_on();
         if on {
             work.early.go_back(problem, &mut work.state, point);
-            work.forget_the_early_ones();
+            work.forget_the_trial();
         }
         on
     }
@@ -79,13 +80,6 @@ impl<const D: usize> OnContacts<Auto, D> {
 }
 
 impl<P: Linearised<D> + Disked<D>, const D: usize> HybridWork<P, D> {
-    /// The point is the one after the first sweeps.
-    fn forget_the_early_ones(&mut self) {
-        self.done.taken_back += self.done.sweeps - GLANCE;
-        self.done.sweeps = GLANCE;
-        self.rate.begin();
-    }
-
     /// The point is the one where the trial began.
     fn forget_the_trial(&mut self) {
         let (rate, sweeps) = &self.mark;

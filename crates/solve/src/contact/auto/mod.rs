@@ -184,7 +184,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     rate: Rate,
     early: EarlyAcceleration,
     acceleration: Acceleration,
-    /// The rate and the sweeps where its trial began.
+    /// The rate and the sweeps where the trial of either began.
     mark: (Rate, usize),
     /// Whether W has spread, where that was asked, and room for finding it out.
     spread: Option<bool>,
