@@ -183,6 +183,19 @@ fn a_shaken_wall_is_solved_along_its_central_path() {
     assert!(along, "{:?}", end.account);
 }
 
+/// Contacts between sticking and sliding, to which whole Newton steps give their sides at once: with a line search this took 826 and 500 iterations.
+#[test]
+fn shaken_walls_are_solved_by_whole_steps() {
+    for (rows, columns, seed) in [(24, 24, 1), (20, 8, 24)] {
+        let wall = Wall { rows, columns, state: State::Perturbed, seed, ..Wall::default() };
+        let problem = wall.build().unwrap().problem().unwrap();
+        let Outcome { status, measure, factorisations, .. } =
+            run(&problem, "auto", &[], &within(1e-8, 60.0)).outcome;
+        assert_eq!(status, Status::Solved, "{rows} {columns}: {}", measure.relative);
+        assert!(factorisations < 300, "{rows} {columns}: {factorisations}");
+    }
+}
+
 /// After the sweeps the weight of the upper rows has yet to come down to the lower ones, and contacts open.
 #[test]
 fn a_wall_with_head_joints_rests() {

@@ -16,7 +16,7 @@
 //! 4. **Interior point** on the exact law ([`Central`]), a starter, from well inside the cones about the impulses so far: some 8 to 20 iterations lead near the solution of a problem
 //!    at rest; where the central path turns back it is left again.
 //! 5. **Proximal point, semismooth Newton inside** (`proximal_newton.rs`): ε falls as fast as the subproblems are solved
-//!    easily, and rises where they are not. It keeps full accuracy on hyperstatic problems.
+//!    easily, and rises where they are not. It keeps full accuracy on hyperstatic problems. Steps are whole where W has no spread (walls, columns, arches), else shortened by a line search.
 //! 6. **Sweeps between the proximal steps**, while they help: they move the impulses within the null space of W, which Newton leaves
 //!    where they are. After a trial in vain from near a solution they come first.
 //! 7. **The central path by its arc length** ([`Pursuit`]), where Newton's iterations promise to be many: it turns back with the
@@ -639,11 +639,11 @@ impl<const D: usize> OnContacts<Auto, D> {
         work: &mut HybridWork<P, D>,
         error: f64,
     ) {
-        let HybridWork { newton, controller, .. } = work;
+        let HybridWork { newton, controller, spread, .. } = work;
         let Some(newton) = newton else { return };
         let r = P::impulses(point);
         newton.focus(r, error, work.tolerance);
-        newton.center(r, controller.epsilon(), controller.kappa());
+        newton.center(r, controller.epsilon(), controller.kappa(), *spread == Some(false));
         work.inner_best.copy_from_slice(r);
         if controller.start(error, newton.residual(r), work.tolerance) {
             work.best.copy_from_slice(r);

@@ -4,7 +4,8 @@
 //!
 //! Outer k: the law for `u_ε = u + ε E (r − r_k)` in place of u, E diagonal in units of W. Its W + εE is regular, the bias
 //! vanishes where `r = r_k`, so hyperstatic problems lose no accuracy.
-//! Inner: Newton on Φ(u_ε, r) = 0, `(∂Φ/∂r + ε ∂Φ/∂u E + ∂Φ/∂u W) Δr = −Φ`, with a line search on ‖Φ/ρ‖.
+//! Inner: Newton on Φ(u_ε, r) = 0, `(∂Φ/∂r + ε ∂Φ/∂u E + ∂Φ/∂u W) Δr = −Φ`, with a line search on ‖Φ/ρ‖ or with whole steps. Where many contacts are between
+//! sticking and sliding a whole step raises ‖Φ/ρ‖ and yet gives them their sides, as an active set method does, where shorter ones creep.
 //!
 //! The metric: with K made self-dual (`D = diag(mu, 1, 1)`, `x = D r`, `W' = D⁻¹ W D⁻¹`) one number a contact,
 //! `w_c = tr(W'_cc)/D`, measures normal and tangential directions alike: ρ = κ/((1 + ε) w_c), E = w_c, both carried back by D.
@@ -47,6 +48,8 @@ pub struct ProximalNewton<L, const D: usize> {
     trial_r: Vec<f64>,
     trial_u: Vec<f64>,
     failures: usize,
+    /// Steps are taken whole.
+    whole: bool,
     /// Velocities are computed in doubled precision.
     precise: bool,
 }
@@ -104,6 +107,7 @@ impl<L: DiskLaw<D>, const D: usize> ProximalNewton<L, D> {
             trial_r: vec![],
             trial_u: vec![],
             failures: 0,
+            whole: false,
             precise: false,
         };
         out.fill(problem, state);
@@ -184,12 +188,13 @@ impl<L: DiskLaw<D>, const D: usize> ProximalNewton<L, D> {
         self.precise = rounding > 0.1 * tolerance && error < NEAR * rounding;
     }
 
-    /// Starts the subproblem of `epsilon` about `r`, with ρ = `kappa`/w_c.
-    pub fn center(&mut self, r: &[f64], epsilon: f64, kappa: f64) {
+    /// Starts the subproblem of `epsilon` about `r`, with ρ = `kappa`/w_c, whose steps are taken `whole` or after a line search.
+    pub fn center(&mut self, r: &[f64], epsilon: f64, kappa: f64, whole: bool) {
         self.center.copy_from_slice(r);
         self.epsilon = epsilon;
         self.kappa = kappa;
         self.failures = 0;
+        self.whole = whole;
     }
 
     /// How far the last Newton direction leads, as a velocity over ‖q‖: `‖(w_c Δr_c)_c‖/‖q‖`. Of impulses that no load asks for it is large: the matrix is nearly singular.
@@ -295,7 +300,7 @@ impl<L: DiskLaw<D>, const D: usize> ProximalNewton<L, D> {
         if !self.dr.iter().all(|x| x.is_finite()) {
             return failed;
         }
-        let step = self.search(r);
+        let step = if self.whole { 1.0 } else { self.search(r) };
         r.iter_mut().zip(&self.dr).for_each(|(r, d)| *r += step * d);
         self.update(problem, state, r);
         Inner { residual: self.natural(&self.u, r, self.epsilon), step }

@@ -57,9 +57,9 @@ const INTERIOR_SHORT: (f64, usize) = (1e-6, 6);
 /// of the interior point, or after so many steps that did not halve its own. Another κ has another path, and which of them leads
 /// to the end cannot be foreseen; where one came no nearer than this, the others are not tried.
 const PURSUITS: [Chase; 3] = [
-    Chase { after: 30, smoothing: 0.5, idle: 40 },
-    Chase { after: 90, smoothing: 0.25, idle: 160 },
-    Chase { after: 200, smoothing: 0.1, idle: 320 },
+    Chase { after: 60, smoothing: 0.5, idle: 40 },
+    Chase { after: 180, smoothing: 0.25, idle: 160 },
+    Chase { after: 400, smoothing: 0.1, idle: 320 },
 ];
 const PURSUE_COST: f64 = 60.0;
 const PURSUE_AGAIN: f64 = 1e-3;
@@ -219,7 +219,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         };
         let r = P::impulses(point);
         newton.focus(r, error, work.tolerance);
-        newton.center(r, TRIAL_EPSILON, controller.kappa());
+        newton.center(r, TRIAL_EPSILON, controller.kappa(), false);
         inner_best.copy_from_slice(r);
         work.stage = Stage::Trial { idle: 0, least: error, rescues: 0 };
     }
@@ -287,7 +287,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             r.copy_from_slice(inner_best);
             error = newton.look(problem, state, r);
         }
-        newton.center(r, TRIAL_EPSILON, work.controller.kappa());
+        newton.center(r, TRIAL_EPSILON, work.controller.kappa(), false);
         inner_best.copy_from_slice(r);
         *stage = Stage::Trial { idle: 0, least: error, rescues: rescues + 1 };
         Step::Continue { estimate: error }
