@@ -183,7 +183,7 @@ fn target(option: &Option<PathBuf>, named: &Option<String>, scene: &Path) -> Opt
     option.clone().or_else(|| named.as_ref().map(beside))
 }
 
-/// Checks that all outputs can be written, each to a file of its own.
+/// Checks that all outputs can be written, each to a file of its own whose name says what it is.
 fn writable<'a, const N: usize>(
     read: impl IntoIterator<Item = &'a Path>,
     written: [(&str, &Option<PathBuf>); N],
@@ -195,7 +195,15 @@ fn writable<'a, const N: usize>(
             option => files::writable(option, path)?,
         }
     }
-    files::apart(read, there())
+    files::apart(read, there())?;
+    there().try_for_each(|(option, path)| match option {
+        "--html" => files::ends_in(option, path, &["html", "htm"]),
+        "--csv" => files::ends_in(option, path, &["csv"]),
+        "--vtk" => files::ends_in(option, path, &["pvd"]),
+        "--glb" => files::ends_in(option, path, &["glb"]),
+        // Of pictures the name may be a folder's, of trajectories it is checked before all else.
+        _ => Ok(()),
+    })
 }
 
 /// Runs `simulate`.

@@ -70,6 +70,26 @@ fn what_is_read_or_written_already_is_not_written_over() {
     // A scene is no trajectory, whatever is asked.
     folder.run("simulate ball.toml --out ball.toml").refused(&["ends in .h5 or .hdf5"]);
     assert!(content(&folder) == before);
+    // Nor is a table a page, and a trajectory of another run stays what it is.
+    for (command, expected) in [
+        (
+            "simulate ball.toml --csv ball.h5",
+            "--csv ball.h5: expected a file name that ends in .csv",
+        ),
+        (
+            "simulate ball.toml --html run.csv",
+            "--html run.csv: expected a file name that ends in .html or .htm",
+        ),
+        (
+            "simulate ball.toml --vtk run.vtu",
+            "--vtk run.vtu: expected a file name that ends in .pvd",
+        ),
+        ("play ball.h5 --html run.csv", "ends in .html"),
+        ("play ball.h5 --glb run.gltf", "--glb run.gltf: expected a file name that ends in .glb"),
+    ] {
+        folder.run(command).refused(&[expected]);
+        assert!(content(&folder) == before, "{command}");
+    }
 }
 
 #[cfg(unix)]

@@ -34,7 +34,7 @@ const LEAST_SHARE: f64 = 0.02;
 /// stays what it is, or rises a little, for hundreds of steps before it falls; going back to the least error undid them.
 const AS_GOOD: f64 = 2.0;
 /// From below this error no strategy begins anew at zero.
-const NEAR: f64 = 1e-6;
+const KEPT_BELOW: f64 = 1e-6;
 /// A strategy is left after this many factorisations that did not halve the error, and each later one half as late again.
 const PATIENT: f64 = 200.0;
 const MORE_PATIENT: f64 = 1.5;
@@ -273,7 +273,7 @@ impl Controller {
         self.floor = 0.0;
         self.failures = 0;
         let (_, share, mut from) = STRATEGIES[self.strategy];
-        if self.least < NEAR {
+        if self.least < KEPT_BELOW {
             from = Origin::Best;
         }
         if from == Origin::Projected && std::mem::replace(&mut self.projected, true) {

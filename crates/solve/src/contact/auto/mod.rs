@@ -613,7 +613,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     ) {
         let error = self.look_round(problem, point, work);
         if !self.0.interior {
-            self.subproblem(point, work, error);
+            self.subproblem(problem, point, work, error);
         } else {
             self.begin_starts(problem, point, work, error);
         }
@@ -629,21 +629,23 @@ impl<const D: usize> OnContacts<Auto, D> {
         let HybridWork { newton, state, .. } = work;
         let Some(newton) = newton else { return };
         let error = newton.look(problem, state, P::impulses(point));
-        self.subproblem(point, work, error);
+        self.subproblem(problem, point, work, error);
     }
 
     /// Begins a proximal subproblem about the present impulses, whose velocities and error are known.
     fn subproblem<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
+        problem: &P,
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
         error: f64,
     ) {
-        let HybridWork { newton, controller, spread, .. } = work;
+        let whole = !starts::has_spread(problem, work);
+        let HybridWork { newton, controller, .. } = work;
         let Some(newton) = newton else { return };
         let r = P::impulses(point);
         newton.focus(r, error, work.tolerance);
-        newton.center(r, controller.epsilon(), controller.kappa(), *spread == Some(false));
+        newton.center(r, controller.epsilon(), controller.kappa(), whole);
         work.inner_best.copy_from_slice(r);
         if controller.start(error, newton.residual(r), work.tolerance) {
             work.best.copy_from_slice(r);
@@ -731,7 +733,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             let left = work.controller.sweeps(costs.worth / costs.sweep);
             work.begin_between(point, left);
         } else {
-            self.subproblem(point, work, error);
+            self.subproblem(problem, point, work, error);
         }
         Step::Continue { estimate: error }
     }
@@ -766,7 +768,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             r.copy_from_slice(&work.before);
             self.subproblem_here(problem, point, work);
         } else {
-            self.subproblem(point, work, error);
+            self.subproblem(problem, point, work, error);
         }
         Step::Continue { estimate: error }
     }

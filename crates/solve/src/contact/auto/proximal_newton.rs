@@ -57,7 +57,7 @@ pub struct ProximalNewton<L, const D: usize> {
 /// Plain sums of W r are wrong by about this share of their terms.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// Doubled precision begins where the error is below this multiple of that rounding.
-const NEAR: f64 = 1e4;
+const PRECISE_BELOW: f64 = 1e4;
 
 #[derive(Debug, Clone, Copy)]
 struct Contact<L> {
@@ -185,7 +185,7 @@ impl<L: DiskLaw<D>, const D: usize> ProximalNewton<L, D> {
             .zip(&self.contacts)
             .map(|(r, c)| r.iter().map(|r| (c.unit * r / self.scale).powi(2)).sum::<f64>());
         let rounding = ROUNDING * squares.sum::<f64>().sqrt();
-        self.precise = rounding > 0.1 * tolerance && error < NEAR * rounding;
+        self.precise = rounding > 0.1 * tolerance && error < PRECISE_BELOW * rounding;
     }
 
     /// Starts the subproblem of `epsilon` about `r`, with ρ = `kappa`/w_c, whose steps are taken `whole` or after a line search.

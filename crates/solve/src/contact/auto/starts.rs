@@ -4,6 +4,7 @@
 use nonsmooth_problem::check::Kinematic;
 
 use super::controller::Controller;
+use super::proximal_newton::ProximalNewton;
 use super::{Auto, Done, FIRST, FIRST_SWEEPS, HybridWork, NEAR, RestSearch, Stage, swept};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
@@ -219,8 +220,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         };
         let r = P::impulses(point);
         newton.focus(r, error, work.tolerance);
-        newton.center(r, TRIAL_EPSILON, controller.kappa(), false);
-        inner_best.copy_from_slice(r);
+        centre_trial(newton, controller, r, inner_best);
         work.stage = Stage::Trial { idle: 0, least: error, rescues: 0 };
     }
 
@@ -276,7 +276,8 @@ impl<const D: usize> OnContacts<Auto, D> {
         let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
         let most = RESCUE_COST * costs.factorisation / costs.sweep;
         problem.enter(&mut work.state, point);
-        let HybridWork { newton, state, inner_best, done, sweep, stage, scale, .. } = work;
+        let HybridWork { newton, state, controller, inner_best, done, sweep, stage, scale, .. } =
+            work;
         let Some(newton) = newton else { return lost() };
         let r = P::impulses(point);
         let count = (RESCUE << rescues).min(most as usize).max(1);
@@ -287,8 +288,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             r.copy_from_slice(inner_best);
             error = newton.look(problem, state, r);
         }
-        newton.center(r, TRIAL_EPSILON, work.controller.kappa(), false);
-        inner_best.copy_from_slice(r);
+        centre_trial(newton, controller, r, inner_best);
         *stage = Stage::Trial { idle: 0, least: error, rescues: rescues + 1 };
         Step::Continue { estimate: error }
     }
@@ -528,6 +528,17 @@ impl<const D: usize> OnContacts<Auto, D> {
         r.copy_from_slice(alternating.impulses());
         newton.look(problem, state, r)
     }
+}
+
+/// Newton's iterations of stage 3 begin about `r`, the best so far.
+fn centre_trial<L: DiskLaw<D>, const D: usize>(
+    newton: &mut ProximalNewton<L, D>,
+    controller: &Controller,
+    r: &[f64],
+    best: &mut [f64],
+) {
+    newton.center(r, TRIAL_EPSILON, controller.kappa(), false);
+    best.copy_from_slice(r);
 }
 
 /// Whether an error that fell so in so many iterations takes more than `most` others to the tolerance.

@@ -86,6 +86,20 @@ pub trait Contacts<const D: usize>: Problem {
     /// The diagonal block `W_cc`.
     fn diagonal_block(&self, state: &Self::State, c: usize) -> [[f64; D]; D];
 
+    /// `w_c = tr(W_cc)/D` of all contacts, which makes impulses velocities. Positive: of a contact that its own impulse does not move, the mean of the others, or 1.
+    fn units(&self, state: &Self::State, unit: &mut Vec<f64>) {
+        unit.clear();
+        let of = |c| small::mean_diagonal(&self.diagonal_block(state, c));
+        unit.extend((0..self.contacts()).map(of));
+        if unit.iter().all(|w| *w > 0.0) {
+            return;
+        }
+        let positive = unit.iter().filter(|w| **w > 0.0);
+        let (count, sum) = (positive.clone().count(), positive.sum::<f64>());
+        let mean = if count > 0 { sum / count as f64 } else { 1.0 };
+        unit.iter_mut().filter(|w| w.is_nan() || **w <= 0.0).for_each(|w| *w = mean);
+    }
+
     /// `‖q‖`, or 1 where q = 0: what a solver's estimate is relative to.
     fn velocity_scale(&self, state: &Self::State) -> f64;
 

@@ -306,15 +306,7 @@ impl<'a, P: Linearised<D> + Disked<D>, const D: usize> Skeleton<'a, P, D> {
     fn fill(&self, problem: &P, work: &mut Work<P, D>) {
         let n = problem.contacts();
         work.scale = problem.velocity_scale(&work.state) / (n as f64).sqrt();
-        work.unit.clear();
-        let state = &work.state;
-        work.unit.extend((0..n).map(|c| small::mean_diagonal(&problem.diagonal_block(state, c))));
-        let mean = work.unit.iter().sum::<f64>() / n as f64;
-        for w in &mut work.unit {
-            if *w <= 0.0 {
-                *w = if mean > 0.0 { mean } else { 1.0 };
-            }
-        }
+        problem.units(&work.state, &mut work.unit);
         for x in [
             &mut work.u,
             &mut work.trial,

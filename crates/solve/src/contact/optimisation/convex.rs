@@ -111,16 +111,7 @@ impl<P: Linear<D> + Frictional<D>, const D: usize> Convex<P, D> {
         self.sets.extend(problem.mu().iter().map(|&mu| Set::Cone(mu)));
         self.scale = problem.velocity_scale(&self.state);
         problem.velocities(&mut self.state, &self.d, &mut self.q);
-        let state = &self.state;
-        self.unit.clear();
-        self.unit.extend((0..n).map(|c| small::mean_diagonal(&problem.diagonal_block(state, c))));
-        let positive = self.unit.iter().filter(|w| **w > 0.0);
-        let mean = positive.clone().sum::<f64>() / positive.count().max(1) as f64;
-        for w in &mut self.unit {
-            if w.is_nan() || *w <= 0.0 {
-                *w = if mean > 0.0 { mean } else { 1.0 };
-            }
-        }
+        problem.units(&self.state, &mut self.unit);
     }
 
     /// The mean of `w_c`.

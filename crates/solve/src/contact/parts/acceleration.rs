@@ -9,8 +9,6 @@
 //! References: Anderson1965; WalkerNi2011.
 //! Cost of a step: some 40 products of the length of r, a projection a contact and a pass over the rows of H. Storage: 16 vectors and w_c.
 
-use nonsmooth_linalg::small;
-
 use super::anderson::Accelerator;
 use crate::contact::form::{Blockwise, Disked, put_within_cones};
 
@@ -157,7 +155,7 @@ impl Acceleration {
         let accelerator = self.accelerator.get_or_insert_with(|| Accelerator::new(DEPTH, r.len()));
         accelerator.resize(r.len());
         accelerator.begin(r);
-        velocity_units(problem, state, &mut self.unit);
+        problem.units(state, &mut self.unit);
         (self.on, self.low, self.idle) = (true, f64::INFINITY, 0);
         if self.verdict == Verdict::OnTrial {
             self.steps = 0;
@@ -165,17 +163,6 @@ impl Acceleration {
             self.from.extend_from_slice(r);
         }
     }
-}
-
-/// `w_c = tr(W_cc)/D` of all contacts, with which impulses become velocities.
-pub(super) fn velocity_units<P: Blockwise<D> + Disked<D>, const D: usize>(
-    problem: &P,
-    state: &P::State,
-    unit: &mut Vec<f64>,
-) {
-    let of = |c| small::mean_diagonal(&problem.diagonal_block(state, c)).abs();
-    unit.clear();
-    unit.extend((0..problem.contacts()).map(of));
 }
 
 #[cfg(test)]

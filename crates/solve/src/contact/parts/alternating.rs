@@ -102,11 +102,7 @@ impl<const D: usize> Alternating<D> {
         self.make_room(problem.contacts());
         (self.way, self.rho, self.steps) = (way, way.parameters().0, 0);
         self.scale = problem.velocity_scale(state);
-        self.unit.clear();
-        self.unit.extend((0..problem.contacts()).map(|c| {
-            let w = small::mean_diagonal(&problem.diagonal_block(state, c));
-            if w > 0.0 { w } else { 1.0 }
-        }));
+        problem.units(state, &mut self.unit);
         self.z.fill(0.0);
         self.y.fill(0.0);
         problem.velocities(state, &self.z, &mut self.q);

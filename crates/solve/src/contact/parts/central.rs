@@ -196,14 +196,8 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         self.inverse_speed = (n as f64).sqrt() / self.scale;
         self.laws.clear();
         self.laws.extend((0..n).map(|c| problem.law(c)));
-        self.weight.clear();
-        let unit = |c| small::mean_diagonal(&problem.diagonal_block(state, c));
-        self.weight.extend((0..n).map(unit));
-        let mean = self.weight.iter().sum::<f64>() / n as f64;
-        let mean = if mean > 0.0 && mean.is_finite() { mean } else { 1.0 };
-        for w in &mut self.weight {
-            *w = self.inverse_speed * if *w > 0.0 { *w } else { mean };
-        }
+        problem.units(state, &mut self.weight);
+        self.weight.iter_mut().for_each(|w| *w *= self.inverse_speed);
         let zero = [0.0; D];
         self.rho.clear();
         self.rho.resize(n, zero);

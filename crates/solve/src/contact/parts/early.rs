@@ -10,7 +10,6 @@
 
 use nonsmooth_linalg::small;
 
-use super::acceleration::velocity_units;
 use super::anderson::Accelerator;
 use crate::contact::form::{Blockwise, Disked, put_within_cones};
 
@@ -74,7 +73,7 @@ impl EarlyAcceleration {
         let accelerator = self.accelerator.get_or_insert_with(|| Accelerator::new(DEPTH, r.len()));
         accelerator.resize(r.len());
         accelerator.begin(r);
-        velocity_units(problem, state, &mut self.unit);
+        problem.units(state, &mut self.unit);
         for copy in [&mut self.from, &mut self.reached] {
             copy.clear();
             copy.extend_from_slice(r);

@@ -88,16 +88,7 @@ impl<L: DiskLaw<D>, const D: usize> Speeds<L, D> {
         self.scale = problem.velocity_scale(state);
         self.laws.clear();
         self.laws.extend((0..n).map(|c| problem.law(c)));
-        let unit = |c| small::mean_diagonal(&problem.diagonal_block(state, c));
-        self.unit.clear();
-        self.unit.extend((0..n).map(unit));
-        let positive = self.unit.iter().filter(|w| **w > 0.0);
-        let mean = positive.clone().sum::<f64>() / positive.count().max(1) as f64;
-        for w in &mut self.unit {
-            if w.is_nan() || *w <= 0.0 {
-                *w = if mean > 0.0 { mean } else { 1.0 };
-            }
-        }
+        problem.units(state, &mut self.unit);
         let speeds = [&mut self.s, &mut self.image, &mut self.gap, &mut self.ds, &mut self.held];
         for x in speeds {
             x.clear();

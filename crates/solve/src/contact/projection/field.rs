@@ -53,15 +53,7 @@ impl<P: Linear<D>, const D: usize> Field<P, D> {
 
     fn fill(&mut self, problem: &P) {
         self.scale = problem.velocity_scale(&self.state);
-        self.unit.clear();
-        let (state, n) = (&self.state, problem.contacts());
-        self.unit.extend((0..n).map(|c| small::mean_diagonal(&problem.diagonal_block(state, c))));
-        let mean = self.unit.iter().sum::<f64>() / n as f64;
-        for w in &mut self.unit {
-            if *w <= 0.0 {
-                *w = if mean > 0.0 { mean } else { 1.0 };
-            }
-        }
+        problem.units(&self.state, &mut self.unit);
         self.rho = 1.0;
     }
 

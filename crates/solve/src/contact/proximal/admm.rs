@@ -260,15 +260,7 @@ impl<P: Linearised<D> + Frictional<D>, const D: usize> StepsWork<P, D> {
     fn fill(&mut self, problem: &P) {
         let n = problem.mu().len();
         self.scale = problem.velocity_scale(&self.state);
-        self.unit.clear();
-        let state = &self.state;
-        self.unit.extend((0..n).map(|c| small::mean_diagonal(&problem.diagonal_block(state, c))));
-        let mean = self.unit.iter().sum::<f64>() / n as f64;
-        for w in &mut self.unit {
-            if *w <= 0.0 {
-                *w = if mean > 0.0 { mean } else { 1.0 };
-            }
-        }
+        problem.units(&self.state, &mut self.unit);
         self.identity.clear();
         self.identity.resize(n, diagonal(1.0));
         let vectors = [

@@ -162,7 +162,7 @@ where
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
         let state = problem.state(Access::Products)?;
         let (mut unit, m) = (vec![], D * problem.contacts());
-        units(problem, &state, &mut unit);
+        problem.units(&state, &mut unit);
         let alpha = self.settings.prox_alpha;
         let weight = unit.iter().map(|w| alpha * w).collect();
         let center = vec![0.0; m];
@@ -185,7 +185,7 @@ where
 
     fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
         problem.refill(&mut work.state)?;
-        units(problem, &work.state, &mut work.unit);
+        problem.units(&work.state, &mut work.unit);
         let m = D * problem.contacts();
         work.u.resize(m, 0.0);
         work.problem.center.resize(m, 0.0);
@@ -310,22 +310,5 @@ impl<P: Linear<D> + Disked<D>, S: Solver<Regularised<P>>, const D: usize> OuterW
         }
         let scale = problem.base.velocity_scale(state);
         (own.sqrt() / scale, inner.sqrt() / scale)
-    }
-}
-
-/// `w_c`, positive.
-fn units<P: Linear<D> + Disked<D>, const D: usize>(
-    problem: &P,
-    state: &P::State,
-    unit: &mut Vec<f64>,
-) {
-    let n = problem.contacts();
-    unit.clear();
-    unit.extend((0..n).map(|c| small::mean_diagonal(&problem.diagonal_block(state, c))));
-    let mean = unit.iter().sum::<f64>() / n as f64;
-    for w in unit {
-        if *w <= 0.0 {
-            *w = if mean > 0.0 { mean } else { 1.0 };
-        }
     }
 }
