@@ -49,6 +49,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     }
     super::apart(&args.runs, &args.out)?;
     files::writable("--out", &args.out)?;
+    files::ends_in("--out", &args.out, &["md"])?;
     let Joined { runs, mut exit, .. } = super::read(&args.runs)?;
     let described = match args.problems.as_slice() {
         [] => None,

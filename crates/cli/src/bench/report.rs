@@ -37,6 +37,7 @@ Exit codes: 0 all files are in the report; 2 a file at fault (the report is of t
 pub fn run(args: &Args) -> Result<Exit, String> {
     super::apart(&args.files, &args.out)?;
     files::writable("--out", &args.out)?;
+    files::ends_in("--out", &args.out, &["html", "htm"])?;
     let Joined { runs: all, twice, exit } = super::read(&args.files)?;
     let options = args.title.clone().map_or_else(Options::default, |title| Options { title });
     let page = html(&all, &options);

@@ -85,6 +85,14 @@ fn what_is_read_or_written_already_is_not_written_over() {
             "--vtk run.vtu: expected a file name that ends in .pvd",
         ),
         ("play ball.h5 --html run.csv", "ends in .html"),
+        (
+            "bench report runs.jsonl --out others.jsonl",
+            "--out others.jsonl: expected a file name that ends in .html",
+        ),
+        (
+            "bench page runs.jsonl --out others.jsonl",
+            "--out others.jsonl: expected a file name that ends in .md",
+        ),
         ("play ball.h5 --glb run.gltf", "--glb run.gltf: expected a file name that ends in .glb"),
     ] {
         folder.run(command).refused(&[expected]);
