@@ -30,6 +30,9 @@ pub(super) struct Done {
     pub(super) trial: usize,
     pub(super) interior: usize,
     pub(super) interior_error: f64,
+    /// On the convex relaxation after that, and the least error of the law on the way.
+    pub(super) relaxed: usize,
+    pub(super) relaxed_error: f64,
     pub(super) subproblems: usize,
     pub(super) failed: usize,
     pub(super) newton: usize,
@@ -92,6 +95,12 @@ pub(super) fn of<
     if interior > 0 {
         lines.push(format!(
             "{interior} interior-point iterations on the exact law, to {interior_error:.1e}"
+        ));
+    }
+    if work.done.relaxed > 0 {
+        lines.push(format!(
+            "{} interior-point iterations on the convex relaxation, to {:.1e}",
+            work.done.relaxed, work.done.relaxed_error
         ));
     }
     if subproblems > 0 {

@@ -264,6 +264,11 @@ impl Controller {
         self.spent > self.budget
     }
 
+    /// Whether sweeps with one projection a contact may come now, as for the first time.
+    pub(super) fn projects(&mut self) -> bool {
+        !std::mem::replace(&mut self.projected, true)
+    }
+
     /// Goes over to another strategy; returns where it goes on from.
     pub(super) fn change(&mut self) -> Origin {
         self.strategy = (self.strategy + 1) % STRATEGIES.len();
@@ -276,7 +281,7 @@ impl Controller {
         if self.least < KEPT_BELOW {
             from = Origin::Best;
         }
-        if from == Origin::Projected && std::mem::replace(&mut self.projected, true) {
+        if from == Origin::Projected && !self.projects() {
             from = Origin::Best;
         }
         self.share = share;

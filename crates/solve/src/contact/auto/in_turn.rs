@@ -397,7 +397,7 @@ impl<L: DiskLaw<D>, const D: usize> Impulses<L, D> {
         let problem = FrictionGlobal { H: h, w, mu, ..whole.clone() };
         let mut state = problem.state(Access::Newton).ok()?;
         let mut central = Central::default();
-        let now = central.begin_convex(&problem, &mut state, &vec![0.0; nc], None);
+        let now = central.begin_relaxed(&problem, &mut state, None);
         Some(Self {
             halvings: Halvings::from(now.error),
             iterations: 0,

@@ -14,7 +14,8 @@
 //! 3. **Trial**: Newton's iterations of stage 5 without its proximal term, where the sweeps came near or the structure is not hyperstatic, for as long as each halves the error; there sweeps come to
 //!    its rescue a few times.
 //! 4. **Interior point** on the exact law ([`Central`]), a starter, from well inside the cones about the impulses so far: some 8 to 20 iterations lead near the solution of a problem
-//!    at rest; where the central path turns back it is left again.
+//!    at rest; where the central path turns back it is left again. Where it failed and little slides, on the convex relaxation (s = 0, `relaxed.rs`), whose path does not: where nothing slides its solution
+//!    obeys the law; where it comes near, stages 8, sweeps with one projection and 9 come next, which find what little slides.
 //! 5. **Proximal point, semismooth Newton inside** (`proximal_newton.rs`): ε falls as fast as the subproblems are solved
 //!    easily, and rises where they are not. It keeps full accuracy on hyperstatic problems. Steps are whole where W has no spread (walls, columns, arches), else shortened by a line search.
 //! 6. **Sweeps between the proximal steps**, while they help: they move the impulses within the null space of W, which Newton leaves
@@ -29,7 +30,7 @@
 //! 11. **Another strategy** (other ρ, more sweeps, a start from zero but near a solution) where the error has not halved for long; at the first time
 //!     the existence of a solution is investigated, and a problem without one is given up with its certificate; where that is one by the last digits only, the loop asks for more
 //!     ([`Solver::go_on`]), and Cadoux' fixed point of a small problem begins anew. That first time sweeps with
-//!     one projection a contact ([`Projection`]) are tried from zero: where exact ones circle, these may come near or end.
+//!     one projection a contact ([`Projection`]) are tried from zero, if they have not been: where exact ones circle, these may come near or end.
 //!
 //! A problem with scalar rows that have bounds begins with sweeps, which visit them too. The later stages know no bounds; where sweeps promise little, those
 //! of the rows that are at their bounds are sought as a set (`held.rs`), each time with all stages on the problem of the rest.
@@ -50,6 +51,7 @@ mod controller;
 mod held;
 mod in_turn;
 mod proximal_newton;
+mod relaxed;
 mod starts;
 
 use nonsmooth_linalg::budget;
@@ -225,6 +227,7 @@ enum Stage {
     Rest,
     Trial { idle: usize, least: f64, rescues: usize },
     Interior { halvings: Halvings, short: usize },
+    Relaxed { halvings: Halvings },
     Newton,
     Between { left: usize },
     Projected { left: usize },
@@ -239,7 +242,8 @@ impl Stage {
     /// Whether its steps leave the point where it is, all but the last and those that claim the tolerance, which say so.
     fn stands_still(self) -> bool {
         use Stage::*;
-        matches!(self, Rest | Interior { .. } | InTurn | Cadoux | Pursuit { .. } | Alternating)
+        let starts = matches!(self, Rest | Interior { .. } | Relaxed { .. });
+        starts || matches!(self, InTurn | Cadoux | Pursuit { .. } | Alternating)
     }
 }
 
@@ -360,6 +364,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             Stage::Rest => self.rest(problem, point, work),
             Stage::Trial { .. } => self.trial(problem, point, work),
             Stage::Interior { .. } => self.interior(problem, point, work),
+            Stage::Relaxed { .. } => self.relaxed(problem, point, work),
             Stage::Newton => self.newton(problem, point, work),
             Stage::Between { left } => self.between(problem, point, work, left),
             Stage::Projected { left } => self.projected(problem, point, work, left),
@@ -773,7 +778,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         Step::Continue { estimate: error }
     }
 
-    /// Sweeps of stage 11 with one projection a contact, from zero; the better of what they come to and the best point goes on.
+    /// Sweeps with one projection a contact, from zero, of stage 11 or after alternating directions where little slides; the better of what they come to and the best point goes on.
     fn projected<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
@@ -923,29 +928,50 @@ impl<const D: usize> OnContacts<Auto, D> {
             return Step::Stuck(why.into());
         }
         let from = work.controller.change();
-        let r = P::impulses(point);
-        match from {
-            Origin::Best => r.copy_from_slice(&work.best),
-            Origin::Swept | Origin::Projected => r.fill(0.0),
+        if from == Origin::Best {
+            P::impulses(point).copy_from_slice(&work.best);
+        } else {
+            P::impulses(point).fill(0.0);
         }
-        if work.passed_by.is_some() && from != Origin::Projected {
+        if from == Origin::Projected {
+            self.begin_projected(problem, point, work);
+        } else if work.passed_by.is_some() {
             starts::begin_interior(problem, work, None);
         } else if from == Origin::Best {
             self.subproblem_here(problem, point, work);
         } else {
             // Some problems want nothing but sweeps, tens of thousands: as many as the strategy before took time for.
             problem.enter(&mut work.state, point);
-            let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
-            let left = work.controller.long_sweeps(from, costs.worth / costs.sweep);
-            if from == Origin::Projected {
-                let HybridWork { projected, state, stage, .. } = work;
-                let sweep = || Box::new(Sweep::with(Projection { step: OMEGA }, problem, state));
-                projected.get_or_insert_with(sweep);
-                *stage = Stage::Projected { left };
-            } else {
-                work.begin_between(point, left);
-            }
+            let left = self.long_sweeps(problem, work, from);
+            work.begin_between(point, left);
         }
         Step::Continue { estimate: f64::NAN }
+    }
+
+    /// So many sweeps from there.
+    fn long_sweeps<P: Linearised<D> + Disked<D>>(
+        &self,
+        problem: &P,
+        work: &mut HybridWork<P, D>,
+        from: Origin,
+    ) -> usize {
+        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        work.controller.long_sweeps(from, costs.worth / costs.sweep)
+    }
+
+    /// Begins sweeps with one projection a contact, from zero.
+    fn begin_projected<P: Linearised<D> + Disked<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) {
+        let left = self.long_sweeps(problem, work, Origin::Projected);
+        P::impulses(point).fill(0.0);
+        problem.enter(&mut work.state, point);
+        let HybridWork { projected, state, stage, .. } = work;
+        let sweep = || Box::new(Sweep::with(Projection { step: OMEGA }, problem, state));
+        projected.get_or_insert_with(sweep);
+        *stage = Stage::Projected { left };
     }
 }

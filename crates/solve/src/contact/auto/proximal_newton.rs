@@ -16,7 +16,7 @@
 //!
 //! Cost of an iteration: one factorisation of `Q + P W`, one to five products with W, O(nc) a trial of the line search.
 
-use nonsmooth_linalg::{Block, small};
+use nonsmooth_linalg::{Block, norm_of, small};
 
 use crate::contact::form::{Disked, Linearised};
 use crate::contact::law::DiskLaw;
@@ -219,6 +219,12 @@ impl<L: DiskLaw<D>, const D: usize> ProximalNewton<L, D> {
         let contacts = r.chunks(D).zip(self.u.chunks(D));
         let opening = contacts.filter(|(r, u)| r[0] == 0.0 && u[0] > 0.0);
         opening.map(|(_, u)| u[0] * u[0]).sum::<f64>().sqrt() / self.scale
+    }
+
+    /// How fast contacts with impulse slide at r, relative to ‖q‖.
+    pub fn sliding(&self, r: &[f64]) -> f64 {
+        let contacts = r.chunks(D).zip(self.u.chunks(D)).filter(|(r, _)| r[0] > 0.0);
+        norm_of(contacts.flat_map(|(_, u)| u[1..].iter().copied())) / self.scale
     }
 
     /// The relative natural residual with ε: `‖( w r − P_K(w r − ũ_ε) )_c‖ / ‖q‖`, `w = w_c + ε E`.

@@ -5,6 +5,7 @@ use nonsmooth_problem::check::Kinematic;
 
 use super::controller::Controller;
 use super::proximal_newton::ProximalNewton;
+use super::relaxed::nearly_rests;
 use super::{Auto, Done, FIRST, FIRST_SWEEPS, HybridWork, NEAR, RestSearch, Stage, swept};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
@@ -42,14 +43,14 @@ const SWEEP_AGAIN: f64 = 3.0;
 /// The interior point ends after this many iterations, or below this error, or after so many iterations that did not halve the
 /// error, or so many short steps in a row; such steps know at least this part of the slope of ‖u_T‖. Before its first halving it has longer where W has not spread: in walls of thousands
 /// of bodies it takes some 20 iterations to come into sight of the solution, and ten to reach it.
-const INTERIOR: usize = 60;
+pub(super) const INTERIOR: usize = 60;
 /// It begins at the point's impulses and their velocities, so far inside the cones, in units of the mean load a contact: nearer to the boundary its steps are cut short.
-const INTERIOR_MARGIN: f64 = 0.7;
+pub(super) const INTERIOR_MARGIN: f64 = 0.7;
 /// Where Newton's iterations promise to take longer than this, the interior point is worth a trial; not before so many, which is what one subproblem in vain takes.
 const INTERIOR_COST: f64 = 20.0;
 const IN_VAIN: usize = 12;
 const INTERIOR_ERROR: f64 = 1e-8;
-const INTERIOR_IDLE: usize = 10;
+pub(super) const INTERIOR_IDLE: usize = 10;
 const INTERIOR_FIRST: usize = 30;
 const INTERIOR_SLOPE: f64 = 0.2;
 const INTERIOR_SHORT: (f64, usize) = (1e-6, 6);
@@ -82,6 +83,8 @@ const ALTERNATE_NEAR: f64 = 1e-2;
 /// They have this many iterations at least, and promise more as long as what is left costs less than this many factorisations.
 const ALTERNATE_FIRST: usize = 40;
 const ALTERNATE_WORTH: f64 = 200.0;
+/// Where the relaxation says that little slides they come before Newton's iterations, from none, and are worth more: 200 end pyramids with bases of 6 and 7 spheres, 500 of 5 and 9 too.
+const ALTERNATE_WORTH_AT_REST: f64 = 500.0;
 
 impl<const D: usize> OnContacts<Auto, D> {
     /// Whichever of stages 2 to 4 comes first; `error` is that of the point.
@@ -351,10 +354,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         };
         done.interior_error = central.best().1;
         if ended && (!may_wait || has_spread(problem, work)) {
-            if let HybridWork { central: Some(central), controller, .. } = work {
-                take(central.best(), controller, P::impulses(point));
-            }
-            self.subproblem_here(problem, point, work);
+            return self.after_interior(problem, point, work);
         }
         Step::Continue { estimate: work.done.interior_error }
     }
@@ -444,7 +444,10 @@ impl<const D: usize> OnContacts<Auto, D> {
         error: f64,
     ) -> Step {
         let HybridWork { alternating, state, done, rate, stage, from_here, .. } = work;
-        *from_here = if done.alternations == 0 { error < ALTERNATE_NEAR } else { !*from_here };
+        *from_here = match done.alternations {
+            0 => error < ALTERNATE_NEAR && !nearly_rests(done),
+            _ => !*from_here,
+        };
         done.alternations += 1;
         let start = from_here.then_some(&*P::impulses(point));
         rate.begin();
@@ -469,9 +472,14 @@ impl<const D: usize> OnContacts<Auto, D> {
             None => return lost(),
         };
         let young = steps < ALTERNATE_FIRST;
-        if !young && !self.promises(problem, work, ALTERNATE_WORTH) || estimate.is_nan() {
+        let first = nearly_rests(&work.done);
+        let worth = if first { ALTERNATE_WORTH_AT_REST } else { ALTERNATE_WORTH };
+        if !young && !self.promises(problem, work, worth) || estimate.is_nan() {
             self.end_alternating(problem, point, work);
             self.subproblem_here(problem, point, work);
+            if first && work.controller.projects() {
+                self.begin_projected(problem, point, work);
+            }
         }
         Step::Continue { estimate }
     }
@@ -548,7 +556,7 @@ fn takes_longer([from, to]: [f64; 2], iterations: usize, tolerance: f64, most: f
 }
 
 /// The impulses of an iterate with its error become the point's where they are better.
-fn take((theirs, error): (&[f64], f64), controller: &mut Controller, ours: &mut [f64]) {
+pub(super) fn take((theirs, error): (&[f64], f64), controller: &mut Controller, ours: &mut [f64]) {
     if controller.offer(error) {
         ours.copy_from_slice(theirs);
     }

@@ -185,6 +185,20 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         self.enter(problem, state, start)
     }
 
+    /// Begins with the convex relaxation, s = 0; `start` as above.
+    pub fn begin_relaxed<P: Linearised<D> + Disked<D, Law = L>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        start: Option<(&[f64], f64)>,
+    ) -> Iterate {
+        self.law = Some(Law::Given);
+        self.smoothing = 0.0;
+        self.s.clear();
+        self.s.resize(L::DISKS * problem.contacts(), 0.0);
+        self.enter(problem, state, start)
+    }
+
     fn enter<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
