@@ -212,6 +212,11 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
 }
 
 impl<P: Linearised<D> + Disked<D>, const D: usize> HybridWork<P, D> {
+    /// What steps cost; counted once.
+    fn costs(&mut self, problem: &P) -> Costs {
+        *self.costs.get_or_insert_with(|| problem.costs(&mut self.state))
+    }
+
     /// Begins so many sweeps of stage 6 at the point, whose impulses the state knows.
     fn begin_between(&mut self, point: &mut P::Point, left: usize) {
         self.before.copy_from_slice(P::impulses(point));
@@ -547,7 +552,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         if work.done.sweeps < FIRST_SWEEPS && estimate > 0.0 {
             return Step::Continue { estimate };
         }
-        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        let costs = work.costs(problem);
         let limits = [SWEEPS_WORTH * costs.factorisation, SWEEPS_WORTH_SPREAD * costs.worth];
         let cost = SWEEPS_A_STEP as f64 * costs.sweep;
         let [without, with] = limits.map(|limit| work.rate.promises(work.tolerance, cost, limit));
@@ -734,7 +739,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         }
         problem.enter(&mut work.state, point);
         if error > SWEEP_ABOVE {
-            let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+            let costs = work.costs(problem);
             let left = work.controller.sweeps(costs.worth / costs.sweep);
             work.begin_between(point, left);
         } else {
@@ -928,14 +933,17 @@ impl<const D: usize> OnContacts<Auto, D> {
             return Step::Stuck(why.into());
         }
         let from = work.controller.change();
-        if from == Origin::Best {
-            P::impulses(point).copy_from_slice(&work.best);
-        } else {
-            P::impulses(point).fill(0.0);
-        }
         if from == Origin::Projected {
             self.begin_projected(problem, point, work);
-        } else if work.passed_by.is_some() {
+            return Step::Continue { estimate: f64::NAN };
+        }
+        let r = P::impulses(point);
+        if from == Origin::Best {
+            r.copy_from_slice(&work.best)
+        } else {
+            r.fill(0.0)
+        }
+        if work.passed_by.is_some() {
             starts::begin_interior(problem, work, None);
         } else if from == Origin::Best {
             self.subproblem_here(problem, point, work);
@@ -955,7 +963,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         work: &mut HybridWork<P, D>,
         from: Origin,
     ) -> usize {
-        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        let costs = work.costs(problem);
         work.controller.long_sweeps(from, costs.worth / costs.sweep)
     }
 

@@ -98,7 +98,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         if work.rest == RestSearch::Done {
             return self.begin_trial(problem, point, work, error);
         }
-        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        let costs = work.costs(problem);
         let opening = self.opening(point, work);
         let quiet = opening < OPENING;
         let at_once = quiet || opening < FALLING_AT_ONCE * error && !has_spread(problem, work);
@@ -197,7 +197,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         work: &mut HybridWork<P, D>,
         error: f64,
     ) {
-        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        let costs = work.costs(problem);
         if work.done.sweeps < FIRST_SWEEPS || self.sweeps_are_cheap(work, costs) {
             problem.enter(&mut work.state, point);
             work.rate.begin();
@@ -276,7 +276,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         least: f64,
         rescues: usize,
     ) -> Step {
-        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        let costs = work.costs(problem);
         let most = RESCUE_COST * costs.factorisation / costs.sweep;
         problem.enter(&mut work.state, point);
         let HybridWork { newton, state, controller, inner_best, done, sweep, stage, scale, .. } =
@@ -309,7 +309,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         if work.done.sweeps < SWEPT_LONG {
             return self.subproblem_here(problem, point, work);
         }
-        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        let costs = work.costs(problem);
         let most = SWEEP_AGAIN * costs.worth / costs.sweep;
         problem.enter(&mut work.state, point);
         work.begin_between(point, work.done.sweeps.min(most as usize).max(1));
@@ -509,7 +509,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         work: &mut HybridWork<P, D>,
         factorisations: f64,
     ) -> bool {
-        let costs = *work.costs.get_or_insert_with(|| problem.costs(&mut work.state));
+        let costs = work.costs(problem);
         let limit = factorisations * costs.factorisation;
         work.rate.promises(work.tolerance, costs.solve, limit)
     }

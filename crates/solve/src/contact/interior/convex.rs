@@ -75,8 +75,6 @@ pub struct RelaxedWork<P: Linearised<D> + Frictional<D>, const D: usize> {
     rate: Rate,
     stage: Stage,
     ip: ConvexIp<D>,
-    /// s = 0.
-    s: Vec<f64>,
     error: f64,
     since_best: usize,
 }
@@ -98,7 +96,7 @@ impl<P: Linearised<D> + Frictional<D>, const D: usize> RelaxedWork<P, D> {
 
     fn begin_interior(&mut self, problem: &P) {
         self.stage = Stage::Interior;
-        self.error = self.ip.begin(problem, &mut self.state, &self.s, None).error;
+        self.error = self.ip.begin_relaxed(problem, &mut self.state, None).error;
         self.since_best = 0;
     }
 }
@@ -110,21 +108,18 @@ impl<P: Linearised<D> + Frictional<D>, const D: usize> Solver<P>
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
         let state = problem.state(Access::Newton)?;
-        let s = vec![0.0; problem.mu().len()];
         Ok(RelaxedWork {
             state,
             rest: Alternating::default(),
             rate: Rate::default(),
             stage: Stage::Rest,
             ip: ConvexIp::new(),
-            s,
             error: f64::INFINITY,
             since_best: 0,
         })
     }
 
     fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
-        work.s.resize(problem.mu().len(), 0.0);
         problem.refill(&mut work.state)
     }
 

@@ -178,11 +178,9 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         s: &[f64],
         start: Option<(&[f64], f64)>,
     ) -> Iterate {
-        self.law = Some(Law::Given);
-        self.smoothing = 0.0;
         self.s.clear();
         self.s.extend_from_slice(s);
-        self.enter(problem, state, start)
+        self.enter_given(problem, state, start)
     }
 
     /// Begins with the convex relaxation, s = 0; `start` as above.
@@ -192,10 +190,19 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         state: &mut P::State,
         start: Option<(&[f64], f64)>,
     ) -> Iterate {
-        self.law = Some(Law::Given);
-        self.smoothing = 0.0;
         self.s.clear();
         self.s.resize(L::DISKS * problem.contacts(), 0.0);
+        self.enter_given(problem, state, start)
+    }
+
+    /// Begins with the convex problem for the s that is set.
+    fn enter_given<P: Linearised<D> + Disked<D, Law = L>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        start: Option<(&[f64], f64)>,
+    ) -> Iterate {
+        (self.law, self.smoothing) = (Some(Law::Given), 0.0);
         self.enter(problem, state, start)
     }
 
